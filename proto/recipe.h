@@ -1,0 +1,75 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "proto/oblique.pb.h"
+#include "worker/solver/case_result.h"
+#include "worker/solver/parameters.h"
+
+namespace oblique::protocol {
+
+/// One point of a study.
+struct Point {
+  std::uint64_t model;  ///< number of its model in the recipe
+  double H_m;
+  double mu;
+  double e_star;
+};
+
+/// Points of a study that follow each other and share a model.
+struct Segment {
+  std::uint64_t model;
+  std::uint64_t first_point;
+  std::uint64_t count;
+};
+
+/// A recipe checked and made fit for computing with: point i and model j as pure functions, in time
+/// and memory that do not grow with the number of points.
+class PointTable {
+ public:
+  /// Most points a study may have.
+  static constexpr std::uint64_t kMaxPoints = 1'000'000'000'000;
+
+  /// Throws solver::InputError naming key, value and what is allowed: unknown or repeated keys, a
+  /// missing H, mu or e, axes out of order, empty axes, reversed or non-finite ranges, values out
+  /// of their domain, too many points.
+  explicit PointTable(Recipe recipe);
+
+  const Recipe& recipe() const { return recipe_; }
+  std::uint64_t size() const;
+  std::uint64_t models() const;
+
+  /// Throws std::out_of_range for a point or model that the study does not have.
+  Point point(std::uint64_t index) const;
+  solver::ModelParameters model(std::uint64_t index) const;
+  /// The whole run of points around `index` that shares its model and block.
+  Segment segment_at(std::uint64_t index) const;
+
+ private:
+  struct BlockLayout {
+    std::uint64_t first_point;
+    std::uint64_t points;
+    std::uint64_t first_model;
+    std::uint64_t models;
+  };
+  const BlockLayout& layout_at(std::uint64_t point, std::size_t& block) const;
+
+  Recipe recipe_;
+  solver::ModelParameters base_model_;
+  std::vector<BlockLayout> blocks_;
+};
+
+/// Value i of an axis. A range has its two ends exactly.
+double axis_value(const Axis& axis, std::uint64_t i);
+std::uint64_t axis_size(const Axis& axis);
+
+ModelParameters to_message(const solver::ModelParameters& model);
+/// Throws solver::InputError when the message is outside the model's domain.
+solver::ModelParameters from_message(const ModelParameters& message);
+
+PointResult to_message(std::uint64_t point, const solver::CaseResult& result);
+/// A failed point. An empty reason becomes "unknown".
+PointResult failed_point(std::uint64_t point, const std::string& reason);
+
+}  // namespace oblique::protocol

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+#include "worker/solver/case_result.h"
+#include "worker/solver/parameters.h"
+
+namespace oblique::solver {
+
+/// A point that has no answer: the tip never drops H, the contact does not end, a step diverged.
+class SolveError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Version of the solver; results of one study come from one version.
+std::string solver_version();
+
+/// Instruction set the solver runs with on this machine, as "avx2".
+std::string instruction_set();
+
+/// Solves points of one model. The fall is solved once, when first needed, and shared by all
+/// points. Const members may be called from several threads at once. A point's result has the same
+/// bits whatever was solved before or beside it.
+class Finger {
+ public:
+  using TraceSink = std::function<void(const TraceRow&)>;
+
+  /// Throws InputError when `model` is outside its domain.
+  explicit Finger(ModelParameters model);
+  ~Finger();
+  Finger(Finger&&) noexcept;
+  Finger& operator=(Finger&&) noexcept;
+
+  const ModelParameters& model() const;
+
+  /// Largest drop of the tip before it first turns back [m].
+  double largest_drop_m() const;
+
+  /// Solves one point. Throws InputError for a value outside its range, SolveError when there is
+  /// no answer. `trace`, when set, is called at every accepted step, from touch to separation.
+  CaseResult solve(double H_m, double mu, double e_star, const TraceSink& trace = {}) const;
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace oblique::solver
