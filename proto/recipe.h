@@ -1,6 +1,9 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "proto/oblique.pb.h"
@@ -31,14 +34,15 @@ class PointTable {
   /// Most points a study may have.
   static constexpr std::uint64_t kMaxPoints = 1'000'000'000'000;
 
+  /// Blocks without model axes share one model number. An absent model is the preset `paper`.
   /// Throws solver::InputError naming key, value and what is allowed: unknown or repeated keys, a
   /// missing H, mu or e, axes out of order, empty axes, reversed or non-finite ranges, values out
   /// of their domain, too many points.
   explicit PointTable(Recipe recipe);
 
   const Recipe& recipe() const { return recipe_; }
-  std::uint64_t size() const;
-  std::uint64_t models() const;
+  std::uint64_t size() const;    ///< number of points
+  std::uint64_t models() const;  ///< number of models
 
   /// Throws std::out_of_range for a point or model that the study does not have.
   Point point(std::uint64_t index) const;
@@ -55,19 +59,31 @@ class PointTable {
   };
   const BlockLayout& layout_at(std::uint64_t point, std::size_t& block) const;
 
+  void add_block(const Block& block);
+
   Recipe recipe_;
   solver::ModelParameters base_model_;
   std::vector<BlockLayout> blocks_;
+  std::vector<std::size_t> model_blocks_;  ///< blocks that bring models of their own, in order
+  std::optional<std::uint64_t> base_model_number_;  ///< shared by all blocks without model axes
+  std::uint64_t points_ = 0;
+  std::uint64_t models_ = 0;
 };
 
-/// Value i of an axis. A range has its two ends exactly.
+/// Value i of an axis. A range has its two ends exactly; the values between are equally spaced, and
+/// the same bits on every machine. Throws std::out_of_range for a value that the axis does not
+/// have.
 double axis_value(const Axis& axis, std::uint64_t i);
+
+/// Number of values of an axis.
 std::uint64_t axis_size(const Axis& axis);
 
+/// Every parameter of a model.
 ModelParameters to_message(const solver::ModelParameters& model);
 /// Throws solver::InputError when the message is outside the model's domain.
 solver::ModelParameters from_message(const ModelParameters& message);
 
+/// What solving a point gave, but for H, mu and e, which follow from the point's number.
 PointResult to_message(std::uint64_t point, const solver::CaseResult& result);
 /// A failed point. An empty reason becomes "unknown".
 PointResult failed_point(std::uint64_t point, const std::string& reason);
