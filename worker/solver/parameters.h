@@ -1,19 +1,13 @@
 #pragma once
 
 #include <span>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
 
-namespace oblique::solver {
+#include "worker/solver/errors.h"
 
-/// A value from the user that the solver cannot take. The message names key, value and what is
-/// allowed.
-class InputError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
+namespace oblique::solver {
 
 /// How the equations of motion are stepped (see README.md of this folder).
 enum class Integrator {

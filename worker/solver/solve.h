@@ -2,19 +2,13 @@
 
 #include <functional>
 #include <memory>
-#include <stdexcept>
 #include <string>
 
 #include "worker/solver/case_result.h"
+#include "worker/solver/errors.h"
 #include "worker/solver/parameters.h"
 
 namespace oblique::solver {
-
-/// A point that has no answer: the tip never drops H, the contact does not end, a step diverged.
-class SolveError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
 
 /// Version of the solver; results of one study come from one version.
 std::string solver_version();

@@ -1,0 +1,162 @@
+#include "worker/solver/chain.h"
+
+#include <cmath>
+
+namespace oblique::solver {
+namespace {
+
+/// Rows of a chain: the pin's position and slope, two a node, one more at each joint.
+std::size_t count_rows(const ModelParameters& model) {
+  validate(model);
+  const std::size_t links = model.lengths_m.size();
+  const auto n = static_cast<std::size_t>(model.elements_per_link);
+  return 2 + 2 * n * links + (links - 1);
+}
+
+BandedMatrix with_unit_pin(std::size_t rows, double unit) {
+  BandedMatrix matrix(rows);
+  matrix.at(0, 0) = unit;
+  return matrix;
+}
+
+void add_element(BandedMatrix& matrix, const std::array<std::size_t, 4>& row,
+                 const std::array<std::array<double, 4>, 4>& entries, double factor) {
+  for (std::size_t a = 0; a < 4; ++a) {
+    for (std::size_t b = 0; b < 4; ++b) {
+      if (row[a] != 0 && row[b] != 0) {
+        matrix.add(row[a], row[b], factor * entries[a][b]);
+      }
+    }
+  }
+}
+
+/// Largest lambda with det(K - lambda M) = 0: lambda M - K is positive definite exactly above it.
+double largest_eigenvalue(const BandedMatrix& stiffness, const BandedMatrix& mass) {
+  const auto is_above = [&](double lambda) {
+    BandedMatrix shifted(mass.rows());
+    shifted.at(0, 0) = 1.0;
+    for (std::size_t i = 1; i < mass.rows(); ++i) {
+      for (std::size_t d = 0; d <= kHalfBandwidth; ++d) {
+        shifted.at(i, d) = lambda * mass.at(i, d) - stiffness.at(i, d);
+      }
+    }
+    return BandedCholesky(shifted).positive_definite();
+  };
+  double high = 1.0;
+  while (!is_above(high)) {
+    high *= 4.0;
+  }
+  double low = 0.25 * high;
+  while (high - low > 1e-10 * high) {
+    const double middle = 0.5 * (low + high);
+    (is_above(middle) ? high : low) = middle;
+  }
+  return high;
+}
+
+}  // namespace
+
+Chain::Chain(const ModelParameters& model)
+    : rows_(count_rows(model)),
+      gravity_m_s2_(model.g_m_s2),
+      gravity_(2 * rows_, 0.0),
+      mass_(with_unit_pin(rows_, 1.0)),
+      mass_factor_(BandedMatrix(0)),
+      axial_(with_unit_pin(rows_, 0.0)),
+      bending_(with_unit_pin(rows_, 0.0)) {
+  number_rows(model);
+  const double mass_per_length = model.rho_kg_m3 * model.A_m2;
+  for (const Element& element : elements_) {
+    const double length = 1.0 / element.inverse_length;
+    add_element(mass_, element.row, mass_matrix(mass_per_length, length), 1.0);
+    add_element(axial_, element.row, gradient_matrix(length), model.E_Pa * model.A_m2);
+    add_element(bending_, element.row, bending_matrix(length), model.E_Pa * model.I_m4);
+    const auto load = uniform_load(length);
+    for (std::size_t a = 0; a < 4; ++a) {
+      gravity_[2 * element.row[a] + 1] -= mass_per_length * model.g_m_s2 * load[a];
+    }
+  }
+  mass_.at(tip_row(), 0) += model.tip_mass_kg;
+  gravity_[2 * tip_row() + 1] -= model.tip_mass_kg * model.g_m_s2;
+  mass_factor_ = BandedCholesky(mass_);
+  if (!mass_factor_.positive_definite()) {
+    throw InputError("the mass matrix of this model is not positive definite: rho, A and the lengths "
+                     "are too far apart in magnitude");
+  }
+}
+
+void Chain::number_rows(const ModelParameters& model) {
+  const int n = model.elements_per_link;
+  std::size_t left = 0;  // row of the left node's position; its slope follows
+  for (std::size_t link = 0; link < model.lengths_m.size(); ++link) {
+    const double length = model.lengths_m[link] / n;
+    for (int e = 0; e < n; ++e) {
+      const bool ends_at_joint = e + 1 == n && link + 1 < model.lengths_m.size();
+      Element element{};
+      element.row = {left, left + 1, left + 2, left + 3};
+      if (ends_at_joint) {
+        std::swap(element.row[2], element.row[3]);  // slope of the inner link, then the position
+      }
+      element.inverse_length = 1.0 / length;
+      element.half_EA_length = 0.5 * model.E_Pa * model.A_m2 * length;
+      element.bending = 2.0 * model.E_Pa * model.I_m4 / length;
+      elements_.push_back(element);
+      left = element.row[2];
+    }
+  }
+}
+
+ChainState Chain::at_rest() const {
+  ChainState state;
+  state.q.assign(2 * rows_, 0.0);
+  state.v.assign(2 * rows_, 0.0);
+  double x = 0.0;
+  for (const Element& element : elements_) {
+    x += 1.0 / element.inverse_length;
+    state.q[2 * element.row[1]] = 1.0;
+    state.q[2 * element.row[2]] = x;
+    state.q[2 * element.row[3]] = 1.0;
+  }
+  return state;
+}
+
+double Chain::kinetic_energy_J(const Coordinates& v) const {
+  return 0.5 * (mass_.bilinear(v.data(), v.data(), 2) + mass_.bilinear(v.data() + 1, v.data() + 1, 2));
+}
+
+double Chain::strain_energy_J(const Coordinates& q) const {
+  const auto at = [&q](std::size_t row) {
+    return PlanarVector<double>{q[2 * row], q[2 * row + 1]};
+  };
+  double energy = 0.0;
+  for (const Element& element : elements_) {
+    const auto [pi, si, pj, sj] = element.row;
+    energy += strain_energy(
+        gradient_coefficients(at(pi), at(si), at(pj), at(sj), element.inverse_length),
+        element.half_EA_length, element.bending);
+  }
+  return energy;
+}
+
+double Chain::gravity_energy_J(const Coordinates& q) const {
+  double energy = 0.0;
+  for (std::size_t i = 0; i < q.size(); ++i) {
+    energy -= gravity_[i] * q[i];
+  }
+  return energy;
+}
+
+TipState Chain::tip(const ChainState& state) const {
+  const std::size_t i = 2 * tip_row();
+  return {state.q[i], state.q[i + 1], state.v[i], state.v[i + 1]};
+}
+
+double Chain::highest_frequency_rad_s(double tip_stiffness_N_m) const {
+  BandedMatrix axial = axial_;
+  BandedMatrix bending = bending_;
+  axial.at(tip_row(), 0) += tip_stiffness_N_m;
+  bending.at(tip_row(), 0) += tip_stiffness_N_m;
+  return std::sqrt(std::max(largest_eigenvalue(axial, mass_), largest_eigenvalue(bending, mass_)));
+}
+
+}  // namespace oblique::solver

@@ -1,0 +1,137 @@
+#include "worker/solver/fall.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "worker/solver/errors.h"
+#include "worker/solver/pefrl.h"
+
+namespace oblique::solver {
+namespace {
+
+/// Most states kept. A state costs 32 bytes a row; when there are more, every other one goes.
+constexpr std::size_t kMostKept = 4096;
+/// A fall that lasts this many times sqrt(2 length / g) is not one.
+constexpr double kLongestFall = 100.0;
+
+void step_in_place(const Chain& chain, double h_s, ChainState& state, Coordinates& scratch) {
+  pefrl_step(chain, AffineContactForce<double>{}, h_s, state.q.data(), state.v.data(),
+             scratch.data());
+  state.t_s += h_s;
+}
+
+}  // namespace
+
+Fall::Fall(const Chain& chain, double dt_s) : chain_(chain), dt_s_(dt_s) {
+  ChainState state = chain.at_rest();
+  Coordinates scratch(state.q.size());
+  const double length_m = chain.tip(state).x_m;
+  const double longest_s = kLongestFall * std::sqrt(2.0 * length_m / chain.gravity_m_s2());
+  kept_.push_back(state);
+  ChainState before = state;
+  for (std::int64_t step = 1;; ++step) {
+    before = state;
+    step_in_place(chain, dt_s, state, scratch);
+    // The kept times are products, not sums: a long fall would otherwise gather rounding.
+    state.t_s = static_cast<double>(step) * dt_s;
+    const TipState tip = chain.tip(state);
+    if (!std::isfinite(tip.y_m) || std::abs(tip.y_m) > 2.0 * length_m) {
+      std::ostringstream message;
+      message << "the fall diverged at t = " << state.t_s << " s with dt_fall = " << dt_s << " s";
+      throw SolveError(message.str());
+    }
+    if (tip.vy_m_s >= 0.0) {
+      break;
+    }
+    if (state.t_s > longest_s) {
+      std::ostringstream message;
+      message << "the tip did not turn back within " << longest_s << " s of falling";
+      throw SolveError(message.str());
+    }
+    keep(step, state);
+  }
+  // The turn itself: bisection on V_y over the last step.
+  double low = 0.0;
+  double high = dt_s;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (low + high);
+    (chain.tip(stepped(before, middle)).vy_m_s < 0.0 ? low : high) = middle;
+  }
+  largest_drop_m_ = -chain.tip(stepped(before, low)).y_m;
+}
+
+void Fall::keep(std::int64_t step, const ChainState& state) {
+  if (step % steps_kept_ != 0) {
+    return;
+  }
+  kept_.push_back(state);
+  if (kept_.size() < kMostKept) {
+    return;
+  }
+  for (std::size_t i = 1; 2 * i < kept_.size(); ++i) {
+    kept_[i] = std::move(kept_[2 * i]);
+  }
+  kept_.resize((kept_.size() + 1) / 2);
+  steps_kept_ *= 2;
+}
+
+ChainState Fall::stepped(const ChainState& from, double h_s) const {
+  ChainState state = from;
+  Coordinates scratch(state.q.size());
+  step_in_place(chain_, h_s, state, scratch);
+  return state;
+}
+
+ChainState Fall::state_at(double H_m) const {
+  if (!(H_m > 0.0 && H_m <= largest_drop_m_)) {
+    std::ostringstream message;
+    message.precision(7);
+    message << "H = " << H_m << " m is not allowed: the tip of this model drops at most "
+            << largest_drop_m_ << " m before it turns back";
+    throw InputError(message.str());
+  }
+  const auto drop = [this](const ChainState& state) { return -chain_.tip(state).y_m; };
+  auto after = std::upper_bound(kept_.begin(), kept_.end(), H_m,
+                                [&](double H, const ChainState& state) { return H < drop(state); });
+  ChainState before = *(after - 1);
+  ChainState state = before;
+  const auto first_step = static_cast<std::int64_t>(after - kept_.begin() - 1) * steps_kept_;
+  for (std::int64_t step = 1; step <= steps_kept_; ++step) {
+    before = state;
+    state = stepped(before, dt_s_);
+    state.t_s = static_cast<double>(first_step + step) * dt_s_;
+    if (drop(state) >= H_m || chain_.tip(state).vy_m_s >= 0.0) {
+      break;
+    }
+  }
+  return locate(H_m, before);
+}
+
+ChainState Fall::locate(double H_m, const ChainState& before) const {
+  // Newton on the drop, kept inside the step; near the largest drop, where the speed vanishes, it
+  // falls back on bisection.
+  double low = 0.0;
+  double high = dt_s_;
+  double h = 0.5 * dt_s_;
+  ChainState state = before;
+  for (int i = 0; i < 80 && high - low > 0.0; ++i) {
+    state = stepped(before, h);
+    const TipState tip = chain_.tip(state);
+    const double missing_m = H_m + tip.y_m;
+    if (missing_m == 0.0) {
+      break;
+    }
+    const bool is_before = missing_m > 0.0 && tip.vy_m_s < 0.0;
+    (is_before ? low : high) = h;
+    const double newton = h - missing_m / tip.vy_m_s;
+    const double next = newton > low && newton < high ? newton : 0.5 * (low + high);
+    if (next == h || std::abs(next - h) < 1e-18) {
+      break;
+    }
+    h = next;
+  }
+  return state;
+}
+
+}  // namespace oblique::solver

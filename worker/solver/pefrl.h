@@ -1,0 +1,80 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "worker/solver/chain.h"
+
+/// PEFRL, the position-extended Forest-Ruth-like splitting of Omelyan, Mryglod and Folk (Comput.
+/// Phys. Commun. 146, 2002, 188): explicit, symplectic, time-reversible, order 4, four force
+/// evaluations a step. Drifts q += c_i h v and kicks v += d_i h a(q) alternate.
+namespace oblique::solver {
+
+struct Pefrl {
+  static constexpr double xi = 0.1786178958448091;
+  static constexpr double lambda = -0.2123418310626054;
+  static constexpr double chi = -0.06626458266981849;
+  static constexpr std::array<double, 5> drift{xi, chi, 1.0 - 2.0 * (chi + xi), chi, xi};
+  static constexpr std::array<double, 4> kick{0.5 - lambda, lambda, lambda, 0.5 - lambda};
+
+  /// Largest stable omega h on a harmonic oscillator, found from the trace of the step's map.
+  static double stability_limit();
+};
+
+/// Contact forces as affine functions of the tip's position, as they are between two events:
+///   F_n = fn0 - k_nn (y - y0),   F_t = ft0 - k_tn (y - y0) - k_tt (x - x0).
+/// All zero in the fall. `Real` is a number or a vector of lanes.
+template <class Real>
+struct AffineContactForce {
+  Real fn0{};
+  Real ft0{};
+  Real k_nn{};
+  Real k_tn{};
+  Real k_tt{};
+  Real x0{};
+  Real y0{};
+};
+
+/// Time integrals over one step, carried through the same splitting, hence of its order.
+template <class Real>
+struct ContactIntegrals {
+  Real impulse_n{};  ///< int F_n dt [Ns]
+  Real impulse_t{};  ///< int F_t dt [Ns]
+  Real work_t{};     ///< int F_t V_t dt [J]
+};
+
+/// Advances q and v (2 chain.rows() entries each) by one step of h seconds. `acceleration` is
+/// scratch of the same size.
+template <class Real>
+ContactIntegrals<Real> pefrl_step(const Chain& chain, const AffineContactForce<Real>& force,
+                                  const Real& h_s, Real* q, Real* v, Real* acceleration) {
+  const std::size_t size = 2 * chain.rows();
+  const std::size_t tip = 2 * chain.tip_row();
+  ContactIntegrals<Real> integrals;
+  for (std::size_t stage = 0; stage < Pefrl::kick.size(); ++stage) {
+    const Real drift_s = Pefrl::drift[stage] * h_s;
+    for (std::size_t i = 2; i < size; ++i) {
+      q[i] += drift_s * v[i];
+    }
+    const Real dx = q[tip] - force.x0;
+    const Real dy = q[tip + 1] - force.y0;
+    const Real fn = force.fn0 - force.k_nn * dy;
+    const Real ft = force.ft0 - force.k_tn * dy - force.k_tt * dx;
+    chain.accelerations(q, ft, fn, acceleration);
+    const Real kick_s = Pefrl::kick[stage] * h_s;
+    const Real vt_before = v[tip];
+    for (std::size_t i = 2; i < size; ++i) {
+      v[i] += kick_s * acceleration[i];
+    }
+    integrals.impulse_n += kick_s * fn;
+    integrals.impulse_t += kick_s * ft;
+    integrals.work_t += kick_s * ft * (0.5 * (vt_before + v[tip]));
+  }
+  const Real drift_s = Pefrl::drift.back() * h_s;
+  for (std::size_t i = 2; i < size; ++i) {
+    q[i] += drift_s * v[i];
+  }
+  return integrals;
+}
+
+}  // namespace oblique::solver

@@ -1,0 +1,44 @@
+#include "worker/solver/step_choice.h"
+
+#include <algorithm>
+#include <sstream>
+
+#include "worker/solver/errors.h"
+#include "worker/solver/pefrl.h"
+
+namespace oblique::solver {
+namespace {
+
+double checked(const char* key, double asked_s, double limit_s, double fraction) {
+  if (asked_s == 0.0) {
+    return fraction * limit_s;
+  }
+  if (asked_s > limit_s) {
+    std::ostringstream message;
+    message << key << " = " << asked_s << " s is not allowed: the explicit integrator is stable up to "
+            << limit_s << " s here (0 chooses a step)";
+    throw InputError(message.str());
+  }
+  return asked_s;
+}
+
+}  // namespace
+
+StepChoice::StepChoice(const Chain& chain, const ModelParameters& model)
+    : chain_(chain),
+      k_N_m_(model.k_N_m),
+      stiffest_ratio_(std::max(1.0, 1.0 / model.eta2)),
+      asked_contact_s_(model.dt_s),
+      fall_limit_s_(Pefrl::stability_limit() / chain.highest_frequency_rad_s(0.0)),
+      fall_s_(checked("dt_fall", model.dt_fall_s, fall_limit_s_, kFallFraction)) {}
+
+double StepChoice::contact_limit_s(double e_star) const {
+  const double stiffest_N_m = k_N_m_ * std::max(stiffest_ratio_, 1.0 / (e_star * e_star));
+  return Pefrl::stability_limit() / chain_.highest_frequency_rad_s(stiffest_N_m);
+}
+
+double StepChoice::contact_s(double e_star) const {
+  return checked("dt", asked_contact_s_, contact_limit_s(e_star), kContactFraction);
+}
+
+}  // namespace oblique::solver

@@ -1,0 +1,36 @@
+#pragma once
+
+#include "worker/solver/chain.h"
+
+namespace oblique::solver {
+
+/// Step lengths of the explicit integrator: what the user asked for, checked against the stability
+/// limit, or fractions of that limit. The limit is PEFRL's omega h over the highest frequency of
+/// the chain, in contact with its tip on the stiffest contact spring.
+class StepChoice {
+ public:
+  /// Fractions of the stability limit taken when no step is asked for. Chosen by work and precision
+  /// (README.md): at these, the errors of steps are far below those of the formatted outputs.
+  static constexpr double kFallFraction = 0.9;
+  static constexpr double kContactFraction = 0.4;
+
+  /// Throws InputError when model.dt_fall_s is above its limit.
+  StepChoice(const Chain& chain, const ModelParameters& model);
+
+  double fall_s() const { return fall_s_; }
+  double fall_limit_s() const { return fall_limit_s_; }
+  /// Step in a contact with restitution e_star. Throws InputError when model.dt_s is above its
+  /// limit.
+  double contact_s(double e_star) const;
+  double contact_limit_s(double e_star) const;
+
+ private:
+  const Chain& chain_;
+  double k_N_m_;
+  double stiffest_ratio_;  ///< of the contact springs in compression to k
+  double asked_contact_s_;
+  double fall_limit_s_;
+  double fall_s_;
+};
+
+}  // namespace oblique::solver
