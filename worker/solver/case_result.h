@@ -48,7 +48,7 @@ struct ContactEnergy {
 
 struct SolverReport {
   std::string integrator;
-  double dt_s;          ///< step in contact
+  double dt_s;          ///< step in contact (in compression; restitution at low e* steps shorter)
   std::int64_t steps;   ///< accepted steps in contact
   double wall_s;        ///< wall time of the contact; not reproducible
   std::string version;  ///< solver version

@@ -79,8 +79,7 @@ class Chain {
   Coordinates gravity_;     ///< generalised force [N] and [N m]
   BandedMatrix mass_;       ///< of the free rows; row 0 is a unit row
   BandedCholesky mass_factor_;
-  BandedMatrix axial_;      ///< axial stiffness of the straight chain
-  BandedMatrix bending_;    ///< bending stiffness
+  BandedMatrix along_;  ///< stiffness of the straight chain along itself: axial and bending
 };
 
 template <class Real>

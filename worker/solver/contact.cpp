@@ -17,12 +17,13 @@ double sign_of(double value) { return value < 0.0 ? -1.0 : 1.0; }
 
 }  // namespace
 
-Contact::Contact(const ContactParameters& parameters, const TipState& touch, double dt_s)
+Contact::Contact(const ContactParameters& parameters, const TipState& touch,
+                 const ContactSteps& steps)
     : law_(parameters, touch),
-      dt_s_(dt_s),
+      steps_s_(steps),
       tip_(touch),
       vt_sign_(sign_of(touch.vx_m_s)),
-      trial_s_(dt_s),
+      trial_s_(steps.compression_s),
       // Both forces are zero at touch, so both sides of the cone are.
       fresh_(bit(ContactEvent::kSlipForward) | bit(ContactEvent::kSlipBackward)),
       record_(law_, touch) {}
@@ -51,7 +52,7 @@ std::optional<Contact::Candidate> Contact::earliest_event(const TipState& end, d
 bool Contact::judge(const TipState& end, const ContactIntegrals<double>& integrals) {
   if (!std::isfinite(end.x_m + end.y_m + end.vx_m_s + end.vy_m_s)) {
     std::ostringstream message;
-    message << "the contact diverged after " << t_s_ << " s with dt = " << dt_s_ << " s";
+    message << "the contact diverged after " << t_s_ << " s with dt = " << full_step_s() << " s";
     throw SolveError(message.str());
   }
   switch (search_.seeking) {
@@ -139,6 +140,10 @@ bool Contact::judge_crossing(const TipState& end, const ContactIntegrals<double>
   return false;
 }
 
+double Contact::full_step_s() const {
+  return law_.is_compression() ? steps_s_.compression_s : steps_s_.restitution_s;
+}
+
 void Contact::accept(const TipState& end, const ContactIntegrals<double>& integrals) {
   record_.add_step(law_, tip_, end, integrals);
   tip_ = end;
@@ -149,7 +154,7 @@ void Contact::accept(const TipState& end, const ContactIntegrals<double>& integr
   }
   refuted_ = 0;
   search_.seeking = Seeking::kNothing;
-  trial_s_ = dt_s_;
+  trial_s_ = full_step_s();
   if (t_s_ > kLongest_s) {
     std::ostringstream message;
     message << "the contact did not end within " << kLongest_s << " s";
@@ -201,6 +206,7 @@ void Contact::happen(ContactEvent event) {
       fresh_ |= bit(ContactEvent::kTangentialExtremum);
       return;
   }
+  trial_s_ = full_step_s();
   record_.add_state(law_, tip_, t_s_);
 }
 

@@ -27,7 +27,7 @@ class Contact {
   /// Most events of one contact; more means that states follow each other without time passing.
   static constexpr int kMostEvents = 10'000;
 
-  Contact(const ContactParameters& parameters, const TipState& touch, double dt_s);
+  Contact(const ContactParameters& parameters, const TipState& touch, const ContactSteps& steps);
 
   bool finished() const { return finished_; }
   double trial_step_s() const { return trial_s_; }
@@ -67,12 +67,13 @@ class Contact {
   bool judge_peak(const TipState& end);
   bool judge_crossing(const TipState& end, const ContactIntegrals<double>& integrals);
   void start_search(const Candidate& candidate, double h_s);
+  double full_step_s() const;
   void accept(const TipState& end, const ContactIntegrals<double>& integrals);
   void happen(ContactEvent event);
   double phi(ContactEvent event, const TipState& tip) const;
 
   ContactLaw law_;
-  double dt_s_;
+  ContactSteps steps_s_;
   double t_s_ = 0.0;
   TipState tip_;
   double vt_sign_;

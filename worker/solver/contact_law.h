@@ -17,6 +17,12 @@ struct ContactParameters {
   double e_star;  ///< Stronge's energetic restitution; stiffness in restitution is k / e*^2
 };
 
+/// Step lengths of one contact. The stiffer spring of restitution asks for shorter steps.
+struct ContactSteps {
+  double compression_s;
+  double restitution_s;
+};
+
 /// Regime of the contact and the anchors of its piecewise linear laws. Between two events:
 ///   F_n = fn_anchor - k_n (y - y_anchor),  k_n = k or k / e*^2       (paper, eqs. 17 and 22)
 ///   stick: F_t = ft_anchor - (k/eta2) (x - x_anchor)                 (paper, eq. 19)

@@ -98,7 +98,7 @@ double Finger::largest_drop_m() const { return parts_->solved_fall().largest_dro
 CaseResult Finger::solve(double H_m, double mu, double e_star, const TraceSink& trace) const {
   validate_point(parts_->model, H_m, mu, e_star);
   const Chain& chain = parts_->chain;
-  const double dt_s = parts_->steps.contact_s(e_star);
+  const ContactSteps steps = parts_->steps.contact(e_star);
   ChainState accepted = parts_->solved_fall().state_at(H_m);
   const auto started = std::chrono::steady_clock::now();
   const TipState touch = chain.tip(accepted);
@@ -113,7 +113,7 @@ CaseResult Finger::solve(double H_m, double mu, double e_star, const TraceSink& 
   result.vt_in_m_s = touch.vx_m_s;
   result.vn_in_m_s = touch.vy_m_s;
 
-  Contact contact({parts_->model.k_N_m, parts_->model.eta2, mu, e_star}, touch, dt_s);
+  Contact contact({parts_->model.k_N_m, parts_->model.eta2, mu, e_star}, touch, steps);
   ChainState trial = accepted;
   Coordinates scratch(accepted.q.size());
   if (trace) {
@@ -138,7 +138,7 @@ CaseResult Finger::solve(double H_m, double mu, double e_star, const TraceSink& 
   contact.record().write_to(result);
   balance(energies_in, energies(chain, accepted), contact.record(), result);
   result.solver.integrator = integrator_name(parts_->model.integrator);
-  result.solver.dt_s = dt_s;
+  result.solver.dt_s = steps.compression_s;
   result.solver.steps = contact.steps();
   result.solver.version = solver_version();
   result.solver.wall_s =

@@ -37,8 +37,13 @@ double StepChoice::contact_limit_s(double e_star) const {
   return Pefrl::stability_limit() / chain_.highest_frequency_rad_s(stiffest_N_m);
 }
 
-double StepChoice::contact_s(double e_star) const {
-  return checked("dt", asked_contact_s_, contact_limit_s(e_star), kContactFraction);
+ContactSteps StepChoice::contact(double e_star) const {
+  const double limit_s = contact_limit_s(e_star);
+  const double step_s = checked("dt", asked_contact_s_, limit_s, kContactFraction);
+  if (asked_contact_s_ != 0.0) {
+    return {step_s, step_s};
+  }
+  return {step_s, step_s * std::min(1.0, e_star / kFastRestitution)};
 }
 
 }  // namespace oblique::solver

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "worker/solver/chain.h"
+#include "worker/solver/contact_law.h"
 
 namespace oblique::solver {
 
@@ -10,18 +11,21 @@ namespace oblique::solver {
 class StepChoice {
  public:
   /// Fractions of the stability limit taken when no step is asked for. Chosen by work and precision
-  /// (README.md): at these, the errors of steps are far below those of the formatted outputs.
-  static constexpr double kFallFraction = 0.9;
-  static constexpr double kContactFraction = 0.4;
+  /// (README.md).
+  static constexpr double kFallFraction = 0.5;
+  static constexpr double kContactFraction = 0.2;
+  /// The restitution spring is e*^-2 times stiffer and its motion e*^-1 times faster. Below this e*
+  /// it is faster than the chain's own response to contact, and steps in restitution shrink with it.
+  static constexpr double kFastRestitution = 0.4;
 
   /// Throws InputError when model.dt_fall_s is above its limit.
   StepChoice(const Chain& chain, const ModelParameters& model);
 
   double fall_s() const { return fall_s_; }
   double fall_limit_s() const { return fall_limit_s_; }
-  /// Step in a contact with restitution e_star. Throws InputError when model.dt_s is above its
+  /// Steps in a contact with restitution e_star. Throws InputError when model.dt_s is above its
   /// limit.
-  double contact_s(double e_star) const;
+  ContactSteps contact(double e_star) const;
   double contact_limit_s(double e_star) const;
 
  private:
