@@ -1,0 +1,78 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "proto/oblique.pb.h"
+#include "proto/recipe.h"
+
+namespace oblique::server {
+
+enum class StudyState { kRunning, kDone, kCancelled };
+
+/// As in the column `studies.state`.
+constexpr const char* state_name(StudyState state) {
+  switch (state) {
+    case StudyState::kRunning:
+      return "running";
+    case StudyState::kDone:
+      return "done";
+    case StudyState::kCancelled:
+      return "cancelled";
+  }
+  return "";
+}
+
+// What can be written to the database. Instants are UTC in ISO 8601.
+
+struct AddStudy {
+  std::uint64_t study_id;
+  std::string name;
+  std::shared_ptr<const protocol::PointTable> table;
+  std::string created_at;
+};
+
+struct SetStudyState {
+  std::uint64_t study_id;
+  StudyState state;
+  std::string changed_at;
+};
+
+struct AddWorker {
+  std::uint64_t worker_id;
+  std::string name;
+  std::uint32_t threads;
+  std::string solver_version;
+  std::string instruction_set;
+  std::string joined_at;
+};
+
+/// Results of one study. A point that has a row already keeps it.
+struct AddResults {
+  std::uint64_t study_id;
+  std::shared_ptr<const protocol::PointTable> table;
+  std::uint64_t worker_id;  ///< 0: the server itself failed the points
+  std::string solver_version;
+  std::string instruction_set;
+  std::uint32_t attempt;
+  std::string solved_at;
+  std::vector<protocol::PointResult> results;
+};
+
+using Change = std::variant<AddStudy, SetStudyState, AddWorker, AddResults>;
+
+/// What the writer needs of a database. Tests put a failing one in its place.
+class Storage {
+ public:
+  virtual ~Storage() = default;
+
+  /// Makes all changes durable, in order, in one transaction. Throws StorageError: then none of
+  /// them was kept.
+  virtual void commit(std::span<const Change> changes) = 0;
+};
+
+}  // namespace oblique::server

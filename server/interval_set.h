@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <vector>
+
+namespace oblique::server {
+
+/// A half-open run of points [begin, end).
+struct Interval {
+  std::uint64_t begin;
+  std::uint64_t end;
+
+  bool operator==(const Interval&) const = default;
+};
+
+/// A set of points kept as disjoint, non-touching intervals: its cost grows with the number of
+/// runs, not of points.
+class IntervalSet {
+ public:
+  IntervalSet() = default;
+  /// The one interval [begin, end); empty when begin == end.
+  IntervalSet(std::uint64_t begin, std::uint64_t end) { insert(begin, end); }
+
+  /// Adds [begin, end), whatever of it is there already. Nothing happens when begin >= end.
+  void insert(std::uint64_t begin, std::uint64_t end);
+  void insert(std::uint64_t point) { insert(point, point + 1); }
+
+  /// Removes [begin, end), whatever of it is there.
+  void erase(std::uint64_t begin, std::uint64_t end);
+  void erase(std::uint64_t point) { erase(point, point + 1); }
+
+  bool contains(std::uint64_t point) const;
+  bool empty() const { return ends_.empty(); }
+
+  /// Number of points.
+  std::uint64_t size() const { return size_; }
+
+  /// Number of intervals.
+  std::size_t runs() const { return ends_.size(); }
+
+  /// The lowest interval. The set must not be empty.
+  Interval front() const { return {ends_.begin()->first, ends_.begin()->second}; }
+
+  /// The parts of the set that lie in [begin, end), in order.
+  std::vector<Interval> within(std::uint64_t begin, std::uint64_t end) const;
+
+  /// Calls `visit` with every interval, in order.
+  template <typename Visitor>
+  void for_each(Visitor visit) const {
+    for (const auto& [begin, end] : ends_) {
+      visit(Interval{begin, end});
+    }
+  }
+
+  bool operator==(const IntervalSet& other) const { return ends_ == other.ends_; }
+
+ private:
+  std::map<std::uint64_t, std::uint64_t> ends_;  // end by begin
+  std::uint64_t size_ = 0;
+};
+
+}  // namespace oblique::server

@@ -1,0 +1,444 @@
+#include "server/scheduler.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+namespace oblique::server {
+namespace {
+
+/// Longest gap between two ticks that counts as silence of the workers. In a longer one it was the
+/// server that did not run, and what the workers said meanwhile still waits to be read.
+constexpr std::int64_t kLongestTick_ms = 1000;
+
+/// Weight of the newest measurement in a worker's pace.
+constexpr double kPaceWeight = 0.5;
+
+}  // namespace
+
+std::vector<Effect> Scheduler::handle(const Event& event, std::int64_t now_ms) {
+  now_ms_ = std::max(now_ms_, now_ms);
+  effects_.clear();
+  std::visit([this](const auto& e) { on(e); }, event);
+  dispatch();
+  return std::exchange(effects_, {});
+}
+
+// ---- Studies ----------------------------------------------------------------------------------
+
+void Scheduler::on(const StudyAdded& event) {
+  if (studies_.contains(event.study)) {
+    return;
+  }
+  const std::uint32_t suspect_after_losses = std::max(settings_.max_losses, 2U) - 1;
+  studies_.emplace(event.study, Study{StudyPoints(event.table, event.settled, suspect_after_losses),
+                                      event.failed, event.cancelled, false});
+  finish_if_complete(event.study);
+}
+
+void Scheduler::on(const StudyCancelled& event) {
+  const auto found = studies_.find(event.study);
+  if (found == studies_.end() || found->second.cancelled || found->second.finished) {
+    return;
+  }
+  found->second.cancelled = true;
+  std::vector<LeaseId> ended;
+  for (const auto& [id, lease] : leases_) {
+    if (lease.study == event.study) {
+      ended.push_back(id);
+    }
+  }
+  for (const LeaseId id : ended) {
+    end_lease(id, LeaseEnd::kReturned);
+  }
+  for (auto& [id, worker] : workers_) {
+    if (worker.defined.erase(event.study) != 0) {
+      effects_.emplace_back(WithdrawStudy{id, event.study});
+    }
+  }
+}
+
+void Scheduler::on(const StudyReopened& event) {
+  const auto found = studies_.find(event.study);
+  if (found != studies_.end()) {
+    found->second.cancelled = false;
+  }
+}
+
+void Scheduler::finish_if_complete(StudyId id) {
+  Study& study = studies_.at(id);
+  if (!study.finished && study.points.is_complete()) {
+    study.finished = true;
+    study.cancelled = false;
+    effects_.emplace_back(StudyFinished{id});
+  }
+}
+
+// ---- Workers ----------------------------------------------------------------------------------
+
+void Scheduler::on(const WorkerJoined& event) {
+  Worker worker{};
+  worker.threads = std::max(event.threads, 1U);
+  worker.last_heard_ms = now_ms_;
+  if (workers_.emplace(event.worker, std::move(worker)).second) {
+    threads_ += std::max(event.threads, 1U);
+  }
+}
+
+Scheduler::Worker* Scheduler::heard_from(WorkerId worker) {
+  const auto found = workers_.find(worker);
+  if (found == workers_.end()) {
+    return nullptr;
+  }
+  found->second.last_heard_ms = now_ms_;
+  return &found->second;
+}
+
+void Scheduler::on(const CreditGiven& event) {
+  if (Worker* worker = heard_from(event.worker)) {
+    const std::uint32_t room = settings_.max_credit - worker->credit;
+    worker->credit += std::min(event.batches, room);
+    queue(event.worker, *worker);
+  }
+}
+
+void Scheduler::queue(WorkerId id, Worker& worker) {
+  if (!worker.queued && worker.credit > 0) {
+    worker.queued = true;
+    ready_workers_.push_back(id);
+  }
+}
+
+void Scheduler::on(const HeartbeatReceived& event) {
+  Worker* worker = heard_from(event.worker);
+  if (worker == nullptr) {
+    return;
+  }
+  // A lease that the worker still does not name when a batch must long have reached it never did.
+  const std::set<LeaseId> held(event.leases.begin(), event.leases.end());
+  std::vector<LeaseId> strayed;
+  for (const LeaseId id : worker->leases) {
+    if (!held.contains(id) && now_ms_ - leases_.at(id).granted_ms > settings_.lost_after_ms) {
+      strayed.push_back(id);
+    }
+  }
+  for (const LeaseId id : strayed) {
+    end_lease(id, LeaseEnd::kReturned);
+  }
+}
+
+void Scheduler::on(const WorkerLeft& event) {
+  remove_worker(event.worker, LeaseEnd::kReturned);
+}
+
+void Scheduler::on(const WorkerUnreachable& event) {
+  if (workers_.contains(event.worker)) {
+    remove_worker(event.worker, LeaseEnd::kLost);
+    effects_.emplace_back(DropWorker{event.worker, "its connection is gone"});
+  }
+}
+
+void Scheduler::on(const Tick&) {
+  const std::int64_t gap_ms = last_tick_ms_ < 0 ? 0 : now_ms_ - last_tick_ms_;
+  last_tick_ms_ = now_ms_;
+  std::vector<WorkerId> lost;
+  for (auto& [id, worker] : workers_) {
+    if (gap_ms > kLongestTick_ms) {
+      worker.last_heard_ms = std::min(now_ms_, worker.last_heard_ms + gap_ms - kLongestTick_ms);
+    }
+    if (now_ms_ - worker.last_heard_ms > settings_.lost_after_ms) {
+      lost.push_back(id);
+    }
+  }
+  for (const WorkerId id : lost) {
+    const std::int64_t silent_ms = now_ms_ - workers_.at(id).last_heard_ms;
+    remove_worker(id, LeaseEnd::kLost);
+    effects_.emplace_back(DropWorker{id, "silent for " + std::to_string(silent_ms) + " ms"});
+  }
+}
+
+void Scheduler::remove_worker(WorkerId id, LeaseEnd how) {
+  const auto found = workers_.find(id);
+  if (found == workers_.end()) {
+    return;
+  }
+  const std::set<LeaseId> leases = found->second.leases;
+  for (const LeaseId lease : leases) {
+    end_lease(lease, how);
+  }
+  if (found->second.queued) {
+    std::erase(ready_workers_, id);
+  }
+  threads_ -= found->second.threads;
+  workers_.erase(found);
+}
+
+void Scheduler::on(const DispatchHeld& event) {
+  held_ = event.held;
+}
+
+// ---- Leases and results -----------------------------------------------------------------------
+
+void Scheduler::end_lease(LeaseId id, LeaseEnd how) {
+  const Lease lease = leases_.at(id);
+  leases_.erase(id);
+  workers_.at(lease.worker).leases.erase(id);
+  StudyPoints& points = studies_.at(lease.study).points;
+  for (const Interval& run :
+       points.leased_set().within(lease.chunk.first_point, lease.chunk.end())) {
+    if (how == LeaseEnd::kLost) {
+      give_back_lost(lease.study, run, lease);
+    } else {
+      points.give_back(run, lease.chunk.attempts + 1, lease.chunk.losses);
+    }
+  }
+}
+
+void Scheduler::give_back_lost(StudyId study, const Interval& run, const Lease& lease) {
+  StudyPoints& points = studies_.at(study).points;
+  const std::uint32_t attempts = lease.chunk.attempts + 1;
+  const std::uint32_t losses = lease.chunk.losses + 1;
+  if (losses < settings_.max_losses) {
+    points.give_back(run, attempts, losses);
+    return;
+  }
+  if (run.end - run.begin > 1) {
+    // The halves stay suspect: the one without the killer is solved, the other is split again.
+    const std::uint64_t middle = run.begin + (run.end - run.begin) / 2;
+    points.give_back({run.begin, middle}, attempts, losses - 1);
+    points.give_back({middle, run.end}, attempts, losses - 1);
+    return;
+  }
+  points.receive(run.begin);
+  effects_.emplace_back(StoreFailure{
+      study, run.begin, attempts,
+      "no answer: " + std::to_string(attempts) + " leases of this point ended without one, " +
+          std::to_string(losses) + " of them because the worker was lost or gave up"});
+}
+
+void Scheduler::on(const ResultsReceived& event) {
+  Worker* worker = heard_from(event.worker);
+  if (worker == nullptr) {
+    return;
+  }
+  StoreResults store{event.worker, event.study, event.sequence, {}};
+  const auto study = studies_.find(event.study);
+  if (study != studies_.end()) {
+    for (std::size_t i = 0; i < event.outcomes.size(); ++i) {
+      if (study->second.points.receive(event.outcomes[i].point)) {
+        store.accepted.push_back(i);
+      }
+    }
+    learn_pace(*worker, event);
+  }
+  effects_.emplace_back(std::move(store));
+  const auto lease = leases_.find(event.lease);
+  if (event.batch_done && lease != leases_.end() && lease->second.worker == event.worker &&
+      lease->second.study == event.study) {
+    // Points of a finished batch that got no answer count as lost, or a worker that never answers
+    // them would take them for ever.
+    end_lease(event.lease, LeaseEnd::kLost);
+  }
+}
+
+void Scheduler::learn_pace(Worker& worker, const ResultsReceived& event) {
+  if (event.outcomes.empty() || !std::isfinite(event.busy_s) || event.busy_s <= 0.0) {
+    return;
+  }
+  const double s_per_point = event.busy_s / static_cast<double>(event.outcomes.size());
+  double& known = worker.paces[event.study].s_per_point;
+  known = known > 0.0 ? known + kPaceWeight * (s_per_point - known) : s_per_point;
+}
+
+void Scheduler::on(const ResultsStored& event) {
+  const auto study = studies_.find(event.study);
+  const auto worker = workers_.find(event.worker);
+  if (study != studies_.end()) {
+    for (const PointOutcome& outcome : event.outcomes) {
+      if (study->second.points.settle(outcome.point)) {
+        study->second.failed += outcome.failed ? 1U : 0U;
+        if (worker != workers_.end()) {
+          worker->second.solved_points += outcome.failed ? 0U : 1U;
+        }
+      }
+    }
+    finish_if_complete(event.study);
+  }
+  if (worker != workers_.end()) {
+    effects_.emplace_back(AcknowledgeResults{event.worker, event.sequence});
+  }
+}
+
+// ---- Dispatch ---------------------------------------------------------------------------------
+
+void Scheduler::dispatch() {
+  if (held_) {
+    return;
+  }
+  std::size_t served_nothing = 0;  // workers in a row
+  while (served_nothing < ready_workers_.size() &&
+         (next_free_study() != 0 || next_suspect_study() != 0)) {
+    const WorkerId id = ready_workers_.front();
+    ready_workers_.pop_front();
+    Worker& worker = workers_.at(id);
+    worker.queued = false;
+    const bool served = serve(id, worker);
+    queue(id, worker);
+    served_nothing = served ? 0 : served_nothing + 1;
+  }
+}
+
+bool Scheduler::serve(WorkerId id, Worker& worker) {
+  const bool holds_suspect = !worker.leases.empty() && leases_.at(*worker.leases.begin()).alone;
+  if (holds_suspect) {
+    return false;
+  }
+  if (next_suspect_study() == 0) {
+    worker.draining = false;
+  } else if (worker.leases.empty()) {
+    return serve_suspect(id, worker);
+  } else if (worker.draining || !anyone_draining()) {
+    // Suspect points wait for one worker to empty, the others go on.
+    worker.draining = true;
+    return false;
+  }
+  const StudyId study = next_free_study();
+  if (study == 0) {
+    return false;
+  }
+  last_served_ = study;
+  if (const auto chunk = studies_.at(study).points.take(batch_points(worker, study))) {
+    grant(id, worker, study, *chunk, false);
+  }
+  return true;
+}
+
+bool Scheduler::serve_suspect(WorkerId id, Worker& worker) {
+  const StudyId study = next_suspect_study();
+  worker.draining = false;
+  if (const auto chunk = studies_.at(study).points.take_suspect(batch_points(worker, study))) {
+    grant(id, worker, study, *chunk, true);
+  }
+  return true;
+}
+
+StudyId Scheduler::next_free_study() const {
+  const auto is_open = [](const auto& entry) {
+    return !entry.second.cancelled && !entry.second.finished && entry.second.points.has_free();
+  };
+  const auto after = studies_.upper_bound(last_served_);
+  auto found = std::find_if(after, studies_.end(), is_open);
+  if (found == studies_.end()) {
+    found = std::find_if(studies_.begin(), after, is_open);
+    return found == after ? 0 : found->first;
+  }
+  return found->first;
+}
+
+StudyId Scheduler::next_suspect_study() const {
+  const auto found = std::find_if(studies_.begin(), studies_.end(), [](const auto& entry) {
+    return !entry.second.cancelled && !entry.second.finished && entry.second.points.has_suspect();
+  });
+  return found == studies_.end() ? 0 : found->first;
+}
+
+bool Scheduler::anyone_draining() const {
+  return std::any_of(workers_.begin(), workers_.end(),
+                     [](const auto& entry) { return entry.second.draining; });
+}
+
+std::uint64_t Scheduler::batch_points(const Worker& worker, StudyId id) const {
+  std::uint64_t points = settings_.first_batch_points;
+  const auto pace = worker.paces.find(id);
+  if (pace != worker.paces.end() && pace->second.s_per_point > 0.0) {
+    const double wanted = settings_.batch_target_s / pace->second.s_per_point;
+    const auto largest = static_cast<double>(
+        std::min(settings_.largest_batch_points,
+                 settings_.growth * std::max<std::uint64_t>(pace->second.last_batch_points, 1)));
+    points = static_cast<std::uint64_t>(std::min(wanted, largest));
+  }
+  const std::uint64_t shares = settings_.tail_batches_per_thread * threads_;
+  const std::uint64_t fair = studies_.at(id).points.free() / std::max<std::uint64_t>(shares, 1);
+  return std::max<std::uint64_t>(std::min(points, fair), 1);
+}
+
+void Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Chunk& chunk, bool alone) {
+  if (worker.defined.insert(study).second) {
+    effects_.emplace_back(DefineStudy{id, study});
+  }
+  const LeaseId lease = next_lease_++;
+  leases_.emplace(lease, Lease{id, study, chunk, alone, now_ms_});
+  worker.leases.insert(lease);
+  --worker.credit;
+  worker.paces[study].last_batch_points = chunk.count;
+  effects_.emplace_back(
+      SendBatch{id, study, chunk.model, chunk.first_point, chunk.count, chunk.attempts + 1, lease});
+}
+
+// ---- Views of the state -----------------------------------------------------------------------
+
+StudyCounts Scheduler::study(StudyId id) const {
+  const Study& study = studies_.at(id);
+  return {study.points.table().size(), study.points.settled() - study.failed, study.failed,
+          study.points.leased(), study.cancelled};
+}
+
+WorkerCounts Scheduler::worker(WorkerId id, std::int64_t now_ms) const {
+  const Worker& worker = workers_.at(id);
+  WorkerCounts counts{0, worker.solved_points,
+                      std::max<std::int64_t>(0, now_ms - worker.last_heard_ms)};
+  for (const LeaseId lease_id : worker.leases) {
+    const Lease& lease = leases_.at(lease_id);
+    const IntervalSet& leased = studies_.at(lease.study).points.leased_set();
+    for (const Interval& run : leased.within(lease.chunk.first_point, lease.chunk.end())) {
+      counts.leased_points += run.end - run.begin;
+    }
+  }
+  return counts;
+}
+
+void Scheduler::check_invariants() const {
+  const auto require = [](bool holds, const char* what) {
+    if (!holds) {
+      throw std::logic_error(what);
+    }
+  };
+  std::map<StudyId, IntervalSet> under_lease;
+  for (const auto& [id, lease] : leases_) {
+    const auto worker = workers_.find(lease.worker);
+    require(worker != workers_.end() && worker->second.leases.contains(id),
+            "a lease has no worker");
+    require(studies_.contains(lease.study), "a lease has no study");
+    require(!lease.alone || worker->second.leases.size() == 1, "a suspect lease is not alone");
+    require(lease.chunk.count > 0 && id < next_lease_, "a lease is malformed");
+    IntervalSet& covered = under_lease[lease.study];
+    require(covered.within(lease.chunk.first_point, lease.chunk.end()).empty(),
+            "two leases hold one point");
+    covered.insert(lease.chunk.first_point, lease.chunk.end());
+  }
+  for (const auto& [id, study] : studies_) {
+    study.points.check_invariants();
+    require(study.finished == study.points.is_complete(), "a study is finished and is not");
+    require(study.failed <= study.points.settled(), "more points failed than were settled");
+    require(!study.cancelled || study.points.leased() == 0, "a cancelled study holds leases");
+    study.points.leased_set().for_each([&, study_id = id](const Interval& run) {
+      const auto covered = under_lease[study_id].within(run.begin, run.end);
+      require(covered.size() == 1 && covered.front() == run, "a leased point has no lease");
+    });
+  }
+  std::uint64_t threads = 0;
+  std::size_t leases = 0;
+  for (const auto& [id, worker] : workers_) {
+    threads += worker.threads;
+    leases += worker.leases.size();
+    require(worker.queued == (std::count(ready_workers_.begin(), ready_workers_.end(), id) == 1),
+            "a worker stands in the queue twice or not as noted");
+    require(worker.queued == (worker.credit > 0), "a worker with credit is not in the queue");
+  }
+  require(threads == threads_, "the number of threads is wrong");
+  require(leases == leases_.size(), "a worker holds a lease that does not exist");
+}
+
+}  // namespace oblique::server

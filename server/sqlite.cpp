@@ -1,0 +1,176 @@
+#include "server/sqlite.h"
+
+#include <filesystem>
+#include <system_error>
+
+namespace oblique::server {
+
+DatabaseHandle open_database(const std::string& path, int flags) {
+  sqlite3* raw = nullptr;
+  const int code = sqlite3_open_v2(path.c_str(), &raw, flags | SQLITE_OPEN_EXRESCODE, nullptr);
+  DatabaseHandle database(raw);
+  if (code != SQLITE_OK) {
+    throw StorageError("cannot open the database " + path + ": " +
+                       (raw != nullptr ? sqlite3_errmsg(raw) : sqlite3_errstr(code)));
+  }
+  return database;
+}
+
+void execute(sqlite3* database, const std::string& sql) {
+  char* message = nullptr;
+  if (sqlite3_exec(database, sql.c_str(), nullptr, nullptr, &message) != SQLITE_OK) {
+    const std::string reason = message != nullptr ? message : sqlite3_errmsg(database);
+    sqlite3_free(message);
+    throw StorageError("the database refused a statement: " + reason);
+  }
+}
+
+Statement::Statement(sqlite3* database, std::string_view sql) : database_(database) {
+  sqlite3_stmt* raw = nullptr;
+  check(sqlite3_prepare_v3(database, sql.data(), static_cast<int>(sql.size()),
+                           SQLITE_PREPARE_PERSISTENT, &raw, nullptr));
+  statement_.reset(raw);
+}
+
+void Statement::check(int code) const {
+  if (code != SQLITE_OK) {
+    throw StorageError("the database refused a statement: " +
+                       std::string(sqlite3_errmsg(database_)));
+  }
+}
+
+void Statement::bind(int index, std::int64_t value) {
+  check(sqlite3_bind_int64(statement_.get(), index, value));
+}
+
+void Statement::bind(int index, std::uint64_t value) {
+  bind(index, static_cast<std::int64_t>(value));
+}
+
+void Statement::bind(int index, double value) {
+  check(sqlite3_bind_double(statement_.get(), index, value));
+}
+
+void Statement::bind(int index, std::string_view text) {
+  check(sqlite3_bind_text64(statement_.get(), index, text.data(), text.size(), SQLITE_TRANSIENT,
+                            SQLITE_UTF8));
+}
+
+void Statement::bind_blob(int index, std::string_view bytes) {
+  check(sqlite3_bind_blob64(statement_.get(), index, bytes.data(), bytes.size(), SQLITE_TRANSIENT));
+}
+
+void Statement::bind_null(int index) {
+  check(sqlite3_bind_null(statement_.get(), index));
+}
+
+bool Statement::step() {
+  const int code = sqlite3_step(statement_.get());
+  if (code == SQLITE_ROW) {
+    return true;
+  }
+  if (code != SQLITE_DONE) {
+    const std::string reason = sqlite3_errmsg(database_);
+    reset();
+    throw StorageError("the database failed: " + reason);
+  }
+  return false;
+}
+
+void Statement::run() {
+  step();
+  reset();
+}
+
+void Statement::reset() {
+  sqlite3_reset(statement_.get());
+  sqlite3_clear_bindings(statement_.get());
+}
+
+std::int64_t Statement::integer(int column) const {
+  return sqlite3_column_int64(statement_.get(), column);
+}
+
+std::string Statement::text(int column) const {
+  const void* bytes = sqlite3_column_blob(statement_.get(), column);
+  const auto size = static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column));
+  return size == 0 ? std::string() : std::string(static_cast<const char*>(bytes), size);
+}
+
+Transaction::Transaction(sqlite3* database) : database_(database) {
+  execute(database_, "BEGIN IMMEDIATE");
+}
+
+Transaction::~Transaction() {
+  // SQLite itself may have rolled back already, as when the disk is full.
+  if (open_ && sqlite3_get_autocommit(database_) == 0) {
+    sqlite3_exec(database_, "ROLLBACK", nullptr, nullptr, nullptr);
+  }
+}
+
+void Transaction::commit() {
+  execute(database_, "COMMIT");
+  open_ = false;
+}
+
+namespace {
+
+std::int64_t pragma(sqlite3* database, const std::string& name) {
+  Statement statement(database, "PRAGMA " + name);
+  return statement.step() ? statement.integer(0) : 0;
+}
+
+std::string tables_found(sqlite3* database) {
+  Statement statement(database, "SELECT name FROM sqlite_schema WHERE type = 'table' LIMIT 4");
+  std::string names;
+  for (int count = 0; statement.step(); ++count) {
+    names += count == 0 ? "" : ", ";
+    names += count < 3 ? statement.text(0) : "...";
+  }
+  return names.empty() ? "no tables" : "tables " + names;
+}
+
+}  // namespace
+
+DatabaseKind identify(sqlite3* database, const std::string& path) {
+  std::int64_t application_id = 0;
+  std::int64_t version = 0;
+  std::string tables;
+  try {
+    application_id = pragma(database, "application_id");
+    version = pragma(database, "user_version");
+    tables = tables_found(database);
+  } catch (const StorageError&) {
+    const int code = sqlite3_errcode(database);
+    throw StorageError(code == SQLITE_NOTADB
+                           ? path + " is not a database: it is some other kind of file"
+                           : "cannot read the database " + path + ": " + sqlite3_errmsg(database));
+  }
+  if (application_id == 0 && version == 0 && tables == "no tables") {
+    return DatabaseKind::kEmpty;
+  }
+  if (application_id != kApplicationId) {
+    throw StorageError(path + " is a database of another program (application id " +
+                       std::to_string(application_id) + ", " + tables + "): choose another file");
+  }
+  if (version != kSchemaVersion) {
+    throw StorageError(path + " has schema version " + std::to_string(version) +
+                       ", and this program knows version " + std::to_string(kSchemaVersion) +
+                       (version > kSchemaVersion ? ": use the newer program that wrote it"
+                                                 : ": the file is damaged"));
+  }
+  return DatabaseKind::kOurs;
+}
+
+void check_path(const std::string& path) {
+  std::error_code ignored;
+  const auto status = std::filesystem::status(path, ignored);
+  if (std::filesystem::is_directory(status)) {
+    throw StorageError(path + " is a directory: name a file in it");
+  }
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
+    throw StorageError(path + " is not a regular file");
+  }
+}
+
+}  // namespace oblique::server

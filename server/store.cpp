@@ -1,0 +1,306 @@
+#include "server/store.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <random>
+#include <utility>
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <nlohmann/json.hpp>
+
+#include "server/result_row.h"
+#include "server/schema.h"
+
+namespace oblique::server {
+namespace {
+
+constexpr int kBusyTimeout_ms = 2000;
+constexpr std::size_t kMostCachedModels = 65536;
+
+std::string random_id() {
+  std::random_device source;
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  std::string id;
+  for (int i = 0; i < 32; ++i) {
+    id += kDigits[source() % kDigits.size()];
+  }
+  return id;
+}
+
+StudyState state_named(const std::string& name) {
+  for (const StudyState state : {StudyState::kDone, StudyState::kCancelled}) {
+    if (name == state_name(state)) {
+      return state;
+    }
+  }
+  return StudyState::kRunning;
+}
+
+/// Inserts a model, its columns by name. The keys are the columns, but for those handled first.
+std::string insert_model_sql() {
+  std::string names = "definition, lengths_m";
+  std::string marks = "?, ?";
+  for (const auto& key : solver::model_keys()) {
+    names += ", " + std::string(key.name);
+    marks += ", ?";
+  }
+  return "INSERT INTO models (" + names + ") VALUES (" + marks +
+         ") ON CONFLICT (definition) DO NOTHING";
+}
+
+void bind_model(Statement& insert, const solver::ModelParameters& model,
+                const std::string& definition) {
+  insert.reset();
+  insert.bind_blob(1, definition);
+  insert.bind(2, nlohmann::json(model.lengths_m).dump());
+  int index = 3;
+  for (const auto& key : solver::model_keys()) {
+    const double value = key.get(model);
+    const bool whole = key.name == "links" || key.name == "elements_per_link";
+    if (key.name == "integrator") {
+      insert.bind(index, solver::integrator_name(model.integrator));
+    } else if (whole) {
+      insert.bind(index, static_cast<std::int64_t>(value));
+    } else if (key.name != "length" ||
+               std::count(model.lengths_m.begin(), model.lengths_m.end(), value) ==
+                   static_cast<std::ptrdiff_t>(model.lengths_m.size())) {
+      insert.bind(index, value);
+    }
+    ++index;
+  }
+}
+
+}  // namespace
+
+/// Holds the file against a second server, apart from SQLite's own locks.
+class Store::Lock {
+ public:
+  explicit Lock(const std::string& path)
+      : file_(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644)) {
+    if (file_ < 0) {
+      throw StorageError("cannot open the database " + path +
+                         " for writing: " + std::strerror(errno));
+    }
+    if (::flock(file_, LOCK_EX | LOCK_NB) != 0) {
+      ::close(file_);
+      throw StorageError("another server already uses the database " + path +
+                         ": stop it, or ask it with --server");
+    }
+  }
+  ~Lock() { ::close(file_); }
+  Lock(const Lock&) = delete;
+  Lock& operator=(const Lock&) = delete;
+
+ private:
+  int file_;
+};
+
+struct Store::Statements {
+  explicit Statements(sqlite3* database)
+      : add_study(database,
+                  "INSERT INTO studies (study_id, name, recipe, points, state, created_at,"
+                  " changed_at) VALUES (?1, ?2, ?3, ?4, 'running', ?5, ?5)"),
+        set_state(database,
+                  "UPDATE studies SET state = ?2, changed_at = ?3"
+                  " WHERE study_id = ?1 AND state <> ?2"),
+        add_worker(database,
+                   "INSERT INTO workers (worker_id, name, threads, solver_version,"
+                   " instruction_set, joined_at) VALUES (?, ?, ?, ?, ?, ?)"),
+        find_model(database, "SELECT model_id FROM models WHERE definition = ?"),
+        add_model(database, insert_model_sql()),
+        add_result(database, insert_result_sql()) {}
+
+  Statement add_study;
+  Statement set_state;
+  Statement add_worker;
+  Statement find_model;
+  Statement add_model;
+  Statement add_result;
+};
+
+Store::Store(const std::string& path) {
+  check_path(path);
+  lock_ = std::make_unique<Lock>(path);
+  database_ = open_database(path, SQLITE_OPEN_READWRITE);
+  sqlite3_busy_timeout(database_.get(), kBusyTimeout_ms);
+  const DatabaseKind kind = identify(database_.get(), path);
+  Statement journal(database_.get(), "PRAGMA journal_mode = WAL");
+  if (!journal.step() || journal.text(0) != "wal") {
+    throw StorageError("the file system of " + path + " cannot hold a write-ahead log");
+  }
+  journal.reset();
+  execute(database_.get(), "PRAGMA synchronous = FULL");
+  if (kind == DatabaseKind::kEmpty) {
+    create_schema();
+  }
+  statements_ = std::make_unique<Statements>(database_.get());
+}
+
+Store::~Store() = default;
+
+void Store::create_schema() {
+  Transaction transaction(database_.get());
+  execute(database_.get(), kSchemaSql);
+  execute(database_.get(), "PRAGMA application_id = " + std::to_string(kApplicationId));
+  execute(database_.get(), "PRAGMA user_version = " + std::to_string(kSchemaVersion));
+  Statement about(database_.get(), "INSERT INTO about (database_id) VALUES (?)");
+  about.bind(1, random_id());
+  about.run();
+  transaction.commit();
+}
+
+void Store::set_sync(bool full) {
+  if (full != full_sync_) {
+    execute(database_.get(), full ? "PRAGMA synchronous = FULL" : "PRAGMA synchronous = NORMAL");
+    full_sync_ = full;
+  }
+}
+
+void Store::commit(std::span<const Change> changes) {
+  const bool control = std::any_of(changes.begin(), changes.end(), [](const Change& change) {
+    return std::holds_alternative<AddStudy>(change) ||
+           std::holds_alternative<SetStudyState>(change);
+  });
+  try {
+    set_sync(control);
+    Transaction transaction(database_.get());
+    for (const Change& change : changes) {
+      std::visit([this](const auto& c) { add(c); }, change);
+    }
+    transaction.commit();
+  } catch (...) {
+    model_ids_.clear();
+    throw;
+  }
+}
+
+void Store::add(const AddStudy& change) {
+  Statement& insert = statements_->add_study;
+  insert.bind(1, change.study_id);
+  insert.bind(2, change.name);
+  insert.bind_blob(3, change.table->recipe().SerializeAsString());
+  insert.bind(4, change.table->size());
+  insert.bind(5, change.created_at);
+  insert.run();
+}
+
+void Store::add(const SetStudyState& change) {
+  Statement& update = statements_->set_state;
+  update.bind(1, change.study_id);
+  update.bind(2, std::string_view(state_name(change.state)));
+  update.bind(3, change.changed_at);
+  update.run();
+}
+
+void Store::add(const AddWorker& change) {
+  Statement& insert = statements_->add_worker;
+  insert.bind(1, change.worker_id);
+  insert.bind(2, change.name);
+  insert.bind(3, std::uint64_t{change.threads});
+  insert.bind(4, change.solver_version);
+  insert.bind(5, change.instruction_set);
+  insert.bind(6, change.joined_at);
+  insert.run();
+}
+
+void Store::add(const AddResults& change) {
+  for (const protocol::PointResult& result : change.results) {
+    const protocol::Point point = change.table->point(result.point());
+    const RowContext context{
+        change.study_id,       model_id(change, point.model), point,          change.worker_id,
+        change.solver_version, change.instruction_set,        change.attempt, change.solved_at};
+    bind_result(statements_->add_result, context, result);
+    statements_->add_result.run();
+  }
+}
+
+std::int64_t Store::model_id(const AddResults& change, std::uint64_t model) {
+  const std::pair key{change.study_id, model};
+  if (const auto known = model_ids_.find(key); known != model_ids_.end()) {
+    return known->second;
+  }
+  const solver::ModelParameters parameters = change.table->model(model);
+  const std::string definition = protocol::to_message(parameters).SerializeAsString();
+  bind_model(statements_->add_model, parameters, definition);
+  statements_->add_model.run();
+  Statement& find = statements_->find_model;
+  find.bind_blob(1, definition);
+  find.step();
+  const std::int64_t id = find.integer(0);
+  find.reset();
+  if (model_ids_.size() >= kMostCachedModels) {
+    model_ids_.clear();
+  }
+  model_ids_.emplace(key, id);
+  return id;
+}
+
+std::vector<StoredStudy> Store::studies() {
+  std::vector<StoredStudy> found;
+  Statement list(database_.get(),
+                 "SELECT study_id, name, recipe, state, created_at FROM studies ORDER BY study_id");
+  Statement settled(database_.get(), "SELECT point FROM results WHERE study_id = ? ORDER BY point");
+  Statement failed(database_.get(),
+                   "SELECT count(*) FROM results WHERE study_id = ? AND status = 'failed'");
+  while (list.step()) {
+    StoredStudy study{};
+    study.study_id = static_cast<std::uint64_t>(list.integer(0));
+    study.name = list.text(1);
+    study.state = state_named(list.text(3));
+    study.created_at = list.text(4);
+    protocol::Recipe recipe;
+    try {
+      if (!recipe.ParseFromString(list.text(2))) {
+        throw StorageError("its bytes are damaged");
+      }
+      study.table = std::make_shared<const protocol::PointTable>(std::move(recipe));
+    } catch (const std::runtime_error& reason) {
+      throw StorageError("the recipe of study " + study.name + " cannot be read: " + reason.what());
+    }
+    Interval run{0, 0};
+    settled.bind(1, study.study_id);
+    while (settled.step()) {
+      const auto point = static_cast<std::uint64_t>(settled.integer(0));
+      if (point != run.end) {
+        study.settled.insert(run.begin, run.end);
+        run.begin = point;
+      }
+      run.end = point + 1;
+    }
+    study.settled.insert(run.begin, run.end);
+    settled.reset();
+    failed.bind(1, study.study_id);
+    failed.step();
+    study.failed = static_cast<std::uint64_t>(failed.integer(0));
+    failed.reset();
+    found.push_back(std::move(study));
+  }
+  return found;
+}
+
+std::uint64_t Store::highest(const std::string& sql) {
+  Statement statement(database_.get(), sql);
+  return statement.step() ? static_cast<std::uint64_t>(statement.integer(0)) : 0;
+}
+
+std::uint64_t Store::last_study_id() {
+  return highest("SELECT max(study_id) FROM studies");
+}
+
+std::uint64_t Store::last_worker_id() {
+  return highest("SELECT max(worker_id) FROM workers");
+}
+
+std::string Store::database_id() {
+  Statement statement(database_.get(), "SELECT database_id FROM about");
+  if (!statement.step()) {
+    throw StorageError("the database has lost its identity: the table about is empty");
+  }
+  return statement.text(0);
+}
+
+}  // namespace oblique::server

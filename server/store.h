@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/changes.h"
+#include "server/interval_set.h"
+#include "server/sqlite.h"
+
+namespace oblique::server {
+
+/// A study as the database has it.
+struct StoredStudy {
+  std::uint64_t study_id;
+  std::string name;
+  std::shared_ptr<const protocol::PointTable> table;
+  StudyState state;
+  std::string created_at;
+  IntervalSet settled;  ///< points that have a row
+  std::uint64_t failed;
+};
+
+/// The SQLite database (schema.sql), opened for writing. Only one Store may have a file open;
+/// readers are free. Results are committed without waiting for the disk's own cache (losing power
+/// may undo the last ones, which are then solved again), studies with a full sync.
+class Store final : public Storage {
+ public:
+  /// Opens the database at `path`, or makes it. Throws StorageError naming what was found: a
+  /// directory, a foreign file, a newer schema, an unreadable file, one that is open elsewhere.
+  explicit Store(const std::string& path);
+  ~Store() override;
+
+  void commit(std::span<const Change> changes) override;
+
+  /// All studies in the order of their numbers, with what is settled. Throws StorageError, also for
+  /// a recipe that cannot be read.
+  std::vector<StoredStudy> studies();
+
+  /// Highest number given to a study or worker so far; 0 when there is none.
+  std::uint64_t last_study_id();
+  std::uint64_t last_worker_id();
+
+  /// Drawn at random when the file was made.
+  std::string database_id();
+
+ private:
+  struct Statements;
+  class Lock;
+
+  void create_schema();
+  void add(const AddStudy& change);
+  void add(const SetStudyState& change);
+  void add(const AddWorker& change);
+  void add(const AddResults& change);
+  std::int64_t model_id(const AddResults& change, std::uint64_t model);
+  void set_sync(bool full);
+  std::uint64_t highest(const std::string& sql);
+
+  std::unique_ptr<Lock> lock_;  // outlives the connection: closing it drops SQLite's own locks
+  DatabaseHandle database_;
+  std::unique_ptr<Statements> statements_;
+  // Row of `models` by study and model number; emptied when it grows or a transaction fails.
+  std::map<std::pair<std::uint64_t, std::uint64_t>, std::int64_t> model_ids_;
+  bool full_sync_ = true;
+};
+
+}  // namespace oblique::server

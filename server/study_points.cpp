@@ -1,0 +1,128 @@
+#include "server/study_points.h"
+
+#include <algorithm>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+
+namespace oblique::server {
+
+StudyPoints::StudyPoints(std::shared_ptr<const protocol::PointTable> table, IntervalSet settled,
+                         std::uint32_t suspect_after_losses)
+    : table_(std::move(table)),
+      suspect_after_losses_(suspect_after_losses),
+      fresh_(0, table_->size()),
+      settled_(std::move(settled)) {
+  settled_.erase(table_->size(), std::numeric_limits<std::uint64_t>::max());
+  settled_.for_each([this](const Interval& run) { fresh_.erase(run.begin, run.end); });
+}
+
+std::optional<Chunk> StudyPoints::take(std::uint64_t at_most) {
+  if (!returned_.empty()) {
+    return take_from(returned_, at_most);
+  }
+  if (fresh_.empty()) {
+    return std::nullopt;
+  }
+  const Interval run = fresh_.front();
+  const protocol::Segment segment = table_->segment_at(run.begin);
+  const std::uint64_t end =
+      std::min({run.end, segment.first_point + segment.count, run.begin + at_most});
+  fresh_.erase(run.begin, end);
+  leased_.insert(run.begin, end);
+  return Chunk{segment.model, run.begin, end - run.begin, 0, 0};
+}
+
+std::optional<Chunk> StudyPoints::take_suspect(std::uint64_t at_most) {
+  return take_from(suspect_, at_most);
+}
+
+std::optional<Chunk> StudyPoints::take_from(Returned& chunks, std::uint64_t at_most) {
+  if (chunks.empty()) {
+    return std::nullopt;
+  }
+  const auto [first, history] = *chunks.begin();
+  const std::uint64_t end = std::min(history.end, first + at_most);
+  chunks.erase(chunks.begin());
+  if (end < history.end) {
+    chunks.emplace(end, history);
+  }
+  leased_.insert(first, end);
+  return Chunk{table_->segment_at(first).model, first, end - first, history.attempts,
+               history.losses};
+}
+
+void StudyPoints::give_back(const Interval& range, std::uint32_t attempts, std::uint32_t losses) {
+  Returned& chunks = losses >= suspect_after_losses_ ? suspect_ : returned_;
+  for (const Interval& run : leased_.within(range.begin, range.end)) {
+    chunks.emplace(run.begin, History{run.end, attempts, losses});
+  }
+  leased_.erase(range.begin, range.end);
+}
+
+bool StudyPoints::receive(std::uint64_t point) {
+  if (leased_.contains(point)) {
+    leased_.erase(point);
+  } else if (fresh_.contains(point)) {
+    fresh_.erase(point);
+  } else if (!erase_from(returned_, point) && !erase_from(suspect_, point)) {
+    return false;
+  }
+  committing_.insert(point);
+  return true;
+}
+
+bool StudyPoints::erase_from(Returned& chunks, std::uint64_t point) {
+  auto chunk = chunks.upper_bound(point);
+  if (chunk == chunks.begin() || (--chunk)->second.end <= point) {
+    return false;
+  }
+  const History history = chunk->second;
+  if (chunk->first == point) {
+    chunks.erase(chunk);
+  } else {
+    chunk->second.end = point;
+  }
+  if (point + 1 < history.end) {
+    chunks.emplace(point + 1, history);
+  }
+  return true;
+}
+
+bool StudyPoints::settle(std::uint64_t point) {
+  if (!committing_.contains(point)) {
+    return false;
+  }
+  committing_.erase(point);
+  settled_.insert(point);
+  return true;
+}
+
+std::uint64_t StudyPoints::free() const {
+  return table_->size() - leased_.size() - committing_.size() - settled_.size();
+}
+
+void StudyPoints::check_invariants() const {
+  IntervalSet all;
+  std::uint64_t points = 0;
+  const auto add = [&](const Interval& run) {
+    if (run.begin >= run.end) {
+      throw std::logic_error("a study holds an empty run of points");
+    }
+    all.insert(run.begin, run.end);
+    points += run.end - run.begin;
+  };
+  for (const auto* set : {&fresh_, &leased_, &committing_, &settled_}) {
+    set->for_each(add);
+  }
+  for (const auto* chunks : {&returned_, &suspect_}) {
+    for (const auto& [first, history] : *chunks) {
+      add({first, history.end});
+    }
+  }
+  if (points != table_->size() || !(all == IntervalSet(0, table_->size()))) {
+    throw std::logic_error("a point of a study is in no place or in two");
+  }
+}
+
+}  // namespace oblique::server

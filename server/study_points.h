@@ -1,0 +1,89 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+
+#include "proto/recipe.h"
+#include "server/interval_set.h"
+
+namespace oblique::server {
+
+/// A run of points handed out together: one model, no gap.
+struct Chunk {
+  std::uint64_t model;
+  std::uint64_t first_point;
+  std::uint64_t count;
+  std::uint32_t attempts;  ///< how often these points had been leased before
+  std::uint32_t losses;    ///< how many of those leases ended with the death of their worker
+
+  std::uint64_t end() const { return first_point + count; }
+};
+
+/// Where the points of one study stand. Every point is in exactly one place: fresh (never leased by
+/// this run of the server), returned (leased before, free again), suspect (returned, and its leases
+/// cost so many workers that it is leased to a worker that holds nothing else), leased, committing
+/// (its result is on the way to the disk) or settled. The cost grows with the number of runs of
+/// points, not with their number.
+class StudyPoints {
+ public:
+  /// `settled` are the points that have a row already. A chunk lost `suspect_after_losses` times is
+  /// suspect.
+  StudyPoints(std::shared_ptr<const protocol::PointTable> table, IntervalSet settled,
+              std::uint32_t suspect_after_losses);
+
+  const protocol::PointTable& table() const { return *table_; }
+  std::shared_ptr<const protocol::PointTable> shared_table() const { return table_; }
+
+  /// Takes up to `at_most` points out of the returned ones or, when there are none, the fresh ones.
+  /// Nothing when there are neither.
+  std::optional<Chunk> take(std::uint64_t at_most);
+  /// The same out of the suspect ones.
+  std::optional<Chunk> take_suspect(std::uint64_t at_most);
+
+  /// The points of [begin, end) that are still leased become free again, with the history given.
+  void give_back(const Interval& range, std::uint32_t attempts, std::uint32_t losses);
+
+  /// The result of a point came in: false when the point was received before or is not of this
+  /// study, else it is now committing.
+  bool receive(std::uint64_t point);
+
+  /// The result of a committing point is durable. False when the point was not committing.
+  bool settle(std::uint64_t point);
+
+  bool has_free() const { return !returned_.empty() || !fresh_.empty(); }
+  bool has_suspect() const { return !suspect_.empty(); }
+  bool is_complete() const { return settled_.size() == table_->size(); }
+
+  std::uint64_t free() const;  ///< fresh, returned and suspect points
+  std::uint64_t settled() const { return settled_.size(); }
+  std::uint64_t leased() const { return leased_.size(); }
+  const IntervalSet& settled_set() const { return settled_; }
+  const IntervalSet& leased_set() const { return leased_; }
+
+  /// Throws std::logic_error unless every point is in exactly one place.
+  void check_invariants() const;
+
+ private:
+  struct History {
+    std::uint64_t end;
+    std::uint32_t attempts;
+    std::uint32_t losses;
+  };
+  using Returned = std::map<std::uint64_t, History>;  // by first point
+
+  std::optional<Chunk> take_from(Returned& chunks, std::uint64_t at_most);
+  static bool erase_from(Returned& chunks, std::uint64_t point);
+
+  std::shared_ptr<const protocol::PointTable> table_;
+  std::uint32_t suspect_after_losses_;
+  IntervalSet fresh_;
+  Returned returned_;
+  Returned suspect_;
+  IntervalSet leased_;
+  IntervalSet committing_;
+  IntervalSet settled_;
+};
+
+}  // namespace oblique::server
