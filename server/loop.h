@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <string>
+
+#include "server/service.h"
+
+namespace oblique::server {
+
+struct LoopSettings {
+  std::string database;              ///< file
+  std::string listen = "127.0.0.1";  ///< address of both sockets; loopback only
+  std::string worker_port = "7601";  ///< "*": the system picks one
+  std::string client_port = "7600";
+  ServiceSettings service;  ///< solver_version must be set; the rest from the database
+};
+
+/// What the loop ended with.
+struct LoopEnd {
+  std::size_t lost_writes;  ///< changes that could not be made durable
+};
+
+/// The server: two ROUTER sockets, the writer and the query thread, and one loop that feeds the
+/// service with what comes from them. Logs to spdlog's default logger.
+class Loop {
+ public:
+  /// Opens the database and binds both sockets. Throws StorageError, and std::runtime_error for an
+  /// address that is not loopback or cannot be bound.
+  explicit Loop(LoopSettings settings);
+  ~Loop();
+  Loop(const Loop&) = delete;
+  Loop& operator=(const Loop&) = delete;
+
+  /// As ZeroMQ endpoints with the ports that are really used.
+  std::string client_endpoint() const;
+  std::string worker_endpoint() const;
+
+  /// Runs until `stop_fd` becomes readable; then tells the workers, makes what was received
+  /// durable, acknowledges it and returns.
+  LoopEnd run(int stop_fd);
+
+ private:
+  class Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+/// Throws std::runtime_error, saying what is allowed, unless `address` is a loopback address or
+/// "localhost". Returns the address to bind.
+std::string loopback_address(const std::string& address);
+
+}  // namespace oblique::server

@@ -1,0 +1,247 @@
+#include "server/service.h"
+
+#include <chrono>
+#include <ctime>
+#include <iomanip>
+#include <sstream>
+#include <utility>
+
+#include "proto/frames.h"
+
+namespace oblique::server {
+namespace {
+
+/// Rates are taken over so long.
+constexpr std::int64_t kRateSpan_ms = 5000;
+
+}  // namespace
+
+std::string iso_8601(Instant now) {
+  const std::time_t seconds = static_cast<std::time_t>(now.utc_ms / 1000);
+  std::tm parts{};
+  gmtime_r(&seconds, &parts);
+  std::ostringstream text;
+  text << std::put_time(&parts, "%Y-%m-%dT%H:%M:%S.") << std::setw(3) << std::setfill('0')
+       << now.utc_ms % 1000 << 'Z';
+  return text.str();
+}
+
+std::string shortened(const std::string& text, std::size_t bytes) {
+  if (text.size() <= bytes) {
+    return text;
+  }
+  while (bytes > 0 && (static_cast<unsigned char>(text[bytes]) & 0xc0U) == 0x80U) {
+    --bytes;
+  }
+  return text.substr(0, bytes);
+}
+
+Service::Service(ServiceSettings settings, Outbox& outbox, std::vector<StoredStudy> studies,
+                 Instant now)
+    : settings_(std::move(settings)), outbox_(outbox), scheduler_(settings_.scheduler) {
+  for (StoredStudy& study : studies) {
+    study_ids_.emplace(study.name, study.study_id);
+    studies_.emplace(
+        study.study_id,
+        Study{study.name, study.table, study.state, study.created_at, true, 0, {}, {}});
+    feed(StudyAdded{study.study_id, study.table, std::move(study.settled), study.failed,
+                    study.state == StudyState::kCancelled},
+         now);
+  }
+}
+
+void Service::feed(const Event& event, Instant now, protocol::Results* message) {
+  for (const Effect& effect : scheduler_.handle(event, now.steady_ms)) {
+    perform(effect, now, message);
+  }
+  while (!unreachable_.empty()) {
+    const WorkerId gone = unreachable_.back();
+    unreachable_.pop_back();
+    for (const Effect& effect : scheduler_.handle(WorkerUnreachable{gone}, now.steady_ms)) {
+      perform(effect, now, nullptr);
+    }
+  }
+}
+
+void Service::perform(const Effect& effect, Instant now, protocol::Results* message) {
+  protocol::ServerToWorker out;
+  if (const auto* define = std::get_if<DefineStudy>(&effect)) {
+    out.mutable_study()->set_study_id(define->study);
+    *out.mutable_study()->mutable_recipe() = studies_.at(define->study).table->recipe();
+    send(define->worker, out);
+  } else if (const auto* batch = std::get_if<SendBatch>(&effect)) {
+    auto& fields = *out.mutable_batch();
+    fields.set_study_id(batch->study);
+    fields.set_model(batch->model);
+    fields.set_first_point(batch->first_point);
+    fields.set_count(batch->count);
+    fields.set_attempt(batch->attempt);
+    fields.set_lease_id(batch->lease);
+    send(batch->worker, out);
+  } else if (const auto* store = std::get_if<StoreResults>(&effect)) {
+    write_results(*store, *message, now);
+  } else if (const auto* failure = std::get_if<StoreFailure>(&effect)) {
+    write_failure(*failure, now);
+  } else if (const auto* stored = std::get_if<AcknowledgeResults>(&effect)) {
+    out.mutable_results_stored()->set_sequence(stored->sequence);
+    send(stored->worker, out);
+  } else if (const auto* withdraw = std::get_if<WithdrawStudy>(&effect)) {
+    out.mutable_withdraw()->set_study_id(withdraw->study);
+    send(withdraw->worker, out);
+  } else if (const auto* drop = std::get_if<DropWorker>(&effect)) {
+    const auto peer = peers_.find(drop->worker);
+    outbox_.note(Severity::kWarning, "worker " + std::to_string(drop->worker) + " (" +
+                                         (peer == peers_.end() ? "" : peer->second.name) +
+                                         ") is lost: " + drop->reason);
+    forget(drop->worker);
+  } else if (const auto* finished = std::get_if<StudyFinished>(&effect)) {
+    Study& study = studies_.at(finished->study);
+    if (study.state != StudyState::kDone) {
+      study.state = StudyState::kDone;
+      outbox_.note(Severity::kInfo, "study " + study.name + " is done");
+      write(SetStudyState{finished->study, StudyState::kDone, iso_8601(now)}, OfNothing{}, false);
+    }
+  }
+}
+
+void Service::send(WorkerId worker, const protocol::ServerToWorker& message) {
+  const auto peer = peers_.find(worker);
+  if (peer != peers_.end() && !outbox_.to_worker(peer->second.identity, message)) {
+    unreachable_.push_back(worker);
+  }
+}
+
+// ---- Writing ----------------------------------------------------------------------------------
+
+void Service::write(Change change, Write meaning, bool answer_failure) {
+  const std::uint64_t ticket = ++last_ticket_;
+  writes_.emplace(ticket, std::move(meaning));
+  outbox_.write({ticket, std::move(change), answer_failure});
+}
+
+void Service::write_results(const StoreResults& effect, protocol::Results& message, Instant now) {
+  const Peer& peer = peers_.at(effect.worker);
+  const auto study = studies_.find(effect.study);
+  AddResults change{effect.study,         study == studies_.end() ? nullptr : study->second.table,
+                    effect.worker,        peer.solver_version,
+                    peer.instruction_set, message.attempt(),
+                    iso_8601(now),        {}};
+  OfResults meaning{{effect.worker, effect.study, effect.sequence, {}}};
+  for (const std::size_t index : effect.accepted) {
+    protocol::PointResult& result = *message.mutable_results(static_cast<int>(index));
+    meaning.event.outcomes.push_back({result.point(), !result.error().empty()});
+    change.results.push_back(std::move(result));
+  }
+  write(std::move(change), std::move(meaning), false);
+}
+
+void Service::write_failure(const StoreFailure& effect, Instant now) {
+  outbox_.note(Severity::kWarning, "point " + std::to_string(effect.point) + " of study " +
+                                       studies_.at(effect.study).name +
+                                       " failed: " + effect.reason);
+  AddResults change{effect.study,
+                    studies_.at(effect.study).table,
+                    0,
+                    {},
+                    {},
+                    effect.attempt,
+                    iso_8601(now),
+                    {protocol::failed_point(effect.point, effect.reason)}};
+  write(std::move(change), OfResults{{0, effect.study, 0, {{effect.point, true}}}}, false);
+}
+
+void Service::written(const WriteReport& report, Instant now) {
+  if (report.kind == WriteReport::Kind::kFault) {
+    outbox_.note(Severity::kError, "results wait, nothing is handed out: " + report.error);
+    feed(DispatchHeld{true}, now);
+    return;
+  }
+  if (report.kind == WriteReport::Kind::kRecovered) {
+    outbox_.note(Severity::kInfo, "the database takes results again");
+    feed(DispatchHeld{stopping_}, now);
+    return;
+  }
+  const auto found = writes_.find(report.ticket);
+  if (found == writes_.end()) {
+    return;
+  }
+  const Write meaning = std::move(found->second);
+  writes_.erase(found);
+  if (report.kind == WriteReport::Kind::kStored) {
+    stored(meaning, now);
+  } else {
+    refused(meaning, report.error);
+  }
+}
+
+void Service::stored(const Write& meaning, Instant now) {
+  if (const auto* results = std::get_if<OfResults>(&meaning)) {
+    feed(results->event, now);
+  } else if (const auto* added = std::get_if<OfStudy>(&meaning)) {
+    Study& study = studies_.at(added->study);
+    study.durable = true;
+    outbox_.note(Severity::kInfo, "study " + study.name + " of " +
+                                      std::to_string(study.table->size()) + " points begins");
+    feed(StudyAdded{added->study, study.table, {}, 0, false}, now);
+    bool created = true;
+    for (const Client& client : std::exchange(study.submitters, {})) {
+      reply_submitted(client, added->study, std::exchange(created, false));
+    }
+  } else if (const auto* state = std::get_if<OfState>(&meaning)) {
+    --studies_.at(state->study).state_writes;
+    if (state->state == StudyState::kCancelled) {
+      feed(StudyCancelled{state->study}, now);
+      reply_cancelled(state->client, state->study, now);
+    } else {
+      feed(StudyReopened{state->study}, now);
+      reply_submitted(state->client, state->study, false);
+    }
+  }
+}
+
+void Service::refused(const Write& meaning, const std::string& error) {
+  if (const auto* added = std::get_if<OfStudy>(&meaning)) {
+    const auto study = studies_.find(added->study);
+    for (const Client& client : study->second.submitters) {
+      reply_error(client, "the study was not stored: " + error);
+    }
+    study_ids_.erase(study->second.name);
+    studies_.erase(study);
+  } else if (const auto* state = std::get_if<OfState>(&meaning)) {
+    Study& study = studies_.at(state->study);
+    --study.state_writes;
+    if (study.state == state->state) {
+      study.state =
+          state->state == StudyState::kCancelled ? StudyState::kRunning : StudyState::kCancelled;
+    }
+    reply_error(state->client, "the change was not stored, the study is as before: " + error);
+  }
+}
+
+// ---- Time -------------------------------------------------------------------------------------
+
+void Service::tick(Instant now) {
+  feed(Tick{}, now);
+  for (auto& [id, study] : studies_) {
+    if (!study.durable) {
+      continue;
+    }
+    const StudyCounts counts = scheduler_.study(id);
+    study.samples.push_back({now.steady_ms, counts.solved + counts.failed});
+    while (now.steady_ms - study.samples.front().steady_ms > kRateSpan_ms) {
+      study.samples.pop_front();
+    }
+  }
+}
+
+void Service::stop(Instant now) {
+  stopping_ = true;
+  feed(DispatchHeld{true}, now);
+  protocol::ServerToWorker message;
+  message.mutable_stopping();
+  for (const auto& [id, peer] : peers_) {
+    outbox_.to_worker(peer.identity, message);
+  }
+}
+
+}  // namespace oblique::server

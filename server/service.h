@@ -1,0 +1,167 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "proto/oblique.pb.h"
+#include "server/query_thread.h"
+#include "server/scheduler.h"
+#include "server/store.h"
+#include "server/writer.h"
+
+namespace oblique::server {
+
+/// A moment by two clocks.
+struct Instant {
+  std::int64_t steady_ms;  ///< never runs backwards
+  std::int64_t utc_ms;     ///< since 1970
+};
+
+enum class Severity { kInfo, kWarning, kError };
+
+/// What the service asks of the world around it. Nothing here may block or call the service back.
+class Outbox {
+ public:
+  virtual ~Outbox() = default;
+
+  /// False when the worker cannot be reached any more.
+  virtual bool to_worker(const std::string& identity, const protocol::ServerToWorker& message) = 0;
+  /// A reply that cannot be delivered is dropped: the client asks again.
+  virtual void to_client(const std::string& identity, const protocol::ClientReply& reply) = 0;
+  /// `Service::written` is called once the job's fate is known.
+  virtual void write(WriteJob job) = 0;
+  /// `Service::queried` is called with the answer. False when too many queries wait.
+  virtual bool query(QueryJob job) = 0;
+  /// For the log.
+  virtual void note(Severity severity, const std::string& text) = 0;
+};
+
+struct ServiceSettings {
+  SchedulerSettings scheduler;
+  std::uint32_t heartbeat_interval_ms = 1000;
+  std::string solver_version;  ///< workers with another one are refused
+  std::string database_id;
+  std::uint64_t last_study_id = 0;
+  std::uint64_t last_worker_id = 0;
+};
+
+/// Speaks with workers and clients in messages, keeps the scheduler informed and carries out its
+/// decisions. No sockets, no clock, no thread: tests drive it message by message. Every frame is
+/// taken for hostile until it is parsed. Not thread-safe.
+class Service {
+ public:
+  Service(ServiceSettings settings, Outbox& outbox, std::vector<StoredStudy> studies, Instant now);
+
+  void worker_frame(const std::string& identity, std::string_view frame, Instant now);
+  void client_frame(const std::string& identity, std::string_view frame, Instant now);
+  void written(const WriteReport& report, Instant now);
+  void queried(QueryReport report);
+  /// To be called several times a second.
+  void tick(Instant now);
+  /// Tells the workers that the server stops. Nothing is handed out afterwards; results are still
+  /// taken.
+  void stop(Instant now);
+
+  /// Something is on its way to the disk.
+  bool waits_for_disk() const { return !writes_.empty(); }
+  std::uint64_t bad_frames() const { return bad_frames_; }
+  const Scheduler& scheduler() const { return scheduler_; }
+
+ private:
+  struct Client {
+    std::string identity;
+    std::uint64_t request_id;
+  };
+  struct Peer {
+    std::string identity;
+    std::string name;
+    std::uint32_t threads;
+    std::string solver_version;
+    std::string instruction_set;
+  };
+  struct Sample {
+    std::int64_t steady_ms;
+    std::uint64_t settled;
+  };
+  struct Study {
+    std::string name;
+    std::shared_ptr<const protocol::PointTable> table;
+    StudyState state;  // as last sent to the database
+    std::string created_at;
+    bool durable = false;
+    std::uint32_t state_writes = 0;  // changes of state on their way to the disk
+    std::vector<Client> submitters;  // wait for it to be durable
+    std::deque<Sample> samples;      // of the last seconds
+  };
+  // What a write stands for.
+  struct OfResults {
+    ResultsStored event;
+  };
+  struct OfStudy {
+    StudyId study;
+  };
+  struct OfState {
+    StudyId study;
+    StudyState state;
+    Client client;
+  };
+  struct OfNothing {};
+  using Write = std::variant<OfResults, OfStudy, OfState, OfNothing>;
+
+  // service_workers.cpp
+  void hello(const std::string& identity, const protocol::WorkerHello& hello, Instant now);
+  void results(WorkerId worker, protocol::Results results, Instant now);
+  void forget(WorkerId worker);
+  void bad_frame(const std::string& who);
+
+  // service_clients.cpp
+  void set_state(const Client& client, StudyId id, StudyState state, Instant now);
+  void submit(const Client& client, const protocol::SubmitRequest& request, Instant now);
+  void continue_study(const Client& client, StudyId id, Instant now);
+  void cancel(const Client& client, const protocol::CancelRequest& request, Instant now);
+  void status(const Client& client, const protocol::StatusRequest& request, Instant now);
+  void workers(const Client& client, Instant now);
+  void query(const Client& client, const protocol::QueryRequest& request);
+  void reply_submitted(const Client& client, StudyId id, bool created);
+  void reply_cancelled(const Client& client, StudyId id, Instant now);
+  void reply_error(const Client& client, const std::string& message);
+  protocol::StudyStatus status_of(StudyId id, Instant now) const;
+
+  // service.cpp
+  void feed(const Event& event, Instant now, protocol::Results* message = nullptr);
+  void perform(const Effect& effect, Instant now, protocol::Results* message);
+  void send(WorkerId worker, const protocol::ServerToWorker& message);
+  void write(Change change, Write meaning, bool answer_failure);
+  void write_results(const StoreResults& effect, protocol::Results& message, Instant now);
+  void write_failure(const StoreFailure& effect, Instant now);
+  void stored(const Write& meaning, Instant now);
+  void refused(const Write& meaning, const std::string& error);
+
+  ServiceSettings settings_;
+  Outbox& outbox_;
+  Scheduler scheduler_;
+  std::map<WorkerId, Peer> peers_;
+  std::map<std::string, WorkerId, std::less<>> worker_ids_;  // by identity
+  std::map<StudyId, Study> studies_;
+  std::map<std::string, StudyId, std::less<>> study_ids_;  // by name
+  std::map<std::uint64_t, Write> writes_;                  // by ticket
+  std::map<std::uint64_t, Client> queries_;                // by ticket
+  std::vector<WorkerId> unreachable_;                      // found while effects were carried out
+  std::uint64_t last_ticket_ = 0;
+  std::uint64_t bad_frames_ = 0;
+  bool stopping_ = false;
+};
+
+/// UTC in ISO 8601 with milliseconds.
+std::string iso_8601(Instant now);
+
+/// The beginning of a UTF-8 text, at most `bytes` long, without half a character at its end.
+std::string shortened(const std::string& text, std::size_t bytes);
+
+}  // namespace oblique::server

@@ -1,0 +1,254 @@
+// The side of the service that speaks with clients.
+#include <algorithm>
+#include <utility>
+
+#include "proto/frames.h"
+#include "server/service.h"
+
+namespace oblique::server {
+namespace {
+
+constexpr std::size_t kLongestName = 200;
+
+/// Why a study cannot be called so, or an empty text.
+std::string objection_to_name(const std::string& name) {
+  if (name.empty() || name.size() > kLongestName) {
+    return "a study needs a name of 1 to " + std::to_string(kLongestName) + " bytes, not " +
+           std::to_string(name.size());
+  }
+  const bool printable = std::none_of(name.begin(), name.end(), [](char c) {
+    const auto byte = static_cast<unsigned char>(c);
+    return byte < 0x20 || byte == 0x7f;
+  });
+  return printable ? "" : "the name of a study may not contain control characters";
+}
+
+std::string unknown_study(const std::string& name) {
+  return "there is no study called \"" + shortened(name, kLongestName) +
+         "\": `oblique studies` lists all";
+}
+
+}  // namespace
+
+void Service::client_frame(const std::string& identity, std::string_view frame, Instant now) {
+  protocol::ClientRequest request;
+  using Kind = protocol::ClientRequest;
+  if (!protocol::decode(frame, request)) {
+    bad_frame("a client");
+    reply_error({identity, 0}, "the request cannot be read");
+    return;
+  }
+  const Client client{identity, request.request_id()};
+  if (request.protocol_version() != protocol::kProtocolVersion) {
+    reply_error(client, "the server speaks protocol version " +
+                            std::to_string(protocol::kProtocolVersion) + ", the client " +
+                            std::to_string(request.protocol_version()) +
+                            ": install the same release on both");
+    return;
+  }
+  switch (request.kind_case()) {
+    case Kind::kSubmit:
+      submit(client, request.submit(), now);
+      break;
+    case Kind::kStatus:
+      status(client, request.status(), now);
+      break;
+    case Kind::kWorkers:
+      workers(client, now);
+      break;
+    case Kind::kCancel:
+      cancel(client, request.cancel(), now);
+      break;
+    case Kind::kQuery:
+      query(client, request.query());
+      break;
+    case Kind::KIND_NOT_SET:
+      bad_frame("a client");
+      reply_error(client, "the server does not know this kind of request");
+      break;
+  }
+}
+
+void Service::submit(const Client& client, const protocol::SubmitRequest& request, Instant now) {
+  if (stopping_) {
+    reply_error(client, "the server is stopping: submit again when it is back");
+    return;
+  }
+  if (const std::string reason = objection_to_name(request.name()); !reason.empty()) {
+    reply_error(client, reason);
+    return;
+  }
+  std::shared_ptr<const protocol::PointTable> table;
+  try {
+    table = std::make_shared<const protocol::PointTable>(request.recipe());
+  } catch (const solver::InputError& error) {
+    reply_error(client, error.what());
+    return;
+  }
+  if (const auto known = study_ids_.find(request.name()); known != study_ids_.end()) {
+    const Study& study = studies_.at(known->second);
+    if (study.table->recipe().SerializeAsString() != table->recipe().SerializeAsString()) {
+      reply_error(client, "there is a study called \"" + request.name() +
+                              "\" with other points or another model: give this one another name, "
+                              "or use another database");
+      return;
+    }
+    continue_study(client, known->second, now);
+    return;
+  }
+  const StudyId id = ++settings_.last_study_id;
+  const std::string created_at = iso_8601(now);
+  study_ids_.emplace(request.name(), id);
+  studies_.emplace(
+      id, Study{request.name(), table, StudyState::kRunning, created_at, false, 0, {client}, {}});
+  write(AddStudy{id, request.name(), table, created_at}, OfStudy{id}, true);
+}
+
+void Service::continue_study(const Client& client, StudyId id, Instant now) {
+  Study& study = studies_.at(id);
+  if (!study.durable) {
+    study.submitters.push_back(client);
+  } else if (study.state == StudyState::kCancelled || study.state_writes > 0) {
+    set_state(client, id, StudyState::kRunning, now);
+  } else {
+    reply_submitted(client, id, false);
+  }
+}
+
+void Service::set_state(const Client& client, StudyId id, StudyState state, Instant now) {
+  Study& study = studies_.at(id);
+  study.state = state;
+  ++study.state_writes;
+  write(SetStudyState{id, state, iso_8601(now)}, OfState{id, state, client}, true);
+}
+
+void Service::cancel(const Client& client, const protocol::CancelRequest& request, Instant now) {
+  const auto known = study_ids_.find(request.study());
+  if (known == study_ids_.end() || !studies_.at(known->second).durable) {
+    reply_error(client, unknown_study(request.study()));
+    return;
+  }
+  const Study& study = studies_.at(known->second);
+  if (study.state == StudyState::kDone ||
+      (study.state == StudyState::kCancelled && study.state_writes == 0)) {
+    reply_cancelled(client, known->second, now);
+    return;
+  }
+  set_state(client, known->second, StudyState::kCancelled, now);
+}
+
+void Service::status(const Client& client, const protocol::StatusRequest& request, Instant now) {
+  protocol::ClientReply reply;
+  reply.set_request_id(client.request_id);
+  auto& fields = *reply.mutable_status();
+  fields.set_workers(static_cast<std::uint32_t>(scheduler_.workers()));
+  for (const auto& [id, study] : studies_) {
+    if (study.durable && (request.study().empty() || request.study() == study.name)) {
+      *fields.add_studies() = status_of(id, now);
+    }
+  }
+  if (!request.study().empty() && fields.studies().empty()) {
+    reply_error(client, unknown_study(request.study()));
+    return;
+  }
+  outbox_.to_client(client.identity, reply);
+}
+
+protocol::StudyStatus Service::status_of(StudyId id, Instant now) const {
+  const Study& study = studies_.at(id);
+  const StudyCounts counts = scheduler_.study(id);
+  const std::uint64_t settled = counts.solved + counts.failed;
+  protocol::StudyStatus status;
+  status.set_study_id(id);
+  status.set_name(study.name);
+  status.set_state(settled == counts.points ? "done" : state_name(study.state));
+  status.set_points(counts.points);
+  status.set_solved(counts.solved);
+  status.set_failed(counts.failed);
+  status.set_leased(counts.leased);
+  status.set_created_at(study.created_at);
+  if (!study.samples.empty()) {
+    const Sample& oldest = study.samples.front();
+    const std::int64_t span_ms = now.steady_ms - oldest.steady_ms;
+    if (span_ms > 0) {
+      status.set_points_per_s(1000.0 * static_cast<double>(settled - oldest.settled) /
+                              static_cast<double>(span_ms));
+    }
+  }
+  return status;
+}
+
+void Service::workers(const Client& client, Instant now) {
+  protocol::ClientReply reply;
+  reply.set_request_id(client.request_id);
+  auto& fields = *reply.mutable_workers();
+  for (const auto& [id, peer] : peers_) {
+    const WorkerCounts counts = scheduler_.worker(id, now.steady_ms);
+    auto& worker = *fields.add_workers();
+    worker.set_worker_id(id);
+    worker.set_name(peer.name);
+    worker.set_threads(peer.threads);
+    worker.set_instruction_set(peer.instruction_set);
+    worker.set_solver_version(peer.solver_version);
+    worker.set_leased_points(counts.leased_points);
+    worker.set_solved_points(counts.solved_points);
+    worker.set_silent_ms(static_cast<std::uint32_t>(counts.silent_ms));
+  }
+  outbox_.to_client(client.identity, reply);
+}
+
+void Service::query(const Client& client, const protocol::QueryRequest& request) {
+  const std::uint64_t ticket = ++last_ticket_;
+  queries_.emplace(ticket, client);
+  if (!outbox_.query({ticket, request})) {
+    queries_.erase(ticket);
+    reply_error(client, "too many queries wait already: ask again later");
+  }
+}
+
+void Service::queried(QueryReport report) {
+  const auto found = queries_.find(report.ticket);
+  if (found == queries_.end()) {
+    return;
+  }
+  const Client client = std::move(found->second);
+  queries_.erase(found);
+  if (!report.error.empty()) {
+    reply_error(client, report.error);
+    return;
+  }
+  protocol::ClientReply reply;
+  reply.set_request_id(client.request_id);
+  *reply.mutable_query() = std::move(report.reply);
+  outbox_.to_client(client.identity, reply);
+}
+
+// ---- Replies ----------------------------------------------------------------------------------
+
+void Service::reply_submitted(const Client& client, StudyId id, bool created) {
+  const StudyCounts counts = scheduler_.study(id);
+  protocol::ClientReply reply;
+  reply.set_request_id(client.request_id);
+  auto& fields = *reply.mutable_submit();
+  fields.set_study_id(id);
+  fields.set_points(counts.points);
+  fields.set_settled(counts.solved + counts.failed);
+  fields.set_created(created);
+  outbox_.to_client(client.identity, reply);
+}
+
+void Service::reply_cancelled(const Client& client, StudyId id, Instant now) {
+  protocol::ClientReply reply;
+  reply.set_request_id(client.request_id);
+  *reply.mutable_cancel()->mutable_study() = status_of(id, now);
+  outbox_.to_client(client.identity, reply);
+}
+
+void Service::reply_error(const Client& client, const std::string& message) {
+  protocol::ClientReply reply;
+  reply.set_request_id(client.request_id);
+  reply.mutable_error()->set_message(message);
+  outbox_.to_client(client.identity, reply);
+}
+
+}  // namespace oblique::server

@@ -1,0 +1,155 @@
+// The side of the service that speaks with workers.
+#include <algorithm>
+#include <bit>
+#include <utility>
+
+#include "proto/frames.h"
+#include "server/result_row.h"
+#include "server/service.h"
+
+namespace oblique::server {
+namespace {
+
+constexpr std::size_t kLongestName = 256;
+constexpr std::uint32_t kMostThreads = 4096;
+
+/// Why the worker cannot work here, or an empty text.
+std::string objection(const protocol::WorkerHello& hello, const std::string& solver_version) {
+  if (hello.protocol_version() != protocol::kProtocolVersion) {
+    return "the server speaks protocol version " + std::to_string(protocol::kProtocolVersion) +
+           ", the worker " + std::to_string(hello.protocol_version()) +
+           ": install the same release on both";
+  }
+  if (hello.solver_version() != solver_version) {
+    return "the server's solver has version " + solver_version + ", the worker's " +
+           shortened(hello.solver_version(), kLongestName) +
+           ": install the same release on both, for a study's results come from one solver";
+  }
+  return {};
+}
+
+}  // namespace
+
+void Service::worker_frame(const std::string& identity, std::string_view frame, Instant now) {
+  protocol::WorkerMessage message;
+  using Kind = protocol::WorkerMessage;
+  if (!protocol::decode(frame, message) || message.kind_case() == Kind::KIND_NOT_SET) {
+    bad_frame("a worker");
+    return;
+  }
+  if (message.kind_case() == Kind::kHello) {
+    hello(identity, message.hello(), now);
+    return;
+  }
+  const auto known = worker_ids_.find(identity);
+  if (known == worker_ids_.end()) {
+    if (message.kind_case() != Kind::kGoodbye) {
+      protocol::ServerToWorker again;
+      again.mutable_hello_again();
+      outbox_.to_worker(identity, again);
+    }
+    return;
+  }
+  const WorkerId worker = known->second;
+  switch (message.kind_case()) {
+    case Kind::kCredit:
+      feed(CreditGiven{worker, message.credit().batches()}, now);
+      break;
+    case Kind::kResults:
+      results(worker, std::move(*message.mutable_results()), now);
+      break;
+    case Kind::kHeartbeat: {
+      const auto& leases = message.heartbeat().lease_ids();
+      feed(HeartbeatReceived{worker, {leases.begin(), leases.end()}}, now);
+      protocol::ServerToWorker reply;
+      reply.mutable_heartbeat_reply();
+      outbox_.to_worker(identity, reply);
+      break;
+    }
+    case Kind::kGoodbye:
+      outbox_.note(Severity::kInfo, "worker " + std::to_string(worker) + " leaves");
+      feed(WorkerLeft{worker}, now);
+      forget(worker);
+      break;
+    default:
+      break;
+  }
+}
+
+void Service::hello(const std::string& identity, const protocol::WorkerHello& hello, Instant now) {
+  if (const auto known = worker_ids_.find(identity); known != worker_ids_.end()) {
+    // It begins anew, and so do we: what it held is free again.
+    const WorkerId old = known->second;
+    feed(WorkerLeft{old}, now);
+    forget(old);
+  }
+  protocol::ServerToWorker reply;
+  if (const std::string reason = objection(hello, settings_.solver_version); !reason.empty()) {
+    outbox_.note(Severity::kWarning, "a worker is refused: " + reason);
+    reply.mutable_refused()->set_reason(reason);
+    outbox_.to_worker(identity, reply);
+    return;
+  }
+  const WorkerId id = ++settings_.last_worker_id;
+  const Peer peer{identity, shortened(hello.name(), kLongestName),
+                  std::clamp(hello.threads(), 1U, kMostThreads), hello.solver_version(),
+                  shortened(hello.instruction_set(), kLongestName)};
+  auto& welcome = *reply.mutable_welcome();
+  welcome.set_protocol_version(protocol::kProtocolVersion);
+  welcome.set_worker_id(id);
+  welcome.set_heartbeat_interval_ms(settings_.heartbeat_interval_ms);
+  welcome.set_lost_after_ms(static_cast<std::uint32_t>(settings_.scheduler.lost_after_ms));
+  welcome.set_database_id(settings_.database_id);
+  if (!outbox_.to_worker(identity, reply)) {
+    return;
+  }
+  outbox_.note(Severity::kInfo, "worker " + std::to_string(id) + " (" + peer.name + ", " +
+                                    std::to_string(peer.threads) + " threads) joins");
+  peers_.emplace(id, peer);
+  worker_ids_[identity] = id;
+  write(AddWorker{id, peer.name, peer.threads, peer.solver_version, peer.instruction_set,
+                  iso_8601(now)},
+        OfNothing{}, false);
+  feed(WorkerJoined{id, peer.threads}, now);
+  if (stopping_) {
+    reply.mutable_stopping();
+    outbox_.to_worker(identity, reply);
+  }
+}
+
+void Service::results(WorkerId worker, protocol::Results message, Instant now) {
+  ResultsReceived event{worker,
+                        message.study_id(),
+                        message.lease_id(),
+                        message.sequence(),
+                        message.batch_done(),
+                        message.busy_s(),
+                        {}};
+  event.outcomes.reserve(static_cast<std::size_t>(message.results_size()));
+  for (protocol::PointResult& result : *message.mutable_results()) {
+    if (const std::string fault = fault_of(result); !fault.empty()) {
+      result = protocol::failed_point(result.point(), fault);
+    }
+    event.outcomes.push_back({result.point(), !result.error().empty()});
+  }
+  feed(event, now, &message);
+}
+
+void Service::forget(WorkerId worker) {
+  const auto peer = peers_.find(worker);
+  if (peer != peers_.end()) {
+    worker_ids_.erase(peer->second.identity);
+    peers_.erase(peer);
+  }
+}
+
+void Service::bad_frame(const std::string& who) {
+  ++bad_frames_;
+  // A flood of them must not become a flood of lines.
+  if (std::has_single_bit(bad_frames_)) {
+    outbox_.note(Severity::kWarning, who + " sent a frame that is no message (" +
+                                         std::to_string(bad_frames_) + " of them so far)");
+  }
+}
+
+}  // namespace oblique::server

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "server/changes.h"
+
+namespace oblique::server {
+
+/// A change on its way to the database.
+struct WriteJob {
+  std::uint64_t ticket;
+  Change change;
+  /// Somebody waits for a yes or no: a failure is reported at once. Otherwise the change is kept
+  /// and tried again until it is durable.
+  bool answer_failure;
+};
+
+/// What became of a job, or of the database itself.
+struct WriteReport {
+  enum class Kind {
+    kStored,     ///< the job of that ticket is durable
+    kRefused,    ///< it failed and is given up; `error` says why
+    kFault,      ///< the database does not take changes; jobs wait. Said once
+    kRecovered,  ///< it does again
+  };
+  Kind kind;
+  std::uint64_t ticket = 0;
+  std::string error;
+};
+
+/// The one thread that writes the database. What waits is committed together, in order.
+class Writer {
+ public:
+  using Report = std::function<void(std::vector<WriteReport>)>;
+
+  /// `report` is called on the writer's thread, after each commit. Both references must outlive
+  /// the writer.
+  Writer(Storage& storage, Report report);
+  /// Stops without waiting for jobs that keep failing.
+  ~Writer();
+  Writer(const Writer&) = delete;
+  Writer& operator=(const Writer&) = delete;
+
+  void submit(WriteJob job);
+
+  /// Writes what waits and ends the thread. Returns how many jobs could not be made durable.
+  std::size_t finish();
+
+ private:
+  void run();
+  void write(std::deque<WriteJob>& jobs);
+  bool write_group(std::deque<WriteJob>& jobs, std::vector<WriteReport>& reports);
+  void write_singly(std::deque<WriteJob>& jobs, std::vector<WriteReport>& reports);
+
+  Storage& storage_;
+  Report report_;
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  std::deque<WriteJob> queue_;  // guarded by mutex_
+  bool finishing_ = false;      // guarded by mutex_
+  std::size_t left_over_ = 0;   // written by the thread, read after it ended
+  bool faulty_ = false;         // of the thread
+  std::thread thread_;          // last: it uses all the others
+};
+
+}  // namespace oblique::server
