@@ -1,0 +1,420 @@
+#include "worker/conversation.h"
+
+#include <algorithm>
+#include <limits>
+#include <set>
+#include <utility>
+
+namespace oblique::worker {
+namespace {
+
+constexpr std::int64_t kNever_ms = std::numeric_limits<std::int64_t>::max();
+
+/// What a server may ask for; outside it, heartbeats would flood or never come.
+constexpr std::int64_t kShortestInterval_ms = 10;
+constexpr std::int64_t kLongestInterval_ms = 600'000;
+
+}  // namespace
+
+Conversation::Conversation(protocol::WorkerHello hello, ConversationSettings settings)
+    : hello_(std::move(hello)), settings_(settings) {}
+
+Effects Conversation::take_effects() {
+  return std::exchange(effects_, {});
+}
+
+// ---- Connecting
+// -----------------------------------------------------------------------------------
+
+Effects Conversation::start(std::int64_t now_ms) {
+  now_ms_ = now_ms;
+  connect("");
+  return take_effects();
+}
+
+void Conversation::connect(const std::string& reason) {
+  effects_.emplace_back(Connect{reason});
+  protocol::WorkerMessage message;
+  *message.mutable_hello() = hello_;
+  effects_.emplace_back(Send{std::move(message)});
+  state_ = State::kGreeting;
+  deadline_ms_ = now_ms_ + settings_.hello_timeout_ms;
+  backoff_ms_ =
+      std::clamp(2 * backoff_ms_, settings_.shortest_backoff_ms, settings_.longest_backoff_ms);
+}
+
+void Conversation::connect_after_backoff(const std::string& reason) {
+  server_stopping_ = false;
+  if (backoff_ms_ == 0) {
+    connect(reason);
+    return;
+  }
+  effects_.emplace_back(Note{reason + ": trying again in " + std::to_string(backoff_ms_) + " ms"});
+  state_ = State::kWaiting;
+  deadline_ms_ = now_ms_ + backoff_ms_;
+}
+
+Effects Conversation::on_send_failed(std::int64_t now_ms) {
+  now_ms_ = now_ms;
+  if (state_ == State::kGreeting || state_ == State::kWelcomed) {
+    connect_after_backoff("a message could not be sent");
+  }
+  return take_effects();
+}
+
+Effects Conversation::on_time(std::int64_t now_ms) {
+  now_ms_ = now_ms;
+  if (stopping_ && now_ms_ >= stop_deadline_ms_) {
+    finish(0, "stopped");
+  }
+  switch (state_) {
+    case State::kGreeting:
+      if (now_ms_ >= deadline_ms_) {
+        connect_after_backoff("the server does not answer");
+      }
+      break;
+    case State::kWaiting:
+      if (now_ms_ >= deadline_ms_) {
+        connect("");
+      }
+      break;
+    case State::kWelcomed:
+      if (now_ms_ >= deadline_ms_) {
+        connect_after_backoff("the server is silent");
+      } else if (now_ms_ >= heartbeat_due_ms_) {
+        send_heartbeat();
+      }
+      break;
+    case State::kFinished:
+      break;
+  }
+  return take_effects();
+}
+
+std::int64_t Conversation::next_deadline_ms() const {
+  if (state_ == State::kFinished) {
+    return kNever_ms;
+  }
+  const std::int64_t stop_ms = stopping_ ? stop_deadline_ms_ : kNever_ms;
+  const std::int64_t heartbeat_ms = state_ == State::kWelcomed ? heartbeat_due_ms_ : kNever_ms;
+  return std::min({deadline_ms_, stop_ms, heartbeat_ms});
+}
+
+void Conversation::send_heartbeat() {
+  std::set<std::uint64_t> leases;
+  for (const auto& [number, held] : held_) {
+    leases.insert(held.lease_id);
+  }
+  for (const protocol::Results& results : unacknowledged_) {
+    leases.insert(results.lease_id());
+  }
+  leases.erase(0);
+  protocol::WorkerMessage message;
+  message.mutable_heartbeat()->mutable_lease_ids()->Assign(leases.begin(), leases.end());
+  send(std::move(message));
+  heartbeat_due_ms_ = now_ms_ + heartbeat_interval_ms_;
+}
+
+void Conversation::send(protocol::WorkerMessage message) {
+  if (state_ == State::kWelcomed) {
+    effects_.emplace_back(Send{std::move(message)});
+  }
+}
+
+// ---- Messages
+// -------------------------------------------------------------------------------------
+
+Effects Conversation::on_message(const protocol::ServerToWorker& message, std::int64_t now_ms) {
+  now_ms_ = now_ms;
+  const auto kind = message.kind_case();
+  if (state_ == State::kGreeting) {
+    // Before the welcome only the answers to a hello mean anything.
+    if (kind == protocol::ServerToWorker::kWelcome) {
+      on(message.welcome());
+    } else if (kind == protocol::ServerToWorker::kRefused) {
+      on(message.refused());
+    } else if (kind == protocol::ServerToWorker::kHelloAgain) {
+      on(message.hello_again());
+    }
+    return take_effects();
+  }
+  if (state_ != State::kWelcomed) {
+    return take_effects();
+  }
+  deadline_ms_ = now_ms_ + lost_after_ms_;
+  switch (kind) {
+    case protocol::ServerToWorker::kRefused:
+      on(message.refused());
+      break;
+    case protocol::ServerToWorker::kStudy:
+      on(message.study());
+      break;
+    case protocol::ServerToWorker::kBatch:
+      on(message.batch());
+      break;
+    case protocol::ServerToWorker::kResultsStored:
+      on(message.results_stored());
+      break;
+    case protocol::ServerToWorker::kWithdraw:
+      on(message.withdraw());
+      break;
+    case protocol::ServerToWorker::kHelloAgain:
+      on(message.hello_again());
+      break;
+    case protocol::ServerToWorker::kHeartbeatReply:
+      on(message.heartbeat_reply());
+      break;
+    case protocol::ServerToWorker::kStopping:
+      on(message.stopping());
+      break;
+    case protocol::ServerToWorker::kWelcome:  // said twice: the first one counts
+    case protocol::ServerToWorker::KIND_NOT_SET:
+      break;
+  }
+  return take_effects();
+}
+
+void Conversation::on(const protocol::Welcome& welcome) {
+  state_ = State::kWelcomed;
+  heartbeat_interval_ms_ = std::clamp<std::int64_t>(welcome.heartbeat_interval_ms(),
+                                                    kShortestInterval_ms, kLongestInterval_ms);
+  lost_after_ms_ = std::clamp<std::int64_t>(welcome.lost_after_ms(), 2 * heartbeat_interval_ms_,
+                                            3 * kLongestInterval_ms);
+  deadline_ms_ = now_ms_ + lost_after_ms_;
+  heartbeat_due_ms_ = now_ms_ + heartbeat_interval_ms_;
+  server_stopping_ = false;
+  effects_.emplace_back(Note{"welcomed as worker " + std::to_string(welcome.worker_id())});
+
+  // The server has given up what this worker held and hands it out anew.
+  effects_.emplace_back(DropAll{});
+  held_.clear();
+  studies_.clear();
+  open_credit_ = 0;
+  if (database_id_ != welcome.database_id()) {
+    if (!unacknowledged_.empty()) {
+      effects_.emplace_back(Note{"another database: " + std::to_string(unacknowledged_results_) +
+                                 " results for the one before are dropped"});
+    }
+    unacknowledged_.clear();
+    unacknowledged_results_ = 0;
+    database_id_ = welcome.database_id();
+  }
+  // Results go before credit, so that their points are not handed out again.
+  for (protocol::Results& results : unacknowledged_) {
+    results.set_lease_id(0);
+    results.set_batch_done(false);
+    protocol::WorkerMessage message;
+    *message.mutable_results() = results;
+    send(std::move(message));
+  }
+  give_credit();
+  finish_if_delivered();
+}
+
+void Conversation::on(const protocol::Refused& refused) {
+  finish(1, "the server refuses this worker: " + refused.reason());
+}
+
+void Conversation::on(const protocol::StudyDefinition& definition) {
+  try {
+    studies_[definition.study_id()] =
+        std::make_shared<const protocol::PointTable>(definition.recipe());
+  } catch (const solver::InputError& error) {
+    // The server took this recipe, so it reads recipes otherwise than this worker does. To fail the
+    // points would blame the study.
+    finish(1, "study " + std::to_string(definition.study_id()) +
+                  " cannot be read, is this worker older than the server? " + error.what());
+  }
+}
+
+void Conversation::on(const protocol::Batch& batch) {
+  open_credit_ -= std::min(open_credit_, 1U);
+  if (stopping_) {
+    return;
+  }
+  const auto study = studies_.find(batch.study_id());
+  const bool is_sound = study != studies_.end() && batch.count() > 0 &&
+                        batch.model() < study->second->models() &&
+                        batch.first_point() < study->second->size() &&
+                        batch.count() <= study->second->size() - batch.first_point();
+  if (!is_sound) {
+    connect_after_backoff("a batch of points that no known study has");
+    return;
+  }
+  backoff_ms_ = 0;
+  const std::uint64_t number = next_task_++;
+  held_[number] = {batch.study_id(), batch.lease_id(), batch.attempt()};
+  effects_.emplace_back(Solve{{number, batch.study_id(), batch.model(), batch.first_point(),
+                               batch.count(), study->second}});
+}
+
+void Conversation::on(const protocol::ResultsStored& stored) {
+  backoff_ms_ = 0;
+  const auto found = std::lower_bound(
+      unacknowledged_.begin(), unacknowledged_.end(), stored.sequence(),
+      [](const protocol::Results& results, std::uint64_t s) { return results.sequence() < s; });
+  if (found != unacknowledged_.end() && found->sequence() == stored.sequence()) {
+    forget_results(static_cast<std::size_t>(found->results_size()));
+    unacknowledged_.erase(found);
+  }
+  give_credit();
+  finish_if_delivered();
+}
+
+void Conversation::on(const protocol::Withdraw& withdraw) {
+  effects_.emplace_back(DropStudy{withdraw.study_id()});
+  std::erase_if(held_,
+                [&](const auto& entry) { return entry.second.study_id == withdraw.study_id(); });
+  std::erase_if(unacknowledged_, [&](const protocol::Results& results) {
+    const bool is_withdrawn = results.study_id() == withdraw.study_id();
+    if (is_withdrawn) {
+      forget_results(static_cast<std::size_t>(results.results_size()));
+    }
+    return is_withdrawn;
+  });
+  give_credit();
+  finish_if_delivered();
+}
+
+void Conversation::on(const protocol::HelloAgain&) {
+  connect_after_backoff("the server does not know this worker");
+}
+
+void Conversation::on(const protocol::HeartbeatReply&) {
+  backoff_ms_ = 0;
+}
+
+void Conversation::on(const protocol::ServerStopping&) {
+  // Batches at hand are solved and their results kept. The socket finds the server when it is back,
+  // which then says HelloAgain.
+  server_stopping_ = true;
+  effects_.emplace_back(Note{"the server stops"});
+}
+
+// ---- Results
+// --------------------------------------------------------------------------------------
+
+Effects Conversation::on_progress(std::vector<Progress> progress, std::int64_t now_ms) {
+  now_ms_ = now_ms;
+  if (state_ == State::kFinished) {
+    return take_effects();
+  }
+  for (Progress& part : progress) {
+    report(part);
+  }
+  give_credit();
+  return take_effects();
+}
+
+void Conversation::report(Progress& progress) {
+  const auto found = held_.find(progress.task);
+  // A task of before the last welcome: what is solved is solved, but there is no lease to end.
+  const Held held = found != held_.end() ? found->second : Held{progress.study_id, 0, 0};
+  const auto new_message = [&] {
+    protocol::Results results;
+    results.set_study_id(progress.study_id);
+    results.set_lease_id(held.lease_id);
+    results.set_attempt(held.attempt);
+    return results;
+  };
+  const double s_per_point = progress.results.empty()
+                                 ? 0.0
+                                 : progress.busy_s / static_cast<double>(progress.results.size());
+  protocol::Results results = new_message();
+  std::size_t bytes = 0;
+  for (protocol::PointResult& result : progress.results) {
+    if (result.ByteSizeLong() > settings_.bytes_a_message) {
+      result = protocol::failed_point(result.point(), "its result is too large to send");
+    }
+    const std::size_t result_bytes = result.ByteSizeLong();
+    const auto count = static_cast<std::size_t>(results.results_size());
+    if (count == settings_.results_a_message ||
+        (count > 0 && bytes + result_bytes > settings_.bytes_a_message)) {
+      queue_results(std::exchange(results, new_message()));
+      bytes = 0;
+    }
+    bytes += result_bytes;
+    results.set_busy_s(results.busy_s() + s_per_point);
+    *results.add_results() = std::move(result);
+  }
+  const bool ends_lease = progress.task_done && found != held_.end();
+  results.set_batch_done(ends_lease);
+  if (ends_lease) {
+    held_.erase(found);
+  }
+  if (ends_lease || results.results_size() > 0) {
+    queue_results(std::move(results));
+  }
+}
+
+void Conversation::queue_results(protocol::Results results) {
+  results.set_sequence(next_sequence_++);
+  unacknowledged_results_ += static_cast<std::size_t>(results.results_size());
+  protocol::WorkerMessage message;
+  *message.mutable_results() = results;
+  unacknowledged_.push_back(std::move(results));
+  send(std::move(message));
+}
+
+void Conversation::forget_results(std::size_t count) {
+  unacknowledged_results_ -= count;
+}
+
+bool Conversation::may_solve() const {
+  return unacknowledged_results_ < settings_.unacknowledged_limit;
+}
+
+void Conversation::give_credit() {
+  const auto taken = static_cast<std::uint32_t>(held_.size()) + open_credit_;
+  if (state_ != State::kWelcomed || stopping_ || server_stopping_ || !may_solve() ||
+      taken >= settings_.batches_held) {
+    return;
+  }
+  protocol::WorkerMessage message;
+  message.mutable_credit()->set_batches(settings_.batches_held - taken);
+  send(std::move(message));
+  open_credit_ = settings_.batches_held - static_cast<std::uint32_t>(held_.size());
+}
+
+// ---- The end
+// --------------------------------------------------------------------------------------
+
+Effects Conversation::stop(std::int64_t now_ms) {
+  now_ms_ = now_ms;
+  if (stopping_) {
+    finish(0, "stopped at once");
+    return take_effects();
+  }
+  stopping_ = true;
+  stop_deadline_ms_ = now_ms_ + settings_.stop_timeout_ms;
+  effects_.emplace_back(DropAll{});
+  held_.clear();
+  finish_if_delivered();
+  return take_effects();
+}
+
+void Conversation::finish_if_delivered() {
+  if (stopping_ && unacknowledged_.empty()) {
+    finish(0, "stopped");
+  }
+}
+
+void Conversation::finish(int exit_code, const std::string& reason) {
+  if (state_ == State::kFinished) {
+    return;
+  }
+  if (exit_code == 0) {
+    protocol::WorkerMessage message;
+    message.mutable_goodbye();
+    send(std::move(message));
+  }
+  state_ = State::kFinished;
+  effects_.emplace_back(DropAll{});
+  const std::string lost = unacknowledged_results_ == 0
+                               ? ""
+                               : "; " + std::to_string(unacknowledged_results_) +
+                                     " results could not be delivered and will be solved again";
+  effects_.emplace_back(Finish{exit_code, reason + lost});
+}
+
+}  // namespace oblique::worker

@@ -1,0 +1,95 @@
+#include <pthread.h>
+#include <sys/signalfd.h>
+#include <unistd.h>
+
+#include <array>
+#include <csignal>
+#include <cstdlib>
+#include <exception>
+#include <string>
+
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+#include <CLI/CLI.hpp>
+
+#include "worker/point_solver.h"
+#include "worker/session.h"
+#include "worker/solver/solve.h"
+
+namespace {
+
+using oblique::worker::SessionSettings;
+
+constexpr int kWrongUsage = 2;
+
+std::string host_and_process() {
+  std::array<char, 256> host{};
+  gethostname(host.data(), host.size() - 1);
+  return std::string(host.data()) + ":" + std::to_string(getpid());
+}
+
+/// Blocks SIGTERM and SIGINT for this thread and those it starts, and returns a descriptor that is
+/// readable when one has come.
+int signal_descriptor() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGTERM);
+  sigaddset(&signals, SIGINT);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  return signalfd(-1, &signals, SFD_NONBLOCK | SFD_CLOEXEC);
+}
+
+int run_worker(const SessionSettings& settings) {
+  const int signals = signal_descriptor();
+  // The log's reader may be gone before this process is.
+  std::signal(SIGPIPE, SIG_IGN);
+  oblique::worker::PointSolver points(settings.models_kept);
+  oblique::worker::Session session(settings,
+                                   [&](const oblique::worker::Task& task, std::uint64_t point) {
+                                     return points.solve(task, point);
+                                   });
+  spdlog::info("worker {}, solver {} ({}), server {}", settings.name,
+               oblique::solver::solver_version(), oblique::solver::instruction_set(),
+               settings.server);
+  const int exit_code = session.run(signals, [&] {
+    signalfd_siginfo received{};
+    static_cast<void>(read(signals, &received, sizeof(received)));
+  });
+  if (session.is_solving()) {
+    // A point cannot be interrupted and may take long; nobody waits for it any more.
+    spdlog::default_logger()->flush();
+    std::_Exit(exit_code);
+  }
+  return exit_code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  spdlog::set_default_logger(spdlog::stderr_color_mt("worker"));
+  SessionSettings settings;
+  settings.name = host_and_process();
+  CLI::App app(
+      "Solves points of parameter studies for an oblique-server.\n"
+      "Example: oblique-worker --server tcp://127.0.0.1:7601");
+  app.set_version_flag("--version", oblique::solver::solver_version());
+  app.add_option("--server", settings.server, "Where the server awaits workers")
+      ->capture_default_str();
+  app.add_option("--name", settings.name, "Name that people see")->capture_default_str();
+  app.add_flag("--stop-with-parent", settings.stop_with_parent,
+               "Stop when the parent process is gone");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? EXIT_SUCCESS : kWrongUsage;
+  }
+  try {
+    return run_worker(settings);
+  } catch (const oblique::worker::AddressError& error) {
+    spdlog::error("{}", error.what());
+    return kWrongUsage;
+  } catch (const std::exception& error) {
+    spdlog::error("{}", error.what());
+    return EXIT_FAILURE;
+  }
+}

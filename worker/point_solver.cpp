@@ -1,0 +1,58 @@
+#include "worker/point_solver.h"
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+
+namespace oblique::worker {
+
+PointSolver::PointSolver(std::size_t models_kept) : fingers_(models_kept) {}
+
+protocol::PointResult PointSolver::solve(const Task& task, std::uint64_t point) {
+  try {
+    const auto finger = fingers_.finger(task.points->model(task.model));
+    const protocol::Point at = task.points->point(point);
+    protocol::PointResult result =
+        protocol::to_message(point, finger->solve(at.H_m, at.mu, at.e_star));
+    return is_finite(result)
+               ? result
+               : protocol::failed_point(point, "the solver gave a value that is not finite");
+  } catch (const std::exception& error) {
+    return protocol::failed_point(point, error.what());
+  }
+}
+
+bool is_finite(const protocol::PointResult& result) {
+  const auto finite = [](double value) { return std::isfinite(value); };
+  const auto all_finite = [&](const auto& values) {
+    return std::all_of(values.begin(), values.end(), finite);
+  };
+  const double scalars[] = {result.fall_time_s(),
+                            result.impact_x_m(),
+                            result.vt_in_m_s(),
+                            result.vn_in_m_s(),
+                            result.duration_s(),
+                            result.fn_peak_n(),
+                            result.ft_peak_n(),
+                            result.impulse_n_ns(),
+                            result.impulse_t_ns(),
+                            result.slide_m(),
+                            result.vt_out_m_s(),
+                            result.vn_out_m_s(),
+                            result.stick_total_s(),
+                            result.kinetic_in_j(),
+                            result.friction_j(),
+                            result.restitution_j(),
+                            result.kinetic_change_j(),
+                            result.strain_change_j(),
+                            result.gravity_change_j(),
+                            result.exchanged_j(),
+                            result.closure(),
+                            result.dt_s(),
+                            result.wall_s()};
+  return std::all_of(std::begin(scalars), std::end(scalars), finite) &&
+         all_finite(result.peaks()) && all_finite(result.ft_peaks()) &&
+         all_finite(result.phase_ends_s()) && all_finite(result.stick_intervals());
+}
+
+}  // namespace oblique::worker

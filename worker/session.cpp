@@ -1,0 +1,200 @@
+#include "worker/session.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <limits>
+#include <string_view>
+#include <utility>
+
+#include <spdlog/spdlog.h>
+
+#include "proto/frames.h"
+#include "worker/solver/solve.h"
+
+namespace oblique::worker {
+namespace {
+
+constexpr int kLinger_ms = 500;  ///< for the goodbye to leave
+constexpr int kHeartbeatInterval_ms = 1000;
+constexpr int kHeartbeatTimeout_ms = 3000;
+constexpr int kQueuedMessages = 1000;
+constexpr std::int64_t kParentCheckInterval_ms = 200;
+constexpr int kMessagesAtATime = 1000;  ///< then other duties get their turn
+
+std::int64_t now_ms() {
+  using std::chrono::duration_cast;
+  using std::chrono::milliseconds;
+  return duration_cast<milliseconds>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+protocol::WorkerHello hello_of(const SessionSettings& settings) {
+  protocol::WorkerHello hello;
+  hello.set_protocol_version(protocol::kProtocolVersion);
+  hello.set_solver_version(solver::solver_version());
+  hello.set_instruction_set(solver::instruction_set());
+  hello.set_name(settings.name);
+  hello.set_threads(1);
+  return hello;
+}
+
+template <class... Handlers>
+struct Overloaded : Handlers... {
+  using Handlers::operator()...;
+};
+
+}  // namespace
+
+Session::Session(SessionSettings settings, BatchSolver::SolvePoint solve)
+    : settings_(std::move(settings)),
+      parent_(getppid()),
+      conversation_(hello_of(settings_), settings_.conversation),
+      solver_(std::move(solve), [this] { task_ended_.wake(); }) {}
+
+Session::~Session() = default;
+
+void Session::open_socket() {
+  socket_.reset();
+  socket_.emplace(context_, zmq::socket_type::dealer);
+  socket_->set(zmq::sockopt::linger, kLinger_ms);
+  socket_->set(zmq::sockopt::maxmsgsize, static_cast<std::int64_t>(protocol::kMaxFrameBytes));
+  socket_->set(zmq::sockopt::sndhwm, kQueuedMessages);
+  socket_->set(zmq::sockopt::rcvhwm, kQueuedMessages);
+  socket_->set(zmq::sockopt::heartbeat_ivl, kHeartbeatInterval_ms);
+  socket_->set(zmq::sockopt::heartbeat_timeout, kHeartbeatTimeout_ms);
+  const ConversationSettings& conversation = settings_.conversation;
+  socket_->set(zmq::sockopt::reconnect_ivl, static_cast<int>(conversation.shortest_backoff_ms));
+  socket_->set(zmq::sockopt::reconnect_ivl_max, static_cast<int>(conversation.longest_backoff_ms));
+  try {
+    socket_->connect(settings_.server);
+  } catch (const zmq::error_t& error) {
+    throw AddressError("server = \"" + settings_.server + "\" is not an address (" + error.what() +
+                       "): it must be as tcp://HOST:PORT");
+  }
+}
+
+int Session::run(int stop_descriptor, const std::function<void()>& on_stop) {
+  apply(conversation_.start(now_ms()));
+  while (!exit_code_) {
+    zmq::pollitem_t items[] = {{socket_->handle(), 0, ZMQ_POLLIN, 0},
+                               {nullptr, task_ended_.descriptor(), ZMQ_POLLIN, 0},
+                               {nullptr, stop_descriptor, ZMQ_POLLIN, 0}};
+    try {
+      zmq::poll(items, std::size(items), std::chrono::milliseconds(poll_timeout_ms()));
+    } catch (const zmq::error_t& error) {
+      if (error.num() != EINTR) {
+        throw;
+      }
+      continue;
+    }
+    receive_all();
+    if ((items[1].revents & ZMQ_POLLIN) != 0 || now_ms() >= report_due_ms_) {
+      task_ended_.clear();
+      report_progress();
+    }
+    if ((items[2].revents & ZMQ_POLLIN) != 0) {
+      on_stop();
+      report_progress();
+      apply(conversation_.stop(now_ms()));
+    }
+    stop_with_parent();
+    apply(conversation_.on_time(now_ms()));
+    solver_.set_paused(!conversation_.may_solve());
+  }
+  socket_.reset();
+  context_.close();  // waits for the goodbye, no longer than the socket lingers
+  return *exit_code_;
+}
+
+std::int64_t Session::poll_timeout_ms() const {
+  std::int64_t due_ms = std::min(conversation_.next_deadline_ms(), report_due_ms_);
+  if (settings_.stop_with_parent) {
+    due_ms = std::min(due_ms, parent_check_due_ms_);
+  }
+  return std::max<std::int64_t>(due_ms - now_ms(), 0);
+}
+
+void Session::report_progress() {
+  apply(conversation_.on_progress(solver_.collect(), now_ms()));
+  report_due_ms_ = now_ms() + settings_.report_interval_ms;
+}
+
+void Session::stop_with_parent() {
+  if (!settings_.stop_with_parent || now_ms() < parent_check_due_ms_) {
+    return;
+  }
+  parent_check_due_ms_ = now_ms() + kParentCheckInterval_ms;
+  if (getppid() != parent_) {
+    spdlog::warn("the parent process is gone");
+    parent_check_due_ms_ = std::numeric_limits<std::int64_t>::max();
+    report_progress();
+    apply(conversation_.stop(now_ms()));
+  }
+}
+
+void Session::receive_all() {
+  for (int i = 0; i < kMessagesAtATime && !exit_code_; ++i) {
+    zmq::message_t frame;
+    try {
+      if (!socket_->recv(frame, zmq::recv_flags::dontwait)) {
+        return;
+      }
+    } catch (const zmq::error_t& error) {
+      if (error.num() != EINTR) {
+        throw;
+      }
+      continue;
+    }
+    protocol::ServerToWorker message;
+    if (!protocol::decode({frame.data<char>(), frame.size()}, message)) {
+      spdlog::warn("a frame of {} bytes that is no message was dropped", frame.size());
+      continue;
+    }
+    apply(conversation_.on_message(message, now_ms()));
+  }
+}
+
+bool Session::send(const protocol::WorkerMessage& message) {
+  const std::string frame = protocol::encode(message);
+  while (true) {
+    try {
+      return socket_->send(zmq::buffer(frame), zmq::send_flags::dontwait).has_value();
+    } catch (const zmq::error_t& error) {
+      if (error.num() != EINTR) {
+        spdlog::warn("sending failed: {}", error.what());
+        return false;
+      }
+    }
+  }
+}
+
+void Session::apply(Effects effects) {
+  bool send_failed = false;
+  const Overloaded apply_one{
+      [&](const Connect& connect) {
+        if (!connect.reason.empty()) {
+          spdlog::info("{}: connecting to {} again", connect.reason, settings_.server);
+        }
+        open_socket();
+      },
+      [&](const Send& effect) { send_failed = send_failed || !send(effect.message); },
+      [&](Solve& effect) { solver_.add(std::move(effect.task)); },
+      [&](const DropStudy& effect) { solver_.drop_study(effect.study_id); },
+      [&](const DropAll&) { solver_.drop_all(); },
+      [&](const Note& note) { spdlog::info("{}", note.text); },
+      [&](const Finish& finish) {
+        exit_code_ = finish.exit_code;
+        spdlog::log(finish.exit_code == 0 ? spdlog::level::info : spdlog::level::err, "{}",
+                    finish.reason);
+      }};
+  for (Effect& effect : effects) {
+    std::visit(apply_one, effect);
+  }
+  if (send_failed && !exit_code_) {
+    apply(conversation_.on_send_failed(now_ms()));
+  }
+}
+
+}  // namespace oblique::worker
