@@ -12,8 +12,10 @@ double strain_energy(const GradientCoefficients<double>& g, double half_EA_lengt
   };
   const double axial_sum =
       GaussRule::centre_weight * axial(0.0) +
-      GaussRule::inner_weight * (axial(GaussRule::inner_abscissa) + axial(-GaussRule::inner_abscissa)) +
-      GaussRule::outer_weight * (axial(GaussRule::outer_abscissa) + axial(-GaussRule::outer_abscissa));
+      GaussRule::inner_weight *
+          (axial(GaussRule::inner_abscissa) + axial(-GaussRule::inner_abscissa)) +
+      GaussRule::outer_weight *
+          (axial(GaussRule::outer_abscissa) + axial(-GaussRule::outer_abscissa));
   const double c1_squared = g.c[1].x * g.c[1].x + g.c[1].y * g.c[1].y;
   const double c2_squared = g.c[2].x * g.c[2].x + g.c[2].y * g.c[2].y;
   return half_EA_length * axial_sum + bending * (c1_squared + 3.0 * c2_squared);

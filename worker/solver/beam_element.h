@@ -35,7 +35,9 @@ struct GaussRule {
   static constexpr double centre_weight = 0.56888888888888888889;
 };
 
-constexpr double legendre_p2(double zeta) { return 1.5 * zeta * zeta - 0.5; }
+constexpr double legendre_p2(double zeta) {
+  return 1.5 * zeta * zeta - 0.5;
+}
 
 template <class Real>
 GradientCoefficients<Real> gradient_coefficients(const PlanarVector<Real>& p_i,
@@ -60,8 +62,7 @@ inline void add_axial_pair(const GradientCoefficients<Real>& g, double zeta, dou
   const PlanarVector<Real> even{g.c[0].x + p2 * g.c[2].x, g.c[0].y + p2 * g.c[2].y};
   const PlanarVector<Real> odd{zeta * g.c[1].x, zeta * g.c[1].y};
   // eps(+-zeta) = mean +- difference, eps = (r'.r' - 1)/2.
-  const Real mean =
-      0.5 * (even.x * even.x + even.y * even.y + odd.x * odd.x + odd.y * odd.y) - 0.5;
+  const Real mean = 0.5 * (even.x * even.x + even.y * even.y + odd.x * odd.x + odd.y * odd.y) - 0.5;
   const Real difference = even.x * odd.x + even.y * odd.y;
   const Real weighted_mean = (2.0 * w) * mean;
   const Real weighted_difference = (2.0 * w) * difference;

@@ -34,6 +34,12 @@ struct StickInterval {
   double t1_s;
 };
 
+/// Largest reaction at the pin or a joint during a contact: the force on the outer link.
+struct ReactionPeak {
+  double t_s;
+  double force_N;  ///< magnitude
+};
+
 /// Energy balance of one contact. Signs: what is lost is positive.
 struct ContactEnergy {
   double kinetic_in_J;   ///< kinetic energy of the whole finger at touch
@@ -78,6 +84,7 @@ struct CaseResult {
   double stick_total_s;
   std::vector<StickInterval> stick_intervals;
   std::vector<Phase> phases;
+  std::vector<ReactionPeak> reaction_peaks;  ///< O first, then each joint; empty unless asked for
   ContactEnergy energy;
   SolverReport solver;
 };
@@ -96,6 +103,8 @@ struct TraceRow {
   double vt_m_s;
   double vn_m_s;
   std::string state;  ///< SC, SR, sC or sR
+  /// Forces on the outer link at O and at each joint, x and y in turn [N].
+  std::vector<double> reactions_N;
 };
 
 }  // namespace oblique::solver

@@ -59,29 +59,30 @@ double largest_eigenvalue(const BandedMatrix& stiffness, const BandedMatrix& mas
 Chain::Chain(const ModelParameters& model)
     : rows_(count_rows(model)),
       gravity_m_s2_(model.g_m_s2),
+      mass_per_length_(model.rho_kg_m3 * model.A_m2),
       gravity_(2 * rows_, 0.0),
       mass_(with_unit_pin(rows_, 1.0)),
       mass_factor_(BandedMatrix(0)),
       along_(with_unit_pin(rows_, 0.0)) {
   number_rows(model);
-  const double mass_per_length = model.rho_kg_m3 * model.A_m2;
   for (const Element& element : elements_) {
     const double length = 1.0 / element.inverse_length;
-    add_element(mass_, element.row, mass_matrix(mass_per_length, length), 1.0);
+    add_element(mass_, element.row, mass_matrix(mass_per_length_, length), 1.0);
     // kappa^2 = r''.r'' counts both directions, so bending stiffness acts along the chain too.
     add_element(along_, element.row, gradient_matrix(length), model.E_Pa * model.A_m2);
     add_element(along_, element.row, bending_matrix(length), model.E_Pa * model.I_m4);
     const auto load = uniform_load(length);
     for (std::size_t a = 0; a < 4; ++a) {
-      gravity_[2 * element.row[a] + 1] -= mass_per_length * model.g_m_s2 * load[a];
+      gravity_[2 * element.row[a] + 1] -= mass_per_length_ * gravity_m_s2_ * load[a];
     }
   }
   mass_.at(tip_row(), 0) += model.tip_mass_kg;
   gravity_[2 * tip_row() + 1] -= model.tip_mass_kg * model.g_m_s2;
   mass_factor_ = BandedCholesky(mass_);
   if (!mass_factor_.positive_definite()) {
-    throw InputError("the mass matrix of this model is not positive definite: rho, A and the lengths "
-                     "are too far apart in magnitude");
+    throw InputError(
+        "the mass matrix of this model is not positive definite: rho, A and the lengths "
+        "are too far apart in magnitude");
   }
 }
 
@@ -90,6 +91,7 @@ void Chain::number_rows(const ModelParameters& model) {
   std::size_t left = 0;  // row of the left node's position; its slope follows
   for (std::size_t link = 0; link < model.lengths_m.size(); ++link) {
     const double length = model.lengths_m[link] / n;
+    first_element_.push_back(elements_.size());
     for (int e = 0; e < n; ++e) {
       const bool ends_at_joint = e + 1 == n && link + 1 < model.lengths_m.size();
       Element element{};
@@ -121,7 +123,8 @@ ChainState Chain::at_rest() const {
 }
 
 double Chain::kinetic_energy_J(const Coordinates& v) const {
-  return 0.5 * (mass_.bilinear(v.data(), v.data(), 2) + mass_.bilinear(v.data() + 1, v.data() + 1, 2));
+  return 0.5 *
+         (mass_.bilinear(v.data(), v.data(), 2) + mass_.bilinear(v.data() + 1, v.data() + 1, 2));
 }
 
 double Chain::strain_energy_J(const Coordinates& q) const {
@@ -131,9 +134,9 @@ double Chain::strain_energy_J(const Coordinates& q) const {
   double energy = 0.0;
   for (const Element& element : elements_) {
     const auto [pi, si, pj, sj] = element.row;
-    energy += strain_energy(
-        gradient_coefficients(at(pi), at(si), at(pj), at(sj), element.inverse_length),
-        element.half_EA_length, element.bending);
+    energy +=
+        strain_energy(gradient_coefficients(at(pi), at(si), at(pj), at(sj), element.inverse_length),
+                      element.half_EA_length, element.bending);
   }
   return energy;
 }
@@ -149,6 +152,28 @@ double Chain::gravity_energy_J(const Coordinates& q) const {
 TipState Chain::tip(const ChainState& state) const {
   const std::size_t i = 2 * tip_row();
   return {state.q[i], state.q[i + 1], state.v[i], state.v[i + 1]};
+}
+
+PlanarVector<double> Chain::inner_end_force(std::size_t link, const Coordinates& q,
+                                            const Coordinates& acceleration) const {
+  const Element& element = elements_[first_element_.at(link)];
+  const auto at = [](const Coordinates& values, std::size_t row) {
+    return PlanarVector<double>{values[2 * row], values[2 * row + 1]};
+  };
+  const auto [pi, si, pj, sj] = element.row;
+  const double length = 1.0 / element.inverse_length;
+  const auto g =
+      gradient_coefficients(at(q, pi), at(q, si), at(q, pj), at(q, sj), element.inverse_length);
+  const auto f = elastic_gradient(g, element.half_EA_length, element.bending);
+  PlanarVector<double> force{(f.c[2].x - f.c[0].x) * element.inverse_length,
+                             (f.c[2].y - f.c[0].y) * element.inverse_length};
+  const auto mass = mass_matrix(mass_per_length_, length);
+  for (std::size_t b = 0; b < 4; ++b) {
+    force.x += mass[0][b] * acceleration[2 * element.row[b]];
+    force.y += mass[0][b] * acceleration[2 * element.row[b] + 1];
+  }
+  force.y += mass_per_length_ * gravity_m_s2_ * uniform_load(length)[0];
+  return force;
 }
 
 double Chain::highest_frequency_rad_s(double tip_stiffness_N_m) const {

@@ -17,6 +17,12 @@ struct ChainState {
   double t_s = 0.0;  ///< since release
   Coordinates q;     ///< [m] and [-]
   Coordinates v;     ///< [m/s] and [1/s]
+  /// What an integrator remembers besides; empty where it remembers nothing.
+  Coordinates acceleration;  ///< q'' at t_s
+  /// (a - q'')/h of generalized-alpha: a_n stands for q'' a fixed part of a step away, so it is
+  /// kept per second and serves a next step of any length.
+  Coordinates algorithmic_offset_rate;
+  std::vector<double> multipliers_N;  ///< joint multipliers, x and y in turn
 };
 
 /// Tip position and velocity in the fixed frame, origin at O, y up.
@@ -60,6 +66,12 @@ class Chain {
   double gravity_energy_J(const Coordinates& q) const;
   TipState tip(const ChainState& state) const;
 
+  std::size_t links() const { return first_element_.size(); }
+  /// Force on a link at its inner end (the pin or a joint), from the balance of its first node:
+  /// M q'' + dU/dq - Q there.
+  PlanarVector<double> inner_end_force(std::size_t link, const Coordinates& q,
+                                       const Coordinates& acceleration) const;
+
   /// Highest angular frequency [rad/s] of the straight chain, the tip held by springs of
   /// `tip_stiffness_N_m` in both directions. To a relative 1e-10.
   double highest_frequency_rad_s(double tip_stiffness_N_m) const;
@@ -75,9 +87,11 @@ class Chain {
 
   std::size_t rows_;
   double gravity_m_s2_;
+  double mass_per_length_;
   std::vector<Element> elements_;
-  Coordinates gravity_;     ///< generalised force [N] and [N m]
-  BandedMatrix mass_;       ///< of the free rows; row 0 is a unit row
+  std::vector<std::size_t> first_element_;  ///< of each link
+  Coordinates gravity_;                     ///< generalised force [N] and [N m]
+  BandedMatrix mass_;                       ///< of the free rows; row 0 is a unit row
   BandedCholesky mass_factor_;
   BandedMatrix along_;  ///< stiffness of the straight chain along itself: axial and bending
 };

@@ -11,9 +11,13 @@ namespace {
 /// An event counts as located when the next correction of its instant would be smaller [s].
 constexpr double kLocated_s = 1e-13;
 
-constexpr unsigned bit(ContactEvent event) { return 1U << static_cast<unsigned>(event); }
+constexpr unsigned bit(ContactEvent event) {
+  return 1U << static_cast<unsigned>(event);
+}
 
-double sign_of(double value) { return value < 0.0 ? -1.0 : 1.0; }
+double sign_of(double value) {
+  return value < 0.0 ? -1.0 : 1.0;
+}
 
 }  // namespace
 
@@ -134,9 +138,8 @@ bool Contact::judge_crossing(const TipState& end, const ContactIntegrals<double>
     return true;
   }
   const double next = t + correction_s;
-  trial_s_ = next > search_.low_s && next < search_.high_s
-                 ? next
-                 : 0.5 * (search_.low_s + search_.high_s);
+  trial_s_ =
+      next > search_.low_s && next < search_.high_s ? next : 0.5 * (search_.low_s + search_.high_s);
   return false;
 }
 
@@ -192,9 +195,9 @@ void Contact::happen(ContactEvent event) {
       fresh_ |= bit(ContactEvent::kStick);
       break;
     case ContactEvent::kStick:
-      fresh_ |= bit(ContactEvent::kStick) | bit(law_.slip_direction() > 0.0
-                                                    ? ContactEvent::kSlipForward
-                                                    : ContactEvent::kSlipBackward);
+      fresh_ |= bit(ContactEvent::kStick) |
+                bit(law_.slip_direction() > 0.0 ? ContactEvent::kSlipForward
+                                                : ContactEvent::kSlipBackward);
       law_.stop_slip(tip_);
       vt_sign_ = sign_of(tip_.vx_m_s);
       break;

@@ -42,6 +42,8 @@ class Contact {
   const ContactRecord& record() const { return record_; }
   double time_s() const { return t_s_; }
   std::int64_t steps() const { return steps_; }
+  /// Number of events so far; when it grows, force() has changed.
+  int events() const { return events_; }
   const TipState& tip() const { return tip_; }
 
  private:
@@ -49,13 +51,13 @@ class Contact {
   struct Search {
     Seeking seeking = Seeking::kNothing;
     ContactEvent event = ContactEvent::kTurn;
-    double low_s = 0.0;     ///< phi is negative here
-    double high_s = 0.0;    ///< phi is not negative here
-    double slope = 0.0;     ///< d phi / dt near the crossing
-    double last_s = -1.0;   ///< the last trial, < 0 before the first
+    double low_s = 0.0;    ///< phi is negative here
+    double high_s = 0.0;   ///< phi is not negative here
+    double slope = 0.0;    ///< d phi / dt near the crossing
+    double last_s = -1.0;  ///< the last trial, < 0 before the first
     double last_value = 0.0;
-    double full_s = 0.0;    ///< the step in which the event was seen
-    double guess_s = 0.0;   ///< where the polynomial crosses
+    double full_s = 0.0;   ///< the step in which the event was seen
+    double guess_s = 0.0;  ///< where the polynomial crosses
   };
   struct Candidate {
     ContactEvent event;
@@ -81,8 +83,8 @@ class Contact {
   double trial_s_;
   std::int64_t steps_ = 0;
   int events_ = 0;
-  unsigned fresh_ = 0;     ///< bit a ContactEvent
-  unsigned refuted_ = 0;   ///< events seen inside the present step that turned out not to happen
+  unsigned fresh_ = 0;    ///< bit a ContactEvent
+  unsigned refuted_ = 0;  ///< events seen inside the present step that turned out not to happen
   Search search_;
   ContactRecord record_;
 };

@@ -93,7 +93,8 @@ EventFunction event_function(const ContactLaw& law, ContactEvent event, const Ti
     case ContactEvent::kTurn:
       return {law.is_compression() ? tip.vy_m_s : -tip.vy_m_s, 0.0};
     case ContactEvent::kSlipForward:
-      return {-law.ft_N(tip) - mu * law.fn_N(tip), -law.ft_rate_N_s(tip) - mu * law.fn_rate_N_s(tip)};
+      return {-law.ft_N(tip) - mu * law.fn_N(tip),
+              -law.ft_rate_N_s(tip) - mu * law.fn_rate_N_s(tip)};
     case ContactEvent::kSlipBackward:
       return {law.ft_N(tip) - mu * law.fn_N(tip), law.ft_rate_N_s(tip) - mu * law.fn_rate_N_s(tip)};
     case ContactEvent::kStick:

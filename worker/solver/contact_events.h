@@ -11,11 +11,11 @@ namespace oblique::solver {
 /// What ends a stretch of smooth motion. The order is the order in which events that fall together
 /// (within kSimultaneous_s) are taken: one that comes first may make a later one void.
 enum class ContactEvent {
-  kSeparation,       ///< restitution: F_n falls to 0
-  kTurn,             ///< V_n changes sign: compression <-> restitution
-  kSlipForward,      ///< stick: -F_t reaches mu F_n from below; P starts to slide towards +x
-  kSlipBackward,     ///< stick: F_t reaches mu F_n from below; P starts to slide towards -x
-  kStick,            ///< slip: P's velocity falls to 0
+  kSeparation,          ///< restitution: F_n falls to 0
+  kTurn,                ///< V_n changes sign: compression <-> restitution
+  kSlipForward,         ///< stick: -F_t reaches mu F_n from below; P starts to slide towards +x
+  kSlipBackward,        ///< stick: F_t reaches mu F_n from below; P starts to slide towards -x
+  kStick,               ///< slip: P's velocity falls to 0
   kTangentialExtremum,  ///< stick: V_t changes sign; an extremum of F_t, no change of regime
 };
 
@@ -47,9 +47,9 @@ EventFunction event_function(const ContactLaw& law, ContactEvent event, const Ti
 /// polynomial: cubic Hermite for force events; for velocity events the quadratic with the same
 /// mean as the velocity has over the step. Nothing when it does not.
 struct EventGuess {
-  double fraction;       ///< of the step
-  double slope;          ///< d phi / d fraction there
-  bool inside_only;      ///< phi is negative at both ends: the crossing rests on the polynomial alone
+  double fraction;   ///< of the step
+  double slope;      ///< d phi / d fraction there
+  bool inside_only;  ///< phi is negative at both ends: the crossing rests on the polynomial alone
   double peak_fraction;  ///< where the polynomial is largest; meaningful with inside_only
 };
 

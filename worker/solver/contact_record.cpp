@@ -9,7 +9,9 @@ namespace {
 
 constexpr double kRippleFraction = 0.05;
 
-double position_of_P(const ContactLaw& law, const TipState& tip) { return tip.x_m - law.ux_m(tip); }
+double position_of_P(const ContactLaw& law, const TipState& tip) {
+  return tip.x_m - law.ux_m(tip);
+}
 
 }  // namespace
 
@@ -73,7 +75,8 @@ void ContactRecord::finish(const ContactLaw& law, const TipState& tip, double t_
 
 std::vector<bool> without_ripples(const std::vector<double>& fn_N) {
   std::vector<bool> survives(fn_N.size(), true);
-  const double threshold = fn_N.empty() ? 0.0 : kRippleFraction * *std::max_element(fn_N.begin(), fn_N.end());
+  const double threshold =
+      fn_N.empty() ? 0.0 : kRippleFraction * *std::max_element(fn_N.begin(), fn_N.end());
   for (;;) {
     std::size_t left = fn_N.size();
     std::size_t best_left = fn_N.size();

@@ -5,7 +5,6 @@
 #include <sstream>
 
 #include "worker/solver/errors.h"
-#include "worker/solver/pefrl.h"
 
 namespace oblique::solver {
 namespace {
@@ -15,34 +14,37 @@ constexpr std::size_t kMostKept = 4096;
 /// A fall that lasts this many times sqrt(2 length / g) is not one.
 constexpr double kLongestFall = 100.0;
 
-void step_in_place(const Chain& chain, double h_s, ChainState& state, Coordinates& scratch) {
-  pefrl_step(chain, AffineContactForce<double>{}, h_s, state.q.data(), state.v.data(),
-             scratch.data());
-  state.t_s += h_s;
-}
+constexpr AffineContactForce<double> kNoContact{};
 
 }  // namespace
 
-Fall::Fall(const Chain& chain, double dt_s) : chain_(chain), dt_s_(dt_s) {
-  ChainState state = chain.at_rest();
-  Coordinates scratch(state.q.size());
-  const double length_m = chain.tip(state).x_m;
-  const double longest_s = kLongestFall * std::sqrt(2.0 * length_m / chain.gravity_m_s2());
+double longest_fall_s(const Chain& chain) {
+  const double length_m = chain.tip(chain.at_rest()).x_m;
+  return kLongestFall * std::sqrt(2.0 * length_m / chain.gravity_m_s2());
+}
+
+Fall::Fall(const Chain& chain, double dt_s)
+    : Fall(std::make_shared<ExplicitMotion>(chain), dt_s, longest_fall_s(chain)) {}
+
+Fall::Fall(std::shared_ptr<const Motion> motion, double dt_s, double longest_s)
+    : motion_(std::move(motion)), dt_s_(dt_s) {
+  ChainState before = motion_->at_rest();
+  ChainState state = before;
+  const double length_m = motion_->tip(state).x_m;
   kept_.push_back(state);
-  ChainState before = state;
   for (std::int64_t step = 1;; ++step) {
-    before = state;
-    step_in_place(chain, dt_s, state, scratch);
-    // The kept times are products, not sums: a long fall would otherwise gather rounding.
+    motion_->step(before, kNoContact, dt_s, state);
+    // Times are products, not sums: a long fall would otherwise gather rounding.
     state.t_s = static_cast<double>(step) * dt_s;
-    const TipState tip = chain.tip(state);
+    const TipState tip = motion_->tip(state);
     if (!std::isfinite(tip.y_m) || std::abs(tip.y_m) > 2.0 * length_m) {
       std::ostringstream message;
       message << "the fall diverged at t = " << state.t_s << " s with dt_fall = " << dt_s << " s";
       throw SolveError(message.str());
     }
     if (tip.vy_m_s >= 0.0) {
-      break;
+      locate_turn(before);
+      return;
     }
     if (state.t_s > longest_s) {
       std::ostringstream message;
@@ -50,15 +52,18 @@ Fall::Fall(const Chain& chain, double dt_s) : chain_(chain), dt_s_(dt_s) {
       throw SolveError(message.str());
     }
     keep(step, state);
+    std::swap(before, state);
   }
-  // The turn itself: bisection on V_y over the last step.
+}
+
+void Fall::locate_turn(const ChainState& before) {
   double low = 0.0;
-  double high = dt_s;
+  double high = dt_s_;
   for (int i = 0; i < 60; ++i) {
     const double middle = 0.5 * (low + high);
-    (chain.tip(stepped(before, middle)).vy_m_s < 0.0 ? low : high) = middle;
+    (motion_->tip(stepped(before, middle)).vy_m_s < 0.0 ? low : high) = middle;
   }
-  largest_drop_m_ = -chain.tip(stepped(before, low)).y_m;
+  largest_drop_m_ = -motion_->tip(stepped(before, low)).y_m;
 }
 
 void Fall::keep(std::int64_t step, const ChainState& state) {
@@ -77,9 +82,8 @@ void Fall::keep(std::int64_t step, const ChainState& state) {
 }
 
 ChainState Fall::stepped(const ChainState& from, double h_s) const {
-  ChainState state = from;
-  Coordinates scratch(state.q.size());
-  step_in_place(chain_, h_s, state, scratch);
+  ChainState state;
+  motion_->step(from, kNoContact, h_s, state);
   return state;
 }
 
@@ -91,7 +95,7 @@ ChainState Fall::state_at(double H_m) const {
             << largest_drop_m_ << " m before it turns back";
     throw InputError(message.str());
   }
-  const auto drop = [this](const ChainState& state) { return -chain_.tip(state).y_m; };
+  const auto drop = [this](const ChainState& state) { return -motion_->tip(state).y_m; };
   auto after = std::upper_bound(kept_.begin(), kept_.end(), H_m,
                                 [&](double H, const ChainState& state) { return H < drop(state); });
   ChainState before = *(after - 1);
@@ -101,7 +105,7 @@ ChainState Fall::state_at(double H_m) const {
     before = state;
     state = stepped(before, dt_s_);
     state.t_s = static_cast<double>(first_step + step) * dt_s_;
-    if (drop(state) >= H_m || chain_.tip(state).vy_m_s >= 0.0) {
+    if (drop(state) >= H_m || motion_->tip(state).vy_m_s >= 0.0) {
       break;
     }
   }
@@ -117,7 +121,7 @@ ChainState Fall::locate(double H_m, const ChainState& before) const {
   ChainState state = before;
   for (int i = 0; i < 80 && high - low > 0.0; ++i) {
     state = stepped(before, h);
-    const TipState tip = chain_.tip(state);
+    const TipState tip = motion_->tip(state);
     const double missing_m = H_m + tip.y_m;
     if (missing_m == 0.0) {
       break;

@@ -1,11 +1,15 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
-#include "worker/solver/chain.h"
+#include "worker/solver/motion.h"
 
 namespace oblique::solver {
+
+/// 100 times the time of a free fall from the chain's length [s]: a fall that lasts longer is none.
+double longest_fall_s(const Chain& chain);
 
 /// The free fall from rest up to the instant at which the tip first turns back. One fall passes
 /// every drop H, and nothing in it depends on mu, e*, k or eta2. Immutable after construction:
@@ -13,8 +17,11 @@ namespace oblique::solver {
 /// bits do not depend on what was asked before.
 class Fall {
  public:
-  /// Solves the fall of `chain` with steps of dt_s. Throws SolveError when it diverges or the tip
-  /// does not turn within 100 times the time of a free fall from the chain's length.
+  /// Solves the fall with steps of dt_s up to the first turn of the tip. Throws SolveError when it
+  /// diverges or lasts longer than `longest_s`.
+  Fall(std::shared_ptr<const Motion> motion, double dt_s, double longest_s);
+  /// The same by the explicit integrator; `longest_s` is 100 times the time of a free fall from
+  /// the chain's length. `chain` must outlive this.
   Fall(const Chain& chain, double dt_s);
 
   /// Largest drop of the tip before it first turns back [m].
@@ -26,11 +33,12 @@ class Fall {
 
  private:
   ChainState stepped(const ChainState& from, double h_s) const;
+  void locate_turn(const ChainState& before);
   void keep(std::int64_t step, const ChainState& state);
   /// Steps from `before` to the instant of the drop H_m, which lies within one step of it.
   ChainState locate(double H_m, const ChainState& before) const;
 
-  const Chain& chain_;
+  std::shared_ptr<const Motion> motion_;
   double dt_s_;
   double largest_drop_m_ = 0.0;
   std::int64_t steps_kept_ = 1;   ///< steps from one kept state to the next

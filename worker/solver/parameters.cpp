@@ -9,19 +9,25 @@
 namespace oblique::solver {
 namespace {
 
-bool positive(double value) { return value > 0.0; }
-bool not_negative(double value) { return value >= 0.0; }
-bool is_whole(double value) { return value == std::floor(value); }
+bool positive(double value) {
+  return value > 0.0;
+}
+bool not_negative(double value) {
+  return value >= 0.0;
+}
+bool is_whole(double value) {
+  return value == std::floor(value);
+}
 
 constexpr int kMaxLinks = 64;
 constexpr int kMaxElementsPerLink = 256;
 
-constexpr std::array<std::string_view, 1> kIntegratorNames{"explicit"};
+constexpr std::array<std::string_view, 2> kIntegratorNames{"explicit", "generalized-alpha"};
 constexpr std::array<std::string_view, 3> kPresetNames{"paper", "printed", "converged"};
 
 using Model = ModelParameters;
 
-constexpr std::array<ParameterKey, 14> kModelKeys{{
+constexpr std::array<ParameterKey, 15> kModelKeys{{
     {"links", "", "number of links", "a whole number from 1 to 64",
      [](double v) { return is_whole(v) && v >= 1 && v <= kMaxLinks; },
      [](const Model& m) { return static_cast<double>(m.lengths_m.size()); },
@@ -51,13 +57,17 @@ constexpr std::array<ParameterKey, 14> kModelKeys{{
      [](const Model& m) { return m.eta2; }, [](Model& m, double v) { m.eta2 = v; }},
     {"tip_mass", "kg", "point mass at the tip", ">= 0", not_negative,
      [](const Model& m) { return m.tip_mass_kg; }, [](Model& m, double v) { m.tip_mass_kg = v; }},
-    {"integrator", "", "how the equations of motion are stepped", "explicit",
+    {"integrator", "", "how the equations of motion are stepped", "explicit or generalized-alpha",
      [](double v) { return is_whole(v) && v >= 0 && v < double{kIntegratorNames.size()}; },
      [](const Model& m) { return static_cast<double>(m.integrator); },
      [](Model& m, double v) { m.integrator = static_cast<Integrator>(v); }},
-    {"dt", "s", "step in contact; 0: from the stability limit", ">= 0", not_negative,
+    {"spectral_radius", "", "of generalized-alpha at infinite frequency",
+     ">= 0 and < 1 (at 1 nothing damps the multipliers, and they never settle)",
+     [](double v) { return v >= 0.0 && v < 1.0; }, [](const Model& m) { return m.spectral_radius; },
+     [](Model& m, double v) { m.spectral_radius = v; }},
+    {"dt", "s", "step in contact; 0: chosen for the integrator", ">= 0", not_negative,
      [](const Model& m) { return m.dt_s; }, [](Model& m, double v) { m.dt_s = v; }},
-    {"dt_fall", "s", "step in the fall; 0: from the stability limit", ">= 0", not_negative,
+    {"dt_fall", "s", "step in the fall; 0: chosen for the integrator", ">= 0", not_negative,
      [](const Model& m) { return m.dt_fall_s; }, [](Model& m, double v) { m.dt_fall_s = v; }},
 }};
 
@@ -81,15 +91,19 @@ std::string joined(const std::array<std::string_view, n>& names) {
 
 }  // namespace
 
-std::span<const ParameterKey> model_keys() { return kModelKeys; }
+std::span<const ParameterKey> model_keys() {
+  return kModelKeys;
+}
 
 const ParameterKey* find_model_key(std::string_view name) {
-  const auto found =
-      std::find_if(kModelKeys.begin(), kModelKeys.end(), [&](const auto& k) { return k.name == name; });
+  const auto found = std::find_if(kModelKeys.begin(), kModelKeys.end(),
+                                  [&](const auto& k) { return k.name == name; });
   return found == kModelKeys.end() ? nullptr : &*found;
 }
 
-std::span<const ParameterKey> point_keys() { return kPointKeys; }
+std::span<const ParameterKey> point_keys() {
+  return kPointKeys;
+}
 
 void check_value(const ParameterKey& key, double value) {
   if (std::isfinite(value) && key.is_allowed(value)) {
@@ -141,7 +155,9 @@ Integrator integrator_named(std::string_view name) {
   return static_cast<Integrator>(found - kIntegratorNames.begin());
 }
 
-std::span<const std::string_view> integrator_names() { return kIntegratorNames; }
+std::span<const std::string_view> integrator_names() {
+  return kIntegratorNames;
+}
 
 ModelParameters preset(std::string_view name) {
   ModelParameters model;
@@ -159,6 +175,8 @@ ModelParameters preset(std::string_view name) {
   return model;
 }
 
-std::span<const std::string_view> preset_names() { return kPresetNames; }
+std::span<const std::string_view> preset_names() {
+  return kPresetNames;
+}
 
 }  // namespace oblique::solver

@@ -11,7 +11,8 @@ namespace oblique::solver {
 
 /// How the equations of motion are stepped (see README.md of this folder).
 enum class Integrator {
-  kExplicit,  ///< joints eliminated, PEFRL: explicit, symplectic, order 4
+  kExplicit,          ///< joints eliminated, PEFRL: explicit, symplectic, order 4
+  kGeneralizedAlpha,  ///< joints as constraints with multipliers, generalized-alpha: order 2
 };
 
 /// Every parameter of the finger and its solution but H, mu and e*. Defaults are the preset
@@ -28,8 +29,9 @@ struct ModelParameters {
   double eta2 = 1.2463;      ///< ratio of normal to tangential contact stiffness
   double tip_mass_kg = 0.0;  ///< point mass carried by the tip node
   Integrator integrator = Integrator::kExplicit;
-  double dt_s = 0.0;       ///< step in contact; 0: chosen from the stability limit
-  double dt_fall_s = 0.0;  ///< step in the fall; 0: chosen from the stability limit
+  double spectral_radius = 0.9;  ///< of generalized-alpha at infinite frequency
+  double dt_s = 0.0;             ///< step in contact; 0: chosen for the integrator
+  double dt_fall_s = 0.0;        ///< step in the fall; 0: chosen for the integrator
 
   bool operator==(const ModelParameters&) const = default;
 };

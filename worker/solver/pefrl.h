@@ -33,6 +33,11 @@ struct AffineContactForce {
   Real k_tt{};
   Real x0{};
   Real y0{};
+
+  Real fn_N(const Real& y_m) const { return fn0 - k_nn * (y_m - y0); }
+  Real ft_N(const Real& x_m, const Real& y_m) const {
+    return ft0 - k_tn * (y_m - y0) - k_tt * (x_m - x0);
+  }
 };
 
 /// Time integrals over one step, carried through the same splitting, hence of its order.
@@ -56,10 +61,8 @@ ContactIntegrals<Real> pefrl_step(const Chain& chain, const AffineContactForce<R
     for (std::size_t i = 2; i < size; ++i) {
       q[i] += drift_s * v[i];
     }
-    const Real dx = q[tip] - force.x0;
-    const Real dy = q[tip + 1] - force.y0;
-    const Real fn = force.fn0 - force.k_nn * dy;
-    const Real ft = force.ft0 - force.k_tn * dy - force.k_tt * dx;
+    const Real fn = force.fn_N(q[tip + 1]);
+    const Real ft = force.ft_N(q[tip], q[tip + 1]);
     chain.accelerations(q, ft, fn, acceleration);
     const Real kick_s = Pefrl::kick[stage] * h_s;
     const Real vt_before = v[tip];

@@ -22,6 +22,10 @@ std::string instruction_set();
 class Finger {
  public:
   using TraceSink = std::function<void(const TraceRow&)>;
+  struct Extras {
+    bool reaction_peaks = false;  ///< fill CaseResult::reaction_peaks
+    TraceSink trace;              ///< called at every accepted step, from touch to separation
+  };
 
   /// Throws InputError when `model` is outside its domain.
   explicit Finger(ModelParameters model);
@@ -35,8 +39,9 @@ class Finger {
   double largest_drop_m() const;
 
   /// Solves one point. Throws InputError for a value outside its range, SolveError when there is
-  /// no answer. `trace`, when set, is called at every accepted step, from touch to separation.
-  CaseResult solve(double H_m, double mu, double e_star, const TraceSink& trace = {}) const;
+  /// no answer.
+  CaseResult solve(double H_m, double mu, double e_star) const;
+  CaseResult solve(double H_m, double mu, double e_star, const Extras& extras) const;
 
  private:
   struct Parts;

@@ -1,6 +1,7 @@
 #include "worker/solver/step_choice.h"
 
 #include <algorithm>
+#include <cmath>
 #include <sstream>
 
 #include "worker/solver/errors.h"
@@ -15,11 +16,27 @@ double checked(const char* key, double asked_s, double limit_s, double fraction)
   }
   if (asked_s > limit_s) {
     std::ostringstream message;
-    message << key << " = " << asked_s << " s is not allowed: the explicit integrator is stable up to "
-            << limit_s << " s here (0 chooses a step)";
+    message << key << " = " << asked_s
+            << " s is not allowed: the explicit integrator is stable up to " << limit_s
+            << " s here (0 chooses a step)";
     throw InputError(message.str());
   }
   return asked_s;
+}
+
+double chosen_fall_s(const Chain& chain, const ModelParameters& model) {
+  if (model.integrator == Integrator::kGeneralizedAlpha) {
+    return model.dt_fall_s != 0.0 ? model.dt_fall_s
+                                  : StepChoice::kImplicitFallFraction *
+                                        std::sqrt(model.lengths_m.back() / model.g_m_s2);
+  }
+  return checked("dt_fall", model.dt_fall_s,
+                 Pefrl::stability_limit() / chain.highest_frequency_rad_s(0.0),
+                 StepChoice::kFallFraction);
+}
+
+double link_mass_kg(const ModelParameters& model) {
+  return model.rho_kg_m3 * model.A_m2 * model.lengths_m.back() + model.tip_mass_kg;
 }
 
 }  // namespace
@@ -28,9 +45,10 @@ StepChoice::StepChoice(const Chain& chain, const ModelParameters& model)
     : chain_(chain),
       k_N_m_(model.k_N_m),
       stiffest_ratio_(std::max(1.0, 1.0 / model.eta2)),
+      integrator_(model.integrator),
       asked_contact_s_(model.dt_s),
-      fall_limit_s_(Pefrl::stability_limit() / chain.highest_frequency_rad_s(0.0)),
-      fall_s_(checked("dt_fall", model.dt_fall_s, fall_limit_s_, kFallFraction)) {}
+      implicit_contact_s_(kImplicitContactFraction * std::sqrt(link_mass_kg(model) / model.k_N_m)),
+      fall_s_(chosen_fall_s(chain, model)) {}
 
 double StepChoice::contact_limit_s(double e_star) const {
   const double stiffest_N_m = k_N_m_ * std::max(stiffest_ratio_, 1.0 / (e_star * e_star));
@@ -38,8 +56,10 @@ double StepChoice::contact_limit_s(double e_star) const {
 }
 
 ContactSteps StepChoice::contact(double e_star) const {
-  const double limit_s = contact_limit_s(e_star);
-  const double step_s = checked("dt", asked_contact_s_, limit_s, kContactFraction);
+  double step_s = asked_contact_s_ != 0.0 ? asked_contact_s_ : implicit_contact_s_;
+  if (integrator_ == Integrator::kExplicit) {
+    step_s = checked("dt", asked_contact_s_, contact_limit_s(e_star), kContactFraction);
+  }
   if (asked_contact_s_ != 0.0) {
     return {step_s, step_s};
   }

@@ -5,35 +5,43 @@
 
 namespace oblique::solver {
 
-/// Step lengths of the explicit integrator: what the user asked for, checked against the stability
-/// limit, or fractions of that limit. The limit is PEFRL's omega h over the highest frequency of
-/// the chain, in contact with its tip on the stiffest contact spring.
+/// Step lengths: what the user asked for, or what is chosen for the integrator.
+///
+/// Explicit: fractions of the stability limit, which is PEFRL's omega h over the highest frequency
+/// of the chain, in contact with its tip on the stiffest contact spring; a longer step is refused.
+/// Generalized-alpha: fractions of the times that the motion itself takes, on any mesh.
 class StepChoice {
  public:
   /// Fractions of the stability limit taken when no step is asked for. Chosen by work and precision
   /// (README.md).
   static constexpr double kFallFraction = 0.5;
   static constexpr double kContactFraction = 0.2;
+  /// Generalized-alpha: fraction of sqrt(length/g) in the fall (5 us for the default model) and of
+  /// sqrt(mass of the last link/k) in contact (0.24 us).
+  static constexpr double kImplicitFallFraction = 1.0 / 40'000.0;
+  static constexpr double kImplicitContactFraction = 1.0 / 600.0;
   /// The restitution spring is e*^-2 times stiffer and its motion e*^-1 times faster. Below this e*
-  /// it is faster than the chain's own response to contact, and steps in restitution shrink with it.
+  /// it is faster than the chain's own response to contact, and steps in restitution shrink with
+  /// it.
   static constexpr double kFastRestitution = 0.4;
 
   /// Throws InputError when model.dt_fall_s is above its limit.
   StepChoice(const Chain& chain, const ModelParameters& model);
 
   double fall_s() const { return fall_s_; }
-  double fall_limit_s() const { return fall_limit_s_; }
   /// Steps in a contact with restitution e_star. Throws InputError when model.dt_s is above its
   /// limit.
   ContactSteps contact(double e_star) const;
+  /// Longest stable step of the explicit integrator in such a contact.
   double contact_limit_s(double e_star) const;
 
  private:
   const Chain& chain_;
   double k_N_m_;
   double stiffest_ratio_;  ///< of the contact springs in compression to k
+  Integrator integrator_;
   double asked_contact_s_;
-  double fall_limit_s_;
+  double implicit_contact_s_;
   double fall_s_;
 };
 

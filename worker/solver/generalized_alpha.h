@@ -1,0 +1,71 @@
+#pragma once
+
+#include <vector>
+
+#include "worker/solver/constrained_chain.h"
+#include "worker/solver/motion.h"
+
+namespace oblique::solver {
+
+/// Parameters of generalized-alpha from the spectral radius xi at infinite frequency (paper, after
+/// eq. 28): second order, unconditionally stable for linear problems.
+struct GeneralizedAlphaParameters {
+  explicit GeneralizedAlphaParameters(double xi)
+      : alpha_m((2.0 * xi - 1.0) / (xi + 1.0)),
+        alpha_f(xi / (xi + 1.0)),
+        beta(0.25 * (1.0 - alpha_m + alpha_f) * (1.0 - alpha_m + alpha_f)),
+        gamma(0.5 - alpha_m + alpha_f) {}
+
+  double alpha_m;
+  double alpha_f;
+  double beta;
+  double gamma;
+};
+
+/// The index-3 system of ConstrainedChain under generalized-alpha (Arnold and Bruels, Multibody
+/// System Dynamics 18, 2007, 185):
+///
+///   q_{n+1} = q_n + h v_n + h^2 ((1/2 - beta) a_n + beta a_{n+1})
+///   v_{n+1} = v_n + h ((1 - gamma) a_n + gamma a_{n+1})
+///   (1 - alpha_m) a_{n+1} + alpha_m a_n = (1 - alpha_f) q''_{n+1} + alpha_f q''_n
+///
+/// with the equations of motion and Phi = 0 holding at t_{n+1}. Newton's unknowns are a_{n+1} and
+/// lambda_{n+1} with the constraints divided by beta h^2: the matrix
+/// [c M + beta h^2 K, Phi_qᵀ; Phi_q, 0], c = (1 - alpha_m)/(1 - alpha_f), tends to a regular one as
+/// h -> 0.
+class GeneralizedAlphaMotion : public Motion {
+ public:
+  /// Newton stops when a correction moves no position by more than this fraction of an element's
+  /// length and no slope by more than this; convergence is quadratic, so what remains is far below
+  /// rounding.
+  static constexpr double kNewtonTolerance = 1e-9;
+  static constexpr int kMostIterations = 20;
+
+  explicit GeneralizedAlphaMotion(const ModelParameters& model);
+
+  const ConstrainedChain& chain() const { return chain_; }
+
+  ChainState at_rest() const override;
+  TipState tip(const ChainState& state) const override { return chain_.tip(state); }
+  Energies energies(const ChainState& state) const override;
+  /// Throws SolveError when Newton does not converge.
+  ContactIntegrals<double> step(const ChainState& from, const AffineContactForce<double>& force,
+                                double h_s, ChainState& to) const override;
+  void restart(const AffineContactForce<double>& force, ChainState& state) const override;
+  std::vector<JointReaction> reactions(const AffineContactForce<double>& force,
+                                       const ChainState& state) const override;
+
+ private:
+  void predict(const ChainState& from, double h_s, ChainState& to) const;
+  void evaluate(const AffineContactForce<double>& force, double h_s, const ChainState& state,
+                std::vector<double>& residual) const;
+  double correct(double h_s, const std::vector<double>& correction, ChainState& state) const;
+  ContactIntegrals<double> integrals(const AffineContactForce<double>& force, double h_s,
+                                     const ChainState& from, const ChainState& to) const;
+
+  ConstrainedChain chain_;
+  GeneralizedAlphaParameters alpha_;
+  double element_length_m_;  ///< the shortest
+};
+
+}  // namespace oblique::solver
