@@ -63,6 +63,7 @@ ModelParameters to_message(const solver::ModelParameters& model) {
   message.set_integrator(static_cast<std::uint32_t>(model.integrator));
   message.set_dt_s(model.dt_s);
   message.set_dt_fall_s(model.dt_fall_s);
+  message.set_spectral_radius(model.spectral_radius);
   return message;
 }
 
@@ -82,6 +83,7 @@ solver::ModelParameters from_message(const ModelParameters& message) {
       static_cast<solver::Integrator>(checked_whole_number("integrator", message.integrator()));
   model.dt_s = message.dt_s();
   model.dt_fall_s = message.dt_fall_s();
+  model.spectral_radius = message.spectral_radius();
   solver::validate(model);
   return model;
 }

@@ -34,8 +34,9 @@ CREATE TABLE models (
   eta2        REAL NOT NULL,
   tip_mass    REAL NOT NULL,
   integrator  TEXT NOT NULL,
-  dt          REAL NOT NULL,     -- 0: chosen from the stability limit
-  dt_fall     REAL NOT NULL,     -- 0: chosen from the stability limit
+  spectral_radius REAL NOT NULL, -- of generalized-alpha
+  dt          REAL NOT NULL,     -- 0: chosen for the integrator
+  dt_fall     REAL NOT NULL,     -- 0: chosen for the integrator
   definition  BLOB NOT NULL UNIQUE  -- oblique.protocol.ModelParameters, serialised
 ) STRICT;
 
@@ -141,7 +142,8 @@ SELECT s.name AS study, r.study_id AS study_id, r.point AS point, r.H AS H, r.mu
        r.attempt AS attempt, r.solved_at AS solved_at, r.model_id AS model_id, m.links AS links,
        m.length AS length, m.lengths_m AS lengths_m, m.E AS E_Pa, m.A AS A, m.I AS I, m.rho AS rho,
        m.g AS g, m.elements_per_link AS elements_per_link, m.k AS k, m.eta2 AS eta2,
-       m.tip_mass AS tip_mass, m.integrator AS integrator, m.dt AS dt, m.dt_fall AS dt_fall
+       m.tip_mass AS tip_mass, m.integrator AS integrator,
+       m.spectral_radius AS spectral_radius, m.dt AS dt, m.dt_fall AS dt_fall
 FROM results AS r
 JOIN studies AS s ON s.study_id = r.study_id
 JOIN models AS m ON m.model_id = r.model_id
