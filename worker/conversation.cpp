@@ -254,7 +254,7 @@ void Conversation::on(const protocol::ResultsStored& stored) {
       unacknowledged_.begin(), unacknowledged_.end(), stored.sequence(),
       [](const protocol::Results& results, std::uint64_t s) { return results.sequence() < s; });
   if (found != unacknowledged_.end() && found->sequence() == stored.sequence()) {
-    forget_results(static_cast<std::size_t>(found->results_size()));
+    unacknowledged_results_ -= static_cast<std::size_t>(found->results_size());
     unacknowledged_.erase(found);
   }
   give_credit();
@@ -268,7 +268,7 @@ void Conversation::on(const protocol::Withdraw& withdraw) {
   std::erase_if(unacknowledged_, [&](const protocol::Results& results) {
     const bool is_withdrawn = results.study_id() == withdraw.study_id();
     if (is_withdrawn) {
-      forget_results(static_cast<std::size_t>(results.results_size()));
+      unacknowledged_results_ -= static_cast<std::size_t>(results.results_size());
     }
     return is_withdrawn;
   });
@@ -354,10 +354,6 @@ void Conversation::queue_results(protocol::Results results) {
   *message.mutable_results() = results;
   unacknowledged_.push_back(std::move(results));
   send(std::move(message));
-}
-
-void Conversation::forget_results(std::size_t count) {
-  unacknowledged_results_ -= count;
 }
 
 bool Conversation::may_solve() const {

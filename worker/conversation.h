@@ -113,7 +113,6 @@ class Conversation {
   void send(protocol::WorkerMessage message);
   void send_heartbeat();
   void give_credit();
-  void forget_results(std::size_t count);
   void finish_if_delivered();
   void finish(int exit_code, const std::string& reason);
   Effects take_effects();

@@ -69,6 +69,7 @@ int main(int argc, char** argv) {
   spdlog::set_default_logger(spdlog::stderr_color_mt("worker"));
   SessionSettings settings;
   settings.name = host_and_process();
+  bool quiet = false;
   CLI::App app(
       "Solves points of parameter studies for an oblique-server.\n"
       "Example: oblique-worker --server tcp://127.0.0.1:7601");
@@ -78,10 +79,14 @@ int main(int argc, char** argv) {
   app.add_option("--name", settings.name, "Name that people see")->capture_default_str();
   app.add_flag("--stop-with-parent", settings.stop_with_parent,
                "Stop when the parent process is gone");
+  app.add_flag("--quiet", quiet, "Log warnings and errors only");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? EXIT_SUCCESS : kWrongUsage;
+  }
+  if (quiet) {
+    spdlog::set_level(spdlog::level::warn);
   }
   try {
     return run_worker(settings);

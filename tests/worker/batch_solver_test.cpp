@@ -1,0 +1,152 @@
+#include "worker/batch_solver.h"
+
+#include <condition_variable>
+#include <mutex>
+
+#include <gtest/gtest.h>
+
+namespace oblique::worker {
+namespace {
+
+Task task(std::uint64_t number, std::uint64_t first, std::uint64_t count,
+          std::uint64_t study_id = 7) {
+  return {number, study_id, 0, first, count, nullptr};
+}
+
+/// Lets the test decide when each point ends.
+class Gate {
+ public:
+  /// Called by the solver: says that a point has begun and waits until it may end.
+  void pass() {
+    std::unique_lock lock(mutex_);
+    ++begun_;
+    changed_.notify_all();
+    changed_.wait(lock, [this] { return open_ > 0; });
+    --open_;
+  }
+  void open(int points) {
+    const std::lock_guard lock(mutex_);
+    open_ += points;
+    changed_.notify_all();
+  }
+  void wait_begun(int points) {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return begun_ >= points; });
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  int begun_ = 0;
+  int open_ = 0;
+};
+
+/// A batch solver whose points are solved when the test says so.
+class BatchSolverTest : public ::testing::Test {
+ protected:
+  void TearDown() override { gate_.open(1'000'000); }
+
+  void wait_tasks_ended(int tasks) {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return tasks_ended_ >= tasks; });
+  }
+
+  Gate gate_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  int tasks_ended_ = 0;
+  BatchSolver solver_{[this](const Task&, std::uint64_t point) {
+                        gate_.pass();
+                        return protocol::failed_point(point, "for the test");
+                      },
+                      [this] {
+                        const std::lock_guard lock(mutex_);
+                        ++tasks_ended_;
+                        changed_.notify_all();
+                      }};
+};
+
+TEST_F(BatchSolverTest, TasksAreSolvedPointByPointInTheOrderTheyWereAdded) {
+  solver_.add(task(1, 10, 3));
+  solver_.add(task(2, 50, 2));
+  gate_.open(5);
+  wait_tasks_ended(2);
+  const auto progress = solver_.collect();
+  ASSERT_EQ(progress.size(), 2U);
+  EXPECT_EQ(progress[0].task, 1U);
+  ASSERT_EQ(progress[0].results.size(), 3U);
+  EXPECT_EQ(progress[0].results[2].point(), 12U);
+  EXPECT_TRUE(progress[0].task_done);
+  EXPECT_EQ(progress[1].results.size(), 2U);
+  EXPECT_TRUE(solver_.collect().empty());
+}
+
+TEST_F(BatchSolverTest, PartOfATaskCanBeCollectedWhileItIsSolved) {
+  solver_.add(task(1, 0, 3));
+  gate_.open(2);
+  gate_.wait_begun(3);
+  const auto part = solver_.collect();
+  ASSERT_EQ(part.size(), 1U);
+  EXPECT_EQ(part[0].results.size(), 2U);
+  EXPECT_FALSE(part[0].task_done);
+  EXPECT_TRUE(solver_.is_solving());
+  gate_.open(1);
+  wait_tasks_ended(1);
+  const auto rest = solver_.collect();
+  ASSERT_EQ(rest.size(), 1U);
+  EXPECT_EQ(rest[0].results.size(), 1U);
+  EXPECT_TRUE(rest[0].task_done);
+}
+
+TEST_F(BatchSolverTest, ADroppedStudyLeavesNothingAndOthersGoOn) {
+  solver_.add(task(1, 0, 3, 7));
+  solver_.add(task(2, 0, 3, 7));
+  solver_.add(task(3, 0, 1, 8));
+  gate_.open(1);
+  gate_.wait_begun(2);
+  solver_.drop_study(7);
+  gate_.open(2);
+  wait_tasks_ended(1);
+  const auto progress = solver_.collect();
+  ASSERT_EQ(progress.size(), 1U);
+  EXPECT_EQ(progress[0].task, 3U);
+}
+
+TEST_F(BatchSolverTest, WhenAllIsDroppedWhatWasSolvedCanStillBeCollected) {
+  solver_.add(task(1, 0, 3));
+  solver_.add(task(2, 0, 3));
+  gate_.open(1);
+  gate_.wait_begun(2);
+  solver_.drop_all();
+  const auto progress = solver_.collect();
+  ASSERT_EQ(progress.size(), 1U);
+  EXPECT_EQ(progress[0].results.size(), 1U);
+  EXPECT_FALSE(progress[0].task_done);
+  gate_.open(1);
+  solver_.add(task(3, 0, 1));
+  gate_.open(1);
+  wait_tasks_ended(1);
+  EXPECT_EQ(solver_.collect().at(0).task, 3U);
+}
+
+TEST_F(BatchSolverTest, APausedSolverEndsItsPointAndBeginsNoOther) {
+  solver_.add(task(1, 0, 2));
+  gate_.wait_begun(1);
+  solver_.set_paused(true);
+  gate_.open(2);
+  while (solver_.is_solving()) {
+    std::this_thread::yield();
+  }
+  EXPECT_EQ(solver_.collect().at(0).results.size(), 1U);
+  solver_.set_paused(false);
+  wait_tasks_ended(1);
+  EXPECT_EQ(solver_.collect().at(0).results.size(), 1U);
+}
+
+TEST_F(BatchSolverTest, APausedSolverCanBeEnded) {
+  solver_.set_paused(true);
+  solver_.add(task(1, 0, 2));
+}
+
+}  // namespace
+}  // namespace oblique::worker

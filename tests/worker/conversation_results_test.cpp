@@ -1,0 +1,199 @@
+#include <limits>
+
+#include "tests/worker/conversation_fixture.h"
+#include "worker/conversation.h"
+
+namespace oblique::worker {
+namespace {
+
+using protocol::WorkerMessage;
+
+TEST_F(ConversationTest, ResultsAreNumberedFromOneAndTheLastOfABatchSaysSo) {
+  join();
+  receive(batch_message(7, 31));
+  solve(1, 0, 4, false);
+  ASSERT_EQ(sent_results().size(), 1U);
+  protocol::Results results = sent_results()[0];
+  EXPECT_EQ(results.sequence(), 1U);
+  EXPECT_EQ(results.study_id(), 7U);
+  EXPECT_EQ(results.lease_id(), 31U);
+  EXPECT_EQ(results.attempt(), 1U);
+  EXPECT_FALSE(results.batch_done());
+  EXPECT_EQ(results.results_size(), 4);
+  solve(1, 4, 6, true);
+  ASSERT_EQ(sent_results().size(), 1U);
+  results = sent_results()[0];
+  EXPECT_EQ(results.sequence(), 2U);
+  EXPECT_TRUE(results.batch_done());
+  EXPECT_EQ(results.results(5).point(), 9U);
+}
+
+TEST_F(ConversationTest, ABatchThatEndsWithNothingNewIsStillSaidToBeDone) {
+  join();
+  receive(batch_message(7, 31));
+  solve(1, 0, 10, false);
+  solve(1, 10, 0, true);
+  ASSERT_EQ(sent_results().size(), 1U);
+  EXPECT_TRUE(sent_results()[0].batch_done());
+  EXPECT_EQ(sent_results()[0].results_size(), 0);
+}
+
+TEST_F(ConversationTest, ManyResultsAreSplitAndOnlyTheLastMessageEndsTheBatch) {
+  ConversationSettings settings;
+  settings.results_a_message = 4;
+  use(settings);
+  join();
+  receive(batch_message(7, 31));
+  solve(1, 0, 10, true);
+  const auto results = sent_results();
+  ASSERT_EQ(results.size(), 3U);
+  double busy_s = 0.0;
+  std::uint64_t next = 0;
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    EXPECT_EQ(results[i].batch_done(), i == 2);
+    EXPECT_EQ(results[i].sequence(), i + 1);
+    busy_s += results[i].busy_s();
+    for (const auto& result : results[i].results()) {
+      EXPECT_EQ(result.point(), next++);
+    }
+  }
+  EXPECT_EQ(next, 10U);
+  EXPECT_NEAR(busy_s, 0.5, 1e-12);
+}
+
+TEST_F(ConversationTest, AMessageStaysBelowItsSizeInBytes) {
+  ConversationSettings settings;
+  settings.bytes_a_message = 100;
+  use(settings);
+  join();
+  receive(batch_message(7, 31));
+  solve(1, 0, 10, true);
+  EXPECT_GT(sent_results().size(), 1U);
+  for (const auto& results : sent_results()) {
+    EXPECT_LT(results.ByteSizeLong(), 200U);
+  }
+}
+
+TEST_F(ConversationTest, AResultTooLargeToSendBecomesAFailedPoint) {
+  ConversationSettings settings;
+  settings.bytes_a_message = 100;
+  use(settings);
+  join();
+  receive(batch_message(7, 31, 0, 1));
+  Progress progress{1, 7, {}, 0.1, true};
+  progress.results.push_back(protocol::failed_point(0, std::string(1000, 'x')));
+  std::vector<Progress> all;
+  all.push_back(std::move(progress));
+  take(conversation_->on_progress(std::move(all), now_ms_));
+  ASSERT_EQ(sent_results().size(), 1U);
+  EXPECT_EQ(sent_results()[0].results(0).error(), "its result is too large to send");
+}
+
+TEST_F(ConversationTest, UnacknowledgedResultsAreDeliveredAgainBeforeCreditIsGiven) {
+  join();
+  receive(batch_message(7, 31));
+  solve(1, 0, 4, false);
+  solve(1, 4, 3, false);
+  receive(stored_message(1));
+  receive(hello_again_message());
+  receive(welcome_message());
+  const auto sends = effects_of<Send>();
+  ASSERT_EQ(sends.size(), 2U);
+  EXPECT_EQ(sends[0].message.results().sequence(), 2U);
+  EXPECT_EQ(sends[0].message.results().results(0).point(), 4U);
+  EXPECT_EQ(sends[1].message.credit().batches(), 2U);
+}
+
+TEST_F(ConversationTest, ResultsOfAnEarlierSessionBelongToNoLease) {
+  join();
+  receive(batch_message(7, 31));
+  solve(1, 0, 10, true);
+  receive(hello_again_message());
+  receive(welcome_message());
+  ASSERT_EQ(sent_results().size(), 1U);
+  EXPECT_EQ(sent_results()[0].lease_id(), 0U);
+  EXPECT_FALSE(sent_results()[0].batch_done());
+}
+
+TEST_F(ConversationTest, TasksOfAnEarlierSessionAreDroppedAtTheWelcomeAndNotBefore) {
+  join();
+  receive(batch_message(7, 31));
+  receive(hello_again_message());
+  EXPECT_FALSE(has<DropAll>());
+  receive(welcome_message());
+  EXPECT_TRUE(has<DropAll>());
+  EXPECT_EQ(credit_given(), 2U);
+}
+
+TEST_F(ConversationTest, PointsOfADroppedTaskThatWereSolvedAreDeliveredWithoutALease) {
+  join();
+  receive(batch_message(7, 31));
+  receive(hello_again_message());
+  receive(welcome_message());
+  receive(study_message(7));
+  receive(batch_message(7, 31));  // the server counts its leases anew
+  solve(1, 0, 3, false);
+  ASSERT_EQ(sent_results().size(), 1U);
+  EXPECT_EQ(sent_results()[0].lease_id(), 0U);
+  solve(1, 3, 0, true);
+  EXPECT_TRUE(sent_results().empty());
+  solve(2, 0, 10, true);
+  ASSERT_EQ(sent_results().size(), 1U);
+  EXPECT_EQ(sent_results()[0].lease_id(), 31U);
+  EXPECT_TRUE(sent_results()[0].batch_done());
+}
+
+TEST_F(ConversationTest, PointsSolvedWhileTheServerIsAwayAreKeptAndDeliveredAtTheWelcome) {
+  join();
+  receive(batch_message(7, 31));
+  receive(hello_again_message());
+  solve(1, 0, 10, true);
+  EXPECT_TRUE(sent_results().empty());
+  EXPECT_EQ(conversation_->unacknowledged_results(), 10U);
+  receive(welcome_message());
+  ASSERT_EQ(sent_results().size(), 1U);
+  EXPECT_EQ(sent_results()[0].results_size(), 10);
+}
+
+TEST_F(ConversationTest, ResultsForOneDatabaseAreNeverDeliveredToAnother) {
+  join();
+  receive(batch_message(7, 31));
+  solve(1, 0, 10, true);
+  receive(hello_again_message());
+  receive(welcome_message("another"));
+  EXPECT_TRUE(sent_results().empty());
+  EXPECT_EQ(conversation_->unacknowledged_results(), 0U);
+}
+
+TEST_F(ConversationTest, TooManyUnacknowledgedResultsStopCreditAndSolvingUntilTheyAreStored) {
+  ConversationSettings settings;
+  settings.unacknowledged_limit = 10;
+  use(settings);
+  join();
+  receive(batch_message(7, 31));
+  solve(1, 0, 9, false);
+  EXPECT_TRUE(conversation_->may_solve());
+  solve(1, 9, 1, true);
+  EXPECT_FALSE(conversation_->may_solve());
+  EXPECT_EQ(credit_given(), 0U);
+  receive(stored_message(1));
+  EXPECT_TRUE(conversation_->may_solve());
+  EXPECT_EQ(credit_given(), 1U);
+}
+
+TEST_F(ConversationTest, AnAcknowledgementThatComesTwiceOrForNothingChangesNothing) {
+  join();
+  receive(batch_message(7, 31));
+  solve(1, 0, 4, false);
+  solve(1, 4, 4, false);
+  receive(stored_message(2));
+  receive(stored_message(2));
+  receive(stored_message(77));
+  receive(stored_message(std::numeric_limits<std::uint64_t>::max()));
+  EXPECT_EQ(conversation_->unacknowledged_results(), 4U);
+  receive(stored_message(1));
+  EXPECT_EQ(conversation_->unacknowledged_results(), 0U);
+}
+
+}  // namespace
+}  // namespace oblique::worker

@@ -1,0 +1,279 @@
+#include "worker/conversation.h"
+
+#include "tests/worker/conversation_fixture.h"
+
+namespace oblique::worker {
+namespace {
+
+using protocol::WorkerMessage;
+
+TEST_F(ConversationTest, TheFirstThingSaidIsHelloOnANewSocket) {
+  start();
+  ASSERT_EQ(effects_.size(), 2U);
+  EXPECT_TRUE(std::holds_alternative<Connect>(effects_[0]));
+  EXPECT_EQ(std::get<Send>(effects_[1]).message.hello().name(), "test");
+}
+
+TEST_F(ConversationTest, AWelcomedWorkerAsksForTwoBatches) {
+  start();
+  receive(welcome_message());
+  EXPECT_EQ(credit_given(), 2U);
+}
+
+TEST_F(ConversationTest, ABatchIsSolvedWithTheRecipeOfItsStudy) {
+  join();
+  receive(batch_message(7, 31, 90, 10));
+  const auto solves = effects_of<Solve>();
+  ASSERT_EQ(solves.size(), 1U);
+  EXPECT_EQ(solves[0].task.study_id, 7U);
+  EXPECT_EQ(solves[0].task.first_point, 90U);
+  EXPECT_EQ(solves[0].task.count, 10U);
+  EXPECT_EQ(solves[0].task.points->size(), 100U);
+}
+
+TEST_F(ConversationTest, CreditIsGivenAgainForEachBatchSolvedAndNeverForMoreThanTwo) {
+  join();
+  receive(batch_message(7, 31, 0));
+  EXPECT_EQ(credit_given(), 0U);
+  receive(batch_message(7, 32, 10));
+  EXPECT_EQ(credit_given(), 0U);
+  solve(1, 0, 5, false);
+  EXPECT_EQ(credit_given(), 0U);
+  solve(1, 5, 5, true);
+  EXPECT_EQ(credit_given(), 1U);
+  solve(2, 10, 10, true);
+  EXPECT_EQ(credit_given(), 1U);
+}
+
+TEST_F(ConversationTest, HeartbeatsGoOnEachIntervalAndNameWhatIsHeld) {
+  join();
+  receive(batch_message(7, 31, 0));
+  receive(batch_message(7, 32, 10));
+  pass(999);
+  EXPECT_TRUE(sent(WorkerMessage::kHeartbeat).empty());
+  pass(1);
+  const auto beats = sent(WorkerMessage::kHeartbeat);
+  ASSERT_EQ(beats.size(), 1U);
+  EXPECT_EQ(beats[0].heartbeat().lease_ids_size(), 2);
+  EXPECT_EQ(conversation_->next_deadline_ms(), now_ms_ + 1000);
+}
+
+TEST_F(ConversationTest, AHeartbeatNamesALeaseUntilItsLastResultsAreStored) {
+  join();
+  receive(batch_message(7, 31, 0));
+  solve(1, 0, 10, true);
+  pass(1000);
+  ASSERT_EQ(sent(WorkerMessage::kHeartbeat).size(), 1U);
+  EXPECT_EQ(sent(WorkerMessage::kHeartbeat)[0].heartbeat().lease_ids_size(), 1);
+  receive(stored_message(1));
+  pass(1000);
+  ASSERT_EQ(sent(WorkerMessage::kHeartbeat).size(), 1U);
+  EXPECT_EQ(sent(WorkerMessage::kHeartbeat)[0].heartbeat().lease_ids_size(), 0);
+}
+
+TEST_F(ConversationTest, ASilentServerIsMetOnANewSocket) {
+  join();
+  receive(heartbeat_reply_message());
+  pass(2999);
+  EXPECT_FALSE(has<Connect>());
+  pass(1);
+  EXPECT_TRUE(has<Connect>());
+  EXPECT_EQ(sent(WorkerMessage::kHello).size(), 1U);
+}
+
+TEST_F(ConversationTest, AnyMessageShowsThatTheServerLives) {
+  join();
+  receive(heartbeat_reply_message());
+  for (int i = 0; i < 10; ++i) {
+    pass(1000);
+    EXPECT_FALSE(has<Connect>());
+    receive(heartbeat_reply_message());
+  }
+}
+
+TEST_F(ConversationTest, AHelloWithoutAnswerIsSaidAgainAfterAPauseThatDoublesToTwoSeconds) {
+  start();
+  for (const std::int64_t backoff_ms : {50, 100, 200, 400, 800, 1600, 2000, 2000}) {
+    pass(3000);
+    EXPECT_FALSE(has<Connect>());
+    EXPECT_EQ(conversation_->next_deadline_ms(), now_ms_ + backoff_ms);
+    pass(backoff_ms);
+    EXPECT_TRUE(has<Connect>());
+    EXPECT_EQ(sent(WorkerMessage::kHello).size(), 1U);
+  }
+}
+
+TEST_F(ConversationTest, AServerThatAsksForHelloAfterHelloIsNotAskedWithoutPause) {
+  join();
+  receive(heartbeat_reply_message());
+  receive(hello_again_message());
+  EXPECT_TRUE(has<Connect>());
+  receive(welcome_message());
+  receive(hello_again_message());
+  EXPECT_FALSE(has<Connect>());
+  EXPECT_EQ(conversation_->next_deadline_ms(), now_ms_ + 50);
+}
+
+TEST_F(ConversationTest, MessagesOfAnOldSocketAreNotHeardBeforeTheWelcome) {
+  join();
+  receive(hello_again_message());
+  pass(50);
+  receive(batch_message(7, 31));
+  EXPECT_TRUE(effects_.empty());
+  receive(stored_message(1));
+  EXPECT_TRUE(effects_.empty());
+}
+
+TEST_F(ConversationTest, AMessageThatCannotBeSentMeansANewSocket) {
+  join();
+  receive(heartbeat_reply_message());
+  take(conversation_->on_send_failed(now_ms_));
+  EXPECT_TRUE(has<Connect>());
+}
+
+TEST_F(ConversationTest, ARefusedWorkerEndsWithOneAndTheReason) {
+  start();
+  protocol::ServerToWorker message;
+  message.mutable_refused()->set_reason("protocol 2 is spoken here");
+  receive(message);
+  ASSERT_TRUE(finish());
+  EXPECT_EQ(finish()->exit_code, 1);
+  EXPECT_NE(finish()->reason.find("protocol 2 is spoken here"), std::string::npos);
+}
+
+TEST_F(ConversationTest, ABatchOfAStudyNeverDefinedBeginsTheConversationAnew) {
+  join();
+  receive(heartbeat_reply_message());
+  receive(batch_message(8, 31));
+  EXPECT_FALSE(has<Solve>());
+  EXPECT_TRUE(has<Connect>());
+}
+
+TEST_F(ConversationTest, ABatchBeyondItsStudyBeginsTheConversationAnew) {
+  const auto max = std::numeric_limits<std::uint64_t>::max();
+  protocol::ServerToWorker wrong_model = batch_message(7, 31);
+  wrong_model.mutable_batch()->set_model(1);
+  for (const auto& batch :
+       {batch_message(7, 31, 95, 6), batch_message(7, 31, 100, 1), batch_message(7, 31, 0, 0),
+        batch_message(7, 31, 50, max), batch_message(7, 31, max, 2), wrong_model}) {
+    use(ConversationSettings{});
+    join();
+    receive(heartbeat_reply_message());
+    receive(batch);
+    EXPECT_FALSE(has<Solve>());
+    EXPECT_TRUE(has<Connect>());
+  }
+}
+
+TEST_F(ConversationTest, AStudyThatCannotBeReadEndsTheWorkerRatherThanFailingItsPoints) {
+  start();
+  receive(welcome_message());
+  protocol::ServerToWorker message = study_message(7);
+  message.mutable_study()->mutable_recipe()->mutable_blocks(0)->mutable_axes(0)->set_key("wobble");
+  receive(message);
+  ASSERT_TRUE(finish());
+  EXPECT_EQ(finish()->exit_code, 1);
+  EXPECT_NE(finish()->reason.find("wobble"), std::string::npos);
+}
+
+TEST_F(ConversationTest, MessagesWithoutAKnownKindAreIgnored) {
+  join();
+  receive(protocol::ServerToWorker());
+  EXPECT_TRUE(effects_.empty());
+}
+
+TEST_F(ConversationTest, AWithdrawnStudyIsDroppedAndItsPlaceGivenAgain) {
+  join();
+  receive(batch_message(7, 31, 0));
+  receive(batch_message(7, 32, 10));
+  solve(1, 0, 5, false);
+  receive(withdraw_message(7));
+  ASSERT_EQ(effects_of<DropStudy>().size(), 1U);
+  EXPECT_EQ(effects_of<DropStudy>()[0].study_id, 7U);
+  EXPECT_EQ(credit_given(), 2U);
+  EXPECT_EQ(conversation_->unacknowledged_results(), 0U);
+}
+
+TEST_F(ConversationTest, AStoppingServerGetsResultsButIsAskedForNothing) {
+  join();
+  receive(batch_message(7, 31));
+  protocol::ServerToWorker stopping;
+  stopping.mutable_stopping();
+  receive(stopping);
+  EXPECT_FALSE(has<Finish>());
+  solve(1, 0, 10, true);
+  EXPECT_EQ(sent_results().size(), 1U);
+  EXPECT_EQ(credit_given(), 0U);
+}
+
+TEST_F(ConversationTest, AWorkerIsWelcomedBackAfterAStoppingServerIsStartedAgain) {
+  join();
+  protocol::ServerToWorker stopping;
+  stopping.mutable_stopping();
+  receive(stopping);
+  receive(hello_again_message());
+  pass(2000);
+  receive(welcome_message());
+  EXPECT_EQ(credit_given(), 2U);
+}
+
+TEST_F(ConversationTest, AnIdleWorkerThatIsStoppedSaysGoodbyeAtOnce) {
+  join();
+  take(conversation_->stop(now_ms_));
+  EXPECT_EQ(sent(WorkerMessage::kGoodbye).size(), 1U);
+  ASSERT_TRUE(finish());
+  EXPECT_EQ(finish()->exit_code, 0);
+}
+
+TEST_F(ConversationTest, AStoppedWorkerSaysGoodbyeOnceItsResultsAreStored) {
+  join();
+  receive(batch_message(7, 31));
+  solve(1, 0, 5, false);
+  take(conversation_->stop(now_ms_));
+  EXPECT_TRUE(has<DropAll>());
+  EXPECT_FALSE(finish());
+  receive(stored_message(1));
+  EXPECT_EQ(sent(WorkerMessage::kGoodbye).size(), 1U);
+  EXPECT_TRUE(finish());
+}
+
+TEST_F(ConversationTest, AStoppedWorkerTakesNoFurtherBatch) {
+  join();
+  receive(batch_message(7, 31));
+  solve(1, 0, 5, false);
+  take(conversation_->stop(now_ms_));
+  receive(batch_message(7, 32));
+  EXPECT_FALSE(has<Solve>());
+}
+
+TEST_F(ConversationTest, AStoppedWorkerWaitsTwoSecondsForItsResultsAndThenLeaves) {
+  join();
+  receive(batch_message(7, 31));
+  solve(1, 0, 5, false);
+  take(conversation_->stop(now_ms_));
+  pass(1999);
+  EXPECT_FALSE(finish());
+  pass(1);
+  ASSERT_TRUE(finish());
+  EXPECT_EQ(finish()->exit_code, 0);
+  EXPECT_NE(finish()->reason.find("5 results"), std::string::npos);
+}
+
+TEST_F(ConversationTest, AWorkerThatIsStoppedTwiceLeavesAtOnce) {
+  join();
+  receive(batch_message(7, 31));
+  solve(1, 0, 5, false);
+  take(conversation_->stop(now_ms_));
+  take(conversation_->stop(now_ms_));
+  EXPECT_TRUE(finish());
+}
+
+TEST_F(ConversationTest, AWorkerWithoutServerLeavesAtOnceWhenItHasNothingToDeliver) {
+  start();
+  take(conversation_->stop(now_ms_));
+  ASSERT_TRUE(finish());
+  EXPECT_EQ(finish()->exit_code, 0);
+}
+
+}  // namespace
+}  // namespace oblique::worker

@@ -1,0 +1,217 @@
+#include "worker/session.h"
+
+#include <future>
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "proto/frames.h"
+#include "tests/worker/conversation_fixture.h"
+#include "worker/wake_up.h"
+
+namespace oblique::worker {
+namespace {
+
+using protocol::WorkerMessage;
+
+/// The server's side of the socket, played by the test. Waiting for a message that never comes is
+/// an error after a time that no sound run needs.
+class ScriptedServer {
+ public:
+  explicit ScriptedServer(const std::string& endpoint = "tcp://127.0.0.1:*")
+      : socket_(context_, zmq::socket_type::router) {
+    constexpr int kNeverThatLong_ms = 30'000;
+    socket_.set(zmq::sockopt::linger, 0);
+    socket_.set(zmq::sockopt::rcvtimeo, kNeverThatLong_ms);
+    socket_.bind(endpoint);
+  }
+
+  std::string endpoint() const { return socket_.get(zmq::sockopt::last_endpoint); }
+
+  /// The next message of that kind; others are passed over.
+  WorkerMessage wait_for(WorkerMessage::KindCase kind) {
+    while (true) {
+      zmq::message_t identity;
+      zmq::message_t frame;
+      if (!socket_.recv(identity) || !socket_.recv(frame)) {
+        throw std::runtime_error("the worker never sent the message that the test waits for");
+      }
+      WorkerMessage message;
+      if (!protocol::decode({frame.data<char>(), frame.size()}, message)) {
+        throw std::runtime_error("the worker sent a frame that is no message");
+      }
+      if (message.kind_case() == kind) {
+        worker_ = identity.to_string();
+        return message;
+      }
+    }
+  }
+
+  /// To the worker heard last.
+  void send(const protocol::ServerToWorker& message) { send_frame(protocol::encode(message)); }
+  void send_frame(const std::string& frame) {
+    socket_.send(zmq::buffer(worker_), zmq::send_flags::sndmore);
+    socket_.send(zmq::buffer(frame));
+  }
+
+  /// Takes a hello and hands out points 0 to `count − 1` of study 7.
+  void welcome_and_hand_out(std::uint64_t count) {
+    wait_for(WorkerMessage::kHello);
+    protocol::ServerToWorker welcome = welcome_message();
+    welcome.mutable_welcome()->set_heartbeat_interval_ms(20);
+    welcome.mutable_welcome()->set_lost_after_ms(10'000);
+    send(welcome);
+    wait_for(WorkerMessage::kCredit);
+    send(study_message(7));
+    send(batch_message(7, 31, 0, count));
+  }
+
+ private:
+  zmq::context_t context_;
+  zmq::socket_t socket_;
+  std::string worker_;
+};
+
+/// A session on a thread of its own.
+class RunningWorker {
+ public:
+  explicit RunningWorker(const std::string& server, BatchSolver::SolvePoint solve)
+      : session_(settings(server), std::move(solve)),
+        exit_code_(std::async(std::launch::async, [this] {
+          return session_.run(stop_.descriptor(), [this] { stop_.clear(); });
+        })) {}
+  ~RunningWorker() { stop_.wake(); }
+  RunningWorker(const RunningWorker&) = delete;
+  RunningWorker& operator=(const RunningWorker&) = delete;
+
+  void stop() { stop_.wake(); }
+  int exit_code() { return exit_code_.get(); }
+
+ private:
+  static SessionSettings settings(const std::string& server) {
+    SessionSettings settings;
+    settings.server = server;
+    settings.name = "test";
+    return settings;
+  }
+
+  WakeUp stop_;
+  Session session_;
+  std::future<int> exit_code_;
+};
+
+protocol::PointResult solved_at_once(const Task&, std::uint64_t point) {
+  return protocol::failed_point(point, "for the test");
+}
+
+TEST(SessionTest, ABatchIsSolvedAndReportedAndAStoppedWorkerSaysGoodbye) {
+  ScriptedServer server;
+  RunningWorker worker(server.endpoint(), solved_at_once);
+  server.welcome_and_hand_out(10);
+  std::uint64_t points = 0;
+  bool batch_done = false;
+  while (!batch_done) {
+    const auto results = server.wait_for(WorkerMessage::kResults).results();
+    points += static_cast<std::uint64_t>(results.results_size());
+    batch_done = results.batch_done();
+    server.send(stored_message(results.sequence()));
+  }
+  EXPECT_EQ(points, 10U);
+  worker.stop();
+  server.wait_for(WorkerMessage::kGoodbye);
+  EXPECT_EQ(worker.exit_code(), 0);
+}
+
+TEST(SessionTest, HeartbeatsGoOnWhileAPointIsSolved) {
+  ScriptedServer server;
+  std::promise<void> release;
+  const std::shared_future<void> released(release.get_future());
+  RunningWorker worker(server.endpoint(), [&](const Task&, std::uint64_t point) {
+    released.wait();
+    return protocol::failed_point(point, "for the test");
+  });
+  server.welcome_and_hand_out(1);
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_LE(server.wait_for(WorkerMessage::kHeartbeat).heartbeat().lease_ids_size(), 1);
+  }
+  release.set_value();
+  const auto results = server.wait_for(WorkerMessage::kResults).results();
+  EXPECT_EQ(results.results_size(), 1);
+  server.send(stored_message(results.sequence()));
+}
+
+TEST(SessionTest, WhatTheLostServerDidNotStoreIsDeliveredToTheNextOneAtTheSameAddress) {
+  auto server = std::make_unique<ScriptedServer>();
+  const std::string endpoint = server->endpoint();
+  RunningWorker worker(endpoint, solved_at_once);
+  server->welcome_and_hand_out(10);
+  while (!server->wait_for(WorkerMessage::kResults).results().batch_done()) {
+  }
+  server.reset();
+
+  ScriptedServer next(endpoint);
+  next.wait_for(WorkerMessage::kHeartbeat);
+  next.send(hello_again_message());
+  next.wait_for(WorkerMessage::kHello);
+  next.send(welcome_message());
+  std::uint64_t points = 0;
+  while (points < 10) {
+    const auto results = next.wait_for(WorkerMessage::kResults).results();
+    points += static_cast<std::uint64_t>(results.results_size());
+    EXPECT_EQ(results.lease_id(), 0U);
+    next.send(stored_message(results.sequence()));
+  }
+  EXPECT_EQ(points, 10U);
+}
+
+TEST(SessionTest, AWorkerStartedBeforeItsServerFindsIt) {
+  std::string endpoint;
+  {
+    const ScriptedServer once;
+    endpoint = once.endpoint();
+  }
+  RunningWorker worker(endpoint, solved_at_once);
+  ScriptedServer server(endpoint);
+  EXPECT_EQ(server.wait_for(WorkerMessage::kHello).hello().name(), "test");
+}
+
+TEST(SessionTest, FramesThatAreNoMessagesDoNotHarmAWorker) {
+  ScriptedServer server;
+  RunningWorker worker(server.endpoint(), solved_at_once);
+  server.wait_for(WorkerMessage::kHello);
+  server.send_frame("");
+  server.send_frame("GET / HTTP/1.1\r\n\r\n");
+  server.send_frame(std::string(100'000, '\xFF'));
+  server.send(welcome_message());
+  EXPECT_EQ(server.wait_for(WorkerMessage::kCredit).credit().batches(), 2U);
+}
+
+TEST(SessionTest, ARefusedWorkerEndsWithOne) {
+  ScriptedServer server;
+  RunningWorker worker(server.endpoint(), solved_at_once);
+  server.wait_for(WorkerMessage::kHello);
+  protocol::ServerToWorker refused;
+  refused.mutable_refused()->set_reason("for the test");
+  server.send(refused);
+  EXPECT_EQ(worker.exit_code(), 1);
+}
+
+TEST(SessionTest, AnAddressThatIsNoneIsAnErrorThatNamesIt) {
+  for (const std::string address : {"", "localhost", "tcp://127.0.0.1", "tcp://127.0.0.1:port"}) {
+    SessionSettings settings;
+    settings.server = address;
+    Session session(settings, solved_at_once);
+    const WakeUp stop;
+    try {
+      session.run(stop.descriptor(), [] {});
+      FAIL() << "connected to \"" << address << '"';
+    } catch (const AddressError& error) {
+      EXPECT_NE(std::string(error.what()).find('"' + address + '"'), std::string::npos);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace oblique::worker
