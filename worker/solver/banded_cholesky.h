@@ -5,10 +5,9 @@
 #include <cstddef>
 #include <vector>
 
-namespace oblique::solver {
+#include "worker/solver/chain_kernel.h"
 
-/// Half-bandwidth of every matrix of the chain: an element spans four consecutive rows.
-inline constexpr std::size_t kHalfBandwidth = 3;
+namespace oblique::solver {
 
 /// Symmetric matrix of half-bandwidth 3, lower part by rows: at(i, d) is entry (i, i - d).
 class BandedMatrix {
@@ -81,31 +80,13 @@ class BandedCholesky {
   /// `Real` is a number or a vector of lanes. Needs positive_definite().
   template <class Real>
   void solve_pairs(Real* f) const {
-    const std::size_t n = rows_.size();
-    for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t d = 1; d <= kHalfBandwidth && d <= i; ++d) {
-        f[2 * i] -= rows_[i].factor[d - 1] * f[2 * (i - d)];
-        f[2 * i + 1] -= rows_[i].factor[d - 1] * f[2 * (i - d) + 1];
-      }
-    }
-    for (std::size_t i = n; i-- > 0;) {
-      Real x = f[2 * i] * rows_[i].inverse_pivot;
-      Real y = f[2 * i + 1] * rows_[i].inverse_pivot;
-      for (std::size_t d = 1; d <= kHalfBandwidth && i + d < n; ++d) {
-        x -= rows_[i + d].factor[d - 1] * f[2 * (i + d)];
-        y -= rows_[i + d].factor[d - 1] * f[2 * (i + d) + 1];
-      }
-      f[2 * i] = x;
-      f[2 * i + 1] = y;
-    }
+    solve_factored(rows_.data(), rows_.size(), f);
   }
 
+  const FactorRow* data() const { return rows_.data(); }
+
  private:
-  struct Row {
-    std::array<double, kHalfBandwidth> factor{};  ///< L(i, i-1), L(i, i-2), L(i, i-3)
-    double inverse_pivot = 0.0;
-  };
-  std::vector<Row> rows_;
+  std::vector<FactorRow> rows_;
   bool positive_definite_ = true;
 };
 

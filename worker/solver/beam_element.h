@@ -23,7 +23,7 @@ struct PlanarVector {
 /// Gradient coefficients (or the forces conjugate to them) of one element.
 template <class Real>
 struct GradientCoefficients {
-  std::array<PlanarVector<Real>, 3> c;
+  PlanarVector<Real> c[3];
 };
 
 /// Five-point Gauss rule on [-1, 1]; exact to degree 9, and eps r' P2 has degree 8.
@@ -52,13 +52,12 @@ GradientCoefficients<Real> gradient_coefficients(const PlanarVector<Real>& p_i,
   return g;
 }
 
-/// Adds the axial forces of the Gauss points at +-zeta, half weight `w` = EA l/2 times the Gauss
-/// weight. The gradient splits into an even and an odd part, so the pair costs little more than one
-/// point.
+/// Adds the axial forces of the Gauss points at +-zeta, p2 = P2(zeta), half weight `w` = EA l/2
+/// times the Gauss weight. The gradient splits into an even and an odd part, so the pair costs
+/// little more than one point.
 template <class Real>
-inline void add_axial_pair(const GradientCoefficients<Real>& g, double zeta, double w,
+inline void add_axial_pair(const GradientCoefficients<Real>& g, double zeta, double p2, double w,
                            GradientCoefficients<Real>& f) {
-  const double p2 = legendre_p2(zeta);
   const PlanarVector<Real> even{g.c[0].x + p2 * g.c[2].x, g.c[0].y + p2 * g.c[2].y};
   const PlanarVector<Real> odd{zeta * g.c[1].x, zeta * g.c[1].y};
   // eps(+-zeta) = mean +- difference, eps = (r'.r' - 1)/2.
@@ -93,8 +92,12 @@ GradientCoefficients<Real> elastic_gradient(const GradientCoefficients<Real>& g,
   f.c[1] = {(2.0 * bending) * g.c[1].x, (2.0 * bending) * g.c[1].y};
   f.c[2] = {(6.0 * bending) * g.c[2].x - 0.5 * f.c[0].x,
             (6.0 * bending) * g.c[2].y - 0.5 * f.c[0].y};
-  add_axial_pair(g, GaussRule::inner_abscissa, half_EA_length * GaussRule::inner_weight, f);
-  add_axial_pair(g, GaussRule::outer_abscissa, half_EA_length * GaussRule::outer_weight, f);
+  constexpr double inner_p2 = legendre_p2(GaussRule::inner_abscissa);
+  constexpr double outer_p2 = legendre_p2(GaussRule::outer_abscissa);
+  add_axial_pair(g, GaussRule::inner_abscissa, inner_p2, half_EA_length * GaussRule::inner_weight,
+                 f);
+  add_axial_pair(g, GaussRule::outer_abscissa, outer_p2, half_EA_length * GaussRule::outer_weight,
+                 f);
   return f;
 }
 

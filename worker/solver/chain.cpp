@@ -19,7 +19,7 @@ BandedMatrix with_unit_pin(std::size_t rows, double unit) {
   return matrix;
 }
 
-void add_element(BandedMatrix& matrix, const std::array<std::size_t, 4>& row,
+void add_element(BandedMatrix& matrix, const std::size_t (&row)[4],
                  const std::array<std::array<double, 4>, 4>& entries, double factor) {
   for (std::size_t a = 0; a < 4; ++a) {
     for (std::size_t b = 0; b < 4; ++b) {
@@ -65,7 +65,7 @@ Chain::Chain(const ModelParameters& model)
       mass_factor_(BandedMatrix(0)),
       along_(with_unit_pin(rows_, 0.0)) {
   number_rows(model);
-  for (const Element& element : elements_) {
+  for (const ElementTable& element : elements_) {
     const double length = 1.0 / element.inverse_length;
     add_element(mass_, element.row, mass_matrix(mass_per_length_, length), 1.0);
     // kappa^2 = r''.r'' counts both directions, so bending stiffness acts along the chain too.
@@ -94,8 +94,10 @@ void Chain::number_rows(const ModelParameters& model) {
     first_element_.push_back(elements_.size());
     for (int e = 0; e < n; ++e) {
       const bool ends_at_joint = e + 1 == n && link + 1 < model.lengths_m.size();
-      Element element{};
-      element.row = {left, left + 1, left + 2, left + 3};
+      ElementTable element{};
+      for (std::size_t a = 0; a < 4; ++a) {
+        element.row[a] = left + a;
+      }
       if (ends_at_joint) {
         std::swap(element.row[2], element.row[3]);  // slope of the inner link, then the position
       }
@@ -113,7 +115,7 @@ ChainState Chain::at_rest() const {
   state.q.assign(2 * rows_, 0.0);
   state.v.assign(2 * rows_, 0.0);
   double x = 0.0;
-  for (const Element& element : elements_) {
+  for (const ElementTable& element : elements_) {
     x += 1.0 / element.inverse_length;
     state.q[2 * element.row[1]] = 1.0;
     state.q[2 * element.row[2]] = x;
@@ -132,7 +134,7 @@ double Chain::strain_energy_J(const Coordinates& q) const {
     return PlanarVector<double>{q[2 * row], q[2 * row + 1]};
   };
   double energy = 0.0;
-  for (const Element& element : elements_) {
+  for (const ElementTable& element : elements_) {
     const auto [pi, si, pj, sj] = element.row;
     energy +=
         strain_energy(gradient_coefficients(at(pi), at(si), at(pj), at(sj), element.inverse_length),
@@ -156,7 +158,7 @@ TipState Chain::tip(const ChainState& state) const {
 
 PlanarVector<double> Chain::inner_end_force(std::size_t link, const Coordinates& q,
                                             const Coordinates& acceleration) const {
-  const Element& element = elements_[first_element_.at(link)];
+  const ElementTable& element = elements_[first_element_.at(link)];
   const auto at = [](const Coordinates& values, std::size_t row) {
     return PlanarVector<double>{values[2 * row], values[2 * row + 1]};
   };
