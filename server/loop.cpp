@@ -28,6 +28,8 @@ constexpr int kTcpHeartbeat_ms = 2000;
 constexpr int kTcpTimeout_ms = 10'000;
 /// Messages taken from one socket before the others get their turn.
 constexpr int kMessagesPerTurn = 256;
+/// What has arrived when the server is told to stop is still read, for so long at most.
+constexpr std::chrono::milliseconds kLongestDrain{1000};
 
 Instant now() {
   using std::chrono::duration_cast;
@@ -236,14 +238,16 @@ class Loop::Parts final : public Outbox {
     }
   }
 
-  void take_worker_messages() {
+  /// False when messages may be left.
+  bool take_worker_messages() {
     for (int i = 0; i < kMessagesPerTurn; ++i) {
       const auto message = receive(workers_);
       if (!message) {
-        return;
+        return true;
       }
       service_->worker_frame(message->identity, body_of(*message), now());
     }
+    return false;
   }
 
   void take_client_messages() {
@@ -264,7 +268,9 @@ class Loop::Parts final : public Outbox {
   LoopEnd finish() {
     spdlog::info("stopping");
     service_->stop(now());
-    take_worker_messages();
+    const auto until = Clock::now() + kLongestDrain;
+    while (!take_worker_messages() && Clock::now() < until) {
+    }
     take_client_messages();
     const std::size_t lost = writer_.finish();
     take_reports();

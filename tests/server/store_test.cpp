@@ -1,0 +1,275 @@
+#include "server/store.h"
+
+#include <cstdlib>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/reader.h"
+#include "tests/server/results.h"
+#include "tests/server/scheduler_bench.h"
+
+namespace oblique::server {
+namespace {
+
+using protocol::QueryReply;
+using testing::HasSubstr;
+
+AddStudy study_of(std::uint64_t points, std::uint64_t id = 1, const std::string& name = "a") {
+  return {id, name, table_of(points), "2024-01-01T00:00:00.000Z"};
+}
+
+AddResults results_of(const AddStudy& study, std::vector<protocol::PointResult> results) {
+  return {study.study_id,    study.table, 1, "0.1", "avx2", 1, "2024-01-01T00:00:01.000Z",
+          std::move(results)};
+}
+
+QueryReply ask(const std::string& path, const std::string& sql) {
+  return Reader(path).query(sql, kNoLimits);
+}
+
+std::string message_of_opening(const std::string& path) {
+  try {
+    const Store store(path);
+  } catch (const StorageError& error) {
+    return error.what();
+  }
+  return "it opened";
+}
+
+class StoreTest : public testing::Test {
+ protected:
+  void commit(Store& store, std::vector<Change> changes) { store.commit(changes); }
+
+  TemporaryFolder folder_;
+  std::string path_ = folder_.file("studies.db");
+};
+
+TEST_F(StoreTest, WhatWasCommittedIsThereAfterReopening) {
+  const auto study = study_of(10);
+  std::string identity;
+  {
+    Store store(path_);
+    identity = store.database_id();
+    commit(store, {study, AddWorker{1, "host", 2, "0.1", "avx2", "now"},
+                   results_of(study, {solved_point(0), solved_point(1), solved_point(5),
+                                      protocol::failed_point(7, "it did not end")})});
+  }
+  Store store(path_);
+  const auto studies = store.studies();
+  ASSERT_EQ(studies.size(), 1U);
+  EXPECT_EQ(studies[0].name, "a");
+  EXPECT_EQ(studies[0].table->recipe().SerializeAsString(),
+            study.table->recipe().SerializeAsString());
+  IntervalSet settled(0, 2);
+  settled.insert(5);
+  settled.insert(7);
+  EXPECT_TRUE(studies[0].settled == settled);
+  EXPECT_EQ(studies[0].failed, 1U);
+  EXPECT_EQ(studies[0].state, StudyState::kRunning);
+  EXPECT_EQ(store.last_study_id(), 1U);
+  EXPECT_EQ(store.last_worker_id(), 1U);
+  EXPECT_EQ(store.database_id(), identity);
+}
+
+TEST_F(StoreTest, AnEmptyDatabaseHasNoStudies) {
+  Store store(path_);
+  EXPECT_TRUE(store.studies().empty());
+  EXPECT_EQ(store.last_study_id(), 0U);
+  EXPECT_EQ(store.last_worker_id(), 0U);
+}
+
+TEST_F(StoreTest, TwoDatabasesHaveDifferentIdentities) {
+  EXPECT_NE(Store(path_).database_id(), Store(folder_.file("other.db")).database_id());
+}
+
+TEST_F(StoreTest, TheFirstResultOfAPointStays) {
+  Store store(path_);
+  const auto study = study_of(3);
+  commit(store, {study, results_of(study, {solved_point(1)})});
+  auto other = solved_point(1);
+  other.set_mode("sC");
+  commit(store, {results_of(study, {other, protocol::failed_point(1, "late")})});
+  const auto reply = ask(path_, "SELECT mode, status, (SELECT count(*) FROM results) FROM results");
+  ASSERT_EQ(reply.rows_size(), 1);
+  EXPECT_EQ(reply.rows(0).values(0).text(), "SC SR sR");
+  EXPECT_EQ(reply.rows(0).values(1).text(), "solved");
+  EXPECT_EQ(reply.rows(0).values(2).integer(), 1);
+}
+
+TEST_F(StoreTest, AFailedTransactionKeepsNothing) {
+  Store store(path_);
+  const auto study = study_of(3);
+  EXPECT_THROW(commit(store, {study, study_of(3, 2, "a")}), StorageError);
+  EXPECT_TRUE(store.studies().empty());
+  commit(store, {study, results_of(study, {solved_point(0)})});
+  EXPECT_EQ(store.studies().at(0).settled.size(), 1U);
+}
+
+TEST_F(StoreTest, ModelsAreForgottenWithTheTransactionThatBroughtThem) {
+  Store store(path_);
+  const auto study = study_of(3);
+  commit(store, {study});
+  EXPECT_THROW(commit(store, {results_of(study, {solved_point(0)}), study_of(3, 2, "a")}),
+               StorageError);
+  commit(store, {results_of(study, {solved_point(0)})});
+  EXPECT_EQ(ask(path_, "SELECT 1 FROM results JOIN models USING (model_id)").rows_size(), 1);
+}
+
+TEST_F(StoreTest, TheStateOfAStudyIsKept) {
+  const auto study = study_of(3);
+  {
+    Store store(path_);
+    commit(store, {study, SetStudyState{1, StudyState::kCancelled, "later"}});
+  }
+  EXPECT_EQ(Store(path_).studies().at(0).state, StudyState::kCancelled);
+}
+
+TEST_F(StoreTest, DoublesComeBackWithTheSameBitsFromColumnsAndViews) {
+  Store store(path_);
+  const auto study = study_of(500);
+  std::vector<protocol::PointResult> results;
+  for (std::uint64_t point = 0; point < 500; ++point) {
+    results.push_back(solved_point(point));
+  }
+  commit(store, {study, results_of(study, results)});
+  const auto scalars = ask(path_,
+                           "SELECT fall_time_s, duration_s, fn_peak_N, closure, mu FROM results"
+                           " ORDER BY point");
+  const auto peaks = ask(path_, "SELECT t_s, fn_N, ft_N FROM peaks ORDER BY point, seq");
+  const auto phases = ask(path_, "SELECT t0_s, t1_s FROM phases ORDER BY point, seq");
+  const auto sticks = ask(path_, "SELECT t0_s, t1_s FROM stick_intervals ORDER BY point, seq");
+  ASSERT_EQ(scalars.rows_size(), 500);
+  ASSERT_EQ(peaks.rows_size(), 1000);
+  for (int i = 0; i < 500; ++i) {
+    const auto& result = results[static_cast<std::size_t>(i)];
+    const auto& row = scalars.rows(i);
+    EXPECT_EQ(row.values(0).real(), result.fall_time_s());
+    EXPECT_EQ(row.values(1).real(), result.duration_s());
+    EXPECT_EQ(row.values(2).real(), result.fn_peak_n());
+    EXPECT_EQ(row.values(3).real(), result.closure());
+    EXPECT_EQ(row.values(4).real(), study.table->point(result.point()).mu);
+    for (int j = 0; j < 6; ++j) {
+      EXPECT_EQ(peaks.rows(2 * i + j / 3).values(j % 3).real(), result.peaks(j));
+    }
+    EXPECT_EQ(phases.rows(3 * i + 1).values(0).real(), result.phase_ends_s(0));
+    EXPECT_EQ(phases.rows(3 * i + 1).values(1).real(), result.phase_ends_s(1));
+    EXPECT_EQ(sticks.rows(i).values(1).real(), result.stick_intervals(1));
+  }
+}
+
+TEST_F(StoreTest, ViewsUnfoldThePackedArrays) {
+  Store store(path_);
+  const auto study = study_of(3);
+  commit(store, {study, results_of(study, {solved_point(2)})});
+  const auto peaks = ask(path_, "SELECT study_id, point, seq, typeof(t_s), major FROM peaks");
+  ASSERT_EQ(peaks.rows_size(), 2);
+  EXPECT_EQ(peaks.rows(0).values(1).integer(), 2);
+  EXPECT_EQ(peaks.rows(0).values(2).integer(), 0);
+  EXPECT_EQ(peaks.rows(0).values(3).text(), "real");  // 0.0 is no integer
+  EXPECT_EQ(peaks.rows(0).values(4).integer(), 0);
+  EXPECT_EQ(peaks.rows(1).values(2).integer(), 1);
+  EXPECT_EQ(peaks.rows(1).values(4).integer(), 1);
+  const auto phases = ask(path_, "SELECT group_concat(kind) FROM phases");
+  EXPECT_EQ(phases.rows(0).values(0).text(), "compression,restitution,compression");
+}
+
+TEST_F(StoreTest, AFailedPointHasAReasonAndNoOutputs) {
+  Store store(path_);
+  const auto study = study_of(3);
+  commit(store, {study, results_of(study, {protocol::failed_point(2, "it never fell")})});
+  const auto row = ask(path_, "SELECT status, error, duration_s IS NULL, peaks IS NULL FROM runs");
+  ASSERT_EQ(row.rows_size(), 1);
+  EXPECT_EQ(row.rows(0).values(0).text(), "failed");
+  EXPECT_EQ(row.rows(0).values(1).text(), "it never fell");
+  EXPECT_EQ(row.rows(0).values(2).integer(), 1);
+  EXPECT_EQ(row.rows(0).values(3).integer(), 1);
+  EXPECT_EQ(ask(path_, "SELECT * FROM peaks").rows_size(), 0);
+}
+
+TEST_F(StoreTest, OneModelOfTwoStudiesIsOneRowAndEachKeyIsAColumn) {
+  Store store(path_);
+  const auto first = study_of(3, 1, "a");
+  const auto second = study_of(5, 2, "b");
+  commit(store, {first, second, results_of(first, {solved_point(0)}),
+                 results_of(second, {solved_point(0)})});
+  std::string columns = "lengths_m";
+  for (const auto& key : solver::model_keys()) {
+    columns += ", " + std::string(key.name);
+  }
+  const auto reply = ask(path_, "SELECT " + columns + " FROM models");
+  ASSERT_EQ(reply.rows_size(), 1);
+  EXPECT_EQ(reply.rows(0).values(0).text(), "[0.4,0.4,0.4]");
+  const solver::ModelParameters paper;
+  int column = 1;
+  for (const auto& key : solver::model_keys()) {
+    const auto& value = reply.rows(0).values(column++);
+    const double number = value.has_integer() ? static_cast<double>(value.integer()) : value.real();
+    if (key.name == "integrator") {
+      EXPECT_EQ(value.text(), solver::integrator_name(paper.integrator));
+    } else {
+      EXPECT_EQ(number, key.get(paper)) << key.name;
+    }
+  }
+}
+
+TEST_F(StoreTest, RunsNamesTheStudyItsModelAndTheWorker) {
+  Store store(path_);
+  const auto study = study_of(3);
+  commit(store, {study, AddWorker{1, "host", 2, "0.1", "avx2", "now"},
+                 results_of(study, {solved_point(1)})});
+  const auto reply =
+      ask(path_, "SELECT study, mu, e, E_Pa, elements_per_link, worker_name FROM runs");
+  ASSERT_EQ(reply.rows_size(), 1);
+  EXPECT_EQ(reply.rows(0).values(0).text(), "a");
+  EXPECT_EQ(reply.rows(0).values(1).real(), 0.5);
+  EXPECT_EQ(reply.rows(0).values(2).real(), 1.0);
+  EXPECT_EQ(reply.rows(0).values(3).real(), 70e9);
+  EXPECT_EQ(reply.rows(0).values(5).text(), "host");
+}
+
+TEST_F(StoreTest, ADatabaseInUseIsNotOpenedTwice) {
+  const Store store(path_);
+  EXPECT_THAT(message_of_opening(path_), HasSubstr("another server already uses"));
+}
+
+TEST_F(StoreTest, OtherFilesAreRefusedByTheirKind) {
+  EXPECT_THAT(message_of_opening(folder_.file("")), HasSubstr("is a directory"));
+  EXPECT_THAT(message_of_opening(folder_.file("none/studies.db")), HasSubstr("No such file"));
+  std::ofstream(path_) << std::string(5000, 'x');
+  EXPECT_THAT(message_of_opening(path_), HasSubstr("is not a database"));
+  EXPECT_EQ(std::filesystem::file_size(path_), 5000U);
+}
+
+TEST_F(StoreTest, ADatabaseOfAnotherProgramIsRefusedByName) {
+  execute(open_database(path_, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE).get(),
+          "CREATE TABLE recipes (name TEXT)");
+  EXPECT_THAT(message_of_opening(path_), HasSubstr("another program"));
+  EXPECT_THAT(message_of_opening(path_), HasSubstr("recipes"));
+}
+
+TEST_F(StoreTest, ANewerSchemaIsRefusedWithBothVersions) {
+  { const Store store(path_); }
+  execute(open_database(path_, SQLITE_OPEN_READWRITE).get(), "PRAGMA user_version = 7");
+  EXPECT_THAT(message_of_opening(path_), HasSubstr("schema version 7"));
+  EXPECT_THAT(message_of_opening(path_), HasSubstr("knows version 1"));
+}
+
+TEST_F(StoreTest, ARecipeThatCannotBeReadIsAnErrorThatNamesTheStudy) {
+  {
+    Store store(path_);
+    commit(store, {study_of(3)});
+  }
+  execute(open_database(path_, SQLITE_OPEN_READWRITE).get(), "UPDATE studies SET recipe = x'ff'");
+  Store store(path_);
+  try {
+    store.studies();
+    FAIL() << "a damaged recipe was read";
+  } catch (const StorageError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("recipe of study a"));
+  }
+}
+
+}  // namespace
+}  // namespace oblique::server
