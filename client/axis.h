@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "proto/oblique.pb.h"
+#include "proto/recipe.h"
+#include "worker/solver/parameters.h"
+
+namespace oblique::client {
+
+/// A study as people write it: a name and what makes its points.
+struct Study {
+  std::string name;
+  protocol::Recipe recipe;
+};
+
+/// The model or point key called `name`. Throws InputError for an unknown one, with the nearest
+/// and the list of all.
+const solver::ParameterKey& axis_key(std::string_view name);
+
+/// A number of plain text; nothing for what is not one number from end to end.
+std::optional<double> parsed_number(std::string_view text);
+
+/// A number as error messages and tables show it.
+std::string shown_number(double value);
+
+/// Axes from what users wrote. Each throws InputError naming key, value and what is allowed.
+protocol::Axis listed_axis(const solver::ParameterKey& key, const std::vector<double>& values);
+/// `count` values with both ends in.
+protocol::Axis counted_axis(const solver::ParameterKey& key, double from, double to,
+                            std::int64_t count);
+/// Values `step` apart, of which the last is `to`.
+protocol::Axis stepped_axis(const solver::ParameterKey& key, double from, double to, double step);
+
+/// Puts the axes into the order that recipes need: model keys as listings have them, then H, mu, e.
+/// Throws InputError when H, mu or e is missing.
+protocol::Block block_of(std::vector<protocol::Axis> axes);
+
+/// Throws InputError unless every model of block `block` reaches the block's largest H. Only an H
+/// near the length of the chain is looked into, by solving the fall once for each model, and only
+/// when the study has few models; elsewhere an H out of reach shows as failed points.
+void check_reach(const protocol::PointTable& table, int block);
+
+/// Throws InputError unless `name` may name a study: 1 to 100 bytes without control characters,
+/// not beginning with '-'.
+void check_study_name(const std::string& name);
+
+}  // namespace oblique::client

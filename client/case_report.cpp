@@ -1,0 +1,140 @@
+#include "client/case_report.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include "client/printer.h"
+
+namespace oblique::client {
+namespace {
+
+using nlohmann::ordered_json;
+using solver::CaseResult;
+
+constexpr double kMicro = 1e6;
+constexpr double kMilli = 1e3;
+
+const char* kind_name(solver::PhaseKind kind) {
+  return kind == solver::PhaseKind::kCompression ? "compression" : "restitution";
+}
+
+ordered_json json_of(const solver::ContactEnergy& energy) {
+  return {
+      {"kinetic_in_J", energy.kinetic_in_J},       {"friction_J", energy.friction_J},
+      {"restitution_J", energy.restitution_J},     {"kinetic_change_J", energy.kinetic_change_J},
+      {"strain_change_J", energy.strain_change_J}, {"gravity_change_J", energy.gravity_change_J},
+      {"exchanged_J", energy.exchanged_J},         {"closure", energy.closure}};
+}
+
+ordered_json json_of(const solver::SolverReport& report) {
+  return {{"integrator", report.integrator},
+          {"dt_s", report.dt_s},
+          {"steps", report.steps},
+          {"wall_s", report.wall_s},
+          {"version", report.version}};
+}
+
+}  // namespace
+
+ordered_json json_of(const CaseResult& result) {
+  ordered_json fn_peaks = ordered_json::array();
+  ordered_json major_peaks = ordered_json::array();
+  for (const auto& peak : result.peaks) {
+    fn_peaks.push_back(peak.fn_N);
+    if (peak.major) {
+      major_peaks.push_back(peak.fn_N);
+    }
+  }
+  ordered_json ft_peaks = ordered_json::array();
+  for (const auto& peak : result.ft_peaks) {
+    ft_peaks.push_back(peak.ft_N);
+  }
+  ordered_json sticks = ordered_json::array();
+  for (const auto& stick : result.stick_intervals) {
+    sticks.push_back({stick.t0_s, stick.t1_s});
+  }
+  ordered_json phases = ordered_json::array();
+  for (const auto& phase : result.phases) {
+    phases.push_back({{"kind", kind_name(phase.kind)}, {"t0_s", phase.t0_s}, {"t1_s", phase.t1_s}});
+  }
+  return {{"H", result.H_m},
+          {"mu", result.mu},
+          {"e", result.e_star},
+          {"fall_time_s", result.fall_time_s},
+          {"impact_x_m", result.impact_x_m},
+          {"vt_in_m_s", result.vt_in_m_s},
+          {"vn_in_m_s", result.vn_in_m_s},
+          {"duration_s", result.duration_s},
+          {"fn_peak_N", result.fn_peak_N},
+          {"ft_peak_N", result.ft_peak_N},
+          {"fn_peaks_N", fn_peaks},
+          {"ft_peaks_N", ft_peaks},
+          {"major_peaks_N", major_peaks},
+          {"impulse_n_Ns", result.impulse_n_Ns},
+          {"impulse_t_Ns", result.impulse_t_Ns},
+          {"slide_m", result.slide_m},
+          {"vt_out_m_s", result.vt_out_m_s},
+          {"vn_out_m_s", result.vn_out_m_s},
+          {"mode", result.mode},
+          {"major_mode", result.major_mode},
+          {"stick_total_s", result.stick_total_s},
+          {"stick_intervals_s", sticks},
+          {"phases", phases},
+          {"energy", json_of(result.energy)},
+          {"solver", json_of(result.solver)}};
+}
+
+void print_summary(std::ostream& out, const CaseResult& result) {
+  out << fmt::format("H = {:g} m, mu = {:g}, e* = {:g}\n", result.H_m, result.mu, result.e_star)
+      << fmt::format(
+             "fall        {:.6f} s; the tip lands at x = {:.5f} m with V_t = {:.4f}, V_n = {:.4f} "
+             "m/s\n",
+             result.fall_time_s, result.impact_x_m, result.vt_in_m_s, result.vn_in_m_s)
+      << fmt::format("contact     {:.2f} us, leaving with V_t = {:.4f}, V_n = {:.4f} m/s\n",
+                     result.duration_s * kMicro, result.vt_out_m_s, result.vn_out_m_s)
+      << "mode        " << result.major_mode;
+  if (result.mode != result.major_mode) {
+    out << "  (with ripples: " << result.mode << ')';
+  }
+  out << "\n\npeaks         t [us]    F_n [N]  largest |F_t| around it [N]\n";
+  for (const auto& peak : result.peaks) {
+    out << fmt::format("            {:8.2f}  {:9.2f}  {:9.2f}{}\n", peak.t_s * kMicro, peak.fn_N,
+                       peak.ft_N, peak.major ? "" : "  ripple");
+  }
+  out << fmt::format("largest               {:9.2f}  {:9.2f}\n", result.fn_peak_N,
+                     result.ft_peak_N);
+  out << "\nphases      from [us]  to [us]  lasting [us]\n";
+  for (const auto& phase : result.phases) {
+    out << fmt::format("{:<11}  {:8.2f} {:8.2f}  {:12.2f}\n", kind_name(phase.kind),
+                       phase.t0_s * kMicro, phase.t1_s * kMicro,
+                       (phase.t1_s - phase.t0_s) * kMicro);
+  }
+  for (const auto& stick : result.stick_intervals) {
+    out << fmt::format("{:<11}  {:8.2f} {:8.2f}  {:12.2f}\n", "stick", stick.t0_s * kMicro,
+                       stick.t1_s * kMicro, (stick.t1_s - stick.t0_s) * kMicro);
+  }
+  const auto& energy = result.energy;
+  const auto& report = result.solver;
+  out << fmt::format("\nslide       P slides {:.5f} mm along the ground\n", result.slide_m * kMilli)
+      << fmt::format("impulses    normal {:.6f}, tangential {:.6f} N s\n", result.impulse_n_Ns,
+                     result.impulse_t_Ns)
+      << fmt::format(
+             "energy      {:.4f} J in; friction takes {:.6f} J, restitution {:.6f} J; "
+             "closure {:.1e}\n",
+             energy.kinetic_in_J, energy.friction_J, energy.restitution_J, energy.closure)
+      << fmt::format("solver      {} {}, {} steps of {:.3g} us, {:.2g} ms\n", report.integrator,
+                     report.version, report.steps, report.dt_s * kMicro, report.wall_s * kMilli);
+}
+
+void print_trace_header(std::ostream& out) {
+  out << "t_s,fn_N,ft_N,uy_m,ux_m,xP_m,vP_m_s,x_m,y_m,vt_m_s,vn_m_s,state\n";
+}
+
+void print_trace_row(std::ostream& out, const solver::TraceRow& row) {
+  for (const double value : {row.t_s, row.fn_N, row.ft_N, row.uy_m, row.ux_m, row.xP_m, row.vP_m_s,
+                             row.x_m, row.y_m, row.vt_m_s, row.vn_m_s}) {
+    out << exact_number(value) << ',';
+  }
+  out << csv_field(row.state) << '\n';
+}
+
+}  // namespace oblique::client

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <filesystem>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace oblique::client {
+
+/// A process could not be started, or ended when it was needed.
+class ProcessError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// A file descriptor that closes itself.
+class Descriptor {
+ public:
+  Descriptor() = default;
+  explicit Descriptor(int number) : number_(number) {}
+  ~Descriptor() { close(); }
+  Descriptor(Descriptor&& other) noexcept;
+  Descriptor& operator=(Descriptor&& other) noexcept;
+
+  int number() const { return number_; }
+  void close();
+
+ private:
+  int number_ = -1;
+};
+
+/// Both ends of a pipe, closed in children unless handed to them.
+struct Pipe {
+  Pipe();  ///< Throws ProcessError.
+  Descriptor read;
+  Descriptor write;
+};
+
+/// How a child is started.
+struct ChildSettings {
+  std::filesystem::path program;
+  std::vector<std::string> arguments;  ///< without the program's name
+  bool show_errors = false;            ///< its standard error goes to ours; else it is kept
+  int handed_over = -1;                ///< descriptor that becomes the child's kHandedOver
+};
+
+/// One process of our own. It runs in a process group of its own, so that a Ctrl-C on the terminal
+/// reaches us alone and we end it in order. Killed and reaped when this is destroyed.
+class ChildProcess {
+ public:
+  /// Number of the descriptor that the child is handed.
+  static constexpr int kHandedOver = 3;
+
+  /// Throws ProcessError naming the program.
+  explicit ChildProcess(const ChildSettings& settings);
+  ~ChildProcess();
+  ChildProcess(const ChildProcess&) = delete;
+  ChildProcess& operator=(const ChildProcess&) = delete;
+
+  /// Whether it still runs; reaps it when it has ended.
+  bool is_running();
+  /// Sends a signal while it runs.
+  void send(int signal);
+  pid_t pid() const { return pid_; }
+
+  /// How it ended, as "ended with exit code 1" or "was killed by signal 9 (Killed)".
+  std::string ending() const;
+  /// The last lines of its standard error, if they were kept.
+  std::string last_words() const;
+
+ private:
+  pid_t pid_ = -1;
+  std::optional<int> status_;  ///< as waitpid tells it; none while it runs
+  Descriptor errors_;          ///< the file that keeps its standard error
+};
+
+/// The program called `name` beside our own. Throws ProcessError when it is not there.
+std::filesystem::path sibling_program(const std::string& name);
+
+}  // namespace oblique::client

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace oblique::client {
+
+/// The candidate that differs least from `word` by insertions, deletions and replacements of
+/// letters, capitals alike; empty when none is near enough to be what was meant.
+std::string_view nearest(std::string_view word, std::span<const std::string_view> candidates);
+
+/// " (did you mean `x`?)" with the nearest candidate, or nothing.
+std::string did_you_mean(std::string_view word, std::span<const std::string_view> candidates);
+
+/// Names for a sentence: "a, b, c".
+std::string joined(std::span<const std::string_view> names);
+
+}  // namespace oblique::client

@@ -1,0 +1,204 @@
+#include "client/printer.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "client/nearest.h"
+#include "worker/solver/parameters.h"
+
+namespace oblique::client {
+namespace {
+
+using protocol::QueryReply;
+using protocol::Value;
+
+constexpr std::array<std::string_view, 3> kFormatNames{"table", "csv", "json"};
+
+// Columns that a person sees: characters, not bytes of UTF-8.
+std::size_t width_of(std::string_view text) {
+  return static_cast<std::size_t>(std::count_if(text.begin(), text.end(), [](char byte) {
+    return (static_cast<unsigned char>(byte) & 0xc0) != 0x80;
+  }));
+}
+
+std::string table_cell(const Value& value) {
+  switch (value.kind_case()) {
+    case Value::kInteger:
+      return std::to_string(value.integer());
+    case Value::kReal: {
+      char text[32];
+      std::snprintf(text, sizeof text, "%.6g", value.real());
+      return text;
+    }
+    case Value::kText: {
+      // A line break inside a cell would break the table.
+      auto text = value.text();
+      std::replace_if(
+          text.begin(), text.end(), [](char c) { return c == '\n' || c == '\t'; }, ' ');
+      return text;
+    }
+    default:
+      return "-";
+  }
+}
+
+void print_line(std::ostream& out, const std::vector<std::string>& cells,
+                const std::vector<std::size_t>& widths, const std::vector<bool>& right) {
+  std::string line;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const std::string padding(widths[i] - width_of(cells[i]), ' ');
+    line += i > 0 ? "  " : "";
+    line += right[i] ? padding + cells[i] : cells[i] + padding;
+  }
+  line.erase(line.find_last_not_of(' ') + 1);
+  out << line << '\n';
+}
+
+void print_table(std::ostream& out, const QueryReply& rows) {
+  const auto columns = static_cast<std::size_t>(rows.columns_size());
+  const std::vector<std::string> header(rows.columns().begin(), rows.columns().end());
+  std::vector<std::size_t> widths;
+  std::transform(header.begin(), header.end(), std::back_inserter(widths), width_of);
+  std::vector<bool> right(columns, false);
+  std::vector<std::vector<std::string>> cells;
+  for (const auto& row : rows.rows()) {
+    auto& line = cells.emplace_back(columns);
+    for (std::size_t i = 0; i < columns; ++i) {
+      const auto& value = row.values(static_cast<int>(i));
+      line[i] = table_cell(value);
+      widths[i] = std::max(widths[i], width_of(line[i]));
+      if (value.has_integer() || value.has_real()) {
+        right[i] = true;
+      }
+    }
+  }
+  print_line(out, header, widths, right);
+  std::vector<std::string> rule;
+  std::transform(widths.begin(), widths.end(), std::back_inserter(rule),
+                 [](std::size_t width) { return std::string(width, '-'); });
+  print_line(out, rule, widths, right);
+  for (const auto& line : cells) {
+    print_line(out, line, widths, right);
+  }
+}
+
+std::string csv_value(const Value& value) {
+  switch (value.kind_case()) {
+    case Value::kInteger:
+      return std::to_string(value.integer());
+    case Value::kReal:
+      return exact_number(value.real());
+    case Value::kText:
+      return csv_field(value.text());
+    default:
+      return {};
+  }
+}
+
+void print_csv(std::ostream& out, const QueryReply& rows) {
+  std::string line;
+  for (const auto& column : rows.columns()) {
+    line += line.empty() ? "" : ",";
+    line += csv_field(column);
+  }
+  out << line << '\n';
+  for (const auto& row : rows.rows()) {
+    line.clear();
+    for (int i = 0; i < row.values_size(); ++i) {
+      line += i == 0 ? "" : ",";
+      line += csv_value(row.values(i));
+    }
+    out << line << '\n';
+  }
+}
+
+nlohmann::json json_value(const Value& value) {
+  switch (value.kind_case()) {
+    case Value::kInteger:
+      return value.integer();
+    case Value::kReal:
+      return std::isfinite(value.real()) ? nlohmann::json(value.real()) : nlohmann::json();
+    case Value::kText:
+      return value.text();
+    default:
+      return {};
+  }
+}
+
+void print_json(std::ostream& out, const QueryReply& rows) {
+  out << '[';
+  const char* separator = "\n";
+  for (const auto& row : rows.rows()) {
+    nlohmann::ordered_json object = nlohmann::ordered_json::object();
+    for (int i = 0; i < row.values_size(); ++i) {
+      object[rows.columns(i)] = json_value(row.values(i));
+    }
+    out << separator
+        << object.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+    separator = ",\n";
+  }
+  out << (rows.rows().empty() ? "]\n" : "\n]\n");
+}
+
+}  // namespace
+
+Format format_named(std::string_view name) {
+  const auto found = std::find(kFormatNames.begin(), kFormatNames.end(), name);
+  if (found == kFormatNames.end()) {
+    throw solver::InputError("format = \"" + std::string(name) +
+                             "\" is not allowed: it must be one of " + joined(kFormatNames));
+  }
+  return static_cast<Format>(found - kFormatNames.begin());
+}
+
+std::string csv_field(std::string_view text) {
+  if (text.find_first_of(",\"\r\n") == std::string_view::npos && !text.empty()) {
+    return std::string(text);
+  }
+  // An empty text is quoted too, for an empty field is NULL.
+  std::string field = "\"";
+  for (const char letter : text) {
+    field.append(letter == '"' ? 2 : 1, letter);
+  }
+  field += '"';
+  return field;
+}
+
+std::string exact_number(double value) {
+  char text[32];
+  const auto end = std::to_chars(std::begin(text), std::end(text), value).ptr;
+  return {text, end};
+}
+
+void print(std::ostream& out, const QueryReply& rows, Format format) {
+  switch (format) {
+    case Format::kTable:
+      print_table(out, rows);
+      break;
+    case Format::kCsv:
+      print_csv(out, rows);
+      break;
+    case Format::kJson:
+      print_json(out, rows);
+      break;
+  }
+}
+
+void add_value(protocol::Row& row, const std::string& text) {
+  row.add_values()->set_text(text);
+}
+void add_value(protocol::Row& row, double value) {
+  row.add_values()->set_real(value);
+}
+void add_value(protocol::Row& row, std::int64_t value) {
+  row.add_values()->set_integer(value);
+}
+
+}  // namespace oblique::client

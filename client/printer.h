@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+#include <ostream>
+#include <string>
+#include <string_view>
+
+#include "proto/oblique.pb.h"
+
+namespace oblique::client {
+
+enum class Format { kTable, kCsv, kJson };
+
+/// The format of that name: `table`, `csv` or `json`. Throws solver::InputError for other names.
+Format format_named(std::string_view name);
+
+/// Prints columns and rows. Tables are for reading: numbers of six digits, aligned. CSV (RFC 4180,
+/// a header line) and JSON (an array of objects) hold every number so that it reads back as the
+/// same bits; NULL is an empty field, respectively null.
+void print(std::ostream& out, const protocol::QueryReply& rows, Format format);
+
+/// One field of CSV, in quotes where it needs them.
+std::string csv_field(std::string_view text);
+
+/// The shortest text that reads back as the same number.
+std::string exact_number(double value);
+
+/// Appends one value to a row of an answer.
+void add_value(protocol::Row& row, const std::string& text);
+void add_value(protocol::Row& row, double value);
+void add_value(protocol::Row& row, std::int64_t value);
+
+}  // namespace oblique::client

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <ostream>
+#include <string>
+#include <utility>
+
+namespace oblique::client {
+
+/// How far a study is.
+struct ProgressState {
+  std::string study;
+  std::uint64_t points = 0;
+  std::uint64_t settled = 0;  ///< solved or failed
+  std::uint64_t failed = 0;
+  double elapsed_s = 0.0;                   ///< since the watching began
+  std::optional<double> points_per_s = {};  ///< unknown until something moved
+};
+
+/// "study [####----] 5/10 50 % 3.1/s 2 s left", for a line that is drawn over itself.
+std::string progress_bar(const ProgressState& state);
+
+/// "study: 5 of 10 points (50 %), 3.1 points/s, 2 s left", for logs.
+std::string progress_line(const ProgressState& state);
+
+/// A length of time for people: "0.4 s", "12 s", "3 min 05 s", "2 h 10 min", "3 d 4 h".
+std::string shown_duration(double seconds);
+
+/// Draws the progress of one study: a bar over itself on a terminal, else a plain line now and
+/// then. The clock is the caller's.
+class Progress {
+ public:
+  /// `out` must live as long; `on_terminal` says whether it may be drawn over.
+  Progress(std::ostream& out, bool on_terminal) : out_(out), on_terminal_(on_terminal) {}
+
+  /// Takes in where the study is and draws it when it is time to. `elapsed_s` must not fall; the
+  /// rate is filled in here.
+  void update(ProgressState state);
+
+  /// Draws the last state a last time and ends the line.
+  void finish();
+
+ private:
+  void draw();
+
+  std::ostream& out_;
+  bool on_terminal_;
+  ProgressState last_;
+  std::deque<std::pair<double, std::uint64_t>> window_;  ///< (elapsed_s, settled) lately
+  double next_line_s_ = 2.0;
+};
+
+}  // namespace oblique::client

@@ -1,0 +1,64 @@
+#include <iostream>
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+#include "client/connection.h"
+#include "client/embedded_service.h"
+#include "client/point_flags.h"
+#include "client/printer.h"
+#include "client/run_service.h"
+#include "client/verbs.h"
+
+namespace oblique::client {
+namespace {
+
+constexpr const char* kExamples = R"(Examples:
+  oblique run deploy/studies/paper.toml
+  oblique run --H 1 --mu 0.1:2.0:40 --e 0.6,0.8,1 --name friction
+  oblique run sweep.toml --db sweep.db --workers 4
+
+Ctrl-C stops it and loses nothing: the same command again goes on where it stopped.
+The exit code is 1 when a point failed, too.)";
+
+struct RunFlags {
+  StudyFlags study;
+  RunSettings settings;
+};
+
+int run(const RunFlags& flags) {
+  const auto study = study_of_flags(flags.study);
+  const auto end = run_study(study, flags.settings);
+  if (!end) {
+    return kFailed;
+  }
+  print(std::cout, end->rows, Format::kTable);
+  if (end->rows.rows_size() < static_cast<int>(end->status.points())) {
+    std::cerr << "The first " << end->rows.rows_size() << " of " << end->status.points()
+              << " points are shown.\n";
+  }
+  std::cerr << "More: oblique query " << study.name << " --db "
+            << flags.settings.service.database.string() << "\n";
+  return end->exit_code;
+}
+
+}  // namespace
+
+void add_run(CLI::App& app, Command& command) {
+  auto flags = std::make_shared<RunFlags>();
+  auto* verb = app.add_subcommand(
+      "run", "Run a study on this machine: server, workers and database in one command");
+  verb->footer(kExamples);
+  verb->add_option("--db", flags->settings.service.database, "database, made when it is not there")
+      ->type_name("FILE")
+      ->capture_default_str();
+  add_worker_flags(*verb, flags->settings);
+  verb->add_option("--rows", flags->settings.rows, "most rows of the table shown at the end")
+      ->type_name("N")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  add_study_flags(*verb, flags->study);
+  verb->callback([flags, &command] { command = [flags] { return run(*flags); }; });
+}
+
+}  // namespace oblique::client

@@ -1,0 +1,101 @@
+#include "client/run_service.h"
+
+#include <algorithm>
+#include <iostream>
+#include <string>
+
+#include "client/connection.h"
+#include "client/stop_signal.h"
+#include "client/watching.h"
+
+namespace oblique::client {
+namespace {
+
+// The columns that tell the points of this study apart, then the results most asked for.
+std::string query_of_results(const Study& study, std::uint64_t rows) {
+  std::string columns = "point";
+  for (const auto& key : solver::model_keys()) {
+    const auto varies = [&key](const protocol::Block& block) {
+      return std::any_of(block.axes().begin(), block.axes().end(),
+                         [&key](const protocol::Axis& axis) { return axis.key() == key.name; });
+    };
+    const auto& blocks = study.recipe.blocks();
+    if (std::any_of(blocks.begin(), blocks.end(), varies)) {
+      // SQL does not tell E from e, so the view calls Young's modulus otherwise.
+      columns += key.name == "E" ? ", E_Pa" : ", " + std::string(key.name);
+    }
+  }
+  return "SELECT " + columns +
+         ", H, mu, e, status, fn_peak_N, ft_peak_N, duration_s, slide_m, stick_total_s, major_mode "
+         "FROM runs WHERE study = " +
+         sql_text(study.name) + " ORDER BY point LIMIT " + std::to_string(rows);
+}
+
+void tell_how_to_continue(const Study& study, const RunSettings& settings) {
+  std::cerr << "Stopped. What was solved of \"" << study.name << "\" is in "
+            << settings.service.database.string()
+            << "; the same command again goes on from there.\n";
+}
+
+RunEnd submit_and_wait(const Study& study, const RunSettings& settings, EmbeddedService& service,
+                       StopSignal& stop) {
+  const auto look_after = [&] {
+    service.check();
+    if (const auto news = service.news(); !news.empty()) {
+      std::cerr << news << '\n';
+    }
+    return !stop.requested();
+  };
+  ConnectionSettings where;
+  where.server_url = service.client_url();
+  Connection connection(where, look_after);
+  const auto submitted = connection.submit(study);
+  if (!submitted.created()) {
+    std::cerr << "Going on with \"" << study.name << "\": " << submitted.settled() << " of "
+              << submitted.points() << " points are done.\n";
+  }
+  const auto ask = [&] {
+    look_after();
+    const auto reply = connection.status(study.name);
+    if (reply.studies_size() != 1) {
+      throw ServerError("the server no longer knows the study \"" + study.name + "\"");
+    }
+    return reply.studies(0);
+  };
+  RunEnd end;
+  end.status = watch_study(ask, stop);
+  if (stop.requested()) {
+    throw Interrupted("stopped");
+  }
+  end.rows = connection.query(query_of_results(study, settings.rows));
+  end.exit_code =
+      tell_end(end.status, [&](const std::string& sql) { return connection.query(sql); });
+  return end;
+}
+
+}  // namespace
+
+void add_worker_flags(CLI::App& verb, RunSettings& settings) {
+  verb.add_option("--workers", settings.service.workers,
+                  "worker processes; the default is the number of cores here")
+      ->type_name("N")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
+  verb.add_flag("--verbose", settings.service.verbose, "show what server and workers say");
+}
+
+std::optional<RunEnd> run_study(const Study& study, const RunSettings& settings) {
+  // Before any thread is started; see StopSignal.
+  StopSignal stop;
+  try {
+    EmbeddedService service(settings.service, stop);
+    auto end = submit_and_wait(study, settings, service, stop);
+    service.stop();
+    return end;
+  } catch (const Interrupted&) {
+    tell_how_to_continue(study, settings);
+    return std::nullopt;
+  }
+}
+
+}  // namespace oblique::client

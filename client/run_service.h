@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include <CLI/CLI.hpp>
+
+#include "client/axis.h"
+#include "client/embedded_service.h"
+#include "client/source.h"
+#include "proto/oblique.pb.h"
+
+namespace oblique::client {
+
+/// How `run` runs a study, and `paper` its cases.
+struct RunSettings {
+  ServiceSettings service{.database = DatabaseSettings().file, .workers = default_workers()};
+  std::uint64_t rows = 30;  ///< most rows of results asked for at the end
+};
+
+/// Adds --workers and --verbose. `settings` must live as long as `verb`.
+void add_worker_flags(CLI::App& verb, RunSettings& settings);
+
+/// How a study ended.
+struct RunEnd {
+  protocol::StudyStatus status;
+  protocol::QueryReply rows;  ///< the first results, a few columns
+  int exit_code;              ///< kDone when every point is solved
+};
+
+/// Starts server and workers here, submits the study, shows its progress and waits for its end;
+/// nothing is left running. Nothing when stopped by a signal; what to do next is told then. Throws
+/// ProcessError when server or workers end too soon, ServerError when the study is refused.
+std::optional<RunEnd> run_study(const Study& study, const RunSettings& settings);
+
+}  // namespace oblique::client

@@ -1,0 +1,134 @@
+#include "client/source.h"
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <iostream>
+
+#include "client/verbs.h"
+#include "server/reader.h"
+#include "worker/solver/parameters.h"
+
+namespace oblique::client {
+namespace {
+
+constexpr const char* kServerVariable = "OBLIQUE_SERVER";
+
+std::string server_of_environment() {
+  const char* value = std::getenv(kServerVariable);
+  return value == nullptr ? std::string() : std::string(value);
+}
+
+class DatabaseSource : public Source {
+ public:
+  explicit DatabaseSource(std::string file) : file_(std::move(file)), reader_(file_) {}
+
+  protocol::QueryReply query(const std::string& sql) override {
+    return reader_.query(sql, server::kNoLimits);
+  }
+  std::vector<protocol::StudyStatus> status(const std::string& study) override {
+    return reader_.study_status(study);
+  }
+  std::string place() const override { return file_; }
+
+ private:
+  std::string file_;
+  server::Reader reader_;
+};
+
+class ServerSource : public Source {
+ public:
+  explicit ServerSource(const ConnectionSettings& settings) : connection_(settings) {}
+
+  protocol::QueryReply query(const std::string& sql) override { return connection_.query(sql); }
+  std::vector<protocol::StudyStatus> status(const std::string& study) override {
+    const auto reply = connection_.status(study);
+    return {reply.studies().begin(), reply.studies().end()};
+  }
+  std::string place() const override { return connection_.url(); }
+
+ private:
+  Connection connection_;
+};
+
+}  // namespace
+
+void add_server_flags(CLI::App& verb, SourceFlags& flags) {
+  verb.add_option("--server", flags.server,
+                  std::string("address of the server; default: ") + kServerVariable + ", else " +
+                      ConnectionSettings().server_url)
+      ->type_name("URL");
+  verb.add_option("--timeout", flags.timeout_s, "longest wait for an answer [s]")
+      ->type_name("SECONDS")
+      ->capture_default_str();
+}
+
+void add_source_flags(CLI::App& verb, SourceFlags& flags) {
+  auto* database = verb.add_option(
+      "--db", flags.database,
+      "database to read directly; default, unless a server is named: " + DatabaseSettings().file +
+          " when it is in this folder");
+  database->type_name("FILE");
+  add_server_flags(verb, flags);
+  database->excludes("--server");
+}
+
+void add_format_flag(CLI::App& verb, std::string& format) {
+  verb.add_option("--format", format, "table, csv or json")
+      ->type_name("FORMAT")
+      ->capture_default_str();
+}
+
+int print_whole(const protocol::QueryReply& rows, Format format) {
+  print(std::cout, rows, format);
+  if (!rows.truncated()) {
+    return kDone;
+  }
+  std::cerr << "Only the first " << rows.rows_size()
+            << " rows: the server sends no more at once. Narrow it with WHERE and LIMIT, or read "
+               "the database itself with --db FILE.\n";
+  return kFailed;
+}
+
+ConnectionSettings connection_settings(const SourceFlags& flags) {
+  ConnectionSettings settings;
+  constexpr double kLongest_s = 1e6;
+  if (!(flags.timeout_s > 0.0 && flags.timeout_s <= kLongest_s)) {
+    throw solver::InputError("--timeout " + shown_number(flags.timeout_s) +
+                             " is not allowed: it must be > 0 and at most " +
+                             shown_number(kLongest_s) + " s");
+  }
+  settings.timeout_ms = std::llround(std::ceil(flags.timeout_s * 1000.0));
+  if (!flags.server.empty()) {
+    settings.server_url = flags.server;
+  } else if (const auto from_environment = server_of_environment(); !from_environment.empty()) {
+    settings.server_url = from_environment;
+  }
+  return settings;
+}
+
+std::unique_ptr<Source> open_source(const SourceFlags& flags) {
+  if (!flags.database.empty()) {
+    return open_database(flags.database);
+  }
+  const bool server_named = !flags.server.empty() || !server_of_environment().empty();
+  if (!server_named && std::filesystem::exists(DatabaseSettings().file)) {
+    return open_database(DatabaseSettings().file);
+  }
+  return std::make_unique<ServerSource>(connection_settings(flags));
+}
+
+std::unique_ptr<Source> open_database(const std::string& file) {
+  return std::make_unique<DatabaseSource>(file);
+}
+
+std::string sql_text(const std::string& text) {
+  std::string quoted = "'";
+  for (const char letter : text) {
+    quoted.append(letter == '\'' ? 2 : 1, letter);
+  }
+  quoted += '\'';
+  return quoted;
+}
+
+}  // namespace oblique::client

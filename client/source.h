@@ -1,0 +1,65 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "client/connection.h"
+#include "client/printer.h"
+#include "proto/oblique.pb.h"
+
+namespace oblique::client {
+
+/// Name of the database where none is given, here and in `run`.
+struct DatabaseSettings {
+  std::string file{"oblique.db"};
+};
+
+/// Where answers come from: a database file or a server.
+class Source {
+ public:
+  virtual ~Source() = default;
+  /// Runs one statement that only reads. Throws what the source throws, for a wrong one too.
+  virtual protocol::QueryReply query(const std::string& sql) = 0;
+  /// The study of that name, or all of them when it is empty. Throws for an unknown name.
+  virtual std::vector<protocol::StudyStatus> status(const std::string& study) = 0;
+  /// "oblique.db" or "tcp://127.0.0.1:7600", for messages.
+  virtual std::string place() const = 0;
+};
+
+/// What --db, --server and --timeout said.
+struct SourceFlags {
+  std::string database;  ///< empty: not given
+  std::string server;    ///< empty: not given
+  double timeout_s = static_cast<double>(ConnectionSettings().timeout_ms) / 1000.0;
+};
+
+/// Adds --server and --timeout. `flags` must live as long as `verb`.
+void add_server_flags(CLI::App& verb, SourceFlags& flags);
+/// Adds --db, --server and --timeout. `flags` must live as long as `verb`.
+void add_source_flags(CLI::App& verb, SourceFlags& flags);
+
+/// Adds --format.
+void add_format_flag(CLI::App& verb, std::string& format);
+
+/// Prints rows to standard output. When the source cut them off, says so on standard error and
+/// gives kFailed, else kDone.
+int print_whole(const protocol::QueryReply& rows, Format format);
+
+/// The server that the flags name, else OBLIQUE_SERVER, else the default. Throws
+/// solver::InputError for a timeout that is not positive.
+ConnectionSettings connection_settings(const SourceFlags& flags);
+
+/// Opens what the flags name: --db, else --server or OBLIQUE_SERVER, else oblique.db when it is in
+/// this folder, else the server at its default address.
+std::unique_ptr<Source> open_source(const SourceFlags& flags);
+
+/// A database file, read directly.
+std::unique_ptr<Source> open_database(const std::string& file);
+
+/// A text as SQL writes it, in single quotes.
+std::string sql_text(const std::string& text);
+
+}  // namespace oblique::client

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <csignal>
+
+#include <chrono>
+
+namespace oblique::client {
+
+/// While it lives, SIGINT, SIGTERM and SIGHUP no longer end the program but are noticed here. Make
+/// it before any thread is started, for threads inherit what is blocked.
+class StopSignal {
+ public:
+  StopSignal();
+  ~StopSignal();
+  StopSignal(const StopSignal&) = delete;
+  StopSignal& operator=(const StopSignal&) = delete;
+
+  /// Whether one of the signals has come.
+  bool requested();
+
+  /// Waits for a signal, at most `longest`; whether one has come.
+  bool wait(std::chrono::nanoseconds longest);
+
+ private:
+  sigset_t signals_{};
+  sigset_t before_{};
+  bool requested_ = false;
+};
+
+}  // namespace oblique::client

@@ -1,0 +1,68 @@
+#include <iostream>
+#include <memory>
+
+#include "client/connection.h"
+#include "client/point_flags.h"
+#include "client/source.h"
+#include "client/verbs.h"
+#include "client/watching.h"
+
+namespace oblique::client {
+namespace {
+
+constexpr const char* kExamples = R"(Examples:
+  oblique submit deploy/studies/paper.toml
+  oblique submit sweep.toml --server tcp://127.0.0.1:7600 --watch
+  oblique submit --H 1 --mu 0.1:2.0:40 --e 0.6,0.8,1 --name friction
+
+A study is safe in the server's database once this returns. Submitting the same study again
+goes on with it; another study under a taken name is refused.)";
+
+struct SubmitFlags {
+  StudyFlags study;
+  SourceFlags source;
+  bool watch = false;
+};
+
+int submit(const SubmitFlags& flags) {
+  const auto study = study_of_flags(flags.study);
+  StopSignal stop;
+  Connection connection(connection_settings(flags.source), [&stop] { return !stop.requested(); });
+  const auto reply = connection.submit(study);
+  std::cout << study.name << ": " << reply.points() << " points, " << reply.settled() << " done"
+            << (reply.created() ? "" : "; the server had it already") << std::endl;
+  if (!flags.watch) {
+    return kDone;
+  }
+  const auto ask = [&] {
+    const auto status = connection.status(study.name);
+    if (status.studies_size() != 1) {
+      throw ServerError("the server no longer knows the study \"" + study.name + "\"");
+    }
+    return status.studies(0);
+  };
+  try {
+    const auto status = watch_study(ask, stop);
+    if (!stop.requested()) {
+      return tell_end(status, [&](const std::string& sql) { return connection.query(sql); });
+    }
+  } catch (const Interrupted&) {
+    // Told below.
+  }
+  std::cerr << "No longer watching; the study goes on at " << connection.url() << ".\n";
+  return kFailed;
+}
+
+}  // namespace
+
+void add_submit(CLI::App& app, Command& command) {
+  auto flags = std::make_shared<SubmitFlags>();
+  auto* verb = app.add_subcommand("submit", "Hand a study to a server");
+  verb->footer(kExamples);
+  add_server_flags(*verb, flags->source);
+  verb->add_flag("--watch", flags->watch, "show the progress until the study is done");
+  add_study_flags(*verb, flags->study);
+  verb->callback([flags, &command] { command = [flags] { return submit(*flags); }; });
+}
+
+}  // namespace oblique::client

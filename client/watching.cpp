@@ -1,0 +1,99 @@
+#include "client/watching.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <iostream>
+
+#include "client/printer.h"
+#include "client/verbs.h"
+
+namespace oblique::client {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using Seconds = std::chrono::duration<double>;
+
+// A short study is seen to end at once; a long one is not asked after needlessly.
+Seconds pause_after(Seconds elapsed) {
+  constexpr Seconds kShortest{0.004};
+  constexpr Seconds kLongest{0.5};
+  return std::clamp(elapsed / 40, kShortest, kLongest);
+}
+
+void tell_failures(const protocol::StudyStatus& status,
+                   const std::function<protocol::QueryReply(const std::string&)>& query) {
+  std::cerr << status.failed() << " of " << status.points() << " points failed:\n";
+  const auto reasons = query(
+      "SELECT error, count(*), min(point) FROM runs WHERE study = " + sql_text(status.name()) +
+      " AND status = 'failed' GROUP BY error ORDER BY count(*) DESC LIMIT 10");
+  for (const auto& row : reasons.rows()) {
+    std::cerr << "  " << row.values(1).integer() << " x " << row.values(0).text()
+              << " (first at point " << row.values(2).integer() << ")\n";
+  }
+}
+
+}  // namespace
+
+protocol::StudyStatus watch_study(const std::function<protocol::StudyStatus()>& ask,
+                                  StopSignal& stop) {
+  Progress progress(std::cerr, isatty(STDERR_FILENO) == 1);
+  const auto start = Clock::now();
+  for (;;) {
+    auto status = ask();
+    const Seconds elapsed = Clock::now() - start;
+    const std::uint64_t settled = status.solved() + status.failed();
+    progress.update({.study = status.name(),
+                     .points = status.points(),
+                     .settled = settled,
+                     .failed = status.failed(),
+                     .elapsed_s = elapsed.count()});
+    const bool over = status.state() != "running" || settled == status.points();
+    if (over ||
+        stop.wait(std::chrono::duration_cast<std::chrono::nanoseconds>(pause_after(elapsed)))) {
+      progress.finish();
+      return status;
+    }
+  }
+}
+
+protocol::StudyStatus the_study(Source& source, const std::string& name) {
+  const auto found = source.status(name);
+  if (found.size() != 1) {
+    throw std::runtime_error("there is no study called \"" + name + "\" in " + source.place());
+  }
+  return found.front();
+}
+
+int tell_end(const protocol::StudyStatus& status,
+             const std::function<protocol::QueryReply(const std::string&)>& query) {
+  if (status.failed() > 0) {
+    tell_failures(status, query);
+  }
+  if (status.state() == "cancelled") {
+    std::cerr << "The study is cancelled; submitting it again does not resume it.\n";
+  }
+  return status.solved() == status.points() ? kDone : kFailed;
+}
+
+protocol::QueryReply table_of(const std::vector<protocol::StudyStatus>& studies) {
+  protocol::QueryReply table;
+  for (const char* column :
+       {"study", "state", "points", "solved", "failed", "leased", "points_per_s", "created_at"}) {
+    table.add_columns(column);
+  }
+  for (const auto& study : studies) {
+    auto& row = *table.add_rows();
+    add_value(row, study.name());
+    add_value(row, study.state());
+    for (const auto count : {study.points(), study.solved(), study.failed(), study.leased()}) {
+      add_value(row, static_cast<std::int64_t>(count));
+    }
+    add_value(row, study.points_per_s());
+    add_value(row, study.created_at());
+  }
+  return table;
+}
+
+}  // namespace oblique::client
