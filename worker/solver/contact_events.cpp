@@ -15,6 +15,7 @@ struct Cubic {
 
   double at(double z) const { return a0 + z * (a1 + z * (a2 + z * a3)); }
   double slope(double z) const { return a1 + z * (2.0 * a2 + z * 3.0 * a3); }
+  bool is_zero() const { return a0 == 0.0 && a1 == 0.0 && a2 == 0.0 && a3 == 0.0; }
 
   /// Ends of the stretches of [0, 1] on which the cubic is monotone: turning points, then 1.
   struct Stretches {
@@ -131,6 +132,9 @@ std::optional<EventGuess> guess_event(const ContactLaw& law, ContactEvent event,
                                       const TipState& start, const TipState& end, double h_s,
                                       double vt_sign, bool fresh) {
   const Cubic phi = event_polynomial(law, event, start, end, h_s, vt_sign);
+  if (phi.is_zero()) {
+    return std::nullopt;  // a tip that does not move along the ground: nothing rises
+  }
   const bool ends_below = phi.at(1.0) < 0.0;
   if (!fresh && phi.a0 >= 0.0 && (phi.a1 > 0.0 || !ends_below)) {
     return EventGuess{0.0, phi.a1, false, 0.0};

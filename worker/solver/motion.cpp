@@ -11,10 +11,11 @@ ContactIntegrals<double> ExplicitMotion::step(const ChainState& from,
                                               const AffineContactForce<double>& force, double h_s,
                                               ChainState& to) const {
   to.t_s = from.t_s + h_s;
-  to.q = from.q;
-  to.v = from.v;
+  to.q.resize(from.q.size());
+  to.v.resize(from.v.size());
   Coordinates scratch(from.q.size());
-  return pefrl_step(chain_, force, h_s, to.q.data(), to.v.data(), scratch.data());
+  return pefrl_step(chain_.tables(), force, h_s, from.q.data(), from.v.data(), to.q.data(),
+                    to.v.data(), scratch.data());
 }
 
 std::vector<JointReaction> ExplicitMotion::reactions(const AffineContactForce<double>& force,

@@ -11,11 +11,11 @@ double Pefrl::stability_limit() {
     for (int column = 0; column < 2; ++column) {
       double q = column == 0 ? 1.0 : 0.0;
       double v = column == 0 ? 0.0 : 1.0;
-      for (std::size_t i = 0; i < kick.size(); ++i) {
+      for (std::size_t i = 0; i < kKicks; ++i) {
         q += drift[i] * h * v;
         v -= kick[i] * h * q;
       }
-      q += drift.back() * h * v;
+      q += drift[kKicks] * h * v;
       half_trace += 0.5 * (column == 0 ? q : v);
     }
     return std::abs(half_trace) <= 1.0;

@@ -1,9 +1,8 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 
-#include "worker/solver/chain.h"
+#include "worker/solver/chain_kernel.h"
 
 /// PEFRL, the position-extended Forest-Ruth-like splitting of Omelyan, Mryglod and Folk (Comput.
 /// Phys. Commun. 146, 2002, 188): explicit, symplectic, time-reversible, order 4, four force
@@ -14,8 +13,10 @@ struct Pefrl {
   static constexpr double xi = 0.1786178958448091;
   static constexpr double lambda = -0.2123418310626054;
   static constexpr double chi = -0.06626458266981849;
-  static constexpr std::array<double, 5> drift{xi, chi, 1.0 - 2.0 * (chi + xi), chi, xi};
-  static constexpr std::array<double, 4> kick{0.5 - lambda, lambda, lambda, 0.5 - lambda};
+  static constexpr double drift[]{xi, chi, 1.0 - 2.0 * (chi + xi), chi, xi};
+  static constexpr double kick[]{0.5 - lambda, lambda, lambda, 0.5 - lambda};
+
+  static constexpr std::size_t kKicks = 4;
 
   /// Largest stable omega h on a harmonic oscillator, found from the trace of the step's map.
   static double stability_limit();
@@ -48,34 +49,43 @@ struct ContactIntegrals {
   Real work_t{};     ///< int F_t V_t dt [J]
 };
 
-/// Advances q and v (2 chain.rows() entries each) by one step of h seconds. `acceleration` is
-/// scratch of the same size.
+/// Steps q and v (2 chain.rows entries each) by h seconds into q_next and v_next, which may be q
+/// and v themselves. `acceleration` is scratch of the same size. As chain_kernel.h, for numbers and
+/// lanes.
 template <class Real>
-ContactIntegrals<Real> pefrl_step(const Chain& chain, const AffineContactForce<Real>& force,
-                                  const Real& h_s, Real* q, Real* v, Real* acceleration) {
-  const std::size_t size = 2 * chain.rows();
-  const std::size_t tip = 2 * chain.tip_row();
+inline ContactIntegrals<Real> pefrl_step(const ChainTables& chain,
+                                         const AffineContactForce<Real>& force, const Real& h_s,
+                                         const Real* q, const Real* v, Real* q_next, Real* v_next,
+                                         Real* acceleration) {
+  const std::size_t size = 2 * chain.rows;
+  const std::size_t tip = 2 * chain.tip_row;
   ContactIntegrals<Real> integrals;
-  for (std::size_t stage = 0; stage < Pefrl::kick.size(); ++stage) {
+  q_next[0] = q[0];
+  q_next[1] = q[1];
+  v_next[0] = v[0];
+  v_next[1] = v[1];
+  for (std::size_t stage = 0; stage < Pefrl::kKicks; ++stage) {
+    const Real* q_from = stage == 0 ? q : q_next;
+    const Real* v_from = stage == 0 ? v : v_next;
     const Real drift_s = Pefrl::drift[stage] * h_s;
     for (std::size_t i = 2; i < size; ++i) {
-      q[i] += drift_s * v[i];
+      q_next[i] = q_from[i] + drift_s * v_from[i];
     }
-    const Real fn = force.fn_N(q[tip + 1]);
-    const Real ft = force.ft_N(q[tip], q[tip + 1]);
-    chain.accelerations(q, ft, fn, acceleration);
+    const Real fn = force.fn_N(q_next[tip + 1]);
+    const Real ft = force.ft_N(q_next[tip], q_next[tip + 1]);
+    chain_accelerations(chain, q_next, ft, fn, acceleration);
     const Real kick_s = Pefrl::kick[stage] * h_s;
-    const Real vt_before = v[tip];
+    const Real vt_before = v_from[tip];
     for (std::size_t i = 2; i < size; ++i) {
-      v[i] += kick_s * acceleration[i];
+      v_next[i] = v_from[i] + kick_s * acceleration[i];
     }
     integrals.impulse_n += kick_s * fn;
     integrals.impulse_t += kick_s * ft;
-    integrals.work_t += kick_s * ft * (0.5 * (vt_before + v[tip]));
+    integrals.work_t += kick_s * ft * (0.5 * (vt_before + v_next[tip]));
   }
-  const Real drift_s = Pefrl::drift.back() * h_s;
+  const Real drift_s = Pefrl::drift[Pefrl::kKicks] * h_s;
   for (std::size_t i = 2; i < size; ++i) {
-    q[i] += drift_s * v[i];
+    q_next[i] += drift_s * v_next[i];
   }
   return integrals;
 }

@@ -1,11 +1,14 @@
 #include "worker/solver/solve.h"
 
+#include <map>
 #include <mutex>
 #include <optional>
+#include <utility>
 
 #include "worker/solver/chain.h"
 #include "worker/solver/fall.h"
 #include "worker/solver/generalized_alpha.h"
+#include "worker/solver/lane_batch.h"
 #include "worker/solver/solve_contact.h"
 #include "worker/solver/step_choice.h"
 
@@ -34,6 +37,32 @@ struct Finger::Parts {
     return *fall;
   }
 
+  /// Throws InputError for a value outside its range, a step that is too long, an H never reached.
+  void check(double H_m, double mu, double e_star) const {
+    validate_point(model, H_m, mu, e_star);
+    steps.contact(e_star);
+    if (H_m > solved_fall().largest_drop_m()) {
+      solved_fall().state_at(H_m);
+    }
+  }
+  ContactParameters contact_parameters(double mu, double e_star) const {
+    return {model.k_N_m, model.eta2, mu, e_star};
+  }
+  void sign(SolverReport& report) const {
+    report.integrator = integrator_name(model.integrator);
+    report.version = solver_version();
+  }
+  CaseResult solve_by_motion(const PointRequest& point, const Extras& extras) const {
+    ChainState touch = solved_fall().state_at(point.H_m);
+    const double fall_time_s = touch.t_s;
+    CaseResult result = solve_contact(*motion, contact_parameters(point.mu, point.e_star),
+                                      steps.contact(point.e_star), std::move(touch), extras);
+    result.H_m = point.H_m;
+    result.fall_time_s = fall_time_s;
+    sign(result.solver);
+    return result;
+  }
+
   ModelParameters model;
   Chain chain;
   StepChoice steps;
@@ -41,6 +70,43 @@ struct Finger::Parts {
   mutable std::once_flag fall_once;
   mutable std::optional<Fall> fall;
 };
+
+namespace {
+
+/// States at touch and steps for points that come in order: neighbours share H and cycle through
+/// the same e*.
+class TouchCache {
+ public:
+  explicit TouchCache(const Finger::Parts& parts) : parts_(parts) {}
+
+  const ChainState& at(double H_m) {
+    if (!(H_m == H_m_)) {
+      touch_ = parts_.solved_fall().state_at(H_m);
+      H_m_ = H_m;
+    }
+    return touch_;
+  }
+  ContactSteps steps(double e_star) {
+    if (steps_.size() >= kMostSteps) {
+      steps_.clear();
+    }
+    auto found = steps_.find(e_star);
+    if (found == steps_.end()) {
+      found = steps_.emplace(e_star, parts_.steps.contact(e_star)).first;
+    }
+    return found->second;
+  }
+
+ private:
+  static constexpr std::size_t kMostSteps = 4096;
+
+  const Finger::Parts& parts_;
+  double H_m_ = 0.0;  // no drop: the first at() finds its own
+  ChainState touch_;
+  std::map<double, ContactSteps> steps_;
+};
+
+}  // namespace
 
 std::string solver_version() {
   return OBLIQUE_SOLVER_VERSION;
@@ -66,18 +132,75 @@ CaseResult Finger::solve(double H_m, double mu, double e_star) const {
 }
 
 CaseResult Finger::solve(double H_m, double mu, double e_star, const Extras& extras) const {
-  validate_point(parts_->model, H_m, mu, e_star);
-  const ContactSteps steps = parts_->steps.contact(e_star);
-  ChainState touch = parts_->solved_fall().state_at(H_m);
-  const double fall_time_s = touch.t_s;
-  CaseResult result =
-      solve_contact(*parts_->motion, {parts_->model.k_N_m, parts_->model.eta2, mu, e_star}, steps,
-                    std::move(touch), extras);
-  result.H_m = H_m;
-  result.fall_time_s = fall_time_s;
-  result.solver.integrator = integrator_name(parts_->model.integrator);
-  result.solver.version = solver_version();
-  return result;
+  parts_->check(H_m, mu, e_star);
+  if (parts_->model.integrator != Integrator::kExplicit) {
+    return parts_->solve_by_motion({0, H_m, mu, e_star}, extras);
+  }
+  std::optional<PointRequest> request = PointRequest{0, H_m, mu, e_star};
+  PointOutcome outcome{};
+  solve_in_lanes([&request] { return std::exchange(request, std::nullopt); },
+                 [&outcome](PointOutcome&& o) { outcome = std::move(o); }, extras);
+  if (!outcome.result) {
+    throw SolveError(outcome.error);
+  }
+  return std::move(*outcome.result);
+}
+
+void Finger::solve_points(const std::function<std::optional<PointRequest>()>& source,
+                          const std::function<void(PointOutcome&&)>& sink) const {
+  if (parts_->model.integrator == Integrator::kExplicit) {
+    solve_in_lanes(source, sink, Extras{});
+    return;
+  }
+  while (const auto request = source()) {
+    PointOutcome outcome{request->number, std::nullopt, {}};
+    try {
+      parts_->check(request->H_m, request->mu, request->e_star);
+      outcome.result = parts_->solve_by_motion(*request, Extras{});
+    } catch (const std::exception& error) {
+      outcome.error = error.what();
+    }
+    sink(std::move(outcome));
+  }
+}
+
+void Finger::solve_in_lanes(const std::function<std::optional<PointRequest>()>& source,
+                            const std::function<void(PointOutcome&&)>& sink,
+                            const Extras& extras) const {
+  struct Entry {
+    PointRequest request;
+    double fall_time_s;
+  };
+  std::map<std::uint64_t, Entry> under_way;  // at most one a lane
+  TouchCache touches(*parts_);
+  std::uint64_t next_tag = 0;
+  const auto take = [&]() -> std::optional<ContactCase> {
+    while (const auto request = source()) {
+      try {
+        validate_point(parts_->model, request->H_m, request->mu, request->e_star);
+        const ContactSteps steps = touches.steps(request->e_star);
+        const ChainState& touch = touches.at(request->H_m);
+        under_way[next_tag] = {*request, touch.t_s};
+        return ContactCase{next_tag++, parts_->contact_parameters(request->mu, request->e_star),
+                           steps, &touch};
+      } catch (const std::exception& error) {
+        sink({request->number, std::nullopt, error.what()});
+      }
+    }
+    return std::nullopt;
+  };
+  const auto give = [&](ContactOutcome&& contact) {
+    const Entry entry = under_way.at(contact.tag);
+    under_way.erase(contact.tag);
+    if (contact.result) {
+      contact.result->H_m = entry.request.H_m;
+      contact.result->fall_time_s = entry.fall_time_s;
+      parts_->sign(contact.result->solver);
+    }
+    sink({entry.request.number, std::move(contact.result), std::move(contact.error)});
+  };
+  LaneBatch batch(parts_->chain, runnable_lane_kernels().front());
+  batch.solve(take, give, extras);
 }
 
 }  // namespace oblique::solver

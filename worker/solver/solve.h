@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "worker/solver/case_result.h"
@@ -16,11 +18,27 @@ std::string solver_version();
 /// Instruction set the solver runs with on this machine, as "avx2".
 std::string instruction_set();
 
+/// A point to solve, under the caller's number.
+struct PointRequest {
+  std::uint64_t number;
+  double H_m;
+  double mu;
+  double e_star;
+};
+
+/// What became of it: a result, or the reason why there is none.
+struct PointOutcome {
+  std::uint64_t number;
+  std::optional<CaseResult> result;
+  std::string error;
+};
+
 /// Solves points of one model. The fall is solved once, when first needed, and shared by all
 /// points. Const members may be called from several threads at once. A point's result has the same
 /// bits whatever was solved before or beside it.
 class Finger {
  public:
+  struct Parts;  ///< of the implementation
   using TraceSink = std::function<void(const TraceRow&)>;
   struct Extras {
     bool reaction_peaks = false;  ///< fill CaseResult::reaction_peaks
@@ -43,8 +61,16 @@ class Finger {
   CaseResult solve(double H_m, double mu, double e_star) const;
   CaseResult solve(double H_m, double mu, double e_star, const Extras& extras) const;
 
+  /// Solves the points that `source` gives until it gives nothing more, side by side in vector
+  /// lanes where the integrator allows, and hands each outcome to `sink`, in the order in which
+  /// they are done. Points of equal H should follow each other: the state at touch is found once
+  /// for them. Throws nothing of its own; what goes wrong with a point is in its outcome.
+  void solve_points(const std::function<std::optional<PointRequest>()>& source,
+                    const std::function<void(PointOutcome&&)>& sink) const;
+
  private:
-  struct Parts;
+  void solve_in_lanes(const std::function<std::optional<PointRequest>()>& source,
+                      const std::function<void(PointOutcome&&)>& sink, const Extras& extras) const;
   std::unique_ptr<Parts> parts_;
 };
 

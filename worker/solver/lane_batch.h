@@ -1,0 +1,69 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "worker/solver/contact_outcome.h"
+#include "worker/solver/lane_stepper.h"
+
+namespace oblique::solver {
+
+/// A contact to solve, from touch on.
+struct ContactCase {
+  std::uint64_t tag;  ///< the caller's name for it
+  ContactParameters parameters;
+  ContactSteps steps;
+  const ChainState* touch;  ///< of the eliminated chain; read when the case is taken
+};
+
+/// What became of a case: a result (without H, fall time and solver name), or why there is none.
+struct ContactOutcome {
+  std::uint64_t tag;
+  std::optional<CaseResult> result;
+  std::string error;
+};
+
+/// Solves contacts of the explicit integrator side by side in vector lanes. A lane whose contact
+/// ends takes the next case at once, and a lane that locates an event steps from its own saved
+/// state with a length of its own while the others go on. A case has the same bits whatever lane
+/// and neighbours it had. Not for use from two threads at once.
+class LaneBatch {
+ public:
+  using Source = std::function<std::optional<ContactCase>()>;
+  using Sink = std::function<void(ContactOutcome&&)>;
+
+  /// `chain` must outlive this.
+  LaneBatch(const Chain& chain, const LaneKernel& kernel);
+
+  /// Solves what `source` gives until it gives nothing more. Outcomes come in the order in which
+  /// contacts end. With `extras`, every case is observed.
+  void solve(const Source& source, const Sink& sink, const Finger::Extras& extras = {});
+
+ private:
+  struct Lane {
+    std::optional<Contact> contact;  ///< empty: the lane idles
+    ContactCase contact_case{};
+    TipState touch{};
+    Energies in{};
+    std::optional<ContactObserver> observer;
+    std::chrono::steady_clock::time_point started{};
+    bool failed = false;
+  };
+  void fill(std::size_t lane, const Source& source, const Finger::Extras& extras);
+  bool advance(std::size_t lane, const Sink& sink);
+  void finish(std::size_t lane, std::size_t busy, const Sink& sink);
+  const ChainState& stored(std::size_t lane);
+
+  const Chain& chain_;
+  ExplicitMotion motion_;
+  LaneStepper stepper_;
+  std::vector<Lane> lanes_;
+  std::vector<unsigned char> accept_;
+  ChainState column_;
+};
+
+}  // namespace oblique::solver

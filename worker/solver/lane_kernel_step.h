@@ -1,0 +1,26 @@
+#pragma once
+
+#include "worker/solver/lane_pack.h"
+#include "worker/solver/lane_stepper.h"
+
+namespace oblique::solver {
+
+/// One step of all lanes of `Pack`, a LanePack. Compiled once in each lane_kernel_*.cpp with the
+/// flags of its instruction set.
+template <class Pack>
+void step_lanes(const ChainTables& chain, const LaneArrays& arrays) {
+  const auto packs = [](auto* numbers) { return reinterpret_cast<Pack*>(numbers); };
+  const auto constant = [](const double* numbers) {
+    return reinterpret_cast<const Pack*>(numbers);
+  };
+  const Pack* f = constant(arrays.force);
+  const AffineContactForce<Pack> force{f[0], f[1], f[2], f[3], f[4], f[5], f[6]};
+  const ContactIntegrals<Pack> integrals =
+      pefrl_step(chain, force, *constant(arrays.h_s), constant(arrays.q), constant(arrays.v),
+                 packs(arrays.q_next), packs(arrays.v_next), packs(arrays.scratch));
+  packs(arrays.integrals)[0] = integrals.impulse_n;
+  packs(arrays.integrals)[1] = integrals.impulse_t;
+  packs(arrays.integrals)[2] = integrals.work_t;
+}
+
+}  // namespace oblique::solver
