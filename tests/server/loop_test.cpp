@@ -1,0 +1,328 @@
+// The whole server in this process, over real sockets of the loopback device, with a pretended
+// worker and client.
+#include "server/loop.h"
+
+#include <array>
+#include <thread>
+
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <zmq.hpp>
+
+#include "proto/frames.h"
+#include "tests/server/results.h"
+#include "tests/server/scheduler_bench.h"
+
+namespace oblique::server {
+namespace {
+
+using protocol::ClientReply;
+using protocol::ClientRequest;
+using protocol::ServerToWorker;
+using protocol::WorkerMessage;
+using testing::HasSubstr;
+
+/// A server on ports that the system picked, stopped when it goes out of scope.
+class RunningServer {
+ public:
+  explicit RunningServer(const std::string& database) : loop_(settings(database)) {
+    thread_ = std::thread([this] { end_ = loop_.run(stop_fd_); });
+  }
+  ~RunningServer() { stop(); }
+  RunningServer(const RunningServer&) = delete;
+  RunningServer& operator=(const RunningServer&) = delete;
+
+  LoopEnd stop() {
+    if (thread_.joinable()) {
+      const std::uint64_t one = 1;
+      EXPECT_EQ(::write(stop_fd_, &one, sizeof one), static_cast<ssize_t>(sizeof one));
+      thread_.join();
+      ::close(stop_fd_);
+    }
+    return end_;
+  }
+  std::string client_endpoint() const { return loop_.client_endpoint(); }
+  std::string worker_endpoint() const { return loop_.worker_endpoint(); }
+
+ private:
+  static LoopSettings settings(const std::string& database) {
+    LoopSettings settings;
+    settings.database = database;
+    settings.worker_port = "*";
+    settings.client_port = "*";
+    settings.service.solver_version = "1.0";
+    return settings;
+  }
+
+  int stop_fd_ = eventfd(0, 0);
+  Loop loop_;
+  LoopEnd end_{};
+  std::thread thread_;
+};
+
+/// A DEALER socket that speaks in messages.
+template <typename Out, typename In>
+class Peer {
+ public:
+  explicit Peer(const std::string& endpoint) : socket_(context_, zmq::socket_type::dealer) {
+    socket_.set(zmq::sockopt::linger, 0);
+    socket_.set(zmq::sockopt::rcvtimeo, 20'000);  // so that a broken server fails the test
+    socket_.connect(endpoint);
+  }
+  void send(const Out& message) { send_frame(protocol::encode(message)); }
+  void send_frame(const std::string& frame) {
+    socket_.send(zmq::buffer(frame), zmq::send_flags::none);
+  }
+  void send_frames(const std::vector<std::string>& frames) {
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      socket_.send(zmq::buffer(frames[i]),
+                   i + 1 < frames.size() ? zmq::send_flags::sndmore : zmq::send_flags::none);
+    }
+  }
+  In receive() {
+    zmq::message_t frame;
+    In message;
+    if (!socket_.recv(frame)) {
+      throw std::runtime_error("the server does not answer");
+    }
+    if (!protocol::decode(frame.to_string_view(), message)) {
+      throw std::runtime_error("the server sent what is no message");
+    }
+    return message;
+  }
+
+ private:
+  zmq::context_t context_;
+  zmq::socket_t socket_;
+};
+
+class PretendedWorker : public Peer<WorkerMessage, ServerToWorker> {
+ public:
+  using Peer::Peer;
+
+  ServerToWorker hello() {
+    WorkerMessage message;
+    message.mutable_hello()->set_protocol_version(protocol::kProtocolVersion);
+    message.mutable_hello()->set_solver_version("1.0");
+    message.mutable_hello()->set_instruction_set("avx2");
+    message.mutable_hello()->set_name("pretended");
+    message.mutable_hello()->set_threads(1);
+    send(message);
+    return receive();
+  }
+  void credit(std::uint32_t batches) {
+    WorkerMessage message;
+    message.mutable_credit()->set_batches(batches);
+    send(message);
+  }
+  void solve(const protocol::Batch& batch) {
+    WorkerMessage message;
+    auto& results = *message.mutable_results();
+    results.set_study_id(batch.study_id());
+    results.set_lease_id(batch.lease_id());
+    results.set_attempt(batch.attempt());
+    results.set_sequence(++sequence_);
+    results.set_batch_done(true);
+    results.set_busy_s(1e-3);
+    for (std::uint64_t i = 0; i < batch.count(); ++i) {
+      *results.add_results() = solved_point(batch.first_point() + i);
+    }
+    send(message);
+  }
+  /// Takes batches, one at a time, until `points` are solved and stored.
+  void work(std::uint64_t points) {
+    std::uint64_t waiting = points;
+    credit(1);
+    while (waiting > 0) {
+      const auto message = receive();
+      if (message.has_batch()) {
+        in_hand_[sequence_ + 1] = message.batch().count();
+        solve(message.batch());
+      } else if (message.has_results_stored()) {
+        waiting -= std::min(waiting, in_hand_.at(message.results_stored().sequence()));
+        credit(1);
+      }
+    }
+  }
+
+ private:
+  std::uint64_t sequence_ = 0;
+  std::map<std::uint64_t, std::uint64_t> in_hand_;
+};
+
+class PretendedClient : public Peer<ClientRequest, ClientReply> {
+ public:
+  using Peer::Peer;
+
+  ClientReply ask(ClientRequest request) {
+    request.set_protocol_version(protocol::kProtocolVersion);
+    request.set_request_id(++id_);
+    send(request);
+    const auto reply = receive();
+    EXPECT_EQ(reply.request_id(), id_);
+    return reply;
+  }
+  ClientReply submit(const std::string& name, std::uint64_t points) {
+    ClientRequest request;
+    request.mutable_submit()->set_name(name);
+    *request.mutable_submit()->mutable_recipe() = table_of(points)->recipe();
+    return ask(request);
+  }
+  ClientReply query(const std::string& sql) {
+    ClientRequest request;
+    request.mutable_query()->set_sql(sql);
+    return ask(request);
+  }
+  protocol::StudyStatus status(const std::string& name) {
+    ClientRequest request;
+    request.mutable_status()->set_study(name);
+    return ask(request).status().studies(0);
+  }
+
+ private:
+  std::uint64_t id_ = 0;
+};
+
+class LoopTest : public testing::Test {
+ protected:
+  TemporaryFolder folder_;
+  std::string path_ = folder_.file("studies.db");
+};
+
+TEST_F(LoopTest, AStudyIsSolvedStoredAndQueried) {
+  RunningServer server(path_);
+  PretendedClient client(server.client_endpoint());
+  EXPECT_EQ(client.submit("a", 30).submit().points(), 30U);
+  PretendedWorker worker(server.worker_endpoint());
+  ASSERT_TRUE(worker.hello().has_welcome());
+  worker.work(30);
+  EXPECT_EQ(client.status("a").state(), "done");
+  const auto reply = client.query("SELECT count(*), count(DISTINCT point) FROM results");
+  EXPECT_EQ(reply.query().rows(0).values(0).integer(), 30);
+  EXPECT_EQ(reply.query().rows(0).values(1).integer(), 30);
+  ClientRequest workers;
+  workers.mutable_workers();
+  const auto known = client.ask(workers).workers();
+  ASSERT_EQ(known.workers_size(), 1);
+  EXPECT_EQ(known.workers(0).solved_points(), 30U);
+}
+
+TEST_F(LoopTest, ARestartedServerGoesOnWhereItWas) {
+  {
+    RunningServer server(path_);
+    PretendedClient client(server.client_endpoint());
+    client.submit("a", 30);
+    PretendedWorker worker(server.worker_endpoint());
+    worker.hello();
+    worker.work(5);
+  }
+  RunningServer server(path_);
+  PretendedClient client(server.client_endpoint());
+  const auto status = client.status("a");
+  EXPECT_GE(status.solved(), 5U);
+  EXPECT_EQ(status.state(), "running");
+  PretendedWorker worker(server.worker_endpoint());
+  EXPECT_EQ(worker.hello().welcome().worker_id(), 2U);
+  worker.work(30 - status.solved());
+  EXPECT_EQ(client.status("a").state(), "done");
+}
+
+TEST_F(LoopTest, AStoppingServerTellsItsWorkersAndCommitsWhatItReceived) {
+  auto server = std::make_unique<RunningServer>(path_);
+  PretendedClient client(server->client_endpoint());
+  client.submit("a", 1000);
+  PretendedWorker worker(server->worker_endpoint());
+  worker.hello();
+  worker.credit(1);
+  worker.receive();  // the definition
+  const auto batch = worker.receive().batch();
+  worker.solve(batch);
+  WorkerMessage heartbeat;
+  heartbeat.mutable_heartbeat();
+  worker.send(heartbeat);
+  bool received = false;
+  bool stored = false;
+  while (!received) {  // its answer tells that the results before it have arrived
+    const auto message = worker.receive();
+    received = message.has_heartbeat_reply();
+    stored = stored || message.has_results_stored();
+  }
+  EXPECT_EQ(server->stop().lost_writes, 0U);
+  bool stopping = false;
+  while (!stopping || !stored) {
+    const auto message = worker.receive();
+    stopping = stopping || message.has_stopping();
+    stored = stored || message.has_results_stored();
+  }
+  server.reset();
+  EXPECT_EQ(Reader(path_).study_status("a").at(0).solved(), batch.count());
+}
+
+TEST_F(LoopTest, HostileFramesHarmNobody) {
+  RunningServer server(path_);
+  PretendedClient client(server.client_endpoint());
+  PretendedWorker worker(server.worker_endpoint());
+  worker.hello();
+  PretendedWorker hostile_worker(server.worker_endpoint());
+  PretendedClient hostile_client(server.client_endpoint());
+  for (const std::string& frame :
+       {std::string(), std::string(1000, '\xff'), std::string("GET /")}) {
+    hostile_worker.send_frame(frame);
+    hostile_client.send_frame(frame);
+    EXPECT_TRUE(hostile_client.receive().has_error());
+  }
+  hostile_worker.send_frames({"", "a", "b", "c"});
+  hostile_client.send_frames({"", "a", "b", "c"});
+  EXPECT_TRUE(hostile_client.receive().has_error());
+  EXPECT_TRUE(client.submit("a", 10).has_submit());
+  worker.work(10);
+  EXPECT_EQ(client.status("a").state(), "done");
+}
+
+TEST_F(LoopTest, AFrameOverTheLimitCostsItsSenderTheConnectionAndNobodyElse) {
+  RunningServer server(path_);
+  PretendedClient hostile(server.client_endpoint());
+  hostile.send_frame(std::string(protocol::kMaxFrameBytes + 1, 'x'));
+  PretendedClient client(server.client_endpoint());
+  EXPECT_TRUE(client.submit("a", 10).has_submit());
+}
+
+TEST_F(LoopTest, ALongQueryHoldsUpNothingElse) {
+  RunningServer server(path_);
+  PretendedClient client(server.client_endpoint());
+  PretendedClient other(server.client_endpoint());
+  ClientRequest endless;
+  endless.set_protocol_version(protocol::kProtocolVersion);
+  endless.mutable_query()->set_sql(
+      "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT count(*) FROM n");
+  other.send(endless);
+  EXPECT_TRUE(client.submit("a", 10).has_submit());
+  EXPECT_EQ(client.status("a").points(), 10U);
+}
+
+TEST_F(LoopTest, AQueryThatWritesIsRefused) {
+  RunningServer server(path_);
+  PretendedClient client(server.client_endpoint());
+  EXPECT_THAT(client.query("DELETE FROM studies").error().message(), HasSubstr("only statements"));
+}
+
+TEST_F(LoopTest, TheSecondServerOfADatabaseIsRefused) {
+  RunningServer server(path_);
+  EXPECT_THROW(RunningServer{path_}, StorageError);
+}
+
+TEST(LoopbackAddressTest, OnlyLoopbackIsAllowed) {
+  EXPECT_EQ(loopback_address("localhost"), "127.0.0.1");
+  EXPECT_EQ(loopback_address("127.3.2.1"), "127.3.2.1");
+  EXPECT_EQ(loopback_address("::1"), "::1");
+  for (const char* address :
+       {"0.0.0.0", "*", "192.168.0.1", "::", "128.0.0.1", "example.org", ""}) {
+    EXPECT_THROW(loopback_address(address), std::runtime_error) << address;
+  }
+}
+
+}  // namespace
+}  // namespace oblique::server
