@@ -1,0 +1,123 @@
+#include <csignal>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/system/processes.h"
+
+namespace oblique::test {
+namespace {
+
+/// 10,000 points of a coarse finger, which are soon solved.
+const std::vector<std::string> kPoints{
+    "--H",         "1",      "--mu", "0.1:2.0:100",         "--e",
+    "0.5:1.0:100", "--name", "many", "--elements-per-link", "1"};
+constexpr double kCount = 10'000;
+
+/// A server with the study of `kPoints` and a client that watches it to its end.
+class KillTest : public ::testing::Test {
+ protected:
+  void submit() {
+    std::vector<std::string> arguments{"submit", "--server", server_->client_url()};
+    arguments.insert(arguments.end(), kPoints.begin(), kPoints.end());
+    const Ran ran = run_client(folder_, arguments);
+    ASSERT_EQ(ran.exit_code, 0) << ran.errors;
+  }
+
+  void start_worker() {
+    workers_.push_back(std::make_unique<Worker>(folder_, server_->worker_url()));
+  }
+
+  void wait_for_rows(double rows) {
+    wait_until("rows in the database", [&] { return database_.rows() >= rows; });
+  }
+
+  /// Every point has exactly one row, and that of its own values.
+  void expect_complete() {
+    wait_for_rows(kCount);
+    EXPECT_EQ(database_.rows(), kCount);
+    EXPECT_EQ(database_.number("SELECT count(*) FROM results WHERE status = 'solved'"), kCount);
+    EXPECT_EQ(database_.number("SELECT count(DISTINCT point) FROM results"), kCount);
+    EXPECT_EQ(database_.number("SELECT max(point) FROM results"), kCount - 1);
+    EXPECT_EQ(database_.number("SELECT count(*) FROM (SELECT DISTINCT H, mu, e FROM results)"),
+              kCount);
+    wait_until("the study is done",
+               [&] { return database_.texts("SELECT state FROM studies").at(0) == "done"; });
+  }
+
+  Folder folder_;
+  Database database_{folder_.file("many.db")};
+  std::unique_ptr<Server> server_ = std::make_unique<Server>(folder_, folder_.file("many.db"));
+  std::vector<std::unique_ptr<Worker>> workers_;
+};
+
+TEST_F(KillTest, AServerKilledInTheMiddleOfAStudyAndStartedAgainCompletesItWithTheSameWorkers) {
+  submit();
+  start_worker();
+  start_worker();
+  for (const double rows : {1000, 3000, 5000}) {
+    wait_for_rows(rows);
+    server_->process().send(SIGKILL);
+    EXPECT_EQ(server_->process().wait(), 128 + SIGKILL);
+    ASSERT_LT(database_.rows(), kCount) << "killed too late to be a test";
+    server_ = std::make_unique<Server>(folder_, folder_.file("many.db"), *server_);
+  }
+  expect_complete();
+  for (const auto& worker : workers_) {
+    worker->send(SIGTERM);
+    EXPECT_EQ(worker->wait(), 0) << worker->errors();
+  }
+}
+
+TEST_F(KillTest, AServerToldToStopInTheMiddleOfAStudyAndStartedAgainCompletesIt) {
+  submit();
+  start_worker();
+  wait_for_rows(1000);
+  server_->process().send(SIGTERM);
+  EXPECT_EQ(server_->process().wait(), 0) << server_->process().errors();
+  ASSERT_LT(database_.rows(), kCount) << "stopped too late to be a test";
+  server_ = std::make_unique<Server>(folder_, folder_.file("many.db"), *server_);
+  expect_complete();
+}
+
+TEST_F(KillTest, PointsOfAWorkerKilledInTheMiddleOfAStudyAreSolvedByTheOthers) {
+  submit();
+  start_worker();
+  start_worker();
+  wait_for_rows(1000);
+  workers_.front()->send(SIGKILL);
+  EXPECT_EQ(workers_.front()->wait(), 128 + SIGKILL);
+  ASSERT_LT(database_.rows(), kCount) << "killed too late to be a test";
+  expect_complete();
+  EXPECT_EQ(database_.number("SELECT count(*) FROM workers"), 2);
+}
+
+TEST_F(KillTest, AStudyWhoseOnlyWorkerWasKilledWaitsForTheNextOne) {
+  submit();
+  start_worker();
+  wait_for_rows(1000);
+  workers_.front()->send(SIGKILL);
+  workers_.front()->wait();
+  ASSERT_LT(database_.rows(), kCount) << "killed too late to be a test";
+  start_worker();
+  expect_complete();
+}
+
+TEST_F(KillTest, AWorkerThatWasHaltedAndGivenUpComesBackAndNothingIsStoredTwice) {
+  submit();
+  start_worker();
+  start_worker();
+  wait_for_rows(1000);
+  workers_.front()->send(SIGSTOP);
+  wait_until("the halted worker is given up",
+             [&] { return server_->process().errors().find("silent for") != std::string::npos; });
+  workers_.front()->send(SIGCONT);
+  expect_complete();
+  workers_.front()->send(SIGTERM);
+  EXPECT_EQ(workers_.front()->wait(), 0) << workers_.front()->errors();
+}
+
+}  // namespace
+}  // namespace oblique::test

@@ -1,0 +1,99 @@
+#include <algorithm>
+#include <csignal>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/system/processes.h"
+
+namespace oblique::test {
+namespace {
+
+/// `oblique run` of a study that takes long enough to be stopped in its middle.
+class RunTest : public ::testing::Test {
+ protected:
+  std::vector<std::string> arguments() const {
+    return {"run", "--H",        "1",      "--mu", "0.1:2.0:100",
+            "--e", "0.5:1.0:40", "--name", "some", "--elements-per-link",
+            "1",   "--workers",  "2",      "--db", folder_.file("some.db")};
+  }
+  static constexpr double kCount = 4000;
+
+  /// The server and the workers of a run, once all are there and at work.
+  std::vector<pid_t> started_by(const Process& run) {
+    wait_until("rows in the database", [&] { return database_.rows() >= 100; });
+    const auto children = children_of(run.pid());
+    EXPECT_EQ(children.size(), 3U);
+    return children;
+  }
+
+  static void expect_gone(const std::vector<pid_t>& processes) {
+    wait_until("all processes of the run are gone",
+               [&] { return std::none_of(processes.begin(), processes.end(), is_running); });
+  }
+
+  Folder folder_;
+  Database database_{folder_.file("some.db")};
+};
+
+TEST_F(RunTest, CtrlCLeavesNothingRunningAndTheSameCommandContinues) {
+  Process run(folder_, client_program(), arguments());
+  const auto children = started_by(run);
+  kill(-run.pid(), SIGINT);  // as a terminal does: to the whole group
+  EXPECT_EQ(run.wait(), 1);
+  EXPECT_NE(run.errors().find("the same command again"), std::string::npos) << run.errors();
+  EXPECT_EQ(run.output(), "");
+  for (const pid_t child : children) {
+    EXPECT_FALSE(is_running(child));
+  }
+  const double rows = database_.rows();
+  ASSERT_LT(rows, kCount) << "stopped too late to be a test";
+  const auto kept = database_.texts("SELECT point || ' ' || solved_at FROM results ORDER BY point");
+
+  const Ran again = run_client(folder_, arguments());
+  EXPECT_EQ(again.exit_code, 0) << again.errors;
+  EXPECT_EQ(database_.rows(), kCount);
+  const auto now = database_.texts("SELECT point || ' ' || solved_at FROM results ORDER BY point");
+  EXPECT_TRUE(std::includes(now.begin(), now.end(), kept.begin(), kept.end(),
+                            [](const std::string& a, const std::string& b) {
+                              return std::stoll(a) != std::stoll(b) ? std::stoll(a) < std::stoll(b)
+                                                                    : a < b;
+                            }))
+      << "points were solved again";
+}
+
+TEST_F(RunTest, ARunThatIsKilledLeavesNoProcessAndTheSameCommandContinues) {
+  Process run(folder_, client_program(), arguments());
+  const auto children = started_by(run);
+  run.send(SIGKILL);
+  EXPECT_EQ(run.wait(), 128 + SIGKILL);
+  expect_gone(children);
+  ASSERT_LT(database_.rows(), kCount) << "killed too late to be a test";
+  const Ran again = run_client(folder_, arguments());
+  EXPECT_EQ(again.exit_code, 0) << again.errors;
+  EXPECT_EQ(database_.number("SELECT count(*) FROM results WHERE status = 'solved'"), kCount);
+}
+
+TEST_F(RunTest, ARunGoesOnWhenOneOfItsWorkersIsKilled) {
+  Process run(folder_, client_program(), arguments());
+  const auto children = started_by(run);
+  const pid_t worker = *std::max_element(children.begin(), children.end());  // started last
+  kill(worker, SIGKILL);
+  EXPECT_EQ(run.wait(), 0) << run.errors();
+  EXPECT_EQ(database_.number("SELECT count(*) FROM results WHERE status = 'solved'"), kCount);
+}
+
+TEST_F(RunTest, TwoRunsOnOneDatabaseAtATimeDoNotSpoilIt) {
+  Process first(folder_, client_program(), arguments());
+  started_by(first);
+  Process second(folder_, client_program(), arguments());
+  const int second_exit = second.wait();
+  EXPECT_EQ(first.wait(), 0) << first.errors();
+  EXPECT_TRUE(second_exit == 0 || !second.errors().empty());
+  EXPECT_EQ(database_.number("SELECT count(*) FROM results WHERE status = 'solved'"), kCount);
+  EXPECT_EQ(database_.texts("PRAGMA integrity_check").at(0), "ok");
+}
+
+}  // namespace
+}  // namespace oblique::test
