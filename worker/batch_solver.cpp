@@ -1,11 +1,10 @@
 #include "worker/batch_solver.h"
 
-#include <chrono>
 #include <utility>
 
 namespace oblique::worker {
 
-BatchSolver::BatchSolver(SolvePoint solve, std::function<void()> task_ended)
+BatchSolver::BatchSolver(SolvePoints solve, std::function<void()> task_ended)
     : solve_(std::move(solve)),
       task_ended_(std::move(task_ended)),
       thread_([this](const std::stop_token& stop) { run(stop); }) {}
@@ -48,7 +47,7 @@ void BatchSolver::set_paused(bool paused) {
 
 bool BatchSolver::is_solving() const {
   const std::lock_guard lock(mutex_);
-  return solving_;
+  return current_.has_value();
 }
 
 std::vector<Progress> BatchSolver::collect() {
@@ -70,39 +69,48 @@ Progress& BatchSolver::progress_of(const Task& task) {
 void BatchSolver::run(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   while (changed_.wait(lock, stop, [this] { return !waiting_.empty(); })) {
-    current_ = Current{std::move(waiting_.front()), false};
+    current_ = Current{std::move(waiting_.front()), 0, false, Clock::now()};
     waiting_.pop_front();
-    run_current(lock, stop);
+    const Task task = current_->task;
+    lock.unlock();
+    solve_(
+        task, [&] { return next_point(stop); },
+        [&](protocol::PointResult&& result) { take(std::move(result)); });
+    lock.lock();
+    const bool ended = !current_->dropped && current_->given == task.count;
     current_.reset();
+    if (ended) {
+      progress_of(task).task_done = true;
+      lock.unlock();
+      task_ended_();
+      lock.lock();
+    }
   }
 }
 
-void BatchSolver::run_current(std::unique_lock<std::mutex>& lock, const std::stop_token& stop) {
-  using Clock = std::chrono::steady_clock;
-  const Task task = current_->task;
-  for (std::uint64_t i = 0; i < task.count; ++i) {
+std::optional<std::uint64_t> BatchSolver::next_point(const std::stop_token& stop) {
+  std::unique_lock lock(mutex_);
+  if (paused_) {
+    const Clock::time_point paused_at = Clock::now();
     changed_.wait(lock, stop, [this] { return !paused_ || current_->dropped; });
-    if (current_->dropped || stop.stop_requested()) {
-      return;
-    }
-    solving_ = true;
-    lock.unlock();
-    const Clock::time_point begin = Clock::now();
-    protocol::PointResult result = solve_(task, task.first_point + i);
-    const std::chrono::duration<double> busy = Clock::now() - begin;
-    lock.lock();
-    solving_ = false;
-    if (current_->dropped) {
-      return;
-    }
-    Progress& progress = progress_of(task);
-    progress.results.push_back(std::move(result));
-    progress.busy_s += busy.count();
+    current_->busy_since += Clock::now() - paused_at;
   }
-  progress_of(task).task_done = true;
-  lock.unlock();
-  task_ended_();
-  lock.lock();
+  if (current_->dropped || stop.stop_requested() || current_->given == current_->task.count) {
+    return std::nullopt;
+  }
+  return current_->task.first_point + current_->given++;
+}
+
+void BatchSolver::take(protocol::PointResult&& result) {
+  const std::lock_guard lock(mutex_);
+  if (current_->dropped) {
+    return;
+  }
+  const Clock::time_point now = Clock::now();
+  Progress& progress = progress_of(current_->task);
+  progress.results.push_back(std::move(result));
+  progress.busy_s += std::chrono::duration<double>(now - current_->busy_since).count();
+  current_->busy_since = now;
 }
 
 }  // namespace oblique::worker

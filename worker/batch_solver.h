@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
@@ -19,13 +20,18 @@ namespace oblique::worker {
 /// never holds up heartbeats. More threads would share the queue: nothing outside would change.
 class BatchSolver {
  public:
-  using SolvePoint = std::function<protocol::PointResult(const Task&, std::uint64_t point)>;
+  /// Gives the next point to solve; nothing when there is none.
+  using NextPoint = std::function<std::optional<std::uint64_t>()>;
+  using TakeResult = std::function<void(protocol::PointResult&&)>;
+  /// Solves the points of a task that the second gives, some of them at a time, and hands each
+  /// result to the third in any order.
+  using SolvePoints = std::function<void(const Task&, const NextPoint&, const TakeResult&)>;
 
   /// `solve` must not throw. `task_ended` is called from the solving thread after the last point of
   /// a task; it must not call back.
-  BatchSolver(SolvePoint solve, std::function<void()> task_ended);
+  BatchSolver(SolvePoints solve, std::function<void()> task_ended);
 
-  /// Waits for the point that is being solved.
+  /// Waits for the points that are being solved.
   ~BatchSolver();
   BatchSolver(const BatchSolver&) = delete;
   BatchSolver& operator=(const BatchSolver&) = delete;
@@ -41,23 +47,27 @@ class BatchSolver {
   /// While paused, no further point is begun.
   void set_paused(bool paused);
 
-  /// Whether a point is being solved now.
+  /// Whether points are being solved now.
   bool is_solving() const;
 
   /// What was solved since the last call, by task.
   std::vector<Progress> collect();
 
  private:
+  using Clock = std::chrono::steady_clock;
   struct Current {
     Task task;
+    std::uint64_t given;  ///< points that were begun
     bool dropped;
+    Clock::time_point busy_since;  ///< work before this is in a Progress
   };
 
   void run(const std::stop_token& stop);
-  void run_current(std::unique_lock<std::mutex>& lock, const std::stop_token& stop);
+  std::optional<std::uint64_t> next_point(const std::stop_token& stop);
+  void take(protocol::PointResult&& result);
   Progress& progress_of(const Task& task);
 
-  const SolvePoint solve_;
+  const SolvePoints solve_;
   const std::function<void()> task_ended_;
   mutable std::mutex mutex_;
   std::condition_variable_any changed_;
@@ -65,7 +75,6 @@ class BatchSolver {
   std::optional<Current> current_;
   std::map<std::uint64_t, Progress> progress_;  // by the task's number
   bool paused_ = false;
-  bool solving_ = false;
   std::jthread thread_;  // last: it uses all the others
 };
 

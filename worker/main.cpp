@@ -45,8 +45,8 @@ int run_worker(const SessionSettings& settings) {
   std::signal(SIGPIPE, SIG_IGN);
   oblique::worker::PointSolver points(settings.models_kept);
   oblique::worker::Session session(settings,
-                                   [&](const oblique::worker::Task& task, std::uint64_t point) {
-                                     return points.solve(task, point);
+                                   [&](const auto& task, const auto& next, const auto& take) {
+                                     points.solve(task, next, take);
                                    });
   spdlog::info("worker {}, solver {} ({}), server {}", settings.name,
                oblique::solver::solver_version(), oblique::solver::instruction_set(),
@@ -56,7 +56,7 @@ int run_worker(const SessionSettings& settings) {
     static_cast<void>(read(signals, &received, sizeof(received)));
   });
   if (session.is_solving()) {
-    // A point cannot be interrupted and may take long; nobody waits for it any more.
+    // Points cannot be interrupted and may take long; nobody waits for them any more.
     spdlog::default_logger()->flush();
     std::_Exit(exit_code);
   }

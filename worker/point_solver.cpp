@@ -3,23 +3,47 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
+#include <memory>
+#include <optional>
 
 namespace oblique::worker {
+namespace {
+
+protocol::PointResult message_of(const solver::PointOutcome& outcome) {
+  if (!outcome.result) {
+    return protocol::failed_point(outcome.number, outcome.error);
+  }
+  protocol::PointResult result = protocol::to_message(outcome.number, *outcome.result);
+  return is_finite(result)
+             ? result
+             : protocol::failed_point(outcome.number, "the solver gave a value that is not finite");
+}
+
+}  // namespace
 
 PointSolver::PointSolver(std::size_t models_kept) : fingers_(models_kept) {}
 
-protocol::PointResult PointSolver::solve(const Task& task, std::uint64_t point) {
+void PointSolver::solve(const Task& task, const BatchSolver::NextPoint& next,
+                        const BatchSolver::TakeResult& take) {
+  std::shared_ptr<const solver::Finger> finger;
   try {
-    const auto finger = fingers_.finger(task.points->model(task.model));
-    const protocol::Point at = task.points->point(point);
-    protocol::PointResult result =
-        protocol::to_message(point, finger->solve(at.H_m, at.mu, at.e_star));
-    return is_finite(result)
-               ? result
-               : protocol::failed_point(point, "the solver gave a value that is not finite");
+    finger = fingers_.finger(task.points->model(task.model));
   } catch (const std::exception& error) {
-    return protocol::failed_point(point, error.what());
+    while (const auto point = next()) {
+      take(protocol::failed_point(*point, error.what()));
+    }
+    return;
   }
+  finger->solve_points(
+      [&]() -> std::optional<solver::PointRequest> {
+        const auto number = next();
+        if (!number) {
+          return std::nullopt;
+        }
+        const protocol::Point point = task.points->point(*number);
+        return solver::PointRequest{*number, point.H_m, point.mu, point.e_star};
+      },
+      [&](solver::PointOutcome&& outcome) { take(message_of(outcome)); });
 }
 
 bool is_finite(const protocol::PointResult& result) {

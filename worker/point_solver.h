@@ -1,22 +1,24 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 
+#include "worker/batch_solver.h"
 #include "worker/fall_cache.h"
 #include "worker/task.h"
 
 namespace oblique::worker {
 
-/// Solves single points of tasks. May be used from several threads.
+/// Solves points of tasks. May be used from several threads.
 class PointSolver {
  public:
   /// Keeps the falls of `models_kept` models.
   explicit PointSolver(std::size_t models_kept);
 
-  /// What solving `point` gave. Never throws for a point that has no answer, and never holds a
-  /// value that is not finite: both become a failed point with the reason.
-  protocol::PointResult solve(const Task& task, std::uint64_t point);
+  /// Solves the points that `next` gives, side by side, and hands each result to `take`. A point
+  /// that has no answer, and one with a value that is not finite, becomes a failed point with the
+  /// reason; nothing is thrown for it.
+  void solve(const Task& task, const BatchSolver::NextPoint& next,
+             const BatchSolver::TakeResult& take);
 
  private:
   FallCache fingers_;

@@ -47,7 +47,7 @@ struct Overloaded : Handlers... {
 
 }  // namespace
 
-Session::Session(SessionSettings settings, BatchSolver::SolvePoint solve)
+Session::Session(SessionSettings settings, BatchSolver::SolvePoints solve)
     : settings_(std::move(settings)),
       parent_(getppid()),
       conversation_(hello_of(settings_), settings_.conversation),

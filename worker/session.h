@@ -35,7 +35,7 @@ class AddressError : public std::runtime_error {
 class Session {
  public:
   /// Solves points by `solve`. Connects to nothing yet.
-  Session(SessionSettings settings, BatchSolver::SolvePoint solve);
+  Session(SessionSettings settings, BatchSolver::SolvePoints solve);
   ~Session();
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;

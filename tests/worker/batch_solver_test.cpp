@@ -29,6 +29,10 @@ class Gate {
     open_ += points;
     changed_.notify_all();
   }
+  int begun() {
+    const std::lock_guard lock(mutex_);
+    return begun_;
+  }
   void wait_begun(int points) {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return begun_ >= points; });
@@ -55,9 +59,11 @@ class BatchSolverTest : public ::testing::Test {
   std::mutex mutex_;
   std::condition_variable changed_;
   int tasks_ended_ = 0;
-  BatchSolver solver_{[this](const Task&, std::uint64_t point) {
-                        gate_.pass();
-                        return protocol::failed_point(point, "for the test");
+  BatchSolver solver_{[this](const Task&, const auto& next, const auto& take) {
+                        while (const auto point = next()) {
+                          gate_.pass();
+                          take(protocol::failed_point(*point, "for the test"));
+                        }
                       },
                       [this] {
                         const std::lock_guard lock(mutex_);
@@ -130,17 +136,21 @@ TEST_F(BatchSolverTest, WhenAllIsDroppedWhatWasSolvedCanStillBeCollected) {
 }
 
 TEST_F(BatchSolverTest, APausedSolverEndsItsPointAndBeginsNoOther) {
-  solver_.add(task(1, 0, 2));
+  solver_.add(task(1, 0, 3));
   gate_.wait_begun(1);
   solver_.set_paused(true);
   gate_.open(2);
-  while (solver_.is_solving()) {
-    std::this_thread::yield();
+  std::size_t results = 0;
+  while (results == 0) {
+    for (const Progress& progress : solver_.collect()) {
+      results += progress.results.size();
+    }
   }
-  EXPECT_EQ(solver_.collect().at(0).results.size(), 1U);
+  EXPECT_EQ(gate_.begun(), 1);
   solver_.set_paused(false);
+  gate_.open(1);
   wait_tasks_ended(1);
-  EXPECT_EQ(solver_.collect().at(0).results.size(), 1U);
+  EXPECT_EQ(solver_.collect().at(0).results.size(), 2U);
 }
 
 TEST_F(BatchSolverTest, APausedSolverCanBeEnded) {

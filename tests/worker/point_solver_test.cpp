@@ -1,6 +1,11 @@
 #include "worker/point_solver.h"
 
 #include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -44,24 +49,52 @@ Task task_of(const protocol::Recipe& recipe) {
   return {1, 7, 0, 0, points->size(), points};
 }
 
-TEST(PointSolverTest, APointGivesWhatTheFingerGives) {
-  const Task task = task_of(recipe_with_points(3));
+/// Solves all points of a task; the results in the order of the points.
+std::vector<protocol::PointResult> solved(const Task& task) {
   PointSolver solver(2);
-  const protocol::PointResult result = solver.solve(task, 1);
-  const solver::CaseResult expected = solver::Finger({}).solve(1.0, 0.4, 0.75);
-  EXPECT_EQ(result.error(), "");
-  EXPECT_EQ(result.point(), 1U);
-  EXPECT_EQ(result.fn_peak_n(), expected.fn_peak_N);
-  EXPECT_EQ(result.vn_out_m_s(), expected.vn_out_m_s);
+  std::vector<protocol::PointResult> results(task.count);
+  std::uint64_t given = 0;
+  solver.solve(
+      task,
+      [&] { return given < task.count ? std::optional(task.first_point + given++) : std::nullopt; },
+      [&](protocol::PointResult&& result) { results.at(result.point()) = std::move(result); });
+  return results;
 }
 
-TEST(PointSolverTest, APointWithoutAnswerFailsWithTheReason) {
+TEST(PointSolverTest, EveryPointGivesWhatTheFingerGivesForItAlone) {
+  const Task task = task_of(recipe_with_points(12));
+  const auto results = solved(task);
+  const solver::Finger finger({});
+  for (std::uint64_t i = 0; i < task.count; ++i) {
+    const protocol::Point point = task.points->point(i);
+    const solver::CaseResult expected = finger.solve(point.H_m, point.mu, point.e_star);
+    EXPECT_EQ(results[i].error(), "");
+    EXPECT_EQ(results[i].point(), i);
+    EXPECT_EQ(results[i].fn_peak_n(), expected.fn_peak_N);
+    EXPECT_EQ(results[i].vn_out_m_s(), expected.vn_out_m_s);
+  }
+}
+
+TEST(PointSolverTest, APointWithoutAnswerFailsWithTheReasonAndTheOthersAreSolved) {
   protocol::Recipe recipe = recipe_with_points(2);
-  recipe.mutable_blocks(0)->mutable_axes(0)->set_values(0, 1.19);  // beyond the largest drop
-  PointSolver solver(2);
-  const protocol::PointResult result = solver.solve(task_of(recipe), 0);
-  EXPECT_EQ(result.point(), 0U);
-  EXPECT_NE(result.error().find("1.19"), std::string::npos) << result.error();
+  recipe.mutable_blocks(0)->mutable_axes(0)->add_values(1.19);  // beyond the largest drop
+  const auto results = solved(task_of(recipe));
+  ASSERT_EQ(results.size(), 4U);
+  EXPECT_EQ(results[1].error(), "");
+  EXPECT_NE(results[2].error().find("1.19"), std::string::npos) << results[2].error();
+}
+
+TEST(PointSolverTest, AModelThatMakesNoFingerFailsEachPointWithTheReason) {
+  // The recipe takes any positive number, the solver only one that leaves it a step.
+  protocol::Recipe recipe = recipe_with_points(3);
+  solver::ModelParameters model;
+  model.dt_s = 1.0;
+  *recipe.mutable_model() = protocol::to_message(model);
+  const auto results = solved(task_of(recipe));
+  ASSERT_EQ(results.size(), 3U);
+  for (const auto& result : results) {
+    EXPECT_NE(result.error().find("dt = 1"), std::string::npos) << result.error();
+  }
 }
 
 TEST(PointSolverTest, AValueThatIsNotFiniteIsFoundWhereverItIs) {

@@ -77,7 +77,7 @@ class ScriptedServer {
 /// A session on a thread of its own.
 class RunningWorker {
  public:
-  explicit RunningWorker(const std::string& server, BatchSolver::SolvePoint solve)
+  explicit RunningWorker(const std::string& server, BatchSolver::SolvePoints solve)
       : session_(settings(server), std::move(solve)),
         exit_code_(std::async(std::launch::async, [this] {
           return session_.run(stop_.descriptor(), [this] { stop_.clear(); });
@@ -102,8 +102,11 @@ class RunningWorker {
   std::future<int> exit_code_;
 };
 
-protocol::PointResult solved_at_once(const Task&, std::uint64_t point) {
-  return protocol::failed_point(point, "for the test");
+void solved_at_once(const Task&, const BatchSolver::NextPoint& next,
+                    const BatchSolver::TakeResult& take) {
+  while (const auto point = next()) {
+    take(protocol::failed_point(*point, "for the test"));
+  }
 }
 
 TEST(SessionTest, ABatchIsSolvedAndReportedAndAStoppedWorkerSaysGoodbye) {
@@ -128,10 +131,11 @@ TEST(SessionTest, HeartbeatsGoOnWhileAPointIsSolved) {
   ScriptedServer server;
   std::promise<void> release;
   const std::shared_future<void> released(release.get_future());
-  RunningWorker worker(server.endpoint(), [&](const Task&, std::uint64_t point) {
-    released.wait();
-    return protocol::failed_point(point, "for the test");
-  });
+  RunningWorker worker(server.endpoint(),
+                       [&](const Task& task, const auto& next, const auto& take) {
+                         released.wait();
+                         solved_at_once(task, next, take);
+                       });
   server.welcome_and_hand_out(1);
   for (int i = 0; i < 5; ++i) {
     EXPECT_LE(server.wait_for(WorkerMessage::kHeartbeat).heartbeat().lease_ids_size(), 1);
