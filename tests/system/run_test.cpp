@@ -14,9 +14,8 @@ namespace {
 class RunTest : public ::testing::Test {
  protected:
   std::vector<std::string> arguments() const {
-    return {"run", "--H",        "1",      "--mu", "0.1:2.0:100",
-            "--e", "0.5:1.0:40", "--name", "some", "--elements-per-link",
-            "1",   "--workers",  "2",      "--db", folder_.file("some.db")};
+    return {"run",  "--H",       "1", "--mu", "0.1:2.0:100",          "--e", "0.5:1.0:40", "--name",
+            "some", "--workers", "2", "--db", folder_.file("some.db")};
   }
   static constexpr double kCount = 4000;
 
