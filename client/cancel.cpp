@@ -13,7 +13,7 @@ constexpr const char* kExamples = R"(Examples:
   oblique cancel friction
   oblique cancel friction --server tcp://127.0.0.1:7600
 
-What is solved stays in the database.)";
+What is solved stays in the database; submitting the same study again goes on with it.)";
 
 struct CancelFlags {
   std::string study;

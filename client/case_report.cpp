@@ -1,5 +1,8 @@
 #include "client/case_report.h"
 
+#include <string>
+#include <vector>
+
 #include <spdlog/fmt/fmt.h>
 
 #include "client/printer.h"
@@ -31,6 +34,14 @@ ordered_json json_of(const solver::SolverReport& report) {
           {"steps", report.steps},
           {"wall_s", report.wall_s},
           {"version", report.version}};
+}
+
+ordered_json json_of(const std::vector<solver::ReactionPeak>& peaks) {
+  ordered_json all = ordered_json::array();
+  for (const auto& peak : peaks) {
+    all.push_back({{"t_s", peak.t_s}, {"force_N", peak.force_N}});
+  }
+  return all;
 }
 
 }  // namespace
@@ -79,6 +90,7 @@ ordered_json json_of(const CaseResult& result) {
           {"stick_total_s", result.stick_total_s},
           {"stick_intervals_s", sticks},
           {"phases", phases},
+          {"reaction_peaks", json_of(result.reaction_peaks)},
           {"energy", json_of(result.energy)},
           {"solver", json_of(result.solver)}};
 }
@@ -112,6 +124,15 @@ void print_summary(std::ostream& out, const CaseResult& result) {
     out << fmt::format("{:<11}  {:8.2f} {:8.2f}  {:12.2f}\n", "stick", stick.t0_s * kMicro,
                        stick.t1_s * kMicro, (stick.t1_s - stick.t0_s) * kMicro);
   }
+  if (!result.reaction_peaks.empty()) {
+    out << "\nreactions     t [us]  largest [N]\n";
+  }
+  for (std::size_t i = 0; i < result.reaction_peaks.size(); ++i) {
+    const auto& peak = result.reaction_peaks[i];
+    out << fmt::format("{:<11} {:8.2f}  {:11.2f}\n",
+                       i == 0 ? std::string("pin O") : fmt::format("joint {}", i),
+                       peak.t_s * kMicro, peak.force_N);
+  }
   const auto& energy = result.energy;
   const auto& report = result.solver;
   out << fmt::format("\nslide       P slides {:.5f} mm along the ground\n", result.slide_m * kMilli)
@@ -125,8 +146,12 @@ void print_summary(std::ostream& out, const CaseResult& result) {
                      report.version, report.steps, report.dt_s * kMicro, report.wall_s * kMilli);
 }
 
-void print_trace_header(std::ostream& out) {
-  out << "t_s,fn_N,ft_N,uy_m,ux_m,xP_m,vP_m_s,x_m,y_m,vt_m_s,vn_m_s,state\n";
+void print_trace_header(std::ostream& out, std::size_t links) {
+  out << "t_s,fn_N,ft_N,uy_m,ux_m,xP_m,vP_m_s,x_m,y_m,vt_m_s,vn_m_s,state";
+  for (std::size_t i = 0; i < links; ++i) {
+    out << ",R" << i << "x_N,R" << i << "y_N";
+  }
+  out << '\n';
 }
 
 void print_trace_row(std::ostream& out, const solver::TraceRow& row) {
@@ -134,7 +159,11 @@ void print_trace_row(std::ostream& out, const solver::TraceRow& row) {
                              row.x_m, row.y_m, row.vt_m_s, row.vn_m_s}) {
     out << exact_number(value) << ',';
   }
-  out << csv_field(row.state) << '\n';
+  out << csv_field(row.state);
+  for (const double reaction_N : row.reactions_N) {
+    out << ',' << exact_number(reaction_N);
+  }
+  out << '\n';
 }
 
 }  // namespace oblique::client

@@ -1,3 +1,4 @@
+#include <cstdint>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -10,6 +11,7 @@
 #include "client/source.h"
 #include "client/verbs.h"
 #include "client/watching.h"
+#include "worker/solver/parameters.h"
 
 namespace oblique::client {
 namespace {
@@ -28,7 +30,7 @@ struct QueryFlags {
   std::string select{
       "point,H,mu,e,status,fn_peak_N,ft_peak_N,duration_s,slide_m,stick_total_s,major_mode"};
   std::string order{"point"};
-  std::optional<std::uint64_t> limit;
+  std::optional<std::int64_t> limit;
   std::string format{"table"};
   SourceFlags source;
 };
@@ -58,6 +60,10 @@ std::string with_columns(const std::string& message, Source& source) {
 
 int query(const QueryFlags& flags) {
   const auto format = format_named(flags.format);
+  if (flags.limit && *flags.limit < 0) {
+    throw solver::InputError("--limit " + std::to_string(*flags.limit) +
+                             " is not allowed: it must be >= 0");
+  }
   const auto source = open_source(flags.source);
   the_study(*source, flags.study);
   protocol::QueryReply rows;

@@ -55,7 +55,6 @@ void add_run(CLI::App& app, Command& command) {
   add_worker_flags(*verb, flags->settings);
   verb->add_option("--rows", flags->settings.rows, "most rows of the table shown at the end")
       ->type_name("N")
-      ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   add_study_flags(*verb, flags->study);
   verb->callback([flags, &command] { command = [flags] { return run(*flags); }; });

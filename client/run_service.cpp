@@ -12,7 +12,7 @@ namespace oblique::client {
 namespace {
 
 // The columns that tell the points of this study apart, then the results most asked for.
-std::string query_of_results(const Study& study, std::uint64_t rows) {
+std::string query_of_results(const Study& study, std::int64_t rows) {
   std::string columns = "point";
   for (const auto& key : solver::model_keys()) {
     const auto varies = [&key](const protocol::Block& block) {
@@ -29,6 +29,19 @@ std::string query_of_results(const Study& study, std::uint64_t rows) {
          ", H, mu, e, status, fn_peak_N, ft_peak_N, duration_s, slide_m, stick_total_s, major_mode "
          "FROM runs WHERE study = " +
          sql_text(study.name) + " ORDER BY point LIMIT " + std::to_string(rows);
+}
+
+void check_settings(const RunSettings& settings) {
+  constexpr int kMostWorkers = 1024;
+  if (settings.service.workers < 1 || settings.service.workers > kMostWorkers) {
+    throw solver::InputError("--workers " + std::to_string(settings.service.workers) +
+                             " is not allowed: it must be from 1 to " +
+                             std::to_string(kMostWorkers));
+  }
+  if (settings.rows < 0) {
+    throw solver::InputError("--rows " + std::to_string(settings.rows) +
+                             " is not allowed: it must be >= 0");
+  }
 }
 
 void tell_how_to_continue(const Study& study, const RunSettings& settings) {
@@ -79,12 +92,12 @@ void add_worker_flags(CLI::App& verb, RunSettings& settings) {
   verb.add_option("--workers", settings.service.workers,
                   "worker processes; the default is the number of cores here")
       ->type_name("N")
-      ->check(CLI::Range(1, 1024))
       ->capture_default_str();
   verb.add_flag("--verbose", settings.service.verbose, "show what server and workers say");
 }
 
 std::optional<RunEnd> run_study(const Study& study, const RunSettings& settings) {
+  check_settings(settings);
   // Before any thread is started; see StopSignal.
   StopSignal stop;
   try {

@@ -15,7 +15,7 @@ namespace oblique::client {
 /// How `run` runs a study, and `paper` its cases.
 struct RunSettings {
   ServiceSettings service{.database = DatabaseSettings().file, .workers = default_workers()};
-  std::uint64_t rows = 30;  ///< most rows of results asked for at the end
+  std::int64_t rows = 30;  ///< most rows of results asked for at the end
 };
 
 /// Adds --workers and --verbose. `settings` must live as long as `verb`.

@@ -43,7 +43,7 @@ int solve(const SolveFlags& flags) {
   extras.reaction_peaks = true;
   if (!flags.trace.empty()) {
     trace.open(flags.trace);
-    print_trace_header(trace);
+    print_trace_header(trace, finger.model().lengths_m.size());
     extras.trace = [&trace](const solver::TraceRow& row) { print_trace_row(trace, row); };
     if (!trace) {
       throw solver::InputError("cannot write the trace to " + flags.trace);

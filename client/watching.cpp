@@ -72,7 +72,7 @@ int tell_end(const protocol::StudyStatus& status,
     tell_failures(status, query);
   }
   if (status.state() == "cancelled") {
-    std::cerr << "The study is cancelled; submitting it again does not resume it.\n";
+    std::cerr << "The study is cancelled; submit it again and it goes on.\n";
   }
   return status.solved() == status.points() ? kDone : kFailed;
 }

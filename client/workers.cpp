@@ -28,7 +28,8 @@ protocol::QueryReply workers_of_server(const ConnectionSettings& settings) {
                              "leased_points", "solved_points", "silent_ms"}) {
     table.add_columns(column);
   }
-  for (const auto& worker : Connection(settings).workers().workers()) {
+  const auto reply = Connection(settings).workers();
+  for (const auto& worker : reply.workers()) {
     auto& row = *table.add_rows();
     add_value(row, static_cast<std::int64_t>(worker.worker_id()));
     add_value(row, worker.name());

@@ -1,0 +1,155 @@
+#include "client/printer.h"
+
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "worker/solver/parameters.h"
+
+namespace oblique::client {
+namespace {
+
+const std::vector<double> kAwkward{0.1,
+                                   1.0 / 3.0,
+                                   -0.0,
+                                   5e-324,
+                                   std::numeric_limits<double>::max(),
+                                   std::numeric_limits<double>::epsilon(),
+                                   5057.6299999999992,
+                                   1e22};
+
+protocol::QueryReply rows_of_texts(const std::vector<std::string>& texts) {
+  protocol::QueryReply rows;
+  rows.add_columns("text");
+  for (const auto& text : texts) {
+    add_value(*rows.add_rows(), text);
+  }
+  return rows;
+}
+
+std::string printed(const protocol::QueryReply& rows, Format format) {
+  std::ostringstream out;
+  print(out, rows, format);
+  return out.str();
+}
+
+// Reads CSV back by RFC 4180: fields of one column.
+std::vector<std::string> csv_fields(const std::string& text) {
+  std::vector<std::string> fields(1);
+  bool quoted = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (quoted && text[i] == '"' && i + 1 < text.size() && text[i + 1] == '"') {
+      fields.back() += text[i++];
+    } else if (text[i] == '"') {
+      quoted = !quoted;
+    } else if (text[i] == '\n' && !quoted) {
+      fields.emplace_back();
+    } else {
+      fields.back() += text[i];
+    }
+  }
+  fields.pop_back();
+  return fields;
+}
+
+TEST(Csv, HoldsEveryNumberToTheLastBit) {
+  protocol::QueryReply rows;
+  rows.add_columns("x");
+  for (const double value : kAwkward) {
+    add_value(*rows.add_rows(), value);
+  }
+  const auto fields = csv_fields(printed(rows, Format::kCsv));
+  ASSERT_EQ(fields.size(), kAwkward.size() + 1);
+  for (std::size_t i = 0; i < kAwkward.size(); ++i) {
+    double back = 0.0;
+    const auto& text = fields[i + 1];
+    std::from_chars(text.data(), text.data() + text.size(), back);
+    EXPECT_EQ(back, kAwkward[i]);
+    EXPECT_EQ(std::signbit(back), std::signbit(kAwkward[i]));
+  }
+}
+
+TEST(Csv, QuotesWhatWouldBreakALine) {
+  const std::vector<std::string> texts{"plain", "a,b", "say \"no\"", "two\nlines", ""};
+  auto fields = csv_fields(printed(rows_of_texts(texts), Format::kCsv));
+  fields.erase(fields.begin());
+  EXPECT_EQ(fields, texts);
+}
+
+TEST(Csv, TellsNullFromAnEmptyText) {
+  auto rows = rows_of_texts({""});
+  rows.add_rows()->add_values();
+  EXPECT_EQ(printed(rows, Format::kCsv), "text\n\"\"\n\n");
+}
+
+TEST(Json, HoldsEveryNumberToTheLastBitAndKeepsTheOrderOfColumns) {
+  protocol::QueryReply rows;
+  rows.add_columns("z");
+  rows.add_columns("a");
+  for (const double value : kAwkward) {
+    auto& row = *rows.add_rows();
+    add_value(row, value);
+    add_value(row, std::int64_t{7});
+  }
+  const auto text = printed(rows, Format::kJson);
+  EXPECT_LT(text.find("\"z\""), text.find("\"a\""));
+  const auto back = nlohmann::json::parse(text);
+  ASSERT_EQ(back.size(), kAwkward.size());
+  for (std::size_t i = 0; i < kAwkward.size(); ++i) {
+    EXPECT_EQ(back[i]["z"].get<double>(), kAwkward[i]);
+    EXPECT_TRUE(back[i]["a"].is_number_integer());
+  }
+}
+
+TEST(Json, IsValidForTextsOfAllSortsForNullAndForNoRows) {
+  auto rows = rows_of_texts({"say \"no\"", "two\nlines", "broken \xff utf-8"});
+  rows.add_rows()->add_values();
+  add_value(*rows.add_rows(), std::nan(""));
+  const auto back = nlohmann::json::parse(printed(rows, Format::kJson));
+  EXPECT_EQ(back[0]["text"], "say \"no\"");
+  EXPECT_EQ(back[1]["text"], "two\nlines");
+  EXPECT_TRUE(back[3]["text"].is_null());
+  EXPECT_TRUE(back[4]["text"].is_null());
+  EXPECT_EQ(nlohmann::json::parse(printed(rows_of_texts({}), Format::kJson)),
+            nlohmann::json::array());
+}
+
+TEST(Table, AlignsNumbersToTheRightAndTextsToTheLeft) {
+  protocol::QueryReply rows;
+  rows.add_columns("mode");
+  rows.add_columns("fn_peak_N");
+  for (const auto& [mode, force] : {std::pair{"SC SR", 5057.62999}, std::pair{"sC", 12.5}}) {
+    auto& row = *rows.add_rows();
+    add_value(row, std::string(mode));
+    add_value(row, force);
+  }
+  EXPECT_EQ(printed(rows, Format::kTable),
+            "mode   fn_peak_N\n"
+            "-----  ---------\n"
+            "SC SR    5057.63\n"
+            "sC          12.5\n");
+}
+
+TEST(Table, ShowsNullAsADashAndKeepsToOneLineARow) {
+  auto rows = rows_of_texts({"two\nlines"});
+  rows.add_rows()->add_values();
+  EXPECT_EQ(printed(rows, Format::kTable), "text\n---------\ntwo lines\n-\n");
+}
+
+TEST(Table, CountsCharactersNotBytes) {
+  EXPECT_EQ(printed(rows_of_texts({"µ", "ab"}), Format::kTable), "text\n----\nµ\nab\n");
+}
+
+TEST(Formats, OfOtherNamesAreRefused) {
+  EXPECT_EQ(format_named("csv"), Format::kCsv);
+  EXPECT_THROW(format_named("xml"), solver::InputError);
+}
+
+}  // namespace
+}  // namespace oblique::client
