@@ -19,7 +19,7 @@ constexpr std::chrono::milliseconds kRetryPause{500};
 }  // namespace
 
 Writer::Writer(Storage& storage, Report report)
-    : storage_(storage), report_(std::move(report)), thread_([this] { run(); }) {}
+    : commits_(storage), report_(std::move(report)), thread_([this] { run(); }) {}
 
 Writer::~Writer() {
   finish();
@@ -49,7 +49,7 @@ void Writer::run() {
     bool last_round = false;
     {
       std::unique_lock lock(mutex_);
-      if (faulty_) {
+      if (commits_.is_faulty()) {
         wake_.wait_for(lock, kRetryPause, [this] { return finishing_; });
       } else if (jobs.empty()) {
         wake_.wait(lock, [this] { return finishing_ || !queue_.empty(); });
@@ -58,26 +58,27 @@ void Writer::run() {
       queue_.clear();
       last_round = finishing_;
     }
-    const bool was_faulty = faulty_;
-    write(jobs);
-    if (last_round && (jobs.empty() || (faulty_ && was_faulty))) {
+    const bool was_faulty = commits_.is_faulty();
+    auto reports = jobs.empty() ? std::vector<WriteReport>() : commits_.write(jobs);
+    if (!reports.empty()) {
+      report_(std::move(reports));
+    }
+    if (last_round && (jobs.empty() || (was_faulty && commits_.is_faulty()))) {
       left_over_ = jobs.size();
       return;
     }
   }
 }
 
-void Writer::write(std::deque<WriteJob>& jobs) {
+std::vector<WriteReport> GroupCommit::write(std::deque<WriteJob>& jobs) {
   std::vector<WriteReport> reports;
   if (!jobs.empty() && !write_group(jobs, reports)) {
     write_singly(jobs, reports);
   }
-  if (!reports.empty()) {
-    report_(std::move(reports));
-  }
+  return reports;
 }
 
-bool Writer::write_group(std::deque<WriteJob>& jobs, std::vector<WriteReport>& reports) {
+bool GroupCommit::write_group(std::deque<WriteJob>& jobs, std::vector<WriteReport>& reports) {
   const std::size_t size = std::min(jobs.size(), kLargestGroup);
   std::vector<Change> changes;
   changes.reserve(size);
@@ -102,7 +103,7 @@ bool Writer::write_group(std::deque<WriteJob>& jobs, std::vector<WriteReport>& r
   return true;
 }
 
-void Writer::write_singly(std::deque<WriteJob>& jobs, std::vector<WriteReport>& reports) {
+void GroupCommit::write_singly(std::deque<WriteJob>& jobs, std::vector<WriteReport>& reports) {
   std::deque<WriteJob> kept;
   std::string fault;
   for (WriteJob& job : jobs) {

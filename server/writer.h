@@ -35,13 +35,34 @@ struct WriteReport {
   std::string error;
 };
 
+/// Writes jobs in groups, one transaction each. No thread and no clock of its own.
+class GroupCommit {
+ public:
+  /// `storage` must outlive this.
+  explicit GroupCommit(Storage& storage) : storage_(storage) {}
+
+  /// Writes the first of `jobs`, in order, and takes off what is durable or given up. When a group
+  /// fails, each of all jobs is tried alone, so that a bad one does not take the others with it.
+  std::vector<WriteReport> write(std::deque<WriteJob>& jobs);
+
+  /// The last write left jobs that the database did not take.
+  bool is_faulty() const { return faulty_; }
+
+ private:
+  bool write_group(std::deque<WriteJob>& jobs, std::vector<WriteReport>& reports);
+  void write_singly(std::deque<WriteJob>& jobs, std::vector<WriteReport>& reports);
+
+  Storage& storage_;
+  bool faulty_ = false;
+};
+
 /// The one thread that writes the database. What waits is committed together, in order.
 class Writer {
  public:
   using Report = std::function<void(std::vector<WriteReport>)>;
 
-  /// `report` is called on the writer's thread, after each commit. Both references must outlive
-  /// the writer.
+  /// `report` is called on the writer's thread, after each commit. `storage`
+  /// must outlive the writer.
   Writer(Storage& storage, Report report);
   /// Stops without waiting for jobs that keep failing.
   ~Writer();
@@ -55,18 +76,14 @@ class Writer {
 
  private:
   void run();
-  void write(std::deque<WriteJob>& jobs);
-  bool write_group(std::deque<WriteJob>& jobs, std::vector<WriteReport>& reports);
-  void write_singly(std::deque<WriteJob>& jobs, std::vector<WriteReport>& reports);
 
-  Storage& storage_;
+  GroupCommit commits_;  // of the thread
   Report report_;
   std::mutex mutex_;
   std::condition_variable wake_;
   std::deque<WriteJob> queue_;  // guarded by mutex_
   bool finishing_ = false;      // guarded by mutex_
   std::size_t left_over_ = 0;   // written by the thread, read after it ended
-  bool faulty_ = false;         // of the thread
   std::thread thread_;          // last: it uses all the others
 };
 

@@ -1,0 +1,164 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <set>
+#include <string>
+#include <utility>
+
+#include "tests/simulation/world.h"
+
+namespace oblique::simulation {
+
+/// Connections as sockets with TCP below give them: in order and whole until they break, when
+/// everything on the way is lost, and the peer comes back under another identity. Half-open
+/// connections swallow what is sent before they break. Beyond TCP, results may be doubled or
+/// overtaken on request of the sender.
+class Network {
+ public:
+  using ToServer = std::function<void(const std::string& identity, const std::string& frame)>;
+  using ToPeer = std::function<void(const std::string& frame)>;
+  using LinkId = std::uint64_t;
+
+  Network(World& world, ToServer to_server) : world_(world), to_server_(std::move(to_server)) {}
+
+  /// A new socket of a peer; what the server sends goes to `to_peer`.
+  LinkId open(ToPeer to_peer) {
+    const LinkId id = ++last_link_;
+    links_.emplace(id, Link{new_identity(id), std::move(to_peer), 0, 0, false, false, 0});
+    if (world_.faults && world_.chance(0.2)) {
+      const std::int64_t life_ms = world_.between(500, 20'000);
+      world_.after(life_ms, [this, id] { cut(id); });
+    }
+    return id;
+  }
+
+  /// The socket is closed: what comes for it is lost. What it sent still arrives when `linger`.
+  void close(LinkId id, bool linger) {
+    links_.erase(id);
+    if (!linger) {
+      silenced_.insert(id);
+    }
+  }
+
+  /// `loosely`: may be doubled or overtaken.
+  void send(LinkId id, const std::string& frame, bool loosely) {
+    const auto found = links_.find(id);
+    if (found == links_.end() || found->second.cut_up) {
+      return;
+    }
+    Link& link = found->second;
+    const std::string identity = link.identity;
+    const auto deliver = [this, identity, frame, breaks = link.breaks, id] {
+      const auto there = links_.find(id);
+      const bool closed = there == links_.end();
+      if (closed ? !silenced_.contains(id) : there->second.breaks == breaks) {
+        to_server_(identity, frame);
+      }
+    };
+    if (loosely && world_.faults && world_.chance(0.05)) {
+      world_.after(delay_ms() + world_.between(0, 300), deliver);
+      if (world_.chance(0.5)) {
+        return;  // overtaken only
+      }
+    }
+    link.last_up_ms = std::max(link.last_up_ms, world_.now_ms() + delay_ms());
+    world_.after(link.last_up_ms - world_.now_ms(), deliver);
+  }
+
+  /// False when no connection has that identity.
+  bool send_to(const std::string& identity, const std::string& frame) {
+    const LinkId id = link_of(identity);
+    const auto found = links_.find(id);
+    if (found == links_.end()) {
+      return false;
+    }
+    Link& link = found->second;
+    if (link.cut_down) {
+      return true;  // nobody knows yet
+    }
+    link.last_down_ms = std::max(link.last_down_ms, world_.now_ms() + delay_ms());
+    world_.after(link.last_down_ms - world_.now_ms(), [this, id, frame, breaks = link.breaks] {
+      const auto there = links_.find(id);
+      if (there != links_.end() && there->second.breaks == breaks) {
+        there->second.to_peer(frame);
+      }
+    });
+    return true;
+  }
+
+  /// Every connection breaks, as when the server dies; the sockets connect again.
+  void break_all() {
+    for (auto& [id, link] : links_) {
+      break_link(id, link);
+    }
+  }
+
+  void heal() {
+    for (auto& [id, link] : links_) {
+      if (link.cut_up || link.cut_down) {
+        break_link(id, link);
+      }
+    }
+  }
+
+  LinkId link_of(const std::string& identity) const {
+    const auto found = identities_.find(identity);
+    return found == identities_.end() ? 0 : found->second;
+  }
+
+ private:
+  struct Link {
+    std::string identity;
+    ToPeer to_peer;
+    std::int64_t last_up_ms;
+    std::int64_t last_down_ms;
+    bool cut_up;
+    bool cut_down;
+    std::uint64_t breaks;  // how often it broke: what was sent before is lost
+  };
+
+  std::string new_identity(LinkId id) {
+    std::string identity = "peer " + std::to_string(++last_identity_);
+    identities_[identity] = id;
+    return identity;
+  }
+
+  std::int64_t delay_ms() {
+    return world_.faults && world_.chance(0.01) ? world_.between(50, 3000) : world_.between(0, 3);
+  }
+
+  void cut(LinkId id) {
+    const auto found = links_.find(id);
+    if (found == links_.end()) {
+      return;
+    }
+    found->second.cut_up = world_.chance(0.7);
+    found->second.cut_down = !found->second.cut_up || world_.chance(0.5);
+    world_.after(world_.between(0, 8000), [this, id] {
+      const auto there = links_.find(id);
+      if (there != links_.end()) {
+        break_link(id, there->second);
+      }
+    });
+  }
+
+  void break_link(LinkId id, Link& link) {
+    ++link.breaks;
+    identities_.erase(link.identity);
+    link.identity = new_identity(id);
+    link.cut_up = false;
+    link.cut_down = false;
+  }
+
+  World& world_;
+  ToServer to_server_;
+  std::map<LinkId, Link> links_;
+  std::map<std::string, LinkId> identities_;
+  std::set<LinkId> silenced_;  // closed, and nothing of them arrives
+  LinkId last_link_ = 0;
+  std::uint64_t last_identity_ = 0;
+};
+
+}  // namespace oblique::simulation

@@ -1,0 +1,87 @@
+#include "tests/simulation/simulated_client.h"
+
+#include <utility>
+
+#include "proto/frames.h"
+#include "tests/proto/recipe_builder.h"
+
+namespace oblique::simulation {
+
+SimulatedClient::SimulatedClient(World& world, Network& network, std::string name,
+                                 std::uint64_t points)
+    : world_(world), network_(network), name_(std::move(name)), points_(points) {}
+
+void SimulatedClient::start() {
+  connect();
+  world_.after(world_.between(0, 5000), [this] {
+    ++request_;
+    ask();
+  });
+  world_.after(world_.between(3000, 20'000), [this] { change_mind(); });
+}
+
+void SimulatedClient::connect() {
+  // A late request of a closed socket would undo what was asked since.
+  network_.close(link_, false);
+  link_ = network_.open([this](const std::string& frame) { answered(frame); });
+}
+
+void SimulatedClient::ask() {
+  if (settled_request_) {
+    return;
+  }
+  protocol::ClientRequest request;
+  request.set_protocol_version(protocol::kProtocolVersion);
+  request.set_request_id(request_);
+  if (cancelling_) {
+    request.mutable_cancel()->set_study(name_);
+  } else {
+    request.mutable_submit()->set_name(name_);
+    *request.mutable_submit()->mutable_recipe() = protocol::recipe_of(
+        {{protocol::listed("H", {1.0}), protocol::range("mu", 0.0, 1.0, points_),
+          protocol::listed("e", {1.0})}});
+  }
+  network_.send(link_, protocol::encode(request), false);
+  world_.after(2000, [this, number = request_] {
+    if (number == request_ && !settled_request_) {
+      connect();
+      ask();
+    }
+  });
+}
+
+void SimulatedClient::answered(const std::string& frame) {
+  protocol::ClientReply reply;
+  if (!protocol::decode(frame, reply) || reply.request_id() != request_ || settled_request_) {
+    return;
+  }
+  if (reply.has_error()) {
+    if (acknowledged_ && reply.error().message().find("was not stored") == std::string::npos) {
+      throw Violation("an acknowledged study is refused: " + reply.error().message());
+    }
+    return;  // asked again later
+  }
+  settled_request_ = true;
+  if (reply.has_submit()) {
+    if (acknowledged_ && reply.submit().created()) {
+      throw Violation("an acknowledged study was forgotten");
+    }
+    acknowledged_ = true;
+  }
+}
+
+void SimulatedClient::change_mind() {
+  // Once faults end the study is submitted for the last time.
+  const bool last = !world_.faults;
+  if (settled_request_ && (!last || cancelling_)) {
+    cancelling_ = !last && !cancelling_ && world_.chance(0.3);
+    settled_request_ = false;
+    ++request_;
+    ask();
+  }
+  if (!last || !settled_request_ || cancelling_) {
+    world_.after(world_.between(500, 4000), [this] { change_mind(); });
+  }
+}
+
+}  // namespace oblique::simulation

@@ -1,0 +1,172 @@
+#include "tests/simulation/simulated_worker.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "proto/frames.h"
+
+namespace oblique::simulation {
+
+protocol::PointResult answer_to(std::uint64_t study_size, std::uint64_t point) {
+  protocol::PointResult result;
+  result.set_point(point);
+  result.set_duration_s(static_cast<double>(study_size));
+  result.set_fn_peak_n(static_cast<double>(point));
+  return result;
+}
+
+SimulatedWorker::SimulatedWorker(World& world, Network& network, Killers killers)
+    : world_(world),
+      network_(network),
+      killers_(std::move(killers)),
+      ms_per_point_(world.chance(0.2) ? world.between(50, 400) : world.between(1, 20)) {}
+
+void SimulatedWorker::start() {
+  protocol::WorkerHello hello;
+  hello.set_protocol_version(protocol::kProtocolVersion);
+  hello.set_solver_version("1");
+  hello.set_threads(1);
+  ++life_;
+  planned_time_ms_ = -1;
+  conversation_.emplace(hello, worker::ConversationSettings{});
+  apply(conversation_->start(world_.now_ms()));
+}
+
+void SimulatedWorker::restart(std::int64_t away_ms) {
+  ++life_;
+  ++sockets_;
+  network_.close(link_, world_.chance(0.5));
+  link_ = 0;
+  tasks_.clear();
+  solving_ = false;
+  frozen_until_ms_ = 0;
+  conversation_.reset();
+  sent_.clear();
+  world_.after(away_ms, [this, life = life_] {
+    if (life == life_) {
+      start();
+    }
+  });
+}
+
+void SimulatedWorker::stop() {
+  if (conversation_) {
+    apply(conversation_->stop(world_.now_ms()));
+  }
+}
+
+const protocol::Results* SimulatedWorker::sent(Network::LinkId link, std::uint64_t sequence) const {
+  const auto found = sent_.find({link, sequence});
+  return found == sent_.end() ? nullptr : &found->second;
+}
+
+void SimulatedWorker::when_awake(std::function<void()> what) {
+  if (world_.now_ms() >= frozen_until_ms_) {
+    what();
+    return;
+  }
+  world_.after(frozen_until_ms_ - world_.now_ms(), [this, life = life_, what = std::move(what)] {
+    if (life == life_) {
+      when_awake(what);
+    }
+  });
+}
+
+void SimulatedWorker::apply(worker::Effects effects) {
+  for (worker::Effect& effect : effects) {
+    if (std::holds_alternative<worker::Connect>(effect)) {
+      network_.close(link_, true);
+      const std::uint64_t socket = ++sockets_;
+      link_ = network_.open([this, socket](const std::string& frame) {
+        when_awake([this, socket, frame] {
+          protocol::ServerToWorker message;
+          if (socket == sockets_ && protocol::decode(frame, message)) {
+            apply(conversation_->on_message(message, world_.now_ms()));
+          }
+        });
+      });
+    } else if (auto* send = std::get_if<worker::Send>(&effect)) {
+      const bool is_results = send->message.has_results();
+      if (is_results) {
+        sent_[{link_, send->message.results().sequence()}] = send->message.results();
+      }
+      network_.send(link_, protocol::encode(send->message),
+                    is_results || send->message.has_heartbeat());
+    } else if (auto* solve = std::get_if<worker::Solve>(&effect)) {
+      tasks_.push_back({std::move(solve->task), 0});
+    } else if (const auto* drop = std::get_if<worker::DropStudy>(&effect)) {
+      std::erase_if(tasks_, [&](const Work& w) { return w.task.study_id == drop->study_id; });
+    } else if (std::holds_alternative<worker::DropAll>(effect)) {
+      tasks_.clear();
+    } else if (std::holds_alternative<worker::Finish>(effect)) {
+      restart(world_.between(10, 2000));
+      return;
+    }
+  }
+  plan_time();
+  plan_solving();
+}
+
+void SimulatedWorker::plan_time() {
+  const std::int64_t due_ms = conversation_->next_deadline_ms();
+  if (planned_time_ms_ >= world_.now_ms() && planned_time_ms_ <= due_ms) {
+    return;
+  }
+  planned_time_ms_ = due_ms;
+  world_.after(std::max<std::int64_t>(due_ms - world_.now_ms(), 0), [this, life = life_, due_ms] {
+    if (life != life_ || due_ms != planned_time_ms_) {
+      return;
+    }
+    when_awake([this, life] {
+      if (life == life_) {
+        planned_time_ms_ = -1;
+        apply(conversation_->on_time(world_.now_ms()));
+      }
+    });
+  });
+}
+
+void SimulatedWorker::plan_solving() {
+  if (solving_ || tasks_.empty() || !conversation_->may_solve()) {
+    return;
+  }
+  solving_ = true;
+  world_.after(ms_per_point_, [this, life = life_] {
+    if (life == life_) {
+      when_awake([this, life] {
+        if (life == life_) {
+          solving_ = false;
+          solve_some();
+        }
+      });
+    }
+  });
+}
+
+void SimulatedWorker::solve_some() {
+  if (tasks_.empty()) {
+    return;
+  }
+  Work& work = tasks_.front();
+  const std::uint64_t size = work.task.points->size();
+  const std::uint64_t point = work.task.first_point + work.solved;
+  const auto killers = killers_.find(size);
+  if (killers != killers_.end() && killers->second.contains(point)) {
+    restart(world_.between(100, 1000));
+    return;
+  }
+  ++work.solved;
+  worker::Progress progress{work.task.number,
+                            work.task.study_id,
+                            {answer_to(size, point)},
+                            1e-3 * static_cast<double>(ms_per_point_),
+                            work.solved == work.task.count};
+  if (progress.task_done) {
+    tasks_.pop_front();
+  }
+  std::vector<worker::Progress> all;
+  all.push_back(std::move(progress));
+  apply(conversation_->on_progress(std::move(all), world_.now_ms()));
+}
+
+}  // namespace oblique::simulation

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+
+#include "tests/simulation/network.h"
+#include "tests/simulation/world.h"
+#include "worker/conversation.h"
+
+namespace oblique::simulation {
+
+/// The made-up answer to a point; whoever checks it knows that it is of this study and point.
+protocol::PointResult answer_to(std::uint64_t study_size, std::uint64_t point);
+
+/// The real conversation of a worker around a pretended solver. It can be killed, stopped for a
+/// while, or told to end; it always starts again.
+class SimulatedWorker {
+ public:
+  /// Points of studies of that size whose solving kills the process.
+  using Killers = std::map<std::uint64_t, std::set<std::uint64_t>>;
+
+  SimulatedWorker(World& world, Network& network, Killers killers);
+
+  /// The process, if there is one, dies; another one starts after a while. The first one starts so
+  /// too.
+  void restart(std::int64_t away_ms);
+  /// The process stands still for a while, as after SIGSTOP.
+  void freeze(std::int64_t duration_ms) { frozen_until_ms_ = world_.now_ms() + duration_ms; }
+  void stop();
+
+  /// The results of that message of the socket, or nullptr.
+  const protocol::Results* sent(Network::LinkId link, std::uint64_t sequence) const;
+  bool holds_nothing() const { return tasks_.empty(); }
+
+ private:
+  struct Work {
+    worker::Task task;
+    std::uint64_t solved;
+  };
+  void start();
+  /// Runs `what` of this process life now, or when it is no longer frozen.
+  void when_awake(std::function<void()> what);
+  void apply(worker::Effects effects);
+  void plan_time();
+  void plan_solving();
+  void solve_some();
+
+  World& world_;
+  Network& network_;
+  Killers killers_;
+  std::int64_t ms_per_point_;
+  std::optional<worker::Conversation> conversation_;
+  Network::LinkId link_ = 0;
+  std::deque<Work> tasks_;
+  bool solving_ = false;
+  std::int64_t frozen_until_ms_ = 0;
+  std::int64_t planned_time_ms_ = -1;
+  std::uint64_t life_ = 0;     // counts processes: what an earlier one planned does not happen
+  std::uint64_t sockets_ = 0;  // counts sockets: what waits in an earlier one is gone
+  std::map<std::pair<Network::LinkId, std::uint64_t>, protocol::Results> sent_;
+};
+
+}  // namespace oblique::simulation
