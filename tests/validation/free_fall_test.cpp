@@ -1,0 +1,108 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <string>
+
+#include "tests/validation/validation_table.h"
+#include "worker/solver/fall.h"
+#include "worker/solver/generalized_alpha.h"
+#include "worker/solver/motion.h"
+
+namespace oblique::validation {
+namespace {
+
+using solver::Chain;
+using solver::ChainState;
+using solver::Fall;
+using solver::GeneralizedAlphaMotion;
+using solver::ModelParameters;
+using solver::Motion;
+using solver::TipState;
+
+/// State of the tip when it has dropped H.
+struct KnownState {
+  double H_m;
+  double t_s;
+  double x_m;
+  double vx_m_s;
+  double vy_m_s;
+};
+
+/// Largest errors over some known states.
+struct FallErrors {
+  double t_s = 0.0;
+  double x_m = 0.0;
+  double v_m_s = 0.0;
+};
+
+/// An independent explicit solution of order 4 of the preset `paper`, converged to nine digits and
+/// printed to the digits here.
+constexpr std::array<KnownState, 3> kKnown{{{0.96, 0.42263713, 0.6273702, -5.23465, -5.34110},
+                                            {1.00, 0.43018976, 0.5859693, -5.73783, -5.23380},
+                                            {1.04, 0.43798758, 0.5389964, -6.31882, -4.99916}}};
+const std::string kKnownFrom = "independent explicit solution, converged";
+
+/// Three rigid links, whatever A and I: minimal coordinates, Runge-Kutta.
+constexpr std::array<KnownState, 1> kRigid{{{1.00, 0.430188812, 0.0, -5.738072, -5.234437}}};
+
+template <std::size_t n>
+FallErrors errors(const Motion& motion, const Fall& fall, const std::array<KnownState, n>& known) {
+  FallErrors worst;
+  for (const KnownState& right : known) {
+    const ChainState state = fall.state_at(right.H_m);
+    const TipState tip = motion.tip(state);
+    worst.t_s = std::max(worst.t_s, std::abs(state.t_s - right.t_s));
+    worst.x_m = std::max(worst.x_m, std::abs(tip.x_m - right.x_m));
+    worst.v_m_s =
+        std::max({worst.v_m_s, std::abs(tip.vx_m_s - right.vx_m_s), std::abs(tip.vy_m_s - right.vy_m_s)});
+  }
+  return worst;
+}
+
+template <std::size_t n>
+FallErrors explicit_errors(const ModelParameters& model, double dt_s,
+                           const std::array<KnownState, n>& known) {
+  const Chain chain(model);
+  return errors(solver::ExplicitMotion(chain), Fall(chain, dt_s), known);
+}
+
+template <std::size_t n>
+FallErrors generalized_alpha_errors(const ModelParameters& model, double dt_s,
+                                    const std::array<KnownState, n>& known) {
+  const auto motion = std::make_shared<GeneralizedAlphaMotion>(model);
+  return errors(*motion, Fall(motion, dt_s, solver::longest_fall_s(Chain(model))), known);
+}
+
+TEST(FreeFall, ExplicitWayReachesTheKnownStates) {
+  const FallErrors worst = explicit_errors(ModelParameters{}, 2.5e-6, kKnown);
+  expect_at_most({"fall, explicit, 2.5 us: time at H = 0.96, 1, 1.04 [s]", kKnownFrom, worst.t_s,
+                  1e-8, "digits of the reference"});
+  expect_at_most({"fall, explicit, 2.5 us: x of the tip [m]", kKnownFrom, worst.x_m, 1e-7,
+                  "digits of the reference"});
+  expect_at_most({"fall, explicit, 2.5 us: velocity of the tip [m/s]", kKnownFrom, worst.v_m_s,
+                  5e-5, "digits of the reference"});
+}
+
+TEST(FreeFall, GeneralizedAlphaReachesTheKnownStates) {
+  const FallErrors worst = generalized_alpha_errors(ModelParameters{}, 5e-6, kKnown);
+  const std::string reason = "vibration from the release, too fast for the step: differs by";
+  expect_at_most({"fall, generalized-alpha, 5 us: time at H = 0.96, 1, 1.04 [s]", kKnownFrom,
+                  worst.t_s, 1e-8 + 3e-9, "the reference's digits, and the vibration's 3e-9"});
+  expect_at_most({"fall, generalized-alpha, 5 us: x of the tip [m]", kKnownFrom, worst.x_m, 1e-7,
+                  "digits of the reference"});
+  expect_at_most({"fall, generalized-alpha, 5 us: velocity of the tip [m/s]", kKnownFrom,
+                  worst.v_m_s, 1e-3,
+                  "amplitude of the vibration from the release, which 5 us do not resolve"});
+}
+
+TEST(FreeFall, GeneralizedAlphaFindsTheImpactTimeWithStepsOfATenthOfAMillisecond) {
+  const FallErrors worst = generalized_alpha_errors(ModelParameters{}, 1e-4, kKnown);
+  expect_at_most({"fall, generalized-alpha, 100 us: time at H = 0.96, 1, 1.04 [s]", kKnownFrom,
+                  worst.t_s, 3e-7, "required; h^2/12 w^2 t of the swing's w of about 10 rad/s"});
+}
+
+}  // namespace
+}  // namespace oblique::validation
