@@ -44,26 +44,35 @@ double link_mass_kg(const ModelParameters& model) {
 StepChoice::StepChoice(const Chain& chain, const ModelParameters& model)
     : chain_(chain),
       k_N_m_(model.k_N_m),
-      stiffest_ratio_(std::max(1.0, 1.0 / model.eta2)),
+      tangential_ratio_(1.0 / model.eta2),
       integrator_(model.integrator),
       asked_contact_s_(model.dt_s),
       implicit_contact_s_(kImplicitContactFraction * std::sqrt(link_mass_kg(model) / model.k_N_m)),
       fall_s_(chosen_fall_s(chain, model)) {}
 
-double StepChoice::contact_limit_s(double e_star) const {
-  const double stiffest_N_m = k_N_m_ * std::max(stiffest_ratio_, 1.0 / (e_star * e_star));
-  return Pefrl::stability_limit() / chain_.highest_frequency_rad_s(stiffest_N_m);
+ContactSteps StepChoice::contact_limits(double e_star) const {
+  const auto limit_s = [this](double stiffness_ratio) {
+    const double stiffest_N_m = k_N_m_ * std::max(stiffness_ratio, tangential_ratio_);
+    return Pefrl::stability_limit() / chain_.highest_frequency_rad_s(stiffest_N_m);
+  };
+  return {limit_s(1.0), limit_s(1.0 / (e_star * e_star))};
 }
 
 ContactSteps StepChoice::contact(double e_star) const {
-  double step_s = asked_contact_s_ != 0.0 ? asked_contact_s_ : implicit_contact_s_;
-  if (integrator_ == Integrator::kExplicit) {
-    step_s = checked("dt", asked_contact_s_, contact_limit_s(e_star), kContactFraction);
-  }
   if (asked_contact_s_ != 0.0) {
-    return {step_s, step_s};
+    if (integrator_ == Integrator::kExplicit) {
+      checked("dt", asked_contact_s_, contact_limits(e_star).restitution_s, kContactFraction);
+    }
+    return {asked_contact_s_, asked_contact_s_};
   }
-  return {step_s, step_s * std::min(1.0, e_star / kFastRestitution)};
+  const double faster = std::min(1.0, e_star / kFastRestitution);
+  if (integrator_ != Integrator::kExplicit) {
+    return {implicit_contact_s_, implicit_contact_s_ * faster};
+  }
+  // Far below kFastRestitution the limit itself falls as e* does.
+  const ContactSteps limits = contact_limits(e_star);
+  return {kContactFraction * limits.compression_s,
+          kContactFraction * std::min(limits.restitution_s, limits.compression_s * faster)};
 }
 
 }  // namespace oblique::solver

@@ -32,13 +32,14 @@ class StepChoice {
   /// Steps in a contact with restitution e_star. Throws InputError when model.dt_s is above its
   /// limit.
   ContactSteps contact(double e_star) const;
-  /// Longest stable step of the explicit integrator in such a contact.
-  double contact_limit_s(double e_star) const;
+  /// Longest stable steps of the explicit integrator in such a contact. In restitution the tip is
+  /// held by k/e*^2.
+  ContactSteps contact_limits(double e_star) const;
 
  private:
   const Chain& chain_;
   double k_N_m_;
-  double stiffest_ratio_;  ///< of the contact springs in compression to k
+  double tangential_ratio_;  ///< of the tangential stiffness to k
   Integrator integrator_;
   double asked_contact_s_;
   double implicit_contact_s_;
