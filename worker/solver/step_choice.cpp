@@ -59,6 +59,12 @@ ContactSteps StepChoice::contact_limits(double e_star) const {
 }
 
 ContactSteps StepChoice::contact(double e_star) const {
+  if (e_star < kSmallestRestitution) {
+    std::ostringstream message;
+    message << "e = " << e_star << " cannot be solved in double precision: the restitution spring "
+            << "k/e^2 is too stiff; e from " << kSmallestRestitution << " on can";
+    throw SolveError(message.str());
+  }
   if (asked_contact_s_ != 0.0) {
     if (integrator_ == Integrator::kExplicit) {
       checked("dt", asked_contact_s_, contact_limits(e_star).restitution_s, kContactFraction);

@@ -24,13 +24,16 @@ class StepChoice {
   /// it is faster than the chain's own response to contact, and steps in restitution shrink with
   /// it.
   static constexpr double kFastRestitution = 0.4;
+  /// Below, k/e*^2 turns the rounding of the tip's position into forces of newtons, and events come
+  /// faster than they can be told apart.
+  static constexpr double kSmallestRestitution = 1e-3;
 
   /// Throws InputError when model.dt_fall_s is above its limit.
   StepChoice(const Chain& chain, const ModelParameters& model);
 
   double fall_s() const { return fall_s_; }
   /// Steps in a contact with restitution e_star. Throws InputError when model.dt_s is above its
-  /// limit.
+  /// limit, SolveError when e_star is below kSmallestRestitution.
   ContactSteps contact(double e_star) const;
   /// Longest stable steps of the explicit integrator in such a contact. In restitution the tip is
   /// held by k/e*^2.
