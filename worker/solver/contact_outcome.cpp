@@ -10,9 +10,19 @@ namespace {
 
 /// A balance that misses this much of the exchanged work means the step resolves nothing.
 constexpr double kWorstClosure = 1e-2;
+/// Work below this fraction of the energies at touch drowns in their rounding.
+constexpr double kLeastExchanged = 1e-10;
 
 void balance(const Energies& in, const Energies& out, const ContactRecord& record,
              ContactEnergy& energy) {
+  const double at_touch_J = in.kinetic_J + std::abs(in.strain_J) + std::abs(in.gravity_J);
+  if (!(energy.exchanged_J > kLeastExchanged * at_touch_J)) {
+    std::ostringstream message;
+    message << "the tip touches the ground with hardly any speed, as at its largest drop: the "
+            << energy.exchanged_J << " J that the contact exchanges drown in the rounding of the "
+            << at_touch_J << " J of the finger";
+    throw SolveError(message.str());
+  }
   energy.kinetic_in_J = in.kinetic_J;
   energy.kinetic_change_J = out.kinetic_J - in.kinetic_J;
   energy.strain_change_J = out.strain_J - in.strain_J;
