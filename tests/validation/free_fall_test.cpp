@@ -56,8 +56,8 @@ FallErrors errors(const Motion& motion, const Fall& fall, const std::array<Known
     const TipState tip = motion.tip(state);
     worst.t_s = std::max(worst.t_s, std::abs(state.t_s - right.t_s));
     worst.x_m = std::max(worst.x_m, std::abs(tip.x_m - right.x_m));
-    worst.v_m_s =
-        std::max({worst.v_m_s, std::abs(tip.vx_m_s - right.vx_m_s), std::abs(tip.vy_m_s - right.vy_m_s)});
+    worst.v_m_s = std::max(
+        {worst.v_m_s, std::abs(tip.vx_m_s - right.vx_m_s), std::abs(tip.vy_m_s - right.vy_m_s)});
   }
   return worst;
 }

@@ -15,9 +15,9 @@ std::vector<std::string> header() {
   return {"check", "reference", "measured", "bound", "where the bound comes from"};
 }
 
-std::string two_digits(double value) {
+std::string three_digits(double value) {
   std::ostringstream text;
-  text << std::setprecision(2) << value;
+  text << std::setprecision(3) << value;
   return text.str();
 }
 
@@ -27,8 +27,8 @@ void record(const Check& check, const char* relation) {
   std::ostringstream key;
   key << kKeyPrefix << std::setw(3) << std::setfill('0') << test->result()->test_property_count();
   std::ostringstream line;
-  line << check.what << kSeparator << check.reference << kSeparator << two_digits(check.measured)
-       << kSeparator << relation << ' ' << two_digits(check.bound) << kSeparator << check.reason;
+  line << check.what << kSeparator << check.reference << kSeparator << three_digits(check.measured)
+       << kSeparator << relation << ' ' << three_digits(check.bound) << kSeparator << check.reason;
   testing::Test::RecordProperty(key.str(), line.str());
 }
 

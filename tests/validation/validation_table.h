@@ -25,8 +25,8 @@ void expect_at_least(const Check& check);
 
 enum class TableFormat { kText, kMarkdown };
 
-/// Gathers the lines of all tests that run and prints them as one table when the program ends. Lines
-/// travel as properties of their test, so reports in XML hold them too.
+/// Gathers the lines of all tests that run and prints them as one table when the program ends.
+/// Lines travel as properties of their test, so reports in XML hold them too.
 class ValidationTable : public testing::EmptyTestEventListener {
  public:
   /// `out` must outlive this.

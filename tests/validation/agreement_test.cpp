@@ -1,0 +1,190 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <map>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "tests/validation/both_ways.h"
+#include "tests/validation/outputs.h"
+#include "tests/validation/validation_table.h"
+#include "worker/solver/solve.h"
+
+namespace oblique::validation {
+namespace {
+
+using solver::CaseResult;
+
+/// Explicit steps of the reference: PEFRL's own error is below 1e-9 there.
+constexpr double kReferenceStep_s = 2e-7;
+const std::string kReference = "explicit, 0.2 us";
+
+std::vector<Point> grid() {
+  std::vector<Point> points;
+  for (const double H_m : {0.8, 0.9, 0.96, 1.0, 1.04}) {
+    for (const double mu : {0.2, 0.4, 0.8, 1.4}) {
+      for (const double e_star : {0.6, 0.8, 1.0}) {
+        points.push_back({H_m, mu, e_star});
+      }
+    }
+  }
+  return points;
+}
+
+/// Bounds by the name of an output and what it is relative to.
+struct Bound {
+  double value;
+  std::string reason;
+};
+using Bounds = std::map<std::string, Bound>;
+
+std::string key(const Output& output) {
+  return output.name + ", of " + output.relative_to;
+}
+
+/// Largest difference of each output over the cases given so far.
+class Differences {
+ public:
+  /// `values` holds those of each output, in the order of outputs(); all or the headline ones.
+  void add(const Point& point, const std::vector<std::vector<double>>& values,
+           const CaseResult& right, bool headline_only) {
+    for (std::size_t i = 0; i < outputs_.size(); ++i) {
+      if (headline_only && !outputs_[i].is_headline) {
+        continue;
+      }
+      const double found = difference(outputs_[i], values[i], right);
+      if (!(found <= largest_[i])) {
+        largest_[i] = found;
+        where_[i] = point;
+      }
+    }
+  }
+
+  void expect_within(const std::string& title, const Bound& usual, const Bounds& others) const {
+    for (std::size_t i = 0; i < outputs_.size(); ++i) {
+      const auto other = others.find(key(outputs_[i]));
+      const Bound& bound = other == others.end() ? usual : other->second;
+      std::ostringstream what;
+      what << title << ": " << key(outputs_[i]) << ", worst at (" << where_[i].H_m << ", "
+           << where_[i].mu << ", " << where_[i].e_star << ')';
+      expect_at_most({what.str(), kReference, largest_[i], bound.value, bound.reason});
+    }
+  }
+
+ private:
+  std::vector<Output> outputs_ = outputs();
+  std::vector<double> largest_ = std::vector<double>(outputs_.size(), -1.0);
+  std::vector<Point> where_ = std::vector<Point>(outputs_.size());
+};
+
+std::vector<std::vector<double>> values_of(const CaseResult& result) {
+  std::vector<std::vector<double>> values;
+  for (const Output& output : outputs()) {
+    values.push_back(output.values(result));
+  }
+  return values;
+}
+
+/// (4 f(h/2) - f(h))/3: what is left when an error of order 2 is taken away.
+std::vector<std::vector<double>> extrapolated(const CaseResult& whole, const CaseResult& half) {
+  auto values = values_of(half);
+  const auto coarse = values_of(whole);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    for (std::size_t j = 0; j < values[i].size(); ++j) {
+      values[i][j] += (values[i][j] - coarse[i].at(j)) / 3.0;
+    }
+  }
+  return values;
+}
+
+const std::string kPeriodError = "the method's period error (w h)^2/12 on the chain's vibration";
+const std::string kSlowExit = kPeriodError + "; some exits are slow";
+
+TEST(Agreement, BothIntegratorsGiveTheSameSixtyContactsAtATenthOfAMicrosecond) {
+  const BothWays both(solver::ModelParameters{});
+  Differences at_step;
+  Differences without_leading_error;
+  for (const Point& point : grid()) {
+    const CaseResult right = both.explicit_case(point, kReferenceStep_s);
+    const CaseResult whole = both.generalized_alpha_case(point, 1e-7);
+    const CaseResult half = both.generalized_alpha_case(point, 0.5e-7);
+    ASSERT_TRUE(have_same_turns(whole, right))
+        << point.H_m << ' ' << point.mu << ' ' << point.e_star;
+    ASSERT_TRUE(have_same_turns(half, right))
+        << point.H_m << ' ' << point.mu << ' ' << point.e_star;
+    at_step.add(point, values_of(whole), right, false);
+    without_leading_error.add(point, extrapolated(whole, half), right, false);
+  }
+  at_step.expect_within(
+      "60 contacts, 0.1 us", {1e-4, "required"},
+      {{"exit velocity, of speed at touch", {1.5e-4, kPeriodError}},
+       {"exit velocity, of exit speed", {1e-3, kSlowExit}},
+       {"reaction peaks, of each itself", {2e-4, kPeriodError}},
+       {"instants of turns, of duration",
+        {2.5e-4, kPeriodError + ", over the small acceleration at a grazing turn"}}});
+  without_leading_error.expect_within(
+      "60 contacts, extrapolated from 0.1 and 0.05 us",
+      {5e-6, "of an error in h^2, h^4 stays: 1e-4 times (w h)^2 of 0.003 and up"}, {});
+}
+
+TEST(Agreement, BothIntegratorsGiveTheSameSixtyContactsAtAMicrosecond) {
+  const BothWays both(solver::ModelParameters{});
+  Differences differences;
+  std::string apart;
+  int cases_apart = 0;
+  for (const Point& point : grid()) {
+    const CaseResult right = both.explicit_case(point, kReferenceStep_s);
+    const CaseResult result = both.generalized_alpha_case(point, 1e-6);
+    const bool is_apart = !have_same_turns(result, right);
+    differences.add(point, values_of(result), right, is_apart);
+    if (is_apart) {
+      ++cases_apart;
+      std::ostringstream text;
+      text << " (" << point.H_m << ", " << point.mu << ", " << point.e_star << ')';
+      apart += text.str();
+    }
+  }
+  differences.expect_within("60 contacts, 1 us", {1e-3, "required"},
+                            {{"exit velocity, of speed at touch", {1.5e-2, kPeriodError}},
+                             {"exit velocity, of exit speed", {0.1, kSlowExit}},
+                             {"reaction peaks, of each itself", {2e-2, kPeriodError}},
+                             {"all peaks of F_n, of largest F_n", {3e-3, kPeriodError}},
+                             {"all peaks of F_n, of each itself", {1e-2, kPeriodError}},
+                             {"all peaks of F_t, of largest F_t", {3e-3, kPeriodError}},
+                             {"instants of turns, of duration", {1e-2, kPeriodError}}});
+  expect_at_most(
+      {"60 contacts, 1 us: contacts with a grazing ripple more or "
+       "less, of which only outputs of the whole are compared:" +
+           apart,
+       kReference, static_cast<double>(cases_apart), 6.0,
+       "grazing turns come and go with errors of the size of the ripple"});
+}
+
+TEST(Agreement, BothIntegratorsGiveTheSameSixtyCasesFromReleaseToSeparation) {
+  solver::ModelParameters model;
+  model.dt_fall_s = 5e-6;
+  model.dt_s = 1e-7;
+  const BothWays reference(model);
+  model.integrator = solver::Integrator::kGeneralizedAlpha;
+  const solver::Finger finger(model);
+  solver::Finger::Extras extras;
+  extras.reaction_peaks = true;
+  Differences differences;
+  for (const Point& point : grid()) {
+    const CaseResult right = reference.explicit_case(point, kReferenceStep_s);
+    const CaseResult result = finger.solve(point.H_m, point.mu, point.e_star, extras);
+    ASSERT_TRUE(have_same_turns(result, right))
+        << point.H_m << ' ' << point.mu << ' ' << point.e_star;
+    differences.add(point, values_of(result), right, false);
+  }
+  differences.expect_within("60 whole cases, fall 5 us, contact 0.1 us", {3e-4, "required"},
+                            {{"exit velocity, of exit speed", {1e-3, kSlowExit}},
+                             {"reaction peaks, of each itself",
+                              {4e-4, "vibration from the release, which 5 us do not resolve"}}});
+}
+
+}  // namespace
+}  // namespace oblique::validation

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <array>
+#include <functional>
+
+#include "worker/solver/case_result.h"
+#include "worker/solver/chain.h"
+#include "worker/solver/contact_law.h"
+#include "worker/solver/fall.h"
+#include "worker/solver/generalized_alpha.h"
+#include "worker/solver/motion.h"
+
+namespace oblique::validation {
+
+struct Point {
+  double H_m;
+  double mu;
+  double e_star;
+};
+
+/// The ten distinct impacts of the paper.
+inline constexpr std::array<Point, 10> kPublishedPoints{{{1.00, 0.4, 1.0},
+                                                         {1.00, 0.4, 0.8},
+                                                         {1.00, 0.4, 0.6},
+                                                         {0.96, 0.4, 1.0},
+                                                         {1.04, 0.4, 1.0},
+                                                         {1.00, 0.6, 1.0},
+                                                         {1.00, 0.8, 1.0},
+                                                         {1.00, 1.2, 1.0},
+                                                         {1.00, 1.4, 1.0},
+                                                         {1.00, 1.6, 1.0}}};
+
+/// One chain under both integrators. Contacts start from the same state at touch, that of an
+/// explicit fall, so that what differs is the contact's alone.
+class BothWays {
+ public:
+  explicit BothWays(const solver::ModelParameters& model);
+
+  const solver::Chain& chain() const { return chain_; }
+  const solver::ExplicitMotion& by_explicit() const { return explicit_; }
+  const solver::GeneralizedAlphaMotion& by_generalized_alpha() const { return generalized_alpha_; }
+  const solver::Fall& fall() const { return fall_; }
+
+  /// The state at touch in the coordinates of each integrator.
+  solver::ChainState explicit_touch(double H_m) const { return fall_.state_at(H_m); }
+  solver::ChainState generalized_alpha_touch(double H_m) const {
+    return generalized_alpha_.chain().from_eliminated(fall_.state_at(H_m));
+  }
+  solver::ContactParameters contact(const Point& point) const {
+    return {model_.k_N_m, model_.eta2, point.mu, point.e_star};
+  }
+  /// The contact with reactions, steps of dt_s throughout.
+  solver::CaseResult explicit_case(const Point& point, double dt_s) const;
+  solver::CaseResult generalized_alpha_case(const Point& point, double dt_s) const;
+
+ private:
+  solver::ModelParameters model_;
+  solver::Chain chain_;
+  solver::ExplicitMotion explicit_;
+  solver::GeneralizedAlphaMotion generalized_alpha_;
+  solver::Fall fall_;
+};
+
+}  // namespace oblique::validation
