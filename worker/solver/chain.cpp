@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "worker/solver/errors.h"
+
 namespace oblique::solver {
 namespace {
 
@@ -45,6 +47,10 @@ double largest_eigenvalue(const BandedMatrix& stiffness, const BandedMatrix& mas
   double high = 1.0;
   while (!is_above(high)) {
     high *= 4.0;
+    if (!std::isfinite(high)) {
+      throw InputError("the stiffness of this model is beyond numbers: E, A, I, rho, k, eta2 and the "
+                       "lengths are too far apart in magnitude");
+    }
   }
   double low = 0.25 * high;
   while (high - low > 1e-10 * high) {

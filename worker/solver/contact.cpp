@@ -163,6 +163,11 @@ void Contact::accept(const TipState& end, const ContactIntegrals<double>& integr
     message << "the contact did not end within " << kLongest_s << " s";
     throw SolveError(message.str());
   }
+  if (steps_ > kMostSteps) {
+    std::ostringstream message;
+    message << "the contact takes more than " << kMostSteps << " steps of " << full_step_s() << " s";
+    throw SolveError(message.str());
+  }
 }
 
 void Contact::happen(ContactEvent event) {

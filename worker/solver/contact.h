@@ -26,6 +26,8 @@ class Contact {
   static constexpr double kLongest_s = 20e-3;
   /// Most events of one contact; more means that states follow each other without time passing.
   static constexpr int kMostEvents = 10'000;
+  /// Most steps of one contact, ten thousand times what the default step takes.
+  static constexpr std::int64_t kMostSteps = 5'000'000;
 
   Contact(const ContactParameters& parameters, const TipState& touch, const ContactSteps& steps);
 
@@ -35,7 +37,7 @@ class Contact {
   const ContactLaw& law() const { return law_; }
 
   /// True when the step is accepted. Throws SolveError when the tip's state is not finite, the
-  /// contact outlasts kLongest_s or has more than kMostEvents events.
+  /// contact outlasts kLongest_s, or has more than kMostEvents events or kMostSteps steps.
   bool judge(const TipState& end, const ContactIntegrals<double>& integrals);
 
   /// What has been gathered so far; whole once finished.

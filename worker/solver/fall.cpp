@@ -13,6 +13,8 @@ namespace {
 constexpr std::size_t kMostKept = 4096;
 /// A fall that lasts this many times sqrt(2 length / g) is not one.
 constexpr double kLongestFall = 100.0;
+/// Steps in sqrt(2 length / g) beyond which a fall is not begun: it would take hours.
+constexpr double kMostSteps = 1e9;
 
 constexpr AffineContactForce<double> kNoContact{};
 
@@ -28,6 +30,12 @@ Fall::Fall(const Chain& chain, double dt_s)
 
 Fall::Fall(std::shared_ptr<const Motion> motion, double dt_s, double longest_s)
     : motion_(std::move(motion)), dt_s_(dt_s) {
+  if (!(longest_s <= kLongestFall * kMostSteps * dt_s)) {
+    std::ostringstream message;
+    message << "the fall would take more than " << kMostSteps << " steps of dt_fall = " << dt_s
+            << " s";
+    throw SolveError(message.str());
+  }
   ChainState before = motion_->at_rest();
   ChainState state = before;
   const double length_m = motion_->tip(state).x_m;

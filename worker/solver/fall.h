@@ -18,7 +18,7 @@ double longest_fall_s(const Chain& chain);
 class Fall {
  public:
   /// Solves the fall with steps of dt_s up to the first turn of the tip. Throws SolveError when it
-  /// diverges or lasts longer than `longest_s`.
+  /// diverges, lasts longer than `longest_s` or would take more than 1e9 steps.
   Fall(std::shared_ptr<const Motion> motion, double dt_s, double longest_s);
   /// The same by the explicit integrator; `longest_s` is 100 times the time of a free fall from
   /// the chain's length. `chain` must outlive this.
