@@ -33,6 +33,8 @@ void add_verbs(CLI::App& app, Command& command) {
   add_query(app, command);
   add_sql(app, command);
   add_paper(app, command);
+  add_converge(app, command);
+  add_fit(app, command);
 }
 
 // The verb that was parsed, or the program itself.
@@ -77,14 +79,14 @@ int parse(CLI::App& app, int argc, const char* const* argv) {
   try {
     app.parse(argc, argv);
     return kDone;
-  } catch (const CLI::ExtrasError&) {
-    auto& verb = parsed_verb(app);
-    return wrong_usage(app, verb, unexpected_words(app, verb));
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) {
       return app.exit(error, std::cout, std::cerr);
     }
-    return wrong_usage(app, parsed_verb(app), error.what());
+    // A word too many says more than the missing verb or flag that it may have been meant for.
+    auto& verb = parsed_verb(app);
+    const bool word_too_many = !app.remaining(true).empty();
+    return wrong_usage(app, verb, word_too_many ? unexpected_words(app, verb) : error.what());
   }
 }
 

@@ -62,6 +62,24 @@ const char* name_of(Quantity quantity) {
 
 }  // namespace
 
+OwnCase own_case(const solver::CaseResult& result) {
+  OwnCase own{.fn_N = {},
+              .ft_N = {},
+              .phases_s = {},
+              .stick_total_s = result.stick_total_s,
+              .major_mode = result.major_mode};
+  for (const auto& peak : result.peaks) {
+    if (peak.major) {
+      own.fn_N.push_back(peak.fn_N);
+      own.ft_N.push_back(peak.ft_N);
+    }
+  }
+  for (const auto& phase : result.phases) {
+    own.phases_s.push_back(phase.t1_s - phase.t0_s);
+  }
+  return own;
+}
+
 std::optional<double> Difference::percent() const {
   return ours ? std::optional(100.0 * (*ours - published) / published) : std::nullopt;
 }

@@ -8,6 +8,7 @@
 
 #include "client/published_table.h"
 #include "proto/oblique.pb.h"
+#include "worker/solver/case_result.h"
 
 namespace oblique::client {
 
@@ -19,6 +20,9 @@ struct OwnCase {
   double stick_total_s;
   std::string major_mode;
 };
+
+/// What a comparison needs of a result.
+OwnCase own_case(const solver::CaseResult& result);
 
 enum class Quantity { kFn, kFt, kPhase, kStick };
 

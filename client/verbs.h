@@ -26,6 +26,8 @@ void add_cancel(CLI::App& app, Command& command);
 void add_query(CLI::App& app, Command& command);
 void add_sql(CLI::App& app, Command& command);
 void add_paper(CLI::App& app, Command& command);
+void add_converge(CLI::App& app, Command& command);
+void add_fit(CLI::App& app, Command& command);
 
 /// Parses the command line and does what it says: data to standard output, everything else to
 /// standard error. The exit code: 0 done, 1 failed, 2 wrong usage.
