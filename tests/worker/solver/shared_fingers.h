@@ -1,0 +1,25 @@
+#pragma once
+
+#include "worker/solver/solve.h"
+
+namespace oblique::solver {
+
+/// The preset `paper`. One for all tests of a process: its fall takes half a second.
+inline const Finger& paper_finger() {
+  static const Finger finger{ModelParameters{}};
+  return finger;
+}
+
+/// The preset `paper` with few elements a link, whose fall takes little.
+inline ModelParameters coarse_model(int elements_per_link = 1) {
+  ModelParameters model;
+  model.elements_per_link = elements_per_link;
+  return model;
+}
+
+inline const Finger& coarse_finger() {
+  static const Finger finger{coarse_model()};
+  return finger;
+}
+
+}  // namespace oblique::solver
