@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <string>
 #include <utility>
 
 #include <nlohmann/json.hpp>
 
 #include "client/axis.h"
 #include "client/printer.h"
+#include "worker/solver/contact_record.h"
+#include "worker/solver/solve.h"
 
 namespace oblique::client {
 namespace {
@@ -29,20 +32,27 @@ bool same(double a, double b) {
   return std::abs(a - b) <= 1e-9;
 }
 
+// Rows do not have F_n at valleys, so they do not say which turns a ripple takes with it: phases
+// are known up to the peak before the first ripple.
 OwnCase own_case(const protocol::Row& row) {
   OwnCase own{.fn_N = {},
               .ft_N = {},
               .phases_s = {},
               .stick_total_s = row.values(6).real(),
               .major_mode = row.values(7).text()};
-  for (const auto& peak : nlohmann::json::parse(row.values(4).text())) {
-    if (peak.at(3).get<int>() != 0) {
-      own.fn_N.push_back(peak.at(1));
-      own.ft_N.push_back(peak.at(2));
+  const auto peaks = nlohmann::json::parse(row.values(4).text());
+  const auto phases = nlohmann::json::parse(row.values(5).text());
+  std::size_t known_phases = phases.size();
+  for (std::size_t i = 0; i < peaks.size(); ++i) {
+    if (peaks[i].at(3).get<int>() != 0) {
+      own.fn_N.push_back(peaks[i].at(1));
+      own.ft_N.push_back(peaks[i].at(2));
+    } else {
+      known_phases = std::min(known_phases, 2 * i == 0 ? 0 : 2 * i - 1);
     }
   }
-  for (const auto& phase : nlohmann::json::parse(row.values(5).text())) {
-    own.phases_s.push_back(phase.at(2).get<double>() - phase.at(1).get<double>());
+  for (std::size_t i = 0; i < known_phases; ++i) {
+    own.phases_s.push_back(phases[i].at(2).get<double>() - phases[i].at(1).get<double>());
   }
   return own;
 }
@@ -74,8 +84,17 @@ OwnCase own_case(const solver::CaseResult& result) {
       own.ft_N.push_back(peak.ft_N);
     }
   }
-  for (const auto& phase : result.phases) {
-    own.phases_s.push_back(phase.t1_s - phase.t0_s);
+  std::vector<double> turns_N;
+  for (std::size_t i = 0; i + 1 < result.phases.size(); ++i) {
+    turns_N.push_back(result.phases[i].fn_end_N);
+  }
+  const auto survives = solver::without_ripples(turns_N);
+  double start_s = 0.0;
+  for (std::size_t i = 0; i < result.phases.size(); ++i) {
+    if (i == survives.size() || survives[i]) {
+      own.phases_s.push_back(result.phases[i].t1_s - start_s);
+      start_s = result.phases[i].t1_s;
+    }
   }
   return own;
 }
@@ -122,6 +141,33 @@ DifferenceSummary summary_of(const std::vector<Difference>& differences) {
     summary.rms_percent = std::sqrt(sum_squared / static_cast<double>(summary.counted));
   }
   return summary;
+}
+
+std::vector<std::optional<OwnCase>> solved_cases(const PublishedTable& table,
+                                                 const solver::ModelParameters& model) {
+  const solver::Finger finger(model);
+  std::vector<std::optional<OwnCase>> own(table.cases.size());
+  std::size_t next = 0;
+  std::string error;
+  finger.solve_points(
+      [&]() -> std::optional<solver::PointRequest> {
+        if (next == table.cases.size()) {
+          return std::nullopt;
+        }
+        const auto& asked = table.cases[next];
+        return solver::PointRequest{next++, asked.H_m, asked.mu, asked.e_star};
+      },
+      [&](solver::PointOutcome&& outcome) {
+        if (outcome.result) {
+          own[outcome.number] = own_case(*outcome.result);
+        } else {
+          error = outcome.error;
+        }
+      });
+  if (!error.empty()) {
+    throw solver::SolveError(error);
+  }
+  return own;
 }
 
 std::vector<std::optional<OwnCase>> own_cases(const PublishedTable& table,

@@ -9,14 +9,15 @@
 #include "client/published_table.h"
 #include "proto/oblique.pb.h"
 #include "worker/solver/case_result.h"
+#include "worker/solver/parameters.h"
 
 namespace oblique::client {
 
 /// What we have for one published case, ripples merged.
 struct OwnCase {
-  std::vector<double> fn_N;  ///< F_n at each major peak
-  std::vector<double> ft_N;  ///< largest |F_t| around each major peak
-  std::vector<double> phases_s;
+  std::vector<double> fn_N;      ///< F_n at each major peak
+  std::vector<double> ft_N;      ///< largest |F_t| around each major peak
+  std::vector<double> phases_s;  ///< how long each lasts
   double stick_total_s;
   std::string major_mode;
 };
@@ -52,9 +53,13 @@ struct DifferenceSummary {
 };
 DifferenceSummary summary_of(const std::vector<Difference>& differences);
 
+/// Solves the cases with `model`. Throws solver::SolveError when one cannot be solved.
+std::vector<std::optional<OwnCase>> solved_cases(const PublishedTable& table,
+                                                 const solver::ModelParameters& model);
+
 /// Reads the cases from rows of `runs` with the columns point, H, mu, e, peaks, phases,
-/// stick_total_s and major_mode. A case without a solved point is nothing. Throws
-/// std::runtime_error when a case has several.
+/// stick_total_s and major_mode. A case without a solved point is nothing, and phases from the
+/// first ripple on are left out. Throws std::runtime_error when a case has several points.
 std::vector<std::optional<OwnCase>> own_cases(const PublishedTable& table,
                                               const protocol::QueryReply& rows);
 

@@ -1,13 +1,12 @@
 #include "client/recovery.h"
 
 #include <cmath>
-#include <cstdint>
-#include <optional>
+#include <string>
 
 #include <unsupported/Eigen/LevenbergMarquardt>
 
 #include "client/parallel.h"
-#include "worker/solver/solve.h"
+#include "worker/solver/errors.h"
 
 namespace oblique::client {
 namespace {
@@ -17,8 +16,8 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr int kMostIterations = 50;
-constexpr double kSmallestStep = 1e-6;
-constexpr double kSmallestGain = 1e-8;
+constexpr double kSmallestStep = 1e-5;
+constexpr double kSmallestGain = 1e-5;
 /// Of a parameter, for derivatives: the outputs are smooth to about 1e-7 of themselves.
 constexpr double kDifferenceStep = 1e-4;
 
@@ -77,29 +76,7 @@ class Residuals : public Eigen::DenseFunctor<double> {
 
 std::vector<Difference> differences_of(const PublishedTable& published,
                                        const solver::ModelParameters& model) {
-  const solver::Finger finger(model);
-  std::vector<std::optional<OwnCase>> own(published.cases.size());
-  std::size_t next = 0;
-  std::string error;
-  finger.solve_points(
-      [&]() -> std::optional<solver::PointRequest> {
-        if (next == published.cases.size()) {
-          return std::nullopt;
-        }
-        const auto& asked = published.cases[next];
-        return solver::PointRequest{next++, asked.H_m, asked.mu, asked.e_star};
-      },
-      [&](solver::PointOutcome&& outcome) {
-        if (outcome.result) {
-          own[outcome.number] = own_case(*outcome.result);
-        } else {
-          error = outcome.error;
-        }
-      });
-  if (!error.empty()) {
-    throw solver::SolveError(error);
-  }
-  return compare(published, own);
+  return compare(published, solved_cases(published, model));
 }
 
 FitStep recover(const PublishedTable& published, const solver::ModelParameters& start,

@@ -31,7 +31,7 @@ std::vector<Difference> differences_of(const PublishedTable& published,
 /// relative differences from all published numbers is least (Levenberg-Marquardt on the logarithms
 /// of the parameters, derivatives by differences). A published peak, phase or stick that the model
 /// lacks counts as a difference of 100 %. Stops when an iteration changes no parameter by more than
-/// 1e-6 of itself or the sum of squares by more than 1e-8 of itself. `told` is called with the
+/// 1e-5 of itself or the sum of squares by more than 1e-5 of itself. `told` is called with the
 /// start and after each iteration. Gives the last step. Throws SolveError when no minimum is found
 /// within 50 iterations or a model on the way cannot be solved.
 FitStep recover(const PublishedTable& published, const solver::ModelParameters& start,

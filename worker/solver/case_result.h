@@ -26,6 +26,7 @@ struct Phase {
   PhaseKind kind;
   double t0_s;
   double t1_s;
+  double fn_end_N = 0.0;  ///< F_n at t1_s
 };
 
 /// A span in which P does not move.

@@ -146,10 +146,10 @@ void ContactRecord::write_to(CaseResult& result) const {
       result.fn_peak_N = std::max(result.fn_peak_N, turns_[i].fn_N);
     }
     result.phases.push_back({is_peak ? PhaseKind::kCompression : PhaseKind::kRestitution,
-                             phase_start_s, turns_[i].t_s});
+                             phase_start_s, turns_[i].t_s, turns_[i].fn_N});
     phase_start_s = turns_[i].t_s;
   }
-  result.phases.push_back({PhaseKind::kRestitution, phase_start_s, duration_s_});
+  result.phases.push_back({PhaseKind::kRestitution, phase_start_s, duration_s_, 0.0});
   result.stick_total_s = 0.0;
   for (std::size_t i = 0; i < states_.size(); ++i) {
     if (!states_[i].stick) {
