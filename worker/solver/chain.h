@@ -20,7 +20,8 @@ struct ChainState {
   /// What an integrator remembers besides; empty where it remembers nothing.
   Coordinates acceleration;  ///< q'' at t_s
   /// (a - q'')/h of generalized-alpha: a_n stands for q'' a fixed part of a step away, so it is
-  /// kept per second and serves a next step of any length.
+  /// kept per second and serves a next step of any length. Empty after a restart: the next step
+  /// finds it.
   Coordinates algorithmic_offset_rate;
   std::vector<double> multipliers_N;  ///< joint multipliers, x and y in turn
 };

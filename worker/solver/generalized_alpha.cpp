@@ -40,40 +40,75 @@ void GeneralizedAlphaMotion::restart(const AffineContactForce<double>& force,
   chain_.add_elastic_and_gravity(state.q, unknowns);
   unknowns[tip] -= force.ft_N(state.q[tip], state.q[tip + 1]);
   unknowns[tip + 1] -= force.fn_N(state.q[tip + 1]);
-  // The same system gives the rates: M q''' + Phiᵀ lambda' = dF_c/dt - K v, Phi q''' = 0.
-  std::vector<double> rates(size, 0.0);
-  chain_.add_stiffness_product(state.q, state.v, rates);
-  rates[tip] += force.k_tn * state.v[tip + 1] + force.k_tt * state.v[tip];
-  rates[tip + 1] += force.k_nn * state.v[tip + 1];
-  for (std::size_t i = 0; i < size; ++i) {
-    unknowns[i] = -unknowns[i];
-    rates[i] = -rates[i];
+  for (double& value : unknowns) {
+    value = -value;
   }
   matrix.solve(unknowns);
-  matrix.solve(rates);
   state.multipliers_N.resize(2 * chain_.links());
   for (std::size_t link = 0; link < chain_.links(); ++link) {
     for (std::size_t c = 0; c < 2; ++c) {
       const std::size_t index = chain_.multiplier_index(link) + c;
       state.multipliers_N[2 * link + c] = unknowns[index];
       unknowns[index] = 0.0;
-      rates[index] = 0.0;
     }
   }
   state.acceleration = std::move(unknowns);
-  // a_n stands for q'' at t_n + (alpha_m - alpha_f) h.
-  state.algorithmic_offset_rate = std::move(rates);
-  for (double& rate : state.algorithmic_offset_rate) {
-    rate *= alpha_.alpha_m - alpha_.alpha_f;
-  }
+  state.algorithmic_offset_rate.clear();
 }
 
-void GeneralizedAlphaMotion::predict(const ChainState& from, double h_s, ChainState& to) const {
+double GeneralizedAlphaMotion::mass_factor() const {
+  return (1.0 - alpha_.alpha_m) / (1.0 - alpha_.alpha_f);
+}
+
+void GeneralizedAlphaMotion::add_newton_matrix(const Coordinates& q,
+                                               const AffineContactForce<double>& force, double h_s,
+                                               ConstrainedChain::Matrix& matrix) const {
+  const std::size_t tip = chain_.tip_index();
+  const double stiffness_factor = alpha_.beta * h_s * h_s;
+  chain_.add_tangent(q, mass_factor(), stiffness_factor, matrix);
+  matrix.add(tip, tip, stiffness_factor * force.k_tt);
+  matrix.add(tip, tip + 1, stiffness_factor * force.k_tn);
+  matrix.add(tip + 1, tip + 1, stiffness_factor * force.k_nn);
+}
+
+Coordinates GeneralizedAlphaMotion::starting_offset_rate(const ChainState& from,
+                                                         const AffineContactForce<double>& force,
+                                                         double h_s) const {
+  const std::size_t tip = chain_.tip_index();
+  ConstrainedChain::Matrix matrix(chain_.size());
+  matrix.set_zero();
+  add_newton_matrix(from.q, force, h_s, matrix);
+  if (!matrix.factor()) {
+    throw SolveError("the Newton matrix is singular");
+  }
+  Coordinates rates(chain_.size(), 0.0);
+  chain_.add_stiffness_product(from.q, from.v, rates);
+  rates[tip] += force.k_tn * from.v[tip + 1] + force.k_tt * from.v[tip];
+  rates[tip + 1] += force.k_nn * from.v[tip + 1];
+  // a_n stands for q'' at t_n + (alpha_m - alpha_f) h.
+  const double factor = mass_factor() * (alpha_.alpha_f - alpha_.alpha_m);
+  for (double& rate : rates) {
+    rate *= factor;
+  }
+  matrix.solve(rates);
+  for (std::size_t link = 0; link < chain_.links(); ++link) {
+    rates[chain_.multiplier_index(link)] = 0.0;
+    rates[chain_.multiplier_index(link) + 1] = 0.0;
+  }
+  return rates;
+}
+
+void GeneralizedAlphaMotion::predict(const ChainState& from,
+                                     const AffineContactForce<double>& force, double h_s,
+                                     ChainState& to) const {
   to = from;
+  if (from.algorithmic_offset_rate.empty()) {
+    to.algorithmic_offset_rate = starting_offset_rate(from, force, h_s);
+  }
   to.t_s = from.t_s + h_s;
   // q''_{n+1} = q''_n to begin with.
   for (std::size_t i = 0; i < chain_.size(); ++i) {
-    const double a_from = from.acceleration[i] + h_s * from.algorithmic_offset_rate[i];
+    const double a_from = from.acceleration[i] + h_s * to.algorithmic_offset_rate[i];
     const double a_to = (from.acceleration[i] - alpha_.alpha_m * a_from) / (1.0 - alpha_.alpha_m);
     to.q[i] += h_s * (from.v[i] + h_s * ((0.5 - alpha_.beta) * a_from + alpha_.beta * a_to));
     to.v[i] += h_s * ((1.0 - alpha_.gamma) * a_from + alpha_.gamma * a_to);
@@ -99,7 +134,7 @@ double GeneralizedAlphaMotion::correct(double h_s, const std::vector<double>& co
                                        ChainState& state) const {
   const double q_factor = alpha_.beta * h_s * h_s;
   const double v_factor = alpha_.gamma * h_s;
-  const double acceleration_factor = (1.0 - alpha_.alpha_m) / (1.0 - alpha_.alpha_f);
+  const double acceleration_factor = mass_factor();
   double largest = 0.0;
   for (std::size_t link = 0; link < chain_.links(); ++link) {
     const std::size_t multiplier = chain_.multiplier_index(link);
@@ -127,10 +162,7 @@ ContactIntegrals<double> GeneralizedAlphaMotion::step(const ChainState& from,
     to = from;
     return {};
   }
-  const std::size_t tip = chain_.tip_index();
-  const double mass_factor = (1.0 - alpha_.alpha_m) / (1.0 - alpha_.alpha_f);
-  const double stiffness_factor = alpha_.beta * h_s * h_s;
-  predict(from, h_s, to);
+  predict(from, force, h_s, to);
   ConstrainedChain::Matrix matrix(chain_.size());
   std::vector<double> residual(chain_.size());
   for (int iteration = 0;; ++iteration) {
@@ -142,10 +174,7 @@ ContactIntegrals<double> GeneralizedAlphaMotion::step(const ChainState& from,
     }
     evaluate(force, h_s, to, residual);
     matrix.set_zero();
-    chain_.add_tangent(to.q, mass_factor, stiffness_factor, matrix);
-    matrix.add(tip, tip, stiffness_factor * force.k_tt);
-    matrix.add(tip, tip + 1, stiffness_factor * force.k_tn);
-    matrix.add(tip + 1, tip + 1, stiffness_factor * force.k_nn);
+    add_newton_matrix(to.q, force, h_s, matrix);
     if (!matrix.factor()) {
       throw SolveError("the Newton matrix is singular");
     }

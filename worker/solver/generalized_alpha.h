@@ -56,7 +56,21 @@ class GeneralizedAlphaMotion : public Motion {
                                        const ChainState& state) const override;
 
  private:
-  void predict(const ChainState& from, double h_s, ChainState& to) const;
+  /// (1 - alpha_m)/(1 - alpha_f), by which q'' follows a.
+  double mass_factor() const;
+  /// matrix += [mass_factor M + beta h^2 K, Phi_qᵀ; Phi_q, 0].
+  void add_newton_matrix(const Coordinates& q, const AffineContactForce<double>& force, double h_s,
+                         ConstrainedChain::Matrix& matrix) const;
+  /// (a_0 - q''_0)/h of the first step after a restart, (alpha_m - alpha_f) q''' with
+  ///
+  ///   (M + beta h^2/mass_factor K) q''' + Phi_qᵀ lambda' = -K v,   Phi_q q''' = 0.
+  ///
+  /// The term in K changes q''' by order h^2 where the step resolves the motion. Where it does not,
+  /// it keeps the offset as small as the velocity allows; -M^-1 K v would multiply rounding.
+  Coordinates starting_offset_rate(const ChainState& from, const AffineContactForce<double>& force,
+                                   double h_s) const;
+  void predict(const ChainState& from, const AffineContactForce<double>& force, double h_s,
+               ChainState& to) const;
   void evaluate(const AffineContactForce<double>& force, double h_s, const ChainState& state,
                 std::vector<double>& residual) const;
   double correct(double h_s, const std::vector<double>& correction, ChainState& state) const;
