@@ -1,0 +1,176 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "tests/worker/solver/shared_fingers.h"
+
+namespace oblique::solver {
+namespace {
+
+struct Traced {
+  CaseResult result;
+  std::vector<TraceRow> rows;
+};
+
+Traced traced(double H_m, double mu, double e_star) {
+  Traced traced;
+  Finger::Extras extras;
+  extras.trace = [&traced](const TraceRow& row) { traced.rows.push_back(row); };
+  traced.result = coarse_finger().solve(H_m, mu, e_star, extras);
+  return traced;
+}
+
+/// Slip only; stick and slip; low restitution; no friction.
+const std::vector<Traced>& traces() {
+  static const std::vector<Traced> list{traced(1.0, 0.4, 1.0), traced(1.0, 1.4, 0.8),
+                                        traced(0.9, 0.9, 0.2), traced(0.9, 0.0, 0.8)};
+  return list;
+}
+
+TEST(Trace, BeginsAtTouchWithoutForcesAndEndsAtSeparation) {
+  for (const Traced& t : traces()) {
+    const TraceRow& first = t.rows.front();
+    EXPECT_EQ(first.t_s, 0.0);
+    EXPECT_EQ(first.fn_N, 0.0);
+    EXPECT_EQ(first.ft_N, 0.0);
+    EXPECT_EQ(first.uy_m, 0.0);
+    EXPECT_NEAR(first.y_m, -t.result.H_m, 1e-15);
+    EXPECT_EQ(first.x_m, t.result.impact_x_m);
+    EXPECT_EQ(first.vn_m_s, t.result.vn_in_m_s);
+    EXPECT_EQ(first.state[1], 'C');
+    const TraceRow& last = t.rows.back();
+    EXPECT_EQ(last.t_s, t.result.duration_s);
+    EXPECT_NEAR(last.fn_N, 0.0, 1e-6);
+    EXPECT_NEAR(last.ft_N, 0.0, 1e-6);
+    EXPECT_EQ(last.vt_m_s, t.result.vt_out_m_s);
+    EXPECT_EQ(last.vn_m_s, t.result.vn_out_m_s);
+    EXPECT_EQ(last.state[1], 'R');
+  }
+}
+
+TEST(Trace, TimeNeverGoesBack) {
+  for (const Traced& t : traces()) {
+    EXPECT_TRUE(std::is_sorted(t.rows.begin(), t.rows.end(),
+                               [](const TraceRow& a, const TraceRow& b) { return a.t_s < b.t_s; }));
+  }
+}
+
+TEST(Trace, ForcesStayInsideTheConeAndOnItInSlip) {
+  for (const Traced& t : traces()) {
+    for (const TraceRow& row : t.rows) {
+      const double limit_N = t.result.mu * row.fn_N;
+      EXPECT_GE(row.fn_N, -1e-6);
+      EXPECT_LE(std::abs(row.ft_N), limit_N + 1e-6);
+      if (row.state[0] == 's') {
+        EXPECT_NEAR(std::abs(row.ft_N), limit_N, 1e-6);
+        EXPECT_LE(row.ft_N * row.vP_m_s, 1e-6) << "friction acts against P";
+      }
+    }
+  }
+}
+
+TEST(Trace, DeformationsAndPositionsBelongToTheForces) {
+  const ModelParameters& model = coarse_finger().model();
+  for (const Traced& t : traces()) {
+    for (const TraceRow& row : t.rows) {
+      EXPECT_NEAR(row.ft_N, -model.k_N_m / model.eta2 * row.ux_m, 1e-6);
+      EXPECT_NEAR(row.xP_m, row.x_m - row.ux_m, 1e-15);
+      EXPECT_NEAR(row.uy_m, row.y_m + t.result.H_m, 1e-15);
+    }
+    // Up to the first turn the normal force is that of the spring in compression.
+    for (const TraceRow& row : t.rows) {
+      if (row.state[1] == 'R') {
+        break;
+      }
+      EXPECT_NEAR(row.fn_N, -model.k_N_m * row.uy_m, 1e-6);
+    }
+  }
+}
+
+TEST(Trace, PRestsInStickAndMovesWithItsVelocityInSlip) {
+  for (const Traced& t : traces()) {
+    double slide_m = 0.0;
+    for (std::size_t i = 1; i < t.rows.size(); ++i) {
+      const TraceRow& a = t.rows[i - 1];
+      const TraceRow& b = t.rows[i];
+      slide_m += std::abs(b.xP_m - a.xP_m);
+      if (a.state[0] == 'S') {
+        EXPECT_NEAR(b.xP_m, a.xP_m, 1e-14);
+        EXPECT_EQ(a.vP_m_s, 0.0);
+      }
+    }
+    EXPECT_NEAR(slide_m, t.result.slide_m, 1e-12);
+  }
+}
+
+TEST(Trace, StatesAreThoseOfTheMode) {
+  for (const Traced& t : traces()) {
+    std::string mode;
+    std::string last;
+    // The last row repeats the state that ended.
+    for (const TraceRow& row : t.rows) {
+      if (row.state != last) {
+        mode += (mode.empty() ? "" : " ") + row.state;
+      }
+      last = row.state;
+    }
+    EXPECT_EQ(mode, t.result.mode);
+  }
+}
+
+TEST(Trace, ImpulsesAreTheIntegralsOfTheForces) {
+  for (const Traced& t : traces()) {
+    double impulse_n_Ns = 0.0;
+    double impulse_t_Ns = 0.0;
+    for (std::size_t i = 1; i < t.rows.size(); ++i) {
+      const double half_s = 0.5 * (t.rows[i].t_s - t.rows[i - 1].t_s);
+      impulse_n_Ns += half_s * (t.rows[i].fn_N + t.rows[i - 1].fn_N);
+      impulse_t_Ns += half_s * (t.rows[i].ft_N + t.rows[i - 1].ft_N);
+    }
+    // The trapezoidal rule errs by (omega h)^2/12 of the fastest motion seen.
+    EXPECT_NEAR(impulse_n_Ns, t.result.impulse_n_Ns, 5e-3 * t.result.impulse_n_Ns);
+    EXPECT_NEAR(impulse_t_Ns, t.result.impulse_t_Ns, 5e-3 * t.result.impulse_n_Ns);
+  }
+}
+
+TEST(Trace, NoRowExceedsThePeaksAndEachPeakIsARow) {
+  for (const Traced& t : traces()) {
+    for (const TraceRow& row : t.rows) {
+      EXPECT_LE(row.fn_N, t.result.fn_peak_N);
+      EXPECT_LE(std::abs(row.ft_N), t.result.ft_peak_N);
+    }
+    for (const Peak& peak : t.result.peaks) {
+      EXPECT_TRUE(std::any_of(t.rows.begin(), t.rows.end(), [&peak](const TraceRow& row) {
+        return row.t_s == peak.t_s && row.fn_N == peak.fn_N;
+      }));
+    }
+  }
+}
+
+TEST(Trace, ReactionsAtThePinAndTheJointsMoveTheLinks) {
+  // Three links have the pin and two joints.
+  for (const Traced& t : traces()) {
+    for (const TraceRow& row : t.rows) {
+      EXPECT_EQ(row.reactions_N.size(), 6U);
+    }
+  }
+  Finger::Extras extras;
+  extras.reaction_peaks = true;
+  const CaseResult result = coarse_finger().solve(1.0, 0.4, 1.0, extras);
+  ASSERT_EQ(result.reaction_peaks.size(), 3U);
+  const auto& rows = traces()[0].rows;
+  for (std::size_t joint = 0; joint < 3; ++joint) {
+    double largest_N = 0.0;
+    for (const TraceRow& row : rows) {
+      largest_N = std::max(largest_N, std::hypot(row.reactions_N[2 * joint],
+                                                 row.reactions_N[2 * joint + 1]));
+    }
+    EXPECT_NEAR(result.reaction_peaks[joint].force_N, largest_N, 0.02 * largest_N);
+  }
+}
+
+}  // namespace
+}  // namespace oblique::solver
