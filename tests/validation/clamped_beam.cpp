@@ -1,0 +1,111 @@
+#include "tests/validation/clamped_beam.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "worker/solver/banded_lu.h"
+#include "worker/solver/beam_element.h"
+#include "worker/solver/beam_tangent.h"
+
+namespace oblique::validation {
+namespace {
+
+constexpr std::size_t kBandwidth = 7;
+constexpr std::size_t kClamped = 4;  ///< coordinates of the first node
+constexpr double kConverged = 1e-12;
+constexpr int kMostIterations = 50;
+
+}  // namespace
+
+ClampedBeam::ClampedBeam(const Properties& properties)
+    : properties_(properties),
+      element_length_m_(properties.length_m / properties.elements),
+      q_(4 * (static_cast<std::size_t>(properties.elements) + 1), 0.0) {
+  for (std::size_t i = 0; i < q_.size(); i += 4) {
+    q_[i] = element_length_m_ * static_cast<double>(i / 4);
+    q_[i + 2] = 1.0;
+  }
+}
+
+void ClampedBeam::load_to(const TipLoad& load, int increments) {
+  const TipLoad from = load_;
+  for (int i = 1; i <= increments; ++i) {
+    const double part = static_cast<double>(i) / increments;
+    equilibrate({from.force_y_N + part * (load.force_y_N - from.force_y_N),
+                 from.moment_N_m + part * (load.moment_N_m - from.moment_N_m)});
+  }
+  load_ = load;
+}
+
+void ClampedBeam::equilibrate(const TipLoad& load) {
+  for (int iteration = 0; iteration < kMostIterations; ++iteration) {
+    if (newton_step(load) < kConverged) {
+      return;
+    }
+  }
+  throw std::runtime_error("the clamped beam found no equilibrium");
+}
+
+double ClampedBeam::newton_step(const TipLoad& load) {
+  solver::BandedLu<kBandwidth> matrix(q_.size() - kClamped);
+  matrix.set_zero();
+  std::vector<double> residual(q_.size() - kClamped, 0.0);
+  const double inverse_length = 1.0 / element_length_m_;
+  const double half_EA_length = 0.5 * properties_.EA_N * element_length_m_;
+  const double bending = 2.0 * properties_.EI_N_m2 / element_length_m_;
+  const auto map = solver::gradient_map(inverse_length);
+  for (std::size_t first = 0; first + 4 < q_.size(); first += 4) {
+    const auto pair = [&](std::size_t i) {
+      return solver::PlanarVector<double>{q_[first + i], q_[first + i + 1]};
+    };
+    const auto g =
+        solver::gradient_coefficients(pair(0), pair(2), pair(4), pair(6), inverse_length);
+    const auto f = solver::elastic_gradient(g, half_EA_length, bending);
+    const auto tangent = solver::elastic_tangent(g, inverse_length, half_EA_length, bending);
+    for (std::size_t a = 0; a < 8; ++a) {
+      if (first + a < kClamped) {
+        continue;
+      }
+      for (std::size_t k = 0; k < 3; ++k) {
+        residual[first + a - kClamped] += map[k][a / 2] * (a % 2 == 0 ? f.c[k].x : f.c[k].y);
+      }
+      for (std::size_t b = 0; b < 8; ++b) {
+        if (first + b >= kClamped) {
+          matrix.add(first + a - kClamped, first + b - kClamped, tangent[a][b]);
+        }
+      }
+    }
+  }
+  const std::size_t tip = residual.size() - 4;
+  residual[tip + 1] -= load.force_y_N;
+  // A moment works on the slope's angle: Q = M (-s_y, s_x)/|s|^2.
+  const double x = q_[q_.size() - 2];
+  const double y = q_[q_.size() - 1];
+  const double s = x * x + y * y;
+  const double m = load.moment_N_m / s;
+  residual[tip + 2] += m * y;
+  residual[tip + 3] -= m * x;
+  matrix.add(tip + 2, tip + 2, -2.0 * m * x * y / s);
+  matrix.add(tip + 2, tip + 3, m - 2.0 * m * y * y / s);
+  matrix.add(tip + 3, tip + 2, -m + 2.0 * m * x * x / s);
+  matrix.add(tip + 3, tip + 3, 2.0 * m * x * y / s);
+  if (!matrix.factor()) {
+    throw std::runtime_error("the tangent of the clamped beam is singular");
+  }
+  matrix.solve(residual);
+  double largest = 0.0;
+  for (std::size_t i = 0; i < residual.size(); ++i) {
+    q_[i + kClamped] -= residual[i];
+    const double scale = i % 4 < 2 ? element_length_m_ : 1.0;
+    largest = std::max(largest, std::abs(residual[i]) / scale);
+  }
+  return largest;
+}
+
+ClampedBeam::Tip ClampedBeam::tip() const {
+  const std::size_t i = q_.size() - 4;
+  return {q_[i], q_[i + 1], std::atan2(q_[i + 3], q_[i + 2])};
+}
+
+}  // namespace oblique::validation
