@@ -1,0 +1,69 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <string>
+
+#include "tests/validation/both_ways.h"
+#include "tests/validation/validation_table.h"
+
+namespace oblique::validation {
+namespace {
+
+using solver::CaseResult;
+using solver::ChainState;
+using solver::Motion;
+
+const std::string kBalance = "kinetic + strain + gravity + springs + losses = constant";
+
+/// What the energies of a contact do not add up to, of the work exchanged, taken anew from the
+/// result's parts.
+double closure(const CaseResult& result) {
+  const solver::ContactEnergy& e = result.energy;
+  const double missing_J =
+      e.kinetic_change_J + e.strain_change_J + e.gravity_change_J + e.friction_J + e.restitution_J;
+  EXPECT_NEAR(std::abs(missing_J) / e.exchanged_J, e.closure, 1e-12);
+  return std::abs(missing_J) / e.exchanged_J;
+}
+
+TEST(Energy, BalancesOverThePublishedContactsUnderBothIntegrators) {
+  const BothWays both(solver::ModelParameters{});
+  double by_explicit = 0.0;
+  double by_generalized_alpha = 0.0;
+  for (const Point& point : kPublishedPoints) {
+    by_explicit = std::max(by_explicit, closure(both.explicit_case(point, 1e-6)));
+    by_generalized_alpha =
+        std::max(by_generalized_alpha, closure(both.generalized_alpha_case(point, 1e-7)));
+  }
+  expect_at_most({"ten published contacts, explicit, 1 us: energy missing, of that exchanged",
+                  kBalance, by_explicit, 1e-6, "required"});
+  expect_at_most(
+      {"ten published contacts, generalized-alpha, 0.1 us: energy missing, of that exchanged",
+       kBalance, by_generalized_alpha, 1e-6, "required"});
+}
+
+/// Energy gained or lost in the fall to H = 1, of the kinetic energy there.
+double fall_drift(const Motion& motion, const solver::Fall& fall) {
+  const solver::Energies before = motion.energies(motion.at_rest());
+  const solver::Energies after = motion.energies(fall.state_at(1.0));
+  return std::abs(after.kinetic_J + after.strain_J + after.gravity_J - before.strain_J -
+                  before.gravity_J) /
+         after.kinetic_J;
+}
+
+TEST(Energy, IsKeptInTheFallUnderBothIntegrators) {
+  const solver::ModelParameters model;
+  const solver::Chain chain(model);
+  const auto generalized_alpha = std::make_shared<solver::GeneralizedAlphaMotion>(model);
+  const solver::Fall one(chain, 2.5e-6);
+  const solver::Fall other(generalized_alpha, 5e-6, solver::longest_fall_s(chain));
+  expect_at_most({"fall to H = 1, explicit, 2.5 us: energy, of the kinetic one", kBalance,
+                  fall_drift(solver::ExplicitMotion(chain), one), 1e-10, "symplectic, no drift"});
+  expect_at_most({"fall to H = 1, generalized-alpha, 5 us: energy, of the kinetic one", kBalance,
+                  fall_drift(*generalized_alpha, other), 1e-7,
+                  "the vibration from the release, which is damped away"});
+}
+
+}  // namespace
+}  // namespace oblique::validation
