@@ -284,9 +284,6 @@ double stiff_vibration_left(double spectral_radius, int steps) {
 }
 
 TEST(GeneralizedAlpha, SpectralRadiusSaysHowFastUnresolvedVibrationsGo) {
-  for (double x : {0., .5, .9})
-    for (int n : {1, 2, 3, 5, 10, 20, 40, 60, 100, 200, 400})
-      printf("%g %d %g\n", x, n, stiff_vibration_left(x, n));
   EXPECT_LT(stiff_vibration_left(0.0, 5), 1e-3);
   EXPECT_LT(stiff_vibration_left(0.5, 40), 1e-6);
   EXPECT_GT(stiff_vibration_left(0.9, 20), 0.1);
