@@ -3,9 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <Eigen/LU>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <random>
@@ -13,7 +11,6 @@
 #include <vector>
 
 #include "tests/worker/solver/chain_probe.h"
-#include "worker/solver/beam_tangent.h"
 #include "worker/solver/errors.h"
 
 namespace oblique::solver {
@@ -73,142 +70,6 @@ struct MovingChain {
   ChainState constrained;
 };
 
-TEST(BeamTangent, IsTheDerivativeOfTheElasticForce) {
-  std::mt19937_64 generator(3);
-  std::uniform_real_distribution<double> uniform(-0.3, 0.3);
-  constexpr double kLength = 0.1;
-  constexpr double kHalfEALength = 50.0;
-  constexpr double kBending = 0.7;
-  std::array<double, 8> q{0.0, 0.0, 1.0, 0.0, kLength, 0.0, 1.0, 0.0};
-  for (double& value : q) {
-    value += kLength * uniform(generator);
-  }
-  const auto coefficients = [](const std::array<double, 8>& e) {
-    return gradient_coefficients<double>({e[0], e[1]}, {e[2], e[3]}, {e[4], e[5]}, {e[6], e[7]},
-                                         1.0 / kLength);
-  };
-  const auto map = gradient_map(1.0 / kLength);
-  const auto force = [&](const std::array<double, 8>& e) {
-    const auto f = elastic_gradient(coefficients(e), kHalfEALength, kBending);
-    std::array<double, 8> result{};
-    for (std::size_t i = 0; i < 8; ++i) {
-      for (std::size_t k = 0; k < 3; ++k) {
-        result[i] += map[k][i / 2] * (i % 2 == 0 ? f.c[k].x : f.c[k].y);
-      }
-    }
-    return result;
-  };
-  const ElementTangent tangent =
-      elastic_tangent(coefficients(q), 1.0 / kLength, kHalfEALength, kBending);
-  double largest = 0.0;
-  for (const auto& row : tangent) {
-    for (const double entry : row) {
-      largest = std::max(largest, std::abs(entry));
-    }
-  }
-  constexpr double kStep = 1e-6;
-  for (std::size_t j = 0; j < 8; ++j) {
-    auto forward = q;
-    auto backward = q;
-    forward[j] += kStep;
-    backward[j] -= kStep;
-    for (std::size_t i = 0; i < 8; ++i) {
-      // The force is a cubic, so the central difference misses by its third derivative times h^2/6.
-      EXPECT_NEAR(tangent[i][j], (force(forward)[i] - force(backward)[i]) / (2.0 * kStep),
-                  1e-8 * largest)
-          << i << ", " << j;
-    }
-  }
-}
-
-TEST(BandedLu, SolvesWhatADensePivotingSolverSolvesAlsoWithZerosOnTheDiagonal) {
-  std::mt19937_64 generator(5);
-  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
-  constexpr std::size_t kBand = 3;
-  for (const std::size_t n : {1U, 2U, 5U, 40U}) {
-    BandedLu<kBand> banded(n);
-    banded.set_zero();
-    const auto size = static_cast<Eigen::Index>(n);
-    Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(size, size);
-    for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t j = i < kBand ? 0 : i - kBand; j < std::min(n, i + kBand + 1); ++j) {
-        // Every third diagonal entry is zero, as a multiplier's is, and others are tiny.
-        const double value = n > 1 && i == j ? (i % 3 == 0 ? 0.0 : 1e-13) : uniform(generator);
-        banded.add(i, j, value);
-        dense(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = value;
-      }
-    }
-    std::vector<double> right_side(n);
-    for (double& value : right_side) {
-      value = uniform(generator);
-    }
-    const Eigen::VectorXd expected =
-        dense.fullPivLu().solve(Eigen::Map<const Eigen::VectorXd>(right_side.data(), size));
-    ASSERT_TRUE(banded.factor());
-    banded.solve(right_side);
-    for (std::size_t i = 0; i < n; ++i) {
-      EXPECT_NEAR(right_side[i], expected[static_cast<Eigen::Index>(i)],
-                  1e-11 * expected.lpNorm<Eigen::Infinity>());
-    }
-  }
-}
-
-TEST(BandedLu, TellsASingularMatrix) {
-  BandedLu<2> matrix(4);
-  matrix.set_zero();
-  for (std::size_t i = 0; i < 4; ++i) {
-    matrix.add(i, i, i == 2 ? 0.0 : 1.0);
-  }
-  EXPECT_FALSE(matrix.factor());
-}
-
-TEST(ConstrainedChain, StateOfTheEliminatedChainKeepsItsEnergiesAndTip) {
-  const MovingChain moving(ModelParameters{});
-  const ConstrainedChain& constrained = moving.motion.chain();
-  EXPECT_NEAR(constrained.kinetic_energy_J(moving.constrained.v),
-              moving.chain.kinetic_energy_J(moving.state.v),
-              1e-13 * moving.chain.kinetic_energy_J(moving.state.v));
-  EXPECT_NEAR(constrained.strain_energy_J(moving.constrained.q),
-              moving.chain.strain_energy_J(moving.state.q),
-              1e-13 * moving.chain.strain_energy_J(moving.state.q));
-  EXPECT_NEAR(constrained.gravity_energy_J(moving.constrained.q),
-              moving.chain.gravity_energy_J(moving.state.q), 1e-13);
-  const TipState one = moving.chain.tip(moving.state);
-  const TipState other = constrained.tip(moving.constrained);
-  EXPECT_EQ(one.x_m, other.x_m);
-  EXPECT_EQ(one.y_m, other.y_m);
-  EXPECT_EQ(one.vx_m_s, other.vx_m_s);
-  EXPECT_EQ(one.vy_m_s, other.vy_m_s);
-  EXPECT_EQ(moving.largest_gap(moving.constrained.q), 0.0);
-}
-
-TEST(GeneralizedAlpha, ConsistentAccelerationsAndReactionsAreThoseOfTheEliminatedChain) {
-  MovingChain moving(ModelParameters{});
-  const auto force = push_at(moving.chain.tip(moving.state));
-  moving.motion.restart(force, moving.constrained);
-  ChainState eliminated = moving.state;
-  const TipState tip = moving.chain.tip(moving.state);
-  moving.chain.accelerations(moving.state.q.data(), force.ft_N(tip.x_m, tip.y_m),
-                             force.fn_N(tip.y_m), eliminated.v.data());
-  const Coordinates expected = moving.motion.chain().from_eliminated(eliminated).v;
-  double scale = 0.0;
-  for (const double a : expected) {
-    scale = std::max(scale, std::abs(a));
-  }
-  for (std::size_t i = 0; i < expected.size(); ++i) {
-    EXPECT_NEAR(moving.constrained.acceleration[i], expected[i], 1e-11 * scale);
-  }
-  const auto one = moving.motion.reactions(force, moving.constrained);
-  const auto other = ExplicitMotion(moving.chain).reactions(force, moving.state);
-  ASSERT_EQ(one.size(), 3U);
-  for (std::size_t link = 0; link < one.size(); ++link) {
-    const double size_N = std::hypot(other[link].x_N, other[link].y_N);
-    EXPECT_GT(size_N, 100.0);
-    EXPECT_NEAR(one[link].x_N, other[link].x_N, 1e-10 * size_N);
-    EXPECT_NEAR(one[link].y_N, other[link].y_N, 1e-10 * size_N);
-  }
-}
-
 TEST(GeneralizedAlpha, PinAndJointsHoldOverManySteps) {
   MovingChain moving(ModelParameters{});
   const auto force = push_at(moving.chain.tip(moving.state));
@@ -253,14 +114,6 @@ TEST(GeneralizedAlpha, ReactionAtThePinHoldsTheHangingChain) {
   for (std::size_t link = 0; link < 3; ++link) {
     EXPECT_NEAR(mean_N[link], link_N * static_cast<double>(3 - link), 0.02 * link_N);
   }
-}
-
-TEST(GeneralizedAlpha, ParametersAreThoseOfTheSpectralRadius) {
-  const GeneralizedAlphaParameters half(0.5);
-  EXPECT_DOUBLE_EQ(half.alpha_m, 0.0);
-  EXPECT_DOUBLE_EQ(half.alpha_f, 1.0 / 3.0);
-  EXPECT_DOUBLE_EQ(half.gamma, 0.5 + 1.0 / 3.0);
-  EXPECT_DOUBLE_EQ(half.beta, 4.0 / 9.0);
 }
 
 /// What is left, after `steps` steps a hundred times too long for it, of a link's vibration along
