@@ -54,7 +54,8 @@ std::vector<double> tail_of(const std::vector<std::optional<double>>& values) {
 OutputConvergence output_convergence(const Output& finest,
                                      const std::vector<std::vector<Output>>& levels,
                                      double highest_order) {
-  OutputConvergence output{.name = finest.name, .values = {}, .extrapolation = {}};
+  OutputConvergence output{
+      .name = finest.name, .scale = finest.scale, .values = {}, .extrapolation = {}};
   for (const auto& level : levels) {
     const auto same = std::find_if(level.begin(), level.end(), [&](const Output& other) {
       return other.name == finest.name && other.mode == finest.mode;
@@ -117,10 +118,11 @@ std::vector<Level> mesh_levels(const solver::ModelParameters& model, int coarses
     }
     levels.push_back(std::move(level));
   }
-  if (levels.size() < 2 || n != 2 * finest) {
+  constexpr std::size_t kFewest = 3;  // for an order
+  if (levels.size() < kFewest || n != 2 * finest) {
     throw solver::InputError(fmt::format(
-        "--finest {} is not allowed: it must be 2, 4, 8, ... times the {} elements a link of the "
-        "coarsest mesh",
+        "--finest {} is not allowed: it must be 4, 8, 16, ... times the {} elements a link of "
+        "the coarsest mesh",
         finest, coarsest));
   }
   return levels;

@@ -18,7 +18,9 @@ namespace oblique::client {
 struct Output {
   std::string name;  ///< with its unit, as results have it; `major_peak_2_N` is the second one
   double value;
-  double scale;  ///< a size of the same unit that is not zero; digits below 1e-9 of it are rounding
+  /// Largest force, duration, speed at touch, ...: what errors are small against. Digits below 1e-9
+  /// of it are rounding.
+  double scale;
   /// States up to the instant that makes the value, ripples merged. Values of two levels are the
   /// same quantity when this is the same.
   std::string mode;
@@ -37,7 +39,7 @@ struct Level {
 /// explicit integrator are those it chooses on each mesh, except that the fall takes the longest
 /// that are safe (its steps are far shorter than its motion asks for, and most of the work); those
 /// of generalized-alpha do not depend on the mesh and stay. Throws InputError unless finest is
-/// coarsest times 2, 4, 8, ...
+/// coarsest times 4, 8, 16, ...
 std::vector<Level> mesh_levels(const solver::ModelParameters& model, int coarsest, int finest);
 
 /// Steps of contact and fall, both halved each time, from those that the model takes at e_star;
@@ -67,6 +69,7 @@ std::vector<SolvedLevel> solve_levels(const std::vector<Level>& levels,
 /// One output over the levels.
 struct OutputConvergence {
   std::string name;
+  double scale;  ///< as of the finest level's Output
   /// One a level, coarsest first; nothing where the mode differs from the finest's before.
   std::vector<std::optional<double>> values;
   /// Over the finest levels that have the value, without a gap.

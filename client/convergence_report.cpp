@@ -30,7 +30,7 @@ bool is_settled(const OutputConvergence& output) {
     case Trend::kTooFew:
       return false;
     case Trend::kUnsettled:
-      return *extrapolation.error <= kSettled * std::abs(extrapolation.limit);
+      return *extrapolation.error <= kSettled * output.scale;
     default:
       return true;
   }
@@ -45,7 +45,7 @@ const char* remark_on(const OutputConvergence& output) {
     case Trend::kOscillating:
       return "oscillates";
     case Trend::kUnsettled:
-      return is_settled(output) ? "settled" : "does not settle";
+      return is_settled(output) ? "wavers" : "does not settle";
     default:
       return "";
   }

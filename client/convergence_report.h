@@ -26,8 +26,9 @@ struct Refinement {
 Refinement refinement_of(std::string what, const std::vector<SolvedLevel>& levels,
                          std::size_t point);
 
-/// Largest relative error that still counts as settled where differences do not fall.
-inline constexpr double kSettled = 1e-4;
+/// Differences that do not fall count as settled below this part of the output's scale: a fine mesh
+/// carries ever faster vibrations, which leave outputs wavering at about this level.
+inline constexpr double kSettled = 1e-3;
 
 /// Whether every output is seen to approach a limit: one mode on the finest three levels, and
 /// differences that fall or are below kSettled.

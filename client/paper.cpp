@@ -1,19 +1,15 @@
-#include <cstdlib>
-
-#include <cerrno>
-#include <cstring>
-#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <optional>
-#include <stdexcept>
 #include <string>
-#include <system_error>
+#include <vector>
+
+#include <spdlog/fmt/fmt.h>
 
 #include "client/nearest.h"
 #include "client/paper_comparison.h"
 #include "client/printer.h"
-#include "client/run_service.h"
+#include "client/source.h"
 #include "client/verbs.h"
 #include "client/watching.h"
 #include "worker/solver/parameters.h"
@@ -23,7 +19,9 @@ namespace {
 
 constexpr const char* kExamples = R"(Examples:
   oblique paper
+  oblique paper --preset converged          where the paper's modes come of its mesh
   oblique paper --preset printed
+  oblique paper --format markdown           the tables of README.md
   oblique paper --db oblique.db --study paper
   oblique paper --format csv > differences.csv)";
 
@@ -32,32 +30,6 @@ struct PaperFlags {
   std::string study{"paper"};
   std::string database;  // empty: solve the cases now
   std::string format{"table"};
-  RunSettings run;
-};
-
-// A folder that goes with this object.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    auto path = (std::filesystem::temp_directory_path() / "oblique-paper-XXXXXX").string();
-    if (mkdtemp(path.data()) == nullptr) {
-      throw std::runtime_error("cannot make a folder in " +
-                               std::filesystem::temp_directory_path().string() + ": " +
-                               std::strerror(errno));
-    }
-    path_ = path;
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
 };
 
 protocol::QueryReply rows_of_study(Source& source, const std::string& study) {
@@ -67,31 +39,23 @@ protocol::QueryReply rows_of_study(Source& source, const std::string& study) {
       sql_text(study) + " AND status = 'solved'");
 }
 
-// Solves the cases on a database of their own; nothing when stopped.
-std::optional<protocol::QueryReply> solved_now(const PublishedTable& published,
-                                               const PaperFlags& flags) {
-  const TemporaryFolder folder;
-  RunSettings settings = flags.run;
-  settings.service.database = folder.path() / "paper.db";
-  const Study study{.name = flags.study, .recipe = recipe_of(published, flags.preset)};
-  if (!run_study(study, settings)) {
-    return std::nullopt;
+std::vector<std::optional<OwnCase>> cases_of(const PublishedTable& published,
+                                             const PaperFlags& flags) {
+  if (!flags.database.empty()) {
+    return own_cases(published, rows_of_study(*open_database(flags.database), flags.study));
   }
-  return rows_of_study(*open_database(settings.service.database), study.name);
+  const auto model = solver::preset(flags.preset);
+  std::cerr << fmt::format("{} impacts of the preset {}, {} elements a link\n",
+                           published.cases.size(), flags.preset, model.elements_per_link);
+  return solved_cases(published, model);
 }
 
 int paper(const PaperFlags& flags) {
   const auto format = format_named(flags.format);
   const auto published = published_table();
-  const auto rows = flags.database.empty()
-                        ? solved_now(published, flags)
-                        : rows_of_study(*open_database(flags.database), flags.study);
-  if (!rows) {
-    return kFailed;
-  }
-  const auto own = own_cases(published, *rows);
-  if (format == Format::kTable) {
-    print_comparison(std::cout, published, own);
+  const auto own = cases_of(published, flags);
+  if (format == Format::kTable || format == Format::kMarkdown) {
+    print_comparison(std::cout, format, published, own);
   } else {
     print(std::cout, rows_of(published, compare(published, own)), format);
   }
@@ -115,7 +79,6 @@ void add_paper(CLI::App& app, Command& command) {
       ->needs(database)
       ->capture_default_str();
   add_format_flag(*verb, flags->format);
-  add_worker_flags(*verb, flags->run);
   verb->callback([flags, &command] { command = [flags] { return paper(*flags); }; });
 }
 

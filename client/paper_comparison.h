@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "client/printer.h"
 #include "client/published_table.h"
 #include "proto/oblique.pb.h"
 #include "worker/solver/case_result.h"
@@ -63,8 +64,9 @@ std::vector<std::optional<OwnCase>> solved_cases(const PublishedTable& table,
 std::vector<std::optional<OwnCase>> own_cases(const PublishedTable& table,
                                               const protocol::QueryReply& rows);
 
-/// Prints the tables for people: forces, durations, stick times, modes, summary, misprints.
-void print_comparison(std::ostream& out, const PublishedTable& table,
+/// Prints the tables for people: forces, durations, stick times, modes and where they are not the
+/// published ones, summary, misprints. `format` is kTable or kMarkdown.
+void print_comparison(std::ostream& out, Format format, const PublishedTable& table,
                       const std::vector<std::optional<OwnCase>>& own);
 
 /// The differences as rows, one a published number, for CSV and JSON.

@@ -25,7 +25,7 @@ void add_case(protocol::Row& row, const PublishedCase& published) {
   add_value(row, published.e_star);
 }
 
-// "5.058  5.07  -0.2 %", or what there is of it.
+// "5.058 / 5.07 / -0.24", or what there is of it.
 std::string beside(const std::vector<Difference>& differences, std::size_t case_index,
                    Quantity quantity, std::size_t index, int decimals) {
   const auto found =
@@ -38,16 +38,16 @@ std::string beside(const std::vector<Difference>& differences, std::size_t case_
   }
   const auto published = fmt::format("{:.{}f}", found->published, decimals);
   if (!found->ours) {
-    return fmt::format("{:>6}  {}", "-", published);
+    return fmt::format("- / {}", published);
   }
-  return fmt::format("{:.{}f}  {}  {:+.2f}", *found->ours, decimals + 1, published,
+  return fmt::format("{:.{}f} / {} / {:+.2f}", *found->ours, decimals + 1, published,
                      *found->percent());
 }
 
-void print_forces(std::ostream& out, const PublishedTable& published,
+void print_forces(std::ostream& out, Format format, const PublishedTable& published,
                   const std::vector<Difference>& differences) {
   constexpr std::array<const char*, 3> kPeaks{"1st", "2nd", "3rd"};
-  out << "Peaks of the contact forces (Tab. 2): ours, published [kN], difference [%]\n\n";
+  out << "Peaks of the contact forces (Tab. 2): ours / published [kN] / difference [%]\n\n";
   protocol::QueryReply table;
   add_header(table, {"H", "mu", "e*", "force", kPeaks[0], kPeaks[1], kPeaks[2]});
   for (std::size_t i = 0; i < published.cases.size(); ++i) {
@@ -64,15 +64,15 @@ void print_forces(std::ostream& out, const PublishedTable& published,
       }
     }
   }
-  print(out, table, Format::kTable);
+  print(out, table, format);
 }
 
-void print_durations(std::ostream& out, const PublishedTable& published,
+void print_durations(std::ostream& out, Format format, const PublishedTable& published,
                      const std::vector<Difference>& differences) {
-  out << "\nDurations of compression and restitution (section 4.2): ours, published [ms], "
+  out << "\nDurations of compression and restitution (section 4.2): ours / published [ms] / "
          "difference [%]\n\n";
   protocol::QueryReply table;
-  add_header(table, {"H", "mu", "e*", "phase", "ours, published, difference"});
+  add_header(table, {"H", "mu", "e*", "phase", "ours / published / difference"});
   for (std::size_t i = 0; i < published.cases.size(); ++i) {
     for (std::size_t phase = 0; phase < published.cases[i].phases_ms.size(); ++phase) {
       auto& row = *table.add_rows();
@@ -82,14 +82,14 @@ void print_durations(std::ostream& out, const PublishedTable& published,
       add_value(row, beside(differences, i, Quantity::kPhase, phase, 3));
     }
   }
-  print(out, table, Format::kTable);
+  print(out, table, format);
 }
 
-void print_sticks(std::ostream& out, const PublishedTable& published,
+void print_sticks(std::ostream& out, Format format, const PublishedTable& published,
                   const std::vector<Difference>& differences) {
-  out << "\nTime in stick (section 4.3): ours, published [ms], difference [%]\n\n";
+  out << "\nTime in stick (section 4.3): ours / published [ms] / difference [%]\n\n";
   protocol::QueryReply table;
-  add_header(table, {"H", "mu", "e*", "ours, published, difference"});
+  add_header(table, {"H", "mu", "e*", "ours / published / difference"});
   for (std::size_t i = 0; i < published.cases.size(); ++i) {
     if (published.cases[i].stick_ms) {
       auto& row = *table.add_rows();
@@ -97,10 +97,11 @@ void print_sticks(std::ostream& out, const PublishedTable& published,
       add_value(row, beside(differences, i, Quantity::kStick, 0, 3));
     }
   }
-  print(out, table, Format::kTable);
+  print(out, table, format);
 }
 
-void print_modes(std::ostream& out, const PublishedTable& published, const Own& own) {
+void print_modes(std::ostream& out, Format format, const PublishedTable& published,
+                 const Own& own) {
   out << "\nPeaks and modes, ripples merged (Figs. 4 to 6)\n\n";
   protocol::QueryReply table;
   add_header(table, {"H", "mu", "e*", "peaks", "published", "mode", "published mode"});
@@ -118,7 +119,36 @@ void print_modes(std::ostream& out, const PublishedTable& published, const Own& 
                        ? std::string("the same")
                        : published.cases[i].mode);
   }
-  print(out, table, Format::kTable);
+  print(out, table, format);
+}
+
+std::string place_of(const PublishedCase& in) {
+  return fmt::format("H = {:g}, mu = {:g}, e* = {:g}", in.H_m, in.mu, in.e_star);
+}
+
+// Says plainly which published modes are not ours.
+void print_other_modes(std::ostream& out, const PublishedTable& published, const Own& own) {
+  std::string others;
+  std::size_t solved = 0;
+  std::size_t same = 0;
+  for (std::size_t i = 0; i < published.cases.size(); ++i) {
+    const auto& in = published.cases[i];
+    if (!own[i]) {
+      continue;
+    }
+    ++solved;
+    if (own[i]->major_mode == in.mode) {
+      ++same;
+      continue;
+    }
+    others += fmt::format("- {}: {} ({} peaks), published {} ({})\n", place_of(in),
+                          own[i]->major_mode, own[i]->fn_N.size(), in.mode, published_peaks(in));
+  }
+  if (solved == 0) {
+    return;
+  }
+  out << fmt::format("\nThe mode is the published one in {} of {} cases solved", same, solved);
+  out << (others.empty() ? ".\n" : ". It is another one, with other peaks, at\n\n" + others);
 }
 
 std::string place_of(const PublishedTable& published, const Difference& difference) {
@@ -139,7 +169,7 @@ std::string place_of(const PublishedTable& published, const Difference& differen
       what = "time in stick";
       break;
   }
-  return fmt::format("{} at H = {:g}, mu = {:g}, e* = {:g}", what, in.H_m, in.mu, in.e_star);
+  return what + " at " + place_of(in);
 }
 
 void print_differences_summary(std::ostream& out, const PublishedTable& published,
@@ -157,9 +187,9 @@ void print_differences_summary(std::ostream& out, const PublishedTable& publishe
 }
 
 void print_misprints(std::ostream& out, const PublishedTable& published) {
-  out << "\nNot counted, for they are misprinted:\n";
+  out << "\nNot counted, for they are misprinted:\n\n";
   for (const auto& misprint : published.misprints) {
-    out << "  " << misprint.where << ": ";
+    out << "- " << misprint.where << ": ";
     for (std::size_t i = 0; i < misprint.printed.size(); ++i) {
       out << (i > 0 ? "; " : "") << misprint.printed[i];
     }
@@ -169,12 +199,14 @@ void print_misprints(std::ostream& out, const PublishedTable& published) {
 
 }  // namespace
 
-void print_comparison(std::ostream& out, const PublishedTable& table, const Own& own) {
+void print_comparison(std::ostream& out, Format format, const PublishedTable& table,
+                      const Own& own) {
   const auto differences = compare(table, own);
-  print_forces(out, table, differences);
-  print_durations(out, table, differences);
-  print_sticks(out, table, differences);
-  print_modes(out, table, own);
+  print_forces(out, format, table, differences);
+  print_durations(out, format, table, differences);
+  print_sticks(out, format, table, differences);
+  print_modes(out, format, table, own);
+  print_other_modes(out, table, own);
   print_differences_summary(out, table, differences);
   print_misprints(out, table);
 }

@@ -19,7 +19,7 @@ namespace {
 using protocol::QueryReply;
 using protocol::Value;
 
-constexpr std::array<std::string_view, 3> kFormatNames{"table", "csv", "json"};
+constexpr std::array<std::string_view, 4> kFormatNames{"table", "csv", "json", "markdown"};
 
 // Columns that a person sees: characters, not bytes of UTF-8.
 std::size_t width_of(std::string_view text) {
@@ -86,6 +86,33 @@ void print_table(std::ostream& out, const QueryReply& rows) {
   print_line(out, rule, widths, right);
   for (const auto& line : cells) {
     print_line(out, line, widths, right);
+  }
+}
+
+std::string markdown_cell(const std::string& text) {
+  std::string cell;
+  for (const char letter : text) {
+    cell += letter == '|' ? "\\|" : std::string(1, letter);
+  }
+  return cell;
+}
+
+void print_markdown(std::ostream& out, const QueryReply& rows) {
+  std::string header = "|";
+  std::string rule = "|";
+  for (int i = 0; i < rows.columns_size(); ++i) {
+    const bool is_number = rows.rows_size() > 0 && (rows.rows(0).values(i).has_integer() ||
+                                                    rows.rows(0).values(i).has_real());
+    header += ' ' + markdown_cell(rows.columns(i)) + " |";
+    rule += is_number ? "---:|" : "---|";
+  }
+  out << header << '\n' << rule << '\n';
+  for (const auto& row : rows.rows()) {
+    out << '|';
+    for (const auto& value : row.values()) {
+      out << ' ' << markdown_cell(table_cell(value)) << " |";
+    }
+    out << '\n';
   }
 }
 
@@ -187,6 +214,9 @@ void print(std::ostream& out, const QueryReply& rows, Format format) {
       break;
     case Format::kJson:
       print_json(out, rows);
+      break;
+    case Format::kMarkdown:
+      print_markdown(out, rows);
       break;
   }
 }

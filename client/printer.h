@@ -9,12 +9,14 @@
 
 namespace oblique::client {
 
-enum class Format { kTable, kCsv, kJson };
+enum class Format { kTable, kCsv, kJson, kMarkdown };
 
-/// The format of that name: `table`, `csv` or `json`. Throws solver::InputError for other names.
+/// The format of that name: `table`, `csv`, `json` or `markdown`. Throws solver::InputError for
+/// other names.
 Format format_named(std::string_view name);
 
-/// Prints columns and rows. Tables are for reading: numbers of six digits, aligned. CSV (RFC 4180,
+/// Prints columns and rows. Tables, plain or in Markdown, are for reading: numbers of
+/// six digits, aligned. CSV (RFC 4180,
 /// a header line) and JSON (an array of objects) hold every number so that it reads back as the
 /// same bits; NULL is an empty field, respectively null.
 void print(std::ostream& out, const protocol::QueryReply& rows, Format format);

@@ -74,7 +74,7 @@ void add_source_flags(CLI::App& verb, SourceFlags& flags) {
 }
 
 void add_format_flag(CLI::App& verb, std::string& format) {
-  verb.add_option("--format", format, "table, csv or json")
+  verb.add_option("--format", format, "table, csv, json or markdown")
       ->type_name("FORMAT")
       ->capture_default_str();
 }

@@ -14,8 +14,9 @@
 namespace oblique::client {
 namespace {
 
-const std::vector<std::string> kVerbs{"solve",   "run",    "submit", "status", "watch", "studies",
-                                      "workers", "cancel", "query",  "sql",    "paper"};
+const std::vector<std::string> kVerbs{"solve",   "run",      "submit", "status", "watch",
+                                      "studies", "workers",  "cancel", "query",  "sql",
+                                      "paper",   "converge", "fit"};
 
 TEST(CommandLine, AnswersWrongUsageWithExitCodeTwoAndASentence) {
   const struct {
@@ -50,6 +51,12 @@ TEST(CommandLine, AnswersWrongUsageWithExitCodeTwoAndASentence) {
       {{"sql"}, "STATEMENT is required"},
       {{"paper", "--preset", "papre"}, "papre"},
       {{"paper", "--study", "x"}, "--db"},
+      {{"converge", "--H", "1", "--mu", "0.4,0.6", "--e", "1"}, "2 points, and converge takes one"},
+      {{"converge", "--H", "1", "--mu", "0.4", "--e", "1", "--finest", "24"}, "--finest 24"},
+      {{"converge", "--H", "1", "--mu", "0.4", "--e", "1", "--halvings", "1"}, "--halvings 1"},
+      {{"converge", "--tolerance", "1"}, "--mesh-study"},
+      {{"fit", "--from", "papre"}, "papre"},
+      {{"fit", "--elements-per-link", "0"}, "elements_per_link = 0"},
   };
   for (const auto& [arguments, says] : wrong) {
     const auto outcome = oblique(arguments);

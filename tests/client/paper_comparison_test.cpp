@@ -83,10 +83,10 @@ TEST(Comparison, IsPrintedWithDifferencesSummaryAndMisprints) {
   protocol::QueryReply rows;
   add_point(rows, 1.0, 1.2);
   std::ostringstream out;
-  print_comparison(out, table, own_cases(table, rows));
+  print_comparison(out, Format::kTable, table, own_cases(table, rows));
   const auto text = out.str();
   for (const char* part :
-       {"4.040  4.00  +1.00", "0.1100  0.100  +10.00", "not solved", "the same",
+       {"4.040 / 4.00 / +1.00", "0.1100 / 0.100 / +10.00", "not solved", "the same",
         "7 trustworthy published numbers", "largest 10.00 % (time in stick at H = 1, mu = 1.2",
         "column 3: 7.0 kN", "it is column 2"}) {
     EXPECT_NE(text.find(part), std::string::npos) << part << " is not in:\n" << text;
