@@ -35,14 +35,32 @@ struct QueryFlags {
   SourceFlags source;
 };
 
-std::string statement_of(const QueryFlags& flags) {
+// The statement, from row `skipped` of what it gives.
+std::string statement_of(const QueryFlags& flags, std::int64_t skipped) {
   // The study is chosen inside, where no --where can widen it.
   std::string sql = "SELECT " + flags.select +
                     " FROM (SELECT * FROM runs WHERE study = " + sql_text(flags.study) + ")";
   sql += flags.where.empty() ? "" : " WHERE " + flags.where;
   sql += flags.order.empty() ? "" : " ORDER BY " + flags.order;
-  sql += flags.limit ? " LIMIT " + std::to_string(*flags.limit) : "";
+  // SQL wants a limit before an offset; -1 is none.
+  const std::int64_t limit = flags.limit ? *flags.limit - skipped : -1;
+  sql += " LIMIT " + std::to_string(limit) + " OFFSET " + std::to_string(skipped);
   return sql;
+}
+
+// A server cuts long answers off. The rest is asked for while nothing is added to the study, for
+// new rows would shift the parts against each other.
+protocol::QueryReply all_rows(Source& source, const QueryFlags& flags, bool at_rest) {
+  auto rows = source.query(statement_of(flags, 0));
+  while (rows.truncated() && at_rest) {
+    const auto more = source.query(statement_of(flags, rows.rows_size()));
+    if (more.rows().empty()) {
+      break;
+    }
+    rows.mutable_rows()->MergeFrom(more.rows());
+    rows.set_truncated(more.truncated());
+  }
+  return rows;
 }
 
 // A wrong column's error, with the columns there are.
@@ -65,10 +83,10 @@ int query(const QueryFlags& flags) {
                              " is not allowed: it must be >= 0");
   }
   const auto source = open_source(flags.source);
-  the_study(*source, flags.study);
+  const auto study = the_study(*source, flags.study);
   protocol::QueryReply rows;
   try {
-    rows = source->query(statement_of(flags));
+    rows = all_rows(*source, flags, study.state() != "running");
   } catch (const ConnectionError&) {
     throw;
   } catch (const std::runtime_error& error) {

@@ -14,7 +14,7 @@ namespace oblique::protocol {
 inline constexpr std::uint32_t kProtocolVersion = 1;
 
 /// Largest frame that either side takes; a longer one is a foreign or broken peer.
-inline constexpr std::size_t kMaxFrameBytes = 16 * 1024 * 1024;
+inline constexpr std::size_t kMaxFrameBytes = std::size_t{16} * 1024 * 1024;
 
 /// Serialises a message into one frame.
 std::string encode(const google::protobuf::MessageLite& message);

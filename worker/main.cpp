@@ -2,8 +2,11 @@
 #include <sys/signalfd.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <csignal>
+#include <cstddef>
+#include <cstdio>
 #include <cstdlib>
 #include <exception>
 #include <string>
@@ -26,6 +29,16 @@ std::string host_and_process() {
   std::array<char, 256> host{};
   gethostname(host.data(), host.size() - 1);
   return std::string(host.data()) + ":" + std::to_string(getpid());
+}
+
+/// Empty for a name that any terminal shows and any message carries, else what is wrong with it.
+std::string objection_to_name(const std::string& name) {
+  constexpr std::size_t kLongestName = 200;
+  const bool is_plain =
+      std::all_of(name.begin(), name.end(), [](char c) { return c >= ' ' && c <= '~'; });
+  return is_plain && !name.empty() && name.size() <= kLongestName
+             ? ""
+             : "a name has 1 to 200 printable ASCII characters";
 }
 
 /// Blocks SIGTERM and SIGINT for this thread and those it starts, and returns a descriptor that is
@@ -63,9 +76,8 @@ int run_worker(const SessionSettings& settings) {
   return exit_code;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+/// Everything but errors that nobody foresaw.
+int run_program(int argc, char** argv) {
   spdlog::set_default_logger(spdlog::stderr_color_mt("worker"));
   SessionSettings settings;
   settings.name = host_and_process();
@@ -76,7 +88,9 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", oblique::solver::solver_version());
   app.add_option("--server", settings.server, "Where the server awaits workers")
       ->capture_default_str();
-  app.add_option("--name", settings.name, "Name that people see")->capture_default_str();
+  app.add_option("--name", settings.name, "Name that people see")
+      ->capture_default_str()
+      ->check(objection_to_name);
   app.add_flag("--stop-with-parent", settings.stop_with_parent,
                "Stop when the parent process is gone");
   app.add_flag("--quiet", quiet, "Log warnings and errors only");
@@ -93,8 +107,16 @@ int main(int argc, char** argv) {
   } catch (const oblique::worker::AddressError& error) {
     spdlog::error("{}", error.what());
     return kWrongUsage;
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run_program(argc, argv);
   } catch (const std::exception& error) {
-    spdlog::error("{}", error.what());
+    std::fprintf(stderr, "oblique-worker: %s\n", error.what());
     return EXIT_FAILURE;
   }
 }

@@ -48,8 +48,9 @@ double largest_eigenvalue(const BandedMatrix& stiffness, const BandedMatrix& mas
   while (!is_above(high)) {
     high *= 4.0;
     if (!std::isfinite(high)) {
-      throw InputError("the stiffness of this model is beyond numbers: E, A, I, rho, k, eta2 and the "
-                       "lengths are too far apart in magnitude");
+      throw InputError(
+          "the stiffness of this model is beyond numbers: E, A, I, rho, k, eta2 and the "
+          "lengths are too far apart in magnitude");
     }
   }
   double low = 0.25 * high;

@@ -165,7 +165,8 @@ void Contact::accept(const TipState& end, const ContactIntegrals<double>& integr
   }
   if (steps_ > kMostSteps) {
     std::ostringstream message;
-    message << "the contact takes more than " << kMostSteps << " steps of " << full_step_s() << " s";
+    message << "the contact takes more than " << kMostSteps << " steps of " << full_step_s()
+            << " s";
     throw SolveError(message.str());
   }
 }

@@ -38,7 +38,7 @@ class GeneralizedAlphaMotion : public Motion {
   /// Newton stops when a correction moves no position by more than this fraction of an element's
   /// length and no slope by more than this; convergence is quadratic, so what remains is far below
   /// rounding.
-  static constexpr double kNewtonTolerance = 1e-9;
+  static constexpr double kNewtonTolerance = 1e-7;
   static constexpr int kMostIterations = 20;
 
   explicit GeneralizedAlphaMotion(const ModelParameters& model);

@@ -105,8 +105,8 @@ RigidImpact::Ending RigidImpact::end_of(const Motion& motion) const {
     watches.push_back({End::kSeparation, 0.0, [&](double t) { return -motion.force_N(t)[1]; }});
   }
   const double turn_sign = regime.compression ? 1.0 : -1.0;
-  watches.push_back(
-      {End::kTurn, 0.0, [&, turn_sign](double t) { return turn_sign * motion.velocity_m_s(t)[1]; }});
+  watches.push_back({End::kTurn, 0.0,
+                     [&, turn_sign](double t) { return turn_sign * motion.velocity_m_s(t)[1]; }});
   if (regime.stick) {
     for (const double s : {1.0, -1.0}) {
       watches.push_back({End::kSlip, s, [&, s](double t) {

@@ -11,7 +11,8 @@ namespace oblique::solver {
 /// d(V_t, V_n)/dt = W (F_t, F_n), with W symmetric and positive definite. In each regime the force
 /// is F_0 - K r, r the tip's way since the regime began, so that
 ///
-///   r'' = W F_0 - W K r,   K = diag(k/eta2, k_n) in stick,   rows (0, -s mu k_n), (0, k_n) in slip,
+///   r'' = W F_0 - W K r,   K = diag(k/eta2, k_n) in stick,   rows (0, -s mu k_n), (0, k_n) in
+///   slip,
 ///
 /// which is solved mode by mode; regimes end at roots of functions of that solution, found by
 /// scanning and bisection. Nothing is shared with the solver.

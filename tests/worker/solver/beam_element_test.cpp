@@ -43,7 +43,9 @@ GradientCoefficients<double> gradient(const Nodes& q) {
   return gradient_coefficients(at(0), at(1), at(2), at(3), 1.0 / kLength_m);
 }
 
-double energy(const Nodes& q) { return strain_energy(gradient(q), kHalfEALength, kBending); }
+double energy(const Nodes& q) {
+  return strain_energy(gradient(q), kHalfEALength, kBending);
+}
 
 /// dU/dq from dU/dc, by c0 = (p_j - p_i)/l, c1 = (s_j - s_i)/2, c2 = (s_i + s_j)/2 - c0.
 Nodes energy_gradient(const Nodes& q) {
@@ -72,8 +74,8 @@ Eigen::RowVector4d shape(int order, double x) {
   Eigen::RowVector4d s;
   switch (order) {
     case 0:
-      s << 1 - 3 * z * z + 2 * z * z * z, l * (z - 2 * z * z + z * z * z), 3 * z * z - 2 * z * z * z,
-          l * (z * z * z - z * z);
+      s << 1 - 3 * z * z + 2 * z * z * z, l * (z - 2 * z * z + z * z * z),
+          3 * z * z - 2 * z * z * z, l * (z * z * z - z * z);
       return s;
     case 1:
       s << (-6 * z + 6 * z * z) / l, 1 - 4 * z + 3 * z * z, (6 * z - 6 * z * z) / l,
@@ -128,8 +130,8 @@ TEST(BeamElement, ElasticForceIsMinusTheGradientOfTheStrainEnergy) {
   for (int sample = 0; sample < 200; ++sample) {
     const Nodes q = random_nodes(generator);
     const Nodes direction = random_nodes(generator);
-    const double expected = five_point_difference(
-        [&](double h) -> double { return energy(q + h * direction); }, 0.1);
+    const double expected =
+        five_point_difference([&](double h) -> double { return energy(q + h * direction); }, 0.1);
     const double scale = energy_gradient(q).norm() * direction.norm();
     EXPECT_NEAR(energy_gradient(q).cwiseProduct(direction).sum(), expected, 1e-12 * scale);
   }

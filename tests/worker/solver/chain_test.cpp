@@ -125,17 +125,16 @@ TEST(Chain, JointsTurnFreely) {
   Coordinates q = chain.at_rest().q;
   // Rows: pin, slope, slope at the joint, joint, slope after the joint, tip, slope.
   ASSERT_EQ(chain.rows(), 7U);
-  const std::size_t tip = 2 * chain.tip_row();
-  q[2 * 4] = 0.0;
-  q[2 * 4 + 1] = 1.0;
-  q[tip] = 0.4;
-  q[tip + 1] = 0.4;
-  q[tip + 2] = 0.0;
-  q[tip + 3] = 1.0;
+  const auto set = [&q](std::size_t row, double x, double y) {
+    q[2 * row] = x;
+    q[2 * row + 1] = y;
+  };
+  set(4, 0.0, 1.0);
+  set(5, 0.4, 0.4);
+  set(6, 0.0, 1.0);
   EXPECT_LT(chain.strain_energy_J(q), 1e-20);
   // At the slope before the joint, the same turn bends the inner link.
-  std::swap(q[2 * 2], q[2 * 4]);
-  std::swap(q[2 * 2 + 1], q[2 * 4 + 1]);
+  set(2, 0.0, 1.0);
   EXPECT_GT(chain.strain_energy_J(q), 1.0);
 }
 
@@ -188,7 +187,8 @@ TEST(Chain, TipMassAddsToTheMassThatAForceAtTheTipMeets) {
     const ChainProbe probe(chain);
     const Coordinates q = chain.at_rest().q;
     const auto tip = static_cast<Eigen::Index>(chain.tip_row() - 1);
-    const ChainProbe::Pairs change = probe.accelerations(q, 0.0, 1.0) - probe.accelerations(q, 0.0, 0.0);
+    const ChainProbe::Pairs change =
+        probe.accelerations(q, 0.0, 1.0) - probe.accelerations(q, 0.0, 0.0);
     return 1.0 / change(tip, 1);
   };
   const double bare_kg = tip_inertia_kg();

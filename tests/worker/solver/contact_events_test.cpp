@@ -48,8 +48,12 @@ std::optional<EventGuess> guess(const ContactLaw& law, ContactEvent event, const
   return guess_event(law, event, motion.at(0.0), motion.at(1.0), kStep_s, 1.0, fresh);
 }
 
-ContactLaw slipping() { return ContactLaw(kParameters, {0.0, 0.0, 1.0, -1.0}); }
-ContactLaw sticking() { return ContactLaw(kParameters, {0.0, 0.0, 0.1, -1.0}); }
+ContactLaw slipping() {
+  return ContactLaw(kParameters, {0.0, 0.0, 1.0, -1.0});
+}
+ContactLaw sticking() {
+  return ContactLaw(kParameters, {0.0, 0.0, 0.1, -1.0});
+}
 
 /// In restitution with F_n = 10 N at y = -1e-5.
 ContactLaw restitution(bool stick) {
@@ -69,8 +73,8 @@ TEST(ContactEvents, EachRegimeHasItsOwnEventsInTheOrderInWhichTheyAreTaken) {
   EXPECT_THAT(possible(restitution(false)), ElementsAre(kSeparation, kTurn, kStick));
   EXPECT_THAT(possible(sticking()),
               ElementsAre(kTurn, kSlipForward, kSlipBackward, kTangentialExtremum));
-  EXPECT_THAT(possible(restitution(true)), ElementsAre(kSeparation, kTurn, kSlipForward,
-                                                       kSlipBackward, kTangentialExtremum));
+  EXPECT_THAT(possible(restitution(true)),
+              ElementsAre(kSeparation, kTurn, kSlipForward, kSlipBackward, kTangentialExtremum));
 }
 
 TEST(ContactEvents, RatesAreTheDerivativesOfTheFunctionsDefinedByForces) {
@@ -134,7 +138,8 @@ TEST(GuessEvent, ForceThatFallsToZeroAlongACubicIsFoundExactly) {
 TEST(GuessEvent, MotionThatDoesNotCrossGivesNothing) {
   EXPECT_FALSE(guess(slipping(), ContactEvent::kTurn, with_normal_velocity(-1.0, 0.5, 0.2)));
   // Falling through zero is not an event.
-  EXPECT_FALSE(guess(restitution(false), ContactEvent::kTurn, with_normal_velocity(0.5, -0.2, 0.0)));
+  EXPECT_FALSE(
+      guess(restitution(false), ContactEvent::kTurn, with_normal_velocity(0.5, -0.2, 0.0)));
 }
 
 TEST(GuessEvent, DoubleCrossingInsideAStepIsSeenFromThePolynomialAlone) {

@@ -65,8 +65,7 @@ void expect_closed_form(const RigidImpact::Parameters& p, double tolerance = 1e-
   for (std::size_t i = 0; i < result.peaks.size(); ++i) {
     EXPECT_NEAR(result.peaks[i].fn_N, exact.fn_peaks_N()[i], tolerance * force_N);
   }
-  const Eigen::Vector2d impulse =
-      p.W_per_kg.inverse() * (exact.velocity_out_m_s() - p.V0_m_s);
+  const Eigen::Vector2d impulse = p.W_per_kg.inverse() * (exact.velocity_out_m_s() - p.V0_m_s);
   EXPECT_NEAR(result.impulse_t_Ns, impulse[0], tolerance * impulse.norm());
   EXPECT_NEAR(result.impulse_n_Ns, impulse[1], tolerance * impulse.norm());
   EXPECT_LT(result.energy.closure, tolerance);
@@ -84,9 +83,9 @@ TEST(ContactOfARigidBody, FollowsTheClosedFormInEveryRegime) {
       {"SC SR sR", impact(3.5, 0.0, 1.0, 0.6, 0.7, 0.4, -1.0)},
       {"SC sC sR", impact(1.0, 0.5, 1.0, 0.2, 0.7, 0.22, -1.0)},
       {"sC SC SR sR", impact(3.5, 0.0, 1.0, 0.5, 0.7, 1.0, -1.0)},
-      {"sC sR SR sR", impact(3.4928785161876057, 1.2891535126663172, 0.93766677179615554,
-                             0.66391722246148854, 0.72912460571295656, -1.664905994595733,
-                             -0.65960054168311433, 1.0147357221371993)},
+      {"sC sR SR sR",
+       impact(3.4928785161876057, 1.2891535126663172, 0.93766677179615554, 0.66391722246148854,
+              0.72912460571295656, -1.664905994595733, -0.65960054168311433, 1.0147357221371993)},
   };
   for (const Regime& regime : regimes) {
     SCOPED_TRACE(regime.mode);
@@ -109,8 +108,7 @@ TEST(ContactOfARigidBody, FollowsTheClosedFormAtRandom) {
     const double vt_m_s = uniform(-3.0, 3.0);
     const double vn_m_s = uniform(-1.0, -0.3);
     SCOPED_TRACE(i);
-    expect_closed_form(
-        impact(W_tt, W_tn, W_nn, mu, e_star, vt_m_s, vn_m_s, uniform(0.5, 2.5)));
+    expect_closed_form(impact(W_tt, W_tn, W_nn, mu, e_star, vt_m_s, vn_m_s, uniform(0.5, 2.5)));
   }
 }
 
@@ -151,8 +149,8 @@ TEST(ContactOfARigidBody, EventLocationCostsNoOrder) {
     return (V - exact.velocity_out_m_s()).norm() +
            std::abs(result.duration_s - exact.duration_s()) / radian_s;
   };
-  for (const auto& p : {impact(1.5, 0.4, 1.0, 0.3, 0.6, -2.0, -1.0),
-                        impact(3.5, 0.0, 1.0, 0.5, 0.7, 1.0, -1.0)}) {
+  for (const auto& p :
+       {impact(1.5, 0.4, 1.0, 0.3, 0.6, -2.0, -1.0), impact(3.5, 0.0, 1.0, 0.5, 0.7, 1.0, -1.0)}) {
     // Steps fall differently between events at each length, so the ratio scatters about 16.
     EXPECT_GT(error(p, 0.2) / error(p, 0.05), 11.3 * 11.3);
     EXPECT_GT(error(p, 0.1) / error(p, 0.025), 11.3 * 11.3);
@@ -190,8 +188,7 @@ TEST(ContactOfARigidBody, CoincidingEventsGiveTheLimitOfThoseThatFollowEachOther
   for (const double e_star : {0.8, 1.0}) {
     const CaseResult at_once = solved(impact(1.5, 0.0, 1.0, 0.4, e_star, 0.6, -1.0));
     for (const double shift_m_s : {-1e-7, 1e-7}) {
-      const CaseResult apart =
-          solved(impact(1.5, 0.0, 1.0, 0.4, e_star, 0.6 + shift_m_s, -1.0));
+      const CaseResult apart = solved(impact(1.5, 0.0, 1.0, 0.4, e_star, 0.6 + shift_m_s, -1.0));
       EXPECT_NEAR(at_once.vt_out_m_s, apart.vt_out_m_s, 1e-5);
       EXPECT_NEAR(at_once.duration_s, apart.duration_s, 1e-5 * radian_s);
     }

@@ -56,10 +56,9 @@ double beam_error(int elements) {
   const BeamEndOnSpring exact(model.rho_kg_m3 * model.A_m2, model.E_Pa * model.I_m4, k_N_m,
                               kSpeed_m_s);
   double largest = 0.0;
-  follow(chain, {k_N_m, 1.0, 0.0, 1.0}, start, 1.5 * exact.peak_time_s(),
-         [&](const TraceRow& row) {
-           largest = std::max(largest, std::abs(row.fn_N - exact.force_N(row.t_s)));
-         });
+  follow(chain, {k_N_m, 1.0, 0.0, 1.0}, start, 1.5 * exact.peak_time_s(), [&](const TraceRow& row) {
+    largest = std::max(largest, std::abs(row.fn_N - exact.force_N(row.t_s)));
+  });
   return largest / exact.peak_N();
 }
 
@@ -71,8 +70,9 @@ TEST(BeamTipOnSpring, IsAsNearTheMittagLefflerSolutionAsTheMeshAllows) {
 }
 
 /// Largest error of the force on the end of a rod that flies along itself onto a spring, and its
-/// last value, over the force on a wall. The link stands on end, its tip below; its other end is held by the pin, whose
-/// wave arrives at L/c, so that only the time up to `fraction` of that counts.
+/// last value, over the force on a wall. The link stands on end, its tip below; its other end is
+/// held by the pin, whose wave arrives at L/c, so that only the time up to `fraction` of that
+/// counts.
 struct RodForce {
   double largest_error;
   double last;

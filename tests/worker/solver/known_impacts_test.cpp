@@ -53,8 +53,7 @@ TEST(KnownImpacts, PeaksOfTheForcesAreKnown) {
     }
     EXPECT_EQ(result.fn_peak_N, largest_N);
     if (known.ft_peak_N > 0.0) {
-      EXPECT_NEAR(result.ft_peak_N, known.ft_peak_N,
-                  kRelative * known.ft_peak_N + kForceDigit_N);
+      EXPECT_NEAR(result.ft_peak_N, known.ft_peak_N, kRelative * known.ft_peak_N + kForceDigit_N);
     }
   });
 }
@@ -93,9 +92,8 @@ TEST(KnownImpacts, ModesAndNumbersOfMajorPeaksAreThePublishedOnes) {
 }
 
 TEST(KnownImpacts, EnergyBalanceClosesToAMillionthOfTheWorkExchanged) {
-  for_each_impact([](const KnownImpact&, const CaseResult& result) {
-    EXPECT_LT(result.energy.closure, 1e-6);
-  });
+  for_each_impact(
+      [](const KnownImpact&, const CaseResult& result) { EXPECT_LT(result.energy.closure, 1e-6); });
 }
 
 TEST(KnownImpacts, ExitVelocitiesAreThoseOfAFourTimesShorterStep) {

@@ -31,11 +31,11 @@ const std::vector<Case>& cases() {
       {"ripple on the way down, then a peak",
        {100, 30, 33, 10, 60},
        {true, false, false, true, true}},
-      {"ripple at the foot of a later peak", {100, 20, 23, 21, 80}, {true, true, false, false, true}},
+      {"ripple at the foot of a later peak",
+       {100, 20, 23, 21, 80},
+       {true, true, false, false, true}},
       {"the shallowest goes first", {100, 50, 54, 51, 90}, {true, true, false, false, true}},
-      {"two ripples on one slope",
-       {100, 70, 72, 40, 43},
-       {true, false, false, false, false}},
+      {"two ripples on one slope", {100, 70, 72, 40, 43}, {true, false, false, false, false}},
       {"all ripples leave the largest", {98, 96, 100, 97, 99}, {false, false, true, false, false}},
   };
   return table;

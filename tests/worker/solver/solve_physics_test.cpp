@@ -55,8 +55,8 @@ TEST(Impact, LossInRestitutionIsThatOfEveryCycleBetweenItsTurns) {
   double loss_J = 0.0;
   double fn_N = 0.0;
   for (const Phase& phase : result.phases) {
-    const double work_J = (phase.fn_end_N * phase.fn_end_N - fn_N * fn_N) /
-                          (2.0 * paper_finger().model().k_N_m);
+    const double work_J =
+        (phase.fn_end_N * phase.fn_end_N - fn_N * fn_N) / (2.0 * paper_finger().model().k_N_m);
     loss_J += phase.kind == PhaseKind::kCompression ? work_J : e_star * e_star * work_J;
     fn_N = phase.fn_end_N;
   }

@@ -12,12 +12,28 @@ namespace oblique::solver {
 namespace {
 
 void expect_finite(const CaseResult& r) {
-  for (const double value :
-       {r.fall_time_s, r.impact_x_m, r.vt_in_m_s, r.vn_in_m_s, r.duration_s, r.fn_peak_N,
-        r.ft_peak_N, r.impulse_n_Ns, r.impulse_t_Ns, r.slide_m, r.vt_out_m_s, r.vn_out_m_s,
-        r.stick_total_s, r.energy.kinetic_in_J, r.energy.friction_J, r.energy.restitution_J,
-        r.energy.kinetic_change_J, r.energy.strain_change_J, r.energy.gravity_change_J,
-        r.energy.exchanged_J, r.energy.closure, r.solver.dt_s}) {
+  for (const double value : {r.fall_time_s,
+                             r.impact_x_m,
+                             r.vt_in_m_s,
+                             r.vn_in_m_s,
+                             r.duration_s,
+                             r.fn_peak_N,
+                             r.ft_peak_N,
+                             r.impulse_n_Ns,
+                             r.impulse_t_Ns,
+                             r.slide_m,
+                             r.vt_out_m_s,
+                             r.vn_out_m_s,
+                             r.stick_total_s,
+                             r.energy.kinetic_in_J,
+                             r.energy.friction_J,
+                             r.energy.restitution_J,
+                             r.energy.kinetic_change_J,
+                             r.energy.strain_change_J,
+                             r.energy.gravity_change_J,
+                             r.energy.exchanged_J,
+                             r.energy.closure,
+                             r.solver.dt_s}) {
     EXPECT_TRUE(std::isfinite(value));
   }
 }
@@ -72,13 +88,14 @@ PointRequest random_point(const Finger& finger, std::mt19937_64& generator) {
   const auto uniform = [&generator](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(generator);
   };
-  const double top_m = std::min(finger.largest_drop_m(), 0.999999 * [&finger] {
-    double length_m = 0.0;
-    for (const double link_m : finger.model().lengths_m) {
-      length_m += link_m;
-    }
-    return length_m;
-  }());
+  const double top_m = std::min(
+      finger.largest_drop_m(), 0.999999 * [&finger] {
+        double length_m = 0.0;
+        for (const double link_m : finger.model().lengths_m) {
+          length_m += link_m;
+        }
+        return length_m;
+      }());
   PointRequest point{0, top_m * uniform(0.05, 0.98), uniform(0.0, 2.0), uniform(0.05, 1.0)};
   switch (std::uniform_int_distribution<int>(0, 17)(generator)) {
     case 0:
@@ -125,9 +142,13 @@ ModelParameters five_links() {
   return model;
 }
 
-TEST(SolveSweep, ThreeLinks) { sweep(coarse_model(2), 60, 1); }
+TEST(SolveSweep, ThreeLinks) {
+  sweep(coarse_model(2), 60, 1);
+}
 
-TEST(SolveSweep, OneElementALink) { sweep(coarse_model(1), 60, 2); }
+TEST(SolveSweep, OneElementALink) {
+  sweep(coarse_model(1), 60, 2);
+}
 
 TEST(SolveSweep, OneLink) {
   ModelParameters model = coarse_model(3);
@@ -135,7 +156,9 @@ TEST(SolveSweep, OneLink) {
   sweep(model, 60, 3);
 }
 
-TEST(SolveSweep, FiveLinks) { sweep(five_links(), 40, 4); }
+TEST(SolveSweep, FiveLinks) {
+  sweep(five_links(), 40, 4);
+}
 
 TEST(SolveSweep, TipMass) {
   ModelParameters model = coarse_model();
@@ -164,7 +187,9 @@ TEST(SolveSweep, TangentialSpringSofterAndHarderThanTheNormalOne) {
   sweep(model, 20, 10);
 }
 
-TEST(SolveSweep, SlowManyPointsOfThePaper) { sweep(ModelParameters{}, 3000, 11); }
+TEST(SolveSweep, SlowManyPointsOfThePaper) {
+  sweep(ModelParameters{}, 3000, 11);
+}
 
 }  // namespace
 }  // namespace oblique::solver

@@ -150,6 +150,52 @@ TEST(Trace, NoRowExceedsThePeaksAndEachPeakIsARow) {
   }
 }
 
+TEST(Trace, TangentialForceOfAPeakIsTheLargestBetweenTheValleysBesideIt) {
+  for (const Traced& t : traces()) {
+    for (std::size_t i = 0; i < t.result.peaks.size(); ++i) {
+      const double from_s = t.result.phases[2 * i].t0_s;
+      const double to_s = t.result.phases[2 * i + 1].t1_s;
+      double largest_N = 0.0;
+      for (const TraceRow& row : t.rows) {
+        if (row.t_s >= from_s && row.t_s <= to_s) {
+          largest_N = std::max(largest_N, std::abs(row.ft_N));
+        }
+      }
+      EXPECT_NEAR(t.result.peaks[i].ft_N, largest_N, 1e-6);
+    }
+  }
+}
+
+TEST(Trace, TangentialPeaksAreTheLocalMaximaOfTheTangentialForce) {
+  std::vector<Traced> many = traces();
+  for (const double mu : {0.7, 1.0, 1.3, 2.5}) {
+    for (const double H_m : {0.1, 0.5, 1.1}) {
+      many.push_back(traced(H_m, mu, 0.9));
+    }
+  }
+  for (const Traced& t : many) {
+    SCOPED_TRACE(t.result.mode);
+    // Rows of distinct instants, so that both sides of an event count once.
+    std::vector<TraceRow> rows;
+    for (const TraceRow& row : t.rows) {
+      if (rows.empty() || row.t_s > rows.back().t_s + 1e-11) {
+        rows.push_back(row);
+      }
+    }
+    std::vector<double> maxima_N;
+    for (std::size_t i = 1; i + 1 < rows.size(); ++i) {
+      const double ft_N = std::abs(rows[i].ft_N);
+      if (ft_N > std::abs(rows[i - 1].ft_N) && ft_N > std::abs(rows[i + 1].ft_N)) {
+        maxima_N.push_back(ft_N);
+      }
+    }
+    ASSERT_EQ(t.result.ft_peaks.size(), maxima_N.size());
+    for (std::size_t i = 0; i < maxima_N.size(); ++i) {
+      EXPECT_NEAR(t.result.ft_peaks[i].ft_N, maxima_N[i], 1e-6 + 1e-9 * maxima_N[i]);
+    }
+  }
+}
+
 TEST(Trace, ReactionsAtThePinAndTheJointsMoveTheLinks) {
   // Three links have the pin and two joints.
   for (const Traced& t : traces()) {
@@ -165,8 +211,8 @@ TEST(Trace, ReactionsAtThePinAndTheJointsMoveTheLinks) {
   for (std::size_t joint = 0; joint < 3; ++joint) {
     double largest_N = 0.0;
     for (const TraceRow& row : rows) {
-      largest_N = std::max(largest_N, std::hypot(row.reactions_N[2 * joint],
-                                                 row.reactions_N[2 * joint + 1]));
+      largest_N = std::max(largest_N,
+                           std::hypot(row.reactions_N[2 * joint], row.reactions_N[2 * joint + 1]));
     }
     EXPECT_NEAR(result.reaction_peaks[joint].force_N, largest_N, 0.02 * largest_N);
   }
