@@ -17,9 +17,9 @@ class StepChoice {
   static constexpr double kFallFraction = 0.5;
   static constexpr double kContactFraction = 0.2;
   /// Generalized-alpha: fraction of sqrt(length/g) in the fall (5 us for the default model) and of
-  /// sqrt(mass of the last link/k) in contact (0.24 us).
+  /// sqrt(mass of the last link/k) in contact (0.1 us).
   static constexpr double kImplicitFallFraction = 1.0 / 40'000.0;
-  static constexpr double kImplicitContactFraction = 1.0 / 600.0;
+  static constexpr double kImplicitContactFraction = 1.0 / 1500.0;
   /// The restitution spring is e*^-2 times stiffer and its motion e*^-1 times faster. Below this e*
   /// it is faster than the chain's own response to contact, and steps in restitution shrink with
   /// it.
