@@ -49,6 +49,23 @@ double stick_s(const CaseResult& result) {
   return sum;
 }
 
+/// Local maxima of |F_t| in the closed form, by sampling.
+std::vector<double> tangential_maxima_N(const RigidImpact& exact) {
+  constexpr int kSamples = 5000;
+  std::vector<double> maxima_N;
+  double before_N = 0.0;
+  double here_N = 0.0;
+  for (int i = 1; i <= kSamples; ++i) {
+    const double next_N = std::abs(exact.force_N(exact.duration_s() * i / kSamples)[0]);
+    if (here_N > before_N && here_N >= next_N) {
+      maxima_N.push_back(here_N);
+    }
+    before_N = here_N;
+    here_N = next_N;
+  }
+  return maxima_N;
+}
+
 /// Step of 2e-3 rad: order 4 leaves 1e-11.
 void expect_closed_form(const RigidImpact::Parameters& p, double tolerance = 1e-9) {
   const RigidImpact exact(p);
@@ -64,6 +81,12 @@ void expect_closed_form(const RigidImpact::Parameters& p, double tolerance = 1e-
   ASSERT_EQ(result.peaks.size(), exact.fn_peaks_N().size());
   for (std::size_t i = 0; i < result.peaks.size(); ++i) {
     EXPECT_NEAR(result.peaks[i].fn_N, exact.fn_peaks_N()[i], tolerance * force_N);
+  }
+  const std::vector<double> maxima_N = tangential_maxima_N(exact);
+  ASSERT_EQ(result.ft_peaks.size(), maxima_N.size());
+  for (std::size_t i = 0; i < maxima_N.size(); ++i) {
+    // Kinks are met by samples to a 5000th of the duration only.
+    EXPECT_NEAR(result.ft_peaks[i].ft_N, maxima_N[i], 2e-3 * force_N);
   }
   const Eigen::Vector2d impulse = p.W_per_kg.inverse() * (exact.velocity_out_m_s() - p.V0_m_s);
   EXPECT_NEAR(result.impulse_t_Ns, impulse[0], tolerance * impulse.norm());

@@ -175,7 +175,7 @@ TEST(Trace, TangentialPeaksAreTheLocalMaximaOfTheTangentialForce) {
   }
   for (const Traced& t : many) {
     SCOPED_TRACE(t.result.mode);
-    // Rows of distinct instants, so that both sides of an event count once.
+    // Rows of distinct instants, so that both sides of an event count once: 1e-11 s at 1e7 N/s.
     std::vector<TraceRow> rows;
     for (const TraceRow& row : t.rows) {
       if (rows.empty() || row.t_s > rows.back().t_s + 1e-11) {
@@ -191,7 +191,7 @@ TEST(Trace, TangentialPeaksAreTheLocalMaximaOfTheTangentialForce) {
     }
     ASSERT_EQ(t.result.ft_peaks.size(), maxima_N.size());
     for (std::size_t i = 0; i < maxima_N.size(); ++i) {
-      EXPECT_NEAR(t.result.ft_peaks[i].ft_N, maxima_N[i], 1e-6 + 1e-9 * maxima_N[i]);
+      EXPECT_NEAR(t.result.ft_peaks[i].ft_N, maxima_N[i], 1e-4);
     }
   }
 }
