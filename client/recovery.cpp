@@ -17,7 +17,7 @@ using Eigen::VectorXd;
 
 constexpr int kMostIterations = 50;
 constexpr double kSmallestStep = 1e-5;
-constexpr double kSmallestGain = 1e-5;
+constexpr double kSmallestGain = 1e-3;
 /// Of a parameter, for derivatives: the outputs are smooth to about 1e-7 of themselves.
 constexpr double kDifferenceStep = 1e-4;
 

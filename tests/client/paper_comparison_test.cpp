@@ -3,6 +3,7 @@
 #include <cmath>
 #include <sstream>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -34,14 +35,17 @@ PublishedTable small_table() {
           .misprints = {{.where = "column 3", .printed = {"7.0 kN"}, .why = "it is column 2"}}};
 }
 
-void add_point(protocol::QueryReply& rows, double H_m, double mu) {
+// The third peak is a ripple.
+constexpr const char* kLateRipple = "[[1e-5,4040,2020,1],[2e-5,1000,500,1],[3e-5,990,495,0]]";
+
+void add_point(protocol::QueryReply& rows, double H_m, double mu,
+               const std::string& peaks = kLateRipple) {
   auto& row = *rows.add_rows();
   add_value(row, std::int64_t{0});
   add_value(row, H_m);
   add_value(row, mu);
   add_value(row, 1.0);
-  // The second peak is a ripple.
-  add_value(row, std::string("[[1e-5,4040,2020,1],[2e-5,4000,2000,0],[3e-5,1000,500,1]]"));
+  add_value(row, peaks);
   add_value(row, std::string("[[\"compression\",0,1e-4],[\"restitution\",1e-4,3e-4]]"));
   add_value(row, 1.1e-4);
   add_value(row, std::string("SC SR sR sC sR"));
@@ -62,6 +66,26 @@ TEST(Comparison, PutsMajorPeaksPhasesAndStickBesideWhatIsPublished) {
   EXPECT_EQ(summary.missing, 0U);
   EXPECT_NEAR(summary.largest_percent, 10.0, 1e-9);
   EXPECT_NEAR(summary.rms_percent, std::sqrt((1.0 + 1.0 + 100.0) / 7.0), 1e-9);
+}
+
+TEST(Comparison, LeavesOutPhasesOfARowFromTheFirstRippleOn) {
+  const auto table = small_table();
+  protocol::QueryReply rows;
+  add_point(rows, 1.0, 1.2, "[[1e-5,4040,2020,1],[2e-5,4000,2000,0],[3e-5,1000,500,1]]");
+  const auto own = own_cases(table, rows).front().value();
+  EXPECT_EQ(own.phases_s, std::vector<double>{1e-4});
+  EXPECT_EQ(own.fn_N, (std::vector<double>{4040.0, 1000.0}));
+}
+
+TEST(Comparison, MergesRipplesInThePhasesOfAResult) {
+  using solver::PhaseKind;
+  solver::CaseResult result{};
+  // Turns at 4000, 100, 200, 150, 1000 N: the peak of 200 and the valley of 150 are a ripple.
+  result.phases = {
+      {PhaseKind::kCompression, 0.0, 1.0, 4000.0}, {PhaseKind::kRestitution, 1.0, 3.0, 100.0},
+      {PhaseKind::kCompression, 3.0, 4.0, 200.0},  {PhaseKind::kRestitution, 4.0, 5.0, 150.0},
+      {PhaseKind::kCompression, 5.0, 9.0, 1000.0}, {PhaseKind::kRestitution, 9.0, 16.0, 0.0}};
+  EXPECT_EQ(own_case(result).phases_s, (std::vector<double>{1.0, 2.0, 6.0, 7.0}));
 }
 
 TEST(Comparison, CountsWhatWeDoNotHaveAsMissing) {
@@ -88,9 +112,25 @@ TEST(Comparison, IsPrintedWithDifferencesSummaryAndMisprints) {
   for (const char* part :
        {"4.040 / 4.00 / +1.00", "0.1100 / 0.100 / +10.00", "not solved", "the same",
         "7 trustworthy published numbers", "largest 10.00 % (time in stick at H = 1, mu = 1.2",
-        "column 3: 7.0 kN", "it is column 2"}) {
+        "The mode is the published one in 1 of 1 cases", "column 3: 7.0 kN", "it is column 2"}) {
     EXPECT_NE(text.find(part), std::string::npos) << part << " is not in:\n" << text;
   }
+}
+
+TEST(Comparison, SaysPlainlyWhereTheModeIsNotThePublishedOne) {
+  auto table = small_table();
+  table.cases[0].mode = "sC sR";
+  protocol::QueryReply rows;
+  add_point(rows, 1.0, 1.2);
+  std::ostringstream out;
+  print_comparison(out, Format::kMarkdown, table, own_cases(table, rows));
+  EXPECT_NE(out.str().find("The mode is the published one in 0 of 1 cases solved"),
+            std::string::npos);
+  EXPECT_NE(
+      out.str().find("- H = 1, mu = 1.2, e* = 1: SC SR sR sC sR (2 peaks), published sC sR (1)"),
+      std::string::npos)
+      << out.str();
+  EXPECT_NE(out.str().find("| 4.040 / 4.00 / +1.00 |"), std::string::npos) << out.str();
 }
 
 TEST(Comparison, HasOneRowForEachNumber) {

@@ -37,10 +37,10 @@ TEST(Energy, BalancesOverThePublishedContactsUnderBothIntegrators) {
         std::max(by_generalized_alpha, closure(both.generalized_alpha_case(point, 1e-7)));
   }
   expect_at_most({"ten published contacts, explicit, 1 us: energy missing, of that exchanged",
-                  kBalance, by_explicit, 1e-6, "required"});
+                  kBalance, by_explicit, 1e-6, "stated accuracy"});
   expect_at_most(
       {"ten published contacts, generalized-alpha, 0.1 us: energy missing, of that exchanged",
-       kBalance, by_generalized_alpha, 1e-6, "required"});
+       kBalance, by_generalized_alpha, 1e-6, "stated accuracy"});
 }
 
 /// Energy gained or lost in the fall to H = 1, of the kinetic energy there.

@@ -84,7 +84,7 @@ Values reactions(const CaseResult& r) {
 
 }  // namespace
 
-const std::vector<Output> outputs() {
+std::vector<Output> outputs() {
   return {
       {"largest F_n", "itself", [](const CaseResult& r) { return Values{r.fn_peak_N}; }, itself,
        true},

@@ -20,7 +20,7 @@ struct Output {
 };
 
 /// All outputs of a case that are numbers.
-const std::vector<Output> outputs();
+std::vector<Output> outputs();
 
 /// Largest difference of one output between two results, relative to its scale in `right`. The
 /// results must have equally many values.

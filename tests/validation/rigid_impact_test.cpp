@@ -68,10 +68,10 @@ struct Regime {
 };
 /// Each regime of Stronge's theory, by the order of states that the closed form has.
 constexpr std::array<Regime, 5> kRegimes{{{"slip throughout", "sC sR", 0.3, 3.0},
-                                          {"stick until the end slips", "SC SR sR", 0.8, 1.0},
+                                          {"stick, then slip in restitution", "SC SR sR", 0.8, 1.0},
                                           {"slip, stick, slip", "sC SC SR sR", 0.1, 1.0},
                                           {"stick that slips in compression", "SC sC sR", 0.5, 3.0},
-                                          {"slip with reversed start", "sC sR", 0.1, -1.0}}};
+                                          {"slip the other way", "sC sR", 0.1, -1.0}}};
 
 TEST(RigidImpact, ContactMachineFollowsTheClosedFormInEachRegime) {
   for (const Regime& regime : kRegimes) {
