@@ -89,7 +89,7 @@ int converge(const ConvergeFlags& flags, const protocol::PointTable& table) {
     std::cout << json.dump(2) << '\n';
     return kDone;
   }
-  std::cout << shown(points[0]) << "\n\nMesh: elements a link, halved\n\n";
+  std::cout << shown(points[0]) << "\n\nMesh: n elements a link, doubled\n\n";
   print_refinement(std::cout, mesh);
   std::cout << fmt::format("\nStep: steps of contact and fall, halved, on n = {}\n\n",
                            model.elements_per_link);

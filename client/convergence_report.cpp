@@ -129,16 +129,23 @@ std::string names_of_unsettled(const PointConvergence& convergence) {
   return names;
 }
 
-std::string worst_of(const PointConvergence& convergence) {
-  const OutputConvergence* worst = nullptr;
-  for (const auto& output : convergence.outputs) {
-    if (relative(output) && (worst == nullptr || *relative(output) > *relative(*worst))) {
-      worst = &output;
+// "0.95 % (vt_out_m_s)": the largest of relative errors.
+class Worst {
+ public:
+  void add(const std::string& name, const std::optional<double>& error) {
+    if (error && (!error_ || *error > *error_)) {
+      error_ = error;
+      name_ = name;
     }
   }
-  return worst == nullptr ? std::string("-")
-                          : fmt::format("{:.2g} % ({})", kPercent * *relative(*worst), worst->name);
-}
+  std::string shown() const {
+    return error_ ? fmt::format("{:.2g} % ({})", kPercent * *error_, name_) : std::string("-");
+  }
+
+ private:
+  std::string name_;
+  std::optional<double> error_;
+};
 
 void print_verdict(std::ostream& out, const Refinement& refinement) {
   const auto& convergence = refinement.convergence;
@@ -147,13 +154,20 @@ void print_verdict(std::ostream& out, const Refinement& refinement) {
   }
   const auto& finest = refinement.levels.back().level.name;
   if (converges(refinement)) {
-    out << fmt::format("The {} converges; largest estimated error on {}: {}.\n", refinement.what,
-                       finest, worst_of(convergence));
+    Worst fine;
+    Worst coarse;
+    for (const auto& output : convergence.outputs) {
+      fine.add(output.name, relative(output));
+      coarse.add(output.name, relative_error(output.values.front(), output.extrapolation.limit));
+    }
+    out << fmt::format("The {} converges; largest estimated error on {}: {}, on {}: {}.\n",
+                       refinement.what, finest, fine.shown(), refinement.levels.front().level.name,
+                       coarse.shown());
     return;
   }
   out << fmt::format("The {} does not converge by {}: ", refinement.what, finest);
   if (convergence.has_one_mode) {
-    out << names_of_unsettled(convergence) << " do not settle, though the mode does";
+    out << "the mode is one, but not settled are " << names_of_unsettled(convergence);
   } else {
     out << "the mode is not one on the finest three levels";
   }

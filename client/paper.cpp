@@ -19,7 +19,7 @@ namespace {
 
 constexpr const char* kExamples = R"(Examples:
   oblique paper
-  oblique paper --preset converged          where the paper's modes come of its mesh
+  oblique paper --preset converged --modes  where the paper's modes come of its mesh
   oblique paper --preset printed
   oblique paper --format markdown           the tables of README.md
   oblique paper --db oblique.db --study paper
@@ -30,6 +30,7 @@ struct PaperFlags {
   std::string study{"paper"};
   std::string database;  // empty: solve the cases now
   std::string format{"table"};
+  bool modes = false;
 };
 
 protocol::QueryReply rows_of_study(Source& source, const std::string& study) {
@@ -54,7 +55,10 @@ int paper(const PaperFlags& flags) {
   const auto format = format_named(flags.format);
   const auto published = published_table();
   const auto own = cases_of(published, flags);
-  if (format == Format::kTable || format == Format::kMarkdown) {
+  const bool is_for_people = format == Format::kTable || format == Format::kMarkdown;
+  if (is_for_people && flags.modes) {
+    print_modes(std::cout, format, published, own);
+  } else if (is_for_people) {
     print_comparison(std::cout, format, published, own);
   } else {
     print(std::cout, rows_of(published, compare(published, own)), format);
@@ -78,6 +82,7 @@ void add_paper(CLI::App& app, Command& command) {
       ->type_name("NAME")
       ->needs(database)
       ->capture_default_str();
+  verb->add_flag("--modes", flags->modes, "peaks and modes alone (in tables for people)");
   add_format_flag(*verb, flags->format);
   verb->callback([flags, &command] { command = [flags] { return paper(*flags); }; });
 }

@@ -69,6 +69,10 @@ std::vector<std::optional<OwnCase>> own_cases(const PublishedTable& table,
 void print_comparison(std::ostream& out, Format format, const PublishedTable& table,
                       const std::vector<std::optional<OwnCase>>& own);
 
+/// Of these, peaks and modes alone.
+void print_modes(std::ostream& out, Format format, const PublishedTable& table,
+                 const std::vector<std::optional<OwnCase>>& own);
+
 /// The differences as rows, one a published number, for CSV and JSON.
 protocol::QueryReply rows_of(const PublishedTable& table,
                              const std::vector<Difference>& differences);

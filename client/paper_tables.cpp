@@ -100,28 +100,6 @@ void print_sticks(std::ostream& out, Format format, const PublishedTable& publis
   print(out, table, format);
 }
 
-void print_modes(std::ostream& out, Format format, const PublishedTable& published,
-                 const Own& own) {
-  out << "\nPeaks and modes, ripples merged (Figs. 4 to 6)\n\n";
-  protocol::QueryReply table;
-  add_header(table, {"H", "mu", "e*", "peaks", "published", "mode", "published mode"});
-  for (std::size_t i = 0; i < published.cases.size(); ++i) {
-    auto& row = *table.add_rows();
-    add_case(row, published.cases[i]);
-    if (own[i]) {
-      add_value(row, static_cast<std::int64_t>(own[i]->fn_N.size()));
-    } else {
-      row.add_values();
-    }
-    add_value(row, std::int64_t{published_peaks(published.cases[i])});
-    add_value(row, own[i] ? own[i]->major_mode : std::string("not solved"));
-    add_value(row, own[i] && own[i]->major_mode == published.cases[i].mode
-                       ? std::string("the same")
-                       : published.cases[i].mode);
-  }
-  print(out, table, format);
-}
-
 std::string place_of(const PublishedCase& in) {
   return fmt::format("H = {:g}, mu = {:g}, e* = {:g}", in.H_m, in.mu, in.e_star);
 }
@@ -149,6 +127,28 @@ void print_other_modes(std::ostream& out, const PublishedTable& published, const
   }
   out << fmt::format("\nThe mode is the published one in {} of {} cases solved", same, solved);
   out << (others.empty() ? ".\n" : ". It is another one, with other peaks, at\n\n" + others);
+}
+
+void print_modes_table(std::ostream& out, Format format, const PublishedTable& published,
+                       const Own& own) {
+  out << "Peaks and modes, ripples merged (Figs. 4 to 6)\n\n";
+  protocol::QueryReply table;
+  add_header(table, {"H", "mu", "e*", "peaks", "published", "mode", "published mode"});
+  for (std::size_t i = 0; i < published.cases.size(); ++i) {
+    auto& row = *table.add_rows();
+    add_case(row, published.cases[i]);
+    if (own[i]) {
+      add_value(row, static_cast<std::int64_t>(own[i]->fn_N.size()));
+    } else {
+      row.add_values();
+    }
+    add_value(row, std::int64_t{published_peaks(published.cases[i])});
+    add_value(row, own[i] ? own[i]->major_mode : std::string("not solved"));
+    add_value(row, own[i] && own[i]->major_mode == published.cases[i].mode
+                       ? std::string("the same")
+                       : published.cases[i].mode);
+  }
+  print(out, table, format);
 }
 
 std::string place_of(const PublishedTable& published, const Difference& difference) {
@@ -199,14 +199,19 @@ void print_misprints(std::ostream& out, const PublishedTable& published) {
 
 }  // namespace
 
+void print_modes(std::ostream& out, Format format, const PublishedTable& table, const Own& own) {
+  print_modes_table(out, format, table, own);
+  print_other_modes(out, table, own);
+}
+
 void print_comparison(std::ostream& out, Format format, const PublishedTable& table,
                       const Own& own) {
   const auto differences = compare(table, own);
   print_forces(out, format, table, differences);
   print_durations(out, format, table, differences);
   print_sticks(out, format, table, differences);
+  out << '\n';
   print_modes(out, format, table, own);
-  print_other_modes(out, table, own);
   print_differences_summary(out, table, differences);
   print_misprints(out, table);
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -196,14 +197,83 @@ TEST(Convergence, OfTheExplicitStepIsOfOrderFourOnARealImpact) {
   EXPECT_LT(vn_out.extrapolation.error.value(), 1e-5);
 }
 
-TEST(CoarsestWithin, IsTheFirstLevelFromWhichOnAllIsCloseEnough) {
-  Refinement refinement;
-  std::vector<CaseResult> results;
-  for (const double h : {0.4, 0.1, 0.05, 0.025}) {
-    results.push_back(second_order(h));
-    refinement.levels.push_back({.level = {"n", {}}, .results = {results.back()}, .wall_s = 0.0});
+Refinement refinement_with(const std::vector<CaseResult>& results) {
+  Refinement refinement{.what = "step", .levels = {}, .convergence = {}};
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    refinement.levels.push_back(
+        {.level = {"dt/" + std::to_string(1 << i), {}}, .results = {results[i]}, .wall_s = 0.0});
   }
   refinement.convergence = convergence_of(results, kHighestOrder);
+  return refinement;
+}
+
+std::string shown(const Refinement& refinement) {
+  std::ostringstream out;
+  print_refinement(out, refinement);
+  return out.str();
+}
+
+TEST(Verdict, GivesTheLargestErrorsOfThePointThatConverges) {
+  const auto text =
+      shown(refinement_with({second_order(0.1), second_order(0.05), second_order(0.025)}));
+  // h^2 of the value: 0.0625 % at h = 0.025, 1 % at 0.1.
+  EXPECT_NE(text.find("The step converges; largest estimated error on dt/4: 0.062 %"),
+            std::string::npos)
+      << text;
+  EXPECT_NE(text.find("on dt/1: 1 %"), std::string::npos) << text;
+}
+
+TEST(Verdict, BlamesTheEventThatComesAndGoes) {
+  auto finest = second_order(0.025);
+  finest.major_mode = "SC SR sR sC sR sC sR";
+  using solver::PhaseKind;
+  finest.phases = {{PhaseKind::kCompression, 0.0, 1e-5, 0.0},
+                   {PhaseKind::kRestitution, 1e-5, 2e-4, 0.0},
+                   {PhaseKind::kCompression, 2e-4, 2.01e-4, 0.0},
+                   {PhaseKind::kRestitution, 2.01e-4, 5e-4, 0.0}};
+  auto middle = second_order(0.05);
+  middle.phases = {{PhaseKind::kCompression, 0.0, 1e-5, 0.0},
+                   {PhaseKind::kRestitution, 1e-5, 5e-4, 0.0}};
+  auto coarsest = second_order(0.1);
+  coarsest.phases = middle.phases;
+  const auto refinement = refinement_with({coarsest, middle, finest});
+  EXPECT_FALSE(converges(refinement));
+  EXPECT_NE(shown(refinement)
+                .find("The step does not converge by dt/4: the mode is not one on the finest three "
+                      "levels; to blame: dt/4 has a compression of 1 us, from 200.00 to 201.00 us "
+                      "(V_n grazes 0); dt/2 has not."),
+            std::string::npos)
+      << shown(refinement);
+  const auto json = json_of(refinement);
+  EXPECT_EQ(json["converges"], false);
+  ASSERT_EQ(json["changes"].size(), 1U);
+  EXPECT_EQ(json["changes"][0]["kind"], "compression");
+  EXPECT_EQ(json["changes"][0]["finer"], "dt/4");
+}
+
+TEST(Verdict, NamesOutputsThatGoOnChanging) {
+  auto finest = second_order(0.025);
+  finest.vt_out_m_s = -3.0;
+  const auto refinement = refinement_with({second_order(0.1), second_order(0.05), finest});
+  EXPECT_FALSE(converges(refinement));
+  EXPECT_NE(shown(refinement).find("the mode is one, but not settled are vt_out_m_s."),
+            std::string::npos)
+      << shown(refinement);
+}
+
+TEST(Verdict, TakesChangesBelowAThousandthOfTheScaleForSettled) {
+  auto finest = second_order(0.025);
+  auto middle = second_order(0.05);
+  middle.vt_out_m_s = -1.0;
+  finest.vt_out_m_s = -1.005;  // of a speed of 7 m/s at touch
+  auto coarsest = second_order(0.1);
+  coarsest.vt_out_m_s = -1.001;
+  EXPECT_TRUE(converges(refinement_with({coarsest, middle, finest})));
+}
+
+TEST(CoarsestWithin, IsTheFirstLevelFromWhichOnAllIsCloseEnough) {
+  const auto refinement = refinement_with(
+      {second_order(0.4), second_order(0.1), second_order(0.05), second_order(0.025)});
   EXPECT_EQ(coarsest_within(refinement, 0.2), 0U);
   EXPECT_EQ(coarsest_within(refinement, 0.011), 1U);
   EXPECT_EQ(coarsest_within(refinement, 0.003), 2U);

@@ -58,6 +58,19 @@ std::vector<std::string> csv_fields(const std::string& text) {
   return fields;
 }
 
+TEST(Markdown, KeepsBarsOfTextOutOfTheTableAndAlignsNumbers) {
+  protocol::QueryReply rows;
+  rows.add_columns("|F_t|");
+  rows.add_columns("n");
+  auto& row = *rows.add_rows();
+  add_value(row, std::string("a|b"));
+  add_value(row, 2.5);
+  EXPECT_EQ(printed(rows, Format::kMarkdown),
+            "| \\|F_t\\| | n |\n"
+            "|---|---:|\n"
+            "| a\\|b | 2.5 |\n");
+}
+
 TEST(Csv, HoldsEveryNumberToTheLastBit) {
   protocol::QueryReply rows;
   rows.add_columns("x");
