@@ -167,7 +167,7 @@ void print_verdict(std::ostream& out, const Refinement& refinement) {
   }
   out << fmt::format("The {} does not converge by {}: ", refinement.what, finest);
   if (convergence.has_one_mode) {
-    out << "the mode is one, but not settled are " << names_of_unsettled(convergence);
+    out << names_of_unsettled(convergence) << " do not settle, though the mode does";
   } else {
     out << "the mode is not one on the finest three levels";
   }
