@@ -86,11 +86,12 @@ std::string read_ready_line(const Descriptor& ready, ChildProcess& server, StopS
   return line;
 }
 
-}  // namespace
-
-int default_workers() {
-  return static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+/// Threads of each worker, so that all together use the cores of this machine.
+unsigned threads_each(int workers) {
+  return std::max(1U, std::thread::hardware_concurrency() / static_cast<unsigned>(workers));
 }
+
+}  // namespace
 
 EmbeddedService::EmbeddedService(const ServiceSettings& settings, StopSignal& stop) {
   const auto worker_program = sibling_program("oblique-worker");
@@ -102,7 +103,8 @@ EmbeddedService::EmbeddedService(const ServiceSettings& settings, StopSignal& st
   for (int i = 0; i < settings.workers; ++i) {
     workers_.push_back(std::make_unique<ChildProcess>(
         ChildSettings{.program = worker_program,
-                      .arguments = {"--server", worker_url_, "--stop-with-parent"},
+                      .arguments = {"--server", worker_url_, "--stop-with-parent", "--threads",
+                                    std::to_string(threads_each(settings.workers))},
                       .show_errors = settings.verbose}));
   }
 }

@@ -14,7 +14,7 @@ namespace oblique::client {
 /// A server and workers on this machine, for as long as this object lives.
 struct ServiceSettings {
   std::filesystem::path database;
-  int workers = 1;
+  int workers = 1;       ///< processes, which share the cores
   bool verbose = false;  ///< what server and workers say goes to our standard error
 };
 
@@ -51,8 +51,5 @@ class EmbeddedService {
   std::string client_url_;
   std::string worker_url_;
 };
-
-/// As many workers as this process may use cores.
-int default_workers();
 
 }  // namespace oblique::client

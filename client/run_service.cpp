@@ -90,7 +90,7 @@ RunEnd submit_and_wait(const Study& study, const RunSettings& settings, Embedded
 
 void add_worker_flags(CLI::App& verb, RunSettings& settings) {
   verb.add_option("--workers", settings.service.workers,
-                  "worker processes; the default is the number of cores here")
+                  "worker processes, which share the cores of this machine")
       ->type_name("N")
       ->capture_default_str();
   verb.add_flag("--verbose", settings.service.verbose, "show what server and workers say");

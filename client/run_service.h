@@ -14,7 +14,7 @@ namespace oblique::client {
 
 /// How `run` runs a study, and `paper` its cases.
 struct RunSettings {
-  ServiceSettings service{.database = DatabaseSettings().file, .workers = default_workers()};
+  ServiceSettings service{.database = DatabaseSettings().file};
   std::int64_t rows = 30;  ///< most rows of results asked for at the end
 };
 

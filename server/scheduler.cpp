@@ -350,17 +350,18 @@ bool Scheduler::anyone_draining() const {
 }
 
 std::uint64_t Scheduler::batch_points(const Worker& worker, StudyId id) const {
-  std::uint64_t points = settings_.first_batch_points;
+  std::uint64_t points = settings_.first_batch_points * worker.threads;
   const auto pace = worker.paces.find(id);
   if (pace != worker.paces.end() && pace->second.s_per_point > 0.0) {
-    const double wanted = settings_.batch_target_s / pace->second.s_per_point;
+    const double wanted = settings_.batch_target_s * worker.threads / pace->second.s_per_point;
     const auto largest = static_cast<double>(
-        std::min(settings_.largest_batch_points,
+        std::min(settings_.largest_batch_points * worker.threads,
                  settings_.growth * std::max<std::uint64_t>(pace->second.last_batch_points, 1)));
     points = static_cast<std::uint64_t>(std::min(wanted, largest));
   }
   const std::uint64_t shares = settings_.tail_batches_per_thread * threads_;
-  const std::uint64_t fair = studies_.at(id).points.free() / std::max<std::uint64_t>(shares, 1);
+  const std::uint64_t fair =
+      studies_.at(id).points.free() / std::max<std::uint64_t>(shares, 1) * worker.threads;
   return std::max<std::uint64_t>(std::min(points, fair), 1);
 }
 

@@ -19,10 +19,10 @@ using WorkerId = std::uint64_t;
 using LeaseId = std::uint64_t;
 
 struct SchedulerSettings {
-  std::int64_t lost_after_ms = 3000;     ///< a worker silent for longer is lost
-  double batch_target_s = 0.1;           ///< work of one batch, once a worker's pace is known
-  std::uint64_t first_batch_points = 4;  ///< largest batch to a worker of unknown pace
-  std::uint64_t largest_batch_points = 4096;
+  std::int64_t lost_after_ms = 3000;          ///< a worker silent for longer is lost
+  double batch_target_s = 0.1;                ///< time a batch takes, once a worker's pace is known
+  std::uint64_t first_batch_points = 4;       ///< a thread, in a batch to a worker of unknown pace
+  std::uint64_t largest_batch_points = 4096;  ///< a thread
   std::uint64_t growth = 4;  ///< a batch is at most so many times the worker's last one
   /// While free points last, at least so many more batches are left for each thread: the tail of a
   /// study goes out in ever smaller batches and all workers finish together.

@@ -198,6 +198,7 @@ void Conversation::on(const protocol::Welcome& welcome) {
     unacknowledged_.clear();
     unacknowledged_results_ = 0;
     database_id_ = welcome.database_id();
+    first_task_of_database_ = next_task_;
   }
   // Results go before credit, so that their points are not handed out again.
   for (protocol::Results& results : unacknowledged_) {
@@ -307,6 +308,9 @@ Effects Conversation::on_progress(std::vector<Progress> progress, std::int64_t n
 }
 
 void Conversation::report(Progress& progress) {
+  if (progress.task < first_task_of_database_) {
+    return;  // the study of that number is another one now
+  }
   const auto found = held_.find(progress.task);
   // A task of before the last welcome: what is solved is solved, but there is no lease to end.
   const Held held = found != held_.end() ? found->second : Held{progress.study_id, 0, 0};

@@ -135,7 +135,8 @@ class Conversation {
   std::map<std::uint64_t, std::shared_ptr<const protocol::PointTable>> studies_;
   std::map<std::uint64_t, Held> held_;  // by the task's number
   std::uint64_t next_task_ = 1;
-  std::uint32_t open_credit_ = 0;  ///< batches asked for and not yet come
+  std::uint64_t first_task_of_database_ = 1;  ///< earlier tasks were of another database
+  std::uint32_t open_credit_ = 0;             ///< batches asked for and not yet come
 
   std::deque<protocol::Results> unacknowledged_;  // by sequence
   std::size_t unacknowledged_results_ = 0;

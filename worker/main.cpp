@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <exception>
 #include <string>
+#include <thread>
 
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
@@ -41,6 +42,12 @@ std::string objection_to_name(const std::string& name) {
              : "a name has 1 to 200 printable ASCII characters";
 }
 
+constexpr std::size_t kMostThreads = 4096;
+
+std::size_t cores() {
+  return std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, kMostThreads);
+}
+
 /// Blocks SIGTERM and SIGINT for this thread and those it starts, and returns a descriptor that is
 /// readable when one has come.
 int signal_descriptor() {
@@ -61,9 +68,9 @@ int run_worker(const SessionSettings& settings) {
                                    [&](const auto& task, const auto& next, const auto& take) {
                                      points.solve(task, next, take);
                                    });
-  spdlog::info("worker {}, solver {} ({}), server {}", settings.name,
+  spdlog::info("worker {}, solver {} ({}), threads {}, server {}", settings.name,
                oblique::solver::solver_version(), oblique::solver::instruction_set(),
-               settings.server);
+               settings.threads, settings.server);
   const int exit_code = session.run(signals, [&] {
     signalfd_siginfo received{};
     static_cast<void>(read(signals, &received, sizeof(received)));
@@ -81,6 +88,7 @@ int run_program(int argc, char** argv) {
   spdlog::set_default_logger(spdlog::stderr_color_mt("worker"));
   SessionSettings settings;
   settings.name = host_and_process();
+  settings.threads = cores();
   bool quiet = false;
   CLI::App app(
       "Solves points of parameter studies for an oblique-server.\n"
@@ -91,6 +99,10 @@ int run_program(int argc, char** argv) {
   app.add_option("--name", settings.name, "Name that people see")
       ->capture_default_str()
       ->check(objection_to_name);
+  app.add_option("--threads", settings.threads,
+                 "Points solved at a time, each thread on a core; the default is all cores here")
+      ->capture_default_str()
+      ->check(CLI::Range(std::size_t{1}, kMostThreads));
   app.add_flag("--stop-with-parent", settings.stop_with_parent,
                "Stop when the parent process is gone");
   app.add_flag("--quiet", quiet, "Log warnings and errors only");

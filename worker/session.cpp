@@ -36,7 +36,7 @@ protocol::WorkerHello hello_of(const SessionSettings& settings) {
   hello.set_solver_version(solver::solver_version());
   hello.set_instruction_set(solver::instruction_set());
   hello.set_name(settings.name);
-  hello.set_threads(1);
+  hello.set_threads(static_cast<std::uint32_t>(settings.threads));
   return hello;
 }
 
@@ -53,7 +53,8 @@ Session::Session(SessionSettings settings, BatchSolver::SolvePoints solve)
     : settings_(std::move(settings)),
       parent_(getppid()),
       conversation_(hello_of(settings_), settings_.conversation),
-      solver_(std::move(solve), [this] { task_ended_.wake(); }) {}
+      solver_(
+          std::move(solve), [this] { task_ended_.wake(); }, settings_.threads) {}
 
 Session::~Session() = default;
 

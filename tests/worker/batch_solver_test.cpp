@@ -1,7 +1,9 @@
 #include "worker/batch_solver.h"
 
+#include <chrono>
 #include <condition_variable>
 #include <mutex>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -128,11 +130,14 @@ TEST_F(BatchSolverTest, WhenAllIsDroppedWhatWasSolvedCanStillBeCollected) {
   ASSERT_EQ(progress.size(), 1U);
   EXPECT_EQ(progress[0].results.size(), 1U);
   EXPECT_FALSE(progress[0].task_done);
-  gate_.open(1);
   solver_.add(task(3, 0, 1));
-  gate_.open(1);
+  gate_.open(2);
   wait_tasks_ended(1);
-  EXPECT_EQ(solver_.collect().at(0).task, 3U);
+  const auto rest = solver_.collect();
+  ASSERT_EQ(rest.size(), 2U);
+  EXPECT_EQ(rest[0].task, 1U) << "the point that was being solved counts";
+  EXPECT_EQ(rest[0].results.size(), 1U);
+  EXPECT_EQ(rest[1].task, 3U);
 }
 
 TEST_F(BatchSolverTest, APausedSolverEndsItsPointAndBeginsNoOther) {
@@ -156,6 +161,65 @@ TEST_F(BatchSolverTest, APausedSolverEndsItsPointAndBeginsNoOther) {
 TEST_F(BatchSolverTest, APausedSolverCanBeEnded) {
   solver_.set_paused(true);
   solver_.add(task(1, 0, 2));
+}
+
+TEST_F(BatchSolverTest, SeveralThreadsShareATask) {
+  BatchSolver shared(
+      [this](const Task&, const auto& next, const auto& take) {
+        while (const auto point = next()) {
+          gate_.pass();
+          take(protocol::failed_point(*point, "for the test"));
+        }
+      },
+      [] {}, 3);
+  shared.add(task(1, 0, 3));
+  gate_.wait_begun(3);  // none has ended
+  gate_.open(3);
+}
+
+TEST(BatchSolver, EveryPointOfManyTasksIsSolvedOnceHoweverManyThreads) {
+  constexpr std::uint64_t kTasks = 40;
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::uint64_t ended = 0;
+  BatchSolver solver(
+      [](const Task&, const auto& next, const auto& take) {
+        while (const auto point = next()) {
+          take(protocol::failed_point(*point, "for the test"));
+        }
+      },
+      [&] {
+        const std::lock_guard lock(mutex);
+        ++ended;
+        changed.notify_all();
+      },
+      4);
+  std::uint64_t first = 0;
+  for (std::uint64_t number = 1; number <= kTasks; ++number) {
+    solver.add(task(number, first, 13 * number));
+    first += 13 * number;
+  }
+  std::vector<int> solved(first, 0);
+  std::uint64_t done = 0;
+  const auto gather = [&] {
+    for (const Progress& progress : solver.collect()) {
+      for (const auto& result : progress.results) {
+        ++solved.at(result.point());
+      }
+      done += progress.task_done ? 1U : 0U;
+    }
+  };
+  {
+    std::unique_lock lock(mutex);
+    while (!changed.wait_for(lock, std::chrono::milliseconds(1), [&] { return ended == kTasks; })) {
+      lock.unlock();
+      gather();
+      lock.lock();
+    }
+  }
+  gather();
+  EXPECT_EQ(done, kTasks);
+  EXPECT_EQ(solved, std::vector<int>(first, 1));
 }
 
 }  // namespace

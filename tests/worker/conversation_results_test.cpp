@@ -165,6 +165,19 @@ TEST_F(ConversationTest, ResultsForOneDatabaseAreNeverDeliveredToAnother) {
   EXPECT_EQ(conversation_->unacknowledged_results(), 0U);
 }
 
+TEST_F(ConversationTest, APointThatEndsAfterTheDatabaseChangedIsNotDeliveredEither) {
+  join();
+  receive(batch_message(7, 31));
+  receive(hello_again_message());
+  receive(welcome_message("another"));
+  receive(study_message(7));
+  receive(batch_message(7, 31));
+  solve(1, 0, 10, false);
+  EXPECT_TRUE(sent_results().empty()) << "study 7 is another one now";
+  solve(2, 0, 10, false);
+  EXPECT_EQ(sent_results().size(), 1U);
+}
+
 TEST_F(ConversationTest, TooManyUnacknowledgedResultsStopCreditAndSolvingUntilTheyAreStored) {
   ConversationSettings settings;
   settings.unacknowledged_limit = 10;

@@ -58,19 +58,22 @@ class BandedCholesky {
         const std::size_t j = i - d;
         double entry = matrix.at(i, d);
         for (std::size_t m = 1; m + d <= kHalfBandwidth && m <= j; ++m) {
-          entry -= rows_[i].factor[d + m - 1] * rows_[j].factor[m - 1] * pivots[j - m];
+          entry -= rows_[i].left[d + m - 1] * rows_[j].left[m - 1] * pivots[j - m];
         }
-        rows_[i].factor[d - 1] = entry / pivots[j];
+        rows_[i].left[d - 1] = entry / pivots[j];
       }
       pivots[i] = matrix.at(i, 0);
       for (std::size_t d = 1; d <= kHalfBandwidth && d <= i; ++d) {
-        pivots[i] -= rows_[i].factor[d - 1] * rows_[i].factor[d - 1] * pivots[i - d];
+        pivots[i] -= rows_[i].left[d - 1] * rows_[i].left[d - 1] * pivots[i - d];
       }
       if (!(pivots[i] > 0.0)) {
         positive_definite_ = false;
         return;
       }
       rows_[i].inverse_pivot = 1.0 / pivots[i];
+      for (std::size_t d = 1; d <= kHalfBandwidth && d <= i; ++d) {
+        rows_[i - d].below[d - 1] = rows_[i].left[d - 1];
+      }
     }
   }
 
@@ -80,7 +83,14 @@ class BandedCholesky {
   /// `Real` is a number or a vector of lanes. Needs positive_definite().
   template <class Real>
   void solve_pairs(Real* f) const {
-    solve_factored(rows_.data(), rows_.size(), f);
+    ForwardSubstitution<Real> forward;
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+      put_pair(f, i, forward.next(rows_[i], pair_at(f, i)));
+    }
+    BackSubstitution<Real> backward;
+    for (std::size_t i = rows_.size(); i-- > 0;) {
+      put_pair(f, i, backward.next(rows_[i], pair_at(f, i)));
+    }
   }
 
   const FactorRow* data() const { return rows_.data(); }

@@ -67,12 +67,12 @@ Chain::Chain(const ModelParameters& model)
     : rows_(count_rows(model)),
       gravity_m_s2_(model.g_m_s2),
       mass_per_length_(model.rho_kg_m3 * model.A_m2),
-      gravity_(2 * rows_, 0.0),
+      weight_N_(rows_, 0.0),
       mass_(with_unit_pin(rows_, 1.0)),
       mass_factor_(BandedMatrix(0)),
       along_(with_unit_pin(rows_, 0.0)) {
   number_rows(model);
-  for (const ElementTable& element : elements_) {
+  for (const Element& element : elements_) {
     const double length = 1.0 / element.inverse_length;
     add_element(mass_, element.row, mass_matrix(mass_per_length_, length), 1.0);
     // kappa^2 = r''.r'' counts both directions, so bending stiffness acts along the chain too.
@@ -80,11 +80,11 @@ Chain::Chain(const ModelParameters& model)
     add_element(along_, element.row, bending_matrix(length), model.E_Pa * model.I_m4);
     const auto load = uniform_load(length);
     for (std::size_t a = 0; a < 4; ++a) {
-      gravity_[2 * element.row[a] + 1] -= mass_per_length_ * gravity_m_s2_ * load[a];
+      weight_N_[element.row[a]] -= mass_per_length_ * gravity_m_s2_ * load[a];
     }
   }
   mass_.at(tip_row(), 0) += model.tip_mass_kg;
-  gravity_[2 * tip_row() + 1] -= model.tip_mass_kg * model.g_m_s2;
+  weight_N_[tip_row()] -= model.tip_mass_kg * model.g_m_s2;
   mass_factor_ = BandedCholesky(mass_);
   if (!mass_factor_.positive_definite()) {
     throw InputError(
@@ -101,7 +101,7 @@ void Chain::number_rows(const ModelParameters& model) {
     first_element_.push_back(elements_.size());
     for (int e = 0; e < n; ++e) {
       const bool ends_at_joint = e + 1 == n && link + 1 < model.lengths_m.size();
-      ElementTable element{};
+      Element element{};
       for (std::size_t a = 0; a < 4; ++a) {
         element.row[a] = left + a;
       }
@@ -114,6 +114,8 @@ void Chain::number_rows(const ModelParameters& model) {
       elements_.push_back(element);
       left = element.row[2];
     }
+    const Element& last = elements_.back();
+    constants_.push_back(elastic_constants(length, last.half_EA_length, last.bending));
   }
 }
 
@@ -122,7 +124,7 @@ ChainState Chain::at_rest() const {
   state.q.assign(2 * rows_, 0.0);
   state.v.assign(2 * rows_, 0.0);
   double x = 0.0;
-  for (const ElementTable& element : elements_) {
+  for (const Element& element : elements_) {
     x += 1.0 / element.inverse_length;
     state.q[2 * element.row[1]] = 1.0;
     state.q[2 * element.row[2]] = x;
@@ -141,7 +143,7 @@ double Chain::strain_energy_J(const Coordinates& q) const {
     return PlanarVector<double>{q[2 * row], q[2 * row + 1]};
   };
   double energy = 0.0;
-  for (const ElementTable& element : elements_) {
+  for (const Element& element : elements_) {
     const auto [pi, si, pj, sj] = element.row;
     energy +=
         strain_energy(gradient_coefficients(at(pi), at(si), at(pj), at(sj), element.inverse_length),
@@ -152,8 +154,8 @@ double Chain::strain_energy_J(const Coordinates& q) const {
 
 double Chain::gravity_energy_J(const Coordinates& q) const {
   double energy = 0.0;
-  for (std::size_t i = 0; i < q.size(); ++i) {
-    energy -= gravity_[i] * q[i];
+  for (std::size_t row = 0; row < rows_; ++row) {
+    energy -= weight_N_[row] * q[2 * row + 1];
   }
   return energy;
 }
@@ -165,7 +167,7 @@ TipState Chain::tip(const ChainState& state) const {
 
 PlanarVector<double> Chain::inner_end_force(std::size_t link, const Coordinates& q,
                                             const Coordinates& acceleration) const {
-  const ElementTable& element = elements_[first_element_.at(link)];
+  const Element& element = elements_[first_element_.at(link)];
   const auto at = [](const Coordinates& values, std::size_t row) {
     return PlanarVector<double>{values[2 * row], values[2 * row + 1]};
   };

@@ -55,8 +55,13 @@ class Chain {
 
   /// The tables that the kernels of chain_kernel.h read.
   ChainTables tables() const {
-    return {rows_,          tip_row(), elements_.size(), elements_.data(), mass_factor_.data(),
-            gravity_.data()};
+    return {rows_,
+            tip_row(),
+            links(),
+            elements_.size() / links(),
+            constants_.data(),
+            mass_factor_.data(),
+            weight_N_.data()};
   }
   /// As in chain_kernel.h.
   template <class Real>
@@ -80,15 +85,22 @@ class Chain {
   double highest_frequency_rad_s(double tip_stiffness_N_m) const;
 
  private:
+  struct Element {
+    std::size_t row[4];  ///< rows of p_i, s_i, p_j, s_j
+    double inverse_length;
+    double half_EA_length;  ///< EA l/2
+    double bending;         ///< 2 EI/l
+  };
   void number_rows(const ModelParameters& model);
 
   std::size_t rows_;
   double gravity_m_s2_;
   double mass_per_length_;
-  std::vector<ElementTable> elements_;
-  std::vector<std::size_t> first_element_;  ///< of each link
-  Coordinates gravity_;                     ///< generalised force [N] and [N m]
-  BandedMatrix mass_;                       ///< of the free rows; row 0 is a unit row
+  std::vector<Element> elements_;
+  std::vector<std::size_t> first_element_;   ///< of each link
+  std::vector<ElasticConstants> constants_;  ///< of an element of each link
+  std::vector<double> weight_N_;  ///< generalised gravity along y [N] and [N m], one a row
+  BandedMatrix mass_;             ///< of the free rows; row 0 is a unit row
   BandedCholesky mass_factor_;
   BandedMatrix along_;  ///< stiffness of the straight chain along itself: axial and bending
 };

@@ -2,7 +2,7 @@
 
 #include <cstddef>
 
-#include "worker/solver/beam_element.h"
+#include "worker/solver/elastic_kernel.h"
 
 /// The innermost loops: the chain's accelerations for one number or a vector of lanes. Plain tables
 /// and templates over `Real` only, so that one source serves every instruction set: nothing here
@@ -12,16 +12,10 @@ namespace oblique::solver {
 /// Half-bandwidth of every matrix of the eliminated chain: an element spans four consecutive rows.
 inline constexpr std::size_t kHalfBandwidth = 3;
 
-struct ElementTable {
-  std::size_t row[4];  ///< rows of p_i, s_i, p_j, s_j
-  double inverse_length;
-  double half_EA_length;  ///< EA l/2
-  double bending;         ///< 2 EI/l
-};
-
-/// One row of A = L D Lᵀ, L with unit diagonal.
+/// One row of A = L D Lᵀ, L with unit diagonal. Entries beyond the matrix are zero.
 struct FactorRow {
-  double factor[kHalfBandwidth];  ///< L(i, i-1), L(i, i-2), L(i, i-3); zero beyond the matrix
+  double left[kHalfBandwidth];   ///< L(i, i-1), L(i, i-2), L(i, i-3)
+  double below[kHalfBandwidth];  ///< L(i+1, i), L(i+2, i), L(i+3, i)
   double inverse_pivot;
 };
 
@@ -29,75 +23,112 @@ struct FactorRow {
 struct ChainTables {
   std::size_t rows;
   std::size_t tip_row;
-  std::size_t elements;
-  const ElementTable* element;
+  std::size_t links;
+  std::size_t elements_per_link;
+  const ElasticConstants* link;  ///< of an element of each link
   const FactorRow* mass_factor;
-  const double* gravity;
+  const double* weight_N;  ///< generalised gravity along y, one a row; there is none along x
 };
 
-/// Solves A z = f in place for two right-hand sides interleaved by rows: f[2 i + c]. Needs
-/// n >= kHalfBandwidth.
+/// L y = f, row by row downwards. The row just before comes last into each sum: what rows wait for
+/// is then one multiply-add.
 template <class Real>
-inline void solve_factored(const FactorRow* row, std::size_t n, Real* f) {
-  const auto eliminate = [&](std::size_t i, std::size_t reach) {
-    Real x = f[2 * i];
-    Real y = f[2 * i + 1];
-    for (std::size_t d = 1; d <= reach; ++d) {
-      x -= row[i].factor[d - 1] * f[2 * (i - d)];
-      y -= row[i].factor[d - 1] * f[2 * (i - d) + 1];
+class ForwardSubstitution {
+ public:
+  inline PlanarVector<Real> next(const FactorRow& row, PlanarVector<Real> f) {
+    for (std::size_t d = kHalfBandwidth; d >= 1; --d) {
+      f.x -= row.left[d - 1] * before_[d - 1].x;
+      f.y -= row.left[d - 1] * before_[d - 1].y;
     }
-    f[2 * i] = x;
-    f[2 * i + 1] = y;
-  };
-  eliminate(1, 1);
-  eliminate(2, 2);
-  for (std::size_t i = kHalfBandwidth; i < n; ++i) {
-    eliminate(i, kHalfBandwidth);
+    before_[2] = before_[1];
+    before_[1] = before_[0];
+    before_[0] = f;
+    return f;
   }
-  const auto substitute = [&](std::size_t i, std::size_t reach) {
-    Real x = f[2 * i] * row[i].inverse_pivot;
-    Real y = f[2 * i + 1] * row[i].inverse_pivot;
-    for (std::size_t d = reach; d >= 1; --d) {
-      x -= row[i + d].factor[d - 1] * f[2 * (i + d)];
-      y -= row[i + d].factor[d - 1] * f[2 * (i + d) + 1];
+
+ private:
+  PlanarVector<Real> before_[kHalfBandwidth]{};
+};
+
+/// D Lᵀ z = y, row by row upwards.
+template <class Real>
+class BackSubstitution {
+ public:
+  inline PlanarVector<Real> next(const FactorRow& row, const PlanarVector<Real>& y) {
+    PlanarVector<Real> z{y.x * row.inverse_pivot, y.y * row.inverse_pivot};
+    for (std::size_t d = kHalfBandwidth; d >= 1; --d) {
+      z.x -= row.below[d - 1] * after_[d - 1].x;
+      z.y -= row.below[d - 1] * after_[d - 1].y;
     }
-    f[2 * i] = x;
-    f[2 * i + 1] = y;
+    after_[2] = after_[1];
+    after_[1] = after_[0];
+    after_[0] = z;
+    return z;
+  }
+
+ private:
+  PlanarVector<Real> after_[kHalfBandwidth]{};
+};
+
+template <class Real>
+inline PlanarVector<Real> pair_at(const Real* values, std::size_t row) {
+  return {values[2 * row], values[2 * row + 1]};
+}
+
+template <class Real>
+inline void put_pair(Real* values, std::size_t row, const PlanarVector<Real>& pair) {
+  values[2 * row] = pair.x;
+  values[2 * row + 1] = pair.y;
+}
+
+/// The way down: y = L^-1 (Q_gravity + S_tipᵀ F - dU/dq), forces and substitution in one pass along
+/// the chain. `q` and `y` have 2 rows entries. What it says of the pin's row has no meaning.
+template <class Real>
+inline void substitute_forces(const ChainTables& chain, const Real* q, const Real& ft_N,
+                              const Real& fn_N, Real* y) {
+  ForwardSubstitution<Real> forward;
+  const auto finish = [&](std::size_t row, const PlanarVector<Real>& force) {
+    put_pair(y, row, forward.next(chain.mass_factor[row], force));
   };
-  substitute(n - 1, 0);
-  substitute(n - 2, 1);
-  substitute(n - 3, 2);
-  for (std::size_t i = n - kHalfBandwidth; i-- > 0;) {
-    substitute(i, kHalfBandwidth);
+  const auto weight = [&](std::size_t row) {
+    return PlanarVector<Real>{Real{}, Real{} + chain.weight_N[row]};
+  };
+  std::size_t row = 0;  // of the position at the element's left end
+  PlanarVector<Real> on_p = weight(row);
+  for (std::size_t link = 0; link < chain.links; ++link) {
+    const ElasticConstants constants = chain.link[link];  // a copy: nothing written below is in it
+    PlanarVector<Real> on_s = weight(row + 1);
+    for (std::size_t e = 1; e <= chain.elements_per_link; ++e) {
+      // At a joint the inner link's slope comes before the position.
+      const bool ends_at_joint = e == chain.elements_per_link && link + 1 < chain.links;
+      const std::size_t p_row = row + (ends_at_joint ? 3 : 2);
+      const std::size_t s_row = row + (ends_at_joint ? 2 : 3);
+      const ElasticForces<Real> elastic = elastic_forces(
+          pair_at(q, row), pair_at(q, row + 1), pair_at(q, p_row), pair_at(q, s_row), constants);
+      finish(row, {on_p.x + elastic.pull.x, on_p.y + elastic.pull.y});
+      finish(row + 1,
+             {on_s.x + elastic.by_d.x - elastic.by_t.x, on_s.y + elastic.by_d.y - elastic.by_t.y});
+      on_p = {Real{} - elastic.pull.x, chain.weight_N[p_row] - elastic.pull.y};
+      on_s = {Real{} - elastic.by_d.x - elastic.by_t.x,
+              chain.weight_N[s_row] - elastic.by_d.y - elastic.by_t.y};
+      row = p_row;
+    }
+    if (link + 1 < chain.links) {
+      finish(row - 1, on_s);
+    } else {
+      finish(row, {on_p.x + ft_N, on_p.y + fn_N});
+      finish(row + 1, on_s);
+    }
   }
 }
 
-/// force -= dU/dq. `q` and `force` have 2 rows entries.
-template <class Real>
-inline void subtract_elastic_force(const ChainTables& chain, const Real* q, Real* force) {
-  for (std::size_t e = 0; e < chain.elements; ++e) {
-    const ElementTable& element = chain.element[e];
-    const std::size_t pi = 2 * element.row[0];
-    const std::size_t si = 2 * element.row[1];
-    const std::size_t pj = 2 * element.row[2];
-    const std::size_t sj = 2 * element.row[3];
-    const GradientCoefficients<Real> g = gradient_coefficients(
-        PlanarVector<Real>{q[pi], q[pi + 1]}, PlanarVector<Real>{q[si], q[si + 1]},
-        PlanarVector<Real>{q[pj], q[pj + 1]}, PlanarVector<Real>{q[sj], q[sj + 1]},
-        element.inverse_length);
-    const GradientCoefficients<Real> f =
-        elastic_gradient(g, element.half_EA_length, element.bending);
-    // c0 = (p_j - p_i)/l, c1 = (s_j - s_i)/2, c2 = (s_i + s_j)/2 - c0.
-    const Real px = (f.c[0].x - f.c[2].x) * element.inverse_length;
-    const Real py = (f.c[0].y - f.c[2].y) * element.inverse_length;
-    force[pi] += px;
-    force[pi + 1] += py;
-    force[pj] -= px;
-    force[pj + 1] -= py;
-    force[si] -= 0.5 * (f.c[2].x - f.c[1].x);
-    force[si + 1] -= 0.5 * (f.c[2].y - f.c[1].y);
-    force[sj] -= 0.5 * (f.c[2].x + f.c[1].x);
-    force[sj + 1] -= 0.5 * (f.c[2].y + f.c[1].y);
+/// The way up: q'' = L^-T D^-1 y, given to `take(row, q'')` from the tip to the row after the pin,
+/// which does not move.
+template <class Real, class Take>
+inline void substitute_accelerations(const ChainTables& chain, const Real* y, const Take& take) {
+  BackSubstitution<Real> backward;
+  for (std::size_t row = chain.rows; row-- > 1;) {
+    take(row, backward.next(chain.mass_factor[row], pair_at(y, row)));
   }
 }
 
@@ -105,15 +136,12 @@ inline void subtract_elastic_force(const ChainTables& chain, const Real* q, Real
 template <class Real>
 inline void chain_accelerations(const ChainTables& chain, const Real* q, const Real& ft_N,
                                 const Real& fn_N, Real* acceleration) {
-  for (std::size_t i = 0; i < 2 * chain.rows; ++i) {
-    acceleration[i] = Real{} + chain.gravity[i];
-  }
-  acceleration[2 * chain.tip_row] += ft_N;
-  acceleration[2 * chain.tip_row + 1] += fn_N;
-  subtract_elastic_force(chain, q, acceleration);
-  acceleration[0] = Real{};  // the pin does not move
-  acceleration[1] = Real{};
-  solve_factored(chain.mass_factor, chain.rows, acceleration);
+  substitute_forces(chain, q, ft_N, fn_N, acceleration);
+  substitute_accelerations(chain, acceleration,
+                           [&](std::size_t row, const PlanarVector<Real>& value) {
+                             put_pair(acceleration, row, value);
+                           });
+  put_pair(acceleration, 0, PlanarVector<Real>{});
 }
 
 }  // namespace oblique::solver

@@ -16,6 +16,11 @@ struct Cubic {
   double at(double z) const { return a0 + z * (a1 + z * (a2 + z * a3)); }
   double slope(double z) const { return a1 + z * (2.0 * a2 + z * 3.0 * a3); }
   bool is_zero() const { return a0 == 0.0 && a1 == 0.0 && a2 == 0.0 && a3 == 0.0; }
+  /// Sufficient for being negative on [0, 1]: all Bernstein coefficients are.
+  bool is_clearly_negative() const {
+    return a0 < 0.0 && 3.0 * a0 + a1 < 0.0 && 3.0 * a0 + 2.0 * a1 + a2 < 0.0 &&
+           a0 + a1 + a2 + a3 < 0.0;
+  }
 
   /// Ends of the stretches of [0, 1] on which the cubic is monotone: turning points, then 1.
   struct Stretches {
@@ -132,6 +137,9 @@ std::optional<EventGuess> guess_event(const ContactLaw& law, ContactEvent event,
                                       const TipState& start, const TipState& end, double h_s,
                                       double vt_sign, bool fresh) {
   const Cubic phi = event_polynomial(law, event, start, end, h_s, vt_sign);
+  if (phi.is_clearly_negative()) {
+    return std::nullopt;  // as nearly always; what follows costs much more
+  }
   if (phi.is_zero()) {
     return std::nullopt;  // a tip that does not move along the ground: nothing rises
   }

@@ -43,6 +43,9 @@ struct LanePack {
   friend inline LanePack operator*(const LanePack& a, double b) {
     return each([&](std::size_t i) { return a.part[i] * b; });
   }
+  friend inline LanePack operator-(double a, const LanePack& b) {
+    return each([&](std::size_t i) { return a - b.part[i]; });
+  }
   friend inline LanePack operator+(double a, const LanePack& b) { return b + a; }
   friend inline LanePack operator*(double a, const LanePack& b) { return b * a; }
   inline LanePack& operator+=(const LanePack& b) { return *this = *this + b; }

@@ -50,42 +50,39 @@ struct ContactIntegrals {
 };
 
 /// Steps q and v (2 chain.rows entries each) by h seconds into q_next and v_next, which may be q
-/// and v themselves. `acceleration` is scratch of the same size. As chain_kernel.h, for numbers and
-/// lanes.
+/// and v themselves. `scratch` has the same size. As chain_kernel.h, for numbers and lanes.
 template <class Real>
 inline ContactIntegrals<Real> pefrl_step(const ChainTables& chain,
                                          const AffineContactForce<Real>& force, const Real& h_s,
                                          const Real* q, const Real* v, Real* q_next, Real* v_next,
-                                         Real* acceleration) {
-  const std::size_t size = 2 * chain.rows;
+                                         Real* scratch) {
   const std::size_t tip = 2 * chain.tip_row;
   ContactIntegrals<Real> integrals;
-  q_next[0] = q[0];
-  q_next[1] = q[1];
-  v_next[0] = v[0];
-  v_next[1] = v[1];
+  put_pair(q_next, 0, pair_at(q, 0));  // the pin does not move
+  put_pair(v_next, 0, pair_at(v, 0));
+  const Real first_drift_s = Pefrl::drift[0] * h_s;
+  for (std::size_t i = 2; i < 2 * chain.rows; ++i) {
+    q_next[i] = q[i] + first_drift_s * v[i];
+  }
   for (std::size_t stage = 0; stage < Pefrl::kKicks; ++stage) {
-    const Real* q_from = stage == 0 ? q : q_next;
     const Real* v_from = stage == 0 ? v : v_next;
-    const Real drift_s = Pefrl::drift[stage] * h_s;
-    for (std::size_t i = 2; i < size; ++i) {
-      q_next[i] = q_from[i] + drift_s * v_from[i];
-    }
     const Real fn = force.fn_N(q_next[tip + 1]);
     const Real ft = force.ft_N(q_next[tip], q_next[tip + 1]);
-    chain_accelerations(chain, q_next, ft, fn, acceleration);
+    substitute_forces(chain, q_next, ft, fn, scratch);
     const Real kick_s = Pefrl::kick[stage] * h_s;
+    const Real drift_s = Pefrl::drift[stage + 1] * h_s;
     const Real vt_before = v_from[tip];
-    for (std::size_t i = 2; i < size; ++i) {
-      v_next[i] = v_from[i] + kick_s * acceleration[i];
-    }
+    // Kick, and drift on, as the accelerations come.
+    substitute_accelerations(chain, scratch, [&](std::size_t row, const PlanarVector<Real>& a) {
+      const PlanarVector<Real> v_row{v_from[2 * row] + kick_s * a.x,
+                                     v_from[2 * row + 1] + kick_s * a.y};
+      put_pair(v_next, row, v_row);
+      q_next[2 * row] += drift_s * v_row.x;
+      q_next[2 * row + 1] += drift_s * v_row.y;
+    });
     integrals.impulse_n += kick_s * fn;
     integrals.impulse_t += kick_s * ft;
     integrals.work_t += kick_s * ft * (0.5 * (vt_before + v_next[tip]));
-  }
-  const Real drift_s = Pefrl::drift[Pefrl::kKicks] * h_s;
-  for (std::size_t i = 2; i < size; ++i) {
-    q_next[i] += drift_s * v_next[i];
   }
   return integrals;
 }

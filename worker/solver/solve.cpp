@@ -112,7 +112,7 @@ std::string solver_version() {
   return OBLIQUE_SOLVER_VERSION;
 }
 std::string instruction_set() {
-  return "generic";
+  return std::string(runnable_lane_kernels().front().name);
 }
 
 Finger::Finger(ModelParameters model) : parts_(std::make_unique<Parts>(std::move(model))) {}

@@ -66,7 +66,8 @@ TEST(Trace, ForcesStayInsideTheConeAndOnItInSlip) {
       EXPECT_LE(std::abs(row.ft_N), limit_N + 1e-6);
       if (row.state[0] == 's') {
         EXPECT_NEAR(std::abs(row.ft_N), limit_N, 1e-6);
-        EXPECT_LE(row.ft_N * row.vP_m_s, 1e-6) << "friction acts against P";
+        // P stops at an instant located to 1e-13 s: forces of 1e4 N, accelerations of 1e4 m/s^2.
+        EXPECT_LE(row.ft_N * row.vP_m_s, 1e-5) << "friction acts against P";
       }
     }
   }

@@ -1,0 +1,74 @@
+#include <benchmark/benchmark.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "tests/bench/counted_number.h"
+#include "tests/bench/multiply_add_peak.h"
+#include "worker/solver/chain.h"
+#include "worker/solver/lane_stepper.h"
+#include "worker/solver/parameters.h"
+#include "worker/solver/pefrl.h"
+
+namespace oblique::bench {
+namespace {
+
+using solver::Chain;
+using solver::LaneKernel;
+
+/// Floating-point operations of one evaluation of the accelerations with its kick and drift: a
+/// quarter of a PEFRL step.
+double operations_an_evaluation(const Chain& chain) {
+  std::vector<CountedNumber> state(2 * chain.rows());
+  std::vector<CountedNumber> q = state;
+  std::vector<CountedNumber> v = state;
+  std::vector<CountedNumber> scratch = state;
+  const std::uint64_t before = CountedNumber::operations();
+  solver::pefrl_step<CountedNumber>(chain.tables(), {}, CountedNumber(1e-6), state.data(),
+                                    state.data(), q.data(), v.data(), scratch.data());
+  return static_cast<double>(CountedNumber::operations() - before) / solver::Pefrl::kKicks;
+}
+
+/// Steps of full lanes, without the contact law: ns an evaluation of one lane, and the share of the
+/// multiply-add peak that this core has shown just before with the same vectors.
+void lane_step(benchmark::State& bench, const LaneKernel& kernel, int elements_per_link) {
+  solver::ModelParameters model;
+  model.elements_per_link = elements_per_link;
+  const Chain chain(model);
+  solver::LaneStepper stepper(chain.tables(), kernel);
+  const solver::ChainState rest = chain.at_rest();
+  for (std::size_t lane = 0; lane < kernel.lanes; ++lane) {
+    stepper.load(lane, rest.q.data(), rest.v.data());
+    stepper.set_step(lane,
+                     0.2 * solver::Pefrl::stability_limit() / chain.highest_frequency_rad_s(0.0));
+  }
+  const std::vector<unsigned char> accept(kernel.lanes, 1);
+  const double peak_per_s = multiply_add_peak_per_s(kernel.name);
+  for (auto _ : bench) {
+    stepper.step();
+    stepper.settle(accept);
+  }
+  const double evaluations = static_cast<double>(bench.iterations()) *
+                             static_cast<double>(solver::Pefrl::kKicks * kernel.lanes);
+  using benchmark::Counter;
+  bench.counters["s/evaluation"] = Counter(evaluations, Counter::kIsRate | Counter::kInvert);
+  bench.counters["operations"] = operations_an_evaluation(chain);
+  bench.counters["peak_share"] =
+      Counter(evaluations * operations_an_evaluation(chain) / peak_per_s, Counter::kIsRate);
+}
+
+[[maybe_unused]] const bool registered = [] {
+  for (const LaneKernel& kernel : solver::runnable_lane_kernels()) {
+    for (const int n : {4, 8, 16, 32}) {
+      const std::string name = "lane_step/" + std::string(kernel.name) + "/" + std::to_string(n);
+      benchmark::RegisterBenchmark(
+          name.c_str(), [kernel, n](benchmark::State& bench) { lane_step(bench, kernel, n); });
+    }
+  }
+  return true;
+}();
+
+}  // namespace
+}  // namespace oblique::bench
