@@ -57,11 +57,19 @@ Cubic::Stretches Cubic::stretches() const {
   return result;
 }
 
-/// Root of a function that rises through zero and is monotone on [low, high].
+/// Root of a function that rises through zero and is monotone on [low, high]: Newton's steps, and
+/// bisection where they leave the bracket.
 double rising_root(const Cubic& phi, double low, double high) {
+  double z = 0.5 * (low + high);
   for (int i = 0; i < 60 && high - low > 1e-15; ++i) {
-    const double z = 0.5 * (low + high);
-    (phi.at(z) < 0.0 ? low : high) = z;
+    const double value = phi.at(z);
+    (value < 0.0 ? low : high) = z;
+    const double next = z - value / phi.slope(z);
+    const double step = next - z;
+    z = next > low && next < high ? next : 0.5 * (low + high);
+    if (std::abs(step) < 1e-15) {
+      return z;
+    }
   }
   return high;
 }
