@@ -131,7 +131,7 @@ TEST(CommandLine, SaysThatADatabaseIsNotThere) {
 TEST(CommandLine, FailsWhenStandardOutputCannotBeWritten) {
   const TestFolder folder;
   std::ofstream(folder.path() / "script")
-      << "exec " << OBLIQUE_PROGRAM << " solve --H 1 --mu 0.4 --e 1 > /dev/full\n";
+      << "exec '" << OBLIQUE_PROGRAM << "' solve --H 1 --mu 0.4 --e 1 > /dev/full\n";
   const int status = std::system(
       ("sh " + (folder.path() / "script").string() + " 2> " + (folder.path() / "err").string())
           .c_str());

@@ -143,6 +143,14 @@ bool Contact::judge_crossing(const TipState& end, const ContactIntegrals<double>
   return false;
 }
 
+Contact Contact::branched(double e_star, const ContactSteps& steps) const {
+  Contact branch = *this;
+  branch.law_.set_restitution(e_star);
+  branch.steps_s_ = steps;
+  branch.trial_s_ = branch.full_step_s();
+  return branch;
+}
+
 double Contact::full_step_s() const {
   return law_.is_compression() ? steps_s_.compression_s : steps_s_.restitution_s;
 }

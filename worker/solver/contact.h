@@ -40,6 +40,12 @@ class Contact {
   /// contact outlasts kLongest_s, or has more than kMostEvents events or kMostSteps steps.
   bool judge(const TipState& end, const ContactIntegrals<double>& integrals);
 
+  /// Whether the last accepted step ended at the first turn. Up to there e* has no say.
+  bool is_at_first_turn() const { return record_.turned_once_at(t_s_); }
+  /// This contact with another e* and its steps: the same as one that had them from touch on. Only
+  /// at the first turn; the step in compression must be the same.
+  Contact branched(double e_star, const ContactSteps& steps) const;
+
   /// What has been gathered so far; whole once finished.
   const ContactRecord& record() const { return record_; }
   double time_s() const { return t_s_; }

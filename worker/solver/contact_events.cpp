@@ -64,12 +64,12 @@ double rising_root(const Cubic& phi, double low, double high) {
   for (int i = 0; i < 60 && high - low > 1e-15; ++i) {
     const double value = phi.at(z);
     (value < 0.0 ? low : high) = z;
-    const double next = z - value / phi.slope(z);
-    const double step = next - z;
-    z = next > low && next < high ? next : 0.5 * (low + high);
+    const double step = -value / phi.slope(z);
     if (std::abs(step) < 1e-15) {
       return z;
     }
+    const double next = z + step;
+    z = next > low && next < high ? next : 0.5 * (low + high);
   }
   return high;
 }

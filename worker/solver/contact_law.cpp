@@ -6,37 +6,20 @@ namespace oblique::solver {
 
 ContactLaw::ContactLaw(const ContactParameters& parameters, const TipState& touch)
     : parameters_(parameters),
+      tangential_stiffness_N_m_(parameters.k_N_m / parameters.eta2),
       stick_(std::abs(touch.vx_m_s) < parameters.mu * parameters.eta2 * std::abs(touch.vy_m_s)),
       s_(touch.vx_m_s < 0.0 ? -1.0 : 1.0),
       x_anchor_m_(touch.x_m),
-      y_anchor_m_(touch.y_m) {}
-
-double ContactLaw::normal_stiffness_N_m() const {
-  return is_compression() ? parameters_.k_N_m
-                          : parameters_.k_N_m / (parameters_.e_star * parameters_.e_star);
+      y_anchor_m_(touch.y_m) {
+  enter(PhaseKind::kCompression);
 }
 
-double ContactLaw::fn_N(const TipState& tip) const {
-  return fn_anchor_N_ - normal_stiffness_N_m() * (tip.y_m - y_anchor_m_);
-}
-
-double ContactLaw::ft_N(const TipState& tip) const {
-  return stick_ ? ft_anchor_N_ - tangential_stiffness_N_m() * (tip.x_m - x_anchor_m_)
-                : -s_ * parameters_.mu * fn_N(tip);
-}
-
-double ContactLaw::fn_rate_N_s(const TipState& tip) const {
-  return -normal_stiffness_N_m() * tip.vy_m_s;
-}
-
-double ContactLaw::ft_rate_N_s(const TipState& tip) const {
-  return stick_ ? -tangential_stiffness_N_m() * tip.vx_m_s
-                : -s_ * parameters_.mu * fn_rate_N_s(tip);
-}
-
-double ContactLaw::slip_velocity_m_s(const TipState& tip) const {
-  const double stiffness_ratio = normal_stiffness_N_m() / parameters_.k_N_m;
-  return tip.vx_m_s + s_ * parameters_.mu * parameters_.eta2 * stiffness_ratio * tip.vy_m_s;
+void ContactLaw::enter(PhaseKind phase) {
+  phase_ = phase;
+  const double stiffness_ratio =
+      is_compression() ? 1.0 : 1.0 / (parameters_.e_star * parameters_.e_star);
+  normal_stiffness_N_m_ = stiffness_ratio * parameters_.k_N_m;
+  slip_coupling_ = parameters_.mu * parameters_.eta2 * stiffness_ratio;
 }
 
 AffineContactForce<double> ContactLaw::affine() const {
@@ -66,7 +49,7 @@ void ContactLaw::anchor(const TipState& tip) {
 
 void ContactLaw::turn(const TipState& tip) {
   anchor(tip);
-  phase_ = is_compression() ? PhaseKind::kRestitution : PhaseKind::kCompression;
+  enter(is_compression() ? PhaseKind::kRestitution : PhaseKind::kCompression);
 }
 
 void ContactLaw::start_slip(const TipState& tip) {

@@ -38,21 +38,36 @@ class ContactLaw {
   double slip_direction() const { return s_; }
   double mu() const { return parameters_.mu; }
   /// Slope of the normal element in the present phase [N/m].
-  double normal_stiffness_N_m() const;
-  double tangential_stiffness_N_m() const { return parameters_.k_N_m / parameters_.eta2; }
+  double normal_stiffness_N_m() const { return normal_stiffness_N_m_; }
+  double tangential_stiffness_N_m() const { return tangential_stiffness_N_m_; }
 
-  double fn_N(const TipState& tip) const;
-  double ft_N(const TipState& tip) const;
-  double fn_rate_N_s(const TipState& tip) const;
-  double ft_rate_N_s(const TipState& tip) const;
+  double fn_N(const TipState& tip) const {
+    return fn_anchor_N_ - normal_stiffness_N_m_ * (tip.y_m - y_anchor_m_);
+  }
+  double ft_N(const TipState& tip) const {
+    return stick_ ? ft_anchor_N_ - tangential_stiffness_N_m_ * (tip.x_m - x_anchor_m_)
+                  : -s_ * parameters_.mu * fn_N(tip);
+  }
+  double fn_rate_N_s(const TipState& tip) const { return -normal_stiffness_N_m_ * tip.vy_m_s; }
+  double ft_rate_N_s(const TipState& tip) const {
+    return stick_ ? -tangential_stiffness_N_m_ * tip.vx_m_s
+                  : -s_ * parameters_.mu * fn_rate_N_s(tip);
+  }
   /// Tangential deformation u_x = -F_t eta2 / k [m].
   double ux_m(const TipState& tip) const { return -ft_N(tip) / tangential_stiffness_N_m(); }
   /// Velocity that P has in slip: V_t + s mu eta2 (k_n/k) V_n (paper, eq. 24).
-  double slip_velocity_m_s(const TipState& tip) const;
+  double slip_velocity_m_s(const TipState& tip) const {
+    return tip.vx_m_s + s_ * slip_coupling_ * tip.vy_m_s;
+  }
 
   /// The laws as the integrators take them.
   AffineContactForce<double> affine() const;
 
+  /// Makes e* another one, from here on.
+  void set_restitution(double e_star) {
+    parameters_.e_star = e_star;
+    enter(phase_);
+  }
   /// Compression becomes restitution, or the other way; forces are continuous.
   void turn(const TipState& tip);
   /// P starts to slide, against the friction force.
@@ -62,9 +77,13 @@ class ContactLaw {
 
  private:
   void anchor(const TipState& tip);
+  void enter(PhaseKind phase);
 
   ContactParameters parameters_;
-  PhaseKind phase_ = PhaseKind::kCompression;
+  double tangential_stiffness_N_m_;
+  PhaseKind phase_{};
+  double normal_stiffness_N_m_{};  ///< in the present phase
+  double slip_coupling_{};         ///< mu eta2 k_n/k in the present phase
   bool stick_;
   double s_;
   double x_anchor_m_;

@@ -27,6 +27,7 @@ class ContactRecord {
 
   /// Fills the parts of `result` that the contact determines. Needs finish().
   void write_to(CaseResult& result) const;
+  bool turned_once_at(double t_s) const { return turns_.size() == 1 && turns_[0].t_s == t_s; }
   double work_n_J() const { return work_n_J_; }
   double work_t_J() const { return work_t_J_; }
 

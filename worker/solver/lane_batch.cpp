@@ -1,5 +1,6 @@
 #include "worker/solver/lane_batch.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "worker/solver/errors.h"
@@ -15,12 +16,10 @@ LaneBatch::LaneBatch(const Chain& chain, const LaneKernel& kernel)
       column_(chain.at_rest()) {}
 
 void LaneBatch::solve(const Source& source, const Sink& sink, const Finger::Extras& extras) {
-  std::size_t busy = 0;
   for (std::size_t lane = 0; lane < lanes_.size(); ++lane) {
     fill(lane, source, extras);
-    busy += lanes_[lane].contact ? 1U : 0U;
   }
-  while (busy > 0) {
+  for (std::size_t busy = busy_lanes(); busy > 0; busy = busy_lanes()) {
     stepper_.step();
     for (std::size_t lane = 0; lane < lanes_.size(); ++lane) {
       accept_[lane] = lanes_[lane].contact && advance(lane, sink) ? 1 : 0;
@@ -29,20 +28,30 @@ void LaneBatch::solve(const Source& source, const Sink& sink, const Finger::Extr
     for (std::size_t lane = 0; lane < lanes_.size(); ++lane) {
       Lane& slot = lanes_[lane];
       if (!slot.contact) {
+        if (!branches_.empty()) {
+          start_branch(lane);
+        }
         continue;
       }
       if (accept_[lane] != 0 && slot.observer) {
         slot.observer->accepted(*slot.contact, stored(lane));
+      }
+      if (!slot.followers.empty() && slot.contact->is_at_first_turn()) {
+        branch_off(lane);
       }
       if (slot.contact->finished()) {
         finish(lane, busy, sink);
       }
       if (slot.contact->finished() || slot.failed) {
         fill(lane, source, extras);
-        busy -= slot.contact ? 0U : 1U;
       }
     }
   }
+}
+
+std::size_t LaneBatch::busy_lanes() const {
+  return static_cast<std::size_t>(std::count_if(
+      lanes_.begin(), lanes_.end(), [](const Lane& lane) { return lane.contact.has_value(); }));
 }
 
 void LaneBatch::fill(std::size_t lane, const Source& source, const Finger::Extras& extras) {
@@ -50,24 +59,73 @@ void LaneBatch::fill(std::size_t lane, const Source& source, const Finger::Extra
   slot.observer.reset();
   slot.contact.reset();
   slot.failed = false;
-  const auto next = source();
+  if (!branches_.empty()) {
+    start_branch(lane);
+    return;
+  }
+  const auto next = upcoming_ ? std::exchange(upcoming_, std::nullopt) : source();
   if (!next) {
     stepper_.set_step(lane, 0.0);  // idle lanes stand still
     return;
   }
-  slot.contact_case = *next;
-  slot.started = std::chrono::steady_clock::now();
-  const ChainState& touch = *next->touch;
+  start(lane, *next);
+  if (ContactObserver::is_needed(extras)) {
+    slot.observer.emplace(motion_, extras, slot.touch);
+    slot.observer->accepted(*slot.contact, *next->touch);
+  } else {
+    take_followers(slot, source);
+  }
+}
+
+void LaneBatch::start(std::size_t lane, const ContactCase& next) {
+  Lane& slot = lanes_[lane];
+  slot.contact_case = next;
+  slot.started = Clock::now();
+  const ChainState& touch = *next.touch;
   stepper_.load(lane, touch.q.data(), touch.v.data());
   slot.touch = chain_.tip(touch);
   slot.in = motion_.energies(touch);
-  slot.contact.emplace(next->parameters, slot.touch, next->steps);
+  slot.contact.emplace(next.parameters, slot.touch, next.steps);
   stepper_.set_step(lane, slot.contact->trial_step_s());
   stepper_.set_force(lane, slot.contact->force());
-  if (ContactObserver::is_needed(extras)) {
-    slot.observer.emplace(motion_, extras, slot.touch);
-    slot.observer->accepted(*slot.contact, touch);
+}
+
+/// The state at touch of the case just started is in its lane by now: the source may move on.
+void LaneBatch::take_followers(Lane& slot, const Source& source) {
+  while (slot.followers.size() + 1 < kLargestGroup) {
+    upcoming_ = source();
+    if (!upcoming_ || upcoming_->group != slot.contact_case.group) {
+      return;
+    }
+    slot.followers.push_back(*upcoming_);
+    upcoming_.reset();
   }
+}
+
+void LaneBatch::branch_off(std::size_t lane) {
+  Lane& slot = lanes_[lane];
+  const auto trunk =
+      std::make_shared<const Trunk>(Trunk{*slot.contact, stored(lane), slot.touch, slot.in});
+  for (const ContactCase& follower : slot.followers) {
+    branches_.push_back({trunk, follower});
+  }
+  slot.followers.clear();
+}
+
+void LaneBatch::start_branch(std::size_t lane) {
+  Lane& slot = lanes_[lane];
+  const Branch branch = std::move(branches_.front());
+  branches_.pop_front();
+  const Trunk& trunk = *branch.trunk;
+  slot.contact_case = branch.contact_case;
+  slot.started = Clock::now();
+  slot.touch = trunk.touch;
+  slot.in = trunk.in;
+  slot.contact.emplace(
+      trunk.contact.branched(branch.contact_case.parameters.e_star, branch.contact_case.steps));
+  stepper_.load(lane, trunk.state.q.data(), trunk.state.v.data());
+  stepper_.set_step(lane, slot.contact->trial_step_s());
+  stepper_.set_force(lane, slot.contact->force());
 }
 
 bool LaneBatch::advance(std::size_t lane, const Sink& sink) {
@@ -82,6 +140,10 @@ bool LaneBatch::advance(std::size_t lane, const Sink& sink) {
   } catch (const SolveError& error) {
     slot.failed = true;
     sink({slot.contact_case.tag, std::nullopt, error.what()});
+    for (const ContactCase& follower : slot.followers) {
+      sink({follower.tag, std::nullopt, error.what()});  // it would come the same way
+    }
+    slot.followers.clear();
     return false;
   }
   stepper_.set_step(lane, slot.contact->trial_step_s());
@@ -103,7 +165,7 @@ void LaneBatch::finish(std::size_t lane, std::size_t busy, const Sink& sink) {
     result.solver.dt_s = slot.contact_case.steps.compression_s;
     result.solver.steps = slot.contact->steps();
     // The lanes share the time.
-    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - slot.started;
+    const std::chrono::duration<double> elapsed = Clock::now() - slot.started;
     result.solver.wall_s = elapsed.count() / static_cast<double>(busy);
     outcome.result = std::move(result);
   } catch (const SolveError& error) {

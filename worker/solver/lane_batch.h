@@ -1,8 +1,11 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,7 +17,8 @@ namespace oblique::solver {
 
 /// A contact to solve, from touch on.
 struct ContactCase {
-  std::uint64_t tag;  ///< the caller's name for it
+  std::uint64_t tag;    ///< the caller's name for it
+  std::uint64_t group;  ///< cases of one group that follow each other differ in e* only
   ContactParameters parameters;
   ContactSteps steps;
   const ChainState* touch;  ///< of the eliminated chain; read when the case is taken
@@ -29,8 +33,9 @@ struct ContactOutcome {
 
 /// Solves contacts of the explicit integrator side by side in vector lanes. A lane whose contact
 /// ends takes the next case at once, and a lane that locates an event steps from its own saved
-/// state with a length of its own while the others go on. A case has the same bits whatever lane
-/// and neighbours it had. Not for use from two threads at once.
+/// state with a length of its own while the others go on. Cases of a group share the contact up to
+/// its first turn, where e* begins to count. A case has the same bits whatever lane, neighbours and
+/// group it had. Not for use from two threads at once.
 class LaneBatch {
  public:
   using Source = std::function<std::optional<ContactCase>()>;
@@ -44,24 +49,47 @@ class LaneBatch {
   void solve(const Source& source, const Sink& sink, const Finger::Extras& extras = {});
 
  private:
+  using Clock = std::chrono::steady_clock;
+  /// Largest group: the first case and those that branch off.
+  static constexpr std::size_t kLargestGroup = 16;
+
   struct Lane {
     std::optional<Contact> contact;  ///< empty: the lane idles
     ContactCase contact_case{};
     TipState touch{};
     Energies in{};
+    std::vector<ContactCase> followers;  ///< the rest of the group, before the first turn
     std::optional<ContactObserver> observer;
-    std::chrono::steady_clock::time_point started{};
+    Clock::time_point started{};
     bool failed = false;
   };
+  /// A contact at its first turn.
+  struct Trunk {
+    Contact contact;
+    ChainState state;
+    TipState touch;
+    Energies in;
+  };
+  struct Branch {
+    std::shared_ptr<const Trunk> trunk;
+    ContactCase contact_case;
+  };
   void fill(std::size_t lane, const Source& source, const Finger::Extras& extras);
+  void start(std::size_t lane, const ContactCase& next);
+  void start_branch(std::size_t lane);
+  void take_followers(Lane& slot, const Source& source);
+  void branch_off(std::size_t lane);
   bool advance(std::size_t lane, const Sink& sink);
   void finish(std::size_t lane, std::size_t busy, const Sink& sink);
+  std::size_t busy_lanes() const;
   const ChainState& stored(std::size_t lane);
 
   const Chain& chain_;
   ExplicitMotion motion_;
   LaneStepper stepper_;
   std::vector<Lane> lanes_;
+  std::deque<Branch> branches_;          ///< taken before further cases
+  std::optional<ContactCase> upcoming_;  ///< taken from the source, the first of its group
   std::vector<unsigned char> accept_;
   ChainState column_;
 };

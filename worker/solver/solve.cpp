@@ -171,18 +171,22 @@ void Finger::solve_in_lanes(const std::function<std::optional<PointRequest>()>& 
     PointRequest request;
     double fall_time_s;
   };
-  std::map<std::uint64_t, Entry> under_way;  // at most one a lane
+  std::map<std::uint64_t, Entry> under_way;
   TouchCache touches(*parts_);
   std::uint64_t next_tag = 0;
+  std::uint64_t group = 0;
+  std::optional<PointRequest> last;
   const auto take = [&]() -> std::optional<ContactCase> {
     while (const auto request = source()) {
       try {
         validate_point(parts_->model, request->H_m, request->mu, request->e_star);
         const ContactSteps steps = touches.steps(request->e_star);
         const ChainState& touch = touches.at(request->H_m);
+        group += last && last->H_m == request->H_m && last->mu == request->mu ? 0U : 1U;
+        last = *request;
         under_way[next_tag] = {*request, touch.t_s};
-        return ContactCase{next_tag++, parts_->contact_parameters(request->mu, request->e_star),
-                           steps, &touch};
+        return ContactCase{next_tag++, group,
+                           parts_->contact_parameters(request->mu, request->e_star), steps, &touch};
       } catch (const std::exception& error) {
         sink({request->number, std::nullopt, error.what()});
       }

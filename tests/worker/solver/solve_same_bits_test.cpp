@@ -133,9 +133,9 @@ TEST(Lanes, EveryInstructionSetGivesTheSameAnswersButForRounding) {
       std::size_t done = 0;
       batch.solve(
           [&]() -> std::optional<ContactCase> {
-            return given < cases
-                       ? std::optional(ContactCase{given++, parameters, steps.contact(0.8), &touch})
-                       : std::nullopt;
+            return given < cases ? std::optional(ContactCase{given++, 0, parameters,
+                                                             steps.contact(0.8), &touch})
+                                 : std::nullopt;
           },
           [&](ContactOutcome&& outcome) {
             ++done;

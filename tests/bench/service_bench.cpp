@@ -1,0 +1,237 @@
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+#include <thread>
+#include <vector>
+
+#include <sys/eventfd.h>
+
+#include "proto/recipe.h"
+#include "tests/system/processes.h"
+#include "worker/session.h"
+#include "worker/solver/solve.h"
+
+/// Whole studies through real processes: what they take of the clock, of each process's CPU and
+/// memory, and of the disk. README.md says how to run it.
+namespace oblique::bench {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// A study of about `points` points: drops times frictions times restitutions.
+std::vector<std::string> study_of(std::uint64_t points) {
+  const auto side =
+      static_cast<std::uint64_t>(std::llround(std::cbrt(static_cast<double>(points))));
+  std::ostringstream text;
+  text << ':' << std::max<std::uint64_t>(side, 2);
+  const std::string count = text.str();
+  return {"--H", "0.1:1.15" + count, "--mu",   "0.05:0.95" + count,
+          "--e", "0.2:1.0" + count,  "--name", "bench"};
+}
+
+struct Usage {
+  double cpu_s;
+  double peak_MB;
+};
+
+/// What a living process has used so far.
+Usage usage_of(pid_t pid) {
+  const std::string folder = "/proc/" + std::to_string(pid);
+  std::ifstream stat(folder + "/stat");
+  std::string text((std::istreambuf_iterator<char>(stat)), std::istreambuf_iterator<char>());
+  std::istringstream fields(text.substr(text.rfind(')') + 1));
+  std::string skipped;
+  for (int i = 0; i < 11; ++i) {
+    fields >> skipped;
+  }
+  double user_ticks = 0.0;
+  double system_ticks = 0.0;
+  fields >> user_ticks >> system_ticks;
+  Usage usage{(user_ticks + system_ticks) / static_cast<double>(sysconf(_SC_CLK_TCK)), 0.0};
+  std::ifstream status(folder + "/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.starts_with("VmHWM:")) {
+      usage.peak_MB = std::stod(line.substr(6)) / 1024.0;
+    }
+  }
+  return usage;
+}
+
+double megabytes(const std::string& file) {
+  std::error_code missing;
+  const auto bytes = std::filesystem::file_size(file, missing);
+  return missing ? 0.0 : static_cast<double>(bytes) / 1e6;
+}
+
+/// One study, submitted and watched to its end by `oblique`.
+struct Study {
+  explicit Study(std::uint64_t points) : arguments(study_of(points)) {}
+
+  void run() {
+    std::vector<std::string> submit{"submit", "--server", server.client_url()};
+    submit.insert(submit.end(), arguments.begin(), arguments.end());
+    began = Clock::now();
+    check(test::run_client(folder, submit));
+    submitted_s = seconds();
+    check(test::run_client(folder, {"watch", "bench", "--server", server.client_url()}));
+    wall_s = seconds();
+    rows = database.rows();
+  }
+  double seconds() const { return std::chrono::duration<double>(Clock::now() - began).count(); }
+  static void check(const test::Ran& ran) {
+    if (ran.exit_code != 0) {
+      throw std::runtime_error(ran.errors);
+    }
+  }
+
+  test::Folder folder;
+  std::string file = folder.file("bench.db");
+  test::Database database{file};
+  test::Server server{folder, file};
+  std::vector<std::string> arguments;
+  Clock::time_point began;
+  double submitted_s = 0.0;
+  double wall_s = 0.0;
+  double rows = 0.0;
+};
+
+void bench_service(std::uint64_t points) {
+  Study study(points);
+  test::Worker worker(study.folder, study.server.worker_url());
+  study.run();
+  const Usage solving = usage_of(worker.pid());
+  const Usage serving = usage_of(study.server.process().pid());
+  const double wal_MB = megabytes(study.file + "-wal");
+  std::printf("| %.0f | %.1f | %.0f | %.1f | %.1f | %.1f %% | %.1f | %.0f | %.0f | %.0f |\n",
+              study.rows, study.wall_s, study.rows / study.wall_s, solving.cpu_s, serving.cpu_s,
+              100.0 * serving.cpu_s / (serving.cpu_s + solving.cpu_s),
+              1e6 * serving.cpu_s / study.rows, solving.peak_MB, serving.peak_MB,
+              megabytes(study.file) + wal_MB);
+  std::fflush(stdout);
+}
+
+/// A worker in this process that answers every point at once, with one result solved beforehand.
+class InstantWorker {
+ public:
+  explicit InstantWorker(const std::string& server_url) : stop_(eventfd(0, EFD_CLOEXEC)) {
+    worker::SessionSettings settings;
+    settings.server = server_url;
+    settings.name = "instant";
+    settings.report_interval_ms = 10;
+    thread_ = std::thread([this, settings] {
+      worker::Session session(settings, [this](const auto&, const auto& next, const auto& take) {
+        while (const auto point = next()) {
+          protocol::PointResult result = result_;
+          result.set_point(*point);
+          take(std::move(result));
+        }
+      });
+      session.run(stop_, [] {});
+    });
+  }
+  ~InstantWorker() {
+    const std::uint64_t one = 1;
+    static_cast<void>(write(stop_, &one, sizeof(one)));
+    thread_.join();
+    close(stop_);
+  }
+  InstantWorker(const InstantWorker&) = delete;
+  InstantWorker& operator=(const InstantWorker&) = delete;
+
+ private:
+  const protocol::PointResult result_ =
+      protocol::to_message(0, solver::Finger(solver::ModelParameters{}).solve(1.0, 0.4, 0.8));
+  int stop_;
+  std::thread thread_;
+};
+
+void bench_server_alone(std::uint64_t points) {
+  Study study(points);
+  const InstantWorker worker(study.server.worker_url());
+  study.run();
+  const Usage serving = usage_of(study.server.process().pid());
+  std::printf("| %.0f | %.1f | %.0f | %.1f | %.1f | %.0f |\n", study.rows, study.wall_s,
+              study.rows / study.wall_s, serving.cpu_s, 1e6 * serving.cpu_s / study.rows,
+              serving.peak_MB);
+  std::fflush(stdout);
+}
+
+/// A study of so many points that none of it is ever solved: no worker is there.
+void bench_submission(std::uint64_t points) {
+  const test::Folder folder;
+  test::Server server(folder, folder.file("bench.db"));
+  std::vector<std::string> submit{"submit", "--server", server.client_url()};
+  const auto study = study_of(points);
+  submit.insert(submit.end(), study.begin(), study.end());
+  const Usage before = usage_of(server.process().pid());
+  const auto began = Clock::now();
+  Study::check(test::run_client(folder, submit));
+  const std::chrono::duration<double> taken = Clock::now() - began;
+  const Usage after = usage_of(server.process().pid());
+  std::printf("| %.0e | %.3f | %.1f | %.1f |\n", static_cast<double>(points), taken.count(),
+              before.peak_MB, after.peak_MB);
+}
+
+void run_all(const std::string& what, const std::vector<std::uint64_t>& points) {
+  const auto table = [&](const char* header, const std::function<void(std::uint64_t)>& row) {
+    std::puts(header);
+    for (const std::uint64_t count : points) {
+      row(count);
+    }
+  };
+  if (what == "service") {
+    table(
+        "| points | wall [s] | points/s | worker CPU [s] | server CPU [s] | server's share | "
+        "server "
+        "us a point | worker MB | server MB | database MB |\n"
+        "|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
+        bench_service);
+  } else if (what == "server-alone") {
+    table(
+        "| results | wall [s] | results/s | server CPU [s] | us a result | server MB |\n"
+        "|---:|---:|---:|---:|---:|---:|",
+        bench_server_alone);
+  } else if (what == "submission") {
+    table(
+        "| points | submitted in [s] | server before MB | after MB |\n"
+        "|---:|---:|---:|---:|",
+        bench_submission);
+  } else {
+    throw std::invalid_argument("`" + what + "` is none of service, server-alone and submission");
+  }
+}
+
+}  // namespace
+}  // namespace oblique::bench
+
+int main(int argc, char** argv) {
+  try {
+    if (argc < 3) {
+      throw std::invalid_argument(
+          "usage: oblique-service-bench service|server-alone|submission POINTS...");
+    }
+    std::vector<std::uint64_t> points;
+    for (int i = 2; i < argc; ++i) {
+      points.push_back(std::stoull(argv[i]));
+    }
+    oblique::bench::run_all(argv[1], points);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "oblique-service-bench: %s\n", error.what());
+    return EXIT_FAILURE;
+  }
+  return EXIT_SUCCESS;
+}

@@ -1,0 +1,124 @@
+#include <benchmark/benchmark.h>
+
+#include <atomic>
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "worker/solver/chain.h"
+#include "worker/solver/fall.h"
+#include "worker/solver/solve.h"
+#include "worker/solver/solve_contact.h"
+#include "worker/solver/step_choice.h"
+
+namespace oblique::bench {
+namespace {
+
+using solver::Chain;
+using solver::Fall;
+using solver::Finger;
+using solver::ModelParameters;
+using solver::PointRequest;
+
+/// A sweep of 8 drops, 8 frictions and 8 restitutions.
+std::vector<PointRequest> sweep() {
+  std::vector<PointRequest> points;
+  for (int i = 0; i < 8; ++i) {
+    for (int j = 0; j < 8; ++j) {
+      for (int k = 0; k < 8; ++k) {
+        points.push_back({points.size(), 0.1 + 0.15 * i, 0.05 + 0.13 * j, 0.2 + 0.8 * k / 7.0});
+      }
+    }
+  }
+  return points;
+}
+
+ModelParameters with_elements(std::int64_t elements_per_link) {
+  ModelParameters model;
+  model.elements_per_link = static_cast<int>(elements_per_link);
+  return model;
+}
+
+void count_cases(benchmark::State& bench, std::size_t cases_an_iteration) {
+  bench.counters["cases/s"] = benchmark::Counter(
+      static_cast<double>(bench.iterations()) * static_cast<double>(cases_an_iteration),
+      benchmark::Counter::kIsRate);
+}
+
+/// A contact of one case, one number at a time.
+void solve_scalar(const Chain& chain, const Fall& fall, const solver::StepChoice& steps,
+                  const PointRequest& point) {
+  const solver::ExplicitMotion motion(chain);
+  const ModelParameters model;
+  benchmark::DoNotOptimize(
+      solver::solve_contact(motion, {model.k_N_m, model.eta2, point.mu, point.e_star},
+                            steps.contact(point.e_star), fall.state_at(point.H_m), {}));
+}
+
+/// What a script would do: the model built and the fall solved for every case, no lanes.
+void naive(benchmark::State& bench) {
+  const std::vector<PointRequest> points = sweep();
+  std::size_t next = 0;
+  for (auto _ : bench) {
+    const ModelParameters model;
+    const Chain chain(model);
+    const solver::StepChoice steps(chain, model);
+    const Fall fall(chain, steps.fall_s());
+    solve_scalar(chain, fall, steps, points[next]);
+    next = (next + 37) % points.size();  // all over the sweep
+  }
+  count_cases(bench, 1);
+}
+BENCHMARK(naive)->Unit(benchmark::kMillisecond);
+
+/// One fall for all cases, still one number at a time.
+void shared_fall(benchmark::State& bench) {
+  const ModelParameters model = with_elements(bench.range(0));
+  const Chain chain(model);
+  const solver::StepChoice steps(chain, model);
+  const Fall fall(chain, steps.fall_s());
+  const std::vector<PointRequest> points = sweep();
+  std::size_t next = 0;
+  for (auto _ : bench) {
+    solve_scalar(chain, fall, steps, points[next]);
+    next = (next + 37) % points.size();
+  }
+  count_cases(bench, 1);
+}
+BENCHMARK(shared_fall)->Arg(4)->Arg(16)->Unit(benchmark::kMicrosecond);
+
+/// One fall, vector lanes, and so many threads.
+void lanes_and_threads(benchmark::State& bench) {
+  const Finger finger(with_elements(bench.range(0)));
+  const auto threads = static_cast<std::size_t>(bench.range(1));
+  const std::vector<PointRequest> points = sweep();
+  finger.largest_drop_m();  // solves the fall
+  for (auto _ : bench) {
+    std::atomic<std::size_t> next{0};
+    std::vector<std::jthread> workers;
+    for (std::size_t i = 0; i < threads; ++i) {
+      workers.emplace_back([&] {
+        finger.solve_points(
+            [&]() -> std::optional<PointRequest> {
+              const std::size_t index = next++;
+              return index < points.size() ? std::optional(points[index]) : std::nullopt;
+            },
+            [](solver::PointOutcome&& outcome) { benchmark::DoNotOptimize(outcome); });
+      });
+    }
+  }
+  count_cases(bench, points.size());
+}
+BENCHMARK(lanes_and_threads)
+    ->ArgNames({"n", "threads"})
+    ->ArgsProduct({{4, 8, 16, 32}, {1}})
+    ->Args({4, 2})
+    ->Args({4, 4})
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace oblique::bench
