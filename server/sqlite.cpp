@@ -7,7 +7,9 @@ namespace oblique::server {
 
 DatabaseHandle open_database(const std::string& path, int flags) {
   sqlite3* raw = nullptr;
-  const int code = sqlite3_open_v2(path.c_str(), &raw, flags | SQLITE_OPEN_EXRESCODE, nullptr);
+  // One thread uses a connection at a time, so SQLite need not lock at every call.
+  const int code = sqlite3_open_v2(path.c_str(), &raw,
+                                   flags | SQLITE_OPEN_EXRESCODE | SQLITE_OPEN_NOMUTEX, nullptr);
   DatabaseHandle database(raw);
   if (code != SQLITE_OK) {
     throw StorageError("cannot open the database " + path + ": " +
