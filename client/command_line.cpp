@@ -30,11 +30,16 @@ void add_verbs(CLI::App& app, Command& command) {
   add_studies(app, command);
   add_workers(app, command);
   add_cancel(app, command);
+  add_pause(app, command);
+  add_resume(app, command);
+  add_retry(app, command);
   add_query(app, command);
   add_sql(app, command);
   add_paper(app, command);
   add_converge(app, command);
   add_fit(app, command);
+  add_backup(app, command);
+  add_check(app, command);
 }
 
 // The verb that was parsed, or the program itself.

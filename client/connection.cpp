@@ -4,6 +4,7 @@
 #include <string_view>
 #include <utility>
 
+#include "proto/address.h"
 #include "proto/frames.h"
 
 namespace oblique::client {
@@ -27,6 +28,11 @@ Connection::Connection(ConnectionSettings settings, KeepWaiting keep_waiting)
   // The embedded service may be connected to before it listens.
   socket_.set(zmq::sockopt::reconnect_ivl, 20);
   socket_.set(zmq::sockopt::reconnect_ivl_max, 1000);
+  if (const auto objection = protocol::objection_to_address(settings_.server_url);
+      !objection.empty()) {
+    throw solver::InputError("server = \"" + settings_.server_url + "\" is not an address: " +
+                             objection + ", as in " + ConnectionSettings().server_url);
+  }
   try {
     socket_.connect(settings_.server_url);
   } catch (const zmq::error_t&) {
@@ -85,6 +91,14 @@ protocol::ClientReply Connection::call(protocol::ClientRequest request) {
     if (reply.has_error()) {
       throw ServerError(reply.error().message());
     }
+    // A reply has the number of its request's kind. Other programs' frames may be read as anything.
+    if (static_cast<int>(reply.kind_case()) != static_cast<int>(request.kind_case())) {
+      throw ConnectionError("what answers at " + settings_.server_url +
+                            " does not speak as oblique-server does to clients: check the "
+                            "address and port (" +
+                            ConnectionSettings().server_url +
+                            " is for clients; the port for workers is another one)");
+    }
     return reply;
   }
   throw ConnectionError("no answer from " + settings_.server_url + " within " +
@@ -93,10 +107,12 @@ protocol::ClientReply Connection::call(protocol::ClientRequest request) {
                         "where it is with --server URL or OBLIQUE_SERVER");
 }
 
-protocol::SubmitReply Connection::submit(const Study& study) {
+protocol::SubmitReply Connection::submit(const Study& study, std::int32_t priority, double weight) {
   protocol::ClientRequest request;
   request.mutable_submit()->set_name(study.name);
   *request.mutable_submit()->mutable_recipe() = study.recipe;
+  request.mutable_submit()->set_priority(priority);
+  request.mutable_submit()->set_weight(weight);
   return call(std::move(request)).submit();
 }
 
@@ -112,10 +128,11 @@ protocol::WorkersReply Connection::workers() {
   return call(std::move(request)).workers();
 }
 
-protocol::StudyStatus Connection::cancel(const std::string& study) {
+protocol::ChangeReply Connection::change(const std::string& study, protocol::StudyChange change) {
   protocol::ClientRequest request;
-  request.mutable_cancel()->set_study(study);
-  return call(std::move(request)).cancel().study();
+  request.mutable_change()->set_study(study);
+  request.mutable_change()->set_change(change);
+  return call(std::move(request)).change();
 }
 
 protocol::QueryReply Connection::query(const std::string& sql, std::uint64_t max_rows) {

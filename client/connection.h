@@ -49,11 +49,12 @@ class Connection {
 
   const std::string& url() const { return settings_.server_url; }
 
-  protocol::SubmitReply submit(const Study& study);
+  /// `priority` and `weight` say how the study shares the workers with others.
+  protocol::SubmitReply submit(const Study& study, std::int32_t priority = 0, double weight = 1.0);
   /// The study of that name, or all of them when it is empty.
   protocol::StatusReply status(const std::string& study);
   protocol::WorkersReply workers();
-  protocol::StudyStatus cancel(const std::string& study);
+  protocol::ChangeReply change(const std::string& study, protocol::StudyChange change);
   /// Runs one statement that only reads; `max_rows` 0 leaves the limit to the server.
   protocol::QueryReply query(const std::string& sql, std::uint64_t max_rows = 0);
 

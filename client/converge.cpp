@@ -179,6 +179,7 @@ void add_converge(CLI::App& app, Command& command) {
   verb->add_option("--tolerance", flags->tolerance_percent,
                    "of the mesh study: largest difference of a mesh that is good enough [%]")
       ->type_name("PERCENT")
+      ->check(CLI::Range(1e-9, 100.0))
       ->needs(study)
       ->capture_default_str();
   add_point_flags(*verb, flags->points, FlagValues::kMany);

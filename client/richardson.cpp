@@ -36,7 +36,7 @@ Extrapolation extrapolate(std::span<const double> values, double highest_order, 
   if (std::abs(last) <= resolution) {
     result.trend = Trend::kRounding;
     result.error = resolution;
-  } else if (!(std::abs(last) < std::abs(before))) {
+  } else if (!(std::abs(last) < std::abs(before) * std::exp2(-kLeastOrder))) {
     result.trend = Trend::kUnsettled;
     result.error = std::max(std::abs(last), std::abs(before));
   } else if ((last > 0.0) != (before > 0.0)) {

@@ -11,7 +11,7 @@ enum class Trend {
   kRounding,     ///< the last two values are the same but for rounding
   kMonotone,     ///< the last two differences have one sign, and the last is smaller
   kOscillating,  ///< the last difference is smaller and of the other sign
-  kUnsettled,    ///< the last difference is not smaller: no limit to be seen
+  kUnsettled,    ///< the last difference is not or hardly smaller: no limit to be seen
 };
 
 /// What a sequence v_1, v_2, ..., v_m says of its limit by Richardson's extrapolation. With
@@ -22,7 +22,9 @@ enum class Trend {
 /// for monotone values. Where p exceeds the order P that theory promises, the last difference is
 /// small by luck: then d_2 is not believed to be smaller than d_1 2^-P, and p = P is used for the
 /// error. Oscillating values are not extrapolated: limit = v_m, error = max(|d_2|, |d_1| 2^-P).
-/// For unsettled values the error is the larger difference, which bounds nothing.
+/// For unsettled values, those of an order below kLeastOrder among them, the error is the larger
+/// difference, which bounds nothing.
+inline constexpr double kLeastOrder = 0.4;
 struct Extrapolation {
   Trend trend = Trend::kTooFew;
   double limit = 0.0;

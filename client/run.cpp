@@ -26,6 +26,20 @@ struct RunFlags {
   RunSettings settings;
 };
 
+/// `text` as one word of a shell.
+std::string shell_word(const std::string& text) {
+  constexpr std::string_view kPlain =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-./";
+  if (!text.empty() && text.find_first_not_of(kPlain) == std::string::npos) {
+    return text;
+  }
+  std::string quoted = "'";
+  for (const char letter : text) {
+    quoted += letter == '\'' ? std::string("'\\''") : std::string(1, letter);
+  }
+  return quoted + "'";
+}
+
 int run(const RunFlags& flags) {
   const auto study = study_of_flags(flags.study);
   const auto end = run_study(study, flags.settings);
@@ -37,8 +51,8 @@ int run(const RunFlags& flags) {
     std::cerr << "The first " << end->rows.rows_size() << " of " << end->status.points()
               << " points are shown.\n";
   }
-  std::cerr << "More: oblique query " << study.name << " --db "
-            << flags.settings.service.database.string() << "\n";
+  std::cerr << "More: oblique query " << shell_word(study.name) << " --db "
+            << shell_word(flags.settings.service.database.string()) << "\n";
   return end->exit_code;
 }
 

@@ -41,6 +41,9 @@ int solve(const SolveFlags& flags) {
   std::ofstream trace;
   solver::Finger::Extras extras;
   extras.reaction_peaks = true;
+  if (flags.trace == "-") {
+    throw solver::InputError("--trace - is not allowed: the trace goes to a file, name one");
+  }
   if (!flags.trace.empty()) {
     trace.open(flags.trace);
     print_trace_header(trace, finger.model().lengths_m.size());

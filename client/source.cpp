@@ -27,7 +27,11 @@ class DatabaseSource : public Source {
     return reader_.query(sql, server::kNoLimits);
   }
   std::vector<protocol::StudyStatus> status(const std::string& study) override {
-    return reader_.study_status(study);
+    try {
+      return reader_.study_status(study);
+    } catch (const server::QueryError& error) {
+      throw server::QueryError(std::string(error.what()) + " in " + file_);
+    }
   }
   std::string place() const override { return file_; }
 

@@ -1,3 +1,4 @@
+#include <cstdint>
 #include <iostream>
 #include <memory>
 
@@ -22,13 +23,15 @@ struct SubmitFlags {
   StudyFlags study;
   SourceFlags source;
   bool watch = false;
+  std::int32_t priority = 0;
+  double weight = 1.0;
 };
 
 int submit(const SubmitFlags& flags) {
   const auto study = study_of_flags(flags.study);
   StopSignal stop;
   Connection connection(connection_settings(flags.source), [&stop] { return !stop.requested(); });
-  const auto reply = connection.submit(study);
+  const auto reply = connection.submit(study, flags.priority, flags.weight);
   std::cout << study.name << ": " << reply.points() << " points, " << reply.settled() << " done"
             << (reply.created() ? "" : "; the server had it already") << std::endl;
   if (!flags.watch) {
@@ -61,6 +64,16 @@ void add_submit(CLI::App& app, Command& command) {
   verb->footer(kExamples);
   add_server_flags(*verb, flags->source);
   verb->add_flag("--watch", flags->watch, "show the progress until the study is done");
+  verb->add_option("--priority", flags->priority,
+                   "studies of a higher priority come first, -1000 to 1000")
+      ->check(CLI::Range(-1000, 1000))
+      ->type_name("N")
+      ->capture_default_str();
+  verb->add_option("--weight", flags->weight,
+                   "share of the workers among studies of one priority, 0.001 to 1000")
+      ->check(CLI::Range(0.001, 1000.0))
+      ->type_name("W")
+      ->capture_default_str();
   add_study_flags(*verb, flags->study);
   verb->callback([flags, &command] { command = [flags] { return submit(*flags); }; });
 }

@@ -23,11 +23,16 @@ void add_watch(CLI::App& app, Command& command);
 void add_studies(CLI::App& app, Command& command);
 void add_workers(CLI::App& app, Command& command);
 void add_cancel(CLI::App& app, Command& command);
+void add_pause(CLI::App& app, Command& command);
+void add_resume(CLI::App& app, Command& command);
+void add_retry(CLI::App& app, Command& command);
 void add_query(CLI::App& app, Command& command);
 void add_sql(CLI::App& app, Command& command);
 void add_paper(CLI::App& app, Command& command);
 void add_converge(CLI::App& app, Command& command);
 void add_fit(CLI::App& app, Command& command);
+void add_backup(CLI::App& app, Command& command);
+void add_check(CLI::App& app, Command& command);
 
 /// Parses the command line and does what it says: data to standard output, everything else to
 /// standard error. The exit code: 0 done, 1 failed, 2 wrong usage.

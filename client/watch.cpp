@@ -27,7 +27,7 @@ int watch(const WatchFlags& flags) {
   const auto source = open_source(flags.source);
   const auto status = watch_study([&] { return the_study(*source, flags.study); }, stop);
   if (stop.requested()) {
-    std::cerr << "No longer watching; the study goes on.\n";
+    std::cerr << "No longer watching.\n";
     return kFailed;
   }
   return tell_end(status, [&](const std::string& sql) { return source->query(sql); });

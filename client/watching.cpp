@@ -22,6 +22,9 @@ Seconds pause_after(Seconds elapsed) {
   return std::clamp(elapsed / 40, kShortest, kLongest);
 }
 
+/// After so long without a point solved it is said.
+constexpr std::chrono::seconds kLongWithout{10};
+
 void tell_failures(const protocol::StudyStatus& status,
                    const std::function<protocol::QueryReply(const std::string&)>& query) {
   std::cerr << status.failed() << " of " << status.points() << " points failed:\n";
@@ -40,6 +43,9 @@ protocol::StudyStatus watch_study(const std::function<protocol::StudyStatus()>& 
                                   StopSignal& stop) {
   Progress progress(std::cerr, isatty(STDERR_FILENO) == 1);
   const auto start = Clock::now();
+  std::uint64_t last_settled = 0;
+  auto last_change = start;
+  bool told = false;
   for (;;) {
     auto status = ask();
     const Seconds elapsed = Clock::now() - start;
@@ -49,7 +55,18 @@ protocol::StudyStatus watch_study(const std::function<protocol::StudyStatus()>& 
                      .settled = settled,
                      .failed = status.failed(),
                      .elapsed_s = elapsed.count()});
-    const bool over = status.state() != "running" || settled == status.points();
+    if (settled != last_settled) {
+      last_settled = settled;
+      last_change = Clock::now();
+      told = false;
+    } else if (!told && Clock::now() - last_change > kLongWithout) {
+      progress.finish();
+      std::cerr << "Nothing was solved for " << kLongWithout.count()
+                << " s: is a server at work on this study, with workers?\n";
+      told = true;
+    }
+    const bool over =
+        (status.state() != "running" && status.state() != "paused") || settled == status.points();
     if (over ||
         stop.wait(std::chrono::duration_cast<std::chrono::nanoseconds>(pause_after(elapsed)))) {
       progress.finish();
@@ -72,7 +89,7 @@ int tell_end(const protocol::StudyStatus& status,
     tell_failures(status, query);
   }
   if (status.state() == "cancelled") {
-    std::cerr << "The study is cancelled; submit it again and it goes on.\n";
+    std::cerr << "The study is cancelled; oblique resume goes on with it.\n";
   }
   return status.solved() == status.points() ? kDone : kFailed;
 }

@@ -9,16 +9,20 @@
 
 #include "proto/oblique.pb.h"
 #include "proto/recipe.h"
+#include "server/interval_set.h"
+#include "server/study_points.h"
 
 namespace oblique::server {
 
-enum class StudyState { kRunning, kDone, kCancelled };
+enum class StudyState { kRunning, kPaused, kCancelled, kDone };
 
 /// As in the column `studies.state`.
 constexpr const char* state_name(StudyState state) {
   switch (state) {
     case StudyState::kRunning:
       return "running";
+    case StudyState::kPaused:
+      return "paused";
     case StudyState::kDone:
       return "done";
     case StudyState::kCancelled:
@@ -34,6 +38,20 @@ struct AddStudy {
   std::string name;
   std::shared_ptr<const protocol::PointTable> table;
   std::string created_at;
+  StudyShare share{};
+};
+
+struct SetStudyShare {
+  std::uint64_t study_id;
+  StudyShare share{};
+};
+
+/// Forgets that these points failed; a study that was done is running again. Rows of solved points
+/// stay.
+struct ForgetFailures {
+  std::uint64_t study_id;
+  IntervalSet points;
+  std::string changed_at;
 };
 
 struct SetStudyState {
@@ -63,7 +81,8 @@ struct AddResults {
   std::vector<protocol::PointResult> results;
 };
 
-using Change = std::variant<AddStudy, SetStudyState, AddWorker, AddResults>;
+using Change =
+    std::variant<AddStudy, SetStudyState, SetStudyShare, ForgetFailures, AddWorker, AddResults>;
 
 /// What the writer needs of a database. Tests put a failing one in its place.
 class Storage {

@@ -34,7 +34,8 @@ void Scheduler::on(const StudyAdded& event) {
   }
   const std::uint32_t suspect_after_losses = std::max(settings_.max_losses, 2U) - 1;
   studies_.emplace(event.study, Study{StudyPoints(event.table, event.settled, suspect_after_losses),
-                                      event.failed, event.cancelled, false});
+                                      event.failed, event.cancelled, event.paused, false,
+                                      event.share, least_served(event.study)});
   finish_if_complete(event.study);
 }
 
@@ -60,11 +61,53 @@ void Scheduler::on(const StudyCancelled& event) {
   }
 }
 
+void Scheduler::on(const StudyPaused& event) {
+  const auto found = studies_.find(event.study);
+  if (found != studies_.end() && found->second.is_open()) {
+    found->second.paused = true;
+  }
+}
+
 void Scheduler::on(const StudyReopened& event) {
   const auto found = studies_.find(event.study);
-  if (found != studies_.end()) {
+  if (found != studies_.end() && !found->second.is_open()) {
     found->second.cancelled = false;
+    found->second.paused = false;
+    found->second.served = least_served(event.study);
   }
+}
+
+void Scheduler::on(const StudyShareChanged& event) {
+  const auto found = studies_.find(event.study);
+  if (found != studies_.end()) {
+    found->second.share = event.share;
+    found->second.served = least_served(event.study);
+  }
+}
+
+void Scheduler::on(const FailuresForgotten& event) {
+  const auto found = studies_.find(event.study);
+  if (found == studies_.end()) {
+    return;
+  }
+  Study& study = found->second;
+  study.failed -= std::min(study.failed, study.points.reopen(event.points));
+  if (study.finished && !study.points.is_complete()) {
+    study.finished = false;
+    study.served = least_served(event.study);
+  }
+}
+
+/// Where a study begins that opens now: level with the one served least, so that it neither waits
+/// for nor catches up with what went before.
+double Scheduler::least_served(StudyId but) const {
+  std::optional<double> least;
+  for (const auto& [id, study] : studies_) {
+    if (id != but && study.is_open() && study.points.has_free()) {
+      least = std::min(least.value_or(study.served), study.served);
+    }
+  }
+  return least.value_or(0.0);
 }
 
 void Scheduler::finish_if_complete(StudyId id) {
@@ -72,6 +115,7 @@ void Scheduler::finish_if_complete(StudyId id) {
   if (!study.finished && study.points.is_complete()) {
     study.finished = true;
     study.cancelled = false;
+    study.paused = false;
     effects_.emplace_back(StudyFinished{id});
   }
 }
@@ -308,7 +352,6 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
   if (study == 0) {
     return false;
   }
-  last_served_ = study;
   if (const auto chunk = studies_.at(study).points.take(batch_points(worker, study))) {
     grant(id, worker, study, *chunk, false);
   }
@@ -324,22 +367,28 @@ bool Scheduler::serve_suspect(WorkerId id, Worker& worker) {
   return true;
 }
 
+/// The highest priority, then the one served least for its weight, then the oldest.
 StudyId Scheduler::next_free_study() const {
-  const auto is_open = [](const auto& entry) {
-    return !entry.second.cancelled && !entry.second.finished && entry.second.points.has_free();
-  };
-  const auto after = studies_.upper_bound(last_served_);
-  auto found = std::find_if(after, studies_.end(), is_open);
-  if (found == studies_.end()) {
-    found = std::find_if(studies_.begin(), after, is_open);
-    return found == after ? 0 : found->first;
+  auto best = studies_.end();
+  for (auto study = studies_.begin(); study != studies_.end(); ++study) {
+    const Study& candidate = study->second;
+    if (!candidate.is_open() || !candidate.points.has_free()) {
+      continue;
+    }
+    const bool is_better = best == studies_.end() ||
+                           candidate.share.priority > best->second.share.priority ||
+                           (candidate.share.priority == best->second.share.priority &&
+                            candidate.served < best->second.served);
+    if (is_better) {
+      best = study;
+    }
   }
-  return found->first;
+  return best == studies_.end() ? 0 : best->first;
 }
 
 StudyId Scheduler::next_suspect_study() const {
   const auto found = std::find_if(studies_.begin(), studies_.end(), [](const auto& entry) {
-    return !entry.second.cancelled && !entry.second.finished && entry.second.points.has_suspect();
+    return entry.second.is_open() && entry.second.points.has_suspect();
   });
   return found == studies_.end() ? 0 : found->first;
 }
@@ -369,6 +418,7 @@ void Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Chunk& c
   if (worker.defined.insert(study).second) {
     effects_.emplace_back(DefineStudy{id, study});
   }
+  studies_.at(study).served += 1.0 / studies_.at(study).share.weight;
   const LeaseId lease = next_lease_++;
   leases_.emplace(lease, Lease{id, study, chunk, alone, now_ms_});
   worker.leases.insert(lease);

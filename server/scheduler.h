@@ -50,14 +50,29 @@ struct StudyAdded {
   IntervalSet settled;
   std::uint64_t failed = 0;  ///< how many of the settled points failed
   bool cancelled = false;
+  bool paused = false;
+  StudyShare share{};
 };
 /// The study's cancellation is durable.
 struct StudyCancelled {
   StudyId study;
 };
-/// A cancelled study goes on.
+/// Nothing more of the study is handed out; what is handed out is still solved.
+struct StudyPaused {
+  StudyId study;
+};
+/// A cancelled or paused study goes on.
 struct StudyReopened {
   StudyId study;
+};
+struct StudyShareChanged {
+  StudyId study;
+  StudyShare share;
+};
+/// It is durable that these points, all failed before, have no row any more.
+struct FailuresForgotten {
+  StudyId study;
+  IntervalSet points;
 };
 /// A worker said hello. Worker numbers are never used twice.
 struct WorkerJoined {
@@ -105,9 +120,10 @@ struct DispatchHeld {
 /// Time has passed.
 struct Tick {};
 
-using Event = std::variant<StudyAdded, StudyCancelled, StudyReopened, WorkerJoined, CreditGiven,
-                           ResultsReceived, ResultsStored, HeartbeatReceived, WorkerLeft,
-                           WorkerUnreachable, DispatchHeld, Tick>;
+using Event =
+    std::variant<StudyAdded, StudyCancelled, StudyPaused, StudyReopened, StudyShareChanged,
+                 FailuresForgotten, WorkerJoined, CreditGiven, ResultsReceived, ResultsStored,
+                 HeartbeatReceived, WorkerLeft, WorkerUnreachable, DispatchHeld, Tick>;
 
 // ---- Effects ----------------------------------------------------------------------------------
 
@@ -213,7 +229,12 @@ class Scheduler {
     StudyPoints points;
     std::uint64_t failed;
     bool cancelled;
+    bool paused;
     bool finished;
+    StudyShare share;
+    double served = 0.0;  ///< batches handed out over the weight, since the study was last open
+
+    bool is_open() const { return !cancelled && !paused && !finished; }
   };
   struct Lease {
     WorkerId worker;
@@ -241,7 +262,10 @@ class Scheduler {
 
   void on(const StudyAdded& event);
   void on(const StudyCancelled& event);
+  void on(const StudyPaused& event);
   void on(const StudyReopened& event);
+  void on(const StudyShareChanged& event);
+  void on(const FailuresForgotten& event);
   void on(const WorkerJoined& event);
   void on(const CreditGiven& event);
   void on(const ResultsReceived& event);
@@ -264,6 +288,7 @@ class Scheduler {
   bool serve(WorkerId id, Worker& worker);
   bool serve_suspect(WorkerId id, Worker& worker);
   StudyId next_free_study() const;
+  double least_served(StudyId but) const;
   StudyId next_suspect_study() const;
   bool anyone_draining() const;
   std::uint64_t batch_points(const Worker& worker, StudyId study) const;
@@ -276,7 +301,6 @@ class Scheduler {
   std::map<LeaseId, Lease> leases_;
   std::deque<WorkerId> ready_workers_;  // with credit, first come first served
   std::uint64_t threads_ = 0;
-  StudyId last_served_ = 0;
   LeaseId next_lease_ = settings_.first_lease_id;
   bool held_ = false;
   std::int64_t now_ms_ = 0;

@@ -12,9 +12,11 @@ CREATE TABLE studies (
   name        TEXT NOT NULL UNIQUE,
   recipe      BLOB NOT NULL,     -- oblique.protocol.Recipe, serialised: point i is a function of it
   points      INTEGER NOT NULL,
-  state       TEXT NOT NULL CHECK (state IN ('running', 'done', 'cancelled')),
+  state       TEXT NOT NULL CHECK (state IN ('running', 'paused', 'cancelled', 'done')),
   created_at  TEXT NOT NULL,     -- UTC, ISO 8601
-  changed_at  TEXT NOT NULL      -- when `state` was last set
+  changed_at  TEXT NOT NULL,     -- when `state` was last set
+  priority    INTEGER NOT NULL,  -- studies of a higher one come first
+  weight      REAL NOT NULL      -- share of the workers among studies of one priority
 ) STRICT;
 
 -- Every parameter but H, mu and e; one row for each distinct model that has results. The columns

@@ -41,11 +41,19 @@ Service::Service(ServiceSettings settings, Outbox& outbox, std::vector<StoredStu
     : settings_(std::move(settings)), outbox_(outbox), scheduler_(settings_.scheduler) {
   for (StoredStudy& study : studies) {
     study_ids_.emplace(study.name, study.study_id);
-    studies_.emplace(
-        study.study_id,
-        Study{study.name, study.table, study.state, study.created_at, true, 0, {}, {}});
-    feed(StudyAdded{study.study_id, study.table, std::move(study.settled), study.failed,
-                    study.state == StudyState::kCancelled},
+    studies_.emplace(study.study_id, Study{study.name,
+                                           study.table,
+                                           study.state,
+                                           study.created_at,
+                                           study.share,
+                                           study.failures,
+                                           true,
+                                           0,
+                                           {},
+                                           {}});
+    feed(StudyAdded{study.study_id, study.table, std::move(study.settled), study.failures.size(),
+                    study.state == StudyState::kCancelled, study.state == StudyState::kPaused,
+                    study.share},
          now);
   }
 }
@@ -176,13 +184,18 @@ void Service::written(const WriteReport& report, Instant now) {
 
 void Service::stored(const Write& meaning, Instant now) {
   if (const auto* results = std::get_if<OfResults>(&meaning)) {
+    for (const PointOutcome& outcome : results->event.outcomes) {
+      if (outcome.failed) {
+        studies_.at(results->event.study).failures.insert(outcome.point);
+      }
+    }
     feed(results->event, now);
   } else if (const auto* added = std::get_if<OfStudy>(&meaning)) {
     Study& study = studies_.at(added->study);
     study.durable = true;
     outbox_.note(Severity::kInfo, "study " + study.name + " of " +
                                       std::to_string(study.table->size()) + " points begins");
-    feed(StudyAdded{added->study, study.table, {}, 0, false}, now);
+    feed(StudyAdded{added->study, study.table, {}, 0, false, false, study.share}, now);
     bool created = true;
     for (const Client& client : std::exchange(study.submitters, {})) {
       reply_submitted(client, added->study, std::exchange(created, false));
@@ -191,11 +204,25 @@ void Service::stored(const Write& meaning, Instant now) {
     --studies_.at(state->study).state_writes;
     if (state->state == StudyState::kCancelled) {
       feed(StudyCancelled{state->study}, now);
-      reply_cancelled(state->client, state->study, now);
+    } else if (state->state == StudyState::kPaused) {
+      feed(StudyPaused{state->study}, now);
     } else {
       feed(StudyReopened{state->study}, now);
-      reply_submitted(state->client, state->study, false);
     }
+    if (state->submitted) {
+      reply_submitted(state->client, state->study, false);
+    } else {
+      reply_changed(state->client, state->study, 0, now);
+    }
+  } else if (const auto* forgotten = std::get_if<OfFailures>(&meaning)) {
+    Study& study = studies_.at(forgotten->study);
+    forgotten->points.for_each(
+        [&](const Interval& run) { study.failures.erase(run.begin, run.end); });
+    if (study.state == StudyState::kDone) {
+      study.state = StudyState::kRunning;
+    }
+    feed(FailuresForgotten{forgotten->study, forgotten->points}, now);
+    reply_changed(forgotten->client, forgotten->study, forgotten->points.size(), now);
   }
 }
 
@@ -211,10 +238,11 @@ void Service::refused(const Write& meaning, const std::string& error) {
     Study& study = studies_.at(state->study);
     --study.state_writes;
     if (study.state == state->state) {
-      study.state =
-          state->state == StudyState::kCancelled ? StudyState::kRunning : StudyState::kCancelled;
+      study.state = state->before;
     }
     reply_error(state->client, "the change was not stored, the study is as before: " + error);
+  } else if (const auto* forgotten = std::get_if<OfFailures>(&meaning)) {
+    reply_error(forgotten->client, "the change was not stored, the study is as before: " + error);
   }
 }
 

@@ -94,6 +94,8 @@ class Service {
     std::shared_ptr<const protocol::PointTable> table;
     StudyState state;  // as last sent to the database
     std::string created_at;
+    StudyShare share;
+    IntervalSet failures;  // points whose rows say failed
     bool durable = false;
     std::uint32_t state_writes = 0;  // changes of state on their way to the disk
     std::vector<Client> submitters;  // wait for it to be durable
@@ -108,11 +110,18 @@ class Service {
   };
   struct OfState {
     StudyId study;
+    StudyState before;
     StudyState state;
+    Client client;
+    bool submitted;  // the client asked for it by submitting the study again
+  };
+  struct OfFailures {
+    StudyId study;
+    IntervalSet points;
     Client client;
   };
   struct OfNothing {};
-  using Write = std::variant<OfResults, OfStudy, OfState, OfNothing>;
+  using Write = std::variant<OfResults, OfStudy, OfState, OfFailures, OfNothing>;
 
   // service_workers.cpp
   void hello(const std::string& identity, const protocol::WorkerHello& hello, Instant now);
@@ -121,15 +130,17 @@ class Service {
   void bad_frame(const std::string& who);
 
   // service_clients.cpp
-  void set_state(const Client& client, StudyId id, StudyState state, Instant now);
+  void set_state(const Client& client, StudyId id, StudyState state, bool submitted, Instant now);
   void submit(const Client& client, const protocol::SubmitRequest& request, Instant now);
   void continue_study(const Client& client, StudyId id, Instant now);
-  void cancel(const Client& client, const protocol::CancelRequest& request, Instant now);
+  void set_share(StudyId id, const StudyShare& share, Instant now);
+  void change(const Client& client, const protocol::ChangeRequest& request, Instant now);
+  void retry(const Client& client, StudyId id, Instant now);
   void status(const Client& client, const protocol::StatusRequest& request, Instant now);
   void workers(const Client& client, Instant now);
   void query(const Client& client, const protocol::QueryRequest& request);
   void reply_submitted(const Client& client, StudyId id, bool created);
-  void reply_cancelled(const Client& client, StudyId id, Instant now);
+  void reply_changed(const Client& client, StudyId id, std::uint64_t retried, Instant now);
   void reply_error(const Client& client, const std::string& message);
   protocol::StudyStatus status_of(StudyId id, Instant now) const;
 

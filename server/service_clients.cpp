@@ -23,6 +23,20 @@ std::string objection_to_name(const std::string& name) {
   return printable ? "" : "the name of a study may not contain control characters";
 }
 
+/// Why studies cannot share the workers so, or an empty text.
+std::string objection_to_share(const StudyShare& share) {
+  constexpr std::int32_t kHighestPriority = 1000;
+  constexpr double kLeastWeight = 0.001;
+  constexpr double kLargestWeight = 1000.0;
+  if (share.priority < -kHighestPriority || share.priority > kHighestPriority) {
+    return "priority = " + std::to_string(share.priority) + " is not allowed: -1000 to 1000 is";
+  }
+  if (!(share.weight >= kLeastWeight && share.weight <= kLargestWeight)) {
+    return "weight = " + std::to_string(share.weight) + " is not allowed: 0.001 to 1000 is";
+  }
+  return {};
+}
+
 std::string unknown_study(const std::string& name) {
   return "there is no study called \"" + shortened(name, kLongestName) +
          "\": `oblique studies` lists all";
@@ -40,6 +54,11 @@ void Service::client_frame(const std::string& identity, std::string_view frame, 
   }
   const Client client{identity, request.request_id()};
   if (request.protocol_version() != protocol::kProtocolVersion) {
+    if (request.protocol_version() == 0) {
+      bad_frame("a client");
+      reply_error(client, "this is the port for clients; workers connect to the other one");
+      return;
+    }
     reply_error(client, "the server speaks protocol version " +
                             std::to_string(protocol::kProtocolVersion) + ", the client " +
                             std::to_string(request.protocol_version()) +
@@ -56,8 +75,8 @@ void Service::client_frame(const std::string& identity, std::string_view frame, 
     case Kind::kWorkers:
       workers(client, now);
       break;
-    case Kind::kCancel:
-      cancel(client, request.cancel(), now);
+    case Kind::kChange:
+      change(client, request.change(), now);
       break;
     case Kind::kQuery:
       query(client, request.query());
@@ -78,6 +97,11 @@ void Service::submit(const Client& client, const protocol::SubmitRequest& reques
     reply_error(client, reason);
     return;
   }
+  const StudyShare share{request.priority(), request.weight() == 0.0 ? 1.0 : request.weight()};
+  if (const std::string reason = objection_to_share(share); !reason.empty()) {
+    reply_error(client, reason);
+    return;
+  }
   std::shared_ptr<const protocol::PointTable> table;
   try {
     table = std::make_shared<const protocol::PointTable>(request.recipe());
@@ -93,48 +117,99 @@ void Service::submit(const Client& client, const protocol::SubmitRequest& reques
                               "or use another database");
       return;
     }
+    set_share(known->second, share, now);
     continue_study(client, known->second, now);
     return;
   }
   const StudyId id = ++settings_.last_study_id;
   const std::string created_at = iso_8601(now);
   study_ids_.emplace(request.name(), id);
-  studies_.emplace(
-      id, Study{request.name(), table, StudyState::kRunning, created_at, false, 0, {client}, {}});
-  write(AddStudy{id, request.name(), table, created_at}, OfStudy{id}, true);
+  studies_.emplace(id, Study{request.name(),
+                             table,
+                             StudyState::kRunning,
+                             created_at,
+                             share,
+                             {},
+                             false,
+                             0,
+                             {client},
+                             {}});
+  write(AddStudy{id, request.name(), table, created_at, share}, OfStudy{id}, true);
 }
 
 void Service::continue_study(const Client& client, StudyId id, Instant now) {
   Study& study = studies_.at(id);
+  const bool rests = study.state == StudyState::kCancelled || study.state == StudyState::kPaused;
   if (!study.durable) {
     study.submitters.push_back(client);
-  } else if (study.state == StudyState::kCancelled || study.state_writes > 0) {
-    set_state(client, id, StudyState::kRunning, now);
+  } else if (rests || study.state_writes > 0) {
+    set_state(client, id, StudyState::kRunning, true, now);
   } else {
     reply_submitted(client, id, false);
   }
 }
 
-void Service::set_state(const Client& client, StudyId id, StudyState state, Instant now) {
+void Service::set_state(const Client& client, StudyId id, StudyState state, bool submitted,
+                        Instant now) {
   Study& study = studies_.at(id);
+  const StudyState before = study.state;
   study.state = state;
   ++study.state_writes;
-  write(SetStudyState{id, state, iso_8601(now)}, OfState{id, state, client}, true);
+  write(SetStudyState{id, state, iso_8601(now)}, OfState{id, before, state, client, submitted},
+        true);
 }
 
-void Service::cancel(const Client& client, const protocol::CancelRequest& request, Instant now) {
+void Service::set_share(StudyId id, const StudyShare& share, Instant now) {
+  Study& study = studies_.at(id);
+  if (study.share == share) {
+    return;
+  }
+  study.share = share;
+  write(SetStudyShare{id, share}, OfNothing{}, false);
+  feed(StudyShareChanged{id, share}, now);
+}
+
+void Service::change(const Client& client, const protocol::ChangeRequest& request, Instant now) {
   const auto known = study_ids_.find(request.study());
   if (known == study_ids_.end() || !studies_.at(known->second).durable) {
     reply_error(client, unknown_study(request.study()));
     return;
   }
-  const Study& study = studies_.at(known->second);
-  if (study.state == StudyState::kDone ||
-      (study.state == StudyState::kCancelled && study.state_writes == 0)) {
-    reply_cancelled(client, known->second, now);
+  const StudyId id = known->second;
+  const Study& study = studies_.at(id);
+  StudyState wanted{};
+  switch (request.change()) {
+    case protocol::STUDY_CHANGE_CANCEL:
+      wanted = StudyState::kCancelled;
+      break;
+    case protocol::STUDY_CHANGE_PAUSE:
+      // A cancelled study rests already.
+      wanted = study.state == StudyState::kCancelled ? study.state : StudyState::kPaused;
+      break;
+    case protocol::STUDY_CHANGE_RESUME:
+      wanted = StudyState::kRunning;
+      break;
+    case protocol::STUDY_CHANGE_RETRY:
+      retry(client, id, now);
+      return;
+    default:
+      reply_error(client, "the server does not know this change of a study");
+      return;
+  }
+  if (study.state == StudyState::kDone || (study.state == wanted && study.state_writes == 0)) {
+    reply_changed(client, id, 0, now);
     return;
   }
-  set_state(client, known->second, StudyState::kCancelled, now);
+  set_state(client, id, wanted, false, now);
+}
+
+void Service::retry(const Client& client, StudyId id, Instant now) {
+  const IntervalSet& failures = studies_.at(id).failures;
+  if (failures.empty()) {
+    reply_changed(client, id, 0, now);
+    return;
+  }
+  write(ForgetFailures{id, failures, iso_8601(now)}, OfFailures{id, failures, client}, true);
 }
 
 void Service::status(const Client& client, const protocol::StatusRequest& request, Instant now) {
@@ -167,7 +242,9 @@ protocol::StudyStatus Service::status_of(StudyId id, Instant now) const {
   status.set_failed(counts.failed);
   status.set_leased(counts.leased);
   status.set_created_at(study.created_at);
-  if (!study.samples.empty()) {
+  status.set_priority(study.share.priority);
+  status.set_weight(study.share.weight);
+  if (study.state == StudyState::kRunning && !study.samples.empty()) {
     const Sample& oldest = study.samples.front();
     const std::int64_t span_ms = now.steady_ms - oldest.steady_ms;
     if (span_ms > 0) {
@@ -237,10 +314,11 @@ void Service::reply_submitted(const Client& client, StudyId id, bool created) {
   outbox_.to_client(client.identity, reply);
 }
 
-void Service::reply_cancelled(const Client& client, StudyId id, Instant now) {
+void Service::reply_changed(const Client& client, StudyId id, std::uint64_t retried, Instant now) {
   protocol::ClientReply reply;
   reply.set_request_id(client.request_id);
-  *reply.mutable_cancel()->mutable_study() = status_of(id, now);
+  *reply.mutable_change()->mutable_study() = status_of(id, now);
+  reply.mutable_change()->set_retried(retried);
   outbox_.to_client(client.identity, reply);
 }
 

@@ -89,6 +89,10 @@ void Statement::reset() {
   sqlite3_clear_bindings(statement_.get());
 }
 
+double Statement::real(int column) const {
+  return sqlite3_column_double(statement_.get(), column);
+}
+
 std::int64_t Statement::integer(int column) const {
   return sqlite3_column_int64(statement_.get(), column);
 }
@@ -155,13 +159,13 @@ DatabaseKind identify(sqlite3* database, const std::string& path) {
     throw StorageError(path + " is a database of another program (application id " +
                        std::to_string(application_id) + ", " + tables + "): choose another file");
   }
-  if (version != kSchemaVersion) {
+  if (version < 1 || version > kSchemaVersion) {
     throw StorageError(path + " has schema version " + std::to_string(version) +
-                       ", and this program knows version " + std::to_string(kSchemaVersion) +
+                       ", and this program knows versions 1 to " + std::to_string(kSchemaVersion) +
                        (version > kSchemaVersion ? ": use the newer program that wrote it"
                                                  : ": the file is damaged"));
   }
-  return DatabaseKind::kOurs;
+  return version == kSchemaVersion ? DatabaseKind::kOurs : DatabaseKind::kOlder;
 }
 
 void check_path(const std::string& path) {

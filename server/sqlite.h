@@ -50,6 +50,7 @@ class Statement {
   void reset();
 
   std::int64_t integer(int column) const;
+  double real(int column) const;
   std::string text(int column) const;  ///< bytes of a text or blob
 
  private:
@@ -80,12 +81,13 @@ class Transaction {
 
 /// The schema that this program writes, and the marks that tell its databases from others.
 inline constexpr std::int32_t kApplicationId = 0x6f626c71;  // "oblq"
-inline constexpr std::int32_t kSchemaVersion = 1;
+inline constexpr std::int32_t kSchemaVersion = 2;
 
-enum class DatabaseKind { kEmpty, kOurs };
+enum class DatabaseKind { kEmpty, kOurs, kOlder };
 
-/// Says whether an open database is empty or ours. Throws StorageError naming what was found when
-/// it is a foreign file or has a newer schema. `path` is for the messages.
+/// Says whether an open database is empty, ours, or ours with an older schema. Throws StorageError
+/// naming what was found when it is a foreign file or has a newer schema. `path` is for the
+/// messages.
 DatabaseKind identify(sqlite3* database, const std::string& path);
 
 /// Throws StorageError naming what `path` is when no database could be there: a directory, or some

@@ -32,12 +32,31 @@ std::string random_id() {
 }
 
 StudyState state_named(const std::string& name) {
-  for (const StudyState state : {StudyState::kDone, StudyState::kCancelled}) {
+  for (const StudyState state : {StudyState::kDone, StudyState::kCancelled, StudyState::kPaused}) {
     if (name == state_name(state)) {
       return state;
     }
   }
   return StudyState::kRunning;
+}
+
+/// The points, in order, that a query over one study gives.
+IntervalSet points_of(Statement& query, std::uint64_t study_id) {
+  IntervalSet points;
+  Interval run{0, 0};
+  query.reset();
+  query.bind(1, study_id);
+  while (query.step()) {
+    const auto point = static_cast<std::uint64_t>(query.integer(0));
+    if (point != run.end) {
+      points.insert(run.begin, run.end);
+      run.begin = point;
+    }
+    run.end = point + 1;
+  }
+  points.insert(run.begin, run.end);
+  query.reset();
+  return points;
 }
 
 /// Inserts a model, its columns by name. The keys are the columns, but for those handled first.
@@ -87,8 +106,8 @@ class Store::Lock {
     }
     if (::flock(file_, LOCK_EX | LOCK_NB) != 0) {
       ::close(file_);
-      throw StorageError("another server already uses the database " + path +
-                         ": stop it, or ask it with --server");
+      throw StorageError("another server or `oblique run` already uses the database " + path +
+                         ": wait for it, or name another database");
     }
   }
   ~Lock() { ::close(file_); }
@@ -103,10 +122,18 @@ struct Store::Statements {
   explicit Statements(sqlite3* database)
       : add_study(database,
                   "INSERT INTO studies (study_id, name, recipe, points, state, created_at,"
-                  " changed_at) VALUES (?1, ?2, ?3, ?4, 'running', ?5, ?5)"),
+                  " changed_at, priority, weight)"
+                  " VALUES (?1, ?2, ?3, ?4, 'running', ?5, ?5, ?6, ?7)"),
         set_state(database,
                   "UPDATE studies SET state = ?2, changed_at = ?3"
                   " WHERE study_id = ?1 AND state <> ?2"),
+        set_share(database, "UPDATE studies SET priority = ?2, weight = ?3 WHERE study_id = ?1"),
+        forget_failures(database,
+                        "DELETE FROM results WHERE study_id = ?1 AND point >= ?2 AND point < ?3"
+                        " AND status = 'failed'"),
+        reopen(database,
+               "UPDATE studies SET state = 'running', changed_at = ?2"
+               " WHERE study_id = ?1 AND state = 'done'"),
         add_worker(database,
                    "INSERT INTO workers (worker_id, name, threads, solver_version,"
                    " instruction_set, joined_at) VALUES (?, ?, ?, ?, ?, ?)"),
@@ -116,6 +143,9 @@ struct Store::Statements {
 
   Statement add_study;
   Statement set_state;
+  Statement set_share;
+  Statement forget_failures;
+  Statement reopen;
   Statement add_worker;
   Statement find_model;
   Statement add_model;
@@ -136,6 +166,8 @@ Store::Store(const std::string& path) {
   execute(database_.get(), "PRAGMA synchronous = FULL");
   if (kind == DatabaseKind::kEmpty) {
     create_schema();
+  } else if (kind == DatabaseKind::kOlder) {
+    migrate();
   }
   statements_ = std::make_unique<Statements>(database_.get());
 }
@@ -153,6 +185,13 @@ void Store::create_schema() {
   transaction.commit();
 }
 
+void Store::migrate() {
+  Transaction transaction(database_.get());
+  execute(database_.get(), kMigrateFrom1Sql);
+  execute(database_.get(), "PRAGMA user_version = " + std::to_string(kSchemaVersion));
+  transaction.commit();
+}
+
 void Store::set_sync(bool full) {
   if (full != full_sync_) {
     execute(database_.get(), full ? "PRAGMA synchronous = FULL" : "PRAGMA synchronous = NORMAL");
@@ -162,8 +201,8 @@ void Store::set_sync(bool full) {
 
 void Store::commit(std::span<const Change> changes) {
   const bool control = std::any_of(changes.begin(), changes.end(), [](const Change& change) {
-    return std::holds_alternative<AddStudy>(change) ||
-           std::holds_alternative<SetStudyState>(change);
+    return !std::holds_alternative<AddWorker>(change) &&
+           !std::holds_alternative<AddResults>(change);
   });
   try {
     set_sync(control);
@@ -185,7 +224,31 @@ void Store::add(const AddStudy& change) {
   insert.bind_blob(3, change.table->recipe().SerializeAsString());
   insert.bind(4, change.table->size());
   insert.bind(5, change.created_at);
+  insert.bind(6, std::int64_t{change.share.priority});
+  insert.bind(7, change.share.weight);
   insert.run();
+}
+
+void Store::add(const SetStudyShare& change) {
+  Statement& update = statements_->set_share;
+  update.bind(1, change.study_id);
+  update.bind(2, std::int64_t{change.share.priority});
+  update.bind(3, change.share.weight);
+  update.run();
+}
+
+void Store::add(const ForgetFailures& change) {
+  change.points.for_each([&](const Interval& run) {
+    Statement& forget = statements_->forget_failures;
+    forget.bind(1, change.study_id);
+    forget.bind(2, run.begin);
+    forget.bind(3, run.end);
+    forget.run();
+  });
+  Statement& reopen = statements_->reopen;
+  reopen.bind(1, change.study_id);
+  reopen.bind(2, change.changed_at);
+  reopen.run();
 }
 
 void Store::add(const SetStudyState& change) {
@@ -242,16 +305,19 @@ std::int64_t Store::model_id(const AddResults& change, std::uint64_t model) {
 std::vector<StoredStudy> Store::studies() {
   std::vector<StoredStudy> found;
   Statement list(database_.get(),
-                 "SELECT study_id, name, recipe, state, created_at FROM studies ORDER BY study_id");
+                 "SELECT study_id, name, recipe, state, created_at, priority, weight FROM studies"
+                 " ORDER BY study_id");
   Statement settled(database_.get(), "SELECT point FROM results WHERE study_id = ? ORDER BY point");
   Statement failed(database_.get(),
-                   "SELECT count(*) FROM results WHERE study_id = ? AND status = 'failed'");
+                   "SELECT point FROM results WHERE study_id = ? AND status = 'failed'"
+                   " ORDER BY point");
   while (list.step()) {
     StoredStudy study{};
     study.study_id = static_cast<std::uint64_t>(list.integer(0));
     study.name = list.text(1);
     study.state = state_named(list.text(3));
     study.created_at = list.text(4);
+    study.share = {static_cast<std::int32_t>(list.integer(5)), list.real(6)};
     protocol::Recipe recipe;
     try {
       if (!recipe.ParseFromString(list.text(2))) {
@@ -261,22 +327,8 @@ std::vector<StoredStudy> Store::studies() {
     } catch (const std::runtime_error& reason) {
       throw StorageError("the recipe of study " + study.name + " cannot be read: " + reason.what());
     }
-    Interval run{0, 0};
-    settled.bind(1, study.study_id);
-    while (settled.step()) {
-      const auto point = static_cast<std::uint64_t>(settled.integer(0));
-      if (point != run.end) {
-        study.settled.insert(run.begin, run.end);
-        run.begin = point;
-      }
-      run.end = point + 1;
-    }
-    study.settled.insert(run.begin, run.end);
-    settled.reset();
-    failed.bind(1, study.study_id);
-    failed.step();
-    study.failed = static_cast<std::uint64_t>(failed.integer(0));
-    failed.reset();
+    study.settled = points_of(settled, study.study_id);
+    study.failures = points_of(failed, study.study_id);
     found.push_back(std::move(study));
   }
   return found;

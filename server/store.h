@@ -19,8 +19,9 @@ struct StoredStudy {
   std::shared_ptr<const protocol::PointTable> table;
   StudyState state;
   std::string created_at;
-  IntervalSet settled;  ///< points that have a row
-  std::uint64_t failed;
+  StudyShare share{};
+  IntervalSet settled;   ///< points that have a row
+  IntervalSet failures;  ///< those whose row says failed
 };
 
 /// The SQLite database (schema.sql), opened for writing. Only one Store may have a file open;
@@ -28,7 +29,8 @@ struct StoredStudy {
 /// may undo the last ones, which are then solved again), studies with a full sync.
 class Store final : public Storage {
  public:
-  /// Opens the database at `path`, or makes it. Throws StorageError naming what was found: a
+  /// Opens the database at `path`, or makes it; one of an older schema is brought to the present
+  /// one. Throws StorageError naming what was found: a
   /// directory, a foreign file, a newer schema, an unreadable file, one that is open elsewhere.
   explicit Store(const std::string& path);
   ~Store() override;
@@ -51,8 +53,11 @@ class Store final : public Storage {
   class Lock;
 
   void create_schema();
+  void migrate();
   void add(const AddStudy& change);
   void add(const SetStudyState& change);
+  void add(const SetStudyShare& change);
+  void add(const ForgetFailures& change);
   void add(const AddWorker& change);
   void add(const AddResults& change);
   std::int64_t model_id(const AddResults& change, std::uint64_t model);

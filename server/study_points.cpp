@@ -98,6 +98,18 @@ bool StudyPoints::settle(std::uint64_t point) {
   return true;
 }
 
+std::uint64_t StudyPoints::reopen(const IntervalSet& points) {
+  std::uint64_t reopened = 0;
+  points.for_each([&](const Interval& asked) {
+    for (const Interval& run : settled_.within(asked.begin, asked.end)) {
+      settled_.erase(run.begin, run.end);
+      fresh_.insert(run.begin, run.end);
+      reopened += run.end - run.begin;
+    }
+  });
+  return reopened;
+}
+
 std::uint64_t StudyPoints::free() const {
   return table_->size() - leased_.size() - committing_.size() - settled_.size();
 }

@@ -10,6 +10,15 @@
 
 namespace oblique::server {
 
+/// How studies share the workers: those of the highest priority come first, and among them each
+/// gets batches in proportion to its weight.
+struct StudyShare {
+  std::int32_t priority = 0;
+  double weight = 1.0;
+
+  bool operator==(const StudyShare&) const = default;
+};
+
 /// A run of points handed out together: one model, no gap.
 struct Chunk {
   std::uint64_t model;
@@ -51,6 +60,9 @@ class StudyPoints {
 
   /// The result of a committing point is durable. False when the point was not committing.
   bool settle(std::uint64_t point);
+
+  /// The settled ones among these points become fresh. Returns how many they were.
+  std::uint64_t reopen(const IntervalSet& points);
 
   bool has_free() const { return !returned_.empty() || !fresh_.empty(); }
   bool has_suspect() const { return !suspect_.empty(); }

@@ -11,6 +11,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include "proto/address.h"
 #include "proto/frames.h"
 #include "worker/solver/solve.h"
 
@@ -70,6 +71,10 @@ void Session::open_socket() {
   const ConversationSettings& conversation = settings_.conversation;
   socket_->set(zmq::sockopt::reconnect_ivl, static_cast<int>(conversation.shortest_backoff_ms));
   socket_->set(zmq::sockopt::reconnect_ivl_max, static_cast<int>(conversation.longest_backoff_ms));
+  if (const auto objection = protocol::objection_to_address(settings_.server); !objection.empty()) {
+    throw AddressError("server = \"" + settings_.server + "\" is not an address: " + objection +
+                       ", as in " + SessionSettings().server);
+  }
   try {
     socket_->connect(settings_.server);
   } catch (const zmq::error_t& error) {

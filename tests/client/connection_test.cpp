@@ -127,7 +127,7 @@ TEST(Connection, HandsOnTheServersOwnErrors) {
   });
   Connection connection(at(server.url(), kLong_ms));
   try {
-    connection.cancel("x");
+    connection.change("x", protocol::STUDY_CHANGE_CANCEL);
     FAIL();
   } catch (const ServerError& error) {
     EXPECT_STREQ(error.what(), "no study called \"x\"");

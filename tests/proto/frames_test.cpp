@@ -75,7 +75,7 @@ TEST(FramesTest, AFrameLongerThanAllowedIsRefusedAndTheLongestTaken) {
 
 TEST(FramesTest, TextThatIsNotUtf8IsRefused) {
   ClientRequest request;
-  request.mutable_cancel()->set_study("abc");
+  request.mutable_change()->set_study("abc");
   std::string frame = encode(request);
   frame.back() = '\xFF';
   ClientRequest received;

@@ -65,11 +65,31 @@ class ServiceTest : public testing::Test {
     *message.mutable_submit()->mutable_recipe() = table_of(points)->recipe();
     return message;
   }
-  ClientRequest cancel_request(const std::string& name) {
+  ClientRequest change_request(const std::string& name, protocol::StudyChange change) {
     ClientRequest message;
     message.set_protocol_version(protocol::kProtocolVersion);
-    message.mutable_cancel()->set_study(name);
+    message.mutable_change()->set_study(name);
+    message.mutable_change()->set_change(change);
     return message;
+  }
+  ClientRequest cancel_request(const std::string& name) {
+    return change_request(name, protocol::STUDY_CHANGE_CANCEL);
+  }
+  /// Results of the points of the last batch, failed ones from `first_failed` on.
+  void answer_batch(std::uint64_t first_failed) {
+    const auto batch = last_message().batch();
+    WorkerMessage message;
+    auto& results = *message.mutable_results();
+    results.set_study_id(batch.study_id());
+    results.set_lease_id(batch.lease_id());
+    results.set_sequence(++sequence_);
+    results.set_batch_done(true);
+    for (std::uint64_t i = batch.first_point(); i < batch.first_point() + batch.count(); ++i) {
+      *results.add_results() =
+          i < first_failed ? solved_point(i) : protocol::failed_point(i, "for the test");
+    }
+    worker_says(message);
+    write_all();
   }
   void worker_says(const WorkerMessage& message, const std::string& identity = "worker") {
     service_->worker_frame(identity, protocol::encode(message), now_);
@@ -106,6 +126,7 @@ class ServiceTest : public testing::Test {
     return outbox_.worker_messages.empty() ? ServerToWorker() : outbox_.worker_messages.back();
   }
 
+  std::uint64_t sequence_ = 0;
   Instant now_{1000, 1'700'000'000'123};
   FakeOutbox outbox_;
   std::optional<Service> service_;
@@ -167,9 +188,9 @@ TEST_F(ServiceTest, CancellingIsAcknowledgedOnceItIsStoredAndSubmittingAgainGoes
   request(cancel_request("a"));
   EXPECT_TRUE(outbox_.replies.empty());
   write_all();
-  EXPECT_EQ(last_reply().cancel().study().state(), "cancelled");
+  EXPECT_EQ(last_reply().change().study().state(), "cancelled");
   request(cancel_request("a"));
-  EXPECT_EQ(last_reply().cancel().study().state(), "cancelled");
+  EXPECT_EQ(last_reply().change().study().state(), "cancelled");
   request(submit_request("a"));
   write_all();
   EXPECT_FALSE(last_reply().submit().created());
@@ -355,6 +376,93 @@ TEST_F(ServiceTest, AServerThatStopsTellsItsWorkersAndHandsOutNothing) {
 TEST_F(ServiceTest, AShortenedTextKeepsWholeCharacters) {
   EXPECT_EQ(shortened("a\xc3\xa9", 2), "a");
   EXPECT_EQ(shortened("a\xc3\xa9", 3), "a\xc3\xa9");
+}
+
+TEST_F(ServiceTest, APausedStudyHandsOutNothingUntilItIsResumed) {
+  request(submit_request("a"));
+  write_all();
+  request(change_request("a", protocol::STUDY_CHANGE_PAUSE));
+  EXPECT_FALSE(last_reply().has_change()) << "not durable yet";
+  write_all();
+  EXPECT_EQ(last_reply().change().study().state(), "paused");
+  hello();
+  credit(1);
+  EXPECT_FALSE(last_message().has_batch());
+  request(change_request("a", protocol::STUDY_CHANGE_RESUME));
+  write_all();
+  EXPECT_EQ(last_reply().change().study().state(), "running");
+  EXPECT_TRUE(last_message().has_batch());
+}
+
+TEST_F(ServiceTest, PointsHandedOutBeforeAPauseAreStillTaken) {
+  request(submit_request("a", 1));
+  write_all();
+  hello();
+  credit(1);
+  request(change_request("a", protocol::STUDY_CHANGE_PAUSE));
+  write_all();
+  answer_batch(1);
+  EXPECT_EQ(service_->scheduler().study(1).solved, 1U);
+}
+
+TEST_F(ServiceTest, ChangesThatAreThereAlreadyAreAnsweredAtOnce) {
+  request(submit_request("a"));
+  write_all();
+  request(change_request("a", protocol::STUDY_CHANGE_RESUME));
+  EXPECT_EQ(last_reply().change().study().state(), "running");
+  request(change_request("a", protocol::STUDY_CHANGE_PAUSE));
+  write_all();
+  request(change_request("a", protocol::STUDY_CHANGE_PAUSE));
+  EXPECT_EQ(last_reply().change().study().state(), "paused");
+  request(change_request("a", protocol::STUDY_CHANGE_RETRY));
+  EXPECT_EQ(last_reply().change().retried(), 0U);
+  EXPECT_TRUE(outbox_.jobs.empty());
+}
+
+TEST_F(ServiceTest, RetriedPointsAreHandedOutAgainOnceTheirRowsAreGone) {
+  request(submit_request("a", 1));
+  write_all();
+  hello();
+  credit(1);
+  answer_batch(0);
+  write_all();
+  EXPECT_EQ(service_->scheduler().study(1).failed, 1U);
+  credit(1);
+  outbox_.worker_messages.clear();
+  request(change_request("a", protocol::STUDY_CHANGE_RETRY));
+  EXPECT_TRUE(outbox_.worker_messages.empty()) << "not durable yet";
+  write_all();
+  EXPECT_EQ(last_reply().change().retried(), 1U);
+  EXPECT_EQ(last_reply().change().study().state(), "running");
+  EXPECT_EQ(service_->scheduler().study(1).failed, 0U);
+  ASSERT_TRUE(last_message().has_batch());
+  answer_batch(1);
+  write_all();
+  EXPECT_EQ(service_->scheduler().study(1).solved, 1U);
+  request(change_request("a", protocol::STUDY_CHANGE_RETRY));
+  EXPECT_EQ(last_reply().change().study().state(), "done");
+}
+
+TEST_F(ServiceTest, AChangeThatIsNotStoredLeavesTheStudyAsItWas) {
+  request(submit_request("a"));
+  write_all();
+  request(change_request("a", protocol::STUDY_CHANGE_PAUSE));
+  write_all("disk full");
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("disk full"));
+  hello();
+  credit(1);
+  EXPECT_TRUE(last_message().has_batch());
+}
+
+TEST_F(ServiceTest, APriorityOrWeightOutOfRangeIsRefusedByName) {
+  auto heavy = submit_request("a");
+  heavy.mutable_submit()->set_weight(-2.0);
+  request(heavy);
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("weight = -2"));
+  auto urgent = submit_request("a");
+  urgent.mutable_submit()->set_priority(100'000);
+  request(urgent);
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("priority = 100000"));
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ using protocol::QueryReply;
 using testing::HasSubstr;
 
 AddStudy study_of(std::uint64_t points, std::uint64_t id = 1, const std::string& name = "a") {
-  return {id, name, table_of(points), "2024-01-01T00:00:00.000Z"};
+  return {id, name, table_of(points), "2024-01-01T00:00:00.000Z", {}};
 }
 
 AddResults results_of(const AddStudy& study, std::vector<protocol::PointResult> results) {
@@ -66,7 +66,7 @@ TEST_F(StoreTest, WhatWasCommittedIsThereAfterReopening) {
   settled.insert(5);
   settled.insert(7);
   EXPECT_TRUE(studies[0].settled == settled);
-  EXPECT_EQ(studies[0].failed, 1U);
+  EXPECT_EQ(studies[0].failures.size(), 1U);
   EXPECT_EQ(studies[0].state, StudyState::kRunning);
   EXPECT_EQ(store.last_study_id(), 1U);
   EXPECT_EQ(store.last_worker_id(), 1U);
@@ -231,7 +231,7 @@ TEST_F(StoreTest, RunsNamesTheStudyItsModelAndTheWorker) {
 
 TEST_F(StoreTest, ADatabaseInUseIsNotOpenedTwice) {
   const Store store(path_);
-  EXPECT_THAT(message_of_opening(path_), HasSubstr("another server already uses"));
+  EXPECT_THAT(message_of_opening(path_), HasSubstr("already uses the database"));
 }
 
 TEST_F(StoreTest, OtherFilesAreRefusedByTheirKind) {
@@ -253,7 +253,7 @@ TEST_F(StoreTest, ANewerSchemaIsRefusedWithBothVersions) {
   { const Store store(path_); }
   execute(open_database(path_, SQLITE_OPEN_READWRITE).get(), "PRAGMA user_version = 7");
   EXPECT_THAT(message_of_opening(path_), HasSubstr("schema version 7"));
-  EXPECT_THAT(message_of_opening(path_), HasSubstr("knows version 1"));
+  EXPECT_THAT(message_of_opening(path_), HasSubstr("knows versions 1 to 2"));
 }
 
 TEST_F(StoreTest, ARecipeThatCannotBeReadIsAnErrorThatNamesTheStudy) {

@@ -34,7 +34,9 @@ void SimulatedClient::ask() {
   request.set_protocol_version(protocol::kProtocolVersion);
   request.set_request_id(request_);
   if (cancelling_) {
-    request.mutable_cancel()->set_study(name_);
+    request.mutable_change()->set_study(name_);
+    // Any of cancel, pause, resume and retry.
+    request.mutable_change()->set_change(static_cast<protocol::StudyChange>(world_.between(1, 4)));
   } else {
     request.mutable_submit()->set_name(name_);
     *request.mutable_submit()->mutable_recipe() = protocol::recipe_of(

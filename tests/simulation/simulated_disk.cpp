@@ -17,8 +17,8 @@ void SimulatedDisk::commit(std::span<const Change> changes) {
     throw server::StorageError("the disk is full");
   }
   const bool synced = std::any_of(changes.begin(), changes.end(), [](const Change& change) {
-    return std::holds_alternative<AddStudy>(change) ||
-           std::holds_alternative<SetStudyState>(change);
+    return !std::holds_alternative<AddWorker>(change) &&
+           !std::holds_alternative<AddResults>(change);
   });
   unsynced_.emplace_back();
   for (const Change& change : changes) {
@@ -31,15 +31,19 @@ void SimulatedDisk::commit(std::span<const Change> changes) {
 
 void SimulatedDisk::apply(const Change& change) {
   if (const auto* study = std::get_if<AddStudy>(&change)) {
-    contents_.studies[study->study_id] = {study->study_id,
-                                          study->name,
-                                          study->table,
-                                          server::StudyState::kRunning,
-                                          study->created_at,
-                                          {},
-                                          0};
+    contents_.studies[study->study_id] = {
+        study->study_id,   study->name,  study->table, server::StudyState::kRunning,
+        study->created_at, study->share, {},           {}};
   } else if (const auto* state = std::get_if<SetStudyState>(&change)) {
     contents_.studies.at(state->study_id).state = state->state;
+  } else if (const auto* share = std::get_if<server::SetStudyShare>(&change)) {
+    contents_.studies.at(share->study_id).share = share->share;
+  } else if (const auto* forget = std::get_if<server::ForgetFailures>(&change)) {
+    std::erase_if(contents_.results[forget->study_id], [&](const auto& entry) {
+      return forget->points.contains(entry.first) && !entry.second.error().empty();
+    });
+    auto& state_now = contents_.studies.at(forget->study_id).state;
+    state_now = state_now == server::StudyState::kDone ? server::StudyState::kRunning : state_now;
   } else if (const auto* worker = std::get_if<AddWorker>(&change)) {
     contents_.last_worker_id = std::max(contents_.last_worker_id, worker->worker_id);
   } else if (const auto* results = std::get_if<AddResults>(&change)) {
@@ -58,7 +62,9 @@ Found SimulatedDisk::load() const {
     found.studies.push_back(study);
     for (const auto& [point, result] : results(id)) {
       found.studies.back().settled.insert(point);
-      found.studies.back().failed += result.error().empty() ? 0U : 1U;
+      if (!result.error().empty()) {
+        found.studies.back().failures.insert(point);
+      }
     }
     found.last_study_id = std::max(found.last_study_id, id);
   }

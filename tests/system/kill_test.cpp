@@ -10,10 +10,10 @@
 namespace oblique::test {
 namespace {
 
-/// 10,000 points of the preset `paper`.
-const std::vector<std::string> kPoints{"--H", "1",           "--mu",   "0.1:2.0:100",
-                                       "--e", "0.5:1.0:100", "--name", "many"};
-constexpr double kCount = 10'000;
+/// 40,000 points of the preset `paper`.
+const std::vector<std::string> kPoints{"--H", "1",           "--mu",   "0.1:2.0:200",
+                                       "--e", "0.5:1.0:200", "--name", "many"};
+constexpr double kCount = 40'000;
 
 /// A server with the study of `kPoints` and a client that watches it to its end.
 class KillTest : public ::testing::Test {

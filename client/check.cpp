@@ -1,0 +1,45 @@
+#include <iostream>
+#include <memory>
+
+#include "client/source.h"
+#include "client/verbs.h"
+#include "server/database_care.h"
+
+namespace oblique::client {
+namespace {
+
+constexpr const char* kExamples = R"(Examples:
+  oblique check
+  oblique check --db friction.db
+
+Reads the whole database: every page and index, every reference, and that each row is of a point
+that its study has. Exit code 1 when something is wrong. Of a damaged file, the program sqlite3 saves
+what can still be read:  sqlite3 damaged.db .recover | sqlite3 saved.db)";
+
+int check(const DatabaseSettings& database) {
+  const auto faults = server::find_faults(database.file);
+  for (const auto& fault : faults) {
+    std::cout << fault << '\n';
+  }
+  if (faults.empty()) {
+    std::cerr << database.file << " is sound.\n";
+    return kDone;
+  }
+  std::cerr << database.file << " is damaged. What can be read is saved by:\n  sqlite3 "
+            << database.file << " .recover | sqlite3 saved.db\n";
+  return kFailed;
+}
+
+}  // namespace
+
+void add_check(CLI::App& app, Command& command) {
+  auto database = std::make_shared<DatabaseSettings>();
+  auto* verb = app.add_subcommand("check", "Look for damage in a database");
+  verb->footer(kExamples);
+  verb->add_option("--db", database->file, "the database")
+      ->type_name("FILE")
+      ->capture_default_str();
+  verb->callback([database, &command] { command = [database] { return check(*database); }; });
+}
+
+}  // namespace oblique::client

@@ -1,0 +1,168 @@
+#include "server/database_care.h"
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/reader.h"
+#include "server/store.h"
+#include "tests/server/results.h"
+#include "tests/server/scheduler_bench.h"
+
+namespace oblique::server {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+/// A database with one study of ten points, five of them solved.
+class DatabaseCareTest : public testing::Test {
+ protected:
+  DatabaseCareTest() { add_results(*store_, 0, 5, true); }
+
+  void add_results(Store& store, std::uint64_t first, std::uint64_t end, bool with_study) {
+    std::vector<Change> changes;
+    if (with_study) {
+      changes.emplace_back(AddStudy{1, "a", table_, "2024-01-01T00:00:00.000Z", {}});
+      changes.emplace_back(AddWorker{1, "host", 1, "0.1", "avx2", "now"});
+    }
+    std::vector<protocol::PointResult> results;
+    for (std::uint64_t point = first; point < end; ++point) {
+      results.push_back(solved_point(point));
+    }
+    changes.emplace_back(
+        AddResults{1, table_, 1, "0.1", "avx2", 1, "2024-01-01T00:00:01.000Z", results});
+    store.commit(changes);
+  }
+
+  TemporaryFolder folder_;
+  std::string path_ = folder_.file("studies.db");
+  std::string copy_ = folder_.file("copy.db");
+  std::shared_ptr<const protocol::PointTable> table_ = table_of(10);
+  std::optional<Store> store_{path_};
+};
+
+TEST_F(DatabaseCareTest, ACopyMadeWhileTheDatabaseIsOpenHasAllThatWasCommitted) {
+  back_up(path_, copy_);
+  add_results(*store_, 5, 10, false);
+  Store copy(copy_);
+  const auto studies = copy.studies();
+  ASSERT_EQ(studies.size(), 1U);
+  EXPECT_EQ(studies[0].settled, IntervalSet(0, 5));
+  EXPECT_EQ(copy.database_id(), store_->database_id());
+}
+
+TEST_F(DatabaseCareTest, ACopyNeverReplacesAFile) {
+  std::ofstream(copy_) << "mine";
+  EXPECT_THROW(back_up(path_, copy_), StorageError);
+  std::ifstream file(copy_);
+  EXPECT_EQ(std::string(std::istreambuf_iterator<char>(file), {}), "mine");
+}
+
+TEST_F(DatabaseCareTest, OnlyADatabaseOfOursIsCopied) {
+  const std::string other = folder_.file("notes.txt");
+  std::ofstream(other) << "not a database, and long enough to be sure of it";
+  EXPECT_THROW(back_up(other, copy_), StorageError);
+  EXPECT_THROW(back_up(folder_.file("nowhere.db"), copy_), StorageError);
+  EXPECT_FALSE(std::filesystem::exists(copy_));
+}
+
+TEST_F(DatabaseCareTest, ASoundDatabaseHasNoFaults) {
+  EXPECT_THAT(find_faults(path_), IsEmpty());
+}
+
+TEST_F(DatabaseCareTest, ADamagedPageIsFoundAndNotCopied) {
+  store_.reset();  // all is in the one file now
+  {
+    std::fstream file(path_, std::ios::in | std::ios::out | std::ios::binary);
+    const auto size = std::filesystem::file_size(path_);
+    const std::string rubbish(4096, '\x5a');
+    // Every page but the first, which tells what the file is.
+    for (std::uintmax_t at = 4096; at < size; at += 4096) {
+      file.seekp(static_cast<std::streamoff>(at));
+      file << rubbish;
+    }
+  }
+  bool found = false;
+  try {
+    found = !find_faults(path_).empty();
+  } catch (const StorageError&) {
+    found = true;
+  }
+  EXPECT_TRUE(found);
+  EXPECT_THROW(back_up(path_, copy_), StorageError);
+  EXPECT_FALSE(std::filesystem::exists(copy_));
+}
+
+TEST_F(DatabaseCareTest, ARowOfAPointThatTheStudyDoesNotHaveIsNamed) {
+  store_.reset();
+  const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);
+  execute(database.get(), "UPDATE results SET point = 77 WHERE point = 4");
+  EXPECT_THAT(find_faults(path_), testing::Contains(HasSubstr("study a")));
+}
+
+/// A database as version 1 of the schema had it.
+class OldDatabaseTest : public testing::Test {
+ protected:
+  OldDatabaseTest() {
+    std::ifstream schema(OBLIQUE_SCHEMA_1);
+    const std::string sql(std::istreambuf_iterator<char>(schema), {});
+    const DatabaseHandle database =
+        open_database(path_, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
+    execute(database.get(), sql);
+    execute(database.get(), "PRAGMA application_id = " + std::to_string(kApplicationId));
+    execute(database.get(), "PRAGMA user_version = 1");
+    execute(database.get(), "INSERT INTO about (database_id) VALUES ('old')");
+    Statement insert(database.get(),
+                     "INSERT INTO studies (study_id, name, recipe, points, state, created_at,"
+                     " changed_at) VALUES (3, 'old study', ?, 10, 'cancelled', 'then', 'later')");
+    insert.bind_blob(1, table_of(10)->recipe().SerializeAsString());
+    insert.run();
+  }
+
+  TemporaryFolder folder_;
+  std::string path_ = folder_.file("old.db");
+};
+
+TEST_F(OldDatabaseTest, IsBroughtToThePresentSchemaAndKeepsItsStudies) {
+  Store store(path_);
+  EXPECT_EQ(store.database_id(), "old");
+  const auto studies = store.studies();
+  ASSERT_EQ(studies.size(), 1U);
+  EXPECT_EQ(studies[0].name, "old study");
+  EXPECT_EQ(studies[0].state, StudyState::kCancelled);
+  EXPECT_EQ(studies[0].share, StudyShare{});
+  store.commit(std::vector<Change>{SetStudyState{3, StudyState::kPaused, "now"}});
+  EXPECT_EQ(store.studies()[0].state, StudyState::kPaused);
+  EXPECT_THAT(find_faults(path_), IsEmpty());
+}
+
+TEST_F(OldDatabaseTest, HasTheColumnsAndViewsOfANewOneAfterwards) {
+  const std::string fresh = folder_.file("new.db");
+  { const Store store(path_); }
+  { const Store store(fresh); }
+  const auto layout = [](const std::string& path) {
+    const DatabaseHandle database = open_database(path, SQLITE_OPEN_READONLY);
+    Statement columns(database.get(),
+                      "SELECT t.name || ' ' || c.name || ' ' || c.type || c.\"notnull\" || c.pk"
+                      " FROM sqlite_schema AS t, pragma_table_info(t.name) AS c"
+                      " WHERE t.type IN ('table', 'view') ORDER BY t.name, c.cid");
+    std::vector<std::string> found;
+    while (columns.step()) {
+      found.push_back(columns.text(0));
+    }
+    return found;
+  };
+  EXPECT_EQ(layout(path_), layout(fresh));
+}
+
+TEST_F(OldDatabaseTest, CanBeReadAsItIs) {
+  EXPECT_EQ(Reader(path_).query("SELECT name FROM studies", kNoLimits).rows_size(), 1);
+}
+
+}  // namespace
+}  // namespace oblique::server
