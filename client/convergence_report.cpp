@@ -167,7 +167,7 @@ void print_verdict(std::ostream& out, const Refinement& refinement) {
   }
   out << fmt::format("The {} does not converge by {}: ", refinement.what, finest);
   if (convergence.has_one_mode) {
-    out << names_of_unsettled(convergence) << " do not settle, though the mode does";
+    out << "the mode settles, but not " << names_of_unsettled(convergence);
   } else {
     out << "the mode is not one on the finest three levels";
   }
