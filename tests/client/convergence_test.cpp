@@ -256,8 +256,7 @@ TEST(Verdict, NamesOutputsThatGoOnChanging) {
   finest.vt_out_m_s = -3.0;
   const auto refinement = refinement_with({second_order(0.1), second_order(0.05), finest});
   EXPECT_FALSE(converges(refinement));
-  EXPECT_NE(shown(refinement).find("the mode settles, but not vt_out_m_s"),
-            std::string::npos)
+  EXPECT_NE(shown(refinement).find("the mode settles, but not vt_out_m_s"), std::string::npos)
       << shown(refinement);
 }
 
