@@ -1,0 +1,60 @@
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "server/service.h"
+
+namespace oblique::server {
+namespace {
+
+/// Writes at once, and forgets what is said.
+class Sink final : public Outbox {
+ public:
+  bool to_worker(const std::string&, const protocol::ServerToWorker&) override { return true; }
+  void to_client(const std::string&, const protocol::ClientReply&) override {}
+  void write(WriteJob job) override { jobs.push_back(std::move(job)); }
+  bool query(QueryJob) override { return true; }
+  void note(Severity, const std::string&) override {}
+
+  std::vector<WriteJob> jobs;
+};
+
+/// The input is a conversation: of each piece the first byte says who speaks and how long it is.
+void converse(std::string_view input) {
+  Sink outbox;
+  ServiceSettings settings;
+  settings.solver_version = "1";
+  settings.database_id = "db";
+  Instant now{1000, 1'700'000'000'000};
+  Service service(settings, outbox, {}, now);
+  while (!input.empty()) {
+    const auto head = static_cast<unsigned char>(input.front());
+    const std::size_t length = std::min<std::size_t>((head >> 2U) * 4U, input.size() - 1);
+    const std::string_view frame = input.substr(1, length);
+    input.remove_prefix(1 + length);
+    const std::string identity = (head & 1U) != 0 ? "a" : "b";
+    if ((head & 2U) != 0) {
+      service.worker_frame(identity, frame, now);
+    } else {
+      service.client_frame(identity, frame, now);
+    }
+    for (const WriteJob& job : std::exchange(outbox.jobs, {})) {
+      service.written({WriteReport::Kind::kStored, job.ticket, {}}, now);
+    }
+    now.steady_ms += 100;
+    service.tick(now);
+    service.scheduler().check_invariants();
+  }
+}
+
+}  // namespace
+}  // namespace oblique::server
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  oblique::server::converse({reinterpret_cast<const char*>(data), size});
+  return 0;
+}
