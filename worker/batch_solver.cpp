@@ -155,8 +155,11 @@ void BatchSolver::take(Share& share, protocol::PointResult&& result) {
 
 /// Needs the lock.
 void BatchSolver::hand_on(Share& share) {
+  if (share.results.empty()) {
+    return;  // the time since is that of results to come
+  }
   const Clock::time_point now = Clock::now();
-  if (!share.task->unwanted && !share.results.empty()) {
+  if (!share.task->unwanted) {
     Progress& progress = progress_of(share.task->task);
     progress.results.insert(progress.results.end(), std::move_iterator(share.results.begin()),
                             std::move_iterator(share.results.end()));

@@ -23,8 +23,7 @@ Effects Conversation::take_effects() {
   return std::exchange(effects_, {});
 }
 
-// ---- Connecting
-// -----------------------------------------------------------------------------------
+// ---- Connecting -------------------------------------------------------------------------------
 
 Effects Conversation::start(std::int64_t now_ms) {
   now_ms_ = now_ms;
@@ -121,8 +120,7 @@ void Conversation::send(protocol::WorkerMessage message) {
   }
 }
 
-// ---- Messages
-// -------------------------------------------------------------------------------------
+// ---- Messages ---------------------------------------------------------------------------------
 
 Effects Conversation::on_message(const protocol::ServerToWorker& message, std::int64_t now_ms) {
   now_ms_ = now_ms;
@@ -292,8 +290,7 @@ void Conversation::on(const protocol::ServerStopping&) {
   effects_.emplace_back(Note{"the server stops"});
 }
 
-// ---- Results
-// --------------------------------------------------------------------------------------
+// ---- Results ----------------------------------------------------------------------------------
 
 Effects Conversation::on_progress(std::vector<Progress> progress, std::int64_t now_ms) {
   now_ms_ = now_ms;
@@ -376,8 +373,7 @@ void Conversation::give_credit() {
   open_credit_ = settings_.batches_held - static_cast<std::uint32_t>(held_.size());
 }
 
-// ---- The end
-// --------------------------------------------------------------------------------------
+// ---- The end ----------------------------------------------------------------------------------
 
 Effects Conversation::stop(std::int64_t now_ms) {
   now_ms_ = now_ms;

@@ -1,0 +1,100 @@
+// Pause, resume, retry, and how studies share the workers.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/server/service_fixture.h"
+
+namespace oblique::server {
+namespace {
+
+using testing::HasSubstr;
+
+TEST_F(ServiceTest, APausedStudyHandsOutNothingUntilItIsResumed) {
+  request(submit_request("a"));
+  write_all();
+  request(change_request("a", protocol::STUDY_CHANGE_PAUSE));
+  EXPECT_FALSE(last_reply().has_change()) << "not durable yet";
+  write_all();
+  EXPECT_EQ(last_reply().change().study().state(), "paused");
+  hello();
+  credit(1);
+  EXPECT_FALSE(last_message().has_batch());
+  request(change_request("a", protocol::STUDY_CHANGE_RESUME));
+  write_all();
+  EXPECT_EQ(last_reply().change().study().state(), "running");
+  EXPECT_TRUE(last_message().has_batch());
+}
+
+TEST_F(ServiceTest, PointsHandedOutBeforeAPauseAreStillTaken) {
+  request(submit_request("a", 1));
+  write_all();
+  hello();
+  credit(1);
+  request(change_request("a", protocol::STUDY_CHANGE_PAUSE));
+  write_all();
+  answer_batch(1);
+  EXPECT_EQ(service_->scheduler().study(1).solved, 1U);
+}
+
+TEST_F(ServiceTest, ChangesThatAreThereAlreadyAreAnsweredAtOnce) {
+  request(submit_request("a"));
+  write_all();
+  request(change_request("a", protocol::STUDY_CHANGE_RESUME));
+  EXPECT_EQ(last_reply().change().study().state(), "running");
+  request(change_request("a", protocol::STUDY_CHANGE_PAUSE));
+  write_all();
+  request(change_request("a", protocol::STUDY_CHANGE_PAUSE));
+  EXPECT_EQ(last_reply().change().study().state(), "paused");
+  request(change_request("a", protocol::STUDY_CHANGE_RETRY));
+  EXPECT_EQ(last_reply().change().retried(), 0U);
+  EXPECT_TRUE(outbox_.jobs.empty());
+}
+
+TEST_F(ServiceTest, RetriedPointsAreHandedOutAgainOnceTheirRowsAreGone) {
+  request(submit_request("a", 1));
+  write_all();
+  hello();
+  credit(1);
+  answer_batch(0);
+  write_all();
+  EXPECT_EQ(service_->scheduler().study(1).failed, 1U);
+  credit(1);
+  outbox_.worker_messages.clear();
+  request(change_request("a", protocol::STUDY_CHANGE_RETRY));
+  EXPECT_TRUE(outbox_.worker_messages.empty()) << "not durable yet";
+  write_all();
+  EXPECT_EQ(last_reply().change().retried(), 1U);
+  EXPECT_EQ(last_reply().change().study().state(), "running");
+  EXPECT_EQ(service_->scheduler().study(1).failed, 0U);
+  ASSERT_TRUE(last_message().has_batch());
+  answer_batch(1);
+  write_all();
+  EXPECT_EQ(service_->scheduler().study(1).solved, 1U);
+  request(change_request("a", protocol::STUDY_CHANGE_RETRY));
+  EXPECT_EQ(last_reply().change().study().state(), "done");
+}
+
+TEST_F(ServiceTest, AChangeThatIsNotStoredLeavesTheStudyAsItWas) {
+  request(submit_request("a"));
+  write_all();
+  request(change_request("a", protocol::STUDY_CHANGE_PAUSE));
+  write_all("disk full");
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("disk full"));
+  hello();
+  credit(1);
+  EXPECT_TRUE(last_message().has_batch());
+}
+
+TEST_F(ServiceTest, APriorityOrWeightOutOfRangeIsRefusedByName) {
+  auto heavy = submit_request("a");
+  heavy.mutable_submit()->set_weight(-2.0);
+  request(heavy);
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("weight = -2"));
+  auto urgent = submit_request("a");
+  urgent.mutable_submit()->set_priority(100'000);
+  request(urgent);
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("priority = 100000"));
+}
+
+}  // namespace
+}  // namespace oblique::server

@@ -1,0 +1,139 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "proto/frames.h"
+#include "server/service.h"
+#include "tests/server/results.h"
+#include "tests/server/scheduler_bench.h"
+
+namespace oblique::server {
+
+using protocol::ClientReply;
+using protocol::ClientRequest;
+using protocol::ServerToWorker;
+using protocol::WorkerMessage;
+
+/// Keeps what the service sends, and writes only when told to.
+class FakeOutbox final : public Outbox {
+ public:
+  bool to_worker(const std::string& identity, const ServerToWorker& message) override {
+    if (identity == unreachable) {
+      return false;
+    }
+    worker_messages.push_back(message);
+    return true;
+  }
+  void to_client(const std::string&, const ClientReply& reply) override {
+    replies.push_back(reply);
+  }
+  void write(WriteJob job) override { jobs.push_back(std::move(job)); }
+  bool query(QueryJob job) override {
+    queries.push_back(std::move(job));
+    return queries.size() < 3;
+  }
+  void note(Severity, const std::string&) override { ++notes; }
+
+  std::string unreachable;
+  std::vector<ServerToWorker> worker_messages;
+  std::vector<ClientReply> replies;
+  std::vector<WriteJob> jobs;
+  std::vector<QueryJob> queries;
+  int notes = 0;
+};
+
+class ServiceTest : public testing::Test {
+ protected:
+  ServiceTest() {
+    ServiceSettings settings;
+    settings.solver_version = "1.0";
+    settings.database_id = "db";
+    service_.emplace(settings, outbox_, std::vector<StoredStudy>{}, now_);
+  }
+
+  void request(const ClientRequest& message) {
+    service_->client_frame("client", protocol::encode(message), now_);
+    service_->scheduler().check_invariants();
+  }
+  ClientRequest submit_request(const std::string& name, std::uint64_t points = 10) {
+    ClientRequest message;
+    message.set_protocol_version(protocol::kProtocolVersion);
+    message.set_request_id(42);
+    message.mutable_submit()->set_name(name);
+    *message.mutable_submit()->mutable_recipe() = table_of(points)->recipe();
+    return message;
+  }
+  ClientRequest change_request(const std::string& name, protocol::StudyChange change) {
+    ClientRequest message;
+    message.set_protocol_version(protocol::kProtocolVersion);
+    message.mutable_change()->set_study(name);
+    message.mutable_change()->set_change(change);
+    return message;
+  }
+  ClientRequest cancel_request(const std::string& name) {
+    return change_request(name, protocol::STUDY_CHANGE_CANCEL);
+  }
+  /// Results of the points of the last batch, failed ones from `first_failed` on.
+  void answer_batch(std::uint64_t first_failed) {
+    const auto batch = last_message().batch();
+    WorkerMessage message;
+    auto& results = *message.mutable_results();
+    results.set_study_id(batch.study_id());
+    results.set_lease_id(batch.lease_id());
+    results.set_sequence(++sequence_);
+    results.set_batch_done(true);
+    for (std::uint64_t i = batch.first_point(); i < batch.first_point() + batch.count(); ++i) {
+      *results.add_results() =
+          i < first_failed ? solved_point(i) : protocol::failed_point(i, "for the test");
+    }
+    worker_says(message);
+    write_all();
+  }
+  void worker_says(const WorkerMessage& message, const std::string& identity = "worker") {
+    service_->worker_frame(identity, protocol::encode(message), now_);
+    service_->scheduler().check_invariants();
+  }
+  void hello(const std::string& identity = "worker", const std::string& solver = "1.0") {
+    WorkerMessage message;
+    message.mutable_hello()->set_protocol_version(protocol::kProtocolVersion);
+    message.mutable_hello()->set_solver_version(solver);
+    message.mutable_hello()->set_threads(1);
+    worker_says(message, identity);
+  }
+  void credit(std::uint32_t batches) {
+    WorkerMessage message;
+    message.mutable_credit()->set_batches(batches);
+    worker_says(message);
+  }
+  /// All that waits is written, and fails with `error` unless that is empty.
+  void write_all(const std::string& error = {}) {
+    for (const WriteJob& job : std::exchange(outbox_.jobs, {})) {
+      const bool refused = !error.empty() && job.answer_failure;
+      service_->written(
+          {refused ? WriteReport::Kind::kRefused : WriteReport::Kind::kStored, job.ticket, error},
+          now_);
+    }
+    service_->scheduler().check_invariants();
+  }
+  ClientReply last_reply() {
+    EXPECT_FALSE(outbox_.replies.empty());
+    return outbox_.replies.empty() ? ClientReply() : outbox_.replies.back();
+  }
+  ServerToWorker last_message() {
+    EXPECT_FALSE(outbox_.worker_messages.empty());
+    return outbox_.worker_messages.empty() ? ServerToWorker() : outbox_.worker_messages.back();
+  }
+
+  std::uint64_t sequence_ = 0;
+  Instant now_{1000, 1'700'000'000'123};
+  FakeOutbox outbox_;
+  std::optional<Service> service_;
+};
+
+}  // namespace oblique::server
