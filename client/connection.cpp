@@ -107,12 +107,13 @@ protocol::ClientReply Connection::call(protocol::ClientRequest request) {
                         "where it is with --server URL or OBLIQUE_SERVER");
 }
 
-protocol::SubmitReply Connection::submit(const Study& study, std::int32_t priority, double weight) {
+protocol::SubmitReply Connection::submit(const Study& study, const StudyTerms& terms) {
   protocol::ClientRequest request;
   request.mutable_submit()->set_name(study.name);
   *request.mutable_submit()->mutable_recipe() = study.recipe;
-  request.mutable_submit()->set_priority(priority);
-  request.mutable_submit()->set_weight(weight);
+  request.mutable_submit()->set_priority(terms.priority);
+  request.mutable_submit()->set_weight(terms.weight);
+  request.mutable_submit()->set_mixes_versions(terms.mixes_versions);
   return call(std::move(request)).submit();
 }
 

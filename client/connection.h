@@ -37,6 +37,13 @@ class Interrupted : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// How a study uses the workers of its server.
+struct StudyTerms {
+  std::int32_t priority = 0;    ///< studies of a higher one come first
+  double weight = 1.0;          ///< share of the workers among studies of one priority
+  bool mixes_versions = false;  ///< workers of any solver version take part
+};
+
 /// Asks one server, one question at a time. Every call sends one ClientRequest and waits for the
 /// reply with its number; each throws ServerError, ConnectionError or Interrupted.
 class Connection {
@@ -49,8 +56,7 @@ class Connection {
 
   const std::string& url() const { return settings_.server_url; }
 
-  /// `priority` and `weight` say how the study shares the workers with others.
-  protocol::SubmitReply submit(const Study& study, std::int32_t priority = 0, double weight = 1.0);
+  protocol::SubmitReply submit(const Study& study, const StudyTerms& terms = {});
   /// The study of that name, or all of them when it is empty.
   protocol::StatusReply status(const std::string& study);
   protocol::WorkersReply workers();

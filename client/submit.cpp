@@ -23,15 +23,14 @@ struct SubmitFlags {
   StudyFlags study;
   SourceFlags source;
   bool watch = false;
-  std::int32_t priority = 0;
-  double weight = 1.0;
+  StudyTerms terms;
 };
 
 int submit(const SubmitFlags& flags) {
   const auto study = study_of_flags(flags.study);
   StopSignal stop;
   Connection connection(connection_settings(flags.source), [&stop] { return !stop.requested(); });
-  const auto reply = connection.submit(study, flags.priority, flags.weight);
+  const auto reply = connection.submit(study, flags.terms);
   std::cout << study.name << ": " << reply.points() << " points, " << reply.settled() << " done"
             << (reply.created() ? "" : "; the server had it already") << std::endl;
   if (!flags.watch) {
@@ -64,16 +63,19 @@ void add_submit(CLI::App& app, Command& command) {
   verb->footer(kExamples);
   add_server_flags(*verb, flags->source);
   verb->add_flag("--watch", flags->watch, "show the progress until the study is done");
-  verb->add_option("--priority", flags->priority,
+  verb->add_option("--priority", flags->terms.priority,
                    "studies of a higher priority come first, -1000 to 1000")
       ->check(CLI::Range(-1000, 1000))
       ->type_name("N")
       ->capture_default_str();
-  verb->add_option("--weight", flags->weight,
+  verb->add_option("--weight", flags->terms.weight,
                    "share of the workers among studies of one priority, 0.001 to 1000")
       ->check(CLI::Range(0.001, 1000.0))
       ->type_name("W")
       ->capture_default_str();
+  verb->add_flag("--mix-versions", flags->terms.mixes_versions,
+                 "workers of any solver version take part; the column solver_version says which "
+                 "solved a point");
   add_study_flags(*verb, flags->study);
   verb->callback([flags, &command] { command = [flags] { return submit(*flags); }; });
 }

@@ -25,6 +25,30 @@ Seconds pause_after(Seconds elapsed) {
 /// After so long without a point solved it is said.
 constexpr std::chrono::seconds kLongWithout{10};
 
+/// Says what a study waits for, once it does so for a while, and that it goes on.
+class WaitTeller {
+ public:
+  void update(const protocol::StudyStatus& status, Clock::time_point now, Progress& progress) {
+    if (status.waits_for() != reason_) {
+      reason_ = status.waits_for();
+      since_ = now;
+    }
+    const bool settled = reason_.empty() || now - since_ > kWhile;
+    if (!settled || reason_ == told_) {
+      return;
+    }
+    told_ = reason_;
+    progress.finish();
+    std::cerr << (told_.empty() ? "The study goes on.\n" : "The study waits for " + told_ + ".\n");
+  }
+
+ private:
+  static constexpr std::chrono::seconds kWhile{2};
+  std::string reason_;
+  std::string told_;
+  Clock::time_point since_;
+};
+
 void tell_failures(const protocol::StudyStatus& status,
                    const std::function<protocol::QueryReply(const std::string&)>& query) {
   std::cerr << status.failed() << " of " << status.points() << " points failed:\n";
@@ -46,6 +70,7 @@ protocol::StudyStatus watch_study(const std::function<protocol::StudyStatus()>& 
   std::uint64_t last_settled = 0;
   auto last_change = start;
   bool told = false;
+  WaitTeller waits;
   for (;;) {
     auto status = ask();
     const Seconds elapsed = Clock::now() - start;
@@ -55,11 +80,12 @@ protocol::StudyStatus watch_study(const std::function<protocol::StudyStatus()>& 
                      .settled = settled,
                      .failed = status.failed(),
                      .elapsed_s = elapsed.count()});
+    waits.update(status, Clock::now(), progress);
     if (settled != last_settled) {
       last_settled = settled;
       last_change = Clock::now();
       told = false;
-    } else if (!told && Clock::now() - last_change > kLongWithout) {
+    } else if (!told && status.waits_for().empty() && Clock::now() - last_change > kLongWithout) {
       progress.finish();
       std::cerr << "Nothing was solved for " << kLongWithout.count()
                 << " s: is a server at work on this study, with workers?\n";
@@ -96,8 +122,8 @@ int tell_end(const protocol::StudyStatus& status,
 
 protocol::QueryReply table_of(const std::vector<protocol::StudyStatus>& studies) {
   protocol::QueryReply table;
-  for (const char* column :
-       {"study", "state", "points", "solved", "failed", "leased", "points_per_s", "created_at"}) {
+  for (const char* column : {"study", "state", "points", "solved", "failed", "leased",
+                             "points_per_s", "created_at", "priority", "weight", "waits_for"}) {
     table.add_columns(column);
   }
   for (const auto& study : studies) {
@@ -109,6 +135,9 @@ protocol::QueryReply table_of(const std::vector<protocol::StudyStatus>& studies)
     }
     add_value(row, study.points_per_s());
     add_value(row, study.created_at());
+    add_value(row, static_cast<std::int64_t>(study.priority()));
+    add_value(row, study.weight());
+    add_value(row, study.waits_for());
   }
   return table;
 }

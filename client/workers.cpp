@@ -40,6 +40,11 @@ protocol::QueryReply workers_of_server(const ConnectionSettings& settings) {
     add_value(row, static_cast<std::int64_t>(worker.solved_points()));
     add_value(row, static_cast<std::int64_t>(worker.silent_ms()));
   }
+  if (reply.bad_frames() > 0) {
+    std::cerr
+        << reply.bad_frames()
+        << " frames came that no sound worker or client sends; the server's log says from whom\n";
+  }
   return table;
 }
 

@@ -2,6 +2,15 @@
 
 namespace oblique::protocol {
 
+std::string objection_to_version(std::uint32_t version, const std::string& who) {
+  if (version >= kOldestProtocolVersion && version <= kProtocolVersion) {
+    return {};
+  }
+  return "the server speaks protocol versions " + std::to_string(kOldestProtocolVersion) + " and " +
+         std::to_string(kProtocolVersion) + ", the " + who + " " + std::to_string(version) +
+         ": install the same release on both";
+}
+
 std::string encode(const google::protobuf::MessageLite& message) {
   return message.SerializeAsString();
 }

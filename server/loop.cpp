@@ -22,7 +22,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::milliseconds kTick{250};
+constexpr std::chrono::milliseconds kTick{100};
 constexpr int kLinger_ms = 500;
 constexpr int kTcpHeartbeat_ms = 2000;
 constexpr int kTcpTimeout_ms = 10'000;
@@ -174,8 +174,8 @@ class Loop::Parts final : public Outbox {
     service.database_id = store_.database_id();
     service.last_study_id = store_.last_study_id();
     service.last_worker_id = store_.last_worker_id();
-    // Above every number that an earlier run can have given in the time it ran.
-    service.scheduler.first_lease_id = static_cast<LeaseId>(now().utc_ms) << 12U;
+    // Above every number that an earlier run can have given, whatever the clock says.
+    service.scheduler.first_lease_id = store_.count_start() << 40U;
     service_.emplace(std::move(service), *this, store_.studies(), now());
   }
 

@@ -21,6 +21,7 @@ constexpr double kPaceWeight = 0.5;
 std::vector<Effect> Scheduler::handle(const Event& event, std::int64_t now_ms) {
   now_ms_ = std::max(now_ms_, now_ms);
   effects_.clear();
+  seeks_stragglers_ = std::holds_alternative<Tick>(event);
   std::visit([this](const auto& e) { on(e); }, event);
   dispatch();
   return std::exchange(effects_, {});
@@ -33,9 +34,10 @@ void Scheduler::on(const StudyAdded& event) {
     return;
   }
   const std::uint32_t suspect_after_losses = std::max(settings_.max_losses, 2U) - 1;
-  studies_.emplace(event.study, Study{StudyPoints(event.table, event.settled, suspect_after_losses),
-                                      event.failed, event.cancelled, event.paused, false,
-                                      event.share, least_served(event.study)});
+  studies_.emplace(event.study,
+                   Study{StudyPoints(event.table, event.settled, suspect_after_losses),
+                         event.failed, event.cancelled, event.paused, false, event.share,
+                         least_served(event.study), event.solver_version});
   finish_if_complete(event.study);
 }
 
@@ -79,9 +81,21 @@ void Scheduler::on(const StudyReopened& event) {
 
 void Scheduler::on(const StudyShareChanged& event) {
   const auto found = studies_.find(event.study);
-  if (found != studies_.end()) {
-    found->second.share = event.share;
-    found->second.served = least_served(event.study);
+  if (found == studies_.end()) {
+    return;
+  }
+  Study& study = found->second;
+  study.share = event.share;
+  study.served = least_served(event.study);
+  std::vector<LeaseId> unfit;  // of workers that take part no more
+  for (const auto& [id, lease] : leases_) {
+    if (lease.study == event.study && !admits(study, workers_.at(lease.worker))) {
+      unfit.push_back(id);
+      effects_.emplace_back(ReleaseBatch{lease.worker, id});
+    }
+  }
+  for (const LeaseId id : unfit) {
+    end_lease(id, LeaseEnd::kReturned);
   }
 }
 
@@ -92,6 +106,7 @@ void Scheduler::on(const FailuresForgotten& event) {
   }
   Study& study = found->second;
   study.failed -= std::min(study.failed, study.points.reopen(event.points));
+  study.overlaps = study.leases > 0;  // the lease that a point failed in may still be there
   if (study.finished && !study.points.is_complete()) {
     study.finished = false;
     study.served = least_served(event.study);
@@ -125,6 +140,7 @@ void Scheduler::finish_if_complete(StudyId id) {
 void Scheduler::on(const WorkerJoined& event) {
   Worker worker{};
   worker.threads = std::max(event.threads, 1U);
+  worker.solver_version = event.solver_version;
   worker.last_heard_ms = now_ms_;
   if (workers_.emplace(event.worker, std::move(worker)).second) {
     threads_ += std::max(event.threads, 1U);
@@ -180,7 +196,7 @@ void Scheduler::on(const WorkerLeft& event) {
 void Scheduler::on(const WorkerUnreachable& event) {
   if (workers_.contains(event.worker)) {
     remove_worker(event.worker, LeaseEnd::kLost);
-    effects_.emplace_back(DropWorker{event.worker, "its connection is gone"});
+    effects_.emplace_back(DropWorker{event.worker, event.reason});
   }
 }
 
@@ -229,14 +245,55 @@ void Scheduler::end_lease(LeaseId id, LeaseEnd how) {
   const Lease lease = leases_.at(id);
   leases_.erase(id);
   workers_.at(lease.worker).leases.erase(id);
-  StudyPoints& points = studies_.at(lease.study).points;
-  for (const Interval& run :
-       points.leased_set().within(lease.chunk.first_point, lease.chunk.end())) {
+  if (const auto twin = leases_.find(lease.twin); twin != leases_.end()) {
+    twin->second.twin = 0;
+  }
+  Study& study = studies_.at(lease.study);
+  for (const Interval& run : held_by(lease)) {
     if (how == LeaseEnd::kLost) {
       give_back_lost(lease.study, run, lease);
     } else {
-      points.give_back(run, lease.chunk.attempts + 1, lease.chunk.losses);
+      study.points.give_back(run, lease.chunk.attempts + 1, lease.chunk.losses);
     }
+  }
+  if (--study.leases == 0) {
+    study.overlaps = false;
+    if (!study.points.has_results()) {
+      study.solver_version.clear();
+    }
+  }
+}
+
+/// Points that are leased by this lease, which has ended, and by no other.
+std::vector<Interval> Scheduler::held_by(const Lease& lease) const {
+  const Study& study = studies_.at(lease.study);
+  const auto leased = study.points.leased_set().within(lease.chunk.first_point, lease.chunk.end());
+  if (!study.overlaps || leased.empty()) {
+    return leased;
+  }
+  IntervalSet held;
+  for (const Interval& run : leased) {
+    held.insert(run.begin, run.end);
+  }
+  for (const auto& [id, other] : leases_) {
+    if (other.study == lease.study) {
+      held.erase(other.chunk.first_point, other.chunk.end());
+    }
+  }
+  return held.within(lease.chunk.first_point, lease.chunk.end());
+}
+
+/// A batch whose points were all answered by others is nobody's work any more.
+void Scheduler::release_if_answered(LeaseId id) {
+  const auto lease = leases_.find(id);
+  if (lease == leases_.end()) {
+    return;
+  }
+  const Chunk& chunk = lease->second.chunk;
+  const IntervalSet& leased = studies_.at(lease->second.study).points.leased_set();
+  if (leased.within(chunk.first_point, chunk.end()).empty()) {
+    effects_.emplace_back(ReleaseBatch{lease->second.worker, id});
+    end_lease(id, LeaseEnd::kReturned);
   }
 }
 
@@ -269,22 +326,32 @@ void Scheduler::on(const ResultsReceived& event) {
   }
   StoreResults store{event.worker, event.study, event.sequence, {}};
   const auto study = studies_.find(event.study);
-  if (study != studies_.end()) {
+  // What a worker of another solver version solved before the study was given to this one's is
+  // not wanted, though acknowledged: those points are solved again.
+  if (study != studies_.end() && admits(study->second, *worker)) {
     for (std::size_t i = 0; i < event.outcomes.size(); ++i) {
       if (study->second.points.receive(event.outcomes[i].point)) {
         store.accepted.push_back(i);
       }
     }
+    if (!store.accepted.empty() && study->second.solver_version.empty()) {
+      study->second.solver_version = worker->solver_version;
+    }
     learn_pace(*worker, event);
   }
   effects_.emplace_back(std::move(store));
   const auto lease = leases_.find(event.lease);
-  if (event.batch_done && lease != leases_.end() && lease->second.worker == event.worker &&
-      lease->second.study == event.study) {
+  if (lease == leases_.end() || lease->second.worker != event.worker ||
+      lease->second.study != event.study) {
+    return;
+  }
+  const LeaseId twin = lease->second.twin;
+  if (event.batch_done) {
     // Points of a finished batch that got no answer count as lost, or a worker that never answers
     // them would take them for ever.
     end_lease(event.lease, LeaseEnd::kLost);
   }
+  release_if_answered(twin);
 }
 
 void Scheduler::learn_pace(Worker& worker, const ResultsReceived& event) {
@@ -319,8 +386,17 @@ void Scheduler::on(const ResultsStored& event) {
 
 StudyCounts Scheduler::study(StudyId id) const {
   const Study& study = studies_.at(id);
-  return {study.points.table().size(), study.points.settled() - study.failed, study.failed,
-          study.points.leased(), study.cancelled};
+  const bool lacks_worker = study.has_work() && !workers_.empty() &&
+                            std::none_of(workers_.begin(), workers_.end(), [&](const auto& entry) {
+                              return admits(study, entry.second);
+                            });
+  return {study.points.table().size(),
+          study.points.settled() - study.failed,
+          study.failed,
+          study.points.leased(),
+          study.cancelled,
+          study.solver_version,
+          lacks_worker};
 }
 
 WorkerCounts Scheduler::worker(WorkerId id, std::int64_t now_ms) const {
@@ -344,6 +420,7 @@ void Scheduler::check_invariants() const {
     }
   };
   std::map<StudyId, IntervalSet> under_lease;
+  std::map<StudyId, std::size_t> leases_of;
   for (const auto& [id, lease] : leases_) {
     const auto worker = workers_.find(lease.worker);
     require(worker != workers_.end() && worker->second.leases.contains(id),
@@ -352,8 +429,15 @@ void Scheduler::check_invariants() const {
     require(!lease.alone || worker->second.leases.size() == 1, "a suspect lease is not alone");
     require(lease.chunk.count > 0 && id < next_lease_, "a lease is malformed");
     IntervalSet& covered = under_lease[lease.study];
-    require(covered.within(lease.chunk.first_point, lease.chunk.end()).empty(),
+    require(studies_.at(lease.study).overlaps ||
+                covered.within(lease.chunk.first_point, lease.chunk.end()).empty(),
             "two leases hold one point");
+    require(lease.twin == 0 || (leases_.contains(lease.twin) && leases_.at(lease.twin).twin == id &&
+                                leases_.at(lease.twin).worker != lease.worker),
+            "a batch's second lease is not one");
+    require(admits(studies_.at(lease.study), worker->second),
+            "a worker of another solver version holds a lease");
+    ++leases_of[lease.study];
     covered.insert(lease.chunk.first_point, lease.chunk.end());
   }
   for (const auto& [id, study] : studies_) {
@@ -361,6 +445,7 @@ void Scheduler::check_invariants() const {
     require(study.finished == study.points.is_complete(), "a study is finished and is not");
     require(study.failed <= study.points.settled(), "more points failed than were settled");
     require(!study.cancelled || study.points.leased() == 0, "a cancelled study holds leases");
+    require(study.leases == leases_of[id], "a study's leases are miscounted");
     study.points.leased_set().for_each([&, study_id = id](const Interval& run) {
       const auto covered = under_lease[study_id].within(run.begin, run.end);
       require(covered.size() == 1 && covered.front() == run, "a leased point has no lease");

@@ -19,7 +19,8 @@ using WorkerId = std::uint64_t;
 using LeaseId = std::uint64_t;
 
 struct SchedulerSettings {
-  std::int64_t lost_after_ms = 3000;          ///< a worker silent for longer is lost
+  /// A worker silent for longer is lost: three heartbeats missed, and noticed within 3 s.
+  std::int64_t lost_after_ms = 2800;
   double batch_target_s = 0.1;                ///< time a batch takes, once a worker's pace is known
   std::uint64_t first_batch_points = 4;       ///< a thread, in a batch to a worker of unknown pace
   std::uint64_t largest_batch_points = 4096;  ///< a thread
@@ -27,6 +28,10 @@ struct SchedulerSettings {
   /// While free points last, at least so many more batches are left for each thread: the tail of a
   /// study goes out in ever smaller batches and all workers finish together.
   std::uint64_t tail_batches_per_thread = 3;
+  /// With nothing else to hand out, a batch that takes this long, and `straggler_factor` times as
+  /// long as it should, is given to a second worker too; the first answer to a point wins.
+  std::int64_t straggler_after_ms = 1000;
+  double straggler_factor = 4.0;
   /// A chunk whose leases cost so many workers is split; a single point of that kind fails.
   std::uint32_t max_losses = 3;
   std::uint32_t max_credit = 1024;  ///< batches a worker may ask for at a time
@@ -52,6 +57,7 @@ struct StudyAdded {
   bool cancelled = false;
   bool paused = false;
   StudyShare share{};
+  std::string solver_version{};  ///< of its results; empty while there are none
 };
 /// The study's cancellation is durable.
 struct StudyCancelled {
@@ -78,6 +84,7 @@ struct FailuresForgotten {
 struct WorkerJoined {
   WorkerId worker;
   std::uint32_t threads;
+  std::string solver_version{};
 };
 /// The worker takes so many batches more.
 struct CreditGiven {
@@ -109,9 +116,10 @@ struct HeartbeatReceived {
 struct WorkerLeft {
   WorkerId worker;
 };
-/// A message could not be sent to the worker.
+/// A message could not be sent to the worker, or it behaves as no worker does.
 struct WorkerUnreachable {
   WorkerId worker;
+  std::string reason = "its connection is gone";
 };
 /// While held (the disk does not take results), no batch goes out.
 struct DispatchHeld {
@@ -166,6 +174,11 @@ struct WithdrawStudy {
   WorkerId worker;
   StudyId study;
 };
+/// Every point of that batch has a result from elsewhere: what is left of it need not be solved.
+struct ReleaseBatch {
+  WorkerId worker;
+  LeaseId lease;
+};
 /// The worker is lost or was given up; it is unknown from now on.
 struct DropWorker {
   WorkerId worker;
@@ -177,7 +190,7 @@ struct StudyFinished {
 };
 
 using Effect = std::variant<DefineStudy, SendBatch, StoreResults, StoreFailure, AcknowledgeResults,
-                            WithdrawStudy, DropWorker, StudyFinished>;
+                            WithdrawStudy, ReleaseBatch, DropWorker, StudyFinished>;
 
 // ---- State ------------------------------------------------------------------------------------
 
@@ -188,6 +201,8 @@ struct StudyCounts {
   std::uint64_t failed;
   std::uint64_t leased;
   bool cancelled;
+  std::string solver_version;  ///< that its results have; empty while there are none
+  bool lacks_worker;           ///< points wait, and no worker has that version
 };
 
 struct WorkerCounts {
@@ -221,7 +236,8 @@ class Scheduler {
   }
 
   /// Throws std::logic_error when the state contradicts itself: a point in two places or in none, a
-  /// lease without worker or study, a leased point without lease, two leases of one point.
+  /// lease without worker or study, a leased point without lease, two leases of one point where no
+  /// batch was given to a second worker.
   void check_invariants() const;
 
  private:
@@ -233,8 +249,12 @@ class Scheduler {
     bool finished;
     StudyShare share;
     double served = 0.0;  ///< batches handed out over the weight, since the study was last open
+    std::string solver_version{};  ///< of its results and leases; empty while there are none
+    std::size_t leases = 0;
+    bool overlaps = false;  ///< a point of it may be under several of these leases
 
     bool is_open() const { return !cancelled && !paused && !finished; }
+    bool has_work() const { return is_open() && (points.has_free() || points.has_suspect()); }
   };
   struct Lease {
     WorkerId worker;
@@ -242,6 +262,7 @@ class Scheduler {
     Chunk chunk;
     bool alone;  ///< of suspect points: its worker gets nothing beside it
     std::int64_t granted_ms;
+    LeaseId twin = 0;  ///< of another worker, for what is left of the same batch; 0: none
   };
   struct Pace {
     double s_per_point = 0.0;  ///< 0: unknown
@@ -249,6 +270,7 @@ class Scheduler {
   };
   struct Worker {
     std::uint32_t threads;
+    std::string solver_version;
     std::uint32_t credit = 0;
     bool queued = false;    ///< stands in `ready_workers_`
     bool draining = false;  ///< gets nothing until it holds nothing, then suspect points
@@ -279,7 +301,9 @@ class Scheduler {
   enum class LeaseEnd { kReturned, kLost };
   Worker* heard_from(WorkerId worker);
   void end_lease(LeaseId lease, LeaseEnd how);
+  std::vector<Interval> held_by(const Lease& lease) const;
   void give_back_lost(StudyId study, const Interval& run, const Lease& lease);
+  void release_if_answered(LeaseId lease);
   void remove_worker(WorkerId worker, LeaseEnd how);
   void learn_pace(Worker& worker, const ResultsReceived& event);
   void finish_if_complete(StudyId id);
@@ -287,12 +311,15 @@ class Scheduler {
   void dispatch();
   bool serve(WorkerId id, Worker& worker);
   bool serve_suspect(WorkerId id, Worker& worker);
-  StudyId next_free_study() const;
+  bool serve_straggler(WorkerId id, Worker& worker);
+  bool is_straggling(const Lease& lease, const Worker& helper) const;
+  static bool admits(const Study& study, const Worker& worker);
+  StudyId next_free_study(const Worker& worker) const;
   double least_served(StudyId but) const;
-  StudyId next_suspect_study() const;
+  StudyId next_suspect_study(const Worker& worker) const;
   bool anyone_draining() const;
   std::uint64_t batch_points(const Worker& worker, StudyId study) const;
-  void grant(WorkerId id, Worker& worker, StudyId study, const Chunk& chunk, bool alone);
+  LeaseId grant(WorkerId id, Worker& worker, StudyId study, const Chunk& chunk, bool alone);
   void queue(WorkerId id, Worker& worker);
 
   SchedulerSettings settings_;
@@ -303,6 +330,7 @@ class Scheduler {
   std::uint64_t threads_ = 0;
   LeaseId next_lease_ = settings_.first_lease_id;
   bool held_ = false;
+  bool seeks_stragglers_ = false;  // of the event being handled: they are sought at ticks only
   std::int64_t now_ms_ = 0;
   std::int64_t last_tick_ms_ = -1;
   Effects effects_;  // of the event being handled

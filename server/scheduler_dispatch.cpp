@@ -10,9 +10,13 @@ void Scheduler::dispatch() {
   if (held_) {
     return;
   }
+  const auto has_work = [this] {
+    return seeks_stragglers_ ||
+           std::any_of(studies_.begin(), studies_.end(),
+                       [](const auto& entry) { return entry.second.has_work(); });
+  };
   std::size_t served_nothing = 0;  // workers in a row
-  while (served_nothing < ready_workers_.size() &&
-         (next_free_study() != 0 || next_suspect_study() != 0)) {
+  while (served_nothing < ready_workers_.size() && has_work()) {
     const WorkerId id = ready_workers_.front();
     ready_workers_.pop_front();
     Worker& worker = workers_.at(id);
@@ -28,7 +32,7 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
   if (holds_suspect) {
     return false;
   }
-  if (next_suspect_study() == 0) {
+  if (next_suspect_study(worker) == 0) {
     worker.draining = false;
   } else if (worker.leases.empty()) {
     return serve_suspect(id, worker);
@@ -37,9 +41,9 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
     worker.draining = true;
     return false;
   }
-  const StudyId study = next_free_study();
+  const StudyId study = next_free_study(worker);
   if (study == 0) {
-    return false;
+    return seeks_stragglers_ && serve_straggler(id, worker);
   }
   if (const auto chunk = studies_.at(study).points.take(batch_points(worker, study))) {
     grant(id, worker, study, *chunk, false);
@@ -48,7 +52,7 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
 }
 
 bool Scheduler::serve_suspect(WorkerId id, Worker& worker) {
-  const StudyId study = next_suspect_study();
+  const StudyId study = next_suspect_study(worker);
   worker.draining = false;
   if (const auto chunk = studies_.at(study).points.take_suspect(batch_points(worker, study))) {
     grant(id, worker, study, *chunk, true);
@@ -56,12 +60,69 @@ bool Scheduler::serve_suspect(WorkerId id, Worker& worker) {
   return true;
 }
 
+/// What is left of the batch that straggles longest, also to this worker.
+bool Scheduler::serve_straggler(WorkerId id, Worker& worker) {
+  auto longest = leases_.end();
+  for (auto lease = leases_.begin(); lease != leases_.end(); ++lease) {
+    const bool is_longer =
+        longest == leases_.end() || lease->second.granted_ms < longest->second.granted_ms;
+    if (is_longer && lease->second.worker != id && is_straggling(lease->second, worker)) {
+      longest = lease;
+    }
+  }
+  if (longest == leases_.end()) {
+    seeks_stragglers_ =
+        false;  // the next worker looks at the next tick: looking at all leases costs
+    return false;
+  }
+  Lease& straggler = longest->second;
+  Study& study = studies_.at(straggler.study);
+  const auto left =
+      study.points.leased_set().within(straggler.chunk.first_point, straggler.chunk.end());
+  study.overlaps = true;
+  const Chunk rest{straggler.chunk.model, left.front().begin, left.back().end - left.front().begin,
+                   straggler.chunk.attempts + 1, straggler.chunk.losses};
+  const LeaseId twin = grant(id, worker, straggler.study, rest, false);
+  straggler.twin = twin;
+  leases_.at(twin).twin = longest->first;
+  return true;
+}
+
+bool Scheduler::is_straggling(const Lease& lease, const Worker& helper) const {
+  const Study& study = studies_.at(lease.study);
+  const std::int64_t age_ms = now_ms_ - lease.granted_ms;
+  if (lease.twin != 0 || lease.alone || age_ms < settings_.straggler_after_ms || !study.is_open() ||
+      !admits(study, helper) ||
+      study.points.leased_set().within(lease.chunk.first_point, lease.chunk.end()).empty()) {
+    return false;
+  }
+  const Worker& holder = workers_.at(lease.worker);
+  if (leases_.at(*holder.leases.begin()).granted_ms < lease.granted_ms) {
+    return true;  // it waits behind another batch of its worker
+  }
+  for (const Worker* judge : {&helper, &holder}) {
+    const auto pace = judge->paces.find(lease.study);
+    if (pace != judge->paces.end() && pace->second.s_per_point > 0.0) {
+      const double expected_ms =
+          1e3 * pace->second.s_per_point * static_cast<double>(lease.chunk.count) / judge->threads;
+      return static_cast<double>(age_ms) > settings_.straggler_factor * expected_ms;
+    }
+  }
+  return true;
+}
+
+/// The results of a study come from one solver version, unless it was said that they need not.
+bool Scheduler::admits(const Study& study, const Worker& worker) {
+  return study.share.mixes_versions || study.solver_version.empty() ||
+         study.solver_version == worker.solver_version;
+}
+
 /// The highest priority, then the one served least for its weight, then the oldest.
-StudyId Scheduler::next_free_study() const {
+StudyId Scheduler::next_free_study(const Worker& worker) const {
   auto best = studies_.end();
   for (auto study = studies_.begin(); study != studies_.end(); ++study) {
     const Study& candidate = study->second;
-    if (!candidate.is_open() || !candidate.points.has_free()) {
+    if (!candidate.is_open() || !candidate.points.has_free() || !admits(candidate, worker)) {
       continue;
     }
     const bool is_better = best == studies_.end() ||
@@ -75,9 +136,10 @@ StudyId Scheduler::next_free_study() const {
   return best == studies_.end() ? 0 : best->first;
 }
 
-StudyId Scheduler::next_suspect_study() const {
-  const auto found = std::find_if(studies_.begin(), studies_.end(), [](const auto& entry) {
-    return entry.second.is_open() && entry.second.points.has_suspect();
+StudyId Scheduler::next_suspect_study(const Worker& worker) const {
+  const auto found = std::find_if(studies_.begin(), studies_.end(), [&](const auto& entry) {
+    return entry.second.is_open() && entry.second.points.has_suspect() &&
+           admits(entry.second, worker);
   });
   return found == studies_.end() ? 0 : found->first;
 }
@@ -103,11 +165,17 @@ std::uint64_t Scheduler::batch_points(const Worker& worker, StudyId id) const {
   return std::max<std::uint64_t>(std::min(points, fair), 1);
 }
 
-void Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Chunk& chunk, bool alone) {
+LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Chunk& chunk,
+                         bool alone) {
   if (worker.defined.insert(study).second) {
     effects_.emplace_back(DefineStudy{id, study});
   }
-  studies_.at(study).served += 1.0 / studies_.at(study).share.weight;
+  Study& served = studies_.at(study);
+  served.served += 1.0 / served.share.weight;
+  ++served.leases;
+  if (served.solver_version.empty()) {
+    served.solver_version = worker.solver_version;
+  }
   const LeaseId lease = next_lease_++;
   leases_.emplace(lease, Lease{id, study, chunk, alone, now_ms_});
   worker.leases.insert(lease);
@@ -115,6 +183,7 @@ void Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Chunk& c
   worker.paces[study].last_batch_points = chunk.count;
   effects_.emplace_back(
       SendBatch{id, study, chunk.model, chunk.first_point, chunk.count, chunk.attempts + 1, lease});
+  return lease;
 }
 
 }  // namespace oblique::server

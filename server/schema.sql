@@ -4,7 +4,8 @@
 
 -- One row. Workers know by it which database their results are meant for.
 CREATE TABLE about (
-  database_id TEXT NOT NULL      -- drawn at random when the file was made
+  database_id TEXT NOT NULL,     -- drawn at random when the file was made
+  starts      INTEGER NOT NULL DEFAULT 0  -- how often a server began to work on it
 ) STRICT;
 
 CREATE TABLE studies (
@@ -16,7 +17,8 @@ CREATE TABLE studies (
   created_at  TEXT NOT NULL,     -- UTC, ISO 8601
   changed_at  TEXT NOT NULL,     -- when `state` was last set
   priority    INTEGER NOT NULL,  -- studies of a higher one come first
-  weight      REAL NOT NULL      -- share of the workers among studies of one priority
+  weight      REAL NOT NULL,     -- share of the workers among studies of one priority
+  mixes_versions INTEGER NOT NULL DEFAULT 0  -- 1: results of several solver versions are allowed
 ) STRICT;
 
 -- Every parameter but H, mu and e; one row for each distinct model that has results. The columns

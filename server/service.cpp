@@ -53,7 +53,7 @@ Service::Service(ServiceSettings settings, Outbox& outbox, std::vector<StoredStu
                                            {}});
     feed(StudyAdded{study.study_id, study.table, std::move(study.settled), study.failures.size(),
                     study.state == StudyState::kCancelled, study.state == StudyState::kPaused,
-                    study.share},
+                    study.share, study.solver_version},
          now);
   }
 }
@@ -96,6 +96,9 @@ void Service::perform(const Effect& effect, Instant now, protocol::Results* mess
   } else if (const auto* withdraw = std::get_if<WithdrawStudy>(&effect)) {
     out.mutable_withdraw()->set_study_id(withdraw->study);
     send(withdraw->worker, out);
+  } else if (const auto* release = std::get_if<ReleaseBatch>(&effect)) {
+    out.mutable_release()->set_lease_id(release->lease);
+    send(release->worker, out);
   } else if (const auto* drop = std::get_if<DropWorker>(&effect)) {
     const auto peer = peers_.find(drop->worker);
     outbox_.note(Severity::kWarning, "worker " + std::to_string(drop->worker) + " (" +
@@ -114,6 +117,10 @@ void Service::perform(const Effect& effect, Instant now, protocol::Results* mess
 
 void Service::send(WorkerId worker, const protocol::ServerToWorker& message) {
   const auto peer = peers_.find(worker);
+  const bool is_of_version_2 = message.has_release() || message.has_notice();
+  if (peer != peers_.end() && is_of_version_2 && peer->second.protocol_version < 2) {
+    return;
+  }
   if (peer != peers_.end() && !outbox_.to_worker(peer->second.identity, message)) {
     unreachable_.push_back(worker);
   }
@@ -124,11 +131,13 @@ void Service::send(WorkerId worker, const protocol::ServerToWorker& message) {
 void Service::write(Change change, Write meaning, bool answer_failure) {
   const std::uint64_t ticket = ++last_ticket_;
   writes_.emplace(ticket, std::move(meaning));
+  waiting_changes_ += answer_failure ? 1U : 0U;
   outbox_.write({ticket, std::move(change), answer_failure});
 }
 
 void Service::write_results(const StoreResults& effect, protocol::Results& message, Instant now) {
-  const Peer& peer = peers_.at(effect.worker);
+  Peer& peer = peers_.at(effect.worker);
+  ++peer.unstored_messages;
   const auto study = studies_.find(effect.study);
   AddResults change{effect.study,         study == studies_.end() ? nullptr : study->second.table,
                     effect.worker,        peer.solver_version,
@@ -161,11 +170,13 @@ void Service::write_failure(const StoreFailure& effect, Instant now) {
 void Service::written(const WriteReport& report, Instant now) {
   if (report.kind == WriteReport::Kind::kFault) {
     outbox_.note(Severity::kError, "results wait, nothing is handed out: " + report.error);
+    storage_fault_ = report.error;
     feed(DispatchHeld{true}, now);
     return;
   }
   if (report.kind == WriteReport::Kind::kRecovered) {
     outbox_.note(Severity::kInfo, "the database takes results again");
+    storage_fault_.clear();
     feed(DispatchHeld{stopping_}, now);
     return;
   }
@@ -175,6 +186,9 @@ void Service::written(const WriteReport& report, Instant now) {
   }
   const Write meaning = std::move(found->second);
   writes_.erase(found);
+  const bool a_client_waits =
+      !std::holds_alternative<OfResults>(meaning) && !std::holds_alternative<OfNothing>(meaning);
+  waiting_changes_ -= a_client_waits ? 1U : 0U;
   if (report.kind == WriteReport::Kind::kStored) {
     stored(meaning, now);
   } else {
@@ -188,6 +202,9 @@ void Service::stored(const Write& meaning, Instant now) {
       if (outcome.failed) {
         studies_.at(results->event.study).failures.insert(outcome.point);
       }
+    }
+    if (const auto peer = peers_.find(results->event.worker); peer != peers_.end()) {
+      --peer->second.unstored_messages;
     }
     feed(results->event, now);
   } else if (const auto* added = std::get_if<OfStudy>(&meaning)) {

@@ -44,8 +44,11 @@ class Outbox {
 
 struct ServiceSettings {
   SchedulerSettings scheduler;
-  std::uint32_t heartbeat_interval_ms = 1000;
-  std::string solver_version;  ///< workers with another one are refused
+  std::uint32_t heartbeat_interval_ms = 900;
+  std::string solver_version;  ///< workers with another one are told so
+  /// Results messages of one worker that wait for the disk. A sound worker stops long before.
+  std::size_t most_unstored_messages = 100'000;
+  std::size_t most_waiting_changes = 10'000;  ///< of clients, that wait for the disk
   std::string database_id;
   std::uint64_t last_study_id = 0;
   std::uint64_t last_worker_id = 0;
@@ -70,6 +73,7 @@ class Service {
 
   /// Something is on its way to the disk.
   bool waits_for_disk() const { return !writes_.empty(); }
+  /// Frames that no sound peer sends.
   std::uint64_t bad_frames() const { return bad_frames_; }
   const Scheduler& scheduler() const { return scheduler_; }
 
@@ -80,10 +84,12 @@ class Service {
   };
   struct Peer {
     std::string identity;
+    std::uint32_t protocol_version;
     std::string name;
     std::uint32_t threads;
     std::string solver_version;
     std::string instruction_set;
+    std::size_t unstored_messages = 0;
   };
   struct Sample {
     std::int64_t steady_ms;
@@ -128,6 +134,8 @@ class Service {
   void results(WorkerId worker, protocol::Results results, Instant now);
   void forget(WorkerId worker);
   void bad_frame(const std::string& who);
+  void bad_peer(WorkerId worker, const std::string& what, Instant now);
+  void tell_of_version(WorkerId worker);
 
   // service_clients.cpp
   void set_state(const Client& client, StudyId id, StudyState state, bool submitted, Instant now);
@@ -143,6 +151,7 @@ class Service {
   void reply_changed(const Client& client, StudyId id, std::uint64_t retried, Instant now);
   void reply_error(const Client& client, const std::string& message);
   protocol::StudyStatus status_of(StudyId id, Instant now) const;
+  std::string what_it_waits_for(const Study& study, const StudyCounts& counts) const;
 
   // service.cpp
   void feed(const Event& event, Instant now, protocol::Results* message = nullptr);
@@ -162,10 +171,12 @@ class Service {
   std::map<StudyId, Study> studies_;
   std::map<std::string, StudyId, std::less<>> study_ids_;  // by name
   std::map<std::uint64_t, Write> writes_;                  // by ticket
+  std::size_t waiting_changes_ = 0;                        // writes that a client waits for
   std::map<std::uint64_t, Client> queries_;                // by ticket
   std::vector<WorkerId> unreachable_;                      // found while effects were carried out
   std::uint64_t last_ticket_ = 0;
   std::uint64_t bad_frames_ = 0;
+  std::string storage_fault_;  // why the database takes no results; empty: it does
   bool stopping_ = false;
 };
 

@@ -53,16 +53,20 @@ void Service::client_frame(const std::string& identity, std::string_view frame, 
     return;
   }
   const Client client{identity, request.request_id()};
-  if (request.protocol_version() != protocol::kProtocolVersion) {
-    if (request.protocol_version() == 0) {
-      bad_frame("a client");
-      reply_error(client, "this is the port for clients; workers connect to the other one");
-      return;
-    }
-    reply_error(client, "the server speaks protocol version " +
-                            std::to_string(protocol::kProtocolVersion) + ", the client " +
-                            std::to_string(request.protocol_version()) +
-                            ": install the same release on both");
+  if (request.protocol_version() == 0) {
+    bad_frame("a client");
+    reply_error(client, "this is the port for clients; workers connect to the other one");
+    return;
+  }
+  if (const std::string reason =
+          protocol::objection_to_version(request.protocol_version(), "client");
+      !reason.empty()) {
+    reply_error(client, reason);
+    return;
+  }
+  if ((request.has_submit() || request.has_change()) &&
+      waiting_changes_ >= settings_.most_waiting_changes) {
+    reply_error(client, "too many changes wait for the disk already: ask again later");
     return;
   }
   switch (request.kind_case()) {
@@ -97,7 +101,8 @@ void Service::submit(const Client& client, const protocol::SubmitRequest& reques
     reply_error(client, reason);
     return;
   }
-  const StudyShare share{request.priority(), request.weight() == 0.0 ? 1.0 : request.weight()};
+  const StudyShare share{request.priority(), request.weight() == 0.0 ? 1.0 : request.weight(),
+                         request.mixes_versions()};
   if (const std::string reason = objection_to_share(share); !reason.empty()) {
     reply_error(client, reason);
     return;
@@ -244,6 +249,9 @@ protocol::StudyStatus Service::status_of(StudyId id, Instant now) const {
   status.set_created_at(study.created_at);
   status.set_priority(study.share.priority);
   status.set_weight(study.share.weight);
+  status.set_mixes_versions(study.share.mixes_versions);
+  status.set_solver_version(counts.solver_version);
+  status.set_waits_for(what_it_waits_for(study, counts));
   if (study.state == StudyState::kRunning && !study.samples.empty()) {
     const Sample& oldest = study.samples.front();
     const std::int64_t span_ms = now.steady_ms - oldest.steady_ms;
@@ -255,10 +263,28 @@ protocol::StudyStatus Service::status_of(StudyId id, Instant now) const {
   return status;
 }
 
+std::string Service::what_it_waits_for(const Study& study, const StudyCounts& counts) const {
+  if (study.state != StudyState::kRunning || counts.solved + counts.failed == counts.points) {
+    return {};
+  }
+  if (!storage_fault_.empty()) {
+    return "the database, which takes no results: " + storage_fault_;
+  }
+  if (scheduler_.workers() == 0) {
+    return "a worker";
+  }
+  if (counts.lacks_worker) {
+    return "a worker with solver version " + counts.solver_version +
+           ", that of its results, or to be submitted again with --mix-versions";
+  }
+  return {};
+}
+
 void Service::workers(const Client& client, Instant now) {
   protocol::ClientReply reply;
   reply.set_request_id(client.request_id);
   auto& fields = *reply.mutable_workers();
+  fields.set_bad_frames(bad_frames_);
   for (const auto& [id, peer] : peers_) {
     const WorkerCounts counts = scheduler_.worker(id, now.steady_ms);
     auto& worker = *fields.add_workers();

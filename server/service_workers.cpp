@@ -13,21 +13,6 @@ namespace {
 constexpr std::size_t kLongestName = 256;
 constexpr std::uint32_t kMostThreads = 4096;
 
-/// Why the worker cannot work here, or an empty text.
-std::string objection(const protocol::WorkerHello& hello, const std::string& solver_version) {
-  if (hello.protocol_version() != protocol::kProtocolVersion) {
-    return "the server speaks protocol version " + std::to_string(protocol::kProtocolVersion) +
-           ", the worker " + std::to_string(hello.protocol_version()) +
-           ": install the same release on both";
-  }
-  if (hello.solver_version() != solver_version) {
-    return "the server's solver has version " + solver_version + ", the worker's " +
-           shortened(hello.solver_version(), kLongestName) +
-           ": install the same release on both, for a study's results come from one solver";
-  }
-  return {};
-}
-
 }  // namespace
 
 void Service::worker_frame(const std::string& identity, std::string_view frame, Instant now) {
@@ -84,18 +69,22 @@ void Service::hello(const std::string& identity, const protocol::WorkerHello& he
     forget(old);
   }
   protocol::ServerToWorker reply;
-  if (const std::string reason = objection(hello, settings_.solver_version); !reason.empty()) {
+  if (const std::string reason = protocol::objection_to_version(hello.protocol_version(), "worker");
+      !reason.empty()) {
     outbox_.note(Severity::kWarning, "a worker is refused: " + reason);
     reply.mutable_refused()->set_reason(reason);
     outbox_.to_worker(identity, reply);
     return;
   }
   const WorkerId id = ++settings_.last_worker_id;
-  const Peer peer{identity, shortened(hello.name(), kLongestName),
-                  std::clamp(hello.threads(), 1U, kMostThreads), hello.solver_version(),
+  const Peer peer{identity,
+                  hello.protocol_version(),
+                  shortened(hello.name(), kLongestName),
+                  std::clamp(hello.threads(), 1U, kMostThreads),
+                  shortened(hello.solver_version(), kLongestName),
                   shortened(hello.instruction_set(), kLongestName)};
   auto& welcome = *reply.mutable_welcome();
-  welcome.set_protocol_version(protocol::kProtocolVersion);
+  welcome.set_protocol_version(peer.protocol_version);
   welcome.set_worker_id(id);
   welcome.set_heartbeat_interval_ms(settings_.heartbeat_interval_ms);
   welcome.set_lost_after_ms(static_cast<std::uint32_t>(settings_.scheduler.lost_after_ms));
@@ -110,14 +99,36 @@ void Service::hello(const std::string& identity, const protocol::WorkerHello& he
   write(AddWorker{id, peer.name, peer.threads, peer.solver_version, peer.instruction_set,
                   iso_8601(now)},
         OfNothing{}, false);
-  feed(WorkerJoined{id, peer.threads}, now);
+  tell_of_version(id);
+  feed(WorkerJoined{id, peer.threads, peer.solver_version}, now);
   if (stopping_) {
     reply.mutable_stopping();
     outbox_.to_worker(identity, reply);
   }
 }
 
+void Service::tell_of_version(WorkerId worker) {
+  const Peer& peer = peers_.at(worker);
+  if (peer.solver_version == settings_.solver_version) {
+    return;
+  }
+  const std::string text = "its solver has version " + peer.solver_version + ", the server's " +
+                           settings_.solver_version +
+                           ": studies with results of another version than its own go to other "
+                           "workers, unless they were submitted with --mix-versions";
+  outbox_.note(Severity::kWarning, "worker " + std::to_string(worker) + ": " + text);
+  protocol::ServerToWorker message;
+  message.mutable_notice()->set_text("worker " + std::to_string(worker) + ": " + text);
+  send(worker, message);
+}
+
 void Service::results(WorkerId worker, protocol::Results message, Instant now) {
+  constexpr std::size_t kWorkersThatKeepAll = 100;
+  if (peers_.at(worker).unstored_messages >= settings_.most_unstored_messages ||
+      writes_.size() >= kWorkersThatKeepAll * settings_.most_unstored_messages) {
+    bad_peer(worker, "it sends more results than workers keep", now);
+    return;
+  }
   ResultsReceived event{worker,
                         message.study_id(),
                         message.lease_id(),
@@ -141,6 +152,15 @@ void Service::forget(WorkerId worker) {
     worker_ids_.erase(peer->second.identity);
     peers_.erase(peer);
   }
+}
+
+/// The peer is given up. A sound worker says hello again and delivers what it has kept.
+void Service::bad_peer(WorkerId worker, const std::string& what, Instant now) {
+  ++bad_frames_;
+  protocol::ServerToWorker again;
+  again.mutable_hello_again();
+  send(worker, again);
+  feed(WorkerUnreachable{worker, what}, now);
 }
 
 void Service::bad_frame(const std::string& who) {

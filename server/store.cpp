@@ -1,6 +1,7 @@
 #include "server/store.h"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <random>
@@ -122,12 +123,14 @@ struct Store::Statements {
   explicit Statements(sqlite3* database)
       : add_study(database,
                   "INSERT INTO studies (study_id, name, recipe, points, state, created_at,"
-                  " changed_at, priority, weight)"
-                  " VALUES (?1, ?2, ?3, ?4, 'running', ?5, ?5, ?6, ?7)"),
+                  " changed_at, priority, weight, mixes_versions)"
+                  " VALUES (?1, ?2, ?3, ?4, 'running', ?5, ?5, ?6, ?7, ?8)"),
         set_state(database,
                   "UPDATE studies SET state = ?2, changed_at = ?3"
                   " WHERE study_id = ?1 AND state <> ?2"),
-        set_share(database, "UPDATE studies SET priority = ?2, weight = ?3 WHERE study_id = ?1"),
+        set_share(database,
+                  "UPDATE studies SET priority = ?2, weight = ?3, mixes_versions = ?4"
+                  " WHERE study_id = ?1"),
         forget_failures(database,
                         "DELETE FROM results WHERE study_id = ?1 AND point >= ?2 AND point < ?3"
                         " AND status = 'failed'"),
@@ -186,8 +189,16 @@ void Store::create_schema() {
 }
 
 void Store::migrate() {
+  constexpr std::array kSteps{kMigrateFrom1Sql, kMigrateFrom2Sql};
+  static_assert(kSteps.size() == kSchemaVersion - 1, "a step from each schema to the next");
+  Statement version(database_.get(), "PRAGMA user_version");
+  version.step();
+  const auto found = static_cast<std::size_t>(version.integer(0));
+  version.reset();
   Transaction transaction(database_.get());
-  execute(database_.get(), kMigrateFrom1Sql);
+  for (std::size_t step = found; step < kSchemaVersion; ++step) {
+    execute(database_.get(), kSteps.at(step - 1));
+  }
   execute(database_.get(), "PRAGMA user_version = " + std::to_string(kSchemaVersion));
   transaction.commit();
 }
@@ -226,6 +237,7 @@ void Store::add(const AddStudy& change) {
   insert.bind(5, change.created_at);
   insert.bind(6, std::int64_t{change.share.priority});
   insert.bind(7, change.share.weight);
+  insert.bind(8, std::int64_t{change.share.mixes_versions});
   insert.run();
 }
 
@@ -234,6 +246,7 @@ void Store::add(const SetStudyShare& change) {
   update.bind(1, change.study_id);
   update.bind(2, std::int64_t{change.share.priority});
   update.bind(3, change.share.weight);
+  update.bind(4, std::int64_t{change.share.mixes_versions});
   update.run();
 }
 
@@ -305,8 +318,11 @@ std::int64_t Store::model_id(const AddResults& change, std::uint64_t model) {
 std::vector<StoredStudy> Store::studies() {
   std::vector<StoredStudy> found;
   Statement list(database_.get(),
-                 "SELECT study_id, name, recipe, state, created_at, priority, weight FROM studies"
-                 " ORDER BY study_id");
+                 "SELECT study_id, name, recipe, state, created_at, priority, weight,"
+                 " mixes_versions FROM studies ORDER BY study_id");
+  Statement version(database_.get(),
+                    "SELECT solver_version FROM results WHERE study_id = ?"
+                    " AND solver_version IS NOT NULL ORDER BY point LIMIT 1");
   Statement settled(database_.get(), "SELECT point FROM results WHERE study_id = ? ORDER BY point");
   Statement failed(database_.get(),
                    "SELECT point FROM results WHERE study_id = ? AND status = 'failed'"
@@ -317,7 +333,7 @@ std::vector<StoredStudy> Store::studies() {
     study.name = list.text(1);
     study.state = state_named(list.text(3));
     study.created_at = list.text(4);
-    study.share = {static_cast<std::int32_t>(list.integer(5)), list.real(6)};
+    study.share = {static_cast<std::int32_t>(list.integer(5)), list.real(6), list.integer(7) != 0};
     protocol::Recipe recipe;
     try {
       if (!recipe.ParseFromString(list.text(2))) {
@@ -327,6 +343,10 @@ std::vector<StoredStudy> Store::studies() {
     } catch (const std::runtime_error& reason) {
       throw StorageError("the recipe of study " + study.name + " cannot be read: " + reason.what());
     }
+    version.reset();
+    version.bind(1, study.study_id);
+    study.solver_version = version.step() ? version.text(0) : "";
+    version.reset();
     study.settled = points_of(settled, study.study_id);
     study.failures = points_of(failed, study.study_id);
     found.push_back(std::move(study));
@@ -345,6 +365,14 @@ std::uint64_t Store::last_study_id() {
 
 std::uint64_t Store::last_worker_id() {
   return highest("SELECT max(worker_id) FROM workers");
+}
+
+std::uint64_t Store::count_start() {
+  set_sync(true);
+  Transaction transaction(database_.get());
+  execute(database_.get(), "UPDATE about SET starts = starts + 1");
+  transaction.commit();
+  return highest("SELECT starts FROM about");
 }
 
 std::string Store::database_id() {

@@ -20,8 +20,9 @@ struct StoredStudy {
   StudyState state;
   std::string created_at;
   StudyShare share{};
-  IntervalSet settled;   ///< points that have a row
-  IntervalSet failures;  ///< those whose row says failed
+  std::string solver_version;  ///< of its first result that a worker solved; empty: there is none
+  IntervalSet settled;         ///< points that have a row
+  IntervalSet failures;        ///< those whose row says failed
 };
 
 /// The SQLite database (schema.sql), opened for writing. Only one Store may have a file open;
@@ -44,6 +45,10 @@ class Store final : public Storage {
   /// Highest number given to a study or worker so far; 0 when there is none.
   std::uint64_t last_study_id();
   std::uint64_t last_worker_id();
+
+  /// To be called once, when a server begins to work: counts it, durably. Returns how many began so
+  /// far, this one included.
+  std::uint64_t count_start();
 
   /// Drawn at random when the file was made.
   std::string database_id();

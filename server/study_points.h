@@ -15,6 +15,8 @@ namespace oblique::server {
 struct StudyShare {
   std::int32_t priority = 0;
   double weight = 1.0;
+  /// Workers of any solver version take part, not only of the one that the study began with.
+  bool mixes_versions = false;
 
   bool operator==(const StudyShare&) const = default;
 };
@@ -67,6 +69,8 @@ class StudyPoints {
   bool has_free() const { return !returned_.empty() || !fresh_.empty(); }
   bool has_suspect() const { return !suspect_.empty(); }
   bool is_complete() const { return settled_.size() == table_->size(); }
+  /// Some point has a result, durable or on its way.
+  bool has_results() const { return !settled_.empty() || !committing_.empty(); }
 
   std::uint64_t free() const;  ///< fresh, returned and suspect points
   std::uint64_t settled() const { return settled_.size(); }

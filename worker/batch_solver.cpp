@@ -42,6 +42,16 @@ void BatchSolver::drop_study(std::uint64_t study_id) {
   changed_.notify_all();
 }
 
+void BatchSolver::drop_task(std::uint64_t number) {
+  const std::lock_guard lock(mutex_);
+  const auto found = std::find_if(open_.begin(), open_.end(),
+                                  [&](const OpenTask& task) { return task.task.number == number; });
+  if (found != open_.end()) {
+    drop(found);
+  }
+  changed_.notify_all();
+}
+
 void BatchSolver::drop_all() {
   const std::lock_guard lock(mutex_);
   for (auto task = open_.begin(); task != open_.end();) {

@@ -43,6 +43,9 @@ class BatchSolver {
   /// Drops the tasks of a study and their results that were not collected.
   void drop_study(std::uint64_t study_id);
 
+  /// Drops one task; what is solved of it can still be collected. An unknown number is passed over.
+  void drop_task(std::uint64_t number);
+
   /// Drops all tasks; what is solved can still be collected.
   void drop_all();
 

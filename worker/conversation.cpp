@@ -165,6 +165,12 @@ Effects Conversation::on_message(const protocol::ServerToWorker& message, std::i
     case protocol::ServerToWorker::kStopping:
       on(message.stopping());
       break;
+    case protocol::ServerToWorker::kRelease:
+      on(message.release());
+      break;
+    case protocol::ServerToWorker::kNotice:
+      effects_.emplace_back(Note{message.notice().text()});
+      break;
     case protocol::ServerToWorker::kWelcome:  // said twice: the first one counts
     case protocol::ServerToWorker::KIND_NOT_SET:
       break;
@@ -273,6 +279,17 @@ void Conversation::on(const protocol::Withdraw& withdraw) {
   });
   give_credit();
   finish_if_delivered();
+}
+
+void Conversation::on(const protocol::Release& release) {
+  const auto found = std::find_if(held_.begin(), held_.end(), [&](const auto& entry) {
+    return entry.second.lease_id == release.lease_id();
+  });
+  if (found != held_.end()) {
+    effects_.emplace_back(DropTask{found->first});
+    held_.erase(found);
+    give_credit();
+  }
 }
 
 void Conversation::on(const protocol::HelloAgain&) {

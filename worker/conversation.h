@@ -44,6 +44,10 @@ struct Solve {
 struct DropStudy {
   std::uint64_t study_id;
 };
+/// Drop that task.
+struct DropTask {
+  std::uint64_t number;
+};
 /// Drop all tasks: whoever gets their points now is the server's to say.
 struct DropAll {};
 /// Worth a line in the log.
@@ -56,7 +60,7 @@ struct Finish {
   std::string reason;
 };
 
-using Effect = std::variant<Connect, Send, Solve, DropStudy, DropAll, Note, Finish>;
+using Effect = std::variant<Connect, Send, Solve, DropStudy, DropTask, DropAll, Note, Finish>;
 using Effects = std::vector<Effect>;
 
 /// The worker's side of the conversation with the server (proto/protocol.md): decides what follows
@@ -104,6 +108,7 @@ class Conversation {
   void on(const protocol::Batch& batch);
   void on(const protocol::ResultsStored& stored);
   void on(const protocol::Withdraw& withdraw);
+  void on(const protocol::Release& release);
   void on(const protocol::HelloAgain& again);
   void on(const protocol::HeartbeatReply& reply);
   void on(const protocol::ServerStopping& stopping);

@@ -190,6 +190,7 @@ void Session::apply(Effects effects) {
       [&](const Send& effect) { send_failed = send_failed || !send(effect.message); },
       [&](Solve& effect) { solver_.add(std::move(effect.task)); },
       [&](const DropStudy& effect) { solver_.drop_study(effect.study_id); },
+      [&](const DropTask& effect) { solver_.drop_task(effect.number); },
       [&](const DropAll&) { solver_.drop_all(); },
       [&](const Note& note) { spdlog::info("{}", note.text); },
       [&](const Finish& finish) {

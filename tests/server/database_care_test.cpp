@@ -105,21 +105,26 @@ TEST_F(DatabaseCareTest, ARowOfAPointThatTheStudyDoesNotHaveIsNamed) {
   EXPECT_THAT(find_faults(path_), testing::Contains(HasSubstr("study a")));
 }
 
-/// A database as version 1 of the schema had it.
-class OldDatabaseTest : public testing::Test {
+/// A database as an earlier version of the schema had it.
+class OldDatabaseTest : public testing::TestWithParam<int> {
  protected:
   OldDatabaseTest() {
-    std::ifstream schema(OBLIQUE_SCHEMA_1);
+    const std::string version = std::to_string(GetParam());
+    std::ifstream schema(OBLIQUE_OLD_SCHEMAS "/schema_" + version + ".sql");
     const std::string sql(std::istreambuf_iterator<char>(schema), {});
     const DatabaseHandle database =
         open_database(path_, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
     execute(database.get(), sql);
     execute(database.get(), "PRAGMA application_id = " + std::to_string(kApplicationId));
-    execute(database.get(), "PRAGMA user_version = 1");
+    execute(database.get(), "PRAGMA user_version = " + version);
     execute(database.get(), "INSERT INTO about (database_id) VALUES ('old')");
+    const bool has_share = GetParam() >= 2;
     Statement insert(database.get(),
                      "INSERT INTO studies (study_id, name, recipe, points, state, created_at,"
-                     " changed_at) VALUES (3, 'old study', ?, 10, 'cancelled', 'then', 'later')");
+                     " changed_at" +
+                         std::string(has_share ? ", priority, weight" : "") +
+                         ") VALUES (3, 'old study', ?, 10, 'cancelled', 'then', 'later'" +
+                         (has_share ? ", 0, 1)" : ")"));
     insert.bind_blob(1, table_of(10)->recipe().SerializeAsString());
     insert.run();
   }
@@ -128,7 +133,7 @@ class OldDatabaseTest : public testing::Test {
   std::string path_ = folder_.file("old.db");
 };
 
-TEST_F(OldDatabaseTest, IsBroughtToThePresentSchemaAndKeepsItsStudies) {
+TEST_P(OldDatabaseTest, IsBroughtToThePresentSchemaAndKeepsItsStudies) {
   Store store(path_);
   EXPECT_EQ(store.database_id(), "old");
   const auto studies = store.studies();
@@ -141,7 +146,7 @@ TEST_F(OldDatabaseTest, IsBroughtToThePresentSchemaAndKeepsItsStudies) {
   EXPECT_THAT(find_faults(path_), IsEmpty());
 }
 
-TEST_F(OldDatabaseTest, HasTheColumnsAndViewsOfANewOneAfterwards) {
+TEST_P(OldDatabaseTest, HasTheColumnsAndViewsOfANewOneAfterwards) {
   const std::string fresh = folder_.file("new.db");
   { const Store store(path_); }
   { const Store store(fresh); }
@@ -160,8 +165,19 @@ TEST_F(OldDatabaseTest, HasTheColumnsAndViewsOfANewOneAfterwards) {
   EXPECT_EQ(layout(path_), layout(fresh));
 }
 
-TEST_F(OldDatabaseTest, CanBeReadAsItIs) {
-  EXPECT_EQ(Reader(path_).query("SELECT name FROM studies", kNoLimits).rows_size(), 1);
+TEST_P(OldDatabaseTest, CanBeReadAsItIs) {
+  Reader reader(path_);
+  EXPECT_EQ(reader.query("SELECT name FROM studies", kNoLimits).rows_size(), 1);
+  EXPECT_EQ(reader.study_status("old study").at(0).weight(), 1.0);
+}
+
+INSTANTIATE_TEST_SUITE_P(EveryEarlierSchema, OldDatabaseTest,
+                         testing::Range(1, static_cast<int>(kSchemaVersion)));
+
+TEST_F(DatabaseCareTest, StartsOfServersAreCountedSoThatNoLeaseNumberComesTwice) {
+  EXPECT_EQ(store_->count_start(), 1U);
+  store_.reset();
+  EXPECT_EQ(Store(path_).count_start(), 2U);
 }
 
 }  // namespace

