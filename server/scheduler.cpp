@@ -247,6 +247,11 @@ void Scheduler::end_lease(LeaseId id, LeaseEnd how) {
   workers_.at(lease.worker).leases.erase(id);
   if (const auto twin = leases_.find(lease.twin); twin != leases_.end()) {
     twin->second.twin = 0;
+    if (how == LeaseEnd::kLost) {
+      // What killed one worker may kill the other: that must not be forgotten.
+      std::uint32_t& losses = twin->second.chunk.losses;
+      losses = std::max(losses, lease.chunk.losses + 1);
+    }
   }
   Study& study = studies_.at(lease.study);
   for (const Interval& run : held_by(lease)) {

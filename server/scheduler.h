@@ -29,7 +29,8 @@ struct SchedulerSettings {
   /// study goes out in ever smaller batches and all workers finish together.
   std::uint64_t tail_batches_per_thread = 3;
   /// With nothing else to hand out, a batch that takes this long, and `straggler_factor` times as
-  /// long as it should, is given to a second worker too; the first answer to a point wins.
+  /// long as it should, is given to a second worker too; the first answer to a point wins. Batches
+  /// that have cost a worker are not.
   std::int64_t straggler_after_ms = 1000;
   double straggler_factor = 4.0;
   /// A chunk whose leases cost so many workers is split; a single point of that kind fails.

@@ -91,8 +91,8 @@ bool Scheduler::serve_straggler(WorkerId id, Worker& worker) {
 bool Scheduler::is_straggling(const Lease& lease, const Worker& helper) const {
   const Study& study = studies_.at(lease.study);
   const std::int64_t age_ms = now_ms_ - lease.granted_ms;
-  if (lease.twin != 0 || lease.alone || age_ms < settings_.straggler_after_ms || !study.is_open() ||
-      !admits(study, helper) ||
+  if (lease.twin != 0 || lease.alone || lease.chunk.losses > 0 ||
+      age_ms < settings_.straggler_after_ms || !study.is_open() || !admits(study, helper) ||
       study.points.leased_set().within(lease.chunk.first_point, lease.chunk.end()).empty()) {
     return false;
   }

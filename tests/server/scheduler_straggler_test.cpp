@@ -113,10 +113,8 @@ TEST_F(StragglerTest, AWorkerDoesNotGetItsOwnBatchTwiceNorAThirdWorkerOne) {
   EXPECT_TRUE(only<SendBatch>(bench_.pass(20'000, {1, 2, 3})).empty());
 }
 
-TEST_F(StragglerTest, ABatchOfSlowPointsIsNotTakenForAStragglerOne) {
+TEST_F(StragglerTest, ABatchOfSlowPointsIsNotTakenForAStraggler) {
   // Worker 2 is known to need 10 s a point.
-  SchedulerBench bench(settings());
-  bench.feed(StudyAdded{1, table_of(2), {}});
   SchedulerSettings one = settings();
   one.first_batch_points = 1;
   SchedulerBench slow(one);
@@ -146,6 +144,18 @@ TEST_F(StragglerTest, ABatchThatWaitsBehindAnotherOfItsWorkerIsTakenOver) {
   const auto taken = only<SendBatch>(bench.pass(500, {1, 2}));
   ASSERT_EQ(taken.size(), 1U);
   EXPECT_EQ(taken[0].first_point, waits.first_point);
+}
+
+TEST_F(StragglerTest, ABatchThatKillsWorkersIsFoundAlthoughTwoOfThemHadIt) {
+  second();
+  bench_.feed(WorkerUnreachable{1});
+  bench_.join(3, 1);
+  EXPECT_TRUE(only<SendBatch>(bench_.pass(5000, {2, 3})).empty()) << "not given to a third worker";
+  bench_.feed(WorkerUnreachable{2});
+  // Two workers were lost: the points are suspect now, and go to a worker that holds nothing else.
+  EXPECT_EQ(bench_.scheduler.study(1).leased, 4U);
+  EXPECT_EQ(only<StoreFailure>(bench_.feed(WorkerUnreachable{3})).size(), 0U);
+  EXPECT_EQ(bench_.join(4, 1).at(0).count, 2U) << "split in halves";
 }
 
 TEST_F(StragglerTest, AFailureForgottenUnderARunningLeaseIsNotGivenBackWhileItsNewLeaseLasts) {

@@ -65,12 +65,12 @@ TEST_F(ServiceTest, BytesOfThePreviousProtocolVersionAreStillRead) {
   // Taken from a worker and a client of version 1: a hello of one thread, a credit of two batches,
   // a submission of ten points.
   const std::string hello(
-      "\x0a\x10\x08\x01\x12\x03"
+      "\x0a\x0f\x08\x01\x12\x03"
       "1.0"
       "\x1a\x04"
       "avx2"
       "\x28\x01",
-      18);
+      17);
   const std::string credit("\x12\x02\x08\x02", 4);
   service_->worker_frame("worker", hello, now_);
   EXPECT_EQ(last_message().welcome().worker_id(), 1U);

@@ -31,9 +31,15 @@ void SimulatedDisk::commit(std::span<const Change> changes) {
 
 void SimulatedDisk::apply(const Change& change) {
   if (const auto* study = std::get_if<AddStudy>(&change)) {
-    contents_.studies[study->study_id] = {
-        study->study_id,   study->name,  study->table, server::StudyState::kRunning,
-        study->created_at, study->share, {},           {}};
+    contents_.studies[study->study_id] = {study->study_id,
+                                          study->name,
+                                          study->table,
+                                          server::StudyState::kRunning,
+                                          study->created_at,
+                                          study->share,
+                                          {},
+                                          {},
+                                          {}};
   } else if (const auto* state = std::get_if<SetStudyState>(&change)) {
     contents_.studies.at(state->study_id).state = state->state;
   } else if (const auto* share = std::get_if<server::SetStudyShare>(&change)) {
