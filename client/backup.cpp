@@ -5,6 +5,7 @@
 #include "client/source.h"
 #include "client/verbs.h"
 #include "server/database_care.h"
+#include "server/salvage.h"
 
 namespace oblique::client {
 namespace {
@@ -12,16 +13,30 @@ namespace {
 constexpr const char* kExamples = R"(Examples:
   oblique backup monday.db
   oblique backup /mnt/safe/friction.db --db friction.db
+  oblique backup saved.db --db damaged.db --salvage
 
 A server may be at work on the database: the copy is the database as it was at one instant. It is
 checked, and has its name only when it is whole.)";
 
 struct BackupFlags {
   std::string copy;
+  bool salvage = false;
   DatabaseSettings database;
 };
 
+int save_what_can_be_read(const BackupFlags& flags) {
+  const auto saved = server::salvage(flags.database.file, flags.copy);
+  std::cerr << flags.copy << " has " << saved.studies << " studies and " << saved.results
+            << " results of " << flags.database.file << "; rows were passed over at "
+            << saved.unreadable_places
+            << " places. A server that goes on with it solves again what is missing.\n";
+  return kDone;
+}
+
 int backup(const BackupFlags& flags) {
+  if (flags.salvage) {
+    return save_what_can_be_read(flags);
+  }
   server::back_up(flags.database.file, flags.copy);
   std::cerr << flags.copy << " is a copy of " << flags.database.file << ".\n";
   return kDone;
@@ -37,6 +52,8 @@ void add_backup(CLI::App& app, Command& command) {
   verb->add_option("--db", flags->database.file, "the database")
       ->type_name("FILE")
       ->capture_default_str();
+  verb->add_flag("--salvage", flags->salvage,
+                 "the database is damaged: save every row that can still be read");
   verb->callback([flags, &command] { command = [flags] { return backup(*flags); }; });
 }
 

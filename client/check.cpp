@@ -13,8 +13,8 @@ constexpr const char* kExamples = R"(Examples:
   oblique check --db friction.db
 
 Reads the whole database: every page and index, every reference, and that each row is of a point
-that its study has. Exit code 1 when something is wrong. Of a damaged file, the program sqlite3 saves
-what can still be read:  sqlite3 damaged.db .recover | sqlite3 saved.db)";
+that its study has. Exit code 1 when something is wrong. What can still be read of a damaged file is
+saved by:  oblique backup saved.db --db damaged.db --salvage)";
 
 int check(const DatabaseSettings& database) {
   const auto faults = server::find_faults(database.file);
@@ -25,8 +25,8 @@ int check(const DatabaseSettings& database) {
     std::cerr << database.file << " is sound.\n";
     return kDone;
   }
-  std::cerr << database.file << " is damaged. What can be read is saved by:\n  sqlite3 "
-            << database.file << " .recover | sqlite3 saved.db\n";
+  std::cerr << database.file << " is damaged. What can be read is saved by:\n  oblique backup "
+            << "saved.db --db " << database.file << " --salvage\n";
   return kFailed;
 }
 

@@ -31,12 +31,16 @@ std::string with_last_words(const std::string& what, const ChildProcess& child) 
 }
 
 ChildSettings server_settings(const ServiceSettings& settings, int ready) {
-  return {
+  ChildSettings child{
       .program = sibling_program("oblique-server"),
       .arguments = {"--db", settings.database.string(), "--worker-port", "0", "--client-port", "0",
                     "--ready-fd", std::to_string(ChildProcess::kHandedOver), "--stop-with-parent"},
       .show_errors = settings.verbose,
       .handed_over = ready};
+  if (settings.allow_network_disk) {
+    child.arguments.emplace_back("--allow-network-disk");
+  }
+  return child;
 }
 
 // Waits until none of `children` runs, and kills what still does at the end of the time.

@@ -14,8 +14,9 @@ namespace oblique::client {
 /// A server and workers on this machine, for as long as this object lives.
 struct ServiceSettings {
   std::filesystem::path database;
-  int workers = 1;       ///< processes, which share the cores
-  bool verbose = false;  ///< what server and workers say goes to our standard error
+  int workers = 1;                  ///< processes, which share the cores
+  bool allow_network_disk = false;  ///< the database may lie on a network file system
+  bool verbose = false;             ///< what server and workers say goes to our standard error
 };
 
 /// Starts `oblique-server` on loopback, at ports that the system picks, and workers that ask it

@@ -66,6 +66,9 @@ void add_run(CLI::App& app, Command& command) {
   verb->add_option("--db", flags->settings.service.database, "database, made when it is not there")
       ->type_name("FILE")
       ->capture_default_str();
+  verb->add_flag(
+      "--allow-network-disk", flags->settings.service.allow_network_disk,
+      "take a database on a network file system, where a second machine could damage it");
   add_worker_flags(*verb, flags->settings);
   verb->add_option("--rows", flags->settings.rows, "most rows of the table shown at the end")
       ->type_name("N")

@@ -1,11 +1,8 @@
 #include "server/database_care.h"
 
 #include <filesystem>
-#include <system_error>
 
-#include <fcntl.h>
-#include <unistd.h>
-
+#include "server/draft_file.h"
 #include "server/sqlite.h"
 
 namespace oblique::server {
@@ -36,45 +33,13 @@ std::vector<std::string> texts(sqlite3* database, const std::string& sql) {
 }
 
 std::vector<std::string> damaged_pages(sqlite3* database) {
-  auto found = texts(database, "PRAGMA integrity_check(20)");
-  return found == std::vector<std::string>{"ok"} ? std::vector<std::string>{} : found;
+  try {
+    auto found = texts(database, "PRAGMA integrity_check(20)");
+    return found == std::vector<std::string>{"ok"} ? std::vector<std::string>{} : found;
+  } catch (const StorageError& error) {
+    return {error.what()};  // too damaged to be looked at
+  }
 }
-
-/// A file that goes with this object unless it is kept.
-class Draft {
- public:
-  explicit Draft(std::string path) : path_(std::move(path)) { remove(); }
-  ~Draft() { remove(); }
-  Draft(const Draft&) = delete;
-  Draft& operator=(const Draft&) = delete;
-
-  const std::string& path() const { return path_; }
-
-  /// Flushes the file to the disk and gives it its name.
-  void keep_as(const std::string& name) {
-    const int file = ::open(path_.c_str(), O_RDONLY | O_CLOEXEC);
-    const bool flushed = file >= 0 && ::fsync(file) == 0;
-    if (file >= 0) {
-      ::close(file);
-    }
-    std::error_code error;
-    if (flushed) {
-      std::filesystem::rename(path_, name, error);
-    }
-    if (!flushed || error) {
-      throw StorageError("cannot write the copy " + name);
-    }
-  }
-
- private:
-  void remove() const {
-    std::error_code ignored;
-    for (const char* suffix : {"", "-journal", "-wal", "-shm"}) {
-      std::filesystem::remove(path_ + suffix, ignored);
-    }
-  }
-  std::string path_;
-};
 
 void copy_pages(sqlite3* from, sqlite3* to, const std::string& path) {
   sqlite3_backup* backup = sqlite3_backup_init(to, "main", from, "main");
@@ -95,7 +60,7 @@ void back_up(const std::string& from, const std::string& to) {
     throw StorageError(to + " exists already: name a file that does not");
   }
   const DatabaseHandle source = open_ours(from);
-  Draft draft(to + ".part");
+  DraftFile draft(to + ".part");
   {
     const DatabaseHandle copy =
         open_database(draft.path(), SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);

@@ -16,6 +16,7 @@
 #include <zmq.hpp>
 
 #include "proto/frames.h"
+#include "server/file_system.h"
 
 namespace oblique::server {
 namespace {
@@ -141,6 +142,19 @@ bool send(zmq::socket_t& socket, const std::string& identity, const std::string&
 
 }  // namespace
 
+namespace {
+
+/// Throws StorageError for a path where a database would be in danger.
+const std::string& safe_path(const LoopSettings& settings) {
+  const std::string objection = objection_to_file_system(settings.database);
+  if (!objection.empty() && !settings.allow_network_disk) {
+    throw StorageError(objection);
+  }
+  return settings.database;
+}
+
+}  // namespace
+
 std::string loopback_address(const std::string& address) {
   if (address == "localhost") {
     return "127.0.0.1";
@@ -162,7 +176,7 @@ class Loop::Parts final : public Outbox {
  public:
   explicit Parts(LoopSettings settings)
       : address_(loopback_address(settings.listen)),
-        store_(settings.database),
+        store_(safe_path(settings)),
         written_(context_, "written"),
         queried_(context_, "queried"),
         writer_(store_, [this](std::vector<WriteReport> r) { written_.put(std::move(r)); }),

@@ -10,6 +10,7 @@ namespace oblique::server {
 
 struct LoopSettings {
   std::string database;              ///< file
+  bool allow_network_disk = false;   ///< the file may lie on a network file system
   std::string listen = "127.0.0.1";  ///< address of both sockets; loopback only
   std::string worker_port = "7601";  ///< "*": the system picks one
   std::string client_port = "7600";
@@ -25,7 +26,8 @@ struct LoopEnd {
 /// service with what comes from them. Logs to spdlog's default logger.
 class Loop {
  public:
-  /// Opens the database and binds both sockets. Throws StorageError, and std::runtime_error for an
+  /// Opens the database and binds both sockets. Throws StorageError, also for a file on a network
+  /// file system, and std::runtime_error for an
   /// address that is not loopback or cannot be bound.
   explicit Loop(LoopSettings settings);
   ~Loop();

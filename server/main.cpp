@@ -70,6 +70,8 @@ void tell_ready(int fd, const Loop& loop) {
 
 int run(const LoopSettings& settings, int ready_fd) {
   const int stop_fd = stop_signals();
+  // A file that may not grow further is a full disk, and no reason to die.
+  std::signal(SIGXFSZ, SIG_IGN);
   Loop loop(settings);
   spdlog::info("database {}, clients at {}, workers at {}", settings.database,
                loop.client_endpoint(), loop.worker_endpoint());
@@ -98,6 +100,8 @@ int main(int argc, char** argv) {
       "Example: oblique-server --db oblique.db"};
   app.option_defaults()->always_capture_default();
   app.add_option("--db", settings.database, "Database file; made when it is not there");
+  app.add_flag("--allow-network-disk", settings.allow_network_disk,
+               "Take a database on a network file system, where a second machine could damage it");
   app.add_option("--listen", settings.listen, "Loopback address to listen on");
   app.add_option("--worker-port", worker_port, "Port for workers; 0: the system picks one");
   app.add_option("--client-port", client_port, "Port for clients; 0: the system picks one");
@@ -108,6 +112,13 @@ int main(int argc, char** argv) {
   app.add_flag("--quiet", quiet, "Log warnings and errors only");
   try {
     app.parse(argc, argv);
+    if (settings.database.empty()) {
+      throw std::runtime_error("--db names no file: it must be the path of a database");
+    }
+    if (worker_port == client_port && worker_port != 0) {
+      throw std::runtime_error("--worker-port and --client-port are both " +
+                               std::to_string(worker_port) + ": they must differ");
+    }
     (void)oblique::server::loopback_address(settings.listen);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kWrongUsage;

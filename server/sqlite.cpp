@@ -4,6 +4,14 @@
 #include <system_error>
 
 namespace oblique::server {
+namespace {
+
+constexpr const char* kWayOut =
+    ": the file is damaged. `oblique check --db FILE` says where, and `oblique backup SAVED.db "
+    "--db "
+    "FILE --salvage` saves what can be read; points whose results are lost are then solved again";
+
+}  // namespace
 
 DatabaseHandle open_database(const std::string& path, int flags) {
   sqlite3* raw = nullptr;
@@ -66,13 +74,25 @@ void Statement::bind_null(int index) {
   check(sqlite3_bind_null(statement_.get(), index));
 }
 
+void Statement::bind_column(int index, const Statement& row, int column) {
+  check(sqlite3_bind_value(statement_.get(), index,
+                           sqlite3_column_value(row.statement_.get(), column)));
+}
+
+int Statement::columns() const {
+  return sqlite3_column_count(statement_.get());
+}
+
 bool Statement::step() {
   const int code = sqlite3_step(statement_.get());
   if (code == SQLITE_ROW) {
     return true;
   }
   if (code != SQLITE_DONE) {
-    const std::string reason = sqlite3_errmsg(database_);
+    std::string reason = sqlite3_errmsg(database_);
+    if ((static_cast<unsigned>(code) & 0xffU) == SQLITE_CORRUPT) {
+      reason += kWayOut;
+    }
     reset();
     throw StorageError("the database failed: " + reason);
   }
@@ -150,7 +170,8 @@ DatabaseKind identify(sqlite3* database, const std::string& path) {
     const int code = sqlite3_errcode(database);
     throw StorageError(code == SQLITE_NOTADB
                            ? path + " is not a database: it is some other kind of file"
-                           : "cannot read the database " + path + ": " + sqlite3_errmsg(database));
+                           : "cannot read the database " + path + ": " + sqlite3_errmsg(database) +
+                                 (code == SQLITE_CORRUPT ? kWayOut : ""));
   }
   if (application_id == 0 && version == 0 && tables == "no tables") {
     return DatabaseKind::kEmpty;

@@ -41,6 +41,8 @@ class Statement {
   void bind(int index, std::string_view text);
   void bind_blob(int index, std::string_view bytes);
   void bind_null(int index);
+  /// The value, of whatever type, that another statement's row has in that column.
+  void bind_column(int index, const Statement& row, int column);
 
   /// Advances: true when there is a row. Throws StorageError.
   bool step();
@@ -49,6 +51,7 @@ class Statement {
   /// Makes the statement ready to run again. Bindings are cleared.
   void reset();
 
+  int columns() const;
   std::int64_t integer(int column) const;
   double real(int column) const;
   std::string text(int column) const;  ///< bytes of a text or blob

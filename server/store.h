@@ -31,8 +31,8 @@ struct StoredStudy {
 class Store final : public Storage {
  public:
   /// Opens the database at `path`, or makes it; one of an older schema is brought to the present
-  /// one. Throws StorageError naming what was found: a
-  /// directory, a foreign file, a newer schema, an unreadable file, one that is open elsewhere.
+  /// one. Throws StorageError naming what was found: a directory, a foreign file, a newer schema, a
+  /// damaged or unwritable file, one that is open elsewhere.
   explicit Store(const std::string& path);
   ~Store() override;
 

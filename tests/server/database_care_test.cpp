@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "server/reader.h"
+#include "server/salvage.h"
 #include "server/store.h"
 #include "tests/server/results.h"
 #include "tests/server/scheduler_bench.h"
@@ -96,6 +97,68 @@ TEST_F(DatabaseCareTest, ADamagedPageIsFoundAndNotCopied) {
   EXPECT_TRUE(found);
   EXPECT_THROW(back_up(path_, copy_), StorageError);
   EXPECT_FALSE(std::filesystem::exists(copy_));
+}
+
+TEST_F(DatabaseCareTest, WhatCanBeReadOfADamagedDatabaseIsSavedAndTheRestIsPendingAgain) {
+  constexpr std::uint64_t kPoints = 400;
+  const std::string damaged = folder_.file("damaged.db");
+  table_ = table_of(kPoints);
+  {
+    Store store(damaged);
+    add_results(store, 0, kPoints, true);
+    store.commit(std::vector<Change>{SetStudyState{1, StudyState::kDone, "now"}});
+  }
+  {
+    // One page in the middle, where nearly all pages are rows of results.
+    std::fstream file(damaged, std::ios::in | std::ios::out | std::ios::binary);
+    constexpr std::uintmax_t kPage = 4096;
+    file.seekp(
+        static_cast<std::streamoff>(std::filesystem::file_size(damaged) / 2 / kPage * kPage));
+    file << std::string(kPage, '\x5a');
+  }
+  EXPECT_FALSE(find_faults(damaged).empty());
+  const auto saved = salvage(damaged, copy_);
+  EXPECT_EQ(saved.studies, 1U);
+  EXPECT_GE(saved.unreadable_places, 1U);
+  EXPECT_LT(saved.results, kPoints);
+  EXPECT_GT(saved.results, kPoints - 40);
+  EXPECT_THAT(find_faults(copy_), IsEmpty());
+  Store copy(copy_);
+  const auto studies = copy.studies();
+  EXPECT_EQ(studies.at(0).settled.size(), saved.results);
+  EXPECT_EQ(studies.at(0).state, StudyState::kRunning);
+}
+
+TEST_F(DatabaseCareTest, ASoundDatabaseIsSalvagedWhole) {
+  store_.reset();
+  const auto saved = salvage(path_, copy_);
+  EXPECT_EQ(saved.results, 5U);
+  EXPECT_EQ(saved.unreadable_places, 0U);
+  EXPECT_THROW(salvage(path_, copy_), StorageError) << "it exists";
+}
+
+TEST_F(DatabaseCareTest, ADamagedDatabaseIsRefusedWithTheWayOut) {
+  store_.reset();
+  const auto page_of = [&](const std::string& name) {
+    const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READONLY);
+    Statement root(database.get(), "SELECT rootpage FROM sqlite_schema WHERE name = ?");
+    root.bind(1, std::string_view(name));
+    root.step();
+    return root.integer(0);
+  };
+  const std::int64_t page = page_of("studies");
+  {
+    std::fstream file(path_, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp((page - 1) * 4096);
+    file << std::string(4096, '\x5a');
+  }
+  try {
+    Store store(path_);
+    (void)store.studies();
+    FAIL() << "a damaged database was opened";
+  } catch (const StorageError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("--salvage"));
+  }
 }
 
 TEST_F(DatabaseCareTest, ARowOfAPointThatTheStudyDoesNotHaveIsNamed) {

@@ -1,0 +1,154 @@
+#include "server/salvage.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <limits>
+#include <vector>
+
+#include "server/draft_file.h"
+#include "server/sqlite.h"
+#include "server/store.h"
+
+namespace oblique::server {
+namespace {
+
+std::vector<std::string> columns_of(sqlite3* database, const std::string& table) {
+  Statement list(database, "SELECT name FROM pragma_table_info('" + table + "')");
+  std::vector<std::string> names;
+  while (list.step()) {
+    names.push_back(list.text(0));
+  }
+  return names;
+}
+
+/// The columns that both have, as a list for SQL.
+std::string common_columns(sqlite3* from, sqlite3* to, const std::string& table) {
+  const auto there = columns_of(from, table);
+  std::string list;
+  for (const std::string& column : columns_of(to, table)) {
+    if (std::find(there.begin(), there.end(), column) != there.end()) {
+      list += (list.empty() ? "" : ", ") + column;
+    }
+  }
+  return list;
+}
+
+/// Copies the rows of one table in the order of their numbers, and passes over what cannot be read.
+class TableCopy {
+ public:
+  TableCopy(sqlite3* from, sqlite3* to, const std::string& table)
+      : columns_(common_columns(from, to, table)),
+        read_(from,
+              "SELECT rowid, " + columns_ + " FROM " + table + " WHERE rowid > ? ORDER BY rowid"),
+        insert_(to, "INSERT INTO " + table + " (" + columns_ + ") VALUES (" + marks() + ")") {}
+
+  std::uint64_t rows() const { return rows_; }
+  std::uint64_t unreadable_places() const { return unreadable_; }
+
+  void run() {
+    // After an unreadable place the next readable row is sought in growing leaps, so that a long
+    // one costs little and a short one takes few rows with it.
+    std::int64_t leap = 1;
+    while (!copy_until_unreadable()) {
+      unreadable_ += leap == 1 ? 1U : 0U;
+      if (last_ > std::numeric_limits<std::int64_t>::max() - leap) {
+        return;
+      }
+      last_ += leap;
+      leap = copied_since_ ? 1 : 2 * leap;
+    }
+  }
+
+ private:
+  std::string marks() const {
+    std::string text = "?";
+    for (const char letter : columns_) {
+      text += letter == ',' ? ", ?" : "";
+    }
+    return text;
+  }
+
+  /// True at the end of the table.
+  bool copy_until_unreadable() {
+    copied_since_ = false;
+    read_.reset();
+    read_.bind(1, last_);
+    try {
+      while (read_.step()) {
+        last_ = read_.integer(0);
+        copied_since_ = true;
+        insert_row();
+      }
+      read_.reset();
+      return true;
+    } catch (const StorageError&) {
+      return false;
+    }
+  }
+
+  /// A row that the schema does not take is damaged, too.
+  void insert_row() {
+    try {
+      for (int column = 1; column < read_.columns(); ++column) {
+        insert_.bind_column(column, read_, column);
+      }
+      insert_.run();
+      ++rows_;
+    } catch (const StorageError&) {
+      insert_.reset();
+      ++unreadable_;
+    }
+  }
+
+  std::string columns_;
+  Statement read_;
+  Statement insert_;
+  std::int64_t last_ = std::numeric_limits<std::int64_t>::min();
+  bool copied_since_ = false;
+  std::uint64_t rows_ = 0;
+  std::uint64_t unreadable_ = 0;
+};
+
+}  // namespace
+
+Salvaged salvage(const std::string& from, const std::string& to) {
+  check_path(from);
+  if (std::filesystem::exists(to)) {
+    throw StorageError(to + " exists already: name a file that does not");
+  }
+  const DatabaseHandle source = open_database(from, SQLITE_OPEN_READWRITE);
+  (void)identify(source.get(), from);
+  DraftFile draft(to + ".part");
+  Salvaged saved;
+  { const Store with_schema(draft.path()); }
+  {
+    const DatabaseHandle target = open_database(draft.path(), SQLITE_OPEN_READWRITE);
+    Transaction transaction(target.get());
+    for (const char* table : {"studies", "models", "workers", "results"}) {
+      TableCopy copy(source.get(), target.get(), table);
+      copy.run();
+      saved.unreadable_places += copy.unreadable_places();
+      (table == std::string("studies") ? saved.studies : saved.results) = copy.rows();
+    }
+    // Rows of a study or model that is gone tell nothing.
+    execute(target.get(),
+            "DELETE FROM results WHERE study_id NOT IN (SELECT study_id FROM studies)"
+            " OR model_id NOT IN (SELECT model_id FROM models)");
+    execute(target.get(),
+            "UPDATE results SET worker = NULL"
+            " WHERE worker NOT IN (SELECT worker_id FROM workers)");
+    execute(target.get(),
+            "UPDATE studies SET state = 'running' WHERE state = 'done' AND points <>"
+            " (SELECT count(*) FROM results AS r WHERE r.study_id = studies.study_id)");
+    transaction.commit();
+    Statement count(target.get(), "SELECT count(*) FROM results");
+    count.step();
+    saved.results = static_cast<std::uint64_t>(count.integer(0));
+    count.reset();
+    execute(target.get(), "PRAGMA journal_mode = DELETE");
+  }
+  draft.keep_as(to);
+  return saved;
+}
+
+}  // namespace oblique::server

@@ -1,0 +1,55 @@
+#include <sys/resource.h>
+
+#include <csignal>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "tests/system/processes.h"
+
+namespace oblique::test {
+namespace {
+
+/// No file of that process may grow beyond `bytes`, as on a full disk.
+void limit_files(pid_t pid, rlim_t bytes) {
+  const rlimit limit{bytes, RLIM_INFINITY};
+  ASSERT_EQ(prlimit(pid, RLIMIT_FSIZE, &limit, nullptr), 0);
+}
+
+std::string status_of(const Folder& folder, const Server& server) {
+  return run_client(folder, {"status", "full", "--server", server.client_url(), "--format", "csv"})
+      .output;
+}
+
+TEST(DiskFullTest, AStudyWaitsForRoomOnTheDiskSaysSoAndLosesNothing) {
+  const Folder folder;
+  const std::string file = folder.file("full.db");
+  const Database database(file);
+  Server server(folder, file);
+  constexpr rlim_t kRoom = 600'000;
+  limit_files(server.process().pid(), kRoom);
+  const Ran submitted =
+      run_client(folder, {"submit", "--H", "1", "--mu", "0.1:2.0:50", "--e", "0.5:1.0:40", "--name",
+                          "full", "--server", server.client_url()});
+  ASSERT_EQ(submitted.exit_code, 0) << submitted.errors;
+  Worker worker(folder, server.worker_url());
+  wait_until("the study waits for the disk", [&] {
+    return status_of(folder, server).find("takes no results") != std::string::npos;
+  });
+  const double rows = database.rows();
+  EXPECT_GT(rows, 0);
+  EXPECT_LT(rows, 2000);
+  const Ran refused = run_client(folder, {"submit", "--H", "1", "--mu", "0.4", "--e", "1", "--name",
+                                          "another", "--server", server.client_url()});
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_NE(refused.errors.find("was not stored"), std::string::npos) << refused.errors;
+  EXPECT_TRUE(is_running(server.process().pid()));
+  EXPECT_TRUE(is_running(worker.pid()));
+  limit_files(server.process().pid(), RLIM_INFINITY);
+  wait_until("the study is done", [&] { return database.rows() == 2000; });
+  EXPECT_EQ(database.number("SELECT count(DISTINCT point) FROM results"), 2000);
+  EXPECT_EQ(run_client(folder, {"check", "--db", file}).exit_code, 0);
+}
+
+}  // namespace
+}  // namespace oblique::test
