@@ -105,11 +105,11 @@ EmbeddedService::EmbeddedService(const ServiceSettings& settings, StopSignal& st
   ready.write.close();
   wait_until_ready(ready.read, stop);
   for (int i = 0; i < settings.workers; ++i) {
-    workers_.push_back(std::make_unique<ChildProcess>(
-        ChildSettings{.program = worker_program,
-                      .arguments = {"--server", worker_url_, "--stop-with-parent", "--threads",
-                                    std::to_string(threads_each(settings.workers))},
-                      .show_errors = settings.verbose}));
+    workers_.push_back(std::make_unique<ChildProcess>(ChildSettings{
+        .program = worker_program,
+        .arguments = {"--server", worker_url_, "--stop-with-parent", std::to_string(getpid()),
+                      "--threads", std::to_string(threads_each(settings.workers))},
+        .show_errors = settings.verbose}));
   }
 }
 

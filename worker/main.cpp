@@ -59,7 +59,8 @@ int signal_descriptor() {
   return signalfd(-1, &signals, SFD_NONBLOCK | SFD_CLOEXEC);
 }
 
-int run_worker(const SessionSettings& settings) {
+/// `parent` is who started this process, 0 when nobody has said.
+int run_worker(const SessionSettings& settings, pid_t parent) {
   const int signals = signal_descriptor();
   // The log's reader may be gone before this process is.
   std::signal(SIGPIPE, SIG_IGN);
@@ -68,6 +69,12 @@ int run_worker(const SessionSettings& settings) {
                                    [&](const auto& task, const auto& next, const auto& take) {
                                      points.solve(task, next, take);
                                    });
+  // The session waits for the end of whoever was the parent when it was made. One that was gone by
+  // then must have been named to be missed.
+  if (parent != 0 && getppid() != parent) {
+    spdlog::warn("the parent process was gone before this one began");
+    return EXIT_SUCCESS;
+  }
   spdlog::info("worker {}, solver {} ({}), threads {}, server {}", settings.name,
                oblique::solver::solver_version(), oblique::solver::instruction_set(),
                settings.threads, settings.server);
@@ -103,19 +110,25 @@ int run_program(int argc, char** argv) {
                  "Points solved at a time, each thread on a core; the default is all cores here")
       ->capture_default_str()
       ->check(CLI::Range(std::size_t{1}, kMostThreads));
-  app.add_flag("--stop-with-parent", settings.stop_with_parent,
-               "Stop when the parent process is gone");
+  pid_t parent = 0;
+  auto* with_parent =
+      app.add_option("--stop-with-parent", parent,
+                     "Stop when the parent process is gone; with its id, also when it was before "
+                     "this one began")
+          ->expected(0, 1)
+          ->type_name("[PID]");
   app.add_flag("--quiet", quiet, "Log warnings and errors only");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? EXIT_SUCCESS : kWrongUsage;
   }
+  settings.stop_with_parent = with_parent->count() > 0;
   if (quiet) {
     spdlog::set_level(spdlog::level::warn);
   }
   try {
-    return run_worker(settings);
+    return run_worker(settings, parent);
   } catch (const oblique::worker::AddressError& error) {
     spdlog::error("{}", error.what());
     return kWrongUsage;

@@ -49,6 +49,42 @@ std::optional<ProcessState> state_of(pid_t pid) {
   return rest ? std::optional(state) : std::nullopt;
 }
 
+/// Our environment with `changes`, each as NAME=value.
+std::vector<std::string> environment_with(const Environment& changes) {
+  std::vector<std::string> all;
+  for (char** variable = environ; *variable != nullptr; ++variable) {
+    const std::string text = *variable;
+    if (!changes.contains(text.substr(0, text.find('=')))) {
+      all.push_back(text);
+    }
+  }
+  for (const auto& [name, value] : changes) {
+    all.push_back(name + "=" + value);
+  }
+  return all;
+}
+
+/// As system calls take a list of texts; lives as long as they do.
+std::vector<char*> pointers_to(std::vector<std::string>& texts) {
+  std::vector<char*> pointers;
+  for (std::string& text : texts) {
+    pointers.push_back(text.data());
+  }
+  pointers.push_back(nullptr);
+  return pointers;
+}
+
+std::vector<pid_t> all_processes() {
+  std::vector<pid_t> all;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc")) {
+    const std::string name = entry.path().filename();
+    if (name.find_first_not_of("0123456789") == std::string::npos) {
+      all.push_back(static_cast<pid_t>(std::stol(name)));
+    }
+  }
+  return all;
+}
+
 std::string port_of(const std::string& url) {
   return url.substr(url.rfind(':') + 1);
 }
@@ -104,12 +140,7 @@ bool is_running(pid_t pid) {
 
 std::vector<pid_t> children_of(pid_t pid) {
   std::vector<pid_t> children;
-  for (const auto& entry : std::filesystem::directory_iterator("/proc")) {
-    const std::string name = entry.path().filename();
-    if (name.find_first_not_of("0123456789") != std::string::npos) {
-      continue;
-    }
-    const auto child = static_cast<pid_t>(std::stol(name));
+  for (const pid_t child : all_processes()) {
     const auto state = state_of(child);
     if (state && state->parent == pid) {
       children.push_back(child);
@@ -118,10 +149,22 @@ std::vector<pid_t> children_of(pid_t pid) {
   return children;
 }
 
+std::vector<pid_t> processes_of(const Folder& folder) {
+  std::vector<pid_t> found;
+  for (const pid_t pid : all_processes()) {
+    const std::string environment = contents("/proc/" + std::to_string(pid) + "/environ");
+    if (environment.find(folder.path().string()) != std::string::npos) {
+      found.push_back(pid);
+    }
+  }
+  return found;
+}
+
 // ---- Process ----------------------------------------------------------------------------------
 
 Process::Process(const Folder& folder, const std::string& program,
-                 const std::vector<std::string>& arguments, int ready_fd) {
+                 const std::vector<std::string>& arguments, const Environment& environment,
+                 int ready_fd) {
   std::string base = folder.file("process-XXXXXX");
   const int unique = mkstemp(base.data());
   close(unique);
@@ -142,13 +185,9 @@ Process::Process(const Folder& folder, const std::string& program,
   posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
   std::vector<std::string> words{program};
   words.insert(words.end(), arguments.begin(), arguments.end());
-  std::vector<char*> argv;
-  for (std::string& word : words) {
-    argv.push_back(word.data());
-  }
-  argv.push_back(nullptr);
-  const int error =
-      posix_spawn(&pid_, program.c_str(), &actions, &attributes, argv.data(), environ);
+  std::vector<std::string> variables = environment_with(environment);
+  const int error = posix_spawn(&pid_, program.c_str(), &actions, &attributes,
+                                pointers_to(words).data(), pointers_to(variables).data());
   posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
   if (error != 0) {
@@ -178,6 +217,11 @@ bool Process::reap() {
   return exit_code_.has_value();
 }
 
+std::optional<int> Process::exit_code() {
+  reap();
+  return exit_code_;
+}
+
 int Process::wait() {
   wait_until("the end of process " + std::to_string(pid_) + ", which said: " + errors(),
              [this] { return reap(); });
@@ -199,16 +243,18 @@ Ran run_client(const Folder& folder, const std::vector<std::string>& arguments) 
 
 // ---- Server and worker --------------------------------------------------------------------------
 
-Server::Server(const Folder& folder, const std::string& database) {
-  start(folder, database, "0", "0");
+Server::Server(const Folder& folder, const std::string& database, const Environment& environment) {
+  start(folder, database, "0", "0", environment);
 }
 
-Server::Server(const Folder& folder, const std::string& database, const Server& before) {
-  start(folder, database, port_of(before.worker_url()), port_of(before.client_url()));
+Server::Server(const Folder& folder, const std::string& database, const Server& before,
+               const Environment& environment) {
+  start(folder, database, port_of(before.worker_url()), port_of(before.client_url()), environment);
 }
 
 void Server::start(const Folder& folder, const std::string& database,
-                   const std::string& worker_port, const std::string& client_port) {
+                   const std::string& worker_port, const std::string& client_port,
+                   const Environment& environment) {
   std::array<int, 2> ready{};
   if (pipe2(ready.data(), O_CLOEXEC) != 0) {
     throw std::runtime_error("pipe: " + std::string(std::strerror(errno)));
@@ -217,7 +263,7 @@ void Server::start(const Folder& folder, const std::string& database,
       folder, server_program(),
       std::vector<std::string>{"--db", database, "--worker-port", worker_port, "--client-port",
                                client_port, "--ready-fd", "3", "--stop-with-parent"},
-      ready[1]);
+      environment, ready[1]);
   close(ready[1]);
   const std::string line = read_line(ready[0]);
   close(ready[0]);
@@ -229,8 +275,20 @@ void Server::start(const Folder& folder, const std::string& database,
   client_url_ = urls.at("client");
 }
 
-Worker::Worker(const Folder& folder, const std::string& server_url)
-    : Process(folder, worker_program(), {"--server", server_url, "--stop-with-parent"}) {}
+namespace {
+
+std::vector<std::string> worker_arguments(const std::string& server_url,
+                                          const std::vector<std::string>& more) {
+  std::vector<std::string> all{"--server", server_url, "--stop-with-parent"};
+  all.insert(all.end(), more.begin(), more.end());
+  return all;
+}
+
+}  // namespace
+
+Worker::Worker(const Folder& folder, const std::string& server_url,
+               const std::vector<std::string>& arguments, const Environment& environment)
+    : Process(folder, worker_program(), worker_arguments(server_url, arguments), environment) {}
 
 // ---- Database -----------------------------------------------------------------------------------
 

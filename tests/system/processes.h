@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -35,12 +36,19 @@ bool is_running(pid_t pid);
 /// Processes that `pid` started and that still have it as their parent.
 std::vector<pid_t> children_of(pid_t pid);
 
+/// Processes in whose environment the name of this folder stands, whoever their parent is.
+std::vector<pid_t> processes_of(const Folder& folder);
+
+/// Variables for a program, beside our own or in place of them.
+using Environment = std::map<std::string, std::string>;
+
 /// A program under test, in a process group of its own. Its output goes to files in the folder.
 class Process {
  public:
   /// Starts `program` with `arguments`. `ready_fd`, when not −1, is its descriptor 3.
   Process(const Folder& folder, const std::string& program,
-          const std::vector<std::string>& arguments, int ready_fd = -1);
+          const std::vector<std::string>& arguments, const Environment& environment = {},
+          int ready_fd = -1);
   /// Kills what still runs.
   ~Process();
   Process(const Process&) = delete;
@@ -48,6 +56,8 @@ class Process {
 
   pid_t pid() const { return pid_; }
   void send(int signal) const;
+  /// Nothing while it runs.
+  std::optional<int> exit_code();
   /// Waits for the end. The exit code, or 128 + the signal that ended it.
   int wait();
   /// What it has written so far.
@@ -75,9 +85,10 @@ Ran run_client(const Folder& folder, const std::vector<std::string>& arguments);
 class Server {
  public:
   /// At ports that the system picks.
-  Server(const Folder& folder, const std::string& database);
+  Server(const Folder& folder, const std::string& database, const Environment& environment = {});
   /// At the same ports as one that has ended.
-  Server(const Folder& folder, const std::string& database, const Server& before);
+  Server(const Folder& folder, const std::string& database, const Server& before,
+         const Environment& environment = {});
 
   const std::string& worker_url() const { return worker_url_; }
   const std::string& client_url() const { return client_url_; }
@@ -85,7 +96,7 @@ class Server {
 
  private:
   void start(const Folder& folder, const std::string& database, const std::string& worker_port,
-             const std::string& client_port);
+             const std::string& client_port, const Environment& environment);
 
   std::string worker_url_;
   std::string client_url_;
@@ -95,7 +106,8 @@ class Server {
 /// An `oblique-worker` of `server`.
 class Worker : public Process {
  public:
-  Worker(const Folder& folder, const std::string& server_url);
+  Worker(const Folder& folder, const std::string& server_url,
+         const std::vector<std::string>& arguments = {}, const Environment& environment = {});
 };
 
 /// Answers of a database that a server may be writing to.

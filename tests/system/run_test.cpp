@@ -75,6 +75,17 @@ TEST_F(RunTest, ARunThatIsKilledLeavesNoProcessAndTheSameCommandContinues) {
   EXPECT_EQ(database_.number("SELECT count(*) FROM results WHERE status = 'solved'"), kCount);
 }
 
+TEST(WorkerOfARunTest, EndsWhenTheRunWasKilledBeforeTheWorkerBegan) {
+  const Folder folder;
+  Process parent(folder, client_program(), {"--help"});
+  parent.wait();
+  Process worker(
+      folder, worker_program(),
+      {"--server", "tcp://127.0.0.1:1", "--stop-with-parent", std::to_string(parent.pid())});
+  EXPECT_EQ(worker.wait(), 0);
+  EXPECT_NE(worker.errors().find("parent process was gone"), std::string::npos) << worker.errors();
+}
+
 TEST_F(RunTest, ARunGoesOnWhenOneOfItsWorkersIsKilled) {
   Process run(folder_, client_program(), arguments());
   const auto children = started_by(run);

@@ -1,0 +1,232 @@
+// A library that a test loads into a program with LD_PRELOAD. It stands between the program and the
+// calls by which the program commits, sends and receives, and sends the program a signal at one of
+// them. So the programs under test are those that people run, without a hook of their own.
+//
+// OBLIQUE_KILL_AT = "PROGRAM POINT OCCURRENCE SIGNAL PAUSE_MS MARK" is the order:
+//   PROGRAM     who is meant; its children inherit the variable and are left alone
+//   POINT       before-commit, after-commit, before-send:KIND, after-send:KIND, after-receive:KIND
+//               with a kind of proto/oblique.proto, or time
+//   OCCURRENCE  at which one, from 1; of time: milliseconds after the start
+//   SIGNAL      number of the signal
+//   PAUSE_MS    how long the thread sleeps before, as for a message to leave the process
+//   MARK        a file that is made, with the process id, before the signal is sent. When it is
+//               there already another process was hit, and this one goes on.
+#include <dlfcn.h>
+#include <fcntl.h>
+#include <pthread.h>
+#include <sqlite3.h>
+#include <unistd.h>
+#include <zmq.h>
+
+#include <atomic>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstdint>
+#include <cstdlib>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+namespace {
+
+struct Order {
+  std::string point;
+  int occurrence = 0;
+  int signal = 0;
+  int pause_ms = 0;
+  std::string mark;
+};
+
+std::optional<Order> order_for(const std::string& program) {
+  const char* text = std::getenv("OBLIQUE_KILL_AT");
+  if (text == nullptr) {
+    return std::nullopt;
+  }
+  std::istringstream words(text);
+  std::string meant;
+  Order order;
+  words >> meant >> order.point >> order.occurrence >> order.signal >> order.pause_ms >> order.mark;
+  return words && meant == program ? std::optional(order) : std::nullopt;
+}
+
+// ---- Kinds of messages --------------------------------------------------------------------------
+
+/// Names of the kinds of a message, the first one being field `first`.
+struct Kinds {
+  std::uint64_t first;
+  std::vector<std::string> names;
+};
+
+const Kinds& kinds_of(const std::string& program, bool sent, bool with_client) {
+  static const Kinds to_server{1, {"hello", "credit", "results", "heartbeat", "goodbye"}};
+  static const Kinds to_worker{1,
+                               {"welcome", "refused", "study", "batch", "results_stored",
+                                "withdraw", "hello_again", "heartbeat_reply", "stopping"}};
+  static const Kinds request{3, {"submit", "status", "workers", "change", "query"}};
+  static const Kinds reply{2, {"error", "submit", "status", "workers", "change", "query"}};
+  const bool by_server = (program == "oblique-server") == sent;
+  if (with_client) {
+    return by_server ? reply : request;
+  }
+  return by_server ? to_worker : to_server;
+}
+
+/// Takes a varint off the front of `bytes`.
+std::uint64_t take_varint(std::basic_string_view<unsigned char>& bytes) {
+  std::uint64_t value = 0;
+  for (int shift = 0; !bytes.empty() && shift < 64; shift += 7) {
+    const unsigned char byte = bytes.front();
+    bytes.remove_prefix(1);
+    value |= std::uint64_t{byte & 0x7fU} << shift;
+    if (byte < 0x80) {
+      break;
+    }
+  }
+  return value;
+}
+
+/// Name of the kind of message in a frame, empty for none. By hand: a second copy of the generated
+/// code in one process is refused by the Protobuf library.
+std::string kind_of(const std::string& program, bool sent, const void* data, std::size_t size) {
+  std::basic_string_view<unsigned char> bytes(static_cast<const unsigned char*>(data), size);
+  constexpr unsigned char kNumberInFieldOne = 0x08;
+  const bool with_client = !bytes.empty() && bytes.front() == kNumberInFieldOne;
+  const Kinds& kinds = kinds_of(program, sent, with_client);
+  // The kind is the first field that is a message; only numbers stand before it.
+  while (!bytes.empty()) {
+    const std::uint64_t tag = take_varint(bytes);
+    constexpr std::uint64_t kNumber = 0;
+    constexpr std::uint64_t kMessage = 2;
+    if ((tag & 7U) == kMessage) {
+      const std::uint64_t index = (tag >> 3U) - kinds.first;
+      return index < kinds.names.size() ? kinds.names[index] : std::string();
+    }
+    if ((tag & 7U) != kNumber) {
+      break;
+    }
+    take_varint(bytes);
+  }
+  return {};
+}
+
+// ---- The points ---------------------------------------------------------------------------------
+
+class KillPoints {
+ public:
+  KillPoints() : program_(program_invocation_short_name), order_(order_for(program_)) {
+    if (order_ && order_->point == "time") {
+      start_clock();
+    }
+  }
+
+  bool armed() const { return order_.has_value(); }
+
+  void reached(const std::string& point) {
+    if (order_ && order_->point == point && ++times_ == order_->occurrence) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(order_->pause_ms));
+      strike();
+    }
+  }
+
+  void reached(const char* point, bool sent, const void* data, std::size_t size) {
+    const std::string kind = kind_of(program_, sent, data, size);
+    if (!kind.empty()) {
+      reached(point + kind);
+    }
+  }
+
+ private:
+  void strike() const {
+    const int mark = open(order_->mark.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0600);
+    if (mark < 0) {
+      return;
+    }
+    const std::string line = std::to_string(getpid()) + "\n";
+    const bool written = write(mark, line.data(), line.size()) > 0;
+    close(mark);
+    if (written) {
+      kill(getpid(), order_->signal);
+    }
+  }
+
+  /// The thread takes no signal: those sent to the process are for its own threads.
+  void start_clock() const {
+    sigset_t all;
+    sigset_t before;
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &before);
+    std::thread([this] {
+      std::this_thread::sleep_for(std::chrono::milliseconds(order_->occurrence));
+      strike();
+    }).detach();
+    pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  }
+
+  std::string program_;
+  std::optional<Order> order_;
+  std::atomic<int> times_ = 0;
+};
+
+/// Never destroyed: threads may come here until the very end.
+KillPoints& points() {
+  static auto* const only = new KillPoints;
+  return *only;
+}
+
+[[gnu::constructor]] void start() {
+  points();
+}
+
+template <class Function>
+Function* next(const char* name) {
+  return reinterpret_cast<Function*>(dlsym(RTLD_NEXT, name));
+}
+
+}  // namespace
+
+// ---- In the place of the libraries' functions ---------------------------------------------------
+
+extern "C" int sqlite3_exec(sqlite3* database, const char* sql,
+                            int (*take)(void*, int, char**, char**), void* context,
+                            char** message) {
+  static auto* const real = next<decltype(sqlite3_exec)>("sqlite3_exec");
+  const bool commits = points().armed() && sql != nullptr && std::string_view(sql) == "COMMIT";
+  if (commits) {
+    points().reached("before-commit");
+  }
+  const int code = real(database, sql, take, context, message);
+  if (commits && code == SQLITE_OK) {
+    points().reached("after-commit");
+  }
+  return code;
+}
+
+extern "C" int zmq_send(void* socket, const void* data, std::size_t size, int flags) {
+  static auto* const real = next<decltype(zmq_send)>("zmq_send");
+  const bool whole = points().armed() && (flags & ZMQ_SNDMORE) == 0;
+  if (whole) {
+    points().reached("before-send:", true, data, size);
+  }
+  const int sent = real(socket, data, size, flags);
+  const int error = errno;
+  if (whole && sent >= 0) {
+    points().reached("after-send:", true, data, size);
+  }
+  errno = error;
+  return sent;
+}
+
+extern "C" int zmq_msg_recv(zmq_msg_t* message, void* socket, int flags) {
+  static auto* const real = next<decltype(zmq_msg_recv)>("zmq_msg_recv");
+  const int received = real(message, socket, flags);
+  const int error = errno;
+  if (received >= 0 && points().armed() && zmq_msg_more(message) == 0) {
+    points().reached("after-receive:", false, zmq_msg_data(message), zmq_msg_size(message));
+  }
+  errno = error;
+  return received;
+}
