@@ -188,6 +188,62 @@ void bench_submission(std::uint64_t points) {
               before.peak_MB, after.peak_MB);
 }
 
+void wait_for(const std::function<bool()>& condition) {
+  while (!condition()) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+}
+
+/// A study under way, whose highest settled run of points shows what is still out.
+struct Underway : Study {
+  explicit Underway(std::uint64_t points) : Study(points) {
+    std::vector<std::string> submit{"submit", "--server", server.client_url()};
+    submit.insert(submit.end(), arguments.begin(), arguments.end());
+    check(test::run_client(folder, submit));
+  }
+  double count() const { return database.rows(); }
+};
+
+/// How long after a worker's death every point has a row that it held then: its batches were found
+/// lost, given to another worker, solved and stored. They are the gaps below what the other worker
+/// has reached a second later.
+void bench_worker_killed(std::uint64_t points) {
+  Underway study(points);
+  test::Worker survivor(study.folder, study.server.worker_url());
+  test::Worker victim(study.folder, study.server.worker_url());
+  wait_for([&] { return study.count() > 5000; });
+  victim.send(SIGKILL);
+  victim.wait();
+  const auto killed = Clock::now();
+  std::this_thread::sleep_for(std::chrono::seconds(1));
+  const double reached = study.database.number("SELECT max(point) FROM results");
+  const std::string below =
+      "SELECT count(*) FROM results WHERE point <= " + std::to_string(reached);
+  const double gaps = reached + 1.0 - study.database.number(below);
+  wait_for([&] { return study.database.number(below) > reached; });
+  const std::chrono::duration<double> taken = Clock::now() - killed;
+  std::printf("| %.3g | %.0f | %.2f |\n", static_cast<double>(points), gaps, taken.count());
+}
+
+/// How long after a server's death (and start at once) both workers hold batches of the new one and
+/// rows come again.
+void bench_server_killed(std::uint64_t points) {
+  Underway study(points);
+  test::Worker one(study.folder, study.server.worker_url());
+  test::Worker other(study.folder, study.server.worker_url());
+  wait_for([&] { return study.count() > 5000; });
+  study.server.process().send(SIGKILL);
+  study.server.process().wait();
+  const auto killed = Clock::now();
+  const test::Server again(study.folder, study.file, study.server);
+  const std::chrono::duration<double> started = Clock::now() - killed;
+  const std::string joined = "SELECT count(DISTINCT worker) FROM results WHERE worker > 2";
+  wait_for([&] { return study.database.number(joined) >= 2; });
+  const std::chrono::duration<double> full = Clock::now() - killed;
+  std::printf("| %.3g | %.2f | %.2f |\n", static_cast<double>(points), started.count(),
+              full.count());
+}
+
 void run_all(const std::string& what, const std::vector<std::uint64_t>& points) {
   const auto table = [&](const char* header, const std::function<void(std::uint64_t)>& row) {
     std::puts(header);
@@ -214,8 +270,20 @@ void run_all(const std::string& what, const std::vector<std::uint64_t>& points) 
         "| points | submitted in [s] | server before MB | after MB |\n"
         "|---:|---:|---:|---:|",
         bench_submission);
+  } else if (what == "worker-killed") {
+    table(
+        "| points | of them held by the killed worker | solved elsewhere after [s] |\n"
+        "|---:|---:|---:|",
+        bench_worker_killed);
+  } else if (what == "server-killed") {
+    table(
+        "| points | listens again after [s] | rows of both workers again after [s] |\n"
+        "|---:|---:|---:|",
+        bench_server_killed);
   } else {
-    throw std::invalid_argument("`" + what + "` is none of service, server-alone and submission");
+    throw std::invalid_argument("`" + what +
+                                "` is none of service, server-alone, submission, worker-killed "
+                                "and server-killed");
   }
 }
 
@@ -226,7 +294,9 @@ int main(int argc, char** argv) {
   try {
     if (argc < 3) {
       throw std::invalid_argument(
-          "usage: oblique-service-bench service|server-alone|submission POINTS...");
+          "usage: oblique-service-bench "
+          "service|server-alone|submission|worker-killed|server-killed "
+          "POINTS...");
     }
     std::vector<std::uint64_t> points;
     for (int i = 2; i < argc; ++i) {
