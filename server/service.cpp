@@ -254,7 +254,17 @@ void Service::refused(const Write& meaning, const std::string& error) {
   } else if (const auto* state = std::get_if<OfState>(&meaning)) {
     Study& study = studies_.at(state->study);
     --study.state_writes;
-    if (study.state == state->state) {
+    OfState* later = nullptr;
+    for (auto& [ticket, write] : writes_) {
+      auto* other = std::get_if<OfState>(&write);
+      if (later == nullptr && other != nullptr && other->study == state->study) {
+        later = other;
+      }
+    }
+    if (later != nullptr) {
+      // That one is on its way still, and stands now on what was before this one.
+      later->before = state->before;
+    } else if (study.state == state->state) {
       study.state = state->before;
     }
     reply_error(state->client, "the change was not stored, the study is as before: " + error);

@@ -147,7 +147,7 @@ void Service::continue_study(const Client& client, StudyId id, Instant now) {
   const bool rests = study.state == StudyState::kCancelled || study.state == StudyState::kPaused;
   if (!study.durable) {
     study.submitters.push_back(client);
-  } else if (rests || study.state_writes > 0) {
+  } else if (rests || (study.state_writes > 0 && study.state != StudyState::kDone)) {
     set_state(client, id, StudyState::kRunning, true, now);
   } else {
     reply_submitted(client, id, false);

@@ -85,6 +85,31 @@ TEST_F(ServiceTest, AChangeThatIsNotStoredLeavesTheStudyAsItWas) {
   EXPECT_TRUE(last_message().has_batch());
 }
 
+TEST_F(ServiceTest, AChangeRefusedBeforeAnotherLeavesWhatTheOtherMakesOfIt) {
+  request(submit_request("a"));
+  write_all();
+  request(change_request("a", protocol::STUDY_CHANGE_CANCEL));
+  request(change_request("a", protocol::STUDY_CHANGE_CANCEL));  // a client that asks again
+  service_->written({WriteReport::Kind::kRefused, outbox_.jobs.front().ticket, "full"}, now_);
+  outbox_.jobs.erase(outbox_.jobs.begin());
+  write_all();
+  EXPECT_EQ(last_reply().change().study().state(), "cancelled");
+  request(change_request("a", protocol::STUDY_CHANGE_RESUME));
+  ASSERT_EQ(outbox_.jobs.size(), 1U) << "cancelled, so there is something to do";
+  write_all();
+  EXPECT_EQ(last_reply().change().study().state(), "running");
+}
+
+TEST_F(ServiceTest, SeveralChangesThatAreNotStoredLeaveTheStudyAsItWas) {
+  request(submit_request("a"));
+  write_all();
+  request(change_request("a", protocol::STUDY_CHANGE_CANCEL));
+  request(change_request("a", protocol::STUDY_CHANGE_RESUME));
+  write_all("disk full");
+  request(change_request("a", protocol::STUDY_CHANGE_CANCEL));
+  EXPECT_EQ(outbox_.jobs.size(), 1U) << "running, so there is something to do";
+}
+
 TEST_F(ServiceTest, APriorityOrWeightOutOfRangeIsRefusedByName) {
   auto heavy = submit_request("a");
   heavy.mutable_submit()->set_weight(-2.0);

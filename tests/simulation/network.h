@@ -13,8 +13,9 @@ namespace oblique::simulation {
 
 /// Connections as sockets with TCP below give them: in order and whole until they break, when
 /// everything on the way is lost, and the peer comes back under another identity. Half-open
-/// connections swallow what is sent before they break. Beyond TCP, results may be doubled or
-/// overtaken on request of the sender.
+/// connections swallow what is sent before they break. A partition separates several peers from the
+/// server: what is sent waits, as TCP sends it again and again, until the partition ends or the
+/// connections break. Beyond TCP, results may be doubled or overtaken on request of the sender.
 class Network {
  public:
   using ToServer = std::function<void(const std::string& identity, const std::string& frame)>;
@@ -23,10 +24,10 @@ class Network {
 
   Network(World& world, ToServer to_server) : world_(world), to_server_(std::move(to_server)) {}
 
-  /// A new socket of a peer; what the server sends goes to `to_peer`.
-  LinkId open(ToPeer to_peer) {
+  /// A new socket of that peer; what the server sends goes to `to_peer`.
+  LinkId open(std::uint64_t peer, ToPeer to_peer) {
     const LinkId id = ++last_link_;
-    links_.emplace(id, Link{new_identity(id), std::move(to_peer), 0, 0, false, false, 0});
+    links_.emplace(id, Link{new_identity(id), peer, std::move(to_peer), 0, 0, false, false, 0});
     if (world_.faults && world_.chance(0.2)) {
       const std::int64_t life_ms = world_.between(500, 20'000);
       world_.after(life_ms, [this, id] { cut(id); });
@@ -49,6 +50,7 @@ class Network {
       return;
     }
     Link& link = found->second;
+    wait_for_partition(link);
     const std::string identity = link.identity;
     const auto deliver = [this, identity, frame, breaks = link.breaks, id] {
       const auto there = links_.find(id);
@@ -78,6 +80,7 @@ class Network {
     if (link.cut_down) {
       return true;  // nobody knows yet
     }
+    wait_for_partition(link);
     link.last_down_ms = std::max(link.last_down_ms, world_.now_ms() + delay_ms());
     world_.after(link.last_down_ms - world_.now_ms(), [this, id, frame, breaks = link.breaks] {
       const auto there = links_.find(id);
@@ -88,6 +91,21 @@ class Network {
     return true;
   }
 
+  /// Nothing passes between these peers and the server for so long. Connections that stand still
+  /// for too long break.
+  void part(std::set<std::uint64_t> peers, std::int64_t duration_ms) {
+    parted_ = std::move(peers);
+    parted_until_ms_ = world_.now_ms() + duration_ms;
+    world_.after(std::min(duration_ms, kPatience_ms), [this, until_ms = parted_until_ms_] {
+      for (auto& [id, link] : links_) {
+        if (until_ms == parted_until_ms_ && world_.now_ms() < until_ms &&
+            parted_.contains(link.peer)) {
+          break_link(id, link);
+        }
+      }
+    });
+  }
+
   /// Every connection breaks, as when the server dies; the sockets connect again.
   void break_all() {
     for (auto& [id, link] : links_) {
@@ -96,8 +114,9 @@ class Network {
   }
 
   void heal() {
+    parted_until_ms_ = 0;
     for (auto& [id, link] : links_) {
-      if (link.cut_up || link.cut_down) {
+      if (link.cut_up || link.cut_down || parted_.contains(link.peer)) {
         break_link(id, link);
       }
     }
@@ -109,8 +128,12 @@ class Network {
   }
 
  private:
+  /// A connection on which nothing arrives for so long is given up.
+  static constexpr std::int64_t kPatience_ms = 10'000;
+
   struct Link {
     std::string identity;
+    std::uint64_t peer;
     ToPeer to_peer;
     std::int64_t last_up_ms;
     std::int64_t last_down_ms;
@@ -127,6 +150,13 @@ class Network {
 
   std::int64_t delay_ms() {
     return world_.faults && world_.chance(0.01) ? world_.between(50, 3000) : world_.between(0, 3);
+  }
+
+  void wait_for_partition(Link& link) {
+    if (parted_until_ms_ > world_.now_ms() && parted_.contains(link.peer)) {
+      link.last_up_ms = std::max(link.last_up_ms, parted_until_ms_);
+      link.last_down_ms = std::max(link.last_down_ms, parted_until_ms_);
+    }
   }
 
   void cut(LinkId id) {
@@ -150,13 +180,17 @@ class Network {
     link.identity = new_identity(id);
     link.cut_up = false;
     link.cut_down = false;
+    link.last_up_ms = 0;
+    link.last_down_ms = 0;
   }
 
   World& world_;
   ToServer to_server_;
   std::map<LinkId, Link> links_;
   std::map<std::string, LinkId> identities_;
-  std::set<LinkId> silenced_;  // closed, and nothing of them arrives
+  std::set<LinkId> silenced_;       // closed, and nothing of them arrives
+  std::set<std::uint64_t> parted_;  // peers, until that time
+  std::int64_t parted_until_ms_ = 0;
   LinkId last_link_ = 0;
   std::uint64_t last_identity_ = 0;
 };

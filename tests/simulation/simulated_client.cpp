@@ -7,9 +7,11 @@
 
 namespace oblique::simulation {
 
-SimulatedClient::SimulatedClient(World& world, Network& network, std::string name,
-                                 std::uint64_t points)
-    : world_(world), network_(network), name_(std::move(name)), points_(points) {}
+using server::StudyState;
+
+SimulatedClient::SimulatedClient(World& world, Network& network, std::uint64_t peer,
+                                 std::string name, std::uint64_t points)
+    : world_(world), network_(network), peer_(peer), name_(std::move(name)), points_(points) {}
 
 void SimulatedClient::start() {
   connect();
@@ -23,7 +25,7 @@ void SimulatedClient::start() {
 void SimulatedClient::connect() {
   // A late request of a closed socket would undo what was asked since.
   network_.close(link_, false);
-  link_ = network_.open([this](const std::string& frame) { answered(frame); });
+  link_ = network_.open(peer_, [this](const std::string& frame) { answered(frame); });
 }
 
 void SimulatedClient::ask() {
@@ -36,8 +38,11 @@ void SimulatedClient::ask() {
   if (cancelling_) {
     request.mutable_change()->set_study(name_);
     // Any of cancel, pause, resume and retry.
-    request.mutable_change()->set_change(static_cast<protocol::StudyChange>(world_.between(1, 4)));
+    const auto asked = static_cast<protocol::StudyChange>(world_.between(1, 4));
+    request.mutable_change()->set_change(asked);
+    expect(asked);
   } else {
+    expect(protocol::STUDY_CHANGE_RESUME);
     request.mutable_submit()->set_name(name_);
     *request.mutable_submit()->mutable_recipe() = protocol::recipe_of(
         {{protocol::listed("H", {1.0}), protocol::range("mu", 0.0, 1.0, points_),
@@ -69,6 +74,34 @@ void SimulatedClient::answered(const std::string& frame) {
       throw Violation("an acknowledged study was forgotten");
     }
     acknowledged_ = true;
+    possible_ = {StudyState::kRunning};
+    return;
+  }
+  const std::string& told = reply.change().study().state();
+  for (const StudyState state :
+       {StudyState::kRunning, StudyState::kPaused, StudyState::kCancelled}) {
+    if (told == server::state_name(state)) {
+      // It may be that of another one of these changes, still on its way.
+      possible_ = asked_.size() > 1 ? std::nullopt : std::optional(std::set{state});
+      return;
+    }
+  }
+  possible_.reset();
+}
+
+void SimulatedClient::expect(protocol::StudyChange asked) {
+  asked_.insert(asked);
+  if (possible_) {
+    possible_->insert(asked == protocol::STUDY_CHANGE_CANCEL  ? StudyState::kCancelled
+                      : asked == protocol::STUDY_CHANGE_PAUSE ? StudyState::kPaused
+                                                              : StudyState::kRunning);
+  }
+}
+
+void SimulatedClient::check_found(StudyState state) const {
+  if (possible_ && state != StudyState::kDone && !possible_->contains(state)) {
+    throw Violation("an acknowledged change of " + name_ + " was forgotten: it is " +
+                    server::state_name(state));
   }
 }
 
@@ -78,6 +111,7 @@ void SimulatedClient::change_mind() {
   if (settled_request_ && (!last || cancelling_)) {
     cancelling_ = !last && !cancelling_ && world_.chance(0.3);
     settled_request_ = false;
+    asked_.clear();
     ++request_;
     ask();
   }

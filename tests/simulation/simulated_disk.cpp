@@ -1,109 +1,142 @@
 #include "tests/simulation/simulated_disk.h"
 
-#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <filesystem>
+#include <stdexcept>
+#include <utility>
 
 #include "tests/simulation/world.h"
 
 namespace oblique::simulation {
+namespace {
 
-using server::AddResults;
-using server::AddStudy;
-using server::AddWorker;
-using server::Change;
-using server::SetStudyState;
-
-void SimulatedDisk::commit(std::span<const Change> changes) {
-  if (full) {
-    throw server::StorageError("the disk is full");
-  }
-  const bool synced = std::any_of(changes.begin(), changes.end(), [](const Change& change) {
-    return !std::holds_alternative<AddWorker>(change) &&
-           !std::holds_alternative<AddResults>(change);
-  });
-  unsynced_.emplace_back();
-  for (const Change& change : changes) {
-    apply(change);
-  }
-  if (synced) {
-    unsynced_.clear();
-  }
-}
-
-void SimulatedDisk::apply(const Change& change) {
-  if (const auto* study = std::get_if<AddStudy>(&change)) {
-    contents_.studies[study->study_id] = {study->study_id,
-                                          study->name,
-                                          study->table,
-                                          server::StudyState::kRunning,
-                                          study->created_at,
-                                          study->share,
-                                          {},
-                                          {},
-                                          {}};
-  } else if (const auto* state = std::get_if<SetStudyState>(&change)) {
-    contents_.studies.at(state->study_id).state = state->state;
-  } else if (const auto* share = std::get_if<server::SetStudyShare>(&change)) {
-    contents_.studies.at(share->study_id).share = share->share;
-  } else if (const auto* forget = std::get_if<server::ForgetFailures>(&change)) {
-    std::erase_if(contents_.results[forget->study_id], [&](const auto& entry) {
-      return forget->points.contains(entry.first) && !entry.second.error().empty();
-    });
-    auto& state_now = contents_.studies.at(forget->study_id).state;
-    state_now = state_now == server::StudyState::kDone ? server::StudyState::kRunning : state_now;
-  } else if (const auto* worker = std::get_if<AddWorker>(&change)) {
-    contents_.last_worker_id = std::max(contents_.last_worker_id, worker->worker_id);
-  } else if (const auto* results = std::get_if<AddResults>(&change)) {
-    for (const auto& result : results->results) {
-      if (!contents_.results[results->study_id].emplace(result.point(), result).second) {
-        throw Violation("point " + std::to_string(result.point()) + " was stored twice");
-      }
-      unsynced_.back().emplace_back(results->study_id, result.point());
+/// A folder of this process, removed with it. The store locks its database there; the contents are
+/// elsewhere.
+class Folder {
+ public:
+  Folder()
+      : path_((std::filesystem::temp_directory_path() / "oblique-simulation-XXXXXX").string()) {
+    if (::mkdtemp(path_.data()) == nullptr) {
+      throw std::runtime_error("cannot make a folder " + path_);
     }
   }
+  ~Folder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+
+  std::string database() const { return path_ + "/database"; }
+
+ private:
+  std::string path_;
+};
+
+const std::string& database_path() {
+  static const Folder kFolder;
+  static const std::string kPath = kFolder.database();
+  return kPath;
 }
 
-Found SimulatedDisk::load() const {
-  Found found{{}, 0, contents_.last_worker_id};
-  for (const auto& [id, study] : contents_.studies) {
-    found.studies.push_back(study);
-    for (const auto& [point, result] : results(id)) {
-      found.studies.back().settled.insert(point);
-      if (!result.error().empty()) {
-        found.studies.back().failures.insert(point);
-      }
-    }
-    found.last_study_id = std::max(found.last_study_id, id);
+/// A database without studies, made once.
+const std::string& empty_database() {
+  static const std::string kImage = [] {
+    World world(0);
+    SimulatedFiles files(world, database_path(), {});
+    files.start();
+    { const server::Store store(files.path()); }
+    return files.contents();
+  }();
+  return kImage;
+}
+
+}  // namespace
+
+SimulatedDisk::SimulatedDisk(World& world, DiskAtFirst at_first)
+    : world_(world),
+      files_(world, database_path(),
+             at_first == DiskAtFirst::kEmptyFile ? std::string() : empty_database()),
+      checkpoint_pages_(static_cast<int>(
+          std::array{4, 16, 64, 1000}.at(static_cast<std::size_t>(world.between(0, 3))))) {}
+
+Found SimulatedDisk::open() {
+  files_.start();
+  store_ = std::make_unique<server::Store>(files_.path());
+  // Checkpoints come more often than in a server, for these databases are small.
+  store_->checkpoint_at(checkpoint_pages_);
+  Found found{store_->studies(), store_->last_study_id(), store_->last_worker_id()};
+  model_.restarted(found, power_was_lost_);
+  power_was_lost_ = false;
+  found.starts = store_->count_start();
+  if (found.starts <= std::exchange(starts_, found.starts)) {
+    throw Violation("two servers began with one number: leases of both have the same numbers");
   }
+  model_.synced();
   return found;
 }
 
-void SimulatedDisk::lose_power(std::uint64_t at_most) {
-  for (; at_most > 0 && !unsynced_.empty(); --at_most) {
-    for (const auto& [study_id, point] : unsynced_.back()) {
-      contents_.results.at(study_id).erase(point);
-    }
-    unsynced_.pop_back();
+void SimulatedDisk::crash(bool power_is_lost) {
+  if (power_is_lost) {
+    files_.lose_power();
+    power_was_lost_ = true;
+  } else {
+    files_.kill();
   }
+  store_.reset();
 }
 
-bool SimulatedDisk::has_result(std::uint64_t study_id, std::uint64_t point) const {
-  return results(study_id).contains(point);
+void SimulatedDisk::commit(std::span<const server::Change> changes) {
+  try {
+    store_->commit(changes);
+  } catch (const server::StorageError&) {
+    model_.refused(changes);
+    throw;
+  }
+  model_.stored(changes);
 }
 
-const server::StoredStudy* SimulatedDisk::study(const std::string& name) const {
-  for (const auto& [id, study] : contents_.studies) {
-    if (study.name == name) {
-      return &study;
+void SimulatedDisk::check_rows() {
+  using server::Statement;
+  const auto database = server::open_database(files_.path(), SQLITE_OPEN_READONLY);
+  Statement integrity(database.get(), "PRAGMA integrity_check");
+  if (!integrity.step() || integrity.text(0) != "ok") {
+    throw Violation("the database is damaged: " + integrity.text(0));
+  }
+  Statement references(database.get(), "PRAGMA foreign_key_check");
+  if (references.step()) {
+    throw Violation("a row of " + references.text(0) + " names one of " + references.text(2) +
+                    " that is not there");
+  }
+  Statement rows(database.get(),
+                 "SELECT study_id, point, mu, coalesce(error, ''), duration_s, fn_peak_N"
+                 " FROM results ORDER BY study_id, point");
+  std::map<std::uint64_t, std::size_t> counts;
+  while (rows.step()) {
+    const auto study_id = static_cast<std::uint64_t>(rows.integer(0));
+    const auto point = static_cast<std::uint64_t>(rows.integer(1));
+    const auto& expected = model_.rows(study_id);
+    const auto row = expected.find(point);
+    if (row == expected.end() || row->second->error() != rows.text(3) ||
+        row->second->duration_s() != rows.real(4) || row->second->fn_peak_n() != rows.real(5) ||
+        model_.study(study_id)->table->point(point).mu != rows.real(2)) {
+      throw Violation("the row of point " + std::to_string(point) + " of study " +
+                      std::to_string(study_id) + " is not what was stored");
+    }
+    ++counts[study_id];
+  }
+  Statement versions(database.get(),
+                     "SELECT study_id FROM results WHERE worker IS NOT NULL"
+                     " GROUP BY study_id HAVING count(DISTINCT solver_version) > 1");
+  if (versions.step()) {
+    throw Violation("study " + versions.text(0) + " has results of two solver versions");
+  }
+  for (const auto& study : store_->studies()) {
+    if (counts[study.study_id] != model_.rows(study.study_id).size()) {
+      throw Violation("rows of study " + study.name + " are missing");
     }
   }
-  return nullptr;
-}
-
-const std::map<std::uint64_t, protocol::PointResult>& SimulatedDisk::results(
-    std::uint64_t study_id) const {
-  static const std::map<std::uint64_t, protocol::PointResult> kNone;
-  const auto found = contents_.results.find(study_id);
-  return found == contents_.results.end() ? kNone : found->second;
 }
 
 }  // namespace oblique::simulation

@@ -1,52 +1,54 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <memory>
+#include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "server/store.h"
+#include "tests/simulation/simulated_files.h"
+#include "tests/simulation/store_model.h"
 
 namespace oblique::simulation {
 
-/// What is found on a disk when the server starts.
-struct Found {
-  std::vector<server::StoredStudy> studies;
-  std::uint64_t last_study_id;
-  std::uint64_t last_worker_id;
-};
+/// What the first server finds at the path of its database.
+enum class DiskAtFirst { kEmptyDatabase, kEmptyFile };
 
-/// A disk that keeps what was committed, in memory. It can be full, and losing power makes it
-/// forget commits that were not synced.
+/// The real store on simulated files, held against a model after each restart. Whoever commits
+/// must look whether the process died on the way.
 class SimulatedDisk final : public server::Storage {
  public:
-  /// Throws Violation when a result is written for a point that has one.
+  explicit SimulatedDisk(World& world, DiskAtFirst at_first = DiskAtFirst::kEmptyDatabase);
+
+  /// A server starts. Throws StorageError when the disk is at fault, Violation when what the store
+  /// has is not what it must have.
+  Found open();
+  /// The server ends in an orderly way.
+  void close() { store_.reset(); }
+  /// The server is killed, or the machine loses power; also while no server runs.
+  void crash(bool power_is_lost);
+  /// The process died while it wrote.
+  bool died() const { return !files_.is_used(); }
+  /// A store may fail.
+  bool is_at_fault() const { return died() || files_.full || files_.failing; }
+
   void commit(std::span<const server::Change> changes) override;
 
-  Found load() const;
-  /// Forgets the last commits, as many as `at_most` and none that was synced.
-  void lose_power(std::uint64_t at_most);
+  /// Compares every row with the model's, and lets SQLite look for damage. Throws Violation.
+  void check_rows();
 
-  bool has_result(std::uint64_t study_id, std::uint64_t point) const;
-  /// The study called `name`, or nullptr.
-  const server::StoredStudy* study(const std::string& name) const;
-  const std::map<std::uint64_t, protocol::PointResult>& results(std::uint64_t study_id) const;
-
-  bool full = false;
+  const StoreModel& model() const { return model_; }
+  SimulatedFiles& files() { return files_; }
 
  private:
-  struct Contents {
-    std::map<std::uint64_t, server::StoredStudy> studies;
-    std::map<std::uint64_t, std::map<std::uint64_t, protocol::PointResult>> results;
-    std::uint64_t last_worker_id = 0;
-  };
-  void apply(const server::Change& change);
-
-  Contents contents_;
-  /// What each commit since the last synced one added, newest last.
-  std::vector<std::vector<std::pair<std::uint64_t, std::uint64_t>>> unsynced_;
+  World& world_;
+  SimulatedFiles files_;
+  StoreModel model_;
+  bool power_was_lost_ = false;  // since the store was last open
+  int checkpoint_pages_;
+  std::uint64_t starts_ = 0;
+  std::unique_ptr<server::Store> store_;
 };
 
 }  // namespace oblique::simulation

@@ -10,52 +10,110 @@ SimulatedServer::SimulatedServer(World& world, SimulatedDisk& disk, std::uint32_
     : world_(world), disk_(disk), max_losses_(max_losses) {}
 
 void SimulatedServer::start() {
-  Found found = disk_.load();
+  ++life_;
+  Found found;
+  try {
+    found = disk_.open();
+  } catch (const server::StorageError& error) {
+    if (!disk_.is_at_fault()) {
+      throw Violation("a server cannot start: " + std::string(error.what()));
+    }
+    disk_.crash(false);
+    after(500, [this] { start(); });
+    return;
+  }
+  on_started(found);
   server::ServiceSettings settings;
   settings.scheduler.max_losses = max_losses_;
-  settings.scheduler.first_lease_id = static_cast<std::uint64_t>(world_.now_ms()) << 12U;
+  // As server/loop.cpp does.
+  settings.scheduler.first_lease_id = found.starts << 40U;
   settings.solver_version = "1";
   settings.database_id = "disk";
   settings.last_study_id = found.last_study_id;
   settings.last_worker_id = found.last_worker_id;
-  ++life_;
   commits_.emplace(disk_);
   service_.emplace(settings, *this, std::move(found.studies), now());
   tick();
 }
 
-void SimulatedServer::crash(bool power_is_lost) {
-  ++crashes;
+void SimulatedServer::end() {
   ++life_;
   service_.reset();
   jobs_.clear();
+  held_.clear();
   writing_ = false;
+  frozen_until_ms_ = 0;
   workers->break_all();
   clients->break_all();
-  if (power_is_lost) {
-    disk_.lose_power(static_cast<std::uint64_t>(world_.between(1, 5)));
+  after(world_.faults ? world_.between(1, 5000) : 10, [this] { start(); });
+}
+
+void SimulatedServer::crash(bool power_is_lost) {
+  ++crashes;
+  power_losses += power_is_lost ? 1U : 0U;
+  deaths_in_writes += disk_.died() ? 1U : 0U;
+  disk_.crash(power_is_lost);
+  end();
+}
+
+void SimulatedServer::stop() {
+  service_->stop(now());
+  while (!jobs_.empty() && !disk_.died()) {
+    for (const auto& report : commits_->write(jobs_)) {
+      service_->written(report, now());
+    }
+    if (commits_->is_faulty()) {
+      break;
+    }
   }
-  world_.after(world_.faults ? world_.between(1, 5000) : 10, [this] { start(); });
+  disk_.close();
+  if (disk_.died()) {
+    disk_.crash(false);
+  }
+  end();
+}
+
+void SimulatedServer::after(std::int64_t delay_ms, std::function<void()> what) {
+  world_.after(delay_ms, [this, life = life_, what = std::move(what)] {
+    if (life != life_) {
+      return;
+    }
+    if (world_.now_ms() < frozen_until_ms_) {
+      after(frozen_until_ms_ - world_.now_ms(), what);
+      return;
+    }
+    what();
+  });
 }
 
 void SimulatedServer::tick() {
   service_->tick(now());
-  world_.after(250, [this, life = life_] {
-    if (life == life_) {
-      tick();
-    }
-  });
+  after(250, [this] { tick(); });
 }
 
 void SimulatedServer::worker_frame(const std::string& identity, const std::string& frame) {
-  if (service_) {
-    service_->worker_frame(identity, frame, now());
-  }
+  take([this, identity, frame] { service_->worker_frame(identity, frame, now()); });
 }
 
 void SimulatedServer::client_frame(const std::string& identity, const std::string& frame) {
-  if (service_) {
-    service_->client_frame(identity, frame, now());
+  take([this, identity, frame] { service_->client_frame(identity, frame, now()); });
+}
+
+void SimulatedServer::take(std::function<void()> frame) {
+  if (!service_) {
+    return;
+  }
+  if (held_.empty() && world_.now_ms() >= frozen_until_ms_) {
+    frame();
+    return;
+  }
+  held_.push_back(std::move(frame));
+  if (held_.size() == 1) {
+    after(0, [this] {
+      for (const auto& held : std::exchange(held_, {})) {
+        held();
+      }
+    });
   }
 }
 
@@ -75,18 +133,15 @@ void SimulatedServer::write(server::WriteJob job) {
   jobs_.push_back(std::move(job));
   if (!writing_) {
     writing_ = true;
-    world_.after(world_.between(1, 20), [this, life = life_] {
-      if (life == life_) {
-        write_group();
-      }
-    });
+    after(world_.between(1, 20), [this] { write_group(); });
   }
 }
 
 void SimulatedServer::write_group() {
   const auto reports = commits_->write(jobs_);
-  if (world_.faults && world_.chance(0.003)) {
-    crash(false);  // after the commit and before anybody knows of it
+  // In the middle of a write, or after the commit and before anybody knows of it.
+  if (disk_.died() || (world_.faults && world_.chance(0.003))) {
+    crash(world_.chance(0.4));
     return;
   }
   writing_ = false;
@@ -95,11 +150,7 @@ void SimulatedServer::write_group() {
   }
   if (!jobs_.empty() && !writing_) {
     writing_ = true;
-    world_.after(commits_->is_faulty() ? 500 : 1, [this, life = life_] {
-      if (life == life_) {
-        write_group();
-      }
-    });
+    after(commits_->is_faulty() ? 500 : 1, [this] { write_group(); });
   }
 }
 

@@ -13,17 +13,25 @@
 
 namespace oblique::simulation {
 
-/// The real service and scheduler on a simulated disk and network. It can be killed at any moment
-/// and starts again from what the disk has.
+/// The real service, scheduler and store on a simulated disk and network. It can be killed at any
+/// moment, stopped in an orderly way or for a while, and starts again from what the disk has.
 class SimulatedServer final : public server::Outbox {
  public:
   /// Called with each acknowledgement before it is sent: its results must be durable.
   using OnAcknowledged = std::function<void(const std::string& identity, std::uint64_t sequence)>;
 
+  /// Called with what a server that starts found.
+  using OnStarted = std::function<void(const Found& found)>;
+
   SimulatedServer(World& world, SimulatedDisk& disk, std::uint32_t max_losses);
 
+  /// Tries until the disk lets it.
   void start();
   void crash(bool power_is_lost);
+  /// An orderly end, as after SIGTERM; another one starts after a while.
+  void stop();
+  /// The process stands still for a while, as after SIGSTOP.
+  void freeze(std::int64_t duration_ms) { frozen_until_ms_ = world_.now_ms() + duration_ms; }
   bool runs() const { return service_.has_value(); }
   const server::Service& service() const { return *service_; }
 
@@ -39,10 +47,17 @@ class SimulatedServer final : public server::Outbox {
   Network* workers = nullptr;
   Network* clients = nullptr;
   OnAcknowledged on_acknowledged;
+  OnStarted on_started;
   std::uint64_t crashes = 0;
+  std::uint64_t power_losses = 0;      // of these
+  std::uint64_t deaths_in_writes = 0;  // of the crashes
 
  private:
-  server::Instant now() const { return {world_.now_ms(), 1'700'000'000'000 + world_.now_ms()}; }
+  server::Instant now() const { return {world_.now_ms(), world_.utc_ms()}; }
+  /// Runs `what` of this process life after so long, or when it is no longer frozen.
+  void after(std::int64_t delay_ms, std::function<void()> what);
+  void take(std::function<void()> frame);
+  void end();
   void tick();
   void write_group();
 
@@ -53,6 +68,8 @@ class SimulatedServer final : public server::Outbox {
   std::optional<server::GroupCommit> commits_;
   std::deque<server::WriteJob> jobs_;
   bool writing_ = false;
+  std::int64_t frozen_until_ms_ = 0;
+  std::deque<std::function<void()>> held_;  // frames that came meanwhile, in order
   std::uint64_t life_ = 0;  // counts starts: what an earlier life planned does not happen
 };
 

@@ -15,16 +15,19 @@ protocol::PointResult answer_to(std::uint64_t study_size, std::uint64_t point) {
   return result;
 }
 
-SimulatedWorker::SimulatedWorker(World& world, Network& network, Killers killers)
+SimulatedWorker::SimulatedWorker(World& world, Network& network, std::uint64_t peer,
+                                 Killers killers)
     : world_(world),
       network_(network),
+      peer_(peer),
       killers_(std::move(killers)),
+      solver_version_(world.chance(0.2) ? "2" : "1"),
       ms_per_point_(world.chance(0.2) ? world.between(50, 400) : world.between(1, 20)) {}
 
 void SimulatedWorker::start() {
   protocol::WorkerHello hello;
   hello.set_protocol_version(protocol::kProtocolVersion);
-  hello.set_solver_version("1");
+  hello.set_solver_version(solver_version_);
   hello.set_threads(1);
   ++life_;
   planned_time_ms_ = -1;
@@ -77,7 +80,7 @@ void SimulatedWorker::apply(worker::Effects effects) {
     if (std::holds_alternative<worker::Connect>(effect)) {
       network_.close(link_, true);
       const std::uint64_t socket = ++sockets_;
-      link_ = network_.open([this, socket](const std::string& frame) {
+      link_ = network_.open(peer_, [this, socket](const std::string& frame) {
         when_awake([this, socket, frame] {
           protocol::ServerToWorker message;
           if (socket == sockets_ && protocol::decode(frame, message)) {

@@ -24,7 +24,8 @@ class SimulatedWorker {
   /// Points of studies of that size whose solving kills the process.
   using Killers = std::map<std::uint64_t, std::set<std::uint64_t>>;
 
-  SimulatedWorker(World& world, Network& network, Killers killers);
+  /// `peer` is its number in the network.
+  SimulatedWorker(World& world, Network& network, std::uint64_t peer, Killers killers);
 
   /// The process, if there is one, dies; another one starts after a while. The first one starts so
   /// too.
@@ -33,6 +34,7 @@ class SimulatedWorker {
   void freeze(std::int64_t duration_ms) { frozen_until_ms_ = world_.now_ms() + duration_ms; }
   void stop();
 
+  const std::string& solver_version() const { return solver_version_; }
   /// The results of that message of the socket, or nullptr.
   const protocol::Results* sent(Network::LinkId link, std::uint64_t sequence) const;
   bool holds_nothing() const { return tasks_.empty(); }
@@ -52,7 +54,9 @@ class SimulatedWorker {
 
   World& world_;
   Network& network_;
+  std::uint64_t peer_;
   Killers killers_;
+  std::string solver_version_;
   std::int64_t ms_per_point_;
   std::optional<worker::Conversation> conversation_;
   Network::LinkId link_ = 0;

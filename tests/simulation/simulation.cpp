@@ -1,5 +1,6 @@
 #include "tests/simulation/simulation.h"
 
+#include <algorithm>
 #include <memory>
 #include <set>
 #include <string>
@@ -19,6 +20,7 @@ class Simulation {
   Simulation(std::uint64_t seed, const SimulationSettings& settings)
       : settings_(settings),
         world_(seed),
+        disk_(world_),
         // Random crashes hit innocent points too, so that blame is tried in runs of its own.
         server_(world_, disk_, settings.killers ? 3 : 1000),
         workers_network_(world_, [this](const std::string& i,
@@ -27,11 +29,13 @@ class Simulation {
           server_.client_frame(i, f);
         }) {
     world_.faults = !settings.killers;
+    disk_.files().forgets = settings.forgetful_syncs;
     server_.workers = &workers_network_;
     server_.clients = &clients_network_;
     server_.on_acknowledged = [this](const std::string& identity, std::uint64_t sequence) {
       check_acknowledged(identity, sequence);
     };
+    server_.on_started = [this](const Found& found) { check_found(found); };
   }
 
   SimulationOutcome run() {
@@ -50,7 +54,12 @@ class Simulation {
         healed_ms + settings_.healing_ms, [this] { return is_over(); }, [this] { check(); });
     outcome_.healed_after_ms = world_.now_ms() - healed_ms;
     check_end();
-    outcome_.server_crashes = server_.crashes;
+    outcome_.server_kills = server_.crashes - server_.power_losses;
+    outcome_.power_losses = server_.power_losses;
+    outcome_.deaths_in_writes = server_.deaths_in_writes;
+    outcome_.undone_commits = disk_.model().undone_commits;
+    outcome_.refused_kept = disk_.model().refused_kept;
+    outcome_.failed_commits = disk_.model().failed_commits;
     return outcome_;
   }
 
@@ -60,8 +69,9 @@ class Simulation {
     for (std::int64_t i = 0; i < count; ++i) {
       // Sizes differ, for answers name their study by its size.
       const auto points = static_cast<std::uint64_t>(world_.between(1, 60) * 7 + i);
-      clients_.push_back(std::make_unique<SimulatedClient>(
-          world_, clients_network_, "study " + std::to_string(i), points + 2));
+      clients_.push_back(
+          std::make_unique<SimulatedClient>(world_, clients_network_, static_cast<std::uint64_t>(i),
+                                            "study " + std::to_string(i), points + 2));
       outcome_.points += clients_.back()->points();
       clients_.back()->start();
       if (settings_.killers) {
@@ -78,7 +88,8 @@ class Simulation {
   void add_workers() {
     const std::int64_t count = world_.between(1, 5);
     for (std::int64_t i = 0; i < count; ++i) {
-      workers_.push_back(std::make_unique<SimulatedWorker>(world_, workers_network_, killers_));
+      workers_.push_back(std::make_unique<SimulatedWorker>(
+          world_, workers_network_, static_cast<std::uint64_t>(i), killers_));
       workers_.back()->restart(world_.between(0, 3000));
     }
   }
@@ -93,38 +104,99 @@ class Simulation {
   }
 
   void fault() {
-    SimulatedWorker& worker = *workers_[static_cast<std::size_t>(
-        world_.between(0, static_cast<std::int64_t>(workers_.size()) - 1))];
-    switch (world_.between(0, 9)) {
+    switch (world_.between(0, 17)) {
+      case 0:
+      case 1:
+      case 2:
+      case 3:
+      case 4:
+      case 5:
+        fault_of_disk_or_server();
+        break;
+      case 6: {
+        std::set<std::uint64_t> parted;
+        for (std::uint64_t peer = 0; peer < workers_.size(); ++peer) {
+          if (world_.chance(0.6)) {
+            parted.insert(peer);
+          }
+        }
+        (world_.chance(0.8) ? workers_network_ : clients_network_)
+            .part(std::move(parted), world_.between(500, 15'000));
+        ++outcome_.partitions;
+        break;
+      }
+      case 7:
+        // By hours, either way, and sometimes by the moment that a server was away.
+        world_.set_clock(world_.chance(0.5) ? world_.between(-6000, 6000)
+                                            : world_.between(-20'000'000, 20'000'000));
+        ++outcome_.clock_jumps;
+        break;
+      default:
+        fault_of_worker();
+        break;
+    }
+  }
+
+  void fault_of_disk_or_server() {
+    SimulatedFiles& files = disk_.files();
+    switch (world_.between(0, 7)) {
       case 0:
       case 1:
         if (server_.runs()) {
-          server_.crash(world_.chance(0.3));
+          server_.crash(world_.chance(0.4));
+        } else if (world_.chance(0.3)) {
+          disk_.crash(true);  // the machine, after the server
         }
         break;
       case 2:
-        disk_.full = true;
-        world_.after(world_.between(100, 6000), [this] { disk_.full = false; });
-        break;
       case 3:
+        files.plan_death(world_.between(1, 80));
+        break;
       case 4:
-        worker.freeze(world_.between(100, 8000));
-        ++outcome_.worker_faults;
+        files.full = true;
+        world_.after(world_.between(100, 6000), [this] { disk_.files().full = false; });
+        ++outcome_.disk_faults;
         break;
       case 5:
+        files.failing = true;
+        world_.after(world_.between(100, 6000), [this] { disk_.files().failing = false; });
+        ++outcome_.disk_faults;
+        break;
+      case 6:
+        if (server_.runs()) {
+          server_.stop();
+          ++outcome_.server_stops;
+        }
+        break;
+      default:
+        server_.freeze(world_.between(100, 8000));
+        break;
+    }
+  }
+
+  void fault_of_worker() {
+    SimulatedWorker& worker = *workers_[static_cast<std::size_t>(
+        world_.between(0, static_cast<std::int64_t>(workers_.size()) - 1))];
+    ++outcome_.worker_faults;
+    switch (world_.between(0, 6)) {
+      case 0:
+      case 1:
+        worker.freeze(world_.between(100, 8000));
+        break;
+      case 2:
         worker.stop();
-        ++outcome_.worker_faults;
         break;
       default:
         worker.restart(world_.between(0, 3000));
-        ++outcome_.worker_faults;
         break;
     }
   }
 
   void heal() {
     world_.faults = false;
-    disk_.full = false;
+    disk_.files().full = false;
+    disk_.files().failing = false;
+    disk_.files().plan_death(0);
     workers_network_.heal();
     clients_network_.heal();
   }
@@ -140,11 +212,14 @@ class Simulation {
     const auto link = workers_network_.link_of(identity);
     for (const auto& worker : workers_) {
       const auto* results = worker->sent(link, sequence);
-      if (results == nullptr) {
+      // What a worker of another solver version solved is acknowledged, for it is not wanted.
+      if (results == nullptr ||
+          server_.service().scheduler().study(results->study_id()).solver_version !=
+              worker->solver_version()) {
         continue;
       }
       for (const auto& result : results->results()) {
-        if (!disk_.has_result(results->study_id(), result.point())) {
+        if (!disk_.model().rows(results->study_id()).contains(result.point())) {
           throw Violation("point " + std::to_string(result.point()) +
                           " was acknowledged and is not on the disk");
         }
@@ -152,31 +227,44 @@ class Simulation {
     }
   }
 
+  void check_found(const Found& found) {
+    for (const auto& client : clients_) {
+      for (const auto& study : found.studies) {
+        if (study.name == client->name()) {
+          client->check_found(study.state);
+        }
+      }
+    }
+  }
+
   bool is_over() const {
     for (const auto& client : clients_) {
-      const auto* study = disk_.study(client->name());
+      const auto* study = disk_.model().study(client->name());
       if (!client->wants_results() || study == nullptr ||
           study->state != server::StudyState::kDone ||
-          disk_.results(study->study_id).size() < client->points()) {
+          disk_.model().rows(study->study_id).size() < client->points()) {
         return false;
       }
     }
-    return true;
+    return server_.runs();
   }
 
   void check_end() {
+    if (!server_.runs()) {
+      throw Violation("no server runs at the end");  // one is started soon after each end
+    }
     for (const auto& client : clients_) {
-      const auto* study = disk_.study(client->name());
+      const auto* study = disk_.model().study(client->name());
       if (study == nullptr || !client->was_acknowledged()) {
         throw Violation(client->name() + " was never accepted");
       }
-      const auto& results = disk_.results(study->study_id);
+      const auto& results = disk_.model().rows(study->study_id);
       const auto counts = server_.service().scheduler().study(study->study_id);
       if (results.size() != client->points()) {
         throw Violation(client->name() + " has " + std::to_string(results.size()) + " of " +
                         std::to_string(client->points()) + " points at the end, " +
-                        std::to_string(counts.leased) + " leased" +
-                        (counts.cancelled ? ", cancelled" : "") + ", with " +
+                        std::to_string(counts.leased) + " leased" + ", " +
+                        server::state_name(study->state) + ", with " +
                         std::to_string(server_.service().scheduler().workers()) + " workers");
       }
       check_rows(client->points(), results);
@@ -187,16 +275,16 @@ class Simulation {
         throw Violation("a lease of " + client->name() + " leaked");
       }
     }
+    disk_.check_rows();
   }
 
-  void check_rows(std::uint64_t size,
-                  const std::map<std::uint64_t, protocol::PointResult>& results) {
+  void check_rows(std::uint64_t size, const StoreModel::Rows& results) {
     const auto killers = killers_.find(size);
     for (const auto& [point, result] : results) {
       const bool kills = killers != killers_.end() && killers->second.contains(point);
       outcome_.failed_points += kills ? 1U : 0U;
-      if (kills ? result.error().empty()
-                : result.SerializeAsString() != answer_to(size, point).SerializeAsString()) {
+      if (kills ? result->error().empty()
+                : result->SerializeAsString() != answer_to(size, point).SerializeAsString()) {
         throw Violation("the row of point " + std::to_string(point) + " is wrong");
       }
     }
@@ -215,6 +303,39 @@ class Simulation {
 };
 
 }  // namespace
+
+SimulationOutcome& SimulationOutcome::operator+=(const SimulationOutcome& other) {
+  points += other.points;
+  failed_points += other.failed_points;
+  server_kills += other.server_kills;
+  power_losses += other.power_losses;
+  deaths_in_writes += other.deaths_in_writes;
+  server_stops += other.server_stops;
+  undone_commits += other.undone_commits;
+  refused_kept += other.refused_kept;
+  worker_faults += other.worker_faults;
+  disk_faults += other.disk_faults;
+  failed_commits += other.failed_commits;
+  partitions += other.partitions;
+  clock_jumps += other.clock_jumps;
+  events += other.events;
+  healed_after_ms = std::max(healed_after_ms, other.healed_after_ms);
+  return *this;
+}
+
+std::string SimulationOutcome::text() const {
+  using std::to_string;
+  return to_string(points) + " points, " + to_string(failed_points) + " of them killers; " +
+         to_string(server_kills) + " servers killed, " + to_string(power_losses) +
+         " losses of power, " + to_string(deaths_in_writes) +
+         " of these in the middle of a write, " + to_string(server_stops) + " servers stopped; " +
+         to_string(undone_commits) + " commits undone by losing power, " + to_string(refused_kept) +
+         " refused ones found after a crash; " + to_string(disk_faults) + " faults of disks, " +
+         to_string(failed_commits) + " commits failed; " + to_string(worker_faults) +
+         " faults of workers, " + to_string(partitions) + " partitions, " + to_string(clock_jumps) +
+         " jumps of the clock; " + to_string(events) + " events; healed after at most " +
+         to_string(healed_after_ms) + " ms";
+}
 
 SimulationOutcome simulate(std::uint64_t seed, const SimulationSettings& settings) {
   return Simulation(seed, settings).run();

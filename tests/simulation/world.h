@@ -21,7 +21,11 @@ class World {
  public:
   explicit World(std::uint64_t seed) : random_(seed) {}
 
+  /// The clock that never runs backwards.
   std::int64_t now_ms() const { return now_ms_; }
+  /// The clock that people set.
+  std::int64_t utc_ms() const { return utc_at_zero_ms_ + now_ms_; }
+  void set_clock(std::int64_t forward_ms) { utc_at_zero_ms_ += forward_ms; }
 
   void after(std::int64_t delay_ms, std::function<void()> what) {
     to_come_.emplace(std::pair{now_ms_ + delay_ms, next_++}, std::move(what));
@@ -52,6 +56,7 @@ class World {
  private:
   std::mt19937_64 random_;
   std::int64_t now_ms_ = 1'000'000;
+  std::int64_t utc_at_zero_ms_ = 1'700'000'000'000;
   std::uint64_t next_ = 0;
   std::map<std::pair<std::int64_t, std::uint64_t>, std::function<void()>> to_come_;
 };

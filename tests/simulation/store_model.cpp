@@ -1,0 +1,213 @@
+#include "tests/simulation/store_model.h"
+
+#include <algorithm>
+#include <optional>
+
+#include "tests/simulation/world.h"
+
+namespace oblique::simulation {
+
+using server::AddResults;
+using server::AddStudy;
+using server::AddWorker;
+using server::Change;
+using server::ForgetFailures;
+using server::SetStudyShare;
+using server::SetStudyState;
+using server::StudyState;
+
+bool StoreModel::apply(const Change& change, Contents& contents) {
+  if (const auto* study = std::get_if<AddStudy>(&change)) {
+    contents.studies[study->study_id] = {study->study_id,
+                                         study->name,
+                                         study->table,
+                                         StudyState::kRunning,
+                                         study->created_at,
+                                         study->share,
+                                         {},
+                                         {},
+                                         {}};
+    return true;
+  }
+  if (const auto* state = std::get_if<SetStudyState>(&change)) {
+    return std::exchange(contents.studies.at(state->study_id).state, state->state) != state->state;
+  }
+  if (const auto* share = std::get_if<SetStudyShare>(&change)) {
+    auto& now = contents.studies.at(share->study_id).share;
+    const bool changes = !(now == share->share);
+    now = share->share;
+    return changes;
+  }
+  if (const auto* worker = std::get_if<AddWorker>(&change)) {
+    contents.last_worker_id = std::max(contents.last_worker_id, worker->worker_id);
+    return true;
+  }
+  const auto* forget = std::get_if<ForgetFailures>(&change);
+  return forget != nullptr ? apply(*forget, contents)
+                           : apply(std::get<AddResults>(change), contents);
+}
+
+bool StoreModel::apply(const ForgetFailures& change, Contents& contents) {
+  auto& study = contents.studies.at(change.study_id);
+  bool changes = study.state == StudyState::kDone;
+  study.state = changes ? StudyState::kRunning : study.state;
+  change.points.for_each([&](const server::Interval& run) {
+    for (std::uint64_t point = run.begin; point < run.end; ++point) {
+      if (study.failures.contains(point)) {
+        contents.rows[change.study_id].erase(point);
+        study.failures.erase(point);
+        study.settled.erase(point);
+        changes = true;
+      }
+    }
+  });
+  return changes;
+}
+
+bool StoreModel::apply(const AddResults& change, Contents& contents) {
+  auto& study = contents.studies.at(change.study_id);
+  for (const auto& result : change.results) {
+    auto row = std::make_shared<const protocol::PointResult>(result);
+    if (!contents.rows[change.study_id].emplace(result.point(), std::move(row)).second) {
+      throw Violation("point " + std::to_string(result.point()) + " was stored twice");
+    }
+    study.settled.insert(result.point());
+    if (!result.error().empty()) {
+      study.failures.insert(result.point());
+    }
+  }
+  return !change.results.empty();
+}
+
+void StoreModel::stored(std::span<const Change> changes) {
+  bool control = false;
+  bool writes = false;
+  for (const Change& change : changes) {
+    control = control || (!std::holds_alternative<AddWorker>(change) &&
+                          !std::holds_alternative<AddResults>(change));
+    writes = apply(change, now_) || writes;
+  }
+  // A transaction that changes nothing writes nothing, and so syncs nothing.
+  if (control && writes) {
+    synced();
+  } else if (writes) {
+    entries_.push_back({{changes.begin(), changes.end()}, true});
+  }
+}
+
+void StoreModel::refused(std::span<const Change> changes) {
+  ++failed_commits;
+  entries_.push_back({{changes.begin(), changes.end()}, false});
+}
+
+void StoreModel::synced() {
+  synced_ = now_;
+  entries_.clear();
+}
+
+void StoreModel::restarted(const Found& found, bool power_was_lost) {
+  // Without a loss of power only what was refused since the last commit is in doubt.
+  const auto last_stored =
+      std::find_if(entries_.rbegin(), entries_.rend(), [](const Entry& e) { return e.stored; });
+  auto entry = power_was_lost ? entries_.begin() : last_stored.base();
+  Contents state = power_was_lost ? synced_ : now_;
+  std::optional<Contents> matching;
+  auto came_back = entries_.end();
+  std::uint64_t undone = 0;
+  const auto consider = [&](const Contents& candidate, std::vector<Entry>::iterator refused_one) {
+    if (candidate == found) {
+      matching = candidate;
+      came_back = refused_one;
+      undone = 0;
+    }
+  };
+  consider(state, entries_.end());
+  for (; entry != entries_.end(); ++entry) {
+    if (entry->stored) {
+      apply_all(*entry, state);
+      ++undone;
+      consider(state, entries_.end());
+    } else {
+      Contents with_refused = state;
+      apply_all(*entry, with_refused);
+      consider(with_refused, entry);
+    }
+  }
+  if (!matching) {
+    refuse(found, power_was_lost);
+  }
+  undone_commits += undone;
+  refused_kept += came_back != entries_.end() ? 1U : 0U;
+  now_ = std::move(*matching);
+  if (power_was_lost) {
+    synced_ = now_;
+    entries_.clear();
+  } else if (came_back != entries_.end()) {
+    // It counts from now on. Others that were refused beside it may still come instead.
+    came_back->stored = true;
+    std::rotate(came_back, came_back + 1, entries_.end());
+  }
+}
+
+void StoreModel::apply_all(const Entry& entry, Contents& contents) {
+  for (const Change& change : entry.changes) {
+    apply(change, contents);
+  }
+}
+
+void StoreModel::refuse(const Found& found, bool power_was_lost) const {
+  Contents there;
+  for (const auto& study : found.studies) {
+    there.studies[study.study_id] = study;
+  }
+  there.last_worker_id = found.last_worker_id;
+  throw Violation("after a restart the store has " + there.description() + " and not " +
+                  now_.description() +
+                  (power_was_lost ? ", nor what was there since " + synced_.description() : ""));
+}
+
+bool StoreModel::Contents::operator==(const Found& found) const {
+  const std::uint64_t last = studies.empty() ? 0 : studies.rbegin()->first;
+  return last == found.last_study_id && last_worker_id == found.last_worker_id &&
+         std::equal(studies.begin(), studies.end(), found.studies.begin(), found.studies.end(),
+                    [](const auto& entry, const server::StoredStudy& there) {
+                      const server::StoredStudy& here = entry.second;
+                      return here.study_id == there.study_id && here.name == there.name &&
+                             here.state == there.state && here.created_at == there.created_at &&
+                             here.share == there.share && here.settled == there.settled &&
+                             here.failures == there.failures &&
+                             here.table->recipe().SerializeAsString() ==
+                                 there.table->recipe().SerializeAsString();
+                    });
+}
+
+std::string StoreModel::Contents::description() const {
+  std::string text = std::to_string(last_worker_id) + " workers";
+  for (const auto& [id, study] : studies) {
+    text += ", " + study.name + " " + server::state_name(study.state) + " with " +
+            std::to_string(study.settled.size()) + " points";
+  }
+  return text;
+}
+
+const server::StoredStudy* StoreModel::study(const std::string& name) const {
+  for (const auto& [id, study] : now_.studies) {
+    if (study.name == name) {
+      return &study;
+    }
+  }
+  return nullptr;
+}
+
+const server::StoredStudy* StoreModel::study(std::uint64_t study_id) const {
+  const auto found = now_.studies.find(study_id);
+  return found == now_.studies.end() ? nullptr : &found->second;
+}
+
+const StoreModel::Rows& StoreModel::rows(std::uint64_t study_id) const {
+  static const Rows kNone;
+  const auto found = now_.rows.find(study_id);
+  return found == now_.rows.end() ? kNone : found->second;
+}
+
+}  // namespace oblique::simulation
