@@ -58,7 +58,8 @@ bool is_number(const toml::node& node) {
 /// Turns the tables of one file into a study; every error carries file and line.
 class Reader {
  public:
-  explicit Reader(std::string file) : file_(std::move(file)) {}
+  Reader(std::string file, const ReachCheck& check_reach)
+      : file_(std::move(file)), check_reach_(check_reach) {}
 
   Study study(const toml::table& top) const;
 
@@ -89,6 +90,7 @@ class Reader {
   double axis_number(const solver::ParameterKey& key, const toml::node& node) const;
 
   std::string file_;
+  const ReachCheck& check_reach_;
 };
 
 double Reader::number(std::string_view key, const toml::node& node,
@@ -294,7 +296,7 @@ Study Reader::study(const toml::table& top) const {
     protocol::Recipe alone;
     *alone.mutable_model() = study.recipe.model();
     *alone.add_blocks() = study.recipe.blocks(study.recipe.blocks_size() - 1);
-    located(node, [&] { check_reach(protocol::PointTable(alone), 0); });
+    located(node, [&] { check_reach_(protocol::PointTable(alone), 0); });
   }
   try {
     const protocol::PointTable whole(study.recipe);
@@ -306,9 +308,9 @@ Study Reader::study(const toml::table& top) const {
 
 }  // namespace
 
-Study parse_study(std::string_view text, const std::string& file) {
+Study parse_study(std::string_view text, const std::string& file, const ReachCheck& check) {
   try {
-    return Reader(file).study(toml::parse(text, file));
+    return Reader(file, check).study(toml::parse(text, file));
   } catch (const toml::parse_error& error) {
     throw InputError(file + ":" + std::to_string(error.source().begin.line) + ": " +
                      std::string(error.description()));

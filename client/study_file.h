@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <string_view>
 
@@ -13,7 +14,12 @@ namespace oblique::client {
 /// solver::InputError naming file, line where it is known, key, value and what is allowed.
 Study read_study_file(const std::filesystem::path& path);
 
-/// The same for the text of a study file; `file` is what errors call it.
-Study parse_study(std::string_view text, const std::string& file);
+/// Looks whether the tip reaches every H of a block, and throws solver::InputError where not.
+using ReachCheck = std::function<void(const protocol::PointTable& table, int block)>;
+
+/// The same for the text of a study file; `file` is what errors call it. `check` may be cheaper
+/// than check_reach, which solves falls.
+Study parse_study(std::string_view text, const std::string& file,
+                  const ReachCheck& check = check_reach);
 
 }  // namespace oblique::client

@@ -5,15 +5,12 @@
 #include "client/study_file.h"
 #include "worker/solver/errors.h"
 
-/// A study file either gives a study or an InputError. Files that lead to a solved fall, which
-/// takes long, are left out: those whose H comes near the chain's length.
+/// A study file either gives a study or an InputError. Whether the tip reaches H is left out: that
+/// solves falls, which takes long.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text(reinterpret_cast<const char*>(data), size);
-  if (text.find('H') != std::string_view::npos && text.find("H = 0.5") == std::string_view::npos) {
-    return 0;
-  }
   try {
-    oblique::client::parse_study(text, "fuzz.toml");
+    oblique::client::parse_study(text, "fuzz.toml", [](const auto&, int) {});
   } catch (const oblique::solver::InputError&) {
   }
   return 0;

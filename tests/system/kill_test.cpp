@@ -5,22 +5,21 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/system/many_points.h"
 #include "tests/system/processes.h"
 
 namespace oblique::test {
 namespace {
 
-/// 40,000 points of the preset `paper`.
-const std::vector<std::string> kPoints{"--H", "1",           "--mu",   "0.1:2.0:200",
-                                       "--e", "0.5:1.0:200", "--name", "many"};
-constexpr double kCount = 40'000;
+constexpr double kCount = kManyPoints;
 
-/// A server with the study of `kPoints` and a client that watches it to its end.
+/// A server with a study of many points.
 class KillTest : public ::testing::Test {
  protected:
   void submit() {
     std::vector<std::string> arguments{"submit", "--server", server_->client_url()};
-    arguments.insert(arguments.end(), kPoints.begin(), kPoints.end());
+    const auto points = many_points("many");
+    arguments.insert(arguments.end(), points.begin(), points.end());
     const Ran ran = run_client(folder_, arguments);
     ASSERT_EQ(ran.exit_code, 0) << ran.errors;
   }
@@ -56,7 +55,7 @@ TEST_F(KillTest, AServerKilledInTheMiddleOfAStudyAndStartedAgainCompletesItWithT
   submit();
   start_worker();
   start_worker();
-  for (const double rows : {1000, 3000, 5000}) {
+  for (const double rows : {kCount / 40, 3 * kCount / 40, kCount / 8}) {
     wait_for_rows(rows);
     server_->process().send(SIGKILL);
     EXPECT_EQ(server_->process().wait(), 128 + SIGKILL);
@@ -73,7 +72,7 @@ TEST_F(KillTest, AServerKilledInTheMiddleOfAStudyAndStartedAgainCompletesItWithT
 TEST_F(KillTest, AServerToldToStopInTheMiddleOfAStudyAndStartedAgainCompletesIt) {
   submit();
   start_worker();
-  wait_for_rows(1000);
+  wait_for_rows(kCount / 40);
   server_->process().send(SIGTERM);
   EXPECT_EQ(server_->process().wait(), 0) << server_->process().errors();
   ASSERT_LT(database_.rows(), kCount) << "stopped too late to be a test";
@@ -85,7 +84,7 @@ TEST_F(KillTest, PointsOfAWorkerKilledInTheMiddleOfAStudyAreSolvedByTheOthers) {
   submit();
   start_worker();
   start_worker();
-  wait_for_rows(1000);
+  wait_for_rows(kCount / 40);
   workers_.front()->send(SIGKILL);
   EXPECT_EQ(workers_.front()->wait(), 128 + SIGKILL);
   ASSERT_LT(database_.rows(), kCount) << "killed too late to be a test";
@@ -96,7 +95,7 @@ TEST_F(KillTest, PointsOfAWorkerKilledInTheMiddleOfAStudyAreSolvedByTheOthers) {
 TEST_F(KillTest, AStudyWhoseOnlyWorkerWasKilledWaitsForTheNextOne) {
   submit();
   start_worker();
-  wait_for_rows(1000);
+  wait_for_rows(kCount / 40);
   workers_.front()->send(SIGKILL);
   workers_.front()->wait();
   ASSERT_LT(database_.rows(), kCount) << "killed too late to be a test";
@@ -108,7 +107,7 @@ TEST_F(KillTest, AWorkerThatWasHaltedAndGivenUpComesBackAndNothingIsStoredTwice)
   submit();
   start_worker();
   start_worker();
-  wait_for_rows(1000);
+  wait_for_rows(kCount / 40);
   workers_.front()->send(SIGSTOP);
   wait_until("the halted worker is given up",
              [&] { return server_->process().errors().find("silent for") != std::string::npos; });

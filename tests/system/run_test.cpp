@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/system/many_points.h"
 #include "tests/system/processes.h"
 
 namespace oblique::test {
@@ -14,15 +15,16 @@ namespace {
 class RunTest : public ::testing::Test {
  protected:
   std::vector<std::string> arguments() const {
-    return {
-        "run",  "--H",       "1", "--mu", "0.1:2.0:200",          "--e", "0.5:1.0:200", "--name",
-        "some", "--workers", "2", "--db", folder_.file("some.db")};
+    std::vector<std::string> words{"run", "--workers", "2", "--db", folder_.file("some.db")};
+    const auto points = many_points("some");
+    words.insert(words.end(), points.begin(), points.end());
+    return words;
   }
-  static constexpr double kCount = 40'000;
+  static constexpr double kCount = kManyPoints;
 
   /// The server and the workers of a run, once all are there and at work.
   std::vector<pid_t> started_by(const Process& run) {
-    wait_until("rows in the database", [&] { return database_.rows() >= 100; });
+    wait_until("rows in the database", [&] { return database_.rows() >= kCount / 400; });
     const auto children = children_of(run.pid());
     EXPECT_EQ(children.size(), 3U);
     return children;

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace oblique::test {
+
+#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
+constexpr int kSide = 30;  ///< sanitized programs are some twenty times slower
+#else
+constexpr int kSide = 200;
+#endif
+
+/// A study that takes seconds, so that there is time to break something in its middle.
+constexpr double kManyPoints = kSide * kSide;
+inline std::vector<std::string> many_points(const std::string& name) {
+  const std::string count = std::to_string(kSide);
+  return {"--H", "1", "--mu", "0.1:2.0:" + count, "--e", "0.5:1.0:" + count, "--name", name};
+}
+
+}  // namespace oblique::test
