@@ -1,7 +1,6 @@
 #include "server/scheduler.h"
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -12,9 +11,6 @@ namespace {
 /// Longest gap between two ticks that counts as silence of the workers. In a longer one it was the
 /// server that did not run, and what the workers said meanwhile still waits to be read.
 constexpr std::int64_t kLongestTick_ms = 1000;
-
-/// Weight of the newest measurement in a worker's pace.
-constexpr double kPaceWeight = 0.5;
 
 }  // namespace
 
@@ -239,154 +235,6 @@ void Scheduler::on(const DispatchHeld& event) {
   held_ = event.held;
 }
 
-// ---- Leases and results -----------------------------------------------------------------------
-
-void Scheduler::end_lease(LeaseId id, LeaseEnd how) {
-  const Lease lease = leases_.at(id);
-  leases_.erase(id);
-  workers_.at(lease.worker).leases.erase(id);
-  if (const auto twin = leases_.find(lease.twin); twin != leases_.end()) {
-    twin->second.twin = 0;
-    if (how == LeaseEnd::kLost) {
-      // What killed one worker may kill the other: that must not be forgotten.
-      std::uint32_t& losses = twin->second.chunk.losses;
-      losses = std::max(losses, lease.chunk.losses + 1);
-    }
-  }
-  Study& study = studies_.at(lease.study);
-  for (const Interval& run : held_by(lease)) {
-    if (how == LeaseEnd::kLost) {
-      give_back_lost(lease.study, run, lease);
-    } else {
-      study.points.give_back(run, lease.chunk.attempts + 1, lease.chunk.losses);
-    }
-  }
-  if (--study.leases == 0) {
-    study.overlaps = false;
-    if (!study.points.has_results()) {
-      study.solver_version.clear();
-    }
-  }
-}
-
-/// Points that are leased by this lease, which has ended, and by no other.
-std::vector<Interval> Scheduler::held_by(const Lease& lease) const {
-  const Study& study = studies_.at(lease.study);
-  const auto leased = study.points.leased_set().within(lease.chunk.first_point, lease.chunk.end());
-  if (!study.overlaps || leased.empty()) {
-    return leased;
-  }
-  IntervalSet held;
-  for (const Interval& run : leased) {
-    held.insert(run.begin, run.end);
-  }
-  for (const auto& [id, other] : leases_) {
-    if (other.study == lease.study) {
-      held.erase(other.chunk.first_point, other.chunk.end());
-    }
-  }
-  return held.within(lease.chunk.first_point, lease.chunk.end());
-}
-
-/// A batch whose points were all answered by others is nobody's work any more.
-void Scheduler::release_if_answered(LeaseId id) {
-  const auto lease = leases_.find(id);
-  if (lease == leases_.end()) {
-    return;
-  }
-  const Chunk& chunk = lease->second.chunk;
-  const IntervalSet& leased = studies_.at(lease->second.study).points.leased_set();
-  if (leased.within(chunk.first_point, chunk.end()).empty()) {
-    effects_.emplace_back(ReleaseBatch{lease->second.worker, id});
-    end_lease(id, LeaseEnd::kReturned);
-  }
-}
-
-void Scheduler::give_back_lost(StudyId study, const Interval& run, const Lease& lease) {
-  StudyPoints& points = studies_.at(study).points;
-  const std::uint32_t attempts = lease.chunk.attempts + 1;
-  const std::uint32_t losses = lease.chunk.losses + 1;
-  if (losses < settings_.max_losses) {
-    points.give_back(run, attempts, losses);
-    return;
-  }
-  if (run.end - run.begin > 1) {
-    // The halves stay suspect: the one without the killer is solved, the other is split again.
-    const std::uint64_t middle = run.begin + (run.end - run.begin) / 2;
-    points.give_back({run.begin, middle}, attempts, losses - 1);
-    points.give_back({middle, run.end}, attempts, losses - 1);
-    return;
-  }
-  points.receive(run.begin);
-  effects_.emplace_back(StoreFailure{
-      study, run.begin, attempts,
-      "no answer: " + std::to_string(attempts) + " leases of this point ended without one, " +
-          std::to_string(losses) + " of them because the worker was lost or gave up"});
-}
-
-void Scheduler::on(const ResultsReceived& event) {
-  Worker* worker = heard_from(event.worker);
-  if (worker == nullptr) {
-    return;
-  }
-  StoreResults store{event.worker, event.study, event.sequence, {}};
-  const auto study = studies_.find(event.study);
-  // What a worker of another solver version solved before the study was given to this one's is
-  // not wanted, though acknowledged: those points are solved again.
-  if (study != studies_.end() && admits(study->second, *worker)) {
-    for (std::size_t i = 0; i < event.outcomes.size(); ++i) {
-      if (study->second.points.receive(event.outcomes[i].point)) {
-        store.accepted.push_back(i);
-      }
-    }
-    if (!store.accepted.empty() && study->second.solver_version.empty()) {
-      study->second.solver_version = worker->solver_version;
-    }
-    learn_pace(*worker, event);
-  }
-  effects_.emplace_back(std::move(store));
-  const auto lease = leases_.find(event.lease);
-  if (lease == leases_.end() || lease->second.worker != event.worker ||
-      lease->second.study != event.study) {
-    return;
-  }
-  const LeaseId twin = lease->second.twin;
-  if (event.batch_done) {
-    // Points of a finished batch that got no answer count as lost, or a worker that never answers
-    // them would take them for ever.
-    end_lease(event.lease, LeaseEnd::kLost);
-  }
-  release_if_answered(twin);
-}
-
-void Scheduler::learn_pace(Worker& worker, const ResultsReceived& event) {
-  if (event.outcomes.empty() || !std::isfinite(event.busy_s) || event.busy_s <= 0.0) {
-    return;
-  }
-  const double s_per_point = event.busy_s / static_cast<double>(event.outcomes.size());
-  double& known = worker.paces[event.study].s_per_point;
-  known = known > 0.0 ? known + kPaceWeight * (s_per_point - known) : s_per_point;
-}
-
-void Scheduler::on(const ResultsStored& event) {
-  const auto study = studies_.find(event.study);
-  const auto worker = workers_.find(event.worker);
-  if (study != studies_.end()) {
-    for (const PointOutcome& outcome : event.outcomes) {
-      if (study->second.points.settle(outcome.point)) {
-        study->second.failed += outcome.failed ? 1U : 0U;
-        if (worker != workers_.end()) {
-          worker->second.solved_points += outcome.failed ? 0U : 1U;
-        }
-      }
-    }
-    finish_if_complete(event.study);
-  }
-  if (worker != workers_.end()) {
-    effects_.emplace_back(AcknowledgeResults{event.worker, event.sequence});
-  }
-}
-
 // ---- Views of the state -----------------------------------------------------------------------
 
 StudyCounts Scheduler::study(StudyId id) const {
@@ -404,10 +252,13 @@ StudyCounts Scheduler::study(StudyId id) const {
           lacks_worker};
 }
 
+std::int64_t Scheduler::silent_ms(WorkerId id, std::int64_t now_ms) const {
+  return std::max<std::int64_t>(0, now_ms - workers_.at(id).last_heard_ms);
+}
+
 WorkerCounts Scheduler::worker(WorkerId id, std::int64_t now_ms) const {
   const Worker& worker = workers_.at(id);
-  WorkerCounts counts{0, worker.solved_points,
-                      std::max<std::int64_t>(0, now_ms - worker.last_heard_ms)};
+  WorkerCounts counts{0, worker.solved_points, silent_ms(id, now_ms)};
   for (const LeaseId lease_id : worker.leases) {
     const Lease& lease = leases_.at(lease_id);
     const IntervalSet& leased = studies_.at(lease.study).points.leased_set();

@@ -231,6 +231,8 @@ class Scheduler {
   StudyCounts study(StudyId study) const;
   /// Throws std::out_of_range for an unknown worker.
   WorkerCounts worker(WorkerId worker, std::int64_t now_ms) const;
+  /// Since its last message. Throws std::out_of_range for an unknown worker.
+  std::int64_t silent_ms(WorkerId worker, std::int64_t now_ms) const;
   /// Which points of the study have a row. Throws std::out_of_range for an unknown study.
   const IntervalSet& settled(StudyId study) const {
     return studies_.at(study).points.settled_set();

@@ -49,6 +49,7 @@ Service::Service(ServiceSettings settings, Outbox& outbox, std::vector<StoredStu
                                            study.failures,
                                            true,
                                            0,
+                                           false,
                                            {},
                                            {}});
     feed(StudyAdded{study.study_id, study.table, std::move(study.settled), study.failures.size(),
@@ -219,6 +220,7 @@ void Service::stored(const Write& meaning, Instant now) {
     }
   } else if (const auto* state = std::get_if<OfState>(&meaning)) {
     --studies_.at(state->study).state_writes;
+    studies_.at(state->study).is_doubtful = false;
     if (state->state == StudyState::kCancelled) {
       feed(StudyCancelled{state->study}, now);
     } else if (state->state == StudyState::kPaused) {
@@ -254,6 +256,7 @@ void Service::refused(const Write& meaning, const std::string& error) {
   } else if (const auto* state = std::get_if<OfState>(&meaning)) {
     Study& study = studies_.at(state->study);
     --study.state_writes;
+    study.is_doubtful = true;
     OfState* later = nullptr;
     for (auto& [ticket, write] : writes_) {
       auto* other = std::get_if<OfState>(&write);
@@ -276,6 +279,16 @@ void Service::refused(const Write& meaning, const std::string& error) {
 // ---- Time -------------------------------------------------------------------------------------
 
 void Service::tick(Instant now) {
+  // A heartbeat is late: sending shows whether the connection is gone, as that of a killed process
+  // is, long before the silence would.
+  protocol::ServerToWorker sign;
+  sign.mutable_heartbeat_reply();
+  const std::int64_t late_ms = settings_.heartbeat_interval_ms * 5 / 4;
+  for (const auto& [id, peer] : peers_) {
+    if (scheduler_.silent_ms(id, now.steady_ms) > late_ms) {
+      send(id, sign);
+    }
+  }
   feed(Tick{}, now);
   for (auto& [id, study] : studies_) {
     if (!study.durable) {

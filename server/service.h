@@ -104,6 +104,9 @@ class Service {
     IntervalSet failures;  // points whose rows say failed
     bool durable = false;
     std::uint32_t state_writes = 0;  // changes of state on their way to the disk
+    /// A change was refused. What the disk took of it may count again after a crash, until
+    /// something else is written in its place.
+    bool is_doubtful = false;
     std::vector<Client> submitters;  // wait for it to be durable
     std::deque<Sample> samples;      // of the last seconds
   };

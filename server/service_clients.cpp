@@ -137,6 +137,7 @@ void Service::submit(const Client& client, const protocol::SubmitRequest& reques
                              {},
                              false,
                              0,
+                             false,
                              {client},
                              {}});
   write(AddStudy{id, request.name(), table, created_at, share}, OfStudy{id}, true);
@@ -147,7 +148,8 @@ void Service::continue_study(const Client& client, StudyId id, Instant now) {
   const bool rests = study.state == StudyState::kCancelled || study.state == StudyState::kPaused;
   if (!study.durable) {
     study.submitters.push_back(client);
-  } else if (rests || (study.state_writes > 0 && study.state != StudyState::kDone)) {
+  } else if (rests ||
+             ((study.state_writes > 0 || study.is_doubtful) && study.state != StudyState::kDone)) {
     set_state(client, id, StudyState::kRunning, true, now);
   } else {
     reply_submitted(client, id, false);
@@ -201,7 +203,8 @@ void Service::change(const Client& client, const protocol::ChangeRequest& reques
       reply_error(client, "the server does not know this change of a study");
       return;
   }
-  if (study.state == StudyState::kDone || (study.state == wanted && study.state_writes == 0)) {
+  if (study.state == StudyState::kDone ||
+      (study.state == wanted && study.state_writes == 0 && !study.is_doubtful)) {
     reply_changed(client, id, 0, now);
     return;
   }

@@ -125,9 +125,7 @@ struct Store::Statements {
                   "INSERT INTO studies (study_id, name, recipe, points, state, created_at,"
                   " changed_at, priority, weight, mixes_versions)"
                   " VALUES (?1, ?2, ?3, ?4, 'running', ?5, ?5, ?6, ?7, ?8)"),
-        set_state(database,
-                  "UPDATE studies SET state = ?2, changed_at = ?3"
-                  " WHERE study_id = ?1 AND state <> ?2"),
+        set_state(database, "UPDATE studies SET state = ?2, changed_at = ?3 WHERE study_id = ?1"),
         set_share(database,
                   "UPDATE studies SET priority = ?2, weight = ?3, mixes_versions = ?4"
                   " WHERE study_id = ?1"),
@@ -167,28 +165,18 @@ Store::Store(const std::string& path) {
   }
   journal.reset();
   execute(database_.get(), "PRAGMA synchronous = FULL");
+  log_ = std::make_unique<WriteAheadLog>(database_.get());
+  log_->make_sure();
   if (kind == DatabaseKind::kEmpty) {
     create_schema();
   } else if (kind == DatabaseKind::kOlder) {
     migrate();
   }
   statements_ = std::make_unique<Statements>(database_.get());
-  sqlite3_wal_hook(
-      database_.get(),
-      [](void* store, sqlite3*, const char*, int pages) {
-        static_cast<Store*>(store)->log_pages_ = pages;
-        return SQLITE_OK;
-      },
-      this);
 }
 
 Store::~Store() {
-  try {
-    rewrite_log();
-  } catch (const StorageError&) {
-    // The next server tries again; closing must not build on it.
-    sqlite3_db_config(database_.get(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
-  }
+  log_->before_closing();
 }
 
 void Store::create_schema() {
@@ -224,69 +212,23 @@ void Store::set_sync(bool full) {
   }
 }
 
-/// When a sync fails, Linux takes for written what it could not write, and a later sync succeeds
-/// without it: commits that stand in the log would be lost with the power, and a checkpoint could
-/// leave the database with parts of them. So after a failure all of the log is written again, byte
-/// by byte as it is, before anything builds on it. A server that starts does so too, for it does
-/// not know how the one before ended.
-void Store::rewrite_log() {
-  if (!log_is_suspect_) {
-    return;
-  }
-  sqlite3_file* log = nullptr;
-  const int found =
-      sqlite3_file_control(database_.get(), "main", SQLITE_FCNTL_JOURNAL_POINTER, &log);
-  if (found == SQLITE_OK && log != nullptr && log->pMethods != nullptr) {
-    std::vector<char> bytes(std::size_t{1} << 16U);
-    sqlite3_int64 size = 0;
-    int code = log->pMethods->xFileSize(log, &size);
-    for (sqlite3_int64 at = 0; at < size && code == SQLITE_OK;) {
-      const auto part = static_cast<int>(std::min<sqlite3_int64>(std::ssize(bytes), size - at));
-      code = log->pMethods->xRead(log, bytes.data(), part, at);
-      if (code == SQLITE_OK) {
-        code = log->pMethods->xWrite(log, bytes.data(), part, at);
-      }
-      at += part;
-    }
-    if (code == SQLITE_OK) {
-      code = log->pMethods->xSync(log, SQLITE_SYNC_NORMAL);
-    }
-    if (code != SQLITE_OK) {
-      throw StorageError("the write-ahead log cannot be written again after a failure: " +
-                         std::string(sqlite3_errstr(code)));
-    }
-  }
-  log_is_suspect_ = false;
-}
-
-/// Moves a long log into the database. Readers may keep it from doing all, which is no fault.
-void Store::checkpoint() {
-  if (log_pages_ < checkpoint_pages_) {
-    return;
-  }
-  const int code = sqlite3_wal_checkpoint_v2(database_.get(), "main", SQLITE_CHECKPOINT_PASSIVE,
-                                             nullptr, nullptr);
-  // What was committed stands. SQLite would do this by itself, and keep a failure to itself.
-  log_is_suspect_ = code != SQLITE_OK && code != SQLITE_BUSY;
-}
-
 void Store::commit(std::span<const Change> changes) {
   const bool control = std::any_of(changes.begin(), changes.end(), [](const Change& change) {
     return !std::holds_alternative<AddWorker>(change) &&
            !std::holds_alternative<AddResults>(change);
   });
   try {
-    rewrite_log();
+    log_->make_sure();
     set_sync(control);
     Transaction transaction(database_.get());
     for (const Change& change : changes) {
       std::visit([this](const auto& c) { add(c); }, change);
     }
     transaction.commit();
-    checkpoint();
+    log_->shorten();
   } catch (...) {
     model_ids_.clear();
-    log_is_suspect_ = true;
+    log_->suspect();
     throw;
   }
 }
@@ -431,7 +373,7 @@ std::uint64_t Store::last_worker_id() {
 }
 
 std::uint64_t Store::count_start() {
-  rewrite_log();
+  log_->make_sure();
   set_sync(true);
   Transaction transaction(database_.get());
   execute(database_.get(), "UPDATE about SET starts = starts + 1");

@@ -9,6 +9,7 @@
 #include "server/changes.h"
 #include "server/interval_set.h"
 #include "server/sqlite.h"
+#include "server/write_ahead_log.h"
 
 namespace oblique::server {
 
@@ -39,7 +40,7 @@ class Store final : public Storage {
   void commit(std::span<const Change> changes) override;
 
   /// The log is moved into the database when it has so many pages; 1000 unless told.
-  void checkpoint_at(int pages) { checkpoint_pages_ = pages; }
+  void checkpoint_at(int pages) { log_->shorten_at(pages); }
 
   /// All studies in the order of their numbers, with what is settled. Throws StorageError, also for
   /// a recipe that cannot be read.
@@ -70,19 +71,15 @@ class Store final : public Storage {
   void add(const AddResults& change);
   std::int64_t model_id(const AddResults& change, std::uint64_t model);
   void set_sync(bool full);
-  void rewrite_log();
-  void checkpoint();
   std::uint64_t highest(const std::string& sql);
 
   std::unique_ptr<Lock> lock_;  // outlives the connection: closing it drops SQLite's own locks
   DatabaseHandle database_;
+  std::unique_ptr<WriteAheadLog> log_;
   std::unique_ptr<Statements> statements_;
   // Row of `models` by study and model number; emptied when it grows or a transaction fails.
   std::map<std::pair<std::uint64_t, std::uint64_t>, std::int64_t> model_ids_;
   bool full_sync_ = true;
-  bool log_is_suspect_ = true;  // something failed, perhaps a sync that lost what it should keep
-  int log_pages_ = 0;
-  int checkpoint_pages_ = 1000;
 };
 
 }  // namespace oblique::server

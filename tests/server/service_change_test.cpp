@@ -121,5 +121,20 @@ TEST_F(ServiceTest, APriorityOrWeightOutOfRangeIsRefusedByName) {
   EXPECT_THAT(last_reply().error().message(), HasSubstr("priority = 100000"));
 }
 
+TEST_F(ServiceTest, AfterARefusedChangeTheNextOneIsWrittenAlthoughNothingSeemsToChange) {
+  // What the disk took of the refused one could count again after a crash.
+  request(submit_request("a"));
+  write_all();
+  request(change_request("a", protocol::STUDY_CHANGE_PAUSE));
+  write_all("the disk is failing");
+  EXPECT_TRUE(last_reply().has_error());
+  request(change_request("a", protocol::STUDY_CHANGE_RESUME));
+  EXPECT_EQ(outbox_.jobs.size(), 1U);
+  write_all();
+  EXPECT_EQ(last_reply().change().study().state(), "running");
+  request(change_request("a", protocol::STUDY_CHANGE_RESUME));
+  EXPECT_TRUE(outbox_.jobs.empty());
+}
+
 }  // namespace
 }  // namespace oblique::server

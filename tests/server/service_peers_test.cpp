@@ -104,6 +104,21 @@ TEST_F(ServiceTest, AFieldOfALaterVersionIsPassedOver) {
   EXPECT_EQ(service_->bad_frames(), 0U);
 }
 
+TEST_F(ServiceTest, AWorkerWhoseConnectionIsGoneIsFoundAsSoonAsAHeartbeatIsLate) {
+  request(submit_request("a"));
+  write_all();
+  hello();
+  credit(1);
+  outbox_.unreachable = "worker";
+  now_.steady_ms += 1000;
+  service_->tick(now_);
+  EXPECT_EQ(service_->scheduler().workers(), 1U);
+  now_.steady_ms += 200;
+  service_->tick(now_);
+  EXPECT_EQ(service_->scheduler().workers(), 0U);
+  EXPECT_EQ(service_->scheduler().study(1).leased, 0U);
+}
+
 /// A service with small limits.
 class FloodedServiceTest : public ServiceTest {
  protected:

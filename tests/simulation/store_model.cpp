@@ -30,7 +30,8 @@ bool StoreModel::apply(const Change& change, Contents& contents) {
     return true;
   }
   if (const auto* state = std::get_if<SetStudyState>(&change)) {
-    return std::exchange(contents.studies.at(state->study_id).state, state->state) != state->state;
+    contents.studies.at(state->study_id).state = state->state;
+    return true;
   }
   if (const auto* share = std::get_if<SetStudyShare>(&change)) {
     auto& now = contents.studies.at(share->study_id).share;

@@ -37,6 +37,8 @@ TEST(UsageTest, WrongFlagsEndWithTwoAndASentenceThatNamesThem) {
       {server_program(), {"--bogus"}, "--bogus"},
       {server_program(), {"--worker-port", "99999999"}, "--worker-port"},
       {server_program(), {"--listen", "0.0.0.0"}, "0.0.0.0"},
+      {server_program(), {"--db", ""}, "--db"},
+      {server_program(), {"--worker-port", "7700", "--client-port", "7700"}, "7700"},
       {worker_program(), {"--bogus"}, "--bogus"},
       {worker_program(), {"--server", "nowhere"}, "nowhere"},
   };
