@@ -1,5 +1,7 @@
 #include "proto/frames.h"
 
+#include <google/protobuf/stubs/logging.h>
+
 namespace oblique::protocol {
 
 std::string objection_to_version(std::uint32_t version, const std::string& who) {
@@ -18,6 +20,10 @@ std::string encode(const google::protobuf::MessageLite& message) {
 bool decode(std::string_view frame, google::protobuf::MessageLite& message) {
   return frame.size() <= kMaxFrameBytes &&
          message.ParseFromArray(frame.data(), static_cast<int>(frame.size()));
+}
+
+void silence_protobuf() {
+  google::protobuf::SetLogHandler(nullptr);
 }
 
 }  // namespace oblique::protocol

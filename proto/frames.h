@@ -29,4 +29,8 @@ std::string encode(const google::protobuf::MessageLite& message);
 /// long, truncated or foreign (no known kind set is the caller's to check).
 bool decode(std::string_view frame, google::protobuf::MessageLite& message);
 
+/// For main functions: keeps Protobuf from writing a line to standard error for each hostile frame,
+/// which would let a peer fill the log. Whoever decodes frames counts them instead.
+void silence_protobuf();
+
 }  // namespace oblique::protocol

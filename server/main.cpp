@@ -17,6 +17,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "proto/frames.h"
 #include "server/loop.h"
 #include "worker/solver/solve.h"
 
@@ -86,6 +87,7 @@ int run(const LoopSettings& settings, int ready_fd) {
 
 int main(int argc, char** argv) {
   const pid_t parent = getppid();
+  oblique::protocol::silence_protobuf();
   spdlog::set_default_logger(spdlog::stderr_logger_mt("oblique-server"));
 
   LoopSettings settings;

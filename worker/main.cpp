@@ -16,6 +16,7 @@
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
 
+#include "proto/frames.h"
 #include "worker/point_solver.h"
 #include "worker/session.h"
 #include "worker/solver/solve.h"
@@ -93,6 +94,7 @@ int run_worker(const SessionSettings& settings, pid_t parent) {
 /// Everything but errors that nobody foresaw.
 int run_program(int argc, char** argv) {
   spdlog::set_default_logger(spdlog::stderr_color_mt("worker"));
+  oblique::protocol::silence_protobuf();
   SessionSettings settings;
   settings.name = host_and_process();
   settings.threads = cores();

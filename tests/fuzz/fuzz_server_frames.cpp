@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "proto/frames.h"
 #include "server/service.h"
 
 namespace oblique::server {
@@ -53,6 +54,11 @@ void converse(std::string_view input) {
 
 }  // namespace
 }  // namespace oblique::server
+
+extern "C" int LLVMFuzzerInitialize(int*, char***) {
+  oblique::protocol::silence_protobuf();
+  return 0;
+}
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   oblique::server::converse({reinterpret_cast<const char*>(data), size});

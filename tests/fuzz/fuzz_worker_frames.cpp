@@ -6,6 +6,11 @@
 #include "proto/frames.h"
 #include "worker/conversation.h"
 
+extern "C" int LLVMFuzzerInitialize(int*, char***) {
+  oblique::protocol::silence_protobuf();
+  return 0;
+}
+
 /// Frames of a server to a worker: of each piece the first byte says how long it is.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   std::string_view input(reinterpret_cast<const char*>(data), size);
