@@ -111,9 +111,15 @@ protocol::SubmitReply Connection::submit(const Study& study, const StudyTerms& t
   protocol::ClientRequest request;
   request.mutable_submit()->set_name(study.name);
   *request.mutable_submit()->mutable_recipe() = study.recipe;
-  request.mutable_submit()->set_priority(terms.priority);
-  request.mutable_submit()->set_weight(terms.weight);
-  request.mutable_submit()->set_mixes_versions(terms.mixes_versions);
+  if (terms.priority) {
+    request.mutable_submit()->set_priority(*terms.priority);
+  }
+  if (terms.weight) {
+    request.mutable_submit()->set_weight(*terms.weight);
+  }
+  if (terms.mixes_versions) {
+    request.mutable_submit()->set_mixes_versions(true);
+  }
   return call(std::move(request)).submit();
 }
 

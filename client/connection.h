@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
@@ -39,9 +40,10 @@ class Interrupted : public std::runtime_error {
 
 /// How a study uses the workers of its server.
 struct StudyTerms {
-  std::int32_t priority = 0;    ///< studies of a higher one come first
-  double weight = 1.0;          ///< share of the workers among studies of one priority
-  bool mixes_versions = false;  ///< workers of any solver version take part
+  // What is not given stays as it is for a study that the server knows.
+  std::optional<std::int32_t> priority = {};  ///< studies of a higher one come first
+  std::optional<double> weight = {};          ///< share of the workers among those of one priority
+  bool mixes_versions = false;                ///< workers of any solver version take part
 };
 
 /// Asks one server, one question at a time. Every call sends one ClientRequest and waits for the

@@ -66,6 +66,8 @@ void add_run(CLI::App& app, Command& command) {
   verb->add_option("--db", flags->settings.service.database, "database, made when it is not there")
       ->type_name("FILE")
       ->capture_default_str();
+  verb->add_flag("--mix-versions", flags->settings.terms.mixes_versions,
+                 "go on with a study although another solver version began it");
   verb->add_flag(
       "--allow-network-disk", flags->settings.service.allow_network_disk,
       "take a database on a network file system, where a second machine could damage it");

@@ -62,7 +62,7 @@ RunEnd submit_and_wait(const Study& study, const RunSettings& settings, Embedded
   ConnectionSettings where;
   where.server_url = service.client_url();
   Connection connection(where, look_after);
-  const auto submitted = connection.submit(study);
+  const auto submitted = connection.submit(study, settings.terms);
   if (!submitted.created()) {
     std::cerr << "Going on with \"" << study.name << "\": " << submitted.settled() << " of "
               << submitted.points() << " points are done.\n";

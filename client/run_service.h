@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 
 #include "client/axis.h"
+#include "client/connection.h"
 #include "client/embedded_service.h"
 #include "client/source.h"
 #include "proto/oblique.pb.h"
@@ -15,6 +16,7 @@ namespace oblique::client {
 /// How `run` runs a study, and `paper` its cases.
 struct RunSettings {
   ServiceSettings service{.database = DatabaseSettings().file};
+  StudyTerms terms;
   std::int64_t rows = 30;  ///< most rows of results asked for at the end
 };
 

@@ -64,15 +64,14 @@ void add_submit(CLI::App& app, Command& command) {
   add_server_flags(*verb, flags->source);
   verb->add_flag("--watch", flags->watch, "show the progress until the study is done");
   verb->add_option("--priority", flags->terms.priority,
-                   "studies of a higher priority come first, -1000 to 1000")
+                   "studies of a higher priority come first, -1000 to 1000; 0 unless told")
       ->check(CLI::Range(-1000, 1000))
-      ->type_name("N")
-      ->capture_default_str();
-  verb->add_option("--weight", flags->terms.weight,
-                   "share of the workers among studies of one priority, 0.001 to 1000")
+      ->type_name("N");
+  verb->add_option(
+          "--weight", flags->terms.weight,
+          "share of the workers among studies of one priority, 0.001 to 1000; 1 unless told")
       ->check(CLI::Range(0.001, 1000.0))
-      ->type_name("W")
-      ->capture_default_str();
+      ->type_name("W");
   verb->add_flag("--mix-versions", flags->terms.mixes_versions,
                  "workers of any solver version take part; the column solver_version says which "
                  "solved a point");

@@ -13,11 +13,12 @@
 namespace oblique::server {
 namespace {
 
-constexpr std::array<std::string_view, 22> kNetworkTypes{
-    "nfs",       "nfs4",        "cifs",         "smb3",        "smbfs",          "afs",
-    "ceph",      "glusterfs",   "lustre",       "beegfs",      "gpfs",           "orangefs",
-    "pvfs2",     "davfs",       "fuse.sshfs",   "fuse.ceph",   "fuse.glusterfs", "fuse.rclone",
-    "fuse.s3fs", "fuse.davfs2", "fuse.moosefs", "fuse.juicefs"};
+constexpr std::array<std::string_view, 25> kNetworkTypes{
+    "nfs",          "nfs4",           "cifs",         "smb3",      "smbfs",
+    "afs",          "ceph",           "glusterfs",    "lustre",    "beegfs",
+    "gpfs",         "orangefs",       "pvfs2",        "davfs",     "fuse.sshfs",
+    "fuse.ceph",    "fuse.glusterfs", "fuse.rclone",  "fuse.s3fs", "fuse.davfs2",
+    "fuse.moosefs", "fuse.juicefs",   "fuse.gcsfuse", "panfs",     "wekafs"};
 
 /// A path of mountinfo, where some letters are written as a backslash and three octal digits.
 std::string unescaped(const std::string& text) {

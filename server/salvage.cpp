@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <limits>
+#include <stdexcept>
 #include <vector>
 
 #include "server/draft_file.h"
@@ -33,11 +33,34 @@ std::string common_columns(sqlite3* from, sqlite3* to, const std::string& table)
   return list;
 }
 
+/// The copy cannot be written, whatever can be read.
+class SaveError : public std::runtime_error {
+ public:
+  SaveError() : std::runtime_error("the copy cannot be written: is there room on its disk?") {}
+};
+
+/// Throws StorageError unless the tables can be found.
+void check_tables(sqlite3* database, const std::string& path) {
+  try {
+    if (identify(database, path) != DatabaseKind::kEmpty) {
+      return;
+    }
+  } catch (const StorageError&) {
+    if ((static_cast<unsigned>(sqlite3_errcode(database)) & 0xffU) != SQLITE_CORRUPT) {
+      throw;
+    }
+    throw StorageError(path +
+                       " is damaged where it says what tables it has: nothing can be salvaged");
+  }
+  throw StorageError(path + " is empty: no study was ever stored in it");
+}
+
 /// Copies the rows of one table in the order of their numbers, and passes over what cannot be read.
 class TableCopy {
  public:
   TableCopy(sqlite3* from, sqlite3* to, const std::string& table)
-      : columns_(common_columns(from, to, table)),
+      : to_(to),
+        columns_(common_columns(from, to, table)),
         read_(from,
               "SELECT rowid, " + columns_ + " FROM " + table + " WHERE rowid > ? ORDER BY rowid"),
         insert_(to, "INSERT INTO " + table + " (" + columns_ + ") VALUES (" + marks() + ")") {}
@@ -48,14 +71,15 @@ class TableCopy {
   void run() {
     // After an unreadable place the next readable row is sought in growing leaps, so that a long
     // one costs little and a short one takes few rows with it.
-    std::int64_t leap = 1;
+    std::int64_t leap = 0;
     while (!copy_until_unreadable()) {
-      unreadable_ += leap == 1 ? 1U : 0U;
-      if (last_ > std::numeric_limits<std::int64_t>::max() - leap) {
+      const bool is_new_place = copied_since_ || leap == 0;
+      unreadable_ += is_new_place ? 1U : 0U;
+      leap = is_new_place ? 1 : 2 * leap;
+      if (leap > kLongestLeap) {
         return;
       }
       last_ += leap;
-      leap = copied_since_ ? 1 : 2 * leap;
     }
   }
 
@@ -95,15 +119,22 @@ class TableCopy {
       insert_.run();
       ++rows_;
     } catch (const StorageError&) {
+      const auto code = static_cast<unsigned>(sqlite3_errcode(to_)) & 0xffU;
+      if (code != SQLITE_CONSTRAINT && code != SQLITE_MISMATCH) {
+        throw SaveError();
+      }
       insert_.reset();
       ++unreadable_;
     }
   }
 
+  sqlite3* to_;
   std::string columns_;
   Statement read_;
   Statement insert_;
-  std::int64_t last_ = std::numeric_limits<std::int64_t>::min();
+  /// No table has so many rows: behind such a leap is nothing.
+  static constexpr std::int64_t kLongestLeap = std::int64_t{1} << 42U;
+  std::int64_t last_ = 0;  // SQLite counts rows from 1
   bool copied_since_ = false;
   std::uint64_t rows_ = 0;
   std::uint64_t unreadable_ = 0;
@@ -113,11 +144,14 @@ class TableCopy {
 
 Salvaged salvage(const std::string& from, const std::string& to) {
   check_path(from);
+  if (!std::filesystem::exists(from)) {
+    throw StorageError("there is no database " + from);
+  }
   if (std::filesystem::exists(to)) {
     throw StorageError(to + " exists already: name a file that does not");
   }
   const DatabaseHandle source = open_database(from, SQLITE_OPEN_READWRITE);
-  (void)identify(source.get(), from);
+  check_tables(source.get(), from);
   DraftFile draft(to + ".part");
   Salvaged saved;
   { const Store with_schema(draft.path()); }

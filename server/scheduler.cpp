@@ -103,6 +103,9 @@ void Scheduler::on(const FailuresForgotten& event) {
   Study& study = found->second;
   study.failed -= std::min(study.failed, study.points.reopen(event.points));
   study.overlaps = study.leases > 0;  // the lease that a point failed in may still be there
+  if (study.leases == 0 && !study.points.has_results()) {
+    study.solver_version.clear();
+  }
   if (study.finished && !study.points.is_complete()) {
     study.finished = false;
     study.served = least_served(event.study);

@@ -15,6 +15,11 @@ void Scheduler::dispatch() {
            std::any_of(studies_.begin(), studies_.end(),
                        [](const auto& entry) { return entry.second.has_work(); });
   };
+  if (seeks_stragglers_ && !ready_workers_.empty()) {
+    // Another worker looks first each time, in case this one may have no straggler there is.
+    ready_workers_.push_back(ready_workers_.front());
+    ready_workers_.pop_front();
+  }
   std::size_t served_nothing = 0;  // workers in a row
   while (served_nothing < ready_workers_.size() && has_work()) {
     const WorkerId id = ready_workers_.front();

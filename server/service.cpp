@@ -40,6 +40,9 @@ Service::Service(ServiceSettings settings, Outbox& outbox, std::vector<StoredStu
                  Instant now)
     : settings_(std::move(settings)), outbox_(outbox), scheduler_(settings_.scheduler) {
   for (StoredStudy& study : studies) {
+    if (study.state == StudyState::kDone && study.settled.size() < study.table->size()) {
+      study.state = StudyState::kRunning;  // rows were lost or removed since: they are solved again
+    }
     study_ids_.emplace(study.name, study.study_id);
     studies_.emplace(study.study_id, Study{study.name,
                                            study.table,
@@ -233,6 +236,10 @@ void Service::stored(const Write& meaning, Instant now) {
     } else {
       reply_changed(state->client, state->study, 0, now);
     }
+  } else if (const auto* share = std::get_if<OfShare>(&meaning)) {
+    studies_.at(share->study).share = share->share;
+    feed(StudyShareChanged{share->study, share->share}, now);
+    continue_study(share->client, share->study, now);
   } else if (const auto* forgotten = std::get_if<OfFailures>(&meaning)) {
     Study& study = studies_.at(forgotten->study);
     forgotten->points.for_each(
@@ -240,6 +247,7 @@ void Service::stored(const Write& meaning, Instant now) {
     if (study.state == StudyState::kDone) {
       study.state = StudyState::kRunning;
     }
+    study.samples.clear();  // fewer points are settled now: no rate can be had of that
     feed(FailuresForgotten{forgotten->study, forgotten->points}, now);
     reply_changed(forgotten->client, forgotten->study, forgotten->points.size(), now);
   }
@@ -271,6 +279,8 @@ void Service::refused(const Write& meaning, const std::string& error) {
       study.state = state->before;
     }
     reply_error(state->client, "the change was not stored, the study is as before: " + error);
+  } else if (const auto* share = std::get_if<OfShare>(&meaning)) {
+    reply_error(share->client, "the change was not stored, the study is as before: " + error);
   } else if (const auto* forgotten = std::get_if<OfFailures>(&meaning)) {
     reply_error(forgotten->client, "the change was not stored, the study is as before: " + error);
   }

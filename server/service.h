@@ -90,6 +90,7 @@ class Service {
     std::string solver_version;
     std::string instruction_set;
     std::size_t unstored_messages = 0;
+    std::uint32_t hellos = 1;  // on its one connection
   };
   struct Sample {
     std::int64_t steady_ms;
@@ -129,8 +130,13 @@ class Service {
     IntervalSet points;
     Client client;
   };
+  struct OfShare {
+    StudyId study;
+    StudyShare share;
+    Client client;  // submitted the study again
+  };
   struct OfNothing {};
-  using Write = std::variant<OfResults, OfStudy, OfState, OfFailures, OfNothing>;
+  using Write = std::variant<OfResults, OfStudy, OfState, OfShare, OfFailures, OfNothing>;
 
   // service_workers.cpp
   void hello(const std::string& identity, const protocol::WorkerHello& hello, Instant now);
@@ -144,7 +150,6 @@ class Service {
   void set_state(const Client& client, StudyId id, StudyState state, bool submitted, Instant now);
   void submit(const Client& client, const protocol::SubmitRequest& request, Instant now);
   void continue_study(const Client& client, StudyId id, Instant now);
-  void set_share(StudyId id, const StudyShare& share, Instant now);
   void change(const Client& client, const protocol::ChangeRequest& request, Instant now);
   void retry(const Client& client, StudyId id, Instant now);
   void status(const Client& client, const protocol::StatusRequest& request, Instant now);
@@ -179,6 +184,7 @@ class Service {
   std::vector<WorkerId> unreachable_;                      // found while effects were carried out
   std::uint64_t last_ticket_ = 0;
   std::uint64_t bad_frames_ = 0;
+  std::uint64_t refused_workers_ = 0;
   std::string storage_fault_;  // why the database takes no results; empty: it does
   bool stopping_ = false;
 };

@@ -37,6 +37,20 @@ std::string objection_to_share(const StudyShare& share) {
   return {};
 }
 
+/// What the request says of the share, and for the rest what is.
+StudyShare asked_share(const protocol::SubmitRequest& request, StudyShare share) {
+  if (request.has_priority()) {
+    share.priority = request.priority();
+  }
+  if (request.has_weight() && request.weight() != 0.0) {
+    share.weight = request.weight();
+  }
+  if (request.has_mixes_versions()) {
+    share.mixes_versions = request.mixes_versions();
+  }
+  return share;
+}
+
 std::string unknown_study(const std::string& name) {
   return "there is no study called \"" + shortened(name, kLongestName) +
          "\": `oblique studies` lists all";
@@ -101,8 +115,9 @@ void Service::submit(const Client& client, const protocol::SubmitRequest& reques
     reply_error(client, reason);
     return;
   }
-  const StudyShare share{request.priority(), request.weight() == 0.0 ? 1.0 : request.weight(),
-                         request.mixes_versions()};
+  const auto known = study_ids_.find(request.name());
+  const StudyShare share = asked_share(
+      request, known == study_ids_.end() ? StudyShare{} : studies_.at(known->second).share);
   if (const std::string reason = objection_to_share(share); !reason.empty()) {
     reply_error(client, reason);
     return;
@@ -114,7 +129,7 @@ void Service::submit(const Client& client, const protocol::SubmitRequest& reques
     reply_error(client, error.what());
     return;
   }
-  if (const auto known = study_ids_.find(request.name()); known != study_ids_.end()) {
+  if (known != study_ids_.end()) {
     const Study& study = studies_.at(known->second);
     if (study.table->recipe().SerializeAsString() != table->recipe().SerializeAsString()) {
       reply_error(client, "there is a study called \"" + request.name() +
@@ -122,8 +137,11 @@ void Service::submit(const Client& client, const protocol::SubmitRequest& reques
                               "or use another database");
       return;
     }
-    set_share(known->second, share, now);
-    continue_study(client, known->second, now);
+    if (study.durable && !(study.share == share)) {
+      write(SetStudyShare{known->second, share}, OfShare{known->second, share, client}, true);
+    } else {
+      continue_study(client, known->second, now);
+    }
     return;
   }
   const StudyId id = ++settings_.last_study_id;
@@ -164,16 +182,6 @@ void Service::set_state(const Client& client, StudyId id, StudyState state, bool
   ++study.state_writes;
   write(SetStudyState{id, state, iso_8601(now)}, OfState{id, before, state, client, submitted},
         true);
-}
-
-void Service::set_share(StudyId id, const StudyShare& share, Instant now) {
-  Study& study = studies_.at(id);
-  if (study.share == share) {
-    return;
-  }
-  study.share = share;
-  write(SetStudyShare{id, share}, OfNothing{}, false);
-  feed(StudyShareChanged{id, share}, now);
 }
 
 void Service::change(const Client& client, const protocol::ChangeRequest& request, Instant now) {
@@ -259,7 +267,8 @@ protocol::StudyStatus Service::status_of(StudyId id, Instant now) const {
     const Sample& oldest = study.samples.front();
     const std::int64_t span_ms = now.steady_ms - oldest.steady_ms;
     if (span_ms > 0) {
-      status.set_points_per_s(1000.0 * static_cast<double>(settled - oldest.settled) /
+      status.set_points_per_s(1000.0 *
+                              (static_cast<double>(settled) - static_cast<double>(oldest.settled)) /
                               static_cast<double>(span_ms));
     }
   }

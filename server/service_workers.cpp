@@ -13,6 +13,15 @@ namespace {
 constexpr std::size_t kLongestName = 256;
 constexpr std::uint32_t kMostThreads = 4096;
 
+/// What a stranger says of itself, fit for logs and tables.
+std::string plain(const std::string& text) {
+  std::string kept = shortened(text, kLongestName);
+  std::replace_if(
+      kept.begin(), kept.end(),
+      [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, '?');
+  return kept;
+}
+
 }  // namespace
 
 void Service::worker_frame(const std::string& identity, std::string_view frame, Instant now) {
@@ -62,16 +71,33 @@ void Service::worker_frame(const std::string& identity, std::string_view frame, 
 }
 
 void Service::hello(const std::string& identity, const protocol::WorkerHello& hello, Instant now) {
+  if (writes_.size() >= settings_.most_unstored_messages) {
+    return;  // nobody is taken on while so much waits for the disk; the worker says it again
+  }
+  std::uint32_t hellos = 1;
   if (const auto known = worker_ids_.find(identity); known != worker_ids_.end()) {
+    // A worker says it once on a connection.
+    constexpr std::uint32_t kMostHellos = 8;
+    hellos = peers_.at(known->second).hellos + 1;
+    if (hellos > kMostHellos) {
+      bad_frame("a worker");
+      return;
+    }
     // It begins anew, and so do we: what it held is free again.
     const WorkerId old = known->second;
     feed(WorkerLeft{old}, now);
     forget(old);
   }
   protocol::ServerToWorker reply;
-  if (const std::string reason = protocol::objection_to_version(hello.protocol_version(), "worker");
-      !reason.empty()) {
-    outbox_.note(Severity::kWarning, "a worker is refused: " + reason);
+  std::string reason = protocol::objection_to_version(hello.protocol_version(), "worker");
+  if (reason.empty() && hello.solver_version().empty()) {
+    reason = "it does not say which version its solver has";
+  }
+  if (!reason.empty()) {
+    if (std::has_single_bit(++refused_workers_)) {
+      outbox_.note(Severity::kWarning, "a worker is refused: " + reason + " (" +
+                                           std::to_string(refused_workers_) + " refused so far)");
+    }
     reply.mutable_refused()->set_reason(reason);
     outbox_.to_worker(identity, reply);
     return;
@@ -79,10 +105,12 @@ void Service::hello(const std::string& identity, const protocol::WorkerHello& he
   const WorkerId id = ++settings_.last_worker_id;
   const Peer peer{identity,
                   hello.protocol_version(),
-                  shortened(hello.name(), kLongestName),
+                  plain(hello.name()),
                   std::clamp(hello.threads(), 1U, kMostThreads),
-                  shortened(hello.solver_version(), kLongestName),
-                  shortened(hello.instruction_set(), kLongestName)};
+                  plain(hello.solver_version()),
+                  plain(hello.instruction_set()),
+                  0,
+                  hellos};
   auto& welcome = *reply.mutable_welcome();
   welcome.set_protocol_version(peer.protocol_version);
   welcome.set_worker_id(id);

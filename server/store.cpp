@@ -158,6 +158,7 @@ Store::Store(const std::string& path) {
   lock_ = std::make_unique<Lock>(path);
   database_ = open_database(path, SQLITE_OPEN_READWRITE);
   sqlite3_busy_timeout(database_.get(), kBusyTimeout_ms);
+  log_ = std::make_unique<WriteAheadLog>(database_.get());
   const DatabaseKind kind = identify(database_.get(), path);
   Statement journal(database_.get(), "PRAGMA journal_mode = WAL");
   if (!journal.step() || journal.text(0) != "wal") {
@@ -165,7 +166,6 @@ Store::Store(const std::string& path) {
   }
   journal.reset();
   execute(database_.get(), "PRAGMA synchronous = FULL");
-  log_ = std::make_unique<WriteAheadLog>(database_.get());
   log_->make_sure();
   if (kind == DatabaseKind::kEmpty) {
     create_schema();

@@ -42,6 +42,8 @@ void WriteAheadLog::make_sure() {
   if (!is_suspect_) {
     return;
   }
+  // No other program may write meanwhile.
+  const Transaction transaction(database_);
   sqlite3_file* file = nullptr;
   sqlite3_file_control(database_, "main", SQLITE_FCNTL_JOURNAL_POINTER, &file);
   // Without methods it is not open: there is no log.

@@ -1,5 +1,6 @@
 #include "server/database_care.h"
 
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -127,6 +128,51 @@ TEST_F(DatabaseCareTest, WhatCanBeReadOfADamagedDatabaseIsSavedAndTheRestIsPendi
   const auto studies = copy.studies();
   EXPECT_EQ(studies.at(0).settled.size(), saved.results);
   EXPECT_EQ(studies.at(0).state, StudyState::kRunning);
+}
+
+TEST_F(DatabaseCareTest, SalvagingEndsAlsoWhenTheFirstPagesOfATableAreGone) {
+  constexpr std::uint64_t kPoints = 400;
+  for (const std::string damage : {"root of results", "first rows", "root of models"}) {
+    const std::string damaged = folder_.file(damage + ".db");
+    table_ = table_of(kPoints);
+    {
+      Store store(damaged);
+      add_results(store, 0, kPoints, true);
+    }
+    std::int64_t page = 0;
+    {
+      const DatabaseHandle database = open_database(damaged, SQLITE_OPEN_READONLY);
+      const std::string table = damage == "root of models" ? "models" : "results";
+      Statement root(database.get(), "SELECT rootpage FROM sqlite_schema WHERE name = ?");
+      root.bind(1, std::string_view(table));
+      ASSERT_TRUE(root.step());
+      page = root.integer(0);
+    }
+    std::fstream file(damaged, std::ios::in | std::ios::out | std::ios::binary);
+    if (damage == "first rows") {
+      // The first child that the root names, behind its header of twelve bytes and pointers.
+      std::array<unsigned char, 4096> root{};
+      file.seekg((page - 1) * 4096);
+      file.read(reinterpret_cast<char*>(root.data()), root.size());
+      const std::size_t cell = root[12] * 256U + root[13];
+      page = root[cell] * 16777216 + root[cell + 1] * 65536 + root[cell + 2] * 256 + root[cell + 3];
+    }
+    file.seekp((page - 1) * 4096);
+    file << std::string(4096, '\x5a');
+    file.close();
+    const std::string saved_file = folder_.file(damage + " saved.db");
+    const auto saved = salvage(damaged, saved_file);
+    EXPECT_GE(saved.unreadable_places, 1U) << damage;
+    EXPECT_EQ(saved.results > kPoints - 40, damage == "first rows") << damage << saved.results;
+    EXPECT_THAT(find_faults(saved_file), IsEmpty()) << damage;
+  }
+}
+
+TEST_F(DatabaseCareTest, ADatabaseWithoutStudiesOrTablesIsNotSalvaged) {
+  std::ofstream(folder_.file("empty.db"));
+  EXPECT_THROW(salvage(folder_.file("empty.db"), copy_), StorageError);
+  EXPECT_THROW(salvage(folder_.file("nowhere.db"), copy_), StorageError);
+  EXPECT_FALSE(std::filesystem::exists(copy_));
 }
 
 TEST_F(DatabaseCareTest, ASoundDatabaseIsSalvagedWhole) {

@@ -56,6 +56,14 @@ TEST(SchedulerVersion, AStudyWithoutResultsIsFreeForAnotherVersionOnceItsLeasesE
   EXPECT_EQ(bench.scheduler.study(1).solver_version, "2.0");
 }
 
+TEST(SchedulerVersion, AStudyWhoseOnlyResultsWereForgottenFailuresIsFreeForAnyVersion) {
+  SchedulerBench bench;
+  bench.feed(StudyAdded{1, table_of(1), IntervalSet(0, 1), 1, false, false, {}, "1.0"});
+  bench.feed(WorkerJoined{2, 1, "2.0"});
+  bench.feed(CreditGiven{2, 1});
+  EXPECT_EQ(only<SendBatch>(bench.feed(FailuresForgotten{1, IntervalSet(0, 1)})).size(), 1U);
+}
+
 TEST(SchedulerVersion, LateResultsOfAnotherVersionAreAcknowledgedAndNotStored) {
   SchedulerBench bench;
   bench.feed(StudyAdded{1, table_of(100), IntervalSet(0, 1), 0, false, false, {}, "1.0"});

@@ -45,7 +45,32 @@ TEST_F(ServiceTest, AStudyBegunWithAnotherSolverWaitsAndSaysForWhat) {
   ClientRequest mixing = submit_request("a");
   mixing.mutable_submit()->set_mixes_versions(true);
   request(mixing);
+  write_all();
   EXPECT_TRUE(last_message().has_batch());
+}
+
+TEST_F(ServiceTest, AnotherShareIsAcknowledgedOnceItIsDurableAndWhatIsNotGivenStays) {
+  ClientRequest first = submit_request("a");
+  first.mutable_submit()->set_weight(3.0);
+  request(first);
+  write_all();
+  ClientRequest again = submit_request("a");
+  again.mutable_submit()->set_priority(7);
+  const std::size_t replies = outbox_.replies.size();
+  request(again);
+  EXPECT_EQ(outbox_.replies.size(), replies) << "not before it is written";
+  write_all();
+  EXPECT_TRUE(last_reply().has_submit());
+  ClientRequest status;
+  status.set_protocol_version(protocol::kProtocolVersion);
+  status.mutable_status();
+  request(status);
+  EXPECT_EQ(last_reply().status().studies(0).priority(), 7);
+  EXPECT_EQ(last_reply().status().studies(0).weight(), 3.0);
+  again.mutable_submit()->set_priority(8);
+  request(again);
+  write_all("the disk is full");
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("disk is full"));
 }
 
 TEST_F(ServiceTest, PeersOfThePreviousProtocolVersionAreServed) {
@@ -95,6 +120,27 @@ TEST_F(ServiceTest, PeersOfAnyOtherProtocolVersionAreRefusedWithTheVersions) {
   EXPECT_THAT(last_reply().error().message(), HasSubstr("77"));
 }
 
+TEST_F(ServiceTest, AWorkerThatDoesNotNameItsSolverIsRefused) {
+  hello("worker", "");
+  EXPECT_THAT(last_message().refused().reason(), HasSubstr("version"));
+  EXPECT_EQ(service_->scheduler().workers(), 0U);
+}
+
+TEST_F(ServiceTest, HellosWithoutEndOnOneConnectionAreNotAnsweredForEver) {
+  for (int i = 0; i < 100; ++i) {
+    hello();
+  }
+  EXPECT_LT(outbox_.jobs.size(), 20U) << "each is a row in the database";
+  EXPECT_GT(service_->bad_frames(), 50U);
+}
+
+TEST_F(ServiceTest, WhatAWorkerSaysOfItselfCannotForgeLines) {
+  WorkerMessage message = hello_of(protocol::kProtocolVersion, "1.0");
+  message.mutable_hello()->set_name("a\n\x1b[31mb");
+  worker_says(message);
+  EXPECT_EQ(std::get<AddWorker>(outbox_.jobs.back().change).name, "a??[31mb");
+}
+
 TEST_F(ServiceTest, AFieldOfALaterVersionIsPassedOver) {
   // Field 1000 of the message and of the hello in it.
   std::string hello = protocol::encode(hello_of(protocol::kProtocolVersion, "1.0"));
@@ -142,6 +188,9 @@ TEST_F(FloodedServiceTest, AWorkerThatSendsWithoutEndIsDroppedAndCountedAndMayBe
   EXPECT_EQ(service_->bad_frames(), 1U);
   EXPECT_EQ(service_->scheduler().workers(), 0U);
   EXPECT_TRUE(last_message().has_hello_again());
+  hello();
+  EXPECT_EQ(service_->scheduler().workers(), 0U) << "not while so much waits for the disk";
+  write_all();
   hello();
   EXPECT_EQ(service_->scheduler().workers(), 1U);
 }

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <csignal>
+#include <filesystem>
 #include <fstream>
 #include <sstream>
 
@@ -14,7 +15,12 @@ constexpr std::chrono::milliseconds kBetweenLooks{5};
 }  // namespace
 
 Blow::Blow(const Folder& folder, const KillCase& kill_case)
-    : case_(kill_case), folder_(folder.path().string()), mark_(folder.file("struck")) {
+    : case_(kill_case),
+      folder_(folder.path().string()),
+      mark_(folder.file("struck")),
+      library_(folder.file("kill_points.so")) {
+  // LD_PRELOAD ends a path at a space or colon, which that of the build folder may have.
+  std::filesystem::create_symlink(OBLIQUE_KILL_POINTS, library_);
   if (case_.signal == SIGSTOP) {
     halt_ = std::jthread([this](const std::stop_token& stop) { end_the_halt(stop); });
   }
@@ -27,7 +33,7 @@ Environment Blow::environment(const std::string& program) const {
     order << case_.program << ' ' << case_.point << ' ' << case_.occurrence << ' ' << case_.signal
           << ' ' << case_.pause.count() << ' ' << mark_;
     all["OBLIQUE_KILL_AT"] = order.str();
-    all["LD_PRELOAD"] = OBLIQUE_KILL_POINTS;
+    all["LD_PRELOAD"] = library_;
   }
   return all;
 }

@@ -33,6 +33,7 @@ class Blow {
   const KillCase& case_;
   std::string folder_;
   std::string mark_;
+  std::string library_;
   bool explained_ = false;
   std::jthread halt_;  ///< last, as it uses the others
 };
