@@ -44,6 +44,11 @@ void SimulatedClient::ask() {
   } else {
     expect(protocol::STUDY_CHANGE_RESUME);
     request.mutable_submit()->set_name(name_);
+    if (world_.chance(0.3)) {
+      // Submitting again with another share changes it, durably before it is acknowledged.
+      request.mutable_submit()->set_priority(static_cast<std::int32_t>(world_.between(-2, 2)));
+      request.mutable_submit()->set_weight(static_cast<double>(world_.between(1, 8)) / 4.0);
+    }
     *request.mutable_submit()->mutable_recipe() = protocol::recipe_of(
         {{protocol::listed("H", {1.0}), protocol::range("mu", 0.0, 1.0, points_),
           protocol::listed("e", {1.0})}});
