@@ -35,6 +35,13 @@ void add_intervals(const solver::CaseResult& result, PointResult& message) {
   }
 }
 
+void add_reaction_peaks(const solver::CaseResult& result, PointResult& message) {
+  for (const solver::ReactionPeak& peak : result.reaction_peaks) {
+    message.add_reaction_peaks(peak.t_s);
+    message.add_reaction_peaks(peak.force_N);
+  }
+}
+
 void add_energy(const solver::ContactEnergy& energy, PointResult& message) {
   message.set_kinetic_in_j(energy.kinetic_in_J);
   message.set_friction_j(energy.friction_J);
@@ -108,6 +115,7 @@ PointResult to_message(std::uint64_t point, const solver::CaseResult& result) {
   message.set_stick_total_s(result.stick_total_s);
   add_peaks(result, message);
   add_intervals(result, message);
+  add_reaction_peaks(result, message);
   add_energy(result.energy, message);
   message.set_dt_s(result.solver.dt_s);
   message.set_steps(static_cast<std::uint64_t>(result.solver.steps));

@@ -46,9 +46,11 @@ constexpr std::array<RealColumn, 23> kRealColumns{{
 /// Columns before and after the real ones, in the order of the bindings.
 constexpr std::array<std::string_view, 8> kHeadColumns{"study_id", "point", "model_id", "H",
                                                        "mu",       "e",     "status",   "error"};
-constexpr std::array<std::string_view, 12> kTailColumns{
-    "steps",           "mode",   "major_mode",     "peaks",           "ft_peaks", "phases",
-    "stick_intervals", "worker", "solver_version", "instruction_set", "attempt",  "solved_at"};
+constexpr std::array<std::string_view, 13> kTailColumns{
+    "steps",    "mode",           "major_mode",      "peaks",
+    "ft_peaks", "phases",         "stick_intervals", "reaction_peaks",
+    "worker",   "solver_version", "instruction_set", "attempt",
+    "solved_at"};
 
 constexpr std::size_t kLongestText = 65536;
 
@@ -89,14 +91,14 @@ std::string fault_of(const PointResult& result) {
       return "the worker sent a " + std::string(column.name) + " that is not a finite number";
     }
   }
-  for (const Values* values :
-       {&result.peaks(), &result.ft_peaks(), &result.phase_ends_s(), &result.stick_intervals()}) {
+  for (const Values* values : {&result.peaks(), &result.ft_peaks(), &result.phase_ends_s(),
+                               &result.stick_intervals(), &result.reaction_peaks()}) {
     if (!all_finite(*values)) {
       return "the worker sent a list with a number that is not finite";
     }
   }
   if (result.peaks_size() % 3 != 0 || result.ft_peaks_size() % 2 != 0 ||
-      result.stick_intervals_size() % 2 != 0) {
+      result.stick_intervals_size() % 2 != 0 || result.reaction_peaks_size() % 2 != 0) {
     return "the worker sent a list of the wrong length";
   }
   if (std::max({result.mode().size(), result.major_mode().size(), result.error().size()}) >
@@ -146,10 +148,14 @@ void bind_result(Statement& insert, const RowContext& context, const PointResult
     insert.bind(index++, ft_peaks_json(result));
     insert.bind(index++, phases_json(result));
     insert.bind(index++, stick_intervals_json(result));
+    if (!result.reaction_peaks().empty()) {
+      insert.bind(index, reaction_peaks_json(result));
+    }
+    ++index;
   } else {
     // The outputs stay unbound, and so NULL.
     insert.bind(index, result.error());
-    index += 1 + static_cast<int>(kRealColumns.size()) + 7;
+    index += 1 + static_cast<int>(kRealColumns.size()) + 8;
   }
   if (context.worker_id != 0) {
     insert.bind(index, context.worker_id);
@@ -200,6 +206,10 @@ std::string phases_json(const PointResult& result) {
 
 std::string stick_intervals_json(const PointResult& result) {
   return pairs_json(result.stick_intervals());
+}
+
+std::string reaction_peaks_json(const PointResult& result) {
+  return pairs_json(result.reaction_peaks());
 }
 
 }  // namespace oblique::server

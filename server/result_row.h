@@ -38,5 +38,6 @@ std::string peaks_json(const protocol::PointResult& result);
 std::string ft_peaks_json(const protocol::PointResult& result);
 std::string phases_json(const protocol::PointResult& result);
 std::string stick_intervals_json(const protocol::PointResult& result);
+std::string reaction_peaks_json(const protocol::PointResult& result);
 
 }  // namespace oblique::server

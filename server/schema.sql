@@ -99,6 +99,9 @@ CREATE TABLE results (
   instruction_set  TEXT,
   attempt          INTEGER NOT NULL,
   solved_at        TEXT NOT NULL,
+  -- Largest force on the outer link at the pin O, then at each joint: JSON [[t_s, force_N], ...].
+  -- NULL: the row is of an earlier schema or worker.
+  reaction_peaks   TEXT,
   UNIQUE (study_id, point)
 ) STRICT;
 
@@ -126,6 +129,13 @@ SELECT r.study_id AS study_id, r.point AS point, item.key AS seq,
        json_extract(item.value, '$[1]') AS t1_s
 FROM results AS r, json_each(r.stick_intervals) AS item;
 
+-- `seq` 0 is the pin O, 1 the first joint from there.
+CREATE VIEW reaction_peaks AS
+SELECT r.study_id AS study_id, r.point AS point, item.key AS seq,
+       json_extract(item.value, '$[0]') AS t_s,
+       json_extract(item.value, '$[1]') AS force_N
+FROM results AS r, json_each(r.reaction_peaks) AS item;
+
 -- For people: study name, outputs and model beside each other. Young's modulus is E_Pa here, for
 -- column names do not tell E from e.
 CREATE VIEW runs AS
@@ -137,6 +147,7 @@ SELECT s.name AS study, r.study_id AS study_id, r.point AS point, r.H AS H, r.mu
        r.vt_out_m_s AS vt_out_m_s, r.vn_out_m_s AS vn_out_m_s, r.mode AS mode,
        r.major_mode AS major_mode, r.stick_total_s AS stick_total_s, r.peaks AS peaks,
        r.ft_peaks AS ft_peaks, r.phases AS phases, r.stick_intervals AS stick_intervals,
+       r.reaction_peaks AS reaction_peaks,
        r.kinetic_in_J AS kinetic_in_J, r.friction_J AS friction_J,
        r.restitution_J AS restitution_J, r.kinetic_change_J AS kinetic_change_J,
        r.strain_change_J AS strain_change_J, r.gravity_change_J AS gravity_change_J,

@@ -191,7 +191,7 @@ void Store::create_schema() {
 }
 
 void Store::migrate() {
-  constexpr std::array kSteps{kMigrateFrom1Sql, kMigrateFrom2Sql};
+  constexpr std::array kSteps{kMigrateFrom1Sql, kMigrateFrom2Sql, kMigrateFrom3Sql};
   static_assert(kSteps.size() == kSchemaVersion - 1, "a step from each schema to the next");
   Statement version(database_.get(), "PRAGMA user_version");
   version.step();

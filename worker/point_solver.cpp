@@ -76,7 +76,8 @@ bool is_finite(const protocol::PointResult& result) {
                             result.wall_s()};
   return std::all_of(std::begin(scalars), std::end(scalars), finite) &&
          all_finite(result.peaks()) && all_finite(result.ft_peaks()) &&
-         all_finite(result.phase_ends_s()) && all_finite(result.stick_intervals());
+         all_finite(result.phase_ends_s()) && all_finite(result.stick_intervals()) &&
+         all_finite(result.reaction_peaks());
 }
 
 }  // namespace oblique::worker

@@ -72,6 +72,7 @@ solver::CaseResult distinct_result() {
   result.major_mode = "SC SR";
   result.stick_total_s = 7e-5;
   result.stick_intervals = {{0.0, 6e-5}, {8e-5, 9e-5}};
+  result.reaction_peaks = {{3.2e-4, 5053.0}, {3.4e-4, 4611.0}};
   result.phases = {{solver::PhaseKind::kCompression, 0.0, 6.8e-5},
                    {solver::PhaseKind::kRestitution, 6.8e-5, 5.5e-4}};
   result.energy = {1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0};
@@ -126,6 +127,8 @@ TEST(PointResultTest, ListsOfAResultArePackedInOrder) {
   EXPECT_EQ(doubles(message.ft_peaks()), (std::vector<double>{1.1e-5, 2023.0, 3.1e-5, 607.0}));
   EXPECT_EQ(doubles(message.phase_ends_s()), (std::vector<double>{6.8e-5, 5.5e-4}));
   EXPECT_EQ(doubles(message.stick_intervals()), (std::vector<double>{0.0, 6e-5, 8e-5, 9e-5}));
+  EXPECT_EQ(doubles(message.reaction_peaks()),
+            (std::vector<double>{3.2e-4, 5053.0, 3.4e-4, 4611.0}));
 }
 
 TEST(PointResultTest, AResultComesBackFromAFrameUnchanged) {

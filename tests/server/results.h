@@ -54,6 +54,10 @@ inline protocol::PointResult solved_point(std::uint64_t point) {
   result.add_phase_ends_s(third * 3e-4);
   result.add_stick_intervals(0.0);
   result.add_stick_intervals(third * 1e-6);
+  for (int joint = 0; joint < 3; ++joint) {
+    result.add_reaction_peaks(third * 1e-5 * (joint + 1));
+    result.add_reaction_peaks(third * 1e3 / (joint + 1));
+  }
   result.set_steps(1234);
   result.set_wall_s(0.25);
   return result;

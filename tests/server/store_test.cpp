@@ -175,6 +175,27 @@ TEST_F(StoreTest, ViewsUnfoldThePackedArrays) {
   EXPECT_EQ(phases.rows(0).values(0).text(), "compression,restitution,compression");
 }
 
+TEST_F(StoreTest, TheLargestReactionsComeBackWithTheSameBitsThePinFirst) {
+  Store store(path_);
+  const auto study = study_of(3);
+  auto of_older_worker = solved_point(2);
+  of_older_worker.clear_reaction_peaks();
+  const auto result = solved_point(1);
+  commit(store, {study, results_of(study, {result, of_older_worker})});
+  const auto peaks = ask(path_, "SELECT point, seq, t_s, force_N FROM reaction_peaks ORDER BY seq");
+  ASSERT_EQ(peaks.rows_size(), 3);
+  for (int joint = 0; joint < 3; ++joint) {
+    const auto& row = peaks.rows(joint);
+    EXPECT_EQ(row.values(0).integer(), 1);
+    EXPECT_EQ(row.values(1).integer(), joint);
+    EXPECT_EQ(row.values(2).real(), result.reaction_peaks(2 * joint));
+    EXPECT_EQ(row.values(3).real(), result.reaction_peaks(2 * joint + 1));
+  }
+  const auto in_runs = ask(path_, "SELECT reaction_peaks IS NULL FROM runs ORDER BY point");
+  EXPECT_EQ(in_runs.rows(0).values(0).integer(), 0);
+  EXPECT_EQ(in_runs.rows(1).values(0).integer(), 1) << "its worker did not send any";
+}
+
 TEST_F(StoreTest, AFailedPointHasAReasonAndNoOutputs) {
   Store store(path_);
   const auto study = study_of(3);
