@@ -276,9 +276,20 @@ void PointTable::add_block(const Block& block) {
   }
   if (axes.empty()) {
     base_model_number_ = first_model;
+    add_to_base_segments(block_points);
   }
   blocks_.push_back({points_, block_points, first_model, block_models});
   points_ += block_points;
+}
+
+void PointTable::add_to_base_segments(std::uint64_t block_points) {
+  const bool continues = !base_segments_.empty() &&
+                         base_segments_.back().first_point + base_segments_.back().count == points_;
+  if (continues) {
+    base_segments_.back().count += block_points;
+  } else {
+    base_segments_.push_back({*base_model_number_, points_, block_points});
+  }
 }
 
 std::uint64_t PointTable::size() const {
@@ -337,6 +348,12 @@ solver::ModelParameters PointTable::model(std::uint64_t index) const {
 Segment PointTable::segment_at(std::uint64_t index) const {
   std::size_t block = 0;
   const BlockLayout& layout = layout_at(index, block);
+  const auto next = std::upper_bound(
+      base_segments_.begin(), base_segments_.end(), index,
+      [](std::uint64_t point, const Segment& segment) { return point < segment.first_point; });
+  if (next != base_segments_.begin() && index - (next - 1)->first_point < (next - 1)->count) {
+    return *(next - 1);
+  }
   const std::uint64_t points_per_model = layout.points / layout.models;
   const std::uint64_t model = (index - layout.first_point) / points_per_model;
   return {layout.first_model + model, layout.first_point + model * points_per_model,

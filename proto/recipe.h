@@ -47,7 +47,9 @@ class PointTable {
   /// Throws std::out_of_range for a point or model that the study does not have.
   Point point(std::uint64_t index) const;
   solver::ModelParameters model(std::uint64_t index) const;
-  /// The whole run of points around `index` that shares its model and block.
+  /// The whole run of points around `index` that shares its model. Blocks without model axes that
+  /// follow each other are one run, so that studies of many small blocks are handed out and solved
+  /// as one large block is.
   Segment segment_at(std::uint64_t index) const;
 
  private:
@@ -60,10 +62,13 @@ class PointTable {
   const BlockLayout& layout_at(std::uint64_t point, std::size_t& block) const;
 
   void add_block(const Block& block);
+  /// Counts the points of a block without model axes that is about to be added.
+  void add_to_base_segments(std::uint64_t block_points);
 
   Recipe recipe_;
   solver::ModelParameters base_model_;
   std::vector<BlockLayout> blocks_;
+  std::vector<Segment> base_segments_;     ///< of the blocks without model axes, in order
   std::vector<std::size_t> model_blocks_;  ///< blocks that bring models of their own, in order
   std::optional<std::uint64_t> base_model_number_;  ///< shared by all blocks without model axes
   std::uint64_t points_ = 0;

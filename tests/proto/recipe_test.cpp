@@ -68,7 +68,7 @@ TEST(PointTableTest, EveryPointIsThatOfNestedLoopsOverTheAxes) {
   }
 }
 
-TEST(PointTableTest, ASegmentIsTheLongestRunOfPointsWithOneModelInsideABlock) {
+TEST(PointTableTest, ASegmentIsTheLongestRunOfPointsWithOneModel) {
   const PointTable table(varied_recipe());
   std::uint64_t next = 0;
   int segments = 0;
@@ -86,6 +86,30 @@ TEST(PointTableTest, ASegmentIsTheLongestRunOfPointsWithOneModelInsideABlock) {
   }
   EXPECT_EQ(next, table.size());
   EXPECT_EQ(segments, 1 + 6 + 1 + 3);
+}
+
+TEST(PointTableTest, BlocksThatShareAModelAndFollowEachOtherAreOneSegment) {
+  const std::vector<Axis> point{listed("H", {1.0}), listed("mu", {0.4}), listed("e", {1.0})};
+  const std::vector<Axis> two{listed("H", {0.9, 1.0}), listed("mu", {0.4}), listed("e", {1.0})};
+  std::vector<Axis> other_model = two;
+  other_model.insert(other_model.begin(), listed("k", {1e7}));
+  const PointTable table(recipe_of({point, two, point, other_model, other_model, two, two, point}));
+  struct Run {
+    std::uint64_t model;
+    std::uint64_t first_point;
+    std::uint64_t count;
+  };
+  for (const auto& [model, first_point, count] :
+       {Run{0, 0, 4}, Run{1, 4, 2}, Run{2, 6, 2}, Run{0, 8, 5}}) {
+    for (std::uint64_t i = first_point; i < first_point + count; ++i) {
+      SCOPED_TRACE(i);
+      const Segment segment = table.segment_at(i);
+      EXPECT_EQ(segment.model, model);
+      EXPECT_EQ(segment.first_point, first_point);
+      EXPECT_EQ(segment.count, count);
+    }
+  }
+  EXPECT_THROW(table.segment_at(13), std::out_of_range);
 }
 
 TEST(PointTableTest, BlocksWithoutModelAxesShareOneModel) {

@@ -39,6 +39,29 @@ TEST(SchedulerTest, AWorkerGetsNoMoreBatchesThanItAskedFor) {
   EXPECT_TRUE(bench.pass(1000, {5}).empty());
 }
 
+TEST(SchedulerTest, ABatchRunsAcrossBlocksOfOnePointEach) {
+  constexpr std::uint64_t kBlocks = 1000;
+  const std::vector<protocol::Axis> point{
+      protocol::listed("H", {1.0}), protocol::listed("mu", {0.4}), protocol::listed("e", {1.0})};
+  SchedulerBench bench;
+  bench.feed(StudyAdded{
+      1, std::make_shared<const protocol::PointTable>(protocol::recipe_of({kBlocks, point})), {}});
+  std::deque<SendBatch> held;
+  std::uint64_t batches = 0;
+  for (const auto& batch : bench.join(1, 1)) {
+    held.push_back(batch);
+  }
+  while (!held.empty()) {
+    ++batches;
+    bench.solve_and_store(held.front());
+    held.pop_front();
+    for (const auto& batch : only<SendBatch>(bench.feed(CreditGiven{1, 1}))) {
+      held.push_back(batch);
+    }
+  }
+  EXPECT_LT(batches, kBlocks / 10);
+}
+
 TEST(SchedulerTest, TenPointsSpreadOverTwoWorkers) {
   SchedulerBench bench;
   bench.join(1, 2);
