@@ -3,6 +3,8 @@
 #include <filesystem>
 
 #include "server/draft_file.h"
+#include "server/result_row.h"
+#include "server/row_checksum.h"
 #include "server/sqlite.h"
 
 namespace oblique::server {
@@ -94,6 +96,15 @@ std::vector<std::string> find_faults(const std::string& path) {
       " WHERE r.study_id = s.study_id) || ' of ' || points || ' results' FROM studies AS s"
       " WHERE state = 'done' AND points <> (SELECT count(*) FROM results AS r"
       " WHERE r.study_id = s.study_id) LIMIT 20");
+  if (identify(database.get(), path) == DatabaseKind::kOurs) {
+    add_row_checksum(database.get());
+    add("SELECT 'study ' || study_id || ', ' || name || ': its recipe, name or size is not the one"
+        " that was stored' FROM studies"
+        " WHERE checksum <> row_checksum(study_id, name, recipe, points, created_at) LIMIT 20");
+    add("SELECT 'study ' || study_id || ', point ' || point || ': its row is not the one that was"
+        " stored' FROM results WHERE checksum <> " +
+        result_checksum_sql() + " LIMIT 20");
+  }
   return faults;
 }
 

@@ -83,6 +83,27 @@ std::string pairs_json(const Values& values) {
   return text + "]";
 }
 
+/// As lists for SQL; ?1 is the parameter of the first column.
+struct ColumnsAndMarks {
+  std::string names;
+  std::string marks;
+};
+ColumnsAndMarks columns_and_marks() {
+  ColumnsAndMarks lists;
+  int count = 0;
+  const auto add = [&](std::string_view name) {
+    const std::string separator = ++count == 1 ? "" : ", ";
+    lists.names += separator + std::string(name);
+    lists.marks += separator + "?" + std::to_string(count);
+  };
+  std::for_each(kHeadColumns.begin(), kHeadColumns.end(), add);
+  for (const auto& column : kRealColumns) {
+    add(column.name);
+  }
+  std::for_each(kTailColumns.begin(), kTailColumns.end(), add);
+  return lists;
+}
+
 }  // namespace
 
 std::string fault_of(const PointResult& result) {
@@ -101,6 +122,16 @@ std::string fault_of(const PointResult& result) {
       result.stick_intervals_size() % 2 != 0 || result.reaction_peaks_size() % 2 != 0) {
     return "the worker sent a list of the wrong length";
   }
+  if (std::any_of(result.major_peaks().begin(), result.major_peaks().end(),
+                  [&](std::uint32_t number) {
+                    return number >= static_cast<std::uint32_t>(result.peaks_size() / 3);
+                  })) {
+    return "the worker sent the number of a major peak that is not there";
+  }
+  if (result.steps() > static_cast<std::uint64_t>(INT64_MAX)) {
+    return "the worker sent steps = " + std::to_string(result.steps()) +
+           ", more than the database can hold";
+  }
   if (std::max({result.mode().size(), result.major_mode().size(), result.error().size()}) >
       kLongestText) {
     return "the worker sent a text that is too long";
@@ -109,20 +140,14 @@ std::string fault_of(const PointResult& result) {
 }
 
 std::string insert_result_sql() {
-  std::string names;
-  std::string marks;
-  const auto add = [&](std::string_view name) {
-    names += (names.empty() ? "" : ", ") + std::string(name);
-    marks += marks.empty() ? "?" : ", ?";
-  };
-  std::for_each(kHeadColumns.begin(), kHeadColumns.end(), add);
-  for (const auto& column : kRealColumns) {
-    add(column.name);
-  }
-  std::for_each(kTailColumns.begin(), kTailColumns.end(), add);
+  const auto [names, marks] = columns_and_marks();
   // Only a point that is there already is passed over; any other conflict is an error.
-  return "INSERT INTO results (" + names + ") VALUES (" + marks +
-         ") ON CONFLICT (study_id, point) DO NOTHING";
+  return "INSERT INTO results (" + names + ", checksum) VALUES (" + marks + ", row_checksum(" +
+         marks + ")) ON CONFLICT (study_id, point) DO NOTHING";
+}
+
+std::string result_checksum_sql() {
+  return "row_checksum(" + columns_and_marks().names + ")";
 }
 
 void bind_result(Statement& insert, const RowContext& context, const PointResult& result) {

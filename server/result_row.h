@@ -9,13 +9,17 @@
 
 namespace oblique::server {
 
-/// Why a result from the network cannot be stored, or an empty text: a number that is not finite,
-/// packed arrays of impossible length, texts too long.
+/// Why a result from the network cannot be stored, or an empty text: a number that is not finite or
+/// that the database cannot hold, packed arrays of impossible length, texts too long.
 std::string fault_of(const protocol::PointResult& result);
 
 /// The statement that inserts one row into `results` unless the point has one; `bind_result` binds
-/// it.
+/// it. The connection must have `row_checksum`.
 std::string insert_result_sql();
+
+/// What `checksum` of a row of `results` must be, as an expression over its columns. A later schema
+/// leaves columns that it adds out of it: earlier rows keep their checksums.
+std::string result_checksum_sql();
 
 /// What stands in a row of `results` beside the outputs of the solver.
 struct RowContext {

@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "server/draft_file.h"
+#include "server/result_row.h"
+#include "server/row_checksum.h"
 #include "server/sqlite.h"
 #include "server/store.h"
 
@@ -55,14 +57,22 @@ void check_tables(sqlite3* database, const std::string& path) {
   throw StorageError(path + " is empty: no study was ever stored in it");
 }
 
+/// Says of each row of the table whether it is as it was written, as far as that can be told.
+std::string soundness_sql(sqlite3* database, const std::string& table) {
+  const auto names = columns_of(database, table);
+  const bool has_checksums =
+      table == "results" && std::find(names.begin(), names.end(), "checksum") != names.end();
+  return has_checksums ? "checksum IS NULL OR checksum = " + result_checksum_sql() : "1";
+}
+
 /// Copies the rows of one table in the order of their numbers, and passes over what cannot be read.
 class TableCopy {
  public:
   TableCopy(sqlite3* from, sqlite3* to, const std::string& table)
       : to_(to),
         columns_(common_columns(from, to, table)),
-        read_(from,
-              "SELECT rowid, " + columns_ + " FROM " + table + " WHERE rowid > ? ORDER BY rowid"),
+        read_(from, "SELECT rowid, " + soundness_sql(from, table) + ", " + columns_ + " FROM " +
+                        table + " WHERE rowid > ? ORDER BY rowid"),
         insert_(to, "INSERT INTO " + table + " (" + columns_ + ") VALUES (" + marks() + ")") {}
 
   std::uint64_t rows() const { return rows_; }
@@ -112,9 +122,13 @@ class TableCopy {
 
   /// A row that the schema does not take is damaged, too.
   void insert_row() {
+    if (read_.integer(1) == 0) {
+      ++unreadable_;
+      return;
+    }
     try {
-      for (int column = 1; column < read_.columns(); ++column) {
-        insert_.bind_column(column, read_, column);
+      for (int column = 2; column < read_.columns(); ++column) {
+        insert_.bind_column(column - 1, read_, column);
       }
       insert_.run();
       ++rows_;
@@ -140,6 +154,35 @@ class TableCopy {
   std::uint64_t unreadable_ = 0;
 };
 
+/// The tables that are copied, each after those that it refers to.
+std::vector<const char*> tables_of(sqlite3* database) {
+  std::vector<const char*> tables{"studies", "models", "workers", "results"};
+  if (!columns_of(database, "retries").empty()) {
+    tables.push_back("retries");
+  }
+  return tables;
+}
+
+/// Makes an end of what refers to rows that were not saved.
+void mend_references(sqlite3* database) {
+  // Rows of a study or model that is gone tell nothing.
+  execute(database,
+          "DELETE FROM results WHERE study_id NOT IN (SELECT study_id FROM studies)"
+          " OR model_id NOT IN (SELECT model_id FROM models)");
+  execute(database, "DELETE FROM retries WHERE study_id NOT IN (SELECT study_id FROM studies)");
+  // A worker's number that is known to be right stays, so that the row keeps its checksum.
+  execute(database,
+          "INSERT INTO workers SELECT worker, 'lost with a damaged file', 1, min(solver_version),"
+          " min(instruction_set), min(solved_at) FROM results WHERE checksum IS NOT NULL"
+          " AND worker NOT IN (SELECT worker_id FROM workers) GROUP BY worker");
+  execute(database,
+          "UPDATE results SET worker = NULL"
+          " WHERE worker NOT IN (SELECT worker_id FROM workers)");
+  execute(database,
+          "UPDATE studies SET state = 'running' WHERE state = 'done' AND points <>"
+          " (SELECT count(*) FROM results AS r WHERE r.study_id = studies.study_id)");
+}
+
 }  // namespace
 
 Salvaged salvage(const std::string& from, const std::string& to) {
@@ -152,28 +195,20 @@ Salvaged salvage(const std::string& from, const std::string& to) {
   }
   const DatabaseHandle source = open_database(from, SQLITE_OPEN_READWRITE);
   check_tables(source.get(), from);
+  add_row_checksum(source.get());
   DraftFile draft(to + ".part");
   Salvaged saved;
   { const Store with_schema(draft.path()); }
   {
     const DatabaseHandle target = open_database(draft.path(), SQLITE_OPEN_READWRITE);
     Transaction transaction(target.get());
-    for (const char* table : {"studies", "models", "workers", "results"}) {
+    for (const char* table : tables_of(source.get())) {
       TableCopy copy(source.get(), target.get(), table);
       copy.run();
       saved.unreadable_places += copy.unreadable_places();
-      (table == std::string("studies") ? saved.studies : saved.results) = copy.rows();
+      saved.studies += table == std::string_view("studies") ? copy.rows() : 0;
     }
-    // Rows of a study or model that is gone tell nothing.
-    execute(target.get(),
-            "DELETE FROM results WHERE study_id NOT IN (SELECT study_id FROM studies)"
-            " OR model_id NOT IN (SELECT model_id FROM models)");
-    execute(target.get(),
-            "UPDATE results SET worker = NULL"
-            " WHERE worker NOT IN (SELECT worker_id FROM workers)");
-    execute(target.get(),
-            "UPDATE studies SET state = 'running' WHERE state = 'done' AND points <>"
-            " (SELECT count(*) FROM results AS r WHERE r.study_id = studies.study_id)");
+    mend_references(target.get());
     transaction.commit();
     Statement count(target.get(), "SELECT count(*) FROM results");
     count.step();

@@ -34,6 +34,7 @@ void Scheduler::on(const StudyAdded& event) {
                    Study{StudyPoints(event.table, event.settled, suspect_after_losses),
                          event.failed, event.cancelled, event.paused, false, event.share,
                          least_served(event.study), event.solver_version});
+  studies_.at(event.study).points.count_attempts(event.attempts);
   finish_if_complete(event.study);
 }
 
@@ -102,6 +103,7 @@ void Scheduler::on(const FailuresForgotten& event) {
   }
   Study& study = found->second;
   study.failed -= std::min(study.failed, study.points.reopen(event.points));
+  study.points.count_attempts(event.attempts);
   study.overlaps = study.leases > 0;  // the lease that a point failed in may still be there
   if (study.leases == 0 && !study.points.has_results()) {
     study.solver_version.clear();

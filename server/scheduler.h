@@ -59,6 +59,7 @@ struct StudyAdded {
   bool paused = false;
   StudyShare share{};
   std::string solver_version{};  ///< of its results; empty while there are none
+  AttemptRuns attempts{};        ///< of points that failed, also of those that were forgotten
 };
 /// The study's cancellation is durable.
 struct StudyCancelled {
@@ -80,6 +81,7 @@ struct StudyShareChanged {
 struct FailuresForgotten {
   StudyId study;
   IntervalSet points;
+  AttemptRuns attempts{};  ///< in which they failed
 };
 /// A worker said hello. Worker numbers are never used twice.
 struct WorkerJoined {

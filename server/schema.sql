@@ -18,7 +18,8 @@ CREATE TABLE studies (
   changed_at  TEXT NOT NULL,     -- when `state` was last set
   priority    INTEGER NOT NULL,  -- studies of a higher one come first
   weight      REAL NOT NULL,     -- share of the workers among studies of one priority
-  mixes_versions INTEGER NOT NULL DEFAULT 0  -- 1: results of several solver versions are allowed
+  mixes_versions INTEGER NOT NULL DEFAULT 0, -- 1: results of several solver versions are allowed
+  checksum    INTEGER            -- CRC-32 of study_id, name, recipe, points and created_at
 ) STRICT;
 
 -- Every parameter but H, mu and e; one row for each distinct model that has results. The columns
@@ -102,7 +103,20 @@ CREATE TABLE results (
   -- Largest force on the outer link at the pin O, then at each joint: JSON [[t_s, force_N], ...].
   -- NULL: the row is of an earlier schema or worker.
   reaction_peaks   TEXT,
+  -- CRC-32 of the other columns (server/row_checksum.h), which `oblique check` compares with them.
+  -- NULL: the row is of an earlier schema. Whoever changes a row sets it to NULL.
+  checksum         INTEGER,
   UNIQUE (study_id, point)
+) STRICT;
+
+-- Failed points that were forgotten to be solved again: runs of neighbours that had failed in one
+-- attempt. Where several rows name a point the last one counts.
+CREATE TABLE retries (
+  study_id    INTEGER NOT NULL REFERENCES studies (study_id),
+  first_point INTEGER NOT NULL,
+  points      INTEGER NOT NULL,
+  attempt     INTEGER NOT NULL,  -- that failed; the next one has a higher number
+  retried_at  TEXT NOT NULL
 ) STRICT;
 
 CREATE INDEX failed_points ON results (study_id, point) WHERE status = 'failed';

@@ -50,6 +50,7 @@ Service::Service(ServiceSettings settings, Outbox& outbox, std::vector<StoredStu
                                            study.created_at,
                                            study.share,
                                            study.failures,
+                                           study.attempts,
                                            true,
                                            0,
                                            false,
@@ -57,7 +58,7 @@ Service::Service(ServiceSettings settings, Outbox& outbox, std::vector<StoredStu
                                            {}});
     feed(StudyAdded{study.study_id, study.table, std::move(study.settled), study.failures.size(),
                     study.state == StudyState::kCancelled, study.state == StudyState::kPaused,
-                    study.share, study.solver_version},
+                    study.share, study.solver_version, std::move(study.attempts)},
          now);
   }
 }
@@ -147,7 +148,7 @@ void Service::write_results(const StoreResults& effect, protocol::Results& messa
                     effect.worker,        peer.solver_version,
                     peer.instruction_set, message.attempt(),
                     iso_8601(now),        {}};
-  OfResults meaning{{effect.worker, effect.study, effect.sequence, {}}};
+  OfResults meaning{{effect.worker, effect.study, effect.sequence, {}}, message.attempt()};
   for (const std::size_t index : effect.accepted) {
     protocol::PointResult& result = *message.mutable_results(static_cast<int>(index));
     meaning.event.outcomes.push_back({result.point(), !result.error().empty()});
@@ -168,7 +169,8 @@ void Service::write_failure(const StoreFailure& effect, Instant now) {
                     effect.attempt,
                     iso_8601(now),
                     {protocol::failed_point(effect.point, effect.reason)}};
-  write(std::move(change), OfResults{{0, effect.study, 0, {{effect.point, true}}}}, false);
+  write(std::move(change), OfResults{{0, effect.study, 0, {{effect.point, true}}}, effect.attempt},
+        false);
 }
 
 void Service::written(const WriteReport& report, Instant now) {
@@ -204,7 +206,9 @@ void Service::stored(const Write& meaning, Instant now) {
   if (const auto* results = std::get_if<OfResults>(&meaning)) {
     for (const PointOutcome& outcome : results->event.outcomes) {
       if (outcome.failed) {
-        studies_.at(results->event.study).failures.insert(outcome.point);
+        Study& study = studies_.at(results->event.study);
+        study.failures.insert(outcome.point);
+        study.attempts.set({outcome.point, outcome.point + 1}, results->attempt);
       }
     }
     if (const auto peer = peers_.find(results->event.worker); peer != peers_.end()) {
@@ -248,7 +252,7 @@ void Service::stored(const Write& meaning, Instant now) {
       study.state = StudyState::kRunning;
     }
     study.samples.clear();  // fewer points are settled now: no rate can be had of that
-    feed(FailuresForgotten{forgotten->study, forgotten->points}, now);
+    feed(FailuresForgotten{forgotten->study, forgotten->points, study.attempts}, now);
     reply_changed(forgotten->client, forgotten->study, forgotten->points.size(), now);
   }
 }

@@ -103,6 +103,7 @@ class Service {
     std::string created_at;
     StudyShare share;
     IntervalSet failures;  // points whose rows say failed
+    AttemptRuns attempts;  // of points that failed, also of those that were forgotten
     bool durable = false;
     std::uint32_t state_writes = 0;  // changes of state on their way to the disk
     /// A change was refused. What the disk took of it may count again after a crash, until
@@ -114,6 +115,7 @@ class Service {
   // What a write stands for.
   struct OfResults {
     ResultsStored event;
+    std::uint32_t attempt;
   };
   struct OfStudy {
     StudyId study;

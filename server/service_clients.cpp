@@ -153,6 +153,7 @@ void Service::submit(const Client& client, const protocol::SubmitRequest& reques
                              created_at,
                              share,
                              {},
+                             {},
                              false,
                              0,
                              false,

@@ -5,7 +5,6 @@
 #include <cerrno>
 #include <cstring>
 #include <random>
-#include <utility>
 
 #include <fcntl.h>
 #include <sys/file.h>
@@ -14,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "server/result_row.h"
+#include "server/row_checksum.h"
 #include "server/schema.h"
 
 namespace oblique::server {
@@ -30,34 +30,6 @@ std::string random_id() {
     id += kDigits[source() % kDigits.size()];
   }
   return id;
-}
-
-StudyState state_named(const std::string& name) {
-  for (const StudyState state : {StudyState::kDone, StudyState::kCancelled, StudyState::kPaused}) {
-    if (name == state_name(state)) {
-      return state;
-    }
-  }
-  return StudyState::kRunning;
-}
-
-/// The points, in order, that a query over one study gives.
-IntervalSet points_of(Statement& query, std::uint64_t study_id) {
-  IntervalSet points;
-  Interval run{0, 0};
-  query.reset();
-  query.bind(1, study_id);
-  while (query.step()) {
-    const auto point = static_cast<std::uint64_t>(query.integer(0));
-    if (point != run.end) {
-      points.insert(run.begin, run.end);
-      run.begin = point;
-    }
-    run.end = point + 1;
-  }
-  points.insert(run.begin, run.end);
-  query.reset();
-  return points;
 }
 
 /// Inserts a model, its columns by name. The keys are the columns, but for those handled first.
@@ -123,12 +95,21 @@ struct Store::Statements {
   explicit Statements(sqlite3* database)
       : add_study(database,
                   "INSERT INTO studies (study_id, name, recipe, points, state, created_at,"
-                  " changed_at, priority, weight, mixes_versions)"
-                  " VALUES (?1, ?2, ?3, ?4, 'running', ?5, ?5, ?6, ?7, ?8)"),
+                  " changed_at, priority, weight, mixes_versions, checksum)"
+                  " VALUES (?1, ?2, ?3, ?4, 'running', ?5, ?5, ?6, ?7, ?8,"
+                  " row_checksum(?1, ?2, ?3, ?4, ?5))"),
         set_state(database, "UPDATE studies SET state = ?2, changed_at = ?3 WHERE study_id = ?1"),
         set_share(database,
                   "UPDATE studies SET priority = ?2, weight = ?3, mixes_versions = ?4"
                   " WHERE study_id = ?1"),
+        note_retries(database,
+                     // Neighbours of one attempt have one difference between number and rank.
+                     "INSERT INTO retries (study_id, first_point, points, attempt, retried_at)"
+                     " SELECT ?1, min(point), count(*), attempt, ?4 FROM"
+                     " (SELECT point, attempt,"
+                     " point - row_number() OVER (PARTITION BY attempt ORDER BY point) AS run"
+                     " FROM results WHERE study_id = ?1 AND point >= ?2 AND point < ?3"
+                     " AND status = 'failed') GROUP BY attempt, run"),
         forget_failures(database,
                         "DELETE FROM results WHERE study_id = ?1 AND point >= ?2 AND point < ?3"
                         " AND status = 'failed'"),
@@ -145,6 +126,7 @@ struct Store::Statements {
   Statement add_study;
   Statement set_state;
   Statement set_share;
+  Statement note_retries;
   Statement forget_failures;
   Statement reopen;
   Statement add_worker;
@@ -158,6 +140,7 @@ Store::Store(const std::string& path) {
   lock_ = std::make_unique<Lock>(path);
   database_ = open_database(path, SQLITE_OPEN_READWRITE);
   sqlite3_busy_timeout(database_.get(), kBusyTimeout_ms);
+  add_row_checksum(database_.get());
   log_ = std::make_unique<WriteAheadLog>(database_.get());
   const DatabaseKind kind = identify(database_.get(), path);
   Statement journal(database_.get(), "PRAGMA journal_mode = WAL");
@@ -257,6 +240,12 @@ void Store::add(const SetStudyShare& change) {
 
 void Store::add(const ForgetFailures& change) {
   change.points.for_each([&](const Interval& run) {
+    Statement& note = statements_->note_retries;
+    note.bind(1, change.study_id);
+    note.bind(2, run.begin);
+    note.bind(3, run.end);
+    note.bind(4, change.changed_at);
+    note.run();
     Statement& forget = statements_->forget_failures;
     forget.bind(1, change.study_id);
     forget.bind(2, run.begin);
@@ -318,45 +307,6 @@ std::int64_t Store::model_id(const AddResults& change, std::uint64_t model) {
   }
   model_ids_.emplace(key, id);
   return id;
-}
-
-std::vector<StoredStudy> Store::studies() {
-  std::vector<StoredStudy> found;
-  Statement list(database_.get(),
-                 "SELECT study_id, name, recipe, state, created_at, priority, weight,"
-                 " mixes_versions FROM studies ORDER BY study_id");
-  Statement version(database_.get(),
-                    "SELECT solver_version FROM results WHERE study_id = ?"
-                    " AND solver_version IS NOT NULL ORDER BY point LIMIT 1");
-  Statement settled(database_.get(), "SELECT point FROM results WHERE study_id = ? ORDER BY point");
-  Statement failed(database_.get(),
-                   "SELECT point FROM results WHERE study_id = ? AND status = 'failed'"
-                   " ORDER BY point");
-  while (list.step()) {
-    StoredStudy study{};
-    study.study_id = static_cast<std::uint64_t>(list.integer(0));
-    study.name = list.text(1);
-    study.state = state_named(list.text(3));
-    study.created_at = list.text(4);
-    study.share = {static_cast<std::int32_t>(list.integer(5)), list.real(6), list.integer(7) != 0};
-    protocol::Recipe recipe;
-    try {
-      if (!recipe.ParseFromString(list.text(2))) {
-        throw StorageError("its bytes are damaged");
-      }
-      study.table = std::make_shared<const protocol::PointTable>(std::move(recipe));
-    } catch (const std::runtime_error& reason) {
-      throw StorageError("the recipe of study " + study.name + " cannot be read: " + reason.what());
-    }
-    version.reset();
-    version.bind(1, study.study_id);
-    study.solver_version = version.step() ? version.text(0) : "";
-    version.reset();
-    study.settled = points_of(settled, study.study_id);
-    study.failures = points_of(failed, study.study_id);
-    found.push_back(std::move(study));
-  }
-  return found;
 }
 
 std::uint64_t Store::highest(const std::string& sql) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "server/attempt_runs.h"
 #include "server/changes.h"
 #include "server/interval_set.h"
 #include "server/sqlite.h"
@@ -24,6 +25,7 @@ struct StoredStudy {
   std::string solver_version;  ///< of its first result that a worker solved; empty: there is none
   IntervalSet settled;         ///< points that have a row
   IntervalSet failures;        ///< those whose row says failed
+  AttemptRuns attempts{};      ///< of these, and of those that failed and were forgotten
 };
 
 /// The SQLite database (schema.sql), opened for writing. Only one Store may have a file open;
@@ -63,6 +65,7 @@ class Store final : public Storage {
 
   void create_schema();
   void migrate();
+  AttemptRuns attempts_of(std::uint64_t study_id);
   void add(const AddStudy& change);
   void add(const SetStudyState& change);
   void add(const SetStudyShare& change);

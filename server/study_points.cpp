@@ -110,6 +110,22 @@ std::uint64_t StudyPoints::reopen(const IntervalSet& points) {
   return reopened;
 }
 
+void StudyPoints::count_attempts(const AttemptRuns& attempts) {
+  // Workers may say any number; what is added to it must not overflow.
+  constexpr std::uint32_t kMostAttempts = 1'000'000'000;
+  attempts.for_each([this](const Interval& counted, std::uint32_t times) {
+    for (const Interval& run : fresh_.within(counted.begin, counted.end)) {
+      fresh_.erase(run.begin, run.end);
+      for (std::uint64_t first = run.begin; first < run.end;) {
+        const protocol::Segment segment = table_->segment_at(first);
+        const std::uint64_t end = std::min(run.end, segment.first_point + segment.count);
+        returned_.emplace(first, History{end, times < kMostAttempts ? times : kMostAttempts, 0});
+        first = end;
+      }
+    }
+  });
+}
+
 std::uint64_t StudyPoints::free() const {
   return table_->size() - leased_.size() - committing_.size() - settled_.size();
 }

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "proto/recipe.h"
+#include "server/attempt_runs.h"
 #include "server/interval_set.h"
 
 namespace oblique::server {
@@ -65,6 +66,10 @@ class StudyPoints {
 
   /// The settled ones among these points become fresh. Returns how many they were.
   std::uint64_t reopen(const IntervalSet& points);
+
+  /// The fresh ones among these points were leased so often before, by an earlier run of the server
+  /// or before they were reopened.
+  void count_attempts(const AttemptRuns& attempts);
 
   bool has_free() const { return !returned_.empty() || !fresh_.empty(); }
   bool has_suspect() const { return !suspect_.empty(); }

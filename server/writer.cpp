@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <chrono>
 #include <iterator>
+#include <set>
+#include <type_traits>
 #include <utility>
+#include <variant>
 
 #include "server/sqlite.h"
 
@@ -15,6 +18,19 @@ constexpr std::size_t kLargestGroup = 256;
 
 /// Pause before a faulty database is tried again.
 constexpr std::chrono::milliseconds kRetryPause{500};
+
+/// The study that a change is of; 0: of none.
+std::uint64_t study_of(const Change& change) {
+  return std::visit(
+      [](const auto& c) -> std::uint64_t {
+        if constexpr (std::is_same_v<std::decay_t<decltype(c)>, AddWorker>) {
+          return 0;
+        } else {
+          return c.study_id;
+        }
+      },
+      change);
+}
 
 }  // namespace
 
@@ -105,11 +121,21 @@ bool GroupCommit::write_group(std::deque<WriteJob>& jobs, std::vector<WriteRepor
 
 void GroupCommit::write_singly(std::deque<WriteJob>& jobs, std::vector<WriteReport>& reports) {
   std::deque<WriteJob> kept;
+  std::set<std::uint64_t> waiting;  // studies with a job among those kept
   std::string fault;
+  const auto keep = [&](WriteJob& job) {
+    waiting.insert(study_of(job.change));
+    kept.push_back(std::move(job));
+  };
   for (WriteJob& job : jobs) {
-    // Behind a job that must stay in order nothing of its kind is tried.
+    // Behind a job that is kept nothing of its kind is tried, nor anything else of its study: done
+    // and then retried must not become retried and then done.
     if (!fault.empty() && !job.answer_failure) {
-      kept.push_back(std::move(job));
+      keep(job);
+      continue;
+    }
+    if (waiting.contains(study_of(job.change))) {
+      reports.push_back({WriteReport::Kind::kRefused, job.ticket, fault});
       continue;
     }
     try {
@@ -120,7 +146,7 @@ void GroupCommit::write_singly(std::deque<WriteJob>& jobs, std::vector<WriteRepo
         reports.push_back({WriteReport::Kind::kRefused, job.ticket, error.what()});
       } else {
         fault = error.what();
-        kept.push_back(std::move(job));
+        keep(job);
       }
     }
   }

@@ -42,7 +42,8 @@ class GroupCommit {
   explicit GroupCommit(Storage& storage) : storage_(storage) {}
 
   /// Writes the first of `jobs`, in order, and takes off what is durable or given up. When a group
-  /// fails, each of all jobs is tried alone, so that a bad one does not take the others with it.
+  /// fails, each of all jobs is tried alone, so that a bad one does not take the others with it;
+  /// changes of one study keep their order also then.
   std::vector<WriteReport> write(std::deque<WriteJob>& jobs);
 
   /// The last write left jobs that the database did not take.

@@ -86,6 +86,7 @@ class ServiceTest : public testing::Test {
     auto& results = *message.mutable_results();
     results.set_study_id(batch.study_id());
     results.set_lease_id(batch.lease_id());
+    results.set_attempt(batch.attempt());
     results.set_sequence(++sequence_);
     results.set_batch_done(true);
     for (std::uint64_t i = batch.first_point(); i < batch.first_point() + batch.count(); ++i) {

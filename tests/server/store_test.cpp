@@ -235,6 +235,36 @@ TEST_F(StoreTest, OneModelOfTwoStudiesIsOneRowAndEachKeyIsAColumn) {
   }
 }
 
+TEST_F(StoreTest, AttemptsOfFailuresAreKnownAfterARestartAlsoWhenTheFailuresAreForgotten) {
+  const auto study = study_of(10);
+  const auto failed_in = [&](std::uint32_t attempt, std::vector<std::uint64_t> points) {
+    std::vector<protocol::PointResult> results;
+    for (const std::uint64_t point : points) {
+      results.push_back(protocol::failed_point(point, "it never fell"));
+    }
+    auto change = results_of(study, std::move(results));
+    change.attempt = attempt;
+    return change;
+  };
+  IntervalSet retried(2, 6);
+  retried.insert(8);
+  {
+    Store store(path_);
+    commit(store, {study, failed_in(1, {2, 3, 5}), failed_in(2, {4, 8, 9})});
+    commit(store, {ForgetFailures{1, retried, "later"}});
+    commit(store, {failed_in(3, {4})});
+  }
+  std::map<std::uint64_t, std::uint32_t> attempts;
+  Store(path_).studies().at(0).attempts.for_each([&](const Interval& run, std::uint32_t number) {
+    for (std::uint64_t point = run.begin; point < run.end; ++point) {
+      attempts[point] = number;
+    }
+  });
+  EXPECT_EQ(attempts, (std::map<std::uint64_t, std::uint32_t>{
+                          {2, 1}, {3, 1}, {4, 3}, {5, 1}, {8, 2}, {9, 2}}));
+  EXPECT_EQ(ask(path_, "SELECT * FROM retries").rows_size(), 4) << "neighbours share a row";
+}
+
 TEST_F(StoreTest, RunsNamesTheStudyItsModelAndTheWorker) {
   Store store(path_);
   const auto study = study_of(3);

@@ -141,6 +141,37 @@ TEST_F(WriterTest, ResultsWaitForAFullDiskAndAreWrittenWhenThereIsRoom) {
   EXPECT_EQ(storage_.committed(), (std::vector<std::uint64_t>{1, 2}));
 }
 
+TEST(GroupCommitTest, AChangeThatWaitsIsNotOvertakenByALaterOneOfItsStudy) {
+  // Takes retries, and nothing else.
+  class OnlyRetries final : public Storage {
+   public:
+    void commit(std::span<const Change> changes) override {
+      for (const Change& change : changes) {
+        if (!std::holds_alternative<ForgetFailures>(change)) {
+          throw StorageError("the disk is full");
+        }
+      }
+      ++retries;
+    }
+    int retries = 0;
+  };
+  OnlyRetries storage;
+  GroupCommit commits(storage);
+  std::deque<WriteJob> jobs;
+  jobs.push_back({1, SetStudyState{1, StudyState::kDone, ""}, false});
+  jobs.push_back({2, ForgetFailures{1, IntervalSet(0, 1), ""}, true});
+  jobs.push_back({3, ForgetFailures{2, IntervalSet(0, 1), ""}, true});
+  std::map<std::uint64_t, Kind> became;
+  for (const auto& report : commits.write(jobs)) {
+    became[report.ticket] = report.kind;
+  }
+  EXPECT_EQ(became[2], Kind::kRefused);
+  EXPECT_EQ(became[3], Kind::kStored) << "of another study";
+  EXPECT_EQ(storage.retries, 1);
+  ASSERT_EQ(jobs.size(), 1U);
+  EXPECT_EQ(jobs.front().ticket, 1U);
+}
+
 TEST_F(WriterTest, FinishingSaysHowManyChangesWereNotMadeDurable) {
   storage_.set_full(true);
   writer_.submit(kept(1));
