@@ -4,13 +4,11 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <numeric>
 #include <set>
 #include <span>
 #include <utility>
 
 #include "client/nearest.h"
-#include "worker/solver/solve.h"
 
 namespace oblique::client {
 namespace {
@@ -37,9 +35,12 @@ const ParameterKey* find_point_key(std::string_view name) {
 }
 
 // Place of a key in the order of a block's axes.
-std::size_t place_of(std::string_view name) {
-  const auto names = all_key_names();
-  return static_cast<std::size_t>(std::find(names.begin(), names.end(), name) - names.begin());
+std::ptrdiff_t place_of(std::string_view name) {
+  const auto model_keys = solver::model_keys();
+  const auto* key = solver::find_model_key(name);
+  return key != nullptr
+             ? key - model_keys.data()
+             : std::ssize(model_keys) + (find_point_key(name) - solver::point_keys().data());
 }
 
 void check_ends(const ParameterKey& key, double from, double to) {
@@ -49,48 +50,6 @@ void check_ends(const ParameterKey& key, double from, double to) {
     throw InputError(std::string(key.name) + " runs from " + shown_number(from) + " to " +
                      shown_number(to) + ": a range must rise; swap `from` and `to`");
   }
-}
-
-// A fall depends on these keys alone; models that differ elsewhere share one.
-solver::ModelParameters fall_of(solver::ModelParameters model) {
-  const solver::ModelParameters defaults;
-  model.k_N_m = defaults.k_N_m;
-  model.eta2 = defaults.eta2;
-  model.dt_s = defaults.dt_s;
-  return model;
-}
-
-double largest_H_m(const protocol::Block& block) {
-  const auto& axis = *std::find_if(block.axes().begin(), block.axes().end(),
-                                   [](const protocol::Axis& a) { return a.key() == "H"; });
-  return axis.count() > 0 ? axis.to()
-                          : *std::max_element(axis.values().begin(), axis.values().end());
-}
-
-// The distinct falls of a block's models; empty when there are too many to solve beforehand.
-std::vector<solver::ModelParameters> falls_of_block(const protocol::PointTable& table, int block) {
-  constexpr std::uint64_t kMostModels = 8;
-  if (table.models() > kMostModels) {
-    return {};
-  }
-  std::vector<solver::ModelParameters> falls;
-  std::uint64_t first = 0;
-  for (int b = 0; b <= block; ++b) {
-    std::uint64_t points = 1;
-    for (const auto& axis : table.recipe().blocks(b).axes()) {
-      points *= protocol::axis_size(axis);
-    }
-    for (std::uint64_t at = first; b == block && at < first + points;) {
-      const auto segment = table.segment_at(at);
-      const auto fall = fall_of(table.model(segment.model));
-      if (std::find(falls.begin(), falls.end(), fall) == falls.end()) {
-        falls.push_back(fall);
-      }
-      at = segment.first_point + segment.count;
-    }
-    first += points;
-  }
-  return falls;
 }
 
 }  // namespace
@@ -214,45 +173,6 @@ protocol::Block block_of(std::vector<protocol::Axis> axes) {
     *block.add_axes() = std::move(axis);
   }
   return block;
-}
-
-namespace {
-
-/// Whether a coarse mesh, which falls nearly alike and at a small part of the cost, passes H with
-/// room to spare.
-bool is_reached_by_far(solver::ModelParameters model, double H_m) {
-  constexpr int kCoarse = 2;
-  constexpr double kRoom = 0.98;
-  if (model.elements_per_link <= kCoarse) {
-    return false;
-  }
-  model.elements_per_link = kCoarse;
-  model.dt_fall_s = 0.0;  // the coarse mesh's own
-  return H_m <= kRoom * solver::Finger(model).largest_drop_m();
-}
-
-}  // namespace
-
-void check_reach(const protocol::PointTable& table, int block) {
-  // No finger falls through less than this part of its length, so lower drops need no look.
-  constexpr double kSurelyReached = 0.9;
-  const double H_m = largest_H_m(table.recipe().blocks(block));
-  for (const auto& model : falls_of_block(table, block)) {
-    const double length_m = std::accumulate(model.lengths_m.begin(), model.lengths_m.end(), 0.0);
-    if (H_m <= kSurelyReached * length_m) {
-      continue;
-    }
-    if (is_reached_by_far(model, H_m)) {
-      continue;
-    }
-    const double reach_m = solver::Finger(model).largest_drop_m();
-    if (H_m > reach_m) {
-      throw InputError(
-          "H = " + shown_number(H_m) +
-          " m is not allowed: the tip of this finger first turns back after a drop of " +
-          shown_number(reach_m) + " m, so H must be at most that");
-    }
-  }
 }
 
 void check_study_name(const std::string& name) {

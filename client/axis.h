@@ -40,12 +40,6 @@ protocol::Axis stepped_axis(const solver::ParameterKey& key, double from, double
 /// Throws InputError when H, mu or e is missing.
 protocol::Block block_of(std::vector<protocol::Axis> axes);
 
-/// Throws InputError unless every model of block `block` reaches the block's largest H. Only an H
-/// near the length of the chain is looked into, by solving the fall once for each model (on a
-/// coarse mesh, which mostly settles it, and then on the model's own), and only when the study has
-/// few models; elsewhere an H out of reach shows as failed points.
-void check_reach(const protocol::PointTable& table, int block);
-
 /// Throws InputError unless `name` may name a study: 1 to 100 bytes without control characters,
 /// not beginning with '-'.
 void check_study_name(const std::string& name);

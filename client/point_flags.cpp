@@ -179,7 +179,7 @@ protocol::Recipe recipe_of_flags(const PointFlags& flags) {
   protocol::Recipe recipe;
   *recipe.mutable_model() = protocol::to_message(model);
   *recipe.add_blocks() = block_of(std::move(axes));
-  check_reach(protocol::PointTable(recipe), 0);
+  ReachChecker()(protocol::PointTable(recipe), 0);
   return recipe;
 }
 

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "client/axis.h"
+#include "client/reach.h"
 
 namespace oblique::client {
 
@@ -18,8 +19,8 @@ Study read_study_file(const std::filesystem::path& path);
 using ReachCheck = std::function<void(const protocol::PointTable& table, int block)>;
 
 /// The same for the text of a study file; `file` is what errors call it. `check` may be cheaper
-/// than check_reach, which solves falls.
+/// than a ReachChecker, which solves falls.
 Study parse_study(std::string_view text, const std::string& file,
-                  const ReachCheck& check = check_reach);
+                  const ReachCheck& check = ReachChecker());
 
 }  // namespace oblique::client

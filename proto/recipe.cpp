@@ -2,9 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <bitset>
 #include <cmath>
-#include <numeric>
-#include <set>
 #include <span>
 #include <sstream>
 #include <stdexcept>
@@ -15,11 +14,6 @@ namespace {
 
 /// The point keys close every block in this order.
 constexpr std::array<std::string_view, 3> kPointKeyOrder{"H", "mu", "e"};
-
-/// How many values of a range are checked one by one. Every key allows an interval, so that the two
-/// ends would do, or the whole numbers in an interval shorter than this: there, more values than
-/// this are less than 1 apart and the second is refused.
-constexpr std::uint64_t kCheckedRangeValues = 1024;
 
 /// A key from outside, fit for a message: long ones only by their length.
 std::string quoted(const std::string& key) {
@@ -34,13 +28,6 @@ std::string all_keys() {
     names += std::string(key.name) + ", ";
   }
   return names + "H, mu and e";
-}
-
-const solver::ParameterKey* find_point_key(std::string_view name) {
-  const auto keys = solver::point_keys();
-  const auto found = std::find_if(
-      keys.begin(), keys.end(), [&](const solver::ParameterKey& key) { return key.name == name; });
-  return found == keys.end() ? nullptr : &*found;
 }
 
 std::string number(double value) {
@@ -89,43 +76,65 @@ void check_range_axis(const solver::ParameterKey& key, const Axis& axis) {
                              " values is not allowed: a range holds both ends, so it needs two "
                              "different ends and 2 values or more, or equal ends and 1");
   }
-  for (std::uint64_t i = 0; i < std::min(axis.count(), kCheckedRangeValues); ++i) {
+  for (const std::uint64_t i : deciding_values(axis)) {
     solver::check_value(key, axis_value(axis, i));
   }
 }
 
-/// Checks one axis alone.
-void check_axis(const Axis& axis) {
-  const solver::ParameterKey* key = find_point_key(axis.key());
-  if (key == nullptr) {
-    key = solver::find_model_key(axis.key());
+/// Number of a key among the model keys and, after them, those of a point. Throws InputError for an
+/// unknown one.
+std::size_t key_number(const std::string& name) {
+  const auto model_keys = solver::model_keys();
+  if (const solver::ParameterKey* key = solver::find_model_key(name)) {
+    return static_cast<std::size_t>(key - model_keys.data());
   }
-  if (key == nullptr) {
-    throw solver::InputError("unknown key " + quoted(axis.key()) + ": the keys are " + all_keys());
+  const auto found = std::find(kPointKeyOrder.begin(), kPointKeyOrder.end(), name);
+  if (found == kPointKeyOrder.end()) {
+    throw solver::InputError("unknown key " + quoted(name) + ": the keys are " + all_keys());
   }
-  if (axis.count() == 0) {
-    check_listed_axis(*key, axis);
-  } else {
-    check_range_axis(*key, axis);
-  }
+  return model_keys.size() + static_cast<std::size_t>(found - kPointKeyOrder.begin());
 }
 
-/// Checks the keys of a block together: none twice, H, mu and e there, and last in that order.
-void check_axis_order(const Block& block) {
-  std::set<std::string_view> seen;
+const solver::ParameterKey& key_numbered(std::size_t number) {
+  const auto model_keys = solver::model_keys();
+  return number < model_keys.size() ? model_keys[number]
+                                    : solver::point_keys()[number - model_keys.size()];
+}
+
+/// Which keys a block has, by `key_number`.
+using KeySet = std::bitset<32>;
+
+/// Checks each axis of a block alone and that no key is there twice. Returns which are.
+KeySet check_axes(const Block& block) {
+  KeySet seen;
   for (const Axis& axis : block.axes()) {
-    if (!seen.insert(axis.key()).second) {
+    const std::size_t number = key_number(axis.key());
+    if (seen.test(number)) {
       throw solver::InputError(axis.key() + " appears twice: an axis is given once in a block");
     }
-  }
-  for (const auto key : kPointKeyOrder) {
-    if (!seen.contains(key)) {
-      throw solver::InputError(std::string(key) + " is missing: every block needs H, mu and e");
+    seen.set(number);
+    const solver::ParameterKey& key = key_numbered(number);
+    if (axis.count() == 0) {
+      check_listed_axis(key, axis);
+    } else {
+      check_range_axis(key, axis);
     }
   }
-  const auto model_keys = block.axes_size() - static_cast<int>(kPointKeyOrder.size());
+  return seen;
+}
+
+/// Checks the keys of a block together: H, mu and e there, and last in that order.
+void check_axis_order(const Block& block, const KeySet& seen) {
+  const std::size_t model_keys = solver::model_keys().size();
   for (std::size_t i = 0; i < kPointKeyOrder.size(); ++i) {
-    const Axis& axis = block.axes(model_keys + static_cast<int>(i));
+    if (!seen.test(model_keys + i)) {
+      throw solver::InputError(std::string(kPointKeyOrder[i]) +
+                               " is missing: every block needs H, mu and e");
+    }
+  }
+  const auto model_axes = block.axes_size() - static_cast<int>(kPointKeyOrder.size());
+  for (std::size_t i = 0; i < kPointKeyOrder.size(); ++i) {
+    const Axis& axis = block.axes(model_axes + static_cast<int>(i));
     if (axis.key() != kPointKeyOrder[i]) {
       throw solver::InputError("axis " + axis.key() +
                                " is out of order: model keys come first, then H, mu and e");
@@ -170,10 +179,7 @@ void check_reach(solver::ModelParameters model, const Block& block) {
 }
 
 void check_block(const solver::ModelParameters& model, const Block& block) {
-  for (const Axis& axis : block.axes()) {
-    check_axis(axis);
-  }
-  check_axis_order(block);
+  check_axis_order(block, check_axes(block));
   check_reach(model, block);
 }
 
@@ -234,6 +240,16 @@ double axis_value(const Axis& axis, std::uint64_t i) {
                               i, axis.count() - 1),
                  exponent);
   return std::min(std::max(value, axis.from()), axis.to());
+}
+
+std::vector<std::uint64_t> deciding_values(const Axis& axis) {
+  std::vector<std::uint64_t> deciding{0};
+  for (const std::uint64_t i : {std::uint64_t{1}, axis.count() - 1}) {
+    if (i < axis.count() && i > deciding.back()) {
+      deciding.push_back(i);
+    }
+  }
+  return deciding;
 }
 
 std::uint64_t axis_size(const Axis& axis) {

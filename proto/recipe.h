@@ -80,6 +80,11 @@ class PointTable {
 /// have.
 double axis_value(const Axis& axis, std::uint64_t i);
 
+/// Numbers of the values of a range that tell whether all of them are allowed. Every key allows an
+/// interval, for which the two ends are enough, or the whole numbers of one: when the first two
+/// values are whole their distance is, and so are all.
+std::vector<std::uint64_t> deciding_values(const Axis& axis);
+
 /// Number of values of an axis.
 std::uint64_t axis_size(const Axis& axis);
 

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -293,6 +294,28 @@ TEST(ExampleStudies, HaveThePointsThatTheirCommentsPromise) {
   EXPECT_EQ(points("paper"), 10U);
   EXPECT_EQ(points("friction-and-restitution"), 440U);
   EXPECT_EQ(points("mesh"), 6U);
+}
+
+TEST(StudyFileTest, AFallIsSolvedOnceForAllBlocksThatShareIt) {
+  std::string text;
+  for (int i = 0; i < 50; ++i) {
+    text += "[[block]]\nH = 1.1\nmu = 0." + std::to_string(100 + i) + "\ne = 1\n";
+    text += "k = [1e7, 2e7]\n";  // a stiffness of the contact: the fall is the same
+  }
+  ReachChecker checker;
+  EXPECT_EQ(parse_study(text, "x.toml", std::ref(checker)).recipe.blocks_size(), 50);
+  EXPECT_GT(checker.falls_solved(), 0U);
+  EXPECT_LE(checker.falls_solved(), 2U) << "on a coarse mesh and on the model's own";
+}
+
+TEST(StudyFileTest, OnlyTheFirstFewFallsOfAStudyAreSolvedBeforehand) {
+  std::string text = "[model]\nelements_per_link = 2\n";
+  for (int i = 0; i < 30; ++i) {
+    text += "[[block]]\nH = 1.1\nmu = 0.4\ne = 1\nrho = " + std::to_string(2700 + i) + "\n";
+  }
+  ReachChecker checker;
+  parse_study(text, "x.toml", std::ref(checker));
+  EXPECT_EQ(checker.falls_solved(), ReachChecker::kMostFalls);
 }
 
 }  // namespace

@@ -127,6 +127,32 @@ TEST(RecipeErrorsTest, ARangeOfWholeNumbersThatHoldsFractionsIsRefused) {
               HasSubstr("elements_per_link = 1.0000002"));
 }
 
+TEST(RecipeErrorsTest, ARangeIsRefusedExactlyWhenOneOfItsValuesIs) {
+  const solver::ParameterKey& key = *solver::find_model_key("elements_per_link");
+  for (const double from : {1.0, 2.0, 7.0}) {
+    for (const double to : {8.0, 13.0, 256.0}) {
+      for (std::uint64_t count = 2; count <= 520; ++count) {
+        const Axis axis = range("elements_per_link", from, to, count);
+        bool all_allowed = true;
+        for (std::uint64_t i = 0; i < count; ++i) {
+          all_allowed = all_allowed && key.is_allowed(axis_value(axis, i));
+        }
+        EXPECT_EQ(refusal_with_model_axis(axis).empty(), all_allowed)
+            << from << ":" << to << ":" << count;
+      }
+    }
+  }
+}
+
+TEST(RecipeErrorsTest, ARangeOfAnyLengthIsJudgedByThreeOfItsValues) {
+  EXPECT_EQ(deciding_values(range("mu", 0.4, 0.4, 1)).size(), 1U);
+  EXPECT_EQ(deciding_values(range("mu", 0.0, 1.0, 2)).size(), 2U);
+  for (const std::uint64_t count : {3ULL, 1024ULL, 1'000'000'000'000ULL}) {
+    EXPECT_EQ(deciding_values(range("mu", 0.0, 1.0, count)),
+              (std::vector<std::uint64_t>{0, 1, count - 1}));
+  }
+}
+
 TEST(RecipeErrorsTest, AnHBeyondTheShortestChainOfTheBlockIsRefused) {
   EXPECT_THAT(
       refusal(recipe_of({{range("H", 0.9, 1.3, 5), listed("mu", {0.4}), listed("e", {1.0})}})),
