@@ -36,6 +36,7 @@ void Scheduler::on(const StudyAdded& event) {
                          least_served(event.study), event.solver_version});
   studies_.at(event.study).points.count_attempts(event.attempts);
   finish_if_complete(event.study);
+  requeue(event.study);
 }
 
 void Scheduler::on(const StudyCancelled& event) {
@@ -44,15 +45,11 @@ void Scheduler::on(const StudyCancelled& event) {
     return;
   }
   found->second.cancelled = true;
-  std::vector<LeaseId> ended;
-  for (const auto& [id, lease] : leases_) {
-    if (lease.study == event.study) {
-      ended.push_back(id);
-    }
-  }
-  for (const LeaseId id : ended) {
+  found->second.overlaps = false;  // all leases end: whose point it was does not matter
+  for (const LeaseId id : found->second.leases.all()) {
     end_lease(id, LeaseEnd::kReturned);
   }
+  requeue(event.study);
   for (auto& [id, worker] : workers_) {
     if (worker.defined.erase(event.study) != 0) {
       effects_.emplace_back(WithdrawStudy{id, event.study});
@@ -64,6 +61,7 @@ void Scheduler::on(const StudyPaused& event) {
   const auto found = studies_.find(event.study);
   if (found != studies_.end() && found->second.is_open()) {
     found->second.paused = true;
+    requeue(event.study);
   }
 }
 
@@ -73,6 +71,7 @@ void Scheduler::on(const StudyReopened& event) {
     found->second.cancelled = false;
     found->second.paused = false;
     found->second.served = least_served(event.study);
+    requeue(event.study);
   }
 }
 
@@ -84,16 +83,14 @@ void Scheduler::on(const StudyShareChanged& event) {
   Study& study = found->second;
   study.share = event.share;
   study.served = least_served(event.study);
-  std::vector<LeaseId> unfit;  // of workers that take part no more
-  for (const auto& [id, lease] : leases_) {
-    if (lease.study == event.study && !admits(study, workers_.at(lease.worker))) {
-      unfit.push_back(id);
-      effects_.emplace_back(ReleaseBatch{lease.worker, id});
+  for (const LeaseId id : study.leases.all()) {
+    const WorkerId worker = leases_.at(id).worker;
+    if (!admits(study, workers_.at(worker))) {  // it takes part no more
+      effects_.emplace_back(ReleaseBatch{worker, id});
+      end_lease(id, LeaseEnd::kReturned);
     }
   }
-  for (const LeaseId id : unfit) {
-    end_lease(id, LeaseEnd::kReturned);
-  }
+  requeue(event.study);
 }
 
 void Scheduler::on(const FailuresForgotten& event) {
@@ -104,26 +101,33 @@ void Scheduler::on(const FailuresForgotten& event) {
   Study& study = found->second;
   study.failed -= std::min(study.failed, study.points.reopen(event.points));
   study.points.count_attempts(event.attempts);
-  study.overlaps = study.leases > 0;  // the lease that a point failed in may still be there
-  if (study.leases == 0 && !study.points.has_results()) {
+  study.overlaps = !study.leases.empty();  // the lease that a point failed in may still be there
+  if (study.leases.empty() && !study.points.has_results()) {
     study.solver_version.clear();
   }
   if (study.finished && !study.points.is_complete()) {
     study.finished = false;
     study.served = least_served(event.study);
   }
+  requeue(event.study);
 }
 
 /// Where a study begins that opens now: level with the one served least, so that it neither waits
 /// for nor catches up with what went before.
 double Scheduler::least_served(StudyId but) const {
-  std::optional<double> least;
-  for (const auto& [id, study] : studies_) {
-    if (id != but && study.is_open() && study.points.has_free()) {
-      least = std::min(least.value_or(study.served), study.served);
-    }
+  return queue_.least_served(but).value_or(0.0);
+}
+
+StudyQueue::Place Scheduler::place_of(const Study& study) const {
+  if (!study.has_work()) {
+    return {};
   }
-  return least.value_or(0.0);
+  return {study.points.has_free(), study.points.has_suspect(), study.share.priority, study.served,
+          study.share.mixes_versions ? std::string() : study.solver_version};
+}
+
+void Scheduler::requeue(StudyId id) {
+  queue_.put(id, place_of(studies_.at(id)));
 }
 
 void Scheduler::finish_if_complete(StudyId id) {
@@ -306,7 +310,10 @@ void Scheduler::check_invariants() const {
     require(study.finished == study.points.is_complete(), "a study is finished and is not");
     require(study.failed <= study.points.settled(), "more points failed than were settled");
     require(!study.cancelled || study.points.leased() == 0, "a cancelled study holds leases");
-    require(study.leases == leases_of[id], "a study's leases are miscounted");
+    require(study.leases.size() == leases_of[id], "a study's leases are miscounted");
+    const StudyQueue::Place* place = queue_.find(id);
+    require(place_of(study) == (place == nullptr ? StudyQueue::Place{} : *place),
+            "a study is not where it belongs in the queue");
     study.points.leased_set().for_each([&, study_id = id](const Interval& run) {
       const auto covered = under_lease[study_id].within(run.begin, run.end);
       require(covered.size() == 1 && covered.front() == run, "a leased point has no lease");

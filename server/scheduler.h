@@ -10,7 +10,9 @@
 #include <vector>
 
 #include "proto/recipe.h"
+#include "server/lease_index.h"
 #include "server/study_points.h"
+#include "server/study_queue.h"
 
 namespace oblique::server {
 
@@ -255,7 +257,7 @@ class Scheduler {
     StudyShare share;
     double served = 0.0;  ///< batches handed out over the weight, since the study was last open
     std::string solver_version{};  ///< of its results and leases; empty while there are none
-    std::size_t leases = 0;
+    LeaseIndex leases{};
     bool overlaps = false;  ///< a point of it may be under several of these leases
 
     bool is_open() const { return !cancelled && !paused && !finished; }
@@ -312,6 +314,9 @@ class Scheduler {
   void remove_worker(WorkerId worker, LeaseEnd how);
   void learn_pace(Worker& worker, const ResultsReceived& event);
   void finish_if_complete(StudyId id);
+  StudyQueue::Place place_of(const Study& study) const;
+  /// To be called after every change of a study or its points.
+  void requeue(StudyId id);
 
   void dispatch();
   bool serve(WorkerId id, Worker& worker);
@@ -329,6 +334,7 @@ class Scheduler {
 
   SchedulerSettings settings_;
   std::map<StudyId, Study> studies_;
+  StudyQueue queue_;  // of the studies that have something to hand out
   std::map<WorkerId, Worker> workers_;
   std::map<LeaseId, Lease> leases_;
   std::deque<WorkerId> ready_workers_;  // with credit, first come first served

@@ -10,11 +10,7 @@ void Scheduler::dispatch() {
   if (held_) {
     return;
   }
-  const auto has_work = [this] {
-    return seeks_stragglers_ ||
-           std::any_of(studies_.begin(), studies_.end(),
-                       [](const auto& entry) { return entry.second.has_work(); });
-  };
+  const auto has_work = [this] { return seeks_stragglers_ || !queue_.empty(); };
   if (seeks_stragglers_ && !ready_workers_.empty()) {
     // Another worker looks first each time, in case this one may have no straggler there is.
     ready_workers_.push_back(ready_workers_.front());
@@ -67,15 +63,15 @@ bool Scheduler::serve_suspect(WorkerId id, Worker& worker) {
 
 /// What is left of the batch that straggles longest, also to this worker.
 bool Scheduler::serve_straggler(WorkerId id, Worker& worker) {
-  auto longest = leases_.end();
-  for (auto lease = leases_.begin(); lease != leases_.end(); ++lease) {
-    const bool is_longer =
-        longest == leases_.end() || lease->second.granted_ms < longest->second.granted_ms;
-    if (is_longer && lease->second.worker != id && is_straggling(lease->second, worker)) {
-      longest = lease;
-    }
-  }
-  if (longest == leases_.end()) {
+  // Leases are numbered as they are granted: the first that straggles does so longest, and none
+  // after one that is too young does.
+  const auto longest = std::find_if(leases_.begin(), leases_.end(), [&](const auto& entry) {
+    const Lease& lease = entry.second;
+    return now_ms_ - lease.granted_ms < settings_.straggler_after_ms ||
+           (lease.worker != id && is_straggling(lease, worker));
+  });
+  if (longest == leases_.end() ||
+      now_ms_ - longest->second.granted_ms < settings_.straggler_after_ms) {
     seeks_stragglers_ =
         false;  // the next worker looks at the next tick: looking at all leases costs
     return false;
@@ -122,31 +118,16 @@ bool Scheduler::admits(const Study& study, const Worker& worker) {
          study.solver_version == worker.solver_version;
 }
 
-/// The highest priority, then the one served least for its weight, then the oldest.
 StudyId Scheduler::next_free_study(const Worker& worker) const {
-  auto best = studies_.end();
-  for (auto study = studies_.begin(); study != studies_.end(); ++study) {
-    const Study& candidate = study->second;
-    if (!candidate.is_open() || !candidate.points.has_free() || !admits(candidate, worker)) {
-      continue;
-    }
-    const bool is_better = best == studies_.end() ||
-                           candidate.share.priority > best->second.share.priority ||
-                           (candidate.share.priority == best->second.share.priority &&
-                            candidate.served < best->second.served);
-    if (is_better) {
-      best = study;
-    }
-  }
-  return best == studies_.end() ? 0 : best->first;
+  return queue_.next_free(worker.solver_version);
 }
 
 StudyId Scheduler::next_suspect_study(const Worker& worker) const {
-  const auto found = std::find_if(studies_.begin(), studies_.end(), [&](const auto& entry) {
-    return entry.second.is_open() && entry.second.points.has_suspect() &&
-           admits(entry.second, worker);
+  const auto& suspects = queue_.with_suspects();
+  const auto found = std::find_if(suspects.begin(), suspects.end(), [&](StudyId study) {
+    return admits(studies_.at(study), worker);
   });
-  return found == studies_.end() ? 0 : found->first;
+  return found == suspects.end() ? 0 : *found;
 }
 
 bool Scheduler::anyone_draining() const {
@@ -177,15 +158,16 @@ LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Chunk
   }
   Study& served = studies_.at(study);
   served.served += 1.0 / served.share.weight;
-  ++served.leases;
   if (served.solver_version.empty()) {
     served.solver_version = worker.solver_version;
   }
   const LeaseId lease = next_lease_++;
   leases_.emplace(lease, Lease{id, study, chunk, alone, now_ms_});
+  served.leases.insert(lease, chunk);
   worker.leases.insert(lease);
   --worker.credit;
   worker.paces[study].last_batch_points = chunk.count;
+  requeue(study);
   effects_.emplace_back(
       SendBatch{id, study, chunk.model, chunk.first_point, chunk.count, chunk.attempts + 1, lease});
   return lease;

@@ -26,6 +26,7 @@ void Scheduler::end_lease(LeaseId id, LeaseEnd how) {
     }
   }
   Study& study = studies_.at(lease.study);
+  study.leases.erase(id, lease.chunk);
   for (const Interval& run : held_by(lease)) {
     if (how == LeaseEnd::kLost) {
       give_back_lost(lease.study, run, lease);
@@ -33,12 +34,13 @@ void Scheduler::end_lease(LeaseId id, LeaseEnd how) {
       study.points.give_back(run, lease.chunk.attempts + 1, lease.chunk.losses);
     }
   }
-  if (--study.leases == 0) {
+  if (study.leases.empty()) {
     study.overlaps = false;
     if (!study.points.has_results()) {
       study.solver_version.clear();
     }
   }
+  requeue(lease.study);
 }
 
 /// Points that are leased by this lease, which has ended, and by no other.
@@ -52,10 +54,9 @@ std::vector<Interval> Scheduler::held_by(const Lease& lease) const {
   for (const Interval& run : leased) {
     held.insert(run.begin, run.end);
   }
-  for (const auto& [id, other] : leases_) {
-    if (other.study == lease.study) {
-      held.erase(other.chunk.first_point, other.chunk.end());
-    }
+  for (const LeaseId id : study.leases.near(lease.chunk)) {
+    const Chunk& other = leases_.at(id).chunk;
+    held.erase(other.first_point, other.end());
   }
   return held.within(lease.chunk.first_point, lease.chunk.end());
 }
@@ -114,6 +115,7 @@ void Scheduler::on(const ResultsReceived& event) {
     if (!store.accepted.empty() && study->second.solver_version.empty()) {
       study->second.solver_version = worker->solver_version;
     }
+    requeue(event.study);
     learn_pace(*worker, event);
   }
   effects_.emplace_back(std::move(store));
@@ -153,6 +155,7 @@ void Scheduler::on(const ResultsStored& event) {
       }
     }
     finish_if_complete(event.study);
+    requeue(event.study);
   }
   if (worker != workers_.end()) {
     effects_.emplace_back(AcknowledgeResults{event.worker, event.sequence});
