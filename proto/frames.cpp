@@ -1,6 +1,11 @@
 #include "proto/frames.h"
 
+#include <google/protobuf/io/coded_stream.h>
+#include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 #include <google/protobuf/stubs/logging.h>
+#include <google/protobuf/wire_format_lite.h>
+
+#include "proto/oblique.pb.h"
 
 namespace oblique::protocol {
 
@@ -15,6 +20,28 @@ std::string objection_to_version(std::uint32_t version, const std::string& who) 
 
 std::string encode(const google::protobuf::MessageLite& message) {
   return message.SerializeAsString();
+}
+
+std::string reply_around(std::string_view encoded_query_reply) {
+  using google::protobuf::internal::WireFormatLite;
+  std::string bytes;
+  bytes.reserve(encoded_query_reply.size() + 16);
+  {
+    google::protobuf::io::StringOutputStream stream(&bytes);
+    google::protobuf::io::CodedOutputStream out(&stream);
+    out.WriteTag(WireFormatLite::MakeTag(ClientReply::kQueryFieldNumber,
+                                         WireFormatLite::WIRETYPE_LENGTH_DELIMITED));
+    out.WriteVarint32(static_cast<std::uint32_t>(encoded_query_reply.size()));
+    out.WriteRaw(encoded_query_reply.data(), static_cast<int>(encoded_query_reply.size()));
+  }
+  return bytes;
+}
+
+std::string with_request_id(std::uint64_t request_id, std::string_view encoded_reply) {
+  ClientReply number;
+  number.set_request_id(request_id);
+  // Encoded messages one after another are, decoded, one message with all their fields.
+  return encode(number).append(encoded_reply);
 }
 
 bool decode(std::string_view frame, google::protobuf::MessageLite& message) {

@@ -25,6 +25,12 @@ std::string objection_to_version(std::uint32_t version, const std::string& who);
 /// Serialises a message into one frame.
 std::string encode(const google::protobuf::MessageLite& message);
 
+/// The bytes of a ClientReply that holds nothing but a QueryReply, which is encoded already.
+std::string reply_around(std::string_view encoded_query_reply);
+
+/// The frame of the same ClientReply, whose bytes lack only that number. Nothing is parsed.
+std::string with_request_id(std::uint64_t request_id, std::string_view encoded_reply);
+
 /// Parses one frame. Every frame is hostile until this says otherwise: false for one that is too
 /// long, truncated or foreign (no known kind set is the caller's to check).
 bool decode(std::string_view frame, google::protobuf::MessageLite& message);

@@ -180,7 +180,7 @@ class Loop::Parts final : public Outbox {
         written_(context_, "written"),
         queried_(context_, "queried"),
         writer_(store_, [this](std::vector<WriteReport> r) { written_.put(std::move(r)); }),
-        queries_(settings.database,
+        queries_(settings.database, settings.queries,
                  [this](QueryReport r) { queried_.put(std::array{std::move(r)}); }),
         workers_(bound_router(context_, address_, settings.worker_port)),
         clients_(bound_router(context_, address_, settings.client_port)) {
@@ -217,13 +217,15 @@ class Loop::Parts final : public Outbox {
   bool to_worker(const std::string& identity, const protocol::ServerToWorker& message) override {
     return send(workers_, identity, protocol::encode(message));
   }
-  void to_client(const std::string& identity, const protocol::ClientReply& reply) override {
-    if (!send(clients_, identity, protocol::encode(reply))) {
-      spdlog::debug("a client left before its reply");
-    }
+  bool to_client(const std::string& identity, const protocol::ClientReply& reply) override {
+    return forward_to_client(identity, protocol::encode(reply));
+  }
+  bool forward_to_client(const std::string& identity, const std::string& frame) override {
+    return send(clients_, identity, frame);
   }
   void write(WriteJob job) override { writer_.submit(std::move(job)); }
   bool query(QueryJob job) override { return queries_.submit(std::move(job)); }
+  void cancel_query(std::uint64_t ticket) override { queries_.cancel(ticket); }
   void note(Severity severity, const std::string& text) override {
     constexpr std::array kLevels{spdlog::level::info, spdlog::level::warn, spdlog::level::err};
     spdlog::log(kLevels.at(static_cast<std::size_t>(severity)), "{}", text);
@@ -281,6 +283,7 @@ class Loop::Parts final : public Outbox {
 
   LoopEnd finish() {
     spdlog::info("stopping");
+    queries_.stop();
     service_->stop(now());
     const auto until = Clock::now() + kLongestDrain;
     while (!take_worker_messages() && Clock::now() < until) {
@@ -300,7 +303,7 @@ class Loop::Parts final : public Outbox {
   ReportBox written_;
   ReportBox queried_;
   Writer writer_;
-  QueryThread queries_;
+  QueryPool queries_;
   zmq::socket_t workers_;
   zmq::socket_t clients_;
   std::optional<Service> service_;

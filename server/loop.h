@@ -14,6 +14,7 @@ struct LoopSettings {
   std::string listen = "127.0.0.1";  ///< address of both sockets; loopback only
   std::string worker_port = "7601";  ///< "*": the system picks one
   std::string client_port = "7600";
+  QueryPoolSettings queries;
   ServiceSettings service;  ///< solver_version must be set; the rest from the database
 };
 
@@ -22,8 +23,8 @@ struct LoopEnd {
   std::size_t lost_writes;  ///< changes that could not be made durable
 };
 
-/// The server: two ROUTER sockets, the writer and the query thread, and one loop that feeds the
-/// service with what comes from them. Logs to spdlog's default logger.
+/// The server: two ROUTER sockets, the writer and the readers of queries, and one loop that feeds
+/// the service with what comes from them. Logs to spdlog's default logger.
 class Loop {
  public:
   /// Opens the database and binds both sockets. Throws StorageError, also for a file on a network

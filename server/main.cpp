@@ -6,6 +6,7 @@
 #include <iostream>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 #include <sys/prctl.h>
 #include <sys/signalfd.h>
@@ -19,6 +20,7 @@
 
 #include "proto/frames.h"
 #include "server/loop.h"
+#include "server/reader_program.h"
 #include "worker/solver/solve.h"
 
 namespace {
@@ -86,6 +88,9 @@ int run(const LoopSettings& settings, int ready_fd) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (argc == 3 && std::string_view(argv[1]) == oblique::server::kReadMode) {
+    return oblique::server::run_reader_program(argv[2]);
+  }
   const pid_t parent = getppid();
   oblique::protocol::silence_protobuf();
   spdlog::set_default_logger(spdlog::stderr_logger_mt("oblique-server"));

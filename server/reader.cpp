@@ -1,130 +1,42 @@
 #include "server/reader.h"
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <filesystem>
-#include <string_view>
+#include <utility>
+
+#include "server/query_values.h"
 
 namespace oblique::server {
 namespace {
 
 constexpr int kBusyTimeout_ms = 2000;
-constexpr int kLongestSql = 1'000'000;
 /// Instructions of SQLite's machine between two looks at the clock.
 constexpr int kInstructionsPerLook = 10'000;
+/// What a message takes in the one around it beside its own bytes, at most.
+constexpr std::uint64_t kFieldBytes = 8;
 
-/// Pragmas that only tell something, when they have no argument or name a table.
-bool is_harmless_pragma(std::string_view name, const char* argument) {
-  constexpr std::array<std::string_view, 6> kAboutTables{
-      "table_info", "table_xinfo", "table_list", "index_list", "index_info", "foreign_key_list"};
-  constexpr std::array<std::string_view, 4> kPlain{"user_version", "application_id",
-                                                   "compile_options", "page_count"};
-  const auto has = [name](const auto& names) {
-    return std::find(names.begin(), names.end(), name) != names.end();
-  };
-  return has(kAboutTables) || (argument == nullptr && has(kPlain));
-}
+enum class Fit { kYes, kNot };
 
-/// Lets statements read and compute, nothing else.
-int authorize(void*, int action, const char* first, const char* second, const char*, const char*) {
-  switch (action) {
-    case SQLITE_SELECT:
-    case SQLITE_READ:
-    case SQLITE_RECURSIVE:
-      return SQLITE_OK;
-    case SQLITE_FUNCTION:
-      return second != nullptr && std::string_view(second) == "load_extension" ? SQLITE_DENY
-                                                                               : SQLITE_OK;
-    case SQLITE_PRAGMA:
-      return first != nullptr && is_harmless_pragma(first, second) ? SQLITE_OK : SQLITE_DENY;
-    default:
-      return SQLITE_DENY;
-  }
-}
-
-bool is_utf8(std::string_view text) {
-  std::size_t i = 0;
-  while (i < text.size()) {
-    const auto lead = static_cast<unsigned char>(text[i]);
-    const std::size_t length = lead < 0x80 ? 1 : lead < 0xe0 ? 2 : lead < 0xf0 ? 3 : 4;
-    if ((lead >= 0x80 && lead < 0xc2) || lead > 0xf4 || i + length > text.size()) {
-      return false;
+/// Copies the row at which `statement` stands into `row`; says whether it has at most `most_bytes`
+/// in a reply. Throws QueryError when memory ran out.
+Fit copy_row(sqlite3* database, sqlite3_stmt* statement, std::uint64_t most_bytes,
+             protocol::Row& row) {
+  row.Clear();
+  std::uint64_t left = most_bytes;
+  for (int i = 0; i < sqlite3_column_count(statement); ++i) {
+    protocol::Value& value = *row.add_values();
+    const Copied copied = copy_value(statement, i, left, value);
+    if (copied == Copied::kNoMemory) {
+      throw failure(database, SQLITE_NOMEM);
     }
-    for (std::size_t j = 1; j < length; ++j) {
-      const auto byte = static_cast<unsigned char>(text[i + j]);
-      // The second byte also keeps out overlong forms, surrogates and what lies above U+10FFFF.
-      const unsigned low = j > 1 ? 0x80 : lead == 0xe0 ? 0xa0 : lead == 0xf0 ? 0x90 : 0x80;
-      const unsigned high = j > 1 ? 0xbf : lead == 0xed ? 0x9f : lead == 0xf4 ? 0x8f : 0xbf;
-      if (byte < low || byte > high) {
-        return false;
-      }
+    const std::uint64_t bytes = value.ByteSizeLong() + kFieldBytes;
+    if (copied == Copied::kTooLarge || bytes > left) {
+      return Fit::kNot;
     }
-    i += length;
+    left -= bytes;
   }
-  return true;
-}
-
-std::string hexadecimal(std::string_view bytes) {
-  constexpr std::string_view kDigits = "0123456789ABCDEF";
-  std::string text = "x'";
-  for (const char c : bytes) {
-    const auto byte = static_cast<unsigned char>(c);
-    text += kDigits[byte >> 4U];
-    text += kDigits[byte & 0xfU];
-  }
-  return text + "'";
-}
-
-void set_value(sqlite3_stmt* statement, int column, protocol::Value& value) {
-  switch (sqlite3_column_type(statement, column)) {
-    case SQLITE_INTEGER:
-      value.set_integer(sqlite3_column_int64(statement, column));
-      break;
-    case SQLITE_FLOAT:
-      value.set_real(sqlite3_column_double(statement, column));
-      break;
-    case SQLITE_NULL:
-      break;
-    default: {
-      const bool is_text = sqlite3_column_type(statement, column) == SQLITE_TEXT;
-      const void* data = sqlite3_column_blob(statement, column);
-      const auto size = static_cast<std::size_t>(sqlite3_column_bytes(statement, column));
-      const std::string_view bytes(size == 0 ? "" : static_cast<const char*>(data), size);
-      value.set_text(is_text && is_utf8(bytes) ? std::string(bytes) : hexadecimal(bytes));
-    }
-  }
-}
-
-bool is_blank(std::string_view text) {
-  return text.find_first_not_of(" \t\r\n;") == std::string_view::npos;
-}
-
-using StatementHandle = std::unique_ptr<sqlite3_stmt, int (*)(sqlite3_stmt*)>;
-
-StatementHandle prepare(sqlite3* database, const std::string& sql) {
-  sqlite3_stmt* raw = nullptr;
-  const char* tail = nullptr;
-  const int code =
-      sqlite3_prepare_v2(database, sql.c_str(), static_cast<int>(sql.size()) + 1, &raw, &tail);
-  StatementHandle statement(raw, &sqlite3_finalize);
-  if (code == SQLITE_AUTH) {
-    throw QueryError(std::string("only statements that read are allowed: ") +
-                     sqlite3_errmsg(database));
-  }
-  if (code != SQLITE_OK) {
-    throw QueryError(std::string("the statement is wrong: ") + sqlite3_errmsg(database));
-  }
-  if (statement == nullptr) {
-    throw QueryError("there is no statement");
-  }
-  if (!is_blank(tail)) {
-    throw QueryError("one statement at a time: something follows the first");
-  }
-  if (sqlite3_stmt_readonly(raw) == 0) {
-    throw QueryError("only statements that read are allowed");
-  }
-  return statement;
+  return Fit::kYes;
 }
 
 }  // namespace
@@ -164,43 +76,68 @@ Reader::Reader(const std::string& path) {
   if (identify(database_.get(), path) == DatabaseKind::kEmpty) {
     throw StorageError(path + " is empty: no study was ever stored in it");
   }
-  sqlite3_limit(database_.get(), SQLITE_LIMIT_SQL_LENGTH, kLongestSql);
-  sqlite3_db_config(database_.get(), SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
-  sqlite3_set_authorizer(database_.get(), &authorize, nullptr);
+  restrict_to_reading(database_.get());
 }
 
 protocol::QueryReply Reader::query(const std::string& sql, const QueryLimits& limits) {
-  if (sql.size() > kLongestSql) {
-    throw QueryError("the statement is longer than " + std::to_string(kLongestSql) + " bytes");
-  }
-  const Deadline deadline(database_.get(), interrupted_, limits.time_limit_ms);
-  const StatementHandle statement = prepare(database_.get(), sql);
+  google::protobuf::RepeatedPtrField<protocol::Row> rows;
+  protocol::QueryReply reply =
+      run(sql, limits, [&rows](protocol::Row& row) { *rows.Add() = std::move(row); });
+  *reply.mutable_rows() = std::move(rows);
+  return reply;
+}
+
+std::string Reader::encoded_query(const std::string& sql, const QueryLimits& limits) {
+  // Encoded messages one after another are, decoded, one message with all their fields.
+  std::string bytes;
+  protocol::QueryReply part;
+  protocol::Row& slot = *part.add_rows();
+  const protocol::QueryReply rest = run(sql, limits, [&](protocol::Row& row) {
+    slot.Swap(&row);
+    part.AppendToString(&bytes);
+  });
+  rest.AppendToString(&bytes);
+  return bytes;
+}
+
+protocol::QueryReply Reader::run(const std::string& sql, const QueryLimits& limits,
+                                 const TakeRow& take) {
+  sqlite3* const database = database_.get();
+  sqlite3_limit(database, SQLITE_LIMIT_LENGTH, static_cast<int>(limits.max_value_bytes));
+  const Deadline deadline(database, interrupted_, limits.time_limit_ms);
+  const StatementHandle statement = prepare_query(database, sql);
   protocol::QueryReply reply;
-  const int columns = sqlite3_column_count(statement.get());
-  for (int i = 0; i < columns; ++i) {
-    const std::string_view name = sqlite3_column_name(statement.get(), i);
+  for (int i = 0; i < sqlite3_column_count(statement.get()); ++i) {
+    const char* name = sqlite3_column_name(statement.get(), i);
+    if (name == nullptr) {
+      throw failure(database, SQLITE_NOMEM);
+    }
     reply.add_columns(is_utf8(name) ? std::string(name) : hexadecimal(name));
   }
-  std::uint64_t bytes = 0;
-  int code = sqlite3_step(statement.get());
-  for (; code == SQLITE_ROW; code = sqlite3_step(statement.get())) {
-    protocol::Row row;
-    for (int i = 0; i < columns; ++i) {
-      set_value(statement.get(), i, *row.add_values());
-    }
-    bytes += row.ByteSizeLong() + 8;
-    if (static_cast<std::uint64_t>(reply.rows_size()) >= limits.max_rows ||
-        bytes > limits.max_bytes) {
+  std::uint64_t bytes = reply.ByteSizeLong() + kFieldBytes;
+  protocol::Row row;
+  int code = SQLITE_DONE;
+  for (std::uint64_t rows = 0; (code = sqlite3_step(statement.get())) == SQLITE_ROW; ++rows) {
+    const std::uint64_t left = limits.max_bytes - std::min(limits.max_bytes, bytes);
+    const bool is_full = rows >= limits.max_rows;
+    if (is_full || copy_row(database, statement.get(), left, row) == Fit::kNot) {
+      if (rows == 0 && !is_full) {
+        throw QueryError("one row alone has more than the " + std::to_string(limits.max_bytes) +
+                         " bytes of a reply, blobs counted twice: select less of it, as with "
+                         "substr() or length()");
+      }
       reply.set_truncated(true);
       return reply;
     }
-    *reply.add_rows() = std::move(row);
+    bytes += row.ByteSizeLong() + kFieldBytes;
+    take(row);
   }
-  if (code == SQLITE_INTERRUPT && !interrupted_) {
-    throw QueryError("the query took longer than " + std::to_string(limits.time_limit_ms) + " ms");
+  if (code == SQLITE_INTERRUPT) {
+    throw QueryError(interrupted_ ? "the query was interrupted"
+                                  : took_too_long(limits.time_limit_ms));
   }
   if (code != SQLITE_DONE) {
-    throw QueryError(std::string("the query failed: ") + sqlite3_errmsg(database_.get()));
+    throw failure(database, code);
   }
   return reply;
 }

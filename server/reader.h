@@ -2,30 +2,16 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
 #include "proto/oblique.pb.h"
+#include "server/query_limits.h"
+#include "server/query_rules.h"
 #include "server/sqlite.h"
 
 namespace oblique::server {
-
-/// A statement was refused or failed. The message says why, for people.
-class QueryError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
-
-/// What one query may cost.
-struct QueryLimits {
-  std::uint64_t max_rows = 100'000;  ///< more are cut off, and `truncated` says so
-  std::uint64_t max_bytes =
-      12ULL << 20U;                     ///< of the reply, likewise; below protocol::kMaxFrameBytes
-  std::int64_t time_limit_ms = 30'000;  ///< a longer query is an error; 0: no limit
-};
-
-/// No limits but memory: for a program that reads its own database.
-inline constexpr QueryLimits kNoLimits{UINT64_MAX, UINT64_MAX, 0};
 
 /// A database opened for reading only, also while a server writes it. Not thread-safe, but for
 /// `interrupt`.
@@ -36,9 +22,13 @@ class Reader {
   explicit Reader(const std::string& path);
 
   /// Runs one statement that only reads. A blob comes as the text x'0F..', as does a text that is
-  /// not UTF-8. Throws QueryError: no statement or more than one, one that writes, attaches or sets
-  /// something, one that SQLite refuses, one over the time limit or interrupted.
+  /// not UTF-8. Throws QueryError: what `prepare_query` says, one over the time limit or
+  /// interrupted, one that needs more memory than there is or than SQLite's heap limit, a row that
+  /// has more than `max_bytes` alone.
   protocol::QueryReply query(const std::string& sql, const QueryLimits& limits);
+
+  /// The same as the bytes of an encoded QueryReply, which takes hardly more memory than those.
+  std::string encoded_query(const std::string& sql, const QueryLimits& limits);
 
   /// Where the study called `name` stands, or all of them when `name` is empty. Nothing is leased
   /// and the rate is 0, for that only a server knows. Throws QueryError for an unknown name.
@@ -49,6 +39,10 @@ class Reader {
 
  private:
   struct Deadline;
+  using TakeRow = std::function<void(protocol::Row&)>;
+
+  /// Gives columns and `truncated`; each row goes to `take`.
+  protocol::QueryReply run(const std::string& sql, const QueryLimits& limits, const TakeRow& take);
 
   DatabaseHandle database_;
   std::atomic<bool> interrupted_ = false;

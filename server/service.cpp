@@ -304,6 +304,7 @@ void Service::tick(Instant now) {
     }
   }
   feed(Tick{}, now);
+  tell_of_queries(now);
   for (auto& [id, study] : studies_) {
     if (!study.durable) {
       continue;
@@ -324,6 +325,10 @@ void Service::stop(Instant now) {
   for (const auto& [id, peer] : peers_) {
     outbox_.to_worker(peer.identity, message);
   }
+  for (const auto& [ticket, query] : queries_) {
+    reply_error(query.client, "the server is stopping: ask again when it runs");
+  }
+  queries_.clear();
 }
 
 }  // namespace oblique::server

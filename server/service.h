@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "proto/oblique.pb.h"
-#include "server/query_thread.h"
+#include "server/query_pool.h"
 #include "server/scheduler.h"
 #include "server/store.h"
 #include "server/writer.h"
@@ -32,12 +32,16 @@ class Outbox {
 
   /// False when the worker cannot be reached any more.
   virtual bool to_worker(const std::string& identity, const protocol::ServerToWorker& message) = 0;
-  /// A reply that cannot be delivered is dropped: the client asks again.
-  virtual void to_client(const std::string& identity, const protocol::ClientReply& reply) = 0;
+  /// False when the client is gone, or reads nothing; the reply is dropped then: it asks again.
+  virtual bool to_client(const std::string& identity, const protocol::ClientReply& reply) = 0;
+  /// The same for a reply that is encoded already.
+  virtual bool forward_to_client(const std::string& identity, const std::string& frame) = 0;
   /// `Service::written` is called once the job's fate is known.
   virtual void write(WriteJob job) = 0;
   /// `Service::queried` is called with the answer. False when too many queries wait.
   virtual bool query(QueryJob job) = 0;
+  /// Nobody waits for that query any more.
+  virtual void cancel_query(std::uint64_t ticket) = 0;
   /// For the log.
   virtual void note(Severity severity, const std::string& text) = 0;
 };
@@ -49,6 +53,9 @@ struct ServiceSettings {
   /// Results messages of one worker that wait for the disk. A sound worker stops long before.
   std::size_t most_unstored_messages = 100'000;
   std::size_t most_waiting_changes = 10'000;  ///< of clients, that wait for the disk
+  /// How often a client hears that its query waits or runs, by which the server also finds out that
+  /// the client is gone.
+  std::int64_t still_working_every_ms = 1000;
   std::string database_id;
   std::uint64_t last_study_id = 0;
   std::uint64_t last_worker_id = 0;
@@ -81,6 +88,11 @@ class Service {
   struct Client {
     std::string identity;
     std::uint64_t request_id;
+  };
+  struct Query {
+    Client client;
+    std::int64_t next_word_ms;  // when the client is to hear of it again
+    bool runs = false;
   };
   struct Peer {
     std::string identity;
@@ -156,7 +168,8 @@ class Service {
   void retry(const Client& client, StudyId id, Instant now);
   void status(const Client& client, const protocol::StatusRequest& request, Instant now);
   void workers(const Client& client, Instant now);
-  void query(const Client& client, const protocol::QueryRequest& request);
+  void query(const Client& client, const protocol::QueryRequest& request, Instant now);
+  void tell_of_queries(Instant now);
   void reply_submitted(const Client& client, StudyId id, bool created);
   void reply_changed(const Client& client, StudyId id, std::uint64_t retried, Instant now);
   void reply_error(const Client& client, const std::string& message);
@@ -182,7 +195,7 @@ class Service {
   std::map<std::string, StudyId, std::less<>> study_ids_;  // by name
   std::map<std::uint64_t, Write> writes_;                  // by ticket
   std::size_t waiting_changes_ = 0;                        // writes that a client waits for
-  std::map<std::uint64_t, Client> queries_;                // by ticket
+  std::map<std::uint64_t, Query> queries_;                 // by ticket
   std::vector<WorkerId> unreachable_;                      // found while effects were carried out
   std::uint64_t last_ticket_ = 0;
   std::uint64_t bad_frames_ = 0;

@@ -9,6 +9,8 @@ namespace oblique::server {
 namespace {
 
 constexpr std::size_t kLongestName = 200;
+/// Number of no request: a reply with it is passed over by clients that do not know its kind.
+constexpr std::uint64_t kNobodysRequest = UINT64_MAX;
 
 /// Why a study cannot be called so, or an empty text.
 std::string objection_to_name(const std::string& name) {
@@ -97,7 +99,7 @@ void Service::client_frame(const std::string& identity, std::string_view frame, 
       change(client, request.change(), now);
       break;
     case Kind::kQuery:
-      query(client, request.query());
+      query(client, request.query(), now);
       break;
     case Kind::KIND_NOT_SET:
       bad_frame("a client");
@@ -313,13 +315,21 @@ void Service::workers(const Client& client, Instant now) {
   outbox_.to_client(client.identity, reply);
 }
 
-void Service::query(const Client& client, const protocol::QueryRequest& request) {
-  const std::uint64_t ticket = ++last_ticket_;
-  queries_.emplace(ticket, client);
-  if (!outbox_.query({ticket, request})) {
-    queries_.erase(ticket);
-    reply_error(client, "too many queries wait already: ask again later");
+void Service::query(const Client& client, const protocol::QueryRequest& request, Instant now) {
+  const bool is_known = std::any_of(queries_.begin(), queries_.end(), [&](const auto& entry) {
+    return entry.second.client.identity == client.identity &&
+           entry.second.client.request_id == client.request_id;
+  });
+  if (is_known) {
+    return;  // asked again; the answer is on its way
   }
+  const std::uint64_t ticket = ++last_ticket_;
+  if (stopping_ || !outbox_.query({ticket, client.identity, request})) {
+    reply_error(client, stopping_ ? "the server is stopping: ask again when it runs"
+                                  : "too many queries wait already: ask again later");
+    return;
+  }
+  queries_.emplace(ticket, Query{client, now.steady_ms + settings_.still_working_every_ms});
 }
 
 void Service::queried(QueryReport report) {
@@ -327,16 +337,35 @@ void Service::queried(QueryReport report) {
   if (found == queries_.end()) {
     return;
   }
-  const Client client = std::move(found->second);
-  queries_.erase(found);
-  if (!report.error.empty()) {
-    reply_error(client, report.error);
+  if (report.kind != QueryReport::Kind::kAnswered) {
+    found->second.runs = report.kind == QueryReport::Kind::kBegun;
     return;
   }
-  protocol::ClientReply reply;
-  reply.set_request_id(client.request_id);
-  *reply.mutable_query() = std::move(report.reply);
-  outbox_.to_client(client.identity, reply);
+  const Client client = std::move(found->second.client);
+  queries_.erase(found);
+  outbox_.forward_to_client(client.identity,
+                            protocol::with_request_id(client.request_id, report.reply));
+}
+
+void Service::tell_of_queries(Instant now) {
+  std::vector<std::uint64_t> abandoned;
+  for (auto& [ticket, query] : queries_) {
+    if (now.steady_ms < query.next_word_ms) {
+      continue;
+    }
+    query.next_word_ms = now.steady_ms + settings_.still_working_every_ms;
+    protocol::ClientReply word;
+    word.set_request_id(kNobodysRequest);
+    word.mutable_still_working()->set_request_id(query.client.request_id);
+    word.mutable_still_working()->set_runs(query.runs);
+    if (!outbox_.to_client(query.client.identity, word)) {
+      abandoned.push_back(ticket);
+    }
+  }
+  for (const std::uint64_t ticket : abandoned) {
+    outbox_.cancel_query(ticket);
+    queries_.erase(ticket);
+  }
 }
 
 // ---- Replies ----------------------------------------------------------------------------------

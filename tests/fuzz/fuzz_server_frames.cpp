@@ -16,9 +16,11 @@ namespace {
 class Sink final : public Outbox {
  public:
   bool to_worker(const std::string&, const protocol::ServerToWorker&) override { return true; }
-  void to_client(const std::string&, const protocol::ClientReply&) override {}
+  bool to_client(const std::string&, const protocol::ClientReply&) override { return true; }
+  bool forward_to_client(const std::string&, const std::string&) override { return true; }
   void write(WriteJob job) override { jobs.push_back(std::move(job)); }
   bool query(QueryJob) override { return true; }
+  void cancel_query(std::uint64_t) override {}
   void note(Severity, const std::string&) override {}
 
   std::vector<WriteJob> jobs;

@@ -32,7 +32,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   static oblique::server::Reader& database = reader();
   const std::string condition(reinterpret_cast<const char*>(data), size);
   try {
-    database.query("SELECT point FROM runs WHERE (" + condition + "\n) LIMIT 5", {10, 10'000, 50});
+    database.query("SELECT point FROM runs WHERE (" + condition + "\n) LIMIT 5", {10, 10'000, 50, 1'000'000});
   } catch (const oblique::server::QueryError&) {
   }
   return 0;

@@ -13,6 +13,7 @@
 #include <zmq.hpp>
 
 #include "proto/frames.h"
+#include "server/reader.h"
 #include "tests/server/results.h"
 #include "tests/server/scheduler_bench.h"
 
@@ -28,7 +29,8 @@ using testing::HasSubstr;
 /// A server on ports that the system picked, stopped when it goes out of scope.
 class RunningServer {
  public:
-  explicit RunningServer(const std::string& database) : loop_(settings(database)) {
+  explicit RunningServer(const std::string& database, TurnSettings turns = {})
+      : loop_(settings(database, turns)) {
     thread_ = std::thread([this] { end_ = loop_.run(stop_fd_); });
   }
   ~RunningServer() { stop(); }
@@ -48,12 +50,14 @@ class RunningServer {
   std::string worker_endpoint() const { return loop_.worker_endpoint(); }
 
  private:
-  static LoopSettings settings(const std::string& database) {
+  static LoopSettings settings(const std::string& database, TurnSettings turns) {
     LoopSettings settings;
+    settings.queries.turns = turns;
     settings.database = database;
     settings.worker_port = "*";
     settings.client_port = "*";
     settings.service.solver_version = "1.0";
+    settings.queries.reader_program = OBLIQUE_SERVER_PROGRAM;
     return settings;
   }
 
@@ -176,6 +180,23 @@ class PretendedClient : public Peer<ClientRequest, ClientReply> {
     request.mutable_query()->set_sql(sql);
     return ask(request);
   }
+  /// Asks for what takes minutes, and waits until it is said that the query runs.
+  void start_query(const std::string& sql) {
+    ClientRequest request;
+    request.set_protocol_version(protocol::kProtocolVersion);
+    request.set_request_id(++id_);
+    request.mutable_query()->set_sql(sql);
+    request.mutable_query()->set_time_limit_ms(600'000);
+    send(request);
+    for (int words = 0; words < 60; ++words) {
+      const auto word = receive();
+      ASSERT_EQ(word.still_working().request_id(), id_);
+      if (word.still_working().runs()) {
+        return;
+      }
+    }
+    FAIL() << "the query does not begin";
+  }
   protocol::StudyStatus status(const std::string& name) {
     ClientRequest request;
     request.mutable_status()->set_study(name);
@@ -290,17 +311,37 @@ TEST_F(LoopTest, AFrameOverTheLimitCostsItsSenderTheConnectionAndNobodyElse) {
   EXPECT_TRUE(client.submit("a", 10).has_submit());
 }
 
+/// Compares for hours without a look at the clock.
+constexpr const char* kDeaf = "SELECT instr(zeroblob(16000000), zeroblob(7999999) || x'01')";
+
 TEST_F(LoopTest, ALongQueryHoldsUpNothingElse) {
   RunningServer server(path_);
   PretendedClient client(server.client_endpoint());
   PretendedClient other(server.client_endpoint());
-  ClientRequest endless;
-  endless.set_protocol_version(protocol::kProtocolVersion);
-  endless.mutable_query()->set_sql(
-      "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT count(*) FROM n");
-  other.send(endless);
+  other.start_query(kDeaf);
   EXPECT_TRUE(client.submit("a", 10).has_submit());
   EXPECT_EQ(client.status("a").points(), 10U);
+  EXPECT_EQ(client.query("SELECT 3").query().rows(0).values(0).integer(), 3);
+}
+
+TEST_F(LoopTest, TheQueriesOfClientsThatWentAreGivenUp) {
+  TurnSettings turns;
+  turns.readers = 2;
+  turns.quick_ms = 1'000'000;  // so that nothing is put back for others
+  RunningServer server(path_, turns);
+  for (int i = 0; i < 2; ++i) {
+    PretendedClient(server.client_endpoint()).start_query(kDeaf);
+  }
+  PretendedClient(server.client_endpoint()).start_query(kDeaf);
+}
+
+TEST_F(LoopTest, TheServerStopsWhateverQueriesDo) {
+  RunningServer server(path_);
+  PretendedClient client(server.client_endpoint());
+  client.start_query(kDeaf);
+  EXPECT_EQ(server.stop().lost_writes, 0U);
+  while (!client.receive().has_error()) {
+  }
 }
 
 TEST_F(LoopTest, AQueryThatWritesIsRefused) {

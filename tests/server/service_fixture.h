@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "proto/frames.h"
+#include "server/reader_program.h"
 #include "server/service.h"
 #include "tests/server/results.h"
 #include "tests/server/scheduler_bench.h"
@@ -30,14 +31,24 @@ class FakeOutbox final : public Outbox {
     worker_messages.push_back(message);
     return true;
   }
-  void to_client(const std::string&, const ClientReply& reply) override {
+  bool to_client(const std::string& identity, const ClientReply& reply) override {
+    if (identity == unreachable) {
+      return false;
+    }
     replies.push_back(reply);
+    return true;
+  }
+  bool forward_to_client(const std::string& identity, const std::string& frame) override {
+    ClientReply reply;
+    EXPECT_TRUE(protocol::decode(frame, reply));
+    return to_client(identity, reply);
   }
   void write(WriteJob job) override { jobs.push_back(std::move(job)); }
   bool query(QueryJob job) override {
     queries.push_back(std::move(job));
     return queries.size() < 3;
   }
+  void cancel_query(std::uint64_t ticket) override { cancelled_queries.push_back(ticket); }
   void note(Severity, const std::string&) override { ++notes; }
 
   std::string unreachable;
@@ -45,6 +56,7 @@ class FakeOutbox final : public Outbox {
   std::vector<ClientReply> replies;
   std::vector<WriteJob> jobs;
   std::vector<QueryJob> queries;
+  std::vector<std::uint64_t> cancelled_queries;
   int notes = 0;
 };
 
@@ -121,6 +133,10 @@ class ServiceTest : public testing::Test {
           now_);
     }
     service_->scheduler().check_invariants();
+  }
+  /// The query that was asked `index`-th gets that answer.
+  void answer_query(std::size_t index, const std::string& reply) {
+    service_->queried({QueryReport::Kind::kAnswered, outbox_.queries.at(index).ticket, reply});
   }
   ClientReply last_reply() {
     EXPECT_FALSE(outbox_.replies.empty());

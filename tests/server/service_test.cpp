@@ -193,13 +193,18 @@ TEST_F(ServiceTest, TooManyQueriesAreRefused) {
   ClientRequest message;
   message.set_protocol_version(protocol::kProtocolVersion);
   message.mutable_query()->set_sql("SELECT 1");
-  request(message);
-  request(message);
+  for (std::uint64_t id = 1; id <= 2; ++id) {
+    message.set_request_id(id);
+    request(message);
+  }
   EXPECT_TRUE(outbox_.replies.empty());
+  message.set_request_id(3);
   request(message);
   EXPECT_THAT(last_reply().error().message(), HasSubstr("too many queries"));
-  service_->queried({outbox_.queries[0].ticket, {}, "no such column"});
+  EXPECT_EQ(last_reply().request_id(), 3U);
+  answer_query(0, encoded_error("no such column"));
   EXPECT_EQ(last_reply().error().message(), "no such column");
+  EXPECT_EQ(last_reply().request_id(), 1U);
 }
 
 TEST_F(ServiceTest, StatusTellsTheRateOfTheLastSeconds) {

@@ -125,8 +125,12 @@ bool SimulatedServer::to_worker(const std::string& identity,
   return workers->send_to(identity, protocol::encode(message));
 }
 
-void SimulatedServer::to_client(const std::string& identity, const protocol::ClientReply& reply) {
-  clients->send_to(identity, protocol::encode(reply));
+bool SimulatedServer::to_client(const std::string& identity, const protocol::ClientReply& reply) {
+  return forward_to_client(identity, protocol::encode(reply));
+}
+
+bool SimulatedServer::forward_to_client(const std::string& identity, const std::string& frame) {
+  return clients->send_to(identity, frame);
 }
 
 void SimulatedServer::write(server::WriteJob job) {

@@ -39,9 +39,11 @@ class SimulatedServer final : public server::Outbox {
   void client_frame(const std::string& identity, const std::string& frame);
 
   bool to_worker(const std::string& identity, const protocol::ServerToWorker& message) override;
-  void to_client(const std::string& identity, const protocol::ClientReply& reply) override;
+  bool to_client(const std::string& identity, const protocol::ClientReply& reply) override;
+  bool forward_to_client(const std::string& identity, const std::string& frame) override;
   void write(server::WriteJob job) override;
   bool query(server::QueryJob) override { return false; }
+  void cancel_query(std::uint64_t) override {}
   void note(server::Severity, const std::string&) override {}
 
   Network* workers = nullptr;

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+#include <sqlite3.h>
+
+namespace oblique::server {
+
+/// A statement was refused or failed. The message says why, for people.
+class QueryError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Longest statement [bytes].
+inline constexpr int kLongestSql = 1'000'000;
+
+/// Lets statements on `database` read and compute, nothing else, and bounds what one statement may
+/// be made of. What does not fit into memory is not put into files.
+void restrict_to_reading(sqlite3* database);
+
+using StatementHandle = std::unique_ptr<sqlite3_stmt, int (*)(sqlite3_stmt*)>;
+
+/// One statement that only reads. Throws QueryError: none or more than one, one that writes,
+/// attaches or sets something, one with parameters, one that SQLite refuses.
+StatementHandle prepare_query(sqlite3* database, const std::string& sql);
+
+/// What a failed call on `database` means to the one who asked. `code` is what SQLite returned.
+QueryError failure(sqlite3* database, int code);
+
+}  // namespace oblique::server
