@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "client/nearest.h"
+#include "proto/study_name.h"
 
 namespace oblique::client {
 namespace {
@@ -176,14 +177,8 @@ protocol::Block block_of(std::vector<protocol::Axis> axes) {
 }
 
 void check_study_name(const std::string& name) {
-  constexpr std::size_t kMostBytes = 100;
-  const bool plain = std::none_of(name.begin(), name.end(), [](char letter) {
-    return static_cast<unsigned char>(letter) < 0x20 || letter == 0x7f;
-  });
-  if (name.empty() || name.size() > kMostBytes || name.front() == '-' || !plain) {
-    throw InputError("name = \"" + name.substr(0, kMostBytes) +
-                     "\" is not allowed: a study's name has 1 to " + std::to_string(kMostBytes) +
-                     " bytes, no control characters, and does not begin with '-'");
+  if (const auto objection = protocol::objection_to_study_name(name); !objection.empty()) {
+    throw InputError(objection);
   }
 }
 

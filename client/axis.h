@@ -40,8 +40,7 @@ protocol::Axis stepped_axis(const solver::ParameterKey& key, double from, double
 /// Throws InputError when H, mu or e is missing.
 protocol::Block block_of(std::vector<protocol::Axis> axes);
 
-/// Throws InputError unless `name` may name a study: 1 to 100 bytes without control characters,
-/// not beginning with '-'.
+/// Throws InputError unless `name` may name a study; proto/study_name.h says what may.
 void check_study_name(const std::string& name);
 
 }  // namespace oblique::client

@@ -5,6 +5,7 @@
 #include "client/connection.h"
 #include "client/source.h"
 #include "client/verbs.h"
+#include "proto/visible_text.h"
 
 namespace oblique::client {
 namespace {
@@ -18,8 +19,8 @@ int change(const ChangeFlags& flags, protocol::StudyChange change) {
   Connection connection(connection_settings(flags.source));
   const auto reply = connection.change(flags.study, change);
   const auto& status = reply.study();
-  std::cout << status.name() << ": " << status.state() << ", " << status.solved() + status.failed()
-            << " of " << status.points() << " points done";
+  std::cout << protocol::visible(status.name()) << ": " << status.state() << ", "
+            << status.solved() + status.failed() << " of " << status.points() << " points done";
   if (change == protocol::STUDY_CHANGE_RETRY) {
     std::cout << ", " << reply.retried() << " failed ones to be solved again";
   }

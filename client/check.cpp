@@ -3,6 +3,7 @@
 
 #include "client/source.h"
 #include "client/verbs.h"
+#include "proto/visible_text.h"
 #include "server/database_care.h"
 
 namespace oblique::client {
@@ -19,7 +20,7 @@ saved by:  oblique backup saved.db --db damaged.db --salvage)";
 int check(const DatabaseSettings& database) {
   const auto faults = server::find_faults(database.file);
   for (const auto& fault : faults) {
-    std::cout << fault << '\n';
+    std::cout << protocol::visible(fault) << '\n';
   }
   if (faults.empty()) {
     std::cerr << database.file << " is sound.\n";

@@ -7,6 +7,7 @@
 
 #include "client/nearest.h"
 #include "client/verbs.h"
+#include "proto/visible_text.h"
 #include "worker/solver/parameters.h"
 #include "worker/solver/solve.h"
 
@@ -19,7 +20,7 @@ constexpr const char* kExamples = R"(Examples:
   oblique query paper --where "mu > 0.5"           its results
   oblique VERB --help                              flags, defaults and examples of a verb
 
-Exit codes: 0 done, 1 failed, 2 wrong usage.)";
+Exit codes: 0 done, 1 failed, 2 wrong usage; stopped by a signal: 128 and its number, 130 for Ctrl-C.)";
 
 void add_verbs(CLI::App& app, Command& command) {
   add_solve(app, command);
@@ -76,7 +77,8 @@ std::string unexpected_words(CLI::App& app, CLI::App& verb) {
 
 int wrong_usage(const CLI::App& app, const CLI::App& verb, const std::string& message) {
   const std::string words = &verb == &app ? app.get_name() : app.get_name() + " " + verb.get_name();
-  std::cerr << words << ": " << message << "\nTry `" << words << " --help`.\n";
+  std::cerr << words << ": " << protocol::visible_lines(message) << "\nTry `" << words
+            << " --help`.\n";
   return kWrongUsage;
 }
 
@@ -106,11 +108,11 @@ int execute(CLI::App& app, const Command& command) {
     }
     return code;
   } catch (const solver::InputError& error) {
-    std::cerr << words << error.what() << '\n';
+    std::cerr << words << protocol::visible_lines(error.what()) << '\n';
     return kWrongUsage;
   } catch (const std::exception& error) {
     std::cout.flush();
-    std::cerr << words << error.what() << '\n';
+    std::cerr << words << protocol::visible_lines(error.what()) << '\n';
     return kFailed;
   }
 }

@@ -1,7 +1,7 @@
 #include "client/connection.h"
 
 #include <algorithm>
-#include <string_view>
+#include <array>
 #include <utility>
 
 #include "proto/address.h"
@@ -10,10 +10,8 @@
 namespace oblique::client {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
-std::string seconds_of(std::int64_t milliseconds) {
-  return shown_number(static_cast<double>(milliseconds) / 1000.0) + " s";
+std::string seconds_of(std::chrono::milliseconds time) {
+  return shown_number(static_cast<double>(time.count()) / 1000.0) + " s";
 }
 
 }  // namespace
@@ -21,7 +19,10 @@ std::string seconds_of(std::int64_t milliseconds) {
 Connection::Connection(ConnectionSettings settings, KeepWaiting keep_waiting)
     : settings_(std::move(settings)),
       keep_waiting_(std::move(keep_waiting)),
-      socket_(context_, zmq::socket_type::dealer) {
+      socket_(context_, zmq::socket_type::dealer),
+      monitor_(context_, socket_) {
+  // Nothing is queued for a server that is not there, which would get every copy when it is back.
+  socket_.set(zmq::sockopt::immediate, true);
   // A request that was not sent yet must not hold up the end of the program.
   socket_.set(zmq::sockopt::linger, 0);
   socket_.set(zmq::sockopt::maxmsgsize, static_cast<std::int64_t>(protocol::kMaxFrameBytes));
@@ -42,69 +43,114 @@ Connection::Connection(ConnectionSettings settings, KeepWaiting keep_waiting)
   }
 }
 
-bool Connection::wait_for_frame(Clock::time_point deadline) {
-  constexpr std::chrono::milliseconds kSlice{50};
-  while (Clock::now() < deadline) {
-    if (keep_waiting_ && !keep_waiting_()) {
-      throw Interrupted("stopped while waiting for the server");
-    }
-    const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now());
-    zmq::pollitem_t item{socket_.handle(), 0, ZMQ_POLLIN, 0};
-    try {
-      if (zmq::poll(&item, 1, std::clamp(left, std::chrono::milliseconds{0}, kSlice)) > 0) {
-        return true;
-      }
-    } catch (const zmq::error_t& error) {
-      if (error.num() != EINTR) {
-        throw;
-      }
-    }
-  }
-  return false;
+bool Connection::is_due(const Outstanding& outstanding) {
+  const auto connections = monitor_.connections();
+  // What an earlier connection took may have been lost with it.
+  return connections > 0 && (outstanding.sent_over != connections ||
+                             Clock::now() - outstanding.sent > outstanding.resend_after);
 }
 
-protocol::ClientReply Connection::call(protocol::ClientRequest request) {
+void Connection::send_if_due(Outstanding& outstanding) {
+  const auto connections = monitor_.connections();
+  if (!is_due(outstanding) ||
+      !socket_.send(zmq::buffer(outstanding.frame), zmq::send_flags::dontwait)) {
+    return;
+  }
+  if (outstanding.sent_over == connections) {
+    constexpr std::chrono::milliseconds kLongestPause{60'000};
+    outstanding.resend_after = std::min(2 * outstanding.resend_after, kLongestPause);
+  }
+  outstanding.sent_over = connections;
+  outstanding.sent = Clock::now();
+}
+
+void Connection::wait_a_slice(bool to_send) {
+  constexpr std::chrono::milliseconds kSlice{50};
+  if (keep_waiting_ && !keep_waiting_()) {
+    throw Interrupted("stopped while waiting for the server");
+  }
+  const int events = ZMQ_POLLIN | (to_send ? ZMQ_POLLOUT : 0);
+  // The monitor first: the socket, looked at after it, then knows of the same connection.
+  std::array<zmq::pollitem_t, 2> items{{{monitor_.handle(), 0, ZMQ_POLLIN, 0},
+                                        {socket_.handle(), 0, static_cast<short>(events), 0}}};
+  try {
+    zmq::poll(items, kSlice);
+  } catch (const zmq::error_t& error) {
+    if (error.num() != EINTR) {
+      throw;
+    }
+  }
+}
+
+std::optional<protocol::ClientReply> Connection::received(std::uint64_t request_id) {
+  zmq::message_t answer;
+  if (!socket_.recv(answer, zmq::recv_flags::dontwait)) {
+    return std::nullopt;
+  }
+  protocol::ClientReply reply;
+  if (!protocol::decode(answer.to_string_view(), reply)) {
+    throw ConnectionError("what answers at " + settings_.server_url +
+                          " does not speak as oblique-server does: check the address and port");
+  }
+  // An answer that came after its time was given up, or a second one, belongs to nobody.
+  if (reply.request_id() != request_id && reply.request_id() != 0) {
+    return std::nullopt;
+  }
+  return reply;
+}
+
+protocol::ClientReply Connection::answer_to(const protocol::ClientRequest& request,
+                                            Outstanding outstanding, const Tell& tell) {
+  constexpr std::chrono::seconds kSilence{3};
+  const std::chrono::milliseconds timeout(settings_.timeout_ms);
+  bool told = false;
+  while (tell || Clock::now() - outstanding.heard < timeout) {
+    send_if_due(outstanding);
+    wait_a_slice(is_due(outstanding));
+    if (auto reply = received(request.request_id())) {
+      if (told) {
+        tell(settings_.server_url + " answers again");
+      }
+      return *std::move(reply);
+    }
+    if (tell && !told && Clock::now() - outstanding.heard > kSilence) {
+      tell("no answer from " + settings_.server_url + " for " + seconds_of(kSilence) +
+           ": waiting until it is back");
+      told = true;
+    }
+  }
+  throw ConnectionError("no answer from " + settings_.server_url + " within " +
+                        seconds_of(timeout) +
+                        ": is a server running there? Start one with `oblique-server`, or say "
+                        "where it is with --server URL or OBLIQUE_SERVER");
+}
+
+protocol::ClientReply Connection::call(protocol::ClientRequest request, const Tell& tell) {
   request.set_protocol_version(protocol::kProtocolVersion);
   request.set_request_id(++last_request_id_);
-  const auto frame = protocol::encode(request);
+  auto frame = protocol::encode(request);
   if (frame.size() > protocol::kMaxFrameBytes) {
     throw ConnectionError("the request has " + std::to_string(frame.size()) +
                           " bytes, more than the " + std::to_string(protocol::kMaxFrameBytes) +
                           " that a server takes: write long lists of values as ranges");
   }
-  const auto deadline = Clock::now() + std::chrono::milliseconds(settings_.timeout_ms);
-  socket_.send(zmq::buffer(frame), zmq::send_flags::dontwait);
-  while (wait_for_frame(deadline)) {
-    zmq::message_t answer;
-    if (!socket_.recv(answer, zmq::recv_flags::dontwait)) {
-      continue;
-    }
-    protocol::ClientReply reply;
-    if (!protocol::decode(answer.to_string_view(), reply)) {
-      throw ConnectionError("what answers at " + settings_.server_url +
-                            " does not speak as oblique-server does: check the address and port");
-    }
-    // An answer that came after its time was given up belongs to nobody.
-    if (reply.request_id() != last_request_id_ && reply.request_id() != 0) {
-      continue;
-    }
-    if (reply.has_error()) {
-      throw ServerError(reply.error().message());
-    }
-    // A reply has the number of its request's kind. Other programs' frames may be read as anything.
-    if (static_cast<int>(reply.kind_case()) != static_cast<int>(request.kind_case())) {
-      throw ConnectionError("what answers at " + settings_.server_url +
-                            " does not speak as oblique-server does to clients: check the "
-                            "address and port (" +
-                            ConnectionSettings().server_url +
-                            " is for clients; the port for workers is another one)");
-    }
-    return reply;
+  auto reply = answer_to(request,
+                         {.frame = std::move(frame),
+                          .heard = Clock::now(),
+                          .resend_after = std::chrono::milliseconds(settings_.resend_after_ms)},
+                         tell);
+  if (reply.has_error()) {
+    throw ServerError(reply.error().message());
   }
-  throw ConnectionError("no answer from " + settings_.server_url + " within " +
-                        seconds_of(settings_.timeout_ms) +
-                        ": is a server running there? Start one with `oblique-server`, or say "
-                        "where it is with --server URL or OBLIQUE_SERVER");
+  // A reply has the number of its request's kind. Other programs' frames may be read as anything.
+  if (static_cast<int>(reply.kind_case()) != static_cast<int>(request.kind_case())) {
+    throw ConnectionError("what answers at " + settings_.server_url +
+                          " does not speak as oblique-server does to clients: check the "
+                          "address and port (" +
+                          ConnectionSettings().server_url +
+                          " is for clients; the port for workers is another one)");
+  }
+  return reply;
 }
 
 protocol::SubmitReply Connection::submit(const Study& study, const StudyTerms& terms) {
@@ -123,10 +169,10 @@ protocol::SubmitReply Connection::submit(const Study& study, const StudyTerms& t
   return call(std::move(request)).submit();
 }
 
-protocol::StatusReply Connection::status(const std::string& study) {
+protocol::StatusReply Connection::status(const std::string& study, const Tell& tell) {
   protocol::ClientRequest request;
   request.mutable_status()->set_study(study);
-  return call(std::move(request)).status();
+  return call(std::move(request), tell).status();
 }
 
 protocol::WorkersReply Connection::workers() {
@@ -142,11 +188,12 @@ protocol::ChangeReply Connection::change(const std::string& study, protocol::Stu
   return call(std::move(request)).change();
 }
 
-protocol::QueryReply Connection::query(const std::string& sql, std::uint64_t max_rows) {
+protocol::QueryReply Connection::query(const std::string& sql, std::uint64_t max_rows,
+                                       const Tell& tell) {
   protocol::ClientRequest request;
   request.mutable_query()->set_sql(sql);
   request.mutable_query()->set_max_rows(max_rows);
-  return call(std::move(request)).query();
+  return call(std::move(request), tell).query();
 }
 
 }  // namespace oblique::client

@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <utility>
 
+#include "proto/visible_text.h"
+
 namespace oblique::client {
 namespace {
 
@@ -64,7 +66,7 @@ std::string progress_bar(const ProgressState& state) {
                           ? 1.0
                           : static_cast<double>(state.settled) / static_cast<double>(state.points);
   const auto filled = static_cast<std::size_t>(part * static_cast<double>(kWidth));
-  std::string text = state.study + " [" + std::string(filled, '#') +
+  std::string text = protocol::visible(state.study) + " [" + std::string(filled, '#') +
                      std::string(kWidth - filled, '-') + "] " + std::to_string(state.settled) +
                      "/" + std::to_string(state.points) + " " + std::to_string(percent(state)) +
                      " %";
@@ -81,9 +83,9 @@ std::string progress_bar(const ProgressState& state) {
 }
 
 std::string progress_line(const ProgressState& state) {
-  std::string text = state.study + ": " + std::to_string(state.settled) + " of " +
-                     std::to_string(state.points) + " points (" + std::to_string(percent(state)) +
-                     " %)";
+  std::string text = protocol::visible(state.study) + ": " + std::to_string(state.settled) +
+                     " of " + std::to_string(state.points) + " points (" +
+                     std::to_string(percent(state)) + " %)";
   if (state.failed > 0) {
     text += ", " + std::to_string(state.failed) + " of them failed";
   }
@@ -111,7 +113,7 @@ void Progress::update(ProgressState state) {
     state.points_per_s = static_cast<double>(state.settled - settled) / (state.elapsed_s - since_s);
   }
   last_ = std::move(state);
-  if (on_terminal_ || last_.elapsed_s >= next_line_s_) {
+  if (on_terminal_ || last_->elapsed_s >= next_line_s_) {
     draw();
   }
 }
@@ -119,19 +121,22 @@ void Progress::update(ProgressState state) {
 void Progress::draw() {
   if (on_terminal_) {
     // Back to the first column, and what a longer line left behind cleared away.
-    out_ << '\r' << progress_bar(last_) << "\x1b[K" << std::flush;
+    out_ << '\r' << progress_bar(*last_) << "\x1b[K" << std::flush;
     return;
   }
-  out_ << progress_line(last_) << std::endl;
+  out_ << progress_line(*last_) << std::endl;
   constexpr double kBetweenLines_s = 10.0;
-  next_line_s_ = last_.elapsed_s + kBetweenLines_s;
+  next_line_s_ = last_->elapsed_s + kBetweenLines_s;
 }
 
 void Progress::finish() {
+  if (!last_) {
+    return;
+  }
   if (on_terminal_) {
     out_ << '\r' << "\x1b[K";
   }
-  out_ << progress_line(last_) << std::endl;
+  out_ << progress_line(*last_) << std::endl;
 }
 
 }  // namespace oblique::client

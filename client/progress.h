@@ -39,7 +39,7 @@ class Progress {
   /// rate is filled in here.
   void update(ProgressState state);
 
-  /// Draws the last state a last time and ends the line.
+  /// Draws the last state, if there is one, a last time and ends the line.
   void finish();
 
  private:
@@ -47,7 +47,7 @@ class Progress {
 
   std::ostream& out_;
   bool on_terminal_;
-  ProgressState last_;
+  std::optional<ProgressState> last_;                    ///< none before the first
   std::deque<std::pair<double, std::uint64_t>> window_;  ///< (elapsed_s, settled) lately
   double next_line_s_ = 2.0;
 };

@@ -8,6 +8,7 @@
 #include "client/point_flags.h"
 #include "client/printer.h"
 #include "client/run_service.h"
+#include "client/stop_signal.h"
 #include "client/verbs.h"
 
 namespace oblique::client {
@@ -42,9 +43,11 @@ std::string shell_word(const std::string& text) {
 
 int run(const RunFlags& flags) {
   const auto study = study_of_flags(flags.study);
-  const auto end = run_study(study, flags.settings);
+  // Before any thread is started; see StopSignal.
+  StopSignal stop;
+  const auto end = run_study(study, flags.settings, stop);
   if (!end) {
-    return kFailed;
+    return stop.exit_code();
   }
   print(std::cout, end->rows, Format::kTable);
   if (end->rows.rows_size() < static_cast<int>(end->status.points())) {

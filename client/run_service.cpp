@@ -5,8 +5,8 @@
 #include <string>
 
 #include "client/connection.h"
-#include "client/stop_signal.h"
 #include "client/watching.h"
+#include "proto/visible_text.h"
 
 namespace oblique::client {
 namespace {
@@ -55,7 +55,7 @@ RunEnd submit_and_wait(const Study& study, const RunSettings& settings, Embedded
   const auto look_after = [&] {
     service.check();
     if (const auto news = service.news(); !news.empty()) {
-      std::cerr << news << '\n';
+      std::cerr << protocol::visible_lines(news) << '\n';
     }
     return !stop.requested();
   };
@@ -67,9 +67,9 @@ RunEnd submit_and_wait(const Study& study, const RunSettings& settings, Embedded
     std::cerr << "Going on with \"" << study.name << "\": " << submitted.settled() << " of "
               << submitted.points() << " points are done.\n";
   }
-  const auto ask = [&] {
+  const auto ask = [&](const Tell& tell) {
     look_after();
-    const auto reply = connection.status(study.name);
+    const auto reply = connection.status(study.name, tell);
     if (reply.studies_size() != 1) {
       throw ServerError("the server no longer knows the study \"" + study.name + "\"");
     }
@@ -80,9 +80,12 @@ RunEnd submit_and_wait(const Study& study, const RunSettings& settings, Embedded
   if (stop.requested()) {
     throw Interrupted("stopped");
   }
-  end.rows = connection.query(query_of_results(study, settings.rows));
-  end.exit_code =
-      tell_end(end.status, [&](const std::string& sql) { return connection.query(sql); });
+  const auto query = [&](const std::string& sql) {
+    const std::uint64_t servers_limit = 0;
+    return connection.query(sql, servers_limit, tell_line);
+  };
+  end.rows = query(query_of_results(study, settings.rows));
+  end.exit_code = tell_end(end.status, query);
   return end;
 }
 
@@ -96,10 +99,8 @@ void add_worker_flags(CLI::App& verb, RunSettings& settings) {
   verb.add_flag("--verbose", settings.service.verbose, "show what server and workers say");
 }
 
-std::optional<RunEnd> run_study(const Study& study, const RunSettings& settings) {
+std::optional<RunEnd> run_study(const Study& study, const RunSettings& settings, StopSignal& stop) {
   check_settings(settings);
-  // Before any thread is started; see StopSignal.
-  StopSignal stop;
   try {
     EmbeddedService service(settings.service, stop);
     auto end = submit_and_wait(study, settings, service, stop);

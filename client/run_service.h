@@ -9,6 +9,7 @@
 #include "client/connection.h"
 #include "client/embedded_service.h"
 #include "client/source.h"
+#include "client/stop_signal.h"
 #include "proto/oblique.pb.h"
 
 namespace oblique::client {
@@ -31,8 +32,8 @@ struct RunEnd {
 };
 
 /// Starts server and workers here, submits the study, shows its progress and waits for its end;
-/// nothing is left running. Nothing when stopped by a signal; what to do next is told then. Throws
+/// nothing is left running. Nothing when `stop` is requested; what to do next is told then. Throws
 /// ProcessError when server or workers end too soon, ServerError when the study is refused.
-std::optional<RunEnd> run_study(const Study& study, const RunSettings& settings);
+std::optional<RunEnd> run_study(const Study& study, const RunSettings& settings, StopSignal& stop);
 
 }  // namespace oblique::client

@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>
+#include <utility>
 
 #include "client/verbs.h"
 #include "server/reader.h"
@@ -26,7 +27,7 @@ class DatabaseSource : public Source {
   protocol::QueryReply query(const std::string& sql) override {
     return reader_.query(sql, server::kNoLimits);
   }
-  std::vector<protocol::StudyStatus> status(const std::string& study) override {
+  std::vector<protocol::StudyStatus> status(const std::string& study, const Tell&) override {
     try {
       return reader_.study_status(study);
     } catch (const server::QueryError& error) {
@@ -42,11 +43,12 @@ class DatabaseSource : public Source {
 
 class ServerSource : public Source {
  public:
-  explicit ServerSource(const ConnectionSettings& settings) : connection_(settings) {}
+  ServerSource(ConnectionSettings settings, Connection::KeepWaiting keep_waiting)
+      : connection_(std::move(settings), std::move(keep_waiting)) {}
 
   protocol::QueryReply query(const std::string& sql) override { return connection_.query(sql); }
-  std::vector<protocol::StudyStatus> status(const std::string& study) override {
-    const auto reply = connection_.status(study);
+  std::vector<protocol::StudyStatus> status(const std::string& study, const Tell& tell) override {
+    const auto reply = connection_.status(study, tell);
     return {reply.studies().begin(), reply.studies().end()};
   }
   std::string place() const override { return connection_.url(); }
@@ -111,7 +113,8 @@ ConnectionSettings connection_settings(const SourceFlags& flags) {
   return settings;
 }
 
-std::unique_ptr<Source> open_source(const SourceFlags& flags) {
+std::unique_ptr<Source> open_source(const SourceFlags& flags,
+                                    Connection::KeepWaiting keep_waiting) {
   if (!flags.database.empty()) {
     return open_database(flags.database);
   }
@@ -119,7 +122,7 @@ std::unique_ptr<Source> open_source(const SourceFlags& flags) {
   if (!server_named && std::filesystem::exists(DatabaseSettings().file)) {
     return open_database(DatabaseSettings().file);
   }
-  return std::make_unique<ServerSource>(connection_settings(flags));
+  return std::make_unique<ServerSource>(connection_settings(flags), std::move(keep_waiting));
 }
 
 std::unique_ptr<Source> open_database(const std::string& file) {

@@ -23,8 +23,10 @@ class Source {
   virtual ~Source() = default;
   /// Runs one statement that only reads. Throws what the source throws, for a wrong one too.
   virtual protocol::QueryReply query(const std::string& sql) = 0;
-  /// The study of that name, or all of them when it is empty. Throws for an unknown name.
-  virtual std::vector<protocol::StudyStatus> status(const std::string& study) = 0;
+  /// The study of that name, or all of them when it is empty. Throws for an unknown name. Given a
+  /// `tell`, waits for a server that is away; see Connection.
+  virtual std::vector<protocol::StudyStatus> status(const std::string& study, const Tell& tell) = 0;
+  std::vector<protocol::StudyStatus> status(const std::string& study) { return status(study, {}); }
   /// "oblique.db" or "tcp://127.0.0.1:7600", for messages.
   virtual std::string place() const = 0;
 };
@@ -54,7 +56,9 @@ ConnectionSettings connection_settings(const SourceFlags& flags);
 
 /// Opens what the flags name: --db, else --server or OBLIQUE_SERVER, else oblique.db when it is in
 /// this folder, else the server at its default address.
-std::unique_ptr<Source> open_source(const SourceFlags& flags);
+/// `keep_waiting` may end the wait for a server's answer; see Connection.
+std::unique_ptr<Source> open_source(const SourceFlags& flags,
+                                    Connection::KeepWaiting keep_waiting = {});
 
 /// A database file, read directly.
 std::unique_ptr<Source> open_database(const std::string& file);

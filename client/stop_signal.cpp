@@ -25,7 +25,7 @@ bool StopSignal::requested() {
 }
 
 bool StopSignal::wait(std::chrono::nanoseconds longest) {
-  if (requested_) {
+  if (signal_ > 0) {
     return true;
   }
   const auto left = std::max(longest, std::chrono::nanoseconds::zero());
@@ -33,8 +33,8 @@ bool StopSignal::wait(std::chrono::nanoseconds longest) {
   timespec time{};
   time.tv_sec = seconds.count();
   time.tv_nsec = (left - seconds).count();
-  requested_ = sigtimedwait(&signals_, nullptr, &time) > 0;
-  return requested_;
+  signal_ = std::max(sigtimedwait(&signals_, nullptr, &time), 0);
+  return signal_ > 0;
 }
 
 }  // namespace oblique::client

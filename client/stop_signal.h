@@ -21,10 +21,14 @@ class StopSignal {
   /// Waits for a signal, at most `longest`; whether one has come.
   bool wait(std::chrono::nanoseconds longest);
 
+  /// The exit code of a program that ends because of the signal that came: 128 and its number, as
+  /// shells say it; 130 for Ctrl-C.
+  int exit_code() const { return 128 + signal_; }
+
  private:
   sigset_t signals_{};
   sigset_t before_{};
-  bool requested_ = false;
+  int signal_ = 0;  ///< 0: none came
 };
 
 }  // namespace oblique::client

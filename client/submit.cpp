@@ -26,33 +26,44 @@ struct SubmitFlags {
   StudyTerms terms;
 };
 
-int submit(const SubmitFlags& flags) {
-  const auto study = study_of_flags(flags.study);
-  StopSignal stop;
-  Connection connection(connection_settings(flags.source), [&stop] { return !stop.requested(); });
-  const auto reply = connection.submit(study, flags.terms);
+void tell_submitted(const Study& study, const protocol::SubmitReply& reply) {
   std::cout << study.name << ": " << reply.points() << " points, " << reply.settled() << " done"
             << (reply.created() ? "" : "; the server had it already") << std::endl;
-  if (!flags.watch) {
-    return kDone;
-  }
-  const auto ask = [&] {
-    const auto status = connection.status(study.name);
+}
+
+int watch(const Study& study, Connection& connection, StopSignal& stop) {
+  const auto ask = [&](const Tell& tell) {
+    const auto status = connection.status(study.name, tell);
     if (status.studies_size() != 1) {
       throw ServerError("the server no longer knows the study \"" + study.name + "\"");
     }
     return status.studies(0);
   };
-  try {
-    const auto status = watch_study(ask, stop);
-    if (!stop.requested()) {
-      return tell_end(status, [&](const std::string& sql) { return connection.query(sql); });
-    }
-  } catch (const Interrupted&) {
-    // Told below.
+  const auto status = watch_study(ask, stop);
+  if (stop.requested()) {
+    throw Interrupted("no longer watching");
   }
-  std::cerr << "No longer watching; the study goes on at " << connection.url() << ".\n";
-  return kFailed;
+  const std::uint64_t servers_limit = 0;
+  return tell_end(status, [&](const std::string& sql) {
+    return connection.query(sql, servers_limit, tell_line);
+  });
+}
+
+int submit(const SubmitFlags& flags) {
+  const auto study = study_of_flags(flags.study);
+  StopSignal stop;
+  Connection connection(connection_settings(flags.source), [&stop] { return !stop.requested(); });
+  bool submitted = false;
+  try {
+    tell_submitted(study, connection.submit(study, flags.terms));
+    submitted = true;
+    return flags.watch ? watch(study, connection, stop) : kDone;
+  } catch (const Interrupted&) {
+    std::cerr << (submitted ? "No longer watching; the study goes on at "
+                            : "Stopped before the server answered; it may have the study: ")
+              << connection.url() << ".\n";
+    return stop.exit_code();
+  }
 }
 
 }  // namespace

@@ -6,7 +6,7 @@
 
 namespace oblique::client {
 
-/// What a verb does once all is parsed; gives the exit code, kDone or kFailed.
+/// What a verb does once all is parsed; gives the exit code.
 using Command = std::function<int()>;
 
 inline constexpr int kDone = 0;
@@ -35,7 +35,8 @@ void add_backup(CLI::App& app, Command& command);
 void add_check(CLI::App& app, Command& command);
 
 /// Parses the command line and does what it says: data to standard output, everything else to
-/// standard error. The exit code: 0 done, 1 failed, 2 wrong usage.
+/// standard error. The exit code: 0 done, 1 failed, 2 wrong usage, 128 and its number for a signal
+/// that stopped a verb which ends in order.
 int run_command_line(int argc, const char* const* argv);
 
 }  // namespace oblique::client

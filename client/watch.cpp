@@ -14,8 +14,8 @@ constexpr const char* kExamples = R"(Examples:
   oblique watch paper --db sweep.db
   oblique watch paper --server tcp://127.0.0.1:7600
 
-Ctrl-C ends the watching; the study goes on. The exit code is 1 when a point failed, or when the
-study is not done.)";
+Ctrl-C ends the watching; the study goes on. A server that falls silent is waited for. The exit
+code is 1 when a point failed, or when the study is not done.)";
 
 struct WatchFlags {
   std::string study;
@@ -24,13 +24,24 @@ struct WatchFlags {
 
 int watch(const WatchFlags& flags) {
   StopSignal stop;
-  const auto source = open_source(flags.source);
-  const auto status = watch_study([&] { return the_study(*source, flags.study); }, stop);
-  if (stop.requested()) {
-    std::cerr << "No longer watching.\n";
-    return kFailed;
+  const auto source = open_source(flags.source, [&stop] { return !stop.requested(); });
+  bool answered = false;
+  const auto ask = [&](const Tell& tell) {
+    // Where nobody ever answered, the address may be wrong.
+    auto status = the_study(*source, flags.study, answered ? tell : Tell());
+    answered = true;
+    return status;
+  };
+  try {
+    const auto status = watch_study(ask, stop);
+    if (!stop.requested()) {
+      return tell_end(status, [&](const std::string& sql) { return source->query(sql); });
+    }
+  } catch (const Interrupted&) {
+    // Told below.
   }
-  return tell_end(status, [&](const std::string& sql) { return source->query(sql); });
+  std::cerr << "No longer watching.\n";
+  return stop.exit_code();
 }
 
 }  // namespace

@@ -7,7 +7,10 @@
 #include <iostream>
 
 #include "client/printer.h"
+#include "client/progress.h"
 #include "client/verbs.h"
+#include "client/watch_teller.h"
+#include "proto/visible_text.h"
 
 namespace oblique::client {
 namespace {
@@ -22,33 +25,6 @@ Seconds pause_after(Seconds elapsed) {
   return std::clamp(elapsed / 40, kShortest, kLongest);
 }
 
-/// After so long without a point solved it is said.
-constexpr std::chrono::seconds kLongWithout{10};
-
-/// Says what a study waits for, once it does so for a while, and that it goes on.
-class WaitTeller {
- public:
-  void update(const protocol::StudyStatus& status, Clock::time_point now, Progress& progress) {
-    if (status.waits_for() != reason_) {
-      reason_ = status.waits_for();
-      since_ = now;
-    }
-    const bool settled = reason_.empty() || now - since_ > kWhile;
-    if (!settled || reason_ == told_) {
-      return;
-    }
-    told_ = reason_;
-    progress.finish();
-    std::cerr << (told_.empty() ? "The study goes on.\n" : "The study waits for " + told_ + ".\n");
-  }
-
- private:
-  static constexpr std::chrono::seconds kWhile{2};
-  std::string reason_;
-  std::string told_;
-  Clock::time_point since_;
-};
-
 void tell_failures(const protocol::StudyStatus& status,
                    const std::function<protocol::QueryReply(const std::string&)>& query) {
   std::cerr << status.failed() << " of " << status.points() << " points failed:\n";
@@ -56,23 +32,27 @@ void tell_failures(const protocol::StudyStatus& status,
       "SELECT error, count(*), min(point) FROM runs WHERE study = " + sql_text(status.name()) +
       " AND status = 'failed' GROUP BY error ORDER BY count(*) DESC LIMIT 10");
   for (const auto& row : reasons.rows()) {
-    std::cerr << "  " << row.values(1).integer() << " x " << row.values(0).text()
-              << " (first at point " << row.values(2).integer() << ")\n";
+    tell_line("  " + std::to_string(row.values(1).integer()) + " x " + row.values(0).text() +
+              " (first at point " + std::to_string(row.values(2).integer()) + ")");
   }
 }
 
 }  // namespace
 
-protocol::StudyStatus watch_study(const std::function<protocol::StudyStatus()>& ask,
-                                  StopSignal& stop) {
+void tell_line(const std::string& sentence) {
+  std::cerr << protocol::visible(sentence) << '\n';
+}
+
+protocol::StudyStatus watch_study(const AskStatus& ask, StopSignal& stop) {
   Progress progress(std::cerr, isatty(STDERR_FILENO) == 1);
+  const Tell tell = [&progress](const std::string& sentence) {
+    progress.finish();
+    tell_line(sentence);
+  };
   const auto start = Clock::now();
-  std::uint64_t last_settled = 0;
-  auto last_change = start;
-  bool told = false;
-  WaitTeller waits;
+  WatchTeller teller;
   for (;;) {
-    auto status = ask();
+    auto status = ask(tell);
     const Seconds elapsed = Clock::now() - start;
     const std::uint64_t settled = status.solved() + status.failed();
     progress.update({.study = status.name(),
@@ -80,16 +60,8 @@ protocol::StudyStatus watch_study(const std::function<protocol::StudyStatus()>& 
                      .settled = settled,
                      .failed = status.failed(),
                      .elapsed_s = elapsed.count()});
-    waits.update(status, Clock::now(), progress);
-    if (settled != last_settled) {
-      last_settled = settled;
-      last_change = Clock::now();
-      told = false;
-    } else if (!told && status.waits_for().empty() && Clock::now() - last_change > kLongWithout) {
-      progress.finish();
-      std::cerr << "Nothing was solved for " << kLongWithout.count()
-                << " s: is a server at work on this study, with workers?\n";
-      told = true;
+    if (const auto sentence = teller.update(status, elapsed); !sentence.empty()) {
+      tell(sentence);
     }
     const bool over =
         (status.state() != "running" && status.state() != "paused") || settled == status.points();
@@ -101,8 +73,8 @@ protocol::StudyStatus watch_study(const std::function<protocol::StudyStatus()>& 
   }
 }
 
-protocol::StudyStatus the_study(Source& source, const std::string& name) {
-  const auto found = source.status(name);
+protocol::StudyStatus the_study(Source& source, const std::string& name, const Tell& tell) {
+  const auto found = source.status(name, tell);
   if (found.size() != 1) {
     throw std::runtime_error("there is no study called \"" + name + "\" in " + source.place());
   }

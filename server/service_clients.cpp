@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "proto/frames.h"
+#include "proto/study_name.h"
 #include "server/service.h"
 
 namespace oblique::server {
@@ -11,19 +12,6 @@ namespace {
 constexpr std::size_t kLongestName = 200;
 /// Number of no request: a reply with it is passed over by clients that do not know its kind.
 constexpr std::uint64_t kNobodysRequest = UINT64_MAX;
-
-/// Why a study cannot be called so, or an empty text.
-std::string objection_to_name(const std::string& name) {
-  if (name.empty() || name.size() > kLongestName) {
-    return "a study needs a name of 1 to " + std::to_string(kLongestName) + " bytes, not " +
-           std::to_string(name.size());
-  }
-  const bool printable = std::none_of(name.begin(), name.end(), [](char c) {
-    const auto byte = static_cast<unsigned char>(c);
-    return byte < 0x20 || byte == 0x7f;
-  });
-  return printable ? "" : "the name of a study may not contain control characters";
-}
 
 /// Why studies cannot share the workers so, or an empty text.
 std::string objection_to_share(const StudyShare& share) {
@@ -113,7 +101,7 @@ void Service::submit(const Client& client, const protocol::SubmitRequest& reques
     reply_error(client, "the server is stopping: submit again when it is back");
     return;
   }
-  if (const std::string reason = objection_to_name(request.name()); !reason.empty()) {
+  if (const std::string reason = protocol::objection_to_study_name(request.name()); !reason.empty()) {
     reply_error(client, reason);
     return;
   }

@@ -1,72 +1,21 @@
 #include "client/connection.h"
 
-#include <functional>
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "proto/frames.h"
+#include "tests/client/scripted_server.h"
+#include "tests/support/reserved_port.h"
 #include "worker/solver/parameters.h"
 
 namespace oblique::client {
 namespace {
-
-// A server that answers each request with what `answer` makes of it, until destroyed.
-class ScriptedServer {
- public:
-  using Answer = std::function<std::vector<std::string>(const protocol::ClientRequest&)>;
-
-  explicit ScriptedServer(Answer answer)
-      : answer_(std::move(answer)), socket_(context_, zmq::socket_type::router) {
-    socket_.set(zmq::sockopt::linger, 0);
-    socket_.bind("tcp://127.0.0.1:*");
-    url_ = socket_.get(zmq::sockopt::last_endpoint);
-    thread_ = std::thread([this] { serve(); });
-  }
-  ~ScriptedServer() {
-    context_.shutdown();
-    thread_.join();
-  }
-  ScriptedServer(const ScriptedServer&) = delete;
-  ScriptedServer& operator=(const ScriptedServer&) = delete;
-
-  const std::string& url() const { return url_; }
-
- private:
-  void serve() {
-    try {
-      for (;;) {
-        zmq::message_t peer;
-        zmq::message_t frame;
-        static_cast<void>(socket_.recv(peer));
-        static_cast<void>(socket_.recv(frame));
-        protocol::ClientRequest request;
-        ASSERT_TRUE(protocol::decode(frame.to_string_view(), request));
-        for (const auto& reply : answer_(request)) {
-          socket_.send(zmq::buffer(peer.to_string()), zmq::send_flags::sndmore);
-          socket_.send(zmq::buffer(reply));
-        }
-      }
-    } catch (const zmq::error_t&) {
-      // The context was shut down; it waits until its socket is closed.
-      socket_.close();
-    }
-  }
-
-  Answer answer_;
-  zmq::context_t context_;
-  zmq::socket_t socket_;
-  std::string url_;
-  std::thread thread_;
-};
-
-protocol::ClientReply reply_to(const protocol::ClientRequest& request) {
-  protocol::ClientReply reply;
-  reply.set_request_id(request.request_id());
-  return reply;
-}
 
 ConnectionSettings at(const std::string& url, std::int64_t timeout_ms) {
   return {.server_url = url, .timeout_ms = timeout_ms};
@@ -74,16 +23,9 @@ ConnectionSettings at(const std::string& url, std::int64_t timeout_ms) {
 
 constexpr std::int64_t kLong_ms = 30'000;
 
-// An address at which nobody listens: bound for a moment, so that it is nobody else's.
-std::string dead_address() {
-  zmq::context_t context;
-  zmq::socket_t socket(context, zmq::socket_type::router);
-  socket.bind("tcp://127.0.0.1:*");
-  return socket.get(zmq::sockopt::last_endpoint);
-}
-
 TEST(Connection, SaysWhereItLookedAndWhatToDoWhenNobodyAnswers) {
-  const auto url = dead_address();
+  const test::ReservedPort nobody;
+  const auto url = nobody.url();
   Connection connection(at(url, 100));
   try {
     connection.status("");
@@ -102,8 +44,9 @@ TEST(Connection, RefusesAnAddressThatIsNone) {
 }
 
 TEST(Connection, StopsWaitingWhenToldTo) {
+  const test::ReservedPort nobody;
   int asked = 0;
-  Connection connection(at(dead_address(), kLong_ms), [&asked] { return ++asked < 3; });
+  Connection connection(at(nobody.url(), kLong_ms), [&asked] { return ++asked < 3; });
   EXPECT_THROW(connection.workers(), Interrupted);
 }
 
@@ -145,6 +88,105 @@ TEST(Connection, PassesOverAnswersToEarlierQuestions) {
   });
   Connection connection(at(server.url(), kLong_ms));
   EXPECT_EQ(connection.status("").workers(), 2U);
+}
+
+/// Frames with one reply to a status question, which says that there are so many workers.
+std::vector<std::string> workers_reply(const protocol::ClientRequest& request,
+                                       std::uint32_t workers) {
+  auto reply = reply_to(request);
+  reply.mutable_status()->set_workers(workers);
+  return {protocol::encode(reply)};
+}
+
+TEST(Connection, SendsARequestAgainThatTheServerTookWithItWhenItDied) {
+  const test::ReservedPort port;
+  std::atomic<std::uint64_t> taken{0};
+  auto server = std::make_unique<ScriptedServer>(
+      [&](const protocol::ClientRequest& request) {
+        taken = request.request_id();
+        return std::vector<std::string>();
+      },
+      port.url());
+  bool is_second = false;
+  const auto replace_when_taken = [&] {
+    if (!is_second && taken != 0) {
+      is_second = true;
+      server.reset();
+      server = std::make_unique<ScriptedServer>(
+          [&](const protocol::ClientRequest& request) {
+            EXPECT_EQ(request.request_id(), taken);
+            return workers_reply(request, 3);
+          },
+          port.url());
+    }
+    return true;
+  };
+  // So long that only the new connection is a reason to send again.
+  Connection connection(
+      {.server_url = port.url(), .timeout_ms = kLong_ms, .resend_after_ms = kLong_ms},
+      replace_when_taken);
+  EXPECT_EQ(connection.status("").workers(), 3U);
+}
+
+TEST(Connection, SendsARequestAgainWhenNothingIsHeardOverAConnectionThatStands) {
+  std::vector<std::uint64_t> ids;
+  std::mutex mutex;
+  const ScriptedServer server([&](const protocol::ClientRequest& request) {
+    const std::lock_guard lock(mutex);
+    ids.push_back(request.request_id());
+    return ids.size() < 3 ? std::vector<std::string>() : workers_reply(request, 4);
+  });
+  Connection connection({.server_url = server.url(), .timeout_ms = kLong_ms, .resend_after_ms = 1});
+  EXPECT_EQ(connection.status("").workers(), 4U);
+  const std::lock_guard lock(mutex);
+  EXPECT_GE(ids.size(), 3U);
+  EXPECT_EQ(ids, std::vector<std::uint64_t>(ids.size(), ids.front()));
+}
+
+TEST(Connection, AsksAServerThatAnswersOnce) {
+  std::atomic<int> asked{0};
+  const ScriptedServer server([&](const protocol::ClientRequest& request) {
+    ++asked;
+    return workers_reply(request, 1);
+  });
+  Connection connection(
+      {.server_url = server.url(), .timeout_ms = kLong_ms, .resend_after_ms = kLong_ms});
+  for (int i = 1; i <= 20; ++i) {
+    connection.status("");
+    EXPECT_EQ(asked, i);
+  }
+}
+
+TEST(Connection, PassesOverASecondAnswerToAnEarlierQuestion) {
+  const ScriptedServer server([](const protocol::ClientRequest& request) {
+    auto replies = workers_reply(request, static_cast<std::uint32_t>(request.request_id()));
+    replies.push_back(replies.front());
+    return replies;
+  });
+  Connection connection(at(server.url(), kLong_ms));
+  for (std::uint32_t i = 1; i <= 20; ++i) {
+    EXPECT_EQ(connection.status("").workers(), i);
+  }
+}
+
+TEST(Connection, ThatIsToWaitSaysThatTheServerIsSilentAndThatItIsBack) {
+  const test::ReservedPort port;
+  std::unique_ptr<ScriptedServer> server;
+  std::vector<std::string> told;
+  const Tell tell = [&](const std::string& sentence) {
+    told.push_back(sentence);
+    if (server == nullptr) {
+      server = std::make_unique<ScriptedServer>(
+          [](const protocol::ClientRequest& request) { return workers_reply(request, 5); },
+          port.url());
+    }
+  };
+  // Far longer than the time-out of an answer that is not waited for.
+  Connection connection(at(port.url(), 10));
+  EXPECT_EQ(connection.status("", tell).workers(), 5U);
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_NE(told[0].find("no answer from " + port.url()), std::string::npos) << told[0];
+  EXPECT_NE(told[1].find("answers again"), std::string::npos) << told[1];
 }
 
 TEST(Connection, TellsAForeignServerFromOurs) {

@@ -47,7 +47,7 @@ TEST_F(ServiceTest, TwoWhoSubmitTheSameBeforeItIsStoredAreBothAnswered) {
 
 TEST_F(ServiceTest, BadStudiesAreRefusedWithTheReason) {
   request(submit_request(""));
-  EXPECT_THAT(last_reply().error().message(), HasSubstr("needs a name"));
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("1 to 100 bytes"));
   request(submit_request("a\nb"));
   EXPECT_THAT(last_reply().error().message(), HasSubstr("control characters"));
   auto bad = submit_request("a");

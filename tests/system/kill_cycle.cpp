@@ -81,7 +81,7 @@ class ApartCycle {
   }
 
  private:
-  /// Killed before it is ready, it is started once more at ports that the system picks.
+  /// Killed before it is ready, it is started once more, at other ports.
   void start_server() {
     try {
       server_ = std::make_unique<Server>(folder_, database_, blow_.environment("oblique-server"));
@@ -93,19 +93,9 @@ class ApartCycle {
     }
   }
 
-  /// At the same ports. Until it has them another process may hold them for a moment.
+  /// At the same ports.
   void start_server_again() {
-    wait_until("the server listens again", [this] {
-      try {
-        server_ = std::make_unique<Server>(folder_, database_, *server_, blow_.bystander());
-        return true;
-      } catch (const std::runtime_error& error) {
-        if (std::string(error.what()).find("cannot listen") == std::string::npos) {
-          throw;
-        }
-        return false;
-      }
-    });
+    server_ = std::make_unique<Server>(folder_, database_, *server_, blow_.bystander());
   }
 
   /// One thread each: so few cores are shared by so many cycles.
@@ -137,12 +127,11 @@ class ApartCycle {
 
   /// False when it is to be done again.
   bool submit_and_watch(bool first) {
-    // A killed server does not answer what it was asked before. One that is halted does in the end.
-    const bool is_lost = case_.program == "oblique-server" && case_.is_killed();
-    Process client(folder_, client_program(),
-                   {"submit", study_.file(), "--server", server_->client_url(), "--watch",
-                    "--timeout", is_lost ? "4" : "30"},
-                   first ? blow_.environment("oblique") : blow_.bystander());
+    // What a killed server was asked is asked again of the next one: the client does not give up.
+    Process client(
+        folder_, client_program(),
+        {"submit", study_.file(), "--server", server_->client_url(), "--watch", "--timeout", "30"},
+        first ? blow_.environment("oblique") : blow_.bystander());
     while (!client.exit_code()) {
       look_after();
       std::this_thread::sleep_for(kBetweenLooks);
@@ -151,10 +140,7 @@ class ApartCycle {
     if (code == kPointsFailed && says_end_of_study(client)) {
       return true;
     }
-    const bool gave_up = client.errors().find("no answer from") != std::string::npos;
-    if (!(code == 1 && gave_up && is_lost && blow_.has_struck())) {
-      expect_explained("oblique", code, client);
-    }
+    expect_explained("oblique", code, client);
     return false;
   }
 

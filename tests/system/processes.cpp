@@ -85,10 +85,6 @@ std::vector<pid_t> all_processes() {
   return all;
 }
 
-std::string port_of(const std::string& url) {
-  return url.substr(url.rfind(':') + 1);
-}
-
 std::string read_line(int descriptor) {
   std::string line;
   char byte = 0;
@@ -243,27 +239,28 @@ Ran run_client(const Folder& folder, const std::vector<std::string>& arguments) 
 
 // ---- Server and worker --------------------------------------------------------------------------
 
-Server::Server(const Folder& folder, const std::string& database, const Environment& environment) {
-  start(folder, database, "0", "0", environment);
+Server::Server(const Folder& folder, const std::string& database, const Environment& environment)
+    : ports_(std::make_shared<Ports>()) {
+  start(folder, database, environment);
 }
 
 Server::Server(const Folder& folder, const std::string& database, const Server& before,
-               const Environment& environment) {
-  start(folder, database, port_of(before.worker_url()), port_of(before.client_url()), environment);
+               const Environment& environment)
+    : ports_(before.ports_) {
+  start(folder, database, environment);
 }
 
 void Server::start(const Folder& folder, const std::string& database,
-                   const std::string& worker_port, const std::string& client_port,
                    const Environment& environment) {
   std::array<int, 2> ready{};
   if (pipe2(ready.data(), O_CLOEXEC) != 0) {
     throw std::runtime_error("pipe: " + std::string(std::strerror(errno)));
   }
-  process_.emplace(
-      folder, server_program(),
-      std::vector<std::string>{"--db", database, "--worker-port", worker_port, "--client-port",
-                               client_port, "--ready-fd", "3", "--stop-with-parent"},
-      environment, ready[1]);
+  process_.emplace(folder, server_program(),
+                   std::vector<std::string>{
+                       "--db", database, "--worker-port", ports_->worker.number(), "--client-port",
+                       ports_->client.number(), "--ready-fd", "3", "--stop-with-parent"},
+                   environment, ready[1]);
   close(ready[1]);
   const std::string line = read_line(ready[0]);
   close(ready[0]);

@@ -5,9 +5,12 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "tests/support/reserved_port.h"
 
 namespace oblique::test {
 
@@ -84,7 +87,7 @@ Ran run_client(const Folder& folder, const std::vector<std::string>& arguments);
 /// An `oblique-server` on loopback that is ready when constructed.
 class Server {
  public:
-  /// At ports that the system picks.
+  /// At ports that the system picks, and gives nobody else while this or a successor lives.
   Server(const Folder& folder, const std::string& database, const Environment& environment = {});
   /// At the same ports as one that has ended.
   Server(const Folder& folder, const std::string& database, const Server& before,
@@ -95,9 +98,13 @@ class Server {
   Process& process() { return *process_; }
 
  private:
-  void start(const Folder& folder, const std::string& database, const std::string& worker_port,
-             const std::string& client_port, const Environment& environment);
+  struct Ports {
+    ReservedPort worker;
+    ReservedPort client;
+  };
+  void start(const Folder& folder, const std::string& database, const Environment& environment);
 
+  std::shared_ptr<const Ports> ports_;
   std::string worker_url_;
   std::string client_url_;
   std::optional<Process> process_;

@@ -43,7 +43,7 @@ TEST_F(RunTest, CtrlCLeavesNothingRunningAndTheSameCommandContinues) {
   Process run(folder_, client_program(), arguments());
   const auto children = started_by(run);
   kill(-run.pid(), SIGINT);  // as a terminal does: to the whole group
-  EXPECT_EQ(run.wait(), 1);
+  EXPECT_EQ(run.wait(), 128 + SIGINT);
   EXPECT_NE(run.errors().find("the same command again"), std::string::npos) << run.errors();
   EXPECT_EQ(run.output(), "");
   for (const pid_t child : children) {

@@ -1,8 +1,11 @@
 #include "worker/batch_solver.h"
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <cstdint>
 #include <mutex>
+#include <set>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -158,9 +161,21 @@ TEST_F(BatchSolverTest, APausedSolverEndsItsPointAndBeginsNoOther) {
   EXPECT_EQ(solver_.collect().at(0).results.size(), 2U);
 }
 
-TEST_F(BatchSolverTest, APausedSolverCanBeEnded) {
-  solver_.set_paused(true);
-  solver_.add(task(1, 0, 2));
+TEST_F(BatchSolverTest, APausedSolverThatIsEndedBeginsNoPoint) {
+  std::atomic<int> begun{0};
+  {
+    BatchSolver paused(
+        [&begun](const Task&, const auto& next, const auto& take) {
+          while (const auto point = next()) {
+            ++begun;
+            take(protocol::failed_point(*point, "for the test"));
+          }
+        },
+        [] {});
+    paused.set_paused(true);
+    paused.add(task(1, 0, 2));
+  }
+  EXPECT_EQ(begun, 0);
 }
 
 TEST_F(BatchSolverTest, SeveralThreadsShareATask) {
@@ -173,8 +188,18 @@ TEST_F(BatchSolverTest, SeveralThreadsShareATask) {
       },
       [] {}, 3);
   shared.add(task(1, 0, 3));
-  gate_.wait_begun(3);  // none has ended
+  gate_.wait_begun(3);
+  EXPECT_TRUE(shared.collect().empty()) << "none has ended, and all three are begun";
   gate_.open(3);
+  std::set<std::uint64_t> points;
+  while (points.size() < 3) {
+    for (const Progress& progress : shared.collect()) {
+      for (const auto& result : progress.results) {
+        EXPECT_TRUE(points.insert(result.point()).second) << result.point();
+      }
+    }
+  }
+  EXPECT_EQ(points, (std::set<std::uint64_t>{0, 1, 2}));
 }
 
 TEST(BatchSolver, EveryPointOfManyTasksIsSolvedOnceHoweverManyThreads) {

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "proto/frames.h"
+#include "tests/support/reserved_port.h"
 #include "tests/worker/conversation_fixture.h"
 #include "worker/wake_up.h"
 
@@ -147,15 +148,15 @@ TEST(SessionTest, HeartbeatsGoOnWhileAPointIsSolved) {
 }
 
 TEST(SessionTest, WhatTheLostServerDidNotStoreIsDeliveredToTheNextOneAtTheSameAddress) {
-  auto server = std::make_unique<ScriptedServer>();
-  const std::string endpoint = server->endpoint();
-  RunningWorker worker(endpoint, solved_at_once);
+  const test::ReservedPort port;
+  auto server = std::make_unique<ScriptedServer>(port.url());
+  RunningWorker worker(port.url(), solved_at_once);
   server->welcome_and_hand_out(10);
   while (!server->wait_for(WorkerMessage::kResults).results().batch_done()) {
   }
   server.reset();
 
-  ScriptedServer next(endpoint);
+  ScriptedServer next(port.url());
   next.wait_for(WorkerMessage::kHeartbeat);
   next.send(hello_again_message());
   next.wait_for(WorkerMessage::kHello);
@@ -171,13 +172,9 @@ TEST(SessionTest, WhatTheLostServerDidNotStoreIsDeliveredToTheNextOneAtTheSameAd
 }
 
 TEST(SessionTest, AWorkerStartedBeforeItsServerFindsIt) {
-  std::string endpoint;
-  {
-    const ScriptedServer once;
-    endpoint = once.endpoint();
-  }
-  RunningWorker worker(endpoint, solved_at_once);
-  ScriptedServer server(endpoint);
+  const test::ReservedPort port;
+  RunningWorker worker(port.url(), solved_at_once);
+  ScriptedServer server(port.url());
   EXPECT_EQ(server.wait_for(WorkerMessage::kHello).hello().name(), "test");
 }
 

@@ -1,0 +1,110 @@
+// What people see who watch a study while its server comes and goes.
+#include <csignal>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/system/many_points.h"
+#include "tests/system/processes.h"
+
+namespace oblique::test {
+namespace {
+
+/// A server with a study of many points that nobody solves yet.
+class ServerAwayTest : public ::testing::Test {
+ protected:
+  std::vector<std::string> submit_and_watch() const {
+    std::vector<std::string> arguments{"submit", "--server", server_->client_url(), "--watch"};
+    const auto points = many_points("many");
+    arguments.insert(arguments.end(), points.begin(), points.end());
+    return arguments;
+  }
+
+  std::vector<std::string> watch() const {
+    return {"watch", "many", "--server", server_->client_url()};
+  }
+
+  static void wait_until_said(const Process& client, const std::string& words) {
+    wait_until("the client says: " + words,
+               [&] { return client.errors().find(words) != std::string::npos; });
+  }
+
+  void kill_server() {
+    server_->process().send(SIGKILL);
+    EXPECT_EQ(server_->process().wait(), 128 + SIGKILL);
+  }
+
+  void start_server_again() { server_ = std::make_unique<Server>(folder_, database_, *server_); }
+
+  Folder folder_;
+  std::string database_{folder_.file("many.db")};
+  std::unique_ptr<Server> server_ = std::make_unique<Server>(folder_, database_);
+};
+
+TEST_F(ServerAwayTest, WatchingGoesOnWhenTheServerIsKilledAndComesBack) {
+  Process submitting(folder_, client_program(), submit_and_watch());
+  wait_until_said(submitting, "waits for a worker");
+  Process watching(folder_, client_program(), watch());
+  wait_until_said(watching, "waits for a worker");
+  kill_server();
+  for (const Process* client : {&submitting, &watching}) {
+    wait_until_said(*client, "no answer from " + server_->client_url());
+  }
+  start_server_again();
+  const Worker worker(folder_, server_->worker_url());
+  for (Process* client : {&submitting, &watching}) {
+    wait_until_said(*client, "answers again");
+    EXPECT_EQ(client->wait(), 0) << client->errors();
+  }
+  EXPECT_EQ(Database(database_).rows(), kManyPoints);
+}
+
+TEST_F(ServerAwayTest, AServerThatWasNeverThereIsNotWaitedFor) {
+  kill_server();
+  for (auto arguments : {submit_and_watch(), watch()}) {
+    arguments.insert(arguments.end(), {"--timeout", "0.2"});
+    const Ran ran = run_client(folder_, arguments);
+    EXPECT_EQ(ran.exit_code, 1) << ran.errors;
+    EXPECT_NE(ran.errors.find("no answer from"), std::string::npos) << ran.errors;
+  }
+}
+
+TEST_F(ServerAwayTest, ASignalEndsTheWatchingWithItsNumberWhetherTheServerIsThereOrNot) {
+  for (const bool is_away : {false, true}) {
+    std::vector<std::unique_ptr<Process>> clients;
+    for (const auto& arguments : {submit_and_watch(), watch(), submit_and_watch(), watch()}) {
+      clients.push_back(std::make_unique<Process>(folder_, client_program(), arguments));
+      // Watching wants the study to be there.
+      wait_until("the study is stored", [this] {
+        const std::string count = "SELECT count(*) FROM studies";
+        try {
+          return Database(database_).number(count) == 1.0;
+        } catch (const std::runtime_error&) {
+          return false;  // no tables yet
+        }
+      });
+    }
+    for (const auto& client : clients) {
+      wait_until_said(*client, "many: 0 of");
+    }
+    if (is_away) {
+      kill_server();
+    }
+    for (std::size_t i = 0; i < clients.size(); ++i) {
+      if (is_away) {
+        wait_until_said(*clients[i], "no answer from");
+      }
+      const int signal = i < 2 ? SIGINT : SIGTERM;
+      clients[i]->send(signal);
+      EXPECT_EQ(clients[i]->wait(), 128 + signal) << clients[i]->errors();
+      EXPECT_NE(clients[i]->errors().find("No longer watching"), std::string::npos)
+          << clients[i]->errors();
+    }
+  }
+}
+
+}  // namespace
+}  // namespace oblique::test
