@@ -25,7 +25,7 @@ struct WorkersFlags {
 protocol::QueryReply workers_of_server(const ConnectionSettings& settings) {
   protocol::QueryReply table;
   for (const char* column : {"worker", "name", "threads", "instruction_set", "solver_version",
-                             "leased_points", "solved_points", "silent_ms"}) {
+                             "leased_points", "solved_points", "silent_ms", "losses", "standing"}) {
     table.add_columns(column);
   }
   const auto reply = Connection(settings).workers();
@@ -39,6 +39,10 @@ protocol::QueryReply workers_of_server(const ConnectionSettings& settings) {
     add_value(row, static_cast<std::int64_t>(worker.leased_points()));
     add_value(row, static_cast<std::int64_t>(worker.solved_points()));
     add_value(row, static_cast<std::int64_t>(worker.silent_ms()));
+    add_value(row, static_cast<std::int64_t>(worker.losses()));
+    add_value(row, std::string(worker.set_aside() ? "set aside"
+                               : worker.proven()  ? "proven"
+                                                  : "new"));
   }
   if (reply.bad_frames() > 0) {
     std::cerr

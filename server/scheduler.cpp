@@ -29,9 +29,8 @@ void Scheduler::on(const StudyAdded& event) {
   if (studies_.contains(event.study)) {
     return;
   }
-  const std::uint32_t suspect_after_losses = std::max(settings_.max_losses, 2U) - 1;
   studies_.emplace(event.study,
-                   Study{StudyPoints(event.table, event.settled, suspect_after_losses),
+                   Study{StudyPoints(event.table, event.settled, settings_.loss_limits),
                          event.failed, event.cancelled, event.paused, false, event.share,
                          least_served(event.study), event.solver_version});
   studies_.at(event.study).points.count_attempts(event.attempts);
@@ -47,7 +46,7 @@ void Scheduler::on(const StudyCancelled& event) {
   found->second.cancelled = true;
   found->second.overlaps = false;  // all leases end: whose point it was does not matter
   for (const LeaseId id : found->second.leases.all()) {
-    end_lease(id, LeaseEnd::kReturned);
+    end_lease(id, std::nullopt);
   }
   requeue(event.study);
   for (auto& [id, worker] : workers_) {
@@ -87,7 +86,7 @@ void Scheduler::on(const StudyShareChanged& event) {
     const WorkerId worker = leases_.at(id).worker;
     if (!admits(study, workers_.at(worker))) {  // it takes part no more
       effects_.emplace_back(ReleaseBatch{worker, id});
-      end_lease(id, LeaseEnd::kReturned);
+      end_lease(id, std::nullopt);
     }
   }
   requeue(event.study);
@@ -122,7 +121,7 @@ StudyQueue::Place Scheduler::place_of(const Study& study) const {
   if (!study.has_work()) {
     return {};
   }
-  return {study.points.has_free(), study.points.has_suspect(), study.share.priority, study.served,
+  return {study.points.has_free(), study.has_suspect(), study.share.priority, study.served,
           study.share.mixes_versions ? std::string() : study.solver_version};
 }
 
@@ -143,13 +142,26 @@ void Scheduler::finish_if_complete(StudyId id) {
 // ---- Workers ----------------------------------------------------------------------------------
 
 void Scheduler::on(const WorkerJoined& event) {
+  if (workers_.contains(event.worker)) {
+    return;
+  }
   Worker worker{};
   worker.threads = std::max(event.threads, 1U);
   worker.solver_version = event.solver_version;
   worker.last_heard_ms = now_ms_;
-  if (workers_.emplace(event.worker, std::move(worker)).second) {
-    threads_ += std::max(event.threads, 1U);
+  worker.process = processes_.join(event.process, event.worker);
+  threads_ += worker.threads;
+  const ProcessNumber process = worker.process;
+  workers_.emplace(event.worker, std::move(worker));
+  if (event.process_has_one_worker) {
+    for (const WorkerId earlier : std::set<WorkerId>(processes_.at(process).workers)) {
+      if (earlier != event.worker) {
+        remove_worker(earlier, WorkerEnd::kReplaced);
+        effects_.emplace_back(DropWorker{earlier, "its process has a new connection"});
+      }
+    }
   }
+  take_back_losses(process);
 }
 
 Scheduler::Worker* Scheduler::heard_from(WorkerId worker) {
@@ -183,6 +195,10 @@ void Scheduler::on(const HeartbeatReceived& event) {
   }
   // A lease that the worker still does not name when a batch must long have reached it never did.
   const std::set<LeaseId> held(event.leases.begin(), event.leases.end());
+  if (worker->probe != 0 && !held.contains(worker->probe) &&
+      now_ms_ - *worker->probed_ms > settings_.lost_after_ms) {
+    worker->probe = 0;
+  }
   std::vector<LeaseId> strayed;
   for (const LeaseId id : worker->leases) {
     if (!held.contains(id) && now_ms_ - leases_.at(id).granted_ms > settings_.lost_after_ms) {
@@ -190,17 +206,17 @@ void Scheduler::on(const HeartbeatReceived& event) {
     }
   }
   for (const LeaseId id : strayed) {
-    end_lease(id, LeaseEnd::kReturned);
+    end_lease(id, std::nullopt);
   }
 }
 
 void Scheduler::on(const WorkerLeft& event) {
-  remove_worker(event.worker, LeaseEnd::kReturned);
+  remove_worker(event.worker, WorkerEnd::kLeft);
 }
 
 void Scheduler::on(const WorkerUnreachable& event) {
   if (workers_.contains(event.worker)) {
-    remove_worker(event.worker, LeaseEnd::kLost);
+    remove_worker(event.worker, WorkerEnd::kLost);
     effects_.emplace_back(DropWorker{event.worker, event.reason});
   }
 }
@@ -208,6 +224,7 @@ void Scheduler::on(const WorkerUnreachable& event) {
 void Scheduler::on(const Tick&) {
   const std::int64_t gap_ms = last_tick_ms_ < 0 ? 0 : now_ms_ - last_tick_ms_;
   last_tick_ms_ = now_ms_;
+  fail_condemned();
   std::vector<WorkerId> lost;
   for (auto& [id, worker] : workers_) {
     if (gap_ms > kLongestTick_ms) {
@@ -219,25 +236,32 @@ void Scheduler::on(const Tick&) {
   }
   for (const WorkerId id : lost) {
     const std::int64_t silent_ms = now_ms_ - workers_.at(id).last_heard_ms;
-    remove_worker(id, LeaseEnd::kLost);
+    remove_worker(id, WorkerEnd::kLost);
     effects_.emplace_back(DropWorker{id, "silent for " + std::to_string(silent_ms) + " ms"});
   }
 }
 
-void Scheduler::remove_worker(WorkerId id, LeaseEnd how) {
+void Scheduler::remove_worker(WorkerId id, WorkerEnd how) {
   const auto found = workers_.find(id);
   if (found == workers_.end()) {
     return;
   }
+  const ProcessNumber process = found->second.process;
+  note_end(found->second, how);
+  std::optional<Loss> loss;
   const std::set<LeaseId> leases = found->second.leases;
+  if (how == WorkerEnd::kLost) {
+    loss = Loss{process, is_proven(found->second) && leases.size() == 1};
+  }
   for (const LeaseId lease : leases) {
-    end_lease(lease, how);
+    end_lease(lease, loss);
   }
   if (found->second.queued) {
     std::erase(ready_workers_, id);
   }
   threads_ -= found->second.threads;
   workers_.erase(found);
+  processes_.leave(process, id);
 }
 
 void Scheduler::on(const DispatchHeld& event) {
@@ -267,7 +291,12 @@ std::int64_t Scheduler::silent_ms(WorkerId id, std::int64_t now_ms) const {
 
 WorkerCounts Scheduler::worker(WorkerId id, std::int64_t now_ms) const {
   const Worker& worker = workers_.at(id);
-  WorkerCounts counts{0, worker.solved_points, silent_ms(id, now_ms)};
+  WorkerCounts counts{0,
+                      worker.solved_points,
+                      silent_ms(id, now_ms),
+                      processes_.at(worker.process).losses,
+                      is_proven(worker),
+                      is_set_aside(worker)};
   for (const LeaseId lease_id : worker.leases) {
     const Lease& lease = leases_.at(lease_id);
     const IntervalSet& leased = studies_.at(lease.study).points.leased_set();
@@ -328,6 +357,7 @@ void Scheduler::check_invariants() const {
             "a worker stands in the queue twice or not as noted");
     require(worker.queued == (worker.credit > 0), "a worker with credit is not in the queue");
   }
+  check_losses();
   require(threads == threads_, "the number of threads is wrong");
   require(leases == leases_.size(), "a worker holds a lease that does not exist");
 }

@@ -3,201 +3,18 @@
 #include <cstdint>
 #include <deque>
 #include <map>
-#include <memory>
+#include <optional>
 #include <set>
 #include <string>
-#include <variant>
 #include <vector>
 
-#include "proto/recipe.h"
 #include "server/lease_index.h"
+#include "server/scheduler_events.h"
 #include "server/study_points.h"
 #include "server/study_queue.h"
+#include "server/worker_processes.h"
 
 namespace oblique::server {
-
-using StudyId = std::uint64_t;
-using WorkerId = std::uint64_t;
-using LeaseId = std::uint64_t;
-
-struct SchedulerSettings {
-  /// A worker silent for longer is lost: three heartbeats missed, and noticed within 3 s.
-  std::int64_t lost_after_ms = 2800;
-  double batch_target_s = 0.1;                ///< time a batch takes, once a worker's pace is known
-  std::uint64_t first_batch_points = 4;       ///< a thread, in a batch to a worker of unknown pace
-  std::uint64_t largest_batch_points = 4096;  ///< a thread
-  std::uint64_t growth = 4;  ///< a batch is at most so many times the worker's last one
-  /// While free points last, at least so many more batches are left for each thread: the tail of a
-  /// study goes out in ever smaller batches and all workers finish together.
-  std::uint64_t tail_batches_per_thread = 3;
-  /// With nothing else to hand out, a batch that takes this long, and `straggler_factor` times as
-  /// long as it should, is given to a second worker too; the first answer to a point wins. Batches
-  /// that have cost a worker are not.
-  std::int64_t straggler_after_ms = 1000;
-  double straggler_factor = 4.0;
-  /// A chunk whose leases cost so many workers is split; a single point of that kind fails.
-  std::uint32_t max_losses = 3;
-  std::uint32_t max_credit = 1024;  ///< batches a worker may ask for at a time
-  /// Leases are numbered from here. A server that restarts begins above all earlier numbers, so
-  /// that results of an earlier run never close a lease of this one.
-  LeaseId first_lease_id = 1;
-};
-
-/// What became of one point.
-struct PointOutcome {
-  std::uint64_t point;
-  bool failed;
-};
-
-// ---- Events -----------------------------------------------------------------------------------
-
-/// A study that is new, or found in the database with the points that have a row.
-struct StudyAdded {
-  StudyId study;
-  std::shared_ptr<const protocol::PointTable> table;
-  IntervalSet settled;
-  std::uint64_t failed = 0;  ///< how many of the settled points failed
-  bool cancelled = false;
-  bool paused = false;
-  StudyShare share{};
-  std::string solver_version{};  ///< of its results; empty while there are none
-  AttemptRuns attempts{};        ///< of points that failed, also of those that were forgotten
-};
-/// The study's cancellation is durable.
-struct StudyCancelled {
-  StudyId study;
-};
-/// Nothing more of the study is handed out; what is handed out is still solved.
-struct StudyPaused {
-  StudyId study;
-};
-/// A cancelled or paused study goes on.
-struct StudyReopened {
-  StudyId study;
-};
-struct StudyShareChanged {
-  StudyId study;
-  StudyShare share;
-};
-/// It is durable that these points, all failed before, have no row any more.
-struct FailuresForgotten {
-  StudyId study;
-  IntervalSet points;
-  AttemptRuns attempts{};  ///< in which they failed
-};
-/// A worker said hello. Worker numbers are never used twice.
-struct WorkerJoined {
-  WorkerId worker;
-  std::uint32_t threads;
-  std::string solver_version{};
-};
-/// The worker takes so many batches more.
-struct CreditGiven {
-  WorkerId worker;
-  std::uint32_t batches;
-};
-struct ResultsReceived {
-  WorkerId worker;
-  StudyId study;
-  LeaseId lease;
-  std::uint64_t sequence;  ///< the worker's number for this message
-  bool batch_done;
-  double busy_s;
-  std::vector<PointOutcome> outcomes;
-};
-/// A StoreResults or StoreFailure effect is durable.
-struct ResultsStored {
-  WorkerId worker;  ///< 0: nobody waits for an acknowledgement
-  StudyId study;
-  std::uint64_t sequence;
-  std::vector<PointOutcome> outcomes;
-};
-/// The worker lives and holds these leases.
-struct HeartbeatReceived {
-  WorkerId worker;
-  std::vector<LeaseId> leases;
-};
-/// The worker said goodbye.
-struct WorkerLeft {
-  WorkerId worker;
-};
-/// A message could not be sent to the worker, or it behaves as no worker does.
-struct WorkerUnreachable {
-  WorkerId worker;
-  std::string reason = "its connection is gone";
-};
-/// While held (the disk does not take results), no batch goes out.
-struct DispatchHeld {
-  bool held;
-};
-/// Time has passed.
-struct Tick {};
-
-using Event =
-    std::variant<StudyAdded, StudyCancelled, StudyPaused, StudyReopened, StudyShareChanged,
-                 FailuresForgotten, WorkerJoined, CreditGiven, ResultsReceived, ResultsStored,
-                 HeartbeatReceived, WorkerLeft, WorkerUnreachable, DispatchHeld, Tick>;
-
-// ---- Effects ----------------------------------------------------------------------------------
-
-/// Tell the worker the recipe: its first batch of the study follows.
-struct DefineStudy {
-  WorkerId worker;
-  StudyId study;
-};
-struct SendBatch {
-  WorkerId worker;
-  StudyId study;
-  std::uint64_t model;
-  std::uint64_t first_point;
-  std::uint64_t count;
-  std::uint32_t attempt;
-  LeaseId lease;
-};
-/// Make these results of the message durable, then say ResultsStored. Sent for every Results
-/// message, even with nothing to keep: the acknowledgement follows all commits before it.
-struct StoreResults {
-  WorkerId worker;
-  StudyId study;
-  std::uint64_t sequence;
-  std::vector<std::size_t> accepted;  ///< indices into the event's outcomes
-};
-/// Make it durable that the point failed, then say ResultsStored (worker 0).
-struct StoreFailure {
-  StudyId study;
-  std::uint64_t point;
-  std::uint32_t attempt;
-  std::string reason;
-};
-/// The results of that number are durable: tell the worker.
-struct AcknowledgeResults {
-  WorkerId worker;
-  std::uint64_t sequence;
-};
-/// Tell the worker to drop the study.
-struct WithdrawStudy {
-  WorkerId worker;
-  StudyId study;
-};
-/// Every point of that batch has a result from elsewhere: what is left of it need not be solved.
-struct ReleaseBatch {
-  WorkerId worker;
-  LeaseId lease;
-};
-/// The worker is lost or was given up; it is unknown from now on.
-struct DropWorker {
-  WorkerId worker;
-  std::string reason;
-};
-/// Every point of the study is settled.
-struct StudyFinished {
-  StudyId study;
-};
-
-using Effect = std::variant<DefineStudy, SendBatch, StoreResults, StoreFailure, AcknowledgeResults,
-                            WithdrawStudy, ReleaseBatch, DropWorker, StudyFinished>;
-
-// ---- State ------------------------------------------------------------------------------------
 
 /// A study as others see it.
 struct StudyCounts {
@@ -214,6 +31,9 @@ struct WorkerCounts {
   std::uint64_t leased_points;
   std::uint64_t solved_points;
   std::int64_t silent_ms;
+  std::uint64_t losses;  ///< leases of its process that ended without an answer
+  bool is_proven;        ///< its process has solved points that were handed to it
+  bool is_set_aside;     ///< it gets nothing until it has solved a probe
 };
 
 /// Decides who solves which points: (state, event, now) -> effects. No I/O, no clock, no thread, no
@@ -261,7 +81,10 @@ class Scheduler {
     bool overlaps = false;  ///< a point of it may be under several of these leases
 
     bool is_open() const { return !cancelled && !paused && !finished; }
-    bool has_work() const { return is_open() && (points.has_free() || points.has_suspect()); }
+    bool has_suspect() const {
+      return points.has(Standing::kSuspect) || points.has(Standing::kAccused);
+    }
+    bool has_work() const { return is_open() && (points.has_free() || has_suspect()); }
   };
   struct Lease {
     WorkerId worker;
@@ -281,6 +104,9 @@ class Scheduler {
     std::uint32_t credit = 0;
     bool queued = false;    ///< stands in `ready_workers_`
     bool draining = false;  ///< gets nothing until it holds nothing, then suspect points
+    ProcessNumber process = kNobody;
+    LeaseId probe = 0;                        ///< that it has, and then nothing else; 0: none
+    std::optional<std::int64_t> probed_ms{};  ///< when it got its last probe
     std::int64_t last_heard_ms;
     std::uint64_t solved_points = 0;
     std::set<LeaseId> leases;
@@ -305,22 +131,34 @@ class Scheduler {
   void on(const DispatchHeld& event);
   void on(const Tick& event);
 
-  enum class LeaseEnd { kReturned, kLost };
+  enum class WorkerEnd { kLeft, kReplaced, kLost };
   Worker* heard_from(WorkerId worker);
-  void end_lease(LeaseId lease, LeaseEnd how);
+  /// `loss`: who went with it without an answer; nothing: its points are given back.
+  void end_lease(LeaseId lease, const std::optional<Loss>& loss);
   std::vector<Interval> held_by(const Lease& lease) const;
-  void give_back_lost(StudyId study, const Interval& run, const Lease& lease);
   void release_if_answered(LeaseId lease);
-  void remove_worker(WorkerId worker, LeaseEnd how);
+  void remove_worker(WorkerId worker, WorkerEnd how);
   void learn_pace(Worker& worker, const ResultsReceived& event);
   void finish_if_complete(StudyId id);
   StudyQueue::Place place_of(const Study& study) const;
   /// To be called after every change of a study or its points.
   void requeue(StudyId id);
 
+  void note_loss(const Lease& lease, const std::vector<Interval>& held, Loss loss);
+  void note_end(const Worker& worker, WorkerEnd how);
+  void note_answers(Worker& worker, const ResultsReceived& event, bool any_accepted);
+  void take_back_losses(ProcessNumber process);
+  void fail_condemned();
+  bool is_proven(const Worker& worker) const;
+  bool is_set_aside(const Worker& worker) const;
+  bool is_longest_proven(const Worker& worker, const Study& study) const;
+  bool probe(WorkerId id, Worker& worker);
+  void check_losses() const;
+
   void dispatch();
   bool serve(WorkerId id, Worker& worker);
   bool serve_suspect(WorkerId id, Worker& worker);
+  std::optional<Standing> suspect_for(const Study& study, const Worker& worker) const;
   bool serve_straggler(WorkerId id, Worker& worker);
   bool is_straggling(const Lease& lease, const Worker& helper) const;
   static bool admits(const Study& study, const Worker& worker);
@@ -332,7 +170,17 @@ class Scheduler {
   LeaseId grant(WorkerId id, Worker& worker, StudyId study, const Chunk& chunk, bool alone);
   void queue(WorkerId id, Worker& worker);
 
+  /// A point that is to fail, unless it is condemned no more.
+  struct Condemned {
+    std::int64_t due_ms;
+    StudyId study;
+    std::uint64_t point;
+  };
+
   SchedulerSettings settings_;
+  WorkerProcesses processes_{settings_.most_absent_processes};
+  std::deque<Condemned> condemned_;       // the one that is due first in front
+  std::deque<std::int64_t> vanished_ms_;  // when the last newcomers vanished with points
   std::map<StudyId, Study> studies_;
   StudyQueue queue_;  // of the studies that have something to hand out
   std::map<WorkerId, Worker> workers_;

@@ -30,16 +30,28 @@ void Scheduler::dispatch() {
 
 bool Scheduler::serve(WorkerId id, Worker& worker) {
   const bool holds_suspect = !worker.leases.empty() && leases_.at(*worker.leases.begin()).alone;
-  if (holds_suspect) {
+  if (holds_suspect || worker.probe != 0) {
     return false;
   }
-  if (next_suspect_study(worker) == 0) {
+  if (is_set_aside(worker)) {
+    return probe(id, worker);
+  }
+  const StudyId suspect_study = next_suspect_study(worker);
+  if (suspect_study == 0) {
     worker.draining = false;
+  } else if (!is_proven(worker)) {
+    // It may have nothing else by which to show that it is fit for them.
+    if (worker.leases.empty() && next_free_study(worker) == 0) {
+      return probe(id, worker);
+    }
   } else if (worker.leases.empty()) {
     return serve_suspect(id, worker);
   } else if (worker.draining || !anyone_draining()) {
     // Suspect points wait for one worker to empty, the others go on.
     worker.draining = true;
+    return false;
+  }
+  if (!is_proven(worker) && worker.leases.size() >= settings_.newcomer_batches) {
     return false;
   }
   const StudyId study = next_free_study(worker);
@@ -53,10 +65,12 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
 }
 
 bool Scheduler::serve_suspect(WorkerId id, Worker& worker) {
-  const StudyId study = next_suspect_study(worker);
+  const StudyId id_of_study = next_suspect_study(worker);
+  Study& study = studies_.at(id_of_study);
   worker.draining = false;
-  if (const auto chunk = studies_.at(study).points.take_suspect(batch_points(worker, study))) {
-    grant(id, worker, study, *chunk, true);
+  const std::uint64_t at_most = batch_points(worker, id_of_study);
+  if (const auto chunk = study.points.take(*suspect_for(study, worker), at_most)) {
+    grant(id, worker, id_of_study, *chunk, true);
   }
   return true;
 }
@@ -92,7 +106,7 @@ bool Scheduler::serve_straggler(WorkerId id, Worker& worker) {
 bool Scheduler::is_straggling(const Lease& lease, const Worker& helper) const {
   const Study& study = studies_.at(lease.study);
   const std::int64_t age_ms = now_ms_ - lease.granted_ms;
-  if (lease.twin != 0 || lease.alone || lease.chunk.losses > 0 ||
+  if (lease.twin != 0 || lease.alone || !lease.chunk.losses.empty() ||
       age_ms < settings_.straggler_after_ms || !study.is_open() || !admits(study, helper) ||
       study.points.leased_set().within(lease.chunk.first_point, lease.chunk.end()).empty()) {
     return false;
@@ -125,9 +139,23 @@ StudyId Scheduler::next_free_study(const Worker& worker) const {
 StudyId Scheduler::next_suspect_study(const Worker& worker) const {
   const auto& suspects = queue_.with_suspects();
   const auto found = std::find_if(suspects.begin(), suspects.end(), [&](StudyId study) {
-    return admits(studies_.at(study), worker);
+    return admits(studies_.at(study), worker) && suspect_for(studies_.at(study), worker);
   });
   return found == suspects.end() ? 0 : *found;
+}
+
+/// Which of the study's suspect points the worker may get. For accused ones the worker is wanted
+/// that is least likely to be lost for a reason of its own. A newcomer gets none, but is told so
+/// here, that it may be probed.
+std::optional<Standing> Scheduler::suspect_for(const Study& study, const Worker& worker) const {
+  const StudyPoints& points = study.points;
+  if (points.has(Standing::kAccused) &&
+      (!is_proven(worker) ||
+       now_ms_ - points.returned_ms(Standing::kAccused) >= settings_.longest_proven_within_ms ||
+       is_longest_proven(worker, study))) {
+    return Standing::kAccused;
+  }
+  return points.has(Standing::kSuspect) ? std::optional(Standing::kSuspect) : std::nullopt;
 }
 
 bool Scheduler::anyone_draining() const {

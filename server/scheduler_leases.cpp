@@ -13,25 +13,21 @@ constexpr double kPaceWeight = 0.5;
 
 }  // namespace
 
-void Scheduler::end_lease(LeaseId id, LeaseEnd how) {
+void Scheduler::end_lease(LeaseId id, const std::optional<Loss>& loss) {
   const Lease lease = leases_.at(id);
   leases_.erase(id);
   workers_.at(lease.worker).leases.erase(id);
   if (const auto twin = leases_.find(lease.twin); twin != leases_.end()) {
     twin->second.twin = 0;
-    if (how == LeaseEnd::kLost) {
-      // What killed one worker may kill the other: that must not be forgotten.
-      std::uint32_t& losses = twin->second.chunk.losses;
-      losses = std::max(losses, lease.chunk.losses + 1);
-    }
   }
   Study& study = studies_.at(lease.study);
   study.leases.erase(id, lease.chunk);
-  for (const Interval& run : held_by(lease)) {
-    if (how == LeaseEnd::kLost) {
-      give_back_lost(lease.study, run, lease);
-    } else {
-      study.points.give_back(run, lease.chunk.attempts + 1, lease.chunk.losses);
+  const std::vector<Interval> held = held_by(lease);
+  if (loss) {
+    note_loss(lease, held, *loss);
+  } else {
+    for (const Interval& run : held) {
+      study.points.give_back(run, lease.chunk.attempts + 1, lease.chunk.losses, now_ms_);
     }
   }
   if (study.leases.empty()) {
@@ -71,30 +67,8 @@ void Scheduler::release_if_answered(LeaseId id) {
   const IntervalSet& leased = studies_.at(lease->second.study).points.leased_set();
   if (leased.within(chunk.first_point, chunk.end()).empty()) {
     effects_.emplace_back(ReleaseBatch{lease->second.worker, id});
-    end_lease(id, LeaseEnd::kReturned);
+    end_lease(id, std::nullopt);
   }
-}
-
-void Scheduler::give_back_lost(StudyId study, const Interval& run, const Lease& lease) {
-  StudyPoints& points = studies_.at(study).points;
-  const std::uint32_t attempts = lease.chunk.attempts + 1;
-  const std::uint32_t losses = lease.chunk.losses + 1;
-  if (losses < settings_.max_losses) {
-    points.give_back(run, attempts, losses);
-    return;
-  }
-  if (run.end - run.begin > 1) {
-    // The halves stay suspect: the one without the killer is solved, the other is split again.
-    const std::uint64_t middle = run.begin + (run.end - run.begin) / 2;
-    points.give_back({run.begin, middle}, attempts, losses - 1);
-    points.give_back({middle, run.end}, attempts, losses - 1);
-    return;
-  }
-  points.receive(run.begin);
-  effects_.emplace_back(StoreFailure{
-      study, run.begin, attempts,
-      "no answer: " + std::to_string(attempts) + " leases of this point ended without one, " +
-          std::to_string(losses) + " of them because the worker was lost or gave up"});
 }
 
 void Scheduler::on(const ResultsReceived& event) {
@@ -118,6 +92,7 @@ void Scheduler::on(const ResultsReceived& event) {
     requeue(event.study);
     learn_pace(*worker, event);
   }
+  note_answers(*worker, event, !store.accepted.empty());
   effects_.emplace_back(std::move(store));
   const auto lease = leases_.find(event.lease);
   if (lease == leases_.end() || lease->second.worker != event.worker ||
@@ -128,7 +103,7 @@ void Scheduler::on(const ResultsReceived& event) {
   if (event.batch_done) {
     // Points of a finished batch that got no answer count as lost, or a worker that never answers
     // them would take them for ever.
-    end_lease(event.lease, LeaseEnd::kLost);
+    end_lease(event.lease, Loss{kNobody, is_proven(*worker) && worker->leases.size() == 1});
   }
   release_if_answered(twin);
 }

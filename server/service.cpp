@@ -91,6 +91,8 @@ void Service::perform(const Effect& effect, Instant now, protocol::Results* mess
     fields.set_attempt(batch->attempt);
     fields.set_lease_id(batch->lease);
     send(batch->worker, out);
+  } else if (const auto* probe = std::get_if<SendProbe>(&effect)) {
+    send_probe(*probe);
   } else if (const auto* store = std::get_if<StoreResults>(&effect)) {
     write_results(*store, *message, now);
   } else if (const auto* failure = std::get_if<StoreFailure>(&effect)) {
@@ -228,6 +230,10 @@ void Service::stored(const Write& meaning, Instant now) {
   } else if (const auto* state = std::get_if<OfState>(&meaning)) {
     --studies_.at(state->study).state_writes;
     studies_.at(state->study).is_doubtful = false;
+    outbox_.note(Severity::kInfo, "study " + studies_.at(state->study).name +
+                                      (state->state == StudyState::kRunning
+                                           ? std::string(" goes on")
+                                           : " is " + std::string(state_name(state->state))));
     if (state->state == StudyState::kCancelled) {
       feed(StudyCancelled{state->study}, now);
     } else if (state->state == StudyState::kPaused) {
@@ -251,6 +257,8 @@ void Service::stored(const Write& meaning, Instant now) {
     if (study.state == StudyState::kDone) {
       study.state = StudyState::kRunning;
     }
+    outbox_.note(Severity::kInfo, "study " + study.name + " tries its failed points again: " +
+                                      std::to_string(forgotten->points.size()));
     study.samples.clear();  // fewer points are settled now: no rate can be had of that
     feed(FailuresForgotten{forgotten->study, forgotten->points, study.attempts}, now);
     reply_changed(forgotten->client, forgotten->study, forgotten->points.size(), now);

@@ -159,6 +159,7 @@ class Service {
   void bad_frame(const std::string& who);
   void bad_peer(WorkerId worker, const std::string& what, Instant now);
   void tell_of_version(WorkerId worker);
+  void send_probe(const SendProbe& effect);
 
   // service_clients.cpp
   void set_state(const Client& client, StudyId id, StudyState state, bool submitted, Instant now);

@@ -299,6 +299,9 @@ void Service::workers(const Client& client, Instant now) {
     worker.set_leased_points(counts.leased_points);
     worker.set_solved_points(counts.solved_points);
     worker.set_silent_ms(static_cast<std::uint32_t>(counts.silent_ms));
+    worker.set_losses(counts.losses);
+    worker.set_set_aside(counts.is_set_aside);
+    worker.set_proven(counts.is_proven);
   }
   outbox_.to_client(client.identity, reply);
 }

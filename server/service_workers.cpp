@@ -22,6 +22,31 @@ std::string plain(const std::string& text) {
   return kept;
 }
 
+/// By what the process of a worker is known again, or an empty text: by the id that it has drawn,
+/// or by the name that older workers have when they are given no other one, HOST:PID.
+std::string process_of(const protocol::WorkerHello& hello) {
+  if (!hello.process_id().empty()) {
+    return "id " + shortened(hello.process_id(), kLongestName);
+  }
+  const std::string& name = hello.name();
+  const std::size_t colon = name.rfind(':');
+  const bool ends_in_number = colon != std::string::npos && colon > 0 && colon + 1 < name.size() &&
+                              name.find_first_not_of("0123456789", colon + 1) == std::string::npos;
+  return ends_in_number ? "name " + shortened(name, kLongestName) : std::string();
+}
+
+/// A recipe of the point that every sound worker solves in a moment.
+protocol::Recipe probe_recipe() {
+  protocol::Recipe recipe;
+  protocol::Block& block = *recipe.add_blocks();
+  for (const auto& [key, value] : {std::pair{"H", 1.0}, {"mu", 0.4}, {"e", 1.0}}) {
+    protocol::Axis& axis = *block.add_axes();
+    axis.set_key(key);
+    axis.add_values(value);
+  }
+  return recipe;
+}
+
 }  // namespace
 
 void Service::worker_frame(const std::string& identity, std::string_view frame, Instant now) {
@@ -128,7 +153,9 @@ void Service::hello(const std::string& identity, const protocol::WorkerHello& he
                   iso_8601(now)},
         OfNothing{}, false);
   tell_of_version(id);
-  feed(WorkerJoined{id, peer.threads, peer.solver_version}, now);
+  feed(WorkerJoined{id, peer.threads, peer.solver_version, process_of(hello),
+                    !hello.process_id().empty()},
+       now);
   if (stopping_) {
     reply.mutable_stopping();
     outbox_.to_worker(identity, reply);
@@ -148,6 +175,19 @@ void Service::tell_of_version(WorkerId worker) {
   protocol::ServerToWorker message;
   message.mutable_notice()->set_text("worker " + std::to_string(worker) + ": " + text);
   send(worker, message);
+}
+
+void Service::send_probe(const SendProbe& effect) {
+  protocol::ServerToWorker definition;
+  definition.mutable_study()->set_study_id(kProbeStudy);
+  *definition.mutable_study()->mutable_recipe() = probe_recipe();
+  send(effect.worker, definition);
+  protocol::ServerToWorker batch;
+  batch.mutable_batch()->set_study_id(kProbeStudy);
+  batch.mutable_batch()->set_count(1);
+  batch.mutable_batch()->set_attempt(1);
+  batch.mutable_batch()->set_lease_id(effect.lease);
+  send(effect.worker, batch);
 }
 
 void Service::results(WorkerId worker, protocol::Results message, Instant now) {

@@ -1,6 +1,7 @@
 #include "server/study_points.h"
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
 #include <stdexcept>
 #include <utility>
@@ -8,9 +9,9 @@
 namespace oblique::server {
 
 StudyPoints::StudyPoints(std::shared_ptr<const protocol::PointTable> table, IntervalSet settled,
-                         std::uint32_t suspect_after_losses)
+                         const LossLimits& limits)
     : table_(std::move(table)),
-      suspect_after_losses_(suspect_after_losses),
+      limits_(limits),
       fresh_(0, table_->size()),
       settled_(std::move(settled)) {
   settled_.erase(table_->size(), std::numeric_limits<std::uint64_t>::max());
@@ -18,8 +19,8 @@ StudyPoints::StudyPoints(std::shared_ptr<const protocol::PointTable> table, Inte
 }
 
 std::optional<Chunk> StudyPoints::take(std::uint64_t at_most) {
-  if (!returned_.empty()) {
-    return take_from(returned_, at_most);
+  if (has(Standing::kSound)) {
+    return take(Standing::kSound, at_most);
   }
   if (fresh_.empty()) {
     return std::nullopt;
@@ -30,14 +31,11 @@ std::optional<Chunk> StudyPoints::take(std::uint64_t at_most) {
       std::min({run.end, segment.first_point + segment.count, run.begin + at_most});
   fresh_.erase(run.begin, end);
   leased_.insert(run.begin, end);
-  return Chunk{segment.model, run.begin, end - run.begin, 0, 0};
+  return Chunk{segment.model, run.begin, end - run.begin, 0, {}};
 }
 
-std::optional<Chunk> StudyPoints::take_suspect(std::uint64_t at_most) {
-  return take_from(suspect_, at_most);
-}
-
-std::optional<Chunk> StudyPoints::take_from(Returned& chunks, std::uint64_t at_most) {
+std::optional<Chunk> StudyPoints::take(Standing standing, std::uint64_t at_most) {
+  Returned& chunks = returned(standing);
   if (chunks.empty()) {
     return std::nullopt;
   }
@@ -52,12 +50,41 @@ std::optional<Chunk> StudyPoints::take_from(Returned& chunks, std::uint64_t at_m
                history.losses};
 }
 
-void StudyPoints::give_back(const Interval& range, std::uint32_t attempts, std::uint32_t losses) {
-  Returned& chunks = losses >= suspect_after_losses_ ? suspect_ : returned_;
+std::optional<Chunk> StudyPoints::take_condemned(std::uint64_t point, std::int64_t until_ms) {
+  Returned& condemned = returned(Standing::kCondemned);
+  const auto found = condemned.find(point);
+  if (found == condemned.end() || found->second.returned_ms > until_ms) {
+    return std::nullopt;
+  }
+  const History history = found->second;
+  condemned.erase(found);
+  leased_.insert(point);
+  return Chunk{table_->segment_at(point).model, point, 1, history.attempts, history.losses};
+}
+
+void StudyPoints::give_back(const Interval& range, std::uint32_t attempts,
+                            const LossHistory& losses, std::int64_t now_ms) {
+  Returned& chunks = returned(losses.standing(limits_));
   for (const Interval& run : leased_.within(range.begin, range.end)) {
-    chunks.emplace(run.begin, History{run.end, attempts, losses});
+    chunks.emplace(run.begin, History{run.end, attempts, losses, now_ms});
   }
   leased_.erase(range.begin, range.end);
+}
+
+void StudyPoints::take_back_losses(ProcessNumber process) {
+  Returned cleared;
+  for (Returned& chunks : returned_) {
+    for (auto chunk = chunks.begin(); chunk != chunks.end();) {
+      const auto next = std::next(chunk);
+      if (chunk->second.losses.take_back(process)) {
+        cleared.insert(chunks.extract(chunk));
+      }
+      chunk = next;
+    }
+  }
+  for (auto& [first, history] : cleared) {
+    returned(history.losses.standing(limits_)).emplace(first, history);
+  }
 }
 
 bool StudyPoints::receive(std::uint64_t point) {
@@ -65,7 +92,8 @@ bool StudyPoints::receive(std::uint64_t point) {
     leased_.erase(point);
   } else if (fresh_.contains(point)) {
     fresh_.erase(point);
-  } else if (!erase_from(returned_, point) && !erase_from(suspect_, point)) {
+  } else if (std::none_of(returned_.begin(), returned_.end(),
+                          [&](Returned& chunks) { return erase_from(chunks, point); })) {
     return false;
   }
   committing_.insert(point);
@@ -119,11 +147,20 @@ void StudyPoints::count_attempts(const AttemptRuns& attempts) {
       for (std::uint64_t first = run.begin; first < run.end;) {
         const protocol::Segment segment = table_->segment_at(first);
         const std::uint64_t end = std::min(run.end, segment.first_point + segment.count);
-        returned_.emplace(first, History{end, times < kMostAttempts ? times : kMostAttempts, 0});
+        returned(Standing::kSound)
+            .emplace(first, History{end, times < kMostAttempts ? times : kMostAttempts, {}, 0});
         first = end;
       }
     }
   });
+}
+
+std::vector<std::uint64_t> StudyPoints::condemned() const {
+  std::vector<std::uint64_t> points;
+  for (const auto& [first, history] : returned(Standing::kCondemned)) {
+    points.push_back(first);
+  }
+  return points;
 }
 
 std::uint64_t StudyPoints::free() const {
@@ -143,9 +180,13 @@ void StudyPoints::check_invariants() const {
   for (const auto* set : {&fresh_, &leased_, &committing_, &settled_}) {
     set->for_each(add);
   }
-  for (const auto* chunks : {&returned_, &suspect_}) {
-    for (const auto& [first, history] : *chunks) {
+  for (const Standing standing :
+       {Standing::kSound, Standing::kSuspect, Standing::kAccused, Standing::kCondemned}) {
+    for (const auto& [first, history] : returned(standing)) {
       add({first, history.end});
+      if (history.losses.standing(limits_) != standing) {
+        throw std::logic_error("returned points are in the place of another standing");
+      }
     }
   }
   if (points != table_->size() || !(all == IntervalSet(0, table_->size()))) {

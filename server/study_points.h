@@ -1,13 +1,16 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "proto/recipe.h"
 #include "server/attempt_runs.h"
 #include "server/interval_set.h"
+#include "server/loss_history.h"
 
 namespace oblique::server {
 
@@ -28,34 +31,39 @@ struct Chunk {
   std::uint64_t first_point;
   std::uint64_t count;
   std::uint32_t attempts;  ///< how often these points had been leased before
-  std::uint32_t losses;    ///< how many of those leases ended with the death of their worker
+  LossHistory losses;      ///< of the leases before
 
   std::uint64_t end() const { return first_point + count; }
 };
 
 /// Where the points of one study stand. Every point is in exactly one place: fresh (never leased by
-/// this run of the server), returned (leased before, free again), suspect (returned, and its leases
-/// cost so many workers that it is leased to a worker that holds nothing else), leased, committing
-/// (its result is on the way to the disk) or settled. The cost grows with the number of runs of
-/// points, not with their number.
+/// this run of the server), returned with one of the four standings that its losses give it,
+/// leased, committing (its result is on the way to the disk) or settled. The cost grows with the
+/// number of runs of points, not with their number.
 class StudyPoints {
  public:
-  /// `settled` are the points that have a row already. A chunk lost `suspect_after_losses` times is
-  /// suspect.
+  /// `settled` are the points that have a row already.
   StudyPoints(std::shared_ptr<const protocol::PointTable> table, IntervalSet settled,
-              std::uint32_t suspect_after_losses);
+              const LossLimits& limits);
 
   const protocol::PointTable& table() const { return *table_; }
   std::shared_ptr<const protocol::PointTable> shared_table() const { return table_; }
 
-  /// Takes up to `at_most` points out of the returned ones or, when there are none, the fresh ones.
-  /// Nothing when there are neither.
+  /// Takes up to `at_most` points out of the returned sound ones or, when there are none, the fresh
+  /// ones. Nothing when there are neither.
   std::optional<Chunk> take(std::uint64_t at_most);
-  /// The same out of the suspect ones.
-  std::optional<Chunk> take_suspect(std::uint64_t at_most);
+  /// The same out of the returned ones of that standing.
+  std::optional<Chunk> take(Standing standing, std::uint64_t at_most);
+  /// The chunk of the condemned point if it came back at `until_ms` or before, else nothing.
+  std::optional<Chunk> take_condemned(std::uint64_t point, std::int64_t until_ms);
 
-  /// The points of [begin, end) that are still leased become free again, with the history given.
-  void give_back(const Interval& range, std::uint32_t attempts, std::uint32_t losses);
+  /// The points of [begin, end) that are still leased are returned at `now_ms`, with the history
+  /// given.
+  void give_back(const Interval& range, std::uint32_t attempts, const LossHistory& losses,
+                 std::int64_t now_ms);
+
+  /// The losses of returned points that went with this process are taken back.
+  void take_back_losses(ProcessNumber process);
 
   /// The result of a point came in: false when the point was received before or is not of this
   /// study, else it is now committing.
@@ -71,13 +79,20 @@ class StudyPoints {
   /// or before they were reopened.
   void count_attempts(const AttemptRuns& attempts);
 
-  bool has_free() const { return !returned_.empty() || !fresh_.empty(); }
-  bool has_suspect() const { return !suspect_.empty(); }
+  bool has_free() const { return has(Standing::kSound) || !fresh_.empty(); }
+  /// Returned points of that standing.
+  bool has(Standing standing) const { return !returned(standing).empty(); }
+  /// When the next chunk to be taken of that standing came back. There must be one.
+  std::int64_t returned_ms(Standing standing) const {
+    return returned(standing).begin()->second.returned_ms;
+  }
   bool is_complete() const { return settled_.size() == table_->size(); }
   /// Some point has a result, durable or on its way.
   bool has_results() const { return !settled_.empty() || !committing_.empty(); }
 
-  std::uint64_t free() const;  ///< fresh, returned and suspect points
+  std::vector<std::uint64_t> condemned() const;  ///< points
+
+  std::uint64_t free() const;  ///< fresh and returned points
   std::uint64_t settled() const { return settled_.size(); }
   std::uint64_t leased() const { return leased_.size(); }
   const IntervalSet& settled_set() const { return settled_; }
@@ -90,18 +105,21 @@ class StudyPoints {
   struct History {
     std::uint64_t end;
     std::uint32_t attempts;
-    std::uint32_t losses;
+    LossHistory losses;
+    std::int64_t returned_ms;
   };
   using Returned = std::map<std::uint64_t, History>;  // by first point
 
-  std::optional<Chunk> take_from(Returned& chunks, std::uint64_t at_most);
+  Returned& returned(Standing standing) { return returned_.at(static_cast<std::size_t>(standing)); }
+  const Returned& returned(Standing standing) const {
+    return returned_.at(static_cast<std::size_t>(standing));
+  }
   static bool erase_from(Returned& chunks, std::uint64_t point);
 
   std::shared_ptr<const protocol::PointTable> table_;
-  std::uint32_t suspect_after_losses_;
+  LossLimits limits_;
   IntervalSet fresh_;
-  Returned returned_;
-  Returned suspect_;
+  std::array<Returned, 4> returned_;  // by standing
   IntervalSet leased_;
   IntervalSet committing_;
   IntervalSet settled_;

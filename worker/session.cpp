@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
+#include <iomanip>
 #include <limits>
+#include <random>
+#include <sstream>
 #include <string_view>
 #include <utility>
 
@@ -31,6 +34,17 @@ std::int64_t now_ms() {
   return duration_cast<milliseconds>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
+/// 128 bits that no other process draws, in hexadecimal digits.
+std::string random_id() {
+  std::random_device source;
+  std::ostringstream digits;
+  digits << std::hex << std::setfill('0');
+  for (int i = 0; i < 4; ++i) {
+    digits << std::setw(8) << source();
+  }
+  return digits.str();
+}
+
 protocol::WorkerHello hello_of(const SessionSettings& settings) {
   protocol::WorkerHello hello;
   hello.set_protocol_version(protocol::kProtocolVersion);
@@ -38,6 +52,7 @@ protocol::WorkerHello hello_of(const SessionSettings& settings) {
   hello.set_instruction_set(solver::instruction_set());
   hello.set_name(settings.name);
   hello.set_threads(static_cast<std::uint32_t>(settings.threads));
+  hello.set_process_id(random_id());
   return hello;
 }
 

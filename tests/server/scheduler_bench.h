@@ -28,6 +28,13 @@ std::vector<Kind> only(const std::vector<Effect>& effects) {
   return kept;
 }
 
+/// Settings by which newcomers get as many batches as they ask for, for tests of something else.
+inline SchedulerSettings trusting() {
+  SchedulerSettings settings;
+  settings.newcomer_batches = 1'000'000;
+  return settings;
+}
+
 /// A scheduler whose invariants are checked after each event, with a clock that tests set.
 class SchedulerBench {
  public:
@@ -43,6 +50,22 @@ class SchedulerBench {
   std::vector<SendBatch> join(WorkerId worker, std::uint32_t credit, std::uint32_t threads = 1) {
     feed(WorkerJoined{worker, threads});
     return only<SendBatch>(feed(CreditGiven{worker, credit}));
+  }
+
+  /// A connection of that process, as `join`.
+  std::vector<Effect> join_as(const std::string& process, WorkerId worker, std::uint32_t credit) {
+    auto effects = feed(WorkerJoined{worker, 1, {}, process, true});
+    append(effects, feed(CreditGiven{worker, credit}));
+    return effects;
+  }
+
+  /// The worker solves the probe, and asks for another batch in its place.
+  std::vector<Effect> solve_probe(const SendProbe& probe) {
+    auto effects = feed(ResultsReceived{
+        probe.worker, kProbeStudy, probe.lease, ++sequence, true, 1e-3, {{0, false}}});
+    append(effects, feed(ResultsStored{probe.worker, kProbeStudy, sequence, {}}));
+    append(effects, feed(CreditGiven{probe.worker, 1}));
+    return effects;
   }
 
   /// The whole batch solved in `busy_s` and the results received.
@@ -82,14 +105,13 @@ class SchedulerBench {
     return all;
   }
 
-  Scheduler scheduler;
-  std::int64_t now_ms = 1'000'000;
-  std::uint64_t sequence = 0;
-
- private:
   static void append(std::vector<Effect>& all, std::vector<Effect> more) {
     all.insert(all.end(), more.begin(), more.end());
   }
+
+  Scheduler scheduler;
+  std::int64_t now_ms = 1'000'000;
+  std::uint64_t sequence = 0;
 };
 
 }  // namespace oblique::server

@@ -19,7 +19,7 @@ std::map<StudyId, int> shares(SchedulerBench& bench, std::uint32_t batches) {
 }
 
 TEST(SchedulerShare, StudiesOfOnePriorityShareTheWorkersByWeight) {
-  SchedulerBench bench;
+  SchedulerBench bench(trusting());
   bench.feed(StudyAdded{1, table_of(1'000'000), {}, 0, false, false, {0, 1.0}});
   bench.feed(StudyAdded{2, table_of(1'000'000), {}, 0, false, false, {0, 3.0}});
   bench.feed(WorkerJoined{1, 1});
@@ -29,7 +29,7 @@ TEST(SchedulerShare, StudiesOfOnePriorityShareTheWorkersByWeight) {
 }
 
 TEST(SchedulerShare, AStudyOfAHigherPriorityComesFirst) {
-  SchedulerBench bench;
+  SchedulerBench bench(trusting());
   bench.feed(StudyAdded{1, table_of(1'000'000), {}});
   bench.feed(StudyAdded{2, table_of(1'000'000), {}, 0, false, false, {5, 1.0}});
   bench.feed(WorkerJoined{1, 1});
@@ -39,7 +39,7 @@ TEST(SchedulerShare, AStudyOfAHigherPriorityComesFirst) {
 }
 
 TEST(SchedulerShare, AStudyThatOpensLaterDoesNotCatchUpWithWhatWentBefore) {
-  SchedulerBench bench;
+  SchedulerBench bench(trusting());
   bench.feed(StudyAdded{1, table_of(1'000'000), {}});
   bench.feed(WorkerJoined{1, 1});
   shares(bench, 100);
@@ -49,8 +49,21 @@ TEST(SchedulerShare, AStudyThatOpensLaterDoesNotCatchUpWithWhatWentBefore) {
   EXPECT_NEAR(counts.at(2), 50, 1);
 }
 
+TEST(SchedulerShare, AStudyThatIsReopenedDoesNotCatchUpWithWhatWentOnWithoutIt) {
+  SchedulerBench bench(trusting());
+  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  bench.feed(StudyAdded{2, table_of(1'000'000), {}});
+  bench.feed(StudyPaused{2});
+  bench.feed(WorkerJoined{1, 1});
+  EXPECT_EQ(shares(bench, 100).at(1), 100);
+  bench.feed(StudyReopened{2});
+  const auto counts = shares(bench, 100);
+  EXPECT_NEAR(counts.at(1), 50, 1);
+  EXPECT_NEAR(counts.at(2), 50, 1);
+}
+
 TEST(SchedulerShare, ForgottenFailuresAreFreeAgainAndOthersStaySettled) {
-  SchedulerBench bench;
+  SchedulerBench bench(trusting());
   IntervalSet settled(0, 10);
   bench.feed(StudyAdded{1, table_of(10), settled, 3});
   bench.feed(WorkerJoined{1, 1});

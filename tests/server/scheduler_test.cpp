@@ -33,7 +33,7 @@ TEST(SchedulerTest, ADefinitionIsSentOnce) {
 }
 
 TEST(SchedulerTest, AWorkerGetsNoMoreBatchesThanItAskedFor) {
-  SchedulerBench bench;
+  SchedulerBench bench(trusting());
   bench.feed(StudyAdded{1, table_of(1'000'000), {}});
   EXPECT_EQ(bench.join(5, 3).size(), 3U);
   EXPECT_TRUE(bench.pass(1000, {5}).empty());
@@ -137,7 +137,7 @@ TEST(SchedulerTest, ABatchNeverCrossesModelsOrBlocks) {
       recipe_of({{listed("k", {1e7, 2e7, 3e7}), listed("H", {0.9, 1.0}), listed("mu", {0.4}),
                   listed("e", {1.0})},
                  {listed("H", {0.9}), listed("mu", {0.1, 0.2, 0.3}), listed("e", {1.0})}}));
-  SchedulerSettings settings;
+  SchedulerSettings settings = trusting();
   settings.first_batch_points = 100;
   settings.tail_batches_per_thread = 0;
   SchedulerBench bench(settings);
@@ -200,7 +200,7 @@ TEST(SchedulerTest, PointsOutsideTheStudyAreDropped) {
 }
 
 TEST(SchedulerTest, ASilentWorkersPointsGoToAnotherWithinThreeSeconds) {
-  SchedulerBench bench;
+  SchedulerBench bench(trusting());
   bench.feed(StudyAdded{1, table_of(4), {}});
   const auto lost = bench.join(1, 1).at(0);
   bench.join(2, 0);
@@ -322,7 +322,7 @@ TEST(SchedulerTest, ResultsOfACancelledStudyAreKept) {
 }
 
 TEST(SchedulerTest, ARestoredStudyHandsOutOnlyWhatIsOpen) {
-  SchedulerBench bench;
+  SchedulerBench bench(trusting());
   IntervalSet settled(0, 5);
   settled.insert(7);
   bench.feed(StudyAdded{1, table_of(10), settled, 2});
@@ -344,7 +344,7 @@ TEST(SchedulerTest, ARestoredStudyWithoutOpenPointsIsFinished) {
 }
 
 TEST(SchedulerTest, StudiesTakeTurns) {
-  SchedulerBench bench;
+  SchedulerBench bench(trusting());
   bench.feed(StudyAdded{1, table_of(1'000'000), {}});
   bench.feed(StudyAdded{2, table_of(1'000'000), {}});
   std::vector<StudyId> order;

@@ -132,6 +132,78 @@ TEST_F(ServiceTest, AChangeRefusedBeforeAnotherLeavesWhatTheOtherMakesOfIt) {
   EXPECT_EQ(last_reply().change().study().state(), "running");
 }
 
+TEST_F(ServiceTest, OfTwoChangesOnTheirWayTheSecondStandsWhenTheFirstIsRefused) {
+  request(submit_request("a"));
+  write_all();
+  request(change_request("a", protocol::STUDY_CHANGE_PAUSE));
+  request(change_request("a", protocol::STUDY_CHANGE_CANCEL));
+  service_->written({WriteReport::Kind::kRefused, outbox_.jobs.front().ticket, "full"}, now_);
+  outbox_.jobs.erase(outbox_.jobs.begin());
+  EXPECT_EQ(status_of("a").state(), "cancelled");
+  write_all();
+  EXPECT_EQ(status_of("a").state(), "cancelled");
+}
+
+TEST_F(ServiceTest, OfTwoChangesThatAreBothRefusedNoneStands) {
+  request(submit_request("a"));
+  write_all();
+  request(change_request("a", protocol::STUDY_CHANGE_PAUSE));
+  request(change_request("a", protocol::STUDY_CHANGE_CANCEL));
+  write_all("disk full");
+  EXPECT_EQ(status_of("a").state(), "running");
+}
+
+TEST_F(ServiceTest, AFaultThatIsOverWhileTheServerStopsHandsOutNothing) {
+  request(submit_request("a", 100));
+  write_all();
+  hello();
+  service_->written({WriteReport::Kind::kFault, 0, "disk full"}, now_);
+  credit(1);
+  service_->stop(now_);
+  outbox_.worker_messages.clear();
+  service_->written({WriteReport::Kind::kRecovered, 0, {}}, now_);
+  credit(1);
+  EXPECT_TRUE(outbox_.worker_messages.empty());
+}
+
+TEST_F(ServiceTest, TheRateAfterARetryIsNotNegative) {
+  request(submit_request("a", 1));
+  write_all();
+  hello();
+  credit(1);
+  answer_batch(0);
+  write_all();
+  service_->tick(now_);
+  now_.steady_ms += 1000;
+  request(change_request("a", protocol::STUDY_CHANGE_RETRY));
+  write_all();
+  EXPECT_EQ(last_reply().change().study().points_per_s(), 0.0);
+  service_->tick(now_);
+  now_.steady_ms += 1000;
+  EXPECT_EQ(status_of("a").points_per_s(), 0.0);
+}
+
+TEST_F(ServiceTest, EveryChangeOfAStudyLeavesALineInTheLog) {
+  request(submit_request("a", 1));
+  write_all();
+  hello();
+  const auto line_after = [&](protocol::StudyChange change) {
+    outbox_.log.clear();
+    request(change_request("a", change));
+    EXPECT_TRUE(outbox_.log.empty()) << "it is not durable yet";
+    write_all();
+    return outbox_.log.empty() ? std::string() : outbox_.log.front();
+  };
+  EXPECT_EQ(line_after(protocol::STUDY_CHANGE_PAUSE), "study a is paused");
+  EXPECT_EQ(line_after(protocol::STUDY_CHANGE_RESUME), "study a goes on");
+  EXPECT_EQ(line_after(protocol::STUDY_CHANGE_CANCEL), "study a is cancelled");
+  EXPECT_EQ(line_after(protocol::STUDY_CHANGE_RESUME), "study a goes on");
+  credit(1);
+  answer_batch(0);
+  write_all();
+  EXPECT_EQ(line_after(protocol::STUDY_CHANGE_RETRY), "study a tries its failed points again: 1");
+}
+
 TEST_F(ServiceTest, SeveralChangesThatAreNotStoredLeaveTheStudyAsItWas) {
   request(submit_request("a"));
   write_all();

@@ -49,7 +49,10 @@ class FakeOutbox final : public Outbox {
     return queries.size() < 3;
   }
   void cancel_query(std::uint64_t ticket) override { cancelled_queries.push_back(ticket); }
-  void note(Severity, const std::string&) override { ++notes; }
+  void note(Severity, const std::string& text) override {
+    ++notes;
+    log.push_back(text);
+  }
 
   std::string unreachable;
   std::vector<ServerToWorker> worker_messages;
@@ -58,6 +61,7 @@ class FakeOutbox final : public Outbox {
   std::vector<QueryJob> queries;
   std::vector<std::uint64_t> cancelled_queries;
   int notes = 0;
+  std::vector<std::string> log;
 };
 
 class ServiceTest : public testing::Test {
@@ -92,7 +96,7 @@ class ServiceTest : public testing::Test {
     return change_request(name, protocol::STUDY_CHANGE_CANCEL);
   }
   /// Results of the points of the last batch, failed ones from `first_failed` on.
-  void answer_batch(std::uint64_t first_failed) {
+  void answer_batch(std::uint64_t first_failed, const std::string& identity = "worker") {
     const auto batch = last_message().batch();
     WorkerMessage message;
     auto& results = *message.mutable_results();
@@ -105,7 +109,7 @@ class ServiceTest : public testing::Test {
       *results.add_results() =
           i < first_failed ? solved_point(i) : protocol::failed_point(i, "for the test");
     }
-    worker_says(message);
+    worker_says(message, identity);
     write_all();
   }
   void worker_says(const WorkerMessage& message, const std::string& identity = "worker") {
@@ -119,10 +123,17 @@ class ServiceTest : public testing::Test {
     message.mutable_hello()->set_threads(1);
     worker_says(message, identity);
   }
-  void credit(std::uint32_t batches) {
+  void credit(std::uint32_t batches, const std::string& identity = "worker") {
     WorkerMessage message;
     message.mutable_credit()->set_batches(batches);
-    worker_says(message);
+    worker_says(message, identity);
+  }
+  protocol::StudyStatus status_of(const std::string& name) {
+    ClientRequest message;
+    message.set_protocol_version(protocol::kProtocolVersion);
+    message.mutable_status()->set_study(name);
+    request(message);
+    return last_reply().status().studies(0);
   }
   /// All that waits is written, and fails with `error` unless that is empty.
   void write_all(const std::string& error = {}) {

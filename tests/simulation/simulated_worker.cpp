@@ -30,6 +30,7 @@ void SimulatedWorker::start() {
   hello.set_solver_version(solver_version_);
   hello.set_threads(1);
   ++life_;
+  hello.set_process_id(std::to_string(peer_) + " in life " + std::to_string(life_));
   planned_time_ms_ = -1;
   conversation_.emplace(hello, worker::ConversationSettings{});
   apply(conversation_->start(world_.now_ms()));

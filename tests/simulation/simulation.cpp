@@ -213,7 +213,7 @@ class Simulation {
     for (const auto& worker : workers_) {
       const auto* results = worker->sent(link, sequence);
       // What a worker of another solver version solved is acknowledged, for it is not wanted.
-      if (results == nullptr ||
+      if (results == nullptr || results->study_id() == server::kProbeStudy ||
           server_.service().scheduler().study(results->study_id()).solver_version !=
               worker->solver_version()) {
         continue;

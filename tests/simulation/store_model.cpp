@@ -66,6 +66,9 @@ bool StoreModel::apply(const ForgetFailures& change, Contents& contents) {
 }
 
 bool StoreModel::apply(const AddResults& change, Contents& contents) {
+  if (change.results.empty()) {
+    return false;  // of a probe, perhaps, which is of no study
+  }
   auto& study = contents.studies.at(change.study_id);
   for (const auto& result : change.results) {
     auto row = std::make_shared<const protocol::PointResult>(result);
@@ -77,7 +80,7 @@ bool StoreModel::apply(const AddResults& change, Contents& contents) {
       study.failures.insert(result.point());
     }
   }
-  return !change.results.empty();
+  return true;
 }
 
 void StoreModel::stored(std::span<const Change> changes) {
