@@ -3,17 +3,18 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <set>
 #include <span>
 #include <utility>
 
 #include "client/nearest.h"
 #include "proto/study_name.h"
+#include "worker/solver/number.h"
 
 namespace oblique::client {
 namespace {
 
+using solver::exact_number;
 using solver::InputError;
 using solver::ParameterKey;
 
@@ -48,8 +49,8 @@ void check_ends(const ParameterKey& key, double from, double to) {
   solver::check_value(key, from);
   solver::check_value(key, to);
   if (from > to) {
-    throw InputError(std::string(key.name) + " runs from " + shown_number(from) + " to " +
-                     shown_number(to) + ": a range must rise; swap `from` and `to`");
+    throw InputError(std::string(key.name) + " runs from " + exact_number(from) + " to " +
+                     exact_number(to) + ": a range must rise; swap `from` and `to`");
   }
 }
 
@@ -77,12 +78,6 @@ std::optional<double> parsed_number(std::string_view text) {
   return value;
 }
 
-std::string shown_number(double value) {
-  char text[32];
-  const int length = std::snprintf(text, sizeof text, "%.10g", value);
-  return {text, static_cast<std::size_t>(length)};
-}
-
 protocol::Axis listed_axis(const ParameterKey& key, const std::vector<double>& values) {
   if (values.empty()) {
     throw InputError(std::string(key.name) + " = [] has no values: give at least one");
@@ -93,7 +88,7 @@ protocol::Axis listed_axis(const ParameterKey& key, const std::vector<double>& v
   for (const double value : values) {
     solver::check_value(key, value);
     if (!seen.insert(value).second) {
-      throw InputError(std::string(key.name) + " has " + shown_number(value) +
+      throw InputError(std::string(key.name) + " has " + exact_number(value) +
                        " twice: every value of a list must differ");
     }
     axis.add_values(value);
@@ -110,12 +105,12 @@ protocol::Axis counted_axis(const ParameterKey& key, double from, double to, std
   }
   if (count == 1 && from != to) {
     throw InputError(name + ": count = 1 is not allowed with two different ends, " +
-                     shown_number(from) + " and " + shown_number(to) +
+                     exact_number(from) + " and " + exact_number(to) +
                      ": both ends belong to a range; give 2 or more, or the value alone");
   }
   if (count > 1 && from == to) {
     throw InputError(name + ": count = " + std::to_string(count) +
-                     " is not allowed with equal ends, " + shown_number(from) +
+                     " is not allowed with equal ends, " + exact_number(from) +
                      ": every value would be the same; give the value alone");
   }
   protocol::Axis axis;
@@ -134,11 +129,11 @@ protocol::Axis stepped_axis(const ParameterKey& key, double from, double to, dou
   const std::string name(key.name);
   check_ends(key, from, to);
   if (!(std::isfinite(step) && step > 0.0)) {
-    throw InputError(name + ": step = " + shown_number(step) + " is not allowed: step must be > 0");
+    throw InputError(name + ": step = " + exact_number(step) + " is not allowed: step must be > 0");
   }
   const double steps = (to - from) / step;
   if (steps > static_cast<double>(protocol::PointTable::kMaxPoints)) {
-    throw InputError(name + ": step = " + shown_number(step) + " makes more than " +
+    throw InputError(name + ": step = " + exact_number(step) + " makes more than " +
                      std::to_string(protocol::PointTable::kMaxPoints) +
                      " values, the most that are allowed");
   }
@@ -147,9 +142,10 @@ protocol::Axis stepped_axis(const ParameterKey& key, double from, double to, dou
   const double tolerance = 1e-9 * std::max(1.0, steps);
   if (std::abs(steps - whole_steps) > tolerance) {
     const double below = from + std::floor(steps) * step;
-    throw InputError(name + ": step = " + shown_number(step) + " does not lead from " +
-                     shown_number(from) + " to " + shown_number(to) + ": the value after " +
-                     shown_number(below) + " would be " + shown_number(below + step) +
+    throw InputError(name + ": step = " + exact_number(step) + " does not lead from " +
+                     exact_number(from) + " to " + exact_number(to) + ": the value after " +
+                     solver::readable_number(below, 10) + " would be " +
+                     solver::readable_number(below + step, 10) +
                      "; change `to` or the step, or give `count`");
   }
   return counted_axis(key, from, to, static_cast<std::int64_t>(whole_steps) + 1);

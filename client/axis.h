@@ -25,9 +25,6 @@ const solver::ParameterKey& axis_key(std::string_view name);
 /// A number of plain text; nothing for what is not one number from end to end.
 std::optional<double> parsed_number(std::string_view text);
 
-/// A number as error messages and tables show it.
-std::string shown_number(double value);
-
 /// Axes from what users wrote. Each throws InputError naming key, value and what is allowed.
 protocol::Axis listed_axis(const solver::ParameterKey& key, const std::vector<double>& values);
 /// `count` values with both ends in.

@@ -6,12 +6,16 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/printer.h"
+#include "worker/solver/number.h"
 
 namespace oblique::client {
 namespace {
 
 using nlohmann::ordered_json;
 using solver::CaseResult;
+using solver::exact_number;
+using solver::fixed_number;
+using solver::readable_number;
 
 constexpr double kMicro = 1e6;
 constexpr double kMilli = 1e3;
@@ -42,6 +46,42 @@ ordered_json json_of(const std::vector<solver::ReactionPeak>& peaks) {
     all.push_back({{"t_s", peak.t_s}, {"force_N", peak.force_N}});
   }
   return all;
+}
+
+void print_peaks(std::ostream& out, const CaseResult& result) {
+  out << "peaks         t [us]    F_n [N]  largest |F_t| around it [N]\n";
+  for (const auto& peak : result.peaks) {
+    out << fmt::format("            {:>8}  {:>9}  {:>9}{}\n", fixed_number(peak.t_s * kMicro, 2),
+                       fixed_number(peak.fn_N, 2), fixed_number(peak.ft_N, 2),
+                       peak.major ? "" : "  ripple");
+  }
+  out << fmt::format("largest               {:>9}  {:>9}\n", fixed_number(result.fn_peak_N, 2),
+                     fixed_number(result.ft_peak_N, 2));
+}
+
+void print_span(std::ostream& out, const char* name, double t0_s, double t1_s) {
+  out << fmt::format("{:<11}  {:>8} {:>8}  {:>12}\n", name, fixed_number(t0_s * kMicro, 2),
+                     fixed_number(t1_s * kMicro, 2), fixed_number((t1_s - t0_s) * kMicro, 2));
+}
+
+void print_spans(std::ostream& out, const CaseResult& result) {
+  out << "\nphases      from [us]  to [us]  lasting [us]\n";
+  for (const auto& phase : result.phases) {
+    print_span(out, kind_name(phase.kind), phase.t0_s, phase.t1_s);
+  }
+  for (const auto& stick : result.stick_intervals) {
+    print_span(out, "stick", stick.t0_s, stick.t1_s);
+  }
+}
+
+void print_reactions(std::ostream& out, const std::vector<solver::ReactionPeak>& peaks) {
+  if (!peaks.empty()) {
+    out << "\nreactions     t [us]  largest [N]\n";
+  }
+  for (std::size_t i = 0; i < peaks.size(); ++i) {
+    out << fmt::format("{:<11} {:>8}  {:>11}\n", i == 0 ? "pin O" : "joint " + std::to_string(i),
+                       fixed_number(peaks[i].t_s * kMicro, 2), fixed_number(peaks[i].force_N, 2));
+  }
 }
 
 }  // namespace
@@ -96,54 +136,34 @@ ordered_json json_of(const CaseResult& result) {
 }
 
 void print_summary(std::ostream& out, const CaseResult& result) {
-  out << fmt::format("H = {:g} m, mu = {:g}, e* = {:g}\n", result.H_m, result.mu, result.e_star)
-      << fmt::format(
-             "fall        {:.6f} s; the tip lands at x = {:.5f} m with V_t = {:.4f}, V_n = {:.4f} "
-             "m/s\n",
-             result.fall_time_s, result.impact_x_m, result.vt_in_m_s, result.vn_in_m_s)
-      << fmt::format("contact     {:.2f} us, leaving with V_t = {:.4f}, V_n = {:.4f} m/s\n",
-                     result.duration_s * kMicro, result.vt_out_m_s, result.vn_out_m_s)
+  out << fmt::format("H = {} m, mu = {}, e* = {}\n", exact_number(result.H_m),
+                     exact_number(result.mu), exact_number(result.e_star))
+      << fmt::format("fall        {} s; the tip lands at x = {} m with V_t = {}, V_n = {} m/s\n",
+                     fixed_number(result.fall_time_s, 6), fixed_number(result.impact_x_m, 5),
+                     fixed_number(result.vt_in_m_s, 4), fixed_number(result.vn_in_m_s, 4))
+      << fmt::format("contact     {} us, leaving with V_t = {}, V_n = {} m/s\n",
+                     fixed_number(result.duration_s * kMicro, 2),
+                     fixed_number(result.vt_out_m_s, 4), fixed_number(result.vn_out_m_s, 4))
       << "mode        " << result.major_mode;
   if (result.mode != result.major_mode) {
     out << "  (with ripples: " << result.mode << ')';
   }
-  out << "\n\npeaks         t [us]    F_n [N]  largest |F_t| around it [N]\n";
-  for (const auto& peak : result.peaks) {
-    out << fmt::format("            {:8.2f}  {:9.2f}  {:9.2f}{}\n", peak.t_s * kMicro, peak.fn_N,
-                       peak.ft_N, peak.major ? "" : "  ripple");
-  }
-  out << fmt::format("largest               {:9.2f}  {:9.2f}\n", result.fn_peak_N,
-                     result.ft_peak_N);
-  out << "\nphases      from [us]  to [us]  lasting [us]\n";
-  for (const auto& phase : result.phases) {
-    out << fmt::format("{:<11}  {:8.2f} {:8.2f}  {:12.2f}\n", kind_name(phase.kind),
-                       phase.t0_s * kMicro, phase.t1_s * kMicro,
-                       (phase.t1_s - phase.t0_s) * kMicro);
-  }
-  for (const auto& stick : result.stick_intervals) {
-    out << fmt::format("{:<11}  {:8.2f} {:8.2f}  {:12.2f}\n", "stick", stick.t0_s * kMicro,
-                       stick.t1_s * kMicro, (stick.t1_s - stick.t0_s) * kMicro);
-  }
-  if (!result.reaction_peaks.empty()) {
-    out << "\nreactions     t [us]  largest [N]\n";
-  }
-  for (std::size_t i = 0; i < result.reaction_peaks.size(); ++i) {
-    const auto& peak = result.reaction_peaks[i];
-    out << fmt::format("{:<11} {:8.2f}  {:11.2f}\n",
-                       i == 0 ? std::string("pin O") : fmt::format("joint {}", i),
-                       peak.t_s * kMicro, peak.force_N);
-  }
+  out << "\n\n";
+  print_peaks(out, result);
+  print_spans(out, result);
+  print_reactions(out, result.reaction_peaks);
   const auto& energy = result.energy;
   const auto& report = result.solver;
-  out << fmt::format("\nslide       P slides {:.5f} mm along the ground\n", result.slide_m * kMilli)
-      << fmt::format("impulses    normal {:.6f}, tangential {:.6f} N s\n", result.impulse_n_Ns,
-                     result.impulse_t_Ns)
-      << fmt::format(
-             "energy      {:.4f} J in; friction takes {:.6f} J, restitution {:.6f} J; "
-             "closure {:.1e}\n",
-             energy.kinetic_in_J, energy.friction_J, energy.restitution_J, energy.closure)
-      << fmt::format("solver      {} {}, {} steps of {:.3g} us, {:.2g} ms\n", report.integrator,
-                     report.version, report.steps, report.dt_s * kMicro, report.wall_s * kMilli);
+  out << fmt::format("\nslide       P slides {} mm along the ground\n",
+                     fixed_number(result.slide_m * kMilli, 5))
+      << fmt::format("impulses    normal {}, tangential {} N s\n",
+                     fixed_number(result.impulse_n_Ns, 6), fixed_number(result.impulse_t_Ns, 6))
+      << fmt::format("energy      {} J in; friction takes {} J, restitution {} J; closure {}\n",
+                     fixed_number(energy.kinetic_in_J, 4), fixed_number(energy.friction_J, 6),
+                     fixed_number(energy.restitution_J, 6), readable_number(energy.closure, 2))
+      << fmt::format("solver      {} {}, {} steps of {} us, {} ms\n", report.integrator,
+                     report.version, report.steps, readable_number(report.dt_s * kMicro, 3),
+                     readable_number(report.wall_s * kMilli, 2));
 }
 
 void print_trace_header(std::ostream& out, std::size_t links) {

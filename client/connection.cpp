@@ -6,12 +6,13 @@
 
 #include "proto/address.h"
 #include "proto/frames.h"
+#include "worker/solver/number.h"
 
 namespace oblique::client {
 namespace {
 
 std::string seconds_of(std::chrono::milliseconds time) {
-  return shown_number(static_cast<double>(time.count()) / 1000.0) + " s";
+  return solver::exact_number(static_cast<double>(time.count()) / 1000.0) + " s";
 }
 
 }  // namespace

@@ -6,9 +6,13 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "worker/solver/number.h"
+
 namespace oblique::client {
 namespace {
 
+using solver::fixed_number;
+using solver::readable_number;
 using Kind = ContactChange::Kind;
 
 constexpr double kMicro = 1e6;
@@ -122,12 +126,13 @@ const char* name_of(Kind kind) {
 
 std::string described(const ContactChange& change) {
   if (change.kind == Kind::kRipple) {
-    return fmt::format("a peak of F_n at {:.2f} us, near the depth at which ripples are merged",
-                       change.t0_s * kMicro);
+    return fmt::format("a peak of F_n at {} us, near the depth at which ripples are merged",
+                       fixed_number(change.t0_s * kMicro, 2));
   }
-  return fmt::format("a {} of {:.3g} us, from {:.2f} to {:.2f} us ({})", name_of(change.kind),
-                     (change.t1_s - change.t0_s) * kMicro, change.t0_s * kMicro,
-                     change.t1_s * kMicro, cause_of(change.kind));
+  return fmt::format("a {} of {} us, from {} to {} us ({})", name_of(change.kind),
+                     readable_number((change.t1_s - change.t0_s) * kMicro, 3),
+                     fixed_number(change.t0_s * kMicro, 2), fixed_number(change.t1_s * kMicro, 2),
+                     cause_of(change.kind));
 }
 
 }  // namespace oblique::client

@@ -11,6 +11,7 @@
 #include "client/point_flags.h"
 #include "client/verbs.h"
 #include "proto/recipe.h"
+#include "worker/solver/number.h"
 
 namespace oblique::client {
 namespace {
@@ -50,12 +51,14 @@ std::vector<SolvedLevel> solved(const char* what, const std::vector<Level>& leve
   std::cerr << fmt::format("{}: {} levels, {} to {}\n", what, levels.size(), levels.front().name,
                            levels.back().name);
   return solve_levels(levels, points, [what](const SolvedLevel& level) {
-    std::cerr << fmt::format("{}: {} solved in {:.1f} s\n", what, level.level.name, level.wall_s);
+    std::cerr << fmt::format("{}: {} solved in {} s\n", what, level.level.name,
+                             solver::fixed_number(level.wall_s, 1));
   });
 }
 
 std::string shown(const ContactPoint& point) {
-  return fmt::format("H = {:g} m, mu = {:g}, e* = {:g}", point.H_m, point.mu, point.e_star);
+  return fmt::format("H = {} m, mu = {}, e* = {}", solver::exact_number(point.H_m),
+                     solver::exact_number(point.mu), solver::exact_number(point.e_star));
 }
 
 nlohmann::ordered_json json_of_point(const ContactPoint& point) {
@@ -140,8 +143,8 @@ int mesh_study(const ConvergeFlags& flags, const protocol::PointTable& table) {
     print_modes(std::cout, refinements[i]);
     std::cout << '\n';
   }
-  std::cout << fmt::format("The coarsest mesh with all of these within {:g} %: {}.\n",
-                           flags.tolerance_percent,
+  std::cout << fmt::format("The coarsest mesh with all of these within {} %: {}.\n",
+                           solver::exact_number(flags.tolerance_percent),
                            choice ? levels[*choice].level.name : std::string("none"));
   return kDone;
 }

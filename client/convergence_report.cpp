@@ -7,11 +7,14 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/printer.h"
+#include "worker/solver/number.h"
 
 namespace oblique::client {
 namespace {
 
 using nlohmann::ordered_json;
+using solver::fixed_number;
+using solver::readable_number;
 
 constexpr double kMicro = 1e6;
 constexpr double kPercent = 100.0;
@@ -75,7 +78,7 @@ void add_optional(protocol::Row& row, const std::optional<double>& value) {
 
 // Two digits are all that an estimate has.
 void add_rough(protocol::Row& row, const std::optional<double>& value) {
-  add_value(row, value ? fmt::format("{:.2g}", *value) : std::string("-"));
+  add_value(row, value ? readable_number(*value, 2) : std::string("-"));
 }
 
 std::optional<double> relative(const OutputConvergence& output) {
@@ -139,7 +142,8 @@ class Worst {
     }
   }
   std::string shown() const {
-    return error_ ? fmt::format("{:.2g} % ({})", kPercent * *error_, name_) : std::string("-");
+    return error_ ? readable_number(kPercent * *error_, 2) + " % (" + name_ + ")"
+                  : std::string("-");
   }
 
  private:
@@ -241,8 +245,8 @@ void print_modes(std::ostream& out, const Refinement& refinement) {
   out << "\nmode, ripples merged\n";
   for (std::size_t i = 0; i < refinement.levels.size(); ++i) {
     const auto& result = refinement.result(i);
-    out << fmt::format("  {:<8} {}  ({:.3g} us steps)\n", refinement.levels[i].level.name,
-                       result.major_mode, result.solver.dt_s * kMicro);
+    out << fmt::format("  {:<8} {}  ({} us steps)\n", refinement.levels[i].level.name,
+                       result.major_mode, readable_number(result.solver.dt_s * kMicro, 3));
   }
 }
 
@@ -289,7 +293,7 @@ void print_errors(std::ostream& out, const Refinement& refinement) {
     add_value(row, output.name);
     for (const auto& value : output.values) {
       const auto error = relative_error(value, output.extrapolation.limit);
-      add_value(row, error   ? fmt::format("{:.3f}", kPercent * *error)
+      add_value(row, error   ? fixed_number(kPercent * *error, 3)
                      : value ? std::string("-")
                              : std::string("other mode"));
     }

@@ -11,10 +11,14 @@
 #include "client/printer.h"
 #include "client/recovery.h"
 #include "client/verbs.h"
+#include "worker/solver/number.h"
 
 namespace oblique::client {
 namespace {
 
+using solver::fixed_number;
+using solver::readable_number;
+using solver::signed_number;
 constexpr const char* kExamples = R"(Examples:
   oblique fit
   oblique fit --from paper
@@ -41,9 +45,10 @@ std::string heading(std::string_view name) {
 void tell(const FitStep& step) {
   std::cerr << fmt::format("iteration {:>2}:", step.iteration);
   for (const auto name : kFittedKeys) {
-    std::cerr << fmt::format("  {} = {:.5g}", name, fitted_key(name).get(step.model));
+    std::cerr << fmt::format("  {} = {}", name,
+                             readable_number(fitted_key(name).get(step.model), 5));
   }
-  std::cerr << fmt::format("  rms {:.3f} %", step.summary.rms_percent);
+  std::cerr << fmt::format("  rms {} %", fixed_number(step.summary.rms_percent, 3));
   if (step.summary.missing > 0) {
     std::cerr << fmt::format(" ({} numbers missing)", step.summary.missing);
   }
@@ -67,12 +72,13 @@ void print_end(const FitStep& end, const solver::ModelParameters& start) {
     add_value(row, key.get(start));
     add_value(row, key.get(end.model));
     add_value(row, key.get(preset));
-    add_value(row, fmt::format("{:+.2f}", percent_from(key.get(end.model), key.get(preset))));
+    add_value(row, signed_number(percent_from(key.get(end.model), key.get(preset)), 2));
   }
   print(std::cout, table, Format::kTable);
   const auto& summary = end.summary;
-  std::cout << fmt::format("\n{} published numbers: rms difference {:.2f} %, largest {:.2f} %",
-                           end.differences.size(), summary.rms_percent, summary.largest_percent);
+  std::cout << fmt::format("\n{} published numbers: rms difference {} %, largest {} %",
+                           end.differences.size(), fixed_number(summary.rms_percent, 2),
+                           fixed_number(summary.largest_percent, 2));
   if (summary.missing > 0) {
     std::cout << fmt::format(", {} without ours", summary.missing);
   }

@@ -11,6 +11,7 @@
 #include "client/axis.h"
 #include "client/printer.h"
 #include "worker/solver/contact_record.h"
+#include "worker/solver/number.h"
 #include "worker/solver/solve.h"
 
 namespace oblique::client {
@@ -182,9 +183,9 @@ std::vector<std::optional<OwnCase>> own_cases(const PublishedTable& table,
       }
       if (own[i]) {
         throw std::runtime_error(
-            "the study has several points with H = " + shown_number(published.H_m) +
-            ", mu = " + shown_number(published.mu) + ", e = " + shown_number(published.e_star) +
-            ": the comparison needs a study of one model");
+            "the study has several points with H = " + solver::exact_number(published.H_m) +
+            ", mu = " + solver::exact_number(published.mu) + ", e = " +
+            solver::exact_number(published.e_star) + ": the comparison needs a study of one model");
       }
       own[i] = own_case(row);
     }

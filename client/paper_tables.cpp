@@ -7,10 +7,14 @@
 
 #include "client/paper_comparison.h"
 #include "client/printer.h"
+#include "worker/solver/number.h"
 
 namespace oblique::client {
 namespace {
 
+using solver::exact_number;
+using solver::fixed_number;
+using solver::signed_number;
 using Own = std::vector<std::optional<OwnCase>>;
 
 void add_header(protocol::QueryReply& table, const std::vector<std::string>& columns) {
@@ -36,12 +40,12 @@ std::string beside(const std::vector<Difference>& differences, std::size_t case_
   if (found == differences.end()) {
     return {};
   }
-  const auto published = fmt::format("{:.{}f}", found->published, decimals);
+  const auto published = fixed_number(found->published, decimals);
   if (!found->ours) {
     return fmt::format("- / {}", published);
   }
-  return fmt::format("{:.{}f} / {} / {:+.2f}", *found->ours, decimals + 1, published,
-                     *found->percent());
+  return fmt::format("{} / {} / {}", fixed_number(*found->ours, decimals + 1), published,
+                     signed_number(*found->percent(), 2));
 }
 
 void print_forces(std::ostream& out, Format format, const PublishedTable& published,
@@ -101,7 +105,8 @@ void print_sticks(std::ostream& out, Format format, const PublishedTable& publis
 }
 
 std::string place_of(const PublishedCase& in) {
-  return fmt::format("H = {:g}, mu = {:g}, e* = {:g}", in.H_m, in.mu, in.e_star);
+  return fmt::format("H = {}, mu = {}, e* = {}", exact_number(in.H_m), exact_number(in.mu),
+                     exact_number(in.e_star));
 }
 
 // Says plainly which published modes are not ours.
@@ -180,8 +185,9 @@ void print_differences_summary(std::ostream& out, const PublishedTable& publishe
     out << fmt::format(", {} of them without ours", summary.missing);
   }
   if (summary.largest) {
-    out << fmt::format(": rms difference {:.2f} %, largest {:.2f} % ({})", summary.rms_percent,
-                       summary.largest_percent, place_of(published, *summary.largest));
+    out << fmt::format(
+        ": rms difference {} %, largest {} % ({})", fixed_number(summary.rms_percent, 2),
+        fixed_number(summary.largest_percent, 2), place_of(published, *summary.largest));
   }
   out << "\n";
 }

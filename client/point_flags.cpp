@@ -10,6 +10,7 @@
 #include "client/nearest.h"
 #include "client/study_file.h"
 #include "proto/recipe.h"
+#include "worker/solver/number.h"
 
 namespace oblique::client {
 namespace {
@@ -95,7 +96,7 @@ std::string default_of(const ParameterKey& key) {
   if (key.name == "integrator") {
     return std::string(solver::integrator_name(defaults.integrator));
   }
-  return shown_number(key.get(defaults));
+  return solver::exact_number(key.get(defaults));
 }
 
 }  // namespace

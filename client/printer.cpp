@@ -2,15 +2,14 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
 #include "client/nearest.h"
+#include "worker/solver/number.h"
 #include "worker/solver/parameters.h"
 
 namespace oblique::client {
@@ -32,11 +31,8 @@ std::string table_cell(const Value& value) {
   switch (value.kind_case()) {
     case Value::kInteger:
       return std::to_string(value.integer());
-    case Value::kReal: {
-      char text[32];
-      std::snprintf(text, sizeof text, "%.6g", value.real());
-      return text;
-    }
+    case Value::kReal:
+      return solver::readable_number(value.real());
     case Value::kText: {
       // A line break inside a cell would break the table.
       auto text = value.text();
@@ -121,7 +117,7 @@ std::string csv_value(const Value& value) {
     case Value::kInteger:
       return std::to_string(value.integer());
     case Value::kReal:
-      return exact_number(value.real());
+      return solver::exact_number(value.real());
     case Value::kText:
       return csv_field(value.text());
     default:
@@ -196,12 +192,6 @@ std::string csv_field(std::string_view text) {
   }
   field += '"';
   return field;
-}
-
-std::string exact_number(double value) {
-  char text[32];
-  const auto end = std::to_chars(std::begin(text), std::end(text), value).ptr;
-  return {text, end};
 }
 
 void print(std::ostream& out, const QueryReply& rows, Format format) {

@@ -24,9 +24,6 @@ void print(std::ostream& out, const protocol::QueryReply& rows, Format format);
 /// One field of CSV, in quotes where it needs them.
 std::string csv_field(std::string_view text);
 
-/// The shortest text that reads back as the same number.
-std::string exact_number(double value);
-
 /// Appends one value to a row of an answer.
 void add_value(protocol::Row& row, const std::string& text);
 void add_value(protocol::Row& row, double value);

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <utility>
 
 #include "proto/visible_text.h"
+#include "worker/solver/number.h"
 
 namespace oblique::client {
 namespace {
@@ -18,9 +18,7 @@ int percent(const ProgressState& state) {
 }
 
 std::string shown_rate(double points_per_s) {
-  char text[32];
-  std::snprintf(text, sizeof text, points_per_s < 100.0 ? "%.3g" : "%.0f", points_per_s);
-  return text;
+  return solver::readable_number(points_per_s, 3);
 }
 
 std::optional<double> seconds_left(const ProgressState& state) {
@@ -32,19 +30,15 @@ std::optional<double> seconds_left(const ProgressState& state) {
 
 std::string two_units(std::int64_t large, const char* large_unit, std::int64_t small,
                       const char* small_unit) {
-  char text[64];
-  std::snprintf(text, sizeof text, "%lld %s %02lld %s", static_cast<long long>(large), large_unit,
-                static_cast<long long>(small), small_unit);
-  return text;
+  return std::to_string(large) + ' ' + large_unit + (small < 10 ? " 0" : " ") +
+         std::to_string(small) + ' ' + small_unit;
 }
 
 }  // namespace
 
 std::string shown_duration(double seconds) {
   if (seconds < 9.95) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.1f s", std::max(seconds, 0.0));
-    return text;
+    return solver::fixed_number(std::max(seconds, 0.0), 1) + " s";
   }
   constexpr double kLongest_s = 1e12;
   const auto whole = static_cast<std::int64_t>(std::llround(std::min(seconds, kLongest_s)));

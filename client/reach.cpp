@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "client/axis.h"
+#include "worker/solver/number.h"
 #include "worker/solver/solve.h"
 
 namespace oblique::client {
@@ -59,9 +60,9 @@ void ReachChecker::operator()(const protocol::PointTable& table, int block) {
     }
     if (H_m > largest_drop_m(*fall)) {
       throw InputError(
-          "H = " + shown_number(H_m) +
+          "H = " + solver::exact_number(H_m) +
           " m is not allowed: the tip of this finger first turns back after a drop of " +
-          shown_number(largest_drop_m(*fall)) + " m, so H must be at most that");
+          solver::readable_number(largest_drop_m(*fall), 10) + " m, so H must be at most that");
     }
   }
 }

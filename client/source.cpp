@@ -8,6 +8,7 @@
 
 #include "client/verbs.h"
 #include "server/reader.h"
+#include "worker/solver/number.h"
 #include "worker/solver/parameters.h"
 
 namespace oblique::client {
@@ -100,9 +101,9 @@ ConnectionSettings connection_settings(const SourceFlags& flags) {
   ConnectionSettings settings;
   constexpr double kLongest_s = 1e6;
   if (!(flags.timeout_s > 0.0 && flags.timeout_s <= kLongest_s)) {
-    throw solver::InputError("--timeout " + shown_number(flags.timeout_s) +
+    throw solver::InputError("--timeout " + solver::exact_number(flags.timeout_s) +
                              " is not allowed: it must be > 0 and at most " +
-                             shown_number(kLongest_s) + " s");
+                             solver::exact_number(kLongest_s) + " s");
   }
   settings.timeout_ms = std::llround(std::ceil(flags.timeout_s * 1000.0));
   if (!flags.server.empty()) {

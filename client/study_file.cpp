@@ -11,6 +11,7 @@
 
 #include "client/nearest.h"
 #include "proto/recipe.h"
+#include "worker/solver/number.h"
 #include "worker/solver/parameters.h"
 
 namespace oblique::client {
@@ -41,12 +42,36 @@ std::string kind_of(const toml::node& node) {
   }
 }
 
+// A value of a list or table as the file has it, or nearly; nested ones only by their kind.
+std::string element(const toml::node& node) {
+  if (const auto* number = node.as_floating_point()) {
+    return solver::exact_number(number->get());
+  }
+  if (node.is_array() || node.is_table()) {
+    return kind_of(node);
+  }
+  std::ostringstream text;
+  node.visit([&](const auto& value) { text << value; });
+  return text.str();
+}
+
 // A value as the file has it, shortened for a message.
 std::string shown(const toml::node& node) {
   constexpr std::size_t kMost = 60;
-  std::ostringstream text;
-  node.visit([&](const auto& value) { text << value; });
-  auto line = text.str();
+  std::string line;
+  if (const auto* list = node.as_array()) {
+    for (const auto& value : *list) {
+      line += (line.empty() ? "[" : ", ") + element(value);
+    }
+    line = list->empty() ? "[]" : line + "]";
+  } else if (const auto* table = node.as_table()) {
+    for (const auto& [key, value] : *table) {
+      line += (line.empty() ? "{ " : ", ") + std::string(key.str()) + " = " + element(value);
+    }
+    line = table->empty() ? "{}" : line + " }";
+  } else {
+    line = element(node);
+  }
   line = line.substr(0, line.find('\n'));
   return line.size() > kMost ? line.substr(0, kMost) + "..." : line;
 }

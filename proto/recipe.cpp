@@ -5,9 +5,10 @@
 #include <bitset>
 #include <cmath>
 #include <span>
-#include <sstream>
 #include <stdexcept>
 #include <string>
+
+#include "worker/solver/number.h"
 
 namespace oblique::protocol {
 namespace {
@@ -28,13 +29,6 @@ std::string all_keys() {
     names += std::string(key.name) + ", ";
   }
   return names + "H, mu and e";
-}
-
-std::string number(double value) {
-  std::ostringstream text;
-  text.precision(12);
-  text << value;
-  return text.str();
 }
 
 [[noreturn]] void throw_too_many_points() {
@@ -67,7 +61,8 @@ void check_range_axis(const solver::ParameterKey& key, const Axis& axis) {
   }
   solver::check_value(key, axis.from());
   solver::check_value(key, axis.to());
-  const std::string range = name + " from " + number(axis.from()) + " to " + number(axis.to());
+  const std::string range = name + " from " + solver::exact_number(axis.from()) + " to " +
+                            solver::exact_number(axis.to());
   if (axis.from() > axis.to()) {
     throw solver::InputError(range + " is reversed: `to` must not be below `from`");
   }

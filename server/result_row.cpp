@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <vector>
+
+#include "worker/solver/number.h"
 
 namespace oblique::server {
 namespace {
@@ -54,16 +55,6 @@ constexpr std::array<std::string_view, 13> kTailColumns{
 
 constexpr std::size_t kLongestText = 65536;
 
-void append_number(std::string& text, double value) {
-  std::array<char, 32> digits{};
-  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr;
-  const std::string_view shortest(digits.data(), static_cast<std::size_t>(end - digits.data()));
-  text += shortest;
-  if (shortest.find_first_of(".e") == std::string_view::npos) {
-    text += ".0";
-  }
-}
-
 using Values = google::protobuf::RepeatedField<double>;
 
 bool all_finite(const Values& values) {
@@ -75,9 +66,9 @@ std::string pairs_json(const Values& values) {
   std::string text = "[";
   for (int i = 0; i + 1 < values.size(); i += 2) {
     text += i == 0 ? "[" : ",[";
-    append_number(text, values[i]);
+    text += solver::exact_real(values[i]);
     text += ',';
-    append_number(text, values[i + 1]);
+    text += solver::exact_real(values[i + 1]);
     text += ']';
   }
   return text + "]";
@@ -202,7 +193,7 @@ std::string peaks_json(const PointResult& result) {
   for (int i = 0; i + 2 < result.peaks_size(); i += 3) {
     text += i == 0 ? "[" : ",[";
     for (int j = 0; j < 3; ++j) {
-      append_number(text, result.peaks(i + j));
+      text += solver::exact_real(result.peaks(i + j));
       text += ',';
     }
     text += is_major[static_cast<std::size_t>(i / 3)] ? "1]" : "0]";
@@ -220,10 +211,10 @@ std::string phases_json(const PointResult& result) {
   for (int i = 0; i < result.phase_ends_s_size(); ++i) {
     text += i == 0 ? "[" : ",[";
     text += i % 2 == 0 ? "\"compression\"," : "\"restitution\",";
-    append_number(text, begin_s);
+    text += solver::exact_real(begin_s);
     text += ',';
     begin_s = result.phase_ends_s(i);
-    append_number(text, begin_s);
+    text += solver::exact_real(begin_s);
     text += ']';
   }
   return text + "]";

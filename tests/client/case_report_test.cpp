@@ -108,5 +108,17 @@ TEST(Summary, TellsRipplesFromPeaks) {
   EXPECT_NE(out.str().find("(with ripples: SC SR sC sR)"), std::string::npos);
 }
 
+TEST(Summary, NeverShowsMinusZeroOrAnExponentWherePlainDigitsDo) {
+  auto result = some_result();
+  result.energy.restitution_J = -3e-17;
+  result.vt_out_m_s = -1e-6;
+  result.solver.wall_s = 0.1234;
+  std::ostringstream out;
+  print_summary(out, result);
+  EXPECT_EQ(out.str().find("-0.0"), std::string::npos) << out.str();
+  EXPECT_EQ(out.str().find("e+"), std::string::npos) << out.str();
+  EXPECT_NE(out.str().find("123 ms"), std::string::npos) << out.str();
+}
+
 }  // namespace
 }  // namespace oblique::client

@@ -155,6 +155,15 @@ TEST(Table, ShowsNullAsADashAndKeepsToOneLineARow) {
   EXPECT_EQ(printed(rows, Format::kTable), "text\n---------\ntwo lines\n-\n");
 }
 
+TEST(Table, ShowsNumbersForReading) {
+  protocol::QueryReply rows;
+  rows.add_columns("x");
+  for (const double value : {-0.0, 0.1 + 0.2, 14300.0, 7e10}) {
+    add_value(*rows.add_rows(), value);
+  }
+  EXPECT_EQ(printed(rows, Format::kTable), "    x\n-----\n    0\n  0.3\n14300\n7e+10\n");
+}
+
 TEST(Table, CountsCharactersNotBytes) {
   EXPECT_EQ(printed(rows_of_texts({"µ", "ab"}), Format::kTable), "text\n----\nµ\nab\n");
 }

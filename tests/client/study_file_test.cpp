@@ -11,6 +11,7 @@
 
 #include "client/axis.h"
 #include "proto/recipe.h"
+#include "worker/solver/number.h"
 
 namespace oblique::client {
 namespace {
@@ -69,7 +70,13 @@ std::vector<WrongFile> wrong_tables() {
        {":2: ", "k = ", "stiff", "a number"}},
       {"ModelKeyList",
        "[model]\nk = [1e7, 2e7]\n" + std::string(kPoint),
-       {":2: ", "k = ", "[[block]]"}},
+       {":2: ", "k = [1e+07, 2e+07]", "[[block]]"}},
+      {"NumbersAreRepeatedAsTheyWereWritten",
+       "[model]\nk = [0.1, 0.3, 'x', [1]]\n" + std::string(kPoint),
+       {":2: ", "k = [0.1, 0.3, 'x', a list] is a list"}},
+      {"ATableIsRepeatedWithItsKeys",
+       "[model]\nk = { from = 0.1, to = 2 }\n" + std::string(kPoint),
+       {":2: ", "k = { from = 0.1, to = 2 } is a table"}},
       {"ModelKeyOutOfRange",
        "[model]\nrho = -1\n" + std::string(kPoint),
        {":2: ", "rho = -1", "> 0"}},
@@ -242,7 +249,7 @@ TEST(StudyFile, TakesEveryModelKeyWithItsOwnDefault) {
     text += std::string(key.name) + " = ";
     text += key.name == "integrator"
                 ? '"' + std::string(solver::integrator_name(defaults.integrator)) + '"'
-                : shown_number(key.get(defaults));
+                : solver::exact_number(key.get(defaults));
     text += "\n";
   }
   const auto study = parse_study(text + kPoint, "x");

@@ -1,9 +1,10 @@
 #include "worker/solver/contact.h"
 
 #include <cmath>
-#include <sstream>
+#include <string>
 
 #include "worker/solver/errors.h"
+#include "worker/solver/number.h"
 
 namespace oblique::solver {
 namespace {
@@ -55,9 +56,8 @@ std::optional<Contact::Candidate> Contact::earliest_event(const TipState& end, d
 
 bool Contact::judge(const TipState& end, const ContactIntegrals<double>& integrals) {
   if (!std::isfinite(end.x_m + end.y_m + end.vx_m_s + end.vy_m_s)) {
-    std::ostringstream message;
-    message << "the contact diverged after " << t_s_ << " s with dt = " << full_step_s() << " s";
-    throw SolveError(message.str());
+    throw SolveError("the contact diverged after " + readable_number(t_s_) +
+                     " s with dt = " + readable_number(full_step_s()) + " s");
   }
   switch (search_.seeking) {
     case Seeking::kNothing:
@@ -167,23 +167,18 @@ void Contact::accept(const TipState& end, const ContactIntegrals<double>& integr
   search_.seeking = Seeking::kNothing;
   trial_s_ = full_step_s();
   if (t_s_ > kLongest_s) {
-    std::ostringstream message;
-    message << "the contact did not end within " << kLongest_s << " s";
-    throw SolveError(message.str());
+    throw SolveError("the contact did not end within " + exact_number(kLongest_s) + " s");
   }
   if (steps_ > kMostSteps) {
-    std::ostringstream message;
-    message << "the contact takes more than " << kMostSteps << " steps of " << full_step_s()
-            << " s";
-    throw SolveError(message.str());
+    throw SolveError("the contact takes more than " + std::to_string(kMostSteps) + " steps of " +
+                     readable_number(full_step_s()) + " s");
   }
 }
 
 void Contact::happen(ContactEvent event) {
   if (++events_ > kMostEvents) {
-    std::ostringstream message;
-    message << "the contact has more than " << kMostEvents << " events within " << t_s_ << " s";
-    throw SolveError(message.str());
+    throw SolveError("the contact has more than " + std::to_string(kMostEvents) +
+                     " events within " + readable_number(t_s_) + " s");
   }
   const double ft = law_.ft_N(tip_);
   const double ft_rate_before = sign_of(ft) * law_.ft_rate_N_s(tip_);

@@ -1,9 +1,10 @@
 #include "worker/solver/contact_outcome.h"
 
 #include <cmath>
-#include <sstream>
+#include <string>
 
 #include "worker/solver/errors.h"
+#include "worker/solver/number.h"
 
 namespace oblique::solver {
 namespace {
@@ -17,11 +18,11 @@ void balance(const Energies& in, const Energies& out, const ContactRecord& recor
              ContactEnergy& energy) {
   const double at_touch_J = in.kinetic_J + std::abs(in.strain_J) + std::abs(in.gravity_J);
   if (!(energy.exchanged_J > kLeastExchanged * at_touch_J)) {
-    std::ostringstream message;
-    message << "the tip touches the ground with hardly any speed, as at its largest drop: the "
-            << energy.exchanged_J << " J that the contact exchanges drown in the rounding of the "
-            << at_touch_J << " J of the finger";
-    throw SolveError(message.str());
+    throw SolveError(
+        "the tip touches the ground with hardly any speed, as at its largest drop: the " +
+        readable_number(energy.exchanged_J) +
+        " J that the contact exchanges drown in the rounding of the " +
+        readable_number(at_touch_J) + " J of the finger");
   }
   energy.kinetic_in_J = in.kinetic_J;
   energy.kinetic_change_J = out.kinetic_J - in.kinetic_J;
@@ -31,10 +32,9 @@ void balance(const Energies& in, const Energies& out, const ContactRecord& recor
                            energy.gravity_change_J - record.work_n_J() - record.work_t_J();
   energy.closure = std::abs(missing_J) / energy.exchanged_J;
   if (!(energy.closure < kWorstClosure)) {
-    std::ostringstream message;
-    message << "the energy balance of the contact misses " << energy.closure
-            << " of the exchanged work, more than " << kWorstClosure << ": dt is too long";
-    throw SolveError(message.str());
+    throw SolveError("the energy balance of the contact misses " + readable_number(energy.closure) +
+                     " of the exchanged work, more than " + exact_number(kWorstClosure) +
+                     ": dt is too long");
   }
 }
 

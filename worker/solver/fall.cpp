@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
+#include <string>
 
 #include "worker/solver/errors.h"
+#include "worker/solver/number.h"
 
 namespace oblique::solver {
 namespace {
@@ -31,10 +32,8 @@ Fall::Fall(const Chain& chain, double dt_s)
 Fall::Fall(std::shared_ptr<const Motion> motion, double dt_s, double longest_s)
     : motion_(std::move(motion)), dt_s_(dt_s) {
   if (!(longest_s <= kLongestFall * kMostSteps * dt_s)) {
-    std::ostringstream message;
-    message << "the fall would take more than " << kMostSteps << " steps of dt_fall = " << dt_s
-            << " s";
-    throw SolveError(message.str());
+    throw SolveError("the fall would take more than " + exact_number(kMostSteps) +
+                     " steps of dt_fall = " + exact_number(dt_s) + " s");
   }
   ChainState before = motion_->at_rest();
   ChainState state = before;
@@ -46,18 +45,16 @@ Fall::Fall(std::shared_ptr<const Motion> motion, double dt_s, double longest_s)
     state.t_s = static_cast<double>(step) * dt_s;
     const TipState tip = motion_->tip(state);
     if (!std::isfinite(tip.y_m) || std::abs(tip.y_m) > 2.0 * length_m) {
-      std::ostringstream message;
-      message << "the fall diverged at t = " << state.t_s << " s with dt_fall = " << dt_s << " s";
-      throw SolveError(message.str());
+      throw SolveError("the fall diverged at t = " + readable_number(state.t_s) +
+                       " s with dt_fall = " + exact_number(dt_s) + " s");
     }
     if (tip.vy_m_s >= 0.0) {
       locate_turn(before);
       return;
     }
     if (state.t_s > longest_s) {
-      std::ostringstream message;
-      message << "the tip did not turn back within " << longest_s << " s of falling";
-      throw SolveError(message.str());
+      throw SolveError("the tip did not turn back within " + readable_number(longest_s) +
+                       " s of falling");
     }
     keep(step, state);
     std::swap(before, state);
@@ -97,11 +94,9 @@ ChainState Fall::stepped(const ChainState& from, double h_s) const {
 
 ChainState Fall::state_at(double H_m) const {
   if (!(H_m > 0.0 && H_m <= largest_drop_m_)) {
-    std::ostringstream message;
-    message.precision(7);
-    message << "H = " << H_m << " m is not allowed: the tip of this model drops at most "
-            << largest_drop_m_ << " m before it turns back";
-    throw InputError(message.str());
+    throw InputError("H = " + exact_number(H_m) +
+                     " m is not allowed: the tip of this model drops at most " +
+                     readable_number(largest_drop_m_, 7) + " m before it turns back");
   }
   const auto drop = [this](const ChainState& state) { return -motion_->tip(state).y_m; };
   auto after = std::upper_bound(kept_.begin(), kept_.end(), H_m,

@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
+#include <string>
 
 #include "worker/solver/errors.h"
+#include "worker/solver/number.h"
 
 namespace oblique::solver {
 
@@ -167,10 +168,9 @@ ContactIntegrals<double> GeneralizedAlphaMotion::step(const ChainState& from,
   std::vector<double> residual(chain_.size());
   for (int iteration = 0;; ++iteration) {
     if (iteration == kMostIterations) {
-      std::ostringstream message;
-      message << "Newton's method did not converge in " << kMostIterations
-              << " iterations at t = " << to.t_s << " s with a step of " << h_s << " s";
-      throw SolveError(message.str());
+      throw SolveError("Newton's method did not converge in " + std::to_string(kMostIterations) +
+                       " iterations at t = " + readable_number(to.t_s) + " s with a step of " +
+                       exact_number(h_s) + " s");
     }
     evaluate(force, h_s, to, residual);
     matrix.set_zero();
@@ -184,9 +184,8 @@ ContactIntegrals<double> GeneralizedAlphaMotion::step(const ChainState& from,
       break;
     }
     if (!std::isfinite(moved)) {
-      std::ostringstream message;
-      message << "a step of " << h_s << " s diverged at t = " << to.t_s << " s";
-      throw SolveError(message.str());
+      throw SolveError("a step of " + exact_number(h_s) +
+                       " s diverged at t = " + readable_number(to.t_s) + " s");
     }
   }
   for (std::size_t i = 0; i < chain_.size(); ++i) {

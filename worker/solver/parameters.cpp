@@ -4,7 +4,8 @@
 #include <array>
 #include <cmath>
 #include <numeric>
-#include <sstream>
+
+#include "worker/solver/number.h"
 
 namespace oblique::solver {
 namespace {
@@ -109,11 +110,13 @@ void check_value(const ParameterKey& key, double value) {
   if (std::isfinite(value) && key.is_allowed(value)) {
     return;
   }
-  std::ostringstream message;
-  message.precision(12);
-  message << key.name << " = " << value << (key.unit.empty() ? "" : " ") << key.unit
-          << " is not allowed: " << key.name << " must be " << key.allowed;
-  throw InputError(message.str());
+  const std::string name(key.name);
+  std::string message = name + " = " + exact_number(value);
+  if (!key.unit.empty()) {
+    message += ' ';
+    message += key.unit;
+  }
+  throw InputError(message + " is not allowed: " + name + " must be " + std::string(key.allowed));
 }
 
 void validate(const ModelParameters& model) {
@@ -135,10 +138,9 @@ void validate_point(const ModelParameters& model, double H_m, double mu, double 
   check_value(kPointKeys[2], e_star);
   const double reach_m = std::accumulate(model.lengths_m.begin(), model.lengths_m.end(), 0.0);
   if (H_m > reach_m) {
-    std::ostringstream message;
-    message << "H = " << H_m << " m is not allowed: the tip drops at most the length of the chain, "
-            << reach_m << " m";
-    throw InputError(message.str());
+    throw InputError("H = " + exact_number(H_m) +
+                     " m is not allowed: the tip drops at most the length of the chain, " +
+                     readable_number(reach_m, 10) + " m");
   }
 }
 

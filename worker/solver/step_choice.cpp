@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
+#include <string>
 
 #include "worker/solver/errors.h"
+#include "worker/solver/number.h"
 #include "worker/solver/pefrl.h"
 
 namespace oblique::solver {
@@ -15,11 +16,9 @@ double checked(const char* key, double asked_s, double limit_s, double fraction)
     return fraction * limit_s;
   }
   if (asked_s > limit_s) {
-    std::ostringstream message;
-    message << key << " = " << asked_s
-            << " s is not allowed: the explicit integrator is stable up to " << limit_s
-            << " s here (0 chooses a step)";
-    throw InputError(message.str());
+    throw InputError(std::string(key) + " = " + exact_number(asked_s) +
+                     " s is not allowed: the explicit integrator is stable up to " +
+                     readable_number(limit_s) + " s here (0 chooses a step)");
   }
   return asked_s;
 }
@@ -60,10 +59,10 @@ ContactSteps StepChoice::contact_limits(double e_star) const {
 
 ContactSteps StepChoice::contact(double e_star) const {
   if (e_star < kSmallestRestitution) {
-    std::ostringstream message;
-    message << "e = " << e_star << " cannot be solved in double precision: the restitution spring "
-            << "k/e^2 is too stiff; e from " << kSmallestRestitution << " on can";
-    throw SolveError(message.str());
+    throw SolveError("e = " + exact_number(e_star) +
+                     " cannot be solved in double precision: the restitution spring k/e^2 is too "
+                     "stiff; e from " +
+                     exact_number(kSmallestRestitution) + " on can");
   }
   if (asked_contact_s_ != 0.0) {
     if (integrator_ == Integrator::kExplicit) {
