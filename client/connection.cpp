@@ -6,6 +6,7 @@
 
 #include "proto/address.h"
 #include "proto/frames.h"
+#include "proto/socket.h"
 #include "worker/solver/number.h"
 
 namespace oblique::client {
@@ -24,12 +25,12 @@ Connection::Connection(ConnectionSettings settings, KeepWaiting keep_waiting)
       monitor_(context_, socket_) {
   // Nothing is queued for a server that is not there, which would get every copy when it is back.
   socket_.set(zmq::sockopt::immediate, true);
-  // A request that was not sent yet must not hold up the end of the program.
-  socket_.set(zmq::sockopt::linger, 0);
-  socket_.set(zmq::sockopt::maxmsgsize, static_cast<std::int64_t>(protocol::kMaxFrameBytes));
-  // The embedded service may be connected to before it listens.
-  socket_.set(zmq::sockopt::reconnect_ivl, 20);
-  socket_.set(zmq::sockopt::reconnect_ivl_max, 1000);
+  // A request that was not sent yet must not hold up the end of the program; the embedded service
+  // may be connected to before it listens.
+  constexpr int kLinger_ms = 0;
+  constexpr int kShortestPause_ms = 20;
+  constexpr int kLongestPause_ms = 1000;
+  protocol::prepare_dealer(socket_, kLinger_ms, kShortestPause_ms, kLongestPause_ms);
   if (const auto objection = protocol::objection_to_address(settings_.server_url);
       !objection.empty()) {
     throw solver::InputError("server = \"" + settings_.server_url + "\" is not an address: " +

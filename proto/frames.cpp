@@ -1,5 +1,7 @@
 #include "proto/frames.h"
 
+#include <algorithm>
+
 #include <google/protobuf/io/coded_stream.h>
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 #include <google/protobuf/stubs/logging.h>
@@ -47,6 +49,37 @@ std::string with_request_id(std::uint64_t request_id, std::string_view encoded_r
 bool decode(std::string_view frame, google::protobuf::MessageLite& message) {
   return frame.size() <= kMaxFrameBytes &&
          message.ParseFromArray(frame.data(), static_cast<int>(frame.size()));
+}
+
+std::size_t count_nested(std::string_view frame, int outer, int inner) {
+  using google::protobuf::internal::WireFormatLite;
+  const auto tag_of = [](int field) {
+    return WireFormatLite::MakeTag(field, WireFormatLite::WIRETYPE_LENGTH_DELIMITED);
+  };
+  google::protobuf::io::CodedInputStream in(reinterpret_cast<const std::uint8_t*>(frame.data()),
+                                            static_cast<int>(frame.size()));
+  std::size_t count = 0;
+  while (const std::uint32_t tag = in.ReadTag()) {
+    std::uint32_t bytes = 0;
+    if (tag != tag_of(outer)) {
+      if (!WireFormatLite::SkipField(&in, tag)) {
+        break;
+      }
+      continue;
+    }
+    if (!in.ReadVarint32(&bytes)) {
+      break;
+    }
+    const auto end = in.PushLimit(static_cast<int>(std::min<std::size_t>(bytes, frame.size())));
+    while (const std::uint32_t nested = in.ReadTag()) {
+      count += nested == tag_of(inner) ? 1U : 0U;
+      if (!WireFormatLite::SkipField(&in, nested)) {
+        return count;
+      }
+    }
+    in.PopLimit(end);
+  }
+  return count;
 }
 
 void silence_protobuf() {

@@ -2,21 +2,26 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
+#include <cerrno>
 #include <chrono>
 #include <deque>
 #include <mutex>
 #include <optional>
 #include <stdexcept>
+#include <system_error>
 #include <utility>
 #include <variant>
 
 #include <arpa/inet.h>
+#include <poll.h>
+#include <sys/eventfd.h>
 
 #include <spdlog/spdlog.h>
-#include <zmq.hpp>
 
 #include "proto/frames.h"
 #include "server/file_system.h"
+#include "server/network/network.h"
 
 namespace oblique::server {
 namespace {
@@ -24,11 +29,10 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kTick{100};
-constexpr int kLinger_ms = 500;
-constexpr int kTcpHeartbeat_ms = 2000;
-constexpr int kTcpTimeout_ms = 10'000;
-/// Messages taken from one socket before the others get their turn.
-constexpr int kMessagesPerTurn = 256;
+/// What is not sent yet is still sent for so long at the end.
+constexpr std::chrono::milliseconds kLinger{500};
+/// A port's share of a turn: then the other port, the disk and the clock get theirs.
+constexpr std::chrono::milliseconds kShareOfTurn{5};
 /// What has arrived when the server is told to stop is still read, for so long at most.
 constexpr std::chrono::milliseconds kLongestDrain{1000};
 
@@ -39,19 +43,18 @@ Instant now() {
           duration_cast<milliseconds>(std::chrono::system_clock::now().time_since_epoch()).count()};
 }
 
-/// Reports of the other threads, kept for the loop, which an inproc socket wakes.
+/// Reports of the other threads, kept for the loop, which a descriptor wakes.
 class ReportBox {
  public:
   using Item = std::variant<WriteReport, QueryReport>;
 
-  ReportBox(zmq::context_t& context, const std::string& name)
-      : wake_(context, zmq::socket_type::push), woken_(context, zmq::socket_type::pull) {
-    wake_.set(zmq::sockopt::linger, 0);
-    woken_.bind("inproc://" + name);
-    wake_.connect("inproc://" + name);
+  ReportBox() : woken_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
+    if (!woken_.is_open()) {
+      throw std::system_error(errno, std::generic_category(), "eventfd");
+    }
   }
 
-  /// From the one thread that fills this box.
+  /// From any thread.
   template <typename Reports>
   void put(Reports reports) {
     {
@@ -60,89 +63,25 @@ class ReportBox {
         items_.emplace_back(std::move(report));
       }
     }
-    // When the socket is full the loop has wake-ups enough to read.
-    (void)wake_.send(zmq::message_t(), zmq::send_flags::dontwait);
+    static_cast<void>(eventfd_write(woken_.number(), 1));
   }
 
   /// From the loop: everything put so far.
   std::deque<Item> take() {
-    zmq::message_t ignored;
-    while (woken_.recv(ignored, zmq::recv_flags::dontwait)) {
-    }
+    eventfd_t count = 0;
+    static_cast<void>(eventfd_read(woken_.number(), &count));
     const std::lock_guard lock(mutex_);
     return std::exchange(items_, {});
   }
 
-  void* socket() { return woken_.handle(); }
+  /// Readable when there is something to take.
+  int descriptor() const { return woken_.number(); }
 
  private:
-  zmq::socket_t wake_;
-  zmq::socket_t woken_;
+  Descriptor woken_;
   std::mutex mutex_;
   std::deque<Item> items_;  // guarded by mutex_
 };
-
-zmq::socket_t bound_router(zmq::context_t& context, const std::string& address,
-                           const std::string& port) {
-  zmq::socket_t socket(context, zmq::socket_type::router);
-  socket.set(zmq::sockopt::router_mandatory, 1);
-  socket.set(zmq::sockopt::linger, kLinger_ms);
-  socket.set(zmq::sockopt::maxmsgsize, static_cast<std::int64_t>(protocol::kMaxFrameBytes));
-  socket.set(zmq::sockopt::heartbeat_ivl, kTcpHeartbeat_ms);
-  socket.set(zmq::sockopt::heartbeat_timeout, kTcpTimeout_ms);
-  socket.set(zmq::sockopt::ipv6, address.find(':') != std::string::npos);
-  const std::string host = address.find(':') != std::string::npos ? "[" + address + "]" : address;
-  const std::string endpoint = "tcp://" + host + ":" + port;
-  try {
-    socket.bind(endpoint);
-  } catch (const zmq::error_t& error) {
-    throw std::runtime_error("cannot listen on " + endpoint + ": " + error.what() +
-                             (error.num() == EADDRINUSE ? ": does a server run already?" : ""));
-  }
-  return socket;
-}
-
-/// One message of two frames, identity and body; nothing when none waits. `well_formed` is false
-/// for any other number of frames; all of them are taken off the socket.
-struct Incoming {
-  std::string identity;
-  zmq::message_t body;
-  bool well_formed;
-};
-std::optional<Incoming> receive(zmq::socket_t& socket) {
-  zmq::message_t identity;
-  if (!socket.recv(identity, zmq::recv_flags::dontwait)) {
-    return std::nullopt;
-  }
-  Incoming incoming{identity.to_string(), {}, false};
-  bool more = identity.more();
-  for (int frames = 1; more; ++frames) {
-    zmq::message_t frame;
-    (void)socket.recv(frame, zmq::recv_flags::none);
-    more = frame.more();
-    incoming.well_formed = frames == 1 && !more;
-    incoming.body = std::move(frame);
-  }
-  return incoming;
-}
-
-/// False when the peer is gone or takes nothing any more.
-bool send(zmq::socket_t& socket, const std::string& identity, const std::string& body) {
-  try {
-    return socket.send(zmq::buffer(identity),
-                       zmq::send_flags::sndmore | zmq::send_flags::dontwait) &&
-           socket.send(zmq::buffer(body), zmq::send_flags::dontwait);
-  } catch (const zmq::error_t& error) {
-    if (error.num() == EHOSTUNREACH) {
-      return false;
-    }
-    throw;
-  }
-}
-
-}  // namespace
-
-namespace {
 
 /// Throws StorageError for a path where a database would be in danger.
 const std::string& safe_path(const LoopSettings& settings) {
@@ -177,13 +116,12 @@ class Loop::Parts final : public Outbox {
   explicit Parts(LoopSettings settings)
       : address_(loopback_address(settings.listen)),
         store_(safe_path(settings)),
-        written_(context_, "written"),
-        queried_(context_, "queried"),
         writer_(store_, [this](std::vector<WriteReport> r) { written_.put(std::move(r)); }),
         queries_(settings.database, settings.queries,
                  [this](QueryReport r) { queried_.put(std::array{std::move(r)}); }),
-        workers_(bound_router(context_, address_, settings.worker_port)),
-        clients_(bound_router(context_, address_, settings.client_port)) {
+        network_(settings.network),
+        workers_(network_.listen(address_, settings.worker_port)),
+        clients_(network_.listen(address_, settings.client_port)) {
     ServiceSettings service = std::move(settings.service);
     service.database_id = store_.database_id();
     service.last_study_id = store_.last_study_id();
@@ -195,17 +133,20 @@ class Loop::Parts final : public Outbox {
 
   LoopEnd run(int stop_fd) {
     auto next_tick = Clock::now();
-    std::array<zmq::pollitem_t, 5> items{{{workers_.handle(), 0, ZMQ_POLLIN, 0},
-                                          {clients_.handle(), 0, ZMQ_POLLIN, 0},
-                                          {written_.socket(), 0, ZMQ_POLLIN, 0},
-                                          {queried_.socket(), 0, ZMQ_POLLIN, 0},
-                                          {nullptr, stop_fd, ZMQ_POLLIN, 0}}};
+    std::array<pollfd, 4> items{{{network_.descriptor(), POLLIN, 0},
+                                 {written_.descriptor(), POLLIN, 0},
+                                 {queried_.descriptor(), POLLIN, 0},
+                                 {stop_fd, POLLIN, 0}}};
+    bool has_more = false;
     while (items.back().revents == 0) {
       const auto wait = std::chrono::ceil<std::chrono::milliseconds>(next_tick - Clock::now());
-      poll(items, std::max(wait, std::chrono::milliseconds(0)));
+      ::poll(items.data(), items.size(),
+             has_more ? 0 : static_cast<int>(std::max<std::int64_t>(wait.count(), 0)));
+      network_.collect(now().steady_ms);
       take_reports();
-      take_worker_messages();
-      take_client_messages();
+      has_more = take_worker_messages();
+      has_more = take_client_messages() || has_more;
+      note_departures();
       if (Clock::now() >= next_tick) {
         service_->tick(now());
         next_tick = Clock::now() + kTick;
@@ -214,14 +155,16 @@ class Loop::Parts final : public Outbox {
     return finish();
   }
 
-  bool to_worker(const std::string& identity, const protocol::ServerToWorker& message) override {
-    return send(workers_, identity, protocol::encode(message));
+  Delivery to_worker(const std::string& identity,
+                     const protocol::ServerToWorker& message) override {
+    return network_.send(identity, protocol::encode(message));
   }
+  bool is_busy(const std::string& identity) const override { return network_.is_busy(identity); }
   bool to_client(const std::string& identity, const protocol::ClientReply& reply) override {
     return forward_to_client(identity, protocol::encode(reply));
   }
   bool forward_to_client(const std::string& identity, const std::string& frame) override {
-    return send(clients_, identity, frame);
+    return network_.send(identity, frame) != Delivery::kGone;
   }
   void write(WriteJob job) override { writer_.submit(std::move(job)); }
   bool query(QueryJob job) override { return queries_.submit(std::move(job)); }
@@ -231,20 +174,10 @@ class Loop::Parts final : public Outbox {
     spdlog::log(kLevels.at(static_cast<std::size_t>(severity)), "{}", text);
   }
 
-  std::string client_endpoint() const { return clients_.get(zmq::sockopt::last_endpoint); }
-  std::string worker_endpoint() const { return workers_.get(zmq::sockopt::last_endpoint); }
+  std::string client_endpoint() const { return network_.endpoint(clients_); }
+  std::string worker_endpoint() const { return network_.endpoint(workers_); }
 
  private:
-  static void poll(std::array<zmq::pollitem_t, 5>& items, std::chrono::milliseconds wait) {
-    try {
-      zmq::poll(items, wait);
-    } catch (const zmq::error_t& error) {
-      if (error.num() != EINTR) {
-        throw;
-      }
-    }
-  }
-
   void take_reports() {
     for (const auto& report : written_.take()) {
       service_->written(std::get<WriteReport>(report), now());
@@ -254,31 +187,50 @@ class Loop::Parts final : public Outbox {
     }
   }
 
-  /// False when messages may be left.
+  /// True when messages are left that could be taken at once.
   bool take_worker_messages() {
-    for (int i = 0; i < kMessagesPerTurn; ++i) {
-      const auto message = receive(workers_);
-      if (!message) {
+    return take_messages(
+        workers_, [this](const std::string& worker) { return service_->has_room_for(worker); },
+        [this](const Incoming& incoming) {
+          service_->worker_frame(incoming.identity, frame_of(incoming), now());
+        });
+  }
+
+  /// The same. Who does not take what it asked for is not asked what it wants next.
+  bool take_client_messages() {
+    return take_messages(
+        clients_, [this](const std::string& client) { return !network_.is_busy(client); },
+        [this](const Incoming& incoming) {
+          service_->client_frame(incoming.identity, frame_of(incoming), now());
+        });
+  }
+
+  template <typename Take>
+  bool take_messages(Network::Port port, const Network::MayTake& may_take, const Take& take) {
+    const auto until = Clock::now() + kShareOfTurn;
+    while (const auto incoming = network_.next(port, may_take)) {
+      take(*incoming);
+      if (Clock::now() >= until) {
         return true;
       }
-      service_->worker_frame(message->identity, body_of(*message), now());
     }
     return false;
   }
 
-  void take_client_messages() {
-    for (int i = 0; i < kMessagesPerTurn; ++i) {
-      const auto message = receive(clients_);
-      if (!message) {
-        return;
-      }
-      service_->client_frame(message->identity, body_of(*message), now());
-    }
+  /// What is not of one frame is passed on as a frame that no message has.
+  static std::string_view frame_of(const Incoming& incoming) {
+    return incoming.message.is_single ? std::string_view(incoming.message.body)
+                                      : std::string_view("\xff", 1);
   }
 
-  /// What is not of two frames is passed on as a frame that no message has.
-  static std::string_view body_of(const Incoming& message) {
-    return message.well_formed ? message.body.to_string_view() : std::string_view("\xff", 1);
+  /// A flood of connections that must be ended must not become a flood of lines.
+  void note_departures() {
+    for (const Departure& departure : network_.take_departures()) {
+      if (!departure.reason.empty() && std::has_single_bit(++ended_connections_)) {
+        spdlog::warn("a connection was ended: {} ({} ended so far)", departure.reason,
+                     ended_connections_);
+      }
+    }
   }
 
   LoopEnd finish() {
@@ -286,26 +238,33 @@ class Loop::Parts final : public Outbox {
     queries_.stop();
     service_->stop(now());
     const auto until = Clock::now() + kLongestDrain;
-    while (!take_worker_messages() && Clock::now() < until) {
+    bool has_more = true;
+    while (has_more && Clock::now() < until) {
+      pollfd item{network_.descriptor(), POLLIN, 0};
+      has_more = ::poll(&item, 1, 0) > 0;
+      network_.collect(now().steady_ms);
+      has_more = take_worker_messages() || has_more;
     }
     take_client_messages();
     const std::size_t lost = writer_.finish();
     take_reports();
+    network_.flush(kLinger);
     if (lost > 0) {
       spdlog::error("{} changes could not be made durable and were not acknowledged", lost);
     }
     return {lost};
   }
 
-  zmq::context_t context_;
   std::string address_;
   Store store_;
   ReportBox written_;
   ReportBox queried_;
   Writer writer_;
   QueryPool queries_;
-  zmq::socket_t workers_;
-  zmq::socket_t clients_;
+  Network network_;
+  Network::Port workers_;
+  Network::Port clients_;
+  std::uint64_t ended_connections_ = 0;
   std::optional<Service> service_;
 };
 

@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "server/network/network.h"
 #include "server/service.h"
 
 namespace oblique::server {
@@ -15,6 +16,7 @@ struct LoopSettings {
   std::string worker_port = "7601";  ///< "*": the system picks one
   std::string client_port = "7600";
   QueryPoolSettings queries;
+  NetworkLimits network;
   ServiceSettings service;  ///< solver_version must be set; the rest from the database
 };
 
@@ -23,8 +25,8 @@ struct LoopEnd {
   std::size_t lost_writes;  ///< changes that could not be made durable
 };
 
-/// The server: two ROUTER sockets, the writer and the readers of queries, and one loop that feeds
-/// the service with what comes from them. Logs to spdlog's default logger.
+/// The server: its network, the writer and the readers of queries, and one loop that feeds the
+/// service with what comes from them. Logs to spdlog's default logger.
 class Loop {
  public:
   /// Opens the database and binds both sockets. Throws StorageError, also for a file on a network

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include <sys/prctl.h>
+#include <sys/resource.h>
 #include <sys/signalfd.h>
 #include <unistd.h>
 #include <csignal>
@@ -59,6 +60,16 @@ void stop_with_parent(pid_t parent) {
   }
 }
 
+/// A connection takes a descriptor, and systems give few to begin with.
+void take_all_descriptors() {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_NOFILE, &limit) == 0) {
+    limit.rlim_cur = limit.rlim_max;
+    // Otherwise there are fewer connections.
+    static_cast<void>(setrlimit(RLIMIT_NOFILE, &limit));
+  }
+}
+
 void tell_ready(int fd, const Loop& loop) {
   const std::string line =
       nlohmann::json{{"client", loop.client_endpoint()}, {"worker", loop.worker_endpoint()}}
@@ -75,6 +86,7 @@ int run(const LoopSettings& settings, int ready_fd) {
   const int stop_fd = stop_signals();
   // A file that may not grow further is a full disk, and no reason to die.
   std::signal(SIGXFSZ, SIG_IGN);
+  take_all_descriptors();
   Loop loop(settings);
   spdlog::info("database {}, clients at {}, workers at {}", settings.database,
                loop.client_endpoint(), loop.worker_endpoint());

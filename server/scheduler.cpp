@@ -264,6 +264,14 @@ void Scheduler::remove_worker(WorkerId id, WorkerEnd how) {
   processes_.leave(process, id);
 }
 
+void Scheduler::on(const WorkerBusy& event) {
+  const auto found = workers_.find(event.worker);
+  if (found != workers_.end()) {
+    found->second.is_busy = event.is_busy;
+    found->second.draining = found->second.draining && !event.is_busy;
+  }
+}
+
 void Scheduler::on(const DispatchHeld& event) {
   held_ = event.held;
 }

@@ -103,6 +103,7 @@ class Scheduler {
     std::string solver_version;
     std::uint32_t credit = 0;
     bool queued = false;    ///< stands in `ready_workers_`
+    bool is_busy = false;   ///< gets nothing
     bool draining = false;  ///< gets nothing until it holds nothing, then suspect points
     ProcessNumber process = kNobody;
     LeaseId probe = 0;                        ///< that it has, and then nothing else; 0: none
@@ -128,6 +129,7 @@ class Scheduler {
   void on(const HeartbeatReceived& event);
   void on(const WorkerLeft& event);
   void on(const WorkerUnreachable& event);
+  void on(const WorkerBusy& event);
   void on(const DispatchHeld& event);
   void on(const Tick& event);
 

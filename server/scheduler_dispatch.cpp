@@ -29,6 +29,9 @@ void Scheduler::dispatch() {
 }
 
 bool Scheduler::serve(WorkerId id, Worker& worker) {
+  if (worker.is_busy) {
+    return false;
+  }
   const bool holds_suspect = !worker.leases.empty() && leases_.at(*worker.leases.begin()).alone;
   if (holds_suspect || worker.probe != 0) {
     return false;

@@ -142,6 +142,11 @@ struct WorkerUnreachable {
   WorkerId worker;
   std::string reason = "its connection is gone";
 };
+/// While so much waits to go out to the worker, it gets nothing more. No sign of life.
+struct WorkerBusy {
+  WorkerId worker;
+  bool is_busy;
+};
 /// While held (the disk does not take results), no batch goes out.
 struct DispatchHeld {
   bool held;
@@ -152,7 +157,7 @@ struct Tick {};
 using Event =
     std::variant<StudyAdded, StudyCancelled, StudyPaused, StudyReopened, StudyShareChanged,
                  FailuresForgotten, WorkerJoined, CreditGiven, ResultsReceived, ResultsStored,
-                 HeartbeatReceived, WorkerLeft, WorkerUnreachable, DispatchHeld, Tick>;
+                 HeartbeatReceived, WorkerLeft, WorkerUnreachable, WorkerBusy, DispatchHeld, Tick>;
 
 // ---- Effects ----------------------------------------------------------------------------------
 

@@ -64,15 +64,17 @@ Service::Service(ServiceSettings settings, Outbox& outbox, std::vector<StoredStu
 }
 
 void Service::feed(const Event& event, Instant now, protocol::Results* message) {
+  handle(event, now, message);
+  while (!found_.empty()) {
+    const Event found = std::move(found_.back());
+    found_.pop_back();
+    handle(found, now, nullptr);
+  }
+}
+
+void Service::handle(const Event& event, Instant now, protocol::Results* message) {
   for (const Effect& effect : scheduler_.handle(event, now.steady_ms)) {
     perform(effect, now, message);
-  }
-  while (!unreachable_.empty()) {
-    const WorkerId gone = unreachable_.back();
-    unreachable_.pop_back();
-    for (const Effect& effect : scheduler_.handle(WorkerUnreachable{gone}, now.steady_ms)) {
-      perform(effect, now, nullptr);
-    }
   }
 }
 
@@ -128,8 +130,14 @@ void Service::send(WorkerId worker, const protocol::ServerToWorker& message) {
   if (peer != peers_.end() && is_of_version_2 && peer->second.protocol_version < 2) {
     return;
   }
-  if (peer != peers_.end() && !outbox_.to_worker(peer->second.identity, message)) {
-    unreachable_.push_back(worker);
+  if (peer == peers_.end()) {
+    return;
+  }
+  const Delivery delivery = outbox_.to_worker(peer->second.identity, message);
+  if (delivery == Delivery::kGone) {
+    found_.emplace_back(WorkerUnreachable{worker});
+  } else if (delivery == Delivery::kBusy && !std::exchange(peer->second.is_busy, true)) {
+    found_.emplace_back(WorkerBusy{worker, true});
   }
 }
 
@@ -144,13 +152,16 @@ void Service::write(Change change, Write meaning, bool answer_failure) {
 
 void Service::write_results(const StoreResults& effect, protocol::Results& message, Instant now) {
   Peer& peer = peers_.at(effect.worker);
+  const std::size_t bytes = message.ByteSizeLong();
   ++peer.unstored_messages;
+  peer.unstored_bytes += bytes;
+  unstored_bytes_ += bytes;
   const auto study = studies_.find(effect.study);
   AddResults change{effect.study,         study == studies_.end() ? nullptr : study->second.table,
                     effect.worker,        peer.solver_version,
                     peer.instruction_set, message.attempt(),
                     iso_8601(now),        {}};
-  OfResults meaning{{effect.worker, effect.study, effect.sequence, {}}, message.attempt()};
+  OfResults meaning{{effect.worker, effect.study, effect.sequence, {}}, message.attempt(), bytes};
   for (const std::size_t index : effect.accepted) {
     protocol::PointResult& result = *message.mutable_results(static_cast<int>(index));
     meaning.event.outcomes.push_back({result.point(), !result.error().empty()});
@@ -171,8 +182,8 @@ void Service::write_failure(const StoreFailure& effect, Instant now) {
                     effect.attempt,
                     iso_8601(now),
                     {protocol::failed_point(effect.point, effect.reason)}};
-  write(std::move(change), OfResults{{0, effect.study, 0, {{effect.point, true}}}, effect.attempt},
-        false);
+  write(std::move(change),
+        OfResults{{0, effect.study, 0, {{effect.point, true}}}, effect.attempt, 0}, false);
 }
 
 void Service::written(const WriteReport& report, Instant now) {
@@ -185,7 +196,7 @@ void Service::written(const WriteReport& report, Instant now) {
   if (report.kind == WriteReport::Kind::kRecovered) {
     outbox_.note(Severity::kInfo, "the database takes results again");
     storage_fault_.clear();
-    feed(DispatchHeld{stopping_}, now);
+    feed(DispatchHeld{stopping_ || disk_is_behind_}, now);
     return;
   }
   const auto found = writes_.find(report.ticket);
@@ -202,6 +213,7 @@ void Service::written(const WriteReport& report, Instant now) {
   } else {
     refused(meaning, report.error);
   }
+  hold_while_disk_is_behind(now);
 }
 
 void Service::stored(const Write& meaning, Instant now) {
@@ -213,8 +225,10 @@ void Service::stored(const Write& meaning, Instant now) {
         study.attempts.set({outcome.point, outcome.point + 1}, results->attempt);
       }
     }
+    unstored_bytes_ -= results->bytes;
     if (const auto peer = peers_.find(results->event.worker); peer != peers_.end()) {
       --peer->second.unstored_messages;
+      peer->second.unstored_bytes -= results->bytes;
     }
     feed(results->event, now);
   } else if (const auto* added = std::get_if<OfStudy>(&meaning)) {
@@ -301,16 +315,7 @@ void Service::refused(const Write& meaning, const std::string& error) {
 // ---- Time -------------------------------------------------------------------------------------
 
 void Service::tick(Instant now) {
-  // A heartbeat is late: sending shows whether the connection is gone, as that of a killed process
-  // is, long before the silence would.
-  protocol::ServerToWorker sign;
-  sign.mutable_heartbeat_reply();
-  const std::int64_t late_ms = settings_.heartbeat_interval_ms * 5 / 4;
-  for (const auto& [id, peer] : peers_) {
-    if (scheduler_.silent_ms(id, now.steady_ms) > late_ms) {
-      send(id, sign);
-    }
-  }
+  look_after_workers(now);
   feed(Tick{}, now);
   tell_of_queries(now);
   for (auto& [id, study] : studies_) {
@@ -322,6 +327,46 @@ void Service::tick(Instant now) {
     while (now.steady_ms - study.samples.front().steady_ms > kRateSpan_ms) {
       study.samples.pop_front();
     }
+  }
+}
+
+void Service::look_after_workers(Instant now) {
+  // A heartbeat is late: sending shows whether the connection is gone, as that of a killed process
+  // is, long before the silence would. A worker whose messages wait here must hear something too.
+  protocol::ServerToWorker sign;
+  sign.mutable_heartbeat_reply();
+  const std::int64_t late_ms = settings_.heartbeat_interval_ms * 5 / 4;
+  for (auto& [id, peer] : peers_) {
+    if (scheduler_.silent_ms(id, now.steady_ms) > late_ms) {
+      send(id, sign);
+      if (!has_room_for(peer)) {
+        found_.emplace_back(CreditGiven{id, 0});  // it is not silent: it is not heard
+      }
+    }
+    if (peer.is_busy && !outbox_.is_busy(peer.identity)) {
+      peer.is_busy = false;
+      found_.emplace_back(WorkerBusy{id, false});
+    }
+  }
+}
+
+bool Service::has_room_for(std::string_view worker) const {
+  const auto known = worker_ids_.find(worker);
+  return known == worker_ids_.end() || has_room_for(peers_.at(known->second));
+}
+
+bool Service::has_room_for(const Peer& peer) const {
+  return peer.unstored_bytes < settings_.unstored_bytes_of_worker &&
+         unstored_bytes_ < settings_.unstored_bytes;
+}
+
+void Service::hold_while_disk_is_behind(Instant now) {
+  const std::size_t parts = disk_is_behind_ ? 2 : 1;
+  const bool is_behind = unstored_bytes_ >= settings_.unstored_bytes_to_hold / parts ||
+                         writes_.size() >= settings_.unstored_messages_to_hold / parts;
+  if (is_behind != disk_is_behind_) {
+    disk_is_behind_ = is_behind;
+    feed(DispatchHeld{stopping_ || !storage_fault_.empty() || is_behind}, now);
   }
 }
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "proto/oblique.pb.h"
+#include "server/network/delivery.h"
 #include "server/query_pool.h"
 #include "server/scheduler.h"
 #include "server/store.h"
@@ -30,9 +31,11 @@ class Outbox {
  public:
   virtual ~Outbox() = default;
 
-  /// False when the worker cannot be reached any more.
-  virtual bool to_worker(const std::string& identity, const protocol::ServerToWorker& message) = 0;
-  /// False when the client is gone, or reads nothing; the reply is dropped then: it asks again.
+  virtual Delivery to_worker(const std::string& identity,
+                             const protocol::ServerToWorker& message) = 0;
+  /// More waits to go out to that worker than should.
+  virtual bool is_busy(const std::string& identity) const = 0;
+  /// False when the client is gone; the reply is dropped then: it asks again.
   virtual bool to_client(const std::string& identity, const protocol::ClientReply& reply) = 0;
   /// The same for a reply that is encoded already.
   virtual bool forward_to_client(const std::string& identity, const std::string& frame) = 0;
@@ -52,6 +55,13 @@ struct ServiceSettings {
   std::string solver_version;  ///< workers with another one are told so
   /// Results messages of one worker that wait for the disk. A sound worker stops long before.
   std::size_t most_unstored_messages = 100'000;
+  /// Results that wait for the disk, as bytes of their messages. With so many of one worker, or of
+  /// all, no more are taken: they wait where they are.
+  std::size_t unstored_bytes_of_worker = std::size_t{16} << 20U;
+  std::size_t unstored_bytes = std::size_t{128} << 20U;
+  /// With so many no batch goes out, until half of them are stored.
+  std::size_t unstored_bytes_to_hold = std::size_t{16} << 20U;
+  std::size_t unstored_messages_to_hold = 20'000;
   std::size_t most_waiting_changes = 10'000;  ///< of clients, that wait for the disk
   /// How often a client hears that its query waits or runs, by which the server also finds out that
   /// the client is gone.
@@ -78,6 +88,10 @@ class Service {
   /// taken.
   void stop(Instant now);
 
+  /// Whether a message of that worker should be taken now, or wait until more is stored. Who waits
+  /// so is not taken for silent.
+  bool has_room_for(std::string_view worker) const;
+
   /// Something is on its way to the disk.
   bool waits_for_disk() const { return !writes_.empty(); }
   /// Frames that no sound peer sends.
@@ -102,7 +116,9 @@ class Service {
     std::string solver_version;
     std::string instruction_set;
     std::size_t unstored_messages = 0;
+    std::size_t unstored_bytes = 0;
     std::uint32_t hellos = 1;  // on its one connection
+    bool is_busy = false;      // as the scheduler knows
   };
   struct Sample {
     std::int64_t steady_ms;
@@ -128,6 +144,7 @@ class Service {
   struct OfResults {
     ResultsStored event;
     std::uint32_t attempt;
+    std::size_t bytes;  // of the message
   };
   struct OfStudy {
     StudyId study;
@@ -180,7 +197,11 @@ class Service {
   // service.cpp
   void feed(const Event& event, Instant now, protocol::Results* message = nullptr);
   void perform(const Effect& effect, Instant now, protocol::Results* message);
+  void handle(const Event& event, Instant now, protocol::Results* message);
   void send(WorkerId worker, const protocol::ServerToWorker& message);
+  bool has_room_for(const Peer& peer) const;
+  void hold_while_disk_is_behind(Instant now);
+  void look_after_workers(Instant now);
   void write(Change change, Write meaning, bool answer_failure);
   void write_results(const StoreResults& effect, protocol::Results& message, Instant now);
   void write_failure(const StoreFailure& effect, Instant now);
@@ -197,7 +218,9 @@ class Service {
   std::map<std::uint64_t, Write> writes_;                  // by ticket
   std::size_t waiting_changes_ = 0;                        // writes that a client waits for
   std::map<std::uint64_t, Query> queries_;                 // by ticket
-  std::vector<WorkerId> unreachable_;                      // found while effects were carried out
+  std::vector<Event> found_;        // while effects were carried out: workers gone or busy
+  std::size_t unstored_bytes_ = 0;  // of all workers' results
+  bool disk_is_behind_ = false;
   std::uint64_t last_ticket_ = 0;
   std::uint64_t bad_frames_ = 0;
   std::uint64_t refused_workers_ = 0;

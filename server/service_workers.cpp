@@ -12,6 +12,8 @@ namespace {
 
 constexpr std::size_t kLongestName = 256;
 constexpr std::uint32_t kMostThreads = 4096;
+/// In one message; workers send a thousand.
+constexpr std::size_t kMostResults = 10'000;
 
 /// What a stranger says of itself, fit for logs and tables.
 std::string plain(const std::string& text) {
@@ -52,7 +54,9 @@ protocol::Recipe probe_recipe() {
 void Service::worker_frame(const std::string& identity, std::string_view frame, Instant now) {
   protocol::WorkerMessage message;
   using Kind = protocol::WorkerMessage;
-  if (!protocol::decode(frame, message) || message.kind_case() == Kind::KIND_NOT_SET) {
+  if (protocol::count_nested(frame, Kind::kResultsFieldNumber,
+                             protocol::Results::kResultsFieldNumber) > kMostResults ||
+      !protocol::decode(frame, message) || message.kind_case() == Kind::KIND_NOT_SET) {
     bad_frame("a worker");
     return;
   }
@@ -135,6 +139,7 @@ void Service::hello(const std::string& identity, const protocol::WorkerHello& he
                   plain(hello.solver_version()),
                   plain(hello.instruction_set()),
                   0,
+                  0,
                   hellos};
   auto& welcome = *reply.mutable_welcome();
   welcome.set_protocol_version(peer.protocol_version);
@@ -142,7 +147,7 @@ void Service::hello(const std::string& identity, const protocol::WorkerHello& he
   welcome.set_heartbeat_interval_ms(settings_.heartbeat_interval_ms);
   welcome.set_lost_after_ms(static_cast<std::uint32_t>(settings_.scheduler.lost_after_ms));
   welcome.set_database_id(settings_.database_id);
-  if (!outbox_.to_worker(identity, reply)) {
+  if (outbox_.to_worker(identity, reply) == Delivery::kGone) {
     return;
   }
   outbox_.note(Severity::kInfo, "worker " + std::to_string(id) + " (" + peer.name + ", " +
@@ -212,6 +217,7 @@ void Service::results(WorkerId worker, protocol::Results message, Instant now) {
     event.outcomes.push_back({result.point(), !result.error().empty()});
   }
   feed(event, now, &message);
+  hold_while_disk_is_behind(now);
 }
 
 void Service::forget(WorkerId worker) {

@@ -16,14 +16,13 @@
 
 #include "proto/address.h"
 #include "proto/frames.h"
+#include "proto/socket.h"
 #include "worker/solver/solve.h"
 
 namespace oblique::worker {
 namespace {
 
 constexpr int kLinger_ms = 500;  ///< for the goodbye to leave
-constexpr int kHeartbeatInterval_ms = 1000;
-constexpr int kHeartbeatTimeout_ms = 3000;
 constexpr int kQueuedMessages = 1000;
 constexpr std::int64_t kParentCheckInterval_ms = 200;
 constexpr int kMessagesAtATime = 1000;  ///< then other duties get their turn
@@ -77,15 +76,11 @@ Session::~Session() = default;
 void Session::open_socket() {
   socket_.reset();
   socket_.emplace(context_, zmq::socket_type::dealer);
-  socket_->set(zmq::sockopt::linger, kLinger_ms);
-  socket_->set(zmq::sockopt::maxmsgsize, static_cast<std::int64_t>(protocol::kMaxFrameBytes));
+  const ConversationSettings& conversation = settings_.conversation;
+  protocol::prepare_dealer(*socket_, kLinger_ms, static_cast<int>(conversation.shortest_backoff_ms),
+                           static_cast<int>(conversation.longest_backoff_ms));
   socket_->set(zmq::sockopt::sndhwm, kQueuedMessages);
   socket_->set(zmq::sockopt::rcvhwm, kQueuedMessages);
-  socket_->set(zmq::sockopt::heartbeat_ivl, kHeartbeatInterval_ms);
-  socket_->set(zmq::sockopt::heartbeat_timeout, kHeartbeatTimeout_ms);
-  const ConversationSettings& conversation = settings_.conversation;
-  socket_->set(zmq::sockopt::reconnect_ivl, static_cast<int>(conversation.shortest_backoff_ms));
-  socket_->set(zmq::sockopt::reconnect_ivl_max, static_cast<int>(conversation.longest_backoff_ms));
   if (const auto objection = protocol::objection_to_address(settings_.server); !objection.empty()) {
     throw AddressError("server = \"" + settings_.server + "\" is not an address: " + objection +
                        ", as in " + SessionSettings().server);

@@ -15,7 +15,10 @@ namespace {
 /// Writes at once, and forgets what is said.
 class Sink final : public Outbox {
  public:
-  bool to_worker(const std::string&, const protocol::ServerToWorker&) override { return true; }
+  Delivery to_worker(const std::string&, const protocol::ServerToWorker&) override {
+    return Delivery::kSent;
+  }
+  bool is_busy(const std::string&) const override { return false; }
   bool to_client(const std::string&, const protocol::ClientReply&) override { return true; }
   bool forward_to_client(const std::string&, const std::string&) override { return true; }
   void write(WriteJob job) override { jobs.push_back(std::move(job)); }

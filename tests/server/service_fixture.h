@@ -24,13 +24,14 @@ using protocol::WorkerMessage;
 /// Keeps what the service sends, and writes only when told to.
 class FakeOutbox final : public Outbox {
  public:
-  bool to_worker(const std::string& identity, const ServerToWorker& message) override {
+  Delivery to_worker(const std::string& identity, const ServerToWorker& message) override {
     if (identity == unreachable) {
-      return false;
+      return Delivery::kGone;
     }
     worker_messages.push_back(message);
-    return true;
+    return identity == busy ? Delivery::kBusy : Delivery::kSent;
   }
+  bool is_busy(const std::string& identity) const override { return identity == busy; }
   bool to_client(const std::string& identity, const ClientReply& reply) override {
     if (identity == unreachable) {
       return false;
@@ -55,6 +56,7 @@ class FakeOutbox final : public Outbox {
   }
 
   std::string unreachable;
+  std::string busy;
   std::vector<ServerToWorker> worker_messages;
   std::vector<ClientReply> replies;
   std::vector<WriteJob> jobs;

@@ -117,12 +117,13 @@ void SimulatedServer::take(std::function<void()> frame) {
   }
 }
 
-bool SimulatedServer::to_worker(const std::string& identity,
-                                const protocol::ServerToWorker& message) {
+server::Delivery SimulatedServer::to_worker(const std::string& identity,
+                                            const protocol::ServerToWorker& message) {
   if (message.has_results_stored()) {
     on_acknowledged(identity, message.results_stored().sequence());
   }
-  return workers->send_to(identity, protocol::encode(message));
+  return workers->send_to(identity, protocol::encode(message)) ? server::Delivery::kSent
+                                                               : server::Delivery::kGone;
 }
 
 bool SimulatedServer::to_client(const std::string& identity, const protocol::ClientReply& reply) {

@@ -38,7 +38,9 @@ class SimulatedServer final : public server::Outbox {
   void worker_frame(const std::string& identity, const std::string& frame);
   void client_frame(const std::string& identity, const std::string& frame);
 
-  bool to_worker(const std::string& identity, const protocol::ServerToWorker& message) override;
+  server::Delivery to_worker(const std::string& identity,
+                             const protocol::ServerToWorker& message) override;
+  bool is_busy(const std::string&) const override { return false; }
   bool to_client(const std::string& identity, const protocol::ClientReply& reply) override;
   bool forward_to_client(const std::string& identity, const std::string& frame) override;
   void write(server::WriteJob job) override;

@@ -15,6 +15,7 @@
 #include <fcntl.h>
 #include <pthread.h>
 #include <sqlite3.h>
+#include <sys/socket.h>
 #include <unistd.h>
 #include <zmq.h>
 
@@ -24,6 +25,7 @@
 #include <csignal>
 #include <cstdint>
 #include <cstdlib>
+#include <map>
 #include <optional>
 #include <sstream>
 #include <string>
@@ -124,6 +126,8 @@ class KillPoints {
   }
 
   bool armed() const { return order_.has_value(); }
+  /// The server speaks ZMTP itself; the others leave that to libzmq.
+  bool watches_sockets() const { return armed() && program_ == "oblique-server"; }
 
   void reached(const std::string& point) {
     if (order_ && order_->point == point && ++times_ == order_->occurrence) {
@@ -170,6 +174,56 @@ class KillPoints {
   std::optional<Order> order_;
   std::atomic<int> times_ = 0;
 };
+
+/// What a peer sends to the server, by ZMTP: a greeting, then frames.
+class Stream {
+ public:
+  /// Calls `take` with the body of every message that is whole now.
+  template <class Take>
+  void receive(std::string_view bytes, const Take& take) {
+    buffer_ += bytes;
+    constexpr std::size_t kGreeting = 64;
+    if (!greeted_ && buffer_.size() >= kGreeting) {
+      greeted_ = true;
+      buffer_.erase(0, kGreeting);
+    }
+    while (greeted_ && take_frame(take)) {
+    }
+  }
+
+ private:
+  template <class Take>
+  bool take_frame(const Take& take) {
+    constexpr unsigned kLong = 2;
+    constexpr unsigned kCommand = 4;
+    const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(buffer_[i]); };
+    const std::size_t header = buffer_.empty() || (byte(0) & kLong) == 0 ? 2 : 9;
+    if (buffer_.size() < header) {
+      return false;
+    }
+    std::uint64_t size = 0;
+    for (std::size_t i = 1; i < header; ++i) {
+      size = size << 8U | byte(i);
+    }
+    if (buffer_.size() - header < size) {
+      return false;
+    }
+    if ((byte(0) & kCommand) == 0) {
+      take(std::string_view(buffer_).substr(header, static_cast<std::size_t>(size)));
+    }
+    buffer_.erase(0, header + static_cast<std::size_t>(size));
+    return true;
+  }
+
+  std::string buffer_;
+  bool greeted_ = false;
+};
+
+/// By descriptor; of the server's one thread that has sockets.
+std::map<int, Stream>& streams() {
+  static auto* const only = new std::map<int, Stream>;
+  return *only;
+}
 
 /// Never destroyed: threads may come here until the very end.
 KillPoints& points() {
@@ -226,6 +280,58 @@ extern "C" int zmq_msg_recv(zmq_msg_t* message, void* socket, int flags) {
   const int error = errno;
   if (received >= 0 && points().armed() && zmq_msg_more(message) == 0) {
     points().reached("after-receive:", false, zmq_msg_data(message), zmq_msg_size(message));
+  }
+  errno = error;
+  return received;
+}
+
+/// Queries go to other processes by sockets too.
+static bool is_of_a_peer(int socket) {
+  int domain = 0;
+  socklen_t size = sizeof domain;
+  return points().watches_sockets() &&
+         getsockopt(socket, SOL_SOCKET, SO_DOMAIN, &domain, &size) == 0 &&
+         (domain == AF_INET || domain == AF_INET6);
+}
+
+extern "C" int accept4(int listener, sockaddr* address, socklen_t* size, int flags) {
+  static auto* const real = next<decltype(accept4)>("accept4");
+  const int accepted = real(listener, address, size, flags);
+  const int error = errno;
+  if (accepted >= 0 && points().watches_sockets()) {
+    streams()[accepted] = Stream();
+  }
+  errno = error;
+  return accepted;
+}
+
+/// The server sends a message's header and body as two parts, once.
+extern "C" ssize_t sendmsg(int socket, const msghdr* message, int flags) {
+  static auto* const real = next<decltype(sendmsg)>("sendmsg");
+  const bool whole = is_of_a_peer(socket) && message->msg_iovlen == 2;
+  if (whole) {
+    points().reached("before-send:", true, message->msg_iov[1].iov_base,
+                     message->msg_iov[1].iov_len);
+  }
+  const ssize_t sent = real(socket, message, flags);
+  const int error = errno;
+  if (whole && sent >= 0) {
+    points().reached("after-send:", true, message->msg_iov[1].iov_base,
+                     message->msg_iov[1].iov_len);
+  }
+  errno = error;
+  return sent;
+}
+
+extern "C" ssize_t recv(int socket, void* bytes, std::size_t size, int flags) {
+  static auto* const real = next<decltype(recv)>("recv");
+  const ssize_t received = real(socket, bytes, size, flags);
+  const int error = errno;
+  if (received > 0 && is_of_a_peer(socket)) {
+    streams()[socket].receive({static_cast<const char*>(bytes), static_cast<std::size_t>(received)},
+                              [](std::string_view body) {
+                                points().reached("after-receive:", false, body.data(), body.size());
+                              });
   }
   errno = error;
   return received;

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "server/network/descriptor.h"
+#include "server/network/zmtp.h"
+
+namespace oblique::server {
+
+/// One peer's TCP connection: what came and was not taken, what is to go out and did not. Nothing
+/// here waits.
+class Connection {
+ public:
+  /// Takes over a non-blocking TCP socket.
+  explicit Connection(Descriptor socket);
+
+  /// Sends the server's greeting.
+  void greet() { send_answers(); }
+  enum class Read { kBytes, kNothingYet, kEnd };
+  /// Reads once from the socket.
+  Read read();
+  /// Sends a message, or what the system takes of it; the rest is kept.
+  void send(std::string_view body);
+  /// Sends what is kept.
+  void flush();
+  /// The peer still takes what it is sent. What it sent before may be left to read when it does
+  /// not.
+  bool can_send() const { return can_send_; }
+
+  bool has_message() const { return zmtp_.has_message(); }
+  ZmtpMessage take_message() { return zmtp_.take_message(); }
+  /// The handshake is done.
+  bool is_open() const { return zmtp_.is_open(); }
+  /// Why it must be ended; empty: it need not.
+  const std::string& fault() const { return zmtp_.fault(); }
+  int descriptor() const { return socket_.number(); }
+  /// Memory for what has come and was not taken.
+  std::size_t held_in_bytes() const { return zmtp_.held_bytes(); }
+  /// Bytes that the system has not taken yet.
+  std::size_t waiting_out_bytes() const { return out_.size() - sent_; }
+
+ private:
+  void send_answers();
+  void sending_failed();
+
+  Descriptor socket_;
+  bool can_send_ = true;
+  Zmtp zmtp_;
+  std::string out_;
+  std::size_t sent_ = 0;  // of `out_`
+};
+
+}  // namespace oblique::server

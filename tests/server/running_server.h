@@ -1,0 +1,213 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <map>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <gtest/gtest.h>
+#include <zmq.hpp>
+
+#include "proto/frames.h"
+#include "server/loop.h"
+#include "tests/server/results.h"
+#include "tests/server/scheduler_bench.h"
+
+namespace oblique::server {
+
+using protocol::ClientReply;
+using protocol::ClientRequest;
+using protocol::ServerToWorker;
+using protocol::WorkerMessage;
+
+/// A server on ports that the system picked, stopped when it goes out of scope.
+class RunningServer {
+ public:
+  explicit RunningServer(const std::string& database, TurnSettings turns = {},
+                         NetworkLimits network = {})
+      : loop_(settings(database, turns, network)) {
+    thread_ = std::thread([this] { end_ = loop_.run(stop_fd_); });
+  }
+  ~RunningServer() { stop(); }
+  RunningServer(const RunningServer&) = delete;
+  RunningServer& operator=(const RunningServer&) = delete;
+
+  LoopEnd stop() {
+    if (thread_.joinable()) {
+      const std::uint64_t one = 1;
+      EXPECT_EQ(::write(stop_fd_, &one, sizeof one), static_cast<ssize_t>(sizeof one));
+      thread_.join();
+      ::close(stop_fd_);
+    }
+    return end_;
+  }
+  std::string client_endpoint() const { return loop_.client_endpoint(); }
+  std::string worker_endpoint() const { return loop_.worker_endpoint(); }
+
+ private:
+  static LoopSettings settings(const std::string& database, TurnSettings turns,
+                               NetworkLimits network) {
+    LoopSettings settings;
+    settings.network = network;
+    settings.queries.turns = turns;
+    settings.database = database;
+    settings.worker_port = "*";
+    settings.client_port = "*";
+    settings.service.solver_version = "1.0";
+    settings.queries.reader_program = OBLIQUE_SERVER_PROGRAM;
+    return settings;
+  }
+
+  int stop_fd_ = eventfd(0, 0);
+  Loop loop_;
+  LoopEnd end_{};
+  std::thread thread_;
+};
+
+/// A DEALER socket that speaks in messages.
+template <typename Out, typename In>
+class Peer {
+ public:
+  explicit Peer(const std::string& endpoint) : socket_(context_, zmq::socket_type::dealer) {
+    socket_.set(zmq::sockopt::linger, 0);
+    socket_.set(zmq::sockopt::rcvtimeo, 20'000);  // so that a broken server fails the test
+    socket_.connect(endpoint);
+  }
+  void send(const Out& message) { send_frame(protocol::encode(message)); }
+  void send_frame(const std::string& frame) {
+    socket_.send(zmq::buffer(frame), zmq::send_flags::none);
+  }
+  void send_frames(const std::vector<std::string>& frames) {
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      socket_.send(zmq::buffer(frames[i]),
+                   i + 1 < frames.size() ? zmq::send_flags::sndmore : zmq::send_flags::none);
+    }
+  }
+  In receive() {
+    zmq::message_t frame;
+    In message;
+    if (!socket_.recv(frame)) {
+      throw std::runtime_error("the server does not answer");
+    }
+    if (!protocol::decode(frame.to_string_view(), message)) {
+      throw std::runtime_error("the server sent what is no message");
+    }
+    return message;
+  }
+
+ private:
+  zmq::context_t context_;
+  zmq::socket_t socket_;
+};
+
+class PretendedWorker : public Peer<WorkerMessage, ServerToWorker> {
+ public:
+  using Peer::Peer;
+
+  ServerToWorker hello() {
+    WorkerMessage message;
+    message.mutable_hello()->set_protocol_version(protocol::kProtocolVersion);
+    message.mutable_hello()->set_solver_version("1.0");
+    message.mutable_hello()->set_instruction_set("avx2");
+    message.mutable_hello()->set_name("pretended");
+    message.mutable_hello()->set_threads(1);
+    send(message);
+    return receive();
+  }
+  void credit(std::uint32_t batches) {
+    WorkerMessage message;
+    message.mutable_credit()->set_batches(batches);
+    send(message);
+  }
+  void solve(const protocol::Batch& batch) {
+    WorkerMessage message;
+    auto& results = *message.mutable_results();
+    results.set_study_id(batch.study_id());
+    results.set_lease_id(batch.lease_id());
+    results.set_attempt(batch.attempt());
+    results.set_sequence(++sequence_);
+    results.set_batch_done(true);
+    results.set_busy_s(1e-3);
+    for (std::uint64_t i = 0; i < batch.count(); ++i) {
+      *results.add_results() = solved_point(batch.first_point() + i);
+    }
+    send(message);
+  }
+  /// Takes batches, one at a time, until `points` are solved and stored.
+  void work(std::uint64_t points) {
+    std::uint64_t waiting = points;
+    credit(1);
+    while (waiting > 0) {
+      const auto message = receive();
+      if (message.has_batch()) {
+        in_hand_[sequence_ + 1] = message.batch().count();
+        solve(message.batch());
+      } else if (message.has_results_stored()) {
+        waiting -= std::min(waiting, in_hand_.at(message.results_stored().sequence()));
+        credit(1);
+      }
+    }
+  }
+
+ private:
+  std::uint64_t sequence_ = 0;
+  std::map<std::uint64_t, std::uint64_t> in_hand_;
+};
+
+class PretendedClient : public Peer<ClientRequest, ClientReply> {
+ public:
+  using Peer::Peer;
+
+  ClientReply ask(ClientRequest request) {
+    request.set_protocol_version(protocol::kProtocolVersion);
+    request.set_request_id(++id_);
+    send(request);
+    const auto reply = receive();
+    EXPECT_EQ(reply.request_id(), id_);
+    return reply;
+  }
+  ClientReply submit(const std::string& name, std::uint64_t points) {
+    ClientRequest request;
+    request.mutable_submit()->set_name(name);
+    *request.mutable_submit()->mutable_recipe() = table_of(points)->recipe();
+    return ask(request);
+  }
+  ClientReply query(const std::string& sql) {
+    ClientRequest request;
+    request.mutable_query()->set_sql(sql);
+    return ask(request);
+  }
+  /// Asks for what takes minutes, and waits until it is said that the query runs.
+  void start_query(const std::string& sql) {
+    ClientRequest request;
+    request.set_protocol_version(protocol::kProtocolVersion);
+    request.set_request_id(++id_);
+    request.mutable_query()->set_sql(sql);
+    request.mutable_query()->set_time_limit_ms(600'000);
+    send(request);
+    for (int words = 0; words < 60; ++words) {
+      const auto word = receive();
+      ASSERT_EQ(word.still_working().request_id(), id_);
+      if (word.still_working().runs()) {
+        return;
+      }
+    }
+    FAIL() << "the query does not begin";
+  }
+  protocol::StudyStatus status(const std::string& name) {
+    ClientRequest request;
+    request.mutable_status()->set_study(name);
+    return ask(request).status().studies(0);
+  }
+
+ private:
+  std::uint64_t id_ = 0;
+};
+
+}  // namespace oblique::server
