@@ -103,8 +103,8 @@ void Conversation::send_heartbeat() {
   for (const auto& [number, held] : held_) {
     leases.insert(held.lease_id);
   }
-  for (const protocol::Results& results : unacknowledged_) {
-    leases.insert(results.lease_id());
+  for (const Unacknowledged& waiting : unacknowledged_) {
+    leases.insert(waiting.results.lease_id());
   }
   leases.erase(0);
   protocol::WorkerMessage message;
@@ -200,17 +200,19 @@ void Conversation::on(const protocol::Welcome& welcome) {
     }
     unacknowledged_.clear();
     unacknowledged_results_ = 0;
+    unacknowledged_bytes_ = 0;
     database_id_ = welcome.database_id();
     first_task_of_database_ = next_task_;
   }
   // Results go before credit, so that their points are not handed out again.
-  for (protocol::Results& results : unacknowledged_) {
-    results.set_lease_id(0);
-    results.set_batch_done(false);
-    protocol::WorkerMessage message;
-    *message.mutable_results() = results;
-    send(std::move(message));
+  for (Unacknowledged& waiting : unacknowledged_) {
+    waiting.results.set_lease_id(0);
+    waiting.results.set_batch_done(false);
+    waiting.on_its_way = false;
   }
+  on_their_way_ = 0;
+  bytes_on_their_way_ = 0;
+  deliver();
   give_credit();
   finish_if_delivered();
 }
@@ -254,13 +256,16 @@ void Conversation::on(const protocol::Batch& batch) {
 
 void Conversation::on(const protocol::ResultsStored& stored) {
   backoff_ms_ = 0;
-  const auto found = std::lower_bound(
-      unacknowledged_.begin(), unacknowledged_.end(), stored.sequence(),
-      [](const protocol::Results& results, std::uint64_t s) { return results.sequence() < s; });
-  if (found != unacknowledged_.end() && found->sequence() == stored.sequence()) {
-    unacknowledged_results_ -= static_cast<std::size_t>(found->results_size());
+  const auto found =
+      std::lower_bound(unacknowledged_.begin(), unacknowledged_.end(), stored.sequence(),
+                       [](const Unacknowledged& waiting, std::uint64_t sequence) {
+                         return waiting.results.sequence() < sequence;
+                       });
+  if (found != unacknowledged_.end() && found->results.sequence() == stored.sequence()) {
+    forget(found);
     unacknowledged_.erase(found);
   }
+  deliver();
   give_credit();
   finish_if_delivered();
 }
@@ -269,13 +274,15 @@ void Conversation::on(const protocol::Withdraw& withdraw) {
   effects_.emplace_back(DropStudy{withdraw.study_id()});
   std::erase_if(held_,
                 [&](const auto& entry) { return entry.second.study_id == withdraw.study_id(); });
-  std::erase_if(unacknowledged_, [&](const protocol::Results& results) {
-    const bool is_withdrawn = results.study_id() == withdraw.study_id();
-    if (is_withdrawn) {
-      unacknowledged_results_ -= static_cast<std::size_t>(results.results_size());
+  for (auto waiting = unacknowledged_.begin(); waiting != unacknowledged_.end();) {
+    if (waiting->results.study_id() == withdraw.study_id()) {
+      forget(waiting);
+      waiting = unacknowledged_.erase(waiting);
+    } else {
+      ++waiting;
     }
-    return is_withdrawn;
-  });
+  }
+  deliver();
   give_credit();
   finish_if_delivered();
 }

@@ -18,8 +18,13 @@ namespace oblique::worker {
 /// What the conversation with the server keeps to.
 struct ConversationSettings {
   std::uint32_t batches_held = 2;  ///< one is solved, the next waits ready
-  /// With so many results not acknowledged, no more are solved.
+  /// With so many results not acknowledged, or so many bytes of them, no more are solved.
   std::size_t unacknowledged_limit = 50'000;
+  std::size_t unacknowledged_bytes_limit = std::size_t{64} << 20U;
+  /// Of those, so many messages and bytes are on their way at a time; the others wait here, so that
+  /// what was solved while the server was away does not come upon it all at once.
+  std::size_t messages_on_their_way = 256;
+  std::size_t bytes_on_their_way = std::size_t{8} << 20U;
   std::size_t results_a_message = 1000;
   std::size_t bytes_a_message = std::size_t{1} << 20U;
   std::int64_t hello_timeout_ms = 3000;   ///< a hello without answer is said again
@@ -115,6 +120,7 @@ class Conversation {
 
   void report(Progress& progress);
   void queue_results(protocol::Results results);
+  void deliver();
   void send(protocol::WorkerMessage message);
   void send_heartbeat();
   void give_credit();
@@ -143,8 +149,18 @@ class Conversation {
   std::uint64_t first_task_of_database_ = 1;  ///< earlier tasks were of another database
   std::uint32_t open_credit_ = 0;             ///< batches asked for and not yet come
 
-  std::deque<protocol::Results> unacknowledged_;  // by sequence
+  struct Unacknowledged {
+    protocol::Results results;
+    std::size_t bytes;
+    bool on_its_way;  // sent in this session
+  };
+  void forget(std::deque<Unacknowledged>::const_iterator results);
+
+  std::deque<Unacknowledged> unacknowledged_;  // by sequence; those on their way come first
   std::size_t unacknowledged_results_ = 0;
+  std::size_t unacknowledged_bytes_ = 0;
+  std::size_t on_their_way_ = 0;        // messages
+  std::size_t bytes_on_their_way_ = 0;  // of those
   std::uint64_t next_sequence_ = 1;
   Effects effects_;  // of the call being made
 };

@@ -63,20 +63,48 @@ void Conversation::report(Progress& progress) {
 
 void Conversation::queue_results(protocol::Results results) {
   results.set_sequence(next_sequence_++);
+  const std::size_t bytes = results.ByteSizeLong();
   unacknowledged_results_ += static_cast<std::size_t>(results.results_size());
-  protocol::WorkerMessage message;
-  *message.mutable_results() = results;
-  unacknowledged_.push_back(std::move(results));
-  send(std::move(message));
+  unacknowledged_bytes_ += bytes;
+  unacknowledged_.push_back({std::move(results), bytes, false});
+  deliver();
+}
+
+void Conversation::deliver() {
+  while (state_ == State::kWelcomed && on_their_way_ < unacknowledged_.size()) {
+    Unacknowledged& next = unacknowledged_[on_their_way_];
+    if (on_their_way_ > 0 && (on_their_way_ >= settings_.messages_on_their_way ||
+                              bytes_on_their_way_ + next.bytes > settings_.bytes_on_their_way)) {
+      return;
+    }
+    next.on_its_way = true;
+    ++on_their_way_;
+    bytes_on_their_way_ += next.bytes;
+    protocol::WorkerMessage message;
+    *message.mutable_results() = next.results;
+    send(std::move(message));
+  }
+}
+
+void Conversation::forget(std::deque<Unacknowledged>::const_iterator results) {
+  unacknowledged_results_ -= static_cast<std::size_t>(results->results.results_size());
+  unacknowledged_bytes_ -= results->bytes;
+  if (results->on_its_way) {
+    --on_their_way_;
+    bytes_on_their_way_ -= results->bytes;
+  }
 }
 
 bool Conversation::may_solve() const {
-  return unacknowledged_results_ < settings_.unacknowledged_limit;
+  return unacknowledged_results_ < settings_.unacknowledged_limit &&
+         unacknowledged_bytes_ < settings_.unacknowledged_bytes_limit;
 }
 
 void Conversation::give_credit() {
   const auto taken = static_cast<std::uint32_t>(held_.size()) + open_credit_;
-  if (state_ != State::kWelcomed || stopping_ || server_stopping_ || !may_solve() ||
+  // Points of results that still wait here must not be handed out again.
+  const bool waits = on_their_way_ < unacknowledged_.size();
+  if (state_ != State::kWelcomed || stopping_ || server_stopping_ || waits || !may_solve() ||
       taken >= settings_.batches_held) {
     return;
   }

@@ -194,6 +194,74 @@ TEST_F(ConversationTest, TooManyUnacknowledgedResultsStopCreditAndSolvingUntilTh
   EXPECT_EQ(credit_given(), 1U);
 }
 
+TEST_F(ConversationTest, TooManyUnacknowledgedBytesStopSolvingToo) {
+  ConversationSettings settings;
+  settings.unacknowledged_bytes_limit = 1;
+  use(settings);
+  join();
+  receive(batch_message(7, 31));
+  EXPECT_TRUE(conversation_->may_solve());
+  solve(1, 0, 1, false);
+  EXPECT_FALSE(conversation_->may_solve());
+  receive(stored_message(1));
+  EXPECT_TRUE(conversation_->may_solve());
+}
+
+TEST_F(ConversationTest, WhatWasSolvedWhileTheServerWasAwayIsDeliveredAFewMessagesAtATime) {
+  ConversationSettings settings;
+  settings.messages_on_their_way = 2;
+  use(settings);
+  join();
+  receive(batch_message(7, 31));
+  receive(hello_again_message());
+  for (std::uint64_t point = 0; point < 5; ++point) {
+    solve(1, point, 1, false);
+  }
+  receive(welcome_message());
+  EXPECT_EQ(sent_results().size(), 2U);
+  EXPECT_EQ(credit_given(), 0U) << "points of what waits would be handed out again";
+  receive(stored_message(1));
+  ASSERT_EQ(sent_results().size(), 1U);
+  EXPECT_EQ(sent_results()[0].sequence(), 3U);
+  receive(stored_message(3));
+  receive(stored_message(2));
+  EXPECT_EQ(sent_results().back().sequence(), 5U);
+  EXPECT_EQ(credit_given(), 2U);
+  receive(stored_message(4));
+  receive(stored_message(5));
+  EXPECT_EQ(conversation_->unacknowledged_results(), 0U);
+}
+
+TEST_F(ConversationTest, BytesOnTheirWayAreBoundedTooAndALargeMessageGoesAlone) {
+  ConversationSettings settings;
+  settings.bytes_on_their_way = 1;
+  use(settings);
+  join();
+  receive(batch_message(7, 31));
+  solve(1, 0, 1, false);
+  EXPECT_EQ(sent_results().size(), 1U);
+  solve(1, 1, 1, false);
+  EXPECT_TRUE(sent_results().empty());
+  receive(stored_message(1));
+  EXPECT_EQ(sent_results().size(), 1U);
+}
+
+TEST_F(ConversationTest, AWithdrawnStudyMakesRoomForTheResultsOfOthers) {
+  ConversationSettings settings;
+  settings.messages_on_their_way = 1;
+  use(settings);
+  join();
+  receive(study_message(8));
+  receive(batch_message(7, 31));
+  receive(batch_message(8, 32));
+  solve(1, 0, 1, false);
+  solve(1, 1, 1, false);
+  solve(2, 0, 1, false, 8);
+  receive(withdraw_message(7));
+  ASSERT_EQ(sent_results().size(), 1U);
+  EXPECT_EQ(sent_results()[0].study_id(), 8U);
+}
+
 TEST_F(ConversationTest, AnAcknowledgementThatComesTwiceOrForNothingChangesNothing) {
   join();
   receive(batch_message(7, 31));
