@@ -1,5 +1,5 @@
-// simulate FIRST COUNT [killers | forgetful]: runs that many seeds, on all cores, and names those
-// that fail.
+// simulate FIRST COUNT [killers | storms | forgetful]: runs that many seeds, on all cores, and
+// names those that fail.
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
@@ -118,12 +118,13 @@ Report run(Seeds seeds, const SimulationSettings& settings) {
 
 int main(int argc, char** argv) {
   if (argc < 3) {
-    std::cerr << "usage: simulate FIRST_SEED COUNT [killers | forgetful]\n";
+    std::cerr << "usage: simulate FIRST_SEED COUNT [killers | storms | forgetful]\n";
     return 2;
   }
   try {
     SimulationSettings settings;
     settings.killers = argc > 3 && std::string(argv[3]) == "killers";
+    settings.storms = argc > 3 && std::string(argv[3]) == "storms";
     settings.forgetful_syncs = argc > 3 && std::string(argv[3]) == "forgetful";
     const Report all = run({std::stoull(argv[1]), std::stoull(argv[2])}, settings);
     std::cout << all.seeds << " seeds, " << all.failures << " failed: " << all.outcome.text()

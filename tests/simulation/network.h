@@ -113,6 +113,15 @@ class Network {
     }
   }
 
+  /// The connections of that peer break.
+  void break_peer(std::uint64_t peer) {
+    for (auto& [id, link] : links_) {
+      if (link.peer == peer) {
+        break_link(id, link);
+      }
+    }
+  }
+
   void heal() {
     parted_until_ms_ = 0;
     for (auto& [id, link] : links_) {

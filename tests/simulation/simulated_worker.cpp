@@ -16,12 +16,12 @@ protocol::PointResult answer_to(std::uint64_t study_size, std::uint64_t point) {
 }
 
 SimulatedWorker::SimulatedWorker(World& world, Network& network, std::uint64_t peer,
-                                 Killers killers)
+                                 Killers killers, std::string solver_version)
     : world_(world),
       network_(network),
       peer_(peer),
       killers_(std::move(killers)),
-      solver_version_(world.chance(0.2) ? "2" : "1"),
+      solver_version_(std::move(solver_version)),
       ms_per_point_(world.chance(0.2) ? world.between(50, 400) : world.between(1, 20)) {}
 
 void SimulatedWorker::start() {
@@ -158,6 +158,7 @@ void SimulatedWorker::solve_some() {
   const std::uint64_t point = work.task.first_point + work.solved;
   const auto killers = killers_.find(size);
   if (killers != killers_.end() && killers->second.contains(point)) {
+    ++deaths_;
     restart(world_.between(100, 1000));
     return;
   }

@@ -25,7 +25,8 @@ class SimulatedWorker {
   using Killers = std::map<std::uint64_t, std::set<std::uint64_t>>;
 
   /// `peer` is its number in the network.
-  SimulatedWorker(World& world, Network& network, std::uint64_t peer, Killers killers);
+  SimulatedWorker(World& world, Network& network, std::uint64_t peer, Killers killers,
+                  std::string solver_version);
 
   /// The process, if there is one, dies; another one starts after a while. The first one starts so
   /// too.
@@ -38,6 +39,8 @@ class SimulatedWorker {
   /// The results of that message of the socket, or nullptr.
   const protocol::Results* sent(Network::LinkId link, std::uint64_t sequence) const;
   bool holds_nothing() const { return tasks_.empty(); }
+  /// How often a point has killed it.
+  std::uint64_t deaths() const { return deaths_; }
 
  private:
   struct Work {
@@ -64,7 +67,8 @@ class SimulatedWorker {
   bool solving_ = false;
   std::int64_t frozen_until_ms_ = 0;
   std::int64_t planned_time_ms_ = -1;
-  std::uint64_t life_ = 0;     // counts processes: what an earlier one planned does not happen
+  std::uint64_t life_ = 0;  // counts processes: what an earlier one planned does not happen
+  std::uint64_t deaths_ = 0;
   std::uint64_t sockets_ = 0;  // counts sockets: what waits in an earlier one is gone
   std::map<std::pair<Network::LinkId, std::uint64_t>, protocol::Results> sent_;
 };

@@ -10,6 +10,7 @@
 #include "tests/simulation/simulated_disk.h"
 #include "tests/simulation/simulated_server.h"
 #include "tests/simulation/simulated_worker.h"
+#include "tests/simulation/vanishing_peers.h"
 #include "tests/simulation/world.h"
 
 namespace oblique::simulation {
@@ -22,7 +23,7 @@ class Simulation {
         world_(seed),
         disk_(world_),
         // Random crashes hit innocent points too, so that blame is tried in runs of its own.
-        server_(world_, disk_, settings.killers ? 3 : 1000),
+        server_(world_, disk_, settings.killers || settings.storms ? 3 : 1000),
         workers_network_(world_, [this](const std::string& i,
                                         const std::string& f) { server_.worker_frame(i, f); }),
         clients_network_(world_, [this](const std::string& i, const std::string& f) {
@@ -54,6 +55,7 @@ class Simulation {
         healed_ms + settings_.healing_ms, [this] { return is_over(); }, [this] { check(); });
     outcome_.healed_after_ms = world_.now_ms() - healed_ms;
     check_end();
+    outcome_.vanished_peers = vanishing_peers_.vanished();
     outcome_.server_kills = server_.crashes - server_.power_losses;
     outcome_.power_losses = server_.power_losses;
     outcome_.deaths_in_writes = server_.deaths_in_writes;
@@ -86,21 +88,47 @@ class Simulation {
   }
 
   void add_workers() {
-    const std::int64_t count = world_.between(1, 5);
+    const std::int64_t count = world_.between(settings_.storms ? 2 : 1, 5);
     for (std::int64_t i = 0; i < count; ++i) {
       workers_.push_back(std::make_unique<SimulatedWorker>(
-          world_, workers_network_, static_cast<std::uint64_t>(i), killers_));
+          world_, workers_network_, static_cast<std::uint64_t>(i), killers_,
+          !settings_.storms && world_.chance(0.2) ? "2" : "1"));
       workers_.back()->restart(world_.between(0, 3000));
     }
   }
 
   void plan_faults() {
-    world_.after(world_.between(100, 3000), [this] {
+    const auto wait_ms = settings_.storms ? world_.between(20, 400) : world_.between(100, 3000);
+    world_.after(wait_ms, [this] {
       if (world_.faults) {
-        fault();
+        settings_.storms ? blow() : fault();
         plan_faults();
       }
     });
+  }
+
+  /// One of a storm. Nothing of it happens to the first worker but that its connection is cut.
+  void blow() {
+    const std::int64_t last = static_cast<std::int64_t>(workers_.size()) - 1;
+    SimulatedWorker& victim = *workers_[static_cast<std::size_t>(world_.between(1, last))];
+    switch (world_.between(0, 4)) {
+      case 0:
+      case 1:
+        victim.restart(world_.between(0, 300));
+        ++outcome_.worker_faults;
+        break;
+      case 2:
+        victim.freeze(world_.between(100, 8000));
+        ++outcome_.worker_faults;
+        break;
+      case 3:
+        workers_network_.break_peer(static_cast<std::uint64_t>(world_.between(0, last)));
+        ++outcome_.cuts;
+        break;
+      default:
+        vanishing_peers_.come();
+        break;
+    }
   }
 
   void fault() {
@@ -276,6 +304,24 @@ class Simulation {
       }
     }
     disk_.check_rows();
+    check_deaths();
+  }
+
+  /// Two while the point is among others that nobody suspects, one for each time that these are
+  /// split, three alone.
+  void check_deaths() {
+    constexpr std::uint64_t kMostOfAKiller = 8;
+    std::uint64_t killing = 0;
+    for (const auto& [size, points] : killers_) {
+      killing += points.size();
+    }
+    for (const auto& worker : workers_) {
+      outcome_.deaths += worker->deaths();
+    }
+    if (outcome_.deaths > kMostOfAKiller * killing) {
+      throw Violation(std::to_string(killing) + " points killed " +
+                      std::to_string(outcome_.deaths) + " workers");
+    }
   }
 
   void check_rows(std::uint64_t size, const StoreModel::Rows& results) {
@@ -296,6 +342,7 @@ class Simulation {
   SimulatedServer server_;
   Network workers_network_;
   Network clients_network_;
+  VanishingPeers vanishing_peers_{world_, workers_network_};
   SimulatedWorker::Killers killers_;
   std::vector<std::unique_ptr<SimulatedClient>> clients_;
   std::vector<std::unique_ptr<SimulatedWorker>> workers_;
@@ -318,6 +365,9 @@ SimulationOutcome& SimulationOutcome::operator+=(const SimulationOutcome& other)
   failed_commits += other.failed_commits;
   partitions += other.partitions;
   clock_jumps += other.clock_jumps;
+  cuts += other.cuts;
+  vanished_peers += other.vanished_peers;
+  deaths += other.deaths;
   events += other.events;
   healed_after_ms = std::max(healed_after_ms, other.healed_after_ms);
   return *this;
@@ -325,16 +375,17 @@ SimulationOutcome& SimulationOutcome::operator+=(const SimulationOutcome& other)
 
 std::string SimulationOutcome::text() const {
   using std::to_string;
-  return to_string(points) + " points, " + to_string(failed_points) + " of them killers; " +
-         to_string(server_kills) + " servers killed, " + to_string(power_losses) +
-         " losses of power, " + to_string(deaths_in_writes) +
+  return to_string(points) + " points, " + to_string(failed_points) + " of them killers of " +
+         to_string(deaths) + " workers; " + to_string(server_kills) + " servers killed, " +
+         to_string(power_losses) + " losses of power, " + to_string(deaths_in_writes) +
          " of these in the middle of a write, " + to_string(server_stops) + " servers stopped; " +
          to_string(undone_commits) + " commits undone by losing power, " + to_string(refused_kept) +
          " refused ones found after a crash; " + to_string(disk_faults) + " faults of disks, " +
          to_string(failed_commits) + " commits failed; " + to_string(worker_faults) +
          " faults of workers, " + to_string(partitions) + " partitions, " + to_string(clock_jumps) +
-         " jumps of the clock; " + to_string(events) + " events; healed after at most " +
-         to_string(healed_after_ms) + " ms";
+         " jumps of the clock, " + to_string(cuts) + " connections cut, " +
+         to_string(vanished_peers) + " peers vanished with batches; " + to_string(events) +
+         " events; healed after at most " + to_string(healed_after_ms) + " ms";
 }
 
 SimulationOutcome simulate(std::uint64_t seed, const SimulationSettings& settings) {

@@ -12,6 +12,10 @@ struct SimulationSettings {
   /// cannot live with that: commits that were acknowledged after such a failure can be lost.
   bool forgetful_syncs = false;
   bool killers = false;  ///< some points kill their workers; no other fault happens then
+  /// Beside one worker that nothing happens to but breaking connections, others are killed and
+  /// halted again and again, connections are cut, and peers take batches and vanish. No point may
+  /// fail for it. No other fault happens then.
+  bool storms = false;
 };
 
 /// What happened in one run or more, to show that the faults were real.
@@ -29,6 +33,9 @@ struct SimulationOutcome {
   std::uint64_t failed_commits = 0;  ///< because of that
   std::uint64_t partitions = 0;
   std::uint64_t clock_jumps = 0;
+  std::uint64_t cuts = 0;            ///< of single connections, in storms
+  std::uint64_t vanished_peers = 0;  ///< with batches
+  std::uint64_t deaths = 0;          ///< of workers, by points that kill
   std::uint64_t events = 0;
   std::int64_t healed_after_ms = 0;  ///< from the last fault to the end of the last study, at most
 

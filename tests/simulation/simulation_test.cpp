@@ -52,6 +52,16 @@ TEST(KillersTest, OnlyThePointsThatKillTheirWorkersFail) {
   EXPECT_GT(all.failed_points, 50U);
 }
 
+TEST(StormsTest, NoPointFailsForWorkersThatAreLostBesideASoundOne) {
+  SimulationSettings settings;
+  settings.storms = true;
+  const auto all = simulate_seeds(1, 100, settings);
+  EXPECT_GT(all.worker_faults, 1000U);
+  EXPECT_GT(all.cuts, 500U);
+  EXPECT_GT(all.vanished_peers, 100U);
+  EXPECT_EQ(all.failed_points, 0U);
+}
+
 TEST(SeedTest, GivesTheSameRunAgain) {
   EXPECT_EQ(simulate(7, {}), simulate(7, {}));
 }

@@ -24,9 +24,16 @@ constexpr bool kRun = true;
 constexpr const char* kClient = "oblique";
 constexpr const char* kServer = "oblique-server";
 constexpr const char* kWorker = "oblique-worker";
+constexpr const char* kNobody = "";
+constexpr int kNoSignal = 0;
 
-// The first twenty have every class of point, every program in both ways of starting it, and both
-// signals: they are what runs always. Occurrences are such that a sound run has them.
+// Points that are a storm.
+constexpr const char* kKilledWorkers = "storm:killed workers";
+constexpr const char* kCutConnections = "storm:cut connections";
+constexpr const char* kVanishingPeers = "storm:vanishing peers";
+
+// The first twenty-three have every class of point, every program in both ways of starting it, and
+// both signals: they are what runs always. Occurrences are such that a sound run has them.
 constexpr std::array kMatrix{
     Entry{kApart, kServer, "before-commit", SIGKILL, 8},
     Entry{kApart, kServer, "after-commit", SIGKILL, 8},
@@ -48,7 +55,14 @@ constexpr std::array kMatrix{
     Entry{kRun, kServer, "after-commit", SIGKILL, 8},
     Entry{kRun, kWorker, "before-send:results", SIGSTOP, 4},
     Entry{kRun, kClient, "after-receive:status", SIGSTOP, 12},
-    // Those of the server.
+    Entry{kApart, kNobody, kKilledWorkers, kNoSignal, 1},
+    Entry{kApart, kNobody, kCutConnections, kNoSignal, 1},
+    Entry{kApart, kNobody, kVanishingPeers, kNoSignal, 1},
+    // Those of the server. A companion is there to whom it sends what workers seldom get.
+    Entry{kApart, kServer, "before-send:release", SIGKILL, 1},
+    Entry{kApart, kServer, "after-send:release", SIGSTOP, 1},
+    Entry{kApart, kServer, "before-send:notice", SIGKILL, 1},
+    Entry{kApart, kServer, "after-send:notice", SIGSTOP, 1},
     Entry{kApart, kServer, "before-commit", SIGSTOP, 8},
     Entry{kApart, kServer, "time", SIGSTOP, 1500},
     Entry{kApart, kServer, "after-receive:submit", SIGKILL, 1},
@@ -109,6 +123,16 @@ std::string name_of(int signal) {
   return signal == SIGKILL ? "SIGKILL" : signal == SIGSTOP ? "SIGSTOP" : "SIGCONT";
 }
 
+std::optional<StormKind> storm_of(const std::string& point) {
+  if (point == kKilledWorkers) {
+    return StormKind::kKilledWorkers;
+  }
+  if (point == kCutConnections) {
+    return StormKind::kCutConnections;
+  }
+  return point == kVanishingPeers ? std::optional(StormKind::kVanishingPeers) : std::nullopt;
+}
+
 }  // namespace
 
 bool KillCase::is_killed() const {
@@ -130,6 +154,7 @@ KillCase draw_case(std::uint64_t seed) {
   drawn.all_in_one = entry.all_in_one;
   drawn.program = entry.program;
   drawn.point = entry.point;
+  drawn.storm = storm_of(drawn.point);
   drawn.signal = entry.signal;
   drawn.occurrence = up_to(entry.highest);
   // At once a message is still in the process; 20 ms later it has left.
@@ -156,8 +181,13 @@ std::string class_of(const std::string& point) {
 
 std::string describe(const KillCase& kill_case) {
   std::ostringstream line;
-  line << "seed " << kill_case.seed << ": " << (kill_case.all_in_one ? "oblique run, " : "")
-       << kill_case.program << " at " << kill_case.point << " " << kill_case.occurrence
+  line << "seed " << kill_case.seed << ": ";
+  if (kill_case.storm) {
+    line << kill_case.point;
+    return line.str();
+  }
+  line << (kill_case.all_in_one ? "oblique run, " : "") << kill_case.program << " at "
+       << kill_case.point << " " << kill_case.occurrence
        << (kill_case.point == "time" ? " ms" : "");
   if (kill_case.pause.count() > 0) {
     line << " + " << kill_case.pause.count() << " ms";

@@ -2,8 +2,11 @@
 
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
+
+#include "tests/system/storm.h"
 
 namespace oblique::test {
 
@@ -11,10 +14,11 @@ namespace oblique::test {
 struct KillCase {
   std::uint64_t seed = 0;
   bool all_in_one = false;  ///< `oblique run`, else programs started one by one
-  std::string program;      ///< who is struck; empty: nobody
-  std::string point;        ///< as kill_points.cpp names them
-  int occurrence = 1;       ///< at which one; of the point `time`: milliseconds after the start
-  int signal = 0;           ///< SIGKILL or SIGSTOP
+  std::string program;      ///< who is struck; empty: nobody, there is a storm in its place
+  std::optional<StormKind> storm{};  ///< goes on until the study is done
+  std::string point;                 ///< as kill_points.cpp names them
+  int occurrence = 1;  ///< at which one; of the point `time`: milliseconds after the start
+  int signal = 0;      ///< SIGKILL or SIGSTOP
   std::chrono::milliseconds pause{0};  ///< between point and signal
   // Of SIGSTOP only.
   std::chrono::milliseconds stopped{0};  ///< for how long

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "tests/system/blow.h"
+#include "tests/system/companion.h"
 #include "tests/system/same_rows.h"
 
 namespace oblique::test {
@@ -65,6 +66,10 @@ class ApartCycle {
 
   void run() {
     start_server();
+    if (case_.storm) {
+      storm_.emplace(*case_.storm, folder_, server_->worker_url(), blow_.bystander());
+    }
+    companion_.emplace(case_.point, server_->worker_url());
     for (auto& worker : workers_) {
       start_worker(worker, &worker == workers_.data());
     }
@@ -77,8 +82,14 @@ class ApartCycle {
       look_after();
       return Database(database_).texts("SELECT state FROM studies").at(0) == "done";
     });
+    companion_.reset();
+    if (storm_) {
+      storm_->end();
+    }
     stop_all();
   }
+
+  bool had_storm() const { return storm_ && storm_->blows() > 0; }
 
  private:
   /// Killed before it is ready, it is started once more, at other ports.
@@ -175,6 +186,8 @@ class ApartCycle {
   std::string database_;
   std::unique_ptr<Server> server_;
   std::array<std::unique_ptr<Worker>, 2> workers_;
+  std::optional<Companion> companion_;
+  std::optional<Storm> storm_;
 };
 
 // ---- `oblique run` ------------------------------------------------------------------------------
@@ -252,7 +265,9 @@ CycleOutcome run_cycle(const KillStudy& study, const KillCase& kill_case) {
         done = run_once(folder, study, kill_case, blow, false);
       }
     } else {
-      ApartCycle(folder, study, kill_case, blow).run();
+      ApartCycle cycle(folder, study, kill_case, blow);
+      cycle.run();
+      outcome.struck = cycle.had_storm();
     }
     wait_until("no process is left", [&] { return processes_of(folder).empty(); });
     check_database(folder, study);
@@ -262,7 +277,7 @@ CycleOutcome run_cycle(const KillStudy& study, const KillCase& kill_case) {
       kill(left, SIGKILL);
     }
   }
-  outcome.struck = blow.has_struck();
+  outcome.struck = outcome.struck || blow.has_struck();
   return outcome;
 }
 

@@ -12,6 +12,9 @@ namespace {
 constexpr unsigned kAtOncePerCore = 4;
 
 std::string blow_of(const KillCase& kill_case) {
+  if (kill_case.storm) {
+    return kill_case.point;
+  }
   const std::string after = kill_case.then == SIGKILL ? "SIGSTOP and SIGKILL" : "SIGSTOP";
   return std::string(kill_case.all_in_one ? "oblique run: " : "apart: ") + kill_case.program +
          ", " + (kill_case.signal == SIGKILL ? "SIGKILL" : after);

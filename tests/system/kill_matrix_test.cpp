@@ -13,7 +13,7 @@ namespace oblique::test {
 namespace {
 
 /// More of them: `oblique-kill-matrix`.
-constexpr std::uint64_t kCycles = 20;
+constexpr std::uint64_t kCycles = 23;
 
 TEST(KillMatrixTest, WhoeverIsKilledOrHaltedWhereverTheDatabaseIsThatOfAnUndisturbedRun) {
   const MatrixReport report = run_matrix(0, kCycles);

@@ -65,9 +65,10 @@ struct Kinds {
 
 const Kinds& kinds_of(const std::string& program, bool sent, bool with_client) {
   static const Kinds to_server{1, {"hello", "credit", "results", "heartbeat", "goodbye"}};
-  static const Kinds to_worker{1,
-                               {"welcome", "refused", "study", "batch", "results_stored",
-                                "withdraw", "hello_again", "heartbeat_reply", "stopping"}};
+  static const Kinds to_worker{
+      1,
+      {"welcome", "refused", "study", "batch", "results_stored", "withdraw", "hello_again",
+       "heartbeat_reply", "stopping", "release", "notice"}};
   static const Kinds request{3, {"submit", "status", "workers", "change", "query"}};
   static const Kinds reply{2, {"error", "submit", "status", "workers", "change", "query"}};
   const bool by_server = (program == "oblique-server") == sent;
