@@ -15,7 +15,10 @@ namespace {
 /// What a default step is held to, besides half of the last digit that is known.
 constexpr double kRelative = 3e-5;
 constexpr double kForceDigit_N = 0.005;
-constexpr double kTimeDigit_us = 0.005;
+constexpr double kTimeDigit_us = 0.0005;
+constexpr double kStickDigit_us = 0.005;
+/// Of the duration, for instants: valleys are flat, and the default step moves one by 0.0016 us.
+constexpr double kRelativeTime = 3e-6;
 constexpr double kSlideDigit_mm = 0.000005;
 
 std::string name_of(const KnownImpact& known) {
@@ -61,13 +64,13 @@ TEST(KnownImpacts, PeaksOfTheForcesAreKnown) {
 TEST(KnownImpacts, DurationsAreKnown) {
   for_each_impact([](const KnownImpact& known, const CaseResult& result) {
     EXPECT_NEAR(1e6 * result.duration_s, known.contact_us,
-                kRelative * known.contact_us + kTimeDigit_us);
+                kRelativeTime * known.contact_us + kTimeDigit_us);
     EXPECT_NEAR(1e6 * result.stick_total_s, known.stick_us,
-                kRelative * known.stick_us + kTimeDigit_us);
+                kRelativeTime * known.stick_us + kStickDigit_us);
     ASSERT_EQ(result.phases.size(), known.phases_us.size());
     for (std::size_t i = 0; i < result.phases.size(); ++i) {
-      // The known phases were read from sampled histories, up to 0.011 us late at either end.
-      EXPECT_NEAR(1e6 * (result.phases[i].t1_s - result.phases[i].t0_s), known.phases_us[i], 0.02);
+      EXPECT_NEAR(1e6 * (result.phases[i].t1_s - result.phases[i].t0_s), known.phases_us[i],
+                  kRelativeTime * known.contact_us + kTimeDigit_us);
     }
   });
 }
