@@ -166,24 +166,4 @@ void print_summary(std::ostream& out, const CaseResult& result) {
                      readable_number(report.wall_s * kMilli, 2));
 }
 
-void print_trace_header(std::ostream& out, std::size_t links) {
-  out << "t_s,fn_N,ft_N,uy_m,ux_m,xP_m,vP_m_s,x_m,y_m,vt_m_s,vn_m_s,state";
-  for (std::size_t i = 0; i < links; ++i) {
-    out << ",R" << i << "x_N,R" << i << "y_N";
-  }
-  out << '\n';
-}
-
-void print_trace_row(std::ostream& out, const solver::TraceRow& row) {
-  for (const double value : {row.t_s, row.fn_N, row.ft_N, row.uy_m, row.ux_m, row.xP_m, row.vP_m_s,
-                             row.x_m, row.y_m, row.vt_m_s, row.vn_m_s}) {
-    out << exact_number(value) << ',';
-  }
-  out << csv_field(row.state);
-  for (const double reaction_N : row.reactions_N) {
-    out << ',' << exact_number(reaction_N);
-  }
-  out << '\n';
-}
-
 }  // namespace oblique::client

@@ -77,30 +77,6 @@ TEST(SolveJson, GivesTheLargestReactionAtThePinAndAtEachJoint) {
                 R"([{"t_s": 2e-5, "force_N": 900.0}, {"t_s": 3e-5, "force_N": 1800.0}])"));
 }
 
-TEST(Trace, HasAColumnForEveryHeading) {
-  std::ostringstream out;
-  print_trace_header(out, 2);
-  solver::TraceRow row{};
-  row.t_s = 1e-6;
-  row.fn_N = 0.1;
-  row.ft_N = 2;
-  row.uy_m = 3;
-  row.ux_m = 4;
-  row.xP_m = 5;
-  row.vP_m_s = 6;
-  row.x_m = 7;
-  row.y_m = 8;
-  row.vt_m_s = 9;
-  row.vn_m_s = 10;
-  row.state = "SC";
-  row.reactions_N = {11, 12, -13, 14};
-  print_trace_row(out, row);
-  EXPECT_EQ(out.str(),
-            "t_s,fn_N,ft_N,uy_m,ux_m,xP_m,vP_m_s,x_m,y_m,vt_m_s,vn_m_s,state,"
-            "R0x_N,R0y_N,R1x_N,R1y_N\n"
-            "1e-06,0.1,2,3,4,5,6,7,8,9,10,SC,11,12,-13,14\n");
-}
-
 TEST(Summary, TellsRipplesFromPeaks) {
   std::ostringstream out;
   print_summary(out, some_result());

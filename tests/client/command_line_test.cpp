@@ -5,6 +5,7 @@
 #include <fstream>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -130,6 +131,42 @@ TEST(CommandLine, WritesATraceFromTouchToSeparation) {
   }
   EXPECT_GT(rows, 100);
   EXPECT_NEAR(t_s, 345.82e-6, 0.1e-6);
+}
+
+TEST(CommandLine, WritesATraceWithShapeToStandardOutputAndTheRestToStandardError) {
+  const auto outcome = oblique({"solve", "--H", "0.9", "--mu", "0.4", "--e", "1",
+                                "--elements-per-link", "1", "--trace", "-", "--trace-shape"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  std::istringstream trace(outcome.out);
+  std::string line;
+  std::getline(trace, line);
+  EXPECT_TRUE(line.ends_with("node2x_m,node2y_m,node3x_m,node3y_m")) << line;
+  const auto columns = std::count(line.begin(), line.end(), ',');
+  int rows = 0;
+  while (std::getline(trace, line)) {
+    ASSERT_EQ(std::count(line.begin(), line.end(), ','), columns) << line;
+    ++rows;
+  }
+  EXPECT_GT(rows, 20);
+  EXPECT_NE(outcome.err.find("contact"), std::string::npos) << "the summary";
+}
+
+TEST(CommandLine, RefusesATraceThatHasNoPlaceToGo) {
+  const std::vector<std::string> point{
+      "solve", "--H", "0.9", "--mu", "0.4", "--e", "1", "--elements-per-link", "1"};
+  const auto with = [&point](std::vector<std::string> more) {
+    more.insert(more.begin(), point.begin(), point.end());
+    return oblique(more);
+  };
+  for (const auto& [flags, reason] : std::vector<std::pair<std::vector<std::string>, std::string>>{
+           {{"--trace", "-", "--json"}, "both write to standard output"},
+           {{"--trace", ""}, "--trace is empty"},
+           {{"--trace-shape"}, "--trace"}}) {
+    const auto outcome = with(flags);
+    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_EQ(outcome.out, "");
+    EXPECT_NE(outcome.err.find(reason), std::string::npos) << outcome.err;
+  }
 }
 
 TEST(CommandLine, SaysThatNobodyAnswersAndWhatToDo) {

@@ -8,12 +8,6 @@ namespace {
 /// At 2 us the fall's own error is 1e-10 of the speed.
 constexpr double kFallStep_s = 2e-6;
 
-solver::Finger::Extras with_reactions() {
-  solver::Finger::Extras extras;
-  extras.reaction_peaks = true;
-  return extras;
-}
-
 }  // namespace
 
 BothWays::BothWays(const solver::ModelParameters& model)
@@ -25,12 +19,12 @@ BothWays::BothWays(const solver::ModelParameters& model)
 
 solver::CaseResult BothWays::explicit_case(const Point& point, double dt_s) const {
   return solver::solve_contact(explicit_, contact(point), {dt_s, dt_s}, explicit_touch(point.H_m),
-                               with_reactions());
+                               {});
 }
 
 solver::CaseResult BothWays::generalized_alpha_case(const Point& point, double dt_s) const {
   return solver::solve_contact(generalized_alpha_, contact(point), {dt_s, dt_s},
-                               generalized_alpha_touch(point.H_m), with_reactions());
+                               generalized_alpha_touch(point.H_m), {});
 }
 
 }  // namespace oblique::validation

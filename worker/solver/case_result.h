@@ -35,7 +35,8 @@ struct StickInterval {
   double t1_s;
 };
 
-/// Largest reaction at the pin or a joint during a contact: the force on the outer link.
+/// Largest reaction at the pin or a joint during a contact: the force on the outer link. Between
+/// steps it is a parabola's.
 struct ReactionPeak {
   double t_s;
   double force_N;  ///< magnitude
@@ -85,7 +86,7 @@ struct CaseResult {
   double stick_total_s;
   std::vector<StickInterval> stick_intervals;
   std::vector<Phase> phases;
-  std::vector<ReactionPeak> reaction_peaks;  ///< O first, then each joint; empty unless asked for
+  std::vector<ReactionPeak> reaction_peaks;  ///< O first, then each joint
   ContactEnergy energy;
   SolverReport solver;
 };
@@ -104,8 +105,15 @@ struct TraceRow {
   double vt_m_s;
   double vn_m_s;
   std::string state;  ///< SC, SR, sC or sR
+  double kinetic_J;   ///< of the whole chain
+  double strain_J;    ///< 0 when unstressed
+  double gravity_J;   ///< 0 at the height of O
+  double momentum_x_Ns;
+  double momentum_y_Ns;
   /// Forces on the outer link at O and at each joint, x and y in turn [N].
   std::vector<double> reactions_N;
+  /// Positions of the nodes, O first and the tip last, x and y in turn [m]; empty unless asked for.
+  std::vector<double> nodes_m;
 };
 
 }  // namespace oblique::solver

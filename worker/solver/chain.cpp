@@ -68,6 +68,7 @@ Chain::Chain(const ModelParameters& model)
       gravity_m_s2_(model.g_m_s2),
       mass_per_length_(model.rho_kg_m3 * model.A_m2),
       weight_N_(rows_, 0.0),
+      momentum_kg_(rows_, 0.0),
       mass_(with_unit_pin(rows_, 1.0)),
       mass_factor_(BandedMatrix(0)),
       along_(with_unit_pin(rows_, 0.0)) {
@@ -81,10 +82,13 @@ Chain::Chain(const ModelParameters& model)
     const auto load = uniform_load(length);
     for (std::size_t a = 0; a < 4; ++a) {
       weight_N_[element.row[a]] -= mass_per_length_ * gravity_m_s2_ * load[a];
+      momentum_kg_[element.row[a]] += mass_per_length_ * load[a];
     }
   }
   mass_.at(tip_row(), 0) += model.tip_mass_kg;
   weight_N_[tip_row()] -= model.tip_mass_kg * model.g_m_s2;
+  momentum_kg_[tip_row()] += model.tip_mass_kg;
+  balance_links(model.tip_mass_kg);
   mass_factor_ = BandedCholesky(mass_);
   if (!mass_factor_.positive_definite()) {
     throw InputError(
@@ -116,6 +120,17 @@ void Chain::number_rows(const ModelParameters& model) {
     }
     const Element& last = elements_.back();
     constants_.push_back(elastic_constants(length, last.half_EA_length, last.bending));
+  }
+}
+
+void Chain::balance_links(double tip_mass_kg) {
+  balance_.resize(links());
+  double beyond_kg = tip_mass_kg;
+  const auto elements_per_link = static_cast<double>(elements_.size() / links());
+  for (std::size_t link = links(); link-- > 0;) {
+    const double length = 1.0 / elements_[first_element_[link]].inverse_length;
+    beyond_kg += elements_per_link * mass_per_length_ * length;
+    balance_[link] = {mass_per_length_ * uniform_load(length)[0], gravity_m_s2_ * beyond_kg};
   }
 }
 
@@ -158,6 +173,24 @@ double Chain::gravity_energy_J(const Coordinates& q) const {
     energy -= weight_N_[row] * q[2 * row + 1];
   }
   return energy;
+}
+
+PlanarVector<double> Chain::momentum_Ns(const Coordinates& v) const {
+  PlanarVector<double> momentum{0.0, 0.0};
+  for (std::size_t row = 0; row < rows_; ++row) {
+    momentum.x += momentum_kg_[row] * v[2 * row];
+    momentum.y += momentum_kg_[row] * v[2 * row + 1];
+  }
+  return momentum;
+}
+
+std::vector<PlanarVector<double>> Chain::node_positions_m(const Coordinates& q) const {
+  std::vector<PlanarVector<double>> nodes{{q[0], q[1]}};
+  for (const Element& element : elements_) {
+    const std::size_t outer = 2 * element.row[2];
+    nodes.push_back({q[outer], q[outer + 1]});
+  }
+  return nodes;
 }
 
 TipState Chain::tip(const ChainState& state) const {

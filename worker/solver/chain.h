@@ -61,7 +61,9 @@ class Chain {
             elements_.size() / links(),
             constants_.data(),
             mass_factor_.data(),
-            weight_N_.data()};
+            weight_N_.data(),
+            momentum_kg_.data(),
+            balance_.data()};
   }
   /// As in chain_kernel.h.
   template <class Real>
@@ -73,6 +75,9 @@ class Chain {
   double strain_energy_J(const Coordinates& q) const;
   double gravity_energy_J(const Coordinates& q) const;
   TipState tip(const ChainState& state) const;
+  PlanarVector<double> momentum_Ns(const Coordinates& v) const;
+  /// O first, then the outer end of each element.
+  std::vector<PlanarVector<double>> node_positions_m(const Coordinates& q) const;
 
   std::size_t links() const { return first_element_.size(); }
   /// Force on a link at its inner end (the pin or a joint), from the balance of its first node:
@@ -92,6 +97,7 @@ class Chain {
     double bending;         ///< 2 EI/l
   };
   void number_rows(const ModelParameters& model);
+  void balance_links(double tip_mass_kg);
 
   std::size_t rows_;
   double gravity_m_s2_;
@@ -99,8 +105,10 @@ class Chain {
   std::vector<Element> elements_;
   std::vector<std::size_t> first_element_;   ///< of each link
   std::vector<ElasticConstants> constants_;  ///< of an element of each link
-  std::vector<double> weight_N_;  ///< generalised gravity along y [N] and [N m], one a row
-  BandedMatrix mass_;             ///< of the free rows; row 0 is a unit row
+  std::vector<double> weight_N_;     ///< generalised gravity along y [N] and [N m], one a row
+  std::vector<double> momentum_kg_;  ///< what a rate adds to the momentum [kg] and [kg m]
+  std::vector<LinkBalance> balance_;
+  BandedMatrix mass_;  ///< of the free rows; row 0 is a unit row
   BandedCholesky mass_factor_;
   BandedMatrix along_;  ///< stiffness of the straight chain along itself: axial and bending
 };

@@ -19,6 +19,12 @@ struct FactorRow {
   double inverse_pivot;
 };
 
+/// What the momentum of a link and all beyond it asks for besides the weights of its rows.
+struct LinkBalance {
+  double inner_end_kg;     ///< the link's own share of the row in which its inner end lies
+  double weight_beyond_N;  ///< of the link and all beyond it
+};
+
 /// What the loops read. Points into a Chain, which must outlive it.
 struct ChainTables {
   std::size_t rows;
@@ -27,7 +33,9 @@ struct ChainTables {
   std::size_t elements_per_link;
   const ElasticConstants* link;  ///< of an element of each link
   const FactorRow* mass_factor;
-  const double* weight_N;  ///< generalised gravity along y, one a row; there is none along x
+  const double* weight_N;      ///< generalised gravity along y, one a row; there is none along x
+  const double* momentum_kg;   ///< one a row: the chain's momentum is the sum of these times v
+  const LinkBalance* balance;  ///< of each link
 };
 
 /// L y = f, row by row downwards. The row just before comes last into each sum: what rows wait for
@@ -142,6 +150,57 @@ inline void chain_accelerations(const ChainTables& chain, const Real* q, const R
                              put_pair(acceleration, row, value);
                            });
   put_pair(acceleration, 0, PlanarVector<Real>{});
+}
+
+/// Momentum of each link and all beyond it, x and y in turn, gathered as rates come row by row from
+/// the tip to the row after the pin.
+template <class Real>
+class LinkMomenta {
+ public:
+  /// Writes 2 links entries of `momenta_Ns`.
+  LinkMomenta(const ChainTables& chain, Real* momenta_Ns)
+      : chain_(chain), momenta_Ns_(momenta_Ns), link_(chain.links - 1) {}
+
+  inline void add(std::size_t row, const PlanarVector<Real>& v) {
+    const double kg = chain_.momentum_kg[row];
+    if (row == link_ * (2 * chain_.elements_per_link + 1)) {
+      const double own_kg = chain_.balance[link_].inner_end_kg;
+      put_pair(momenta_Ns_, link_,
+               PlanarVector<Real>{sum_.x + own_kg * v.x, sum_.y + own_kg * v.y});
+      --link_;
+    }
+    if (kg != 0.0) {  // as it is for slopes between elements of one length
+      sum_.x += kg * v.x;
+      sum_.y += kg * v.y;
+    }
+    if (row == 1) {  // the pin does not move
+      put_pair(momenta_Ns_, 0, sum_);
+    }
+  }
+
+ private:
+  const ChainTables& chain_;
+  Real* momenta_Ns_;
+  std::size_t link_;  ///< whose inner end comes next
+  PlanarVector<Real> sum_{};
+};
+
+/// Squared mean of the reaction on each link's inner end over a step of h seconds, one a link: the
+/// change of the momentum of all beyond it, less the impulses of the contact forces and of the
+/// weight, over h. Exact but for the step's own error.
+template <class Real>
+inline void mean_reactions_squared(const ChainTables& chain, const Real* momenta_before_Ns,
+                                   const Real* momenta_after_Ns,
+                                   const PlanarVector<Real>& contact_impulse_Ns,
+                                   const Real& inverse_h_Hz, Real* squared_N2) {
+  for (std::size_t link = 0; link < chain.links; ++link) {
+    const PlanarVector<Real> before = pair_at(momenta_before_Ns, link);
+    const PlanarVector<Real> after = pair_at(momenta_after_Ns, link);
+    const Real x = (after.x - before.x - contact_impulse_Ns.x) * inverse_h_Hz;
+    const Real y = (after.y - before.y - contact_impulse_Ns.y) * inverse_h_Hz +
+                   chain.balance[link].weight_beyond_N;
+    squared_N2[link] = x * x + y * y;
+  }
 }
 
 }  // namespace oblique::solver

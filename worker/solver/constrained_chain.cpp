@@ -220,4 +220,26 @@ double ConstrainedChain::gravity_energy_J(const Coordinates& q) const {
   return energy;
 }
 
+PlanarVector<double> ConstrainedChain::momentum_Ns(const Coordinates& v) const {
+  std::vector<double> rows(size_, 0.0);
+  add_inertia(v, rows);
+  // A rigid shift moves positions and no slope, so the rows of positions add up to the momentum.
+  PlanarVector<double> momentum{0.0, 0.0};
+  for (const Link& link : links_) {
+    for (std::size_t i = link.inner; i <= link.outer; i += 4) {
+      momentum.x += rows[i];
+      momentum.y += rows[i + 1];
+    }
+  }
+  return momentum;
+}
+
+std::vector<PlanarVector<double>> ConstrainedChain::node_positions_m(const Coordinates& q) const {
+  std::vector<PlanarVector<double>> nodes{pair_at(q, elements_.front().first)};
+  for (const Element& element : elements_) {
+    nodes.push_back(pair_at(q, element.first + 4));
+  }
+  return nodes;
+}
+
 }  // namespace oblique::solver

@@ -60,6 +60,9 @@ class ConstrainedChain {
   double kinetic_energy_J(const Coordinates& v) const;
   double strain_energy_J(const Coordinates& q) const;
   double gravity_energy_J(const Coordinates& q) const;
+  PlanarVector<double> momentum_Ns(const Coordinates& v) const;
+  /// O first, then the outer end of each element.
+  std::vector<PlanarVector<double>> node_positions_m(const Coordinates& q) const;
 
  private:
   struct Element {

@@ -74,22 +74,24 @@ CaseResult contact_result(const Contact& contact, const ContactParameters& param
   return result;
 }
 
-void ContactObserver::accepted(const Contact& contact, const ChainState& state) {
-  const auto reactions = motion_.reactions(contact.force(), state);
-  if (extras_.reaction_peaks) {
-    peaks_.add(contact.time_s(), reactions);
+void ContactTracer::accepted(const Contact& contact, const ChainState& state) const {
+  TraceRow row = trace_row(contact, touch_y_m_);
+  for (const auto& reaction : motion_.reactions(contact.force(), state)) {
+    row.reactions_N.insert(row.reactions_N.end(), {reaction.x_N, reaction.y_N});
   }
-  if (extras_.trace) {
-    TraceRow row = trace_row(contact, touch_y_m_);
-    for (const auto& reaction : reactions) {
-      row.reactions_N.insert(row.reactions_N.end(), {reaction.x_N, reaction.y_N});
+  const Energies energies = motion_.energies(state);
+  row.kinetic_J = energies.kinetic_J;
+  row.strain_J = energies.strain_J;
+  row.gravity_J = energies.gravity_J;
+  const auto momentum = motion_.momentum_Ns(state);
+  row.momentum_x_Ns = momentum.x;
+  row.momentum_y_Ns = momentum.y;
+  if (extras_.trace_shape) {
+    for (const auto& node : motion_.node_positions_m(state)) {
+      row.nodes_m.insert(row.nodes_m.end(), {node.x, node.y});
     }
-    extras_.trace(row);
   }
-}
-
-std::vector<ReactionPeak> ContactObserver::reaction_peaks() const {
-  return extras_.reaction_peaks ? peaks_.peaks() : std::vector<ReactionPeak>{};
+  extras_.trace(row);
 }
 
 }  // namespace oblique::solver

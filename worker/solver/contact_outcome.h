@@ -1,11 +1,8 @@
 #pragma once
 
-#include <vector>
-
 #include "worker/solver/case_result.h"
 #include "worker/solver/contact.h"
 #include "worker/solver/motion.h"
-#include "worker/solver/reaction_peaks.h"
 #include "worker/solver/solve.h"
 
 namespace oblique::solver {
@@ -16,25 +13,20 @@ namespace oblique::solver {
 CaseResult contact_result(const Contact& contact, const ContactParameters& parameters,
                           const TipState& touch, const Energies& in, const Energies& out);
 
-/// Serves what is asked for besides the result, at each accepted instant.
-class ContactObserver {
+/// Hands the trace that is asked for on, row by row.
+class ContactTracer {
  public:
-  /// `motion` and `extras` must outlive this.
-  ContactObserver(const Motion& motion, const Finger::Extras& extras, const TipState& touch)
+  /// `motion` and `extras` must outlive this. `extras.trace` must be set.
+  ContactTracer(const Motion& motion, const Finger::Extras& extras, const TipState& touch)
       : motion_(motion), extras_(extras), touch_y_m_(touch.y_m) {}
 
-  /// Whether anything is asked for at all.
-  static bool is_needed(const Finger::Extras& extras) {
-    return extras.reaction_peaks || extras.trace;
-  }
-  void accepted(const Contact& contact, const ChainState& state);
-  std::vector<ReactionPeak> reaction_peaks() const;
+  /// At each accepted instant.
+  void accepted(const Contact& contact, const ChainState& state) const;
 
  private:
   const Motion& motion_;
   const Finger::Extras& extras_;
   double touch_y_m_;
-  ReactionPeaks peaks_;
 };
 
 }  // namespace oblique::solver

@@ -53,6 +53,12 @@ class GeneralizedAlphaMotion : public Motion {
   ContactIntegrals<double> step(const ChainState& from, const AffineContactForce<double>& force,
                                 double h_s, ChainState& to) const override;
   void restart(const AffineContactForce<double>& force, ChainState& state) const override;
+  PlanarVector<double> momentum_Ns(const ChainState& state) const override {
+    return chain_.momentum_Ns(state.v);
+  }
+  std::vector<PlanarVector<double>> node_positions_m(const ChainState& state) const override {
+    return chain_.node_positions_m(state.q);
+  }
   std::vector<JointReaction> reactions(const AffineContactForce<double>& force,
                                        const ChainState& state) const override;
 

@@ -12,6 +12,7 @@ LaneBatch::LaneBatch(const Chain& chain, const LaneKernel& kernel)
       motion_(chain),
       stepper_(chain.tables(), kernel),
       lanes_(kernel.lanes),
+      reactions_(chain.links(), kernel.lanes, kernel.reaction_loops),
       accept_(kernel.lanes, 0),
       column_(chain.at_rest()) {}
 
@@ -25,6 +26,7 @@ void LaneBatch::solve(const Source& source, const Sink& sink, const Finger::Extr
       accept_[lane] = lanes_[lane].contact && advance(lane, sink) ? 1 : 0;
     }
     stepper_.settle(accept_);
+    reactions_.add(stepper_.mean_reactions_squared_N2());
     for (std::size_t lane = 0; lane < lanes_.size(); ++lane) {
       Lane& slot = lanes_[lane];
       if (!slot.contact) {
@@ -33,8 +35,8 @@ void LaneBatch::solve(const Source& source, const Sink& sink, const Finger::Extr
         }
         continue;
       }
-      if (accept_[lane] != 0 && slot.observer) {
-        slot.observer->accepted(*slot.contact, stored(lane));
+      if (accept_[lane] != 0 && slot.tracer) {
+        slot.tracer->accepted(*slot.contact, stored(lane));
       }
       if (!slot.followers.empty() && slot.contact->is_at_first_turn()) {
         branch_off(lane);
@@ -56,7 +58,7 @@ std::size_t LaneBatch::busy_lanes() const {
 
 void LaneBatch::fill(std::size_t lane, const Source& source, const Finger::Extras& extras) {
   Lane& slot = lanes_[lane];
-  slot.observer.reset();
+  slot.tracer.reset();
   slot.contact.reset();
   slot.failed = false;
   if (!branches_.empty()) {
@@ -69,9 +71,9 @@ void LaneBatch::fill(std::size_t lane, const Source& source, const Finger::Extra
     return;
   }
   start(lane, *next);
-  if (ContactObserver::is_needed(extras)) {
-    slot.observer.emplace(motion_, extras, slot.touch);
-    slot.observer->accepted(*slot.contact, *next->touch);
+  if (extras.trace) {
+    slot.tracer.emplace(motion_, extras, slot.touch);
+    slot.tracer->accepted(*slot.contact, *next->touch);
   } else {
     take_followers(slot, source);
   }
@@ -85,6 +87,7 @@ void LaneBatch::start(std::size_t lane, const ContactCase& next) {
   stepper_.load(lane, touch.q.data(), touch.v.data());
   slot.touch = chain_.tip(touch);
   slot.in = motion_.energies(touch);
+  reactions_.restart(lane);
   slot.contact.emplace(next.parameters, slot.touch, next.steps);
   stepper_.set_step(lane, slot.contact->trial_step_s());
   stepper_.set_force(lane, slot.contact->force());
@@ -104,8 +107,8 @@ void LaneBatch::take_followers(Lane& slot, const Source& source) {
 
 void LaneBatch::branch_off(std::size_t lane) {
   Lane& slot = lanes_[lane];
-  const auto trunk =
-      std::make_shared<const Trunk>(Trunk{*slot.contact, stored(lane), slot.touch, slot.in});
+  const auto trunk = std::make_shared<const Trunk>(
+      Trunk{*slot.contact, stored(lane), slot.touch, slot.in, reactions_.taken_out(lane)});
   for (const ContactCase& follower : slot.followers) {
     branches_.push_back({trunk, follower});
   }
@@ -121,6 +124,7 @@ void LaneBatch::start_branch(std::size_t lane) {
   slot.started = Clock::now();
   slot.touch = trunk.touch;
   slot.in = trunk.in;
+  reactions_.put_in(lane, trunk.reactions);
   slot.contact.emplace(
       trunk.contact.branched(branch.contact_case.parameters.e_star, branch.contact_case.steps));
   stepper_.load(lane, trunk.state.q.data(), trunk.state.v.data());
@@ -134,6 +138,7 @@ bool LaneBatch::advance(std::size_t lane, const Sink& sink) {
   const TipState end{stepper_.trial_q(lane, tip), stepper_.trial_q(lane, tip + 1),
                      stepper_.trial_v(lane, tip), stepper_.trial_v(lane, tip + 1)};
   const int events = slot.contact->events();
+  const double h_s = slot.contact->trial_step_s();
   bool is_accepted = false;
   try {
     is_accepted = slot.contact->judge(end, stepper_.integrals(lane));
@@ -145,6 +150,9 @@ bool LaneBatch::advance(std::size_t lane, const Sink& sink) {
     }
     slot.followers.clear();
     return false;
+  }
+  if (is_accepted && h_s >= kShortestSpan * slot.contact_case.steps.compression_s) {
+    reactions_.set_span(lane, slot.contact->time_s(), h_s);
   }
   stepper_.set_step(lane, slot.contact->trial_step_s());
   if (slot.contact->events() != events) {
@@ -159,9 +167,7 @@ void LaneBatch::finish(std::size_t lane, std::size_t busy, const Sink& sink) {
   try {
     CaseResult result = contact_result(*slot.contact, slot.contact_case.parameters, slot.touch,
                                        slot.in, motion_.energies(stored(lane)));
-    if (slot.observer) {
-      result.reaction_peaks = slot.observer->reaction_peaks();
-    }
+    result.reaction_peaks = reaction_peaks(lane);
     result.solver.dt_s = slot.contact_case.steps.compression_s;
     result.solver.steps = slot.contact->steps();
     // The lanes share the time.
@@ -172,6 +178,22 @@ void LaneBatch::finish(std::size_t lane, std::size_t busy, const Sink& sink) {
     outcome.error = error.what();
   }
   sink(std::move(outcome));
+}
+
+/// Of a contact that has just ended.
+std::vector<ReactionPeak> LaneBatch::reaction_peaks(std::size_t lane) {
+  if (!reactions_.rises_at_end(lane)) {
+    return reactions_.peaks(lane);
+  }
+  const Contact& contact = *lanes_[lane].contact;
+  ReactionPeaks with_end = reactions_.taken_out(lane);
+  std::vector<double> squared_N2;
+  for (const JointReaction& reaction : motion_.reactions(contact.force(), stored(lane))) {
+    squared_N2.push_back(reaction.x_N * reaction.x_N + reaction.y_N * reaction.y_N);
+  }
+  with_end.set_span(0, contact.time_s(), 0.0);
+  with_end.add(squared_N2.data());
+  return with_end.peaks(0);
 }
 
 const ChainState& LaneBatch::stored(std::size_t lane) {

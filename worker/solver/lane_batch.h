@@ -12,6 +12,7 @@
 
 #include "worker/solver/contact_outcome.h"
 #include "worker/solver/lane_stepper.h"
+#include "worker/solver/reaction_peaks.h"
 
 namespace oblique::solver {
 
@@ -45,7 +46,7 @@ class LaneBatch {
   LaneBatch(const Chain& chain, const LaneKernel& kernel);
 
   /// Solves what `source` gives until it gives nothing more. Outcomes come in the order in which
-  /// contacts end. With `extras`, every case is observed.
+  /// contacts end. With `extras`, every case is traced.
   void solve(const Source& source, const Sink& sink, const Finger::Extras& extras = {});
 
  private:
@@ -53,13 +54,17 @@ class LaneBatch {
   /// Largest group: the first case and those that branch off.
   static constexpr std::size_t kLargestGroup = 16;
 
+  /// A span shorter than this fraction of a step, as beside an event, gives no mean of a reaction
+  /// that rounding leaves alone.
+  static constexpr double kShortestSpan = 1e-3;
+
   struct Lane {
     std::optional<Contact> contact;  ///< empty: the lane idles
     ContactCase contact_case{};
     TipState touch{};
     Energies in{};
     std::vector<ContactCase> followers;  ///< the rest of the group, before the first turn
-    std::optional<ContactObserver> observer;
+    std::optional<ContactTracer> tracer;
     Clock::time_point started{};
     bool failed = false;
   };
@@ -69,6 +74,7 @@ class LaneBatch {
     ChainState state;
     TipState touch;
     Energies in;
+    ReactionPeaks reactions;
   };
   struct Branch {
     std::shared_ptr<const Trunk> trunk;
@@ -81,6 +87,7 @@ class LaneBatch {
   void branch_off(std::size_t lane);
   bool advance(std::size_t lane, const Sink& sink);
   void finish(std::size_t lane, std::size_t busy, const Sink& sink);
+  std::vector<ReactionPeak> reaction_peaks(std::size_t lane);
   std::size_t busy_lanes() const;
   const ChainState& stored(std::size_t lane);
 
@@ -88,6 +95,7 @@ class LaneBatch {
   ExplicitMotion motion_;
   LaneStepper stepper_;
   std::vector<Lane> lanes_;
+  ReactionPeaks reactions_;
   std::deque<Branch> branches_;          ///< taken before further cases
   std::optional<ContactCase> upcoming_;  ///< taken from the source, the first of its group
   std::vector<unsigned char> accept_;

@@ -12,7 +12,7 @@ using Pack = LanePack<Avx2Vectors, 1>;
 }  // namespace
 
 LaneKernel avx2_kernel() {
-  return {"avx2", Pack::kLanes, &step_lanes<Pack>};
+  return {"avx2", Pack::kLanes, &step_lanes<Pack>, reaction_loops<Avx2Vectors>()};
 }
 
 }  // namespace oblique::solver

@@ -12,7 +12,7 @@ using Pack = LanePack<Avx512Vectors, 1>;
 }  // namespace
 
 LaneKernel avx512_kernel() {
-  return {"avx512", Pack::kLanes, &step_lanes<Pack>};
+  return {"avx512", Pack::kLanes, &step_lanes<Pack>, reaction_loops<Avx512Vectors>()};
 }
 
 }  // namespace oblique::solver

@@ -12,7 +12,7 @@ using Pack = LanePack<BaselineVectors, 2>;
 }  // namespace
 
 LaneKernel baseline_kernel() {
-  return {"baseline", Pack::kLanes, &step_lanes<Pack>};
+  return {"baseline", Pack::kLanes, &step_lanes<Pack>, reaction_loops<BaselineVectors>()};
 }
 
 }  // namespace oblique::solver

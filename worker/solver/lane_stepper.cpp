@@ -36,7 +36,8 @@ LaneStepper::LaneStepper(const ChainTables& chain, const LaneKernel& kernel)
     : chain_(chain), kernel_(kernel), size_(2 * chain.rows) {
   const std::size_t state = size_ * lanes();
   const std::size_t small = std::max(lanes(), kAlignment / sizeof(double));
-  memory_.assign(5 * state + (1 + 7 + 3) * small + kAlignment / sizeof(double), 0.0);
+  memory_.assign(5 * state + (2 + 7 + 3 + 5 * chain.links) * small + kAlignment / sizeof(double),
+                 0.0);
   const auto address = reinterpret_cast<std::uintptr_t>(memory_.data());
   double* next = memory_.data() + (kAlignment - address % kAlignment) % kAlignment / sizeof(double);
   const auto take = [&next](std::size_t count) {
@@ -50,8 +51,11 @@ LaneStepper::LaneStepper(const ChainTables& chain, const LaneKernel& kernel)
   v_next_ = take(state);
   scratch_ = take(state);
   h_s_ = take(small);
+  inverse_h_Hz_ = take(small);
   force_ = take(7 * small);
   integrals_ = take(3 * small);
+  momenta_ = take(4 * chain.links * small);
+  reactions_ = take(chain.links * small);
 }
 
 void LaneStepper::load(std::size_t lane, const double* q, const double* v) {
@@ -78,7 +82,8 @@ void LaneStepper::set_force(std::size_t lane, const AffineContactForce<double>& 
 }
 
 void LaneStepper::step() {
-  kernel_.step(chain_, {q_, v_, q_next_, v_next_, scratch_, h_s_, force_, integrals_});
+  kernel_.step(chain_, {q_, v_, q_next_, v_next_, scratch_, h_s_, inverse_h_Hz_, force_, integrals_,
+                        momenta_, reactions_});
 }
 
 ContactIntegrals<double> LaneStepper::integrals(std::size_t lane) const {

@@ -8,6 +8,7 @@
 
 #include "worker/solver/chain_kernel.h"
 #include "worker/solver/pefrl.h"
+#include "worker/solver/reaction_peaks.h"
 
 namespace oblique::solver {
 
@@ -18,9 +19,12 @@ struct LaneArrays {
   double* q_next;
   double* v_next;
   double* scratch;
-  const double* h_s;    ///< one a lane
+  const double* h_s;  ///< one a lane
+  const double* inverse_h_Hz;
   const double* force;  ///< fn0, ft0, k_nn, k_tn, k_tt, x0, y0: one a lane each
   double* integrals;    ///< impulse_n, impulse_t, work_t: one a lane each
+  double* momenta;      ///< scratch for 4 entries a link
+  double* reactions;    ///< squared means of the reactions: for each link one a lane
 };
 
 /// The PEFRL step compiled for one instruction set.
@@ -28,6 +32,7 @@ struct LaneKernel {
   std::string_view name;  ///< of the instruction set
   std::size_t lanes;
   void (*step)(const ChainTables& chain, const LaneArrays& arrays);
+  ReactionLoops reaction_loops;
 };
 
 /// Kernels that this machine can run, the fastest first; never empty.
@@ -47,7 +52,12 @@ class LaneStepper {
   /// Takes the accepted state of a lane out.
   void store(std::size_t lane, double* q, double* v) const;
 
-  void set_step(std::size_t lane, double h_s) { h_s_[lane] = h_s; }
+  void set_step(std::size_t lane, double h_s) {
+    if (h_s != h_s_[lane]) {
+      h_s_[lane] = h_s;
+      inverse_h_Hz_[lane] = h_s > 0.0 ? 1.0 / h_s : 0.0;
+    }
+  }
   void set_force(std::size_t lane, const AffineContactForce<double>& force);
 
   /// Steps every lane from its accepted state to a trial state.
@@ -56,6 +66,9 @@ class LaneStepper {
   double trial_q(std::size_t lane, std::size_t i) const { return q_next_[i * lanes() + lane]; }
   double trial_v(std::size_t lane, std::size_t i) const { return v_next_[i * lanes() + lane]; }
   ContactIntegrals<double> integrals(std::size_t lane) const;
+  /// Squared magnitudes of the mean reactions on the links' inner ends over the last step [N^2],
+  /// element [link * lanes + lane].
+  const double* mean_reactions_squared_N2() const { return reactions_; }
   /// Makes the trial states accepted in the lanes with accept[lane] != 0; the others stay.
   void settle(std::span<const unsigned char> accept);
 
@@ -70,8 +83,11 @@ class LaneStepper {
   double* v_next_;
   double* scratch_;
   double* h_s_;
+  double* inverse_h_Hz_;
   double* force_;
   double* integrals_;
+  double* momenta_;
+  double* reactions_;
 };
 
 }  // namespace oblique::solver

@@ -39,6 +39,11 @@ class Motion {
   /// Makes what the integrator remembers consistent with `force`, after an event changed the law.
   virtual void restart(const AffineContactForce<double>& force, ChainState& state) const = 0;
 
+  /// Linear momentum of the whole chain [N s].
+  virtual PlanarVector<double> momentum_Ns(const ChainState& state) const = 0;
+  /// Positions of the nodes along the chain: O first, the tip last.
+  virtual std::vector<PlanarVector<double>> node_positions_m(const ChainState& state) const = 0;
+
   /// Reactions at O and at each joint, from O outwards.
   virtual std::vector<JointReaction> reactions(const AffineContactForce<double>& force,
                                                const ChainState& state) const = 0;
@@ -56,6 +61,12 @@ class ExplicitMotion : public Motion {
   ContactIntegrals<double> step(const ChainState& from, const AffineContactForce<double>& force,
                                 double h_s, ChainState& to) const override;
   void restart(const AffineContactForce<double>&, ChainState&) const override {}
+  PlanarVector<double> momentum_Ns(const ChainState& state) const override {
+    return chain_.momentum_Ns(state.v);
+  }
+  std::vector<PlanarVector<double>> node_positions_m(const ChainState& state) const override {
+    return chain_.node_positions_m(state.q);
+  }
   std::vector<JointReaction> reactions(const AffineContactForce<double>& force,
                                        const ChainState& state) const override;
 

@@ -49,13 +49,22 @@ struct ContactIntegrals {
   Real work_t{};     ///< int F_t V_t dt [J]
 };
 
-/// Steps q and v (2 chain.rows entries each) by h seconds into q_next and v_next, which may be q
-/// and v themselves. `scratch` has the same size. As chain_kernel.h, for numbers and lanes.
+/// Watches nothing.
 template <class Real>
+struct UnwatchedStep {
+  void start(std::size_t, const PlanarVector<Real>&) {}
+  void end(std::size_t, const PlanarVector<Real>&) {}
+};
+
+/// Steps q and v (2 chain.rows entries each) by h seconds into q_next and v_next, which may be q
+/// and v themselves. `scratch` has the same size. As chain_kernel.h, for numbers and lanes. `watch`
+/// is told the rates at the start and at the end of the step, row by row from the tip to the row
+/// after the pin, while they are in registers.
+template <class Real, class Watch = UnwatchedStep<Real>>
 inline ContactIntegrals<Real> pefrl_step(const ChainTables& chain,
                                          const AffineContactForce<Real>& force, const Real& h_s,
                                          const Real* q, const Real* v, Real* q_next, Real* v_next,
-                                         Real* scratch) {
+                                         Real* scratch, Watch&& watch = {}) {
   const std::size_t tip = 2 * chain.tip_row;
   ContactIntegrals<Real> integrals;
   put_pair(q_next, 0, pair_at(q, 0));  // the pin does not move
@@ -74,8 +83,14 @@ inline ContactIntegrals<Real> pefrl_step(const ChainTables& chain,
     const Real vt_before = v_from[tip];
     // Kick, and drift on, as the accelerations come.
     substitute_accelerations(chain, scratch, [&](std::size_t row, const PlanarVector<Real>& a) {
-      const PlanarVector<Real> v_row{v_from[2 * row] + kick_s * a.x,
-                                     v_from[2 * row + 1] + kick_s * a.y};
+      const PlanarVector<Real> v_before = pair_at(v_from, row);
+      const PlanarVector<Real> v_row{v_before.x + kick_s * a.x, v_before.y + kick_s * a.y};
+      if (stage == 0) {
+        watch.start(row, v_before);
+      }
+      if (stage + 1 == Pefrl::kKicks) {
+        watch.end(row, v_row);
+      }
       put_pair(v_next, row, v_row);
       q_next[2 * row] += drift_s * v_row.x;
       q_next[2 * row + 1] += drift_s * v_row.y;

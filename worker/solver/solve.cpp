@@ -3,6 +3,7 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "worker/solver/chain.h"
@@ -31,9 +32,19 @@ struct Finger::Parts {
         steps(chain, model),
         motion(make_motion(model, chain)) {}
 
+  /// Throws SolveError when the fall has no end, again and at once for every point: what one long
+  /// computation has said need not be computed again.
   const Fall& solved_fall() const {
-    std::call_once(fall_once,
-                   [this] { fall.emplace(motion, steps.fall_s(), longest_fall_s(chain)); });
+    std::call_once(fall_once, [this] {
+      try {
+        fall.emplace(motion, steps.fall_s(), longest_fall_s(chain));
+      } catch (const SolveError& error) {
+        fall_error = error.what();
+      }
+    });
+    if (!fall) {
+      throw SolveError(fall_error);
+    }
     return *fall;
   }
 
@@ -69,6 +80,7 @@ struct Finger::Parts {
   std::shared_ptr<const Motion> motion;
   mutable std::once_flag fall_once;
   mutable std::optional<Fall> fall;
+  mutable std::string fall_error;  ///< why there is no fall, once that is known
 };
 
 namespace {

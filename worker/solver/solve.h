@@ -41,8 +41,8 @@ class Finger {
   struct Parts;  ///< of the implementation
   using TraceSink = std::function<void(const TraceRow&)>;
   struct Extras {
-    bool reaction_peaks = false;  ///< fill CaseResult::reaction_peaks
-    TraceSink trace;              ///< called at every accepted step, from touch to separation
+    TraceSink trace;           ///< called at every accepted step, from touch to separation
+    bool trace_shape = false;  ///< fill TraceRow::nodes_m
   };
 
   /// Throws InputError when `model` is outside its domain.
@@ -53,7 +53,8 @@ class Finger {
 
   const ModelParameters& model() const;
 
-  /// Largest drop of the tip before it first turns back [m].
+  /// Largest drop of the tip before it first turns back [m]. Throws SolveError when the fall has no
+  /// answer.
   double largest_drop_m() const;
 
   /// Solves one point. Throws InputError for a value outside its range, SolveError when there is

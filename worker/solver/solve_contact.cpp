@@ -1,10 +1,12 @@
 #include "worker/solver/solve_contact.h"
 
+#include <algorithm>
 #include <chrono>
-#include <optional>
 #include <utility>
+#include <vector>
 
 #include "worker/solver/contact_outcome.h"
+#include "worker/solver/reaction_peaks.h"
 
 namespace oblique::solver {
 
@@ -16,11 +18,20 @@ CaseResult solve_contact(const Motion& motion, const ContactParameters& paramete
   const Energies in = motion.energies(accepted);
   Contact contact(parameters, touch, steps);
   motion.restart(contact.force(), accepted);
-  std::optional<ContactObserver> observer;
-  if (ContactObserver::is_needed(extras)) {
-    observer.emplace(motion, extras, touch);
-    observer->accepted(contact, accepted);
-  }
+  const ContactTracer tracer(motion, extras, touch);
+  std::vector<double> squared_N2(motion.reactions(contact.force(), accepted).size());
+  ReactionPeaks reaction_peaks(squared_N2.size());
+  const auto observe = [&] {
+    const auto reactions = motion.reactions(contact.force(), accepted);
+    std::transform(reactions.begin(), reactions.end(), squared_N2.begin(),
+                   [](const JointReaction& r) { return r.x_N * r.x_N + r.y_N * r.y_N; });
+    reaction_peaks.set_span(0, contact.time_s(), 0.0);
+    reaction_peaks.add(squared_N2.data());
+    if (extras.trace) {
+      tracer.accepted(contact, accepted);
+    }
+  };
+  observe();
   ChainState trial = accepted;
   while (!contact.finished()) {
     const auto integrals = motion.step(accepted, contact.force(), contact.trial_step_s(), trial);
@@ -32,14 +43,10 @@ CaseResult solve_contact(const Motion& motion, const ContactParameters& paramete
     if (contact.events() != events) {
       motion.restart(contact.force(), accepted);
     }
-    if (observer) {
-      observer->accepted(contact, accepted);
-    }
+    observe();
   }
   CaseResult result = contact_result(contact, parameters, touch, in, motion.energies(accepted));
-  if (observer) {
-    result.reaction_peaks = observer->reaction_peaks();
-  }
+  result.reaction_peaks = reaction_peaks.peaks(0);
   result.solver.dt_s = steps.compression_s;
   result.solver.steps = contact.steps();
   result.solver.wall_s =

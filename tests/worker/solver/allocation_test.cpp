@@ -65,5 +65,27 @@ TEST(Allocations, AStepInLanesMakesNone) {
   EXPECT_EQ(fine.allocations, coarse.allocations);
 }
 
+/// Allocations of one point that has no answer.
+std::uint64_t allocations_of_a_failure(const Finger& finger) {
+  std::optional<PointRequest> request = PointRequest{0, 1.0, 0.4, 1.0};
+  const std::uint64_t before = allocations();
+  finger.solve_points([&] { return std::exchange(request, std::nullopt); },
+                      [](PointOutcome&& outcome) { EXPECT_NE(outcome.error, ""); });
+  return allocations() - before;
+}
+
+TEST(Allocations, AFallThatFailsIsSolvedOnceForAllPoints) {
+  ModelParameters model;
+  model.integrator = Integrator::kGeneralizedAlpha;
+  model.elements_per_link = 1;
+  model.dt_fall_s = 0.025;  // some steps on, Newton's method does not converge
+  const Finger finger(model);
+  const std::uint64_t first = allocations_of_a_failure(finger);
+  for (int again = 0; again < 3; ++again) {
+    EXPECT_LT(allocations_of_a_failure(finger), first / 4) << "every implicit step makes some";
+  }
+  EXPECT_THROW(finger.largest_drop_m(), SolveError);
+}
+
 }  // namespace
 }  // namespace oblique::solver

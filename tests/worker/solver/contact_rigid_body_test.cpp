@@ -38,7 +38,7 @@ CaseResult solved(const RigidImpact::Parameters& p, double step_radians = 2e-3,
   const double dt_s = step_radians * radian_s;
   // Restitution is 1/e* times faster.
   return solve_contact(motion, {p.k_N_m, p.eta2, p.mu, p.e_star}, {dt_s, dt_s * p.e_star},
-                       motion.moving(p.V0_m_s), {false, trace});
+                       motion.moving(p.V0_m_s), {trace, false});
 }
 
 double stick_s(const CaseResult& result) {

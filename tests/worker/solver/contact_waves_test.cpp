@@ -38,7 +38,7 @@ void follow(const Chain& chain, const ContactParameters& parameters, const Chain
     }
     see(row);
   };
-  EXPECT_THROW(solve_contact(motion, parameters, {dt_s, dt_s}, start, {false, trace}), SeenEnough);
+  EXPECT_THROW(solve_contact(motion, parameters, {dt_s, dt_s}, start, {trace, false}), SeenEnough);
 }
 
 /// Largest error of the force on the tip of a link of n elements that meets a spring sideways,

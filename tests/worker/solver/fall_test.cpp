@@ -113,6 +113,26 @@ TEST(Fall, TipStandsStillAtTheLargestDrop) {
   EXPECT_LT(coarse.tip_at(coarse.fall.largest_drop_m() - 1e-3).vy_m_s, -0.1);
 }
 
+TEST(Fall, TurnThatLiesEarlyInItsStepIsFoundAllTheSame) {
+  const FallOf fine(coarse_model(), 9e-6);
+  const double largest_m = fine.fall.largest_drop_m();
+  const double turn_s = fine.fall.state_at(largest_m).t_s;
+  // Just after the turn, in its middle, and just before the next step.
+  for (const double fraction : {0.01, 0.5, 0.99}) {
+    SCOPED_TRACE(fraction);
+    const FallOf one(coarse_model(), turn_s / (std::floor(turn_s / 9e-6) + fraction));
+    EXPECT_NEAR(one.fall.largest_drop_m(), largest_m, 1e-9);
+    const ChainState top = one.fall.state_at(one.fall.largest_drop_m());
+    EXPECT_NEAR(-one.chain.tip(top).y_m, one.fall.largest_drop_m(), 1e-15);
+    EXPECT_NEAR(top.t_s, turn_s, 1e-6) << "the drop fixes the instant only to the root of rounding";
+    // And just below it, on the way down.
+    const ChainState below = one.fall.state_at(largest_m - 1e-9);
+    EXPECT_LT(below.t_s, top.t_s);
+    EXPECT_LT(one.chain.tip(below).vy_m_s, 0.0);
+    EXPECT_NEAR(-one.chain.tip(below).y_m, largest_m - 1e-9, 1e-15);
+  }
+}
+
 class FallOrder : public testing::Test {
  protected:
   static constexpr double kCoarse_s = 12e-6;

@@ -50,6 +50,13 @@ class RigidTipMotion : public Motion {
     return integrals;
   }
   void restart(const AffineContactForce<double>&, ChainState&) const override {}
+  PlanarVector<double> momentum_Ns(const ChainState& state) const override {
+    return {mass_kg_(0, 0) * state.v[0] + mass_kg_(0, 1) * state.v[1],
+            mass_kg_(1, 0) * state.v[0] + mass_kg_(1, 1) * state.v[1]};
+  }
+  std::vector<PlanarVector<double>> node_positions_m(const ChainState& state) const override {
+    return {{state.q[0], state.q[1]}};
+  }
   std::vector<JointReaction> reactions(const AffineContactForce<double>&,
                                        const ChainState&) const override {
     return {};

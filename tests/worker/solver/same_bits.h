@@ -52,6 +52,11 @@ inline void expect_same_bits(const CaseResult& a, const CaseResult& b) {
     EXPECT_EQ(a.stick_intervals[i].t0_s, b.stick_intervals[i].t0_s);
     EXPECT_EQ(a.stick_intervals[i].t1_s, b.stick_intervals[i].t1_s);
   }
+  ASSERT_EQ(a.reaction_peaks.size(), b.reaction_peaks.size());
+  for (std::size_t i = 0; i < a.reaction_peaks.size(); ++i) {
+    EXPECT_EQ(a.reaction_peaks[i].t_s, b.reaction_peaks[i].t_s);
+    EXPECT_EQ(a.reaction_peaks[i].force_N, b.reaction_peaks[i].force_N);
+  }
   EXPECT_EQ(a.energy.kinetic_in_J, b.energy.kinetic_in_J);
   EXPECT_EQ(a.energy.friction_J, b.energy.friction_J);
   EXPECT_EQ(a.energy.restitution_J, b.energy.restitution_J);

@@ -106,7 +106,6 @@ TEST(SameBits, FromSeveralThreadsAtOnceThatShareAFinger) {
 TEST(SameBits, WithATraceOrWithout) {
   int rows = 0;
   Finger::Extras extras;
-  extras.reaction_peaks = true;
   extras.trace = [&rows](const TraceRow&) { ++rows; };
   const CaseResult traced = coarse_finger().solve(1.0, 0.9, 0.7, extras);
   EXPECT_GT(rows, 10);
