@@ -1,8 +1,10 @@
 #include "client/run_service.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <iostream>
 #include <string>
+#include <system_error>
 
 #include "client/connection.h"
 #include "client/watching.h"
@@ -48,6 +50,18 @@ void tell_how_to_continue(const Study& study, const RunSettings& settings) {
   std::cerr << "Stopped. What was solved of \"" << study.name << "\" is in "
             << settings.service.database.string()
             << "; the same command again goes on from there.\n";
+}
+
+/// Rows that were not merged into the file are missing in a copy of it.
+void tell_of_log(const std::filesystem::path& database) {
+  std::error_code ignored;
+  const std::string log = database.string() + "-wal";
+  const auto size = std::filesystem::file_size(log, ignored);
+  if (!ignored && size > 0) {
+    std::cerr << "Another program reads " << database.string() << ", so " << log
+              << " holds some of its rows: a copy needs both files. `oblique backup COPY.db --db "
+              << database.string() << "` makes one that is whole.\n";
+  }
 }
 
 RunEnd submit_and_wait(const Study& study, const RunSettings& settings, EmbeddedService& service,
@@ -105,6 +119,7 @@ std::optional<RunEnd> run_study(const Study& study, const RunSettings& settings,
     EmbeddedService service(settings.service, stop);
     auto end = submit_and_wait(study, settings, service, stop);
     service.stop();
+    tell_of_log(settings.service.database);
     return end;
   } catch (const Interrupted&) {
     tell_how_to_continue(study, settings);

@@ -90,8 +90,16 @@ class Storage {
   virtual ~Storage() = default;
 
   /// Makes all changes durable, in order, in one transaction. Throws StorageError: then none of
-  /// them was kept.
+  /// them was kept. Throws StorageGone as `check` does, before and after the transaction: nothing
+  /// that came back is lost.
   virtual void commit(std::span<const Change> changes) = 0;
+
+  /// Throws StorageGone when the database is not where it was opened.
+  virtual void check() {}
+
+  /// Moves the write-ahead log into the database and empties it, so that the one file holds all.
+  /// False when a reader keeps it from doing so: to be tried again. Throws StorageError.
+  virtual bool merge_log() { return true; }
 };
 
 }  // namespace oblique::server

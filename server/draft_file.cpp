@@ -3,6 +3,8 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <system_error>
 #include <utility>
@@ -13,6 +15,12 @@ namespace oblique::server {
 
 DraftFile::DraftFile(std::string path) : path_(std::move(path)) {
   remove();
+  constexpr mode_t kOwnerOnly = 0600;
+  const int file = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kOwnerOnly);
+  if (file < 0) {
+    throw StorageError("cannot write " + path_ + ": " + std::strerror(errno));
+  }
+  ::close(file);
 }
 
 DraftFile::~DraftFile() {

@@ -8,6 +8,7 @@ namespace oblique::server {
 /// with this object, so that a half-made database never has its name.
 class DraftFile {
  public:
+  /// Makes the file, empty and for its owner alone (mode 0600). Throws StorageError.
   explicit DraftFile(std::string path);
   ~DraftFile();
   DraftFile(const DraftFile&) = delete;

@@ -33,6 +33,8 @@ constexpr std::chrono::milliseconds kTick{100};
 constexpr std::chrono::milliseconds kLinger{500};
 /// A port's share of a turn: then the other port, the disk and the clock get theirs.
 constexpr std::chrono::milliseconds kShareOfTurn{5};
+/// When the database is gone, peers can still ask for so long why.
+constexpr std::chrono::seconds kFarewell{3};
 /// What has arrived when the server is told to stop is still read, for so long at most.
 constexpr std::chrono::milliseconds kLongestDrain{1000};
 
@@ -122,6 +124,10 @@ class Loop::Parts final : public Outbox {
         network_(settings.network),
         workers_(network_.listen(address_, settings.worker_port)),
         clients_(network_.listen(address_, settings.client_port)) {
+    if (store_.is_new()) {
+      spdlog::info("made the database {}: only its owner can read it (chmod lets others)",
+                   settings.database);
+    }
     ServiceSettings service = std::move(settings.service);
     service.database_id = store_.database_id();
     service.last_study_id = store_.last_study_id();
@@ -138,7 +144,8 @@ class Loop::Parts final : public Outbox {
                                  {queried_.descriptor(), POLLIN, 0},
                                  {stop_fd, POLLIN, 0}}};
     bool has_more = false;
-    while (items.back().revents == 0) {
+    std::optional<Clock::time_point> farewell_until;
+    while (items.back().revents == 0 && (!farewell_until || Clock::now() < *farewell_until)) {
       const auto wait = std::chrono::ceil<std::chrono::milliseconds>(next_tick - Clock::now());
       ::poll(items.data(), items.size(),
              has_more ? 0 : static_cast<int>(std::max<std::int64_t>(wait.count(), 0)));
@@ -150,6 +157,9 @@ class Loop::Parts final : public Outbox {
       if (Clock::now() >= next_tick) {
         service_->tick(now());
         next_tick = Clock::now() + kTick;
+      }
+      if (service_->storage_is_gone() && !farewell_until) {
+        farewell_until = Clock::now() + kFarewell;
       }
     }
     return finish();
@@ -252,7 +262,7 @@ class Loop::Parts final : public Outbox {
     if (lost > 0) {
       spdlog::error("{} changes could not be made durable and were not acknowledged", lost);
     }
-    return {lost};
+    return {lost, service_->storage_is_gone()};
   }
 
   std::string address_;

@@ -23,6 +23,7 @@ struct LoopSettings {
 /// What the loop ended with.
 struct LoopEnd {
   std::size_t lost_writes;  ///< changes that could not be made durable
+  bool lost_database;       ///< it was deleted or replaced, and so the server ended
 };
 
 /// The server: its network, the writer and the readers of queries, and one loop that feeds the
@@ -41,8 +42,8 @@ class Loop {
   std::string client_endpoint() const;
   std::string worker_endpoint() const;
 
-  /// Runs until `stop_fd` becomes readable; then tells the workers, makes what was received
-  /// durable, acknowledges it and returns.
+  /// Runs until `stop_fd` becomes readable, or a little longer than the database is there; then
+  /// tells the workers, makes what was received durable, acknowledges it and returns.
   LoopEnd run(int stop_fd);
 
  private:

@@ -94,7 +94,7 @@ int run(const LoopSettings& settings, int ready_fd) {
     tell_ready(ready_fd, loop);
   }
   const auto end = loop.run(stop_fd);
-  return end.lost_writes == 0 ? 0 : kFailed;
+  return end.lost_writes == 0 && !end.lost_database ? 0 : kFailed;
 }
 
 }  // namespace

@@ -199,6 +199,17 @@ void Service::written(const WriteReport& report, Instant now) {
     feed(DispatchHeld{stopping_ || disk_is_behind_}, now);
     return;
   }
+  if (report.kind == WriteReport::Kind::kGone) {
+    lose_storage(report.error, now);
+    return;
+  }
+  if (report.kind == WriteReport::Kind::kUnmerged) {
+    outbox_.note(Severity::kWarning,
+                 "another program reads the database and keeps its write-ahead log (the file "
+                 "beside it that ends in -wal) from being merged: until then a copy needs both "
+                 "files; `oblique backup` makes one that is whole");
+    return;
+  }
   const auto found = writes_.find(report.ticket);
   if (found == writes_.end()) {
     return;
@@ -310,6 +321,25 @@ void Service::refused(const Write& meaning, const std::string& error) {
   } else if (const auto* forgotten = std::get_if<OfFailures>(&meaning)) {
     reply_error(forgotten->client, "the change was not stored, the study is as before: " + error);
   }
+}
+
+/// Nobody is told that something is stored from here on.
+void Service::lose_storage(const std::string& error, Instant now) {
+  outbox_.note(Severity::kError, error);
+  storage_fault_ = error;
+  storage_is_gone_ = true;
+  while (!writes_.empty()) {
+    const Write meaning = std::move(writes_.begin()->second);
+    writes_.erase(writes_.begin());
+    refused(meaning, error);
+  }
+  waiting_changes_ = 0;
+  protocol::ServerToWorker notice;
+  notice.mutable_notice()->set_text(error);
+  for (const auto& [id, peer] : peers_) {
+    send(id, notice);
+  }
+  stop(now);
 }
 
 // ---- Time -------------------------------------------------------------------------------------

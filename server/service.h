@@ -94,6 +94,8 @@ class Service {
 
   /// Something is on its way to the disk.
   bool waits_for_disk() const { return !writes_.empty(); }
+  /// The database is not where it was: nothing more can be stored, and the server should end.
+  bool storage_is_gone() const { return storage_is_gone_; }
   /// Frames that no sound peer sends.
   std::uint64_t bad_frames() const { return bad_frames_; }
   const Scheduler& scheduler() const { return scheduler_; }
@@ -207,6 +209,7 @@ class Service {
   void write_failure(const StoreFailure& effect, Instant now);
   void stored(const Write& meaning, Instant now);
   void refused(const Write& meaning, const std::string& error);
+  void lose_storage(const std::string& error, Instant now);
 
   ServiceSettings settings_;
   Outbox& outbox_;
@@ -225,6 +228,7 @@ class Service {
   std::uint64_t bad_frames_ = 0;
   std::uint64_t refused_workers_ = 0;
   std::string storage_fault_;  // why the database takes no results; empty: it does
+  bool storage_is_gone_ = false;
   bool stopping_ = false;
 };
 

@@ -73,6 +73,10 @@ void Service::client_frame(const std::string& identity, std::string_view frame, 
     reply_error(client, "too many changes wait for the disk already: ask again later");
     return;
   }
+  if (storage_is_gone_ && !request.has_status() && !request.has_workers()) {
+    reply_error(client, storage_fault_);
+    return;
+  }
   switch (request.kind_case()) {
     case Kind::kSubmit:
       submit(client, request.submit(), now);
@@ -271,7 +275,8 @@ std::string Service::what_it_waits_for(const Study& study, const StudyCounts& co
     return {};
   }
   if (!storage_fault_.empty()) {
-    return "the database, which takes no results: " + storage_fault_;
+    return storage_is_gone_ ? storage_fault_
+                            : "the database, which takes no results: " + storage_fault_;
   }
   if (scheduler_.workers() == 0) {
     return "a worker";

@@ -100,7 +100,7 @@ void Service::worker_frame(const std::string& identity, std::string_view frame, 
 }
 
 void Service::hello(const std::string& identity, const protocol::WorkerHello& hello, Instant now) {
-  if (writes_.size() >= settings_.most_unstored_messages) {
+  if (storage_is_gone_ || writes_.size() >= settings_.most_unstored_messages) {
     return;  // nobody is taken on while so much waits for the disk; the worker says it again
   }
   std::uint32_t hellos = 1;
@@ -197,6 +197,9 @@ void Service::send_probe(const SendProbe& effect) {
 
 void Service::results(WorkerId worker, protocol::Results message, Instant now) {
   constexpr std::size_t kWorkersThatKeepAll = 100;
+  if (storage_is_gone_) {
+    return;  // not acknowledged: the worker keeps them
+  }
   if (peers_.at(worker).unstored_messages >= settings_.most_unstored_messages ||
       writes_.size() >= kWorkersThatKeepAll * settings_.most_unstored_messages) {
     bad_peer(worker, "it sends more results than workers keep", now);

@@ -18,6 +18,13 @@ class StorageError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// The files of the database were deleted, renamed or replaced while it was open. Nothing that is
+/// written from then on is kept, and no later attempt will be.
+class StorageGone : public StorageError {
+ public:
+  using StorageError::StorageError;
+};
+
 struct CloseDatabase {
   void operator()(sqlite3* database) const { sqlite3_close_v2(database); }
 };

@@ -2,13 +2,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <cstring>
 #include <random>
-
-#include <fcntl.h>
-#include <sys/file.h>
-#include <unistd.h>
 
 #include <nlohmann/json.hpp>
 
@@ -66,30 +60,21 @@ void bind_model(Statement& insert, const solver::ModelParameters& model,
   }
 }
 
-}  // namespace
-
-/// Holds the file against a second server, apart from SQLite's own locks.
-class Store::Lock {
+/// While it lives the connection waits for no other one.
+class Impatience {
  public:
-  explicit Lock(const std::string& path)
-      : file_(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644)) {
-    if (file_ < 0) {
-      throw StorageError("cannot open the database " + path +
-                         " for writing: " + std::strerror(errno));
-    }
-    if (::flock(file_, LOCK_EX | LOCK_NB) != 0) {
-      ::close(file_);
-      throw StorageError("another server or `oblique run` already uses the database " + path +
-                         ": wait for it, or name another database");
-    }
+  explicit Impatience(sqlite3* database) : database_(database) {
+    sqlite3_busy_timeout(database_, 0);
   }
-  ~Lock() { ::close(file_); }
-  Lock(const Lock&) = delete;
-  Lock& operator=(const Lock&) = delete;
+  ~Impatience() { sqlite3_busy_timeout(database_, kBusyTimeout_ms); }
+  Impatience(const Impatience&) = delete;
+  Impatience& operator=(const Impatience&) = delete;
 
  private:
-  int file_;
+  sqlite3* database_;
 };
+
+}  // namespace
 
 struct Store::Statements {
   explicit Statements(sqlite3* database)
@@ -137,7 +122,7 @@ struct Store::Statements {
 
 Store::Store(const std::string& path) {
   check_path(path);
-  lock_ = std::make_unique<Lock>(path);
+  files_ = std::make_unique<DatabaseFiles>(path);
   database_ = open_database(path, SQLITE_OPEN_READWRITE);
   sqlite3_busy_timeout(database_.get(), kBusyTimeout_ms);
   add_row_checksum(database_.get());
@@ -152,14 +137,35 @@ Store::Store(const std::string& path) {
   log_->make_sure();
   if (kind == DatabaseKind::kEmpty) {
     create_schema();
+    log_->merge();  // the file is a whole database from the start
   } else if (kind == DatabaseKind::kOlder) {
     migrate();
   }
   statements_ = std::make_unique<Statements>(database_.get());
+  files_->expect(database_.get(), database_id());
 }
 
 Store::~Store() {
-  log_->before_closing();
+  try {
+    files_->check();
+    log_->before_closing();
+  } catch (const StorageGone&) {
+    leave_files();
+  }
+}
+
+/// Whoever comes after must not find our log beside another database, where SQLite would take it
+/// for that one's. What was acknowledged goes into our own file, wherever that may be now.
+void Store::leave_files() {
+  try {
+    if (files_->were_overwritten()) {
+      log_->discard();
+    } else {
+      log_->merge();
+    }
+  } catch (const StorageError&) {
+    // Nothing more can be done for it.
+  }
 }
 
 void Store::create_schema() {
@@ -201,6 +207,7 @@ void Store::commit(std::span<const Change> changes) {
            !std::holds_alternative<AddResults>(change);
   });
   try {
+    files_->check();
     log_->make_sure();
     set_sync(control);
     Transaction transaction(database_.get());
@@ -208,12 +215,20 @@ void Store::commit(std::span<const Change> changes) {
       std::visit([this](const auto& c) { add(c); }, change);
     }
     transaction.commit();
+    files_->check();  // or it was committed to a file that nobody will find
     log_->shorten();
   } catch (...) {
     model_ids_.clear();
     log_->suspect();
     throw;
   }
+}
+
+bool Store::merge_log() {
+  files_->check();
+  // A reader may take long, and results would wait.
+  const Impatience impatience(database_.get());
+  return log_->merge();
 }
 
 void Store::add(const AddStudy& change) {

@@ -8,6 +8,7 @@
 
 #include "server/attempt_runs.h"
 #include "server/changes.h"
+#include "server/database_files.h"
 #include "server/interval_set.h"
 #include "server/sqlite.h"
 #include "server/write_ahead_log.h"
@@ -29,8 +30,9 @@ struct StoredStudy {
 };
 
 /// The SQLite database (schema.sql), opened for writing. Only one Store may have a file open;
-/// readers are free. Results are committed without waiting for the disk's own cache (losing power
-/// may undo the last ones, which are then solved again), studies with a full sync.
+/// readers are free. A new file is for its owner alone (mode 0600). Results are committed without
+/// waiting for the disk's own cache (losing power may undo the last ones, which are then solved
+/// again), studies with a full sync.
 class Store final : public Storage {
  public:
   /// Opens the database at `path`, or makes it; one of an older schema is brought to the present
@@ -40,6 +42,11 @@ class Store final : public Storage {
   ~Store() override;
 
   void commit(std::span<const Change> changes) override;
+  void check() override { files_->check(); }
+  bool merge_log() override;
+
+  /// There was no file; it was made.
+  bool is_new() const { return files_->were_made(); }
 
   /// The log is moved into the database when it has so many pages; 1000 unless told.
   void checkpoint_at(int pages) { log_->shorten_at(pages); }
@@ -61,8 +68,8 @@ class Store final : public Storage {
 
  private:
   struct Statements;
-  class Lock;
 
+  void leave_files();
   void create_schema();
   void migrate();
   AttemptRuns attempts_of(std::uint64_t study_id);
@@ -76,7 +83,7 @@ class Store final : public Storage {
   void set_sync(bool full);
   std::uint64_t highest(const std::string& sql);
 
-  std::unique_ptr<Lock> lock_;  // outlives the connection: closing it drops SQLite's own locks
+  std::unique_ptr<DatabaseFiles> files_;  // outlives the connection
   DatabaseHandle database_;
   std::unique_ptr<WriteAheadLog> log_;
   std::unique_ptr<Statements> statements_;

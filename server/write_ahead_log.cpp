@@ -9,6 +9,13 @@
 namespace oblique::server {
 namespace {
 
+/// The log; nullptr while there is none.
+sqlite3_file* file_of(sqlite3* database) {
+  sqlite3_file* file = nullptr;
+  sqlite3_file_control(database, "main", SQLITE_FCNTL_JOURNAL_POINTER, &file);
+  return file != nullptr && file->pMethods != nullptr ? file : nullptr;  // without them: not open
+}
+
 /// Writes every byte of the file as it is, and syncs it. SQLite's code for what failed.
 int write_again(sqlite3_file* file) {
   std::vector<char> bytes(std::size_t{1} << 16U);
@@ -44,10 +51,8 @@ void WriteAheadLog::make_sure() {
   }
   // No other program may write meanwhile.
   const Transaction transaction(database_);
-  sqlite3_file* file = nullptr;
-  sqlite3_file_control(database_, "main", SQLITE_FCNTL_JOURNAL_POINTER, &file);
-  // Without methods it is not open: there is no log.
-  const int code = file != nullptr && file->pMethods != nullptr ? write_again(file) : SQLITE_OK;
+  sqlite3_file* file = file_of(database_);
+  const int code = file != nullptr ? write_again(file) : SQLITE_OK;
   if (code != SQLITE_OK) {
     throw StorageError("the write-ahead log cannot be written again after a failure: " +
                        std::string(sqlite3_errstr(code)));
@@ -63,6 +68,28 @@ void WriteAheadLog::shorten() {
       sqlite3_wal_checkpoint_v2(database_, "main", SQLITE_CHECKPOINT_PASSIVE, nullptr, nullptr);
   // Readers may keep it from doing all, which is no fault.
   is_suspect_ = code != SQLITE_OK && code != SQLITE_BUSY;
+}
+
+bool WriteAheadLog::merge() {
+  make_sure();
+  const int code =
+      sqlite3_wal_checkpoint_v2(database_, "main", SQLITE_CHECKPOINT_TRUNCATE, nullptr, nullptr);
+  if ((static_cast<unsigned>(code) & 0xffU) == SQLITE_BUSY) {
+    return false;
+  }
+  if (code != SQLITE_OK) {
+    is_suspect_ = true;
+    throw StorageError("the write-ahead log cannot be merged into the database: " +
+                       std::string(sqlite3_errstr(code)));
+  }
+  pages_ = 0;
+  return true;
+}
+
+void WriteAheadLog::discard() {
+  if (sqlite3_file* file = file_of(database_); file != nullptr) {
+    file->pMethods->xTruncate(file, 0);
+  }
 }
 
 void WriteAheadLog::before_closing() {

@@ -25,6 +25,11 @@ class WriteAheadLog {
   void make_sure();
   /// Moves a long log into the database. What was committed stands, also when this fails.
   void shorten();
+  /// Moves all of it into the database and empties it. False when a reader still needs it. Throws
+  /// StorageError.
+  bool merge();
+  /// Empties it: what it is to be merged into is not there any more.
+  void discard();
   /// A log of so many pages is long.
   void shorten_at(int pages) { long_pages_ = pages; }
   /// To be called before the database is closed, which would build on the log.

@@ -19,6 +19,21 @@ constexpr std::size_t kLargestGroup = 256;
 /// Pause before a faulty database is tried again.
 constexpr std::chrono::milliseconds kRetryPause{500};
 
+/// While nothing is to be written the database is looked after so often.
+constexpr std::chrono::milliseconds kTendPause{1000};
+
+/// So often a log that readers hold is tried before that is said.
+constexpr int kQuietTries = 5;
+
+/// At the end the log is tried so often, with such pauses: readers have some seconds.
+constexpr int kLastTries = 15;
+constexpr std::chrono::milliseconds kLastPause{200};
+
+bool ends_a_study(const Change& change) {
+  const auto* state = std::get_if<SetStudyState>(&change);
+  return state != nullptr && state->state == StudyState::kDone;
+}
+
 /// The study that a change is of; 0: of none.
 std::uint64_t study_of(const Change& change) {
   return std::visit(
@@ -68,30 +83,83 @@ void Writer::run() {
       if (commits_.is_faulty()) {
         wake_.wait_for(lock, kRetryPause, [this] { return finishing_; });
       } else if (jobs.empty()) {
-        wake_.wait(lock, [this] { return finishing_ || !queue_.empty(); });
+        wake_.wait_for(lock, kTendPause, [this] { return finishing_ || !queue_.empty(); });
       }
       std::move(queue_.begin(), queue_.end(), std::back_inserter(jobs));
       queue_.clear();
       last_round = finishing_;
     }
     const bool was_faulty = commits_.is_faulty();
-    auto reports = jobs.empty() ? std::vector<WriteReport>() : commits_.write(jobs);
+    auto reports = jobs.empty() ? commits_.tend() : commits_.write(jobs);
     if (!reports.empty()) {
       report_(std::move(reports));
     }
-    if (last_round && (jobs.empty() || (was_faulty && commits_.is_faulty()))) {
+    const bool gives_up = commits_.is_gone() || (was_faulty && commits_.is_faulty());
+    if (last_round && (jobs.empty() || gives_up)) {
       left_over_ = jobs.size();
+      merge_before_the_end();
       return;
     }
   }
 }
 
+void Writer::merge_before_the_end() {
+  std::vector<WriteReport> reports;
+  bool merged = false;
+  for (int tries = 0; !merged && !commits_.is_gone() && tries < kLastTries; ++tries) {
+    if (tries > 0) {
+      std::this_thread::sleep_for(kLastPause);
+    }
+    merged = commits_.merge(reports);
+  }
+  if (!merged && !commits_.is_gone()) {
+    reports.push_back({WriteReport::Kind::kUnmerged, 0, {}});
+  }
+  if (!reports.empty()) {
+    report_(std::move(reports));
+  }
+}
+
 std::vector<WriteReport> GroupCommit::write(std::deque<WriteJob>& jobs) {
   std::vector<WriteReport> reports;
-  if (!jobs.empty() && !write_group(jobs, reports)) {
+  if (!gone_ && !jobs.empty() && !write_group(jobs, reports)) {
     write_singly(jobs, reports);
   }
   return reports;
+}
+
+std::vector<WriteReport> GroupCommit::tend() {
+  std::vector<WriteReport> reports;
+  if (gone_) {
+    return reports;
+  }
+  try {
+    storage_.check();
+  } catch (const StorageGone& error) {
+    note_gone(error, reports);
+    return reports;
+  }
+  if (to_be_merged_ && !merge(reports) && ++tries_ == kQuietTries) {
+    reports.push_back({WriteReport::Kind::kUnmerged, 0, {}});
+  }
+  return reports;
+}
+
+bool GroupCommit::merge(std::vector<WriteReport>& reports) {
+  try {
+    to_be_merged_ = !storage_.merge_log();
+    return !to_be_merged_;
+  } catch (const StorageGone& error) {
+    note_gone(error, reports);
+  } catch (const StorageError&) {
+    // What was committed stands, and the log is still there.
+  }
+  return false;
+}
+
+void GroupCommit::note_gone(const StorageGone& error, std::vector<WriteReport>& reports) {
+  gone_ = true;
+  reports.push_back({WriteReport::Kind::kGone, 0, error.what()});
 }
 
 bool GroupCommit::write_group(std::deque<WriteJob>& jobs, std::vector<WriteReport>& reports) {
@@ -101,13 +169,24 @@ bool GroupCommit::write_group(std::deque<WriteJob>& jobs, std::vector<WriteRepor
   for (std::size_t i = 0; i < size; ++i) {
     changes.push_back(std::move(jobs[i].change));
   }
-  try {
-    storage_.commit(changes);
-  } catch (const StorageError&) {
+  const auto put_back = [&] {
     for (std::size_t i = 0; i < size; ++i) {
       jobs[i].change = std::move(changes[i]);
     }
+  };
+  try {
+    storage_.commit(changes);
+  } catch (const StorageGone& error) {
+    put_back();
+    note_gone(error, reports);
+    return true;
+  } catch (const StorageError&) {
+    put_back();
     return false;  // which of them failed is found by trying each alone
+  }
+  if (std::any_of(changes.begin(), changes.end(), ends_a_study)) {
+    to_be_merged_ = true;
+    tries_ = 0;
   }
   if (std::exchange(faulty_, false)) {
     reports.push_back({WriteReport::Kind::kRecovered, 0, {}});
@@ -130,7 +209,7 @@ void GroupCommit::write_singly(std::deque<WriteJob>& jobs, std::vector<WriteRepo
   for (WriteJob& job : jobs) {
     // Behind a job that is kept nothing of its kind is tried, nor anything else of its study: done
     // and then retried must not become retried and then done.
-    if (!fault.empty() && !job.answer_failure) {
+    if (gone_ || (!fault.empty() && !job.answer_failure)) {
       keep(job);
       continue;
     }
@@ -141,6 +220,9 @@ void GroupCommit::write_singly(std::deque<WriteJob>& jobs, std::vector<WriteRepo
     try {
       storage_.commit({&job.change, 1});
       reports.push_back({WriteReport::Kind::kStored, job.ticket, {}});
+    } catch (const StorageGone& error) {
+      note_gone(error, reports);
+      keep(job);
     } catch (const StorageError& error) {
       if (job.answer_failure) {
         reports.push_back({WriteReport::Kind::kRefused, job.ticket, error.what()});
@@ -151,7 +233,7 @@ void GroupCommit::write_singly(std::deque<WriteJob>& jobs, std::vector<WriteRepo
     }
   }
   jobs = std::move(kept);
-  if (faulty_ != !fault.empty()) {
+  if (!gone_ && faulty_ != !fault.empty()) {
     faulty_ = !fault.empty();
     reports.push_back(
         {faulty_ ? WriteReport::Kind::kFault : WriteReport::Kind::kRecovered, 0, fault});

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "server/changes.h"
+#include "server/sqlite.h"
 
 namespace oblique::server {
 
@@ -29,6 +30,8 @@ struct WriteReport {
     kRefused,    ///< it failed and is given up; `error` says why
     kFault,      ///< the database does not take changes; jobs wait. Said once
     kRecovered,  ///< it does again
+    kGone,       ///< its files are not there any more; nothing is written from then on. Said once
+    kUnmerged,   ///< readers keep the write-ahead log from being merged. Said once a study or stop
   };
   Kind kind;
   std::uint64_t ticket = 0;
@@ -48,13 +51,27 @@ class GroupCommit {
 
   /// The last write left jobs that the database did not take.
   bool is_faulty() const { return faulty_; }
+  /// The database is not where it was; nothing is written any more.
+  bool is_gone() const { return gone_; }
+
+  /// To be called now and then while nothing waits: looks whether the database is still there, and
+  /// merges its log once a study is done.
+  std::vector<WriteReport> tend();
+
+  /// Merges the log. False when it must be tried again; the database may be gone by then.
+  bool merge(std::vector<WriteReport>& reports);
 
  private:
   bool write_group(std::deque<WriteJob>& jobs, std::vector<WriteReport>& reports);
   void write_singly(std::deque<WriteJob>& jobs, std::vector<WriteReport>& reports);
 
+  void note_gone(const StorageGone& error, std::vector<WriteReport>& reports);
+
   Storage& storage_;
   bool faulty_ = false;
+  bool gone_ = false;
+  bool to_be_merged_ = false;  // a study is done
+  int tries_ = 0;              // to merge since then
 };
 
 /// The one thread that writes the database. What waits is committed together, in order.
@@ -72,11 +89,13 @@ class Writer {
 
   void submit(WriteJob job);
 
-  /// Writes what waits and ends the thread. Returns how many jobs could not be made durable.
+  /// Writes what waits, merges the log and ends the thread. Returns how many jobs could not be made
+  /// durable.
   std::size_t finish();
 
  private:
   void run();
+  void merge_before_the_end();
 
   GroupCommit commits_;  // of the thread
   Report report_;

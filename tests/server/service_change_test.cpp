@@ -106,6 +106,45 @@ TEST_F(ServiceTest, TheAttemptGoesOnCountingAfterARetryAlsoWhenTheServerStartedA
   EXPECT_EQ(attempts, (std::map<std::uint64_t, std::uint32_t>{{0, 1}, {1, 5}}));
 }
 
+TEST_F(ServiceTest, WhenTheDatabaseIsGoneNothingMoreIsAcknowledgedAndEverybodyIsTold) {
+  request(submit_request("a"));
+  write_all();
+  hello();
+  credit(1);
+  ASSERT_TRUE(last_message().has_batch());
+  request(submit_request("b"));
+  outbox_.worker_messages.clear();
+  service_->written({WriteReport::Kind::kGone, 0, "the file was deleted"}, now_);
+  EXPECT_TRUE(service_->storage_is_gone());
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("the file was deleted")) << "who waited";
+  ASSERT_EQ(outbox_.worker_messages.size(), 2U);
+  EXPECT_EQ(outbox_.worker_messages[0].notice().text(), "the file was deleted");
+  EXPECT_TRUE(outbox_.worker_messages[1].has_stopping());
+
+  outbox_.jobs.clear();
+  outbox_.worker_messages.clear();
+  WorkerMessage results;
+  results.mutable_results()->set_study_id(1);
+  results.mutable_results()->set_sequence(1);
+  *results.mutable_results()->add_results() = solved_point(0);
+  worker_says(results);
+  credit(1);
+  service_->tick(now_);
+  EXPECT_TRUE(outbox_.jobs.empty());
+  EXPECT_TRUE(outbox_.worker_messages.empty()) << "the worker keeps its results";
+  for (const auto& asked :
+       {submit_request("c"), change_request("a", protocol::STUDY_CHANGE_PAUSE)}) {
+    request(asked);
+    EXPECT_THAT(last_reply().error().message(), HasSubstr("the file was deleted"));
+  }
+  ClientRequest status;
+  status.set_protocol_version(protocol::kProtocolVersion);
+  status.mutable_status();
+  request(status);
+  ASSERT_EQ(last_reply().status().studies_size(), 1);
+  EXPECT_EQ(last_reply().status().studies(0).waits_for(), "the file was deleted");
+}
+
 TEST_F(ServiceTest, AChangeThatIsNotStoredLeavesTheStudyAsItWas) {
   request(submit_request("a"));
   write_all();

@@ -172,6 +172,99 @@ TEST(GroupCommitTest, AChangeThatWaitsIsNotOvertakenByALaterOneOfItsStudy) {
   EXPECT_EQ(jobs.front().ticket, 1U);
 }
 
+/// Takes changes until its files are gone; merges its log at the so-many-th try.
+class VanishingStorage final : public Storage {
+ public:
+  void commit(std::span<const Change> changes) override {
+    check();
+    committed += changes.size();
+    if (vanishes_in_commit) {
+      gone = true;
+      check();
+    }
+  }
+  void check() override {
+    if (gone) {
+      throw StorageGone("the file was deleted");
+    }
+  }
+  bool merge_log() override { return ++merges >= merged_at; }
+
+  bool gone = false;
+  bool vanishes_in_commit = false;
+  std::size_t committed = 0;
+  int merges = 0;
+  int merged_at = 1;
+};
+
+std::vector<Kind> kinds_of(const std::vector<WriteReport>& reports) {
+  std::vector<Kind> kinds;
+  for (const auto& report : reports) {
+    kinds.push_back(report.kind);
+  }
+  return kinds;
+}
+
+class VanishingTest : public testing::Test {
+ protected:
+  static std::deque<WriteJob> some_jobs() {
+    std::deque<WriteJob> jobs;
+    jobs.push_back({1, AddWorker{1, "", 1, "", "", ""}, false});
+    jobs.push_back({2, SetStudyState{1, StudyState::kDone, ""}, true});
+    return jobs;
+  }
+
+  VanishingStorage storage_;
+  GroupCommit commits_{storage_};
+};
+
+TEST_F(VanishingTest, NothingIsReportedStoredThatWasCommittedToFilesThatAreGone) {
+  storage_.vanishes_in_commit = true;
+  auto jobs = some_jobs();
+  EXPECT_EQ(kinds_of(commits_.write(jobs)), std::vector<Kind>{Kind::kGone});
+  EXPECT_EQ(storage_.committed, 2U) << "both in one transaction";
+  EXPECT_EQ(jobs.size(), 2U) << "they count as lost";
+  EXPECT_EQ(kinds_of(commits_.write(jobs)), std::vector<Kind>{}) << "said once, never tried again";
+  EXPECT_EQ(storage_.committed, 2U);
+}
+
+TEST_F(VanishingTest, FilesThatAreGoneAreNoticedWhileNothingIsWritten) {
+  EXPECT_EQ(kinds_of(commits_.tend()), std::vector<Kind>{});
+  storage_.gone = true;
+  EXPECT_EQ(kinds_of(commits_.tend()), std::vector<Kind>{Kind::kGone});
+  EXPECT_TRUE(commits_.is_gone());
+  EXPECT_EQ(kinds_of(commits_.tend()), std::vector<Kind>{});
+}
+
+TEST_F(VanishingTest, TheLogIsMergedWhenAStudyIsDoneAsSoonAsReadersLetIt) {
+  commits_.tend();
+  EXPECT_EQ(storage_.merges, 0) << "no study has ended";
+  auto jobs = some_jobs();
+  commits_.write(jobs);
+  storage_.merged_at = 8;
+  std::vector<Kind> told;
+  for (int i = 0; i < 20; ++i) {
+    for (const Kind kind : kinds_of(commits_.tend())) {
+      told.push_back(kind);
+    }
+  }
+  EXPECT_EQ(storage_.merges, 8);
+  EXPECT_EQ(told, std::vector<Kind>{Kind::kUnmerged}) << "said once";
+}
+
+TEST_F(WriterTest, AnEndMergesTheLogAndSaysWhenReadersKeepIt) {
+  for (const bool readers_stay : {false, true}) {
+    VanishingStorage storage;
+    storage.merged_at = readers_stay ? 1'000'000 : 3;
+    Reports reports;
+    Writer writer(storage, [&](const std::vector<WriteReport>& r) { reports.take(r); });
+    writer.submit(kept(1));
+    EXPECT_EQ(writer.finish(), 0U);
+    EXPECT_GE(storage.merges, 3);
+    EXPECT_EQ(reports.count(Kind::kUnmerged), readers_stay ? 1 : 0);
+  }
+}
+
 TEST_F(WriterTest, FinishingSaysHowManyChangesWereNotMadeDurable) {
   storage_.set_full(true);
   writer_.submit(kept(1));

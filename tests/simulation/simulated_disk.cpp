@@ -97,6 +97,11 @@ void SimulatedDisk::commit(std::span<const server::Change> changes) {
   model_.stored(changes);
 }
 
+bool SimulatedDisk::merge_log() {
+  ++merges;
+  return store_->merge_log();
+}
+
 void SimulatedDisk::check_rows() {
   using server::Statement;
   const auto database = server::open_database(files_.path(), SQLITE_OPEN_READONLY);

@@ -34,9 +34,13 @@ class SimulatedDisk final : public server::Storage {
   bool is_at_fault() const { return died() || files_.full || files_.failing; }
 
   void commit(std::span<const server::Change> changes) override;
+  void check() override { store_->check(); }
+  bool merge_log() override;
 
   /// Compares every row with the model's, and lets SQLite look for damage. Throws Violation.
   void check_rows();
+
+  std::uint64_t merges = 0;  ///< of the write-ahead log, tried
 
   const StoreModel& model() const { return model_; }
   SimulatedFiles& files() { return files_; }

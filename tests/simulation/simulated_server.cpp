@@ -66,6 +66,10 @@ void SimulatedServer::stop() {
       break;
     }
   }
+  if (!disk_.died()) {
+    std::vector<server::WriteReport> ignored;
+    commits_->merge(ignored);
+  }
   disk_.close();
   if (disk_.died()) {
     disk_.crash(false);
@@ -156,6 +160,11 @@ void SimulatedServer::write_group() {
   if (!jobs_.empty() && !writing_) {
     writing_ = true;
     after(commits_->is_faulty() ? 500 : 1, [this] { write_group(); });
+  } else if (jobs_.empty()) {
+    commits_->tend();
+    if (disk_.died()) {
+      crash(world_.chance(0.4));
+    }
   }
 }
 

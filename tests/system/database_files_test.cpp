@@ -1,0 +1,136 @@
+// What becomes of a database that is taken away under its server, or that others read while its
+// server ends.
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <sqlite3.h>
+
+#include "tests/system/many_points.h"
+#include "tests/system/processes.h"
+
+namespace oblique::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A connection of another program that reads.
+class OtherReader {
+ public:
+  explicit OtherReader(const std::string& file) {
+    sqlite3_open_v2(file.c_str(), &database_, SQLITE_OPEN_READONLY, nullptr);
+    sqlite3_prepare_v2(database_, "SELECT point FROM results", -1, &statement_, nullptr);
+  }
+  ~OtherReader() {
+    sqlite3_finalize(statement_);
+    sqlite3_close(database_);
+  }
+  OtherReader(const OtherReader&) = delete;
+  OtherReader& operator=(const OtherReader&) = delete;
+
+  /// Stays in the middle of a query; false when there is no row.
+  bool read_one() { return sqlite3_step(statement_) == SQLITE_ROW; }
+  void finish_query() { sqlite3_reset(statement_); }
+
+ private:
+  sqlite3* database_ = nullptr;
+  sqlite3_stmt* statement_ = nullptr;
+};
+
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+class DatabaseFilesTest : public ::testing::Test {
+ protected:
+  std::vector<std::string> run_arguments() const {
+    std::vector<std::string> words{"run", "--workers", "1", "--db", file_};
+    const auto points = many_points("some");
+    words.insert(words.end(), points.begin(), points.end());
+    return words;
+  }
+  void submit_to(const Server& server) const {
+    std::vector<std::string> words{"submit", "--server", server.client_url()};
+    const auto points = many_points("some");
+    words.insert(words.end(), points.begin(), points.end());
+    const Ran ran = run_client(folder_, words);
+    ASSERT_EQ(ran.exit_code, 0) << ran.errors;
+  }
+
+  Folder folder_;
+  std::string file_ = folder_.file("some.db");
+  Database database_{file_};
+};
+
+TEST_F(DatabaseFilesTest, AServerWhoseDatabaseIsDeletedSaysSoAndEndsWithOne) {
+  Server server(folder_, file_);
+  Worker worker(folder_, server.worker_url());
+  submit_to(server);
+  wait_until("rows in the database", [&] { return database_.rows() > 0; });
+  fs::remove(file_);
+  // While it still answers, it says why.
+  wait_until("a client is told", [&] {
+    const Ran asked = run_client(folder_, {"cancel", "some", "--server", server.client_url()});
+    return asked.exit_code == 1 && contains(asked.errors, "was deleted");
+  });
+  EXPECT_EQ(server.process().wait(), 1);
+  EXPECT_TRUE(contains(server.process().errors(), file_ + " was deleted"))
+      << server.process().errors();
+  EXPECT_TRUE(is_running(worker.pid())) << "it keeps what is not stored";
+}
+
+TEST_F(DatabaseFilesTest, ARunWhoseDatabaseIsReplacedFailsAndSaysSo) {
+  const std::string other = folder_.file("other.db");
+  ASSERT_EQ(
+      run_client(folder_, {"run", "--H", "1", "--mu", "0.4", "--e", "1", "--db", other}).exit_code,
+      0);
+  Process run(folder_, client_program(), run_arguments());
+  wait_until("rows in the database", [&] { return database_.rows() > 0; });
+  fs::rename(other, file_);
+  EXPECT_EQ(run.wait(), 1);
+  EXPECT_TRUE(contains(run.errors(), file_ + " was replaced")) << run.errors();
+  EXPECT_EQ(database_.rows(), 1) << "the other database is as it was";
+}
+
+TEST_F(DatabaseFilesTest, TheFileAloneHasAllRowsAfterARunAlsoWhenAnotherProgramHasItOpen) {
+  ASSERT_EQ(
+      run_client(folder_, {"run", "--H", "1", "--mu", "0.4", "--e", "1", "--db", file_}).exit_code,
+      0);
+  OtherReader reader(file_);
+  ASSERT_TRUE(reader.read_one());
+  reader.finish_query();
+  const Ran ran = run_client(folder_, run_arguments());
+  ASSERT_EQ(ran.exit_code, 0) << ran.errors;
+  EXPECT_FALSE(contains(ran.errors, "-wal")) << ran.errors;
+  fs::copy_file(file_, folder_.file("copy.db"));
+  EXPECT_EQ(Database(folder_.file("copy.db")).rows(), kManyPoints + 1);
+}
+
+TEST_F(DatabaseFilesTest, TheFileAloneHasAllRowsOnceAStudyIsDoneWhileItsServerRuns) {
+  Server server(folder_, file_);
+  const Worker worker(folder_, server.worker_url());
+  submit_to(server);
+  wait_until("all rows", [&] { return database_.rows() == kManyPoints; });
+  wait_until("an empty log", [&] { return fs::file_size(file_ + "-wal") == 0; });
+  fs::copy_file(file_, folder_.file("copy.db"));
+  EXPECT_EQ(Database(folder_.file("copy.db")).rows(), kManyPoints);
+}
+
+TEST_F(DatabaseFilesTest, AServerThatEndsUnderALongQueryOfAnotherProgramSaysWhereRowsAre) {
+  Server server(folder_, file_);
+  Worker worker(folder_, server.worker_url());
+  submit_to(server);
+  wait_until("rows in the database", [&] { return database_.rows() > 0; });
+  OtherReader reader(file_);
+  ASSERT_TRUE(reader.read_one());
+  const double seen = database_.rows();
+  wait_until("more rows", [&] { return database_.rows() > seen; });
+  server.process().send(SIGTERM);
+  EXPECT_EQ(server.process().wait(), 0);
+  EXPECT_TRUE(contains(server.process().errors(), "oblique backup")) << server.process().errors();
+}
+
+}  // namespace
+}  // namespace oblique::test
