@@ -13,16 +13,19 @@ constexpr const char* kExamples = R"(Examples:
   oblique check
   oblique check --db friction.db
 
-Reads the whole database: every page and index, every reference, and that each row is of a point
-that its study has. Exit code 1 when something is wrong. What can still be read of a damaged file is
-saved by:  oblique backup saved.db --db damaged.db --salvage)";
+Reads the whole database: every page and index, every reference, every row against its checksum and
+the recipe of its study. It also says which studies are not finished, which is no damage: a copy made
+without the file that ends in -wal lacks rows in this way. Exit code 1 when something is wrong. What
+can still be read of a damaged file is saved by:  oblique backup saved.db --db damaged.db --salvage)";
 
 int check(const DatabaseSettings& database) {
-  const auto faults = server::find_faults(database.file);
-  for (const auto& fault : faults) {
-    std::cout << protocol::visible(fault) << '\n';
+  const auto found = server::diagnose(database.file);
+  for (const auto* sentences : {&found.faults, &found.remarks}) {
+    for (const auto& sentence : *sentences) {
+      std::cout << protocol::visible(sentence) << '\n';
+    }
   }
-  if (faults.empty()) {
+  if (found.faults.empty()) {
     std::cerr << database.file << " is sound.\n";
     return kDone;
   }

@@ -23,7 +23,11 @@ std::string server_of_environment() {
 
 class DatabaseSource : public Source {
  public:
-  explicit DatabaseSource(std::string file) : file_(std::move(file)), reader_(file_) {}
+  explicit DatabaseSource(std::string file) : file_(std::move(file)), reader_(file_) {
+    if (!reader_.remark().empty()) {
+      std::cerr << reader_.remark() << ".\n";
+    }
+  }
 
   protocol::QueryReply query(const std::string& sql) override {
     return reader_.query(sql, server::kNoLimits);

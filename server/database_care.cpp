@@ -1,28 +1,26 @@
 #include "server/database_care.h"
 
+#include <cstddef>
 #include <filesystem>
+#include <utility>
 
 #include "server/draft_file.h"
-#include "server/result_row.h"
+#include "server/open_for_reading.h"
 #include "server/row_checksum.h"
+#include "server/row_faults.h"
 #include "server/sqlite.h"
 
 namespace oblique::server {
 namespace {
 
-constexpr int kBusyTimeout_ms = 5000;
+constexpr std::size_t kMostOfAKind = 20;
 
-DatabaseHandle open_ours(const std::string& path) {
-  check_path(path);
-  if (!std::filesystem::exists(path)) {
-    throw StorageError("there is no database " + path);
-  }
-  DatabaseHandle database = open_database(path, SQLITE_OPEN_READONLY);
-  sqlite3_busy_timeout(database.get(), kBusyTimeout_ms);
-  if (identify(database.get(), path) == DatabaseKind::kEmpty) {
+OpenedForReading open_ours(const std::string& path) {
+  OpenedForReading opened = open_for_reading(path);
+  if (identify(opened.database.get(), path) == DatabaseKind::kEmpty) {
     throw StorageError(path + " is empty: no study was ever stored in it");
   }
-  return database;
+  return opened;
 }
 
 std::vector<std::string> texts(sqlite3* database, const std::string& sql) {
@@ -43,6 +41,17 @@ std::vector<std::string> damaged_pages(sqlite3* database) {
   }
 }
 
+int schema_of(sqlite3* database) {
+  Statement version(database, "PRAGMA user_version");
+  return version.step() ? static_cast<int>(version.integer(0)) : 0;
+}
+
+/// Every study beside the number of its results, for FROM.
+std::string counted_studies() {
+  return "(SELECT *, (SELECT count(*) FROM results AS r WHERE r.study_id = s.study_id) AS results"
+         " FROM studies AS s)";
+}
+
 void copy_pages(sqlite3* from, sqlite3* to, const std::string& path) {
   sqlite3_backup* backup = sqlite3_backup_init(to, "main", from, "main");
   if (backup == nullptr) {
@@ -61,12 +70,12 @@ void back_up(const std::string& from, const std::string& to) {
   if (std::filesystem::exists(to)) {
     throw StorageError(to + " exists already: name a file that does not");
   }
-  const DatabaseHandle source = open_ours(from);
+  const OpenedForReading source = open_ours(from);
   DraftFile draft(to + ".part");
   {
     const DatabaseHandle copy =
         open_database(draft.path(), SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
-    copy_pages(source.get(), copy.get(), to);
+    copy_pages(source.database.get(), copy.get(), to);
     // One file, without a log beside it.
     execute(copy.get(), "PRAGMA journal_mode = DELETE");
     if (const auto faults = damaged_pages(copy.get()); !faults.empty()) {
@@ -76,36 +85,57 @@ void back_up(const std::string& from, const std::string& to) {
   draft.keep_as(to);
 }
 
-std::vector<std::string> find_faults(const std::string& path) {
-  const DatabaseHandle database = open_ours(path);
-  auto faults = damaged_pages(database.get());
-  const auto add = [&](const std::string& sql) {
-    for (auto& fault : texts(database.get(), sql)) {
-      faults.push_back(std::move(fault));
+Diagnosis diagnose(const std::string& path) {
+  const OpenedForReading opened = open_ours(path);
+  sqlite3* database = opened.database.get();
+  Diagnosis found;
+  if (!opened.remark.empty()) {
+    found.remarks.push_back(opened.remark);
+  }
+  found.faults = damaged_pages(database);
+  if (!found.faults.empty()) {
+    return found;  // what damaged pages say of anything else means nothing
+  }
+  add_row_checksum(database);
+  const auto add = [&](std::vector<std::string>& to, const std::string& sql) {
+    for (auto& text : texts(database, sql)) {
+      to.push_back(std::move(text));
     }
   };
-  if (!faults.empty()) {
-    return faults;  // what damaged pages say of anything else means nothing
-  }
-  add("SELECT 'table ' || \"table\" || ', row ' || rowid || ': refers to a row of ' || parent ||"
+  add(found.faults,
+      "SELECT 'table ' || \"table\" || ', row ' || rowid || ': refers to a row of ' || parent ||"
       " ' that is not there' FROM pragma_foreign_key_check LIMIT 20");
-  add("SELECT 'study ' || name || ': ' || count(*) || ' results of points that it does not have'"
+  add(found.faults,
+      "SELECT 'study ' || name || ': ' || count(*) || ' results of points that it does not have'"
       " FROM results JOIN studies USING (study_id) WHERE point < 0 OR point >= points"
       " GROUP BY study_id LIMIT 20");
-  add("SELECT 'study ' || name || ' is called done with ' || (SELECT count(*) FROM results AS r"
-      " WHERE r.study_id = s.study_id) || ' of ' || points || ' results' FROM studies AS s"
-      " WHERE state = 'done' AND points <> (SELECT count(*) FROM results AS r"
-      " WHERE r.study_id = s.study_id) LIMIT 20");
-  if (identify(database.get(), path) == DatabaseKind::kOurs) {
-    add_row_checksum(database.get());
-    add("SELECT 'study ' || study_id || ', ' || name || ': its recipe, name or size is not the one"
-        " that was stored' FROM studies"
-        " WHERE checksum <> row_checksum(study_id, name, recipe, points, created_at) LIMIT 20");
-    add("SELECT 'study ' || study_id || ', point ' || point || ': its row is not the one that was"
-        " stored' FROM results WHERE checksum <> " +
-        result_checksum_sql() + " LIMIT 20");
+  add(found.faults,
+      "SELECT 'study ' || name || ' is called done with ' || results || ' of ' || points ||"
+      " ' results' FROM " +
+          counted_studies() +
+          " WHERE state = 'done' AND results <> points"
+          " LIMIT 20");
+  const int schema = schema_of(database);
+  for (auto& fault : faults_of_rows(database, schema, kMostOfAKind)) {
+    found.faults.push_back(std::move(fault));
   }
-  return faults;
+  add(found.remarks,
+      "SELECT 'study ' || name || ' is ' || state || ': ' || results || ' of ' || points ||"
+      " ' points have a result' FROM " +
+          counted_studies() +
+          " WHERE results < points"
+          " ORDER BY study_id");
+  if (schema == kSchemaVersion) {
+    add(found.remarks,
+        "SELECT count(*) || ' of ' || (SELECT count(*) FROM results) || ' results have no checksum,"
+        " for they are of an earlier schema: a flipped bit in them may go unseen'"
+        " FROM results WHERE checksum IS NULL HAVING count(*) > 0");
+  }
+  return found;
+}
+
+std::vector<std::string> find_faults(const std::string& path) {
+  return diagnose(path).faults;
 }
 
 }  // namespace oblique::server

@@ -11,10 +11,18 @@ namespace oblique::server {
 /// damaged page.
 void back_up(const std::string& from, const std::string& to);
 
-/// What is wrong with the database at `path`, a sentence each, at most some twenty; empty when it
-/// is sound: every page and index, every reference, no row of a point that its study does not have,
-/// no study called done that is not. Reads all of it. Throws StorageError when it is no database of
-/// ours.
+/// What can be said of a database, a sentence each.
+struct Diagnosis {
+  std::vector<std::string> faults;   ///< damage, at most some twenty of a kind; empty: it is sound
+  std::vector<std::string> remarks;  ///< studies that are not finished, and what cannot be told
+};
+
+/// Looks at everything in the database at `path`: every page and index, every reference, that rows
+/// are what was stored and of points that their studies have, with the recipe's H, mu, e and model,
+/// that no study is called done that is not. Throws StorageError when it is no database of ours.
+Diagnosis diagnose(const std::string& path);
+
+/// The faults alone.
 std::vector<std::string> find_faults(const std::string& path);
 
 }  // namespace oblique::server

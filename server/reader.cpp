@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <chrono>
-#include <filesystem>
 #include <utility>
 
+#include "server/open_for_reading.h"
 #include "server/query_values.h"
 
 namespace oblique::server {
@@ -67,11 +67,9 @@ struct Reader::Deadline {
 };
 
 Reader::Reader(const std::string& path) {
-  check_path(path);
-  if (!std::filesystem::exists(path)) {
-    throw StorageError("there is no database " + path);
-  }
-  database_ = open_database(path, SQLITE_OPEN_READONLY);
+  auto opened = open_for_reading(path);
+  database_ = std::move(opened.database);
+  remark_ = std::move(opened.remark);
   sqlite3_busy_timeout(database_.get(), kBusyTimeout_ms);
   if (identify(database_.get(), path) == DatabaseKind::kEmpty) {
     throw StorageError(path + " is empty: no study was ever stored in it");

@@ -21,6 +21,9 @@ class Reader {
   /// schema, an unreadable file.
   explicit Reader(const std::string& path);
 
+  /// What there is to say of how the database is read (see open_for_reading); mostly nothing.
+  const std::string& remark() const { return remark_; }
+
   /// Runs one statement that only reads. A blob comes as the text x'0F..', as does a text that is
   /// not UTF-8. Throws QueryError: what `prepare_query` says, one over the time limit or
   /// interrupted, one that needs more memory than there is or than SQLite's heap limit, a row that
@@ -45,6 +48,7 @@ class Reader {
   protocol::QueryReply run(const std::string& sql, const QueryLimits& limits, const TakeRow& take);
 
   DatabaseHandle database_;
+  std::string remark_;
   std::atomic<bool> interrupted_ = false;
 };
 

@@ -141,6 +141,19 @@ std::string result_checksum_sql() {
   return "row_checksum(" + columns_and_marks().names + ")";
 }
 
+std::string study_checksum_sql() {
+  return "row_checksum(study_id, name, recipe, points, created_at)";
+}
+
+std::vector<std::string> output_columns() {
+  std::vector<std::string> names{"steps",    "mode",   "major_mode",     "peaks",
+                                 "ft_peaks", "phases", "stick_intervals"};
+  for (const auto& column : kRealColumns) {
+    names.emplace_back(column.name);
+  }
+  return names;
+}
+
 void bind_result(Statement& insert, const RowContext& context, const PointResult& result) {
   const bool solved = result.error().empty();
   insert.reset();

@@ -2,6 +2,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "proto/oblique.pb.h"
 #include "proto/recipe.h"
@@ -20,6 +21,12 @@ std::string insert_result_sql();
 /// What `checksum` of a row of `results` must be, as an expression over its columns. A later schema
 /// leaves columns that it adds out of it: earlier rows keep their checksums.
 std::string result_checksum_sql();
+/// The same for `studies`.
+std::string study_checksum_sql();
+
+/// The columns that a solved row has and a failed one lacks, in no particular order; without
+/// reaction_peaks, which rows of earlier schemas lack.
+std::vector<std::string> output_columns();
 
 /// What stands in a row of `results` beside the outputs of the solver.
 struct RowContext {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "server/draft_file.h"
+#include "server/open_for_reading.h"
 #include "server/result_row.h"
 #include "server/row_checksum.h"
 #include "server/sqlite.h"
@@ -171,10 +172,11 @@ void mend_references(sqlite3* database) {
           " OR model_id NOT IN (SELECT model_id FROM models)");
   execute(database, "DELETE FROM retries WHERE study_id NOT IN (SELECT study_id FROM studies)");
   // A worker's number that is known to be right stays, so that the row keeps its checksum.
-  execute(database,
-          "INSERT INTO workers SELECT worker, 'lost with a damaged file', 1, min(solver_version),"
-          " min(instruction_set), min(solved_at) FROM results WHERE checksum IS NOT NULL"
-          " AND worker NOT IN (SELECT worker_id FROM workers) GROUP BY worker");
+  execute(
+      database,
+      "INSERT INTO workers SELECT worker, 'lost with a damaged file', 1, min(solver_version),"
+      " min(instruction_set), min(solved_at) FROM results WHERE checksum IS NOT NULL"
+      " AND worker IS NOT NULL AND worker NOT IN (SELECT worker_id FROM workers) GROUP BY worker");
   execute(database,
           "UPDATE results SET worker = NULL"
           " WHERE worker NOT IN (SELECT worker_id FROM workers)");
@@ -186,14 +188,12 @@ void mend_references(sqlite3* database) {
 }  // namespace
 
 Salvaged salvage(const std::string& from, const std::string& to) {
-  check_path(from);
-  if (!std::filesystem::exists(from)) {
-    throw StorageError("there is no database " + from);
-  }
   if (std::filesystem::exists(to)) {
     throw StorageError(to + " exists already: name a file that does not");
   }
-  const DatabaseHandle source = open_database(from, SQLITE_OPEN_READWRITE);
+  const DatabaseHandle source = open_for_reading(from).database;
+  // Also what is shorter than its first page says can be read, as far as it goes.
+  execute(source.get(), "PRAGMA writable_schema = ON");
   check_tables(source.get(), from);
   add_row_checksum(source.get());
   DraftFile draft(to + ".part");

@@ -59,6 +59,7 @@ class Statement {
   void reset();
 
   int columns() const;
+  bool is_null(int column) const;
   std::int64_t integer(int column) const;
   double real(int column) const;
   std::string text(int column) const;  ///< bytes of a text or blob
