@@ -205,9 +205,11 @@ void Service::written(const WriteReport& report, Instant now) {
   }
   if (report.kind == WriteReport::Kind::kUnmerged) {
     outbox_.note(Severity::kWarning,
-                 "another program reads the database and keeps its write-ahead log (the file "
-                 "beside it that ends in -wal) from being merged: until then a copy needs both "
-                 "files; `oblique backup` makes one that is whole");
+                 "the write-ahead log, the file beside the database that ends in -wal, is not yet "
+                 "merged into it: " +
+                     report.error +
+                     ". Until then a copy needs both files; `oblique backup` makes one that is "
+                     "whole");
     return;
   }
   const auto found = writes_.find(report.ticket);

@@ -80,7 +80,7 @@ void Writer::run() {
     bool last_round = false;
     {
       std::unique_lock lock(mutex_);
-      if (commits_.is_faulty()) {
+      if (commits_.is_faulty() || commits_.is_gone()) {
         wake_.wait_for(lock, kRetryPause, [this] { return finishing_; });
       } else if (jobs.empty()) {
         wake_.wait_for(lock, kTendPause, [this] { return finishing_ || !queue_.empty(); });
@@ -104,6 +104,9 @@ void Writer::run() {
 }
 
 void Writer::merge_before_the_end() {
+  if (commits_.is_faulty()) {
+    return;  // what waits is not in the log either; that it is lost is said
+  }
   std::vector<WriteReport> reports;
   bool merged = false;
   for (int tries = 0; !merged && !commits_.is_gone() && tries < kLastTries; ++tries) {
@@ -113,7 +116,7 @@ void Writer::merge_before_the_end() {
     merged = commits_.merge(reports);
   }
   if (!merged && !commits_.is_gone()) {
-    reports.push_back({WriteReport::Kind::kUnmerged, 0, {}});
+    reports.push_back(commits_.unmerged());
   }
   if (!reports.empty()) {
     report_(std::move(reports));
@@ -140,7 +143,7 @@ std::vector<WriteReport> GroupCommit::tend() {
     return reports;
   }
   if (to_be_merged_ && !merge(reports) && ++tries_ == kQuietTries) {
-    reports.push_back({WriteReport::Kind::kUnmerged, 0, {}});
+    reports.push_back(unmerged());
   }
   return reports;
 }
@@ -148,11 +151,12 @@ std::vector<WriteReport> GroupCommit::tend() {
 bool GroupCommit::merge(std::vector<WriteReport>& reports) {
   try {
     to_be_merged_ = !storage_.merge_log();
+    why_unmerged_ = to_be_merged_ ? "another program is in the middle of reading" : "";
     return !to_be_merged_;
   } catch (const StorageGone& error) {
     note_gone(error, reports);
-  } catch (const StorageError&) {
-    // What was committed stands, and the log is still there.
+  } catch (const StorageError& error) {
+    why_unmerged_ = error.what();  // what was committed stands, and the log is still there
   }
   return false;
 }

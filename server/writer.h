@@ -31,7 +31,7 @@ struct WriteReport {
     kFault,      ///< the database does not take changes; jobs wait. Said once
     kRecovered,  ///< it does again
     kGone,       ///< its files are not there any more; nothing is written from then on. Said once
-    kUnmerged,   ///< readers keep the write-ahead log from being merged. Said once a study or stop
+    kUnmerged,  ///< the write-ahead log cannot be merged, as `error` says. Said once a study or end
   };
   Kind kind;
   std::uint64_t ticket = 0;
@@ -60,6 +60,8 @@ class GroupCommit {
 
   /// Merges the log. False when it must be tried again; the database may be gone by then.
   bool merge(std::vector<WriteReport>& reports);
+  /// Says that the last `merge` failed, and why.
+  WriteReport unmerged() const { return {WriteReport::Kind::kUnmerged, 0, why_unmerged_}; }
 
  private:
   bool write_group(std::deque<WriteJob>& jobs, std::vector<WriteReport>& reports);
@@ -72,6 +74,7 @@ class GroupCommit {
   bool gone_ = false;
   bool to_be_merged_ = false;  // a study is done
   int tries_ = 0;              // to merge since then
+  std::string why_unmerged_;
 };
 
 /// The one thread that writes the database. What waits is committed together, in order.

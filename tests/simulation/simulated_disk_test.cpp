@@ -54,6 +54,60 @@ bool live(SimulatedDisk& disk) {
   return !disk.died();
 }
 
+/// As `live`, on a disk where something fails once: what is refused is tried again.
+void live_through_a_failure(SimulatedDisk& disk) {
+  const auto insist = [](const auto& attempt) {
+    constexpr int kTries = 3;
+    for (int tries = 1;; ++tries) {
+      try {
+        attempt();
+        return;
+      } catch (const server::StorageError&) {
+        if (tries == kTries) {
+          throw;
+        }
+      }
+    }
+  };
+  insist([&] {
+    try {
+      disk.open();
+    } catch (const server::StorageError&) {
+      disk.crash(false);
+      throw;
+    }
+  });
+  for (std::uint64_t id = 1; id <= 3; ++id) {
+    const server::Change added = study(id);
+    insist([&] { disk.commit({&added, 1}); });
+    for (std::uint64_t point = 0; point < kPoints; ++point) {
+      const server::Change change = result(std::get<server::AddStudy>(added), point);
+      insist([&] { disk.commit({&change, 1}); });
+    }
+  }
+}
+
+TEST(FailingSync, NoneThatFailsAndForgetsLosesAStudyWhenThePowerGoes) {
+  std::uint64_t failures = 0;
+  for (std::int64_t sync = 1;; ++sync) {
+    for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+      World world(seed * 1000 + static_cast<std::uint64_t>(sync));
+      SimulatedDisk disk(world);
+      disk.files().plan_failing_sync(sync);
+      live_through_a_failure(disk);
+      if (disk.files().awaits_failing_sync()) {
+        EXPECT_GT(failures, 20U);
+        return;
+      }
+      ++failures;
+      disk.crash(true);
+      // The model refuses what is not there any more and was promised.
+      ASSERT_NO_THROW(disk.open()) << "sync " << sync << ", seed " << seed;
+      disk.check_rows();
+    }
+  }
+}
+
 class SimulatedDiskTest : public testing::TestWithParam<bool> {};
 
 TEST_P(SimulatedDiskTest, NoDeathInAnyOperationLosesWhatWasPromised) {

@@ -121,6 +121,10 @@ int SimulatedFiles::truncate(SimulatedFile& file, std::size_t size) {
 }
 
 int SimulatedFiles::sync(SimulatedFile& file, bool and_directory) {
+  if (failing_sync_in_ > 0 && --failing_sync_in_ == 0) {
+    file.forget_unsynced();
+    return SQLITE_IOERR_FSYNC;
+  }
   const bool dies = dies_now();
   if ((dies && world_.chance(0.5)) || fails_now()) {
     if (dies) {

@@ -47,6 +47,10 @@ class SimulatedFiles {
   void lose_power();
   /// The process dies within the so-many-th write, sync, truncation or deletion from now; 0: never.
   void plan_death(std::int64_t operations) { death_in_ = operations; }
+  /// The so-many-th sync from now fails, once, and what it did not write is lost; 0: none.
+  void plan_failing_sync(std::int64_t syncs) { failing_sync_in_ = syncs; }
+  /// The planned sync is still to come.
+  bool awaits_failing_sync() const { return failing_sync_in_ > 0; }
   /// Counts processes.
   std::uint64_t life() const { return life_; }
   /// The last connection that was opened.
@@ -79,6 +83,7 @@ class SimulatedFiles {
   Entries entries_;
   Entries durable_entries_;
   std::int64_t death_in_ = 0;
+  std::int64_t failing_sync_in_ = 0;
   std::uint64_t life_ = 0;
   bool used_ = false;
   sqlite3* connection_ = nullptr;
