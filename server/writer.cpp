@@ -161,6 +161,13 @@ bool GroupCommit::merge(std::vector<WriteReport>& reports) {
   return false;
 }
 
+void GroupCommit::note_ends(std::span<const Change> changes) {
+  if (std::any_of(changes.begin(), changes.end(), ends_a_study)) {
+    to_be_merged_ = true;
+    tries_ = 0;
+  }
+}
+
 void GroupCommit::note_gone(const StorageGone& error, std::vector<WriteReport>& reports) {
   gone_ = true;
   reports.push_back({WriteReport::Kind::kGone, 0, error.what()});
@@ -188,10 +195,7 @@ bool GroupCommit::write_group(std::deque<WriteJob>& jobs, std::vector<WriteRepor
     put_back();
     return false;  // which of them failed is found by trying each alone
   }
-  if (std::any_of(changes.begin(), changes.end(), ends_a_study)) {
-    to_be_merged_ = true;
-    tries_ = 0;
-  }
+  note_ends(changes);
   if (std::exchange(faulty_, false)) {
     reports.push_back({WriteReport::Kind::kRecovered, 0, {}});
   }
@@ -223,6 +227,7 @@ void GroupCommit::write_singly(std::deque<WriteJob>& jobs, std::vector<WriteRepo
     }
     try {
       storage_.commit({&job.change, 1});
+      note_ends({&job.change, 1});
       reports.push_back({WriteReport::Kind::kStored, job.ticket, {}});
     } catch (const StorageGone& error) {
       note_gone(error, reports);

@@ -5,6 +5,7 @@
 #include <deque>
 #include <functional>
 #include <mutex>
+#include <span>
 #include <string>
 #include <thread>
 #include <vector>
@@ -67,6 +68,7 @@ class GroupCommit {
   bool write_group(std::deque<WriteJob>& jobs, std::vector<WriteReport>& reports);
   void write_singly(std::deque<WriteJob>& jobs, std::vector<WriteReport>& reports);
 
+  void note_ends(std::span<const Change> changes);
   void note_gone(const StorageGone& error, std::vector<WriteReport>& reports);
 
   Storage& storage_;
