@@ -155,13 +155,32 @@ nlohmann::json json_value(const Value& value) {
   }
 }
 
+// A key stands for one value only: of equal names the second becomes name_2, and so on.
+std::vector<std::string> distinct_names(const QueryReply& rows) {
+  std::vector<std::string> names;
+  const auto is_taken = [&names, &rows](const std::string& name) {
+    return std::find(names.begin(), names.end(), name) != names.end() ||
+           std::find(rows.columns().begin(), rows.columns().end(), name) != rows.columns().end();
+  };
+  for (const std::string& column : rows.columns()) {
+    std::string name = column;
+    const bool is_first = std::find(names.begin(), names.end(), name) == names.end();
+    for (int i = 2; !is_first && is_taken(name); ++i) {
+      name = column + "_" + std::to_string(i);
+    }
+    names.push_back(std::move(name));
+  }
+  return names;
+}
+
 void print_json(std::ostream& out, const QueryReply& rows) {
+  const auto names = distinct_names(rows);
   out << '[';
   const char* separator = "\n";
   for (const auto& row : rows.rows()) {
     nlohmann::ordered_json object = nlohmann::ordered_json::object();
     for (int i = 0; i < row.values_size(); ++i) {
-      object[rows.columns(i)] = json_value(row.values(i));
+      object[names[static_cast<std::size_t>(i)]] = json_value(row.values(i));
     }
     out << separator
         << object.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);

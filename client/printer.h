@@ -18,7 +18,8 @@ Format format_named(std::string_view name);
 /// Prints columns and rows. Tables, plain or in Markdown, are for reading: numbers of
 /// six digits, aligned. CSV (RFC 4180,
 /// a header line) and JSON (an array of objects) hold every number so that it reads back as the
-/// same bits; NULL is an empty field, respectively null.
+/// same bits; NULL is an empty field, respectively null. In JSON the second of two columns of one
+/// name is called name_2.
 void print(std::ostream& out, const protocol::QueryReply& rows, Format format);
 
 /// One field of CSV, in quotes where it needs them.

@@ -1,17 +1,14 @@
-#include <cstdint>
-#include <iostream>
 #include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "client/nearest.h"
 #include "client/printer.h"
+#include "client/result_query.h"
 #include "client/source.h"
 #include "client/verbs.h"
 #include "client/watching.h"
-#include "worker/solver/parameters.h"
 
 namespace oblique::client {
 namespace {
@@ -22,46 +19,15 @@ constexpr const char* kExamples = R"(Examples:
   oblique query friction --select mu,fn_peak_N,mode --format csv > friction.csv
   oblique query friction --select "*" --limit 1 --format json
 
-Columns are those of the view `runs`; WHERE, ORDER and COLUMNS are written as in SQL.)";
+Columns are those of the view `runs`, in the case in which they are written: e is the restitution
+coefficient, E_Pa Young's modulus. EXPR and COLUMNS are SQL expressions, without comments and
+parameters.)";
 
 struct QueryFlags {
-  std::string study;
-  std::string where;
-  std::string select{
-      "point,H,mu,e,status,fn_peak_N,ft_peak_N,duration_s,slide_m,stick_total_s,major_mode"};
-  std::string order{"point"};
-  std::optional<std::int64_t> limit;
+  ResultQuery query;
   std::string format{"table"};
   SourceFlags source;
 };
-
-// The statement, from row `skipped` of what it gives.
-std::string statement_of(const QueryFlags& flags, std::int64_t skipped) {
-  // The study is chosen inside, where no --where can widen it.
-  std::string sql = "SELECT " + flags.select +
-                    " FROM (SELECT * FROM runs WHERE study = " + sql_text(flags.study) + ")";
-  sql += flags.where.empty() ? "" : " WHERE " + flags.where;
-  sql += flags.order.empty() ? "" : " ORDER BY " + flags.order;
-  // SQL wants a limit before an offset; -1 is none.
-  const std::int64_t limit = flags.limit ? *flags.limit - skipped : -1;
-  sql += " LIMIT " + std::to_string(limit) + " OFFSET " + std::to_string(skipped);
-  return sql;
-}
-
-// A server cuts long answers off. The rest is asked for while nothing is added to the study, for
-// new rows would shift the parts against each other.
-protocol::QueryReply all_rows(Source& source, const QueryFlags& flags, bool at_rest) {
-  auto rows = source.query(statement_of(flags, 0));
-  while (rows.truncated() && at_rest) {
-    const auto more = source.query(statement_of(flags, rows.rows_size()));
-    if (more.rows().empty()) {
-      break;
-    }
-    rows.mutable_rows()->MergeFrom(more.rows());
-    rows.set_truncated(more.truncated());
-  }
-  return rows;
-}
 
 // A wrong column's error, with the columns there are.
 std::string with_columns(const std::string& message, Source& source) {
@@ -78,15 +44,13 @@ std::string with_columns(const std::string& message, Source& source) {
 
 int query(const QueryFlags& flags) {
   const auto format = format_named(flags.format);
-  if (flags.limit && *flags.limit < 0) {
-    throw solver::InputError("--limit " + std::to_string(*flags.limit) +
-                             " is not allowed: it must be >= 0");
-  }
+  check(flags.query);
   const auto source = open_source(flags.source);
-  const auto study = the_study(*source, flags.study);
+  const auto study = the_study(*source, flags.query.study);
+  check_columns(flags.query, *source);
   protocol::QueryReply rows;
   try {
-    rows = all_rows(*source, flags, study.state() != "running");
+    rows = all_rows(*source, flags.query, study.state() != "running");
   } catch (const ConnectionError&) {
     throw;
   } catch (const std::runtime_error& error) {
@@ -101,15 +65,17 @@ void add_query(CLI::App& app, Command& command) {
   auto flags = std::make_shared<QueryFlags>();
   auto* verb = app.add_subcommand("query", "Show results of a study");
   verb->footer(kExamples);
-  verb->add_option("STUDY", flags->study, "name of the study")->required()->type_name("");
-  verb->add_option("--where", flags->where, "condition that points must meet")->type_name("EXPR");
-  verb->add_option("--select", flags->select, "columns to show; `*` is all")
+  verb->add_option("STUDY", flags->query.study, "name of the study")->required()->type_name("");
+  verb->add_option("--where", flags->query.where, "condition that points must meet")
+      ->type_name("EXPR");
+  verb->add_option("--select", flags->query.select, "columns to show; `*` is all")
       ->type_name("COLUMNS")
       ->capture_default_str();
-  verb->add_option("--order", flags->order, "columns to sort by; DESC turns one round")
+  verb->add_option("--order", flags->query.order, "columns to sort by; DESC turns one round")
       ->type_name("COLUMNS")
       ->capture_default_str();
-  verb->add_option("--limit", flags->limit, "most rows shown; all when left out")->type_name("N");
+  verb->add_option("--limit", flags->query.limit, "most rows shown; all when left out")
+      ->type_name("N");
   add_format_flag(*verb, flags->format);
   add_source_flags(*verb, flags->source);
   verb->callback([flags, &command] { command = [flags] { return query(*flags); }; });

@@ -1,11 +1,13 @@
 #include "client/source.h"
 
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>
 #include <utility>
 
+#include "client/time_guard.h"
 #include "client/verbs.h"
 #include "server/reader.h"
 #include "worker/solver/number.h"
@@ -21,16 +23,41 @@ std::string server_of_environment() {
   return value == nullptr ? std::string() : std::string(value);
 }
 
+double seconds(std::int64_t milliseconds) {
+  return static_cast<double>(milliseconds) / 1000.0;
+}
+
+std::int64_t timeout_of(const SourceFlags& flags, std::int64_t default_ms) {
+  constexpr double kLongest_s = 1e6;
+  if (!flags.timeout_s) {
+    return default_ms;
+  }
+  if (!(*flags.timeout_s > 0.0 && *flags.timeout_s <= kLongest_s)) {
+    throw solver::InputError("--timeout " + solver::exact_number(*flags.timeout_s) +
+                             " is not allowed: it must be > 0 and at most " +
+                             solver::exact_number(kLongest_s) + " s");
+  }
+  return std::llround(std::ceil(*flags.timeout_s * 1000.0));
+}
+
 class DatabaseSource : public Source {
  public:
-  explicit DatabaseSource(std::string file) : file_(std::move(file)), reader_(file_) {
+  DatabaseSource(std::string file, std::int64_t timeout_ms)
+      : file_(std::move(file)), reader_(file_) {
+    limits_.time_limit_ms = timeout_ms;
+    // One for the whole process, which has nothing else in SQLite.
+    sqlite3_hard_heap_limit64(kHeapBytes);
     if (!reader_.remark().empty()) {
       std::cerr << reader_.remark() << ".\n";
     }
   }
 
   protocol::QueryReply query(const std::string& sql) override {
-    return reader_.query(sql, server::kNoLimits);
+    // Some functions of SQL do not look at the clock.
+    constexpr std::chrono::milliseconds kGrace{500};
+    const TimeGuard guard(std::chrono::milliseconds(limits_.time_limit_ms) + kGrace,
+                          "oblique: " + server::took_too_long(limits_.time_limit_ms));
+    return reader_.query(sql, limits_);
   }
   std::vector<protocol::StudyStatus> status(const std::string& study, const Tell&) override {
     try {
@@ -42,8 +69,12 @@ class DatabaseSource : public Source {
   std::string place() const override { return file_; }
 
  private:
+  static constexpr std::int64_t kHeapBytes = std::int64_t{1} << 30U;
+
   std::string file_;
   server::Reader reader_;
+  // Nobody else is kept waiting, and an answer may be as long as memory is.
+  server::QueryLimits limits_{UINT64_MAX, UINT64_MAX, 0, std::int64_t{64} << 20U};
 };
 
 class ServerSource : public Source {
@@ -69,9 +100,10 @@ void add_server_flags(CLI::App& verb, SourceFlags& flags) {
                   std::string("address of the server; default: ") + kServerVariable + ", else " +
                       ConnectionSettings().server_url)
       ->type_name("URL");
-  verb.add_option("--timeout", flags.timeout_s, "longest wait for an answer [s]")
-      ->type_name("SECONDS")
-      ->capture_default_str();
+  verb.add_option("--timeout", flags.timeout_s,
+                  "longest wait for an answer [s]; default: " +
+                      solver::exact_number(seconds(ConnectionSettings().timeout_ms)))
+      ->type_name("SECONDS");
 }
 
 void add_source_flags(CLI::App& verb, SourceFlags& flags) {
@@ -81,6 +113,10 @@ void add_source_flags(CLI::App& verb, SourceFlags& flags) {
           " when it is in this folder");
   database->type_name("FILE");
   add_server_flags(verb, flags);
+  verb.get_option("--timeout")
+      ->description("longest wait for an answer [s]; default: " +
+                    solver::exact_number(seconds(ConnectionSettings().timeout_ms)) + " from a server, " +
+                    solver::exact_number(seconds(DatabaseSettings().timeout_ms)) + " from a file");
   database->excludes("--server");
 }
 
@@ -103,13 +139,7 @@ int print_whole(const protocol::QueryReply& rows, Format format) {
 
 ConnectionSettings connection_settings(const SourceFlags& flags) {
   ConnectionSettings settings;
-  constexpr double kLongest_s = 1e6;
-  if (!(flags.timeout_s > 0.0 && flags.timeout_s <= kLongest_s)) {
-    throw solver::InputError("--timeout " + solver::exact_number(flags.timeout_s) +
-                             " is not allowed: it must be > 0 and at most " +
-                             solver::exact_number(kLongest_s) + " s");
-  }
-  settings.timeout_ms = std::llround(std::ceil(flags.timeout_s * 1000.0));
+  settings.timeout_ms = timeout_of(flags, settings.timeout_ms);
   if (!flags.server.empty()) {
     settings.server_url = flags.server;
   } else if (const auto from_environment = server_of_environment(); !from_environment.empty()) {
@@ -120,18 +150,19 @@ ConnectionSettings connection_settings(const SourceFlags& flags) {
 
 std::unique_ptr<Source> open_source(const SourceFlags& flags,
                                     Connection::KeepWaiting keep_waiting) {
+  const auto database_timeout_ms = timeout_of(flags, DatabaseSettings().timeout_ms);
   if (!flags.database.empty()) {
-    return open_database(flags.database);
+    return open_database(flags.database, database_timeout_ms);
   }
   const bool server_named = !flags.server.empty() || !server_of_environment().empty();
   if (!server_named && std::filesystem::exists(DatabaseSettings().file)) {
-    return open_database(DatabaseSettings().file);
+    return open_database(DatabaseSettings().file, database_timeout_ms);
   }
   return std::make_unique<ServerSource>(connection_settings(flags), std::move(keep_waiting));
 }
 
-std::unique_ptr<Source> open_database(const std::string& file) {
-  return std::make_unique<DatabaseSource>(file);
+std::unique_ptr<Source> open_database(const std::string& file, std::int64_t timeout_ms) {
+  return std::make_unique<DatabaseSource>(file, timeout_ms);
 }
 
 std::string sql_text(const std::string& text) {

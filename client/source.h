@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +17,7 @@ namespace oblique::client {
 /// Name of the database where none is given, here and in `run`.
 struct DatabaseSettings {
   std::string file{"oblique.db"};
+  std::int64_t timeout_ms = 60'000;  ///< for one statement
 };
 
 /// Where answers come from: a database file or a server.
@@ -33,9 +36,9 @@ class Source {
 
 /// What --db, --server and --timeout said.
 struct SourceFlags {
-  std::string database;  ///< empty: not given
-  std::string server;    ///< empty: not given
-  double timeout_s = static_cast<double>(ConnectionSettings().timeout_ms) / 1000.0;
+  std::string database;             ///< empty: not given
+  std::string server;               ///< empty: not given
+  std::optional<double> timeout_s;  ///< none: the default of what answers
 };
 
 /// Adds --server and --timeout. `flags` must live as long as `verb`.
@@ -60,8 +63,10 @@ ConnectionSettings connection_settings(const SourceFlags& flags);
 std::unique_ptr<Source> open_source(const SourceFlags& flags,
                                     Connection::KeepWaiting keep_waiting = {});
 
-/// A database file, read directly.
-std::unique_ptr<Source> open_database(const std::string& file);
+/// A database file, read directly. A statement that takes longer than `timeout_ms` is an error; one
+/// that cannot be stopped then ends the program soon after.
+std::unique_ptr<Source> open_database(const std::string& file,
+                                      std::int64_t timeout_ms = DatabaseSettings().timeout_ms);
 
 /// A text as SQL writes it, in single quotes.
 std::string sql_text(const std::string& text);

@@ -133,6 +133,17 @@ TEST(Json, IsValidForTextsOfAllSortsForNullAndForNoRows) {
             nlohmann::json::array());
 }
 
+TEST(Json, GivesEachColumnAKeyOfItsOwn) {
+  protocol::QueryReply rows;
+  auto& row = *rows.add_rows();
+  for (const char* name : {"a", "b", "a", "a", "a_2"}) {
+    rows.add_columns(name);
+    add_value(row, static_cast<std::int64_t>(rows.columns_size()));
+  }
+  EXPECT_EQ(printed(rows, Format::kJson),
+            "[\n{\"a\":1,\"b\":2,\"a_3\":3,\"a_4\":4,\"a_2\":5}\n]\n");
+}
+
 TEST(Table, AlignsNumbersToTheRightAndTextsToTheLeft) {
   protocol::QueryReply rows;
   rows.add_columns("mode");
