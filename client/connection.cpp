@@ -12,6 +12,9 @@
 namespace oblique::client {
 namespace {
 
+/// A server that says nothing for so long is away.
+constexpr std::chrono::seconds kSilence{3};
+
 std::string seconds_of(std::chrono::milliseconds time) {
   return solver::exact_number(static_cast<double>(time.count()) / 1000.0) + " s";
 }
@@ -95,31 +98,53 @@ std::optional<protocol::ClientReply> Connection::received(std::uint64_t request_
                           " does not speak as oblique-server does: check the address and port");
   }
   // An answer that came after its time was given up, or a second one, belongs to nobody.
-  if (reply.request_id() != request_id && reply.request_id() != 0) {
+  const bool is_word_of_it =
+      reply.has_still_working() && reply.still_working().request_id() == request_id;
+  if (reply.request_id() != request_id && reply.request_id() != 0 && !is_word_of_it) {
     return std::nullopt;
   }
   return reply;
 }
 
+void Connection::note_word(Outstanding& outstanding, const protocol::StillWorking& word,
+                           bool counts_as_answer) {
+  const auto now = Clock::now();
+  outstanding.word = now;
+  outstanding.runs = word.runs();
+  outstanding.sent = now;  // it has arrived
+  if (counts_as_answer) {
+    outstanding.heard = now;
+  }
+}
+
 protocol::ClientReply Connection::answer_to(const protocol::ClientRequest& request,
                                             Outstanding outstanding, const Tell& tell) {
-  constexpr std::chrono::seconds kSilence{3};
   const std::chrono::milliseconds timeout(settings_.timeout_ms);
   bool told = false;
   while (tell || Clock::now() - outstanding.heard < timeout) {
     send_if_due(outstanding);
     wait_a_slice(is_due(outstanding));
     if (auto reply = received(request.request_id())) {
-      if (told) {
+      if (std::exchange(told, false)) {
         tell(settings_.server_url + " answers again");
       }
-      return *std::move(reply);
+      if (!reply->has_still_working()) {
+        return *std::move(reply);
+      }
+      note_word(outstanding, reply->still_working(), tell != nullptr);
     }
     if (tell && !told && Clock::now() - outstanding.heard > kSilence) {
       tell("no answer from " + settings_.server_url + " for " + seconds_of(kSilence) +
            ": waiting until it is back");
       told = true;
     }
+  }
+  if (outstanding.runs && Clock::now() - outstanding.word < kSilence) {
+    throw ConnectionError(
+        "the query took too long: after " + seconds_of(timeout) + " " + settings_.server_url +
+        (*outstanding.runs ? " works on it still" : " is busy with the queries of others still") +
+        ". Narrow it, as with WHERE or LIMIT, or give it more time with "
+        "--timeout SECONDS");
   }
   throw ConnectionError("no answer from " + settings_.server_url + " within " +
                         seconds_of(timeout) +
@@ -195,6 +220,7 @@ protocol::QueryReply Connection::query(const std::string& sql, std::uint64_t max
   protocol::ClientRequest request;
   request.mutable_query()->set_sql(sql);
   request.mutable_query()->set_max_rows(max_rows);
+  request.mutable_query()->set_time_limit_ms(static_cast<std::uint64_t>(settings_.timeout_ms));
   return call(std::move(request), tell).query();
 }
 

@@ -77,7 +77,8 @@ class Connection {
   protocol::StatusReply status(const std::string& study, const Tell& tell = {});
   protocol::WorkersReply workers();
   protocol::ChangeReply change(const std::string& study, protocol::StudyChange change);
-  /// Runs one statement that only reads; `max_rows` 0 leaves the limit to the server.
+  /// Runs one statement that only reads, for no longer than an answer is waited for; `max_rows` 0
+  /// leaves that limit to the server.
   protocol::QueryReply query(const std::string& sql, std::uint64_t max_rows = 0,
                              const Tell& tell = {});
 
@@ -91,6 +92,8 @@ class Connection {
     std::chrono::milliseconds resend_after;  ///< since `sent`
     Clock::time_point sent = {};             ///< when it was last sent
     std::uint64_t sent_over = 0;             ///< connection that took it; 0: none has
+    Clock::time_point word = {};             ///< when the server last said that it has it
+    std::optional<bool> runs = {};           ///< what it said: the query runs, or waits
   };
 
   protocol::ClientReply call(protocol::ClientRequest request, const Tell& tell = {});
@@ -102,7 +105,11 @@ class Connection {
   void send_if_due(Outstanding& outstanding);
   /// Waits for the next frame, a connection, or the end of a slice of time.
   void wait_a_slice(bool to_send);
-  /// The next frame from the server, if it is an answer to request `request_id`.
+  /// The server has the query and works on it. For a call that waits for ever that is sign enough.
+  static void note_word(Outstanding& outstanding, const protocol::StillWorking& word,
+                        bool counts_as_answer);
+  /// The next frame from the server, if it is an answer to request `request_id` or says that the
+  /// server works on it still.
   std::optional<protocol::ClientReply> received(std::uint64_t request_id);
 
   ConnectionSettings settings_;

@@ -189,6 +189,49 @@ TEST(Connection, ThatIsToWaitSaysThatTheServerIsSilentAndThatItIsBack) {
   EXPECT_NE(told[1].find("answers again"), std::string::npos) << told[1];
 }
 
+/// What a server says while a query waits or runs.
+std::string still_working(const protocol::ClientRequest& request, bool runs) {
+  protocol::ClientReply word;
+  word.set_request_id(UINT64_MAX);
+  word.mutable_still_working()->set_request_id(request.request_id());
+  word.mutable_still_working()->set_runs(runs);
+  return protocol::encode(word);
+}
+
+TEST(Connection, SaysThatAQueryTookTooLongWhenTheServerWorksOnItStill) {
+  for (const bool runs : {true, false}) {
+    const ScriptedServer server([runs](const protocol::ClientRequest& request) {
+      EXPECT_EQ(request.query().time_limit_ms(), 500U);
+      return std::vector{still_working(request, runs)};
+    });
+    Connection connection(at(server.url(), 500));
+    try {
+      connection.query("SELECT 1");
+      FAIL();
+    } catch (const ConnectionError& error) {
+      const std::string message = error.what();
+      EXPECT_NE(message.find("the query took too long: after 0.5 s"), std::string::npos) << message;
+      EXPECT_NE(message.find(runs ? "works on it still" : "queries of others"), std::string::npos)
+          << message;
+      EXPECT_NE(message.find("--timeout"), std::string::npos) << message;
+      EXPECT_EQ(message.find("is a server running"), std::string::npos) << message;
+    }
+  }
+}
+
+TEST(Connection, TakesTheAnswerThatFollowsWordsOfWorkAndOnlyThat) {
+  const ScriptedServer server([](const protocol::ClientRequest& request) {
+    protocol::ClientRequest another = request;
+    another.set_request_id(request.request_id() + 1);
+    auto reply = reply_to(request);
+    reply.mutable_query()->add_columns("a");
+    return std::vector{still_working(another, true), still_working(request, false),
+                       still_working(request, true), protocol::encode(reply)};
+  });
+  Connection connection(at(server.url(), kLong_ms));
+  EXPECT_EQ(connection.query("SELECT 1").columns(0), "a");
+}
+
 TEST(Connection, TellsAForeignServerFromOurs) {
   const ScriptedServer server(
       [](const protocol::ClientRequest&) { return std::vector<std::string>{"HTTP/1.1 400"}; });
