@@ -115,7 +115,8 @@ void add_source_flags(CLI::App& verb, SourceFlags& flags) {
   add_server_flags(verb, flags);
   verb.get_option("--timeout")
       ->description("longest wait for an answer [s]; default: " +
-                    solver::exact_number(seconds(ConnectionSettings().timeout_ms)) + " from a server, " +
+                    solver::exact_number(seconds(ConnectionSettings().timeout_ms)) +
+                    " from a server, " +
                     solver::exact_number(seconds(DatabaseSettings().timeout_ms)) + " from a file");
   database->excludes("--server");
 }

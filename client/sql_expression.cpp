@@ -75,7 +75,9 @@ std::string what_is_allowed(SqlPart part) {
 }
 
 std::string not_allowed(std::string_view flag, std::string_view text, const std::string& why) {
-  return std::string(flag) + " \"" + std::string(text) + "\" is not allowed: " + why;
+  // An error ends at a zero byte, so what it quotes must end before.
+  const std::string shown(text.substr(0, text.find('\0')));
+  return std::string(flag) + " \"" + shown + "\" is not allowed: " + why;
 }
 
 /// The name that a token writes, without its quotes.

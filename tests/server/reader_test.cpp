@@ -82,6 +82,48 @@ TEST_F(ReaderTest, StatementsThatWriteOrReachOutsideAreRefused) {
   EXPECT_EQ(Reader(path_).query("SELECT * FROM results", {}).rows_size(), 3);
 }
 
+TEST_F(ReaderTest, FunctionsThatReachOutOfTheDatabaseAreRefused) {
+  for (const char* sql : {"SELECT fts3_tokenizer('simple')", "SELECT fts3_tokenizer('x', x'00')",
+                          "SELECT load_extension('x')", "SELECT sqlite_log(1, 'x')",
+                          "SELECT rtreecheck('results')"}) {
+    EXPECT_THAT(refusal_of(sql), HasSubstr("not authorized to use function")) << sql;
+  }
+  EXPECT_EQ(refusal_of("SELECT json_extract('[1]', '$[0]'), abs(-1), randomblob(3), upper('x')"),
+            "it ran");
+}
+
+TEST_F(ReaderTest, AParameterIsRefusedForItHasNoValue) {
+  EXPECT_THAT(refusal_of("SELECT ?"), HasSubstr("the parameter ?,"));
+  EXPECT_THAT(refusal_of("SELECT 1 WHERE 1 > :mu"), HasSubstr("the parameter :mu,"));
+  EXPECT_THAT(refusal_of("SELECT $x"), HasSubstr("the parameter $x,"));
+}
+
+TEST_F(ReaderTest, ARowOverTheLimitOfAReplyIsAnError) {
+  const QueryLimits limits{10, 1000, 0, 1'000'000};
+  EXPECT_THAT(refusal_of("SELECT zeroblob(499)", limits), HasSubstr("more than the 1000 bytes"));
+  EXPECT_THAT(refusal_of("SELECT hex(zeroblob(499))", limits),
+              HasSubstr("more than the 1000 bytes"));
+  EXPECT_EQ(refusal_of("SELECT zeroblob(400)", limits), "it ran");
+  EXPECT_TRUE(Reader(path_).query("SELECT 1 UNION ALL SELECT zeroblob(499)", limits).truncated());
+}
+
+TEST_F(ReaderTest, AValueOverItsLimitIsAnErrorOnTheWayToo) {
+  const QueryLimits limits{10, 1000, 0, 1 << 20U};
+  EXPECT_THAT(refusal_of("SELECT length(zeroblob(1048577))", limits),
+              HasSubstr("more than the 1 MiB allowed"));
+  EXPECT_EQ(refusal_of("SELECT length(zeroblob(1000000))", limits), "it ran");
+}
+
+TEST_F(ReaderTest, TheEncodedAnswerIsTheSame) {
+  const std::string sql = "SELECT point, error, mode, peaks FROM results ORDER BY point";
+  for (const std::uint64_t rows : {2U, 100U}) {
+    const QueryLimits limits{rows, 100'000, 0, 1'000'000};
+    protocol::QueryReply decoded;
+    ASSERT_TRUE(decoded.ParseFromString(Reader(path_).encoded_query(sql, limits)));
+    EXPECT_EQ(decoded.SerializeAsString(), Reader(path_).query(sql, limits).SerializeAsString());
+  }
+}
+
 TEST_F(ReaderTest, OneStatementAtATime) {
   EXPECT_THAT(refusal_of("SELECT 1; SELECT 2"), HasSubstr("one statement"));
   EXPECT_THAT(refusal_of("  "), HasSubstr("no statement"));
