@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <exception>
 #include <iterator>
 #include <set>
 #include <type_traits>
@@ -191,7 +192,7 @@ bool GroupCommit::write_group(std::deque<WriteJob>& jobs, std::vector<WriteRepor
     put_back();
     note_gone(error, reports);
     return true;
-  } catch (const StorageError&) {
+  } catch (const std::exception&) {  // out of memory, too
     put_back();
     return false;  // which of them failed is found by trying each alone
   }
@@ -232,7 +233,7 @@ void GroupCommit::write_singly(std::deque<WriteJob>& jobs, std::vector<WriteRepo
     } catch (const StorageGone& error) {
       note_gone(error, reports);
       keep(job);
-    } catch (const StorageError& error) {
+    } catch (const std::exception& error) {
       if (job.answer_failure) {
         reports.push_back({WriteReport::Kind::kRefused, job.ticket, error.what()});
       } else {

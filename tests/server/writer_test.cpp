@@ -3,6 +3,7 @@
 #include <condition_variable>
 #include <map>
 #include <mutex>
+#include <new>
 
 #include <gtest/gtest.h>
 
@@ -19,6 +20,9 @@ class FailingStorage final : public Storage {
   void commit(std::span<const Change> changes) override {
     const std::lock_guard lock(mutex_);
     ++attempts_;
+    if (out_of_memory_) {
+      throw std::bad_alloc();
+    }
     for (const Change& change : changes) {
       const auto* state = std::get_if<SetStudyState>(&change);
       if (full_ || (state != nullptr && state->study_id == kBad)) {
@@ -38,6 +42,10 @@ class FailingStorage final : public Storage {
     const std::lock_guard lock(mutex_);
     full_ = full;
   }
+  void set_out_of_memory(bool out_of_memory) {
+    const std::lock_guard lock(mutex_);
+    out_of_memory_ = out_of_memory;
+  }
   std::vector<std::uint64_t> committed() {
     const std::lock_guard lock(mutex_);
     return committed_;
@@ -50,6 +58,7 @@ class FailingStorage final : public Storage {
  private:
   std::mutex mutex_;
   bool full_ = false;
+  bool out_of_memory_ = false;
   int attempts_ = 0;
   std::vector<std::uint64_t> committed_;
 };
@@ -135,6 +144,19 @@ TEST_F(WriterTest, ResultsWaitForAFullDiskAndAreWrittenWhenThereIsRoom) {
   reports_.wait_for(Kind::kFault);
   EXPECT_EQ(reports_.count(Kind::kStored), 0);
   storage_.set_full(false);
+  EXPECT_EQ(reports_.wait_for_ticket(2), Kind::kStored);
+  EXPECT_EQ(reports_.count(Kind::kRecovered), 1);
+  EXPECT_EQ(reports_.count(Kind::kFault), 1);
+  EXPECT_EQ(storage_.committed(), (std::vector<std::uint64_t>{1, 2}));
+}
+
+TEST_F(WriterTest, ResultsWaitWhileThereIsNoMemoryAndAreWrittenWhenThereIs) {
+  storage_.set_out_of_memory(true);
+  writer_.submit(kept(1));
+  writer_.submit(kept(2));
+  reports_.wait_for(Kind::kFault);
+  EXPECT_EQ(reports_.count(Kind::kStored), 0);
+  storage_.set_out_of_memory(false);
   EXPECT_EQ(reports_.wait_for_ticket(2), Kind::kStored);
   EXPECT_EQ(reports_.count(Kind::kRecovered), 1);
   EXPECT_EQ(reports_.count(Kind::kFault), 1);
