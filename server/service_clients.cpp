@@ -105,7 +105,8 @@ void Service::submit(const Client& client, const protocol::SubmitRequest& reques
     reply_error(client, "the server is stopping: submit again when it is back");
     return;
   }
-  if (const std::string reason = protocol::objection_to_study_name(request.name()); !reason.empty()) {
+  if (const std::string reason = protocol::objection_to_study_name(request.name());
+      !reason.empty()) {
     reply_error(client, reason);
     return;
   }
