@@ -19,7 +19,7 @@ int change(const ChangeFlags& flags, protocol::StudyChange change) {
   Connection connection(connection_settings(flags.source));
   const auto reply = connection.change(flags.study, change);
   const auto& status = reply.study();
-  std::cout << protocol::visible(status.name()) << ": " << status.state() << ", "
+  std::cout << protocol::visible(status.name()) << ": " << protocol::visible(status.state()) << ", "
             << status.solved() + status.failed() << " of " << status.points() << " points done";
   if (change == protocol::STUDY_CHANGE_RETRY) {
     std::cout << ", " << reply.retried() << " failed ones to be solved again";

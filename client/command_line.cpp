@@ -7,6 +7,7 @@
 
 #include "client/nearest.h"
 #include "client/verbs.h"
+#include "proto/usage.h"
 #include "proto/visible_text.h"
 #include "worker/solver/parameters.h"
 #include "worker/solver/solve.h"
@@ -76,10 +77,8 @@ std::string unexpected_words(CLI::App& app, CLI::App& verb) {
 }
 
 int wrong_usage(const CLI::App& app, const CLI::App& verb, const std::string& message) {
-  const std::string words = &verb == &app ? app.get_name() : app.get_name() + " " + verb.get_name();
-  std::cerr << words << ": " << protocol::visible_lines(message) << "\nTry `" << words
-            << " --help`.\n";
-  return kWrongUsage;
+  return protocol::tell_wrong_usage(
+      &verb == &app ? app.get_name() : app.get_name() + " " + verb.get_name(), message);
 }
 
 int parse(CLI::App& app, int argc, const char* const* argv) {
@@ -128,6 +127,7 @@ int run_command_line(int argc, const char* const* argv) {
   app.get_formatter()->column_width(28);
   Command command;
   add_verbs(app, command);
+  protocol::refuse_empty_values(app);
   if (argc == 1) {
     return wrong_usage(app, app, "no verb given, as in `oblique run STUDY.toml`");
   }

@@ -166,6 +166,9 @@ protocol::ClientReply Connection::call(protocol::ClientRequest request, const Te
                           .heard = Clock::now(),
                           .resend_after = std::chrono::milliseconds(settings_.resend_after_ms)},
                          tell);
+  if (reply.has_error() && reply.error().wrong_request()) {
+    throw solver::InputError(reply.error().message());
+  }
   if (reply.has_error()) {
     throw ServerError(reply.error().message());
   }

@@ -54,7 +54,8 @@ struct StudyTerms {
 using Tell = std::function<void(const std::string& sentence)>;
 
 /// Asks one server, one question at a time. Every call sends one ClientRequest and waits for the
-/// reply with its number; each throws ServerError, ConnectionError or Interrupted.
+/// reply with its number; each throws ServerError, ConnectionError or Interrupted, and
+/// solver::InputError where the server says that the fault is in what was asked.
 ///
 /// Requests are idempotent. One that a server may have taken with it when it died is sent again, as
 /// soon as a server is there again; so is one of which nothing is heard. Of several answers the

@@ -11,6 +11,7 @@
 #include "client/point_flags.h"
 #include "client/verbs.h"
 #include "proto/recipe.h"
+#include "proto/usage.h"
 #include "worker/solver/number.h"
 
 namespace oblique::client {
@@ -26,6 +27,8 @@ Work grows with the cube of the mesh for the explicit integrator: the finest mes
 a minute, one of 64 about eight.)";
 
 constexpr int kStudyFinest = 64;
+// The check of the mesh itself says what a model may have.
+constexpr int kMostElements = 1024;
 
 struct ConvergeFlags {
   PointFlags points;
@@ -168,10 +171,12 @@ void add_converge(CLI::App& app, Command& command) {
   verb->footer(kExamples);
   verb->add_flag("--json", flags->json, "print one JSON object (SI units)");
   verb->add_option("--coarsest", flags->coarsest, "elements a link of the coarsest mesh")
+      ->check(CLI::Range(1, kMostElements))
       ->type_name("N")
       ->capture_default_str();
   verb->add_option("--finest", flags->finest,
                    "elements a link of the finest mesh; default 32, for the mesh study 64")
+      ->check(CLI::Range(1, kMostElements))
       ->type_name("N");
   verb->add_option("--halvings", flags->halvings, "how often the step is halved")
       ->type_name("N")
@@ -182,7 +187,7 @@ void add_converge(CLI::App& app, Command& command) {
   verb->add_option("--tolerance", flags->tolerance_percent,
                    "of the mesh study: largest difference of a mesh that is good enough [%]")
       ->type_name("PERCENT")
-      ->check(CLI::Range(1e-9, 100.0))
+      ->check(protocol::number_between(1e-9, 100.0))
       ->needs(study)
       ->capture_default_str();
   add_point_flags(*verb, flags->points, FlagValues::kMany);

@@ -61,7 +61,7 @@ int paper(const PaperFlags& flags) {
   } else if (is_for_people) {
     print_comparison(std::cout, format, published, own);
   } else {
-    print(std::cout, rows_of(published, compare(published, own)), format);
+    print_out(rows_of(published, compare(published, own)), format);
   }
   return kDone;
 }

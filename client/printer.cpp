@@ -1,14 +1,21 @@
 #include "client/printer.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
+#include <iostream>
+#include <iterator>
+#include <sstream>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
 #include "client/nearest.h"
+#include "proto/visible_text.h"
 #include "worker/solver/number.h"
 #include "worker/solver/parameters.h"
 
@@ -38,7 +45,7 @@ std::string table_cell(const Value& value) {
       auto text = value.text();
       std::replace_if(
           text.begin(), text.end(), [](char c) { return c == '\n' || c == '\t'; }, ' ');
-      return text;
+      return protocol::visible(text);
     }
     default:
       return "-";
@@ -59,7 +66,9 @@ void print_line(std::ostream& out, const std::vector<std::string>& cells,
 
 void print_table(std::ostream& out, const QueryReply& rows) {
   const auto columns = static_cast<std::size_t>(rows.columns_size());
-  const std::vector<std::string> header(rows.columns().begin(), rows.columns().end());
+  std::vector<std::string> header;
+  std::transform(rows.columns().begin(), rows.columns().end(), std::back_inserter(header),
+                 protocol::visible);
   std::vector<std::size_t> widths;
   std::transform(header.begin(), header.end(), std::back_inserter(widths), width_of);
   std::vector<bool> right(columns, false);
@@ -99,7 +108,7 @@ void print_markdown(std::ostream& out, const QueryReply& rows) {
   for (int i = 0; i < rows.columns_size(); ++i) {
     const bool is_number = rows.rows_size() > 0 && (rows.rows(0).values(i).has_integer() ||
                                                     rows.rows(0).values(i).has_real());
-    header += ' ' + markdown_cell(rows.columns(i)) + " |";
+    header += ' ' + markdown_cell(protocol::visible(rows.columns(i))) + " |";
     rule += is_number ? "---:|" : "---|";
   }
   out << header << '\n' << rule << '\n';
@@ -173,6 +182,24 @@ std::vector<std::string> distinct_names(const QueryReply& rows) {
   return names;
 }
 
+// JSON with the characters written as \u.... that a terminal would act on. They stand in texts
+// alone, and there mean the same.
+std::string harmless(std::string_view json) {
+  std::string shown;
+  while (!json.empty()) {
+    const auto next = protocol::first_character(json);
+    if (protocol::is_control(next.code)) {
+      std::array<char, 8> escape{};
+      std::snprintf(escape.data(), escape.size(), "\\u%04x", static_cast<unsigned>(next.code));
+      shown += escape.data();
+    } else {
+      shown += json.substr(0, next.bytes);
+    }
+    json.remove_prefix(next.bytes);
+  }
+  return shown;
+}
+
 void print_json(std::ostream& out, const QueryReply& rows) {
   const auto names = distinct_names(rows);
   out << '[';
@@ -183,7 +210,7 @@ void print_json(std::ostream& out, const QueryReply& rows) {
       object[names[static_cast<std::size_t>(i)]] = json_value(row.values(i));
     }
     out << separator
-        << object.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+        << harmless(object.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
     separator = ",\n";
   }
   out << (rows.rows().empty() ? "]\n" : "\n]\n");
@@ -228,6 +255,16 @@ void print(std::ostream& out, const QueryReply& rows, Format format) {
       print_markdown(out, rows);
       break;
   }
+}
+
+void print_out(const QueryReply& rows, Format format) {
+  if (format != Format::kCsv || isatty(STDOUT_FILENO) != 1) {
+    print(std::cout, rows, format);
+    return;
+  }
+  std::ostringstream text;
+  print(text, rows, format);
+  std::cout << protocol::visible_lines(text.str());
 }
 
 void add_value(protocol::Row& row, const std::string& text) {

@@ -22,6 +22,11 @@ Format format_named(std::string_view name);
 /// name is called name_2.
 void print(std::ostream& out, const protocol::QueryReply& rows, Format format);
 
+/// The same to standard output. In tables and on a terminal texts from outside are made visible
+/// (proto/visible_text.h); in JSON their characters are escaped as JSON does. CSV in a file or a
+/// pipe holds them byte for byte.
+void print_out(const protocol::QueryReply& rows, Format format);
+
 /// One field of CSV, in quotes where it needs them.
 std::string csv_field(std::string_view text);
 

@@ -9,6 +9,8 @@
 #include "client/source.h"
 #include "client/verbs.h"
 #include "client/watching.h"
+#include "proto/usage.h"
+#include "worker/solver/parameters.h"
 
 namespace oblique::client {
 namespace {
@@ -51,10 +53,8 @@ int query(const QueryFlags& flags) {
   protocol::QueryReply rows;
   try {
     rows = all_rows(*source, flags.query, study.state() != "running");
-  } catch (const ConnectionError&) {
-    throw;
-  } catch (const std::runtime_error& error) {
-    throw std::runtime_error(with_columns(error.what(), *source));
+  } catch (const solver::InputError& error) {
+    throw solver::InputError(with_columns(error.what(), *source));
   }
   return print_whole(rows, format);
 }
@@ -75,6 +75,7 @@ void add_query(CLI::App& app, Command& command) {
       ->type_name("COLUMNS")
       ->capture_default_str();
   verb->add_option("--limit", flags->query.limit, "most rows shown; all when left out")
+      ->check(protocol::whole_number_from(0))
       ->type_name("N");
   add_format_flag(*verb, flags->format);
   add_source_flags(*verb, flags->source);

@@ -10,6 +10,7 @@
 #include "client/run_service.h"
 #include "client/stop_signal.h"
 #include "client/verbs.h"
+#include "proto/usage.h"
 
 namespace oblique::client {
 namespace {
@@ -49,7 +50,7 @@ int run(const RunFlags& flags) {
   if (!end) {
     return stop.exit_code();
   }
-  print(std::cout, end->rows, Format::kTable);
+  print_out(end->rows, Format::kTable);
   if (end->rows.rows_size() < static_cast<int>(end->status.points())) {
     std::cerr << "The first " << end->rows.rows_size() << " of " << end->status.points()
               << " points are shown.\n";
@@ -76,6 +77,7 @@ void add_run(CLI::App& app, Command& command) {
       "take a database on a network file system, where a second machine could damage it");
   add_worker_flags(*verb, flags->settings);
   verb->add_option("--rows", flags->settings.rows, "most rows of the table shown at the end")
+      ->check(protocol::whole_number_from(0))
       ->type_name("N")
       ->capture_default_str();
   add_study_flags(*verb, flags->study);

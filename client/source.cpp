@@ -9,6 +9,8 @@
 
 #include "client/time_guard.h"
 #include "client/verbs.h"
+#include "proto/visible_text.h"
+#include "server/database_in_use.h"
 #include "server/reader.h"
 #include "worker/solver/number.h"
 #include "worker/solver/parameters.h"
@@ -48,7 +50,7 @@ class DatabaseSource : public Source {
     // One for the whole process, which has nothing else in SQLite.
     sqlite3_hard_heap_limit64(kHeapBytes);
     if (!reader_.remark().empty()) {
-      std::cerr << reader_.remark() << ".\n";
+      std::cerr << protocol::visible(reader_.remark()) << ".\n";
     }
   }
 
@@ -57,11 +59,19 @@ class DatabaseSource : public Source {
     constexpr std::chrono::milliseconds kGrace{500};
     const TimeGuard guard(std::chrono::milliseconds(limits_.time_limit_ms) + kGrace,
                           "oblique: " + server::took_too_long(limits_.time_limit_ms));
-    return reader_.query(sql, limits_);
+    try {
+      return reader_.query(sql, limits_);
+    } catch (const server::StatementError& error) {
+      throw solver::InputError(error.what());
+    }
   }
   std::vector<protocol::StudyStatus> status(const std::string& study, const Tell&) override {
     try {
-      return reader_.study_status(study);
+      auto found = reader_.study_status(study);
+      if (!server::is_in_use(file_)) {
+        say_that_nobody_works(found);
+      }
+      return found;
     } catch (const server::QueryError& error) {
       throw server::QueryError(std::string(error.what()) + " in " + file_);
     }
@@ -69,6 +79,14 @@ class DatabaseSource : public Source {
   std::string place() const override { return file_; }
 
  private:
+  void say_that_nobody_works(std::vector<protocol::StudyStatus>& studies) const {
+    for (auto& study : studies) {
+      if (study.state() == "running") {
+        study.set_waits_for("a server: nobody is at work on " + file_);
+      }
+    }
+  }
+
   static constexpr std::int64_t kHeapBytes = std::int64_t{1} << 30U;
 
   std::string file_;
@@ -128,7 +146,7 @@ void add_format_flag(CLI::App& verb, std::string& format) {
 }
 
 int print_whole(const protocol::QueryReply& rows, Format format) {
-  print(std::cout, rows, format);
+  print_out(rows, format);
   if (!rows.truncated()) {
     return kDone;
   }

@@ -24,7 +24,8 @@ struct DatabaseSettings {
 class Source {
  public:
   virtual ~Source() = default;
-  /// Runs one statement that only reads. Throws what the source throws, for a wrong one too.
+  /// Runs one statement that only reads. Throws solver::InputError for a wrong one, and what the
+  /// source throws.
   virtual protocol::QueryReply query(const std::string& sql) = 0;
   /// The study of that name, or all of them when it is empty. Throws for an unknown name. Given a
   /// `tell`, waits for a server that is away; see Connection.

@@ -26,7 +26,7 @@ struct StatusFlags {
 int status(const StatusFlags& flags) {
   const auto format = format_named(flags.format);
   const auto source = open_source(flags.source);
-  print(std::cout, table_of(source->status(flags.study)), format);
+  print_out(table_of(source->status(flags.study)), format);
   return kDone;
 }
 

@@ -33,7 +33,7 @@ int studies(const StudiesFlags& flags) {
     add_value(row, static_cast<std::int64_t>(study.solved() + study.failed()));
     add_value(row, study.created_at());
   }
-  print(std::cout, table, format);
+  print_out(table, format);
   return kDone;
 }
 

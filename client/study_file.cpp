@@ -277,6 +277,7 @@ protocol::Axis Reader::axis(std::string_view name, const toml::node& value) cons
   if (const auto* list = value.as_array()) {
     for (const auto& item : *list) {
       values.push_back(axis_number(key, item));
+      located(item, [&] { solver::check_value(key, values.back()); });
     }
   } else {
     values.push_back(axis_number(key, value));

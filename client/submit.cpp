@@ -7,6 +7,7 @@
 #include "client/source.h"
 #include "client/verbs.h"
 #include "client/watching.h"
+#include "proto/usage.h"
 
 namespace oblique::client {
 namespace {
@@ -81,7 +82,7 @@ void add_submit(CLI::App& app, Command& command) {
   verb->add_option(
           "--weight", flags->terms.weight,
           "share of the workers among studies of one priority, 0.001 to 1000; 1 unless told")
-      ->check(CLI::Range(0.001, 1000.0))
+      ->check(protocol::number_between(0.001, 1000.0))
       ->type_name("W");
   verb->add_flag("--mix-versions", flags->terms.mixes_versions,
                  "workers of any solver version take part; the column solver_version says which "

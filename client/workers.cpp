@@ -55,14 +55,14 @@ protocol::QueryReply workers_of_server(const ConnectionSettings& settings) {
 int workers(const WorkersFlags& flags) {
   const auto format = format_named(flags.format);
   if (flags.source.database.empty()) {
-    print(std::cout, workers_of_server(connection_settings(flags.source)), format);
+    print_out(workers_of_server(connection_settings(flags.source)), format);
     return kDone;
   }
   const auto source = open_database(flags.source.database);
-  print(std::cout,
-        source->query("SELECT worker_id AS worker, name, threads, instruction_set, solver_version, "
-                      "joined_at FROM workers ORDER BY worker_id"),
-        format);
+  print_out(
+      source->query("SELECT worker_id AS worker, name, threads, instruction_set, solver_version, "
+                    "joined_at FROM workers ORDER BY worker_id"),
+      format);
   return kDone;
 }
 

@@ -135,6 +135,9 @@ class Loop::Parts final : public Outbox {
     // Above every number that an earlier run can have given, whatever the clock says.
     service.scheduler.first_lease_id = store_.count_start() << 40U;
     service_.emplace(std::move(service), *this, store_.studies(), now());
+    for (const auto& sentence : store_.left_out()) {
+      spdlog::warn("{}", sentence);
+    }
   }
 
   LoopEnd run(int stop_fd) {

@@ -8,18 +8,21 @@
 #include <string>
 #include <string_view>
 
+#include <fcntl.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/signalfd.h>
 #include <unistd.h>
 #include <csignal>
 
-#include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "proto/frames.h"
+#include "proto/log.h"
+#include "proto/usage.h"
+#include "proto/visible_text.h"
 #include "server/loop.h"
 #include "server/reader_program.h"
 #include "worker/solver/solve.h"
@@ -30,7 +33,6 @@ using oblique::server::Loop;
 using oblique::server::LoopSettings;
 
 constexpr int kFailed = 1;
-constexpr int kWrongUsage = 2;
 
 /// SIGINT and SIGTERM as a readable file descriptor. Must run before any thread starts, so that all
 /// inherit the mask.
@@ -70,6 +72,15 @@ void take_all_descriptors() {
   }
 }
 
+/// Empty for −1 and for a descriptor that is open, else what is wrong with it.
+std::string objection_to_descriptor(const std::string& text) {
+  int fd = -1;
+  const bool is_number = CLI::detail::lexical_cast(text, fd);
+  return is_number && (fd == -1 || fcntl(fd, F_GETFD) != -1)
+             ? ""
+             : "\"" + text + "\" is no open file descriptor";
+}
+
 void tell_ready(int fd, const Loop& loop) {
   const std::string line =
       nlohmann::json{{"client", loop.client_endpoint()}, {"worker", loop.worker_endpoint()}}
@@ -105,7 +116,7 @@ int main(int argc, char** argv) {
   }
   const pid_t parent = getppid();
   oblique::protocol::silence_protobuf();
-  spdlog::set_default_logger(spdlog::stderr_logger_mt("oblique-server"));
+  oblique::protocol::set_up_log("oblique-server");
 
   LoopSettings settings;
   settings.database = "oblique.db";
@@ -116,7 +127,9 @@ int main(int argc, char** argv) {
   bool quiet = false;
   CLI::App app{
       "Hands out the points of studies to workers and keeps the results.\n"
-      "Example: oblique-server --db oblique.db"};
+      "Example: oblique-server --db oblique.db",
+      "oblique-server"};
+  app.set_version_flag("--version", "oblique-server " + oblique::solver::solver_version());
   app.option_defaults()->always_capture_default();
   app.add_option("--db", settings.database, "Database file; made when it is not there");
   app.add_flag("--allow-network-disk", settings.allow_network_disk,
@@ -126,24 +139,21 @@ int main(int argc, char** argv) {
   app.add_option("--client-port", client_port, "Port for clients; 0: the system picks one");
   app.add_option("--ready-fd", ready_fd,
                  "File descriptor that gets one line of JSON with both endpoints once the server "
-                 "can be used; -1: none");
+                 "can be used; -1: none")
+      ->check(objection_to_descriptor);
   app.add_flag("--stop-with-parent", with_parent, "Stop when the process that started this ends");
   app.add_flag("--quiet", quiet, "Log warnings and errors only");
+  if (const auto exit_code = oblique::protocol::parse_command_line(app, argc, argv)) {
+    return *exit_code;
+  }
   try {
-    app.parse(argc, argv);
-    if (settings.database.empty()) {
-      throw std::runtime_error("--db names no file: it must be the path of a database");
-    }
     if (worker_port == client_port && worker_port != 0) {
       throw std::runtime_error("--worker-port and --client-port are both " +
                                std::to_string(worker_port) + ": they must differ");
     }
     (void)oblique::server::loopback_address(settings.listen);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : kWrongUsage;
   } catch (const std::runtime_error& error) {
-    std::cerr << error.what() << '\n';
-    return kWrongUsage;
+    return oblique::protocol::tell_wrong_usage(app.get_name(), error.what());
   }
   if (quiet) {
     spdlog::set_level(spdlog::level::warn);
@@ -157,7 +167,7 @@ int main(int argc, char** argv) {
     }
     return run(settings, ready_fd);
   } catch (const std::exception& error) {
-    std::cerr << "oblique-server: " << error.what() << '\n';
+    std::cerr << "oblique-server: " << oblique::protocol::visible_lines(error.what()) << '\n';
     return kFailed;
   }
 }

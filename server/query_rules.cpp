@@ -87,7 +87,7 @@ void restrict_to_reading(sqlite3* database) {
 
 StatementHandle prepare_query(sqlite3* database, const std::string& sql) {
   if (sql.size() > kLongestSql) {
-    throw QueryError("the statement is longer than " + std::to_string(kLongestSql) + " bytes");
+    throw StatementError("the statement is longer than " + std::to_string(kLongestSql) + " bytes");
   }
   sqlite3_stmt* raw = nullptr;
   const char* tail = nullptr;
@@ -96,30 +96,30 @@ StatementHandle prepare_query(sqlite3* database, const std::string& sql) {
   StatementHandle statement(raw, &sqlite3_finalize);
   const int primary = static_cast<int>(static_cast<unsigned>(code) & 0xffU);
   if (primary == SQLITE_AUTH) {
-    throw QueryError(std::string("only statements that read are allowed: ") +
-                     sqlite3_errmsg(database));
+    throw StatementError(std::string("only statements that read are allowed: ") +
+                         sqlite3_errmsg(database));
   }
   if (primary == SQLITE_ERROR) {
-    throw QueryError(std::string("the statement is wrong: ") + sqlite3_errmsg(database));
+    throw StatementError(std::string("the statement is wrong: ") + sqlite3_errmsg(database));
   }
   if (primary != SQLITE_OK) {
     throw failure(database, code);
   }
   if (statement == nullptr) {
-    throw QueryError("there is no statement");
+    throw StatementError("there is no statement");
   }
   if (!is_blank(tail)) {
-    throw QueryError("one statement at a time: something follows the first");
+    throw StatementError("one statement at a time: something follows the first");
   }
   if (sqlite3_stmt_readonly(raw) == 0) {
-    throw QueryError("only statements that read are allowed");
+    throw StatementError("only statements that read are allowed");
   }
   if (sqlite3_bind_parameter_count(raw) > 0) {
     // Only the named ones have a name; nothing would ever be bound to any.
     const char* name = sqlite3_bind_parameter_name(raw, sqlite3_bind_parameter_count(raw));
-    throw QueryError(std::string("the statement has the parameter ") +
-                     (name == nullptr ? "?" : name) +
-                     ", which has no value: write the value itself, a text in single quotes");
+    throw StatementError(std::string("the statement has the parameter ") +
+                         (name == nullptr ? "?" : name) +
+                         ", which has no value: write the value itself, a text in single quotes");
   }
   return statement;
 }

@@ -14,6 +14,12 @@ class QueryError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// The statement itself is wrong: asking for it again gives the same.
+class StatementError : public QueryError {
+ public:
+  using QueryError::QueryError;
+};
+
 /// Longest statement [bytes].
 inline constexpr int kLongestSql = 1'000'000;
 
@@ -23,8 +29,9 @@ void restrict_to_reading(sqlite3* database);
 
 using StatementHandle = std::unique_ptr<sqlite3_stmt, int (*)(sqlite3_stmt*)>;
 
-/// One statement that only reads. Throws QueryError: none or more than one, one that writes,
-/// attaches or sets something, one with parameters, one that SQLite refuses.
+/// One statement that only reads. Throws StatementError: none or more than one, one that
+/// writes, attaches or sets something, one with parameters, one that SQLite refuses; QueryError for
+/// one that needs too much.
 StatementHandle prepare_query(sqlite3* database, const std::string& sql);
 
 /// What a failed call on `database` means to the one who asked. `code` is what SQLite returned.

@@ -133,6 +133,8 @@ std::string answer(std::optional<Reader>& reader, const std::string& path,
     return protocol::reply_around(reader->encoded_query(request.sql(), limits));
   } catch (const std::bad_alloc&) {
     return encoded_error("the answer needs more memory than a query may have");
+  } catch (const StatementError& error) {
+    return encoded_error(error.what(), true);
   } catch (const std::exception& error) {
     return encoded_error(error.what());
   }
@@ -140,8 +142,9 @@ std::string answer(std::optional<Reader>& reader, const std::string& path,
 
 }  // namespace
 
-std::string encoded_error(const std::string& message) {
+std::string encoded_error(const std::string& message, bool wrong_request) {
   protocol::ClientReply reply;
+  reply.mutable_error()->set_wrong_request(wrong_request);
   // A statement may have put any bytes into what SQLite says.
   reply.mutable_error()->set_message(
       shortened(is_utf8(message) ? message : hexadecimal(message), kLongestError));

@@ -16,7 +16,7 @@ inline constexpr const char* kReadMode = "--read";
 using FrameLength = std::uint32_t;
 
 /// The bytes of a ClientReply that says why a query has no answer.
-std::string encoded_error(const std::string& message);
+std::string encoded_error(const std::string& message, bool wrong_request = false);
 
 /// A reader process: answers the queries on the database at `path` that come by `kReaderChannel`,
 /// one after another, until that is closed. Bounds its own memory, files and processor time first,

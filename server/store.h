@@ -54,6 +54,9 @@ class Store final : public Storage {
   /// All studies in the order of their numbers, with what is settled. Throws StorageError, also for
   /// a recipe that cannot be read.
   std::vector<StoredStudy> studies();
+  /// A sentence about each study that `studies` left out, because an earlier version took what this
+  /// one does not.
+  const std::vector<std::string>& left_out() const { return left_out_; }
 
   /// Highest number given to a study or worker so far; 0 when there is none.
   std::uint64_t last_study_id();
@@ -90,6 +93,7 @@ class Store final : public Storage {
   // Row of `models` by study and model number; emptied when it grows or a transaction fails.
   std::map<std::pair<std::uint64_t, std::uint64_t>, std::int64_t> model_ids_;
   bool full_sync_ = true;
+  std::vector<std::string> left_out_;
 };
 
 }  // namespace oblique::server

@@ -63,6 +63,11 @@ std::vector<StoredStudy> Store::studies() {
         throw StorageError("its bytes are damaged");
       }
       study.table = std::make_shared<const protocol::PointTable>(std::move(recipe));
+    } catch (const solver::InputError& reason) {
+      left_out_.push_back(
+          "the study \"" + study.name +
+          "\" is left as it is, for this version takes no such study: " + reason.what());
+      continue;
     } catch (const std::runtime_error& reason) {
       throw StorageError("the recipe of study " + study.name + " cannot be read: " + reason.what());
     }

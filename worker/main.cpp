@@ -6,17 +6,19 @@
 #include <array>
 #include <csignal>
 #include <cstddef>
-#include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <iostream>
 #include <string>
 #include <thread>
 
-#include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
 
 #include "proto/frames.h"
+#include "proto/log.h"
+#include "proto/usage.h"
+#include "proto/visible_text.h"
 #include "worker/point_solver.h"
 #include "worker/session.h"
 #include "worker/solver/solve.h"
@@ -24,8 +26,6 @@
 namespace {
 
 using oblique::worker::SessionSettings;
-
-constexpr int kWrongUsage = 2;
 
 std::string host_and_process() {
   std::array<char, 256> host{};
@@ -41,6 +41,14 @@ std::string objection_to_name(const std::string& name) {
   return is_plain && !name.empty() && name.size() <= kLongestName
              ? ""
              : "a name has 1 to 200 printable ASCII characters";
+}
+
+/// Empty for the id of a process, and for no value at all.
+std::string objection_to_process(const std::string& text) {
+  pid_t process = 0;
+  return text.empty() || (CLI::detail::lexical_cast(text, process) && process > 0)
+             ? ""
+             : "\"" + text + "\" is no process id";
 }
 
 constexpr std::size_t kMostThreads = 4096;
@@ -93,7 +101,7 @@ int run_worker(const SessionSettings& settings, pid_t parent) {
 
 /// Everything but errors that nobody foresaw.
 int run_program(int argc, char** argv) {
-  spdlog::set_default_logger(spdlog::stderr_color_mt("worker"));
+  oblique::protocol::set_up_log("oblique-worker");
   oblique::protocol::silence_protobuf();
   SessionSettings settings;
   settings.name = host_and_process();
@@ -101,8 +109,9 @@ int run_program(int argc, char** argv) {
   bool quiet = false;
   CLI::App app(
       "Solves points of parameter studies for an oblique-server.\n"
-      "Example: oblique-worker --server tcp://127.0.0.1:7601");
-  app.set_version_flag("--version", oblique::solver::solver_version());
+      "Example: oblique-worker --server tcp://127.0.0.1:7601",
+      "oblique-worker");
+  app.set_version_flag("--version", "oblique-worker " + oblique::solver::solver_version());
   app.add_option("--server", settings.server, "Where the server awaits workers")
       ->capture_default_str();
   app.add_option("--name", settings.name, "Name that people see")
@@ -118,12 +127,11 @@ int run_program(int argc, char** argv) {
                      "Stop when the parent process is gone; with its id, also when it was before "
                      "this one began")
           ->expected(0, 1)
+          ->check(objection_to_process)
           ->type_name("[PID]");
   app.add_flag("--quiet", quiet, "Log warnings and errors only");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? EXIT_SUCCESS : kWrongUsage;
+  if (const auto exit_code = oblique::protocol::parse_command_line(app, argc, argv)) {
+    return *exit_code;
   }
   settings.stop_with_parent = with_parent->count() > 0;
   if (quiet) {
@@ -132,8 +140,7 @@ int run_program(int argc, char** argv) {
   try {
     return run_worker(settings, parent);
   } catch (const oblique::worker::AddressError& error) {
-    spdlog::error("{}", error.what());
-    return kWrongUsage;
+    return oblique::protocol::tell_wrong_usage(app.get_name(), error.what());
   }
 }
 
@@ -143,7 +150,7 @@ int main(int argc, char** argv) {
   try {
     return run_program(argc, argv);
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "oblique-worker: %s\n", error.what());
+    std::cerr << "oblique-worker: " << oblique::protocol::visible_lines(error.what()) << '\n';
     return EXIT_FAILURE;
   }
 }

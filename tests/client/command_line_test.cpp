@@ -56,7 +56,7 @@ TEST(CommandLine, AnswersWrongUsageWithExitCodeTwoAndASentence) {
       {{"run", "nowhere.toml"}, "nowhere.toml"},
       {{"run", "a.toml", "b.toml"}, "unexpected `b.toml`"},
       {{"run", "--H", "1", "--mu", "0.4", "--e", "1", "--workers", "0"}, "--workers 0"},
-      {{"run", "--H", "1", "--mu", "0.4", "--e", "1", "--rows", "-1"}, "--rows -1"},
+      {{"run", "--H", "1", "--mu", "0.4", "--e", "1", "--rows", "-1"}, "--rows: -1"},
       {{"run", "--workers", "many"}, "many"},
       {{"submit", "--H", "1", "--mu", "0.4", "--e", "1", "--server", "nowhere"}, "tcp://HOST:PORT"},
       {{"status", "--timeout", "-1"}, "--timeout -1"},
@@ -160,7 +160,7 @@ TEST(CommandLine, RefusesATraceThatHasNoPlaceToGo) {
   };
   for (const auto& [flags, reason] : std::vector<std::pair<std::vector<std::string>, std::string>>{
            {{"--trace", "-", "--json"}, "both write to standard output"},
-           {{"--trace", ""}, "--trace is empty"},
+           {{"--trace", ""}, "--trace: the value is empty"},
            {{"--trace-shape"}, "--trace"}}) {
     const auto outcome = with(flags);
     EXPECT_EQ(outcome.exit_code, 2);

@@ -179,6 +179,41 @@ TEST(Table, CountsCharactersNotBytes) {
   EXPECT_EQ(printed(rows_of_texts({"µ", "ab"}), Format::kTable), "text\n----\nµ\nab\n");
 }
 
+TEST(Csv, QuotesACarriageReturn) {
+  EXPECT_EQ(printed(rows_of_texts({"one\rtwo"}), Format::kCsv), "text\n\"one\rtwo\"\n");
+  EXPECT_EQ(csv_field("\r"), "\"\r\"");
+}
+
+constexpr const char* kSteering = "\x1b[2J\u009b1m\u202ex\x7f";
+
+TEST(Table, ShowsControlCharactersOfTextsAndColumnsWrittenOut) {
+  auto rows = rows_of_texts({kSteering});
+  rows.set_columns(0, "a\x1b");
+  for (const Format format : {Format::kTable, Format::kMarkdown}) {
+    const auto text = printed(rows, format);
+    EXPECT_NE(text.find("a\\x1b"), std::string::npos) << text;
+    EXPECT_NE(text.find("\\x1b[2J\\u009b1m\\u202ex\\x7f"), std::string::npos) << text;
+    EXPECT_EQ(text.find_first_of("\x1b\x7f\xc2\xe2"), std::string::npos) << text;
+  }
+}
+
+TEST(Json, EscapesControlCharactersAndReadsBackTheSame) {
+  auto rows = rows_of_texts({kSteering, "\u2066µ🙂"});
+  rows.set_columns(0, "a\u009b");
+  const auto text = printed(rows, Format::kJson);
+  EXPECT_EQ(text.find_first_of("\x1b\x7f"), std::string::npos) << text;
+  EXPECT_EQ(text.find("\u009b"), std::string::npos) << text;
+  EXPECT_EQ(text.find("\u202e"), std::string::npos) << text;
+  EXPECT_NE(text.find("µ🙂"), std::string::npos) << text;
+  const auto back = nlohmann::json::parse(text);
+  EXPECT_EQ(back[0]["a\u009b"], kSteering);
+  EXPECT_EQ(back[1]["a\u009b"], "\u2066µ🙂");
+}
+
+TEST(Csv, HoldsTextsByteForByteWhereNoTerminalShowsIt) {
+  EXPECT_EQ(printed(rows_of_texts({"\x1b[2J\u202e"}), Format::kCsv), "text\n\x1b[2J\u202e\n");
+}
+
 TEST(Formats, OfOtherNamesAreRefused) {
   EXPECT_EQ(format_named("csv"), Format::kCsv);
   EXPECT_THROW(format_named("xml"), solver::InputError);

@@ -62,6 +62,39 @@ TEST(Progress, FollowsTheRateOfTheLastSeconds) {
   EXPECT_NE(text.substr(text.rfind('\r')).find(" 1 points/s"), std::string::npos);
 }
 
+TEST(Progress, WeighsSamplesByTheTimeBetweenThem) {
+  std::ostringstream out;
+  Progress progress(out, true);
+  const auto update = [&progress](double elapsed_s, std::uint64_t settled) {
+    progress.update({.study = "s", .points = 5000, .settled = settled, .elapsed_s = elapsed_s});
+  };
+  const auto last_bar = [&out] {
+    const auto text = out.str();
+    return text.substr(text.rfind('\r'));
+  };
+  // A burst of looks, then one 4 s later: 400 points in 5 s, however many looks there were.
+  for (int i = 0; i <= 100; ++i) {
+    update(0.01 * i, static_cast<std::uint64_t>(i));
+  }
+  update(5.0, 400);
+  EXPECT_NE(last_bar().find(" 80 points/s"), std::string::npos) << last_bar();
+  // Nothing is looked at for a minute: the rate is that minute's.
+  update(65.0, 1000);
+  EXPECT_NE(last_bar().find(" 10 points/s"), std::string::npos) << last_bar();
+  EXPECT_NE(last_bar().find(" 6 min 40 s left"), std::string::npos) << last_bar();
+}
+
+TEST(Progress, ShowsTheNameOfAStudyWithoutSteeringTheTerminal) {
+  EXPECT_TRUE(progress_line({.study = "a\x1b[2J", .points = 1}).starts_with("a\\x1b[2J: "));
+  EXPECT_TRUE(progress_bar({.study = "a\u202e", .points = 1}).starts_with("a\\u202e ["));
+}
+
+TEST(Progress, ThatNeverBeganHasNothingToDrawAtItsEnd) {
+  std::ostringstream out;
+  Progress(out, false).finish();
+  EXPECT_EQ(out.str(), "");
+}
+
 TEST(Durations, AreShownInUnitsThatFit) {
   EXPECT_EQ(shown_duration(0.42), "0.4 s");
   EXPECT_EQ(shown_duration(12.3), "12 s");

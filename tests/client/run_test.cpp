@@ -101,13 +101,13 @@ TEST(Queries, ThatAreWrongSayWhatIsWrong) {
       oblique(folder, {"run", "--H", "1", "--mu", "0.4", "--e", "1", "--name", "one"}).exit_code,
       0);
   const auto column = oblique(folder, {"query", "one", "--where", "fn_peak > 1"});
-  EXPECT_EQ(column.exit_code, 1);
+  EXPECT_EQ(column.exit_code, 2);
   EXPECT_NE(column.err.find("did you mean `fn_peak_N`"), std::string::npos) << column.err;
   const auto study = oblique(folder, {"query", "two"});
   EXPECT_EQ(study.exit_code, 1);
   EXPECT_NE(study.err.find("two"), std::string::npos) << study.err;
   const auto writes = oblique(folder, {"sql", "DELETE FROM results"});
-  EXPECT_EQ(writes.exit_code, 1);
+  EXPECT_EQ(writes.exit_code, 2);
   EXPECT_EQ(solved(folder), 1U);
 }
 
@@ -134,6 +134,44 @@ TEST(Run, NoticesThatTheServerDied) {
   EXPECT_NE(outcome.err.find("the server was killed by signal 9"), std::string::npos)
       << outcome.err;
   expect_gone(processes);
+}
+
+TEST(Run, OfAStudyThatSomebodyCancelsSaysSoAndEndsWithOne) {
+  const TestFolder folder;
+  write_study(folder, 100000);
+  auto arguments = run_arguments();
+  arguments.push_back("--verbose");
+  Program program(folder, arguments);
+  wait_until_at_work(folder, program);
+  // The server's log says where it awaits clients.
+  const auto said = program.err();
+  const auto url = said.substr(said.find("clients at tcp://") + std::string("clients at ").size());
+  const auto cancel =
+      oblique(folder, {"cancel", "many", "--server", url.substr(0, url.find_first_of(",\n"))});
+  EXPECT_EQ(cancel.exit_code, 0) << cancel.err;
+  const auto outcome = program.outcome();
+  EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
+  EXPECT_NE(outcome.err.find("The study is cancelled"), std::string::npos) << outcome.err;
+}
+
+TEST(Watch, OfAFileOnWhichNobodyWorksSaysSo) {
+  const TestFolder folder;
+  write_study(folder, 100000);
+  {
+    Program program(folder, run_arguments());
+    wait_until_at_work(folder, program);
+    kill(program.pid(), SIGINT);
+    EXPECT_EQ(program.outcome().exit_code, 128 + SIGINT);
+  }
+  const auto status = oblique(folder, {"status"});
+  EXPECT_NE(status.out.find("nobody is at work on oblique.db"), std::string::npos) << status.out;
+  Program watch(folder, {"watch", "many"});
+  wait_for([&] {
+    return watch.err().find("waits for a server: nobody is at work on oblique.db") !=
+           std::string::npos;
+  });
+  kill(watch.pid(), SIGINT);
+  EXPECT_EQ(watch.outcome().exit_code, 128 + SIGINT);
 }
 
 TEST(Run, GoesOnWithTheWorkersThatAreLeftAndStopsWhenNoneIs) {

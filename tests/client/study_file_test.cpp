@@ -57,6 +57,9 @@ std::vector<WrongFile> wrong_tables() {
       {"NameNoString", "name = 3\n" + std::string(kPoint), {":1: ", "name = 3", "a string"}},
       {"NameEmpty", "name = ''\n" + std::string(kPoint), {":1: ", "name", "1 to 100 bytes"}},
       {"NameLikeAFlag", "name = '-x'\n" + std::string(kPoint), {":1: ", "-x"}},
+      {"NameWithEscape", "name = \"a\\u001b[2J\"\n" + std::string(kPoint), {":1: ", "a\\x1b[2J"}},
+      {"NameWithC1", "name = \"a\\u009b\"\n" + std::string(kPoint), {":1: ", "a\\u009b"}},
+      {"NameTurned", "name = \"a\\u202eb\"\n" + std::string(kPoint), {":1: ", "a\\u202eb"}},
       {"NoBlock", "name = 'x'\n", {"[[block]]", "H, mu and e"}},
       {"EmptyBlockList", "block = []\n", {":1: ", "empty"}},
       {"BlockNoTable", "block = [3]\n", {":1: ", "[[block]]"}},
@@ -114,17 +117,31 @@ std::vector<WrongFile> wrong_axes() {
   return {
       {"NoH", "[[block]]\nmu = 0.4\ne = 1\n", {":1: ", "H is missing", "> 0"}},
       {"NoMu", "[[block]]\nH = 1\ne = 1\n", {":1: ", "mu is missing", ">= 0"}},
-      {"NoE", "[[block]]\nH = 1\nmu = 0.4\n", {":1: ", "e is missing", "(0, 1]"}},
+      {"NoE", "[[block]]\nH = 1\nmu = 0.4\n", {":1: ", "e is missing", "[0.001, 1]"}},
       {"UnknownAxis", block_with("mu = 0.4\nmuu = 1"), {":4: ", "`muu`", "`mu`", "the keys are"}},
       {"PresetAsAxis", block_with("mu = 0.4\npreset = 'paper'"), {":4: ", "preset", "[model]"}},
       {"MuNegative", block_with("mu = -0.4"), {":3: ", "mu = -0.4", ">= 0"}},
       {"MuNan", block_with("mu = nan"), {":3: ", "mu = nan", ">= 0"}},
       {"HInfinite", block_with("H = inf"), {":2: ", "H = inf", "> 0"}},
-      {"EZero", block_with("e = 0"), {":4: ", "e = 0", "(0, 1]"}},
-      {"EAboveOne", block_with("e = [0.5, 1.1]"), {":4: ", "e = 1.1", "(0, 1]"}},
+      {"EZero", block_with("e = 0"), {":4: ", "e = 0", "[0.001, 1]"}},
+      {"EAboveOne", block_with("e = [0.5, 1.1]"), {":4: ", "e = 1.1", "[0.001, 1]"}},
       {"AxisNoNumber", block_with("mu = 'rough'"), {":3: ", "mu = ", "rough", "a list of numbers"}},
       {"AxisTrue", block_with("mu = true"), {":3: ", "mu = true", "a boolean"}},
       {"AxisListOfStrings", block_with("mu = ['a']"), {":3: ", "a list of numbers"}},
+      {"AxisElementNoNumber",
+       block_with("mu = [\n0.4,\n'a',\n0.6]"),
+       {":5: ", "a list of numbers"}},
+      {"AxisElementOutOfRange", block_with("mu = [\n0.4,\n0.5,\n-0.6]"), {":6: ", "mu = -0.6"}},
+      {"AxisElementUnknownIntegrator",
+       block_with("mu = 0.4\nintegrator = [\n'explicit',\n'euler']"),
+       {":6: ", "euler"}},
+      {"LengthsElementNegative",
+       "[model]\nlengths = [\n0.4,\n-0.4]\n" + std::string(kPoint),
+       {":4: ", "-0.4", "> 0"}},
+      {"EBelowWhatCanBeSolved", block_with("e = 0.0009"), {":4: ", "e = 0.0009", "[0.001, 1]"}},
+      {"ERangeFromBelowWhatCanBeSolved",
+       block_with("e = { from = 1e-4, to = 1, count = 3 }"),
+       {":4: ", "e = 0.0001", "[0.001, 1]"}},
       {"AxisEmpty", block_with("mu = []"), {":3: ", "mu = []", "at least one"}},
       {"AxisValueTwice", block_with("mu = [0.4, 0.4]"), {":3: ", "0.4 twice"}},
       {"IntegratorAxisByNumber", block_with("mu = 0.4\nintegrator = [0]"), {":4: ", "explicit"}},
@@ -145,7 +162,7 @@ std::vector<WrongFile> wrong_axes() {
       {"RangeToNan", block_with("mu = { from = 1, to = nan, count = 2 }"), {":3: ", "mu = nan"}},
       {"RangeOutOfDomain",
        block_with("e = { from = 0.5, to = 1.5, count = 2 }"),
-       {":4: ", "e = 1.5", "(0, 1]"}},
+       {":4: ", "e = 1.5", "[0.001, 1]"}},
       {"CountZero",
        block_with("mu = { from = 1, to = 2, count = 0 }"),
        {":3: ", "count = 0", "at least 1"}},
@@ -225,6 +242,10 @@ TEST(StudyFile, StepsLeadToTheEndOfTheRangeExactly) {
   EXPECT_EQ(table.point(0).e_star, 0.5);
   EXPECT_EQ(table.point(10).e_star, 1.0);
   EXPECT_NEAR(table.point(3).e_star, 0.65, 1e-15);
+}
+
+TEST(StudyFile, TakesTheSmallestRestitutionThatCanBeSolved) {
+  EXPECT_EQ(protocol::PointTable(parse_study(block_with("e = 0.001"), "x").recipe).size(), 1U);
 }
 
 TEST(StudyFile, ARangeOfOneValueIsThatValue) {

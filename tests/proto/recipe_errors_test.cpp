@@ -113,7 +113,7 @@ TEST(RecipeErrorsTest, ValuesOutOfTheirDomainAreNamedWithWhatIsAllowed) {
               AllOf(HasSubstr("mu = -0.1"), HasSubstr(">= 0")));
   EXPECT_THAT(
       refusal(recipe_of({{listed("H", {1.0}), listed("mu", {0.4}), range("e", 0.0, 1.0, 3)}})),
-      AllOf(HasSubstr("e = 0"), HasSubstr("(0, 1]")));
+      AllOf(HasSubstr("e = 0"), HasSubstr("[0.001, 1]")));
   EXPECT_THAT(refusal(recipe_of({{listed("H", {-1.0}), listed("mu", {0.4}), listed("e", {1.0})}})),
               HasSubstr("H = -1"));
   EXPECT_THAT(refusal_with_model_axis(listed("k", {0.0})), HasSubstr("k = 0"));

@@ -308,6 +308,33 @@ TEST_F(StoreTest, ANewerSchemaIsRefusedWithBothVersions) {
               HasSubstr("knows versions 1 to " + std::to_string(kSchemaVersion)));
 }
 
+TEST_F(StoreTest, AStudyThatThisVersionDoesNotTakeIsLeftOutAndNamedAndTheOthersAreThere) {
+  {
+    Store store(path_);
+    commit(store, {study_of(10, 1, "too elastic"), study_of(10, 2, "b")});
+  }
+  // Earlier versions took an e that no version can solve.
+  auto recipe = table_of(10)->recipe();
+  auto& e = *recipe.mutable_blocks(0)->mutable_axes(recipe.blocks(0).axes_size() - 1);
+  ASSERT_EQ(e.key(), "e");
+  e.clear_values();
+  e.add_values(1e-4);
+  {
+    const auto database = open_database(path_, SQLITE_OPEN_READWRITE);
+    Statement update(database.get(), "UPDATE studies SET recipe = ? WHERE study_id = 1");
+    const std::string bytes = recipe.SerializeAsString();
+    update.bind_blob(1, bytes);
+    update.run();
+  }
+  Store store(path_);
+  const auto studies = store.studies();
+  ASSERT_EQ(studies.size(), 1U);
+  EXPECT_EQ(studies[0].name, "b");
+  ASSERT_EQ(store.left_out().size(), 1U);
+  EXPECT_THAT(store.left_out().front(),
+              testing::AllOf(HasSubstr("too elastic"), HasSubstr("e = 0.0001")));
+}
+
 TEST_F(StoreTest, ARecipeThatCannotBeReadIsAnErrorThatNamesTheStudy) {
   {
     Store store(path_);

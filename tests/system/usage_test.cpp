@@ -1,3 +1,6 @@
+#include <filesystem>
+#include <regex>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -52,6 +55,75 @@ TEST(UsageTest, WrongFlagsEndWithTwoAndASentenceThatNamesThem) {
     EXPECT_NE(process.errors().find(use.named), std::string::npos)
         << line << "\nsaid: " << process.errors();
     EXPECT_EQ(process.output(), "") << line;
+  }
+}
+
+/// Flags of a program that take a value, as its help lists them.
+std::vector<std::string> flags_with_values(const Folder& folder, const std::string& program) {
+  Process help(folder, program, {"--help"});
+  help.wait();
+  std::istringstream lines(help.output());
+  std::vector<std::string> flags;
+  const std::regex flag(R"(^\s+(?:-\w,)?(--[a-z-]+) [A-Z]+.*)");
+  std::smatch found;
+  for (std::string line; std::getline(lines, line);) {
+    if (std::regex_match(line, found, flag)) {
+      flags.push_back(found[1]);
+    }
+  }
+  return flags;
+}
+
+void expect_refused(const Folder& folder, const std::string& program,
+                    const std::vector<std::string>& arguments) {
+  Process process(folder, program, arguments);
+  const std::string line = program + " " + testing::PrintToString(arguments);
+  EXPECT_EQ(process.wait(), 2) << line << process.errors();
+  const std::string name = std::filesystem::path(program).filename().string() + ": ";
+  EXPECT_TRUE(process.errors().starts_with(name)) << line << process.errors();
+  EXPECT_NE(process.errors().find(arguments.front()), std::string::npos)
+      << line << process.errors();
+  EXPECT_EQ(process.output(), "") << line;
+}
+
+TEST(UsageTest, EveryFlagOfServerAndWorkerRefusesAnEmptyValue) {
+  const Folder folder;
+  for (const std::string& program : {server_program(), worker_program()}) {
+    const auto flags = flags_with_values(folder, program);
+    EXPECT_GE(flags.size(), 3U) << program;
+    for (const std::string& flag : flags) {
+      expect_refused(folder, program, {flag, ""});
+    }
+  }
+}
+
+TEST(UsageTest, NumbersOfServerAndWorkerRefuseWhatTheyCannotBe) {
+  const Folder folder;
+  for (const char* value : {"nan", "-1", "1.5", "65536", "99999999999999999999", "x"}) {
+    expect_refused(folder, server_program(), {"--worker-port", value});
+    expect_refused(folder, server_program(), {"--client-port", value});
+    expect_refused(folder, worker_program(), {"--threads", value});
+  }
+  for (const char* value : {"nan", "-2", "1.5", "1000000", "99999999999999999999", "x"}) {
+    expect_refused(folder, server_program(), {"--ready-fd", value});
+  }
+  for (const char* value : {"nan", "-2", "0", "1.5", "99999999999999999999", "x"}) {
+    expect_refused(folder, worker_program(), {"--stop-with-parent", value});
+  }
+  for (const char* value : {"two\nlines", "\x1b[2J", "\xc2\x9b"}) {
+    expect_refused(folder, worker_program(), {"--name", value});
+  }
+}
+
+TEST(UsageTest, EveryProgramSaysItsVersion) {
+  const Folder folder;
+  for (const std::string& program : {client_program(), server_program(), worker_program()}) {
+    Process process(folder, program, {"--version"});
+    EXPECT_EQ(process.wait(), 0) << program;
+    const std::string name = std::filesystem::path(program).filename().string();
+    EXPECT_TRUE(std::regex_match(process.output(), std::regex(name + R"( \d+\.\d+\.\d+\n)")))
+        << process.output();
+    EXPECT_EQ(process.errors(), "") << program;
   }
 }
 

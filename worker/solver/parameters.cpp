@@ -7,6 +7,8 @@
 
 #include "worker/solver/number.h"
 
+#include "worker/solver/smallest_restitution.h"
+
 namespace oblique::solver {
 namespace {
 
@@ -76,8 +78,8 @@ constexpr std::array<ParameterKey, 3> kPointKeys{{
     {"H", "m", "drop of the tip at touch", "> 0 and at most the largest drop of the tip", positive,
      nullptr, nullptr},
     {"mu", "", "coefficient of friction", ">= 0", not_negative, nullptr, nullptr},
-    {"e", "", "Stronge's energetic coefficient of restitution", "in (0, 1]",
-     [](double v) { return v > 0.0 && v <= 1.0; }, nullptr, nullptr},
+    {"e", "", "Stronge's energetic coefficient of restitution", "in [0.001, 1]",
+     [](double v) { return v >= kSmallestRestitution && v <= 1.0; }, nullptr, nullptr},
 }};
 
 template <std::size_t n>

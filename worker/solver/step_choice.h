@@ -2,6 +2,7 @@
 
 #include "worker/solver/chain.h"
 #include "worker/solver/contact_law.h"
+#include "worker/solver/smallest_restitution.h"
 
 namespace oblique::solver {
 
@@ -24,9 +25,6 @@ class StepChoice {
   /// it is faster than the chain's own response to contact, and steps in restitution shrink with
   /// it.
   static constexpr double kFastRestitution = 0.4;
-  /// Below, k/e*^2 turns the rounding of the tip's position into forces of newtons, and events come
-  /// faster than they can be told apart.
-  static constexpr double kSmallestRestitution = 1e-3;
 
   /// Throws InputError when model.dt_fall_s is above its limit.
   StepChoice(const Chain& chain, const ModelParameters& model);

@@ -44,9 +44,9 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 TEST(SolveErrors, ValueOutsideItsRangeIsNamedWithWhatIsAllowed) {
   EXPECT_THAT(input_error(1.0, -0.1, 1.0), AllOf(HasSubstr("mu = -0.1"), HasSubstr(">= 0")));
-  EXPECT_THAT(input_error(1.0, 0.4, 0.0), AllOf(HasSubstr("e = 0"), HasSubstr("(0, 1]")));
+  EXPECT_THAT(input_error(1.0, 0.4, 0.0), AllOf(HasSubstr("e = 0"), HasSubstr("[0.001, 1]")));
   EXPECT_THAT(input_error(1.0, 0.4, -0.5), HasSubstr("e = -0.5"));
-  EXPECT_THAT(input_error(1.0, 0.4, 1.01), AllOf(HasSubstr("e = 1.01"), HasSubstr("(0, 1]")));
+  EXPECT_THAT(input_error(1.0, 0.4, 1.01), AllOf(HasSubstr("e = 1.01"), HasSubstr("[0.001, 1]")));
   EXPECT_THAT(input_error(0.0, 0.4, 1.0), AllOf(HasSubstr("H = 0 m"), HasSubstr("> 0")));
   EXPECT_THAT(input_error(-1.0, 0.4, 1.0), HasSubstr("H = -1 m"));
 }
