@@ -6,6 +6,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/columns.h"
 #include "client/printer.h"
 #include "worker/solver/number.h"
 
@@ -69,6 +70,10 @@ const char* name_of(Trend trend) {
   }
 }
 
+std::optional<double> times(const std::optional<double>& value, double factor) {
+  return value ? std::optional(*value * factor) : std::nullopt;
+}
+
 void add_optional(protocol::Row& row, const std::optional<double>& value) {
   auto* added = row.add_values();
   if (value) {
@@ -100,14 +105,15 @@ void print_outputs(std::ostream& out, const Refinement& refinement) {
   }
   for (const auto& output : refinement.convergence.outputs) {
     auto& row = *table.add_rows();
-    add_value(row, output.name);
+    const auto shown = shown_column(output.name);
+    add_value(row, shown.heading);
     for (const auto& value : output.values) {
-      add_optional(row, value);
+      add_optional(row, times(value, shown.per_unit));
     }
     const auto& extrapolation = output.extrapolation;
-    add_value(row, extrapolation.limit);
+    add_value(row, extrapolation.limit * shown.per_unit);
     add_rough(row, extrapolation.order);
-    add_rough(row, extrapolation.error);
+    add_rough(row, times(extrapolation.error, shown.per_unit));
     const auto error = relative(output);
     add_rough(row, error ? std::optional(kPercent * *error) : std::nullopt);
     add_value(row, std::string(remark_on(output)));
@@ -290,15 +296,16 @@ void print_errors(std::ostream& out, const Refinement& refinement) {
       continue;
     }
     auto& row = *table.add_rows();
-    add_value(row, output.name);
+    const auto shown = shown_column(output.name);
+    add_value(row, shown.heading);
     for (const auto& value : output.values) {
       const auto error = relative_error(value, output.extrapolation.limit);
       add_value(row, error   ? fixed_number(kPercent * *error, 3)
                      : value ? std::string("-")
                              : std::string("other mode"));
     }
-    add_value(row, output.finest());
-    add_value(row, output.extrapolation.limit);
+    add_value(row, output.finest() * shown.per_unit);
+    add_value(row, output.extrapolation.limit * shown.per_unit);
     add_rough(row, output.extrapolation.order);
   }
   print(out, table, Format::kTable);

@@ -15,6 +15,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/nearest.h"
+#include "client/packed_columns.h"
 #include "proto/visible_text.h"
 #include "worker/solver/number.h"
 #include "worker/solver/parameters.h"
@@ -151,13 +152,17 @@ void print_csv(std::ostream& out, const QueryReply& rows) {
   }
 }
 
-nlohmann::json json_value(const Value& value) {
+nlohmann::ordered_json json_value(const std::string& column, const Value& value) {
   switch (value.kind_case()) {
     case Value::kInteger:
       return value.integer();
     case Value::kReal:
-      return std::isfinite(value.real()) ? nlohmann::json(value.real()) : nlohmann::json();
+      return std::isfinite(value.real()) ? nlohmann::ordered_json(value.real())
+                                         : nlohmann::ordered_json();
     case Value::kText:
+      if (auto list = unpacked(column, value.text())) {
+        return *std::move(list);
+      }
       return value.text();
     default:
       return {};
@@ -207,7 +212,7 @@ void print_json(std::ostream& out, const QueryReply& rows) {
   for (const auto& row : rows.rows()) {
     nlohmann::ordered_json object = nlohmann::ordered_json::object();
     for (int i = 0; i < row.values_size(); ++i) {
-      object[names[static_cast<std::size_t>(i)]] = json_value(row.values(i));
+      object[names[static_cast<std::size_t>(i)]] = json_value(rows.columns(i), row.values(i));
     }
     out << separator
         << harmless(object.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));

@@ -15,11 +15,16 @@ enum class Format { kTable, kCsv, kJson, kMarkdown };
 /// other names.
 Format format_named(std::string_view name);
 
+/// Whether it is for reading, not for other programs.
+inline bool is_for_people(Format format) {
+  return format == Format::kTable || format == Format::kMarkdown;
+}
+
 /// Prints columns and rows. Tables, plain or in Markdown, are for reading: numbers of
 /// six digits, aligned. CSV (RFC 4180,
 /// a header line) and JSON (an array of objects) hold every number so that it reads back as the
 /// same bits; NULL is an empty field, respectively null. In JSON the second of two columns of one
-/// name is called name_2.
+/// name is called name_2, and lists that columns pack as text are arrays; see packed_columns.h.
 void print(std::ostream& out, const protocol::QueryReply& rows, Format format);
 
 /// The same to standard output. In tables and on a terminal texts from outside are made visible

@@ -3,6 +3,7 @@
 #include <string_view>
 #include <vector>
 
+#include "client/columns.h"
 #include "client/nearest.h"
 #include "client/printer.h"
 #include "client/result_query.h"
@@ -21,9 +22,10 @@ constexpr const char* kExamples = R"(Examples:
   oblique query friction --select mu,fn_peak_N,mode --format csv > friction.csv
   oblique query friction --select "*" --limit 1 --format json
 
-Columns are those of the view `runs`, in the case in which they are written: e is the restitution
+`oblique columns` lists the columns, in the case in which they are written: e is the restitution
 coefficient, E_Pa Young's modulus. EXPR and COLUMNS are SQL expressions, without comments and
-parameters.)";
+parameters, over values in SI units. Tables show some columns in other units, which stand in
+brackets in the heading.)";
 
 struct QueryFlags {
   ResultQuery query;
@@ -39,7 +41,7 @@ std::string with_columns(const std::string& message, Source& source) {
     return message;
   }
   const auto wrong = message.substr(at + kNoColumn.size());
-  const auto runs = source.query("SELECT * FROM runs LIMIT 0");
+  const auto runs = source.query("SELECT * FROM " + rows_of_queries() + " LIMIT 0");
   const std::vector<std::string_view> columns(runs.columns().begin(), runs.columns().end());
   return message + did_you_mean(wrong, columns) + "; the columns are " + joined(columns);
 }
@@ -56,7 +58,7 @@ int query(const QueryFlags& flags) {
   } catch (const solver::InputError& error) {
     throw solver::InputError(with_columns(error.what(), *source));
   }
-  return print_whole(rows, format);
+  return print_whole(is_for_people(format) ? in_shown_units(std::move(rows)) : rows, format);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "client/columns.h"
 #include "client/sql_expression.h"
 #include "worker/solver/errors.h"
 
@@ -29,7 +30,7 @@ void check(const ResultQuery& query) {
 }
 
 void check_columns(const ResultQuery& query, Source& source) {
-  const auto runs = source.query("SELECT * FROM runs LIMIT 0");
+  const auto runs = source.query("SELECT * FROM " + rows_of_queries() + " LIMIT 0");
   const std::vector<std::string> columns(runs.columns().begin(), runs.columns().end());
   const auto names_given = names_given_in(query.select);
   check_case_of_columns(kSelect, query.select, columns, names_given);
@@ -39,8 +40,8 @@ void check_columns(const ResultQuery& query, Source& source) {
 
 std::string statement_of(const ResultQuery& query, std::int64_t skipped) {
   // The study is chosen inside, where no --where can widen it.
-  std::string sql = "SELECT " + query.select +
-                    " FROM (SELECT * FROM runs WHERE study = " + sql_text(query.study) + ")";
+  std::string sql = "SELECT " + query.select + " FROM (SELECT * FROM " + rows_of_queries() +
+                    " WHERE study = " + sql_text(query.study) + ")";
   sql += query.where.empty() ? "" : " WHERE (" + query.where + ")";
   sql += query.order.empty() ? "" : " ORDER BY " + query.order;
   // SQL wants a limit before an offset; -1 is none.

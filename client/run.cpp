@@ -3,8 +3,10 @@
 #include <stdexcept>
 #include <string>
 
+#include "client/columns.h"
 #include "client/connection.h"
 #include "client/embedded_service.h"
+#include "client/mesh_note.h"
 #include "client/point_flags.h"
 #include "client/printer.h"
 #include "client/run_service.h"
@@ -44,13 +46,14 @@ std::string shell_word(const std::string& text) {
 
 int run(const RunFlags& flags) {
   const auto study = study_of_flags(flags.study);
+  tell_mesh(std::cerr, study.recipe);
   // Before any thread is started; see StopSignal.
   StopSignal stop;
   const auto end = run_study(study, flags.settings, stop);
   if (!end) {
     return stop.exit_code();
   }
-  print_out(end->rows, Format::kTable);
+  print_out(in_shown_units(end->rows), Format::kTable);
   if (end->rows.rows_size() < static_cast<int>(end->status.points())) {
     std::cerr << "The first " << end->rows.rows_size() << " of " << end->status.points()
               << " points are shown.\n";

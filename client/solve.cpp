@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "client/case_report.h"
+#include "client/mesh_note.h"
 #include "client/point_flags.h"
 #include "client/trace_table.h"
 #include "client/verbs.h"
@@ -84,6 +85,7 @@ class TraceOutput {
 int solve(const SolveFlags& flags) {
   const protocol::PointTable table(recipe_of_flags(flags.points));
   check_one_point(table);
+  tell_mesh(std::cerr, table.recipe());
   const auto point = table.point(0);
   const solver::Finger finger(table.model(0));
   std::optional<TraceOutput> trace;

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "client/connection.h"
+#include "client/mesh_note.h"
 #include "client/point_flags.h"
 #include "client/source.h"
 #include "client/verbs.h"
@@ -52,6 +53,7 @@ int watch(const Study& study, Connection& connection, StopSignal& stop) {
 
 int submit(const SubmitFlags& flags) {
   const auto study = study_of_flags(flags.study);
+  tell_mesh(std::cerr, study.recipe);
   StopSignal stop;
   Connection connection(connection_settings(flags.source), [&stop] { return !stop.requested(); });
   bool submitted = false;

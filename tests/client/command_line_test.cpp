@@ -110,6 +110,16 @@ TEST(CommandLine, SolvesOnePointAsOneJsonObject) {
   EXPECT_EQ(json["major_peaks_N"].size(), 3U);
 }
 
+TEST(CommandLine, SaysOnceAndBesideTheDataThatThePublishedMeshIsNotConverged) {
+  const auto outcome = oblique({"solve", "--H", "1", "--mu", "0.4", "--e", "1", "--json"});
+  EXPECT_TRUE(nlohmann::json::accept(outcome.out)) << outcome.out;
+  EXPECT_NE(outcome.err.find("--preset converged"), std::string::npos) << outcome.err;
+  const auto run = oblique({"run", "--H", "0.6", "--mu", "0.2:0.4:3", "--e", "1"});
+  const auto first = run.err.find("--preset converged");
+  EXPECT_NE(first, std::string::npos) << run.err;
+  EXPECT_EQ(run.err.find("--preset converged", first + 1), std::string::npos) << run.err;
+}
+
 TEST(CommandLine, WritesATraceFromTouchToSeparation) {
   const TestFolder folder;
   const auto outcome =

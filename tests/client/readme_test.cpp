@@ -9,8 +9,8 @@
 namespace oblique::client {
 namespace {
 
-std::string readme() {
-  std::ifstream file(std::string(OBLIQUE_SOURCE_DIR) + "/README.md");
+std::string contents(const std::string& name) {
+  std::ifstream file(std::string(OBLIQUE_SOURCE_DIR) + "/" + name);
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
@@ -28,8 +28,17 @@ std::string shown(const std::string& text, const std::string& command) {
 TEST(Readme, ShowsTheTableThatItsCommandPrints) {
   const auto printed = oblique({"paper", "--format", "markdown"});
   ASSERT_EQ(printed.exit_code, 0) << printed.err;
-  EXPECT_EQ(shown(readme(), "oblique paper --format markdown"), "\n" + printed.out + "\n")
+  EXPECT_EQ(shown(contents("README.md"), "oblique paper --format markdown"),
+            "\n" + printed.out + "\n")
       << "deploy/tables writes the tables into README.md";
+}
+
+TEST(Readme, DescribesEveryColumn) {
+  const auto printed = oblique({"columns", "--format", "markdown"});
+  ASSERT_EQ(printed.exit_code, 0) << printed.err;
+  EXPECT_EQ(shown(contents("client/README.md"), "oblique columns --format markdown"),
+            "\n" + printed.out + "\n")
+      << "deploy/tables writes the tables into client/README.md";
 }
 
 }  // namespace

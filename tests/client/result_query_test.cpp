@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "client/columns.h"
 #include "worker/solver/errors.h"
 
 namespace oblique::client {
@@ -97,8 +98,9 @@ TEST(ResultQuery, AConditionCannotWidenWhatItStandsIn) {
     q.limit = 5;
   });
   EXPECT_THAT(statement_of(query, 2),
-              HasSubstr("FROM (SELECT * FROM runs WHERE study = 'it''s') WHERE (mu > 1 OR 1) "
-                        "ORDER BY mu DESC LIMIT 3 OFFSET 2"));
+              HasSubstr(rows_of_queries() +
+                        " WHERE study = 'it''s') WHERE (mu > 1 OR 1) ORDER BY mu DESC LIMIT 3 "
+                        "OFFSET 2"));
 }
 
 TEST(ResultQuery, EachFlagIsCheckedAndNamed) {
