@@ -69,6 +69,9 @@ void ContactRecord::add_state(const ContactLaw& law, const TipState& tip, double
 
 void ContactRecord::finish(const ContactLaw& law, const TipState& tip, double t_s) {
   close_slide(law, tip);
+  if (states_.back().t0_s == t_s) {
+    states_.pop_back();  // as where both forces vanish together, and rounding lets P slip first
+  }
   turns_.back().ft_span_N = ft_span_N_;
   duration_s_ = t_s;
 }

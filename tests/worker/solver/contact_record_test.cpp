@@ -105,6 +105,18 @@ TEST(ContactRecord, AStateOfNoLengthThatLeadsBackLeavesTheStateBeforeItWhole) {
   EXPECT_TRUE(result.stick_intervals.empty());
 }
 
+TEST(ContactRecord, AStateThatBeginsAtSeparationIsNotInTheMode) {
+  Told told(kSticking_m_s);
+  told.step_to(at(1e-6, -1e-4));
+  told.turn(1e-4);
+  told.step_to(at(0.0, 0.0));
+  told.slip(2e-4);
+  const CaseResult result = told.finished(2e-4);
+  EXPECT_EQ(result.mode, "SC SR");
+  ASSERT_EQ(result.stick_intervals.size(), 1U);
+  EXPECT_EQ(result.stick_intervals[0].t1_s, 2e-4);
+}
+
 TEST(ContactRecord, TheFirstStateLeftAtOnceIsNotInTheModeEither) {
   Told told(kSticking_m_s);
   told.slip(0.0);
@@ -132,14 +144,14 @@ TEST(ContactRecord, LargestTangentialForceOfAPeakCountsTheValleyFromWhichItFalls
 TEST(ContactRecord, WorkExchangedCountsWhatGoesInAndWhatComesBack) {
   Told told(kSticking_m_s);
   ContactIntegrals<double> integrals;
-  integrals.work_t = -0.25;
+  integrals.work_t = 0.25;
   told.step_to(at(0.0, -1e-3), integrals);
   told.turn(1e-4);
-  integrals.work_t = 0.125;
+  integrals.work_t = -0.375;
   told.step_to(at(0.0, 0.0), integrals);
   const CaseResult result = told.finished(2e-4);
-  // F_n = 1e6 N/m 1e-3 m: half a joule each way, along the ground a quarter and an eighth.
-  EXPECT_DOUBLE_EQ(result.energy.exchanged_J, 0.5 + 0.5 + 0.25 + 0.125);
+  // F_n = 1e6 N/m 1e-3 m: half a joule each way, against that along the ground.
+  EXPECT_DOUBLE_EQ(result.energy.exchanged_J, 0.5 + 0.5 + 0.25 + 0.375);
   EXPECT_DOUBLE_EQ(result.energy.friction_J, 0.125);
   EXPECT_NEAR(result.energy.restitution_J, 0.0, 1e-15);
 }

@@ -64,13 +64,15 @@ TEST(Contact, ABumpThatIsHigherOnOneSideOfItsStepIsLocated) {
 
 /// Half a period in which forces rise and fall together: the turn meets the extremum of F_t at its
 /// middle, and separation meets both sides of the cone at its end. `lead_s` is by how much motion
-/// along the ground is ahead.
-TipPath in_step(double lead_s) {
-  return [lead_s](double t_s) -> TipState {
+/// along the ground is ahead; `skew` makes the polynomials through a step err otherwise there.
+TipPath in_step(double lead_s, double skew = 0.0) {
+  return [lead_s, skew](double t_s) -> TipState {
     constexpr double kRate = M_PI / kPeriod_s;
     const double z = kRate * t_s;
     const double ahead = kRate * (t_s + lead_s);
-    return {3e-5 * std::sin(ahead), -1e-4 * std::sin(z), 3e-5 * kRate * std::cos(ahead),
+    const double sine = std::sin(ahead);
+    return {3e-5 * sine * (1.0 + skew * sine * sine), -1e-4 * std::sin(z),
+            3e-5 * kRate * std::cos(ahead) * (1.0 + 3.0 * skew * sine * sine),
             -1e-4 * kRate * std::cos(z)};
   };
 }
@@ -89,6 +91,18 @@ TEST(Contact, EventsThatCoincideAreTakenInTheirStatedOrder) {
     EXPECT_EQ(events[1].state, "SR");
     EXPECT_NEAR(events[2].t_s, kPeriod_s, 1e-11);
     EXPECT_TRUE(contact.finished());
+    EXPECT_EQ(mode_of(contact), "SC SR");
+  }
+}
+
+TEST(Contact, ASlipThatRoundingPutsBeforeTheSeparationItMeetsIsNotInTheMode) {
+  for (const double skew : {-0.3, 0.3}) {
+    SCOPED_TRACE(skew);
+    const TipPath path = in_step(0.0, skew);
+    Contact contact({k_N_m, kEta2, 0.5, 1.0}, path(0.0), {0.7e-4, 0.7e-4});
+    const auto events = followed(contact, path, 2.0 * kPeriod_s);
+    ASSERT_TRUE(contact.finished());
+    EXPECT_EQ(events[0].state, "SR");
     EXPECT_EQ(mode_of(contact), "SC SR");
   }
 }

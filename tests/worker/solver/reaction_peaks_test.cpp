@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <vector>
@@ -69,6 +70,19 @@ TEST(ReactionPeaks, TheLargestOfSeveralCountsWhereverItLies) {
     EXPECT_NEAR(peaks.peaks(0).at(0).force_N, 2.0 * std::exp(grows * first_s),
                 0.02 * 2.0 * std::exp(grows * first_s));
   }
+}
+
+TEST(ReactionPeaks, APeakBetweenInstantsCountsThoughAnInstantOfAnotherIsHigher) {
+  // 1 - (t - 1)^2 is met at its top, 1.005 - (t - 3.1)^2 a tenth beside it on either side.
+  ReactionPeaks peaks(1);
+  for (int i = 0; i <= 20; ++i) {
+    const double t_s = 0.2 * i;
+    const double first = 1.0 - (t_s - 1.0) * (t_s - 1.0);
+    const double second = 1.005 - (t_s - 3.1) * (t_s - 3.1);
+    add(peaks, t_s, 0.0, std::max({first, second, 0.0}));
+  }
+  EXPECT_NEAR(peaks.peaks(0).at(0).force_N, 1.005, 1e-12);
+  EXPECT_NEAR(peaks.peaks(0).at(0).t_s, 3.1, 1e-12);
 }
 
 TEST(ReactionPeaks, AForceThatOnlyFallsOrRisesIsLargestAtItsEnd) {
