@@ -76,13 +76,13 @@ TEST_F(SourceTest, IsTheDatabaseThatIsNamedWhateverElseThereIs) {
   make_database("oblique.db", "default");
   make_database("other.db", "other");
   setenv("OBLIQUE_SERVER", from_environment_.url().c_str(), 1);
-  EXPECT_EQ(study_of({.database = "other.db", .server = {}}), "other");
+  EXPECT_EQ(study_of({.database = "other.db", .server = {}, .timeout_s = {}}), "other");
 }
 
 TEST_F(SourceTest, IsTheServerThatIsNamedBeforeThatOfTheEnvironmentAndTheFile) {
   make_database("oblique.db", "default");
   setenv("OBLIQUE_SERVER", from_environment_.url().c_str(), 1);
-  EXPECT_EQ(study_of({.database = {}, .server = named_.url()}), "named");
+  EXPECT_EQ(study_of({.database = {}, .server = named_.url(), .timeout_s = {}}), "named");
 }
 
 TEST_F(SourceTest, IsTheServerOfTheEnvironmentBeforeTheFileInThisFolder) {
@@ -137,7 +137,7 @@ TEST_F(SourceTest, CallsAWrongStatementWrongUsageWhereverItIsAsked) {
     reply.mutable_error()->set_wrong_request(request.query().sql() == "SELEC 1");
     return std::vector{protocol::encode(reply)};
   });
-  const auto source = open_source({.database = {}, .server = server.url()});
+  const auto source = open_source({.database = {}, .server = server.url(), .timeout_s = {}});
   EXPECT_THROW(source->query("SELEC 1"), solver::InputError);
   EXPECT_THROW(source->query("SELECT 1"), ServerError);
 }
