@@ -19,6 +19,12 @@ std::string seconds_of(std::chrono::milliseconds time) {
   return solver::exact_number(static_cast<double>(time.count()) / 1000.0) + " s";
 }
 
+/// Where the page begins that follows the one after `asked`; 0: there is none. A page that does not
+/// come later than the one before would never end.
+std::uint64_t next_page(std::uint64_t asked, std::uint64_t told) {
+  return told > asked ? told : 0;
+}
+
 }  // namespace
 
 Connection::Connection(ConnectionSettings settings, KeepWaiting keep_waiting)
@@ -200,15 +206,30 @@ protocol::SubmitReply Connection::submit(const Study& study, const StudyTerms& t
 }
 
 protocol::StatusReply Connection::status(const std::string& study, const Tell& tell) {
-  protocol::ClientRequest request;
-  request.mutable_status()->set_study(study);
-  return call(std::move(request), tell).status();
+  protocol::StatusReply all;
+  std::uint64_t after = 0;
+  do {
+    protocol::ClientRequest request;
+    request.mutable_status()->set_study(study);
+    request.mutable_status()->set_after_study_id(after);
+    const protocol::StatusReply page = call(std::move(request), tell).status();
+    after = next_page(after, page.next_after());
+    all.MergeFrom(page);
+  } while (after != 0);
+  return all;
 }
 
 protocol::WorkersReply Connection::workers() {
-  protocol::ClientRequest request;
-  request.mutable_workers();
-  return call(std::move(request)).workers();
+  protocol::WorkersReply all;
+  std::uint64_t after = 0;
+  do {
+    protocol::ClientRequest request;
+    request.mutable_workers()->set_after_worker_id(after);
+    const protocol::WorkersReply page = call(std::move(request)).workers();
+    after = next_page(after, page.next_after());
+    all.MergeFrom(page);
+  } while (after != 0);
+  return all;
 }
 
 protocol::ChangeReply Connection::change(const std::string& study, protocol::StudyChange change) {

@@ -74,8 +74,9 @@ class Connection {
   const std::string& url() const { return settings_.server_url; }
 
   protocol::SubmitReply submit(const Study& study, const StudyTerms& terms = {});
-  /// The study of that name, or all of them when it is empty.
+  /// The study of that name, or all of them when it is empty, however many pages they fill.
   protocol::StatusReply status(const std::string& study, const Tell& tell = {});
+  /// All workers, likewise.
   protocol::WorkersReply workers();
   protocol::ChangeReply change(const std::string& study, protocol::StudyChange change);
   /// Runs one statement that only reads, for no longer than an answer is waited for; `max_rows` 0

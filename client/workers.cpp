@@ -13,7 +13,7 @@ namespace {
 constexpr const char* kExamples = R"(Examples:
   oblique workers
   oblique workers --server tcp://127.0.0.1:7600 --format csv
-  oblique workers --db sweep.db        every worker that ever joined
+  oblique workers --db sweep.db        every worker that delivered a result
 
 A server tells of the workers that are there now.)";
 

@@ -31,13 +31,12 @@ std::string reply_around(std::string_view encoded_query_reply);
 /// The frame of the same ClientReply, whose bytes lack only that number. Nothing is parsed.
 std::string with_request_id(std::uint64_t request_id, std::string_view encoded_reply);
 
+/// The frame of a ServerToWorker that defines a study by a Recipe that is encoded already.
+std::string definition_around(std::uint64_t study_id, std::string_view encoded_recipe);
+
 /// Parses one frame. Every frame is hostile until this says otherwise: false for one that is too
 /// long, truncated or foreign (no known kind set is the caller's to check).
 bool decode(std::string_view frame, google::protobuf::MessageLite& message);
-
-/// How many fields `inner` stand in all fields `outer` of an encoded message, messages both.
-/// Decodes nothing: an empty message of two bytes takes hundreds once it is decoded.
-std::size_t count_nested(std::string_view frame, int outer, int inner);
 
 /// For main functions: keeps Protobuf from writing a line to standard error for each hostile frame,
 /// which would let a peer fill the log. Whoever decodes frames counts them instead.

@@ -11,6 +11,7 @@
 #include "proto/recipe.h"
 #include "server/interval_set.h"
 #include "server/study_points.h"
+#include "server/study_table.h"
 
 namespace oblique::server {
 
@@ -36,7 +37,7 @@ constexpr const char* state_name(StudyState state) {
 struct AddStudy {
   std::uint64_t study_id;
   std::string name;
-  std::shared_ptr<const protocol::PointTable> table;
+  StudyTable table;
   std::string created_at;
   StudyShare share{};
 };

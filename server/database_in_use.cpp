@@ -11,7 +11,8 @@ bool is_in_use(const std::string& path) {
   if (file < 0) {
     return false;
   }
-  // Shared, and for an instant: a server that takes its lock just then tries again; see DatabaseFiles.
+  // Shared, and for an instant: a server that takes its lock just then tries again; see
+  // DatabaseFiles.
   const bool is_locked = ::flock(file, LOCK_SH | LOCK_NB) != 0;
   ::close(file);
   return is_locked;

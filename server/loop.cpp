@@ -48,7 +48,7 @@ Instant now() {
 /// Reports of the other threads, kept for the loop, which a descriptor wakes.
 class ReportBox {
  public:
-  using Item = std::variant<WriteReport, QueryReport>;
+  using Item = std::variant<WriteReport, QueryReport, ReadReport>;
 
   ReportBox() : woken_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
     if (!woken_.is_open()) {
@@ -121,6 +121,7 @@ class Loop::Parts final : public Outbox {
         writer_(store_, [this](std::vector<WriteReport> r) { written_.put(std::move(r)); }),
         queries_(settings.database, settings.queries,
                  [this](QueryReport r) { queried_.put(std::array{std::move(r)}); }),
+        reader_([this](ReadReport r) { requests_read_.put(std::array{std::move(r)}); }),
         network_(settings.network),
         workers_(network_.listen(address_, settings.worker_port)),
         clients_(network_.listen(address_, settings.client_port)) {
@@ -142,9 +143,10 @@ class Loop::Parts final : public Outbox {
 
   LoopEnd run(int stop_fd) {
     auto next_tick = Clock::now();
-    std::array<pollfd, 4> items{{{network_.descriptor(), POLLIN, 0},
+    std::array<pollfd, 5> items{{{network_.descriptor(), POLLIN, 0},
                                  {written_.descriptor(), POLLIN, 0},
                                  {queried_.descriptor(), POLLIN, 0},
+                                 {requests_read_.descriptor(), POLLIN, 0},
                                  {stop_fd, POLLIN, 0}}};
     bool has_more = false;
     std::optional<Clock::time_point> farewell_until;
@@ -170,7 +172,10 @@ class Loop::Parts final : public Outbox {
 
   Delivery to_worker(const std::string& identity,
                      const protocol::ServerToWorker& message) override {
-    return network_.send(identity, protocol::encode(message));
+    return forward_to_worker(identity, protocol::encode(message));
+  }
+  Delivery forward_to_worker(const std::string& identity, const std::string& frame) override {
+    return network_.send(identity, frame);
   }
   bool is_busy(const std::string& identity) const override { return network_.is_busy(identity); }
   bool to_client(const std::string& identity, const protocol::ClientReply& reply) override {
@@ -182,6 +187,7 @@ class Loop::Parts final : public Outbox {
   void write(WriteJob job) override { writer_.submit(std::move(job)); }
   bool query(QueryJob job) override { return queries_.submit(std::move(job)); }
   void cancel_query(std::uint64_t ticket) override { queries_.cancel(ticket); }
+  void read(ReadJob job) override { reader_.submit(std::move(job)); }
   void note(Severity severity, const std::string& text) override {
     constexpr std::array kLevels{spdlog::level::info, spdlog::level::warn, spdlog::level::err};
     spdlog::log(kLevels.at(static_cast<std::size_t>(severity)), "{}", text);
@@ -197,6 +203,9 @@ class Loop::Parts final : public Outbox {
     }
     for (auto& report : queried_.take()) {
       service_->queried(std::get<QueryReport>(std::move(report)));
+    }
+    for (auto& report : requests_read_.take()) {
+      service_->request_read(std::get<ReadReport>(std::move(report)), now());
     }
   }
 
@@ -272,8 +281,10 @@ class Loop::Parts final : public Outbox {
   Store store_;
   ReportBox written_;
   ReportBox queried_;
+  ReportBox requests_read_;
   Writer writer_;
   QueryPool queries_;
+  RequestReader reader_;
   Network network_;
   Network::Port workers_;
   Network::Port clients_;

@@ -48,6 +48,7 @@ void Scheduler::on(const StudyCancelled& event) {
   for (const LeaseId id : found->second.leases.all()) {
     end_lease(id, std::nullopt);
   }
+  found->second.points.rest();
   requeue(event.study);
   for (auto& [id, worker] : workers_) {
     if (worker.defined.erase(event.study) != 0) {
@@ -135,6 +136,7 @@ void Scheduler::finish_if_complete(StudyId id) {
     study.finished = true;
     study.cancelled = false;
     study.paused = false;
+    study.points.rest();
     effects_.emplace_back(StudyFinished{id});
   }
 }
@@ -284,12 +286,9 @@ StudyCounts Scheduler::study(StudyId id) const {
                             std::none_of(workers_.begin(), workers_.end(), [&](const auto& entry) {
                               return admits(study, entry.second);
                             });
-  return {study.points.table().size(),
-          study.points.settled() - study.failed,
-          study.failed,
-          study.points.leased(),
-          study.cancelled,
-          study.solver_version,
+  return {study.points.size(), study.points.settled() - study.failed,
+          study.failed,        study.points.leased(),
+          study.cancelled,     study.solver_version,
           lacks_worker};
 }
 

@@ -68,7 +68,7 @@ struct PointOutcome {
 /// A study that is new, or found in the database with the points that have a row.
 struct StudyAdded {
   StudyId study;
-  std::shared_ptr<const protocol::PointTable> table;
+  StudyTable table;
   IntervalSet settled;
   std::uint64_t failed = 0;  ///< how many of the settled points failed
   bool cancelled = false;

@@ -9,12 +9,6 @@
 #include "proto/frames.h"
 
 namespace oblique::server {
-namespace {
-
-/// Rates are taken over so long.
-constexpr std::int64_t kRateSpan_ms = 5000;
-
-}  // namespace
 
 std::string iso_8601(Instant now) {
   const std::time_t seconds = static_cast<std::time_t>(now.utc_ms / 1000);
@@ -40,7 +34,7 @@ Service::Service(ServiceSettings settings, Outbox& outbox, std::vector<StoredStu
                  Instant now)
     : settings_(std::move(settings)), outbox_(outbox), scheduler_(settings_.scheduler) {
   for (StoredStudy& study : studies) {
-    if (study.state == StudyState::kDone && study.settled.size() < study.table->size()) {
+    if (study.state == StudyState::kDone && study.settled.size() < study.table.size()) {
       study.state = StudyState::kRunning;  // rows were lost or removed since: they are solved again
     }
     study_ids_.emplace(study.name, study.study_id);
@@ -55,7 +49,7 @@ Service::Service(ServiceSettings settings, Outbox& outbox, std::vector<StoredStu
                                            0,
                                            false,
                                            {},
-                                           {}});
+                                           now.steady_ms});
     feed(StudyAdded{study.study_id, study.table, std::move(study.settled), study.failures.size(),
                     study.state == StudyState::kCancelled, study.state == StudyState::kPaused,
                     study.share, study.solver_version, std::move(study.attempts)},
@@ -81,9 +75,7 @@ void Service::handle(const Event& event, Instant now, protocol::Results* message
 void Service::perform(const Effect& effect, Instant now, protocol::Results* message) {
   protocol::ServerToWorker out;
   if (const auto* define = std::get_if<DefineStudy>(&effect)) {
-    out.mutable_study()->set_study_id(define->study);
-    *out.mutable_study()->mutable_recipe() = studies_.at(define->study).table->recipe();
-    send(define->worker, out);
+    define_study(*define);
   } else if (const auto* batch = std::get_if<SendBatch>(&effect)) {
     auto& fields = *out.mutable_batch();
     fields.set_study_id(batch->study);
@@ -110,9 +102,11 @@ void Service::perform(const Effect& effect, Instant now, protocol::Results* mess
     send(release->worker, out);
   } else if (const auto* drop = std::get_if<DropWorker>(&effect)) {
     const auto peer = peers_.find(drop->worker);
-    outbox_.note(Severity::kWarning, "worker " + std::to_string(drop->worker) + " (" +
-                                         (peer == peers_.end() ? "" : peer->second.name) +
-                                         ") is lost: " + drop->reason);
+    note_of_worker(Severity::kWarning,
+                   "worker " + std::to_string(drop->worker) + " (" +
+                       (peer == peers_.end() ? "" : peer->second.name) +
+                       ") is lost: " + drop->reason,
+                   now);
     forget(drop->worker);
   } else if (const auto* finished = std::get_if<StudyFinished>(&effect)) {
     Study& study = studies_.at(finished->study);
@@ -133,215 +127,28 @@ void Service::send(WorkerId worker, const protocol::ServerToWorker& message) {
   if (peer == peers_.end()) {
     return;
   }
-  const Delivery delivery = outbox_.to_worker(peer->second.identity, message);
+  note_delivery(worker, peer->second, outbox_.to_worker(peer->second.identity, message));
+}
+
+void Service::note_delivery(WorkerId worker, Peer& peer, Delivery delivery) {
   if (delivery == Delivery::kGone) {
     found_.emplace_back(WorkerUnreachable{worker});
-  } else if (delivery == Delivery::kBusy && !std::exchange(peer->second.is_busy, true)) {
+  } else if (delivery == Delivery::kBusy && !std::exchange(peer.is_busy, true)) {
     found_.emplace_back(WorkerBusy{worker, true});
   }
 }
 
-// ---- Writing ----------------------------------------------------------------------------------
-
-void Service::write(Change change, Write meaning, bool answer_failure) {
-  const std::uint64_t ticket = ++last_ticket_;
-  writes_.emplace(ticket, std::move(meaning));
-  waiting_changes_ += answer_failure ? 1U : 0U;
-  outbox_.write({ticket, std::move(change), answer_failure});
-}
-
-void Service::write_results(const StoreResults& effect, protocol::Results& message, Instant now) {
-  Peer& peer = peers_.at(effect.worker);
-  const std::size_t bytes = message.ByteSizeLong();
-  ++peer.unstored_messages;
-  peer.unstored_bytes += bytes;
-  unstored_bytes_ += bytes;
-  const auto study = studies_.find(effect.study);
-  AddResults change{effect.study,         study == studies_.end() ? nullptr : study->second.table,
-                    effect.worker,        peer.solver_version,
-                    peer.instruction_set, message.attempt(),
-                    iso_8601(now),        {}};
-  OfResults meaning{{effect.worker, effect.study, effect.sequence, {}}, message.attempt(), bytes};
-  for (const std::size_t index : effect.accepted) {
-    protocol::PointResult& result = *message.mutable_results(static_cast<int>(index));
-    meaning.event.outcomes.push_back({result.point(), !result.error().empty()});
-    change.results.push_back(std::move(result));
-  }
-  write(std::move(change), std::move(meaning), false);
-}
-
-void Service::write_failure(const StoreFailure& effect, Instant now) {
-  outbox_.note(Severity::kWarning, "point " + std::to_string(effect.point) + " of study " +
-                                       studies_.at(effect.study).name +
-                                       " failed: " + effect.reason);
-  AddResults change{effect.study,
-                    studies_.at(effect.study).table,
-                    0,
-                    {},
-                    {},
-                    effect.attempt,
-                    iso_8601(now),
-                    {protocol::failed_point(effect.point, effect.reason)}};
-  write(std::move(change),
-        OfResults{{0, effect.study, 0, {{effect.point, true}}}, effect.attempt, 0}, false);
-}
-
-void Service::written(const WriteReport& report, Instant now) {
-  if (report.kind == WriteReport::Kind::kFault) {
-    outbox_.note(Severity::kError, "results wait, nothing is handed out: " + report.error);
-    storage_fault_ = report.error;
-    feed(DispatchHeld{true}, now);
+/// The recipe goes out as it is kept: encoding a long one again for each worker would hold up the
+/// others.
+void Service::define_study(const DefineStudy& effect) {
+  const auto peer = peers_.find(effect.worker);
+  if (peer == peers_.end()) {
     return;
   }
-  if (report.kind == WriteReport::Kind::kRecovered) {
-    outbox_.note(Severity::kInfo, "the database takes results again");
-    storage_fault_.clear();
-    feed(DispatchHeld{stopping_ || disk_is_behind_}, now);
-    return;
-  }
-  if (report.kind == WriteReport::Kind::kGone) {
-    lose_storage(report.error, now);
-    return;
-  }
-  if (report.kind == WriteReport::Kind::kUnmerged) {
-    outbox_.note(Severity::kWarning,
-                 "the write-ahead log, the file beside the database that ends in -wal, is not yet "
-                 "merged into it: " +
-                     report.error +
-                     ". Until then a copy needs both files; `oblique backup` makes one that is "
-                     "whole");
-    return;
-  }
-  const auto found = writes_.find(report.ticket);
-  if (found == writes_.end()) {
-    return;
-  }
-  const Write meaning = std::move(found->second);
-  writes_.erase(found);
-  const bool a_client_waits =
-      !std::holds_alternative<OfResults>(meaning) && !std::holds_alternative<OfNothing>(meaning);
-  waiting_changes_ -= a_client_waits ? 1U : 0U;
-  if (report.kind == WriteReport::Kind::kStored) {
-    stored(meaning, now);
-  } else {
-    refused(meaning, report.error);
-  }
-  hold_while_disk_is_behind(now);
-}
-
-void Service::stored(const Write& meaning, Instant now) {
-  if (const auto* results = std::get_if<OfResults>(&meaning)) {
-    for (const PointOutcome& outcome : results->event.outcomes) {
-      if (outcome.failed) {
-        Study& study = studies_.at(results->event.study);
-        study.failures.insert(outcome.point);
-        study.attempts.set({outcome.point, outcome.point + 1}, results->attempt);
-      }
-    }
-    unstored_bytes_ -= results->bytes;
-    if (const auto peer = peers_.find(results->event.worker); peer != peers_.end()) {
-      --peer->second.unstored_messages;
-      peer->second.unstored_bytes -= results->bytes;
-    }
-    feed(results->event, now);
-  } else if (const auto* added = std::get_if<OfStudy>(&meaning)) {
-    Study& study = studies_.at(added->study);
-    study.durable = true;
-    outbox_.note(Severity::kInfo, "study " + study.name + " of " +
-                                      std::to_string(study.table->size()) + " points begins");
-    feed(StudyAdded{added->study, study.table, {}, 0, false, false, study.share}, now);
-    bool created = true;
-    for (const Client& client : std::exchange(study.submitters, {})) {
-      reply_submitted(client, added->study, std::exchange(created, false));
-    }
-  } else if (const auto* state = std::get_if<OfState>(&meaning)) {
-    --studies_.at(state->study).state_writes;
-    studies_.at(state->study).is_doubtful = false;
-    outbox_.note(Severity::kInfo, "study " + studies_.at(state->study).name +
-                                      (state->state == StudyState::kRunning
-                                           ? std::string(" goes on")
-                                           : " is " + std::string(state_name(state->state))));
-    if (state->state == StudyState::kCancelled) {
-      feed(StudyCancelled{state->study}, now);
-    } else if (state->state == StudyState::kPaused) {
-      feed(StudyPaused{state->study}, now);
-    } else {
-      feed(StudyReopened{state->study}, now);
-    }
-    if (state->submitted) {
-      reply_submitted(state->client, state->study, false);
-    } else {
-      reply_changed(state->client, state->study, 0, now);
-    }
-  } else if (const auto* share = std::get_if<OfShare>(&meaning)) {
-    studies_.at(share->study).share = share->share;
-    feed(StudyShareChanged{share->study, share->share}, now);
-    continue_study(share->client, share->study, now);
-  } else if (const auto* forgotten = std::get_if<OfFailures>(&meaning)) {
-    Study& study = studies_.at(forgotten->study);
-    forgotten->points.for_each(
-        [&](const Interval& run) { study.failures.erase(run.begin, run.end); });
-    if (study.state == StudyState::kDone) {
-      study.state = StudyState::kRunning;
-    }
-    outbox_.note(Severity::kInfo, "study " + study.name + " tries its failed points again: " +
-                                      std::to_string(forgotten->points.size()));
-    study.samples.clear();  // fewer points are settled now: no rate can be had of that
-    feed(FailuresForgotten{forgotten->study, forgotten->points, study.attempts}, now);
-    reply_changed(forgotten->client, forgotten->study, forgotten->points.size(), now);
-  }
-}
-
-void Service::refused(const Write& meaning, const std::string& error) {
-  if (const auto* added = std::get_if<OfStudy>(&meaning)) {
-    const auto study = studies_.find(added->study);
-    for (const Client& client : study->second.submitters) {
-      reply_error(client, "the study was not stored: " + error);
-    }
-    study_ids_.erase(study->second.name);
-    studies_.erase(study);
-  } else if (const auto* state = std::get_if<OfState>(&meaning)) {
-    Study& study = studies_.at(state->study);
-    --study.state_writes;
-    study.is_doubtful = true;
-    OfState* later = nullptr;
-    for (auto& [ticket, write] : writes_) {
-      auto* other = std::get_if<OfState>(&write);
-      if (later == nullptr && other != nullptr && other->study == state->study) {
-        later = other;
-      }
-    }
-    if (later != nullptr) {
-      // That one is on its way still, and stands now on what was before this one.
-      later->before = state->before;
-    } else if (study.state == state->state) {
-      study.state = state->before;
-    }
-    reply_error(state->client, "the change was not stored, the study is as before: " + error);
-  } else if (const auto* share = std::get_if<OfShare>(&meaning)) {
-    reply_error(share->client, "the change was not stored, the study is as before: " + error);
-  } else if (const auto* forgotten = std::get_if<OfFailures>(&meaning)) {
-    reply_error(forgotten->client, "the change was not stored, the study is as before: " + error);
-  }
-}
-
-/// Nobody is told that something is stored from here on.
-void Service::lose_storage(const std::string& error, Instant now) {
-  outbox_.note(Severity::kError, error);
-  storage_fault_ = error;
-  storage_is_gone_ = true;
-  while (!writes_.empty()) {
-    const Write meaning = std::move(writes_.begin()->second);
-    writes_.erase(writes_.begin());
-    refused(meaning, error);
-  }
-  waiting_changes_ = 0;
-  protocol::ServerToWorker notice;
-  notice.mutable_notice()->set_text(error);
-  for (const auto& [id, peer] : peers_) {
-    send(id, notice);
-  }
-  stop(now);
+  const std::string frame =
+      protocol::definition_around(effect.study, studies_.at(effect.study).table.recipe_bytes());
+  note_delivery(effect.worker, peer->second,
+                outbox_.forward_to_worker(peer->second.identity, frame));
 }
 
 // ---- Time -------------------------------------------------------------------------------------
@@ -350,15 +157,23 @@ void Service::tick(Instant now) {
   look_after_workers(now);
   feed(Tick{}, now);
   tell_of_queries(now);
-  for (auto& [id, study] : studies_) {
-    if (!study.durable) {
-      continue;
-    }
-    const StudyCounts counts = scheduler_.study(id);
-    study.samples.push_back({now.steady_ms, counts.solved + counts.failed});
-    while (now.steady_ms - study.samples.front().steady_ms > kRateSpan_ms) {
-      study.samples.pop_front();
-    }
+  if (const std::uint64_t more = worker_notes_.take_left_out(now.steady_ms); more > 0) {
+    outbox_.note(Severity::kInfo,
+                 "and " + std::to_string(more) + " more lines of workers that come and go");
+  }
+  rates_.sample([this](StudyId id) { return settled_of(id); }, now.steady_ms);
+}
+
+std::uint64_t Service::settled_of(StudyId id) const {
+  const StudyCounts counts = scheduler_.study(id);
+  return counts.solved + counts.failed;
+}
+
+/// Before the points of `event` count as settled.
+void Service::note_rate(const ResultsStored& event, Instant now) {
+  const auto study = studies_.find(event.study);
+  if (study != studies_.end() && study->second.durable && !event.outcomes.empty()) {
+    rates_.note(event.study, settled_of(event.study), study->second.since_ms, now.steady_ms);
   }
 }
 
@@ -405,6 +220,9 @@ void Service::hold_while_disk_is_behind(Instant now) {
 void Service::stop(Instant now) {
   stopping_ = true;
   feed(DispatchHeld{true}, now);
+  for (const auto& [ticket, request] : std::exchange(long_requests_, {})) {
+    reply_error(request.client, "the server is stopping: ask again when it is back");
+  }
   protocol::ServerToWorker message;
   message.mutable_stopping();
   for (const auto& [id, peer] : peers_) {

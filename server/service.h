@@ -1,9 +1,7 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <map>
-#include <memory>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -11,8 +9,11 @@
 
 #include "proto/oblique.pb.h"
 #include "server/network/delivery.h"
+#include "server/note_rate.h"
 #include "server/query_pool.h"
+#include "server/request_reader.h"
 #include "server/scheduler.h"
+#include "server/settled_rates.h"
 #include "server/store.h"
 #include "server/writer.h"
 
@@ -33,6 +34,8 @@ class Outbox {
 
   virtual Delivery to_worker(const std::string& identity,
                              const protocol::ServerToWorker& message) = 0;
+  /// The same for a message that is encoded already.
+  virtual Delivery forward_to_worker(const std::string& identity, const std::string& frame) = 0;
   /// More waits to go out to that worker than should.
   virtual bool is_busy(const std::string& identity) const = 0;
   /// False when the client is gone; the reply is dropped then: it asks again.
@@ -45,6 +48,8 @@ class Outbox {
   virtual bool query(QueryJob job) = 0;
   /// Nobody waits for that query any more.
   virtual void cancel_query(std::uint64_t ticket) = 0;
+  /// `Service::request_read` is called with what the frame says.
+  virtual void read(ReadJob job) = 0;
   /// For the log.
   virtual void note(Severity severity, const std::string& text) = 0;
 };
@@ -66,6 +71,12 @@ struct ServiceSettings {
   /// How often a client hears that its query waits or runs, by which the server also finds out that
   /// the client is gone.
   std::int64_t still_working_every_ms = 1000;
+  /// Longer requests are read on a thread of their own; so many of them wait there at most.
+  std::size_t longest_inline_bytes = std::size_t{64} * 1024;
+  std::size_t most_long_requests = 64;
+  std::size_t most_long_requests_of_one = 2;  ///< client
+  std::size_t most_long_bytes = std::size_t{64} * 1024 * 1024;
+  std::size_t largest_page = 1000;  ///< studies or workers in one reply
   std::string database_id;
   std::uint64_t last_study_id = 0;
   std::uint64_t last_worker_id = 0;
@@ -82,6 +93,7 @@ class Service {
   void client_frame(const std::string& identity, std::string_view frame, Instant now);
   void written(const WriteReport& report, Instant now);
   void queried(QueryReport report);
+  void request_read(ReadReport report, Instant now);
   /// To be called several times a second.
   void tick(Instant now);
   /// Tells the workers that the server stops. Nothing is handed out afterwards; results are still
@@ -99,11 +111,14 @@ class Service {
   /// Frames that no sound peer sends.
   std::uint64_t bad_frames() const { return bad_frames_; }
   const Scheduler& scheduler() const { return scheduler_; }
+  const SettledRates& rates() const { return rates_; }
 
  private:
   struct Client {
     std::string identity;
     std::uint64_t request_id;
+
+    bool operator==(const Client&) const = default;
   };
   struct Query {
     Client client;
@@ -121,14 +136,16 @@ class Service {
     std::size_t unstored_bytes = 0;
     std::uint32_t hellos = 1;  // on its one connection
     bool is_busy = false;      // as the scheduler knows
+    std::string joined_at{};
+    bool has_row = false;  // in the database, since its first result
   };
-  struct Sample {
-    std::int64_t steady_ms;
-    std::uint64_t settled;
+  struct LongRequest {
+    Client client;
+    std::size_t bytes;
   };
   struct Study {
     std::string name;
-    std::shared_ptr<const protocol::PointTable> table;
+    StudyTable table;
     StudyState state;  // as last sent to the database
     std::string created_at;
     StudyShare share;
@@ -140,7 +157,7 @@ class Service {
     /// something else is written in its place.
     bool is_doubtful = false;
     std::vector<Client> submitters;  // wait for it to be durable
-    std::deque<Sample> samples;      // of the last seconds
+    std::int64_t since_ms = 0;       // nothing is known of its rate before
   };
   // What a write stands for.
   struct OfResults {
@@ -177,23 +194,30 @@ class Service {
   void forget(WorkerId worker);
   void bad_frame(const std::string& who);
   void bad_peer(WorkerId worker, const std::string& what, Instant now);
-  void tell_of_version(WorkerId worker);
+  void oversized_frame(const std::string& identity, Instant now);
+  void note_of_worker(Severity severity, const std::string& text, Instant now);
+  void tell_of_version(WorkerId worker, Instant now);
   void send_probe(const SendProbe& effect);
 
   // service_clients.cpp
   void set_state(const Client& client, StudyId id, StudyState state, bool submitted, Instant now);
-  void submit(const Client& client, const protocol::SubmitRequest& request, Instant now);
+  void read_elsewhere(const std::string& identity, std::string_view frame);
+  void take(const std::string& identity, const ReadRequest& read, Instant now);
+  void submit(const Client& client, const ReadRequest& read, Instant now);
   void continue_study(const Client& client, StudyId id, Instant now);
   void change(const Client& client, const protocol::ChangeRequest& request, Instant now);
   void retry(const Client& client, StudyId id, Instant now);
-  void status(const Client& client, const protocol::StatusRequest& request, Instant now);
-  void workers(const Client& client, Instant now);
   void query(const Client& client, const protocol::QueryRequest& request, Instant now);
   void tell_of_queries(Instant now);
   void reply_submitted(const Client& client, StudyId id, bool created);
   void reply_changed(const Client& client, StudyId id, std::uint64_t retried, Instant now);
   void reply_error(const Client& client, const std::string& message);
+
+  // service_status.cpp
+  void status(const Client& client, const protocol::StatusRequest& request, Instant now);
+  void workers(const Client& client, const protocol::WorkersRequest& request, Instant now);
   protocol::StudyStatus status_of(StudyId id, Instant now) const;
+  protocol::WorkerStatus status_of_worker(WorkerId id, const Peer& peer, Instant now) const;
   std::string what_it_waits_for(const Study& study, const StudyCounts& counts) const;
 
   // service.cpp
@@ -204,12 +228,19 @@ class Service {
   bool has_room_for(const Peer& peer) const;
   void hold_while_disk_is_behind(Instant now);
   void look_after_workers(Instant now);
+  void define_study(const DefineStudy& effect);
+  void note_delivery(WorkerId worker, Peer& peer, Delivery delivery);
+  std::uint64_t settled_of(StudyId id) const;
+  void note_rate(const ResultsStored& event, Instant now);
+
+  // service_writes.cpp
   void write(Change change, Write meaning, bool answer_failure);
   void write_results(const StoreResults& effect, protocol::Results& message, Instant now);
   void write_failure(const StoreFailure& effect, Instant now);
   void stored(const Write& meaning, Instant now);
   void refused(const Write& meaning, const std::string& error);
   void lose_storage(const std::string& error, Instant now);
+  OfState* next_state_write(StudyId study);
 
   ServiceSettings settings_;
   Outbox& outbox_;
@@ -224,6 +255,9 @@ class Service {
   std::vector<Event> found_;        // while effects were carried out: workers gone or busy
   std::size_t unstored_bytes_ = 0;  // of all workers' results
   bool disk_is_behind_ = false;
+  std::map<std::uint64_t, LongRequest> long_requests_;  // by ticket
+  SettledRates rates_;
+  NoteRate worker_notes_;
   std::uint64_t last_ticket_ = 0;
   std::uint64_t bad_frames_ = 0;
   std::uint64_t refused_workers_ = 0;
@@ -231,6 +265,9 @@ class Service {
   bool storage_is_gone_ = false;
   bool stopping_ = false;
 };
+
+/// What to say of a name that no study has.
+std::string unknown_study(const std::string& name);
 
 /// UTC in ISO 8601 with milliseconds.
 std::string iso_8601(Instant now);

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "proto/frame_scan.h"
 #include "proto/frames.h"
 #include "proto/study_name.h"
 #include "server/service.h"
@@ -41,22 +42,65 @@ StudyShare asked_share(const protocol::SubmitRequest& request, StudyShare share)
   return share;
 }
 
+}  // namespace
+
 std::string unknown_study(const std::string& name) {
   return "there is no study called \"" + shortened(name, kLongestName) +
          "\": `oblique studies` lists all";
 }
 
-}  // namespace
-
 void Service::client_frame(const std::string& identity, std::string_view frame, Instant now) {
-  protocol::ClientRequest request;
-  using Kind = protocol::ClientRequest;
-  if (!protocol::decode(frame, request)) {
-    bad_frame("a client");
-    reply_error({identity, 0}, "the request cannot be read");
+  if (frame.size() > settings_.longest_inline_bytes) {
+    read_elsewhere(identity, frame);
     return;
   }
-  const Client client{identity, request.request_id()};
+  take(identity, read_request(frame), now);
+}
+
+/// Of one client few wait, so that the others find room.
+void Service::read_elsewhere(const std::string& identity, std::string_view frame) {
+  const Client client{identity, protocol::request_id_of(frame)};
+  std::size_t bytes = frame.size();
+  std::size_t of_client = 0;
+  for (const auto& [ticket, request] : long_requests_) {
+    if (client.request_id != 0 && request.client == client) {
+      return;  // it is sent again because the answer takes long; it waits already
+    }
+    bytes += request.bytes;
+    of_client += request.client.identity == identity ? 1U : 0U;
+  }
+  if (stopping_) {
+    reply_error(client, "the server is stopping: ask again when it is back");
+  } else if (long_requests_.size() >= settings_.most_long_requests ||
+             of_client >= settings_.most_long_requests_of_one ||
+             bytes > settings_.most_long_bytes) {
+    reply_error(client, "too many long requests wait already: ask again later");
+  } else {
+    const std::uint64_t ticket = ++last_ticket_;
+    long_requests_.emplace(ticket, LongRequest{client, frame.size()});
+    outbox_.read({ticket, std::string(frame)});
+  }
+}
+
+void Service::request_read(ReadReport report, Instant now) {
+  const auto found = long_requests_.find(report.ticket);
+  if (found == long_requests_.end()) {
+    return;
+  }
+  const std::string identity = found->second.client.identity;
+  long_requests_.erase(found);
+  take(identity, report.read, now);
+}
+
+void Service::take(const std::string& identity, const ReadRequest& read, Instant now) {
+  const Client client{identity, read.request_id};
+  const protocol::ClientRequest& request = read.request;
+  using Kind = protocol::ClientRequest;
+  if (!read.is_readable) {
+    bad_frame("a client");
+    reply_error(client, "the request cannot be read");
+    return;
+  }
   if (request.protocol_version() == 0) {
     bad_frame("a client");
     reply_error(client, "this is the port for clients; workers connect to the other one");
@@ -79,13 +123,13 @@ void Service::client_frame(const std::string& identity, std::string_view frame, 
   }
   switch (request.kind_case()) {
     case Kind::kSubmit:
-      submit(client, request.submit(), now);
+      submit(client, read, now);
       break;
     case Kind::kStatus:
       status(client, request.status(), now);
       break;
     case Kind::kWorkers:
-      workers(client, now);
+      workers(client, request.workers(), now);
       break;
     case Kind::kChange:
       change(client, request.change(), now);
@@ -100,7 +144,8 @@ void Service::client_frame(const std::string& identity, std::string_view frame, 
   }
 }
 
-void Service::submit(const Client& client, const protocol::SubmitRequest& request, Instant now) {
+void Service::submit(const Client& client, const ReadRequest& read, Instant now) {
+  const protocol::SubmitRequest& request = read.request.submit();
   if (stopping_) {
     reply_error(client, "the server is stopping: submit again when it is back");
     return;
@@ -117,16 +162,13 @@ void Service::submit(const Client& client, const protocol::SubmitRequest& reques
     reply_error(client, reason);
     return;
   }
-  std::shared_ptr<const protocol::PointTable> table;
-  try {
-    table = std::make_shared<const protocol::PointTable>(request.recipe());
-  } catch (const solver::InputError& error) {
-    reply_error(client, error.what());
+  if (!read.objection.empty()) {
+    reply_error(client, read.objection);
     return;
   }
   if (known != study_ids_.end()) {
     const Study& study = studies_.at(known->second);
-    if (study.table->recipe().SerializeAsString() != table->recipe().SerializeAsString()) {
+    if (study.table.recipe_bytes() != read.table.recipe_bytes()) {
       reply_error(client, "there is a study called \"" + request.name() +
                               "\" with other points or another model: give this one another name, "
                               "or use another database");
@@ -143,7 +185,7 @@ void Service::submit(const Client& client, const protocol::SubmitRequest& reques
   const std::string created_at = iso_8601(now);
   study_ids_.emplace(request.name(), id);
   studies_.emplace(id, Study{request.name(),
-                             table,
+                             read.table,
                              StudyState::kRunning,
                              created_at,
                              share,
@@ -153,8 +195,8 @@ void Service::submit(const Client& client, const protocol::SubmitRequest& reques
                              0,
                              false,
                              {client},
-                             {}});
-  write(AddStudy{id, request.name(), table, created_at, share}, OfStudy{id}, true);
+                             now.steady_ms});
+  write(AddStudy{id, request.name(), read.table, created_at, share}, OfStudy{id}, true);
 }
 
 void Service::continue_study(const Client& client, StudyId id, Instant now) {
@@ -221,95 +263,13 @@ void Service::retry(const Client& client, StudyId id, Instant now) {
     reply_changed(client, id, 0, now);
     return;
   }
-  write(ForgetFailures{id, failures, iso_8601(now)}, OfFailures{id, failures, client}, true);
-}
-
-void Service::status(const Client& client, const protocol::StatusRequest& request, Instant now) {
-  protocol::ClientReply reply;
-  reply.set_request_id(client.request_id);
-  auto& fields = *reply.mutable_status();
-  fields.set_workers(static_cast<std::uint32_t>(scheduler_.workers()));
-  for (const auto& [id, study] : studies_) {
-    if (study.durable && (request.study().empty() || request.study() == study.name)) {
-      *fields.add_studies() = status_of(id, now);
-    }
-  }
-  if (!request.study().empty() && fields.studies().empty()) {
-    reply_error(client, unknown_study(request.study()));
+  try {
+    (void)studies_.at(id).table.get();
+  } catch (const std::runtime_error& error) {
+    reply_error(client, "the recipe of the study cannot be read: " + std::string(error.what()));
     return;
   }
-  outbox_.to_client(client.identity, reply);
-}
-
-protocol::StudyStatus Service::status_of(StudyId id, Instant now) const {
-  const Study& study = studies_.at(id);
-  const StudyCounts counts = scheduler_.study(id);
-  const std::uint64_t settled = counts.solved + counts.failed;
-  protocol::StudyStatus status;
-  status.set_study_id(id);
-  status.set_name(study.name);
-  status.set_state(settled == counts.points ? "done" : state_name(study.state));
-  status.set_points(counts.points);
-  status.set_solved(counts.solved);
-  status.set_failed(counts.failed);
-  status.set_leased(counts.leased);
-  status.set_created_at(study.created_at);
-  status.set_priority(study.share.priority);
-  status.set_weight(study.share.weight);
-  status.set_mixes_versions(study.share.mixes_versions);
-  status.set_solver_version(counts.solver_version);
-  status.set_waits_for(what_it_waits_for(study, counts));
-  if (study.state == StudyState::kRunning && !study.samples.empty()) {
-    const Sample& oldest = study.samples.front();
-    const std::int64_t span_ms = now.steady_ms - oldest.steady_ms;
-    if (span_ms > 0) {
-      status.set_points_per_s(1000.0 *
-                              (static_cast<double>(settled) - static_cast<double>(oldest.settled)) /
-                              static_cast<double>(span_ms));
-    }
-  }
-  return status;
-}
-
-std::string Service::what_it_waits_for(const Study& study, const StudyCounts& counts) const {
-  if (study.state != StudyState::kRunning || counts.solved + counts.failed == counts.points) {
-    return {};
-  }
-  if (!storage_fault_.empty()) {
-    return storage_is_gone_ ? storage_fault_
-                            : "the database, which takes no results: " + storage_fault_;
-  }
-  if (scheduler_.workers() == 0) {
-    return "a worker";
-  }
-  if (counts.lacks_worker) {
-    return "a worker with solver version " + counts.solver_version +
-           ", that of its results, or to be submitted again with --mix-versions";
-  }
-  return {};
-}
-
-void Service::workers(const Client& client, Instant now) {
-  protocol::ClientReply reply;
-  reply.set_request_id(client.request_id);
-  auto& fields = *reply.mutable_workers();
-  fields.set_bad_frames(bad_frames_);
-  for (const auto& [id, peer] : peers_) {
-    const WorkerCounts counts = scheduler_.worker(id, now.steady_ms);
-    auto& worker = *fields.add_workers();
-    worker.set_worker_id(id);
-    worker.set_name(peer.name);
-    worker.set_threads(peer.threads);
-    worker.set_instruction_set(peer.instruction_set);
-    worker.set_solver_version(peer.solver_version);
-    worker.set_leased_points(counts.leased_points);
-    worker.set_solved_points(counts.solved_points);
-    worker.set_silent_ms(static_cast<std::uint32_t>(counts.silent_ms));
-    worker.set_losses(counts.losses);
-    worker.set_set_aside(counts.is_set_aside);
-    worker.set_proven(counts.is_proven);
-  }
-  outbox_.to_client(client.identity, reply);
+  write(ForgetFailures{id, failures, iso_8601(now)}, OfFailures{id, failures, client}, true);
 }
 
 void Service::query(const Client& client, const protocol::QueryRequest& request, Instant now) {

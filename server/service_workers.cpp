@@ -3,6 +3,7 @@
 #include <bit>
 #include <utility>
 
+#include "proto/frame_scan.h"
 #include "proto/frames.h"
 #include "server/result_row.h"
 #include "server/service.h"
@@ -12,8 +13,6 @@ namespace {
 
 constexpr std::size_t kLongestName = 256;
 constexpr std::uint32_t kMostThreads = 4096;
-/// In one message; workers send a thousand.
-constexpr std::size_t kMostResults = 10'000;
 
 /// What a stranger says of itself, fit for logs and tables.
 std::string plain(const std::string& text) {
@@ -52,11 +51,13 @@ protocol::Recipe probe_recipe() {
 }  // namespace
 
 void Service::worker_frame(const std::string& identity, std::string_view frame, Instant now) {
+  if (!protocol::is_of_a_workers_size(frame)) {
+    oversized_frame(identity, now);
+    return;
+  }
   protocol::WorkerMessage message;
   using Kind = protocol::WorkerMessage;
-  if (protocol::count_nested(frame, Kind::kResultsFieldNumber,
-                             protocol::Results::kResultsFieldNumber) > kMostResults ||
-      !protocol::decode(frame, message) || message.kind_case() == Kind::KIND_NOT_SET) {
+  if (!protocol::decode(frame, message) || message.kind_case() == Kind::KIND_NOT_SET) {
     bad_frame("a worker");
     return;
   }
@@ -90,7 +91,7 @@ void Service::worker_frame(const std::string& identity, std::string_view frame, 
       break;
     }
     case Kind::kGoodbye:
-      outbox_.note(Severity::kInfo, "worker " + std::to_string(worker) + " leaves");
+      note_of_worker(Severity::kInfo, "worker " + std::to_string(worker) + " leaves", now);
       feed(WorkerLeft{worker}, now);
       forget(worker);
       break;
@@ -140,7 +141,9 @@ void Service::hello(const std::string& identity, const protocol::WorkerHello& he
                   plain(hello.instruction_set()),
                   0,
                   0,
-                  hellos};
+                  hellos,
+                  false,
+                  iso_8601(now)};
   auto& welcome = *reply.mutable_welcome();
   welcome.set_protocol_version(peer.protocol_version);
   welcome.set_worker_id(id);
@@ -150,14 +153,13 @@ void Service::hello(const std::string& identity, const protocol::WorkerHello& he
   if (outbox_.to_worker(identity, reply) == Delivery::kGone) {
     return;
   }
-  outbox_.note(Severity::kInfo, "worker " + std::to_string(id) + " (" + peer.name + ", " +
-                                    std::to_string(peer.threads) + " threads) joins");
+  note_of_worker(Severity::kInfo,
+                 "worker " + std::to_string(id) + " (" + peer.name + ", " +
+                     std::to_string(peer.threads) + " threads) joins",
+                 now);
   peers_.emplace(id, peer);
   worker_ids_[identity] = id;
-  write(AddWorker{id, peer.name, peer.threads, peer.solver_version, peer.instruction_set,
-                  iso_8601(now)},
-        OfNothing{}, false);
-  tell_of_version(id);
+  tell_of_version(id, now);
   feed(WorkerJoined{id, peer.threads, peer.solver_version, process_of(hello),
                     !hello.process_id().empty()},
        now);
@@ -167,7 +169,7 @@ void Service::hello(const std::string& identity, const protocol::WorkerHello& he
   }
 }
 
-void Service::tell_of_version(WorkerId worker) {
+void Service::tell_of_version(WorkerId worker, Instant now) {
   const Peer& peer = peers_.at(worker);
   if (peer.solver_version == settings_.solver_version) {
     return;
@@ -176,7 +178,7 @@ void Service::tell_of_version(WorkerId worker) {
                            settings_.solver_version +
                            ": studies with results of another version than its own go to other "
                            "workers, unless they were submitted with --mix-versions";
-  outbox_.note(Severity::kWarning, "worker " + std::to_string(worker) + ": " + text);
+  note_of_worker(Severity::kWarning, "worker " + std::to_string(worker) + ": " + text, now);
   protocol::ServerToWorker message;
   message.mutable_notice()->set_text("worker " + std::to_string(worker) + ": " + text);
   send(worker, message);
@@ -228,6 +230,23 @@ void Service::forget(WorkerId worker) {
   if (peer != peers_.end()) {
     worker_ids_.erase(peer->second.identity);
     peers_.erase(peer);
+  }
+}
+
+/// A frame that no sound worker sends, found before it is read.
+void Service::oversized_frame(const std::string& identity, Instant now) {
+  const auto known = worker_ids_.find(identity);
+  if (known == worker_ids_.end()) {
+    bad_frame("a worker");
+  } else {
+    bad_peer(known->second, "it sends more in one message than workers do", now);
+  }
+}
+
+/// Of workers that come and go any number of times.
+void Service::note_of_worker(Severity severity, const std::string& text, Instant now) {
+  if (worker_notes_.allows(now.steady_ms)) {
+    outbox_.note(severity, text);
   }
 }
 

@@ -235,8 +235,8 @@ void Store::add(const AddStudy& change) {
   Statement& insert = statements_->add_study;
   insert.bind(1, change.study_id);
   insert.bind(2, change.name);
-  insert.bind_blob(3, change.table->recipe().SerializeAsString());
-  insert.bind(4, change.table->size());
+  insert.bind_blob(3, change.table.recipe_bytes());
+  insert.bind(4, change.table.size());
   insert.bind(5, change.created_at);
   insert.bind(6, std::int64_t{change.share.priority});
   insert.bind(7, change.share.weight);

@@ -19,7 +19,7 @@ namespace oblique::server {
 struct StoredStudy {
   std::uint64_t study_id;
   std::string name;
-  std::shared_ptr<const protocol::PointTable> table;
+  StudyTable table;
   StudyState state;
   std::string created_at;
   StudyShare share{};
@@ -75,7 +75,6 @@ class Store final : public Storage {
   void leave_files();
   void create_schema();
   void migrate();
-  AttemptRuns attempts_of(std::uint64_t study_id);
   void add(const AddStudy& change);
   void add(const SetStudyState& change);
   void add(const SetStudyShare& change);

@@ -8,13 +8,12 @@
 
 namespace oblique::server {
 
-StudyPoints::StudyPoints(std::shared_ptr<const protocol::PointTable> table, IntervalSet settled,
-                         const LossLimits& limits)
+StudyPoints::StudyPoints(StudyTable table, IntervalSet settled, const LossLimits& limits)
     : table_(std::move(table)),
       limits_(limits),
-      fresh_(0, table_->size()),
+      fresh_(0, table_.size()),
       settled_(std::move(settled)) {
-  settled_.erase(table_->size(), std::numeric_limits<std::uint64_t>::max());
+  settled_.erase(table_.size(), std::numeric_limits<std::uint64_t>::max());
   settled_.for_each([this](const Interval& run) { fresh_.erase(run.begin, run.end); });
 }
 
@@ -164,7 +163,7 @@ std::vector<std::uint64_t> StudyPoints::condemned() const {
 }
 
 std::uint64_t StudyPoints::free() const {
-  return table_->size() - leased_.size() - committing_.size() - settled_.size();
+  return table_.size() - leased_.size() - committing_.size() - settled_.size();
 }
 
 void StudyPoints::check_invariants() const {
@@ -189,7 +188,7 @@ void StudyPoints::check_invariants() const {
       }
     }
   }
-  if (points != table_->size() || !(all == IntervalSet(0, table_->size()))) {
+  if (points != table_.size() || !(all == IntervalSet(0, table_.size()))) {
     throw std::logic_error("a point of a study is in no place or in two");
   }
 }

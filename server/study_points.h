@@ -7,10 +7,10 @@
 #include <optional>
 #include <vector>
 
-#include "proto/recipe.h"
 #include "server/attempt_runs.h"
 #include "server/interval_set.h"
 #include "server/loss_history.h"
+#include "server/study_table.h"
 
 namespace oblique::server {
 
@@ -43,11 +43,11 @@ struct Chunk {
 class StudyPoints {
  public:
   /// `settled` are the points that have a row already.
-  StudyPoints(std::shared_ptr<const protocol::PointTable> table, IntervalSet settled,
-              const LossLimits& limits);
+  StudyPoints(StudyTable table, IntervalSet settled, const LossLimits& limits);
 
-  const protocol::PointTable& table() const { return *table_; }
-  std::shared_ptr<const protocol::PointTable> shared_table() const { return table_; }
+  std::uint64_t size() const { return table_.size(); }
+  /// Nothing is handed out for a while: the table is forgotten until something is.
+  void rest() { table_.release(); }
 
   /// Takes up to `at_most` points out of the returned sound ones or, when there are none, the fresh
   /// ones. Nothing when there are neither.
@@ -86,7 +86,7 @@ class StudyPoints {
   std::int64_t returned_ms(Standing standing) const {
     return returned(standing).begin()->second.returned_ms;
   }
-  bool is_complete() const { return settled_.size() == table_->size(); }
+  bool is_complete() const { return settled_.size() == table_.size(); }
   /// Some point has a result, durable or on its way.
   bool has_results() const { return !settled_.empty() || !committing_.empty(); }
 
@@ -116,7 +116,7 @@ class StudyPoints {
   }
   static bool erase_from(Returned& chunks, std::uint64_t point);
 
-  std::shared_ptr<const protocol::PointTable> table_;
+  StudyTable table_;
   LossLimits limits_;
   IntervalSet fresh_;
   std::array<Returned, 4> returned_;  // by standing

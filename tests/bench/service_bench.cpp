@@ -1,5 +1,6 @@
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <csignal>
@@ -16,10 +17,14 @@
 #include <string>
 #include <system_error>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <sys/eventfd.h>
 
+#include <zmq.hpp>
+
+#include "proto/frames.h"
 #include "proto/recipe.h"
 #include "tests/system/processes.h"
 #include "worker/session.h"
@@ -242,6 +247,56 @@ void bench_server_killed(std::uint64_t points) {
               full.count());
 }
 
+/// Submits that many small studies over one connection, some at a time.
+void submit_studies(const std::string& client_url, std::uint64_t studies) {
+  constexpr std::uint64_t kAtATime = 64;
+  zmq::context_t context;
+  zmq::socket_t socket(context, zmq::socket_type::dealer);
+  socket.set(zmq::sockopt::linger, 0);
+  socket.connect(client_url);
+  protocol::ClientRequest request;
+  request.set_protocol_version(protocol::kProtocolVersion);
+  auto& block = *request.mutable_submit()->mutable_recipe()->add_blocks();
+  for (const auto& [key, value] : {std::pair{"H", 1.0}, {"mu", 0.4}, {"e", 1.0}}) {
+    auto& axis = *block.add_axes();
+    axis.set_key(key);
+    axis.add_values(value);
+  }
+  zmq::message_t reply;
+  for (std::uint64_t i = 0; i < studies + kAtATime; ++i) {
+    if (i < studies) {
+      request.mutable_submit()->set_name("study " + std::to_string(i));
+      socket.send(zmq::buffer(protocol::encode(request)), zmq::send_flags::none);
+    }
+    if (i >= kAtATime || i >= studies) {
+      static_cast<void>(socket.recv(reply));
+    }
+  }
+}
+
+/// Many studies: what it takes to submit them, to list them, and to start on them again.
+void bench_studies(std::uint64_t studies) {
+  const test::Folder folder;
+  const std::string file = folder.file("bench.db");
+  test::Server server(folder, file);
+  const auto seconds_of = [](const std::function<void()>& work) {
+    const auto began = Clock::now();
+    work();
+    return std::chrono::duration<double>(Clock::now() - began).count();
+  };
+  const double submitted_s = seconds_of(
+      [&] { submit_studies(server.client_url(), std::max<std::uint64_t>(studies, 64)); });
+  const double listed_s = seconds_of([&] {
+    Study::check(test::run_client(folder, {"studies", "--server", server.client_url()}));
+  });
+  const Usage serving = usage_of(server.process().pid());
+  server.process().send(SIGTERM);
+  server.process().wait();
+  const double started_s = seconds_of([&] { const test::Server again(folder, file); });
+  std::printf("| %.3g | %.2f | %.2f | %.2f | %.0f |\n", static_cast<double>(studies), submitted_s,
+              listed_s, started_s, serving.peak_MB);
+}
+
 void run_all(const std::string& what, const std::vector<std::uint64_t>& points) {
   const auto table = [&](const char* header, const std::function<void(std::uint64_t)>& row) {
     std::puts(header);
@@ -278,10 +333,15 @@ void run_all(const std::string& what, const std::vector<std::uint64_t>& points) 
         "| points | listens again after [s] | rows of both workers again after [s] |\n"
         "|---:|---:|---:|",
         bench_server_killed);
+  } else if (what == "studies") {
+    table(
+        "| studies | submitted in [s] | listed in [s] | started again in [s] | server MB |\n"
+        "|---:|---:|---:|---:|---:|",
+        bench_studies);
   } else {
     throw std::invalid_argument("`" + what +
-                                "` is none of service, server-alone, submission, worker-killed "
-                                "and server-killed");
+                                "` is none of service, server-alone, submission, studies, "
+                                "worker-killed and server-killed");
   }
 }
 
@@ -293,7 +353,7 @@ int main(int argc, char** argv) {
     if (argc < 3) {
       throw std::invalid_argument(
           "usage: oblique-service-bench "
-          "service|server-alone|submission|worker-killed|server-killed "
+          "service|server-alone|submission|studies|worker-killed|server-killed "
           "POINTS...");
     }
     std::vector<std::uint64_t> points;

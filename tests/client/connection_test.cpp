@@ -232,6 +232,22 @@ TEST(Connection, TakesTheAnswerThatFollowsWordsOfWorkAndOnlyThat) {
   EXPECT_EQ(connection.query("SELECT 1").columns(0), "a");
 }
 
+TEST(Connection, AsksForEveryPageOfALongListAndForNoneThatDoesNotCome) {
+  const ScriptedServer server([](const protocol::ClientRequest& request) {
+    auto reply = reply_to(request);
+    const std::uint64_t after = request.status().after_study_id();
+    reply.mutable_status()->add_studies()->set_study_id(after + 10);
+    reply.mutable_status()->set_workers(3);
+    reply.mutable_status()->set_next_after(after < 30 ? after + 10 : 5);
+    return std::vector{protocol::encode(reply)};
+  });
+  Connection connection(at(server.url(), kLong_ms));
+  const auto all = connection.status("");
+  ASSERT_EQ(all.studies_size(), 4);
+  EXPECT_EQ(all.studies(3).study_id(), 40U);
+  EXPECT_EQ(all.workers(), 3U);
+}
+
 TEST(Connection, TellsAForeignServerFromOurs) {
   const ScriptedServer server(
       [](const protocol::ClientRequest&) { return std::vector<std::string>{"HTTP/1.1 400"}; });

@@ -19,11 +19,15 @@ class Sink final : public Outbox {
     return Delivery::kSent;
   }
   bool is_busy(const std::string&) const override { return false; }
+  Delivery forward_to_worker(const std::string&, const std::string&) override {
+    return Delivery::kSent;
+  }
   bool to_client(const std::string&, const protocol::ClientReply&) override { return true; }
   bool forward_to_client(const std::string&, const std::string&) override { return true; }
   void write(WriteJob job) override { jobs.push_back(std::move(job)); }
   bool query(QueryJob) override { return true; }
   void cancel_query(std::uint64_t) override {}
+  void read(ReadJob) override {}
   void note(Severity, const std::string&) override {}
 
   std::vector<WriteJob> jobs;

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "proto/oblique.pb.h"
+#include "tests/proto/recipe_builder.h"
 
 namespace oblique::protocol {
 namespace {
@@ -71,6 +72,14 @@ TEST(FramesTest, AFrameLongerThanAllowedIsRefusedAndTheLongestTaken) {
   frame = encode(request);
   ASSERT_GT(frame.size(), kMaxFrameBytes);
   EXPECT_FALSE(decode(frame, received));
+}
+
+TEST(FramesTest, ADefinitionAroundAnEncodedRecipeIsThatOfTheRecipe) {
+  ServerToWorker message;
+  message.mutable_study()->set_study_id(300);
+  *message.mutable_study()->mutable_recipe() =
+      recipe_of({{listed("H", {1.0}), range("mu", 0.1, 1.0, 1024), listed("e", {1.0})}});
+  EXPECT_EQ(definition_around(300, encode(message.study().recipe())), encode(message));
 }
 
 TEST(FramesTest, TextThatIsNotUtf8IsRefused) {

@@ -112,9 +112,37 @@ TEST_F(LoopTest, HostileFramesHarmNobody) {
 TEST_F(LoopTest, AFrameOverTheLimitCostsItsSenderTheConnectionAndNobodyElse) {
   RunningServer server(path_);
   PretendedClient hostile(server.client_endpoint());
-  hostile.send_frame(std::string(protocol::kMaxFrameBytes + 1, 'x'));
   PretendedClient client(server.client_endpoint());
   EXPECT_TRUE(client.submit("a", 10).has_submit());
+  hostile.send_frame(std::string(protocol::kMaxFrameBytes + 1, 'x'));
+  EXPECT_TRUE(hostile.is_cut_off());
+  EXPECT_EQ(client.status("a").points(), 10U) << "on the connection that it had";
+}
+
+TEST_F(LoopTest, ALongRecipeIsStoredAndHandedOutWhileOthersAreAnswered) {
+  RunningServer server(path_);
+  PretendedClient client(server.client_endpoint());
+  client.submit("small", 10);
+  ClientRequest large;
+  large.set_protocol_version(protocol::kProtocolVersion);
+  large.mutable_submit()->set_name("large");
+  large.mutable_submit()->set_priority(1);
+  constexpr int kBlocks = 50'000;
+  for (int i = 0; i < kBlocks; ++i) {
+    auto& block = *large.mutable_submit()->mutable_recipe()->add_blocks();
+    *block.add_axes() = protocol::range("H", 0.1 + 1e-6 * i, 1.0, 1024);
+    *block.add_axes() = protocol::range("mu", 0.1, 1.0, 1024);
+    *block.add_axes() = protocol::listed("e", {1.0});
+  }
+  PretendedClient other(server.client_endpoint());
+  other.send(large);
+  EXPECT_EQ(client.status("small").points(), 10U);
+  EXPECT_EQ(other.receive().submit().points(), 1024ULL * 1024 * kBlocks);
+  PretendedWorker worker(server.worker_endpoint());
+  worker.hello();
+  worker.credit(1);
+  EXPECT_EQ(worker.receive().study().recipe().blocks_size(), kBlocks);
+  EXPECT_TRUE(worker.receive().has_batch());
 }
 
 /// Compares for hours without a look at the clock.

@@ -76,7 +76,8 @@ class Peer {
  public:
   explicit Peer(const std::string& endpoint) : socket_(context_, zmq::socket_type::dealer) {
     socket_.set(zmq::sockopt::linger, 0);
-    socket_.set(zmq::sockopt::rcvtimeo, 20'000);  // so that a broken server fails the test
+    socket_.set(zmq::sockopt::rcvtimeo, kLongest_ms);  // so that a broken server fails the test
+    disconnections_.init(socket_, "inproc://disconnections", ZMQ_EVENT_DISCONNECTED);
     socket_.connect(endpoint);
   }
   void send(const Out& message) { send_frame(protocol::encode(message)); }
@@ -89,6 +90,8 @@ class Peer {
                    i + 1 < frames.size() ? zmq::send_flags::sndmore : zmq::send_flags::none);
     }
   }
+  /// Waits until the server ends the connection; false when it does not.
+  bool is_cut_off() { return disconnections_.check_event(kLongest_ms); }
   In receive() {
     zmq::message_t frame;
     In message;
@@ -102,8 +105,11 @@ class Peer {
   }
 
  private:
+  static constexpr int kLongest_ms = 20'000;
+
   zmq::context_t context_;
   zmq::socket_t socket_;
+  zmq::monitor_t disconnections_;  // of them alone
 };
 
 class PretendedWorker : public Peer<WorkerMessage, ServerToWorker> {

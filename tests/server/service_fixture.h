@@ -31,6 +31,11 @@ class FakeOutbox final : public Outbox {
     worker_messages.push_back(message);
     return identity == busy ? Delivery::kBusy : Delivery::kSent;
   }
+  Delivery forward_to_worker(const std::string& identity, const std::string& frame) override {
+    ServerToWorker message;
+    EXPECT_TRUE(protocol::decode(frame, message));
+    return to_worker(identity, message);
+  }
   bool is_busy(const std::string& identity) const override { return identity == busy; }
   bool to_client(const std::string& identity, const ClientReply& reply) override {
     if (identity == unreachable) {
@@ -50,6 +55,7 @@ class FakeOutbox final : public Outbox {
     return queries.size() < 3;
   }
   void cancel_query(std::uint64_t ticket) override { cancelled_queries.push_back(ticket); }
+  void read(ReadJob job) override { reads.push_back(std::move(job)); }
   void note(Severity, const std::string& text) override {
     ++notes;
     log.push_back(text);
@@ -62,6 +68,7 @@ class FakeOutbox final : public Outbox {
   std::vector<WriteJob> jobs;
   std::vector<QueryJob> queries;
   std::vector<std::uint64_t> cancelled_queries;
+  std::vector<ReadJob> reads;
   int notes = 0;
   std::vector<std::string> log;
 };
@@ -150,6 +157,13 @@ class ServiceTest : public testing::Test {
   /// The query that was asked `index`-th gets that answer.
   void answer_query(std::size_t index, const std::string& reply) {
     service_->queried({QueryReport::Kind::kAnswered, outbox_.queries.at(index).ticket, reply});
+  }
+  /// Long requests that wait are read.
+  void read_all() {
+    for (const ReadJob& job : std::exchange(outbox_.reads, {})) {
+      service_->request_read({job.ticket, read_request(job.frame)}, now_);
+    }
+    service_->scheduler().check_invariants();
   }
   ClientReply last_reply() {
     EXPECT_FALSE(outbox_.replies.empty());

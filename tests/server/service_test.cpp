@@ -131,7 +131,7 @@ TEST_F(ServiceTest, ResultsAreAcknowledgedOnceTheyAreStored) {
   *results.add_results() = solved_point(0);
   write_all();
   worker_says(message);
-  ASSERT_EQ(outbox_.jobs.size(), 1U);
+  ASSERT_EQ(outbox_.jobs.size(), 2U) << "the worker's row and the results";
   EXPECT_FALSE(last_message().has_results_stored());
   write_all();
   EXPECT_EQ(last_message().results_stored().sequence(), 9U);
@@ -151,8 +151,8 @@ TEST_F(ServiceTest, AResultThatIsNotFiniteBecomesAFailedPoint) {
   *message.mutable_results()->add_results() = result;
   write_all();
   worker_says(message);
-  ASSERT_EQ(outbox_.jobs.size(), 1U);
-  const auto& change = std::get<AddResults>(outbox_.jobs[0].change);
+  ASSERT_EQ(outbox_.jobs.size(), 2U) << "the worker's row and the results";
+  const auto& change = std::get<AddResults>(outbox_.jobs[1].change);
   EXPECT_THAT(change.results.at(0).error(), HasSubstr("duration_s"));
 }
 

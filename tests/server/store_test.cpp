@@ -21,7 +21,7 @@ AddStudy study_of(std::uint64_t points, std::uint64_t id = 1, const std::string&
 }
 
 AddResults results_of(const AddStudy& study, std::vector<protocol::PointResult> results) {
-  return {study.study_id,    study.table, 1, "0.1", "avx2", 1, "2024-01-01T00:00:01.000Z",
+  return {study.study_id,    study.table.get(), 1, "0.1", "avx2", 1, "2024-01-01T00:00:01.000Z",
           std::move(results)};
 }
 

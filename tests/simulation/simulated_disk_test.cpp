@@ -25,7 +25,7 @@ server::AddStudy study(std::uint64_t id) {
 
 server::AddResults result(const server::AddStudy& study, std::uint64_t point) {
   server::AddResults results{
-      study.study_id, study.table, 0, "1", "", 1, "2026-01-01T00:00:01.000Z", {}};
+      study.study_id, study.table.get(), 0, "1", "", 1, "2026-01-01T00:00:01.000Z", {}};
   results.results.emplace_back().set_point(point);
   return results;
 }

@@ -126,8 +126,12 @@ server::Delivery SimulatedServer::to_worker(const std::string& identity,
   if (message.has_results_stored()) {
     on_acknowledged(identity, message.results_stored().sequence());
   }
-  return workers->send_to(identity, protocol::encode(message)) ? server::Delivery::kSent
-                                                               : server::Delivery::kGone;
+  return forward_to_worker(identity, protocol::encode(message));
+}
+
+server::Delivery SimulatedServer::forward_to_worker(const std::string& identity,
+                                                    const std::string& frame) {
+  return workers->send_to(identity, frame) ? server::Delivery::kSent : server::Delivery::kGone;
 }
 
 bool SimulatedServer::to_client(const std::string& identity, const protocol::ClientReply& reply) {
@@ -136,6 +140,12 @@ bool SimulatedServer::to_client(const std::string& identity, const protocol::Cli
 
 bool SimulatedServer::forward_to_client(const std::string& identity, const std::string& frame) {
   return clients->send_to(identity, frame);
+}
+
+void SimulatedServer::read(server::ReadJob job) {
+  after(1, [this, job = std::move(job)] {
+    service_->request_read({job.ticket, server::read_request(job.frame)}, now());
+  });
 }
 
 void SimulatedServer::write(server::WriteJob job) {

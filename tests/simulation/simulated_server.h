@@ -41,11 +41,14 @@ class SimulatedServer final : public server::Outbox {
   server::Delivery to_worker(const std::string& identity,
                              const protocol::ServerToWorker& message) override;
   bool is_busy(const std::string&) const override { return false; }
+  server::Delivery forward_to_worker(const std::string& identity,
+                                     const std::string& frame) override;
   bool to_client(const std::string& identity, const protocol::ClientReply& reply) override;
   bool forward_to_client(const std::string& identity, const std::string& frame) override;
   void write(server::WriteJob job) override;
   bool query(server::QueryJob) override { return false; }
   void cancel_query(std::uint64_t) override {}
+  void read(server::ReadJob job) override;
   void note(server::Severity, const std::string&) override {}
 
   Network* workers = nullptr;

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+namespace oblique::protocol {
+
+// What a frame holds, counted on its bytes before anything is built of it. A message of two bytes
+// becomes an object of hundreds, so a hostile frame could else cost a hundred times its size.
+
+/// Longest frame that a worker sends: a sound one splits its results at 1 MiB.
+inline constexpr std::size_t kMaxWorkerFrameBytes = std::size_t{4} * 1024 * 1024;
+/// Most results in one message; a sound worker sends 1,000.
+inline constexpr std::size_t kMostResultsAMessage = 10'000;
+/// Most leases that a heartbeat names: a worker keeps 50,000 results that are not acknowledged, and
+/// holds at most 1,024 batches.
+inline constexpr std::size_t kMostLeasesAHeartbeat = 65'536;
+
+/// Whether the frame is short and holds no more than a sound worker sends. One that cannot be read
+/// may pass.
+bool is_of_a_workers_size(std::string_view frame);
+
+/// Whether the recipe in a client's request has room in its bytes for all the axes that its blocks
+/// need. One that has none is padded with empty messages, and wrong. So is a request that cannot be
+/// read.
+bool is_of_a_requests_shape(std::string_view frame);
+
+/// The number of a client's request, from the beginning of its frame; 0 when it is not there.
+std::uint64_t request_id_of(std::string_view frame);
+
+}  // namespace oblique::protocol

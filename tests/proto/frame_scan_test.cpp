@@ -1,0 +1,123 @@
+#include "proto/frame_scan.h"
+
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "proto/frames.h"
+#include "proto/oblique.pb.h"
+#include "tests/proto/recipe_builder.h"
+
+namespace oblique::protocol {
+namespace {
+
+std::string heartbeat_of(std::size_t leases) {
+  WorkerMessage message;
+  message.mutable_heartbeat();
+  for (std::size_t i = 0; i < leases; ++i) {
+    message.mutable_heartbeat()->add_lease_ids((std::uint64_t{1} << 40U) + i);
+  }
+  return encode(message);
+}
+
+std::string results_of(std::size_t results) {
+  WorkerMessage message;
+  message.mutable_results()->set_study_id(1);
+  for (std::size_t i = 0; i < results; ++i) {
+    message.mutable_results()->add_results();
+  }
+  return encode(message);
+}
+
+ClientRequest submission() {
+  ClientRequest request;
+  request.set_protocol_version(kProtocolVersion);
+  request.set_request_id(77);
+  request.mutable_submit()->set_name("a");
+  *request.mutable_submit()->mutable_recipe() = recipe_of(
+      {{listed("k", {1e7}), listed("H", {1.0}), range("mu", 0.0, 0.0, 1), listed("e", {1.0})}});
+  return request;
+}
+
+TEST(FrameScanTest, WhatASoundWorkerSendsPasses) {
+  EXPECT_TRUE(is_of_a_workers_size(heartbeat_of(50'000 + 1024)));
+  EXPECT_TRUE(is_of_a_workers_size(results_of(1000)));
+  EXPECT_TRUE(is_of_a_workers_size(""));
+  WorkerMessage long_text;
+  auto& result = *long_text.mutable_results()->add_results();
+  result.set_mode(std::string(1 << 20, 'S'));
+  EXPECT_TRUE(is_of_a_workers_size(encode(long_text)));
+}
+
+TEST(FrameScanTest, MoreLeasesThanAWorkerCanHoldAreTooMany) {
+  EXPECT_TRUE(is_of_a_workers_size(heartbeat_of(kMostLeasesAHeartbeat)));
+  EXPECT_FALSE(is_of_a_workers_size(heartbeat_of(kMostLeasesAHeartbeat + 1)));
+  EXPECT_FALSE(is_of_a_workers_size(heartbeat_of(2'500'000)));
+}
+
+TEST(FrameScanTest, LeasesThatAreNotPackedCountTheSame) {
+  std::string ids;
+  for (std::size_t i = 0; i <= kMostLeasesAHeartbeat; ++i) {
+    ids += std::string("\x08\x01", 2);
+  }
+  // Field 4 of the message, in two parts, which a reader puts together.
+  const auto part = [](const std::string& bytes) {
+    std::string size;
+    for (std::size_t left = bytes.size(); size.empty() || left > 0; left >>= 7U) {
+      size += static_cast<char>((left & 0x7fU) | (left > 0x7fU ? 0x80U : 0U));
+    }
+    return "\x22" + size + bytes;
+  };
+  const std::string half = ids.substr(0, ids.size() / 4 * 2);
+  EXPECT_TRUE(is_of_a_workers_size(part(half)));
+  EXPECT_FALSE(is_of_a_workers_size(part(half) + part(ids.substr(half.size()))));
+}
+
+TEST(FrameScanTest, MoreResultsThanAMessageHoldsAreTooMany) {
+  EXPECT_TRUE(is_of_a_workers_size(results_of(kMostResultsAMessage)));
+  EXPECT_FALSE(is_of_a_workers_size(results_of(kMostResultsAMessage + 1)));
+}
+
+TEST(FrameScanTest, ALongFrameOfAWorkerIsRefusedWhateverIsInIt) {
+  EXPECT_FALSE(is_of_a_workers_size(std::string(kMaxWorkerFrameBytes + 1, '\xff')));
+}
+
+TEST(FrameScanTest, ARecipeWithRoomForItsAxesPasses) {
+  EXPECT_TRUE(is_of_a_requests_shape(encode(submission())));
+  ClientRequest query;
+  query.mutable_query()->set_sql("SELECT 1");
+  EXPECT_TRUE(is_of_a_requests_shape(encode(query)));
+}
+
+TEST(FrameScanTest, ARecipePaddedWithEmptyBlocksOrAxesIsNotRead) {
+  ClientRequest blocks = submission();
+  blocks.mutable_submit()->mutable_recipe()->add_blocks();
+  EXPECT_FALSE(is_of_a_requests_shape(encode(blocks)));
+  ClientRequest axes = submission();
+  axes.mutable_submit()->mutable_recipe()->mutable_blocks(0)->add_axes();
+  EXPECT_FALSE(is_of_a_requests_shape(encode(axes)));
+  EXPECT_FALSE(is_of_a_requests_shape(std::string("\x1a\x7f", 2))) << "cut off";
+}
+
+TEST(FrameScanTest, TheNumberOfARequestIsReadFromItsBeginning) {
+  const std::string frame = encode(submission());
+  EXPECT_EQ(request_id_of(frame), 77U);
+  EXPECT_EQ(request_id_of(frame.substr(0, 8)), 77U) << "the rest is of no matter";
+  EXPECT_EQ(request_id_of(""), 0U);
+  EXPECT_EQ(request_id_of("\xff\xff"), 0U);
+}
+
+TEST(FrameScanTest, NoTruncationOrForeignByteIsReadBeyondTheEnd) {
+  const std::string frame = encode(submission());
+  for (std::size_t length = 0; length <= frame.size(); ++length) {
+    for (const char foreign : {'\x00', '\x0f', '\x7f', '\xff'}) {
+      const std::string cut = frame.substr(0, length) + foreign;
+      (void)is_of_a_requests_shape(cut);
+      (void)is_of_a_workers_size(cut);
+      EXPECT_TRUE(request_id_of(cut) == 77U || length < 5) << length;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace oblique::protocol
