@@ -46,6 +46,7 @@ std::string shell_word(const std::string& text) {
 
 int run(const RunFlags& flags) {
   const auto study = study_of_flags(flags.study);
+  check_settings(flags.settings);
   tell_mesh(std::cerr, study.recipe);
   // Before any thread is started; see StopSignal.
   StopSignal stop;

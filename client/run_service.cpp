@@ -33,19 +33,6 @@ std::string query_of_results(const Study& study, std::int64_t rows) {
          sql_text(study.name) + " ORDER BY point LIMIT " + std::to_string(rows);
 }
 
-void check_settings(const RunSettings& settings) {
-  constexpr int kMostWorkers = 1024;
-  if (settings.service.workers < 1 || settings.service.workers > kMostWorkers) {
-    throw solver::InputError("--workers " + std::to_string(settings.service.workers) +
-                             " is not allowed: it must be from 1 to " +
-                             std::to_string(kMostWorkers));
-  }
-  if (settings.rows < 0) {
-    throw solver::InputError("--rows " + std::to_string(settings.rows) +
-                             " is not allowed: it must be >= 0");
-  }
-}
-
 void tell_how_to_continue(const Study& study, const RunSettings& settings) {
   std::cerr << "Stopped. What was solved of \"" << study.name << "\" is in "
             << settings.service.database.string()
@@ -104,6 +91,19 @@ RunEnd submit_and_wait(const Study& study, const RunSettings& settings, Embedded
 }
 
 }  // namespace
+
+void check_settings(const RunSettings& settings) {
+  constexpr int kMostWorkers = 1024;
+  if (settings.service.workers < 1 || settings.service.workers > kMostWorkers) {
+    throw solver::InputError("--workers " + std::to_string(settings.service.workers) +
+                             " is not allowed: it must be from 1 to " +
+                             std::to_string(kMostWorkers));
+  }
+  if (settings.rows < 0) {
+    throw solver::InputError("--rows " + std::to_string(settings.rows) +
+                             " is not allowed: it must be >= 0");
+  }
+}
 
 void add_worker_flags(CLI::App& verb, RunSettings& settings) {
   verb.add_option("--workers", settings.service.workers,

@@ -24,6 +24,10 @@ struct RunSettings {
 /// Adds --workers and --verbose. `settings` must live as long as `verb`.
 void add_worker_flags(CLI::App& verb, RunSettings& settings);
 
+/// Throws solver::InputError, naming the flag and what is allowed, for a number of workers or rows
+/// that cannot be.
+void check_settings(const RunSettings& settings);
+
 /// How a study ended.
 struct RunEnd {
   protocol::StudyStatus status;

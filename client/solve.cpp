@@ -85,7 +85,6 @@ class TraceOutput {
 int solve(const SolveFlags& flags) {
   const protocol::PointTable table(recipe_of_flags(flags.points));
   check_one_point(table);
-  tell_mesh(std::cerr, table.recipe());
   const auto point = table.point(0);
   const solver::Finger finger(table.model(0));
   std::optional<TraceOutput> trace;
@@ -105,6 +104,7 @@ int solve(const SolveFlags& flags) {
   if (trace) {
     trace->finish();
   }
+  tell_mesh(std::cerr, table.recipe());
   return kDone;
 }
 

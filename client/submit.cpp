@@ -53,12 +53,12 @@ int watch(const Study& study, Connection& connection, StopSignal& stop) {
 
 int submit(const SubmitFlags& flags) {
   const auto study = study_of_flags(flags.study);
-  tell_mesh(std::cerr, study.recipe);
   StopSignal stop;
   Connection connection(connection_settings(flags.source), [&stop] { return !stop.requested(); });
   bool submitted = false;
   try {
     tell_submitted(study, connection.submit(study, flags.terms));
+    tell_mesh(std::cerr, study.recipe);
     submitted = true;
     return flags.watch ? watch(study, connection, stop) : kDone;
   } catch (const Interrupted&) {

@@ -11,9 +11,10 @@
 namespace oblique::client {
 namespace {
 
-/// The number behind `word` in a statement.
+/// The number behind `word` in a statement; 0 where the word is not.
 int number_after(const std::string& sql, const std::string& word) {
-  return std::stoi(sql.substr(sql.rfind(word) + word.size()));
+  const auto at = sql.rfind(word);
+  return at == std::string::npos ? 0 : std::stoi(sql.substr(at + word.size()));
 }
 
 /// Rows of one number, from that of `OFFSET` on, but never more than two at once.

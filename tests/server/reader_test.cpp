@@ -205,6 +205,14 @@ TEST_F(ReaderTest, AStudyWithAllItsRowsIsDone) {
   EXPECT_EQ(Reader(path_).study_status("a").at(0).state(), "done");
 }
 
+TEST_F(ReaderTest, AStatementMayUnfoldListsItself) {
+  { const Store store(path_); }
+  for (const char* sql : {"SELECT sum(value) FROM json_each('[1, 2, 3]')",
+                          "SELECT sum(atom) FROM json_tree('[1, [2, 3]]')"}) {
+    EXPECT_EQ(Reader(path_).query(sql, kNoLimits).rows(0).values(0).integer(), 6) << sql;
+  }
+}
+
 TEST_F(ReaderTest, WhatIsNoDatabaseOfOursIsRefusedByItsKind) {
   const auto message_of = [](const std::string& path) -> std::string {
     try {
