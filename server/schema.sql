@@ -45,7 +45,7 @@ CREATE TABLE models (
   definition  BLOB NOT NULL UNIQUE  -- oblique.protocol.ModelParameters, serialised
 ) STRICT;
 
--- One row for each time that a worker said hello.
+-- One row for each session of a worker in which it delivered a result.
 CREATE TABLE workers (
   worker_id       INTEGER PRIMARY KEY,
   name            TEXT NOT NULL,
