@@ -126,10 +126,10 @@ void Chain::number_rows(const ModelParameters& model) {
 void Chain::balance_links(double tip_mass_kg) {
   balance_.resize(links());
   double beyond_kg = tip_mass_kg;
-  const auto elements_per_link = static_cast<double>(elements_.size() / links());
+  const std::size_t elements_per_link = elements_.size() / links();
   for (std::size_t link = links(); link-- > 0;) {
     const double length = 1.0 / elements_[first_element_[link]].inverse_length;
-    beyond_kg += elements_per_link * mass_per_length_ * length;
+    beyond_kg += static_cast<double>(elements_per_link) * mass_per_length_ * length;
     balance_[link] = {mass_per_length_ * uniform_load(length)[0], gravity_m_s2_ * beyond_kg};
   }
 }
