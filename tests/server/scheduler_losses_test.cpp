@@ -132,6 +132,19 @@ TEST(SchedulerLosses, ANewConnectionOfAProcessEndsItsOldOneAtOnce) {
   EXPECT_EQ(only<SendBatch>(effects)[0].first_point, lost.first_point);
 }
 
+TEST(SchedulerLosses, ANewcomerThatConnectsAnewHasNotVanished) {
+  SchedulerBench bench;
+  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  // Each of four processes has an earlier connection, which held a batch, replaced by a new one.
+  for (const WorkerId worker : {1U, 2U, 3U, 4U}) {
+    const std::string process = "sound " + std::to_string(worker);
+    ASSERT_EQ(only<SendBatch>(bench.join_as(process, worker, 1)).size(), 1U);
+    bench.join_as(process, worker + 10, 0);
+  }
+  EXPECT_EQ(only<SendBatch>(bench.join_as("another", 30, 1)).size(), 1U);
+  EXPECT_FALSE(bench.scheduler.worker(30, bench.now_ms).is_set_aside);
+}
+
 TEST(SchedulerLosses, WorkersThatOnlyShareANameDoNotEndEachOther) {
   SchedulerBench bench;
   bench.feed(WorkerJoined{1, 1, {}, "name box:1", false});
