@@ -23,6 +23,37 @@ namespace fs = std::filesystem;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
+/// A file that goes at the instant of a commit, on connections opened while this lives.
+class DoomedFile {
+ public:
+  DoomedFile() { sqlite3_auto_extension(reinterpret_cast<void (*)()>(&watch)); }
+  ~DoomedFile() {
+    sqlite3_cancel_auto_extension(reinterpret_cast<void (*)()>(&watch));
+    path().clear();
+  }
+  DoomedFile(const DoomedFile&) = delete;
+  DoomedFile& operator=(const DoomedFile&) = delete;
+
+  static void name(const std::string& file) { path() = file; }
+
+ private:
+  static std::string& path() {
+    static std::string named;
+    return named;
+  }
+  static int watch(sqlite3* database, const char**, const void*) {
+    sqlite3_commit_hook(
+        database,
+        [](void*) {
+          std::error_code ignored;
+          fs::remove(path(), ignored);
+          return 0;
+        },
+        nullptr);
+    return SQLITE_OK;
+  }
+};
+
 class StoreFilesTest : public testing::Test {
  protected:
   StoreFilesTest() {
@@ -54,6 +85,14 @@ class StoreFilesTest : public testing::Test {
   std::shared_ptr<const protocol::PointTable> table_ = table_of(10);
   std::optional<Store> store_;
 };
+
+TEST_F(StoreFilesTest, ACommitInWhichTheFileGoesIsNotAcknowledged) {
+  const DoomedFile doomed;
+  const std::string late = folder_.file("late.db");
+  Store store(late);
+  DoomedFile::name(late);
+  EXPECT_THROW(store.commit(std::vector<Change>{AddStudy{1, "a", table_, "now", {}}}), StorageGone);
+}
 
 TEST_F(StoreFilesTest, NothingIsAcknowledgedOnceAFileIsDeletedRenamedOrReplaced) {
   const std::map<std::string, std::function<void()>> blows{
