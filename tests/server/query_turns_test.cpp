@@ -56,6 +56,19 @@ TEST_F(QueryTurnsTest, ClientsTakeTurnsHoweverManyQueriesEachHas) {
   EXPECT_EQ(begin(), Names{"a:3"});
 }
 
+TEST_F(QueryTurnsTest, BytesOfAQueryThatIsGivenUpOrRunsAreFreeForOthers) {
+  constexpr std::size_t kHalf = TurnSettings{}.most_waiting_bytes / 2;
+  const std::string half(kHalf, ' ');
+  for (int i = 0; i < 10; ++i) {
+    ASSERT_TRUE(ask("a", half)) << i;
+    ASSERT_TRUE(ask("b", half)) << i;
+    EXPECT_FALSE(ask("c")) << "all the bytes are taken";
+    turns_.remove(last_ticket_ - 1);  // of b, which waits
+    ASSERT_EQ(begin().size(), 1U);
+    turns_.remove(last_ticket_ - 2);  // of a, which ran
+  }
+}
+
 TEST_F(QueryTurnsTest, WhatWaitsIsBoundedForEachClientAndForAll) {
   for (int i = 0; i < 16; ++i) {
     EXPECT_TRUE(ask("a"));
