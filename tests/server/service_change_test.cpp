@@ -222,6 +222,24 @@ TEST_F(ServiceTest, TheRateAfterARetryIsNotNegative) {
   EXPECT_EQ(status_of("a").points_per_s(), 0.0);
 }
 
+TEST_F(ServiceTest, TheRateForgetsWhatWasSettledBeforeARetry) {
+  constexpr int kPoints = 8;
+  request(submit_request("a", kPoints));
+  write_all();
+  hello();
+  for (int i = 0; i < kPoints; ++i) {
+    credit(1);
+    answer_batch(0);
+    write_all();
+    service_->tick(now_);
+    now_.steady_ms += 1000;
+  }
+  request(change_request("a", protocol::STUDY_CHANGE_RETRY));
+  write_all();
+  EXPECT_EQ(last_reply().change().study().points_per_s(), 0.0);
+  EXPECT_EQ(status_of("a").points_per_s(), 0.0);
+}
+
 TEST_F(ServiceTest, EveryChangeOfAStudyLeavesALineInTheLog) {
   request(submit_request("a", 1));
   write_all();

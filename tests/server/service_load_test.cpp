@@ -51,6 +51,21 @@ TEST_F(ServiceLoadTest, NoBatchGoesOutWhileTheDiskIsFarBehind) {
   EXPECT_EQ(batches_sent(), 2U);
 }
 
+TEST_F(ServiceLoadTest, AFaultThatIsOverHandsOutNothingWhileTheDiskIsFarBehind) {
+  ServiceSettings settings;
+  settings.unstored_bytes_to_hold = 1000;
+  begin(settings);
+  service_->written({WriteReport::Kind::kFault, 0, "disk full"}, now_);
+  for (std::uint64_t point = 900; point < 910; ++point) {
+    worker_says(one_result(point));
+  }
+  credit(1);
+  service_->written({WriteReport::Kind::kRecovered, 0, {}}, now_);
+  EXPECT_EQ(batches_sent(), 0U);
+  write_all();
+  EXPECT_EQ(batches_sent(), 1U);
+}
+
 TEST_F(ServiceLoadTest, NoBatchGoesOutWhileManyMessagesWaitForTheDisk) {
   ServiceSettings settings;
   settings.unstored_messages_to_hold = 4;
