@@ -91,5 +91,16 @@ TEST(FramesTest, TextThatIsNotUtf8IsRefused) {
   EXPECT_FALSE(decode(frame, received));
 }
 
+TEST(FramesTest, TheLongestFrameIsReadAndNoLongerOne) {
+  constexpr std::size_t kHead = 5;  // a tag, and a length of four bytes
+  Notice notice;
+  notice.set_text(std::string(kMaxFrameBytes - kHead, 'x'));
+  const std::string longest = encode(notice);
+  ASSERT_EQ(longest.size(), kMaxFrameBytes);
+  EXPECT_TRUE(decode(longest, notice));
+  notice.set_text(std::string(kMaxFrameBytes - kHead + 1, 'x'));
+  EXPECT_FALSE(decode(encode(notice), notice));
+}
+
 }  // namespace
 }  // namespace oblique::protocol
