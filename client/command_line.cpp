@@ -1,3 +1,5 @@
+#include "client/command_line.h"
+
 #include <algorithm>
 #include <exception>
 #include <iostream>
@@ -5,12 +7,12 @@
 #include <string_view>
 #include <vector>
 
-#include "client/nearest.h"
-#include "client/verbs.h"
-#include "proto/usage.h"
-#include "proto/visible_text.h"
-#include "worker/solver/parameters.h"
-#include "worker/solver/solve.h"
+#include "client/study/nearest.h"
+#include "client/verbs/verbs.h"
+#include "proto/program/usage.h"
+#include "proto/text.h"
+#include "worker/solver/model/parameters.h"
+#include "worker/solver/model/version.h"
 
 namespace oblique::client {
 namespace {

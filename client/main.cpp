@@ -1,4 +1,4 @@
-#include "client/verbs.h"
+#include "client/command_line.h"
 #include "proto/frames.h"
 
 int main(int argc, char** argv) {

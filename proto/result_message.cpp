@@ -1,4 +1,4 @@
-#include "proto/recipe.h"
+#include "proto/recipe/recipe.h"
 
 namespace oblique::protocol {
 namespace {

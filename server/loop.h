@@ -5,7 +5,7 @@
 #include <string>
 
 #include "server/network/network.h"
-#include "server/service.h"
+#include "server/service/service.h"
 
 namespace oblique::server {
 

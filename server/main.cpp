@@ -20,12 +20,12 @@
 #include <nlohmann/json.hpp>
 
 #include "proto/frames.h"
-#include "proto/log.h"
-#include "proto/usage.h"
-#include "proto/visible_text.h"
+#include "proto/program/log.h"
+#include "proto/program/usage.h"
+#include "proto/text.h"
 #include "server/loop.h"
-#include "server/reader_program.h"
-#include "worker/solver/solve.h"
+#include "server/queries/reader_program.h"
+#include "worker/solver/model/version.h"
 
 namespace {
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "proto/oblique.pb.h"
-#include "proto/recipe.h"
+#include "proto/recipe/recipe.h"
 #include "worker/task.h"
 
 namespace oblique::worker {

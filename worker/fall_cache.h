@@ -5,7 +5,7 @@
 #include <memory>
 #include <mutex>
 
-#include "worker/solver/parameters.h"
+#include "worker/solver/model/parameters.h"
 #include "worker/solver/solve.h"
 
 namespace oblique::worker {

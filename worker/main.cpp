@@ -16,9 +16,9 @@
 #include <CLI/CLI.hpp>
 
 #include "proto/frames.h"
-#include "proto/log.h"
-#include "proto/usage.h"
-#include "proto/visible_text.h"
+#include "proto/program/log.h"
+#include "proto/program/usage.h"
+#include "proto/text.h"
 #include "worker/point_solver.h"
 #include "worker/session.h"
 #include "worker/solver/solve.h"

@@ -16,7 +16,7 @@
 
 #include "proto/address.h"
 #include "proto/frames.h"
-#include "proto/socket.h"
+#include "proto/socket/socket.h"
 #include "worker/solver/solve.h"
 
 namespace oblique::worker {

@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "proto/recipe.h"
+#include "proto/recipe/recipe.h"
 
 namespace oblique::worker {
 

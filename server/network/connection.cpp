@@ -10,7 +10,7 @@
 #include <cerrno>
 #include <utility>
 
-#include "proto/socket.h"
+#include "proto/socket/socket.h"
 
 namespace oblique::server {
 namespace {

@@ -3,9 +3,9 @@
 #include <memory>
 #include <utility>
 
-#include "worker/solver/contact.h"
-#include "worker/solver/fall.h"
-#include "worker/solver/generalized_alpha.h"
+#include "worker/solver/contact/contact.h"
+#include "worker/solver/motion/fall.h"
+#include "worker/solver/motion/generalized_alpha.h"
 
 namespace oblique::solver {
 namespace {

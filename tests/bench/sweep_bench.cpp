@@ -8,10 +8,10 @@
 #include <thread>
 #include <vector>
 
-#include "worker/solver/chain.h"
-#include "worker/solver/fall.h"
+#include "worker/solver/chain/chain.h"
+#include "worker/solver/contact/solve_contact.h"
+#include "worker/solver/motion/fall.h"
 #include "worker/solver/solve.h"
-#include "worker/solver/solve_contact.h"
 #include "worker/solver/step_choice.h"
 
 namespace oblique::bench {

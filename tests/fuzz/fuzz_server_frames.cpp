@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "proto/frames.h"
-#include "server/service.h"
+#include "server/service/service.h"
 
 namespace oblique::server {
 namespace {

@@ -2,8 +2,8 @@
 #include <cstdint>
 #include <string_view>
 
-#include "client/study_file.h"
-#include "worker/solver/errors.h"
+#include "client/study/study_file.h"
+#include "worker/solver/model/errors.h"
 
 /// A study file either gives a study or an InputError. Whether the tip reaches H is left out: that
 /// solves falls, which takes long.

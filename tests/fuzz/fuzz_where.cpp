@@ -6,10 +6,10 @@
 
 #include <unistd.h>
 
-#include "client/sql_expression.h"
-#include "server/reader.h"
-#include "server/store.h"
-#include "worker/solver/errors.h"
+#include "client/sql/sql_expression.h"
+#include "server/reading/reader.h"
+#include "server/store/store.h"
+#include "worker/solver/model/errors.h"
 
 namespace {
 

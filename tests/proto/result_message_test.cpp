@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "proto/frames.h"
-#include "proto/recipe.h"
+#include "proto/recipe/recipe.h"
 
 namespace oblique::protocol {
 namespace {

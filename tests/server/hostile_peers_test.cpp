@@ -9,7 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/server/raw_peer.h"
+#include "tests/server/network/raw_peer.h"
 #include "tests/server/running_server.h"
 
 namespace oblique::server {

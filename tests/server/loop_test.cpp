@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/reader.h"
+#include "server/reading/reader.h"
 #include "tests/server/running_server.h"
 
 namespace oblique::server {

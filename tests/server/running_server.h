@@ -16,8 +16,8 @@
 
 #include "proto/frames.h"
 #include "server/loop.h"
-#include "tests/server/results.h"
-#include "tests/server/scheduler_bench.h"
+#include "tests/server/scheduler/scheduler_bench.h"
+#include "tests/server/store/results.h"
 
 namespace oblique::server {
 

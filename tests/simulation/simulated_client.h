@@ -5,7 +5,7 @@
 #include <set>
 #include <string>
 
-#include "server/changes.h"
+#include "server/store/changes.h"
 #include "tests/simulation/network.h"
 #include "tests/simulation/world.h"
 

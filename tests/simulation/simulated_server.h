@@ -6,9 +6,9 @@
 #include <optional>
 #include <string>
 
-#include "server/service.h"
+#include "server/service/service.h"
+#include "tests/simulation/disk/simulated_disk.h"
 #include "tests/simulation/network.h"
-#include "tests/simulation/simulated_disk.h"
 #include "tests/simulation/world.h"
 
 namespace oblique::simulation {

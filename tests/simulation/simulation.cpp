@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/simulation/disk/simulated_disk.h"
 #include "tests/simulation/simulated_client.h"
-#include "tests/simulation/simulated_disk.h"
 #include "tests/simulation/simulated_server.h"
 #include "tests/simulation/simulated_worker.h"
 #include "tests/simulation/vanishing_peers.h"

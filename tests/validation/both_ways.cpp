@@ -1,6 +1,6 @@
 #include "tests/validation/both_ways.h"
 
-#include "worker/solver/solve_contact.h"
+#include "worker/solver/contact/solve_contact.h"
 
 namespace oblique::validation {
 namespace {

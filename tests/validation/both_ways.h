@@ -3,12 +3,12 @@
 #include <array>
 #include <functional>
 
-#include "worker/solver/case_result.h"
-#include "worker/solver/chain.h"
-#include "worker/solver/contact_law.h"
-#include "worker/solver/fall.h"
-#include "worker/solver/generalized_alpha.h"
-#include "worker/solver/motion.h"
+#include "worker/solver/chain/chain.h"
+#include "worker/solver/contact/contact_law.h"
+#include "worker/solver/model/case_result.h"
+#include "worker/solver/motion/fall.h"
+#include "worker/solver/motion/generalized_alpha.h"
+#include "worker/solver/motion/motion.h"
 
 namespace oblique::validation {
 

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "worker/solver/banded_lu.h"
-#include "worker/solver/beam_element.h"
-#include "worker/solver/beam_tangent.h"
+#include "worker/solver/chain/banded_lu.h"
+#include "worker/solver/chain/beam_element.h"
+#include "worker/solver/chain/beam_tangent.h"
 
 namespace oblique::validation {
 namespace {

@@ -8,9 +8,9 @@
 #include <string>
 
 #include "tests/validation/validation_table.h"
-#include "worker/solver/fall.h"
-#include "worker/solver/generalized_alpha.h"
-#include "worker/solver/motion.h"
+#include "worker/solver/motion/fall.h"
+#include "worker/solver/motion/generalized_alpha.h"
+#include "worker/solver/motion/motion.h"
 
 namespace oblique::validation {
 namespace {

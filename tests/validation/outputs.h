@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "worker/solver/case_result.h"
+#include "worker/solver/model/case_result.h"
 
 namespace oblique::validation {
 

@@ -8,8 +8,9 @@
 #include <utility>
 
 #include "tests/validation/validation_table.h"
-#include "worker/solver/generalized_alpha.h"
-#include "worker/solver/motion.h"
+#include "worker/solver/motion/generalized_alpha.h"
+#include "worker/solver/motion/motion.h"
+#include "worker/solver/motion/pefrl.h"
 
 namespace oblique::validation {
 namespace {

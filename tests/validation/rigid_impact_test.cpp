@@ -9,10 +9,10 @@
 #include <string>
 
 #include "tests/validation/validation_table.h"
-#include "tests/worker/solver/analytic_rigid_impact.h"
-#include "tests/worker/solver/rigid_tip_motion.h"
-#include "worker/solver/generalized_alpha.h"
-#include "worker/solver/solve_contact.h"
+#include "tests/worker/solver/analytic/analytic_rigid_impact.h"
+#include "tests/worker/solver/contact/rigid_tip_motion.h"
+#include "worker/solver/contact/solve_contact.h"
+#include "worker/solver/motion/generalized_alpha.h"
 
 namespace oblique::validation {
 namespace {

@@ -8,10 +8,11 @@
 #include <utility>
 
 #include "tests/validation/validation_table.h"
-#include "tests/worker/solver/analytic_waves.h"
-#include "tests/worker/solver/chain_probe.h"
-#include "worker/solver/generalized_alpha.h"
-#include "worker/solver/motion.h"
+#include "tests/worker/solver/analytic/analytic_waves.h"
+#include "tests/worker/solver/chain/chain_probe.h"
+#include "worker/solver/motion/generalized_alpha.h"
+#include "worker/solver/motion/motion.h"
+#include "worker/solver/motion/pefrl.h"
 
 namespace oblique::validation {
 namespace {

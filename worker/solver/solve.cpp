@@ -6,11 +6,11 @@
 #include <string>
 #include <utility>
 
-#include "worker/solver/chain.h"
-#include "worker/solver/fall.h"
-#include "worker/solver/generalized_alpha.h"
-#include "worker/solver/lane_batch.h"
-#include "worker/solver/solve_contact.h"
+#include "worker/solver/chain/chain.h"
+#include "worker/solver/contact/solve_contact.h"
+#include "worker/solver/lanes/lane_batch.h"
+#include "worker/solver/motion/fall.h"
+#include "worker/solver/motion/generalized_alpha.h"
 #include "worker/solver/step_choice.h"
 
 namespace oblique::solver {
@@ -63,11 +63,11 @@ struct Finger::Parts {
     report.integrator = integrator_name(model.integrator);
     report.version = solver_version();
   }
-  CaseResult solve_by_motion(const PointRequest& point, const Extras& extras) const {
+  CaseResult solve_by_motion(const PointRequest& point, const Tracing& tracing) const {
     ChainState touch = solved_fall().state_at(point.H_m);
     const double fall_time_s = touch.t_s;
     CaseResult result = solve_contact(*motion, contact_parameters(point.mu, point.e_star),
-                                      steps.contact(point.e_star), std::move(touch), extras);
+                                      steps.contact(point.e_star), std::move(touch), tracing);
     result.H_m = point.H_m;
     result.fall_time_s = fall_time_s;
     sign(result.solver);
@@ -120,9 +120,6 @@ class TouchCache {
 
 }  // namespace
 
-std::string solver_version() {
-  return OBLIQUE_SOLVER_VERSION;
-}
 std::string instruction_set() {
   return std::string(runnable_lane_kernels().front().name);
 }
@@ -140,18 +137,18 @@ double Finger::largest_drop_m() const {
 }
 
 CaseResult Finger::solve(double H_m, double mu, double e_star) const {
-  return solve(H_m, mu, e_star, Extras{});
+  return solve(H_m, mu, e_star, Tracing{});
 }
 
-CaseResult Finger::solve(double H_m, double mu, double e_star, const Extras& extras) const {
+CaseResult Finger::solve(double H_m, double mu, double e_star, const Tracing& tracing) const {
   parts_->check(H_m, mu, e_star);
   if (parts_->model.integrator != Integrator::kExplicit) {
-    return parts_->solve_by_motion({0, H_m, mu, e_star}, extras);
+    return parts_->solve_by_motion({0, H_m, mu, e_star}, tracing);
   }
   std::optional<PointRequest> request = PointRequest{0, H_m, mu, e_star};
   PointOutcome outcome{};
   solve_in_lanes([&request] { return std::exchange(request, std::nullopt); },
-                 [&outcome](PointOutcome&& o) { outcome = std::move(o); }, extras);
+                 [&outcome](PointOutcome&& o) { outcome = std::move(o); }, tracing);
   if (!outcome.result) {
     throw SolveError(outcome.error);
   }
@@ -161,14 +158,14 @@ CaseResult Finger::solve(double H_m, double mu, double e_star, const Extras& ext
 void Finger::solve_points(const std::function<std::optional<PointRequest>()>& source,
                           const std::function<void(PointOutcome&&)>& sink) const {
   if (parts_->model.integrator == Integrator::kExplicit) {
-    solve_in_lanes(source, sink, Extras{});
+    solve_in_lanes(source, sink, Tracing{});
     return;
   }
   while (const auto request = source()) {
     PointOutcome outcome{request->number, std::nullopt, {}};
     try {
       parts_->check(request->H_m, request->mu, request->e_star);
-      outcome.result = parts_->solve_by_motion(*request, Extras{});
+      outcome.result = parts_->solve_by_motion(*request, Tracing{});
     } catch (const std::exception& error) {
       outcome.error = error.what();
     }
@@ -178,7 +175,7 @@ void Finger::solve_points(const std::function<std::optional<PointRequest>()>& so
 
 void Finger::solve_in_lanes(const std::function<std::optional<PointRequest>()>& source,
                             const std::function<void(PointOutcome&&)>& sink,
-                            const Extras& extras) const {
+                            const Tracing& tracing) const {
   struct Entry {
     PointRequest request;
     double fall_time_s;
@@ -216,7 +213,7 @@ void Finger::solve_in_lanes(const std::function<std::optional<PointRequest>()>& 
     sink({entry.request.number, std::move(contact.result), std::move(contact.error)});
   };
   LaneBatch batch(parts_->chain, runnable_lane_kernels().front());
-  batch.solve(take, give, extras);
+  batch.solve(take, give, tracing);
 }
 
 }  // namespace oblique::solver

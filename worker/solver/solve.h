@@ -6,14 +6,13 @@
 #include <optional>
 #include <string>
 
-#include "worker/solver/case_result.h"
-#include "worker/solver/errors.h"
-#include "worker/solver/parameters.h"
+#include "worker/solver/model/case_result.h"
+#include "worker/solver/model/errors.h"
+#include "worker/solver/model/parameters.h"
+#include "worker/solver/model/trace.h"
+#include "worker/solver/model/version.h"
 
 namespace oblique::solver {
-
-/// Version of the solver; results of one study come from one version.
-std::string solver_version();
 
 /// Instruction set the solver runs with on this machine, as "avx2".
 std::string instruction_set();
@@ -39,11 +38,6 @@ struct PointOutcome {
 class Finger {
  public:
   struct Parts;  ///< of the implementation
-  using TraceSink = std::function<void(const TraceRow&)>;
-  struct Extras {
-    TraceSink trace;           ///< called at every accepted step, from touch to separation
-    bool trace_shape = false;  ///< fill TraceRow::nodes_m
-  };
 
   /// Throws InputError when `model` is outside its domain.
   explicit Finger(ModelParameters model);
@@ -60,7 +54,7 @@ class Finger {
   /// Solves one point. Throws InputError for a value outside its range, SolveError when there is
   /// no answer.
   CaseResult solve(double H_m, double mu, double e_star) const;
-  CaseResult solve(double H_m, double mu, double e_star, const Extras& extras) const;
+  CaseResult solve(double H_m, double mu, double e_star, const Tracing& tracing) const;
 
   /// Solves the points that `source` gives until it gives nothing more, side by side in vector
   /// lanes where the integrator allows, and hands each outcome to `sink`, in the order in which
@@ -71,7 +65,8 @@ class Finger {
 
  private:
   void solve_in_lanes(const std::function<std::optional<PointRequest>()>& source,
-                      const std::function<void(PointOutcome&&)>& sink, const Extras& extras) const;
+                      const std::function<void(PointOutcome&&)>& sink,
+                      const Tracing& tracing) const;
   std::unique_ptr<Parts> parts_;
 };
 

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <string>
 
-#include "worker/solver/errors.h"
-#include "worker/solver/number.h"
-#include "worker/solver/pefrl.h"
+#include "worker/solver/model/errors.h"
+#include "worker/solver/model/number.h"
+#include "worker/solver/motion/pefrl.h"
 
 namespace oblique::solver {
 namespace {

@@ -5,8 +5,8 @@
 
 #include <cmath>
 
-#include "worker/solver/errors.h"
-#include "worker/solver/pefrl.h"
+#include "worker/solver/model/errors.h"
+#include "worker/solver/motion/pefrl.h"
 
 namespace oblique::solver {
 namespace {

@@ -1,0 +1,333 @@
+#include "client/convergence/convergence_report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "client/output/columns.h"
+#include "client/output/printer.h"
+#include "worker/solver/model/number.h"
+
+namespace oblique::client {
+namespace {
+
+using nlohmann::ordered_json;
+using solver::fixed_number;
+using solver::readable_number;
+
+constexpr double kMicro = 1e6;
+constexpr double kPercent = 100.0;
+/// PEFRL and the cubic elements are of order 4; generalized-alpha is of order 2.
+constexpr double kHighOrder = 4.0;
+constexpr double kLowOrder = 2.0;
+
+double highest_order(const std::string& what, const solver::ModelParameters& model) {
+  const bool is_low = what == "step" && model.integrator == solver::Integrator::kGeneralizedAlpha;
+  return is_low ? kLowOrder : kHighOrder;
+}
+
+bool is_settled(const OutputConvergence& output) {
+  const auto& extrapolation = output.extrapolation;
+  switch (extrapolation.trend) {
+    case Trend::kTooFew:
+      return false;
+    case Trend::kUnsettled:
+      return *extrapolation.error <= kSettled * output.scale;
+    default:
+      return true;
+  }
+}
+
+const char* remark_on(const OutputConvergence& output) {
+  switch (output.extrapolation.trend) {
+    case Trend::kTooFew:
+      return "other mode before";
+    case Trend::kRounding:
+      return "rounding only";
+    case Trend::kOscillating:
+      return "oscillates";
+    case Trend::kUnsettled:
+      return is_settled(output) ? "wavers" : "does not settle";
+    default:
+      return "";
+  }
+}
+
+const char* name_of(Trend trend) {
+  switch (trend) {
+    case Trend::kTooFew:
+      return "too few values";
+    case Trend::kRounding:
+      return "rounding";
+    case Trend::kMonotone:
+      return "monotone";
+    case Trend::kOscillating:
+      return "oscillating";
+    default:
+      return "unsettled";
+  }
+}
+
+std::optional<double> times(const std::optional<double>& value, double factor) {
+  return value ? std::optional(*value * factor) : std::nullopt;
+}
+
+void add_optional(protocol::Row& row, const std::optional<double>& value) {
+  auto* added = row.add_values();
+  if (value) {
+    added->set_real(*value);
+  }
+}
+
+// Two digits are all that an estimate has.
+void add_rough(protocol::Row& row, const std::optional<double>& value) {
+  add_value(row, value ? readable_number(*value, 2) : std::string("-"));
+}
+
+std::optional<double> relative(const OutputConvergence& output) {
+  const auto& extrapolation = output.extrapolation;
+  if (!extrapolation.error || output.finest() == 0.0) {
+    return std::nullopt;
+  }
+  return *extrapolation.error / std::abs(output.finest());
+}
+
+void print_outputs(std::ostream& out, const Refinement& refinement) {
+  protocol::QueryReply table;
+  table.add_columns("output");
+  for (const auto& level : refinement.levels) {
+    table.add_columns(level.level.name);
+  }
+  for (const char* column : {"limit", "order", "error", "error [%]", "remark"}) {
+    table.add_columns(column);
+  }
+  for (const auto& output : refinement.convergence.outputs) {
+    auto& row = *table.add_rows();
+    const auto shown = shown_column(output.name);
+    add_value(row, shown.heading);
+    for (const auto& value : output.values) {
+      add_optional(row, times(value, shown.per_unit));
+    }
+    const auto& extrapolation = output.extrapolation;
+    add_value(row, extrapolation.limit * shown.per_unit);
+    add_rough(row, extrapolation.order);
+    add_rough(row, times(extrapolation.error, shown.per_unit));
+    const auto error = relative(output);
+    add_rough(row, error ? std::optional(kPercent * *error) : std::nullopt);
+    add_value(row, std::string(remark_on(output)));
+  }
+  print(out, table, Format::kTable);
+}
+
+std::string change_sentence(const Refinement& refinement, const LevelChange& change) {
+  const auto& finer = refinement.levels[change.finer].level.name;
+  const auto& coarser = refinement.levels[change.finer - 1].level.name;
+  return fmt::format("{} has {}; {} has not", change.change.in_finer ? finer : coarser,
+                     described(change.change), change.change.in_finer ? coarser : finer);
+}
+
+std::string names_of_unsettled(const PointConvergence& convergence) {
+  std::string names;
+  for (const auto& output : convergence.outputs) {
+    if (!is_settled(output)) {
+      names += (names.empty() ? "" : ", ") + output.name;
+    }
+  }
+  return names;
+}
+
+// "0.95 % (vt_out_m_s)": the largest of relative errors.
+class Worst {
+ public:
+  void add(const std::string& name, const std::optional<double>& error) {
+    if (error && (!error_ || *error > *error_)) {
+      error_ = error;
+      name_ = name;
+    }
+  }
+  std::string shown() const {
+    return error_ ? readable_number(kPercent * *error_, 2) + " % (" + name_ + ")"
+                  : std::string("-");
+  }
+
+ private:
+  std::string name_;
+  std::optional<double> error_;
+};
+
+void print_verdict(std::ostream& out, const Refinement& refinement) {
+  const auto& convergence = refinement.convergence;
+  for (const auto& change : convergence.changes) {
+    out << "  " << change_sentence(refinement, change) << ".\n";
+  }
+  const auto& finest = refinement.levels.back().level.name;
+  if (converges(refinement)) {
+    Worst fine;
+    Worst coarse;
+    for (const auto& output : convergence.outputs) {
+      fine.add(output.name, relative(output));
+      coarse.add(output.name, relative_error(output.values.front(), output.extrapolation.limit));
+    }
+    out << fmt::format("The {} converges; largest estimated error on {}: {}, on {}: {}.\n",
+                       refinement.what, finest, fine.shown(), refinement.levels.front().level.name,
+                       coarse.shown());
+    return;
+  }
+  out << fmt::format("The {} does not converge by {}: ", refinement.what, finest);
+  if (convergence.has_one_mode) {
+    out << "the mode settles, but not " << names_of_unsettled(convergence);
+  } else {
+    out << "the mode is not one on the finest three levels";
+  }
+  if (!convergence.changes.empty()) {
+    out << "; to blame: " << change_sentence(refinement, convergence.changes.back());
+  }
+  out << ".\n";
+}
+
+ordered_json json_of_value(const std::optional<double>& value) {
+  return value ? ordered_json(*value) : ordered_json();
+}
+
+ordered_json json_of_level(const Refinement& refinement, std::size_t i) {
+  const auto& level = refinement.levels[i];
+  const auto& result = refinement.result(i);
+  return {{"name", level.level.name},   {"elements_per_link", level.level.model.elements_per_link},
+          {"dt_s", result.solver.dt_s}, {"wall_s", level.wall_s},
+          {"mode", result.mode},        {"major_mode", result.major_mode}};
+}
+
+ordered_json json_of(const OutputConvergence& output) {
+  ordered_json values = ordered_json::array();
+  for (const auto& value : output.values) {
+    values.push_back(json_of_value(value));
+  }
+  const auto& extrapolation = output.extrapolation;
+  return {{"name", output.name},
+          {"values", values},
+          {"finest", output.finest()},
+          {"limit", extrapolation.limit},
+          {"order", json_of_value(extrapolation.order)},
+          {"error", json_of_value(extrapolation.error)},
+          {"trend", name_of(extrapolation.trend)}};
+}
+
+bool decides_the_mesh(const OutputConvergence& output) {
+  return output.name.starts_with("major_peak") || output.name == "duration_s" ||
+         output.name == "stick_total_s";
+}
+
+}  // namespace
+
+Refinement refinement_of(std::string what, const std::vector<SolvedLevel>& levels,
+                         std::size_t point) {
+  std::vector<solver::CaseResult> results;
+  results.reserve(levels.size());
+  for (const auto& level : levels) {
+    results.push_back(level.results[point]);
+  }
+  const double order = highest_order(what, levels.front().level.model);
+  return {.what = std::move(what),
+          .levels = levels,
+          .convergence = convergence_of(results, order),
+          .point = point};
+}
+
+bool converges(const Refinement& refinement) {
+  const auto& convergence = refinement.convergence;
+  return convergence.has_one_mode &&
+         std::all_of(convergence.outputs.begin(), convergence.outputs.end(), is_settled);
+}
+
+void print_refinement(std::ostream& out, const Refinement& refinement) {
+  print_outputs(out, refinement);
+  print_modes(out, refinement);
+  print_verdict(out, refinement);
+}
+
+void print_modes(std::ostream& out, const Refinement& refinement) {
+  out << "\nmode, ripples merged\n";
+  for (std::size_t i = 0; i < refinement.levels.size(); ++i) {
+    const auto& result = refinement.result(i);
+    out << fmt::format("  {:<8} {}  ({} us steps)\n", refinement.levels[i].level.name,
+                       result.major_mode, readable_number(result.solver.dt_s * kMicro, 3));
+  }
+}
+
+ordered_json json_of(const Refinement& refinement) {
+  ordered_json levels = ordered_json::array();
+  for (std::size_t i = 0; i < refinement.levels.size(); ++i) {
+    levels.push_back(json_of_level(refinement, i));
+  }
+  ordered_json outputs = ordered_json::array();
+  for (const auto& output : refinement.convergence.outputs) {
+    outputs.push_back(json_of(output));
+  }
+  ordered_json changes = ordered_json::array();
+  for (const auto& change : refinement.convergence.changes) {
+    const auto& [kind, t0_s, t1_s, in_finer] = change.change;
+    changes.push_back({{"finer", refinement.levels[change.finer].level.name},
+                       {"coarser", refinement.levels[change.finer - 1].level.name},
+                       {"kind", name_of(kind)},
+                       {"t0_s", t0_s},
+                       {"t1_s", t1_s},
+                       {"in_finer", in_finer}});
+  }
+  return {{"refined", refinement.what},
+          {"converges", converges(refinement)},
+          {"levels", levels},
+          {"outputs", outputs},
+          {"changes", changes}};
+}
+
+void print_errors(std::ostream& out, const Refinement& refinement) {
+  protocol::QueryReply table;
+  table.add_columns("output");
+  for (const auto& level : refinement.levels) {
+    table.add_columns(level.level.name + " [%]");
+  }
+  for (const char* column : {"finest", "limit", "order"}) {
+    table.add_columns(column);
+  }
+  for (const auto& output : refinement.convergence.outputs) {
+    if (!decides_the_mesh(output)) {
+      continue;
+    }
+    auto& row = *table.add_rows();
+    const auto shown = shown_column(output.name);
+    add_value(row, shown.heading);
+    for (const auto& value : output.values) {
+      const auto error = relative_error(value, output.extrapolation.limit);
+      add_value(row, error   ? fixed_number(kPercent * *error, 3)
+                     : value ? std::string("-")
+                             : std::string("other mode"));
+    }
+    add_value(row, output.finest() * shown.per_unit);
+    add_value(row, output.extrapolation.limit * shown.per_unit);
+    add_rough(row, output.extrapolation.order);
+  }
+  print(out, table, Format::kTable);
+}
+
+std::optional<std::size_t> coarsest_within(const Refinement& refinement, double tolerance) {
+  const auto& outputs = refinement.convergence.outputs;
+  const auto is_within = [&](std::size_t level) {
+    return std::all_of(outputs.begin(), outputs.end(), [&](const OutputConvergence& output) {
+      if (!decides_the_mesh(output)) {
+        return true;
+      }
+      const auto& value = output.values[level];
+      return value && std::abs(*value - output.extrapolation.limit) <=
+                          tolerance * std::abs(output.extrapolation.limit);
+    });
+  };
+  std::optional<std::size_t> coarsest;
+  for (std::size_t level = refinement.levels.size(); level-- > 0 && is_within(level);) {
+    coarsest = level;
+  }
+  return coarsest;
+}
+
+}  // namespace oblique::client

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include "client/output/printer.h"
+#include "client/paper/published_table.h"
+#include "proto/oblique.pb.h"
+#include "worker/solver/model/case_result.h"
+#include "worker/solver/model/parameters.h"
+
+namespace oblique::client {
+
+/// What we have for one published case, ripples merged.
+struct OwnCase {
+  std::vector<double> fn_N;      ///< F_n at each major peak
+  std::vector<double> ft_N;      ///< largest |F_t| around each major peak
+  std::vector<double> phases_s;  ///< how long each lasts
+  double stick_total_s;
+  std::string major_mode;
+};
+
+/// What a comparison needs of a result.
+OwnCase own_case(const solver::CaseResult& result);
+
+enum class Quantity { kFn, kFt, kPhase, kStick };
+
+/// One published number beside ours, in the unit that the paper prints (kN or ms).
+struct Difference {
+  std::size_t case_index;
+  Quantity quantity;
+  std::size_t index;  ///< which peak or phase, from 0
+  double published;
+  std::optional<double> ours;  ///< nothing where we have no such peak, phase or case
+
+  /// (ours - published) / published, in percent.
+  std::optional<double> percent() const;
+};
+
+/// Every counted published number beside ours; `own` has one entry a case.
+std::vector<Difference> compare(const PublishedTable& table,
+                                const std::vector<std::optional<OwnCase>>& own);
+
+/// Root mean square and largest size of the differences [%].
+struct DifferenceSummary {
+  std::size_t counted = 0;
+  std::size_t missing = 0;
+  double rms_percent = 0.0;
+  double largest_percent = 0.0;
+  std::optional<Difference> largest;
+};
+DifferenceSummary summary_of(const std::vector<Difference>& differences);
+
+/// Solves the cases with `model`. Throws solver::SolveError when one cannot be solved.
+std::vector<std::optional<OwnCase>> solved_cases(const PublishedTable& table,
+                                                 const solver::ModelParameters& model);
+
+/// Reads the cases from rows of `runs` with the columns point, H, mu, e, peaks, phases,
+/// stick_total_s and major_mode. A case without a solved point is nothing, and phases from the
+/// first ripple on are left out. Throws std::runtime_error when a case has several points.
+std::vector<std::optional<OwnCase>> own_cases(const PublishedTable& table,
+                                              const protocol::QueryReply& rows);
+
+/// Prints the tables for people: forces, durations, stick times, modes and where they are not the
+/// published ones, summary, misprints. `format` is kTable or kMarkdown.
+void print_comparison(std::ostream& out, Format format, const PublishedTable& table,
+                      const std::vector<std::optional<OwnCase>>& own);
+
+/// Of these, peaks and modes alone.
+void print_modes(std::ostream& out, Format format, const PublishedTable& table,
+                 const std::vector<std::optional<OwnCase>>& own);
+
+/// The differences as rows, one a published number, for CSV and JSON.
+protocol::QueryReply rows_of(const PublishedTable& table,
+                             const std::vector<Difference>& differences);
+
+}  // namespace oblique::client

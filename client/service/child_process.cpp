@@ -1,0 +1,189 @@
+#include "client/service/child_process.h"
+
+#include <fcntl.h>
+#include <spawn.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <csignal>
+#include <cstdlib>
+#include <cstring>
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <utility>
+
+namespace oblique::client {
+namespace {
+
+std::string reason(int error_number) {
+  return std::strerror(error_number);
+}
+
+// A file without a name: it vanishes with its last descriptor, whatever ends us.
+Descriptor nameless_file() {
+  auto path = (std::filesystem::temp_directory_path() / "oblique-XXXXXX").string();
+  Descriptor file(mkostemp(path.data(), O_CLOEXEC | O_APPEND));
+  if (file.number() < 0) {
+    throw ProcessError("cannot make a file in " + std::filesystem::temp_directory_path().string() +
+                       ": " + reason(errno));
+  }
+  unlink(path.c_str());
+  return file;
+}
+
+// What a child starts with: the descriptors it gets, no blocked signals, its own process group.
+class SpawnPlan {
+ public:
+  SpawnPlan(const ChildSettings& settings, int errors) {
+    posix_spawn_file_actions_init(&actions_);
+    posix_spawn_file_actions_addopen(&actions_, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+    if (errors >= 0) {
+      posix_spawn_file_actions_adddup2(&actions_, errors, STDERR_FILENO);
+    }
+    // Standard output is for our data alone.
+    posix_spawn_file_actions_adddup2(&actions_, STDERR_FILENO, STDOUT_FILENO);
+    if (settings.handed_over >= 0) {
+      posix_spawn_file_actions_adddup2(&actions_, settings.handed_over, ChildProcess::kHandedOver);
+    }
+    posix_spawnattr_init(&attributes_);
+    sigset_t none;
+    sigemptyset(&none);
+    posix_spawnattr_setsigmask(&attributes_, &none);
+    posix_spawnattr_setpgroup(&attributes_, 0);
+    posix_spawnattr_setflags(&attributes_, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETPGROUP);
+  }
+  ~SpawnPlan() {
+    posix_spawn_file_actions_destroy(&actions_);
+    posix_spawnattr_destroy(&attributes_);
+  }
+  SpawnPlan(const SpawnPlan&) = delete;
+  SpawnPlan& operator=(const SpawnPlan&) = delete;
+
+  const posix_spawn_file_actions_t* actions() const { return &actions_; }
+  const posix_spawnattr_t* attributes() const { return &attributes_; }
+
+ private:
+  posix_spawn_file_actions_t actions_{};
+  posix_spawnattr_t attributes_{};
+};
+
+}  // namespace
+
+Descriptor::Descriptor(Descriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
+
+Descriptor& Descriptor::operator=(Descriptor&& other) noexcept {
+  std::swap(number_, other.number_);
+  return *this;
+}
+
+void Descriptor::close() {
+  if (number_ >= 0) {
+    ::close(std::exchange(number_, -1));
+  }
+}
+
+Pipe::Pipe() {
+  std::array<int, 2> ends{};
+  if (pipe2(ends.data(), O_CLOEXEC) != 0) {
+    throw ProcessError("cannot make a pipe: " + reason(errno));
+  }
+  read = Descriptor(ends[0]);
+  write = Descriptor(ends[1]);
+}
+
+ChildProcess::ChildProcess(const ChildSettings& settings) {
+  if (!settings.show_errors) {
+    errors_ = nameless_file();
+  }
+  const SpawnPlan plan(settings, errors_.number());
+  std::vector<std::string> texts{settings.program.string()};
+  texts.insert(texts.end(), settings.arguments.begin(), settings.arguments.end());
+  std::vector<char*> arguments;
+  for (auto& text : texts) {
+    arguments.push_back(text.data());
+  }
+  arguments.push_back(nullptr);
+  const int error = posix_spawn(&pid_, settings.program.c_str(), plan.actions(), plan.attributes(),
+                                arguments.data(), environ);
+  if (error != 0) {
+    pid_ = -1;
+    throw ProcessError("cannot start " + settings.program.string() + ": " + reason(error));
+  }
+}
+
+ChildProcess::~ChildProcess() {
+  if (pid_ < 0 || !is_running()) {
+    return;
+  }
+  send(SIGKILL);
+  int status = 0;
+  while (waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
+  }
+}
+
+bool ChildProcess::is_running() {
+  if (status_) {
+    return false;
+  }
+  int status = 0;
+  if (waitpid(pid_, &status, WNOHANG) == pid_) {
+    status_ = status;
+  }
+  return !status_;
+}
+
+void ChildProcess::send(int signal) {
+  // Reaped here and nowhere else, so the number cannot have passed to another process.
+  if (is_running()) {
+    kill(pid_, signal);
+  }
+}
+
+std::string ChildProcess::ending() const {
+  if (!status_) {
+    return "is running";
+  }
+  if (WIFSIGNALED(*status_)) {
+    const int signal = WTERMSIG(*status_);
+    return "was killed by signal " + std::to_string(signal) + " (" + strsignal(signal) + ")";
+  }
+  return "ended with exit code " + std::to_string(WEXITSTATUS(*status_));
+}
+
+std::string ChildProcess::last_words() const {
+  constexpr off_t kMostBytes = 4000;
+  constexpr int kMostLines = 12;
+  struct stat about {};
+  if (errors_.number() < 0 || fstat(errors_.number(), &about) != 0) {
+    return {};
+  }
+  const off_t from = std::max<off_t>(0, about.st_size - kMostBytes);
+  std::string text(static_cast<std::size_t>(about.st_size - from), '\0');
+  const auto got = pread(errors_.number(), text.data(), text.size(), from);
+  text.resize(static_cast<std::size_t>(std::max<ssize_t>(0, got)));
+  while (!text.empty() && text.back() == '\n') {
+    text.pop_back();
+  }
+  std::size_t start = text.size();
+  for (int lines = 0; lines < kMostLines && start != std::string::npos && start > 0; ++lines) {
+    start = text.rfind('\n', start - 1);
+  }
+  return start == std::string::npos || start == 0 ? text : text.substr(start + 1);
+}
+
+std::filesystem::path sibling_program(const std::string& name) {
+  const auto own = std::filesystem::read_symlink("/proc/self/exe");
+  auto program = own.parent_path() / name;
+  if (access(program.c_str(), X_OK) != 0) {
+    throw ProcessError("cannot find " + program.string() +
+                       ": the programs oblique, oblique-server and oblique-worker must lie in one "
+                       "folder");
+  }
+  return program;
+}
+
+}  // namespace oblique::client

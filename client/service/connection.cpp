@@ -1,0 +1,251 @@
+#include "client/service/connection.h"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "proto/address.h"
+#include "proto/frames.h"
+#include "proto/socket/socket.h"
+#include "worker/solver/model/number.h"
+
+namespace oblique::client {
+namespace {
+
+/// A server that says nothing for so long is away.
+constexpr std::chrono::seconds kSilence{3};
+
+std::string seconds_of(std::chrono::milliseconds time) {
+  return solver::exact_number(static_cast<double>(time.count()) / 1000.0) + " s";
+}
+
+/// Where the page begins that follows the one after `asked`; 0: there is none. A page that does not
+/// come later than the one before would never end.
+std::uint64_t next_page(std::uint64_t asked, std::uint64_t told) {
+  return told > asked ? told : 0;
+}
+
+}  // namespace
+
+Connection::Connection(ConnectionSettings settings, KeepWaiting keep_waiting)
+    : settings_(std::move(settings)),
+      keep_waiting_(std::move(keep_waiting)),
+      socket_(context_, zmq::socket_type::dealer),
+      monitor_(context_, socket_) {
+  // Nothing is queued for a server that is not there, which would get every copy when it is back.
+  socket_.set(zmq::sockopt::immediate, true);
+  // A request that was not sent yet must not hold up the end of the program; the embedded service
+  // may be connected to before it listens.
+  constexpr int kLinger_ms = 0;
+  constexpr int kShortestPause_ms = 20;
+  constexpr int kLongestPause_ms = 1000;
+  protocol::prepare_dealer(socket_, kLinger_ms, kShortestPause_ms, kLongestPause_ms);
+  if (const auto objection = protocol::objection_to_address(settings_.server_url);
+      !objection.empty()) {
+    throw solver::InputError("server = \"" + settings_.server_url + "\" is not an address: " +
+                             objection + ", as in " + ConnectionSettings().server_url);
+  }
+  try {
+    socket_.connect(settings_.server_url);
+  } catch (const zmq::error_t&) {
+    throw solver::InputError("server = \"" + settings_.server_url +
+                             "\" is not an address: write tcp://HOST:PORT, as " +
+                             ConnectionSettings().server_url);
+  }
+}
+
+bool Connection::is_due(const Outstanding& outstanding) {
+  const auto connections = monitor_.connections();
+  // What an earlier connection took may have been lost with it.
+  return connections > 0 && (outstanding.sent_over != connections ||
+                             Clock::now() - outstanding.sent > outstanding.resend_after);
+}
+
+void Connection::send_if_due(Outstanding& outstanding) {
+  const auto connections = monitor_.connections();
+  if (!is_due(outstanding) ||
+      !socket_.send(zmq::buffer(outstanding.frame), zmq::send_flags::dontwait)) {
+    return;
+  }
+  if (outstanding.sent_over == connections) {
+    constexpr std::chrono::milliseconds kLongestPause{60'000};
+    outstanding.resend_after = std::min(2 * outstanding.resend_after, kLongestPause);
+  }
+  outstanding.sent_over = connections;
+  outstanding.sent = Clock::now();
+}
+
+void Connection::wait_a_slice(bool to_send) {
+  constexpr std::chrono::milliseconds kSlice{50};
+  if (keep_waiting_ && !keep_waiting_()) {
+    throw Interrupted("stopped while waiting for the server");
+  }
+  const int events = ZMQ_POLLIN | (to_send ? ZMQ_POLLOUT : 0);
+  // The monitor first: the socket, looked at after it, then knows of the same connection.
+  std::array<zmq::pollitem_t, 2> items{{{monitor_.handle(), 0, ZMQ_POLLIN, 0},
+                                        {socket_.handle(), 0, static_cast<short>(events), 0}}};
+  try {
+    zmq::poll(items, kSlice);
+  } catch (const zmq::error_t& error) {
+    if (error.num() != EINTR) {
+      throw;
+    }
+  }
+}
+
+std::optional<protocol::ClientReply> Connection::received(std::uint64_t request_id) {
+  zmq::message_t answer;
+  if (!socket_.recv(answer, zmq::recv_flags::dontwait)) {
+    return std::nullopt;
+  }
+  protocol::ClientReply reply;
+  if (!protocol::decode(answer.to_string_view(), reply)) {
+    throw ConnectionError("what answers at " + settings_.server_url +
+                          " does not speak as oblique-server does: check the address and port");
+  }
+  // An answer that came after its time was given up, or a second one, belongs to nobody.
+  const bool is_word_of_it =
+      reply.has_still_working() && reply.still_working().request_id() == request_id;
+  if (reply.request_id() != request_id && reply.request_id() != 0 && !is_word_of_it) {
+    return std::nullopt;
+  }
+  return reply;
+}
+
+void Connection::note_word(Outstanding& outstanding, const protocol::StillWorking& word,
+                           bool counts_as_answer) {
+  const auto now = Clock::now();
+  outstanding.word = now;
+  outstanding.runs = word.runs();
+  outstanding.sent = now;  // it has arrived
+  if (counts_as_answer) {
+    outstanding.heard = now;
+  }
+}
+
+protocol::ClientReply Connection::answer_to(const protocol::ClientRequest& request,
+                                            Outstanding outstanding, const Tell& tell) {
+  const std::chrono::milliseconds timeout(settings_.timeout_ms);
+  bool told = false;
+  while (tell || Clock::now() - outstanding.heard < timeout) {
+    send_if_due(outstanding);
+    wait_a_slice(is_due(outstanding));
+    if (auto reply = received(request.request_id())) {
+      if (std::exchange(told, false)) {
+        tell(settings_.server_url + " answers again");
+      }
+      if (!reply->has_still_working()) {
+        return *std::move(reply);
+      }
+      note_word(outstanding, reply->still_working(), tell != nullptr);
+    }
+    if (tell && !told && Clock::now() - outstanding.heard > kSilence) {
+      tell("no answer from " + settings_.server_url + " for " + seconds_of(kSilence) +
+           ": waiting until it is back");
+      told = true;
+    }
+  }
+  if (outstanding.runs && Clock::now() - outstanding.word < kSilence) {
+    throw ConnectionError(
+        "the query took too long: after " + seconds_of(timeout) + " " + settings_.server_url +
+        (*outstanding.runs ? " works on it still" : " is busy with the queries of others still") +
+        ". Narrow it, as with WHERE or LIMIT, or give it more time with "
+        "--timeout SECONDS");
+  }
+  throw ConnectionError("no answer from " + settings_.server_url + " within " +
+                        seconds_of(timeout) +
+                        ": is a server running there? Start one with `oblique-server`, or say "
+                        "where it is with --server URL or OBLIQUE_SERVER");
+}
+
+protocol::ClientReply Connection::call(protocol::ClientRequest request, const Tell& tell) {
+  request.set_protocol_version(protocol::kProtocolVersion);
+  request.set_request_id(++last_request_id_);
+  auto frame = protocol::encode(request);
+  if (frame.size() > protocol::kMaxFrameBytes) {
+    throw ConnectionError("the request has " + std::to_string(frame.size()) +
+                          " bytes, more than the " + std::to_string(protocol::kMaxFrameBytes) +
+                          " that a server takes: write long lists of values as ranges");
+  }
+  auto reply = answer_to(request,
+                         {.frame = std::move(frame),
+                          .heard = Clock::now(),
+                          .resend_after = std::chrono::milliseconds(settings_.resend_after_ms)},
+                         tell);
+  if (reply.has_error() && reply.error().wrong_request()) {
+    throw solver::InputError(reply.error().message());
+  }
+  if (reply.has_error()) {
+    throw ServerError(reply.error().message());
+  }
+  // A reply has the number of its request's kind. Other programs' frames may be read as anything.
+  if (static_cast<int>(reply.kind_case()) != static_cast<int>(request.kind_case())) {
+    throw ConnectionError("what answers at " + settings_.server_url +
+                          " does not speak as oblique-server does to clients: check the "
+                          "address and port (" +
+                          ConnectionSettings().server_url +
+                          " is for clients; the port for workers is another one)");
+  }
+  return reply;
+}
+
+protocol::SubmitReply Connection::submit(const Study& study, const StudyTerms& terms) {
+  protocol::ClientRequest request;
+  request.mutable_submit()->set_name(study.name);
+  *request.mutable_submit()->mutable_recipe() = study.recipe;
+  if (terms.priority) {
+    request.mutable_submit()->set_priority(*terms.priority);
+  }
+  if (terms.weight) {
+    request.mutable_submit()->set_weight(*terms.weight);
+  }
+  if (terms.mixes_versions) {
+    request.mutable_submit()->set_mixes_versions(true);
+  }
+  return call(std::move(request)).submit();
+}
+
+protocol::StatusReply Connection::status(const std::string& study, const Tell& tell) {
+  protocol::StatusReply all;
+  std::uint64_t after = 0;
+  do {
+    protocol::ClientRequest request;
+    request.mutable_status()->set_study(study);
+    request.mutable_status()->set_after_study_id(after);
+    const protocol::StatusReply page = call(std::move(request), tell).status();
+    after = next_page(after, page.next_after());
+    all.MergeFrom(page);
+  } while (after != 0);
+  return all;
+}
+
+protocol::WorkersReply Connection::workers() {
+  protocol::WorkersReply all;
+  std::uint64_t after = 0;
+  do {
+    protocol::ClientRequest request;
+    request.mutable_workers()->set_after_worker_id(after);
+    const protocol::WorkersReply page = call(std::move(request)).workers();
+    after = next_page(after, page.next_after());
+    all.MergeFrom(page);
+  } while (after != 0);
+  return all;
+}
+
+protocol::ChangeReply Connection::change(const std::string& study, protocol::StudyChange change) {
+  protocol::ClientRequest request;
+  request.mutable_change()->set_study(study);
+  request.mutable_change()->set_change(change);
+  return call(std::move(request)).change();
+}
+
+protocol::QueryReply Connection::query(const std::string& sql, std::uint64_t max_rows,
+                                       const Tell& tell) {
+  protocol::ClientRequest request;
+  request.mutable_query()->set_sql(sql);
+  request.mutable_query()->set_max_rows(max_rows);
+  request.mutable_query()->set_time_limit_ms(static_cast<std::uint64_t>(settings_.timeout_ms));
+  return call(std::move(request), tell).query();
+}
+
+}  // namespace oblique::client

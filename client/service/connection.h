@@ -1,0 +1,125 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+#include <zmq.hpp>
+
+#include "client/service/socket_monitor.h"
+#include "client/study/axis.h"
+#include "proto/oblique.pb.h"
+
+namespace oblique::client {
+
+/// Where the server is, and how long to wait for it.
+struct ConnectionSettings {
+  std::string server_url{"tcp://127.0.0.1:7600"};
+  std::int64_t timeout_ms = 10'000;  ///< for one answer
+  /// A request of which nothing was heard for so long is sent again over the same connection, and
+  /// again after twice as long.
+  std::int64_t resend_after_ms = 3'000;
+};
+
+/// The server answered that it cannot or will not; the message is its own.
+class ServerError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// No answer that can be read. The message says what to do.
+class ConnectionError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// The waiting was ended by `keep_waiting`.
+class Interrupted : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// How a study uses the workers of its server.
+struct StudyTerms {
+  // What is not given stays as it is for a study that the server knows.
+  std::optional<std::int32_t> priority = {};  ///< studies of a higher one come first
+  std::optional<double> weight = {};          ///< share of the workers among those of one priority
+  bool mixes_versions = false;                ///< workers of any solver version take part
+};
+
+/// Takes in a sentence for people.
+using Tell = std::function<void(const std::string& sentence)>;
+
+/// Asks one server, one question at a time. Every call sends one ClientRequest and waits for the
+/// reply with its number; each throws ServerError, ConnectionError or Interrupted, and
+/// solver::InputError where the server says that the fault is in what was asked.
+///
+/// Requests are idempotent. One that a server may have taken with it when it died is sent again, as
+/// soon as a server is there again; so is one of which nothing is heard. Of several answers the
+/// first counts.
+///
+/// A call that is given a `tell` does not end for want of an answer: it says once that the server
+/// is silent, and once that it answers again.
+class Connection {
+ public:
+  /// Asked many times a second while waiting; false ends the wait. It may throw.
+  using KeepWaiting = std::function<bool()>;
+
+  /// Connects in the background. Throws solver::InputError for an address that is none.
+  explicit Connection(ConnectionSettings settings, KeepWaiting keep_waiting = {});
+
+  const std::string& url() const { return settings_.server_url; }
+
+  protocol::SubmitReply submit(const Study& study, const StudyTerms& terms = {});
+  /// The study of that name, or all of them when it is empty, however many pages they fill.
+  protocol::StatusReply status(const std::string& study, const Tell& tell = {});
+  /// All workers, likewise.
+  protocol::WorkersReply workers();
+  protocol::ChangeReply change(const std::string& study, protocol::StudyChange change);
+  /// Runs one statement that only reads, for no longer than an answer is waited for; `max_rows` 0
+  /// leaves that limit to the server.
+  protocol::QueryReply query(const std::string& sql, std::uint64_t max_rows = 0,
+                             const Tell& tell = {});
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  /// A request that is not answered yet.
+  struct Outstanding {
+    std::string frame;
+    Clock::time_point heard;                 ///< when the server last gave a sign, or the start
+    std::chrono::milliseconds resend_after;  ///< since `sent`
+    Clock::time_point sent = {};             ///< when it was last sent
+    std::uint64_t sent_over = 0;             ///< connection that took it; 0: none has
+    Clock::time_point word = {};             ///< when the server last said that it has it
+    std::optional<bool> runs = {};           ///< what it said: the query runs, or waits
+  };
+
+  protocol::ClientReply call(protocol::ClientRequest request, const Tell& tell = {});
+  protocol::ClientReply answer_to(const protocol::ClientRequest& request, Outstanding outstanding,
+                                  const Tell& tell);
+  /// Whether to send the request now, for the first time or once more.
+  bool is_due(const Outstanding& outstanding);
+  /// Sends it if that is due and a connection takes it.
+  void send_if_due(Outstanding& outstanding);
+  /// Waits for the next frame, a connection, or the end of a slice of time.
+  void wait_a_slice(bool to_send);
+  /// The server has the query and works on it. For a call that waits for ever that is sign enough.
+  static void note_word(Outstanding& outstanding, const protocol::StillWorking& word,
+                        bool counts_as_answer);
+  /// The next frame from the server, if it is an answer to request `request_id` or says that the
+  /// server works on it still.
+  std::optional<protocol::ClientReply> received(std::uint64_t request_id);
+
+  ConnectionSettings settings_;
+  KeepWaiting keep_waiting_;
+  zmq::context_t context_;
+  zmq::socket_t socket_;
+  SocketMonitor monitor_;
+  std::uint64_t last_request_id_ = 0;
+};
+
+}  // namespace oblique::client

@@ -1,0 +1,172 @@
+#include "client/service/embedded_service.h"
+
+#include <poll.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <iterator>
+#include <thread>
+
+#include <nlohmann/json.hpp>
+
+#include "client/service/connection.h"
+
+namespace oblique::client {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// A server with a large database first reads what is done; more than this is no start.
+constexpr std::chrono::seconds kReadyWithin{60};
+// A worker ends its point first, which on fine meshes takes long; the server commits.
+constexpr std::chrono::seconds kStopWithin{5};
+
+std::string with_last_words(const std::string& what, const ChildProcess& child) {
+  const auto words = child.last_words();
+  return words.empty() ? what : what + "; its last words:\n" + words;
+}
+
+ChildSettings server_settings(const ServiceSettings& settings, int ready) {
+  ChildSettings child{
+      .program = sibling_program("oblique-server"),
+      .arguments = {"--db", settings.database.string(), "--worker-port", "0", "--client-port", "0",
+                    "--ready-fd", std::to_string(ChildProcess::kHandedOver), "--stop-with-parent"},
+      .show_errors = settings.verbose,
+      .handed_over = ready};
+  if (settings.allow_network_disk) {
+    child.arguments.emplace_back("--allow-network-disk");
+  }
+  return child;
+}
+
+// Waits until none of `children` runs, and kills what still does at the end of the time.
+void end_all(const std::vector<ChildProcess*>& children) {
+  for (auto* child : children) {
+    child->send(SIGTERM);
+  }
+  const auto deadline = Clock::now() + kStopWithin;
+  const auto runs = [](ChildProcess* child) { return child->is_running(); };
+  while (std::any_of(children.begin(), children.end(), runs)) {
+    if (Clock::now() > deadline) {
+      for (auto* child : children) {
+        child->send(SIGKILL);
+      }
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+}
+
+// The line that the server writes once it listens; empty when it closes the pipe without one.
+std::string read_ready_line(const Descriptor& ready, ChildProcess& server, StopSignal& stop) {
+  std::string line;
+  const auto deadline = Clock::now() + kReadyWithin;
+  while (line.find('\n') == std::string::npos) {
+    if (stop.requested()) {
+      throw Interrupted("stopped before the server was ready");
+    }
+    if (Clock::now() > deadline) {
+      throw ProcessError(with_last_words("the server was not ready in time", server));
+    }
+    pollfd waited{ready.number(), POLLIN, 0};
+    constexpr int kSlice_ms = 50;
+    if (poll(&waited, 1, kSlice_ms) <= 0) {
+      continue;
+    }
+    std::array<char, 512> bytes{};
+    const auto got = read(ready.number(), bytes.data(), bytes.size());
+    if (got == 0) {
+      return {};
+    }
+    if (got > 0) {
+      line.append(bytes.data(), static_cast<std::size_t>(got));
+    } else if (errno != EINTR) {
+      return {};
+    }
+  }
+  return line;
+}
+
+/// Threads of each worker, so that all together use the cores of this machine.
+unsigned threads_each(int workers) {
+  return std::max(1U, std::thread::hardware_concurrency() / static_cast<unsigned>(workers));
+}
+
+}  // namespace
+
+EmbeddedService::EmbeddedService(const ServiceSettings& settings, StopSignal& stop) {
+  const auto worker_program = sibling_program("oblique-worker");
+  Pipe ready;
+  server_ = std::make_unique<ChildProcess>(server_settings(settings, ready.write.number()));
+  // Only the server holds it now, so its end shows on ours.
+  ready.write.close();
+  wait_until_ready(ready.read, stop);
+  for (int i = 0; i < settings.workers; ++i) {
+    workers_.push_back(std::make_unique<ChildProcess>(ChildSettings{
+        .program = worker_program,
+        .arguments = {"--server", worker_url_, "--stop-with-parent", std::to_string(getpid()),
+                      "--threads", std::to_string(threads_each(settings.workers))},
+        .show_errors = settings.verbose}));
+  }
+}
+
+EmbeddedService::~EmbeddedService() {
+  stop();
+}
+
+void EmbeddedService::wait_until_ready(const Descriptor& ready, StopSignal& stop) {
+  const auto line = read_ready_line(ready, *server_, stop);
+  const auto urls = nlohmann::json::parse(line, nullptr, false);
+  if (urls.is_object() && urls.contains("client") && urls.contains("worker") &&
+      urls["client"].is_string() && urls["worker"].is_string()) {
+    client_url_ = urls["client"];
+    worker_url_ = urls["worker"];
+    return;
+  }
+  // It closed the pipe because it ends: let it, so that its last words are whole.
+  const auto deadline = Clock::now() + kStopWithin;
+  while (server_->is_running() && Clock::now() < deadline) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  throw ProcessError(
+      with_last_words("the server did not start: it " + server_->ending(), *server_));
+}
+
+void EmbeddedService::check() {
+  if (!server_->is_running()) {
+    throw ProcessError(with_last_words("the server " + server_->ending(), *server_));
+  }
+  const bool any = std::any_of(workers_.begin(), workers_.end(),
+                               [](const auto& worker) { return worker->is_running(); });
+  if (!any) {
+    throw ProcessError(with_last_words(
+        "no worker is left: the last one " + workers_.back()->ending(), *workers_.back()));
+  }
+}
+
+std::string EmbeddedService::news() {
+  std::string text;
+  for (const auto& worker : workers_) {
+    if (!worker->is_running() && told_.insert(worker->pid()).second) {
+      text += text.empty() ? "" : "\n";
+      text += with_last_words(
+          "a worker (process " + std::to_string(worker->pid()) + ") " + worker->ending(), *worker);
+    }
+  }
+  return text;
+}
+
+void EmbeddedService::stop() {
+  std::vector<ChildProcess*> workers;
+  std::transform(workers_.begin(), workers_.end(), std::back_inserter(workers),
+                 [](const auto& worker) { return worker.get(); });
+  end_all(workers);
+  if (server_) {
+    end_all({server_.get()});
+  }
+}
+
+}  // namespace oblique::client

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "client/service/child_process.h"
+#include "client/service/stop_signal.h"
+
+namespace oblique::client {
+
+/// A server and workers on this machine, for as long as this object lives.
+struct ServiceSettings {
+  std::filesystem::path database;
+  int workers = 1;                  ///< processes, which share the cores
+  bool allow_network_disk = false;  ///< the database may lie on a network file system
+  bool verbose = false;             ///< what server and workers say goes to our standard error
+};
+
+/// Starts `oblique-server` on loopback, at ports that the system picks, and workers that ask it
+/// for work; ends them all when destroyed. The same programs and messages as on many machines.
+class EmbeddedService {
+ public:
+  /// Waits until the server listens, then starts the workers. Throws ProcessError with the last
+  /// words of what failed, Interrupted when `stop` is requested meanwhile.
+  EmbeddedService(const ServiceSettings& settings, StopSignal& stop);
+  ~EmbeddedService();
+  EmbeddedService(const EmbeddedService&) = delete;
+  EmbeddedService& operator=(const EmbeddedService&) = delete;
+
+  /// Where clients connect.
+  const std::string& client_url() const { return client_url_; }
+
+  /// Throws ProcessError when the server or the last worker has ended.
+  void check();
+
+  /// What a worker that ended said, each told once; empty when none has ended since.
+  std::string news();
+
+  /// Asks all to end, workers first so that the server can take in what they have, and kills what
+  /// does not end in time. Nothing is left behind.
+  void stop();
+
+ private:
+  void wait_until_ready(const Descriptor& ready, StopSignal& stop);
+
+  std::unique_ptr<ChildProcess> server_;
+  std::vector<std::unique_ptr<ChildProcess>> workers_;
+  std::set<pid_t> told_;  ///< workers whose end `news` has told
+  std::string client_url_;
+  std::string worker_url_;
+};
+
+}  // namespace oblique::client

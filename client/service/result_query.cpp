@@ -1,0 +1,66 @@
+#include "client/service/result_query.h"
+
+#include <vector>
+
+#include "client/output/columns.h"
+#include "client/sql/sql_expression.h"
+#include "worker/solver/model/errors.h"
+
+namespace oblique::client {
+namespace {
+
+constexpr const char* kWhere = "--where";
+constexpr const char* kSelect = "--select";
+constexpr const char* kOrder = "--order";
+
+}  // namespace
+
+void check(const ResultQuery& query) {
+  if (query.limit && *query.limit < 0) {
+    throw solver::InputError("--limit " + std::to_string(*query.limit) +
+                             " is not allowed: it must be >= 0");
+  }
+  check_sql_part(kSelect, query.select, SqlPart::kColumns);
+  if (!query.where.empty()) {
+    check_sql_part(kWhere, query.where, SqlPart::kCondition);
+  }
+  if (!query.order.empty()) {
+    check_sql_part(kOrder, query.order, SqlPart::kOrder);
+  }
+}
+
+void check_columns(const ResultQuery& query, Source& source) {
+  const auto runs = source.query("SELECT * FROM " + rows_of_queries() + " LIMIT 0");
+  const std::vector<std::string> columns(runs.columns().begin(), runs.columns().end());
+  const auto names_given = names_given_in(query.select);
+  check_case_of_columns(kSelect, query.select, columns, names_given);
+  check_case_of_columns(kWhere, query.where, columns, names_given);
+  check_case_of_columns(kOrder, query.order, columns, names_given);
+}
+
+std::string statement_of(const ResultQuery& query, std::int64_t skipped) {
+  // The study is chosen inside, where no --where can widen it.
+  std::string sql = "SELECT " + query.select + " FROM (SELECT * FROM " + rows_of_queries() +
+                    " WHERE study = " + sql_text(query.study) + ")";
+  sql += query.where.empty() ? "" : " WHERE (" + query.where + ")";
+  sql += query.order.empty() ? "" : " ORDER BY " + query.order;
+  // SQL wants a limit before an offset; -1 is none.
+  const std::int64_t limit = query.limit ? *query.limit - skipped : -1;
+  sql += " LIMIT " + std::to_string(limit) + " OFFSET " + std::to_string(skipped);
+  return sql;
+}
+
+protocol::QueryReply all_rows(Source& source, const ResultQuery& query, bool at_rest) {
+  auto rows = source.query(statement_of(query, 0));
+  while (rows.truncated() && at_rest) {
+    const auto more = source.query(statement_of(query, rows.rows_size()));
+    if (more.rows().empty()) {
+      break;
+    }
+    rows.mutable_rows()->MergeFrom(more.rows());
+    rows.set_truncated(more.truncated());
+  }
+  return rows;
+}
+
+}  // namespace oblique::client

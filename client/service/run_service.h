@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include <CLI/CLI.hpp>
+
+#include "client/service/connection.h"
+#include "client/service/embedded_service.h"
+#include "client/service/source.h"
+#include "client/service/stop_signal.h"
+#include "client/study/axis.h"
+#include "proto/oblique.pb.h"
+
+namespace oblique::client {
+
+/// How `run` runs a study, and `paper` its cases.
+struct RunSettings {
+  ServiceSettings service{.database = DatabaseSettings().file};
+  StudyTerms terms;
+  std::int64_t rows = 30;  ///< most rows of results asked for at the end
+};
+
+/// Adds --workers and --verbose. `settings` must live as long as `verb`.
+void add_worker_flags(CLI::App& verb, RunSettings& settings);
+
+/// Throws solver::InputError, naming the flag and what is allowed, for a number of workers or rows
+/// that cannot be.
+void check_settings(const RunSettings& settings);
+
+/// How a study ended.
+struct RunEnd {
+  protocol::StudyStatus status;
+  protocol::QueryReply rows;  ///< the first results, a few columns
+  int exit_code;              ///< kDone when every point is solved
+};
+
+/// Starts server and workers here, submits the study, shows its progress and waits for its end;
+/// nothing is left running. Nothing when `stop` is requested; what to do next is told then. Throws
+/// ProcessError when server or workers end too soon, ServerError when the study is refused.
+std::optional<RunEnd> run_study(const Study& study, const RunSettings& settings, StopSignal& stop);
+
+}  // namespace oblique::client

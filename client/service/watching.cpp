@@ -1,0 +1,117 @@
+#include "client/service/watching.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <iostream>
+
+#include "client/output/printer.h"
+#include "client/output/progress.h"
+#include "client/service/watch_teller.h"
+#include "proto/program/exit_code.h"
+#include "proto/text.h"
+
+namespace oblique::client {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using Seconds = std::chrono::duration<double>;
+
+// A short study is seen to end at once; a long one is not asked after needlessly.
+Seconds pause_after(Seconds elapsed) {
+  constexpr Seconds kShortest{0.004};
+  constexpr Seconds kLongest{0.5};
+  return std::clamp(elapsed / 40, kShortest, kLongest);
+}
+
+void tell_failures(const protocol::StudyStatus& status,
+                   const std::function<protocol::QueryReply(const std::string&)>& query) {
+  std::cerr << status.failed() << " of " << status.points() << " points failed:\n";
+  const auto reasons = query(
+      "SELECT error, count(*), min(point) FROM runs WHERE study = " + sql_text(status.name()) +
+      " AND status = 'failed' GROUP BY error ORDER BY count(*) DESC LIMIT 10");
+  for (const auto& row : reasons.rows()) {
+    tell_line("  " + std::to_string(row.values(1).integer()) + " x " + row.values(0).text() +
+              " (first at point " + std::to_string(row.values(2).integer()) + ")");
+  }
+}
+
+}  // namespace
+
+void tell_line(const std::string& sentence) {
+  std::cerr << protocol::visible(sentence) << '\n';
+}
+
+protocol::StudyStatus watch_study(const AskStatus& ask, StopSignal& stop) {
+  Progress progress(std::cerr, isatty(STDERR_FILENO) == 1);
+  const Tell tell = [&progress](const std::string& sentence) {
+    progress.finish();
+    tell_line(sentence);
+  };
+  const auto start = Clock::now();
+  WatchTeller teller;
+  for (;;) {
+    auto status = ask(tell);
+    const Seconds elapsed = Clock::now() - start;
+    const std::uint64_t settled = status.solved() + status.failed();
+    progress.update({.study = status.name(),
+                     .points = status.points(),
+                     .settled = settled,
+                     .failed = status.failed(),
+                     .elapsed_s = elapsed.count()});
+    if (const auto sentence = teller.update(status, elapsed); !sentence.empty()) {
+      tell(sentence);
+    }
+    const bool over =
+        (status.state() != "running" && status.state() != "paused") || settled == status.points();
+    if (over ||
+        stop.wait(std::chrono::duration_cast<std::chrono::nanoseconds>(pause_after(elapsed)))) {
+      progress.finish();
+      return status;
+    }
+  }
+}
+
+protocol::StudyStatus the_study(Source& source, const std::string& name, const Tell& tell) {
+  const auto found = source.status(name, tell);
+  if (found.size() != 1) {
+    throw std::runtime_error("there is no study called \"" + name + "\" in " + source.place());
+  }
+  return found.front();
+}
+
+int tell_end(const protocol::StudyStatus& status,
+             const std::function<protocol::QueryReply(const std::string&)>& query) {
+  if (status.failed() > 0) {
+    tell_failures(status, query);
+  }
+  if (status.state() == "cancelled") {
+    std::cerr << "The study is cancelled; oblique resume goes on with it.\n";
+  }
+  return status.solved() == status.points() ? protocol::kDone : protocol::kFailed;
+}
+
+protocol::QueryReply table_of(const std::vector<protocol::StudyStatus>& studies) {
+  protocol::QueryReply table;
+  for (const char* column : {"study", "state", "points", "solved", "failed", "leased",
+                             "points_per_s", "created_at", "priority", "weight", "waits_for"}) {
+    table.add_columns(column);
+  }
+  for (const auto& study : studies) {
+    auto& row = *table.add_rows();
+    add_value(row, study.name());
+    add_value(row, study.state());
+    for (const auto count : {study.points(), study.solved(), study.failed(), study.leased()}) {
+      add_value(row, static_cast<std::int64_t>(count));
+    }
+    add_value(row, study.points_per_s());
+    add_value(row, study.created_at());
+    add_value(row, static_cast<std::int64_t>(study.priority()));
+    add_value(row, study.weight());
+    add_value(row, study.waits_for());
+  }
+  return table;
+}
+
+}  // namespace oblique::client

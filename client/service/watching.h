@@ -1,0 +1,36 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "client/service/source.h"
+#include "client/service/stop_signal.h"
+#include "proto/oblique.pb.h"
+
+namespace oblique::client {
+
+/// Where a watched study is. Given a `tell`, it may take for as long as the server is away.
+using AskStatus = std::function<protocol::StudyStatus(const Tell& tell)>;
+
+/// Asks where one study is, over and over, and shows it on standard error, with what it waits for,
+/// until it no longer runs or `stop` is requested. Asks often at first, then ever less. Throws what
+/// `ask` throws. Returns the last status.
+protocol::StudyStatus watch_study(const AskStatus& ask, StopSignal& stop);
+
+/// Writes one line to standard error, whatever is in it.
+void tell_line(const std::string& sentence);
+
+/// The one study of that name in an answer to a status question. Given a `tell`, waits for a server
+/// that is away.
+protocol::StudyStatus the_study(Source& source, const std::string& name, const Tell& tell = {});
+
+/// Tells on standard error how a watched study stands: failed points with their reasons, or that
+/// it was cancelled. Gives the exit code: kDone when every point is solved.
+int tell_end(const protocol::StudyStatus& status,
+             const std::function<protocol::QueryReply(const std::string&)>& query);
+
+/// Columns and rows of studies for `status` and `studies`.
+protocol::QueryReply table_of(const std::vector<protocol::StudyStatus>& studies);
+
+}  // namespace oblique::client

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <string_view>
+
+#include <CLI/CLI.hpp>
+
+#include "client/study/axis.h"
+#include "worker/solver/model/parameters.h"
+
+namespace oblique::client {
+
+/// What the flags of points and models said, as plain text until they are read together.
+struct PointFlags {
+  std::string preset{"paper"};
+  std::string lengths;                      ///< "0.4,0.4,0.3"; empty: by links and length
+  std::map<std::string, std::string> axes;  ///< text of each given flag, by key
+};
+
+/// Whether flags may give one value only (`solve`) or lists and ranges as well.
+enum class FlagValues { kOne, kMany };
+
+/// Adds --H, --mu, --e, --preset, --lengths and a flag for every model key. `flags` must live as
+/// long as `verb`.
+void add_point_flags(CLI::App& verb, PointFlags& flags, FlagValues values);
+
+/// The axis that a flag's text means: `0.4`, `0.4,0.6,0.8` or `0.1:2.0:40` (from:to:count, both
+/// ends in). Throws InputError naming flag, value and what is allowed.
+protocol::Axis axis_of_flag(const solver::ParameterKey& key, std::string_view text);
+
+/// The recipe of all flags together, checked as study files are. Model keys with one value shape
+/// the model; with several they are axes. Throws InputError.
+protocol::Recipe recipe_of_flags(const PointFlags& flags);
+
+/// "sweep-" and eight hexadecimal digits that depend on the recipe alone, so that the same flags
+/// name the same study again.
+std::string name_of_recipe(const protocol::Recipe& recipe);
+
+/// How a key is written as a flag: `tip_mass` is --tip-mass.
+std::string flag_of_key(std::string_view key);
+
+/// Where a study comes from: a file, or the point flags.
+struct StudyFlags {
+  std::filesystem::path file;  ///< empty: by the point flags
+  std::string name;            ///< empty: the file's name, or one made from the recipe
+  PointFlags points;
+};
+
+/// Adds the STUDY.toml argument, --name and the point flags. `flags` must live as long as `verb`.
+void add_study_flags(CLI::App& verb, StudyFlags& flags);
+
+/// Throws InputError when both a file and flags say what the points are, or none, and for what
+/// either says wrong.
+Study study_of_flags(const StudyFlags& flags);
+
+}  // namespace oblique::client

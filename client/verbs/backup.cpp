@@ -1,0 +1,60 @@
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include "client/service/source.h"
+#include "client/verbs/verbs.h"
+#include "server/care/database_care.h"
+#include "server/care/salvage.h"
+
+namespace oblique::client {
+namespace {
+
+constexpr const char* kExamples = R"(Examples:
+  oblique backup monday.db
+  oblique backup /mnt/safe/friction.db --db friction.db
+  oblique backup saved.db --db damaged.db --salvage
+
+A server may be at work on the database: the copy is the database as it was at one instant. It is
+checked, and has its name only when it is whole.)";
+
+struct BackupFlags {
+  std::string copy;
+  bool salvage = false;
+  DatabaseSettings database;
+};
+
+int save_what_can_be_read(const BackupFlags& flags) {
+  const auto saved = server::salvage(flags.database.file, flags.copy);
+  std::cerr << flags.copy << " has " << saved.studies << " studies and " << saved.results
+            << " results of " << flags.database.file << "; rows were passed over at "
+            << saved.unreadable_places
+            << " places. A server that goes on with it solves again what is missing.\n";
+  return kDone;
+}
+
+int backup(const BackupFlags& flags) {
+  if (flags.salvage) {
+    return save_what_can_be_read(flags);
+  }
+  server::back_up(flags.database.file, flags.copy);
+  std::cerr << flags.copy << " is a copy of " << flags.database.file << ".\n";
+  return kDone;
+}
+
+}  // namespace
+
+void add_backup(CLI::App& app, Command& command) {
+  auto flags = std::make_shared<BackupFlags>();
+  auto* verb = app.add_subcommand("backup", "Copy a database, also while a server writes to it");
+  verb->footer(kExamples);
+  verb->add_option("FILE", flags->copy, "the copy; must not exist")->required()->type_name("");
+  verb->add_option("--db", flags->database.file, "the database")
+      ->type_name("FILE")
+      ->capture_default_str();
+  verb->add_flag("--salvage", flags->salvage,
+                 "the database is damaged: save every row that can still be read");
+  verb->callback([flags, &command] { command = [flags] { return backup(*flags); }; });
+}
+
+}  // namespace oblique::client

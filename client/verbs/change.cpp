@@ -1,0 +1,74 @@
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include "client/service/connection.h"
+#include "client/service/source.h"
+#include "client/verbs/verbs.h"
+#include "proto/text.h"
+
+namespace oblique::client {
+namespace {
+
+struct ChangeFlags {
+  std::string study;
+  SourceFlags source;
+};
+
+int change(const ChangeFlags& flags, protocol::StudyChange change) {
+  Connection connection(connection_settings(flags.source));
+  const auto reply = connection.change(flags.study, change);
+  const auto& status = reply.study();
+  std::cout << protocol::visible(status.name()) << ": " << protocol::visible(status.state()) << ", "
+            << status.solved() + status.failed() << " of " << status.points() << " points done";
+  if (change == protocol::STUDY_CHANGE_RETRY) {
+    std::cout << ", " << reply.retried() << " failed ones to be solved again";
+  }
+  std::cout << '\n';
+  return kDone;
+}
+
+/// A verb that asks a server to change how a study goes.
+void add_change(CLI::App& app, Command& command, const std::string& name,
+                const std::string& description, const std::string& remark,
+                protocol::StudyChange what) {
+  auto flags = std::make_shared<ChangeFlags>();
+  auto* verb = app.add_subcommand(name, description);
+  verb->footer("Examples:\n  oblique " + name + " friction\n  oblique " + name +
+               " friction --server tcp://127.0.0.1:7600\n\n" + remark);
+  verb->add_option("STUDY", flags->study, "name of the study")->required()->type_name("");
+  add_server_flags(*verb, flags->source);
+  verb->callback(
+      [flags, &command, what] { command = [flags, what] { return change(*flags, what); }; });
+}
+
+}  // namespace
+
+void add_cancel(CLI::App& app, Command& command) {
+  add_change(app, command, "cancel", "Stop solving a study",
+             "Workers drop what they have of it. What is solved stays in the database; `oblique\n"
+             "resume`, or submitting the same study again, goes on with it.",
+             protocol::STUDY_CHANGE_CANCEL);
+}
+
+void add_pause(CLI::App& app, Command& command) {
+  add_change(app, command, "pause", "Hand out no more points of a study",
+             "Points that are handed out are still solved and kept. `oblique resume` goes on.",
+             protocol::STUDY_CHANGE_PAUSE);
+}
+
+void add_resume(CLI::App& app, Command& command) {
+  add_change(app, command, "resume", "Go on with a paused or cancelled study",
+             "A study that runs or is done stays as it is.", protocol::STUDY_CHANGE_RESUME);
+}
+
+void add_retry(CLI::App& app, Command& command) {
+  add_change(
+      app, command, "retry", "Solve the failed points of a study again",
+      "Their rows are removed, and the points handed out like new ones. Points fail for a\n"
+      "reason, which `oblique query STUDY --where \"status = 'failed'\"` shows; retry once it\n"
+      "is gone.",
+      protocol::STUDY_CHANGE_RETRY);
+}
+
+}  // namespace oblique::client

@@ -1,0 +1,197 @@
+#include <algorithm>
+#include <iostream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "client/convergence/convergence.h"
+#include "client/convergence/convergence_report.h"
+#include "client/study/point_flags.h"
+#include "client/verbs/verbs.h"
+#include "proto/program/usage.h"
+#include "proto/recipe/recipe.h"
+#include "worker/solver/model/number.h"
+
+namespace oblique::client {
+namespace {
+
+constexpr const char* kExamples = R"(Examples:
+  oblique converge --H 1 --mu 0.4 --e 1
+  oblique converge --H 1 --mu 0.6 --e 0.8 --finest 16 --json
+  oblique converge --H 1 --mu 0.4 --e 1 --integrator generalized-alpha
+  oblique converge --mesh-study                     the study that the preset `converged` rests on
+
+Work grows with the cube of the mesh for the explicit integrator: the finest mesh of 32 takes about
+a minute, one of 64 about eight.)";
+
+constexpr int kStudyFinest = 64;
+// The check of the mesh itself says what a model may have.
+constexpr int kMostElements = 1024;
+
+struct ConvergeFlags {
+  PointFlags points;
+  bool mesh_study = false;
+  bool json = false;
+  int coarsest = 4;
+  int finest = 0;  // 0: not given
+  int halvings = 2;
+  double tolerance_percent = 0.5;
+};
+
+std::vector<ContactPoint> points_of(const protocol::PointTable& table) {
+  std::vector<ContactPoint> points;
+  for (std::uint64_t i = 0; i < table.size(); ++i) {
+    const auto point = table.point(i);
+    points.push_back({point.H_m, point.mu, point.e_star});
+  }
+  return points;
+}
+
+std::vector<SolvedLevel> solved(const char* what, const std::vector<Level>& levels,
+                                const std::vector<ContactPoint>& points) {
+  std::cerr << fmt::format("{}: {} levels, {} to {}\n", what, levels.size(), levels.front().name,
+                           levels.back().name);
+  return solve_levels(levels, points, [what](const SolvedLevel& level) {
+    std::cerr << fmt::format("{}: {} solved in {} s\n", what, level.level.name,
+                             solver::fixed_number(level.wall_s, 1));
+  });
+}
+
+std::string shown(const ContactPoint& point) {
+  return fmt::format("H = {} m, mu = {}, e* = {}", solver::exact_number(point.H_m),
+                     solver::exact_number(point.mu), solver::exact_number(point.e_star));
+}
+
+nlohmann::ordered_json json_of_point(const ContactPoint& point) {
+  return {{"H", point.H_m}, {"mu", point.mu}, {"e", point.e_star}};
+}
+
+int converge(const ConvergeFlags& flags, const protocol::PointTable& table) {
+  const auto points = points_of(table);
+  if (points.size() != 1) {
+    throw solver::InputError(fmt::format(
+        "the flags make {} points, and converge takes one: give one value each", points.size()));
+  }
+  constexpr int kMostHalvings = 8;
+  if (flags.halvings < 2 || flags.halvings > kMostHalvings) {
+    throw solver::InputError(fmt::format(
+        "--halvings {} is not allowed: it must be from 2 to {}, for an order needs three "
+        "steps",
+        flags.halvings, kMostHalvings));
+  }
+  constexpr int kFinest = 32;
+  const auto model = table.model(0);
+  const int finest = flags.finest == 0 ? std::max(kFinest, 4 * flags.coarsest) : flags.finest;
+  const auto meshes = mesh_levels(model, flags.coarsest, finest);
+  const auto steps = step_levels(model, points[0].e_star, flags.halvings);
+  const auto step = refinement_of("step", solved("step", steps, points), 0);
+  const auto mesh = refinement_of("mesh", solved("mesh", meshes, points), 0);
+  if (flags.json) {
+    auto json = json_of_point(points[0]);
+    json["mesh"] = json_of(mesh);
+    json["step"] = json_of(step);
+    std::cout << json.dump(2) << '\n';
+    return kDone;
+  }
+  std::cout << shown(points[0]) << "\n\nMesh: n elements a link, doubled\n\n";
+  print_refinement(std::cout, mesh);
+  std::cout << fmt::format("\nStep: steps of contact and fall, halved, on n = {}\n\n",
+                           model.elements_per_link);
+  print_refinement(std::cout, step);
+  return kDone;
+}
+
+// The smallest mesh good enough for every point.
+std::optional<std::size_t> choice_of(const std::vector<Refinement>& refinements, double tolerance) {
+  std::size_t chosen = 0;
+  for (const auto& refinement : refinements) {
+    const auto level = coarsest_within(refinement, tolerance);
+    if (!level) {
+      return std::nullopt;
+    }
+    chosen = std::max(chosen, *level);
+  }
+  return chosen;
+}
+
+int mesh_study(const ConvergeFlags& flags, const protocol::PointTable& table) {
+  if (table.models() != 1) {
+    throw solver::InputError(
+        fmt::format("the flags make {} models, and a mesh study takes one", table.models()));
+  }
+  const auto points = points_of(table);
+  const int finest = flags.finest == 0 ? kStudyFinest : flags.finest;
+  const auto levels = solved("mesh", mesh_levels(table.model(0), flags.coarsest, finest), points);
+  std::vector<Refinement> refinements;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    refinements.push_back(refinement_of("mesh", levels, i));
+  }
+  const auto choice = choice_of(refinements, flags.tolerance_percent / 100.0);
+  if (flags.json) {
+    nlohmann::ordered_json json = {{"tolerance_percent", flags.tolerance_percent}};
+    json["chosen"] = choice ? nlohmann::ordered_json(levels[*choice].level.name) : nullptr;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      auto point = json_of_point(points[i]);
+      point["mesh"] = json_of(refinements[i]);
+      json["points"].push_back(point);
+    }
+    std::cout << json.dump(2) << '\n';
+    return kDone;
+  }
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    std::cout << shown(points[i]) << ": difference from the extrapolated value\n\n";
+    print_errors(std::cout, refinements[i]);
+    print_modes(std::cout, refinements[i]);
+    std::cout << '\n';
+  }
+  std::cout << fmt::format("The coarsest mesh with all of these within {} %: {}.\n",
+                           solver::exact_number(flags.tolerance_percent),
+                           choice ? levels[*choice].level.name : std::string("none"));
+  return kDone;
+}
+
+int converge_of_flags(ConvergeFlags flags) {
+  if (flags.mesh_study) {
+    flags.points.axes.try_emplace("H", "1");
+    flags.points.axes.try_emplace("mu", "0.4,1.2");
+    flags.points.axes.try_emplace("e", "1");
+  }
+  const protocol::PointTable table(recipe_of_flags(flags.points));
+  return flags.mesh_study ? mesh_study(flags, table) : converge(flags, table);
+}
+
+}  // namespace
+
+void add_converge(CLI::App& app, Command& command) {
+  auto flags = std::make_shared<ConvergeFlags>();
+  auto* verb = app.add_subcommand(
+      "converge", "Refine mesh and step of one point and estimate the error of every output");
+  verb->footer(kExamples);
+  verb->add_flag("--json", flags->json, "print one JSON object (SI units)");
+  verb->add_option("--coarsest", flags->coarsest, "elements a link of the coarsest mesh")
+      ->check(CLI::Range(1, kMostElements))
+      ->type_name("N")
+      ->capture_default_str();
+  verb->add_option("--finest", flags->finest,
+                   "elements a link of the finest mesh; default 32, for the mesh study 64")
+      ->check(CLI::Range(1, kMostElements))
+      ->type_name("N");
+  verb->add_option("--halvings", flags->halvings, "how often the step is halved")
+      ->type_name("N")
+      ->capture_default_str();
+  auto* study = verb->add_flag(
+      "--mesh-study", flags->mesh_study,
+      "mesh alone, at H = 1, mu = 0.4 and 1.2, e = 1 unless said otherwise: errors of every mesh");
+  verb->add_option("--tolerance", flags->tolerance_percent,
+                   "of the mesh study: largest difference of a mesh that is good enough [%]")
+      ->type_name("PERCENT")
+      ->check(protocol::number_between(1e-9, 100.0))
+      ->needs(study)
+      ->capture_default_str();
+  add_point_flags(*verb, flags->points, FlagValues::kMany);
+  verb->callback([flags, &command] { command = [flags] { return converge_of_flags(*flags); }; });
+}
+
+}  // namespace oblique::client

@@ -1,0 +1,90 @@
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "client/output/printer.h"
+#include "client/paper/paper_comparison.h"
+#include "client/service/source.h"
+#include "client/service/watching.h"
+#include "client/study/nearest.h"
+#include "client/verbs/verbs.h"
+#include "worker/solver/model/parameters.h"
+
+namespace oblique::client {
+namespace {
+
+constexpr const char* kExamples = R"(Examples:
+  oblique paper
+  oblique paper --preset converged --modes  where the paper's modes come of its mesh
+  oblique paper --preset printed
+  oblique paper --format markdown           the tables of README.md
+  oblique paper --db oblique.db --study paper
+  oblique paper --format csv > differences.csv)";
+
+struct PaperFlags {
+  std::string preset{"paper"};
+  std::string study{"paper"};
+  std::string database;  // empty: solve the cases now
+  std::string format{"table"};
+  bool modes = false;
+};
+
+protocol::QueryReply rows_of_study(Source& source, const std::string& study) {
+  the_study(source, study);
+  return source.query(
+      "SELECT point, H, mu, e, peaks, phases, stick_total_s, major_mode FROM runs WHERE study = " +
+      sql_text(study) + " AND status = 'solved'");
+}
+
+std::vector<std::optional<OwnCase>> cases_of(const PublishedTable& published,
+                                             const PaperFlags& flags) {
+  if (!flags.database.empty()) {
+    return own_cases(published, rows_of_study(*open_database(flags.database), flags.study));
+  }
+  const auto model = solver::preset(flags.preset);
+  std::cerr << fmt::format("{} impacts of the preset {}, {} elements a link\n",
+                           published.cases.size(), flags.preset, model.elements_per_link);
+  return solved_cases(published, model);
+}
+
+int paper(const PaperFlags& flags) {
+  const auto format = format_named(flags.format);
+  const auto published = published_table();
+  const auto own = cases_of(published, flags);
+  const bool is_for_people = format == Format::kTable || format == Format::kMarkdown;
+  if (is_for_people && flags.modes) {
+    print_modes(std::cout, format, published, own);
+  } else if (is_for_people) {
+    print_comparison(std::cout, format, published, own);
+  } else {
+    print_out(rows_of(published, compare(published, own)), format);
+  }
+  return kDone;
+}
+
+}  // namespace
+
+void add_paper(CLI::App& app, Command& command) {
+  auto flags = std::make_shared<PaperFlags>();
+  auto* verb = app.add_subcommand("paper", "Put the paper's tables beside ours, with differences");
+  verb->footer(kExamples);
+  auto* preset =
+      verb->add_option("--preset", flags->preset, "model: " + joined(solver::preset_names()));
+  preset->type_name("NAME")->capture_default_str();
+  auto* database = verb->add_option("--db", flags->database,
+                                    "compare results of this database instead of solving now");
+  database->type_name("FILE")->excludes(preset);
+  verb->add_option("--study", flags->study, "the study in that database")
+      ->type_name("NAME")
+      ->needs(database)
+      ->capture_default_str();
+  verb->add_flag("--modes", flags->modes, "peaks and modes alone (in tables for people)");
+  add_format_flag(*verb, flags->format);
+  verb->callback([flags, &command] { command = [flags] { return paper(*flags); }; });
+}
+
+}  // namespace oblique::client

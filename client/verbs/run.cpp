@@ -1,0 +1,91 @@
+#include <iostream>
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+#include "client/output/columns.h"
+#include "client/output/mesh_note.h"
+#include "client/output/printer.h"
+#include "client/service/connection.h"
+#include "client/service/embedded_service.h"
+#include "client/service/run_service.h"
+#include "client/service/stop_signal.h"
+#include "client/study/point_flags.h"
+#include "client/verbs/verbs.h"
+#include "proto/program/usage.h"
+
+namespace oblique::client {
+namespace {
+
+constexpr const char* kExamples = R"(Examples:
+  oblique run deploy/studies/paper.toml
+  oblique run --H 1 --mu 0.1:2.0:40 --e 0.6,0.8,1 --name friction
+  oblique run sweep.toml --db sweep.db --workers 4
+
+Ctrl-C stops it and loses nothing: the same command again goes on where it stopped.
+The exit code is 1 when a point failed, too.)";
+
+struct RunFlags {
+  StudyFlags study;
+  RunSettings settings;
+};
+
+/// `text` as one word of a shell.
+std::string shell_word(const std::string& text) {
+  constexpr std::string_view kPlain =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-./";
+  if (!text.empty() && text.find_first_not_of(kPlain) == std::string::npos) {
+    return text;
+  }
+  std::string quoted = "'";
+  for (const char letter : text) {
+    quoted += letter == '\'' ? std::string("'\\''") : std::string(1, letter);
+  }
+  return quoted + "'";
+}
+
+int run(const RunFlags& flags) {
+  const auto study = study_of_flags(flags.study);
+  check_settings(flags.settings);
+  tell_mesh(std::cerr, study.recipe);
+  // Before any thread is started; see StopSignal.
+  StopSignal stop;
+  const auto end = run_study(study, flags.settings, stop);
+  if (!end) {
+    return stop.exit_code();
+  }
+  print_out(in_shown_units(end->rows), Format::kTable);
+  if (end->rows.rows_size() < static_cast<int>(end->status.points())) {
+    std::cerr << "The first " << end->rows.rows_size() << " of " << end->status.points()
+              << " points are shown.\n";
+  }
+  std::cerr << "More: oblique query " << shell_word(study.name) << " --db "
+            << shell_word(flags.settings.service.database.string()) << "\n";
+  return end->exit_code;
+}
+
+}  // namespace
+
+void add_run(CLI::App& app, Command& command) {
+  auto flags = std::make_shared<RunFlags>();
+  auto* verb = app.add_subcommand(
+      "run", "Run a study on this machine: server, workers and database in one command");
+  verb->footer(kExamples);
+  verb->add_option("--db", flags->settings.service.database, "database, made when it is not there")
+      ->type_name("FILE")
+      ->capture_default_str();
+  verb->add_flag("--mix-versions", flags->settings.terms.mixes_versions,
+                 "go on with a study although another solver version began it");
+  verb->add_flag(
+      "--allow-network-disk", flags->settings.service.allow_network_disk,
+      "take a database on a network file system, where a second machine could damage it");
+  add_worker_flags(*verb, flags->settings);
+  verb->add_option("--rows", flags->settings.rows, "most rows of the table shown at the end")
+      ->check(protocol::whole_number_from(0))
+      ->type_name("N")
+      ->capture_default_str();
+  add_study_flags(*verb, flags->study);
+  verb->callback([flags, &command] { command = [flags] { return run(*flags); }; });
+}
+
+}  // namespace oblique::client

@@ -1,0 +1,129 @@
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "client/output/case_report.h"
+#include "client/output/mesh_note.h"
+#include "client/output/trace_table.h"
+#include "client/study/point_flags.h"
+#include "client/verbs/verbs.h"
+#include "proto/recipe/recipe.h"
+#include "worker/solver/solve.h"
+
+namespace oblique::client {
+namespace {
+
+constexpr const char* kExamples = R"(Examples:
+  oblique solve --H 1 --mu 0.4 --e 1
+  oblique solve --H 1 --mu 1.2 --e 0.8 --json
+  oblique solve --H 1 --mu 0.4 --e 1 --trace impact.csv --trace-shape
+  oblique solve --H 1 --mu 0.4 --e 1 --trace - > impact.csv
+  oblique solve --H 0.6 --mu 0.4 --e 1 --preset converged --lengths 0.4,0.4,0.2)";
+
+struct SolveFlags {
+  PointFlags points;
+  bool json = false;
+  std::optional<std::string> trace;  // where to; "-" is standard output
+  bool trace_shape = false;
+};
+
+void check_one_point(const protocol::PointTable& table) {
+  if (table.size() == 1) {
+    return;
+  }
+  throw solver::InputError("the flags make " + std::to_string(table.size()) +
+                           " points, and solve takes one: give one value each, or use `oblique "
+                           "run` for all of them");
+}
+
+/// Where a trace goes: a file, or standard output.
+class TraceOutput {
+ public:
+  /// Throws InputError when `where` is not a file that can be written, or standard output that
+  /// `json` has already.
+  TraceOutput(std::string where, bool json) : where_(std::move(where)) {
+    if (where_.empty()) {
+      throw solver::InputError("--trace is empty: name a file, or - for standard output");
+    }
+    if (is_standard_output()) {
+      if (json) {
+        throw solver::InputError(
+            "--trace - and --json both write to standard output: give the trace a file");
+      }
+      return;
+    }
+    file_.open(where_);
+    if (!file_) {
+      throw solver::InputError("cannot write the trace to " + where_);
+    }
+  }
+
+  bool is_standard_output() const { return where_ == "-"; }
+  void begin(const solver::ModelParameters& model, bool shape) {
+    const std::size_t links = model.lengths_m.size();
+    const auto elements = links * static_cast<std::size_t>(model.elements_per_link);
+    print_trace_header(out(), links, shape ? elements + 1 : 0);
+  }
+  void add(const solver::TraceRow& row) { print_trace_row(out(), row); }
+  void finish() {
+    if (!out().flush()) {
+      throw std::runtime_error("the trace could not be written whole to " +
+                               (is_standard_output() ? "standard output" : where_));
+    }
+  }
+
+ private:
+  std::ostream& out() { return is_standard_output() ? std::cout : file_; }
+
+  std::string where_;
+  std::ofstream file_;
+};
+
+int solve(const SolveFlags& flags) {
+  const protocol::PointTable table(recipe_of_flags(flags.points));
+  check_one_point(table);
+  const auto point = table.point(0);
+  const solver::Finger finger(table.model(0));
+  std::optional<TraceOutput> trace;
+  solver::Tracing tracing;
+  if (flags.trace) {
+    trace.emplace(*flags.trace, flags.json);
+    trace->begin(finger.model(), flags.trace_shape);
+    tracing.sink = [&trace](const solver::TraceRow& row) { trace->add(row); };
+    tracing.with_shape = flags.trace_shape;
+  }
+  const auto result = finger.solve(point.H_m, point.mu, point.e_star, tracing);
+  if (flags.json) {
+    std::cout << json_of(result).dump(2) << '\n';
+  } else {
+    print_summary(trace && trace->is_standard_output() ? std::cerr : std::cout, result);
+  }
+  if (trace) {
+    trace->finish();
+  }
+  tell_mesh(std::cerr, table.recipe());
+  return kDone;
+}
+
+}  // namespace
+
+void add_solve(CLI::App& app, Command& command) {
+  auto flags = std::make_shared<SolveFlags>();
+  auto* verb = app.add_subcommand("solve", "Solve one point, here and now");
+  verb->footer(kExamples);
+  verb->add_flag("--json", flags->json, "print the result as one JSON object (SI units)");
+  auto* trace = verb->add_option("--trace", flags->trace,
+                                 "write the time histories of the contact to FILE (CSV, SI "
+                                 "units); - is standard output")
+                    ->type_name("FILE");
+  verb->add_flag("--trace-shape", flags->trace_shape,
+                 "add the positions of the chain's nodes to the trace")
+      ->needs(trace);
+  add_point_flags(*verb, flags->points, FlagValues::kOne);
+  verb->callback([flags, &command] { command = [flags] { return solve(*flags); }; });
+}
+
+}  // namespace oblique::client

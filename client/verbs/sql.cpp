@@ -1,0 +1,45 @@
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include "client/output/printer.h"
+#include "client/service/source.h"
+#include "client/verbs/verbs.h"
+
+namespace oblique::client {
+namespace {
+
+constexpr const char* kExamples = R"(Examples:
+  oblique sql "SELECT study, count(*), max(fn_peak_N) FROM runs GROUP BY study"
+  oblique sql "SELECT * FROM peaks WHERE study_id = 1 AND major" --format csv
+  oblique sql "SELECT name, sql FROM sqlite_schema"     tables and views
+
+One statement that only reads.)";
+
+struct SqlFlags {
+  std::string statement;
+  std::string format{"table"};
+  SourceFlags source;
+};
+
+int sql(const SqlFlags& flags) {
+  const auto format = format_named(flags.format);
+  const auto source = open_source(flags.source);
+  return print_whole(source->query(flags.statement), format);
+}
+
+}  // namespace
+
+void add_sql(CLI::App& app, Command& command) {
+  auto flags = std::make_shared<SqlFlags>();
+  auto* verb = app.add_subcommand("sql", "Ask the database in SQL, reading only");
+  verb->footer(kExamples);
+  verb->add_option("STATEMENT", flags->statement, "the statement, in quotes")
+      ->required()
+      ->type_name("");
+  add_format_flag(*verb, flags->format);
+  add_source_flags(*verb, flags->source);
+  verb->callback([flags, &command] { command = [flags] { return sql(*flags); }; });
+}
+
+}  // namespace oblique::client

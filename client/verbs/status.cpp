@@ -1,0 +1,45 @@
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include "client/output/printer.h"
+#include "client/service/source.h"
+#include "client/service/watching.h"
+#include "client/verbs/verbs.h"
+
+namespace oblique::client {
+namespace {
+
+constexpr const char* kExamples = R"(Examples:
+  oblique status
+  oblique status paper
+  oblique status --server tcp://127.0.0.1:7600 --format json
+
+A database file knows nothing of leases and rates; a server does.)";
+
+struct StatusFlags {
+  std::string study;  // empty: all
+  std::string format{"table"};
+  SourceFlags source;
+};
+
+int status(const StatusFlags& flags) {
+  const auto format = format_named(flags.format);
+  const auto source = open_source(flags.source);
+  print_out(table_of(source->status(flags.study)), format);
+  return kDone;
+}
+
+}  // namespace
+
+void add_status(CLI::App& app, Command& command) {
+  auto flags = std::make_shared<StatusFlags>();
+  auto* verb = app.add_subcommand("status", "Say how far a study is, or all of them");
+  verb->footer(kExamples);
+  verb->add_option("STUDY", flags->study, "name of the study; all when left out")->type_name("");
+  add_format_flag(*verb, flags->format);
+  add_source_flags(*verb, flags->source);
+  verb->callback([flags, &command] { command = [flags] { return status(*flags); }; });
+}
+
+}  // namespace oblique::client

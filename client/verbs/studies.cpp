@@ -1,0 +1,51 @@
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include "client/output/printer.h"
+#include "client/service/source.h"
+#include "client/verbs/verbs.h"
+
+namespace oblique::client {
+namespace {
+
+constexpr const char* kExamples = R"(Examples:
+  oblique studies
+  oblique studies --db sweep.db --format csv)";
+
+struct StudiesFlags {
+  std::string format{"table"};
+  SourceFlags source;
+};
+
+int studies(const StudiesFlags& flags) {
+  const auto format = format_named(flags.format);
+  const auto source = open_source(flags.source);
+  protocol::QueryReply table;
+  for (const char* column : {"study", "state", "points", "done", "created_at"}) {
+    table.add_columns(column);
+  }
+  for (const auto& study : source->status({})) {
+    auto& row = *table.add_rows();
+    add_value(row, study.name());
+    add_value(row, study.state());
+    add_value(row, static_cast<std::int64_t>(study.points()));
+    add_value(row, static_cast<std::int64_t>(study.solved() + study.failed()));
+    add_value(row, study.created_at());
+  }
+  print_out(table, format);
+  return kDone;
+}
+
+}  // namespace
+
+void add_studies(CLI::App& app, Command& command) {
+  auto flags = std::make_shared<StudiesFlags>();
+  auto* verb = app.add_subcommand("studies", "List the studies");
+  verb->footer(kExamples);
+  add_format_flag(*verb, flags->format);
+  add_source_flags(*verb, flags->source);
+  verb->callback([flags, &command] { command = [flags] { return studies(*flags); }; });
+}
+
+}  // namespace oblique::client

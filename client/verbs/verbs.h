@@ -1,0 +1,40 @@
+#pragma once
+
+#include <functional>
+
+#include <CLI/CLI.hpp>
+
+#include "proto/program/exit_code.h"
+
+namespace oblique::client {
+
+/// What a verb does once all is parsed; gives the exit code.
+using Command = std::function<int()>;
+
+using protocol::kDone;
+using protocol::kFailed;
+using protocol::kWrongUsage;
+
+// Each adds one verb with its flags, help and examples to `app`. When that verb is parsed,
+// `command` is set to what it does.
+void add_solve(CLI::App& app, Command& command);
+void add_run(CLI::App& app, Command& command);
+void add_submit(CLI::App& app, Command& command);
+void add_status(CLI::App& app, Command& command);
+void add_watch(CLI::App& app, Command& command);
+void add_studies(CLI::App& app, Command& command);
+void add_workers(CLI::App& app, Command& command);
+void add_cancel(CLI::App& app, Command& command);
+void add_pause(CLI::App& app, Command& command);
+void add_resume(CLI::App& app, Command& command);
+void add_retry(CLI::App& app, Command& command);
+void add_query(CLI::App& app, Command& command);
+void add_sql(CLI::App& app, Command& command);
+void add_columns(CLI::App& app, Command& command);
+void add_paper(CLI::App& app, Command& command);
+void add_converge(CLI::App& app, Command& command);
+void add_fit(CLI::App& app, Command& command);
+void add_backup(CLI::App& app, Command& command);
+void add_check(CLI::App& app, Command& command);
+
+}  // namespace oblique::client

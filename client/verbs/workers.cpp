@@ -1,0 +1,82 @@
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include "client/output/printer.h"
+#include "client/service/connection.h"
+#include "client/service/source.h"
+#include "client/verbs/verbs.h"
+
+namespace oblique::client {
+namespace {
+
+constexpr const char* kExamples = R"(Examples:
+  oblique workers
+  oblique workers --server tcp://127.0.0.1:7600 --format csv
+  oblique workers --db sweep.db        every worker that delivered a result
+
+A server tells of the workers that are there now.)";
+
+struct WorkersFlags {
+  std::string format{"table"};
+  SourceFlags source;
+};
+
+protocol::QueryReply workers_of_server(const ConnectionSettings& settings) {
+  protocol::QueryReply table;
+  for (const char* column : {"worker", "name", "threads", "instruction_set", "solver_version",
+                             "leased_points", "solved_points", "silent_ms", "losses", "standing"}) {
+    table.add_columns(column);
+  }
+  const auto reply = Connection(settings).workers();
+  for (const auto& worker : reply.workers()) {
+    auto& row = *table.add_rows();
+    add_value(row, static_cast<std::int64_t>(worker.worker_id()));
+    add_value(row, worker.name());
+    add_value(row, static_cast<std::int64_t>(worker.threads()));
+    add_value(row, worker.instruction_set());
+    add_value(row, worker.solver_version());
+    add_value(row, static_cast<std::int64_t>(worker.leased_points()));
+    add_value(row, static_cast<std::int64_t>(worker.solved_points()));
+    add_value(row, static_cast<std::int64_t>(worker.silent_ms()));
+    add_value(row, static_cast<std::int64_t>(worker.losses()));
+    add_value(row, std::string(worker.set_aside() ? "set aside"
+                               : worker.proven()  ? "proven"
+                                                  : "new"));
+  }
+  if (reply.bad_frames() > 0) {
+    std::cerr
+        << reply.bad_frames()
+        << " frames came that no sound worker or client sends; the server's log says from whom\n";
+  }
+  return table;
+}
+
+int workers(const WorkersFlags& flags) {
+  const auto format = format_named(flags.format);
+  if (flags.source.database.empty()) {
+    print_out(workers_of_server(connection_settings(flags.source)), format);
+    return kDone;
+  }
+  const auto source = open_database(flags.source.database);
+  print_out(
+      source->query("SELECT worker_id AS worker, name, threads, instruction_set, solver_version, "
+                    "joined_at FROM workers ORDER BY worker_id"),
+      format);
+  return kDone;
+}
+
+}  // namespace
+
+void add_workers(CLI::App& app, Command& command) {
+  auto flags = std::make_shared<WorkersFlags>();
+  auto* verb = app.add_subcommand("workers", "List the workers of a server");
+  verb->footer(kExamples);
+  add_format_flag(*verb, flags->format);
+  verb->add_option("--db", flags->source.database, "database to read directly instead")
+      ->type_name("FILE");
+  add_server_flags(*verb, flags->source);
+  verb->callback([flags, &command] { command = [flags] { return workers(*flags); }; });
+}
+
+}  // namespace oblique::client

@@ -1,0 +1,131 @@
+#include "proto/text.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+
+namespace oblique::protocol {
+namespace {
+
+std::string escaped(const char* format, unsigned number) {
+  std::array<char, 16> text{};
+  const int length = std::snprintf(text.data(), text.size(), format, number);
+  return {text.data(), static_cast<std::size_t>(length)};
+}
+
+std::string escape_of(char32_t code) {
+  switch (code) {
+    case U'\n':
+      return "\\n";
+    case U'\r':
+      return "\\r";
+    case U'\t':
+      return "\\t";
+    default:
+      return escaped(code < 0x80 ? "\\x%02x" : "\\u%04x", code);
+  }
+}
+
+std::string visible_but(std::string_view text, std::string_view kept) {
+  std::string shown;
+  shown.reserve(text.size());
+  while (!text.empty()) {
+    const Character next = first_character(text);
+    if (next.bytes == 0) {
+      shown += escaped("\\x%02x", static_cast<unsigned char>(text.front()));
+      text.remove_prefix(1);
+      continue;
+    }
+    const auto bytes = text.substr(0, next.bytes);
+    if (is_control(next.code) && kept.find(bytes) == std::string_view::npos) {
+      shown += escape_of(next.code);
+    } else {
+      shown += bytes;
+    }
+    text.remove_prefix(next.bytes);
+  }
+  return shown;
+}
+
+}  // namespace
+
+Character first_character(std::string_view text) {
+  constexpr Character kNone{0, 0};
+  if (text.empty()) {
+    return kNone;
+  }
+  const auto lead = static_cast<unsigned char>(text.front());
+  if (lead < 0x80) {
+    return {1, lead};
+  }
+  const std::size_t bytes = lead < 0xe0 ? 2 : lead < 0xf0 ? 3 : 4;
+  if (lead < 0xc2 || lead > 0xf4 || text.size() < bytes) {
+    return kNone;
+  }
+  char32_t code = lead & (0x7fU >> bytes);
+  for (std::size_t i = 1; i < bytes; ++i) {
+    const auto byte = static_cast<unsigned char>(text[i]);
+    if ((byte & 0xc0U) != 0x80) {
+      return kNone;
+    }
+    code = (code << 6U) | (byte & 0x3fU);
+  }
+  // Longer than need be, half of a pair of UTF-16, or above the last code point.
+  constexpr std::array<char32_t, 5> kLeast{0, 0, 0x80, 0x800, 0x10000};
+  const bool is_sound =
+      code >= kLeast.at(bytes) && !(code >= 0xd800 && code <= 0xdfff) && code <= 0x10ffff;
+  return is_sound ? Character{bytes, code} : kNone;
+}
+
+bool is_control(char32_t code) {
+  struct Range {
+    char32_t first;
+    char32_t last;
+  };
+  constexpr std::array<Range, 6> kControls{{
+      {0x00, 0x1f},      // C0
+      {0x7f, 0x9f},      // DEL, C1
+      {0x061c, 0x061c},  // Arabic letter mark
+      {0x200e, 0x200f},  // left-to-right and right-to-left marks
+      {0x2028, 0x202e},  // line and paragraph separators; embeddings and overrides
+      {0x2066, 0x2069},  // isolates
+  }};
+  return std::any_of(kControls.begin(), kControls.end(), [code](const Range& range) {
+    return code >= range.first && code <= range.last;
+  });
+}
+
+std::string visible(std::string_view text) {
+  return visible_but(text, {});
+}
+
+std::string visible_lines(std::string_view text) {
+  return visible_but(text, "\n");
+}
+
+bool is_utf8(std::string_view text) {
+  while (!text.empty()) {
+    const std::size_t bytes = first_character(text).bytes;
+    if (bytes == 0) {
+      return false;
+    }
+    text.remove_prefix(bytes);
+  }
+  return true;
+}
+
+std::string shortened(const std::string& text, std::size_t bytes) {
+  if (text.size() <= bytes) {
+    return text;
+  }
+  while (bytes > 0 && (static_cast<unsigned char>(text[bytes]) & 0xc0U) == 0x80U) {
+    --bytes;
+  }
+  return text.substr(0, bytes);
+}
+
+bool is_visible(std::string_view text) {
+  return visible(text) == text;
+}
+
+}  // namespace oblique::protocol

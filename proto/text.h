@@ -1,0 +1,38 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace oblique::protocol {
+
+/// `text` with everything written out that would steer a terminal or forge a line of a log: control
+/// characters (C0, DEL and C1), the marks that turn the direction of writing, Unicode's line and
+/// paragraph separators, and bytes that are not UTF-8. ESC becomes \x1b, U+202E \u202e, a line
+/// break \n. All other text stays as it is. For whatever people read that comes from outside:
+/// names, values of a database, keys of files, messages of other processes.
+std::string visible(std::string_view text);
+
+/// The same, but line breaks stay: for messages of several lines.
+std::string visible_lines(std::string_view text);
+
+/// Whether `visible` leaves `text` as it is.
+bool is_visible(std::string_view text);
+
+/// Whether `text` is UTF-8 from end to end.
+bool is_utf8(std::string_view text);
+
+/// The beginning of a UTF-8 text, at most `bytes` long, without half a character at its end.
+std::string shortened(const std::string& text, std::size_t bytes);
+
+/// Length in bytes of the UTF-8 character at the start of `text`, and its code point; length 0 when
+/// there is none.
+struct Character {
+  std::size_t bytes;
+  char32_t code;
+};
+Character first_character(std::string_view text);
+
+/// Whether a terminal would act on the character rather than show it.
+bool is_control(char32_t code);
+
+}  // namespace oblique::protocol

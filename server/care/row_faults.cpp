@@ -1,0 +1,225 @@
+#include "server/care/row_faults.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string_view>
+#include <utility>
+
+#include "proto/recipe/recipe.h"
+#include "server/store/packed_arrays.h"
+#include "server/store/result_row.h"
+
+namespace oblique::server {
+namespace {
+
+constexpr int kFirstWithChecksums = 4;
+
+std::string shown(double value) {
+  std::string text(32, '\0');
+  text.resize(static_cast<std::size_t>(std::snprintf(text.data(), text.size(), "%.17g", value)));
+  return text;
+}
+
+/// Collects what is found of one kind.
+class Found {
+ public:
+  Found(std::vector<std::string>& faults, std::size_t at_most)
+      : faults_(faults), most_(faults.size() + at_most) {}
+
+  bool is_full() const { return faults_.size() >= most_; }
+  void add(std::string fault) {
+    if (!is_full()) {
+      faults_.push_back(std::move(fault));
+    }
+  }
+  /// Adds the first column of every row.
+  void add_all(sqlite3* database, const std::string& sql) {
+    Statement statement(database, sql);
+    while (!is_full() && statement.step()) {
+      add(statement.text(0));
+    }
+    statement.reset();
+  }
+
+ private:
+  std::vector<std::string>& faults_;
+  std::size_t most_;
+};
+
+/// Outputs that a row has or lacks without reason.
+std::string misplaced_outputs_sql() {
+  std::string missing = "0";
+  for (const std::string& column : output_columns()) {
+    missing += " + (" + column + " IS NULL)";
+  }
+  const std::string all = std::to_string(output_columns().size());
+  return "SELECT 'study ' || study_id || ', point ' || point || ': it is ' || status ||"
+         " CASE WHEN (status = 'solved') <> (error IS NULL) THEN ', and its error says otherwise'"
+         " WHEN status = 'solved' THEN ', and outputs are missing' ELSE ', and has outputs' END"
+         " FROM results WHERE (status = 'solved') <> (error IS NULL) OR (" +
+         missing + ") <> CASE status WHEN 'solved' THEN 0 ELSE " + all + " END";
+}
+
+/// Holds each row of a model against the message that it was made of.
+void check_models(sqlite3* database, Found& found) {
+  std::string columns = "model_id, definition";
+  for (const auto& key : solver::model_keys()) {
+    columns += ", " + std::string(key.name);
+  }
+  Statement rows(database, "SELECT " + columns + " FROM models");
+  while (!found.is_full() && rows.step()) {
+    const std::string name = "model " + std::to_string(rows.integer(0));
+    protocol::ModelParameters message;
+    solver::ModelParameters model;
+    try {
+      if (!message.ParseFromString(rows.text(1))) {
+        throw std::runtime_error("its bytes are damaged");
+      }
+      model = protocol::from_message(message);
+    } catch (const std::runtime_error& error) {
+      found.add(name + ": its definition cannot be read: " + error.what());
+      continue;
+    }
+    int column = 2;
+    for (const auto& key : solver::model_keys()) {
+      const bool agrees = key.name == "integrator"
+                              ? rows.text(column) == solver::integrator_name(model.integrator)
+                              : rows.is_null(column) || rows.real(column) == key.get(model);
+      if (!agrees) {
+        found.add(name + ": " + std::string(key.name) + " is not that of its definition");
+      }
+      ++column;
+    }
+  }
+  rows.reset();
+}
+
+/// Holds the rows of one study against its recipe, in the order of the points.
+class StudyCheck {
+ public:
+  StudyCheck(sqlite3* database, bool has_checksums)
+      : definition_(database, "SELECT definition FROM models WHERE model_id = ?"),
+        rows_(database, std::string("SELECT point, model_id, H, mu, e, status = 'solved' AND ") +
+                            (has_checksums ? "checksum IS NULL" : "1") + ", " + kArrayColumns +
+                            ", " + (has_checksums ? "reaction_peaks" : "NULL") +
+                            " FROM results WHERE study_id = ? ORDER BY point") {}
+
+  void run(std::int64_t study_id, const std::string& name, const protocol::PointTable& table,
+           Found& found) {
+    segment_.reset();
+    rows_.reset();
+    rows_.bind(1, study_id);
+    while (!found.is_full() && rows_.step()) {
+      const auto number = static_cast<std::uint64_t>(rows_.integer(0));
+      if (number >= table.size()) {
+        continue;  // reported with all of its kind
+      }
+      std::string fault = fault_of_place(table, number);
+      if (fault.empty() && rows_.integer(5) != 0) {
+        fault = fault_of_arrays(rows_, kFirstArray);
+      }
+      if (!fault.empty()) {
+        found.add("study " + name + ", point " + std::to_string(number) + ": " + fault);
+      }
+    }
+    rows_.reset();
+  }
+
+ private:
+  static constexpr int kFirstArray = 6;
+
+  /// Whether H, mu, e and model are the recipe's.
+  std::string fault_of_place(const protocol::PointTable& table, std::uint64_t number) {
+    const protocol::Point point = table.point(number);
+    const std::pair<const char*, double> expected[]{
+        {"H", point.H_m}, {"mu", point.mu}, {"e", point.e_star}};
+    int column = 2;
+    for (const auto& [key, value] : expected) {
+      if (rows_.real(column) != value) {
+        return std::string(key) + " is " + shown(rows_.real(column)) + ", and " + shown(value) +
+               " in the recipe";
+      }
+      ++column;
+    }
+    if (!segment_ || segment_->model != point.model) {
+      segment_ = {point.model, protocol::to_message(table.model(point.model)).SerializeAsString(),
+                  -1};
+    }
+    if (const std::int64_t model_id = rows_.integer(1); model_id != segment_->good_id) {
+      definition_.reset();
+      definition_.bind(1, model_id);
+      const bool agrees = definition_.step() && definition_.text(0) == segment_->definition;
+      definition_.reset();
+      if (!agrees) {
+        return "its model is not that of the recipe";
+      }
+      segment_->good_id = model_id;
+    }
+    return {};
+  }
+
+  /// The model of the points at hand.
+  struct Model {
+    std::uint64_t model;
+    std::string definition;
+    std::int64_t good_id;  ///< row that has it; -1: none was seen
+  };
+  std::optional<Model> segment_;
+  Statement definition_;
+  Statement rows_;
+};
+
+void check_studies(sqlite3* database, bool has_checksums, Found& found) {
+  StudyCheck check(database, has_checksums);
+  Statement studies(database, "SELECT study_id, name, recipe, points FROM studies");
+  while (!found.is_full() && studies.step()) {
+    const std::string name = studies.text(1);
+    protocol::Recipe recipe;
+    try {
+      if (!recipe.ParseFromString(studies.text(2))) {
+        throw std::runtime_error("its bytes are damaged");
+      }
+      const protocol::PointTable table(std::move(recipe));
+      if (table.size() != static_cast<std::uint64_t>(studies.integer(3))) {
+        found.add("study " + name + ": it has " + std::to_string(studies.integer(3)) +
+                  " points, and " + std::to_string(table.size()) + " by its recipe");
+      }
+      check.run(studies.integer(0), name, table, found);
+    } catch (const StorageError&) {
+      throw;
+    } catch (const std::runtime_error& error) {
+      found.add("study " + name + ": its recipe cannot be read: " + error.what());
+    }
+  }
+  studies.reset();
+}
+
+}  // namespace
+
+std::vector<std::string> faults_of_rows(sqlite3* database, int schema, std::size_t at_most) {
+  const bool has_checksums = schema >= kFirstWithChecksums;
+  std::vector<std::string> faults;
+  const auto kind = [&] { return Found(faults, at_most); };
+  if (has_checksums) {
+    kind().add_all(database,
+                   "SELECT 'study ' || study_id || ', ' || name || ': its name, recipe or size is"
+                   " not the one that was stored' FROM studies WHERE checksum <> " +
+                       study_checksum_sql());
+    kind().add_all(database,
+                   "SELECT 'study ' || study_id || ', point ' || point || ': its row is not the one"
+                   " that was stored' FROM results WHERE checksum <> " +
+                       result_checksum_sql());
+  }
+  kind().add_all(database, misplaced_outputs_sql());
+  auto models = kind();
+  check_models(database, models);
+  auto studies = kind();
+  check_studies(database, has_checksums, studies);
+  return faults;
+}
+
+}  // namespace oblique::server

@@ -1,0 +1,81 @@
+#include "server/database/open_for_reading.h"
+
+#include <array>
+#include <filesystem>
+#include <string_view>
+#include <system_error>
+
+#include <unistd.h>
+
+namespace oblique::server {
+namespace {
+
+constexpr int kBusyTimeout_ms = 5000;
+
+/// SQLite's code for a first look at the contents.
+int look_at(sqlite3* database) {
+  return sqlite3_exec(database, "PRAGMA schema_version", nullptr, nullptr, nullptr);
+}
+
+/// SQLite could not make or open what it wants beside the database.
+bool lacks_files(int code) {
+  const unsigned kind = static_cast<unsigned>(code) & 0xffU;
+  return kind == SQLITE_CANTOPEN || kind == SQLITE_READONLY;
+}
+
+bool can_write_beside(const std::string& path) {
+  const auto folder = std::filesystem::absolute(path).parent_path();
+  return ::access(folder.c_str(), W_OK) == 0;
+}
+
+std::string as_uri(const std::string& path) {
+  constexpr std::string_view kPlain =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-._~/";
+  constexpr std::string_view kDigits = "0123456789ABCDEF";
+  std::string uri = "file:";
+  for (const char letter : std::filesystem::absolute(path).string()) {
+    if (kPlain.find(letter) != std::string_view::npos) {
+      uri += letter;
+    } else {
+      const auto byte = static_cast<unsigned char>(letter);
+      uri += {'%', kDigits[byte >> 4U], kDigits[byte & 0xfU]};
+    }
+  }
+  return uri;
+}
+
+/// Without anything beside it: the index of a log is held in memory.
+DatabaseHandle open_alone(const std::string& path) {
+  std::error_code no_log;
+  const bool has_log = std::filesystem::file_size(path + "-wal", no_log) > 0 && !no_log;
+  // A database that SQLite calls immutable has no log. One without locks may have its index in
+  // memory, where an exclusive one has it.
+  DatabaseHandle database =
+      open_database(as_uri(path) + (has_log ? "?vfs=unix-none" : "?immutable=1"),
+                    SQLITE_OPEN_READONLY | SQLITE_OPEN_URI);
+  if (has_log) {
+    execute(database.get(), "PRAGMA locking_mode = EXCLUSIVE");
+    sqlite3_db_config(database.get(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
+  }
+  return database;
+}
+
+}  // namespace
+
+OpenedForReading open_for_reading(const std::string& path) {
+  check_path(path);
+  if (!std::filesystem::exists(path)) {
+    throw StorageError("there is no database " + path);
+  }
+  OpenedForReading opened{open_database(path, SQLITE_OPEN_READONLY), {}};
+  sqlite3_busy_timeout(opened.database.get(), kBusyTimeout_ms);
+  if (lacks_files(look_at(opened.database.get())) && !can_write_beside(path)) {
+    opened.database = open_alone(path);
+    opened.remark = path +
+                    " lies where nothing can be written: it is read as it stands, without "
+                    "regard to a server that may write to it from another machine or user";
+  }
+  return opened;
+}
+
+}  // namespace oblique::server

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+
+#include "server/database/sqlite.h"
+
+namespace oblique::server {
+
+/// A database that is only read, and what there is to say of how.
+struct OpenedForReading {
+  DatabaseHandle database;
+  std::string remark;  ///< a sentence for people; empty: nothing is unusual
+};
+
+/// Opens the database at `path`, whose contents may be anything, for reading only; nothing is
+/// changed beside it either where that is possible. SQLite wants to put an index of the write-ahead
+/// log beside a database; where nothing can be written, in a folder of somebody else or on a
+/// read-only disk, it is read without one, rows in the log included. Throws StorageError when there
+/// is no such file or it cannot be opened.
+OpenedForReading open_for_reading(const std::string& path);
+
+}  // namespace oblique::server

@@ -1,0 +1,207 @@
+#include "server/database/sqlite.h"
+
+#include <filesystem>
+#include <system_error>
+
+namespace oblique::server {
+namespace {
+
+constexpr const char* kWayOut =
+    ": the file is damaged. `oblique check --db FILE` says where, and `oblique backup SAVED.db "
+    "--db "
+    "FILE --salvage` saves what can be read; points whose results are lost are then solved again";
+
+}  // namespace
+
+DatabaseHandle open_database(const std::string& path, int flags) {
+  sqlite3* raw = nullptr;
+  // One thread uses a connection at a time, so SQLite need not lock at every call.
+  const int code = sqlite3_open_v2(path.c_str(), &raw,
+                                   flags | SQLITE_OPEN_EXRESCODE | SQLITE_OPEN_NOMUTEX, nullptr);
+  DatabaseHandle database(raw);
+  if (code != SQLITE_OK) {
+    throw StorageError("cannot open the database " + path + ": " +
+                       (raw != nullptr ? sqlite3_errmsg(raw) : sqlite3_errstr(code)));
+  }
+  return database;
+}
+
+void execute(sqlite3* database, const std::string& sql) {
+  char* message = nullptr;
+  if (sqlite3_exec(database, sql.c_str(), nullptr, nullptr, &message) != SQLITE_OK) {
+    const std::string reason = message != nullptr ? message : sqlite3_errmsg(database);
+    sqlite3_free(message);
+    throw StorageError("the database refused a statement: " + reason);
+  }
+}
+
+Statement::Statement(sqlite3* database, std::string_view sql) : database_(database) {
+  sqlite3_stmt* raw = nullptr;
+  check(sqlite3_prepare_v3(database, sql.data(), static_cast<int>(sql.size()),
+                           SQLITE_PREPARE_PERSISTENT, &raw, nullptr));
+  statement_.reset(raw);
+}
+
+void Statement::check(int code) const {
+  if (code != SQLITE_OK) {
+    throw StorageError("the database refused a statement: " +
+                       std::string(sqlite3_errmsg(database_)));
+  }
+}
+
+void Statement::bind(int index, std::int64_t value) {
+  check(sqlite3_bind_int64(statement_.get(), index, value));
+}
+
+void Statement::bind(int index, std::uint64_t value) {
+  bind(index, static_cast<std::int64_t>(value));
+}
+
+void Statement::bind(int index, double value) {
+  check(sqlite3_bind_double(statement_.get(), index, value));
+}
+
+void Statement::bind(int index, std::string_view text) {
+  check(sqlite3_bind_text64(statement_.get(), index, text.data(), text.size(), SQLITE_TRANSIENT,
+                            SQLITE_UTF8));
+}
+
+void Statement::bind_blob(int index, std::string_view bytes) {
+  check(sqlite3_bind_blob64(statement_.get(), index, bytes.data(), bytes.size(), SQLITE_TRANSIENT));
+}
+
+void Statement::bind_null(int index) {
+  check(sqlite3_bind_null(statement_.get(), index));
+}
+
+void Statement::bind_column(int index, const Statement& row, int column) {
+  check(sqlite3_bind_value(statement_.get(), index,
+                           sqlite3_column_value(row.statement_.get(), column)));
+}
+
+int Statement::columns() const {
+  return sqlite3_column_count(statement_.get());
+}
+
+bool Statement::is_null(int column) const {
+  return sqlite3_column_type(statement_.get(), column) == SQLITE_NULL;
+}
+
+bool Statement::step() {
+  const int code = sqlite3_step(statement_.get());
+  if (code == SQLITE_ROW) {
+    return true;
+  }
+  if (code != SQLITE_DONE) {
+    std::string reason = sqlite3_errmsg(database_);
+    if ((static_cast<unsigned>(code) & 0xffU) == SQLITE_CORRUPT) {
+      reason += kWayOut;
+    }
+    reset();
+    throw StorageError("the database failed: " + reason);
+  }
+  return false;
+}
+
+void Statement::run() {
+  step();
+  reset();
+}
+
+void Statement::reset() {
+  sqlite3_reset(statement_.get());
+  sqlite3_clear_bindings(statement_.get());
+}
+
+double Statement::real(int column) const {
+  return sqlite3_column_double(statement_.get(), column);
+}
+
+std::int64_t Statement::integer(int column) const {
+  return sqlite3_column_int64(statement_.get(), column);
+}
+
+std::string Statement::text(int column) const {
+  const void* bytes = sqlite3_column_blob(statement_.get(), column);
+  const auto size = static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column));
+  return size == 0 ? std::string() : std::string(static_cast<const char*>(bytes), size);
+}
+
+Transaction::Transaction(sqlite3* database) : database_(database) {
+  execute(database_, "BEGIN IMMEDIATE");
+}
+
+Transaction::~Transaction() {
+  // SQLite itself may have rolled back already, as when the disk is full.
+  if (open_ && sqlite3_get_autocommit(database_) == 0) {
+    sqlite3_exec(database_, "ROLLBACK", nullptr, nullptr, nullptr);
+  }
+}
+
+void Transaction::commit() {
+  execute(database_, "COMMIT");
+  open_ = false;
+}
+
+namespace {
+
+std::int64_t pragma(sqlite3* database, const std::string& name) {
+  Statement statement(database, "PRAGMA " + name);
+  return statement.step() ? statement.integer(0) : 0;
+}
+
+std::string tables_found(sqlite3* database) {
+  Statement statement(database, "SELECT name FROM sqlite_schema WHERE type = 'table' LIMIT 4");
+  std::string names;
+  for (int count = 0; statement.step(); ++count) {
+    names += count == 0 ? "" : ", ";
+    names += count < 3 ? statement.text(0) : "...";
+  }
+  return names.empty() ? "no tables" : "tables " + names;
+}
+
+}  // namespace
+
+DatabaseKind identify(sqlite3* database, const std::string& path) {
+  std::int64_t application_id = 0;
+  std::int64_t version = 0;
+  std::string tables;
+  try {
+    application_id = pragma(database, "application_id");
+    version = pragma(database, "user_version");
+    tables = tables_found(database);
+  } catch (const StorageError&) {
+    const int code = sqlite3_errcode(database);
+    throw StorageError(code == SQLITE_NOTADB
+                           ? path + " is not a database: it is some other kind of file"
+                           : "cannot read the database " + path + ": " + sqlite3_errmsg(database) +
+                                 (code == SQLITE_CORRUPT ? kWayOut : ""));
+  }
+  if (application_id == 0 && version == 0 && tables == "no tables") {
+    return DatabaseKind::kEmpty;
+  }
+  if (application_id != kApplicationId) {
+    throw StorageError(path + " is a database of another program (application id " +
+                       std::to_string(application_id) + ", " + tables + "): choose another file");
+  }
+  if (version < 1 || version > kSchemaVersion) {
+    throw StorageError(path + " has schema version " + std::to_string(version) +
+                       ", and this program knows versions 1 to " + std::to_string(kSchemaVersion) +
+                       (version > kSchemaVersion ? ": use the newer program that wrote it"
+                                                 : ": the file is damaged"));
+  }
+  return version == kSchemaVersion ? DatabaseKind::kOurs : DatabaseKind::kOlder;
+}
+
+void check_path(const std::string& path) {
+  std::error_code ignored;
+  const auto status = std::filesystem::status(path, ignored);
+  if (std::filesystem::is_directory(status)) {
+    throw StorageError(path + " is a directory: name a file in it");
+  }
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
+    throw StorageError(path + " is not a regular file");
+  }
+}
+
+}  // namespace oblique::server

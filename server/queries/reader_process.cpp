@@ -1,0 +1,196 @@
+#include "server/queries/reader_process.h"
+
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstring>
+#include <system_error>
+#include <thread>
+#include <utility>
+
+#include <fcntl.h>
+#include <poll.h>
+#include <spawn.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "proto/frames.h"
+#include "server/queries/reader_program.h"
+
+namespace oblique::server {
+namespace {
+
+/// A killed process is gone at once, unless the system itself hangs on its disk.
+constexpr std::chrono::milliseconds kLongestEnd{500};
+constexpr std::size_t kReadBytes = 64 * 1024;
+
+void check(int error, const std::string& what) {
+  if (error != 0) {
+    throw std::system_error(error, std::generic_category(), what);
+  }
+}
+
+/// What a reader starts with: its channel, no other descriptor but standard error, no signal
+/// blocked or ignored, a process group of its own, so that a Ctrl-C on the terminal is the server's
+/// alone.
+class SpawnPlan {
+ public:
+  explicit SpawnPlan(int channel) {
+    posix_spawn_file_actions_init(&actions_);
+    posix_spawn_file_actions_adddup2(&actions_, channel, kReaderChannel);
+    posix_spawn_file_actions_addopen(&actions_, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+    posix_spawn_file_actions_adddup2(&actions_, STDERR_FILENO, STDOUT_FILENO);
+    posix_spawn_file_actions_addclosefrom_np(&actions_, kReaderChannel + 1);
+    posix_spawnattr_init(&attributes_);
+    sigset_t signals;
+    sigemptyset(&signals);
+    posix_spawnattr_setsigmask(&attributes_, &signals);
+    sigfillset(&signals);
+    posix_spawnattr_setsigdefault(&attributes_, &signals);
+    posix_spawnattr_setpgroup(&attributes_, 0);
+    posix_spawnattr_setflags(
+        &attributes_, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
+  }
+  ~SpawnPlan() {
+    posix_spawn_file_actions_destroy(&actions_);
+    posix_spawnattr_destroy(&attributes_);
+  }
+  SpawnPlan(const SpawnPlan&) = delete;
+  SpawnPlan& operator=(const SpawnPlan&) = delete;
+
+  const posix_spawn_file_actions_t* actions() const { return &actions_; }
+  const posix_spawnattr_t* attributes() const { return &attributes_; }
+
+ private:
+  posix_spawn_file_actions_t actions_{};
+  posix_spawnattr_t attributes_{};
+};
+
+}  // namespace
+
+ReaderProcess::ReaderProcess(const std::string& program, const std::string& path) {
+  std::array<int, 2> ends{};
+  check(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) == 0 ? 0 : errno,
+        "socketpair");
+  channel_ = ends[0];
+  int error = fcntl(channel_, F_SETFL, O_NONBLOCK) == 0 ? 0 : errno;
+  if (error == 0) {
+    const SpawnPlan plan(ends[1]);
+    // Its name is for those who list processes.
+    std::array<std::string, 3> words{"oblique-reader", kReadMode, path};
+    std::array<char*, 4> arguments{words[0].data(), words[1].data(), words[2].data(), nullptr};
+    error = posix_spawn(&pid_, program.c_str(), plan.actions(), plan.attributes(), arguments.data(),
+                        environ);
+  }
+  ::close(ends[1]);
+  if (error != 0) {
+    ::close(channel_);
+    check(error, program);
+  }
+}
+
+ReaderProcess::~ReaderProcess() {
+  kill();
+  const auto give_up = std::chrono::steady_clock::now() + kLongestEnd;
+  while (!is_gone() && std::chrono::steady_clock::now() < give_up) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  ::close(channel_);
+}
+
+void ReaderProcess::ask(const std::string& request) {
+  const auto length = static_cast<FrameLength>(request.size());
+  out_.assign(reinterpret_cast<const char*>(&length), sizeof length);
+  out_ += request;
+  sent_ = 0;
+  in_.clear();
+  state_ = State::kWorking;
+}
+
+short ReaderProcess::events() const {
+  const bool sends = state_ == State::kWorking && sent_ < out_.size();
+  return static_cast<short>(sends ? POLLIN | POLLOUT : POLLIN);
+}
+
+ReaderProcess::State ReaderProcess::advance() {
+  if (state_ != State::kAnswered && state_ != State::kEnded && (!send_some() || !receive_some())) {
+    state_ = State::kEnded;
+  }
+  return state_;
+}
+
+/// False when the process is gone.
+bool ReaderProcess::send_some() {
+  while (sent_ < out_.size()) {
+    const ssize_t sent = ::send(channel_, out_.data() + sent_, out_.size() - sent_, MSG_NOSIGNAL);
+    if (sent >= 0) {
+      sent_ += static_cast<std::size_t>(sent);
+    } else if (errno != EINTR) {
+      return errno == EAGAIN;
+    }
+  }
+  return true;
+}
+
+/// False when the process is gone, or says what no reader says.
+bool ReaderProcess::receive_some() {
+  std::array<char, kReadBytes> bytes;
+  while (true) {
+    const ssize_t got = ::recv(channel_, bytes.data(), bytes.size(), 0);
+    if (got < 0 && errno == EINTR) {
+      continue;
+    }
+    if (got <= 0) {
+      return got < 0 && errno == EAGAIN;
+    }
+    in_.append(bytes.data(), static_cast<std::size_t>(got));
+    FrameLength length = 0;
+    if (in_.size() < sizeof length) {
+      continue;
+    }
+    std::memcpy(&length, in_.data(), sizeof length);
+    if (state_ != State::kWorking || length > protocol::kMaxFrameBytes ||
+        in_.size() > sizeof length + length) {
+      return false;
+    }
+    if (in_.size() == sizeof length + length) {
+      state_ = State::kAnswered;
+      return true;
+    }
+  }
+}
+
+std::string ReaderProcess::take_answer() {
+  std::string answer = std::exchange(in_, {});
+  answer.erase(0, sizeof(FrameLength));
+  out_ = {};
+  sent_ = 0;
+  state_ = State::kIdle;
+  return answer;
+}
+
+void ReaderProcess::kill() {
+  // Waited for here and nowhere else, so the number cannot have passed to another process.
+  if (!is_gone()) {
+    ::kill(pid_, SIGKILL);
+  }
+}
+
+bool ReaderProcess::is_gone() {
+  if (!gone_) {
+    gone_ = waitpid(pid_, &status_, WNOHANG) == pid_;
+  }
+  return gone_;
+}
+
+std::string ReaderProcess::ending() const {
+  if (WIFSIGNALED(status_)) {
+    const int signal = WTERMSIG(status_);
+    return "was killed by signal " + std::to_string(signal) + " (" + strsignal(signal) + ")";
+  }
+  return "ended with exit code " + std::to_string(WEXITSTATUS(status_));
+}
+
+}  // namespace oblique::server

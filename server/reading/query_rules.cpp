@@ -1,0 +1,145 @@
+#include "server/reading/query_rules.h"
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+#include <utility>
+
+#include "server/database/sqlite.h"
+
+namespace oblique::server {
+namespace {
+
+/// Pragmas that only tell something, when they have no argument or name a table.
+bool is_harmless_pragma(std::string_view name, const char* argument) {
+  constexpr std::array<std::string_view, 6> kAboutTables{
+      "table_info", "table_xinfo", "table_list", "index_list", "index_info", "foreign_key_list"};
+  constexpr std::array<std::string_view, 4> kPlain{"user_version", "application_id",
+                                                   "compile_options", "page_count"};
+  const auto has = [name](const auto& names) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+  };
+  return has(kAboutTables) || (argument == nullptr && has(kPlain));
+}
+
+/// Functions that reach out of the database, take or give addresses of this process, run SQL of
+/// their own, or belong to kinds of tables that ours has not.
+bool is_harmless_function(std::string_view name) {
+  constexpr std::array<std::string_view, 16> kOthers{
+      "load_extension", "fts3_tokenizer", "fts5",       "fts5_source_id",
+      "bm25",           "highlight",      "match",      "matchinfo",
+      "offsets",        "optimize",       "rtreecheck", "rtreedepth",
+      "rtreenode",      "snippet",        "sqlite_log", "edit"};
+  return std::find(kOthers.begin(), kOthers.end(), name) == kOthers.end();
+}
+
+/// Lets statements read and compute, nothing else. Holds inside views too.
+int authorize(void*, int action, const char* first, const char* second, const char*, const char*) {
+  switch (action) {
+    case SQLITE_SELECT:
+    case SQLITE_READ:
+    case SQLITE_RECURSIVE:
+      return SQLITE_OK;
+    case SQLITE_FUNCTION:
+      return second != nullptr && is_harmless_function(second) ? SQLITE_OK : SQLITE_DENY;
+    case SQLITE_PRAGMA:
+      return first != nullptr && is_harmless_pragma(first, second) ? SQLITE_OK : SQLITE_DENY;
+    default:
+      return SQLITE_DENY;
+  }
+}
+
+bool is_blank(std::string_view text) {
+  return text.find_first_not_of(" \t\r\n;") == std::string_view::npos;
+}
+
+std::string mebibytes(std::int64_t bytes) {
+  return std::to_string(bytes >> 20U) + " MiB";
+}
+
+}  // namespace
+
+void restrict_to_reading(sqlite3* database) {
+  execute(database, "PRAGMA temp_store = MEMORY");
+  constexpr std::array<std::pair<int, int>, 9> kLimits{{{SQLITE_LIMIT_SQL_LENGTH, kLongestSql},
+                                                        {SQLITE_LIMIT_COLUMN, 1000},
+                                                        {SQLITE_LIMIT_EXPR_DEPTH, 1000},
+                                                        {SQLITE_LIMIT_COMPOUND_SELECT, 100},
+                                                        {SQLITE_LIMIT_VDBE_OP, 1'000'000},
+                                                        {SQLITE_LIMIT_FUNCTION_ARG, 100},
+                                                        {SQLITE_LIMIT_ATTACHED, 0},
+                                                        {SQLITE_LIMIT_LIKE_PATTERN_LENGTH, 1000},
+                                                        {SQLITE_LIMIT_WORKER_THREADS, 0}}};
+  for (const auto& [limit, most] : kLimits) {
+    sqlite3_limit(database, limit, most);
+  }
+  // The schema stays trusted: SQLite 3.40 takes json_extract, which our views use, for unsafe.
+  constexpr std::array<std::pair<int, int>, 4> kSwitches{
+      {{SQLITE_DBCONFIG_DEFENSIVE, 1},
+       {SQLITE_DBCONFIG_ENABLE_FTS3_TOKENIZER, 0},
+       {SQLITE_DBCONFIG_ENABLE_LOAD_EXTENSION, 0},
+       {SQLITE_DBCONFIG_ENABLE_TRIGGER, 0}}};
+  for (const auto& [name, value] : kSwitches) {
+    sqlite3_db_config(database, name, value, nullptr);
+  }
+  // SQLite makes these tables of functions when they are first named, which would be refused then.
+  execute(database, "SELECT 1 FROM json_each('[]'), json_tree('[]')");
+  sqlite3_set_authorizer(database, &authorize, nullptr);
+}
+
+StatementHandle prepare_query(sqlite3* database, const std::string& sql) {
+  if (sql.size() > kLongestSql) {
+    throw StatementError("the statement is longer than " + std::to_string(kLongestSql) + " bytes");
+  }
+  sqlite3_stmt* raw = nullptr;
+  const char* tail = nullptr;
+  const int code =
+      sqlite3_prepare_v2(database, sql.c_str(), static_cast<int>(sql.size()) + 1, &raw, &tail);
+  StatementHandle statement(raw, &sqlite3_finalize);
+  const int primary = static_cast<int>(static_cast<unsigned>(code) & 0xffU);
+  if (primary == SQLITE_AUTH) {
+    throw StatementError(std::string("only statements that read are allowed: ") +
+                         sqlite3_errmsg(database));
+  }
+  if (primary == SQLITE_ERROR) {
+    throw StatementError(std::string("the statement is wrong: ") + sqlite3_errmsg(database));
+  }
+  if (primary != SQLITE_OK) {
+    throw failure(database, code);
+  }
+  if (statement == nullptr) {
+    throw StatementError("there is no statement");
+  }
+  if (!is_blank(tail)) {
+    throw StatementError("one statement at a time: something follows the first");
+  }
+  if (sqlite3_stmt_readonly(raw) == 0) {
+    throw StatementError("only statements that read are allowed");
+  }
+  if (sqlite3_bind_parameter_count(raw) > 0) {
+    // Only the named ones have a name; nothing would ever be bound to any.
+    const char* name = sqlite3_bind_parameter_name(raw, sqlite3_bind_parameter_count(raw));
+    throw StatementError(std::string("the statement has the parameter ") +
+                         (name == nullptr ? "?" : name) +
+                         ", which has no value: write the value itself, a text in single quotes");
+  }
+  return statement;
+}
+
+QueryError failure(sqlite3* database, int code) {
+  switch (static_cast<unsigned>(code) & 0xffU) {
+    case SQLITE_NOMEM: {
+      const std::int64_t limit = sqlite3_hard_heap_limit64(-1);
+      return QueryError("the query needs more memory than " +
+                        (limit > 0 ? "the " + mebibytes(limit) + " allowed" : "there is") +
+                        ": sort, group or gather less, as with WHERE or LIMIT");
+    }
+    case SQLITE_TOOBIG:
+      return QueryError("a text, a blob or a row of the query has more than the " +
+                        mebibytes(sqlite3_limit(database, SQLITE_LIMIT_LENGTH, -1)) + " allowed");
+    default:
+      return QueryError(std::string("the query failed: ") + sqlite3_errmsg(database));
+  }
+}
+
+}  // namespace oblique::server

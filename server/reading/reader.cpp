@@ -1,0 +1,179 @@
+#include "server/reading/reader.h"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "proto/text.h"
+#include "server/database/open_for_reading.h"
+#include "server/reading/query_values.h"
+
+namespace oblique::server {
+namespace {
+
+constexpr int kBusyTimeout_ms = 2000;
+/// Instructions of SQLite's machine between two looks at the clock.
+constexpr int kInstructionsPerLook = 10'000;
+/// What a message takes in the one around it beside its own bytes, at most.
+constexpr std::uint64_t kFieldBytes = 8;
+
+enum class Fit { kYes, kNot };
+
+/// Copies the row at which `statement` stands into `row`; says whether it has at most `most_bytes`
+/// in a reply. Throws QueryError when memory ran out.
+Fit copy_row(sqlite3* database, sqlite3_stmt* statement, std::uint64_t most_bytes,
+             protocol::Row& row) {
+  row.Clear();
+  std::uint64_t left = most_bytes;
+  for (int i = 0; i < sqlite3_column_count(statement); ++i) {
+    protocol::Value& value = *row.add_values();
+    const Copied copied = copy_value(statement, i, left, value);
+    if (copied == Copied::kNoMemory) {
+      throw failure(database, SQLITE_NOMEM);
+    }
+    const std::uint64_t bytes = value.ByteSizeLong() + kFieldBytes;
+    if (copied == Copied::kTooLarge || bytes > left) {
+      return Fit::kNot;
+    }
+    left -= bytes;
+  }
+  return Fit::kYes;
+}
+
+}  // namespace
+
+struct Reader::Deadline {
+  using Clock = std::chrono::steady_clock;
+
+  /// Watches the queries of `database` until it is destroyed.
+  Deadline(sqlite3* watched, const std::atomic<bool>& interrupt, std::int64_t limit_ms)
+      : database(watched), interrupted(interrupt), time_limit_ms(limit_ms) {
+    sqlite3_progress_handler(
+        database, kInstructionsPerLook,
+        [](void* self) { return static_cast<const Deadline*>(self)->is_over() ? 1 : 0; }, this);
+  }
+  ~Deadline() { sqlite3_progress_handler(database, 0, nullptr, nullptr); }
+  Deadline(const Deadline&) = delete;
+  Deadline& operator=(const Deadline&) = delete;
+
+  bool is_over() const {
+    return interrupted ||
+           (time_limit_ms > 0 && Clock::now() - start > std::chrono::milliseconds(time_limit_ms));
+  }
+
+  sqlite3* database;
+  const std::atomic<bool>& interrupted;
+  std::int64_t time_limit_ms;
+  Clock::time_point start = Clock::now();
+};
+
+Reader::Reader(const std::string& path) {
+  auto opened = open_for_reading(path);
+  database_ = std::move(opened.database);
+  remark_ = std::move(opened.remark);
+  sqlite3_busy_timeout(database_.get(), kBusyTimeout_ms);
+  if (identify(database_.get(), path) == DatabaseKind::kEmpty) {
+    throw StorageError(path + " is empty: no study was ever stored in it");
+  }
+  restrict_to_reading(database_.get());
+}
+
+protocol::QueryReply Reader::query(const std::string& sql, const QueryLimits& limits) {
+  google::protobuf::RepeatedPtrField<protocol::Row> rows;
+  protocol::QueryReply reply =
+      run(sql, limits, [&rows](protocol::Row& row) { *rows.Add() = std::move(row); });
+  *reply.mutable_rows() = std::move(rows);
+  return reply;
+}
+
+std::string Reader::encoded_query(const std::string& sql, const QueryLimits& limits) {
+  // Encoded messages one after another are, decoded, one message with all their fields.
+  std::string bytes;
+  protocol::QueryReply part;
+  protocol::Row& slot = *part.add_rows();
+  const protocol::QueryReply rest = run(sql, limits, [&](protocol::Row& row) {
+    slot.Swap(&row);
+    part.AppendToString(&bytes);
+  });
+  rest.AppendToString(&bytes);
+  return bytes;
+}
+
+protocol::QueryReply Reader::run(const std::string& sql, const QueryLimits& limits,
+                                 const TakeRow& take) {
+  sqlite3* const database = database_.get();
+  sqlite3_limit(database, SQLITE_LIMIT_LENGTH, static_cast<int>(limits.max_value_bytes));
+  const Deadline deadline(database, interrupted_, limits.time_limit_ms);
+  const StatementHandle statement = prepare_query(database, sql);
+  protocol::QueryReply reply;
+  for (int i = 0; i < sqlite3_column_count(statement.get()); ++i) {
+    const char* name = sqlite3_column_name(statement.get(), i);
+    if (name == nullptr) {
+      throw failure(database, SQLITE_NOMEM);
+    }
+    reply.add_columns(protocol::is_utf8(name) ? std::string(name) : hexadecimal(name));
+  }
+  std::uint64_t bytes = reply.ByteSizeLong() + kFieldBytes;
+  protocol::Row row;
+  int code = SQLITE_DONE;
+  for (std::uint64_t rows = 0; (code = sqlite3_step(statement.get())) == SQLITE_ROW; ++rows) {
+    const std::uint64_t left = limits.max_bytes - std::min(limits.max_bytes, bytes);
+    const bool is_full = rows >= limits.max_rows;
+    if (is_full || copy_row(database, statement.get(), left, row) == Fit::kNot) {
+      if (rows == 0 && !is_full) {
+        throw QueryError("one row alone has more than the " + std::to_string(limits.max_bytes) +
+                         " bytes of a reply, blobs counted twice: select less of it, as with "
+                         "substr() or length()");
+      }
+      reply.set_truncated(true);
+      return reply;
+    }
+    bytes += row.ByteSizeLong() + kFieldBytes;
+    take(row);
+  }
+  if (code == SQLITE_INTERRUPT) {
+    throw QueryError(interrupted_ ? "the query was interrupted"
+                                  : took_too_long(limits.time_limit_ms));
+  }
+  if (code != SQLITE_DONE) {
+    throw failure(database, code);
+  }
+  return reply;
+}
+
+std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name) {
+  Statement schema(database_.get(), "PRAGMA user_version");
+  constexpr int kFirstWithShares = 2;
+  const bool has_shares = schema.step() && schema.integer(0) >= kFirstWithShares;
+  // Counts come from the indices of `results`: its rows are not touched.
+  Statement list(database_.get(),
+                 "SELECT s.study_id, s.name, s.state, s.points, s.created_at,"
+                 " (SELECT count(*) FROM results AS r WHERE r.study_id = s.study_id),"
+                 " (SELECT count(*) FROM results AS r WHERE r.study_id = s.study_id"
+                 " AND r.status = 'failed')" +
+                     std::string(has_shares ? ", s.priority, s.weight" : ", 0, 1.0") +
+                     " FROM studies AS s WHERE ?1 = '' OR s.name = ?1 ORDER BY s.study_id");
+  list.bind(1, name);
+  std::vector<protocol::StudyStatus> found;
+  while (list.step()) {
+    protocol::StudyStatus status;
+    const std::int64_t settled = list.integer(5);
+    status.set_study_id(static_cast<std::uint64_t>(list.integer(0)));
+    status.set_name(list.text(1));
+    // A server that was killed may not have noted the end of a study.
+    status.set_state(settled == list.integer(3) ? "done" : list.text(2));
+    status.set_points(static_cast<std::uint64_t>(list.integer(3)));
+    status.set_created_at(list.text(4));
+    status.set_failed(static_cast<std::uint64_t>(list.integer(6)));
+    status.set_solved(static_cast<std::uint64_t>(settled) - status.failed());
+    status.set_priority(static_cast<std::int32_t>(list.integer(7)));
+    status.set_weight(list.real(8));
+    found.push_back(std::move(status));
+  }
+  if (found.empty() && !name.empty()) {
+    throw QueryError("there is no study called \"" + name + "\"");
+  }
+  return found;
+}
+
+}  // namespace oblique::server

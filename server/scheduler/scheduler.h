@@ -1,0 +1,200 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "server/scheduler/lease_index.h"
+#include "server/scheduler/scheduler_events.h"
+#include "server/scheduler/study_points.h"
+#include "server/scheduler/study_queue.h"
+#include "server/scheduler/worker_processes.h"
+
+namespace oblique::server {
+
+/// A study as others see it.
+struct StudyCounts {
+  std::uint64_t points;
+  std::uint64_t solved;
+  std::uint64_t failed;
+  std::uint64_t leased;
+  bool cancelled;
+  std::string solver_version;  ///< that its results have; empty while there are none
+  bool lacks_worker;           ///< points wait, and no worker has that version
+};
+
+struct WorkerCounts {
+  std::uint64_t leased_points;
+  std::uint64_t solved_points;
+  std::int64_t silent_ms;
+  std::uint64_t losses;  ///< leases of its process that ended without an answer
+  bool is_proven;        ///< its process has solved points that were handed to it
+  bool is_set_aside;     ///< it gets nothing until it has solved a probe
+};
+
+/// Decides who solves which points: (state, event, now) -> effects. No I/O, no clock, no thread, no
+/// randomness; README.md has the table of states and events. Not thread-safe.
+class Scheduler {
+ public:
+  explicit Scheduler(SchedulerSettings settings) : settings_(settings) {}
+
+  /// Takes one event at `now_ms` (any steady clock that never runs backwards) and returns what is
+  /// to be done, in order. Events of unknown workers and studies have no effect but the answers
+  /// that the table names.
+  std::vector<Effect> handle(const Event& event, std::int64_t now_ms);
+
+  bool knows_worker(WorkerId worker) const { return workers_.contains(worker); }
+  bool knows_study(StudyId study) const { return studies_.contains(study); }
+  std::size_t workers() const { return workers_.size(); }
+
+  /// Throws std::out_of_range for an unknown study.
+  StudyCounts study(StudyId study) const;
+  /// Throws std::out_of_range for an unknown worker.
+  WorkerCounts worker(WorkerId worker, std::int64_t now_ms) const;
+  /// Since its last message. Throws std::out_of_range for an unknown worker.
+  std::int64_t silent_ms(WorkerId worker, std::int64_t now_ms) const;
+  /// Which points of the study have a row. Throws std::out_of_range for an unknown study.
+  const IntervalSet& settled(StudyId study) const {
+    return studies_.at(study).points.settled_set();
+  }
+
+  /// Throws std::logic_error when the state contradicts itself: a point in two places or in none, a
+  /// lease without worker or study, a leased point without lease, two leases of one point where no
+  /// batch was given to a second worker.
+  void check_invariants() const;
+
+ private:
+  struct Study {
+    StudyPoints points;
+    std::uint64_t failed;
+    bool cancelled;
+    bool paused;
+    bool finished;
+    StudyShare share;
+    double served = 0.0;  ///< batches handed out over the weight, since the study was last open
+    std::string solver_version{};  ///< of its results and leases; empty while there are none
+    LeaseIndex leases{};
+    bool overlaps = false;  ///< a point of it may be under several of these leases
+
+    bool is_open() const { return !cancelled && !paused && !finished; }
+    bool has_suspect() const {
+      return points.has(Standing::kSuspect) || points.has(Standing::kAccused);
+    }
+    bool has_work() const { return is_open() && (points.has_free() || has_suspect()); }
+  };
+  struct Lease {
+    WorkerId worker;
+    StudyId study;
+    Chunk chunk;
+    bool alone;  ///< of suspect points: its worker gets nothing beside it
+    std::int64_t granted_ms;
+    LeaseId twin = 0;  ///< of another worker, for what is left of the same batch; 0: none
+  };
+  struct Pace {
+    double s_per_point = 0.0;  ///< 0: unknown
+    std::uint64_t last_batch_points = 0;
+  };
+  struct Worker {
+    std::uint32_t threads;
+    std::string solver_version;
+    std::uint32_t credit = 0;
+    bool queued = false;    ///< stands in `ready_workers_`
+    bool is_busy = false;   ///< gets nothing
+    bool draining = false;  ///< gets nothing until it holds nothing, then suspect points
+    ProcessNumber process = kNobody;
+    LeaseId probe = 0;                        ///< that it has, and then nothing else; 0: none
+    std::optional<std::int64_t> probed_ms{};  ///< when it got its last probe
+    std::int64_t last_heard_ms;
+    std::uint64_t solved_points = 0;
+    std::set<LeaseId> leases;
+    std::set<StudyId> defined;
+    std::map<StudyId, Pace> paces;
+  };
+  using Effects = std::vector<Effect>;
+
+  void on(const StudyAdded& event);
+  void on(const StudyCancelled& event);
+  void on(const StudyPaused& event);
+  void on(const StudyReopened& event);
+  void on(const StudyShareChanged& event);
+  void on(const FailuresForgotten& event);
+  void on(const WorkerJoined& event);
+  void on(const CreditGiven& event);
+  void on(const ResultsReceived& event);
+  void on(const ResultsStored& event);
+  void on(const HeartbeatReceived& event);
+  void on(const WorkerLeft& event);
+  void on(const WorkerUnreachable& event);
+  void on(const WorkerBusy& event);
+  void on(const DispatchHeld& event);
+  void on(const Tick& event);
+
+  enum class WorkerEnd { kLeft, kReplaced, kLost };
+  Worker* heard_from(WorkerId worker);
+  /// `loss`: who went with it without an answer; nothing: its points are given back.
+  void end_lease(LeaseId lease, const std::optional<Loss>& loss);
+  std::vector<Interval> held_by(const Lease& lease) const;
+  void release_if_answered(LeaseId lease);
+  void remove_worker(WorkerId worker, WorkerEnd how);
+  void learn_pace(Worker& worker, const ResultsReceived& event);
+  void finish_if_complete(StudyId id);
+  StudyQueue::Place place_of(const Study& study) const;
+  /// To be called after every change of a study or its points.
+  void requeue(StudyId id);
+
+  void note_loss(const Lease& lease, const std::vector<Interval>& held, Loss loss);
+  void note_end(const Worker& worker, WorkerEnd how);
+  void note_answers(Worker& worker, const ResultsReceived& event, bool any_accepted);
+  void take_back_losses(ProcessNumber process);
+  void fail_condemned();
+  bool is_proven(const Worker& worker) const;
+  bool is_set_aside(const Worker& worker) const;
+  bool is_longest_proven(const Worker& worker, const Study& study) const;
+  bool probe(WorkerId id, Worker& worker);
+  void check_losses() const;
+
+  void dispatch();
+  bool serve(WorkerId id, Worker& worker);
+  bool serve_suspect(WorkerId id, Worker& worker);
+  std::optional<Standing> suspect_for(const Study& study, const Worker& worker) const;
+  bool serve_straggler(WorkerId id, Worker& worker);
+  bool is_straggling(const Lease& lease, const Worker& helper) const;
+  static bool admits(const Study& study, const Worker& worker);
+  StudyId next_free_study(const Worker& worker) const;
+  double least_served(StudyId but) const;
+  StudyId next_suspect_study(const Worker& worker) const;
+  bool anyone_draining() const;
+  std::uint64_t batch_points(const Worker& worker, StudyId study) const;
+  LeaseId grant(WorkerId id, Worker& worker, StudyId study, const Chunk& chunk, bool alone);
+  void queue(WorkerId id, Worker& worker);
+
+  /// A point that is to fail, unless it is condemned no more.
+  struct Condemned {
+    std::int64_t due_ms;
+    StudyId study;
+    std::uint64_t point;
+  };
+
+  SchedulerSettings settings_;
+  WorkerProcesses processes_{settings_.most_absent_processes};
+  std::deque<Condemned> condemned_;       // the one that is due first in front
+  std::deque<std::int64_t> vanished_ms_;  // when the last newcomers vanished with points
+  std::map<StudyId, Study> studies_;
+  StudyQueue queue_;  // of the studies that have something to hand out
+  std::map<WorkerId, Worker> workers_;
+  std::map<LeaseId, Lease> leases_;
+  std::deque<WorkerId> ready_workers_;  // with credit, first come first served
+  std::uint64_t threads_ = 0;
+  LeaseId next_lease_ = settings_.first_lease_id;
+  bool held_ = false;
+  bool seeks_stragglers_ = false;  // of the event being handled: they are sought at ticks only
+  std::int64_t now_ms_ = 0;
+  std::int64_t last_tick_ms_ = -1;
+  Effects effects_;  // of the event being handled
+};
+
+}  // namespace oblique::server

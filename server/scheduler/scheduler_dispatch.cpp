@@ -1,0 +1,207 @@
+// The part of the scheduler that decides who gets what next.
+#include <algorithm>
+#include <utility>
+
+#include "server/scheduler/scheduler.h"
+
+namespace oblique::server {
+
+void Scheduler::dispatch() {
+  if (held_) {
+    return;
+  }
+  const auto has_work = [this] { return seeks_stragglers_ || !queue_.empty(); };
+  if (seeks_stragglers_ && !ready_workers_.empty()) {
+    // Another worker looks first each time, in case this one may have no straggler there is.
+    ready_workers_.push_back(ready_workers_.front());
+    ready_workers_.pop_front();
+  }
+  std::size_t served_nothing = 0;  // workers in a row
+  while (served_nothing < ready_workers_.size() && has_work()) {
+    const WorkerId id = ready_workers_.front();
+    ready_workers_.pop_front();
+    Worker& worker = workers_.at(id);
+    worker.queued = false;
+    const bool served = serve(id, worker);
+    queue(id, worker);
+    served_nothing = served ? 0 : served_nothing + 1;
+  }
+}
+
+bool Scheduler::serve(WorkerId id, Worker& worker) {
+  if (worker.is_busy) {
+    return false;
+  }
+  const bool holds_suspect = !worker.leases.empty() && leases_.at(*worker.leases.begin()).alone;
+  if (holds_suspect || worker.probe != 0) {
+    return false;
+  }
+  if (is_set_aside(worker)) {
+    return probe(id, worker);
+  }
+  const StudyId suspect_study = next_suspect_study(worker);
+  if (suspect_study == 0) {
+    worker.draining = false;
+  } else if (!is_proven(worker)) {
+    // It may have nothing else by which to show that it is fit for them.
+    if (worker.leases.empty() && next_free_study(worker) == 0) {
+      return probe(id, worker);
+    }
+  } else if (worker.leases.empty()) {
+    return serve_suspect(id, worker);
+  } else if (worker.draining || !anyone_draining()) {
+    // Suspect points wait for one worker to empty, the others go on.
+    worker.draining = true;
+    return false;
+  }
+  if (!is_proven(worker) && worker.leases.size() >= settings_.newcomer_batches) {
+    return false;
+  }
+  const StudyId study = next_free_study(worker);
+  if (study == 0) {
+    return seeks_stragglers_ && serve_straggler(id, worker);
+  }
+  if (const auto chunk = studies_.at(study).points.take(batch_points(worker, study))) {
+    grant(id, worker, study, *chunk, false);
+  }
+  return true;
+}
+
+bool Scheduler::serve_suspect(WorkerId id, Worker& worker) {
+  const StudyId id_of_study = next_suspect_study(worker);
+  Study& study = studies_.at(id_of_study);
+  worker.draining = false;
+  const std::uint64_t at_most = batch_points(worker, id_of_study);
+  if (const auto chunk = study.points.take(*suspect_for(study, worker), at_most)) {
+    grant(id, worker, id_of_study, *chunk, true);
+  }
+  return true;
+}
+
+/// What is left of the batch that straggles longest, also to this worker.
+bool Scheduler::serve_straggler(WorkerId id, Worker& worker) {
+  // Leases are numbered as they are granted: the first that straggles does so longest, and none
+  // after one that is too young does.
+  const auto longest = std::find_if(leases_.begin(), leases_.end(), [&](const auto& entry) {
+    const Lease& lease = entry.second;
+    return now_ms_ - lease.granted_ms < settings_.straggler_after_ms ||
+           (lease.worker != id && is_straggling(lease, worker));
+  });
+  if (longest == leases_.end() ||
+      now_ms_ - longest->second.granted_ms < settings_.straggler_after_ms) {
+    seeks_stragglers_ =
+        false;  // the next worker looks at the next tick: looking at all leases costs
+    return false;
+  }
+  Lease& straggler = longest->second;
+  Study& study = studies_.at(straggler.study);
+  const auto left =
+      study.points.leased_set().within(straggler.chunk.first_point, straggler.chunk.end());
+  study.overlaps = true;
+  const Chunk rest{straggler.chunk.model, left.front().begin, left.back().end - left.front().begin,
+                   straggler.chunk.attempts + 1, straggler.chunk.losses};
+  const LeaseId twin = grant(id, worker, straggler.study, rest, false);
+  straggler.twin = twin;
+  leases_.at(twin).twin = longest->first;
+  return true;
+}
+
+bool Scheduler::is_straggling(const Lease& lease, const Worker& helper) const {
+  const Study& study = studies_.at(lease.study);
+  const std::int64_t age_ms = now_ms_ - lease.granted_ms;
+  if (lease.twin != 0 || lease.alone || !lease.chunk.losses.empty() ||
+      age_ms < settings_.straggler_after_ms || !study.is_open() || !admits(study, helper) ||
+      study.points.leased_set().within(lease.chunk.first_point, lease.chunk.end()).empty()) {
+    return false;
+  }
+  const Worker& holder = workers_.at(lease.worker);
+  if (leases_.at(*holder.leases.begin()).granted_ms < lease.granted_ms) {
+    return true;  // it waits behind another batch of its worker
+  }
+  for (const Worker* judge : {&helper, &holder}) {
+    const auto pace = judge->paces.find(lease.study);
+    if (pace != judge->paces.end() && pace->second.s_per_point > 0.0) {
+      const double expected_ms =
+          1e3 * pace->second.s_per_point * static_cast<double>(lease.chunk.count) / judge->threads;
+      return static_cast<double>(age_ms) > settings_.straggler_factor * expected_ms;
+    }
+  }
+  return true;
+}
+
+/// The results of a study come from one solver version, unless it was said that they need not.
+bool Scheduler::admits(const Study& study, const Worker& worker) {
+  return study.share.mixes_versions || study.solver_version.empty() ||
+         study.solver_version == worker.solver_version;
+}
+
+StudyId Scheduler::next_free_study(const Worker& worker) const {
+  return queue_.next_free(worker.solver_version);
+}
+
+StudyId Scheduler::next_suspect_study(const Worker& worker) const {
+  const auto& suspects = queue_.with_suspects();
+  const auto found = std::find_if(suspects.begin(), suspects.end(), [&](StudyId study) {
+    return admits(studies_.at(study), worker) && suspect_for(studies_.at(study), worker);
+  });
+  return found == suspects.end() ? 0 : *found;
+}
+
+/// Which of the study's suspect points the worker may get. For accused ones the worker is wanted
+/// that is least likely to be lost for a reason of its own. A newcomer gets none, but is told so
+/// here, that it may be probed.
+std::optional<Standing> Scheduler::suspect_for(const Study& study, const Worker& worker) const {
+  const StudyPoints& points = study.points;
+  if (points.has(Standing::kAccused) &&
+      (!is_proven(worker) ||
+       now_ms_ - points.returned_ms(Standing::kAccused) >= settings_.longest_proven_within_ms ||
+       is_longest_proven(worker, study))) {
+    return Standing::kAccused;
+  }
+  return points.has(Standing::kSuspect) ? std::optional(Standing::kSuspect) : std::nullopt;
+}
+
+bool Scheduler::anyone_draining() const {
+  return std::any_of(workers_.begin(), workers_.end(),
+                     [](const auto& entry) { return entry.second.draining; });
+}
+
+std::uint64_t Scheduler::batch_points(const Worker& worker, StudyId id) const {
+  std::uint64_t points = settings_.first_batch_points * worker.threads;
+  const auto pace = worker.paces.find(id);
+  if (pace != worker.paces.end() && pace->second.s_per_point > 0.0) {
+    const double wanted = settings_.batch_target_s * worker.threads / pace->second.s_per_point;
+    const auto largest = static_cast<double>(
+        std::min(settings_.largest_batch_points * worker.threads,
+                 settings_.growth * std::max<std::uint64_t>(pace->second.last_batch_points, 1)));
+    points = static_cast<std::uint64_t>(std::min(wanted, largest));
+  }
+  const std::uint64_t shares = settings_.tail_batches_per_thread * threads_;
+  const std::uint64_t fair =
+      studies_.at(id).points.free() / std::max<std::uint64_t>(shares, 1) * worker.threads;
+  return std::max<std::uint64_t>(std::min(points, fair), 1);
+}
+
+LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Chunk& chunk,
+                         bool alone) {
+  if (worker.defined.insert(study).second) {
+    effects_.emplace_back(DefineStudy{id, study});
+  }
+  Study& served = studies_.at(study);
+  served.served += 1.0 / served.share.weight;
+  if (served.solver_version.empty()) {
+    served.solver_version = worker.solver_version;
+  }
+  const LeaseId lease = next_lease_++;
+  leases_.emplace(lease, Lease{id, study, chunk, alone, now_ms_});
+  served.leases.insert(lease, chunk);
+  worker.leases.insert(lease);
+  --worker.credit;
+  worker.paces[study].last_batch_points = chunk.count;
+  requeue(study);
+  effects_.emplace_back(
+      SendBatch{id, study, chunk.model, chunk.first_point, chunk.count, chunk.attempts + 1, lease});
+  return lease;
+}
+
+}  // namespace oblique::server

@@ -1,0 +1,231 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "proto/recipe/recipe.h"
+#include "server/scheduler/attempt_runs.h"
+#include "server/scheduler/interval_set.h"
+#include "server/scheduler/loss_history.h"
+#include "server/scheduler/study_points.h"
+#include "server/scheduler/worker_processes.h"
+
+// What the scheduler is told, and what it wants done.
+namespace oblique::server {
+
+using LeaseId = std::uint64_t;
+
+struct SchedulerSettings {
+  /// A worker silent for longer is lost: three heartbeats missed, and noticed within 3 s.
+  std::int64_t lost_after_ms = 2800;
+  double batch_target_s = 0.1;                ///< time a batch takes, once a worker's pace is known
+  std::uint64_t first_batch_points = 4;       ///< a thread, in a batch to a worker of unknown pace
+  std::uint64_t largest_batch_points = 4096;  ///< a thread
+  std::uint64_t growth = 4;  ///< a batch is at most so many times the worker's last one
+  /// While free points last, at least so many more batches are left for each thread: the tail of a
+  /// study goes out in ever smaller batches and all workers finish together.
+  std::uint64_t tail_batches_per_thread = 3;
+  /// With nothing else to hand out, a batch that takes this long, and `straggler_factor` times as
+  /// long as it should, is given to a second worker too; the first answer to a point wins. Batches
+  /// that have cost a worker are not.
+  std::int64_t straggler_after_ms = 1000;
+  double straggler_factor = 4.0;
+  /// From how many losses on points are leased alone, and from how many of those a single point
+  /// fails.
+  LossLimits loss_limits{};
+  std::uint64_t suspect_parts = 8;  ///< into so many parts a suspect chunk is split
+  /// A condemned point fails when none of the processes that it cost says hello again for so long.
+  std::int64_t return_within_ms = 10'000;
+  /// An accused point goes to the worker that has been proven longest, after so long to any.
+  std::int64_t longest_proven_within_ms = 10'000;
+  /// A process that was lost so often without solving anything between is set aside: it gets no
+  /// points until it has solved a probe.
+  std::uint32_t set_aside_after = 3;
+  /// The same goes for every newcomer, when so many of them vanished with points in this time.
+  std::size_t vanished_newcomers = 3;
+  std::int64_t newcomers_watched_ms = 60'000;
+  std::int64_t probe_interval_ms = 1000;     ///< between two probes of one worker
+  std::size_t newcomer_batches = 2;          ///< are with a worker that has solved nothing yet
+  std::size_t most_absent_processes = 1024;  ///< are remembered, of newcomers and of others each
+  std::uint32_t max_credit = 1024;           ///< batches a worker may ask for at a time
+  /// Leases are numbered from here. A server that restarts begins above all earlier numbers, so
+  /// that results of an earlier run never close a lease of this one.
+  LeaseId first_lease_id = 1;
+};
+
+/// What became of one point.
+struct PointOutcome {
+  std::uint64_t point;
+  bool failed;
+};
+
+// ---- Events -----------------------------------------------------------------------------------
+
+/// A study that is new, or found in the database with the points that have a row.
+struct StudyAdded {
+  StudyId study;
+  StudyTable table;
+  IntervalSet settled;
+  std::uint64_t failed = 0;  ///< how many of the settled points failed
+  bool cancelled = false;
+  bool paused = false;
+  StudyShare share{};
+  std::string solver_version{};  ///< of its results; empty while there are none
+  AttemptRuns attempts{};        ///< of points that failed, also of those that were forgotten
+};
+/// The study's cancellation is durable.
+struct StudyCancelled {
+  StudyId study;
+};
+/// Nothing more of the study is handed out; what is handed out is still solved.
+struct StudyPaused {
+  StudyId study;
+};
+/// A cancelled or paused study goes on.
+struct StudyReopened {
+  StudyId study;
+};
+struct StudyShareChanged {
+  StudyId study;
+  StudyShare share;
+};
+/// It is durable that these points, all failed before, have no row any more.
+struct FailuresForgotten {
+  StudyId study;
+  IntervalSet points;
+  AttemptRuns attempts{};  ///< in which they failed
+};
+/// A worker said hello. Worker numbers are never used twice.
+struct WorkerJoined {
+  WorkerId worker;
+  std::uint32_t threads;
+  std::string solver_version{};
+  std::string process{};                ///< that it is a connection of; empty: nobody knows
+  bool process_has_one_worker = false;  ///< its earlier connections have ended, if it had any
+};
+/// The worker takes so many batches more.
+struct CreditGiven {
+  WorkerId worker;
+  std::uint32_t batches;
+};
+struct ResultsReceived {
+  WorkerId worker;
+  StudyId study;
+  LeaseId lease;
+  std::uint64_t sequence;  ///< the worker's number for this message
+  bool batch_done;
+  double busy_s;
+  std::vector<PointOutcome> outcomes;
+};
+/// A StoreResults or StoreFailure effect is durable.
+struct ResultsStored {
+  WorkerId worker;  ///< 0: nobody waits for an acknowledgement
+  StudyId study;
+  std::uint64_t sequence;
+  std::vector<PointOutcome> outcomes;
+};
+/// The worker lives and holds these leases.
+struct HeartbeatReceived {
+  WorkerId worker;
+  std::vector<LeaseId> leases;
+};
+/// The worker said goodbye.
+struct WorkerLeft {
+  WorkerId worker;
+};
+/// A message could not be sent to the worker, or it behaves as no worker does.
+struct WorkerUnreachable {
+  WorkerId worker;
+  std::string reason = "its connection is gone";
+};
+/// While so much waits to go out to the worker, it gets nothing more. No sign of life.
+struct WorkerBusy {
+  WorkerId worker;
+  bool is_busy;
+};
+/// While held (the disk does not take results), no batch goes out.
+struct DispatchHeld {
+  bool held;
+};
+/// Time has passed.
+struct Tick {};
+
+using Event =
+    std::variant<StudyAdded, StudyCancelled, StudyPaused, StudyReopened, StudyShareChanged,
+                 FailuresForgotten, WorkerJoined, CreditGiven, ResultsReceived, ResultsStored,
+                 HeartbeatReceived, WorkerLeft, WorkerUnreachable, WorkerBusy, DispatchHeld, Tick>;
+
+// ---- Effects ----------------------------------------------------------------------------------
+
+/// Tell the worker the recipe: its first batch of the study follows.
+struct DefineStudy {
+  WorkerId worker;
+  StudyId study;
+};
+struct SendBatch {
+  WorkerId worker;
+  StudyId study;
+  std::uint64_t model;
+  std::uint64_t first_point;
+  std::uint64_t count;
+  std::uint32_t attempt;
+  LeaseId lease;
+};
+/// Make these results of the message durable, then say ResultsStored. Sent for every Results
+/// message, even with nothing to keep: the acknowledgement follows all commits before it.
+struct StoreResults {
+  WorkerId worker;
+  StudyId study;
+  std::uint64_t sequence;
+  std::vector<std::size_t> accepted;  ///< indices into the event's outcomes
+};
+/// Make it durable that the point failed, then say ResultsStored (worker 0).
+struct StoreFailure {
+  StudyId study;
+  std::uint64_t point;
+  std::uint32_t attempt;
+  std::string reason;
+};
+/// The results of that number are durable: tell the worker.
+struct AcknowledgeResults {
+  WorkerId worker;
+  std::uint64_t sequence;
+};
+/// Give the worker the probe under that lease: a point that every sound worker solves, and whose
+/// answer nobody needs. Its results are of `kProbeStudy`.
+struct SendProbe {
+  WorkerId worker;
+  LeaseId lease;
+};
+/// Tell the worker to drop the study.
+struct WithdrawStudy {
+  WorkerId worker;
+  StudyId study;
+};
+/// Every point of that batch has a result from elsewhere: what is left of it need not be solved.
+struct ReleaseBatch {
+  WorkerId worker;
+  LeaseId lease;
+};
+/// The worker is lost or was given up; it is unknown from now on.
+struct DropWorker {
+  WorkerId worker;
+  std::string reason;
+};
+/// Every point of the study is settled.
+struct StudyFinished {
+  StudyId study;
+};
+
+using Effect =
+    std::variant<DefineStudy, SendBatch, SendProbe, StoreResults, StoreFailure, AcknowledgeResults,
+                 WithdrawStudy, ReleaseBatch, DropWorker, StudyFinished>;
+
+/// No study has this number.
+constexpr StudyId kProbeStudy = 0;
+
+}  // namespace oblique::server

@@ -1,0 +1,140 @@
+// The part of the scheduler that takes results and gives points back.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "server/scheduler/scheduler.h"
+
+namespace oblique::server {
+namespace {
+
+/// Weight of the newest measurement in a worker's pace.
+constexpr double kPaceWeight = 0.5;
+
+}  // namespace
+
+void Scheduler::end_lease(LeaseId id, const std::optional<Loss>& loss) {
+  const Lease lease = leases_.at(id);
+  leases_.erase(id);
+  workers_.at(lease.worker).leases.erase(id);
+  if (const auto twin = leases_.find(lease.twin); twin != leases_.end()) {
+    twin->second.twin = 0;
+  }
+  Study& study = studies_.at(lease.study);
+  study.leases.erase(id, lease.chunk);
+  const std::vector<Interval> held = held_by(lease);
+  if (loss) {
+    note_loss(lease, held, *loss);
+  } else {
+    for (const Interval& run : held) {
+      study.points.give_back(run, lease.chunk.attempts + 1, lease.chunk.losses, now_ms_);
+    }
+  }
+  if (study.leases.empty()) {
+    study.overlaps = false;
+    if (!study.points.has_results()) {
+      study.solver_version.clear();
+    }
+  }
+  requeue(lease.study);
+}
+
+/// Points that are leased by this lease, which has ended, and by no other.
+std::vector<Interval> Scheduler::held_by(const Lease& lease) const {
+  const Study& study = studies_.at(lease.study);
+  const auto leased = study.points.leased_set().within(lease.chunk.first_point, lease.chunk.end());
+  if (!study.overlaps || leased.empty()) {
+    return leased;
+  }
+  IntervalSet held;
+  for (const Interval& run : leased) {
+    held.insert(run.begin, run.end);
+  }
+  for (const LeaseId id : study.leases.near(lease.chunk)) {
+    const Chunk& other = leases_.at(id).chunk;
+    held.erase(other.first_point, other.end());
+  }
+  return held.within(lease.chunk.first_point, lease.chunk.end());
+}
+
+/// A batch whose points were all answered by others is nobody's work any more.
+void Scheduler::release_if_answered(LeaseId id) {
+  const auto lease = leases_.find(id);
+  if (lease == leases_.end()) {
+    return;
+  }
+  const Chunk& chunk = lease->second.chunk;
+  const IntervalSet& leased = studies_.at(lease->second.study).points.leased_set();
+  if (leased.within(chunk.first_point, chunk.end()).empty()) {
+    effects_.emplace_back(ReleaseBatch{lease->second.worker, id});
+    end_lease(id, std::nullopt);
+  }
+}
+
+void Scheduler::on(const ResultsReceived& event) {
+  Worker* worker = heard_from(event.worker);
+  if (worker == nullptr) {
+    return;
+  }
+  StoreResults store{event.worker, event.study, event.sequence, {}};
+  const auto study = studies_.find(event.study);
+  // What a worker of another solver version solved before the study was given to this one's is
+  // not wanted, though acknowledged: those points are solved again.
+  if (study != studies_.end() && admits(study->second, *worker)) {
+    for (std::size_t i = 0; i < event.outcomes.size(); ++i) {
+      if (study->second.points.receive(event.outcomes[i].point)) {
+        store.accepted.push_back(i);
+      }
+    }
+    if (!store.accepted.empty() && study->second.solver_version.empty()) {
+      study->second.solver_version = worker->solver_version;
+    }
+    requeue(event.study);
+    learn_pace(*worker, event);
+  }
+  note_answers(*worker, event, !store.accepted.empty());
+  effects_.emplace_back(std::move(store));
+  const auto lease = leases_.find(event.lease);
+  if (lease == leases_.end() || lease->second.worker != event.worker ||
+      lease->second.study != event.study) {
+    return;
+  }
+  const LeaseId twin = lease->second.twin;
+  if (event.batch_done) {
+    // Points of a finished batch that got no answer count as lost, or a worker that never answers
+    // them would take them for ever.
+    end_lease(event.lease, Loss{kNobody, is_proven(*worker) && worker->leases.size() == 1});
+  }
+  release_if_answered(twin);
+}
+
+void Scheduler::learn_pace(Worker& worker, const ResultsReceived& event) {
+  if (event.outcomes.empty() || !std::isfinite(event.busy_s) || event.busy_s <= 0.0) {
+    return;
+  }
+  const double s_per_point = event.busy_s / static_cast<double>(event.outcomes.size());
+  double& known = worker.paces[event.study].s_per_point;
+  known = known > 0.0 ? known + kPaceWeight * (s_per_point - known) : s_per_point;
+}
+
+void Scheduler::on(const ResultsStored& event) {
+  const auto study = studies_.find(event.study);
+  const auto worker = workers_.find(event.worker);
+  if (study != studies_.end()) {
+    for (const PointOutcome& outcome : event.outcomes) {
+      if (study->second.points.settle(outcome.point)) {
+        study->second.failed += outcome.failed ? 1U : 0U;
+        if (worker != workers_.end()) {
+          worker->second.solved_points += outcome.failed ? 0U : 1U;
+        }
+      }
+    }
+    finish_if_complete(event.study);
+    requeue(event.study);
+  }
+  if (worker != workers_.end()) {
+    effects_.emplace_back(AcknowledgeResults{event.worker, event.sequence});
+  }
+}
+
+}  // namespace oblique::server

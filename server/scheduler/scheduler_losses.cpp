@@ -1,0 +1,212 @@
+// The part of the scheduler that weighs lost workers: what it makes of the points that they held,
+// and of the workers themselves.
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "server/scheduler/scheduler.h"
+
+namespace oblique::server {
+namespace {
+
+std::uint64_t size_of(const std::vector<Interval>& runs) {
+  std::uint64_t points = 0;
+  for (const Interval& run : runs) {
+    points += run.end - run.begin;
+  }
+  return points;
+}
+
+/// The run in up to `parts` parts of nearly one size.
+std::vector<Interval> split(const Interval& run, std::uint64_t parts) {
+  const std::uint64_t size = (run.end - run.begin + parts - 1) / parts;
+  std::vector<Interval> all;
+  for (std::uint64_t begin = run.begin; begin < run.end; begin += size) {
+    all.push_back({begin, std::min(begin + size, run.end)});
+  }
+  return all;
+}
+
+}  // namespace
+
+// ---- Points -----------------------------------------------------------------------------------
+
+/// The lease ended without an answer to some of its points. It alone held `held` of them.
+void Scheduler::note_loss(const Lease& lease, const std::vector<Interval>& held, Loss loss) {
+  StudyPoints& points = studies_.at(lease.study).points;
+  if (points.leased_set().within(lease.chunk.first_point, lease.chunk.end()).empty()) {
+    return;
+  }
+  if (loss.process != kNobody) {
+    processes_.at(loss.process).in_histories.insert(lease.study);
+  }
+  if (const auto twin = leases_.find(lease.twin); twin != leases_.end()) {
+    // What killed one worker may kill the other: that must not be forgotten.
+    twin->second.chunk.losses.add({loss.process, false});
+  }
+  if (held.empty()) {
+    return;
+  }
+  loss.alone = loss.alone && size_of(held) == 1;
+  LossHistory losses = lease.chunk.losses;
+  losses.add(loss);
+  const Standing standing = losses.standing(settings_.loss_limits);
+  // The parts are suspect too: those without the killer are solved, the other is split again.
+  const std::uint64_t parts = standing == Standing::kSound ? 1 : settings_.suspect_parts;
+  for (const Interval& run : held) {
+    for (const Interval& part : split(run, parts)) {
+      points.give_back(part, lease.chunk.attempts + 1, losses, now_ms_);
+    }
+  }
+  if (standing == Standing::kCondemned) {
+    condemned_.push_back({now_ms_ + settings_.return_within_ms, lease.study, held.front().begin});
+  }
+}
+
+/// The process lives: it was not killed by the points that it held when it was lost.
+void Scheduler::take_back_losses(ProcessNumber number) {
+  const std::set<StudyId> in_histories = std::exchange(processes_.at(number).in_histories, {});
+  for (const StudyId study : in_histories) {
+    studies_.at(study).points.take_back_losses(number);
+    for (const LeaseId lease : studies_.at(study).leases.all()) {
+      leases_.at(lease).chunk.losses.take_back(number);
+    }
+    requeue(study);
+  }
+}
+
+/// None of the processes that these points cost came back.
+void Scheduler::fail_condemned() {
+  while (!condemned_.empty() && condemned_.front().due_ms <= now_ms_) {
+    const Condemned condemned = condemned_.front();
+    condemned_.pop_front();
+    StudyPoints& points = studies_.at(condemned.study).points;
+    const auto chunk = points.take_condemned(condemned.point, now_ms_ - settings_.return_within_ms);
+    if (!chunk) {
+      continue;
+    }
+    points.receive(condemned.point);
+    requeue(condemned.study);
+    effects_.emplace_back(StoreFailure{
+        condemned.study, condemned.point, chunk->attempts,
+        "no answer: " + std::to_string(chunk->attempts) +
+            " leases of this point ended without one, " + std::to_string(chunk->losses.alone()) +
+            " of them because the worker was lost or gave up while it held nothing else"});
+  }
+}
+
+// ---- Workers ----------------------------------------------------------------------------------
+
+/// What its end, with the leases that it still has, says of the worker's process.
+void Scheduler::note_end(const Worker& worker, WorkerEnd how) {
+  if (worker.leases.empty()) {
+    return;
+  }
+  WorkerProcess& process = processes_.at(worker.process);
+  if (how != WorkerEnd::kLeft) {
+    ++process.lost_in_a_row;
+    process.losses += worker.leases.size();
+  }
+  if (how != WorkerEnd::kReplaced && !process.proven_since_ms) {
+    vanished_ms_.push_back(now_ms_);
+    while (vanished_ms_.size() > settings_.vanished_newcomers) {
+      vanished_ms_.pop_front();
+    }
+  }
+}
+
+/// What the message says of the worker's process.
+void Scheduler::note_answers(Worker& worker, const ResultsReceived& event, bool any_accepted) {
+  WorkerProcess& process = processes_.at(worker.process);
+  const auto lease = leases_.find(event.lease);
+  const bool is_probe = event.lease != 0 && event.lease == worker.probe;
+  const bool is_its_lease = lease != leases_.end() && worker.leases.contains(event.lease) &&
+                            lease->second.study == event.study;
+  const bool solved =
+      std::any_of(event.outcomes.begin(), event.outcomes.end(), [&](const PointOutcome& outcome) {
+        return !outcome.failed &&
+               (is_probe || (is_its_lease && outcome.point >= lease->second.chunk.first_point &&
+                             outcome.point < lease->second.chunk.end()));
+      });
+  if (is_probe) {
+    worker.probe = 0;
+  }
+  if (solved && !process.proven_since_ms) {
+    process.proven_since_ms = now_ms_;
+  }
+  if (solved || any_accepted) {
+    process.lost_in_a_row = 0;
+  } else if (is_its_lease && event.batch_done && event.outcomes.empty()) {
+    ++process.lost_in_a_row;
+    ++process.losses;
+  }
+}
+
+bool Scheduler::is_proven(const Worker& worker) const {
+  return processes_.at(worker.process).proven_since_ms.has_value();
+}
+
+/// It was lost again and again, or it is new in a time when those that are vanish.
+bool Scheduler::is_set_aside(const Worker& worker) const {
+  const WorkerProcess& process = processes_.at(worker.process);
+  return process.lost_in_a_row >= settings_.set_aside_after ||
+         (!process.proven_since_ms && vanished_ms_.size() >= settings_.vanished_newcomers &&
+          now_ms_ - vanished_ms_.front() <= settings_.newcomers_watched_ms);
+}
+
+/// Of those that may get points of the study.
+bool Scheduler::is_longest_proven(const Worker& worker, const Study& study) const {
+  const auto since_ms = processes_.at(worker.process).proven_since_ms;
+  return since_ms && std::none_of(workers_.begin(), workers_.end(), [&](const auto& entry) {
+           const auto other_ms = processes_.at(entry.second.process).proven_since_ms;
+           return other_ms && *other_ms < *since_ms && !is_set_aside(entry.second) &&
+                  admits(study, entry.second);
+         });
+}
+
+/// Hands the worker a point that all sound workers solve, if it was not just given one.
+bool Scheduler::probe(WorkerId id, Worker& worker) {
+  if (!worker.leases.empty() ||
+      (worker.probed_ms && now_ms_ - *worker.probed_ms < settings_.probe_interval_ms)) {
+    return false;
+  }
+  worker.probe = next_lease_++;
+  worker.probed_ms = now_ms_;
+  --worker.credit;
+  effects_.emplace_back(SendProbe{id, worker.probe});
+  return true;
+}
+
+void Scheduler::check_losses() const {
+  const auto require = [](bool holds, const char* what) {
+    if (!holds) {
+      throw std::logic_error(what);
+    }
+  };
+  processes_.check_invariants();
+  for (const auto& [id, worker] : workers_) {
+    const WorkerProcess& process = processes_.at(worker.process);
+    require(process.workers.contains(id), "a worker is not known as one of its process");
+    require(worker.probe == 0 || worker.leases.empty(), "a probe is not alone");
+    require(worker.leases.size() <= settings_.newcomer_batches || process.proven_since_ms,
+            "a newcomer has too many batches");
+  }
+  require(processes_.workers() == workers_.size(), "a process has workers that are not there");
+  for (const auto& [id, lease] : leases_) {
+    require(!lease.alone || is_proven(workers_.at(lease.worker)),
+            "suspect points are with a newcomer");
+  }
+  require(vanished_ms_.size() <= settings_.vanished_newcomers, "too many newcomers are noted");
+  std::map<StudyId, IntervalSet> to_fail;
+  for (const Condemned& condemned : condemned_) {
+    to_fail[condemned.study].insert(condemned.point);
+  }
+  for (const auto& [id, study] : studies_) {
+    for (const std::uint64_t point : study.points.condemned()) {
+      require(to_fail[id].contains(point), "a condemned point is forgotten");
+    }
+  }
+}
+
+}  // namespace oblique::server

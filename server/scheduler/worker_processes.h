@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+
+#include "server/scheduler/loss_history.h"
+
+namespace oblique::server {
+
+using StudyId = std::uint64_t;
+using WorkerId = std::uint64_t;
+
+/// What is known of one worker process. Each of its connections is a worker of its own.
+struct WorkerProcess {
+  std::string id;              ///< as it says itself; empty when it says none
+  std::set<WorkerId> workers;  ///< that are there
+  /// Since when it has solved points that were handed to it; nothing: not yet.
+  std::optional<std::int64_t> proven_since_ms{};
+  std::uint32_t lost_in_a_row = 0;   ///< losses since it last solved something
+  std::uint64_t losses = 0;          ///< leases of it that ended without an answer
+  std::set<StudyId> in_histories{};  ///< studies with points whose history it may be in
+};
+
+/// The processes behind the workers, those that are gone too, for they may come back. Of the latter
+/// only so many are remembered, the latest ones, and those that never solved anything apart from
+/// the others: who vanishes again and again under new names makes forget only his like.
+class WorkerProcesses {
+ public:
+  /// `most_absent` of either kind are remembered.
+  explicit WorkerProcesses(std::size_t most_absent) : most_absent_(most_absent) {}
+
+  /// A connection of the process `id`; an empty one is a process of its own. Returns its number.
+  ProcessNumber join(const std::string& id, WorkerId worker);
+  /// The connection ended. The process may be forgotten.
+  void leave(ProcessNumber number, WorkerId worker);
+
+  /// Throws std::out_of_range for one that is not remembered.
+  WorkerProcess& at(ProcessNumber number) { return processes_.at(number); }
+  const WorkerProcess& at(ProcessNumber number) const { return processes_.at(number); }
+  std::size_t size() const { return processes_.size(); }
+  std::size_t workers() const;  ///< of all processes
+
+  /// Throws std::logic_error when more is remembered than should be, or processes are not to be
+  /// found by their id.
+  void check_invariants() const;
+
+ private:
+  using Absent = std::deque<ProcessNumber>;  // the one that left first in front
+  Absent& absent_like(const WorkerProcess& process) {
+    return process.proven_since_ms ? absent_proven_ : absent_newcomers_;
+  }
+  void forget(ProcessNumber number);
+
+  std::size_t most_absent_;
+  ProcessNumber last_number_ = kNobody;
+  std::map<ProcessNumber, WorkerProcess> processes_;
+  std::map<std::string, ProcessNumber> numbers_;  // by id
+  Absent absent_proven_;
+  Absent absent_newcomers_;
+};
+
+}  // namespace oblique::server

@@ -1,0 +1,106 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "proto/oblique.pb.h"
+#include "proto/recipe/recipe.h"
+#include "server/scheduler/interval_set.h"
+#include "server/scheduler/study_points.h"
+#include "server/scheduler/study_table.h"
+
+namespace oblique::server {
+
+enum class StudyState { kRunning, kPaused, kCancelled, kDone };
+
+/// As in the column `studies.state`.
+constexpr const char* state_name(StudyState state) {
+  switch (state) {
+    case StudyState::kRunning:
+      return "running";
+    case StudyState::kPaused:
+      return "paused";
+    case StudyState::kDone:
+      return "done";
+    case StudyState::kCancelled:
+      return "cancelled";
+  }
+  return "";
+}
+
+// What can be written to the database. Instants are UTC in ISO 8601.
+
+struct AddStudy {
+  std::uint64_t study_id;
+  std::string name;
+  StudyTable table;
+  std::string created_at;
+  StudyShare share{};
+};
+
+struct SetStudyShare {
+  std::uint64_t study_id;
+  StudyShare share{};
+};
+
+/// Forgets that these points failed; a study that was done is running again. Rows of solved points
+/// stay.
+struct ForgetFailures {
+  std::uint64_t study_id;
+  IntervalSet points;
+  std::string changed_at;
+};
+
+struct SetStudyState {
+  std::uint64_t study_id;
+  StudyState state;
+  std::string changed_at;
+};
+
+struct AddWorker {
+  std::uint64_t worker_id;
+  std::string name;
+  std::uint32_t threads;
+  std::string solver_version;
+  std::string instruction_set;
+  std::string joined_at;
+};
+
+/// Results of one study. A point that has a row already keeps it.
+struct AddResults {
+  std::uint64_t study_id;
+  std::shared_ptr<const protocol::PointTable> table;
+  std::uint64_t worker_id;  ///< 0: the server itself failed the points
+  std::string solver_version;
+  std::string instruction_set;
+  std::uint32_t attempt;
+  std::string solved_at;
+  std::vector<protocol::PointResult> results;
+};
+
+using Change =
+    std::variant<AddStudy, SetStudyState, SetStudyShare, ForgetFailures, AddWorker, AddResults>;
+
+/// What the writer needs of a database. Tests put a failing one in its place.
+class Storage {
+ public:
+  virtual ~Storage() = default;
+
+  /// Makes all changes durable, in order, in one transaction. Throws StorageError: then none of
+  /// them was kept. Throws StorageGone as `check` does, before and after the transaction: nothing
+  /// that came back is lost.
+  virtual void commit(std::span<const Change> changes) = 0;
+
+  /// Throws StorageGone when the database is not where it was opened.
+  virtual void check() {}
+
+  /// Moves the write-ahead log into the database and empties it, so that the one file holds all.
+  /// False when a reader keeps it from doing so: to be tried again. Throws StorageError.
+  virtual bool merge_log() { return true; }
+};
+
+}  // namespace oblique::server

@@ -1,0 +1,357 @@
+#include "server/store/store.h"
+
+#include <algorithm>
+#include <array>
+#include <random>
+
+#include <nlohmann/json.hpp>
+
+#include "server/database/row_checksum.h"
+#include "server/store/result_row.h"
+#include "server/store/schema.h"
+
+namespace oblique::server {
+namespace {
+
+constexpr int kBusyTimeout_ms = 2000;
+constexpr std::size_t kMostCachedModels = 65536;
+
+std::string random_id() {
+  std::random_device source;
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  std::string id;
+  for (int i = 0; i < 32; ++i) {
+    id += kDigits[source() % kDigits.size()];
+  }
+  return id;
+}
+
+/// Inserts a model, its columns by name. The keys are the columns, but for those handled first.
+std::string insert_model_sql() {
+  std::string names = "definition, lengths_m";
+  std::string marks = "?, ?";
+  for (const auto& key : solver::model_keys()) {
+    names += ", " + std::string(key.name);
+    marks += ", ?";
+  }
+  return "INSERT INTO models (" + names + ") VALUES (" + marks +
+         ") ON CONFLICT (definition) DO NOTHING";
+}
+
+void bind_model(Statement& insert, const solver::ModelParameters& model,
+                const std::string& definition) {
+  insert.reset();
+  insert.bind_blob(1, definition);
+  insert.bind(2, nlohmann::json(model.lengths_m).dump());
+  int index = 3;
+  for (const auto& key : solver::model_keys()) {
+    const double value = key.get(model);
+    const bool whole = key.name == "links" || key.name == "elements_per_link";
+    if (key.name == "integrator") {
+      insert.bind(index, solver::integrator_name(model.integrator));
+    } else if (whole) {
+      insert.bind(index, static_cast<std::int64_t>(value));
+    } else if (key.name != "length" ||
+               std::count(model.lengths_m.begin(), model.lengths_m.end(), value) ==
+                   static_cast<std::ptrdiff_t>(model.lengths_m.size())) {
+      insert.bind(index, value);
+    }
+    ++index;
+  }
+}
+
+/// While it lives the connection waits for no other one.
+class Impatience {
+ public:
+  explicit Impatience(sqlite3* database) : database_(database) {
+    sqlite3_busy_timeout(database_, 0);
+  }
+  ~Impatience() { sqlite3_busy_timeout(database_, kBusyTimeout_ms); }
+  Impatience(const Impatience&) = delete;
+  Impatience& operator=(const Impatience&) = delete;
+
+ private:
+  sqlite3* database_;
+};
+
+}  // namespace
+
+struct Store::Statements {
+  explicit Statements(sqlite3* database)
+      : add_study(database,
+                  "INSERT INTO studies (study_id, name, recipe, points, state, created_at,"
+                  " changed_at, priority, weight, mixes_versions, checksum)"
+                  " VALUES (?1, ?2, ?3, ?4, 'running', ?5, ?5, ?6, ?7, ?8,"
+                  " row_checksum(?1, ?2, ?3, ?4, ?5))"),
+        set_state(database, "UPDATE studies SET state = ?2, changed_at = ?3 WHERE study_id = ?1"),
+        set_share(database,
+                  "UPDATE studies SET priority = ?2, weight = ?3, mixes_versions = ?4"
+                  " WHERE study_id = ?1"),
+        note_retries(database,
+                     // Neighbours of one attempt have one difference between number and rank.
+                     "INSERT INTO retries (study_id, first_point, points, attempt, retried_at)"
+                     " SELECT ?1, min(point), count(*), attempt, ?4 FROM"
+                     " (SELECT point, attempt,"
+                     " point - row_number() OVER (PARTITION BY attempt ORDER BY point) AS run"
+                     " FROM results WHERE study_id = ?1 AND point >= ?2 AND point < ?3"
+                     " AND status = 'failed') GROUP BY attempt, run"),
+        forget_failures(database,
+                        "DELETE FROM results WHERE study_id = ?1 AND point >= ?2 AND point < ?3"
+                        " AND status = 'failed'"),
+        reopen(database,
+               "UPDATE studies SET state = 'running', changed_at = ?2"
+               " WHERE study_id = ?1 AND state = 'done'"),
+        add_worker(database,
+                   "INSERT INTO workers (worker_id, name, threads, solver_version,"
+                   " instruction_set, joined_at) VALUES (?, ?, ?, ?, ?, ?)"),
+        find_model(database, "SELECT model_id FROM models WHERE definition = ?"),
+        add_model(database, insert_model_sql()),
+        add_result(database, insert_result_sql()) {}
+
+  Statement add_study;
+  Statement set_state;
+  Statement set_share;
+  Statement note_retries;
+  Statement forget_failures;
+  Statement reopen;
+  Statement add_worker;
+  Statement find_model;
+  Statement add_model;
+  Statement add_result;
+};
+
+Store::Store(const std::string& path) {
+  check_path(path);
+  files_ = std::make_unique<DatabaseFiles>(path);
+  database_ = open_database(path, SQLITE_OPEN_READWRITE);
+  sqlite3_busy_timeout(database_.get(), kBusyTimeout_ms);
+  add_row_checksum(database_.get());
+  log_ = std::make_unique<WriteAheadLog>(database_.get());
+  const DatabaseKind kind = identify(database_.get(), path);
+  Statement journal(database_.get(), "PRAGMA journal_mode = WAL");
+  if (!journal.step() || journal.text(0) != "wal") {
+    throw StorageError("the file system of " + path + " cannot hold a write-ahead log");
+  }
+  journal.reset();
+  execute(database_.get(), "PRAGMA synchronous = FULL");
+  log_->make_sure();
+  if (kind == DatabaseKind::kEmpty) {
+    create_schema();
+    log_->merge();  // the file is a whole database from the start
+  } else if (kind == DatabaseKind::kOlder) {
+    migrate();
+  }
+  statements_ = std::make_unique<Statements>(database_.get());
+  files_->expect(database_.get(), database_id());
+}
+
+Store::~Store() {
+  try {
+    files_->check();
+    log_->before_closing();
+  } catch (const StorageGone&) {
+    leave_files();
+  }
+}
+
+/// Whoever comes after must not find our log beside another database, where SQLite would take it
+/// for that one's. What was acknowledged goes into our own file, wherever that may be now.
+void Store::leave_files() {
+  try {
+    if (files_->were_overwritten()) {
+      log_->discard();
+    } else {
+      log_->merge();
+    }
+  } catch (const StorageError&) {
+    // Nothing more can be done for it.
+  }
+}
+
+void Store::create_schema() {
+  Transaction transaction(database_.get());
+  execute(database_.get(), kSchemaSql);
+  execute(database_.get(), "PRAGMA application_id = " + std::to_string(kApplicationId));
+  execute(database_.get(), "PRAGMA user_version = " + std::to_string(kSchemaVersion));
+  Statement about(database_.get(), "INSERT INTO about (database_id) VALUES (?)");
+  about.bind(1, random_id());
+  about.run();
+  transaction.commit();
+}
+
+void Store::migrate() {
+  constexpr std::array kSteps{kMigrateFrom1Sql, kMigrateFrom2Sql, kMigrateFrom3Sql};
+  static_assert(kSteps.size() == kSchemaVersion - 1, "a step from each schema to the next");
+  Statement version(database_.get(), "PRAGMA user_version");
+  version.step();
+  const auto found = static_cast<std::size_t>(version.integer(0));
+  version.reset();
+  Transaction transaction(database_.get());
+  for (std::size_t step = found; step < kSchemaVersion; ++step) {
+    execute(database_.get(), kSteps.at(step - 1));
+  }
+  execute(database_.get(), "PRAGMA user_version = " + std::to_string(kSchemaVersion));
+  transaction.commit();
+}
+
+void Store::set_sync(bool full) {
+  if (full != full_sync_) {
+    execute(database_.get(), full ? "PRAGMA synchronous = FULL" : "PRAGMA synchronous = NORMAL");
+    full_sync_ = full;
+  }
+}
+
+void Store::commit(std::span<const Change> changes) {
+  const bool control = std::any_of(changes.begin(), changes.end(), [](const Change& change) {
+    return !std::holds_alternative<AddWorker>(change) &&
+           !std::holds_alternative<AddResults>(change);
+  });
+  try {
+    files_->check();
+    log_->make_sure();
+    set_sync(control);
+    Transaction transaction(database_.get());
+    for (const Change& change : changes) {
+      std::visit([this](const auto& c) { add(c); }, change);
+    }
+    transaction.commit();
+    files_->check();  // or it was committed to a file that nobody will find
+    log_->shorten();
+  } catch (...) {
+    model_ids_.clear();
+    log_->suspect();
+    throw;
+  }
+}
+
+bool Store::merge_log() {
+  files_->check();
+  // A reader may take long, and results would wait.
+  const Impatience impatience(database_.get());
+  return log_->merge();
+}
+
+void Store::add(const AddStudy& change) {
+  Statement& insert = statements_->add_study;
+  insert.bind(1, change.study_id);
+  insert.bind(2, change.name);
+  insert.bind_blob(3, change.table.recipe_bytes());
+  insert.bind(4, change.table.size());
+  insert.bind(5, change.created_at);
+  insert.bind(6, std::int64_t{change.share.priority});
+  insert.bind(7, change.share.weight);
+  insert.bind(8, std::int64_t{change.share.mixes_versions});
+  insert.run();
+}
+
+void Store::add(const SetStudyShare& change) {
+  Statement& update = statements_->set_share;
+  update.bind(1, change.study_id);
+  update.bind(2, std::int64_t{change.share.priority});
+  update.bind(3, change.share.weight);
+  update.bind(4, std::int64_t{change.share.mixes_versions});
+  update.run();
+}
+
+void Store::add(const ForgetFailures& change) {
+  change.points.for_each([&](const Interval& run) {
+    Statement& note = statements_->note_retries;
+    note.bind(1, change.study_id);
+    note.bind(2, run.begin);
+    note.bind(3, run.end);
+    note.bind(4, change.changed_at);
+    note.run();
+    Statement& forget = statements_->forget_failures;
+    forget.bind(1, change.study_id);
+    forget.bind(2, run.begin);
+    forget.bind(3, run.end);
+    forget.run();
+  });
+  Statement& reopen = statements_->reopen;
+  reopen.bind(1, change.study_id);
+  reopen.bind(2, change.changed_at);
+  reopen.run();
+}
+
+void Store::add(const SetStudyState& change) {
+  Statement& update = statements_->set_state;
+  update.bind(1, change.study_id);
+  update.bind(2, std::string_view(state_name(change.state)));
+  update.bind(3, change.changed_at);
+  update.run();
+}
+
+void Store::add(const AddWorker& change) {
+  Statement& insert = statements_->add_worker;
+  insert.bind(1, change.worker_id);
+  insert.bind(2, change.name);
+  insert.bind(3, std::uint64_t{change.threads});
+  insert.bind(4, change.solver_version);
+  insert.bind(5, change.instruction_set);
+  insert.bind(6, change.joined_at);
+  insert.run();
+}
+
+void Store::add(const AddResults& change) {
+  for (const protocol::PointResult& result : change.results) {
+    const protocol::Point point = change.table->point(result.point());
+    const RowContext context{
+        change.study_id,       model_id(change, point.model), point,          change.worker_id,
+        change.solver_version, change.instruction_set,        change.attempt, change.solved_at};
+    bind_result(statements_->add_result, context, result);
+    statements_->add_result.run();
+  }
+}
+
+std::int64_t Store::model_id(const AddResults& change, std::uint64_t model) {
+  const std::pair key{change.study_id, model};
+  if (const auto known = model_ids_.find(key); known != model_ids_.end()) {
+    return known->second;
+  }
+  const solver::ModelParameters parameters = change.table->model(model);
+  const std::string definition = protocol::to_message(parameters).SerializeAsString();
+  bind_model(statements_->add_model, parameters, definition);
+  statements_->add_model.run();
+  Statement& find = statements_->find_model;
+  find.bind_blob(1, definition);
+  find.step();
+  const std::int64_t id = find.integer(0);
+  find.reset();
+  if (model_ids_.size() >= kMostCachedModels) {
+    model_ids_.clear();
+  }
+  model_ids_.emplace(key, id);
+  return id;
+}
+
+std::uint64_t Store::highest(const std::string& sql) {
+  Statement statement(database_.get(), sql);
+  return statement.step() ? static_cast<std::uint64_t>(statement.integer(0)) : 0;
+}
+
+std::uint64_t Store::last_study_id() {
+  return highest("SELECT max(study_id) FROM studies");
+}
+
+std::uint64_t Store::last_worker_id() {
+  return highest("SELECT max(worker_id) FROM workers");
+}
+
+std::uint64_t Store::count_start() {
+  log_->make_sure();
+  set_sync(true);
+  Transaction transaction(database_.get());
+  execute(database_.get(), "UPDATE about SET starts = starts + 1");
+  transaction.commit();
+  return highest("SELECT starts FROM about");
+}
+
+std::string Store::database_id() {
+  Statement statement(database_.get(), "SELECT database_id FROM about");
+  if (!statement.step()) {
+    throw StorageError("the database has lost its identity: the table about is empty");
+  }
+  return statement.text(0);
+}
+
+}  // namespace oblique::server

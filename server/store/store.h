@@ -1,0 +1,98 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/database/sqlite.h"
+#include "server/scheduler/attempt_runs.h"
+#include "server/scheduler/interval_set.h"
+#include "server/store/changes.h"
+#include "server/store/database_files.h"
+#include "server/store/write_ahead_log.h"
+
+namespace oblique::server {
+
+/// A study as the database has it.
+struct StoredStudy {
+  std::uint64_t study_id;
+  std::string name;
+  StudyTable table;
+  StudyState state;
+  std::string created_at;
+  StudyShare share{};
+  std::string solver_version;  ///< of its first result that a worker solved; empty: there is none
+  IntervalSet settled;         ///< points that have a row
+  IntervalSet failures;        ///< those whose row says failed
+  AttemptRuns attempts{};      ///< of these, and of those that failed and were forgotten
+};
+
+/// The SQLite database (schema.sql), opened for writing. Only one Store may have a file open;
+/// readers are free. A new file is for its owner alone (mode 0600). Results are committed without
+/// waiting for the disk's own cache (losing power may undo the last ones, which are then solved
+/// again), studies with a full sync.
+class Store final : public Storage {
+ public:
+  /// Opens the database at `path`, or makes it; one of an older schema is brought to the present
+  /// one. Throws StorageError naming what was found: a directory, a foreign file, a newer schema, a
+  /// damaged or unwritable file, one that is open elsewhere.
+  explicit Store(const std::string& path);
+  ~Store() override;
+
+  void commit(std::span<const Change> changes) override;
+  void check() override { files_->check(); }
+  bool merge_log() override;
+
+  /// There was no file; it was made.
+  bool is_new() const { return files_->were_made(); }
+
+  /// The log is moved into the database when it has so many pages; 1000 unless told.
+  void checkpoint_at(int pages) { log_->shorten_at(pages); }
+
+  /// All studies in the order of their numbers, with what is settled. Throws StorageError, also for
+  /// a recipe that cannot be read.
+  std::vector<StoredStudy> studies();
+  /// A sentence about each study that `studies` left out, because an earlier version took what this
+  /// one does not.
+  const std::vector<std::string>& left_out() const { return left_out_; }
+
+  /// Highest number given to a study or worker so far; 0 when there is none.
+  std::uint64_t last_study_id();
+  std::uint64_t last_worker_id();
+
+  /// To be called once, when a server begins to work: counts it, durably. Returns how many began so
+  /// far, this one included.
+  std::uint64_t count_start();
+
+  /// Drawn at random when the file was made.
+  std::string database_id();
+
+ private:
+  struct Statements;
+
+  void leave_files();
+  void create_schema();
+  void migrate();
+  void add(const AddStudy& change);
+  void add(const SetStudyState& change);
+  void add(const SetStudyShare& change);
+  void add(const ForgetFailures& change);
+  void add(const AddWorker& change);
+  void add(const AddResults& change);
+  std::int64_t model_id(const AddResults& change, std::uint64_t model);
+  void set_sync(bool full);
+  std::uint64_t highest(const std::string& sql);
+
+  std::unique_ptr<DatabaseFiles> files_;  // outlives the connection
+  DatabaseHandle database_;
+  std::unique_ptr<WriteAheadLog> log_;
+  std::unique_ptr<Statements> statements_;
+  // Row of `models` by study and model number; emptied when it grows or a transaction fails.
+  std::map<std::pair<std::uint64_t, std::uint64_t>, std::int64_t> model_ids_;
+  bool full_sync_ = true;
+  std::vector<std::string> left_out_;
+};
+
+}  // namespace oblique::server

@@ -1,0 +1,104 @@
+#include "server/store/write_ahead_log.h"
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "server/database/sqlite.h"
+
+namespace oblique::server {
+namespace {
+
+/// The log; nullptr while there is none.
+sqlite3_file* file_of(sqlite3* database) {
+  sqlite3_file* file = nullptr;
+  sqlite3_file_control(database, "main", SQLITE_FCNTL_JOURNAL_POINTER, &file);
+  return file != nullptr && file->pMethods != nullptr ? file : nullptr;  // without them: not open
+}
+
+/// Writes every byte of the file as it is, and syncs it. SQLite's code for what failed.
+int write_again(sqlite3_file* file) {
+  std::vector<char> bytes(std::size_t{1} << 16U);
+  sqlite3_int64 size = 0;
+  int code = file->pMethods->xFileSize(file, &size);
+  for (sqlite3_int64 at = 0; at < size && code == SQLITE_OK; at += std::ssize(bytes)) {
+    const auto part = static_cast<int>(std::min<sqlite3_int64>(std::ssize(bytes), size - at));
+    code = file->pMethods->xRead(file, bytes.data(), part, at);
+    if (code == SQLITE_OK) {
+      code = file->pMethods->xWrite(file, bytes.data(), part, at);
+    }
+  }
+  return code == SQLITE_OK ? file->pMethods->xSync(file, SQLITE_SYNC_NORMAL) : code;
+}
+
+}  // namespace
+
+WriteAheadLog::WriteAheadLog(sqlite3* database) : database_(database) {
+  // Closing would make a checkpoint of a log that may be suspect.
+  sqlite3_db_config(database_, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
+  sqlite3_wal_hook(
+      database_,
+      [](void* log, sqlite3*, const char*, int pages) {
+        static_cast<WriteAheadLog*>(log)->pages_ = pages;
+        return SQLITE_OK;
+      },
+      this);
+}
+
+void WriteAheadLog::make_sure() {
+  if (!is_suspect_) {
+    return;
+  }
+  // No other program may write meanwhile.
+  const Transaction transaction(database_);
+  sqlite3_file* file = file_of(database_);
+  const int code = file != nullptr ? write_again(file) : SQLITE_OK;
+  if (code != SQLITE_OK) {
+    throw StorageError("the write-ahead log cannot be written again after a failure: " +
+                       std::string(sqlite3_errstr(code)));
+  }
+  is_suspect_ = false;
+}
+
+void WriteAheadLog::shorten() {
+  if (pages_ < long_pages_) {
+    return;
+  }
+  const int code =
+      sqlite3_wal_checkpoint_v2(database_, "main", SQLITE_CHECKPOINT_PASSIVE, nullptr, nullptr);
+  // Readers may keep it from doing all, which is no fault.
+  is_suspect_ = code != SQLITE_OK && code != SQLITE_BUSY;
+}
+
+bool WriteAheadLog::merge() {
+  make_sure();
+  const int code =
+      sqlite3_wal_checkpoint_v2(database_, "main", SQLITE_CHECKPOINT_TRUNCATE, nullptr, nullptr);
+  if ((static_cast<unsigned>(code) & 0xffU) == SQLITE_BUSY) {
+    return false;
+  }
+  if (code != SQLITE_OK) {
+    is_suspect_ = true;
+    throw StorageError("the write-ahead log cannot be merged into the database: " +
+                       std::string(sqlite3_errstr(code)));
+  }
+  pages_ = 0;
+  return true;
+}
+
+void WriteAheadLog::discard() {
+  if (sqlite3_file* file = file_of(database_); file != nullptr) {
+    file->pMethods->xTruncate(file, 0);
+  }
+}
+
+void WriteAheadLog::before_closing() {
+  try {
+    make_sure();
+    sqlite3_db_config(database_, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 0, nullptr);
+  } catch (const StorageError&) {
+    // The next server tries again, with the log as it is.
+  }
+}
+
+}  // namespace oblique::server

@@ -1,0 +1,253 @@
+#include "server/store/writer.h"
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <iterator>
+#include <set>
+#include <type_traits>
+#include <utility>
+#include <variant>
+
+#include "server/database/sqlite.h"
+
+namespace oblique::server {
+namespace {
+
+/// Jobs in one transaction at most, so that acknowledgements do not wait long.
+constexpr std::size_t kLargestGroup = 256;
+
+/// Pause before a faulty database is tried again.
+constexpr std::chrono::milliseconds kRetryPause{500};
+
+/// While nothing is to be written the database is looked after so often.
+constexpr std::chrono::milliseconds kTendPause{1000};
+
+/// So often a log that readers hold is tried before that is said.
+constexpr int kQuietTries = 5;
+
+/// At the end the log is tried so often, with such pauses: readers have some seconds.
+constexpr int kLastTries = 15;
+constexpr std::chrono::milliseconds kLastPause{200};
+
+bool ends_a_study(const Change& change) {
+  const auto* state = std::get_if<SetStudyState>(&change);
+  return state != nullptr && state->state == StudyState::kDone;
+}
+
+/// The study that a change is of; 0: of none.
+std::uint64_t study_of(const Change& change) {
+  return std::visit(
+      [](const auto& c) -> std::uint64_t {
+        if constexpr (std::is_same_v<std::decay_t<decltype(c)>, AddWorker>) {
+          return 0;
+        } else {
+          return c.study_id;
+        }
+      },
+      change);
+}
+
+}  // namespace
+
+Writer::Writer(Storage& storage, Report report)
+    : commits_(storage), report_(std::move(report)), thread_([this] { run(); }) {}
+
+Writer::~Writer() {
+  finish();
+}
+
+void Writer::submit(WriteJob job) {
+  const std::lock_guard lock(mutex_);
+  queue_.push_back(std::move(job));
+  wake_.notify_one();
+}
+
+std::size_t Writer::finish() {
+  {
+    const std::lock_guard lock(mutex_);
+    finishing_ = true;
+    wake_.notify_one();
+  }
+  if (thread_.joinable()) {
+    thread_.join();
+  }
+  return left_over_;
+}
+
+void Writer::run() {
+  std::deque<WriteJob> jobs;  // taken from the queue, not yet durable
+  while (true) {
+    bool last_round = false;
+    {
+      std::unique_lock lock(mutex_);
+      if (commits_.is_faulty() || commits_.is_gone()) {
+        wake_.wait_for(lock, kRetryPause, [this] { return finishing_; });
+      } else if (jobs.empty()) {
+        wake_.wait_for(lock, kTendPause, [this] { return finishing_ || !queue_.empty(); });
+      }
+      std::move(queue_.begin(), queue_.end(), std::back_inserter(jobs));
+      queue_.clear();
+      last_round = finishing_;
+    }
+    const bool was_faulty = commits_.is_faulty();
+    auto reports = jobs.empty() ? commits_.tend() : commits_.write(jobs);
+    if (!reports.empty()) {
+      report_(std::move(reports));
+    }
+    const bool gives_up = commits_.is_gone() || (was_faulty && commits_.is_faulty());
+    if (last_round && (jobs.empty() || gives_up)) {
+      left_over_ = jobs.size();
+      merge_before_the_end();
+      return;
+    }
+  }
+}
+
+void Writer::merge_before_the_end() {
+  if (commits_.is_faulty()) {
+    return;  // what waits is not in the log either; that it is lost is said
+  }
+  std::vector<WriteReport> reports;
+  bool merged = false;
+  for (int tries = 0; !merged && !commits_.is_gone() && tries < kLastTries; ++tries) {
+    if (tries > 0) {
+      std::this_thread::sleep_for(kLastPause);
+    }
+    merged = commits_.merge(reports);
+  }
+  if (!merged && !commits_.is_gone()) {
+    reports.push_back(commits_.unmerged());
+  }
+  if (!reports.empty()) {
+    report_(std::move(reports));
+  }
+}
+
+std::vector<WriteReport> GroupCommit::write(std::deque<WriteJob>& jobs) {
+  std::vector<WriteReport> reports;
+  if (!gone_ && !jobs.empty() && !write_group(jobs, reports)) {
+    write_singly(jobs, reports);
+  }
+  return reports;
+}
+
+std::vector<WriteReport> GroupCommit::tend() {
+  std::vector<WriteReport> reports;
+  if (gone_) {
+    return reports;
+  }
+  try {
+    storage_.check();
+  } catch (const StorageGone& error) {
+    note_gone(error, reports);
+    return reports;
+  }
+  if (to_be_merged_ && !merge(reports) && ++tries_ == kQuietTries) {
+    reports.push_back(unmerged());
+  }
+  return reports;
+}
+
+bool GroupCommit::merge(std::vector<WriteReport>& reports) {
+  try {
+    to_be_merged_ = !storage_.merge_log();
+    why_unmerged_ = to_be_merged_ ? "another program is in the middle of reading" : "";
+    return !to_be_merged_;
+  } catch (const StorageGone& error) {
+    note_gone(error, reports);
+  } catch (const StorageError& error) {
+    why_unmerged_ = error.what();  // what was committed stands, and the log is still there
+  }
+  return false;
+}
+
+void GroupCommit::note_ends(std::span<const Change> changes) {
+  if (std::any_of(changes.begin(), changes.end(), ends_a_study)) {
+    to_be_merged_ = true;
+    tries_ = 0;
+  }
+}
+
+void GroupCommit::note_gone(const StorageGone& error, std::vector<WriteReport>& reports) {
+  gone_ = true;
+  reports.push_back({WriteReport::Kind::kGone, 0, error.what()});
+}
+
+bool GroupCommit::write_group(std::deque<WriteJob>& jobs, std::vector<WriteReport>& reports) {
+  const std::size_t size = std::min(jobs.size(), kLargestGroup);
+  std::vector<Change> changes;
+  changes.reserve(size);
+  for (std::size_t i = 0; i < size; ++i) {
+    changes.push_back(std::move(jobs[i].change));
+  }
+  const auto put_back = [&] {
+    for (std::size_t i = 0; i < size; ++i) {
+      jobs[i].change = std::move(changes[i]);
+    }
+  };
+  try {
+    storage_.commit(changes);
+  } catch (const StorageGone& error) {
+    put_back();
+    note_gone(error, reports);
+    return true;
+  } catch (const std::exception&) {  // out of memory, too
+    put_back();
+    return false;  // which of them failed is found by trying each alone
+  }
+  note_ends(changes);
+  if (std::exchange(faulty_, false)) {
+    reports.push_back({WriteReport::Kind::kRecovered, 0, {}});
+  }
+  for (std::size_t i = 0; i < size; ++i) {
+    reports.push_back({WriteReport::Kind::kStored, jobs[i].ticket, {}});
+  }
+  jobs.erase(jobs.begin(), jobs.begin() + static_cast<std::ptrdiff_t>(size));
+  return true;
+}
+
+void GroupCommit::write_singly(std::deque<WriteJob>& jobs, std::vector<WriteReport>& reports) {
+  std::deque<WriteJob> kept;
+  std::set<std::uint64_t> waiting;  // studies with a job among those kept
+  std::string fault;
+  const auto keep = [&](WriteJob& job) {
+    waiting.insert(study_of(job.change));
+    kept.push_back(std::move(job));
+  };
+  for (WriteJob& job : jobs) {
+    // Behind a job that is kept nothing of its kind is tried, nor anything else of its study: done
+    // and then retried must not become retried and then done.
+    if (gone_ || (!fault.empty() && !job.answer_failure)) {
+      keep(job);
+      continue;
+    }
+    if (waiting.contains(study_of(job.change))) {
+      reports.push_back({WriteReport::Kind::kRefused, job.ticket, fault});
+      continue;
+    }
+    try {
+      storage_.commit({&job.change, 1});
+      note_ends({&job.change, 1});
+      reports.push_back({WriteReport::Kind::kStored, job.ticket, {}});
+    } catch (const StorageGone& error) {
+      note_gone(error, reports);
+      keep(job);
+    } catch (const std::exception& error) {
+      if (job.answer_failure) {
+        reports.push_back({WriteReport::Kind::kRefused, job.ticket, error.what()});
+      } else {
+        fault = error.what();
+        keep(job);
+      }
+    }
+  }
+  jobs = std::move(kept);
+  if (!gone_ && faulty_ != !fault.empty()) {
+    faulty_ = !fault.empty();
+    reports.push_back(
+        {faulty_ ? WriteReport::Kind::kFault : WriteReport::Kind::kRecovered, 0, fault});
+  }
+}
+
+}  // namespace oblique::server

@@ -1,0 +1,115 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <span>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "server/database/sqlite.h"
+#include "server/store/changes.h"
+
+namespace oblique::server {
+
+/// A change on its way to the database.
+struct WriteJob {
+  std::uint64_t ticket;
+  Change change;
+  /// Somebody waits for a yes or no: a failure is reported at once. Otherwise the change is kept
+  /// and tried again until it is durable.
+  bool answer_failure;
+};
+
+/// What became of a job, or of the database itself.
+struct WriteReport {
+  enum class Kind {
+    kStored,     ///< the job of that ticket is durable
+    kRefused,    ///< it failed and is given up; `error` says why
+    kFault,      ///< the database does not take changes; jobs wait. Said once
+    kRecovered,  ///< it does again
+    kGone,       ///< its files are not there any more; nothing is written from then on. Said once
+    kUnmerged,  ///< the write-ahead log cannot be merged, as `error` says. Said once a study or end
+  };
+  Kind kind;
+  std::uint64_t ticket = 0;
+  std::string error;
+};
+
+/// Writes jobs in groups, one transaction each. No thread and no clock of its own.
+class GroupCommit {
+ public:
+  /// `storage` must outlive this.
+  explicit GroupCommit(Storage& storage) : storage_(storage) {}
+
+  /// Writes the first of `jobs`, in order, and takes off what is durable or given up. When a group
+  /// fails, each of all jobs is tried alone, so that a bad one does not take the others with it;
+  /// changes of one study keep their order also then.
+  std::vector<WriteReport> write(std::deque<WriteJob>& jobs);
+
+  /// The last write left jobs that the database did not take.
+  bool is_faulty() const { return faulty_; }
+  /// The database is not where it was; nothing is written any more.
+  bool is_gone() const { return gone_; }
+
+  /// To be called now and then while nothing waits: looks whether the database is still there, and
+  /// merges its log once a study is done.
+  std::vector<WriteReport> tend();
+
+  /// Merges the log. False when it must be tried again; the database may be gone by then.
+  bool merge(std::vector<WriteReport>& reports);
+  /// Says that the last `merge` failed, and why.
+  WriteReport unmerged() const { return {WriteReport::Kind::kUnmerged, 0, why_unmerged_}; }
+
+ private:
+  bool write_group(std::deque<WriteJob>& jobs, std::vector<WriteReport>& reports);
+  void write_singly(std::deque<WriteJob>& jobs, std::vector<WriteReport>& reports);
+
+  void note_ends(std::span<const Change> changes);
+  void note_gone(const StorageGone& error, std::vector<WriteReport>& reports);
+
+  Storage& storage_;
+  bool faulty_ = false;
+  bool gone_ = false;
+  bool to_be_merged_ = false;  // a study is done
+  int tries_ = 0;              // to merge since then
+  std::string why_unmerged_;
+};
+
+/// The one thread that writes the database. What waits is committed together, in order.
+class Writer {
+ public:
+  using Report = std::function<void(std::vector<WriteReport>)>;
+
+  /// `report` is called on the writer's thread, after each commit. `storage`
+  /// must outlive the writer.
+  Writer(Storage& storage, Report report);
+  /// Stops without waiting for jobs that keep failing.
+  ~Writer();
+  Writer(const Writer&) = delete;
+  Writer& operator=(const Writer&) = delete;
+
+  void submit(WriteJob job);
+
+  /// Writes what waits, merges the log and ends the thread. Returns how many jobs could not be made
+  /// durable.
+  std::size_t finish();
+
+ private:
+  void run();
+  void merge_before_the_end();
+
+  GroupCommit commits_;  // of the thread
+  Report report_;
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  std::deque<WriteJob> queue_;  // guarded by mutex_
+  bool finishing_ = false;      // guarded by mutex_
+  std::size_t left_over_ = 0;   // written by the thread, read after it ended
+  std::thread thread_;          // last: it uses all the others
+};
+
+}  // namespace oblique::server

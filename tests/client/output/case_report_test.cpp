@@ -1,0 +1,100 @@
+#include "client/output/case_report.h"
+
+#include <set>
+#include <sstream>
+#include <string>
+
+#include <gtest/gtest.h>
+
+namespace oblique::client {
+namespace {
+
+solver::CaseResult some_result() {
+  solver::CaseResult result{};
+  result.H_m = 1.0;
+  result.mu = 1.2;
+  result.peaks = {{1e-5, 4000.0, 2000.0, true}, {2e-5, 3990.0, 1990.0, false}};
+  result.ft_peaks = {{1.5e-5, 2100.0}};
+  result.fn_peak_N = 4000.0;
+  result.mode = "SC SR sC sR";
+  result.major_mode = "SC SR";
+  result.stick_intervals = {{0.0, 1e-5}};
+  result.phases = {{solver::PhaseKind::kCompression, 0.0, 1e-5},
+                   {solver::PhaseKind::kRestitution, 1e-5, 3e-5}};
+  result.solver = {"explicit", 1e-6, 30, 1e-3, "0.1.0"};
+  return result;
+}
+
+TEST(SolveJson, HasExactlyTheFieldsThatAreDocumented) {
+  const auto json = json_of(some_result());
+  std::set<std::string> names;
+  for (const auto& [name, value] : json.items()) {
+    names.insert(name);
+  }
+  EXPECT_EQ(names, (std::set<std::string>{"H",
+                                          "mu",
+                                          "e",
+                                          "fall_time_s",
+                                          "impact_x_m",
+                                          "vt_in_m_s",
+                                          "vn_in_m_s",
+                                          "duration_s",
+                                          "fn_peak_N",
+                                          "ft_peak_N",
+                                          "fn_peaks_N",
+                                          "ft_peaks_N",
+                                          "major_peaks_N",
+                                          "impulse_n_Ns",
+                                          "impulse_t_Ns",
+                                          "slide_m",
+                                          "vt_out_m_s",
+                                          "vn_out_m_s",
+                                          "mode",
+                                          "major_mode",
+                                          "stick_total_s",
+                                          "stick_intervals_s",
+                                          "phases",
+                                          "reaction_peaks",
+                                          "energy",
+                                          "solver"}));
+}
+
+TEST(SolveJson, ListsAllPeaksAndTheMajorOnes) {
+  const auto json = json_of(some_result());
+  EXPECT_EQ(json["fn_peaks_N"], nlohmann::json::parse("[4000.0, 3990.0]"));
+  EXPECT_EQ(json["major_peaks_N"], nlohmann::json::parse("[4000.0]"));
+  EXPECT_EQ(json["ft_peaks_N"], nlohmann::json::parse("[2100.0]"));
+  EXPECT_EQ(json["stick_intervals_s"], nlohmann::json::parse("[[0.0, 1e-5]]"));
+  EXPECT_EQ(json["phases"][1]["kind"], "restitution");
+  EXPECT_EQ(json["solver"]["steps"], 30);
+}
+
+TEST(SolveJson, GivesTheLargestReactionAtThePinAndAtEachJoint) {
+  auto result = some_result();
+  result.reaction_peaks = {{2e-5, 900.0}, {3e-5, 1800.0}};
+  EXPECT_EQ(json_of(result)["reaction_peaks"],
+            nlohmann::ordered_json::parse(
+                R"([{"t_s": 2e-5, "force_N": 900.0}, {"t_s": 3e-5, "force_N": 1800.0}])"));
+}
+
+TEST(Summary, TellsRipplesFromPeaks) {
+  std::ostringstream out;
+  print_summary(out, some_result());
+  EXPECT_NE(out.str().find("ripple"), std::string::npos);
+  EXPECT_NE(out.str().find("(with ripples: SC SR sC sR)"), std::string::npos);
+}
+
+TEST(Summary, NeverShowsMinusZeroOrAnExponentWherePlainDigitsDo) {
+  auto result = some_result();
+  result.energy.restitution_J = -3e-17;
+  result.vt_out_m_s = -1e-6;
+  result.solver.wall_s = 0.1234;
+  std::ostringstream out;
+  print_summary(out, result);
+  EXPECT_EQ(out.str().find("-0.0"), std::string::npos) << out.str();
+  EXPECT_EQ(out.str().find("e+"), std::string::npos) << out.str();
+  EXPECT_NE(out.str().find("123 ms"), std::string::npos) << out.str();
+}
+
+}  // namespace
+}  // namespace oblique::client

@@ -1,0 +1,45 @@
+#include "client/output/mesh_note.h"
+
+#include <algorithm>
+#include <sstream>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "client/study/study_file.h"
+
+namespace oblique::client {
+namespace {
+
+std::string told(const std::string& model, const std::string& axis = {}) {
+  std::ostringstream out;
+  const std::string point = "[[block]]\nH = 0.6\nmu = [0.4, 0.6]\ne = 1\n";
+  tell_mesh(out, parse_study("[model]\n" + model + "\n" + point + axis, "a.toml").recipe);
+  return out.str();
+}
+
+TEST(MeshNote, SaysInOneLineThatThePublishedMeshIsNotConvergedAndWhatIs) {
+  const auto line = told("");
+  EXPECT_NE(line.find("4 elements a link as published, is not converged"), std::string::npos);
+  EXPECT_NE(line.find("--preset converged"), std::string::npos);
+  EXPECT_NE(line.find("README.md, Limits"), std::string::npos);
+  EXPECT_EQ(std::count(line.begin(), line.end(), '\n'), 1);
+}
+
+TEST(MeshNote, SaysNothingOfAConvergedMesh) {
+  EXPECT_EQ(told("preset = 'converged'"), "");
+  EXPECT_EQ(told("elements_per_link = 16"), "");
+  EXPECT_EQ(told("", "elements_per_link = [16, 32]\n"), "");
+}
+
+TEST(MeshNote, LooksAtTheCoarsestMeshOfAStudy) {
+  EXPECT_NE(told("elements_per_link = 8").find("8 elements a link,"), std::string::npos);
+  EXPECT_NE(told("preset = 'converged'", "elements_per_link = [16, 4]\n").find("4 elements"),
+            std::string::npos);
+  EXPECT_NE(told("preset = 'converged'", "elements_per_link = {from = 2, to = 16, step = 2}\n")
+                .find("2 elements"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace oblique::client

@@ -1,0 +1,107 @@
+#include "client/output/progress.h"
+
+#include <algorithm>
+#include <sstream>
+#include <string>
+
+#include <gtest/gtest.h>
+
+namespace oblique::client {
+namespace {
+
+TEST(Progress, ShowsRateAndTimeLeftInTheBar) {
+  EXPECT_EQ(progress_bar({.study = "paper",
+                          .points = 10,
+                          .settled = 5,
+                          .failed = 1,
+                          .elapsed_s = 1.0,
+                          .points_per_s = 2.0}),
+            "paper [###############---------------] 5/10 50 %, 1 failed, 2 points/s, 2.5 s left");
+}
+
+TEST(Progress, SaysNothingOfARateThatIsNotKnown) {
+  EXPECT_EQ(progress_line({.study = "paper", .points = 10}), "paper: 0 of 10 points (0 %)");
+}
+
+TEST(Progress, NeverCallsAnUnfinishedStudyFinished) {
+  EXPECT_NE(progress_line({.study = "s", .points = 100000, .settled = 99999}).find("(99 %)"),
+            std::string::npos);
+}
+
+TEST(Progress, DrawsPlainLinesNowAndThenWhereThereIsNoTerminal) {
+  std::ostringstream out;
+  Progress progress(out, false);
+  for (int i = 0; i <= 300; ++i) {
+    progress.update({.study = "s",
+                     .points = 1000,
+                     .settled = static_cast<std::uint64_t>(i),
+                     .elapsed_s = 0.1 * i});
+  }
+  progress.finish();
+  const auto text = out.str();
+  EXPECT_EQ(text.find('\r'), std::string::npos);
+  EXPECT_EQ(text.find('\x1b'), std::string::npos);
+  const auto lines = std::count(text.begin(), text.end(), '\n');
+  EXPECT_GE(lines, 3);
+  EXPECT_LE(lines, 5);
+  EXPECT_NE(text.find("10 points/s, 1 min 10 s left"), std::string::npos) << text;
+}
+
+TEST(Progress, FollowsTheRateOfTheLastSeconds) {
+  std::ostringstream out;
+  Progress progress(out, true);
+  // 100 points a second for ten seconds, then 1 a second for a minute.
+  for (int second = 0; second <= 70; ++second) {
+    const int settled = second <= 10 ? 100 * second : 1000 + (second - 10);
+    progress.update({.study = "s",
+                     .points = 5000,
+                     .settled = static_cast<std::uint64_t>(settled),
+                     .elapsed_s = static_cast<double>(second)});
+  }
+  const auto text = out.str();
+  EXPECT_NE(text.substr(text.rfind('\r')).find(" 1 points/s"), std::string::npos);
+}
+
+TEST(Progress, WeighsSamplesByTheTimeBetweenThem) {
+  std::ostringstream out;
+  Progress progress(out, true);
+  const auto update = [&progress](double elapsed_s, std::uint64_t settled) {
+    progress.update({.study = "s", .points = 5000, .settled = settled, .elapsed_s = elapsed_s});
+  };
+  const auto last_bar = [&out] {
+    const auto text = out.str();
+    return text.substr(text.rfind('\r'));
+  };
+  // A burst of looks, then one 4 s later: 400 points in 5 s, however many looks there were.
+  for (int i = 0; i <= 100; ++i) {
+    update(0.01 * i, static_cast<std::uint64_t>(i));
+  }
+  update(5.0, 400);
+  EXPECT_NE(last_bar().find(" 80 points/s"), std::string::npos) << last_bar();
+  // Nothing is looked at for a minute: the rate is that minute's.
+  update(65.0, 1000);
+  EXPECT_NE(last_bar().find(" 10 points/s"), std::string::npos) << last_bar();
+  EXPECT_NE(last_bar().find(" 6 min 40 s left"), std::string::npos) << last_bar();
+}
+
+TEST(Progress, ShowsTheNameOfAStudyWithoutSteeringTheTerminal) {
+  EXPECT_TRUE(progress_line({.study = "a\x1b[2J", .points = 1}).starts_with("a\\x1b[2J: "));
+  EXPECT_TRUE(progress_bar({.study = "a\u202e", .points = 1}).starts_with("a\\u202e ["));
+}
+
+TEST(Progress, ThatNeverBeganHasNothingToDrawAtItsEnd) {
+  std::ostringstream out;
+  Progress(out, false).finish();
+  EXPECT_EQ(out.str(), "");
+}
+
+TEST(Durations, AreShownInUnitsThatFit) {
+  EXPECT_EQ(shown_duration(0.42), "0.4 s");
+  EXPECT_EQ(shown_duration(12.3), "12 s");
+  EXPECT_EQ(shown_duration(185), "3 min 05 s");
+  EXPECT_EQ(shown_duration(7800), "2 h 10 min");
+  EXPECT_EQ(shown_duration(273600), "3 d 04 h");
+}
+
+}  // namespace
+}  // namespace oblique::client

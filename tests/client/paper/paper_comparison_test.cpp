@@ -1,0 +1,144 @@
+#include "client/paper/paper_comparison.h"
+
+#include <cmath>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "client/output/printer.h"
+
+namespace oblique::client {
+namespace {
+
+// Two cases: one with two peaks, two phases and a stick time, one with nothing to count.
+PublishedTable small_table() {
+  return {.cases = {{.H_m = 1.0,
+                     .mu = 1.2,
+                     .e_star = 1.0,
+                     .mode = "SC SR sR sC sR",
+                     .read = "here",
+                     .fn_kN = {4.0, 1.0},
+                     .ft_kN = {2.0, 0.5},
+                     .phases_ms = {0.1, 0.2},
+                     .stick_ms = 0.1},
+                    {.H_m = 0.96,
+                     .mu = 0.4,
+                     .e_star = 1.0,
+                     .mode = "sC sR",
+                     .read = "nowhere",
+                     .fn_kN = {},
+                     .ft_kN = {},
+                     .phases_ms = {},
+                     .stick_ms = {}}},
+          .misprints = {{.where = "column 3", .printed = {"7.0 kN"}, .why = "it is column 2"}}};
+}
+
+// The third peak is a ripple.
+constexpr const char* kLateRipple = "[[1e-5,4040,2020,1],[2e-5,1000,500,1],[3e-5,990,495,0]]";
+
+void add_point(protocol::QueryReply& rows, double H_m, double mu,
+               const std::string& peaks = kLateRipple) {
+  auto& row = *rows.add_rows();
+  add_value(row, std::int64_t{0});
+  add_value(row, H_m);
+  add_value(row, mu);
+  add_value(row, 1.0);
+  add_value(row, peaks);
+  add_value(row, std::string("[[\"compression\",0,1e-4],[\"restitution\",1e-4,3e-4]]"));
+  add_value(row, 1.1e-4);
+  add_value(row, std::string("SC SR sR sC sR"));
+}
+
+TEST(Comparison, PutsMajorPeaksPhasesAndStickBesideWhatIsPublished) {
+  const auto table = small_table();
+  protocol::QueryReply rows;
+  add_point(rows, 1.0, 1.2);
+  const auto differences = compare(table, own_cases(table, rows));
+  ASSERT_EQ(differences.size(), 7U);
+  EXPECT_NEAR(differences[0].percent().value(), 1.0, 1e-9);
+  EXPECT_NEAR(differences[1].ours.value(), 1.0, 1e-12);
+  EXPECT_NEAR(differences[5].percent().value(), 0.0, 1e-9);
+  EXPECT_NEAR(differences[6].percent().value(), 10.0, 1e-9);
+  const auto summary = summary_of(differences);
+  EXPECT_EQ(summary.counted, 7U);
+  EXPECT_EQ(summary.missing, 0U);
+  EXPECT_NEAR(summary.largest_percent, 10.0, 1e-9);
+  EXPECT_NEAR(summary.rms_percent, std::sqrt((1.0 + 1.0 + 100.0) / 7.0), 1e-9);
+}
+
+TEST(Comparison, LeavesOutPhasesOfARowFromTheFirstRippleOn) {
+  const auto table = small_table();
+  protocol::QueryReply rows;
+  add_point(rows, 1.0, 1.2, "[[1e-5,4040,2020,1],[2e-5,4000,2000,0],[3e-5,1000,500,1]]");
+  const auto own = own_cases(table, rows).front().value();
+  EXPECT_EQ(own.phases_s, std::vector<double>{1e-4});
+  EXPECT_EQ(own.fn_N, (std::vector<double>{4040.0, 1000.0}));
+}
+
+TEST(Comparison, MergesRipplesInThePhasesOfAResult) {
+  using solver::PhaseKind;
+  solver::CaseResult result{};
+  // Turns at 4000, 100, 200, 150, 1000 N: the peak of 200 and the valley of 150 are a ripple.
+  result.phases = {
+      {PhaseKind::kCompression, 0.0, 1.0, 4000.0}, {PhaseKind::kRestitution, 1.0, 3.0, 100.0},
+      {PhaseKind::kCompression, 3.0, 4.0, 200.0},  {PhaseKind::kRestitution, 4.0, 5.0, 150.0},
+      {PhaseKind::kCompression, 5.0, 9.0, 1000.0}, {PhaseKind::kRestitution, 9.0, 16.0, 0.0}};
+  EXPECT_EQ(own_case(result).phases_s, (std::vector<double>{1.0, 2.0, 6.0, 7.0}));
+}
+
+TEST(Comparison, CountsWhatWeDoNotHaveAsMissing) {
+  const auto table = small_table();
+  const auto summary = summary_of(compare(table, own_cases(table, {})));
+  EXPECT_EQ(summary.counted, 0U);
+  EXPECT_EQ(summary.missing, 7U);
+}
+
+TEST(Comparison, RefusesAStudyWithSeveralAnswersToOneCase) {
+  protocol::QueryReply rows;
+  add_point(rows, 1.0, 1.2);
+  add_point(rows, 1.0, 1.2);
+  EXPECT_THROW(own_cases(small_table(), rows), std::runtime_error);
+}
+
+TEST(Comparison, IsPrintedWithDifferencesSummaryAndMisprints) {
+  const auto table = small_table();
+  protocol::QueryReply rows;
+  add_point(rows, 1.0, 1.2);
+  std::ostringstream out;
+  print_comparison(out, Format::kTable, table, own_cases(table, rows));
+  const auto text = out.str();
+  for (const char* part :
+       {"4.040 / 4.00 / +1.00", "0.1100 / 0.100 / +10.00", "not solved", "the same",
+        "7 trustworthy published numbers", "largest 10.00 % (time in stick at H = 1, mu = 1.2",
+        "The mode is the published one in 1 of 1 cases", "column 3: 7.0 kN", "it is column 2"}) {
+    EXPECT_NE(text.find(part), std::string::npos) << part << " is not in:\n" << text;
+  }
+}
+
+TEST(Comparison, SaysPlainlyWhereTheModeIsNotThePublishedOne) {
+  auto table = small_table();
+  table.cases[0].mode = "sC sR";
+  protocol::QueryReply rows;
+  add_point(rows, 1.0, 1.2);
+  std::ostringstream out;
+  print_comparison(out, Format::kMarkdown, table, own_cases(table, rows));
+  EXPECT_NE(out.str().find("The mode is the published one in 0 of 1 cases solved"),
+            std::string::npos);
+  EXPECT_NE(
+      out.str().find("- H = 1, mu = 1.2, e* = 1: SC SR sR sC sR (2 peaks), published sC sR (1)"),
+      std::string::npos)
+      << out.str();
+  EXPECT_NE(out.str().find("| 4.040 / 4.00 / +1.00 |"), std::string::npos) << out.str();
+}
+
+TEST(Comparison, HasOneRowForEachNumber) {
+  const auto table = small_table();
+  const auto rows = rows_of(table, compare(table, own_cases(table, {})));
+  EXPECT_EQ(rows.rows_size(), 7);
+  EXPECT_EQ(rows.rows(0).values_size(), rows.columns_size());
+}
+
+}  // namespace
+}  // namespace oblique::client

@@ -1,0 +1,69 @@
+#include "client/paper/published_table.h"
+
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "client/study/study_file.h"
+#include "proto/recipe/recipe.h"
+
+namespace oblique::client {
+namespace {
+
+TEST(PublishedTable, HoldsTheSixtyThreeTrustworthyNumbers) {
+  std::size_t fn = 0;
+  std::size_t ft = 0;
+  std::size_t phases = 0;
+  std::size_t sticks = 0;
+  for (const auto& published : published_table().cases) {
+    fn += published.fn_kN.size();
+    ft += published.ft_kN.size();
+    phases += published.phases_ms.size();
+    sticks += published.stick_ms ? 1U : 0U;
+  }
+  EXPECT_EQ(fn, 24U);
+  EXPECT_EQ(ft, 24U);
+  EXPECT_EQ(phases, 12U);
+  EXPECT_EQ(sticks, 3U);
+}
+
+TEST(PublishedTable, HasAsManyPeaksAsItsModesSay) {
+  for (const auto& published : published_table().cases) {
+    EXPECT_EQ(published_peaks(published), published.mu < 1.0 ? 3 : 2);
+    if (!published.fn_kN.empty()) {
+      EXPECT_EQ(published.fn_kN.size(), static_cast<std::size_t>(published_peaks(published)));
+    }
+    EXPECT_EQ(published.fn_kN.size(), published.ft_kN.size());
+    EXPECT_FALSE(published.read.empty());
+  }
+}
+
+TEST(PublishedTable, NamesItsMisprintsWithReasons) {
+  const auto table = published_table();
+  EXPECT_GE(table.misprints.size(), 5U);
+  for (const auto& misprint : table.misprints) {
+    EXPECT_FALSE(misprint.printed.empty());
+    EXPECT_FALSE(misprint.why.empty());
+  }
+}
+
+TEST(PublishedTable, HasTheCasesOfTheExampleStudyInItsOrder) {
+  const protocol::PointTable published(recipe_of(published_table(), "paper"));
+  const protocol::PointTable study(
+      read_study_file(std::string(OBLIQUE_SOURCE_DIR) + "/deploy/studies/paper.toml").recipe);
+  ASSERT_EQ(published.size(), study.size());
+  for (std::uint64_t i = 0; i < study.size(); ++i) {
+    EXPECT_EQ(published.point(i).H_m, study.point(i).H_m);
+    EXPECT_EQ(published.point(i).mu, study.point(i).mu);
+    EXPECT_EQ(published.point(i).e_star, study.point(i).e_star);
+  }
+  EXPECT_EQ(published.model(0), study.model(0));
+}
+
+TEST(PublishedTable, IsRefusedWhenSomethingIsMissing) {
+  EXPECT_THROW(parse_published_table("[[case]]\nH = 1\n[[misprint]]\n"), std::runtime_error);
+  EXPECT_THROW(parse_published_table("x = 1\n"), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace oblique::client

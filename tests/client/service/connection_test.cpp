@@ -1,0 +1,264 @@
+#include "client/service/connection.h"
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "proto/frames.h"
+#include "tests/client/service/scripted_server.h"
+#include "tests/support/reserved_port.h"
+#include "worker/solver/model/parameters.h"
+
+namespace oblique::client {
+namespace {
+
+ConnectionSettings at(const std::string& url, std::int64_t timeout_ms) {
+  return {.server_url = url, .timeout_ms = timeout_ms};
+}
+
+constexpr std::int64_t kLong_ms = 30'000;
+
+TEST(Connection, SaysWhereItLookedAndWhatToDoWhenNobodyAnswers) {
+  const test::ReservedPort nobody;
+  const auto url = nobody.url();
+  Connection connection(at(url, 100));
+  try {
+    connection.status("");
+    FAIL();
+  } catch (const ConnectionError& error) {
+    const std::string message = error.what();
+    EXPECT_NE(message.find("no answer from " + url + " within 0.1 s"), std::string::npos)
+        << message;
+    EXPECT_NE(message.find("oblique-server"), std::string::npos) << message;
+    EXPECT_NE(message.find("--server"), std::string::npos) << message;
+  }
+}
+
+TEST(Connection, RefusesAnAddressThatIsNone) {
+  EXPECT_THROW(Connection(at("localhost", 100)), solver::InputError);
+}
+
+TEST(Connection, StopsWaitingWhenToldTo) {
+  const test::ReservedPort nobody;
+  int asked = 0;
+  Connection connection(at(nobody.url(), kLong_ms), [&asked] { return ++asked < 3; });
+  EXPECT_THROW(connection.workers(), Interrupted);
+}
+
+TEST(Connection, SendsTheStudyAndReadsTheReply) {
+  const ScriptedServer server([](const protocol::ClientRequest& request) {
+    auto reply = reply_to(request);
+    EXPECT_EQ(request.protocol_version(), protocol::kProtocolVersion);
+    EXPECT_EQ(request.submit().name(), "sweep");
+    reply.mutable_submit()->set_points(7);
+    return std::vector{protocol::encode(reply)};
+  });
+  Connection connection(at(server.url(), kLong_ms));
+  EXPECT_EQ(connection.submit({.name = "sweep", .recipe = {}}).points(), 7U);
+}
+
+TEST(Connection, HandsOnTheServersOwnErrors) {
+  const ScriptedServer server([](const protocol::ClientRequest& request) {
+    auto reply = reply_to(request);
+    reply.mutable_error()->set_message("no study called \"x\"");
+    return std::vector{protocol::encode(reply)};
+  });
+  Connection connection(at(server.url(), kLong_ms));
+  try {
+    connection.change("x", protocol::STUDY_CHANGE_CANCEL);
+    FAIL();
+  } catch (const ServerError& error) {
+    EXPECT_STREQ(error.what(), "no study called \"x\"");
+  }
+}
+
+TEST(Connection, PassesOverAnswersToEarlierQuestions) {
+  const ScriptedServer server([](const protocol::ClientRequest& request) {
+    protocol::ClientReply stale;
+    stale.set_request_id(request.request_id() + 1000);
+    stale.mutable_status()->set_workers(1);
+    auto reply = reply_to(request);
+    reply.mutable_status()->set_workers(2);
+    return std::vector{protocol::encode(stale), protocol::encode(reply)};
+  });
+  Connection connection(at(server.url(), kLong_ms));
+  EXPECT_EQ(connection.status("").workers(), 2U);
+}
+
+/// Frames with one reply to a status question, which says that there are so many workers.
+std::vector<std::string> workers_reply(const protocol::ClientRequest& request,
+                                       std::uint32_t workers) {
+  auto reply = reply_to(request);
+  reply.mutable_status()->set_workers(workers);
+  return {protocol::encode(reply)};
+}
+
+TEST(Connection, SendsARequestAgainThatTheServerTookWithItWhenItDied) {
+  const test::ReservedPort port;
+  std::atomic<std::uint64_t> taken{0};
+  auto server = std::make_unique<ScriptedServer>(
+      [&](const protocol::ClientRequest& request) {
+        taken = request.request_id();
+        return std::vector<std::string>();
+      },
+      port.url());
+  bool is_second = false;
+  const auto replace_when_taken = [&] {
+    if (!is_second && taken != 0) {
+      is_second = true;
+      server.reset();
+      server = std::make_unique<ScriptedServer>(
+          [&](const protocol::ClientRequest& request) {
+            EXPECT_EQ(request.request_id(), taken);
+            return workers_reply(request, 3);
+          },
+          port.url());
+    }
+    return true;
+  };
+  // So long that only the new connection is a reason to send again.
+  Connection connection(
+      {.server_url = port.url(), .timeout_ms = kLong_ms, .resend_after_ms = kLong_ms},
+      replace_when_taken);
+  EXPECT_EQ(connection.status("").workers(), 3U);
+}
+
+TEST(Connection, SendsARequestAgainWhenNothingIsHeardOverAConnectionThatStands) {
+  std::vector<std::uint64_t> ids;
+  std::mutex mutex;
+  const ScriptedServer server([&](const protocol::ClientRequest& request) {
+    const std::lock_guard lock(mutex);
+    ids.push_back(request.request_id());
+    return ids.size() < 3 ? std::vector<std::string>() : workers_reply(request, 4);
+  });
+  Connection connection({.server_url = server.url(), .timeout_ms = kLong_ms, .resend_after_ms = 1});
+  EXPECT_EQ(connection.status("").workers(), 4U);
+  const std::lock_guard lock(mutex);
+  EXPECT_GE(ids.size(), 3U);
+  EXPECT_EQ(ids, std::vector<std::uint64_t>(ids.size(), ids.front()));
+}
+
+TEST(Connection, AsksAServerThatAnswersOnce) {
+  std::atomic<int> asked{0};
+  const ScriptedServer server([&](const protocol::ClientRequest& request) {
+    ++asked;
+    return workers_reply(request, 1);
+  });
+  Connection connection(
+      {.server_url = server.url(), .timeout_ms = kLong_ms, .resend_after_ms = kLong_ms});
+  for (int i = 1; i <= 20; ++i) {
+    connection.status("");
+    EXPECT_EQ(asked, i);
+  }
+}
+
+TEST(Connection, PassesOverASecondAnswerToAnEarlierQuestion) {
+  const ScriptedServer server([](const protocol::ClientRequest& request) {
+    auto replies = workers_reply(request, static_cast<std::uint32_t>(request.request_id()));
+    replies.push_back(replies.front());
+    return replies;
+  });
+  Connection connection(at(server.url(), kLong_ms));
+  for (std::uint32_t i = 1; i <= 20; ++i) {
+    EXPECT_EQ(connection.status("").workers(), i);
+  }
+}
+
+TEST(Connection, ThatIsToWaitSaysThatTheServerIsSilentAndThatItIsBack) {
+  const test::ReservedPort port;
+  std::unique_ptr<ScriptedServer> server;
+  std::vector<std::string> told;
+  const Tell tell = [&](const std::string& sentence) {
+    told.push_back(sentence);
+    if (server == nullptr) {
+      server = std::make_unique<ScriptedServer>(
+          [](const protocol::ClientRequest& request) { return workers_reply(request, 5); },
+          port.url());
+    }
+  };
+  // Far longer than the time-out of an answer that is not waited for.
+  Connection connection(at(port.url(), 10));
+  EXPECT_EQ(connection.status("", tell).workers(), 5U);
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_NE(told[0].find("no answer from " + port.url()), std::string::npos) << told[0];
+  EXPECT_NE(told[1].find("answers again"), std::string::npos) << told[1];
+}
+
+/// What a server says while a query waits or runs.
+std::string still_working(const protocol::ClientRequest& request, bool runs) {
+  protocol::ClientReply word;
+  word.set_request_id(UINT64_MAX);
+  word.mutable_still_working()->set_request_id(request.request_id());
+  word.mutable_still_working()->set_runs(runs);
+  return protocol::encode(word);
+}
+
+TEST(Connection, SaysThatAQueryTookTooLongWhenTheServerWorksOnItStill) {
+  for (const bool runs : {true, false}) {
+    const ScriptedServer server([runs](const protocol::ClientRequest& request) {
+      EXPECT_EQ(request.query().time_limit_ms(), 500U);
+      return std::vector{still_working(request, runs)};
+    });
+    Connection connection(at(server.url(), 500));
+    try {
+      connection.query("SELECT 1");
+      FAIL();
+    } catch (const ConnectionError& error) {
+      const std::string message = error.what();
+      EXPECT_NE(message.find("the query took too long: after 0.5 s"), std::string::npos) << message;
+      EXPECT_NE(message.find(runs ? "works on it still" : "queries of others"), std::string::npos)
+          << message;
+      EXPECT_NE(message.find("--timeout"), std::string::npos) << message;
+      EXPECT_EQ(message.find("is a server running"), std::string::npos) << message;
+    }
+  }
+}
+
+TEST(Connection, TakesTheAnswerThatFollowsWordsOfWorkAndOnlyThat) {
+  const ScriptedServer server([](const protocol::ClientRequest& request) {
+    protocol::ClientRequest another = request;
+    another.set_request_id(request.request_id() + 1);
+    auto reply = reply_to(request);
+    reply.mutable_query()->add_columns("a");
+    return std::vector{still_working(another, true), still_working(request, false),
+                       still_working(request, true), protocol::encode(reply)};
+  });
+  Connection connection(at(server.url(), kLong_ms));
+  EXPECT_EQ(connection.query("SELECT 1").columns(0), "a");
+}
+
+TEST(Connection, AsksForEveryPageOfALongListAndForNoneThatDoesNotCome) {
+  const ScriptedServer server([](const protocol::ClientRequest& request) {
+    auto reply = reply_to(request);
+    const std::uint64_t after = request.status().after_study_id();
+    reply.mutable_status()->add_studies()->set_study_id(after + 10);
+    reply.mutable_status()->set_workers(3);
+    reply.mutable_status()->set_next_after(after < 30 ? after + 10 : 5);
+    return std::vector{protocol::encode(reply)};
+  });
+  Connection connection(at(server.url(), kLong_ms));
+  const auto all = connection.status("");
+  ASSERT_EQ(all.studies_size(), 4);
+  EXPECT_EQ(all.studies(3).study_id(), 40U);
+  EXPECT_EQ(all.workers(), 3U);
+}
+
+TEST(Connection, TellsAForeignServerFromOurs) {
+  const ScriptedServer server(
+      [](const protocol::ClientRequest&) { return std::vector<std::string>{"HTTP/1.1 400"}; });
+  Connection connection(at(server.url(), kLong_ms));
+  try {
+    connection.query("SELECT 1");
+    FAIL();
+  } catch (const ConnectionError& error) {
+    EXPECT_NE(std::string(error.what()).find("does not speak"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace oblique::client

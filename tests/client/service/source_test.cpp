@@ -1,0 +1,146 @@
+#include "client/service/source.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "proto/recipe/recipe.h"
+#include "server/store/store.h"
+#include "tests/client/service/scripted_server.h"
+#include "tests/client/verbs/program.h"
+
+namespace oblique::client {
+namespace {
+
+/// A folder to be in, with OBLIQUE_SERVER as the test sets it.
+class SourceTest : public ::testing::Test {
+ protected:
+  SourceTest() {
+    std::filesystem::current_path(folder_.path());
+    unsetenv("OBLIQUE_SERVER");
+  }
+  ~SourceTest() override {
+    unsetenv("OBLIQUE_SERVER");
+    std::filesystem::current_path(before_);
+  }
+
+  static void make_database(const std::string& file, const std::string& study) {
+    protocol::Recipe recipe;
+    for (const auto& [key, value] : {std::pair{"H", 1.0}, {"mu", 0.4}, {"e", 1.0}}) {
+      if (recipe.blocks().empty()) {
+        recipe.add_blocks();
+      }
+      auto& axis = *recipe.mutable_blocks(0)->add_axes();
+      axis.set_key(key);
+      axis.add_values(value);
+    }
+    server::Store store(file);
+    const std::vector<server::Change> changes{
+        server::AddStudy{1, study, std::make_shared<const protocol::PointTable>(recipe),
+                         "2026-01-01T00:00:00.000Z"}};
+    store.commit(changes);
+  }
+
+  /// Where the one study comes from that a source names: a file's is called after it.
+  static std::string study_of(const SourceFlags& flags) {
+    return open_source(flags)->status({}).at(0).name();
+  }
+
+  TestFolder folder_;
+  std::filesystem::path before_ = std::filesystem::current_path();
+  ScriptedServer named_{answer("named")};
+  ScriptedServer from_environment_{answer("environment")};
+
+ private:
+  static ScriptedServer::Answer answer(const std::string& name) {
+    return [name](const protocol::ClientRequest& request) {
+      auto reply = reply_to(request);
+      reply.mutable_status()->add_studies()->set_name(name);
+      return std::vector{protocol::encode(reply)};
+    };
+  }
+};
+
+TEST_F(SourceTest, IsTheDatabaseThatIsNamedWhateverElseThereIs) {
+  make_database("oblique.db", "default");
+  make_database("other.db", "other");
+  setenv("OBLIQUE_SERVER", from_environment_.url().c_str(), 1);
+  EXPECT_EQ(study_of({.database = "other.db", .server = {}, .timeout_s = {}}), "other");
+}
+
+TEST_F(SourceTest, IsTheServerThatIsNamedBeforeThatOfTheEnvironmentAndTheFile) {
+  make_database("oblique.db", "default");
+  setenv("OBLIQUE_SERVER", from_environment_.url().c_str(), 1);
+  EXPECT_EQ(study_of({.database = {}, .server = named_.url(), .timeout_s = {}}), "named");
+}
+
+TEST_F(SourceTest, IsTheServerOfTheEnvironmentBeforeTheFileInThisFolder) {
+  make_database("oblique.db", "default");
+  setenv("OBLIQUE_SERVER", from_environment_.url().c_str(), 1);
+  EXPECT_EQ(study_of({}), "environment");
+}
+
+TEST_F(SourceTest, IsTheFileInThisFolderWhenNothingIsNamed) {
+  make_database("oblique.db", "default");
+  EXPECT_EQ(study_of({}), "default");
+  setenv("OBLIQUE_SERVER", "", 1);
+  EXPECT_EQ(study_of({}), "default") << "an empty variable names no server";
+}
+
+TEST_F(SourceTest, IsTheServerAtItsDefaultAddressWhenThereIsNoFileEither) {
+  EXPECT_EQ(open_source({})->place(), ConnectionSettings().server_url);
+}
+
+TEST_F(SourceTest, SaysOfAFileThatNobodyWorksOnIt) {
+  make_database("oblique.db", "default");
+  EXPECT_EQ(open_source({})->status("default").at(0).waits_for(),
+            "a server: nobody is at work on oblique.db");
+}
+
+TEST_F(SourceTest, SaysNothingOfTheKindWhileAServerHasTheFile) {
+  make_database("oblique.db", "default");
+  const server::Store at_work("oblique.db");
+  EXPECT_EQ(open_source({})->status("default").at(0).waits_for(), "");
+}
+
+TEST_F(SourceTest, KeepsNoServerFromItsFileByLookingAtIt) {
+  make_database("oblique.db", "default");
+  // As somebody who looks does, at the instant when the server begins.
+  const int looking = open("oblique.db", O_RDONLY | O_CLOEXEC);
+  ASSERT_EQ(flock(looking, LOCK_SH | LOCK_NB), 0);
+  std::thread done([looking] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    close(looking);
+  });
+  EXPECT_NO_THROW(server::Store("oblique.db"));
+  done.join();
+}
+
+TEST_F(SourceTest, CallsAWrongStatementWrongUsageWhereverItIsAsked) {
+  make_database("oblique.db", "default");
+  EXPECT_THROW(open_source({})->query("SELEC 1"), solver::InputError);
+  EXPECT_THROW(open_source({})->query("DELETE FROM results"), solver::InputError);
+  const ScriptedServer server([](const protocol::ClientRequest& request) {
+    auto reply = reply_to(request);
+    reply.mutable_error()->set_message("the statement is wrong");
+    reply.mutable_error()->set_wrong_request(request.query().sql() == "SELEC 1");
+    return std::vector{protocol::encode(reply)};
+  });
+  const auto source = open_source({.database = {}, .server = server.url(), .timeout_s = {}});
+  EXPECT_THROW(source->query("SELEC 1"), solver::InputError);
+  EXPECT_THROW(source->query("SELECT 1"), ServerError);
+}
+
+}  // namespace
+}  // namespace oblique::client

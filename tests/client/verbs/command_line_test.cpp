@@ -1,0 +1,207 @@
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "tests/client/verbs/program.h"
+
+namespace oblique::client {
+namespace {
+
+// Every verb that the program itself lists: one that is added is checked with the others.
+std::vector<std::string> verbs_of(const std::string& help) {
+  std::vector<std::string> verbs;
+  std::istringstream lines(help.substr(std::min(help.size(), help.find("Subcommands:"))));
+  std::string line;
+  std::getline(lines, line);
+  while (std::getline(lines, line) && line.starts_with("  ")) {
+    std::string verb;
+    std::istringstream(line) >> verb;
+    if (line[2] != ' ') {  // not a description that goes on
+      verbs.push_back(verb);
+    }
+  }
+  return verbs;
+}
+
+TEST(CommandLine, AnswersWrongUsageWithExitCodeTwoAndASentence) {
+  const struct {
+    std::vector<std::string> arguments;
+    std::string says;
+  } wrong[] = {
+      {{}, "no verb given"},
+      {{"solv"}, "unknown verb `solv` (did you mean `solve`?)"},
+      {{"--verbos"}, "unexpected `--verbos`"},
+      {{"solve", "--H", "1", "--mu", "0.4"}, "--e is missing"},
+      {{"solve", "--H", "1", "--mu", "-0.4", "--e", "1"}, "mu = -0.4"},
+      {{"solve", "--H", "1", "--mu", "abc", "--e", "1"}, "\"abc\" is not a number"},
+      {{"solve", "--H", "1", "--mu", "0.4", "--e", "1.1"}, "e = 1.1"},
+      {{"solve", "--H", "1.3", "--mu", "0.4", "--e", "1"}, "1.2 m"},
+      {{"solve", "--H", "1,1.1", "--mu", "0.4", "--e", "1"}, "2 points, and solve takes one"},
+      {{"solve", "--H", "1", "--mu", "0.4", "--e", "1", "--trace", "/nowhere/x.csv"},
+       "/nowhere/x.csv"},
+      {{"solve", "--elements-per-lnk=3"}, "(did you mean `--elements-per-link`?)"},
+      {{"solve", "--H"}, "--H"},
+      {{"solve", "--H", "1", "--mu", "0.4", "--e", "1", "--dt", "0.1000000000000001"},
+       "dt = 0.1000000000000001 s"},
+      {{"run"}, "no points"},
+      {{"run", "nowhere.toml"}, "nowhere.toml"},
+      {{"run", "a.toml", "b.toml"}, "unexpected `b.toml`"},
+      {{"run", "--H", "1", "--mu", "0.4", "--e", "1", "--workers", "0"}, "--workers 0"},
+      {{"run", "--H", "1", "--mu", "0.4", "--e", "1", "--rows", "-1"}, "--rows: -1"},
+      {{"run", "--workers", "many"}, "many"},
+      {{"submit", "--H", "1", "--mu", "0.4", "--e", "1", "--server", "nowhere"}, "tcp://HOST:PORT"},
+      {{"status", "--timeout", "-1"}, "--timeout -1"},
+      {{"status", "--db", "a.db", "--server", "tcp://127.0.0.1:1"}, "--server"},
+      {{"query"}, "STUDY is required"},
+      {{"query", "paper", "--format", "xml"}, "xml"},
+      {{"query", "paper", "--limit", "-1"}, "--limit"},
+      {{"sql"}, "STATEMENT is required"},
+      {{"paper", "--preset", "papre"}, "papre"},
+      {{"paper", "--study", "x"}, "--db"},
+      {{"converge", "--H", "1", "--mu", "0.4,0.6", "--e", "1"}, "2 points, and converge takes one"},
+      {{"converge", "--H", "1", "--mu", "0.4", "--e", "1", "--finest", "24"}, "--finest 24"},
+      {{"converge", "--H", "1", "--mu", "0.4", "--e", "1", "--halvings", "1"}, "--halvings 1"},
+      {{"converge", "--tolerance", "1"}, "--mesh-study"},
+      {{"fit", "--from", "papre"}, "papre"},
+      {{"fit", "--elements-per-link", "0"}, "elements_per_link = 0"},
+  };
+  for (const auto& [arguments, says] : wrong) {
+    const auto outcome = oblique(arguments);
+    const auto words = testing::PrintToString(arguments);
+    EXPECT_EQ(outcome.exit_code, 2) << words << outcome.err;
+    EXPECT_EQ(outcome.out, "") << words;
+    EXPECT_NE(outcome.err.find(says), std::string::npos) << words << outcome.err;
+    EXPECT_TRUE(outcome.err.starts_with("oblique")) << words << outcome.err;
+  }
+}
+
+TEST(CommandLine, ShowsEveryVerbWithExamplesOnStandardOutput) {
+  const auto help = oblique({"--help"});
+  EXPECT_EQ(help.exit_code, 0);
+  EXPECT_EQ(help.err, "");
+  const auto verbs = verbs_of(help.out);
+  for (const char* verb : {"solve", "run", "backup", "retry"}) {
+    ASSERT_EQ(std::count(verbs.begin(), verbs.end(), verb), 1) << verb << '\n' << help.out;
+  }
+  for (const auto& verb : verbs) {
+    const auto outcome = oblique({verb, "--help"});
+    EXPECT_EQ(outcome.exit_code, 0) << verb;
+    EXPECT_EQ(outcome.err, "") << verb;
+    EXPECT_NE(outcome.out.find("Examples:\n  oblique " + verb), std::string::npos) << outcome.out;
+  }
+}
+
+TEST(CommandLine, SolvesOnePointAsOneJsonObject) {
+  const auto outcome = oblique({"solve", "--H", "1", "--mu", "0.4", "--e", "1", "--json"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const auto json = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(json["H"], 1.0);
+  EXPECT_EQ(json["mode"], "sC sR sC sR sC sR");
+  EXPECT_NEAR(json["fn_peak_N"], 5057.63, 0.15);
+  EXPECT_EQ(json["major_peaks_N"].size(), 3U);
+}
+
+TEST(CommandLine, SaysOnceAndBesideTheDataThatThePublishedMeshIsNotConverged) {
+  const auto outcome = oblique({"solve", "--H", "1", "--mu", "0.4", "--e", "1", "--json"});
+  EXPECT_TRUE(nlohmann::json::accept(outcome.out)) << outcome.out;
+  EXPECT_NE(outcome.err.find("--preset converged"), std::string::npos) << outcome.err;
+  const auto run = oblique({"run", "--H", "0.6", "--mu", "0.2:0.4:3", "--e", "1"});
+  const auto first = run.err.find("--preset converged");
+  EXPECT_NE(first, std::string::npos) << run.err;
+  EXPECT_EQ(run.err.find("--preset converged", first + 1), std::string::npos) << run.err;
+}
+
+TEST(CommandLine, WritesATraceFromTouchToSeparation) {
+  const TestFolder folder;
+  const auto outcome =
+      oblique(folder, {"solve", "--H", "1", "--mu", "1.2", "--e", "1", "--trace", "trace.csv"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("contact"), std::string::npos);
+  std::ifstream trace(folder.path() / "trace.csv");
+  std::string line;
+  std::getline(trace, line);
+  EXPECT_TRUE(line.starts_with("t_s,fn_N,ft_N,uy_m,ux_m,xP_m,vP_m_s,x_m,y_m,vt_m_s,vn_m_s,state"))
+      << line;
+  int rows = 0;
+  double t_s = -1.0;
+  while (std::getline(trace, line)) {
+    const double next_s = std::stod(line);
+    EXPECT_GE(next_s, t_s);
+    t_s = next_s;
+    ++rows;
+  }
+  EXPECT_GT(rows, 100);
+  EXPECT_NEAR(t_s, 345.82e-6, 0.1e-6);
+}
+
+TEST(CommandLine, WritesATraceWithShapeToStandardOutputAndTheRestToStandardError) {
+  const auto outcome = oblique({"solve", "--H", "0.9", "--mu", "0.4", "--e", "1",
+                                "--elements-per-link", "1", "--trace", "-", "--trace-shape"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  std::istringstream trace(outcome.out);
+  std::string line;
+  std::getline(trace, line);
+  EXPECT_TRUE(line.ends_with("node2x_m,node2y_m,node3x_m,node3y_m")) << line;
+  const auto columns = std::count(line.begin(), line.end(), ',');
+  int rows = 0;
+  while (std::getline(trace, line)) {
+    ASSERT_EQ(std::count(line.begin(), line.end(), ','), columns) << line;
+    ++rows;
+  }
+  EXPECT_GT(rows, 20);
+  EXPECT_NE(outcome.err.find("contact"), std::string::npos) << "the summary";
+}
+
+TEST(CommandLine, RefusesATraceThatHasNoPlaceToGo) {
+  const std::vector<std::string> point{
+      "solve", "--H", "0.9", "--mu", "0.4", "--e", "1", "--elements-per-link", "1"};
+  const auto with = [&point](std::vector<std::string> more) {
+    more.insert(more.begin(), point.begin(), point.end());
+    return oblique(more);
+  };
+  for (const auto& [flags, reason] : std::vector<std::pair<std::vector<std::string>, std::string>>{
+           {{"--trace", "-", "--json"}, "both write to standard output"},
+           {{"--trace", ""}, "--trace: the value is empty"},
+           {{"--trace-shape"}, "--trace"}}) {
+    const auto outcome = with(flags);
+    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_EQ(outcome.out, "");
+    EXPECT_NE(outcome.err.find(reason), std::string::npos) << outcome.err;
+  }
+}
+
+TEST(CommandLine, SaysThatNobodyAnswersAndWhatToDo) {
+  const auto outcome = oblique({"status", "--server", "tcp://127.0.0.1:1", "--timeout", "0.05"});
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_EQ(outcome.out, "");
+  EXPECT_NE(outcome.err.find("no answer from tcp://127.0.0.1:1 within 0.05 s"), std::string::npos)
+      << outcome.err;
+}
+
+TEST(CommandLine, SaysThatADatabaseIsNotThere) {
+  const auto outcome = oblique({"studies", "--db", "nowhere.db"});
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_NE(outcome.err.find("nowhere.db"), std::string::npos) << outcome.err;
+}
+
+TEST(CommandLine, FailsWhenStandardOutputCannotBeWritten) {
+  const TestFolder folder;
+  std::ofstream(folder.path() / "script")
+      << "exec '" << OBLIQUE_PROGRAM << "' solve --H 1 --mu 0.4 --e 1 > /dev/full\n";
+  const int status = std::system(
+      ("sh " + (folder.path() / "script").string() + " 2> " + (folder.path() / "err").string())
+          .c_str());
+  EXPECT_EQ(WEXITSTATUS(status), 1);
+}
+
+}  // namespace
+}  // namespace oblique::client

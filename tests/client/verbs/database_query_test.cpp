@@ -1,0 +1,111 @@
+// Questions to a database file, by the program itself.
+#include <chrono>
+#include <csignal>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/store/store.h"
+#include "tests/client/verbs/program.h"
+#include "tests/server/scheduler/scheduler_bench.h"
+#include "tests/server/store/results.h"
+
+namespace oblique::client {
+namespace {
+
+using testing::HasSubstr;
+
+/// Compares for hours without a look at the clock.
+constexpr const char* kDeaf = "SELECT instr(zeroblob(60000000), zeroblob(29999999) || x'01')";
+
+/// A folder with oblique.db, which has four results of the study `a`.
+class DatabaseQuery : public testing::Test {
+ protected:
+  DatabaseQuery() {
+    server::Store store((folder_.path() / "oblique.db").string());
+    const auto table = server::table_of(4);
+    const std::vector<server::Change> changes{
+        server::AddStudy{1, "a", table, "2024-01-01T00:00:00.000Z"},
+        server::AddResults{1,
+                           table,
+                           0,
+                           "",
+                           "",
+                           1,
+                           "now",
+                           {server::solved_point(0), server::solved_point(1),
+                            server::solved_point(2), server::solved_point(3)}}};
+    store.commit(changes);
+  }
+  Outcome ask(const std::vector<std::string>& arguments) { return oblique(folder_, arguments); }
+
+  TestFolder folder_;
+};
+
+TEST_F(DatabaseQuery, AStatementHasItsTimeWhateverItDoes) {
+  for (const char* sql :
+       {kDeaf,
+        "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT max(i) FROM n"}) {
+    const auto outcome = ask({"sql", sql, "--timeout", "0.2"});
+    EXPECT_EQ(outcome.exit_code, 1) << sql;
+    EXPECT_EQ(outcome.out, "") << sql;
+    EXPECT_THAT(outcome.err, HasSubstr("took too long (more than 0.2 s)")) << sql;
+    EXPECT_TRUE(outcome.err.starts_with("oblique")) << outcome.err;
+  }
+}
+
+TEST_F(DatabaseQuery, ASignalEndsAStatementThatNeverLooksAtTheClock) {
+  Program program(folder_, {"sql", kDeaf});
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  kill(program.pid(), SIGINT);
+  EXPECT_THAT(program.outcome().exit_code, testing::AnyOf(-1, 130));
+}
+
+TEST_F(DatabaseQuery, AStatementThatNeedsMuchMemoryFailsAndSaysSo) {
+  EXPECT_THAT(ask({"sql", "SELECT hex(zeroblob(450000000))"}).err,
+              HasSubstr("more than the 64 MiB allowed"));
+  const auto outcome =
+      ask({"sql",
+           "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n LIMIT 5000) "
+           "SELECT b FROM (SELECT hex(zeroblob(500000)) || i AS b FROM n) ORDER BY b"});
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("more memory than the 1024 MiB allowed"));
+}
+
+TEST_F(DatabaseQuery, ANameInTheWrongCaseIsRefusedWithTheRightOne) {
+  const auto outcome = ask({"query", "a", "--where", "E > 1e10"});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_EQ(outcome.out, "");
+  EXPECT_THAT(outcome.err, HasSubstr("write e, or E_Pa"));
+  EXPECT_EQ(ask({"query", "a", "--where", "E_Pa > 1e10"}).exit_code, 0);
+  EXPECT_EQ(ask({"query", "a", "--select", "max(mu) AS MU", "--order", "MU"}).exit_code, 0);
+  EXPECT_EQ(ask({"query", "a", "--select", "Mu"}).exit_code, 2);
+  EXPECT_EQ(ask({"query", "a", "--order", "POINT DESC"}).exit_code, 2);
+}
+
+TEST_F(DatabaseQuery, AConditionCannotCutOffOrderAndLimit) {
+  const auto outcome = ask({"query", "a", "--where", "point >= 0 --", "--limit", "1"});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("it has a comment (--)"));
+  EXPECT_EQ(ask({"query", "a", "--where", "point = 1 OR 1", "--select", "point", "--order",
+                 "point DESC", "--limit", "2", "--format", "csv"})
+                .out,
+            "point\n3\n2\n");
+}
+
+TEST_F(DatabaseQuery, AParameterHasNoValueAndIsRefused) {
+  for (const char* sql : {"SELECT ?", "SELECT :mu", "SELECT * FROM runs WHERE mu > @mu"}) {
+    const auto outcome = ask({"sql", sql});
+    EXPECT_NE(outcome.exit_code, 0) << sql;
+    EXPECT_THAT(outcome.err, HasSubstr("parameter")) << sql;
+  }
+}
+
+TEST_F(DatabaseQuery, ColumnsOfOneNameHaveKeysOfTheirOwnInJson) {
+  EXPECT_EQ(ask({"sql", "SELECT 1 AS a, 2 AS a", "--format", "json"}).out,
+            "[\n{\"a\":1,\"a_2\":2}\n]\n");
+}
+
+}  // namespace
+}  // namespace oblique::client

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "server/store/store.h"
+#include "tests/server/scheduler/scheduler_bench.h"
+#include "tests/server/store/results.h"
+
+namespace oblique::server {
+
+/// A database with one study of ten points, five of them solved.
+class DatabaseCareTest : public testing::Test {
+ protected:
+  DatabaseCareTest() { add_results(*store_, 0, 5, true); }
+
+  void add_results(Store& store, std::uint64_t first, std::uint64_t end, bool with_study) {
+    std::vector<Change> changes;
+    if (with_study) {
+      changes.emplace_back(AddStudy{1, "a", table_, "2024-01-01T00:00:00.000Z", {}});
+      changes.emplace_back(AddWorker{1, "host", 1, "0.1", "avx2", "now"});
+    }
+    std::vector<protocol::PointResult> results;
+    for (std::uint64_t point = first; point < end; ++point) {
+      results.push_back(solved_point(point));
+    }
+    changes.emplace_back(
+        AddResults{1, table_, 1, "0.1", "avx2", 1, "2024-01-01T00:00:01.000Z", results});
+    store.commit(changes);
+  }
+
+  TemporaryFolder folder_;
+  std::string path_ = folder_.file("studies.db");
+  std::string copy_ = folder_.file("copy.db");
+  std::shared_ptr<const protocol::PointTable> table_ = table_of(10);
+  std::optional<Store> store_{path_};
+};
+
+}  // namespace oblique::server

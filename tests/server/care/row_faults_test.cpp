@@ -1,0 +1,141 @@
+#include "server/care/row_faults.h"
+
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/care/database_care.h"
+#include "server/store/store.h"
+#include "tests/server/scheduler/scheduler_bench.h"
+#include "tests/server/store/results.h"
+
+namespace oblique::server {
+namespace {
+
+using testing::Contains;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+/// A solved point whose outputs agree with each other.
+protocol::PointResult agreeing_point(std::uint64_t point) {
+  protocol::PointResult result;
+  result.set_point(point);
+  result.set_duration_s(3e-4);
+  result.set_fn_peak_n(5000.0);
+  result.set_ft_peak_n(2000.0);
+  result.set_stick_total_s(5e-5);
+  result.set_mode("SC sC sR sC SC SR");
+  result.set_major_mode("SC sR");
+  for (const double value : {1e-4, 5000.0, 2000.0, 2.5e-4, 1500.0, 600.0}) {
+    result.add_peaks(value);
+  }
+  for (const double value : {1e-4, 2000.0, 2.5e-4, 600.0}) {
+    result.add_ft_peaks(value);
+  }
+  for (const double end_s : {1e-4, 2e-4, 2.5e-4, 3e-4}) {
+    result.add_phase_ends_s(end_s);
+  }
+  for (const double value : {0.0, 2e-5, 2.7e-4, 3e-4}) {
+    result.add_stick_intervals(value);
+  }
+  for (const double value : {3e-4, 5000.0, 1e-4, 4000.0}) {
+    result.add_reaction_peaks(value);
+  }
+  return result;
+}
+
+/// Three points, the last of them failed; their rows have no checksums.
+class RowFaultsTest : public testing::Test {
+ protected:
+  RowFaultsTest() {
+    Store store(path_);
+    store.commit(std::vector<Change>{
+        AddStudy{1, "a", table_, "now", {}},
+        AddResults{1,
+                   table_,
+                   0,
+                   "0.1",
+                   "avx2",
+                   1,
+                   "now",
+                   {agreeing_point(0), agreeing_point(1), protocol::failed_point(2, "why")}}});
+    run("UPDATE results SET checksum = NULL");
+    run("UPDATE studies SET checksum = NULL");
+  }
+  void run(const std::string& sql) {
+    execute(open_database(path_, SQLITE_OPEN_READWRITE).get(), sql);
+  }
+
+  TemporaryFolder folder_;
+  std::string path_ = folder_.file("studies.db");
+  std::shared_ptr<const protocol::PointTable> table_ = table_of(5);
+};
+
+TEST_F(RowFaultsTest, RowsThatAgreeWithThemselvesAndTheRecipeHaveNone) {
+  EXPECT_THAT(find_faults(path_), IsEmpty());
+}
+
+TEST_F(RowFaultsTest, AColumnThatDisagreesWithTheRecipeOrAnotherColumnIsNamed) {
+  const std::vector<std::pair<std::string, std::string>> damages{
+      {"H = 1.0000000000000002", "H is 1.0000000000000002"},
+      {"mu = mu + 0.125", "mu is"},
+      {"e = 0.5", "e is"},
+      {"duration_s = duration_s * 2", "duration"},
+      {"fn_peak_N = 5001", "fn_peak_N"},
+      {"ft_peak_N = 2001", "ft_peak_N"},
+      {"stick_total_s = 0", "stick_total_s"},
+      {"mode = 'SC sC sR'", "mode"},
+      {"peaks = replace(peaks, '5000', '4000')", "fn_peak_N"},
+      {"peaks = replace(peaks, ']]', ']')", "peaks"},
+      {"peaks = '[[2e-4,5000.0,1.0,1],[1e-4,1.0,1.0,1]]'", "peaks"},
+      {"peaks = '[[1e-4,5000.0,1]]'", "peaks"},
+      {"ft_peaks = '[[1e-4,1e999]]'", "ft_peaks"},
+      {"phases = replace(phases, 'compression', 'compressiom')", "phases"},
+      {"phases = '[[\"compression\",0.0,1e-4],[\"restitution\",2e-4,3e-4]]'", "phases"},
+      {"stick_intervals = replace(stick_intervals, '2e-05', '3e-05')", "stick_total_s"},
+      {"reaction_peaks = '[[1e-4,true]]'", "reaction_peaks"},
+      {"impulse_n_Ns = NULL", "outputs are missing"},
+      {"error = 'none'", "its error says otherwise"}};
+  for (const auto& [change, said] : damages) {
+    const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);
+    execute(database.get(), "CREATE TEMP TABLE before AS SELECT * FROM results WHERE point = 1");
+    execute(database.get(), "UPDATE results SET " + change + " WHERE point = 1");
+    EXPECT_THAT(find_faults(path_), Contains(testing::AllOf(HasSubstr("point 1"), HasSubstr(said))))
+        << change;
+    execute(database.get(), "DELETE FROM results WHERE point = 1");
+    execute(database.get(), "INSERT INTO results SELECT * FROM before");
+    EXPECT_THAT(find_faults(path_), IsEmpty()) << "after " << change;
+  }
+}
+
+TEST_F(RowFaultsTest, AFailedPointWithOutputsIsNamed) {
+  run("UPDATE results SET fn_peak_N = 1 WHERE point = 2");
+  EXPECT_THAT(find_faults(path_), Contains(HasSubstr("point 2: it is failed, and has outputs")));
+}
+
+TEST_F(RowFaultsTest, AModelThatIsNotThatOfItsDefinitionOrOfTheRecipeIsNamed) {
+  run("UPDATE models SET E = E + 1");
+  EXPECT_THAT(find_faults(path_), Contains(HasSubstr("model 1: E is not")));
+  run("UPDATE models SET E = E - 1");
+  solver::ModelParameters other;
+  other.E_Pa += 1.0;
+  {
+    const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);
+    Statement update(database.get(), "UPDATE models SET E = E + 1, definition = ?");
+    update.bind_blob(1, protocol::to_message(other).SerializeAsString());
+    update.run();
+  }
+  EXPECT_THAT(find_faults(path_), Contains(HasSubstr("point 0: its model is not")));
+}
+
+TEST_F(RowFaultsTest, ARecipeThatCannotBeReadOrHasOtherPointsIsNamed) {
+  run("UPDATE studies SET points = 6");
+  EXPECT_THAT(find_faults(path_), Contains(HasSubstr("it has 6 points, and 5 by its recipe")));
+  run("UPDATE studies SET points = 5, recipe = x'ff'");
+  EXPECT_THAT(find_faults(path_), Contains(HasSubstr("its recipe cannot be read")));
+}
+
+}  // namespace
+}  // namespace oblique::server

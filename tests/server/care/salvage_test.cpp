@@ -1,0 +1,179 @@
+#include "server/care/salvage.h"
+
+#include <array>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/care/database_care.h"
+#include "server/reading/reader.h"
+#include "server/store/store.h"
+#include "tests/server/care/database_care_fixture.h"
+
+namespace oblique::server {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+class SalvageTest : public DatabaseCareTest {};
+
+TEST_F(SalvageTest, WhatCanBeReadOfADamagedDatabaseIsSavedAndTheRestIsPendingAgain) {
+  constexpr std::uint64_t kPoints = 400;
+  const std::string damaged = folder_.file("damaged.db");
+  table_ = table_of(kPoints);
+  {
+    Store store(damaged);
+    add_results(store, 0, kPoints, true);
+    store.commit(std::vector<Change>{SetStudyState{1, StudyState::kDone, "now"}});
+  }
+  {
+    // One page in the middle, where nearly all pages are rows of results.
+    std::fstream file(damaged, std::ios::in | std::ios::out | std::ios::binary);
+    constexpr std::uintmax_t kPage = 4096;
+    file.seekp(
+        static_cast<std::streamoff>(std::filesystem::file_size(damaged) / 2 / kPage * kPage));
+    file << std::string(kPage, '\x5a');
+  }
+  EXPECT_FALSE(find_faults(damaged).empty());
+  const auto saved = salvage(damaged, copy_);
+  EXPECT_EQ(saved.studies, 1U);
+  EXPECT_GE(saved.unreadable_places, 1U);
+  EXPECT_LT(saved.results, kPoints);
+  EXPECT_GT(saved.results, kPoints - 40);
+  EXPECT_THAT(find_faults(copy_), IsEmpty());
+  Store copy(copy_);
+  const auto studies = copy.studies();
+  EXPECT_EQ(studies.at(0).settled.size(), saved.results);
+  EXPECT_EQ(studies.at(0).state, StudyState::kRunning);
+}
+
+TEST_F(SalvageTest, SalvagingEndsAlsoWhenTheFirstPagesOfATableAreGone) {
+  constexpr std::uint64_t kPoints = 400;
+  for (const std::string damage : {"root of results", "first rows", "root of models"}) {
+    const std::string damaged = folder_.file(damage + ".db");
+    table_ = table_of(kPoints);
+    {
+      Store store(damaged);
+      add_results(store, 0, kPoints, true);
+    }
+    std::int64_t page = 0;
+    {
+      const DatabaseHandle database = open_database(damaged, SQLITE_OPEN_READONLY);
+      const std::string table = damage == "root of models" ? "models" : "results";
+      Statement root(database.get(), "SELECT rootpage FROM sqlite_schema WHERE name = ?");
+      root.bind(1, std::string_view(table));
+      ASSERT_TRUE(root.step());
+      page = root.integer(0);
+    }
+    std::fstream file(damaged, std::ios::in | std::ios::out | std::ios::binary);
+    if (damage == "first rows") {
+      // The first child that the root names, behind its header of twelve bytes and pointers.
+      std::array<unsigned char, 4096> root{};
+      file.seekg((page - 1) * 4096);
+      file.read(reinterpret_cast<char*>(root.data()), root.size());
+      const std::size_t cell = root[12] * 256U + root[13];
+      page = root[cell] * 16777216 + root[cell + 1] * 65536 + root[cell + 2] * 256 + root[cell + 3];
+    }
+    file.seekp((page - 1) * 4096);
+    file << std::string(4096, '\x5a');
+    file.close();
+    const std::string saved_file = folder_.file(damage + " saved.db");
+    const auto saved = salvage(damaged, saved_file);
+    EXPECT_GE(saved.unreadable_places, 1U) << damage;
+    EXPECT_EQ(saved.results > kPoints - 40, damage == "first rows") << damage << saved.results;
+    EXPECT_THAT(find_faults(saved_file), IsEmpty()) << damage;
+  }
+}
+
+TEST_F(SalvageTest, AFlippedByteInAnyValueOfARowIsFoundAndTheRowIsNotSalvaged) {
+  store_.reset();
+  std::string bytes;
+  {
+    std::ifstream file(path_, std::ios::binary);
+    bytes.assign(std::istreambuf_iterator<char>(file), {});
+  }
+  // The row of point 3 begins with the numbers that its columns do, near the end of the file; its
+  // texts are found by what they say.
+  const auto text_of = [&](const std::string& column) {
+    return Reader(path_)
+        .query("SELECT " + column + " FROM results WHERE point = 3", kNoLimits)
+        .rows(0)
+        .values(0)
+        .text();
+  };
+  for (const std::string column : {"peaks", "ft_peaks", "phases", "reaction_peaks"}) {
+    const std::string text = text_of(column);
+    const auto at = bytes.find(text);
+    ASSERT_NE(at, std::string::npos) << column;
+    std::string damaged = bytes;
+    auto& digit = damaged[at + text.find_first_of("123456789")];
+    digit = digit == '1' ? '2' : '1';
+    const std::string file = folder_.file(column + ".db");
+    std::ofstream(file, std::ios::binary) << damaged;
+    EXPECT_THAT(find_faults(file), testing::Contains(HasSubstr("point 3"))) << column;
+    const auto saved = salvage(file, folder_.file(column + " saved.db"));
+    EXPECT_EQ(saved.results, 4U) << column;
+    EXPECT_EQ(saved.unreadable_places, 1U) << column;
+  }
+}
+
+TEST_F(SalvageTest, ADatabaseWithoutStudiesOrTablesIsNotSalvaged) {
+  std::ofstream(folder_.file("empty.db"));
+  EXPECT_THROW(salvage(folder_.file("empty.db"), copy_), StorageError);
+  EXPECT_THROW(salvage(folder_.file("nowhere.db"), copy_), StorageError);
+  EXPECT_FALSE(std::filesystem::exists(copy_));
+}
+
+TEST_F(SalvageTest, ASoundDatabaseIsSalvagedWhole) {
+  store_.reset();
+  const auto saved = salvage(path_, copy_);
+  EXPECT_EQ(saved.results, 5U);
+  EXPECT_EQ(saved.unreadable_places, 0U);
+  EXPECT_THROW(salvage(path_, copy_), StorageError) << "it exists";
+}
+
+TEST_F(SalvageTest, OfATruncatedFileEveryRowThatIsLeftIsSavedAndTheFileStaysAsItIs) {
+  constexpr std::uint64_t kPoints = 2000;
+  const std::string whole = folder_.file("whole.db");
+  table_ = table_of(kPoints);
+  {
+    Store store(whole);
+    for (std::uint64_t first = 0; first < kPoints; first += 100) {
+      add_results(store, first, first + 100, first == 0);
+    }
+  }
+  const auto size = std::filesystem::file_size(whole);
+  // In the middle of a page, at its end, and so that little more than the tables' heads is left.
+  for (const std::uintmax_t cut : {size / 100 * 99 + 7, size / 4096 * 3 / 4 * 4096, size / 10}) {
+    const std::string name = std::to_string(cut);
+    const std::string truncated = folder_.file(name + ".db");
+    const std::string saved_file = folder_.file(name + " saved.db");
+    std::filesystem::copy_file(whole, truncated);
+    std::filesystem::resize_file(truncated, cut);
+    const auto saved = salvage(truncated, saved_file);
+    const double share = static_cast<double>(cut) / static_cast<double>(size);
+    EXPECT_GT(static_cast<double>(saved.results), (share - 0.1) * kPoints) << cut;
+    EXPECT_LT(saved.results, kPoints) << cut;
+    EXPECT_GE(saved.unreadable_places, 1U) << cut;
+    EXPECT_THAT(find_faults(saved_file), IsEmpty()) << cut;
+    EXPECT_EQ(std::filesystem::file_size(truncated), cut);
+  }
+}
+
+TEST_F(SalvageTest, RowsThatAreOnlyInTheLogAreSavedTooAndTheLogStaysAsItIs) {
+  const std::string crashed = folder_.file("crashed.db");
+  std::filesystem::copy_file(path_, crashed);
+  std::filesystem::copy_file(path_ + "-wal", crashed + "-wal");
+  const auto log = std::filesystem::file_size(crashed + "-wal");
+  ASSERT_GT(log, 0U);
+  EXPECT_EQ(salvage(crashed, copy_).results, 5U);
+  EXPECT_EQ(std::filesystem::file_size(crashed + "-wal"), log);
+}
+
+}  // namespace
+}  // namespace oblique::server

@@ -1,0 +1,125 @@
+#include "server/database/open_for_reading.h"
+
+#include <cstdlib>
+#include <filesystem>
+#include <functional>
+#include <iostream>
+#include <string>
+
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/care/database_care.h"
+#include "server/care/salvage.h"
+#include "server/reading/reader.h"
+#include "server/store/store.h"
+#include "tests/server/scheduler/scheduler_bench.h"
+#include "tests/server/store/results.h"
+
+namespace oblique::server {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A database that lies in a folder where nothing can be written. What it holds: two rows in the
+/// file and, with a log beside it, a third one there.
+class ReadOnlyFolderTest : public testing::Test {
+ protected:
+  ReadOnlyFolderTest() {
+    Store store(folder_.file("source.db"));
+    const auto table = table_of(10);
+    store.commit(std::vector<Change>{
+        AddStudy{1, "a", table, "now", {}},
+        AddResults{1, table, 0, "0.1", "avx2", 1, "now", {solved_point(0), solved_point(1)}}});
+    store.merge_log();
+    store.commit(
+        std::vector<Change>{AddResults{1, table, 0, "0.1", "avx2", 1, "now", {solved_point(2)}}});
+    place("", "alone");
+    place("", "with_log");
+    place("-wal", "with_log");
+    ::chmod(folder_.file("").c_str(), 0755);
+    fs::create_directory(folder_.file("out"));
+    ::chmod(folder_.file("out").c_str(), 0777);
+  }
+  ~ReadOnlyFolderTest() override {
+    for (const char* name : {"alone", "with_log"}) {
+      ::chmod(folder_.file(name).c_str(), 0755);
+    }
+  }
+
+  std::string file_in(const std::string& name) const {
+    return folder_.file(name + "/some % results?.db");
+  }
+
+  /// Runs `what` as a user who can write nowhere but in `out`: root could write in every folder.
+  /// Ends the process with 0 when `what` gives true.
+  void as_stranger(const std::function<bool()>& what) const {
+    constexpr uid_t kNobody = 65534;
+    if (::geteuid() == 0 && (::setgid(kNobody) != 0 || ::setuid(kNobody) != 0)) {
+      std::_Exit(2);
+    }
+    try {
+      std::_Exit(what() ? 0 : 1);
+    } catch (const std::exception& error) {
+      std::cerr << error.what() << '\n';
+      std::_Exit(3);
+    }
+  }
+
+  TemporaryFolder folder_;
+
+ private:
+  void place(const std::string& suffix, const std::string& name) {
+    fs::create_directories(folder_.file(name));
+    fs::copy_file(folder_.file("source.db" + suffix), file_in(name) + suffix);
+    ::chmod((file_in(name) + suffix).c_str(), 0444);
+    if (name == "alone" || suffix == "-wal") {
+      ::chmod(folder_.file(name).c_str(), 0555);
+    }
+  }
+};
+
+int rows_of(const std::string& path) {
+  return Reader(path).query("SELECT point FROM results", kNoLimits).rows_size();
+}
+
+TEST_F(ReadOnlyFolderTest, EveryRowIsReadAlsoThoseThatAreOnlyInTheLog) {
+  for (const auto& [name, rows] : {std::pair{"alone", 2}, std::pair{"with_log", 3}}) {
+    const std::string file = file_in(name);
+    EXPECT_EXIT(as_stranger([&, expected = rows] { return rows_of(file) == expected; }),
+                testing::ExitedWithCode(0), "")
+        << name;
+  }
+}
+
+TEST_F(ReadOnlyFolderTest, ItIsSaidThatTheDatabaseIsReadAsItStands) {
+  EXPECT_EXIT(as_stranger([&] { return !Reader(file_in("alone")).remark().empty(); }),
+              testing::ExitedWithCode(0), "");
+  EXPECT_EQ(Reader(folder_.file("source.db")).remark(), "");
+}
+
+TEST_F(ReadOnlyFolderTest, StatusCheckBackupAndSalvageWorkToo) {
+  const std::string file = file_in("with_log");
+  const std::string copy = folder_.file("out/copy.db");
+  const std::string saved = folder_.file("out/saved.db");
+  EXPECT_EXIT(as_stranger([&] {
+                back_up(file, copy);
+                return Reader(file).study_status("a").at(0).solved() == 3 &&
+                       find_faults(file).empty() && rows_of(copy) == 3 &&
+                       salvage(file, saved).results == 3;
+              }),
+              testing::ExitedWithCode(0), "");
+}
+
+TEST_F(ReadOnlyFolderTest, NothingIsLeftBesideADatabaseThatCanBeReadOnly) {
+  EXPECT_EXIT(as_stranger([&] { return rows_of(file_in("with_log")) == 3; }),
+              testing::ExitedWithCode(0), "");
+  const fs::directory_iterator files(folder_.file("with_log"));
+  EXPECT_EQ(std::distance(fs::begin(files), fs::end(files)), 2);
+}
+
+}  // namespace
+}  // namespace oblique::server

@@ -1,0 +1,117 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "server/scheduler/scheduler.h"
+#include "tests/proto/recipe/recipe_builder.h"
+
+namespace oblique::server {
+
+/// A study of `points` points of one model.
+inline std::shared_ptr<const protocol::PointTable> table_of(std::uint64_t points) {
+  return std::make_shared<const protocol::PointTable>(protocol::recipe_of(
+      {{protocol::listed("H", {1.0}), protocol::range("mu", 0.0, points == 1 ? 0.0 : 1.0, points),
+        protocol::listed("e", {1.0})}}));
+}
+
+/// The effects of one type, in order.
+template <typename Kind>
+std::vector<Kind> only(const std::vector<Effect>& effects) {
+  std::vector<Kind> kept;
+  for (const Effect& effect : effects) {
+    if (const auto* wanted = std::get_if<Kind>(&effect)) {
+      kept.push_back(*wanted);
+    }
+  }
+  return kept;
+}
+
+/// Settings by which newcomers get as many batches as they ask for, for tests of something else.
+inline SchedulerSettings trusting() {
+  SchedulerSettings settings;
+  settings.newcomer_batches = 1'000'000;
+  return settings;
+}
+
+/// A scheduler whose invariants are checked after each event, with a clock that tests set.
+class SchedulerBench {
+ public:
+  explicit SchedulerBench(SchedulerSettings settings = {}) : scheduler(settings) {}
+
+  std::vector<Effect> feed(const Event& event) {
+    auto effects = scheduler.handle(event, now_ms);
+    scheduler.check_invariants();
+    return effects;
+  }
+
+  /// A worker of one thread that takes `credit` batches; returns what it got at once.
+  std::vector<SendBatch> join(WorkerId worker, std::uint32_t credit, std::uint32_t threads = 1) {
+    feed(WorkerJoined{worker, threads});
+    return only<SendBatch>(feed(CreditGiven{worker, credit}));
+  }
+
+  /// A connection of that process, as `join`.
+  std::vector<Effect> join_as(const std::string& process, WorkerId worker, std::uint32_t credit) {
+    auto effects = feed(WorkerJoined{worker, 1, {}, process, true});
+    append(effects, feed(CreditGiven{worker, credit}));
+    return effects;
+  }
+
+  /// The worker solves the probe, and asks for another batch in its place.
+  std::vector<Effect> solve_probe(const SendProbe& probe) {
+    auto effects = feed(ResultsReceived{
+        probe.worker, kProbeStudy, probe.lease, ++sequence, true, 1e-3, {{0, false}}});
+    append(effects, feed(ResultsStored{probe.worker, kProbeStudy, sequence, {}}));
+    append(effects, feed(CreditGiven{probe.worker, 1}));
+    return effects;
+  }
+
+  /// The whole batch solved in `busy_s` and the results received.
+  std::vector<Effect> solve(const SendBatch& batch, double busy_s = 1e-3) {
+    ResultsReceived event{batch.worker, batch.study, batch.lease, ++sequence, true, busy_s, {}};
+    for (std::uint64_t i = 0; i < batch.count; ++i) {
+      event.outcomes.push_back({batch.first_point + i, false});
+    }
+    return feed(event);
+  }
+
+  /// `solve`, and the results are made durable. Returns the effects of both.
+  std::vector<Effect> solve_and_store(const SendBatch& batch, double busy_s = 1e-3) {
+    auto effects = solve(batch, busy_s);
+    for (const StoreResults& store : only<StoreResults>(effects)) {
+      ResultsStored stored{store.worker, store.study, store.sequence, {}};
+      for (const std::size_t index : store.accepted) {
+        stored.outcomes.push_back({batch.first_point + index, false});
+      }
+      append(effects, feed(stored));
+    }
+    return effects;
+  }
+
+  /// Time passes in steps as in the server's loop; `alive` send heartbeats with what they hold.
+  /// Returns all effects.
+  std::vector<Effect> pass(std::int64_t duration_ms, const std::vector<WorkerId>& alive = {}) {
+    std::vector<Effect> all;
+    const std::int64_t end_ms = now_ms + duration_ms;
+    while (now_ms < end_ms) {
+      now_ms += 250;
+      for (const WorkerId worker : alive) {
+        append(all, feed(CreditGiven{worker, 0}));
+      }
+      append(all, feed(Tick{}));
+    }
+    return all;
+  }
+
+  static void append(std::vector<Effect>& all, std::vector<Effect> more) {
+    all.insert(all.end(), more.begin(), more.end());
+  }
+
+  Scheduler scheduler;
+  std::int64_t now_ms = 1'000'000;
+  std::uint64_t sequence = 0;
+};
+
+}  // namespace oblique::server

@@ -1,0 +1,235 @@
+// Workers that are lost without fault of the points that they held: nothing of that fails a point.
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "server/scheduler/loss_history.h"
+#include "server/scheduler/scheduler.h"
+#include "server/scheduler/worker_processes.h"
+#include "tests/server/scheduler/scheduler_bench.h"
+
+namespace oblique::server {
+namespace {
+
+TEST(SchedulerLosses, PeersThatTakeBatchesAndVanishUnderNewNamesFailNoPoint) {
+  SchedulerBench bench;
+  bench.feed(StudyAdded{1, table_of(2000), {}});
+  WorkerId fake = 100;
+  const auto vanish = [&] {
+    ++fake;
+    bench.join_as("fake " + std::to_string(fake), fake, 1000);
+    return only<StoreFailure>(bench.feed(WorkerUnreachable{fake})).size();
+  };
+  std::size_t failures = 0;
+  for (int i = 0; i < 100; ++i) {
+    failures += vanish();
+  }
+  failures += only<StoreFailure>(bench.pass(60'000)).size();
+  std::vector<Effect> effects = bench.join_as("sound", 1, 2);
+  bool finished = false;
+  for (int i = 0; i < 10'000 && !finished; ++i) {
+    failures += vanish() + only<StoreFailure>(effects).size();
+    std::vector<Effect> next = bench.pass(250, {1});
+    for (const auto& probe : only<SendProbe>(effects)) {
+      SchedulerBench::append(next,
+                             probe.worker == 1 ? bench.solve_probe(probe) : std::vector<Effect>{});
+    }
+    for (const auto& batch : only<SendBatch>(effects)) {
+      SchedulerBench::append(next, bench.solve_and_store(batch));
+      SchedulerBench::append(next, bench.feed(CreditGiven{1, 1}));
+    }
+    finished = !only<StudyFinished>(next).empty();
+    effects = std::move(next);
+  }
+  EXPECT_EQ(failures, 0U);
+  EXPECT_TRUE(finished);
+  EXPECT_EQ(bench.scheduler.study(1).solved, 2000U);
+}
+
+TEST(SchedulerLosses, NewcomersSolveAProbeFirstWhileOthersVanishWithTheirPoints) {
+  SchedulerBench bench;
+  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  for (const WorkerId fake : {1U, 2U, 3U}) {
+    EXPECT_FALSE(bench.join(fake, 1).empty());
+    bench.feed(WorkerUnreachable{fake});
+  }
+  const auto effects = bench.join_as("sound", 4, 2);
+  EXPECT_TRUE(only<SendBatch>(effects).empty());
+  ASSERT_EQ(only<SendProbe>(effects).size(), 1U) << "one at a time";
+  EXPECT_TRUE(bench.scheduler.worker(4, bench.now_ms).is_set_aside);
+  EXPECT_FALSE(bench.scheduler.worker(4, bench.now_ms).is_proven);
+  EXPECT_FALSE(only<SendBatch>(bench.solve_probe(only<SendProbe>(effects)[0])).empty());
+  EXPECT_FALSE(bench.scheduler.worker(4, bench.now_ms).is_set_aside);
+  EXPECT_TRUE(bench.scheduler.worker(4, bench.now_ms).is_proven);
+  bench.pass(61'000, {4});
+  EXPECT_FALSE(bench.join(5, 1).empty()) << "it has been calm for a minute";
+}
+
+TEST(SchedulerLosses, AProbeThatIsNotSolvedIsRepeatedEverySecondAndNoOftener) {
+  SchedulerBench bench;
+  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  for (const WorkerId fake : {1U, 2U, 3U}) {
+    bench.join(fake, 1);
+    bench.feed(WorkerUnreachable{fake});
+  }
+  const auto probe = only<SendProbe>(bench.join_as("faulty", 4, 10)).at(0);
+  const auto failed =
+      bench.feed(ResultsReceived{4, kProbeStudy, probe.lease, 1, true, 0.1, {{0, true}}});
+  EXPECT_TRUE(only<SendProbe>(failed).empty());
+  EXPECT_TRUE(only<SendBatch>(failed).empty());
+  EXPECT_EQ(only<SendProbe>(bench.pass(1000, {4})).size(), 1U);
+}
+
+TEST(SchedulerLosses, AProbeThatNeverArrivedIsGivenAgain) {
+  SchedulerBench bench;
+  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  for (const WorkerId fake : {1U, 2U, 3U}) {
+    bench.join(fake, 1);
+    bench.feed(WorkerUnreachable{fake});
+  }
+  const auto probe = only<SendProbe>(bench.join_as("sound", 4, 2)).at(0);
+  bench.pass(2750, {4});
+  EXPECT_TRUE(bench.feed(HeartbeatReceived{4, {}}).empty()) << "it may be on its way";
+  bench.pass(250, {4});
+  EXPECT_TRUE(bench.feed(HeartbeatReceived{4, {probe.lease}}).empty());
+  EXPECT_EQ(only<SendProbe>(bench.feed(HeartbeatReceived{4, {}})).size(), 1U);
+}
+
+TEST(SchedulerLosses, ANewcomerHoldsTwoBatchesAtMost) {
+  SchedulerBench bench;
+  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  const auto first = bench.join(1, 1000);
+  EXPECT_EQ(first.size(), 2U);
+  EXPECT_EQ(only<SendBatch>(bench.solve(first[0])).size(), 998U);
+}
+
+TEST(SchedulerLosses, AProcessLostThreeTimesInARowIsSetAsideUntilItSolvesAProbe) {
+  SchedulerBench bench;
+  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  bench.solve(only<SendBatch>(bench.join_as("weak", 1, 1)).at(0));
+  for (const WorkerId worker : {2U, 3U, 4U}) {
+    EXPECT_EQ(only<SendBatch>(bench.join_as("weak", worker, 1)).size(), 1U);
+    bench.feed(WorkerUnreachable{worker});
+  }
+  auto effects = bench.join_as("weak", 5, 2);
+  EXPECT_TRUE(bench.scheduler.worker(5, bench.now_ms).is_set_aside);
+  EXPECT_EQ(bench.scheduler.worker(5, bench.now_ms).losses, 3U);
+  EXPECT_TRUE(only<SendBatch>(effects).empty());
+  effects = bench.solve_probe(only<SendProbe>(effects).at(0));
+  EXPECT_EQ(only<SendBatch>(effects).size(), 2U);
+  EXPECT_FALSE(bench.scheduler.worker(5, bench.now_ms).is_set_aside);
+}
+
+TEST(SchedulerLosses, ANewConnectionOfAProcessEndsItsOldOneAtOnce) {
+  SchedulerBench bench;
+  bench.feed(StudyAdded{1, table_of(1), {}});
+  const auto lost = only<SendBatch>(bench.join_as("one", 1, 1)).at(0);
+  const auto effects = bench.join_as("one", 2, 1);
+  ASSERT_EQ(only<DropWorker>(effects).size(), 1U);
+  EXPECT_EQ(only<DropWorker>(effects)[0].worker, 1U);
+  ASSERT_EQ(only<SendBatch>(effects).size(), 1U);
+  EXPECT_EQ(only<SendBatch>(effects)[0].first_point, lost.first_point);
+}
+
+TEST(SchedulerLosses, ANewcomerThatConnectsAnewHasNotVanished) {
+  SchedulerBench bench;
+  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  // Each of four processes has an earlier connection, which held a batch, replaced by a new one.
+  for (const WorkerId worker : {1U, 2U, 3U, 4U}) {
+    const std::string process = "sound " + std::to_string(worker);
+    ASSERT_EQ(only<SendBatch>(bench.join_as(process, worker, 1)).size(), 1U);
+    bench.join_as(process, worker + 10, 0);
+  }
+  EXPECT_EQ(only<SendBatch>(bench.join_as("another", 30, 1)).size(), 1U);
+  EXPECT_FALSE(bench.scheduler.worker(30, bench.now_ms).is_set_aside);
+}
+
+TEST(SchedulerLosses, WorkersThatOnlyShareANameDoNotEndEachOther) {
+  SchedulerBench bench;
+  bench.feed(WorkerJoined{1, 1, {}, "name box:1", false});
+  bench.feed(WorkerJoined{2, 1, {}, "name box:1", false});
+  EXPECT_TRUE(bench.scheduler.knows_worker(1));
+  EXPECT_TRUE(bench.scheduler.knows_worker(2));
+}
+
+TEST(SchedulerLosses, PointsAreSuspectNoMoreWhenTheirWorkersComeBack) {
+  SchedulerSettings settings;
+  settings.tail_batches_per_thread = 0;
+  SchedulerBench bench(settings);
+  bench.feed(StudyAdded{1, table_of(4), {}});
+  for (const WorkerId worker : {1U, 2U}) {
+    EXPECT_EQ(only<SendBatch>(bench.join_as(std::to_string(worker), worker, 1)).size(), 1U);
+    bench.feed(WorkerUnreachable{worker});
+  }
+  EXPECT_TRUE(bench.join(3, 1).empty()) << "they are suspect, and this one is new";
+  const auto given = bench.join_as("1", 4, 0);
+  EXPECT_TRUE(only<SendBatch>(given).empty());
+  EXPECT_EQ(only<SendBatch>(bench.feed(CreditGiven{4, 1})).size(), 1U);
+}
+
+TEST(SchedulerLosses, AWorkerIsNotLostAfterExactlyTheTimeThatItMayBeSilent) {
+  SchedulerBench bench;
+  bench.feed(WorkerJoined{1, 1});
+  for (const std::int64_t step_ms : {900, 900, 900, 100}) {
+    bench.now_ms += step_ms;
+    EXPECT_TRUE(only<DropWorker>(bench.feed(Tick{})).empty());
+  }
+  bench.now_ms += 1;
+  EXPECT_EQ(only<DropWorker>(bench.feed(Tick{})).size(), 1U);
+}
+
+TEST(LossHistory, CountsEachProcessOnceAndTakesItsLossBackWhenItReturns) {
+  LossHistory history;
+  history.add({1, false});
+  history.add({1, false});
+  EXPECT_EQ(history.count(), 1U);
+  EXPECT_EQ(history.standing({}), Standing::kSound);
+  history.add({2, false});
+  EXPECT_EQ(history.standing({}), Standing::kSuspect);
+  history.add({2, true});
+  EXPECT_EQ(history.count(), 2U);
+  EXPECT_EQ(history.standing({}), Standing::kAccused);
+  EXPECT_TRUE(history.take_back(2));
+  EXPECT_FALSE(history.take_back(2));
+  EXPECT_EQ(history.standing({}), Standing::kSound);
+}
+
+TEST(LossHistory, ThoseWhoLiveOnAreCountedEachTimeAndNotTakenBack) {
+  LossHistory history;
+  for (int i = 0; i < 3; ++i) {
+    history.add({kNobody, true});
+  }
+  EXPECT_FALSE(history.take_back(kNobody));
+  EXPECT_EQ(history.standing({}), Standing::kCondemned);
+}
+
+TEST(LossHistory, DoesNotGrowWithoutEnd) {
+  LossHistory history;
+  for (ProcessNumber process = 1; process < 1000; ++process) {
+    history.add({process, false});
+  }
+  EXPECT_LE(history.count(), 16U);
+  history.add({5000, true});
+  EXPECT_EQ(history.alone(), 1U);
+}
+
+TEST(WorkerProcesses, OfThoseThatAreGoneTheLatestAreRememberedEachKindApart) {
+  WorkerProcesses processes(2);
+  const auto proven = processes.join("proven", 1);
+  processes.at(proven).proven_since_ms = 5;
+  processes.leave(proven, 1);
+  for (WorkerId worker = 2; worker < 100; ++worker) {
+    const std::string id = "fake " + std::to_string(worker);
+    processes.leave(processes.join(id, worker), worker);
+    processes.leave(processes.join("", worker), worker);
+    processes.check_invariants();
+    EXPECT_LE(processes.size(), 3U);
+  }
+  EXPECT_EQ(processes.join("proven", 100), proven);
+  EXPECT_EQ(processes.at(proven).proven_since_ms, 5);
+  EXPECT_EQ(processes.join("fake 2", 101), 198U) << "it was forgotten";
+}
+
+}  // namespace
+}  // namespace oblique::server

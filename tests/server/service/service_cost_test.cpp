@@ -1,0 +1,273 @@
+// What costly but valid messages cost, counted in work and not in time.
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "proto/frame_scan.h"
+#include "tests/server/service/service_fixture.h"
+
+namespace oblique::server {
+namespace {
+
+using testing::HasSubstr;
+
+ClientRequest status_request(std::uint64_t after = 0, std::uint32_t limit = 0) {
+  ClientRequest message;
+  message.set_protocol_version(protocol::kProtocolVersion);
+  message.mutable_status()->set_after_study_id(after);
+  message.mutable_status()->set_limit(limit);
+  return message;
+}
+
+/// A submission whose recipe has so many bytes at least.
+ClientRequest long_submission(const std::string& name, std::size_t bytes) {
+  ClientRequest message;
+  message.set_protocol_version(protocol::kProtocolVersion);
+  message.set_request_id(7);
+  message.mutable_submit()->set_name(name);
+  auto& mu = *message.mutable_submit()->mutable_recipe();
+  mu = protocol::recipe_of(
+      {{protocol::listed("H", {1.0}), protocol::listed("mu", {}), protocol::listed("e", {1.0})}});
+  for (std::size_t i = 0; i < bytes / 8 + 1; ++i) {
+    mu.mutable_blocks(0)->mutable_axes(1)->add_values(0.1 + 1e-9 * static_cast<double>(i));
+  }
+  return message;
+}
+
+constexpr std::size_t kLong = std::size_t{100} * 1024;
+
+TEST_F(ServiceTest, ALongRecipeIsJudgedElsewhereAndOthersAreAnsweredMeanwhile) {
+  request(long_submission("large", kLong));
+  ASSERT_EQ(outbox_.reads.size(), 1U);
+  EXPECT_TRUE(outbox_.replies.empty());
+  request(submit_request("small"));
+  write_all();
+  EXPECT_TRUE(last_reply().has_submit());
+  request(status_request());
+  EXPECT_EQ(last_reply().status().studies_size(), 1);
+  read_all();
+  write_all();
+  EXPECT_EQ(last_reply().request_id(), 7U);
+  EXPECT_TRUE(last_reply().submit().created());
+}
+
+TEST_F(ServiceTest, OfTwoLongSubmissionsOfOneNameTheSameIsOneStudyAndAnotherIsRefused) {
+  request(long_submission("a", kLong));
+  service_->client_frame("same", protocol::encode(long_submission("a", kLong)), now_);
+  service_->client_frame("other", protocol::encode(long_submission("a", 2 * kLong)), now_);
+  read_all();
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("another name"));
+  outbox_.replies.clear();
+  write_all();
+  ASSERT_EQ(outbox_.replies.size(), 2U);
+  EXPECT_TRUE(outbox_.replies[0].submit().created());
+  EXPECT_FALSE(outbox_.replies[1].submit().created());
+  EXPECT_EQ(outbox_.replies[0].submit().study_id(), outbox_.replies[1].submit().study_id());
+}
+
+TEST_F(ServiceTest, ALongRecipeWithAFaultIsRefusedWithTheReason) {
+  ClientRequest bad = long_submission("a", kLong);
+  bad.mutable_submit()->mutable_recipe()->mutable_blocks(0)->mutable_axes(2)->set_values(0, 1.5);
+  request(bad);
+  read_all();
+  EXPECT_EQ(last_reply().request_id(), 7U);
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("e = 1.5"));
+  EXPECT_TRUE(outbox_.jobs.empty());
+}
+
+TEST_F(ServiceTest, LongRequestsThatWaitAreBoundedForEachClientAndInAll) {
+  ClientRequest message = long_submission("a", kLong);
+  for (std::uint64_t id = 1; id <= 3; ++id) {
+    message.set_request_id(id);
+    request(message);
+  }
+  EXPECT_EQ(outbox_.reads.size(), 2U);
+  EXPECT_EQ(last_reply().request_id(), 3U);
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("ask again later"));
+  const std::string frame = protocol::encode(long_submission("a", std::size_t{10} << 20U));
+  for (int i = 0; i < 100; ++i) {
+    service_->client_frame("client " + std::to_string(i), frame, now_);
+  }
+  EXPECT_EQ(outbox_.reads.size() - 2, (std::size_t{64} << 20U) / frame.size());
+  read_all();
+  request(message);
+  EXPECT_EQ(outbox_.reads.size(), 1U) << "there is room again";
+}
+
+TEST_F(ServiceTest, ALongRequestThatIsSentAgainWhileItWaitsIsReadAndAnsweredOnce) {
+  for (int i = 0; i < 5; ++i) {
+    request(long_submission("a", kLong));
+  }
+  EXPECT_EQ(outbox_.reads.size(), 1U);
+  EXPECT_TRUE(outbox_.replies.empty());
+  read_all();
+  write_all();
+  EXPECT_EQ(outbox_.replies.size(), 1U);
+}
+
+TEST_F(ServiceTest, ALongRequestThatComesOrWaitsWhileTheServerStopsIsAnswered) {
+  request(long_submission("a", kLong));
+  service_->stop(now_);
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("stopping"));
+  request(long_submission("b", kLong));
+  EXPECT_EQ(outbox_.replies.size(), 2U);
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("stopping"));
+  read_all();
+  EXPECT_EQ(outbox_.replies.size(), 2U) << "each is answered once";
+  EXPECT_TRUE(outbox_.jobs.empty());
+}
+
+TEST_F(ServiceTest, ALongFrameThatIsNoMessageIsAnsweredWithItsNumber) {
+  std::string frame = protocol::encode(long_submission("a", kLong));
+  frame.back() = '\x7f';
+  frame += '\x7f';
+  service_->client_frame("client", frame, now_);
+  read_all();
+  EXPECT_EQ(last_reply().request_id(), 7U);
+  EXPECT_TRUE(last_reply().has_error());
+  EXPECT_EQ(service_->bad_frames(), 1U);
+}
+
+TEST_F(ServiceTest, AHeartbeatOfMoreLeasesThanAWorkerHoldsIsABadFrameThatIsNotRead) {
+  hello();
+  WorkerMessage message;
+  for (std::uint64_t i = 0; i <= protocol::kMostLeasesAHeartbeat; ++i) {
+    message.mutable_heartbeat()->add_lease_ids(i);
+  }
+  worker_says(message);
+  EXPECT_EQ(service_->bad_frames(), 1U);
+  EXPECT_TRUE(last_message().has_hello_again());
+  EXPECT_EQ(service_->scheduler().workers(), 0U);
+  worker_says(message);
+  EXPECT_EQ(service_->bad_frames(), 2U) << "a stranger's too";
+}
+
+TEST_F(ServiceTest, ResultsOfMorePointsThanAMessageHoldsAreABadFrame) {
+  hello();
+  WorkerMessage message;
+  for (std::size_t i = 0; i <= protocol::kMostResultsAMessage; ++i) {
+    message.mutable_results()->add_results();
+  }
+  worker_says(message);
+  EXPECT_EQ(service_->bad_frames(), 1U);
+  EXPECT_EQ(service_->scheduler().workers(), 0U);
+}
+
+TEST_F(ServiceTest, AWorkerThatDeliversNothingLeavesNoRowAndOneThatDoesHasItFirst) {
+  request(submit_request("a", 4));
+  write_all();
+  for (int i = 0; i < 1000; ++i) {
+    hello("worker " + std::to_string(i));
+  }
+  EXPECT_TRUE(outbox_.jobs.empty());
+  hello();
+  credit(1);
+  const auto batch = last_message().batch();
+  WorkerMessage message;
+  auto& results = *message.mutable_results();
+  results.set_study_id(batch.study_id());
+  results.set_lease_id(batch.lease_id());
+  for (int sequence = 1; sequence <= 2; ++sequence) {
+    results.set_sequence(static_cast<std::uint64_t>(sequence));
+    results.clear_results();
+    *results.add_results() = solved_point(batch.first_point());
+    worker_says(message);
+  }
+  ASSERT_EQ(outbox_.jobs.size(), 3U) << "one row of the worker, and two messages";
+  EXPECT_EQ(std::get<AddWorker>(outbox_.jobs[0].change).worker_id, 1001U);
+  EXPECT_EQ(std::get<AddResults>(outbox_.jobs[1].change).worker_id, 1001U);
+}
+
+TEST_F(ServiceTest, WorkersThatComeAndGoWithoutEndDoNotFillTheLog) {
+  for (int i = 0; i < 10'000; ++i) {
+    hello("worker " + std::to_string(i));
+    WorkerMessage goodbye;
+    goodbye.mutable_goodbye();
+    service_->worker_frame("worker " + std::to_string(i), protocol::encode(goodbye), now_);
+  }
+  EXPECT_LT(outbox_.notes, 50);
+  const int notes = outbox_.notes;
+  now_.steady_ms += 20'000;
+  service_->tick(now_);
+  EXPECT_EQ(outbox_.notes, notes + 1) << "how many were left out is said";
+  hello();
+  EXPECT_EQ(outbox_.notes, notes + 2) << "and later ones are written again";
+}
+
+/// A service with 2,500 studies.
+class ManyStudiesTest : public ServiceTest {
+ protected:
+  static constexpr int kStudies = 2500;
+  ManyStudiesTest() {
+    for (int i = 0; i < kStudies; ++i) {
+      request_unchecked(submit_request("study " + std::to_string(i)));
+    }
+    for (const WriteJob& job : std::exchange(outbox_.jobs, {})) {
+      service_->written({WriteReport::Kind::kStored, job.ticket, {}}, now_);
+    }
+  }
+  void request_unchecked(const ClientRequest& message) {
+    service_->client_frame("client", protocol::encode(message), now_);
+  }
+};
+
+TEST_F(ManyStudiesTest, TheirStatusComesInPagesThatHoldEachStudyOnce) {
+  std::uint64_t after = 0;
+  int seen = 0;
+  int pages = 0;
+  do {
+    request_unchecked(status_request(after));
+    const auto& page = outbox_.replies.back().status();
+    ASSERT_LE(page.studies_size(), 1000);
+    for (const auto& study : page.studies()) {
+      EXPECT_GT(study.study_id(), after);
+      after = study.study_id();
+    }
+    seen += page.studies_size();
+    EXPECT_EQ(page.next_after(), seen < kStudies ? after : 0U);
+    ++pages;
+  } while (outbox_.replies.back().status().next_after() != 0);
+  EXPECT_EQ(seen, kStudies);
+  EXPECT_EQ(pages, 3);
+}
+
+TEST_F(ManyStudiesTest, APageIsAsShortAsAskedAndNeverLongerThanTheServersOwn) {
+  request_unchecked(status_request(0, 10));
+  EXPECT_EQ(last_reply().status().studies_size(), 10);
+  request_unchecked(status_request(0, 1'000'000));
+  EXPECT_EQ(last_reply().status().studies_size(), 1000);
+}
+
+TEST_F(ManyStudiesTest, OnlyStudiesOfWhichPointsAreSettledAreSampledForTheirRate) {
+  service_->tick(now_);
+  EXPECT_EQ(service_->rates().studies(), 0U);
+  hello();
+  credit(1);
+  answer_batch(1000);
+  service_->tick(now_);
+  EXPECT_EQ(service_->rates().studies(), 1U);
+  for (int i = 0; i < 200; ++i) {
+    now_.steady_ms += 100;
+    service_->tick(now_);
+  }
+  EXPECT_EQ(service_->rates().studies(), 0U) << "it rests again";
+}
+
+TEST_F(ServiceTest, WorkersComeInPagesToo) {
+  for (int i = 0; i < 1500; ++i) {
+    hello("worker " + std::to_string(i));
+  }
+  ClientRequest message;
+  message.set_protocol_version(protocol::kProtocolVersion);
+  message.mutable_workers();
+  request(message);
+  ASSERT_EQ(last_reply().workers().workers_size(), 1000);
+  message.mutable_workers()->set_after_worker_id(last_reply().workers().next_after());
+  request(message);
+  EXPECT_EQ(last_reply().workers().workers_size(), 500);
+  EXPECT_EQ(last_reply().workers().next_after(), 0U);
+}
+
+}  // namespace
+}  // namespace oblique::server

@@ -1,0 +1,161 @@
+// What the service does when the disk or a peer does not keep up.
+#include <gtest/gtest.h>
+
+#include "tests/server/service/service_fixture.h"
+
+namespace oblique::server {
+namespace {
+
+class ServiceLoadTest : public ServiceTest {
+ protected:
+  /// Begins anew with other settings, a study of 1000 points and a worker.
+  void begin(ServiceSettings settings) {
+    settings.solver_version = "1.0";
+    settings.database_id = "db";
+    service_.emplace(settings, outbox_, std::vector<StoredStudy>{}, now_);
+    request(submit_request("a", 1000));
+    write_all();
+    hello();
+    write_all();
+  }
+  /// One result of the last batch, without an end of it.
+  WorkerMessage one_result(std::uint64_t point) {
+    WorkerMessage message;
+    auto& results = *message.mutable_results();
+    results.set_study_id(1);
+    results.set_sequence(++sequence_);
+    *results.add_results() = solved_point(point);
+    return message;
+  }
+  std::size_t batches_sent() const {
+    std::size_t count = 0;
+    for (const auto& message : outbox_.worker_messages) {
+      count += message.has_batch() ? 1U : 0U;
+    }
+    return count;
+  }
+};
+
+TEST_F(ServiceLoadTest, NoBatchGoesOutWhileTheDiskIsFarBehind) {
+  ServiceSettings settings;
+  settings.unstored_bytes_to_hold = 1000;
+  begin(settings);
+  credit(1);
+  EXPECT_EQ(batches_sent(), 1U);
+  for (std::uint64_t point = 900; point < 910; ++point) {
+    worker_says(one_result(point));
+  }
+  credit(1);
+  EXPECT_EQ(batches_sent(), 1U);
+  write_all();
+  EXPECT_EQ(batches_sent(), 2U);
+}
+
+TEST_F(ServiceLoadTest, AFaultThatIsOverHandsOutNothingWhileTheDiskIsFarBehind) {
+  ServiceSettings settings;
+  settings.unstored_bytes_to_hold = 1000;
+  begin(settings);
+  service_->written({WriteReport::Kind::kFault, 0, "disk full"}, now_);
+  for (std::uint64_t point = 900; point < 910; ++point) {
+    worker_says(one_result(point));
+  }
+  credit(1);
+  service_->written({WriteReport::Kind::kRecovered, 0, {}}, now_);
+  EXPECT_EQ(batches_sent(), 0U);
+  write_all();
+  EXPECT_EQ(batches_sent(), 1U);
+}
+
+TEST_F(ServiceLoadTest, NoBatchGoesOutWhileManyMessagesWaitForTheDisk) {
+  ServiceSettings settings;
+  settings.unstored_messages_to_hold = 4;
+  begin(settings);
+  for (std::uint64_t point = 900; point < 904; ++point) {
+    worker_says(one_result(point));
+  }
+  credit(1);
+  EXPECT_EQ(batches_sent(), 0U);
+  write_all();
+  EXPECT_EQ(batches_sent(), 1U);
+}
+
+TEST_F(ServiceLoadTest, AWorkerFarAheadOfTheDiskIsNotHeardUntilMoreIsStored) {
+  ServiceSettings settings;
+  settings.unstored_bytes_of_worker = 500;
+  begin(settings);
+  hello("another");
+  write_all();
+  for (std::uint64_t point = 900; service_->has_room_for("worker") && point < 1000; ++point) {
+    worker_says(one_result(point));
+  }
+  EXPECT_FALSE(service_->has_room_for("worker"));
+  EXPECT_TRUE(service_->has_room_for("another"));
+  EXPECT_TRUE(service_->has_room_for("a stranger"));
+  write_all();
+  EXPECT_TRUE(service_->has_room_for("worker"));
+}
+
+TEST_F(ServiceLoadTest, AllWorkersTogetherAreNotHeardWhileTooMuchWaitsForTheDisk) {
+  ServiceSettings settings;
+  settings.unstored_bytes = 500;
+  begin(settings);
+  hello("another");
+  write_all();
+  for (std::uint64_t point = 900; service_->has_room_for("worker") && point < 1000; ++point) {
+    worker_says(one_result(point));
+  }
+  EXPECT_FALSE(service_->has_room_for("another"));
+  write_all();
+  EXPECT_TRUE(service_->has_room_for("another"));
+}
+
+TEST_F(ServiceLoadTest, AWorkerThatIsNotHeardIsNotTakenForSilentAndHearsThatTheServerLives) {
+  ServiceSettings settings;
+  settings.unstored_bytes_of_worker = 1;
+  begin(settings);
+  worker_says(one_result(900));
+  outbox_.worker_messages.clear();
+  for (int i = 0; i < 100; ++i) {
+    now_.steady_ms += 100;
+    service_->tick(now_);
+  }
+  EXPECT_EQ(service_->scheduler().workers(), 1U);
+  std::size_t signs = 0;
+  for (const auto& message : outbox_.worker_messages) {
+    signs += message.has_heartbeat_reply() ? 1U : 0U;
+  }
+  EXPECT_GE(signs, 5U);
+  write_all();
+  for (int i = 0; i < 100; ++i) {
+    now_.steady_ms += 100;
+    service_->tick(now_);
+  }
+  EXPECT_EQ(service_->scheduler().workers(), 0U) << "now it is silent indeed";
+}
+
+TEST_F(ServiceLoadTest, AWorkerThatDoesNotReadGetsNoFurtherBatchAndNoPointCountsAsLost) {
+  begin({});
+  outbox_.busy = "worker";
+  credit(1);
+  EXPECT_EQ(batches_sent(), 1U);
+  credit(1);
+  EXPECT_EQ(batches_sent(), 1U);
+  EXPECT_EQ(service_->scheduler().workers(), 1U);
+  outbox_.busy.clear();
+  service_->tick(now_);
+  EXPECT_EQ(batches_sent(), 2U);
+}
+
+TEST_F(ServiceLoadTest, ResultsWithMorePointsThanAWorkerSendsAreABadFrame) {
+  begin({});
+  WorkerMessage message;
+  for (int i = 0; i < 100'000; ++i) {
+    message.mutable_results()->add_results();
+  }
+  worker_says(message);
+  EXPECT_EQ(service_->bad_frames(), 1U);
+  EXPECT_TRUE(outbox_.jobs.empty());
+}
+
+}  // namespace
+}  // namespace oblique::server

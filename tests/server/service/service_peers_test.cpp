@@ -1,0 +1,238 @@
+// Peers of other versions, and those that do what no sound peer does.
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/server/service/service_fixture.h"
+
+namespace oblique::server {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+WorkerMessage hello_of(std::uint32_t protocol_version, const std::string& solver_version) {
+  WorkerMessage message;
+  message.mutable_hello()->set_protocol_version(protocol_version);
+  message.mutable_hello()->set_solver_version(solver_version);
+  message.mutable_hello()->set_threads(1);
+  return message;
+}
+
+TEST_F(ServiceTest, AWorkerWithAnotherSolverIsWelcomedAndToldBothVersions) {
+  hello("worker", "0.9");
+  ASSERT_TRUE(last_message().has_notice());
+  EXPECT_THAT(last_message().notice().text(), HasSubstr("0.9"));
+  EXPECT_THAT(last_message().notice().text(), HasSubstr("1.0"));
+  EXPECT_EQ(service_->scheduler().workers(), 1U);
+}
+
+TEST_F(ServiceTest, AStudyBegunWithAnotherSolverWaitsAndSaysForWhat) {
+  request(submit_request("a"));
+  write_all();
+  hello();
+  credit(1);
+  answer_batch(1000);
+  worker_says(hello_of(protocol::kProtocolVersion, "0.9"));
+  credit(1);
+  EXPECT_FALSE(last_message().has_batch());
+  ClientRequest status;
+  status.set_protocol_version(protocol::kProtocolVersion);
+  status.mutable_status();
+  request(status);
+  EXPECT_THAT(last_reply().status().studies(0).waits_for(), HasSubstr("solver version 1.0"));
+  ClientRequest mixing = submit_request("a");
+  mixing.mutable_submit()->set_mixes_versions(true);
+  request(mixing);
+  write_all();
+  EXPECT_TRUE(last_message().has_batch());
+}
+
+TEST_F(ServiceTest, AnotherShareIsAcknowledgedOnceItIsDurableAndWhatIsNotGivenStays) {
+  ClientRequest first = submit_request("a");
+  first.mutable_submit()->set_weight(3.0);
+  request(first);
+  write_all();
+  ClientRequest again = submit_request("a");
+  again.mutable_submit()->set_priority(7);
+  const std::size_t replies = outbox_.replies.size();
+  request(again);
+  EXPECT_EQ(outbox_.replies.size(), replies) << "not before it is written";
+  write_all();
+  EXPECT_TRUE(last_reply().has_submit());
+  ClientRequest status;
+  status.set_protocol_version(protocol::kProtocolVersion);
+  status.mutable_status();
+  request(status);
+  EXPECT_EQ(last_reply().status().studies(0).priority(), 7);
+  EXPECT_EQ(last_reply().status().studies(0).weight(), 3.0);
+  again.mutable_submit()->set_priority(8);
+  request(again);
+  write_all("the disk is full");
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("disk is full"));
+}
+
+TEST_F(ServiceTest, PeersOfThePreviousProtocolVersionAreServed) {
+  worker_says(hello_of(protocol::kOldestProtocolVersion, "0.9"));
+  ASSERT_TRUE(last_message().has_welcome()) << "they do not know notices";
+  EXPECT_EQ(last_message().welcome().protocol_version(), protocol::kOldestProtocolVersion);
+  ClientRequest message = submit_request("a");
+  message.set_protocol_version(protocol::kOldestProtocolVersion);
+  request(message);
+  write_all();
+  EXPECT_TRUE(last_reply().has_submit());
+  credit(1);
+  EXPECT_TRUE(last_message().has_batch());
+}
+
+TEST_F(ServiceTest, BytesOfThePreviousProtocolVersionAreStillRead) {
+  // Taken from a worker and a client of version 1: a hello of one thread, a credit of two batches,
+  // a submission of ten points.
+  const std::string hello(
+      "\x0a\x0f\x08\x01\x12\x03"
+      "1.0"
+      "\x1a\x04"
+      "avx2"
+      "\x28\x01",
+      17);
+  const std::string credit("\x12\x02\x08\x02", 4);
+  service_->worker_frame("worker", hello, now_);
+  EXPECT_EQ(last_message().welcome().worker_id(), 1U);
+  ClientRequest message = submit_request("a");
+  message.set_protocol_version(1);
+  request(message);
+  write_all();
+  service_->worker_frame("worker", credit, now_);
+  EXPECT_TRUE(last_message().has_batch());
+}
+
+TEST_F(ServiceTest, PeersOfAnyOtherProtocolVersionAreRefusedWithTheVersions) {
+  for (const std::uint32_t version : {0U, protocol::kProtocolVersion + 1, 77U}) {
+    worker_says(hello_of(version, "1.0"));
+    EXPECT_THAT(last_message().refused().reason(), HasSubstr("versions 1 and 2"));
+    EXPECT_THAT(last_message().refused().reason(), HasSubstr(std::to_string(version)));
+  }
+  EXPECT_EQ(service_->scheduler().workers(), 0U);
+  ClientRequest message = submit_request("a");
+  message.set_protocol_version(77);
+  request(message);
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("77"));
+}
+
+TEST_F(ServiceTest, AWorkerThatDoesNotNameItsSolverIsRefused) {
+  hello("worker", "");
+  EXPECT_THAT(last_message().refused().reason(), HasSubstr("version"));
+  EXPECT_EQ(service_->scheduler().workers(), 0U);
+}
+
+TEST_F(ServiceTest, HellosWithoutEndOnOneConnectionAreNotAnsweredForEver) {
+  for (int i = 0; i < 100; ++i) {
+    hello();
+  }
+  EXPECT_LT(outbox_.worker_messages.size(), 20U);
+  EXPECT_GT(service_->bad_frames(), 50U);
+}
+
+TEST_F(ServiceTest, WhatAWorkerSaysOfItselfCannotForgeLines) {
+  WorkerMessage message = hello_of(protocol::kProtocolVersion, "1.0");
+  message.mutable_hello()->set_name("a\n\x1b[31mb");
+  worker_says(message);
+  EXPECT_THAT(outbox_.log.back(), HasSubstr("(a??[31mb, 1 threads) joins"));
+}
+
+TEST_F(ServiceTest, AFieldOfALaterVersionIsPassedOver) {
+  // Field 1000 of the message and of the hello in it.
+  std::string hello = protocol::encode(hello_of(protocol::kProtocolVersion, "1.0"));
+  hello += std::string("\xc0\x3e\x07", 3);
+  service_->worker_frame("worker", hello, now_);
+  EXPECT_TRUE(last_message().has_welcome());
+  EXPECT_EQ(service_->bad_frames(), 0U);
+}
+
+TEST_F(ServiceTest, AWorkerWhoseConnectionIsGoneIsFoundAsSoonAsAHeartbeatIsLate) {
+  request(submit_request("a"));
+  write_all();
+  hello();
+  credit(1);
+  outbox_.unreachable = "worker";
+  now_.steady_ms += 1000;
+  service_->tick(now_);
+  EXPECT_EQ(service_->scheduler().workers(), 1U);
+  now_.steady_ms += 200;
+  service_->tick(now_);
+  EXPECT_EQ(service_->scheduler().workers(), 0U);
+  EXPECT_EQ(service_->scheduler().study(1).leased, 0U);
+}
+
+/// A service with small limits.
+class FloodedServiceTest : public ServiceTest {
+ protected:
+  FloodedServiceTest() {
+    ServiceSettings settings;
+    settings.solver_version = "1.0";
+    settings.most_unstored_messages = 3;
+    settings.most_waiting_changes = 2;
+    service_.emplace(settings, outbox_, std::vector<StoredStudy>{}, now_);
+  }
+};
+
+TEST_F(FloodedServiceTest, AWorkerThatSendsWithoutEndIsDroppedAndCountedAndMayBeginAnew) {
+  hello();
+  WorkerMessage message;
+  message.mutable_results()->set_study_id(1);
+  for (std::uint64_t sequence = 1; sequence <= 4; ++sequence) {
+    message.mutable_results()->set_sequence(sequence);
+    worker_says(message);
+  }
+  EXPECT_EQ(service_->bad_frames(), 1U);
+  EXPECT_EQ(service_->scheduler().workers(), 0U);
+  EXPECT_TRUE(last_message().has_hello_again());
+  hello();
+  EXPECT_EQ(service_->scheduler().workers(), 0U) << "not while so much waits for the disk";
+  write_all();
+  hello();
+  EXPECT_EQ(service_->scheduler().workers(), 1U);
+}
+
+TEST_F(FloodedServiceTest, AWorkerWhoseResultsAreStoredMaySendOn) {
+  hello();
+  WorkerMessage message;
+  message.mutable_results()->set_study_id(1);
+  for (std::uint64_t sequence = 1; sequence <= 20; ++sequence) {
+    message.mutable_results()->set_sequence(sequence);
+    worker_says(message);
+    write_all();
+  }
+  EXPECT_EQ(service_->bad_frames(), 0U);
+  EXPECT_EQ(service_->scheduler().workers(), 1U);
+}
+
+TEST_F(FloodedServiceTest, ChangesBeyondTheLimitAreRefusedUntilTheDiskTookOthers) {
+  for (const char* name : {"a", "b", "c"}) {
+    request(submit_request(name));
+  }
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("ask again later"));
+  write_all();
+  request(submit_request("c"));
+  write_all();
+  EXPECT_TRUE(last_reply().has_submit());
+}
+
+TEST_F(ServiceTest, AStudyWhoseResultsTheDiskDoesNotTakeSaysSoAndForgetsItAfterwards) {
+  request(submit_request("a"));
+  write_all();
+  hello();
+  ClientRequest status;
+  status.set_protocol_version(protocol::kProtocolVersion);
+  status.mutable_status();
+  service_->written({WriteReport::Kind::kFault, 0, "disk full"}, now_);
+  request(status);
+  EXPECT_THAT(last_reply().status().studies(0).waits_for(), HasSubstr("disk full"));
+  service_->written({WriteReport::Kind::kRecovered, 0, {}}, now_);
+  request(status);
+  EXPECT_THAT(last_reply().status().studies(0).waits_for(), IsEmpty());
+}
+
+}  // namespace
+}  // namespace oblique::server

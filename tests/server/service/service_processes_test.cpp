@@ -1,0 +1,147 @@
+// Connections and the worker processes behind them, probes, and workers of the previous protocol.
+#include <algorithm>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "proto/recipe/recipe.h"
+#include "tests/server/service/service_fixture.h"
+
+namespace oblique::server {
+namespace {
+
+class ProcessesTest : public ServiceTest {
+ protected:
+  void hello_as(const std::string& identity, const std::string& process_id,
+                const std::string& name = "lab",
+                std::uint32_t version = protocol::kProtocolVersion) {
+    WorkerMessage message;
+    message.mutable_hello()->set_protocol_version(version);
+    message.mutable_hello()->set_solver_version("1.0");
+    message.mutable_hello()->set_name(name);
+    message.mutable_hello()->set_threads(1);
+    message.mutable_hello()->set_process_id(process_id);
+    worker_says(message, identity);
+  }
+  protocol::WorkersReply workers() {
+    ClientRequest message;
+    message.set_protocol_version(protocol::kProtocolVersion);
+    message.mutable_workers();
+    request(message);
+    return last_reply().workers();
+  }
+  /// The worker at `identity` solves a batch and says goodbye.
+  void solve_and_leave(const std::string& identity) {
+    credit(1, identity);
+    answer_batch(1000, identity);
+    WorkerMessage goodbye;
+    goodbye.mutable_goodbye();
+    worker_says(goodbye, identity);
+  }
+  /// Three newcomers get batches and are gone.
+  void let_newcomers_vanish() {
+    for (const char* identity : {"x", "y", "z"}) {
+      hello_as(identity, identity);
+      credit(1, identity);
+      EXPECT_TRUE(last_message().has_batch());
+      outbox_.unreachable = identity;
+      now_.steady_ms += 1200;
+      service_->tick(now_);
+    }
+    outbox_.unreachable.clear();
+  }
+};
+
+TEST_F(ProcessesTest, AProcessOnANewConnectionGetsAtOnceWhatItHeldOnTheOldOne) {
+  request(submit_request("a", 1));
+  write_all();
+  hello_as("first", "process 1");
+  credit(1, "first");
+  hello_as("second", "process 1");
+  EXPECT_EQ(service_->scheduler().workers(), 1U);
+  credit(1, "second");
+  EXPECT_TRUE(last_message().has_batch());
+  credit(1, "first");
+  EXPECT_TRUE(last_message().has_hello_again()) << "the old connection is nobody's any more";
+}
+
+TEST_F(ProcessesTest, AWorkerThatDrewNoIdIsKnownByItsNameIfThatHasAProcessNumber) {
+  request(submit_request("a", 100));
+  write_all();
+  for (const char* name : {"box:12", "lab"}) {
+    hello_as("first", "", name);
+    solve_and_leave("first");
+    hello_as("second", "", name);
+    const bool is_known = name == std::string("box:12");
+    EXPECT_EQ(workers().workers(0).proven(), is_known) << name;
+    solve_and_leave("second");
+  }
+}
+
+TEST_F(ProcessesTest, WorkersSayWhatWasLostWithTheirProcess) {
+  request(submit_request("a", 100));
+  write_all();
+  hello_as("first", "process 1");
+  credit(2, "first");
+  hello_as("second", "process 1");
+  const auto worker = workers().workers(0);
+  EXPECT_EQ(worker.losses(), 2U);
+  EXPECT_FALSE(worker.proven());
+  EXPECT_FALSE(worker.set_aside());
+}
+
+TEST_F(ProcessesTest, AProbeIsAStudyOfOnePointThatAnyWorkerReadsAndItsResultIsAcknowledged) {
+  request(submit_request("a", 100));
+  write_all();
+  let_newcomers_vanish();
+  hello_as("worker", "sound");
+  EXPECT_TRUE(workers().workers(0).set_aside());
+  credit(1);
+  ASSERT_TRUE(last_message().has_batch());
+  const auto batch = last_message().batch();
+  EXPECT_EQ(batch.study_id(), 0U);
+  EXPECT_EQ(batch.count(), 1U);
+  const auto& definition = outbox_.worker_messages.at(outbox_.worker_messages.size() - 2);
+  ASSERT_TRUE(definition.has_study());
+  EXPECT_EQ(definition.study().study_id(), 0U);
+  EXPECT_EQ(protocol::PointTable(definition.study().recipe()).size(), 1U);
+  answer_batch(1);
+  EXPECT_TRUE(last_message().has_results_stored());
+  EXPECT_TRUE(workers().workers(0).proven());
+  EXPECT_EQ(workers().workers(0).solved_points(), 0U);
+  credit(1);
+  ASSERT_TRUE(last_message().has_batch());
+  EXPECT_EQ(last_message().batch().study_id(), 1U);
+}
+
+/// How many Release messages a worker of that protocol version gets when another one has solved
+/// its batch.
+class ReleaseTest : public ProcessesTest, public testing::WithParamInterface<std::uint32_t> {};
+
+TEST_P(ReleaseTest, IsSentToWorkersThatKnowItOnly) {
+  request(submit_request("a", 1));
+  write_all();
+  hello_as("slow", "slow", "slow", GetParam());
+  credit(1, "slow");
+  hello();
+  credit(1);
+  for (int i = 0; i < 8 && !last_message().has_batch(); ++i) {
+    now_.steady_ms += 250;
+    credit(0, "slow");
+    credit(0);
+    service_->tick(now_);
+  }
+  ASSERT_TRUE(last_message().has_batch());
+  answer_batch(1);
+  const auto releases =
+      std::count_if(outbox_.worker_messages.begin(), outbox_.worker_messages.end(),
+                    [](const ServerToWorker& message) { return message.has_release(); });
+  EXPECT_EQ(releases, GetParam() < 2 ? 0 : 1);
+}
+
+INSTANTIATE_TEST_SUITE_P(Version, ReleaseTest,
+                         testing::Values(protocol::kOldestProtocolVersion,
+                                         protocol::kProtocolVersion));
+
+}  // namespace
+}  // namespace oblique::server

@@ -1,0 +1,92 @@
+// Queries as the service sees them: who waits, who is told, who is gone.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/server/service/service_fixture.h"
+
+namespace oblique::server {
+namespace {
+
+class ServiceQueryTest : public ServiceTest {
+ protected:
+  void ask(std::uint64_t request_id, const std::string& identity = "client") {
+    ClientRequest message;
+    message.set_protocol_version(protocol::kProtocolVersion);
+    message.set_request_id(request_id);
+    message.mutable_query()->set_sql("SELECT 1");
+    service_->client_frame(identity, protocol::encode(message), now_);
+  }
+  void pass(std::int64_t duration_ms) {
+    for (const std::int64_t end_ms = now_.steady_ms + duration_ms; now_.steady_ms < end_ms;) {
+      now_.steady_ms += 100;
+      service_->tick(now_);
+    }
+  }
+};
+
+TEST_F(ServiceQueryTest, AnAnswerGoesToTheOneWhoAskedUnderItsNumber) {
+  ask(7);
+  ASSERT_EQ(outbox_.queries.size(), 1U);
+  EXPECT_EQ(outbox_.queries[0].client, "client");
+  protocol::QueryReply rows;
+  rows.add_columns("a");
+  rows.add_rows()->add_values()->set_integer(5);
+  answer_query(0, protocol::reply_around(protocol::encode(rows)));
+  EXPECT_EQ(last_reply().request_id(), 7U);
+  EXPECT_EQ(last_reply().query().rows(0).values(0).integer(), 5);
+}
+
+TEST_F(ServiceQueryTest, AClientHearsEverySecondThatItsQueryWaitsOrRuns) {
+  ask(7);
+  pass(900);
+  EXPECT_TRUE(outbox_.replies.empty());
+  pass(100);
+  ASSERT_EQ(outbox_.replies.size(), 1U);
+  EXPECT_EQ(last_reply().request_id(), UINT64_MAX);
+  EXPECT_EQ(last_reply().still_working().request_id(), 7U);
+  EXPECT_FALSE(last_reply().still_working().runs());
+  service_->queried({QueryReport::Kind::kBegun, outbox_.queries[0].ticket, {}});
+  pass(1000);
+  ASSERT_EQ(outbox_.replies.size(), 2U);
+  EXPECT_TRUE(last_reply().still_working().runs());
+  service_->queried({QueryReport::Kind::kPutBack, outbox_.queries[0].ticket, {}});
+  pass(1000);
+  EXPECT_FALSE(last_reply().still_working().runs());
+  answer_query(0, encoded_error("no such column"));
+  const auto replies = outbox_.replies.size();
+  pass(5000);
+  EXPECT_EQ(outbox_.replies.size(), replies);
+}
+
+TEST_F(ServiceQueryTest, TheQueryOfAClientThatIsGoneIsCancelled) {
+  ask(7);
+  outbox_.unreachable = "client";
+  pass(1000);
+  EXPECT_EQ(outbox_.cancelled_queries, std::vector{outbox_.queries[0].ticket});
+  pass(5000);
+  EXPECT_EQ(outbox_.cancelled_queries.size(), 1U);
+  answer_query(0, encoded_error("too late"));
+  EXPECT_TRUE(outbox_.replies.empty());
+}
+
+TEST_F(ServiceQueryTest, AQueryAskedTwiceUnderOneNumberRunsOnce) {
+  ask(7);
+  ask(7);
+  EXPECT_EQ(outbox_.queries.size(), 1U);
+  ask(7, "another");
+  EXPECT_EQ(outbox_.queries.size(), 2U);
+}
+
+TEST_F(ServiceQueryTest, AStoppingServerAnswersThoseWhoWait) {
+  ask(7);
+  service_->stop(now_);
+  EXPECT_EQ(last_reply().request_id(), 7U);
+  EXPECT_THAT(last_reply().error().message(), testing::HasSubstr("stopping"));
+  ask(8);
+  EXPECT_EQ(outbox_.queries.size(), 1U);
+  EXPECT_EQ(last_reply().request_id(), 8U);
+  EXPECT_THAT(last_reply().error().message(), testing::HasSubstr("stopping"));
+}
+
+}  // namespace
+}  // namespace oblique::server

@@ -1,0 +1,247 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/server/service/service_fixture.h"
+
+namespace oblique::server {
+namespace {
+
+using testing::HasSubstr;
+
+TEST_F(ServiceTest, AStudyIsAcknowledgedOnlyOnceItIsStored) {
+  request(submit_request("a"));
+  EXPECT_TRUE(outbox_.replies.empty());
+  write_all();
+  const auto reply = last_reply();
+  EXPECT_EQ(reply.request_id(), 42U);
+  EXPECT_EQ(reply.submit().points(), 10U);
+  EXPECT_TRUE(reply.submit().created());
+}
+
+TEST_F(ServiceTest, AStudyThatCouldNotBeStoredIsRefusedAndItsNameIsFree) {
+  request(submit_request("a"));
+  write_all("the disk is full");
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("the disk is full"));
+  request(submit_request("a", 20));
+  write_all();
+  EXPECT_EQ(last_reply().submit().points(), 20U);
+}
+
+TEST_F(ServiceTest, TheSameStudyContinuesAndAnotherOfTheNameIsRefused) {
+  request(submit_request("a"));
+  write_all();
+  request(submit_request("a"));
+  EXPECT_FALSE(last_reply().submit().created());
+  request(submit_request("a", 11));
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("another name"));
+}
+
+TEST_F(ServiceTest, TwoWhoSubmitTheSameBeforeItIsStoredAreBothAnswered) {
+  request(submit_request("a"));
+  request(submit_request("a"));
+  write_all();
+  ASSERT_EQ(outbox_.replies.size(), 2U);
+  EXPECT_TRUE(outbox_.replies[0].submit().created());
+  EXPECT_FALSE(outbox_.replies[1].submit().created());
+}
+
+TEST_F(ServiceTest, BadStudiesAreRefusedWithTheReason) {
+  request(submit_request(""));
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("1 to 100 bytes"));
+  request(submit_request("a\nb"));
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("control characters"));
+  auto bad = submit_request("a");
+  bad.mutable_submit()->mutable_recipe()->mutable_blocks(0)->mutable_axes(2)->set_values(0, 1.5);
+  request(bad);
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("e = 1.5"));
+  EXPECT_TRUE(outbox_.jobs.empty());
+}
+
+TEST_F(ServiceTest, CancellingIsAcknowledgedOnceItIsStoredAndSubmittingAgainGoesOn) {
+  request(submit_request("a"));
+  write_all();
+  outbox_.replies.clear();
+  request(cancel_request("a"));
+  EXPECT_TRUE(outbox_.replies.empty());
+  write_all();
+  EXPECT_EQ(last_reply().change().study().state(), "cancelled");
+  request(cancel_request("a"));
+  EXPECT_EQ(last_reply().change().study().state(), "cancelled");
+  request(submit_request("a"));
+  write_all();
+  EXPECT_FALSE(last_reply().submit().created());
+  EXPECT_FALSE(service_->scheduler().study(1).cancelled);
+  request(cancel_request("b"));
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("no study called \"b\""));
+}
+
+TEST_F(ServiceTest, ACancellationThatCouldNotBeStoredLeavesTheStudyRunning) {
+  request(submit_request("a"));
+  write_all();
+  request(cancel_request("a"));
+  write_all("the disk is full");
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("the disk is full"));
+  EXPECT_FALSE(service_->scheduler().study(1).cancelled);
+}
+
+TEST_F(ServiceTest, AWorkerIsWelcomedByNumberAndToldTheDatabase) {
+  hello();
+  EXPECT_EQ(last_message().welcome().worker_id(), 1U);
+  EXPECT_EQ(last_message().welcome().database_id(), "db");
+  EXPECT_EQ(last_message().welcome().lost_after_ms(), 2800U);
+}
+
+TEST_F(ServiceTest, AnUnknownWorkerIsAskedToSayHelloAgain) {
+  credit(1);
+  EXPECT_TRUE(last_message().has_hello_again());
+}
+
+TEST_F(ServiceTest, AHeartbeatIsAnswered) {
+  hello();
+  WorkerMessage message;
+  message.mutable_heartbeat();
+  worker_says(message);
+  EXPECT_TRUE(last_message().has_heartbeat_reply());
+}
+
+TEST_F(ServiceTest, AWorkerThatSaysHelloTwiceBeginsAnew) {
+  request(submit_request("a"));
+  write_all();
+  hello();
+  credit(1);
+  ASSERT_TRUE(last_message().has_batch());
+  hello();
+  EXPECT_EQ(service_->scheduler().workers(), 1U);
+  EXPECT_EQ(service_->scheduler().study(1).leased, 0U);
+}
+
+TEST_F(ServiceTest, ResultsAreAcknowledgedOnceTheyAreStored) {
+  request(submit_request("a", 1));
+  write_all();
+  hello();
+  credit(1);
+  const auto batch = last_message().batch();
+  WorkerMessage message;
+  auto& results = *message.mutable_results();
+  results.set_study_id(batch.study_id());
+  results.set_lease_id(batch.lease_id());
+  results.set_attempt(batch.attempt());
+  results.set_sequence(9);
+  results.set_batch_done(true);
+  *results.add_results() = solved_point(0);
+  write_all();
+  worker_says(message);
+  ASSERT_EQ(outbox_.jobs.size(), 2U) << "the worker's row and the results";
+  EXPECT_FALSE(last_message().has_results_stored());
+  write_all();
+  EXPECT_EQ(last_message().results_stored().sequence(), 9U);
+  // Its end is noted in the database.
+  ASSERT_EQ(outbox_.jobs.size(), 1U);
+  EXPECT_EQ(std::get<SetStudyState>(outbox_.jobs[0].change).state, StudyState::kDone);
+}
+
+TEST_F(ServiceTest, AResultThatIsNotFiniteBecomesAFailedPoint) {
+  request(submit_request("a", 1));
+  write_all();
+  hello();
+  WorkerMessage message;
+  message.mutable_results()->set_study_id(1);
+  auto result = solved_point(0);
+  result.set_duration_s(std::numeric_limits<double>::quiet_NaN());
+  *message.mutable_results()->add_results() = result;
+  write_all();
+  worker_says(message);
+  ASSERT_EQ(outbox_.jobs.size(), 2U) << "the worker's row and the results";
+  const auto& change = std::get<AddResults>(outbox_.jobs[1].change);
+  EXPECT_THAT(change.results.at(0).error(), HasSubstr("duration_s"));
+}
+
+TEST_F(ServiceTest, AWorkerThatCannotBeReachedLosesItsBatchAtOnce) {
+  request(submit_request("a"));
+  write_all();
+  hello();
+  outbox_.unreachable = "worker";
+  credit(1);
+  EXPECT_EQ(service_->scheduler().workers(), 0U);
+  EXPECT_EQ(service_->scheduler().study(1).leased, 0U);
+}
+
+TEST_F(ServiceTest, WhatIsNoMessageIsCountedAndClientsAreTold) {
+  service_->worker_frame("worker", "\xff\xff", now_);
+  service_->worker_frame("worker", "", now_);
+  EXPECT_EQ(service_->bad_frames(), 2U);
+  EXPECT_TRUE(outbox_.worker_messages.empty());
+  service_->client_frame("client", "\xff\xff", now_);
+  EXPECT_TRUE(last_reply().has_error());
+  ClientRequest nothing;
+  nothing.set_protocol_version(protocol::kProtocolVersion);
+  request(nothing);
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("kind of request"));
+  nothing.set_protocol_version(3);
+  request(nothing);
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("protocol version"));
+}
+
+TEST_F(ServiceTest, NoFloodOfBadFramesFloodsTheLog) {
+  for (int i = 0; i < 1000; ++i) {
+    service_->worker_frame("worker", "\xff", now_);
+  }
+  EXPECT_LE(outbox_.notes, 10);
+}
+
+TEST_F(ServiceTest, TooManyQueriesAreRefused) {
+  ClientRequest message;
+  message.set_protocol_version(protocol::kProtocolVersion);
+  message.mutable_query()->set_sql("SELECT 1");
+  for (std::uint64_t id = 1; id <= 2; ++id) {
+    message.set_request_id(id);
+    request(message);
+  }
+  EXPECT_TRUE(outbox_.replies.empty());
+  message.set_request_id(3);
+  request(message);
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("too many queries"));
+  EXPECT_EQ(last_reply().request_id(), 3U);
+  answer_query(0, encoded_error("no such column"));
+  EXPECT_EQ(last_reply().error().message(), "no such column");
+  EXPECT_EQ(last_reply().request_id(), 1U);
+}
+
+TEST_F(ServiceTest, StatusTellsTheRateOfTheLastSeconds) {
+  request(submit_request("a", 1000));
+  write_all();
+  hello();
+  WorkerMessage message;
+  message.mutable_results()->set_study_id(1);
+  for (std::uint64_t point = 0; point < 100; ++point) {
+    *message.mutable_results()->add_results() = solved_point(point);
+  }
+  service_->tick(now_);
+  worker_says(message);
+  write_all();
+  now_.steady_ms += 500;
+  ClientRequest status;
+  status.set_protocol_version(protocol::kProtocolVersion);
+  status.mutable_status()->set_study("a");
+  request(status);
+  ASSERT_EQ(last_reply().status().studies_size(), 1);
+  EXPECT_EQ(last_reply().status().studies(0).solved(), 100U);
+  EXPECT_DOUBLE_EQ(last_reply().status().studies(0).points_per_s(), 200.0);
+  EXPECT_EQ(last_reply().status().studies(0).created_at(), "2023-11-14T22:13:20.123Z");
+}
+
+TEST_F(ServiceTest, AServerThatStopsTellsItsWorkersAndHandsOutNothing) {
+  request(submit_request("a"));
+  write_all();
+  hello();
+  service_->stop(now_);
+  EXPECT_TRUE(last_message().has_stopping());
+  const auto before = outbox_.worker_messages.size();
+  credit(1);
+  EXPECT_EQ(outbox_.worker_messages.size(), before);
+  request(submit_request("b"));
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("stopping"));
+}
+
+}  // namespace
+}  // namespace oblique::server

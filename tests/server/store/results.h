@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include <unistd.h>
+
+#include <gtest/gtest.h>
+
+#include "proto/recipe/recipe.h"
+
+namespace oblique::server {
+
+/// A folder of its own for each test, removed afterwards.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::string pattern = (std::filesystem::temp_directory_path() / "oblique-XXXXXX").string();
+    if (mkdtemp(pattern.data()) == nullptr) {
+      throw std::runtime_error("no temporary folder");
+    }
+    path_ = pattern;
+  }
+  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+  std::string file(const std::string& name) const { return (path_ / name).string(); }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// A solved point with made-up outputs that do not repeat and that no short decimal equals.
+inline protocol::PointResult solved_point(std::uint64_t point) {
+  protocol::PointResult result;
+  const double third = 1.0 / 3.0 + static_cast<double>(point);
+  result.set_point(point);
+  result.set_fall_time_s(third * 1.0);
+  result.set_duration_s(third * 1e-5);
+  result.set_fn_peak_n(third * 1e4);
+  result.set_closure(third * 1e-9);
+  result.set_mode("SC SR sR");
+  result.set_major_mode("SC SR");
+  for (const double value : {0.0, third, 2.0, 1e-5 / 3.0, third * 7.0, 1e300 / 3.0}) {
+    result.add_peaks(value);
+  }
+  result.add_major_peaks(1);
+  result.add_ft_peaks(third);
+  result.add_ft_peaks(-third);
+  result.add_phase_ends_s(third * 1e-4);
+  result.add_phase_ends_s(third * 2e-4);
+  result.add_phase_ends_s(third * 3e-4);
+  result.add_stick_intervals(0.0);
+  result.add_stick_intervals(third * 1e-6);
+  for (int joint = 0; joint < 3; ++joint) {
+    result.add_reaction_peaks(third * 1e-5 * (joint + 1));
+    result.add_reaction_peaks(third * 1e3 / (joint + 1));
+  }
+  result.set_steps(1234);
+  result.set_wall_s(0.25);
+  return result;
+}
+
+}  // namespace oblique::server

@@ -1,0 +1,354 @@
+#include "server/store/store.h"
+
+#include <cstdlib>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/reading/reader.h"
+#include "tests/server/scheduler/scheduler_bench.h"
+#include "tests/server/store/results.h"
+
+namespace oblique::server {
+namespace {
+
+using protocol::QueryReply;
+using testing::HasSubstr;
+
+AddStudy study_of(std::uint64_t points, std::uint64_t id = 1, const std::string& name = "a") {
+  return {id, name, table_of(points), "2024-01-01T00:00:00.000Z", {}};
+}
+
+AddResults results_of(const AddStudy& study, std::vector<protocol::PointResult> results) {
+  return {study.study_id,    study.table.get(), 1, "0.1", "avx2", 1, "2024-01-01T00:00:01.000Z",
+          std::move(results)};
+}
+
+QueryReply ask(const std::string& path, const std::string& sql) {
+  return Reader(path).query(sql, kNoLimits);
+}
+
+std::string message_of_opening(const std::string& path) {
+  try {
+    const Store store(path);
+  } catch (const StorageError& error) {
+    return error.what();
+  }
+  return "it opened";
+}
+
+class StoreTest : public testing::Test {
+ protected:
+  void commit(Store& store, std::vector<Change> changes) { store.commit(changes); }
+
+  TemporaryFolder folder_;
+  std::string path_ = folder_.file("studies.db");
+};
+
+TEST_F(StoreTest, WhatWasCommittedIsThereAfterReopening) {
+  const auto study = study_of(10);
+  std::string identity;
+  {
+    Store store(path_);
+    identity = store.database_id();
+    commit(store, {study, AddWorker{1, "host", 2, "0.1", "avx2", "now"},
+                   results_of(study, {solved_point(0), solved_point(1), solved_point(5),
+                                      protocol::failed_point(7, "it did not end")})});
+  }
+  Store store(path_);
+  const auto studies = store.studies();
+  ASSERT_EQ(studies.size(), 1U);
+  EXPECT_EQ(studies[0].name, "a");
+  EXPECT_EQ(studies[0].table->recipe().SerializeAsString(),
+            study.table->recipe().SerializeAsString());
+  IntervalSet settled(0, 2);
+  settled.insert(5);
+  settled.insert(7);
+  EXPECT_TRUE(studies[0].settled == settled);
+  EXPECT_EQ(studies[0].failures.size(), 1U);
+  EXPECT_EQ(studies[0].state, StudyState::kRunning);
+  EXPECT_EQ(store.last_study_id(), 1U);
+  EXPECT_EQ(store.last_worker_id(), 1U);
+  EXPECT_EQ(store.database_id(), identity);
+}
+
+TEST_F(StoreTest, AnEmptyDatabaseHasNoStudies) {
+  Store store(path_);
+  EXPECT_TRUE(store.studies().empty());
+  EXPECT_EQ(store.last_study_id(), 0U);
+  EXPECT_EQ(store.last_worker_id(), 0U);
+}
+
+TEST_F(StoreTest, TwoDatabasesHaveDifferentIdentities) {
+  EXPECT_NE(Store(path_).database_id(), Store(folder_.file("other.db")).database_id());
+}
+
+TEST_F(StoreTest, TheFirstResultOfAPointStays) {
+  Store store(path_);
+  const auto study = study_of(3);
+  commit(store, {study, results_of(study, {solved_point(1)})});
+  auto other = solved_point(1);
+  other.set_mode("sC");
+  commit(store, {results_of(study, {other, protocol::failed_point(1, "late")})});
+  const auto reply = ask(path_, "SELECT mode, status, (SELECT count(*) FROM results) FROM results");
+  ASSERT_EQ(reply.rows_size(), 1);
+  EXPECT_EQ(reply.rows(0).values(0).text(), "SC SR sR");
+  EXPECT_EQ(reply.rows(0).values(1).text(), "solved");
+  EXPECT_EQ(reply.rows(0).values(2).integer(), 1);
+}
+
+TEST_F(StoreTest, AFailedTransactionKeepsNothing) {
+  Store store(path_);
+  const auto study = study_of(3);
+  EXPECT_THROW(commit(store, {study, study_of(3, 2, "a")}), StorageError);
+  EXPECT_TRUE(store.studies().empty());
+  commit(store, {study, results_of(study, {solved_point(0)})});
+  EXPECT_EQ(store.studies().at(0).settled.size(), 1U);
+}
+
+TEST_F(StoreTest, ModelsAreForgottenWithTheTransactionThatBroughtThem) {
+  Store store(path_);
+  const auto study = study_of(3);
+  commit(store, {study});
+  EXPECT_THROW(commit(store, {results_of(study, {solved_point(0)}), study_of(3, 2, "a")}),
+               StorageError);
+  commit(store, {results_of(study, {solved_point(0)})});
+  EXPECT_EQ(ask(path_, "SELECT 1 FROM results JOIN models USING (model_id)").rows_size(), 1);
+}
+
+TEST_F(StoreTest, TheStateOfAStudyIsKept) {
+  const auto study = study_of(3);
+  {
+    Store store(path_);
+    commit(store, {study, SetStudyState{1, StudyState::kCancelled, "later"}});
+  }
+  EXPECT_EQ(Store(path_).studies().at(0).state, StudyState::kCancelled);
+}
+
+TEST_F(StoreTest, DoublesComeBackWithTheSameBitsFromColumnsAndViews) {
+  Store store(path_);
+  const auto study = study_of(500);
+  std::vector<protocol::PointResult> results;
+  for (std::uint64_t point = 0; point < 500; ++point) {
+    results.push_back(solved_point(point));
+  }
+  commit(store, {study, results_of(study, results)});
+  const auto scalars = ask(path_,
+                           "SELECT fall_time_s, duration_s, fn_peak_N, closure, mu FROM results"
+                           " ORDER BY point");
+  const auto peaks = ask(path_, "SELECT t_s, fn_N, ft_N FROM peaks ORDER BY point, seq");
+  const auto phases = ask(path_, "SELECT t0_s, t1_s FROM phases ORDER BY point, seq");
+  const auto sticks = ask(path_, "SELECT t0_s, t1_s FROM stick_intervals ORDER BY point, seq");
+  ASSERT_EQ(scalars.rows_size(), 500);
+  ASSERT_EQ(peaks.rows_size(), 1000);
+  for (int i = 0; i < 500; ++i) {
+    const auto& result = results[static_cast<std::size_t>(i)];
+    const auto& row = scalars.rows(i);
+    EXPECT_EQ(row.values(0).real(), result.fall_time_s());
+    EXPECT_EQ(row.values(1).real(), result.duration_s());
+    EXPECT_EQ(row.values(2).real(), result.fn_peak_n());
+    EXPECT_EQ(row.values(3).real(), result.closure());
+    EXPECT_EQ(row.values(4).real(), study.table->point(result.point()).mu);
+    for (int j = 0; j < 6; ++j) {
+      EXPECT_EQ(peaks.rows(2 * i + j / 3).values(j % 3).real(), result.peaks(j));
+    }
+    EXPECT_EQ(phases.rows(3 * i + 1).values(0).real(), result.phase_ends_s(0));
+    EXPECT_EQ(phases.rows(3 * i + 1).values(1).real(), result.phase_ends_s(1));
+    EXPECT_EQ(sticks.rows(i).values(1).real(), result.stick_intervals(1));
+  }
+}
+
+TEST_F(StoreTest, ViewsUnfoldThePackedArrays) {
+  Store store(path_);
+  const auto study = study_of(3);
+  commit(store, {study, results_of(study, {solved_point(2)})});
+  const auto peaks = ask(path_, "SELECT study_id, point, seq, typeof(t_s), major FROM peaks");
+  ASSERT_EQ(peaks.rows_size(), 2);
+  EXPECT_EQ(peaks.rows(0).values(1).integer(), 2);
+  EXPECT_EQ(peaks.rows(0).values(2).integer(), 0);
+  EXPECT_EQ(peaks.rows(0).values(3).text(), "real");  // 0.0 is no integer
+  EXPECT_EQ(peaks.rows(0).values(4).integer(), 0);
+  EXPECT_EQ(peaks.rows(1).values(2).integer(), 1);
+  EXPECT_EQ(peaks.rows(1).values(4).integer(), 1);
+  const auto phases = ask(path_, "SELECT group_concat(kind) FROM phases");
+  EXPECT_EQ(phases.rows(0).values(0).text(), "compression,restitution,compression");
+}
+
+TEST_F(StoreTest, TheLargestReactionsComeBackWithTheSameBitsThePinFirst) {
+  Store store(path_);
+  const auto study = study_of(3);
+  auto of_older_worker = solved_point(2);
+  of_older_worker.clear_reaction_peaks();
+  const auto result = solved_point(1);
+  commit(store, {study, results_of(study, {result, of_older_worker})});
+  const auto peaks = ask(path_, "SELECT point, seq, t_s, force_N FROM reaction_peaks ORDER BY seq");
+  ASSERT_EQ(peaks.rows_size(), 3);
+  for (int joint = 0; joint < 3; ++joint) {
+    const auto& row = peaks.rows(joint);
+    EXPECT_EQ(row.values(0).integer(), 1);
+    EXPECT_EQ(row.values(1).integer(), joint);
+    EXPECT_EQ(row.values(2).real(), result.reaction_peaks(2 * joint));
+    EXPECT_EQ(row.values(3).real(), result.reaction_peaks(2 * joint + 1));
+  }
+  const auto in_runs = ask(path_, "SELECT reaction_peaks IS NULL FROM runs ORDER BY point");
+  EXPECT_EQ(in_runs.rows(0).values(0).integer(), 0);
+  EXPECT_EQ(in_runs.rows(1).values(0).integer(), 1) << "its worker did not send any";
+}
+
+TEST_F(StoreTest, AFailedPointHasAReasonAndNoOutputs) {
+  Store store(path_);
+  const auto study = study_of(3);
+  commit(store, {study, results_of(study, {protocol::failed_point(2, "it never fell")})});
+  const auto row = ask(path_, "SELECT status, error, duration_s IS NULL, peaks IS NULL FROM runs");
+  ASSERT_EQ(row.rows_size(), 1);
+  EXPECT_EQ(row.rows(0).values(0).text(), "failed");
+  EXPECT_EQ(row.rows(0).values(1).text(), "it never fell");
+  EXPECT_EQ(row.rows(0).values(2).integer(), 1);
+  EXPECT_EQ(row.rows(0).values(3).integer(), 1);
+  EXPECT_EQ(ask(path_, "SELECT * FROM peaks").rows_size(), 0);
+}
+
+TEST_F(StoreTest, OneModelOfTwoStudiesIsOneRowAndEachKeyIsAColumn) {
+  Store store(path_);
+  const auto first = study_of(3, 1, "a");
+  const auto second = study_of(5, 2, "b");
+  commit(store, {first, second, results_of(first, {solved_point(0)}),
+                 results_of(second, {solved_point(0)})});
+  std::string columns = "lengths_m";
+  for (const auto& key : solver::model_keys()) {
+    columns += ", " + std::string(key.name);
+  }
+  const auto reply = ask(path_, "SELECT " + columns + " FROM models");
+  ASSERT_EQ(reply.rows_size(), 1);
+  EXPECT_EQ(reply.rows(0).values(0).text(), "[0.4,0.4,0.4]");
+  const solver::ModelParameters paper;
+  int column = 1;
+  for (const auto& key : solver::model_keys()) {
+    const auto& value = reply.rows(0).values(column++);
+    const double number = value.has_integer() ? static_cast<double>(value.integer()) : value.real();
+    if (key.name == "integrator") {
+      EXPECT_EQ(value.text(), solver::integrator_name(paper.integrator));
+    } else {
+      EXPECT_EQ(number, key.get(paper)) << key.name;
+    }
+  }
+}
+
+TEST_F(StoreTest, AttemptsOfFailuresAreKnownAfterARestartAlsoWhenTheFailuresAreForgotten) {
+  const auto study = study_of(10);
+  const auto failed_in = [&](std::uint32_t attempt, std::vector<std::uint64_t> points) {
+    std::vector<protocol::PointResult> results;
+    for (const std::uint64_t point : points) {
+      results.push_back(protocol::failed_point(point, "it never fell"));
+    }
+    auto change = results_of(study, std::move(results));
+    change.attempt = attempt;
+    return change;
+  };
+  IntervalSet retried(2, 6);
+  retried.insert(8);
+  {
+    Store store(path_);
+    commit(store, {study, failed_in(1, {2, 3, 5}), failed_in(2, {4, 8, 9})});
+    commit(store, {ForgetFailures{1, retried, "later"}});
+    commit(store, {failed_in(3, {4})});
+  }
+  std::map<std::uint64_t, std::uint32_t> attempts;
+  Store(path_).studies().at(0).attempts.for_each([&](const Interval& run, std::uint32_t number) {
+    for (std::uint64_t point = run.begin; point < run.end; ++point) {
+      attempts[point] = number;
+    }
+  });
+  EXPECT_EQ(attempts, (std::map<std::uint64_t, std::uint32_t>{
+                          {2, 1}, {3, 1}, {4, 3}, {5, 1}, {8, 2}, {9, 2}}));
+  EXPECT_EQ(ask(path_, "SELECT * FROM retries").rows_size(), 4) << "neighbours share a row";
+}
+
+TEST_F(StoreTest, RunsNamesTheStudyItsModelAndTheWorker) {
+  Store store(path_);
+  const auto study = study_of(3);
+  commit(store, {study, AddWorker{1, "host", 2, "0.1", "avx2", "now"},
+                 results_of(study, {solved_point(1)})});
+  const auto reply =
+      ask(path_, "SELECT study, mu, e, E_Pa, elements_per_link, worker_name FROM runs");
+  ASSERT_EQ(reply.rows_size(), 1);
+  EXPECT_EQ(reply.rows(0).values(0).text(), "a");
+  EXPECT_EQ(reply.rows(0).values(1).real(), 0.5);
+  EXPECT_EQ(reply.rows(0).values(2).real(), 1.0);
+  EXPECT_EQ(reply.rows(0).values(3).real(), 70e9);
+  EXPECT_EQ(reply.rows(0).values(5).text(), "host");
+}
+
+TEST_F(StoreTest, ADatabaseInUseIsNotOpenedTwice) {
+  const Store store(path_);
+  EXPECT_THAT(message_of_opening(path_), HasSubstr("already uses the database"));
+}
+
+TEST_F(StoreTest, OtherFilesAreRefusedByTheirKind) {
+  EXPECT_THAT(message_of_opening(folder_.file("")), HasSubstr("is a directory"));
+  EXPECT_THAT(message_of_opening(folder_.file("none/studies.db")), HasSubstr("No such file"));
+  std::ofstream(path_) << std::string(5000, 'x');
+  EXPECT_THAT(message_of_opening(path_), HasSubstr("is not a database"));
+  EXPECT_EQ(std::filesystem::file_size(path_), 5000U);
+}
+
+TEST_F(StoreTest, ADatabaseOfAnotherProgramIsRefusedByName) {
+  execute(open_database(path_, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE).get(),
+          "CREATE TABLE recipes (name TEXT)");
+  EXPECT_THAT(message_of_opening(path_), HasSubstr("another program"));
+  EXPECT_THAT(message_of_opening(path_), HasSubstr("recipes"));
+}
+
+TEST_F(StoreTest, ANewerSchemaIsRefusedWithBothVersions) {
+  { const Store store(path_); }
+  execute(open_database(path_, SQLITE_OPEN_READWRITE).get(), "PRAGMA user_version = 7");
+  EXPECT_THAT(message_of_opening(path_), HasSubstr("schema version 7"));
+  EXPECT_THAT(message_of_opening(path_),
+              HasSubstr("knows versions 1 to " + std::to_string(kSchemaVersion)));
+}
+
+TEST_F(StoreTest, AStudyThatThisVersionDoesNotTakeIsLeftOutAndNamedAndTheOthersAreThere) {
+  {
+    Store store(path_);
+    commit(store, {study_of(10, 1, "too elastic"), study_of(10, 2, "b")});
+  }
+  // Earlier versions took an e that no version can solve.
+  auto recipe = table_of(10)->recipe();
+  auto& e = *recipe.mutable_blocks(0)->mutable_axes(recipe.blocks(0).axes_size() - 1);
+  ASSERT_EQ(e.key(), "e");
+  e.clear_values();
+  e.add_values(1e-4);
+  {
+    const auto database = open_database(path_, SQLITE_OPEN_READWRITE);
+    Statement update(database.get(), "UPDATE studies SET recipe = ? WHERE study_id = 1");
+    const std::string bytes = recipe.SerializeAsString();
+    update.bind_blob(1, bytes);
+    update.run();
+  }
+  Store store(path_);
+  const auto studies = store.studies();
+  ASSERT_EQ(studies.size(), 1U);
+  EXPECT_EQ(studies[0].name, "b");
+  ASSERT_EQ(store.left_out().size(), 1U);
+  EXPECT_THAT(store.left_out().front(),
+              testing::AllOf(HasSubstr("too elastic"), HasSubstr("e = 0.0001")));
+}
+
+TEST_F(StoreTest, ARecipeThatCannotBeReadIsAnErrorThatNamesTheStudy) {
+  {
+    Store store(path_);
+    commit(store, {study_of(3)});
+  }
+  execute(open_database(path_, SQLITE_OPEN_READWRITE).get(), "UPDATE studies SET recipe = x'ff'");
+  Store store(path_);
+  try {
+    store.studies();
+    FAIL() << "a damaged recipe was read";
+  } catch (const StorageError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("recipe of study a"));
+  }
+}
+
+}  // namespace
+}  // namespace oblique::server

@@ -1,0 +1,147 @@
+#include "tests/simulation/disk/simulated_disk.h"
+
+#include <array>
+#include <cstdlib>
+#include <filesystem>
+#include <stdexcept>
+#include <utility>
+
+#include "tests/simulation/world.h"
+
+namespace oblique::simulation {
+namespace {
+
+/// A folder of this process, removed with it. The store locks its database there; the contents are
+/// elsewhere.
+class Folder {
+ public:
+  Folder()
+      : path_((std::filesystem::temp_directory_path() / "oblique-simulation-XXXXXX").string()) {
+    if (::mkdtemp(path_.data()) == nullptr) {
+      throw std::runtime_error("cannot make a folder " + path_);
+    }
+  }
+  ~Folder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+
+  std::string database() const { return path_ + "/database"; }
+
+ private:
+  std::string path_;
+};
+
+const std::string& database_path() {
+  static const Folder kFolder;
+  static const std::string kPath = kFolder.database();
+  return kPath;
+}
+
+/// A database without studies, made once.
+const std::string& empty_database() {
+  static const std::string kImage = [] {
+    World world(0);
+    SimulatedFiles files(world, database_path(), {});
+    files.start();
+    { const server::Store store(files.path()); }
+    return files.contents();
+  }();
+  return kImage;
+}
+
+}  // namespace
+
+SimulatedDisk::SimulatedDisk(World& world, DiskAtFirst at_first)
+    : world_(world),
+      files_(world, database_path(),
+             at_first == DiskAtFirst::kEmptyFile ? std::string() : empty_database()),
+      checkpoint_pages_(static_cast<int>(
+          std::array{4, 16, 64, 1000}.at(static_cast<std::size_t>(world.between(0, 3))))) {}
+
+Found SimulatedDisk::open() {
+  files_.start();
+  store_ = std::make_unique<server::Store>(files_.path());
+  // Checkpoints come more often than in a server, for these databases are small.
+  store_->checkpoint_at(checkpoint_pages_);
+  Found found{store_->studies(), store_->last_study_id(), store_->last_worker_id()};
+  model_.restarted(found, power_was_lost_);
+  power_was_lost_ = false;
+  found.starts = store_->count_start();
+  if (found.starts <= std::exchange(starts_, found.starts)) {
+    throw Violation("two servers began with one number: leases of both have the same numbers");
+  }
+  model_.synced();
+  return found;
+}
+
+void SimulatedDisk::crash(bool power_is_lost) {
+  if (power_is_lost) {
+    files_.lose_power();
+    power_was_lost_ = true;
+  } else {
+    files_.kill();
+  }
+  store_.reset();
+}
+
+void SimulatedDisk::commit(std::span<const server::Change> changes) {
+  try {
+    store_->commit(changes);
+  } catch (const server::StorageError&) {
+    model_.refused(changes);
+    throw;
+  }
+  model_.stored(changes);
+}
+
+bool SimulatedDisk::merge_log() {
+  ++merges;
+  return store_->merge_log();
+}
+
+void SimulatedDisk::check_rows() {
+  using server::Statement;
+  const auto database = server::open_database(files_.path(), SQLITE_OPEN_READONLY);
+  Statement integrity(database.get(), "PRAGMA integrity_check");
+  if (!integrity.step() || integrity.text(0) != "ok") {
+    throw Violation("the database is damaged: " + integrity.text(0));
+  }
+  Statement references(database.get(), "PRAGMA foreign_key_check");
+  if (references.step()) {
+    throw Violation("a row of " + references.text(0) + " names one of " + references.text(2) +
+                    " that is not there");
+  }
+  Statement rows(database.get(),
+                 "SELECT study_id, point, mu, coalesce(error, ''), duration_s, fn_peak_N"
+                 " FROM results ORDER BY study_id, point");
+  std::map<std::uint64_t, std::size_t> counts;
+  while (rows.step()) {
+    const auto study_id = static_cast<std::uint64_t>(rows.integer(0));
+    const auto point = static_cast<std::uint64_t>(rows.integer(1));
+    const auto& expected = model_.rows(study_id);
+    const auto row = expected.find(point);
+    if (row == expected.end() || row->second->error() != rows.text(3) ||
+        row->second->duration_s() != rows.real(4) || row->second->fn_peak_n() != rows.real(5) ||
+        model_.study(study_id)->table->point(point).mu != rows.real(2)) {
+      throw Violation("the row of point " + std::to_string(point) + " of study " +
+                      std::to_string(study_id) + " is not what was stored");
+    }
+    ++counts[study_id];
+  }
+  Statement versions(database.get(),
+                     "SELECT study_id FROM results WHERE worker IS NOT NULL"
+                     " GROUP BY study_id HAVING count(DISTINCT solver_version) > 1");
+  if (versions.step()) {
+    throw Violation("study " + versions.text(0) + " has results of two solver versions");
+  }
+  for (const auto& study : store_->studies()) {
+    if (counts[study.study_id] != model_.rows(study.study_id).size()) {
+      throw Violation("rows of study " + study.name + " are missing");
+    }
+  }
+}
+
+}  // namespace oblique::simulation

@@ -1,0 +1,92 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <sqlite3.h>
+
+#include "tests/simulation/disk/simulated_file.h"
+#include "tests/simulation/world.h"
+
+namespace oblique::simulation {
+
+/// What the connections to one database share of its write-ahead index. A crash loses it.
+struct SharedMemory {
+  static constexpr std::size_t kRegion = 32768;
+  std::vector<std::unique_ptr<std::array<std::byte, kRegion>>> regions;
+  std::array<int, SQLITE_SHM_NLOCK> shared{};
+  std::array<bool, SQLITE_SHM_NLOCK> exclusive{};
+};
+
+/// The files of one database in memory, under the faults that disks have. While it lives, SQLite
+/// finds them at `path` through its default VFS; what is at other paths it finds where it is. One
+/// thread may use such files in a process.
+class SimulatedFiles {
+ public:
+  /// The database begins as `image`, durably. What SQLite draws at random follows from `world` too.
+  SimulatedFiles(World& world, std::string path, const std::string& image);
+  ~SimulatedFiles();
+  SimulatedFiles(const SimulatedFiles&) = delete;
+  SimulatedFiles& operator=(const SimulatedFiles&) = delete;
+
+  const std::string& path() const { return path_; }
+  std::string contents() const { return entries_.at(path_)->contents(); }
+
+  /// A process begins to use the files.
+  void start();
+  /// It is gone: its handles do nothing any more, what it wrote is there.
+  void kill();
+  bool is_used() const { return used_; }
+  /// The machine is gone: files and their names are as the disk has them.
+  void lose_power();
+  /// The process dies within the so-many-th write, sync, truncation or deletion from now; 0: never.
+  void plan_death(std::int64_t operations) { death_in_ = operations; }
+  /// The so-many-th sync from now fails, once, and what it did not write is lost; 0: none.
+  void plan_failing_sync(std::int64_t syncs) { failing_sync_in_ = syncs; }
+  /// The planned sync is still to come.
+  bool awaits_failing_sync() const { return failing_sync_in_ > 0; }
+  /// Counts processes.
+  std::uint64_t life() const { return life_; }
+  /// The last connection that was opened.
+  sqlite3* connection() const { return connection_; }
+
+  bool full = false;     ///< no file can grow
+  bool failing = false;  ///< reads, writes and syncs fail now and then
+  bool forgets = false;  ///< what a sync that failed did not write is lost
+
+  // What the VFS needs. Numbers are result codes of SQLite.
+  std::shared_ptr<SimulatedFile> open(const std::string& name, bool create);
+  bool exists(const std::string& name) const { return entries_.contains(name); }
+  int remove(const std::string& name, bool sync_directory);
+  int write(SimulatedFile& file, std::size_t offset, std::string_view bytes);
+  int truncate(SimulatedFile& file, std::size_t size);
+  int sync(SimulatedFile& file, bool and_directory);
+  bool read_fails() { return failing && world_.chance(0.02); }
+  void opened(sqlite3* connection) { connection_ = connection; }
+
+  std::map<const void*, int> locks;  ///< levels of the connections on the database file
+  std::weak_ptr<SharedMemory> memory;
+
+ private:
+  using Entries = std::map<std::string, std::shared_ptr<SimulatedFile>>;
+  bool dies_now() { return death_in_ > 0 && --death_in_ == 0; }
+  bool fails_now() { return failing && world_.chance(0.2); }
+
+  World& world_;
+  std::string path_;
+  Entries entries_;
+  Entries durable_entries_;
+  std::int64_t death_in_ = 0;
+  std::int64_t failing_sync_in_ = 0;
+  std::uint64_t life_ = 0;
+  bool used_ = false;
+  sqlite3* connection_ = nullptr;
+};
+
+}  // namespace oblique::simulation

@@ -1,0 +1,284 @@
+#include "tests/system/kill_matrix/kill_cycle.h"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <sstream>
+#include <stdexcept>
+#include <thread>
+#include <vector>
+
+#include "tests/system/kill_matrix/blow.h"
+#include "tests/system/kill_matrix/companion.h"
+#include "tests/system/kill_matrix/same_rows.h"
+
+namespace oblique::test {
+namespace {
+
+constexpr std::chrono::milliseconds kBetweenLooks{5};
+constexpr int kMostAttempts = 6;
+constexpr int kPointsFailed = 1;  ///< exit code: the study is at its end, with its failures
+
+// Several models, so that batches end before the study does. The points of the first block take
+// long enough for heartbeats and for a score of commits. The last two have no answer.
+constexpr const char* kStudy = R"(name = "matrix"
+[[block]]
+dt = 1e-6
+H = 1.0
+mu = { from = 0.1, to = 2.0, count = 24 }
+e = { from = 0.5, to = 1.0, count = 25 }
+[[block]]
+dt = [4e-6, 2e-6]
+H = [0.98, 1.0]
+mu = { from = 0.1, to = 2.0, count = 10 }
+e = { from = 0.5, to = 1.0, count = 10 }
+[[block]]
+dt = 2e-5
+H = 1.0
+mu = 0.4
+e = [0.8, 1.0]
+)";
+
+[[noreturn]] void fail(const std::string& what) {
+  throw std::runtime_error(what);
+}
+
+bool says_end_of_study(const Process& process) {
+  const std::string end = std::to_string(KillStudy::kFailing) + " of ";
+  return process.errors().find(end) != std::string::npos &&
+         process.errors().find("points failed") != std::string::npos;
+}
+
+// ---- Server, workers and client, each started apart ---------------------------------------------
+
+class ApartCycle {
+ public:
+  ApartCycle(const Folder& folder, const KillStudy& study, const KillCase& kill_case, Blow& blow)
+      : folder_(folder),
+        study_(study),
+        case_(kill_case),
+        blow_(blow),
+        database_(folder.file("matrix.db")) {}
+
+  void run() {
+    start_server();
+    if (case_.storm) {
+      storm_.emplace(*case_.storm, folder_, server_->worker_url(), blow_.bystander());
+    }
+    companion_.emplace(case_.point, server_->worker_url());
+    for (auto& worker : workers_) {
+      start_worker(worker, &worker == workers_.data());
+    }
+    for (int attempt = 1; !submit_and_watch(attempt == 1); ++attempt) {
+      if (attempt == kMostAttempts) {
+        fail("the study was submitted " + std::to_string(attempt) + " times and did not end");
+      }
+    }
+    wait_until("the study is done", [this] {
+      look_after();
+      return Database(database_).texts("SELECT state FROM studies").at(0) == "done";
+    });
+    companion_.reset();
+    if (storm_) {
+      storm_->end();
+    }
+    stop_all();
+  }
+
+  bool had_storm() const { return storm_ && storm_->blows() > 0; }
+
+ private:
+  /// Killed before it is ready, it is started once more, at other ports.
+  void start_server() {
+    try {
+      server_ = std::make_unique<Server>(folder_, database_, blow_.environment("oblique-server"));
+    } catch (const std::runtime_error&) {
+      if (!blow_.explains("oblique-server", 128 + SIGKILL)) {
+        throw;
+      }
+      server_ = std::make_unique<Server>(folder_, database_, blow_.bystander());
+    }
+  }
+
+  /// At the same ports.
+  void start_server_again() {
+    server_ = std::make_unique<Server>(folder_, database_, *server_, blow_.bystander());
+  }
+
+  /// One thread each: so few cores are shared by so many cycles.
+  void start_worker(std::unique_ptr<Worker>& worker, bool first) {
+    worker = std::make_unique<Worker>(
+        folder_, server_->worker_url(), std::vector<std::string>{"--threads", "1"},
+        first ? blow_.environment("oblique-worker") : blow_.bystander());
+  }
+
+  /// Starts again what the blow has ended. Nothing else may end.
+  void look_after() {
+    if (const auto code = server_->process().exit_code()) {
+      expect_explained("oblique-server", *code, server_->process());
+      start_server_again();
+    }
+    for (auto& worker : workers_) {
+      if (const auto code = worker->exit_code()) {
+        expect_explained("oblique-worker", *code, *worker);
+        start_worker(worker, false);
+      }
+    }
+  }
+
+  void expect_explained(const std::string& program, int code, const Process& process) {
+    if (!blow_.explains(program, code)) {
+      fail(program + " ended with exit code " + std::to_string(code) + ":\n" + process.errors());
+    }
+  }
+
+  /// False when it is to be done again.
+  bool submit_and_watch(bool first) {
+    // What a killed server was asked is asked again of the next one: the client does not give up.
+    Process client(
+        folder_, client_program(),
+        {"submit", study_.file(), "--server", server_->client_url(), "--watch", "--timeout", "30"},
+        first ? blow_.environment("oblique") : blow_.bystander());
+    while (!client.exit_code()) {
+      look_after();
+      std::this_thread::sleep_for(kBetweenLooks);
+    }
+    const int code = *client.exit_code();
+    if (code == kPointsFailed && says_end_of_study(client)) {
+      return true;
+    }
+    expect_explained("oblique", code, client);
+    return false;
+  }
+
+  void stop_all() {
+    if (case_.server_stops_first) {
+      stop("oblique-server", server_->process());
+    }
+    for (auto& worker : workers_) {
+      stop("oblique-worker", *worker);
+    }
+    if (!case_.server_stops_first) {
+      stop("oblique-server", server_->process());
+    }
+  }
+
+  void stop(const std::string& program, Process& process) {
+    // Until a program has said that it begins a signal may end it as any program.
+    wait_until(program + " has begun",
+               [&] { return process.exit_code() || !process.errors().empty(); });
+    if (!process.exit_code()) {
+      process.send(SIGTERM);
+    }
+    if (const int code = process.wait(); code != 0) {
+      expect_explained(program, code, process);
+    }
+  }
+
+  const Folder& folder_;
+  const KillStudy& study_;
+  const KillCase& case_;
+  Blow& blow_;
+  std::string database_;
+  std::unique_ptr<Server> server_;
+  std::array<std::unique_ptr<Worker>, 2> workers_;
+  std::optional<Companion> companion_;
+  std::optional<Storm> storm_;
+};
+
+// ---- `oblique run` ------------------------------------------------------------------------------
+
+/// False when the same command is to be given again.
+bool run_once(const Folder& folder, const KillStudy& study, const KillCase& kill_case, Blow& blow,
+              bool first) {
+  Process run(folder, client_program(),
+              {"run", study.file(), "--db", folder.file("matrix.db"), "--workers", "2"},
+              first ? blow.environment(kill_case.program) : blow.bystander());
+  const int code = run.wait();
+  wait_until("the children of oblique run are gone", [&] { return processes_of(folder).empty(); });
+  if (code == kPointsFailed && says_end_of_study(run)) {
+    return true;
+  }
+  // It goes on without one of its workers, and says so when it loses its server.
+  const bool server_lost = code == 1 && kill_case.program == "oblique-server" &&
+                           run.errors().find("was killed by signal 9") != std::string::npos;
+  if (!first || !blow.has_struck() || !(server_lost || blow.explains("oblique", code))) {
+    fail("oblique run ended with exit code " + std::to_string(code) + ":\n" + run.errors());
+  }
+  return false;
+}
+
+// ---- The end ------------------------------------------------------------------------------------
+
+void check_database(const Folder& folder, const KillStudy& study) {
+  const std::string database = folder.file("matrix.db");
+  const Ran check = run_client(folder, {"check", "--db", database});
+  if (check.exit_code != 0) {
+    fail("oblique check: " + check.output + check.errors);
+  }
+  if (Database(database).texts("SELECT state FROM studies") != std::vector<std::string>{"done"}) {
+    fail("the study is not done, or not the only one");
+  }
+  if (const std::string difference = first_difference(database, study.undisturbed());
+      !difference.empty()) {
+    fail("differs from the undisturbed run: " + difference);
+  }
+}
+
+std::string last_words(const Folder& folder) {
+  std::ostringstream words;
+  for (const auto& entry : std::filesystem::directory_iterator(folder.path())) {
+    if (entry.path().extension() == ".err") {
+      std::ifstream file(entry.path());
+      const std::string text(std::istreambuf_iterator<char>(file), {});
+      constexpr std::size_t kMost = 3000;
+      words << "\n--- " << entry.path().filename().string() << "\n"
+            << text.substr(text.size() - std::min(kMost, text.size()));
+    }
+  }
+  return words.str();
+}
+
+}  // namespace
+
+KillStudy::KillStudy() {
+  std::ofstream(file()) << kStudy;
+  const Folder folder;
+  const KillCase nobody;
+  Blow blow(folder, nobody);
+  ApartCycle(folder, *this, nobody, blow).run();
+  std::filesystem::copy_file(folder.file("matrix.db"), undisturbed());
+}
+
+CycleOutcome run_cycle(const KillStudy& study, const KillCase& kill_case) {
+  const Folder folder;
+  CycleOutcome outcome;
+  Blow blow(folder, kill_case);
+  try {
+    if (kill_case.all_in_one) {
+      bool done = run_once(folder, study, kill_case, blow, true);
+      if (!done) {
+        done = run_once(folder, study, kill_case, blow, false);
+      }
+    } else {
+      ApartCycle cycle(folder, study, kill_case, blow);
+      cycle.run();
+      outcome.struck = cycle.had_storm();
+    }
+    wait_until("no process is left", [&] { return processes_of(folder).empty(); });
+    check_database(folder, study);
+  } catch (const std::exception& error) {
+    outcome.failure = error.what() + last_words(folder);
+    for (const pid_t left : processes_of(folder)) {
+      kill(left, SIGKILL);
+    }
+  }
+  outcome.struck = outcome.struck || blow.has_struck();
+  return outcome;
+}
+
+}  // namespace oblique::test

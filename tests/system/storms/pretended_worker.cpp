@@ -1,0 +1,65 @@
+#include "tests/system/storms/pretended_worker.h"
+
+#include "proto/frames.h"
+#include "tests/system/processes.h"
+
+namespace oblique::test {
+
+PretendedWorker::PretendedWorker(const std::string& server_url)
+    : socket_(context_, zmq::socket_type::dealer) {
+  socket_.set(zmq::sockopt::linger, 0);
+  socket_.connect(server_url);
+}
+
+void PretendedWorker::send(const protocol::WorkerMessage& message) {
+  (void)socket_.send(zmq::buffer(protocol::encode(message)), zmq::send_flags::dontwait);
+}
+
+void PretendedWorker::hello(const std::string& solver_version, const std::string& process_id) {
+  protocol::WorkerMessage message;
+  auto& hello = *message.mutable_hello();
+  hello.set_protocol_version(protocol::kProtocolVersion);
+  hello.set_solver_version(solver_version);
+  hello.set_name("pretended");
+  hello.set_threads(1);
+  hello.set_process_id(process_id);
+  send(message);
+}
+
+void PretendedWorker::credit(std::uint32_t batches) {
+  protocol::WorkerMessage message;
+  message.mutable_credit()->set_batches(batches);
+  send(message);
+}
+
+void PretendedWorker::heartbeat(const std::vector<std::uint64_t>& leases) {
+  protocol::WorkerMessage message;
+  message.mutable_heartbeat()->mutable_lease_ids()->Assign(leases.begin(), leases.end());
+  send(message);
+}
+
+void PretendedWorker::goodbye() {
+  protocol::WorkerMessage message;
+  message.mutable_goodbye();
+  send(message);
+}
+
+std::optional<protocol::ServerToWorker> PretendedWorker::receive(std::chrono::milliseconds within) {
+  socket_.set(zmq::sockopt::rcvtimeo, static_cast<int>(within.count()));
+  zmq::message_t frame;
+  protocol::ServerToWorker message;
+  if (!socket_.recv(frame) || !protocol::decode(frame.to_string_view(), message)) {
+    return std::nullopt;
+  }
+  return message;
+}
+
+std::string worker_solver_version() {
+  const Folder folder;
+  Process process(folder, worker_program(), {"--version"});
+  process.wait();
+  const std::string output = process.output();
+  return output.substr(0, output.find('\n'));
+}
+
+}  // namespace oblique::test

@@ -1,0 +1,58 @@
+// Workers that are lost again and again beside a sound one: every point is solved.
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "tests/system/many_points.h"
+#include "tests/system/processes.h"
+#include "tests/system/storms/storm.h"
+
+namespace oblique::test {
+namespace {
+
+class StormTest : public ::testing::Test {
+ protected:
+  /// A study of many points is solved by one worker in such a storm. Returns how many blows fell.
+  int weather(StormKind kind) {
+    Server server(folder_, folder_.file("many.db"));
+    Storm storm(kind, folder_, server.worker_url());
+    std::vector<std::string> arguments{"submit", "--server", server.client_url()};
+    const auto points = many_points("many");
+    arguments.insert(arguments.end(), points.begin(), points.end());
+    const Ran submitted = run_client(folder_, arguments);
+    EXPECT_EQ(submitted.exit_code, 0) << submitted.errors;
+    if (kind == StormKind::kVanishingPeers) {
+      // They had every chance before there was anybody else.
+      wait_until("the first peers vanished", [&] { return storm.blows() >= 2; });
+    }
+    Worker sound(folder_, server.worker_url(), {"--threads", "1"});
+    wait_until("the study is done",
+               [&] { return database_.texts("SELECT state FROM studies").at(0) == "done"; });
+    storm.end();
+    EXPECT_EQ(database_.number("SELECT count(*) FROM results WHERE status = 'solved'"),
+              kManyPoints);
+    EXPECT_EQ(database_.number("SELECT count(*) FROM results WHERE status <> 'solved'"), 0);
+    const Ran workers =
+        run_client(folder_, {"workers", "--server", server.client_url(), "--format", "csv"});
+    EXPECT_NE(workers.output.find(",proven"), std::string::npos) << workers.output;
+    return storm.blows();
+  }
+
+  Folder folder_;
+  Database database_{folder_.file("many.db")};
+};
+
+TEST_F(StormTest, AWorkerKilledAgainAndAgainBesideASoundOneFailsNoPoint) {
+  EXPECT_GE(weather(StormKind::kKilledWorkers), 5) << "too few to be a test";
+}
+
+TEST_F(StormTest, AConnectionCutAgainAndAgainFailsNoPoint) {
+  EXPECT_GE(weather(StormKind::kCutConnections), 5) << "too few to be a test";
+}
+
+TEST_F(StormTest, PeersThatTakeBatchesAndVanishUnderEverNewNamesFailNoPoint) {
+  EXPECT_GE(weather(StormKind::kVanishingPeers), 2) << "too few to be a test";
+}
+
+}  // namespace
+}  // namespace oblique::test

@@ -1,0 +1,113 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <cmath>
+
+#include "tests/worker/solver/analytic/analytic_rigid_impact.h"
+#include "tests/worker/solver/analytic/analytic_waves.h"
+
+namespace oblique::solver {
+namespace {
+
+TEST(MittagLeffler, HasItsKnownValuesAndDerivative) {
+  EXPECT_DOUBLE_EQ(mittag_leffler_three_halves(2.0, 0.0), 1.0);
+  // d/dt (t E_{3/2,2}(-t^{3/2})) = E_{3/2,1}(-t^{3/2}).
+  const auto f = [](double t) { return t * mittag_leffler_three_halves(2.0, -std::pow(t, 1.5)); };
+  for (const double t : {0.5, 1.0, 2.0, 4.0}) {
+    EXPECT_NEAR((f(t + 1e-4) - f(t - 1e-4)) / 2e-4,
+                mittag_leffler_three_halves(1.0, -std::pow(t, 1.5)), 1e-8);
+  }
+}
+
+TEST(BeamEndOnSpring, PeaksWhereKnown) {
+  const BeamEndOnSpring beam(2700.0 * 5e-4, 70e9 * 2e-8, 2.6e7, 1.0);
+  EXPECT_NEAR(beam.peak_N(), 784.05, 0.005);
+  EXPECT_NEAR(beam.peak_time_s(), 57.8e-6, 0.05e-6);
+}
+
+TEST(BeamEndOnSpring, ObeysItsIntegralEquation) {
+  const BeamEndOnSpring beam(1.35, 1400.0, 2.6e7, 1.0);
+  const double C = std::sqrt(2.0) / (std::pow(1.35, 0.75) * std::pow(1400.0, 0.25));
+  // The half integral of F at t, with s = t - u^2 to take away the root's singularity.
+  constexpr int kIntervals = 1000;
+  for (const double t : {10e-6, 50e-6, 90e-6}) {
+    double sum = 0.0;
+    for (int i = 0; i < kIntervals; ++i) {
+      const double u = std::sqrt(t) * (i + 0.5) / kIntervals;
+      sum += beam.force_N(t - u * u);
+    }
+    const double half_integral = 2.0 / std::sqrt(M_PI) * sum * std::sqrt(t) / kIntervals;
+    EXPECT_NEAR(beam.force_rate_N_s(t), 2.6e7 * (1.0 - C * half_integral), 2.6e7 * 1e-6);
+  }
+}
+
+TEST(RodEndOnSpring, HasTheKnownImpedanceAndTendsToTheForceOnAWall) {
+  const RodEndOnSpring rod(70e9, 5e-4, 2700.0, 2.7e7, 2.0);
+  EXPECT_NEAR(rod.wave_speed_m_s(), 5091.75, 0.005);
+  EXPECT_NEAR(rod.impedance_Ns_m(), 6873.9, 0.05);
+  EXPECT_NEAR(rod.force_N(1e-9), 2.7e7 * 2.0 * 1e-9, 1e-6);
+  EXPECT_NEAR(rod.force_N(1.0), rod.force_without_spring_N(), 1e-9);
+}
+
+RigidImpact::Parameters impact(double W_tt, double W_tn, double W_nn) {
+  RigidImpact::Parameters p;
+  p.W_per_kg << W_tt, W_tn, W_tn, W_nn;
+  p.k_N_m = 1e6;
+  p.eta2 = 1.21;
+  p.mu = 0.3;
+  p.e_star = 0.7;
+  p.V0_m_s = {2.0, -1.0};
+  return p;
+}
+
+TEST(RigidImpact, BallThatSlidesThroughoutIsABilinearOscillator) {
+  // A free particle: W = 1/m, no coupling.
+  const RigidImpact ball(impact(0.5, 0.0, 0.5));
+  const double omega = std::sqrt(1e6 * 0.5);
+  EXPECT_EQ(ball.mode(), "sC sR");
+  EXPECT_NEAR(ball.duration_s(), 0.5 * M_PI / omega * (1.0 + 0.7), 1e-15);
+  EXPECT_NEAR(ball.fn_peaks_N().at(0), 1e6 / omega, 1e-8);
+  EXPECT_NEAR(ball.velocity_out_m_s()[1], 0.7, 1e-12);
+  EXPECT_NEAR(ball.velocity_out_m_s()[0], 2.0 - 0.3 * 1.7, 1e-12);
+}
+
+TEST(RigidImpact, SlidingBodyWithCouplingHasItsNormalMotionFromTheSlidingInertia) {
+  const RigidImpact::Parameters p = impact(1.5, 0.4, 1.0);
+  const RigidImpact body(p);
+  ASSERT_EQ(body.mode(), "sC sR");
+  const double omega = std::sqrt(p.k_N_m * (1.0 - p.mu * 0.4));
+  EXPECT_NEAR(body.duration_s(), 0.5 * M_PI / omega * (1.0 + 0.7), 1e-15);
+  EXPECT_NEAR(body.velocity_out_m_s()[1], 0.7, 1e-12);
+  const double impulse = 1.7 / (1.0 - p.mu * 0.4);
+  EXPECT_NEAR(body.velocity_out_m_s()[0], 2.0 + (0.4 - p.mu * 1.5) * impulse, 1e-12);
+}
+
+TEST(RigidImpact, StickingBodyKeepsItsEnergy) {
+  RigidImpact::Parameters p = impact(1.0, 0.3, 1.0);
+  p.mu = 50.0;
+  p.e_star = 1.0;
+  p.V0_m_s = {0.4, -1.0};
+  const RigidImpact body(p);
+  const Eigen::Matrix2d mass = p.W_per_kg.inverse();
+  for (int i = 0; i <= 20; ++i) {
+    const double t = body.duration_s() * 0.9 * i / 20.0;
+    const Eigen::Vector2d V = body.velocity_m_s(t);
+    const Eigen::Vector2d F = body.force_N(t);
+    const double springs = 0.5 * (F[0] * F[0] * p.eta2 + F[1] * F[1]) / p.k_N_m;
+    EXPECT_NEAR(0.5 * V.dot(mass * V) + springs, 0.5 * p.V0_m_s.dot(mass * p.V0_m_s), 1e-9);
+  }
+  EXPECT_EQ(body.mode().substr(0, 5), "SC SR");
+}
+
+TEST(RigidImpact, WorkOfRestitutionIsThatOfCompressionTimesMinusTheSquareOfTheRestitution) {
+  for (const double e_star : {0.2, 0.7, 1.0}) {
+    RigidImpact::Parameters p = impact(1.5, -0.4, 1.0);
+    p.e_star = e_star;
+    const RigidImpact body(p);
+    ASSERT_EQ(body.fn_peaks_N().size(), 1U);
+    EXPECT_NEAR(body.restitution_work_J() / body.compression_work_J(), -e_star * e_star, 1e-12);
+  }
+}
+
+}  // namespace
+}  // namespace oblique::solver

@@ -1,0 +1,124 @@
+#include "tests/worker/solver/cases/known_impacts.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "tests/worker/solver/cases/shared_fingers.h"
+
+namespace oblique::solver {
+namespace {
+
+/// What a default step is held to, besides half of the last digit that is known.
+constexpr double kRelative = 3e-5;
+constexpr double kForceDigit_N = 0.005;
+constexpr double kTimeDigit_us = 0.0005;
+constexpr double kStickDigit_us = 0.005;
+/// Of the duration, for instants: valleys are flat, and the default step moves one by 0.0016 us.
+constexpr double kRelativeTime = 3e-6;
+constexpr double kSlideDigit_mm = 0.000005;
+
+std::string name_of(const KnownImpact& known) {
+  return "H = " + std::to_string(known.H_m) + ", mu = " + std::to_string(known.mu) +
+         ", e* = " + std::to_string(known.e_star);
+}
+
+const std::vector<CaseResult>& results() {
+  static const std::vector<CaseResult> solved = [] {
+    std::vector<CaseResult> list;
+    for (const KnownImpact& known : known_impacts()) {
+      list.push_back(paper_finger().solve(known.H_m, known.mu, known.e_star));
+    }
+    return list;
+  }();
+  return solved;
+}
+
+template <class Check>
+void for_each_impact(const Check& check) {
+  for (std::size_t i = 0; i < known_impacts().size(); ++i) {
+    SCOPED_TRACE(name_of(known_impacts()[i]));
+    check(known_impacts()[i], results()[i]);
+  }
+}
+
+TEST(KnownImpacts, PeaksOfTheForcesAreKnown) {
+  for_each_impact([](const KnownImpact& known, const CaseResult& result) {
+    ASSERT_EQ(result.peaks.size(), known.fn_peaks_N.size());
+    double largest_N = 0.0;
+    for (std::size_t i = 0; i < result.peaks.size(); ++i) {
+      const double fn_N = known.fn_peaks_N[i];
+      EXPECT_NEAR(result.peaks[i].fn_N, fn_N, kRelative * fn_N + kForceDigit_N);
+      largest_N = std::max(largest_N, result.peaks[i].fn_N);
+    }
+    EXPECT_EQ(result.fn_peak_N, largest_N);
+    if (known.ft_peak_N > 0.0) {
+      EXPECT_NEAR(result.ft_peak_N, known.ft_peak_N, kRelative * known.ft_peak_N + kForceDigit_N);
+    }
+  });
+}
+
+TEST(KnownImpacts, DurationsAreKnown) {
+  for_each_impact([](const KnownImpact& known, const CaseResult& result) {
+    EXPECT_NEAR(1e6 * result.duration_s, known.contact_us,
+                kRelativeTime * known.contact_us + kTimeDigit_us);
+    EXPECT_NEAR(1e6 * result.stick_total_s, known.stick_us,
+                kRelativeTime * known.stick_us + kStickDigit_us);
+    ASSERT_EQ(result.phases.size(), known.phases_us.size());
+    for (std::size_t i = 0; i < result.phases.size(); ++i) {
+      EXPECT_NEAR(1e6 * (result.phases[i].t1_s - result.phases[i].t0_s), known.phases_us[i],
+                  kRelativeTime * known.contact_us + kTimeDigit_us);
+    }
+  });
+}
+
+TEST(KnownImpacts, WayThatPSlidesIsKnown) {
+  for_each_impact([](const KnownImpact& known, const CaseResult& result) {
+    if (known.slide_mm > 0.0) {
+      EXPECT_NEAR(1e3 * result.slide_m, known.slide_mm,
+                  kRelative * known.slide_mm + kSlideDigit_mm);
+    }
+  });
+}
+
+TEST(KnownImpacts, ModesAndNumbersOfMajorPeaksAreThePublishedOnes) {
+  for_each_impact([](const KnownImpact& known, const CaseResult& result) {
+    EXPECT_EQ(result.mode, known.mode);
+    EXPECT_EQ(result.major_mode, known.major_peaks == 3 ? "sC sR sC sR sC sR" : "SC SR sR sC sR");
+    const auto major = std::count_if(result.peaks.begin(), result.peaks.end(),
+                                     [](const Peak& peak) { return peak.major; });
+    EXPECT_EQ(static_cast<std::size_t>(major), known.major_peaks);
+  });
+}
+
+TEST(KnownImpacts, EnergyBalanceClosesToAMillionthOfTheWorkExchanged) {
+  for_each_impact(
+      [](const KnownImpact&, const CaseResult& result) { EXPECT_LT(result.energy.closure, 1e-6); });
+}
+
+TEST(KnownImpacts, ExitVelocitiesAreThoseOfAFourTimesShorterStep) {
+  ModelParameters model;
+  model.dt_s = results()[0].solver.dt_s / 4.0;
+  const Finger fine{model};
+  for_each_impact([&fine](const KnownImpact& known, const CaseResult& result) {
+    const CaseResult exact = fine.solve(known.H_m, known.mu, known.e_star);
+    EXPECT_NEAR(result.vt_out_m_s, exact.vt_out_m_s, 1e-3);
+    EXPECT_NEAR(result.vn_out_m_s, exact.vn_out_m_s, 1e-3);
+  });
+}
+
+TEST(KnownImpacts, FirstPeakDependsOnRestitutionNotAtAll) {
+  EXPECT_EQ(results()[0].peaks[0].fn_N, results()[1].peaks[0].fn_N);
+  EXPECT_EQ(results()[0].peaks[0].fn_N, results()[2].peaks[0].fn_N);
+}
+
+TEST(KnownImpacts, FirstPeakInStickDependsOnFrictionNotAtAll) {
+  EXPECT_EQ(results()[7].peaks[0].fn_N, results()[8].peaks[0].fn_N);
+  EXPECT_EQ(results()[7].peaks[0].fn_N, results()[9].peaks[0].fn_N);
+}
+
+}  // namespace
+}  // namespace oblique::solver

@@ -1,0 +1,160 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tests/worker/solver/cases/shared_fingers.h"
+#include "worker/solver/contact/contact.h"
+
+namespace oblique::solver {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+template <class Error>
+std::string message_of(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  ADD_FAILURE() << "no such error";
+  return {};
+}
+
+std::string input_error(double H_m, double mu, double e_star) {
+  return message_of<InputError>([&] { coarse_finger().solve(H_m, mu, e_star); });
+}
+
+std::string model_error(const std::function<void(ModelParameters&)>& change) {
+  ModelParameters model = coarse_model();
+  change(model);
+  return message_of<InputError>([&] { Finger{model}; });
+}
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+TEST(SolveErrors, ValueOutsideItsRangeIsNamedWithWhatIsAllowed) {
+  EXPECT_THAT(input_error(1.0, -0.1, 1.0), AllOf(HasSubstr("mu = -0.1"), HasSubstr(">= 0")));
+  EXPECT_THAT(input_error(1.0, 0.4, 0.0), AllOf(HasSubstr("e = 0"), HasSubstr("[0.001, 1]")));
+  EXPECT_THAT(input_error(1.0, 0.4, -0.5), HasSubstr("e = -0.5"));
+  EXPECT_THAT(input_error(1.0, 0.4, 1.01), AllOf(HasSubstr("e = 1.01"), HasSubstr("[0.001, 1]")));
+  EXPECT_THAT(input_error(0.0, 0.4, 1.0), AllOf(HasSubstr("H = 0 m"), HasSubstr("> 0")));
+  EXPECT_THAT(input_error(-1.0, 0.4, 1.0), HasSubstr("H = -1 m"));
+}
+
+TEST(SolveErrors, WhatIsNoNumberIsRefused) {
+  for (const double bad : {kNaN, kInfinity, -kInfinity}) {
+    EXPECT_THAT(input_error(bad, 0.4, 1.0), HasSubstr("H = "));
+    EXPECT_THAT(input_error(1.0, bad, 1.0), HasSubstr("mu = "));
+    EXPECT_THAT(input_error(1.0, 0.4, bad), HasSubstr("e = "));
+    EXPECT_THAT(model_error([bad](ModelParameters& m) { m.E_Pa = bad; }), HasSubstr("E = "));
+    EXPECT_THAT(model_error([bad](ModelParameters& m) { m.lengths_m[2] = bad; }),
+                HasSubstr("length = "));
+    EXPECT_THAT(model_error([bad](ModelParameters& m) { m.dt_s = bad; }), HasSubstr("dt = "));
+  }
+}
+
+TEST(SolveErrors, DropThatTheTipNeverReachesNamesTheLargestDrop) {
+  EXPECT_THAT(input_error(1.19, 0.4, 1.0),
+              AllOf(HasSubstr("H = 1.19 m"), HasSubstr("at most 1.179156 m")));
+  EXPECT_THAT(input_error(1.3, 0.4, 1.0), HasSubstr("1.2 m")) << "longer than the chain";
+}
+
+TEST(SolveErrors, TouchWithoutSpeedSaysThatThereIsNothingToSolve) {
+  const Finger& finger = coarse_finger();
+  const double H_m = finger.largest_drop_m();
+  EXPECT_THAT(message_of<SolveError>([&] { finger.solve(H_m, 0.4, 1.0); }),
+              HasSubstr("hardly any speed"));
+}
+
+TEST(SolveErrors, StepAboveTheStabilityLimitNamesTheLimit) {
+  EXPECT_THAT(model_error([](ModelParameters& m) { m.dt_fall_s = 1e-3; }),
+              AllOf(HasSubstr("dt_fall = 0.001 s"), HasSubstr("stable up to 1.84")));
+  ModelParameters model = coarse_model();
+  model.dt_s = 1e-3;
+  const Finger finger{model};
+  EXPECT_THAT(message_of<InputError>([&] { finger.solve(1.0, 0.4, 1.0); }),
+              AllOf(HasSubstr("dt = 0.001 s"), HasSubstr("stable up to 1.8")));
+  // The stiffer spring of restitution lowers the limit.
+  model.dt_s = 1e-5;
+  const Finger lower{model};
+  EXPECT_NO_THROW(lower.solve(1.0, 0.4, 1.0));
+  EXPECT_THAT(message_of<InputError>([&] { lower.solve(1.0, 0.4, 0.05); }),
+              HasSubstr("dt = 1e-05 s"));
+}
+
+TEST(SolveErrors, ContactThatOutlastsTheStatedTimeIsGivenUp) {
+  ModelParameters model = coarse_model();
+  model.k_N_m = 1e3;  // half a period of a link on it takes 45 ms
+  const Finger soft{model};
+  EXPECT_THAT(message_of<SolveError>([&] { soft.solve(0.5, 0.4, 1.0); }),
+              HasSubstr("did not end within 0.02 s"));
+  model = coarse_model();
+  model.tip_mass_kg = 1e6;
+  const Finger heavy{model};
+  EXPECT_THAT(message_of<SolveError>([&] { heavy.solve(0.5, 0.4, 1.0); }),
+              HasSubstr("did not end within 0.02 s"));
+}
+
+TEST(SolveErrors, MagnitudesBeyondNumbersAreAnErrorInBoundedTime) {
+  EXPECT_THAT(model_error([](ModelParameters& m) { m.I_m4 = 1e300; }), HasSubstr("magnitude"));
+  EXPECT_THAT(model_error([](ModelParameters& m) { m.rho_kg_m3 = 1e-300; }),
+              HasSubstr("magnitude"));
+  ModelParameters model = coarse_model();
+  model.dt_fall_s = 1e-300;
+  const Finger finger{model};
+  EXPECT_THAT(message_of<SolveError>([&] { finger.solve(0.5, 0.4, 1.0); }),
+              HasSubstr("more than 1e+09 steps"));
+}
+
+TEST(SolveErrors, MachineRefusesStatesThatAreNoNumbersAndContactsWithoutEnd) {
+  const ContactParameters parameters{1e6, 1.2, 0.5, 1.0};
+  Contact contact(parameters, {0.0, 0.0, 1.0, -1.0}, {1e-5, 1e-5});
+  EXPECT_THROW(contact.judge({kNaN, 0.0, 1.0, -1.0}, {}), SolveError);
+  // A tip that sinks for ever.
+  Contact sinking(parameters, {0.0, 0.0, 1.0, -1.0}, {1e-5, 1e-5});
+  TipState tip{0.0, 0.0, 1.0, -1.0};
+  const auto sink = [&] {
+    for (int i = 0; i < 3000; ++i) {
+      tip.y_m -= 1e-5;
+      tip.x_m += 1e-5;
+      sinking.judge(tip, {});
+    }
+  };
+  EXPECT_THROW(sink(), SolveError);
+}
+
+TEST(SolveErrors, OnePointThatFailsLeavesTheOthersOfItsBatchAlone) {
+  const std::vector<PointRequest> list{{7, 0.5, 0.4, 1.0},  {8, 1.19, 0.4, 1.0},
+                                       {9, 0.5, -1.0, 1.0}, {10, kNaN, 0.4, 1.0},
+                                       {11, 0.6, 0.4, 0.0}, {12, 1.0, 0.4, 0.5}};
+  std::size_t next = 0;
+  std::map<std::uint64_t, std::string> errors;
+  coarse_finger().solve_points(
+      [&]() -> std::optional<PointRequest> {
+        return next < list.size() ? std::optional(list[next++]) : std::nullopt;
+      },
+      [&errors](PointOutcome&& outcome) {
+        EXPECT_EQ(outcome.result.has_value(), outcome.error.empty());
+        errors[outcome.number] = outcome.error;
+      });
+  ASSERT_EQ(errors.size(), list.size());
+  EXPECT_EQ(errors[7], "");
+  EXPECT_THAT(errors[8], HasSubstr("1.179156"));
+  EXPECT_THAT(errors[9], HasSubstr("mu = -1"));
+  EXPECT_THAT(errors[10], HasSubstr("H = nan"));
+  EXPECT_THAT(errors[11], HasSubstr("e = 0"));
+  EXPECT_EQ(errors[12], "");
+}
+
+}  // namespace
+}  // namespace oblique::solver

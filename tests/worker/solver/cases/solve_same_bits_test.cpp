@@ -1,0 +1,157 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <random>
+#include <thread>
+#include <vector>
+
+#include "tests/worker/solver/cases/same_bits.h"
+#include "tests/worker/solver/cases/shared_fingers.h"
+#include "worker/solver/contact/solve_contact.h"
+#include "worker/solver/lanes/lane_batch.h"
+#include "worker/solver/motion/fall.h"
+#include "worker/solver/step_choice.h"
+
+namespace oblique::solver {
+namespace {
+
+/// Points of all kinds of impact, short and long, numbered from 0.
+std::vector<PointRequest> points() {
+  std::vector<PointRequest> list;
+  for (const double H_m : {0.3, 0.9, 1.0, 1.04}) {
+    for (const double mu : {0.0, 0.4, 0.9, 1.4}) {
+      for (const double e_star : {1.0, 0.7, 0.15}) {
+        list.push_back({list.size(), H_m, mu, e_star});
+      }
+    }
+  }
+  return list;
+}
+
+using Results = std::map<std::uint64_t, CaseResult>;
+
+Results solved_together(const Finger& finger, const std::vector<PointRequest>& list) {
+  Results results;
+  std::size_t next = 0;
+  finger.solve_points(
+      [&]() -> std::optional<PointRequest> {
+        return next < list.size() ? std::optional(list[next++]) : std::nullopt;
+      },
+      [&results](PointOutcome&& outcome) {
+        EXPECT_TRUE(outcome.result) << outcome.error;
+        const bool is_new = results.emplace(outcome.number, std::move(*outcome.result)).second;
+        EXPECT_TRUE(is_new) << "point " << outcome.number << " came twice";
+      });
+  return results;
+}
+
+Results solved_one_by_one(const Finger& finger, const std::vector<PointRequest>& list) {
+  Results results;
+  for (const PointRequest& point : list) {
+    results.emplace(point.number, finger.solve(point.H_m, point.mu, point.e_star));
+  }
+  return results;
+}
+
+void expect_same(const Results& a, const Results& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (const auto& [number, result] : a) {
+    SCOPED_TRACE(number);
+    ASSERT_TRUE(b.contains(number));
+    expect_same_bits(result, b.at(number));
+  }
+}
+
+TEST(SameBits, WhateverWasSolvedBefore) {
+  const auto list = points();
+  const Finger fresh{coarse_model()};
+  expect_same(solved_one_by_one(fresh, {list.rbegin(), list.rend()}),
+              solved_one_by_one(coarse_finger(), list));
+}
+
+TEST(SameBits, WhateverNeighboursItHasInTheLanes) {
+  auto list = points();
+  const Results alone = solved_one_by_one(coarse_finger(), list);
+  expect_same(solved_together(coarse_finger(), list), alone);
+  std::mt19937_64 generator(1);
+  for (int shuffle = 0; shuffle < 3; ++shuffle) {
+    std::shuffle(list.begin(), list.end(), generator);
+    expect_same(solved_together(coarse_finger(), list), alone);
+  }
+}
+
+TEST(SameBits, FromSeveralThreadsAtOnceThatShareAFinger) {
+  const auto list = points();
+  const Finger shared{coarse_model()};
+  std::vector<Results> by_thread(4);
+  std::vector<std::thread> threads;
+  for (std::size_t i = 0; i < by_thread.size(); ++i) {
+    threads.emplace_back([&, i] {
+      // The first to come solves the fall.
+      by_thread[i] = i % 2 == 0 ? solved_together(shared, list) : solved_one_by_one(shared, list);
+    });
+  }
+  for (std::thread& thread : threads) {
+    thread.join();
+  }
+  const Results alone = solved_one_by_one(coarse_finger(), list);
+  for (const Results& results : by_thread) {
+    expect_same(results, alone);
+  }
+}
+
+TEST(SameBits, WithATraceOrWithout) {
+  int rows = 0;
+  Tracing tracing;
+  tracing.sink = [&rows](const TraceRow&) { ++rows; };
+  const CaseResult traced = coarse_finger().solve(1.0, 0.9, 0.7, tracing);
+  EXPECT_GT(rows, 10);
+  expect_same_bits(traced, coarse_finger().solve(1.0, 0.9, 0.7));
+}
+
+TEST(Lanes, EveryInstructionSetGivesTheSameAnswersButForRounding) {
+  const ModelParameters model = coarse_model();
+  const Chain chain(model);
+  const StepChoice steps(chain, model);
+  const Fall fall(chain, steps.fall_s());
+  const ChainState touch = fall.state_at(1.0);
+  const ExplicitMotion motion(chain);
+  for (const double mu : {0.4, 1.4}) {
+    const ContactParameters parameters{model.k_N_m, model.eta2, mu, 0.8};
+    const CaseResult by_motion =
+        solve_contact(motion, parameters, steps.contact(0.8), touch, Tracing{});
+    for (const LaneKernel& kernel : runnable_lane_kernels()) {
+      SCOPED_TRACE(kernel.name);
+      LaneBatch batch(chain, kernel);
+      std::size_t given = 0;
+      // More cases than lanes, so that lanes are taken again.
+      const std::size_t cases = 2 * kernel.lanes + 1;
+      std::size_t done = 0;
+      batch.solve(
+          [&]() -> std::optional<ContactCase> {
+            return given < cases ? std::optional(ContactCase{given++, 0, parameters,
+                                                             steps.contact(0.8), &touch})
+                                 : std::nullopt;
+          },
+          [&](ContactOutcome&& outcome) {
+            ++done;
+            ASSERT_TRUE(outcome.result) << outcome.error;
+            const CaseResult& result = *outcome.result;
+            EXPECT_EQ(result.mode, by_motion.mode);
+            EXPECT_NEAR(result.duration_s, by_motion.duration_s, 1e-10 * by_motion.duration_s);
+            EXPECT_NEAR(result.fn_peak_N, by_motion.fn_peak_N, 1e-10 * by_motion.fn_peak_N);
+            EXPECT_NEAR(result.ft_peak_N, by_motion.ft_peak_N, 1e-10 * by_motion.ft_peak_N);
+            EXPECT_NEAR(result.slide_m, by_motion.slide_m, 1e-10 * by_motion.slide_m);
+            EXPECT_NEAR(result.vn_out_m_s, by_motion.vn_out_m_s, 1e-9);
+            EXPECT_NEAR(result.energy.friction_J, by_motion.energy.friction_J, 1e-9);
+          });
+      EXPECT_EQ(done, cases);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace oblique::solver

@@ -1,0 +1,329 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "tests/worker/solver/cases/shared_fingers.h"
+
+namespace oblique::solver {
+namespace {
+
+struct Traced {
+  CaseResult result;
+  std::vector<TraceRow> rows;
+};
+
+Traced traced(double H_m, double mu, double e_star) {
+  Traced traced;
+  Tracing tracing;
+  tracing.sink = [&traced](const TraceRow& row) { traced.rows.push_back(row); };
+  traced.result = coarse_finger().solve(H_m, mu, e_star, tracing);
+  return traced;
+}
+
+/// Slip only; stick and slip; low restitution; no friction.
+const std::vector<Traced>& traces() {
+  static const std::vector<Traced> list{traced(1.0, 0.4, 1.0), traced(1.0, 1.4, 0.8),
+                                        traced(0.9, 0.9, 0.2), traced(0.9, 0.0, 0.8)};
+  return list;
+}
+
+TEST(Trace, BeginsAtTouchWithoutForcesAndEndsAtSeparation) {
+  for (const Traced& t : traces()) {
+    const TraceRow& first = t.rows.front();
+    EXPECT_EQ(first.t_s, 0.0);
+    EXPECT_EQ(first.fn_N, 0.0);
+    EXPECT_EQ(first.ft_N, 0.0);
+    EXPECT_EQ(first.uy_m, 0.0);
+    EXPECT_NEAR(first.y_m, -t.result.H_m, 1e-15);
+    EXPECT_EQ(first.x_m, t.result.impact_x_m);
+    EXPECT_EQ(first.vn_m_s, t.result.vn_in_m_s);
+    EXPECT_EQ(first.state[1], 'C');
+    const TraceRow& last = t.rows.back();
+    EXPECT_EQ(last.t_s, t.result.duration_s);
+    EXPECT_NEAR(last.fn_N, 0.0, 1e-6);
+    EXPECT_NEAR(last.ft_N, 0.0, 1e-6);
+    EXPECT_EQ(last.vt_m_s, t.result.vt_out_m_s);
+    EXPECT_EQ(last.vn_m_s, t.result.vn_out_m_s);
+    EXPECT_EQ(last.state[1], 'R');
+  }
+}
+
+TEST(Trace, TimeNeverGoesBack) {
+  for (const Traced& t : traces()) {
+    EXPECT_TRUE(std::is_sorted(t.rows.begin(), t.rows.end(),
+                               [](const TraceRow& a, const TraceRow& b) { return a.t_s < b.t_s; }));
+  }
+}
+
+TEST(Trace, ForcesStayInsideTheConeAndOnItInSlip) {
+  for (const Traced& t : traces()) {
+    for (const TraceRow& row : t.rows) {
+      const double limit_N = t.result.mu * row.fn_N;
+      EXPECT_GE(row.fn_N, -1e-6);
+      EXPECT_LE(std::abs(row.ft_N), limit_N + 1e-6);
+      if (row.state[0] == 's') {
+        EXPECT_NEAR(std::abs(row.ft_N), limit_N, 1e-6);
+        // P stops at an instant located to 1e-13 s: forces of 1e4 N, accelerations of 1e4 m/s^2.
+        EXPECT_LE(row.ft_N * row.vP_m_s, 1e-5) << "friction acts against P";
+      }
+    }
+  }
+}
+
+TEST(Trace, DeformationsAndPositionsBelongToTheForces) {
+  const ModelParameters& model = coarse_finger().model();
+  for (const Traced& t : traces()) {
+    for (const TraceRow& row : t.rows) {
+      EXPECT_NEAR(row.ft_N, -model.k_N_m / model.eta2 * row.ux_m, 1e-6);
+      EXPECT_NEAR(row.xP_m, row.x_m - row.ux_m, 1e-15);
+      EXPECT_NEAR(row.uy_m, row.y_m + t.result.H_m, 1e-15);
+    }
+    // Up to the first turn the normal force is that of the spring in compression.
+    for (const TraceRow& row : t.rows) {
+      if (row.state[1] == 'R') {
+        break;
+      }
+      EXPECT_NEAR(row.fn_N, -model.k_N_m * row.uy_m, 1e-6);
+    }
+  }
+}
+
+TEST(Trace, PRestsInStickAndMovesWithItsVelocityInSlip) {
+  for (const Traced& t : traces()) {
+    double slide_m = 0.0;
+    for (std::size_t i = 1; i < t.rows.size(); ++i) {
+      const TraceRow& a = t.rows[i - 1];
+      const TraceRow& b = t.rows[i];
+      slide_m += std::abs(b.xP_m - a.xP_m);
+      if (a.state[0] == 'S') {
+        EXPECT_NEAR(b.xP_m, a.xP_m, 1e-14);
+        EXPECT_EQ(a.vP_m_s, 0.0);
+      }
+    }
+    EXPECT_NEAR(slide_m, t.result.slide_m, 1e-12);
+  }
+}
+
+TEST(Trace, StatesAreThoseOfTheMode) {
+  for (const Traced& t : traces()) {
+    std::string mode;
+    std::string last;
+    // The last row repeats the state that ended.
+    for (const TraceRow& row : t.rows) {
+      if (row.state != last) {
+        mode += (mode.empty() ? "" : " ") + row.state;
+      }
+      last = row.state;
+    }
+    EXPECT_EQ(mode, t.result.mode);
+  }
+}
+
+TEST(Trace, ImpulsesAreTheIntegralsOfTheForces) {
+  for (const Traced& t : traces()) {
+    double impulse_n_Ns = 0.0;
+    double impulse_t_Ns = 0.0;
+    for (std::size_t i = 1; i < t.rows.size(); ++i) {
+      const double half_s = 0.5 * (t.rows[i].t_s - t.rows[i - 1].t_s);
+      impulse_n_Ns += half_s * (t.rows[i].fn_N + t.rows[i - 1].fn_N);
+      impulse_t_Ns += half_s * (t.rows[i].ft_N + t.rows[i - 1].ft_N);
+    }
+    // The trapezoidal rule errs by (omega h)^2/12 of the fastest motion seen.
+    EXPECT_NEAR(impulse_n_Ns, t.result.impulse_n_Ns, 5e-3 * t.result.impulse_n_Ns);
+    EXPECT_NEAR(impulse_t_Ns, t.result.impulse_t_Ns, 5e-3 * t.result.impulse_n_Ns);
+  }
+}
+
+TEST(Trace, NoRowExceedsThePeaksAndEachPeakIsARow) {
+  for (const Traced& t : traces()) {
+    for (const TraceRow& row : t.rows) {
+      EXPECT_LE(row.fn_N, t.result.fn_peak_N);
+      EXPECT_LE(std::abs(row.ft_N), t.result.ft_peak_N);
+    }
+    for (const Peak& peak : t.result.peaks) {
+      EXPECT_TRUE(std::any_of(t.rows.begin(), t.rows.end(), [&peak](const TraceRow& row) {
+        return row.t_s == peak.t_s && row.fn_N == peak.fn_N;
+      }));
+    }
+  }
+}
+
+TEST(Trace, TangentialForceOfAPeakIsTheLargestBetweenTheValleysBesideIt) {
+  for (const Traced& t : traces()) {
+    for (std::size_t i = 0; i < t.result.peaks.size(); ++i) {
+      const double from_s = t.result.phases[2 * i].t0_s;
+      const double to_s = t.result.phases[2 * i + 1].t1_s;
+      double largest_N = 0.0;
+      for (const TraceRow& row : t.rows) {
+        if (row.t_s >= from_s && row.t_s <= to_s) {
+          largest_N = std::max(largest_N, std::abs(row.ft_N));
+        }
+      }
+      EXPECT_NEAR(t.result.peaks[i].ft_N, largest_N, 1e-6);
+    }
+  }
+}
+
+TEST(Trace, TangentialPeaksAreTheLocalMaximaOfTheTangentialForce) {
+  std::vector<Traced> many = traces();
+  for (const double mu : {0.7, 1.0, 1.3, 2.5}) {
+    for (const double H_m : {0.1, 0.5, 1.1}) {
+      many.push_back(traced(H_m, mu, 0.9));
+    }
+  }
+  for (const Traced& t : many) {
+    SCOPED_TRACE(t.result.mode);
+    // Rows of distinct instants, so that both sides of an event count once: 1e-11 s at 1e7 N/s.
+    std::vector<TraceRow> rows;
+    for (const TraceRow& row : t.rows) {
+      if (rows.empty() || row.t_s > rows.back().t_s + 1e-11) {
+        rows.push_back(row);
+      }
+    }
+    std::vector<double> maxima_N;
+    for (std::size_t i = 1; i + 1 < rows.size(); ++i) {
+      const double ft_N = std::abs(rows[i].ft_N);
+      if (ft_N > std::abs(rows[i - 1].ft_N) && ft_N > std::abs(rows[i + 1].ft_N)) {
+        maxima_N.push_back(ft_N);
+      }
+    }
+    ASSERT_EQ(t.result.ft_peaks.size(), maxima_N.size());
+    for (std::size_t i = 0; i < maxima_N.size(); ++i) {
+      EXPECT_NEAR(t.result.ft_peaks[i].ft_N, maxima_N[i], 1e-4);
+    }
+  }
+}
+
+TEST(Trace, WorkExchangedIsTheSumOverTheRows) {
+  for (const Traced& t : traces()) {
+    double exchanged_J = 0.0;
+    for (std::size_t i = 1; i < t.rows.size(); ++i) {
+      const TraceRow& a = t.rows[i - 1];
+      const TraceRow& b = t.rows[i];
+      exchanged_J += std::abs(0.5 * (a.fn_N + b.fn_N) * (b.y_m - a.y_m)) +
+                     std::abs(0.5 * (a.ft_N + b.ft_N) * (b.x_m - a.x_m));
+    }
+    EXPECT_NEAR(t.result.energy.exchanged_J, exchanged_J, 1e-3 * exchanged_J);
+  }
+}
+
+TEST(Trace, EnergiesChangeByTheWorkOfTheContactForces) {
+  for (const Traced& t : traces()) {
+    const TraceRow& first = t.rows.front();
+    const TraceRow& last = t.rows.back();
+    const ContactEnergy& energy = t.result.energy;
+    EXPECT_EQ(first.kinetic_J, energy.kinetic_in_J);
+    EXPECT_NEAR(last.kinetic_J - first.kinetic_J, energy.kinetic_change_J, 1e-12);
+    EXPECT_NEAR(last.strain_J - first.strain_J, energy.strain_change_J, 1e-12);
+    EXPECT_NEAR(last.gravity_J - first.gravity_J, energy.gravity_change_J, 1e-12);
+    EXPECT_LT(first.gravity_J, 0.0) << "the finger hangs below O";
+    double work_J = 0.0;
+    for (std::size_t i = 1; i < t.rows.size(); ++i) {
+      const TraceRow& a = t.rows[i - 1];
+      const TraceRow& b = t.rows[i];
+      work_J +=
+          0.5 * (a.fn_N + b.fn_N) * (b.y_m - a.y_m) + 0.5 * (a.ft_N + b.ft_N) * (b.x_m - a.x_m);
+      const double change_J = (b.kinetic_J + b.strain_J + b.gravity_J) -
+                              (first.kinetic_J + first.strain_J + first.gravity_J);
+      EXPECT_NEAR(change_J, work_J, 2e-3 * energy.exchanged_J);
+    }
+  }
+}
+
+TEST(Trace, MomentumChangesByThePinTheContactAndTheWeight) {
+  const ModelParameters& model = coarse_finger().model();
+  double length_m = 0.0;
+  for (const double link_m : model.lengths_m) {
+    length_m += link_m;
+  }
+  const double weight_N = model.rho_kg_m3 * model.A_m2 * length_m * model.g_m_s2;
+  for (const Traced& t : traces()) {
+    const TraceRow& first = t.rows.front();
+    double impulse_x_Ns = 0.0;
+    double impulse_y_Ns = 0.0;
+    double largest_Ns = 0.0;
+    for (std::size_t i = 1; i < t.rows.size(); ++i) {
+      const TraceRow& a = t.rows[i - 1];
+      const TraceRow& b = t.rows[i];
+      const double half_s = 0.5 * (b.t_s - a.t_s);
+      impulse_x_Ns += half_s * (a.reactions_N[0] + b.reactions_N[0] + a.ft_N + b.ft_N);
+      impulse_y_Ns +=
+          half_s * (a.reactions_N[1] + b.reactions_N[1] + a.fn_N + b.fn_N - 2.0 * weight_N);
+      largest_Ns = std::max({largest_Ns, std::abs(impulse_x_Ns), std::abs(impulse_y_Ns)});
+      // The trapezoidal rule errs by (omega h)^2/12 of the fastest motion seen.
+      EXPECT_NEAR(b.momentum_x_Ns - first.momentum_x_Ns, impulse_x_Ns, 2e-2 * largest_Ns);
+      EXPECT_NEAR(b.momentum_y_Ns - first.momentum_y_Ns, impulse_y_Ns, 2e-2 * largest_Ns);
+    }
+  }
+}
+
+Traced with_shape(const ModelParameters& model) {
+  Traced traced;
+  Tracing tracing;
+  tracing.sink = [&traced](const TraceRow& row) { traced.rows.push_back(row); };
+  tracing.with_shape = true;
+  traced.result = Finger{model}.solve(0.9, 0.4, 1.0, tracing);
+  return traced;
+}
+
+TEST(Trace, ShapeIsThatOfAChainFromThePinToTheTip) {
+  const ModelParameters model = coarse_model(2);
+  for (const TraceRow& row : with_shape(model).rows) {
+    // Three links of two elements: seven nodes.
+    ASSERT_EQ(row.nodes_m.size(), 14U);
+    EXPECT_EQ(row.nodes_m[0], 0.0);
+    EXPECT_EQ(row.nodes_m[1], 0.0);
+    EXPECT_EQ(row.nodes_m[12], row.x_m);
+    EXPECT_EQ(row.nodes_m[13], row.y_m);
+    for (std::size_t node = 1; node < 7; ++node) {
+      const double element_m = std::hypot(row.nodes_m[2 * node] - row.nodes_m[2 * node - 2],
+                                          row.nodes_m[2 * node + 1] - row.nodes_m[2 * node - 1]);
+      EXPECT_NEAR(element_m, 0.2, 0.002) << "links bend and stretch little";
+    }
+  }
+  EXPECT_TRUE(traces()[0].rows[0].nodes_m.empty()) << "unless it is asked for";
+}
+
+TEST(Trace, BothIntegratorsTellTheSameEnergiesMomentaAndShapes) {
+  ModelParameters model = coarse_model();
+  const TraceRow by_default = with_shape(model).rows.front();
+  model.integrator = Integrator::kGeneralizedAlpha;
+  model.dt_fall_s = 20e-6;
+  model.dt_s = 1e-6;
+  const TraceRow reference = with_shape(model).rows.front();
+  EXPECT_NEAR(reference.kinetic_J, by_default.kinetic_J, 1e-2 * by_default.kinetic_J);
+  EXPECT_NEAR(reference.gravity_J, by_default.gravity_J, 1e-3 * std::abs(by_default.gravity_J));
+  EXPECT_NEAR(reference.momentum_x_Ns, by_default.momentum_x_Ns,
+              1e-2 * std::abs(by_default.momentum_x_Ns));
+  EXPECT_NEAR(reference.momentum_y_Ns, by_default.momentum_y_Ns,
+              1e-2 * std::abs(by_default.momentum_y_Ns));
+  ASSERT_EQ(reference.nodes_m.size(), by_default.nodes_m.size());
+  for (std::size_t i = 0; i < reference.nodes_m.size(); ++i) {
+    EXPECT_NEAR(reference.nodes_m[i], by_default.nodes_m[i], 1e-3);
+  }
+}
+
+TEST(Trace, PeaksOfTheReactionsAreThoseOfTheRows) {
+  for (const Traced& t : traces()) {
+    // Three links have the pin and two joints.
+    ASSERT_EQ(t.result.reaction_peaks.size(), 3U);
+    for (std::size_t joint = 0; joint < 3; ++joint) {
+      double largest_N = 0.0;
+      for (const TraceRow& row : t.rows) {
+        ASSERT_EQ(row.reactions_N.size(), 6U);
+        largest_N = std::max(
+            largest_N, std::hypot(row.reactions_N[2 * joint], row.reactions_N[2 * joint + 1]));
+      }
+      // Rows miss the top between two of them: (omega h)^2/8 of the fastest motion at most, with
+      // one element a link a visible part of the whole.
+      EXPECT_GT(t.result.reaction_peaks[joint].force_N, 0.998 * largest_N);
+      EXPECT_LT(t.result.reaction_peaks[joint].force_N, 1.02 * largest_N);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace oblique::solver

@@ -1,0 +1,226 @@
+#include "worker/solver/chain/beam_element.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Core>
+#include <cmath>
+#include <random>
+#include <type_traits>
+
+namespace oblique::solver {
+namespace {
+
+constexpr double kLength_m = 0.1;
+constexpr double kEA_N = 3.7e7;
+constexpr double kEI_N_m2 = 1570.0;
+constexpr double kHalfEALength = 0.5 * kEA_N * kLength_m;
+constexpr double kBending = 2.0 * kEI_N_m2 / kLength_m;
+
+/// p_i, s_i, p_j, s_j, one column a direction.
+using Nodes = Eigen::Matrix<double, 4, 2>;
+
+Nodes random_nodes(std::mt19937_64& generator) {
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  Nodes q;
+  for (int i = 0; i < q.size(); ++i) {
+    q.data()[i] = uniform(generator);
+  }
+  q.row(0) *= kLength_m;
+  q.row(2) *= kLength_m;
+  return q;
+}
+
+Nodes straight_nodes(double angle_rad, double x_m, double y_m) {
+  const double c = std::cos(angle_rad);
+  const double s = std::sin(angle_rad);
+  Nodes q;
+  q << x_m, y_m, c, s, x_m + kLength_m * c, y_m + kLength_m * s, c, s;
+  return q;
+}
+
+GradientCoefficients<double> gradient(const Nodes& q) {
+  const auto at = [&q](int row) { return PlanarVector<double>{q(row, 0), q(row, 1)}; };
+  return gradient_coefficients(at(0), at(1), at(2), at(3), 1.0 / kLength_m);
+}
+
+double energy(const Nodes& q) {
+  return strain_energy(gradient(q), kHalfEALength, kBending);
+}
+
+/// dU/dq from dU/dc, by c0 = (p_j - p_i)/l, c1 = (s_j - s_i)/2, c2 = (s_i + s_j)/2 - c0.
+Nodes energy_gradient(const Nodes& q) {
+  const auto f = elastic_gradient(gradient(q), kHalfEALength, kBending);
+  Eigen::Matrix<double, 3, 2> by_c;
+  for (int k = 0; k < 3; ++k) {
+    by_c(k, 0) = f.c[static_cast<std::size_t>(k)].x;
+    by_c(k, 1) = f.c[static_cast<std::size_t>(k)].y;
+  }
+  Eigen::Matrix<double, 3, 4> c_of_q;
+  const double a = 1.0 / kLength_m;
+  c_of_q << -a, 0.0, a, 0.0, 0.0, -0.5, 0.0, 0.5, a, 0.5, -a, 0.5;
+  return c_of_q.transpose() * by_c;
+}
+
+/// Central difference of five points: exact for polynomials up to degree 4, which the energy is.
+template <class Function>
+std::invoke_result_t<Function, double> five_point_difference(const Function& f, double h) {
+  return ((f(-2.0 * h) - f(2.0 * h)) + 8.0 * (f(h) - f(-h))) / (12.0 * h);
+}
+
+/// Hermite shape functions and their derivatives of order 0, 1, 2 at x.
+Eigen::RowVector4d shape(int order, double x) {
+  const double l = kLength_m;
+  const double z = x / l;
+  Eigen::RowVector4d s;
+  switch (order) {
+    case 0:
+      s << 1 - 3 * z * z + 2 * z * z * z, l * (z - 2 * z * z + z * z * z),
+          3 * z * z - 2 * z * z * z, l * (z * z * z - z * z);
+      return s;
+    case 1:
+      s << (-6 * z + 6 * z * z) / l, 1 - 4 * z + 3 * z * z, (6 * z - 6 * z * z) / l,
+          3 * z * z - 2 * z;
+      return s;
+    default:
+      s << (-6 + 12 * z) / (l * l), (-4 + 6 * z) / l, (6 - 12 * z) / (l * l), (6 * z - 2) / l;
+      return s;
+  }
+}
+
+/// Nodal values p_i, s_i, p_j, s_j of x^power.
+Eigen::Vector4d monomial(int power) {
+  const auto x_to = [](double x, int n) { return n < 0 ? 0.0 : std::pow(x, n); };
+  return {x_to(0.0, power), power * x_to(0.0, power - 1), x_to(kLength_m, power),
+          power * x_to(kLength_m, power - 1)};
+}
+
+/// Integral over the element of the derivatives of x^a and x^b.
+double monomial_integral(int a, int b, int derivatives) {
+  double factor = 1.0;
+  for (int i = 0; i < derivatives; ++i) {
+    factor *= (a - i) * (b - i);
+  }
+  const int power = a + b - 2 * derivatives;
+  return factor == 0.0 ? 0.0 : factor * std::pow(kLength_m, power + 1) / (power + 1);
+}
+
+Eigen::Matrix4d dense(const std::array<std::array<double, 4>, 4>& entries) {
+  Eigen::Matrix4d matrix;
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; j < 4; ++j) {
+      matrix(i, j) = entries[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
+    }
+  }
+  return matrix;
+}
+
+void expect_exact_on_cubics(const Eigen::Matrix4d& matrix, double factor, int derivatives) {
+  for (int a = 0; a <= 3; ++a) {
+    for (int b = 0; b <= 3; ++b) {
+      const double exact = factor * monomial_integral(a, b, derivatives);
+      const double scale = factor * std::pow(kLength_m, a + b - 2 * derivatives + 1);
+      EXPECT_NEAR(monomial(a).dot(matrix * monomial(b)), exact, 1e-13 * scale)
+          << "x^" << a << " and x^" << b;
+    }
+  }
+}
+
+TEST(BeamElement, ElasticForceIsMinusTheGradientOfTheStrainEnergy) {
+  std::mt19937_64 generator(1);
+  for (int sample = 0; sample < 200; ++sample) {
+    const Nodes q = random_nodes(generator);
+    const Nodes direction = random_nodes(generator);
+    const double expected =
+        five_point_difference([&](double h) -> double { return energy(q + h * direction); }, 0.1);
+    const double scale = energy_gradient(q).norm() * direction.norm();
+    EXPECT_NEAR(energy_gradient(q).cwiseProduct(direction).sum(), expected, 1e-12 * scale);
+  }
+}
+
+TEST(BeamElement, RigidTranslationAndRotationGiveNeitherForceNorEnergy) {
+  for (const double angle_rad : {0.0, 0.3, 1.5707, 2.6, -3.0}) {
+    const Nodes q = straight_nodes(angle_rad, 0.7, -1.2);
+    // Strains are differences of numbers of size 1: forces vanish to EA times rounding, energies
+    // to EA l times its square.
+    EXPECT_LT(energy_gradient(q).cwiseAbs().maxCoeff(), 1e-14 * kEA_N) << angle_rad;
+    EXPECT_LT(energy(q), 1e-26 * kEA_N * kLength_m) << angle_rad;
+  }
+}
+
+TEST(BeamElement, RotatingADeformedElementRotatesItsForceAndKeepsItsEnergy) {
+  std::mt19937_64 generator(2);
+  for (int sample = 0; sample < 50; ++sample) {
+    const Nodes q = random_nodes(generator);
+    Eigen::Matrix2d turn;
+    turn << std::cos(0.8), std::sin(0.8), -std::sin(0.8), std::cos(0.8);
+    EXPECT_NEAR(energy(q * turn), energy(q), 1e-13 * energy(q));
+    const Nodes force = energy_gradient(q);
+    EXPECT_LT((energy_gradient(q * turn) - force * turn).norm(), 1e-13 * force.norm());
+  }
+}
+
+TEST(BeamElement, UniformStretchStoresTheEnergyOfTheGreenStrain) {
+  Nodes q = straight_nodes(0.4, 0.0, 0.0);
+  q *= 1.1;
+  const double strain = 0.5 * (1.1 * 1.1 - 1.0);
+  EXPECT_NEAR(energy(q), 0.5 * kEA_N * kLength_m * strain * strain, 1e-12 * energy(q));
+}
+
+TEST(BeamElement, FiveGaussPointsGiveTheExactEnergy) {
+  std::mt19937_64 generator(3);
+  constexpr int kIntervals = 4000;
+  for (int sample = 0; sample < 10; ++sample) {
+    const Nodes q = random_nodes(generator);
+    double simpson = 0.0;
+    for (int i = 0; i <= kIntervals; ++i) {
+      const double x = kLength_m * i / kIntervals;
+      const double strain = 0.5 * ((shape(1, x) * q).squaredNorm() - 1.0);
+      const double curvature_squared = (shape(2, x) * q).squaredNorm();
+      const double weight = i == 0 || i == kIntervals ? 1.0 : (i % 2 == 0 ? 2.0 : 4.0);
+      simpson += weight * 0.5 * (kEA_N * strain * strain + kEI_N_m2 * curvature_squared);
+    }
+    simpson *= kLength_m / kIntervals / 3.0;
+    // Simpson's error falls as the fourth power of the interval: 1e-14 times a derivative.
+    EXPECT_NEAR(energy(q), simpson, 1e-10 * energy(q));
+  }
+}
+
+TEST(BeamElement, MassMatrixIsExactOnPolynomials) {
+  expect_exact_on_cubics(dense(mass_matrix(1.4, kLength_m)), 1.4, 0);
+}
+
+TEST(BeamElement, GradientMatrixIsExactOnPolynomials) {
+  expect_exact_on_cubics(dense(gradient_matrix(kLength_m)), 1.0, 1);
+}
+
+TEST(BeamElement, BendingMatrixIsExactOnPolynomials) {
+  expect_exact_on_cubics(dense(bending_matrix(kLength_m)), 1.0, 2);
+}
+
+TEST(BeamElement, UniformLoadIsExactOnPolynomials) {
+  const auto load = uniform_load(kLength_m);
+  for (int a = 0; a <= 3; ++a) {
+    EXPECT_NEAR(monomial(a).dot(Eigen::Map<const Eigen::Vector4d>(load.data())),
+                monomial_integral(a, 0, 0), 1e-15);
+  }
+}
+
+TEST(BeamElement, TangentAtTheStraightStateIsAxialAndBendingAlongAndBendingAcross) {
+  const Nodes straight = straight_nodes(0.0, 0.2, 0.0);
+  const Eigen::Matrix4d bending = kEI_N_m2 * dense(bending_matrix(kLength_m));
+  const Eigen::Matrix4d along = kEA_N * dense(gradient_matrix(kLength_m)) + bending;
+  for (int column = 0; column < 8; ++column) {
+    Nodes direction = Nodes::Zero();
+    direction(column % 4, column / 4) = 1.0;
+    // The force is a cubic polynomial, so five points are exact.
+    const Nodes tangent = five_point_difference(
+        [&](double h) -> Nodes { return energy_gradient(straight + h * direction); }, 1e-2);
+    Nodes expected = Nodes::Zero();
+    expected.col(column / 4) = (column < 4 ? along : bending).col(column % 4);
+    // The axial stiffness sets the rounding of every entry.
+    EXPECT_LT((tangent - expected).norm(), 1e-12 * along.norm()) << "column " << column;
+  }
+}
+
+}  // namespace
+}  // namespace oblique::solver

@@ -1,0 +1,210 @@
+#include "worker/solver/motion/generalized_alpha.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <random>
+#include <utility>
+#include <vector>
+
+#include "tests/worker/solver/chain/chain_probe.h"
+#include "worker/solver/model/errors.h"
+
+namespace oblique::solver {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr AffineContactForce<double> kNoContact{};
+
+ModelParameters coarse_model() {
+  ModelParameters model;
+  model.elements_per_link = 2;
+  return model;
+}
+
+/// A contact that pushes on the tip in both directions from where it is.
+AffineContactForce<double> push_at(const TipState& tip) {
+  AffineContactForce<double> force;
+  force.fn0 = 3000.0;
+  force.ft0 = -1200.0;
+  force.k_nn = 2.7e7;
+  force.k_tn = 1.1e7;
+  force.k_tt = 2.1e7;
+  force.x0 = tip.x_m;
+  force.y0 = tip.y_m;
+  return force;
+}
+
+/// A bent chain in motion, in the coordinates of both systems.
+struct MovingChain {
+  explicit MovingChain(const ModelParameters& parameters)
+      : model(parameters), chain(model), motion(model) {
+    std::mt19937_64 generator(7);
+    state = chain.at_rest();
+    state.q = ChainProbe(chain).random_coordinates(generator, 1e-4);
+    std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+    for (std::size_t i = 2; i < state.v.size(); ++i) {
+      state.v[i] = uniform(generator);
+    }
+    constrained = motion.chain().from_eliminated(state);
+  }
+  /// Phi of positions or velocities: the largest gap at the pin and the joints.
+  double largest_gap(const Coordinates& values) const {
+    std::vector<double> rows(motion.chain().size(), 0.0);
+    motion.chain().set_constraints(values, 1.0, rows);
+    double largest = 0.0;
+    for (const double gap : rows) {
+      largest = std::max(largest, std::abs(gap));
+    }
+    return largest;
+  }
+
+  ModelParameters model;
+  Chain chain;
+  GeneralizedAlphaMotion motion;
+  ChainState state;
+  ChainState constrained;
+};
+
+TEST(GeneralizedAlpha, PinAndJointsHoldOverManySteps) {
+  MovingChain moving(ModelParameters{});
+  const auto force = push_at(moving.chain.tip(moving.state));
+  moving.motion.restart(force, moving.constrained);
+  ChainState state = moving.constrained;
+  ChainState next = state;
+  for (int i = 0; i < 200; ++i) {
+    moving.motion.step(state, force, 1e-6, next);
+    std::swap(state, next);
+    // One rounding of a coordinate of about 1.
+    ASSERT_LE(moving.largest_gap(state.q), 1e-15);
+  }
+  EXPECT_LE(moving.largest_gap(state.v), 1e-9);
+}
+
+TEST(GeneralizedAlpha, ReactionAtThePinHoldsTheHangingChain) {
+  // Straight down and at rest: O carries the weight, each joint what hangs below it. The links
+  // stretch a little from rest, so the reactions swing about that.
+  const ModelParameters model;
+  const Chain chain(model);
+  const GeneralizedAlphaMotion motion(model);
+  ChainState state = chain.at_rest();
+  for (std::size_t i = 0; i < state.q.size(); i += 2) {
+    state.q[i + 1] = -state.q[i];
+    state.q[i] = 0.0;
+  }
+  state = motion.chain().from_eliminated(state);
+  motion.restart(kNoContact, state);
+  ChainState next = state;
+  std::vector<double> mean_N(3, 0.0);
+  constexpr int kSteps = 20'000;
+  for (int i = 0; i < kSteps; ++i) {
+    motion.step(state, kNoContact, 2e-6, next);
+    std::swap(state, next);
+    const auto reactions = motion.reactions(kNoContact, state);
+    for (std::size_t link = 0; link < 3; ++link) {
+      mean_N[link] += reactions[link].y_N / kSteps;
+      ASSERT_NEAR(reactions[link].x_N, 0.0, 1e-6);
+    }
+  }
+  const double link_N = model.rho_kg_m3 * model.A_m2 * 0.4 * model.g_m_s2;
+  for (std::size_t link = 0; link < 3; ++link) {
+    EXPECT_NEAR(mean_N[link], link_N * static_cast<double>(3 - link), 0.02 * link_N);
+  }
+}
+
+/// What is left, after `steps` steps a hundred times too long for it, of a link's vibration along
+/// itself.
+double stiff_vibration_left(double spectral_radius, int steps) {
+  ModelParameters model = coarse_model();
+  model.lengths_m = {0.4};
+  model.g_m_s2 = 1e-12;
+  model.spectral_radius = spectral_radius;
+  const GeneralizedAlphaMotion motion(model);
+  constexpr double kStretch_m = 1e-9;
+  ChainState state = motion.at_rest();
+  state.q[motion.chain().tip_index()] += kStretch_m;
+  motion.restart(kNoContact, state);
+  ChainState next = state;
+  for (int i = 0; i < steps; ++i) {
+    motion.step(state, kNoContact, 5e-3, next);
+    std::swap(state, next);
+  }
+  return std::abs(motion.tip(state).x_m - 0.4) / kStretch_m;
+}
+
+TEST(GeneralizedAlpha, SpectralRadiusSaysHowFastUnresolvedVibrationsGo) {
+  EXPECT_LT(stiff_vibration_left(0.0, 5), 1e-3);
+  EXPECT_LT(stiff_vibration_left(0.5, 40), 1e-6);
+  EXPECT_GT(stiff_vibration_left(0.9, 20), 0.1);
+  EXPECT_LT(stiff_vibration_left(0.9, 200), 1e-5);
+}
+
+TEST(GeneralizedAlpha, SpectralRadiusOfOneIsRefusedWithTheReason) {
+  ModelParameters model;
+  model.spectral_radius = 1.0;
+  try {
+    const GeneralizedAlphaMotion motion(model);
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("spectral_radius = 1"));
+    EXPECT_THAT(error.what(), HasSubstr("nothing damps the multipliers"));
+  }
+}
+
+TEST(GeneralizedAlpha, StepThatNewtonCannotSolveIsASolveErrorWithItsTime) {
+  MovingChain moving(coarse_model());
+  for (double& rate : moving.constrained.v) {
+    rate *= 1e6;
+  }
+  moving.motion.restart(kNoContact, moving.constrained);
+  ChainState next;
+  try {
+    moving.motion.step(moving.constrained, kNoContact, 1.0, next);
+    FAIL() << "accepted";
+  } catch (const SolveError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("step of 1 s"));
+    EXPECT_THAT(error.what(), HasSubstr("at t = 1 s"));
+  }
+}
+
+TEST(GeneralizedAlpha, StepOfNoLengthChangesNothing) {
+  MovingChain moving(coarse_model());
+  moving.motion.restart(kNoContact, moving.constrained);
+  ChainState next;
+  const auto integrals = moving.motion.step(moving.constrained, kNoContact, 0.0, next);
+  EXPECT_EQ(next.q, moving.constrained.q);
+  EXPECT_EQ(next.v, moving.constrained.v);
+  EXPECT_EQ(integrals.impulse_n, 0.0);
+}
+
+TEST(GeneralizedAlpha, AShorterStepAfterALongOneKeepsTheOrder) {
+  // Steps of changing length, as events make them, against equal ones: errors fall by four.
+  const auto error = [](int divisions) {
+    MovingChain moving(coarse_model());
+    const auto force = push_at(moving.chain.tip(moving.state));
+    const auto run = [&](const std::vector<double>& pattern_s, int repeats) {
+      ChainState state = moving.constrained;
+      moving.motion.restart(force, state);
+      ChainState next = state;
+      for (int i = 0; i < repeats; ++i) {
+        for (const double h_s : pattern_s) {
+          moving.motion.step(state, force, h_s, next);
+          std::swap(state, next);
+        }
+      }
+      return moving.motion.tip(state);
+    };
+    const double h_s = 1e-6 / divisions;
+    const TipState uneven = run({1.6 * h_s, 0.4 * h_s, 1.0 * h_s}, 10 * divisions);
+    const TipState exact = run({3e-6 / 64}, 640);
+    return std::hypot(uneven.x_m - exact.x_m, uneven.y_m - exact.y_m);
+  };
+  EXPECT_GT(error(2) / error(4), std::pow(2.0, 1.9));
+}
+
+}  // namespace
+}  // namespace oblique::solver

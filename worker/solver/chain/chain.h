@@ -1,0 +1,116 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "worker/solver/chain/banded_cholesky.h"
+#include "worker/solver/chain/beam_element.h"
+#include "worker/solver/model/parameters.h"
+
+namespace oblique::solver {
+
+/// Positions and slopes of a chain, or their rates. `values[2 row + c]`, c = 0 for x, 1 for y.
+using Coordinates = std::vector<double>;
+
+struct ChainState {
+  double t_s = 0.0;  ///< since release
+  Coordinates q;     ///< [m] and [-]
+  Coordinates v;     ///< [m/s] and [1/s]
+  /// What an integrator remembers besides; empty where it remembers nothing.
+  Coordinates acceleration;  ///< q'' at t_s
+  /// (a - q'')/h of generalized-alpha: a_n stands for q'' a fixed part of a step away, so it is
+  /// kept per second and serves a next step of any length. Empty after a restart: the next step
+  /// finds it.
+  Coordinates algorithmic_offset_rate;
+  std::vector<double> multipliers_N;  ///< joint multipliers, x and y in turn
+};
+
+/// Tip position and velocity in the fixed frame, origin at O, y up.
+struct TipState {
+  double x_m;
+  double y_m;
+  double vx_m_s;
+  double vy_m_s;
+};
+
+/// The chain with joints eliminated: links share the position of a joint and keep slopes of their
+/// own. Immutable; what changes is ChainState.
+///
+/// Rows run along the chain so that each element owns four consecutive ones: the pin's position
+/// (row 0, held at zero), its slope, then position and slope of each node; at a joint the slope of
+/// the inner link, the position, the slope of the outer link. All matrices then have half-bandwidth
+/// 3. Both directions share one scalar matrix.
+class Chain {
+ public:
+  /// Throws InputError when `model` is outside its domain.
+  explicit Chain(const ModelParameters& model);
+
+  std::size_t rows() const { return rows_; }
+  std::size_t tip_row() const { return rows_ - 2; }
+  double gravity_m_s2() const { return gravity_m_s2_; }
+
+  /// Straight, horizontal, unstressed, at rest (paper, section 2).
+  ChainState at_rest() const;
+
+  /// The tables that the kernels of chain_kernel.h read.
+  ChainTables tables() const {
+    return {rows_,
+            tip_row(),
+            links(),
+            elements_.size() / links(),
+            constants_.data(),
+            mass_factor_.data(),
+            weight_N_.data(),
+            momentum_kg_.data(),
+            balance_.data()};
+  }
+  /// As in chain_kernel.h.
+  template <class Real>
+  void accelerations(const Real* q, const Real& ft_N, const Real& fn_N, Real* acceleration) const {
+    chain_accelerations(tables(), q, ft_N, fn_N, acceleration);
+  }
+
+  double kinetic_energy_J(const Coordinates& v) const;
+  double strain_energy_J(const Coordinates& q) const;
+  double gravity_energy_J(const Coordinates& q) const;
+  TipState tip(const ChainState& state) const;
+  PlanarVector<double> momentum_Ns(const Coordinates& v) const;
+  /// O first, then the outer end of each element.
+  std::vector<PlanarVector<double>> node_positions_m(const Coordinates& q) const;
+
+  std::size_t links() const { return first_element_.size(); }
+  /// Force on a link at its inner end (the pin or a joint), from the balance of its first node:
+  /// M q'' + dU/dq - Q there.
+  PlanarVector<double> inner_end_force(std::size_t link, const Coordinates& q,
+                                       const Coordinates& acceleration) const;
+
+  /// Highest angular frequency [rad/s] of the straight chain, the tip held by springs of
+  /// `tip_stiffness_N_m` in both directions. To a relative 1e-10.
+  double highest_frequency_rad_s(double tip_stiffness_N_m) const;
+
+ private:
+  struct Element {
+    std::size_t row[4];  ///< rows of p_i, s_i, p_j, s_j
+    double inverse_length;
+    double half_EA_length;  ///< EA l/2
+    double bending;         ///< 2 EI/l
+  };
+  void number_rows(const ModelParameters& model);
+  void balance_links(double tip_mass_kg);
+
+  std::size_t rows_;
+  double gravity_m_s2_;
+  double mass_per_length_;
+  std::vector<Element> elements_;
+  std::vector<std::size_t> first_element_;   ///< of each link
+  std::vector<ElasticConstants> constants_;  ///< of an element of each link
+  std::vector<double> weight_N_;     ///< generalised gravity along y [N] and [N m], one a row
+  std::vector<double> momentum_kg_;  ///< what a rate adds to the momentum [kg] and [kg m]
+  std::vector<LinkBalance> balance_;
+  BandedMatrix mass_;  ///< of the free rows; row 0 is a unit row
+  BandedCholesky mass_factor_;
+  BandedMatrix along_;  ///< stiffness of the straight chain along itself: axial and bending
+};
+
+}  // namespace oblique::solver

@@ -1,0 +1,204 @@
+#include "worker/solver/lanes/lane_batch.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "worker/solver/model/errors.h"
+
+namespace oblique::solver {
+
+LaneBatch::LaneBatch(const Chain& chain, const LaneKernel& kernel)
+    : chain_(chain),
+      motion_(chain),
+      stepper_(chain.tables(), kernel),
+      lanes_(kernel.lanes),
+      reactions_(chain.links(), kernel.lanes, kernel.reaction_loops),
+      accept_(kernel.lanes, 0),
+      column_(chain.at_rest()) {}
+
+void LaneBatch::solve(const Source& source, const Sink& sink, const Tracing& tracing) {
+  for (std::size_t lane = 0; lane < lanes_.size(); ++lane) {
+    fill(lane, source, tracing);
+  }
+  for (std::size_t busy = busy_lanes(); busy > 0; busy = busy_lanes()) {
+    stepper_.step();
+    for (std::size_t lane = 0; lane < lanes_.size(); ++lane) {
+      accept_[lane] = lanes_[lane].contact && advance(lane, sink) ? 1 : 0;
+    }
+    stepper_.settle(accept_);
+    reactions_.add(stepper_.mean_reactions_squared_N2());
+    for (std::size_t lane = 0; lane < lanes_.size(); ++lane) {
+      Lane& slot = lanes_[lane];
+      if (!slot.contact) {
+        if (!branches_.empty()) {
+          start_branch(lane);
+        }
+        continue;
+      }
+      if (accept_[lane] != 0 && slot.tracer) {
+        slot.tracer->accepted(*slot.contact, stored(lane));
+      }
+      if (!slot.followers.empty() && slot.contact->is_at_first_turn()) {
+        branch_off(lane);
+      }
+      if (slot.contact->finished()) {
+        finish(lane, busy, sink);
+      }
+      if (slot.contact->finished() || slot.failed) {
+        fill(lane, source, tracing);
+      }
+    }
+  }
+}
+
+std::size_t LaneBatch::busy_lanes() const {
+  return static_cast<std::size_t>(std::count_if(
+      lanes_.begin(), lanes_.end(), [](const Lane& lane) { return lane.contact.has_value(); }));
+}
+
+void LaneBatch::fill(std::size_t lane, const Source& source, const Tracing& tracing) {
+  Lane& slot = lanes_[lane];
+  slot.tracer.reset();
+  slot.contact.reset();
+  slot.failed = false;
+  if (!branches_.empty()) {
+    start_branch(lane);
+    return;
+  }
+  const auto next = upcoming_ ? std::exchange(upcoming_, std::nullopt) : source();
+  if (!next) {
+    stepper_.set_step(lane, 0.0);  // idle lanes stand still
+    return;
+  }
+  start(lane, *next);
+  if (tracing.sink) {
+    slot.tracer.emplace(motion_, tracing, slot.touch);
+    slot.tracer->accepted(*slot.contact, *next->touch);
+  } else {
+    take_followers(slot, source);
+  }
+}
+
+void LaneBatch::start(std::size_t lane, const ContactCase& next) {
+  Lane& slot = lanes_[lane];
+  slot.contact_case = next;
+  slot.started = Clock::now();
+  const ChainState& touch = *next.touch;
+  stepper_.load(lane, touch.q.data(), touch.v.data());
+  slot.touch = chain_.tip(touch);
+  slot.in = motion_.energies(touch);
+  reactions_.restart(lane);
+  slot.contact.emplace(next.parameters, slot.touch, next.steps);
+  stepper_.set_step(lane, slot.contact->trial_step_s());
+  stepper_.set_force(lane, slot.contact->force());
+}
+
+/// The state at touch of the case just started is in its lane by now: the source may move on.
+void LaneBatch::take_followers(Lane& slot, const Source& source) {
+  while (slot.followers.size() + 1 < kLargestGroup) {
+    upcoming_ = source();
+    if (!upcoming_ || upcoming_->group != slot.contact_case.group) {
+      return;
+    }
+    slot.followers.push_back(*upcoming_);
+    upcoming_.reset();
+  }
+}
+
+void LaneBatch::branch_off(std::size_t lane) {
+  Lane& slot = lanes_[lane];
+  const auto trunk = std::make_shared<const Trunk>(
+      Trunk{*slot.contact, stored(lane), slot.touch, slot.in, reactions_.taken_out(lane)});
+  for (const ContactCase& follower : slot.followers) {
+    branches_.push_back({trunk, follower});
+  }
+  slot.followers.clear();
+}
+
+void LaneBatch::start_branch(std::size_t lane) {
+  Lane& slot = lanes_[lane];
+  const Branch branch = std::move(branches_.front());
+  branches_.pop_front();
+  const Trunk& trunk = *branch.trunk;
+  slot.contact_case = branch.contact_case;
+  slot.started = Clock::now();
+  slot.touch = trunk.touch;
+  slot.in = trunk.in;
+  reactions_.put_in(lane, trunk.reactions);
+  slot.contact.emplace(
+      trunk.contact.branched(branch.contact_case.parameters.e_star, branch.contact_case.steps));
+  stepper_.load(lane, trunk.state.q.data(), trunk.state.v.data());
+  stepper_.set_step(lane, slot.contact->trial_step_s());
+  stepper_.set_force(lane, slot.contact->force());
+}
+
+bool LaneBatch::advance(std::size_t lane, const Sink& sink) {
+  Lane& slot = lanes_[lane];
+  const std::size_t tip = 2 * chain_.tip_row();
+  const TipState end{stepper_.trial_q(lane, tip), stepper_.trial_q(lane, tip + 1),
+                     stepper_.trial_v(lane, tip), stepper_.trial_v(lane, tip + 1)};
+  const int events = slot.contact->events();
+  const double h_s = slot.contact->trial_step_s();
+  bool is_accepted = false;
+  try {
+    is_accepted = slot.contact->judge(end, stepper_.integrals(lane));
+  } catch (const SolveError& error) {
+    slot.failed = true;
+    sink({slot.contact_case.tag, std::nullopt, error.what()});
+    for (const ContactCase& follower : slot.followers) {
+      sink({follower.tag, std::nullopt, error.what()});  // it would come the same way
+    }
+    slot.followers.clear();
+    return false;
+  }
+  if (is_accepted && h_s >= kShortestSpan * slot.contact_case.steps.compression_s) {
+    reactions_.set_span(lane, slot.contact->time_s(), h_s);
+  }
+  stepper_.set_step(lane, slot.contact->trial_step_s());
+  if (slot.contact->events() != events) {
+    stepper_.set_force(lane, slot.contact->force());
+  }
+  return is_accepted;
+}
+
+void LaneBatch::finish(std::size_t lane, std::size_t busy, const Sink& sink) {
+  Lane& slot = lanes_[lane];
+  ContactOutcome outcome{slot.contact_case.tag, std::nullopt, {}};
+  try {
+    CaseResult result = contact_result(*slot.contact, slot.contact_case.parameters, slot.touch,
+                                       slot.in, motion_.energies(stored(lane)));
+    result.reaction_peaks = reaction_peaks(lane);
+    result.solver.dt_s = slot.contact_case.steps.compression_s;
+    result.solver.steps = slot.contact->steps();
+    // The lanes share the time.
+    const std::chrono::duration<double> elapsed = Clock::now() - slot.started;
+    result.solver.wall_s = elapsed.count() / static_cast<double>(busy);
+    outcome.result = std::move(result);
+  } catch (const SolveError& error) {
+    outcome.error = error.what();
+  }
+  sink(std::move(outcome));
+}
+
+/// Of a contact that has just ended.
+std::vector<ReactionPeak> LaneBatch::reaction_peaks(std::size_t lane) {
+  if (!reactions_.rises_at_end(lane)) {
+    return reactions_.peaks(lane);
+  }
+  const Contact& contact = *lanes_[lane].contact;
+  ReactionPeaks with_end = reactions_.taken_out(lane);
+  std::vector<double> squared_N2;
+  for (const JointReaction& reaction : motion_.reactions(contact.force(), stored(lane))) {
+    squared_N2.push_back(reaction.x_N * reaction.x_N + reaction.y_N * reaction.y_N);
+  }
+  with_end.set_span(0, contact.time_s(), 0.0);
+  with_end.add(squared_N2.data());
+  return with_end.peaks(0);
+}
+
+const ChainState& LaneBatch::stored(std::size_t lane) {
+  stepper_.store(lane, column_.q.data(), column_.v.data());
+  return column_;
+}
+
+}  // namespace oblique::solver

@@ -1,0 +1,47 @@
+#pragma once
+
+#include "worker/solver/lanes/lane_pack.h"
+#include "worker/solver/lanes/lane_stepper.h"
+
+namespace oblique::solver {
+
+template <class Hardware>
+ReactionLoops reaction_loops() {
+  return {&ReactionKernel<Hardware>::mark_candidates, &ReactionKernel<Hardware>::shift};
+}
+
+/// Gathers the momenta of all links at both ends of a step.
+template <class Pack>
+struct MomentaOfStep {
+  LinkMomenta<Pack> before;
+  LinkMomenta<Pack> after;
+
+  void start(std::size_t row, const PlanarVector<Pack>& v) { before.add(row, v); }
+  void end(std::size_t row, const PlanarVector<Pack>& v) { after.add(row, v); }
+};
+
+/// One step of all lanes of `Pack`, a LanePack. Compiled once in each lane_kernel_*.cpp with the
+/// flags of its instruction set.
+template <class Pack>
+void step_lanes(const ChainTables& chain, const LaneArrays& arrays) {
+  const auto packs = [](auto* numbers) { return reinterpret_cast<Pack*>(numbers); };
+  const auto constant = [](const double* numbers) {
+    return reinterpret_cast<const Pack*>(numbers);
+  };
+  const Pack* f = constant(arrays.force);
+  const AffineContactForce<Pack> force{f[0], f[1], f[2], f[3], f[4], f[5], f[6]};
+  Pack* momenta_before = packs(arrays.momenta);
+  Pack* momenta_after = momenta_before + 2 * chain.links;
+  const ContactIntegrals<Pack> integrals =
+      pefrl_step(chain, force, *constant(arrays.h_s), constant(arrays.q), constant(arrays.v),
+                 packs(arrays.q_next), packs(arrays.v_next), packs(arrays.scratch),
+                 MomentaOfStep<Pack>{{chain, momenta_before}, {chain, momenta_after}});
+  packs(arrays.integrals)[0] = integrals.impulse_n;
+  packs(arrays.integrals)[1] = integrals.impulse_t;
+  packs(arrays.integrals)[2] = integrals.work_t;
+  mean_reactions_squared(chain, momenta_before, momenta_after,
+                         {integrals.impulse_t, integrals.impulse_n}, *constant(arrays.inverse_h_Hz),
+                         packs(arrays.reactions));
+}
+
+}  // namespace oblique::solver

@@ -1,0 +1,94 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace oblique::solver {
+
+/// A local maximum of F_n.
+struct Peak {
+  double t_s;   ///< since touch
+  double fn_N;  ///< normal force at t_s
+  double ft_N;  ///< largest |F_t| between the valleys of F_n on either side
+  bool major;   ///< kept when ripples are merged
+};
+
+/// A local maximum of |F_t|.
+struct TangentialPeak {
+  double t_s;
+  double ft_N;
+};
+
+enum class PhaseKind { kCompression, kRestitution };
+
+struct Phase {
+  PhaseKind kind;
+  double t0_s;
+  double t1_s;
+  double fn_end_N = 0.0;  ///< F_n at t1_s
+};
+
+/// A span in which P does not move.
+struct StickInterval {
+  double t0_s;
+  double t1_s;
+};
+
+/// Largest reaction at the pin or a joint during a contact: the force on the outer link. Between
+/// steps it is a parabola's.
+struct ReactionPeak {
+  double t_s;
+  double force_N;  ///< magnitude
+};
+
+/// Energy balance of one contact. Signs: what is lost is positive.
+struct ContactEnergy {
+  double kinetic_in_J;   ///< kinetic energy of the whole finger at touch
+  double friction_J;     ///< dissipated by friction at P
+  double restitution_J;  ///< dissipated by the hysteresis of the normal element
+  double kinetic_change_J;
+  double strain_change_J;
+  double gravity_change_J;
+  double exchanged_J;  ///< integral of |F_n V_n| + |F_t V_t|
+  double closure;      ///< what does not add up, relative to exchanged_J; never negative
+};
+
+struct SolverReport {
+  std::string integrator;
+  double dt_s;          ///< step in contact (in compression; restitution at low e* steps shorter)
+  std::int64_t steps;   ///< accepted steps in contact
+  double wall_s;        ///< wall time of the contact; not reproducible
+  std::string version;  ///< solver version
+};
+
+/// What solving one point gave. SI units; times count from touch unless named otherwise.
+struct CaseResult {
+  double H_m;
+  double mu;
+  double e_star;
+  double fall_time_s;
+  double impact_x_m;
+  double vt_in_m_s;  ///< tip velocity at touch, tangential (x)
+  double vn_in_m_s;  ///< tip velocity at touch, normal (y)
+  double duration_s;
+  double fn_peak_N;
+  double ft_peak_N;
+  std::vector<Peak> peaks;
+  std::vector<TangentialPeak> ft_peaks;
+  double impulse_n_Ns;
+  double impulse_t_Ns;
+  double slide_m;  ///< path length of P
+  double vt_out_m_s;
+  double vn_out_m_s;
+  std::string mode;        ///< order of states, as "SC SR sR sC sR"
+  std::string major_mode;  ///< the same with ripples merged
+  double stick_total_s;
+  std::vector<StickInterval> stick_intervals;
+  std::vector<Phase> phases;
+  std::vector<ReactionPeak> reaction_peaks;  ///< O first, then each joint
+  ContactEnergy energy;
+  SolverReport solver;
+};
+
+}  // namespace oblique::solver

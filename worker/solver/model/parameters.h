@@ -1,0 +1,82 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "worker/solver/model/errors.h"
+
+namespace oblique::solver {
+
+/// How the equations of motion are stepped (see README.md of this folder).
+enum class Integrator {
+  kExplicit,          ///< joints eliminated, PEFRL: explicit, symplectic, order 4
+  kGeneralizedAlpha,  ///< joints as constraints with multipliers, generalized-alpha: order 2
+};
+
+/// Every parameter of the finger and its solution but H, mu and e*. Defaults are the preset
+/// `paper`. Plain values; `validate` says whether they make a model.
+struct ModelParameters {
+  std::vector<double> lengths_m{0.4, 0.4, 0.4};  ///< one a link, from the pin O outwards
+  double E_Pa = 70e9;                            ///< Young's modulus
+  double A_m2 = 5.309e-4;                        ///< cross-section area
+  double I_m4 = 2.243e-8;                        ///< second moment of area
+  double rho_kg_m3 = 2700.0;                     ///< density
+  double g_m_s2 = 9.81;                          ///< gravity, downwards
+  int elements_per_link = 4;
+  double k_N_m = 2.7e7;      ///< normal contact stiffness in compression
+  double eta2 = 1.2463;      ///< ratio of normal to tangential contact stiffness
+  double tip_mass_kg = 0.0;  ///< point mass carried by the tip node
+  Integrator integrator = Integrator::kExplicit;
+  double spectral_radius = 0.9;  ///< of generalized-alpha at infinite frequency
+  double dt_s = 0.0;             ///< step in contact; 0: chosen for the integrator
+  double dt_fall_s = 0.0;        ///< step in the fall; 0: chosen for the integrator
+
+  bool operator==(const ModelParameters&) const = default;
+};
+
+/// One numeric parameter as users write it: in study files, as an axis, as a flag (`_` becomes
+/// `-`), and as a column of the table `models`.
+struct ParameterKey {
+  std::string_view name;
+  std::string_view unit;     ///< SI; empty when dimensionless
+  std::string_view meaning;  ///< one line, for help texts
+  std::string_view allowed;  ///< the range in words, for help and error messages
+  bool (*is_allowed)(double value);
+  double (*get)(const ModelParameters&);
+  void (*set)(ModelParameters&, double value);
+};
+
+/// All numeric model keys in the order that listings use. `links` and `length` act on `lengths_m`:
+/// `links` keeps the first length for every link, `length` sets all. The integrator is a key here
+/// too, by its number; `integrator_name` and `integrator_named` translate.
+std::span<const ParameterKey> model_keys();
+
+/// The model key called `name`, or nullptr.
+const ParameterKey* find_model_key(std::string_view name);
+
+/// The keys of a point: H, mu, e. Their get and set are null.
+std::span<const ParameterKey> point_keys();
+
+/// Throws InputError naming key, value and what is allowed, unless `value` is finite and allowed.
+void check_value(const ParameterKey& key, double value);
+
+/// Throws InputError for the first parameter outside its domain.
+void validate(const ModelParameters& model);
+
+/// Throws InputError unless H, mu and e are allowed and H is at most the length of the chain (the
+/// largest drop that any fall could reach).
+void validate_point(const ModelParameters& model, double H_m, double mu, double e_star);
+
+std::string_view integrator_name(Integrator integrator);
+/// Throws InputError for a name that is no integrator.
+Integrator integrator_named(std::string_view name);
+/// Names of all integrators, in the order of their numbers.
+std::span<const std::string_view> integrator_names();
+
+/// The model of a preset: `paper`, `printed` or `converged`. Throws InputError for other names.
+ModelParameters preset(std::string_view name);
+std::span<const std::string_view> preset_names();
+
+}  // namespace oblique::solver

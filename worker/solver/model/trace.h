@@ -1,0 +1,41 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace oblique::solver {
+
+/// One accepted instant of a contact, for traces.
+struct TraceRow {
+  double t_s;
+  double fn_N;
+  double ft_N;
+  double uy_m;  ///< normal deformation
+  double ux_m;  ///< tangential deformation
+  double xP_m;  ///< position of P
+  double vP_m_s;
+  double x_m;  ///< tip
+  double y_m;
+  double vt_m_s;
+  double vn_m_s;
+  std::string state;  ///< SC, SR, sC or sR
+  double kinetic_J;   ///< of the whole chain
+  double strain_J;    ///< 0 when unstressed
+  double gravity_J;   ///< 0 at the height of O
+  double momentum_x_Ns;
+  double momentum_y_Ns;
+  /// Forces on the outer link at O and at each joint, x and y in turn [N].
+  std::vector<double> reactions_N;
+  /// Positions of the nodes, O first and the tip last, x and y in turn [m]; empty unless asked for.
+  std::vector<double> nodes_m;
+};
+
+/// What is wanted of the time histories of a contact, and where they go.
+struct Tracing {
+  using Sink = std::function<void(const TraceRow&)>;
+  Sink sink;  ///< called at every accepted step, from touch to separation; may be none
+  bool with_shape = false;  ///< fill TraceRow::nodes_m
+};
+
+}  // namespace oblique::solver
