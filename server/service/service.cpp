@@ -24,22 +24,7 @@ Service::Service(ServiceSettings settings, Outbox& outbox, std::vector<StoredStu
                  Instant now)
     : settings_(std::move(settings)), outbox_(outbox), scheduler_(settings_.scheduler) {
   for (StoredStudy& study : studies) {
-    if (study.state == StudyState::kDone && study.settled.size() < study.table.size()) {
-      study.state = StudyState::kRunning;  // rows were lost or removed since: they are solved again
-    }
-    study_ids_.emplace(study.name, study.study_id);
-    studies_.emplace(study.study_id, Study{study.name,
-                                           study.table,
-                                           study.state,
-                                           study.created_at,
-                                           study.share,
-                                           study.failures,
-                                           study.attempts,
-                                           true,
-                                           0,
-                                           false,
-                                           {},
-                                           now.steady_ms});
+    studies_.restore(study, now.steady_ms);
     feed(StudyAdded{study.study_id, study.table, std::move(study.settled), study.failures.size(),
                     study.state == StudyState::kCancelled, study.state == StudyState::kPaused,
                     study.share, study.solver_version, std::move(study.attempts)},
@@ -99,10 +84,8 @@ void Service::perform(const Effect& effect, Instant now, protocol::Results* mess
                    now);
     forget(drop->worker);
   } else if (const auto* finished = std::get_if<StudyFinished>(&effect)) {
-    Study& study = studies_.at(finished->study);
-    if (study.state != StudyState::kDone) {
-      study.state = StudyState::kDone;
-      outbox_.note(Severity::kInfo, "study " + study.name + " is done");
+    if (studies_.finish(finished->study)) {
+      outbox_.note(Severity::kInfo, "study " + studies_.record(finished->study).name + " is done");
       write(SetStudyState{finished->study, StudyState::kDone, iso_8601(now)}, OfNothing{}, false);
     }
   }
@@ -136,7 +119,7 @@ void Service::define_study(const DefineStudy& effect) {
     return;
   }
   const std::string frame =
-      protocol::definition_around(effect.study, studies_.at(effect.study).table.recipe_bytes());
+      protocol::definition_around(effect.study, studies_.record(effect.study).table.recipe_bytes());
   note_delivery(effect.worker, peer->second,
                 outbox_.forward_to_worker(peer->second.identity, frame));
 }
@@ -161,9 +144,9 @@ std::uint64_t Service::settled_of(StudyId id) const {
 
 /// Before the points of `event` count as settled.
 void Service::note_rate(const ResultsStored& event, Instant now) {
-  const auto study = studies_.find(event.study);
-  if (study != studies_.end() && study->second.durable && !event.outcomes.empty()) {
-    rates_.note(event.study, settled_of(event.study), study->second.since_ms, now.steady_ms);
+  if (studies_.contains(event.study) && !event.outcomes.empty()) {
+    rates_.note(event.study, settled_of(event.study), studies_.record(event.study).since_ms,
+                now.steady_ms);
   }
 }
 

@@ -14,6 +14,7 @@
 #include "server/service/note_rate.h"
 #include "server/service/request_reader.h"
 #include "server/service/settled_rates.h"
+#include "server/service/study_states.h"
 #include "server/store/store.h"
 #include "server/store/writer.h"
 
@@ -143,22 +144,6 @@ class Service {
     Client client;
     std::size_t bytes;
   };
-  struct Study {
-    std::string name;
-    StudyTable table;
-    StudyState state;  // as last sent to the database
-    std::string created_at;
-    StudyShare share;
-    IntervalSet failures;  // points whose rows say failed
-    AttemptRuns attempts;  // of points that failed, also of those that were forgotten
-    bool durable = false;
-    std::uint32_t state_writes = 0;  // changes of state on their way to the disk
-    /// A change was refused. What the disk took of it may count again after a crash, until
-    /// something else is written in its place.
-    bool is_doubtful = false;
-    std::vector<Client> submitters;  // wait for it to be durable
-    std::int64_t since_ms = 0;       // nothing is known of its rate before
-  };
   // What a write stands for.
   struct OfResults {
     ResultsStored event;
@@ -170,7 +155,6 @@ class Service {
   };
   struct OfState {
     StudyId study;
-    StudyState before;
     StudyState state;
     Client client;
     bool submitted;  // the client asked for it by submitting the study again
@@ -218,7 +202,7 @@ class Service {
   void workers(const Client& client, const protocol::WorkersRequest& request, Instant now);
   protocol::StudyStatus status_of(StudyId id, Instant now) const;
   protocol::WorkerStatus status_of_worker(WorkerId id, const Peer& peer, Instant now) const;
-  std::string what_it_waits_for(const Study& study, const StudyCounts& counts) const;
+  std::string what_it_waits_for(StudyId id, const StudyCounts& counts) const;
 
   // service.cpp
   void feed(const Event& event, Instant now, protocol::Results* message = nullptr);
@@ -240,18 +224,17 @@ class Service {
   void stored(const Write& meaning, Instant now);
   void refused(const Write& meaning, const std::string& error);
   void lose_storage(const std::string& error, Instant now);
-  OfState* next_state_write(StudyId study);
 
   ServiceSettings settings_;
   Outbox& outbox_;
   Scheduler scheduler_;
   std::map<WorkerId, Peer> peers_;
   std::map<std::string, WorkerId, std::less<>> worker_ids_;  // by identity
-  std::map<StudyId, Study> studies_;
-  std::map<std::string, StudyId, std::less<>> study_ids_;  // by name
-  std::map<std::uint64_t, Write> writes_;                  // by ticket
-  std::size_t waiting_changes_ = 0;                        // writes that a client waits for
-  std::map<std::uint64_t, Query> queries_;                 // by ticket
+  StudyStates studies_;
+  std::map<StudyId, std::vector<Client>> submitters_;  // wait for the study to be durable
+  std::map<std::uint64_t, Write> writes_;              // by ticket
+  std::size_t waiting_changes_ = 0;                    // writes that a client waits for
+  std::map<std::uint64_t, Query> queries_;             // by ticket
   std::vector<Event> found_;        // while effects were carried out: workers gone or busy
   std::size_t unstored_bytes_ = 0;  // of all workers' results
   bool disk_is_behind_ = false;

@@ -156,9 +156,9 @@ void Service::submit(const Client& client, const ReadRequest& read, Instant now)
     reply_error(client, reason);
     return;
   }
-  const auto known = study_ids_.find(request.name());
-  const StudyShare share = asked_share(
-      request, known == study_ids_.end() ? StudyShare{} : studies_.at(known->second).share);
+  const auto known = studies_.find(request.name());
+  const StudyShare share =
+      asked_share(request, known ? studies_.record(*known).share : StudyShare{});
   if (const std::string reason = objection_to_share(share); !reason.empty()) {
     reply_error(client, reason);
     return;
@@ -167,46 +167,32 @@ void Service::submit(const Client& client, const ReadRequest& read, Instant now)
     reply_error(client, read.objection);
     return;
   }
-  if (known != study_ids_.end()) {
-    const Study& study = studies_.at(known->second);
+  if (known) {
+    const StudyRecord& study = studies_.record(*known);
     if (study.table.recipe_bytes() != read.table.recipe_bytes()) {
       reply_error(client, "there is a study called \"" + request.name() +
                               "\" with other points or another model: give this one another name, "
                               "or use another database");
       return;
     }
-    if (study.durable && !(study.share == share)) {
-      write(SetStudyShare{known->second, share}, OfShare{known->second, share, client}, true);
+    if (studies_.is_durable(*known) && !(study.share == share)) {
+      write(SetStudyShare{*known, share}, OfShare{*known, share, client}, true);
     } else {
-      continue_study(client, known->second, now);
+      continue_study(client, *known, now);
     }
     return;
   }
   const StudyId id = ++settings_.last_study_id;
   const std::string created_at = iso_8601(now);
-  study_ids_.emplace(request.name(), id);
-  studies_.emplace(id, Study{request.name(),
-                             read.table,
-                             StudyState::kRunning,
-                             created_at,
-                             share,
-                             {},
-                             {},
-                             false,
-                             0,
-                             false,
-                             {client},
-                             now.steady_ms});
+  studies_.add(id, {request.name(), read.table, created_at, share, {}, {}, now.steady_ms});
+  submitters_[id].push_back(client);
   write(AddStudy{id, request.name(), read.table, created_at, share}, OfStudy{id}, true);
 }
 
 void Service::continue_study(const Client& client, StudyId id, Instant now) {
-  Study& study = studies_.at(id);
-  const bool rests = study.state == StudyState::kCancelled || study.state == StudyState::kPaused;
-  if (!study.durable) {
-    study.submitters.push_back(client);
-  } else if (rests ||
-             ((study.state_writes > 0 || study.is_doubtful) && study.state != StudyState::kDone)) {
+  if (!studies_.is_durable(id)) {
+    submitters_[id].push_back(client);
+  } else if (studies_.needs_write(id, StudyState::kRunning)) {
     set_state(client, id, StudyState::kRunning, true, now);
   } else {
     reply_submitted(client, id, false);
@@ -215,22 +201,17 @@ void Service::continue_study(const Client& client, StudyId id, Instant now) {
 
 void Service::set_state(const Client& client, StudyId id, StudyState state, bool submitted,
                         Instant now) {
-  Study& study = studies_.at(id);
-  const StudyState before = study.state;
-  study.state = state;
-  ++study.state_writes;
-  write(SetStudyState{id, state, iso_8601(now)}, OfState{id, before, state, client, submitted},
-        true);
+  studies_.change(id, state);
+  write(SetStudyState{id, state, iso_8601(now)}, OfState{id, state, client, submitted}, true);
 }
 
 void Service::change(const Client& client, const protocol::ChangeRequest& request, Instant now) {
-  const auto known = study_ids_.find(request.study());
-  if (known == study_ids_.end() || !studies_.at(known->second).durable) {
+  const auto known = studies_.find_durable(request.study());
+  if (!known) {
     reply_error(client, unknown_study(request.study()));
     return;
   }
-  const StudyId id = known->second;
-  const Study& study = studies_.at(id);
+  const StudyId id = *known;
   StudyState wanted{};
   switch (request.change()) {
     case protocol::STUDY_CHANGE_CANCEL:
@@ -238,7 +219,8 @@ void Service::change(const Client& client, const protocol::ChangeRequest& reques
       break;
     case protocol::STUDY_CHANGE_PAUSE:
       // A cancelled study rests already.
-      wanted = study.state == StudyState::kCancelled ? study.state : StudyState::kPaused;
+      wanted = studies_.state(id) == StudyState::kCancelled ? StudyState::kCancelled
+                                                            : StudyState::kPaused;
       break;
     case protocol::STUDY_CHANGE_RESUME:
       wanted = StudyState::kRunning;
@@ -250,8 +232,7 @@ void Service::change(const Client& client, const protocol::ChangeRequest& reques
       reply_error(client, "the server does not know this change of a study");
       return;
   }
-  if (study.state == StudyState::kDone ||
-      (study.state == wanted && study.state_writes == 0 && !study.is_doubtful)) {
+  if (!studies_.needs_write(id, wanted)) {
     reply_changed(client, id, 0, now);
     return;
   }
@@ -259,13 +240,13 @@ void Service::change(const Client& client, const protocol::ChangeRequest& reques
 }
 
 void Service::retry(const Client& client, StudyId id, Instant now) {
-  const IntervalSet& failures = studies_.at(id).failures;
+  const IntervalSet& failures = studies_.record(id).failures;
   if (failures.empty()) {
     reply_changed(client, id, 0, now);
     return;
   }
   try {
-    (void)studies_.at(id).table.get();
+    (void)studies_.record(id).table.get();
   } catch (const std::runtime_error& error) {
     reply_error(client, "the recipe of the study cannot be read: " + std::string(error.what()));
     return;

@@ -22,40 +22,37 @@ void Service::status(const Client& client, const protocol::StatusRequest& reques
   auto& fields = *reply.mutable_status();
   fields.set_workers(static_cast<std::uint32_t>(scheduler_.workers()));
   if (!request.study().empty()) {
-    const auto known = study_ids_.find(request.study());
-    if (known == study_ids_.end() || !studies_.at(known->second).durable) {
+    const auto known = studies_.find_durable(request.study());
+    if (!known) {
       reply_error(client, unknown_study(request.study()));
       return;
     }
-    *fields.add_studies() = status_of(known->second, now);
+    *fields.add_studies() = status_of(*known, now);
     outbox_.to_client(client.identity, reply);
     return;
   }
   const std::size_t most = page_size(request.limit(), settings_.largest_page);
   std::size_t bytes = 0;
-  for (auto study = studies_.upper_bound(request.after_study_id()); study != studies_.end();
-       ++study) {
-    if (!study->second.durable) {
-      continue;
-    }
+  for (auto id = studies_.durable_after(request.after_study_id()); id;
+       id = studies_.durable_after(*id)) {
     if (static_cast<std::size_t>(fields.studies_size()) == most || bytes > kMostPageBytes) {
       fields.set_next_after(fields.studies(fields.studies_size() - 1).study_id());
       break;
     }
-    *fields.add_studies() = status_of(study->first, now);
+    *fields.add_studies() = status_of(*id, now);
     bytes += fields.studies(fields.studies_size() - 1).ByteSizeLong();
   }
   outbox_.to_client(client.identity, reply);
 }
 
 protocol::StudyStatus Service::status_of(StudyId id, Instant now) const {
-  const Study& study = studies_.at(id);
+  const StudyRecord& study = studies_.record(id);
   const StudyCounts counts = scheduler_.study(id);
   const std::uint64_t settled = counts.solved + counts.failed;
   protocol::StudyStatus status;
   status.set_study_id(id);
   status.set_name(study.name);
-  status.set_state(settled == counts.points ? "done" : state_name(study.state));
+  status.set_state(settled == counts.points ? "done" : state_name(studies_.state(id)));
   status.set_points(counts.points);
   status.set_solved(counts.solved);
   status.set_failed(counts.failed);
@@ -65,15 +62,16 @@ protocol::StudyStatus Service::status_of(StudyId id, Instant now) const {
   status.set_weight(study.share.weight);
   status.set_mixes_versions(study.share.mixes_versions);
   status.set_solver_version(counts.solver_version);
-  status.set_waits_for(what_it_waits_for(study, counts));
-  if (study.state == StudyState::kRunning) {
+  status.set_waits_for(what_it_waits_for(id, counts));
+  if (studies_.state(id) == StudyState::kRunning) {
     status.set_points_per_s(rates_.points_per_s(id, settled, now.steady_ms));
   }
   return status;
 }
 
-std::string Service::what_it_waits_for(const Study& study, const StudyCounts& counts) const {
-  if (study.state != StudyState::kRunning || counts.solved + counts.failed == counts.points) {
+std::string Service::what_it_waits_for(StudyId id, const StudyCounts& counts) const {
+  if (studies_.state(id) != StudyState::kRunning ||
+      counts.solved + counts.failed == counts.points) {
     return {};
   }
   if (!storage_fault_.empty()) {

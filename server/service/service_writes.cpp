@@ -18,8 +18,7 @@ void Service::write_results(const StoreResults& effect, protocol::Results& messa
   ++peer.unstored_messages;
   peer.unstored_bytes += bytes;
   unstored_bytes_ += bytes;
-  const auto study = studies_.find(effect.study);
-  const bool any = !effect.accepted.empty() && study != studies_.end();
+  const bool any = !effect.accepted.empty() && studies_.contains(effect.study);
   if (any && !peer.has_row) {
     // Whoever only comes and goes leaves no row.
     peer.has_row = true;
@@ -27,7 +26,7 @@ void Service::write_results(const StoreResults& effect, protocol::Results& messa
                     peer.instruction_set, peer.joined_at},
           OfNothing{}, false);
   }
-  AddResults change{effect.study,         any ? study->second.table.get() : nullptr,
+  AddResults change{effect.study,         any ? studies_.record(effect.study).table.get() : nullptr,
                     effect.worker,        peer.solver_version,
                     peer.instruction_set, message.attempt(),
                     iso_8601(now),        {}};
@@ -42,10 +41,10 @@ void Service::write_results(const StoreResults& effect, protocol::Results& messa
 
 void Service::write_failure(const StoreFailure& effect, Instant now) {
   outbox_.note(Severity::kWarning, "point " + std::to_string(effect.point) + " of study " +
-                                       studies_.at(effect.study).name +
+                                       studies_.record(effect.study).name +
                                        " failed: " + effect.reason);
   AddResults change{effect.study,
-                    studies_.at(effect.study).table.get(),
+                    studies_.record(effect.study).table.get(),
                     0,
                     {},
                     {},
@@ -103,9 +102,7 @@ void Service::stored(const Write& meaning, Instant now) {
   if (const auto* results = std::get_if<OfResults>(&meaning)) {
     for (const PointOutcome& outcome : results->event.outcomes) {
       if (outcome.failed) {
-        Study& study = studies_.at(results->event.study);
-        study.failures.insert(outcome.point);
-        study.attempts.set({outcome.point, outcome.point + 1}, results->attempt);
+        studies_.point_failed(results->event.study, outcome.point, results->attempt);
       }
     }
     unstored_bytes_ -= results->bytes;
@@ -116,20 +113,19 @@ void Service::stored(const Write& meaning, Instant now) {
     note_rate(results->event, now);
     feed(results->event, now);
   } else if (const auto* added = std::get_if<OfStudy>(&meaning)) {
-    Study& study = studies_.at(added->study);
-    study.durable = true;
-    study.since_ms = now.steady_ms;
+    studies_.added(added->study, now.steady_ms);
+    const StudyRecord& study = studies_.record(added->study);
     outbox_.note(Severity::kInfo, "study " + study.name + " of " +
                                       std::to_string(study.table.size()) + " points begins");
     feed(StudyAdded{added->study, study.table, {}, 0, false, false, study.share}, now);
     bool created = true;
-    for (const Client& client : std::exchange(study.submitters, {})) {
+    for (const Client& client : std::exchange(submitters_[added->study], {})) {
       reply_submitted(client, added->study, std::exchange(created, false));
     }
+    submitters_.erase(added->study);
   } else if (const auto* state = std::get_if<OfState>(&meaning)) {
-    --studies_.at(state->study).state_writes;
-    studies_.at(state->study).is_doubtful = false;
-    outbox_.note(Severity::kInfo, "study " + studies_.at(state->study).name +
+    studies_.changed(state->study, state->state);
+    outbox_.note(Severity::kInfo, "study " + studies_.record(state->study).name +
                                       (state->state == StudyState::kRunning
                                            ? std::string(" goes on")
                                            : " is " + std::string(state_name(state->state))));
@@ -146,55 +142,29 @@ void Service::stored(const Write& meaning, Instant now) {
       reply_changed(state->client, state->study, 0, now);
     }
   } else if (const auto* share = std::get_if<OfShare>(&meaning)) {
-    studies_.at(share->study).share = share->share;
+    studies_.set_share(share->study, share->share);
     feed(StudyShareChanged{share->study, share->share}, now);
     continue_study(share->client, share->study, now);
   } else if (const auto* forgotten = std::get_if<OfFailures>(&meaning)) {
-    Study& study = studies_.at(forgotten->study);
-    forgotten->points.for_each(
-        [&](const Interval& run) { study.failures.erase(run.begin, run.end); });
-    if (study.state == StudyState::kDone) {
-      study.state = StudyState::kRunning;
-    }
+    studies_.forget_failures(forgotten->study, forgotten->points, now.steady_ms);
+    const StudyRecord& study = studies_.record(forgotten->study);
     outbox_.note(Severity::kInfo, "study " + study.name + " tries its failed points again: " +
                                       std::to_string(forgotten->points.size()));
     rates_.forget(forgotten->study);  // fewer points are settled now: no rate can be had of that
-    study.since_ms = now.steady_ms;
     feed(FailuresForgotten{forgotten->study, forgotten->points, study.attempts}, now);
     reply_changed(forgotten->client, forgotten->study, forgotten->points.size(), now);
   }
 }
 
-/// The first change of the study's state that is on its way; none: null.
-Service::OfState* Service::next_state_write(StudyId study) {
-  for (auto& [ticket, write] : writes_) {
-    auto* state = std::get_if<OfState>(&write);
-    if (state != nullptr && state->study == study) {
-      return state;
-    }
-  }
-  return nullptr;
-}
-
 void Service::refused(const Write& meaning, const std::string& error) {
   if (const auto* added = std::get_if<OfStudy>(&meaning)) {
-    const auto study = studies_.find(added->study);
-    for (const Client& client : study->second.submitters) {
+    for (const Client& client : std::exchange(submitters_[added->study], {})) {
       reply_error(client, "the study was not stored: " + error);
     }
-    study_ids_.erase(study->second.name);
-    studies_.erase(study);
+    submitters_.erase(added->study);
+    studies_.remove(added->study);
   } else if (const auto* state = std::get_if<OfState>(&meaning)) {
-    Study& study = studies_.at(state->study);
-    --study.state_writes;
-    study.is_doubtful = true;
-    OfState* later = study.state_writes > 0 ? next_state_write(state->study) : nullptr;
-    if (later != nullptr) {
-      // That one is on its way still, and stands now on what was before this one.
-      later->before = state->before;
-    } else if (study.state == state->state) {
-      study.state = state->before;
-    }
+    studies_.refused(state->study);
     reply_error(state->client, "the change was not stored, the study is as before: " + error);
   } else if (const auto* share = std::get_if<OfShare>(&meaning)) {
     reply_error(share->client, "the change was not stored, the study is as before: " + error);

@@ -1,0 +1,107 @@
+#include "server/service/study_states.h"
+
+#include <utility>
+
+namespace oblique::server {
+
+void StudyStates::restore(const StoredStudy& stored, std::int64_t now_ms) {
+  const bool lacks_rows = stored.settled.size() < stored.table.size();
+  const StudyState state =
+      stored.state == StudyState::kDone && lacks_rows ? StudyState::kRunning : stored.state;
+  add(stored.study_id, {stored.name, stored.table, stored.created_at, stored.share, stored.failures,
+                        stored.attempts, now_ms});
+  Study& study = studies_.at(stored.study_id);
+  study.state = state;
+  study.durable_state = state;
+  study.is_durable = true;
+}
+
+void StudyStates::add(StudyId id, StudyRecord record) {
+  ids_.emplace(record.name, id);
+  studies_.emplace(id, Study{std::move(record)});
+}
+
+void StudyStates::added(StudyId id, std::int64_t now_ms) {
+  Study& study = studies_.at(id);
+  study.is_durable = true;
+  study.record.since_ms = now_ms;
+}
+
+void StudyStates::remove(StudyId id) {
+  const auto study = studies_.find(id);
+  ids_.erase(study->second.record.name);
+  studies_.erase(study);
+}
+
+std::optional<StudyId> StudyStates::find(std::string_view name) const {
+  const auto known = ids_.find(name);
+  return known == ids_.end() ? std::nullopt : std::optional(known->second);
+}
+
+std::optional<StudyId> StudyStates::find_durable(std::string_view name) const {
+  const auto id = find(name);
+  return id && is_durable(*id) ? id : std::nullopt;
+}
+
+std::optional<StudyId> StudyStates::durable_after(StudyId id) const {
+  auto study = studies_.upper_bound(id);
+  while (study != studies_.end() && !study->second.is_durable) {
+    ++study;
+  }
+  return study == studies_.end() ? std::nullopt : std::optional(study->first);
+}
+
+bool StudyStates::needs_write(StudyId id, StudyState wanted) const {
+  const Study& study = studies_.at(id);
+  return study.state != StudyState::kDone &&
+         (study.state != wanted || study.on_their_way > 0 || study.is_doubtful);
+}
+
+void StudyStates::change(StudyId id, StudyState state) {
+  Study& study = studies_.at(id);
+  if (study.on_their_way == 0) {
+    study.durable_state = study.state;
+  }
+  study.state = state;
+  ++study.on_their_way;
+}
+
+void StudyStates::changed(StudyId id, StudyState state) {
+  Study& study = studies_.at(id);
+  study.durable_state = study.state == StudyState::kDone ? StudyState::kDone : state;
+  study.is_doubtful = false;
+  --study.on_their_way;
+}
+
+void StudyStates::refused(StudyId id) {
+  Study& study = studies_.at(id);
+  study.is_doubtful = true;
+  --study.on_their_way;
+  if (study.on_their_way == 0) {
+    study.state = study.durable_state;
+  }
+}
+
+bool StudyStates::finish(StudyId id) {
+  Study& study = studies_.at(id);
+  study.durable_state = StudyState::kDone;
+  return std::exchange(study.state, StudyState::kDone) != StudyState::kDone;
+}
+
+void StudyStates::point_failed(StudyId id, std::uint64_t point, std::uint32_t attempt) {
+  StudyRecord& record = studies_.at(id).record;
+  record.failures.insert(point);
+  record.attempts.set({point, point + 1}, attempt);
+}
+
+void StudyStates::forget_failures(StudyId id, const IntervalSet& points, std::int64_t now_ms) {
+  Study& study = studies_.at(id);
+  points.for_each([&](const Interval& run) { study.record.failures.erase(run.begin, run.end); });
+  if (study.state == StudyState::kDone) {
+    study.state = StudyState::kRunning;
+    study.durable_state = StudyState::kRunning;
+  }
+  study.record.since_ms = now_ms;
+}
+
+}  // namespace oblique::server

@@ -1,0 +1,91 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "server/scheduler/attempt_runs.h"
+#include "server/scheduler/interval_set.h"
+#include "server/scheduler/study_table.h"
+#include "server/scheduler/worker_processes.h"
+#include "server/store/changes.h"
+#include "server/store/store.h"
+
+namespace oblique::server {
+
+/// What is known of a study beside the points that the scheduler has.
+struct StudyRecord {
+  std::string name;
+  StudyTable table;
+  std::string created_at;
+  StudyShare share;         ///< as the database has it
+  IntervalSet failures;     ///< points whose rows say failed
+  AttemptRuns attempts;     ///< of points that failed, also of those that were forgotten
+  std::int64_t since_ms{};  ///< nothing is known of its rate before
+};
+
+/// The studies by number and name, and of each what the disk makes of its state: what is durable,
+/// what is on its way there, and what is doubtful, for a change that was refused may count again
+/// after a crash until something else is written in its place. Nothing here writes: it is told what
+/// was handed over, and what became of it, in the order of handing over. Unless said otherwise a
+/// study must be known, or std::out_of_range is thrown.
+class StudyStates {
+ public:
+  /// A study of the database. One that is called done and lacks rows runs again.
+  void restore(const StoredStudy& study, std::int64_t now_ms);
+
+  /// A new study, running, is handed over. Neither its number nor its name may be known.
+  void add(StudyId id, StudyRecord record);
+  /// It is durable.
+  void added(StudyId id, std::int64_t now_ms);
+  /// It was refused, and is unknown from now on.
+  void remove(StudyId id);
+
+  /// The study of that name, durable or on its way.
+  std::optional<StudyId> find(std::string_view name) const;
+  /// The same when it is durable.
+  std::optional<StudyId> find_durable(std::string_view name) const;
+  /// The durable study of the lowest number above this one.
+  std::optional<StudyId> durable_after(StudyId id) const;
+  bool contains(StudyId id) const { return studies_.contains(id); }
+  bool is_durable(StudyId id) const { return studies_.at(id).is_durable; }
+  const StudyRecord& record(StudyId id) const { return studies_.at(id).record; }
+
+  /// As it was handed over last: what the study becomes unless that is refused.
+  StudyState state(StudyId id) const { return studies_.at(id).state; }
+  /// Whether that state must be written to be sure of it. One that is there already must, while
+  /// another one is on its way or doubtful. What is done takes no other state.
+  bool needs_write(StudyId id, StudyState wanted) const;
+  /// A state is handed over, ...
+  void change(StudyId id, StudyState state);
+  /// ... is durable, ...
+  void changed(StudyId id, StudyState state);
+  /// ... or was refused: the latest durable state holds, or what is on its way still.
+  void refused(StudyId id);
+
+  /// All points are settled. False when that is known.
+  bool finish(StudyId id);
+
+  void set_share(StudyId id, const StudyShare& share) { studies_.at(id).record.share = share; }
+  /// It is durable that the point failed in that attempt.
+  void point_failed(StudyId id, std::uint64_t point, std::uint32_t attempt);
+  /// It is durable that these failures are forgotten: a study that was done runs.
+  void forget_failures(StudyId id, const IntervalSet& points, std::int64_t now_ms);
+
+ private:
+  struct Study {
+    StudyRecord record;
+    StudyState state = StudyState::kRunning;
+    StudyState durable_state = StudyState::kRunning;  // while others are on their way
+    std::uint32_t on_their_way = 0;                   // states
+    bool is_doubtful = false;
+    bool is_durable = false;
+  };
+
+  std::map<StudyId, Study> studies_;
+  std::map<std::string, StudyId, std::less<>> ids_;  // by name
+};
+
+}  // namespace oblique::server
