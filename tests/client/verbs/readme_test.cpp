@@ -1,5 +1,6 @@
 #include <fstream>
 #include <iterator>
+#include <regex>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -28,9 +29,22 @@ std::string shown(const std::string& text, const std::string& command) {
 TEST(Readme, ShowsTheTableThatItsCommandPrints) {
   const auto printed = oblique({"paper", "--format", "markdown"});
   ASSERT_EQ(printed.exit_code, 0) << printed.err;
-  EXPECT_EQ(shown(contents("README.md"), "oblique paper --format markdown"),
+  EXPECT_EQ(shown(contents("client/paper/README.md"), "oblique paper --format markdown"),
             "\n" + printed.out + "\n")
-      << ".ci/tables writes the tables into README.md";
+      << ".ci/tables writes the tables into client/paper/README.md";
+}
+
+TEST(Readme, SummarisesTheComparisonInTheNumbersThatItsCommandPrints) {
+  const auto printed = oblique({"paper", "--format", "markdown"});
+  std::smatch number;
+  ASSERT_TRUE(std::regex_search(
+      printed.out, number,
+      std::regex(
+          "(\\d+) trustworthy published numbers: rms difference (\\S+ %), largest (\\S+ %)")));
+  const std::string summary = contents("README.md");
+  EXPECT_NE(summary.find("The " + number.str(1) + " trustworthy numbers"), std::string::npos);
+  EXPECT_NE(summary.find("rms difference of " + number.str(2)), std::string::npos);
+  EXPECT_NE(summary.find("the largest, " + number.str(3)), std::string::npos);
 }
 
 TEST(Readme, DescribesEveryColumn) {
