@@ -3,25 +3,21 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cerrno>
 #include <chrono>
-#include <deque>
-#include <mutex>
 #include <optional>
 #include <stdexcept>
-#include <system_error>
 #include <utility>
 #include <variant>
 
 #include <arpa/inet.h>
 #include <poll.h>
-#include <sys/eventfd.h>
 
 #include <spdlog/spdlog.h>
 
 #include "proto/frames.h"
 #include "server/file_system.h"
 #include "server/network/network.h"
+#include "server/report_box.h"
 
 namespace oblique::server {
 namespace {
@@ -44,46 +40,6 @@ Instant now() {
   return {duration_cast<milliseconds>(Clock::now().time_since_epoch()).count(),
           duration_cast<milliseconds>(std::chrono::system_clock::now().time_since_epoch()).count()};
 }
-
-/// Reports of the other threads, kept for the loop, which a descriptor wakes.
-class ReportBox {
- public:
-  using Item = std::variant<WriteReport, QueryReport, ReadReport>;
-
-  ReportBox() : woken_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
-    if (!woken_.is_open()) {
-      throw std::system_error(errno, std::generic_category(), "eventfd");
-    }
-  }
-
-  /// From any thread.
-  template <typename Reports>
-  void put(Reports reports) {
-    {
-      const std::lock_guard lock(mutex_);
-      for (auto& report : reports) {
-        items_.emplace_back(std::move(report));
-      }
-    }
-    static_cast<void>(eventfd_write(woken_.number(), 1));
-  }
-
-  /// From the loop: everything put so far.
-  std::deque<Item> take() {
-    eventfd_t count = 0;
-    static_cast<void>(eventfd_read(woken_.number(), &count));
-    const std::lock_guard lock(mutex_);
-    return std::exchange(items_, {});
-  }
-
-  /// Readable when there is something to take.
-  int descriptor() const { return woken_.number(); }
-
- private:
-  Descriptor woken_;
-  std::mutex mutex_;
-  std::deque<Item> items_;  // guarded by mutex_
-};
 
 /// Throws StorageError for a path where a database would be in danger.
 const std::string& safe_path(const LoopSettings& settings) {

@@ -17,7 +17,7 @@ using nlohmann::ordered_json;
 using solver::fixed_number;
 using solver::readable_number;
 
-constexpr double kMicro = 1e6;
+constexpr double kMicroseconds = 1e6;
 constexpr double kPercent = 100.0;
 /// PEFRL and the cubic elements are of order 4; generalized-alpha is of order 2.
 constexpr double kHighOrder = 4.0;
@@ -252,7 +252,7 @@ void print_modes(std::ostream& out, const Refinement& refinement) {
   for (std::size_t i = 0; i < refinement.levels.size(); ++i) {
     const auto& result = refinement.result(i);
     out << fmt::format("  {:<8} {}  ({} us steps)\n", refinement.levels[i].level.name,
-                       result.major_mode, readable_number(result.solver.dt_s * kMicro, 3));
+                       result.major_mode, readable_number(result.solver.dt_s * kMicroseconds, 3));
   }
 }
 

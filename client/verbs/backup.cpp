@@ -10,7 +10,7 @@
 namespace oblique::client {
 namespace {
 
-constexpr const char* kExamples = R"(Examples:
+constexpr const char* kBackupExamples = R"(Examples:
   oblique backup monday.db
   oblique backup /mnt/safe/friction.db --db friction.db
   oblique backup saved.db --db damaged.db --salvage
@@ -47,7 +47,7 @@ int backup(const BackupFlags& flags) {
 void add_backup(CLI::App& app, Command& command) {
   auto flags = std::make_shared<BackupFlags>();
   auto* verb = app.add_subcommand("backup", "Copy a database, also while a server writes to it");
-  verb->footer(kExamples);
+  verb->footer(kBackupExamples);
   verb->add_option("FILE", flags->copy, "the copy; must not exist")->required()->type_name("");
   verb->add_option("--db", flags->database.file, "the database")
       ->type_name("FILE")

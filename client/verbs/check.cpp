@@ -9,7 +9,7 @@
 namespace oblique::client {
 namespace {
 
-constexpr const char* kExamples = R"(Examples:
+constexpr const char* kCheckExamples = R"(Examples:
   oblique check
   oblique check --db friction.db
 
@@ -39,7 +39,7 @@ int check(const DatabaseSettings& database) {
 void add_check(CLI::App& app, Command& command) {
   auto database = std::make_shared<DatabaseSettings>();
   auto* verb = app.add_subcommand("check", "Look for damage in a database");
-  verb->footer(kExamples);
+  verb->footer(kCheckExamples);
   verb->add_option("--db", database->file, "the database")
       ->type_name("FILE")
       ->capture_default_str();

@@ -17,7 +17,7 @@
 namespace oblique::client {
 namespace {
 
-constexpr const char* kExamples = R"(Examples:
+constexpr const char* kConvergeExamples = R"(Examples:
   oblique converge --H 1 --mu 0.4 --e 1
   oblique converge --H 1 --mu 0.6 --e 0.8 --finest 16 --json
   oblique converge --H 1 --mu 0.4 --e 1 --integrator generalized-alpha
@@ -168,7 +168,7 @@ void add_converge(CLI::App& app, Command& command) {
   auto flags = std::make_shared<ConvergeFlags>();
   auto* verb = app.add_subcommand(
       "converge", "Refine mesh and step of one point and estimate the error of every output");
-  verb->footer(kExamples);
+  verb->footer(kConvergeExamples);
   verb->add_flag("--json", flags->json, "print one JSON object (SI units)");
   verb->add_option("--coarsest", flags->coarsest, "elements a link of the coarsest mesh")
       ->check(CLI::Range(1, kMostElements))

@@ -19,7 +19,7 @@ namespace {
 using solver::fixed_number;
 using solver::readable_number;
 using solver::signed_number;
-constexpr const char* kExamples = R"(Examples:
+constexpr const char* kFitExamples = R"(Examples:
   oblique fit
   oblique fit --from paper
   oblique fit --elements-per-link 5       the same on another mesh, which fits far worse
@@ -122,7 +122,7 @@ void add_fit(CLI::App& app, Command& command) {
   auto flags = std::make_shared<FitFlags>();
   auto* verb = app.add_subcommand(
       "fit", "Recover the parameters that the paper does not print from the numbers it does");
-  verb->footer(kExamples);
+  verb->footer(kFitExamples);
   verb->add_option("--from", flags->from, "preset to start from: " + joined(solver::preset_names()))
       ->type_name("NAME")
       ->capture_default_str();

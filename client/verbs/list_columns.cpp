@@ -10,7 +10,7 @@
 namespace oblique::client {
 namespace {
 
-constexpr const char* kExamples = R"(Examples:
+constexpr const char* kListColumnsExamples = R"(Examples:
   oblique columns
   oblique columns --format csv
 
@@ -40,7 +40,7 @@ int list_columns(const std::string& format) {
 void add_columns(CLI::App& app, Command& command) {
   auto format = std::make_shared<std::string>("table");
   auto* verb = app.add_subcommand("columns", "Name, unit and meaning of every input and output");
-  verb->footer(kExamples);
+  verb->footer(kListColumnsExamples);
   add_format_flag(*verb, *format);
   verb->callback([format, &command] { command = [format] { return list_columns(*format); }; });
 }

@@ -17,7 +17,7 @@
 namespace oblique::client {
 namespace {
 
-constexpr const char* kExamples = R"(Examples:
+constexpr const char* kPaperExamples = R"(Examples:
   oblique paper
   oblique paper --preset converged --modes  where the paper's modes come of its mesh
   oblique paper --preset printed
@@ -71,7 +71,7 @@ int paper(const PaperFlags& flags) {
 void add_paper(CLI::App& app, Command& command) {
   auto flags = std::make_shared<PaperFlags>();
   auto* verb = app.add_subcommand("paper", "Put the paper's tables beside ours, with differences");
-  verb->footer(kExamples);
+  verb->footer(kPaperExamples);
   auto* preset =
       verb->add_option("--preset", flags->preset, "model: " + joined(solver::preset_names()));
   preset->type_name("NAME")->capture_default_str();

@@ -16,7 +16,7 @@
 namespace oblique::client {
 namespace {
 
-constexpr const char* kExamples = R"(Examples:
+constexpr const char* kQueryExamples = R"(Examples:
   oblique query paper
   oblique query paper --where "mu > 0.5 AND stick_total_s = 0" --order "fn_peak_N DESC"
   oblique query friction --select mu,fn_peak_N,mode --format csv > friction.csv
@@ -66,7 +66,7 @@ int query(const QueryFlags& flags) {
 void add_query(CLI::App& app, Command& command) {
   auto flags = std::make_shared<QueryFlags>();
   auto* verb = app.add_subcommand("query", "Show results of a study");
-  verb->footer(kExamples);
+  verb->footer(kQueryExamples);
   verb->add_option("STUDY", flags->query.study, "name of the study")->required()->type_name("");
   verb->add_option("--where", flags->query.where, "condition that points must meet")
       ->type_name("EXPR");

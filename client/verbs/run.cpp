@@ -17,7 +17,7 @@
 namespace oblique::client {
 namespace {
 
-constexpr const char* kExamples = R"(Examples:
+constexpr const char* kRunExamples = R"(Examples:
   oblique run deploy/studies/paper.toml
   oblique run --H 1 --mu 0.1:2.0:40 --e 0.6,0.8,1 --name friction
   oblique run sweep.toml --db sweep.db --workers 4
@@ -70,7 +70,7 @@ void add_run(CLI::App& app, Command& command) {
   auto flags = std::make_shared<RunFlags>();
   auto* verb = app.add_subcommand(
       "run", "Run a study on this machine: server, workers and database in one command");
-  verb->footer(kExamples);
+  verb->footer(kRunExamples);
   verb->add_option("--db", flags->settings.service.database, "database, made when it is not there")
       ->type_name("FILE")
       ->capture_default_str();

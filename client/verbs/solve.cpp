@@ -16,7 +16,7 @@
 namespace oblique::client {
 namespace {
 
-constexpr const char* kExamples = R"(Examples:
+constexpr const char* kSolveExamples = R"(Examples:
   oblique solve --H 1 --mu 0.4 --e 1
   oblique solve --H 1 --mu 1.2 --e 0.8 --json
   oblique solve --H 1 --mu 0.4 --e 1 --trace impact.csv --trace-shape
@@ -113,7 +113,7 @@ int solve(const SolveFlags& flags) {
 void add_solve(CLI::App& app, Command& command) {
   auto flags = std::make_shared<SolveFlags>();
   auto* verb = app.add_subcommand("solve", "Solve one point, here and now");
-  verb->footer(kExamples);
+  verb->footer(kSolveExamples);
   verb->add_flag("--json", flags->json, "print the result as one JSON object (SI units)");
   auto* trace = verb->add_option("--trace", flags->trace,
                                  "write the time histories of the contact to FILE (CSV, SI "

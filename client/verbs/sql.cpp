@@ -9,7 +9,7 @@
 namespace oblique::client {
 namespace {
 
-constexpr const char* kExamples = R"(Examples:
+constexpr const char* kSqlExamples = R"(Examples:
   oblique sql "SELECT study, count(*), max(fn_peak_N) FROM runs GROUP BY study"
   oblique sql "SELECT * FROM peaks WHERE study_id = 1 AND major" --format csv
   oblique sql "SELECT name, sql FROM sqlite_schema"     tables and views
@@ -33,7 +33,7 @@ int sql(const SqlFlags& flags) {
 void add_sql(CLI::App& app, Command& command) {
   auto flags = std::make_shared<SqlFlags>();
   auto* verb = app.add_subcommand("sql", "Ask the database in SQL, reading only");
-  verb->footer(kExamples);
+  verb->footer(kSqlExamples);
   verb->add_option("STATEMENT", flags->statement, "the statement, in quotes")
       ->required()
       ->type_name("");

@@ -10,7 +10,7 @@
 namespace oblique::client {
 namespace {
 
-constexpr const char* kExamples = R"(Examples:
+constexpr const char* kStatusExamples = R"(Examples:
   oblique status
   oblique status paper
   oblique status --server tcp://127.0.0.1:7600 --format json
@@ -35,7 +35,7 @@ int status(const StatusFlags& flags) {
 void add_status(CLI::App& app, Command& command) {
   auto flags = std::make_shared<StatusFlags>();
   auto* verb = app.add_subcommand("status", "Say how far a study is, or all of them");
-  verb->footer(kExamples);
+  verb->footer(kStatusExamples);
   verb->add_option("STUDY", flags->study, "name of the study; all when left out")->type_name("");
   add_format_flag(*verb, flags->format);
   add_source_flags(*verb, flags->source);

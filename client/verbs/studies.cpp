@@ -9,7 +9,7 @@
 namespace oblique::client {
 namespace {
 
-constexpr const char* kExamples = R"(Examples:
+constexpr const char* kStudiesExamples = R"(Examples:
   oblique studies
   oblique studies --db sweep.db --format csv)";
 
@@ -42,7 +42,7 @@ int studies(const StudiesFlags& flags) {
 void add_studies(CLI::App& app, Command& command) {
   auto flags = std::make_shared<StudiesFlags>();
   auto* verb = app.add_subcommand("studies", "List the studies");
-  verb->footer(kExamples);
+  verb->footer(kStudiesExamples);
   add_format_flag(*verb, flags->format);
   add_source_flags(*verb, flags->source);
   verb->callback([flags, &command] { command = [flags] { return studies(*flags); }; });

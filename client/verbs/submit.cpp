@@ -13,7 +13,7 @@
 namespace oblique::client {
 namespace {
 
-constexpr const char* kExamples = R"(Examples:
+constexpr const char* kSubmitExamples = R"(Examples:
   oblique submit deploy/studies/paper.toml
   oblique submit sweep.toml --server tcp://127.0.0.1:7600 --watch
   oblique submit --H 1 --mu 0.1:2.0:40 --e 0.6,0.8,1 --name friction
@@ -74,7 +74,7 @@ int submit(const SubmitFlags& flags) {
 void add_submit(CLI::App& app, Command& command) {
   auto flags = std::make_shared<SubmitFlags>();
   auto* verb = app.add_subcommand("submit", "Hand a study to a server");
-  verb->footer(kExamples);
+  verb->footer(kSubmitExamples);
   add_server_flags(*verb, flags->source);
   verb->add_flag("--watch", flags->watch, "show the progress until the study is done");
   verb->add_option("--priority", flags->terms.priority,

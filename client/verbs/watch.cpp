@@ -9,7 +9,7 @@
 namespace oblique::client {
 namespace {
 
-constexpr const char* kExamples = R"(Examples:
+constexpr const char* kWatchExamples = R"(Examples:
   oblique watch paper
   oblique watch paper --db sweep.db
   oblique watch paper --server tcp://127.0.0.1:7600
@@ -49,7 +49,7 @@ int watch(const WatchFlags& flags) {
 void add_watch(CLI::App& app, Command& command) {
   auto flags = std::make_shared<WatchFlags>();
   auto* verb = app.add_subcommand("watch", "Show the progress of a study until it is done");
-  verb->footer(kExamples);
+  verb->footer(kWatchExamples);
   verb->add_option("STUDY", flags->study, "name of the study")->required()->type_name("");
   add_source_flags(*verb, flags->source);
   verb->callback([flags, &command] { command = [flags] { return watch(*flags); }; });

@@ -10,7 +10,7 @@
 namespace oblique::client {
 namespace {
 
-constexpr const char* kExamples = R"(Examples:
+constexpr const char* kWorkersExamples = R"(Examples:
   oblique workers
   oblique workers --server tcp://127.0.0.1:7600 --format csv
   oblique workers --db sweep.db        every worker that delivered a result
@@ -71,7 +71,7 @@ int workers(const WorkersFlags& flags) {
 void add_workers(CLI::App& app, Command& command) {
   auto flags = std::make_shared<WorkersFlags>();
   auto* verb = app.add_subcommand("workers", "List the workers of a server");
-  verb->footer(kExamples);
+  verb->footer(kWorkersExamples);
   add_format_flag(*verb, flags->format);
   verb->add_option("--db", flags->source.database, "database to read directly instead")
       ->type_name("FILE");

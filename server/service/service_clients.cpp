@@ -11,7 +11,7 @@
 namespace oblique::server {
 namespace {
 
-constexpr std::size_t kLongestName = 200;
+constexpr std::size_t kLongestNameShown = 200;
 /// Number of no request: a reply with it is passed over by clients that do not know its kind.
 constexpr std::uint64_t kNobodysRequest = UINT64_MAX;
 
@@ -46,7 +46,7 @@ StudyShare asked_share(const protocol::SubmitRequest& request, StudyShare share)
 }  // namespace
 
 std::string unknown_study(const std::string& name) {
-  return "there is no study called \"" + protocol::shortened(name, kLongestName) +
+  return "there is no study called \"" + protocol::shortened(name, kLongestNameShown) +
          "\": `oblique studies` lists all";
 }
 

@@ -12,12 +12,12 @@
 namespace oblique::server {
 namespace {
 
-constexpr std::size_t kLongestName = 256;
+constexpr std::size_t kLongestNameKept = 256;
 constexpr std::uint32_t kMostThreads = 4096;
 
 /// What a stranger says of itself, fit for logs and tables.
 std::string plain(const std::string& text) {
-  std::string kept = protocol::shortened(text, kLongestName);
+  std::string kept = protocol::shortened(text, kLongestNameKept);
   std::replace_if(
       kept.begin(), kept.end(),
       [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, '?');
@@ -28,13 +28,13 @@ std::string plain(const std::string& text) {
 /// or by the name that older workers have when they are given no other one, HOST:PID.
 std::string process_of(const protocol::WorkerHello& hello) {
   if (!hello.process_id().empty()) {
-    return "id " + protocol::shortened(hello.process_id(), kLongestName);
+    return "id " + protocol::shortened(hello.process_id(), kLongestNameKept);
   }
   const std::string& name = hello.name();
   const std::size_t colon = name.rfind(':');
   const bool ends_in_number = colon != std::string::npos && colon > 0 && colon + 1 < name.size() &&
                               name.find_first_not_of("0123456789", colon + 1) == std::string::npos;
-  return ends_in_number ? "name " + protocol::shortened(name, kLongestName) : std::string();
+  return ends_in_number ? "name " + protocol::shortened(name, kLongestNameKept) : std::string();
 }
 
 /// A recipe of the point that every sound worker solves in a moment.

@@ -10,7 +10,7 @@
 namespace oblique::client {
 namespace {
 
-std::string contents(const std::string& name) {
+std::string text_of(const std::string& name) {
   std::ifstream file(std::string(OBLIQUE_SOURCE_DIR) + "/" + name);
   return {std::istreambuf_iterator<char>(file), {}};
 }
@@ -29,7 +29,7 @@ std::string shown(const std::string& text, const std::string& command) {
 TEST(Readme, ShowsTheTableThatItsCommandPrints) {
   const auto printed = oblique({"paper", "--format", "markdown"});
   ASSERT_EQ(printed.exit_code, 0) << printed.err;
-  EXPECT_EQ(shown(contents("client/paper/README.md"), "oblique paper --format markdown"),
+  EXPECT_EQ(shown(text_of("client/paper/README.md"), "oblique paper --format markdown"),
             "\n" + printed.out + "\n")
       << ".ci/tables writes the tables into client/paper/README.md";
 }
@@ -41,7 +41,7 @@ TEST(Readme, SummarisesTheComparisonInTheNumbersThatItsCommandPrints) {
       printed.out, number,
       std::regex(
           "(\\d+) trustworthy published numbers: rms difference (\\S+ %), largest (\\S+ %)")));
-  const std::string summary = contents("README.md");
+  const std::string summary = text_of("README.md");
   EXPECT_NE(summary.find("The " + number.str(1) + " trustworthy numbers"), std::string::npos);
   EXPECT_NE(summary.find("rms difference of " + number.str(2)), std::string::npos);
   EXPECT_NE(summary.find("the largest, " + number.str(3)), std::string::npos);
@@ -50,7 +50,7 @@ TEST(Readme, SummarisesTheComparisonInTheNumbersThatItsCommandPrints) {
 TEST(Readme, DescribesEveryColumn) {
   const auto printed = oblique({"columns", "--format", "markdown"});
   ASSERT_EQ(printed.exit_code, 0) << printed.err;
-  EXPECT_EQ(shown(contents("client/README.md"), "oblique columns --format markdown"),
+  EXPECT_EQ(shown(text_of("client/README.md"), "oblique columns --format markdown"),
             "\n" + printed.out + "\n")
       << ".ci/tables writes the tables into client/README.md";
 }

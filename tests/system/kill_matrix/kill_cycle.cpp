@@ -19,7 +19,7 @@
 namespace oblique::test {
 namespace {
 
-constexpr std::chrono::milliseconds kBetweenLooks{5};
+constexpr std::chrono::milliseconds kBetweenLooksAtCycle{5};
 constexpr int kMostAttempts = 6;
 constexpr int kPointsFailed = 1;  ///< exit code: the study is at its end, with its failures
 
@@ -145,7 +145,7 @@ class ApartCycle {
         first ? blow_.environment("oblique") : blow_.bystander());
     while (!client.exit_code()) {
       look_after();
-      std::this_thread::sleep_for(kBetweenLooks);
+      std::this_thread::sleep_for(kBetweenLooksAtCycle);
     }
     const int code = *client.exit_code();
     if (code == kPointsFailed && says_end_of_study(client)) {
