@@ -6,12 +6,12 @@
 
 namespace oblique::worker {
 
-BatchSolver::BatchSolver(SolvePoints solve, std::function<void()> task_ended, std::size_t threads)
+BatchSolver::BatchSolver(SolvePoints solve, std::function<void()> batch_ended, std::size_t threads)
     : solve_(std::move(solve)),
-      task_ended_(std::move(task_ended)),
+      batch_ended_(std::move(batch_ended)),
       thread_count_(std::max<std::size_t>(threads, 1)) {
   for (std::size_t i = 0; i < thread_count_; ++i) {
-    threads_.emplace_back([this](const std::stop_token& stop) { run(stop); });
+    threads_.emplace_back([this](const std::stop_token& stop) { work(stop); });
   }
 }
 
@@ -23,18 +23,18 @@ BatchSolver::~BatchSolver() {
   threads_.clear();  // joins
 }
 
-void BatchSolver::add(Task task) {
+void BatchSolver::add(Batch batch) {
   const std::lock_guard lock(mutex_);
-  open_.push_back({std::move(task)});
+  open_.push_back({std::move(batch)});
   changed_.notify_all();
 }
 
 void BatchSolver::drop_study(std::uint64_t study_id) {
   const std::lock_guard lock(mutex_);
   std::erase_if(progress_, [&](const auto& entry) { return entry.second.study_id == study_id; });
-  for (auto task = open_.begin(); task != open_.end();) {
-    const auto dropped = task++;
-    if (dropped->task.study_id == study_id) {
+  for (auto batch = open_.begin(); batch != open_.end();) {
+    const auto dropped = batch++;
+    if (dropped->batch.study_id == study_id) {
       dropped->unwanted = true;
       drop(dropped);
     }
@@ -42,10 +42,11 @@ void BatchSolver::drop_study(std::uint64_t study_id) {
   changed_.notify_all();
 }
 
-void BatchSolver::drop_task(std::uint64_t number) {
+void BatchSolver::drop_batch(std::uint64_t number) {
   const std::lock_guard lock(mutex_);
-  const auto found = std::find_if(open_.begin(), open_.end(),
-                                  [&](const OpenTask& task) { return task.task.number == number; });
+  const auto found = std::find_if(open_.begin(), open_.end(), [&](const OpenBatch& batch) {
+    return batch.batch.number == number;
+  });
   if (found != open_.end()) {
     drop(found);
   }
@@ -54,17 +55,17 @@ void BatchSolver::drop_task(std::uint64_t number) {
 
 void BatchSolver::drop_all() {
   const std::lock_guard lock(mutex_);
-  for (auto task = open_.begin(); task != open_.end();) {
-    drop(task++);
+  for (auto batch = open_.begin(); batch != open_.end();) {
+    drop(batch++);
   }
   changed_.notify_all();
 }
 
-/// A task that is worked on stays, marked, until the last thread leaves it.
-void BatchSolver::drop(OpenTasks::iterator task) {
-  task->dropped = true;
-  if (task->solvers == 0) {
-    open_.erase(task);
+/// A batch that is worked on stays, marked, until the last thread leaves it.
+void BatchSolver::drop(OpenBatches::iterator batch) {
+  batch->dropped = true;
+  if (batch->solvers == 0) {
+    open_.erase(batch);
   }
 }
 
@@ -77,7 +78,7 @@ void BatchSolver::set_paused(bool paused) {
 bool BatchSolver::is_solving() const {
   const std::lock_guard lock(mutex_);
   return std::any_of(open_.begin(), open_.end(),
-                     [](const OpenTask& task) { return task.solvers > 0; });
+                     [](const OpenBatch& batch) { return batch.solvers > 0; });
 }
 
 std::vector<Progress> BatchSolver::collect() {
@@ -91,92 +92,93 @@ std::vector<Progress> BatchSolver::collect() {
   return collected;
 }
 
-Progress& BatchSolver::progress_of(const Task& task) {
-  return progress_.try_emplace(task.number, Progress{task.number, task.study_id, {}, 0.0, false})
+Progress& BatchSolver::progress_of(const Batch& batch) {
+  return progress_.try_emplace(batch.number, Progress{batch.number, batch.study_id, {}, 0.0, false})
       .first->second;
 }
 
-BatchSolver::OpenTasks::iterator BatchSolver::task_with_free_points() {
-  return std::find_if(open_.begin(), open_.end(), [](const OpenTask& task) {
-    return !task.dropped && task.given < task.task.count;
+BatchSolver::OpenBatches::iterator BatchSolver::batch_with_free_points() {
+  return std::find_if(open_.begin(), open_.end(), [](const OpenBatch& batch) {
+    return !batch.dropped && batch.given < batch.batch.count;
   });
 }
 
-void BatchSolver::run(const std::stop_token& stop) {
+void BatchSolver::work(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   while (changed_.wait(lock, stop,
-                       [this] { return !paused_ && task_with_free_points() != open_.end(); })) {
-    Share share{task_with_free_points(), 0, 0, {}, Clock::now()};
-    ++share.task->solvers;
-    const Task task = share.task->task;
+                       [this] { return !paused_ && batch_with_free_points() != open_.end(); })) {
+    Task task{batch_with_free_points(), 0, 0, {}, Clock::now()};
+    ++task.batch->solvers;
+    const Batch batch = task.batch->batch;
     lock.unlock();
     solve_(
-        task, [&] { return next_point(share, stop); },
-        [&](protocol::PointResult&& result) { take(share, std::move(result)); });
+        batch, [&] { return next_point(task, stop); },
+        [&](protocol::PointResult&& result) { take(task, std::move(result)); });
     lock.lock();
-    hand_on(share);
-    OpenTask& done = *share.task;
+    hand_on(task);
+    OpenBatch& done = *task.batch;
     if (--done.solvers > 0) {
       continue;
     }
-    const bool ended = !done.dropped && done.given == task.count;
+    const bool ended = !done.dropped && done.given == batch.count;
     if (done.dropped || ended) {
-      open_.erase(share.task);
+      open_.erase(task.batch);
     }
     if (ended) {
-      progress_of(task).task_done = true;
+      progress_of(batch).batch_done = true;
       lock.unlock();
-      task_ended_();
+      batch_ended_();
       lock.lock();
     }
   }
 }
 
-std::optional<std::uint64_t> BatchSolver::next_point(Share& share, const std::stop_token& stop) {
-  if (share.next < share.end) {
-    return share.next++;
+std::optional<std::uint64_t> BatchSolver::next_point(Task& task, const std::stop_token& stop) {
+  if (task.next < task.end) {
+    return task.next++;
   }
   std::unique_lock lock(mutex_);
-  hand_on(share);
-  OpenTask& open = *share.task;
+  hand_on(task);
+  OpenBatch& open = *task.batch;
   if (paused_) {
     changed_.wait(lock, stop, [&] { return !paused_ || open.dropped; });
-    share.busy_since = Clock::now();
+    task.busy_since = Clock::now();
   }
-  const std::uint64_t left = open.task.count - open.given;
+  const std::uint64_t left = open.batch.count - open.given;
   if (open.dropped || stop.stop_requested() || left == 0) {
     return std::nullopt;
   }
-  // Ever shorter runs towards the end, so that the threads finish together.
-  const std::uint64_t run = std::clamp<std::uint64_t>(left / (4 * thread_count_), 1, kLongestRun);
-  share.next = open.task.first_point + open.given;
-  share.end = share.next + run;
-  open.given += run;
-  return share.next++;
+  // Ever smaller tasks towards the end, so that the threads finish together.
+  const std::uint64_t count =
+      std::clamp<std::uint64_t>(left / (4 * thread_count_), 1, kLargestTask);
+  task.next = open.batch.first_point + open.given;
+  task.end = task.next + count;
+  open.given += count;
+  return task.next++;
 }
 
-void BatchSolver::take(Share& share, protocol::PointResult&& result) {
-  share.results.push_back(std::move(result));
-  if (Clock::now() - share.busy_since > kLongestWait) {
+void BatchSolver::take(Task& task, protocol::PointResult&& result) {
+  task.results.push_back(std::move(result));
+  if (Clock::now() - task.busy_since > kLongestWait) {
     const std::lock_guard lock(mutex_);
-    hand_on(share);
+    hand_on(task);
   }
 }
 
 /// Needs the lock.
-void BatchSolver::hand_on(Share& share) {
-  if (share.results.empty()) {
+void BatchSolver::hand_on(Task& task) {
+  if (task.results.empty()) {
     return;  // the time since is that of results to come
   }
   const Clock::time_point now = Clock::now();
-  if (!share.task->unwanted) {
-    Progress& progress = progress_of(share.task->task);
-    progress.results.insert(progress.results.end(), std::move_iterator(share.results.begin()),
-                            std::move_iterator(share.results.end()));
-    progress.busy_s += std::chrono::duration<double>(now - share.busy_since).count();
+  if (!task.batch->unwanted) {
+    Progress& progress = progress_of(task.batch->batch);
+    progress.results.insert(progress.results.end(), std::move_iterator(task.results.begin()),
+                            std::move_iterator(task.results.end()));
+    progress.busy_s += std::chrono::duration<double>(now - task.busy_since).count();
   }
-  share.results.clear();
-  share.busy_since = now;
+  task.results.clear();
+  task.busy_since = now;
 }
 
 }  // namespace oblique::worker

@@ -16,7 +16,7 @@ constexpr std::int64_t kLongestInterval_ms = 600'000;
 }  // namespace
 
 Conversation::Conversation(protocol::WorkerHello hello, ConversationSettings settings)
-    : hello_(std::move(hello)), settings_(settings) {}
+    : hello_(std::move(hello)), settings_(settings), outbox_(settings.outbox) {}
 
 Effects Conversation::take_effects() {
   return std::exchange(effects_, {});
@@ -103,9 +103,7 @@ void Conversation::send_heartbeat() {
   for (const auto& [number, held] : held_) {
     leases.insert(held.lease_id);
   }
-  for (const Unacknowledged& waiting : unacknowledged_) {
-    leases.insert(waiting.results.lease_id());
-  }
+  outbox_.for_each([&](const protocol::Results& results) { leases.insert(results.lease_id()); });
   leases.erase(0);
   protocol::WorkerMessage message;
   message.mutable_heartbeat()->mutable_lease_ids()->Assign(leases.begin(), leases.end());
@@ -194,24 +192,16 @@ void Conversation::on(const protocol::Welcome& welcome) {
   studies_.clear();
   open_credit_ = 0;
   if (database_id_ != welcome.database_id()) {
-    if (!unacknowledged_.empty()) {
-      effects_.emplace_back(Note{"another database: " + std::to_string(unacknowledged_results_) +
+    if (!outbox_.is_empty()) {
+      effects_.emplace_back(Note{"another database: " + std::to_string(outbox_.results()) +
                                  " results for the one before are dropped"});
     }
-    unacknowledged_.clear();
-    unacknowledged_results_ = 0;
-    unacknowledged_bytes_ = 0;
+    outbox_.drop_all();
     database_id_ = welcome.database_id();
-    first_task_of_database_ = next_task_;
+    first_batch_of_database_ = next_batch_;
   }
   // Results go before credit, so that their points are not handed out again.
-  for (Unacknowledged& waiting : unacknowledged_) {
-    waiting.results.set_lease_id(0);
-    waiting.results.set_batch_done(false);
-    waiting.on_its_way = false;
-  }
-  on_their_way_ = 0;
-  bytes_on_their_way_ = 0;
+  outbox_.start_over();
   deliver();
   give_credit();
   finish_if_delivered();
@@ -248,7 +238,7 @@ void Conversation::on(const protocol::Batch& batch) {
     return;
   }
   backoff_ms_ = 0;
-  const std::uint64_t number = next_task_++;
+  const std::uint64_t number = next_batch_++;
   held_[number] = {batch.study_id(), batch.lease_id(), batch.attempt()};
   effects_.emplace_back(Solve{{number, batch.study_id(), batch.model(), batch.first_point(),
                                batch.count(), study->second}});
@@ -256,15 +246,7 @@ void Conversation::on(const protocol::Batch& batch) {
 
 void Conversation::on(const protocol::ResultsStored& stored) {
   backoff_ms_ = 0;
-  const auto found =
-      std::lower_bound(unacknowledged_.begin(), unacknowledged_.end(), stored.sequence(),
-                       [](const Unacknowledged& waiting, std::uint64_t sequence) {
-                         return waiting.results.sequence() < sequence;
-                       });
-  if (found != unacknowledged_.end() && found->results.sequence() == stored.sequence()) {
-    forget(found);
-    unacknowledged_.erase(found);
-  }
+  outbox_.acknowledged(stored.sequence());
   deliver();
   give_credit();
   finish_if_delivered();
@@ -274,14 +256,7 @@ void Conversation::on(const protocol::Withdraw& withdraw) {
   effects_.emplace_back(DropStudy{withdraw.study_id()});
   std::erase_if(held_,
                 [&](const auto& entry) { return entry.second.study_id == withdraw.study_id(); });
-  for (auto waiting = unacknowledged_.begin(); waiting != unacknowledged_.end();) {
-    if (waiting->results.study_id() == withdraw.study_id()) {
-      forget(waiting);
-      waiting = unacknowledged_.erase(waiting);
-    } else {
-      ++waiting;
-    }
-  }
+  outbox_.drop_study(withdraw.study_id());
   deliver();
   give_credit();
   finish_if_delivered();
@@ -292,7 +267,7 @@ void Conversation::on(const protocol::Release& release) {
     return entry.second.lease_id == release.lease_id();
   });
   if (found != held_.end()) {
-    effects_.emplace_back(DropTask{found->first});
+    effects_.emplace_back(DropBatch{found->first});
     held_.erase(found);
     give_credit();
   }
@@ -330,7 +305,7 @@ Effects Conversation::stop(std::int64_t now_ms) {
 }
 
 void Conversation::finish_if_delivered() {
-  if (stopping_ && unacknowledged_.empty()) {
+  if (stopping_ && outbox_.is_empty()) {
     finish(0, "stopped");
   }
 }
@@ -346,9 +321,9 @@ void Conversation::finish(int exit_code, const std::string& reason) {
   }
   state_ = State::kFinished;
   effects_.emplace_back(DropAll{});
-  const std::string lost = unacknowledged_results_ == 0
+  const std::string lost = outbox_.results() == 0
                                ? ""
-                               : "; " + std::to_string(unacknowledged_results_) +
+                               : "; " + std::to_string(outbox_.results()) +
                                      " results could not be delivered and will be solved again";
   effects_.emplace_back(Finish{exit_code, reason + lost});
 }

@@ -75,8 +75,8 @@ int run_worker(const SessionSettings& settings, pid_t parent) {
   std::signal(SIGPIPE, SIG_IGN);
   oblique::worker::PointSolver points(settings.models_kept);
   oblique::worker::Session session(settings,
-                                   [&](const auto& task, const auto& next, const auto& take) {
-                                     points.solve(task, next, take);
+                                   [&](const auto& batch, const auto& next, const auto& take) {
+                                     points.solve(batch, next, take);
                                    });
   // The session waits for the end of whoever was the parent when it was made. One that was gone by
   // then must have been named to be missed.

@@ -23,11 +23,11 @@ protocol::PointResult message_of(const solver::PointOutcome& outcome) {
 
 PointSolver::PointSolver(std::size_t models_kept) : fingers_(models_kept) {}
 
-void PointSolver::solve(const Task& task, const BatchSolver::NextPoint& next,
+void PointSolver::solve(const Batch& batch, const BatchSolver::NextPoint& next,
                         const BatchSolver::TakeResult& take) {
   std::shared_ptr<const solver::Finger> finger;
   try {
-    finger = fingers_.finger(task.points->model(task.model));
+    finger = fingers_.finger(batch.points->model(batch.model));
   } catch (const std::exception& error) {
     while (const auto point = next()) {
       take(protocol::failed_point(*point, error.what()));
@@ -40,7 +40,7 @@ void PointSolver::solve(const Task& task, const BatchSolver::NextPoint& next,
         if (!number) {
           return std::nullopt;
         }
-        const protocol::Point point = task.points->point(*number);
+        const protocol::Point point = batch.points->point(*number);
         return solver::PointRequest{*number, point.H_m, point.mu, point.e_star};
       },
       [&](solver::PointOutcome&& outcome) { take(message_of(outcome)); });

@@ -69,7 +69,7 @@ Session::Session(SessionSettings settings, BatchSolver::SolvePoints solve)
       parent_(getppid()),
       conversation_(hello_of(settings_), settings_.conversation),
       solver_(
-          std::move(solve), [this] { task_ended_.wake(); }, settings_.threads) {}
+          std::move(solve), [this] { batch_ended_.wake(); }, settings_.threads) {}
 
 Session::~Session() = default;
 
@@ -97,7 +97,7 @@ int Session::run(int stop_descriptor, const std::function<void()>& on_stop) {
   apply(conversation_.start(now_ms()));
   while (!exit_code_) {
     zmq::pollitem_t items[] = {{socket_->handle(), 0, ZMQ_POLLIN, 0},
-                               {nullptr, task_ended_.descriptor(), ZMQ_POLLIN, 0},
+                               {nullptr, batch_ended_.descriptor(), ZMQ_POLLIN, 0},
                                {nullptr, stop_descriptor, ZMQ_POLLIN, 0}};
     try {
       zmq::poll(items, std::size(items), std::chrono::milliseconds(poll_timeout_ms()));
@@ -109,7 +109,7 @@ int Session::run(int stop_descriptor, const std::function<void()>& on_stop) {
     }
     receive_all();
     if ((items[1].revents & ZMQ_POLLIN) != 0 || now_ms() >= report_due_ms_) {
-      task_ended_.clear();
+      batch_ended_.clear();
       report_progress();
     }
     if ((items[2].revents & ZMQ_POLLIN) != 0) {
@@ -198,9 +198,9 @@ void Session::apply(Effects effects) {
         open_socket();
       },
       [&](const Send& effect) { send_failed = send_failed || !send(effect.message); },
-      [&](Solve& effect) { solver_.add(std::move(effect.task)); },
+      [&](Solve& effect) { solver_.add(std::move(effect.batch)); },
       [&](const DropStudy& effect) { solver_.drop_study(effect.study_id); },
-      [&](const DropTask& effect) { solver_.drop_task(effect.number); },
+      [&](const DropBatch& effect) { solver_.drop_batch(effect.number); },
       [&](const DropAll&) { solver_.drop_all(); },
       [&](const Note& note) { spdlog::info("{}", note.text); },
       [&](const Finish& finish) {

@@ -64,7 +64,7 @@ class Session {
   const int parent_;
   zmq::context_t context_;
   std::optional<zmq::socket_t> socket_;
-  WakeUp task_ended_;
+  WakeUp batch_ended_;
   Conversation conversation_;
   std::optional<int> exit_code_;
   std::int64_t report_due_ms_ = 0;

@@ -41,7 +41,7 @@ void SimulatedWorker::restart(std::int64_t away_ms) {
   ++sockets_;
   network_.close(link_, world_.chance(0.5));
   link_ = 0;
-  tasks_.clear();
+  batches_.clear();
   solving_ = false;
   frozen_until_ms_ = 0;
   conversation_.reset();
@@ -97,13 +97,13 @@ void SimulatedWorker::apply(worker::Effects effects) {
       network_.send(link_, protocol::encode(send->message),
                     is_results || send->message.has_heartbeat());
     } else if (auto* solve = std::get_if<worker::Solve>(&effect)) {
-      tasks_.push_back({std::move(solve->task), 0});
+      batches_.push_back({std::move(solve->batch), 0});
     } else if (const auto* drop = std::get_if<worker::DropStudy>(&effect)) {
-      std::erase_if(tasks_, [&](const Work& w) { return w.task.study_id == drop->study_id; });
-    } else if (const auto* task = std::get_if<worker::DropTask>(&effect)) {
-      std::erase_if(tasks_, [&](const Work& w) { return w.task.number == task->number; });
+      std::erase_if(batches_, [&](const Work& w) { return w.batch.study_id == drop->study_id; });
+    } else if (const auto* batch = std::get_if<worker::DropBatch>(&effect)) {
+      std::erase_if(batches_, [&](const Work& w) { return w.batch.number == batch->number; });
     } else if (std::holds_alternative<worker::DropAll>(effect)) {
-      tasks_.clear();
+      batches_.clear();
     } else if (std::holds_alternative<worker::Finish>(effect)) {
       restart(world_.between(10, 2000));
       return;
@@ -133,7 +133,7 @@ void SimulatedWorker::plan_time() {
 }
 
 void SimulatedWorker::plan_solving() {
-  if (solving_ || tasks_.empty() || !conversation_->may_solve()) {
+  if (solving_ || batches_.empty() || !conversation_->may_solve()) {
     return;
   }
   solving_ = true;
@@ -150,12 +150,12 @@ void SimulatedWorker::plan_solving() {
 }
 
 void SimulatedWorker::solve_some() {
-  if (tasks_.empty()) {
+  if (batches_.empty()) {
     return;
   }
-  Work& work = tasks_.front();
-  const std::uint64_t size = work.task.points->size();
-  const std::uint64_t point = work.task.first_point + work.solved;
+  Work& work = batches_.front();
+  const std::uint64_t size = work.batch.points->size();
+  const std::uint64_t point = work.batch.first_point + work.solved;
   const auto killers = killers_.find(size);
   if (killers != killers_.end() && killers->second.contains(point)) {
     ++deaths_;
@@ -163,13 +163,13 @@ void SimulatedWorker::solve_some() {
     return;
   }
   ++work.solved;
-  worker::Progress progress{work.task.number,
-                            work.task.study_id,
+  worker::Progress progress{work.batch.number,
+                            work.batch.study_id,
                             {answer_to(size, point)},
                             1e-3 * static_cast<double>(ms_per_point_),
-                            work.solved == work.task.count};
-  if (progress.task_done) {
-    tasks_.pop_front();
+                            work.solved == work.batch.count};
+  if (progress.batch_done) {
+    batches_.pop_front();
   }
   std::vector<worker::Progress> all;
   all.push_back(std::move(progress));

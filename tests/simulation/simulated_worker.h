@@ -38,13 +38,13 @@ class SimulatedWorker {
   const std::string& solver_version() const { return solver_version_; }
   /// The results of that message of the socket, or nullptr.
   const protocol::Results* sent(Network::LinkId link, std::uint64_t sequence) const;
-  bool holds_nothing() const { return tasks_.empty(); }
+  bool holds_nothing() const { return batches_.empty(); }
   /// How often a point has killed it.
   std::uint64_t deaths() const { return deaths_; }
 
  private:
   struct Work {
-    worker::Task task;
+    worker::Batch batch;
     std::uint64_t solved;
   };
   void start();
@@ -63,7 +63,7 @@ class SimulatedWorker {
   std::int64_t ms_per_point_;
   std::optional<worker::Conversation> conversation_;
   Network::LinkId link_ = 0;
-  std::deque<Work> tasks_;
+  std::deque<Work> batches_;
   bool solving_ = false;
   std::int64_t frozen_until_ms_ = 0;
   std::int64_t planned_time_ms_ = -1;

@@ -4,8 +4,10 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
+#include <cstdlib>
 #include <mutex>
 #include <set>
+#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -13,8 +15,8 @@
 namespace oblique::worker {
 namespace {
 
-Task task(std::uint64_t number, std::uint64_t first, std::uint64_t count,
-          std::uint64_t study_id = 7) {
+Batch batch(std::uint64_t number, std::uint64_t first, std::uint64_t count,
+            std::uint64_t study_id = 7) {
   return {number, study_id, 0, first, count, nullptr};
 }
 
@@ -55,16 +57,16 @@ class BatchSolverTest : public ::testing::Test {
  protected:
   void TearDown() override { gate_.open(1'000'000); }
 
-  void wait_tasks_ended(int tasks) {
+  void wait_batches_ended(int batches) {
     std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return tasks_ended_ >= tasks; });
+    changed_.wait(lock, [&] { return batches_ended_ >= batches; });
   }
 
   Gate gate_;
   std::mutex mutex_;
   std::condition_variable changed_;
-  int tasks_ended_ = 0;
-  BatchSolver solver_{[this](const Task&, const auto& next, const auto& take) {
+  int batches_ended_ = 0;
+  BatchSolver solver_{[this](const Batch&, const auto& next, const auto& take) {
                         while (const auto point = next()) {
                           gate_.pass();
                           take(protocol::failed_point(*point, "for the test"));
@@ -72,79 +74,79 @@ class BatchSolverTest : public ::testing::Test {
                       },
                       [this] {
                         const std::lock_guard lock(mutex_);
-                        ++tasks_ended_;
+                        ++batches_ended_;
                         changed_.notify_all();
                       }};
 };
 
-TEST_F(BatchSolverTest, TasksAreSolvedPointByPointInTheOrderTheyWereAdded) {
-  solver_.add(task(1, 10, 3));
-  solver_.add(task(2, 50, 2));
+TEST_F(BatchSolverTest, BatchesAreSolvedPointByPointInTheOrderTheyWereAdded) {
+  solver_.add(batch(1, 10, 3));
+  solver_.add(batch(2, 50, 2));
   gate_.open(5);
-  wait_tasks_ended(2);
+  wait_batches_ended(2);
   const auto progress = solver_.collect();
   ASSERT_EQ(progress.size(), 2U);
-  EXPECT_EQ(progress[0].task, 1U);
+  EXPECT_EQ(progress[0].batch, 1U);
   ASSERT_EQ(progress[0].results.size(), 3U);
   EXPECT_EQ(progress[0].results[2].point(), 12U);
-  EXPECT_TRUE(progress[0].task_done);
+  EXPECT_TRUE(progress[0].batch_done);
   EXPECT_EQ(progress[1].results.size(), 2U);
   EXPECT_TRUE(solver_.collect().empty());
 }
 
-TEST_F(BatchSolverTest, PartOfATaskCanBeCollectedWhileItIsSolved) {
-  solver_.add(task(1, 0, 3));
+TEST_F(BatchSolverTest, PartOfABatchCanBeCollectedWhileItIsSolved) {
+  solver_.add(batch(1, 0, 3));
   gate_.open(2);
   gate_.wait_begun(3);
   const auto part = solver_.collect();
   ASSERT_EQ(part.size(), 1U);
   EXPECT_EQ(part[0].results.size(), 2U);
-  EXPECT_FALSE(part[0].task_done);
+  EXPECT_FALSE(part[0].batch_done);
   EXPECT_TRUE(solver_.is_solving());
   gate_.open(1);
-  wait_tasks_ended(1);
+  wait_batches_ended(1);
   const auto rest = solver_.collect();
   ASSERT_EQ(rest.size(), 1U);
   EXPECT_EQ(rest[0].results.size(), 1U);
-  EXPECT_TRUE(rest[0].task_done);
+  EXPECT_TRUE(rest[0].batch_done);
 }
 
 TEST_F(BatchSolverTest, ADroppedStudyLeavesNothingAndOthersGoOn) {
-  solver_.add(task(1, 0, 3, 7));
-  solver_.add(task(2, 0, 3, 7));
-  solver_.add(task(3, 0, 1, 8));
+  solver_.add(batch(1, 0, 3, 7));
+  solver_.add(batch(2, 0, 3, 7));
+  solver_.add(batch(3, 0, 1, 8));
   gate_.open(1);
   gate_.wait_begun(2);
   solver_.drop_study(7);
   gate_.open(2);
-  wait_tasks_ended(1);
+  wait_batches_ended(1);
   const auto progress = solver_.collect();
   ASSERT_EQ(progress.size(), 1U);
-  EXPECT_EQ(progress[0].task, 3U);
+  EXPECT_EQ(progress[0].batch, 3U);
 }
 
 TEST_F(BatchSolverTest, WhenAllIsDroppedWhatWasSolvedCanStillBeCollected) {
-  solver_.add(task(1, 0, 3));
-  solver_.add(task(2, 0, 3));
+  solver_.add(batch(1, 0, 3));
+  solver_.add(batch(2, 0, 3));
   gate_.open(1);
   gate_.wait_begun(2);
   solver_.drop_all();
   const auto progress = solver_.collect();
   ASSERT_EQ(progress.size(), 1U);
   EXPECT_EQ(progress[0].results.size(), 1U);
-  EXPECT_FALSE(progress[0].task_done);
-  solver_.add(task(3, 0, 1));
+  EXPECT_FALSE(progress[0].batch_done);
+  solver_.add(batch(3, 0, 1));
   gate_.open(2);
-  wait_tasks_ended(1);
+  wait_batches_ended(1);
   const auto rest = solver_.collect();
   ASSERT_EQ(rest.size(), 2U);
-  EXPECT_EQ(rest[0].task, 1U) << "the point that was being solved counts";
+  EXPECT_EQ(rest[0].batch, 1U) << "the point that was being solved counts";
   EXPECT_EQ(rest[0].results.size(), 1U);
-  EXPECT_EQ(rest[1].task, 3U);
+  EXPECT_EQ(rest[1].batch, 3U);
 }
 
 TEST_F(BatchSolverTest, APausedSolverEndsItsPointAndBeginsNoOther) {
-  solver_.add(task(1, 0, 3));
+  solver_.add(batch(1, 0, 3));
   gate_.wait_begun(1);
   solver_.set_paused(true);
   gate_.open(2);
@@ -157,7 +159,7 @@ TEST_F(BatchSolverTest, APausedSolverEndsItsPointAndBeginsNoOther) {
   EXPECT_EQ(gate_.begun(), 1);
   solver_.set_paused(false);
   gate_.open(1);
-  wait_tasks_ended(1);
+  wait_batches_ended(1);
   EXPECT_EQ(solver_.collect().at(0).results.size(), 2U);
 }
 
@@ -165,7 +167,7 @@ TEST_F(BatchSolverTest, APausedSolverThatIsEndedBeginsNoPoint) {
   std::atomic<int> begun{0};
   {
     BatchSolver paused(
-        [&begun](const Task&, const auto& next, const auto& take) {
+        [&begun](const Batch&, const auto& next, const auto& take) {
           while (const auto point = next()) {
             ++begun;
             take(protocol::failed_point(*point, "for the test"));
@@ -173,21 +175,21 @@ TEST_F(BatchSolverTest, APausedSolverThatIsEndedBeginsNoPoint) {
         },
         [] {});
     paused.set_paused(true);
-    paused.add(task(1, 0, 2));
+    paused.add(batch(1, 0, 2));
   }
   EXPECT_EQ(begun, 0);
 }
 
-TEST_F(BatchSolverTest, SeveralThreadsShareATask) {
+TEST_F(BatchSolverTest, SeveralThreadsShareABatch) {
   BatchSolver shared(
-      [this](const Task&, const auto& next, const auto& take) {
+      [this](const Batch&, const auto& next, const auto& take) {
         while (const auto point = next()) {
           gate_.pass();
           take(protocol::failed_point(*point, "for the test"));
         }
       },
       [] {}, 3);
-  shared.add(task(1, 0, 3));
+  shared.add(batch(1, 0, 3));
   gate_.wait_begun(3);
   EXPECT_TRUE(shared.collect().empty()) << "none has ended, and all three are begun";
   gate_.open(3);
@@ -202,13 +204,45 @@ TEST_F(BatchSolverTest, SeveralThreadsShareATask) {
   EXPECT_EQ(points, (std::set<std::uint64_t>{0, 1, 2}));
 }
 
-TEST(BatchSolver, EveryPointOfManyTasksIsSolvedOnceHoweverManyThreads) {
-  constexpr std::uint64_t kTasks = 40;
+TEST_F(BatchSolverTest, AThreadThatIsFreePassesOverADroppedBatchThatAnotherStillWorksOn) {
+  Gate dropped_batch;
+  std::atomic<int> taken_up{0};
+  std::atomic<bool> next_is_solved{false};
+  BatchSolver shared(
+      [&](const Batch& at_hand, const auto& next, const auto& take) {
+        if (at_hand.number == 1 && ++taken_up > 2) {
+          ADD_FAILURE() << "a dropped batch is taken up";
+          std::abort();  // and would be without end
+        }
+        while (const auto point = next()) {
+          if (at_hand.number == 1) {
+            dropped_batch.pass();
+          }
+          take(protocol::failed_point(*point, "for the test"));
+        }
+        next_is_solved = next_is_solved || at_hand.number == 2;
+      },
+      [] {}, 2);
+  shared.add(batch(1, 0, 6));
+  dropped_batch.wait_begun(2);  // both threads are in it
+  shared.drop_batch(1);
+  dropped_batch.open(1);  // one of them comes free
+  shared.add(batch(2, 0, 1));
+  const auto patience = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+  while (!next_is_solved && std::chrono::steady_clock::now() < patience) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  EXPECT_TRUE(next_is_solved);
+  dropped_batch.open(1000);
+}
+
+TEST(BatchSolver, EveryPointOfManyBatchesIsSolvedOnceHoweverManyThreads) {
+  constexpr std::uint64_t kBatches = 40;
   std::mutex mutex;
   std::condition_variable changed;
   std::uint64_t ended = 0;
   BatchSolver solver(
-      [](const Task&, const auto& next, const auto& take) {
+      [](const Batch&, const auto& next, const auto& take) {
         while (const auto point = next()) {
           take(protocol::failed_point(*point, "for the test"));
         }
@@ -220,8 +254,8 @@ TEST(BatchSolver, EveryPointOfManyTasksIsSolvedOnceHoweverManyThreads) {
       },
       4);
   std::uint64_t first = 0;
-  for (std::uint64_t number = 1; number <= kTasks; ++number) {
-    solver.add(task(number, first, 13 * number));
+  for (std::uint64_t number = 1; number <= kBatches; ++number) {
+    solver.add(batch(number, first, 13 * number));
     first += 13 * number;
   }
   std::vector<int> solved(first, 0);
@@ -231,19 +265,20 @@ TEST(BatchSolver, EveryPointOfManyTasksIsSolvedOnceHoweverManyThreads) {
       for (const auto& result : progress.results) {
         ++solved.at(result.point());
       }
-      done += progress.task_done ? 1U : 0U;
+      done += progress.batch_done ? 1U : 0U;
     }
   };
   {
     std::unique_lock lock(mutex);
-    while (!changed.wait_for(lock, std::chrono::milliseconds(1), [&] { return ended == kTasks; })) {
+    while (
+        !changed.wait_for(lock, std::chrono::milliseconds(1), [&] { return ended == kBatches; })) {
       lock.unlock();
       gather();
       lock.lock();
     }
   }
   gather();
-  EXPECT_EQ(done, kTasks);
+  EXPECT_EQ(done, kBatches);
   EXPECT_EQ(solved, std::vector<int>(first, 1));
 }
 

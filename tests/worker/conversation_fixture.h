@@ -108,10 +108,10 @@ class ConversationTest : public ::testing::Test {
     take(conversation_->on_time(now_ms_));
   }
 
-  /// Points `first` to `first + count − 1` of a task were solved.
-  void solve(std::uint64_t task, std::uint64_t first, std::uint64_t count, bool task_done,
+  /// Points `first` to `first + count − 1` of a batch were solved.
+  void solve(std::uint64_t batch, std::uint64_t first, std::uint64_t count, bool batch_done,
              std::uint64_t study_id = 7) {
-    Progress progress{task, study_id, {}, 0.5, task_done};
+    Progress progress{batch, study_id, {}, 0.5, batch_done};
     for (std::uint64_t i = 0; i < count; ++i) {
       progress.results.push_back(protocol::failed_point(first + i, "for the test"));
     }

@@ -115,7 +115,7 @@ TEST_F(ConversationTest, ResultsOfAnEarlierSessionBelongToNoLease) {
   EXPECT_FALSE(sent_results()[0].batch_done());
 }
 
-TEST_F(ConversationTest, TasksOfAnEarlierSessionAreDroppedAtTheWelcomeAndNotBefore) {
+TEST_F(ConversationTest, BatchesOfAnEarlierSessionAreDroppedAtTheWelcomeAndNotBefore) {
   join();
   receive(batch_message(7, 31));
   receive(hello_again_message());
@@ -125,7 +125,7 @@ TEST_F(ConversationTest, TasksOfAnEarlierSessionAreDroppedAtTheWelcomeAndNotBefo
   EXPECT_EQ(credit_given(), 2U);
 }
 
-TEST_F(ConversationTest, PointsOfADroppedTaskThatWereSolvedAreDeliveredWithoutALease) {
+TEST_F(ConversationTest, PointsOfADroppedBatchThatWereSolvedAreDeliveredWithoutALease) {
   join();
   receive(batch_message(7, 31));
   receive(hello_again_message());
@@ -180,7 +180,7 @@ TEST_F(ConversationTest, APointThatEndsAfterTheDatabaseChangedIsNotDeliveredEith
 
 TEST_F(ConversationTest, TooManyUnacknowledgedResultsStopCreditAndSolvingUntilTheyAreStored) {
   ConversationSettings settings;
-  settings.unacknowledged_limit = 10;
+  settings.outbox.unacknowledged_results = 10;
   use(settings);
   join();
   receive(batch_message(7, 31));
@@ -196,7 +196,7 @@ TEST_F(ConversationTest, TooManyUnacknowledgedResultsStopCreditAndSolvingUntilTh
 
 TEST_F(ConversationTest, TooManyUnacknowledgedBytesStopSolvingToo) {
   ConversationSettings settings;
-  settings.unacknowledged_bytes_limit = 1;
+  settings.outbox.unacknowledged_bytes = 1;
   use(settings);
   join();
   receive(batch_message(7, 31));
@@ -209,7 +209,7 @@ TEST_F(ConversationTest, TooManyUnacknowledgedBytesStopSolvingToo) {
 
 TEST_F(ConversationTest, WhatWasSolvedWhileTheServerWasAwayIsDeliveredAFewMessagesAtATime) {
   ConversationSettings settings;
-  settings.messages_on_their_way = 2;
+  settings.outbox.messages_on_their_way = 2;
   use(settings);
   join();
   receive(batch_message(7, 31));
@@ -234,7 +234,7 @@ TEST_F(ConversationTest, WhatWasSolvedWhileTheServerWasAwayIsDeliveredAFewMessag
 
 TEST_F(ConversationTest, BytesOnTheirWayAreBoundedTooAndALargeMessageGoesAlone) {
   ConversationSettings settings;
-  settings.bytes_on_their_way = 1;
+  settings.outbox.bytes_on_their_way = 1;
   use(settings);
   join();
   receive(batch_message(7, 31));
@@ -248,7 +248,7 @@ TEST_F(ConversationTest, BytesOnTheirWayAreBoundedTooAndALargeMessageGoesAlone) 
 
 TEST_F(ConversationTest, AWithdrawnStudyMakesRoomForTheResultsOfOthers) {
   ConversationSettings settings;
-  settings.messages_on_their_way = 1;
+  settings.outbox.messages_on_their_way = 1;
   use(settings);
   join();
   receive(study_message(8));

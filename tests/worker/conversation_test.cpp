@@ -25,10 +25,10 @@ TEST_F(ConversationTest, ABatchIsSolvedWithTheRecipeOfItsStudy) {
   receive(batch_message(7, 31, 90, 10));
   const auto solves = effects_of<Solve>();
   ASSERT_EQ(solves.size(), 1U);
-  EXPECT_EQ(solves[0].task.study_id, 7U);
-  EXPECT_EQ(solves[0].task.first_point, 90U);
-  EXPECT_EQ(solves[0].task.count, 10U);
-  EXPECT_EQ(solves[0].task.points->size(), 100U);
+  EXPECT_EQ(solves[0].batch.study_id, 7U);
+  EXPECT_EQ(solves[0].batch.first_point, 90U);
+  EXPECT_EQ(solves[0].batch.count, 10U);
+  EXPECT_EQ(solves[0].batch.points->size(), 100U);
 }
 
 TEST_F(ConversationTest, CreditIsGivenAgainForEachBatchSolvedAndNeverForMoreThanTwo) {
@@ -201,11 +201,11 @@ TEST_F(ConversationTest, ABatchThatOthersAnsweredIsDroppedAndItsPlaceGivenAgain)
   protocol::ServerToWorker release;
   release.mutable_release()->set_lease_id(31);
   receive(release);
-  ASSERT_TRUE(has<DropTask>());
+  ASSERT_TRUE(has<DropBatch>());
   EXPECT_TRUE(has<Send>()) << "credit for another one";
   release.mutable_release()->set_lease_id(99);
   receive(release);
-  EXPECT_FALSE(has<DropTask>()) << "a lease that it does not have";
+  EXPECT_FALSE(has<DropBatch>()) << "a lease that it does not have";
 }
 
 TEST_F(ConversationTest, WhatTheServerHasToSayToPeopleGoesToTheLog) {

@@ -44,29 +44,31 @@ TEST(FallCacheTest, AModelOutsideItsDomainIsAnErrorAndIsNotKept) {
   EXPECT_THROW(cache.finger(model_with_k(-1.0)), solver::InputError);
 }
 
-Task task_of(const protocol::Recipe& recipe) {
+Batch batch_of(const protocol::Recipe& recipe) {
   const auto points = std::make_shared<const protocol::PointTable>(recipe);
   return {1, 7, 0, 0, points->size(), points};
 }
 
-/// Solves all points of a task; the results in the order of the points.
-std::vector<protocol::PointResult> solved(const Task& task) {
+/// Solves all points of a batch; the results in the order of the points.
+std::vector<protocol::PointResult> solved(const Batch& batch) {
   PointSolver solver(2);
-  std::vector<protocol::PointResult> results(task.count);
+  std::vector<protocol::PointResult> results(batch.count);
   std::uint64_t given = 0;
   solver.solve(
-      task,
-      [&] { return given < task.count ? std::optional(task.first_point + given++) : std::nullopt; },
+      batch,
+      [&] {
+        return given < batch.count ? std::optional(batch.first_point + given++) : std::nullopt;
+      },
       [&](protocol::PointResult&& result) { results.at(result.point()) = std::move(result); });
   return results;
 }
 
 TEST(PointSolverTest, EveryPointGivesWhatTheFingerGivesForItAlone) {
-  const Task task = task_of(recipe_with_points(12));
-  const auto results = solved(task);
+  const Batch batch = batch_of(recipe_with_points(12));
+  const auto results = solved(batch);
   const solver::Finger finger({});
-  for (std::uint64_t i = 0; i < task.count; ++i) {
-    const protocol::Point point = task.points->point(i);
+  for (std::uint64_t i = 0; i < batch.count; ++i) {
+    const protocol::Point point = batch.points->point(i);
     const solver::CaseResult expected = finger.solve(point.H_m, point.mu, point.e_star);
     EXPECT_EQ(results[i].error(), "");
     EXPECT_EQ(results[i].point(), i);
@@ -78,7 +80,7 @@ TEST(PointSolverTest, EveryPointGivesWhatTheFingerGivesForItAlone) {
 TEST(PointSolverTest, APointWithoutAnswerFailsWithTheReasonAndTheOthersAreSolved) {
   protocol::Recipe recipe = recipe_with_points(2);
   recipe.mutable_blocks(0)->mutable_axes(0)->add_values(1.19);  // beyond the largest drop
-  const auto results = solved(task_of(recipe));
+  const auto results = solved(batch_of(recipe));
   ASSERT_EQ(results.size(), 4U);
   EXPECT_EQ(results[1].error(), "");
   EXPECT_NE(results[2].error().find("1.19"), std::string::npos) << results[2].error();
@@ -90,7 +92,7 @@ TEST(PointSolverTest, AModelThatMakesNoFingerFailsEachPointWithTheReason) {
   solver::ModelParameters model;
   model.dt_s = 1.0;
   *recipe.mutable_model() = protocol::to_message(model);
-  const auto results = solved(task_of(recipe));
+  const auto results = solved(batch_of(recipe));
   ASSERT_EQ(results.size(), 3U);
   for (const auto& result : results) {
     EXPECT_NE(result.error().find("dt = 1"), std::string::npos) << result.error();

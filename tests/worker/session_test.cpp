@@ -103,7 +103,7 @@ class RunningWorker {
   std::future<int> exit_code_;
 };
 
-void solved_at_once(const Task&, const BatchSolver::NextPoint& next,
+void solved_at_once(const Batch&, const BatchSolver::NextPoint& next,
                     const BatchSolver::TakeResult& take) {
   while (const auto point = next()) {
     take(protocol::failed_point(*point, "for the test"));
@@ -133,9 +133,9 @@ TEST(SessionTest, HeartbeatsGoOnWhileAPointIsSolved) {
   std::promise<void> release;
   const std::shared_future<void> released(release.get_future());
   RunningWorker worker(server.endpoint(),
-                       [&](const Task& task, const auto& next, const auto& take) {
+                       [&](const Batch& batch, const auto& next, const auto& take) {
                          released.wait();
-                         solved_at_once(task, next, take);
+                         solved_at_once(batch, next, take);
                        });
   server.welcome_and_hand_out(1);
   for (int i = 0; i < 5; ++i) {

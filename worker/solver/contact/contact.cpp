@@ -197,7 +197,7 @@ void Contact::happen(ContactEvent event) {
       break;
     case ContactEvent::kSlipForward:
     case ContactEvent::kSlipBackward:
-      law_.start_slip(tip_);
+      law_.start_slip(tip_, event == ContactEvent::kSlipForward ? 1.0 : -1.0);
       if (ft_rate_before > 0.0 && sign_of(ft) * law_.ft_rate_N_s(tip_) < 0.0) {
         record_.add_tangential_peak(ft, t_s_);
       }

@@ -52,9 +52,9 @@ void ContactLaw::turn(const TipState& tip) {
   enter(is_compression() ? PhaseKind::kRestitution : PhaseKind::kCompression);
 }
 
-void ContactLaw::start_slip(const TipState& tip) {
+void ContactLaw::start_slip(const TipState& tip, double direction) {
   anchor(tip);
-  s_ = ft_anchor_N_ > 0.0 ? -1.0 : 1.0;
+  s_ = direction;
   stick_ = false;
 }
 

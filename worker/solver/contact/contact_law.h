@@ -70,8 +70,8 @@ class ContactLaw {
   }
   /// Compression becomes restitution, or the other way; forces are continuous.
   void turn(const TipState& tip);
-  /// P starts to slide, against the friction force.
-  void start_slip(const TipState& tip);
+  /// P starts to slide in `direction`, 1 or -1 along x; the friction force is against it.
+  void start_slip(const TipState& tip, double direction);
   /// P comes to rest. Without friction there is no cone to stick in: P reverses instead.
   void stop_slip(const TipState& tip);
 

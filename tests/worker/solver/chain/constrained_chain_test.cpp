@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <random>
@@ -56,6 +57,35 @@ TEST(ConstrainedChain, ConstraintsHoldForEveryStateOfTheEliminatedOne) {
   constrained.set_constraints(same.q, 1.0, residual);
   for (const double value : residual) {
     EXPECT_EQ(value, 0.0);
+  }
+}
+
+TEST(ConstrainedChain, ConstraintForcesWorkOnNothingButTheBreachOfConstraints) {
+  // For every displacement, dq . (Phi_qᵀ lambda) = lambda . Phi(dq): a joint pushes both of its
+  // links alike, and the pin is the only force from outside.
+  const ConstrainedChain chain(three_links());
+  std::mt19937_64 generator(2);
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  for (int i = 0; i < 20; ++i) {
+    Coordinates dq(chain.size(), 0.0);
+    std::vector<double> multipliers_N(2 * chain.links());
+    std::generate(dq.begin(), dq.end(), [&] { return uniform(generator); });
+    std::generate(multipliers_N.begin(), multipliers_N.end(), [&] { return uniform(generator); });
+    std::vector<double> forces(chain.size(), 0.0);
+    std::vector<double> breach(chain.size(), 0.0);
+    chain.add_constraint_forces(multipliers_N, forces);
+    chain.set_constraints(dq, 1.0, breach);
+    double work = 0.0;
+    double expected = 0.0;
+    for (std::size_t k = 0; k < dq.size(); ++k) {
+      work += dq[k] * forces[k];
+    }
+    for (std::size_t link = 0; link < chain.links(); ++link) {
+      for (std::size_t c = 0; c < 2; ++c) {
+        expected += multipliers_N[2 * link + c] * breach[chain.multiplier_index(link) + c];
+      }
+    }
+    EXPECT_NEAR(work, expected, 1e-13);
   }
 }
 

@@ -118,11 +118,22 @@ TEST(ContactLaw, ForcesAreContinuousWherePStartsToSlideOnTheConeOnEitherSide) {
     const double fn_N = law.fn_N(tip);
     const double ft_N = law.ft_N(tip);
     ASSERT_NEAR(ft_N, side * kParameters.mu * fn_N, 1e-9 * fn_N);
-    law.start_slip(tip);
+    law.start_slip(tip, -side);
     EXPECT_FALSE(law.is_stick());
     EXPECT_EQ(law.slip_direction(), -side);
     EXPECT_EQ(law.fn_N(tip), fn_N);
     EXPECT_NEAR(law.ft_N(tip), ft_N, 1e-12 * fn_N);
+  }
+}
+
+TEST(ContactLaw, WithoutForcePStartsToSlideTheWayItIsTold) {
+  for (const double direction : {-1.0, 1.0}) {
+    ContactLaw law(kParameters, {0.0, 0.0, 0.1, -1.0});
+    ASSERT_TRUE(law.is_stick());
+    law.start_slip({0.0, 0.0, 0.1, -1.0}, direction);
+    EXPECT_EQ(law.slip_direction(), direction);
+    const TipState pressed{0.0, -1e-4, 0.1, -1.0};
+    EXPECT_DOUBLE_EQ(law.ft_N(pressed), -direction * kParameters.mu * law.fn_N(pressed));
   }
 }
 

@@ -28,7 +28,7 @@ struct Told {
     record.add_state(law, tip, t_s);
   }
   void slip(double t_s) {
-    law.start_slip(tip);
+    law.start_slip(tip, law.ft_N(tip) > 0.0 ? -1.0 : 1.0);
     record.add_state(law, tip, t_s);
   }
   void stick(double t_s) {

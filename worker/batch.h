@@ -9,8 +9,9 @@
 namespace oblique::worker {
 
 /// A batch with all that solving it needs.
-struct Task {
-  std::uint64_t number;  ///< counts this worker's tasks; lease numbers may come again, these do not
+struct Batch {
+  std::uint64_t
+      number;  ///< counts this worker's batches; lease numbers may come again, these do not
   std::uint64_t study_id;
   std::uint64_t model;
   std::uint64_t first_point;
@@ -18,13 +19,13 @@ struct Task {
   std::shared_ptr<const protocol::PointTable> points;
 };
 
-/// Points of one task that were solved since the last report of it.
+/// Points of one batch that were solved since the last report of it.
 struct Progress {
-  std::uint64_t task;
+  std::uint64_t batch;
   std::uint64_t study_id;
   std::vector<protocol::PointResult> results;
-  double busy_s;   ///< time spent solving them
-  bool task_done;  ///< no more will come
+  double busy_s;    ///< time spent solving them
+  bool batch_done;  ///< no more will come
 };
 
 }  // namespace oblique::worker

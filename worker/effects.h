@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "proto/oblique.pb.h"
+#include "worker/batch.h"
+
+/// What the conversation decides and the session carries out.
+namespace oblique::worker {
+
+/// Drop the socket, if there is one, with all that waits in it, and open a new one.
+struct Connect {
+  std::string reason;  ///< empty for the first one
+};
+struct Send {
+  protocol::WorkerMessage message;
+};
+struct Solve {
+  Batch batch;
+};
+/// Drop the batches of the study.
+struct DropStudy {
+  std::uint64_t study_id;
+};
+/// Drop that batch.
+struct DropBatch {
+  std::uint64_t number;
+};
+/// Drop all batches: whoever gets their points now is the server's to say.
+struct DropAll {};
+/// Worth a line in the log.
+struct Note {
+  std::string text;
+};
+/// The conversation is over.
+struct Finish {
+  int exit_code;
+  std::string reason;
+};
+
+using Effect = std::variant<Connect, Send, Solve, DropStudy, DropBatch, DropAll, Note, Finish>;
+using Effects = std::vector<Effect>;
+
+}  // namespace oblique::worker
