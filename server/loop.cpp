@@ -201,9 +201,11 @@ class Loop::Parts final : public Outbox {
                                       : std::string_view("\xff", 1);
   }
 
-  /// A flood of connections that must be ended must not become a flood of lines.
+  /// Nobody waits for the queries of a client that has gone. A flood of connections that must be
+  /// ended must not become a flood of lines.
   void note_departures() {
     for (const Departure& departure : network_.take_departures()) {
+      service_->client_left(departure.identity);
       if (!departure.reason.empty() && std::has_single_bit(++ended_connections_)) {
         spdlog::warn("a connection was ended: {} ({} ended so far)", departure.reason,
                      ended_connections_);

@@ -1,30 +1,32 @@
 #include "server/service/service.h"
 
-#include <chrono>
-#include <ctime>
-#include <iomanip>
-#include <sstream>
 #include <utility>
 
-#include "proto/frames.h"
+#include <spdlog/fmt/fmt.h>
+
+#include "server/store/result_row.h"
 
 namespace oblique::server {
 
-std::string iso_8601(Instant now) {
-  const std::time_t seconds = static_cast<std::time_t>(now.utc_ms / 1000);
-  std::tm parts{};
-  gmtime_r(&seconds, &parts);
-  std::ostringstream text;
-  text << std::put_time(&parts, "%Y-%m-%dT%H:%M:%S.") << std::setw(3) << std::setfill('0')
-       << now.utc_ms % 1000 << 'Z';
-  return text.str();
-}
-
-Service::Service(ServiceSettings settings, Outbox& outbox, std::vector<StoredStudy> studies,
+Service::Service(const ServiceSettings& settings, Outbox& outbox, std::vector<StoredStudy> studies,
                  Instant now)
-    : settings_(std::move(settings)), outbox_(outbox), scheduler_(settings_.scheduler) {
+    : outbox_(outbox),
+      scheduler_(settings.scheduler),
+      ledger_(settings.ledger, outbox),
+      bad_frames_(outbox),
+      workers_({settings.heartbeat_interval_ms, settings.scheduler.lost_after_ms,
+                settings.solver_version, settings.database_id, settings.last_worker_id},
+               outbox, outbox, bad_frames_, ledger_),
+      changes_(settings.last_study_id, states_, ledger_, {scheduler_, states_, ledger_, rates_},
+               outbox, outbox),
+      clients_(settings.clients, {outbox,
+                                  outbox,
+                                  bad_frames_,
+                                  changes_,
+                                  workers_,
+                                  {scheduler_, states_, ledger_, rates_}}) {
   for (StoredStudy& study : studies) {
-    studies_.restore(study, now.steady_ms);
+    states_.restore(study, now.steady_ms);
     feed(StudyAdded{study.study_id, study.table, std::move(study.settled), study.failures.size(),
                     study.state == StudyState::kCancelled, study.state == StudyState::kPaused,
                     study.share, study.solver_version, std::move(study.attempts)},
@@ -32,109 +34,67 @@ Service::Service(ServiceSettings settings, Outbox& outbox, std::vector<StoredStu
   }
 }
 
-void Service::feed(const Event& event, Instant now, protocol::Results* message) {
-  handle(event, now, message);
-  while (!found_.empty()) {
-    const Event found = std::move(found_.back());
-    found_.pop_back();
-    handle(found, now, nullptr);
+// ---- Messages, time ---------------------------------------------------------------------------
+
+void Service::worker_frame(const std::string& identity, std::string_view frame, Instant now) {
+  Heard heard = workers_.take(identity, frame, now);
+  for (const Event& event : heard.events) {
+    handle(event, {now, &heard.results});
+  }
+  handle_found(now);
+  hand_out_or_hold(now);
+}
+
+void Service::client_frame(const std::string& identity, std::string_view frame, Instant now) {
+  clients_.take(identity, frame, now);
+}
+
+void Service::tick(Instant now) {
+  workers_.tick([&](WorkerId id) { return scheduler_.silent_ms(id, now.steady_ms); }, now);
+  feed(Tick{}, now);
+  clients_.tick(now);
+  rates_.sample([this](StudyId id) { return settled_of(id); }, now.steady_ms);
+}
+
+void Service::stop(Instant now) {
+  stopping_ = true;
+  hand_out_or_hold(now);
+  workers_.stop();
+  clients_.stop();
+}
+
+bool Service::has_room_for(std::string_view worker) const {
+  const auto known = workers_.find(worker);
+  return !known || ledger_.has_room_for(*known);
+}
+
+// ---- The scheduler ----------------------------------------------------------------------------
+
+void Service::feed(const Event& event, Instant now) {
+  handle(event, {now});
+  handle_found(now);
+}
+
+void Service::handle(const Event& event, Turn turn) {
+  for (const Effect& effect : scheduler_.handle(event, turn.now.steady_ms)) {
+    std::visit([&](const auto& kind) { perform(kind, turn); }, effect);
   }
 }
 
-void Service::handle(const Event& event, Instant now, protocol::Results* message) {
-  for (const Effect& effect : scheduler_.handle(event, now.steady_ms)) {
-    perform(effect, now, message);
-  }
-}
-
-void Service::perform(const Effect& effect, Instant now, protocol::Results* message) {
-  protocol::ServerToWorker out;
-  if (const auto* define = std::get_if<DefineStudy>(&effect)) {
-    define_study(*define);
-  } else if (const auto* batch = std::get_if<SendBatch>(&effect)) {
-    auto& fields = *out.mutable_batch();
-    fields.set_study_id(batch->study);
-    fields.set_model(batch->model);
-    fields.set_first_point(batch->first_point);
-    fields.set_count(batch->count);
-    fields.set_attempt(batch->attempt);
-    fields.set_lease_id(batch->lease);
-    send(batch->worker, out);
-  } else if (const auto* probe = std::get_if<SendProbe>(&effect)) {
-    send_probe(*probe);
-  } else if (const auto* store = std::get_if<StoreResults>(&effect)) {
-    write_results(*store, *message, now);
-  } else if (const auto* failure = std::get_if<StoreFailure>(&effect)) {
-    write_failure(*failure, now);
-  } else if (const auto* stored = std::get_if<AcknowledgeResults>(&effect)) {
-    out.mutable_results_stored()->set_sequence(stored->sequence);
-    send(stored->worker, out);
-  } else if (const auto* withdraw = std::get_if<WithdrawStudy>(&effect)) {
-    out.mutable_withdraw()->set_study_id(withdraw->study);
-    send(withdraw->worker, out);
-  } else if (const auto* release = std::get_if<ReleaseBatch>(&effect)) {
-    out.mutable_release()->set_lease_id(release->lease);
-    send(release->worker, out);
-  } else if (const auto* drop = std::get_if<DropWorker>(&effect)) {
-    const auto peer = peers_.find(drop->worker);
-    note_of_worker(Severity::kWarning,
-                   "worker " + std::to_string(drop->worker) + " (" +
-                       (peer == peers_.end() ? "" : peer->second.name) +
-                       ") is lost: " + drop->reason,
-                   now);
-    forget(drop->worker);
-  } else if (const auto* finished = std::get_if<StudyFinished>(&effect)) {
-    if (studies_.finish(finished->study)) {
-      outbox_.note(Severity::kInfo, "study " + studies_.record(finished->study).name + " is done");
-      write(SetStudyState{finished->study, StudyState::kDone, iso_8601(now)}, OfNothing{}, false);
+/// What came to light while messages went out to workers.
+void Service::handle_found(Instant now) {
+  for (auto found = workers_.take_found(); !found.empty(); found = workers_.take_found()) {
+    for (const Event& event : found) {
+      handle(event, {now});
     }
   }
 }
 
-void Service::send(WorkerId worker, const protocol::ServerToWorker& message) {
-  const auto peer = peers_.find(worker);
-  const bool is_of_version_2 = message.has_release() || message.has_notice();
-  if (peer != peers_.end() && is_of_version_2 && peer->second.protocol_version < 2) {
-    return;
+void Service::hand_out_or_hold(Instant now) {
+  const bool holds = stopping_ || ledger_.holds_batches();
+  if (std::exchange(holds_batches_, holds) != holds) {
+    feed(DispatchHeld{holds}, now);
   }
-  if (peer == peers_.end()) {
-    return;
-  }
-  note_delivery(worker, peer->second, outbox_.to_worker(peer->second.identity, message));
-}
-
-void Service::note_delivery(WorkerId worker, Peer& peer, Delivery delivery) {
-  if (delivery == Delivery::kGone) {
-    found_.emplace_back(WorkerUnreachable{worker});
-  } else if (delivery == Delivery::kBusy && !std::exchange(peer.is_busy, true)) {
-    found_.emplace_back(WorkerBusy{worker, true});
-  }
-}
-
-/// The recipe goes out as it is kept: encoding a long one again for each worker would hold up the
-/// others.
-void Service::define_study(const DefineStudy& effect) {
-  const auto peer = peers_.find(effect.worker);
-  if (peer == peers_.end()) {
-    return;
-  }
-  const std::string frame =
-      protocol::definition_around(effect.study, studies_.record(effect.study).table.recipe_bytes());
-  note_delivery(effect.worker, peer->second,
-                outbox_.forward_to_worker(peer->second.identity, frame));
-}
-
-// ---- Time -------------------------------------------------------------------------------------
-
-void Service::tick(Instant now) {
-  look_after_workers(now);
-  feed(Tick{}, now);
-  tell_of_queries(now);
-  if (const std::uint64_t more = worker_notes_.take_left_out(now.steady_ms); more > 0) {
-    outbox_.note(Severity::kInfo,
-                 "and " + std::to_string(more) + " more lines of workers that come and go");
-  }
-  rates_.sample([this](StudyId id) { return settled_of(id); }, now.steady_ms);
 }
 
 std::uint64_t Service::settled_of(StudyId id) const {
@@ -142,69 +102,183 @@ std::uint64_t Service::settled_of(StudyId id) const {
   return counts.solved + counts.failed;
 }
 
-/// Before the points of `event` count as settled.
-void Service::note_rate(const ResultsStored& event, Instant now) {
-  if (studies_.contains(event.study) && !event.outcomes.empty()) {
-    rates_.note(event.study, settled_of(event.study), studies_.record(event.study).since_ms,
-                now.steady_ms);
+void Service::perform(const DefineStudy& effect, Turn /*turn*/) {
+  workers_.define(effect, states_.record(effect.study).table.recipe_bytes());
+}
+
+void Service::perform(const SendBatch& effect, Turn /*turn*/) {
+  workers_.send(effect);
+}
+
+void Service::perform(const SendProbe& effect, Turn /*turn*/) {
+  workers_.send(effect);
+}
+
+void Service::perform(const AcknowledgeResults& effect, Turn /*turn*/) {
+  workers_.send(effect);
+}
+
+void Service::perform(const WithdrawStudy& effect, Turn /*turn*/) {
+  workers_.send(effect);
+}
+
+void Service::perform(const ReleaseBatch& effect, Turn /*turn*/) {
+  workers_.send(effect);
+}
+
+void Service::perform(const DropWorker& effect, Turn turn) {
+  workers_.drop(effect, turn.now);
+}
+
+void Service::perform(const StoreResults& effect, Turn turn) {
+  const WorkerRecord& worker = *workers_.find(effect.worker);
+  protocol::Results& message = *turn.results;
+  const std::size_t bytes = message.ByteSizeLong();
+  const bool any = !effect.accepted.empty() && states_.contains(effect.study);
+  if (any && workers_.needs_row(effect.worker)) {
+    // Whoever only comes and goes leaves no row.
+    ledger_.write(AddWorker{effect.worker, worker.name, worker.threads, worker.solver_version,
+                            worker.instruction_set, worker.joined_at},
+                  QuietWrite{});
+  }
+  AddResults change{
+      effect.study,           any ? states_.record(effect.study).table.get() : nullptr,
+      effect.worker,          worker.solver_version,
+      worker.instruction_set, message.attempt(),
+      iso_8601(turn.now),     {}};
+  ResultsWrite write{{effect.worker, effect.study, effect.sequence, {}}, message.attempt(), bytes};
+  for (const std::size_t index : effect.accepted) {
+    protocol::PointResult& result = *message.mutable_results(static_cast<int>(index));
+    write.event.outcomes.push_back({result.point(), !result.error().empty()});
+    change.results.push_back(std::move(result));
+  }
+  ledger_.write(std::move(change), std::move(write));
+}
+
+void Service::perform(const StoreFailure& effect, Turn turn) {
+  const StudyRecord& study = states_.record(effect.study);
+  outbox_.note(Severity::kWarning, fmt::format("point {} of study {} failed: {}", effect.point,
+                                               study.name, effect.reason));
+  AddResults change{effect.study,
+                    study.table.get(),
+                    0,
+                    {},
+                    {},
+                    effect.attempt,
+                    iso_8601(turn.now),
+                    {protocol::failed_point(effect.point, effect.reason)}};
+  ledger_.write(std::move(change),
+                ResultsWrite{{0, effect.study, 0, {{effect.point, true}}}, effect.attempt, 0});
+}
+
+void Service::perform(const StudyFinished& effect, Turn turn) {
+  if (states_.finish(effect.study)) {
+    outbox_.note(Severity::kInfo,
+                 fmt::format("study {} is done", states_.record(effect.study).name));
+    ledger_.write(SetStudyState{effect.study, StudyState::kDone, iso_8601(turn.now)}, QuietWrite{});
   }
 }
 
-void Service::look_after_workers(Instant now) {
-  // A heartbeat is late: sending shows whether the connection is gone, as that of a killed process
-  // is, long before the silence would. A worker whose messages wait here must hear something too.
-  protocol::ServerToWorker sign;
-  sign.mutable_heartbeat_reply();
-  const std::int64_t late_ms = settings_.heartbeat_interval_ms * 5 / 4;
-  for (auto& [id, peer] : peers_) {
-    if (scheduler_.silent_ms(id, now.steady_ms) > late_ms) {
-      send(id, sign);
-      if (!has_room_for(peer)) {
-        found_.emplace_back(CreditGiven{id, 0});  // it is not silent: it is not heard
+// ---- The database -----------------------------------------------------------------------------
+
+void Service::written(const WriteReport& report, Instant now) {
+  switch (report.kind) {
+    case WriteReport::Kind::kFault:
+      outbox_.note(Severity::kError, "results wait, nothing is handed out: " + report.error);
+      ledger_.note_fault(report.error);
+      break;
+    case WriteReport::Kind::kRecovered:
+      outbox_.note(Severity::kInfo, "the database takes results again");
+      ledger_.note_recovery();
+      break;
+    case WriteReport::Kind::kGone:
+      lose_storage(report.error, now);
+      break;
+    case WriteReport::Kind::kUnmerged:
+      outbox_.note(Severity::kWarning,
+                   fmt::format("the write-ahead log, the file beside the database that ends in "
+                               "-wal, is not yet merged into it: {}. Until then a copy needs both "
+                               "files; `oblique backup` makes one that is whole",
+                               report.error));
+      break;
+    case WriteReport::Kind::kStored:
+      if (const auto meaning = ledger_.settle(report.ticket)) {
+        std::visit([&](const auto& write) { stored(write, now); }, *meaning);
       }
+      break;
+    case WriteReport::Kind::kRefused:
+      if (const auto meaning = ledger_.settle(report.ticket)) {
+        std::visit([&](const auto& write) { refused(write, report.error); }, *meaning);
+      }
+      break;
+  }
+  hand_out_or_hold(now);
+}
+
+/// Nobody is told that something is stored from here on.
+void Service::lose_storage(const std::string& error, Instant now) {
+  outbox_.note(Severity::kError, error);
+  for (const Meaning& meaning : ledger_.abandon(error)) {
+    std::visit([&](const auto& write) { refused(write, error); }, meaning);
+  }
+  workers_.notice(error);
+  stop(now);
+}
+
+void Service::stored(const ResultsWrite& write, Instant now) {
+  const StudyId id = write.event.study;
+  for (const PointOutcome& outcome : write.event.outcomes) {
+    if (outcome.failed) {
+      states_.point_failed(id, outcome.point, write.attempt);
     }
-    if (peer.is_busy && !outbox_.is_busy(peer.identity)) {
-      peer.is_busy = false;
-      found_.emplace_back(WorkerBusy{id, false});
-    }
   }
+  if (!write.event.outcomes.empty()) {
+    rates_.note(id, settled_of(id), states_.record(id).since_ms, now.steady_ms);
+  }
+  feed(write.event, now);
 }
 
-bool Service::has_room_for(std::string_view worker) const {
-  const auto known = worker_ids_.find(worker);
-  return known == worker_ids_.end() || has_room_for(peers_.at(known->second));
+void Service::stored(const StudyWrite& write, Instant now) {
+  feed(changes_.stored(write, now), now);
+  changes_.answer(write, now);
 }
 
-bool Service::has_room_for(const Peer& peer) const {
-  return peer.unstored_bytes < settings_.unstored_bytes_of_worker &&
-         unstored_bytes_ < settings_.unstored_bytes;
+void Service::stored(const StateWrite& write, Instant now) {
+  feed(changes_.stored(write, now), now);
+  changes_.answer(write, now);
 }
 
-void Service::hold_while_disk_is_behind(Instant now) {
-  const std::size_t parts = disk_is_behind_ ? 2 : 1;
-  const bool is_behind = unstored_bytes_ >= settings_.unstored_bytes_to_hold / parts ||
-                         writes_.size() >= settings_.unstored_messages_to_hold / parts;
-  if (is_behind != disk_is_behind_) {
-    disk_is_behind_ = is_behind;
-    feed(DispatchHeld{stopping_ || !storage_fault_.empty() || is_behind}, now);
-  }
+void Service::stored(const ShareWrite& write, Instant now) {
+  feed(changes_.stored(write, now), now);
+  changes_.answer(write, now);
 }
 
-void Service::stop(Instant now) {
-  stopping_ = true;
-  feed(DispatchHeld{true}, now);
-  for (const auto& [ticket, request] : std::exchange(long_requests_, {})) {
-    reply_error(request.client, "the server is stopping: ask again when it is back");
-  }
-  protocol::ServerToWorker message;
-  message.mutable_stopping();
-  for (const auto& [id, peer] : peers_) {
-    outbox_.to_worker(peer.identity, message);
-  }
-  for (const auto& [ticket, query] : queries_) {
-    reply_error(query.client, "the server is stopping: ask again when it runs");
-  }
-  queries_.clear();
+void Service::stored(const FailuresWrite& write, Instant now) {
+  rates_.forget(write.study);  // fewer points are settled now: no rate can be had of that
+  feed(changes_.stored(write, now), now);
+  changes_.answer(write, now);
+}
+
+void Service::stored(const QuietWrite& /*write*/, Instant /*now*/) {}
+
+/// The writer keeps these until it can write them; when the database is gone, workers keep results.
+void Service::refused(const ResultsWrite& /*write*/, const std::string& /*error*/) {}
+void Service::refused(const QuietWrite& /*write*/, const std::string& /*error*/) {}
+
+void Service::refused(const StudyWrite& write, const std::string& error) {
+  changes_.refused(write, error);
+}
+
+void Service::refused(const StateWrite& write, const std::string& error) {
+  changes_.refused(write, error);
+}
+
+void Service::refused(const ShareWrite& write, const std::string& error) {
+  changes_.refused(write, error);
+}
+
+void Service::refused(const FailuresWrite& write, const std::string& error) {
+  changes_.refused(write, error);
 }
 
 }  // namespace oblique::server

@@ -38,7 +38,7 @@ class ServiceLoadTest : public ServiceTest {
 
 TEST_F(ServiceLoadTest, NoBatchGoesOutWhileTheDiskIsFarBehind) {
   ServiceSettings settings;
-  settings.unstored_bytes_to_hold = 1000;
+  settings.ledger.bytes_to_hold = 1000;
   begin(settings);
   credit(1);
   EXPECT_EQ(batches_sent(), 1U);
@@ -53,7 +53,7 @@ TEST_F(ServiceLoadTest, NoBatchGoesOutWhileTheDiskIsFarBehind) {
 
 TEST_F(ServiceLoadTest, AFaultThatIsOverHandsOutNothingWhileTheDiskIsFarBehind) {
   ServiceSettings settings;
-  settings.unstored_bytes_to_hold = 1000;
+  settings.ledger.bytes_to_hold = 1000;
   begin(settings);
   service_->written({WriteReport::Kind::kFault, 0, "disk full"}, now_);
   for (std::uint64_t point = 900; point < 910; ++point) {
@@ -68,7 +68,7 @@ TEST_F(ServiceLoadTest, AFaultThatIsOverHandsOutNothingWhileTheDiskIsFarBehind) 
 
 TEST_F(ServiceLoadTest, NoBatchGoesOutWhileManyMessagesWaitForTheDisk) {
   ServiceSettings settings;
-  settings.unstored_messages_to_hold = 4;
+  settings.ledger.messages_to_hold = 4;
   begin(settings);
   for (std::uint64_t point = 900; point < 904; ++point) {
     worker_says(one_result(point));
@@ -81,7 +81,7 @@ TEST_F(ServiceLoadTest, NoBatchGoesOutWhileManyMessagesWaitForTheDisk) {
 
 TEST_F(ServiceLoadTest, AWorkerFarAheadOfTheDiskIsNotHeardUntilMoreIsStored) {
   ServiceSettings settings;
-  settings.unstored_bytes_of_worker = 500;
+  settings.ledger.bytes_of_worker = 500;
   begin(settings);
   hello("another");
   write_all();
@@ -97,7 +97,7 @@ TEST_F(ServiceLoadTest, AWorkerFarAheadOfTheDiskIsNotHeardUntilMoreIsStored) {
 
 TEST_F(ServiceLoadTest, AllWorkersTogetherAreNotHeardWhileTooMuchWaitsForTheDisk) {
   ServiceSettings settings;
-  settings.unstored_bytes = 500;
+  settings.ledger.bytes = 500;
   begin(settings);
   hello("another");
   write_all();
@@ -111,7 +111,7 @@ TEST_F(ServiceLoadTest, AllWorkersTogetherAreNotHeardWhileTooMuchWaitsForTheDisk
 
 TEST_F(ServiceLoadTest, AWorkerThatIsNotHeardIsNotTakenForSilentAndHearsThatTheServerLives) {
   ServiceSettings settings;
-  settings.unstored_bytes_of_worker = 1;
+  settings.ledger.bytes_of_worker = 1;
   begin(settings);
   worker_says(one_result(900));
   outbox_.worker_messages.clear();

@@ -171,8 +171,8 @@ class FloodedServiceTest : public ServiceTest {
   FloodedServiceTest() {
     ServiceSettings settings;
     settings.solver_version = "1.0";
-    settings.most_unstored_messages = 3;
-    settings.most_waiting_changes = 2;
+    settings.ledger.most_messages_of_worker = 3;
+    settings.ledger.most_changes = 2;
     service_.emplace(settings, outbox_, std::vector<StoredStudy>{}, now_);
   }
 };

@@ -69,6 +69,17 @@ TEST_F(ServiceQueryTest, TheQueryOfAClientThatIsGoneIsCancelled) {
   EXPECT_TRUE(outbox_.replies.empty());
 }
 
+TEST_F(ServiceQueryTest, TheQueriesOfAClientThatLeavesAreCancelledAtOnceAndNobodyElses) {
+  ask(7);
+  ask(8, "another");
+  service_->client_left("client");
+  EXPECT_EQ(outbox_.cancelled_queries, std::vector{outbox_.queries[0].ticket});
+  answer_query(0, encoded_error("too late"));
+  EXPECT_TRUE(outbox_.replies.empty());
+  answer_query(1, encoded_error("in time"));
+  EXPECT_EQ(last_reply().request_id(), 8U);
+}
+
 TEST_F(ServiceQueryTest, AQueryAskedTwiceUnderOneNumberRunsOnce) {
   ask(7);
   ask(7);

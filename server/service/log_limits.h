@@ -1,10 +1,17 @@
 #pragma once
 
+#include <bit>
 #include <cstdint>
+#include <string_view>
 
+#include <spdlog/fmt/fmt.h>
+
+#include "server/service/outbox.h"
+
+// What peers can cause without end must not become a flood of lines in the log.
 namespace oblique::server {
 
-/// Keeps lines of one kind that peers can cause from flooding the log: so many are written in a
+/// Keeps lines of one kind that peers can cause rare: so many are written in a
 /// span of time, and of the rest only the number.
 class NoteRate {
  public:
@@ -44,6 +51,28 @@ class NoteRate {
   std::uint64_t written_ = 0;
   std::uint64_t left_out_ = 0;
   std::uint64_t left_out_before_ = 0;
+};
+
+/// Counts frames that no sound peer sends. A flood of them does not become a flood of lines.
+class BadFrames {
+ public:
+  explicit BadFrames(ToLog& log) : log_(log) {}
+
+  /// Of a peer that is given up, for a reason that is said elsewhere.
+  void count() { ++count_; }
+  /// Of `who` nothing else is said.
+  void count(std::string_view who) {
+    ++count_;
+    if (std::has_single_bit(count_)) {
+      log_.note(Severity::kWarning,
+                fmt::format("{} sent a frame that is no message ({} of them so far)", who, count_));
+    }
+  }
+  std::uint64_t total() const { return count_; }
+
+ private:
+  ToLog& log_;
+  std::uint64_t count_ = 0;
 };
 
 }  // namespace oblique::server

@@ -1,0 +1,191 @@
+#include "server/service/clients_desk.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "proto/frame_scan.h"
+#include "proto/frames.h"
+
+namespace oblique::server {
+namespace {
+
+/// A page ends when it has so many bytes, whatever its number of lines.
+constexpr std::size_t kMostPageBytes = std::size_t{1} << 20U;
+
+/// Lines of a page for a client that asks for so many; 0: for as many as there may be.
+std::size_t page_size(std::uint32_t asked, std::size_t largest) {
+  return asked == 0 ? largest : std::min<std::size_t>(asked, largest);
+}
+
+}  // namespace
+
+ClientsDesk::ClientsDesk(const ClientsDeskSettings& settings, const Neighbours& neighbours)
+    : settings_(settings),
+      at_(neighbours),
+      queries_(at_.clients, at_.readers, settings.still_working_every_ms) {}
+
+void ClientsDesk::take(const std::string& identity, std::string_view frame, Instant now) {
+  if (frame.size() > settings_.longest_inline_bytes) {
+    read_elsewhere(identity, frame);
+    return;
+  }
+  const ReadRequest read = read_request(frame);
+  answer({identity, read.request_id}, read, now);
+}
+
+/// Of one client few wait, so that the others find room.
+void ClientsDesk::read_elsewhere(const std::string& identity, std::string_view frame) {
+  const Client client{identity, protocol::request_id_of(frame)};
+  std::size_t bytes = frame.size();
+  std::size_t of_client = 0;
+  for (const auto& [ticket, request] : long_requests_) {
+    if (client.request_id != 0 && request.client == client) {
+      return;  // it is sent again because the answer takes long; it waits already
+    }
+    bytes += request.bytes;
+    of_client += request.client.identity == identity ? 1U : 0U;
+  }
+  if (stopping_) {
+    at_.clients.reply_error(client, "the server is stopping: ask again when it is back");
+  } else if (long_requests_.size() >= settings_.most_long_requests ||
+             of_client >= settings_.most_long_requests_of_one ||
+             bytes > settings_.most_long_bytes) {
+    at_.clients.reply_error(client, "too many long requests wait already: ask again later");
+  } else {
+    const std::uint64_t ticket = ++last_ticket_;
+    long_requests_.emplace(ticket, LongRequest{client, frame.size()});
+    at_.readers.read({ticket, std::string(frame)});
+  }
+}
+
+void ClientsDesk::request_read(const ReadReport& report, Instant now) {
+  const auto found = long_requests_.find(report.ticket);
+  if (found == long_requests_.end()) {
+    return;
+  }
+  const std::string identity = found->second.client.identity;
+  long_requests_.erase(found);
+  answer({identity, report.read.request_id}, report.read, now);
+}
+
+/// Says why, if there is a reason that does not lie in what is asked.
+bool ClientsDesk::refuse(const Client& client, const ReadRequest& read) {
+  const protocol::ClientRequest& request = read.request;
+  const WriteLedger& ledger = at_.sources.ledger;
+  std::string reason;
+  if (!read.is_readable) {
+    at_.bad_frames.count("a client");
+    reason = "the request cannot be read";
+  } else if (request.protocol_version() == 0) {
+    at_.bad_frames.count("a client");
+    reason = "this is the port for clients; workers connect to the other one";
+  } else if (reason = protocol::objection_to_version(request.protocol_version(), "client");
+             !reason.empty()) {
+    // that is it
+  } else if ((request.has_submit() || request.has_change()) && ledger.takes_no_change()) {
+    reason = "too many changes wait for the disk already: ask again later";
+  } else if (ledger.is_gone() && !request.has_status() && !request.has_workers()) {
+    reason = ledger.fault();
+  }
+  if (reason.empty()) {
+    return false;
+  }
+  at_.clients.reply_error(client, reason);
+  return true;
+}
+
+void ClientsDesk::answer(const Client& client, const ReadRequest& read, Instant now) {
+  if (refuse(client, read)) {
+    return;
+  }
+  const protocol::ClientRequest& request = read.request;
+  using Kind = protocol::ClientRequest;
+  switch (request.kind_case()) {
+    case Kind::kSubmit:
+      submit(client, read, now);
+      break;
+    case Kind::kStatus:
+      status(client, request.status(), now);
+      break;
+    case Kind::kWorkers:
+      workers(client, request.workers(), now);
+      break;
+    case Kind::kChange:
+      at_.changes.change(client, request.change(), now);
+      break;
+    case Kind::kQuery:
+      queries_.ask(client, request.query(), now);
+      break;
+    case Kind::KIND_NOT_SET:
+      at_.bad_frames.count("a client");
+      at_.clients.reply_error(client, "the server does not know this kind of request");
+      break;
+  }
+}
+
+void ClientsDesk::submit(const Client& client, const ReadRequest& read, Instant now) {
+  if (stopping_) {
+    at_.clients.reply_error(client, "the server is stopping: submit again when it is back");
+  } else {
+    at_.changes.submit(client, read, now);
+  }
+}
+
+void ClientsDesk::status(const Client& client, const protocol::StatusRequest& request,
+                         Instant now) {
+  protocol::ClientReply reply;
+  reply.set_request_id(client.request_id);
+  auto& fields = *reply.mutable_status();
+  fields.set_workers(static_cast<std::uint32_t>(at_.sources.scheduler.workers()));
+  if (!request.study().empty()) {
+    const auto known = at_.sources.states.find_durable(request.study());
+    if (!known) {
+      at_.clients.reply_error(client, unknown_study(request.study()));
+      return;
+    }
+    *fields.add_studies() = to_message(view_of(*known, at_.sources, now));
+    at_.clients.to_client(client.identity, reply);
+    return;
+  }
+  const std::size_t most = page_size(request.limit(), settings_.largest_page);
+  std::size_t bytes = 0;
+  for (auto id = at_.sources.states.durable_after(request.after_study_id()); id;
+       id = at_.sources.states.durable_after(*id)) {
+    if (static_cast<std::size_t>(fields.studies_size()) == most || bytes > kMostPageBytes) {
+      fields.set_next_after(fields.studies(fields.studies_size() - 1).study_id());
+      break;
+    }
+    *fields.add_studies() = to_message(view_of(*id, at_.sources, now));
+    bytes += fields.studies(fields.studies_size() - 1).ByteSizeLong();
+  }
+  at_.clients.to_client(client.identity, reply);
+}
+
+void ClientsDesk::workers(const Client& client, const protocol::WorkersRequest& request,
+                          Instant now) {
+  protocol::ClientReply reply;
+  reply.set_request_id(client.request_id);
+  auto& fields = *reply.mutable_workers();
+  fields.set_bad_frames(at_.bad_frames.total());
+  const std::size_t most = page_size(request.limit(), settings_.largest_page);
+  for (auto id = at_.workers.next_after(request.after_worker_id()); id;
+       id = at_.workers.next_after(*id)) {
+    if (static_cast<std::size_t>(fields.workers_size()) == most) {
+      fields.set_next_after(fields.workers(fields.workers_size() - 1).worker_id());
+      break;
+    }
+    *fields.add_workers() =
+        to_message(view_of(*id, *at_.workers.find(*id), at_.sources.scheduler, now));
+  }
+  at_.clients.to_client(client.identity, reply);
+}
+
+void ClientsDesk::stop() {
+  stopping_ = true;
+  for (const auto& [ticket, request] : std::exchange(long_requests_, {})) {
+    at_.clients.reply_error(request.client, "the server is stopping: ask again when it is back");
+  }
+  queries_.stop();
+}
+
+}  // namespace oblique::server

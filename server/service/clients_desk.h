@@ -1,0 +1,82 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "proto/oblique.pb.h"
+#include "server/service/log_limits.h"
+#include "server/service/outbox.h"
+#include "server/service/request_reader.h"
+#include "server/service/study_changes.h"
+#include "server/service/views.h"
+#include "server/service/waiting_queries.h"
+#include "server/service/workers_desk.h"
+
+namespace oblique::server {
+
+struct ClientsDeskSettings {
+  /// How often a client hears that its query waits or runs, by which the server also finds out that
+  /// the client is gone.
+  std::int64_t still_working_every_ms = 1000;
+  /// Longer requests are read on a thread of their own; so many of them wait there at most.
+  std::size_t longest_inline_bytes = std::size_t{64} * 1024;
+  std::size_t most_long_requests = 64;
+  std::size_t most_long_requests_of_one = 2;  ///< client
+  std::size_t most_long_bytes = std::size_t{64} * 1024 * 1024;
+  std::size_t largest_page = 1000;  ///< studies or workers in one reply
+};
+
+/// Speaks with clients: takes their requests, shows them how things stand, in pages where that is
+/// long, and passes on what is to be changed, queried or read elsewhere. Every frame is taken for
+/// hostile until it is parsed. Not thread-safe.
+class ClientsDesk {
+ public:
+  /// All of these must outlive the desk.
+  struct Neighbours {
+    ToClients& clients;
+    ToReaders& readers;
+    BadFrames& bad_frames;
+    StudyChanges& changes;
+    const WorkersDesk& workers;
+    StudySources sources;
+  };
+
+  ClientsDesk(const ClientsDeskSettings& settings, const Neighbours& neighbours);
+
+  void take(const std::string& identity, std::string_view frame, Instant now);
+  /// A long request was read.
+  void request_read(const ReadReport& report, Instant now);
+  void queried(QueryReport report) { queries_.report(std::move(report)); }
+  /// The connection of that client is gone, and nothing of it waits to be taken.
+  void client_left(std::string_view identity) { queries_.client_left(identity); }
+  /// To be called several times a second.
+  void tick(Instant now) { queries_.tick(now); }
+  /// The server stops: who waits here is told, and what is asked from now on is refused.
+  void stop();
+
+ private:
+  struct LongRequest {
+    Client client;
+    std::size_t bytes;
+  };
+
+  void read_elsewhere(const std::string& identity, std::string_view frame);
+  bool refuse(const Client& client, const ReadRequest& read);
+  void answer(const Client& client, const ReadRequest& read, Instant now);
+  void submit(const Client& client, const ReadRequest& read, Instant now);
+  void status(const Client& client, const protocol::StatusRequest& request, Instant now);
+  void workers(const Client& client, const protocol::WorkersRequest& request, Instant now);
+
+  ClientsDeskSettings settings_;
+  Neighbours at_;
+  WaitingQueries queries_;
+  std::map<std::uint64_t, LongRequest> long_requests_;  // by ticket
+  std::uint64_t last_ticket_ = 0;
+  bool stopping_ = false;
+};
+
+}  // namespace oblique::server

@@ -1,0 +1,89 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "proto/oblique.pb.h"
+#include "server/network/delivery.h"
+#include "server/queries/query_turns.h"
+#include "server/service/request_reader.h"
+#include "server/store/writer.h"
+
+// What the service asks of the world around it, by whom it asks it. Nothing here may block or call
+// the service back.
+namespace oblique::server {
+
+/// A moment by two clocks.
+struct Instant {
+  std::int64_t steady_ms;  ///< never runs backwards
+  std::int64_t utc_ms;     ///< since 1970
+};
+
+/// UTC in ISO 8601 with milliseconds.
+std::string iso_8601(Instant now);
+
+/// Who waits for a reply.
+struct Client {
+  std::string identity;
+  std::uint64_t request_id;
+
+  bool operator==(const Client&) const = default;
+};
+
+class ToWorkers {
+ public:
+  virtual ~ToWorkers() = default;
+  virtual Delivery to_worker(const std::string& identity,
+                             const protocol::ServerToWorker& message) = 0;
+  /// The same for a message that is encoded already.
+  virtual Delivery forward_to_worker(const std::string& identity, const std::string& frame) = 0;
+  /// More waits to go out to that worker than should.
+  virtual bool is_busy(const std::string& identity) const = 0;
+};
+
+class ToClients {
+ public:
+  virtual ~ToClients() = default;
+  /// False when the client is gone; the reply is dropped then: it asks again.
+  virtual bool to_client(const std::string& identity, const protocol::ClientReply& reply) = 0;
+  /// The same for a reply that is encoded already.
+  virtual bool forward_to_client(const std::string& identity, const std::string& frame) = 0;
+
+  /// The client's request failed, for this reason.
+  void reply_error(const Client& client, const std::string& message);
+};
+
+class ToWriter {
+ public:
+  virtual ~ToWriter() = default;
+  /// `Service::written` is called once the job's fate is known.
+  virtual void write(WriteJob job) = 0;
+};
+
+class ToReaders {
+ public:
+  virtual ~ToReaders() = default;
+  /// `Service::queried` is called with the answer. False when too many queries wait.
+  virtual bool query(QueryJob job) = 0;
+  /// Nobody waits for that query any more.
+  virtual void cancel_query(std::uint64_t ticket) = 0;
+  /// `Service::request_read` is called with what the frame says.
+  virtual void read(ReadJob job) = 0;
+};
+
+enum class Severity { kInfo, kWarning, kError };
+
+class ToLog {
+ public:
+  virtual ~ToLog() = default;
+  virtual void note(Severity severity, const std::string& text) = 0;
+};
+
+/// All of them; the loop is one, and tests put theirs in its place.
+class Outbox : public ToWorkers,
+               public ToClients,
+               public ToWriter,
+               public ToReaders,
+               public ToLog {};
+
+}  // namespace oblique::server

@@ -1,0 +1,275 @@
+#include "server/service/study_changes.h"
+
+#include <stdexcept>
+#include <utility>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "proto/recipe/study_name.h"
+#include "proto/text.h"
+
+namespace oblique::server {
+namespace {
+
+constexpr std::size_t kLongestShownName = 200;
+
+/// Why studies cannot share the workers so, or an empty text.
+std::string objection_to_share(const StudyShare& share) {
+  constexpr std::int32_t kHighestPriority = 1000;
+  constexpr double kLeastWeight = 0.001;
+  constexpr double kLargestWeight = 1000.0;
+  if (share.priority < -kHighestPriority || share.priority > kHighestPriority) {
+    return "priority = " + std::to_string(share.priority) + " is not allowed: -1000 to 1000 is";
+  }
+  if (!(share.weight >= kLeastWeight && share.weight <= kLargestWeight)) {
+    return "weight = " + std::to_string(share.weight) + " is not allowed: 0.001 to 1000 is";
+  }
+  return {};
+}
+
+/// What the request says of the share, and for the rest what is.
+StudyShare asked_share(const protocol::SubmitRequest& request, StudyShare share) {
+  if (request.has_priority()) {
+    share.priority = request.priority();
+  }
+  if (request.has_weight() && request.weight() != 0.0) {
+    share.weight = request.weight();
+  }
+  if (request.has_mixes_versions()) {
+    share.mixes_versions = request.mixes_versions();
+  }
+  return share;
+}
+
+}  // namespace
+
+std::string unknown_study(const std::string& name) {
+  return fmt::format("there is no study called \"{}\": `oblique studies` lists all",
+                     protocol::shortened(name, kLongestShownName));
+}
+
+// ---- What is asked ----------------------------------------------------------------------------
+
+void StudyChanges::submit(const Client& client, const ReadRequest& read, Instant now) {
+  const protocol::SubmitRequest& request = read.request.submit();
+  if (const std::string reason = protocol::objection_to_study_name(request.name());
+      !reason.empty()) {
+    clients_.reply_error(client, reason);
+    return;
+  }
+  const auto known = states_.find(request.name());
+  const StudyShare share =
+      asked_share(request, known ? states_.record(*known).share : StudyShare{});
+  if (const std::string reason = objection_to_share(share); !reason.empty()) {
+    clients_.reply_error(client, reason);
+    return;
+  }
+  if (!read.objection.empty()) {
+    clients_.reply_error(client, read.objection);
+    return;
+  }
+  if (!known) {
+    add(client, read, share, now);
+    return;
+  }
+  const StudyRecord& study = states_.record(*known);
+  if (study.table.recipe_bytes() != read.table.recipe_bytes()) {
+    clients_.reply_error(
+        client, fmt::format("there is a study called \"{}\" with other points or another model: "
+                            "give this one another name, or use another database",
+                            request.name()));
+  } else if (states_.is_durable(*known) && !(study.share == share)) {
+    ledger_.write(SetStudyShare{*known, share}, ShareWrite{*known, share, client});
+  } else {
+    go_on(client, *known, now);
+  }
+}
+
+void StudyChanges::add(const Client& client, const ReadRequest& read, const StudyShare& share,
+                       Instant now) {
+  const StudyId id = ++last_study_id_;
+  const std::string& name = read.request.submit().name();
+  const std::string created_at = iso_8601(now);
+  states_.add(id, {name, read.table, created_at, share, {}, {}, now.steady_ms});
+  submitters_[id].push_back(client);
+  ledger_.write(AddStudy{id, name, read.table, created_at, share}, StudyWrite{id});
+}
+
+/// Submitted again.
+void StudyChanges::go_on(const Client& client, StudyId id, Instant now) {
+  if (!states_.is_durable(id)) {
+    submitters_[id].push_back(client);
+  } else if (states_.needs_write(id, StudyState::kRunning)) {
+    set_state(client, id, StudyState::kRunning, true, now);
+  } else {
+    reply_submitted(client, id, false, now);
+  }
+}
+
+void StudyChanges::change(const Client& client, const protocol::ChangeRequest& request,
+                          Instant now) {
+  const auto known = states_.find_durable(request.study());
+  if (!known) {
+    clients_.reply_error(client, unknown_study(request.study()));
+    return;
+  }
+  StudyState wanted{};
+  switch (request.change()) {
+    case protocol::STUDY_CHANGE_CANCEL:
+      wanted = StudyState::kCancelled;
+      break;
+    case protocol::STUDY_CHANGE_PAUSE:
+      // A cancelled study rests already.
+      wanted = states_.state(*known) == StudyState::kCancelled ? StudyState::kCancelled
+                                                               : StudyState::kPaused;
+      break;
+    case protocol::STUDY_CHANGE_RESUME:
+      wanted = StudyState::kRunning;
+      break;
+    case protocol::STUDY_CHANGE_RETRY:
+      retry(client, *known, now);
+      return;
+    default:
+      clients_.reply_error(client, "the server does not know this change of a study");
+      return;
+  }
+  if (states_.needs_write(*known, wanted)) {
+    set_state(client, *known, wanted, false, now);
+  } else {
+    reply_changed(client, *known, 0, now);
+  }
+}
+
+void StudyChanges::set_state(const Client& client, StudyId id, StudyState state, bool submitted,
+                             Instant now) {
+  states_.change(id, state);
+  ledger_.write(SetStudyState{id, state, iso_8601(now)}, StateWrite{id, state, client, submitted});
+}
+
+void StudyChanges::retry(const Client& client, StudyId id, Instant now) {
+  const StudyRecord& study = states_.record(id);
+  if (study.failures.empty()) {
+    reply_changed(client, id, 0, now);
+    return;
+  }
+  try {
+    (void)study.table.get();
+  } catch (const std::runtime_error& error) {
+    clients_.reply_error(client,
+                         fmt::format("the recipe of the study cannot be read: {}", error.what()));
+    return;
+  }
+  ledger_.write(ForgetFailures{id, study.failures, iso_8601(now)},
+                FailuresWrite{id, study.failures, client});
+}
+
+// ---- What became of it ------------------------------------------------------------------------
+
+Event StudyChanges::stored(const StudyWrite& write, Instant now) {
+  states_.added(write.study, now.steady_ms);
+  const StudyRecord& study = states_.record(write.study);
+  note(write.study, fmt::format("of {} points begins", study.table.size()));
+  return StudyAdded{write.study, study.table, {}, 0, false, false, study.share};
+}
+
+Event StudyChanges::stored(const StateWrite& write, Instant /*now*/) {
+  states_.changed(write.study, write.state);
+  if (write.state == StudyState::kRunning) {
+    note(write.study, "goes on");
+    return StudyReopened{write.study};
+  }
+  note(write.study, fmt::format("is {}", state_name(write.state)));
+  if (write.state == StudyState::kPaused) {
+    return StudyPaused{write.study};
+  }
+  return StudyCancelled{write.study};
+}
+
+Event StudyChanges::stored(const ShareWrite& write, Instant /*now*/) {
+  states_.set_share(write.study, write.share);
+  return StudyShareChanged{write.study, write.share};
+}
+
+Event StudyChanges::stored(const FailuresWrite& write, Instant now) {
+  states_.forget_failures(write.study, write.points, now.steady_ms);
+  note(write.study, fmt::format("tries its failed points again: {}", write.points.size()));
+  return FailuresForgotten{write.study, write.points, states_.record(write.study).attempts};
+}
+
+void StudyChanges::answer(const StudyWrite& write, Instant now) {
+  const auto waiting = submitters_.extract(write.study);
+  bool created = true;
+  for (const Client& client : waiting.mapped()) {
+    reply_submitted(client, write.study, std::exchange(created, false), now);
+  }
+}
+
+void StudyChanges::answer(const StateWrite& write, Instant now) {
+  if (write.submitted) {
+    reply_submitted(write.client, write.study, false, now);
+  } else {
+    reply_changed(write.client, write.study, 0, now);
+  }
+}
+
+void StudyChanges::answer(const ShareWrite& write, Instant now) {
+  go_on(write.client, write.study, now);
+}
+
+void StudyChanges::answer(const FailuresWrite& write, Instant now) {
+  reply_changed(write.client, write.study, write.points.size(), now);
+}
+
+void StudyChanges::refused(const StudyWrite& write, const std::string& error) {
+  states_.remove(write.study);
+  const auto waiting = submitters_.extract(write.study);
+  for (const Client& client : waiting.mapped()) {
+    clients_.reply_error(client, "the study was not stored: " + error);
+  }
+}
+
+void StudyChanges::refused(const StateWrite& write, const std::string& error) {
+  states_.refused(write.study);
+  reply_unchanged(write.client, error);
+}
+
+void StudyChanges::refused(const ShareWrite& write, const std::string& error) {
+  reply_unchanged(write.client, error);
+}
+
+void StudyChanges::refused(const FailuresWrite& write, const std::string& error) {
+  reply_unchanged(write.client, error);
+}
+
+// ---- Replies ----------------------------------------------------------------------------------
+
+void StudyChanges::reply_submitted(const Client& client, StudyId id, bool created, Instant now) {
+  const StudyView view = view_of(id, sources_, now);
+  protocol::ClientReply reply;
+  reply.set_request_id(client.request_id);
+  auto& fields = *reply.mutable_submit();
+  fields.set_study_id(id);
+  fields.set_points(view.points);
+  fields.set_settled(view.settled());
+  fields.set_created(created);
+  clients_.to_client(client.identity, reply);
+}
+
+void StudyChanges::reply_changed(const Client& client, StudyId id, std::uint64_t retried,
+                                 Instant now) {
+  protocol::ClientReply reply;
+  reply.set_request_id(client.request_id);
+  *reply.mutable_change()->mutable_study() = to_message(view_of(id, sources_, now));
+  reply.mutable_change()->set_retried(retried);
+  clients_.to_client(client.identity, reply);
+}
+
+void StudyChanges::reply_unchanged(const Client& client, const std::string& error) {
+  clients_.reply_error(client, "the change was not stored, the study is as before: " + error);
+}
+
+void StudyChanges::note(StudyId id, const std::string& what) {
+  log_.note(Severity::kInfo, fmt::format("study {} {}", states_.record(id).name, what));
+}
+
+}  // namespace oblique::server

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "server/scheduler/scheduler_events.h"
+#include "server/service/outbox.h"
+#include "server/service/views.h"
+
+namespace oblique::server {
+
+/// What clients change: studies that are submitted, paused, resumed, cancelled, tried again. A
+/// change is handed to the ledger, and counts once that gives it back as durable: then `stored`
+/// says what the scheduler is to be told, and `answer` tells the client. Not thread-safe.
+class StudyChanges {
+ public:
+  /// `last_study_id` is the last one of the database. All of these must outlive this.
+  StudyChanges(std::uint64_t last_study_id, StudyStates& states, WriteLedger& ledger,
+               StudySources sources, ToClients& clients, ToLog& log)
+      : last_study_id_(last_study_id),
+        states_(states),
+        ledger_(ledger),
+        sources_(sources),
+        clients_(clients),
+        log_(log) {}
+
+  /// A study whose recipe was read and judged: a new one, or one that is there and goes on.
+  void submit(const Client& client, const ReadRequest& read, Instant now);
+  /// Pause, resume, cancel, retry.
+  void change(const Client& client, const protocol::ChangeRequest& request, Instant now);
+
+  Event stored(const StudyWrite& write, Instant now);
+  Event stored(const StateWrite& write, Instant now);
+  Event stored(const ShareWrite& write, Instant now);
+  Event stored(const FailuresWrite& write, Instant now);
+
+  /// To be called after the scheduler was told.
+  void answer(const StudyWrite& write, Instant now);
+  void answer(const StateWrite& write, Instant now);
+  void answer(const ShareWrite& write, Instant now);
+  void answer(const FailuresWrite& write, Instant now);
+
+  /// The database refused it, as `error` says: all is as before, and the client is told.
+  void refused(const StudyWrite& write, const std::string& error);
+  void refused(const StateWrite& write, const std::string& error);
+  void refused(const ShareWrite& write, const std::string& error);
+  void refused(const FailuresWrite& write, const std::string& error);
+
+ private:
+  void add(const Client& client, const ReadRequest& read, const StudyShare& share, Instant now);
+  void go_on(const Client& client, StudyId id, Instant now);
+  void set_state(const Client& client, StudyId id, StudyState state, bool submitted, Instant now);
+  void retry(const Client& client, StudyId id, Instant now);
+  void reply_submitted(const Client& client, StudyId id, bool created, Instant now);
+  void reply_changed(const Client& client, StudyId id, std::uint64_t retried, Instant now);
+  void reply_unchanged(const Client& client, const std::string& error);
+  void note(StudyId id, const std::string& what);
+
+  std::uint64_t last_study_id_;
+  StudyStates& states_;
+  WriteLedger& ledger_;
+  StudySources sources_;
+  ToClients& clients_;
+  ToLog& log_;
+  std::map<StudyId, std::vector<Client>> submitters_;  // wait for the study to be durable
+};
+
+/// What to say of a name that no study has.
+std::string unknown_study(const std::string& name);
+
+}  // namespace oblique::server

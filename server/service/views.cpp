@@ -1,0 +1,102 @@
+#include "server/service/views.h"
+
+#include <spdlog/fmt/fmt.h>
+
+namespace oblique::server {
+namespace {
+
+std::string what_it_waits_for(const StudySources& sources, const StudyCounts& counts) {
+  const WriteLedger& ledger = sources.ledger;
+  if (ledger.is_gone()) {
+    return ledger.fault();
+  }
+  if (!ledger.fault().empty()) {
+    return "the database, which takes no results: " + ledger.fault();
+  }
+  if (sources.scheduler.workers() == 0) {
+    return "a worker";
+  }
+  if (counts.lacks_worker) {
+    return fmt::format(
+        "a worker with solver version {}, that of its results, or to be submitted again with "
+        "--mix-versions",
+        counts.solver_version);
+  }
+  return {};
+}
+
+}  // namespace
+
+StudyView view_of(StudyId id, const StudySources& sources, Instant now) {
+  const StudyRecord& record = sources.states.record(id);
+  const StudyState state = sources.states.state(id);
+  const StudyCounts counts = sources.scheduler.study(id);
+  StudyView view{id,
+                 record.name,
+                 state,
+                 counts.points,
+                 counts.solved,
+                 counts.failed,
+                 counts.leased,
+                 record.created_at,
+                 record.share,
+                 counts.solver_version,
+                 {},
+                 0.0};
+  const bool is_complete = view.settled() == view.points;
+  if (is_complete) {
+    view.state = StudyState::kDone;
+  }
+  if (state == StudyState::kRunning) {
+    view.points_per_s = sources.rates.points_per_s(id, view.settled(), now.steady_ms);
+    view.waits_for = is_complete ? std::string() : what_it_waits_for(sources, counts);
+  }
+  return view;
+}
+
+protocol::StudyStatus to_message(const StudyView& view) {
+  protocol::StudyStatus message;
+  message.set_study_id(view.id);
+  message.set_name(view.name);
+  message.set_state(state_name(view.state));
+  message.set_points(view.points);
+  message.set_solved(view.solved);
+  message.set_failed(view.failed);
+  message.set_leased(view.leased);
+  message.set_created_at(view.created_at);
+  message.set_priority(view.share.priority);
+  message.set_weight(view.share.weight);
+  message.set_mixes_versions(view.share.mixes_versions);
+  message.set_solver_version(view.solver_version);
+  message.set_waits_for(view.waits_for);
+  message.set_points_per_s(view.points_per_s);
+  return message;
+}
+
+WorkerView view_of(WorkerId id, const WorkerRecord& worker, const Scheduler& scheduler,
+                   Instant now) {
+  return {id,
+          worker.name,
+          worker.threads,
+          worker.instruction_set,
+          worker.solver_version,
+          scheduler.worker(id, now.steady_ms)};
+}
+
+protocol::WorkerStatus to_message(const WorkerView& view) {
+  protocol::WorkerStatus message;
+  message.set_worker_id(view.id);
+  message.set_name(view.name);
+  message.set_threads(view.threads);
+  message.set_instruction_set(view.instruction_set);
+  message.set_solver_version(view.solver_version);
+  message.set_leased_points(view.counts.leased_points);
+  message.set_solved_points(view.counts.solved_points);
+  message.set_silent_ms(static_cast<std::uint32_t>(view.counts.silent_ms));
+  message.set_losses(view.counts.losses);
+  message.set_set_aside(view.counts.is_set_aside);
+  message.set_proven(view.counts.is_proven);
+  return message;
+}
+
+}  // namespace oblique::server

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "proto/oblique.pb.h"
+#include "server/scheduler/scheduler.h"
+#include "server/service/settled_rates.h"
+#include "server/service/study_states.h"
+#include "server/service/workers_desk.h"
+#include "server/service/write_ledger.h"
+
+// Studies and workers as others see them: plain values, from which replies are made, and whatever
+// else shows how things stand.
+namespace oblique::server {
+
+struct StudyView {
+  StudyId id;
+  std::string name;
+  StudyState state;  ///< done as soon as all points are settled
+  std::uint64_t points;
+  std::uint64_t solved;
+  std::uint64_t failed;
+  std::uint64_t leased;
+  std::string created_at;  ///< UTC, ISO 8601
+  StudyShare share;
+  std::string solver_version;  ///< of its results; empty while there are none
+  std::string waits_for;       ///< why a running study does not go on; empty: it does
+  double points_per_s;         ///< settled, over the last seconds; 0 unless it runs
+
+  std::uint64_t settled() const { return solved + failed; }
+};
+
+/// Where a view of a study comes from.
+struct StudySources {
+  const Scheduler& scheduler;
+  const StudyStates& states;
+  const WriteLedger& ledger;
+  const SettledRates& rates;
+};
+
+/// Throws std::out_of_range for a study that is not durable.
+StudyView view_of(StudyId id, const StudySources& sources, Instant now);
+protocol::StudyStatus to_message(const StudyView& view);
+
+struct WorkerView {
+  WorkerId id;
+  std::string name;
+  std::uint32_t threads;
+  std::string instruction_set;
+  std::string solver_version;
+  WorkerCounts counts;
+};
+
+WorkerView view_of(WorkerId id, const WorkerRecord& worker, const Scheduler& scheduler,
+                   Instant now);
+protocol::WorkerStatus to_message(const WorkerView& view);
+
+}  // namespace oblique::server

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <string_view>
+
+#include "proto/oblique.pb.h"
+#include "server/queries/query_pool.h"
+#include "server/service/outbox.h"
+
+namespace oblique::server {
+
+/// The queries of clients that have no answer yet. Who waits hears of it now and then, by which the
+/// server also finds out that a client is gone; its query is cancelled then. Not thread-safe.
+class WaitingQueries {
+ public:
+  /// A client is to hear of its query after each `word_every_ms`.
+  WaitingQueries(ToClients& clients, ToReaders& readers, std::int64_t word_every_ms)
+      : clients_(clients), readers_(readers), word_every_ms_(word_every_ms) {}
+
+  /// Under the number of a query that waits or runs already, it is that query.
+  void ask(const Client& client, const protocol::QueryRequest& request, Instant now);
+  /// The pool tells how it is with a query.
+  void report(QueryReport report);
+  /// To be called several times a second.
+  void tick(Instant now);
+  /// The client has gone: nobody waits for its queries.
+  void client_left(std::string_view identity);
+  /// The server stops: whoever waits or asks is told.
+  void stop();
+
+ private:
+  struct Query {
+    Client client;
+    std::int64_t next_word_ms;  // when the client is to hear of it again
+    bool runs = false;
+  };
+  bool tell(Query& query, Instant now);
+
+  ToClients& clients_;
+  ToReaders& readers_;
+  std::int64_t word_every_ms_;
+  std::map<std::uint64_t, Query> queries_;  // by ticket
+  std::uint64_t last_ticket_ = 0;
+  bool stopping_ = false;
+};
+
+}  // namespace oblique::server

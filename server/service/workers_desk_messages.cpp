@@ -1,0 +1,107 @@
+// What goes out to workers.
+#include <array>
+#include <utility>
+
+#include "proto/frames.h"
+#include "server/service/workers_desk.h"
+
+namespace oblique::server {
+namespace {
+
+/// A recipe of the point that every sound worker solves in a moment.
+protocol::Recipe probe_recipe() {
+  protocol::Recipe recipe;
+  protocol::Block& block = *recipe.add_blocks();
+  for (const auto& [key, value] : {std::pair{"H", 1.0}, {"mu", 0.4}, {"e", 1.0}}) {
+    protocol::Axis& axis = *block.add_axes();
+    axis.set_key(key);
+    axis.add_values(value);
+  }
+  return recipe;
+}
+
+}  // namespace
+
+void WorkersDesk::send(const SendBatch& batch) {
+  protocol::ServerToWorker message;
+  auto& fields = *message.mutable_batch();
+  fields.set_study_id(batch.study);
+  fields.set_model(batch.model);
+  fields.set_first_point(batch.first_point);
+  fields.set_count(batch.count);
+  fields.set_attempt(batch.attempt);
+  fields.set_lease_id(batch.lease);
+  send(batch.worker, message);
+}
+
+void WorkersDesk::send(const SendProbe& probe) {
+  protocol::ServerToWorker definition;
+  definition.mutable_study()->set_study_id(kProbeStudy);
+  *definition.mutable_study()->mutable_recipe() = probe_recipe();
+  send(probe.worker, definition);
+  send(SendBatch{probe.worker, kProbeStudy, 0, 0, 1, 1, probe.lease});
+}
+
+void WorkersDesk::send(const AcknowledgeResults& stored) {
+  protocol::ServerToWorker message;
+  message.mutable_results_stored()->set_sequence(stored.sequence);
+  send(stored.worker, message);
+}
+
+void WorkersDesk::send(const WithdrawStudy& withdraw) {
+  protocol::ServerToWorker message;
+  message.mutable_withdraw()->set_study_id(withdraw.study);
+  send(withdraw.worker, message);
+}
+
+void WorkersDesk::send(const ReleaseBatch& release) {
+  protocol::ServerToWorker message;
+  message.mutable_release()->set_lease_id(release.lease);
+  send(release.worker, message);
+}
+
+void WorkersDesk::define(const DefineStudy& define, const std::string& recipe_bytes) {
+  const auto known = workers_.find(define.worker);
+  if (known == workers_.end()) {
+    return;
+  }
+  const std::string frame = protocol::definition_around(define.study, recipe_bytes);
+  note_delivery(define.worker, known->second,
+                network_.forward_to_worker(known->second.identity, frame));
+}
+
+void WorkersDesk::notice(const std::string& text) {
+  protocol::ServerToWorker message;
+  message.mutable_notice()->set_text(text);
+  for (const auto& [id, worker] : workers_) {
+    send(id, message);
+  }
+}
+
+void WorkersDesk::stop() {
+  stopping_ = true;
+  protocol::ServerToWorker message;
+  message.mutable_stopping();
+  for (const auto& [id, worker] : workers_) {
+    network_.to_worker(worker.identity, message);
+  }
+}
+
+void WorkersDesk::send(WorkerId worker, const protocol::ServerToWorker& message) {
+  const auto known = workers_.find(worker);
+  const bool is_of_version_2 = message.has_release() || message.has_notice();
+  if (known == workers_.end() || (is_of_version_2 && known->second.protocol_version < 2)) {
+    return;
+  }
+  note_delivery(worker, known->second, network_.to_worker(known->second.identity, message));
+}
+
+void WorkersDesk::note_delivery(WorkerId worker, WorkerRecord& record, Delivery delivery) {
+  if (delivery == Delivery::kGone) {
+    found_.emplace_back(WorkerUnreachable{worker});
+  } else if (delivery == Delivery::kBusy && !std::exchange(record.is_busy, true)) {
+    found_.emplace_back(WorkerBusy{worker, true});
+  }
+}
+
+}  // namespace oblique::server
