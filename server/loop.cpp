@@ -15,7 +15,7 @@
 #include <spdlog/spdlog.h>
 
 #include "proto/frames.h"
-#include "server/file_system.h"
+#include "server/database/shared_disk.h"
 #include "server/network/network.h"
 #include "server/report_box.h"
 
@@ -43,7 +43,7 @@ Instant now() {
 
 /// Throws StorageError for a path where a database would be in danger.
 const std::string& safe_path(const LoopSettings& settings) {
-  const std::string objection = objection_to_file_system(settings.database);
+  const std::string objection = objection_to_shared_disk(settings.database);
   if (!objection.empty() && !settings.allow_network_disk) {
     throw StorageError(objection);
   }

@@ -4,7 +4,7 @@
 
 #include "client/service/source.h"
 #include "client/verbs/verbs.h"
-#include "server/care/database_care.h"
+#include "server/care/backup.h"
 #include "server/care/salvage.h"
 
 namespace oblique::client {

@@ -4,7 +4,7 @@
 #include "client/service/source.h"
 #include "client/verbs/verbs.h"
 #include "proto/text.h"
-#include "server/care/database_care.h"
+#include "server/care/diagnosis.h"
 
 namespace oblique::client {
 namespace {

@@ -78,4 +78,12 @@ OpenedForReading open_for_reading(const std::string& path) {
   return opened;
 }
 
+OpenedForReading open_stored(const std::string& path) {
+  OpenedForReading opened = open_for_reading(path);
+  if (identify(opened.database.get(), path) == DatabaseKind::kEmpty) {
+    throw StorageError(path + " is empty: no study was ever stored in it");
+  }
+  return opened;
+}
+
 }  // namespace oblique::server

@@ -19,4 +19,8 @@ struct OpenedForReading {
 /// is no such file or it cannot be opened.
 OpenedForReading open_for_reading(const std::string& path);
 
+/// The same for a database that is ours and has had a study stored in it; throws StorageError,
+/// saying what it is instead, for any other.
+OpenedForReading open_stored(const std::string& path);
+
 }  // namespace oblique::server

@@ -6,7 +6,7 @@
 
 namespace oblique::server {
 
-/// A half-open run of points [begin, end).
+/// Points that follow each other, half-open: [begin, end).
 struct Interval {
   std::uint64_t begin;
   std::uint64_t end;
@@ -15,7 +15,7 @@ struct Interval {
 };
 
 /// A set of points kept as disjoint, non-touching intervals: its cost grows with the number of
-/// runs, not of points.
+/// intervals, not of points.
 class IntervalSet {
  public:
   IntervalSet() = default;
@@ -37,7 +37,7 @@ class IntervalSet {
   std::uint64_t size() const { return size_; }
 
   /// Number of intervals.
-  std::size_t runs() const { return ends_.size(); }
+  std::size_t intervals() const { return ends_.size(); }
 
   /// The lowest interval. The set must not be empty.
   Interval front() const { return {ends_.begin()->first, ends_.begin()->second}; }

@@ -17,12 +17,12 @@ class LeaseIndex {
  public:
   using LeaseId = std::uint64_t;
 
-  void insert(LeaseId lease, const Chunk& chunk) {
-    by_point_.emplace(chunk.first_point, lease);
-    longest_ = std::max(longest_, chunk.count);
+  void insert(LeaseId lease, const Batch& batch) {
+    by_point_.emplace(batch.first_point, lease);
+    longest_ = std::max(longest_, batch.count);
   }
-  void erase(LeaseId lease, const Chunk& chunk) {
-    by_point_.erase({chunk.first_point, lease});
+  void erase(LeaseId lease, const Batch& batch) {
+    by_point_.erase({batch.first_point, lease});
     longest_ = by_point_.empty() ? 0 : longest_;
   }
 
@@ -39,12 +39,12 @@ class LeaseIndex {
     return leases;
   }
 
-  /// Those that may have points of the chunk: all that do, and some others near it.
-  std::vector<LeaseId> near(const Chunk& chunk) const {
-    const std::uint64_t from = chunk.first_point - std::min(chunk.first_point, longest_);
+  /// Those that may have points of the batch: all that do, and some others near it.
+  std::vector<LeaseId> near(const Batch& batch) const {
+    const std::uint64_t from = batch.first_point - std::min(batch.first_point, longest_);
     std::vector<LeaseId> leases;
     for (auto at = by_point_.lower_bound({from, 0});
-         at != by_point_.end() && at->first < chunk.end(); ++at) {
+         at != by_point_.end() && at->first < batch.end(); ++at) {
       leases.push_back(at->second);
     }
     return leases;
@@ -52,7 +52,7 @@ class LeaseIndex {
 
  private:
   std::set<std::pair<std::uint64_t, LeaseId>> by_point_;
-  std::uint64_t longest_ = 0;  // of any chunk since there was none
+  std::uint64_t longest_ = 0;  // of any batch since there was none
 };
 
 }  // namespace oblique::server

@@ -31,7 +31,7 @@ void Scheduler::on(const StudyAdded& event) {
   }
   studies_.emplace(event.study,
                    Study{StudyPoints(event.table, event.settled, settings_.loss_limits),
-                         event.failed, event.cancelled, event.paused, false, event.share,
+                         event.failed, event.cancelled, event.paused, false, event.terms,
                          least_served(event.study), event.solver_version});
   studies_.at(event.study).points.count_attempts(event.attempts);
   finish_if_complete(event.study);
@@ -75,13 +75,13 @@ void Scheduler::on(const StudyReopened& event) {
   }
 }
 
-void Scheduler::on(const StudyShareChanged& event) {
+void Scheduler::on(const StudyTermsChanged& event) {
   const auto found = studies_.find(event.study);
   if (found == studies_.end()) {
     return;
   }
   Study& study = found->second;
-  study.share = event.share;
+  study.terms = event.terms;
   study.served = least_served(event.study);
   for (const LeaseId id : study.leases.all()) {
     const WorkerId worker = leases_.at(id).worker;
@@ -122,8 +122,8 @@ StudyQueue::Place Scheduler::place_of(const Study& study) const {
   if (!study.has_work()) {
     return {};
   }
-  return {study.points.has_free(), study.has_suspect(), study.share.priority, study.served,
-          study.share.mixes_versions ? std::string() : study.solver_version};
+  return {study.points.has_free(), study.has_suspect(), study.terms.priority, study.served,
+          study.terms.mixes_versions ? std::string() : study.solver_version};
 }
 
 void Scheduler::requeue(StudyId id) {
@@ -307,8 +307,8 @@ WorkerCounts Scheduler::worker(WorkerId id, std::int64_t now_ms) const {
   for (const LeaseId lease_id : worker.leases) {
     const Lease& lease = leases_.at(lease_id);
     const IntervalSet& leased = studies_.at(lease.study).points.leased_set();
-    for (const Interval& run : leased.within(lease.chunk.first_point, lease.chunk.end())) {
-      counts.leased_points += run.end - run.begin;
+    for (const Interval& interval : leased.within(lease.batch.first_point, lease.batch.end())) {
+      counts.leased_points += interval.end - interval.begin;
     }
   }
   return counts;
@@ -328,10 +328,10 @@ void Scheduler::check_invariants() const {
             "a lease has no worker");
     require(studies_.contains(lease.study), "a lease has no study");
     require(!lease.alone || worker->second.leases.size() == 1, "a suspect lease is not alone");
-    require(lease.chunk.count > 0 && id < next_lease_, "a lease is malformed");
+    require(lease.batch.count > 0 && id < next_lease_, "a lease is malformed");
     IntervalSet& covered = under_lease[lease.study];
     require(studies_.at(lease.study).overlaps ||
-                covered.within(lease.chunk.first_point, lease.chunk.end()).empty(),
+                covered.within(lease.batch.first_point, lease.batch.end()).empty(),
             "two leases hold one point");
     require(lease.twin == 0 || (leases_.contains(lease.twin) && leases_.at(lease.twin).twin == id &&
                                 leases_.at(lease.twin).worker != lease.worker),
@@ -339,7 +339,7 @@ void Scheduler::check_invariants() const {
     require(admits(studies_.at(lease.study), worker->second),
             "a worker of another solver version holds a lease");
     ++leases_of[lease.study];
-    covered.insert(lease.chunk.first_point, lease.chunk.end());
+    covered.insert(lease.batch.first_point, lease.batch.end());
   }
   for (const auto& [id, study] : studies_) {
     study.points.check_invariants();
@@ -350,9 +350,9 @@ void Scheduler::check_invariants() const {
     const StudyQueue::Place* place = queue_.find(id);
     require(place_of(study) == (place == nullptr ? StudyQueue::Place{} : *place),
             "a study is not where it belongs in the queue");
-    study.points.leased_set().for_each([&, study_id = id](const Interval& run) {
-      const auto covered = under_lease[study_id].within(run.begin, run.end);
-      require(covered.size() == 1 && covered.front() == run, "a leased point has no lease");
+    study.points.leased_set().for_each([&, study_id = id](const Interval& interval) {
+      const auto covered = under_lease[study_id].within(interval.begin, interval.end);
+      require(covered.size() == 1 && covered.front() == interval, "a leased point has no lease");
     });
   }
   std::uint64_t threads = 0;

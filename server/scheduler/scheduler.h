@@ -74,7 +74,7 @@ class Scheduler {
     bool cancelled;
     bool paused;
     bool finished;
-    StudyShare share;
+    StudyTerms terms;
     double served = 0.0;  ///< batches handed out over the weight, since the study was last open
     std::string solver_version{};  ///< of its results and leases; empty while there are none
     LeaseIndex leases{};
@@ -89,7 +89,7 @@ class Scheduler {
   struct Lease {
     WorkerId worker;
     StudyId study;
-    Chunk chunk;
+    Batch batch;
     bool alone;  ///< of suspect points: its worker gets nothing beside it
     std::int64_t granted_ms;
     LeaseId twin = 0;  ///< of another worker, for what is left of the same batch; 0: none
@@ -120,7 +120,7 @@ class Scheduler {
   void on(const StudyCancelled& event);
   void on(const StudyPaused& event);
   void on(const StudyReopened& event);
-  void on(const StudyShareChanged& event);
+  void on(const StudyTermsChanged& event);
   void on(const FailuresForgotten& event);
   void on(const WorkerJoined& event);
   void on(const CreditGiven& event);
@@ -169,7 +169,7 @@ class Scheduler {
   StudyId next_suspect_study(const Worker& worker) const;
   bool anyone_draining() const;
   std::uint64_t batch_points(const Worker& worker, StudyId study) const;
-  LeaseId grant(WorkerId id, Worker& worker, StudyId study, const Chunk& chunk, bool alone);
+  LeaseId grant(WorkerId id, Worker& worker, StudyId study, const Batch& batch, bool alone);
   void queue(WorkerId id, Worker& worker);
 
   /// A point that is to fail, unless it is condemned no more.

@@ -61,8 +61,8 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
   if (study == 0) {
     return seeks_stragglers_ && serve_straggler(id, worker);
   }
-  if (const auto chunk = studies_.at(study).points.take(batch_points(worker, study))) {
-    grant(id, worker, study, *chunk, false);
+  if (const auto batch = studies_.at(study).points.take(batch_points(worker, study))) {
+    grant(id, worker, study, *batch, false);
   }
   return true;
 }
@@ -72,8 +72,8 @@ bool Scheduler::serve_suspect(WorkerId id, Worker& worker) {
   Study& study = studies_.at(id_of_study);
   worker.draining = false;
   const std::uint64_t at_most = batch_points(worker, id_of_study);
-  if (const auto chunk = study.points.take(*suspect_for(study, worker), at_most)) {
-    grant(id, worker, id_of_study, *chunk, true);
+  if (const auto batch = study.points.take(*suspect_for(study, worker), at_most)) {
+    grant(id, worker, id_of_study, *batch, true);
   }
   return true;
 }
@@ -96,10 +96,10 @@ bool Scheduler::serve_straggler(WorkerId id, Worker& worker) {
   Lease& straggler = longest->second;
   Study& study = studies_.at(straggler.study);
   const auto left =
-      study.points.leased_set().within(straggler.chunk.first_point, straggler.chunk.end());
+      study.points.leased_set().within(straggler.batch.first_point, straggler.batch.end());
   study.overlaps = true;
-  const Chunk rest{straggler.chunk.model, left.front().begin, left.back().end - left.front().begin,
-                   straggler.chunk.attempts + 1, straggler.chunk.losses};
+  const Batch rest{straggler.batch.model, left.front().begin, left.back().end - left.front().begin,
+                   straggler.batch.attempts + 1, straggler.batch.losses};
   const LeaseId twin = grant(id, worker, straggler.study, rest, false);
   straggler.twin = twin;
   leases_.at(twin).twin = longest->first;
@@ -109,9 +109,9 @@ bool Scheduler::serve_straggler(WorkerId id, Worker& worker) {
 bool Scheduler::is_straggling(const Lease& lease, const Worker& helper) const {
   const Study& study = studies_.at(lease.study);
   const std::int64_t age_ms = now_ms_ - lease.granted_ms;
-  if (lease.twin != 0 || lease.alone || !lease.chunk.losses.empty() ||
+  if (lease.twin != 0 || lease.alone || !lease.batch.losses.empty() ||
       age_ms < settings_.straggler_after_ms || !study.is_open() || !admits(study, helper) ||
-      study.points.leased_set().within(lease.chunk.first_point, lease.chunk.end()).empty()) {
+      study.points.leased_set().within(lease.batch.first_point, lease.batch.end()).empty()) {
     return false;
   }
   const Worker& holder = workers_.at(lease.worker);
@@ -122,7 +122,7 @@ bool Scheduler::is_straggling(const Lease& lease, const Worker& helper) const {
     const auto pace = judge->paces.find(lease.study);
     if (pace != judge->paces.end() && pace->second.s_per_point > 0.0) {
       const double expected_ms =
-          1e3 * pace->second.s_per_point * static_cast<double>(lease.chunk.count) / judge->threads;
+          1e3 * pace->second.s_per_point * static_cast<double>(lease.batch.count) / judge->threads;
       return static_cast<double>(age_ms) > settings_.straggler_factor * expected_ms;
     }
   }
@@ -131,7 +131,7 @@ bool Scheduler::is_straggling(const Lease& lease, const Worker& helper) const {
 
 /// The results of a study come from one solver version, unless it was said that they need not.
 bool Scheduler::admits(const Study& study, const Worker& worker) {
-  return study.share.mixes_versions || study.solver_version.empty() ||
+  return study.terms.mixes_versions || study.solver_version.empty() ||
          study.solver_version == worker.solver_version;
 }
 
@@ -182,25 +182,25 @@ std::uint64_t Scheduler::batch_points(const Worker& worker, StudyId id) const {
   return std::max<std::uint64_t>(std::min(points, fair), 1);
 }
 
-LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Chunk& chunk,
+LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Batch& batch,
                          bool alone) {
   if (worker.defined.insert(study).second) {
     effects_.emplace_back(DefineStudy{id, study});
   }
   Study& served = studies_.at(study);
-  served.served += 1.0 / served.share.weight;
+  served.served += 1.0 / served.terms.weight;
   if (served.solver_version.empty()) {
     served.solver_version = worker.solver_version;
   }
   const LeaseId lease = next_lease_++;
-  leases_.emplace(lease, Lease{id, study, chunk, alone, now_ms_});
-  served.leases.insert(lease, chunk);
+  leases_.emplace(lease, Lease{id, study, batch, alone, now_ms_});
+  served.leases.insert(lease, batch);
   worker.leases.insert(lease);
   --worker.credit;
-  worker.paces[study].last_batch_points = chunk.count;
+  worker.paces[study].last_batch_points = batch.count;
   requeue(study);
   effects_.emplace_back(
-      SendBatch{id, study, chunk.model, chunk.first_point, chunk.count, chunk.attempts + 1, lease});
+      SendBatch{id, study, batch.model, batch.first_point, batch.count, batch.attempts + 1, lease});
   return lease;
 }
 

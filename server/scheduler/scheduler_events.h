@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "proto/recipe/recipe.h"
-#include "server/scheduler/attempt_runs.h"
 #include "server/scheduler/interval_set.h"
 #include "server/scheduler/loss_history.h"
+#include "server/scheduler/point_attempts.h"
 #include "server/scheduler/study_points.h"
 #include "server/scheduler/worker_processes.h"
 
@@ -37,7 +37,7 @@ struct SchedulerSettings {
   /// From how many losses on points are leased alone, and from how many of those a single point
   /// fails.
   LossLimits loss_limits{};
-  std::uint64_t suspect_parts = 8;  ///< into so many parts a suspect chunk is split
+  std::uint64_t suspect_parts = 8;  ///< into so many parts a suspect interval is split
   /// A condemned point fails when none of the processes that it cost says hello again for so long.
   std::int64_t return_within_ms = 10'000;
   /// An accused point goes to the worker that has been proven longest, after so long to any.
@@ -73,9 +73,9 @@ struct StudyAdded {
   std::uint64_t failed = 0;  ///< how many of the settled points failed
   bool cancelled = false;
   bool paused = false;
-  StudyShare share{};
+  StudyTerms terms{};
   std::string solver_version{};  ///< of its results; empty while there are none
-  AttemptRuns attempts{};        ///< of points that failed, also of those that were forgotten
+  PointAttempts attempts{};      ///< of points that failed, also of those that were forgotten
 };
 /// The study's cancellation is durable.
 struct StudyCancelled {
@@ -89,15 +89,15 @@ struct StudyPaused {
 struct StudyReopened {
   StudyId study;
 };
-struct StudyShareChanged {
+struct StudyTermsChanged {
   StudyId study;
-  StudyShare share;
+  StudyTerms terms;
 };
 /// It is durable that these points, all failed before, have no row any more.
 struct FailuresForgotten {
   StudyId study;
   IntervalSet points;
-  AttemptRuns attempts{};  ///< in which they failed
+  PointAttempts attempts{};  ///< in which they failed
 };
 /// A worker said hello. Worker numbers are never used twice.
 struct WorkerJoined {
@@ -155,7 +155,7 @@ struct DispatchHeld {
 struct Tick {};
 
 using Event =
-    std::variant<StudyAdded, StudyCancelled, StudyPaused, StudyReopened, StudyShareChanged,
+    std::variant<StudyAdded, StudyCancelled, StudyPaused, StudyReopened, StudyTermsChanged,
                  FailuresForgotten, WorkerJoined, CreditGiven, ResultsReceived, ResultsStored,
                  HeartbeatReceived, WorkerLeft, WorkerUnreachable, WorkerBusy, DispatchHeld, Tick>;
 

@@ -21,13 +21,13 @@ void Scheduler::end_lease(LeaseId id, const std::optional<Loss>& loss) {
     twin->second.twin = 0;
   }
   Study& study = studies_.at(lease.study);
-  study.leases.erase(id, lease.chunk);
+  study.leases.erase(id, lease.batch);
   const std::vector<Interval> held = held_by(lease);
   if (loss) {
     note_loss(lease, held, *loss);
   } else {
-    for (const Interval& run : held) {
-      study.points.give_back(run, lease.chunk.attempts + 1, lease.chunk.losses, now_ms_);
+    for (const Interval& interval : held) {
+      study.points.give_back(interval, lease.batch.attempts + 1, lease.batch.losses, now_ms_);
     }
   }
   if (study.leases.empty()) {
@@ -42,19 +42,19 @@ void Scheduler::end_lease(LeaseId id, const std::optional<Loss>& loss) {
 /// Points that are leased by this lease, which has ended, and by no other.
 std::vector<Interval> Scheduler::held_by(const Lease& lease) const {
   const Study& study = studies_.at(lease.study);
-  const auto leased = study.points.leased_set().within(lease.chunk.first_point, lease.chunk.end());
+  const auto leased = study.points.leased_set().within(lease.batch.first_point, lease.batch.end());
   if (!study.overlaps || leased.empty()) {
     return leased;
   }
   IntervalSet held;
-  for (const Interval& run : leased) {
-    held.insert(run.begin, run.end);
+  for (const Interval& interval : leased) {
+    held.insert(interval.begin, interval.end);
   }
-  for (const LeaseId id : study.leases.near(lease.chunk)) {
-    const Chunk& other = leases_.at(id).chunk;
+  for (const LeaseId id : study.leases.near(lease.batch)) {
+    const Batch& other = leases_.at(id).batch;
     held.erase(other.first_point, other.end());
   }
-  return held.within(lease.chunk.first_point, lease.chunk.end());
+  return held.within(lease.batch.first_point, lease.batch.end());
 }
 
 /// A batch whose points were all answered by others is nobody's work any more.
@@ -63,9 +63,9 @@ void Scheduler::release_if_answered(LeaseId id) {
   if (lease == leases_.end()) {
     return;
   }
-  const Chunk& chunk = lease->second.chunk;
+  const Batch& batch = lease->second.batch;
   const IntervalSet& leased = studies_.at(lease->second.study).points.leased_set();
-  if (leased.within(chunk.first_point, chunk.end()).empty()) {
+  if (leased.within(batch.first_point, batch.end()).empty()) {
     effects_.emplace_back(ReleaseBatch{lease->second.worker, id});
     end_lease(id, std::nullopt);
   }

@@ -12,18 +12,18 @@ namespace {
 
 std::uint64_t size_of(const std::vector<Interval>& runs) {
   std::uint64_t points = 0;
-  for (const Interval& run : runs) {
-    points += run.end - run.begin;
+  for (const Interval& interval : runs) {
+    points += interval.end - interval.begin;
   }
   return points;
 }
 
 /// The run in up to `parts` parts of nearly one size.
-std::vector<Interval> split(const Interval& run, std::uint64_t parts) {
-  const std::uint64_t size = (run.end - run.begin + parts - 1) / parts;
+std::vector<Interval> split(const Interval& interval, std::uint64_t parts) {
+  const std::uint64_t size = (interval.end - interval.begin + parts - 1) / parts;
   std::vector<Interval> all;
-  for (std::uint64_t begin = run.begin; begin < run.end; begin += size) {
-    all.push_back({begin, std::min(begin + size, run.end)});
+  for (std::uint64_t begin = interval.begin; begin < interval.end; begin += size) {
+    all.push_back({begin, std::min(begin + size, interval.end)});
   }
   return all;
 }
@@ -35,7 +35,7 @@ std::vector<Interval> split(const Interval& run, std::uint64_t parts) {
 /// The lease ended without an answer to some of its points. It alone held `held` of them.
 void Scheduler::note_loss(const Lease& lease, const std::vector<Interval>& held, Loss loss) {
   StudyPoints& points = studies_.at(lease.study).points;
-  if (points.leased_set().within(lease.chunk.first_point, lease.chunk.end()).empty()) {
+  if (points.leased_set().within(lease.batch.first_point, lease.batch.end()).empty()) {
     return;
   }
   if (loss.process != kNobody) {
@@ -43,20 +43,20 @@ void Scheduler::note_loss(const Lease& lease, const std::vector<Interval>& held,
   }
   if (const auto twin = leases_.find(lease.twin); twin != leases_.end()) {
     // What killed one worker may kill the other: that must not be forgotten.
-    twin->second.chunk.losses.add({loss.process, false});
+    twin->second.batch.losses.add({loss.process, false});
   }
   if (held.empty()) {
     return;
   }
   loss.alone = loss.alone && size_of(held) == 1;
-  LossHistory losses = lease.chunk.losses;
+  LossHistory losses = lease.batch.losses;
   losses.add(loss);
   const Standing standing = losses.standing(settings_.loss_limits);
   // The parts are suspect too: those without the killer are solved, the other is split again.
   const std::uint64_t parts = standing == Standing::kSound ? 1 : settings_.suspect_parts;
-  for (const Interval& run : held) {
-    for (const Interval& part : split(run, parts)) {
-      points.give_back(part, lease.chunk.attempts + 1, losses, now_ms_);
+  for (const Interval& interval : held) {
+    for (const Interval& part : split(interval, parts)) {
+      points.give_back(part, lease.batch.attempts + 1, losses, now_ms_);
     }
   }
   if (standing == Standing::kCondemned) {
@@ -70,7 +70,7 @@ void Scheduler::take_back_losses(ProcessNumber number) {
   for (const StudyId study : in_histories) {
     studies_.at(study).points.take_back_losses(number);
     for (const LeaseId lease : studies_.at(study).leases.all()) {
-      leases_.at(lease).chunk.losses.take_back(number);
+      leases_.at(lease).batch.losses.take_back(number);
     }
     requeue(study);
   }
@@ -82,16 +82,16 @@ void Scheduler::fail_condemned() {
     const Condemned condemned = condemned_.front();
     condemned_.pop_front();
     StudyPoints& points = studies_.at(condemned.study).points;
-    const auto chunk = points.take_condemned(condemned.point, now_ms_ - settings_.return_within_ms);
-    if (!chunk) {
+    const auto batch = points.take_condemned(condemned.point, now_ms_ - settings_.return_within_ms);
+    if (!batch) {
       continue;
     }
     points.receive(condemned.point);
     requeue(condemned.study);
     effects_.emplace_back(StoreFailure{
-        condemned.study, condemned.point, chunk->attempts,
-        "no answer: " + std::to_string(chunk->attempts) +
-            " leases of this point ended without one, " + std::to_string(chunk->losses.alone()) +
+        condemned.study, condemned.point, batch->attempts,
+        "no answer: " + std::to_string(batch->attempts) +
+            " leases of this point ended without one, " + std::to_string(batch->losses.alone()) +
             " of them because the worker was lost or gave up while it held nothing else"});
   }
 }
@@ -126,8 +126,8 @@ void Scheduler::note_answers(Worker& worker, const ResultsReceived& event, bool 
   const bool solved =
       std::any_of(event.outcomes.begin(), event.outcomes.end(), [&](const PointOutcome& outcome) {
         return !outcome.failed &&
-               (is_probe || (is_its_lease && outcome.point >= lease->second.chunk.first_point &&
-                             outcome.point < lease->second.chunk.end()));
+               (is_probe || (is_its_lease && outcome.point >= lease->second.batch.first_point &&
+                             outcome.point < lease->second.batch.end()));
       });
   if (is_probe) {
     worker.probe = 0;

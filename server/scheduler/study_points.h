@@ -7,26 +7,26 @@
 #include <optional>
 #include <vector>
 
-#include "server/scheduler/attempt_runs.h"
 #include "server/scheduler/interval_set.h"
 #include "server/scheduler/loss_history.h"
+#include "server/scheduler/point_attempts.h"
 #include "server/scheduler/study_table.h"
 
 namespace oblique::server {
 
-/// How studies share the workers: those of the highest priority come first, and among them each
-/// gets batches in proportion to its weight.
-struct StudyShare {
+/// On which terms a study gets workers: those of the highest priority come first, and among them
+/// each gets batches in proportion to its weight.
+struct StudyTerms {
   std::int32_t priority = 0;
   double weight = 1.0;
   /// Workers of any solver version take part, not only of the one that the study began with.
   bool mixes_versions = false;
 
-  bool operator==(const StudyShare&) const = default;
+  bool operator==(const StudyTerms&) const = default;
 };
 
-/// A run of points handed out together: one model, no gap.
-struct Chunk {
+/// Points that are handed out together, under one lease: one model, no gap.
+struct Batch {
   std::uint64_t model;
   std::uint64_t first_point;
   std::uint64_t count;
@@ -39,7 +39,7 @@ struct Chunk {
 /// Where the points of one study stand. Every point is in exactly one place: fresh (never leased by
 /// this run of the server), returned with one of the four standings that its losses give it,
 /// leased, committing (its result is on the way to the disk) or settled. The cost grows with the
-/// number of runs of points, not with their number.
+/// number of intervals, not of points.
 class StudyPoints {
  public:
   /// `settled` are the points that have a row already.
@@ -51,11 +51,11 @@ class StudyPoints {
 
   /// Takes up to `at_most` points out of the returned sound ones or, when there are none, the fresh
   /// ones. Nothing when there are neither.
-  std::optional<Chunk> take(std::uint64_t at_most);
+  std::optional<Batch> take(std::uint64_t at_most);
   /// The same out of the returned ones of that standing.
-  std::optional<Chunk> take(Standing standing, std::uint64_t at_most);
-  /// The chunk of the condemned point if it came back at `until_ms` or before, else nothing.
-  std::optional<Chunk> take_condemned(std::uint64_t point, std::int64_t until_ms);
+  std::optional<Batch> take(Standing standing, std::uint64_t at_most);
+  /// The condemned point if it came back at `until_ms` or before, else nothing.
+  std::optional<Batch> take_condemned(std::uint64_t point, std::int64_t until_ms);
 
   /// The points of [begin, end) that are still leased are returned at `now_ms`, with the history
   /// given.
@@ -77,12 +77,12 @@ class StudyPoints {
 
   /// The fresh ones among these points were leased so often before, by an earlier run of the server
   /// or before they were reopened.
-  void count_attempts(const AttemptRuns& attempts);
+  void count_attempts(const PointAttempts& attempts);
 
   bool has_free() const { return has(Standing::kSound) || !fresh_.empty(); }
   /// Returned points of that standing.
   bool has(Standing standing) const { return !returned(standing).empty(); }
-  /// When the next chunk to be taken of that standing came back. There must be one.
+  /// When the next points to be taken of that standing came back. There must be one.
   std::int64_t returned_ms(Standing standing) const {
     return returned(standing).begin()->second.returned_ms;
   }
@@ -114,7 +114,7 @@ class StudyPoints {
   const Returned& returned(Standing standing) const {
     return returned_.at(static_cast<std::size_t>(standing));
   }
-  static bool erase_from(Returned& chunks, std::uint64_t point);
+  static bool erase_from(Returned& intervals, std::uint64_t point);
 
   StudyTable table_;
   LossLimits limits_;

@@ -29,7 +29,7 @@ Service::Service(const ServiceSettings& settings, Outbox& outbox, std::vector<St
     states_.restore(study, now.steady_ms);
     feed(StudyAdded{study.study_id, study.table, std::move(study.settled), study.failures.size(),
                     study.state == StudyState::kCancelled, study.state == StudyState::kPaused,
-                    study.share, study.solver_version, std::move(study.attempts)},
+                    study.terms, study.solver_version, std::move(study.attempts)},
          now);
   }
 }
@@ -248,7 +248,7 @@ void Service::stored(const StateWrite& write, Instant now) {
   changes_.answer(write, now);
 }
 
-void Service::stored(const ShareWrite& write, Instant now) {
+void Service::stored(const TermsWrite& write, Instant now) {
   feed(changes_.stored(write, now), now);
   changes_.answer(write, now);
 }
@@ -273,7 +273,7 @@ void Service::refused(const StateWrite& write, const std::string& error) {
   changes_.refused(write, error);
 }
 
-void Service::refused(const ShareWrite& write, const std::string& error) {
+void Service::refused(const TermsWrite& write, const std::string& error) {
   changes_.refused(write, error);
 }
 

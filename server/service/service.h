@@ -95,13 +95,13 @@ class Service {
   void stored(const ResultsWrite& write, Instant now);
   void stored(const StudyWrite& write, Instant now);
   void stored(const StateWrite& write, Instant now);
-  void stored(const ShareWrite& write, Instant now);
+  void stored(const TermsWrite& write, Instant now);
   void stored(const FailuresWrite& write, Instant now);
   void stored(const QuietWrite& write, Instant now);
   void refused(const ResultsWrite& write, const std::string& error);
   void refused(const StudyWrite& write, const std::string& error);
   void refused(const StateWrite& write, const std::string& error);
-  void refused(const ShareWrite& write, const std::string& error);
+  void refused(const TermsWrite& write, const std::string& error);
   void refused(const FailuresWrite& write, const std::string& error);
   void refused(const QuietWrite& write, const std::string& error);
 

@@ -14,31 +14,31 @@ namespace {
 constexpr std::size_t kLongestShownName = 200;
 
 /// Why studies cannot share the workers so, or an empty text.
-std::string objection_to_share(const StudyShare& share) {
+std::string objection_to_terms(const StudyTerms& terms) {
   constexpr std::int32_t kHighestPriority = 1000;
   constexpr double kLeastWeight = 0.001;
   constexpr double kLargestWeight = 1000.0;
-  if (share.priority < -kHighestPriority || share.priority > kHighestPriority) {
-    return "priority = " + std::to_string(share.priority) + " is not allowed: -1000 to 1000 is";
+  if (terms.priority < -kHighestPriority || terms.priority > kHighestPriority) {
+    return "priority = " + std::to_string(terms.priority) + " is not allowed: -1000 to 1000 is";
   }
-  if (!(share.weight >= kLeastWeight && share.weight <= kLargestWeight)) {
-    return "weight = " + std::to_string(share.weight) + " is not allowed: 0.001 to 1000 is";
+  if (!(terms.weight >= kLeastWeight && terms.weight <= kLargestWeight)) {
+    return "weight = " + std::to_string(terms.weight) + " is not allowed: 0.001 to 1000 is";
   }
   return {};
 }
 
 /// What the request says of the share, and for the rest what is.
-StudyShare asked_share(const protocol::SubmitRequest& request, StudyShare share) {
+StudyTerms asked_terms(const protocol::SubmitRequest& request, StudyTerms terms) {
   if (request.has_priority()) {
-    share.priority = request.priority();
+    terms.priority = request.priority();
   }
   if (request.has_weight() && request.weight() != 0.0) {
-    share.weight = request.weight();
+    terms.weight = request.weight();
   }
   if (request.has_mixes_versions()) {
-    share.mixes_versions = request.mixes_versions();
+    terms.mixes_versions = request.mixes_versions();
   }
-  return share;
+  return terms;
 }
 
 }  // namespace
@@ -58,9 +58,9 @@ void StudyChanges::submit(const Client& client, const ReadRequest& read, Instant
     return;
   }
   const auto known = states_.find(request.name());
-  const StudyShare share =
-      asked_share(request, known ? states_.record(*known).share : StudyShare{});
-  if (const std::string reason = objection_to_share(share); !reason.empty()) {
+  const StudyTerms terms =
+      asked_terms(request, known ? states_.record(*known).terms : StudyTerms{});
+  if (const std::string reason = objection_to_terms(terms); !reason.empty()) {
     clients_.reply_error(client, reason);
     return;
   }
@@ -69,7 +69,7 @@ void StudyChanges::submit(const Client& client, const ReadRequest& read, Instant
     return;
   }
   if (!known) {
-    add(client, read, share, now);
+    add(client, read, terms, now);
     return;
   }
   const StudyRecord& study = states_.record(*known);
@@ -78,21 +78,21 @@ void StudyChanges::submit(const Client& client, const ReadRequest& read, Instant
         client, fmt::format("there is a study called \"{}\" with other points or another model: "
                             "give this one another name, or use another database",
                             request.name()));
-  } else if (states_.is_durable(*known) && !(study.share == share)) {
-    ledger_.write(SetStudyShare{*known, share}, ShareWrite{*known, share, client});
+  } else if (states_.is_durable(*known) && !(study.terms == terms)) {
+    ledger_.write(SetStudyTerms{*known, terms}, TermsWrite{*known, terms, client});
   } else {
     go_on(client, *known, now);
   }
 }
 
-void StudyChanges::add(const Client& client, const ReadRequest& read, const StudyShare& share,
+void StudyChanges::add(const Client& client, const ReadRequest& read, const StudyTerms& terms,
                        Instant now) {
   const StudyId id = ++last_study_id_;
   const std::string& name = read.request.submit().name();
   const std::string created_at = iso_8601(now);
-  states_.add(id, {name, read.table, created_at, share, {}, {}, now.steady_ms});
+  states_.add(id, {name, read.table, created_at, terms, {}, {}, now.steady_ms});
   submitters_[id].push_back(client);
-  ledger_.write(AddStudy{id, name, read.table, created_at, share}, StudyWrite{id});
+  ledger_.write(AddStudy{id, name, read.table, created_at, terms}, StudyWrite{id});
 }
 
 /// Submitted again.
@@ -169,7 +169,7 @@ Event StudyChanges::stored(const StudyWrite& write, Instant now) {
   states_.added(write.study, now.steady_ms);
   const StudyRecord& study = states_.record(write.study);
   note(write.study, fmt::format("of {} points begins", study.table.size()));
-  return StudyAdded{write.study, study.table, {}, 0, false, false, study.share};
+  return StudyAdded{write.study, study.table, {}, 0, false, false, study.terms};
 }
 
 Event StudyChanges::stored(const StateWrite& write, Instant /*now*/) {
@@ -185,9 +185,9 @@ Event StudyChanges::stored(const StateWrite& write, Instant /*now*/) {
   return StudyCancelled{write.study};
 }
 
-Event StudyChanges::stored(const ShareWrite& write, Instant /*now*/) {
-  states_.set_share(write.study, write.share);
-  return StudyShareChanged{write.study, write.share};
+Event StudyChanges::stored(const TermsWrite& write, Instant /*now*/) {
+  states_.set_terms(write.study, write.terms);
+  return StudyTermsChanged{write.study, write.terms};
 }
 
 Event StudyChanges::stored(const FailuresWrite& write, Instant now) {
@@ -212,7 +212,7 @@ void StudyChanges::answer(const StateWrite& write, Instant now) {
   }
 }
 
-void StudyChanges::answer(const ShareWrite& write, Instant now) {
+void StudyChanges::answer(const TermsWrite& write, Instant now) {
   go_on(write.client, write.study, now);
 }
 
@@ -233,7 +233,7 @@ void StudyChanges::refused(const StateWrite& write, const std::string& error) {
   reply_unchanged(write.client, error);
 }
 
-void StudyChanges::refused(const ShareWrite& write, const std::string& error) {
+void StudyChanges::refused(const TermsWrite& write, const std::string& error) {
   reply_unchanged(write.client, error);
 }
 

@@ -33,23 +33,23 @@ class StudyChanges {
 
   Event stored(const StudyWrite& write, Instant now);
   Event stored(const StateWrite& write, Instant now);
-  Event stored(const ShareWrite& write, Instant now);
+  Event stored(const TermsWrite& write, Instant now);
   Event stored(const FailuresWrite& write, Instant now);
 
   /// To be called after the scheduler was told.
   void answer(const StudyWrite& write, Instant now);
   void answer(const StateWrite& write, Instant now);
-  void answer(const ShareWrite& write, Instant now);
+  void answer(const TermsWrite& write, Instant now);
   void answer(const FailuresWrite& write, Instant now);
 
   /// The database refused it, as `error` says: all is as before, and the client is told.
   void refused(const StudyWrite& write, const std::string& error);
   void refused(const StateWrite& write, const std::string& error);
-  void refused(const ShareWrite& write, const std::string& error);
+  void refused(const TermsWrite& write, const std::string& error);
   void refused(const FailuresWrite& write, const std::string& error);
 
  private:
-  void add(const Client& client, const ReadRequest& read, const StudyShare& share, Instant now);
+  void add(const Client& client, const ReadRequest& read, const StudyTerms& terms, Instant now);
   void go_on(const Client& client, StudyId id, Instant now);
   void set_state(const Client& client, StudyId id, StudyState state, bool submitted, Instant now);
   void retry(const Client& client, StudyId id, Instant now);

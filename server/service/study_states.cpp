@@ -8,7 +8,7 @@ void StudyStates::restore(const StoredStudy& stored, std::int64_t now_ms) {
   const bool lacks_rows = stored.settled.size() < stored.table.size();
   const StudyState state =
       stored.state == StudyState::kDone && lacks_rows ? StudyState::kRunning : stored.state;
-  add(stored.study_id, {stored.name, stored.table, stored.created_at, stored.share, stored.failures,
+  add(stored.study_id, {stored.name, stored.table, stored.created_at, stored.terms, stored.failures,
                         stored.attempts, now_ms});
   Study& study = studies_.at(stored.study_id);
   study.state = state;
@@ -96,7 +96,8 @@ void StudyStates::point_failed(StudyId id, std::uint64_t point, std::uint32_t at
 
 void StudyStates::forget_failures(StudyId id, const IntervalSet& points, std::int64_t now_ms) {
   Study& study = studies_.at(id);
-  points.for_each([&](const Interval& run) { study.record.failures.erase(run.begin, run.end); });
+  points.for_each(
+      [&](const Interval& interval) { study.record.failures.erase(interval.begin, interval.end); });
   if (study.state == StudyState::kDone) {
     study.state = StudyState::kRunning;
     study.durable_state = StudyState::kRunning;

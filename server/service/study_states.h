@@ -6,8 +6,8 @@
 #include <string>
 #include <string_view>
 
-#include "server/scheduler/attempt_runs.h"
 #include "server/scheduler/interval_set.h"
+#include "server/scheduler/point_attempts.h"
 #include "server/scheduler/study_table.h"
 #include "server/scheduler/worker_processes.h"
 #include "server/store/changes.h"
@@ -20,9 +20,9 @@ struct StudyRecord {
   std::string name;
   StudyTable table;
   std::string created_at;
-  StudyShare share;         ///< as the database has it
+  StudyTerms terms;         ///< as the database has it
   IntervalSet failures;     ///< points whose rows say failed
-  AttemptRuns attempts;     ///< of points that failed, also of those that were forgotten
+  PointAttempts attempts;   ///< of points that failed, also of those that were forgotten
   std::int64_t since_ms{};  ///< nothing is known of its rate before
 };
 
@@ -68,7 +68,7 @@ class StudyStates {
   /// All points are settled. False when that is known.
   bool finish(StudyId id);
 
-  void set_share(StudyId id, const StudyShare& share) { studies_.at(id).record.share = share; }
+  void set_terms(StudyId id, const StudyTerms& terms) { studies_.at(id).record.terms = terms; }
   /// It is durable that the point failed in that attempt.
   void point_failed(StudyId id, std::uint64_t point, std::uint32_t attempt);
   /// It is durable that these failures are forgotten: a study that was done runs.

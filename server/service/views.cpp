@@ -39,7 +39,7 @@ StudyView view_of(StudyId id, const StudySources& sources, Instant now) {
                  counts.failed,
                  counts.leased,
                  record.created_at,
-                 record.share,
+                 record.terms,
                  counts.solver_version,
                  {},
                  0.0};
@@ -64,9 +64,9 @@ protocol::StudyStatus to_message(const StudyView& view) {
   message.set_failed(view.failed);
   message.set_leased(view.leased);
   message.set_created_at(view.created_at);
-  message.set_priority(view.share.priority);
-  message.set_weight(view.share.weight);
-  message.set_mixes_versions(view.share.mixes_versions);
+  message.set_priority(view.terms.priority);
+  message.set_weight(view.terms.weight);
+  message.set_mixes_versions(view.terms.mixes_versions);
   message.set_solver_version(view.solver_version);
   message.set_waits_for(view.waits_for);
   message.set_points_per_s(view.points_per_s);

@@ -30,9 +30,9 @@ struct StateWrite {
   Client client;
   bool submitted;  ///< the client asked for it by submitting the study again
 };
-struct ShareWrite {
+struct TermsWrite {
   StudyId study;
-  StudyShare share;
+  StudyTerms terms;
   Client client;  ///< submitted the study again
 };
 struct FailuresWrite {
@@ -44,7 +44,7 @@ struct FailuresWrite {
 struct QuietWrite {};
 
 using Meaning =
-    std::variant<ResultsWrite, StudyWrite, StateWrite, ShareWrite, FailuresWrite, QuietWrite>;
+    std::variant<ResultsWrite, StudyWrite, StateWrite, TermsWrite, FailuresWrite, QuietWrite>;
 
 struct LedgerLimits {
   /// Results messages of one worker that wait for the disk. A sound worker stops long before.

@@ -39,12 +39,12 @@ struct AddStudy {
   std::string name;
   StudyTable table;
   std::string created_at;
-  StudyShare share{};
+  StudyTerms terms{};
 };
 
-struct SetStudyShare {
+struct SetStudyTerms {
   std::uint64_t study_id;
-  StudyShare share{};
+  StudyTerms terms{};
 };
 
 /// Forgets that these points failed; a study that was done is running again. Rows of solved points
@@ -83,7 +83,7 @@ struct AddResults {
 };
 
 using Change =
-    std::variant<AddStudy, SetStudyState, SetStudyShare, ForgetFailures, AddWorker, AddResults>;
+    std::variant<AddStudy, SetStudyState, SetStudyTerms, ForgetFailures, AddWorker, AddResults>;
 
 /// What the writer needs of a database. Tests put a failing one in its place.
 class Storage {

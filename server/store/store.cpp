@@ -74,6 +74,27 @@ class Impatience {
   sqlite3* database_;
 };
 
+// Whether losing power must not undo a change: results are solved again, and what people asked for
+// would be gone.
+bool is_lasting(const AddStudy& /*change*/) {
+  return true;
+}
+bool is_lasting(const SetStudyState& /*change*/) {
+  return true;
+}
+bool is_lasting(const SetStudyTerms& /*change*/) {
+  return true;
+}
+bool is_lasting(const ForgetFailures& /*change*/) {
+  return true;
+}
+bool is_lasting(const AddWorker& /*change*/) {
+  return false;
+}
+bool is_lasting(const AddResults& /*change*/) {
+  return false;
+}
+
 }  // namespace
 
 struct Store::Statements {
@@ -84,7 +105,7 @@ struct Store::Statements {
                   " VALUES (?1, ?2, ?3, ?4, 'running', ?5, ?5, ?6, ?7, ?8,"
                   " row_checksum(?1, ?2, ?3, ?4, ?5))"),
         set_state(database, "UPDATE studies SET state = ?2, changed_at = ?3 WHERE study_id = ?1"),
-        set_share(database,
+        set_terms(database,
                   "UPDATE studies SET priority = ?2, weight = ?3, mixes_versions = ?4"
                   " WHERE study_id = ?1"),
         note_retries(database,
@@ -110,7 +131,7 @@ struct Store::Statements {
 
   Statement add_study;
   Statement set_state;
-  Statement set_share;
+  Statement set_terms;
   Statement note_retries;
   Statement forget_failures;
   Statement reopen;
@@ -202,17 +223,16 @@ void Store::set_sync(bool full) {
 }
 
 void Store::commit(std::span<const Change> changes) {
-  const bool control = std::any_of(changes.begin(), changes.end(), [](const Change& change) {
-    return !std::holds_alternative<AddWorker>(change) &&
-           !std::holds_alternative<AddResults>(change);
+  const bool any_is_lasting = std::any_of(changes.begin(), changes.end(), [](const Change& change) {
+    return std::visit([](const auto& kind) { return is_lasting(kind); }, change);
   });
   try {
     files_->check();
     log_->make_sure();
-    set_sync(control);
+    set_sync(any_is_lasting);
     Transaction transaction(database_.get());
     for (const Change& change : changes) {
-      std::visit([this](const auto& c) { add(c); }, change);
+      std::visit([this](const auto& kind) { add(kind); }, change);
     }
     transaction.commit();
     files_->check();  // or it was committed to a file that nobody will find
@@ -238,33 +258,33 @@ void Store::add(const AddStudy& change) {
   insert.bind_blob(3, change.table.recipe_bytes());
   insert.bind(4, change.table.size());
   insert.bind(5, change.created_at);
-  insert.bind(6, std::int64_t{change.share.priority});
-  insert.bind(7, change.share.weight);
-  insert.bind(8, std::int64_t{change.share.mixes_versions});
+  insert.bind(6, std::int64_t{change.terms.priority});
+  insert.bind(7, change.terms.weight);
+  insert.bind(8, std::int64_t{change.terms.mixes_versions});
   insert.run();
 }
 
-void Store::add(const SetStudyShare& change) {
-  Statement& update = statements_->set_share;
+void Store::add(const SetStudyTerms& change) {
+  Statement& update = statements_->set_terms;
   update.bind(1, change.study_id);
-  update.bind(2, std::int64_t{change.share.priority});
-  update.bind(3, change.share.weight);
-  update.bind(4, std::int64_t{change.share.mixes_versions});
+  update.bind(2, std::int64_t{change.terms.priority});
+  update.bind(3, change.terms.weight);
+  update.bind(4, std::int64_t{change.terms.mixes_versions});
   update.run();
 }
 
 void Store::add(const ForgetFailures& change) {
-  change.points.for_each([&](const Interval& run) {
+  change.points.for_each([&](const Interval& interval) {
     Statement& note = statements_->note_retries;
     note.bind(1, change.study_id);
-    note.bind(2, run.begin);
-    note.bind(3, run.end);
+    note.bind(2, interval.begin);
+    note.bind(3, interval.end);
     note.bind(4, change.changed_at);
     note.run();
     Statement& forget = statements_->forget_failures;
     forget.bind(1, change.study_id);
-    forget.bind(2, run.begin);
-    forget.bind(3, run.end);
+    forget.bind(2, interval.begin);
+    forget.bind(3, interval.end);
     forget.run();
   });
   Statement& reopen = statements_->reopen;

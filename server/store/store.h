@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "server/database/sqlite.h"
-#include "server/scheduler/attempt_runs.h"
 #include "server/scheduler/interval_set.h"
+#include "server/scheduler/point_attempts.h"
 #include "server/store/changes.h"
 #include "server/store/database_files.h"
 #include "server/store/write_ahead_log.h"
@@ -22,11 +22,11 @@ struct StoredStudy {
   StudyTable table;
   StudyState state;
   std::string created_at;
-  StudyShare share{};
+  StudyTerms terms{};
   std::string solver_version;  ///< of its first result that a worker solved; empty: there is none
   IntervalSet settled;         ///< points that have a row
   IntervalSet failures;        ///< those whose row says failed
-  AttemptRuns attempts{};      ///< of these, and of those that failed and were forgotten
+  PointAttempts attempts{};    ///< of these, and of those that failed and were forgotten
 };
 
 /// The SQLite database (schema.sql), opened for writing. Only one Store may have a file open;
@@ -77,7 +77,7 @@ class Store final : public Storage {
   void migrate();
   void add(const AddStudy& change);
   void add(const SetStudyState& change);
-  void add(const SetStudyShare& change);
+  void add(const SetStudyTerms& change);
   void add(const ForgetFailures& change);
   void add(const AddWorker& change);
   void add(const AddResults& change);

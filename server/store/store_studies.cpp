@@ -24,7 +24,7 @@ struct Progress {
   std::map<std::uint64_t, std::uint64_t> rows;  // by study, of those that have any
   std::map<std::uint64_t, std::uint64_t> last;  // point that has one
   std::map<std::uint64_t, IntervalSet> failures;
-  std::map<std::uint64_t, AttemptRuns> attempts;
+  std::map<std::uint64_t, PointAttempts> attempts;
 };
 
 std::uint64_t number(Statement& statement, int column) {
@@ -62,18 +62,18 @@ Progress progress_of_all(sqlite3* database) {
 /// The points of a study that have a row.
 IntervalSet points_of(Statement& query, std::uint64_t study_id) {
   IntervalSet points;
-  Interval run{0, 0};
+  Interval interval{0, 0};
   query.reset();
   query.bind(1, study_id);
   while (query.step()) {
     const std::uint64_t point = number(query, 0);
-    if (point != run.end) {
-      points.insert(run.begin, run.end);
-      run.begin = point;
+    if (point != interval.end) {
+      points.insert(interval.begin, interval.end);
+      interval.begin = point;
     }
-    run.end = point + 1;
+    interval.end = point + 1;
   }
-  points.insert(run.begin, run.end);
+  points.insert(interval.begin, interval.end);
   query.reset();
   return points;
 }
@@ -114,7 +114,7 @@ std::vector<StoredStudy> Store::studies() {
     study.table = StudyTable(list.text(2), number(list, 8));
     study.state = state_named(list.text(3));
     study.created_at = list.text(4);
-    study.share = {static_cast<std::int32_t>(list.integer(5)), list.real(6), list.integer(7) != 0};
+    study.terms = {static_cast<std::int32_t>(list.integer(5)), list.real(6), list.integer(7) != 0};
     const std::uint64_t rows = progress.rows[study.study_id];
     if (rows > 0) {
       version.reset();

@@ -5,7 +5,6 @@
 #include <exception>
 #include <iterator>
 #include <set>
-#include <type_traits>
 #include <utility>
 #include <variant>
 
@@ -35,17 +34,27 @@ bool ends_a_study(const Change& change) {
   return state != nullptr && state->state == StudyState::kDone;
 }
 
-/// The study that a change is of; 0: of none.
+// The study that a change is of; 0: of none.
+std::uint64_t study_of(const AddStudy& change) {
+  return change.study_id;
+}
+std::uint64_t study_of(const SetStudyState& change) {
+  return change.study_id;
+}
+std::uint64_t study_of(const SetStudyTerms& change) {
+  return change.study_id;
+}
+std::uint64_t study_of(const ForgetFailures& change) {
+  return change.study_id;
+}
+std::uint64_t study_of(const AddWorker& /*change*/) {
+  return 0;
+}
+std::uint64_t study_of(const AddResults& change) {
+  return change.study_id;
+}
 std::uint64_t study_of(const Change& change) {
-  return std::visit(
-      [](const auto& c) -> std::uint64_t {
-        if constexpr (std::is_same_v<std::decay_t<decltype(c)>, AddWorker>) {
-          return 0;
-        } else {
-          return c.study_id;
-        }
-      },
-      change);
+  return std::visit([](const auto& kind) { return study_of(kind); }, change);
 }
 
 }  // namespace

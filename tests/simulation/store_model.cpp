@@ -12,8 +12,8 @@ using server::AddStudy;
 using server::AddWorker;
 using server::Change;
 using server::ForgetFailures;
-using server::SetStudyShare;
 using server::SetStudyState;
+using server::SetStudyTerms;
 using server::StudyState;
 
 bool StoreModel::apply(const Change& change, Contents& contents) {
@@ -23,7 +23,7 @@ bool StoreModel::apply(const Change& change, Contents& contents) {
                                          study->table,
                                          StudyState::kRunning,
                                          study->created_at,
-                                         study->share,
+                                         study->terms,
                                          {},
                                          {},
                                          {}};
@@ -33,10 +33,10 @@ bool StoreModel::apply(const Change& change, Contents& contents) {
     contents.studies.at(state->study_id).state = state->state;
     return true;
   }
-  if (const auto* share = std::get_if<SetStudyShare>(&change)) {
-    auto& now = contents.studies.at(share->study_id).share;
-    const bool changes = !(now == share->share);
-    now = share->share;
+  if (const auto* terms = std::get_if<SetStudyTerms>(&change)) {
+    auto& now = contents.studies.at(terms->study_id).terms;
+    const bool changes = !(now == terms->terms);
+    now = terms->terms;
     return changes;
   }
   if (const auto* worker = std::get_if<AddWorker>(&change)) {
@@ -52,8 +52,8 @@ bool StoreModel::apply(const ForgetFailures& change, Contents& contents) {
   auto& study = contents.studies.at(change.study_id);
   bool changes = study.state == StudyState::kDone;
   study.state = changes ? StudyState::kRunning : study.state;
-  change.points.for_each([&](const server::Interval& run) {
-    for (std::uint64_t point = run.begin; point < run.end; ++point) {
+  change.points.for_each([&](const server::Interval& interval) {
+    for (std::uint64_t point = interval.begin; point < interval.end; ++point) {
       if (study.failures.contains(point)) {
         contents.rows[change.study_id].erase(point);
         study.failures.erase(point);
@@ -178,7 +178,7 @@ bool StoreModel::Contents::operator==(const Found& found) const {
                       const server::StoredStudy& here = entry.second;
                       return here.study_id == there.study_id && here.name == there.name &&
                              here.state == there.state && here.created_at == there.created_at &&
-                             here.share == there.share && here.settled == there.settled &&
+                             here.terms == there.terms && here.settled == there.settled &&
                              here.failures == there.failures &&
                              here.table->recipe().SerializeAsString() ==
                                  there.table->recipe().SerializeAsString();

@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/care/database_care.h"
+#include "server/care/diagnosis.h"
 #include "server/store/store.h"
 #include "tests/server/scheduler/scheduler_bench.h"
 #include "tests/server/store/results.h"

@@ -9,10 +9,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/care/database_care.h"
+#include "server/care/diagnosis.h"
 #include "server/reading/reader.h"
 #include "server/store/store.h"
-#include "tests/server/care/database_care_fixture.h"
+#include "tests/server/care/care_fixture.h"
 
 namespace oblique::server {
 namespace {
@@ -20,7 +20,7 @@ namespace {
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-class SalvageTest : public DatabaseCareTest {};
+class SalvageTest : public CareTest {};
 
 TEST_F(SalvageTest, WhatCanBeReadOfADamagedDatabaseIsSavedAndTheRestIsPendingAgain) {
   constexpr std::uint64_t kPoints = 400;

@@ -12,9 +12,9 @@ TEST(IntervalSetTest, TouchingIntervalsBecomeOne) {
   IntervalSet set;
   set.insert(0, 5);
   set.insert(10, 15);
-  EXPECT_EQ(set.runs(), 2U);
+  EXPECT_EQ(set.intervals(), 2U);
   set.insert(5, 10);
-  EXPECT_EQ(set.runs(), 1U);
+  EXPECT_EQ(set.intervals(), 1U);
   EXPECT_EQ(set.front(), (Interval{0, 15}));
 }
 
@@ -53,11 +53,11 @@ TEST(IntervalSetTest, BehavesAsASetOfPointsUnderRandomChanges) {
     }
     std::uint64_t last_end = 0;
     bool first = true;
-    set.for_each([&](const Interval& run) {
-      ASSERT_LT(run.begin, run.end);
-      ASSERT_TRUE(first || run.begin > last_end) << "step " << step;
+    set.for_each([&](const Interval& interval) {
+      ASSERT_LT(interval.begin, interval.end);
+      ASSERT_TRUE(first || interval.begin > last_end) << "step " << step;
       first = false;
-      last_end = run.end;
+      last_end = interval.end;
     });
   }
 }

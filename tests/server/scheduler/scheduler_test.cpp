@@ -91,7 +91,7 @@ TEST(SchedulerTest, AStudyOfABillionPointsCostsNoMoreThanASmallOne) {
     }
   }
   EXPECT_EQ(bench.scheduler.study(1).points, 1'000'000'000U);
-  EXPECT_EQ(bench.scheduler.settled(1).runs(), 1U);
+  EXPECT_EQ(bench.scheduler.settled(1).intervals(), 1U);
 }
 
 TEST(SchedulerTest, BatchesGrowToTheWorkThatWasAimedAt) {

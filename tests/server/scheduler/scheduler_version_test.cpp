@@ -6,7 +6,7 @@
 namespace oblique::server {
 namespace {
 
-StudyShare mixed() {
+StudyTerms mixed() {
   return {0, 1.0, true};
 }
 
@@ -79,7 +79,7 @@ TEST(SchedulerVersion, WhenAStudyStopsMixingWorkersOfOtherVersionsLoseTheirBatch
   bench.feed(StudyAdded{1, table_of(100), IntervalSet(0, 1), 0, false, false, mixed(), "1.0"});
   bench.feed(WorkerJoined{2, 1, "2.0"});
   const auto batch = only<SendBatch>(bench.feed(CreditGiven{2, 1})).at(0);
-  const auto released = only<ReleaseBatch>(bench.feed(StudyShareChanged{1, {}}));
+  const auto released = only<ReleaseBatch>(bench.feed(StudyTermsChanged{1, {}}));
   ASSERT_EQ(released.size(), 1U);
   EXPECT_EQ(released[0].lease, batch.lease);
   EXPECT_EQ(bench.scheduler.study(1).leased, 0U);

@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/care/database_care.h"
+#include "server/care/diagnosis.h"
 #include "server/reading/reader.h"
 #include "server/store/store.h"
 #include "tests/server/scheduler/scheduler_bench.h"
@@ -52,7 +52,7 @@ TEST_P(OldDatabaseTest, IsBroughtToThePresentSchemaAndKeepsItsStudies) {
   ASSERT_EQ(studies.size(), 1U);
   EXPECT_EQ(studies[0].name, "old study");
   EXPECT_EQ(studies[0].state, StudyState::kCancelled);
-  EXPECT_EQ(studies[0].share, StudyShare{});
+  EXPECT_EQ(studies[0].terms, StudyTerms{});
   store.commit(std::vector<Change>{SetStudyState{3, StudyState::kPaused, "now"}});
   EXPECT_EQ(store.studies()[0].state, StudyState::kPaused);
   EXPECT_THAT(find_faults(path_), IsEmpty());

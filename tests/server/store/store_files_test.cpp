@@ -10,7 +10,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/care/database_care.h"
+#include "server/care/backup.h"
+#include "server/care/diagnosis.h"
 #include "server/reading/reader.h"
 #include "server/store/store.h"
 #include "tests/server/scheduler/scheduler_bench.h"

@@ -255,11 +255,12 @@ TEST_F(StoreTest, AttemptsOfFailuresAreKnownAfterARestartAlsoWhenTheFailuresAreF
     commit(store, {failed_in(3, {4})});
   }
   std::map<std::uint64_t, std::uint32_t> attempts;
-  Store(path_).studies().at(0).attempts.for_each([&](const Interval& run, std::uint32_t number) {
-    for (std::uint64_t point = run.begin; point < run.end; ++point) {
-      attempts[point] = number;
-    }
-  });
+  Store(path_).studies().at(0).attempts.for_each(
+      [&](const Interval& interval, std::uint32_t number) {
+        for (std::uint64_t point = interval.begin; point < interval.end; ++point) {
+          attempts[point] = number;
+        }
+      });
   EXPECT_EQ(attempts, (std::map<std::uint64_t, std::uint32_t>{
                           {2, 1}, {3, 1}, {4, 3}, {5, 1}, {8, 2}, {9, 2}}));
   EXPECT_EQ(ask(path_, "SELECT * FROM retries").rows_size(), 4) << "neighbours share a row";

@@ -1,16 +1,15 @@
-#include "server/care/database_care.h"
+#include "server/care/diagnosis.h"
 
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/reading/reader.h"
+#include "server/care/backup.h"
 #include "server/store/store.h"
-#include "tests/server/care/database_care_fixture.h"
+#include "tests/server/care/care_fixture.h"
 
 namespace oblique::server {
 namespace {
@@ -20,36 +19,11 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-TEST_F(DatabaseCareTest, ACopyMadeWhileTheDatabaseIsOpenHasAllThatWasCommitted) {
-  back_up(path_, copy_);
-  add_results(*store_, 5, 10, false);
-  Store copy(copy_);
-  const auto studies = copy.studies();
-  ASSERT_EQ(studies.size(), 1U);
-  EXPECT_EQ(studies[0].settled, IntervalSet(0, 5));
-  EXPECT_EQ(copy.database_id(), store_->database_id());
-}
-
-TEST_F(DatabaseCareTest, ACopyNeverReplacesAFile) {
-  std::ofstream(copy_) << "mine";
-  EXPECT_THROW(back_up(path_, copy_), StorageError);
-  std::ifstream file(copy_);
-  EXPECT_EQ(std::string(std::istreambuf_iterator<char>(file), {}), "mine");
-}
-
-TEST_F(DatabaseCareTest, OnlyADatabaseOfOursIsCopied) {
-  const std::string other = folder_.file("notes.txt");
-  std::ofstream(other) << "not a database, and long enough to be sure of it";
-  EXPECT_THROW(back_up(other, copy_), StorageError);
-  EXPECT_THROW(back_up(folder_.file("nowhere.db"), copy_), StorageError);
-  EXPECT_FALSE(std::filesystem::exists(copy_));
-}
-
-TEST_F(DatabaseCareTest, ASoundDatabaseHasNoFaults) {
+TEST_F(CareTest, ASoundDatabaseHasNoFaults) {
   EXPECT_THAT(find_faults(path_), IsEmpty());
 }
 
-TEST_F(DatabaseCareTest, ADamagedPageIsFoundAndNotCopied) {
+TEST_F(CareTest, ADamagedPageIsFoundAndNotCopied) {
   store_.reset();  // all is in the one file now
   {
     std::fstream file(path_, std::ios::in | std::ios::out | std::ios::binary);
@@ -72,7 +46,7 @@ TEST_F(DatabaseCareTest, ADamagedPageIsFoundAndNotCopied) {
   EXPECT_FALSE(std::filesystem::exists(copy_));
 }
 
-TEST_F(DatabaseCareTest, EveryColumnOfAResultIsUnderItsChecksum) {
+TEST_F(CareTest, EveryColumnOfAResultIsUnderItsChecksum) {
   store_.reset();
   std::vector<std::string> columns;
   {
@@ -99,13 +73,13 @@ TEST_F(DatabaseCareTest, EveryColumnOfAResultIsUnderItsChecksum) {
   }
 }
 
-TEST_F(DatabaseCareTest, AStudyThatWasChangedIsFound) {
+TEST_F(CareTest, AStudyThatWasChangedIsFound) {
   store_.reset();
   execute(open_database(path_, SQLITE_OPEN_READWRITE).get(), "UPDATE studies SET name = 'b'");
   EXPECT_THAT(find_faults(path_), testing::Contains(HasSubstr("study 1, b")));
 }
 
-TEST_F(DatabaseCareTest, ADamagedDatabaseIsRefusedWithTheWayOut) {
+TEST_F(CareTest, ADamagedDatabaseIsRefusedWithTheWayOut) {
   store_.reset();
   const auto page_of = [&](const std::string& name) {
     const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READONLY);
@@ -129,20 +103,20 @@ TEST_F(DatabaseCareTest, ADamagedDatabaseIsRefusedWithTheWayOut) {
   }
 }
 
-TEST_F(DatabaseCareTest, ARowOfAPointThatTheStudyDoesNotHaveIsNamed) {
+TEST_F(CareTest, ARowOfAPointThatTheStudyDoesNotHaveIsNamed) {
   store_.reset();
   const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);
   execute(database.get(), "UPDATE results SET point = 77 WHERE point = 4");
   EXPECT_THAT(find_faults(path_), testing::Contains(HasSubstr("study a")));
 }
 
-TEST_F(DatabaseCareTest, StartsOfServersAreCountedSoThatNoLeaseNumberComesTwice) {
+TEST_F(CareTest, StartsOfServersAreCountedSoThatNoLeaseNumberComesTwice) {
   EXPECT_EQ(store_->count_start(), 1U);
   store_.reset();
   EXPECT_EQ(Store(path_).count_start(), 2U);
 }
 
-TEST_F(DatabaseCareTest, AStudyThatIsNotFinishedIsNamedThoughTheDatabaseIsSound) {
+TEST_F(CareTest, AStudyThatIsNotFinishedIsNamedThoughTheDatabaseIsSound) {
   const auto found = diagnose(path_);
   EXPECT_THAT(found.faults, IsEmpty());
   EXPECT_THAT(found.remarks, ElementsAre("study a is running: 5 of 10 points have a result"));
@@ -150,7 +124,7 @@ TEST_F(DatabaseCareTest, AStudyThatIsNotFinishedIsNamedThoughTheDatabaseIsSound)
   EXPECT_THAT(diagnose(path_).remarks, IsEmpty());
 }
 
-TEST_F(DatabaseCareTest, RowsWithoutChecksumsAreCounted) {
+TEST_F(CareTest, RowsWithoutChecksumsAreCounted) {
   execute(open_database(path_, SQLITE_OPEN_READWRITE).get(),
           "UPDATE results SET checksum = NULL WHERE point < 2");
   EXPECT_THAT(diagnose(path_).remarks, Contains(HasSubstr("2 of 5 results have no checksum")));

@@ -15,9 +15,9 @@
 namespace oblique::server {
 
 /// A database with one study of ten points, five of them solved.
-class DatabaseCareTest : public testing::Test {
+class CareTest : public testing::Test {
  protected:
-  DatabaseCareTest() { add_results(*store_, 0, 5, true); }
+  CareTest() { add_results(*store_, 0, 5, true); }
 
   void add_results(Store& store, std::uint64_t first, std::uint64_t end, bool with_study) {
     std::vector<Change> changes;

@@ -11,6 +11,6 @@ std::string file_system_of(const std::string& path, const std::string& mounts);
 /// Why a database at `path` (which may not be there yet) is not safe on its file system, or an
 /// empty text. A file system that other machines reach has neither the locks nor the shared memory
 /// that SQLite's write-ahead log needs: two machines could write at once and damage the file.
-std::string objection_to_file_system(const std::string& path);
+std::string objection_to_shared_disk(const std::string& path);
 
 }  // namespace oblique::server

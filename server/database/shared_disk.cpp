@@ -1,4 +1,4 @@
-#include "server/file_system.h"
+#include "server/database/shared_disk.h"
 
 #include <algorithm>
 #include <array>
@@ -66,7 +66,7 @@ std::string file_system_of(const std::string& path, const std::string& mounts) {
   return type;
 }
 
-std::string objection_to_file_system(const std::string& path) {
+std::string objection_to_shared_disk(const std::string& path) {
   std::error_code error;
   const auto real = std::filesystem::weakly_canonical(std::filesystem::absolute(path), error);
   std::ifstream file("/proc/self/mountinfo");

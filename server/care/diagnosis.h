@@ -3,13 +3,9 @@
 #include <string>
 #include <vector>
 
-namespace oblique::server {
+#include "server/database/sqlite.h"
 
-/// Copies the database at `from` to `to`, as it is at one instant, while a server may be writing to
-/// it. The copy appears under its name only when it is whole, checked and on the disk. Throws
-/// StorageError naming what was found: no database of ours at `from`, something at `to`, no room, a
-/// damaged page.
-void back_up(const std::string& from, const std::string& to);
+namespace oblique::server {
 
 /// What can be said of a database, a sentence each.
 struct Diagnosis {
@@ -21,6 +17,10 @@ struct Diagnosis {
 /// are what was stored and of points that their studies have, with the recipe's H, mu, e and model,
 /// that no study is called done that is not. Throws StorageError when it is no database of ours.
 Diagnosis diagnose(const std::string& path);
+
+/// What SQLite finds wrong with the pages and indices of an open database, at most some twenty;
+/// empty: they are sound.
+std::vector<std::string> faults_of_pages(sqlite3* database);
 
 /// The faults alone.
 std::vector<std::string> find_faults(const std::string& path);

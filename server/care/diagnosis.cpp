@@ -1,11 +1,9 @@
-#include "server/care/database_care.h"
+#include "server/care/diagnosis.h"
 
 #include <cstddef>
-#include <filesystem>
 #include <utility>
 
 #include "server/care/row_faults.h"
-#include "server/database/draft_file.h"
 #include "server/database/open_for_reading.h"
 #include "server/database/row_checksum.h"
 #include "server/database/sqlite.h"
@@ -15,14 +13,6 @@ namespace {
 
 constexpr std::size_t kMostOfAKind = 20;
 
-OpenedForReading open_ours(const std::string& path) {
-  OpenedForReading opened = open_for_reading(path);
-  if (identify(opened.database.get(), path) == DatabaseKind::kEmpty) {
-    throw StorageError(path + " is empty: no study was ever stored in it");
-  }
-  return opened;
-}
-
 std::vector<std::string> texts(sqlite3* database, const std::string& sql) {
   std::vector<std::string> found;
   Statement statement(database, sql);
@@ -30,15 +20,6 @@ std::vector<std::string> texts(sqlite3* database, const std::string& sql) {
     found.push_back(statement.text(0));
   }
   return found;
-}
-
-std::vector<std::string> damaged_pages(sqlite3* database) {
-  try {
-    auto found = texts(database, "PRAGMA integrity_check(20)");
-    return found == std::vector<std::string>{"ok"} ? std::vector<std::string>{} : found;
-  } catch (const StorageError& error) {
-    return {error.what()};  // too damaged to be looked at
-  }
 }
 
 int schema_of(sqlite3* database) {
@@ -52,47 +33,25 @@ std::string counted_studies() {
          " FROM studies AS s)";
 }
 
-void copy_pages(sqlite3* from, sqlite3* to, const std::string& path) {
-  sqlite3_backup* backup = sqlite3_backup_init(to, "main", from, "main");
-  if (backup == nullptr) {
-    throw StorageError("cannot write the copy " + path + ": " + sqlite3_errmsg(to));
-  }
-  // All pages in one step: one instant of the source, whatever is written to it meanwhile.
-  sqlite3_backup_step(backup, -1);
-  if (sqlite3_backup_finish(backup) != SQLITE_OK) {
-    throw StorageError("cannot write the copy " + path + ": " + sqlite3_errmsg(to));
-  }
-}
-
 }  // namespace
 
-void back_up(const std::string& from, const std::string& to) {
-  if (std::filesystem::exists(to)) {
-    throw StorageError(to + " exists already: name a file that does not");
+std::vector<std::string> faults_of_pages(sqlite3* database) {
+  try {
+    auto found = texts(database, "PRAGMA integrity_check(20)");
+    return found == std::vector<std::string>{"ok"} ? std::vector<std::string>{} : found;
+  } catch (const StorageError& error) {
+    return {error.what()};  // too damaged to be looked at
   }
-  const OpenedForReading source = open_ours(from);
-  DraftFile draft(to + ".part");
-  {
-    const DatabaseHandle copy =
-        open_database(draft.path(), SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
-    copy_pages(source.database.get(), copy.get(), to);
-    // One file, without a log beside it.
-    execute(copy.get(), "PRAGMA journal_mode = DELETE");
-    if (const auto faults = damaged_pages(copy.get()); !faults.empty()) {
-      throw StorageError(from + " is damaged, and so would be the copy: " + faults.front());
-    }
-  }
-  draft.keep_as(to);
 }
 
 Diagnosis diagnose(const std::string& path) {
-  const OpenedForReading opened = open_ours(path);
+  const OpenedForReading opened = open_stored(path);
   sqlite3* database = opened.database.get();
   Diagnosis found;
   if (!opened.remark.empty()) {
     found.remarks.push_back(opened.remark);
   }
-  found.faults = damaged_pages(database);
+  found.faults = faults_of_pages(database);
   if (!found.faults.empty()) {
     return found;  // what damaged pages say of anything else means nothing
   }

@@ -1,4 +1,4 @@
-#include "server/file_system.h"
+#include "server/database/shared_disk.h"
 
 #include <gtest/gtest.h>
 
@@ -14,24 +14,24 @@ constexpr const char* kMounts = R"(22 1 254:0 / / rw,relatime shared:1 - ext4 /d
 a line that is none
 )";
 
-TEST(FileSystem, IsThatOfTheLongestMountPointAboveThePath) {
+TEST(SharedDisk, IsThatOfTheLongestMountPointAboveThePath) {
   EXPECT_EQ(file_system_of("/var/oblique.db", kMounts), "ext4");
   EXPECT_EQ(file_system_of("/home/me/oblique.db", kMounts), "nfs4");
   EXPECT_EQ(file_system_of("/home/local/oblique.db", kMounts), "xfs");
   EXPECT_EQ(file_system_of("/homes/oblique.db", kMounts), "ext4");
 }
 
-TEST(FileSystem, MountPointsMayHaveSpacesAndHideEarlierOnes) {
+TEST(SharedDisk, MountPointsMayHaveSpacesAndHideEarlierOnes) {
   EXPECT_EQ(file_system_of("/mnt/two words/a.db", kMounts), "fuse.sshfs");
   EXPECT_EQ(file_system_of("/scratch/a.db", kMounts), "ext4");
 }
 
-TEST(FileSystem, WithoutMountsNothingIsKnown) {
+TEST(SharedDisk, WithoutMountsNothingIsKnown) {
   EXPECT_EQ(file_system_of("/var/oblique.db", ""), "");
 }
 
-TEST(FileSystem, ALocalPathHasNoObjection) {
-  EXPECT_EQ(objection_to_file_system("/proc/self/oblique.db"), "");
+TEST(SharedDisk, ALocalPathHasNoObjection) {
+  EXPECT_EQ(objection_to_shared_disk("/proc/self/oblique.db"), "");
 }
 
 }  // namespace

@@ -7,31 +7,31 @@
 
 namespace oblique::server {
 
-/// How often points were leased, kept as runs of neighbours with one number: the cost grows with
-/// the number of runs, not of points.
-class AttemptRuns {
+/// How often points were leased, kept as intervals of one number: the cost grows with the number of
+/// intervals, not of points.
+class PointAttempts {
  public:
   /// The points of `range` were leased `attempts` times, whatever was said of them before.
   void set(const Interval& range, std::uint32_t attempts);
 
-  bool empty() const { return runs_.empty(); }
+  bool empty() const { return counts_.empty(); }
 
-  /// Calls `visit` with every run and its number, in order of the points.
+  /// Calls `visit` with every interval and its number, in order of the points.
   template <typename Visitor>
   void for_each(Visitor visit) const {
-    for (const auto& [begin, run] : runs_) {
-      visit(Interval{begin, run.end}, run.attempts);
+    for (const auto& [begin, counted] : counts_) {
+      visit(Interval{begin, counted.end}, counted.attempts);
     }
   }
 
  private:
-  struct Run {
+  struct Counted {
     std::uint64_t end;
     std::uint32_t attempts;
   };
   void make_room(const Interval& range);
 
-  std::map<std::uint64_t, Run> runs_;  // by first point
+  std::map<std::uint64_t, Counted> counts_;  // by first point
 };
 
 }  // namespace oblique::server
