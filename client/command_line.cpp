@@ -7,9 +7,9 @@
 #include <string_view>
 #include <vector>
 
-#include "client/study/nearest.h"
 #include "client/verbs/verbs.h"
 #include "proto/program/usage.h"
+#include "proto/suggestion.h"
 #include "proto/text.h"
 #include "worker/solver/model/parameters.h"
 #include "worker/solver/model/version.h"
@@ -76,7 +76,7 @@ std::string unexpected_words(CLI::App& app, CLI::App& verb) {
   const std::string first = unexpected.empty() ? std::string() : unexpected.front();
   const bool is_verb = &verb == &app && !first.starts_with("-");
   return std::string(is_verb ? "unknown verb `" : "unexpected `") + first + "`" +
-         did_you_mean(first.substr(0, first.find('=')), candidates);
+         protocol::did_you_mean(first.substr(0, first.find('=')), candidates);
 }
 
 int wrong_usage(const CLI::App& app, const CLI::App& verb, const std::string& message) {

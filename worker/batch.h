@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "proto/recipe/recipe.h"
+#include "proto/recipe/point_table.h"
 
 namespace oblique::worker {
 

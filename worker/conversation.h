@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "proto/oblique.pb.h"
-#include "proto/recipe/recipe.h"
+#include "proto/recipe/point_table.h"
 #include "worker/batch.h"
 #include "worker/effects.h"
 #include "worker/outbox.h"

@@ -1,6 +1,7 @@
 // The part of the conversation that delivers what was solved and asks for more.
 #include <utility>
 
+#include "proto/result_message.h"
 #include "worker/conversation.h"
 
 namespace oblique::worker {

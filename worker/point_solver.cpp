@@ -1,4 +1,5 @@
 #include "worker/point_solver.h"
+#include "proto/result_message.h"
 
 #include <algorithm>
 #include <cmath>

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "proto/recipe/recipe.h"
+#include "proto/recipe/model_message.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::client {

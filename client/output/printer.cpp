@@ -15,7 +15,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/output/packed_columns.h"
-#include "client/study/nearest.h"
+#include "proto/suggestion.h"
 #include "proto/text.h"
 #include "worker/solver/model/number.h"
 #include "worker/solver/model/parameters.h"
@@ -227,7 +227,8 @@ Format format_named(std::string_view name) {
   const auto found = std::find(kFormatNames.begin(), kFormatNames.end(), name);
   if (found == kFormatNames.end()) {
     throw solver::InputError("format = \"" + std::string(name) +
-                             "\" is not allowed: it must be one of " + joined(kFormatNames));
+                             "\" is not allowed: it must be one of " +
+                             protocol::joined(kFormatNames));
   }
   return static_cast<Format>(found - kFormatNames.begin());
 }

@@ -9,7 +9,6 @@
 #include <nlohmann/json.hpp>
 
 #include "client/output/printer.h"
-#include "client/study/axis.h"
 #include "worker/solver/contact/contact_record.h"
 #include "worker/solver/model/number.h"
 #include "worker/solver/solve.h"

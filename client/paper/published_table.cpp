@@ -1,12 +1,16 @@
 #include "client/paper/published_table.h"
 
 #include <stdexcept>
+#include <utility>
+#include <vector>
 
 #include <toml++/toml.h>
 
 #include "client/paper/published_toml.h"
-#include "client/study/axis.h"
-#include "proto/recipe/recipe.h"
+#include "proto/recipe/blocks.h"
+#include "proto/recipe/keys.h"
+#include "proto/recipe/model_message.h"
+#include "proto/recipe/written_axis.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::client {
@@ -86,9 +90,13 @@ protocol::Recipe recipe_of(const PublishedTable& table, std::string_view preset)
   protocol::Recipe recipe;
   *recipe.mutable_model() = protocol::to_message(solver::preset(preset));
   for (const auto& published : table.cases) {
-    *recipe.add_blocks() = block_of({listed_axis(axis_key("H"), {published.H_m}),
-                                     listed_axis(axis_key("mu"), {published.mu}),
-                                     listed_axis(axis_key("e"), {published.e_star})});
+    const std::pair<std::string_view, double> values[]{
+        {"H", published.H_m}, {"mu", published.mu}, {"e", published.e_star}};
+    std::vector<protocol::Axis> axes;
+    for (const auto& [key, value] : values) {
+      axes.push_back(protocol::listed_axis(protocol::axis_key(key), {value}));
+    }
+    *recipe.add_blocks() = protocol::block_of(std::move(axes));
   }
   return recipe;
 }

@@ -7,6 +7,7 @@
 #include "proto/address.h"
 #include "proto/frames.h"
 #include "proto/socket/socket.h"
+#include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {

@@ -10,7 +10,7 @@
 #include <zmq.hpp>
 
 #include "client/service/socket_monitor.h"
-#include "client/study/axis.h"
+#include "client/study/study.h"
 #include "proto/oblique.pb.h"
 
 namespace oblique::client {

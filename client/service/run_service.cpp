@@ -9,6 +9,7 @@
 #include "client/service/connection.h"
 #include "client/service/watching.h"
 #include "proto/text.h"
+#include "worker/solver/model/parameters.h"
 
 namespace oblique::client {
 namespace {

@@ -9,7 +9,7 @@
 #include "client/service/embedded_service.h"
 #include "client/service/source.h"
 #include "client/service/stop_signal.h"
-#include "client/study/axis.h"
+#include "client/study/study.h"
 #include "proto/oblique.pb.h"
 
 namespace oblique::client {

@@ -1,13 +1,13 @@
 #pragma once
 
-#include <filesystem>
 #include <map>
 #include <string>
 #include <string_view>
 
 #include <CLI/CLI.hpp>
 
-#include "client/study/axis.h"
+#include "client/study/reach.h"
+#include "proto/oblique.pb.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::client {
@@ -30,29 +30,11 @@ void add_point_flags(CLI::App& verb, PointFlags& flags, FlagValues values);
 /// ends in). Throws InputError naming flag, value and what is allowed.
 protocol::Axis axis_of_flag(const solver::ParameterKey& key, std::string_view text);
 
-/// The recipe of all flags together, checked as study files are. Model keys with one value shape
-/// the model; with several they are axes. Throws InputError.
-protocol::Recipe recipe_of_flags(const PointFlags& flags);
-
-/// "sweep-" and eight hexadecimal digits that depend on the recipe alone, so that the same flags
-/// name the same study again.
-std::string name_of_recipe(const protocol::Recipe& recipe);
+/// The recipe of all flags together, judged as study files are, also by `check_reach`. Model keys
+/// with one value shape the model; with several they are axes. Throws InputError.
+protocol::Recipe recipe_of_flags(const PointFlags& flags, const ReachCheck& check_reach);
 
 /// How a key is written as a flag: `tip_mass` is --tip-mass.
 std::string flag_of_key(std::string_view key);
-
-/// Where a study comes from: a file, or the point flags.
-struct StudyFlags {
-  std::filesystem::path file;  ///< empty: by the point flags
-  std::string name;            ///< empty: the file's name, or one made from the recipe
-  PointFlags points;
-};
-
-/// Adds the STUDY.toml argument, --name and the point flags. `flags` must live as long as `verb`.
-void add_study_flags(CLI::App& verb, StudyFlags& flags);
-
-/// Throws InputError when both a file and flags say what the points are, or none, and for what
-/// either says wrong.
-Study study_of_flags(const StudyFlags& flags);
 
 }  // namespace oblique::client

@@ -2,54 +2,30 @@
 
 #include <algorithm>
 #include <numeric>
+#include <utility>
 
-#include "client/study/axis.h"
+#include <spdlog/fmt/fmt.h>
+
+#include "proto/recipe/axes.h"
+#include "proto/recipe/blocks.h"
 #include "worker/solver/model/number.h"
-#include "worker/solver/solve.h"
 
 namespace oblique::client {
-namespace {
 
-using solver::InputError;
+ReachChecker::ReachChecker(LargestDrop largest_drop_m)
+    : largest_drop_m_(std::move(largest_drop_m)) {}
 
-double largest_H_m(const protocol::Block& block) {
-  const auto& axis = *std::find_if(block.axes().begin(), block.axes().end(),
-                                   [](const protocol::Axis& a) { return a.key() == "H"; });
-  return axis.count() > 0 ? axis.to()
-                          : *std::max_element(axis.values().begin(), axis.values().end());
-}
-
-/// First point of a block and the first after it.
-struct PointRange {
-  std::uint64_t begin;
-  std::uint64_t end;
-};
-PointRange points_of_block(const protocol::PointTable& table, int block) {
-  PointRange range{0, 0};
-  for (int b = 0; b <= block; ++b) {
-    std::uint64_t points = 1;
-    for (const auto& axis : table.recipe().blocks(b).axes()) {
-      points *= protocol::axis_size(axis);
-    }
-    range = {range.end, range.end + points};
-  }
-  return range;
-}
-
-}  // namespace
-
-void ReachChecker::operator()(const protocol::PointTable& table, int block) {
+void ReachChecker::operator()(const protocol::PointTable& block) {
   // No finger falls through less than this part of its length, so lower drops need no look.
   constexpr double kSurelyReached = 0.9;
-  if (table.models() > kMostFalls) {
+  if (block.models() > kMostFalls) {
     return;
   }
-  const double H_m = largest_H_m(table.recipe().blocks(block));
-  const PointRange points = points_of_block(table, block);
-  for (std::uint64_t at = points.begin; at < points.end;) {
-    const auto segment = table.segment_at(at);
+  const double H_m = protocol::largest_value(*protocol::point_axes(block.recipe().blocks(0))[0]);
+  for (std::uint64_t at = 0; at < block.size();) {
+    const auto segment = block.segment_at(at);
     at = segment.first_point + segment.count;
-    const auto model = table.model(segment.model);
+    const auto model = block.model(segment.model);
     const double length_m = std::accumulate(model.lengths_m.begin(), model.lengths_m.end(), 0.0);
     if (H_m <= kSurelyReached * length_m) {
       continue;
@@ -58,11 +34,11 @@ void ReachChecker::operator()(const protocol::PointTable& table, int block) {
     if (fall == nullptr || is_reached_by_far(*fall, H_m)) {
       continue;
     }
-    if (H_m > largest_drop_m(*fall)) {
-      throw InputError(
-          "H = " + solver::exact_number(H_m) +
-          " m is not allowed: the tip of this finger first turns back after a drop of " +
-          solver::readable_number(largest_drop_m(*fall), 10) + " m, so H must be at most that");
+    if (H_m > drop_m(*fall)) {
+      throw solver::InputError(
+          fmt::format("H = {} m is not allowed: the tip of this finger first turns back after a "
+                      "drop of {} m, so H must be at most that",
+                      solver::exact_number(H_m), solver::readable_number(drop_m(*fall), 10)));
     }
   }
 }
@@ -95,15 +71,15 @@ bool ReachChecker::is_reached_by_far(Fall& fall, double H_m) {
     solver::ModelParameters coarse = fall.model;
     coarse.elements_per_link = kCoarse;
     coarse.dt_fall_s = 0.0;  // the coarse mesh's own
-    fall.coarse_drop_m = solver::Finger(coarse).largest_drop_m();
+    fall.coarse_drop_m = largest_drop_m_(coarse);
     ++falls_solved_;
   }
   return H_m <= kRoom * *fall.coarse_drop_m;
 }
 
-double ReachChecker::largest_drop_m(Fall& fall) {
+double ReachChecker::drop_m(Fall& fall) {
   if (!fall.drop_m) {
-    fall.drop_m = solver::Finger(fall.model).largest_drop_m();
+    fall.drop_m = largest_drop_m_(fall.model);
     ++falls_solved_;
   }
   return *fall.drop_m;

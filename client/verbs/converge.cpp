@@ -9,9 +9,10 @@
 #include "client/convergence/convergence.h"
 #include "client/convergence/convergence_report.h"
 #include "client/study/point_flags.h"
+#include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
 #include "proto/program/usage.h"
-#include "proto/recipe/recipe.h"
+#include "proto/recipe/point_table.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {
@@ -158,7 +159,7 @@ int converge_of_flags(ConvergeFlags flags) {
     flags.points.axes.try_emplace("mu", "0.4,1.2");
     flags.points.axes.try_emplace("e", "1");
   }
-  const protocol::PointTable table(recipe_of_flags(flags.points));
+  const protocol::PointTable table(recipe_of_flags(flags.points, tip_reach()));
   return flags.mesh_study ? mesh_study(flags, table) : converge(flags, table);
 }
 

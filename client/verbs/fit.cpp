@@ -8,10 +8,10 @@
 
 #include "client/output/printer.h"
 #include "client/paper/recovery.h"
-#include "client/study/axis.h"
-#include "client/study/nearest.h"
 #include "client/verbs/verbs.h"
+#include "proto/suggestion.h"
 #include "worker/solver/model/number.h"
+#include "worker/solver/model/parameters.h"
 
 namespace oblique::client {
 namespace {
@@ -123,7 +123,8 @@ void add_fit(CLI::App& app, Command& command) {
   auto* verb = app.add_subcommand(
       "fit", "Recover the parameters that the paper does not print from the numbers it does");
   verb->footer(kFitExamples);
-  verb->add_option("--from", flags->from, "preset to start from: " + joined(solver::preset_names()))
+  verb->add_option("--from", flags->from,
+                   "preset to start from: " + protocol::joined(solver::preset_names()))
       ->type_name("NAME")
       ->capture_default_str();
   verb->add_option("--elements-per-link", flags->elements_per_link, "mesh on which to fit")

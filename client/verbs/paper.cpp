@@ -10,8 +10,8 @@
 #include "client/paper/paper_comparison.h"
 #include "client/service/source.h"
 #include "client/service/watching.h"
-#include "client/study/nearest.h"
 #include "client/verbs/verbs.h"
+#include "proto/suggestion.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::client {
@@ -72,8 +72,8 @@ void add_paper(CLI::App& app, Command& command) {
   auto flags = std::make_shared<PaperFlags>();
   auto* verb = app.add_subcommand("paper", "Put the paper's tables beside ours, with differences");
   verb->footer(kPaperExamples);
-  auto* preset =
-      verb->add_option("--preset", flags->preset, "model: " + joined(solver::preset_names()));
+  auto* preset = verb->add_option("--preset", flags->preset,
+                                  "model: " + protocol::joined(solver::preset_names()));
   preset->type_name("NAME")->capture_default_str();
   auto* database = verb->add_option("--db", flags->database,
                                     "compare results of this database instead of solving now");

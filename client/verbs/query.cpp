@@ -8,9 +8,9 @@
 #include "client/service/result_query.h"
 #include "client/service/source.h"
 #include "client/service/watching.h"
-#include "client/study/nearest.h"
 #include "client/verbs/verbs.h"
 #include "proto/program/usage.h"
+#include "proto/suggestion.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::client {
@@ -43,7 +43,8 @@ std::string with_columns(const std::string& message, Source& source) {
   const auto wrong = message.substr(at + kNoColumn.size());
   const auto runs = source.query("SELECT * FROM " + rows_of_queries() + " LIMIT 0");
   const std::vector<std::string_view> columns(runs.columns().begin(), runs.columns().end());
-  return message + did_you_mean(wrong, columns) + "; the columns are " + joined(columns);
+  return message + protocol::did_you_mean(wrong, columns) + "; the columns are " +
+         protocol::joined(columns);
 }
 
 int query(const QueryFlags& flags) {

@@ -10,7 +10,8 @@
 #include "client/service/embedded_service.h"
 #include "client/service/run_service.h"
 #include "client/service/stop_signal.h"
-#include "client/study/point_flags.h"
+#include "client/study/study_flags.h"
+#include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
 #include "proto/program/usage.h"
 
@@ -45,7 +46,7 @@ std::string shell_word(const std::string& text) {
 }
 
 int run(const RunFlags& flags) {
-  const auto study = study_of_flags(flags.study);
+  const auto study = study_of_flags(flags.study, tip_reach());
   check_settings(flags.settings);
   tell_mesh(std::cerr, study.recipe);
   // Before any thread is started; see StopSignal.

@@ -9,8 +9,9 @@
 #include "client/output/mesh_note.h"
 #include "client/output/trace_table.h"
 #include "client/study/point_flags.h"
+#include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
-#include "proto/recipe/recipe.h"
+#include "proto/recipe/point_table.h"
 #include "worker/solver/solve.h"
 
 namespace oblique::client {
@@ -83,7 +84,7 @@ class TraceOutput {
 };
 
 int solve(const SolveFlags& flags) {
-  const protocol::PointTable table(recipe_of_flags(flags.points));
+  const protocol::PointTable table(recipe_of_flags(flags.points, tip_reach()));
   check_one_point(table);
   const auto point = table.point(0);
   const solver::Finger finger(table.model(0));

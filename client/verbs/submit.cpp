@@ -1,14 +1,18 @@
 #include <cstdint>
 #include <iostream>
 #include <memory>
+#include <string>
+
+#include <spdlog/fmt/fmt.h>
 
 #include "client/output/mesh_note.h"
 #include "client/service/connection.h"
 #include "client/service/source.h"
 #include "client/service/watching.h"
-#include "client/study/point_flags.h"
+#include "client/study/study_flags.h"
+#include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
-#include "proto/program/usage.h"
+#include "proto/recipe/study_terms.h"
 
 namespace oblique::client {
 namespace {
@@ -51,8 +55,17 @@ int watch(const Study& study, Connection& connection, StopSignal& stop) {
   });
 }
 
+void check(const StudyTerms& terms) {
+  const std::string priority = protocol::objection_to_priority(terms.priority.value_or(0));
+  const std::string weight = protocol::objection_to_weight(terms.weight.value_or(1.0));
+  if (!priority.empty() || !weight.empty()) {
+    throw solver::InputError(priority.empty() ? "--weight: " + weight : "--priority: " + priority);
+  }
+}
+
 int submit(const SubmitFlags& flags) {
-  const auto study = study_of_flags(flags.study);
+  check(flags.terms);
+  const auto study = study_of_flags(flags.study, tip_reach());
   StopSignal stop;
   Connection connection(connection_settings(flags.source), [&stop] { return !stop.requested(); });
   bool submitted = false;
@@ -78,13 +91,13 @@ void add_submit(CLI::App& app, Command& command) {
   add_server_flags(*verb, flags->source);
   verb->add_flag("--watch", flags->watch, "show the progress until the study is done");
   verb->add_option("--priority", flags->terms.priority,
-                   "studies of a higher priority come first, -1000 to 1000; 0 unless told")
-      ->check(CLI::Range(-1000, 1000))
+                   fmt::format("studies of a higher priority come first, {}; 0 unless told",
+                               protocol::allowed_priorities()))
       ->type_name("N");
   verb->add_option(
           "--weight", flags->terms.weight,
-          "share of the workers among studies of one priority, 0.001 to 1000; 1 unless told")
-      ->check(protocol::number_between(0.001, 1000.0))
+          fmt::format("share of the workers among studies of one priority, {}; 1 unless told",
+                      protocol::allowed_weights()))
       ->type_name("W");
   verb->add_flag("--mix-versions", flags->terms.mixes_versions,
                  "workers of any solver version take part; the column solver_version says which "

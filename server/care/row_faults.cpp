@@ -9,7 +9,8 @@
 #include <string_view>
 #include <utility>
 
-#include "proto/recipe/recipe.h"
+#include "proto/recipe/model_message.h"
+#include "proto/recipe/point_table.h"
 #include "server/store/packed_arrays.h"
 #include "server/store/result_row.h"
 

@@ -7,7 +7,6 @@
 #include <variant>
 #include <vector>
 
-#include "proto/recipe/recipe.h"
 #include "server/scheduler/interval_set.h"
 #include "server/scheduler/loss_history.h"
 #include "server/scheduler/point_attempts.h"

@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "proto/recipe/recipe.h"
+#include "proto/recipe/point_table.h"
 
 namespace oblique::server {
 

@@ -6,15 +6,9 @@
 
 #include "proto/frame_scan.h"
 #include "proto/frames.h"
+#include "proto/recipe/checks.h"
 
 namespace oblique::server {
-namespace {
-
-/// Room for what goes around a recipe on its way to a worker.
-constexpr std::size_t kLongestRecipeBytes = protocol::kMaxFrameBytes - 1024;
-
-}  // namespace
-
 ReadRequest read_request(std::string_view frame) {
   // Padding cannot make much of a shorter frame.
   constexpr std::size_t kLookedAtAbove = std::size_t{64} * 1024;
@@ -25,14 +19,8 @@ ReadRequest read_request(std::string_view frame) {
   if (!read.is_readable || !read.request.has_submit()) {
     return read;
   }
-  if (const std::size_t bytes = read.request.submit().recipe().ByteSizeLong();
-      bytes > kLongestRecipeBytes) {
-    read.objection = "the recipe has " + std::to_string(bytes) + " bytes, more than the " +
-                     std::to_string(kLongestRecipeBytes) +
-                     " that a worker can be sent: write long lists of values as ranges";
-    return read;
-  }
   try {
+    protocol::check_size(read.request.submit().recipe());
     read.table = std::make_shared<const protocol::PointTable>(
         std::move(*read.request.mutable_submit()->mutable_recipe()));
   } catch (const solver::InputError& error) {

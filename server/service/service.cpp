@@ -4,6 +4,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/result_message.h"
 #include "server/store/result_row.h"
 
 namespace oblique::server {

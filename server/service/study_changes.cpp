@@ -6,6 +6,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/study_name.h"
+#include "proto/recipe/study_terms.h"
 #include "proto/text.h"
 
 namespace oblique::server {
@@ -15,16 +16,8 @@ constexpr std::size_t kLongestShownName = 200;
 
 /// Why studies cannot share the workers so, or an empty text.
 std::string objection_to_terms(const StudyTerms& terms) {
-  constexpr std::int32_t kHighestPriority = 1000;
-  constexpr double kLeastWeight = 0.001;
-  constexpr double kLargestWeight = 1000.0;
-  if (terms.priority < -kHighestPriority || terms.priority > kHighestPriority) {
-    return "priority = " + std::to_string(terms.priority) + " is not allowed: -1000 to 1000 is";
-  }
-  if (!(terms.weight >= kLeastWeight && terms.weight <= kLargestWeight)) {
-    return "weight = " + std::to_string(terms.weight) + " is not allowed: 0.001 to 1000 is";
-  }
-  return {};
+  const std::string priority = protocol::objection_to_priority(terms.priority);
+  return priority.empty() ? protocol::objection_to_weight(terms.weight) : priority;
 }
 
 /// What the request says of the share, and for the rest what is.

@@ -8,6 +8,7 @@
 
 #include "proto/frame_scan.h"
 #include "proto/frames.h"
+#include "proto/result_message.h"
 #include "proto/text.h"
 #include "server/store/result_row.h"
 

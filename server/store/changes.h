@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "proto/oblique.pb.h"
-#include "proto/recipe/recipe.h"
+#include "proto/recipe/point_table.h"
 #include "server/scheduler/interval_set.h"
 #include "server/scheduler/study_points.h"
 #include "server/scheduler/study_table.h"

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "proto/oblique.pb.h"
-#include "proto/recipe/recipe.h"
+#include "proto/recipe/point_table.h"
 #include "server/database/sqlite.h"
 
 namespace oblique::server {

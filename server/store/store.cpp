@@ -6,6 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "proto/recipe/model_message.h"
 #include "server/database/row_checksum.h"
 #include "server/store/result_row.h"
 #include "server/store/schema.h"

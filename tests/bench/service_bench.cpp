@@ -25,7 +25,7 @@
 #include <zmq.hpp>
 
 #include "proto/frames.h"
-#include "proto/recipe/recipe.h"
+#include "proto/result_message.h"
 #include "tests/system/processes.h"
 #include "worker/session.h"
 #include "worker/solver/solve.h"

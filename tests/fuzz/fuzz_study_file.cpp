@@ -10,7 +10,7 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   try {
-    oblique::client::parse_study(text, "fuzz.toml", [](const auto&, int) {});
+    oblique::client::parse_study(text, "fuzz.toml", [](const auto&) {});
   } catch (const oblique::solver::InputError&) {
   }
   return 0;

@@ -1,54 +1,11 @@
+#include "proto/result_message.h"
+
 #include <gtest/gtest.h>
 
 #include "proto/frames.h"
-#include "proto/recipe/recipe.h"
 
 namespace oblique::protocol {
 namespace {
-
-/// A model in which no parameter has its default.
-solver::ModelParameters unusual_model() {
-  solver::ModelParameters model;
-  model.lengths_m = {0.5, 0.25};
-  model.E_Pa = 1e9;
-  model.A_m2 = 2e-4;
-  model.I_m4 = 3e-8;
-  model.rho_kg_m3 = 1000.0;
-  model.g_m_s2 = 1.62;
-  model.elements_per_link = 7;
-  model.k_N_m = 5e6;
-  model.eta2 = 1.5;
-  model.tip_mass_kg = 0.125;
-  model.dt_s = 1e-6;
-  model.dt_fall_s = 2e-6;
-  return model;
-}
-
-TEST(ModelMessageTest, AModelComesBackFromItsMessageUnchanged) {
-  EXPECT_EQ(from_message(to_message(unusual_model())), unusual_model());
-  for (const auto name : solver::preset_names()) {
-    EXPECT_EQ(from_message(to_message(solver::preset(name))), solver::preset(name));
-  }
-}
-
-TEST(ModelMessageTest, AModelComesBackFromAFrameUnchanged) {
-  ModelParameters message;
-  ASSERT_TRUE(decode(encode(to_message(unusual_model())), message));
-  EXPECT_EQ(from_message(message), unusual_model());
-}
-
-TEST(ModelMessageTest, WholeNumbersThatNoModelCouldHoldAreRefused) {
-  ModelParameters message = to_message(solver::ModelParameters{});
-  message.set_elements_per_link(4'000'000'000U);
-  EXPECT_THROW(from_message(message), solver::InputError);
-  message = to_message(solver::ModelParameters{});
-  message.set_integrator(4'000'000'000U);
-  EXPECT_THROW(from_message(message), solver::InputError);
-}
-
-TEST(ModelMessageTest, AModelWithNothingSetIsRefused) {
-  EXPECT_THROW(from_message(ModelParameters{}), solver::InputError);
-}
 
 /// A result whose every field differs from the others.
 solver::CaseResult distinct_result() {

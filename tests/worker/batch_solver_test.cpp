@@ -1,4 +1,5 @@
 #include "worker/batch_solver.h"
+#include "proto/result_message.h"
 
 #include <atomic>
 #include <chrono>

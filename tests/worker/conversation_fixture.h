@@ -10,6 +10,7 @@
 
 #include <gtest/gtest.h>
 
+#include "proto/result_message.h"
 #include "worker/conversation.h"
 
 namespace oblique::worker {

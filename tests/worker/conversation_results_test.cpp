@@ -1,5 +1,6 @@
 #include <limits>
 
+#include "proto/result_message.h"
 #include "tests/worker/conversation_fixture.h"
 #include "worker/conversation.h"
 

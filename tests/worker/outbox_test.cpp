@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "proto/recipe/recipe.h"
+#include "proto/result_message.h"
 
 namespace oblique::worker {
 namespace {

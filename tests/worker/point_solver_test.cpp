@@ -1,4 +1,5 @@
 #include "worker/point_solver.h"
+#include "proto/recipe/model_message.h"
 
 #include <limits>
 #include <memory>

@@ -1,4 +1,5 @@
 #include "worker/session.h"
+#include "proto/result_message.h"
 
 #include <future>
 #include <memory>

@@ -13,8 +13,10 @@ namespace {
 
 std::string told(const std::string& model, const std::string& axis = {}) {
   std::ostringstream out;
+  const auto any_reach = [](const protocol::PointTable&) {};
   const std::string point = "[[block]]\nH = 0.6\nmu = [0.4, 0.6]\ne = 1\n";
-  tell_mesh(out, parse_study("[model]\n" + model + "\n" + point + axis, "a.toml").recipe);
+  tell_mesh(out,
+            parse_study("[model]\n" + model + "\n" + point + axis, "a.toml", any_reach).recipe);
   return out.str();
 }
 

@@ -5,7 +5,8 @@
 #include <gtest/gtest.h>
 
 #include "client/study/study_file.h"
-#include "proto/recipe/recipe.h"
+#include "client/verbs/tip_reach.h"
+#include "proto/recipe/point_table.h"
 
 namespace oblique::client {
 namespace {
@@ -50,7 +51,8 @@ TEST(PublishedTable, NamesItsMisprintsWithReasons) {
 TEST(PublishedTable, HasTheCasesOfTheExampleStudyInItsOrder) {
   const protocol::PointTable published(recipe_of(published_table(), "paper"));
   const protocol::PointTable study(
-      read_study_file(std::string(OBLIQUE_SOURCE_DIR) + "/deploy/studies/paper.toml").recipe);
+      read_study_file(std::string(OBLIQUE_SOURCE_DIR) + "/deploy/studies/paper.toml", tip_reach())
+          .recipe);
   ASSERT_EQ(published.size(), study.size());
   for (std::uint64_t i = 0; i < study.size(); ++i) {
     EXPECT_EQ(published.point(i).H_m, study.point(i).H_m);

@@ -1,4 +1,5 @@
 #include "client/paper/recovery.h"
+#include "worker/solver/model/parameters.h"
 
 #include <cmath>
 #include <string>

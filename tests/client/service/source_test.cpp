@@ -15,7 +15,7 @@
 
 #include <gtest/gtest.h>
 
-#include "proto/recipe/recipe.h"
+#include "proto/recipe/point_table.h"
 #include "server/store/store.h"
 #include "tests/client/service/scripted_server.h"
 #include "tests/client/verbs/program.h"

@@ -2,218 +2,23 @@
 
 #include <filesystem>
 #include <fstream>
-#include <functional>
-#include <sstream>
 #include <string>
 #include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "client/study/axis.h"
-#include "proto/recipe/recipe.h"
+#include "proto/recipe/model_message.h"
+#include "proto/recipe/point_table.h"
+#include "tests/client/study/study_text.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {
 namespace {
 
-constexpr const char* kPoint = "[[block]]\nH = 1\nmu = 0.4\ne = 1\n";
-
-std::string block_with(const std::string& line) {
-  std::string text = "[[block]]\n";
-  for (const std::string key : {"H = 1\n", "mu = 0.4\n", "e = 1\n"}) {
-    text += line.starts_with(key.substr(0, key.find(' ') + 1)) ? line + "\n" : key;
-  }
-  return text;
-}
-
-struct WrongFile {
-  std::string name;  // a sentence about what is wrong
-  std::string text;
-  std::vector<std::string> says;
-};
-
-class WrongStudyFile : public testing::TestWithParam<WrongFile> {};
-
-TEST_P(WrongStudyFile, IsRefusedWithASentenceThatNamesWhatIsWrongAndWhatIsAllowed) {
-  const auto& wrong = GetParam();
-  try {
-    parse_study(wrong.text, "study.toml");
-    FAIL() << "accepted:\n" << wrong.text;
-  } catch (const solver::InputError& error) {
-    const std::string message = error.what();
-    EXPECT_TRUE(message.starts_with("study.toml:")) << message;
-    for (const auto& part : wrong.says) {
-      EXPECT_NE(message.find(part), std::string::npos) << "no \"" << part << "\" in: " << message;
-    }
-  }
-}
-
-std::vector<WrongFile> wrong_tables() {
-  return {
-      {"NoToml", "name = \n", {":1: "}},
-      {"KeyTwice", "name = 'a'\nname = 'b'\n", {":2: "}},
-      {"UnknownTopKey", "nam = 'x'\n" + std::string(kPoint), {":1: ", "`nam`", "`name`"}},
-      {"PointKeyOutsideABlock", "mu = 0.4\n" + std::string(kPoint), {":1: ", "`mu`", "[[block]]"}},
-      {"NameNoString", "name = 3\n" + std::string(kPoint), {":1: ", "name = 3", "a string"}},
-      {"NameEmpty", "name = ''\n" + std::string(kPoint), {":1: ", "name", "1 to 100 bytes"}},
-      {"NameLikeAFlag", "name = '-x'\n" + std::string(kPoint), {":1: ", "-x"}},
-      {"NameWithEscape", "name = \"a\\u001b[2J\"\n" + std::string(kPoint), {":1: ", "a\\x1b[2J"}},
-      {"NameWithC1", "name = \"a\\u009b\"\n" + std::string(kPoint), {":1: ", "a\\u009b"}},
-      {"NameTurned", "name = \"a\\u202eb\"\n" + std::string(kPoint), {":1: ", "a\\u202eb"}},
-      {"NoBlock", "name = 'x'\n", {"[[block]]", "H, mu and e"}},
-      {"EmptyBlockList", "block = []\n", {":1: ", "empty"}},
-      {"BlockNoTable", "block = [3]\n", {":1: ", "[[block]]"}},
-      {"BlockInSingleBrackets", "[block]\nH = 1\nmu = 0.4\ne = 1\n", {":1: ", "[[block]]"}},
-      {"ModelNoTable", "model = 3\n" + std::string(kPoint), {":1: ", "[model]"}},
-      {"UnknownModelKey",
-       "[model]\nelements_per_lnk = 4\n" + std::string(kPoint),
-       {":2: ", "`elements_per_lnk`", "`elements_per_link`", "tip_mass"}},
-      {"ModelKeyNoNumber",
-       "[model]\nk = 'stiff'\n" + std::string(kPoint),
-       {":2: ", "k = ", "stiff", "a number"}},
-      {"ModelKeyList",
-       "[model]\nk = [1e7, 2e7]\n" + std::string(kPoint),
-       {":2: ", "k = [1e+07, 2e+07]", "[[block]]"}},
-      {"NumbersAreRepeatedAsTheyWereWritten",
-       "[model]\nk = [0.1, 0.3, 'x', [1]]\n" + std::string(kPoint),
-       {":2: ", "k = [0.1, 0.3, 'x', a list] is a list"}},
-      {"ATableIsRepeatedWithItsKeys",
-       "[model]\nk = { from = 0.1, to = 2 }\n" + std::string(kPoint),
-       {":2: ", "k = { from = 0.1, to = 2 } is a table"}},
-      {"ModelKeyOutOfRange",
-       "[model]\nrho = -1\n" + std::string(kPoint),
-       {":2: ", "rho = -1", "> 0"}},
-      {"ModelKeyNan", "[model]\nrho = nan\n" + std::string(kPoint), {":2: ", "rho = nan", "> 0"}},
-      {"ElementsNotWhole",
-       "[model]\nelements_per_link = 2.5\n" + std::string(kPoint),
-       {":2: ", "elements_per_link = 2.5", "whole number"}},
-      {"PresetUnknown",
-       "[model]\npreset = 'papre'\n" + std::string(kPoint),
-       {":2: ", "papre", "paper, printed, converged"}},
-      {"PresetNoString", "[model]\npreset = 3\n" + std::string(kPoint), {":2: ", "preset = 3"}},
-      {"IntegratorUnknown",
-       "[model]\nintegrator = 'euler'\n" + std::string(kPoint),
-       {":2: ", "euler", "explicit"}},
-      {"IntegratorNoString",
-       "[model]\nintegrator = 0\n" + std::string(kPoint),
-       {":2: ", "integrator = 0", "explicit"}},
-      {"LengthsNoList",
-       "[model]\nlengths = 0.4\n" + std::string(kPoint),
-       {":2: ", "lengths = 0.4", "list"}},
-      {"LengthsEmpty", "[model]\nlengths = []\n" + std::string(kPoint), {":2: ", "lengths = []"}},
-      {"LengthsNoNumbers",
-       "[model]\nlengths = [0.4, 'x']\n" + std::string(kPoint),
-       {":2: ", "lengths", "numbers"}},
-      {"LengthsNegative",
-       "[model]\nlengths = [0.4, -0.4]\n" + std::string(kPoint),
-       {":2: ", "-0.4", "> 0"}},
-      {"LengthsBesideLinks",
-       "[model]\nlengths = [0.4]\nlinks = 2\n" + std::string(kPoint),
-       {":2: ", "lengths", "links"}},
-  };
-}
-
-std::vector<WrongFile> wrong_axes() {
-  return {
-      {"NoH", "[[block]]\nmu = 0.4\ne = 1\n", {":1: ", "H is missing", "> 0"}},
-      {"NoMu", "[[block]]\nH = 1\ne = 1\n", {":1: ", "mu is missing", ">= 0"}},
-      {"NoE", "[[block]]\nH = 1\nmu = 0.4\n", {":1: ", "e is missing", "[0.001, 1]"}},
-      {"UnknownAxis", block_with("mu = 0.4\nmuu = 1"), {":4: ", "`muu`", "`mu`", "the keys are"}},
-      {"PresetAsAxis", block_with("mu = 0.4\npreset = 'paper'"), {":4: ", "preset", "[model]"}},
-      {"MuNegative", block_with("mu = -0.4"), {":3: ", "mu = -0.4", ">= 0"}},
-      {"MuNan", block_with("mu = nan"), {":3: ", "mu = nan", ">= 0"}},
-      {"HInfinite", block_with("H = inf"), {":2: ", "H = inf", "> 0"}},
-      {"EZero", block_with("e = 0"), {":4: ", "e = 0", "[0.001, 1]"}},
-      {"EAboveOne", block_with("e = [0.5, 1.1]"), {":4: ", "e = 1.1", "[0.001, 1]"}},
-      {"AxisNoNumber", block_with("mu = 'rough'"), {":3: ", "mu = ", "rough", "a list of numbers"}},
-      {"AxisTrue", block_with("mu = true"), {":3: ", "mu = true", "a boolean"}},
-      {"AxisListOfStrings", block_with("mu = ['a']"), {":3: ", "a list of numbers"}},
-      {"AxisElementNoNumber",
-       block_with("mu = [\n0.4,\n'a',\n0.6]"),
-       {":5: ", "a list of numbers"}},
-      {"AxisElementOutOfRange", block_with("mu = [\n0.4,\n0.5,\n-0.6]"), {":6: ", "mu = -0.6"}},
-      {"AxisElementUnknownIntegrator",
-       block_with("mu = 0.4\nintegrator = [\n'explicit',\n'euler']"),
-       {":6: ", "euler"}},
-      {"LengthsElementNegative",
-       "[model]\nlengths = [\n0.4,\n-0.4]\n" + std::string(kPoint),
-       {":4: ", "-0.4", "> 0"}},
-      {"EBelowWhatCanBeSolved", block_with("e = 0.0009"), {":4: ", "e = 0.0009", "[0.001, 1]"}},
-      {"ERangeFromBelowWhatCanBeSolved",
-       block_with("e = { from = 1e-4, to = 1, count = 3 }"),
-       {":4: ", "e = 0.0001", "[0.001, 1]"}},
-      {"AxisEmpty", block_with("mu = []"), {":3: ", "mu = []", "at least one"}},
-      {"AxisValueTwice", block_with("mu = [0.4, 0.4]"), {":3: ", "0.4 twice"}},
-      {"IntegratorAxisByNumber", block_with("mu = 0.4\nintegrator = [0]"), {":4: ", "explicit"}},
-      {"RangeReversed",
-       block_with("mu = { from = 2, to = 1, count = 3 }"),
-       {":3: ", "from 2 to 1", "swap"}},
-      {"RangeUnknownPart",
-       block_with("mu = { from = 1, to = 2, cuont = 3 }"),
-       {":3: ", "`cuont`", "`count`"}},
-      {"RangeWithoutTo", block_with("mu = { from = 1, count = 3 }"), {":3: ", "`to`"}},
-      {"RangeWithoutCount", block_with("mu = { from = 1, to = 2 }"), {":3: ", "`count` or `step`"}},
-      {"RangeWithBoth",
-       block_with("mu = { from = 1, to = 2, count = 2, step = 1 }"),
-       {":3: ", "either `count` or `step`"}},
-      {"RangeFromNoNumber",
-       block_with("mu = { from = 'a', to = 2, count = 2 }"),
-       {":3: ", "mu: from", "a number"}},
-      {"RangeToNan", block_with("mu = { from = 1, to = nan, count = 2 }"), {":3: ", "mu = nan"}},
-      {"RangeOutOfDomain",
-       block_with("e = { from = 0.5, to = 1.5, count = 2 }"),
-       {":4: ", "e = 1.5", "[0.001, 1]"}},
-      {"CountZero",
-       block_with("mu = { from = 1, to = 2, count = 0 }"),
-       {":3: ", "count = 0", "at least 1"}},
-      {"CountNegative",
-       block_with("mu = { from = 1, to = 2, count = -3 }"),
-       {":3: ", "count = -3", "at least 1"}},
-      {"CountNotWhole",
-       block_with("mu = { from = 1, to = 2, count = 2.5 }"),
-       {":3: ", "count = 2.5", "whole number"}},
-      {"CountOneWithTwoEnds",
-       block_with("mu = { from = 1, to = 2, count = 1 }"),
-       {":3: ", "count = 1", "both ends"}},
-      {"CountManyWithEqualEnds",
-       block_with("mu = { from = 1, to = 1, count = 3 }"),
-       {":3: ", "count = 3", "equal ends"}},
-      {"CountBeyondAllBounds",
-       block_with("mu = { from = 0, to = 1, count = 2000000000000 }"),
-       {":1: ", "1000000000000 points"}},
-      {"StepZero", block_with("mu = { from = 1, to = 2, step = 0 }"), {":3: ", "step = 0", "> 0"}},
-      {"StepNegative",
-       block_with("mu = { from = 1, to = 2, step = -0.5 }"),
-       {":3: ", "step = -0.5", "> 0"}},
-      {"StepNan", block_with("mu = { from = 1, to = 2, step = nan }"), {":3: ", "step = nan"}},
-      {"StepThatDoesNotDivide",
-       block_with("mu = { from = 0.5, to = 1, step = 0.2 }"),
-       {":3: ", "step = 0.2", "0.5 to 1", "0.9", "1.1"}},
-      {"StepTooSmall",
-       block_with("mu = { from = 0, to = 1, step = 1e-300 }"),
-       {":3: ", "step = 1e-300", "the most that are allowed"}},
-      {"WholeKeyBetweenWholeNumbers",
-       block_with("mu = 0.4\nelements_per_link = { from = 2, to = 8, count = 3 }\nlinks = { from = "
-                  "1, to = 2, count = 3 }"),
-       {":5: ", "links = 1.5", "whole number"}},
-      {"HAboveTheChain", block_with("H = 1.3"), {":1: ", "H = 1.3", "1.2 m"}},
-      {"HAboveAShorterChain",
-       "[model]\nlengths = [0.4, 0.2]\n" + block_with("H = 0.7"),
-       {":3: ", "H = 0.7", "0.6 m"}},
-      {"HAboveTheLargestDrop", block_with("H = [1, 1.19]"), {":1: ", "H = 1.19", "1.179"}},
-      {"SecondBlockWrong", std::string(kPoint) + block_with("H = 1.3"), {":5: ", "H = 1.3"}},
-  };
-}
-
-std::string name_of(const testing::TestParamInfo<WrongFile>& info) {
-  return info.param.name;
-}
-INSTANTIATE_TEST_SUITE_P(Tables, WrongStudyFile, testing::ValuesIn(wrong_tables()), name_of);
-INSTANTIATE_TEST_SUITE_P(Axes, WrongStudyFile, testing::ValuesIn(wrong_axes()), name_of);
-
 TEST(StudyFile, MultipliesAxesInsideABlockWithHSlowestAndEFastest) {
   const auto study =
-      parse_study("name = 'x'\n[[block]]\ne = [0.5, 1]\nmu = [0.1, 0.2]\nH = [0.9, 1]\n", "x.toml");
+      parsed("name = 'x'\n[[block]]\ne = [0.5, 1]\nmu = [0.1, 0.2]\nH = [0.9, 1]\n", "x.toml");
   const protocol::PointTable table(study.recipe);
   ASSERT_EQ(table.size(), 8U);
   const auto second = table.point(1);
@@ -227,7 +32,7 @@ TEST(StudyFile, MultipliesAxesInsideABlockWithHSlowestAndEFastest) {
 }
 
 TEST(StudyFile, PutsModelAxesBeforeThePointAxes) {
-  const auto study = parse_study(
+  const auto study = parsed(
       "[[block]]\nH = 1\nmu = [0.1, 0.2]\ne = 1\nk = [1e7, 2e7]\nintegrator = 'explicit'\n", "x");
   const protocol::PointTable table(study.recipe);
   EXPECT_EQ(table.models(), 2U);
@@ -236,7 +41,7 @@ TEST(StudyFile, PutsModelAxesBeforeThePointAxes) {
 }
 
 TEST(StudyFile, StepsLeadToTheEndOfTheRangeExactly) {
-  const auto study = parse_study(block_with("e = { from = 0.5, to = 1.0, step = 0.05 }"), "x");
+  const auto study = parsed(block_with("e = { from = 0.5, to = 1.0, step = 0.05 }"), "x");
   const protocol::PointTable table(study.recipe);
   ASSERT_EQ(table.size(), 11U);
   EXPECT_EQ(table.point(0).e_star, 0.5);
@@ -245,19 +50,18 @@ TEST(StudyFile, StepsLeadToTheEndOfTheRangeExactly) {
 }
 
 TEST(StudyFile, TakesTheSmallestRestitutionThatCanBeSolved) {
-  EXPECT_EQ(protocol::PointTable(parse_study(block_with("e = 0.001"), "x").recipe).size(), 1U);
+  EXPECT_EQ(protocol::PointTable(parsed(block_with("e = 0.001"), "x").recipe).size(), 1U);
 }
 
 TEST(StudyFile, ARangeOfOneValueIsThatValue) {
-  const auto study = parse_study(block_with("mu = { from = 0.3, to = 0.3, step = 0.1 }"), "x");
+  const auto study = parsed(block_with("mu = { from = 0.3, to = 0.3, step = 0.1 }"), "x");
   const protocol::PointTable table(study.recipe);
   ASSERT_EQ(table.size(), 1U);
   EXPECT_EQ(table.point(0).mu, 0.3);
 }
 
 TEST(StudyFile, SingleKeysOverrideThePreset) {
-  const auto study =
-      parse_study("[model]\nk = 1e7\npreset = 'printed'\n" + std::string(kPoint), "x");
+  const auto study = parsed("[model]\nk = 1e7\npreset = 'printed'\n" + std::string(kPoint), "x");
   const auto model = protocol::from_message(study.recipe.model());
   EXPECT_EQ(model.k_N_m, 1e7);
   EXPECT_EQ(model.A_m2, solver::preset("printed").A_m2);
@@ -273,23 +77,33 @@ TEST(StudyFile, TakesEveryModelKeyWithItsOwnDefault) {
                 : solver::exact_number(key.get(defaults));
     text += "\n";
   }
-  const auto study = parse_study(text + kPoint, "x");
+  const auto study = parsed(text + kPoint, "x");
   EXPECT_EQ(protocol::from_message(study.recipe.model()), defaults);
 }
 
 TEST(StudyFile, TakesLengthsOneALink) {
-  const auto study = parse_study("[model]\nlengths = [0.5, 0.3]\n" + block_with("H = 0.5"), "x");
+  const auto study = parsed("[model]\nlengths = [0.5, 0.3]\n" + block_with("H = 0.5"), "x");
   EXPECT_EQ(protocol::from_message(study.recipe.model()).lengths_m,
             (std::vector<double>{0.5, 0.3}));
 }
 
 TEST(StudyFile, WithoutANameIsCalledAsTheFile) {
-  EXPECT_EQ(parse_study(kPoint, "some/where/sweep.toml").name, "sweep");
+  EXPECT_EQ(parsed(kPoint, "some/where/sweep.toml").name, "sweep");
+}
+
+TEST(StudyFile, WhoseOwnNameIsNoneForAStudySaysSo) {
+  try {
+    parsed(kPoint, "-x.toml");
+    FAIL();
+  } catch (const solver::InputError& error) {
+    EXPECT_THAT(error.what(), testing::AllOf(testing::StartsWith("-x.toml: "),
+                                             testing::HasSubstr("name = \"-x\"")));
+  }
 }
 
 TEST(StudyFile, ThatIsNotThereIsAnErrorWithItsName) {
   try {
-    read_study_file("/nowhere/study.toml");
+    read_study_file("/nowhere/study.toml", pretended_reach());
     FAIL();
   } catch (const solver::InputError& error) {
     EXPECT_NE(std::string(error.what()).find("/nowhere/study.toml"), std::string::npos);
@@ -302,7 +116,7 @@ TEST(StudyFile, ThatIsEmptyHasNoBlock) {
   EXPECT_THROW(
       {
         try {
-          read_study_file(file);
+          read_study_file(file, pretended_reach());
         } catch (const solver::InputError& error) {
           EXPECT_NE(std::string(error.what()).find("no [[block]]"), std::string::npos);
           throw;
@@ -315,35 +129,13 @@ TEST(StudyFile, ThatIsEmptyHasNoBlock) {
 TEST(ExampleStudies, HaveThePointsThatTheirCommentsPromise) {
   const std::string folder = std::string(OBLIQUE_SOURCE_DIR) + "/deploy/studies/";
   const auto points = [&](const std::string& name) {
-    const auto study = read_study_file(folder + name + ".toml");
+    const auto study = read_study_file(folder + name + ".toml", pretended_reach());
     EXPECT_EQ(study.name, name);
     return protocol::PointTable(study.recipe).size();
   };
   EXPECT_EQ(points("paper"), 10U);
   EXPECT_EQ(points("friction-and-restitution"), 440U);
   EXPECT_EQ(points("mesh"), 6U);
-}
-
-TEST(StudyFileTest, AFallIsSolvedOnceForAllBlocksThatShareIt) {
-  std::string text;
-  for (int i = 0; i < 50; ++i) {
-    text += "[[block]]\nH = 1.1\nmu = 0." + std::to_string(100 + i) + "\ne = 1\n";
-    text += "k = [1e7, 2e7]\n";  // a stiffness of the contact: the fall is the same
-  }
-  ReachChecker checker;
-  EXPECT_EQ(parse_study(text, "x.toml", std::ref(checker)).recipe.blocks_size(), 50);
-  EXPECT_GT(checker.falls_solved(), 0U);
-  EXPECT_LE(checker.falls_solved(), 2U) << "on a coarse mesh and on the model's own";
-}
-
-TEST(StudyFileTest, OnlyTheFirstFewFallsOfAStudyAreSolvedBeforehand) {
-  std::string text = "[model]\nelements_per_link = 2\n";
-  for (int i = 0; i < 30; ++i) {
-    text += "[[block]]\nH = 1.1\nmu = 0.4\ne = 1\nrho = " + std::to_string(2700 + i) + "\n";
-  }
-  ReachChecker checker;
-  parse_study(text, "x.toml", std::ref(checker));
-  EXPECT_EQ(checker.falls_solved(), ReachChecker::kMostFalls);
 }
 
 }  // namespace

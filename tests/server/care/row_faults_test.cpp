@@ -1,4 +1,6 @@
 #include "server/care/row_faults.h"
+#include "proto/recipe/model_message.h"
+#include "proto/result_message.h"
 
 #include <string>
 #include <vector>

@@ -1,4 +1,5 @@
 #include "server/reading/reader.h"
+#include "proto/result_message.h"
 
 #include <fstream>
 #include <thread>

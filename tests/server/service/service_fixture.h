@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "proto/frames.h"
+#include "proto/result_message.h"
 #include "server/queries/reader_program.h"
 #include "server/service/service.h"
 #include "tests/server/scheduler/scheduler_bench.h"

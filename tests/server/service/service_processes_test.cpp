@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "proto/recipe/recipe.h"
+#include "proto/recipe/point_table.h"
 #include "tests/server/service/service_fixture.h"
 
 namespace oblique::server {

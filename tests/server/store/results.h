@@ -8,7 +8,8 @@
 
 #include <gtest/gtest.h>
 
-#include "proto/recipe/recipe.h"
+#include "proto/recipe/point_table.h"
+#include "proto/result_message.h"
 
 namespace oblique::server {
 

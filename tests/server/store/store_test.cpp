@@ -1,4 +1,5 @@
 #include "server/store/store.h"
+#include "proto/result_message.h"
 
 #include <cstdlib>
 #include <fstream>

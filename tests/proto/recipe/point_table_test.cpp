@@ -1,11 +1,13 @@
-#include "proto/recipe/recipe.h"
+#include "proto/recipe/point_table.h"
 
-#include <cmath>
 #include <stdexcept>
 #include <tuple>
 
 #include <gtest/gtest.h>
 
+#include "proto/recipe/axes.h"
+#include "proto/recipe/blocks.h"
+#include "proto/recipe/model_message.h"
 #include "tests/proto/recipe/recipe_builder.h"
 
 namespace oblique::protocol {
@@ -132,7 +134,7 @@ TEST(PointTableTest, TheModelOfTheRecipeIsTheBaseOfEveryModelAxis) {
 TEST(PointTableTest, AStudyOfATrillionPointsIsReadAtAnyPoint) {
   const PointTable table(recipe_of({{range("H", 0.5, 1.1, 10'000), range("mu", 0.0, 1.0, 10'000),
                                      range("e", 0.5, 1.0, 10'000)}}));
-  ASSERT_EQ(table.size(), PointTable::kMaxPoints);
+  ASSERT_EQ(table.size(), kMaxPoints);
   const Point last = table.point(table.size() - 1);
   EXPECT_EQ(std::tuple(last.H_m, last.mu, last.e_star), std::tuple(1.1, 1.0, 1.0));
   // 123'456'789'012 = 1234 · 10^8 + 5678 · 10^4 + 9012
@@ -156,34 +158,6 @@ TEST(PointTableTest, PointsAndModelsBeyondTheStudyAreOutOfRange) {
   EXPECT_THROW(table.point(1), std::out_of_range);
   EXPECT_THROW(table.segment_at(1), std::out_of_range);
   EXPECT_THROW(table.model(1), std::out_of_range);
-}
-
-TEST(AxisTest, ARangeHasBothEndsExactlyAndRisesBetweenThem) {
-  const Axis axis = range("mu", 0.1, 0.1 + 1e-12, 1000);
-  EXPECT_EQ(axis_value(axis, 0), axis.from());
-  EXPECT_EQ(axis_value(axis, 999), axis.to());
-  for (std::uint64_t i = 1; i < 1000; ++i) {
-    EXPECT_GE(axis_value(axis, i), axis_value(axis, i - 1)) << "value " << i;
-  }
-}
-
-TEST(AxisTest, DecimalStepsGiveTheNumbersThatPeopleType) {
-  const Axis axis = range("mu", 0.1, 2.0, 20);
-  for (std::uint64_t i = 0; i < 20; ++i) {
-    const double typed = std::strtod(
-        (std::to_string((i + 1) / 10) + "." + std::to_string((i + 1) % 10)).c_str(), nullptr);
-    EXPECT_EQ(axis_value(axis, i), typed) << "value " << i;
-  }
-}
-
-TEST(AxisTest, ARangeOfHugeNumbersDoesNotOverflow) {
-  const Axis axis = range("E", 1e300, 1e308, 1'000'000'001);
-  EXPECT_DOUBLE_EQ(axis_value(axis, 500'000'000), 0.5 * (1e300 + 1e308));
-}
-
-TEST(AxisTest, AValueThatTheAxisDoesNotHaveIsOutOfRange) {
-  EXPECT_THROW(axis_value(listed("mu", {0.4}), 1), std::out_of_range);
-  EXPECT_THROW(axis_value(range("mu", 0, 1, 3), 3), std::out_of_range);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "client/study/nearest.h"
+#include "proto/suggestion.h"
 
 #include <algorithm>
 #include <cctype>
@@ -6,7 +6,7 @@
 #include <numeric>
 #include <vector>
 
-namespace oblique::client {
+namespace oblique::protocol {
 namespace {
 
 char lower(char letter) {
@@ -60,4 +60,4 @@ std::string joined(std::span<const std::string_view> names) {
   return text;
 }
 
-}  // namespace oblique::client
+}  // namespace oblique::protocol

@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-namespace oblique::client {
+namespace oblique::protocol {
 
 /// The candidate that differs least from `word` by insertions, deletions and replacements of
 /// letters, capitals alike; empty when none is near enough to be what was meant.
@@ -16,4 +16,4 @@ std::string did_you_mean(std::string_view word, std::span<const std::string_view
 /// Names for a sentence: "a, b, c".
 std::string joined(std::span<const std::string_view> names);
 
-}  // namespace oblique::client
+}  // namespace oblique::protocol

@@ -1,31 +1,31 @@
-#include "client/study/nearest.h"
+#include "proto/suggestion.h"
 
 #include <array>
 #include <string_view>
 
 #include <gtest/gtest.h>
 
-namespace oblique::client {
+namespace oblique::protocol {
 namespace {
 
 constexpr std::array<std::string_view, 5> kNames{"mu", "e", "H", "tip_mass", "elements_per_link"};
 
-TEST(Nearest, FindsWhatAMistypedWordWasMeantToBe) {
+TEST(Suggestion, FindsWhatAMistypedWordWasMeantToBe) {
   EXPECT_EQ(nearest("tip_mas", kNames), "tip_mass");
   EXPECT_EQ(nearest("elements-per-link", kNames), "elements_per_link");
   EXPECT_EQ(nearest("MU", kNames), "mu");
 }
 
-TEST(Nearest, SuggestsNothingForAWordUnlikeAll) {
+TEST(Suggestion, SuggestsNothingForAWordUnlikeAll) {
   EXPECT_EQ(nearest("restitution", kNames), "");
   EXPECT_EQ(nearest("z", kNames), "");
   EXPECT_EQ(did_you_mean("zz", kNames), "");
 }
 
-TEST(Nearest, SaysSoInASentence) {
+TEST(Suggestion, SaysSoInASentence) {
   EXPECT_EQ(did_you_mean("muu", kNames), " (did you mean `mu`?)");
   EXPECT_EQ(joined(kNames), "mu, e, H, tip_mass, elements_per_link");
 }
 
 }  // namespace
-}  // namespace oblique::client
+}  // namespace oblique::protocol

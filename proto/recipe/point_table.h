@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "proto/oblique.pb.h"
-#include "worker/solver/model/case_result.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::protocol {
@@ -31,13 +30,9 @@ struct Segment {
 /// and memory that do not grow with the number of points.
 class PointTable {
  public:
-  /// Most points a study may have.
-  static constexpr std::uint64_t kMaxPoints = 1'000'000'000'000;
-
   /// Blocks without model axes share one model number. An absent model is the preset `paper`.
-  /// Throws solver::InputError naming key, value and what is allowed: unknown or repeated keys, a
-  /// missing H, mu or e, axes out of order, empty axes, reversed or non-finite ranges, values out
-  /// of their domain, too many points.
+  /// Throws solver::InputError naming key, value and what is allowed: what checks.h says of blocks,
+  /// a model outside its domain, no block, too many points.
   explicit PointTable(Recipe recipe);
 
   const Recipe& recipe() const { return recipe_; }
@@ -74,28 +69,5 @@ class PointTable {
   std::uint64_t points_ = 0;
   std::uint64_t models_ = 0;
 };
-
-/// Value i of an axis. A range has its two ends exactly; the values between are equally spaced, and
-/// the same bits on every machine. Throws std::out_of_range for a value that the axis does not
-/// have.
-double axis_value(const Axis& axis, std::uint64_t i);
-
-/// Numbers of the values of a range that tell whether all of them are allowed. Every key allows an
-/// interval, for which the two ends are enough, or the whole numbers of one: when the first two
-/// values are whole their distance is, and so are all.
-std::vector<std::uint64_t> deciding_values(const Axis& axis);
-
-/// Number of values of an axis.
-std::uint64_t axis_size(const Axis& axis);
-
-/// Every parameter of a model.
-ModelParameters to_message(const solver::ModelParameters& model);
-/// Throws solver::InputError when the message is outside the model's domain.
-solver::ModelParameters from_message(const ModelParameters& message);
-
-/// What solving a point gave, but for H, mu and e, which follow from the point's number.
-PointResult to_message(std::uint64_t point, const solver::CaseResult& result);
-/// A failed point. An empty reason becomes "unknown".
-PointResult failed_point(std::uint64_t point, const std::string& reason);
 
 }  // namespace oblique::protocol

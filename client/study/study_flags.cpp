@@ -1,0 +1,61 @@
+#include "client/study/study_flags.h"
+
+#include <cstdint>
+#include <cstdio>
+
+#include "client/study/study_file.h"
+#include "proto/recipe/study_name.h"
+
+namespace oblique::client {
+
+using solver::InputError;
+
+std::string name_of_recipe(const protocol::Recipe& recipe) {
+  // FNV-1a: the name must be the same on every machine and in every version.
+  std::uint32_t hash = 2166136261U;
+  for (const char byte : recipe.SerializeAsString()) {
+    hash = (hash ^ static_cast<unsigned char>(byte)) * 16777619U;
+  }
+  char name[sizeof "sweep-01234567"];
+  std::snprintf(name, sizeof name, "sweep-%08x", hash);
+  return name;
+}
+
+void add_study_flags(CLI::App& verb, StudyFlags& flags) {
+  verb.add_option("STUDY.toml", flags.file, "study file; or say the points by the flags below")
+      ->type_name("");
+  verb.add_option("--name", flags.name,
+                  "name of the study; by default the file's, or `sweep-` and a hash of the flags")
+      ->type_name("NAME");
+  add_point_flags(verb, flags.points, FlagValues::kMany);
+}
+
+Study study_of_flags(const StudyFlags& flags, const ReachCheck& check_reach) {
+  const PointFlags none;
+  const bool by_flags = !flags.points.axes.empty() || !flags.points.lengths.empty() ||
+                        flags.points.preset != none.preset;
+  if (flags.file.empty() && !by_flags) {
+    throw InputError("no points: give a study file, or --H, --mu and --e");
+  }
+  if (!flags.file.empty() && by_flags) {
+    throw InputError("both the study file " + flags.file.string() +
+                     " and flags for points or model are given: use one of them (the file has a "
+                     "[model] of its own)");
+  }
+  Study study;
+  if (flags.file.empty()) {
+    study.recipe = recipe_of_flags(flags.points, check_reach);
+    study.name = name_of_recipe(study.recipe);
+  } else {
+    study = read_study_file(flags.file, check_reach);
+  }
+  if (!flags.name.empty()) {
+    if (const auto objection = protocol::objection_to_study_name(flags.name); !objection.empty()) {
+      throw InputError("--name: " + objection);
+    }
+    study.name = flags.name;
+  }
+  return study;
+}
+
+}  // namespace oblique::client

@@ -1,0 +1,31 @@
+#pragma once
+
+#include "proto/oblique.pb.h"
+#include "worker/solver/model/parameters.h"
+
+// What a study may be. These are the only rules: who writes a study puts the place before their
+// message, who receives one asks them again.
+namespace oblique::protocol {
+
+/// A block lacks H, mu or e. The message begins with the key.
+class MissingKey : public solver::InputError {
+ public:
+  using solver::InputError::InputError;
+};
+
+/// Throws InputError naming key, value and what is allowed unless each value is finite and in the
+/// key's domain, and they are a list without repetitions or a range that rises. Costs a look at
+/// each listed value, and at three of a range.
+void check_axis(const Axis& axis);
+
+/// The same for the two ends of a range whose count is not known yet.
+void check_ends(const solver::ParameterKey& key, double from, double to);
+
+/// Throws InputError unless the axes of a block are allowed, each once, in order, with H, mu and e
+/// (else MissingKey), and no H is longer than the shortest chain that the block makes of `model`.
+void check_block(const solver::ModelParameters& model, const Block& block);
+
+/// Throws InputError for a recipe that is too long to be sent to a worker in one frame.
+void check_size(const Recipe& recipe);
+
+}  // namespace oblique::protocol

@@ -1,0 +1,53 @@
+#include "client/study/reach.h"
+
+#include <functional>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "tests/client/study/study_text.h"
+
+namespace oblique::client {
+namespace {
+
+TEST(Reach, AFallIsSolvedOnceForAllBlocksThatShareIt) {
+  std::string text;
+  for (int i = 0; i < 50; ++i) {
+    text += "[[block]]\nH = 1.1\nmu = 0." + std::to_string(100 + i) + "\ne = 1\n";
+    text += "k = [1e7, 2e7]\n";  // a stiffness of the contact: the fall is the same
+  }
+  ReachChecker checker(pretended_drop_m);
+  EXPECT_EQ(parse_study(text, "x.toml", std::ref(checker)).recipe.blocks_size(), 50);
+  EXPECT_GT(checker.falls_solved(), 0U);
+  EXPECT_LE(checker.falls_solved(), 2U) << "on a coarse mesh and on the model's own";
+}
+
+TEST(Reach, OnlyTheFirstFewFallsOfAStudyAreSolvedBeforehand) {
+  std::string text = "[model]\nelements_per_link = 2\n";
+  for (int i = 0; i < 30; ++i) {
+    text += "[[block]]\nH = 1.1\nmu = 0.4\ne = 1\nrho = " + std::to_string(2700 + i) + "\n";
+  }
+  ReachChecker checker(pretended_drop_m);
+  parse_study(text, "x.toml", std::ref(checker));
+  EXPECT_EQ(checker.falls_solved(), ReachChecker::kMostFalls);
+}
+
+TEST(Reach, ADropThatEveryFingerReachesIsNotLookedInto) {
+  ReachChecker checker(pretended_drop_m);
+  parse_study(block_with("H = 1.08"), "x.toml", std::ref(checker));
+  EXPECT_EQ(checker.falls_solved(), 0U);
+}
+
+TEST(Reach, ADropBelowTheLargestByFarIsSettledOnACoarseMesh) {
+  ReachChecker checker(pretended_drop_m);
+  parse_study(block_with("H = 1.1"), "x.toml", std::ref(checker));
+  EXPECT_EQ(checker.falls_solved(), 1U);
+  parse_study(block_with("H = 1.17"), "x.toml", std::ref(checker));
+  EXPECT_EQ(checker.falls_solved(), 2U);
+  EXPECT_THROW(parse_study(block_with("H = 1.18"), "x.toml", std::ref(checker)),
+               solver::InputError);
+  EXPECT_EQ(checker.falls_solved(), 2U) << "it is remembered";
+}
+
+}  // namespace
+}  // namespace oblique::client

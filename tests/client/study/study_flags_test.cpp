@@ -1,0 +1,39 @@
+#include "client/study/study_flags.h"
+
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "tests/client/study/flags_of.h"
+#include "tests/client/study/pretended_fall.h"
+
+namespace oblique::client {
+namespace {
+
+TEST(StudyFlags, NameTheSameStudyForTheSamePointsAndAnotherForOthers) {
+  const auto a = name_of_recipe(recipe_of_flags(flags_of({}), pretended_reach()));
+  EXPECT_TRUE(a.starts_with("sweep-"));
+  EXPECT_EQ(a.size(), std::string("sweep-01234567").size());
+  EXPECT_EQ(a, name_of_recipe(recipe_of_flags(flags_of({}), pretended_reach())));
+  EXPECT_NE(a, name_of_recipe(recipe_of_flags(flags_of({{"mu", "0.5"}}), pretended_reach())));
+}
+
+TEST(StudyFlags, WantAFileOrPointsAndNotBoth) {
+  StudyFlags flags;
+  EXPECT_THROW(study_of_flags(flags, pretended_reach()), solver::InputError);
+  flags.points = flags_of({});
+  EXPECT_TRUE(study_of_flags(flags, pretended_reach()).name.starts_with("sweep-"));
+  flags.name = "mine";
+  EXPECT_EQ(study_of_flags(flags, pretended_reach()).name, "mine");
+  flags.file = std::string(OBLIQUE_SOURCE_DIR) + "/deploy/studies/paper.toml";
+  EXPECT_THROW(study_of_flags(flags, pretended_reach()), solver::InputError);
+  flags.points = {};
+  EXPECT_EQ(study_of_flags(flags, pretended_reach()).name, "mine");
+  flags.name.clear();
+  EXPECT_EQ(study_of_flags(flags, pretended_reach()).name, "paper");
+  flags.name = "two\nlines";
+  EXPECT_THROW(study_of_flags(flags, pretended_reach()), solver::InputError);
+}
+
+}  // namespace
+}  // namespace oblique::client

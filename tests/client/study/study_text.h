@@ -1,0 +1,26 @@
+#pragma once
+
+#include <string>
+
+#include "client/study/study_file.h"
+#include "tests/client/study/pretended_fall.h"
+
+namespace oblique::client {
+
+inline constexpr const char* kPoint = "[[block]]\nH = 1\nmu = 0.4\ne = 1\n";
+
+/// A block of one point, with a line of it replaced, or one more.
+inline std::string block_with(const std::string& line) {
+  std::string text = "[[block]]\n";
+  for (const std::string key : {"H = 1\n", "mu = 0.4\n", "e = 1\n"}) {
+    text += line.starts_with(key.substr(0, key.find(' ') + 1)) ? line + "\n" : key;
+  }
+  return text;
+}
+
+/// What the text of a study file means, where falls are pretended.
+inline Study parsed(const std::string& text, const std::string& file) {
+  return parse_study(text, file, pretended_reach());
+}
+
+}  // namespace oblique::client

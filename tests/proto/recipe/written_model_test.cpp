@@ -1,0 +1,75 @@
+#include "proto/recipe/written_model.h"
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace oblique::protocol {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+std::string refusal(const std::function<void(WrittenModel&)>& write) {
+  WrittenModel model;
+  try {
+    write(model);
+    (void)model.model();
+  } catch (const solver::InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(WrittenModel, IsThePaperUntilSomethingIsSaid) {
+  EXPECT_EQ(WrittenModel().model(), solver::preset("paper"));
+}
+
+TEST(WrittenModel, IsTheSameInWhateverOrderItIsSaid) {
+  WrittenModel there;
+  there.set("length", 0.2);
+  there.set("k", 1e7);
+  there.set("links", 2);
+  there.set_preset("printed");
+  WrittenModel back;
+  back.set_preset("printed");
+  back.set("links", 2);
+  back.set("k", 1e7);
+  back.set("length", 0.2);
+  EXPECT_EQ(there.model(), back.model());
+  EXPECT_EQ(there.model().lengths_m, (std::vector{0.2, 0.2}));
+  EXPECT_EQ(there.model().k_N_m, 1e7);
+  EXPECT_EQ(there.model().eta2, solver::preset("printed").eta2);
+}
+
+TEST(WrittenModel, RefusesWhatNoModelHasWithASentence) {
+  EXPECT_THAT(refusal([](auto& model) { model.set("tip_mas", 1); }),
+              AllOf(HasSubstr("`tip_mas`"), HasSubstr("`tip_mass`"), HasSubstr("lengths")));
+  EXPECT_THAT(refusal([](auto& model) { model.set("rho", -1); }), HasSubstr("rho = -1"));
+  EXPECT_THAT(refusal([](auto& model) { model.set_preset("papre"); }), HasSubstr("papre"));
+  EXPECT_THAT(refusal([](auto& model) { model.set_lengths({0.4, -0.3}); }), HasSubstr("-0.3"));
+  EXPECT_THAT(refusal([](auto& model) { model.set_lengths({}); }), HasSubstr("lengths = []"));
+  EXPECT_THAT(refusal([](auto& model) { model.set_lengths(std::vector(65, 0.1)); }),
+              HasSubstr("from 1 to 64"));
+}
+
+TEST(WrittenModel, TakesLengthsOrLinksAndLengthButNotBoth) {
+  for (const auto* key : {"links", "length"}) {
+    EXPECT_THAT(refusal([&](auto& model) {
+                  model.set(key, 1);
+                  model.set_lengths({0.4});
+                }),
+                HasSubstr("lengths stands beside"));
+    EXPECT_THAT(refusal([&](auto& model) {
+                  model.set_lengths({0.4});
+                  model.set(key, 1);
+                }),
+                HasSubstr("lengths stands beside"));
+  }
+}
+
+}  // namespace
+}  // namespace oblique::protocol
