@@ -10,15 +10,15 @@
 namespace oblique::server {
 namespace {
 
-std::uint64_t size_of(const std::vector<Interval>& runs) {
+std::uint64_t size_of(const std::vector<Interval>& intervals) {
   std::uint64_t points = 0;
-  for (const Interval& interval : runs) {
+  for (const Interval& interval : intervals) {
     points += interval.end - interval.begin;
   }
   return points;
 }
 
-/// The run in up to `parts` parts of nearly one size.
+/// The interval in up to `parts` parts of nearly one size.
 std::vector<Interval> split(const Interval& interval, std::uint64_t parts) {
   const std::uint64_t size = (interval.end - interval.begin + parts - 1) / parts;
   std::vector<Interval> all;

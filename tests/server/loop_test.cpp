@@ -169,6 +169,26 @@ TEST_F(LoopTest, TheQueriesOfClientsThatWentAreGivenUp) {
   PretendedClient(server.client_endpoint()).start_query(kDeaf);
 }
 
+TEST_F(LoopTest, TheQueriesOfAClientEndWithItsConnectionBeforeItIsToHearOfThem) {
+  TurnSettings turns;
+  turns.readers = 2;
+  turns.quick_ms = 1'000'000;
+  ClientsDeskSettings clients;
+  clients.still_working_every_ms = 1'000'000;
+  RunningServer server(path_, turns, {}, clients);
+  for (int i = 0; i < 2; ++i) {
+    PretendedClient client(server.client_endpoint());
+    ClientRequest request;
+    request.set_protocol_version(protocol::kProtocolVersion);
+    request.mutable_query()->set_sql(kDeaf);
+    request.mutable_query()->set_time_limit_ms(600'000);
+    client.send(request);
+    EXPECT_TRUE(client.submit("a", 10).has_submit());  // so that the query has arrived
+  }
+  PretendedClient client(server.client_endpoint());
+  EXPECT_EQ(client.query("SELECT 3").query().rows(0).values(0).integer(), 3);
+}
+
 TEST_F(LoopTest, TheServerStopsWhateverQueriesDo) {
   RunningServer server(path_);
   PretendedClient client(server.client_endpoint());

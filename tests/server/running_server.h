@@ -30,8 +30,8 @@ using protocol::WorkerMessage;
 class RunningServer {
  public:
   explicit RunningServer(const std::string& database, TurnSettings turns = {},
-                         NetworkLimits network = {})
-      : loop_(settings(database, turns, network)) {
+                         NetworkLimits network = {}, ClientsDeskSettings clients = {})
+      : loop_(settings(database, turns, network, clients)) {
     thread_ = std::thread([this] { end_ = loop_.run(stop_fd_); });
   }
   ~RunningServer() { stop(); }
@@ -52,8 +52,9 @@ class RunningServer {
 
  private:
   static LoopSettings settings(const std::string& database, TurnSettings turns,
-                               NetworkLimits network) {
+                               NetworkLimits network, const ClientsDeskSettings& clients) {
     LoopSettings settings;
+    settings.service.clients = clients;
     settings.network = network;
     settings.queries.turns = turns;
     settings.database = database;

@@ -331,7 +331,8 @@ class Simulation {
       outcome_.failed_points += kills ? 1U : 0U;
       if (kills ? result->error().empty()
                 : result->SerializeAsString() != answer_to(size, point).SerializeAsString()) {
-        throw Violation("the row of point " + std::to_string(point) + " is wrong");
+        throw Violation("the row of point " + std::to_string(point) + " is wrong" +
+                        (result->error().empty() ? "" : ": " + result->error()));
       }
     }
   }

@@ -71,6 +71,17 @@ TEST_F(ConversationTest, AHeartbeatNamesALeaseUntilItsLastResultsAreStored) {
   EXPECT_EQ(sent(WorkerMessage::kHeartbeat)[0].heartbeat().lease_ids_size(), 0);
 }
 
+TEST_F(ConversationTest, AHeartbeatNamesNoLeaseForResultsThatBelongToNone) {
+  join();
+  receive(batch_message(7, 31));
+  solve(1, 0, 10, true);
+  receive(hello_again_message());
+  receive(welcome_message());
+  pass(1000);
+  ASSERT_EQ(sent(WorkerMessage::kHeartbeat).size(), 1U);
+  EXPECT_EQ(sent(WorkerMessage::kHeartbeat)[0].heartbeat().lease_ids_size(), 0);
+}
+
 TEST_F(ConversationTest, ASilentServerIsMetOnANewSocket) {
   join();
   receive(heartbeat_reply_message());

@@ -45,6 +45,7 @@ TEST(LonePairs, AreThoseWhoseLeavingOutBringsTheOthersClosest) {
   EXPECT_EQ(lone_pairs({1.0, 5.0, 5.1}, {1.0}), Pairs{1});
   EXPECT_EQ(lone_pairs({1.0, 1.1, 3.0, 5.0, 5.1}, {3.0}), (Pairs{0, 3}));
   EXPECT_EQ(lone_pairs({1.0, 2.0, 3.0, 4.0}, {}), (Pairs{0, 2}));
+  EXPECT_EQ(lone_pairs({1.0, 4.0, 6.0, 8.0}, {4.0, 6.0}), Pairs{0}) << "never two single ones";
 }
 
 TEST(ContactChanges, AreNoneWhereOnlyTimesDiffer) {

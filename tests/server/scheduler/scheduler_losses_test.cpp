@@ -96,6 +96,25 @@ TEST(SchedulerLosses, AProbeThatNeverArrivedIsGivenAgain) {
   EXPECT_EQ(only<SendProbe>(bench.feed(HeartbeatReceived{4, {}})).size(), 1U);
 }
 
+TEST(SchedulerLosses, ResultsThatBelongToNoLeaseAreNoAnswerToAProbeThatWasNotGiven) {
+  SchedulerBench bench;
+  bench.feed(StudyAdded{1, table_of(100), {}});
+  bench.join(1, 1);
+  bench.feed(ResultsReceived{1, 1, 0, 1, false, 1e-3, {{50, false}}});
+  EXPECT_FALSE(bench.scheduler.worker(1, bench.now_ms).is_proven);
+}
+
+TEST(SchedulerLosses, AHeartbeatThatNamesLeaseZeroNamesNothing) {
+  SchedulerBench bench;
+  bench.feed(StudyAdded{1, table_of(1), {}});
+  const auto batch = bench.join(1, 1).at(0);
+  bench.pass(3000, {1});
+  EXPECT_TRUE(bench.feed(HeartbeatReceived{1, {0, batch.lease}}).empty());
+  EXPECT_EQ(bench.scheduler.study(1).leased, 1U);
+  bench.feed(HeartbeatReceived{1, {0}});
+  EXPECT_EQ(bench.scheduler.study(1).leased, 0U) << "the batch did not reach it";
+}
+
 TEST(SchedulerLosses, ANewcomerHoldsTwoBatchesAtMost) {
   SchedulerBench bench;
   bench.feed(StudyAdded{1, table_of(1'000'000), {}});
