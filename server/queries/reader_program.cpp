@@ -12,6 +12,7 @@
 #include <system_error>
 
 #include <malloc.h>
+#include <poll.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
@@ -55,6 +56,12 @@ template <typename Resource>
 void limit(Resource resource, rlim_t most) {
   const rlimit limits{most, most};
   check(setrlimit(resource, &limits) == 0, "setrlimit");
+}
+
+/// Whether the server has closed its end, which a server that was killed has.
+bool server_is_gone() {
+  pollfd channel{kReaderChannel, 0, 0};
+  return ::poll(&channel, 1, 0) > 0 && (channel.revents & POLLHUP) != 0;
 }
 
 void confine() {
@@ -155,6 +162,10 @@ int run_reader_program(const std::string& path) {
   try {
     protocol::silence_protobuf();
     confine();
+    // A server that was killed before confine sends no signal, and its query would run for nobody.
+    if (server_is_gone()) {
+      return 0;
+    }
     std::optional<Reader> reader;
     while (const auto request = next_request()) {
       const std::string reply = answer(reader, path, *request);

@@ -26,7 +26,8 @@
 
 #include "proto/frames.h"
 #include "proto/result_message.h"
-#include "tests/system/processes.h"
+#include "tests/support/database.h"
+#include "tests/support/programs.h"
 #include "worker/session.h"
 #include "worker/solver/solve.h"
 
@@ -90,20 +91,20 @@ struct Study {
     std::vector<std::string> submit{"submit", "--server", server.client_url()};
     submit.insert(submit.end(), arguments.begin(), arguments.end());
     began = Clock::now();
-    check(test::run_client(folder, submit));
+    check(test::run_oblique(folder, submit));
     submitted_s = seconds();
-    check(test::run_client(folder, {"watch", "bench", "--server", server.client_url()}));
+    check(test::run_oblique(folder, {"watch", "bench", "--server", server.client_url()}));
     wall_s = seconds();
     rows = database.rows();
   }
   double seconds() const { return std::chrono::duration<double>(Clock::now() - began).count(); }
-  static void check(const test::Ran& ran) {
+  static void check(const test::Outcome& ran) {
     if (ran.exit_code != 0) {
-      throw std::runtime_error(ran.errors);
+      throw std::runtime_error(ran.err);
     }
   }
 
-  test::Folder folder;
+  test::TemporaryFolder folder;
   std::string file = folder.file("bench.db");
   test::Database database{file};
   test::Server server{folder, file};
@@ -179,14 +180,14 @@ void bench_server_alone(std::uint64_t points) {
 
 /// A study of so many points that none of it is ever solved: no worker is there.
 void bench_submission(std::uint64_t points) {
-  const test::Folder folder;
+  const test::TemporaryFolder folder;
   test::Server server(folder, folder.file("bench.db"));
   std::vector<std::string> submit{"submit", "--server", server.client_url()};
   const auto study = study_of(points);
   submit.insert(submit.end(), study.begin(), study.end());
   const Usage before = usage_of(server.process().pid());
   const auto began = Clock::now();
-  Study::check(test::run_client(folder, submit));
+  Study::check(test::run_oblique(folder, submit));
   const std::chrono::duration<double> taken = Clock::now() - began;
   const Usage after = usage_of(server.process().pid());
   std::printf("| %.0e | %.3f | %.1f | %.1f |\n", static_cast<double>(points), taken.count(),
@@ -204,7 +205,7 @@ struct Underway : Study {
   explicit Underway(std::uint64_t points) : Study(points) {
     std::vector<std::string> submit{"submit", "--server", server.client_url()};
     submit.insert(submit.end(), arguments.begin(), arguments.end());
-    check(test::run_client(folder, submit));
+    check(test::run_oblique(folder, submit));
   }
   double count() const { return database.rows(); }
 };
@@ -276,7 +277,7 @@ void submit_studies(const std::string& client_url, std::uint64_t studies) {
 
 /// Many studies: what it takes to submit them, to list them, and to start on them again.
 void bench_studies(std::uint64_t studies) {
-  const test::Folder folder;
+  const test::TemporaryFolder folder;
   const std::string file = folder.file("bench.db");
   test::Server server(folder, file);
   const auto seconds_of = [](const std::function<void()>& work) {
@@ -287,7 +288,7 @@ void bench_studies(std::uint64_t studies) {
   const double submitted_s = seconds_of(
       [&] { submit_studies(server.client_url(), std::max<std::uint64_t>(studies, 64)); });
   const double listed_s = seconds_of([&] {
-    Study::check(test::run_client(folder, {"studies", "--server", server.client_url()}));
+    Study::check(test::run_oblique(folder, {"studies", "--server", server.client_url()}));
   });
   const Usage serving = usage_of(server.process().pid());
   server.process().send(SIGTERM);

@@ -6,7 +6,7 @@
 
 #include "proto/frames.h"
 #include "proto/oblique.pb.h"
-#include "tests/proto/recipe/recipe_builder.h"
+#include "tests/support/recipes.h"
 
 namespace oblique::protocol {
 namespace {

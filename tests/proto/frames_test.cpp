@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "proto/oblique.pb.h"
-#include "tests/proto/recipe/recipe_builder.h"
+#include "tests/support/recipes.h"
 
 namespace oblique::protocol {
 namespace {

@@ -11,6 +11,7 @@
 
 #include "tests/server/network/raw_peer.h"
 #include "tests/server/running_server.h"
+#include "tests/support/temporary_folder.h"
 
 namespace oblique::server {
 namespace {
@@ -69,7 +70,7 @@ std::string repeated(const std::string& text, int times) {
 
 class HostilePeersTest : public testing::Test {
  protected:
-  TemporaryFolder folder_;
+  test::TemporaryFolder folder_;
   std::string path_ = folder_.file("studies.db");
 };
 

@@ -7,6 +7,7 @@
 
 #include "server/reading/reader.h"
 #include "tests/server/running_server.h"
+#include "tests/support/temporary_folder.h"
 
 namespace oblique::server {
 namespace {
@@ -15,7 +16,7 @@ using testing::HasSubstr;
 
 class LoopTest : public testing::Test {
  protected:
-  TemporaryFolder folder_;
+  test::TemporaryFolder folder_;
   std::string path_ = folder_.file("studies.db");
 };
 

@@ -16,8 +16,7 @@
 
 #include "proto/frames.h"
 #include "server/loop.h"
-#include "tests/server/scheduler/scheduler_bench.h"
-#include "tests/server/store/results.h"
+#include "tests/support/points.h"
 
 namespace oblique::server {
 

@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "proto/frames.h"
-#include "tests/proto/recipe/recipe_builder.h"
+#include "tests/support/recipes.h"
 
 namespace oblique::simulation {
 

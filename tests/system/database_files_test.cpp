@@ -8,8 +8,9 @@
 #include <gtest/gtest.h>
 #include <sqlite3.h>
 
+#include "tests/support/database.h"
+#include "tests/support/programs.h"
 #include "tests/system/many_points.h"
-#include "tests/system/processes.h"
 
 namespace oblique::test {
 namespace {
@@ -55,11 +56,11 @@ class DatabaseFilesTest : public ::testing::Test {
     std::vector<std::string> words{"submit", "--server", server.client_url()};
     const auto points = many_points("some");
     words.insert(words.end(), points.begin(), points.end());
-    const Ran ran = run_client(folder_, words);
-    ASSERT_EQ(ran.exit_code, 0) << ran.errors;
+    const Outcome ran = run_oblique(folder_, words);
+    ASSERT_EQ(ran.exit_code, 0) << ran.err;
   }
 
-  Folder folder_;
+  TemporaryFolder folder_;
   std::string file_ = folder_.file("some.db");
   Database database_{file_};
 };
@@ -72,38 +73,37 @@ TEST_F(DatabaseFilesTest, AServerWhoseDatabaseIsDeletedSaysSoAndEndsWithOne) {
   fs::remove(file_);
   // While it still answers, it says why.
   wait_until("a client is told", [&] {
-    const Ran asked = run_client(folder_, {"cancel", "some", "--server", server.client_url()});
-    return asked.exit_code == 1 && contains(asked.errors, "was deleted");
+    const Outcome asked = run_oblique(folder_, {"cancel", "some", "--server", server.client_url()});
+    return asked.exit_code == 1 && contains(asked.err, "was deleted");
   });
   EXPECT_EQ(server.process().wait(), 1);
-  EXPECT_TRUE(contains(server.process().errors(), file_ + " was deleted"))
-      << server.process().errors();
+  EXPECT_TRUE(contains(server.process().err(), file_ + " was deleted")) << server.process().err();
   EXPECT_TRUE(is_running(worker.pid())) << "it keeps what is not stored";
 }
 
 TEST_F(DatabaseFilesTest, ARunWhoseDatabaseIsReplacedFailsAndSaysSo) {
   const std::string other = folder_.file("other.db");
   ASSERT_EQ(
-      run_client(folder_, {"run", "--H", "1", "--mu", "0.4", "--e", "1", "--db", other}).exit_code,
+      run_oblique(folder_, {"run", "--H", "1", "--mu", "0.4", "--e", "1", "--db", other}).exit_code,
       0);
   Process run(folder_, client_program(), run_arguments());
   wait_until("rows in the database", [&] { return database_.rows() > 0; });
   fs::rename(other, file_);
   EXPECT_EQ(run.wait(), 1);
-  EXPECT_TRUE(contains(run.errors(), file_ + " was replaced")) << run.errors();
+  EXPECT_TRUE(contains(run.err(), file_ + " was replaced")) << run.err();
   EXPECT_EQ(database_.rows(), 1) << "the other database is as it was";
 }
 
 TEST_F(DatabaseFilesTest, TheFileAloneHasAllRowsAfterARunAlsoWhenAnotherProgramHasItOpen) {
   ASSERT_EQ(
-      run_client(folder_, {"run", "--H", "1", "--mu", "0.4", "--e", "1", "--db", file_}).exit_code,
+      run_oblique(folder_, {"run", "--H", "1", "--mu", "0.4", "--e", "1", "--db", file_}).exit_code,
       0);
   OtherReader reader(file_);
   ASSERT_TRUE(reader.read_one());
   reader.finish_query();
-  const Ran ran = run_client(folder_, run_arguments());
-  ASSERT_EQ(ran.exit_code, 0) << ran.errors;
-  EXPECT_FALSE(contains(ran.errors, "-wal")) << ran.errors;
+  const Outcome ran = run_oblique(folder_, run_arguments());
+  ASSERT_EQ(ran.exit_code, 0) << ran.err;
+  EXPECT_FALSE(contains(ran.err, "-wal")) << ran.err;
   fs::copy_file(file_, folder_.file("copy.db"));
   EXPECT_EQ(Database(folder_.file("copy.db")).rows(), kManyPoints + 1);
 }
@@ -129,7 +129,7 @@ TEST_F(DatabaseFilesTest, AServerThatEndsUnderALongQueryOfAnotherProgramSaysWher
   wait_until("more rows", [&] { return database_.rows() > seen; });
   server.process().send(SIGTERM);
   EXPECT_EQ(server.process().wait(), 0);
-  EXPECT_TRUE(contains(server.process().errors(), "oblique backup")) << server.process().errors();
+  EXPECT_TRUE(contains(server.process().err(), "oblique backup")) << server.process().err();
 }
 
 }  // namespace

@@ -5,7 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/system/processes.h"
+#include "tests/support/database.h"
+#include "tests/support/programs.h"
 
 namespace oblique::test {
 namespace {
@@ -16,22 +17,22 @@ void limit_files(pid_t pid, rlim_t bytes) {
   ASSERT_EQ(prlimit(pid, RLIMIT_FSIZE, &limit, nullptr), 0);
 }
 
-std::string status_of(const Folder& folder, const Server& server) {
-  return run_client(folder, {"status", "full", "--server", server.client_url(), "--format", "csv"})
-      .output;
+std::string status_of(const TemporaryFolder& folder, const Server& server) {
+  return run_oblique(folder, {"status", "full", "--server", server.client_url(), "--format", "csv"})
+      .out;
 }
 
 TEST(DiskFullTest, AStudyWaitsForRoomOnTheDiskSaysSoAndLosesNothing) {
-  const Folder folder;
+  const TemporaryFolder folder;
   const std::string file = folder.file("full.db");
   const Database database(file);
   Server server(folder, file);
   constexpr rlim_t kRoom = 600'000;
   limit_files(server.process().pid(), kRoom);
-  const Ran submitted =
-      run_client(folder, {"submit", "--H", "1", "--mu", "0.1:2.0:50", "--e", "0.5:1.0:40", "--name",
-                          "full", "--server", server.client_url()});
-  ASSERT_EQ(submitted.exit_code, 0) << submitted.errors;
+  const Outcome submitted =
+      run_oblique(folder, {"submit", "--H", "1", "--mu", "0.1:2.0:50", "--e", "0.5:1.0:40",
+                           "--name", "full", "--server", server.client_url()});
+  ASSERT_EQ(submitted.exit_code, 0) << submitted.err;
   Worker worker(folder, server.worker_url());
   wait_until("the study waits for the disk", [&] {
     return status_of(folder, server).find("takes no results") != std::string::npos;
@@ -39,11 +40,12 @@ TEST(DiskFullTest, AStudyWaitsForRoomOnTheDiskSaysSoAndLosesNothing) {
   const double rows = database.rows();
   EXPECT_GT(rows, 0);
   EXPECT_LT(rows, 2000);
-  const Ran refused = run_client(folder, {"submit", "--H", "1", "--mu", "0.4", "--e", "1", "--name",
-                                          "another", "--server", server.client_url()});
+  const Outcome refused =
+      run_oblique(folder, {"submit", "--H", "1", "--mu", "0.4", "--e", "1", "--name", "another",
+                           "--server", server.client_url()});
   // So little may still have fitted.
-  EXPECT_TRUE(refused.exit_code == 0 || refused.errors.find("was not stored") != std::string::npos)
-      << refused.errors;
+  EXPECT_TRUE(refused.exit_code == 0 || refused.err.find("was not stored") != std::string::npos)
+      << refused.err;
   EXPECT_TRUE(is_running(server.process().pid()));
   EXPECT_TRUE(is_running(worker.pid()));
   limit_files(server.process().pid(), RLIM_INFINITY);
@@ -52,7 +54,7 @@ TEST(DiskFullTest, AStudyWaitsForRoomOnTheDiskSaysSoAndLosesNothing) {
              [&] { return database.number("SELECT count(*)" + rows_of_study) == 2000; });
   EXPECT_EQ(database.number("SELECT count(DISTINCT point)" + rows_of_study), 2000);
   EXPECT_EQ(status_of(folder, server).find("takes no results"), std::string::npos);
-  EXPECT_EQ(run_client(folder, {"check", "--db", file}).exit_code, 0);
+  EXPECT_EQ(run_oblique(folder, {"check", "--db", file}).exit_code, 0);
 }
 
 }  // namespace

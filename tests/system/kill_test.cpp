@@ -5,8 +5,9 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/database.h"
+#include "tests/support/programs.h"
 #include "tests/system/many_points.h"
-#include "tests/system/processes.h"
 
 namespace oblique::test {
 namespace {
@@ -20,8 +21,8 @@ class KillTest : public ::testing::Test {
     std::vector<std::string> arguments{"submit", "--server", server_->client_url()};
     const auto points = many_points("many");
     arguments.insert(arguments.end(), points.begin(), points.end());
-    const Ran ran = run_client(folder_, arguments);
-    ASSERT_EQ(ran.exit_code, 0) << ran.errors;
+    const Outcome ran = run_oblique(folder_, arguments);
+    ASSERT_EQ(ran.exit_code, 0) << ran.err;
   }
 
   void start_worker() {
@@ -45,7 +46,7 @@ class KillTest : public ::testing::Test {
                [&] { return database_.texts("SELECT state FROM studies").at(0) == "done"; });
   }
 
-  Folder folder_;
+  TemporaryFolder folder_;
   Database database_{folder_.file("many.db")};
   std::unique_ptr<Server> server_ = std::make_unique<Server>(folder_, folder_.file("many.db"));
   std::vector<std::unique_ptr<Worker>> workers_;
@@ -58,14 +59,14 @@ TEST_F(KillTest, AServerKilledInTheMiddleOfAStudyAndStartedAgainCompletesItWithT
   for (const double rows : {kCount / 40, 3 * kCount / 40, kCount / 8}) {
     wait_for_rows(rows);
     server_->process().send(SIGKILL);
-    EXPECT_EQ(server_->process().wait(), 128 + SIGKILL);
+    EXPECT_EQ(server_->process().wait(), -SIGKILL);
     ASSERT_LT(database_.rows(), kCount) << "killed too late to be a test";
     server_ = std::make_unique<Server>(folder_, folder_.file("many.db"), *server_);
   }
   expect_complete();
   for (const auto& worker : workers_) {
     worker->send(SIGTERM);
-    EXPECT_EQ(worker->wait(), 0) << worker->errors();
+    EXPECT_EQ(worker->wait(), 0) << worker->err();
   }
 }
 
@@ -74,7 +75,7 @@ TEST_F(KillTest, AServerToldToStopInTheMiddleOfAStudyAndStartedAgainCompletesIt)
   start_worker();
   wait_for_rows(kCount / 40);
   server_->process().send(SIGTERM);
-  EXPECT_EQ(server_->process().wait(), 0) << server_->process().errors();
+  EXPECT_EQ(server_->process().wait(), 0) << server_->process().err();
   ASSERT_LT(database_.rows(), kCount) << "stopped too late to be a test";
   server_ = std::make_unique<Server>(folder_, folder_.file("many.db"), *server_);
   expect_complete();
@@ -86,7 +87,7 @@ TEST_F(KillTest, PointsOfAWorkerKilledInTheMiddleOfAStudyAreSolvedByTheOthers) {
   start_worker();
   wait_for_rows(kCount / 40);
   workers_.front()->send(SIGKILL);
-  EXPECT_EQ(workers_.front()->wait(), 128 + SIGKILL);
+  EXPECT_EQ(workers_.front()->wait(), -SIGKILL);
   ASSERT_LT(database_.rows(), kCount) << "killed too late to be a test";
   expect_complete();
   EXPECT_EQ(database_.number("SELECT count(*) FROM results WHERE worker IS NULL OR worker NOT IN"
@@ -112,11 +113,11 @@ TEST_F(KillTest, AWorkerThatWasHaltedAndGivenUpComesBackAndNothingIsStoredTwice)
   wait_for_rows(kCount / 40);
   workers_.front()->send(SIGSTOP);
   wait_until("the halted worker is given up",
-             [&] { return server_->process().errors().find("silent for") != std::string::npos; });
+             [&] { return server_->process().err().find("silent for") != std::string::npos; });
   workers_.front()->send(SIGCONT);
   expect_complete();
   workers_.front()->send(SIGTERM);
-  EXPECT_EQ(workers_.front()->wait(), 0) << workers_.front()->errors();
+  EXPECT_EQ(workers_.front()->wait(), 0) << workers_.front()->err();
 }
 
 }  // namespace

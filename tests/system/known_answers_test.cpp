@@ -5,7 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/system/processes.h"
+#include "tests/support/database.h"
+#include "tests/support/programs.h"
 
 namespace oblique::test {
 namespace {
@@ -173,10 +174,11 @@ void expect_times(const Database& database, const KnownAnswer& known, const std:
 }
 
 TEST(KnownAnswersTest, TheTenPublishedCasesComeThroughRealProcessesWithTheKnownAnswers) {
-  const Folder folder;
+  const TemporaryFolder folder;
   const Database database(folder.file("paper.db"));
-  const Ran ran = run_client(folder, {"run", OBLIQUE_PAPER_STUDY, "--db", folder.file("paper.db")});
-  ASSERT_EQ(ran.exit_code, 0) << ran.errors;
+  const Outcome ran =
+      run_oblique(folder, {"run", OBLIQUE_PAPER_STUDY, "--db", folder.file("paper.db")});
+  ASSERT_EQ(ran.exit_code, 0) << ran.err;
   ASSERT_EQ(database.number("SELECT count(*) FROM results WHERE status = 'solved'"), 10);
   for (const KnownAnswer& known : known_answers()) {
     std::ostringstream name;
@@ -188,26 +190,26 @@ TEST(KnownAnswersTest, TheTenPublishedCasesComeThroughRealProcessesWithTheKnownA
 }
 
 TEST(KnownAnswersTest, TheSameStudyAgainHasNothingToSolve) {
-  const Folder folder;
+  const TemporaryFolder folder;
   const std::string file = folder.file("paper.db");
   const Database database(file);
-  const Ran first = run_client(folder, {"run", OBLIQUE_PAPER_STUDY, "--db", file});
-  ASSERT_EQ(first.exit_code, 0) << first.errors;
+  const Outcome first = run_oblique(folder, {"run", OBLIQUE_PAPER_STUDY, "--db", file});
+  ASSERT_EQ(first.exit_code, 0) << first.err;
   const auto solved_at = database.texts("SELECT solved_at FROM results ORDER BY point");
-  const Ran second = run_client(folder, {"run", OBLIQUE_PAPER_STUDY, "--db", file});
-  EXPECT_EQ(second.exit_code, 0) << second.errors;
-  EXPECT_EQ(second.output, first.output);
+  const Outcome second = run_oblique(folder, {"run", OBLIQUE_PAPER_STUDY, "--db", file});
+  EXPECT_EQ(second.exit_code, 0) << second.err;
+  EXPECT_EQ(second.out, first.out);
   EXPECT_EQ(database.texts("SELECT solved_at FROM results ORDER BY point"), solved_at);
 }
 
 TEST(KnownAnswersTest, APointWithoutAnswerIsARowWithTheReasonAndTheOthersAreSolved) {
-  const Folder folder;
+  const TemporaryFolder folder;
   const Database database(folder.file("steps.db"));
   // 20 µs is beyond the stability limit.
-  const Ran ran =
-      run_client(folder, {"run", "--H", "1", "--mu", "0.4", "--e", "1", "--dt", "4e-6,2e-5",
-                          "--name", "steps", "--db", folder.file("steps.db")});
-  EXPECT_EQ(ran.exit_code, 1) << ran.errors;
+  const Outcome ran =
+      run_oblique(folder, {"run", "--H", "1", "--mu", "0.4", "--e", "1", "--dt", "4e-6,2e-5",
+                           "--name", "steps", "--db", folder.file("steps.db")});
+  EXPECT_EQ(ran.exit_code, 1) << ran.err;
   EXPECT_EQ(database.texts("SELECT status FROM results ORDER BY point"),
             (std::vector<std::string>{"solved", "failed"}));
   EXPECT_NE(database.texts("SELECT error FROM results WHERE point = 1").at(0).find("2e-05"),

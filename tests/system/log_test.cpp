@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/system/processes.h"
+#include "tests/support/programs.h"
 
 namespace oblique::test {
 namespace {
@@ -35,25 +35,25 @@ void expect_log(const std::string& log, const std::string& program) {
 }
 
 TEST(LogTest, HasTheTimeInUtcAsTheDatabaseHasIt) {
-  const Folder folder;
+  const TemporaryFolder folder;
   Server server(folder, folder.file("a.db"), kInTokyo);
   Worker worker(folder, server.worker_url(), {}, kInTokyo);
   wait_until("the worker has joined",
-             [&] { return server.process().errors().find(" joins") != std::string::npos; });
+             [&] { return server.process().err().find(" joins") != std::string::npos; });
   for (Process* process : {static_cast<Process*>(&worker), &server.process()}) {
     process->send(SIGTERM);
-    EXPECT_EQ(process->wait(), 0) << process->errors();
+    EXPECT_EQ(process->wait(), 0) << process->err();
   }
-  expect_log(server.process().errors(), "oblique-server");
-  expect_log(worker.errors(), "oblique-worker");
+  expect_log(server.process().err(), "oblique-server");
+  expect_log(worker.err(), "oblique-worker");
 }
 
 TEST(LogTest, ShowsTextFromOutsideWithoutSteeringTheTerminalOrForgingALine) {
-  const Folder folder;
+  const TemporaryFolder folder;
   Server server(folder, folder.file("a\x1b[2J\u202e\nforged.db"));
   server.process().send(SIGTERM);
   EXPECT_EQ(server.process().wait(), 0);
-  const std::string log = server.process().errors();
+  const std::string log = server.process().err();
   expect_log(log, "oblique-server");
   EXPECT_NE(log.find("a\\x1b[2J\\u202e\\nforged.db"), std::string::npos) << log;
 }

@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/system/processes.h"
+#include "tests/support/programs.h"
 
 namespace oblique::test {
 namespace {
@@ -45,17 +45,17 @@ class QueryAttackTest : public testing::Test {
   }
   void expect_answers() {
     for (int i = 0; i < 3; ++i) {
-      const Ran asked = run_client(folder_, asking("SELECT 1 AS one"));
-      EXPECT_EQ(asked.exit_code, 0) << asked.errors;
-      EXPECT_EQ(asked.output, "one\n1\n");
-      EXPECT_EQ(run_client(folder_, {"status", "--server", server_.client_url()}).exit_code, 0);
+      const Outcome asked = run_oblique(folder_, asking("SELECT 1 AS one"));
+      EXPECT_EQ(asked.exit_code, 0) << asked.err;
+      EXPECT_EQ(asked.out, "one\n1\n");
+      EXPECT_EQ(run_oblique(folder_, {"status", "--server", server_.client_url()}).exit_code, 0);
     }
   }
   void wait_for_readers(std::size_t count) {
     wait_until("queries run", [&] { return children_of(server_.process().pid()).size() >= count; });
   }
 
-  Folder folder_;
+  TemporaryFolder folder_;
   Server server_{folder_, folder_.file("a.db"), {{"SQLITE_TMPDIR", folder_.file("temporary")}}};
   std::deque<Process> attackers_;
 };
@@ -69,11 +69,10 @@ TEST_F(QueryAttackTest, AnswersOfGigabytesFailAndTheServerLivesOnWithLittleMemor
     const int exit_code = attackers_[i].wait();
     // To SQLite's printf a text over the limit is NULL.
     if (i % kHungry.size() == 2) {
-      EXPECT_EQ(exit_code, 0) << attackers_[i].errors();
+      EXPECT_EQ(exit_code, 0) << attackers_[i].err();
     } else {
       EXPECT_EQ(exit_code, 1);
-      EXPECT_NE(attackers_[i].errors().find("MiB allowed"), std::string::npos)
-          << attackers_[i].errors();
+      EXPECT_NE(attackers_[i].err().find("MiB allowed"), std::string::npos) << attackers_[i].err();
     }
   }
   // A single one of these answers had more than three times that.
@@ -88,7 +87,7 @@ TEST_F(QueryAttackTest, QuickQuestionsAreAnsweredWhileMoreSlowOnesRunThanThereAr
   wait_for_readers(4);
   expect_answers();
   for (Process& attacker : attackers_) {
-    EXPECT_FALSE(attacker.exit_code().has_value()) << attacker.errors();
+    EXPECT_FALSE(attacker.exit_code().has_value()) << attacker.err();
   }
 }
 
@@ -105,7 +104,7 @@ TEST_F(QueryAttackTest, AStoppedServerLeavesNoReaderBehind) {
   }
   for (Process& attacker : attackers_) {
     EXPECT_EQ(attacker.wait(), 1);
-    EXPECT_NE(attacker.errors().find("stopping"), std::string::npos) << attacker.errors();
+    EXPECT_NE(attacker.err().find("stopping"), std::string::npos) << attacker.err();
   }
 }
 

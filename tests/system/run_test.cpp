@@ -5,8 +5,9 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/database.h"
+#include "tests/support/programs.h"
 #include "tests/system/many_points.h"
-#include "tests/system/processes.h"
 
 namespace oblique::test {
 namespace {
@@ -35,7 +36,7 @@ class RunTest : public ::testing::Test {
                [&] { return std::none_of(processes.begin(), processes.end(), is_running); });
   }
 
-  Folder folder_;
+  TemporaryFolder folder_;
   Database database_{folder_.file("some.db")};
 };
 
@@ -44,8 +45,8 @@ TEST_F(RunTest, CtrlCLeavesNothingRunningAndTheSameCommandContinues) {
   const auto children = started_by(run);
   kill(-run.pid(), SIGINT);  // as a terminal does: to the whole group
   EXPECT_EQ(run.wait(), 128 + SIGINT);
-  EXPECT_NE(run.errors().find("the same command again"), std::string::npos) << run.errors();
-  EXPECT_EQ(run.output(), "");
+  EXPECT_NE(run.err().find("the same command again"), std::string::npos) << run.err();
+  EXPECT_EQ(run.out(), "");
   for (const pid_t child : children) {
     EXPECT_FALSE(is_running(child));
   }
@@ -53,8 +54,8 @@ TEST_F(RunTest, CtrlCLeavesNothingRunningAndTheSameCommandContinues) {
   ASSERT_LT(rows, kCount) << "stopped too late to be a test";
   const auto kept = database_.texts("SELECT point || ' ' || solved_at FROM results ORDER BY point");
 
-  const Ran again = run_client(folder_, arguments());
-  EXPECT_EQ(again.exit_code, 0) << again.errors;
+  const Outcome again = run_oblique(folder_, arguments());
+  EXPECT_EQ(again.exit_code, 0) << again.err;
   EXPECT_EQ(database_.rows(), kCount);
   const auto now = database_.texts("SELECT point || ' ' || solved_at FROM results ORDER BY point");
   EXPECT_TRUE(std::includes(now.begin(), now.end(), kept.begin(), kept.end(),
@@ -69,23 +70,23 @@ TEST_F(RunTest, ARunThatIsKilledLeavesNoProcessAndTheSameCommandContinues) {
   Process run(folder_, client_program(), arguments());
   const auto children = started_by(run);
   run.send(SIGKILL);
-  EXPECT_EQ(run.wait(), 128 + SIGKILL);
+  EXPECT_EQ(run.wait(), -SIGKILL);
   expect_gone(children);
   ASSERT_LT(database_.rows(), kCount) << "killed too late to be a test";
-  const Ran again = run_client(folder_, arguments());
-  EXPECT_EQ(again.exit_code, 0) << again.errors;
+  const Outcome again = run_oblique(folder_, arguments());
+  EXPECT_EQ(again.exit_code, 0) << again.err;
   EXPECT_EQ(database_.number("SELECT count(*) FROM results WHERE status = 'solved'"), kCount);
 }
 
 TEST(WorkerOfARunTest, EndsWhenTheRunWasKilledBeforeTheWorkerBegan) {
-  const Folder folder;
+  const TemporaryFolder folder;
   Process parent(folder, client_program(), {"--help"});
   parent.wait();
   Process worker(
       folder, worker_program(),
       {"--server", "tcp://127.0.0.1:1", "--stop-with-parent", std::to_string(parent.pid())});
   EXPECT_EQ(worker.wait(), 0);
-  EXPECT_NE(worker.errors().find("parent process was gone"), std::string::npos) << worker.errors();
+  EXPECT_NE(worker.err().find("parent process was gone"), std::string::npos) << worker.err();
 }
 
 TEST_F(RunTest, ARunGoesOnWhenOneOfItsWorkersIsKilled) {
@@ -93,7 +94,7 @@ TEST_F(RunTest, ARunGoesOnWhenOneOfItsWorkersIsKilled) {
   const auto children = started_by(run);
   const pid_t worker = *std::max_element(children.begin(), children.end());  // started last
   kill(worker, SIGKILL);
-  EXPECT_EQ(run.wait(), 0) << run.errors();
+  EXPECT_EQ(run.wait(), 0) << run.err();
   EXPECT_EQ(database_.number("SELECT count(*) FROM results WHERE status = 'solved'"), kCount);
 }
 
@@ -102,9 +103,8 @@ TEST_F(RunTest, ASecondRunOnADatabaseInUseIsRefusedAndTheFirstGoesOn) {
   started_by(first);
   Process second(folder_, client_program(), arguments());
   EXPECT_EQ(second.wait(), 1);
-  EXPECT_NE(second.errors().find("already uses the database"), std::string::npos)
-      << second.errors();
-  EXPECT_EQ(first.wait(), 0) << first.errors();
+  EXPECT_NE(second.err().find("already uses the database"), std::string::npos) << second.err();
+  EXPECT_EQ(first.wait(), 0) << first.err();
   EXPECT_EQ(database_.number("SELECT count(*) FROM results WHERE status = 'solved'"), kCount);
 }
 

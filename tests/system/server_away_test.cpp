@@ -7,8 +7,9 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/database.h"
+#include "tests/support/programs.h"
 #include "tests/system/many_points.h"
-#include "tests/system/processes.h"
 
 namespace oblique::test {
 namespace {
@@ -29,17 +30,17 @@ class ServerAwayTest : public ::testing::Test {
 
   static void wait_until_said(const Process& client, const std::string& words) {
     wait_until("the client says: " + words,
-               [&] { return client.errors().find(words) != std::string::npos; });
+               [&] { return client.err().find(words) != std::string::npos; });
   }
 
   void kill_server() {
     server_->process().send(SIGKILL);
-    EXPECT_EQ(server_->process().wait(), 128 + SIGKILL);
+    EXPECT_EQ(server_->process().wait(), -SIGKILL);
   }
 
   void start_server_again() { server_ = std::make_unique<Server>(folder_, database_, *server_); }
 
-  Folder folder_;
+  TemporaryFolder folder_;
   std::string database_{folder_.file("many.db")};
   std::unique_ptr<Server> server_ = std::make_unique<Server>(folder_, database_);
 };
@@ -57,7 +58,7 @@ TEST_F(ServerAwayTest, WatchingGoesOnWhenTheServerIsKilledAndComesBack) {
   const Worker worker(folder_, server_->worker_url());
   for (Process* client : {&submitting, &watching}) {
     wait_until_said(*client, "answers again");
-    EXPECT_EQ(client->wait(), 0) << client->errors();
+    EXPECT_EQ(client->wait(), 0) << client->err();
   }
   EXPECT_EQ(Database(database_).rows(), kManyPoints);
 }
@@ -66,9 +67,9 @@ TEST_F(ServerAwayTest, AServerThatWasNeverThereIsNotWaitedFor) {
   kill_server();
   for (auto arguments : {submit_and_watch(), watch()}) {
     arguments.insert(arguments.end(), {"--timeout", "0.2"});
-    const Ran ran = run_client(folder_, arguments);
-    EXPECT_EQ(ran.exit_code, 1) << ran.errors;
-    EXPECT_NE(ran.errors.find("no answer from"), std::string::npos) << ran.errors;
+    const Outcome ran = run_oblique(folder_, arguments);
+    EXPECT_EQ(ran.exit_code, 1) << ran.err;
+    EXPECT_NE(ran.err.find("no answer from"), std::string::npos) << ran.err;
   }
 }
 
@@ -99,9 +100,9 @@ TEST_F(ServerAwayTest, ASignalEndsTheWatchingWithItsNumberWhetherTheServerIsTher
       }
       const int signal = i < 2 ? SIGINT : SIGTERM;
       clients[i]->send(signal);
-      EXPECT_EQ(clients[i]->wait(), 128 + signal) << clients[i]->errors();
-      EXPECT_NE(clients[i]->errors().find("No longer watching"), std::string::npos)
-          << clients[i]->errors();
+      EXPECT_EQ(clients[i]->wait(), 128 + signal) << clients[i]->err();
+      EXPECT_NE(clients[i]->err().find("No longer watching"), std::string::npos)
+          << clients[i]->err();
     }
   }
 }

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/system/processes.h"
+#include "tests/support/programs.h"
 
 namespace oblique::test {
 namespace {
@@ -18,7 +18,7 @@ struct WrongUse {
 };
 
 TEST(UsageTest, WrongFlagsEndWithTwoAndASentenceThatNamesThem) {
-  const Folder folder;
+  const TemporaryFolder folder;
   const std::string client = client_program();
   const std::vector<std::string> point{"--mu", "0.4", "--e", "1", "--db", folder.file("a.db")};
   const auto run_with = [&](std::vector<std::string> flags) {
@@ -52,17 +52,18 @@ TEST(UsageTest, WrongFlagsEndWithTwoAndASentenceThatNamesThem) {
     }
     Process process(folder, use.program, use.arguments);
     EXPECT_EQ(process.wait(), 2) << line;
-    EXPECT_NE(process.errors().find(use.named), std::string::npos)
-        << line << "\nsaid: " << process.errors();
-    EXPECT_EQ(process.output(), "") << line;
+    EXPECT_NE(process.err().find(use.named), std::string::npos)
+        << line << "\nsaid: " << process.err();
+    EXPECT_EQ(process.out(), "") << line;
   }
 }
 
 /// Flags of a program that take a value, as its help lists them.
-std::vector<std::string> flags_with_values(const Folder& folder, const std::string& program) {
+std::vector<std::string> flags_with_values(const TemporaryFolder& folder,
+                                           const std::string& program) {
   Process help(folder, program, {"--help"});
   help.wait();
-  std::istringstream lines(help.output());
+  std::istringstream lines(help.out());
   std::vector<std::string> flags;
   const std::regex flag(R"(^\s+(?:-\w,)?(--[a-z-]+) [A-Z]+.*)");
   std::smatch found;
@@ -74,20 +75,19 @@ std::vector<std::string> flags_with_values(const Folder& folder, const std::stri
   return flags;
 }
 
-void expect_refused(const Folder& folder, const std::string& program,
+void expect_refused(const TemporaryFolder& folder, const std::string& program,
                     const std::vector<std::string>& arguments) {
   Process process(folder, program, arguments);
   const std::string line = program + " " + testing::PrintToString(arguments);
-  EXPECT_EQ(process.wait(), 2) << line << process.errors();
+  EXPECT_EQ(process.wait(), 2) << line << process.err();
   const std::string name = std::filesystem::path(program).filename().string() + ": ";
-  EXPECT_TRUE(process.errors().starts_with(name)) << line << process.errors();
-  EXPECT_NE(process.errors().find(arguments.front()), std::string::npos)
-      << line << process.errors();
-  EXPECT_EQ(process.output(), "") << line;
+  EXPECT_TRUE(process.err().starts_with(name)) << line << process.err();
+  EXPECT_NE(process.err().find(arguments.front()), std::string::npos) << line << process.err();
+  EXPECT_EQ(process.out(), "") << line;
 }
 
 TEST(UsageTest, EveryFlagOfServerAndWorkerRefusesAnEmptyValue) {
-  const Folder folder;
+  const TemporaryFolder folder;
   for (const std::string& program : {server_program(), worker_program()}) {
     const auto flags = flags_with_values(folder, program);
     EXPECT_GE(flags.size(), 3U) << program;
@@ -98,7 +98,7 @@ TEST(UsageTest, EveryFlagOfServerAndWorkerRefusesAnEmptyValue) {
 }
 
 TEST(UsageTest, NumbersOfServerAndWorkerRefuseWhatTheyCannotBe) {
-  const Folder folder;
+  const TemporaryFolder folder;
   for (const char* value : {"nan", "-1", "1.5", "65536", "99999999999999999999", "x"}) {
     expect_refused(folder, server_program(), {"--worker-port", value});
     expect_refused(folder, server_program(), {"--client-port", value});
@@ -116,23 +116,23 @@ TEST(UsageTest, NumbersOfServerAndWorkerRefuseWhatTheyCannotBe) {
 }
 
 TEST(UsageTest, EveryProgramSaysItsVersion) {
-  const Folder folder;
+  const TemporaryFolder folder;
   for (const std::string& program : {client_program(), server_program(), worker_program()}) {
     Process process(folder, program, {"--version"});
     EXPECT_EQ(process.wait(), 0) << program;
     const std::string name = std::filesystem::path(program).filename().string();
-    EXPECT_TRUE(std::regex_match(process.output(), std::regex(name + R"( \d+\.\d+\.\d+\n)")))
-        << process.output();
-    EXPECT_EQ(process.errors(), "") << program;
+    EXPECT_TRUE(std::regex_match(process.out(), std::regex(name + R"( \d+\.\d+\.\d+\n)")))
+        << process.out();
+    EXPECT_EQ(process.err(), "") << program;
   }
 }
 
 TEST(UsageTest, HelpIsNoError) {
-  const Folder folder;
+  const TemporaryFolder folder;
   for (const std::string& program : {client_program(), server_program(), worker_program()}) {
     Process process(folder, program, {"--help"});
     EXPECT_EQ(process.wait(), 0) << program;
-    EXPECT_NE(process.output(), "") << program;
+    EXPECT_NE(process.out(), "") << program;
   }
 }
 

@@ -18,7 +18,7 @@
 #include "proto/recipe/point_table.h"
 #include "server/store/store.h"
 #include "tests/client/service/scripted_server.h"
-#include "tests/client/verbs/program.h"
+#include "tests/support/temporary_folder.h"
 
 namespace oblique::client {
 namespace {
@@ -57,7 +57,7 @@ class SourceTest : public ::testing::Test {
     return open_source(flags)->status({}).at(0).name();
   }
 
-  TestFolder folder_;
+  test::TemporaryFolder folder_;
   std::filesystem::path before_ = std::filesystem::current_path();
   ScriptedServer named_{answer("named")};
   ScriptedServer from_environment_{answer("environment")};

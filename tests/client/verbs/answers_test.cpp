@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/client/service/scripted_server.h"
-#include "tests/client/verbs/program.h"
+#include "tests/support/programs.h"
 
 namespace oblique::client {
 namespace {
@@ -54,9 +54,9 @@ ScriptedServer::Answer cuts_off(const std::string& state) {
   };
 }
 
-Outcome ask(const ScriptedServer& server, std::vector<std::string> words) {
+test::Outcome ask(const ScriptedServer& server, std::vector<std::string> words) {
   words.insert(words.end(), {"--server", server.url()});
-  return oblique(words);
+  return test::run_oblique(words);
 }
 
 TEST(CutAnswers, AreAsFarAsLimitGoesPutTogetherAgain) {

@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/output/printer.h"
-#include "tests/client/verbs/program.h"
+#include "tests/support/programs.h"
 
 namespace oblique::client {
 namespace {
@@ -42,15 +42,16 @@ std::set<std::string> members_of(const nlohmann::ordered_json& json) {
 class TwoWays : public testing::Test {
  protected:
   static void SetUpTestSuite() {
-    const TestFolder folder;
+    const test::TemporaryFolder folder;
     const std::vector<std::string> point{"--H", "1", "--mu", "1.2", "--e", "0.9"};
     const auto with_point = [&](std::vector<std::string> words) {
       words.insert(words.end(), point.begin(), point.end());
-      return oblique(folder, words);
+      return test::run_oblique(folder, words);
     };
     solved = nlohmann::ordered_json::parse(with_point({"solve", "--json"}).out);
     ASSERT_EQ(with_point({"run", "--name", "a"}).exit_code, 0);
-    const auto rows = oblique(folder, {"query", "a", "--select", "*", "--format", "json"});
+    const auto rows =
+        test::run_oblique(folder, {"query", "a", "--select", "*", "--format", "json"});
     ASSERT_EQ(rows.exit_code, 0) << rows.err;
     row = nlohmann::ordered_json::parse(rows.out)[0];
   }

@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "tests/client/verbs/program.h"
+#include "tests/support/programs.h"
 
 namespace oblique::client {
 namespace {
@@ -83,7 +83,7 @@ TEST(CommandLine, AnswersWrongUsageWithExitCodeTwoAndASentence) {
       {{"fit", "--elements-per-link", "0"}, "elements_per_link = 0"},
   };
   for (const auto& [arguments, says] : wrong) {
-    const auto outcome = oblique(arguments);
+    const auto outcome = test::run_oblique(arguments);
     const auto words = testing::PrintToString(arguments);
     EXPECT_EQ(outcome.exit_code, 2) << words << outcome.err;
     EXPECT_EQ(outcome.out, "") << words;
@@ -93,7 +93,7 @@ TEST(CommandLine, AnswersWrongUsageWithExitCodeTwoAndASentence) {
 }
 
 TEST(CommandLine, ShowsEveryVerbWithExamplesOnStandardOutput) {
-  const auto help = oblique({"--help"});
+  const auto help = test::run_oblique({"--help"});
   EXPECT_EQ(help.exit_code, 0);
   EXPECT_EQ(help.err, "");
   const auto verbs = verbs_of(help.out);
@@ -101,7 +101,7 @@ TEST(CommandLine, ShowsEveryVerbWithExamplesOnStandardOutput) {
     ASSERT_EQ(std::count(verbs.begin(), verbs.end(), verb), 1) << verb << '\n' << help.out;
   }
   for (const auto& verb : verbs) {
-    const auto outcome = oblique({verb, "--help"});
+    const auto outcome = test::run_oblique({verb, "--help"});
     EXPECT_EQ(outcome.exit_code, 0) << verb;
     EXPECT_EQ(outcome.err, "") << verb;
     EXPECT_NE(outcome.out.find("Examples:\n  oblique " + verb), std::string::npos) << outcome.out;
@@ -109,7 +109,8 @@ TEST(CommandLine, ShowsEveryVerbWithExamplesOnStandardOutput) {
 }
 
 TEST(CommandLine, SolvesOnePointAsOneJsonObject) {
-  const auto outcome = oblique({"solve", "--H", "1", "--mu", "0.4", "--e", "1", "--json"});
+  const auto outcome =
+      test::run_oblique({"solve", "--H", "1", "--mu", "0.4", "--e", "1", "--json"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   const auto json = nlohmann::json::parse(outcome.out);
   EXPECT_EQ(json["H"], 1.0);
@@ -119,19 +120,20 @@ TEST(CommandLine, SolvesOnePointAsOneJsonObject) {
 }
 
 TEST(CommandLine, SaysOnceAndBesideTheDataThatThePublishedMeshIsNotConverged) {
-  const auto outcome = oblique({"solve", "--H", "1", "--mu", "0.4", "--e", "1", "--json"});
+  const auto outcome =
+      test::run_oblique({"solve", "--H", "1", "--mu", "0.4", "--e", "1", "--json"});
   EXPECT_TRUE(nlohmann::json::accept(outcome.out)) << outcome.out;
   EXPECT_NE(outcome.err.find("--preset converged"), std::string::npos) << outcome.err;
-  const auto run = oblique({"run", "--H", "0.6", "--mu", "0.2:0.4:3", "--e", "1"});
+  const auto run = test::run_oblique({"run", "--H", "0.6", "--mu", "0.2:0.4:3", "--e", "1"});
   const auto first = run.err.find("--preset converged");
   EXPECT_NE(first, std::string::npos) << run.err;
   EXPECT_EQ(run.err.find("--preset converged", first + 1), std::string::npos) << run.err;
 }
 
 TEST(CommandLine, WritesATraceFromTouchToSeparation) {
-  const TestFolder folder;
-  const auto outcome =
-      oblique(folder, {"solve", "--H", "1", "--mu", "1.2", "--e", "1", "--trace", "trace.csv"});
+  const test::TemporaryFolder folder;
+  const auto outcome = test::run_oblique(
+      folder, {"solve", "--H", "1", "--mu", "1.2", "--e", "1", "--trace", "trace.csv"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_NE(outcome.out.find("contact"), std::string::npos);
   std::ifstream trace(folder.path() / "trace.csv");
@@ -152,8 +154,9 @@ TEST(CommandLine, WritesATraceFromTouchToSeparation) {
 }
 
 TEST(CommandLine, WritesATraceWithShapeToStandardOutputAndTheRestToStandardError) {
-  const auto outcome = oblique({"solve", "--H", "0.9", "--mu", "0.4", "--e", "1",
-                                "--elements-per-link", "1", "--trace", "-", "--trace-shape"});
+  const auto outcome =
+      test::run_oblique({"solve", "--H", "0.9", "--mu", "0.4", "--e", "1", "--elements-per-link",
+                         "1", "--trace", "-", "--trace-shape"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   std::istringstream trace(outcome.out);
   std::string line;
@@ -174,7 +177,7 @@ TEST(CommandLine, RefusesATraceThatHasNoPlaceToGo) {
       "solve", "--H", "0.9", "--mu", "0.4", "--e", "1", "--elements-per-link", "1"};
   const auto with = [&point](std::vector<std::string> more) {
     more.insert(more.begin(), point.begin(), point.end());
-    return oblique(more);
+    return test::run_oblique(more);
   };
   for (const auto& [flags, reason] : std::vector<std::pair<std::vector<std::string>, std::string>>{
            {{"--trace", "-", "--json"}, "both write to standard output"},
@@ -188,7 +191,8 @@ TEST(CommandLine, RefusesATraceThatHasNoPlaceToGo) {
 }
 
 TEST(CommandLine, SaysThatNobodyAnswersAndWhatToDo) {
-  const auto outcome = oblique({"status", "--server", "tcp://127.0.0.1:1", "--timeout", "0.05"});
+  const auto outcome =
+      test::run_oblique({"status", "--server", "tcp://127.0.0.1:1", "--timeout", "0.05"});
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_EQ(outcome.out, "");
   EXPECT_NE(outcome.err.find("no answer from tcp://127.0.0.1:1 within 0.05 s"), std::string::npos)
@@ -196,15 +200,15 @@ TEST(CommandLine, SaysThatNobodyAnswersAndWhatToDo) {
 }
 
 TEST(CommandLine, SaysThatADatabaseIsNotThere) {
-  const auto outcome = oblique({"studies", "--db", "nowhere.db"});
+  const auto outcome = test::run_oblique({"studies", "--db", "nowhere.db"});
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_NE(outcome.err.find("nowhere.db"), std::string::npos) << outcome.err;
 }
 
 TEST(CommandLine, FailsWhenStandardOutputCannotBeWritten) {
-  const TestFolder folder;
+  const test::TemporaryFolder folder;
   std::ofstream(folder.path() / "script")
-      << "exec '" << OBLIQUE_PROGRAM << "' solve --H 1 --mu 0.4 --e 1 > /dev/full\n";
+      << "exec '" << test::client_program() << "' solve --H 1 --mu 0.4 --e 1 > /dev/full\n";
   const int status = std::system(
       ("sh " + (folder.path() / "script").string() + " 2> " + (folder.path() / "err").string())
           .c_str());

@@ -7,9 +7,8 @@
 #include <gtest/gtest.h>
 
 #include "server/store/store.h"
-#include "tests/client/verbs/program.h"
-#include "tests/server/scheduler/scheduler_bench.h"
-#include "tests/server/store/results.h"
+#include "tests/support/points.h"
+#include "tests/support/programs.h"
 
 namespace oblique::client {
 namespace {
@@ -38,9 +37,11 @@ class DatabaseQuery : public testing::Test {
                             server::solved_point(2), server::solved_point(3)}}};
     store.commit(changes);
   }
-  Outcome ask(const std::vector<std::string>& arguments) { return oblique(folder_, arguments); }
+  test::Outcome ask(const std::vector<std::string>& arguments) {
+    return test::run_oblique(folder_, arguments);
+  }
 
-  TestFolder folder_;
+  test::TemporaryFolder folder_;
 };
 
 TEST_F(DatabaseQuery, AStatementHasItsTimeWhateverItDoes) {
@@ -56,10 +57,10 @@ TEST_F(DatabaseQuery, AStatementHasItsTimeWhateverItDoes) {
 }
 
 TEST_F(DatabaseQuery, ASignalEndsAStatementThatNeverLooksAtTheClock) {
-  Program program(folder_, {"sql", kDeaf});
+  test::Process program(folder_, test::client_program(), {"sql", kDeaf});
   std::this_thread::sleep_for(std::chrono::milliseconds(200));
   kill(program.pid(), SIGINT);
-  EXPECT_THAT(program.outcome().exit_code, testing::AnyOf(-1, 130));
+  EXPECT_THAT(program.outcome().exit_code, testing::AnyOf(-SIGINT, 130));
 }
 
 TEST_F(DatabaseQuery, AStatementThatNeedsMuchMemoryFailsAndSaysSo) {

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/client/verbs/program.h"
+#include "tests/support/programs.h"
 
 namespace oblique::client {
 namespace {
@@ -27,7 +27,7 @@ std::string shown(const std::string& text, const std::string& command) {
 }
 
 TEST(Readme, ShowsTheTableThatItsCommandPrints) {
-  const auto printed = oblique({"paper", "--format", "markdown"});
+  const auto printed = test::run_oblique({"paper", "--format", "markdown"});
   ASSERT_EQ(printed.exit_code, 0) << printed.err;
   EXPECT_EQ(shown(text_of("client/paper/README.md"), "oblique paper --format markdown"),
             "\n" + printed.out + "\n")
@@ -35,7 +35,7 @@ TEST(Readme, ShowsTheTableThatItsCommandPrints) {
 }
 
 TEST(Readme, SummarisesTheComparisonInTheNumbersThatItsCommandPrints) {
-  const auto printed = oblique({"paper", "--format", "markdown"});
+  const auto printed = test::run_oblique({"paper", "--format", "markdown"});
   std::smatch number;
   ASSERT_TRUE(std::regex_search(
       printed.out, number,
@@ -48,7 +48,7 @@ TEST(Readme, SummarisesTheComparisonInTheNumbersThatItsCommandPrints) {
 }
 
 TEST(Readme, DescribesEveryColumn) {
-  const auto printed = oblique({"columns", "--format", "markdown"});
+  const auto printed = test::run_oblique({"columns", "--format", "markdown"});
   ASSERT_EQ(printed.exit_code, 0) << printed.err;
   EXPECT_EQ(shown(text_of("client/README.md"), "oblique columns --format markdown"),
             "\n" + printed.out + "\n")

@@ -11,13 +11,13 @@
 #include <nlohmann/json.hpp>
 
 #include "server/reading/reader.h"
-#include "tests/client/verbs/program.h"
+#include "tests/support/programs.h"
 
 namespace oblique::client {
 namespace {
 
 // Long enough that a signal meets it at work, short enough to be finished afterwards.
-void write_study(const TestFolder& folder, int points) {
+void write_study(const test::TemporaryFolder& folder, int points) {
   std::ofstream(folder.path() / "study.toml")
       << "name = 'many'\n[[block]]\nH = 1\nmu = { from = 0.1, to = 2, count = " << points
       << " }\ne = 0.9\n";
@@ -30,7 +30,7 @@ void wait_for(const std::function<bool()>& condition) {
   }
 }
 
-std::uint64_t solved(const TestFolder& folder) {
+std::uint64_t solved(const test::TemporaryFolder& folder) {
   try {
     server::Reader reader((folder.path() / "oblique.db").string());
     const auto studies = reader.study_status();
@@ -41,9 +41,9 @@ std::uint64_t solved(const TestFolder& folder) {
 }
 
 // Started, with results coming in.
-void wait_until_at_work(const TestFolder& folder, Program& program) {
+void wait_until_at_work(const test::TemporaryFolder& folder, const test::Process& program) {
   wait_for([&] { return solved(folder) > 0; });
-  ASSERT_EQ(program.children().size(), 3U);
+  ASSERT_EQ(test::children_of(program.pid()).size(), 3U);
 }
 
 void expect_gone(const std::vector<pid_t>& processes) {
@@ -57,77 +57,81 @@ std::vector<std::string> run_arguments() {
 }
 
 TEST(Run, SolvesAStudyAndItsResultsAreThereForEveryVerbThatReads) {
-  const TestFolder folder;
+  const test::TemporaryFolder folder;
   const auto paper = std::string(OBLIQUE_SOURCE_DIR) + "/deploy/studies/paper.toml";
-  const auto run = oblique(folder, {"run", paper});
+  const auto run = test::run_oblique(folder, {"run", paper});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_NE(run.out.find("5057.6"), std::string::npos) << run.out;
   EXPECT_NE(run.err.find("10 of 10 points"), std::string::npos) << run.err;
 
-  const auto query = oblique(folder, {"query", "paper", "--where", "mu > 1", "--select",
-                                      "mu,fn_peak_N", "--order", "mu DESC", "--format", "json"});
+  const auto query =
+      test::run_oblique(folder, {"query", "paper", "--where", "mu > 1", "--select", "mu,fn_peak_N",
+                                 "--order", "mu DESC", "--format", "json"});
   ASSERT_EQ(query.exit_code, 0) << query.err;
   const auto rows = nlohmann::json::parse(query.out);
   ASSERT_EQ(rows.size(), 3U);
   EXPECT_EQ(rows[0]["mu"], 1.6);
 
-  const auto sql = oblique(folder, {"sql", "SELECT count(*) AS n FROM peaks", "--format", "csv"});
+  const auto sql =
+      test::run_oblique(folder, {"sql", "SELECT count(*) AS n FROM peaks", "--format", "csv"});
   EXPECT_EQ(sql.exit_code, 0) << sql.err;
   EXPECT_TRUE(sql.out.starts_with("n\n")) << sql.out;
 
-  const auto status = oblique(folder, {"status", "paper"});
+  const auto status = test::run_oblique(folder, {"status", "paper"});
   EXPECT_NE(status.out.find("done"), std::string::npos) << status.out << status.err;
-  EXPECT_NE(oblique(folder, {"studies"}).out.find("paper"), std::string::npos);
-  EXPECT_EQ(oblique(folder, {"watch", "paper"}).exit_code, 0);
+  EXPECT_NE(test::run_oblique(folder, {"studies"}).out.find("paper"), std::string::npos);
+  EXPECT_EQ(test::run_oblique(folder, {"watch", "paper"}).exit_code, 0);
 
-  const auto compared = oblique(folder, {"paper", "--db", "oblique.db"});
+  const auto compared = test::run_oblique(folder, {"paper", "--db", "oblique.db"});
   EXPECT_EQ(compared.exit_code, 0) << compared.err;
   EXPECT_NE(compared.out.find("63 trustworthy published numbers: rms"), std::string::npos);
 }
 
 TEST(Run, OfAStudyThatIsDoneShowsItsResultsAgain) {
-  const TestFolder folder;
+  const test::TemporaryFolder folder;
   const std::vector<std::string> arguments{"run", "--H", "1", "--mu", "0.4", "--e", "1"};
-  const auto first = oblique(folder, arguments);
-  const auto second = oblique(folder, arguments);
+  const auto first = test::run_oblique(folder, arguments);
+  const auto second = test::run_oblique(folder, arguments);
   EXPECT_EQ(second.exit_code, 0) << second.err;
   EXPECT_EQ(first.out, second.out);
   EXPECT_NE(second.err.find("1 of 1 points are done"), std::string::npos) << second.err;
 }
 
 TEST(Queries, ThatAreWrongSayWhatIsWrong) {
-  const TestFolder folder;
+  const test::TemporaryFolder folder;
   ASSERT_EQ(
-      oblique(folder, {"run", "--H", "1", "--mu", "0.4", "--e", "1", "--name", "one"}).exit_code,
+      test::run_oblique(folder, {"run", "--H", "1", "--mu", "0.4", "--e", "1", "--name", "one"})
+          .exit_code,
       0);
-  const auto column = oblique(folder, {"query", "one", "--where", "fn_peak > 1"});
+  const auto column = test::run_oblique(folder, {"query", "one", "--where", "fn_peak > 1"});
   EXPECT_EQ(column.exit_code, 2);
   EXPECT_NE(column.err.find("did you mean `fn_peak_N`"), std::string::npos) << column.err;
-  const auto study = oblique(folder, {"query", "two"});
+  const auto study = test::run_oblique(folder, {"query", "two"});
   EXPECT_EQ(study.exit_code, 1);
   EXPECT_NE(study.err.find("two"), std::string::npos) << study.err;
-  const auto writes = oblique(folder, {"sql", "DELETE FROM results"});
+  const auto writes = test::run_oblique(folder, {"sql", "DELETE FROM results"});
   EXPECT_EQ(writes.exit_code, 2);
   EXPECT_EQ(solved(folder), 1U);
 }
 
 TEST(Run, OfAnotherStudyUnderATakenNameIsRefused) {
-  const TestFolder folder;
+  const test::TemporaryFolder folder;
   ASSERT_EQ(
-      oblique(folder, {"run", "--H", "1", "--mu", "0.4", "--e", "1", "--name", "one"}).exit_code,
+      test::run_oblique(folder, {"run", "--H", "1", "--mu", "0.4", "--e", "1", "--name", "one"})
+          .exit_code,
       0);
   const auto other =
-      oblique(folder, {"run", "--H", "1", "--mu", "0.5", "--e", "1", "--name", "one"});
+      test::run_oblique(folder, {"run", "--H", "1", "--mu", "0.5", "--e", "1", "--name", "one"});
   EXPECT_EQ(other.exit_code, 1);
   EXPECT_NE(other.err.find("one"), std::string::npos) << other.err;
 }
 
 TEST(Run, NoticesThatTheServerDied) {
-  const TestFolder folder;
+  const test::TemporaryFolder folder;
   write_study(folder, 100000);
-  Program program(folder, run_arguments());
+  test::Process program(folder, test::client_program(), run_arguments());
   wait_until_at_work(folder, program);
-  const auto processes = program.children();
+  const auto processes = test::children_of(program.pid());
   kill(processes.front(), SIGKILL);
   const auto outcome = program.outcome();
   EXPECT_EQ(outcome.exit_code, 1);
@@ -137,17 +141,17 @@ TEST(Run, NoticesThatTheServerDied) {
 }
 
 TEST(Run, OfAStudyThatSomebodyCancelsSaysSoAndEndsWithOne) {
-  const TestFolder folder;
+  const test::TemporaryFolder folder;
   write_study(folder, 100000);
   auto arguments = run_arguments();
   arguments.push_back("--verbose");
-  Program program(folder, arguments);
+  test::Process program(folder, test::client_program(), arguments);
   wait_until_at_work(folder, program);
   // The server's log says where it awaits clients.
   const auto said = program.err();
   const auto url = said.substr(said.find("clients at tcp://") + std::string("clients at ").size());
-  const auto cancel =
-      oblique(folder, {"cancel", "many", "--server", url.substr(0, url.find_first_of(",\n"))});
+  const auto cancel = test::run_oblique(
+      folder, {"cancel", "many", "--server", url.substr(0, url.find_first_of(",\n"))});
   EXPECT_EQ(cancel.exit_code, 0) << cancel.err;
   const auto outcome = program.outcome();
   EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
@@ -155,17 +159,17 @@ TEST(Run, OfAStudyThatSomebodyCancelsSaysSoAndEndsWithOne) {
 }
 
 TEST(Watch, OfAFileOnWhichNobodyWorksSaysSo) {
-  const TestFolder folder;
+  const test::TemporaryFolder folder;
   write_study(folder, 100000);
   {
-    Program program(folder, run_arguments());
+    test::Process program(folder, test::client_program(), run_arguments());
     wait_until_at_work(folder, program);
     kill(program.pid(), SIGINT);
     EXPECT_EQ(program.outcome().exit_code, 128 + SIGINT);
   }
-  const auto status = oblique(folder, {"status"});
+  const auto status = test::run_oblique(folder, {"status"});
   EXPECT_NE(status.out.find("nobody is at work on oblique.db"), std::string::npos) << status.out;
-  Program watch(folder, {"watch", "many"});
+  test::Process watch(folder, test::client_program(), {"watch", "many"});
   wait_for([&] {
     return watch.err().find("waits for a server: nobody is at work on oblique.db") !=
            std::string::npos;
@@ -175,11 +179,11 @@ TEST(Watch, OfAFileOnWhichNobodyWorksSaysSo) {
 }
 
 TEST(Run, GoesOnWithTheWorkersThatAreLeftAndStopsWhenNoneIs) {
-  const TestFolder folder;
+  const test::TemporaryFolder folder;
   write_study(folder, 100000);
-  Program program(folder, run_arguments());
+  test::Process program(folder, test::client_program(), run_arguments());
   wait_until_at_work(folder, program);
-  const auto processes = program.children();
+  const auto processes = test::children_of(program.pid());
   kill(processes.at(1), SIGKILL);
   wait_for([&] { return program.err().find("a worker (process ") != std::string::npos; });
   EXPECT_EQ(kill(program.pid(), 0), 0);
@@ -191,9 +195,9 @@ TEST(Run, GoesOnWithTheWorkersThatAreLeftAndStopsWhenNoneIs) {
 }
 
 TEST(Run, SaysWhatTheServerSaidWhenItDoesNotStart) {
-  const TestFolder folder;
+  const test::TemporaryFolder folder;
   std::ofstream(folder.path() / "oblique.db") << "this is no database, but some text in a file\n";
-  const auto outcome = oblique(folder, {"run", "--H", "1", "--mu", "0.4", "--e", "1"});
+  const auto outcome = test::run_oblique(folder, {"run", "--H", "1", "--mu", "0.4", "--e", "1"});
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_NE(outcome.err.find("the server did not start"), std::string::npos) << outcome.err;
   EXPECT_NE(outcome.err.find("oblique.db"), std::string::npos) << outcome.err;

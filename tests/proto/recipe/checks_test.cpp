@@ -11,7 +11,7 @@
 #include "proto/recipe/checks.h"
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
-#include "tests/proto/recipe/recipe_builder.h"
+#include "tests/support/recipes.h"
 
 namespace oblique::protocol {
 namespace {

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "proto/frames.h"
-#include "tests/proto/recipe/recipe_builder.h"
+#include "tests/support/recipes.h"
 
 namespace oblique::protocol {
 namespace {

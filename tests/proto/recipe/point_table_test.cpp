@@ -8,7 +8,7 @@
 #include "proto/recipe/axes.h"
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/model_message.h"
-#include "tests/proto/recipe/recipe_builder.h"
+#include "tests/support/recipes.h"
 
 namespace oblique::protocol {
 namespace {

@@ -9,8 +9,8 @@
 #include <gtest/gtest.h>
 
 #include "server/store/store.h"
-#include "tests/server/scheduler/scheduler_bench.h"
-#include "tests/server/store/results.h"
+#include "tests/support/points.h"
+#include "tests/support/temporary_folder.h"
 
 namespace oblique::server {
 
@@ -34,7 +34,7 @@ class CareTest : public testing::Test {
     store.commit(changes);
   }
 
-  TemporaryFolder folder_;
+  test::TemporaryFolder folder_;
   std::string path_ = folder_.file("studies.db");
   std::string copy_ = folder_.file("copy.db");
   std::shared_ptr<const protocol::PointTable> table_ = table_of(10);

@@ -10,8 +10,8 @@
 
 #include "server/care/diagnosis.h"
 #include "server/store/store.h"
-#include "tests/server/scheduler/scheduler_bench.h"
-#include "tests/server/store/results.h"
+#include "tests/support/points.h"
+#include "tests/support/temporary_folder.h"
 
 namespace oblique::server {
 namespace {
@@ -70,7 +70,7 @@ class RowFaultsTest : public testing::Test {
     execute(open_database(path_, SQLITE_OPEN_READWRITE).get(), sql);
   }
 
-  TemporaryFolder folder_;
+  test::TemporaryFolder folder_;
   std::string path_ = folder_.file("studies.db");
   std::shared_ptr<const protocol::PointTable> table_ = table_of(5);
 };

@@ -17,8 +17,8 @@
 #include "server/care/salvage.h"
 #include "server/reading/reader.h"
 #include "server/store/store.h"
-#include "tests/server/scheduler/scheduler_bench.h"
-#include "tests/server/store/results.h"
+#include "tests/support/points.h"
+#include "tests/support/temporary_folder.h"
 
 namespace oblique::server {
 namespace {
@@ -70,7 +70,7 @@ class ReadOnlyFolderTest : public testing::Test {
     }
   }
 
-  TemporaryFolder folder_;
+  test::TemporaryFolder folder_;
 
  private:
   void place(const std::string& suffix, const std::string& name) {

@@ -1,6 +1,10 @@
 // Queries in real reader processes, some of which do what no thread could be stopped at.
 #include "server/queries/query_pool.h"
 
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
 #include <chrono>
 #include <condition_variable>
 #include <filesystem>
@@ -11,9 +15,10 @@
 #include <gtest/gtest.h>
 
 #include "proto/frames.h"
+#include "server/queries/reader_program.h"
 #include "server/store/store.h"
-#include "tests/server/scheduler/scheduler_bench.h"
-#include "tests/server/store/results.h"
+#include "tests/support/process.h"
+#include "tests/support/temporary_folder.h"
 
 namespace oblique::server {
 namespace {
@@ -70,7 +75,7 @@ class QueryPoolTest : public testing::Test {
     return wait_for(ask(sql)).query().rows(0).values(0).integer();
   }
 
-  TemporaryFolder folder_;
+  test::TemporaryFolder folder_;
   std::string path_ = folder_.file("studies.db");
   std::string program_ = OBLIQUE_SERVER_PROGRAM;
   TurnSettings turns_;
@@ -90,6 +95,21 @@ class QueryPoolTest : public testing::Test {
   std::uint64_t last_ticket_ = 0;
   std::optional<QueryPool> pool_;  // last: it reports to the others
 };
+
+TEST_F(QueryPoolTest, AReaderWhoseServerWasKilledWhileItStartedBeginsNoQuery) {
+  std::array<int, 2> ends{};
+  ASSERT_EQ(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()), 0);
+  protocol::QueryRequest request;
+  request.set_sql(kDeaf);
+  const std::string query = protocol::encode(request);
+  const auto length = static_cast<FrameLength>(query.size());
+  ASSERT_EQ(write(ends[0], &length, sizeof length), static_cast<ssize_t>(sizeof length));
+  ASSERT_EQ(write(ends[0], query.data(), query.size()), static_cast<ssize_t>(query.size()));
+  close(ends[0]);
+  test::Process reader(folder_, program_, {kReadMode, path_}, {}, ends[1]);
+  close(ends[1]);
+  EXPECT_EQ(reader.wait(), 0);
+}
 
 TEST_F(QueryPoolTest, AQueryIsAnsweredByAnotherProcess) {
   const auto reply = wait_for(ask("SELECT 5 AS five, 'x'"));

@@ -8,8 +8,8 @@
 #include <gtest/gtest.h>
 
 #include "server/store/store.h"
-#include "tests/server/scheduler/scheduler_bench.h"
-#include "tests/server/store/results.h"
+#include "tests/support/points.h"
+#include "tests/support/temporary_folder.h"
 
 namespace oblique::server {
 namespace {
@@ -44,7 +44,7 @@ class ReaderTest : public testing::Test {
     return "it ran";
   }
 
-  TemporaryFolder folder_;
+  test::TemporaryFolder folder_;
   std::string path_ = folder_.file("studies.db");
 };
 

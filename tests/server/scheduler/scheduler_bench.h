@@ -5,16 +5,9 @@
 #include <vector>
 
 #include "server/scheduler/scheduler.h"
-#include "tests/proto/recipe/recipe_builder.h"
+#include "tests/support/points.h"
 
 namespace oblique::server {
-
-/// A study of `points` points of one model.
-inline std::shared_ptr<const protocol::PointTable> table_of(std::uint64_t points) {
-  return std::make_shared<const protocol::PointTable>(protocol::recipe_of(
-      {{protocol::listed("H", {1.0}), protocol::range("mu", 0.0, points == 1 ? 0.0 : 1.0, points),
-        protocol::listed("e", {1.0})}}));
-}
 
 /// The effects of one type, in order.
 template <typename Kind>

@@ -12,8 +12,7 @@
 #include "proto/result_message.h"
 #include "server/queries/reader_program.h"
 #include "server/service/service.h"
-#include "tests/server/scheduler/scheduler_bench.h"
-#include "tests/server/store/results.h"
+#include "tests/support/points.h"
 
 namespace oblique::server {
 

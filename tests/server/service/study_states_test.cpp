@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/server/scheduler/scheduler_bench.h"
+#include "tests/support/points.h"
 
 namespace oblique::server {
 namespace {

@@ -9,8 +9,8 @@
 #include "server/care/diagnosis.h"
 #include "server/reading/reader.h"
 #include "server/store/store.h"
-#include "tests/server/scheduler/scheduler_bench.h"
-#include "tests/server/store/results.h"
+#include "tests/support/points.h"
+#include "tests/support/temporary_folder.h"
 
 namespace oblique::server {
 namespace {
@@ -41,7 +41,7 @@ class OldDatabaseTest : public testing::TestWithParam<int> {
     insert.run();
   }
 
-  TemporaryFolder folder_;
+  test::TemporaryFolder folder_;
   std::string path_ = folder_.file("old.db");
 };
 

@@ -9,7 +9,8 @@
 
 #include "server/database/row_checksum.h"
 #include "server/store/store.h"
-#include "tests/server/store/results.h"
+#include "tests/support/points.h"
+#include "tests/support/temporary_folder.h"
 
 namespace oblique::server {
 namespace {
@@ -30,7 +31,7 @@ TEST(ResultRow, ANumberThatTheDatabaseCannotHoldFailsItsPoint) {
 }
 
 TEST(ResultRow, ARowThatBreaksARuleOfTheTableIsAnErrorAndNotPassedOver) {
-  const TemporaryFolder folder;
+  const test::TemporaryFolder folder;
   const std::string path = folder.file("studies.db");
   { const Store store(path); }
   const DatabaseHandle database = open_database(path, SQLITE_OPEN_READWRITE);

@@ -14,8 +14,8 @@
 #include "server/care/diagnosis.h"
 #include "server/reading/reader.h"
 #include "server/store/store.h"
-#include "tests/server/scheduler/scheduler_bench.h"
-#include "tests/server/store/results.h"
+#include "tests/support/points.h"
+#include "tests/support/temporary_folder.h"
 
 namespace oblique::server {
 namespace {
@@ -80,7 +80,7 @@ class StoreFilesTest : public testing::Test {
     return rows_of(copy);
   }
 
-  TemporaryFolder folder_;
+  test::TemporaryFolder folder_;
   std::string path_ = folder_.file("lab/studies.db");
   std::string other_ = folder_.file("other.db");
   std::shared_ptr<const protocol::PointTable> table_ = table_of(10);

@@ -8,8 +8,8 @@
 #include <gtest/gtest.h>
 
 #include "server/reading/reader.h"
-#include "tests/server/scheduler/scheduler_bench.h"
-#include "tests/server/store/results.h"
+#include "tests/support/points.h"
+#include "tests/support/temporary_folder.h"
 
 namespace oblique::server {
 namespace {
@@ -43,7 +43,7 @@ class StoreTest : public testing::Test {
  protected:
   void commit(Store& store, std::vector<Change> changes) { store.commit(changes); }
 
-  TemporaryFolder folder_;
+  test::TemporaryFolder folder_;
   std::string path_ = folder_.file("studies.db");
 };
 

@@ -7,36 +7,15 @@
 #include <utility>
 
 #include "tests/simulation/world.h"
+#include "tests/support/temporary_folder.h"
 
 namespace oblique::simulation {
 namespace {
 
-/// A folder of this process, removed with it. The store locks its database there; the contents are
-/// elsewhere.
-class Folder {
- public:
-  Folder()
-      : path_((std::filesystem::temp_directory_path() / "oblique-simulation-XXXXXX").string()) {
-    if (::mkdtemp(path_.data()) == nullptr) {
-      throw std::runtime_error("cannot make a folder " + path_);
-    }
-  }
-  ~Folder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-
-  std::string database() const { return path_ + "/database"; }
-
- private:
-  std::string path_;
-};
-
+// The store locks its database there; the contents are elsewhere.
 const std::string& database_path() {
-  static const Folder kFolder;
-  static const std::string kPath = kFolder.database();
+  static const test::TemporaryFolder kFolder;
+  static const std::string kPath = kFolder.file("database");
   return kPath;
 }
 

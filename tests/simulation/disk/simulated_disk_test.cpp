@@ -6,9 +6,9 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/proto/recipe/recipe_builder.h"
 #include "tests/simulation/disk/simulated_files.h"
 #include "tests/simulation/world.h"
+#include "tests/support/recipes.h"
 
 namespace oblique::simulation {
 namespace {

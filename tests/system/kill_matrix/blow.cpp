@@ -14,7 +14,7 @@ constexpr std::chrono::milliseconds kBetweenLooks{5};
 
 }  // namespace
 
-Blow::Blow(const Folder& folder, const KillCase& kill_case)
+Blow::Blow(const TemporaryFolder& folder, const KillCase& kill_case)
     : case_(kill_case),
       folder_(folder.path().string()),
       mark_(folder.file("struck")),
@@ -54,7 +54,7 @@ bool Blow::has_struck() const {
 }
 
 bool Blow::explains(const std::string& program, int exit_code) {
-  if (explained_ || program != case_.program || exit_code != 128 + SIGKILL || !case_.is_killed() ||
+  if (explained_ || program != case_.program || exit_code != -SIGKILL || !case_.is_killed() ||
       !has_struck()) {
     return false;
   }

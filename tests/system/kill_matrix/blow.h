@@ -3,8 +3,8 @@
 #include <string>
 #include <thread>
 
+#include "tests/support/programs.h"
 #include "tests/system/kill_matrix/kill_case.h"
-#include "tests/system/processes.h"
 
 namespace oblique::test {
 
@@ -12,7 +12,7 @@ namespace oblique::test {
 /// it is armed for it, and wakes or ends when it was halted.
 class Blow {
  public:
-  Blow(const Folder& folder, const KillCase& kill_case);
+  Blow(const TemporaryFolder& folder, const KillCase& kill_case);
   Blow(const Blow&) = delete;
   Blow& operator=(const Blow&) = delete;
 

@@ -12,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "tests/support/database.h"
 #include "tests/system/kill_matrix/blow.h"
 #include "tests/system/kill_matrix/companion.h"
 #include "tests/system/kill_matrix/same_rows.h"
@@ -49,15 +50,16 @@ e = [0.8, 1.0]
 
 bool says_end_of_study(const Process& process) {
   const std::string end = std::to_string(KillStudy::kFailing) + " of ";
-  return process.errors().find(end) != std::string::npos &&
-         process.errors().find("points failed") != std::string::npos;
+  return process.err().find(end) != std::string::npos &&
+         process.err().find("points failed") != std::string::npos;
 }
 
 // ---- Server, workers and client, each started apart ---------------------------------------------
 
 class ApartCycle {
  public:
-  ApartCycle(const Folder& folder, const KillStudy& study, const KillCase& kill_case, Blow& blow)
+  ApartCycle(const TemporaryFolder& folder, const KillStudy& study, const KillCase& kill_case,
+             Blow& blow)
       : folder_(folder),
         study_(study),
         case_(kill_case),
@@ -97,7 +99,7 @@ class ApartCycle {
     try {
       server_ = std::make_unique<Server>(folder_, database_, blow_.environment("oblique-server"));
     } catch (const std::runtime_error&) {
-      if (!blow_.explains("oblique-server", 128 + SIGKILL)) {
+      if (!blow_.explains("oblique-server", -SIGKILL)) {
         throw;
       }
       server_ = std::make_unique<Server>(folder_, database_, blow_.bystander());
@@ -132,7 +134,7 @@ class ApartCycle {
 
   void expect_explained(const std::string& program, int code, const Process& process) {
     if (!blow_.explains(program, code)) {
-      fail(program + " ended with exit code " + std::to_string(code) + ":\n" + process.errors());
+      fail(program + " ended with exit code " + std::to_string(code) + ":\n" + process.err());
     }
   }
 
@@ -170,7 +172,7 @@ class ApartCycle {
   void stop(const std::string& program, Process& process) {
     // Until a program has said that it begins a signal may end it as any program.
     wait_until(program + " has begun",
-               [&] { return process.exit_code() || !process.errors().empty(); });
+               [&] { return process.exit_code() || !process.err().empty(); });
     if (!process.exit_code()) {
       process.send(SIGTERM);
     }
@@ -179,7 +181,7 @@ class ApartCycle {
     }
   }
 
-  const Folder& folder_;
+  const TemporaryFolder& folder_;
   const KillStudy& study_;
   const KillCase& case_;
   Blow& blow_;
@@ -193,8 +195,8 @@ class ApartCycle {
 // ---- `oblique run` ------------------------------------------------------------------------------
 
 /// False when the same command is to be given again.
-bool run_once(const Folder& folder, const KillStudy& study, const KillCase& kill_case, Blow& blow,
-              bool first) {
+bool run_once(const TemporaryFolder& folder, const KillStudy& study, const KillCase& kill_case,
+              Blow& blow, bool first) {
   Process run(folder, client_program(),
               {"run", study.file(), "--db", folder.file("matrix.db"), "--workers", "2"},
               first ? blow.environment(kill_case.program) : blow.bystander());
@@ -205,20 +207,20 @@ bool run_once(const Folder& folder, const KillStudy& study, const KillCase& kill
   }
   // It goes on without one of its workers, and says so when it loses its server.
   const bool server_lost = code == 1 && kill_case.program == "oblique-server" &&
-                           run.errors().find("was killed by signal 9") != std::string::npos;
+                           run.err().find("was killed by signal 9") != std::string::npos;
   if (!first || !blow.has_struck() || !(server_lost || blow.explains("oblique", code))) {
-    fail("oblique run ended with exit code " + std::to_string(code) + ":\n" + run.errors());
+    fail("oblique run ended with exit code " + std::to_string(code) + ":\n" + run.err());
   }
   return false;
 }
 
 // ---- The end ------------------------------------------------------------------------------------
 
-void check_database(const Folder& folder, const KillStudy& study) {
+void check_database(const TemporaryFolder& folder, const KillStudy& study) {
   const std::string database = folder.file("matrix.db");
-  const Ran check = run_client(folder, {"check", "--db", database});
+  const Outcome check = run_oblique(folder, {"check", "--db", database});
   if (check.exit_code != 0) {
-    fail("oblique check: " + check.output + check.errors);
+    fail("oblique check: " + check.out + check.err);
   }
   if (Database(database).texts("SELECT state FROM studies") != std::vector<std::string>{"done"}) {
     fail("the study is not done, or not the only one");
@@ -229,7 +231,7 @@ void check_database(const Folder& folder, const KillStudy& study) {
   }
 }
 
-std::string last_words(const Folder& folder) {
+std::string last_words(const TemporaryFolder& folder) {
   std::ostringstream words;
   for (const auto& entry : std::filesystem::directory_iterator(folder.path())) {
     if (entry.path().extension() == ".err") {
@@ -247,7 +249,7 @@ std::string last_words(const Folder& folder) {
 
 KillStudy::KillStudy() {
   std::ofstream(file()) << kStudy;
-  const Folder folder;
+  const TemporaryFolder folder;
   const KillCase nobody;
   Blow blow(folder, nobody);
   ApartCycle(folder, *this, nobody, blow).run();
@@ -255,7 +257,7 @@ KillStudy::KillStudy() {
 }
 
 CycleOutcome run_cycle(const KillStudy& study, const KillCase& kill_case) {
-  const Folder folder;
+  const TemporaryFolder folder;
   CycleOutcome outcome;
   Blow blow(folder, kill_case);
   try {

@@ -3,8 +3,8 @@
 #include <optional>
 #include <string>
 
+#include "tests/support/programs.h"
 #include "tests/system/kill_matrix/kill_case.h"
-#include "tests/system/processes.h"
 
 namespace oblique::test {
 
@@ -20,7 +20,7 @@ class KillStudy {
   static constexpr int kFailing = 2;  ///< points whose step is beyond the limit of stability
 
  private:
-  Folder folder_;
+  TemporaryFolder folder_;
 };
 
 struct CycleOutcome {

@@ -55,7 +55,7 @@ class ComparisonTest : public ::testing::Test {
     return first_difference(changed, study_.undisturbed());
   }
 
-  Folder folder_;
+  TemporaryFolder folder_;
   KillStudy study_;
 };
 

@@ -6,7 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "tests/system/processes.h"
+#include "tests/support/database.h"
+#include "tests/support/programs.h"
 
 namespace oblique::test {
 namespace {

@@ -1,7 +1,7 @@
 #include "tests/system/storms/pretended_worker.h"
 
 #include "proto/frames.h"
-#include "tests/system/processes.h"
+#include "tests/support/programs.h"
 
 namespace oblique::test {
 
@@ -55,10 +55,10 @@ std::optional<protocol::ServerToWorker> PretendedWorker::receive(std::chrono::mi
 }
 
 std::string worker_solver_version() {
-  const Folder folder;
+  const TemporaryFolder folder;
   Process process(folder, worker_program(), {"--version"});
   process.wait();
-  const std::string output = process.output();
+  const std::string output = process.out();
   return output.substr(0, output.find('\n'));
 }
 

@@ -38,7 +38,7 @@ bool vanish_with_points(const std::string& server_url, const std::string& solver
 
 }  // namespace
 
-Storm::Storm(StormKind kind, const Folder& folder, const std::string& server_url,
+Storm::Storm(StormKind kind, const TemporaryFolder& folder, const std::string& server_url,
              const Environment& environment)
     : folder_(folder), server_url_(server_url), environment_(environment) {
   if (kind == StormKind::kCutConnections) {

@@ -5,7 +5,7 @@
 #include <string>
 #include <thread>
 
-#include "tests/system/processes.h"
+#include "tests/support/programs.h"
 #include "tests/system/storms/cutting_proxy.h"
 
 namespace oblique::test {
@@ -22,7 +22,7 @@ class Storm {
  public:
   /// Against the server that awaits workers at `server_url`. `environment` is for the processes
   /// that are started.
-  Storm(StormKind kind, const Folder& folder, const std::string& server_url,
+  Storm(StormKind kind, const TemporaryFolder& folder, const std::string& server_url,
         const Environment& environment = {});
   ~Storm();
   Storm(const Storm&) = delete;
@@ -37,7 +37,7 @@ class Storm {
   void kill_workers(const std::stop_token& stop);
   void let_peers_vanish(const std::stop_token& stop);
 
-  const Folder& folder_;
+  const TemporaryFolder& folder_;
   std::string server_url_;
   Environment environment_;
   std::atomic<int> blows_ = 0;

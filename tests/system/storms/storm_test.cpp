@@ -3,8 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/database.h"
+#include "tests/support/programs.h"
 #include "tests/system/many_points.h"
-#include "tests/system/processes.h"
 #include "tests/system/storms/storm.h"
 
 namespace oblique::test {
@@ -19,8 +20,8 @@ class StormTest : public ::testing::Test {
     std::vector<std::string> arguments{"submit", "--server", server.client_url()};
     const auto points = many_points("many");
     arguments.insert(arguments.end(), points.begin(), points.end());
-    const Ran submitted = run_client(folder_, arguments);
-    EXPECT_EQ(submitted.exit_code, 0) << submitted.errors;
+    const Outcome submitted = run_oblique(folder_, arguments);
+    EXPECT_EQ(submitted.exit_code, 0) << submitted.err;
     if (kind == StormKind::kVanishingPeers) {
       // They had every chance before there was anybody else.
       wait_until("the first peers vanished", [&] { return storm.blows() >= 2; });
@@ -32,13 +33,13 @@ class StormTest : public ::testing::Test {
     EXPECT_EQ(database_.number("SELECT count(*) FROM results WHERE status = 'solved'"),
               kManyPoints);
     EXPECT_EQ(database_.number("SELECT count(*) FROM results WHERE status <> 'solved'"), 0);
-    const Ran workers =
-        run_client(folder_, {"workers", "--server", server.client_url(), "--format", "csv"});
-    EXPECT_NE(workers.output.find(",proven"), std::string::npos) << workers.output;
+    const Outcome workers =
+        run_oblique(folder_, {"workers", "--server", server.client_url(), "--format", "csv"});
+    EXPECT_NE(workers.out.find(",proven"), std::string::npos) << workers.out;
     return storm.blows();
   }
 
-  Folder folder_;
+  TemporaryFolder folder_;
   Database database_{folder_.file("many.db")};
 };
 

@@ -1,37 +1,20 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
-#include <string>
-
-#include <unistd.h>
-
-#include <gtest/gtest.h>
+#include <memory>
 
 #include "proto/recipe/point_table.h"
 #include "proto/result_message.h"
+#include "tests/support/recipes.h"
 
 namespace oblique::server {
 
-/// A folder of its own for each test, removed afterwards.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "oblique-XXXXXX").string();
-    if (mkdtemp(pattern.data()) == nullptr) {
-      throw std::runtime_error("no temporary folder");
-    }
-    path_ = pattern;
-  }
-  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-
-  std::string file(const std::string& name) const { return (path_ / name).string(); }
-
- private:
-  std::filesystem::path path_;
-};
+/// A study of `points` points of one model.
+inline std::shared_ptr<const protocol::PointTable> table_of(std::uint64_t points) {
+  return std::make_shared<const protocol::PointTable>(protocol::recipe_of(
+      {{protocol::listed("H", {1.0}), protocol::range("mu", 0.0, points == 1 ? 0.0 : 1.0, points),
+        protocol::listed("e", {1.0})}}));
+}
 
 /// A solved point with made-up outputs that do not repeat and that no short decimal equals.
 inline protocol::PointResult solved_point(std::uint64_t point) {

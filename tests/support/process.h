@@ -1,0 +1,75 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tests/support/temporary_folder.h"
+
+namespace oblique::test {
+
+/// Waits until `condition` holds. Throws std::runtime_error that names `what` after a time that no
+/// sound run needs.
+void wait_until(const std::string& what, const std::function<bool()>& condition);
+
+/// Whether the process lives; one that ended and is not yet waited for does not.
+bool is_running(pid_t pid);
+
+/// Processes that `pid` started and that still have it as their parent.
+std::vector<pid_t> children_of(pid_t pid);
+
+/// Processes in whose environment the name of this folder stands, whoever their parent is.
+std::vector<pid_t> processes_of(const TemporaryFolder& folder);
+
+/// Variables for a program, beside our own or in place of them.
+using Environment = std::map<std::string, std::string>;
+
+/// What one run of a program gave.
+struct Outcome {
+  int exit_code;    ///< as of Process::wait
+  std::string out;  ///< standard output
+  std::string err;  ///< standard error
+};
+
+/// A program under test, in a process group of its own and with the folder as its current one. It
+/// reads nothing; its output goes to files in the folder.
+class Process {
+ public:
+  /// Starts `program` with `arguments`, without OBLIQUE_SERVER unless `environment` has it.
+  /// `ready_fd`, when not −1, is its descriptor 3. Throws std::runtime_error when it does not
+  /// start.
+  Process(const TemporaryFolder& folder, const std::string& program,
+          const std::vector<std::string>& arguments, const Environment& environment = {},
+          int ready_fd = -1);
+  /// Kills what still runs.
+  ~Process();
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+
+  pid_t pid() const { return pid_; }
+  void send(int signal) const;
+  /// As of wait; nothing while it runs.
+  std::optional<int> exit_code();
+  /// Waits for the end. The exit code, or minus the signal that ended it: a program that ends in
+  /// order because of SIGINT gives 130, one that SIGINT ends gives −2.
+  int wait();
+  /// What it has written so far to standard output and standard error.
+  std::string out() const;
+  std::string err() const;
+  /// Waits for the end.
+  Outcome outcome();
+
+ private:
+  bool reap();
+
+  std::string out_file_;
+  std::string err_file_;
+  pid_t pid_ = -1;
+  std::optional<int> exit_code_;
+};
+
+}  // namespace oblique::test

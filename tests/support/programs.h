@@ -1,0 +1,57 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tests/support/process.h"
+#include "tests/support/reserved_port.h"
+
+namespace oblique::test {
+
+// Where our programs are.
+std::string client_program();
+std::string server_program();
+std::string worker_program();
+
+/// Runs `oblique` with `arguments` to its end in `folder`, or in one of its own.
+Outcome run_oblique(const TemporaryFolder& folder, const std::vector<std::string>& arguments);
+Outcome run_oblique(const std::vector<std::string>& arguments);
+
+/// An `oblique-server` on loopback that is ready when constructed.
+class Server {
+ public:
+  /// At ports that the system picks, and gives nobody else while this or a successor lives.
+  Server(const TemporaryFolder& folder, const std::string& database,
+         const Environment& environment = {});
+  /// At the same ports as one that has ended.
+  Server(const TemporaryFolder& folder, const std::string& database, const Server& before,
+         const Environment& environment = {});
+
+  const std::string& worker_url() const { return worker_url_; }
+  const std::string& client_url() const { return client_url_; }
+  Process& process() { return *process_; }
+
+ private:
+  struct Ports {
+    ReservedPort worker;
+    ReservedPort client;
+  };
+  void start(const TemporaryFolder& folder, const std::string& database,
+             const Environment& environment);
+
+  std::shared_ptr<const Ports> ports_;
+  std::string worker_url_;
+  std::string client_url_;
+  std::optional<Process> process_;
+};
+
+/// An `oblique-worker` of `server`.
+class Worker : public Process {
+ public:
+  Worker(const TemporaryFolder& folder, const std::string& server_url,
+         const std::vector<std::string>& arguments = {}, const Environment& environment = {});
+};
+
+}  // namespace oblique::test
