@@ -9,18 +9,18 @@
 #include <string_view>
 
 #include <fcntl.h>
-#include <sys/prctl.h>
 #include <sys/resource.h>
-#include <sys/signalfd.h>
 #include <unistd.h>
-#include <csignal>
 
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "proto/frames.h"
+#include "proto/program/exit_code.h"
 #include "proto/program/log.h"
+#include "proto/program/parent.h"
+#include "proto/program/stop_signals.h"
 #include "proto/program/usage.h"
 #include "proto/text.h"
 #include "server/loop.h"
@@ -29,38 +29,9 @@
 
 namespace {
 
+using oblique::protocol::StopWithParent;
 using oblique::server::Loop;
 using oblique::server::LoopSettings;
-
-constexpr int kFailed = 1;
-
-/// SIGINT and SIGTERM as a readable file descriptor. Must run before any thread starts, so that all
-/// inherit the mask.
-int stop_signals() {
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGINT);
-  sigaddset(&signals, SIGTERM);
-  if (pthread_sigmask(SIG_BLOCK, &signals, nullptr) != 0) {
-    throw std::runtime_error("cannot block signals");
-  }
-  const int fd = signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK);
-  if (fd < 0) {
-    throw std::runtime_error(std::string("cannot watch for signals: ") + std::strerror(errno));
-  }
-  return fd;
-}
-
-/// Asks the system for SIGTERM when the parent ends; a parent that ended before is noticed too.
-void stop_with_parent(pid_t parent) {
-  if (prctl(PR_SET_PDEATHSIG, SIGTERM) != 0) {
-    throw std::runtime_error(std::string("cannot watch the parent process: ") +
-                             std::strerror(errno));
-  }
-  if (getppid() != parent) {
-    throw std::runtime_error("the parent process has ended");
-  }
-}
 
 /// A connection takes a descriptor, and systems give few to begin with.
 void take_all_descriptors() {
@@ -93,10 +64,13 @@ void tell_ready(int fd, const Loop& loop) {
   ::close(fd);
 }
 
-int run(const LoopSettings& settings, int ready_fd) {
-  const int stop_fd = stop_signals();
-  // A file that may not grow further is a full disk, and no reason to die.
-  std::signal(SIGXFSZ, SIG_IGN);
+int run(const LoopSettings& settings, int ready_fd, const StopWithParent& parent) {
+  const oblique::protocol::StopSignals stop;  // before any thread starts
+  oblique::protocol::survive_failed_writes();
+  if (!parent.begin()) {
+    spdlog::warn("the parent process was gone before this one began");
+    return oblique::protocol::kDone;
+  }
   take_all_descriptors();
   Loop loop(settings);
   spdlog::info("database {}, clients at {}, workers at {}", settings.database,
@@ -104,8 +78,9 @@ int run(const LoopSettings& settings, int ready_fd) {
   if (ready_fd >= 0) {
     tell_ready(ready_fd, loop);
   }
-  const auto end = loop.run(stop_fd);
-  return end.lost_writes == 0 && !end.lost_database ? 0 : kFailed;
+  const auto end = loop.run(stop.descriptor());
+  return end.lost_writes == 0 && !end.lost_database ? oblique::protocol::kDone
+                                                    : oblique::protocol::kFailed;
 }
 
 }  // namespace
@@ -114,7 +89,7 @@ int main(int argc, char** argv) {
   if (argc == 3 && std::string_view(argv[1]) == oblique::server::kReadMode) {
     return oblique::server::run_reader_program(argv[2]);
   }
-  const pid_t parent = getppid();
+  StopWithParent parent;
   oblique::protocol::silence_protobuf();
   oblique::protocol::set_up_log("oblique-server");
 
@@ -123,7 +98,6 @@ int main(int argc, char** argv) {
   std::uint16_t worker_port = 7601;
   std::uint16_t client_port = 7600;
   int ready_fd = -1;
-  bool with_parent = false;
   bool quiet = false;
   CLI::App app{
       "Hands out the points of studies to workers and keeps the results.\n"
@@ -141,7 +115,7 @@ int main(int argc, char** argv) {
                  "File descriptor that gets one line of JSON with both endpoints once the server "
                  "can be used; -1: none")
       ->check(objection_to_descriptor);
-  app.add_flag("--stop-with-parent", with_parent, "Stop when the process that started this ends");
+  parent.add_to(app);
   app.add_flag("--quiet", quiet, "Log warnings and errors only");
   if (const auto exit_code = oblique::protocol::parse_command_line(app, argc, argv)) {
     return *exit_code;
@@ -162,12 +136,9 @@ int main(int argc, char** argv) {
   settings.client_port = client_port == 0 ? "*" : std::to_string(client_port);
   settings.service.solver_version = oblique::solver::solver_version();
   try {
-    if (with_parent) {
-      stop_with_parent(parent);
-    }
-    return run(settings, ready_fd);
+    return run(settings, ready_fd, parent);
   } catch (const std::exception& error) {
     std::cerr << "oblique-server: " << oblique::protocol::visible_lines(error.what()) << '\n';
-    return kFailed;
+    return oblique::protocol::kFailed;
   }
 }

@@ -10,7 +10,7 @@
 
 #include <sys/eventfd.h>
 
-#include "server/network/descriptor.h"
+#include "proto/descriptor.h"
 #include "server/queries/query_pool.h"
 #include "server/service/request_reader.h"
 #include "server/store/writer.h"
@@ -52,7 +52,7 @@ class ReportBox {
   int descriptor() const { return woken_.number(); }
 
  private:
-  Descriptor woken_;
+  protocol::Descriptor woken_;
   std::mutex mutex_;
   std::deque<Item> items_;  // guarded by mutex_
 };

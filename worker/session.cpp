@@ -1,12 +1,9 @@
 #include "worker/session.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <iomanip>
-#include <limits>
 #include <random>
 #include <sstream>
 #include <string_view>
@@ -14,7 +11,6 @@
 
 #include <spdlog/spdlog.h>
 
-#include "proto/address.h"
 #include "proto/frames.h"
 #include "proto/socket/socket.h"
 #include "worker/solver/solve.h"
@@ -22,9 +18,7 @@
 namespace oblique::worker {
 namespace {
 
-constexpr int kLinger_ms = 500;  ///< for the goodbye to leave
-constexpr int kQueuedMessages = 1000;
-constexpr std::int64_t kParentCheckInterval_ms = 200;
+constexpr int kLinger_ms = 500;         ///< for the goodbye to leave
 constexpr int kMessagesAtATime = 1000;  ///< then other duties get their turn
 
 std::int64_t now_ms() {
@@ -66,7 +60,6 @@ Overloaded(Handlers...) -> Overloaded<Handlers...>;
 
 Session::Session(SessionSettings settings, BatchSolver::SolvePoints solve)
     : settings_(std::move(settings)),
-      parent_(getppid()),
       conversation_(hello_of(settings_), settings_.conversation),
       solver_(
           std::move(solve), [this] { batch_ended_.wake(); }, settings_.threads) {}
@@ -74,23 +67,15 @@ Session::Session(SessionSettings settings, BatchSolver::SolvePoints solve)
 Session::~Session() = default;
 
 void Session::open_socket() {
+  const protocol::DealerSettings settings{
+      .url = settings_.server,
+      .example_url = SessionSettings().server,
+      .linger_ms = kLinger_ms,
+      .shortest_pause_ms = static_cast<int>(settings_.conversation.shortest_backoff_ms),
+      .longest_pause_ms = static_cast<int>(settings_.conversation.longest_backoff_ms)};
   socket_.reset();
-  socket_.emplace(context_, zmq::socket_type::dealer);
-  const ConversationSettings& conversation = settings_.conversation;
-  protocol::prepare_dealer(*socket_, kLinger_ms, static_cast<int>(conversation.shortest_backoff_ms),
-                           static_cast<int>(conversation.longest_backoff_ms));
-  socket_->set(zmq::sockopt::sndhwm, kQueuedMessages);
-  socket_->set(zmq::sockopt::rcvhwm, kQueuedMessages);
-  if (const auto objection = protocol::objection_to_address(settings_.server); !objection.empty()) {
-    throw AddressError("server = \"" + settings_.server + "\" is not an address: " + objection +
-                       ", as in " + SessionSettings().server);
-  }
-  try {
-    socket_->connect(settings_.server);
-  } catch (const zmq::error_t& error) {
-    throw AddressError("server = \"" + settings_.server + "\" is not an address (" + error.what() +
-                       "): it must be as tcp://HOST:PORT");
-  }
+  socket_ = protocol::made_dealer(context_, settings);
+  protocol::connect(*socket_, settings);
 }
 
 int Session::run(int stop_descriptor, const std::function<void()>& on_stop) {
@@ -117,7 +102,6 @@ int Session::run(int stop_descriptor, const std::function<void()>& on_stop) {
       report_progress();
       apply(conversation_.stop(now_ms()));
     }
-    stop_with_parent();
     apply(conversation_.on_time(now_ms()));
     solver_.set_paused(!conversation_.may_solve());
   }
@@ -127,29 +111,13 @@ int Session::run(int stop_descriptor, const std::function<void()>& on_stop) {
 }
 
 std::int64_t Session::poll_timeout_ms() const {
-  std::int64_t due_ms = std::min(conversation_.next_deadline_ms(), report_due_ms_);
-  if (settings_.stop_with_parent) {
-    due_ms = std::min(due_ms, parent_check_due_ms_);
-  }
-  return std::max<std::int64_t>(due_ms - now_ms(), 0);
+  return std::max<std::int64_t>(
+      std::min(conversation_.next_deadline_ms(), report_due_ms_) - now_ms(), 0);
 }
 
 void Session::report_progress() {
   apply(conversation_.on_progress(solver_.collect(), now_ms()));
   report_due_ms_ = now_ms() + settings_.report_interval_ms;
-}
-
-void Session::stop_with_parent() {
-  if (!settings_.stop_with_parent || now_ms() < parent_check_due_ms_) {
-    return;
-  }
-  parent_check_due_ms_ = now_ms() + kParentCheckInterval_ms;
-  if (getppid() != parent_) {
-    spdlog::warn("the parent process is gone");
-    parent_check_due_ms_ = std::numeric_limits<std::int64_t>::max();
-    report_progress();
-    apply(conversation_.stop(now_ms()));
-  }
 }
 
 void Session::receive_all() {

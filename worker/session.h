@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
-#include <stdexcept>
 #include <string>
 
 #include <zmq.hpp>
@@ -20,16 +19,9 @@ struct SessionSettings {
   std::string server = "tcp://127.0.0.1:7601";  ///< where the server awaits workers
   std::string name;                             ///< for people
   std::size_t threads = 1;                      ///< that solve points
-  bool stop_with_parent = false;                ///< stop when the parent process is gone
   std::size_t models_kept = 8;                  ///< falls kept
   std::int64_t report_interval_ms = 100;        ///< solved points wait at most so long
   ConversationSettings conversation;
-};
-
-/// An address that no socket could connect to.
-class AddressError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
 };
 
 /// Runs a worker: the socket and the heartbeats on the calling thread, solving on another.
@@ -41,9 +33,9 @@ class Session {
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
-  /// Runs until the worker is stopped, refused or its parent is gone, and returns the exit code.
+  /// Runs until the worker is stopped or refused, and returns the exit code.
   /// Stops when `stop_descriptor` is readable; reading it is left to `on_stop`, so that a second
-  /// request can be told from the first. Throws AddressError unless `settings.server` is an
+  /// request can be told from the first. Throws solver::InputError unless `settings.server` is an
   /// address.
   int run(int stop_descriptor, const std::function<void()>& on_stop);
 
@@ -57,18 +49,15 @@ class Session {
   bool send(const protocol::WorkerMessage& message);
   void receive_all();
   void report_progress();
-  void stop_with_parent();
   std::int64_t poll_timeout_ms() const;
 
   const SessionSettings settings_;
-  const int parent_;
   zmq::context_t context_;
   std::optional<zmq::socket_t> socket_;
   WakeUp batch_ended_;
   Conversation conversation_;
   std::optional<int> exit_code_;
   std::int64_t report_due_ms_ = 0;
-  std::int64_t parent_check_due_ms_ = 0;
   BatchSolver solver_;  // last: its thread uses the ones above
 };
 

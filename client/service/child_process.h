@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "proto/descriptor.h"
+
 namespace oblique::client {
 
 /// A process could not be started, or ended when it was needed.
@@ -16,21 +18,7 @@ class ProcessError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// A file descriptor that closes itself.
-class Descriptor {
- public:
-  Descriptor() = default;
-  explicit Descriptor(int number) : number_(number) {}
-  ~Descriptor() { close(); }
-  Descriptor(Descriptor&& other) noexcept;
-  Descriptor& operator=(Descriptor&& other) noexcept;
-
-  int number() const { return number_; }
-  void close();
-
- private:
-  int number_ = -1;
-};
+using protocol::Descriptor;
 
 /// Both ends of a pipe, closed in children unless handed to them.
 struct Pipe {

@@ -4,7 +4,6 @@
 #include <array>
 #include <utility>
 
-#include "proto/address.h"
 #include "proto/frames.h"
 #include "proto/socket/socket.h"
 #include "worker/solver/model/errors.h"
@@ -20,6 +19,18 @@ std::string seconds_of(std::chrono::milliseconds time) {
   return solver::exact_number(static_cast<double>(time.count()) / 1000.0) + " s";
 }
 
+/// A request that was not sent yet must not hold up the end of the program. Nothing is queued for a
+/// server that is not there, which would get every copy when it is back. The embedded service may
+/// be connected to before it listens: attempts follow each other closely.
+protocol::DealerSettings dealer_settings(const ConnectionSettings& settings) {
+  return {.url = settings.server_url,
+          .example_url = ConnectionSettings().server_url,
+          .linger_ms = 0,
+          .shortest_pause_ms = 20,
+          .longest_pause_ms = 1000,
+          .queues_unconnected = false};
+}
+
 /// Where the page begins that follows the one after `asked`; 0: there is none. A page that does not
 /// come later than the one before would never end.
 std::uint64_t next_page(std::uint64_t asked, std::uint64_t told) {
@@ -31,28 +42,9 @@ std::uint64_t next_page(std::uint64_t asked, std::uint64_t told) {
 Connection::Connection(ConnectionSettings settings, KeepWaiting keep_waiting)
     : settings_(std::move(settings)),
       keep_waiting_(std::move(keep_waiting)),
-      socket_(context_, zmq::socket_type::dealer),
+      socket_(protocol::made_dealer(context_, dealer_settings(settings_))),
       monitor_(context_, socket_) {
-  // Nothing is queued for a server that is not there, which would get every copy when it is back.
-  socket_.set(zmq::sockopt::immediate, true);
-  // A request that was not sent yet must not hold up the end of the program; the embedded service
-  // may be connected to before it listens.
-  constexpr int kLinger_ms = 0;
-  constexpr int kShortestPause_ms = 20;
-  constexpr int kLongestPause_ms = 1000;
-  protocol::prepare_dealer(socket_, kLinger_ms, kShortestPause_ms, kLongestPause_ms);
-  if (const auto objection = protocol::objection_to_address(settings_.server_url);
-      !objection.empty()) {
-    throw solver::InputError("server = \"" + settings_.server_url + "\" is not an address: " +
-                             objection + ", as in " + ConnectionSettings().server_url);
-  }
-  try {
-    socket_.connect(settings_.server_url);
-  } catch (const zmq::error_t&) {
-    throw solver::InputError("server = \"" + settings_.server_url +
-                             "\" is not an address: write tcp://HOST:PORT, as " +
-                             ConnectionSettings().server_url);
-  }
+  protocol::connect(socket_, dealer_settings(settings_));
 }
 
 bool Connection::is_due(const Outstanding& outstanding) {

@@ -34,7 +34,8 @@ ChildSettings server_settings(const ServiceSettings& settings, int ready) {
   ChildSettings child{
       .program = sibling_program("oblique-server"),
       .arguments = {"--db", settings.database.string(), "--worker-port", "0", "--client-port", "0",
-                    "--ready-fd", std::to_string(ChildProcess::kHandedOver), "--stop-with-parent"},
+                    "--ready-fd", std::to_string(ChildProcess::kHandedOver), "--stop-with-parent",
+                    std::to_string(getpid())},
       .show_errors = settings.verbose,
       .handed_over = ready};
   if (settings.allow_network_disk) {
@@ -61,7 +62,8 @@ void end_all(const std::vector<ChildProcess*>& children) {
 }
 
 // The line that the server writes once it listens; empty when it closes the pipe without one.
-std::string read_ready_line(const Descriptor& ready, ChildProcess& server, StopSignal& stop) {
+std::string read_ready_line(const Descriptor& ready, ChildProcess& server,
+                            protocol::StopSignals& stop) {
   std::string line;
   const auto deadline = Clock::now() + kReadyWithin;
   while (line.find('\n') == std::string::npos) {
@@ -97,7 +99,7 @@ unsigned threads_each(int workers) {
 
 }  // namespace
 
-EmbeddedService::EmbeddedService(const ServiceSettings& settings, StopSignal& stop) {
+EmbeddedService::EmbeddedService(const ServiceSettings& settings, protocol::StopSignals& stop) {
   const auto worker_program = sibling_program("oblique-worker");
   Pipe ready;
   server_ = std::make_unique<ChildProcess>(server_settings(settings, ready.write.number()));
@@ -117,7 +119,7 @@ EmbeddedService::~EmbeddedService() {
   stop();
 }
 
-void EmbeddedService::wait_until_ready(const Descriptor& ready, StopSignal& stop) {
+void EmbeddedService::wait_until_ready(const Descriptor& ready, protocol::StopSignals& stop) {
   const auto line = read_ready_line(ready, *server_, stop);
   const auto urls = nlohmann::json::parse(line, nullptr, false);
   if (urls.is_object() && urls.contains("client") && urls.contains("worker") &&

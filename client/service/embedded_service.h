@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "client/service/child_process.h"
-#include "client/service/stop_signal.h"
+#include "proto/program/stop_signals.h"
 
 namespace oblique::client {
 
@@ -25,7 +25,7 @@ class EmbeddedService {
  public:
   /// Waits until the server listens, then starts the workers. Throws ProcessError with the last
   /// words of what failed, Interrupted when `stop` is requested meanwhile.
-  EmbeddedService(const ServiceSettings& settings, StopSignal& stop);
+  EmbeddedService(const ServiceSettings& settings, protocol::StopSignals& stop);
   ~EmbeddedService();
   EmbeddedService(const EmbeddedService&) = delete;
   EmbeddedService& operator=(const EmbeddedService&) = delete;
@@ -44,7 +44,7 @@ class EmbeddedService {
   void stop();
 
  private:
-  void wait_until_ready(const Descriptor& ready, StopSignal& stop);
+  void wait_until_ready(const Descriptor& ready, protocol::StopSignals& stop);
 
   std::unique_ptr<ChildProcess> server_;
   std::vector<std::unique_ptr<ChildProcess>> workers_;

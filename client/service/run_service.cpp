@@ -53,7 +53,7 @@ void tell_of_log(const std::filesystem::path& database) {
 }
 
 RunEnd submit_and_wait(const Study& study, const RunSettings& settings, EmbeddedService& service,
-                       StopSignal& stop) {
+                       protocol::StopSignals& stop) {
   const auto look_after = [&] {
     service.check();
     if (const auto news = service.news(); !news.empty()) {
@@ -114,7 +114,8 @@ void add_worker_flags(CLI::App& verb, RunSettings& settings) {
   verb.add_flag("--verbose", settings.service.verbose, "show what server and workers say");
 }
 
-std::optional<RunEnd> run_study(const Study& study, const RunSettings& settings, StopSignal& stop) {
+std::optional<RunEnd> run_study(const Study& study, const RunSettings& settings,
+                                protocol::StopSignals& stop) {
   check_settings(settings);
   try {
     EmbeddedService service(settings.service, stop);

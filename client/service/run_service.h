@@ -8,9 +8,9 @@
 #include "client/service/connection.h"
 #include "client/service/embedded_service.h"
 #include "client/service/source.h"
-#include "client/service/stop_signal.h"
 #include "client/study/study.h"
 #include "proto/oblique.pb.h"
+#include "proto/program/stop_signals.h"
 
 namespace oblique::client {
 
@@ -38,6 +38,7 @@ struct RunEnd {
 /// Starts server and workers here, submits the study, shows its progress and waits for its end;
 /// nothing is left running. Nothing when `stop` is requested; what to do next is told then. Throws
 /// ProcessError when server or workers end too soon, ServerError when the study is refused.
-std::optional<RunEnd> run_study(const Study& study, const RunSettings& settings, StopSignal& stop);
+std::optional<RunEnd> run_study(const Study& study, const RunSettings& settings,
+                                protocol::StopSignals& stop);
 
 }  // namespace oblique::client

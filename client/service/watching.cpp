@@ -43,7 +43,7 @@ void tell_line(const std::string& sentence) {
   std::cerr << protocol::visible(sentence) << '\n';
 }
 
-protocol::StudyStatus watch_study(const AskStatus& ask, StopSignal& stop) {
+protocol::StudyStatus watch_study(const AskStatus& ask, protocol::StopSignals& stop) {
   Progress progress(std::cerr, isatty(STDERR_FILENO) == 1);
   const Tell tell = [&progress](const std::string& sentence) {
     progress.finish();

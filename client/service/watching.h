@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "client/service/source.h"
-#include "client/service/stop_signal.h"
 #include "proto/oblique.pb.h"
+#include "proto/program/stop_signals.h"
 
 namespace oblique::client {
 
@@ -16,7 +16,7 @@ using AskStatus = std::function<protocol::StudyStatus(const Tell& tell)>;
 /// Asks where one study is, over and over, and shows it on standard error, with what it waits for,
 /// until it no longer runs or `stop` is requested. Asks often at first, then ever less. Throws what
 /// `ask` throws. Returns the last status.
-protocol::StudyStatus watch_study(const AskStatus& ask, StopSignal& stop);
+protocol::StudyStatus watch_study(const AskStatus& ask, protocol::StopSignals& stop);
 
 /// Writes one line to standard error, whatever is in it.
 void tell_line(const std::string& sentence);

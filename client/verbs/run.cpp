@@ -9,10 +9,10 @@
 #include "client/service/connection.h"
 #include "client/service/embedded_service.h"
 #include "client/service/run_service.h"
-#include "client/service/stop_signal.h"
 #include "client/study/study_flags.h"
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
+#include "proto/program/stop_signals.h"
 #include "proto/program/usage.h"
 
 namespace oblique::client {
@@ -49,8 +49,8 @@ int run(const RunFlags& flags) {
   const auto study = study_of_flags(flags.study, tip_reach());
   check_settings(flags.settings);
   tell_mesh(std::cerr, study.recipe);
-  // Before any thread is started; see StopSignal.
-  StopSignal stop;
+  // Before any thread is started; see StopSignals.
+  protocol::StopSignals stop;
   const auto end = run_study(study, flags.settings, stop);
   if (!end) {
     return stop.exit_code();

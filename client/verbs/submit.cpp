@@ -37,7 +37,7 @@ void tell_submitted(const Study& study, const protocol::SubmitReply& reply) {
             << (reply.created() ? "" : "; the server had it already") << std::endl;
 }
 
-int watch(const Study& study, Connection& connection, StopSignal& stop) {
+int watch(const Study& study, Connection& connection, protocol::StopSignals& stop) {
   const auto ask = [&](const Tell& tell) {
     const auto status = connection.status(study.name, tell);
     if (status.studies_size() != 1) {
@@ -66,7 +66,7 @@ void check(const StudyTerms& terms) {
 int submit(const SubmitFlags& flags) {
   check(flags.terms);
   const auto study = study_of_flags(flags.study, tip_reach());
-  StopSignal stop;
+  protocol::StopSignals stop;
   Connection connection(connection_settings(flags.source), [&stop] { return !stop.requested(); });
   bool submitted = false;
   try {

@@ -23,7 +23,7 @@ struct WatchFlags {
 };
 
 int watch(const WatchFlags& flags) {
-  StopSignal stop;
+  protocol::StopSignals stop;
   const auto source = open_source(flags.source, [&stop] { return !stop.requested(); });
   bool answered = false;
   const auto ask = [&](const Tell& tell) {

@@ -2,27 +2,26 @@
 
 #include <string>
 
-namespace zmq {
-class socket_t;
-}
+#include <zmq.hpp>
 
 namespace oblique::protocol {
 
-/// How a connection whose other end is gone without a word is found: by TCP, not by ZeroMQ's own
-/// heartbeats, for libzmq 4.3.4 ends its process when these fire for a connection that is read no
-/// more and whose peer has gone (`Assertion failed: !_io_error`).
-struct KeepAlive {
-  int idle_s = 10;     ///< silence before the first probe
-  int interval_s = 5;  ///< between probes
-  int probes = 3;      ///< unanswered, that end the connection
-  int unacknowledged_ms =
-      20'000;  ///< what was sent and is not acknowledged for so long ends it too
+/// What differs between the sockets of workers and clients.
+struct DealerSettings {
+  std::string url;             ///< as tcp://127.0.0.1:7600
+  std::string example_url;     ///< what an address looks like, for messages
+  int linger_ms = 0;           ///< what is not sent yet is still sent for so long after closing
+  int shortest_pause_ms = 20;  ///< between attempts to connect
+  int longest_pause_ms = 1000;
+  bool queues_unconnected = true;  ///< takes messages while there is no connection
 };
 
-/// Sets on a DEALER socket, before it connects, what those of workers and clients have in common:
-/// the largest frame, keepalive, and how long it pauses between attempts to connect.
-/// @param linger_ms  what is not sent yet is still sent for so long after closing
-void prepare_dealer(zmq::socket_t& socket, int linger_ms, int shortest_pause_ms,
-                    int longest_pause_ms);
+/// A DEALER socket with the options that all our sockets have (limits.h, the largest frame), which
+/// does not connect yet. Throws solver::InputError for a `url` that is no address.
+zmq::socket_t made_dealer(zmq::context_t& context, const DealerSettings& settings);
+
+/// Lets it connect, in the background, and again whenever a connection ends. Throws
+/// solver::InputError as above.
+void connect(zmq::socket_t& socket, const DealerSettings& settings);
 
 }  // namespace oblique::protocol

@@ -10,7 +10,7 @@
 #include <cerrno>
 #include <utility>
 
-#include "proto/socket/socket.h"
+#include "proto/socket/limits.h"
 
 namespace oblique::server {
 namespace {
@@ -28,7 +28,7 @@ bool would_block() {
 
 }  // namespace
 
-Connection::Connection(Descriptor socket) : socket_(std::move(socket)) {
+Connection::Connection(protocol::Descriptor socket) : socket_(std::move(socket)) {
   constexpr protocol::KeepAlive kKeepAlive;
   const int fd = socket_.number();
   set(fd, IPPROTO_TCP, TCP_NODELAY, 1);

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "server/network/descriptor.h"
+#include "proto/descriptor.h"
 #include "server/network/zmtp.h"
 
 namespace oblique::server {
@@ -15,7 +15,7 @@ namespace oblique::server {
 class Connection {
  public:
   /// Takes over a non-blocking TCP socket.
-  explicit Connection(Descriptor socket);
+  explicit Connection(protocol::Descriptor socket);
 
   /// Sends the server's greeting.
   void greet() { send_answers(); }
@@ -46,7 +46,7 @@ class Connection {
   void send_answers();
   void sending_failed();
 
-  Descriptor socket_;
+  protocol::Descriptor socket_;
   bool can_send_ = true;
   Zmtp zmtp_;
   std::string out_;

@@ -9,10 +9,10 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "proto/socket/limits.h"
+
 namespace oblique::server {
 namespace {
-
-constexpr int kBacklog = 1024;
 
 /// An address of either family, as the system takes it.
 struct SocketAddress {
@@ -55,14 +55,14 @@ std::string endpoint_of(const std::string& address, const std::string& port) {
 Listener::Listener(const std::string& address, const std::string& port) {
   SocketAddress where = address_of(
       address, port == "*" ? std::uint16_t{0} : static_cast<std::uint16_t>(std::stoi(port)));
-  socket_ =
-      Descriptor(::socket(where.family(), SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, IPPROTO_TCP));
+  socket_ = protocol::Descriptor(
+      ::socket(where.family(), SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, IPPROTO_TCP));
   const int yes = 1;
   const bool listens =
       socket_.is_open() &&
       setsockopt(socket_.number(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes) == 0 &&
       bind(socket_.number(), where.any(), where.bytes) == 0 &&
-      listen(socket_.number(), kBacklog) == 0 &&
+      listen(socket_.number(), protocol::kWaitingConnections) == 0 &&
       getsockname(socket_.number(), where.any(), &where.bytes) == 0;
   if (!listens) {
     const int error = errno;
@@ -73,8 +73,9 @@ Listener::Listener(const std::string& address, const std::string& port) {
   endpoint_ = endpoint_of(address, std::to_string(where.port()));
 }
 
-Descriptor Listener::accept() const {
-  return Descriptor(::accept4(socket_.number(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+protocol::Descriptor Listener::accept() const {
+  return protocol::Descriptor(
+      ::accept4(socket_.number(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
 }
 
 }  // namespace oblique::server

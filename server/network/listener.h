@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "server/network/descriptor.h"
+#include "proto/descriptor.h"
 
 namespace oblique::server {
 
@@ -19,10 +19,10 @@ class Listener {
 
   /// The next connection, non-blocking; none when none waits or the system gives none. Then `errno`
   /// says which.
-  Descriptor accept() const;
+  protocol::Descriptor accept() const;
 
  private:
-  Descriptor socket_;
+  protocol::Descriptor socket_;
   std::string endpoint_;
 };
 

@@ -78,7 +78,7 @@ void Network::collect(std::int64_t now_ms) {
 void Network::accept_all(Port port, std::int64_t now_ms) {
   constexpr int kMostAtATime = 64;
   for (int i = 0; i < kMostAtATime; ++i) {
-    Descriptor socket = listeners_[port]->accept();
+    protocol::Descriptor socket = listeners_[port]->accept();
     if (!socket.is_open()) {
       if (errno == EMFILE || errno == ENFILE) {
         make_room(now_ms);

@@ -88,7 +88,7 @@ class Network {
  private:
   using Number = std::uint64_t;
   struct Peer {
-    explicit Peer(Descriptor socket) : connection(std::move(socket)) {}
+    explicit Peer(protocol::Descriptor socket) : connection(std::move(socket)) {}
     Connection connection;
     Port port = 0;
     std::int64_t since_ms = 0;
@@ -115,7 +115,7 @@ class Network {
   Peer* find(const std::string& identity) const;
 
   NetworkLimits limits_;
-  Descriptor epoll_;
+  protocol::Descriptor epoll_;
   std::vector<std::unique_ptr<Listener>> listeners_;
   std::vector<std::deque<Number>> lines_;  // by port: peers with a message, in turn
   Peers peers_;

@@ -209,7 +209,7 @@ TEST(SessionTest, AnAddressThatIsNoneIsAnErrorThatNamesIt) {
     try {
       session.run(stop.descriptor(), [] {});
       FAIL() << "connected to \"" << address << '"';
-    } catch (const AddressError& error) {
+    } catch (const solver::InputError& error) {
       EXPECT_NE(std::string(error.what()).find('"' + address + '"'), std::string::npos);
     }
   }

@@ -4,7 +4,7 @@
 
 #include <unistd.h>
 
-namespace oblique::server {
+namespace oblique::protocol {
 
 /// A file descriptor that is closed with its owner; -1 is none.
 class Descriptor {
@@ -31,4 +31,4 @@ class Descriptor {
   int number_ = -1;
 };
 
-}  // namespace oblique::server
+}  // namespace oblique::protocol
