@@ -29,7 +29,8 @@ void StopWithParent::add_to(CLI::App& app) {
                            "before this one began")
                 ->expected(0, 1)
                 ->check(objection_to_process)
-                ->type_name("[PID]");
+                ->type_name("[PID]")
+                ->default_str("");  // none: the option may stand alone
 }
 
 bool StopWithParent::begin() const {

@@ -42,7 +42,7 @@ void connect(zmq::socket_t& socket, const DealerSettings& settings) {
   try {
     socket.connect(settings.url);
   } catch (const zmq::error_t& error) {
-    refuse(settings, error.what());
+    refuse(settings, std::string(error.what()) + ": write tcp://HOST:PORT");
   }
 }
 

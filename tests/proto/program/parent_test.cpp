@@ -21,6 +21,7 @@ int began(std::vector<std::string> words) {
   if (child == 0) {
     StopWithParent parent;
     CLI::App app;
+    app.option_defaults()->always_capture_default();
     parent.add_to(app);
     try {
       app.parse(std::move(words));
