@@ -217,10 +217,17 @@ void Scheduler::on(const WorkerLeft& event) {
 }
 
 void Scheduler::on(const WorkerUnreachable& event) {
-  if (workers_.contains(event.worker)) {
-    remove_worker(event.worker, WorkerEnd::kLost);
-    effects_.emplace_back(DropWorker{event.worker, event.reason});
+  const auto found = workers_.find(event.worker);
+  if (found == workers_.end()) {
+    return;
   }
+  for (const LeaseId lease : event.unsent) {
+    if (found->second.leases.contains(lease)) {
+      end_lease(lease, std::nullopt);
+    }
+  }
+  remove_worker(event.worker, WorkerEnd::kLost);
+  effects_.emplace_back(DropWorker{event.worker, event.reason});
 }
 
 void Scheduler::on(const Tick&) {

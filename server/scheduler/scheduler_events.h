@@ -140,6 +140,7 @@ struct WorkerLeft {
 struct WorkerUnreachable {
   WorkerId worker;
   std::string reason = "its connection is gone";
+  std::vector<LeaseId> unsent{};  ///< whose batches could not go out: they say nothing of points
 };
 /// While so much waits to go out to the worker, it gets nothing more. No sign of life.
 struct WorkerBusy {

@@ -283,7 +283,11 @@ void WorkersDesk::tick(const Silence& silent_ms, Instant now) {
 }
 
 std::vector<Event> WorkersDesk::take_found() {
-  return std::exchange(found_, {});
+  std::vector<Event> found = std::exchange(found_, {});
+  for (auto& [id, gone] : std::exchange(gone_, {})) {
+    found.emplace_back(std::move(gone));
+  }
+  return found;
 }
 
 const WorkerRecord* WorkersDesk::find(WorkerId worker) const {

@@ -96,7 +96,8 @@ class WorkersDesk {
   void give_up(WorkerId worker, const std::string& why, Heard& heard);
   void tell_of_version(WorkerId worker, Instant now);
   void forget(WorkerId worker);
-  void send(WorkerId worker, const protocol::ServerToWorker& message);
+  /// `lease`: of the batch that the message is; 0: it is none.
+  void send(WorkerId worker, const protocol::ServerToWorker& message, LeaseId lease = 0);
   void note_delivery(WorkerId worker, WorkerRecord& record, Delivery delivery);
   void note(Severity severity, const std::string& text, Instant now);
 
@@ -107,7 +108,8 @@ class WorkersDesk {
   const WriteLedger& ledger_;
   std::map<WorkerId, WorkerRecord> workers_;
   std::map<std::string, WorkerId, std::less<>> ids_;  // by identity
-  std::vector<Event> found_;
+  std::map<WorkerId, WorkerUnreachable> gone_;        // found out while messages went out
+  std::vector<Event> found_;                          // the rest of what was
   NoteRate notes_;
   std::uint64_t refused_ = 0;
   bool stopping_ = false;

@@ -31,7 +31,7 @@ void WorkersDesk::send(const SendBatch& batch) {
   fields.set_count(batch.count);
   fields.set_attempt(batch.attempt);
   fields.set_lease_id(batch.lease);
-  send(batch.worker, message);
+  send(batch.worker, message, batch.lease);
 }
 
 void WorkersDesk::send(const SendProbe& probe) {
@@ -87,18 +87,22 @@ void WorkersDesk::stop() {
   }
 }
 
-void WorkersDesk::send(WorkerId worker, const protocol::ServerToWorker& message) {
+void WorkersDesk::send(WorkerId worker, const protocol::ServerToWorker& message, LeaseId lease) {
   const auto known = workers_.find(worker);
   const bool is_of_version_2 = message.has_release() || message.has_notice();
   if (known == workers_.end() || (is_of_version_2 && known->second.protocol_version < 2)) {
     return;
   }
-  note_delivery(worker, known->second, network_.to_worker(known->second.identity, message));
+  const Delivery delivery = network_.to_worker(known->second.identity, message);
+  note_delivery(worker, known->second, delivery);
+  if (delivery == Delivery::kGone && lease != 0) {
+    gone_.at(worker).unsent.push_back(lease);
+  }
 }
 
 void WorkersDesk::note_delivery(WorkerId worker, WorkerRecord& record, Delivery delivery) {
   if (delivery == Delivery::kGone) {
-    found_.emplace_back(WorkerUnreachable{worker});
+    gone_.try_emplace(worker, WorkerUnreachable{worker});
   } else if (delivery == Delivery::kBusy && !std::exchange(record.is_busy, true)) {
     found_.emplace_back(WorkerBusy{worker, true});
   }

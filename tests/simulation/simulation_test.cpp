@@ -55,7 +55,7 @@ TEST(KillersTest, OnlyThePointsThatKillTheirWorkersFail) {
 TEST(StormsTest, NoPointFailsForWorkersThatAreLostBesideASoundOne) {
   SimulationSettings settings;
   settings.storms = true;
-  const auto all = simulate_seeds(1, 100, settings);
+  const auto all = simulate_seeds(1, 200, settings);
   EXPECT_GT(all.worker_faults, 1000U);
   EXPECT_GT(all.cuts, 500U);
   EXPECT_GT(all.vanished_peers, 100U);

@@ -115,6 +115,29 @@ TEST(SchedulerLosses, AHeartbeatThatNamesLeaseZeroNamesNothing) {
   EXPECT_EQ(bench.scheduler.study(1).leased, 0U) << "the batch did not reach it";
 }
 
+TEST(SchedulerLosses, ABatchThatCouldNotBeSentSpeaksNeitherAgainstItsPointsNorAgainstTheWorker) {
+  SchedulerBench bench;
+  bench.feed(StudyAdded{1, table_of(1), {}});
+  for (WorkerId worker = 1; worker <= 20; ++worker) {
+    const auto sent = only<SendBatch>(bench.join_as("process", worker, 1));
+    ASSERT_EQ(sent.size(), 1U) << "the point is not suspect and the process not set aside";
+    EXPECT_EQ(sent[0].attempt, worker);
+    bench.feed(WorkerUnreachable{worker, "gone", {sent[0].lease}});
+  }
+}
+
+TEST(SchedulerLosses, OnlyWhatWasSentToALostWorkerCountsAsLost) {
+  SchedulerBench bench;
+  bench.feed(StudyAdded{1, table_of(100), {}});
+  const auto sent = bench.join(1, 2);
+  ASSERT_EQ(sent.size(), 2U);
+  bench.feed(WorkerUnreachable{1, "gone", {sent[1].lease, 12'345}});
+  EXPECT_EQ(bench.scheduler.study(1).leased, 0U);
+  const auto again = bench.join(2, 1);
+  ASSERT_EQ(again.size(), 1U);
+  EXPECT_EQ(again[0].attempt, 2U);
+}
+
 TEST(SchedulerLosses, ANewcomerHoldsTwoBatchesAtMost) {
   SchedulerBench bench;
   bench.feed(StudyAdded{1, table_of(1'000'000), {}});

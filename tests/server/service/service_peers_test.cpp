@@ -165,6 +165,25 @@ TEST_F(ServiceTest, AWorkerWhoseConnectionIsGoneIsFoundAsSoonAsAHeartbeatIsLate)
   EXPECT_EQ(service_->scheduler().study(1).leased, 0U);
 }
 
+TEST_F(ServiceTest, APointIsNotBlamedForWorkersThatWereGoneBeforeItWasSentToThem) {
+  request(submit_request("a", 1));
+  write_all();
+  for (int i = 0; i < 10; ++i) {
+    const std::string worker = "worker " + std::to_string(i);
+    hello(worker);
+    outbox_.unreachable = worker;
+    credit(1, worker);
+    outbox_.unreachable.clear();
+    EXPECT_EQ(service_->scheduler().workers(), 0U);
+  }
+  outbox_.worker_messages.clear();
+  hello("sound");
+  credit(1, "sound");
+  ASSERT_TRUE(last_message().has_batch());
+  EXPECT_EQ(last_message().batch().attempt(), 11U);
+  EXPECT_NE(last_message().batch().study_id(), kProbeStudy) << "not suspect, and nobody vanished";
+}
+
 /// A service with small limits.
 class FloodedServiceTest : public ServiceTest {
  protected:
