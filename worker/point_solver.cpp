@@ -1,11 +1,12 @@
 #include "worker/point_solver.h"
-#include "proto/result_message.h"
 
 #include <algorithm>
 #include <cmath>
 #include <exception>
 #include <memory>
 #include <optional>
+
+#include "proto/result_message.h"
 
 namespace oblique::worker {
 namespace {

@@ -1,9 +1,11 @@
 #include "client/study/study_flags.h"
 
-#include <cstdint>
-#include <cstdio>
+#include <cstddef>
+
+#include <spdlog/fmt/fmt.h>
 
 #include "client/study/study_file.h"
+#include "proto/recipe/canonical.h"
 #include "proto/recipe/study_name.h"
 
 namespace oblique::client {
@@ -11,14 +13,9 @@ namespace oblique::client {
 using solver::InputError;
 
 std::string name_of_recipe(const protocol::Recipe& recipe) {
-  // FNV-1a: the name must be the same on every machine and in every version.
-  std::uint32_t hash = 2166136261U;
-  for (const char byte : recipe.SerializeAsString()) {
-    hash = (hash ^ static_cast<unsigned char>(byte)) * 16777619U;
-  }
-  char name[sizeof "sweep-01234567"];
-  std::snprintf(name, sizeof name, "sweep-%08x", hash);
-  return name;
+  constexpr std::size_t kDigits = 8;
+  return fmt::format("sweep-{}",
+                     protocol::hexadecimal(protocol::recipe_digest(recipe)).substr(0, kDigits));
 }
 
 void add_study_flags(CLI::App& verb, StudyFlags& flags) {

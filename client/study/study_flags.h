@@ -25,8 +25,8 @@ void add_study_flags(CLI::App& verb, StudyFlags& flags);
 /// either says wrong, `check_reach` included.
 Study study_of_flags(const StudyFlags& flags, const ReachCheck& check_reach);
 
-/// "sweep-" and eight hexadecimal digits that depend on the recipe alone, so that the same flags
-/// name the same study again.
+/// "sweep-" and the first eight digits of the recipe's digest (proto/recipe/canonical.h), so that
+/// the same points name the same study again.
 std::string name_of_recipe(const protocol::Recipe& recipe);
 
 }  // namespace oblique::client

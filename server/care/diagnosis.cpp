@@ -84,7 +84,7 @@ Diagnosis diagnose(const std::string& path) {
           counted_studies() +
           " WHERE results < points"
           " ORDER BY study_id");
-  if (schema == kSchemaVersion) {
+  if (schema >= kFirstWithChecksums) {
     add(found.remarks,
         "SELECT count(*) || ' of ' || (SELECT count(*) FROM results) || ' results have no checksum,"
         " for they are of an earlier schema: a flipped bit in them may go unseen'"

@@ -9,15 +9,13 @@
 #include <string_view>
 #include <utility>
 
-#include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
+#include "server/store/model_rows.h"
 #include "server/store/packed_arrays.h"
 #include "server/store/result_row.h"
 
 namespace oblique::server {
 namespace {
-
-constexpr int kFirstWithChecksums = 4;
 
 std::string shown(double value) {
   std::string text(32, '\0');
@@ -65,8 +63,8 @@ std::string misplaced_outputs_sql() {
          missing + ") <> CASE status WHEN 'solved' THEN 0 ELSE " + all + " END";
 }
 
-/// Holds each row of a model against the message that it was made of.
-void check_models(sqlite3* database, Found& found) {
+/// Holds each row of a model against its definition.
+void check_models(sqlite3* database, int schema, Found& found) {
   std::string columns = "model_id, definition";
   for (const auto& key : solver::model_keys()) {
     columns += ", " + std::string(key.name);
@@ -74,13 +72,9 @@ void check_models(sqlite3* database, Found& found) {
   Statement rows(database, "SELECT " + columns + " FROM models");
   while (!found.is_full() && rows.step()) {
     const std::string name = "model " + std::to_string(rows.integer(0));
-    protocol::ModelParameters message;
     solver::ModelParameters model;
     try {
-      if (!message.ParseFromString(rows.text(1))) {
-        throw std::runtime_error("its bytes are damaged");
-      }
-      model = protocol::from_message(message);
+      model = model_of_definition(rows.text(1), schema);
     } catch (const std::runtime_error& error) {
       found.add(name + ": its definition cannot be read: " + error.what());
       continue;
@@ -102,11 +96,13 @@ void check_models(sqlite3* database, Found& found) {
 /// Holds the rows of one study against its recipe, in the order of the points.
 class StudyCheck {
  public:
-  StudyCheck(sqlite3* database, bool has_checksums)
-      : definition_(database, "SELECT definition FROM models WHERE model_id = ?"),
+  StudyCheck(sqlite3* database, int schema)
+      : schema_(schema),
+        definition_(database, "SELECT definition FROM models WHERE model_id = ?"),
         rows_(database, std::string("SELECT point, model_id, H, mu, e, status = 'solved' AND ") +
-                            (has_checksums ? "checksum IS NULL" : "1") + ", " + kArrayColumns +
-                            ", " + (has_checksums ? "reaction_peaks" : "NULL") +
+                            (schema >= kFirstWithChecksums ? "checksum IS NULL" : "1") + ", " +
+                            kArrayColumns + ", " +
+                            (schema >= kFirstWithChecksums ? "reaction_peaks" : "NULL") +
                             " FROM results WHERE study_id = ? ORDER BY point") {}
 
   void run(std::int64_t study_id, const std::string& name, const protocol::PointTable& table,
@@ -147,8 +143,7 @@ class StudyCheck {
       ++column;
     }
     if (!segment_ || segment_->model != point.model) {
-      segment_ = {point.model, protocol::to_message(table.model(point.model)).SerializeAsString(),
-                  -1};
+      segment_ = {point.model, definition_of(table.model(point.model), schema_), -1};
     }
     if (const std::int64_t model_id = rows_.integer(1); model_id != segment_->good_id) {
       definition_.reset();
@@ -169,13 +164,14 @@ class StudyCheck {
     std::string definition;
     std::int64_t good_id;  ///< row that has it; -1: none was seen
   };
+  int schema_;
   std::optional<Model> segment_;
   Statement definition_;
   Statement rows_;
 };
 
-void check_studies(sqlite3* database, bool has_checksums, Found& found) {
-  StudyCheck check(database, has_checksums);
+void check_studies(sqlite3* database, int schema, Found& found) {
+  StudyCheck check(database, schema);
   Statement studies(database, "SELECT study_id, name, recipe, points FROM studies");
   while (!found.is_full() && studies.step()) {
     const std::string name = studies.text(1);
@@ -217,9 +213,9 @@ std::vector<std::string> faults_of_rows(sqlite3* database, int schema, std::size
   }
   kind().add_all(database, misplaced_outputs_sql());
   auto models = kind();
-  check_models(database, models);
+  check_models(database, schema, models);
   auto studies = kind();
-  check_studies(database, has_checksums, studies);
+  check_studies(database, schema, studies);
   return faults;
 }
 

@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <filesystem>
 #include <stdexcept>
+#include <string_view>
 #include <vector>
 
 #include "server/database/draft_file.h"
 #include "server/database/open_for_reading.h"
 #include "server/database/row_checksum.h"
 #include "server/database/sqlite.h"
+#include "server/store/model_rows.h"
 #include "server/store/result_row.h"
 #include "server/store/store.h"
 
@@ -66,14 +68,25 @@ std::string soundness_sql(sqlite3* database, const std::string& table) {
   return has_checksums ? "checksum IS NULL OR checksum = " + result_checksum_sql() : "1";
 }
 
+/// The columns as the present schema has them.
+std::string values_sql(sqlite3* database, const std::string& table, std::string columns) {
+  Statement version(database, "PRAGMA user_version");
+  const bool is_by_message = version.step() && version.integer(0) < kFirstWithCanonicalModels;
+  if (constexpr std::string_view kColumn = "definition"; table == "models" && is_by_message) {
+    columns.replace(columns.find(kColumn), kColumn.size(), "model_definition(definition)");
+  }
+  return columns;
+}
+
 /// Copies the rows of one table in the order of their numbers, and passes over what cannot be read.
 class TableCopy {
  public:
   TableCopy(sqlite3* from, sqlite3* to, const std::string& table)
       : to_(to),
         columns_(common_columns(from, to, table)),
-        read_(from, "SELECT rowid, " + soundness_sql(from, table) + ", " + columns_ + " FROM " +
-                        table + " WHERE rowid > ? ORDER BY rowid"),
+        read_(from, "SELECT rowid, " + soundness_sql(from, table) + ", " +
+                        values_sql(from, table, columns_) + " FROM " + table +
+                        " WHERE rowid > ? ORDER BY rowid"),
         insert_(to, "INSERT INTO " + table + " (" + columns_ + ") VALUES (" + marks() + ")") {}
 
   std::uint64_t rows() const { return rows_; }
@@ -196,6 +209,7 @@ Salvaged salvage(const std::string& from, const std::string& to) {
   execute(source.get(), "PRAGMA writable_schema = ON");
   check_tables(source.get(), from);
   add_row_checksum(source.get());
+  add_model_definition(source.get());
   DraftFile draft(to + ".part");
   Salvaged saved;
   { const Store with_schema(draft.path()); }

@@ -3,23 +3,33 @@
 #include <stdexcept>
 #include <utility>
 
+#include "proto/recipe/canonical.h"
+
 namespace oblique::server {
+namespace {
+
+protocol::Recipe parsed(const std::string& bytes) {
+  protocol::Recipe recipe;
+  if (!recipe.ParseFromString(bytes)) {
+    throw std::runtime_error("its bytes are damaged");
+  }
+  return recipe;
+}
+
+}  // namespace
 
 StudyTable::StudyTable(std::shared_ptr<const protocol::PointTable> table)
-    : shared_(std::make_shared<Shared>(
-          Shared{table->recipe().SerializeAsString(), table->size(), nullptr})) {
+    : shared_(std::make_shared<Shared>(Shared{table->recipe().SerializeAsString(), table->size(),
+                                              nullptr, protocol::recipe_digest(table->recipe())})) {
   shared_->table = std::move(table);
 }
 
 StudyTable::StudyTable(std::string recipe_bytes, std::uint64_t points)
-    : shared_(std::make_shared<Shared>(Shared{std::move(recipe_bytes), points, nullptr})) {}
+    : shared_(std::make_shared<Shared>(Shared{std::move(recipe_bytes), points, nullptr, {}})) {}
 
 const std::shared_ptr<const protocol::PointTable>& StudyTable::get() const {
   if (shared_->table == nullptr) {
-    protocol::Recipe recipe;
-    if (!recipe.ParseFromString(shared_->recipe_bytes)) {
-      throw std::runtime_error("its bytes are damaged");
-    }
+    protocol::Recipe recipe = parsed(shared_->recipe_bytes);
     auto table = std::make_shared<const protocol::PointTable>(std::move(recipe));
     if (table->size() != shared_->points) {
       throw std::runtime_error("it has " + std::to_string(table->size()) +
@@ -28,6 +38,24 @@ const std::shared_ptr<const protocol::PointTable>& StudyTable::get() const {
     shared_->table = std::move(table);
   }
   return shared_->table;
+}
+
+const protocol::Sha256::Digest& StudyTable::digest() const {
+  if (!shared_->digest) {
+    shared_->digest = protocol::recipe_digest(parsed(shared_->recipe_bytes));
+  }
+  return *shared_->digest;
+}
+
+bool StudyTable::is_of_the_recipe_of(const StudyTable& other) const {
+  if (recipe_bytes() == other.recipe_bytes()) {
+    return true;
+  }
+  try {
+    return size() == other.size() && digest() == other.digest();
+  } catch (const std::runtime_error&) {
+    return false;  // one of them cannot be read, or only by another version
+  }
 }
 
 }  // namespace oblique::server

@@ -2,9 +2,11 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "proto/recipe/point_table.h"
+#include "proto/recipe/sha256.h"
 
 namespace oblique::server {
 
@@ -24,6 +26,11 @@ class StudyTable {
   /// oblique.protocol.Recipe, serialised.
   const std::string& recipe_bytes() const { return shared_->recipe_bytes; }
 
+  /// Whether both are of one recipe, however each was written. Costs a look at the bytes; where
+  /// they differ and the sizes do not, once for each table a pass over the recipe, as long as it
+  /// is.
+  bool is_of_the_recipe_of(const StudyTable& other) const;
+
   /// The table, made when there is none. Throws solver::InputError for a recipe that this version
   /// does not take, and std::runtime_error for bytes that are no recipe of so many points.
   const std::shared_ptr<const protocol::PointTable>& get() const;
@@ -38,7 +45,10 @@ class StudyTable {
     std::string recipe_bytes;
     std::uint64_t points;
     std::shared_ptr<const protocol::PointTable> table;
+    std::optional<protocol::Sha256::Digest> digest;  // of the canonical text, once it was asked for
   };
+  const protocol::Sha256::Digest& digest() const;
+
   std::shared_ptr<Shared> shared_;
 };
 

@@ -66,7 +66,7 @@ void StudyChanges::submit(const Client& client, const ReadRequest& read, Instant
     return;
   }
   const StudyRecord& study = states_.record(*known);
-  if (study.table.recipe_bytes() != read.table.recipe_bytes()) {
+  if (!study.table.is_of_the_recipe_of(read.table)) {
     clients_.reply_error(
         client, fmt::format("there is a study called \"{}\" with other points or another model: "
                             "give this one another name, or use another database",

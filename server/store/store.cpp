@@ -1,65 +1,17 @@
 #include "server/store/store.h"
 
 #include <algorithm>
-#include <array>
-#include <random>
 
-#include <nlohmann/json.hpp>
-
-#include "proto/recipe/model_message.h"
 #include "server/database/row_checksum.h"
+#include "server/store/migration.h"
+#include "server/store/model_rows.h"
 #include "server/store/result_row.h"
-#include "server/store/schema.h"
 
 namespace oblique::server {
 namespace {
 
 constexpr int kBusyTimeout_ms = 2000;
 constexpr std::size_t kMostCachedModels = 65536;
-
-std::string random_id() {
-  std::random_device source;
-  constexpr std::string_view kDigits = "0123456789abcdef";
-  std::string id;
-  for (int i = 0; i < 32; ++i) {
-    id += kDigits[source() % kDigits.size()];
-  }
-  return id;
-}
-
-/// Inserts a model, its columns by name. The keys are the columns, but for those handled first.
-std::string insert_model_sql() {
-  std::string names = "definition, lengths_m";
-  std::string marks = "?, ?";
-  for (const auto& key : solver::model_keys()) {
-    names += ", " + std::string(key.name);
-    marks += ", ?";
-  }
-  return "INSERT INTO models (" + names + ") VALUES (" + marks +
-         ") ON CONFLICT (definition) DO NOTHING";
-}
-
-void bind_model(Statement& insert, const solver::ModelParameters& model,
-                const std::string& definition) {
-  insert.reset();
-  insert.bind_blob(1, definition);
-  insert.bind(2, nlohmann::json(model.lengths_m).dump());
-  int index = 3;
-  for (const auto& key : solver::model_keys()) {
-    const double value = key.get(model);
-    const bool whole = key.name == "links" || key.name == "elements_per_link";
-    if (key.name == "integrator") {
-      insert.bind(index, solver::integrator_name(model.integrator));
-    } else if (whole) {
-      insert.bind(index, static_cast<std::int64_t>(value));
-    } else if (key.name != "length" ||
-               std::count(model.lengths_m.begin(), model.lengths_m.end(), value) ==
-                   static_cast<std::ptrdiff_t>(model.lengths_m.size())) {
-      insert.bind(index, value);
-    }
-    ++index;
-  }
-}
 
 /// While it lives the connection waits for no other one.
 class Impatience {
@@ -158,10 +110,10 @@ Store::Store(const std::string& path) {
   execute(database_.get(), "PRAGMA synchronous = FULL");
   log_->make_sure();
   if (kind == DatabaseKind::kEmpty) {
-    create_schema();
+    create_schema(database_.get());
     log_->merge();  // the file is a whole database from the start
   } else if (kind == DatabaseKind::kOlder) {
-    migrate();
+    migrate(database_.get());
   }
   statements_ = std::make_unique<Statements>(database_.get());
   files_->expect(database_.get(), database_id());
@@ -188,32 +140,6 @@ void Store::leave_files() {
   } catch (const StorageError&) {
     // Nothing more can be done for it.
   }
-}
-
-void Store::create_schema() {
-  Transaction transaction(database_.get());
-  execute(database_.get(), kSchemaSql);
-  execute(database_.get(), "PRAGMA application_id = " + std::to_string(kApplicationId));
-  execute(database_.get(), "PRAGMA user_version = " + std::to_string(kSchemaVersion));
-  Statement about(database_.get(), "INSERT INTO about (database_id) VALUES (?)");
-  about.bind(1, random_id());
-  about.run();
-  transaction.commit();
-}
-
-void Store::migrate() {
-  constexpr std::array kSteps{kMigrateFrom1Sql, kMigrateFrom2Sql, kMigrateFrom3Sql};
-  static_assert(kSteps.size() == kSchemaVersion - 1, "a step from each schema to the next");
-  Statement version(database_.get(), "PRAGMA user_version");
-  version.step();
-  const auto found = static_cast<std::size_t>(version.integer(0));
-  version.reset();
-  Transaction transaction(database_.get());
-  for (std::size_t step = found; step < kSchemaVersion; ++step) {
-    execute(database_.get(), kSteps.at(step - 1));
-  }
-  execute(database_.get(), "PRAGMA user_version = " + std::to_string(kSchemaVersion));
-  transaction.commit();
 }
 
 void Store::set_sync(bool full) {
@@ -330,11 +256,10 @@ std::int64_t Store::model_id(const AddResults& change, std::uint64_t model) {
     return known->second;
   }
   const solver::ModelParameters parameters = change.table->model(model);
-  const std::string definition = protocol::to_message(parameters).SerializeAsString();
-  bind_model(statements_->add_model, parameters, definition);
+  bind_model(statements_->add_model, parameters);
   statements_->add_model.run();
   Statement& find = statements_->find_model;
-  find.bind_blob(1, definition);
+  find.bind(1, std::string_view(definition_of(parameters, kSchemaVersion)));
   find.step();
   const std::int64_t id = find.integer(0);
   find.reset();

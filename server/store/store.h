@@ -73,8 +73,6 @@ class Store final : public Storage {
   struct Statements;
 
   void leave_files();
-  void create_schema();
-  void migrate();
   void add(const AddStudy& change);
   void add(const SetStudyState& change);
   void add(const SetStudyTerms& change);

@@ -1,5 +1,4 @@
 #include "worker/batch_solver.h"
-#include "proto/result_message.h"
 
 #include <atomic>
 #include <chrono>
@@ -12,6 +11,8 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+
+#include "proto/result_message.h"
 
 namespace oblique::worker {
 namespace {

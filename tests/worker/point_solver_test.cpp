@@ -1,5 +1,4 @@
 #include "worker/point_solver.h"
-#include "proto/recipe/model_message.h"
 
 #include <limits>
 #include <memory>
@@ -10,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "proto/recipe/model_message.h"
 #include "tests/worker/conversation_fixture.h"
 #include "worker/fall_cache.h"
 

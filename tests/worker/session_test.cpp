@@ -1,5 +1,4 @@
 #include "worker/session.h"
-#include "proto/result_message.h"
 
 #include <future>
 #include <memory>
@@ -9,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "proto/frames.h"
+#include "proto/result_message.h"
 #include "tests/support/reserved_port.h"
 #include "tests/worker/conversation_fixture.h"
 #include "worker/wake_up.h"

@@ -16,8 +16,8 @@ CREATE TABLE studies (
   state       TEXT NOT NULL CHECK (state IN ('running', 'paused', 'cancelled', 'done')),
   created_at  TEXT NOT NULL,     -- UTC, ISO 8601
   changed_at  TEXT NOT NULL,     -- when `state` was last set
-  priority    INTEGER NOT NULL,  -- studies of a higher one come first
-  weight      REAL NOT NULL,     -- share of the workers among studies of one priority
+  priority    INTEGER NOT NULL DEFAULT 0,   -- studies of a higher one come first
+  weight      REAL NOT NULL DEFAULT 1.0,    -- share of the workers among studies of one priority
   mixes_versions INTEGER NOT NULL DEFAULT 0, -- 1: results of several solver versions are allowed
   checksum    INTEGER            -- CRC-32 of study_id, name, recipe, points and created_at
 ) STRICT;
@@ -42,7 +42,9 @@ CREATE TABLE models (
   spectral_radius REAL NOT NULL, -- of generalized-alpha
   dt          REAL NOT NULL,     -- 0: chosen for the integrator
   dt_fall     REAL NOT NULL,     -- 0: chosen for the integrator
-  definition  BLOB NOT NULL UNIQUE  -- oblique.protocol.ModelParameters, serialised
+  -- All of them as one text, by which models are told apart: 'oblique-model-1 lengths=0.4,0.4,0.4 E=7e+10
+  -- A=0.0005309 ...'. proto/recipe/README.md gives it byte by byte.
+  definition  TEXT NOT NULL UNIQUE
 ) STRICT;
 
 -- One row for each session of a worker in which it delivered a result.

@@ -1,11 +1,12 @@
 #include "client/paper/recovery.h"
-#include "worker/solver/model/parameters.h"
 
 #include <cmath>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
+
+#include "worker/solver/model/parameters.h"
 
 namespace oblique::client {
 namespace {

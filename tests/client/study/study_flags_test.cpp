@@ -12,8 +12,7 @@ namespace {
 
 TEST(StudyFlags, NameTheSameStudyForTheSamePointsAndAnotherForOthers) {
   const auto a = name_of_recipe(recipe_of_flags(flags_of({}), pretended_reach()));
-  EXPECT_TRUE(a.starts_with("sweep-"));
-  EXPECT_EQ(a.size(), std::string("sweep-01234567").size());
+  EXPECT_EQ(a, "sweep-078f8855") << "the name stays for ever";
   EXPECT_EQ(a, name_of_recipe(recipe_of_flags(flags_of({}), pretended_reach())));
   EXPECT_NE(a, name_of_recipe(recipe_of_flags(flags_of({{"mu", "0.5"}}), pretended_reach())));
 }

@@ -1,5 +1,5 @@
 #include "server/care/row_faults.h"
-#include "proto/recipe/model_message.h"
+#include "proto/recipe/canonical.h"
 #include "proto/result_message.h"
 
 #include <string>
@@ -126,7 +126,7 @@ TEST_F(RowFaultsTest, AModelThatIsNotThatOfItsDefinitionOrOfTheRecipeIsNamed) {
   {
     const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);
     Statement update(database.get(), "UPDATE models SET E = E + 1, definition = ?");
-    update.bind_blob(1, protocol::to_message(other).SerializeAsString());
+    update.bind(1, std::string_view(protocol::canonical_model(other)));
     update.run();
   }
   EXPECT_THAT(find_faults(path_), Contains(HasSubstr("point 0: its model is not")));

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "proto/recipe/model_message.h"
 #include "tests/server/service/service_fixture.h"
 
 namespace oblique::server {
@@ -34,6 +35,20 @@ TEST_F(ServiceTest, TheSameStudyContinuesAndAnotherOfTheNameIsRefused) {
   EXPECT_FALSE(last_reply().submit().created());
   request(submit_request("a", 11));
   EXPECT_THAT(last_reply().error().message(), HasSubstr("another name"));
+}
+
+TEST_F(ServiceTest, TheSamePointsWrittenInAnotherWayAreTheSameStudy) {
+  request(submit_request("a"));
+  write_all();
+  ClientRequest written = submit_request("a");
+  auto& model = *written.mutable_submit()->mutable_recipe()->mutable_model();
+  model = protocol::to_message(solver::preset("paper"));
+  request(written);
+  EXPECT_FALSE(last_reply().submit().created());
+  EXPECT_EQ(last_reply().submit().study_id(), 1U);
+  model.set_k_n_m(1e7);
+  request(written);
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("another model"));
 }
 
 TEST_F(ServiceTest, TwoWhoSubmitTheSameBeforeItIsStoredAreBothAnswered) {

@@ -1,5 +1,4 @@
 #include "server/store/store.h"
-#include "proto/result_message.h"
 
 #include <cstdlib>
 #include <fstream>
@@ -7,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "proto/result_message.h"
 #include "server/reading/reader.h"
 #include "tests/support/points.h"
 #include "tests/support/temporary_folder.h"

@@ -1,0 +1,248 @@
+#include "proto/recipe/canonical.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cstdint>
+#include <vector>
+
+#include "proto/recipe/axes.h"
+#include "proto/recipe/model_message.h"
+#include "worker/solver/model/number.h"
+
+namespace oblique::protocol {
+namespace {
+
+constexpr std::string_view kModelHead = "oblique-model-1";
+constexpr std::string_view kRecipeHead = "oblique-recipe-1\n";
+/// The keys of version 1 behind `lengths`, always written. Keys that came later are written behind
+/// them, by name, where they are not at their default: what was encoded before they came stays so.
+constexpr std::array<std::string_view, 13> kFirstKeys{"E",
+                                                      "A",
+                                                      "I",
+                                                      "rho",
+                                                      "g",
+                                                      "elements_per_link",
+                                                      "k",
+                                                      "eta2",
+                                                      "tip_mass",
+                                                      "integrator",
+                                                      "spectral_radius",
+                                                      "dt",
+                                                      "dt_fall"};
+/// A piece is given away when it is as long.
+constexpr std::size_t kPiece = 4096;
+
+/// Shortest digits that read back as the same bits; both zeros are one.
+std::string number(double value) {
+  return solver::exact_number(value + 0.0);
+}
+
+bool is_integrator(std::string_view key) {
+  return key == "integrator";
+}
+
+std::string value_of(std::string_view key, double value) {
+  return is_integrator(key) && value >= 0.0 &&
+                 value < static_cast<double>(solver::integrator_names().size())
+             ? std::string(solver::integrator_names()[static_cast<std::size_t>(value)])
+             : number(value);
+}
+
+std::vector<const solver::ParameterKey*> later_keys(std::span<const solver::ParameterKey> keys) {
+  std::vector<const solver::ParameterKey*> later;
+  for (const auto& key : keys) {
+    const bool is_first =
+        key.name == "links" || key.name == "length" ||
+        std::find(kFirstKeys.begin(), kFirstKeys.end(), key.name) != kFirstKeys.end();
+    if (!is_first) {
+      later.push_back(&key);
+    }
+  }
+  std::sort(later.begin(), later.end(),
+            [](const auto* a, const auto* b) { return a->name < b->name; });
+  return later;
+}
+
+/// " lengths=0.4,0.4,0.4 E=7e+10 ..."
+std::string model_fields(const solver::ModelParameters& model,
+                         std::span<const solver::ParameterKey> keys) {
+  std::string text = " lengths=";
+  for (std::size_t i = 0; i < model.lengths_m.size(); ++i) {
+    text += i == 0 ? "" : ",";
+    text += number(model.lengths_m[i]);
+  }
+  const auto add = [&](const solver::ParameterKey& key) {
+    text += ' ';
+    text += key.name;
+    text += '=';
+    text += value_of(key.name, key.get(model));
+  };
+  for (const std::string_view name : kFirstKeys) {
+    add(*solver::find_model_key(name));
+  }
+  for (const auto* key : later_keys(keys)) {
+    if (key->get(model) != key->get(solver::ModelParameters())) {
+      add(*key);
+    }
+  }
+  return text;
+}
+
+/// The count of the range that has the listed values, or 0.
+std::uint64_t count_as_range(const Axis& axis) {
+  constexpr int kFewest = 3;  // two values are a range in any case
+  if (axis.values_size() < kFewest || is_integrator(axis.key())) {
+    return 0;
+  }
+  Axis range;
+  range.set_from(axis.values(0));
+  range.set_to(axis.values(axis.values_size() - 1));
+  range.set_count(static_cast<std::uint64_t>(axis.values_size()));
+  if (!(range.from() < range.to())) {
+    return 0;
+  }
+  for (int i = 1; i < axis.values_size(); ++i) {
+    if (axis.values(i) != axis_value(range, static_cast<std::uint64_t>(i))) {
+      return 0;
+    }
+  }
+  return range.count();
+}
+
+/// Gathers text and gives it away in pieces.
+class Pieces {
+ public:
+  explicit Pieces(const std::function<void(std::string_view)>& take) : take_(take) {}
+
+  Pieces& operator<<(std::string_view text) {
+    text_ += text;
+    if (text_.size() >= kPiece) {
+      finish();
+    }
+    return *this;
+  }
+  void finish() {
+    take_(text_);
+    text_.clear();
+  }
+
+ private:
+  const std::function<void(std::string_view)>& take_;
+  std::string text_;
+};
+
+/// An axis counts by its values: equally spaced ones are a range however they were written.
+void write_axis(const Axis& axis, Pieces& out) {
+  out << " " << axis.key() << "=";
+  const std::uint64_t listed_range = axis.count() == 0 ? count_as_range(axis) : 0;
+  const std::uint64_t count = axis.count() > 2 ? axis.count() : listed_range;
+  if (count > 0) {
+    const std::uint64_t last = axis_size(axis) - 1;
+    out << number(axis_value(axis, 0)) << ":" << number(axis_value(axis, last)) << ":"
+        << std::to_string(count);
+    return;
+  }
+  for (std::uint64_t i = 0; i < axis_size(axis); ++i) {
+    out << (i == 0 ? "" : ",") << value_of(axis.key(), axis_value(axis, i));
+  }
+}
+
+std::vector<std::string_view> split(std::string_view text, char separator) {
+  std::vector<std::string_view> parts;
+  for (;;) {
+    const auto end = text.find(separator);
+    parts.push_back(text.substr(0, end));
+    if (end == std::string_view::npos) {
+      return parts;
+    }
+    text.remove_prefix(end + 1);
+  }
+}
+
+[[noreturn]] void throw_not_canonical() {
+  throw solver::InputError("it is not the canonical text of a model");
+}
+
+double number_of(std::string_view text) {
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size()) {
+    throw_not_canonical();
+  }
+  return value;
+}
+
+void read_field(solver::ModelParameters& model, std::string_view name, std::string_view value) {
+  if (name == "lengths") {
+    model.lengths_m.clear();
+    for (const auto part : split(value, ',')) {
+      model.lengths_m.push_back(number_of(part));
+    }
+    return;
+  }
+  const auto* key = solver::find_model_key(name);
+  if (key == nullptr || name == "links" || name == "length") {
+    throw_not_canonical();
+  }
+  const double set =
+      is_integrator(name) ? static_cast<double>(solver::integrator_named(value)) : number_of(value);
+  if (name == "elements_per_link") {
+    solver::check_value(*key, set);  // or the struct cannot hold it
+  }
+  key->set(model, set);
+}
+
+}  // namespace
+
+std::string canonical_model(const solver::ModelParameters& model,
+                            std::span<const solver::ParameterKey> keys) {
+  return std::string(kModelHead) + model_fields(model, keys);
+}
+
+std::string canonical_model(const solver::ModelParameters& model) {
+  return canonical_model(model, solver::model_keys());
+}
+
+solver::ModelParameters model_of_canonical(std::string_view text) {
+  solver::ModelParameters model;
+  for (const auto field : split(text, ' ')) {
+    if (const auto equals = field.find('='); equals != std::string_view::npos) {
+      read_field(model, field.substr(0, equals), field.substr(equals + 1));
+    }
+  }
+  // One text a model: what is missing, twice or in another order shows here.
+  if (canonical_model(model) != text) {
+    throw_not_canonical();
+  }
+  return model;
+}
+
+void write_canonical(const Recipe& recipe, const std::function<void(std::string_view)>& take) {
+  Pieces out(take);
+  const auto model =
+      recipe.has_model() ? unjudged_from_message(recipe.model()) : solver::ModelParameters();
+  out << kRecipeHead << "model" << model_fields(model, solver::model_keys()) << "\n";
+  for (const Block& block : recipe.blocks()) {
+    out << "block";
+    for (const Axis& axis : block.axes()) {
+      write_axis(axis, out);
+    }
+    out << "\n";
+  }
+  out.finish();
+}
+
+std::string canonical_recipe(const Recipe& recipe) {
+  std::string text;
+  write_canonical(recipe, [&](std::string_view piece) { text += piece; });
+  return text;
+}
+
+Sha256::Digest recipe_digest(const Recipe& recipe) {
+  Sha256 sum;
+  write_canonical(recipe, [&](std::string_view piece) { sum.add(piece); });
+  return sum.digest();
+}
+
+}  // namespace oblique::protocol
