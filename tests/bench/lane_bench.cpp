@@ -21,7 +21,7 @@ using solver::LaneKernel;
 /// Floating-point operations of one evaluation of the accelerations with its kick and drift: a
 /// quarter of a PEFRL step.
 double operations_an_evaluation(const Chain& chain) {
-  std::vector<CountedNumber> state(2 * chain.rows());
+  std::vector<CountedNumber> state(2 * chain.tables().rows);
   std::vector<CountedNumber> q = state;
   std::vector<CountedNumber> v = state;
   std::vector<CountedNumber> scratch = state;

@@ -48,31 +48,28 @@ void ClampedBeam::equilibrate(const TipLoad& load) {
 }
 
 double ClampedBeam::newton_step(const TipLoad& load) {
-  solver::BandedLu<kBandwidth> matrix(q_.size() - kClamped);
-  matrix.set_zero();
+  solver::BandedLu<kBandwidth> matrix;
+  matrix.set_zero(q_.size() - kClamped);
   std::vector<double> residual(q_.size() - kClamped, 0.0);
   const double inverse_length = 1.0 / element_length_m_;
   const double half_EA_length = 0.5 * properties_.EA_N * element_length_m_;
   const double bending = 2.0 * properties_.EI_N_m2 / element_length_m_;
   const auto map = solver::gradient_map(inverse_length);
   for (std::size_t first = 0; first + 4 < q_.size(); first += 4) {
-    const auto pair = [&](std::size_t i) {
-      return solver::PlanarVector<double>{q_[first + i], q_[first + i + 1]};
-    };
-    const auto g =
-        solver::gradient_coefficients(pair(0), pair(2), pair(4), pair(6), inverse_length);
-    const auto f = solver::elastic_gradient(g, half_EA_length, bending);
-    const auto tangent = solver::elastic_tangent(g, inverse_length, half_EA_length, bending);
+    const Eigen::Map<const solver::ElementCoordinates> q(&q_[first]);
+    const auto c = solver::gradient_coefficients(q, inverse_length);
+    const solver::ElementCoordinates force =
+        solver::elastic_gradient(c, half_EA_length, bending) * map;
+    const auto tangent = solver::elastic_tangent(c, map, half_EA_length, bending);
     for (std::size_t a = 0; a < 8; ++a) {
       if (first + a < kClamped) {
         continue;
       }
-      for (std::size_t k = 0; k < 3; ++k) {
-        residual[first + a - kClamped] += map[k][a / 2] * (a % 2 == 0 ? f.c[k].x : f.c[k].y);
-      }
+      residual[first + a - kClamped] += force.data()[a];
       for (std::size_t b = 0; b < 8; ++b) {
         if (first + b >= kClamped) {
-          matrix.add(first + a - kClamped, first + b - kClamped, tangent[a][b]);
+          matrix.add(first + a - kClamped, first + b - kClamped,
+                     tangent(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)));
         }
       }
     }

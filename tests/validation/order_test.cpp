@@ -18,7 +18,6 @@ namespace {
 using solver::ChainState;
 using solver::Contact;
 using solver::ContactParameters;
-using solver::JointReaction;
 using solver::Motion;
 
 /// What a run ends with, as vectors that can be subtracted.
@@ -31,14 +30,21 @@ struct Outcome {
 
 constexpr solver::AffineContactForce<double> kNoContact{};
 
+std::vector<double> in_turn(const Eigen::Matrix2Xd& columns) {
+  return {columns.data(), columns.data() + columns.size()};
+}
+
+solver::Coordinates in_columns(const std::vector<double>& values) {
+  return Eigen::Matrix2Xd::Map(values.data(), 2, static_cast<Eigen::Index>(values.size() / 2));
+}
+
 void add_state(const Motion& motion, const solver::AffineContactForce<double>& force,
                const ChainState& state, Outcome& outcome) {
-  outcome.position = state.q;
-  outcome.velocity = state.v;
-  for (const JointReaction& reaction : motion.reactions(force, state)) {
-    outcome.multipliers.push_back(reaction.x_N);
-    outcome.multipliers.push_back(reaction.y_N);
-  }
+  Eigen::Matrix2Xd reactions_N;
+  motion.reactions(force, state, reactions_N);
+  outcome.position = in_turn(state.q);
+  outcome.velocity = in_turn(state.v);
+  outcome.multipliers = in_turn(reactions_N);
 }
 
 /// Free motion over `steps` steps.
@@ -94,11 +100,11 @@ double distance(const std::vector<double>& a, const std::vector<double>& b) {
 /// What the explicit way ends with, in the coordinates of the constrained chain.
 Outcome in_constrained_coordinates(Outcome outcome, const solver::GeneralizedAlphaMotion& motion) {
   ChainState state;
-  state.q = outcome.position;
-  state.v = outcome.velocity;
+  state.q = in_columns(outcome.position);
+  state.v = in_columns(outcome.velocity);
   state = motion.chain().from_eliminated(state);
-  outcome.position = state.q;
-  outcome.velocity = state.v;
+  outcome.position = in_turn(state.q);
+  outcome.velocity = in_turn(state.v);
   return outcome;
 }
 

@@ -139,11 +139,9 @@ double half_period_s(const Motion& motion, const ChainState& start, double dt_s)
     // (|a + b|^2 - |a - b|^2)/4 in the norm of the kinetic energy, a across, b the mode.
     ChainState sum = start;
     ChainState difference = start;
-    for (std::size_t i = 1; i < state.q.size(); i += 2) {
-      // The link lies along x, so that slopes and positions across are zero at rest.
-      sum.v[i] = state.q[i] + start.v[i];
-      difference.v[i] = state.q[i] - start.v[i];
-    }
+    // The link lies along x, so that slopes and positions across are zero at rest.
+    sum.v.row(1) = state.q.row(1) + start.v.row(1);
+    difference.v.row(1) = state.q.row(1) - start.v.row(1);
     return motion.energies(sum).kinetic_J - motion.energies(difference).kinetic_J;
   };
   return first_zero_s(motion, start, dt_s, product);
@@ -162,10 +160,10 @@ TEST(Pendulum, VibratesAtTheFirstFrequencyOfAPinnedFreeBeam) {
     const Chain chain(model);
     ChainState start = chain.at_rest();
     constexpr double kSpeed_m_s = 1e-4;  // so slow that the vibration is linear
-    for (std::size_t row = 0; row < chain.rows(); ++row) {
+    for (Eigen::Index row = 0; row < chain.rows(); ++row) {
       const double z = kRoot * static_cast<double>(row / 2) / elements;
       const bool is_slope = row % 2 == 1;
-      start.v[2 * row + 1] =
+      start.v(1, row) =
           kSpeed_m_s * (is_slope
                             ? kRoot / length_m *
                                   (std::cos(z) / std::sin(kRoot) + std::cosh(z) / std::sinh(kRoot))

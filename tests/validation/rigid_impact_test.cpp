@@ -145,7 +145,7 @@ struct StiffLinks {
     const Eigen::Index link_of[7] = {0, 0, 0, 0, 1, 1, 1};
     const bool is_slope[7] = {false, true, true, false, true, false, true};
     const Eigen::Vector2d joint_m = J.col(0).reverse().cwiseProduct(Eigen::Vector2d(1.0, -1.0));
-    for (std::size_t row = 0; row < 7; ++row) {
+    for (Eigen::Index row = 0; row < 7; ++row) {
       const Eigen::Index link = link_of[row];
       const double angle = kAngle_rad[link];
       const Eigen::Vector2d along(std::cos(angle), std::sin(angle));
@@ -161,10 +161,8 @@ struct StiffLinks {
           v += J.col(0) * rate[0];
         }
       }
-      for (Eigen::Index c = 0; c < 2; ++c) {
-        state.q[2 * row + static_cast<std::size_t>(c)] = q[c];
-        state.v[2 * row + static_cast<std::size_t>(c)] = v[c];
-      }
+      state.q.col(row) = q;
+      state.v.col(row) = v;
     }
     return state;
   }

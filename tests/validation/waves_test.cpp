@@ -42,9 +42,7 @@ ModelParameters link(double length_m, int elements) {
 /// start at the tip.
 ChainState turning(const Chain& chain, double length_m) {
   ChainState state = chain.at_rest();
-  for (std::size_t i = 0; i < state.q.size(); i += 2) {
-    state.v[i + 1] = -kV0_m_s / length_m * state.q[i];
-  }
+  state.v.row(1) = -kV0_m_s / length_m * state.q.row(0);
   return state;
 }
 
@@ -52,12 +50,10 @@ ChainState turning(const Chain& chain, double length_m) {
 /// pin a wave follows at the speed of sound.
 ChainState falling_along(const Chain& chain, const ModelParameters& model) {
   ChainState state = chain.at_rest();
-  for (std::size_t i = 0; i < state.q.size(); i += 2) {
-    state.q[i + 1] = -state.q[i];
-    state.q[i] = 0.0;
-  }
-  for (const std::size_t row : solver::position_rows(model)) {
-    state.v[2 * row + 1] = row == 0 ? 0.0 : -kV0_m_s;
+  state.q.row(1) = -state.q.row(0);
+  state.q.row(0).setZero();
+  for (const Eigen::Index row : solver::position_rows(model)) {
+    state.v(1, row) = row == 0 ? 0.0 : -kV0_m_s;
   }
   return state;
 }

@@ -4,20 +4,23 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <span>
 #include <utility>
 #include <vector>
 
 namespace oblique::solver {
 
-/// A square banded matrix, `bandwidth` diagonals on either side, and its LU factors with partial
-/// pivoting inside the band: work and memory are linear in the number of rows, and a zero on the
-/// diagonal (a multiplier's row) does no harm.
+/// A square banded matrix, of no rows to begin with, `bandwidth` diagonals on either side, and its
+/// LU factors with partial pivoting inside the band: work and memory are linear in the number of
+/// rows, and a zero on the diagonal (a multiplier's row) does no harm. By hand: Eigen has no banded
+/// factorisation.
 template <std::size_t bandwidth>
 class BandedLu {
  public:
-  explicit BandedLu(std::size_t rows) : rows_(rows), pivots_(rows) {}
-
-  void set_zero() {
+  /// A matrix of zeros of that size. Allocates when the size grows.
+  void set_zero(std::size_t rows) {
+    rows_.resize(rows);
+    pivots_.resize(rows);
     for (auto& row : rows_) {
       row.fill(0.0);
     }
@@ -25,6 +28,17 @@ class BandedLu {
   /// Needs |row - column| <= bandwidth.
   void add(std::size_t row, std::size_t column, double value) {
     rows_[row][column + bandwidth - row] += value;
+  }
+
+  /// Adds a dense block whose first entry is (row, column).
+  template <class Block>
+  void add_block(std::size_t row, std::size_t column, const Block& block) {
+    for (int i = 0; i < block.rows(); ++i) {
+      double* target = &entry(row + static_cast<std::size_t>(i), column);
+      for (int j = 0; j < block.cols(); ++j) {
+        target[j] += block(i, j);
+      }
+    }
   }
 
   /// Factors in place; false when the matrix is singular to working precision.
@@ -59,7 +73,7 @@ class BandedLu {
   }
 
   /// Solves in place. Needs a successful factor().
-  void solve(std::vector<double>& x) const {
+  void solve(std::span<double> x) const {
     const std::size_t n = rows_.size();
     for (std::size_t k = 0; k < n; ++k) {
       std::swap(x[k], x[pivots_[k]]);

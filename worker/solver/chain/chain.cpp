@@ -1,6 +1,7 @@
 #include "worker/solver/chain/chain.h"
 
 #include <cmath>
+#include <numeric>
 
 #include "worker/solver/model/errors.h"
 
@@ -8,25 +9,26 @@ namespace oblique::solver {
 namespace {
 
 /// Rows of a chain: the pin's position and slope, two a node, one more at each joint.
-std::size_t count_rows(const ModelParameters& model) {
+Eigen::Index count_rows(const ModelParameters& model) {
   validate(model);
-  const std::size_t links = model.lengths_m.size();
-  const auto n = static_cast<std::size_t>(model.elements_per_link);
+  const auto links = static_cast<Eigen::Index>(model.lengths_m.size());
+  const Eigen::Index n = model.elements_per_link;
   return 2 + 2 * n * links + (links - 1);
 }
 
-BandedMatrix with_unit_pin(std::size_t rows, double unit) {
-  BandedMatrix matrix(rows);
+BandedMatrix with_unit_pin(Eigen::Index rows, double unit) {
+  BandedMatrix matrix(static_cast<std::size_t>(rows));
   matrix.at(0, 0) = unit;
   return matrix;
 }
 
-void add_element(BandedMatrix& matrix, const std::size_t (&row)[4],
-                 const std::array<std::array<double, 4>, 4>& entries, double factor) {
+void add_element(BandedMatrix& matrix, const std::array<Eigen::Index, 4>& row,
+                 const Eigen::Matrix4d& entries, double factor) {
   for (std::size_t a = 0; a < 4; ++a) {
     for (std::size_t b = 0; b < 4; ++b) {
       if (row[a] != 0 && row[b] != 0) {
-        matrix.add(row[a], row[b], factor * entries[a][b]);
+        matrix.add(static_cast<std::size_t>(row[a]), static_cast<std::size_t>(row[b]),
+                   factor * entries(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)));
       }
     }
   }
@@ -67,8 +69,8 @@ Chain::Chain(const ModelParameters& model)
     : rows_(count_rows(model)),
       gravity_m_s2_(model.g_m_s2),
       mass_per_length_(model.rho_kg_m3 * model.A_m2),
-      weight_N_(rows_, 0.0),
-      momentum_kg_(rows_, 0.0),
+      weight_N_(Eigen::VectorXd::Zero(rows_)),
+      momentum_kg_(Eigen::VectorXd::Zero(rows_)),
       mass_(with_unit_pin(rows_, 1.0)),
       mass_factor_(BandedMatrix(0)),
       along_(with_unit_pin(rows_, 0.0)) {
@@ -79,15 +81,13 @@ Chain::Chain(const ModelParameters& model)
     // kappa^2 = r''.r'' counts both directions, so bending stiffness acts along the chain too.
     add_element(along_, element.row, gradient_matrix(length), model.E_Pa * model.A_m2);
     add_element(along_, element.row, bending_matrix(length), model.E_Pa * model.I_m4);
-    const auto load = uniform_load(length);
-    for (std::size_t a = 0; a < 4; ++a) {
-      weight_N_[element.row[a]] -= mass_per_length_ * gravity_m_s2_ * load[a];
-      momentum_kg_[element.row[a]] += mass_per_length_ * load[a];
-    }
+    const Eigen::Vector4d load = uniform_load(length);
+    weight_N_(element.row) -= mass_per_length_ * gravity_m_s2_ * load;
+    momentum_kg_(element.row) += mass_per_length_ * load;
   }
-  mass_.at(tip_row(), 0) += model.tip_mass_kg;
-  weight_N_[tip_row()] -= model.tip_mass_kg * model.g_m_s2;
-  momentum_kg_[tip_row()] += model.tip_mass_kg;
+  mass_.at(static_cast<std::size_t>(tip_row()), 0) += model.tip_mass_kg;
+  weight_N_(tip_row()) -= model.tip_mass_kg * model.g_m_s2;
+  momentum_kg_(tip_row()) += model.tip_mass_kg;
   balance_links(model.tip_mass_kg);
   mass_factor_ = BandedCholesky(mass_);
   if (!mass_factor_.positive_definite()) {
@@ -99,16 +99,14 @@ Chain::Chain(const ModelParameters& model)
 
 void Chain::number_rows(const ModelParameters& model) {
   const int n = model.elements_per_link;
-  std::size_t left = 0;  // row of the left node's position; its slope follows
+  Eigen::Index left = 0;  // row of the left node's position; its slope follows
   for (std::size_t link = 0; link < model.lengths_m.size(); ++link) {
     const double length = model.lengths_m[link] / n;
     first_element_.push_back(elements_.size());
     for (int e = 0; e < n; ++e) {
       const bool ends_at_joint = e + 1 == n && link + 1 < model.lengths_m.size();
       Element element{};
-      for (std::size_t a = 0; a < 4; ++a) {
-        element.row[a] = left + a;
-      }
+      std::iota(element.row.begin(), element.row.end(), left);
       if (ends_at_joint) {
         std::swap(element.row[2], element.row[3]);  // slope of the inner link, then the position
       }
@@ -136,16 +134,20 @@ void Chain::balance_links(double tip_mass_kg) {
 
 ChainState Chain::at_rest() const {
   ChainState state;
-  state.q.assign(2 * rows_, 0.0);
-  state.v.assign(2 * rows_, 0.0);
+  state.q.setZero(2, rows_);
+  state.v.setZero(2, rows_);
   double x = 0.0;
   for (const Element& element : elements_) {
     x += 1.0 / element.inverse_length;
-    state.q[2 * element.row[1]] = 1.0;
-    state.q[2 * element.row[2]] = x;
-    state.q[2 * element.row[3]] = 1.0;
+    state.q(0, element.row[1]) = 1.0;
+    state.q(0, element.row[2]) = x;
+    state.q(0, element.row[3]) = 1.0;
   }
   return state;
+}
+
+GradientCoefficients Chain::gradient(const Element& element, const Coordinates& q) {
+  return gradient_coefficients(q(Eigen::all, element.row), element.inverse_length);
 }
 
 double Chain::kinetic_energy_J(const Coordinates& v) const {
@@ -154,76 +156,56 @@ double Chain::kinetic_energy_J(const Coordinates& v) const {
 }
 
 double Chain::strain_energy_J(const Coordinates& q) const {
-  const auto at = [&q](std::size_t row) {
-    return PlanarVector<double>{q[2 * row], q[2 * row + 1]};
-  };
   double energy = 0.0;
   for (const Element& element : elements_) {
-    const auto [pi, si, pj, sj] = element.row;
-    energy +=
-        strain_energy(gradient_coefficients(at(pi), at(si), at(pj), at(sj), element.inverse_length),
-                      element.half_EA_length, element.bending);
+    energy += strain_energy(gradient(element, q), element.half_EA_length, element.bending);
   }
   return energy;
 }
 
 double Chain::gravity_energy_J(const Coordinates& q) const {
-  double energy = 0.0;
-  for (std::size_t row = 0; row < rows_; ++row) {
-    energy -= weight_N_[row] * q[2 * row + 1];
-  }
-  return energy;
+  return -q.row(1).dot(weight_N_);
 }
 
-PlanarVector<double> Chain::momentum_Ns(const Coordinates& v) const {
-  PlanarVector<double> momentum{0.0, 0.0};
-  for (std::size_t row = 0; row < rows_; ++row) {
-    momentum.x += momentum_kg_[row] * v[2 * row];
-    momentum.y += momentum_kg_[row] * v[2 * row + 1];
-  }
-  return momentum;
+Eigen::Vector2d Chain::momentum_Ns(const Coordinates& v) const {
+  return v * momentum_kg_;
 }
 
-std::vector<PlanarVector<double>> Chain::node_positions_m(const Coordinates& q) const {
-  std::vector<PlanarVector<double>> nodes{{q[0], q[1]}};
-  for (const Element& element : elements_) {
-    const std::size_t outer = 2 * element.row[2];
-    nodes.push_back({q[outer], q[outer + 1]});
+Coordinates Chain::node_positions_m(const Coordinates& q) const {
+  Coordinates nodes(2, static_cast<Eigen::Index>(elements_.size()) + 1);
+  nodes.col(0) = q.col(0);
+  for (Eigen::Index e = 1; e < nodes.cols(); ++e) {
+    nodes.col(e) = q.col(elements_[static_cast<std::size_t>(e - 1)].row[2]);
   }
   return nodes;
 }
 
 TipState Chain::tip(const ChainState& state) const {
-  const std::size_t i = 2 * tip_row();
-  return {state.q[i], state.q[i + 1], state.v[i], state.v[i + 1]};
+  const auto r = state.q.col(tip_row());
+  const auto v = state.v.col(tip_row());
+  return {r.x(), r.y(), v.x(), v.y()};
 }
 
-PlanarVector<double> Chain::inner_end_force(std::size_t link, const Coordinates& q,
-                                            const Coordinates& acceleration) const {
+Eigen::Vector2d Chain::inner_end_force(std::size_t link, const Coordinates& q,
+                                       const Coordinates& acceleration) const {
   const Element& element = elements_[first_element_.at(link)];
-  const auto at = [](const Coordinates& values, std::size_t row) {
-    return PlanarVector<double>{values[2 * row], values[2 * row + 1]};
-  };
-  const auto [pi, si, pj, sj] = element.row;
   const double length = 1.0 / element.inverse_length;
-  const auto g =
-      gradient_coefficients(at(q, pi), at(q, si), at(q, pj), at(q, sj), element.inverse_length);
-  const auto f = elastic_gradient(g, element.half_EA_length, element.bending);
-  PlanarVector<double> force{(f.c[2].x - f.c[0].x) * element.inverse_length,
-                             (f.c[2].y - f.c[0].y) * element.inverse_length};
-  const auto mass = mass_matrix(mass_per_length_, length);
-  for (std::size_t b = 0; b < 4; ++b) {
-    force.x += mass[0][b] * acceleration[2 * element.row[b]];
-    force.y += mass[0][b] * acceleration[2 * element.row[b] + 1];
+  const GradientCoefficients f =
+      elastic_gradient(gradient(element, q), element.half_EA_length, element.bending);
+  // The first column of (dU/dC) B, and of Q'' M.
+  Eigen::Vector2d force = (f.col(2) - f.col(0)) * element.inverse_length;
+  const Eigen::Vector4d mass = mass_matrix(mass_per_length_, length).col(0);
+  for (std::size_t a = 0; a < 4; ++a) {
+    force += mass[static_cast<Eigen::Index>(a)] * acceleration.col(element.row[a]);
   }
-  force.y += mass_per_length_ * gravity_m_s2_ * uniform_load(length)[0];
+  force.y() += mass_per_length_ * gravity_m_s2_ * uniform_load(length)[0];
   return force;
 }
 
 double Chain::highest_frequency_rad_s(double tip_stiffness_N_m) const {
   // Across, the stiffness is the smaller by the axial part, so the highest frequency lies along.
   BandedMatrix held = along_;
-  held.at(tip_row(), 0) += tip_stiffness_N_m;
+  held.at(static_cast<std::size_t>(tip_row()), 0) += tip_stiffness_N_m;
   return std::sqrt(largest_eigenvalue(held, mass_));
 }
 

@@ -1,17 +1,34 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <cstddef>
 #include <vector>
 
 #include "worker/solver/chain/banded_cholesky.h"
+#include "worker/solver/chain/banded_lu.h"
 #include "worker/solver/chain/beam_element.h"
+#include "worker/solver/chain/tip_state.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::solver {
 
-/// Positions and slopes of a chain, or their rates. `values[2 row + c]`, c = 0 for x, 1 for y.
-using Coordinates = std::vector<double>;
+/// Positions and slopes of a chain, or their rates: one a column, x above y.
+using Coordinates = Eigen::Matrix2Xd;
+
+/// Room for what a step computes on its way, so that steps allocate nothing. No part of a state: a
+/// copy has none of it, and who is assigned to keeps his own.
+struct StepRoom {
+  StepRoom() = default;
+  StepRoom(const StepRoom&) {}
+  StepRoom(StepRoom&&) noexcept = default;
+  StepRoom& operator=(const StepRoom&) { return *this; }
+  StepRoom& operator=(StepRoom&&) noexcept = default;
+  ~StepRoom() = default;
+
+  Coordinates vectors;
+  BandedLu<7> matrix;  ///< of ConstrainedChain
+};
 
 struct ChainState {
   double t_s = 0.0;  ///< since release
@@ -20,18 +37,11 @@ struct ChainState {
   /// What an integrator remembers besides; empty where it remembers nothing.
   Coordinates acceleration;  ///< q'' at t_s
   /// (a - q'')/h of generalized-alpha: a_n stands for q'' a fixed part of a step away, so it is
-  /// kept per second and serves a next step of any length. Empty after a restart: the next step
-  /// finds it.
+  /// kept per second and serves a next step of any length.
   Coordinates algorithmic_offset_rate;
-  std::vector<double> multipliers_N;  ///< joint multipliers, x and y in turn
-};
-
-/// Tip position and velocity in the fixed frame, origin at O, y up.
-struct TipState {
-  double x_m;
-  double y_m;
-  double vx_m_s;
-  double vy_m_s;
+  Coordinates multipliers_N;     ///< a column a link
+  bool has_offset_rate = false;  ///< false after a restart: the next step finds it
+  StepRoom room = {};
 };
 
 /// The chain with joints eliminated: links share the position of a joint and keep slopes of their
@@ -46,8 +56,9 @@ class Chain {
   /// Throws InputError when `model` is outside its domain.
   explicit Chain(const ModelParameters& model);
 
-  std::size_t rows() const { return rows_; }
-  std::size_t tip_row() const { return rows_ - 2; }
+  /// Of the matrices, and columns of Coordinates.
+  Eigen::Index rows() const { return rows_; }
+  Eigen::Index tip_row() const { return rows_ - 2; }
   double gravity_m_s2() const { return gravity_m_s2_; }
 
   /// Straight, horizontal, unstressed, at rest (paper, section 2).
@@ -55,8 +66,8 @@ class Chain {
 
   /// The tables that the kernels of chain_kernel.h read.
   ChainTables tables() const {
-    return {rows_,
-            tip_row(),
+    return {static_cast<std::size_t>(rows_),
+            static_cast<std::size_t>(tip_row()),
             links(),
             elements_.size() / links(),
             constants_.data(),
@@ -75,15 +86,15 @@ class Chain {
   double strain_energy_J(const Coordinates& q) const;
   double gravity_energy_J(const Coordinates& q) const;
   TipState tip(const ChainState& state) const;
-  PlanarVector<double> momentum_Ns(const Coordinates& v) const;
+  Eigen::Vector2d momentum_Ns(const Coordinates& v) const;
   /// O first, then the outer end of each element.
-  std::vector<PlanarVector<double>> node_positions_m(const Coordinates& q) const;
+  Coordinates node_positions_m(const Coordinates& q) const;
 
   std::size_t links() const { return first_element_.size(); }
   /// Force on a link at its inner end (the pin or a joint), from the balance of its first node:
   /// M q'' + dU/dq - Q there.
-  PlanarVector<double> inner_end_force(std::size_t link, const Coordinates& q,
-                                       const Coordinates& acceleration) const;
+  Eigen::Vector2d inner_end_force(std::size_t link, const Coordinates& q,
+                                  const Coordinates& acceleration) const;
 
   /// Highest angular frequency [rad/s] of the straight chain, the tip held by springs of
   /// `tip_stiffness_N_m` in both directions. To a relative 1e-10.
@@ -91,22 +102,23 @@ class Chain {
 
  private:
   struct Element {
-    std::size_t row[4];  ///< rows of p_i, s_i, p_j, s_j
+    std::array<Eigen::Index, 4> row;  ///< of p_i, s_i, p_j, s_j
     double inverse_length;
     double half_EA_length;  ///< EA l/2
     double bending;         ///< 2 EI/l
   };
+  static GradientCoefficients gradient(const Element& element, const Coordinates& q);
   void number_rows(const ModelParameters& model);
   void balance_links(double tip_mass_kg);
 
-  std::size_t rows_;
+  Eigen::Index rows_;
   double gravity_m_s2_;
   double mass_per_length_;
   std::vector<Element> elements_;
   std::vector<std::size_t> first_element_;   ///< of each link
   std::vector<ElasticConstants> constants_;  ///< of an element of each link
-  std::vector<double> weight_N_;     ///< generalised gravity along y [N] and [N m], one a row
-  std::vector<double> momentum_kg_;  ///< what a rate adds to the momentum [kg] and [kg m]
+  Eigen::VectorXd weight_N_;     ///< generalised gravity along y [N] and [N m], one a row
+  Eigen::VectorXd momentum_kg_;  ///< what a rate adds to the momentum [kg] and [kg m]
   std::vector<LinkBalance> balance_;
   BandedMatrix mass_;  ///< of the free rows; row 0 is a unit row
   BandedCholesky mass_factor_;

@@ -1,7 +1,5 @@
 #pragma once
 
-#include "worker/solver/chain/beam_element.h"
-
 /// Elastic forces of the beam element in closed form, for the innermost loops.
 ///
 /// With S = EA l and eps = sum E_k P_k, dU/dc_a = S sum_b K_ab c_b, K_ab = 1/2 int eps P_a P_b
@@ -14,7 +12,14 @@
 /// Five Gauss points give the same, being exact for these integrands, at half as much work again.
 /// Scaled coordinates u = p_j - p_i = l c0, d = s_j - s_i = 2 c1 and t = 2 c2 leave the constants
 /// to a table.
+/// By hand, and without Eigen: `Real` is a number or a vector of lanes.
 namespace oblique::solver {
+
+template <class Real>
+struct PlanarVector {
+  Real x;
+  Real y;
+};
 
 struct ElasticConstants {
   double two_inverse_length;

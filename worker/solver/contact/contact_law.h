@@ -1,6 +1,6 @@
 #pragma once
 
-#include "worker/solver/chain/chain.h"
+#include "worker/solver/chain/tip_state.h"
 #include "worker/solver/model/case_result.h"
 #include "worker/solver/motion/tip.h"
 

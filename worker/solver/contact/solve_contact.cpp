@@ -1,9 +1,8 @@
 #include "worker/solver/contact/solve_contact.h"
 
-#include <algorithm>
 #include <chrono>
+#include <cstddef>
 #include <utility>
-#include <vector>
 
 #include "worker/solver/contact/contact_outcome.h"
 #include "worker/solver/contact/reaction_peaks.h"
@@ -18,12 +17,13 @@ CaseResult solve_contact(const Motion& motion, const ContactParameters& paramete
   Contact contact(parameters, touch, steps);
   motion.restart(contact.force(), accepted);
   const ContactTracer tracer(motion, tracing, touch);
-  std::vector<double> squared_N2(motion.reactions(contact.force(), accepted).size());
-  ReactionPeaks reaction_peaks(squared_N2.size());
+  Eigen::Matrix2Xd reactions_N;
+  motion.reactions(contact.force(), accepted, reactions_N);
+  ReactionPeaks reaction_peaks(static_cast<std::size_t>(reactions_N.cols()));
+  Eigen::RowVectorXd squared_N2(reactions_N.cols());
   const auto observe = [&] {
-    const auto reactions = motion.reactions(contact.force(), accepted);
-    std::transform(reactions.begin(), reactions.end(), squared_N2.begin(),
-                   [](const JointReaction& r) { return r.x_N * r.x_N + r.y_N * r.y_N; });
+    motion.reactions(contact.force(), accepted, reactions_N);
+    squared_N2 = reactions_N.colwise().squaredNorm();
     reaction_peaks.set_span(0, contact.time_s(), 0.0);
     reaction_peaks.add(squared_N2.data());
     if (tracing.sink) {

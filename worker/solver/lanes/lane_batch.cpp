@@ -134,7 +134,7 @@ void LaneBatch::start_branch(std::size_t lane) {
 
 bool LaneBatch::advance(std::size_t lane, const Sink& sink) {
   Lane& slot = lanes_[lane];
-  const std::size_t tip = 2 * chain_.tip_row();
+  const std::size_t tip = 2 * chain_.tables().tip_row;
   const TipState end{stepper_.trial_q(lane, tip), stepper_.trial_q(lane, tip + 1),
                      stepper_.trial_v(lane, tip), stepper_.trial_v(lane, tip + 1)};
   const int events = slot.contact->events();
@@ -187,10 +187,9 @@ std::vector<ReactionPeak> LaneBatch::reaction_peaks(std::size_t lane) {
   }
   const Contact& contact = *lanes_[lane].contact;
   ReactionPeaks with_end = reactions_.taken_out(lane);
-  std::vector<double> squared_N2;
-  for (const JointReaction& reaction : motion_.reactions(contact.force(), stored(lane))) {
-    squared_N2.push_back(reaction.x_N * reaction.x_N + reaction.y_N * reaction.y_N);
-  }
+  Eigen::Matrix2Xd reactions_N;
+  motion_.reactions(contact.force(), stored(lane), reactions_N);
+  const Eigen::RowVectorXd squared_N2 = reactions_N.colwise().squaredNorm();
   with_end.set_span(0, contact.time_s(), 0.0);
   with_end.add(squared_N2.data());
   return with_end.peaks(0);

@@ -62,13 +62,18 @@ Fall::Fall(std::shared_ptr<const Motion> motion, double dt_s, double longest_s)
 }
 
 void Fall::locate_turn(const ChainState& before) {
+  ChainState state;
+  const auto tip_after = [&](double h_s) {
+    motion_->step(before, kNoContact, h_s, state);
+    return motion_->tip(state);
+  };
   double low = 0.0;
   double high = dt_s_;
   for (int i = 0; i < 60; ++i) {
     const double middle = 0.5 * (low + high);
-    (motion_->tip(stepped(before, middle)).vy_m_s < 0.0 ? low : high) = middle;
+    (tip_after(middle).vy_m_s < 0.0 ? low : high) = middle;
   }
-  largest_drop_m_ = -motion_->tip(stepped(before, low)).y_m;
+  largest_drop_m_ = -tip_after(low).y_m;
 }
 
 void Fall::keep(std::int64_t step, const ChainState& state) {
@@ -86,12 +91,6 @@ void Fall::keep(std::int64_t step, const ChainState& state) {
   steps_kept_ *= 2;
 }
 
-ChainState Fall::stepped(const ChainState& from, double h_s) const {
-  ChainState state;
-  motion_->step(from, kNoContact, h_s, state);
-  return state;
-}
-
 ChainState Fall::state_at(double H_m) const {
   if (!(H_m > 0.0 && H_m <= largest_drop_m_)) {
     throw InputError("H = " + exact_number(H_m) +
@@ -105,8 +104,8 @@ ChainState Fall::state_at(double H_m) const {
   ChainState state = before;
   const auto first_step = static_cast<std::int64_t>(after - kept_.begin() - 1) * steps_kept_;
   for (std::int64_t step = 1; step <= steps_kept_; ++step) {
-    before = state;
-    state = stepped(before, dt_s_);
+    std::swap(before, state);
+    motion_->step(before, kNoContact, dt_s_, state);
     state.t_s = static_cast<double>(first_step + step) * dt_s_;
     if (drop(state) >= H_m || motion_->tip(state).vy_m_s >= 0.0) {
       break;
@@ -123,7 +122,7 @@ ChainState Fall::locate(double H_m, const ChainState& before) const {
   double h = 0.5 * dt_s_;
   ChainState state = before;
   for (int i = 0; i < 80 && high - low > 0.0; ++i) {
-    state = stepped(before, h);
+    motion_->step(before, kNoContact, h, state);
     const TipState tip = motion_->tip(state);
     const double missing_m = H_m + tip.y_m;
     if (missing_m == 0.0) {

@@ -32,7 +32,6 @@ class Fall {
   ChainState state_at(double H_m) const;
 
  private:
-  ChainState stepped(const ChainState& from, double h_s) const;
   void locate_turn(const ChainState& before);
   void keep(std::int64_t step, const ChainState& state);
   /// Steps from `before` to the instant of the drop H_m, which lies within one step of it.

@@ -2,18 +2,46 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <string>
 
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::solver {
+namespace {
+
+/// F_c at the tip's position r.
+Eigen::Vector2d contact_force(const AffineContactForce<double>& force, const Eigen::Vector2d& r) {
+  return {force.ft_N(r.x(), r.y()), force.fn_N(r.y())};
+}
+
+/// -dF_c/dr.
+Eigen::Matrix2d contact_stiffness(const AffineContactForce<double>& force) {
+  return Eigen::Matrix2d{{force.k_tt, force.k_tn}, {0.0, force.k_nn}};
+}
+
+/// Solves for all unknowns in place.
+void solve(const ConstrainedChain::Matrix& factored, Coordinates& unknowns) {
+  factored.solve(std::span(unknowns.data(), static_cast<std::size_t>(unknowns.size())));
+}
+
+Eigen::RowVectorXd inverse_scale(const ConstrainedChain& chain, const ModelParameters& model) {
+  const double element_length_m =
+      *std::min_element(model.lengths_m.begin(), model.lengths_m.end()) / model.elements_per_link;
+  Eigen::RowVectorXd scale = Eigen::RowVectorXd::Ones(chain.columns());
+  for (Eigen::Index link = 0; link < chain.links(); ++link) {
+    for (int node = 0; node <= model.elements_per_link; ++node) {
+      scale(chain.multiplier_column(link) + 1 + 2 * node) = 1.0 / element_length_m;
+    }
+  }
+  return scale;
+}
+
+}  // namespace
 
 GeneralizedAlphaMotion::GeneralizedAlphaMotion(const ModelParameters& model)
-    : chain_(model),
-      alpha_(model.spectral_radius),
-      element_length_m_(*std::min_element(model.lengths_m.begin(), model.lengths_m.end()) /
-                        model.elements_per_link) {}
+    : chain_(model), alpha_(model.spectral_radius), inverse_scale_(inverse_scale(chain_, model)) {}
 
 ChainState GeneralizedAlphaMotion::at_rest() const {
   ChainState state = chain_.at_rest();
@@ -28,132 +56,106 @@ Energies GeneralizedAlphaMotion::energies(const ChainState& state) const {
 
 void GeneralizedAlphaMotion::restart(const AffineContactForce<double>& force,
                                      ChainState& state) const {
-  const std::size_t tip = chain_.tip_index();
-  const std::size_t size = chain_.size();
-  ConstrainedChain::Matrix matrix(size);
-  matrix.set_zero();
+  ConstrainedChain::Matrix& matrix = state.room.matrix;
+  matrix.set_zero(static_cast<std::size_t>(2 * chain_.columns()));
   chain_.add_tangent(state.q, 1.0, 0.0, matrix);
   if (!matrix.factor()) {
     throw SolveError("the constraints of this chain are not independent");
   }
-  // M q'' + Phiᵀ lambda = Q + F_c - dU/dq, Phi q'' = 0.
-  std::vector<double> unknowns(size, 0.0);
+  // M q'' + Phi_qᵀ lambda = Q + F_c - dU/dq, Phi_q q'' = 0.
+  const Eigen::Index tip = chain_.tip_column();
+  Coordinates& unknowns = state.acceleration;
+  unknowns.setZero(2, chain_.columns());
   chain_.add_elastic_and_gravity(state.q, unknowns);
-  unknowns[tip] -= force.ft_N(state.q[tip], state.q[tip + 1]);
-  unknowns[tip + 1] -= force.fn_N(state.q[tip + 1]);
-  for (double& value : unknowns) {
-    value = -value;
-  }
-  matrix.solve(unknowns);
-  state.multipliers_N.resize(2 * chain_.links());
-  for (std::size_t link = 0; link < chain_.links(); ++link) {
-    for (std::size_t c = 0; c < 2; ++c) {
-      const std::size_t index = chain_.multiplier_index(link) + c;
-      state.multipliers_N[2 * link + c] = unknowns[index];
-      unknowns[index] = 0.0;
-    }
-  }
-  state.acceleration = std::move(unknowns);
-  state.algorithmic_offset_rate.clear();
+  unknowns.col(tip) -= contact_force(force, state.q.col(tip));
+  unknowns = -unknowns;
+  solve(matrix, unknowns);
+  chain_.take_multipliers(unknowns, state.multipliers_N);
+  state.has_offset_rate = false;
 }
 
 double GeneralizedAlphaMotion::mass_factor() const {
   return (1.0 - alpha_.alpha_m) / (1.0 - alpha_.alpha_f);
 }
 
-void GeneralizedAlphaMotion::add_newton_matrix(const Coordinates& q,
-                                               const AffineContactForce<double>& force, double h_s,
-                                               ConstrainedChain::Matrix& matrix) const {
-  const std::size_t tip = chain_.tip_index();
+void GeneralizedAlphaMotion::factor_newton_matrix(const Coordinates& q,
+                                                  const AffineContactForce<double>& force,
+                                                  double h_s,
+                                                  ConstrainedChain::Matrix& matrix) const {
+  const auto tip = 2 * static_cast<std::size_t>(chain_.tip_column());
   const double stiffness_factor = alpha_.beta * h_s * h_s;
+  matrix.set_zero(static_cast<std::size_t>(2 * chain_.columns()));
   chain_.add_tangent(q, mass_factor(), stiffness_factor, matrix);
-  matrix.add(tip, tip, stiffness_factor * force.k_tt);
-  matrix.add(tip, tip + 1, stiffness_factor * force.k_tn);
-  matrix.add(tip + 1, tip + 1, stiffness_factor * force.k_nn);
-}
-
-Coordinates GeneralizedAlphaMotion::starting_offset_rate(const ChainState& from,
-                                                         const AffineContactForce<double>& force,
-                                                         double h_s) const {
-  const std::size_t tip = chain_.tip_index();
-  ConstrainedChain::Matrix matrix(chain_.size());
-  matrix.set_zero();
-  add_newton_matrix(from.q, force, h_s, matrix);
+  const Eigen::Matrix2d at_tip = stiffness_factor * contact_stiffness(force);
+  matrix.add_block(tip, tip, at_tip);
   if (!matrix.factor()) {
     throw SolveError("the Newton matrix is singular");
   }
-  Coordinates rates(chain_.size(), 0.0);
-  chain_.add_stiffness_product(from.q, from.v, rates);
-  rates[tip] += force.k_tn * from.v[tip + 1] + force.k_tt * from.v[tip];
-  rates[tip + 1] += force.k_nn * from.v[tip + 1];
+}
+
+void GeneralizedAlphaMotion::find_offset_rate(const AffineContactForce<double>& force, double h_s,
+                                              ChainState& state) const {
+  factor_newton_matrix(state.q, force, h_s, state.room.matrix);
+  const Eigen::Index tip = chain_.tip_column();
+  Coordinates& rate = state.algorithmic_offset_rate;
+  rate.setZero(2, chain_.columns());
+  chain_.add_stiffness_product(state.q, state.v, rate);
+  rate.col(tip) += contact_stiffness(force) * state.v.col(tip);
   // a_n stands for q'' at t_n + (alpha_m - alpha_f) h.
-  const double factor = mass_factor() * (alpha_.alpha_f - alpha_.alpha_m);
-  for (double& rate : rates) {
-    rate *= factor;
+  rate *= mass_factor() * (alpha_.alpha_f - alpha_.alpha_m);
+  solve(state.room.matrix, rate);
+  for (Eigen::Index link = 0; link < chain_.links(); ++link) {
+    rate.col(chain_.multiplier_column(link)).setZero();
   }
-  matrix.solve(rates);
-  for (std::size_t link = 0; link < chain_.links(); ++link) {
-    rates[chain_.multiplier_index(link)] = 0.0;
-    rates[chain_.multiplier_index(link) + 1] = 0.0;
-  }
-  return rates;
+  state.has_offset_rate = true;
 }
 
 void GeneralizedAlphaMotion::predict(const ChainState& from,
                                      const AffineContactForce<double>& force, double h_s,
                                      ChainState& to) const {
+  const auto& [alpha_m, alpha_f, beta, gamma] = alpha_;
   to = from;
-  if (from.algorithmic_offset_rate.empty()) {
-    to.algorithmic_offset_rate = starting_offset_rate(from, force, h_s);
+  if (!from.has_offset_rate) {
+    find_offset_rate(force, h_s, to);
   }
   to.t_s = from.t_s + h_s;
-  // q''_{n+1} = q''_n to begin with.
-  for (std::size_t i = 0; i < chain_.size(); ++i) {
-    const double a_from = from.acceleration[i] + h_s * to.algorithmic_offset_rate[i];
-    const double a_to = (from.acceleration[i] - alpha_.alpha_m * a_from) / (1.0 - alpha_.alpha_m);
-    to.q[i] += h_s * (from.v[i] + h_s * ((0.5 - alpha_.beta) * a_from + alpha_.beta * a_to));
-    to.v[i] += h_s * ((1.0 - alpha_.gamma) * a_from + alpha_.gamma * a_to);
-    // Held as a_{n+1} until the step is done.
-    to.algorithmic_offset_rate[i] = a_to;
-  }
+  Coordinates& a_from = to.room.vectors;
+  Coordinates& a = to.algorithmic_offset_rate;
+  a_from = from.acceleration + h_s * a;
+  a = (from.acceleration - alpha_m * a_from) / (1.0 - alpha_m);
+  to.q += h_s * (from.v + h_s * ((0.5 - beta) * a_from + beta * a));
+  to.v += h_s * ((1.0 - gamma) * a_from + gamma * a);
 }
 
 void GeneralizedAlphaMotion::evaluate(const AffineContactForce<double>& force, double h_s,
-                                      const ChainState& state,
-                                      std::vector<double>& residual) const {
-  const std::size_t tip = chain_.tip_index();
-  std::fill(residual.begin(), residual.end(), 0.0);
+                                      const ChainState& state, Coordinates& residual) const {
+  const Eigen::Index tip = chain_.tip_column();
+  residual.setZero();
   chain_.add_inertia(state.acceleration, residual);
   chain_.add_elastic_and_gravity(state.q, residual);
   chain_.add_constraint_forces(state.multipliers_N, residual);
-  residual[tip] -= force.ft_N(state.q[tip], state.q[tip + 1]);
-  residual[tip + 1] -= force.fn_N(state.q[tip + 1]);
+  residual.col(tip) -= contact_force(force, state.q.col(tip));
   chain_.set_constraints(state.q, 1.0 / (alpha_.beta * h_s * h_s), residual);
 }
 
-double GeneralizedAlphaMotion::correct(double h_s, const std::vector<double>& correction,
+double GeneralizedAlphaMotion::correct(const AffineContactForce<double>& force, double h_s,
                                        ChainState& state) const {
-  const double q_factor = alpha_.beta * h_s * h_s;
-  const double v_factor = alpha_.gamma * h_s;
-  const double acceleration_factor = mass_factor();
-  double largest = 0.0;
-  for (std::size_t link = 0; link < chain_.links(); ++link) {
-    const std::size_t multiplier = chain_.multiplier_index(link);
-    state.multipliers_N[2 * link] -= correction[multiplier];
-    state.multipliers_N[2 * link + 1] -= correction[multiplier + 1];
-    const std::size_t end =
-        link + 1 < chain_.links() ? chain_.multiplier_index(link + 1) : chain_.size();
-    for (std::size_t i = multiplier + 2; i < end; ++i) {
-      state.algorithmic_offset_rate[i] -= correction[i];
-      state.acceleration[i] -= acceleration_factor * correction[i];
-      state.q[i] -= q_factor * correction[i];
-      state.v[i] -= v_factor * correction[i];
-      const bool is_position = (i - multiplier - 2) % 4 < 2;
-      const double moved = std::abs(q_factor * correction[i]);
-      largest = std::max(largest, is_position ? moved / element_length_m_ : moved);
-    }
+  Coordinates& correction = state.room.vectors;  // -(Delta a and Delta lambda)
+  evaluate(force, h_s, state, correction);
+  factor_newton_matrix(state.q, force, h_s, state.room.matrix);
+  solve(state.room.matrix, correction);
+  for (Eigen::Index link = 0; link < chain_.links(); ++link) {
+    auto of_multiplier = correction.col(chain_.multiplier_column(link));
+    state.multipliers_N.col(link) -= of_multiplier;
+    of_multiplier.setZero();
   }
-  return largest;
+  const double by_position = alpha_.beta * h_s * h_s;
+  state.algorithmic_offset_rate -= correction;
+  state.acceleration -= mass_factor() * correction;
+  state.q -= by_position * correction;
+  state.v -= alpha_.gamma * h_s * correction;
+  return by_position *
+         (correction * inverse_scale_.asDiagonal()).cwiseAbs().maxCoeff<Eigen::PropagateNaN>();
 }
 
 ContactIntegrals<double> GeneralizedAlphaMotion::step(const ChainState& from,
@@ -164,22 +166,13 @@ ContactIntegrals<double> GeneralizedAlphaMotion::step(const ChainState& from,
     return {};
   }
   predict(from, force, h_s, to);
-  ConstrainedChain::Matrix matrix(chain_.size());
-  std::vector<double> residual(chain_.size());
   for (int iteration = 0;; ++iteration) {
     if (iteration == kMostIterations) {
       throw SolveError("Newton's method did not converge in " + std::to_string(kMostIterations) +
                        " iterations at t = " + readable_number(to.t_s) + " s with a step of " +
                        exact_number(h_s) + " s");
     }
-    evaluate(force, h_s, to, residual);
-    matrix.set_zero();
-    add_newton_matrix(to.q, force, h_s, matrix);
-    if (!matrix.factor()) {
-      throw SolveError("the Newton matrix is singular");
-    }
-    matrix.solve(residual);
-    const double moved = correct(h_s, residual, to);
+    const double moved = correct(force, h_s, to);
     if (moved <= kNewtonTolerance) {
       break;
     }
@@ -188,9 +181,7 @@ ContactIntegrals<double> GeneralizedAlphaMotion::step(const ChainState& from,
                        " s diverged at t = " + readable_number(to.t_s) + " s");
     }
   }
-  for (std::size_t i = 0; i < chain_.size(); ++i) {
-    to.algorithmic_offset_rate[i] = (to.algorithmic_offset_rate[i] - to.acceleration[i]) / h_s;
-  }
+  to.algorithmic_offset_rate = (to.algorithmic_offset_rate - to.acceleration) / h_s;
   return integrals(force, h_s, from, to);
 }
 
@@ -199,42 +190,28 @@ ContactIntegrals<double> GeneralizedAlphaMotion::integrals(const AffineContactFo
                                                            const ChainState& to) const {
   // Hermite rules on values and derivatives at both ends: of higher order than the step.
   struct End {
-    double fn, fn_1, fn_2, ft, ft_1, ft_2, power, power_1;
+    Eigen::Vector2d F, F_1, F_2;  // and derivatives in time
+    double P, P_1;                // F_t V_t
   };
+  const Eigen::Matrix2d K = contact_stiffness(force);
   const auto at = [&](const ChainState& state) {
-    const std::size_t tip = chain_.tip_index();
-    const TipState p = chain_.tip(state);
-    const double ax = state.acceleration[tip];
-    const double ay = state.acceleration[tip + 1];
-    End end{};
-    end.fn = force.fn_N(p.y_m);
-    end.fn_1 = -force.k_nn * p.vy_m_s;
-    end.fn_2 = -force.k_nn * ay;
-    end.ft = force.ft_N(p.x_m, p.y_m);
-    end.ft_1 = -force.k_tn * p.vy_m_s - force.k_tt * p.vx_m_s;
-    end.ft_2 = -force.k_tn * ay - force.k_tt * ax;
-    end.power = end.ft * p.vx_m_s;
-    end.power_1 = end.ft_1 * p.vx_m_s + end.ft * ax;
+    const Eigen::Index tip = chain_.tip_column();
+    const auto v = state.v.col(tip);
+    const auto a = state.acceleration.col(tip);
+    End end;
+    end.F = contact_force(force, state.q.col(tip));
+    end.F_1 = -K * v;
+    end.F_2 = -K * a;
+    end.P = end.F.x() * v.x();
+    end.P_1 = end.F_1.x() * v.x() + end.F.x() * a.x();
     return end;
   };
   const End e0 = at(from);
   const End e1 = at(to);
   const double h = h_s;
-  const auto hermite = [h](double f0, double f1, double d0, double d1, double s0, double s1) {
-    return h * (0.5 * (f0 + f1) + h * ((d0 - d1) / 10.0 + h * (s0 + s1) / 120.0));
-  };
-  return {hermite(e0.fn, e1.fn, e0.fn_1, e1.fn_1, e0.fn_2, e1.fn_2),
-          hermite(e0.ft, e1.ft, e0.ft_1, e1.ft_1, e0.ft_2, e1.ft_2),
-          h * (0.5 * (e0.power + e1.power) + h * (e0.power_1 - e1.power_1) / 12.0)};
-}
-
-std::vector<JointReaction> GeneralizedAlphaMotion::reactions(const AffineContactForce<double>&,
-                                                             const ChainState& state) const {
-  std::vector<JointReaction> reactions;
-  for (std::size_t link = 0; link < chain_.links(); ++link) {
-    reactions.push_back({-state.multipliers_N[2 * link], -state.multipliers_N[2 * link + 1]});
-  }
-  return reactions;
+  const Eigen::Vector2d impulse =
+      h * (0.5 * (e0.F + e1.F) + h * ((e0.F_1 - e1.F_1) / 10.0 + h / 120.0 * (e0.F_2 + e1.F_2)));
+  return {impulse.y(), impulse.x(), h * (0.5 * (e0.P + e1.P) + h / 12.0 * (e0.P_1 - e1.P_1))};
 }
 
 }  // namespace oblique::solver

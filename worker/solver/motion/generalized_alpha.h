@@ -1,6 +1,6 @@
 #pragma once
 
-#include <vector>
+#include <Eigen/Core>
 
 #include "worker/solver/chain/constrained_chain.h"
 #include "worker/solver/motion/motion.h"
@@ -53,40 +53,47 @@ class GeneralizedAlphaMotion : public Motion {
   ContactIntegrals<double> step(const ChainState& from, const AffineContactForce<double>& force,
                                 double h_s, ChainState& to) const override;
   void restart(const AffineContactForce<double>& force, ChainState& state) const override;
-  PlanarVector<double> momentum_Ns(const ChainState& state) const override {
+  Eigen::Vector2d momentum_Ns(const ChainState& state) const override {
     return chain_.momentum_Ns(state.v);
   }
-  std::vector<PlanarVector<double>> node_positions_m(const ChainState& state) const override {
+  Coordinates node_positions_m(const ChainState& state) const override {
     return chain_.node_positions_m(state.q);
   }
-  std::vector<JointReaction> reactions(const AffineContactForce<double>& force,
-                                       const ChainState& state) const override;
+  void reactions(const AffineContactForce<double>&, const ChainState& state,
+                 Eigen::Matrix2Xd& reactions_N) const override {
+    reactions_N = -state.multipliers_N;
+  }
 
  private:
   /// (1 - alpha_m)/(1 - alpha_f), by which q'' follows a.
   double mass_factor() const;
-  /// matrix += [mass_factor M + beta h^2 K, Phi_qᵀ; Phi_q, 0].
-  void add_newton_matrix(const Coordinates& q, const AffineContactForce<double>& force, double h_s,
-                         ConstrainedChain::Matrix& matrix) const;
+  /// Factors [mass_factor M + beta h^2 K, Phi_qᵀ; Phi_q, 0].
+  void factor_newton_matrix(const Coordinates& q, const AffineContactForce<double>& force,
+                            double h_s, ConstrainedChain::Matrix& matrix) const;
   /// (a_0 - q''_0)/h of the first step after a restart, (alpha_m - alpha_f) q''' with
   ///
   ///   (M + beta h^2/mass_factor K) q''' + Phi_qᵀ lambda' = -K v,   Phi_q q''' = 0.
   ///
   /// The term in K changes q''' by order h^2 where the step resolves the motion. Where it does not,
   /// it keeps the offset as small as the velocity allows; -M^-1 K v would multiply rounding.
-  Coordinates starting_offset_rate(const ChainState& from, const AffineContactForce<double>& force,
-                                   double h_s) const;
+  void find_offset_rate(const AffineContactForce<double>& force, double h_s,
+                        ChainState& state) const;
+  /// The step as if q''_{n+1} were q''_n. What is a_{n+1} stands in `algorithmic_offset_rate`
+  /// until the step is done.
   void predict(const ChainState& from, const AffineContactForce<double>& force, double h_s,
                ChainState& to) const;
+  /// M q'' + Phi_qᵀ lambda + dU/dq - Q - F_c and Phi/(beta h^2).
   void evaluate(const AffineContactForce<double>& force, double h_s, const ChainState& state,
-                std::vector<double>& residual) const;
-  double correct(double h_s, const std::vector<double>& correction, ChainState& state) const;
+                Coordinates& residual) const;
+  /// One correction by Newton's method. How far it moves the chain, as kNewtonTolerance counts.
+  double correct(const AffineContactForce<double>& force, double h_s, ChainState& state) const;
   ContactIntegrals<double> integrals(const AffineContactForce<double>& force, double h_s,
                                      const ChainState& from, const ChainState& to) const;
 
   ConstrainedChain chain_;
   GeneralizedAlphaParameters alpha_;
-  double element_length_m_;  ///< the shortest
+  /// A column each: 1 over the shortest element's length for positions, 1 for slopes.
+  Eigen::RowVectorXd inverse_scale_;
 };
 
 }  // namespace oblique::solver

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <vector>
+#include <Eigen/Core>
 
 #include "worker/solver/chain/chain.h"
 #include "worker/solver/motion/tip.h"
@@ -11,12 +11,6 @@ struct Energies {
   double kinetic_J;
   double strain_J;
   double gravity_J;
-};
-
-/// Force on the outer link at the pin or a joint, from what holds it.
-struct JointReaction {
-  double x_N;
-  double y_N;
 };
 
 /// An integrator with the system of equations it solves. Fixed during a solve; what changes is the
@@ -30,8 +24,9 @@ class Motion {
   virtual TipState tip(const ChainState& state) const = 0;
   virtual Energies energies(const ChainState& state) const = 0;
 
-  /// Advances `from` by h_s >= 0 seconds under `force` into `to` (whose vectors are reused), and
-  /// gives the integrals of the contact forces over the step.
+  /// Advances `from` by h_s >= 0 seconds under `force` into `to` (whose vectors and room are
+  /// reused, so that a second step allocates nothing), and gives the integrals of the contact
+  /// forces over the step.
   virtual ContactIntegrals<double> step(const ChainState& from,
                                         const AffineContactForce<double>& force, double h_s,
                                         ChainState& to) const = 0;
@@ -40,13 +35,14 @@ class Motion {
   virtual void restart(const AffineContactForce<double>& force, ChainState& state) const = 0;
 
   /// Linear momentum of the whole chain [N s].
-  virtual PlanarVector<double> momentum_Ns(const ChainState& state) const = 0;
-  /// Positions of the nodes along the chain: O first, the tip last.
-  virtual std::vector<PlanarVector<double>> node_positions_m(const ChainState& state) const = 0;
+  virtual Eigen::Vector2d momentum_Ns(const ChainState& state) const = 0;
+  /// Positions of the nodes along the chain, one a column: O first, the tip last.
+  virtual Coordinates node_positions_m(const ChainState& state) const = 0;
 
-  /// Reactions at O and at each joint, from O outwards.
-  virtual std::vector<JointReaction> reactions(const AffineContactForce<double>& force,
-                                               const ChainState& state) const = 0;
+  /// Forces on the outer link at O and at each joint from what holds it, one a column, from O
+  /// outwards. Allocates when the number of columns is another.
+  virtual void reactions(const AffineContactForce<double>& force, const ChainState& state,
+                         Eigen::Matrix2Xd& reactions_N) const = 0;
 };
 
 /// The chain with joints eliminated, stepped by PEFRL.
@@ -61,14 +57,14 @@ class ExplicitMotion : public Motion {
   ContactIntegrals<double> step(const ChainState& from, const AffineContactForce<double>& force,
                                 double h_s, ChainState& to) const override;
   void restart(const AffineContactForce<double>&, ChainState&) const override {}
-  PlanarVector<double> momentum_Ns(const ChainState& state) const override {
+  Eigen::Vector2d momentum_Ns(const ChainState& state) const override {
     return chain_.momentum_Ns(state.v);
   }
-  std::vector<PlanarVector<double>> node_positions_m(const ChainState& state) const override {
+  Coordinates node_positions_m(const ChainState& state) const override {
     return chain_.node_positions_m(state.q);
   }
-  std::vector<JointReaction> reactions(const AffineContactForce<double>& force,
-                                       const ChainState& state) const override;
+  void reactions(const AffineContactForce<double>& force, const ChainState& state,
+                 Eigen::Matrix2Xd& reactions_N) const override;
 
  private:
   const Chain& chain_;

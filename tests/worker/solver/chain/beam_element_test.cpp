@@ -38,9 +38,8 @@ Nodes straight_nodes(double angle_rad, double x_m, double y_m) {
   return q;
 }
 
-GradientCoefficients<double> gradient(const Nodes& q) {
-  const auto at = [&q](int row) { return PlanarVector<double>{q(row, 0), q(row, 1)}; };
-  return gradient_coefficients(at(0), at(1), at(2), at(3), 1.0 / kLength_m);
+GradientCoefficients gradient(const Nodes& q) {
+  return gradient_coefficients(q.transpose(), 1.0 / kLength_m);
 }
 
 double energy(const Nodes& q) {
@@ -49,16 +48,10 @@ double energy(const Nodes& q) {
 
 /// dU/dq from dU/dc, by c0 = (p_j - p_i)/l, c1 = (s_j - s_i)/2, c2 = (s_i + s_j)/2 - c0.
 Nodes energy_gradient(const Nodes& q) {
-  const auto f = elastic_gradient(gradient(q), kHalfEALength, kBending);
-  Eigen::Matrix<double, 3, 2> by_c;
-  for (int k = 0; k < 3; ++k) {
-    by_c(k, 0) = f.c[static_cast<std::size_t>(k)].x;
-    by_c(k, 1) = f.c[static_cast<std::size_t>(k)].y;
-  }
   Eigen::Matrix<double, 3, 4> c_of_q;
   const double a = 1.0 / kLength_m;
   c_of_q << -a, 0.0, a, 0.0, 0.0, -0.5, 0.0, 0.5, a, 0.5, -a, 0.5;
-  return c_of_q.transpose() * by_c;
+  return (elastic_gradient(gradient(q), kHalfEALength, kBending) * c_of_q).transpose();
 }
 
 /// Central difference of five points: exact for polynomials up to degree 4, which the energy is.
@@ -102,16 +95,6 @@ double monomial_integral(int a, int b, int derivatives) {
   }
   const int power = a + b - 2 * derivatives;
   return factor == 0.0 ? 0.0 : factor * std::pow(kLength_m, power + 1) / (power + 1);
-}
-
-Eigen::Matrix4d dense(const std::array<std::array<double, 4>, 4>& entries) {
-  Eigen::Matrix4d matrix;
-  for (int i = 0; i < 4; ++i) {
-    for (int j = 0; j < 4; ++j) {
-      matrix(i, j) = entries[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
-    }
-  }
-  return matrix;
 }
 
 void expect_exact_on_cubics(const Eigen::Matrix4d& matrix, double factor, int derivatives) {
@@ -185,30 +168,36 @@ TEST(BeamElement, FiveGaussPointsGiveTheExactEnergy) {
   }
 }
 
+TEST(BeamElement, GradientMapIsWhatTheDifferencesOfCoordinatesAre) {
+  std::mt19937_64 generator(4);
+  const Nodes q = random_nodes(generator);
+  const GradientCoefficients mapped = q.transpose() * gradient_map(1.0 / kLength_m).transpose();
+  EXPECT_LT((mapped - gradient(q)).norm(), 1e-14 * mapped.norm());
+}
+
 TEST(BeamElement, MassMatrixIsExactOnPolynomials) {
-  expect_exact_on_cubics(dense(mass_matrix(1.4, kLength_m)), 1.4, 0);
+  expect_exact_on_cubics(mass_matrix(1.4, kLength_m), 1.4, 0);
 }
 
 TEST(BeamElement, GradientMatrixIsExactOnPolynomials) {
-  expect_exact_on_cubics(dense(gradient_matrix(kLength_m)), 1.0, 1);
+  expect_exact_on_cubics(gradient_matrix(kLength_m), 1.0, 1);
 }
 
 TEST(BeamElement, BendingMatrixIsExactOnPolynomials) {
-  expect_exact_on_cubics(dense(bending_matrix(kLength_m)), 1.0, 2);
+  expect_exact_on_cubics(bending_matrix(kLength_m), 1.0, 2);
 }
 
 TEST(BeamElement, UniformLoadIsExactOnPolynomials) {
   const auto load = uniform_load(kLength_m);
   for (int a = 0; a <= 3; ++a) {
-    EXPECT_NEAR(monomial(a).dot(Eigen::Map<const Eigen::Vector4d>(load.data())),
-                monomial_integral(a, 0, 0), 1e-15);
+    EXPECT_NEAR(monomial(a).dot(load), monomial_integral(a, 0, 0), 1e-15);
   }
 }
 
 TEST(BeamElement, TangentAtTheStraightStateIsAxialAndBendingAlongAndBendingAcross) {
   const Nodes straight = straight_nodes(0.0, 0.2, 0.0);
-  const Eigen::Matrix4d bending = kEI_N_m2 * dense(bending_matrix(kLength_m));
-  const Eigen::Matrix4d along = kEA_N * dense(gradient_matrix(kLength_m)) + bending;
+  const Eigen::Matrix4d bending = kEI_N_m2 * bending_matrix(kLength_m);
+  const Eigen::Matrix4d along = kEA_N * gradient_matrix(kLength_m) + bending;
   for (int column = 0; column < 8; ++column) {
     Nodes direction = Nodes::Zero();
     direction(column % 4, column / 4) = 1.0;

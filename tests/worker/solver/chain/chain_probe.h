@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cstddef>
 #include <random>
 #include <vector>
 
@@ -10,8 +9,8 @@
 namespace oblique::solver {
 
 /// Rows that hold positions, the pin first: slopes lie between, one a node, two at a joint.
-inline std::vector<std::size_t> position_rows(const ModelParameters& model) {
-  std::vector<std::size_t> rows{0};
+inline std::vector<Eigen::Index> position_rows(const ModelParameters& model) {
+  std::vector<Eigen::Index> rows{0};
   const std::size_t links = model.lengths_m.size();
   for (std::size_t link = 0; link < links; ++link) {
     for (int e = 1; e <= model.elements_per_link; ++e) {
@@ -27,23 +26,21 @@ inline std::vector<std::size_t> position_rows(const ModelParameters& model) {
 class ChainProbe {
  public:
   explicit ChainProbe(const Chain& chain) : chain_(chain) {
-    const std::size_t n = chain.rows() - 1;
-    const auto size = static_cast<Eigen::Index>(n);
-    mass_.resize(size, size);
-    gravity_.resize(size, 2);
-    for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t j = 0; j <= i; ++j) {
+    const Eigen::Index n = chain.rows() - 1;
+    mass_.resize(n, n);
+    gravity_.resize(n, 2);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      for (Eigen::Index j = 0; j <= i; ++j) {
         // T(i + j) - T(i) - T(j) = M_ij, and T(i) = M_ii/2.
         const double entry =
             i == j ? 2.0 * kinetic({i, i}) : kinetic({i, j}) - kinetic({i, i}) - kinetic({j, j});
-        mass_(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = entry;
-        mass_(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(i)) = entry;
+        mass_(i, j) = entry;
+        mass_(j, i) = entry;
       }
-      for (std::size_t c = 0; c < 2; ++c) {
-        Coordinates q(2 * chain.rows(), 0.0);
-        q[2 * (i + 1) + c] = 1.0;
-        gravity_(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(c)) =
-            -chain.gravity_energy_J(q);
+      for (Eigen::Index c = 0; c < 2; ++c) {
+        Coordinates q = Coordinates::Zero(2, chain.rows());
+        q(c, i + 1) = 1.0;
+        gravity_(i, c) = -chain.gravity_energy_J(q);
       }
     }
   }
@@ -55,9 +52,9 @@ class ChainProbe {
 
   /// Accelerations of the free rows.
   Pairs accelerations(const Coordinates& q, double ft_N, double fn_N) const {
-    Coordinates a(q.size());
+    Coordinates a(2, q.cols());
     chain_.accelerations(q.data(), ft_N, fn_N, a.data());
-    return Eigen::Map<const Pairs>(a.data() + 2, mass_.rows(), 2);
+    return a.rightCols(mass_.rows()).transpose();
   }
 
   /// -dU/dq as the chain applies it: M q'' - Q.
@@ -69,21 +66,21 @@ class ChainProbe {
   Coordinates random_coordinates(std::mt19937_64& generator, double size) const {
     std::uniform_real_distribution<double> uniform(-size, size);
     Coordinates q = chain_.at_rest().q;
-    for (std::size_t i = 2; i < q.size(); ++i) {
-      q[i] += uniform(generator);
+    for (Eigen::Index i = 2; i < q.size(); ++i) {
+      q(i) += uniform(generator);
     }
     return q;
   }
 
  private:
   struct Rows {
-    std::size_t i;
-    std::size_t j;
+    Eigen::Index i;
+    Eigen::Index j;
   };
   double kinetic(const Rows& rows) const {
-    Coordinates v(2 * chain_.rows(), 0.0);
-    v[2 * (rows.i + 1)] = 1.0;
-    v[2 * (rows.j + 1)] = 1.0;
+    Coordinates v = Coordinates::Zero(2, chain_.rows());
+    v(0, rows.i + 1) = 1.0;
+    v(0, rows.j + 1) = 1.0;
     return chain_.kinetic_energy_J(v);
   }
 

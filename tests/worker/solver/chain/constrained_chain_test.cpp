@@ -2,11 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <random>
-#include <vector>
 
 #include "worker/solver/motion/generalized_alpha.h"
 #include "worker/solver/motion/motion.h"
@@ -28,9 +25,9 @@ ChainState bent_and_moving(const Chain& chain) {
   std::mt19937_64 generator(1);
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
   ChainState state = chain.at_rest();
-  for (std::size_t i = 2; i < state.q.size(); ++i) {
-    state.q[i] += 1e-4 * uniform(generator);
-    state.v[i] = uniform(generator);
+  for (Eigen::Index i = 2; i < state.q.size(); ++i) {
+    state.q(i) += 1e-4 * uniform(generator);
+    state.v(i) = uniform(generator);
   }
   return state;
 }
@@ -53,11 +50,9 @@ TEST(ConstrainedChain, ConstraintsHoldForEveryStateOfTheEliminatedOne) {
   const Chain eliminated(three_links());
   const ConstrainedChain constrained(three_links());
   const ChainState same = constrained.from_eliminated(bent_and_moving(eliminated));
-  std::vector<double> residual(constrained.size(), 0.0);
+  Coordinates residual = Coordinates::Zero(2, constrained.columns());
   constrained.set_constraints(same.q, 1.0, residual);
-  for (const double value : residual) {
-    EXPECT_EQ(value, 0.0);
-  }
+  EXPECT_EQ(residual, Coordinates::Zero(2, constrained.columns()));
 }
 
 TEST(ConstrainedChain, ConstraintForcesWorkOnNothingButTheBreachOfConstraints) {
@@ -66,26 +61,21 @@ TEST(ConstrainedChain, ConstraintForcesWorkOnNothingButTheBreachOfConstraints) {
   const ConstrainedChain chain(three_links());
   std::mt19937_64 generator(2);
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  const auto random = [&](Eigen::Index columns) {
+    return Coordinates(Coordinates::NullaryExpr(2, columns, [&] { return uniform(generator); }));
+  };
   for (int i = 0; i < 20; ++i) {
-    Coordinates dq(chain.size(), 0.0);
-    std::vector<double> multipliers_N(2 * chain.links());
-    std::generate(dq.begin(), dq.end(), [&] { return uniform(generator); });
-    std::generate(multipliers_N.begin(), multipliers_N.end(), [&] { return uniform(generator); });
-    std::vector<double> forces(chain.size(), 0.0);
-    std::vector<double> breach(chain.size(), 0.0);
+    Coordinates dq = random(chain.columns());
+    const Coordinates multipliers_N = random(chain.links());
+    Coordinates forces = Coordinates::Zero(2, chain.columns());
+    Coordinates breach = forces;
+    Coordinates breach_by_link;
     chain.add_constraint_forces(multipliers_N, forces);
     chain.set_constraints(dq, 1.0, breach);
-    double work = 0.0;
-    double expected = 0.0;
-    for (std::size_t k = 0; k < dq.size(); ++k) {
-      work += dq[k] * forces[k];
-    }
-    for (std::size_t link = 0; link < chain.links(); ++link) {
-      for (std::size_t c = 0; c < 2; ++c) {
-        expected += multipliers_N[2 * link + c] * breach[chain.multiplier_index(link) + c];
-      }
-    }
-    EXPECT_NEAR(work, expected, 1e-13);
+    chain.take_multipliers(breach, breach_by_link);
+    EXPECT_NEAR(dq.cwiseProduct(forces).sum(), multipliers_N.cwiseProduct(breach_by_link).sum(),
+                1e-13);
+    EXPECT_EQ(breach.norm(), 0.0);
   }
 }
 
@@ -97,21 +87,19 @@ TEST(ConstrainedChain, ConsistentAccelerationsAndReactionsAreThoseOfTheEliminate
   ChainState same = by_constraints.chain().from_eliminated(state);
   by_constraints.restart(kStick, same);
   const TipState tip = eliminated.tip(state);
-  Coordinates a(state.q.size());
+  Coordinates a(2, eliminated.rows());
   eliminated.accelerations(state.q.data(), kStick.ft_N(tip.x_m, tip.y_m), kStick.fn_N(tip.y_m),
                            a.data());
-  const std::size_t i = 2 * eliminated.tip_row();
-  const std::size_t j = by_constraints.chain().tip_index();
-  const double scale = std::hypot(a[i], a[i + 1]);
-  EXPECT_NEAR(same.acceleration[j], a[i], 1e-9 * scale);
-  EXPECT_NEAR(same.acceleration[j + 1], a[i + 1], 1e-9 * scale);
-  const auto expected = by_elimination.reactions(kStick, state);
-  const auto reactions = by_constraints.reactions(kStick, same);
-  ASSERT_EQ(reactions.size(), expected.size());
-  for (std::size_t joint = 0; joint < reactions.size(); ++joint) {
-    const double force_N = std::hypot(expected[joint].x_N, expected[joint].y_N);
-    EXPECT_NEAR(reactions[joint].x_N, expected[joint].x_N, 1e-8 * force_N);
-    EXPECT_NEAR(reactions[joint].y_N, expected[joint].y_N, 1e-8 * force_N);
+  const Eigen::Vector2d at_tip = a.col(eliminated.tip_row());
+  const Eigen::Vector2d same_at_tip = same.acceleration.col(by_constraints.chain().tip_column());
+  EXPECT_LT((same_at_tip - at_tip).norm(), 1e-9 * at_tip.norm());
+  Eigen::Matrix2Xd expected_N;
+  Eigen::Matrix2Xd reactions_N;
+  by_elimination.reactions(kStick, state, expected_N);
+  by_constraints.reactions(kStick, same, reactions_N);
+  ASSERT_EQ(reactions_N.cols(), expected_N.cols());
+  for (Eigen::Index joint = 0; joint < reactions_N.cols(); ++joint) {
+    EXPECT_LT((reactions_N - expected_N).col(joint).norm(), 1e-8 * expected_N.col(joint).norm());
   }
 }
 

@@ -28,16 +28,17 @@ Nodes random_nodes(std::mt19937_64& generator) {
   return nodes;
 }
 
-/// dU/dq from dU/dc, by c0 = (p_j - p_i)/l, c1 = (s_j - s_i)/2, c2 = (s_i + s_j)/2 - c0.
-Nodes forces_by_gauss_points(const Nodes& q) {
-  const auto f = elastic_gradient(gradient_coefficients(q[0], q[1], q[2], q[3], 1.0 / kLength_m),
-                                  kHalfEALength, kBending);
-  const auto force = [&f](double by_c0, double by_c1, double by_c2) {
-    return PlanarVector<double>{-by_c0 * f.c[0].x - by_c1 * f.c[1].x - by_c2 * f.c[2].x,
-                                -by_c0 * f.c[0].y - by_c1 * f.c[1].y - by_c2 * f.c[2].y};
-  };
-  const double a = 1.0 / kLength_m;
-  return {force(-a, 0.0, a), force(0.0, -0.5, 0.5), force(a, 0.0, -a), force(0.0, 0.5, 0.5)};
+Nodes forces_by_gauss_points(const Nodes& nodes) {
+  ElementCoordinates q;
+  for (Eigen::Index a = 0; a < 4; ++a) {
+    const auto& [x, y] = nodes[static_cast<std::size_t>(a)];
+    q.col(a) << x, y;
+  }
+  const double inverse_length = 1.0 / kLength_m;
+  const ElementCoordinates f =
+      -elastic_gradient(gradient_coefficients(q, inverse_length), kHalfEALength, kBending) *
+      gradient_map(inverse_length);
+  return {{{f(0, 0), f(1, 0)}, {f(0, 1), f(1, 1)}, {f(0, 2), f(1, 2)}, {f(0, 3), f(1, 3)}}};
 }
 
 Nodes forces_in_closed_form(const Nodes& q) {

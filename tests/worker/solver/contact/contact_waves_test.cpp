@@ -50,9 +50,7 @@ double beam_error(int elements) {
   const ModelParameters model = one_link(elements);
   const Chain chain(model);
   ChainState start = chain.at_rest();
-  for (std::size_t i = 0; i < start.q.size(); i += 2) {
-    start.v[i + 1] = -kSpeed_m_s * start.q[i] / model.lengths_m[0];
-  }
+  start.v.row(1) = -kSpeed_m_s / model.lengths_m[0] * start.q.row(0);
   const BeamEndOnSpring exact(model.rho_kg_m3 * model.A_m2, model.E_Pa * model.I_m4, k_N_m,
                               kSpeed_m_s);
   double largest = 0.0;
@@ -84,12 +82,10 @@ RodForce rod_force(int elements, double k_N_m, double fraction) {
   model.I_m4 = 1e-14;
   const Chain chain(model);
   ChainState start = chain.at_rest();
-  for (std::size_t i = 0; i < start.q.size(); i += 2) {
-    start.q[i + 1] = -start.q[i];
-    start.q[i] = 0.0;
-  }
-  for (const std::size_t row : position_rows(model)) {
-    start.v[2 * row + 1] = row == 0 ? 0.0 : -kSpeed_m_s;
+  start.q.row(1) = -start.q.row(0);
+  start.q.row(0).setZero();
+  for (const Eigen::Index row : position_rows(model)) {
+    start.v(1, row) = row == 0 ? 0.0 : -kSpeed_m_s;
   }
   const RodEndOnSpring exact(model.E_Pa, model.A_m2, model.rho_kg_m3, k_N_m, kSpeed_m_s);
   const double t_end_s = fraction * model.lengths_m[0] / exact.wave_speed_m_s();

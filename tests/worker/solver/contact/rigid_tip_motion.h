@@ -3,7 +3,6 @@
 #include <Eigen/Core>
 #include <Eigen/LU>
 #include <cstddef>
-#include <vector>
 
 #include "worker/solver/motion/motion.h"
 #include "worker/solver/motion/pefrl.h"
@@ -20,15 +19,15 @@ class RigidTipMotion : public Motion {
   ChainState at_rest() const override { return moving({0.0, 0.0}); }
   ChainState moving(const Eigen::Vector2d& V_m_s) const {
     ChainState state;
-    state.q = {0.0, 0.0};
-    state.v = {V_m_s[0], V_m_s[1]};
+    state.q = Eigen::Vector2d::Zero();
+    state.v = V_m_s;
     return state;
   }
   TipState tip(const ChainState& state) const override {
-    return {state.q[0], state.q[1], state.v[0], state.v[1]};
+    return {state.q(0), state.q(1), state.v(0), state.v(1)};
   }
   Energies energies(const ChainState& state) const override {
-    const Eigen::Vector2d V(state.v[0], state.v[1]);
+    const Eigen::Vector2d V = state.v.col(0);
     return {0.5 * V.dot(mass_kg_ * V), 0.0, 0.0};
   }
   ContactIntegrals<double> step(const ChainState& from, const AffineContactForce<double>& force,
@@ -37,37 +36,28 @@ class RigidTipMotion : public Motion {
     ContactIntegrals<double> integrals;
     for (std::size_t stage = 0; stage < Pefrl::kKicks; ++stage) {
       drift(Pefrl::drift[stage] * h_s, to);
-      const double fn = force.fn_N(to.q[1]);
-      const double ft = force.ft_N(to.q[0], to.q[1]);
+      const double fn = force.fn_N(to.q(1));
+      const double ft = force.ft_N(to.q(0), to.q(1));
       const double kick_s = Pefrl::kick[stage] * h_s;
-      const double vt_before = to.v[0];
-      to.v[0] += kick_s * (W_per_kg_(0, 0) * ft + W_per_kg_(0, 1) * fn);
-      to.v[1] += kick_s * (W_per_kg_(1, 0) * ft + W_per_kg_(1, 1) * fn);
+      const double vt_before = to.v(0);
+      to.v += kick_s * W_per_kg_ * Eigen::Vector2d(ft, fn);
       integrals.impulse_n += kick_s * fn;
       integrals.impulse_t += kick_s * ft;
-      integrals.work_t += kick_s * ft * 0.5 * (vt_before + to.v[0]);
+      integrals.work_t += kick_s * ft * 0.5 * (vt_before + to.v(0));
     }
     drift(Pefrl::drift[Pefrl::kKicks] * h_s, to);
     return integrals;
   }
   void restart(const AffineContactForce<double>&, ChainState&) const override {}
-  PlanarVector<double> momentum_Ns(const ChainState& state) const override {
-    return {mass_kg_(0, 0) * state.v[0] + mass_kg_(0, 1) * state.v[1],
-            mass_kg_(1, 0) * state.v[0] + mass_kg_(1, 1) * state.v[1]};
-  }
-  std::vector<PlanarVector<double>> node_positions_m(const ChainState& state) const override {
-    return {{state.q[0], state.q[1]}};
-  }
-  std::vector<JointReaction> reactions(const AffineContactForce<double>&,
-                                       const ChainState&) const override {
-    return {};
+  Eigen::Vector2d momentum_Ns(const ChainState& state) const override { return mass_kg_ * state.v; }
+  Coordinates node_positions_m(const ChainState& state) const override { return state.q; }
+  void reactions(const AffineContactForce<double>&, const ChainState&,
+                 Eigen::Matrix2Xd& reactions_N) const override {
+    reactions_N.resize(2, 0);
   }
 
  private:
-  static void drift(double h_s, ChainState& state) {
-    state.q[0] += h_s * state.v[0];
-    state.q[1] += h_s * state.v[1];
-  }
+  static void drift(double h_s, ChainState& state) { state.q += h_s * state.v; }
 
   Eigen::Matrix2d W_per_kg_;
   Eigen::Matrix2d mass_kg_;

@@ -53,7 +53,7 @@ std::map<std::uint64_t, ContactOutcome> solved(const std::vector<ContactCase>& c
 TEST(LaneBatch, FollowersOfAContactThatFailsBeforeItsFirstTurnEachGetAnOutcome) {
   const ChainState sound = coarse().fall.state_at(0.9);
   ChainState broken = sound;
-  broken.v[2 * coarse().chain.tip_row()] = std::numeric_limits<double>::quiet_NaN();
+  broken.v(0, coarse().chain.tip_row()) = std::numeric_limits<double>::quiet_NaN();
   std::vector<ContactCase> cases;
   for (const double e_star : {1.0, 0.9, 0.8, 0.7}) {
     cases.push_back(coarse().contact(cases.size(), 1, 0.4, e_star, broken));

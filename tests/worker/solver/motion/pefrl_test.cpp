@@ -46,10 +46,10 @@ class PefrlOnAChain : public testing::Test {
     chain_ = std::make_unique<Chain>(model);
     motion_ = std::make_unique<ExplicitMotion>(*chain_);
     start_ = chain_->at_rest();
-    for (std::size_t i = 2; i < start_.q.size(); ++i) {
+    for (Eigen::Index i = 2; i < start_.q.size(); ++i) {
       const auto phase = static_cast<double>(i);
-      start_.q[i] += 1e-4 * std::sin(phase);
-      start_.v[i] = std::cos(0.7 * phase);
+      start_.q(i) += 1e-4 * std::sin(phase);
+      start_.v(i) = std::cos(0.7 * phase);
     }
     const TipState tip = chain_->tip(start_);
     force_.fn0 = 1000.0;
@@ -85,11 +85,7 @@ class PefrlOnAChain : public testing::Test {
 };
 
 double distance(const Coordinates& a, const Coordinates& b) {
-  double largest = 0.0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    largest = std::max(largest, std::abs(a[i] - b[i]));
-  }
-  return largest;
+  return (a - b).cwiseAbs().maxCoeff();
 }
 
 TEST(Pefrl, OscillatorStaysBoundedJustBelowTheStabilityLimitAndGrowsJustAbove) {
@@ -210,13 +206,13 @@ TEST_F(PefrlOnAChain, ChainAtRestIsStableBelowTheLimitOfItsHighestFrequencyAndNo
   const auto swing = [&](double h_s) {
     ChainState state = chain_->at_rest();
     const ChainState rest = state;
-    state.q[2 * chain_->tip_row()] += 1e-9;
+    state.q(0, chain_->tip_row()) += 1e-9;
     ChainState next;
     for (int i = 0; i < 3000; ++i) {
       motion_->step(state, {}, h_s, next);
       std::swap(state, next);
     }
-    return std::abs(state.q[2 * chain_->tip_row()] - rest.q[2 * chain_->tip_row()]);
+    return std::abs(state.q(0, chain_->tip_row()) - rest.q(0, chain_->tip_row()));
   };
   EXPECT_LT(swing(0.98 * limit_s), 1e-3);
   EXPECT_FALSE(swing(1.02 * limit_s) < 1e-2) << "grows until the chain bends, or beyond numbers";
