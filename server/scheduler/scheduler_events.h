@@ -7,10 +7,10 @@
 #include <variant>
 #include <vector>
 
-#include "server/scheduler/interval_set.h"
-#include "server/scheduler/loss_history.h"
-#include "server/scheduler/point_attempts.h"
-#include "server/scheduler/study_points.h"
+#include "server/scheduler/points/interval_set.h"
+#include "server/scheduler/points/loss_history.h"
+#include "server/scheduler/points/point_attempts.h"
+#include "server/scheduler/points/study_points.h"
 #include "server/scheduler/worker_processes.h"
 
 // What the scheduler is told, and what it wants done.

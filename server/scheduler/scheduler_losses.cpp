@@ -1,7 +1,6 @@
 // The part of the scheduler that weighs lost workers: what it makes of the points that they held,
 // and of the workers themselves.
 #include <algorithm>
-#include <stdexcept>
 #include <string>
 #include <utility>
 
@@ -176,37 +175,6 @@ bool Scheduler::probe(WorkerId id, Worker& worker) {
   --worker.credit;
   effects_.emplace_back(SendProbe{id, worker.probe});
   return true;
-}
-
-void Scheduler::check_losses() const {
-  const auto require = [](bool holds, const char* what) {
-    if (!holds) {
-      throw std::logic_error(what);
-    }
-  };
-  processes_.check_invariants();
-  for (const auto& [id, worker] : workers_) {
-    const WorkerProcess& process = processes_.at(worker.process);
-    require(process.workers.contains(id), "a worker is not known as one of its process");
-    require(worker.probe == 0 || worker.leases.empty(), "a probe is not alone");
-    require(worker.leases.size() <= settings_.newcomer_batches || process.proven_since_ms,
-            "a newcomer has too many batches");
-  }
-  require(processes_.workers() == workers_.size(), "a process has workers that are not there");
-  for (const auto& [id, lease] : leases_) {
-    require(!lease.alone || is_proven(workers_.at(lease.worker)),
-            "suspect points are with a newcomer");
-  }
-  require(vanished_ms_.size() <= settings_.vanished_newcomers, "too many newcomers are noted");
-  std::map<StudyId, IntervalSet> to_fail;
-  for (const Condemned& condemned : condemned_) {
-    to_fail[condemned.study].insert(condemned.point);
-  }
-  for (const auto& [id, study] : studies_) {
-    for (const std::uint64_t point : study.points.condemned()) {
-      require(to_fail[id].contains(point), "a condemned point is forgotten");
-    }
-  }
 }
 
 }  // namespace oblique::server

@@ -10,7 +10,7 @@
 #include <thread>
 
 #include "proto/oblique.pb.h"
-#include "server/scheduler/study_table.h"
+#include "server/scheduler/points/study_table.h"
 
 namespace oblique::server {
 

@@ -6,9 +6,9 @@
 #include <string>
 #include <string_view>
 
-#include "server/scheduler/interval_set.h"
-#include "server/scheduler/point_attempts.h"
-#include "server/scheduler/study_table.h"
+#include "server/scheduler/points/interval_set.h"
+#include "server/scheduler/points/point_attempts.h"
+#include "server/scheduler/points/study_table.h"
 #include "server/scheduler/worker_processes.h"
 #include "server/store/changes.h"
 #include "server/store/store.h"

@@ -9,9 +9,9 @@
 
 #include "proto/oblique.pb.h"
 #include "proto/recipe/point_table.h"
-#include "server/scheduler/interval_set.h"
-#include "server/scheduler/study_points.h"
-#include "server/scheduler/study_table.h"
+#include "server/scheduler/points/interval_set.h"
+#include "server/scheduler/points/study_points.h"
+#include "server/scheduler/points/study_table.h"
 
 namespace oblique::server {
 

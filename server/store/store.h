@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "server/database/sqlite.h"
-#include "server/scheduler/interval_set.h"
-#include "server/scheduler/point_attempts.h"
+#include "server/scheduler/points/interval_set.h"
+#include "server/scheduler/points/point_attempts.h"
 #include "server/store/changes.h"
 #include "server/store/database_files.h"
 #include "server/store/write_ahead_log.h"

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/scheduler/loss_history.h"
+#include "server/scheduler/points/loss_history.h"
 #include "server/scheduler/scheduler.h"
 #include "server/scheduler/worker_processes.h"
 #include "tests/server/scheduler/scheduler_bench.h"

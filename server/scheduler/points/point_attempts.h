@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <map>
 
-#include "server/scheduler/interval_set.h"
+#include "server/scheduler/points/interval_set.h"
 
 namespace oblique::server {
 

@@ -1,4 +1,4 @@
-#include "server/scheduler/study_points.h"
+#include "server/scheduler/points/study_points.h"
 
 #include <algorithm>
 #include <iterator>

@@ -1,4 +1,4 @@
-#include "server/scheduler/loss_history.h"
+#include "server/scheduler/points/loss_history.h"
 
 #include <algorithm>
 

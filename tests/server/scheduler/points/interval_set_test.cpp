@@ -1,4 +1,4 @@
-#include "server/scheduler/interval_set.h"
+#include "server/scheduler/points/interval_set.h"
 
 #include <random>
 #include <set>

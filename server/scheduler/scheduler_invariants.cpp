@@ -1,0 +1,95 @@
+// What must hold of the scheduler's state between two events.
+#include <algorithm>
+#include <map>
+#include <stdexcept>
+
+#include "server/scheduler/scheduler.h"
+
+namespace oblique::server {
+namespace {
+
+void require(bool holds, const char* what) {
+  if (!holds) {
+    throw std::logic_error(what);
+  }
+}
+
+}  // namespace
+
+void Scheduler::check_invariants() const {
+  std::map<StudyId, IntervalSet> under_lease;
+  std::map<StudyId, std::size_t> leases_of;
+  for (const auto& [id, lease] : leases_) {
+    const auto worker = workers_.find(lease.worker);
+    require(worker != workers_.end() && worker->second.leases.contains(id),
+            "a lease has no worker");
+    require(studies_.contains(lease.study), "a lease has no study");
+    require(!lease.alone || worker->second.leases.size() == 1, "a suspect lease is not alone");
+    require(lease.batch.count > 0 && id < next_lease_, "a lease is malformed");
+    IntervalSet& covered = under_lease[lease.study];
+    require(studies_.at(lease.study).overlaps ||
+                covered.within(lease.batch.first_point, lease.batch.end()).empty(),
+            "two leases hold one point");
+    require(lease.twin == 0 || (leases_.contains(lease.twin) && leases_.at(lease.twin).twin == id &&
+                                leases_.at(lease.twin).worker != lease.worker),
+            "a batch's second lease is not one");
+    require(admits(studies_.at(lease.study), worker->second),
+            "a worker of another solver version holds a lease");
+    ++leases_of[lease.study];
+    covered.insert(lease.batch.first_point, lease.batch.end());
+  }
+  for (const auto& [id, study] : studies_) {
+    study.points.check_invariants();
+    require(study.finished == study.points.is_complete(), "a study is finished and is not");
+    require(study.failed <= study.points.settled(), "more points failed than were settled");
+    require(!study.cancelled || study.points.leased() == 0, "a cancelled study holds leases");
+    require(study.leases.size() == leases_of[id], "a study's leases are miscounted");
+    const StudyQueue::Place* place = queue_.find(id);
+    require(place_of(study) == (place == nullptr ? StudyQueue::Place{} : *place),
+            "a study is not where it belongs in the queue");
+    study.points.leased_set().for_each([&, study_id = id](const Interval& interval) {
+      const auto covered = under_lease[study_id].within(interval.begin, interval.end);
+      require(covered.size() == 1 && covered.front() == interval, "a leased point has no lease");
+    });
+  }
+  std::uint64_t threads = 0;
+  std::size_t leases = 0;
+  for (const auto& [id, worker] : workers_) {
+    threads += worker.threads;
+    leases += worker.leases.size();
+    require(worker.queued == (std::count(ready_workers_.begin(), ready_workers_.end(), id) == 1),
+            "a worker stands in the queue twice or not as noted");
+    require(worker.queued == (worker.credit > 0), "a worker with credit is not in the queue");
+  }
+  check_losses();
+  require(threads == threads_, "the number of threads is wrong");
+  require(leases == leases_.size(), "a worker holds a lease that does not exist");
+}
+
+void Scheduler::check_losses() const {
+  processes_.check_invariants();
+  for (const auto& [id, worker] : workers_) {
+    const WorkerProcess& process = processes_.at(worker.process);
+    require(process.workers.contains(id), "a worker is not known as one of its process");
+    require(worker.probe == 0 || worker.leases.empty(), "a probe is not alone");
+    require(worker.leases.size() <= settings_.newcomer_batches || process.proven_since_ms,
+            "a newcomer has too many batches");
+  }
+  require(processes_.workers() == workers_.size(), "a process has workers that are not there");
+  for (const auto& [id, lease] : leases_) {
+    require(!lease.alone || is_proven(workers_.at(lease.worker)),
+            "suspect points are with a newcomer");
+  }
+  require(vanished_ms_.size() <= settings_.vanished_newcomers, "too many newcomers are noted");
+  std::map<StudyId, IntervalSet> to_fail;
+  for (const Condemned& condemned : condemned_) {
+    to_fail[condemned.study].insert(condemned.point);
+  }
+  for (const auto& [id, study] : studies_) {
+    for (const std::uint64_t point : study.points.condemned()) {
+      require(to_fail[id].contains(point), "a condemned point is forgotten");
+    }
+  }
+}
+
+}  // namespace oblique::server
