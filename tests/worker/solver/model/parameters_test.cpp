@@ -1,0 +1,90 @@
+#include "worker/solver/model/parameters.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <set>
+#include <string>
+#include <string_view>
+
+namespace oblique::solver {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+std::string objection_to(const ParameterKey& key, double value) {
+  try {
+    check_value(key, value);
+    return {};
+  } catch (const InputError& error) {
+    return error.what();
+  }
+}
+
+TEST(Parameters, EveryPresetIsInsideItsDomain) {
+  for (const std::string_view name : preset_names()) {
+    EXPECT_NO_THROW(validate(preset(name))) << name;
+  }
+  EXPECT_EQ(preset("paper"), ModelParameters{}) << "the defaults";
+  EXPECT_THROW(preset("papers"), InputError);
+}
+
+TEST(Parameters, EveryKeyHasANameOfItsOwnAndReadsWhatItWrote) {
+  std::set<std::string_view> names;
+  for (const ParameterKey& key : model_keys()) {
+    EXPECT_TRUE(names.insert(key.name).second) << key.name;
+    EXPECT_EQ(find_model_key(key.name), &key);
+    ModelParameters model;
+    const double other = key.get(model) == 1.0 ? 0.0 : 1.0;
+    key.set(model, other);
+    EXPECT_EQ(key.get(model), other) << key.name;
+  }
+  EXPECT_EQ(find_model_key("lengths"), nullptr);
+}
+
+TEST(Parameters, NumberOfLinksKeepsTheFirstLengthAndLengthSetsAll) {
+  ModelParameters model;
+  model.lengths_m = {0.3, 0.5};
+  find_model_key("links")->set(model, 4.0);
+  EXPECT_EQ(model.lengths_m, (std::vector<double>{0.3, 0.3, 0.3, 0.3}));
+  find_model_key("length")->set(model, 0.2);
+  EXPECT_EQ(model.lengths_m, (std::vector<double>{0.2, 0.2, 0.2, 0.2}));
+}
+
+TEST(Parameters, AValueThatIsNotAllowedIsNamedWithItsUnitAndWhatIs) {
+  EXPECT_THAT(objection_to(*find_model_key("rho"), -1.0),
+              AllOf(HasSubstr("rho = -1 kg/m^3 is not allowed"), HasSubstr("> 0")));
+  for (const ParameterKey& key : model_keys()) {
+    EXPECT_NE(objection_to(key, std::numeric_limits<double>::quiet_NaN()), "") << key.name;
+    EXPECT_NE(objection_to(key, std::numeric_limits<double>::infinity()), "") << key.name;
+    EXPECT_NE(objection_to(key, -1.0), "") << key.name;
+    EXPECT_EQ(objection_to(key, key.get(ModelParameters{})), "") << key.name;
+  }
+  for (const std::string_view counts : {"links", "elements_per_link"}) {
+    EXPECT_NE(objection_to(*find_model_key(counts), 1.5), "");
+  }
+  EXPECT_EQ(objection_to(*find_model_key("spectral_radius"), 0.0), "");
+  EXPECT_NE(objection_to(*find_model_key("spectral_radius"), 1.0), "");
+}
+
+TEST(Parameters, ADropIsAtMostTheLengthOfTheChain) {
+  ModelParameters model;
+  model.lengths_m = {0.5, 0.25};
+  EXPECT_NO_THROW(validate_point(model, 0.75, 0.0, 1.0));
+  EXPECT_THROW(validate_point(model, 0.76, 0.0, 1.0), InputError);
+  EXPECT_THROW(validate_point(model, 0.5, -0.1, 1.0), InputError);
+  EXPECT_THROW(validate_point(model, 0.5, 0.0, 1.1), InputError);
+}
+
+TEST(Parameters, IntegratorsGoByTheirNames) {
+  for (const Integrator integrator : {Integrator::kExplicit, Integrator::kGeneralizedAlpha}) {
+    EXPECT_EQ(integrator_named(integrator_name(integrator)), integrator);
+  }
+  EXPECT_EQ(integrator_name(ModelParameters{}.integrator), "explicit");
+  EXPECT_THROW(integrator_named("implicit"), InputError);
+}
+
+}  // namespace
+}  // namespace oblique::solver
