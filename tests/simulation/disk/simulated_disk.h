@@ -8,7 +8,7 @@
 
 #include "server/store/store.h"
 #include "tests/simulation/disk/simulated_files.h"
-#include "tests/simulation/store_model.h"
+#include "tests/simulation/disk/store_model.h"
 
 namespace oblique::simulation {
 

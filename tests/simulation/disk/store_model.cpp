@@ -1,4 +1,4 @@
-#include "tests/simulation/store_model.h"
+#include "tests/simulation/disk/store_model.h"
 
 #include <algorithm>
 #include <optional>
