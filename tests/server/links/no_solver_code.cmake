@@ -1,4 +1,4 @@
-# The server solves nothing: neither its targets nor its symbols are the solver's, but for model/.
+# A program that solves nothing: neither its targets nor its symbols are the solver's, but for model/.
 #   cmake -DPROGRAM=oblique-server -DTARGETS=a,b,c -DSOLVER_ARCHIVES=x.a,y.a -DNM=nm -P no_solver_code.cmake
 cmake_minimum_required(VERSION 3.25)
 string(REPLACE "," ";" TARGETS "${TARGETS}")

@@ -1,0 +1,60 @@
+#include "server/scheduler/points/study_table.h"
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "proto/recipe/model_message.h"
+#include "tests/support/recipes.h"
+
+namespace oblique::server {
+namespace {
+
+using protocol::listed;
+using protocol::range;
+
+protocol::Recipe recipe_of_mu(const protocol::Axis& mu) {
+  return protocol::recipe_of({{listed("H", {1.0}), mu, listed("e", {1.0})}});
+}
+
+StudyTable judged(const protocol::Recipe& recipe) {
+  return StudyTable(std::make_shared<const protocol::PointTable>(recipe));
+}
+
+StudyTable stored(const protocol::Recipe& recipe, std::uint64_t points) {
+  return StudyTable(recipe.SerializeAsString(), points);
+}
+
+TEST(StudyTable, IsOfTheRecipeOfAnotherThatIsWrittenInAnotherWay) {
+  const auto as_range = recipe_of_mu(range("mu", 0.1, 0.5, 5));
+  auto as_list = recipe_of_mu(listed("mu", {0.1, 0.2, 0.3, 0.4, 0.5}));
+  *as_list.mutable_model() = protocol::to_message(solver::preset("paper"));
+  EXPECT_TRUE(judged(as_range).is_of_the_recipe_of(judged(as_list)));
+  EXPECT_TRUE(stored(as_range, 5).is_of_the_recipe_of(judged(as_list)));
+  EXPECT_TRUE(judged(as_range).is_of_the_recipe_of(stored(as_list, 5)));
+}
+
+TEST(StudyTable, IsNotOfARecipeWithAnotherPointOrModel) {
+  const auto table = judged(recipe_of_mu(listed("mu", {0.1, 0.2})));
+  EXPECT_FALSE(table.is_of_the_recipe_of(judged(recipe_of_mu(listed("mu", {0.2, 0.1})))));
+  EXPECT_FALSE(table.is_of_the_recipe_of(judged(recipe_of_mu(listed("mu", {0.1})))));
+  auto other_model = recipe_of_mu(listed("mu", {0.1, 0.2}));
+  *other_model.mutable_model() = protocol::to_message(solver::preset("converged"));
+  EXPECT_FALSE(table.is_of_the_recipe_of(judged(other_model)));
+}
+
+TEST(StudyTable, WhoseBytesAreDamagedIsOfNoOthersRecipe) {
+  const StudyTable damaged(std::string("\xff"), 1);
+  EXPECT_FALSE(damaged.is_of_the_recipe_of(judged(recipe_of_mu(listed("mu", {0.1})))));
+}
+
+TEST(StudyTable, ComparesWithoutMakingTheTableOfAStudyThatRests) {
+  const auto resting = stored(recipe_of_mu(range("mu", 0.1, 0.5, 5)), 5);
+  (void)resting.is_of_the_recipe_of(judged(recipe_of_mu(listed("mu", {1, 2, 3, 4, 5}))));
+  EXPECT_FALSE(resting.is_made());
+}
+
+}  // namespace
+}  // namespace oblique::server
