@@ -111,7 +111,9 @@ bool Contact::judge_peak(const TipState& end) {
 
 bool Contact::judge_crossing(const TipState& end, const ContactIntegrals<double>& integrals) {
   const double t = trial_s_;
-  if (t > 0.0) {
+  // Over a shorter time the mean of a velocity is rounding alone, and what follows from it would
+  // take what has just happened for an event again.
+  if (t > kSimultaneous_s) {
     const auto first = earliest_event(end, t);
     if (first && first->event != search_.event &&
         (first->guess.fraction * t < t - kSimultaneous_s || first->event < search_.event)) {

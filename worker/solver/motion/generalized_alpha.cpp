@@ -130,7 +130,7 @@ void GeneralizedAlphaMotion::predict(const ChainState& from,
 void GeneralizedAlphaMotion::evaluate(const AffineContactForce<double>& force, double h_s,
                                       const ChainState& state, Coordinates& residual) const {
   const Eigen::Index tip = chain_.tip_column();
-  residual.setZero();
+  residual.setZero(2, chain_.columns());
   chain_.add_inertia(state.acceleration, residual);
   chain_.add_elastic_and_gravity(state.q, residual);
   chain_.add_constraint_forces(state.multipliers_N, residual);

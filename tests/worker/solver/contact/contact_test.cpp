@@ -115,6 +115,24 @@ TEST(Contact, AnEarlierOneInTheOrderTakesOverFromTheOneThatIsSoughtWhereTheyCoin
   }
 }
 
+TEST(Contact, ATurnAndAnExtremumAtOneInstantHappenOnceEach) {
+  // Whatever the polynomials say of their order, and however little time rounding leaves between.
+  for (const double skew : {-0.3, -0.2, -0.1, -0.05, 0.05, 0.1, 0.2, 0.3}) {
+    for (const double step_s : {0.6e-4, 0.7e-4, 0.9e-4, 1.1e-4}) {
+      SCOPED_TRACE(skew);
+      SCOPED_TRACE(step_s);
+      const TipPath path = in_step(0.0, skew);
+      Contact contact({k_N_m, kEta2, 0.5, 1.0}, path(0.0), {step_s, step_s});
+      std::vector<Event> events;
+      ASSERT_NO_THROW(events = followed(contact, path, 0.6 * kPeriod_s));
+      ASSERT_EQ(events.size(), 2U);
+      EXPECT_EQ(events[1].state, "SR");
+      EXPECT_NEAR(events[0].t_s, 0.5 * kPeriod_s, 1e-11);
+      EXPECT_NEAR(events[1].t_s, 0.5 * kPeriod_s, 1e-11);
+    }
+  }
+}
+
 TEST(Contact, ASlipThatRoundingPutsBeforeTheSeparationItMeetsIsNotInTheMode) {
   for (const double skew : {-0.3, 0.3}) {
     SCOPED_TRACE(skew);
