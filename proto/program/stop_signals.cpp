@@ -41,6 +41,7 @@ StopSignals::StopSignals() {
 }
 
 StopSignals::~StopSignals() {
+  (void)requested();  // who polled the descriptor has heeded it; unblocked it would end the program
   pthread_sigmask(SIG_SETMASK, &before_, nullptr);
 }
 

@@ -14,6 +14,7 @@ class StopSignals {
  public:
   /// Throws std::system_error when signals cannot be watched.
   StopSignals();
+  /// Takes the signals that are there: who heeds the descriptor alone ends in order.
   ~StopSignals();
   StopSignals(const StopSignals&) = delete;
   StopSignals& operator=(const StopSignals&) = delete;

@@ -43,6 +43,14 @@ TEST(StopSignals, AHangUpThatIsIgnoredStaysIgnored) {
   std::signal(SIGHUP, before);
 }
 
+TEST(StopSignals, ASignalThatIsOnlySeenAtTheDescriptorEndsNothingAfterwards) {
+  {
+    const StopSignals stop;
+    raise(SIGTERM);
+  }
+  SUCCEED() << "or the signal would have ended the test";
+}
+
 TEST(StopSignals, AfterItSignalsAreBlockedNoMore) {
   { const StopSignals stop; }
   sigset_t blocked;
