@@ -4,6 +4,7 @@
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 #include <google/protobuf/stubs/logging.h>
 #include <google/protobuf/wire_format_lite.h>
+#include <spdlog/fmt/fmt.h>
 
 #include "proto/oblique.pb.h"
 
@@ -28,13 +29,16 @@ std::string field_around(int number, std::string_view encoded) {
 
 }  // namespace
 
-std::string objection_to_version(std::uint32_t version, const std::string& who) {
-  if (version >= kOldestProtocolVersion && version <= kProtocolVersion) {
+std::string objection_to_version(std::uint32_t version, std::uint32_t oldest,
+                                 const std::string& who) {
+  if (version >= oldest && version <= kProtocolVersion) {
     return {};
   }
-  return "the server speaks protocol versions " + std::to_string(kOldestProtocolVersion) + " and " +
-         std::to_string(kProtocolVersion) + ", the " + who + " " + std::to_string(version) +
-         ": install the same release on both";
+  const std::string spoken = oldest == kProtocolVersion
+                                 ? fmt::format("version {}", kProtocolVersion)
+                                 : fmt::format("versions {} to {}", oldest, kProtocolVersion);
+  return fmt::format("the server speaks protocol {}, the {} {}: install the same release on both",
+                     spoken, who, version);
 }
 
 std::string encode(const google::protobuf::MessageLite& message) {

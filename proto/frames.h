@@ -10,17 +10,20 @@
 
 namespace oblique::protocol {
 
-/// Version spoken here, and the oldest one that the server still speaks to others. Peers of any
-/// other one are refused with the numbers in the reason. Version 2 brought Release and Notice.
-inline constexpr std::uint32_t kProtocolVersion = 2;
-inline constexpr std::uint32_t kOldestProtocolVersion = 1;
-static_assert(kProtocolVersion - kOldestProtocolVersion == 1, "the previous version is spoken too");
+/// Version spoken here, and the oldest ones that the server still speaks to clients and to workers.
+/// Peers of any other one are refused with the numbers in the reason. protocol.md says what each
+/// version brought.
+inline constexpr std::uint32_t kProtocolVersion = 3;
+inline constexpr std::uint32_t kOldestClientsVersion = 2;
+inline constexpr std::uint32_t kOldestWorkersVersion = 3;
 
 /// Largest frame that either side takes; a longer one is a foreign or broken peer.
 inline constexpr std::size_t kMaxFrameBytes = std::size_t{16} * 1024 * 1024;
 
-/// Why the server does not speak with `who` ("worker", "client") of that version, or an empty text.
-std::string objection_to_version(std::uint32_t version, const std::string& who);
+/// Why the server, which speaks the versions from `oldest` to the present one with `who` ("worker",
+/// "client"), does not speak with one of that version, or an empty text.
+std::string objection_to_version(std::uint32_t version, std::uint32_t oldest,
+                                 const std::string& who);
 
 /// Serialises a message into one frame.
 std::string encode(const google::protobuf::MessageLite& message);

@@ -8,10 +8,31 @@
 
 namespace oblique::protocol {
 
-/// What solving a point gave, but for H, mu and e, which follow from the point's number.
+// What a worker sends of a solved point. The scalars are those of solver::result_fields(), in its
+// order and without their names, which the worker says once, when it joins.
+
+/// What solving a point gave, but for H, mu and e, which follow from the point's number, and the
+/// integrator and version of the solver, which are the study's and the worker's.
 PointResult to_message(std::uint64_t point, const solver::CaseResult& result);
+
+/// The result that was made a message; what it does not hold is 0 or empty.
+solver::CaseResult from_message(const PointResult& message);
 
 /// A failed point. An empty reason becomes "unknown".
 PointResult failed_point(std::uint64_t point, const std::string& reason);
+
+/// Why a result from the network is none, or an empty text: another number of scalars than results
+/// have, a number that is not finite, lists of impossible length, texts too long.
+std::string fault_of(const PointResult& message);
+
+/// Sets what a worker of this build says of its messages: their version, and what its results have.
+void say_protocol(WorkerHello& hello);
+
+/// The names of the scalars that results have, in their order, with spaces between.
+std::string sent_outputs();
+
+/// Why the server does not take results of that worker, or an empty text: it speaks another version
+/// of the protocol, or its results have other outputs, so that numbers would mean something else.
+std::string objection_to_worker(const WorkerHello& hello);
 
 }  // namespace oblique::protocol

@@ -24,7 +24,4 @@ class PointSolver {
   FallCache fingers_;
 };
 
-/// Whether every value of a result is a finite number.
-bool is_finite(const protocol::PointResult& result);
-
 }  // namespace oblique::worker

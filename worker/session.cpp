@@ -12,6 +12,7 @@
 #include <spdlog/spdlog.h>
 
 #include "proto/frames.h"
+#include "proto/result_message.h"
 #include "proto/socket/socket.h"
 #include "worker/solver/solve.h"
 
@@ -40,7 +41,7 @@ std::string random_id() {
 
 protocol::WorkerHello hello_of(const SessionSettings& settings) {
   protocol::WorkerHello hello;
-  hello.set_protocol_version(protocol::kProtocolVersion);
+  protocol::say_protocol(hello);
   hello.set_solver_version(solver::solver_version());
   hello.set_instruction_set(solver::instruction_set());
   hello.set_name(settings.name);

@@ -1,12 +1,16 @@
 #include "client/output/case_report.h"
 
+#include <algorithm>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
 
 #include "client/output/printer.h"
 #include "worker/solver/model/number.h"
+#include "worker/solver/model/result_fields.h"
 
 namespace oblique::client {
 namespace {
@@ -20,32 +24,42 @@ using solver::readable_number;
 constexpr double kMicro = 1e6;
 constexpr double kMilli = 1e3;
 
-const char* kind_name(solver::PhaseKind kind) {
-  return kind == solver::PhaseKind::kCompression ? "compression" : "restitution";
+ordered_json json_of(const solver::Cell& cell) {
+  return std::visit([](const auto& value) { return ordered_json(value); }, cell);
 }
 
-ordered_json json_of(const solver::ContactEnergy& energy) {
-  return {
-      {"kinetic_in_J", energy.kinetic_in_J},       {"friction_J", energy.friction_J},
-      {"restitution_J", energy.restitution_J},     {"kinetic_change_J", energy.kinetic_change_J},
-      {"strain_change_J", energy.strain_change_J}, {"gravity_change_J", energy.gravity_change_J},
-      {"exchanged_J", energy.exchanged_J},         {"closure", energy.closure}};
-}
-
-ordered_json json_of(const solver::SolverReport& report) {
-  return {{"integrator", report.integrator},
-          {"dt_s", report.dt_s},
-          {"steps", report.steps},
-          {"wall_s", report.wall_s},
-          {"version", report.version}};
-}
-
-ordered_json json_of(const std::vector<solver::ReactionPeak>& peaks) {
-  ordered_json all = ordered_json::array();
-  for (const auto& peak : peaks) {
-    all.push_back({{"t_s", peak.t_s}, {"force_N", peak.force_N}});
+ordered_json json_of(const solver::ResultList& list, std::span<const solver::Cell> element) {
+  ordered_json json = list.has_names ? ordered_json::object() : ordered_json::array();
+  for (std::size_t i = 0; i < element.size(); ++i) {
+    if (list.has_names) {
+      json[std::string(list.members[i])] = json_of(element[i]);
+    } else {
+      json.push_back(json_of(element[i]));
+    }
   }
-  return all;
+  return json;
+}
+
+ordered_json json_of(const CaseResult& result, const solver::ListPart& part) {
+  const auto number_of = [&](std::string_view member) {
+    const auto& members = part.list->members;
+    return static_cast<std::size_t>(std::find(members.begin(), members.end(), member) -
+                                    members.begin());
+  };
+  ordered_json list = ordered_json::array();
+  part.list->each(result, [&](std::span<const solver::Cell> element) {
+    if (!part.where.empty() && !std::get<bool>(element[number_of(part.where)])) {
+      return;
+    }
+    list.push_back(part.member.empty() ? json_of(*part.list, element)
+                                       : json_of(element[number_of(part.member)]));
+  });
+  return list;
+}
+
+template <class T>
+ordered_json json_of(const CaseResult& result, const solver::Member<T>& member) {
+  return member.of(result);
 }
 
 void print_peaks(std::ostream& out, const CaseResult& result) {
@@ -59,7 +73,7 @@ void print_peaks(std::ostream& out, const CaseResult& result) {
                      fixed_number(result.ft_peak_N, 2));
 }
 
-void print_span(std::ostream& out, const char* name, double t0_s, double t1_s) {
+void print_span(std::ostream& out, std::string_view name, double t0_s, double t1_s) {
   out << fmt::format("{:<11}  {:>8} {:>8}  {:>12}\n", name, fixed_number(t0_s * kMicro, 2),
                      fixed_number(t1_s * kMicro, 2), fixed_number((t1_s - t0_s) * kMicro, 2));
 }
@@ -67,7 +81,7 @@ void print_span(std::ostream& out, const char* name, double t0_s, double t1_s) {
 void print_spans(std::ostream& out, const CaseResult& result) {
   out << "\nphases      from [us]  to [us]  lasting [us]\n";
   for (const auto& phase : result.phases) {
-    print_span(out, kind_name(phase.kind), phase.t0_s, phase.t1_s);
+    print_span(out, phase_kind_name(phase.kind), phase.t0_s, phase.t1_s);
   }
   for (const auto& stick : result.stick_intervals) {
     print_span(out, "stick", stick.t0_s, stick.t1_s);
@@ -79,7 +93,7 @@ void print_reactions(std::ostream& out, const std::vector<solver::ReactionPeak>&
     out << "\nreactions     t [us]  largest [N]\n";
   }
   for (std::size_t i = 0; i < peaks.size(); ++i) {
-    out << fmt::format("{:<11} {:>8}  {:>11}\n", i == 0 ? "pin O" : "joint " + std::to_string(i),
+    out << fmt::format("{:<11} {:>8}  {:>11}\n", i == 0 ? "pin O" : fmt::format("joint {}", i),
                        fixed_number(peaks[i].t_s * kMicro, 2), fixed_number(peaks[i].force_N, 2));
   }
 }
@@ -87,52 +101,13 @@ void print_reactions(std::ostream& out, const std::vector<solver::ReactionPeak>&
 }  // namespace
 
 ordered_json json_of(const CaseResult& result) {
-  ordered_json fn_peaks = ordered_json::array();
-  ordered_json major_peaks = ordered_json::array();
-  for (const auto& peak : result.peaks) {
-    fn_peaks.push_back(peak.fn_N);
-    if (peak.major) {
-      major_peaks.push_back(peak.fn_N);
-    }
+  ordered_json json{{"H", result.H_m}, {"mu", result.mu}, {"e", result.e_star}};
+  for (const auto& field : solver::result_fields()) {
+    auto& object = field.group.empty() ? json : json[std::string(field.group)];
+    object[std::string(field.name)] =
+        std::visit([&](const auto& value) { return json_of(result, value); }, field.value);
   }
-  ordered_json ft_peaks = ordered_json::array();
-  for (const auto& peak : result.ft_peaks) {
-    ft_peaks.push_back(peak.ft_N);
-  }
-  ordered_json sticks = ordered_json::array();
-  for (const auto& stick : result.stick_intervals) {
-    sticks.push_back({stick.t0_s, stick.t1_s});
-  }
-  ordered_json phases = ordered_json::array();
-  for (const auto& phase : result.phases) {
-    phases.push_back({{"kind", kind_name(phase.kind)}, {"t0_s", phase.t0_s}, {"t1_s", phase.t1_s}});
-  }
-  return {{"H", result.H_m},
-          {"mu", result.mu},
-          {"e", result.e_star},
-          {"fall_time_s", result.fall_time_s},
-          {"impact_x_m", result.impact_x_m},
-          {"vt_in_m_s", result.vt_in_m_s},
-          {"vn_in_m_s", result.vn_in_m_s},
-          {"duration_s", result.duration_s},
-          {"fn_peak_N", result.fn_peak_N},
-          {"ft_peak_N", result.ft_peak_N},
-          {"fn_peaks_N", fn_peaks},
-          {"ft_peaks_N", ft_peaks},
-          {"major_peaks_N", major_peaks},
-          {"impulse_n_Ns", result.impulse_n_Ns},
-          {"impulse_t_Ns", result.impulse_t_Ns},
-          {"slide_m", result.slide_m},
-          {"vt_out_m_s", result.vt_out_m_s},
-          {"vn_out_m_s", result.vn_out_m_s},
-          {"mode", result.mode},
-          {"major_mode", result.major_mode},
-          {"stick_total_s", result.stick_total_s},
-          {"stick_intervals_s", sticks},
-          {"phases", phases},
-          {"reaction_peaks", json_of(result.reaction_peaks)},
-          {"energy", json_of(result.energy)},
-          {"solver", json_of(result.solver)}};
+  return json;
 }
 
 void print_summary(std::ostream& out, const CaseResult& result) {
@@ -144,9 +119,9 @@ void print_summary(std::ostream& out, const CaseResult& result) {
       << fmt::format("contact     {} us, leaving with V_t = {}, V_n = {} m/s\n",
                      fixed_number(result.duration_s * kMicro, 2),
                      fixed_number(result.vt_out_m_s, 4), fixed_number(result.vn_out_m_s, 4))
-      << "mode        " << result.major_mode;
+      << fmt::format("mode        {}", result.major_mode);
   if (result.mode != result.major_mode) {
-    out << "  (with ripples: " << result.mode << ')';
+    out << fmt::format("  (with ripples: {})", result.mode);
   }
   out << "\n\n";
   print_peaks(out, result);

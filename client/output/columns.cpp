@@ -1,8 +1,10 @@
 #include "client/output/columns.h"
 
+#include <algorithm>
 #include <array>
-#include <span>
 #include <string_view>
+
+#include <spdlog/fmt/fmt.h>
 
 #include "worker/solver/model/parameters.h"
 #include "worker/solver/model/result_fields.h"
@@ -12,43 +14,41 @@ namespace {
 
 struct Described {
   std::string_view name;
-  std::string_view unit;
   std::string_view meaning;
 };
 
-/// Outputs as the database packs them, with more than `solve --json` says.
-constexpr std::array<Described, 3> kPackedOutputs{{
-    {"peaks", "s, N",
-     "every peak of the normal force: t_s counted from touch, fn_N, ft_N the largest tangential "
-     "magnitude around it, and whether it is major (1) or a ripple (0)"},
-    {"ft_peaks", "s, N", "every peak of the tangential magnitude: t_s counted from touch and ft_N"},
-    {"stick_intervals", "s", "the same as stick_intervals_s"},
-}};
-
 constexpr std::array<Described, 11> kRowColumns{{
-    {"study", "", "name of the study"},
-    {"study_id", "", "its number in the database"},
-    {"point", "", "number of the point in its study, from 0"},
-    {"model_id", "", "number of the model in the database"},
-    {"status", "", "solved or failed"},
-    {"error", "", "why it failed"},
-    {"worker", "", "number of the worker that solved it"},
-    {"worker_name", "", "that worker's name"},
-    {"instruction_set", "", "vector instructions that it used"},
-    {"attempt", "", "number of the lease under which it was solved"},
-    {"solved_at", "", "when the result arrived (UTC)"},
+    {"study", "name of the study"},
+    {"study_id", "its number in the database"},
+    {"point", "number of the point in its study, from 0"},
+    {"model_id", "number of the model in the database"},
+    {"status", "solved or failed"},
+    {"error", "why it failed"},
+    {"worker", "number of the worker that solved it"},
+    {"worker_name", "that worker's name"},
+    {"instruction_set", "vector instructions that it used"},
+    {"attempt", "number of the lease under which it was solved"},
+    {"solved_at", "when the result arrived (UTC)"},
 }};
 
-/// Lists of `solve --json` made of those that the view packs. The numbers stay texts, so that no
-/// bit of them is lost; a damaged list is NULL and does not spoil the query.
-constexpr std::string_view kRowsOfQueries = R"((SELECT *,
-  CASE WHEN json_valid(runs.peaks) THEN '[' || coalesce((SELECT group_concat(item.value -> 1)
-    FROM json_each(runs.peaks) AS item), '') || ']' END AS fn_peaks_N,
-  CASE WHEN json_valid(runs.ft_peaks) THEN '[' || coalesce((SELECT group_concat(item.value -> 1)
-    FROM json_each(runs.ft_peaks) AS item), '') || ']' END AS ft_peaks_N,
-  CASE WHEN json_valid(runs.peaks) THEN '[' || coalesce((SELECT group_concat(item.value -> 1)
-    FROM json_each(runs.peaks) AS item WHERE item.value ->> 3), '') || ']' END AS major_peaks_N,
-  runs.stick_intervals AS stick_intervals_s FROM runs))";
+/// What the view `runs` has of a list of `solve --json`, as an expression for SQL. The numbers stay
+/// texts, so that no bit of them is lost; a damaged list is NULL and does not spoil the query.
+std::string list_sql(const solver::ListPart& part) {
+  const std::string packed = fmt::format("runs.{}", part.list->column);
+  if (part.member.empty()) {
+    return packed;
+  }
+  const auto number_of = [&](std::string_view member) {
+    const auto& members = part.list->members;
+    return std::find(members.begin(), members.end(), member) - members.begin();
+  };
+  const std::string where =
+      part.where.empty() ? "" : fmt::format(" WHERE item.value ->> {}", number_of(part.where));
+  return fmt::format(
+      "CASE WHEN json_valid({0}) THEN '[' || coalesce((SELECT group_concat(item.value -> {1}) FROM "
+      "json_each({0}) AS item{2}), '') || ']' END",
+      packed, number_of(part.member), where);
+}
 
 std::string place_in_json(const solver::ResultField& field) {
   return field.group.empty() ? std::string(field.name)
@@ -57,7 +57,7 @@ std::string place_in_json(const solver::ResultField& field) {
 
 Column input(const solver::ParameterKey& key, std::string place) {
   return {std::string(key.name), std::string(key.unit), "input", std::move(place),
-          std::string(key.meaning) + "; " + std::string(key.allowed)};
+          fmt::format("{}; {}", key.meaning, key.allowed)};
 }
 
 void add_inputs(std::vector<Column>& columns) {
@@ -88,11 +88,13 @@ void add_outputs(std::vector<Column>& columns) {
   }
 }
 
-void add_described(std::vector<Column>& columns, std::span<const Described> described,
-                   const std::string& kind) {
-  for (const auto& each : described) {
-    columns.push_back(
-        {std::string(each.name), std::string(each.unit), kind, "", std::string(each.meaning)});
+/// Lists as the database packs them, where `solve --json` says less.
+void add_packed_lists(std::vector<Column>& columns) {
+  for (const auto* list : solver::result_lists()) {
+    if (solver::find_result_column(list->column) == nullptr) {
+      columns.push_back({std::string(list->column), std::string(list->unit), "output", "",
+                         std::string(list->meaning)});
+    }
   }
 }
 
@@ -102,13 +104,22 @@ std::vector<Column> all_columns() {
   std::vector<Column> columns;
   add_inputs(columns);
   add_outputs(columns);
-  add_described(columns, kPackedOutputs, "output");
-  add_described(columns, kRowColumns, "row");
+  add_packed_lists(columns);
+  for (const auto& [name, meaning] : kRowColumns) {
+    columns.push_back({std::string(name), "", "row", "", std::string(meaning)});
+  }
   return columns;
 }
 
 std::string rows_of_queries() {
-  return std::string(kRowsOfQueries);
+  std::string lists;
+  for (const auto& field : solver::result_fields()) {
+    const auto* part = std::get_if<solver::ListPart>(&field.value);
+    if (part != nullptr && field.column != part->list->column) {
+      lists += fmt::format(", {} AS {}", list_sql(*part), field.column);
+    }
+  }
+  return fmt::format("(SELECT *{} FROM runs)", lists);
 }
 
 ShownColumn shown_column(const std::string& name) {
@@ -116,7 +127,7 @@ ShownColumn shown_column(const std::string& name) {
   if (field == nullptr || field->shown_per_unit == 1.0) {
     return {name};
   }
-  return {name + " [" + std::string(field->shown_unit) + ']', field->shown_per_unit};
+  return {fmt::format("{} [{}]", name, field->shown_unit), field->shown_per_unit};
 }
 
 protocol::QueryReply in_shown_units(protocol::QueryReply rows) {

@@ -1,8 +1,10 @@
 #include "client/output/packed_columns.h"
 
 #include <algorithm>
-#include <array>
+#include <span>
 #include <utility>
+
+#include "worker/solver/model/result_fields.h"
 
 namespace oblique::client {
 namespace {
@@ -10,24 +12,22 @@ namespace {
 using nlohmann::ordered_json;
 using Members = std::span<const std::string_view>;
 
-// As the database's views of the same lists call them.
-constexpr std::array<std::string_view, 4> kPeak{"t_s", "fn_N", "ft_N", "major"};
-constexpr std::array<std::string_view, 2> kTangentialPeak{"t_s", "ft_N"};
-constexpr std::array<std::string_view, 3> kPhase{"kind", "t0_s", "t1_s"};
-constexpr std::array<std::string_view, 2> kReactionPeak{"t_s", "force_N"};
-
-constexpr std::array<PackedColumn, 10> kColumns{{
-    {"peaks", kPeak},
-    {"ft_peaks", kTangentialPeak},
-    {"phases", kPhase},
-    {"reaction_peaks", kReactionPeak},
-    {"stick_intervals", {}},
-    {"lengths_m", {}},
-    {"stick_intervals_s", {}},
-    {"fn_peaks_N", {}},
-    {"ft_peaks_N", {}},
-    {"major_peaks_N", {}},
-}};
+/// What the values of an element of a packed column are called; none: elements have no names.
+/// Nothing for columns that pack no list.
+std::optional<Members> members_of(std::string_view column) {
+  const auto* list = solver::find_result_list(column);
+  bool is_part = false;
+  if (const auto* field = solver::find_result_column(column)) {
+    if (const auto* part = std::get_if<solver::ListPart>(&field->value)) {
+      list = part->list;
+      is_part = !part->member.empty();
+    }
+  }
+  if (list != nullptr) {
+    return list->has_names && !is_part ? list->members : Members();
+  }
+  return column == "lengths_m" ? std::optional(Members()) : std::nullopt;
+}
 
 bool is_plain(const ordered_json& value) {
   return value.is_primitive();
@@ -58,22 +58,17 @@ std::optional<ordered_json> named(const ordered_json& list, Members members) {
 
 }  // namespace
 
-std::span<const PackedColumn> packed_columns() {
-  return kColumns;
-}
-
 std::optional<ordered_json> unpacked(std::string_view column, const std::string& text) {
-  const auto found = std::find_if(kColumns.begin(), kColumns.end(),
-                                  [&](const PackedColumn& each) { return each.name == column; });
-  if (found == kColumns.end()) {
+  const auto members = members_of(column);
+  if (!members) {
     return std::nullopt;
   }
   auto list = ordered_json::parse(text, nullptr, false);
   if (list.is_discarded() || !is_list(list)) {
     return std::nullopt;
   }
-  if (!found->members.empty()) {
-    return named(list, found->members);
+  if (!members->empty()) {
+    return named(list, *members);
   }
   return std::optional<ordered_json>(std::in_place, std::move(list));
 }

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include <spdlog/fmt/fmt.h>
+
 #include "proto/text.h"
 #include "worker/solver/model/number.h"
 
@@ -30,20 +32,19 @@ std::optional<double> seconds_left(const ProgressState& state) {
 
 std::string two_units(std::int64_t large, const char* large_unit, std::int64_t small,
                       const char* small_unit) {
-  return std::to_string(large) + ' ' + large_unit + (small < 10 ? " 0" : " ") +
-         std::to_string(small) + ' ' + small_unit;
+  return fmt::format("{} {} {:02} {}", large, large_unit, small, small_unit);
 }
 
 }  // namespace
 
 std::string shown_duration(double seconds) {
   if (seconds < 9.95) {
-    return solver::fixed_number(std::max(seconds, 0.0), 1) + " s";
+    return fmt::format("{} s", solver::fixed_number(std::max(seconds, 0.0), 1));
   }
   constexpr double kLongest_s = 1e12;
   const auto whole = static_cast<std::int64_t>(std::llround(std::min(seconds, kLongest_s)));
   if (whole < 60) {
-    return std::to_string(whole) + " s";
+    return fmt::format("{} s", whole);
   }
   if (whole < 3600) {
     return two_units(whole / 60, "min", whole % 60, "s");
@@ -60,36 +61,34 @@ std::string progress_bar(const ProgressState& state) {
                           ? 1.0
                           : static_cast<double>(state.settled) / static_cast<double>(state.points);
   const auto filled = static_cast<std::size_t>(part * static_cast<double>(kWidth));
-  std::string text = protocol::visible(state.study) + " [" + std::string(filled, '#') +
-                     std::string(kWidth - filled, '-') + "] " + std::to_string(state.settled) +
-                     "/" + std::to_string(state.points) + " " + std::to_string(percent(state)) +
-                     " %";
+  std::string text =
+      fmt::format("{} [{:#<{}}{:-<{}}] {}/{} {} %", protocol::visible(state.study), "", filled, "",
+                  kWidth - filled, state.settled, state.points, percent(state));
   if (state.failed > 0) {
-    text += ", " + std::to_string(state.failed) + " failed";
+    text += fmt::format(", {} failed", state.failed);
   }
   if (state.points_per_s) {
-    text += ", " + shown_rate(*state.points_per_s) + " points/s";
+    text += fmt::format(", {} points/s", shown_rate(*state.points_per_s));
   }
   if (const auto left = seconds_left(state); left && state.settled < state.points) {
-    text += ", " + shown_duration(*left) + " left";
+    text += fmt::format(", {} left", shown_duration(*left));
   }
   return text;
 }
 
 std::string progress_line(const ProgressState& state) {
-  std::string text = protocol::visible(state.study) + ": " + std::to_string(state.settled) +
-                     " of " + std::to_string(state.points) + " points (" +
-                     std::to_string(percent(state)) + " %)";
+  std::string text = fmt::format("{}: {} of {} points ({} %)", protocol::visible(state.study),
+                                 state.settled, state.points, percent(state));
   if (state.failed > 0) {
-    text += ", " + std::to_string(state.failed) + " of them failed";
+    text += fmt::format(", {} of them failed", state.failed);
   }
   if (state.points_per_s) {
-    text += ", " + shown_rate(*state.points_per_s) + " points/s";
+    text += fmt::format(", {} points/s", shown_rate(*state.points_per_s));
   }
   if (state.settled == state.points) {
-    text += ", after " + shown_duration(state.elapsed_s);
+    text += fmt::format(", after {}", shown_duration(state.elapsed_s));
   } else if (const auto left = seconds_left(state)) {
-    text += ", " + shown_duration(*left) + " left";
+    text += fmt::format(", {} left", shown_duration(*left));
   }
   return text;
 }

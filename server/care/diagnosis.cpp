@@ -7,6 +7,7 @@
 #include "server/database/open_for_reading.h"
 #include "server/database/row_checksum.h"
 #include "server/database/sqlite.h"
+#include "server/store/result_row.h"
 
 namespace oblique::server {
 namespace {

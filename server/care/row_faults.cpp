@@ -9,6 +9,8 @@
 #include <string_view>
 #include <utility>
 
+#include <spdlog/fmt/fmt.h>
+
 #include "proto/recipe/point_table.h"
 #include "server/store/model_rows.h"
 #include "server/store/packed_arrays.h"
@@ -50,17 +52,20 @@ class Found {
 };
 
 /// Outputs that a row has or lacks without reason.
-std::string misplaced_outputs_sql() {
-  std::string missing = "0";
-  for (const std::string& column : output_columns()) {
-    missing += " + (" + column + " IS NULL)";
-  }
-  const std::string all = std::to_string(output_columns().size());
+std::string misplaced_outputs_sql(int schema) {
+  const auto number_missing = [](const std::vector<std::string>& columns) {
+    return fmt::format("(({} IS NULL))", fmt::join(columns, " IS NULL) + ("));
+  };
+  // Rows may lack what came after the first schema.
+  const auto always = output_columns(1);
+  const auto all = output_columns(schema);
   return "SELECT 'study ' || study_id || ', point ' || point || ': it is ' || status ||"
          " CASE WHEN (status = 'solved') <> (error IS NULL) THEN ', and its error says otherwise'"
          " WHEN status = 'solved' THEN ', and outputs are missing' ELSE ', and has outputs' END"
-         " FROM results WHERE (status = 'solved') <> (error IS NULL) OR (" +
-         missing + ") <> CASE status WHEN 'solved' THEN 0 ELSE " + all + " END";
+         " FROM results WHERE (status = 'solved') <> (error IS NULL) OR CASE status WHEN 'solved'"
+         " THEN " +
+         number_missing(always) + " > 0 ELSE " + number_missing(all) + " < " +
+         std::to_string(all.size()) + " END";
 }
 
 /// Holds each row of a model against its definition.
@@ -101,8 +106,7 @@ class StudyCheck {
         definition_(database, "SELECT definition FROM models WHERE model_id = ?"),
         rows_(database, std::string("SELECT point, model_id, H, mu, e, status = 'solved' AND ") +
                             (schema >= kFirstWithChecksums ? "checksum IS NULL" : "1") + ", " +
-                            kArrayColumns + ", " +
-                            (schema >= kFirstWithChecksums ? "reaction_peaks" : "NULL") +
+                            array_columns_sql(schema) +
                             " FROM results WHERE study_id = ? ORDER BY point") {}
 
   void run(std::int64_t study_id, const std::string& name, const protocol::PointTable& table,
@@ -198,10 +202,9 @@ void check_studies(sqlite3* database, int schema, Found& found) {
 }  // namespace
 
 std::vector<std::string> faults_of_rows(sqlite3* database, int schema, std::size_t at_most) {
-  const bool has_checksums = schema >= kFirstWithChecksums;
   std::vector<std::string> faults;
   const auto kind = [&] { return Found(faults, at_most); };
-  if (has_checksums) {
+  if (schema >= kFirstWithChecksums) {
     kind().add_all(database,
                    "SELECT 'study ' || study_id || ', ' || name || ': its name, recipe or size is"
                    " not the one that was stored' FROM studies WHERE checksum <> " +
@@ -209,9 +212,9 @@ std::vector<std::string> faults_of_rows(sqlite3* database, int schema, std::size
     kind().add_all(database,
                    "SELECT 'study ' || study_id || ', point ' || point || ': its row is not the one"
                    " that was stored' FROM results WHERE checksum <> " +
-                       result_checksum_sql());
+                       result_checksum_sql(schema));
   }
-  kind().add_all(database, misplaced_outputs_sql());
+  kind().add_all(database, misplaced_outputs_sql(schema));
   auto models = kind();
   check_models(database, schema, models);
   auto studies = kind();

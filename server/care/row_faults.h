@@ -8,9 +8,6 @@
 
 namespace oblique::server {
 
-/// The first schema whose rows have checksums.
-inline constexpr int kFirstWithChecksums = 4;
-
 /// What is wrong with the rows of a database whose pages are sound, a sentence each, at most
 /// `at_most` of a kind: a row or a study that is not the one that was stored (by its checksum), a
 /// model or point that is not the recipe's, outputs missing or there without reason. Rows without a

@@ -65,7 +65,9 @@ std::string soundness_sql(sqlite3* database, const std::string& table) {
   const auto names = columns_of(database, table);
   const bool has_checksums =
       table == "results" && std::find(names.begin(), names.end(), "checksum") != names.end();
-  return has_checksums ? "checksum IS NULL OR checksum = " + result_checksum_sql() : "1";
+  Statement version(database, "PRAGMA user_version");
+  const int schema = version.step() ? static_cast<int>(version.integer(0)) : kSchemaVersion;
+  return has_checksums ? "checksum IS NULL OR checksum = " + result_checksum_sql(schema) : "1";
 }
 
 /// The columns as the present schema has them.

@@ -50,6 +50,9 @@ void append_value(std::string& bytes, sqlite3_value* value) {
 void row_checksum(sqlite3_context* context, int count, sqlite3_value** values) {
   auto& bytes = *static_cast<std::string*>(sqlite3_user_data(context));  // kept: it has grown once
   bytes.clear();
+  while (count > 0 && sqlite3_value_type(values[count - 1]) == SQLITE_NULL) {
+    --count;
+  }
   try {
     for (int i = 0; i < count; ++i) {
       append_value(bytes, values[i]);

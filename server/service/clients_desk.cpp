@@ -79,7 +79,8 @@ bool ClientsDesk::refuse(const Client& client, const ReadRequest& read) {
   } else if (request.protocol_version() == 0) {
     at_.bad_frames.count("a client");
     reason = "this is the port for clients; workers connect to the other one";
-  } else if (reason = protocol::objection_to_version(request.protocol_version(), "client");
+  } else if (reason = protocol::objection_to_version(request.protocol_version(),
+                                                     protocol::kOldestClientsVersion, "client");
              !reason.empty()) {
     // that is it
   } else if ((request.has_submit() || request.has_change()) && ledger.takes_no_change()) {

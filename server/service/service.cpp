@@ -5,7 +5,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/result_message.h"
-#include "server/store/result_row.h"
 
 namespace oblique::server {
 

@@ -10,7 +10,6 @@
 #include "proto/frames.h"
 #include "proto/result_message.h"
 #include "proto/text.h"
-#include "server/store/result_row.h"
 
 namespace oblique::server {
 namespace {
@@ -127,7 +126,6 @@ void WorkersDesk::hello(const std::string& identity, const protocol::WorkerHello
   }
   const WorkerId id = ++settings_.last_worker_id;
   const WorkerRecord worker{identity,
-                            hello.protocol_version(),
                             plain(hello.name()),
                             std::clamp(hello.threads(), 1U, kMostThreads),
                             plain(hello.solver_version()),
@@ -153,7 +151,7 @@ void WorkersDesk::hello(const std::string& identity, const protocol::WorkerHello
 
 /// Says why, if there is a reason.
 bool WorkersDesk::refuse(const std::string& identity, const protocol::WorkerHello& hello) {
-  std::string reason = protocol::objection_to_version(hello.protocol_version(), "worker");
+  std::string reason = protocol::objection_to_worker(hello);
   if (reason.empty() && hello.solver_version().empty()) {
     reason = "it does not say which version its solver has";
   }
@@ -174,7 +172,7 @@ bool WorkersDesk::refuse(const std::string& identity, const protocol::WorkerHell
 bool WorkersDesk::welcome(WorkerId id, const WorkerRecord& worker) {
   protocol::ServerToWorker reply;
   auto& welcome = *reply.mutable_welcome();
-  welcome.set_protocol_version(worker.protocol_version);
+  welcome.set_protocol_version(protocol::kProtocolVersion);
   welcome.set_worker_id(id);
   welcome.set_heartbeat_interval_ms(settings_.heartbeat_interval_ms);
   welcome.set_lost_after_ms(static_cast<std::uint32_t>(settings_.lost_after_ms));

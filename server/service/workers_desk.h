@@ -27,7 +27,6 @@ struct WorkersDeskSettings {
 /// A worker on its one connection, as it describes itself.
 struct WorkerRecord {
   std::string identity;
-  std::uint32_t protocol_version;
   std::string name;
   std::uint32_t threads;
   std::string solver_version;

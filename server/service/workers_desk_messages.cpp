@@ -89,8 +89,7 @@ void WorkersDesk::stop() {
 
 void WorkersDesk::send(WorkerId worker, const protocol::ServerToWorker& message, LeaseId lease) {
   const auto known = workers_.find(worker);
-  const bool is_of_version_2 = message.has_release() || message.has_notice();
-  if (known == workers_.end() || (is_of_version_2 && known->second.protocol_version < 2)) {
+  if (known == workers_.end()) {
     return;
   }
   const Delivery delivery = network_.to_worker(known->second.identity, message);

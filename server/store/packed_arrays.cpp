@@ -1,43 +1,79 @@
 #include "server/store/packed_arrays.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
+#include <map>
 #include <optional>
 #include <string_view>
 #include <vector>
 
+#include <spdlog/fmt/fmt.h>
 #include <nlohmann/json.hpp>
+
+#include "worker/solver/model/number.h"
 
 namespace oblique::server {
 namespace {
 
 using Json = nlohmann::json;
 using Rows = std::vector<std::vector<double>>;
+using Lists = std::map<std::string_view, Rows>;  // by column
+using solver::Cell;
+using solver::PhaseKind;
+using solver::ResultList;
 
-/// A JSON array of arrays of `width` finite numbers; nothing when it is none.
-std::optional<Rows> numbers_of(const Json& json, std::size_t width) {
+/// Columns that say what the arrays say, too; these follow them.
+constexpr std::array<std::string_view, 5> kOutputs{"duration_s", "fn_peak_N", "ft_peak_N",
+                                                   "stick_total_s", "mode"};
+enum : int { kDuration, kFnPeak, kFtPeak, kStickTotal, kMode };
+
+std::string packed_cell(const Cell& cell) {
+  if (const auto* number = std::get_if<double>(&cell)) {
+    return solver::exact_real(*number);
+  }
+  if (const auto* truth = std::get_if<bool>(&cell)) {
+    return *truth ? "1" : "0";
+  }
+  // Our own words, which need no escaping.
+  return fmt::format("\"{}\"", std::get<std::string_view>(cell));
+}
+
+/// A finite number, or the number of a kind of phase.
+std::optional<double> number_of(const Json& value) {
+  if (value.is_number() && std::isfinite(value.get<double>())) {
+    return value.get<double>();
+  }
+  for (const PhaseKind kind : {PhaseKind::kCompression, PhaseKind::kRestitution}) {
+    if (value.is_string() && value.get_ref<const std::string&>() == phase_kind_name(kind)) {
+      return static_cast<double>(kind);
+    }
+  }
+  return std::nullopt;
+}
+
+/// The elements of a packed list; nothing when the text is none.
+std::optional<Rows> elements_of(const ResultList& list, const std::string& text) {
+  const Json json = Json::parse(text, nullptr, false);
   if (!json.is_array()) {
     return std::nullopt;
   }
   Rows rows;
   for (const Json& item : json) {
-    if (!item.is_array() || item.size() != width) {
+    if (!item.is_array() || item.size() != list.members.size()) {
       return std::nullopt;
     }
     auto& row = rows.emplace_back();
-    for (const Json& value : item) {
-      if (!value.is_number() || !std::isfinite(value.get<double>())) {
+    for (std::size_t i = 0; i < item.size(); ++i) {
+      const auto number = number_of(item[i]);
+      if (!number || item[i].is_string() != (list.members[i] == "kind")) {
         return std::nullopt;
       }
-      row.push_back(value.get<double>());
+      row.push_back(*number);
     }
   }
   return rows;
-}
-
-Json parsed(const std::string& text) {
-  return Json::parse(text, nullptr, false);
 }
 
 bool ascends(const Rows& rows) {
@@ -72,71 +108,84 @@ std::string turns_of(std::string_view mode) {
 }
 
 /// The kinds of the phases as `turns_of` gives them; nothing unless they follow each other from 0.
-std::optional<std::string> turns_of(const Json& phases, double& end_s) {
-  if (!phases.is_array()) {
-    return std::nullopt;
-  }
+std::optional<std::string> turns_of(const Rows& phases) {
   std::string turns;
-  end_s = 0.0;
-  for (const Json& phase : phases) {
-    const bool is_phase = phase.is_array() && phase.size() == 3 && phase[0].is_string() &&
-                          phase[1].is_number() && phase[2].is_number();
-    if (!is_phase || phase[1].get<double>() != end_s || !(phase[2].get<double>() >= end_s)) {
+  double end_s = 0.0;
+  for (const auto& phase : phases) {
+    if (phase[1] != end_s || !(phase[2] >= end_s)) {
       return std::nullopt;
     }
-    const auto& kind = phase[0].get_ref<const std::string&>();
-    if (kind != "compression" && kind != "restitution") {
-      return std::nullopt;
-    }
-    turns += kind == "compression" ? 'C' : 'R';
-    end_s = phase[2].get<double>();
+    turns += phase[0] == static_cast<double>(PhaseKind::kCompression) ? 'C' : 'R';
+    end_s = phase[2];
   }
   return turns;
 }
 
-}  // namespace
-
-std::string fault_of_arrays(const Statement& row, int first) {
-  const double duration_s = row.real(first);
-  const auto peaks = numbers_of(parsed(row.text(first + 5)), 4);
-  const auto ft_peaks = numbers_of(parsed(row.text(first + 6)), 2);
-  const auto sticks = numbers_of(parsed(row.text(first + 8)), 2);
-  double end_s = 0.0;
-  const auto turns = turns_of(parsed(row.text(first + 7)), end_s);
-  if (!peaks || !ascends(*peaks)) {
-    return "its peaks cannot be read";
-  }
-  if (!ft_peaks || !ascends(*ft_peaks)) {
-    return "its ft_peaks cannot be read";
-  }
-  if (!turns) {
-    return "its phases cannot be read, or have gaps";
-  }
-  if (!sticks || !ascends(*sticks)) {
-    return "its stick_intervals cannot be read";
-  }
-  if (!row.is_null(first + 9) && !numbers_of(parsed(row.text(first + 9)), 2)) {
-    return "its reaction_peaks cannot be read";
-  }
-  if (!about(end_s, duration_s)) {
+/// Why the arrays cannot be those of the outputs beside them.
+std::string disagreement(const Statement& row, int first, const Lists& lists) {
+  const Rows& phases = lists.at("phases");
+  if (!about(phases.empty() ? 0.0 : phases.back()[2], row.real(first + kDuration))) {
     return "its phases do not end with its duration";
   }
-  if (*turns != turns_of(row.text(first + 4))) {
+  if (turns_of(phases) != turns_of(row.text(first + kMode))) {
     return "its phases are not those of its mode";
   }
-  if (!about(largest(*peaks, 1), row.real(first + 1))) {
+  if (!about(largest(lists.at("peaks"), 1), row.real(first + kFnPeak))) {
     return "its fn_peak_N is not the largest of its peaks";
   }
-  if (!about(largest(*ft_peaks, 1), row.real(first + 2))) {
+  if (!about(largest(lists.at("ft_peaks"), 1), row.real(first + kFtPeak))) {
     return "its ft_peak_N is not the largest of its ft_peaks";
   }
   double stick_s = 0.0;
-  for (const auto& interval : *sticks) {
+  for (const auto& interval : lists.at("stick_intervals")) {
     stick_s += interval[1] - interval[0];
   }
-  return about(stick_s, row.real(first + 3)) ? ""
-                                             : "its stick_total_s is not that of its "
-                                               "stick_intervals";
+  return about(stick_s, row.real(first + kStickTotal))
+             ? ""
+             : "its stick_total_s is not that of its stick_intervals";
+}
+
+}  // namespace
+
+std::string packed(const ResultList& list, const solver::CaseResult& result) {
+  std::string text = "[";
+  list.each(result, [&](std::span<const Cell> element) {
+    text += text.size() == 1 ? "[" : ",[";
+    for (std::size_t i = 0; i < element.size(); ++i) {
+      text += i == 0 ? "" : ",";
+      text += packed_cell(element[i]);
+    }
+    text += ']';
+  });
+  return text + "]";
+}
+
+std::string array_columns_sql(int schema) {
+  std::string columns(fmt::to_string(fmt::join(kOutputs, ", ")));
+  for (const ResultList* list : solver::result_lists()) {
+    columns += ", ";
+    columns += list->since_schema <= schema ? list->column : "NULL";
+  }
+  return columns;
+}
+
+std::string fault_of_arrays(const Statement& row, int first) {
+  Lists lists;
+  int column = first + static_cast<int>(kOutputs.size());
+  for (const ResultList* list : solver::result_lists()) {
+    const bool may_lack = list->since_schema > 1 && row.is_null(column);
+    const auto rows = may_lack ? Rows() : elements_of(*list, row.text(column));
+    const bool is_phases = list->column == "phases";
+    // Reactions stand in the order of the joints.
+    const bool in_time = is_phases || list->column == "reaction_peaks" || !rows || ascends(*rows);
+    if (!rows || !in_time || (is_phases && !turns_of(*rows))) {
+      return fmt::format("its {} cannot be read{}", list->column,
+                         is_phases ? ", or have gaps" : "");
+    }
+    lists.emplace(list->column, *rows);
+    ++column;
+  }
+  return disagreement(row, first, lists);
 }
 
 }  // namespace oblique::server

@@ -10,23 +10,24 @@
 
 namespace oblique::server {
 
-/// Why a result from the network cannot be stored, or an empty text: a number that is not finite or
-/// that the database cannot hold, packed arrays of impossible length, texts too long.
-std::string fault_of(const protocol::PointResult& result);
+/// The first schema whose rows have checksums. Outputs of later ones stand behind all other columns
+/// in them, where rows that lack them have the checksum that they always had.
+inline constexpr int kFirstWithChecksums = 4;
 
 /// The statement that inserts one row into `results` unless the point has one; `bind_result` binds
 /// it. The connection must have `row_checksum`.
 std::string insert_result_sql();
 
-/// What `checksum` of a row of `results` must be, as an expression over its columns. A later schema
-/// leaves columns that it adds out of it: earlier rows keep their checksums.
-std::string result_checksum_sql();
+/// What `checksum` of a row of `results` must be, as an expression over the columns that a database
+/// of that schema has. Those of outputs that a later schema brought come last, and so count only
+/// where they are not NULL: earlier rows keep their checksums.
+std::string result_checksum_sql(int schema);
 /// The same for `studies`.
 std::string study_checksum_sql();
 
-/// The columns that a solved row has and a failed one lacks, in no particular order; without
-/// reaction_peaks, which rows of earlier schemas lack.
-std::vector<std::string> output_columns();
+/// The columns of outputs, in no particular order, that schemas up to this one brought. A failed
+/// row lacks them, and a solved one has those that are older than it.
+std::vector<std::string> output_columns(int schema);
 
 /// What stands in a row of `results` beside the outputs of the solver.
 struct RowContext {
@@ -40,15 +41,8 @@ struct RowContext {
   std::string_view solved_at;
 };
 
-/// Binds every parameter of the statement.
+/// Binds every parameter of the statement. Of a solved point `protocol::fault_of` must find
+/// nothing.
 void bind_result(Statement& insert, const RowContext& context, const protocol::PointResult& result);
-
-/// JSON text of the packed columns. Doubles keep their bits; a whole number keeps its ".0", so that
-/// SQL takes it for a real.
-std::string peaks_json(const protocol::PointResult& result);
-std::string ft_peaks_json(const protocol::PointResult& result);
-std::string phases_json(const protocol::PointResult& result);
-std::string stick_intervals_json(const protocol::PointResult& result);
-std::string reaction_peaks_json(const protocol::PointResult& result);
 
 }  // namespace oblique::server

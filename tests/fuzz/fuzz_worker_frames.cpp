@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "proto/frames.h"
+#include "proto/result_message.h"
 #include "worker/conversation.h"
 
 extern "C" int LLVMFuzzerInitialize(int*, char***) {
@@ -15,7 +16,7 @@ extern "C" int LLVMFuzzerInitialize(int*, char***) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   std::string_view input(reinterpret_cast<const char*>(data), size);
   oblique::protocol::WorkerHello hello;
-  hello.set_protocol_version(oblique::protocol::kProtocolVersion);
+  oblique::protocol::say_protocol(hello);
   oblique::worker::Conversation conversation(hello, {});
   std::int64_t now_ms = 0;
   conversation.start(now_ms);

@@ -45,7 +45,7 @@ TEST(FrameScanTest, WhatASoundWorkerSendsPasses) {
   EXPECT_TRUE(is_of_a_workers_size(""));
   WorkerMessage long_text;
   auto& result = *long_text.mutable_results()->add_results();
-  result.set_mode(std::string(1 << 20, 'S'));
+  result.add_texts(std::string(1 << 20, 'S'));
   EXPECT_TRUE(is_of_a_workers_size(encode(long_text)));
 }
 

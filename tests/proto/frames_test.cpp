@@ -19,7 +19,7 @@ WorkerMessage results_message() {
   for (int i = 0; i < 10; ++i) {
     PointResult& result = *results.add_results();
     result.set_point(static_cast<std::uint64_t>(i));
-    result.set_mode("SC SR sR sC sR");
+    result.add_texts("SC SR sR sC sR");
     result.add_peaks(1.5);
   }
   return message;

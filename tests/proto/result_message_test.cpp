@@ -1,11 +1,22 @@
 #include "proto/result_message.h"
 
+#include <algorithm>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "proto/frames.h"
+#include "worker/solver/model/result_fields.h"
 
 namespace oblique::protocol {
 namespace {
+
+using testing::HasSubstr;
+
+constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
 
 /// A result whose every field differs from the others.
 solver::CaseResult distinct_result() {
@@ -33,72 +44,112 @@ solver::CaseResult distinct_result() {
   result.phases = {{solver::PhaseKind::kCompression, 0.0, 6.8e-5},
                    {solver::PhaseKind::kRestitution, 6.8e-5, 5.5e-4}};
   result.energy = {1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0};
-  result.solver = {"explicit", 4e-6, 138, 3e-4, "0.1.0"};
+  result.solver = {"", 4e-6, 138, 3e-4, ""};
   return result;
 }
 
-TEST(PointResultTest, ScalarsOfAResultKeepTheirValuesAndMeaning) {
+std::vector<double> numbers(const google::protobuf::RepeatedField<double>& field) {
+  return {field.begin(), field.end()};
+}
+
+TEST(PointResultTest, ScalarsTravelByTypeInTheOrderThatTheWorkerSays) {
   const PointResult message = to_message(42, distinct_result());
   EXPECT_EQ(message.point(), 42U);
   EXPECT_TRUE(message.error().empty());
-  EXPECT_EQ(message.fall_time_s(), 0.43);
-  EXPECT_EQ(message.impact_x_m(), 0.58);
-  EXPECT_EQ(message.vt_in_m_s(), -5.7);
-  EXPECT_EQ(message.vn_in_m_s(), -5.2);
-  EXPECT_EQ(message.duration_s(), 5.5e-4);
-  EXPECT_EQ(message.fn_peak_n(), 5057.0);
-  EXPECT_EQ(message.ft_peak_n(), 2023.0);
-  EXPECT_EQ(message.impulse_n_ns(), 0.7);
-  EXPECT_EQ(message.impulse_t_ns(), 0.3);
-  EXPECT_EQ(message.slide_m(), 1e-3);
-  EXPECT_EQ(message.vt_out_m_s(), -4.0);
-  EXPECT_EQ(message.vn_out_m_s(), 2.0);
-  EXPECT_EQ(message.mode(), "SC SR sR");
-  EXPECT_EQ(message.major_mode(), "SC SR");
-  EXPECT_EQ(message.stick_total_s(), 7e-5);
-  EXPECT_EQ(message.dt_s(), 4e-6);
-  EXPECT_EQ(message.steps(), 138U);
-  EXPECT_EQ(message.wall_s(), 3e-4);
-}
-
-TEST(PointResultTest, EnergiesOfAResultKeepTheirValuesAndMeaning) {
-  const PointResult message = to_message(0, distinct_result());
-  EXPECT_EQ(message.kinetic_in_j(), 1.0);
-  EXPECT_EQ(message.friction_j(), 2.0);
-  EXPECT_EQ(message.restitution_j(), 3.0);
-  EXPECT_EQ(message.kinetic_change_j(), 4.0);
-  EXPECT_EQ(message.strain_change_j(), 5.0);
-  EXPECT_EQ(message.gravity_change_j(), 6.0);
-  EXPECT_EQ(message.exchanged_j(), 7.0);
-  EXPECT_EQ(message.closure(), 8.0);
+  // As rows of the database were made of them before they stood in one table.
+  EXPECT_EQ(sent_outputs(),
+            "fall_time_s impact_x_m vt_in_m_s vn_in_m_s duration_s fn_peak_N ft_peak_N"
+            " impulse_n_Ns impulse_t_Ns slide_m vt_out_m_s vn_out_m_s stick_total_s kinetic_in_J"
+            " friction_J restitution_J kinetic_change_J strain_change_J gravity_change_J"
+            " exchanged_J closure dt_s wall_s steps mode major_mode");
+  EXPECT_EQ(numbers(message.reals()),
+            (std::vector<double>{0.43, 0.58, -5.7, -5.2, 5.5e-4, 5057.0, 2023.0, 0.7,
+                                 0.3,  1e-3, -4.0, 2.0,  7e-5,   1.0,    2.0,    3.0,
+                                 4.0,  5.0,  6.0,  7.0,  8.0,    4e-6,   3e-4}));
+  ASSERT_EQ(message.whole_numbers_size(), 1);
+  EXPECT_EQ(message.whole_numbers(0), 138);
+  ASSERT_EQ(message.texts_size(), 2);
+  EXPECT_EQ(message.texts(0), "SC SR sR");
+  EXPECT_EQ(message.texts(1), "SC SR");
 }
 
 TEST(PointResultTest, ListsOfAResultArePackedInOrder) {
   const PointResult message = to_message(0, distinct_result());
-  const auto doubles = [](const auto& field) {
-    return std::vector<double>(field.begin(), field.end());
-  };
-  EXPECT_EQ(doubles(message.peaks()),
+  EXPECT_EQ(numbers(message.peaks()),
             (std::vector<double>{1e-5, 5057.0, 2023.0, 2e-5, 40.0, 16.0, 3e-5, 1516.0, 606.0}));
-  EXPECT_EQ(doubles(message.major_peaks()), (std::vector<double>{0, 2}));
-  EXPECT_EQ(doubles(message.ft_peaks()), (std::vector<double>{1.1e-5, 2023.0, 3.1e-5, 607.0}));
-  EXPECT_EQ(doubles(message.phase_ends_s()), (std::vector<double>{6.8e-5, 5.5e-4}));
-  EXPECT_EQ(doubles(message.stick_intervals()), (std::vector<double>{0.0, 6e-5, 8e-5, 9e-5}));
-  EXPECT_EQ(doubles(message.reaction_peaks()),
+  EXPECT_EQ(std::vector<std::uint32_t>(message.major_peaks().begin(), message.major_peaks().end()),
+            (std::vector<std::uint32_t>{0, 2}));
+  EXPECT_EQ(numbers(message.ft_peaks()), (std::vector<double>{1.1e-5, 2023.0, 3.1e-5, 607.0}));
+  EXPECT_EQ(numbers(message.phase_ends_s()), (std::vector<double>{6.8e-5, 5.5e-4}));
+  EXPECT_EQ(numbers(message.stick_intervals()), (std::vector<double>{0.0, 6e-5, 8e-5, 9e-5}));
+  EXPECT_EQ(numbers(message.reaction_peaks()),
             (std::vector<double>{3.2e-4, 5053.0, 3.4e-4, 4611.0}));
 }
 
-TEST(PointResultTest, AResultComesBackFromAFrameUnchanged) {
-  const PointResult sent = to_message(42, distinct_result());
-  PointResult received;
-  ASSERT_TRUE(decode(encode(sent), received));
-  EXPECT_EQ(encode(received), encode(sent));
+TEST(PointResultTest, AResultComesBackFromItsFrame) {
+  const auto sent = distinct_result();
+  PointResult message;
+  ASSERT_TRUE(decode(encode(to_message(42, sent)), message));
+  EXPECT_EQ(fault_of(message), "");
+  const auto received = from_message(message);
+  for (const auto& field : solver::result_fields()) {
+    if (const auto* number = std::get_if<solver::Member<double>>(&field.value)) {
+      EXPECT_EQ(number->of(received), number->of(sent)) << field.name;
+    }
+  }
+  EXPECT_EQ(received.phases.at(1).kind, solver::PhaseKind::kRestitution);
+  EXPECT_EQ(received.phases.at(1).t0_s, 6.8e-5);
+  EXPECT_FALSE(received.peaks.at(1).major);
+  EXPECT_TRUE(received.peaks.at(2).major);
+  EXPECT_EQ(encode(to_message(42, received)), encode(message)) << "every other member";
 }
 
 TEST(PointResultTest, AFailedPointAlwaysHasAReason) {
   EXPECT_EQ(failed_point(7, "the contact does not end").error(), "the contact does not end");
   EXPECT_EQ(failed_point(7, "the contact does not end").point(), 7U);
   EXPECT_EQ(failed_point(7, "").error(), "unknown");
+  EXPECT_EQ(fault_of(failed_point(7, "")), "");
+}
+
+TEST(PointResultTest, ANumberThatIsNotFiniteIsFoundWhereverItIs) {
+  const PointResult sound = to_message(0, distinct_result());
+  for (int i = 0; i < sound.reals_size(); ++i) {
+    PointResult message = sound;
+    message.set_reals(i, kNotANumber);
+    EXPECT_THAT(fault_of(message), HasSubstr("not a finite number")) << i;
+  }
+  PointResult closing = sound;
+  closing.set_reals(20, std::numeric_limits<double>::infinity());
+  EXPECT_THAT(fault_of(closing), HasSubstr("closure"));
+  for (auto* (PointResult::*list)() :
+       {&PointResult::mutable_peaks, &PointResult::mutable_ft_peaks,
+        &PointResult::mutable_phase_ends_s, &PointResult::mutable_stick_intervals,
+        &PointResult::mutable_reaction_peaks}) {
+    PointResult message = sound;
+    (message.*list)()->Set(1, kNotANumber);
+    EXPECT_THAT(fault_of(message), HasSubstr("not finite"));
+  }
+}
+
+TEST(PointResultTest, WhatIsNoResultIsRefused) {
+  const PointResult sound = to_message(0, distinct_result());
+  PointResult shorter = sound;
+  shorter.mutable_reals()->RemoveLast();
+  EXPECT_THAT(fault_of(shorter), HasSubstr("22 real numbers"));
+  PointResult silent = sound;
+  silent.clear_texts();
+  EXPECT_THAT(fault_of(silent), HasSubstr("0 texts"));
+  PointResult odd = sound;
+  odd.add_ft_peaks(1.0);
+  EXPECT_THAT(fault_of(odd), HasSubstr("wrong length"));
+  PointResult no_such_peak = sound;
+  no_such_peak.add_major_peaks(3);  // it has three
+  EXPECT_THAT(fault_of(no_such_peak), HasSubstr("major peak"));
+  PointResult verbose = sound;
+  verbose.set_texts(0, std::string(65537, 'S'));
+  EXPECT_THAT(fault_of(verbose), HasSubstr("too long"));
+  EXPECT_THAT(fault_of(failed_point(0, std::string(65537, 'x'))), HasSubstr("too long"));
+  EXPECT_NE(fault_of(PointResult()), "") << "as one of an earlier protocol version would read";
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "proto/result_message.h"
 #include "tests/server/network/raw_peer.h"
 #include "tests/server/running_server.h"
 #include "tests/support/temporary_folder.h"
@@ -38,7 +39,7 @@ constexpr std::size_t with_shadows(std::size_t bytes) {
 
 std::string hello_frame() {
   WorkerMessage message;
-  message.mutable_hello()->set_protocol_version(protocol::kProtocolVersion);
+  protocol::say_protocol(*message.mutable_hello());
   message.mutable_hello()->set_solver_version("1.0");
   message.mutable_hello()->set_threads(1);
   return zmtp_frame(protocol::encode(message));

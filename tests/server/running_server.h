@@ -15,6 +15,7 @@
 #include <zmq.hpp>
 
 #include "proto/frames.h"
+#include "proto/result_message.h"
 #include "server/loop.h"
 #include "tests/support/points.h"
 
@@ -118,7 +119,7 @@ class PretendedWorker : public Peer<WorkerMessage, ServerToWorker> {
 
   ServerToWorker hello() {
     WorkerMessage message;
-    message.mutable_hello()->set_protocol_version(protocol::kProtocolVersion);
+    protocol::say_protocol(*message.mutable_hello());
     message.mutable_hello()->set_solver_version("1.0");
     message.mutable_hello()->set_instruction_set("avx2");
     message.mutable_hello()->set_name("pretended");

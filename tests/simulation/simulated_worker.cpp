@@ -4,15 +4,15 @@
 #include <utility>
 
 #include "proto/frames.h"
+#include "proto/result_message.h"
 
 namespace oblique::simulation {
 
 protocol::PointResult answer_to(std::uint64_t study_size, std::uint64_t point) {
-  protocol::PointResult result;
-  result.set_point(point);
-  result.set_duration_s(static_cast<double>(study_size));
-  result.set_fn_peak_n(static_cast<double>(point));
-  return result;
+  solver::CaseResult result{};
+  result.duration_s = static_cast<double>(study_size);
+  result.fn_peak_N = static_cast<double>(point);
+  return protocol::to_message(point, result);
 }
 
 SimulatedWorker::SimulatedWorker(World& world, Network& network, std::uint64_t peer,
@@ -26,7 +26,7 @@ SimulatedWorker::SimulatedWorker(World& world, Network& network, std::uint64_t p
 
 void SimulatedWorker::start() {
   protocol::WorkerHello hello;
-  hello.set_protocol_version(protocol::kProtocolVersion);
+  protocol::say_protocol(hello);
   hello.set_solver_version(solver_version_);
   hello.set_threads(1);
   ++life_;

@@ -5,6 +5,7 @@
 
 #include "proto/frames.h"
 #include "proto/oblique.pb.h"
+#include "proto/result_message.h"
 
 namespace oblique::simulation {
 
@@ -19,7 +20,7 @@ void VanishingPeers::come() {
                                   message.batch().study_id() != 0);
   });
   protocol::WorkerMessage hello;
-  hello.mutable_hello()->set_protocol_version(protocol::kProtocolVersion);
+  protocol::say_protocol(*hello.mutable_hello());
   hello.mutable_hello()->set_solver_version("1");
   hello.mutable_hello()->set_threads(1);
   hello.mutable_hello()->set_process_id("vanishing " + std::to_string(came_));

@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "proto/result_message.h"
 #include "server/care/diagnosis.h"
 #include "server/store/store.h"
 #include "tests/support/points.h"
@@ -22,30 +23,23 @@ using testing::IsEmpty;
 
 /// A solved point whose outputs agree with each other.
 protocol::PointResult agreeing_point(std::uint64_t point) {
-  protocol::PointResult result;
-  result.set_point(point);
-  result.set_duration_s(3e-4);
-  result.set_fn_peak_n(5000.0);
-  result.set_ft_peak_n(2000.0);
-  result.set_stick_total_s(5e-5);
-  result.set_mode("SC sC sR sC SC SR");
-  result.set_major_mode("SC sR");
-  for (const double value : {1e-4, 5000.0, 2000.0, 2.5e-4, 1500.0, 600.0}) {
-    result.add_peaks(value);
-  }
-  for (const double value : {1e-4, 2000.0, 2.5e-4, 600.0}) {
-    result.add_ft_peaks(value);
-  }
+  solver::CaseResult result{};
+  result.duration_s = 3e-4;
+  result.fn_peak_N = 5000.0;
+  result.ft_peak_N = 2000.0;
+  result.stick_total_s = 5e-5;
+  result.mode = "SC sC sR sC SC SR";
+  result.major_mode = "SC sR";
+  result.peaks = {{1e-4, 5000.0, 2000.0, false}, {2.5e-4, 1500.0, 600.0, false}};
+  result.ft_peaks = {{1e-4, 2000.0}, {2.5e-4, 600.0}};
+  double begin_s = 0.0;
   for (const double end_s : {1e-4, 2e-4, 2.5e-4, 3e-4}) {
-    result.add_phase_ends_s(end_s);
+    result.phases.push_back({solver::PhaseKind::kCompression, begin_s, end_s});
+    begin_s = end_s;
   }
-  for (const double value : {0.0, 2e-5, 2.7e-4, 3e-4}) {
-    result.add_stick_intervals(value);
-  }
-  for (const double value : {3e-4, 5000.0, 1e-4, 4000.0}) {
-    result.add_reaction_peaks(value);
-  }
-  return result;
+  result.stick_intervals = {{0.0, 2e-5}, {2.7e-4, 3e-4}};
+  result.reaction_peaks = {{3e-4, 5000.0}, {1e-4, 4000.0}};
+  return protocol::to_message(point, result);
 }
 
 /// Three points, the last of them failed; their rows have no checksums.

@@ -127,7 +127,7 @@ class ServiceTest : public testing::Test {
   }
   void hello(const std::string& identity = "worker", const std::string& solver = "1.0") {
     WorkerMessage message;
-    message.mutable_hello()->set_protocol_version(protocol::kProtocolVersion);
+    protocol::say_protocol(*message.mutable_hello());
     message.mutable_hello()->set_solver_version(solver);
     message.mutable_hello()->set_threads(1);
     worker_says(message, identity);

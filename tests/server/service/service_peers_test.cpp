@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "proto/result_message.h"
 #include "tests/server/service/service_fixture.h"
 
 namespace oblique::server {
@@ -14,6 +15,7 @@ using testing::IsEmpty;
 
 WorkerMessage hello_of(std::uint32_t protocol_version, const std::string& solver_version) {
   WorkerMessage message;
+  protocol::say_protocol(*message.mutable_hello());
   message.mutable_hello()->set_protocol_version(protocol_version);
   message.mutable_hello()->set_solver_version(solver_version);
   message.mutable_hello()->set_threads(1);
@@ -73,50 +75,50 @@ TEST_F(ServiceTest, AnotherShareIsAcknowledgedOnceItIsDurableAndWhatIsNotGivenSt
   EXPECT_THAT(last_reply().error().message(), HasSubstr("disk is full"));
 }
 
-TEST_F(ServiceTest, PeersOfThePreviousProtocolVersionAreServed) {
-  worker_says(hello_of(protocol::kOldestProtocolVersion, "0.9"));
-  ASSERT_TRUE(last_message().has_welcome()) << "they do not know notices";
-  EXPECT_EQ(last_message().welcome().protocol_version(), protocol::kOldestProtocolVersion);
+TEST_F(ServiceTest, AClientOfThePreviousProtocolVersionIsServed) {
   ClientRequest message = submit_request("a");
-  message.set_protocol_version(protocol::kOldestProtocolVersion);
+  message.set_protocol_version(protocol::kOldestClientsVersion);
   request(message);
   write_all();
   EXPECT_TRUE(last_reply().has_submit());
-  credit(1);
-  EXPECT_TRUE(last_message().has_batch());
 }
 
-TEST_F(ServiceTest, BytesOfThePreviousProtocolVersionAreStillRead) {
-  // Taken from a worker and a client of version 1: a hello of one thread, a credit of two batches,
-  // a submission of ten points.
+TEST_F(ServiceTest, AWorkerOfThePreviousProtocolVersionIsRefusedForItsResultsWouldReadAsNothing) {
+  // Taken from a worker of version 2: a hello of one thread.
   const std::string hello(
-      "\x0a\x0f\x08\x01\x12\x03"
+      "\x0a\x0f\x08\x02\x12\x03"
       "1.0"
       "\x1a\x04"
       "avx2"
       "\x28\x01",
       17);
-  const std::string credit("\x12\x02\x08\x02", 4);
   service_->worker_frame("worker", hello, now_);
-  EXPECT_EQ(last_message().welcome().worker_id(), 1U);
-  ClientRequest message = submit_request("a");
-  message.set_protocol_version(1);
-  request(message);
-  write_all();
-  service_->worker_frame("worker", credit, now_);
-  EXPECT_TRUE(last_message().has_batch());
+  EXPECT_THAT(last_message().refused().reason(), HasSubstr("version 3, the worker 2"));
+  EXPECT_EQ(service_->scheduler().workers(), 0U);
+}
+
+TEST_F(ServiceTest, AWorkerWhoseResultsHaveOtherOutputsIsRefused) {
+  WorkerMessage message = hello_of(protocol::kProtocolVersion, "1.0");
+  message.mutable_hello()->set_outputs(protocol::sent_outputs() + " something_new_N");
+  worker_says(message);
+  EXPECT_THAT(last_message().refused().reason(), HasSubstr("other outputs"));
+  message.mutable_hello()->clear_outputs();
+  worker_says(message);
+  EXPECT_THAT(last_message().refused().reason(), HasSubstr("other outputs"));
+  EXPECT_EQ(service_->scheduler().workers(), 0U);
 }
 
 TEST_F(ServiceTest, PeersOfAnyOtherProtocolVersionAreRefusedWithTheVersions) {
   for (const std::uint32_t version : {0U, protocol::kProtocolVersion + 1, 77U}) {
     worker_says(hello_of(version, "1.0"));
-    EXPECT_THAT(last_message().refused().reason(), HasSubstr("versions 1 and 2"));
+    EXPECT_THAT(last_message().refused().reason(), HasSubstr("version 3"));
     EXPECT_THAT(last_message().refused().reason(), HasSubstr(std::to_string(version)));
   }
   EXPECT_EQ(service_->scheduler().workers(), 0U);
   ClientRequest message = submit_request("a");
   message.set_protocol_version(77);
   request(message);
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("versions 2 to 3"));
   EXPECT_THAT(last_reply().error().message(), HasSubstr("77"));
 }
 

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "proto/recipe/point_table.h"
+#include "proto/result_message.h"
 #include "tests/server/service/service_fixture.h"
 
 namespace oblique::server {
@@ -13,10 +14,9 @@ namespace {
 class ProcessesTest : public ServiceTest {
  protected:
   void hello_as(const std::string& identity, const std::string& process_id,
-                const std::string& name = "lab",
-                std::uint32_t version = protocol::kProtocolVersion) {
+                const std::string& name = "lab") {
     WorkerMessage message;
-    message.mutable_hello()->set_protocol_version(version);
+    protocol::say_protocol(*message.mutable_hello());
     message.mutable_hello()->set_solver_version("1.0");
     message.mutable_hello()->set_name(name);
     message.mutable_hello()->set_threads(1);
@@ -114,14 +114,10 @@ TEST_F(ProcessesTest, AProbeIsAStudyOfOnePointThatAnyWorkerReadsAndItsResultIsAc
   EXPECT_EQ(last_message().batch().study_id(), 1U);
 }
 
-/// How many Release messages a worker of that protocol version gets when another one has solved
-/// its batch.
-class ReleaseTest : public ProcessesTest, public testing::WithParamInterface<std::uint32_t> {};
-
-TEST_P(ReleaseTest, IsSentToWorkersThatKnowItOnly) {
+TEST_F(ProcessesTest, ABatchThatAnotherWorkerSolvedIsReleased) {
   request(submit_request("a", 1));
   write_all();
-  hello_as("slow", "slow", "slow", GetParam());
+  hello_as("slow", "slow", "slow");
   credit(1, "slow");
   hello();
   credit(1);
@@ -136,12 +132,8 @@ TEST_P(ReleaseTest, IsSentToWorkersThatKnowItOnly) {
   const auto releases =
       std::count_if(outbox_.worker_messages.begin(), outbox_.worker_messages.end(),
                     [](const ServerToWorker& message) { return message.has_release(); });
-  EXPECT_EQ(releases, GetParam() < 2 ? 0 : 1);
+  EXPECT_EQ(releases, 1);
 }
-
-INSTANTIATE_TEST_SUITE_P(Version, ReleaseTest,
-                         testing::Values(protocol::kOldestProtocolVersion,
-                                         protocol::kProtocolVersion));
 
 }  // namespace
 }  // namespace oblique::server

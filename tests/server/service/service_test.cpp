@@ -162,7 +162,7 @@ TEST_F(ServiceTest, AResultThatIsNotFiniteBecomesAFailedPoint) {
   WorkerMessage message;
   message.mutable_results()->set_study_id(1);
   auto result = solved_point(0);
-  result.set_duration_s(std::numeric_limits<double>::quiet_NaN());
+  result.set_reals(4, std::numeric_limits<double>::quiet_NaN());
   *message.mutable_results()->add_results() = result;
   write_all();
   worker_says(message);
@@ -192,7 +192,7 @@ TEST_F(ServiceTest, WhatIsNoMessageIsCountedAndClientsAreTold) {
   nothing.set_protocol_version(protocol::kProtocolVersion);
   request(nothing);
   EXPECT_THAT(last_reply().error().message(), HasSubstr("kind of request"));
-  nothing.set_protocol_version(3);
+  nothing.set_protocol_version(protocol::kProtocolVersion + 1);
   request(nothing);
   EXPECT_THAT(last_reply().error().message(), HasSubstr("protocol version"));
 }

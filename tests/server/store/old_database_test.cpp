@@ -54,7 +54,7 @@ class OldDatabase : public testing::Test {
     add_failure(database.get(), 2, 1);
     if (version >= kFirstWithChecksums) {
       add_row_checksum(database.get());
-      execute(database.get(), "UPDATE results SET checksum = " + result_checksum_sql());
+      execute(database.get(), "UPDATE results SET checksum = " + result_checksum_sql(version));
       execute(database.get(), "UPDATE studies SET checksum = " + study_checksum_sql());
     }
   }
@@ -198,7 +198,7 @@ TEST_F(OldDatabase, HasOneModelAfterwardsWhereTwoDifferedInTheSignOfAZero) {
     add_model(database.get(), 2, same);
     add_failure(database.get(), 7, 2);
     add_row_checksum(database.get());
-    execute(database.get(), "UPDATE results SET checksum = " + result_checksum_sql());
+    execute(database.get(), "UPDATE results SET checksum = " + result_checksum_sql(4));
   }
   { const Store store(path_); }
   EXPECT_THAT(texts("SELECT model_id FROM models"), ElementsAre("1"));

@@ -90,7 +90,7 @@ TEST_F(StoreTest, TheFirstResultOfAPointStays) {
   const auto study = study_of(3);
   commit(store, {study, results_of(study, {solved_point(1)})});
   auto other = solved_point(1);
-  other.set_mode("sC");
+  other.set_texts(0, "sC");
   commit(store, {results_of(study, {other, protocol::failed_point(1, "late")})});
   const auto reply = ask(path_, "SELECT mode, status, (SELECT count(*) FROM results) FROM results");
   ASSERT_EQ(reply.rows_size(), 1);
@@ -145,11 +145,12 @@ TEST_F(StoreTest, DoublesComeBackWithTheSameBitsFromColumnsAndViews) {
   ASSERT_EQ(peaks.rows_size(), 1000);
   for (int i = 0; i < 500; ++i) {
     const auto& result = results[static_cast<std::size_t>(i)];
+    const auto outputs = protocol::from_message(result);
     const auto& row = scalars.rows(i);
-    EXPECT_EQ(row.values(0).real(), result.fall_time_s());
-    EXPECT_EQ(row.values(1).real(), result.duration_s());
-    EXPECT_EQ(row.values(2).real(), result.fn_peak_n());
-    EXPECT_EQ(row.values(3).real(), result.closure());
+    EXPECT_EQ(row.values(0).real(), outputs.fall_time_s);
+    EXPECT_EQ(row.values(1).real(), outputs.duration_s);
+    EXPECT_EQ(row.values(2).real(), outputs.fn_peak_N);
+    EXPECT_EQ(row.values(3).real(), outputs.energy.closure);
     EXPECT_EQ(row.values(4).real(), study.table->point(result.point()).mu);
     for (int j = 0; j < 6; ++j) {
       EXPECT_EQ(peaks.rows(2 * i + j / 3).values(j % 3).real(), result.peaks(j));

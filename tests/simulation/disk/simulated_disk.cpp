@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "proto/result_message.h"
 #include "tests/simulation/world.h"
 #include "tests/support/temporary_folder.h"
 
@@ -102,8 +103,13 @@ void SimulatedDisk::check_rows() {
     const auto point = static_cast<std::uint64_t>(rows.integer(1));
     const auto& expected = model_.rows(study_id);
     const auto row = expected.find(point);
-    if (row == expected.end() || row->second->error() != rows.text(3) ||
-        row->second->duration_s() != rows.real(4) || row->second->fn_peak_n() != rows.real(5) ||
+    const auto agrees = [&](const protocol::PointResult& result) {
+      const auto outputs =
+          result.error().empty() ? protocol::from_message(result) : solver::CaseResult{};
+      return result.error() == rows.text(3) && outputs.duration_s == rows.real(4) &&
+             outputs.fn_peak_N == rows.real(5);
+    };
+    if (row == expected.end() || !agrees(*row->second) ||
         model_.study(study_id)->table->point(point).mu != rows.real(2)) {
       throw Violation("the row of point " + std::to_string(point) + " of study " +
                       std::to_string(study_id) + " is not what was stored");

@@ -1,6 +1,7 @@
 #include "tests/system/storms/pretended_worker.h"
 
 #include "proto/frames.h"
+#include "proto/result_message.h"
 #include "tests/support/programs.h"
 
 namespace oblique::test {
@@ -18,7 +19,7 @@ void PretendedWorker::send(const protocol::WorkerMessage& message) {
 void PretendedWorker::hello(const std::string& solver_version, const std::string& process_id) {
   protocol::WorkerMessage message;
   auto& hello = *message.mutable_hello();
-  hello.set_protocol_version(protocol::kProtocolVersion);
+  protocol::say_protocol(hello);
   hello.set_solver_version(solver_version);
   hello.set_name("pretended");
   hello.set_threads(1);

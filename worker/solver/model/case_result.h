@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace oblique::solver {
@@ -21,6 +22,11 @@ struct TangentialPeak {
 };
 
 enum class PhaseKind { kCompression, kRestitution };
+
+/// "compression" or "restitution".
+constexpr std::string_view phase_kind_name(PhaseKind kind) {
+  return kind == PhaseKind::kCompression ? "compression" : "restitution";
+}
 
 struct Phase {
   PhaseKind kind;

@@ -2,81 +2,265 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace oblique::solver {
 namespace {
 
+/// The member that is reached by these steps from a CaseResult.
+template <auto... steps>
+constexpr auto at = [] {
+  using Value = std::remove_cvref_t<decltype((std::declval<CaseResult&>().*....*steps))>;
+  return Member<Value>{
+      [](const CaseResult& result) -> const Value& { return (result.*....*steps); },
+      [](CaseResult& result) -> Value& { return (result.*....*steps); }};
+}();
+
+template <class... Values>
+std::array<Cell, sizeof...(Values)> element(Values... values) {
+  return {Cell(values)...};
+}
+
+// What the members of elements are called, in the database's views too.
+constexpr std::array<std::string_view, 4> kPeakMembers{"t_s", "fn_N", "ft_N", "major"};
+constexpr std::array<std::string_view, 2> kFtPeakMembers{"t_s", "ft_N"};
+constexpr std::array<std::string_view, 3> kPhaseMembers{"kind", "t0_s", "t1_s"};
+constexpr std::array<std::string_view, 2> kStickMembers{"t0_s", "t1_s"};
+constexpr std::array<std::string_view, 2> kReactionMembers{"t_s", "force_N"};
+
+constexpr ResultList kPeaks{
+    .column = "peaks",
+    .unit = "s, N",
+    .meaning =
+        "every peak of the normal force: t_s counted from touch, fn_N, ft_N the largest "
+        "tangential magnitude around it, and whether it is major (1) or a ripple (0)",
+    .members = kPeakMembers,
+    .each = [](const CaseResult& result, const TakeElement& take) {
+      for (const Peak& peak : result.peaks) {
+        take(element(peak.t_s, peak.fn_N, peak.ft_N, peak.major));
+      }
+    }};
+
+constexpr ResultList kFtPeaks{
+    .column = "ft_peaks",
+    .unit = "s, N",
+    .meaning = "every peak of the tangential magnitude: t_s counted from touch and ft_N",
+    .members = kFtPeakMembers,
+    .each = [](const CaseResult& result, const TakeElement& take) {
+      for (const TangentialPeak& peak : result.ft_peaks) {
+        take(element(peak.t_s, peak.ft_N));
+      }
+    }};
+
+constexpr ResultList kPhases{
+    .column = "phases",
+    .unit = "s",
+    .meaning = "intervals of compression and restitution: kind, t0_s, t1_s, counted from touch",
+    .members = kPhaseMembers,
+    .each = [](const CaseResult& result, const TakeElement& take) {
+      for (const Phase& phase : result.phases) {
+        take(element(phase_kind_name(phase.kind), phase.t0_s, phase.t1_s));
+      }
+    }};
+
+constexpr ResultList kStickIntervals{.column = "stick_intervals",
+                                     .unit = "s",
+                                     .meaning = "the same as stick_intervals_s",
+                                     .members = kStickMembers,
+                                     .has_names = false,
+                                     .each = [](const CaseResult& result, const TakeElement& take) {
+                                       for (const StickInterval& stick : result.stick_intervals) {
+                                         take(element(stick.t0_s, stick.t1_s));
+                                       }
+                                     }};
+
+constexpr ResultList kReactionPeaks{
+    .column = "reaction_peaks",
+    .unit = "s, N",
+    .meaning =
+        "largest force on the outer link at the pin O, then at each joint: t_s, its instant "
+        "counted from touch, and force_N, its magnitude",
+    .members = kReactionMembers,
+    .each =
+        [](const CaseResult& result, const TakeElement& take) {
+          for (const ReactionPeak& peak : result.reaction_peaks) {
+            take(element(peak.t_s, peak.force_N));
+          }
+        },
+    .since_schema = 4};
+
+constexpr std::array kLists{&kPeaks, &kFtPeaks, &kPhases, &kStickIntervals, &kReactionPeaks};
+
 constexpr std::string_view kEnergy = "energy";
 constexpr std::string_view kSolver = "solver";
-constexpr bool kOne = false;
-constexpr bool kList = true;
+constexpr auto kEnergyOf = &CaseResult::energy;
+constexpr auto kSolverOf = &CaseResult::solver;
 
-constexpr std::array<ResultField, 34> kFields{{
-    {"fall_time_s", "", "fall_time_s", "s", "time from rest to touch", kOne},
-    {"impact_x_m", "", "impact_x_m", "m",
-     "where the tip lands: distance from the pin O along the ground", kOne},
-    {"vt_in_m_s", "", "vt_in_m_s", "m/s",
-     "tangential velocity of the tip at touch, along x; negative: towards the pin", kOne},
-    {"vn_in_m_s", "", "vn_in_m_s", "m/s",
-     "normal velocity of the tip at touch, upwards; negative: into the ground", kOne},
-    {"duration_s", "", "duration_s", "s", "duration of contact, from touch to separation", kOne,
-     "us", 1e6},
-    {"fn_peak_N", "", "fn_peak_N", "N",
-     "largest normal force; forces act on the tip, the normal one upwards, never negative", kOne},
-    {"ft_peak_N", "", "ft_peak_N", "N", "largest magnitude of the tangential force", kOne},
-    {"fn_peaks_N", "", "fn_peaks_N", "N",
-     "every peak of the normal force, ripples included, in order of time", kList},
-    {"ft_peaks_N", "", "ft_peaks_N", "N",
-     "every peak of the magnitude of the tangential force, in order of time", kList},
-    {"major_peaks_N", "", "major_peaks_N", "N",
-     "the peaks of the normal force left when ripples are merged", kList},
-    {"impulse_n_Ns", "", "impulse_n_Ns", "N s", "impulse of the normal force, upwards", kOne},
-    {"impulse_t_Ns", "", "impulse_t_Ns", "N s",
-     "impulse of the tangential force, along x; positive: away from the pin", kOne},
-    {"slide_m", "", "slide_m", "m",
-     "length of the path of the contact particle P along the ground, there and back both counted",
-     kOne, "mm", 1e3},
-    {"vt_out_m_s", "", "vt_out_m_s", "m/s",
-     "tangential velocity of the tip at separation, along x; negative: towards the pin", kOne},
-    {"vn_out_m_s", "", "vn_out_m_s", "m/s",
-     "normal velocity of the tip at separation, upwards; positive: off the ground", kOne},
-    {"mode", "", "mode", "", "order of states: S stick, s slip; C compression, R restitution",
-     kOne},
-    {"major_mode", "", "major_mode", "", "the same with ripples merged", kOne},
-    {"stick_total_s", "", "stick_total_s", "s", "total time in stick", kOne, "us", 1e6},
-    {"stick_intervals_s", "", "stick_intervals_s", "s",
-     "spans in which P does not move: [from, to], counted from touch", kList},
-    {"phases", "", "phases", "s",
-     "intervals of compression and restitution: kind, t0_s, t1_s, counted from touch", kList},
-    {"reaction_peaks", "", "reaction_peaks", "s, N",
-     "largest force on the outer link at the pin O, then at each joint: t_s, its instant counted "
-     "from touch, and force_N, its magnitude",
-     kList},
-    {"kinetic_in_J", kEnergy, "kinetic_in_J", "J", "kinetic energy of the whole finger at touch",
-     kOne},
-    {"friction_J", kEnergy, "friction_J", "J",
-     "energy lost to friction at P; what is lost is positive", kOne},
-    {"restitution_J", kEnergy, "restitution_J", "J",
-     "energy lost in the normal contact element; what is lost is positive", kOne},
-    {"kinetic_change_J", kEnergy, "kinetic_change_J", "J",
-     "kinetic energy at separation less that at touch", kOne},
-    {"strain_change_J", kEnergy, "strain_change_J", "J",
-     "strain energy of the links at separation less that at touch", kOne},
-    {"gravity_change_J", kEnergy, "gravity_change_J", "J",
-     "potential energy at separation less that at touch", kOne},
-    {"exchanged_J", kEnergy, "exchanged_J", "J",
-     "work that the contact forces exchanged with the finger, to and fro both counted", kOne},
-    {"closure", kEnergy, "closure", "",
-     "what does not add up in the energy balance, relative to exchanged_J; never negative", kOne},
-    {"integrator", kSolver, "integrator", "",
-     "how the equations of motion are stepped: explicit or generalized-alpha", kOne},
-    {"dt_s", kSolver, "dt_s", "s",
-     "step in contact, in compression; restitution at low e steps shorter", kOne, "us", 1e6},
-    {"steps", kSolver, "steps", "", "accepted steps in contact", kOne},
-    {"wall_s", kSolver, "wall_s", "s", "wall time of the contact alone; not reproducible", kOne,
-     "ms", 1e3},
-    {"version", kSolver, "solver_version", "", "version of the solver", kOne},
-}};
+constexpr std::array kFields{
+    ResultField{.name = "fall_time_s",
+                .unit = "s",
+                .meaning = "time from rest to touch",
+                .value = at<&CaseResult::fall_time_s>},
+    ResultField{.name = "impact_x_m",
+                .unit = "m",
+                .meaning = "where the tip lands: distance from the pin O along the ground",
+                .value = at<&CaseResult::impact_x_m>},
+    ResultField{
+        .name = "vt_in_m_s",
+        .unit = "m/s",
+        .meaning = "tangential velocity of the tip at touch, along x; negative: towards the pin",
+        .value = at<&CaseResult::vt_in_m_s>},
+    ResultField{
+        .name = "vn_in_m_s",
+        .unit = "m/s",
+        .meaning = "normal velocity of the tip at touch, upwards; negative: into the ground",
+        .value = at<&CaseResult::vn_in_m_s>},
+    ResultField{.name = "duration_s",
+                .unit = "s",
+                .meaning = "duration of contact, from touch to separation",
+                .value = at<&CaseResult::duration_s>,
+                .shown_unit = "us",
+                .shown_per_unit = 1e6},
+    ResultField{.name = "fn_peak_N",
+                .unit = "N",
+                .meaning = "largest normal force; forces act on the tip, the normal one upwards, "
+                           "never negative",
+                .value = at<&CaseResult::fn_peak_N>},
+    ResultField{.name = "ft_peak_N",
+                .unit = "N",
+                .meaning = "largest magnitude of the tangential force",
+                .value = at<&CaseResult::ft_peak_N>},
+    ResultField{.name = "fn_peaks_N",
+                .unit = "N",
+                .meaning = "every peak of the normal force, ripples included, in order of time",
+                .value = ListPart{&kPeaks, "fn_N"}},
+    ResultField{.name = "ft_peaks_N",
+                .unit = "N",
+                .meaning = "every peak of the magnitude of the tangential force, in order of time",
+                .value = ListPart{&kFtPeaks, "ft_N"}},
+    ResultField{.name = "major_peaks_N",
+                .unit = "N",
+                .meaning = "the peaks of the normal force left when ripples are merged",
+                .value = ListPart{&kPeaks, "fn_N", "major"}},
+    ResultField{.name = "impulse_n_Ns",
+                .unit = "N s",
+                .meaning = "impulse of the normal force, upwards",
+                .value = at<&CaseResult::impulse_n_Ns>},
+    ResultField{.name = "impulse_t_Ns",
+                .unit = "N s",
+                .meaning = "impulse of the tangential force, along x; positive: away from the pin",
+                .value = at<&CaseResult::impulse_t_Ns>},
+    ResultField{.name = "slide_m",
+                .unit = "m",
+                .meaning = "length of the path of the contact particle P along the ground, there "
+                           "and back both counted",
+                .value = at<&CaseResult::slide_m>,
+                .shown_unit = "mm",
+                .shown_per_unit = 1e3},
+    ResultField{.name = "vt_out_m_s",
+                .unit = "m/s",
+                .meaning = "tangential velocity of the tip at separation, along x; negative: "
+                           "towards the pin",
+                .value = at<&CaseResult::vt_out_m_s>},
+    ResultField{
+        .name = "vn_out_m_s",
+        .unit = "m/s",
+        .meaning = "normal velocity of the tip at separation, upwards; positive: off the ground",
+        .value = at<&CaseResult::vn_out_m_s>},
+    ResultField{.name = "mode",
+                .meaning = "order of states: S stick, s slip; C compression, R restitution",
+                .value = at<&CaseResult::mode>},
+    ResultField{.name = "major_mode",
+                .meaning = "the same with ripples merged",
+                .value = at<&CaseResult::major_mode>},
+    ResultField{.name = "stick_total_s",
+                .unit = "s",
+                .meaning = "total time in stick",
+                .value = at<&CaseResult::stick_total_s>,
+                .shown_unit = "us",
+                .shown_per_unit = 1e6},
+    ResultField{.name = "stick_intervals_s",
+                .unit = "s",
+                .meaning = "spans in which P does not move: [from, to], counted from touch",
+                .value = ListPart{&kStickIntervals}},
+    ResultField{.name = kPhases.column,
+                .unit = kPhases.unit,
+                .meaning = kPhases.meaning,
+                .value = ListPart{&kPhases}},
+    ResultField{.name = kReactionPeaks.column,
+                .unit = kReactionPeaks.unit,
+                .meaning = kReactionPeaks.meaning,
+                .value = ListPart{&kReactionPeaks}},
+    ResultField{.name = "kinetic_in_J",
+                .group = kEnergy,
+                .unit = "J",
+                .meaning = "kinetic energy of the whole finger at touch",
+                .value = at<kEnergyOf, &ContactEnergy::kinetic_in_J>},
+    ResultField{.name = "friction_J",
+                .group = kEnergy,
+                .unit = "J",
+                .meaning = "energy lost to friction at P; what is lost is positive",
+                .value = at<kEnergyOf, &ContactEnergy::friction_J>},
+    ResultField{.name = "restitution_J",
+                .group = kEnergy,
+                .unit = "J",
+                .meaning = "energy lost in the normal contact element; what is lost is positive",
+                .value = at<kEnergyOf, &ContactEnergy::restitution_J>},
+    ResultField{.name = "kinetic_change_J",
+                .group = kEnergy,
+                .unit = "J",
+                .meaning = "kinetic energy at separation less that at touch",
+                .value = at<kEnergyOf, &ContactEnergy::kinetic_change_J>},
+    ResultField{.name = "strain_change_J",
+                .group = kEnergy,
+                .unit = "J",
+                .meaning = "strain energy of the links at separation less that at touch",
+                .value = at<kEnergyOf, &ContactEnergy::strain_change_J>},
+    ResultField{.name = "gravity_change_J",
+                .group = kEnergy,
+                .unit = "J",
+                .meaning = "potential energy at separation less that at touch",
+                .value = at<kEnergyOf, &ContactEnergy::gravity_change_J>},
+    ResultField{.name = "exchanged_J",
+                .group = kEnergy,
+                .unit = "J",
+                .meaning = "work that the contact forces exchanged with the finger, to and fro "
+                           "both counted",
+                .value = at<kEnergyOf, &ContactEnergy::exchanged_J>},
+    ResultField{.name = "closure",
+                .group = kEnergy,
+                .meaning = "what does not add up in the energy balance, relative to exchanged_J; "
+                           "never negative",
+                .value = at<kEnergyOf, &ContactEnergy::closure>},
+    ResultField{.name = "integrator",
+                .group = kSolver,
+                .meaning = "how the equations of motion are stepped: explicit or generalized-alpha",
+                .value = at<kSolverOf, &SolverReport::integrator>,
+                .sent_with = SentWith::kModel},
+    ResultField{.name = "dt_s",
+                .group = kSolver,
+                .unit = "s",
+                .meaning = "step in contact, in compression; restitution at low e steps shorter",
+                .value = at<kSolverOf, &SolverReport::dt_s>,
+                .shown_unit = "us",
+                .shown_per_unit = 1e6},
+    ResultField{.name = "steps",
+                .group = kSolver,
+                .meaning = "accepted steps in contact",
+                .value = at<kSolverOf, &SolverReport::steps>},
+    ResultField{.name = "wall_s",
+                .group = kSolver,
+                .unit = "s",
+                .meaning = "wall time of the contact alone; not reproducible",
+                .value = at<kSolverOf, &SolverReport::wall_s>,
+                .shown_unit = "ms",
+                .shown_per_unit = 1e3},
+    ResultField{.name = "version",
+                .group = kSolver,
+                .column = "solver_version",
+                .meaning = "version of the solver",
+                .value = at<kSolverOf, &SolverReport::version>,
+                .sent_with = SentWith::kWorker}};
 
 }  // namespace
 
@@ -84,10 +268,36 @@ std::span<const ResultField> result_fields() {
   return kFields;
 }
 
+std::span<const ResultList* const> result_lists() {
+  return kLists;
+}
+
 const ResultField* find_result_column(std::string_view column) {
   const auto found = std::find_if(kFields.begin(), kFields.end(),
                                   [&](const ResultField& field) { return field.column == column; });
   return found == kFields.end() ? nullptr : &*found;
+}
+
+const ResultList* find_result_list(std::string_view column) {
+  const auto found = std::find_if(kLists.begin(), kLists.end(),
+                                  [&](const ResultList* list) { return list->column == column; });
+  return found == kLists.end() ? nullptr : *found;
+}
+
+bool is_finite(const CaseResult& result) {
+  bool finite = true;
+  for_each_sent<double>([&](const ResultField&, const Member<double>& member) {
+    finite = finite && std::isfinite(member.of(result));
+  });
+  for (const ResultList* list : kLists) {
+    list->each(result, [&](std::span<const Cell> element) {
+      for (const Cell& cell : element) {
+        const auto* number = std::get_if<double>(&cell);
+        finite = finite && (number == nullptr || std::isfinite(*number));
+      }
+    });
+  }
+  return finite;
 }
 
 }  // namespace oblique::solver

@@ -13,9 +13,9 @@ constexpr TipState at(double x_m, double y_m) {
   return {x_m, y_m, 0.0, 0.0};
 }
 
-/// A contact told step by step: the law, what is recorded of it, and where the tip is.
-struct Told {
-  explicit Told(double vt_in_m_s)
+/// A contact that is driven step by step: the law, what is recorded of it, and where the tip is.
+struct RecordedContact {
+  explicit RecordedContact(double vt_in_m_s)
       : tip{0.0, 0.0, vt_in_m_s, -1.0}, law(kParameters, tip), record(law, tip) {}
 
   void step_to(const TipState& end, const ContactIntegrals<double>& integrals = {}) {
@@ -51,13 +51,13 @@ constexpr double kSticking_m_s = 0.1;
 constexpr double kSliding_m_s = 1.0;
 
 TEST(ContactRecord, StickThroughATurnIsOneInterval) {
-  Told told(kSticking_m_s);
-  told.step_to(at(1e-6, -1e-4));
-  told.turn(1e-4);
-  told.step_to(at(1e-6, -5e-5));
-  told.slip(1.5e-4);
-  told.step_to(at(1e-6, 0.0));
-  const CaseResult result = told.finished(2e-4);
+  RecordedContact contact(kSticking_m_s);
+  contact.step_to(at(1e-6, -1e-4));
+  contact.turn(1e-4);
+  contact.step_to(at(1e-6, -5e-5));
+  contact.slip(1.5e-4);
+  contact.step_to(at(1e-6, 0.0));
+  const CaseResult result = contact.finished(2e-4);
   EXPECT_EQ(result.mode, "SC SR sR");
   ASSERT_EQ(result.stick_intervals.size(), 1U);
   EXPECT_EQ(result.stick_intervals[0].t0_s, 0.0);
@@ -66,13 +66,13 @@ TEST(ContactRecord, StickThroughATurnIsOneInterval) {
 }
 
 TEST(ContactRecord, StickBetweenTwoSlidesIsAnIntervalOfItsOwn) {
-  Told told(kSliding_m_s);
-  told.step_to(at(1e-6, -1e-4));
-  told.stick(5e-5);
-  told.turn(1e-4);
-  told.slip(1.5e-4);
-  told.stick(1.7e-4);
-  const CaseResult result = told.finished(2e-4);
+  RecordedContact contact(kSliding_m_s);
+  contact.step_to(at(1e-6, -1e-4));
+  contact.stick(5e-5);
+  contact.turn(1e-4);
+  contact.slip(1.5e-4);
+  contact.stick(1.7e-4);
+  const CaseResult result = contact.finished(2e-4);
   EXPECT_EQ(result.mode, "sC SC SR sR SR");
   ASSERT_EQ(result.stick_intervals.size(), 2U);
   EXPECT_EQ(result.stick_intervals[0].t1_s, 1.5e-4);
@@ -81,60 +81,60 @@ TEST(ContactRecord, StickBetweenTwoSlidesIsAnIntervalOfItsOwn) {
 }
 
 TEST(ContactRecord, AStateOfNoLengthIsNotInTheMode) {
-  Told told(kSliding_m_s);
-  told.step_to(at(1e-6, -1e-4));
-  told.turn(1e-4);   // sR, left at once
-  told.stick(1e-4);  // SR
-  told.step_to(at(1e-6, 0.0));
-  const CaseResult result = told.finished(2e-4);
+  RecordedContact contact(kSliding_m_s);
+  contact.step_to(at(1e-6, -1e-4));
+  contact.turn(1e-4);   // sR, left at once
+  contact.stick(1e-4);  // SR
+  contact.step_to(at(1e-6, 0.0));
+  const CaseResult result = contact.finished(2e-4);
   EXPECT_EQ(result.mode, "sC SR");
   ASSERT_EQ(result.stick_intervals.size(), 1U);
   EXPECT_EQ(result.stick_intervals[0].t0_s, 1e-4);
 }
 
 TEST(ContactRecord, AStateOfNoLengthThatLeadsBackLeavesTheStateBeforeItWhole) {
-  Told told(kSliding_m_s);
-  told.step_to(at(1e-6, -5e-5));
-  told.stick(5e-5);
-  told.slip(5e-5);
-  told.step_to(at(2e-6, -1e-4));
-  told.turn(1e-4);
-  told.step_to(at(2e-6, 0.0));
-  const CaseResult result = told.finished(2e-4);
+  RecordedContact contact(kSliding_m_s);
+  contact.step_to(at(1e-6, -5e-5));
+  contact.stick(5e-5);
+  contact.slip(5e-5);
+  contact.step_to(at(2e-6, -1e-4));
+  contact.turn(1e-4);
+  contact.step_to(at(2e-6, 0.0));
+  const CaseResult result = contact.finished(2e-4);
   EXPECT_EQ(result.mode, "sC sR");
   EXPECT_TRUE(result.stick_intervals.empty());
 }
 
 TEST(ContactRecord, AStateThatBeginsAtSeparationIsNotInTheMode) {
-  Told told(kSticking_m_s);
-  told.step_to(at(1e-6, -1e-4));
-  told.turn(1e-4);
-  told.step_to(at(0.0, 0.0));
-  told.slip(2e-4);
-  const CaseResult result = told.finished(2e-4);
+  RecordedContact contact(kSticking_m_s);
+  contact.step_to(at(1e-6, -1e-4));
+  contact.turn(1e-4);
+  contact.step_to(at(0.0, 0.0));
+  contact.slip(2e-4);
+  const CaseResult result = contact.finished(2e-4);
   EXPECT_EQ(result.mode, "SC SR");
   ASSERT_EQ(result.stick_intervals.size(), 1U);
   EXPECT_EQ(result.stick_intervals[0].t1_s, 2e-4);
 }
 
 TEST(ContactRecord, TheFirstStateLeftAtOnceIsNotInTheModeEither) {
-  Told told(kSticking_m_s);
-  told.slip(0.0);
-  told.step_to(at(1e-6, -1e-4));
-  told.turn(1e-4);
-  EXPECT_EQ(told.finished(2e-4).mode, "sC sR");
+  RecordedContact contact(kSticking_m_s);
+  contact.slip(0.0);
+  contact.step_to(at(1e-6, -1e-4));
+  contact.turn(1e-4);
+  EXPECT_EQ(contact.finished(2e-4).mode, "sC sR");
 }
 
 TEST(ContactRecord, LargestTangentialForceOfAPeakCountsTheValleyFromWhichItFalls) {
-  Told told(kSticking_m_s);
-  told.step_to(at(-4e-5, -1e-4));
-  told.turn(1e-4);
-  told.step_to(at(-5e-5, -5e-5));  // the valley, where |F_t| is largest
-  told.turn(2e-4);
-  told.step_to(at(-1e-5, -8e-5));
-  told.turn(3e-4);
-  told.step_to(at(0.0, 0.0));
-  const CaseResult result = told.finished(4e-4);
+  RecordedContact contact(kSticking_m_s);
+  contact.step_to(at(-4e-5, -1e-4));
+  contact.turn(1e-4);
+  contact.step_to(at(-5e-5, -5e-5));  // the valley, where |F_t| is largest
+  contact.turn(2e-4);
+  contact.step_to(at(-1e-5, -8e-5));
+  contact.turn(3e-4);
+  contact.step_to(at(0.0, 0.0));
+  const CaseResult result = contact.finished(4e-4);
   ASSERT_EQ(result.peaks.size(), 2U);
   EXPECT_DOUBLE_EQ(result.peaks[0].ft_N, kTangential_N_m * 5e-5);
   EXPECT_DOUBLE_EQ(result.peaks[1].ft_N, kTangential_N_m * 5e-5);
@@ -142,14 +142,14 @@ TEST(ContactRecord, LargestTangentialForceOfAPeakCountsTheValleyFromWhichItFalls
 }
 
 TEST(ContactRecord, WorkExchangedCountsWhatGoesInAndWhatComesBack) {
-  Told told(kSticking_m_s);
+  RecordedContact contact(kSticking_m_s);
   ContactIntegrals<double> integrals;
   integrals.work_t = 0.25;
-  told.step_to(at(0.0, -1e-3), integrals);
-  told.turn(1e-4);
+  contact.step_to(at(0.0, -1e-3), integrals);
+  contact.turn(1e-4);
   integrals.work_t = -0.375;
-  told.step_to(at(0.0, 0.0), integrals);
-  const CaseResult result = told.finished(2e-4);
+  contact.step_to(at(0.0, 0.0), integrals);
+  const CaseResult result = contact.finished(2e-4);
   // F_n = 1e6 N/m 1e-3 m: half a joule each way, against that along the ground.
   EXPECT_DOUBLE_EQ(result.energy.exchanged_J, 0.5 + 0.5 + 0.25 + 0.375);
   EXPECT_DOUBLE_EQ(result.energy.friction_J, 0.125);
