@@ -7,6 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include <spdlog/fmt/fmt.h>
+
 #include "client/verbs/verbs.h"
 #include "proto/program/usage.h"
 #include "proto/suggestion.h"
@@ -75,13 +77,14 @@ std::string unexpected_words(CLI::App& app, CLI::App& verb) {
   const auto unexpected = app.remaining(true);
   const std::string first = unexpected.empty() ? std::string() : unexpected.front();
   const bool is_verb = &verb == &app && !first.starts_with("-");
-  return std::string(is_verb ? "unknown verb `" : "unexpected `") + first + "`" +
-         protocol::did_you_mean(first.substr(0, first.find('=')), candidates);
+  return fmt::format("{} `{}`{}", is_verb ? "unknown verb" : "unexpected", first,
+                     protocol::did_you_mean(first.substr(0, first.find('=')), candidates));
 }
 
 int wrong_usage(const CLI::App& app, const CLI::App& verb, const std::string& message) {
   return protocol::tell_wrong_usage(
-      &verb == &app ? app.get_name() : app.get_name() + " " + verb.get_name(), message);
+      &verb == &app ? app.get_name() : fmt::format("{} {}", app.get_name(), verb.get_name()),
+      message);
 }
 
 int parse(CLI::App& app, int argc, const char* const* argv) {
@@ -101,7 +104,7 @@ int parse(CLI::App& app, int argc, const char* const* argv) {
 
 int execute(CLI::App& app, const Command& command) {
   const auto& verb = parsed_verb(app);
-  const std::string words = app.get_name() + " " + verb.get_name() + ": ";
+  const std::string words = fmt::format("{} {}: ", app.get_name(), verb.get_name());
   try {
     const int code = command();
     if (!std::cout.flush()) {

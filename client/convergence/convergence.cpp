@@ -143,7 +143,7 @@ std::vector<Level> step_levels(const solver::ModelParameters& model, double e_st
 
 std::vector<SolvedLevel> solve_levels(const std::vector<Level>& levels,
                                       const std::vector<ContactPoint>& points,
-                                      const std::function<void(const SolvedLevel&)>& told) {
+                                      const std::function<void(const SolvedLevel&)>& after_each) {
   std::vector<SolvedLevel> solved(levels.size());
   std::mutex telling;
   for_each_in_parallel(levels.size(), [&](std::size_t turn) {
@@ -157,7 +157,7 @@ std::vector<SolvedLevel> solve_levels(const std::vector<Level>& levels,
     solved[i].wall_s =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
     const std::lock_guard lock(telling);
-    told(solved[i]);
+    after_each(solved[i]);
   });
   return solved;
 }

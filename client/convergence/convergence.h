@@ -60,11 +60,11 @@ struct SolvedLevel {
 };
 
 /// Solves `points` on every level, the levels side by side on the cores of this machine, the last
-/// (dearest) first. `told` is called as each level ends, from its thread, one call at a time.
+/// (dearest) first. `after_each` is called as each level ends, from its thread, one call at a time.
 /// Throws what the solver throws.
 std::vector<SolvedLevel> solve_levels(const std::vector<Level>& levels,
                                       const std::vector<ContactPoint>& points,
-                                      const std::function<void(const SolvedLevel&)>& told);
+                                      const std::function<void(const SolvedLevel&)>& after_each);
 
 /// One output over the levels.
 struct OutputConvergence {

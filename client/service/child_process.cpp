@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <spawn.h>
+#include <spdlog/fmt/fmt.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -28,8 +29,8 @@ Descriptor nameless_file() {
   auto path = (std::filesystem::temp_directory_path() / "oblique-XXXXXX").string();
   Descriptor file(mkostemp(path.data(), O_CLOEXEC | O_APPEND));
   if (file.number() < 0) {
-    throw ProcessError("cannot make a file in " + std::filesystem::temp_directory_path().string() +
-                       ": " + reason(errno));
+    throw ProcessError(fmt::format("cannot make a file in {}: {}",
+                                   std::filesystem::temp_directory_path().string(), reason(errno)));
   }
   unlink(path.c_str());
   return file;
@@ -76,7 +77,7 @@ class SpawnPlan {
 Pipe::Pipe() {
   std::array<int, 2> ends{};
   if (pipe2(ends.data(), O_CLOEXEC) != 0) {
-    throw ProcessError("cannot make a pipe: " + reason(errno));
+    throw ProcessError(fmt::format("cannot make a pipe: {}", reason(errno)));
   }
   read = Descriptor(ends[0]);
   write = Descriptor(ends[1]);
@@ -98,7 +99,8 @@ ChildProcess::ChildProcess(const ChildSettings& settings) {
                                 arguments.data(), environ);
   if (error != 0) {
     pid_ = -1;
-    throw ProcessError("cannot start " + settings.program.string() + ": " + reason(error));
+    throw ProcessError(
+        fmt::format("cannot start {}: {}", settings.program.string(), reason(error)));
   }
 }
 
@@ -136,9 +138,9 @@ std::string ChildProcess::ending() const {
   }
   if (WIFSIGNALED(*status_)) {
     const int signal = WTERMSIG(*status_);
-    return "was killed by signal " + std::to_string(signal) + " (" + strsignal(signal) + ")";
+    return fmt::format("was killed by signal {} ({})", signal, strsignal(signal));
   }
-  return "ended with exit code " + std::to_string(WEXITSTATUS(*status_));
+  return fmt::format("ended with exit code {}", WEXITSTATUS(*status_));
 }
 
 std::string ChildProcess::last_words() const {
@@ -166,9 +168,10 @@ std::filesystem::path sibling_program(const std::string& name) {
   const auto own = std::filesystem::read_symlink("/proc/self/exe");
   auto program = own.parent_path() / name;
   if (access(program.c_str(), X_OK) != 0) {
-    throw ProcessError("cannot find " + program.string() +
-                       ": the programs oblique, oblique-server and oblique-worker must lie in one "
-                       "folder");
+    throw ProcessError(
+        fmt::format("cannot find {}: the programs oblique, oblique-server and oblique-worker must "
+                    "lie in one folder",
+                    program.string()));
   }
   return program;
 }

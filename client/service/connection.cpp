@@ -4,6 +4,8 @@
 #include <array>
 #include <utility>
 
+#include <spdlog/fmt/fmt.h>
+
 #include "proto/frames.h"
 #include "proto/socket/socket.h"
 #include "worker/solver/model/errors.h"
@@ -16,7 +18,7 @@ namespace {
 constexpr std::chrono::seconds kSilence{3};
 
 std::string seconds_of(std::chrono::milliseconds time) {
-  return solver::exact_number(static_cast<double>(time.count()) / 1000.0) + " s";
+  return fmt::format("{} s", solver::exact_number(static_cast<double>(time.count()) / 1000.0));
 }
 
 /// A request that was not sent yet must not hold up the end of the program. Nothing is queued for a
@@ -33,8 +35,8 @@ protocol::DealerSettings dealer_settings(const ConnectionSettings& settings) {
 
 /// Where the page begins that follows the one after `asked`; 0: there is none. A page that does not
 /// come later than the one before would never end.
-std::uint64_t next_page(std::uint64_t asked, std::uint64_t told) {
-  return told > asked ? told : 0;
+std::uint64_t next_page(std::uint64_t asked, std::uint64_t answered) {
+  return answered > asked ? answered : 0;
 }
 
 }  // namespace
@@ -93,8 +95,9 @@ std::optional<protocol::ClientReply> Connection::received(std::uint64_t request_
   }
   protocol::ClientReply reply;
   if (!protocol::decode(answer.to_string_view(), reply)) {
-    throw ConnectionError("what answers at " + settings_.server_url +
-                          " does not speak as oblique-server does: check the address and port");
+    throw ConnectionError(fmt::format(
+        "what answers at {} does not speak as oblique-server does: check the address and port",
+        settings_.server_url));
   }
   // An answer that came after its time was given up, or a second one, belongs to nobody.
   const bool is_word_of_it =
@@ -119,36 +122,36 @@ void Connection::note_word(Outstanding& outstanding, const protocol::StillWorkin
 protocol::ClientReply Connection::answer_to(const protocol::ClientRequest& request,
                                             Outstanding outstanding, const Tell& tell) {
   const std::chrono::milliseconds timeout(settings_.timeout_ms);
-  bool told = false;
+  bool said_silent = false;
   while (tell || Clock::now() - outstanding.heard < timeout) {
     send_if_due(outstanding);
     wait_a_slice(is_due(outstanding));
     if (auto reply = received(request.request_id())) {
-      if (std::exchange(told, false)) {
-        tell(settings_.server_url + " answers again");
+      if (std::exchange(said_silent, false)) {
+        tell(fmt::format("{} answers again", settings_.server_url));
       }
       if (!reply->has_still_working()) {
         return *std::move(reply);
       }
       note_word(outstanding, reply->still_working(), tell != nullptr);
     }
-    if (tell && !told && Clock::now() - outstanding.heard > kSilence) {
-      tell("no answer from " + settings_.server_url + " for " + seconds_of(kSilence) +
-           ": waiting until it is back");
-      told = true;
+    if (tell && !said_silent && Clock::now() - outstanding.heard > kSilence) {
+      tell(fmt::format("no answer from {} for {}: waiting until it is back", settings_.server_url,
+                       seconds_of(kSilence)));
+      said_silent = true;
     }
   }
   if (outstanding.runs && Clock::now() - outstanding.word < kSilence) {
-    throw ConnectionError(
-        "the query took too long: after " + seconds_of(timeout) + " " + settings_.server_url +
-        (*outstanding.runs ? " works on it still" : " is busy with the queries of others still") +
-        ". Narrow it, as with WHERE or LIMIT, or give it more time with "
-        "--timeout SECONDS");
+    throw ConnectionError(fmt::format(
+        "the query took too long: after {} {} {} still. Narrow it, as with WHERE or LIMIT, or give "
+        "it more time with --timeout SECONDS",
+        seconds_of(timeout), settings_.server_url,
+        *outstanding.runs ? "works on it" : "is busy with the queries of others"));
   }
-  throw ConnectionError("no answer from " + settings_.server_url + " within " +
-                        seconds_of(timeout) +
-                        ": is a server running there? Start one with `oblique-server`, or say "
-                        "where it is with --server URL or OBLIQUE_SERVER");
+  throw ConnectionError(
+      fmt::format("no answer from {} within {}: is a server running there? Start one with "
+                  "`oblique-server`, or say where it is with --server URL or OBLIQUE_SERVER",
+                  settings_.server_url, seconds_of(timeout)));
 }
 
 protocol::ClientReply Connection::call(protocol::ClientRequest request, const Tell& tell) {
@@ -156,9 +159,10 @@ protocol::ClientReply Connection::call(protocol::ClientRequest request, const Te
   request.set_request_id(++last_request_id_);
   auto frame = protocol::encode(request);
   if (frame.size() > protocol::kMaxFrameBytes) {
-    throw ConnectionError("the request has " + std::to_string(frame.size()) +
-                          " bytes, more than the " + std::to_string(protocol::kMaxFrameBytes) +
-                          " that a server takes: write long lists of values as ranges");
+    throw ConnectionError(
+        fmt::format("the request has {} bytes, more than the {} that a server takes: write long "
+                    "lists of values as ranges",
+                    frame.size(), protocol::kMaxFrameBytes));
   }
   auto reply = answer_to(request,
                          {.frame = std::move(frame),
@@ -173,11 +177,10 @@ protocol::ClientReply Connection::call(protocol::ClientRequest request, const Te
   }
   // A reply has the number of its request's kind. Other programs' frames may be read as anything.
   if (static_cast<int>(reply.kind_case()) != static_cast<int>(request.kind_case())) {
-    throw ConnectionError("what answers at " + settings_.server_url +
-                          " does not speak as oblique-server does to clients: check the "
-                          "address and port (" +
-                          ConnectionSettings().server_url +
-                          " is for clients; the port for workers is another one)");
+    throw ConnectionError(
+        fmt::format("what answers at {} does not speak as oblique-server does to clients: check "
+                    "the address and port ({} is for clients; the port for workers is another one)",
+                    settings_.server_url, ConnectionSettings().server_url));
   }
   return reply;
 }

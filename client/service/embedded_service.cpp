@@ -11,6 +11,7 @@
 #include <iterator>
 #include <thread>
 
+#include <spdlog/fmt/fmt.h>
 #include <nlohmann/json.hpp>
 
 #include "client/service/connection.h"
@@ -27,7 +28,7 @@ constexpr std::chrono::seconds kStopWithin{5};
 
 std::string with_last_words(const std::string& what, const ChildProcess& child) {
   const auto words = child.last_words();
-  return words.empty() ? what : what + "; its last words:\n" + words;
+  return words.empty() ? what : fmt::format("{}; its last words:\n{}", what, words);
 }
 
 ChildSettings server_settings(const ServiceSettings& settings, int ready) {
@@ -134,28 +135,29 @@ void EmbeddedService::wait_until_ready(const Descriptor& ready, protocol::StopSi
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
   throw ProcessError(
-      with_last_words("the server did not start: it " + server_->ending(), *server_));
+      with_last_words(fmt::format("the server did not start: it {}", server_->ending()), *server_));
 }
 
 void EmbeddedService::check() {
   if (!server_->is_running()) {
-    throw ProcessError(with_last_words("the server " + server_->ending(), *server_));
+    throw ProcessError(with_last_words(fmt::format("the server {}", server_->ending()), *server_));
   }
   const bool any = std::any_of(workers_.begin(), workers_.end(),
                                [](const auto& worker) { return worker->is_running(); });
   if (!any) {
     throw ProcessError(with_last_words(
-        "no worker is left: the last one " + workers_.back()->ending(), *workers_.back()));
+        fmt::format("no worker is left: the last one {}", workers_.back()->ending()),
+        *workers_.back()));
   }
 }
 
 std::string EmbeddedService::news() {
   std::string text;
   for (const auto& worker : workers_) {
-    if (!worker->is_running() && told_.insert(worker->pid()).second) {
+    if (!worker->is_running() && reported_.insert(worker->pid()).second) {
       text += text.empty() ? "" : "\n";
       text += with_last_words(
-          "a worker (process " + std::to_string(worker->pid()) + ") " + worker->ending(), *worker);
+          fmt::format("a worker (process {}) {}", worker->pid(), worker->ending()), *worker);
     }
   }
   return text;

@@ -48,7 +48,7 @@ class EmbeddedService {
 
   std::unique_ptr<ChildProcess> server_;
   std::vector<std::unique_ptr<ChildProcess>> workers_;
-  std::set<pid_t> told_;  ///< workers whose end `news` has told
+  std::set<pid_t> reported_;  ///< workers whose end `news` has told
   std::string client_url_;
   std::string worker_url_;
 };

@@ -2,6 +2,8 @@
 
 #include <vector>
 
+#include <spdlog/fmt/fmt.h>
+
 #include "client/output/columns.h"
 #include "client/sql/sql_expression.h"
 #include "worker/solver/model/errors.h"
@@ -17,8 +19,8 @@ constexpr const char* kOrder = "--order";
 
 void check(const ResultQuery& query) {
   if (query.limit && *query.limit < 0) {
-    throw solver::InputError("--limit " + std::to_string(*query.limit) +
-                             " is not allowed: it must be >= 0");
+    throw solver::InputError(
+        fmt::format("--limit {} is not allowed: it must be >= 0", *query.limit));
   }
   check_sql_part(kSelect, query.select, SqlPart::kColumns);
   if (!query.where.empty()) {
@@ -30,7 +32,7 @@ void check(const ResultQuery& query) {
 }
 
 void check_columns(const ResultQuery& query, Source& source) {
-  const auto runs = source.query("SELECT * FROM " + rows_of_queries() + " LIMIT 0");
+  const auto runs = source.query(fmt::format("SELECT * FROM {} LIMIT 0", rows_of_queries()));
   const std::vector<std::string> columns(runs.columns().begin(), runs.columns().end());
   const auto names_given = names_given_in(query.select);
   check_case_of_columns(kSelect, query.select, columns, names_given);
@@ -40,14 +42,13 @@ void check_columns(const ResultQuery& query, Source& source) {
 
 std::string statement_of(const ResultQuery& query, std::int64_t skipped) {
   // The study is chosen inside, where no --where can widen it.
-  std::string sql = "SELECT " + query.select + " FROM (SELECT * FROM " + rows_of_queries() +
-                    " WHERE study = " + sql_text(query.study) + ")";
-  sql += query.where.empty() ? "" : " WHERE (" + query.where + ")";
-  sql += query.order.empty() ? "" : " ORDER BY " + query.order;
+  const std::string where = query.where.empty() ? "" : fmt::format(" WHERE ({})", query.where);
+  const std::string order = query.order.empty() ? "" : fmt::format(" ORDER BY {}", query.order);
   // SQL wants a limit before an offset; -1 is none.
   const std::int64_t limit = query.limit ? *query.limit - skipped : -1;
-  sql += " LIMIT " + std::to_string(limit) + " OFFSET " + std::to_string(skipped);
-  return sql;
+  return fmt::format("SELECT {} FROM (SELECT * FROM {} WHERE study = {}){}{} LIMIT {} OFFSET {}",
+                     query.select, rows_of_queries(), sql_text(query.study), where, order, limit,
+                     skipped);
 }
 
 protocol::QueryReply all_rows(Source& source, const ResultQuery& query, bool at_rest) {

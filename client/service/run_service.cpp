@@ -6,8 +6,11 @@
 #include <string>
 #include <system_error>
 
+#include <spdlog/fmt/fmt.h>
+
 #include "client/service/connection.h"
 #include "client/service/watching.h"
+#include "client/sql/sql_expression.h"
 #include "proto/text.h"
 #include "worker/solver/model/parameters.h"
 
@@ -25,19 +28,19 @@ std::string query_of_results(const Study& study, std::int64_t rows) {
     const auto& blocks = study.recipe.blocks();
     if (std::any_of(blocks.begin(), blocks.end(), varies)) {
       // SQL does not tell E from e, so the view calls Young's modulus otherwise.
-      columns += key.name == "E" ? ", E_Pa" : ", " + std::string(key.name);
+      columns += fmt::format(", {}", key.name == "E" ? "E_Pa" : key.name);
     }
   }
-  return "SELECT " + columns +
-         ", H, mu, e, status, fn_peak_N, ft_peak_N, duration_s, slide_m, stick_total_s, major_mode "
-         "FROM runs WHERE study = " +
-         sql_text(study.name) + " ORDER BY point LIMIT " + std::to_string(rows);
+  return fmt::format(
+      "SELECT {}, H, mu, e, status, fn_peak_N, ft_peak_N, duration_s, slide_m, stick_total_s, "
+      "major_mode FROM runs WHERE study = {} ORDER BY point LIMIT {}",
+      columns, sql_text(study.name), rows);
 }
 
 void tell_how_to_continue(const Study& study, const RunSettings& settings) {
-  std::cerr << "Stopped. What was solved of \"" << study.name << "\" is in "
-            << settings.service.database.string()
-            << "; the same command again goes on from there.\n";
+  std::cerr << fmt::format(
+      "Stopped. What was solved of \"{}\" is in {}; the same command again goes on from there.\n",
+      study.name, settings.service.database.string());
 }
 
 /// Rows that were not merged into the file are missing in a copy of it.
@@ -46,9 +49,10 @@ void tell_of_log(const std::filesystem::path& database) {
   const std::string log = database.string() + "-wal";
   const auto size = std::filesystem::file_size(log, ignored);
   if (!ignored && size > 0) {
-    std::cerr << "Another program reads " << database.string() << ", so " << log
-              << " holds some of its rows: a copy needs both files. `oblique backup COPY.db --db "
-              << database.string() << "` makes one that is whole.\n";
+    std::cerr << fmt::format(
+        "Another program reads {0}, so {1} holds some of its rows: a copy needs both files. "
+        "`oblique backup COPY.db --db {0}` makes one that is whole.\n",
+        database.string(), log);
   }
 }
 
@@ -66,14 +70,14 @@ RunEnd submit_and_wait(const Study& study, const RunSettings& settings, Embedded
   Connection connection(where, look_after);
   const auto submitted = connection.submit(study, settings.terms);
   if (!submitted.created()) {
-    std::cerr << "Going on with \"" << study.name << "\": " << submitted.settled() << " of "
-              << submitted.points() << " points are done.\n";
+    std::cerr << fmt::format("Going on with \"{}\": {} of {} points are done.\n", study.name,
+                             submitted.settled(), submitted.points());
   }
   const auto ask = [&](const Tell& tell) {
     look_after();
     const auto reply = connection.status(study.name, tell);
     if (reply.studies_size() != 1) {
-      throw ServerError("the server no longer knows the study \"" + study.name + "\"");
+      throw ServerError(fmt::format("the server no longer knows the study \"{}\"", study.name));
     }
     return reply.studies(0);
   };
@@ -96,13 +100,12 @@ RunEnd submit_and_wait(const Study& study, const RunSettings& settings, Embedded
 void check_settings(const RunSettings& settings) {
   constexpr int kMostWorkers = 1024;
   if (settings.service.workers < 1 || settings.service.workers > kMostWorkers) {
-    throw solver::InputError("--workers " + std::to_string(settings.service.workers) +
-                             " is not allowed: it must be from 1 to " +
-                             std::to_string(kMostWorkers));
+    throw solver::InputError(fmt::format("--workers {} is not allowed: it must be from 1 to {}",
+                                         settings.service.workers, kMostWorkers));
   }
   if (settings.rows < 0) {
-    throw solver::InputError("--rows " + std::to_string(settings.rows) +
-                             " is not allowed: it must be >= 0");
+    throw solver::InputError(
+        fmt::format("--rows {} is not allowed: it must be >= 0", settings.rows));
   }
 }
 

@@ -2,13 +2,9 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
-#include "client/output/printer.h"
 #include "client/service/connection.h"
 #include "proto/oblique.pb.h"
 
@@ -35,41 +31,13 @@ class Source {
   virtual std::string place() const = 0;
 };
 
-/// What --db, --server and --timeout said.
-struct SourceFlags {
-  std::string database;             ///< empty: not given
-  std::string server;               ///< empty: not given
-  std::optional<double> timeout_s;  ///< none: the default of what answers
-};
-
-/// Adds --server and --timeout. `flags` must live as long as `verb`.
-void add_server_flags(CLI::App& verb, SourceFlags& flags);
-/// Adds --db, --server and --timeout. `flags` must live as long as `verb`.
-void add_source_flags(CLI::App& verb, SourceFlags& flags);
-
-/// Adds --format.
-void add_format_flag(CLI::App& verb, std::string& format);
-
-/// Prints rows to standard output. When the source cut them off, says so on standard error and
-/// gives kFailed, else kDone.
-int print_whole(const protocol::QueryReply& rows, Format format);
-
-/// The server that the flags name, else OBLIQUE_SERVER, else the default. Throws
-/// solver::InputError for a timeout that is not positive.
-ConnectionSettings connection_settings(const SourceFlags& flags);
-
-/// Opens what the flags name: --db, else --server or OBLIQUE_SERVER, else oblique.db when it is in
-/// this folder, else the server at its default address.
-/// `keep_waiting` may end the wait for a server's answer; see Connection.
-std::unique_ptr<Source> open_source(const SourceFlags& flags,
+/// A server. `keep_waiting` may end the wait for its answer; see Connection.
+std::unique_ptr<Source> open_server(ConnectionSettings settings,
                                     Connection::KeepWaiting keep_waiting = {});
 
 /// A database file, read directly. A statement that takes longer than `timeout_ms` is an error; one
 /// that cannot be stopped then ends the program soon after.
 std::unique_ptr<Source> open_database(const std::string& file,
                                       std::int64_t timeout_ms = DatabaseSettings().timeout_ms);
-
-/// A text as SQL writes it, in single quotes.
-std::string sql_text(const std::string& text);
 
 }  // namespace oblique::client

@@ -1,5 +1,7 @@
 #include "client/service/watch_teller.h"
 
+#include <spdlog/fmt/fmt.h>
+
 #include "client/output/progress.h"
 
 namespace oblique::client {
@@ -9,12 +11,12 @@ std::string WatchTeller::wait_to_tell(const protocol::StudyStatus& status, Secon
     reason_ = status.waits_for();
     reason_since_ = elapsed;
   }
-  const bool is_settled = reason_.empty() || elapsed - reason_since_ >= kWaitIsTold;
-  if (!is_settled || reason_ == told_reason_) {
+  const bool is_settled = reason_.empty() || elapsed - reason_since_ >= kShortestWait;
+  if (!is_settled || reason_ == said_reason_) {
     return {};
   }
-  told_reason_ = reason_;
-  return reason_.empty() ? "The study goes on." : "The study waits for " + reason_ + ".";
+  said_reason_ = reason_;
+  return reason_.empty() ? "The study goes on." : fmt::format("The study waits for {}.", reason_);
 }
 
 std::string WatchTeller::update(const protocol::StudyStatus& status, Seconds elapsed) {
@@ -23,11 +25,12 @@ std::string WatchTeller::update(const protocol::StudyStatus& status, Seconds ela
   if (settled != settled_ || !status.waits_for().empty()) {
     settled_ = settled;
     settled_since_ = elapsed;
-    told_without_ = false;
-  } else if (sentence.empty() && !told_without_ && elapsed - settled_since_ >= kLongWithout) {
-    told_without_ = true;
-    sentence = "Nothing was solved for " + shown_duration(kLongWithout.count()) +
-               ": is a server at work on this study, with workers?";
+    said_without_ = false;
+  } else if (sentence.empty() && !said_without_ && elapsed - settled_since_ >= kLongWithout) {
+    said_without_ = true;
+    sentence =
+        fmt::format("Nothing was solved for {}: is a server at work on this study, with workers?",
+                    shown_duration(kLongWithout.count()));
   }
   return sentence;
 }

@@ -14,8 +14,8 @@ class WatchTeller {
  public:
   using Seconds = std::chrono::duration<double>;
 
-  /// A reason to wait is told once it has lasted for so long: workers come and go.
-  static constexpr Seconds kWaitIsTold{2};
+  /// A reason to wait is worth a word once it has lasted for so long: workers come and go.
+  static constexpr Seconds kShortestWait{2};
   /// So long without a point solved, and with no reason known, is told.
   static constexpr Seconds kLongWithout{10};
 
@@ -28,10 +28,10 @@ class WatchTeller {
 
   std::string reason_;  ///< what the study waits for; empty: for nothing
   Seconds reason_since_{0};
-  std::string told_reason_;  ///< of these, the one that was told
+  std::string said_reason_;  ///< of these, the one that was said
   std::uint64_t settled_ = 0;
   Seconds settled_since_{0};
-  bool told_without_ = false;
+  bool said_without_ = false;
 };
 
 }  // namespace oblique::client

@@ -6,9 +6,12 @@
 #include <chrono>
 #include <iostream>
 
+#include <spdlog/fmt/fmt.h>
+
 #include "client/output/printer.h"
 #include "client/output/progress.h"
 #include "client/service/watch_teller.h"
+#include "client/sql/sql_expression.h"
 #include "proto/program/exit_code.h"
 #include "proto/text.h"
 
@@ -27,13 +30,14 @@ Seconds pause_after(Seconds elapsed) {
 
 void tell_failures(const protocol::StudyStatus& status,
                    const std::function<protocol::QueryReply(const std::string&)>& query) {
-  std::cerr << status.failed() << " of " << status.points() << " points failed:\n";
-  const auto reasons = query(
-      "SELECT error, count(*), min(point) FROM runs WHERE study = " + sql_text(status.name()) +
-      " AND status = 'failed' GROUP BY error ORDER BY count(*) DESC LIMIT 10");
+  std::cerr << fmt::format("{} of {} points failed:\n", status.failed(), status.points());
+  const auto reasons = query(fmt::format(
+      "SELECT error, count(*), min(point) FROM runs WHERE study = {} AND status = 'failed' "
+      "GROUP BY error ORDER BY count(*) DESC LIMIT 10",
+      sql_text(status.name())));
   for (const auto& row : reasons.rows()) {
-    tell_line("  " + std::to_string(row.values(1).integer()) + " x " + row.values(0).text() +
-              " (first at point " + std::to_string(row.values(2).integer()) + ")");
+    tell_line(fmt::format("  {} x {} (first at point {})", row.values(1).integer(),
+                          row.values(0).text(), row.values(2).integer()));
   }
 }
 
@@ -73,10 +77,11 @@ protocol::StudyStatus watch_study(const AskStatus& ask, protocol::StopSignals& s
   }
 }
 
-protocol::StudyStatus the_study(Source& source, const std::string& name, const Tell& tell) {
+protocol::StudyStatus study_named(Source& source, const std::string& name, const Tell& tell) {
   const auto found = source.status(name, tell);
   if (found.size() != 1) {
-    throw std::runtime_error("there is no study called \"" + name + "\" in " + source.place());
+    throw std::runtime_error(
+        fmt::format("there is no study called \"{}\" in {}", name, source.place()));
   }
   return found.front();
 }

@@ -23,7 +23,7 @@ void tell_line(const std::string& sentence);
 
 /// The one study of that name in an answer to a status question. Given a `tell`, waits for a server
 /// that is away.
-protocol::StudyStatus the_study(Source& source, const std::string& name, const Tell& tell = {});
+protocol::StudyStatus study_named(Source& source, const std::string& name, const Tell& tell = {});
 
 /// Tells on standard error how a watched study stands: failed points with their reasons, or that
 /// it was cancelled. Gives the exit code: kDone when every point is solved.

@@ -4,6 +4,8 @@
 #include <array>
 #include <cstddef>
 
+#include <spdlog/fmt/fmt.h>
+
 #include "client/sql/sql_tokens.h"
 #include "worker/solver/model/errors.h"
 
@@ -47,7 +49,7 @@ void check_tokens(const std::vector<SqlToken>& tokens, SqlPart part) {
       item_is_empty = true;
       continue;
     } else if (depth == 0 && begins_clause(tokens, i)) {
-      throw NotSqlPart("it has " + std::string(token.text) + " outside brackets");
+      throw NotSqlPart(fmt::format("it has {} outside brackets", token.text));
     }
     item_is_empty = false;
   }
@@ -64,20 +66,20 @@ std::string what_is_allowed(SqlPart part) {
       ", without comments, parameters (?, :x, @x, $x) and semicolons";
   switch (part) {
     case SqlPart::kCondition:
-      return "it must be one condition, as in \"mu > 0.5 AND e = 1\"" + std::string(kWithout);
+      return fmt::format("it must be one condition, as in \"mu > 0.5 AND e = 1\"{}", kWithout);
     case SqlPart::kColumns:
-      return "it must be columns or expressions of them, as in \"mu, fn_peak_N / 1000 AS fn_kN\"" +
-             std::string(kWithout);
+      return fmt::format(
+          "it must be columns or expressions of them, as in \"mu, fn_peak_N / 1000 AS fn_kN\"{}",
+          kWithout);
     case SqlPart::kOrder:
       break;
   }
-  return "it must be columns to sort by, as in \"mu, fn_peak_N DESC\"" + std::string(kWithout);
+  return fmt::format("it must be columns to sort by, as in \"mu, fn_peak_N DESC\"{}", kWithout);
 }
 
 std::string not_allowed(std::string_view flag, std::string_view text, const std::string& why) {
   // An error ends at a zero byte, so what it quotes must end before.
-  const std::string shown(text.substr(0, text.find('\0')));
-  return std::string(flag) + " \"" + shown + "\" is not allowed: " + why;
+  return fmt::format("{} \"{}\" is not allowed: {}", flag, text.substr(0, text.find('\0')), why);
 }
 
 /// The name that a token writes, without its quotes.
@@ -136,7 +138,7 @@ void check_sql_part(std::string_view flag, std::string_view text, SqlPart part) 
     check_tokens(sql_tokens(text), part);
   } catch (const NotSqlPart& error) {
     throw solver::InputError(
-        not_allowed(flag, text, std::string(error.what()) + "; " + what_is_allowed(part)));
+        not_allowed(flag, text, fmt::format("{}; {}", error.what(), what_is_allowed(part))));
   }
 }
 
@@ -153,10 +155,10 @@ void check_case_of_columns(std::string_view flag, std::string_view text,
         std::find_if(columns.begin(), columns.end(),
                      [&](const std::string& column) { return same_but_case(column, name); });
     if (taken_for != columns.end() && !contains(columns, name) && !contains(names_given, name)) {
-      throw solver::InputError(not_allowed(flag, text,
-                                           name + " is no column, and SQL would take it for " +
-                                               *taken_for + ": write " +
-                                               right_names(name, *taken_for, columns)));
+      throw solver::InputError(
+          not_allowed(flag, text,
+                      fmt::format("{} is no column, and SQL would take it for {}: write {}", name,
+                                  *taken_for, right_names(name, *taken_for, columns))));
     }
   }
 }
@@ -170,6 +172,15 @@ std::vector<std::string> names_given_in(std::string_view text) {
     }
   }
   return names;
+}
+
+std::string sql_text(const std::string& text) {
+  std::string quoted = "'";
+  for (const char letter : text) {
+    quoted.append(letter == '\'' ? 2 : 1, letter);
+  }
+  quoted += '\'';
+  return quoted;
 }
 
 }  // namespace oblique::client

@@ -29,4 +29,7 @@ void check_case_of_columns(std::string_view flag, std::string_view text,
 /// The names that `text` gives its columns with AS.
 std::vector<std::string> names_given_in(std::string_view text);
 
+/// A text as SQL writes it, in single quotes.
+std::string sql_text(const std::string& text);
+
 }  // namespace oblique::client

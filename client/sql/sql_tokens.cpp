@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <string>
 
+#include <spdlog/fmt/fmt.h>
+
 namespace oblique::client {
 namespace {
 
@@ -89,10 +91,10 @@ class Tokenizer {
   void refuse_what_no_part_has() const {
     const char c = here();
     if ((c == '-' && here(1) == '-') || (c == '/' && here(1) == '*')) {
-      throw NotSqlPart(std::string("it has a comment (") + c + here(1) + ")");
+      throw NotSqlPart(fmt::format("it has a comment ({}{})", c, here(1)));
     }
     if (c == '?' || c == ':' || c == '@' || c == '$' || c == '#') {
-      throw NotSqlPart(std::string("it has a parameter (") + c + "), which has no value");
+      throw NotSqlPart(fmt::format("it has a parameter ({}), which has no value", c));
     }
     if (c == ';') {
       throw NotSqlPart("it has a semicolon");
@@ -111,7 +113,7 @@ class Tokenizer {
   void take_until(char end) {
     const std::size_t found = text_.find(end, at_ + 1);
     if (found == std::string_view::npos) {
-      throw NotSqlPart(std::string("the quote ") + here() + " is not closed");
+      throw NotSqlPart(fmt::format("the quote {} is not closed", here()));
     }
     at_ = found + 1;
   }

@@ -2,6 +2,8 @@
 #include <memory>
 #include <string>
 
+#include <spdlog/fmt/fmt.h>
+
 #include "client/service/source.h"
 #include "client/verbs/verbs.h"
 #include "server/care/backup.h"
@@ -26,10 +28,10 @@ struct BackupFlags {
 
 int save_what_can_be_read(const BackupFlags& flags) {
   const auto saved = server::salvage(flags.database.file, flags.copy);
-  std::cerr << flags.copy << " has " << saved.studies << " studies and " << saved.results
-            << " results of " << flags.database.file << "; rows were passed over at "
-            << saved.unreadable_places
-            << " places. A server that goes on with it solves again what is missing.\n";
+  std::cerr << fmt::format(
+      "{} has {} studies and {} results of {}; rows were passed over at {} places. A server that "
+      "goes on with it solves again what is missing.\n",
+      flags.copy, saved.studies, saved.results, flags.database.file, saved.unreadable_places);
   return kDone;
 }
 
@@ -38,7 +40,7 @@ int backup(const BackupFlags& flags) {
     return save_what_can_be_read(flags);
   }
   server::back_up(flags.database.file, flags.copy);
-  std::cerr << flags.copy << " is a copy of " << flags.database.file << ".\n";
+  std::cerr << fmt::format("{} is a copy of {}.\n", flags.copy, flags.database.file);
   return kDone;
 }
 

@@ -1,6 +1,8 @@
 #include <iostream>
 #include <memory>
 
+#include <spdlog/fmt/fmt.h>
+
 #include "client/service/source.h"
 #include "client/verbs/verbs.h"
 #include "proto/text.h"
@@ -26,11 +28,13 @@ int check(const DatabaseSettings& database) {
     }
   }
   if (found.faults.empty()) {
-    std::cerr << database.file << " is sound.\n";
+    std::cerr << fmt::format("{} is sound.\n", database.file);
     return kDone;
   }
-  std::cerr << database.file << " is damaged. What can be read is saved by:\n  oblique backup "
-            << "saved.db --db " << database.file << " --salvage\n";
+  std::cerr << fmt::format(
+      "{0} is damaged. What can be read is saved by:\n  oblique backup saved.db --db {0} "
+      "--salvage\n",
+      database.file);
   return kFailed;
 }
 

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/output/printer.h"
-#include "client/paper/recovery.h"
+#include "client/paper/parameter_fit.h"
 #include "client/verbs/verbs.h"
 #include "proto/suggestion.h"
 #include "worker/solver/model/number.h"
@@ -107,7 +107,7 @@ int fit(const FitFlags& flags) {
   auto start = solver::preset(flags.from);
   start.elements_per_link = flags.elements_per_link;
   solver::validate(start);
-  const auto end = recover(published_table(), start, tell);
+  const auto end = fit_parameters(published_table(), start, tell);
   if (flags.json) {
     print_json(end);
   } else {

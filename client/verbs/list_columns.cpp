@@ -4,7 +4,7 @@
 
 #include "client/output/columns.h"
 #include "client/output/printer.h"
-#include "client/service/source.h"
+#include "client/verbs/printed_rows.h"
 #include "client/verbs/verbs.h"
 
 namespace oblique::client {

@@ -10,6 +10,8 @@
 #include "client/paper/paper_comparison.h"
 #include "client/service/source.h"
 #include "client/service/watching.h"
+#include "client/sql/sql_expression.h"
+#include "client/verbs/printed_rows.h"
 #include "client/verbs/verbs.h"
 #include "proto/suggestion.h"
 #include "worker/solver/model/parameters.h"
@@ -34,7 +36,7 @@ struct PaperFlags {
 };
 
 protocol::QueryReply rows_of_study(Source& source, const std::string& study) {
-  the_study(source, study);
+  study_named(source, study);
   return source.query(
       "SELECT point, H, mu, e, peaks, phases, stick_total_s, major_mode FROM runs WHERE study = " +
       sql_text(study) + " AND status = 'solved'");

@@ -3,11 +3,14 @@
 #include <string_view>
 #include <vector>
 
+#include <spdlog/fmt/fmt.h>
+
 #include "client/output/columns.h"
 #include "client/output/printer.h"
 #include "client/service/result_query.h"
-#include "client/service/source.h"
+#include "client/service/source_flags.h"
 #include "client/service/watching.h"
+#include "client/verbs/printed_rows.h"
 #include "client/verbs/verbs.h"
 #include "proto/program/usage.h"
 #include "proto/suggestion.h"
@@ -41,7 +44,7 @@ std::string with_columns(const std::string& message, Source& source) {
     return message;
   }
   const auto wrong = message.substr(at + kNoColumn.size());
-  const auto runs = source.query("SELECT * FROM " + rows_of_queries() + " LIMIT 0");
+  const auto runs = source.query(fmt::format("SELECT * FROM {} LIMIT 0", rows_of_queries()));
   const std::vector<std::string_view> columns(runs.columns().begin(), runs.columns().end());
   return message + protocol::did_you_mean(wrong, columns) + "; the columns are " +
          protocol::joined(columns);
@@ -51,7 +54,7 @@ int query(const QueryFlags& flags) {
   const auto format = format_named(flags.format);
   check(flags.query);
   const auto source = open_source(flags.source);
-  const auto study = the_study(*source, flags.query.study);
+  const auto study = study_named(*source, flags.query.study);
   check_columns(flags.query, *source);
   protocol::QueryReply rows;
   try {

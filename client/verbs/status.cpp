@@ -3,8 +3,9 @@
 #include <string>
 
 #include "client/output/printer.h"
-#include "client/service/source.h"
+#include "client/service/source_flags.h"
 #include "client/service/watching.h"
+#include "client/verbs/printed_rows.h"
 #include "client/verbs/verbs.h"
 
 namespace oblique::client {

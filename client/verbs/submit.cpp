@@ -7,7 +7,7 @@
 
 #include "client/output/mesh_note.h"
 #include "client/service/connection.h"
-#include "client/service/source.h"
+#include "client/service/source_flags.h"
 #include "client/service/watching.h"
 #include "client/study/study_flags.h"
 #include "client/verbs/tip_reach.h"

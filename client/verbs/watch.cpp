@@ -2,7 +2,7 @@
 #include <memory>
 #include <string>
 
-#include "client/service/source.h"
+#include "client/service/source_flags.h"
 #include "client/service/watching.h"
 #include "client/verbs/verbs.h"
 
@@ -28,7 +28,7 @@ int watch(const WatchFlags& flags) {
   bool answered = false;
   const auto ask = [&](const Tell& tell) {
     // Where nobody ever answered, the address may be wrong.
-    auto status = the_study(*source, flags.study, answered ? tell : Tell());
+    auto status = study_named(*source, flags.study, answered ? tell : Tell());
     answered = true;
     return status;
   };

@@ -2,9 +2,12 @@
 #include <memory>
 #include <string>
 
+#include <spdlog/fmt/fmt.h>
+
 #include "client/output/printer.h"
 #include "client/service/connection.h"
-#include "client/service/source.h"
+#include "client/service/source_flags.h"
+#include "client/verbs/printed_rows.h"
 #include "client/verbs/verbs.h"
 
 namespace oblique::client {
@@ -45,9 +48,9 @@ protocol::QueryReply workers_of_server(const ConnectionSettings& settings) {
                                                   : "new"));
   }
   if (reply.bad_frames() > 0) {
-    std::cerr
-        << reply.bad_frames()
-        << " frames came that no sound worker or client sends; the server's log says from whom\n";
+    std::cerr << fmt::format(
+        "{} frames came that no sound worker or client sends; the server's log says from whom\n",
+        reply.bad_frames());
   }
   return table;
 }

@@ -11,7 +11,7 @@
 namespace oblique::client {
 namespace {
 
-std::string told(const std::string& model, const std::string& axis = {}) {
+std::string note_of(const std::string& model, const std::string& axis = {}) {
   std::ostringstream out;
   const auto any_reach = [](const protocol::PointTable&) {};
   const std::string point = "[[block]]\nH = 0.6\nmu = [0.4, 0.6]\ne = 1\n";
@@ -21,7 +21,7 @@ std::string told(const std::string& model, const std::string& axis = {}) {
 }
 
 TEST(MeshNote, SaysInOneLineThatThePublishedMeshIsNotConvergedAndWhatIs) {
-  const auto line = told("");
+  const auto line = note_of("");
   EXPECT_NE(line.find("4 elements a link as published, is not converged"), std::string::npos);
   EXPECT_NE(line.find("--preset converged"), std::string::npos);
   EXPECT_NE(line.find("README.md, Limits"), std::string::npos);
@@ -29,16 +29,16 @@ TEST(MeshNote, SaysInOneLineThatThePublishedMeshIsNotConvergedAndWhatIs) {
 }
 
 TEST(MeshNote, SaysNothingOfAConvergedMesh) {
-  EXPECT_EQ(told("preset = 'converged'"), "");
-  EXPECT_EQ(told("elements_per_link = 16"), "");
-  EXPECT_EQ(told("", "elements_per_link = [16, 32]\n"), "");
+  EXPECT_EQ(note_of("preset = 'converged'"), "");
+  EXPECT_EQ(note_of("elements_per_link = 16"), "");
+  EXPECT_EQ(note_of("", "elements_per_link = [16, 32]\n"), "");
 }
 
 TEST(MeshNote, LooksAtTheCoarsestMeshOfAStudy) {
-  EXPECT_NE(told("elements_per_link = 8").find("8 elements a link,"), std::string::npos);
-  EXPECT_NE(told("preset = 'converged'", "elements_per_link = [16, 4]\n").find("4 elements"),
+  EXPECT_NE(note_of("elements_per_link = 8").find("8 elements a link,"), std::string::npos);
+  EXPECT_NE(note_of("preset = 'converged'", "elements_per_link = [16, 4]\n").find("4 elements"),
             std::string::npos);
-  EXPECT_NE(told("preset = 'converged'", "elements_per_link = {from = 2, to = 16, step = 2}\n")
+  EXPECT_NE(note_of("preset = 'converged'", "elements_per_link = {from = 2, to = 16, step = 2}\n")
                 .find("2 elements"),
             std::string::npos);
 }

@@ -172,9 +172,9 @@ TEST(Connection, PassesOverASecondAnswerToAnEarlierQuestion) {
 TEST(Connection, ThatIsToWaitSaysThatTheServerIsSilentAndThatItIsBack) {
   const test::ReservedPort port;
   std::unique_ptr<ScriptedServer> server;
-  std::vector<std::string> told;
+  std::vector<std::string> sentences;
   const Tell tell = [&](const std::string& sentence) {
-    told.push_back(sentence);
+    sentences.push_back(sentence);
     if (server == nullptr) {
       server = std::make_unique<ScriptedServer>(
           [](const protocol::ClientRequest& request) { return workers_reply(request, 5); },
@@ -184,9 +184,9 @@ TEST(Connection, ThatIsToWaitSaysThatTheServerIsSilentAndThatItIsBack) {
   // Far longer than the time-out of an answer that is not waited for.
   Connection connection(at(port.url(), 10));
   EXPECT_EQ(connection.status("", tell).workers(), 5U);
-  ASSERT_EQ(told.size(), 2U);
-  EXPECT_NE(told[0].find("no answer from " + port.url()), std::string::npos) << told[0];
-  EXPECT_NE(told[1].find("answers again"), std::string::npos) << told[1];
+  ASSERT_EQ(sentences.size(), 2U);
+  EXPECT_NE(sentences[0].find("no answer from " + port.url()), std::string::npos) << sentences[0];
+  EXPECT_NE(sentences[1].find("answers again"), std::string::npos) << sentences[1];
 }
 
 /// What a server says while a query waits or runs.

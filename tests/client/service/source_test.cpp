@@ -1,4 +1,4 @@
-#include "client/service/source.h"
+#include "client/service/source_flags.h"
 
 #include <fcntl.h>
 #include <sys/file.h>

@@ -50,9 +50,9 @@ TEST(Readme, SummarisesTheComparisonInTheNumbersThatItsCommandPrints) {
 TEST(Readme, DescribesEveryColumn) {
   const auto printed = test::run_oblique({"columns", "--format", "markdown"});
   ASSERT_EQ(printed.exit_code, 0) << printed.err;
-  EXPECT_EQ(shown(text_of("client/README.md"), "oblique columns --format markdown"),
+  EXPECT_EQ(shown(text_of("client/output/README.md"), "oblique columns --format markdown"),
             "\n" + printed.out + "\n")
-      << ".ci/tables writes the tables into client/README.md";
+      << ".ci/tables writes the tables into client/output/README.md";
 }
 
 }  // namespace

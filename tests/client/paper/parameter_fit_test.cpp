@@ -1,4 +1,4 @@
-#include "client/paper/recovery.h"
+#include "client/paper/parameter_fit.h"
 
 #include <cmath>
 #include <string>
@@ -11,10 +11,10 @@
 namespace oblique::client {
 namespace {
 
-TEST(Recovery, OfWhatThePaperDoesNotPrintEndsWithinOnePercentOfThePreset) {
+TEST(ParameterFit, OfWhatThePaperDoesNotPrintEndsWithinOnePercentOfThePreset) {
   std::vector<FitStep> steps;
-  const auto end = recover(published_table(), solver::preset("printed"),
-                           [&](const FitStep& step) { steps.push_back(step); });
+  const auto end = fit_parameters(published_table(), solver::preset("printed"),
+                                  [&](const FitStep& step) { steps.push_back(step); });
   const auto preset = solver::preset("paper");
   for (const auto name : kFittedKeys) {
     const auto& key = *solver::find_model_key(name);

@@ -2,8 +2,10 @@
 #include <memory>
 #include <string>
 
+#include <spdlog/fmt/fmt.h>
+
 #include "client/service/connection.h"
-#include "client/service/source.h"
+#include "client/service/source_flags.h"
 #include "client/verbs/verbs.h"
 #include "proto/text.h"
 
@@ -19,12 +21,13 @@ int change(const ChangeFlags& flags, protocol::StudyChange change) {
   Connection connection(connection_settings(flags.source));
   const auto reply = connection.change(flags.study, change);
   const auto& status = reply.study();
-  std::cout << protocol::visible(status.name()) << ": " << protocol::visible(status.state()) << ", "
-            << status.solved() + status.failed() << " of " << status.points() << " points done";
-  if (change == protocol::STUDY_CHANGE_RETRY) {
-    std::cout << ", " << reply.retried() << " failed ones to be solved again";
-  }
-  std::cout << '\n';
+  const std::string again =
+      change == protocol::STUDY_CHANGE_RETRY
+          ? fmt::format(", {} failed ones to be solved again", reply.retried())
+          : "";
+  std::cout << fmt::format("{}: {}, {} of {} points done{}\n", protocol::visible(status.name()),
+                           protocol::visible(status.state()), status.solved() + status.failed(),
+                           status.points(), again);
   return kDone;
 }
 
@@ -34,8 +37,10 @@ void add_change(CLI::App& app, Command& command, const std::string& name,
                 protocol::StudyChange what) {
   auto flags = std::make_shared<ChangeFlags>();
   auto* verb = app.add_subcommand(name, description);
-  verb->footer("Examples:\n  oblique " + name + " friction\n  oblique " + name +
-               " friction --server tcp://127.0.0.1:7600\n\n" + remark);
+  verb->footer(fmt::format(
+      "Examples:\n  oblique {0} friction\n  oblique {0} friction --server tcp://127.0.0.1:7600\n\n"
+      "{1}",
+      name, remark));
   verb->add_option("STUDY", flags->study, "name of the study")->required()->type_name("");
   add_server_flags(*verb, flags->source);
   verb->callback(

@@ -31,10 +31,10 @@ std::vector<Difference> differences_of(const PublishedTable& published,
 /// relative differences from all published numbers is least (Levenberg-Marquardt on the logarithms
 /// of the parameters, derivatives by differences). A published peak, phase or stick that the model
 /// lacks counts as a difference of 100 %. Stops when an iteration lowers the sum of squares by less
-/// than 1e-3 of itself, or moves the parameters by less than 1e-5 of the way from the start. `told`
-/// is called with the start and after each iteration. Gives the last step. Throws SolveError when
-/// no minimum is found within 50 iterations or a model on the way cannot be solved.
-FitStep recover(const PublishedTable& published, const solver::ModelParameters& start,
-                const std::function<void(const FitStep&)>& told);
+/// than 1e-3 of itself, or moves the parameters by less than 1e-5 of the way from the start.
+/// `after_each` is called with the start and after each iteration. Gives the last step. Throws
+/// SolveError when no minimum is found within 50 iterations or a model on the way cannot be solved.
+FitStep fit_parameters(const PublishedTable& published, const solver::ModelParameters& start,
+                       const std::function<void(const FitStep&)>& after_each);
 
 }  // namespace oblique::client

@@ -1,11 +1,11 @@
-#include "client/paper/recovery.h"
+#include "client/paper/parameter_fit.h"
 
 #include <cmath>
-#include <string>
+#include <future>
 
+#include <spdlog/fmt/fmt.h>
 #include <unsupported/Eigen/LevenbergMarquardt>
 
-#include "client/convergence/parallel.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::client {
@@ -54,13 +54,19 @@ class Residuals : public Eigen::DenseFunctor<double> {
 
   int df(const VectorXd& x, MatrixXd& jacobian) const {
     std::vector<VectorXd> at(kFittedKeys.size() + 1);  // the last one undisturbed
-    for_each_in_parallel(at.size(), [&](std::size_t i) {
-      VectorXd disturbed = x;
-      if (i < kFittedKeys.size()) {
-        disturbed[static_cast<Index>(i)] += kDifferenceStep;
-      }
-      (*this)(disturbed, at[i]);
-    });
+    std::vector<std::future<void>> solved;
+    for (std::size_t i = 0; i < at.size(); ++i) {
+      solved.push_back(std::async(std::launch::async, [&, i] {
+        VectorXd disturbed = x;
+        if (i < kFittedKeys.size()) {
+          disturbed[static_cast<Index>(i)] += kDifferenceStep;
+        }
+        (*this)(disturbed, at[i]);
+      }));
+    }
+    for (auto& each : solved) {
+      each.get();
+    }
     for (std::size_t i = 0; i < kFittedKeys.size(); ++i) {
       jacobian.col(static_cast<Index>(i)) = (at[i] - at.back()) / kDifferenceStep;
     }
@@ -79,14 +85,14 @@ std::vector<Difference> differences_of(const PublishedTable& published,
   return compare(published, solved_cases(published, model));
 }
 
-FitStep recover(const PublishedTable& published, const solver::ModelParameters& start,
-                const std::function<void(const FitStep&)>& told) {
+FitStep fit_parameters(const PublishedTable& published, const solver::ModelParameters& start,
+                       const std::function<void(const FitStep&)>& after_each) {
   FitStep step{.iteration = 0,
                .model = start,
                .differences = differences_of(published, start),
                .summary = {}};
   step.summary = summary_of(step.differences);
-  told(step);
+  after_each(step);
   Residuals residuals(published, start, static_cast<int>(step.differences.size()));
   Eigen::LevenbergMarquardt<Residuals> method(residuals);
   method.setXtol(kSmallestStep);
@@ -96,8 +102,8 @@ FitStep recover(const PublishedTable& published, const solver::ModelParameters& 
   while (status == Eigen::LevenbergMarquardtSpace::NotStarted ||
          status == Eigen::LevenbergMarquardtSpace::Running) {
     if (step.iteration == kMostIterations) {
-      throw solver::SolveError("the fit has found no minimum after " +
-                               std::to_string(kMostIterations) + " iterations");
+      throw solver::SolveError(
+          fmt::format("the fit has found no minimum after {} iterations", kMostIterations));
     }
     status = method.minimizeOneStep(x);
     step = {.iteration = step.iteration + 1,
@@ -105,7 +111,7 @@ FitStep recover(const PublishedTable& published, const solver::ModelParameters& 
             .differences = differences_of(published, residuals.model_at(x)),
             .summary = {}};
     step.summary = summary_of(step.differences);
-    told(step);
+    after_each(step);
   }
   return step;
 }

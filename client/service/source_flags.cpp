@@ -1,0 +1,91 @@
+#include "client/service/source_flags.h"
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <utility>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "worker/solver/model/errors.h"
+#include "worker/solver/model/number.h"
+
+namespace oblique::client {
+namespace {
+
+constexpr const char* kServerVariable = "OBLIQUE_SERVER";
+
+std::string server_of_environment() {
+  const char* value = std::getenv(kServerVariable);
+  return value == nullptr ? std::string() : std::string(value);
+}
+
+std::string seconds(std::int64_t milliseconds) {
+  return solver::exact_number(static_cast<double>(milliseconds) / 1000.0);
+}
+
+std::int64_t timeout_of(const SourceFlags& flags, std::int64_t default_ms) {
+  constexpr double kLongest_s = 1e6;
+  if (!flags.timeout_s) {
+    return default_ms;
+  }
+  if (!(*flags.timeout_s > 0.0 && *flags.timeout_s <= kLongest_s)) {
+    throw solver::InputError(
+        fmt::format("--timeout {} is not allowed: it must be > 0 and at most {} s",
+                    solver::exact_number(*flags.timeout_s), solver::exact_number(kLongest_s)));
+  }
+  return std::llround(std::ceil(*flags.timeout_s * 1000.0));
+}
+
+}  // namespace
+
+void add_server_flags(CLI::App& verb, SourceFlags& flags) {
+  verb.add_option("--server", flags.server,
+                  fmt::format("address of the server; default: {}, else {}", kServerVariable,
+                              ConnectionSettings().server_url))
+      ->type_name("URL");
+  verb.add_option("--timeout", flags.timeout_s,
+                  fmt::format("longest wait for an answer [s]; default: {}",
+                              seconds(ConnectionSettings().timeout_ms)))
+      ->type_name("SECONDS");
+}
+
+void add_source_flags(CLI::App& verb, SourceFlags& flags) {
+  auto* database = verb.add_option("--db", flags.database,
+                                   fmt::format("database to read directly; default, unless a "
+                                               "server is named: {} when it is in this folder",
+                                               DatabaseSettings().file));
+  database->type_name("FILE");
+  add_server_flags(verb, flags);
+  verb.get_option("--timeout")
+      ->description(fmt::format(
+          "longest wait for an answer [s]; default: {} from a server, {} from a file",
+          seconds(ConnectionSettings().timeout_ms), seconds(DatabaseSettings().timeout_ms)));
+  database->excludes("--server");
+}
+
+ConnectionSettings connection_settings(const SourceFlags& flags) {
+  ConnectionSettings settings;
+  settings.timeout_ms = timeout_of(flags, settings.timeout_ms);
+  if (!flags.server.empty()) {
+    settings.server_url = flags.server;
+  } else if (const auto from_environment = server_of_environment(); !from_environment.empty()) {
+    settings.server_url = from_environment;
+  }
+  return settings;
+}
+
+std::unique_ptr<Source> open_source(const SourceFlags& flags,
+                                    Connection::KeepWaiting keep_waiting) {
+  const auto database_timeout_ms = timeout_of(flags, DatabaseSettings().timeout_ms);
+  if (!flags.database.empty()) {
+    return open_database(flags.database, database_timeout_ms);
+  }
+  const bool server_named = !flags.server.empty() || !server_of_environment().empty();
+  if (!server_named && std::filesystem::exists(DatabaseSettings().file)) {
+    return open_database(DatabaseSettings().file, database_timeout_ms);
+  }
+  return open_server(connection_settings(flags), std::move(keep_waiting));
+}
+
+}  // namespace oblique::client

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "client/service/connection.h"
+#include "client/service/source.h"
+
+namespace oblique::client {
+
+/// What --db, --server and --timeout said.
+struct SourceFlags {
+  std::string database;             ///< empty: not given
+  std::string server;               ///< empty: not given
+  std::optional<double> timeout_s;  ///< none: the default of what answers
+};
+
+/// Adds --server and --timeout. `flags` must live as long as `verb`.
+void add_server_flags(CLI::App& verb, SourceFlags& flags);
+/// Adds --db, --server and --timeout. `flags` must live as long as `verb`.
+void add_source_flags(CLI::App& verb, SourceFlags& flags);
+
+/// The server that the flags name, else OBLIQUE_SERVER, else the default. Throws
+/// solver::InputError for a timeout that is not positive.
+ConnectionSettings connection_settings(const SourceFlags& flags);
+
+/// Opens what the flags name: --db, else --server or OBLIQUE_SERVER, else oblique.db when it is in
+/// this folder, else the server at its default address.
+/// `keep_waiting` may end the wait for a server's answer; see Connection.
+std::unique_ptr<Source> open_source(const SourceFlags& flags,
+                                    Connection::KeepWaiting keep_waiting = {});
+
+}  // namespace oblique::client

@@ -1,0 +1,30 @@
+#include "client/verbs/printed_rows.h"
+
+#include <iostream>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "proto/program/exit_code.h"
+
+namespace oblique::client {
+
+void add_format_flag(CLI::App& verb, std::string& format) {
+  verb.add_option("--format", format, "table, csv, json or markdown")
+      ->type_name("FORMAT")
+      ->capture_default_str();
+}
+
+int print_whole(const protocol::QueryReply& rows, Format format) {
+  print_out(rows, format);
+  if (!rows.truncated()) {
+    return protocol::kDone;
+  }
+  std::cerr << fmt::format(
+      "Only the first {} rows: the server sends no more at once. Narrow it with WHERE and LIMIT, "
+      "or "
+      "read the database itself with --db FILE.\n",
+      rows.rows_size());
+  return protocol::kFailed;
+}
+
+}  // namespace oblique::client

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "client/output/printer.h"
+#include "proto/oblique.pb.h"
+
+namespace oblique::client {
+
+/// Adds --format.
+void add_format_flag(CLI::App& verb, std::string& format);
+
+/// Prints rows to standard output. When the source cut them off, says so on standard error and
+/// gives kFailed, else kDone.
+int print_whole(const protocol::QueryReply& rows, Format format);
+
+}  // namespace oblique::client
