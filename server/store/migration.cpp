@@ -27,6 +27,7 @@ std::string random_id() {
 void create_schema(sqlite3* database) {
   Transaction transaction(database);
   execute(database, kSchemaSql);
+  execute(database, kViewsSql);
   execute(database, "PRAGMA application_id = " + std::to_string(kApplicationId));
   execute(database, "PRAGMA user_version = " + std::to_string(kSchemaVersion));
   Statement about(database, "INSERT INTO about (database_id) VALUES (?)");
@@ -48,6 +49,7 @@ void migrate(sqlite3* database) {
   for (std::size_t step = found; step < kSchemaVersion; ++step) {
     execute(database, kSteps.at(step - 1));
   }
+  execute(database, kViewsSql);
   execute(database, "PRAGMA user_version = " + std::to_string(kSchemaVersion));
   transaction.commit();
 }

@@ -1,5 +1,5 @@
--- From schema version 3 to 4: results have the largest reactions, and the view `runs` shows them; rows
--- have checksums; failed points that are solved again go on counting their attempts.
+-- From schema version 3 to 4: results have the largest reactions; rows have checksums; failed points
+-- that are solved again go on counting their attempts.
 ALTER TABLE results ADD COLUMN reaction_peaks TEXT;
 ALTER TABLE results ADD COLUMN checksum INTEGER;
 ALTER TABLE studies ADD COLUMN checksum INTEGER;
@@ -13,36 +13,3 @@ CREATE TABLE retries (
   attempt     INTEGER NOT NULL,  -- that failed; the next one has a higher number
   retried_at  TEXT NOT NULL
 ) STRICT;
-
-CREATE VIEW reaction_peaks AS
-SELECT r.study_id AS study_id, r.point AS point, item.key AS seq,
-       json_extract(item.value, '$[0]') AS t_s,
-       json_extract(item.value, '$[1]') AS force_N
-FROM results AS r, json_each(r.reaction_peaks) AS item;
-
-DROP VIEW runs;
-CREATE VIEW runs AS
-SELECT s.name AS study, r.study_id AS study_id, r.point AS point, r.H AS H, r.mu AS mu, r.e AS e,
-       r.status AS status, r.error AS error, r.fall_time_s AS fall_time_s,
-       r.impact_x_m AS impact_x_m, r.vt_in_m_s AS vt_in_m_s, r.vn_in_m_s AS vn_in_m_s,
-       r.duration_s AS duration_s, r.fn_peak_N AS fn_peak_N, r.ft_peak_N AS ft_peak_N,
-       r.impulse_n_Ns AS impulse_n_Ns, r.impulse_t_Ns AS impulse_t_Ns, r.slide_m AS slide_m,
-       r.vt_out_m_s AS vt_out_m_s, r.vn_out_m_s AS vn_out_m_s, r.mode AS mode,
-       r.major_mode AS major_mode, r.stick_total_s AS stick_total_s, r.peaks AS peaks,
-       r.ft_peaks AS ft_peaks, r.phases AS phases, r.stick_intervals AS stick_intervals,
-       r.reaction_peaks AS reaction_peaks,
-       r.kinetic_in_J AS kinetic_in_J, r.friction_J AS friction_J,
-       r.restitution_J AS restitution_J, r.kinetic_change_J AS kinetic_change_J,
-       r.strain_change_J AS strain_change_J, r.gravity_change_J AS gravity_change_J,
-       r.exchanged_J AS exchanged_J, r.closure AS closure, r.dt_s AS dt_s, r.steps AS steps,
-       r.wall_s AS wall_s, r.worker AS worker, w.name AS worker_name,
-       r.solver_version AS solver_version, r.instruction_set AS instruction_set,
-       r.attempt AS attempt, r.solved_at AS solved_at, r.model_id AS model_id, m.links AS links,
-       m.length AS length, m.lengths_m AS lengths_m, m.E AS E_Pa, m.A AS A, m.I AS I, m.rho AS rho,
-       m.g AS g, m.elements_per_link AS elements_per_link, m.k AS k, m.eta2 AS eta2,
-       m.tip_mass AS tip_mass, m.integrator AS integrator,
-       m.spectral_radius AS spectral_radius, m.dt AS dt, m.dt_fall AS dt_fall
-FROM results AS r
-JOIN studies AS s ON s.study_id = r.study_id
-JOIN models AS m ON m.model_id = r.model_id
-LEFT JOIN workers AS w ON w.worker_id = r.worker;
