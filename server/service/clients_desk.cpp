@@ -68,35 +68,34 @@ void ClientsDesk::request_read(const ReadReport& report, Instant now) {
   answer({identity, report.read.request_id}, report.read, now);
 }
 
-/// Says why, if there is a reason that does not lie in what is asked.
-bool ClientsDesk::refuse(const Client& client, const ReadRequest& read) {
+/// Why the request is not answered, for a reason that does not lie in what is asked, or an empty
+/// text.
+std::string ClientsDesk::objection_to(const ReadRequest& read) {
   const protocol::ClientRequest& request = read.request;
   const WriteLedger& ledger = at_.sources.ledger;
-  std::string reason;
   if (!read.is_readable) {
     at_.bad_frames.count("a client");
-    reason = "the request cannot be read";
-  } else if (request.protocol_version() == 0) {
+    return "the request cannot be read";
+  }
+  if (request.protocol_version() == 0) {
     at_.bad_frames.count("a client");
-    reason = "this is the port for clients; workers connect to the other one";
-  } else if (reason = protocol::objection_to_version(request.protocol_version(),
-                                                     protocol::kOldestClientsVersion, "client");
-             !reason.empty()) {
-    // that is it
-  } else if ((request.has_submit() || request.has_change()) && ledger.takes_no_change()) {
-    reason = "too many changes wait for the disk already: ask again later";
-  } else if (ledger.is_gone() && !request.has_status() && !request.has_workers()) {
-    reason = ledger.fault();
+    return "this is the port for clients; workers connect to the other one";
   }
-  if (reason.empty()) {
-    return false;
+  if (std::string reason = protocol::objection_to_version(
+          request.protocol_version(), protocol::kOldestClientsVersion, "client");
+      !reason.empty()) {
+    return reason;
   }
-  at_.clients.reply_error(client, reason);
-  return true;
+  if ((request.has_submit() || request.has_change()) && ledger.takes_no_change()) {
+    return "too many changes wait for the disk already: ask again later";
+  }
+  return ledger.is_gone() && !request.has_status() && !request.has_workers() ? ledger.fault()
+                                                                             : std::string();
 }
 
 void ClientsDesk::answer(const Client& client, const ReadRequest& read, Instant now) {
-  if (refuse(client, read)) {
+  if (const std::string reason = objection_to(read); !reason.empty()) {
+    at_.clients.reply_error(client, reason);
     return;
   }
   const protocol::ClientRequest& request = read.request;

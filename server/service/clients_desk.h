@@ -65,7 +65,7 @@ class ClientsDesk {
   };
 
   void read_elsewhere(const std::string& identity, std::string_view frame);
-  bool refuse(const Client& client, const ReadRequest& read);
+  std::string objection_to(const ReadRequest& read);
   void answer(const Client& client, const ReadRequest& read, Instant now);
   void submit(const Client& client, const ReadRequest& read, Instant now);
   void status(const Client& client, const protocol::StatusRequest& request, Instant now);

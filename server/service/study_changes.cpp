@@ -14,13 +14,13 @@ namespace {
 
 constexpr std::size_t kLongestShownName = 200;
 
-/// Why studies cannot share the workers so, or an empty text.
+/// Why no study can have these terms, or an empty text.
 std::string objection_to_terms(const StudyTerms& terms) {
   const std::string priority = protocol::objection_to_priority(terms.priority);
   return priority.empty() ? protocol::objection_to_weight(terms.weight) : priority;
 }
 
-/// What the request says of the share, and for the rest what is.
+/// What the request says of the terms, and for the rest what is.
 StudyTerms asked_terms(const protocol::SubmitRequest& request, StudyTerms terms) {
   if (request.has_priority()) {
     terms.priority = request.priority();
