@@ -66,6 +66,8 @@ void for_each_pair(const Numbers& numbers, const Take& take) {
 }
 
 void read_peaks(const PointResult& message, CaseResult& result) {
+  result.peaks.reserve(static_cast<std::size_t>(message.peaks_size() / 3));
+  result.ft_peaks.reserve(static_cast<std::size_t>(message.ft_peaks_size() / 2));
   for (int i = 0; i + 2 < message.peaks_size(); i += 3) {
     result.peaks.push_back({message.peaks(i), message.peaks(i + 1), message.peaks(i + 2), false});
   }
@@ -81,6 +83,9 @@ void read_peaks(const PointResult& message, CaseResult& result) {
 
 void read_lists(const PointResult& message, CaseResult& result) {
   read_peaks(message, result);
+  result.phases.reserve(static_cast<std::size_t>(message.phase_ends_s_size()));
+  result.stick_intervals.reserve(static_cast<std::size_t>(message.stick_intervals_size() / 2));
+  result.reaction_peaks.reserve(static_cast<std::size_t>(message.reaction_peaks_size() / 2));
   double begin_s = 0.0;
   for (const double end_s : message.phase_ends_s()) {
     const bool compresses = result.phases.size() % 2 == 0;
