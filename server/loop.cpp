@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <utility>
 #include <variant>
+#include <vector>
 
 #include <arpa/inet.h>
 #include <poll.h>
@@ -138,6 +139,9 @@ class Loop::Parts final : public Outbox {
     return forward_to_client(identity, protocol::encode(reply));
   }
   bool forward_to_client(const std::string& identity, const std::string& frame) override {
+    if (is_ending_) {
+      last_answered_.push_back(identity);
+    }
     return network_.send(identity, frame) != Delivery::kGone;
   }
   void write(WriteJob job) override { writer_.submit(std::move(job)); }
@@ -215,6 +219,7 @@ class Loop::Parts final : public Outbox {
 
   LoopEnd finish() {
     spdlog::info("stopping");
+    is_ending_ = true;
     queries_.stop();
     service_->stop(now());
     const auto until = Clock::now() + kLongestDrain;
@@ -229,10 +234,27 @@ class Loop::Parts final : public Outbox {
     const std::size_t lost = writer_.finish();
     take_reports();
     network_.flush(kLinger);
+    let_clients_read();
     if (lost > 0) {
       spdlog::error("{} changes could not be made durable and were not acknowledged", lost);
     }
     return {lost, service_->storage_is_gone()};
+  }
+
+  /// libzmq forgets what a client has not read yet when the connection ends: who was answered at
+  /// the end gets the time to read it, and mostly goes by itself then.
+  void let_clients_read() {
+    const auto until = Clock::now() + kLinger;
+    const auto is_there = [this](const std::string& client) {
+      return network_.is_connected(client);
+    };
+    while (std::any_of(last_answered_.begin(), last_answered_.end(), is_there) &&
+           Clock::now() < until) {
+      constexpr int kSlice_ms = 10;
+      pollfd item{network_.descriptor(), POLLIN, 0};
+      ::poll(&item, 1, kSlice_ms);
+      network_.collect(now().steady_ms);
+    }
   }
 
   std::string address_;
@@ -247,6 +269,8 @@ class Loop::Parts final : public Outbox {
   Network::Port workers_;
   Network::Port clients_;
   std::uint64_t ended_connections_ = 0;
+  bool is_ending_ = false;
+  std::vector<std::string> last_answered_;  ///< clients that were sent something at the end
   std::optional<Service> service_;
 };
 

@@ -243,6 +243,10 @@ bool Network::is_busy(const std::string& identity) const {
   return peer != nullptr && peer->waiting_out_bytes > limits_.busy_bytes;
 }
 
+bool Network::is_connected(const std::string& identity) const {
+  return find(identity) != nullptr;
+}
+
 void Network::flush(std::chrono::milliseconds longest) {
   using Clock = std::chrono::steady_clock;
   const auto until = Clock::now() + longest;

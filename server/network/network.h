@@ -74,6 +74,7 @@ class Network {
   Delivery send(const std::string& identity, std::string_view body);
   /// More waits to go out to it than a peer should have.
   bool is_busy(const std::string& identity) const;
+  bool is_connected(const std::string& identity) const;
   /// Tries for so long to send what is kept.
   void flush(std::chrono::milliseconds longest);
 
