@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "server/scheduler/lease_index.h"
-#include "server/scheduler/scheduler_events.h"
 #include "server/scheduler/points/study_points.h"
+#include "server/scheduler/scheduler_events.h"
 #include "server/scheduler/study_queue.h"
 #include "server/scheduler/worker_processes.h"
 
