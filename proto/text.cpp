@@ -124,6 +124,18 @@ std::string shortened(const std::string& text, std::size_t bytes) {
   return text.substr(0, bytes);
 }
 
+std::vector<std::string_view> split(std::string_view text, char separator) {
+  std::vector<std::string_view> parts;
+  for (;;) {
+    const auto end = text.find(separator);
+    parts.push_back(text.substr(0, end));
+    if (end == std::string_view::npos) {
+      return parts;
+    }
+    text.remove_prefix(end + 1);
+  }
+}
+
 bool is_visible(std::string_view text) {
   return visible(text) == text;
 }

@@ -2,6 +2,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace oblique::protocol {
 
@@ -23,6 +24,9 @@ bool is_utf8(std::string_view text);
 
 /// The beginning of a UTF-8 text, at most `bytes` long, without half a character at its end.
 std::string shortened(const std::string& text, std::size_t bytes);
+
+/// The parts of `text` between separators: one more than there are separators, empty ones too.
+std::vector<std::string_view> split(std::string_view text, char separator);
 
 /// Length in bytes of the UTF-8 character at the start of `text`, and its code point; length 0 when
 /// there is none.

@@ -1,16 +1,11 @@
 #pragma once
 
-#include <cerrno>
-#include <cstdint>
 #include <deque>
 #include <mutex>
-#include <system_error>
 #include <utility>
 #include <variant>
 
-#include <sys/eventfd.h>
-
-#include "proto/descriptor.h"
+#include "proto/system/wake_up.h"
 #include "server/queries/query_pool.h"
 #include "server/service/request_reader.h"
 #include "server/store/writer.h"
@@ -22,12 +17,6 @@ class ReportBox {
  public:
   using Item = std::variant<WriteReport, QueryReport, ReadReport>;
 
-  ReportBox() : woken_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
-    if (!woken_.is_open()) {
-      throw std::system_error(errno, std::generic_category(), "eventfd");
-    }
-  }
-
   /// From any thread.
   template <typename Reports>
   void put(Reports reports) {
@@ -37,22 +26,21 @@ class ReportBox {
         items_.emplace_back(std::move(report));
       }
     }
-    static_cast<void>(eventfd_write(woken_.number(), 1));
+    woken_.wake();
   }
 
   /// From the loop: everything put so far.
   std::deque<Item> take() {
-    eventfd_t count = 0;
-    static_cast<void>(eventfd_read(woken_.number(), &count));
+    woken_.clear();
     const std::lock_guard lock(mutex_);
     return std::exchange(items_, {});
   }
 
   /// Readable when there is something to take.
-  int descriptor() const { return woken_.number(); }
+  int descriptor() const { return woken_.descriptor(); }
 
  private:
-  protocol::Descriptor woken_;
+  protocol::WakeUp woken_;
   std::mutex mutex_;
   std::deque<Item> items_;  // guarded by mutex_
 };

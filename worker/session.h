@@ -8,9 +8,9 @@
 
 #include <zmq.hpp>
 
+#include "proto/system/wake_up.h"
 #include "worker/batch_solver.h"
 #include "worker/conversation.h"
-#include "worker/wake_up.h"
 
 namespace oblique::worker {
 
@@ -54,7 +54,7 @@ class Session {
   const SessionSettings settings_;
   zmq::context_t context_;
   std::optional<zmq::socket_t> socket_;
-  WakeUp batch_ended_;
+  protocol::WakeUp batch_ended_;
   Conversation conversation_;
   std::optional<int> exit_code_;
   std::int64_t report_due_ms_ = 0;

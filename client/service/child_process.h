@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "proto/descriptor.h"
+#include "proto/system/descriptor.h"
 
 namespace oblique::client {
 

@@ -17,6 +17,7 @@
 #include "proto/recipe/written_axis.h"
 #include "proto/recipe/written_model.h"
 #include "proto/suggestion.h"
+#include "proto/text.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {
@@ -24,28 +25,6 @@ namespace {
 
 using solver::InputError;
 using solver::ParameterKey;
-
-std::vector<std::string_view> split(std::string_view text, char separator) {
-  std::vector<std::string_view> parts;
-  for (;;) {
-    const auto end = text.find(separator);
-    parts.push_back(text.substr(0, end));
-    if (end == std::string_view::npos) {
-      return parts;
-    }
-    text.remove_prefix(end + 1);
-  }
-}
-
-/// A number of plain text from end to end.
-std::optional<double> number_of(std::string_view text) {
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size()) {
-    return std::nullopt;
-  }
-  return value;
-}
 
 /// Runs `work` and puts the flag, as it was typed, before what it throws.
 template <typename Work>
@@ -59,7 +38,7 @@ auto at_flag(std::string_view flag, std::string_view text, Work work) {
 
 /// The number that a part of a flag's text says.
 double flag_number(std::string_view part) {
-  const auto value = number_of(part);
+  const auto value = solver::number_of(part);
   if (!value) {
     throw InputError(
         (part.empty() ? "a value is missing" : fmt::format("\"{}\" is not a number", part)) +
@@ -70,14 +49,14 @@ double flag_number(std::string_view part) {
 
 std::vector<double> flag_numbers(std::string_view text) {
   std::vector<double> values;
-  for (const auto part : split(text, ',')) {
+  for (const auto part : protocol::split(text, ',')) {
     values.push_back(flag_number(part));
   }
   return values;
 }
 
 protocol::Axis range_of_flag(const ParameterKey& key, std::string_view text) {
-  const auto parts = split(text, ':');
+  const auto parts = protocol::split(text, ':');
   if (parts.size() != 3) {
     throw InputError("this is not a range: write from:to:count, as 0.1:2.0:40");
   }
@@ -94,7 +73,7 @@ protocol::Axis range_of_flag(const ParameterKey& key, std::string_view text) {
 
 std::vector<double> integrators(std::string_view text) {
   std::vector<double> values;
-  for (const auto name : split(text, ',')) {
+  for (const auto name : protocol::split(text, ',')) {
     values.push_back(static_cast<double>(solver::integrator_named(name)));
   }
   return values;

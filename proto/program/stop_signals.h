@@ -3,7 +3,7 @@
 #include <chrono>
 #include <csignal>
 
-#include "proto/descriptor.h"
+#include "proto/system/descriptor.h"
 
 namespace oblique::protocol {
 

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cstdint>
 #include <vector>
 
 #include "proto/recipe/axes.h"
 #include "proto/recipe/model_message.h"
+#include "proto/text.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::protocol {
@@ -148,36 +148,23 @@ void write_axis(const Axis& axis, Pieces& out) {
   }
 }
 
-std::vector<std::string_view> split(std::string_view text, char separator) {
-  std::vector<std::string_view> parts;
-  for (;;) {
-    const auto end = text.find(separator);
-    parts.push_back(text.substr(0, end));
-    if (end == std::string_view::npos) {
-      return parts;
-    }
-    text.remove_prefix(end + 1);
-  }
-}
-
 [[noreturn]] void throw_not_canonical() {
   throw solver::InputError("it is not the canonical text of a model");
 }
 
-double number_of(std::string_view text) {
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size()) {
+double read_number(std::string_view text) {
+  const auto value = solver::number_of(text);
+  if (!value) {
     throw_not_canonical();
   }
-  return value;
+  return *value;
 }
 
 void read_field(solver::ModelParameters& model, std::string_view name, std::string_view value) {
   if (name == "lengths") {
     model.lengths_m.clear();
     for (const auto part : split(value, ',')) {
-      model.lengths_m.push_back(number_of(part));
+      model.lengths_m.push_back(read_number(part));
     }
     return;
   }
@@ -185,8 +172,8 @@ void read_field(solver::ModelParameters& model, std::string_view name, std::stri
   if (key == nullptr || name == "links" || name == "length") {
     throw_not_canonical();
   }
-  const double set =
-      is_integrator(name) ? static_cast<double>(solver::integrator_named(value)) : number_of(value);
+  const double set = is_integrator(name) ? static_cast<double>(solver::integrator_named(value))
+                                         : read_number(value);
   if (name == "elements_per_link") {
     solver::check_value(*key, set);  // or the struct cannot hold it
   }

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "proto/descriptor.h"
+#include "proto/system/descriptor.h"
 #include "server/network/zmtp.h"
 
 namespace oblique::server {

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "proto/descriptor.h"
+#include "proto/system/descriptor.h"
 
 namespace oblique::server {
 

@@ -2,12 +2,9 @@
 
 #include <algorithm>
 #include <chrono>
-#include <system_error>
 #include <utility>
 
 #include <poll.h>
-#include <sys/eventfd.h>
-#include <unistd.h>
 
 #include "proto/frames.h"
 #include "server/queries/reader_program.h"
@@ -27,27 +24,17 @@ std::int64_t steady_ms() {
       .count();
 }
 
-int new_event() {
-  const int fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-  if (fd < 0) {
-    throw std::system_error(errno, std::generic_category(), "eventfd");
-  }
-  return fd;
-}
-
 }  // namespace
 
 QueryPool::QueryPool(std::string database, QueryPoolSettings settings, Report report)
     : database_(std::move(database)),
       settings_(std::move(settings)),
       report_(std::move(report)),
-      wake_fd_(new_event()),
       turns_(settings_.turns),
       thread_([this] { run(); }) {}
 
 QueryPool::~QueryPool() {
   stop();
-  ::close(wake_fd_);
 }
 
 bool QueryPool::submit(QueryJob job) {
@@ -55,35 +42,25 @@ bool QueryPool::submit(QueryJob job) {
   if (stopping_ || !turns_.add(std::move(job))) {
     return false;
   }
-  wake();
+  woken_.wake();
   return true;
 }
 
 void QueryPool::cancel(std::uint64_t ticket) {
   const std::lock_guard lock(mutex_);
   unwanted_.push_back(ticket);
-  wake();
+  woken_.wake();
 }
 
 void QueryPool::stop() {
   {
     const std::lock_guard lock(mutex_);
     stopping_ = true;
-    wake();
+    woken_.wake();
   }
   if (thread_.joinable()) {
     thread_.join();
   }
-}
-
-void QueryPool::wake() {
-  const std::uint64_t one = 1;
-  (void)!::write(wake_fd_, &one, sizeof one);  // full: it is awake
-}
-
-void QueryPool::clear_wake() {
-  std::uint64_t count = 0;
-  (void)!::read(wake_fd_, &count, sizeof count);
 }
 
 void QueryPool::run() {
@@ -126,7 +103,7 @@ void QueryPool::turn() {
 }
 
 void QueryPool::wait(std::int64_t now_ms) {
-  std::vector<pollfd> items{{wake_fd_, POLLIN, 0}};
+  std::vector<pollfd> items{{woken_.descriptor(), POLLIN, 0}};
   std::int64_t until_ms = now_ms + kLongWait_ms;
   bool ends_soon = !dying_.empty();
   for (const Slot& slot : slots_) {
@@ -145,7 +122,7 @@ void QueryPool::wait(std::int64_t now_ms) {
   }
   const std::int64_t left_ms = std::max<std::int64_t>(until_ms - now_ms, 0);
   (void)::poll(items.data(), items.size(), static_cast<int>(left_ms));
-  clear_wake();
+  woken_.clear();
 }
 
 void QueryPool::drop_unwanted() {

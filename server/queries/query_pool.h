@@ -9,6 +9,7 @@
 #include <thread>
 #include <vector>
 
+#include "proto/system/wake_up.h"
 #include "server/queries/query_turns.h"
 #include "server/queries/reader_process.h"
 
@@ -77,13 +78,11 @@ class QueryPool {
   Slot* slot_of(std::uint64_t ticket);
   Slot& idle_slot();
   void forget(std::uint64_t ticket);
-  void wake();
-  void clear_wake();
 
   std::string database_;
   QueryPoolSettings settings_;
   Report report_;
-  int wake_fd_;
+  const protocol::WakeUp woken_;
   std::mutex mutex_;
   QueryTurns turns_;                                   // guarded by mutex_
   std::vector<std::uint64_t> unwanted_;                // guarded by mutex_

@@ -9,9 +9,9 @@
 
 #include "proto/frames.h"
 #include "proto/result_message.h"
+#include "proto/system/wake_up.h"
 #include "tests/support/reserved_port.h"
 #include "tests/worker/conversation_fixture.h"
-#include "worker/wake_up.h"
 
 namespace oblique::worker {
 namespace {
@@ -99,7 +99,7 @@ class RunningWorker {
     return settings;
   }
 
-  WakeUp stop_;
+  protocol::WakeUp stop_;
   Session session_;
   std::future<int> exit_code_;
 };
@@ -205,7 +205,7 @@ TEST(SessionTest, AnAddressThatIsNoneIsAnErrorThatNamesIt) {
     SessionSettings settings;
     settings.server = address;
     Session session(settings, solved_at_once);
-    const WakeUp stop;
+    const protocol::WakeUp stop;
     try {
       session.run(stop.descriptor(), [] {});
       FAIL() << "connected to \"" << address << '"';

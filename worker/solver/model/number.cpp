@@ -82,4 +82,11 @@ std::string signed_number(double value, int decimals) {
   return is_nothing || text.starts_with('-') ? text : '+' + text;
 }
 
+std::optional<double> number_of(std::string_view text) {
+  double value = 0.0;
+  const char* const end = text.data() + text.size();
+  const auto [rest, error] = std::from_chars(text.data(), end, value);
+  return error == std::errc() && rest == end ? std::optional(value) : std::nullopt;
+}
+
 }  // namespace oblique::solver

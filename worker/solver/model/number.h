@@ -1,11 +1,13 @@
 #pragma once
 
+#include <optional>
 #include <string>
+#include <string_view>
 
 namespace oblique::solver {
 
-// Numbers as text, the same everywhere: `exact_number` where the text is read back or repeats what
-// somebody wrote, the others where people read it.
+// Numbers as text and back, the same everywhere: `exact_number` where the text is read back or
+// repeats what somebody wrote, the others where people read it.
 
 /// The shortest text that reads back as the same bits: 0.1, 1e-06, -0, nan. Without an exponent
 /// from 0.0001 up to a million, and elsewhere where that is as short.
@@ -24,5 +26,9 @@ std::string fixed_number(double value, int decimals);
 
 /// `fixed_number` with a sign always, but for what rounds to nothing: +0.05, -1.10, 0.00.
 std::string signed_number(double value, int decimals);
+
+/// The number that `text` is from end to end, without spaces or a plus; nothing for any other text.
+/// Reads back what `exact_number` wrote, infinities and NaN too.
+std::optional<double> number_of(std::string_view text);
 
 }  // namespace oblique::solver

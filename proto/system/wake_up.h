@@ -1,23 +1,22 @@
 #pragma once
 
-namespace oblique::worker {
+#include "proto/system/descriptor.h"
+
+namespace oblique::protocol {
 
 /// Wakes a poll from another thread. Many calls before the poll are one.
 class WakeUp {
  public:
   /// Throws std::system_error when the system gives no descriptor.
   WakeUp();
-  ~WakeUp();
-  WakeUp(const WakeUp&) = delete;
-  WakeUp& operator=(const WakeUp&) = delete;
 
   void wake() const;
   void clear() const;
   /// Readable after `wake` and until `clear`.
-  int descriptor() const { return descriptor_; }
+  int descriptor() const { return descriptor_.number(); }
 
  private:
-  const int descriptor_;
+  Descriptor descriptor_;
 };
 
-}  // namespace oblique::worker
+}  // namespace oblique::protocol
