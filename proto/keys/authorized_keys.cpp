@@ -1,0 +1,155 @@
+#include "proto/keys/authorized_keys.h"
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <ctime>
+#include <filesystem>
+
+#include <sys/stat.h>
+
+#include <spdlog/fmt/chrono.h>
+#include <spdlog/fmt/fmt.h>
+
+#include "proto/keys/key_file.h"
+#include "proto/keys/toml_fields.h"
+#include "proto/keys/written_file.h"
+#include "proto/text.h"
+#include "worker/solver/model/errors.h"
+
+namespace oblique::protocol {
+namespace {
+
+constexpr std::array<std::string_view, 4> kEntryFields{"name", "role", "public", "added_at"};
+constexpr std::array<std::string_view, 1> kTopFields{"key"};
+
+/// Whoever may write the list may admit himself.
+void check_writers(const std::string& path) {
+  struct stat file {};
+  if (::stat(path.c_str(), &file) == 0 && S_ISREG(file.st_mode) && (file.st_mode & S_IWOTH) != 0) {
+    throw solver::InputError(
+        fmt::format("the list of keys {} has mode {:04o}: everybody could add a key, so it is not "
+                    "used. Mend it with: chmod o-w '{}'",
+                    path, file.st_mode & 07777U, path));
+  }
+}
+
+AuthorizedKey entry_of(const std::string& path, const toml::node& node) {
+  const auto* table = node.as_table();
+  if (table == nullptr) {
+    throw solver::InputError(
+        fmt::format("{}:{}: `key` must be tables, as [[key]]", path, node.source().begin.line));
+  }
+  const TomlFields fields(path, *table);
+  fields.refuse_unknown(kEntryFields, "an entry");
+  AuthorizedKey key{fields.key_name("name"), fields.role("role"), fields.key("public"),
+                    fields.text("added_at")};
+  if (key.role == Role::kServer) {
+    fields.fail("role", "`role` must be \"client\", \"worker\" or \"reader\": a server is no peer");
+  }
+  return key;
+}
+
+std::string text_of(const AuthorizedKeys& keys) {
+  std::string text =
+      "# Keys that oblique-server admits. `oblique keys add` and `oblique keys revoke` write this\n"
+      "# file anew, without other comments; a running server heeds every change of it.\n";
+  for (const AuthorizedKey& key : keys.all()) {
+    text +=
+        fmt::format("\n[[key]]\nname = \"{}\"\nrole = \"{}\"\npublic = \"{}\"\nadded_at = \"{}\"\n",
+                    key.name, name_of(key.role), z85(key.public_key), key.added_at);
+  }
+  return text;
+}
+
+}  // namespace
+
+const AuthorizedKey* AuthorizedKeys::find(const CurveKey& public_key) const {
+  const auto place = places_.find(public_key);
+  return place == places_.end() ? nullptr : &keys_.at(place->second);
+}
+
+const AuthorizedKey* AuthorizedKeys::find(std::string_view name) const {
+  const auto place = places_by_name_.find(name);
+  return place == places_by_name_.end() ? nullptr : &keys_.at(place->second);
+}
+
+void AuthorizedKeys::add(AuthorizedKey key) {
+  if (const std::string objection = objection_to_key_name(key.name); !objection.empty()) {
+    throw solver::InputError(objection);
+  }
+  if (find(key.name) != nullptr) {
+    throw solver::InputError(fmt::format("there is a key called {} already", key.name));
+  }
+  if (const auto* same = find(key.public_key)) {
+    throw solver::InputError(fmt::format("the public key {} is there already, called {}",
+                                         z85(key.public_key), same->name));
+  }
+  places_.emplace(key.public_key, keys_.size());
+  places_by_name_.emplace(key.name, keys_.size());
+  keys_.push_back(std::move(key));
+}
+
+AuthorizedKey AuthorizedKeys::remove(std::string_view name) {
+  const auto* found = find(name);
+  if (found == nullptr) {
+    std::string names;
+    for (const AuthorizedKey& key : keys_) {
+      names += (names.empty() ? "" : ", ") + key.name;
+    }
+    throw solver::InputError(fmt::format("there is no key called {}; there {}", visible(name),
+                                         names.empty() ? "is none" : "are: " + names));
+  }
+  AuthorizedKey removed = *found;
+  AuthorizedKeys others;
+  for (AuthorizedKey& key : keys_) {
+    if (key.name != name) {
+      others.add(std::move(key));
+    }
+  }
+  *this = std::move(others);
+  return removed;
+}
+
+std::string authorized_keys_beside(const std::string& server_key_file) {
+  return (std::filesystem::path(server_key_file).parent_path() / "authorized_keys.toml").string();
+}
+
+AuthorizedKeys read_authorized_keys(const std::string& path) {
+  check_writers(path);
+  const TomlFile file(path, "the list of keys");
+  TomlFields(path, file.top()).refuse_unknown(kTopFields, "a list of keys");
+  AuthorizedKeys keys;
+  const toml::node* list = file.top().get("key");
+  if (list == nullptr) {
+    return keys;
+  }
+  if (!list->is_array()) {
+    throw solver::InputError(
+        fmt::format("{}:{}: `key` must be tables, as [[key]]", path, list->source().begin.line));
+  }
+  for (const toml::node& node : *list->as_array()) {
+    AuthorizedKey key = entry_of(path, node);
+    try {
+      keys.add(std::move(key));
+    } catch (const solver::InputError& error) {
+      throw solver::InputError(
+          fmt::format("{}:{}: {}", path, node.source().begin.line, error.what()));
+    }
+  }
+  return keys;
+}
+
+void change_authorized_keys(const std::string& path,
+                            const std::function<void(AuthorizedKeys&)>& change) {
+  const FileTurn turn(path);
+  AuthorizedKeys keys = read_authorized_keys(path);
+  change(keys);
+  turn.replace(text_of(keys));
+}
+
+std::string utc_now() {
+  return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
+}
+
+}  // namespace oblique::protocol

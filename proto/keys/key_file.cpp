@@ -1,0 +1,91 @@
+#include "proto/keys/key_file.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cerrno>
+#include <cstring>
+
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "proto/keys/toml_fields.h"
+#include "proto/keys/written_file.h"
+#include "worker/solver/model/errors.h"
+
+namespace oblique::protocol {
+namespace {
+
+constexpr std::array<std::string_view, 4> kServersFields{"role", "name", "public", "secret"};
+constexpr std::array<std::string_view, 5> kPeersFields{"role", "name", "public", "secret",
+                                                       "server"};
+
+/// Who can read a secret key is who it names.
+void check_mode(const std::string& path) {
+  struct stat file {};
+  if (::stat(path.c_str(), &file) != 0) {
+    throw solver::InputError(
+        fmt::format("the key file {} cannot be read: {}", path, std::strerror(errno)));
+  }
+  const bool is_ours = file.st_uid == ::geteuid();
+  const mode_t refused = is_ours ? S_IRWXG | S_IRWXO : S_IRWXO;
+  if (S_ISREG(file.st_mode) && (file.st_mode & refused) != 0) {
+    throw solver::InputError(
+        fmt::format("the key file {} has mode {:04o}: others than its owner can use the secret "
+                    "key in it, so it is not used. Mend it with: chmod {} '{}'",
+                    path, file.st_mode & 07777U, is_ours ? "600" : "o=", path));
+  }
+}
+
+}  // namespace
+
+KeyFile read_key_file(const std::string& path) {
+  check_mode(path);
+  const TomlFile file(path, "the key file");
+  const TomlFields fields(path, file.top());
+  KeyFile key;
+  key.role = fields.role("role");
+  const bool is_server = key.role == Role::kServer;
+  fields.refuse_unknown(is_server ? std::span<const std::string_view>(kServersFields)
+                                  : std::span<const std::string_view>(kPeersFields),
+                        is_server ? "the server's key file" : "a key file");
+  key.name = fields.key_name("name");
+  key.pair = {fields.key("public"), fields.key("secret")};
+  if (public_half_of(key.pair.secret_key) != key.pair.public_key) {
+    fields.fail("secret", "`secret` is not the other half of `public`");
+  }
+  if (!is_server) {
+    key.server = fields.key("server");
+  }
+  return key;
+}
+
+void write_key_file(const std::string& path, const KeyFile& key) {
+  std::string text = fmt::format(
+      "# A key of oblique: whoever can read this file can pass for its owner.\n"
+      "role = \"{}\"\nname = \"{}\"\npublic = \"{}\"\nsecret = \"{}\"\n",
+      name_of(key.role), key.name, z85(key.pair.public_key), z85(key.pair.secret_key));
+  if (key.server) {
+    text += fmt::format("server = \"{}\"  # public key\n", z85(*key.server));
+  }
+  write_new_file(path, text);
+}
+
+std::string objection_to_key_name(std::string_view name) {
+  constexpr std::size_t kLongest = 64;
+  const auto is_plain = [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) != 0 && static_cast<unsigned char>(c) < 0x80;
+  };
+  const auto is_allowed = [&](char c) {
+    return is_plain(c) || std::string_view("._-@").find(c) != std::string_view::npos;
+  };
+  return !name.empty() && name.size() <= kLongest && is_plain(name.front()) &&
+                 std::all_of(name.begin(), name.end(), is_allowed)
+             ? ""
+             : "the name of a key has 1 to 64 letters, digits or . _ - @, and begins with a letter "
+               "or digit";
+}
+
+}  // namespace oblique::protocol

@@ -1,0 +1,95 @@
+#include "proto/keys/toml_fields.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "proto/keys/key_file.h"
+#include "proto/suggestion.h"
+#include "worker/solver/model/errors.h"
+
+namespace oblique::protocol {
+
+TomlFile::TomlFile(const std::string& path, std::string_view what) {
+  constexpr std::size_t kMostBytes = std::size_t{1} << 20U;
+  std::ifstream file(path, std::ios::binary);
+  std::string text(kMostBytes + 1, '\0');
+  if (file) {
+    file.read(text.data(), static_cast<std::streamsize>(text.size()));
+    text.resize(static_cast<std::size_t>(file.gcount()));
+  }
+  if (!file.is_open() || file.bad()) {
+    throw solver::InputError(fmt::format("{} {} cannot be read: {}", what, path,
+                                         std::strerror(errno == 0 ? EIO : errno)));
+  }
+  if (text.size() > kMostBytes) {
+    throw solver::InputError(fmt::format("{} {} has more than {} bytes", what, path, kMostBytes));
+  }
+  try {
+    top_ = toml::parse(text, path);
+  } catch (const toml::parse_error& error) {
+    throw solver::InputError(
+        fmt::format("{}:{}: {}", path, error.source().begin.line, error.description()));
+  }
+}
+
+void TomlFields::fail(std::string_view field, const std::string& message) const {
+  const toml::node* node = table_.get(field);
+  const auto line = (node != nullptr ? node->source() : table_.source()).begin.line;
+  throw solver::InputError(
+      fmt::format("{}:{}: {}", path_, std::max<toml::source_index>(line, 1), message));
+}
+
+std::string TomlFields::text(std::string_view field) const {
+  const toml::node* node = table_.get(field);
+  if (node == nullptr) {
+    fail(field, fmt::format("`{}` is missing", field));
+  }
+  if (!node->is_string()) {
+    fail(field, fmt::format("`{}` must be a text in quotes", field));
+  }
+  return *node->value<std::string>();
+}
+
+Role TomlFields::role(std::string_view field) const {
+  const auto role = role_named(text(field));
+  if (!role) {
+    fail(field,
+         fmt::format("`{}` must be \"server\", \"client\", \"worker\" or \"reader\"", field));
+  }
+  return *role;
+}
+
+CurveKey TomlFields::key(std::string_view field) const {
+  const auto key = key_of_z85(text(field));
+  if (!key) {
+    fail(field,
+         fmt::format("`{}` is no key: one has {} characters, as `oblique keygen` writes them",
+                     field, kKeyCharacters));
+  }
+  return *key;
+}
+
+std::string TomlFields::key_name(std::string_view field) const {
+  std::string name = text(field);
+  if (const std::string objection = objection_to_key_name(name); !objection.empty()) {
+    fail(field, fmt::format("`{}`: {}", field, objection));
+  }
+  return name;
+}
+
+void TomlFields::refuse_unknown(std::span<const std::string_view> known,
+                                std::string_view what) const {
+  for (const auto& [field, value] : table_) {
+    if (std::find(known.begin(), known.end(), field.str()) == known.end()) {
+      fail(field.str(), fmt::format("unknown key `{}`{}: {} has {}", field.str(),
+                                    did_you_mean(field.str(), known), what, joined(known)));
+    }
+  }
+}
+
+}  // namespace oblique::protocol

@@ -1,0 +1,158 @@
+#include "proto/keys/key_file.h"
+
+#include <sys/stat.h>
+
+#include <fstream>
+#include <functional>
+#include <stdexcept>
+
+#include <zmq.hpp>
+
+#include "tests/support/temporary_folder.h"
+#include "worker/solver/model/errors.h"
+
+namespace oblique::protocol {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+std::string message_of(const std::function<void()>& work) {
+  try {
+    work();
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return "nothing was thrown";
+}
+
+KeyFile worker_key() {
+  return {Role::kWorker, "worker", made_key_pair(), made_key_pair().public_key};
+}
+
+mode_t mode_of(const std::string& path) {
+  struct stat file {};
+  EXPECT_EQ(stat(path.c_str(), &file), 0);
+  return file.st_mode & 07777U;
+}
+
+class KeyFileTest : public ::testing::Test {
+ protected:
+  std::string written(const std::string& text, mode_t mode = 0600) const {
+    const std::string path = folder_.file("some.key");
+    std::ofstream(path) << text;
+    chmod(path.c_str(), mode);
+    return path;
+  }
+  std::string text_of(const KeyFile& key) const {
+    return "role = \"worker\"\nname = \"w\"\npublic = \"" + z85(key.pair.public_key) +
+           "\"\nsecret = \"" + z85(key.pair.secret_key) + "\"\nserver = \"" + z85(*key.server) +
+           "\"\n";
+  }
+  std::string error_of(const std::string& text) const {
+    const std::string path = written(text);
+    return message_of([&] { read_key_file(path); });
+  }
+  test::TemporaryFolder folder_;
+};
+
+TEST(CurveKeyTest, AreWrittenAsLibzmqWritesThem) {
+  const KeyPair pair = made_key_pair();
+  char text[kKeyCharacters + 1];
+  ASSERT_NE(zmq_z85_encode(text, pair.secret_key.data(), pair.secret_key.size()), nullptr);
+  EXPECT_EQ(z85(pair.secret_key), text);
+  EXPECT_EQ(key_of_z85(text), pair.secret_key);
+  char public_half[kKeyCharacters + 1];
+  ASSERT_EQ(zmq_curve_public(public_half, text), 0);
+  EXPECT_EQ(z85(pair.public_key), public_half);
+  EXPECT_EQ(public_half_of(pair.secret_key), pair.public_key);
+}
+
+TEST(CurveKeyTest, AreNotReadFromTextThatIsNone) {
+  const std::string good = z85(made_key_pair().public_key);
+  EXPECT_FALSE(key_of_z85(""));
+  EXPECT_FALSE(key_of_z85(good.substr(1)));
+  EXPECT_FALSE(key_of_z85(good + "00000"));
+  EXPECT_FALSE(key_of_z85(std::string(40, '"')));
+  EXPECT_FALSE(key_of_z85(std::string(40, '#'))) << "more than 32 bits in five digits";
+}
+
+TEST_F(KeyFileTest, IsReadAsItWasWrittenAndIsForItsOwnerAlone) {
+  const KeyFile key = worker_key();
+  write_key_file(folder_.file("worker.key"), key);
+  const KeyFile read = read_key_file(folder_.file("worker.key"));
+  EXPECT_EQ(read.role, Role::kWorker);
+  EXPECT_EQ(read.name, "worker");
+  EXPECT_EQ(read.pair.public_key, key.pair.public_key);
+  EXPECT_EQ(read.pair.secret_key, key.pair.secret_key);
+  EXPECT_EQ(read.server, key.server);
+  EXPECT_EQ(mode_of(folder_.file("worker.key")), 0600U);
+}
+
+TEST_F(KeyFileTest, OfAServerHasNoServer) {
+  const KeyFile key{Role::kServer, "server", made_key_pair(), std::nullopt};
+  write_key_file(folder_.file("server.key"), key);
+  EXPECT_EQ(read_key_file(folder_.file("server.key")).server, std::nullopt);
+}
+
+TEST_F(KeyFileTest, IsNeverOverwritten) {
+  const std::string path = written("precious");
+  EXPECT_THAT(message_of([&] { write_key_file(path, worker_key()); }),
+              AllOf(HasSubstr(path), HasSubstr("never overwritten")));
+  std::string kept;
+  std::ifstream(path) >> kept;
+  EXPECT_EQ(kept, "precious");
+}
+
+TEST_F(KeyFileTest, IsNotWrittenThroughALinkThatLeadsNowhere) {
+  ASSERT_EQ(symlink(folder_.file("elsewhere").c_str(), folder_.file("link.key").c_str()), 0);
+  EXPECT_THROW(write_key_file(folder_.file("link.key"), worker_key()), std::runtime_error);
+  EXPECT_FALSE(std::filesystem::exists(folder_.file("elsewhere")));
+}
+
+TEST_F(KeyFileTest, IsRefusedWhenOthersMayReadItWithTheCommandThatMendsIt) {
+  for (const mode_t mode : {0640U, 0604U, 0666U}) {
+    const std::string path = written(text_of(worker_key()), mode);
+    EXPECT_THAT(message_of([&] { read_key_file(path); }),
+                AllOf(HasSubstr(path), HasSubstr("chmod 600 '" + path + "'")));
+  }
+  EXPECT_THAT(message_of([&] { read_key_file(folder_.file("some.key")); }), HasSubstr("0666"));
+  chmod(folder_.file("some.key").c_str(), 0400);
+  EXPECT_NO_THROW(read_key_file(folder_.file("some.key")));
+}
+
+TEST_F(KeyFileTest, NamesFileLineAndKeyOfWhatIsWrong) {
+  const std::string good = text_of(worker_key());
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string text = good;
+    return text.replace(text.find(from), from.size(), to);
+  };
+  EXPECT_THAT(error_of(with("\"worker\"", "\"boss\"")),
+              AllOf(HasSubstr("some.key:1: "), HasSubstr("`role`"), HasSubstr("\"reader\"")));
+  EXPECT_THAT(error_of(with("\"w\"", "\"../w\"")),
+              AllOf(HasSubstr("some.key:2: "), HasSubstr("`name`")));
+  EXPECT_THAT(error_of(with("public", "pubic")),
+              AllOf(HasSubstr("some.key:3: "), HasSubstr("did you mean `public`")));
+  EXPECT_THAT(error_of(with("server = ", "#")),
+              AllOf(HasSubstr("some.key:1: "), HasSubstr("`server` is missing")));
+  EXPECT_THAT(error_of(with("server = ", "server = 3 #")),
+              AllOf(HasSubstr("some.key:5: "), HasSubstr("`server` must be a text")));
+  EXPECT_THAT(error_of(good + "="), HasSubstr("some.key:6: "));
+  EXPECT_THAT(error_of(""), HasSubstr("`role` is missing"));
+  EXPECT_THAT(message_of([&] { read_key_file(folder_.file("none.key")); }),
+              AllOf(HasSubstr("none.key"), HasSubstr("No such file")));
+  EXPECT_THAT(message_of([&] { read_key_file(folder_.path().string()); }),
+              HasSubstr("cannot be read"));
+}
+
+TEST_F(KeyFileTest, WithHalvesOfTwoPairsIsRefusedWithoutShowingASecret) {
+  KeyFile key = worker_key();
+  key.pair.secret_key = made_key_pair().secret_key;
+  EXPECT_THAT(error_of(text_of(key)),
+              AllOf(HasSubstr("some.key:4: "), HasSubstr("not the other half"),
+                    Not(HasSubstr(z85(key.pair.secret_key)))));
+}
+
+}  // namespace
+}  // namespace oblique::protocol
