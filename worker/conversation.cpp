@@ -293,10 +293,13 @@ void Conversation::on(const protocol::ServerStopping&) {
 Effects Conversation::stop(std::int64_t now_ms) {
   now_ms_ = now_ms;
   if (stopping_) {
-    finish(0, "stopped at once");
+    if (now_ms_ >= stop_repeats_until_ms_) {
+      finish(0, "stopped at once");
+    }
     return take_effects();
   }
   stopping_ = true;
+  stop_repeats_until_ms_ = now_ms_ + settings_.stop_repeats_ms;
   stop_deadline_ms_ = now_ms_ + settings_.stop_timeout_ms;
   effects_.emplace_back(DropAll{});
   held_.clear();

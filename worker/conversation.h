@@ -25,6 +25,9 @@ struct ConversationSettings {
   std::int64_t shortest_backoff_ms = 50;  ///< between failures, doubling
   std::int64_t longest_backoff_ms = 2000;
   std::int64_t stop_timeout_ms = 2000;  ///< for the last results to be acknowledged
+  /// A request to stop that follows so soon is part of the one before: Slurm sends SIGTERM twice
+  /// within milliseconds to jobs that it preempts.
+  std::int64_t stop_repeats_ms = 1000;
 };
 
 /// The worker's side of the conversation with the server (proto/protocol.md): decides what follows
@@ -43,7 +46,8 @@ class Conversation {
   Effects on_send_failed(std::int64_t now_ms);
   /// To be called at `next_deadline_ms` or a little later.
   Effects on_time(std::int64_t now_ms);
-  /// Deliver what is solved, say goodbye and finish. A second call finishes at once.
+  /// Deliver what is solved, say goodbye and finish. A second call after `stop_repeats_ms` finishes
+  /// at once.
   Effects stop(std::int64_t now_ms);
 
   std::int64_t next_deadline_ms() const;
@@ -98,6 +102,7 @@ class Conversation {
   std::int64_t backoff_ms_ = 0;  ///< 0: the last attempt came to something
   bool stopping_ = false;
   std::int64_t stop_deadline_ms_ = 0;
+  std::int64_t stop_repeats_until_ms_ = 0;
   bool server_stopping_ = false;
   std::string database_id_;
 

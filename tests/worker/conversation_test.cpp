@@ -292,12 +292,26 @@ TEST_F(ConversationTest, AStoppedWorkerWaitsTwoSecondsForItsResultsAndThenLeaves
   EXPECT_NE(finish()->reason.find("5 results"), std::string::npos);
 }
 
-TEST_F(ConversationTest, AWorkerThatIsStoppedTwiceLeavesAtOnce) {
+TEST_F(ConversationTest, AWorkerThatIsStoppedOnceMoreASecondLaterLeavesAtOnce) {
   join();
   receive(batch_message(7, 31));
   solve(1, 0, 5, false);
   take(conversation_->stop(now_ms_));
+  pass(1000);
   take(conversation_->stop(now_ms_));
+  EXPECT_TRUE(finish());
+}
+
+TEST_F(ConversationTest, SignalsToStopThatFollowEachOtherCloselyAreOneAndTheResultsAreDelivered) {
+  join();
+  receive(batch_message(7, 31));
+  solve(1, 0, 5, false);
+  take(conversation_->stop(now_ms_));
+  pass(999);
+  take(conversation_->stop(now_ms_));
+  EXPECT_FALSE(finish());
+  receive(stored_message(1));
+  EXPECT_EQ(sent(WorkerMessage::kGoodbye).size(), 1U);
   EXPECT_TRUE(finish());
 }
 
