@@ -9,9 +9,7 @@
 #include <cstdlib>
 #include <exception>
 #include <filesystem>
-#include <fstream>
 #include <functional>
-#include <iterator>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -26,6 +24,7 @@
 
 #include "proto/frames.h"
 #include "proto/result_message.h"
+#include "tests/bench/process_usage.h"
 #include "tests/support/database.h"
 #include "tests/support/programs.h"
 #include "worker/session.h"
@@ -47,34 +46,6 @@ std::vector<std::string> study_of(std::uint64_t points) {
   const std::string count = text.str();
   return {"--H", "0.1:1.15" + count, "--mu",   "0.05:0.95" + count,
           "--e", "0.2:1.0" + count,  "--name", "bench"};
-}
-
-struct Usage {
-  double cpu_s;
-  double peak_MB;
-};
-
-/// What a living process has used so far.
-Usage usage_of(pid_t pid) {
-  const std::string folder = "/proc/" + std::to_string(pid);
-  std::ifstream stat(folder + "/stat");
-  std::string text((std::istreambuf_iterator<char>(stat)), std::istreambuf_iterator<char>());
-  std::istringstream fields(text.substr(text.rfind(')') + 1));
-  std::string skipped;
-  for (int i = 0; i < 11; ++i) {
-    fields >> skipped;
-  }
-  double user_ticks = 0.0;
-  double system_ticks = 0.0;
-  fields >> user_ticks >> system_ticks;
-  Usage usage{(user_ticks + system_ticks) / static_cast<double>(sysconf(_SC_CLK_TCK)), 0.0};
-  std::ifstream status(folder + "/status");
-  for (std::string line; std::getline(status, line);) {
-    if (line.starts_with("VmHWM:")) {
-      usage.peak_MB = std::stod(line.substr(6)) / 1024.0;
-    }
-  }
-  return usage;
 }
 
 double megabytes(const std::string& file) {

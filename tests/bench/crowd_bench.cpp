@@ -1,0 +1,171 @@
+#include <sys/resource.h>
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <functional>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "tests/bench/crowd.h"
+#include "tests/bench/process_usage.h"
+#include "tests/bench/status_probe.h"
+#include "tests/support/database.h"
+#include "tests/support/programs.h"
+
+/// Many workers that answer at once against one real server on loopback: results a second, what
+/// they cost the server, and how soon a client is answered meanwhile. README.md says how to run it.
+namespace oblique::bench {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+struct Flags {
+  std::vector<std::size_t> workers{1, 10, 100, 1000};
+  double seconds = 10.0;
+  std::vector<double> point_ms{0.0};
+  std::uint64_t most_results = 2'000'000;
+};
+
+void take_all_descriptors() {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_NOFILE, &limit) == 0) {
+    limit.rlim_cur = limit.rlim_max;
+    static_cast<void>(setrlimit(RLIMIT_NOFILE, &limit));
+  }
+}
+
+void wait_for(const std::string& what, const std::function<bool()>& condition) {
+  constexpr std::chrono::seconds kLongest{60};
+  const auto until = Clock::now() + kLongest;
+  while (!condition()) {
+    if (Clock::now() > until) {
+      throw std::runtime_error("waited in vain for " + what);
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+}
+
+double seconds_since(Clock::time_point instant) {
+  return std::chrono::duration<double>(Clock::now() - instant).count();
+}
+
+/// A study that no crowd comes to the end of.
+void submit(const test::TemporaryFolder& folder, const test::Server& server) {
+  const test::Outcome ran = test::run_oblique(
+      folder, {"submit", "--server", server.client_url(), "--H", "0.1:1.15:1000", "--mu",
+               "0.05:0.95:1000", "--e", "0.2:1.0:1000", "--name", "crowd"});
+  if (ran.exit_code != 0) {
+    throw std::runtime_error(ran.err);
+  }
+}
+
+/// One row: a fresh server and database, the crowd, then the study, all measured from its first
+/// result on.
+void bench(const Flags& flags, std::size_t workers, double point_ms) {
+  const test::TemporaryFolder folder;
+  const test::Database database(folder.file("bench.db"));
+  test::Server server(folder, folder.file("bench.db"));
+  const pid_t pid = server.process().pid();
+  const Usage at_rest = usage_of(pid);
+  CrowdCounts before;
+  CrowdCounts after;
+  Usage began;
+  Usage ended;
+  double crowd_cpu_s = 0.0;
+  double wall_s = 0.0;
+  double rows = 0.0;
+  StatusProbe::Seen seen;
+  {
+    const Crowd crowd({server.worker_url(), workers, point_ms / 1e3});
+    wait_for("welcomes", [&] { return crowd.counts().welcomed >= workers; });
+    submit(folder, server);
+    wait_for("results", [&] { return database.rows() > 0.0; });
+    const double rows_before = database.rows();
+    before = crowd.counts();
+    began = usage_of(pid);
+    crowd_cpu_s = -usage_of(getpid()).cpu_s;
+    const auto start = Clock::now();
+    StatusProbe probe(server.client_url(), "crowd", std::chrono::milliseconds(100));
+    while (seconds_since(start) < flags.seconds &&
+           crowd.counts().results - before.results < flags.most_results) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    wall_s = seconds_since(start);
+    ended = usage_of(pid);
+    crowd_cpu_s += usage_of(getpid()).cpu_s;
+    after = crowd.counts();
+    rows = database.rows() - rows_before;
+    seen = probe.stop();
+  }
+  // Workers that vanished are forgotten after some seconds.
+  std::this_thread::sleep_for(std::chrono::seconds(4));
+  const Usage left = usage_of(pid);
+  const double server_cpu_s = ended.cpu_s - began.cpu_s;
+  const double loop_cpu_s = ended.first_thread_cpu_s - began.first_thread_cpu_s;
+  const auto batches = static_cast<double>(after.batches - before.batches);
+  std::printf(
+      "| %zu | %.4g | %.0f | %.0f | %.0f | %.0f %% | %.0f %% | %.0f %% | %.1f | %.1f | %.1f | %.1f "
+      "| %zu "
+      "| "
+      "%.0f | %.0f | %.0f | %llu |\n",
+      workers, point_ms, rows / wall_s, batches / wall_s,
+      static_cast<double>(after.messages - before.messages) / wall_s, 100.0 * loop_cpu_s / wall_s,
+      100.0 * (server_cpu_s - loop_cpu_s) / wall_s, 100.0 * crowd_cpu_s / wall_s,
+      1e6 * server_cpu_s / rows, seen.quantile_ms(0.5), seen.quantile_ms(0.99),
+      seen.quantile_ms(1.0), seen.latencies_ms.size() + seen.unanswered, at_rest.resident_MB,
+      left.peak_MB, left.resident_MB, static_cast<unsigned long long>(after.connects - workers));
+  std::fflush(stdout);
+  if (after.connects > workers) {
+    std::fprintf(stderr, "the crowd itself was late by %.1f s; the server's log:\n%s",
+                 after.longest_gap_s, server.process().err().c_str());
+  }
+}
+
+void run(const Flags& flags) {
+  take_all_descriptors();
+  std::printf(
+      "| workers | point [ms] | results/s | batches/s | their messages/s | CPU: loop | writer | "
+      "crowd | us a "
+      "result | status p50 [ms] | p99 | max | asked | server MB: at rest | peak | after | "
+      "reconnects |\n"
+      "|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n");
+  for (const std::size_t workers : flags.workers) {
+    for (const double point_ms : flags.point_ms) {
+      bench(flags, workers, point_ms);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace oblique::bench
+
+int main(int argc, char** argv) {
+  oblique::bench::Flags flags;
+  CLI::App app{"Many workers that answer at once against one server.", "oblique-crowd-bench"};
+  app.add_option("--workers", flags.workers, "Numbers of workers, a row each")
+      ->delimiter(',')
+      ->capture_default_str();
+  app.add_option("--seconds", flags.seconds, "Length of a row [s]")->capture_default_str();
+  app.add_option("--results", flags.most_results, "A row ends earlier with so many")
+      ->capture_default_str();
+  app.add_option("--point-ms", flags.point_ms,
+                 "What a point takes a worker, a row each; 0: nothing")
+      ->delimiter(',')
+      ->capture_default_str();
+  CLI11_PARSE(app, argc, argv);
+  try {
+    oblique::bench::run(flags);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "oblique-crowd-bench: %s\n", error.what());
+    return EXIT_FAILURE;
+  }
+  return EXIT_SUCCESS;
+}
