@@ -170,8 +170,8 @@ std::filesystem::path sibling_program(const std::string& name) {
   if (access(program.c_str(), X_OK) != 0) {
     throw ProcessError(
         fmt::format("cannot find {}: the programs oblique, oblique-server and oblique-worker must "
-                    "lie in one folder",
-                    program.string()));
+                    "lie in one folder; of Debian's packages, {} has this one",
+                    program.string(), name));
   }
   return program;
 }

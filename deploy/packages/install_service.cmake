@@ -1,0 +1,40 @@
+# Installs what `part` (server or worker) needs to run as a service: units, account, configuration.
+# Included by cmake --install and by cpack, which set CMAKE_INSTALL_PREFIX and DESTDIR. They also see, in
+# the environment, OBLIQUE_PREFIX: where the files will lie in the end, if that is elsewhere.
+set(prefix "${CMAKE_INSTALL_PREFIX}")
+if(DEFINED ENV{OBLIQUE_PREFIX})
+  set(prefix "$ENV{OBLIQUE_PREFIX}")
+endif()
+cmake_path(ABSOLUTE_PATH bin_folder BASE_DIRECTORY "${prefix}" OUTPUT_VARIABLE OBLIQUE_BIN)
+# What lies in /usr is configured in /etc; anything else beside the programs.
+set(configuration "${CMAKE_INSTALL_PREFIX}/etc/oblique")
+set(OBLIQUE_ETC "${prefix}/etc/oblique")
+if(CMAKE_INSTALL_PREFIX STREQUAL "/usr")
+  set(configuration /etc/oblique)
+  set(OBLIQUE_ETC /etc/oblique)
+endif()
+
+set(systemd "${CMAKE_CURRENT_LIST_DIR}/../systemd")
+# install_filled_in(TEMPLATE FOLDER NAME): with the folders of above, and INSTANCE.
+function(install_filled_in template folder name)
+  configure_file("${template}" "${scratch_folder}/${name}" @ONLY NEWLINE_STYLE LF)
+  file(INSTALL DESTINATION "${folder}" TYPE FILE FILES "${scratch_folder}/${name}")
+endfunction()
+
+set(units "${CMAKE_INSTALL_PREFIX}/lib/systemd/system")
+set(INSTANCE ${part})
+set(OF_INSTANCE "")
+install_filled_in("${systemd}/oblique-${part}.service.in" "${units}" oblique-${part}.service)
+if(part STREQUAL worker)
+  set(INSTANCE %i)
+  set(OF_INSTANCE " for %i")
+  install_filled_in("${systemd}/oblique-worker.service.in" "${units}" oblique-worker@.service)
+else()
+  install_filled_in("${systemd}/oblique-server.sysusers" "${CMAKE_INSTALL_PREFIX}/lib/sysusers.d"
+                    oblique-server.conf)
+endif()
+
+# What somebody has changed stays.
+if(NOT EXISTS "$ENV{DESTDIR}${configuration}/${part}.toml")
+  install_filled_in("${systemd}/${part}.toml" "${configuration}" ${part}.toml)
+endif()
