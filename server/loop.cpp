@@ -114,7 +114,7 @@ class Loop::Parts final : public Outbox {
       network_.collect(now().steady_ms);
       take_reports();
       has_more = take_worker_messages();
-      has_more = take_client_messages() || has_more;
+      has_more = take_client_messages() || has_more || network_.has_more();
       note_departures();
       if (Clock::now() >= next_tick) {
         service_->tick(now());
@@ -210,10 +210,20 @@ class Loop::Parts final : public Outbox {
   void note_departures() {
     for (const Departure& departure : network_.take_departures()) {
       service_->client_left(departure.identity);
-      if (!departure.reason.empty() && std::has_single_bit(++ended_connections_)) {
+      if (departure.refused) {
+        note_refusal(departure, *departure.refused);
+      } else if (!departure.reason.empty() && std::has_single_bit(++ended_connections_)) {
         spdlog::warn("a connection was ended: {} ({} ended so far)", departure.reason,
                      ended_connections_);
       }
+    }
+  }
+
+  void note_refusal(const Departure& departure, RefusalCause cause) {
+    std::uint64_t& so_far = refused_.at(static_cast<std::size_t>(cause));
+    if (std::has_single_bit(++so_far)) {
+      spdlog::warn("{} was refused: {} ({} refused so far: {})", departure.address,
+                   departure.reason, so_far, name_of(cause));
     }
   }
 
@@ -269,6 +279,7 @@ class Loop::Parts final : public Outbox {
   Network::Port workers_;
   Network::Port clients_;
   std::uint64_t ended_connections_ = 0;
+  std::array<std::uint64_t, kRefusalCauses> refused_{};  ///< by cause
   bool is_ending_ = false;
   std::vector<std::string> last_answered_;  ///< clients that were sent something at the end
   std::optional<Service> service_;

@@ -16,6 +16,8 @@ namespace oblique::server {
 namespace {
 
 constexpr std::size_t kReadBytes = 128 * 1024;
+/// Of a peer whose handshake is not done.
+constexpr std::size_t kReadOfStranger_bytes = 4 * 1024;
 
 void set(int socket, int level, int option, int value) {
   // A peer that is gone already may make this fail; reading tells.
@@ -28,7 +30,8 @@ bool would_block() {
 
 }  // namespace
 
-Connection::Connection(protocol::Descriptor socket) : socket_(std::move(socket)) {
+Connection::Connection(protocol::Descriptor socket, const PortGuard* guard)
+    : socket_(std::move(socket)), zmtp_(guard) {
   constexpr protocol::KeepAlive kKeepAlive;
   const int fd = socket_.number();
   set(fd, IPPROTO_TCP, TCP_NODELAY, 1);
@@ -41,7 +44,8 @@ Connection::Connection(protocol::Descriptor socket) : socket_(std::move(socket))
 
 Connection::Read Connection::read() {
   std::array<char, kReadBytes> bytes;
-  const ssize_t count = ::recv(socket_.number(), bytes.data(), bytes.size(), 0);
+  const std::size_t most = zmtp_.is_open() ? bytes.size() : kReadOfStranger_bytes;
+  const ssize_t count = ::recv(socket_.number(), bytes.data(), most, 0);
   if (count < 0 && would_block()) {
     return Read::kNothingYet;
   }
@@ -61,8 +65,22 @@ void Connection::send_answers() {
   }
 }
 
+ZmtpMessage Connection::take_message() {
+  ZmtpMessage message = zmtp_.take_message();
+  send_answers();
+  return message;
+}
+
+void Connection::do_work() {
+  zmtp_.do_work();
+  send_answers();
+}
+
 void Connection::send(std::string_view body) {
-  const std::string header = zmtp_header(body.size());
+  const std::string header = zmtp_.header_or_sealed(body);
+  if (zmtp_.seals()) {
+    body = {};
+  }
   std::size_t taken = 0;
   if (waiting_out_bytes() == 0) {
     // The system copies; sendmsg only reads what it is given.

@@ -14,8 +14,8 @@ namespace oblique::server {
 /// here waits.
 class Connection {
  public:
-  /// Takes over a non-blocking TCP socket.
-  explicit Connection(protocol::Descriptor socket);
+  /// Takes over a non-blocking TCP socket. The guard is as for `Zmtp`.
+  Connection(protocol::Descriptor socket, const PortGuard* guard);
 
   /// Sends the server's greeting.
   void greet() { send_answers(); }
@@ -30,12 +30,10 @@ class Connection {
   /// not.
   bool can_send() const { return can_send_; }
 
-  bool has_message() const { return zmtp_.has_message(); }
-  ZmtpMessage take_message() { return zmtp_.take_message(); }
-  /// The handshake is done.
-  bool is_open() const { return zmtp_.is_open(); }
-  /// Why it must be ended; empty: it need not.
-  const std::string& fault() const { return zmtp_.fault(); }
+  /// What the peer said: messages, work that waits, who it is, faults.
+  const Zmtp& said() const { return zmtp_; }
+  ZmtpMessage take_message();
+  void do_work();
   int descriptor() const { return socket_.number(); }
   /// Memory for what has come and was not taken.
   std::size_t held_in_bytes() const { return zmtp_.held_bytes(); }

@@ -20,6 +20,15 @@ constexpr std::size_t kOtherDescriptors = 128;
 constexpr std::size_t kFewestConnections = 16;
 constexpr std::int64_t kLookInterval_ms = 500;
 constexpr const char* kLeavesTooMuchUnread = "it leaves too much unread";
+constexpr const char* kNoRoom = "there are too many connections, and all of them are at work";
+
+bool has_something_to_take(const Zmtp& said) {
+  return said.has_message() || said.waiting_work() == Zmtp::Work::kSealedFrame;
+}
+
+bool is_waiting(const Zmtp& said) {
+  return said.has_message() || said.waiting_work() != Zmtp::Work::kNone;
+}
 
 /// Most connections for which the system gives descriptors.
 std::size_t most_descriptors() {
@@ -43,21 +52,28 @@ Network::Network(NetworkLimits limits)
 
 Network::~Network() = default;
 
-Network::Port Network::listen(const std::string& address, const std::string& port) {
-  const Port number = listeners_.size();
-  auto listener = std::make_unique<Listener>(address, port);
+Network::Port Network::listen(const std::string& address, const std::string& port,
+                              const std::optional<PortGuard>& guard) {
+  const Port number = ports_.size();
+  OpenPort opened{std::make_unique<Listener>(address, port), nullptr, nullptr, {}};
+  if (guard) {
+    opened.doorkeeper = guard->doorkeeper;
+    opened.guard = std::make_unique<PortGuard>(*guard);
+    opened.guard->doorkeeper =
+        std::make_shared<BoundedDoorkeeper>(guard->doorkeeper, shares_, limits_.connections_of_key);
+  }
   epoll_event event{EPOLLIN, {.u64 = number}};
-  if (epoll_ctl(epoll_.number(), EPOLL_CTL_ADD, listener->descriptor(), &event) != 0) {
+  if (epoll_ctl(epoll_.number(), EPOLL_CTL_ADD, opened.listener->descriptor(), &event) != 0) {
     throw std::system_error(errno, std::generic_category(), "epoll_ctl");
   }
-  listeners_.push_back(std::move(listener));
-  lines_.emplace_back();
+  ports_.push_back(std::move(opened));
   return number;
 }
 
 // ---- What comes -------------------------------------------------------------------------------
 
 void Network::collect(std::int64_t now_ms) {
+  has_unopened_ = false;
   std::array<epoll_event, 256> events;
   const int count = epoll_wait(epoll_.number(), events.data(), static_cast<int>(events.size()), 0);
   for (int i = 0; i < count; ++i) {
@@ -68,6 +84,7 @@ void Network::collect(std::int64_t now_ms) {
       serve(event.data.u64, event.events, now_ms);
     }
   }
+  shake_hands();
   end_the_largest();
   if (now_ms >= next_look_ms_) {
     next_look_ms_ = now_ms + kLookInterval_ms;
@@ -78,39 +95,48 @@ void Network::collect(std::int64_t now_ms) {
 void Network::accept_all(Port port, std::int64_t now_ms) {
   constexpr int kMostAtATime = 64;
   for (int i = 0; i < kMostAtATime; ++i) {
-    protocol::Descriptor socket = listeners_[port]->accept();
-    if (!socket.is_open()) {
+    Listener::Accepted accepted = ports_[port].listener->accept();
+    if (!accepted.socket.is_open()) {
       if (errno == EMFILE || errno == ENFILE) {
         make_room(now_ms);
       }
       return;
     }
-    if (peers_.size() >= limits_.connections && !make_room(now_ms)) {
-      continue;
+    if (handshakes_under_way_ >= limits_.handshakes) {
+      end_oldest_handshake();
     }
-    const Number number = ++last_number_;
-    auto peer = std::make_unique<Peer>(std::move(socket));
-    peer->port = port;
-    peer->since_ms = peer->last_heard_ms = now_ms;
-    Peer& accepted = *peers_.emplace(number, std::move(peer)).first->second;
-    watch(number, accepted, EPOLL_CTL_ADD);
-    accepted.connection.greet();
-    settle(number, accepted);
+    if (peers_.size() < limits_.connections || make_room(now_ms)) {
+      accept(port, std::move(accepted), now_ms);
+    } else {
+      count_refusal(RefusalCause::kBound, accepted.address.text(), kNoRoom);
+    }
   }
 }
 
-/// Ends the connection that has said nothing for longest, strangers first; false when all are at
-/// work.
+void Network::accept(Port port, Listener::Accepted accepted, std::int64_t now_ms) {
+  const Number number = ++last_number_;
+  auto peer = std::make_unique<Peer>(std::move(accepted), ports_[port].guard.get());
+  peer->port = port;
+  peer->since_ms = peer->last_heard_ms = now_ms;
+  Peer& stored = *peers_.emplace(number, std::move(peer)).first->second;
+  strangers_.push_back(number);
+  ++handshakes_under_way_;
+  watch(number, stored, EPOLL_CTL_ADD);
+  stored.connection.greet();
+  settle(number, stored);
+}
+
+/// Ends the oldest of those who have not said who they are, else the connection that has said
+/// nothing for longest; false when all are at work.
 bool Network::make_room(std::int64_t now_ms) {
-  const auto quiet = [](const Peer& peer) {
-    return std::pair(peer.connection.is_open(), peer.last_heard_ms);
-  };
+  if (end_oldest_handshake()) {
+    return true;
+  }
   const auto quietest =
-      std::min_element(peers_.begin(), peers_.end(), [&](const auto& left, const auto& right) {
-        return quiet(*left.second) < quiet(*right.second);
+      std::min_element(peers_.begin(), peers_.end(), [](const auto& left, const auto& right) {
+        return left.second->last_heard_ms < right.second->last_heard_ms;
       });
-  if (quietest == peers_.end() || (quietest->second->connection.is_open() &&
-                                   now_ms - quietest->second->last_heard_ms < limits_.active_ms)) {
+  if (quietest == peers_.end() || now_ms - quietest->second->last_heard_ms < limits_.active_ms) {
     return false;
   }
   end(quietest->first, "it was silent for longest, and there are too many connections");
@@ -128,20 +154,24 @@ void Network::serve(Number number, std::uint32_t events, std::int64_t now_ms) {
     connection.flush();
   }
   const bool has_ended = (events & (EPOLLHUP | EPOLLERR)) != 0;
-  if (connection.has_message()) {
+  if (has_something_to_take(connection.said())) {
     if (has_ended) {
       peer.is_ending = true;
       epoll_ctl(epoll_.number(), EPOLL_CTL_DEL, connection.descriptor(), nullptr);
     }
   } else if (has_ended || (events & EPOLLIN) != 0) {
     peer.last_heard_ms = now_ms;
-    if (connection.read() == Connection::Read::kEnd) {
-      end(number, "");
+    const bool shakes_hands = connection.said().waiting_work() == Zmtp::Work::kHandshake;
+    if (shakes_hands || connection.read() == Connection::Read::kEnd) {
+      end_who_has_left(number, peer);
       return;
     }
-    if (!connection.fault().empty()) {
-      end(number, connection.fault());
+    if (!connection.said().fault().empty()) {
+      end_faulty(number, peer);
       return;
+    }
+    if (peer.is_stranger && connection.said().is_open()) {
+      let_in(peer);
     }
   }
   settle(number, peer);
@@ -150,29 +180,78 @@ void Network::serve(Number number, std::uint32_t events, std::int64_t now_ms) {
   }
 }
 
+/// A few of the steps that wait: each costs as much as hundreds of messages of those who are in.
+void Network::shake_hands() {
+  constexpr std::size_t kStepsATurn = 16;
+  for (std::size_t steps = 0; steps < kStepsATurn && !handshakes_.empty();) {
+    const Number number = handshakes_.front();
+    handshakes_.pop_front();
+    const auto found = peers_.find(number);
+    if (found == peers_.end()) {
+      continue;
+    }
+    ++steps;
+    Peer& peer = *found->second;
+    peer.stands_in_line = false;
+    peer.connection.do_work();
+    if (!peer.connection.said().fault().empty()) {
+      end_faulty(number, peer);
+      continue;
+    }
+    if (peer.connection.said().is_open()) {
+      let_in(peer);
+    }
+    settle(number, peer);
+  }
+}
+
+void Network::let_in(Peer& peer) {
+  peer.is_stranger = false;
+  --handshakes_under_way_;
+  peer.holder = peer.connection.said().holder();
+  if (peer.holder) {
+    peer.share = &shares_.join(peer.connection.said().key(), peer.holder);
+    peer.share->held_in_bytes += peer.held_in_bytes;
+    peer.share->waiting_out_bytes += peer.waiting_out_bytes;
+  }
+}
+
+/// What it holds, in the sums.
+void Network::count(Peer& peer, std::size_t held_in_bytes, std::size_t waiting_out_bytes) {
+  held_in_bytes_ += held_in_bytes - peer.held_in_bytes;
+  waiting_out_bytes_ += waiting_out_bytes - peer.waiting_out_bytes;
+  if (peer.share != nullptr) {
+    peer.share->held_in_bytes += held_in_bytes - peer.held_in_bytes;
+    peer.share->waiting_out_bytes += waiting_out_bytes - peer.waiting_out_bytes;
+    a_key_has_too_much_ = a_key_has_too_much_ ||
+                          peer.share->held_in_bytes > limits_.held_in_bytes_of_key ||
+                          peer.share->waiting_out_bytes > limits_.waiting_out_bytes_of_key;
+  }
+  peer.held_in_bytes = held_in_bytes;
+  peer.waiting_out_bytes = waiting_out_bytes;
+}
+
 /// After anything happened to a peer: its sums, its place in the line, what is awaited of it.
 void Network::settle(Number number, Peer& peer) {
   Connection& connection = peer.connection;
-  held_in_bytes_ += connection.held_in_bytes() - peer.held_in_bytes;
-  waiting_out_bytes_ += connection.waiting_out_bytes() - peer.waiting_out_bytes;
-  peer.held_in_bytes = connection.held_in_bytes();
-  peer.waiting_out_bytes = connection.waiting_out_bytes();
-  if (connection.has_message() && !peer.stands_in_line) {
+  const Zmtp& said = connection.said();
+  count(peer, connection.held_in_bytes(), connection.waiting_out_bytes());
+  if (!peer.stands_in_line && is_waiting(said)) {
     peer.stands_in_line = true;
-    lines_[peer.port].push_back(number);
+    (has_something_to_take(said) ? ports_[peer.port].line : handshakes_).push_back(number);
   }
   if (!connection.can_send()) {
-    depart(number, peer, "");
+    depart(number, peer, "", std::nullopt);
   }
   if (!peer.is_ending) {
     watch(number, peer, EPOLL_CTL_MOD);
   }
 }
 
-/// A peer with a message that was not taken is read no further.
+/// A peer whose turn has not come yet is read no further.
 void Network::watch(Number number, Peer& peer, int operation) {
   const Connection& connection = peer.connection;
-  const std::uint32_t events = (connection.has_message() ? 0U : EPOLLIN) |
+  const std::uint32_t events = (is_waiting(connection.said()) ? 0U : EPOLLIN) |
                                (connection.waiting_out_bytes() > 0 ? EPOLLOUT : 0U);
   if (operation == EPOLL_CTL_MOD && events == peer.watched_events) {
     return;
@@ -183,8 +262,12 @@ void Network::watch(Number number, Peer& peer, int operation) {
 }
 
 std::optional<Incoming> Network::next(Port port, const MayTake& may_take) {
-  std::deque<Number>& line = lines_[port];
-  for (std::size_t left = line.size(); left > 0; --left) {
+  // Of sealed frames that turn out to be no messages.
+  constexpr std::size_t kMostOpened = 64;
+  std::deque<Number>& line = ports_[port].line;
+  std::size_t declined = 0;
+  std::size_t opened = 0;
+  while (declined < line.size() && opened < kMostOpened) {
     const Number number = line.front();
     line.pop_front();
     const auto found = peers_.find(number);
@@ -195,19 +278,29 @@ std::optional<Incoming> Network::next(Port port, const MayTake& may_take) {
     std::string identity = std::to_string(number);
     if (!may_take(identity)) {
       line.push_back(number);
+      ++declined;
       continue;
     }
-    Incoming incoming{std::move(identity), peer.connection.take_message()};
+    peer.connection.do_work();
+    std::optional<Incoming> incoming;
+    if (peer.connection.said().has_message()) {
+      incoming = {std::move(identity), peer.connection.take_message(), peer.holder};
+    } else {
+      ++opened;
+    }
     peer.stands_in_line = false;
     if (peer.is_ending) {
       read_to_the_end(number, peer);
-    } else if (!peer.connection.has_message() && !peer.connection.fault().empty()) {
-      end(number, peer.connection.fault());
+    } else if (!is_waiting(peer.connection.said()) && !peer.connection.said().fault().empty()) {
+      end_faulty(number, peer);
     } else {
       settle(number, peer);
     }
-    return incoming;
+    if (incoming) {
+      return incoming;
+    }
   }
+  has_unopened_ = has_unopened_ || (opened > 0 && !line.empty());
   return std::nullopt;
 }
 
@@ -263,66 +356,6 @@ void Network::flush(std::chrono::milliseconds longest) {
     }
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - Clock::now());
     poll(waiting.data(), waiting.size(), static_cast<int>(std::max<std::int64_t>(left.count(), 0)));
-  }
-}
-
-// ---- Ends -------------------------------------------------------------------------------------
-
-/// The system has nothing more of this peer than what can be read at once.
-void Network::read_to_the_end(Number number, Peer& peer) {
-  while (!peer.connection.has_message()) {
-    if (!peer.connection.fault().empty() || peer.connection.read() != Connection::Read::kBytes) {
-      end(number, peer.connection.fault());
-      return;
-    }
-  }
-  settle(number, peer);
-}
-
-void Network::depart(Number number, Peer& peer, const std::string& reason) {
-  if (!std::exchange(peer.has_departed, true)) {
-    departures_.push_back({std::to_string(number), reason});
-  }
-}
-
-void Network::end(Number number, const std::string& reason) {
-  const auto found = peers_.find(number);
-  depart(number, *found->second, reason);
-  held_in_bytes_ -= found->second->held_in_bytes;
-  waiting_out_bytes_ -= found->second->waiting_out_bytes;
-  peers_.erase(found);
-}
-
-std::vector<Departure> Network::take_departures() {
-  return std::exchange(departures_, {});
-}
-
-void Network::end_the_largest() {
-  const auto end_largest = [&](std::size_t Peer::*bytes, const char* reason) {
-    const auto largest =
-        std::max_element(peers_.begin(), peers_.end(), [&](const auto& left, const auto& right) {
-          return (*left.second).*bytes < (*right.second).*bytes;
-        });
-    end(largest->first, reason);
-  };
-  while (held_in_bytes_ > limits_.held_in_bytes) {
-    end_largest(&Peer::held_in_bytes, "all connections together hold too much, and it holds most");
-  }
-  while (waiting_out_bytes_ > limits_.all_waiting_out_bytes) {
-    end_largest(&Peer::waiting_out_bytes,
-                "all connections together leave too much unread, and it leaves most");
-  }
-}
-
-void Network::end_unfinished_handshakes(std::int64_t now_ms) {
-  std::vector<Number> late;
-  for (const auto& [number, peer] : peers_) {
-    if (!peer->connection.is_open() && now_ms - peer->since_ms > limits_.handshake_ms) {
-      late.push_back(number);
-    }
-  }
-  for (const Number number : late) {
-    end(number, "it does not finish its handshake");
   }
 }
 

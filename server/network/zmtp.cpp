@@ -1,75 +1,21 @@
 #include "server/network/zmtp.h"
 
 #include <algorithm>
-#include <array>
 #include <utility>
 
 #include "proto/frames.h"
+#include "server/network/curve/bytes.h"
 
 namespace oblique::server {
 namespace {
 
-constexpr std::size_t kGreetingBytes = 64;
-constexpr std::size_t kMechanismAt = 12;
-constexpr std::size_t kMechanismBytes = 20;
-constexpr unsigned char kVersionMajor = 3;
-constexpr unsigned char kVersionMinor = 1;
-/// A sound peer's READY has some 50 bytes, and 255 more with an identity.
+/// A sound peer's READY has some 50 bytes, its INITIATE some 300, and 255 more with an identity.
 constexpr std::uint64_t kLongestCommand = 4096;
 constexpr std::size_t kLongestPingContext = 16;
 constexpr std::size_t kPingTimeToLiveBytes = 2;
 
-// Bits of a frame's first byte.
-constexpr unsigned kMore = 1;
-constexpr unsigned kLong = 2;
-constexpr unsigned kCommand = 4;
-
 unsigned char byte_at(std::string_view bytes, std::size_t index) {
   return static_cast<unsigned char>(bytes[index]);
-}
-
-std::string padded_mechanism() {
-  std::string name = "NULL";
-  name.resize(kMechanismBytes, '\0');
-  return name;
-}
-
-std::string greeting() {
-  std::string bytes(kGreetingBytes, '\0');
-  bytes[0] = '\xff';
-  bytes[9] = '\x7f';
-  bytes[10] = static_cast<char>(kVersionMajor);
-  bytes[11] = static_cast<char>(kVersionMinor);
-  return bytes.replace(kMechanismAt, kMechanismBytes, padded_mechanism());
-}
-
-std::uint64_t big_endian(std::string_view bytes) {
-  std::uint64_t value = 0;
-  for (const char byte : bytes) {
-    value = value << 8U | static_cast<unsigned char>(byte);
-  }
-  return value;
-}
-
-/// A command of at most 255 bytes.
-std::string command(std::string_view name, std::string_view data) {
-  std::string bytes;
-  bytes += static_cast<char>(kCommand);
-  bytes += static_cast<char>(1 + name.size() + data.size());
-  bytes += static_cast<char>(name.size());
-  bytes += name;
-  return bytes += data;
-}
-
-std::string ready() {
-  constexpr std::string_view kName = "Socket-Type";
-  constexpr std::string_view kValue = "ROUTER";
-  std::string property;
-  property += static_cast<char>(kName.size());
-  property += kName;
-  property += std::string("\0\0\0", 3);
-  property += static_cast<char>(kValue.size());
-  return command("READY", property += kValue);
 }
 
 }  // namespace
@@ -81,22 +27,9 @@ struct Zmtp::Header {
   bool is_command;
 };
 
-std::string zmtp_header(std::size_t body_bytes) {
-  constexpr std::size_t kLongestShort = 255;
-  std::string header;
-  if (body_bytes <= kLongestShort) {
-    header += '\0';
-    return header += static_cast<char>(body_bytes);
-  }
-  header += static_cast<char>(kLong);
-  for (unsigned shift = 64; shift > 0;) {
-    shift -= 8;
-    header += static_cast<char>(body_bytes >> shift & 0xffU);
-  }
-  return header;
-}
-
-Zmtp::Zmtp() : answers_(greeting()) {}
+Zmtp::Zmtp(const PortGuard* guard)
+    : curve_(guard == nullptr ? nullptr : std::make_unique<CurvePeer>(*guard)),
+      answers_(greeting_of(guard == nullptr ? "NULL" : "CURVE")) {}
 
 void Zmtp::receive(std::string_view bytes) {
   buffer_ += bytes;
@@ -114,10 +47,32 @@ std::string Zmtp::take_answers() {
   return std::exchange(answers_, {});
 }
 
+std::string Zmtp::header_or_sealed(std::string_view body) {
+  if (!curve_) {
+    return zmtp_header(body.size());
+  }
+  std::string frame = zmtp_header(CurveTraffic::kAddedBytes + body.size());
+  frame.reserve(frame.size() + CurveTraffic::kAddedBytes + body.size());
+  curve_->traffic().seal(body, false, frame);
+  return frame;
+}
+
+std::shared_ptr<const KeyHolder> Zmtp::holder() const {
+  return curve_ ? curve_->holder() : nullptr;
+}
+
+void Zmtp::fail(RefusalCause cause, std::string reason) {
+  fault_ = {cause, std::move(reason)};
+  if (curve_ && state_ == State::kHandshake) {
+    const std::string_view code = error_code(cause);
+    answers_ += command_of("ERROR", std::string(1, static_cast<char>(code.size())).append(code));
+  }
+}
+
 void Zmtp::advance() {
   constexpr std::size_t kCompactFrom = 64 * 1024;
   constexpr std::size_t kKeptCapacity = 4 * 1024;
-  while (fault_.empty() && !message_ &&
+  while (fault_.reason.empty() && !message_ && work_ == Work::kNone &&
          (state_ == State::kGreeting ? take_greeting() : discard() && take_frame())) {
   }
   if (begin_ == buffer_.size()) {
@@ -139,20 +94,23 @@ bool Zmtp::take_greeting() {
   };
   if (differs(0, [](unsigned byte) { return byte == 0xffU; }) ||
       differs(9, [](unsigned byte) { return byte == 0x7fU; }) ||
-      differs(10, [](unsigned byte) { return byte >= kVersionMajor; })) {
-    fault_ = "it does not speak ZMTP 3";
+      differs(10, [](unsigned byte) { return byte >= kOldestVersion; })) {
+    fail(RefusalCause::kFaulty, "it does not speak ZMTP 3");
     return false;
   }
   if (bytes.size() < kGreetingBytes) {
     return false;
   }
-  if (bytes.substr(kMechanismAt, kMechanismBytes) != padded_mechanism()) {
-    fault_ = "it asks for another security mechanism than NULL";
+  if (bytes.substr(kMechanismAt, kMechanismBytes) != padded_mechanism(curve_ ? "CURVE" : "NULL")) {
+    fail(RefusalCause::kOtherMechanism, curve_ ? "it has no key, and one is needed here"
+                                               : "it asks for keys, and the server has none");
     return false;
   }
   begin_ += kGreetingBytes;
   state_ = State::kHandshake;
-  answers_ += ready();
+  if (!curve_) {
+    answers_ += command_of("READY", own_properties());
+  }
   return true;
 }
 
@@ -165,12 +123,19 @@ bool Zmtp::discard() {
   if (discard_bytes_ > 0) {
     return false;
   }
-  if (in_multipart_ && !more_follow_) {
+  if (!curve_ && in_multipart_ && !more_follow_) {
     in_multipart_ = false;
     message_ = ZmtpMessage{{}, false};
     return false;
   }
   return true;
+}
+
+std::uint64_t Zmtp::longest(const Header& header) const {
+  if (curve_ && state_ == State::kOpen) {
+    return protocol::kMaxFrameBytes + CurveTraffic::kAddedBytes;
+  }
+  return header.is_command ? kLongestCommand : protocol::kMaxFrameBytes;
 }
 
 std::optional<Zmtp::Header> Zmtp::next_header() {
@@ -181,19 +146,22 @@ std::optional<Zmtp::Header> Zmtp::next_header() {
     return std::nullopt;
   }
   const unsigned flags = byte_at(bytes, 0);
-  const bool is_long = (flags & kLong) != 0;
-  Header header{is_long ? kLongBytes : kShortBytes, 0, (flags & kMore) != 0,
-                (flags & kCommand) != 0};
-  if (flags > (kMore | kLong | kCommand) || (header.more && header.is_command)) {
-    fault_ = "it sends a frame of no known kind";
+  const bool is_long = (flags & kFrameLong) != 0;
+  Header header{is_long ? kLongBytes : kShortBytes, 0, (flags & kFrameMore) != 0,
+                (flags & kFrameCommand) != 0};
+  // What is sealed says inside whether more follows.
+  if (flags > (kFrameMore | kFrameLong | kFrameCommand) ||
+      (header.more && (header.is_command || curve_))) {
+    fail(RefusalCause::kFaulty, "it sends a frame of no known kind");
     return std::nullopt;
   }
   if (bytes.size() < header.bytes) {
     return std::nullopt;
   }
-  header.body_bytes = big_endian(bytes.substr(1, header.bytes - 1));
-  if (header.body_bytes > (header.is_command ? kLongestCommand : protocol::kMaxFrameBytes)) {
-    fault_ = "it sends a frame of " + std::to_string(header.body_bytes) + " bytes";
+  header.body_bytes = number_of(bytes.substr(1, header.bytes - 1));
+  if (header.body_bytes > longest(header)) {
+    fail(RefusalCause::kFaulty,
+         "it sends a frame of " + std::to_string(header.body_bytes) + " bytes");
     return std::nullopt;
   }
   return header;
@@ -205,10 +173,10 @@ bool Zmtp::take_frame() {
     return false;
   }
   if (!header->is_command && state_ == State::kHandshake) {
-    fault_ = "it sends a message before READY";
+    fail(RefusalCause::kFaulty, "it sends a message before the handshake is done");
     return false;
   }
-  if (!header->is_command && (header->more || in_multipart_)) {
+  if (!header->is_command && !curve_ && (header->more || in_multipart_)) {
     begin_ += header->bytes;
     discard_bytes_ = header->body_bytes;
     more_follow_ = header->more;
@@ -216,6 +184,10 @@ bool Zmtp::take_frame() {
     return true;
   }
   if (pending().size() - header->bytes < header->body_bytes) {
+    return false;
+  }
+  if (curve_) {
+    work_ = state_ == State::kHandshake ? Work::kHandshake : Work::kSealedFrame;
     return false;
   }
   const std::string_view body =
@@ -229,61 +201,109 @@ bool Zmtp::take_frame() {
   return true;
 }
 
+void Zmtp::do_work() {
+  if (work_ == Work::kNone) {
+    return;
+  }
+  const Header header = *next_header();
+  const std::string_view body =
+      pending().substr(header.bytes, static_cast<std::size_t>(header.body_bytes));
+  if (work_ == Work::kHandshake) {
+    take_command(body);
+  } else {
+    take_sealed(body);
+  }
+  begin_ += header.bytes + body.size();
+  work_ = Work::kNone;
+  advance();
+}
+
 void Zmtp::take_command(std::string_view body) {
   const std::size_t name_bytes = body.empty() ? 0 : byte_at(body, 0);
   if (name_bytes == 0 || body.size() < 1 + name_bytes) {
-    fault_ = "it sends a command without a name";
+    fail(RefusalCause::kFaulty, "it sends a command without a name");
     return;
   }
   const std::string_view name = body.substr(1, name_bytes);
   const std::string_view data = body.substr(1 + name_bytes);
   if (state_ == State::kHandshake) {
-    if (name == "READY") {
-      take_ready(data);
-    } else {
-      fault_ = "it does not say READY";
-    }
+    take_handshake(name, data);
   } else if (name == "PING") {
     answer_ping(data);
   }  // others are for other kinds of sockets
 }
 
-void Zmtp::take_ready(std::string_view properties) {
-  constexpr std::size_t kLengthBytes = 4;
-  std::string socket_type;
-  while (!properties.empty()) {
-    const std::size_t name_bytes = byte_at(properties, 0);
-    if (properties.size() < 1 + name_bytes + kLengthBytes) {
-      fault_ = "its READY is cut off";
-      return;
-    }
-    const std::string_view name = properties.substr(1, name_bytes);
-    const std::uint64_t value_bytes = big_endian(properties.substr(1 + name_bytes, kLengthBytes));
-    properties.remove_prefix(1 + name_bytes + kLengthBytes);
-    if (properties.size() < value_bytes) {
-      fault_ = "its READY is cut off";
-      return;
-    }
-    if (name == "Socket-Type") {
-      socket_type = properties.substr(0, static_cast<std::size_t>(value_bytes));
-    }
-    properties.remove_prefix(static_cast<std::size_t>(value_bytes));
+void Zmtp::take_handshake(std::string_view name, std::string_view data) {
+  if (curve_) {
+    take_curve_step(name, data);
+  } else if (name == "READY") {
+    take_properties(data);
+  } else {
+    fail(RefusalCause::kFaulty, "it does not say READY");
   }
-  constexpr std::array<std::string_view, 3> kAllowed{"DEALER", "REQ", "ROUTER"};
-  if (std::find(kAllowed.begin(), kAllowed.end(), socket_type) == kAllowed.end()) {
-    fault_ = "its socket is of a kind that does not speak with a ROUTER";
+}
+
+void Zmtp::take_curve_step(std::string_view name, std::string_view data) {
+  CurvePeer::Outcome outcome = curve_->take(name, data);
+  if (auto* const refusal = std::get_if<Refusal>(&outcome)) {
+    fail(refusal->cause, std::move(refusal->reason));
     return;
   }
-  state_ = State::kOpen;
+  const std::string& said = std::get<std::string>(outcome);
+  if (!curve_->is_admitted()) {
+    answers_ += command_of("WELCOME", said);
+    return;
+  }
+  take_properties(said);
+  if (is_open()) {
+    answers_ += command_of("READY", curve_->traffic().ready(own_properties()));
+  }
+}
+
+void Zmtp::take_properties(std::string_view properties) {
+  std::string objection = objection_to_properties(properties);
+  if (objection.empty()) {
+    state_ = State::kOpen;
+  } else {
+    fail(RefusalCause::kFaulty, std::move(objection));
+  }
+}
+
+void Zmtp::take_sealed(std::string_view message) {
+  std::optional<OpenedFrame> frame = curve_->traffic().open(message);
+  if (!frame) {
+    fail(RefusalCause::kFaulty, "it sends what is not sealed with its keys, or was said before");
+  } else if (frame->is_command && frame->body.size() > kLongestCommand) {
+    fail(RefusalCause::kFaulty,
+         "it sends a command of " + std::to_string(frame->body.size()) + " bytes");
+  } else if (frame->is_command) {
+    take_command(frame->body);
+  } else if (frame->more) {
+    in_multipart_ = true;
+  } else if (std::exchange(in_multipart_, false)) {
+    message_ = ZmtpMessage{{}, false};
+  } else {
+    message_ = ZmtpMessage{std::move(frame->body), true};
+  }
 }
 
 /// Earlier releases' sockets find out by PING whether the server lives.
 void Zmtp::answer_ping(std::string_view arguments) {
   if (arguments.size() < kPingTimeToLiveBytes) {
-    fault_ = "its PING is cut off";
+    fail(RefusalCause::kFaulty, "its PING is cut off");
     return;
   }
-  answers_ += command("PONG", arguments.substr(kPingTimeToLiveBytes, kLongestPingContext));
+  answer("PONG", arguments.substr(kPingTimeToLiveBytes, kLongestPingContext));
+}
+
+void Zmtp::answer(std::string_view name, std::string_view data) {
+  if (!curve_) {
+    answers_ += command_of(name, data);
+    return;
+  }
+  const std::string body = std::string(1, static_cast<char>(name.size())).append(name).append(data);
+  answers_ += zmtp_header(CurveTraffic::kAddedBytes + body.size());
+  curve_->traffic().seal(body, true, answers_);
 }
 
 }  // namespace oblique::server

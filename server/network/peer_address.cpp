@@ -1,0 +1,46 @@
+#include "server/network/peer_address.h"
+
+#include <array>
+#include <cstring>
+#include <memory>
+#include <stdexcept>
+#include <string_view>
+
+#include <netdb.h>
+#include <sys/socket.h>
+
+#include <spdlog/fmt/fmt.h>
+
+namespace oblique::server {
+
+PeerAddress::PeerAddress(const std::string& address, std::uint16_t port) {
+  const bool has_brackets = address.size() > 2 && address.front() == '[' && address.back() == ']';
+  const std::string bare = has_brackets ? address.substr(1, address.size() - 2) : address;
+  addrinfo wanted{};
+  wanted.ai_flags = AI_NUMERICHOST | AI_NUMERICSERV;
+  wanted.ai_family = has_brackets ? AF_INET6 : AF_UNSPEC;
+  wanted.ai_socktype = SOCK_STREAM;
+  addrinfo* found = nullptr;
+  if (getaddrinfo(bare.c_str(), std::to_string(port).c_str(), &wanted, &found) != 0) {
+    throw std::runtime_error(address + " is no numeric address");
+  }
+  const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> owned(found, &freeaddrinfo);
+  std::memcpy(&address_, found->ai_addr, found->ai_addrlen);
+}
+
+std::string PeerAddress::text() const {
+  constexpr std::string_view kMapped = "::ffff:";
+  std::array<char, NI_MAXHOST> host{};
+  std::array<char, NI_MAXSERV> port{};
+  getnameinfo(system(), bytes(), host.data(), host.size(), port.data(), port.size(),
+              NI_NUMERICHOST | NI_NUMERICSERV);
+  const std::string_view digits = host.data();
+  if (!is_v6()) {
+    return fmt::format("{}:{}", digits, port.data());
+  }
+  return IN6_IS_ADDR_V4MAPPED(&address_.sin6_addr) && digits.starts_with(kMapped)
+             ? fmt::format("{}:{}", digits.substr(kMapped.size()), port.data())
+             : fmt::format("[{}]:{}", digits, port.data());
+}
+
+}  // namespace oblique::server

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+
+#include <unistd.h>
+
+#include <gtest/gtest.h>
+
+#include "server/network/network.h"
+
+namespace oblique::server {
+
+/// Admits the keys that it was told of.
+class ListDoorkeeper final : public Doorkeeper {
+ public:
+  void admit(const protocol::CurveKey& key, const std::string& name,
+             protocol::Role role = protocol::Role::kWorker) {
+    holders_[key] = std::make_shared<const KeyHolder>(KeyHolder{name, role});
+  }
+  void revoke(const protocol::CurveKey& key) { holders_.erase(key); }
+
+  Verdict judge(const protocol::CurveKey& key) const override {
+    const auto holder = holders_.find(key);
+    if (holder == holders_.end()) {
+      return Refusal{RefusalCause::kUnknownKey, "its key is not authorized"};
+    }
+    return holder->second;
+  }
+
+ private:
+  std::map<protocol::CurveKey, std::shared_ptr<const KeyHolder>> holders_;
+};
+
+/// A network with one port that wants keys and one that takes everybody, turned by hand.
+class GuardedNetworkTest : public testing::Test {
+ protected:
+  explicit GuardedNetworkTest(NetworkLimits limits = {}) : network_(limits) {
+    guarded_ = network_.listen("127.0.0.1", "*", PortGuard(server_, doorkeeper_));
+    open_ = network_.listen("127.0.0.1", "*");
+    doorkeeper_->admit(worker_.public_key, "anna");
+  }
+
+  /// Turns until `done`; a network that never gets there fails the test.
+  template <typename Done>
+  void turn_until(const Done& done) {
+    bool is_done = done();
+    for (int i = 0; i < 20'000 && !is_done; ++i) {
+      network_.collect(now_ms_);
+      if (!network_.has_more()) {
+        usleep(1000);
+      }
+      is_done = done();
+    }
+    ASSERT_TRUE(is_done);
+  }
+  Incoming next() {
+    std::optional<Incoming> incoming;
+    turn_until([&] { return (incoming = network_.next(guarded_, anybody)).has_value(); });
+    return incoming ? std::move(*incoming) : Incoming{};
+  }
+  static bool anybody(const std::string&) { return true; }
+  std::uint64_t refused(RefusalCause cause) const {
+    return network_.refusals().at(static_cast<std::size_t>(cause)).count;
+  }
+
+  std::int64_t now_ms_ = 1000;
+  protocol::KeyPair server_ = protocol::made_key_pair();
+  protocol::KeyPair worker_ = protocol::made_key_pair();
+  std::shared_ptr<ListDoorkeeper> doorkeeper_ = std::make_shared<ListDoorkeeper>();
+  Network network_;
+  Network::Port guarded_ = 0;
+  Network::Port open_ = 0;
+};
+
+}  // namespace oblique::server
