@@ -5,18 +5,17 @@
 #include <bit>
 #include <chrono>
 #include <optional>
-#include <stdexcept>
 #include <utility>
 #include <variant>
 #include <vector>
 
-#include <arpa/inet.h>
 #include <poll.h>
 
 #include <spdlog/spdlog.h>
 
 #include "proto/frames.h"
 #include "server/database/shared_disk.h"
+#include "server/doors/doors.h"
 #include "server/network/network.h"
 #include "server/report_box.h"
 
@@ -53,41 +52,28 @@ const std::string& safe_path(const LoopSettings& settings) {
 
 }  // namespace
 
-std::string loopback_address(const std::string& address) {
-  if (address == "localhost") {
-    return "127.0.0.1";
-  }
-  in_addr v4{};
-  in6_addr v6{};
-  if (inet_pton(AF_INET, address.c_str(), &v4) == 1 && (ntohl(v4.s_addr) >> 24U) == 127) {
-    return address;
-  }
-  if (inet_pton(AF_INET6, address.c_str(), &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6)) {
-    return address;
-  }
-  throw std::runtime_error("--listen " + address +
-                           " is refused: without keys the server listens on loopback only, as "
-                           "127.0.0.1 or ::1");
-}
-
 class Loop::Parts final : public Outbox {
  public:
   explicit Parts(LoopSettings settings)
-      : address_(loopback_address(settings.listen)),
+      : doors_(settings.doors),
         store_(safe_path(settings)),
         writer_(store_, [this](std::vector<WriteReport> r) { written_.put(std::move(r)); }),
         queries_(settings.database, settings.queries,
                  [this](QueryReport r) { queried_.put(std::array{std::move(r)}); }),
         reader_([this](ReadReport r) { requests_read_.put(std::array{std::move(r)}); }),
         network_(settings.network),
-        workers_(network_.listen(address_, settings.worker_port)),
-        clients_(network_.listen(address_, settings.client_port)) {
+        workers_(network_.listen(doors_.address(), settings.worker_port)),
+        clients_(network_.listen(doors_.address(), settings.client_port)) {
     if (store_.is_new()) {
       spdlog::info("made the database {}: only its owner can read it (chmod lets others)",
                    settings.database);
     }
+    if (doors_.access() == Access::kKeys) {
+      throw std::runtime_error("--keys: the network does not check keys yet");
+    }
     ServiceSettings service = std::move(settings.service);
     service.database_id = store_.database_id();
+    service.clients.access = name_of(doors_.access());
     service.last_study_id = store_.last_study_id();
     service.last_worker_id = store_.last_worker_id();
     // Above every number that an earlier run can have given, whatever the clock says.
@@ -118,6 +104,7 @@ class Loop::Parts final : public Outbox {
       note_departures();
       if (Clock::now() >= next_tick) {
         service_->tick(now());
+        look_at_doors();
         next_tick = Clock::now() + kTick;
       }
       if (service_->storage_is_gone() && !farewell_until) {
@@ -227,6 +214,12 @@ class Loop::Parts final : public Outbox {
     }
   }
 
+  void look_at_doors() {
+    if (const auto warning = doors_.warning(now().steady_ms)) {
+      spdlog::warn("{}", *warning);
+    }
+  }
+
   LoopEnd finish() {
     spdlog::info("stopping");
     is_ending_ = true;
@@ -267,7 +260,7 @@ class Loop::Parts final : public Outbox {
     }
   }
 
-  std::string address_;
+  Doors doors_;
   Store store_;
   ReportBox written_;
   ReportBox queried_;

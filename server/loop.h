@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "server/doors/listening.h"
 #include "server/network/network.h"
 #include "server/service/service.h"
 
@@ -12,7 +13,7 @@ namespace oblique::server {
 struct LoopSettings {
   std::string database;              ///< file
   bool allow_network_disk = false;   ///< the file may lie on a network file system
-  std::string listen = "127.0.0.1";  ///< address of both sockets; loopback only
+  DoorSettings doors;                ///< of both ports
   std::string worker_port = "7601";  ///< "*": the system picks one
   std::string client_port = "7600";
   QueryPoolSettings queries;
@@ -31,8 +32,8 @@ struct LoopEnd {
 class Loop {
  public:
   /// Opens the database and binds both sockets. Throws StorageError, also for a file on a network
-  /// file system, and std::runtime_error for an
-  /// address that is not loopback or cannot be bound.
+  /// file system, solver::InputError for an address that may not be listened on, and
+  /// std::runtime_error for one that cannot.
   explicit Loop(LoopSettings settings);
   ~Loop();
   Loop(const Loop&) = delete;
@@ -50,9 +51,5 @@ class Loop {
   class Parts;
   std::unique_ptr<Parts> parts_;
 };
-
-/// Throws std::runtime_error, saying what is allowed, unless `address` is a loopback address or
-/// "localhost". Returns the address to bind.
-std::string loopback_address(const std::string& address);
 
 }  // namespace oblique::server

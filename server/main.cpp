@@ -108,7 +108,14 @@ int main(int argc, char** argv) {
   app.add_option("--db", settings.database, "Database file; made when it is not there");
   app.add_flag("--allow-network-disk", settings.allow_network_disk,
                "Take a database on a network file system, where a second machine could damage it");
-  app.add_option("--listen", settings.listen, "Loopback address to listen on");
+  app.add_option("--listen", settings.doors.listen,
+                 "Address to listen on, * for all; beyond loopback only with --keys or --insecure");
+  app.add_option(
+      "--keys", settings.doors.keys,
+      "Key file of the server, as `oblique keygen` makes it; the list of keys to let in, "
+      "authorized_keys.toml, lies beside it");
+  app.add_flag("--insecure", settings.doors.insecure,
+               "Let in whoever reaches the ports, unencrypted");
   app.add_option("--worker-port", worker_port, "Port for workers; 0: the system picks one");
   app.add_option("--client-port", client_port, "Port for clients; 0: the system picks one");
   app.add_option("--ready-fd", ready_fd,
@@ -125,7 +132,7 @@ int main(int argc, char** argv) {
       throw std::runtime_error("--worker-port and --client-port are both " +
                                std::to_string(worker_port) + ": they must differ");
     }
-    (void)oblique::server::loopback_address(settings.listen);
+    (void)oblique::server::address_to_bind(settings.doors);
   } catch (const std::runtime_error& error) {
     return oblique::protocol::tell_wrong_usage(app.get_name(), error.what());
   }

@@ -76,12 +76,15 @@ class ServerSource : public Source {
   protocol::QueryReply query(const std::string& sql) override { return connection_.query(sql); }
   std::vector<protocol::StudyStatus> status(const std::string& study, const Tell& tell) override {
     const auto reply = connection_.status(study, tell);
+    access_ = reply.access();
     return {reply.studies().begin(), reply.studies().end()};
   }
+  std::string access() const override { return access_; }
   std::string place() const override { return connection_.url(); }
 
  private:
   Connection connection_;
+  std::string access_;
 };
 
 }  // namespace

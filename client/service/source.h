@@ -27,6 +27,8 @@ class Source {
   /// `tell`, waits for a server that is away; see Connection.
   virtual std::vector<protocol::StudyStatus> status(const std::string& study, const Tell& tell) = 0;
   std::vector<protocol::StudyStatus> status(const std::string& study) { return status(study, {}); }
+  /// Who may come there, as StatusReply.access of the last status said; empty for a file.
+  virtual std::string access() const { return {}; }
   /// "oblique.db" or "tcp://127.0.0.1:7600", for messages.
   virtual std::string place() const = 0;
 };

@@ -97,6 +97,15 @@ int tell_end(const protocol::StudyStatus& status,
   return status.solved() == status.points() ? protocol::kDone : protocol::kFailed;
 }
 
+void tell_if_insecure(const std::string& access, const std::string& place) {
+  if (access == "insecure") {
+    tell_line(fmt::format(
+        "INSECURE: {} runs with --insecure: whoever reaches it can use it, and nothing is "
+        "encrypted.",
+        place));
+  }
+}
+
 protocol::QueryReply table_of(const std::vector<protocol::StudyStatus>& studies) {
   protocol::QueryReply table;
   for (const char* column : {"study", "state", "points", "solved", "failed", "leased",

@@ -30,6 +30,10 @@ protocol::StudyStatus study_named(Source& source, const std::string& name, const
 int tell_end(const protocol::StudyStatus& status,
              const std::function<protocol::QueryReply(const std::string&)>& query);
 
+/// Tells on standard error when anybody may come to the server at `place`, as StatusReply.access
+/// says.
+void tell_if_insecure(const std::string& access, const std::string& place);
+
 /// Columns and rows of studies for `status` and `studies`.
 protocol::QueryReply table_of(const std::vector<protocol::StudyStatus>& studies);
 

@@ -24,10 +24,22 @@ struct StatusFlags {
   SourceFlags source;
 };
 
+void add_column(protocol::QueryReply& table, const std::string& name, const std::string& value) {
+  table.add_columns(name);
+  for (auto& row : *table.mutable_rows()) {
+    add_value(row, value);
+  }
+}
+
 int status(const StatusFlags& flags) {
   const auto format = format_named(flags.format);
   const auto source = open_source(flags.source);
-  print_out(table_of(source->status(flags.study)), format);
+  auto table = table_of(source->status(flags.study));
+  tell_if_insecure(source->access(), source->place());
+  if (!is_for_people(format)) {
+    add_column(table, "access", source->access());
+  }
+  print_out(table, format);
   return kDone;
 }
 

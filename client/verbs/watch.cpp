@@ -1,6 +1,7 @@
 #include <iostream>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "client/service/source_flags.h"
 #include "client/service/watching.h"
@@ -29,7 +30,9 @@ int watch(const WatchFlags& flags) {
   const auto ask = [&](const Tell& tell) {
     // Where nobody ever answered, the address may be wrong.
     auto status = study_named(*source, flags.study, answered ? tell : Tell());
-    answered = true;
+    if (!std::exchange(answered, true)) {
+      tell_if_insecure(source->access(), source->place());
+    }
     return status;
   };
   try {

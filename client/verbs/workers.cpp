@@ -7,6 +7,7 @@
 #include "client/output/printer.h"
 #include "client/service/connection.h"
 #include "client/service/source_flags.h"
+#include "client/service/watching.h"
 #include "client/verbs/printed_rows.h"
 #include "client/verbs/verbs.h"
 
@@ -32,6 +33,7 @@ protocol::QueryReply workers_of_server(const ConnectionSettings& settings) {
     table.add_columns(column);
   }
   const auto reply = Connection(settings).workers();
+  tell_if_insecure(reply.access(), settings.server_url);
   for (const auto& worker : reply.workers()) {
     auto& row = *table.add_rows();
     add_value(row, static_cast<std::int64_t>(worker.worker_id()));

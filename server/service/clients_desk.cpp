@@ -137,6 +137,7 @@ void ClientsDesk::status(const Client& client, const protocol::StatusRequest& re
   reply.set_request_id(client.request_id);
   auto& fields = *reply.mutable_status();
   fields.set_workers(static_cast<std::uint32_t>(at_.sources.scheduler.workers()));
+  fields.set_access(settings_.access);
   if (!request.study().empty()) {
     const auto known = at_.sources.states.find_durable(request.study());
     if (!known) {
@@ -167,6 +168,7 @@ void ClientsDesk::workers(const Client& client, const protocol::WorkersRequest& 
   reply.set_request_id(client.request_id);
   auto& fields = *reply.mutable_workers();
   fields.set_bad_frames(at_.bad_frames.total());
+  fields.set_access(settings_.access);
   const std::size_t most = page_size(request.limit(), settings_.largest_page);
   for (auto id = at_.workers.next_after(request.after_worker_id()); id;
        id = at_.workers.next_after(*id)) {

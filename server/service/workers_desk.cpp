@@ -140,6 +140,11 @@ void WorkersDesk::hello(const std::string& identity, const protocol::WorkerHello
   workers_.emplace(id, worker);
   ids_[identity] = id;
   tell_of_version(id, now);
+  if (settings_.is_insecure) {
+    notice_to(id,
+              "the server runs with --insecure: whoever reaches it can use it, and what is sent "
+              "there is not encrypted");
+  }
   if (stopping_) {
     protocol::ServerToWorker stopping;
     stopping.mutable_stopping();
@@ -190,9 +195,7 @@ void WorkersDesk::tell_of_version(WorkerId worker, Instant now) {
       "version than its own go to other workers, unless they were submitted with --mix-versions",
       worker, record.solver_version, settings_.solver_version);
   note(Severity::kWarning, text, now);
-  protocol::ServerToWorker message;
-  message.mutable_notice()->set_text(text);
-  send(worker, message);
+  notice_to(worker, text);
 }
 
 void WorkersDesk::results(WorkerId worker, protocol::Results message, Heard& heard) {

@@ -22,6 +22,7 @@ struct WorkersDeskSettings {
   std::string solver_version;         ///< workers with another one are told so
   std::string database_id;
   std::uint64_t last_worker_id = 0;  ///< in the database
+  bool is_insecure = false;          ///< workers are told that anybody may come
 };
 
 /// A worker on its one connection, as it describes itself.
@@ -94,6 +95,7 @@ class WorkersDesk {
   void oversized(const std::string& identity, Heard& heard);
   void give_up(WorkerId worker, const std::string& why, Heard& heard);
   void tell_of_version(WorkerId worker, Instant now);
+  void notice_to(WorkerId worker, const std::string& text);
   void forget(WorkerId worker);
   /// `lease`: of the batch that the message is; 0: it is none.
   void send(WorkerId worker, const protocol::ServerToWorker& message, LeaseId lease = 0);

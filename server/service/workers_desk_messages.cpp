@@ -71,11 +71,15 @@ void WorkersDesk::define(const DefineStudy& define, const std::string& recipe_by
 }
 
 void WorkersDesk::notice(const std::string& text) {
+  for (const auto& [id, worker] : workers_) {
+    notice_to(id, text);
+  }
+}
+
+void WorkersDesk::notice_to(WorkerId worker, const std::string& text) {
   protocol::ServerToWorker message;
   message.mutable_notice()->set_text(text);
-  for (const auto& [id, worker] : workers_) {
-    send(id, message);
-  }
+  send(worker, message);
 }
 
 void WorkersDesk::stop() {

@@ -210,14 +210,32 @@ TEST_F(LoopTest, TheSecondServerOfADatabaseIsRefused) {
   EXPECT_THROW(RunningServer{path_}, StorageError);
 }
 
-TEST(LoopbackAddressTest, OnlyLoopbackIsAllowed) {
-  EXPECT_EQ(loopback_address("localhost"), "127.0.0.1");
-  EXPECT_EQ(loopback_address("127.3.2.1"), "127.3.2.1");
-  EXPECT_EQ(loopback_address("::1"), "::1");
-  for (const char* address :
-       {"0.0.0.0", "*", "192.168.0.1", "::", "128.0.0.1", "example.org", ""}) {
-    EXPECT_THROW(loopback_address(address), std::runtime_error) << address;
-  }
+TEST_F(LoopTest, AServerThatLetsAnybodyInSaysSoToClientsAndWorkers) {
+  RunningServer open(path_, {}, {}, {}, {.insecure = true});
+  PretendedClient client(open.client_endpoint());
+  ClientRequest status;
+  status.mutable_status();
+  EXPECT_EQ(client.ask(status).status().access(), "insecure");
+  ClientRequest workers;
+  workers.mutable_workers();
+  EXPECT_EQ(client.ask(workers).workers().access(), "insecure");
+  PretendedWorker worker(open.worker_endpoint());
+  worker.hello();
+  EXPECT_THAT(worker.receive().notice().text(), HasSubstr("--insecure"));
+}
+
+TEST_F(LoopTest, AServerOnLoopbackSaysThatItIs) {
+  RunningServer server(path_);
+  ClientRequest status;
+  status.mutable_status();
+  EXPECT_EQ(PretendedClient(server.client_endpoint()).ask(status).status().access(), "loopback");
+}
+
+TEST_F(LoopTest, AllAddressesAreListenedOnAtOnce) {
+  RunningServer open(path_, {}, {}, {}, {.listen = "*", .insecure = true});
+  const std::string endpoint = open.client_endpoint();
+  const std::string port = endpoint.substr(endpoint.rfind(':'));
+  EXPECT_TRUE(PretendedClient("tcp://127.0.0.1" + port).submit("a", 10).has_submit());
 }
 
 }  // namespace

@@ -30,8 +30,9 @@ using protocol::WorkerMessage;
 class RunningServer {
  public:
   explicit RunningServer(const std::string& database, TurnSettings turns = {},
-                         NetworkLimits network = {}, ClientsDeskSettings clients = {})
-      : loop_(settings(database, turns, network, clients)) {
+                         NetworkLimits network = {}, ClientsDeskSettings clients = {},
+                         const DoorSettings& doors = {})
+      : loop_(settings(database, turns, network, clients, doors)) {
     thread_ = std::thread([this] { end_ = loop_.run(stop_fd_); });
   }
   ~RunningServer() { stop(); }
@@ -52,8 +53,10 @@ class RunningServer {
 
  private:
   static LoopSettings settings(const std::string& database, TurnSettings turns,
-                               NetworkLimits network, const ClientsDeskSettings& clients) {
+                               NetworkLimits network, const ClientsDeskSettings& clients,
+                               const DoorSettings& doors) {
     LoopSettings settings;
+    settings.doors = doors;
     settings.service.clients = clients;
     settings.network = network;
     settings.queries.turns = turns;
