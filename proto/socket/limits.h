@@ -16,6 +16,10 @@ struct KeepAlive {
 /// Messages that a worker's or client's socket keeps in either direction.
 inline constexpr int kQueuedMessages = 1000;
 
+/// What keys add to each frame on its way (CURVE's MESSAGE): sockets must take frames so much
+/// longer than the longest.
+inline constexpr int kSealBytes = 33;
+
 /// Connections that wait until the server accepts them.
 inline constexpr int kWaitingConnections = 1024;
 

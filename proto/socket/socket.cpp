@@ -25,7 +25,7 @@ zmq::socket_t made_dealer(zmq::context_t& context, const DealerSettings& setting
   zmq::socket_t socket(context, zmq::socket_type::dealer);
   socket.set(zmq::sockopt::linger, settings.linger_ms);
   socket.set(zmq::sockopt::immediate, !settings.queues_unconnected);
-  socket.set(zmq::sockopt::maxmsgsize, static_cast<std::int64_t>(kMaxFrameBytes));
+  socket.set(zmq::sockopt::maxmsgsize, static_cast<std::int64_t>(kMaxFrameBytes) + kSealBytes);
   socket.set(zmq::sockopt::sndhwm, kQueuedMessages);
   socket.set(zmq::sockopt::rcvhwm, kQueuedMessages);
   socket.set(zmq::sockopt::reconnect_ivl, settings.shortest_pause_ms);

@@ -15,6 +15,8 @@
 namespace oblique::server {
 namespace {
 
+static_assert(CurveTraffic::kAddedBytes == protocol::kSealBytes);
+
 constexpr std::size_t kReadBytes = 128 * 1024;
 /// Of a peer whose handshake is not done.
 constexpr std::size_t kReadOfStranger_bytes = 4 * 1024;

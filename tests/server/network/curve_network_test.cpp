@@ -7,6 +7,7 @@
 #include <zmq.hpp>
 
 #include "proto/frames.h"
+#include "proto/socket/limits.h"
 #include "tests/server/network/guarded_network.h"
 
 namespace oblique::server {
@@ -25,6 +26,8 @@ class Dealer {
     monitor_.connect(where);
     monitor_.set(zmq::sockopt::linger, 0);
     socket_.set(zmq::sockopt::linger, 0);
+    socket_.set(zmq::sockopt::maxmsgsize,
+                static_cast<std::int64_t>(protocol::kMaxFrameBytes) + protocol::kSealBytes);
   }
   void use_keys(const protocol::KeyPair& own, const protocol::CurveKey& server) {
     socket_.set(zmq::sockopt::curve_publickey, zmq::buffer(own.public_key));
@@ -150,6 +153,128 @@ TEST_F(CurveNetworkTest, APeerWithAKeyIsRefusedWhereTheServerHasNoneAndSeesWhy) 
   EXPECT_EQ(failure_of(keyed), std::pair(ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL,
                                          ZMQ_PROTOCOL_ERROR_ZMTP_MECHANISM_MISMATCH));
   turn_until([&] { return refused(RefusalCause::kOtherMechanism) == 1; });
+}
+
+TEST_F(CurveNetworkTest, HeartbeatsOfASocketAreAnsweredUnderSeal) {
+  Dealer worker(context_);
+  worker.use_keys(worker_, server_.public_key);
+  worker.socket().set(zmq::sockopt::heartbeat_ivl, 5);
+  worker.socket().set(zmq::sockopt::heartbeat_timeout, 20'000);
+  worker.socket().connect(network_.endpoint(guarded_));
+  worker.send("first");
+  const Incoming first = next();
+  for (int i = 0; i < 100; ++i) {  // some twenty heartbeats
+    network_.collect(now_ms_);
+    EXPECT_EQ(network_.next(guarded_, anybody), std::nullopt);
+    usleep(1000);
+  }
+  worker.send("last");
+  EXPECT_EQ(next().identity, first.identity);
+  network_.send(first.identity, "reply");
+  EXPECT_EQ(reply_to(worker), "reply");
+}
+
+TEST_F(CurveNetworkTest, AMessageOfSeveralFramesIsKeptNoFurtherThanThatItCame) {
+  const auto worker = admitted();
+  worker->socket().send(zmq::str_buffer("part"), zmq::send_flags::sndmore);
+  worker->send("and another");
+  worker->send("whole");
+  EXPECT_FALSE(next().message.is_single);
+  EXPECT_EQ(next().message.body, "whole");
+}
+
+TEST_F(CurveNetworkTest, WhoseKeyIsRevokedIsEndedAtOnceWithAllThatItSent) {
+  const protocol::KeyPair other = protocol::made_key_pair();
+  doorkeeper_->admit(other.public_key, "berta");
+  const auto revoked = admitted();
+  const auto staying = dealer(other, server_.public_key);
+  revoked->send("first");
+  staying->send("first");
+  const Incoming from_one = next();
+  const Incoming from_other = next();
+  revoked->send("too late");
+  usleep(20'000);
+  network_.collect(now_ms_);
+  doorkeeper_->revoke(worker_.public_key);
+  network_.admission_changed();
+  EXPECT_EQ(network_.connections(), 1U);
+  EXPECT_EQ(network_.next(guarded_, anybody), std::nullopt);
+  EXPECT_EQ(refused(RefusalCause::kRevokedKey), 1U);
+  const auto departures = network_.take_departures();
+  ASSERT_EQ(departures.size(), 1U);
+  const bool one_is_revoked = from_one.holder->name == "anna";
+  EXPECT_EQ(departures[0].identity, (one_is_revoked ? from_one : from_other).identity);
+  EXPECT_EQ(failure_of(*revoked), std::pair(ZMQ_EVENT_HANDSHAKE_FAILED_AUTH, 400));  // and back
+  staying->send("still there");
+  EXPECT_EQ(next().message.body, "still there");
+}
+
+TEST_F(CurveNetworkTest, AKeyThatWasRenamedIsKnownByItsNewNameAtItsNextMessage) {
+  const auto worker = admitted();
+  worker->send("first");
+  EXPECT_EQ(next().holder->name, "anna");
+  doorkeeper_->admit(worker_.public_key, "anna2");
+  network_.admission_changed();
+  EXPECT_EQ(network_.connections(), 1U);
+  worker->send("second");
+  EXPECT_EQ(next().holder->name, "anna2");
+}
+
+class TightCurveNetworkTest : public CurveNetworkTest {
+ protected:
+  static constexpr NetworkLimits kLimits{.handshake_ms = 100,
+                                         .handshakes = 5,
+                                         .connections_of_key = 2,
+                                         .held_in_bytes_of_key = 1'000'000,
+                                         .waiting_out_bytes_of_key = 3'000'000};
+  TightCurveNetworkTest() : CurveNetworkTest(kLimits) {}
+};
+
+TEST_F(TightCurveNetworkTest, AKeyHasSoManyConnectionsAndOthersHaveTheirOwn) {
+  const protocol::KeyPair other = protocol::made_key_pair();
+  doorkeeper_->admit(other.public_key, "berta");
+  std::vector<std::unique_ptr<Dealer>> dealers;
+  for (int i = 0; i < 2; ++i) {
+    dealers.push_back(admitted());
+    dealers.back()->send("hello");
+    next();
+  }
+  const auto third = admitted();
+  EXPECT_EQ(failure_of(*third), std::pair(ZMQ_EVENT_HANDSHAKE_FAILED_AUTH, 300));
+  EXPECT_EQ(refused(RefusalCause::kBound), 1U);
+  EXPECT_THAT(network_.take_departures().at(0).reason,
+              testing::AllOf(HasSubstr("\"anna\""), HasSubstr("2 connections")));
+  const auto others = dealer(other, server_.public_key);
+  others->send("of another key");
+  EXPECT_EQ(next().message.body, "of another key");
+  dealers.pop_back();
+  turn_until([&] { return network_.connections() == 2; });
+  const auto again = admitted();
+  again->send("there is room again");
+  EXPECT_EQ(next().message.body, "there is room again");
+}
+
+TEST_F(TightCurveNetworkTest, TheConnectionsOfAKeyTogetherLeaveNoMoreUnreadThanItsShare) {
+  std::vector<std::unique_ptr<Dealer>> dealers;
+  std::vector<std::string> identities;
+  for (int i = 0; i < 2; ++i) {
+    dealers.push_back(std::make_unique<Dealer>(context_));
+    dealers.back()->use_keys(worker_, server_.public_key);
+    dealers.back()->socket().set(zmq::sockopt::rcvhwm, 1);
+    dealers.back()->socket().connect(network_.endpoint(guarded_));
+    dealers.back()->send("ask");
+    identities.push_back(next().identity);
+  }
+  const std::string reply(1'000'000, 'r');
+  std::vector<Departure> departures;
+  for (int i = 0; i < 1000 && departures.empty(); ++i) {
+    network_.send(identities[static_cast<std::size_t>(i) % 2], reply);
+    network_.collect(now_ms_);
+    departures = network_.take_departures();
+  }
+  ASSERT_FALSE(departures.empty());
+  EXPECT_THAT(departures[0].reason, HasSubstr("the key \"anna\" together leave too much unread"));
+  EXPECT_LE(network_.waiting_out_bytes(), kLimits.waiting_out_bytes_of_key);
 }
 
 }  // namespace

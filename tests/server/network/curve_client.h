@@ -1,0 +1,121 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+#include "server/network/curve/bytes.h"
+#include "server/network/curve/secret.h"
+#include "server/network/zmtp_words.h"
+#include "tests/server/network/raw_peer.h"
+
+namespace oblique::server {
+
+inline std::string text_of_key(const protocol::CurveKey& key) {
+  return {reinterpret_cast<const char*>(key.data()), key.size()};
+}
+
+inline std::string curve_greeting() {
+  std::string bytes = zmtp_greeting();
+  return bytes.replace(12, 5, "CURVE");
+}
+
+/// The client's end of CURVE by hand (rfc.zeromq.org 26), so that a test can say what no library
+/// says: change what it has, and what it says changes.
+struct CurveClient {
+  CurveClient(const protocol::KeyPair& own_keys, const protocol::CurveKey& servers_key)
+      : own(own_keys), server(servers_key) {}
+
+  protocol::KeyPair own;
+  protocol::CurveKey server;
+  protocol::KeyPair brief = protocol::made_key_pair();  // C', c'
+  std::uint64_t nonce = 1;                              // of the next command
+  std::string properties = zmtp_ready("DEALER").substr(8);
+
+  // From WELCOME on.
+  protocol::CurveKey servers_brief{};  // S'
+  std::string cookie;
+
+  // What the vouch says and by which key, unless a test says otherwise.
+  std::optional<protocol::CurveKey> vouched_brief = {};
+  std::optional<protocol::CurveKey> vouched_server = {};
+  std::optional<protocol::CurveKey> vouching_secret = {};
+
+  std::string next_number() {
+    const auto number = big_endian_of(nonce++);
+    return {number.data(), number.size()};
+  }
+
+  static std::string box(std::string_view text, const CurveNonce& nonce_bytes,
+                         const protocol::CurveKey& to, const protocol::CurveKey& from) {
+    std::string sealed(kMacBytes + text.size(), '\0');
+    if (crypto_box_easy(raw(sealed.data()), raw(text), text.size(), nonce_bytes.data(), to.data(),
+                        from.data()) != 0) {
+      throw std::runtime_error("nothing can be sealed with that key");
+    }
+    return sealed;
+  }
+  static std::optional<std::string> opened(std::string_view sealed, const CurveNonce& nonce_bytes,
+                                           const protocol::CurveKey& from,
+                                           const protocol::CurveKey& to) {
+    std::string text(sealed.size() - kMacBytes, '\0');
+    if (crypto_box_open_easy(raw(text.data()), raw(sealed), sealed.size(), nonce_bytes.data(),
+                             from.data(), to.data()) != 0) {
+      return std::nullopt;
+    }
+    return text;
+  }
+
+  /// HELLO's data.
+  std::string hello() {
+    std::string data("\1\0", 2);
+    data.append(72, '\0');
+    data += text_of_key(brief.public_key);
+    const std::string number = next_number();
+    data += number;
+    return data += box(std::string(64, '\0'), curve_nonce("CurveZMQHELLO---", number), server,
+                       brief.secret_key);
+  }
+  /// Takes WELCOME's data; false when it is not for this client.
+  bool take_welcome(std::string_view data) {
+    const auto text = opened(data.substr(16), curve_nonce("WELCOME-", data.substr(0, 16)), server,
+                             brief.secret_key);
+    if (!text || text->size() != 128) {
+      return false;
+    }
+    std::copy_n(text->begin(), servers_brief.size(), servers_brief.begin());
+    cookie = text->substr(32);
+    return true;
+  }
+  /// INITIATE's data.
+  std::string initiate() {
+    const std::string vouch_nonce(16, 'v');
+    std::string text = text_of_key(own.public_key) + vouch_nonce;
+    text += box(text_of_key(vouched_brief.value_or(brief.public_key)) +
+                    text_of_key(vouched_server.value_or(server)),
+                curve_nonce("VOUCH---", vouch_nonce), servers_brief,
+                vouching_secret.value_or(own.secret_key));
+    text += properties;
+    const std::string number = next_number();
+    return cookie + number +
+           box(text, curve_nonce("CurveZMQINITIATE", number), servers_brief, brief.secret_key);
+  }
+  /// A frame, sealed; `flags` are those inside: 1 more, 2 command.
+  std::string sealed(std::string_view body, unsigned flags = 0) {
+    const std::string number = next_number();
+    const std::string text = static_cast<char>(flags) + std::string(body);
+    return zmtp_frame(
+        "\x07MESSAGE" + number +
+        box(text, curve_nonce("CurveZMQMESSAGEC", number), servers_brief, brief.secret_key));
+  }
+  /// What a MESSAGE of the server says, its flags first; nothing when it is not for this client.
+  std::optional<std::string> opened_message(std::string_view message) const {
+    return opened(message.substr(16), curve_nonce("CurveZMQMESSAGES", message.substr(8, 8)),
+                  servers_brief, brief.secret_key);
+  }
+};
+
+}  // namespace oblique::server
