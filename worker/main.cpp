@@ -13,20 +13,25 @@
 #include <CLI/CLI.hpp>
 
 #include "proto/frames.h"
+#include "proto/program/configuration/configuration.h"
+#include "proto/program/configuration/log_flags.h"
 #include "proto/program/exit_code.h"
 #include "proto/program/log.h"
 #include "proto/program/parent.h"
 #include "proto/program/stop_signals.h"
 #include "proto/program/usage.h"
-#include "proto/text.h"
 #include "worker/point_solver.h"
 #include "worker/session.h"
 #include "worker/solver/solve.h"
 
 namespace {
 
+using oblique::protocol::Configuration;
+using oblique::protocol::LogSettings;
 using oblique::protocol::StopWithParent;
 using oblique::worker::SessionSettings;
+
+constexpr const char* kProgram = "oblique-worker";
 
 std::string host_and_process() {
   std::array<char, 256> host{};
@@ -74,37 +79,47 @@ int run_worker(const SessionSettings& settings, const StopWithParent& parent) {
   return exit_code;
 }
 
-/// Everything but errors that nobody foresaw.
-int run_program(int argc, char** argv) {
-  oblique::protocol::set_up_log("oblique-worker");
-  oblique::protocol::silence_protobuf();
-  SessionSettings settings;
-  settings.name = host_and_process();
-  settings.threads = cores();
-  bool quiet = false;
-  CLI::App app(
-      "Solves points of parameter studies for an oblique-server.\n"
-      "Example: oblique-worker --server tcp://127.0.0.1:7601",
-      "oblique-worker");
+void add_options(CLI::App& app, Configuration& configuration, StopWithParent& parent,
+                 SessionSettings& settings) {
   app.set_version_flag("--version", "oblique-worker " + oblique::solver::solver_version());
   app.add_option("--server", settings.server, "Where the server awaits workers")
       ->capture_default_str();
-  app.add_option("--name", settings.name, "Name that people see")
-      ->capture_default_str()
+  app.add_option("--name", settings.name, "Name that people see; the default is HOST:PROCESS")
       ->check(objection_to_name);
   app.add_option("--threads", settings.threads,
                  "Points solved at a time, each thread on a core; the default is all cores here")
       ->capture_default_str()
       ->check(CLI::Range(std::size_t{1}, kMostThreads));
+  configuration.keep_to_command_line(parent.add_to(app));
+}
+
+/// Everything but errors that nobody foresaw.
+int run_program(int argc, char** argv, LogSettings& log) {
+  oblique::protocol::set_up_log(kProgram);
+  oblique::protocol::silence_protobuf();
+  SessionSettings settings;
+  settings.threads = cores();
+  CLI::App app(
+      "Solves points of parameter studies for an oblique-server.\n"
+      "Example: oblique-worker --server tcp://127.0.0.1:7601",
+      kProgram);
+  Configuration configuration(
+      app,
+      {"OBLIQUE_WORKER_", oblique::protocol::default_configuration_file("worker.toml"), {"log"}});
   StopWithParent parent;
-  parent.add_to(app);
-  app.add_flag("--quiet", quiet, "Log warnings and errors only");
-  if (const auto exit_code = oblique::protocol::parse_command_line(app, argc, argv)) {
+  add_options(app, configuration, parent, settings);
+  add_log_flags(app, configuration, log);
+  if (const auto exit_code = configuration.parse(argc, argv)) {
     return *exit_code;
   }
-  if (quiet) {
-    spdlog::set_level(spdlog::level::warn);
+  if (configuration.is_to_be_printed()) {
+    std::cout << configuration.printed();
+    return oblique::protocol::kDone;
   }
+  if (settings.name.empty()) {
+    settings.name = host_and_process();
+  }
+  oblique::protocol::set_up_log(kProgram, log);
   try {
     return run_worker(settings, parent);
   } catch (const oblique::solver::InputError& error) {
@@ -115,10 +130,10 @@ int run_program(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  LogSettings log;
   try {
-    return run_program(argc, argv);
+    return run_program(argc, argv, log);
   } catch (const std::exception& error) {
-    std::cerr << "oblique-worker: " << oblique::protocol::visible_lines(error.what()) << '\n';
-    return oblique::protocol::kFailed;
+    return oblique::protocol::tell_failure(kProgram, error.what(), log);
   }
 }

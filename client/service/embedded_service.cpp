@@ -34,9 +34,9 @@ std::string with_last_words(const std::string& what, const ChildProcess& child) 
 ChildSettings server_settings(const ServiceSettings& settings, int ready) {
   ChildSettings child{
       .program = sibling_program("oblique-server"),
-      .arguments = {"--db", settings.database.string(), "--worker-port", "0", "--client-port", "0",
-                    "--ready-fd", std::to_string(ChildProcess::kHandedOver), "--stop-with-parent",
-                    std::to_string(getpid())},
+      .arguments = {"--no-config", "--db", settings.database.string(), "--worker-port", "0",
+                    "--client-port", "0", "--ready-fd", std::to_string(ChildProcess::kHandedOver),
+                    "--stop-with-parent", std::to_string(getpid())},
       .show_errors = settings.verbose,
       .handed_over = ready};
   if (settings.allow_network_disk) {
@@ -108,11 +108,12 @@ EmbeddedService::EmbeddedService(const ServiceSettings& settings, protocol::Stop
   ready.write.close();
   wait_until_ready(ready.read, stop);
   for (int i = 0; i < settings.workers; ++i) {
-    workers_.push_back(std::make_unique<ChildProcess>(ChildSettings{
-        .program = worker_program,
-        .arguments = {"--server", worker_url_, "--stop-with-parent", std::to_string(getpid()),
-                      "--threads", std::to_string(threads_each(settings.workers))},
-        .show_errors = settings.verbose}));
+    workers_.push_back(std::make_unique<ChildProcess>(
+        ChildSettings{.program = worker_program,
+                      .arguments = {"--no-config", "--server", worker_url_, "--stop-with-parent",
+                                    std::to_string(getpid()), "--threads",
+                                    std::to_string(threads_each(settings.workers))},
+                      .show_errors = settings.verbose}));
   }
 }
 

@@ -23,7 +23,7 @@ std::string objection_to_process(const std::string& text) {
 
 StopWithParent::StopWithParent() : parent_(getppid()) {}
 
-void StopWithParent::add_to(CLI::App& app) {
+const CLI::Option* StopWithParent::add_to(CLI::App& app) {
   option_ = app.add_option("--stop-with-parent", named_,
                            "Stop when the parent process is gone; with its id, also when it was "
                            "before this one began")
@@ -31,6 +31,7 @@ void StopWithParent::add_to(CLI::App& app) {
                 ->check(objection_to_process)
                 ->type_name("[PID]")
                 ->default_str("");  // none: the option may stand alone
+  return option_;
 }
 
 bool StopWithParent::begin() const {

@@ -13,8 +13,8 @@ class StopWithParent {
   /// To be made as the program begins: who is the parent now counts.
   StopWithParent();
 
-  /// Adds the option. This must live as long as `app`.
-  void add_to(CLI::App& app);
+  /// Adds the option and gives it back. This must live as long as `app`.
+  const CLI::Option* add_to(CLI::App& app);
 
   /// After the command line is parsed and signals are watched: asks the system for the signal, if
   /// the option was given. False when the parent has ended already, which one that gave its own

@@ -44,17 +44,26 @@ std::optional<ProcessState> state_of(pid_t pid) {
   return rest ? std::optional(state) : std::nullopt;
 }
 
-/// Our environment without OBLIQUE_SERVER, and with `changes`, each as NAME=value.
+/// Our environment without the variables of our programs and of whoever started us, and with
+/// `changes`, each as NAME=value.
 std::vector<std::string> environment_with(const Environment& changes) {
   std::vector<std::string> all;
+  // What is installed on this machine is not what is tested.
+  Environment set{{"OBLIQUE_SERVER_CONFIG", "/dev/null"}, {"OBLIQUE_WORKER_CONFIG", "/dev/null"}};
+  for (const auto& [name, value] : changes) {
+    set[name] = value;
+  }
   for (char** variable = environ; *variable != nullptr; ++variable) {
     const std::string text = *variable;
     const std::string name = text.substr(0, text.find('='));
-    if (name != "OBLIQUE_SERVER" && !changes.contains(name)) {
+    const bool is_ours = name.starts_with("OBLIQUE_") || name == "NOTIFY_SOCKET" ||
+                         name == "WATCHDOG_USEC" || name == "WATCHDOG_PID" ||
+                         name == "JOURNAL_STREAM";
+    if (!is_ours && !set.contains(name)) {
       all.push_back(text);
     }
   }
-  for (const auto& [name, value] : changes) {
+  for (const auto& [name, value] : set) {
     all.push_back(name + "=" + value);
   }
   return all;

@@ -1,0 +1,186 @@
+// oblique-server: command line, signals and exit codes around the loop.
+#include <cerrno>
+#include <cstdint>
+#include <cstring>
+#include <exception>
+#include <iostream>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+#include <fcntl.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <spdlog/spdlog.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "proto/frames.h"
+#include "proto/program/configuration/configuration.h"
+#include "proto/program/configuration/log_flags.h"
+#include "proto/program/exit_code.h"
+#include "proto/program/log.h"
+#include "proto/program/parent.h"
+#include "proto/program/stop_signals.h"
+#include "proto/program/usage.h"
+#include "server/loop.h"
+#include "server/program/limits.h"
+#include "server/queries/reader_program.h"
+#include "worker/solver/model/version.h"
+
+namespace {
+
+using oblique::protocol::Configuration;
+using oblique::protocol::StopWithParent;
+using oblique::server::Loop;
+using oblique::server::LoopSettings;
+
+constexpr const char* kProgram = "oblique-server";
+
+/// What people choose.
+struct Options {
+  LoopSettings loop;
+  std::uint16_t worker_port = 7601;
+  std::uint16_t client_port = 7600;
+  int ready_fd = -1;
+  oblique::protocol::LogSettings log;
+};
+
+/// A connection takes a descriptor, and systems give few to begin with.
+void take_all_descriptors() {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_NOFILE, &limit) == 0) {
+    limit.rlim_cur = limit.rlim_max;
+    // Otherwise there are fewer connections.
+    static_cast<void>(setrlimit(RLIMIT_NOFILE, &limit));
+  }
+}
+
+/// Empty for −1 and for a descriptor that is open, else what is wrong with it.
+std::string objection_to_descriptor(const std::string& text) {
+  int fd = -1;
+  const bool is_number = CLI::detail::lexical_cast(text, fd);
+  return is_number && (fd == -1 || fcntl(fd, F_GETFD) != -1)
+             ? ""
+             : "\"" + text + "\" is no open file descriptor";
+}
+
+void tell_ready(int fd, const Loop& loop) {
+  const std::string line =
+      nlohmann::json{{"client", loop.client_endpoint()}, {"worker", loop.worker_endpoint()}}
+          .dump() +
+      "\n";
+  if (::write(fd, line.data(), line.size()) != static_cast<ssize_t>(line.size())) {
+    throw std::runtime_error("cannot write to the file descriptor of --ready-fd: " +
+                             std::string(std::strerror(errno)));
+  }
+  ::close(fd);
+}
+
+int run(const LoopSettings& settings, int ready_fd, const StopWithParent& parent) {
+  const oblique::protocol::StopSignals stop;  // before any thread starts
+  oblique::protocol::survive_failed_writes();
+  if (!parent.begin()) {
+    spdlog::warn("the parent process was gone before this one began");
+    return oblique::protocol::kDone;
+  }
+  take_all_descriptors();
+  Loop loop(settings);
+  spdlog::info("database {}, clients at {}, workers at {}", settings.database,
+               loop.client_endpoint(), loop.worker_endpoint());
+  if (ready_fd >= 0) {
+    tell_ready(ready_fd, loop);
+  }
+  const auto end = loop.run(stop.descriptor());
+  return end.lost_writes == 0 && !end.lost_database ? oblique::protocol::kDone
+                                                    : oblique::protocol::kFailed;
+}
+
+void add_options(CLI::App& app, Configuration& configuration, StopWithParent& parent,
+                 Options& options) {
+  LoopSettings& loop = options.loop;
+  app.set_version_flag("--version", "oblique-server " + oblique::solver::solver_version());
+  app.option_defaults()->always_capture_default();
+  app.add_option("--db", loop.database, "Database file; made when it is not there");
+  app.add_flag("--allow-network-disk", loop.allow_network_disk,
+               "Take a database on a network file system, where a second machine could damage it");
+  app.add_option("--listen", loop.doors.listen,
+                 "Address to listen on, * for all; beyond loopback only with --keys or --insecure");
+  app.add_option("--keys", loop.doors.keys,
+                 "Key file of the server, as `oblique keygen` makes it; the list of keys to let "
+                 "in, authorized_keys.toml, lies beside it")
+      ->envname("OBLIQUE_KEYS");
+  app.add_flag("--insecure", loop.doors.insecure, "Let in whoever reaches the ports, unencrypted");
+  constexpr double kLargestPort = 65535;
+  const CLI::Validator port = oblique::protocol::number_between(0, kLargestPort);
+  app.add_option("--worker-port", options.worker_port, "Port for workers; 0: the system picks one")
+      ->check(port);
+  app.add_option("--client-port", options.client_port, "Port for clients; 0: the system picks one")
+      ->check(port);
+  auto* ready = app.add_option("--ready-fd", options.ready_fd,
+                               "File descriptor that gets one line of JSON with both endpoints "
+                               "once the server can be used; -1: none")
+                    ->check(objection_to_descriptor);
+  configuration.keep_to_command_line(ready);
+  configuration.keep_to_command_line(parent.add_to(app));
+  add_log_flags(app, configuration, options.log);
+  add_limits(app, loop.network, loop.service, loop.queries.turns);
+}
+
+/// The exit code when there is nothing to run, or it is told what is wrong with the options.
+std::optional<int> finish_options(const CLI::App& app, const Configuration& configuration,
+                                  Options& options) {
+  LoopSettings& loop = options.loop;
+  try {
+    if (options.worker_port == options.client_port && options.worker_port != 0) {
+      throw std::runtime_error("--worker-port and --client-port are both " +
+                               std::to_string(options.worker_port) + ": they must differ");
+    }
+    (void)oblique::server::address_to_bind(loop.doors);
+  } catch (const std::runtime_error& error) {
+    return oblique::protocol::tell_wrong_usage(app.get_name(), error.what());
+  }
+  if (configuration.is_to_be_printed()) {
+    std::cout << configuration.printed();
+    return oblique::protocol::kDone;
+  }
+  loop.worker_port = options.worker_port == 0 ? "*" : std::to_string(options.worker_port);
+  loop.client_port = options.client_port == 0 ? "*" : std::to_string(options.client_port);
+  loop.service.solver_version = oblique::solver::solver_version();
+  return std::nullopt;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc == 3 && std::string_view(argv[1]) == oblique::server::kReadMode) {
+    return oblique::server::run_reader_program(argv[2]);
+  }
+  StopWithParent parent;
+  oblique::protocol::silence_protobuf();
+  oblique::protocol::set_up_log(kProgram);
+  CLI::App app{
+      "Hands out the points of studies to workers and keeps the results.\n"
+      "Example: oblique-server --db oblique.db",
+      kProgram};
+  Options options;
+  options.loop.database = "oblique.db";
+  Configuration configuration(app, {"OBLIQUE_SERVER_",
+                                    oblique::protocol::default_configuration_file("server.toml"),
+                                    {"limits", "log"}});
+  try {
+    add_options(app, configuration, parent, options);
+    if (const auto exit_code = configuration.parse(argc, argv)) {
+      return *exit_code;
+    }
+    if (const auto exit_code = finish_options(app, configuration, options)) {
+      return *exit_code;
+    }
+    oblique::protocol::set_up_log(kProgram, options.log);
+    return run(options.loop, options.ready_fd, parent);
+  } catch (const std::exception& error) {
+    return oblique::protocol::tell_failure(kProgram, error.what(), options.log);
+  }
+}

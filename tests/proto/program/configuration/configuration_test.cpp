@@ -1,0 +1,246 @@
+#include "proto/program/configuration/configuration.h"
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "proto/program/configuration/log_flags.h"
+#include "tests/support/temporary_folder.h"
+
+namespace oblique::protocol {
+namespace {
+
+/// What a program with a few options makes of its three places.
+class ConfigurationTest : public testing::Test {
+ protected:
+  struct Options {
+    std::string db = "default.db";
+    int port = 7600;
+    bool loud = false;
+    int connections = 10;
+    std::vector<std::string> listen;
+    std::string keys;
+    int ready_fd = -1;
+    LogSettings log;
+  };
+
+  ~ConfigurationTest() override {
+    for (const std::string& name : variables_) {
+      unsetenv(name.c_str());
+    }
+  }
+
+  std::string write(const std::string& text, const std::string& name = "a.toml") {
+    std::ofstream(folder_.file(name)) << text;
+    return folder_.file(name);
+  }
+
+  void set(const std::string& name, const std::string& value) {
+    setenv(name.c_str(), value.c_str(), 1);
+    variables_.push_back(name);
+  }
+
+  /// Parses; what is told goes to `told_`, what holds to `options_` and `printed_`.
+  std::optional<int> parse(std::vector<std::string> words) {
+    options_ = Options();
+    CLI::App app("A program under test", "program");
+    app.option_defaults()->always_capture_default();
+    Configuration configuration(app, {"TEST_PROGRAM_", default_file_, {"limits", "log"}});
+    app.add_option("--db", options_.db);
+    app.add_option("--port", options_.port)->check(CLI::Range(0, 65535));
+    app.add_flag("--loud", options_.loud);
+    app.add_option("--listen", options_.listen);
+    app.add_option("--keys", options_.keys)->envname("TEST_KEYS");
+    app.add_option("--limits-connections", options_.connections)->check(CLI::PositiveNumber);
+    configuration.keep_to_command_line(app.add_option("--ready-fd", options_.ready_fd));
+    add_log_flags(app, configuration, options_.log);
+    std::vector<const char*> arguments{"program"};
+    for (const std::string& word : words) {
+      arguments.push_back(word.c_str());
+    }
+    const std::ostringstream told;
+    auto* const before = std::cerr.rdbuf(told.rdbuf());
+    const auto exit_code =
+        configuration.parse(static_cast<int>(arguments.size()), arguments.data());
+    std::cerr.rdbuf(before);
+    told_ = told.str();
+    printed_ = exit_code ? "" : configuration.printed();
+    return exit_code;
+  }
+
+  void expect_refused(const std::vector<std::string>& words, const std::string& sentence) {
+    EXPECT_EQ(parse(words), 2) << sentence;
+    EXPECT_NE(told_.find(sentence), std::string::npos) << told_;
+  }
+
+  test::TemporaryFolder folder_;
+  std::string default_file_ = folder_.file("default.toml");
+  Options options_;
+  std::string told_;
+  std::string printed_;
+  std::vector<std::string> variables_;
+};
+
+TEST_F(ConfigurationTest, AFlagIsStrongerThanTheEnvironmentAndThatThanTheFile) {
+  const std::string file = write("db = \"file.db\"\nport = 1\n[limits]\nconnections = 3\n");
+  set("TEST_PROGRAM_PORT", "2");
+  set("TEST_PROGRAM_LIMITS_CONNECTIONS", "4");
+  EXPECT_EQ(parse({"--config", file, "--limits-connections", "5"}), std::nullopt) << told_;
+  EXPECT_EQ(options_.db, "file.db");
+  EXPECT_EQ(options_.port, 2);
+  EXPECT_EQ(options_.connections, 5);
+}
+
+TEST_F(ConfigurationTest, WithoutAnyPlaceDefaultsHold) {
+  EXPECT_EQ(parse({}), std::nullopt);
+  EXPECT_EQ(options_.db, "default.db");
+  EXPECT_FALSE(options_.loud);
+}
+
+TEST_F(ConfigurationTest, TheFileOfTheEnvironmentComesBeforeTheDefaultOneAndTheFlagBeforeBoth) {
+  write("port = 1\n", "default.toml");
+  EXPECT_EQ(parse({}), std::nullopt);
+  EXPECT_EQ(options_.port, 1);
+  set("TEST_PROGRAM_CONFIG", write("port = 2\n", "b.toml"));
+  EXPECT_EQ(parse({}), std::nullopt);
+  EXPECT_EQ(options_.port, 2);
+  EXPECT_EQ(parse({"--config", write("port = 3\n")}), std::nullopt);
+  EXPECT_EQ(options_.port, 3);
+}
+
+TEST_F(ConfigurationTest, NoConfigLeavesFilesAndEnvironmentOut) {
+  write("port = 1\n", "default.toml");
+  set("TEST_PROGRAM_DB", "environment.db");
+  set("TEST_KEYS", "a.key");
+  EXPECT_EQ(parse({"--no-config"}), std::nullopt);
+  EXPECT_EQ(options_.port, 7600);
+  EXPECT_EQ(options_.db, "default.db");
+  EXPECT_EQ(options_.keys, "");
+  expect_refused({"--no-config", "--config", folder_.file("default.toml")}, "excludes --config");
+}
+
+TEST_F(ConfigurationTest, AVariableWithoutValueIsNotSet) {
+  set("TEST_PROGRAM_PORT", "");
+  set("TEST_PROGRAM_CONFIG", "");
+  EXPECT_EQ(parse({}), std::nullopt) << told_;
+  EXPECT_EQ(options_.port, 7600);
+}
+
+TEST_F(ConfigurationTest, AVariableOfSeveralProgramsIsWeakerThanTheProgramsOwn) {
+  set("TEST_KEYS", "shared.key");
+  EXPECT_EQ(parse({}), std::nullopt);
+  EXPECT_EQ(options_.keys, "shared.key");
+  EXPECT_NE(printed_.find("TEST_KEYS"), std::string::npos) << printed_;
+  set("TEST_PROGRAM_KEYS", "own.key");
+  EXPECT_EQ(parse({}), std::nullopt);
+  EXPECT_EQ(options_.keys, "own.key");
+}
+
+TEST_F(ConfigurationTest, ListsOfAFileAreSeveralValues) {
+  EXPECT_EQ(parse({"--config", write("listen = [\"127.0.0.1\", \"::1\"]\n")}), std::nullopt);
+  EXPECT_EQ(options_.listen, (std::vector<std::string>{"127.0.0.1", "::1"}));
+}
+
+TEST_F(ConfigurationTest, AFlagCanBeTakenBackByAStrongerPlace) {
+  const std::string file = write("loud = true\n");
+  EXPECT_EQ(parse({"--config", file}), std::nullopt);
+  EXPECT_TRUE(options_.loud);
+  set("TEST_PROGRAM_LOUD", "false");
+  EXPECT_EQ(parse({"--config", file}), std::nullopt);
+  EXPECT_FALSE(options_.loud);
+}
+
+TEST_F(ConfigurationTest, WhatIsPrintedSaysWhereEachValueIsFrom) {
+  set("TEST_PROGRAM_DB", "b.db");
+  const std::string file = write("\nport = 1\n");
+  EXPECT_EQ(parse({"--config", file, "--loud"}), std::nullopt);
+  const auto has_line = [this](const std::string& key, const std::string& origin) {
+    const auto at = printed_.find("\n" + key + " = ");
+    ASSERT_NE(at, std::string::npos) << printed_;
+    const auto line = printed_.substr(at + 1, printed_.find('\n', at + 1) - at - 1);
+    EXPECT_TRUE(line.ends_with("# " + origin)) << line;
+  };
+  has_line("port", file + ":2");
+  has_line("db", "environment variable TEST_PROGRAM_DB");
+  has_line("loud", "flag --loud");
+  has_line("connections", "default");
+}
+
+TEST_F(ConfigurationTest, WhatIsPrintedGivesTheSameWhenItIsReadAgain) {
+  const std::string odd = "a \"b\" \\ 'c' \x1b\xc3\xa4.db";
+  EXPECT_EQ(parse({"--db", odd, "--port", "9", "--loud", "--listen", "::1", "--quiet",
+                   "--limits-connections", "6"}),
+            std::nullopt)
+      << told_;
+  const std::string file = write(printed_);
+  EXPECT_EQ(parse({"--config", file}), std::nullopt) << told_ << printed_;
+  EXPECT_EQ(options_.db, odd);
+  EXPECT_EQ(options_.port, 9);
+  EXPECT_TRUE(options_.loud);
+  EXPECT_EQ(options_.listen, std::vector<std::string>{"::1"});
+  EXPECT_EQ(options_.log.level, "warning");
+  EXPECT_EQ(options_.connections, 6);
+}
+
+TEST_F(ConfigurationTest, WhatIsWrongInTheFileIsToldWithItsLine) {
+  const auto refuse = [this](const std::string& text, const std::string& sentence) {
+    const std::string file = write(text);
+    expect_refused({"--config", file}, sentence);
+    EXPECT_NE(told_.find(file + ":"), std::string::npos) << told_;
+  };
+  refuse("\nprot = 5\n", "a.toml:2: there is no setting prot (did you mean `port`?)");
+  refuse("[limits]\nconections = 5\n", "did you mean `limits.connections`?");
+  refuse("port = 99999\n", "a.toml:1: port");
+  refuse("port = \"5\"\n", "port must be a number");
+  refuse("port = []\n", "port must be a number");
+  refuse("port = [1, 2]\n", "port must be a number");
+  refuse("port = 1979-05-27\n", "port must be");
+  refuse("db = 5\n", "db must be a text");
+  refuse("loud = 1\n", "loud must be true or false");
+  refuse("loud = \n", "a.toml:1: ");
+  refuse("db = \"\"\n", "the value is empty");
+  refuse("ready_fd = 1\n", "ready_fd is given on the command line only");
+  refuse("[log]\nlevel = \"shrill\"\n", "log.level: \"shrill\" is none of debug");
+  refuse("[no]\nkey = 1\n", "there is no setting no.key");
+  refuse("[no]\n", "there is no setting no");
+  refuse("[limits.deep]\nkey = 1\n", "limits.deep");
+}
+
+TEST_F(ConfigurationTest, EmptyTablesOfKnownNamesAndAnEmptyFileAreFine) {
+  EXPECT_EQ(parse({"--config", write("[limits]\n[log]\n")}), std::nullopt) << told_;
+  EXPECT_EQ(parse({"--config", "/dev/null"}), std::nullopt) << told_;
+}
+
+TEST_F(ConfigurationTest, AValueOutOfRangeIsToldAlsoWhereItIsOverridden) {
+  expect_refused({"--config", write("port = -1\n"), "--port", "5"}, "a.toml:1: port");
+  set("TEST_PROGRAM_PORT", "70000");
+  expect_refused({"--port", "5"}, "environment: TEST_PROGRAM_PORT");
+  expect_refused({"--port", "70000"}, "--port");
+}
+
+TEST_F(ConfigurationTest, AFileThatIsNamedMustBeThere) {
+  expect_refused({"--config", folder_.file("missing.toml")}, "missing.toml");
+  expect_refused({"--config", folder_.path().string()}, "cannot be read");
+  set("TEST_PROGRAM_CONFIG", folder_.file("gone.toml"));
+  expect_refused({}, "gone.toml");
+}
+
+TEST_F(ConfigurationTest, QuietIsTheShortFormOfALevel) {
+  const std::string file = write("[log]\nlevel = \"debug\"\n");
+  EXPECT_EQ(parse({"--config", file}), std::nullopt);
+  EXPECT_EQ(options_.log.level, "debug");
+  EXPECT_EQ(parse({"--config", file, "--quiet"}), std::nullopt);
+  EXPECT_EQ(options_.log.level, "warning");
+  EXPECT_NE(printed_.find("# flag --quiet"), std::string::npos) << printed_;
+  expect_refused({"--quiet", "--log-level", "info"}, "excludes");
+}
+
+}  // namespace
+}  // namespace oblique::protocol

@@ -1,0 +1,129 @@
+#include "proto/program/log.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <regex>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <spdlog/spdlog.h>
+#include <nlohmann/json.hpp>
+
+#include "proto/text.h"
+#include "tests/support/temporary_folder.h"
+
+namespace oblique::protocol {
+namespace {
+
+/// What a program writes to its standard error.
+class ProgramLogTest : public testing::Test {
+ protected:
+  ProgramLogTest() : before_(dup(STDERR_FILENO)) {
+    const int file = open(file_.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0600);
+    dup2(file, STDERR_FILENO);
+    close(file);
+  }
+  ~ProgramLogTest() override {
+    dup2(before_, STDERR_FILENO);
+    close(before_);
+    unsetenv("JOURNAL_STREAM");
+    set_up_log("tests");
+  }
+
+  std::vector<std::string> lines() const {
+    std::ifstream file(file_);
+    std::vector<std::string> all;
+    for (std::string line; std::getline(file, line);) {
+      all.push_back(line);
+    }
+    return all;
+  }
+
+  test::TemporaryFolder folder_;
+  std::string file_ = folder_.file("err");
+  int before_;
+};
+
+TEST_F(ProgramLogTest, JsonIsOneValidObjectALineWhateverThePeersSay) {
+  set_up_log("oblique-server", {"debug", "json"});
+  const std::vector<std::string> messages{
+      "plain",
+      "worker \"x\\\" joins\n{\"forged\": true}",
+      std::string("zero \0 inside", 13),
+      "\xff\xfe no UTF-8 \xc3",
+      "\x1b[2J \xe2\x80\xae turned \xe2\x80\xa8 line",
+      "",
+  };
+  for (const std::string& message : messages) {
+    spdlog::warn("{}", message);
+  }
+  const auto written = lines();
+  ASSERT_EQ(written.size(), messages.size());
+  for (std::size_t i = 0; i < written.size(); ++i) {
+    ASSERT_TRUE(is_visible(written[i])) << visible(written[i]);
+    const auto object = nlohmann::json::parse(written[i], nullptr, false);
+    ASSERT_TRUE(object.is_object()) << written[i];
+    EXPECT_EQ(object.size(), 4U);
+    EXPECT_EQ(object.at("level"), "warning");
+    EXPECT_EQ(object.at("program"), "oblique-server");
+    EXPECT_TRUE(std::regex_match(object.at("time").get<std::string>(),
+                                 std::regex(R"(\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z)")));
+    if (is_utf8(messages[i])) {
+      EXPECT_EQ(object.at("message"), messages[i]);
+    }
+  }
+}
+
+TEST_F(ProgramLogTest, LinesBelowTheLevelAreLeftOut) {
+  for (const auto& [level, count] : std::vector<std::pair<std::string, std::size_t>>{
+           {"debug", 4}, {"info", 3}, {"warning", 2}, {"error", 1}}) {
+    const std::size_t before = lines().size();
+    set_up_log("oblique-worker", {level, "text"});
+    spdlog::debug("d");
+    spdlog::info("i");
+    spdlog::warn("w");
+    spdlog::error("e");
+    EXPECT_EQ(lines().size() - before, count) << level;
+  }
+}
+
+TEST_F(ProgramLogTest, TheJournalGetsLevelsAndNoTimes) {
+  struct stat file {};
+  ASSERT_EQ(fstat(STDERR_FILENO, &file), 0);
+  const std::string stream = std::to_string(file.st_dev) + ":" + std::to_string(file.st_ino);
+  setenv("JOURNAL_STREAM", stream.c_str(), 1);
+  set_up_log("oblique-worker");
+  spdlog::info("one\ntwo");
+  spdlog::warn("low");
+  EXPECT_EQ(tell_failure("oblique-worker", "broken", {}), 1);
+  EXPECT_EQ(lines(), (std::vector<std::string>{"<6>one\\ntwo", "<4>low", "<3>broken"}));
+}
+
+TEST_F(ProgramLogTest, AStandardErrorThatIsNotTheJournalHasTimes) {
+  setenv("JOURNAL_STREAM", "1:1", 1);
+  set_up_log("oblique-worker");
+  spdlog::info("ready");
+  ASSERT_EQ(lines().size(), 1U);
+  EXPECT_TRUE(lines()[0].ends_with("Z oblique-worker info: ready")) << lines()[0];
+}
+
+TEST_F(ProgramLogTest, AProgramThatFailsSaysSoInTheFormOfItsLog) {
+  EXPECT_EQ(tell_failure("oblique-server", "no disk", {}), 1);
+  const LogSettings json{"info", "json"};
+  set_up_log("oblique-server", json);
+  tell_failure("oblique-server", "no disk", json);
+  const auto written = lines();
+  ASSERT_EQ(written.size(), 2U);
+  EXPECT_EQ(written[0], "oblique-server: no disk");
+  EXPECT_EQ(nlohmann::json::parse(written[1]).at("message"), "no disk");
+}
+
+}  // namespace
+}  // namespace oblique::protocol
