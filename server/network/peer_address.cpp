@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <string_view>
 
+#include <arpa/inet.h>
 #include <netdb.h>
 #include <sys/socket.h>
 
@@ -14,18 +15,25 @@
 namespace oblique::server {
 
 PeerAddress::PeerAddress(const std::string& address, std::uint16_t port) {
+  auto* const v4 = reinterpret_cast<sockaddr_in*>(&address_);
+  if (inet_pton(AF_INET, address.c_str(), &v4->sin_addr) == 1) {
+    v4->sin_family = AF_INET;
+    v4->sin_port = htons(port);
+    return;
+  }
   const bool has_brackets = address.size() > 2 && address.front() == '[' && address.back() == ']';
   const std::string bare = has_brackets ? address.substr(1, address.size() - 2) : address;
   addrinfo wanted{};
-  wanted.ai_flags = AI_NUMERICHOST | AI_NUMERICSERV;
-  wanted.ai_family = has_brackets ? AF_INET6 : AF_UNSPEC;
+  wanted.ai_flags = AI_NUMERICHOST;
+  wanted.ai_family = AF_INET6;
   wanted.ai_socktype = SOCK_STREAM;
   addrinfo* found = nullptr;
-  if (getaddrinfo(bare.c_str(), std::to_string(port).c_str(), &wanted, &found) != 0) {
+  if (getaddrinfo(bare.c_str(), nullptr, &wanted, &found) != 0) {
     throw std::runtime_error(address + " is no numeric address");
   }
   const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> owned(found, &freeaddrinfo);
   std::memcpy(&address_, found->ai_addr, found->ai_addrlen);
+  address_.sin6_port = htons(port);
 }
 
 std::string PeerAddress::text() const {

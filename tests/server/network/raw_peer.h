@@ -112,6 +112,13 @@ class RawPeer {
     bytes.resize(static_cast<std::size_t>(count < 0 ? 0 : count));
     return bytes;
   }
+  /// Reads what has come already, which may be nothing.
+  std::string receive_what_is_there() {
+    std::string bytes(65536, '\0');
+    const ssize_t count = ::recv(socket_, bytes.data(), bytes.size(), MSG_DONTWAIT);
+    bytes.resize(static_cast<std::size_t>(count < 0 ? 0 : count));
+    return bytes;
+  }
   /// Ends the connection as the system does for a killed process that left something unread.
   void reset() {
     const linger at_once{1, 0};
