@@ -47,6 +47,7 @@ void add_verbs(CLI::App& app, Command& command) {
   add_fit(app, command);
   add_backup(app, command);
   add_check(app, command);
+  add_autoscale(app, command);
 }
 
 // The verb that was parsed, or the program itself.

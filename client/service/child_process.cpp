@@ -15,6 +15,7 @@
 #include <algorithm>
 #include <array>
 #include <memory>
+#include <string_view>
 #include <utility>
 
 namespace oblique::client {
@@ -36,17 +37,30 @@ Descriptor nameless_file() {
   return file;
 }
 
+// Our environment without the variables whose names begin with `hidden`, unless that is empty.
+std::vector<char*> environment_without(const std::string& hidden) {
+  std::vector<char*> variables;
+  for (char** variable = environ; *variable != nullptr; ++variable) {
+    if (hidden.empty() || !std::string_view(*variable).starts_with(hidden)) {
+      variables.push_back(*variable);
+    }
+  }
+  variables.push_back(nullptr);
+  return variables;
+}
+
 // What a child starts with: the descriptors it gets, no blocked signals, its own process group.
 class SpawnPlan {
  public:
-  SpawnPlan(const ChildSettings& settings, int errors) {
+  SpawnPlan(const ChildSettings& settings, int errors, int output) {
     posix_spawn_file_actions_init(&actions_);
     posix_spawn_file_actions_addopen(&actions_, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
     if (errors >= 0) {
       posix_spawn_file_actions_adddup2(&actions_, errors, STDERR_FILENO);
     }
     // Standard output is for our data alone.
-    posix_spawn_file_actions_adddup2(&actions_, STDERR_FILENO, STDOUT_FILENO);
+    posix_spawn_file_actions_adddup2(&actions_, output >= 0 ? output : STDERR_FILENO,
+                                     STDOUT_FILENO);
     if (settings.handed_over >= 0) {
       posix_spawn_file_actions_adddup2(&actions_, settings.handed_over, ChildProcess::kHandedOver);
     }
@@ -87,7 +101,10 @@ ChildProcess::ChildProcess(const ChildSettings& settings) {
   if (!settings.show_errors) {
     errors_ = nameless_file();
   }
-  const SpawnPlan plan(settings, errors_.number());
+  if (settings.keep_output) {
+    output_ = nameless_file();
+  }
+  const SpawnPlan plan(settings, errors_.number(), output_.number());
   std::vector<std::string> texts{settings.program.string()};
   texts.insert(texts.end(), settings.arguments.begin(), settings.arguments.end());
   std::vector<char*> arguments;
@@ -95,8 +112,9 @@ ChildProcess::ChildProcess(const ChildSettings& settings) {
     arguments.push_back(text.data());
   }
   arguments.push_back(nullptr);
-  const int error = posix_spawn(&pid_, settings.program.c_str(), plan.actions(), plan.attributes(),
-                                arguments.data(), environ);
+  auto variables = environment_without(settings.hidden_variables);
+  const int error = posix_spawnp(&pid_, settings.program.c_str(), plan.actions(), plan.attributes(),
+                                 arguments.data(), variables.data());
   if (error != 0) {
     pid_ = -1;
     throw ProcessError(
@@ -132,6 +150,10 @@ void ChildProcess::send(int signal) {
   }
 }
 
+bool ChildProcess::succeeded() const {
+  return status_ && WIFEXITED(*status_) && WEXITSTATUS(*status_) == 0;
+}
+
 std::string ChildProcess::ending() const {
   if (!status_) {
     return "is running";
@@ -162,6 +184,21 @@ std::string ChildProcess::last_words() const {
     start = text.rfind('\n', start - 1);
   }
   return start == std::string::npos || start == 0 ? text : text.substr(start + 1);
+}
+
+std::string ChildProcess::output(std::size_t most_bytes) const {
+  struct stat about {};
+  if (output_.number() < 0 || fstat(output_.number(), &about) != 0) {
+    return {};
+  }
+  if (static_cast<std::size_t>(about.st_size) > most_bytes) {
+    throw ProcessError(
+        fmt::format("it wrote {} bytes, more than the {} allowed", about.st_size, most_bytes));
+  }
+  std::string text(static_cast<std::size_t>(about.st_size), '\0');
+  const auto got = pread(output_.number(), text.data(), text.size(), 0);
+  text.resize(static_cast<std::size_t>(std::max<ssize_t>(0, got)));
+  return text;
 }
 
 std::filesystem::path sibling_program(const std::string& name) {

@@ -2,6 +2,7 @@
 
 #include <sys/types.h>
 
+#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <stdexcept>
@@ -29,10 +30,12 @@ struct Pipe {
 
 /// How a child is started.
 struct ChildSettings {
-  std::filesystem::path program;
+  std::filesystem::path program;       ///< without a slash: the first of that name in PATH
   std::vector<std::string> arguments;  ///< without the program's name
   bool show_errors = false;            ///< its standard error goes to ours; else it is kept
   int handed_over = -1;                ///< descriptor that becomes the child's kHandedOver
+  bool keep_output = false;            ///< its standard output is kept apart; else with the errors
+  std::string hidden_variables{};      ///< it does not see variables that begin so; empty: sees all
 };
 
 /// One process of our own. It runs in a process group of its own, so that a Ctrl-C on the terminal
@@ -54,15 +57,21 @@ class ChildProcess {
   void send(int signal);
   pid_t pid() const { return pid_; }
 
+  /// Whether it ended with exit code 0.
+  bool succeeded() const;
   /// How it ended, as "ended with exit code 1" or "was killed by signal 9 (Killed)".
   std::string ending() const;
   /// The last lines of its standard error, if they were kept.
   std::string last_words() const;
+  /// What it has written to standard output, if that is kept. Throws ProcessError for more than
+  /// `most_bytes`.
+  std::string output(std::size_t most_bytes) const;
 
  private:
   pid_t pid_ = -1;
   std::optional<int> status_;  ///< as waitpid tells it; none while it runs
   Descriptor errors_;          ///< the file that keeps its standard error
+  Descriptor output_;          ///< the file that keeps its standard output
 };
 
 /// The program called `name` beside our own. Throws ProcessError when it is not there.

@@ -36,5 +36,6 @@ void add_converge(CLI::App& app, Command& command);
 void add_fit(CLI::App& app, Command& command);
 void add_backup(CLI::App& app, Command& command);
 void add_check(CLI::App& app, Command& command);
+void add_autoscale(CLI::App& app, Command& command);
 
 }  // namespace oblique::client

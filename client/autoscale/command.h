@@ -1,0 +1,29 @@
+#pragma once
+
+#include <functional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace oblique::client {
+
+/// A program to run to its end.
+struct CommandSettings {
+  std::string program;  ///< without a slash: as found in PATH
+  std::vector<std::string> arguments;
+  double timeout_s = 30.0;         ///< then it is killed
+  std::string hidden_variables{};  ///< see ChildSettings
+};
+
+/// A program could not be run. The message is a sentence part for people.
+class CommandError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Runs the program and gives what it wrote to standard output, at most 16 MiB. Throws CommandError
+/// naming the program when it cannot be started, fails, or takes too long, with what it wrote to
+/// standard error.
+std::string output_of(const CommandSettings& command);
+
+}  // namespace oblique::client
