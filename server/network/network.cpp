@@ -20,7 +20,7 @@ constexpr std::size_t kOtherDescriptors = 128;
 constexpr std::size_t kFewestConnections = 16;
 constexpr std::int64_t kLookInterval_ms = 500;
 constexpr const char* kLeavesTooMuchUnread = "it leaves too much unread";
-constexpr const char* kNoRoom = "there are too many connections, and all of them are at work";
+constexpr const char* kNoRoom = "there are too many connections, and none that would make room";
 
 bool has_something_to_take(const Zmtp& said) {
   return said.has_message() || said.waiting_work() == Zmtp::Work::kSealedFrame;
@@ -98,14 +98,14 @@ void Network::accept_all(Port port, std::int64_t now_ms) {
     Listener::Accepted accepted = ports_[port].listener->accept();
     if (!accepted.socket.is_open()) {
       if (errno == EMFILE || errno == ENFILE) {
-        make_room(now_ms);
+        make_room(port, now_ms);
       }
       return;
     }
     if (handshakes_under_way_ >= limits_.handshakes) {
       end_oldest_handshake();
     }
-    if (peers_.size() < limits_.connections || make_room(now_ms)) {
+    if (peers_.size() < limits_.connections || make_room(port, now_ms)) {
       accept(port, std::move(accepted), now_ms);
     } else {
       count_refusal(RefusalCause::kBound, accepted.address.text(), kNoRoom);
@@ -126,11 +126,15 @@ void Network::accept(Port port, Listener::Accepted accepted, std::int64_t now_ms
   settle(number, stored);
 }
 
-/// Ends the oldest of those who have not said who they are, else the connection that has said
-/// nothing for longest; false when all are at work.
-bool Network::make_room(std::int64_t now_ms) {
+/// For one more at that port. Ends the oldest of those who have not said who they are; where there
+/// are no keys, else the connection that has said nothing for longest. Nobody who has shown a key
+/// makes room for a stranger. False when there is none.
+bool Network::make_room(Port port, std::int64_t now_ms) {
   if (end_oldest_handshake()) {
     return true;
+  }
+  if (ports_[port].guard) {
+    return false;
   }
   const auto quietest =
       std::min_element(peers_.begin(), peers_.end(), [](const auto& left, const auto& right) {

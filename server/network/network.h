@@ -53,7 +53,7 @@ struct Departure {
   std::string address = {};                  ///< as 10.0.0.3:4711; where there is a reason
 };
 
-/// Peers that were not let in, or were sent away when their key was revoked, for one cause.
+/// Peers that were not let in, or were sent away because of their key, for one cause.
 struct RefusalCount {
   std::uint64_t count = 0;
   std::string last_address;
@@ -147,7 +147,7 @@ class Network {
 
   void accept_all(Port port, std::int64_t now_ms);
   void accept(Port port, Listener::Accepted accepted, std::int64_t now_ms);
-  bool make_room(std::int64_t now_ms);
+  bool make_room(Port port, std::int64_t now_ms);
   void serve(Number number, std::uint32_t events, std::int64_t now_ms);
   void shake_hands();
   void let_in(Peer& peer);

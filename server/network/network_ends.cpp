@@ -63,7 +63,9 @@ void Network::end_faulty(Number number, const Peer& peer) {
 /// often in the middle of its own greeting.
 void Network::end_who_has_left(Number number, const Peer& peer) {
   if (peer.connection.said().is_greeting()) {
-    end(number, "it left when it read whether the server asks for keys: one of the two has some",
+    end(number,
+        "it left at the server's greeting, as peers do that have no key where one is needed, or "
+        "one where none is",
         RefusalCause::kOtherMechanism);
   } else {
     end(number, "");
@@ -104,8 +106,10 @@ void Network::end_the_largest_of_keys() {
         most = (*peer).*bytes;
       }
     }
-    end(largest, fmt::format("all connections of the key \"{}\" together {}, and it most",
-                             share.holder->name, what));
+    end(largest,
+        fmt::format("all connections of the key \"{}\" together {}, and it most",
+                    share.holder->name, what),
+        RefusalCause::kBound);
   };
   // Who has ended may have been the last one of its key.
   for (bool has_ended = true; has_ended;) {

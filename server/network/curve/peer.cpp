@@ -43,6 +43,9 @@ CurvePeer::Outcome CurvePeer::take_initiate(std::string_view initiate) {
   }
   key_ = claim->client_key;
   holder_ = std::get<std::shared_ptr<const KeyHolder>>(std::move(verdict));
+  if (!holder_) {
+    return Refusal{RefusalCause::kUnknownKey, "nobody says whose key it has"};
+  }
   traffic_ = handshake_->traffic();
   return std::move(claim->metadata);
 }

@@ -1,0 +1,215 @@
+// What keys cost the server: each refused peer, and each message.
+//   oblique-network-bench refusals [COUNT]
+//   oblique-network-bench messages
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <ctime>
+#include <fstream>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <thread>
+
+#include <poll.h>
+#include <unistd.h>
+
+#include <zmq.hpp>
+
+#include "server/network/network.h"
+#include "tests/server/network/curve_client.h"
+#include "tests/server/network/list_doorkeeper.h"
+
+namespace oblique::server {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double resident_MB() {
+  std::ifstream statm("/proc/self/statm");
+  double total_pages = 0;
+  double resident_pages = 0;
+  statm >> total_pages >> resident_pages;
+  return resident_pages * static_cast<double>(sysconf(_SC_PAGESIZE)) / 1e6;
+}
+
+double thread_cpu_s() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+/// A network that a thread of its own turns, as the server's loop does. Port 0 wants keys, port 1
+/// does not.
+class TurnedNetwork {
+ public:
+  using Take = std::function<void(Network&, const Incoming&)>;
+  explicit TurnedNetwork(Take take) : take_(std::move(take)) {
+    doorkeeper_->admit(own_.public_key, "bench");
+    network_.listen("127.0.0.1", "*", PortGuard(server_, doorkeeper_));
+    network_.listen("127.0.0.1", "*");
+    thread_ = std::thread([this] { turn(); });
+  }
+  ~TurnedNetwork() { stop(); }
+  TurnedNetwork(const TurnedNetwork&) = delete;
+  TurnedNetwork& operator=(const TurnedNetwork&) = delete;
+
+  /// CPU that the thread took, in all. Then it is gone.
+  double stop() {
+    is_stopped_ = true;
+    if (thread_.joinable()) {
+      thread_.join();
+    }
+    return cpu_s_;
+  }
+  std::string endpoint(Network::Port port) const { return network_.endpoint(port); }
+  const protocol::KeyPair& own() const { return own_; }
+  const protocol::CurveKey& server_key() const { return server_.public_key; }
+  const Network& network() const { return network_; }
+
+ private:
+  void turn() {
+    const double before_s = thread_cpu_s();
+    while (!is_stopped_) {
+      pollfd item{network_.descriptor(), POLLIN, 0};
+      ::poll(&item, 1, network_.has_more() ? 0 : 10);
+      network_.collect(
+          std::chrono::duration_cast<std::chrono::milliseconds>(Clock::now().time_since_epoch())
+              .count());
+      for (const Network::Port port : {0U, 1U}) {
+        while (const auto incoming = network_.next(port, [](const std::string&) { return true; })) {
+          take_(network_, *incoming);
+        }
+      }
+      network_.take_departures();
+    }
+    cpu_s_ = thread_cpu_s() - before_s;
+  }
+
+  protocol::KeyPair server_ = protocol::made_key_pair();
+  protocol::KeyPair own_ = protocol::made_key_pair();
+  std::shared_ptr<ListDoorkeeper> doorkeeper_ = std::make_shared<ListDoorkeeper>();
+  Network network_{{}};
+  Take take_;
+  std::atomic<bool> is_stopped_ = false;
+  double cpu_s_ = 0.0;
+  std::thread thread_;
+};
+
+// ---- Refusals ---------------------------------------------------------------------------------
+
+void be_unknown(const TurnedNetwork& server) {
+  RawPeer peer(server.endpoint(0));
+  CurveClient client(protocol::made_key_pair(), server.server_key());
+  peer.send(curve_greeting() + zmtp_command("HELLO", client.hello()));
+  std::string heard;
+  constexpr std::size_t kWelcomeEnds = kGreetingBytes + 170;
+  while (heard.size() < kWelcomeEnds) {
+    heard += peer.receive();
+  }
+  client.take_welcome(std::string_view(heard).substr(kGreetingBytes + 10));
+  peer.send(command_of("INITIATE", client.initiate()));
+  peer.await_end();
+}
+
+void be_astray(const TurnedNetwork& server) {
+  RawPeer peer(server.endpoint(0));
+  CurveClient client(server.own(), server.own().public_key);
+  peer.send(curve_greeting() + zmtp_command("HELLO", client.hello()));
+  peer.await_end();
+}
+
+void be_without_key(const TurnedNetwork& server) {
+  RawPeer peer(server.endpoint(0));
+  peer.send(zmtp_greeting());
+  peer.await_end();
+}
+
+void measure_refusals(const char* what, int count, void (*be_refused)(const TurnedNetwork&)) {
+  TurnedNetwork server([](Network&, const Incoming&) {});
+  for (int i = 0; i < 100; ++i) {
+    be_refused(server);
+  }
+  const double before_MB = resident_MB();
+  for (int i = 0; i < count; ++i) {
+    be_refused(server);
+  }
+  const double after_MB = resident_MB();
+  const double cpu_s = server.stop();
+  std::printf("%-18s %8d %12.3f %12.2f %12.2f\n", what, count, 1e3 * cpu_s / (count + 100),
+              before_MB, after_MB);
+}
+
+void refusals(int count) {
+  std::printf("%-18s %8s %12s %12s %12s\n", "refused for", "times", "CPU each, ms", "before, MB",
+              "after, MB");
+  measure_refusals("no key", count, be_without_key);
+  measure_refusals("wrong server key", count, be_astray);
+  measure_refusals("unknown key", count, be_unknown);
+}
+
+// ---- Messages ---------------------------------------------------------------------------------
+
+struct Cost {
+  double per_second;  ///< messages there and back
+  double cpu_us;      ///< of the server, for one in and one out
+};
+
+Cost measure_messages(std::size_t bytes, bool has_keys, int count) {
+  constexpr int kUnderWay = 64;
+  TurnedNetwork server([](Network& network, const Incoming& incoming) {
+    network.send(incoming.identity, incoming.message.body);
+  });
+  zmq::context_t context;
+  zmq::socket_t socket(context, zmq::socket_type::dealer);
+  socket.set(zmq::sockopt::linger, 0);
+  if (has_keys) {
+    socket.set(zmq::sockopt::curve_publickey, zmq::buffer(server.own().public_key));
+    socket.set(zmq::sockopt::curve_secretkey, zmq::buffer(server.own().secret_key));
+    socket.set(zmq::sockopt::curve_serverkey, zmq::buffer(server.server_key()));
+  }
+  socket.connect(server.endpoint(has_keys ? 0 : 1));
+  const std::string body(bytes, 'm');
+  const auto start = Clock::now();
+  for (int i = 0; i < count + kUnderWay; ++i) {
+    if (i < count) {
+      socket.send(zmq::buffer(body), zmq::send_flags::none);
+    }
+    zmq::message_t echo;
+    if (i >= kUnderWay && !socket.recv(echo)) {
+      throw std::runtime_error("no echo");
+    }
+  }
+  const std::chrono::duration<double> wall = Clock::now() - start;
+  return {count / wall.count(), 1e6 * server.stop() / count};
+}
+
+void messages() {
+  std::printf("%10s %14s %14s %7s %14s %14s %7s\n", "bytes", "echoes/s, off", "on", "ratio",
+              "CPU off, us", "on", "ratio");
+  for (const std::size_t bytes : {std::size_t{100}, std::size_t{4'000}, std::size_t{64'000}}) {
+    const int count = bytes < 10'000 ? 100'000 : 10'000;
+    const Cost off = measure_messages(bytes, false, count);
+    const Cost on = measure_messages(bytes, true, count);
+    std::printf("%10zu %14.0f %14.0f %7.2f %14.2f %14.2f %7.2f\n", bytes, off.per_second,
+                on.per_second, on.per_second / off.per_second, off.cpu_us, on.cpu_us,
+                on.cpu_us / off.cpu_us);
+  }
+}
+
+}  // namespace
+}  // namespace oblique::server
+
+int main(int count, char** arguments) {
+  const std::string what = count > 1 ? arguments[1] : "";
+  if (what == "refusals") {
+    oblique::server::refusals(count > 2 ? std::stoi(arguments[2]) : 2000);
+  } else if (what == "messages") {
+    oblique::server::messages();
+  } else {
+    std::puts("oblique-network-bench refusals [COUNT] | messages");
+    return 2;
+  }
+}
