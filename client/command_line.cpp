@@ -45,6 +45,7 @@ void add_verbs(CLI::App& app, Command& command) {
   add_paper(app, command);
   add_converge(app, command);
   add_fit(app, command);
+  add_merge(app, command);
   add_backup(app, command);
   add_check(app, command);
   add_autoscale(app, command);

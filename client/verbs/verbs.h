@@ -34,6 +34,7 @@ void add_columns(CLI::App& app, Command& command);
 void add_paper(CLI::App& app, Command& command);
 void add_converge(CLI::App& app, Command& command);
 void add_fit(CLI::App& app, Command& command);
+void add_merge(CLI::App& app, Command& command);
 void add_backup(CLI::App& app, Command& command);
 void add_check(CLI::App& app, Command& command);
 void add_autoscale(CLI::App& app, Command& command);

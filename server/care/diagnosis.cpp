@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "server/care/row_faults.h"
+#include "server/care/table_columns.h"
 #include "server/database/open_for_reading.h"
 #include "server/database/row_checksum.h"
 #include "server/database/sqlite.h"
@@ -21,11 +22,6 @@ std::vector<std::string> texts(sqlite3* database, const std::string& sql) {
     found.push_back(statement.text(0));
   }
   return found;
-}
-
-int schema_of(sqlite3* database) {
-  Statement version(database, "PRAGMA user_version");
-  return version.step() ? static_cast<int>(version.integer(0)) : 0;
 }
 
 /// Every study beside the number of its results, for FROM.

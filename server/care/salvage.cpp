@@ -1,42 +1,20 @@
 #include "server/care/salvage.h"
 
-#include <algorithm>
 #include <filesystem>
 #include <stdexcept>
 #include <string_view>
 #include <vector>
 
+#include "server/care/table_columns.h"
 #include "server/database/draft_file.h"
 #include "server/database/open_for_reading.h"
 #include "server/database/row_checksum.h"
 #include "server/database/sqlite.h"
 #include "server/store/model_rows.h"
-#include "server/store/result_row.h"
 #include "server/store/store.h"
 
 namespace oblique::server {
 namespace {
-
-std::vector<std::string> columns_of(sqlite3* database, const std::string& table) {
-  Statement list(database, "SELECT name FROM pragma_table_info('" + table + "')");
-  std::vector<std::string> names;
-  while (list.step()) {
-    names.push_back(list.text(0));
-  }
-  return names;
-}
-
-/// The columns that both have, as a list for SQL.
-std::string common_columns(sqlite3* from, sqlite3* to, const std::string& table) {
-  const auto there = columns_of(from, table);
-  std::string list;
-  for (const std::string& column : columns_of(to, table)) {
-    if (std::find(there.begin(), there.end(), column) != there.end()) {
-      list += (list.empty() ? "" : ", ") + column;
-    }
-  }
-  return list;
-}
 
 /// The copy cannot be written, whatever can be read.
 class SaveError : public std::runtime_error {
@@ -62,22 +40,7 @@ void check_tables(sqlite3* database, const std::string& path) {
 
 /// Says of each row of the table whether it is as it was written, as far as that can be told.
 std::string soundness_sql(sqlite3* database, const std::string& table) {
-  const auto names = columns_of(database, table);
-  const bool has_checksums =
-      table == "results" && std::find(names.begin(), names.end(), "checksum") != names.end();
-  Statement version(database, "PRAGMA user_version");
-  const int schema = version.step() ? static_cast<int>(version.integer(0)) : kSchemaVersion;
-  return has_checksums ? "checksum IS NULL OR checksum = " + result_checksum_sql(schema) : "1";
-}
-
-/// The columns as the present schema has them.
-std::string values_sql(sqlite3* database, const std::string& table, std::string columns) {
-  Statement version(database, "PRAGMA user_version");
-  const bool is_by_message = version.step() && version.integer(0) < kFirstWithCanonicalModels;
-  if (constexpr std::string_view kColumn = "definition"; table == "models" && is_by_message) {
-    columns.replace(columns.find(kColumn), kColumn.size(), "model_definition(definition)");
-  }
-  return columns;
+  return table == "results" ? result_soundness_sql(schema_of(database)) : "1";
 }
 
 /// Copies the rows of one table in the order of their numbers, and passes over what cannot be read.
@@ -87,7 +50,7 @@ class TableCopy {
       : to_(to),
         columns_(common_columns(from, to, table)),
         read_(from, "SELECT rowid, " + soundness_sql(from, table) + ", " +
-                        values_sql(from, table, columns_) + " FROM " + table +
+                        present_values_sql(schema_of(from), table, columns_) + " FROM " + table +
                         " WHERE rowid > ? ORDER BY rowid"),
         insert_(to, "INSERT INTO " + table + " (" + columns_ + ") VALUES (" + marks() + ")") {}
 

@@ -44,16 +44,6 @@ void for_each_output(int first, int last, const Take& take) {
   }
 }
 
-/// The columns of a row but its checksum, in the order of the bindings and of the checksum.
-std::vector<std::string_view> columns(int schema) {
-  std::vector<std::string_view> names(kHeadColumns.begin(), kHeadColumns.end());
-  const auto add = [&](std::string_view column, int, const auto&) { names.push_back(column); };
-  for_each_output(1, kFirstWithChecksums, add);
-  names.insert(names.end(), kTailColumns.begin(), kTailColumns.end());
-  for_each_output(kFirstWithChecksums + 1, schema, add);
-  return names;
-}
-
 /// Binds the outputs that schemas from `first` to `last` brought, from `index` on, and gives the
 /// next index. Without a result they stay unbound, and so NULL.
 int bind_outputs(Statement& insert, int index, int first, int last, const CaseResult* result) {
@@ -76,8 +66,17 @@ int bind_outputs(Statement& insert, int index, int first, int last, const CaseRe
 
 }  // namespace
 
+std::vector<std::string_view> result_columns(int schema) {
+  std::vector<std::string_view> names(kHeadColumns.begin(), kHeadColumns.end());
+  const auto add = [&](std::string_view column, int, const auto&) { names.push_back(column); };
+  for_each_output(1, kFirstWithChecksums, add);
+  names.insert(names.end(), kTailColumns.begin(), kTailColumns.end());
+  for_each_output(kFirstWithChecksums + 1, schema, add);
+  return names;
+}
+
 std::string insert_result_sql() {
-  const auto names = columns(kSchemaVersion);
+  const auto names = result_columns(kSchemaVersion);
   std::string marks;
   for (std::size_t i = 1; i <= names.size(); ++i) {
     marks += fmt::format("{}?{}", i == 1 ? "" : ", ", i);
@@ -90,7 +89,7 @@ std::string insert_result_sql() {
 }
 
 std::string result_checksum_sql(int schema) {
-  return fmt::format("row_checksum({})", fmt::join(columns(schema), ", "));
+  return fmt::format("row_checksum({})", fmt::join(result_columns(schema), ", "));
 }
 
 std::string study_checksum_sql() {

@@ -18,6 +18,10 @@ inline constexpr int kFirstWithChecksums = 4;
 /// it. The connection must have `row_checksum`.
 std::string insert_result_sql();
 
+/// The columns of `results` but the checksum, which a database of that schema has, in the order in
+/// which they count in it.
+std::vector<std::string_view> result_columns(int schema);
+
 /// What `checksum` of a row of `results` must be, as an expression over the columns that a database
 /// of that schema has. Those of outputs that a later schema brought come last, and so count only
 /// where they are not NULL: earlier rows keep their checksums.

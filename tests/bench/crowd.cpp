@@ -14,10 +14,10 @@
 
 #include <zmq.hpp>
 
-#include "proto/system/descriptor.h"
 #include "proto/frames.h"
 #include "proto/result_message.h"
 #include "proto/socket/socket.h"
+#include "proto/system/descriptor.h"
 #include "worker/conversation.h"
 #include "worker/solver/solve.h"
 

@@ -149,6 +149,40 @@ void bench_server_alone(std::uint64_t points) {
   std::fflush(stdout);
 }
 
+/// Runs `oblique` to its end and gives what it took.
+Usage run_and_watch(const test::TemporaryFolder& folder,
+                    const std::vector<std::string>& arguments) {
+  test::Process process(folder, test::client_program(), arguments);
+  Usage last;
+  while (!process.exit_code()) {
+    const Usage now = usage_of(process.pid());
+    last = now.peak_MB > 0.0 ? now : last;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  Study::check(process.outcome());
+  return last;
+}
+
+/// A finished study merged into an empty database, and once more.
+void bench_merge(std::uint64_t points) {
+  Study study(points);
+  {
+    const InstantWorker worker(study.server.worker_url());
+    study.run();
+  }
+  study.server.process().send(SIGTERM);
+  study.server.process().wait();
+  const std::string target = study.folder.file("all.db");
+  for (const char* what : {"new", "known"}) {
+    const auto began = Clock::now();
+    const Usage merging = run_and_watch(study.folder, {"merge", study.file, "--db", target});
+    const std::chrono::duration<double> wall = Clock::now() - began;
+    std::printf("| %.0f | %s | %.1f | %.0f | %.1f | %.0f |\n", study.rows, what, wall.count(),
+                study.rows / wall.count(), 1e6 * merging.cpu_s / study.rows, merging.peak_MB);
+    std::fflush(stdout);
+  }
+}
+
 /// A study of so many points that none of it is ever solved: no worker is there.
 void bench_submission(std::uint64_t points) {
   const test::TemporaryFolder folder;
@@ -295,6 +329,11 @@ void run_all(const std::string& what, const std::vector<std::uint64_t>& points) 
         "| points | submitted in [s] | server before MB | after MB |\n"
         "|---:|---:|---:|---:|",
         bench_submission);
+  } else if (what == "merge") {
+    table(
+        "| rows | which are | wall [s] | rows/s | us a row | MB |\n"
+        "|---:|---|---:|---:|---:|---:|",
+        bench_merge);
   } else if (what == "worker-killed") {
     table(
         "| points | of them held by the killed worker | solved elsewhere after [s] |\n"
@@ -313,7 +352,7 @@ void run_all(const std::string& what, const std::vector<std::uint64_t>& points) 
   } else {
     throw std::invalid_argument("`" + what +
                                 "` is none of service, server-alone, submission, studies, "
-                                "worker-killed and server-killed");
+                                "merge, worker-killed and server-killed");
   }
 }
 
@@ -325,7 +364,7 @@ int main(int argc, char** argv) {
     if (argc < 3) {
       throw std::invalid_argument(
           "usage: oblique-service-bench "
-          "service|server-alone|submission|studies|worker-killed|server-killed "
+          "service|server-alone|submission|studies|merge|worker-killed|server-killed "
           "POINTS...");
     }
     std::vector<std::uint64_t> points;

@@ -132,5 +132,24 @@ TEST_F(DatabaseFilesTest, AServerThatEndsUnderALongQueryOfAnotherProgramSaysWher
   EXPECT_TRUE(contains(server.process().err(), "oblique backup")) << server.process().err();
 }
 
+TEST_F(DatabaseFilesTest, OneThatAServerWorksOnIsMergedFromAndNotInto) {
+  const Server server(folder_, file_);
+  submit_to(server);
+  const Outcome from = run_oblique(folder_, {"merge", file_, "--db", folder_.file("all.db")});
+  EXPECT_EQ(from.exit_code, 0) << from.err;
+  EXPECT_TRUE(contains(from.err, "1 studies new")) << from.err;
+  EXPECT_TRUE(contains(from.err, "A server is at work on")) << from.err;
+  const Outcome into = run_oblique(folder_, {"merge", folder_.file("all.db"), "--db", file_});
+  EXPECT_EQ(into.exit_code, 1);
+  EXPECT_TRUE(contains(into.err, "another server")) << into.err;
+}
+
+TEST_F(DatabaseFilesTest, OneIsNotMergedIntoItselfByWhateverName) {
+  { const Server server(folder_, file_); }
+  fs::create_hard_link(file_, folder_.file("other name.db"));
+  const Outcome ran = run_oblique(folder_, {"merge", folder_.file("other name.db"), "--db", file_});
+  EXPECT_EQ(ran.exit_code, 2) << ran.err;
+}
+
 }  // namespace
 }  // namespace oblique::test

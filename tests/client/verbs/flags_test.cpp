@@ -31,9 +31,10 @@ Ending run(std::vector<std::string> words) {
 
 /// All verbs of the program, as its own main makes them.
 void add_all(CLI::App& app, Command& command) {
-  for (const auto add : {add_solve, add_run, add_submit, add_status, add_watch, add_studies,
-                         add_workers, add_cancel, add_pause, add_resume, add_retry, add_query,
-                         add_sql, add_paper, add_converge, add_fit, add_backup, add_check}) {
+  for (const auto add :
+       {add_solve, add_run, add_submit, add_status, add_watch, add_studies, add_workers, add_cancel,
+        add_pause, add_resume, add_retry, add_query, add_sql, add_paper, add_converge, add_fit,
+        add_merge, add_backup, add_check}) {
     add(app, command);
   }
 }

@@ -10,6 +10,7 @@
 #include "proto/recipe/canonical.h"
 #include "proto/recipe/model_message.h"
 #include "server/care/diagnosis.h"
+#include "server/care/merge.h"
 #include "server/care/salvage.h"
 #include "server/database/row_checksum.h"
 #include "server/reading/reader.h"
@@ -115,6 +116,20 @@ TEST_P(OldDatabaseTest, IsBroughtToThePresentSchemaAndKeepsItsStudies) {
   store.commit(std::vector<Change>{SetStudyState{3, StudyState::kPaused, "now"}});
   EXPECT_EQ(store.studies()[0].state, StudyState::kPaused);
   EXPECT_THAT(find_faults(path_), IsEmpty());
+}
+
+TEST_P(OldDatabaseTest, IsMergedIntoAPresentOneAndStaysAsItWas) {
+  const std::string target = folder_.file("target.db");
+  for (const std::uint64_t added : {1U, 0U}) {
+    const Merged merged = Merger(target).merge(path_, {}, [](auto, auto) {});
+    EXPECT_EQ(merged.studies_added, added);
+    EXPECT_EQ(merged.results_added, added);
+  }
+  EXPECT_THAT(texts("PRAGMA user_version"), ElementsAre(std::to_string(GetParam())));
+  EXPECT_THAT(find_faults(target), IsEmpty());
+  Store store(target);
+  EXPECT_EQ(store.studies().at(0).state, StudyState::kCancelled);
+  EXPECT_EQ(store.studies().at(0).settled, IntervalSet(2, 3));
 }
 
 TEST_P(OldDatabaseTest, HasTheColumnsAndViewsOfANewOneAfterwards) {

@@ -1,0 +1,131 @@
+#include "server/care/merged_references.h"
+
+#include <cstddef>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "server/care/table_columns.h"
+
+namespace oblique::server {
+namespace {
+
+[[noreturn]] void missing(const char* what, std::int64_t number) {
+  throw StorageError(fmt::format(
+      "a result names {} {}, which is not there: `oblique check` tells more", what, number));
+}
+
+/// The columns of a model but its number, the definition first.
+std::vector<std::string> columns_of_models(sqlite3* target) {
+  std::vector<std::string> columns{"definition"};
+  for (const std::string& name : columns_of(target, "models")) {
+    if (name != "model_id" && name != "definition") {
+      columns.push_back(name);
+    }
+  }
+  return columns;
+}
+
+std::int64_t highest(sqlite3* target, const std::string& sql) {
+  Statement statement(target, sql);
+  return statement.step() ? statement.integer(0) : 0;
+}
+
+std::string marks(std::size_t count) {
+  std::string text = "?";
+  for (std::size_t i = 1; i < count; ++i) {
+    text += ", ?";
+  }
+  return text;
+}
+
+}  // namespace
+
+MergedModels::MergedModels(sqlite3* source, sqlite3* target)
+    : MergedModels(source, target, columns_of_models(target)) {}
+
+MergedModels::MergedModels(sqlite3* source, sqlite3* target,
+                           const std::vector<std::string>& columns)
+    : read_(source, fmt::format("SELECT {} FROM models WHERE model_id = ?",
+                                present_values_sql(schema_of(source), "models",
+                                                   fmt::format("{}", fmt::join(columns, ", "))))),
+      find_(target, "SELECT model_id FROM models WHERE definition = ?"),
+      insert_(target, fmt::format("INSERT INTO models (model_id, {}) VALUES ({})",
+                                  fmt::join(columns, ", "), marks(columns.size() + 1))),
+      last_(highest(target, "SELECT max(model_id) FROM models")) {}
+
+std::int64_t MergedModels::in_target(std::int64_t in_source) {
+  constexpr std::size_t kMostKnown = 65536;
+  if (const auto known = known_.find(in_source); known != known_.end()) {
+    return known->second;
+  }
+  read_.bind(1, in_source);
+  if (!read_.step()) {
+    missing("model", in_source);
+  }
+  find_.bind_column(1, read_, 0);
+  std::int64_t number = find_.step() ? find_.integer(0) : 0;
+  find_.reset();
+  if (number == 0) {
+    number = ++last_;
+    insert_.bind(1, number);
+    for (int column = 0; column < read_.columns(); ++column) {
+      insert_.bind_column(column + 2, read_, column);
+    }
+    insert_.run();
+  }
+  read_.reset();
+  if (known_.size() >= kMostKnown) {
+    known_.clear();
+  }
+  known_.emplace(in_source, number);
+  return number;
+}
+
+MergedWorkers::MergedWorkers(sqlite3* source, sqlite3* target)
+    : read_(source,
+            "SELECT name, threads, solver_version, instruction_set, joined_at FROM workers"
+            " WHERE worker_id = ?"),
+      insert_(target,
+              "INSERT INTO workers (worker_id, name, threads, solver_version, instruction_set,"
+              " joined_at) VALUES (?, ?, ?, ?, ?, ?)"),
+      last_(highest(target, "SELECT max(worker_id) FROM workers")) {
+  Statement all(target,
+                "SELECT name, threads, solver_version, instruction_set, joined_at, worker_id"
+                " FROM workers");
+  while (all.step()) {
+    there_.emplace(session_in(all), all.integer(5));
+  }
+}
+
+std::string MergedWorkers::session_in(const Statement& row) {
+  std::string session;
+  for (int column = 0; column < 5; ++column) {
+    const std::string value = row.text(column);
+    session += fmt::format("{} {} ", value.size(), value);
+  }
+  return session;
+}
+
+std::int64_t MergedWorkers::in_target(std::int64_t in_source) {
+  if (const auto known = known_.find(in_source); known != known_.end()) {
+    return known->second;
+  }
+  read_.bind(1, in_source);
+  if (!read_.step()) {
+    missing("worker", in_source);
+  }
+  const auto [there, is_new] = there_.try_emplace(session_in(read_), last_ + 1);
+  if (is_new) {
+    last_ = there->second;
+    insert_.bind(1, last_);
+    for (int column = 0; column < 5; ++column) {
+      insert_.bind_column(column + 2, read_, column);
+    }
+    insert_.run();
+  }
+  read_.reset();
+  known_.emplace(in_source, there->second);
+  return there->second;
+}
+
+}  // namespace oblique::server

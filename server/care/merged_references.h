@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "server/database/sqlite.h"
+
+// What results refer to, of a database that is merged, in the target.
+namespace oblique::server {
+
+/// Models. Two of one definition are one.
+class MergedModels {
+ public:
+  /// The source must have `model_definition`.
+  MergedModels(sqlite3* source, sqlite3* target);
+
+  /// The number in the target of the model that has this one in the source; it is brought there
+  /// when it is not. Throws StorageError when the source has none.
+  std::int64_t in_target(std::int64_t in_source);
+
+ private:
+  MergedModels(sqlite3* source, sqlite3* target, const std::vector<std::string>& columns);
+
+  Statement read_;
+  Statement find_;
+  Statement insert_;
+  std::int64_t last_ = 0;
+  std::unordered_map<std::int64_t, std::int64_t> known_;  // some of them
+};
+
+/// Sessions of workers. Two that began at one instant under one name are one.
+class MergedWorkers {
+ public:
+  MergedWorkers(sqlite3* source, sqlite3* target);
+
+  /// As of MergedModels.
+  std::int64_t in_target(std::int64_t in_source);
+
+ private:
+  static std::string session_in(const Statement& row);
+
+  Statement read_;
+  Statement insert_;
+  std::int64_t last_ = 0;
+  std::unordered_map<std::string, std::int64_t> there_;  // by all that is known of the session
+  std::unordered_map<std::int64_t, std::int64_t> known_;
+};
+
+}  // namespace oblique::server

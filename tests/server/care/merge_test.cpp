@@ -1,0 +1,325 @@
+#include "server/care/merge.h"
+
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/care/diagnosis.h"
+#include "server/database/sqlite.h"
+#include "server/store/store.h"
+#include "tests/support/points.h"
+#include "tests/support/temporary_folder.h"
+
+namespace oblique::server {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using Table = std::shared_ptr<const protocol::PointTable>;
+
+/// Results of one study in one database.
+struct Part {
+  std::string study = "a";
+  Table table = table_of(10);
+  std::uint64_t first = 0;
+  std::uint64_t end = 0;
+  std::string solver_version = "0.1";
+  std::string worker = "host";
+  std::vector<std::uint64_t> failed{};
+  StudyTerms terms{};
+  double closure = 0.0;  ///< added to that of each result
+};
+
+class MergeTest : public testing::Test {
+ protected:
+  std::string file(const std::string& name) const { return folder_.file(name + ".db"); }
+
+  /// A database with these studies and results; some may be there already.
+  void store(const std::string& name, const std::vector<Part>& parts) const {
+    Store store(file(name));
+    for (const Part& part : parts) {
+      commit(store, part);
+    }
+  }
+
+  static void commit(Store& store, const Part& part) {
+    const auto studies = store.studies();
+    const auto known = std::find_if(studies.begin(), studies.end(),
+                                    [&](const auto& study) { return study.name == part.study; });
+    const bool is_new = known == studies.end();
+    const std::uint64_t study = is_new ? store.last_study_id() + 1 : known->study_id;
+    const std::uint64_t worker = store.last_worker_id() + 1;
+    std::vector<Change> changes;
+    if (is_new) {
+      changes.emplace_back(
+          AddStudy{study, part.study, part.table, "2024-01-01T00:00:00.000Z", part.terms});
+    }
+    changes.emplace_back(AddWorker{worker, part.worker, 1, part.solver_version, "avx2", "then"});
+    AddResults results{study, part.table, worker, part.solver_version, "avx2", 1, "now", {}};
+    for (std::uint64_t point = part.first; point < part.end; ++point) {
+      const bool failed =
+          std::find(part.failed.begin(), part.failed.end(), point) != part.failed.end();
+      protocol::PointResult result =
+          failed ? protocol::failed_point(point, "why") : solved_point(point);
+      if (!failed && part.closure != 0.0) {
+        solver::CaseResult other = protocol::from_message(result);
+        other.energy.closure += part.closure;
+        result = protocol::to_message(point, other);
+      }
+      results.results.push_back(std::move(result));
+    }
+    changes.emplace_back(std::move(results));
+    store.commit(changes);
+  }
+
+  Merged merge(const std::string& source, const MergeSettings& settings = {}) const {
+    return Merger(file("all")).merge(file(source), settings, [](auto, auto) {});
+  }
+
+  std::string refusal(const std::string& source, const MergeSettings& settings = {}) const {
+    try {
+      merge(source, settings);
+    } catch (const MergeRefused& error) {
+      return error.what();
+    }
+    return "it was merged";
+  }
+
+  std::vector<std::string> texts(const std::string& name, const std::string& sql) const {
+    const DatabaseHandle database = open_database(file(name), SQLITE_OPEN_READWRITE);
+    Statement statement(database.get(), sql);
+    std::vector<std::string> found;
+    while (statement.step()) {
+      found.push_back(statement.text(0));
+    }
+    return found;
+  }
+  std::string text(const std::string& name, const std::string& sql) const {
+    return texts(name, sql).at(0);
+  }
+
+  test::TemporaryFolder folder_;
+};
+
+TEST_F(MergeTest, StudiesOfSeveralDatabasesStandInOneWithAllTheirRows) {
+  store("one", {{.study = "a", .end = 10}, {.study = "b", .end = 3, .worker = "other host"}});
+  store("two", {{.study = "c", .end = 7, .failed = {2}}});
+  EXPECT_EQ(merge("one").studies_added, 2U);
+  const Merged two = merge("two");
+  EXPECT_EQ(two.studies_added, 1U);
+  EXPECT_EQ(two.results_added, 7U);
+  EXPECT_THAT(texts("all",
+                    "SELECT study || ' ' || count(*) || ' ' || worker_name || ' ' ||"
+                    " sum(status = 'failed') FROM runs GROUP BY study ORDER BY study"),
+              ElementsAre("a 10 host 0", "b 3 other host 0", "c 7 host 1"));
+  EXPECT_THAT(find_faults(file("all")), IsEmpty());
+  for (const char* table : {"peaks", "phases", "stick_intervals", "reaction_peaks"}) {
+    const std::string sum = std::string("SELECT count(*) FROM ") + table;
+    EXPECT_EQ(std::stoi(text("all", sum)),
+              std::stoi(text("one", sum)) + std::stoi(text("two", sum)));
+  }
+}
+
+TEST_F(MergeTest, OutputsKeepTheirBits) {
+  store("one", {{.study = "x", .end = 2}, {.study = "a", .first = 2, .end = 10}});
+  store("all", {{.study = "z", .end = 4}});
+  merge("one");
+  const std::string outputs =
+      "SELECT group_concat(quote(H) || quote(mu) || quote(fn_peak_N) || quote(closure) ||"
+      " quote(peaks) || quote(reaction_peaks) || quote(steps) || quote(wall_s) || solved_at)"
+      " FROM (SELECT * FROM runs WHERE study = 'a' ORDER BY point)";
+  EXPECT_EQ(text("all", outputs), text("one", outputs));
+}
+
+TEST_F(MergeTest, PointsOfOneStudyAreUnitedAndItIsDoneWhenNoneIsLeft) {
+  store("all", {{.end = 4}});
+  store("one", {{.first = 4, .end = 7}});
+  store("two", {{.first = 5, .end = 10}});
+  EXPECT_EQ(merge("one").studies_united, 1U);
+  EXPECT_EQ(text("all", "SELECT state FROM studies"), "running");
+  const Merged two = merge("two");
+  EXPECT_EQ(two.results_added, 3U);
+  EXPECT_EQ(two.results_known, 2U);
+  EXPECT_EQ(two.results_differing, 0U);
+  EXPECT_EQ(text("all", "SELECT state FROM studies"), "done");
+  EXPECT_THAT(find_faults(file("all")), IsEmpty());
+  EXPECT_EQ(Store(file("all")).studies().at(0).settled, IntervalSet(0, 10));
+}
+
+TEST_F(MergeTest, WhatWasMergedBeforeIsPassedOver) {
+  store("one", {{.end = 6, .failed = {3}}});
+  Store(file("one")).commit(std::vector<Change>{ForgetFailures{1, IntervalSet(3, 4), "now"}});
+  merge("one");
+  const Merged again = merge("one");
+  EXPECT_EQ(again.studies_added, 0U);
+  EXPECT_EQ(again.results_added, 0U);
+  EXPECT_EQ(again.results_known, 5U);
+  for (const char* table : {"studies", "models", "workers", "retries"}) {
+    EXPECT_EQ(text("all", std::string("SELECT count(*) FROM ") + table), "1") << table;
+  }
+  store("one", {{.first = 6, .end = 8, .worker = "late"}});
+  EXPECT_EQ(merge("one").results_added, 2U);
+}
+
+TEST_F(MergeTest, ADatabaseIsMergedAsItIsWhileAServerHasIt) {
+  Store served(file("one"));
+  commit(served, {.end = 3});
+  EXPECT_EQ(merge("one").results_added, 3U);
+  commit(served, {.first = 3, .end = 5});
+  EXPECT_EQ(merge("one").results_added, 2U);
+}
+
+TEST_F(MergeTest, OneThatAServerHasIsNotMergedInto) {
+  store("one", {{.end = 3}});
+  const Store served(file("all"));
+  EXPECT_THROW(merge("one"), StorageError);
+}
+
+TEST_F(MergeTest, ARowThatIsThereStaysAndThoseThatDifferAreCountedAndNamed) {
+  store("all", {{.end = 5}});
+  store("one", {{.end = 10, .closure = 1e-12}});
+  const std::string before = text("all", "SELECT quote(closure) FROM results WHERE point = 2");
+  const Merged merged = merge("one");
+  EXPECT_EQ(merged.results_known, 5U);
+  EXPECT_EQ(merged.results_differing, 5U);
+  EXPECT_THAT(merged.remarks.at(2), HasSubstr("study a, point 2 differs in closure"));
+  EXPECT_EQ(text("all", "SELECT quote(closure) FROM results WHERE point = 2"), before);
+}
+
+TEST_F(MergeTest, OfManyThatDifferSomeAreNamed) {
+  store("all", {{.table = table_of(1000), .end = 1000}});
+  store("one", {{.table = table_of(1000), .end = 1000, .closure = 1e-12}});
+  const Merged merged = merge("one");
+  EXPECT_EQ(merged.results_differing, 1000U);
+  EXPECT_EQ(merged.remarks.size(), 10U);
+}
+
+TEST_F(MergeTest, APointThatFailedGivesWayToASolvedOneAndNotTheOtherWay) {
+  store("all", {{.end = 10, .failed = {1, 2}}});
+  store("one", {{.end = 10, .failed = {2, 3}}});
+  const Merged merged = merge("one");
+  EXPECT_EQ(merged.failures_replaced, 1U);
+  EXPECT_EQ(merged.results_added, 1U);
+  EXPECT_EQ(merged.results_known, 9U);
+  EXPECT_EQ(text("all", "SELECT group_concat(point) FROM results WHERE status = 'failed'"), "2");
+  EXPECT_THAT(find_faults(file("all")), IsEmpty());
+}
+
+TEST_F(MergeTest, ANameThatAnotherRecipeHasRefusesTheWholeDatabaseAndNamesAllSuch) {
+  store("all", {{.study = "a", .end = 1}, {.study = "b", .end = 1}});
+  store("one", {{.study = "new", .end = 5},
+                {.study = "b", .table = table_of(11), .end = 5},
+                {.study = "a", .table = table_of(12), .end = 5}});
+  const std::string reason = refusal("one");
+  EXPECT_THAT(reason, HasSubstr("a study called \"a\""));
+  EXPECT_THAT(reason, HasSubstr("a study called \"b\""));
+  EXPECT_THAT(reason, HasSubstr("--rename-prefix"));
+  EXPECT_EQ(text("all", "SELECT count(*) FROM studies"), "2");
+  EXPECT_EQ(text("all", "SELECT count(*) FROM results"), "2");
+}
+
+TEST_F(MergeTest, APrefixRenamesOnlyStudiesWhoseNamesAreTakenAndTheSameTheNextTime) {
+  store("all", {{.study = "a", .end = 1}});
+  store("one", {{.study = "a", .table = table_of(11), .end = 5}, {.study = "b", .end = 2}});
+  EXPECT_EQ(merge("one", {.rename_prefix = "lab "}).studies_added, 2U);
+  EXPECT_THAT(texts("all", "SELECT name FROM studies ORDER BY name"),
+              ElementsAre("a", "b", "lab a"));
+  EXPECT_EQ(merge("one", {.rename_prefix = "lab "}).results_known, 7U);
+  store("two", {{.study = "a", .table = table_of(12), .end = 5}});
+  EXPECT_THAT(refusal("two", {.rename_prefix = "lab "}), HasSubstr("\"lab a\""));
+  EXPECT_THAT(refusal("two", {.rename_prefix = std::string(100, 'x')}), HasSubstr("bytes"));
+}
+
+TEST_F(MergeTest, TwoStudiesThatBecomeOneByANewNameAreUnited) {
+  store("all", {{.study = "a", .table = table_of(11), .end = 1}});
+  store("one", {{.study = "a", .end = 4},
+                {.study = "lab a", .end = 6},
+                {.study = "a", .first = 4, .end = 9}});
+  const Merged merged = merge("one", {.rename_prefix = "lab "});
+  EXPECT_EQ(merged.results_added, 9U);
+  EXPECT_EQ(merged.results_known, 6U);
+  EXPECT_THAT(find_faults(file("all")), IsEmpty());
+}
+
+TEST_F(MergeTest, ResultsOfAnotherSolverVersionAreRefusedUnlessVersionsMayMix) {
+  store("all", {{.end = 4}});
+  store("one", {{.study = "b", .end = 4}, {.first = 4, .end = 7, .solver_version = "0.2"}});
+  EXPECT_THAT(refusal("one"), HasSubstr("solver version 0.2"));
+  EXPECT_EQ(text("all", "SELECT count(*) FROM studies"), "1");
+  EXPECT_EQ(merge("one", {.rename_prefix = "", .mixes_versions = true}).results_added, 7U);
+  EXPECT_EQ(text("all", "SELECT mixes_versions FROM studies WHERE name = 'a'"), "1");
+}
+
+TEST_F(MergeTest, AStudyThatMixesVersionsElsewhereMixesThemHere) {
+  store("all", {{.end = 4}});
+  store("one", {{.first = 4, .end = 7, .solver_version = "0.2", .terms = {0, 1.0, true}}});
+  EXPECT_EQ(merge("one").results_added, 3U);
+  EXPECT_EQ(text("all", "SELECT mixes_versions FROM studies"), "1");
+}
+
+TEST_F(MergeTest, ARowThatIsNotAsItWasStoredRefusesTheWholeDatabase) {
+  store("one", {{.study = "b", .end = 2}, {.end = 9}});
+  texts("one", "UPDATE results SET fn_peak_N = fn_peak_N + 1 WHERE point = 8");
+  EXPECT_THROW(merge("one"), StorageError);
+  EXPECT_EQ(text("all", "SELECT count(*) FROM studies"), "0");
+  texts("one", "UPDATE results SET checksum = NULL, study_id = 77 WHERE point = 8");
+  EXPECT_THROW(merge("one"), StorageError) << "of a study that is not there";
+}
+
+TEST_F(MergeTest, WhatIsMergedIsNotChangedAndItsStateGoesAlong) {
+  store("one", {{.end = 5, .terms = {7, 2.5, false}}});
+  Store(file("one")).commit(std::vector<Change>{SetStudyState{1, StudyState::kPaused, "later"}});
+  const auto bytes = [&] {
+    std::ifstream stream(file("one"), std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(stream), {});
+  };
+  const std::string before = bytes();
+  merge("one");
+  EXPECT_EQ(bytes(), before);
+  EXPECT_EQ(text("all",
+                 "SELECT state || ' ' || priority || ' ' || weight || ' ' || created_at ||"
+                 " ' ' || changed_at FROM studies"),
+            "paused 7 2.5 2024-01-01T00:00:00.000Z later");
+}
+
+TEST_F(MergeTest, KilledInTheMiddleItLeavesWhatWasThereAndIsDoneByTheNextTry) {
+  store("all", {{.study = "before", .end = 5}});
+  store("one", {{.table = table_of(20'000), .end = 20'000}});
+  const pid_t child = fork();
+  if (child == 0) {
+    Merger(file("all")).merge(file("one"), {}, [](auto looked_at, auto) {
+      if (looked_at > 10'000) {
+        kill(getpid(), SIGKILL);
+      }
+    });
+    _exit(EXIT_SUCCESS);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  ASSERT_TRUE(WIFSIGNALED(status));
+  EXPECT_THAT(find_faults(file("all")), IsEmpty());
+  EXPECT_EQ(Store(file("all")).studies().size(), 1U);
+  EXPECT_EQ(merge("one").results_added, 20'000U);
+}
+
+TEST_F(MergeTest, OnlyADatabaseOfOursIsMerged) {
+  std::ofstream(file("notes")) << "not a database, and long enough to be sure of it";
+  EXPECT_THROW(merge("notes"), StorageError);
+  EXPECT_THROW(merge("nowhere"), StorageError);
+  EXPECT_EQ(text("all", "SELECT count(*) FROM studies"), "0");
+}
+
+}  // namespace
+}  // namespace oblique::server
