@@ -138,6 +138,8 @@ class Scheduler {
   /// `loss`: who went with it without an answer; nothing: its points are given back.
   void end_lease(LeaseId lease, const std::optional<Loss>& loss);
   std::vector<Interval> held_by(const Lease& lease) const;
+  /// Whether points of its batch have no answer yet.
+  bool has_open_points(const Lease& lease) const;
   void release_if_answered(LeaseId lease);
   void remove_worker(WorkerId worker, WorkerEnd how);
   void learn_pace(Worker& worker, const ResultsReceived& event);

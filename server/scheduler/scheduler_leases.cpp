@@ -57,15 +57,15 @@ std::vector<Interval> Scheduler::held_by(const Lease& lease) const {
   return held.within(lease.batch.first_point, lease.batch.end());
 }
 
+bool Scheduler::has_open_points(const Lease& lease) const {
+  const IntervalSet& leased = studies_.at(lease.study).points.leased_set();
+  return !leased.within(lease.batch.first_point, lease.batch.end()).empty();
+}
+
 /// A batch whose points were all answered by others is nobody's work any more.
 void Scheduler::release_if_answered(LeaseId id) {
   const auto lease = leases_.find(id);
-  if (lease == leases_.end()) {
-    return;
-  }
-  const Batch& batch = lease->second.batch;
-  const IntervalSet& leased = studies_.at(lease->second.study).points.leased_set();
-  if (leased.within(batch.first_point, batch.end()).empty()) {
+  if (lease != leases_.end() && !has_open_points(lease->second)) {
     effects_.emplace_back(ReleaseBatch{lease->second.worker, id});
     end_lease(id, std::nullopt);
   }

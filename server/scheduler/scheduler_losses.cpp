@@ -136,7 +136,8 @@ void Scheduler::note_answers(Worker& worker, const ResultsReceived& event, bool 
   }
   if (solved || any_accepted) {
     process.lost_in_a_row = 0;
-  } else if (is_its_lease && event.batch_done && event.outcomes.empty()) {
+  } else if (is_its_lease && event.batch_done && event.outcomes.empty() &&
+             has_open_points(lease->second)) {
     ++process.lost_in_a_row;
     ++process.losses;
   }

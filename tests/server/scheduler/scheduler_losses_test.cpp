@@ -163,6 +163,27 @@ TEST(SchedulerLosses, AProcessLostThreeTimesInARowIsSetAsideUntilItSolvesAProbe)
   EXPECT_FALSE(bench.scheduler.worker(5, bench.now_ms).is_set_aside);
 }
 
+TEST(SchedulerLosses, ABatchWhosePointsWereAllAnsweredBeforeItEndedIsNone) {
+  SchedulerBench bench;
+  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  const SendBatch batch = bench.join(1, 1).at(0);
+  ResultsReceived answers{1, 1, batch.lease, 1, false, 1e-3, {}};
+  for (std::uint64_t i = 0; i < batch.count; ++i) {
+    answers.outcomes.push_back({batch.first_point + i, false});
+  }
+  bench.feed(answers);
+  bench.feed(ResultsReceived{1, 1, batch.lease, 2, true, 0.0, {}});
+  EXPECT_EQ(bench.scheduler.worker(1, bench.now_ms).losses, 0U);
+}
+
+TEST(SchedulerLosses, ABatchThatEndsWithoutAnAnswerIsOne) {
+  SchedulerBench bench;
+  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  const SendBatch batch = bench.join(1, 1).at(0);
+  bench.feed(ResultsReceived{1, 1, batch.lease, 1, true, 0.0, {}});
+  EXPECT_EQ(bench.scheduler.worker(1, bench.now_ms).losses, 1U);
+}
+
 TEST(SchedulerLosses, ANewConnectionOfAProcessEndsItsOldOneAtOnce) {
   SchedulerBench bench;
   bench.feed(StudyAdded{1, table_of(1), {}});
