@@ -1,12 +1,20 @@
 #include "proto/address.h"
 
+#include <netdb.h>
+#include <sys/socket.h>
+
 #include <charconv>
+#include <memory>
 #include <string_view>
 
 namespace oblique::protocol {
+namespace {
+
+constexpr std::string_view kScheme = "tcp://";
+
+}  // namespace
 
 std::string objection_to_address(const std::string& url) {
-  constexpr std::string_view kScheme = "tcp://";
   constexpr int kHighestPort = 65535;
   if (!url.starts_with(kScheme)) {
     return {};
@@ -18,6 +26,32 @@ std::string objection_to_address(const std::string& url) {
   return is_number && port >= 1 && port <= kHighestPort
              ? ""
              : "its port must be a number from 1 to 65535";
+}
+
+std::string host_of(const std::string& url) {
+  if (!url.starts_with(kScheme)) {
+    return {};
+  }
+  const std::string host = url.substr(kScheme.size(), url.rfind(':') - kScheme.size());
+  const bool is_bracketed = host.size() >= 2 && host.front() == '[' && host.back() == ']';
+  return is_bracketed ? host.substr(1, host.size() - 2) : host;
+}
+
+Families families_of(const std::string& host) {
+  addrinfo wanted{};
+  wanted.ai_family = AF_UNSPEC;
+  wanted.ai_socktype = SOCK_STREAM;
+  addrinfo* found = nullptr;
+  if (getaddrinfo(host.c_str(), nullptr, &wanted, &found) != 0) {
+    return {};
+  }
+  const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> addresses(found, &freeaddrinfo);
+  Families families;
+  for (const addrinfo* address = found; address != nullptr; address = address->ai_next) {
+    families.has_v4 = families.has_v4 || address->ai_family == AF_INET;
+    families.has_v6 = families.has_v6 || address->ai_family == AF_INET6;
+  }
+  return families;
 }
 
 }  // namespace oblique::protocol

@@ -8,4 +8,18 @@ namespace oblique::protocol {
 /// with a port from 1 to 65535. Addresses of other kinds pass.
 std::string objection_to_address(const std::string& url);
 
+/// The host of such an address, as 127.0.0.1, fe80::1%eth0 (without brackets) or a name; empty
+/// where it is none.
+std::string host_of(const std::string& url);
+
+/// Families of a host's addresses.
+struct Families {
+  bool has_v4 = false;
+  bool has_v6 = false;
+};
+
+/// Of a host that is written as a number, or of what a name has at present: none when nobody knows
+/// it. Looking a name up may take seconds where those who should know do not answer.
+Families families_of(const std::string& host);
+
 }  // namespace oblique::protocol

@@ -76,7 +76,10 @@ void Session::open_socket() {
       .longest_pause_ms = static_cast<int>(settings_.conversation.longest_backoff_ms)};
   socket_.reset();
   socket_ = protocol::made_dealer(context_, settings);
-  protocol::connect(*socket_, settings);
+  if (!std::exchange(was_heard_, false)) {
+    ++attempt_;
+  }
+  protocol::connect(*socket_, settings, attempt_);
 }
 
 int Session::run(int stop_descriptor, const std::function<void()>& on_stop) {
@@ -139,6 +142,7 @@ void Session::receive_all() {
       spdlog::warn("a frame of {} bytes that is no message was dropped", frame.size());
       continue;
     }
+    was_heard_ = true;
     apply(conversation_.on_message(message, now_ms()));
   }
 }

@@ -54,6 +54,8 @@ class Session {
   const SessionSettings settings_;
   zmq::context_t context_;
   std::optional<zmq::socket_t> socket_;
+  unsigned attempt_ = 0;   ///< to connect: which of the families of addresses the host has is tried
+  bool was_heard_ = true;  ///< something came over this socket
   protocol::WakeUp batch_ended_;
   Conversation conversation_;
   std::optional<int> exit_code_;

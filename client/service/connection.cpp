@@ -15,7 +15,7 @@ namespace oblique::client {
 namespace {
 
 /// A server that says nothing for so long is away.
-constexpr std::chrono::seconds kSilence{3};
+constexpr std::chrono::milliseconds kSilence{3'000};
 
 std::string seconds_of(std::chrono::milliseconds time) {
   return fmt::format("{} s", solver::exact_number(static_cast<double>(time.count()) / 1000.0));
@@ -49,25 +49,35 @@ Connection::Connection(ConnectionSettings settings, KeepWaiting keep_waiting)
   protocol::connect(socket_, dealer_settings(settings_));
 }
 
-bool Connection::is_due(const Outstanding& outstanding) {
+bool Connection::is_unsent(const Outstanding& outstanding) {
   const auto connections = monitor_.connections();
   // What an earlier connection took may have been lost with it.
-  return connections > 0 && (outstanding.sent_over != connections ||
-                             Clock::now() - outstanding.sent > outstanding.resend_after);
+  return connections > 0 && outstanding.sent_over != connections;
 }
 
-void Connection::send_if_due(Outstanding& outstanding) {
-  const auto connections = monitor_.connections();
-  if (!is_due(outstanding) ||
-      !socket_.send(zmq::buffer(outstanding.frame), zmq::send_flags::dontwait)) {
+void Connection::send_or_connect_again(Outstanding& outstanding) {
+  const auto now = Clock::now();
+  if (is_unsent(outstanding) &&
+      socket_.send(zmq::buffer(outstanding.frame), zmq::send_flags::dontwait)) {
+    outstanding.sent_over = monitor_.connections();
+    outstanding.sent = now;
     return;
   }
-  if (outstanding.sent_over == connections) {
+  // A connection over which nothing comes may be dead, and only its ends do not know.
+  const bool has_connected = monitor_.connections() > connections_before_;
+  const auto patience = has_connected ? outstanding.resend_after : kSilence;
+  if (now - std::max(outstanding.sent, connecting_since_) <= patience) {
+    return;
+  }
+  if (has_connected) {
     constexpr std::chrono::milliseconds kLongestPause{60'000};
     outstanding.resend_after = std::min(2 * outstanding.resend_after, kLongestPause);
+  } else {
+    ++attempt_;
   }
-  outstanding.sent_over = connections;
-  outstanding.sent = Clock::now();
+  connections_before_ = monitor_.connections();
+  connecting_since_ = now;
+  protocol::connect_again(socket_, dealer_settings(settings_), attempt_);
 }
 
 void Connection::wait_a_slice(bool to_send) {
@@ -124,8 +134,8 @@ protocol::ClientReply Connection::answer_to(const protocol::ClientRequest& reque
   const std::chrono::milliseconds timeout(settings_.timeout_ms);
   bool said_silent = false;
   while (tell || Clock::now() - outstanding.heard < timeout) {
-    send_if_due(outstanding);
-    wait_a_slice(is_due(outstanding));
+    send_or_connect_again(outstanding);
+    wait_a_slice(is_unsent(outstanding));
     if (auto reply = received(request.request_id())) {
       if (std::exchange(said_silent, false)) {
         tell(fmt::format("{} answers again", settings_.server_url));
@@ -167,7 +177,8 @@ protocol::ClientReply Connection::call(protocol::ClientRequest request, const Te
   auto reply = answer_to(request,
                          {.frame = std::move(frame),
                           .heard = Clock::now(),
-                          .resend_after = std::chrono::milliseconds(settings_.resend_after_ms)},
+                          .resend_after = std::chrono::milliseconds(settings_.resend_after_ms),
+                          .sent = Clock::now()},
                          tell);
   if (reply.has_error() && reply.error().wrong_request()) {
     throw solver::InputError(reply.error().message());

@@ -19,7 +19,7 @@ namespace oblique::client {
 struct ConnectionSettings {
   std::string server_url{"tcp://127.0.0.1:7600"};
   std::int64_t timeout_ms = 10'000;  ///< for one answer
-  /// A request of which nothing was heard for so long is sent again over the same connection, and
+  /// A request of which nothing was heard for so long is sent again over a new connection, and
   /// again after twice as long.
   std::int64_t resend_after_ms = 3'000;
 };
@@ -92,7 +92,7 @@ class Connection {
     std::string frame;
     Clock::time_point heard;                 ///< when the server last gave a sign, or the start
     std::chrono::milliseconds resend_after;  ///< since `sent`
-    Clock::time_point sent = {};             ///< when it was last sent
+    Clock::time_point sent;                  ///< when it was last sent, or the start
     std::uint64_t sent_over = 0;             ///< connection that took it; 0: none has
     Clock::time_point word = {};             ///< when the server last said that it has it
     std::optional<bool> runs = {};           ///< what it said: the query runs, or waits
@@ -101,10 +101,11 @@ class Connection {
   protocol::ClientReply call(protocol::ClientRequest request, const Tell& tell = {});
   protocol::ClientReply answer_to(const protocol::ClientRequest& request, Outstanding outstanding,
                                   const Tell& tell);
-  /// Whether to send the request now, for the first time or once more.
-  bool is_due(const Outstanding& outstanding);
-  /// Sends it if that is due and a connection takes it.
-  void send_if_due(Outstanding& outstanding);
+  /// Whether no connection has taken it, or only one that there was before the present one.
+  bool is_unsent(const Outstanding& outstanding);
+  /// Sends it if a connection takes it that has not yet; connects again when nothing was heard for
+  /// long.
+  void send_or_connect_again(Outstanding& outstanding);
   /// Waits for the next frame, a connection, or the end of a slice of time.
   void wait_a_slice(bool to_send);
   /// The server has the query and works on it. For a call that waits for ever that is sign enough.
@@ -119,6 +120,9 @@ class Connection {
   zmq::context_t context_;
   zmq::socket_t socket_;
   SocketMonitor monitor_;
+  unsigned attempt_ = 0;  ///< to connect: which family of addresses is tried
+  Clock::time_point connecting_since_ = Clock::now();
+  std::uint64_t connections_before_ = 0;  ///< the present attempt to connect began
   std::uint64_t last_request_id_ = 0;
 };
 

@@ -13,6 +13,10 @@ struct KeepAlive {
   int unacknowledged_ms = 20'000;  ///< what was sent and stays unacknowledged so long ends it too
 };
 
+/// An attempt to connect that is not answered is given up after this and made anew. The system
+/// would wait ever longer between its own, up to a minute after the network is back.
+inline constexpr int kConnectTimeout_ms = 3000;
+
 /// Messages that a worker's or client's socket keeps in either direction.
 inline constexpr int kQueuedMessages = 1000;
 

@@ -15,6 +15,13 @@ namespace {
                            ", as in " + settings.example_url);
 }
 
+/// Whether this attempt to connect is by IPv6. For that libzmq has to be told: it asks for
+/// addresses of one family only, and, for IPv6, for such of IPv4 where a name has none.
+bool is_by_v6(const std::string& url, unsigned attempt) {
+  const auto [has_v4, has_v6] = families_of(host_of(url));
+  return has_v6 && (!has_v4 || attempt % 2 == 1);
+}
+
 }  // namespace
 
 zmq::socket_t made_dealer(zmq::context_t& context, const DealerSettings& settings) {
@@ -30,6 +37,7 @@ zmq::socket_t made_dealer(zmq::context_t& context, const DealerSettings& setting
   socket.set(zmq::sockopt::rcvhwm, kQueuedMessages);
   socket.set(zmq::sockopt::reconnect_ivl, settings.shortest_pause_ms);
   socket.set(zmq::sockopt::reconnect_ivl_max, settings.longest_pause_ms);
+  socket.set(zmq::sockopt::connect_timeout, kConnectTimeout_ms);
   socket.set(zmq::sockopt::tcp_keepalive, 1);
   socket.set(zmq::sockopt::tcp_keepalive_idle, kKeepAlive.idle_s);
   socket.set(zmq::sockopt::tcp_keepalive_intvl, kKeepAlive.interval_s);
@@ -38,12 +46,18 @@ zmq::socket_t made_dealer(zmq::context_t& context, const DealerSettings& setting
   return socket;
 }
 
-void connect(zmq::socket_t& socket, const DealerSettings& settings) {
+void connect(zmq::socket_t& socket, const DealerSettings& settings, unsigned attempt) {
   try {
+    socket.set(zmq::sockopt::ipv6, is_by_v6(settings.url, attempt));
     socket.connect(settings.url);
   } catch (const zmq::error_t& error) {
     refuse(settings, std::string(error.what()) + ": write tcp://HOST:PORT");
   }
+}
+
+void connect_again(zmq::socket_t& socket, const DealerSettings& settings, unsigned attempt) {
+  socket.disconnect(settings.url);
+  connect(socket, settings, attempt);
 }
 
 }  // namespace oblique::protocol

@@ -20,8 +20,14 @@ struct DealerSettings {
 /// does not connect yet. Throws solver::InputError for a `url` that is no address.
 zmq::socket_t made_dealer(zmq::context_t& context, const DealerSettings& settings);
 
-/// Lets it connect, in the background, and again whenever a connection ends. Throws
-/// solver::InputError as above.
-void connect(zmq::socket_t& socket, const DealerSettings& settings);
+/// Lets it connect, in the background, and again whenever a connection ends; a host's name is
+/// looked up each time. A name may have addresses of both families, of which the server need not
+/// listen on both, and each `attempt` tries the other one: IPv4 first. Throws solver::InputError as
+/// above.
+void connect(zmq::socket_t& socket, const DealerSettings& settings, unsigned attempt = 0);
+
+/// Ends the connection, with what it has not delivered yet, and connects anew: for one over which
+/// nothing comes any more, though neither end was told so.
+void connect_again(zmq::socket_t& socket, const DealerSettings& settings, unsigned attempt);
 
 }  // namespace oblique::protocol
