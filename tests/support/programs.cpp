@@ -45,26 +45,34 @@ Outcome run_oblique(const std::vector<std::string>& arguments) {
 Server::Server(const TemporaryFolder& folder, const std::string& database,
                const Environment& environment)
     : ports_(std::make_shared<Ports>()) {
-  start(folder, database, environment);
+  start(folder, arguments(database), environment);
 }
 
 Server::Server(const TemporaryFolder& folder, const std::string& database, const Server& before,
                const Environment& environment)
     : ports_(before.ports_) {
-  start(folder, database, environment);
+  start(folder, arguments(database), environment);
 }
 
-void Server::start(const TemporaryFolder& folder, const std::string& database,
+Server::Server(const TemporaryFolder& folder, const std::vector<std::string>& arguments,
+               const Environment& environment) {
+  start(folder, arguments, environment);
+}
+
+std::vector<std::string> Server::arguments(const std::string& database) const {
+  return {"--db",          database,
+          "--worker-port", ports_->worker.number(),
+          "--client-port", ports_->client.number()};
+}
+
+void Server::start(const TemporaryFolder& folder, std::vector<std::string> arguments,
                    const Environment& environment) {
   std::array<int, 2> ready{};
   if (pipe2(ready.data(), O_CLOEXEC) != 0) {
     throw std::runtime_error("pipe: " + std::string(std::strerror(errno)));
   }
-  process_.emplace(folder, server_program(),
-                   std::vector<std::string>{
-                       "--db", database, "--worker-port", ports_->worker.number(), "--client-port",
-                       ports_->client.number(), "--ready-fd", "3", "--stop-with-parent"},
-                   environment, ready[1]);
+  arguments.insert(arguments.end(), {"--ready-fd", "3", "--stop-with-parent"});
+  process_.emplace(folder, server_program(), arguments, environment, ready[1]);
   close(ready[1]);
   const std::string line = read_line(ready[0]);
   close(ready[0]);

@@ -19,14 +19,18 @@ std::string worker_program();
 Outcome run_oblique(const TemporaryFolder& folder, const std::vector<std::string>& arguments);
 Outcome run_oblique(const std::vector<std::string>& arguments);
 
-/// An `oblique-server` on loopback that is ready when constructed.
+/// An `oblique-server` that is ready when constructed.
 class Server {
  public:
-  /// At ports that the system picks, and gives nobody else while this or a successor lives.
+  /// On loopback at ports that the system picks, and gives nobody else while this or a successor
+  /// lives.
   Server(const TemporaryFolder& folder, const std::string& database,
          const Environment& environment = {});
   /// At the same ports as one that has ended.
   Server(const TemporaryFolder& folder, const std::string& database, const Server& before,
+         const Environment& environment = {});
+  /// With these arguments, which say where its database is and where it listens.
+  Server(const TemporaryFolder& folder, const std::vector<std::string>& arguments,
          const Environment& environment = {});
 
   const std::string& worker_url() const { return worker_url_; }
@@ -38,7 +42,8 @@ class Server {
     ReservedPort worker;
     ReservedPort client;
   };
-  void start(const TemporaryFolder& folder, const std::string& database,
+  std::vector<std::string> arguments(const std::string& database) const;
+  void start(const TemporaryFolder& folder, std::vector<std::string> arguments,
              const Environment& environment);
 
   std::shared_ptr<const Ports> ports_;

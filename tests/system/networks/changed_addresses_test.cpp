@@ -1,0 +1,54 @@
+// Machines that get other addresses while a study is solved, and addresses of IPv6.
+#include <gtest/gtest.h>
+
+#include "tests/system/networks/study_on_lan.h"
+
+namespace oblique::test {
+namespace {
+
+using ChangedAddresses = StudyOnLan;
+
+TEST_F(ChangedAddresses, TheMachineOfTheOnlyWorkerGetsAnotherAddress) {
+  goes_on_after([this] { worker_hosts_[0]->renumber(13); }, 1);
+}
+
+TEST_F(ChangedAddresses, TheClientsMachineGetsAnotherAddress) {
+  goes_on_after([this] { client_host_->renumber(15); });
+}
+
+TEST_F(ChangedAddresses, TheServersMachineGetsAnotherAddressUnderItsName) {
+  lan_->set_addresses("coordinator", {server_host_->v4()});
+  server_name_ = "coordinator";
+  goes_on_after([this] {
+    server_host_->renumber(12);
+    lan_->set_addresses("coordinator", {server_host_->v4()});
+  });
+}
+
+using IPv6 = StudyOnLan;
+
+TEST_F(IPv6, CarriesAStudyFromEndToEnd) {
+  server_name_ = "[" + server_host_->v6() + "]";
+  goes_on_after([] {});
+}
+
+TEST_F(IPv6, CarriesAStudyOverLinkLocalAddresses) {
+  server_name_ = "[" + server_host_->link_local() + "%eth0]";
+  goes_on_after([] {});
+}
+
+TEST_F(IPv6, IsFoundByName) {
+  lan_->set_addresses("coordinator", {server_host_->v6()});
+  server_name_ = "coordinator";
+  goes_on_after([] {});
+}
+
+TEST_F(IPv6, IsTriedWhereNobodyAnswersAtTheAddressOfIPv4OfTheSameName) {
+  lan_->set_addresses("coordinator", {server_host_->v4(), server_host_->v6()});
+  server_name_ = "coordinator";
+  start_server(server_host_->v6());
+  goes_on_after([] {});
+}
+
+}  // namespace
+}  // namespace oblique::test

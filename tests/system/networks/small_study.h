@@ -1,0 +1,36 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "tests/support/database.h"
+#include "tests/support/process.h"
+
+namespace oblique::test {
+
+#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
+constexpr int kPointsOfAnAxis = 30;  ///< sanitized programs are some twenty times slower
+#else
+constexpr int kPointsOfAnAxis = 120;
+#endif
+
+/// As many as a worker solves in a second or two: a dozen such studies run at a time.
+constexpr double kPoints = kPointsOfAnAxis * kPointsOfAnAxis;
+
+/// The words after `oblique` by which a client submits the study and watches it to its end.
+std::vector<std::string> submit_and_watch(const std::string& server_url);
+
+/// Waits until so many points have a row.
+void wait_for_rows(const Database& database, double at_least);
+
+/// The watching `client` learns that the study has ended, each point has one row, none failed, and
+/// by `workers`, what `oblique workers --format json` wrote, none is taken for one that is lost
+/// again and again.
+void expect_completed(Process& client, const Database& database,
+                      const std::function<std::string()>& workers);
+
+/// Prints what was measured beside the test's own lines.
+void print_measured(const std::string& what, double time_s);
+
+}  // namespace oblique::test
