@@ -12,10 +12,10 @@ namespace oblique::test {
 #if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
 constexpr int kPointsOfAnAxis = 30;  ///< sanitized programs are some twenty times slower
 #else
-constexpr int kPointsOfAnAxis = 120;
+constexpr int kPointsOfAnAxis = 80;
 #endif
 
-/// As many as a worker solves in a second or two: a dozen such studies run at a time.
+/// As many as a worker solves in a second: a dozen such studies run at a time.
 constexpr double kPoints = kPointsOfAnAxis * kPointsOfAnAxis;
 
 /// The words after `oblique` by which a client submits the study and watches it to its end.
