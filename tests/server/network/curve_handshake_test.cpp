@@ -185,6 +185,14 @@ TEST_F(CurveZmtpTest, AFlippedBitAnywhereInAHandshakeLetsNobodyIn) {
     bytes[at] = static_cast<char>(static_cast<unsigned>(bytes[at]) ^ (1U << at % 8));
     return bytes;
   };
+  for (std::size_t at = 0; at < kGreetingBytes; ++at) {
+    Zmtp zmtp = server();
+    static_cast<void>(zmtp.take_answers());
+    const std::string answers =
+        say(zmtp, flipped(curve_greeting(), at) + zmtp_command("HELLO", client().hello()));
+    EXPECT_EQ(answers.empty(), !zmtp.fault().empty()) << at;  // some bytes say nothing
+    EXPECT_FALSE(zmtp.is_open()) << at;
+  }
   const std::size_t hello_bytes = 2 + 6 + 194;
   for (std::size_t at = 0; at < hello_bytes; ++at) {
     Zmtp zmtp = server();
@@ -237,6 +245,30 @@ TEST_F(CurveZmtpTest, AnInitiateForAnotherConnectionsWelcomeIsRefusedWhileThatOn
   refusal_of(others, initiate_frame(anna.initiate()));
   static_cast<void>(say(hers, initiate_frame(anna.initiate())));
   EXPECT_TRUE(hers.is_open());
+}
+
+TEST_F(CurveZmtpTest, AnOldCookieIsWorthNothingInANewHandshake) {
+  CurveClient anna = client();
+  Zmtp earlier = server();
+  be_welcomed(earlier, anna);
+  const std::string old_cookie = anna.cookie;
+  Zmtp zmtp = server();
+  be_welcomed(zmtp, anna);
+  anna.cookie = old_cookie;
+  EXPECT_EQ(refusal_of(zmtp, initiate_frame(anna.initiate())), error_frame("500"));
+}
+
+TEST_F(CurveZmtpTest, AHandshakeIsNotDoneTwiceOnOneConnection) {
+  for (const bool says_hello : {true, false}) {
+    Zmtp zmtp = server();
+    CurveClient anna = client();
+    CurveClient again = anna;
+    be_welcomed(zmtp, anna);
+    const std::string initiate = initiate_frame(anna.initiate());
+    static_cast<void>(say(zmtp, initiate));
+    ASSERT_TRUE(zmtp.is_open());
+    expect_silence_and_end(zmtp, says_hello ? zmtp_command("HELLO", again.hello()) : initiate);
+  }
 }
 
 TEST_F(CurveZmtpTest, CommandsOutOfTurnAreRefused) {

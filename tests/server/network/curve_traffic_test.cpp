@@ -21,7 +21,7 @@ TEST_F(CurveZmtpTest, AFlippedBitAnywhereInAMessageIsNoMessage) {
     static_cast<void>(shake_hands(zmtp, anna));
     std::string bytes = anna.sealed("body");
     ASSERT_EQ(bytes.size(), frame_bytes);
-    // The bit of a frame's first byte that says that it is a command says nothing here.
+    // A sealed frame may be a command or a message.
     bytes[at] = static_cast<char>(static_cast<unsigned>(bytes[at]) ^ (at == 0 ? 2U : 1U << at % 8));
     static_cast<void>(say(zmtp, bytes));
     EXPECT_FALSE(zmtp.has_message()) << at;
@@ -63,6 +63,19 @@ TEST_F(CurveZmtpTest, AFrameIsOpenedWhenItsTurnHasComeAndNothingAfterItIsLookedA
   EXPECT_EQ(zmtp.waiting_work(), Zmtp::Work::kNone);
   EXPECT_EQ(zmtp.take_message().body, "first");
   EXPECT_EQ(zmtp.waiting_work(), Zmtp::Work::kSealedFrame);
+}
+
+TEST_F(CurveZmtpTest, SealedFramesMayComeAsCommandsAsTheStandardHasThem) {
+  Zmtp zmtp = server();
+  CurveClient anna = client();
+  static_cast<void>(shake_hands(zmtp, anna));
+  for (const std::string& body : {std::string("short"), std::string(5000, 'l')}) {
+    std::string bytes = anna.sealed(body);
+    bytes[0] = static_cast<char>(static_cast<unsigned>(bytes[0]) | kFrameCommand);
+    static_cast<void>(say(zmtp, bytes));
+    ASSERT_TRUE(zmtp.has_message());
+    EXPECT_EQ(zmtp.take_message().body, body);
+  }
 }
 
 TEST_F(CurveZmtpTest, AMessageThatNeverEndsTakesNoMemory) {
