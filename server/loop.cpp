@@ -41,6 +41,25 @@ Instant now() {
           duration_cast<milliseconds>(std::chrono::system_clock::now().time_since_epoch()).count()};
 }
 
+/// Null when nothing is to be shown over HTTP, or cannot be and need not.
+std::unique_ptr<Web> web_of(const LoopSettings& settings) {
+  if (!settings.web) {
+    return nullptr;
+  }
+  WebSettings web = *settings.web;
+  web.database = settings.database;
+  web.solver_version = settings.service.solver_version;
+  try {
+    return std::make_unique<Web>(std::move(web));
+  } catch (const std::runtime_error& error) {
+    if (!settings.web->may_be_missing) {
+      throw;
+    }
+    spdlog::warn("no metrics over HTTP: {}", error.what());
+    return nullptr;
+  }
+}
+
 /// Throws StorageError for a path where a database would be in danger.
 const std::string& safe_path(const LoopSettings& settings) {
   const std::string objection = objection_to_shared_disk(settings.database);
@@ -63,7 +82,8 @@ class Loop::Parts final : public Outbox {
         reader_([this](ReadReport r) { requests_read_.put(std::array{std::move(r)}); }),
         network_(settings.network),
         workers_(network_.listen(doors_.address(), settings.worker_port)),
-        clients_(network_.listen(doors_.address(), settings.client_port)) {
+        clients_(network_.listen(doors_.address(), settings.client_port)),
+        web_(web_of(settings)) {
     if (store_.is_new()) {
       spdlog::info("made the database {}: only its owner can read it (chmod lets others)",
                    settings.database);
@@ -105,6 +125,7 @@ class Loop::Parts final : public Outbox {
       if (Clock::now() >= next_tick) {
         service_->tick(now());
         look_at_doors();
+        show();
         next_tick = Clock::now() + kTick;
       }
       if (service_->storage_is_gone() && !farewell_until) {
@@ -119,7 +140,7 @@ class Loop::Parts final : public Outbox {
     return forward_to_worker(identity, protocol::encode(message));
   }
   Delivery forward_to_worker(const std::string& identity, const std::string& frame) override {
-    return network_.send(identity, frame);
+    return sent(network_.send(identity, frame), frame, worker_traffic_);
   }
   bool is_busy(const std::string& identity) const override { return network_.is_busy(identity); }
   bool to_client(const std::string& identity, const protocol::ClientReply& reply) override {
@@ -129,7 +150,7 @@ class Loop::Parts final : public Outbox {
     if (is_ending_) {
       last_answered_.push_back(identity);
     }
-    return network_.send(identity, frame) != Delivery::kGone;
+    return sent(network_.send(identity, frame), frame, client_traffic_) != Delivery::kGone;
   }
   void write(WriteJob job) override { writer_.submit(std::move(job)); }
   bool query(QueryJob job) override { return queries_.submit(std::move(job)); }
@@ -142,8 +163,22 @@ class Loop::Parts final : public Outbox {
 
   std::string client_endpoint() const { return network_.endpoint(clients_); }
   std::string worker_endpoint() const { return network_.endpoint(workers_); }
+  std::string http_url() const { return web_ ? web_->url() : std::string(); }
 
  private:
+  static Delivery sent(Delivery delivery, std::string_view frame, PortTraffic& traffic) {
+    traffic.sent_bytes += delivery == Delivery::kGone ? 0 : frame.size();
+    return delivery;
+  }
+
+  void show() {
+    if (web_) {
+      web_->tick({*service_, network_, writer_, clients_, client_traffic_, workers_,
+                  worker_traffic_, ended_connections_},
+                 now().steady_ms);
+    }
+  }
+
   void take_reports() {
     for (const auto& report : written_.take()) {
       service_->written(std::get<WriteReport>(report), now());
@@ -159,7 +194,8 @@ class Loop::Parts final : public Outbox {
   /// True when messages are left that could be taken at once.
   bool take_worker_messages() {
     return take_messages(
-        workers_, [this](const std::string& worker) { return service_->has_room_for(worker); },
+        workers_, worker_traffic_,
+        [this](const std::string& worker) { return service_->has_room_for(worker); },
         [this](const Incoming& incoming) {
           service_->worker_frame(incoming.identity, frame_of(incoming), now());
         });
@@ -168,16 +204,19 @@ class Loop::Parts final : public Outbox {
   /// The same. Who does not take what it asked for is not asked what it wants next.
   bool take_client_messages() {
     return take_messages(
-        clients_, [this](const std::string& client) { return !network_.is_busy(client); },
+        clients_, client_traffic_,
+        [this](const std::string& client) { return !network_.is_busy(client); },
         [this](const Incoming& incoming) {
           service_->client_frame(incoming.identity, frame_of(incoming), now());
         });
   }
 
   template <typename Take>
-  bool take_messages(Network::Port port, const Network::MayTake& may_take, const Take& take) {
+  bool take_messages(Network::Port port, PortTraffic& traffic, const Network::MayTake& may_take,
+                     const Take& take) {
     const auto until = Clock::now() + kShareOfTurn;
     while (const auto incoming = network_.next(port, may_take)) {
+      traffic.received_bytes += incoming->message.body.size();
       take(*incoming);
       if (Clock::now() >= until) {
         return true;
@@ -225,6 +264,7 @@ class Loop::Parts final : public Outbox {
     is_ending_ = true;
     queries_.stop();
     service_->stop(now());
+    show();
     const auto until = Clock::now() + kLongestDrain;
     bool has_more = true;
     while (has_more && Clock::now() < until) {
@@ -271,6 +311,9 @@ class Loop::Parts final : public Outbox {
   Network network_;
   Network::Port workers_;
   Network::Port clients_;
+  PortTraffic client_traffic_;
+  PortTraffic worker_traffic_;
+  std::unique_ptr<Web> web_;
   std::uint64_t ended_connections_ = 0;
   std::array<std::uint64_t, kRefusalCauses> refused_{};  ///< by cause
   bool is_ending_ = false;
@@ -286,6 +329,9 @@ std::string Loop::client_endpoint() const {
 }
 std::string Loop::worker_endpoint() const {
   return parts_->worker_endpoint();
+}
+std::string Loop::http_url() const {
+  return parts_->http_url();
 }
 LoopEnd Loop::run(int stop_fd) {
   return parts_->run(stop_fd);

@@ -2,11 +2,13 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "server/doors/listening.h"
 #include "server/network/network.h"
 #include "server/service/service.h"
+#include "server/web/web.h"
 
 namespace oblique::server {
 
@@ -18,7 +20,8 @@ struct LoopSettings {
   std::string client_port = "7600";
   QueryPoolSettings queries;
   NetworkLimits network;
-  ServiceSettings service;  ///< solver_version must be set; the rest from the database
+  std::optional<WebSettings> web;  ///< database and solver version are those of the server
+  ServiceSettings service;         ///< solver_version must be set; the rest from the database
 };
 
 /// What the loop ended with.
@@ -42,6 +45,8 @@ class Loop {
   /// As ZeroMQ endpoints with the ports that are really used.
   std::string client_endpoint() const;
   std::string worker_endpoint() const;
+  /// As http://127.0.0.1:7602; empty: nothing is shown over HTTP.
+  std::string http_url() const;
 
   /// Runs until `stop_fd` becomes readable, or a little longer than the database is there; then
   /// tells the workers, makes what was received durable, acknowledges it and returns.

@@ -32,13 +32,13 @@ std::string with_last_words(const std::string& what, const ChildProcess& child) 
 }
 
 ChildSettings server_settings(const ServiceSettings& settings, int ready) {
-  ChildSettings child{
-      .program = sibling_program("oblique-server"),
-      .arguments = {"--no-config", "--db", settings.database.string(), "--worker-port", "0",
-                    "--client-port", "0", "--ready-fd", std::to_string(ChildProcess::kHandedOver),
-                    "--stop-with-parent", std::to_string(getpid())},
-      .show_errors = settings.verbose,
-      .handed_over = ready};
+  ChildSettings child{.program = sibling_program("oblique-server"),
+                      .arguments = {"--no-config", "--db", settings.database.string(),
+                                    "--worker-port", "0", "--client-port", "0", "--http", "off",
+                                    "--ready-fd", std::to_string(ChildProcess::kHandedOver),
+                                    "--stop-with-parent", std::to_string(getpid())},
+                      .show_errors = settings.verbose,
+                      .handed_over = ready};
   if (settings.allow_network_disk) {
     child.arguments.emplace_back("--allow-network-disk");
   }

@@ -21,6 +21,8 @@ class Descriptor {
 
   int number() const { return number_; }
   bool is_open() const { return number_ >= 0; }
+  /// Another owner closes it from now on.
+  int release() { return std::exchange(number_, -1); }
   void close() {
     if (is_open()) {
       ::close(std::exchange(number_, -1));

@@ -72,6 +72,12 @@ Network::Port Network::listen(const std::string& address, const std::string& por
 
 // ---- What comes -------------------------------------------------------------------------------
 
+std::size_t Network::connections(Port port) const {
+  return static_cast<std::size_t>(
+      std::count_if(peers_.begin(), peers_.end(),
+                    [port](const auto& peer) { return peer.second->port == port; }));
+}
+
 void Network::collect(std::int64_t now_ms) {
   has_unopened_ = false;
   std::array<epoll_event, 256> events;

@@ -108,6 +108,7 @@ class Network {
   /// Who has gone since the last call.
   std::vector<Departure> take_departures();
   std::size_t connections() const { return peers_.size(); }
+  std::size_t connections(Port port) const;
   /// Memory for messages that have not come whole, or were not taken.
   std::size_t held_in_bytes() const { return held_in_bytes_; }
   /// Bytes that the system has not taken yet.

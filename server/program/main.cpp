@@ -28,6 +28,7 @@
 #include "server/loop.h"
 #include "server/program/limits.h"
 #include "server/queries/reader_program.h"
+#include "server/web/http_options.h"
 #include "worker/solver/model/version.h"
 
 namespace {
@@ -44,6 +45,7 @@ struct Options {
   LoopSettings loop;
   std::uint16_t worker_port = 7601;
   std::uint16_t client_port = 7600;
+  oblique::server::HttpOptions http;
   int ready_fd = -1;
   oblique::protocol::LogSettings log;
 };
@@ -68,10 +70,11 @@ std::string objection_to_descriptor(const std::string& text) {
 }
 
 void tell_ready(int fd, const Loop& loop) {
-  const std::string line =
-      nlohmann::json{{"client", loop.client_endpoint()}, {"worker", loop.worker_endpoint()}}
-          .dump() +
-      "\n";
+  nlohmann::json ends{{"client", loop.client_endpoint()}, {"worker", loop.worker_endpoint()}};
+  if (!loop.http_url().empty()) {
+    ends["http"] = loop.http_url();
+  }
+  const std::string line = ends.dump() + "\n";
   if (::write(fd, line.data(), line.size()) != static_cast<ssize_t>(line.size())) {
     throw std::runtime_error("cannot write to the file descriptor of --ready-fd: " +
                              std::string(std::strerror(errno)));
@@ -88,8 +91,9 @@ int run(const LoopSettings& settings, int ready_fd, const StopWithParent& parent
   }
   take_all_descriptors();
   Loop loop(settings);
-  spdlog::info("database {}, clients at {}, workers at {}", settings.database,
-               loop.client_endpoint(), loop.worker_endpoint());
+  spdlog::info("database {}, clients at {}, workers at {}, metrics at {}", settings.database,
+               loop.client_endpoint(), loop.worker_endpoint(),
+               loop.http_url().empty() ? "no address" : loop.http_url() + "/metrics");
   if (ready_fd >= 0) {
     tell_ready(ready_fd, loop);
   }
@@ -123,6 +127,7 @@ void add_options(CLI::App& app, Configuration& configuration, StopWithParent& pa
                                "File descriptor that gets one line of JSON with both endpoints "
                                "once the server can be used; -1: none")
                     ->check(objection_to_descriptor);
+  options.http.add_to(app);
   configuration.keep_to_command_line(ready);
   configuration.keep_to_command_line(parent.add_to(app));
   add_log_flags(app, configuration, options.log);
@@ -139,6 +144,7 @@ std::optional<int> finish_options(const CLI::App& app, const Configuration& conf
                                std::to_string(options.worker_port) + ": they must differ");
     }
     (void)oblique::server::address_to_bind(loop.doors);
+    loop.web = options.http.settings();
   } catch (const std::runtime_error& error) {
     return oblique::protocol::tell_wrong_usage(app.get_name(), error.what());
   }

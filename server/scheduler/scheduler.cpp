@@ -150,6 +150,30 @@ StudyCounts Scheduler::study(StudyId id) const {
           lacks_worker};
 }
 
+PointCounts Scheduler::points(StudyId id) const {
+  const Study& study = studies_.at(id);
+  return {study.points.size(), study.points.settled(), study.failed, study.points.leased()};
+}
+
+std::array<Crew, kCrewStates> Scheduler::crews(std::int64_t now_ms,
+                                               std::int64_t silent_after_ms) const {
+  std::array<Crew, kCrewStates> crews{};
+  for (const auto& [id, worker] : workers_) {
+    CrewState state = CrewState::kIdle;
+    if (now_ms - worker.last_heard_ms >= silent_after_ms) {
+      state = CrewState::kSilent;
+    } else if (is_set_aside(worker)) {
+      state = CrewState::kSetAside;
+    } else if (!worker.leases.empty() || worker.probe != 0) {
+      state = CrewState::kWorking;
+    }
+    Crew& crew = crews.at(static_cast<std::size_t>(state));
+    ++crew.workers;
+    crew.threads += worker.threads;
+  }
+  return crews;
+}
+
 std::int64_t Scheduler::silent_ms(WorkerId id, std::int64_t now_ms) const {
   return std::max<std::int64_t>(0, now_ms - workers_.at(id).last_heard_ms);
 }

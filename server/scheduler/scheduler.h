@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <map>
@@ -8,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "server/scheduler/histogram.h"
 #include "server/scheduler/lease_index.h"
 #include "server/scheduler/points/study_points.h"
 #include "server/scheduler/scheduler_events.h"
@@ -25,6 +28,35 @@ struct StudyCounts {
   bool cancelled;
   std::string solver_version;  ///< that its results have; empty while there are none
   bool lacks_worker;           ///< points wait, and no worker has that version
+};
+
+/// The points of a study by where they are; costs nothing to ask for.
+struct PointCounts {
+  std::uint64_t points;
+  std::uint64_t settled;  ///< the failed ones too
+  std::uint64_t failed;
+  std::uint64_t leased;
+
+  std::uint64_t open() const { return points - settled; }
+};
+
+/// What a worker does; of several the first that is true.
+enum class CrewState {
+  kSilent,    ///< nothing came of it lately
+  kSetAside,  ///< it gets nothing until it has solved a probe
+  kWorking,   ///< it holds a batch
+  kIdle,
+};
+inline constexpr std::size_t kCrewStates = 4;
+constexpr const char* crew_name(CrewState state) {
+  constexpr std::array kNames{"silent", "set_aside", "working", "idle"};
+  return kNames.at(static_cast<std::size_t>(state));
+}
+
+/// Workers that do the same.
+struct Crew {
+  std::uint64_t workers = 0;
+  std::uint64_t threads = 0;
 };
 
 struct WorkerCounts {
@@ -53,6 +85,16 @@ class Scheduler {
 
   /// Throws std::out_of_range for an unknown study.
   StudyCounts study(StudyId study) const;
+  /// The same.
+  PointCounts points(StudyId study) const;
+  /// All workers, by CrewState. Those count as silent of which nothing came for so long.
+  std::array<Crew, kCrewStates> crews(std::int64_t now_ms, std::int64_t silent_after_ms) const;
+  /// Batches that are at workers.
+  std::size_t leases() const { return leases_.size(); }
+  /// From handing a batch out to its last result, in s.
+  const Histogram& batch_s() const { return batch_s_; }
+  /// Time of a thread that a point takes, over the last results, in s; 0: not known.
+  double thread_s_per_point() const { return pace_points_ > 0.0 ? pace_s_ / pace_points_ : 0.0; }
   /// Throws std::out_of_range for an unknown worker.
   WorkerCounts worker(WorkerId worker, std::int64_t now_ms) const;
   /// Since its last message. Throws std::out_of_range for an unknown worker.
@@ -197,6 +239,9 @@ class Scheduler {
   std::int64_t now_ms_ = 0;
   std::int64_t last_tick_ms_ = -1;
   Effects effects_;  // of the event being handled
+  Histogram batch_s_{{0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0, 300.0, 1800.0, 7200.0}};
+  double pace_s_ = 0.0;  // of threads, for these points; what is longer ago counts less
+  double pace_points_ = 0.0;
 };
 
 }  // namespace oblique::server

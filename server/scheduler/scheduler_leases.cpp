@@ -11,6 +11,11 @@ namespace {
 /// Weight of the newest measurement in a worker's pace.
 constexpr double kPaceWeight = 0.5;
 
+/// What a message weighs in the pace of all workers when the next has come.
+constexpr double kPaceFades = 0.98;
+/// No point takes longer, and who says so does not count.
+constexpr double kLongestPoint_s = 86'400.0;
+
 }  // namespace
 
 void Scheduler::end_lease(LeaseId id, const std::optional<Loss>& loss) {
@@ -101,6 +106,7 @@ void Scheduler::on(const ResultsReceived& event) {
   }
   const LeaseId twin = lease->second.twin;
   if (event.batch_done) {
+    batch_s_.observe(1e-3 * static_cast<double>(now_ms_ - lease->second.granted_ms));
     // Points of a finished batch that got no answer count as lost, or a worker that never answers
     // them would take them for ever.
     end_lease(event.lease, Loss{kNobody, is_proven(*worker) && worker->leases.size() == 1});
@@ -113,6 +119,10 @@ void Scheduler::learn_pace(Worker& worker, const ResultsReceived& event) {
     return;
   }
   const double s_per_point = event.busy_s / static_cast<double>(event.outcomes.size());
+  if (s_per_point <= kLongestPoint_s) {
+    pace_s_ = kPaceFades * pace_s_ + event.busy_s;
+    pace_points_ = kPaceFades * pace_points_ + static_cast<double>(event.outcomes.size());
+  }
   double& known = worker.paces[event.study].s_per_point;
   known = known > 0.0 ? known + kPaceWeight * (s_per_point - known) : s_per_point;
 }

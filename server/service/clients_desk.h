@@ -59,6 +59,8 @@ class ClientsDesk {
   /// The server stops: who waits here is told, and what is asked from now on is refused.
   void stop();
 
+  QueryCounts query_counts() const { return queries_.counts(); }
+
  private:
   struct LongRequest {
     Client client;

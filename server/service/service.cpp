@@ -64,6 +64,10 @@ void Service::stop(Instant now) {
   clients_.stop();
 }
 
+double Service::points_per_s(std::int64_t now_ms) const {
+  return rates_.points_per_s([this](StudyId id) { return settled_of(id); }, now_ms);
+}
+
 bool Service::has_room_for(std::string_view worker) const {
   const auto known = workers_.find(worker);
   return !known || ledger_.has_room_for(*known);
@@ -99,8 +103,7 @@ void Service::hand_out_or_hold(Instant now) {
 }
 
 std::uint64_t Service::settled_of(StudyId id) const {
-  const StudyCounts counts = scheduler_.study(id);
-  return counts.solved + counts.failed;
+  return scheduler_.points(id).settled;
 }
 
 void Service::perform(const DefineStudy& effect, Turn /*turn*/) {
@@ -232,6 +235,7 @@ void Service::stored(const ResultsWrite& write, Instant now) {
     if (outcome.failed) {
       states_.point_failed(id, outcome.point, write.attempt);
     }
+    ++(outcome.failed ? stored_points_.failed : stored_points_.solved);
   }
   if (!write.event.outcomes.empty()) {
     rates_.note(id, settled_of(id), states_.record(id).since_ms, now.steady_ms);

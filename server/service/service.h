@@ -31,6 +31,12 @@ struct ServiceSettings {
   std::uint64_t last_worker_id = 0;
 };
 
+/// Points that were stored since the service began.
+struct StoredPoints {
+  std::uint64_t solved = 0;
+  std::uint64_t failed = 0;
+};
+
 /// What happens between messages: tells the scheduler what the desks hear and what the database
 /// took, and carries out what it decides. No sockets, no clock, no thread: tests drive it message
 /// by message. README.md draws it. Not thread-safe.
@@ -66,6 +72,13 @@ class Service {
   std::uint64_t bad_frames() const { return bad_frames_.total(); }
   const Scheduler& scheduler() const { return scheduler_; }
   const SettledRates& rates() const { return rates_; }
+  const StudyStates& states() const { return states_; }
+  const WriteLedger& ledger() const { return ledger_; }
+  QueryCounts query_counts() const { return clients_.query_counts(); }
+  const StoredPoints& stored_points() const { return stored_points_; }
+  /// Of all studies, over the last seconds.
+  double points_per_s(std::int64_t now_ms) const;
+  bool is_stopping() const { return stopping_; }
 
  private:
   /// What the events that are fed have in common.
@@ -114,6 +127,7 @@ class Service {
   WorkersDesk workers_;
   StudyChanges changes_;
   ClientsDesk clients_;
+  StoredPoints stored_points_;
   bool stopping_ = false;
   bool holds_batches_ = false;  // as the scheduler knows
 };

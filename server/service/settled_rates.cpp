@@ -42,4 +42,13 @@ double SettledRates::points_per_s(StudyId study, std::uint64_t settled, std::int
          static_cast<double>(now_ms - oldest.at_ms);
 }
 
+double SettledRates::points_per_s(const std::function<std::uint64_t(StudyId)>& settled,
+                                  std::int64_t now_ms) const {
+  double sum = 0.0;
+  for (const auto& [study, samples] : samples_) {
+    sum += points_per_s(study, settled(study), now_ms);
+  }
+  return sum;
+}
+
 }  // namespace oblique::server

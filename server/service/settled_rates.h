@@ -24,6 +24,9 @@ class SettledRates {
 
   /// Points of the study settled a second; `settled` are now.
   double points_per_s(StudyId study, std::uint64_t settled, std::int64_t now_ms) const;
+  /// The same of all studies together; `settled` tells how many points of each are settled.
+  double points_per_s(const std::function<std::uint64_t(StudyId)>& settled,
+                      std::int64_t now_ms) const;
   /// Of so many studies points were settled lately.
   std::size_t studies() const { return samples_.size(); }
 

@@ -3,6 +3,31 @@
 #include <utility>
 
 namespace oblique::server {
+namespace {
+
+bool is_unfinished(StudyState state) {
+  return state == StudyState::kRunning || state == StudyState::kPaused;
+}
+
+}  // namespace
+
+void StudyStates::enter(StudyId id, StudyState state) {
+  ++counts_.at(static_cast<std::size_t>(state));
+  if (is_unfinished(state)) {
+    unfinished_.insert(id);
+  }
+}
+
+void StudyStates::leave(StudyId id, StudyState state) {
+  --counts_.at(static_cast<std::size_t>(state));
+  unfinished_.erase(id);
+}
+
+void StudyStates::set_state(StudyId id, Study& study, StudyState state) {
+  leave(id, study.state);
+  study.state = state;
+  enter(id, state);
+}
 
 void StudyStates::restore(const StoredStudy& stored, std::int64_t now_ms) {
   const bool lacks_rows = stored.settled.size() < stored.table.size();
@@ -11,14 +36,14 @@ void StudyStates::restore(const StoredStudy& stored, std::int64_t now_ms) {
   add(stored.study_id, {stored.name, stored.table, stored.created_at, stored.terms, stored.failures,
                         stored.attempts, now_ms});
   Study& study = studies_.at(stored.study_id);
-  study.state = state;
+  set_state(stored.study_id, study, state);
   study.durable_state = state;
   study.is_durable = true;
 }
 
 void StudyStates::add(StudyId id, StudyRecord record) {
   ids_.emplace(record.name, id);
-  studies_.emplace(id, Study{std::move(record)});
+  enter(id, studies_.emplace(id, Study{std::move(record)}).first->second.state);
 }
 
 void StudyStates::added(StudyId id, std::int64_t now_ms) {
@@ -29,6 +54,7 @@ void StudyStates::added(StudyId id, std::int64_t now_ms) {
 
 void StudyStates::remove(StudyId id) {
   const auto study = studies_.find(id);
+  leave(id, study->second.state);
   ids_.erase(study->second.record.name);
   studies_.erase(study);
 }
@@ -62,7 +88,7 @@ void StudyStates::change(StudyId id, StudyState state) {
   if (study.on_their_way == 0) {
     study.durable_state = study.state;
   }
-  study.state = state;
+  set_state(id, study, state);
   ++study.on_their_way;
 }
 
@@ -78,14 +104,16 @@ void StudyStates::refused(StudyId id) {
   study.is_doubtful = true;
   --study.on_their_way;
   if (study.on_their_way == 0) {
-    study.state = study.durable_state;
+    set_state(id, study, study.durable_state);
   }
 }
 
 bool StudyStates::finish(StudyId id) {
   Study& study = studies_.at(id);
   study.durable_state = StudyState::kDone;
-  return std::exchange(study.state, StudyState::kDone) != StudyState::kDone;
+  const bool is_new = study.state != StudyState::kDone;
+  set_state(id, study, StudyState::kDone);
+  return is_new;
 }
 
 void StudyStates::point_failed(StudyId id, std::uint64_t point, std::uint32_t attempt) {
@@ -99,7 +127,7 @@ void StudyStates::forget_failures(StudyId id, const IntervalSet& points, std::in
   points.for_each(
       [&](const Interval& interval) { study.record.failures.erase(interval.begin, interval.end); });
   if (study.state == StudyState::kDone) {
-    study.state = StudyState::kRunning;
+    set_state(id, study, StudyState::kRunning);
     study.durable_state = StudyState::kRunning;
   }
   study.record.since_ms = now_ms;

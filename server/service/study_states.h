@@ -1,8 +1,11 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 
@@ -53,6 +56,11 @@ class StudyStates {
   bool is_durable(StudyId id) const { return studies_.at(id).is_durable; }
   const StudyRecord& record(StudyId id) const { return studies_.at(id).record; }
 
+  /// Studies by state, by the values of StudyState.
+  const std::array<std::uint64_t, kStudyStates>& counts() const { return counts_; }
+  /// Those that run or are paused, also such as are on their way.
+  const std::set<StudyId>& unfinished() const { return unfinished_; }
+
   /// As it was handed over last: what the study becomes unless that is refused.
   StudyState state(StudyId id) const { return studies_.at(id).state; }
   /// Whether that state must be written to be sure of it. One that is there already must, while
@@ -84,8 +92,14 @@ class StudyStates {
     bool is_durable = false;
   };
 
+  void enter(StudyId id, StudyState state);
+  void leave(StudyId id, StudyState state);
+  void set_state(StudyId id, Study& study, StudyState state);
+
   std::map<StudyId, Study> studies_;
   std::map<std::string, StudyId, std::less<>> ids_;  // by name
+  std::array<std::uint64_t, kStudyStates> counts_{};
+  std::set<StudyId> unfinished_;
 };
 
 }  // namespace oblique::server

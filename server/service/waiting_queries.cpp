@@ -81,6 +81,14 @@ void WaitingQueries::client_left(std::string_view identity) {
   });
 }
 
+QueryCounts WaitingQueries::counts() const {
+  QueryCounts counts;
+  for (const auto& [ticket, query] : queries_) {
+    ++(query.runs ? counts.running : counts.waiting);
+  }
+  return counts;
+}
+
 void WaitingQueries::stop() {
   stopping_ = true;
   for (const auto& [ticket, query] : std::exchange(queries_, {})) {

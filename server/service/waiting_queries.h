@@ -11,6 +11,11 @@
 
 namespace oblique::server {
 
+struct QueryCounts {
+  std::uint64_t waiting = 0;
+  std::uint64_t running = 0;
+};
+
 /// The queries of clients that have no answer yet. Who waits hears of it now and then, by which the
 /// server also finds out that a client is gone; its query is cancelled then. Not thread-safe.
 class WaitingQueries {
@@ -29,6 +34,8 @@ class WaitingQueries {
   void client_left(std::string_view identity);
   /// The server stops: whoever waits or asks is told.
   void stop();
+
+  QueryCounts counts() const;
 
  private:
   struct Query {

@@ -85,6 +85,9 @@ class WriteLedger {
   /// The database is not where it was; nothing can be stored any more.
   bool is_gone() const { return is_gone_; }
   bool is_empty() const { return open_.empty(); }
+  /// So much is not durable yet, and so many bytes of it are messages with results.
+  std::size_t jobs() const { return open_.size(); }
+  std::size_t bytes() const { return bytes_; }
 
   /// No batch should go out: the database takes nothing, or is far behind.
   bool holds_batches() const { return !fault_.empty() || is_behind_; }

@@ -16,6 +16,7 @@
 namespace oblique::server {
 
 enum class StudyState { kRunning, kPaused, kCancelled, kDone };
+inline constexpr std::size_t kStudyStates = 4;
 
 /// As in the column `studies.state`.
 constexpr const char* state_name(StudyState state) {

@@ -100,7 +100,7 @@ void Writer::run() {
       last_round = finishing_;
     }
     const bool was_faulty = commits_.is_faulty();
-    auto reports = jobs.empty() ? commits_.tend() : commits_.write(jobs);
+    auto reports = jobs.empty() ? commits_.tend() : write(jobs);
     if (!reports.empty()) {
       report_(std::move(reports));
     }
@@ -111,6 +111,22 @@ void Writer::run() {
       return;
     }
   }
+}
+
+std::vector<WriteReport> Writer::write(std::deque<WriteJob>& jobs) {
+  const auto began = std::chrono::steady_clock::now();
+  const std::uint64_t rows_before = commits_.rows();
+  auto reports = commits_.write(jobs);
+  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - began;
+  const std::lock_guard lock(mutex_);
+  counts_.duration_s.observe(taken.count());
+  counts_.rows.observe(static_cast<double>(commits_.rows() - rows_before));
+  return reports;
+}
+
+CommitCounts Writer::commits() const {
+  const std::lock_guard lock(mutex_);
+  return counts_;
 }
 
 void Writer::merge_before_the_end() {
@@ -171,7 +187,11 @@ bool GroupCommit::merge(std::vector<WriteReport>& reports) {
   return false;
 }
 
-void GroupCommit::note_ends(std::span<const Change> changes) {
+void GroupCommit::note_committed(std::span<const Change> changes) {
+  for (const Change& change : changes) {
+    const auto* results = std::get_if<AddResults>(&change);
+    rows_ += results == nullptr ? 0 : results->results.size();
+  }
   if (std::any_of(changes.begin(), changes.end(), ends_a_study)) {
     to_be_merged_ = true;
     tries_ = 0;
@@ -205,7 +225,7 @@ bool GroupCommit::write_group(std::deque<WriteJob>& jobs, std::vector<WriteRepor
     put_back();
     return false;  // which of them failed is found by trying each alone
   }
-  note_ends(changes);
+  note_committed(changes);
   if (std::exchange(faulty_, false)) {
     reports.push_back({WriteReport::Kind::kRecovered, 0, {}});
   }
@@ -237,7 +257,7 @@ void GroupCommit::write_singly(std::deque<WriteJob>& jobs, std::vector<WriteRepo
     }
     try {
       storage_.commit({&job.change, 1});
-      note_ends({&job.change, 1});
+      note_committed({&job.change, 1});
       reports.push_back({WriteReport::Kind::kStored, job.ticket, {}});
     } catch (const StorageGone& error) {
       note_gone(error, reports);

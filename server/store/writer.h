@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "server/database/sqlite.h"
+#include "server/scheduler/histogram.h"
 #include "server/store/changes.h"
 
 namespace oblique::server {
@@ -39,6 +40,12 @@ struct WriteReport {
   std::string error;
 };
 
+/// What was committed since the writer began.
+struct CommitCounts {
+  Histogram duration_s{{0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0}};
+  Histogram rows{{1.0, 4.0, 16.0, 64.0, 256.0, 1024.0, 4096.0, 16'384.0, 65'536.0}};  ///< results
+};
+
 /// Writes jobs in groups, one transaction each. No thread and no clock of its own.
 class GroupCommit {
  public:
@@ -50,6 +57,8 @@ class GroupCommit {
   /// changes of one study keep their order also then.
   std::vector<WriteReport> write(std::deque<WriteJob>& jobs);
 
+  /// Results that became durable since this began.
+  std::uint64_t rows() const { return rows_; }
   /// The last write left jobs that the database did not take.
   bool is_faulty() const { return faulty_; }
   /// The database is not where it was; nothing is written any more.
@@ -68,10 +77,11 @@ class GroupCommit {
   bool write_group(std::deque<WriteJob>& jobs, std::vector<WriteReport>& reports);
   void write_singly(std::deque<WriteJob>& jobs, std::vector<WriteReport>& reports);
 
-  void note_ends(std::span<const Change> changes);
+  void note_committed(std::span<const Change> changes);
   void note_gone(const StorageGone& error, std::vector<WriteReport>& reports);
 
   Storage& storage_;
+  std::uint64_t rows_ = 0;
   bool faulty_ = false;
   bool gone_ = false;
   bool to_be_merged_ = false;  // a study is done
@@ -98,16 +108,21 @@ class Writer {
   /// durable.
   std::size_t finish();
 
+  /// From any thread.
+  CommitCounts commits() const;
+
  private:
   void run();
+  std::vector<WriteReport> write(std::deque<WriteJob>& jobs);
   void merge_before_the_end();
 
   GroupCommit commits_;  // of the thread
   Report report_;
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::condition_variable wake_;
   std::deque<WriteJob> queue_;  // guarded by mutex_
   bool finishing_ = false;      // guarded by mutex_
+  CommitCounts counts_;         // guarded by mutex_
   std::size_t left_over_ = 0;   // written by the thread, read after it ended
   std::thread thread_;          // last: it uses all the others
 };

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -31,8 +32,8 @@ class RunningServer {
  public:
   explicit RunningServer(const std::string& database, TurnSettings turns = {},
                          NetworkLimits network = {}, ClientsDeskSettings clients = {},
-                         const DoorSettings& doors = {})
-      : loop_(settings(database, turns, network, clients, doors)) {
+                         const DoorSettings& doors = {}, const std::optional<WebSettings>& web = {})
+      : loop_(settings(database, turns, network, clients, doors, web)) {
     thread_ = std::thread([this] { end_ = loop_.run(stop_fd_); });
   }
   ~RunningServer() { stop(); }
@@ -50,12 +51,14 @@ class RunningServer {
   }
   std::string client_endpoint() const { return loop_.client_endpoint(); }
   std::string worker_endpoint() const { return loop_.worker_endpoint(); }
+  std::string http_url() const { return loop_.http_url(); }
 
  private:
   static LoopSettings settings(const std::string& database, TurnSettings turns,
                                NetworkLimits network, const ClientsDeskSettings& clients,
-                               const DoorSettings& doors) {
+                               const DoorSettings& doors, const std::optional<WebSettings>& web) {
     LoopSettings settings;
+    settings.web = web;
     settings.doors = doors;
     settings.service.clients = clients;
     settings.network = network;

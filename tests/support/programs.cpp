@@ -71,7 +71,8 @@ void Server::start(const TemporaryFolder& folder, std::vector<std::string> argum
   if (pipe2(ready.data(), O_CLOEXEC) != 0) {
     throw std::runtime_error("pipe: " + std::string(std::strerror(errno)));
   }
-  arguments.insert(arguments.end(), {"--ready-fd", "3", "--stop-with-parent"});
+  arguments.insert(arguments.end(),
+                   {"--http", "127.0.0.1:0", "--ready-fd", "3", "--stop-with-parent"});
   process_.emplace(folder, server_program(), arguments, environment, ready[1]);
   close(ready[1]);
   const std::string line = read_line(ready[0]);
@@ -82,6 +83,7 @@ void Server::start(const TemporaryFolder& folder, std::vector<std::string> argum
   }
   worker_url_ = urls.at("worker");
   client_url_ = urls.at("client");
+  http_url_ = urls.at("http");
 }
 
 namespace {

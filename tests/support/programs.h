@@ -35,6 +35,8 @@ class Server {
 
   const std::string& worker_url() const { return worker_url_; }
   const std::string& client_url() const { return client_url_; }
+  /// As http://127.0.0.1:7602, where metrics are.
+  const std::string& http_url() const { return http_url_; }
   Process& process() { return *process_; }
 
  private:
@@ -49,6 +51,7 @@ class Server {
   std::shared_ptr<const Ports> ports_;
   std::string worker_url_;
   std::string client_url_;
+  std::string http_url_;
   std::optional<Process> process_;
 };
 

@@ -1,0 +1,32 @@
+#include "server/web/http_options.h"
+
+#include <CLI/CLI.hpp>
+
+namespace oblique::server {
+
+void HttpOptions::add_to(CLI::App& app) {
+  address_option_ = app.add_option(
+      "--http", address_,
+      "Address and port of metrics and health over HTTP, for whoever reaches it to read; port 0: "
+      "the system picks one; off: none");
+  app.add_option("--http-name", names_,
+                 "Host name by which HTTP is asked, beside numeric addresses and localhost; may be "
+                 "given again");
+}
+
+std::optional<WebSettings> HttpOptions::settings() const {
+  const auto address = http_address_of(address_);
+  if (!address) {
+    return std::nullopt;
+  }
+  WebSettings settings;
+  settings.address = *address;
+  // A second server on a machine need not be told that the first one has the port.
+  settings.may_be_missing = address_option_->count() == 0;
+  for (const std::string& name : names_) {
+    settings.names.insert(CLI::detail::to_lower(name));
+  }
+  return settings;
+}
+
+}  // namespace oblique::server

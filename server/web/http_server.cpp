@@ -1,0 +1,347 @@
+#include "server/web/http_server.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+#include <exception>
+#include <stdexcept>
+#include <string_view>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <microhttpd.h>
+#include <poll.h>
+#include <strings.h>
+#include <sys/socket.h>
+
+#include "proto/system/wake_up.h"
+#include "server/network/listener.h"
+
+namespace oblique::server {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+
+/// While the system has no descriptor for a new connection, it is asked again after so long.
+constexpr milliseconds kAcceptPause{100};
+/// Who waits for an answer is asked for again at least so often.
+constexpr milliseconds kLongestWait{200};
+/// New connections in one turn.
+constexpr int kMostAccepted = 64;
+
+/// To who has not asked yet; nothing of an answer is under way then.
+constexpr std::string_view kTooSlow =
+    "HTTP/1.1 408 Request Timeout\r\nConnection: close\r\nContent-Length: 0\r\n\r\n";
+constexpr std::string_view kCrowded =
+    "HTTP/1.1 503 Service Unavailable\r\nRetry-After: 1\r\nConnection: close\r\n"
+    "Content-Length: 0\r\n\r\n";
+
+/// Without the port; of IPv4 also where it came by an IPv6 socket.
+std::string host_of(const PeerAddress& address) {
+  const std::string text = address.text();
+  return text.substr(0, text.rfind(':'));
+}
+
+RequestHead head_of(MHD_Connection* connection, const char* method) {
+  RequestHead head;
+  head.method = method;
+  const auto take = [](void* into, MHD_ValueKind, const char* key, const char* value) {
+    const auto is = [key](const char* name) { return strcasecmp(key, name) == 0; };
+    RequestHead& taken = *static_cast<RequestHead*>(into);
+    const std::string text = value == nullptr ? "" : value;
+    if (is(MHD_HTTP_HEADER_HOST)) {
+      taken.hosts.push_back(text);
+    } else if (is(MHD_HTTP_HEADER_ORIGIN)) {
+      taken.origins.push_back(text);
+    } else if (is("Sec-Fetch-Site")) {
+      taken.fetch_sites.push_back(text);
+    } else if (is(MHD_HTTP_HEADER_TRANSFER_ENCODING) ||
+               (is(MHD_HTTP_HEADER_CONTENT_LENGTH) && text != "0")) {
+      taken.has_body = true;
+    }
+    return MHD_YES;
+  };
+  MHD_get_connection_values(connection, MHD_HEADER_KIND, take, &head);
+  return head;
+}
+
+void add_headers(MHD_Response* response, const HttpAnswer& answer) {
+  const std::array<std::pair<const char*, const char*>, 7> headers{
+      {{MHD_HTTP_HEADER_CONTENT_TYPE, answer.content_type.c_str()},
+       {MHD_HTTP_HEADER_CONNECTION, "close"},
+       {MHD_HTTP_HEADER_CACHE_CONTROL, "no-store"},
+       {MHD_HTTP_HEADER_X_CONTENT_TYPE_OPTIONS, "nosniff"},
+       {"Content-Security-Policy", "default-src 'none'; frame-ancestors 'none'"},
+       {"Cross-Origin-Resource-Policy", "same-origin"},
+       {"Referrer-Policy", "no-referrer"}}};
+  for (const auto& [name, value] : headers) {
+    MHD_add_response_header(response, name, value);
+  }
+  if (answer.status == MHD_HTTP_METHOD_NOT_ALLOWED) {
+    MHD_add_response_header(response, MHD_HTTP_HEADER_ALLOW, "GET, HEAD");
+  }
+  if (answer.status == MHD_HTTP_SERVICE_UNAVAILABLE) {
+    MHD_add_response_header(response, MHD_HTTP_HEADER_RETRY_AFTER, "1");
+  }
+}
+
+}  // namespace
+
+class HttpServer::Parts {
+ public:
+  Parts(const HttpAddress& address, OwnNames names, const HttpLimits& limits, Answer answer)
+      : names_(std::move(names)),
+        limits_(limits),
+        answer_(std::move(answer)),
+        listener_(address.address, address.port),
+        daemon_(MHD_start_daemon(
+            MHD_USE_EPOLL | MHD_USE_NO_LISTEN_SOCKET | MHD_ALLOW_SUSPEND_RESUME, 0, nullptr,
+            nullptr, &Parts::asked, this, MHD_OPTION_NOTIFY_CONNECTION, &Parts::noticed, this,
+            MHD_OPTION_CONNECTION_MEMORY_LIMIT, limits.bytes_of_connection,
+            MHD_OPTION_CONNECTION_LIMIT, static_cast<unsigned>(2 * limits.connections),
+            MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_END)) {
+    if (daemon_ == nullptr) {
+      throw std::runtime_error("the HTTP server cannot start");
+    }
+    thread_ = std::thread([this] { run(); });
+  }
+  ~Parts() {
+    is_stopping_ = true;
+    wake_up_.wake();
+    thread_.join();
+    MHD_stop_daemon(daemon_);
+  }
+  Parts(const Parts&) = delete;
+  Parts& operator=(const Parts&) = delete;
+
+  const std::string& endpoint() const { return listener_.endpoint(); }
+  void wake() const { wake_up_.wake(); }
+
+ private:
+  struct Peer {
+    int descriptor = -1;
+    std::string address;
+    Clock::time_point since;
+    std::optional<Clock::time_point> asked;
+    bool waits = false;     // suspended
+    bool answered = false;  // an answer is under way
+  };
+  using Peers = std::map<MHD_Connection*, Peer>;
+
+  void run() {
+    std::array<pollfd, 3> items{
+        {{MHD_get_daemon_info(daemon_, MHD_DAEMON_INFO_EPOLL_FD)->epoll_fd, POLLIN, 0},
+         {wake_up_.descriptor(), POLLIN, 0},
+         {listener_.descriptor(), POLLIN, 0}}};
+    while (!is_stopping_) {
+      const auto now = Clock::now();
+      const bool accepts = now >= accept_again_;
+      ::poll(items.data(), accepts ? items.size() : items.size() - 1,
+             static_cast<int>(wait_from(now).count()));
+      wake_up_.clear();
+      end_overdue(Clock::now());
+      accept_all();
+      ask_again();
+      MHD_run(daemon_);
+    }
+    // None may be suspended at the end.
+    ask_again();
+    MHD_run(daemon_);
+  }
+
+  milliseconds wait_from(Clock::time_point now) const {
+    MHD_UNSIGNED_LONG_LONG limit_ms = 0;
+    auto until = now + limits_.longest;
+    if (MHD_get_timeout(daemon_, &limit_ms) == MHD_YES) {
+      until = std::min(until, now + milliseconds(limit_ms));
+    }
+    if (now < accept_again_) {
+      until = std::min(until, accept_again_);
+    }
+    for (const auto& [connection, peer] : peers_) {
+      until = std::min(until, peer.since + limits_.longest);
+      until = peer.waits ? std::min(until, now + kLongestWait) : until;
+    }
+    return std::max(milliseconds(0), std::chrono::ceil<milliseconds>(until - now));
+  }
+
+  void accept_all() {
+    for (int i = 0; i < kMostAccepted; ++i) {
+      Listener::Accepted accepted = listener_.accept();
+      if (!accepted.socket.is_open()) {
+        const bool lacks_room = errno == EMFILE || errno == ENFILE || errno == ENOBUFS;
+        accept_again_ = lacks_room ? Clock::now() + kAcceptPause : accept_again_;
+        return;
+      }
+      const int descriptor = accepted.socket.release();
+      accepted_host_ = host_of(accepted.address);
+      make_room_for(accepted_host_);
+      // It is closed there whether it was taken or not.
+      MHD_add_connection(daemon_, descriptor, accepted.address.system(), accepted.address.bytes());
+      MHD_run(daemon_);  // so that it counts, and those that made room do not
+    }
+  }
+
+  void make_room_for(const std::string& address) {
+    std::map<std::string, std::size_t> counts;
+    for (const auto& [connection, peer] : peers_) {
+      ++counts[peer.address];
+    }
+    const auto most = std::max_element(
+        counts.begin(), counts.end(),
+        [](const auto& one, const auto& other) { return one.second < other.second; });
+    if (counts[address] >= limits_.connections_of_one_address) {
+      end_oldest_of(address);
+    } else if (peers_.size() >= limits_.connections) {
+      end_oldest_of(most->first);
+    }
+  }
+
+  void end_oldest_of(const std::string& address) {
+    auto oldest = peers_.end();
+    for (auto peer = peers_.begin(); peer != peers_.end(); ++peer) {
+      if (peer->second.address == address &&
+          (oldest == peers_.end() || peer->second.since < oldest->second.since)) {
+        oldest = peer;
+      }
+    }
+    if (oldest != peers_.end()) {
+      ++counts_.ended_for_others;
+      end(oldest, kCrowded);
+    }
+  }
+
+  void end_overdue(Clock::time_point now) {
+    for (auto peer = peers_.begin(); peer != peers_.end();) {
+      const auto this_one = peer++;
+      if (now - this_one->second.since >= limits_.longest) {
+        ++counts_.ended_as_slow;
+        end(this_one, kTooSlow);
+      }
+    }
+  }
+
+  /// It is ours no more; the library finds that its socket has ended.
+  void end(Peers::iterator peer, std::string_view last_words) {
+    if (!peer->second.answered) {
+      static_cast<void>(::send(peer->second.descriptor, last_words.data(), last_words.size(),
+                               MSG_DONTWAIT | MSG_NOSIGNAL));
+    }
+    ::shutdown(peer->second.descriptor, SHUT_RDWR);
+    if (peer->second.waits) {
+      MHD_resume_connection(peer->first);
+    }
+    peers_.erase(peer);
+  }
+
+  void ask_again() {
+    for (auto& [connection, peer] : peers_) {
+      if (std::exchange(peer.waits, false)) {
+        MHD_resume_connection(connection);
+      }
+    }
+  }
+
+  static void noticed(void* self, MHD_Connection* connection, void** /*context*/,
+                      MHD_ConnectionNotificationCode what) {
+    Parts& parts = *static_cast<Parts*>(self);
+    if (what == MHD_CONNECTION_NOTIFY_CLOSED) {
+      parts.peers_.erase(connection);
+      return;
+    }
+    const int descriptor =
+        MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD)->connect_fd;
+    parts.peers_[connection] = {descriptor, parts.accepted_host_, Clock::now(), {}};
+  }
+
+  static MHD_Result asked(void* self, MHD_Connection* connection, const char* url,
+                          const char* method, const char* /*version*/, const char* /*upload*/,
+                          std::size_t* upload_bytes, void** state) {
+    Parts& parts = *static_cast<Parts*>(self);
+    const auto peer = parts.peers_.find(connection);
+    if (peer == parts.peers_.end()) {
+      return MHD_NO;  // it was ended
+    }
+    *upload_bytes = 0;
+    try {
+      if (std::exchange(*state, &parts) == nullptr) {  // the head has come
+        const auto refusal = objection_to(head_of(connection, method), parts.names_);
+        return refusal ? parts.send(peer, {refusal->status, kPlainText, refusal->sentence + "\n"})
+                       : MHD_YES;
+      }
+      return parts.answer(peer, url);
+    } catch (const std::exception&) {
+      return MHD_NO;  // no memory: the connection ends
+    }
+  }
+
+  MHD_Result answer(Peers::iterator peer, const char* url) {
+    const auto now = Clock::now();
+    if (!peer->second.asked) {
+      peer->second.asked = now;
+    }
+    const auto waited = std::chrono::duration_cast<milliseconds>(now - *peer->second.asked);
+    counts_.connections = peers_.size();
+    const auto answer = is_stopping_ ? std::nullopt : answer_({url, waited, counts_});
+    if (answer) {
+      return send(peer, *answer);
+    }
+    if (is_stopping_) {
+      return MHD_NO;
+    }
+    peer->second.waits = true;
+    MHD_suspend_connection(peer->first);
+    return MHD_YES;
+  }
+
+  MHD_Result send(Peers::iterator peer, const HttpAnswer& answer) {
+    // The library only reads what it copies.
+    MHD_Response* const response = MHD_create_response_from_buffer(
+        answer.body.size(), const_cast<char*>(answer.body.data()), MHD_RESPMEM_MUST_COPY);
+    if (response == nullptr) {
+      return MHD_NO;
+    }
+    add_headers(response, answer);
+    const MHD_Result queued = MHD_queue_response(peer->first, answer.status, response);
+    MHD_destroy_response(response);
+    peer->second.answered = true;
+    ++counts_.answers[answer.status];
+    return queued;
+  }
+
+  static constexpr const char* kPlainText = "text/plain; charset=utf-8";
+
+  OwnNames names_;
+  HttpLimits limits_;
+  Answer answer_;
+  Listener listener_;
+  protocol::WakeUp wake_up_;
+  std::atomic<bool> is_stopping_ = false;
+  // Of the thread, from here on.
+  Peers peers_;
+  HttpCounts counts_;
+  std::string accepted_host_;  // of the connection that is being taken
+  Clock::time_point accept_again_{};
+  MHD_Daemon* daemon_;
+  std::thread thread_;  // last: it uses all the others
+};
+
+HttpServer::HttpServer(const HttpAddress& address, OwnNames names, const HttpLimits& limits,
+                       Answer answer)
+    : parts_(std::make_unique<Parts>(address, std::move(names), limits, std::move(answer))) {}
+HttpServer::~HttpServer() = default;
+
+std::string HttpServer::url() const {
+  constexpr std::string_view kTcp = "tcp";
+  return "http" + parts_->endpoint().substr(kTcp.size());
+}
+
+void HttpServer::wake() const {
+  parts_->wake();
+}
+
+}  // namespace oblique::server

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace oblique::server {
+
+/// What a request says of itself before it has an answer.
+struct RequestHead {
+  std::string method;
+  bool has_body = false;
+  std::vector<std::string> hosts;        ///< every Host header
+  std::vector<std::string> origins;      ///< every Origin header
+  std::vector<std::string> fetch_sites;  ///< every Sec-Fetch-Site header
+};
+
+/// By what a server may be called in a request. A page of a stranger, opened in a browser on this
+/// machine or near it, can make its own name mean our address (DNS rebinding), and would then read
+/// us as if we were its own site; but it cannot make the browser ask for a name that is not its.
+struct OwnNames {
+  /// Only this machine reaches the server: addresses of other machines are none of its names.
+  bool is_loopback = true;
+  /// Beside numeric addresses and localhost; in lower case.
+  std::set<std::string> names;
+};
+
+struct HttpRefusal {
+  unsigned status;
+  std::string sentence;
+};
+
+/// Why the request gets no answer; nothing: it gets one.
+std::optional<HttpRefusal> objection_to(const RequestHead& head, const OwnNames& own);
+
+/// The host of a Host header, in lower case and without port and brackets: "127.0.0.1" of
+/// "127.0.0.1:7602", "::1" of "[::1]:7602". Nothing when it is malformed.
+std::optional<std::string> host_without_port(const std::string& header);
+
+}  // namespace oblique::server

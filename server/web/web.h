@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <set>
+#include <string>
+
+#include "server/web/http_server.h"
+#include "server/web/snapshot.h"
+
+namespace oblique::server {
+
+struct WebSettings {
+  HttpAddress address;
+  /// A server that finds the address taken goes on without, rather than end.
+  bool may_be_missing = false;
+  std::set<std::string> names;  ///< Host names beside addresses and localhost; in lower case
+  HttpLimits limits;
+  std::string database;  ///< file
+  std::string solver_version;
+};
+
+/// The server as machines of its operator see it: metrics, health, readiness, over HTTP. The loop
+/// is asked for a snapshot only when one is to be shown.
+class Web {
+ public:
+  /// Answers from now on. Throws std::runtime_error, naming the address, when it cannot.
+  explicit Web(WebSettings settings);
+  ~Web();
+  Web(const Web&) = delete;
+  Web& operator=(const Web&) = delete;
+
+  /// As http://127.0.0.1:7602.
+  std::string url() const;
+
+  /// From the loop, several times a second; costs nothing while nobody asks.
+  void tick(const SnapshotSources& sources, std::int64_t now_ms);
+
+ private:
+  class Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace oblique::server
