@@ -170,6 +170,29 @@ TEST_F(RefusedPeersTest, AFloodOfPingsUnderSealDoesNotKeepOthersFromBeingHeard) 
   EXPECT_EQ(next().message.body, "heard");
 }
 
+TEST_F(RefusedPeersTest, FramesThatAreNoMessagesAreOpenedAFewAtATimeAndTheRestIsNotForgotten) {
+  constexpr std::size_t kPings = 200;
+  constexpr std::size_t kPongBytes = 2 + CurveTraffic::kAddedBytes + 5;
+  const auto pinging = admitted();
+  std::string pings;
+  for (std::size_t i = 0; i < kPings; ++i) {
+    pings += pinging->curve.sealed(std::string("\x04PING\0\0", 7), 2);
+  }
+  pinging->tcp.send(pings);
+  // Once they have come the system has no news of this peer: only the network knows of them.
+  turn_until([&] {
+    EXPECT_EQ(network_.next(guarded_, anybody), std::nullopt);
+    return network_.has_more();
+  });
+  std::size_t turns = 1;
+  for (; network_.has_more(); ++turns) {
+    network_.collect(now_ms_);
+    EXPECT_EQ(network_.next(guarded_, anybody), std::nullopt);
+  }
+  EXPECT_GE(turns, 3U);
+  EXPECT_EQ(heard_by(*pinging, kPings * kPongBytes).size(), kPings * kPongBytes);
+}
+
 class TightRefusedPeersTest : public RefusedPeersTest {
  protected:
   static constexpr NetworkLimits kLimits{
