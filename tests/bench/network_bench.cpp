@@ -1,10 +1,13 @@
 // What keys cost the server: each refused peer, and each message.
 //   oblique-network-bench refusals [COUNT]
 //   oblique-network-bench messages
+//   oblique-network-bench flood
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstdio>
 #include <ctime>
+#include <deque>
 #include <fstream>
 #include <functional>
 #include <memory>
@@ -12,6 +15,7 @@
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include <poll.h>
 #include <unistd.h>
@@ -67,7 +71,8 @@ class TurnedNetwork {
   std::string endpoint(Network::Port port) const { return network_.endpoint(port); }
   const protocol::KeyPair& own() const { return own_; }
   const protocol::CurveKey& server_key() const { return server_.public_key; }
-  const Network& network() const { return network_; }
+  /// Connections that have gone, and those that are there. Only when it has stopped.
+  std::uint64_t accepted() const { return departed_ + network_.connections(); }
 
  private:
   void turn() {
@@ -83,7 +88,7 @@ class TurnedNetwork {
           take_(network_, *incoming);
         }
       }
-      network_.take_departures();
+      departed_ += network_.take_departures().size();
     }
     cpu_s_ = thread_cpu_s() - before_s;
   }
@@ -95,6 +100,7 @@ class TurnedNetwork {
   Take take_;
   std::atomic<bool> is_stopped_ = false;
   double cpu_s_ = 0.0;
+  std::uint64_t departed_ = 0;
   std::thread thread_;
 };
 
@@ -157,12 +163,7 @@ struct Cost {
   double cpu_us;      ///< of the server, for one in and one out
 };
 
-Cost measure_messages(std::size_t bytes, bool has_keys, int count) {
-  constexpr int kUnderWay = 64;
-  TurnedNetwork server([](Network& network, const Incoming& incoming) {
-    network.send(incoming.identity, incoming.message.body);
-  });
-  zmq::context_t context;
+zmq::socket_t connected(zmq::context_t& context, const TurnedNetwork& server, bool has_keys) {
   zmq::socket_t socket(context, zmq::socket_type::dealer);
   socket.set(zmq::sockopt::linger, 0);
   if (has_keys) {
@@ -171,6 +172,16 @@ Cost measure_messages(std::size_t bytes, bool has_keys, int count) {
     socket.set(zmq::sockopt::curve_serverkey, zmq::buffer(server.server_key()));
   }
   socket.connect(server.endpoint(has_keys ? 0 : 1));
+  return socket;
+}
+
+Cost measure_messages(std::size_t bytes, bool has_keys, int count) {
+  constexpr int kUnderWay = 64;
+  TurnedNetwork server([](Network& network, const Incoming& incoming) {
+    network.send(incoming.identity, incoming.message.body);
+  });
+  zmq::context_t context;
+  zmq::socket_t socket = connected(context, server, has_keys);
   const std::string body(bytes, 'm');
   const auto start = Clock::now();
   for (int i = 0; i < count + kUnderWay; ++i) {
@@ -199,6 +210,67 @@ void messages() {
   }
 }
 
+// ---- Floods -----------------------------------------------------------------------------------
+
+/// One HELLO, said over and over on new connections: it costs whoever says it nothing.
+void say_hello_without_end(const TurnedNetwork& server, const std::atomic<bool>& is_over) {
+  constexpr std::size_t kAtATime = 200;
+  CurveClient client(protocol::made_key_pair(), server.server_key());
+  const std::string hello = curve_greeting() + zmtp_command("HELLO", client.hello());
+  std::deque<std::unique_ptr<RawPeer>> peers;
+  while (!is_over) {
+    try {
+      peers.push_back(std::make_unique<RawPeer>(server.endpoint(0)));
+      peers.back()->send_what_fits(hello);
+    } catch (const std::runtime_error&) {
+      // it was made to leave
+    }
+    if (peers.size() > kAtATime) {
+      peers.pop_front();
+    }
+  }
+}
+
+void measure_flood(bool is_flooded) {
+  TurnedNetwork server([](Network& network, const Incoming& incoming) {
+    network.send(incoming.identity, incoming.message.body);
+  });
+  zmq::context_t context;
+  zmq::socket_t socket = connected(context, server, true);
+  std::atomic<bool> is_over = false;
+  std::thread flood;
+  if (is_flooded) {
+    flood = std::thread([&] { say_hello_without_end(server, is_over); });
+  }
+  std::vector<double> waits_ms;
+  for (int i = 0; i < 2000; ++i) {
+    const auto start = Clock::now();
+    socket.send(zmq::str_buffer("ask"), zmq::send_flags::none);
+    zmq::message_t echo;
+    if (!socket.recv(echo)) {
+      throw std::runtime_error("no echo");
+    }
+    waits_ms.push_back(std::chrono::duration<double, std::milli>(Clock::now() - start).count());
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  is_over = true;
+  if (flood.joinable()) {
+    flood.join();
+  }
+  server.stop();
+  std::sort(waits_ms.begin(), waits_ms.end());
+  std::printf("%-14s %10.2f %10.2f %10.2f %12llu\n", is_flooded ? "flooded" : "left in peace",
+              waits_ms[waits_ms.size() / 2], waits_ms[waits_ms.size() * 99 / 100], waits_ms.back(),
+              static_cast<unsigned long long>(server.accepted()));
+}
+
+void flood() {
+  std::printf("%-14s %10s %10s %10s %12s\n", "one who is in", "median, ms", "p99, ms", "worst, ms",
+              "connections");
+  measure_flood(false);
+  measure_flood(true);
+}
+
 }  // namespace
 }  // namespace oblique::server
 
@@ -208,8 +280,10 @@ int main(int count, char** arguments) {
     oblique::server::refusals(count > 2 ? std::stoi(arguments[2]) : 2000);
   } else if (what == "messages") {
     oblique::server::messages();
+  } else if (what == "flood") {
+    oblique::server::flood();
   } else {
-    std::puts("oblique-network-bench refusals [COUNT] | messages");
+    std::puts("oblique-network-bench refusals [COUNT] | messages | flood");
     return 2;
   }
 }
