@@ -87,7 +87,7 @@ bool Autoscaler::carry_out(const Decision& decision, double now_s) {
       scaling_.note_submitted(submitted.back(), now_s);
       tell_(fmt::format("submitted: job {}", submitted.back()));
     }
-    if (decision.submit > 0 || !decision.changes_nothing()) {
+    if (!decision.changes_nothing()) {
       note_answer(orders_);
     }
     return true;

@@ -18,8 +18,7 @@ enum class JobState {
   kPending,  ///< waits for its nodes
   kRunning,
   kLeaving,  ///< about to end
-  kEnded,    ///< in order, or because somebody wanted it
-  kFailed,   ///< ended by itself with an error, at its time limit, or with its node
+  kEnded,    ///< whatever ended it
 };
 
 /// A job as the engine lists it.

@@ -1,20 +1,13 @@
 #include "client/autoscale/job_book.h"
 
 #include <algorithm>
+#include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {
-namespace {
-
-bool has_ended(JobState state) {
-  return state == JobState::kEnded || state == JobState::kFailed;
-}
-
-}  // namespace
-
 bool JobBook::stays(const Job& job) {
   return !job.retired_s && job.state != JobState::kLeaving;
 }
@@ -27,10 +20,10 @@ void JobBook::take_listed(const std::vector<ListedJob>& listed, double now_s) {
   std::map<std::string, bool> is_listed;
   for (const auto& [id, state] : listed) {
     const auto known = jobs_.find(id);
-    if (has_ended(state)) {
+    if (state == JobState::kEnded) {
       // One that had ended before it was known is none of ours to judge.
       if (known != jobs_.end()) {
-        fruitless_ += state == JobState::kFailed && !known->second.worked ? 1 : 0;
+        fruitless_ += !known->second.worked && !known->second.retired_s ? 1 : 0;
         jobs_.erase(known);
       }
       continue;
@@ -56,10 +49,12 @@ void JobBook::take_listed(const std::vector<ListedJob>& listed, double now_s) {
 }
 
 void JobBook::take_workers(const Demand& demand, double now_s) {
-  std::size_t with_workers = 0;
+  std::size_t steady_jobs = 0;
+  std::size_t their_threads = 0;
   for (auto& [id, job] : jobs_) {
     const auto found = demand.jobs.find(id);
-    job.workers = found == demand.jobs.end() ? JobWorkers() : found->second;
+    const auto before =
+        std::exchange(job.workers, found == demand.jobs.end() ? JobWorkers() : found->second);
     if (job.state != JobState::kRunning || job.workers.leased_points > 0) {
       job.idle_since_s.reset();
     } else {
@@ -68,13 +63,16 @@ void JobBook::take_workers(const Demand& demand, double now_s) {
     if (job.workers.workers == 0) {
       continue;
     }
-    ++with_workers;
     job.worked = true;
     job.absent_since_s.reset();
     fruitless_ = 0;
+    if (!threads_a_job_ || before.threads == job.workers.threads) {
+      ++steady_jobs;
+      their_threads += job.workers.threads;
+    }
   }
-  if (with_workers > 0) {
-    threads_a_job_ = static_cast<double>(threads()) / static_cast<double>(with_workers);
+  if (steady_jobs > 0) {
+    threads_a_job_ = static_cast<double>(their_threads) / static_cast<double>(steady_jobs);
   }
 }
 

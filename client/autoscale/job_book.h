@@ -47,11 +47,12 @@ class JobBook {
   std::vector<std::string> ids(const std::function<bool(const Job&)>& wanted) const;
   static bool stays(const Job& job);
 
-  /// Threads of their workers, of a job on average; kept when there is no worker any more.
+  /// Threads of their workers, of a job on average, those left out whose workers are just coming or
+  /// going; kept when there is no worker any more.
   std::optional<double> threads_a_job() const { return threads_a_job_; }
   /// Threads of the workers of all known jobs.
   std::size_t threads() const;
-  /// Jobs in a row that failed without a worker of theirs having been heard.
+  /// Jobs in a row that ended unasked without a worker of theirs having been heard.
   int fruitless() const { return fruitless_; }
 
  private:

@@ -32,11 +32,9 @@ JobState state_named(std::string_view name) {
   if (is_any_of(name, {"COMPLETING", "STAGE_OUT", "SIGNALING"})) {
     return JobState::kLeaving;
   }
-  if (is_any_of(name, {"COMPLETED", "CANCELLED", "PREEMPTED", "DEADLINE", "REVOKED"})) {
+  if (is_any_of(name, {"COMPLETED", "CANCELLED", "PREEMPTED", "DEADLINE", "REVOKED", "FAILED",
+                       "TIMEOUT", "NODE_FAIL", "BOOT_FAIL", "OUT_OF_MEMORY"})) {
     return JobState::kEnded;
-  }
-  if (is_any_of(name, {"FAILED", "TIMEOUT", "NODE_FAIL", "BOOT_FAIL", "OUT_OF_MEMORY"})) {
-    return JobState::kFailed;
   }
   return JobState::kRunning;
 }

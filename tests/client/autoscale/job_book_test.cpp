@@ -60,11 +60,11 @@ TEST_F(JobBookTest, AJobThatEndedIsGoneAtOnce) {
   EXPECT_EQ(book_.count(), 0U);
 }
 
-TEST_F(JobBookTest, JobsThatFailedBeforeAWorkerWasHeardAreCountedUntilOneIs) {
+TEST_F(JobBookTest, JobsThatEndedBeforeAWorkerWasHeardAreCountedUntilOneIs) {
   for (const char* id : {"1", "2", "3"}) {
     book_.note_submitted(id, 0.0);
-    book_.update({{id, JobState::kFailed}}, {}, 1.0);
-    book_.update({{id, JobState::kFailed}}, {}, 2.0);  // it is listed for a while
+    book_.update({{id, JobState::kEnded}}, {}, 1.0);
+    book_.update({{id, JobState::kEnded}}, {}, 2.0);  // it is listed for a while
   }
   EXPECT_EQ(book_.fruitless(), 3);
   book_.update({{"4", JobState::kRunning}}, heard({"4"}), 3.0);
@@ -105,6 +105,17 @@ TEST_F(JobBookTest, RemembersHowManyThreadsAJobHas) {
   EXPECT_DOUBLE_EQ(*book_.threads_a_job(), 8.0);
   book_.update({{"1", JobState::kEnded}}, {}, 1.0);
   EXPECT_DOUBLE_EQ(*book_.threads_a_job(), 8.0);
+}
+
+TEST_F(JobBookTest, AJobWhoseWorkersAreStillComingSaysNothingOfTheThreadsOfAJob) {
+  Demand demand;
+  demand.jobs["1"] = {.workers = 4, .threads = 32, .leased_points = 0};
+  book_.update({{"1", JobState::kRunning}}, demand, 0.0);
+  demand.jobs["2"] = {.workers = 1, .threads = 8, .leased_points = 0};
+  book_.update({{"1", JobState::kRunning}, {"2", JobState::kRunning}}, demand, 1.0);
+  EXPECT_DOUBLE_EQ(*book_.threads_a_job(), 32.0);
+  book_.update({{"1", JobState::kRunning}, {"2", JobState::kRunning}}, demand, 2.0);
+  EXPECT_DOUBLE_EQ(*book_.threads_a_job(), 20.0);
 }
 
 }  // namespace

@@ -104,11 +104,11 @@ class ScalingTest : public ::testing::Test {
         return std::find(ids.begin(), ids.end(), job.id) != ids.end();
       });
     }
-    std::erase_if(jobs_, [](const ListedJob& job) { return job.state == JobState::kFailed; });
+    std::erase_if(jobs_, [](const ListedJob& job) { return job.state == JobState::kEnded; });
     for (std::size_t i = 0; i < decision.submit; ++i) {
       const auto state = !starts_jobs_             ? JobState::kPending
                          : jobs_come_to_something_ ? JobState::kRunning
-                                                   : JobState::kFailed;
+                                                   : JobState::kEnded;
       jobs_.push_back({std::to_string(++last_id_), state});
       scaling_->note_submitted(jobs_.back().id, now_s_);
     }
@@ -257,7 +257,7 @@ TEST_F(ScalingTest, AVanishedJobIsReplacedAfterItsTimeAndNotBefore) {
   EXPECT_EQ(running(), 1U);
 }
 
-TEST_F(ScalingTest, JobsThatFailAtOnceAreSubmittedEverMoreSeldom) {
+TEST_F(ScalingTest, JobsThatEndAtOnceAreSubmittedEverMoreSeldom) {
   use(0, 10);
   jobs_come_to_something_ = false;
   open_points_ = 1'000'000;

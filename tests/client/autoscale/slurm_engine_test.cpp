@@ -77,7 +77,7 @@ END)");
   for (const auto& job : engine_.jobs()) {
     seen += job.id + ":" + std::to_string(static_cast<int>(job.state)) + " ";
   }
-  EXPECT_EQ(seen, "12:1 13:0 16:2 17:4 18:3 19:1 ");
+  EXPECT_EQ(seen, "12:1 13:0 16:2 17:3 18:3 19:1 ");
   EXPECT_THAT(arguments(), HasSubstr("--name=sweeps\n"));
 }
 
