@@ -19,6 +19,10 @@ constexpr std::uint64_t kFirstPeer = 16;
 constexpr std::size_t kOtherDescriptors = 128;
 constexpr std::size_t kFewestConnections = 16;
 constexpr std::int64_t kLookInterval_ms = 500;
+/// Of handshakes with keys.
+constexpr std::size_t kStepsOfHandshake = 2;
+constexpr std::size_t kStepsATurn = 16;
+constexpr std::size_t kMostWaitingSteps = 64;
 constexpr const char* kLeavesTooMuchUnread = "it leaves too much unread";
 constexpr const char* kNoRoom = "there are too many connections, and none that would make room";
 
@@ -48,6 +52,10 @@ Network::Network(NetworkLimits limits)
     throw std::system_error(errno, std::generic_category(), "epoll_create1");
   }
   limits_.connections = std::min(limits_.connections, most_descriptors());
+  // One key never has so many that others find no room.
+  constexpr std::size_t kPartForOthers = 8;
+  limits_.connections_of_key = std::min(limits_.connections_of_key,
+                                        limits_.connections - limits_.connections / kPartForOthers);
 }
 
 Network::~Network() = default;
@@ -99,8 +107,11 @@ void Network::collect(std::int64_t now_ms) {
 }
 
 void Network::accept_all(Port port, std::int64_t now_ms) {
-  constexpr int kMostAtATime = 64;
-  for (int i = 0; i < kMostAtATime; ++i) {
+  constexpr std::size_t kMostAtATime = 64;
+  // No more than can be let in: a crowd waits in the system, where nobody is turned away.
+  const bool has_keys = ports_[port].guard != nullptr;
+  const std::size_t most = has_keys ? kStepsATurn / kStepsOfHandshake : kMostAtATime;
+  for (std::size_t i = 0; i < most && handshakes_.size() < kMostWaitingSteps; ++i) {
     Listener::Accepted accepted = ports_[port].listener->accept();
     if (!accepted.socket.is_open()) {
       if (errno == EMFILE || errno == ENFILE) {
@@ -192,7 +203,6 @@ void Network::serve(Number number, std::uint32_t events, std::int64_t now_ms) {
 
 /// A few of the steps that wait: each costs as much as hundreds of messages of those who are in.
 void Network::shake_hands() {
-  constexpr std::size_t kStepsATurn = 16;
   for (std::size_t steps = 0; steps < kStepsATurn && !handshakes_.empty();) {
     const Number number = handshakes_.front();
     handshakes_.pop_front();

@@ -34,7 +34,7 @@ struct NetworkLimits {
   std::int64_t active_ms = 5000;
   std::size_t handshakes = 1024;  ///< under way at a time; the oldest of more is ended
   /// What the connections of one key may have together. One key can be all workers'.
-  std::size_t connections_of_key = 3072;
+  std::size_t connections_of_key = 3072;  ///< at most 7/8 of all
   std::size_t held_in_bytes_of_key = std::size_t{256} << 20U;
   std::size_t waiting_out_bytes_of_key = std::size_t{256} << 20U;
 };

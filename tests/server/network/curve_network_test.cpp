@@ -9,6 +9,7 @@
 #include "proto/frames.h"
 #include "proto/socket/limits.h"
 #include "tests/server/network/guarded_network.h"
+#include "tests/server/network/raw_peer.h"
 
 namespace oblique::server {
 namespace {
@@ -218,6 +219,43 @@ TEST_F(CurveNetworkTest, AKeyThatWasRenamedIsKnownByItsNewNameAtItsNextMessage) 
   EXPECT_EQ(network_.connections(), 1U);
   worker->send("second");
   EXPECT_EQ(next().holder->name, "anna2");
+}
+
+class SmallCurveNetworkTest : public CurveNetworkTest {
+ protected:
+  SmallCurveNetworkTest() : CurveNetworkTest({.connections = 8}) {}
+};
+
+TEST_F(SmallCurveNetworkTest, OneKeyLeavesRoomForOthersWhereTheSystemGivesFewConnections) {
+  const protocol::KeyPair other = protocol::made_key_pair();
+  doorkeeper_->admit(other.public_key, "berta");
+  std::vector<std::unique_ptr<Dealer>> dealers;
+  for (int i = 0; i < 7; ++i) {
+    dealers.push_back(admitted());
+    dealers.back()->send("hello");
+    next();
+  }
+  const auto eighth = admitted();
+  EXPECT_EQ(failure_of(*eighth), std::pair(ZMQ_EVENT_HANDSHAKE_FAILED_AUTH, 300));
+  const auto others = dealer(other, server_.public_key);
+  others->send("of another key");
+  EXPECT_EQ(next().message.body, "of another key");
+}
+
+TEST_F(SmallCurveNetworkTest, WhoHasShownAKeyMakesNoRoomForStrangers) {
+  const protocol::KeyPair other = protocol::made_key_pair();
+  doorkeeper_->admit(other.public_key, "berta");
+  std::vector<std::unique_ptr<Dealer>> dealers;
+  for (int i = 0; i < 8; ++i) {
+    dealers.push_back(i < 4 ? admitted() : dealer(other, server_.public_key));
+    dealers.back()->send("hello");
+    next();
+  }
+  now_ms_ += 60'000;  // all of them are silent for long
+  RawPeer stranger(network_.endpoint(guarded_));
+  turn_until([&] { return refused(RefusalCause::kBound) == 1; });
+  EXPECT_EQ(stranger.receive(), "");
+  EXPECT_EQ(network_.connections(), 8U);
 }
 
 class TightCurveNetworkTest : public CurveNetworkTest {

@@ -115,10 +115,11 @@ TEST_F(RefusedPeersTest, WhoIsInIsServedBetweenTheHandshakesOfAFlood) {
   std::vector<std::unique_ptr<KeyedPeer>> flood;
   for (std::size_t i = 0; i < kFlood; ++i) {
     flood.push_back(peer(worker_, server_.public_key));
-    flood.back()->say_hello();
   }
   turn_until([&] { return network_.connections() == kFlood + 1; });
-  ASSERT_TRUE(network_.has_more());
+  for (const auto& peer : flood) {
+    peer->say_hello();
+  }
   const std::string first = modest->curve.sealed("first");
   modest->tcp.send(first + modest->curve.sealed("second"));
   std::vector<std::string> bodies;
@@ -136,6 +137,36 @@ TEST_F(RefusedPeersTest, WhoIsInIsServedBetweenTheHandshakesOfAFlood) {
     ++welcomed;
   }
   EXPECT_EQ(welcomed, kFlood);
+}
+
+class CrowdedNetworkTest : public RefusedPeersTest {
+ protected:
+  CrowdedNetworkTest() : RefusedPeersTest({.handshakes = 100}) {}
+};
+
+TEST_F(CrowdedNetworkTest, ACrowdOfThoseWhoMayComeInIsLetInWithoutTurningAnyAway) {
+  constexpr std::size_t kCrowd = 300;
+  std::vector<std::unique_ptr<KeyedPeer>> crowd;
+  for (std::size_t i = 0; i < kCrowd; ++i) {
+    crowd.push_back(peer(worker_, server_.public_key));
+    crowd.back()->say_hello();
+  }
+  std::vector<std::string> heard(kCrowd);
+  std::size_t let_in = 0;
+  turn_until([&] {
+    for (std::size_t i = 0; i < kCrowd; ++i) {
+      const std::size_t before = heard[i].size();
+      heard[i] += crowd[i]->tcp.receive_what_is_there();
+      if (before < kWelcomedBytes && heard[i].size() >= kWelcomedBytes) {
+        crowd[i]->curve.take_welcome(std::string_view(heard[i]).substr(kGreetingBytes + 10));
+        crowd[i]->tcp.send(command_of("INITIATE", crowd[i]->curve.initiate()));
+      }
+      let_in += before <= kWelcomedBytes && heard[i].size() > kWelcomedBytes ? 1U : 0U;
+    }
+    return let_in == kCrowd;
+  });
+  EXPECT_EQ(all_refused(), 0U);
+  EXPECT_EQ(network_.connections(), kCrowd);
 }
 
 TEST_F(RefusedPeersTest, WhoConnectsAndLeavesWithoutAWordIsNoRefusedPeer) {
