@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <regex>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -52,7 +53,10 @@ TEST(InstallTest, EachPartHasItsProgramAndWhatBelongsToItAndNothingElse) {
               UnorderedElementsAre("usr/bin/oblique-server", "etc/oblique/server.toml",
                                    "usr/lib/systemd/system/oblique-server.service",
                                    "usr/lib/sysusers.d/oblique-server.conf",
-                                   "usr/share/doc/oblique-server/copyright"));
+                                   "usr/share/doc/oblique-server/copyright",
+                                   "usr/share/doc/oblique-server/deploy/prometheus/README.md",
+                                   "usr/share/doc/oblique-server/deploy/prometheus/prometheus.yml",
+                                   "usr/share/doc/oblique-server/deploy/prometheus/oblique.rules.yml"));
   EXPECT_THAT(files_below(folder.file("worker")),
               UnorderedElementsAre("usr/bin/oblique-worker", "etc/oblique/worker.toml",
                                    "usr/lib/systemd/system/oblique-worker.service",
@@ -104,6 +108,33 @@ TEST(InstallTest, UnitsNameTheProgramsAndTheConfigurationOfTheirPrefix) {
                         "/etc/oblique/worker.toml\n"));
   EXPECT_THAT(text_of(prefix + "/lib/systemd/system/oblique-worker@.service"),
               HasSubstr(" --config " + prefix + "/etc/oblique/%i.toml\n"));
+}
+
+TEST(InstallTest, ProgramsHeedTheConfigurationOfTheirPrefix) {
+  const TemporaryFolder folder;
+  const std::string prefix = folder.file("opt");
+  ASSERT_EQ(install(folder, prefix).exit_code, 0);
+  std::ofstream(prefix + "/etc/oblique/worker.toml") << "server = \"tcp://lab:7601\"\n";
+  const auto worker =
+      run_tool(folder, "env",
+               {"-u", "OBLIQUE_WORKER_CONFIG", prefix + "/bin/oblique-worker", "--print-config"});
+  EXPECT_EQ(worker.exit_code, 0) << worker.err;
+  EXPECT_THAT(worker.out, HasSubstr("# " + prefix + "/etc/oblique/worker.toml:1\n"));
+}
+
+TEST(InstallTest, WhatTheInstalledConfigurationSuggestsIsAllowed) {
+  const TemporaryFolder folder;
+  const std::string prefix = folder.file("opt");
+  ASSERT_EQ(install(folder, prefix).exit_code, 0);
+  for (const std::string part : {"server", "worker"}) {
+    const std::string file = prefix + "/etc/oblique/" + part + ".toml";
+    std::string suggested =
+        std::regex_replace(text_of(file), std::regex("\n# ([a-z_]+ = |\\[)"), "\n$1");
+    ASSERT_NE(suggested, text_of(file));
+    std::ofstream(file) << suggested;
+    Process program(folder, prefix + "/bin/oblique-" + part, {"--config", file, "--print-config"});
+    EXPECT_EQ(program.wait(), 0) << program.err();
+  }
 }
 
 TEST(InstallTest, ConfigurationThatSomebodyChangedStays) {

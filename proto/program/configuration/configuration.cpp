@@ -86,7 +86,13 @@ void check_kind(const CLI::Option& option, const WrittenValue& written) {
 }  // namespace
 
 std::string default_configuration_file(const std::string& name) {
-  return std::string(OBLIQUE_CONFIGURATION_FOLDER) + "/" + name;
+  std::error_code unknown;
+  const auto program = std::filesystem::read_symlink("/proc/self/exe", unknown);
+  if (unknown) {
+    return {};
+  }
+  const auto prefix = program.parent_path().parent_path();
+  return (prefix == "/usr" ? "/etc" : prefix / "etc") / "oblique" / name;
 }
 
 Configuration::Configuration(CLI::App& app, ConfigurationPlaces places)

@@ -19,7 +19,9 @@ struct ConfigurationPlaces {
   std::vector<std::string> tables;  ///< of the file: first words of flags that stand in a table
 };
 
-/// The file NAME in the folder where the installed programs look for their configuration.
+/// The file NAME where the installation of this program has its configuration: /etc/oblique of
+/// programs in /usr/bin, PREFIX/etc/oblique of those in PREFIX/bin. Empty where the system does not
+/// tell where the program lies.
 std::string default_configuration_file(const std::string& name);
 
 /// The settings of a program from a TOML file, environment variables and flags, the later being

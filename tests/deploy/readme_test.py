@@ -1,0 +1,110 @@
+"""What deploy/README.md and the READMEs below it tell people to type, against programs, units and files.
+
+  readme_test.py TREE FOLDER-OF-THE-PROGRAMS
+"""
+import pathlib
+import re
+import shlex
+import subprocess
+import sys
+import tempfile
+import unittest
+
+TREE = pathlib.Path(sys.argv.pop(1))
+PROGRAMS = pathlib.Path(sys.argv.pop(1))
+READMES = [TREE / "deploy/README.md", *sorted((TREE / "deploy").glob("*/README.md"))]
+MAIN = READMES[0].read_text()
+
+
+def blocks(text):
+    """The fenced blocks of commands."""
+    return re.findall(r"^```\n(.*?)^```$", text, re.M | re.S)
+
+
+def commands(text):
+    """Lines of fenced blocks and spans of code that call one of our programs: their words."""
+    lines = [l for b in blocks(text) for l in b.replace("\\\n", " ").splitlines()]
+    lines += re.findall(r"`([^`\n]+)`", re.sub(r"^```.*?^```$", "", text, flags=re.M | re.S))
+    for line in lines:
+        try:
+            words = shlex.split(line)
+        except ValueError:
+            continue
+        starts = [i for i, w in enumerate(words) if w in ("oblique", "oblique-server", "oblique-worker")
+                  and not {"podman", "docker", "apt-get", "systemctl", "useradd", "userdel"} & set(words[:1])]
+        if starts and starts[-1] < len(words) - 1:
+            yield words[starts[-1]:]
+
+
+def help_of(words):
+    """The program's help, and that of the verb or verbs that the words name."""
+    text = ""
+    for n in range(1, min(3, len(words)) + 1):
+        if n > 1 and not re.fullmatch(r"[a-z]+", words[n - 1]):
+            break
+        text += subprocess.run([PROGRAMS / words[0], *words[1:n], "--help"], capture_output=True, text=True,
+                               check=False).stdout
+    return text
+
+
+def settings():
+    """What oblique-server is set to where nothing is said."""
+    return subprocess.run([PROGRAMS / "oblique-server", "--no-config", "--print-config"], text=True,
+                          capture_output=True, check=True).stdout
+
+
+class Readmes(unittest.TestCase):
+    longMessage = False
+
+    def test_commands_have_the_flags_that_are_shown(self):
+        seen = 0
+        for readme in READMES:
+            for words in commands(readme.read_text()):
+                text = help_of(words)
+                self.assertNotEqual(text, "", f"{readme}: {words}: not said what it does")
+                for flag in (w.split("=")[0] for w in words if w.startswith("--")):
+                    self.assertRegex(text, rf"(?<![\w-]){flag}(?![\w-])", f"{readme}: {' '.join(words)}: there is no {flag}")
+                    seen += 1
+        self.assertGreater(seen, 10)
+
+    def test_settings_that_are_named_exist(self):
+        printed = settings()
+        named = re.findall(r"^\| 760\d \(`(\w+)`\)", MAIN, re.M) + ["drain", "insecure"]
+        self.assertEqual(len(named), 5)
+        for key in named:
+            self.assertIn(f"`{key}`", MAIN)
+            self.assertRegex(printed, rf"(?m)^(# )?{key}\b", f"there is no setting {key}")
+
+    def test_ports_are_the_defaults(self):
+        printed = settings()
+        for port, key in re.findall(r"^\| (760\d) \(`(\w+)`\)", MAIN, re.M):
+            self.assertRegex(printed, rf'(?m)^{key} = "?([\d.]+:)?{port}\b', f"{key} is not {port}")
+
+    def test_units_packages_and_parts_are_there(self):
+        for unit in re.findall(r"systemctl enable --now ([\w-]+)", MAIN):
+            self.assertTrue((TREE / f"deploy/systemd/{unit}.service.in").exists(), unit)
+        cmake = (TREE / "deploy/packages/packages.cmake").read_text()
+        for package in re.findall(r"\./([\w-]+)_\*\.deb", MAIN):
+            self.assertRegex(cmake, rf"_PACKAGE_NAME {package}\)")
+        for part in re.search(r"`--component (\w+)`, `(\w+)` or `(\w+)`", MAIN).groups():
+            self.assertIn(part, re.search(r"CPACK_COMPONENTS_ALL ([\w ]+)", cmake)[1].split())
+
+    def test_the_labs_commands_make_the_installed_configuration_one_that_listens_and_connects(self):
+        edits = re.findall(r"sudo (sed -i .*) /etc/oblique/(\w+)\.toml$", MAIN, re.M)
+        self.assertEqual([part for _, part in edits], ["server", "worker"])
+        expected = {"server": {"listen": "*", "keys": "/var/lib/oblique/keys/server.key"},
+                    "worker": {"server": "tcp://hub:7601",
+                               "keys": "/run/credentials/oblique-worker.service/worker.key"}}
+        for edit, part in edits:
+            with tempfile.TemporaryDirectory() as folder:
+                file = pathlib.Path(folder) / f"{part}.toml"
+                file.write_text((TREE / f"deploy/systemd/{part}.toml").read_text())
+                subprocess.run([*shlex.split(edit), file], check=True)
+                printed = subprocess.run([PROGRAMS / f"oblique-{part}", "--config", file, "--print-config"],
+                                         text=True, capture_output=True, check=True).stdout
+            for key, value in expected[part].items():
+                self.assertRegex(printed, rf'(?m)^{key} = "{re.escape(value)}"')
+
+
+if __name__ == "__main__":
+    unittest.main()
