@@ -52,10 +52,12 @@ std::unique_ptr<Web> web_of(const LoopSettings& settings) {
   try {
     return std::make_unique<Web>(std::move(web));
   } catch (const std::runtime_error& error) {
+    const std::string what =
+        std::string(error.what()) + "; --http names another address, or \"off\"";
     if (!settings.web->may_be_missing) {
-      throw;
+      throw std::runtime_error(what);
     }
-    spdlog::warn("no metrics over HTTP: {}", error.what());
+    spdlog::warn("no metrics over HTTP: {}", what);
     return nullptr;
   }
 }

@@ -1,6 +1,12 @@
 #include "server/web/http_options.h"
 
+#include <stdexcept>
+
+#include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
+
+#include "proto/text.h"
+#include "server/web/request_rules.h"
 
 namespace oblique::server {
 
@@ -15,17 +21,23 @@ void HttpOptions::add_to(CLI::App& app) {
 }
 
 std::optional<WebSettings> HttpOptions::settings() const {
+  WebSettings settings;
+  for (const std::string& name : names_) {
+    const std::string lower = CLI::detail::to_lower(name);
+    if (host_without_port(lower) != lower) {
+      throw std::runtime_error(
+          fmt::format("--http-name {} is no host name, as oblique.example.org without a port",
+                      protocol::visible(name)));
+    }
+    settings.names.insert(lower);
+  }
   const auto address = http_address_of(address_);
   if (!address) {
     return std::nullopt;
   }
-  WebSettings settings;
   settings.address = *address;
   // A second server on a machine need not be told that the first one has the port.
   settings.may_be_missing = address_option_->count() == 0;
-  for (const std::string& name : names_) {
-    settings.names.insert(CLI::detail::to_lower(name));
-  }
   return settings;
 }
 

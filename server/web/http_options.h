@@ -19,7 +19,7 @@ class HttpOptions {
   /// This must outlive the parsing.
   void add_to(CLI::App& app);
   /// To be asked after the parsing; nothing: no HTTP. Throws std::runtime_error for what is no
-  /// address.
+  /// address and no name.
   std::optional<WebSettings> settings() const;
 
  private:

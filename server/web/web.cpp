@@ -15,8 +15,6 @@ namespace {
 
 constexpr unsigned kNotFound = 404;
 constexpr unsigned kServiceUnavailable = 503;
-/// A loop that makes no snapshot in this time is held up, and the last one is shown.
-constexpr std::chrono::milliseconds kLongestPatience{2000};
 
 constexpr const char* kPlainText = "text/plain; charset=utf-8";
 
@@ -57,7 +55,7 @@ class Web::Parts {
     const NoticeBoard::Shared latest = board_.latest();
     const std::int64_t asked_ms = steady_ms() - question.waited.count();
     const bool is_recent = latest && latest->made_ms >= asked_ms - NoticeBoard::kPause_ms;
-    if (!is_recent && question.waited < kLongestPatience) {
+    if (!is_recent && question.waited < settings_.patience) {
       board_.want();
       return std::nullopt;
     }

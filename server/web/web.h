@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <set>
@@ -16,6 +17,8 @@ struct WebSettings {
   bool may_be_missing = false;
   std::set<std::string> names;  ///< Host names beside addresses and localhost; in lower case
   HttpLimits limits;
+  /// A loop that makes no snapshot in this time is held up, and the last one is shown.
+  std::chrono::milliseconds patience{2000};
   std::string database;  ///< file
   std::string solver_version;
 };

@@ -16,6 +16,7 @@
 
 #include "tests/bench/crowd.h"
 #include "tests/bench/process_usage.h"
+#include "tests/bench/scraper.h"
 #include "tests/bench/status_probe.h"
 #include "tests/support/database.h"
 #include "tests/support/programs.h"
@@ -32,6 +33,7 @@ struct Flags {
   double seconds = 10.0;
   std::vector<double> point_ms{0.0};
   std::uint64_t most_results = 2'000'000;
+  std::vector<int> scrape_ms{0};
 };
 
 void take_all_descriptors() {
@@ -69,7 +71,7 @@ void submit(const test::TemporaryFolder& folder, const test::Server& server) {
 
 /// One row: a fresh server and database, the crowd, then the study, all measured from its first
 /// result on.
-void bench(const Flags& flags, std::size_t workers, double point_ms) {
+void bench(const Flags& flags, std::size_t workers, double point_ms, int scrape_ms) {
   const test::TemporaryFolder folder;
   const test::Database database(folder.file("bench.db"));
   test::Server server(folder, folder.file("bench.db"));
@@ -83,6 +85,7 @@ void bench(const Flags& flags, std::size_t workers, double point_ms) {
   double wall_s = 0.0;
   double rows = 0.0;
   StatusProbe::Seen seen;
+  std::uint64_t scrapes = 0;
   {
     const Crowd crowd({server.worker_url(), workers, point_ms / 1e3});
     wait_for("welcomes", [&] { return crowd.counts().welcomed >= workers; });
@@ -94,6 +97,7 @@ void bench(const Flags& flags, std::size_t workers, double point_ms) {
     crowd_cpu_s = -usage_of(getpid()).cpu_s;
     const auto start = Clock::now();
     StatusProbe probe(server.client_url(), "crowd", std::chrono::milliseconds(100));
+    const Scraper scraper(server.http_url(), std::chrono::milliseconds(scrape_ms));
     while (seconds_since(start) < flags.seconds &&
            crowd.counts().results - before.results < flags.most_results) {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
@@ -104,6 +108,7 @@ void bench(const Flags& flags, std::size_t workers, double point_ms) {
     after = crowd.counts();
     rows = database.rows() - rows_before;
     seen = probe.stop();
+    scrapes = scraper.scrapes();
   }
   // Workers that vanished are forgotten after some seconds.
   std::this_thread::sleep_for(std::chrono::seconds(4));
@@ -115,13 +120,14 @@ void bench(const Flags& flags, std::size_t workers, double point_ms) {
       "| %zu | %.4g | %.0f | %.0f | %.0f | %.0f %% | %.0f %% | %.0f %% | %.1f | %.1f | %.1f | %.1f "
       "| %zu "
       "| "
-      "%.0f | %.0f | %.0f | %llu |\n",
+      "%.0f | %.0f | %.0f | %llu | %llu |\n",
       workers, point_ms, rows / wall_s, batches / wall_s,
       static_cast<double>(after.messages - before.messages) / wall_s, 100.0 * loop_cpu_s / wall_s,
       100.0 * (server_cpu_s - loop_cpu_s) / wall_s, 100.0 * crowd_cpu_s / wall_s,
       1e6 * server_cpu_s / rows, seen.quantile_ms(0.5), seen.quantile_ms(0.99),
       seen.quantile_ms(1.0), seen.latencies_ms.size() + seen.unanswered, at_rest.resident_MB,
-      left.peak_MB, left.resident_MB, static_cast<unsigned long long>(after.connects - workers));
+      left.peak_MB, left.resident_MB, static_cast<unsigned long long>(after.connects - workers),
+      static_cast<unsigned long long>(scrapes));
   std::fflush(stdout);
   if (after.connects > workers) {
     std::fprintf(stderr, "the crowd itself was late by %.1f s; the server's log:\n%s",
@@ -135,11 +141,14 @@ void run(const Flags& flags) {
       "| workers | point [ms] | results/s | batches/s | their messages/s | CPU: loop | writer | "
       "crowd | us a "
       "result | status p50 [ms] | p99 | max | asked | server MB: at rest | peak | after | "
-      "reconnects |\n"
-      "|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n");
+      "reconnects | scrapes |\n"
+      "|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|"
+      "\n");
   for (const std::size_t workers : flags.workers) {
     for (const double point_ms : flags.point_ms) {
-      bench(flags, workers, point_ms);
+      for (const int scrape_ms : flags.scrape_ms) {
+        bench(flags, workers, point_ms, scrape_ms);
+      }
     }
   }
 }
@@ -158,6 +167,10 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--point-ms", flags.point_ms,
                  "What a point takes a worker, a row each; 0: nothing")
+      ->delimiter(',')
+      ->capture_default_str();
+  app.add_option("--scrape-ms", flags.scrape_ms,
+                 "How often metrics are asked for, a row each; 0: never")
       ->delimiter(',')
       ->capture_default_str();
   CLI11_PARSE(app, argc, argv);

@@ -107,6 +107,12 @@ TEST(UsageTest, NumbersOfServerAndWorkerRefuseWhatTheyCannotBe) {
   for (const char* value : {"nan", "-2", "1.5", "1000000", "99999999999999999999", "x"}) {
     expect_refused(folder, server_program(), {"--ready-fd", value});
   }
+  for (const char* value : {"nan", "127.0.0.1", "7602", "127.0.0.1:65536", "example.org:7602"}) {
+    expect_refused(folder, server_program(), {"--http", value});
+  }
+  for (const char* value : {"a b", "oblique.lab:7602", "http://oblique.lab", "\x1b[2J"}) {
+    expect_refused(folder, server_program(), {"--http-name", value});
+  }
   for (const char* value : {"nan", "-2", "0", "1.5", "99999999999999999999", "x"}) {
     expect_refused(folder, worker_program(), {"--stop-with-parent", value});
   }

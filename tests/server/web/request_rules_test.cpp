@@ -1,10 +1,14 @@
 #include "server/web/request_rules.h"
 
+#include <set>
 #include <stdexcept>
+#include <vector>
 
 #include <gtest/gtest.h>
+#include <CLI/CLI.hpp>
 
 #include "server/web/http_address.h"
+#include "server/web/http_options.h"
 
 namespace oblique::server {
 namespace {
@@ -105,6 +109,30 @@ TEST(HttpAddress, IsAddressAndPortOrOff) {
                                  "127.0.0.1:65536", "127.0.0.1:-1", "127.0.0.1:+1", "127.0.0.1: 1",
                                  "::1:7602", "[127.0.0.1]:7602", "[::1]", "example.org:7602"}) {
     EXPECT_THROW(http_address_of(text), std::runtime_error) << text;
+  }
+}
+
+WebSettings settings_of(const std::vector<std::string>& arguments) {
+  CLI::App app;
+  HttpOptions options;
+  options.add_to(app);
+  app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
+  return options.settings().value();
+}
+
+TEST(HttpOptions, OnlyTheDefaultAddressMayBeTaken) {
+  EXPECT_EQ(settings_of({}).address.address, "127.0.0.1");
+  EXPECT_EQ(settings_of({}).address.port, "7602");
+  EXPECT_TRUE(settings_of({}).may_be_missing);
+  EXPECT_FALSE(settings_of({"--http", "127.0.0.1:7602"}).may_be_missing);
+}
+
+TEST(HttpOptions, NamesAreInLowerCase) {
+  const WebSettings settings =
+      settings_of({"--http-name", "Oblique.Lab", "--http-name", "oblique-server"});
+  EXPECT_EQ(settings.names, (std::set<std::string>{"oblique-server", "oblique.lab"}));
+  for (const std::string name : {"oblique.lab:7602", "", "[::1]", "a b"}) {
+    EXPECT_THROW(settings_of({"--http-name", name}), std::runtime_error) << name;
   }
 }
 

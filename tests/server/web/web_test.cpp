@@ -119,5 +119,17 @@ TEST(Web, AServerWithoutAPortOfItsOwnGoesOnOnlyIfItMay) {
             ClientReply::kSubmit);
 }
 
+TEST(Web, SaysThatTheLoopIsHeldUp) {
+  WebSettings settings = anywhere();
+  settings.patience = std::chrono::milliseconds(50);
+  Web web(settings);
+  const std::string metrics = get(web.url(), "/metrics");
+  EXPECT_EQ(status_of_answer(metrics), 503);
+  EXPECT_EQ(body_of(metrics), "the server has just begun\n");
+  const std::string readiness = get(web.url(), "/readyz");
+  EXPECT_EQ(status_of_answer(readiness), 503);
+  EXPECT_EQ(body_of(readiness), "the server's loop is held up\n");
+}
+
 }  // namespace
 }  // namespace oblique::server
