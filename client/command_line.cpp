@@ -49,6 +49,8 @@ void add_verbs(CLI::App& app, Command& command) {
   add_backup(app, command);
   add_check(app, command);
   add_autoscale(app, command);
+  add_keygen(app, command);
+  add_keys(app, command);
 }
 
 // The verb that was parsed, or the program itself.

@@ -3,6 +3,7 @@
 #include <netdb.h>
 #include <sys/socket.h>
 
+#include <algorithm>
 #include <charconv>
 #include <memory>
 #include <string_view>
@@ -23,9 +24,15 @@ std::string objection_to_address(const std::string& url) {
   int port = 0;
   const auto [end, error] = std::from_chars(url.data() + colon + 1, url.data() + url.size(), port);
   const bool is_number = error == std::errc() && end == url.data() + url.size();
-  return is_number && port >= 1 && port <= kHighestPort
+  if (!is_number || port < 1 || port > kHighestPort) {
+    return "its port must be a number from 1 to 65535";
+  }
+  const std::string_view host(url.data() + kScheme.size(),
+                              std::max(colon, kScheme.size()) - kScheme.size());
+  const bool has_brackets = host.starts_with('[') && host.ends_with(']');
+  return host.find(':') == std::string_view::npos || has_brackets
              ? ""
-             : "its port must be a number from 1 to 65535";
+             : "an address of IPv6 stands in brackets, as tcp://[::1]:7601";
 }
 
 std::string host_of(const std::string& url) {

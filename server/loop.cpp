@@ -83,15 +83,14 @@ class Loop::Parts final : public Outbox {
                  [this](QueryReport r) { queried_.put(std::array{std::move(r)}); }),
         reader_([this](ReadReport r) { requests_read_.put(std::array{std::move(r)}); }),
         network_(settings.network),
-        workers_(network_.listen(doors_.address(), settings.worker_port)),
-        clients_(network_.listen(doors_.address(), settings.client_port)),
+        workers_(network_.listen(doors_.address(), settings.worker_port,
+                                 doors_.guard(PortKeeper::Port::kWorkers))),
+        clients_(network_.listen(doors_.address(), settings.client_port,
+                                 doors_.guard(PortKeeper::Port::kClients))),
         web_(web_of(settings)) {
     if (store_.is_new()) {
       spdlog::info("made the database {}: only its owner can read it (chmod lets others)",
                    settings.database);
-    }
-    if (doors_.access() == Access::kKeys) {
-      throw std::runtime_error("--keys: the network does not check keys yet");
     }
     ServiceSettings service = std::move(settings.service);
     service.database_id = store_.database_id();
@@ -256,8 +255,12 @@ class Loop::Parts final : public Outbox {
   }
 
   void look_at_doors() {
-    if (const auto warning = doors_.warning(now().steady_ms)) {
-      spdlog::warn("{}", *warning);
+    const Doors::News news = doors_.look(now().steady_ms);
+    for (const auto& line : news.lines) {
+      spdlog::log(line.is_warning ? spdlog::level::warn : spdlog::level::info, "{}", line.text);
+    }
+    if (news.admission_changed) {
+      network_.admission_changed();
     }
   }
 

@@ -60,6 +60,20 @@ Effects Conversation::on_send_failed(std::int64_t now_ms) {
   return take_effects();
 }
 
+Effects Conversation::on_rejected(const std::string& reason, std::int64_t now_ms) {
+  constexpr std::int64_t kSecond_ms = 1000;
+  now_ms_ = now_ms;
+  if (state_ == State::kGreeting || state_ == State::kWelcomed) {
+    rejected_ms_ =
+        std::clamp(2 * rejected_ms_, settings_.shortest_rejected_ms, settings_.longest_rejected_ms);
+    effects_.emplace_back(Note{
+        reason + ": trying again in " + std::to_string(rejected_ms_ / kSecond_ms) + " s", true});
+    state_ = State::kWaiting;
+    deadline_ms_ = now_ms_ + rejected_ms_;
+  }
+  return take_effects();
+}
+
 Effects Conversation::on_time(std::int64_t now_ms) {
   now_ms_ = now_ms;
   if (stopping_ && now_ms_ >= stop_deadline_ms_) {
@@ -177,6 +191,7 @@ Effects Conversation::on_message(const protocol::ServerToWorker& message, std::i
 
 void Conversation::on(const protocol::Welcome& welcome) {
   state_ = State::kWelcomed;
+  rejected_ms_ = 0;
   heartbeat_interval_ms_ = std::clamp<std::int64_t>(welcome.heartbeat_interval_ms(),
                                                     kShortestInterval_ms, kLongestInterval_ms);
   lost_after_ms_ = std::clamp<std::int64_t>(welcome.lost_after_ms(), 2 * heartbeat_interval_ms_,

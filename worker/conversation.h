@@ -24,6 +24,8 @@ struct ConversationSettings {
   std::int64_t hello_timeout_ms = 3000;   ///< a hello without answer is said again
   std::int64_t shortest_backoff_ms = 50;  ///< between failures, doubling
   std::int64_t longest_backoff_ms = 2000;
+  std::int64_t shortest_rejected_ms = 2000;  ///< between attempts that the server rejects, doubling
+  std::int64_t longest_rejected_ms = 30'000;
   std::int64_t stop_timeout_ms = 2000;  ///< for the last results to be acknowledged
   /// A request to stop that follows so soon is part of the one before: Slurm sends SIGTERM twice
   /// within milliseconds to jobs that it preempts.
@@ -44,6 +46,8 @@ class Conversation {
   Effects on_progress(std::vector<Progress> progress, std::int64_t now_ms);
   /// A message could not be sent; what follows it of the same effects must not be sent either.
   Effects on_send_failed(std::int64_t now_ms);
+  /// The server has turned the socket away, for this reason, and people must mend that.
+  Effects on_rejected(const std::string& reason, std::int64_t now_ms);
   /// To be called at `next_deadline_ms` or a little later.
   Effects on_time(std::int64_t now_ms);
   /// Deliver what is solved, say goodbye and finish. A second call after `stop_repeats_ms` finishes
@@ -99,7 +103,8 @@ class Conversation {
   std::int64_t heartbeat_due_ms_ = 0;
   std::int64_t heartbeat_interval_ms_ = 1000;
   std::int64_t lost_after_ms_ = 3000;
-  std::int64_t backoff_ms_ = 0;  ///< 0: the last attempt came to something
+  std::int64_t backoff_ms_ = 0;   ///< 0: the last attempt came to something
+  std::int64_t rejected_ms_ = 0;  ///< pause after the last rejection; 0: welcomed since
   bool stopping_ = false;
   std::int64_t stop_deadline_ms_ = 0;
   std::int64_t stop_repeats_until_ms_ = 0;

@@ -34,6 +34,7 @@ struct DropAll {};
 /// Worth a line in the log.
 struct Note {
   std::string text;
+  bool is_warning = false;
 };
 /// The conversation is over.
 struct Finish {

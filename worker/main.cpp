@@ -80,10 +80,11 @@ int run_worker(const SessionSettings& settings, const StopWithParent& parent) {
 }
 
 void add_options(CLI::App& app, Configuration& configuration, StopWithParent& parent,
-                 SessionSettings& settings) {
+                 SessionSettings& settings, std::string& keys) {
   app.set_version_flag("--version", "oblique-worker " + oblique::solver::solver_version());
   app.add_option("--server", settings.server, "Where the server awaits workers")
       ->capture_default_str();
+  app.add_option("--keys", keys, "Key file for a server that has keys")->envname("OBLIQUE_KEYS");
   app.add_option("--name", settings.name, "Name that people see; the default is HOST:PROCESS")
       ->check(objection_to_name);
   app.add_option("--threads", settings.threads,
@@ -98,6 +99,7 @@ int run_program(int argc, char** argv, LogSettings& log) {
   oblique::protocol::set_up_log(kProgram);
   oblique::protocol::silence_protobuf();
   SessionSettings settings;
+  std::string keys;
   settings.threads = cores();
   CLI::App app(
       "Solves points of parameter studies for an oblique-server.\n"
@@ -107,7 +109,7 @@ int run_program(int argc, char** argv, LogSettings& log) {
       app,
       {"OBLIQUE_WORKER_", oblique::protocol::default_configuration_file("worker.toml"), {"log"}});
   StopWithParent parent;
-  add_options(app, configuration, parent, settings);
+  add_options(app, configuration, parent, settings, keys);
   add_log_flags(app, configuration, log);
   if (const auto exit_code = configuration.parse(argc, argv)) {
     return *exit_code;
@@ -121,6 +123,9 @@ int run_program(int argc, char** argv, LogSettings& log) {
   }
   oblique::protocol::set_up_log(kProgram, log);
   try {
+    if (!keys.empty()) {
+      settings.key = oblique::protocol::read_key_file(keys);
+    }
     return run_worker(settings, parent);
   } catch (const oblique::solver::InputError& error) {
     return oblique::protocol::tell_wrong_usage(app.get_name(), error.what());

@@ -67,27 +67,40 @@ Session::Session(SessionSettings settings, BatchSolver::SolvePoints solve)
 
 Session::~Session() = default;
 
+protocol::DealerSettings Session::dealer_settings() const {
+  return {.url = settings_.server,
+          .example_url = SessionSettings().server,
+          .linger_ms = kLinger_ms,
+          .shortest_pause_ms = static_cast<int>(settings_.conversation.shortest_backoff_ms),
+          .longest_pause_ms = static_cast<int>(settings_.conversation.longest_backoff_ms),
+          .is_worker = true,
+          .key = settings_.key};
+}
+
 void Session::open_socket() {
-  const protocol::DealerSettings settings{
-      .url = settings_.server,
-      .example_url = SessionSettings().server,
-      .linger_ms = kLinger_ms,
-      .shortest_pause_ms = static_cast<int>(settings_.conversation.shortest_backoff_ms),
-      .longest_pause_ms = static_cast<int>(settings_.conversation.longest_backoff_ms)};
-  socket_.reset();
-  socket_ = protocol::made_dealer(context_, settings);
+  const protocol::DealerSettings settings = dealer_settings();
+  link_.reset();
+  link_.emplace(context_, settings);
   if (!std::exchange(was_heard_, false)) {
     ++attempt_;
   }
-  protocol::connect(*socket_, settings, attempt_);
+  protocol::connect(link_->socket, settings, attempt_);
+}
+
+void Session::note_rejection() {
+  if (const auto rejection = link_->monitor.rejection()) {
+    apply(
+        conversation_.on_rejected(protocol::sentence_of(*rejection, dealer_settings()), now_ms()));
+  }
 }
 
 int Session::run(int stop_descriptor, const std::function<void()>& on_stop) {
   apply(conversation_.start(now_ms()));
   while (!exit_code_) {
-    zmq::pollitem_t items[] = {{socket_->handle(), 0, ZMQ_POLLIN, 0},
+    zmq::pollitem_t items[] = {{link_->socket.handle(), 0, ZMQ_POLLIN, 0},
                                {nullptr, batch_ended_.descriptor(), ZMQ_POLLIN, 0},
-                               {nullptr, stop_descriptor, ZMQ_POLLIN, 0}};
+                               {nullptr, stop_descriptor, ZMQ_POLLIN, 0},
+                               {link_->monitor.handle(), 0, ZMQ_POLLIN, 0}};
     try {
       zmq::poll(items, std::size(items), std::chrono::milliseconds(poll_timeout_ms()));
     } catch (const zmq::error_t& error) {
@@ -97,6 +110,7 @@ int Session::run(int stop_descriptor, const std::function<void()>& on_stop) {
       continue;
     }
     receive_all();
+    note_rejection();
     if ((items[1].revents & ZMQ_POLLIN) != 0 || now_ms() >= report_due_ms_) {
       batch_ended_.clear();
       report_progress();
@@ -109,7 +123,7 @@ int Session::run(int stop_descriptor, const std::function<void()>& on_stop) {
     apply(conversation_.on_time(now_ms()));
     solver_.set_paused(!conversation_.may_solve());
   }
-  socket_.reset();
+  link_.reset();
   context_.close();  // waits for the goodbye, no longer than the socket lingers
   return *exit_code_;
 }
@@ -128,7 +142,7 @@ void Session::receive_all() {
   for (int i = 0; i < kMessagesAtATime && !exit_code_; ++i) {
     zmq::message_t frame;
     try {
-      if (!socket_->recv(frame, zmq::recv_flags::dontwait)) {
+      if (!link_->socket.recv(frame, zmq::recv_flags::dontwait)) {
         return;
       }
     } catch (const zmq::error_t& error) {
@@ -151,7 +165,7 @@ bool Session::send(const protocol::WorkerMessage& message) {
   const std::string frame = protocol::encode(message);
   while (true) {
     try {
-      return socket_->send(zmq::buffer(frame), zmq::send_flags::dontwait).has_value();
+      return link_->socket.send(zmq::buffer(frame), zmq::send_flags::dontwait).has_value();
     } catch (const zmq::error_t& error) {
       if (error.num() != EINTR) {
         spdlog::warn("sending failed: {}", error.what());
@@ -175,7 +189,9 @@ void Session::apply(Effects effects) {
       [&](const DropStudy& effect) { solver_.drop_study(effect.study_id); },
       [&](const DropBatch& effect) { solver_.drop_batch(effect.number); },
       [&](const DropAll&) { solver_.drop_all(); },
-      [&](const Note& note) { spdlog::info("{}", note.text); },
+      [&](const Note& note) {
+        spdlog::log(note.is_warning ? spdlog::level::warn : spdlog::level::info, "{}", note.text);
+      },
       [&](const Finish& finish) {
         exit_code_ = finish.exit_code;
         spdlog::log(finish.exit_code == 0 ? spdlog::level::info : spdlog::level::err, "{}",

@@ -8,6 +8,9 @@
 
 #include <zmq.hpp>
 
+#include "proto/keys/key_file.h"
+#include "proto/socket/socket.h"
+#include "proto/socket/socket_monitor.h"
 #include "proto/system/wake_up.h"
 #include "worker/batch_solver.h"
 #include "worker/conversation.h"
@@ -21,6 +24,7 @@ struct SessionSettings {
   std::size_t threads = 1;                      ///< that solve points
   std::size_t models_kept = 8;                  ///< falls kept
   std::int64_t report_interval_ms = 100;        ///< solved points wait at most so long
+  std::optional<protocol::KeyFile> key = {};    ///< its own; none: plain text
   ConversationSettings conversation;
 };
 
@@ -43,7 +47,17 @@ class Session {
   bool is_solving() const { return solver_.is_solving(); }
 
  private:
+  /// The socket of the present attempt.
+  struct Link {
+    Link(zmq::context_t& context, const protocol::DealerSettings& settings)
+        : socket(protocol::made_dealer(context, settings)), monitor(context, socket) {}
+    zmq::socket_t socket;
+    protocol::SocketMonitor monitor;
+  };
+
+  protocol::DealerSettings dealer_settings() const;
   void open_socket();
+  void note_rejection();
   void apply(Effects effects);
   /// False when the message could not be handed to the socket.
   bool send(const protocol::WorkerMessage& message);
@@ -53,7 +67,7 @@ class Session {
 
   const SessionSettings settings_;
   zmq::context_t context_;
-  std::optional<zmq::socket_t> socket_;
+  std::optional<Link> link_;
   unsigned attempt_ = 0;   ///< to connect: which of the families of addresses the host has is tried
   bool was_heard_ = true;  ///< something came over this socket
   protocol::WakeUp batch_ended_;

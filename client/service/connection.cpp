@@ -30,7 +30,8 @@ protocol::DealerSettings dealer_settings(const ConnectionSettings& settings) {
           .linger_ms = 0,
           .shortest_pause_ms = 20,
           .longest_pause_ms = 1000,
-          .queues_unconnected = false};
+          .queues_unconnected = false,
+          .key = settings.key};
 }
 
 /// Where the page begins that follows the one after `asked`; 0: there is none. A page that does not
@@ -136,6 +137,9 @@ protocol::ClientReply Connection::answer_to(const protocol::ClientRequest& reque
   while (tell || Clock::now() - outstanding.heard < timeout) {
     send_or_connect_again(outstanding);
     wait_a_slice(is_unsent(outstanding));
+    if (const auto rejection = monitor_.rejection()) {
+      throw ConnectionError(protocol::sentence_of(*rejection, dealer_settings(settings_)));
+    }
     if (auto reply = received(request.request_id())) {
       if (std::exchange(said_silent, false)) {
         tell(fmt::format("{} answers again", settings_.server_url));

@@ -9,9 +9,10 @@
 
 #include <zmq.hpp>
 
-#include "client/service/socket_monitor.h"
 #include "client/study/study.h"
+#include "proto/keys/key_file.h"
 #include "proto/oblique.pb.h"
+#include "proto/socket/socket_monitor.h"
 
 namespace oblique::client {
 
@@ -22,6 +23,7 @@ struct ConnectionSettings {
   /// A request of which nothing was heard for so long is sent again over a new connection, and
   /// again after twice as long.
   std::int64_t resend_after_ms = 3'000;
+  std::optional<protocol::KeyFile> key = {};  ///< ours; none: plain text
 };
 
 /// The server answered that it cannot or will not; the message is its own.
@@ -62,7 +64,8 @@ using Tell = std::function<void(const std::string& sentence)>;
 /// first counts.
 ///
 /// A call that is given a `tell` does not end for want of an answer: it says once that the server
-/// is silent, and once that it answers again.
+/// is silent, and once that it answers again. It ends, as any other, when the server turns this
+/// program away, as for its key.
 class Connection {
  public:
   /// Asked many times a second while waiting; false ends the wait. It may throw.
@@ -119,7 +122,7 @@ class Connection {
   KeepWaiting keep_waiting_;
   zmq::context_t context_;
   zmq::socket_t socket_;
-  SocketMonitor monitor_;
+  protocol::SocketMonitor monitor_;
   unsigned attempt_ = 0;  ///< to connect: which family of addresses is tried
   Clock::time_point connecting_since_ = Clock::now();
   std::uint64_t connections_before_ = 0;  ///< the present attempt to connect began

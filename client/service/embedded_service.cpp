@@ -31,14 +31,15 @@ std::string with_last_words(const std::string& what, const ChildProcess& child) 
   return words.empty() ? what : fmt::format("{}; its last words:\n{}", what, words);
 }
 
-ChildSettings server_settings(const ServiceSettings& settings, int ready) {
-  ChildSettings child{.program = sibling_program("oblique-server"),
-                      .arguments = {"--no-config", "--db", settings.database.string(),
-                                    "--worker-port", "0", "--client-port", "0", "--http", "off",
-                                    "--ready-fd", std::to_string(ChildProcess::kHandedOver),
-                                    "--stop-with-parent", std::to_string(getpid())},
-                      .show_errors = settings.verbose,
-                      .handed_over = ready};
+ChildSettings server_settings(const ServiceSettings& settings, const KeysForARun& keys, int ready) {
+  ChildSettings child{
+      .program = sibling_program("oblique-server"),
+      .arguments = {"--no-config", "--db", settings.database.string(), "--worker-port", "0",
+                    "--client-port", "0", "--http", "off", "--ready-fd",
+                    std::to_string(ChildProcess::kHandedOver), "--stop-with-parent",
+                    std::to_string(getpid()), "--keys", keys.file_of(protocol::Role::kServer)},
+      .show_errors = settings.verbose,
+      .handed_over = ready};
   if (settings.allow_network_disk) {
     child.arguments.emplace_back("--allow-network-disk");
   }
@@ -103,14 +104,15 @@ unsigned threads_each(int workers) {
 EmbeddedService::EmbeddedService(const ServiceSettings& settings, protocol::StopSignals& stop) {
   const auto worker_program = sibling_program("oblique-worker");
   Pipe ready;
-  server_ = std::make_unique<ChildProcess>(server_settings(settings, ready.write.number()));
+  server_ = std::make_unique<ChildProcess>(server_settings(settings, keys_, ready.write.number()));
   // Only the server holds it now, so its end shows on ours.
   ready.write.close();
   wait_until_ready(ready.read, stop);
   for (int i = 0; i < settings.workers; ++i) {
     workers_.push_back(std::make_unique<ChildProcess>(
         ChildSettings{.program = worker_program,
-                      .arguments = {"--no-config", "--server", worker_url_, "--stop-with-parent",
+                      .arguments = {"--no-config", "--server", worker_url_, "--keys",
+                                    keys_.file_of(protocol::Role::kWorker), "--stop-with-parent",
                                     std::to_string(getpid()), "--threads",
                                     std::to_string(threads_each(settings.workers))},
                       .show_errors = settings.verbose}));

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "client/service/child_process.h"
+#include "client/service/keys_for_a_run.h"
 #include "proto/program/stop_signals.h"
 
 namespace oblique::client {
@@ -32,6 +33,11 @@ class EmbeddedService {
 
   /// Where clients connect.
   const std::string& client_url() const { return client_url_; }
+  /// With which they do: the service has keys of its own, for other users of this machine reach
+  /// its ports too.
+  protocol::KeyFile client_key() const {
+    return protocol::read_key_file(keys_.file_of(protocol::Role::kClient));
+  }
 
   /// Throws ProcessError when the server or the last worker has ended.
   void check();
@@ -46,6 +52,7 @@ class EmbeddedService {
  private:
   void wait_until_ready(const Descriptor& ready, protocol::StopSignals& stop);
 
+  KeysForARun keys_;
   std::unique_ptr<ChildProcess> server_;
   std::vector<std::unique_ptr<ChildProcess>> workers_;
   std::set<pid_t> reported_;  ///< workers whose end `news` has told

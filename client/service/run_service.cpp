@@ -67,6 +67,7 @@ RunEnd submit_and_wait(const Study& study, const RunSettings& settings, Embedded
   };
   ConnectionSettings where;
   where.server_url = service.client_url();
+  where.key = service.client_key();
   Connection connection(where, look_after);
   const auto submitted = connection.submit(study, settings.terms);
   if (!submitted.created()) {

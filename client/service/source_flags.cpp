@@ -14,10 +14,15 @@ namespace oblique::client {
 namespace {
 
 constexpr const char* kServerVariable = "OBLIQUE_SERVER";
+constexpr const char* kKeysVariable = "OBLIQUE_KEYS";
+
+std::string of_environment(const char* variable) {
+  const char* value = std::getenv(variable);
+  return value == nullptr ? std::string() : std::string(value);
+}
 
 std::string server_of_environment() {
-  const char* value = std::getenv(kServerVariable);
-  return value == nullptr ? std::string() : std::string(value);
+  return of_environment(kServerVariable);
 }
 
 std::string seconds(std::int64_t milliseconds) {
@@ -44,6 +49,10 @@ void add_server_flags(CLI::App& verb, SourceFlags& flags) {
                   fmt::format("address of the server; default: {}, else {}", kServerVariable,
                               ConnectionSettings().server_url))
       ->type_name("URL");
+  verb.add_option(
+          "--keys", flags.keys,
+          fmt::format("key file for a server that has keys; default: {}, else none", kKeysVariable))
+      ->type_name("FILE");
   verb.add_option("--timeout", flags.timeout_s,
                   fmt::format("longest wait for an answer [s]; default: {}",
                               seconds(ConnectionSettings().timeout_ms)))
@@ -62,6 +71,7 @@ void add_source_flags(CLI::App& verb, SourceFlags& flags) {
           "longest wait for an answer [s]; default: {} from a server, {} from a file",
           seconds(ConnectionSettings().timeout_ms), seconds(DatabaseSettings().timeout_ms)));
   database->excludes("--server");
+  database->excludes("--keys");
 }
 
 ConnectionSettings connection_settings(const SourceFlags& flags) {
@@ -71,6 +81,10 @@ ConnectionSettings connection_settings(const SourceFlags& flags) {
     settings.server_url = flags.server;
   } else if (const auto from_environment = server_of_environment(); !from_environment.empty()) {
     settings.server_url = from_environment;
+  }
+  const std::string keys = flags.keys.empty() ? of_environment(kKeysVariable) : flags.keys;
+  if (!keys.empty()) {
+    settings.key = protocol::read_key_file(keys);
   }
   return settings;
 }

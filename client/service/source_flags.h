@@ -16,15 +16,17 @@ struct SourceFlags {
   std::string database;             ///< empty: not given
   std::string server;               ///< empty: not given
   std::optional<double> timeout_s;  ///< none: the default of what answers
+  std::string keys = {};            ///< file; empty: not given
 };
 
-/// Adds --server and --timeout. `flags` must live as long as `verb`.
+/// Adds --server, --keys and --timeout. `flags` must live as long as `verb`.
 void add_server_flags(CLI::App& verb, SourceFlags& flags);
-/// Adds --db, --server and --timeout. `flags` must live as long as `verb`.
+/// Adds --db, --server, --keys and --timeout. `flags` must live as long as `verb`.
 void add_source_flags(CLI::App& verb, SourceFlags& flags);
 
-/// The server that the flags name, else OBLIQUE_SERVER, else the default. Throws
-/// solver::InputError for a timeout that is not positive.
+/// The server that the flags name, else OBLIQUE_SERVER, else the default; and the key of the file
+/// that they name, else OBLIQUE_KEYS, else none. Throws solver::InputError for a timeout that is
+/// not positive and a key file that cannot be used.
 ConnectionSettings connection_settings(const SourceFlags& flags);
 
 /// Opens what the flags name: --db, else --server or OBLIQUE_SERVER, else oblique.db when it is in

@@ -38,5 +38,7 @@ void add_merge(CLI::App& app, Command& command);
 void add_backup(CLI::App& app, Command& command);
 void add_check(CLI::App& app, Command& command);
 void add_autoscale(CLI::App& app, Command& command);
+void add_keygen(CLI::App& app, Command& command);
+void add_keys(CLI::App& app, Command& command);
 
 }  // namespace oblique::client

@@ -46,6 +46,7 @@ KeyFile read_key_file(const std::string& path) {
   const TomlFile file(path, "the key file");
   const TomlFields fields(path, file.top());
   KeyFile key;
+  key.path = path;
   key.role = fields.role("role");
   const bool is_server = key.role == Role::kServer;
   fields.refuse_unknown(is_server ? std::span<const std::string_view>(kServersFields)

@@ -15,6 +15,7 @@ struct KeyFile {
   std::string name;  ///< of the key, for people
   KeyPair pair;
   std::optional<CurveKey> server = {};  ///< the server's public key; every role but the server's
+  std::string path = {};                ///< of the file that it was read from
 };
 
 /// Reads a key file (TOML, README.md). Throws solver::InputError, with file, line and key, unless

@@ -2,6 +2,8 @@
 
 #include <cstdint>
 
+#include <spdlog/fmt/fmt.h>
+
 #include "proto/address.h"
 #include "proto/frames.h"
 #include "proto/socket/limits.h"
@@ -22,6 +24,18 @@ bool is_by_v6(const std::string& url, unsigned attempt) {
   return has_v6 && (!has_v4 || attempt % 2 == 1);
 }
 
+void set_keys(zmq::socket_t& socket, const KeyFile& key) {
+  if (!key.server) {
+    throw solver::InputError(
+        fmt::format("{} is the key of a server: programs that connect to one take their own, as "
+                    "`oblique keygen` makes them",
+                    key.path));
+  }
+  socket.set(zmq::sockopt::curve_serverkey, z85(*key.server));
+  socket.set(zmq::sockopt::curve_publickey, z85(key.pair.public_key));
+  socket.set(zmq::sockopt::curve_secretkey, z85(key.pair.secret_key));
+}
+
 }  // namespace
 
 zmq::socket_t made_dealer(zmq::context_t& context, const DealerSettings& settings) {
@@ -30,6 +44,9 @@ zmq::socket_t made_dealer(zmq::context_t& context, const DealerSettings& setting
   }
   constexpr KeepAlive kKeepAlive;
   zmq::socket_t socket(context, zmq::socket_type::dealer);
+  if (settings.key) {
+    set_keys(socket, *settings.key);
+  }
   socket.set(zmq::sockopt::linger, settings.linger_ms);
   socket.set(zmq::sockopt::immediate, !settings.queues_unconnected);
   socket.set(zmq::sockopt::maxmsgsize, static_cast<std::int64_t>(kMaxFrameBytes) + kSealBytes);

@@ -1,8 +1,11 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include <zmq.hpp>
+
+#include "proto/keys/key_file.h"
 
 namespace oblique::protocol {
 
@@ -14,10 +17,15 @@ struct DealerSettings {
   int shortest_pause_ms = 20;  ///< between attempts to connect
   int longest_pause_ms = 1000;
   bool queues_unconnected = true;  ///< takes messages while there is no connection
+  bool is_worker = false;  ///< it connects to the port for workers, else to that for clients
+  /// Its key, with the server's: all is encrypted, and only that server is spoken with. None: plain
+  /// text with a server that has no keys.
+  std::optional<KeyFile> key = {};
 };
 
 /// A DEALER socket with the options that all our sockets have (limits.h, the largest frame), which
-/// does not connect yet. Throws solver::InputError for a `url` that is no address.
+/// does not connect yet. Throws solver::InputError for a `url` that is no address, and for a key
+/// that is a server's.
 zmq::socket_t made_dealer(zmq::context_t& context, const DealerSettings& settings);
 
 /// Lets it connect, in the background, and again whenever a connection ends; a host's name is

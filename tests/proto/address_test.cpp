@@ -1,5 +1,7 @@
 #include "proto/address.h"
 
+#include <string>
+
 #include <gtest/gtest.h>
 
 namespace oblique::protocol {
@@ -38,6 +40,11 @@ TEST(Address, IsOfTheFamilyThatItIsWrittenIn) {
   EXPECT_TRUE(v6.has_v6);
   const Families none = families_of("");
   EXPECT_FALSE(none.has_v4 || none.has_v6);
+}
+
+TEST(Address, OfIpv6StandsInBrackets) {
+  EXPECT_NE(objection_to_address("tcp://::1:7601").find("brackets"), std::string::npos);
+  EXPECT_EQ(objection_to_address("tcp://[::1]:7601"), "");
 }
 
 }  // namespace

@@ -37,6 +37,8 @@ struct Refusal {
 struct KeyHolder {
   std::string name;
   protocol::Role role;
+
+  bool operator==(const KeyHolder&) const = default;
 };
 
 using Verdict = std::variant<std::shared_ptr<const KeyHolder>, Refusal>;

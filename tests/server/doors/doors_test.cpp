@@ -11,6 +11,7 @@ namespace {
 using testing::AllOf;
 using testing::AnyOf;
 using testing::HasSubstr;
+using testing::SizeIs;
 
 std::string objection_to_doors(const DoorSettings& settings) {
   try {
@@ -50,12 +51,16 @@ TEST(DoorsTest, TextThatIsNoAddressIsRefusedWhateverElseIsGiven) {
 TEST(DoorsTest, AnOpenDoorIsWarnedOfAtOnceAndAgainLater) {
   Doors open({"0.0.0.0", "", true});
   EXPECT_EQ(open.access(), Access::kInsecure);
-  EXPECT_THAT(open.warning(5).value_or(""), AllOf(HasSubstr("INSECURE"), HasSubstr("0.0.0.0")));
-  EXPECT_FALSE(open.warning(6));
-  EXPECT_TRUE(open.warning(700'000));
+  const auto lines = open.look(5).lines;
+  ASSERT_THAT(lines, SizeIs(1));
+  EXPECT_TRUE(lines.front().is_warning);
+  EXPECT_THAT(lines.front().text, AllOf(HasSubstr("INSECURE"), HasSubstr("0.0.0.0")));
+  EXPECT_THAT(open.look(6).lines, SizeIs(0));
+  EXPECT_THAT(open.look(700'000).lines, SizeIs(1));
   Doors closed({});
   EXPECT_EQ(closed.access(), Access::kLoopback);
-  EXPECT_FALSE(closed.warning(5));
+  EXPECT_THAT(closed.look(5).lines, SizeIs(0));
+  EXPECT_FALSE(closed.guard(PortKeeper::Port::kWorkers));
 }
 
 }  // namespace

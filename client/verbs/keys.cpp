@@ -1,0 +1,130 @@
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "client/output/printer.h"
+#include "client/verbs/printed_rows.h"
+#include "client/verbs/verbs.h"
+#include "proto/keys/key_folder.h"
+#include "proto/text.h"
+#include "worker/solver/model/errors.h"
+
+namespace oblique::client {
+namespace {
+
+constexpr const char* kKeysExamples = R"(Examples:
+  oblique keys list --dir keys
+  oblique keys add alice --role client --dir keys          writes keys/alice.key
+  oblique keys add lab7 --role worker --public KEY         lists a key that was made elsewhere
+  oblique keys revoke alice --dir keys
+
+A running server heeds a change within a second; the connections of a revoked key are ended.)";
+
+struct KeysFlags {
+  std::string folder{"."};
+  std::string name;
+  std::string role;
+  std::string public_key;  // empty: a new pair
+  std::string format{"table"};
+};
+
+protocol::Role role_of(const std::string& name) {
+  const auto role = protocol::role_named(name);
+  if (!role || *role == protocol::Role::kServer) {
+    throw solver::InputError(fmt::format(
+        "--role {} is not allowed: it must be client, worker or reader", protocol::visible(name)));
+  }
+  return *role;
+}
+
+std::optional<protocol::CurveKey> public_key_of(const std::string& text) {
+  if (text.empty()) {
+    return std::nullopt;
+  }
+  const auto key = protocol::key_of_z85(text);
+  if (!key) {
+    throw solver::InputError(
+        fmt::format("--public {} is no key: one has {} characters, as `public` in a key file",
+                    protocol::visible(text), protocol::kKeyCharacters));
+  }
+  return key;
+}
+
+int add(const KeysFlags& flags) {
+  const auto key = protocol::add_key(flags.folder, flags.name, role_of(flags.role),
+                                     public_key_of(flags.public_key));
+  std::cerr << fmt::format("{} ({}) is listed{}.\n", key.name, flags.role,
+                           flags.public_key.empty()
+                               ? "; its key is in " + protocol::key_file_in(flags.folder, key.name)
+                               : "");
+  return kDone;
+}
+
+int list(const KeysFlags& flags) {
+  const auto format = format_named(flags.format);
+  protocol::QueryReply table;
+  for (const char* column : {"name", "role", "public", "added_at"}) {
+    table.add_columns(column);
+  }
+  const auto keys = protocol::read_authorized_keys(protocol::authorized_keys_in(flags.folder));
+  for (const auto& key : keys.all()) {
+    auto& row = *table.add_rows();
+    add_value(row, key.name);
+    add_value(row, std::string(name_of(key.role)));
+    add_value(row, protocol::z85(key.public_key));
+    add_value(row, key.added_at);
+  }
+  print_out(table, format);
+  return kDone;
+}
+
+int revoke(const KeysFlags& flags) {
+  const std::string path = protocol::authorized_keys_in(flags.folder);
+  if (!std::filesystem::exists(path)) {
+    throw solver::InputError(fmt::format("there is no {}: say where it is with --dir", path));
+  }
+  protocol::change_authorized_keys(
+      path, [&](protocol::AuthorizedKeys& keys) { keys.remove(flags.name); });
+  std::cerr << fmt::format("{} is revoked: its key is worth nothing from now on.\n", flags.name);
+  return kDone;
+}
+
+}  // namespace
+
+void add_keys(CLI::App& app, Command& command) {
+  auto flags = std::make_shared<KeysFlags>();
+  auto* verb = app.add_subcommand("keys", "Say whom a server with keys admits");
+  verb->footer(kKeysExamples);
+  verb->require_subcommand(1);
+  const auto add_action = [&](const char* name, const char* help, int (*action)(const KeysFlags&)) {
+    auto* added = verb->add_subcommand(name, help);
+    added->add_option("--dir", flags->folder, "folder of the server's key and the list")
+        ->type_name("DIR")
+        ->capture_default_str();
+    added->callback(
+        [flags, action, &command] { command = [flags, action] { return action(*flags); }; });
+    return added;
+  };
+  auto* added = add_action("add", "List one more key", add);
+  added->add_option("NAME", flags->name, "of the key, for people; also of its file, NAME.key")
+      ->required()
+      ->type_name("");
+  added->add_option("--role", flags->role, "client, worker or reader")
+      ->required()
+      ->type_name("ROLE");
+  added
+      ->add_option("--public", flags->public_key,
+                   "public key that was made elsewhere; default: a new pair, written to NAME.key")
+      ->type_name("KEY");
+  add_format_flag(*add_action("list", "Show the keys that are listed", list), flags->format);
+  add_action("revoke", "List a key no more", revoke)
+      ->add_option("NAME", flags->name, "of the key")
+      ->required()
+      ->type_name("");
+}
+
+}  // namespace oblique::client

@@ -1,0 +1,202 @@
+// Who has a key gets in, and who has none, or a wrong one, is told so at once, on both sides.
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/programs.h"
+
+namespace oblique::test {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+/// A server with keys of its own, and folders with keys of others.
+class KeysTest : public ::testing::Test {
+ protected:
+  KeysTest() {
+    EXPECT_EQ(run_oblique(folder_, {"keygen", keys_}).exit_code, 0);
+    server_ = std::make_unique<Server>(folder_, folder_.file("keys.db"),
+                                       Environment{{"OBLIQUE_KEYS", key("server")}});
+  }
+
+  std::string key(const std::string& name) const { return keys_ + "/" + name + ".key"; }
+
+  Outcome ask(std::vector<std::string> arguments, const std::string& key_file = "") const {
+    arguments.insert(arguments.end(), {"--server", server_->client_url()});
+    if (!key_file.empty()) {
+      arguments.insert(arguments.end(), {"--keys", key_file});
+    }
+    return run_oblique(folder_, arguments);
+  }
+  Outcome change_keys(std::vector<std::string> arguments) const {
+    arguments.insert(arguments.begin(), "keys");
+    arguments.insert(arguments.end(), {"--dir", keys_});
+    return run_oblique(folder_, arguments);
+  }
+  std::unique_ptr<Worker> worker_with(const std::string& key_file) const {
+    return std::make_unique<Worker>(folder_, server_->worker_url(),
+                                    std::vector<std::string>{"--threads", "1", "--keys", key_file});
+  }
+  static void wait_until_said(const Process& process, const std::string& words) {
+    wait_until("is said: " + words, [&] { return process.err().find(words) != std::string::npos; });
+  }
+  /// The exit code and the words of a client that is not let in.
+  void expect_turned_away(const std::string& key_file, const std::string& words) const {
+    const Outcome outcome = ask({"status"}, key_file);
+    EXPECT_EQ(outcome.exit_code, 1) << key_file;
+    EXPECT_THAT(outcome.err, HasSubstr(words));
+    EXPECT_THAT(outcome.err, Not(HasSubstr("no answer")));
+  }
+
+  TemporaryFolder folder_;
+  std::string keys_ = folder_.file("keys");
+  std::unique_ptr<Server> server_;
+};
+
+const std::vector<std::string> kFewPoints{"submit", "--name", "few", "--H",       "1",
+                                          "--mu",   "0.4",    "--e", "0.9,0.95,1"};
+
+TEST_F(KeysTest, WithTheKeysOfTheirRolesAStudyIsSubmittedSolvedAndRead) {
+  const auto worker = worker_with(key("worker"));
+  auto submit = kFewPoints;
+  submit.emplace_back("--watch");
+  EXPECT_EQ(ask(submit, key("client")).exit_code, 0);
+  const Outcome read = ask({"query", "few", "--select", "mu,e,status"}, key("reader"));
+  EXPECT_EQ(read.exit_code, 0) << read.err;
+  EXPECT_THAT(read.out, HasSubstr("solved"));
+  EXPECT_THAT(ask({"status", "--format", "json"}, key("reader")).out,
+              HasSubstr(R"("access":"keys")"));
+}
+
+TEST_F(KeysTest, AClientThatIsNotLetInSaysWhyAndWhoseKeyItShowed) {
+  expect_turned_away("", "asks for a key, and none was given");
+  expect_turned_away(key("worker"), "it is for workers, and this port is for clients");
+  const std::string others = folder_.file("others");
+  ASSERT_EQ(run_oblique(folder_, {"keygen", others}).exit_code, 0);
+  expect_turned_away(others + "/client.key", "the public key of the server in that file");
+  ASSERT_EQ(change_keys({"add", "gone", "--role", "client"}).exit_code, 0);
+  ASSERT_EQ(change_keys({"revoke", "gone"}).exit_code, 0);
+  expect_turned_away(key("gone"), "not on the server's list, or was revoked");
+  EXPECT_THAT(server_->process().err(),
+              AllOf(HasSubstr("key of another role"), HasSubstr("wrong server key")));
+  EXPECT_EQ(ask({"status"}, key("server")).exit_code, 2) << "nobody but the server uses that";
+}
+
+TEST_F(KeysTest, AKeyFileThatOthersMayReadIsWrongUsageWithTheRemedy) {
+  std::filesystem::permissions(key("client"), std::filesystem::perms(0644));
+  const Outcome outcome = ask({"status"}, key("client"));
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("chmod 600 '" + key("client") + "'"));
+}
+
+TEST_F(KeysTest, AServerWithoutKeysSaysSoToWhoComesWithSome) {
+  const Server open(folder_, folder_.file("open.db"));
+  const Outcome outcome =
+      run_oblique(folder_, {"status", "--server", open.client_url(), "--keys", key("client")});
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("has no keys"));
+  const Worker worker(folder_, open.worker_url(), {"--keys", key("worker")});
+  wait_until_said(worker, "has no keys");
+}
+
+TEST_F(KeysTest, AWorkerThatIsNotLetInSaysWhyAndGoesOnTryingSlowly) {
+  const auto client = worker_with(key("client"));
+  wait_until_said(*client, "it is for clients, and this port is for workers: trying again in 2 s");
+  const Worker keyless(folder_, server_->worker_url());
+  wait_until_said(keyless, "asks for a key, and none was given");
+  wait_until_said(*client, "trying again in 4 s");
+}
+
+TEST_F(KeysTest, AWorkerWhoseKeyIsAddedLaterJoinsThenAndLeavesWhenItIsRevoked) {
+  ASSERT_EQ(change_keys({"add", "late", "--role", "worker"}).exit_code, 0);
+  const Outcome listed = change_keys({"list", "--format", "csv"});
+  const std::size_t at = listed.out.find("late,worker,");
+  ASSERT_NE(at, std::string::npos) << listed.out;
+  ASSERT_EQ(change_keys({"revoke", "late"}).exit_code, 0);
+  EXPECT_THAT(change_keys({"list"}).out, Not(HasSubstr("late")));
+  const auto worker = worker_with(key("late"));
+  wait_until_said(*worker, "did not accept this key");
+  // The public key, as the file says it: `keys add --public` lists it again.
+  std::string line;
+  std::ifstream file(key("late"));
+  while (std::getline(file, line) && !line.starts_with("public = \"")) {
+  }
+  const std::string public_key = line.substr(10, 40);
+  ASSERT_EQ(change_keys({"add", "late", "--role", "worker", "--public", public_key}).exit_code, 0);
+  wait_until_said(*worker, "welcomed as worker");
+  ASSERT_EQ(change_keys({"revoke", "late"}).exit_code, 0);
+  wait_until_said(server_->process(), "revoked: late");
+  wait_until("the worker is told", [&] {
+    const std::string said = worker->err();
+    return said.find("did not accept this key", said.find("welcomed as worker")) !=
+           std::string::npos;
+  });
+}
+
+TEST_F(KeysTest, WhoWatchesWithAKeyThatIsRevokedIsTold) {
+  ASSERT_EQ(ask(kFewPoints, key("client")).exit_code, 0);
+  Process watching(folder_, client_program(),
+                   {"watch", "few", "--server", server_->client_url(), "--keys", key("reader")});
+  wait_until_said(watching, "waits for a worker");
+  ASSERT_EQ(change_keys({"revoke", "reader"}).exit_code, 0);
+  EXPECT_EQ(watching.wait(), 1);
+  EXPECT_THAT(watching.err(), HasSubstr("was revoked"));
+}
+
+TEST_F(KeysTest, ListsThatCannotBeChangedAsAskedStayAsTheyAre) {
+  const std::string before = change_keys({"list", "--format", "csv"}).out;
+  EXPECT_EQ(change_keys({"add", "x", "--role", "server"}).exit_code, 2);
+  EXPECT_EQ(change_keys({"add", "x", "--role", "worker", "--public", "short"}).exit_code, 2);
+  EXPECT_EQ(change_keys({"add", "worker", "--role", "client"}).exit_code, 2);
+  EXPECT_EQ(change_keys({"add", "../x", "--role", "client"}).exit_code, 2);
+  EXPECT_THAT(change_keys({"revoke", "nobody"}).err, HasSubstr("client, worker, reader"));
+  EXPECT_EQ(change_keys({"list", "--format", "csv"}).out, before);
+  EXPECT_EQ(run_oblique(folder_, {"keygen", keys_}).exit_code, 1);
+}
+
+TEST(OpenDoorsTest, BeyondLoopbackAServerNeedsKeysOrTheWordInsecure) {
+  const TemporaryFolder folder;
+  const std::vector<std::string> beyond{"--listen", "0.0.0.0",       "--worker-port",
+                                        "0",        "--client-port", "0"};
+  const Outcome refused = Process(folder, server_program(), beyond).outcome();
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, AllOf(HasSubstr("oblique keygen"), HasSubstr("--insecure")));
+
+  Server open(folder, folder.file("open.db"), {{"OBLIQUE_SERVER_INSECURE", "true"}});
+  const Outcome status =
+      run_oblique(folder, {"status", "--server", open.client_url(), "--format", "json"});
+  EXPECT_THAT(status.err, HasSubstr("--insecure"));
+  EXPECT_THAT(open.process().err(), HasSubstr("INSECURE"));
+  const Worker worker(folder, open.worker_url());
+  wait_until("the worker is told",
+             [&] { return worker.err().find("--insecure") != std::string::npos; });
+}
+
+TEST(OpenDoorsTest, ServerWorkerAndClientSpeakByIpv6) {
+  const TemporaryFolder folder;
+  std::unique_ptr<Server> server;
+  try {
+    server = std::make_unique<Server>(folder, folder.file("six.db"),
+                                      Environment{{"OBLIQUE_SERVER_LISTEN", "::1"}});
+  } catch (const std::runtime_error& error) {
+    GTEST_SKIP() << "this machine has no IPv6 on its loopback device: " << error.what();
+  }
+  EXPECT_THAT(server->client_url(), HasSubstr("tcp://[::1]:"));
+  const Worker worker(folder, server->worker_url(), {"--threads", "1"});
+  auto submit = kFewPoints;
+  submit.insert(submit.end(), {"--watch", "--server", server->client_url()});
+  const Outcome outcome = run_oblique(folder, submit);
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+}
+
+}  // namespace
+}  // namespace oblique::test
