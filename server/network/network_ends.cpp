@@ -136,7 +136,8 @@ bool Network::end_oldest_handshake() {
     strangers_.pop_front();
     const auto found = peers_.find(oldest);
     if (found != peers_.end() && found->second->is_stranger) {
-      end(oldest, "there are too many handshakes, and its own is the oldest", RefusalCause::kBound);
+      end(oldest, "there is no room for more, and its handshake is the oldest that is not done",
+          RefusalCause::kBound);
       return true;
     }
   }
