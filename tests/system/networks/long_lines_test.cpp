@@ -2,6 +2,7 @@
 // own.
 #include <chrono>
 #include <thread>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -26,6 +27,12 @@ class LongLines : public ::testing::Test {
     });
   }
 
+  std::vector<std::string> submit_through_proxy() const {
+    auto arguments = submit_and_watch();
+    arguments.insert(arguments.end(), {"--server", to_clients_port_.url()});
+    return arguments;
+  }
+
   TemporaryFolder folder_;
   Database database_{folder_.file("study.db")};
   Server server_{folder_, folder_.file("study.db")};
@@ -33,7 +40,7 @@ class LongLines : public ::testing::Test {
   SlowProxy to_clients_port_{server_.client_url(), milliseconds(200)};
   Worker worker_{folder_, to_workers_port_.url(), {"--threads", "1"}};
   Worker other_worker_{folder_, to_workers_port_.url(), {"--threads", "1"}};
-  Process client_{folder_, client_program(), submit_and_watch(to_clients_port_.url())};
+  Process client_{folder_, client_program(), submit_through_proxy()};
 };
 
 TEST_F(LongLines, TheyAreStalledForSecondsAgainAndAgain) {

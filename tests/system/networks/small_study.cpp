@@ -9,10 +9,10 @@
 
 namespace oblique::test {
 
-std::vector<std::string> submit_and_watch(const std::string& server_url) {
+std::vector<std::string> submit_and_watch() {
   const std::string count = std::to_string(kPointsOfAnAxis);
-  return {"submit",           "--H",    "1",    "--mu",    "0.1:2.0:" + count, "--e",
-          "0.5:1.0:" + count, "--name", "many", "--watch", "--server",         server_url};
+  return {"submit", "--watch", "--name",           "many", "--H",
+          "1",      "--mu",    "0.1:2.0:" + count, "--e",  "0.5:1.0:" + count};
 }
 
 void wait_for_rows(const Database& database, double at_least) {

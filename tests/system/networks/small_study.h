@@ -18,8 +18,9 @@ constexpr int kPointsOfAnAxis = 80;
 /// As many as a worker solves in a second: a dozen such studies run at a time.
 constexpr double kPoints = kPointsOfAnAxis * kPointsOfAnAxis;
 
-/// The words after `oblique` by which a client submits the study and watches it to its end.
-std::vector<std::string> submit_and_watch(const std::string& server_url);
+/// The words after `oblique` by which a client submits the study and watches it to its end, but for
+/// the server.
+std::vector<std::string> submit_and_watch();
 
 /// Waits until so many points have a row.
 void wait_for_rows(const Database& database, double at_least);

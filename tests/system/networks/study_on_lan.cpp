@@ -18,18 +18,45 @@ void StudyOnLan::SetUp() {
   server_name_ = server_host_->v4();
 }
 
-void StudyOnLan::start_server(const std::string& address) {
-  const Inside inside(*server_host_);
-  server_ = std::make_unique<Server>(
-      folder_, std::vector<std::string>{"--db", folder_.file("study.db"), "--listen", address,
-                                        "--insecure"});
+void StudyOnLan::make_keys() {
+  keys_ = folder_.file("keys");
+  const Outcome made = run_oblique(folder_, {"keygen", keys_});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
 }
 
-std::unique_ptr<Worker> StudyOnLan::worker_on(const Host& host) const {
+std::vector<std::string> StudyOnLan::access(const std::string& role) const {
+  const std::string port = role == "worker" ? "7601" : "7600";
+  std::vector<std::string> options{"--server", "tcp://" + server_name_ + ":" + port};
+  if (!keys_.empty()) {
+    options.insert(options.end(), {"--keys", keys_ + "/" + role + ".key"});
+  }
+  return options;
+}
+
+void StudyOnLan::start_server(const std::string& address) {
+  const Inside inside(*server_host_);
+  std::vector<std::string> arguments{"--db", folder_.file("study.db"), "--listen", address};
+  if (keys_.empty()) {
+    arguments.emplace_back("--insecure");
+  } else {
+    arguments.insert(arguments.end(), {"--keys", keys_ + "/server.key"});
+  }
+  server_ = std::make_unique<Server>(folder_, arguments);
+}
+
+std::unique_ptr<Process> StudyOnLan::worker_on(const Host& host) const {
   const Inside inside(host);
-  return std::make_unique<Worker>(
-      folder_, "tcp://" + server_name_ + ":7601",
-      std::vector<std::string>{"--threads", "1", "--name", host.name()});
+  auto arguments = access("worker");
+  arguments.insert(arguments.end(),
+                   {"--threads", "1", "--name", host.name(), "--stop-with-parent"});
+  return std::make_unique<Process>(folder_, worker_program(), arguments);
+}
+
+std::unique_ptr<Process> StudyOnLan::client(std::vector<std::string> arguments) const {
+  const Inside inside(*client_host_);
+  const auto options = access("client");
+  arguments.insert(arguments.end(), options.begin(), options.end());
+  return std::make_unique<Process>(folder_, client_program(), arguments);
 }
 
 void StudyOnLan::start_workers(std::size_t count) {
@@ -38,18 +65,12 @@ void StudyOnLan::start_workers(std::size_t count) {
   }
 }
 
-void StudyOnLan::submit() {
-  const Inside inside(*client_host_);
-  client_ = std::make_unique<Process>(folder_, client_program(),
-                                      submit_and_watch("tcp://" + server_name_ + ":7600"));
-}
-
 void StudyOnLan::goes_on_after(const std::function<void()>& fault, std::size_t workers) {
   if (server_ == nullptr) {
     start_server();
   }
   start_workers(workers);
-  submit();
+  client_ = client(submit_and_watch());
   wait_for_rows(database_, 1);
   fault();
   const auto mended = std::chrono::steady_clock::now();
@@ -59,8 +80,7 @@ void StudyOnLan::goes_on_after(const std::function<void()>& fault, std::size_t w
   print_measured("work goes on after",
                  std::chrono::duration<double>(std::chrono::steady_clock::now() - mended).count());
   expect_completed(*client_, database_, [this] {
-    return client_host_->run(client_program() + " workers --format json --server tcp://" +
-                             server_name_ + ":7600");
+    return client({"workers", "--format", "json"})->outcome().out;
   });
   for (const auto& worker : workers_) {
     EXPECT_FALSE(worker->exit_code()) << worker->err();

@@ -22,13 +22,18 @@ class StudyOnLan : public ::testing::Test {
  protected:
   void SetUp() override;
 
+  /// From now on all programs have keys.
+  void make_keys();
+  /// The options by which a client or worker (`role`) reaches the server.
+  std::vector<std::string> access(const std::string& role) const;
+
   /// At the ports that it has by default; `::` are all addresses of both families.
   void start_server(const std::string& address = "::");
   void start_workers(std::size_t count = 2);
   /// A worker on that machine, under the name of its machine.
-  std::unique_ptr<Worker> worker_on(const Host& host) const;
-  /// The client submits the study and watches it to its end.
-  void submit();
+  std::unique_ptr<Process> worker_on(const Host& host) const;
+  /// `oblique` with these arguments, and how the server is reached, on the client's machine.
+  std::unique_ptr<Process> client(std::vector<std::string> arguments) const;
 
   /// Starts what does not run yet of all these. Once points are stored `fault` happens, at the end
   /// of which what was broken is mended; then the study is completed (small_study.h) and all
@@ -43,9 +48,10 @@ class StudyOnLan : public ::testing::Test {
 
   /// How workers and clients write where the server is; its IPv4 address to begin with.
   std::string server_name_;
+  std::string keys_;  ///< folder of the keys; empty: there are none
 
   std::unique_ptr<Server> server_;
-  std::vector<std::unique_ptr<Worker>> workers_;
+  std::vector<std::unique_ptr<Process>> workers_;
   std::unique_ptr<Process> client_;
   Database database_{folder_.file("study.db")};
 };
