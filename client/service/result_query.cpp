@@ -1,5 +1,6 @@
 #include "client/service/result_query.h"
 
+#include <algorithm>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
@@ -7,6 +8,7 @@
 #include "client/output/columns.h"
 #include "client/sql/sql_expression.h"
 #include "worker/solver/model/errors.h"
+#include "worker/solver/model/parameters.h"
 
 namespace oblique::client {
 namespace {
@@ -16,6 +18,25 @@ constexpr const char* kSelect = "--select";
 constexpr const char* kOrder = "--order";
 
 }  // namespace
+
+std::string statement_of_first_results(const Study& study, std::int64_t rows) {
+  std::string columns = "point";
+  for (const auto& key : solver::model_keys()) {
+    const auto varies = [&key](const protocol::Block& block) {
+      return std::any_of(block.axes().begin(), block.axes().end(),
+                         [&key](const protocol::Axis& axis) { return axis.key() == key.name; });
+    };
+    const auto& blocks = study.recipe.blocks();
+    if (std::any_of(blocks.begin(), blocks.end(), varies)) {
+      // SQL does not tell E from e, so the view calls Young's modulus otherwise.
+      columns += fmt::format(", {}", key.name == "E" ? "E_Pa" : key.name);
+    }
+  }
+  return fmt::format(
+      "SELECT {}, H, mu, e, status, fn_peak_N, ft_peak_N, duration_s, slide_m, stick_total_s, "
+      "major_mode FROM runs WHERE study = {} ORDER BY point LIMIT {}",
+      columns, sql_text(study.name), rows);
+}
 
 void check(const ResultQuery& query) {
   if (query.limit && *query.limit < 0) {

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "client/service/source.h"
+#include "client/study/study.h"
 #include "proto/oblique.pb.h"
 
 namespace oblique::client {
@@ -28,6 +29,10 @@ void check_columns(const ResultQuery& query, Source& source);
 
 /// The statement, from row `skipped` of what it gives. `query` was checked.
 std::string statement_of(const ResultQuery& query, std::int64_t skipped);
+
+/// The statement for the first `rows` points of a study: the columns that tell its points apart,
+/// then the results most asked for.
+std::string statement_of_first_results(const Study& study, std::int64_t rows);
 
 /// The rows. A server cuts long answers off; the rest is asked for while the study is `at_rest`,
 /// for new rows would shift the parts against each other.

@@ -1,6 +1,5 @@
 #include "client/service/run_service.h"
 
-#include <algorithm>
 #include <filesystem>
 #include <iostream>
 #include <string>
@@ -9,33 +8,12 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/service/connection.h"
+#include "client/service/result_query.h"
 #include "client/service/watching.h"
-#include "client/sql/sql_expression.h"
 #include "proto/text.h"
-#include "worker/solver/model/parameters.h"
 
 namespace oblique::client {
 namespace {
-
-// The columns that tell the points of this study apart, then the results most asked for.
-std::string query_of_results(const Study& study, std::int64_t rows) {
-  std::string columns = "point";
-  for (const auto& key : solver::model_keys()) {
-    const auto varies = [&key](const protocol::Block& block) {
-      return std::any_of(block.axes().begin(), block.axes().end(),
-                         [&key](const protocol::Axis& axis) { return axis.key() == key.name; });
-    };
-    const auto& blocks = study.recipe.blocks();
-    if (std::any_of(blocks.begin(), blocks.end(), varies)) {
-      // SQL does not tell E from e, so the view calls Young's modulus otherwise.
-      columns += fmt::format(", {}", key.name == "E" ? "E_Pa" : key.name);
-    }
-  }
-  return fmt::format(
-      "SELECT {}, H, mu, e, status, fn_peak_N, ft_peak_N, duration_s, slide_m, stick_total_s, "
-      "major_mode FROM runs WHERE study = {} ORDER BY point LIMIT {}",
-      columns, sql_text(study.name), rows);
-}
 
 void tell_how_to_continue(const Study& study, const RunSettings& settings) {
   std::cerr << fmt::format(
@@ -91,7 +69,7 @@ RunEnd submit_and_wait(const Study& study, const RunSettings& settings, Embedded
     const std::uint64_t servers_limit = 0;
     return connection.query(sql, servers_limit, tell_line);
   };
-  end.rows = query(query_of_results(study, settings.rows));
+  end.rows = query(statement_of_first_results(study, settings.rows));
   end.exit_code = tell_end(end.status, query);
   return end;
 }

@@ -4,6 +4,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/output/columns.h"
 #include "proto/program/exit_code.h"
 
 namespace oblique::client {
@@ -25,6 +26,13 @@ int print_whole(const protocol::QueryReply& rows, Format format) {
       "read the database itself with --db FILE.\n",
       rows.rows_size());
   return protocol::kFailed;
+}
+
+void print_first(const protocol::QueryReply& rows, std::uint64_t points) {
+  print_out(in_shown_units(rows), Format::kTable);
+  if (static_cast<std::uint64_t>(rows.rows_size()) < points) {
+    std::cerr << fmt::format("The first {} of {} points are shown.\n", rows.rows_size(), points);
+  }
 }
 
 }  // namespace oblique::client

@@ -3,13 +3,12 @@
 #include <stdexcept>
 #include <string>
 
-#include "client/output/columns.h"
 #include "client/output/mesh_note.h"
-#include "client/output/printer.h"
 #include "client/service/connection.h"
 #include "client/service/embedded_service.h"
 #include "client/service/run_service.h"
 #include "client/study/study_flags.h"
+#include "client/verbs/printed_rows.h"
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
 #include "proto/program/stop_signals.h"
@@ -55,11 +54,7 @@ int run(const RunFlags& flags) {
   if (!end) {
     return stop.exit_code();
   }
-  print_out(in_shown_units(end->rows), Format::kTable);
-  if (end->rows.rows_size() < static_cast<int>(end->status.points())) {
-    std::cerr << "The first " << end->rows.rows_size() << " of " << end->status.points()
-              << " points are shown.\n";
-  }
+  print_first(end->rows, end->status.points());
   std::cerr << "More: oblique query " << shell_word(study.name) << " --db "
             << shell_word(flags.settings.service.database.string()) << "\n";
   return end->exit_code;

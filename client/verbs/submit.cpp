@@ -1,17 +1,21 @@
 #include <cstdint>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <spdlog/fmt/fmt.h>
 
 #include "client/output/mesh_note.h"
 #include "client/service/connection.h"
+#include "client/service/result_query.h"
 #include "client/service/source_flags.h"
 #include "client/service/watching.h"
 #include "client/study/study_flags.h"
+#include "client/verbs/printed_rows.h"
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
+#include "proto/program/usage.h"
 #include "proto/recipe/study_terms.h"
 
 namespace oblique::client {
@@ -20,6 +24,7 @@ namespace {
 constexpr const char* kSubmitExamples = R"(Examples:
   oblique submit deploy/studies/paper.toml
   oblique submit sweep.toml --server tcp://127.0.0.1:7600 --watch
+  oblique submit sweep.toml --rows 20      watch it, and show the first 20 points at the end
   oblique submit --H 1 --mu 0.1:2.0:40 --e 0.6,0.8,1 --name friction
 
 A study is safe in the server's database once this returns. Submitting the same study again
@@ -29,6 +34,7 @@ struct SubmitFlags {
   StudyFlags study;
   SourceFlags source;
   bool watch = false;
+  std::optional<std::int64_t> rows;  ///< of the table shown at the end; watches too
   StudyTerms terms;
 };
 
@@ -37,7 +43,8 @@ void tell_submitted(const Study& study, const protocol::SubmitReply& reply) {
             << (reply.created() ? "" : "; the server had it already") << std::endl;
 }
 
-int watch(const Study& study, Connection& connection, protocol::StopSignals& stop) {
+int watch(const Study& study, std::int64_t rows, Connection& connection,
+          protocol::StopSignals& stop) {
   const auto ask = [&](const Tell& tell) {
     const auto status = connection.status(study.name, tell);
     if (status.studies_size() != 1) {
@@ -50,9 +57,13 @@ int watch(const Study& study, Connection& connection, protocol::StopSignals& sto
     throw Interrupted("no longer watching");
   }
   const std::uint64_t servers_limit = 0;
-  return tell_end(status, [&](const std::string& sql) {
+  const auto query = [&](const std::string& sql) {
     return connection.query(sql, servers_limit, tell_line);
-  });
+  };
+  if (rows > 0) {
+    print_first(query(statement_of_first_results(study, rows)), status.points());
+  }
+  return tell_end(status, query);
 }
 
 void check(const StudyTerms& terms) {
@@ -73,7 +84,8 @@ int submit(const SubmitFlags& flags) {
     tell_submitted(study, connection.submit(study, flags.terms));
     tell_mesh(std::cerr, study.recipe);
     submitted = true;
-    return flags.watch ? watch(study, connection, stop) : kDone;
+    return flags.watch || flags.rows ? watch(study, flags.rows.value_or(0), connection, stop)
+                                     : kDone;
   } catch (const Interrupted&) {
     std::cerr << (submitted ? "No longer watching; the study goes on at "
                             : "Stopped before the server answered; it may have the study: ")
@@ -90,6 +102,10 @@ void add_submit(CLI::App& app, Command& command) {
   verb->footer(kSubmitExamples);
   add_server_flags(*verb, flags->source);
   verb->add_flag("--watch", flags->watch, "show the progress until the study is done");
+  verb->add_option("--rows", flags->rows,
+                   "watch, and show a table with so many rows at most when the study is done")
+      ->check(protocol::whole_number_from(0))
+      ->type_name("N");
   verb->add_option("--priority", flags->terms.priority,
                    fmt::format("studies of a higher priority come first, {}; 0 unless told",
                                protocol::allowed_priorities()))
