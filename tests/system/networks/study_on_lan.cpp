@@ -16,9 +16,6 @@ void StudyOnLan::SetUp() {
   worker_hosts_[1] = &lan_->add("worker2", 4);
   client_host_ = &lan_->add("client", 5);
   server_name_ = server_host_->v4();
-}
-
-void StudyOnLan::make_keys() {
   keys_ = folder_.file("keys");
   const Outcome made = run_oblique(folder_, {"keygen", keys_});
   ASSERT_EQ(made.exit_code, 0) << made.err;

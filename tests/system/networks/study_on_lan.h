@@ -22,8 +22,6 @@ class StudyOnLan : public ::testing::Test {
  protected:
   void SetUp() override;
 
-  /// From now on all programs have keys.
-  void make_keys();
   /// The options by which a client or worker (`role`) reaches the server.
   std::vector<std::string> access(const std::string& role) const;
 
@@ -48,7 +46,7 @@ class StudyOnLan : public ::testing::Test {
 
   /// How workers and clients write where the server is; its IPv4 address to begin with.
   std::string server_name_;
-  std::string keys_;  ///< folder of the keys; empty: there are none
+  std::string keys_;  ///< folder of the keys that all programs have; empty: they have none
 
   std::unique_ptr<Server> server_;
   std::vector<std::unique_ptr<Process>> workers_;
