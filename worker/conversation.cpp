@@ -16,7 +16,10 @@ constexpr std::int64_t kLongestInterval_ms = 600'000;
 }  // namespace
 
 Conversation::Conversation(protocol::WorkerHello hello, ConversationSettings settings)
-    : hello_(std::move(hello)), settings_(settings), outbox_(settings.outbox) {}
+    : hello_(std::move(hello)),
+      settings_(settings),
+      hello_timeout_ms_(settings.hello_timeout_ms),
+      outbox_(settings.outbox) {}
 
 Effects Conversation::take_effects() {
   return std::exchange(effects_, {});
@@ -36,7 +39,7 @@ void Conversation::connect(const std::string& reason) {
   *message.mutable_hello() = hello_;
   effects_.emplace_back(Send{std::move(message)});
   state_ = State::kGreeting;
-  deadline_ms_ = now_ms_ + settings_.hello_timeout_ms;
+  deadline_ms_ = now_ms_ + hello_timeout_ms_;
   backoff_ms_ =
       std::clamp(2 * backoff_ms_, settings_.shortest_backoff_ms, settings_.longest_backoff_ms);
 }
@@ -82,6 +85,8 @@ Effects Conversation::on_time(std::int64_t now_ms) {
   switch (state_) {
     case State::kGreeting:
       if (now_ms_ >= deadline_ms_) {
+        // Handshake and hello may take longer than that on a long line.
+        hello_timeout_ms_ = std::min(2 * hello_timeout_ms_, settings_.longest_hello_timeout_ms);
         connect_after_backoff("the server does not answer");
       }
       break;
@@ -191,6 +196,7 @@ Effects Conversation::on_message(const protocol::ServerToWorker& message, std::i
 
 void Conversation::on(const protocol::Welcome& welcome) {
   state_ = State::kWelcomed;
+  hello_timeout_ms_ = settings_.hello_timeout_ms;
   rejected_ms_ = 0;
   heartbeat_interval_ms_ = std::clamp<std::int64_t>(welcome.heartbeat_interval_ms(),
                                                     kShortestInterval_ms, kLongestInterval_ms);

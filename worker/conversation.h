@@ -21,8 +21,9 @@ struct ConversationSettings {
   OutboxLimits outbox;
   std::size_t results_a_message = 1000;
   std::size_t bytes_a_message = std::size_t{1} << 20U;
-  std::int64_t hello_timeout_ms = 3000;   ///< a hello without answer is said again
-  std::int64_t shortest_backoff_ms = 50;  ///< between failures, doubling
+  std::int64_t hello_timeout_ms = 3000;            ///< a hello without answer is said again
+  std::int64_t longest_hello_timeout_ms = 12'000;  ///< doubling up to this
+  std::int64_t shortest_backoff_ms = 50;           ///< between failures, doubling
   std::int64_t longest_backoff_ms = 2000;
   std::int64_t shortest_rejected_ms = 2000;  ///< between attempts that the server rejects, doubling
   std::int64_t longest_rejected_ms = 30'000;
@@ -99,7 +100,8 @@ class Conversation {
 
   State state_ = State::kWaiting;
   std::int64_t now_ms_ = 0;
-  std::int64_t deadline_ms_ = 0;  ///< of the state: hello unanswered, try again, server silent
+  std::int64_t deadline_ms_ = 0;   ///< of the state: hello unanswered, try again, server silent
+  std::int64_t hello_timeout_ms_;  ///< of the present attempt
   std::int64_t heartbeat_due_ms_ = 0;
   std::int64_t heartbeat_interval_ms_ = 1000;
   std::int64_t lost_after_ms_ = 3000;

@@ -66,10 +66,13 @@ void Connection::send_or_connect_again(Outstanding& outstanding) {
   }
   // A connection over which nothing comes may be dead, and only its ends do not know.
   const bool has_connected = monitor_.connections() > connections_before_;
-  const auto patience = has_connected ? outstanding.resend_after : kSilence;
+  // Where nobody answers, the next attempt gets longer: on a long line a handshake takes seconds.
+  const auto patience =
+      has_connected ? outstanding.resend_after : kSilence * (1U << std::min(attempts_in_vain_, 2U));
   if (now - std::max(outstanding.sent, connecting_since_) <= patience) {
     return;
   }
+  attempts_in_vain_ = has_connected ? 0 : attempts_in_vain_ + 1;
   if (has_connected) {
     constexpr std::chrono::milliseconds kLongestPause{60'000};
     outstanding.resend_after = std::min(2 * outstanding.resend_after, kLongestPause);

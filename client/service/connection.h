@@ -123,7 +123,8 @@ class Connection {
   zmq::context_t context_;
   zmq::socket_t socket_;
   protocol::SocketMonitor monitor_;
-  unsigned attempt_ = 0;  ///< to connect: which family of addresses is tried
+  unsigned attempt_ = 0;           ///< to connect: which family of addresses is tried
+  unsigned attempts_in_vain_ = 0;  ///< since the last that led to a connection
   Clock::time_point connecting_since_ = Clock::now();
   std::uint64_t connections_before_ = 0;  ///< the present attempt to connect began
   std::uint64_t last_request_id_ = 0;

@@ -1,6 +1,9 @@
 // Lines that are long, stall and end without a word, on loopback: they need no network of their
 // own.
 #include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -17,39 +20,58 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-/// A server, and two workers and a client behind a line of 200 ms to it.
+/// A server with keys, and two workers and a client behind a long line to it.
 class LongLines : public ::testing::Test {
  protected:
+  /// Every byte takes that long to the other end.
+  void start(milliseconds delay) {
+    ASSERT_EQ(run_oblique(folder_, {"keygen", keys_}).exit_code, 0);
+    server_ = std::make_unique<Server>(folder_, folder_.file("study.db"),
+                                       Environment{{"OBLIQUE_KEYS", keys_ + "/server.key"}});
+    to_workers_port_ = std::make_unique<SlowProxy>(server_->worker_url(), delay);
+    to_clients_port_ = std::make_unique<SlowProxy>(server_->client_url(), delay);
+    for (auto* worker : {&worker_, &other_worker_}) {
+      worker->emplace(folder_, to_workers_port_->url(),
+                      std::vector<std::string>{"--threads", "1", "--keys", keys_ + "/worker.key"});
+    }
+    auto arguments = submit_and_watch();
+    arguments.insert(arguments.end(), {"--server", to_clients_port_->url(), "--keys", client_key_});
+    client_.emplace(folder_, client_program(), arguments);
+    wait_for_rows(database_, 1);
+  }
+
   void expect_completed() {
-    test::expect_completed(client_, database_, [this] {
-      return run_oblique(folder_, {"workers", "--server", server_.client_url(), "--format", "json"})
+    test::expect_completed(*client_, database_, [this] {
+      return run_oblique(folder_, {"workers", "--format", "json", "--server", server_->client_url(),
+                                   "--keys", client_key_})
           .out;
     });
   }
 
-  std::vector<std::string> submit_through_proxy() const {
-    auto arguments = submit_and_watch();
-    arguments.insert(arguments.end(), {"--server", to_clients_port_.url()});
-    return arguments;
-  }
-
   TemporaryFolder folder_;
+  std::string keys_{folder_.file("keys")};
+  std::string client_key_{keys_ + "/client.key"};
   Database database_{folder_.file("study.db")};
-  Server server_{folder_, folder_.file("study.db")};
-  SlowProxy to_workers_port_{server_.worker_url(), milliseconds(200)};
-  SlowProxy to_clients_port_{server_.client_url(), milliseconds(200)};
-  Worker worker_{folder_, to_workers_port_.url(), {"--threads", "1"}};
-  Worker other_worker_{folder_, to_workers_port_.url(), {"--threads", "1"}};
-  Process client_{folder_, client_program(), submit_through_proxy()};
+  std::unique_ptr<Server> server_;
+  std::unique_ptr<SlowProxy> to_workers_port_;
+  std::unique_ptr<SlowProxy> to_clients_port_;
+  std::optional<Worker> worker_;
+  std::optional<Worker> other_worker_;
+  std::optional<Process> client_;
 };
 
+TEST_F(LongLines, TheyTakeSecondsForAHandshake) {
+  start(milliseconds(400));
+  expect_completed();
+}
+
 TEST_F(LongLines, TheyAreStalledForSecondsAgainAndAgain) {
-  wait_for_rows(database_, 1);
+  start(milliseconds(200));
   // The second time for longer than a lease lasts.
   for (const milliseconds time : {milliseconds(1500), milliseconds(4000)}) {
     for (const bool stalls : {true, false}) {
-      to_workers_port_.stall(stalls);
-      to_clients_port_.stall(stalls);
+      to_workers_port_->stall(stalls);
+      to_clients_port_->stall(stalls);
       std::this_thread::sleep_for(stalls ? time : milliseconds(800));
     }
   }
@@ -57,11 +79,11 @@ TEST_F(LongLines, TheyAreStalledForSecondsAgainAndAgain) {
 }
 
 TEST_F(LongLines, TheyEndWithoutAWord) {
-  wait_for_rows(database_, 1);
-  to_workers_port_.swallow();
-  to_clients_port_.swallow();
+  start(milliseconds(200));
+  to_workers_port_->swallow();
+  to_clients_port_->swallow();
   expect_completed();
-  EXPECT_GE(to_workers_port_.connections(), 4) << "both workers had to connect again";
+  EXPECT_GE(to_workers_port_->connections(), 4) << "both workers had to connect again";
 }
 
 }  // namespace
