@@ -15,11 +15,17 @@ if(CMAKE_INSTALL_PREFIX STREQUAL "/usr")
 endif()
 
 set(systemd "${CMAKE_CURRENT_LIST_DIR}/../systemd")
-# install_filled_in(TEMPLATE FOLDER NAME): with the folders of above, and INSTANCE.
-function(install_filled_in template folder name)
-  configure_file("${template}" "${scratch_folder}/${name}" @ONLY NEWLINE_STYLE LF)
-  file(INSTALL DESTINATION "${folder}" TYPE FILE FILES "${scratch_folder}/${name}")
+# fill_in(TEMPLATE FOLDER NAME): installs it with the folders of above, and INSTANCE.
+function(fill_in template folder name)
+  message(STATUS "Installing: $ENV{DESTDIR}${folder}/${name}")
+  configure_file("${template}" "$ENV{DESTDIR}${folder}/${name}" @ONLY NO_SOURCE_PERMISSIONS NEWLINE_STYLE LF)
 endfunction()
+
+# install_filled_in(TEMPLATE FOLDER NAME): the same, and the manifest lists it.
+macro(install_filled_in template folder name)
+  fill_in("${template}" "${folder}" "${name}")
+  list(APPEND CMAKE_INSTALL_MANIFEST_FILES "${folder}/${name}")
+endmacro()
 
 set(units "${CMAKE_INSTALL_PREFIX}/lib/systemd/system")
 set(INSTANCE ${part})
@@ -34,7 +40,7 @@ else()
                     oblique-server.conf)
 endif()
 
-# What somebody has changed stays.
+# What somebody has changed stays, also where the rest is removed by the manifest.
 if(NOT EXISTS "$ENV{DESTDIR}${configuration}/${part}.toml")
-  install_filled_in("${systemd}/${part}.toml" "${configuration}" ${part}.toml)
+  fill_in("${systemd}/${part}.toml" "${configuration}" ${part}.toml)
 endif()
