@@ -20,7 +20,8 @@ struct ConversationSettings {
   std::uint32_t batches_held = 2;  ///< one is solved, the next waits ready
   OutboxLimits outbox;
   std::size_t results_a_message = 1000;
-  std::size_t bytes_a_message = std::size_t{1} << 20U;
+  std::size_t bytes_a_message = std::size_t{64} << 10U;  ///< then another one begins
+  std::size_t most_bytes_a_result = std::size_t{1} << 20U;
   std::int64_t hello_timeout_ms = 3000;            ///< a hello without answer is said again
   std::int64_t longest_hello_timeout_ms = 12'000;  ///< doubling up to this
   std::int64_t shortest_backoff_ms = 50;           ///< between failures, doubling

@@ -38,7 +38,7 @@ void Conversation::report(Progress& progress) {
   protocol::Results results = new_message();
   std::size_t bytes = 0;
   for (protocol::PointResult& result : progress.results) {
-    if (result.ByteSizeLong() > settings_.bytes_a_message) {
+    if (result.ByteSizeLong() > settings_.most_bytes_a_result) {
       result = protocol::failed_point(result.point(), "its result is too large to send");
     }
     const std::size_t result_bytes = result.ByteSizeLong();

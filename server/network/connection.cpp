@@ -17,7 +17,7 @@ namespace {
 
 static_assert(CurveTraffic::kAddedBytes == protocol::kSealBytes);
 
-constexpr std::size_t kReadBytes = 128 * 1024;
+constexpr std::size_t kReadBytes = 64 * 1024;
 /// Of a peer whose handshake is not done.
 constexpr std::size_t kReadOfStranger_bytes = 4 * 1024;
 

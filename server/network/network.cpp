@@ -88,6 +88,7 @@ std::size_t Network::connections(Port port) const {
 
 void Network::collect(std::int64_t now_ms) {
   has_unopened_ = false;
+  read_paused_again();
   std::array<epoll_event, 256> events;
   const int count = epoll_wait(epoll_.number(), events.data(), static_cast<int>(events.size()), 0);
   for (int i = 0; i < count; ++i) {
@@ -180,6 +181,11 @@ void Network::serve(Number number, std::uint32_t events, std::int64_t now_ms) {
       peer.is_ending = true;
       epoll_ctl(epoll_.number(), EPOLL_CTL_DEL, connection.descriptor(), nullptr);
     }
+  } else if (!has_ended && (events & EPOLLIN) != 0 && !peer.is_stranger &&
+             is_full(ports_[peer.port])) {
+    peer.last_heard_ms = now_ms;
+    peer.is_paused = true;
+    ports_[peer.port].paused.push_back(number);
   } else if (has_ended || (events & EPOLLIN) != 0) {
     peer.last_heard_ms = now_ms;
     const bool shakes_hands = connection.said().waiting_work() == Zmtp::Work::kHandshake;
@@ -239,6 +245,7 @@ void Network::let_in(Peer& peer) {
 /// What it holds, in the sums.
 void Network::count(Peer& peer, std::size_t held_in_bytes, std::size_t waiting_out_bytes) {
   held_in_bytes_ += held_in_bytes - peer.held_in_bytes;
+  ports_[peer.port].held_in_bytes += held_in_bytes - peer.held_in_bytes;
   waiting_out_bytes_ += waiting_out_bytes - peer.waiting_out_bytes;
   if (peer.share != nullptr) {
     peer.share->held_in_bytes += held_in_bytes - peer.held_in_bytes;
@@ -271,7 +278,7 @@ void Network::settle(Number number, Peer& peer) {
 /// A peer whose turn has not come yet is read no further.
 void Network::watch(Number number, Peer& peer, int operation) {
   const Connection& connection = peer.connection;
-  const std::uint32_t events = (is_waiting(connection.said()) ? 0U : EPOLLIN) |
+  const std::uint32_t events = (is_waiting(connection.said()) || peer.is_paused ? 0U : EPOLLIN) |
                                (connection.waiting_out_bytes() > 0 ? EPOLLOUT : 0U);
   if (operation == EPOLL_CTL_MOD && events == peer.watched_events) {
     return;

@@ -25,6 +25,9 @@ struct NetworkLimits {
   std::size_t connections = 4096;  ///< at all ports; fewer where the system allows fewer
   /// Messages of all peers that are incomplete or not taken. Of one peer it is at most one message.
   std::size_t held_in_bytes = std::size_t{512} << 20U;
+  /// With so much of a port's peers, nobody of them is read while whole messages wait to be taken:
+  /// who delivers more than is stored waits, and loses no connection.
+  std::size_t held_in_to_pause_bytes = std::size_t{64} << 20U;
   /// With more than this waiting to go out, a peer is busy.
   std::size_t busy_bytes = std::size_t{4} << 20U;
   std::size_t waiting_out_bytes = std::size_t{64} << 20U;       ///< to one peer
@@ -86,7 +89,7 @@ class Network {
   /// Takes what the system has: new connections, bytes, room to send, ends.
   void collect(std::int64_t now_ms);
   /// `collect` or `next` would do more at once, though `descriptor` may not say so.
-  bool has_more() const { return has_unopened_ || !handshakes_.empty(); }
+  bool has_more() const;
 
   /// Whether a peer's next message may be taken now; otherwise it waits, and the peer with it.
   using MayTake = std::function<bool(const std::string& identity)>;
@@ -125,6 +128,8 @@ class Network {
     std::shared_ptr<const Doorkeeper> doorkeeper;  // as it was given
     std::unique_ptr<PortGuard> guard;              // bounded too
     std::deque<Number> line;                       // peers with a message, in turn
+    std::size_t held_in_bytes = 0;                 // of its peers
+    std::vector<Number> paused{};                  // peers that are not read meanwhile
   };
   struct Peer {
     Peer(Listener::Accepted accepted, const PortGuard* guard)
@@ -135,6 +140,7 @@ class Network {
     std::int64_t since_ms = 0;
     std::int64_t last_heard_ms = 0;
     bool stands_in_line = false;
+    bool is_paused = false;
     bool is_stranger = true;  // its handshake is not done
     bool is_ending = false;   // nothing new is awaited of it; what has come is read to its end
     bool has_departed = false;
@@ -162,6 +168,10 @@ class Network {
   void settle(Number number, Peer& peer);
   void count(Peer& peer, std::size_t held_in_bytes, std::size_t waiting_out_bytes);
   void watch(Number number, Peer& peer, int operation);
+  bool is_full(const OpenPort& port) const {
+    return !port.line.empty() && port.held_in_bytes >= limits_.held_in_to_pause_bytes;
+  }
+  void read_paused_again();
   void end_the_largest();
   void end_the_largest_of_keys();
   bool end_oldest_handshake();

@@ -79,6 +79,8 @@ void add_limits(CLI::App& app, NetworkLimits& network, ServiceSettings& service,
       "A connection heard so recently does not make room for another");
   add("held-in-bytes", network.held_in_bytes, kOneMessage, kMostBytes,
       "Messages of all peers that have not come whole or were not taken");
+  add("held-in-bytes-to-pause", network.held_in_to_pause_bytes, kOneMessage, kMostBytes,
+      "With so many of a port nobody of it is read until some were taken");
   add("busy-bytes", network.busy_bytes, 1, kMostBytes,
       "A peer with more waiting to go out to it is not heard");
   add("waiting-out-bytes", network.waiting_out_bytes, kOneMessage, kMostBytes,

@@ -122,7 +122,15 @@ StudyQueue::Place Scheduler::place_of(const Study& study) const {
 }
 
 void Scheduler::requeue(StudyId id) {
-  queue_.put(id, place_of(studies_.at(id)));
+  const StudyQueue::Place* known = queue_.find(id);
+  const StudyQueue::Place before = known == nullptr ? StudyQueue::Place{} : *known;
+  const StudyQueue::Place place = place_of(studies_.at(id));
+  queue_.put(id, place);
+  // Of free points there may be more now, and for whom they are; suspect ones stop some workers.
+  if ((place.has_free && (!before.has_free || place.solver_version != before.solver_version)) ||
+      place.has_suspect != before.has_suspect) {
+    ready_workers_.wake_all();
+  }
 }
 
 void Scheduler::finish_if_complete(StudyId id) {
@@ -140,10 +148,9 @@ void Scheduler::finish_if_complete(StudyId id) {
 
 StudyCounts Scheduler::study(StudyId id) const {
   const Study& study = studies_.at(id);
-  const bool lacks_worker = study.has_work() && !workers_.empty() &&
-                            std::none_of(workers_.begin(), workers_.end(), [&](const auto& entry) {
-                              return admits(study, entry.second);
-                            });
+  const bool lacks_worker = study.has_work() && !workers_.empty() && !study.terms.mixes_versions &&
+                            !study.solver_version.empty() &&
+                            !versions_.contains(study.solver_version);
   return {study.points.size(), study.points.settled() - study.failed,
           study.failed,        study.points.leased(),
           study.cancelled,     study.solver_version,

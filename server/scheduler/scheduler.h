@@ -13,6 +13,7 @@
 #include "server/scheduler/histogram.h"
 #include "server/scheduler/lease_index.h"
 #include "server/scheduler/points/study_points.h"
+#include "server/scheduler/ready_line.h"
 #include "server/scheduler/scheduler_events.h"
 #include "server/scheduler/study_queue.h"
 #include "server/scheduler/worker_processes.h"
@@ -82,6 +83,8 @@ class Scheduler {
   bool knows_worker(WorkerId worker) const { return workers_.contains(worker); }
   bool knows_study(StudyId study) const { return studies_.contains(study); }
   std::size_t workers() const { return workers_.size(); }
+  /// How often a worker was looked at, whether there is something for it: what dispatch has cost.
+  std::uint64_t looks() const { return looks_; }
 
   /// Throws std::out_of_range for an unknown study.
   StudyCounts study(StudyId study) const;
@@ -144,7 +147,6 @@ class Scheduler {
     std::uint32_t threads;
     std::string solver_version;
     std::uint32_t credit = 0;
-    bool queued = false;    ///< stands in `ready_workers_`
     bool is_busy = false;   ///< gets nothing
     bool draining = false;  ///< gets nothing until it holds nothing, then suspect points
     ProcessNumber process = kNobody;
@@ -198,6 +200,7 @@ class Scheduler {
   bool is_proven(const Worker& worker) const;
   bool is_set_aside(const Worker& worker) const;
   bool is_longest_proven(const Worker& worker, const Study& study) const;
+  void standing_of_processes_changed();
   bool probe(WorkerId id, Worker& worker);
   void check_losses() const;
 
@@ -211,7 +214,7 @@ class Scheduler {
   StudyId next_free_study(const Worker& worker) const;
   double least_served(StudyId but) const;
   StudyId next_suspect_study(const Worker& worker) const;
-  bool anyone_draining() const;
+  void set_draining(Worker& worker, bool is_draining);
   std::uint64_t batch_points(const Worker& worker, StudyId study) const;
   LeaseId grant(WorkerId id, Worker& worker, StudyId study, const Batch& batch, bool alone);
   void queue(WorkerId id, Worker& worker);
@@ -231,7 +234,12 @@ class Scheduler {
   StudyQueue queue_;  // of the studies that have something to hand out
   std::map<WorkerId, Worker> workers_;
   std::map<LeaseId, Lease> leases_;
-  std::deque<WorkerId> ready_workers_;  // with credit, first come first served
+  ReadyLine ready_workers_;                      // with credit
+  std::map<std::string, std::size_t> versions_;  // workers by solver version
+  std::size_t draining_ = 0;                     // workers
+  std::uint64_t looks_ = 0;
+  // By solver version, of its workers, and of all under the empty one; emptied when it may change.
+  mutable std::map<std::string, std::optional<std::int64_t>> longest_proven_since_ms_;
   std::uint64_t threads_ = 0;
   LeaseId next_lease_ = settings_.first_lease_id;
   bool held_ = false;

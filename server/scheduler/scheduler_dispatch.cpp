@@ -11,20 +11,20 @@ void Scheduler::dispatch() {
     return;
   }
   const auto has_work = [this] { return seeks_stragglers_ || !queue_.empty(); };
-  if (seeks_stragglers_ && !ready_workers_.empty()) {
+  if (seeks_stragglers_) {
     // Another worker looks first each time, in case this one may have no straggler there is.
-    ready_workers_.push_back(ready_workers_.front());
-    ready_workers_.pop_front();
+    ready_workers_.rotate();
   }
-  std::size_t served_nothing = 0;  // workers in a row
-  while (served_nothing < ready_workers_.size() && has_work()) {
-    const WorkerId id = ready_workers_.front();
-    ready_workers_.pop_front();
+  while (ready_workers_.has_awake() && has_work()) {
+    const WorkerId id = ready_workers_.first_awake();
     Worker& worker = workers_.at(id);
-    worker.queued = false;
-    const bool served = serve(id, worker);
+    ++looks_;
+    if (!serve(id, worker)) {
+      ready_workers_.rest(id);
+      continue;
+    }
+    ready_workers_.remove(id);
     queue(id, worker);
-    served_nothing = served ? 0 : served_nothing + 1;
   }
 }
 
@@ -41,7 +41,7 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
   }
   const StudyId suspect_study = next_suspect_study(worker);
   if (suspect_study == 0) {
-    worker.draining = false;
+    set_draining(worker, false);
   } else if (!is_proven(worker)) {
     // It may have nothing else by which to show that it is fit for them.
     if (worker.leases.empty() && next_free_study(worker) == 0) {
@@ -49,9 +49,9 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
     }
   } else if (worker.leases.empty()) {
     return serve_suspect(id, worker);
-  } else if (worker.draining || !anyone_draining()) {
+  } else if (worker.draining || draining_ == 0) {
     // Suspect points wait for one worker to empty, the others go on.
-    worker.draining = true;
+    set_draining(worker, true);
     return false;
   }
   if (!is_proven(worker) && worker.leases.size() >= settings_.newcomer_batches) {
@@ -70,7 +70,7 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
 bool Scheduler::serve_suspect(WorkerId id, Worker& worker) {
   const StudyId id_of_study = next_suspect_study(worker);
   Study& study = studies_.at(id_of_study);
-  worker.draining = false;
+  set_draining(worker, false);
   const std::uint64_t at_most = batch_points(worker, id_of_study);
   if (const auto batch = study.points.take(*suspect_for(study, worker), at_most)) {
     grant(id, worker, id_of_study, *batch, true);
@@ -161,16 +161,26 @@ std::optional<Standing> Scheduler::suspect_for(const Study& study, const Worker&
   return points.has(Standing::kSuspect) ? std::optional(Standing::kSuspect) : std::nullopt;
 }
 
-bool Scheduler::anyone_draining() const {
-  return std::any_of(workers_.begin(), workers_.end(),
-                     [](const auto& entry) { return entry.second.draining; });
+void Scheduler::set_draining(Worker& worker, bool is_draining) {
+  if (std::exchange(worker.draining, is_draining) == is_draining) {
+    return;
+  }
+  if (is_draining) {
+    ++draining_;
+  } else {
+    --draining_;
+    ready_workers_.wake_all();  // another one may have to
+  }
 }
 
 std::uint64_t Scheduler::batch_points(const Worker& worker, StudyId id) const {
   std::uint64_t points = settings_.first_batch_points * worker.threads;
   const auto pace = worker.paces.find(id);
   if (pace != worker.paces.end() && pace->second.s_per_point > 0.0) {
-    const double wanted = settings_.batch_target_s * worker.threads / pace->second.s_per_point;
+    const double target_s =
+        std::max(settings_.batch_target_s,
+                 static_cast<double>(workers_.size()) / settings_.most_batches_per_s);
+    const double wanted = target_s * worker.threads / pace->second.s_per_point;
     const auto largest = static_cast<double>(
         std::min(settings_.largest_batch_points * worker.threads,
                  settings_.growth * std::max<std::uint64_t>(pace->second.last_batch_points, 1)));

@@ -21,7 +21,9 @@ using LeaseId = std::uint64_t;
 struct SchedulerSettings {
   /// A worker silent for longer is lost: three heartbeats missed, and noticed within 3 s.
   std::int64_t lost_after_ms = 2800;
-  double batch_target_s = 0.1;                ///< time a batch takes, once a worker's pace is known
+  double batch_target_s = 0.1;  ///< time a batch takes, once a worker's pace is known
+  /// With so many workers that they would ask for more, batches take longer.
+  double most_batches_per_s = 10'000;
   std::uint64_t first_batch_points = 4;       ///< a thread, in a batch to a worker of unknown pace
   std::uint64_t largest_batch_points = 4096;  ///< a thread
   std::uint64_t growth = 4;  ///< a batch is at most so many times the worker's last one

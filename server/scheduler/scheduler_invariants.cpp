@@ -1,7 +1,7 @@
 // What must hold of the scheduler's state between two events.
-#include <algorithm>
 #include <map>
 #include <stdexcept>
+#include <string>
 
 #include "server/scheduler/scheduler.h"
 
@@ -54,14 +54,19 @@ void Scheduler::check_invariants() const {
   }
   std::uint64_t threads = 0;
   std::size_t leases = 0;
+  std::size_t draining = 0;
+  std::map<std::string, std::size_t> versions;
   for (const auto& [id, worker] : workers_) {
     threads += worker.threads;
     leases += worker.leases.size();
-    require(worker.queued == (std::count(ready_workers_.begin(), ready_workers_.end(), id) == 1),
-            "a worker stands in the queue twice or not as noted");
-    require(worker.queued == (worker.credit > 0), "a worker with credit is not in the queue");
+    draining += worker.draining ? 1U : 0U;
+    ++versions[worker.solver_version];
+    require(ready_workers_.contains(id) == (worker.credit > 0),
+            "a worker with credit is not in the line, or one without is");
   }
   check_losses();
+  require(ready_workers_.size() <= workers_.size(), "a worker that is gone stands in the line");
+  require(draining == draining_ && versions == versions_, "workers are miscounted");
   require(threads == threads_, "the number of threads is wrong");
   require(leases == leases_.size(), "a worker holds a lease that does not exist");
 }

@@ -22,6 +22,7 @@ void Scheduler::end_lease(LeaseId id, const std::optional<Loss>& loss) {
   const Lease lease = leases_.at(id);
   leases_.erase(id);
   workers_.at(lease.worker).leases.erase(id);
+  ready_workers_.wake(lease.worker);
   if (const auto twin = leases_.find(lease.twin); twin != leases_.end()) {
     twin->second.twin = 0;
   }

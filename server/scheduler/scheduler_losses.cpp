@@ -115,9 +115,17 @@ void Scheduler::note_end(const Worker& worker, WorkerEnd how) {
   }
 }
 
+/// Who has proven itself, is set aside or is there at all may be another now.
+void Scheduler::standing_of_processes_changed() {
+  longest_proven_since_ms_.clear();
+  ready_workers_.wake_all();
+}
+
 /// What the message says of the worker's process.
 void Scheduler::note_answers(Worker& worker, const ResultsReceived& event, bool any_accepted) {
   WorkerProcess& process = processes_.at(worker.process);
+  const bool was_proven = process.proven_since_ms.has_value();
+  const std::uint32_t lost_before = process.lost_in_a_row;
   const auto lease = leases_.find(event.lease);
   const bool is_probe = event.lease != 0 && event.lease == worker.probe;
   const bool is_its_lease = lease != leases_.end() && worker.leases.contains(event.lease) &&
@@ -141,6 +149,9 @@ void Scheduler::note_answers(Worker& worker, const ResultsReceived& event, bool 
     ++process.lost_in_a_row;
     ++process.losses;
   }
+  if (process.proven_since_ms.has_value() != was_proven || process.lost_in_a_row != lost_before) {
+    standing_of_processes_changed();
+  }
 }
 
 bool Scheduler::is_proven(const Worker& worker) const {
@@ -158,11 +169,15 @@ bool Scheduler::is_set_aside(const Worker& worker) const {
 /// Of those that may get points of the study.
 bool Scheduler::is_longest_proven(const Worker& worker, const Study& study) const {
   const auto since_ms = processes_.at(worker.process).proven_since_ms;
-  return since_ms && std::none_of(workers_.begin(), workers_.end(), [&](const auto& entry) {
-           const auto other_ms = processes_.at(entry.second.process).proven_since_ms;
-           return other_ms && *other_ms < *since_ms && !is_set_aside(entry.second) &&
-                  admits(study, entry.second);
-         });
+  const std::string version = study.terms.mixes_versions ? std::string() : study.solver_version;
+  const auto [longest, is_new] = longest_proven_since_ms_.try_emplace(version);
+  for (auto other = is_new ? workers_.begin() : workers_.end(); other != workers_.end(); ++other) {
+    const auto other_ms = processes_.at(other->second.process).proven_since_ms;
+    if (other_ms && !is_set_aside(other->second) && admits(study, other->second)) {
+      longest->second = std::min(*other_ms, longest->second.value_or(*other_ms));
+    }
+  }
+  return since_ms && (!longest->second || *since_ms <= *longest->second);
 }
 
 /// Hands the worker a point that all sound workers solve, if it was not just given one.

@@ -27,6 +27,7 @@ void Scheduler::on(const WorkerJoined& event) {
   worker.last_heard_ms = now_ms_;
   worker.process = processes_.join(event.process, event.worker);
   threads_ += worker.threads;
+  ++versions_[worker.solver_version];
   const ProcessNumber process = worker.process;
   workers_.emplace(event.worker, std::move(worker));
   if (event.process_has_one_worker) {
@@ -38,6 +39,7 @@ void Scheduler::on(const WorkerJoined& event) {
     }
   }
   take_back_losses(process);
+  standing_of_processes_changed();
 }
 
 Scheduler::Worker* Scheduler::heard_from(WorkerId worker) {
@@ -46,6 +48,7 @@ Scheduler::Worker* Scheduler::heard_from(WorkerId worker) {
     return nullptr;
   }
   found->second.last_heard_ms = now_ms_;
+  ready_workers_.wake(worker);
   return &found->second;
 }
 
@@ -58,9 +61,8 @@ void Scheduler::on(const CreditGiven& event) {
 }
 
 void Scheduler::queue(WorkerId id, Worker& worker) {
-  if (!worker.queued && worker.credit > 0) {
-    worker.queued = true;
-    ready_workers_.push_back(id);
+  if (worker.credit > 0) {
+    ready_workers_.add(id);
   }
 }
 
@@ -107,6 +109,7 @@ void Scheduler::on(const WorkerUnreachable& event) {
 void Scheduler::on(const Tick&) {
   const std::int64_t gap_ms = last_tick_ms_ < 0 ? 0 : now_ms_ - last_tick_ms_;
   last_tick_ms_ = now_ms_;
+  standing_of_processes_changed();  // time has passed
   fail_condemned();
   std::vector<WorkerId> lost;
   for (auto& [id, worker] : workers_) {
@@ -139,19 +142,23 @@ void Scheduler::remove_worker(WorkerId id, WorkerEnd how) {
   for (const LeaseId lease : leases) {
     end_lease(lease, loss);
   }
-  if (found->second.queued) {
-    std::erase(ready_workers_, id);
-  }
+  ready_workers_.remove(id);
+  set_draining(found->second, false);
   threads_ -= found->second.threads;
+  if (const auto version = versions_.find(found->second.solver_version); --version->second == 0) {
+    versions_.erase(version);
+  }
   workers_.erase(found);
   processes_.leave(process, id);
+  standing_of_processes_changed();
 }
 
 void Scheduler::on(const WorkerBusy& event) {
   const auto found = workers_.find(event.worker);
   if (found != workers_.end()) {
     found->second.is_busy = event.is_busy;
-    found->second.draining = found->second.draining && !event.is_busy;
+    set_draining(found->second, found->second.draining && !event.is_busy);
+    ready_workers_.wake(event.worker);
   }
 }
 

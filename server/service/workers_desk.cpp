@@ -90,6 +90,7 @@ Heard WorkersDesk::take(const std::string& identity, std::string_view frame, Ins
       protocol::ServerToWorker reply;
       reply.mutable_heartbeat_reply();
       network_.to_worker(identity, reply);
+      workers_.at(worker).was_told = true;
       break;
     }
     case Kind::kGoodbye:
@@ -131,7 +132,8 @@ void WorkersDesk::hello(const std::string& identity, const protocol::WorkerHello
                             plain(hello.solver_version()),
                             plain(hello.instruction_set()),
                             iso_8601(now),
-                            hellos};
+                            hellos,
+                            now.steady_ms};
   if (!welcome(id, worker)) {
     return;
   }
@@ -265,13 +267,17 @@ void WorkersDesk::tick(const Silence& silent_ms, Instant now) {
   sign.mutable_heartbeat_reply();
   const std::int64_t late_ms = settings_.heartbeat_interval_ms * 5 / 4;
   for (auto& [id, worker] : workers_) {
-    if (silent_ms(id) > late_ms) {
+    if (std::exchange(worker.was_told, false)) {
+      worker.told_ms = now.steady_ms;
+    }
+    const bool is_silent = silent_ms(id) > late_ms;
+    if (is_silent || now.steady_ms - worker.told_ms > late_ms) {
       // A connection that is gone, as that of a killed process, shows long before the silence
       // would. And a worker whose messages wait here must hear something too.
       send(id, sign);
-      if (!ledger_.has_room_for(id)) {
-        found_.emplace_back(CreditGiven{id, 0});  // it is not silent: it is not heard
-      }
+    }
+    if (is_silent && !ledger_.has_room_for(id)) {
+      found_.emplace_back(CreditGiven{id, 0});  // it is not silent: it is not heard
     }
     if (worker.is_busy && !network_.is_busy(worker.identity)) {
       worker.is_busy = false;

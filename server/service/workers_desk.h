@@ -34,8 +34,10 @@ struct WorkerRecord {
   std::string instruction_set;
   std::string joined_at;
   std::uint32_t hellos = 1;
-  bool is_busy = false;  ///< as the scheduler knows
-  bool has_row = false;  ///< in the database, since its first result
+  std::int64_t told_ms = 0;  ///< when it was sent something, to a tick
+  bool was_told = false;     ///< since the last tick
+  bool is_busy = false;      ///< as the scheduler knows
+  bool has_row = false;      ///< in the database, since its first result
 };
 
 /// What a frame of a worker comes to.
@@ -73,6 +75,7 @@ class WorkersDesk {
   /// For how long the worker has been silent, in ms.
   using Silence = std::function<std::int64_t(WorkerId)>;
   /// Sends signs of life to those whose heartbeat is late, which shows whether they are there, and
+  /// to those who have heard nothing for as long, for what they sent may wait for the disk; and
   /// looks who has begun to read again. To be called several times a second.
   void tick(const Silence& silent_ms, Instant now);
   /// What was found out about workers while messages went out: who is gone, who is busy.

@@ -104,6 +104,7 @@ void WorkersDesk::send(WorkerId worker, const protocol::ServerToWorker& message,
 }
 
 void WorkersDesk::note_delivery(WorkerId worker, WorkerRecord& record, Delivery delivery) {
+  record.was_told = true;
   if (delivery == Delivery::kGone) {
     gone_.try_emplace(worker, WorkerUnreachable{worker});
   } else if (delivery == Delivery::kBusy && !std::exchange(record.is_busy, true)) {

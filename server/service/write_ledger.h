@@ -52,7 +52,7 @@ struct LedgerLimits {
   /// Results that wait for the disk, as bytes of their messages. With so many of one worker, or of
   /// all, no more are taken: they wait where they are.
   std::size_t bytes_of_worker = std::size_t{16} << 20U;
-  std::size_t bytes = std::size_t{128} << 20U;
+  std::size_t bytes = std::size_t{64} << 20U;
   /// With so many no batch goes out, until half of them are stored.
   std::size_t bytes_to_hold = std::size_t{16} << 20U;
   std::size_t messages_to_hold = 20'000;

@@ -18,11 +18,8 @@ StudyState state_named(const std::string& name) {
   return StudyState::kRunning;
 }
 
-/// How far the studies are, gathered by a few passes over all of them: a look at each alone would
-/// cost more than the rest of a start when there are many.
+/// What is known of failures, gathered by a pass over all of them.
 struct Progress {
-  std::map<std::uint64_t, std::uint64_t> rows;  // by study, of those that have any
-  std::map<std::uint64_t, std::uint64_t> last;  // point that has one
   std::map<std::uint64_t, IntervalSet> failures;
   std::map<std::uint64_t, PointAttempts> attempts;
 };
@@ -33,12 +30,6 @@ std::uint64_t number(Statement& statement, int column) {
 
 Progress progress_of_all(sqlite3* database) {
   Progress progress;
-  // From the index alone.
-  Statement rows(database, "SELECT study_id, count(*), max(point) FROM results GROUP BY study_id");
-  while (rows.step()) {
-    progress.rows[number(rows, 0)] = number(rows, 1);
-    progress.last[number(rows, 0)] = number(rows, 2);
-  }
   // The failures that are there come last: they are later than all that were forgotten.
   Statement retries(database,
                     "SELECT study_id, first_point, points, attempt FROM retries ORDER BY rowid");
@@ -78,6 +69,36 @@ IntervalSet points_of(Statement& query, std::uint64_t study_id) {
   return points;
 }
 
+/// Which points of a study have a row. One that is done is taken at its word when its first and
+/// last point have one: what is finished must not cost each start of a server a look at all its
+/// rows.
+class SettledPoints {
+ public:
+  explicit SettledPoints(sqlite3* database)
+      : ends_(database,
+              "SELECT (SELECT point FROM results WHERE study_id = ?1 ORDER BY point LIMIT 1),"
+              " (SELECT point FROM results WHERE study_id = ?1 ORDER BY point DESC LIMIT 1)"),
+        all_(database, "SELECT point FROM results WHERE study_id = ? ORDER BY point") {}
+
+  IntervalSet of(const StoredStudy& study) {
+    ends_.bind(1, study.study_id);
+    ends_.step();
+    const bool has_none = ends_.is_null(0);
+    const bool has_ends =
+        !has_none && number(ends_, 0) == 0 && number(ends_, 1) + 1 == study.table.size();
+    ends_.reset();
+    if (has_none) {
+      return {};
+    }
+    return has_ends && study.state == StudyState::kDone ? IntervalSet(0, study.table.size())
+                                                        : points_of(all_, study.study_id);
+  }
+
+ private:
+  Statement ends_;
+  Statement all_;
+};
+
 /// Makes sure that points can be handed out; afterwards, those of a study that rests need no table.
 /// Gives why this version takes no such study, or an empty text. Throws StorageError for a recipe
 /// that cannot be read.
@@ -106,7 +127,7 @@ std::vector<StoredStudy> Store::studies() {
   Statement version(database_.get(),
                     "SELECT solver_version FROM results WHERE study_id = ?"
                     " AND solver_version IS NOT NULL ORDER BY point LIMIT 1");
-  Statement settled(database_.get(), "SELECT point FROM results WHERE study_id = ? ORDER BY point");
+  SettledPoints settled(database_.get());
   while (list.step()) {
     StoredStudy study{};
     study.study_id = number(list, 0);
@@ -115,16 +136,10 @@ std::vector<StoredStudy> Store::studies() {
     study.state = state_named(list.text(3));
     study.created_at = list.text(4);
     study.terms = {static_cast<std::int32_t>(list.integer(5)), list.real(6), list.integer(7) != 0};
-    const std::uint64_t rows = progress.rows[study.study_id];
-    if (rows > 0) {
-      version.reset();
-      version.bind(1, study.study_id);
-      study.solver_version = version.step() ? version.text(0) : "";
-      version.reset();
-      const bool is_complete =
-          rows == study.table.size() && progress.last[study.study_id] == rows - 1;
-      study.settled = is_complete ? IntervalSet(0, rows) : points_of(settled, study.study_id);
-    }
+    study.settled = settled.of(study);
+    version.bind(1, study.study_id);
+    study.solver_version = version.step() ? version.text(0) : "";
+    version.reset();
     const bool is_open = study.settled.size() < study.table.size();
     if (const std::string objection = is_open ? objection_to(study) : ""; !objection.empty()) {
       left_out_.push_back(

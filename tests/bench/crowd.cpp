@@ -216,7 +216,13 @@ class Crowd::Parts {
       std::erase_if(member.jobs, [&](const Job& job) { return is_dropped(job.batch); });
     };
     const Overloaded apply_one{
-        [&](const worker::Connect&) { connect(number); },
+        [&](const worker::Connect& effect) {
+          constexpr std::uint64_t kMostTold = 5;
+          if (!effect.reason.empty() && connects_ < members_.size() + kMostTold) {
+            std::fprintf(stderr, "worker %zu connects again: %s\n", number, effect.reason.c_str());
+          }
+          connect(number);
+        },
         [&](const worker::Send& effect) { send(member, effect.message); },
         [&](worker::Solve& effect) {
           if (member.jobs.empty()) {

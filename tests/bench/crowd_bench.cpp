@@ -130,8 +130,7 @@ void bench(const Flags& flags, std::size_t workers, double point_ms, int scrape_
       static_cast<unsigned long long>(scrapes));
   std::fflush(stdout);
   if (after.connects > workers) {
-    std::fprintf(stderr, "the crowd itself was late by %.1f s; the server's log:\n%s",
-                 after.longest_gap_s, server.process().err().c_str());
+    std::fprintf(stderr, "the crowd itself was late by %.1f s at most\n", after.longest_gap_s);
   }
 }
 

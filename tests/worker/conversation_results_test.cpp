@@ -75,9 +75,20 @@ TEST_F(ConversationTest, AMessageStaysBelowItsSizeInBytes) {
   }
 }
 
+TEST_F(ConversationTest, AResultOfMoreThanAMessageUsuallyHasGoesAlone) {
+  ConversationSettings settings;
+  settings.bytes_a_message = 10;
+  use(settings);
+  join();
+  receive(batch_message(7, 31));
+  solve(1, 0, 10, true);
+  ASSERT_EQ(sent_results().size(), 10U);
+  EXPECT_EQ(sent_results()[0].results(0).error(), "for the test") << "as it was solved";
+}
+
 TEST_F(ConversationTest, AResultTooLargeToSendBecomesAFailedPoint) {
   ConversationSettings settings;
-  settings.bytes_a_message = 100;
+  settings.most_bytes_a_result = 100;
   use(settings);
   join();
   receive(batch_message(7, 31, 0, 1));

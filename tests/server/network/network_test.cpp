@@ -83,6 +83,35 @@ TEST_F(NetworkTest, APeerThatIsNotServedIsReadNoFurther) {
   EXPECT_EQ(network_.next(1, anybody), std::nullopt);
 }
 
+TEST(ManyPeers, ThatDeliverMoreThanIsTakenAreReadNoFurtherAndLoseNothing) {
+  constexpr std::size_t kPause = 1'000'000;
+  constexpr std::size_t kMessage = 60'000;
+  constexpr int kPeers = 40;
+  Network network({.held_in_bytes = 3'000'000, .held_in_to_pause_bytes = kPause});
+  const Network::Port port = network.listen("127.0.0.1", "*");
+  std::vector<std::unique_ptr<RawPeer>> peers;
+  std::size_t sent = 0;
+  for (int i = 0; i < kPeers; ++i) {
+    peers.push_back(std::make_unique<RawPeer>(network.endpoint(port)));
+    peers.back()->send(zmtp_greeting() + zmtp_ready("DEALER"));
+    sent += zmtp_frame(std::string(kMessage, 'x')).size();
+    peers.back()->send(zmtp_frame(std::string(kMessage, 'x')));
+  }
+  const auto anyone = [](const std::string&) { return true; };
+  int taken = 0;
+  std::size_t most = 0;
+  for (int turn = 0; taken < kPeers && turn < 100'000; ++turn) {
+    network.collect(turn);
+    most = std::max(most, network.held_in_bytes());
+    const bool is_late = turn > 1000;  // nothing is taken before
+    taken += is_late && network.next(port, anyone) ? 1 : 0;
+  }
+  EXPECT_EQ(taken, kPeers);
+  EXPECT_TRUE(network.take_departures().empty());
+  EXPECT_LT(most, kPause + 4 * kMessage);
+  EXPECT_GT(sent, 2 * kPause);
+}
+
 TEST_F(NetworkTest, WhatAPeerSentBeforeItLeftIsTaken) {
   auto leaving = peer();
   leaving->send(zmtp_frame("first") + zmtp_frame("second") + zmtp_frame("last"));

@@ -133,6 +133,18 @@ TEST_F(ServiceLoadTest, AWorkerThatIsNotHeardIsNotTakenForSilentAndHearsThatTheS
   EXPECT_EQ(service_->scheduler().workers(), 0U) << "now it is silent indeed";
 }
 
+TEST_F(ServiceLoadTest, AWorkerWhoseResultsWaitForTheDiskHearsSignsOfLifeThoughItGoesOnSpeaking) {
+  begin({});
+  outbox_.worker_messages.clear();
+  for (std::uint64_t point = 900; point < 960; ++point) {
+    now_.steady_ms += 100;
+    worker_says(one_result(point));
+    service_->tick(now_);
+  }
+  EXPECT_GE(outbox_.worker_messages.size(), 4U) << "one in 1.2 s";
+  EXPECT_LE(outbox_.worker_messages.size(), 6U);
+}
+
 TEST_F(ServiceLoadTest, AWorkerThatDoesNotReadGetsNoFurtherBatchAndNoPointCountsAsLost) {
   begin({});
   outbox_.busy = "worker";
