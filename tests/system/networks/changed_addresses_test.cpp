@@ -1,6 +1,10 @@
 // Machines that get other addresses while a study is solved, and addresses of IPv6.
+#include <chrono>
+#include <string>
+
 #include <gtest/gtest.h>
 
+#include "tests/system/networks/small_study.h"
 #include "tests/system/networks/study_on_lan.h"
 
 namespace oblique::test {
@@ -13,7 +17,17 @@ TEST_F(ChangedAddresses, TheMachineOfTheOnlyWorkerGetsAnotherAddress) {
 }
 
 TEST_F(ChangedAddresses, TheClientsMachineGetsAnotherAddress) {
-  goes_on_after([this] { client_host_->renumber(15); });
+  start_server();
+  client_ = client(submit_and_watch());
+  const auto says = [this](const std::string& words) {
+    return client_->err().find(words) != std::string::npos;
+  };
+  wait_until("it watches", [&] { return says("waits for a worker"); });
+  client_host_->renumber(15);
+  const auto renumbered = std::chrono::steady_clock::now();
+  wait_until("it is answered again", [&] { return says("answers again"); });
+  print_measured("the client is answered again after", seconds_since(renumbered));
+  goes_on_after([] {});
 }
 
 TEST_F(ChangedAddresses, TheServersMachineGetsAnotherAddressUnderItsName) {

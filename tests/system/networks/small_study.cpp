@@ -27,15 +27,17 @@ void expect_completed(Process& client, const Database& database,
   wait_for_rows(database, kPoints);
   const auto completed = std::chrono::steady_clock::now();
   EXPECT_EQ(client.wait(), 0) << client.err();
-  print_measured(
-      "the client knows of the end after",
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - completed).count());
+  print_measured("the client knows of the end after", seconds_since(completed));
   EXPECT_EQ(database.number("SELECT count(DISTINCT point) FROM results WHERE status = 'solved'"),
             kPoints);
   EXPECT_EQ(database.rows(), kPoints);
   for (const auto& worker : nlohmann::json::parse(workers())) {
     EXPECT_NE(worker.at("standing"), "set aside") << worker;
   }
+}
+
+double seconds_since(std::chrono::steady_clock::time_point then) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - then).count();
 }
 
 void print_measured(const std::string& what, double time_s) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <string>
 #include <vector>
@@ -30,6 +31,8 @@ void wait_for_rows(const Database& database, double at_least);
 /// again and again.
 void expect_completed(Process& client, const Database& database,
                       const std::function<std::string()>& workers);
+
+double seconds_since(std::chrono::steady_clock::time_point then);
 
 /// Prints what was measured beside the test's own lines.
 void print_measured(const std::string& what, double time_s);

@@ -67,15 +67,16 @@ void StudyOnLan::goes_on_after(const std::function<void()>& fault, std::size_t w
     start_server();
   }
   start_workers(workers);
-  client_ = client(submit_and_watch());
+  if (client_ == nullptr) {
+    client_ = client(submit_and_watch());
+  }
   wait_for_rows(database_, 1);
   fault();
   const auto mended = std::chrono::steady_clock::now();
   const double rows = database_.rows();
   ASSERT_LT(rows, kPoints) << "the study was too short for this fault";
   wait_for_rows(database_, rows + 1);
-  print_measured("work goes on after",
-                 std::chrono::duration<double>(std::chrono::steady_clock::now() - mended).count());
+  print_measured("work goes on after", seconds_since(mended));
   expect_completed(*client_, database_, [this] {
     return client({"workers", "--format", "json"})->outcome().out;
   });
