@@ -65,7 +65,9 @@ bool is_of_a_workers_size(std::string_view frame) {
         results += field == Results::kResultsFieldNumber ? 1U : 0U;
         return results <= kMostResultsAMessage;
       });
-    } else if (kind == WorkerMessage::kHeartbeatFieldNumber) {
+    } else if (kind == WorkerMessage::kHeartbeatFieldNumber ||
+               kind == WorkerMessage::kGiveBackFieldNumber) {
+      static_assert(int{Heartbeat::kLeaseIdsFieldNumber} == int{GiveBack::kLeaseIdsFieldNumber});
       for_each_field(part, [&](int field, std::string_view ids) {
         lease_ids += field == Heartbeat::kLeaseIdsFieldNumber ? listed_numbers(ids) : 0;
         return lease_ids <= kMostLeasesAHeartbeat;

@@ -1,13 +1,10 @@
 #include "worker/conversation.h"
 
 #include <algorithm>
-#include <limits>
 #include <utility>
 
 namespace oblique::worker {
 namespace {
-
-constexpr std::int64_t kNever_ms = std::numeric_limits<std::int64_t>::max();
 
 /// What a server may ask for; outside it, heartbeats would flood or never come.
 constexpr std::int64_t kShortestInterval_ms = 10;
@@ -19,7 +16,8 @@ Conversation::Conversation(protocol::WorkerHello hello, ConversationSettings set
     : hello_(std::move(hello)),
       settings_(settings),
       hello_timeout_ms_(settings.hello_timeout_ms),
-      outbox_(settings.outbox) {}
+      outbox_(settings.outbox),
+      leaving_(settings.leaving, hello_.threads()) {}
 
 Effects Conversation::take_effects() {
   return std::exchange(effects_, {});
@@ -29,6 +27,7 @@ Effects Conversation::take_effects() {
 
 Effects Conversation::start(std::int64_t now_ms) {
   now_ms_ = now_ms;
+  leaving_.note_work(now_ms);
   connect("");
   return take_effects();
 }
@@ -80,8 +79,10 @@ Effects Conversation::on_rejected(const std::string& reason, std::int64_t now_ms
 Effects Conversation::on_time(std::int64_t now_ms) {
   now_ms_ = now_ms;
   if (stopping_ && now_ms_ >= stop_deadline_ms_) {
-    finish(0, "stopped");
+    finish(0, stop_reason_);
   }
+  finish_if_delivered();
+  leave_if_due();
   switch (state_) {
     case State::kGreeting:
       if (now_ms_ >= deadline_ms_) {
@@ -112,7 +113,10 @@ std::int64_t Conversation::next_deadline_ms() const {
   if (state_ == State::kFinished) {
     return kNever_ms;
   }
-  const std::int64_t stop_ms = stopping_ ? stop_deadline_ms_ : kNever_ms;
+  const std::int64_t last_points_ms =
+      outbox_.is_empty() ? std::max(last_points_until_ms_, now_ms_ + 1) : kNever_ms;
+  const std::int64_t stop_ms =
+      stopping_ ? std::min(stop_deadline_ms_, last_points_ms) : leaving_.next_deadline_ms();
   const std::int64_t heartbeat_ms = state_ == State::kWelcomed ? heartbeat_due_ms_ : kNever_ms;
   return std::min({deadline_ms_, stop_ms, heartbeat_ms});
 }
@@ -205,6 +209,7 @@ void Conversation::on(const protocol::Welcome& welcome) {
   deadline_ms_ = now_ms_ + lost_after_ms_;
   heartbeat_due_ms_ = now_ms_ + heartbeat_interval_ms_;
   server_stopping_ = false;
+  server_takes_back_ = welcome.takes_back();
   effects_.emplace_back(Note{"welcomed as worker " + std::to_string(welcome.worker_id())});
 
   // The server has given up what this worker held and hands it out anew.
@@ -260,13 +265,17 @@ void Conversation::on(const protocol::Batch& batch) {
   }
   backoff_ms_ = 0;
   const std::uint64_t number = next_batch_++;
-  held_[number] = {batch.study_id(), batch.lease_id(), batch.attempt()};
+  held_[number] = {batch.study_id(), batch.lease_id(), batch.attempt(), batch.count()};
+  leaving_.note_work(now_ms_);
+  leaving_.note_batch({batch.study_id(), batch.count()});
   effects_.emplace_back(Solve{{number, batch.study_id(), batch.model(), batch.first_point(),
                                batch.count(), study->second}});
+  give_back_what_takes_too_long();
 }
 
 void Conversation::on(const protocol::ResultsStored& stored) {
   backoff_ms_ = 0;
+  leaving_.note_work(now_ms_);
   outbox_.acknowledged(stored.sequence());
   deliver();
   give_credit();
@@ -311,26 +320,41 @@ void Conversation::on(const protocol::ServerStopping&) {
 
 // ---- The end ----------------------------------------------------------------------------------
 
-Effects Conversation::stop(std::int64_t now_ms) {
+Effects Conversation::stop(std::int64_t now_ms, bool points_are_solved) {
   now_ms_ = now_ms;
-  if (stopping_) {
-    if (now_ms_ >= stop_repeats_until_ms_) {
-      finish(0, "stopped at once");
-    }
-    return take_effects();
+  if (!stopping_) {
+    stop_repeats_until_ms_ = now_ms_ + settings_.stop_repeats_ms;
+    begin_stop("stopped", points_are_solved);
+  } else if (now_ms_ >= stop_repeats_until_ms_) {
+    finish(0, "stopped at once");
   }
-  stopping_ = true;
-  stop_repeats_until_ms_ = now_ms_ + settings_.stop_repeats_ms;
-  stop_deadline_ms_ = now_ms_ + settings_.stop_timeout_ms;
-  effects_.emplace_back(DropAll{});
-  held_.clear();
+  return take_effects();
+}
+
+Effects Conversation::on_solver_idle(std::int64_t now_ms) {
+  now_ms_ = now_ms;
+  last_points_until_ms_ = std::min(last_points_until_ms_, now_ms);
   finish_if_delivered();
   return take_effects();
 }
 
+void Conversation::begin_stop(const std::string& reason, bool points_are_solved) {
+  stopping_ = true;
+  stop_reason_ = reason;
+  stop_deadline_ms_ = now_ms_ + settings_.stop_timeout_ms;
+  last_points_until_ms_ = now_ms_ + (points_are_solved ? settings_.last_points_ms : 0);
+  // Points of results that still wait here must not be handed out again.
+  if (!outbox_.has_waiting()) {
+    give_back(0);
+  }
+  effects_.emplace_back(DropAll{});
+  held_.clear();
+  finish_if_delivered();
+}
+
 void Conversation::finish_if_delivered() {
-  if (stopping_ && outbox_.is_empty()) {
-    finish(0, "stopped");
+  if (stopping_ && outbox_.is_empty() && now_ms_ >= last_points_until_ms_) {
+    finish(0, stop_reason_);
   }
 }
 

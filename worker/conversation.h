@@ -11,6 +11,7 @@
 #include "proto/recipe/point_table.h"
 #include "worker/batch.h"
 #include "worker/effects.h"
+#include "worker/leaving.h"
 #include "worker/outbox.h"
 
 namespace oblique::worker {
@@ -29,9 +30,11 @@ struct ConversationSettings {
   std::int64_t shortest_rejected_ms = 2000;  ///< between attempts that the server rejects, doubling
   std::int64_t longest_rejected_ms = 30'000;
   std::int64_t stop_timeout_ms = 2000;  ///< for the last results to be acknowledged
+  std::int64_t last_points_ms = 250;    ///< of these: for points that are being solved to end
   /// A request to stop that follows so soon is part of the one before: Slurm sends SIGTERM twice
   /// within milliseconds to jobs that it preempts.
   std::int64_t stop_repeats_ms = 1000;
+  LeavingSettings leaving;
 };
 
 /// The worker's side of the conversation with the server (proto/protocol.md): decides what follows
@@ -52,9 +55,13 @@ class Conversation {
   Effects on_rejected(const std::string& reason, std::int64_t now_ms);
   /// To be called at `next_deadline_ms` or a little later.
   Effects on_time(std::int64_t now_ms);
-  /// Deliver what is solved, say goodbye and finish. A second call after `stop_repeats_ms` finishes
-  /// at once.
-  Effects stop(std::int64_t now_ms);
+  /// Give back what is not solved, deliver what is, say goodbye and finish. While
+  /// `points_are_solved` what comes of them within `last_points_ms` is delivered too. A second call
+  /// after `stop_repeats_ms` finishes at once.
+  Effects stop(std::int64_t now_ms, bool points_are_solved = false);
+  /// After a stop: no point is being solved any more, and all that was is reported.
+  Effects on_solver_idle(std::int64_t now_ms);
+  bool is_stopping() const { return stopping_; }
 
   std::int64_t next_deadline_ms() const;
   /// Whether further points may be solved: false while too many results wait to be acknowledged.
@@ -72,6 +79,7 @@ class Conversation {
     std::uint64_t study_id;
     std::uint64_t lease_id;
     std::uint32_t attempt;
+    std::uint64_t points_left;
   };
 
   void connect(const std::string& reason);
@@ -92,6 +100,11 @@ class Conversation {
   void send(protocol::WorkerMessage message);
   void send_heartbeat();
   void give_credit();
+  std::vector<HeldPoints> held_points() const;
+  void give_back(std::uint64_t first_batch);
+  void give_back_what_takes_too_long();
+  void leave_if_due();
+  void begin_stop(const std::string& reason, bool points_are_solved);
   void finish_if_delivered();
   void finish(int exit_code, const std::string& reason);
   Effects take_effects();
@@ -109,9 +122,12 @@ class Conversation {
   std::int64_t backoff_ms_ = 0;   ///< 0: the last attempt came to something
   std::int64_t rejected_ms_ = 0;  ///< pause after the last rejection; 0: welcomed since
   bool stopping_ = false;
+  std::string stop_reason_;
   std::int64_t stop_deadline_ms_ = 0;
+  std::int64_t last_points_until_ms_ = 0;
   std::int64_t stop_repeats_until_ms_ = 0;
   bool server_stopping_ = false;
+  bool server_takes_back_ = false;
   std::string database_id_;
 
   std::map<std::uint64_t, std::shared_ptr<const protocol::PointTable>> studies_;
@@ -120,6 +136,7 @@ class Conversation {
   std::uint64_t first_batch_of_database_ = 1;  ///< earlier batches were of another database
   std::uint32_t open_credit_ = 0;              ///< batches asked for and not yet come
   Outbox outbox_;
+  Leaving leaving_;
   Effects effects_;  // of the call being made
 };
 

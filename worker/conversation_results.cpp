@@ -1,4 +1,5 @@
 // The part of the conversation that delivers what was solved and asks for more.
+#include <algorithm>
 #include <utility>
 
 #include "proto/result_message.h"
@@ -12,8 +13,11 @@ Effects Conversation::on_progress(std::vector<Progress> progress, std::int64_t n
     return take_effects();
   }
   for (Progress& part : progress) {
+    leaving_.note_work(now_ms);
+    leaving_.note_solved({part.study_id, part.results.size()}, part.busy_s);
     report(part);
   }
+  give_back_what_takes_too_long();
   give_credit();
   return take_effects();
 }
@@ -24,7 +28,7 @@ void Conversation::report(Progress& progress) {
   }
   const auto found = held_.find(progress.batch);
   // A batch of before the last welcome: what is solved is solved, but there is no lease to end.
-  const Held held = found != held_.end() ? found->second : Held{progress.study_id, 0, 0};
+  const Held held = found != held_.end() ? found->second : Held{progress.study_id, 0, 0, 0};
   const auto new_message = [&] {
     protocol::Results results;
     results.set_study_id(progress.study_id);
@@ -53,6 +57,10 @@ void Conversation::report(Progress& progress) {
     results.set_busy_s(results.busy_s() + s_per_point);
     *results.add_results() = std::move(result);
   }
+  if (found != held_.end()) {
+    found->second.points_left -=
+        std::min<std::uint64_t>(found->second.points_left, progress.results.size());
+  }
   const bool ends_lease = progress.batch_done && found != held_.end();
   results.set_batch_done(ends_lease);
   if (ends_lease) {
@@ -80,13 +88,71 @@ void Conversation::give_credit() {
   const auto taken = static_cast<std::uint32_t>(held_.size()) + open_credit_;
   // Points of results that still wait here must not be handed out again.
   if (state_ != State::kWelcomed || stopping_ || server_stopping_ || outbox_.has_waiting() ||
-      !may_solve() || taken >= settings_.batches_held) {
+      !may_solve() || taken >= settings_.batches_held ||
+      !leaving_.has_time_for_more(held_points(), now_ms_)) {
     return;
   }
   protocol::WorkerMessage message;
   message.mutable_credit()->set_batches(settings_.batches_held - taken);
   send(std::move(message));
   open_credit_ = settings_.batches_held - static_cast<std::uint32_t>(held_.size());
+}
+
+// ---- Time that is over ------------------------------------------------------------------------
+
+std::vector<HeldPoints> Conversation::held_points() const {
+  std::vector<HeldPoints> points;
+  points.reserve(held_.size());
+  for (const auto& [number, held] : held_) {
+    points.push_back({held.study_id, held.points_left});
+  }
+  return points;
+}
+
+/// The batches from that number on. To a server that does not know of it they go back with the
+/// goodbye.
+void Conversation::give_back(std::uint64_t first_batch) {
+  protocol::WorkerMessage message;
+  for (auto held = held_.lower_bound(first_batch); held != held_.end(); ++held) {
+    message.mutable_give_back()->add_lease_ids(held->second.lease_id);
+  }
+  if (server_takes_back_ && message.has_give_back()) {
+    send(std::move(message));
+  }
+}
+
+/// Another worker can have what stands behind a batch that takes all the time. The first batch is
+/// worked on to the end: what it gives until then counts.
+void Conversation::give_back_what_takes_too_long() {
+  const std::vector<HeldPoints> points = held_points();
+  const std::size_t kept = std::max<std::size_t>(leaving_.ending_in_time(points, now_ms_), 1);
+  if (stopping_ || !server_takes_back_ || kept >= held_.size()) {
+    return;
+  }
+  const auto first = std::next(held_.begin(), static_cast<std::ptrdiff_t>(kept));
+  effects_.emplace_back(Note{std::to_string(held_.size() - kept) +
+                             " batches would not end before the time to leave and go back"});
+  give_back(first->first);
+  for (auto held = first; held != held_.end(); held = held_.erase(held)) {
+    effects_.emplace_back(DropBatch{held->first});
+  }
+}
+
+void Conversation::leave_if_due() {
+  if (stopping_ || state_ == State::kFinished) {
+    return;
+  }
+  const bool is_without_work = held_.empty() && outbox_.is_empty();
+  if (!is_without_work) {
+    leaving_.note_work(now_ms_);
+  }
+  if (leaving_.is_due(now_ms_)) {
+    begin_stop("the time to work is over", !is_without_work);
+  } else if (is_without_work && !leaving_.has_time_for_more({}, now_ms_)) {
+    begin_stop("no further batch would end before the time to leave", false);
+  } else if (leaving_.is_idle_for_too_long(now_ms_)) {
+    begin_stop("nothing to do for long enough", false);
+  }
 }
 
 }  // namespace oblique::worker

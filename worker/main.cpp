@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
+#include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <cstdlib>
 #include <exception>
 #include <iostream>
@@ -19,6 +22,7 @@
 #include "proto/program/log.h"
 #include "proto/program/parent.h"
 #include "proto/program/stop_signals.h"
+#include "proto/program/until.h"
 #include "proto/program/usage.h"
 #include "worker/point_solver.h"
 #include "worker/session.h"
@@ -33,10 +37,10 @@ using oblique::worker::SessionSettings;
 
 constexpr const char* kProgram = "oblique-worker";
 
-std::string host_and_process() {
+std::string host_name() {
   std::array<char, 256> host{};
   gethostname(host.data(), host.size() - 1);
-  return std::string(host.data()) + ":" + std::to_string(getpid());
+  return host.data();
 }
 
 /// Empty for a name that any terminal shows and any message carries, else what is wrong with it.
@@ -53,6 +57,35 @@ constexpr std::size_t kMostThreads = 4096;
 
 std::size_t cores() {
   return std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, kMostThreads);
+}
+
+/// Empty for a time or duration, else what is wrong with it.
+std::string objection_to_until(const std::string& text) {
+  return oblique::protocol::time_until(text, std::chrono::system_clock::now())
+             ? ""
+             : "\"" + text +
+                   "\" is neither a time, as 2026-11-22T05:00:00Z, nor a duration, as 90m";
+}
+
+/// What people say of when the worker ends by itself.
+struct Ending {
+  std::string until;
+  double idle_exit_s = 0.0;  ///< 0: never
+};
+
+oblique::worker::LeavingSettings leaving_settings(const Ending& ending) {
+  using std::chrono::duration_cast;
+  using std::chrono::milliseconds;
+  oblique::worker::LeavingSettings settings;
+  if (const auto left =
+          oblique::protocol::time_until(ending.until, std::chrono::system_clock::now())) {
+    const auto now = std::chrono::steady_clock::now().time_since_epoch();
+    settings.until_ms = (duration_cast<milliseconds>(now) + *left).count();
+  }
+  if (ending.idle_exit_s > 0.0) {
+    settings.idle_exit_ms = std::max<std::int64_t>(std::llround(ending.idle_exit_s * 1000.0), 1);
+  }
+  return settings;
 }
 
 int run_worker(const SessionSettings& settings, const StopWithParent& parent) {
@@ -80,7 +113,7 @@ int run_worker(const SessionSettings& settings, const StopWithParent& parent) {
 }
 
 void add_options(CLI::App& app, Configuration& configuration, StopWithParent& parent,
-                 SessionSettings& settings, std::string& keys) {
+                 SessionSettings& settings, Ending& ending, std::string& keys) {
   app.set_version_flag("--version", "oblique-worker " + oblique::solver::solver_version());
   app.add_option("--server", settings.server, "Where the server awaits workers")
       ->capture_default_str();
@@ -91,6 +124,17 @@ void add_options(CLI::App& app, Configuration& configuration, StopWithParent& pa
                  "Points solved at a time, each thread on a core; the default is all cores here")
       ->capture_default_str()
       ->check(CLI::Range(std::size_t{1}, kMostThreads));
+  app.add_option("--until", ending.until,
+                 "Be gone by then: a time, as 2026-11-22T05:00:00Z (without a zone it is local), "
+                 "or a duration from now, as 90m")
+      ->type_name("TIME")
+      ->check(objection_to_until);
+  constexpr double kLongestIdle_s = 1e9;
+  app.add_option("--idle-exit", ending.idle_exit_s,
+                 "Leave after so many seconds without work; 0: stay")
+      ->type_name("SECONDS")
+      ->capture_default_str()
+      ->check(oblique::protocol::number_between(0.0, kLongestIdle_s));
   configuration.keep_to_command_line(parent.add_to(app));
 }
 
@@ -109,7 +153,8 @@ int run_program(int argc, char** argv, LogSettings& log) {
       app,
       {"OBLIQUE_WORKER_", oblique::protocol::default_configuration_file("worker.toml"), {"log"}});
   StopWithParent parent;
-  add_options(app, configuration, parent, settings, keys);
+  Ending ending;
+  add_options(app, configuration, parent, settings, ending, keys);
   add_log_flags(app, configuration, log);
   if (const auto exit_code = configuration.parse(argc, argv)) {
     return *exit_code;
@@ -118,9 +163,11 @@ int run_program(int argc, char** argv, LogSettings& log) {
     std::cout << configuration.printed();
     return oblique::protocol::kDone;
   }
+  settings.host = host_name();
   if (settings.name.empty()) {
-    settings.name = host_and_process();
+    settings.name = settings.host + ":" + std::to_string(getpid());
   }
+  settings.conversation.leaving = leaving_settings(ending);
   oblique::protocol::set_up_log(kProgram, log);
   try {
     if (!keys.empty()) {

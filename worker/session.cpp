@@ -20,6 +20,7 @@ namespace oblique::worker {
 namespace {
 
 constexpr int kLinger_ms = 500;         ///< for the goodbye to leave
+constexpr int kLastReports_ms = 10;     ///< between reports of points that end a stopped worker
 constexpr int kMessagesAtATime = 1000;  ///< then other duties get their turn
 
 std::int64_t now_ms() {
@@ -47,6 +48,7 @@ protocol::WorkerHello hello_of(const SessionSettings& settings) {
   hello.set_name(settings.name);
   hello.set_threads(static_cast<std::uint32_t>(settings.threads));
   hello.set_process_id(random_id());
+  hello.set_host(settings.host);
   return hello;
 }
 
@@ -118,7 +120,11 @@ int Session::run(int stop_descriptor, const std::function<void()>& on_stop) {
     if ((items[2].revents & ZMQ_POLLIN) != 0) {
       on_stop();
       report_progress();
-      apply(conversation_.stop(now_ms()));
+      apply(conversation_.stop(now_ms(), solver_.is_solving()));
+    }
+    if (conversation_.is_stopping() && !solver_.is_solving()) {
+      report_progress();
+      apply(conversation_.on_solver_idle(now_ms()));
     }
     apply(conversation_.on_time(now_ms()));
     solver_.set_paused(!conversation_.may_solve());
@@ -135,7 +141,8 @@ std::int64_t Session::poll_timeout_ms() const {
 
 void Session::report_progress() {
   apply(conversation_.on_progress(solver_.collect(), now_ms()));
-  report_due_ms_ = now_ms() + settings_.report_interval_ms;
+  report_due_ms_ =
+      now_ms() + (conversation_.is_stopping() ? kLastReports_ms : settings_.report_interval_ms);
 }
 
 void Session::receive_all() {

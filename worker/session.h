@@ -21,6 +21,7 @@ namespace oblique::worker {
 struct SessionSettings {
   std::string server = "tcp://127.0.0.1:7601";  ///< where the server awaits workers
   std::string name;                             ///< for people
+  std::string host;                             ///< name of this machine, for people
   std::size_t threads = 1;                      ///< that solve points
   std::size_t models_kept = 8;                  ///< falls kept
   std::int64_t report_interval_ms = 100;        ///< solved points wait at most so long

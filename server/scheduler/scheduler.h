@@ -171,6 +171,7 @@ class Scheduler {
   void on(const ResultsReceived& event);
   void on(const ResultsStored& event);
   void on(const HeartbeatReceived& event);
+  void on(const BatchesReturned& event);
   void on(const WorkerLeft& event);
   void on(const WorkerUnreachable& event);
   void on(const WorkerBusy& event);

@@ -134,6 +134,11 @@ struct HeartbeatReceived {
   WorkerId worker;
   std::vector<LeaseId> leases;
 };
+/// The worker will not end these batches, and says so.
+struct BatchesReturned {
+  WorkerId worker;
+  std::vector<LeaseId> leases;
+};
 /// The worker said goodbye.
 struct WorkerLeft {
   WorkerId worker;
@@ -156,10 +161,10 @@ struct DispatchHeld {
 /// Time has passed.
 struct Tick {};
 
-using Event =
-    std::variant<StudyAdded, StudyCancelled, StudyPaused, StudyReopened, StudyTermsChanged,
-                 FailuresForgotten, WorkerJoined, CreditGiven, ResultsReceived, ResultsStored,
-                 HeartbeatReceived, WorkerLeft, WorkerUnreachable, WorkerBusy, DispatchHeld, Tick>;
+using Event = std::variant<StudyAdded, StudyCancelled, StudyPaused, StudyReopened,
+                           StudyTermsChanged, FailuresForgotten, WorkerJoined, CreditGiven,
+                           ResultsReceived, ResultsStored, HeartbeatReceived, BatchesReturned,
+                           WorkerLeft, WorkerUnreachable, WorkerBusy, DispatchHeld, Tick>;
 
 // ---- Effects ----------------------------------------------------------------------------------
 

@@ -88,6 +88,20 @@ void Scheduler::on(const HeartbeatReceived& event) {
   }
 }
 
+void Scheduler::on(const BatchesReturned& event) {
+  Worker* worker = heard_from(event.worker);
+  if (worker == nullptr) {
+    return;
+  }
+  for (const LeaseId lease : event.leases) {
+    if (worker->leases.contains(lease)) {
+      end_lease(lease, std::nullopt);
+    } else if (lease == worker->probe) {
+      worker->probe = 0;
+    }
+  }
+}
+
 void Scheduler::on(const WorkerLeft& event) {
   remove_worker(event.worker, WorkerEnd::kLeft);
 }

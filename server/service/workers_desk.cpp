@@ -93,6 +93,11 @@ Heard WorkersDesk::take(const std::string& identity, std::string_view frame, Ins
       workers_.at(worker).was_told = true;
       break;
     }
+    case Kind::kGiveBack: {
+      const auto& leases = message.give_back().lease_ids();
+      heard.events.emplace_back(BatchesReturned{worker, {leases.begin(), leases.end()}});
+      break;
+    }
     case Kind::kGoodbye:
       note(Severity::kInfo, fmt::format("worker {} leaves", worker), now);
       forget(worker);
@@ -184,6 +189,7 @@ bool WorkersDesk::welcome(WorkerId id, const WorkerRecord& worker) {
   welcome.set_heartbeat_interval_ms(settings_.heartbeat_interval_ms);
   welcome.set_lost_after_ms(static_cast<std::uint32_t>(settings_.lost_after_ms));
   welcome.set_database_id(settings_.database_id);
+  welcome.set_takes_back(true);
   return network_.to_worker(worker.identity, reply) != Delivery::kGone;
 }
 

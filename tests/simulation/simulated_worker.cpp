@@ -32,7 +32,11 @@ void SimulatedWorker::start() {
   ++life_;
   hello.set_process_id(std::to_string(peer_) + " in life " + std::to_string(life_));
   planned_time_ms_ = -1;
-  conversation_.emplace(hello, worker::ConversationSettings{});
+  worker::ConversationSettings settings;
+  if (world_.chance(0.2)) {
+    settings.leaving.until_ms = world_.now_ms() + world_.between(3000, 60'000);
+  }
+  conversation_.emplace(hello, settings);
   apply(conversation_->start(world_.now_ms()));
 }
 

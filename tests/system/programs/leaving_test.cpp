@@ -1,0 +1,128 @@
+// Workers that end while there is work: the rest of it is another's at once, and nobody's loss.
+#include <chrono>
+#include <csignal>
+#include <optional>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "tests/support/programs.h"
+#include "tests/system/many_points.h"
+
+namespace oblique::test {
+namespace {
+
+/// Points whose fall takes seconds, so that a batch is cut before it has any result.
+const std::vector<std::string> kSlowPoints{
+    "--H", "1", "--mu", "0.1:2:40", "--e", "1", "--elements-per-link", "12", "--name", "study"};
+
+nlohmann::json workers_of(const TemporaryFolder& folder, const Server& server) {
+  const Outcome outcome =
+      run_oblique(folder, {"workers", "--server", server.client_url(), "--format", "json"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  return nlohmann::json::parse(outcome.out, nullptr, false);
+}
+
+std::optional<nlohmann::json> worker_named(const TemporaryFolder& folder, const Server& server,
+                                           const std::string& name) {
+  for (const auto& worker : workers_of(folder, server)) {
+    if (worker.at("name") == name) {
+      return worker;
+    }
+  }
+  return std::nullopt;
+}
+
+void submit(const TemporaryFolder& folder, const Server& server,
+            const std::vector<std::string>& points) {
+  std::vector<std::string> words{"submit", "--server", server.client_url()};
+  words.insert(words.end(), points.begin(), points.end());
+  const Outcome outcome = run_oblique(folder, words);
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+}
+
+class LeavingProgramTest : public testing::Test {
+ protected:
+  bool holds_points(const std::string& name) {
+    const auto worker = worker_named(folder_, server_, name);
+    return worker && worker->at("leased_points") > 0;
+  }
+
+  TemporaryFolder folder_;
+  Server server_{folder_, folder_.file("a.db")};
+};
+
+TEST_F(LeavingProgramTest, TheRestOfABatchThatSigtermCutsIsAnotherWorkersAtOnceAndNoLoss) {
+  submit(folder_, server_, kSlowPoints);
+  Worker first(folder_, server_.worker_url(), {"--name", "first", "--threads", "1"});
+  wait_until("the first worker works", [&] { return holds_points("first"); });
+  Worker second(folder_, server_.worker_url(), {"--name", "second", "--threads", "1"});
+  wait_until("the second worker works", [&] { return holds_points("second"); });
+  first.send(SIGTERM);
+  EXPECT_EQ(first.wait(), 0) << first.err();
+  EXPECT_FALSE(worker_named(folder_, server_, "first"));
+  const auto rest = worker_named(folder_, server_, "second");
+  ASSERT_TRUE(rest);
+  EXPECT_EQ(rest->at("losses"), 0);
+  EXPECT_EQ(server_.process().err().find("is lost"), std::string::npos) << server_.process().err();
+}
+
+TEST_F(LeavingProgramTest, AStudyWhoseWorkersComeAndGoIsSolvedOnceAndNothingIsLost) {
+  submit(folder_, server_, many_points("study"));
+  Worker last(folder_, server_.worker_url(), {"--name", "last"});
+  for (int i = 0; i < 3; ++i) {
+    Worker first(folder_, server_.worker_url(), {"--name", "first"});
+    wait_until("the first worker has solved something", [&] {
+      const auto worker = worker_named(folder_, server_, "first");
+      return worker && worker->at("solved_points") > 0;
+    });
+    first.send(SIGTERM);
+    EXPECT_EQ(first.wait(), 0) << first.err();
+    EXPECT_EQ(first.err().find("could not be delivered"), std::string::npos) << first.err();
+  }
+  const auto worker = worker_named(folder_, server_, "last");
+  ASSERT_TRUE(worker);
+  EXPECT_EQ(worker->at("losses"), 0);
+  EXPECT_EQ(server_.process().err().find("is lost"), std::string::npos) << server_.process().err();
+}
+
+TEST_F(LeavingProgramTest, AWorkerIsGoneByTheTimeThatItIsGiven) {
+  submit(folder_, server_, kSlowPoints);
+  const auto begin = std::chrono::steady_clock::now();
+  Worker worker(folder_, server_.worker_url(), {"--until", "5s", "--threads", "1"});
+  EXPECT_EQ(worker.wait(), 0) << worker.err();
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(30));
+  EXPECT_EQ(server_.process().err().find("is lost"), std::string::npos) << server_.process().err();
+  EXPECT_NE(server_.process().err().find(" leaves"), std::string::npos);
+}
+
+TEST_F(LeavingProgramTest, AWorkerWithoutWorkLeaves) {
+  Worker worker(folder_, server_.worker_url(), {"--idle-exit", "0.3"});
+  EXPECT_EQ(worker.wait(), 0) << worker.err();
+  EXPECT_NE(worker.err().find("nothing to do"), std::string::npos) << worker.err();
+  EXPECT_NE(server_.process().err().find(" leaves"), std::string::npos);
+}
+
+TEST_F(LeavingProgramTest, AWorkerWhoseServerIsNotThereLeavesToo) {
+  Worker worker(folder_, "tcp://127.0.0.1:1", {"--idle-exit", "0.3"});
+  EXPECT_EQ(worker.wait(), 0) << worker.err();
+}
+
+TEST(LeavingFlagsTest, NonsenseIsWrongUsage) {
+  const TemporaryFolder folder;
+  for (const auto& [flag, value] :
+       std::vector<std::pair<std::string, std::string>>{{"--until", "soon"},
+                                                        {"--until", "2026-02-30T00:00:00Z"},
+                                                        {"--until", "-5"},
+                                                        {"--idle-exit", "-1"},
+                                                        {"--idle-exit", "nan"},
+                                                        {"--idle-exit", "x"}}) {
+    Process process(folder, worker_program(), {flag, value});
+    EXPECT_EQ(process.wait(), 2) << flag << value;
+    EXPECT_NE(process.err().find(flag), std::string::npos) << process.err();
+  }
+}
+
+}  // namespace
+}  // namespace oblique::test
