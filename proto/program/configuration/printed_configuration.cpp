@@ -33,6 +33,10 @@ std::vector<std::string> values_of(const CLI::Option& option) {
     return {"false"};
   }
   const std::string& by_default = option.get_default_str();
+  if (takes_list(option) && by_default.starts_with('[') && by_default.ends_with(']')) {
+    const std::string listed = by_default.substr(1, by_default.size() - 2);
+    return listed.empty() ? std::vector<std::string>() : CLI::detail::split(listed, ',');
+  }
   return by_default.empty() || by_default == "\"\"" ? std::vector<std::string>()
                                                     : std::vector{by_default};
 }

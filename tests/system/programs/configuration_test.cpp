@@ -50,16 +50,16 @@ TEST(ConfigurationOfProgramsTest, WhatIsPrintedIsAFileThatGivesTheSame) {
 
 TEST(ConfigurationOfProgramsTest, ServerAndWorkerRunOnFilesAlone) {
   const TemporaryFolder folder;
-  const std::string server_file =
-      write(folder.file("server.toml"),
-            "db = \"in_the_file.db\"\nworker_port = 0\nclient_port = 0\n[limits]\n"
-            "connections = 100\n[log]\nformat = \"json\"\n");
+  const std::string server_file = write(folder.file("server.toml"),
+                                        "db = \"in_the_file.db\"\nworker_port = 0\nclient_port = "
+                                        "0\nhttp = \"127.0.0.1:0\"\n[limits]\n"
+                                        "connections = 100\n[log]\nformat = \"json\"\n");
   Process server(folder, server_program(), {"--config", server_file});
   wait_until("the server is ready",
              [&] { return server.err().find("workers at ") != std::string::npos; });
   const std::string log = server.err();
   const auto at = log.find("workers at ") + 11;
-  const std::string url = log.substr(at, log.find('"', at) - at);
+  const std::string url = log.substr(at, log.find_first_of("\",", at) - at);
   const std::string worker_file = write(
       folder.file("worker.toml"), "server = \"" + url + "\"\nthreads = 1\nname = \"filed\"\n");
   Process worker(folder, worker_program(), {}, {{"OBLIQUE_WORKER_CONFIG", worker_file}});

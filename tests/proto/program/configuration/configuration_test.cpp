@@ -26,6 +26,7 @@ class ConfigurationTest : public testing::Test {
     bool loud = false;
     int connections = 10;
     std::vector<std::string> listen;
+    std::vector<std::string> sides{"left", "right"};
     std::string keys;
     int ready_fd = -1;
     LogSettings log;
@@ -57,6 +58,7 @@ class ConfigurationTest : public testing::Test {
     app.add_option("--port", options_.port)->check(CLI::Range(0, 65535));
     app.add_flag("--loud", options_.loud);
     app.add_option("--listen", options_.listen);
+    app.add_option("--sides", options_.sides);
     app.add_option("--keys", options_.keys)->envname("TEST_KEYS");
     app.add_option("--limits-connections", options_.connections)->check(CLI::PositiveNumber);
     configuration.keep_to_command_line(app.add_option("--ready-fd", options_.ready_fd));
@@ -187,6 +189,13 @@ TEST_F(ConfigurationTest, WhatIsPrintedGivesTheSameWhenItIsReadAgain) {
   EXPECT_EQ(options_.listen, std::vector<std::string>{"::1"});
   EXPECT_EQ(options_.log.level, "warning");
   EXPECT_EQ(options_.connections, 6);
+}
+
+TEST_F(ConfigurationTest, DefaultsThatArePrintedGiveTheSameToo) {
+  EXPECT_EQ(parse({}), std::nullopt);
+  EXPECT_EQ(parse({"--config", write(printed_)}), std::nullopt) << told_ << printed_;
+  EXPECT_TRUE(options_.listen.empty());
+  EXPECT_EQ(options_.sides, (std::vector<std::string>{"left", "right"}));
 }
 
 TEST_F(ConfigurationTest, WhatIsWrongInTheFileIsToldWithItsLine) {
