@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cstdio>
 #include <deque>
 #include <optional>
+#include <thread>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -196,7 +198,9 @@ class Crowd::Parts {
   void connect(std::size_t number) {
     Member& member = *members_[number];
     const protocol::DealerSettings settings{.url = settings_.worker_url,
-                                            .example_url = settings_.worker_url};
+                                            .example_url = settings_.worker_url,
+                                            .is_worker = true,
+                                            .key = settings_.key};
     member.socket.reset();
     member.socket = protocol::made_dealer(context_, settings);
     protocol::connect(*member.socket, settings);

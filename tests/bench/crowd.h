@@ -1,12 +1,12 @@
 #pragma once
 
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <exception>
 #include <memory>
+#include <optional>
 #include <string>
-#include <thread>
+
+#include "proto/keys/key_file.h"
 
 namespace oblique::bench {
 
@@ -15,6 +15,7 @@ struct CrowdSettings {
   std::size_t workers = 1;
   /// What a point takes each of them; 0: nothing, they answer at once.
   double point_s = 0.0;
+  std::optional<protocol::KeyFile> key = {};  ///< of all of them
 };
 
 /// What the workers together have seen so far.

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <exception>
 #include <functional>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -14,6 +15,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "proto/keys/key_file.h"
 #include "tests/bench/crowd.h"
 #include "tests/bench/process_usage.h"
 #include "tests/bench/scraper.h"
@@ -33,6 +35,7 @@ struct Flags {
   double seconds = 10.0;
   std::vector<double> point_ms{0.0};
   std::uint64_t most_results = 2'000'000;
+  std::string keys = "off";
   std::vector<int> scrape_ms{0};
 };
 
@@ -59,22 +62,48 @@ double seconds_since(Clock::time_point instant) {
   return std::chrono::duration<double>(Clock::now() - instant).count();
 }
 
-/// A study that no crowd comes to the end of.
-void submit(const test::TemporaryFolder& folder, const test::Server& server) {
-  const test::Outcome ran = test::run_oblique(
-      folder, {"submit", "--server", server.client_url(), "--H", "0.1:1.15:1000", "--mu",
-               "0.05:0.95:1000", "--e", "0.2:1.0:1000", "--name", "crowd"});
+void check(const test::Outcome& ran) {
   if (ran.exit_code != 0) {
     throw std::runtime_error(ran.err);
   }
 }
 
+/// Where a row's server has its files, and with which keys one speaks with it.
+struct Place {
+  explicit Place(bool with_keys) {
+    if (with_keys) {
+      check(test::run_oblique(folder, {"keygen", keys}));
+      environment["OBLIQUE_KEYS"] = keys + "/server.key";
+    }
+  }
+  std::optional<protocol::KeyFile> key(const std::string& role) const {
+    return environment.empty() ? std::nullopt
+                               : std::optional(protocol::read_key_file(keys + "/" + role + ".key"));
+  }
+
+  test::TemporaryFolder folder;
+  std::string keys = folder.file("keys");
+  test::Environment environment;
+};
+
+/// A study that no crowd comes to the end of.
+void submit(const Place& place, const test::Server& server) {
+  std::vector<std::string> words{
+      "submit",         "--server", server.client_url(), "--H",    "0.1:1.15:1000", "--mu",
+      "0.05:0.95:1000", "--e",      "0.2:1.0:1000",      "--name", "crowd"};
+  if (!place.environment.empty()) {
+    words.insert(words.end(), {"--keys", place.keys + "/client.key"});
+  }
+  check(test::run_oblique(place.folder, words));
+}
+
 /// One row: a fresh server and database, the crowd, then the study, all measured from its first
 /// result on.
-void bench(const Flags& flags, std::size_t workers, double point_ms, int scrape_ms) {
-  const test::TemporaryFolder folder;
-  const test::Database database(folder.file("bench.db"));
-  test::Server server(folder, folder.file("bench.db"));
+void bench(const Flags& flags, std::size_t workers, double point_ms, int scrape_ms,
+           bool with_keys) {
+  const Place place(with_keys);
+  const test::Database database(place.folder.file("bench.db"));
+  test::Server server(place.folder, place.folder.file("bench.db"), place.environment);
   const pid_t pid = server.process().pid();
   const Usage at_rest = usage_of(pid);
   CrowdCounts before;
@@ -87,16 +116,17 @@ void bench(const Flags& flags, std::size_t workers, double point_ms, int scrape_
   StatusProbe::Seen seen;
   std::uint64_t scrapes = 0;
   {
-    const Crowd crowd({server.worker_url(), workers, point_ms / 1e3});
+    const Crowd crowd({server.worker_url(), workers, point_ms / 1e3, place.key("worker")});
     wait_for("welcomes", [&] { return crowd.counts().welcomed >= workers; });
-    submit(folder, server);
+    submit(place, server);
     wait_for("results", [&] { return database.rows() > 0.0; });
     const double rows_before = database.rows();
     before = crowd.counts();
     began = usage_of(pid);
     crowd_cpu_s = -usage_of(getpid()).cpu_s;
     const auto start = Clock::now();
-    StatusProbe probe(server.client_url(), "crowd", std::chrono::milliseconds(100));
+    StatusProbe probe(server.client_url(), place.key("client"), "crowd",
+                      std::chrono::milliseconds(100));
     const Scraper scraper(server.http_url(), std::chrono::milliseconds(scrape_ms));
     while (seconds_since(start) < flags.seconds &&
            crowd.counts().results - before.results < flags.most_results) {
@@ -117,11 +147,12 @@ void bench(const Flags& flags, std::size_t workers, double point_ms, int scrape_
   const double loop_cpu_s = ended.first_thread_cpu_s - began.first_thread_cpu_s;
   const auto batches = static_cast<double>(after.batches - before.batches);
   std::printf(
-      "| %zu | %.4g | %.0f | %.0f | %.0f | %.0f %% | %.0f %% | %.0f %% | %.1f | %.1f | %.1f | %.1f "
+      "| %zu | %s | %.4g | %.0f | %.0f | %.0f | %.0f %% | %.0f %% | %.0f %% | %.1f | %.1f | %.1f | "
+      "%.1f "
       "| %zu "
       "| "
       "%.0f | %.0f | %.0f | %llu | %llu |\n",
-      workers, point_ms, rows / wall_s, batches / wall_s,
+      workers, with_keys ? "yes" : "no", point_ms, rows / wall_s, batches / wall_s,
       static_cast<double>(after.messages - before.messages) / wall_s, 100.0 * loop_cpu_s / wall_s,
       100.0 * (server_cpu_s - loop_cpu_s) / wall_s, 100.0 * crowd_cpu_s / wall_s,
       1e6 * server_cpu_s / rows, seen.quantile_ms(0.5), seen.quantile_ms(0.99),
@@ -137,16 +168,22 @@ void bench(const Flags& flags, std::size_t workers, double point_ms, int scrape_
 void run(const Flags& flags) {
   take_all_descriptors();
   std::printf(
-      "| workers | point [ms] | results/s | batches/s | their messages/s | CPU: loop | writer | "
+      "| workers | keys | point [ms] | results/s | batches/s | their messages/s | CPU: loop | "
+      "writer | "
       "crowd | us a "
       "result | status p50 [ms] | p99 | max | asked | server MB: at rest | peak | after | "
       "reconnects | scrapes |\n"
-      "|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|"
+      "|---:|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|--"
+      "-:|"
       "\n");
+  const std::vector<bool> keys =
+      flags.keys == "both" ? std::vector<bool>{false, true} : std::vector<bool>{flags.keys == "on"};
   for (const std::size_t workers : flags.workers) {
     for (const double point_ms : flags.point_ms) {
       for (const int scrape_ms : flags.scrape_ms) {
-        bench(flags, workers, point_ms, scrape_ms);
+        for (const bool with_keys : keys) {
+          bench(flags, workers, point_ms, scrape_ms, with_keys);
+        }
       }
     }
   }
@@ -171,6 +208,9 @@ int main(int argc, char** argv) {
   app.add_option("--scrape-ms", flags.scrape_ms,
                  "How often metrics are asked for, a row each; 0: never")
       ->delimiter(',')
+      ->capture_default_str();
+  app.add_option("--keys", flags.keys, "Whether all is encrypted: off, on, or a row of each")
+      ->check(CLI::IsMember({"off", "on", "both"}))
       ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   try {

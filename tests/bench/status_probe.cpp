@@ -26,9 +26,10 @@ double StatusProbe::Seen::quantile_ms(double share) const {
   return latencies_ms[static_cast<std::size_t>(std::max(rank, 1.0)) - 1];
 }
 
-StatusProbe::StatusProbe(std::string client_url, std::string study,
-                         std::chrono::milliseconds interval)
+StatusProbe::StatusProbe(std::string client_url, std::optional<protocol::KeyFile> key,
+                         std::string study, std::chrono::milliseconds interval)
     : client_url_(std::move(client_url)),
+      key_(std::move(key)),
       study_(std::move(study)),
       interval_(interval),
       thread_([this] { run(); }) {}
@@ -49,7 +50,8 @@ StatusProbe::Seen StatusProbe::stop() {
 
 void StatusProbe::run() {
   zmq::context_t context;
-  const protocol::DealerSettings settings{.url = client_url_, .example_url = client_url_};
+  const protocol::DealerSettings settings{
+      .url = client_url_, .example_url = client_url_, .key = key_};
   zmq::socket_t socket = protocol::made_dealer(context, settings);
   protocol::connect(socket, settings);
   protocol::ClientRequest request;

@@ -3,9 +3,12 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
+
+#include "proto/keys/key_file.h"
 
 namespace oblique::bench {
 
@@ -25,7 +28,8 @@ class StatusProbe {
   };
 
   /// Asks until it is stopped.
-  StatusProbe(std::string client_url, std::string study, std::chrono::milliseconds interval);
+  StatusProbe(std::string client_url, std::optional<protocol::KeyFile> key, std::string study,
+              std::chrono::milliseconds interval);
   ~StatusProbe();
   StatusProbe(const StatusProbe&) = delete;
   StatusProbe& operator=(const StatusProbe&) = delete;
@@ -37,6 +41,7 @@ class StatusProbe {
   void run();
 
   std::string client_url_;
+  std::optional<protocol::KeyFile> key_;
   std::string study_;
   std::chrono::milliseconds interval_;
   Seen seen_;  // of the thread until it has ended
