@@ -53,7 +53,7 @@ std::unique_ptr<Web> web_of(const LoopSettings& settings) {
     return std::make_unique<Web>(std::move(web));
   } catch (const std::runtime_error& error) {
     const std::string what =
-        std::string(error.what()) + "; --http names another address, or \"off\"";
+        std::string(error.what()) + " (--http names another address, or \"off\")";
     if (!settings.web->may_be_missing) {
       throw std::runtime_error(what);
     }
