@@ -15,8 +15,10 @@ namespace {
 class SlurmAutoscaleTest : public SlurmTest {
  protected:
   std::vector<std::string> autoscale(const std::vector<std::string>& more) const {
-    std::vector<std::string> arguments{"autoscale",           "slurm",    "--server",
-                                       server_->client_url(), "--script", OBLIQUE_WORKERS_SCRIPT};
+    std::vector<std::string> arguments{
+        "autoscale",     "slurm",          "--server", server_->client_url(),
+        "--keys",        key_of("reader"), "--script", OBLIQUE_WORKERS_SCRIPT,
+        "--sbatch-args", kTimeLimit};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return arguments;
   }

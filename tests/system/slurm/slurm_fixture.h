@@ -17,7 +17,7 @@
 
 namespace oblique::test {
 
-/// A server, and a Slurm to run its workers. Skipped where Slurm is not installed.
+/// A server with keys, and a Slurm to run its workers. Skipped where Slurm is not installed.
 class SlurmTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -25,7 +25,9 @@ class SlurmTest : public ::testing::Test {
       GTEST_SKIP() << "no Slurm here: " << objection;
     }
     cluster_.emplace(folder_);
-    server_.emplace(folder_, database_);
+    const auto made = run_oblique(folder_, {"keygen", folder_.file("keys")});
+    ASSERT_EQ(made.exit_code, 0) << made.err;
+    server_.emplace(folder_, database_, Environment{{"OBLIQUE_KEYS", key_of("server")}});
   }
 
   void TearDown() override {
@@ -40,9 +42,15 @@ class SlurmTest : public ::testing::Test {
     }
   }
 
+  /// The key file of a server, client, reader or worker.
+  std::string key_of(const std::string& role) const {
+    return folder_.file("keys/" + role + ".key");
+  }
+
   /// Variables of the batch script.
   Environment worker_environment() const {
     return {{"OBLIQUE_WORKER_SERVER", server_->worker_url()},
+            {"OBLIQUE_WORKER_KEYS", key_of("worker")},
             {"OBLIQUE_WORKER_PROGRAM", worker_program()}};
   }
 
@@ -51,7 +59,7 @@ class SlurmTest : public ::testing::Test {
                              const Environment& more = {}) const {
     Environment all = more;
     all.merge(worker_environment());
-    arguments.insert(arguments.begin(), "--parsable");
+    arguments.insert(arguments.begin(), {"--parsable", kTimeLimit});
     arguments.emplace_back(OBLIQUE_WORKERS_SCRIPT);
     return cluster_->run("sbatch", arguments, all);
   }
@@ -72,9 +80,9 @@ class SlurmTest : public ::testing::Test {
   void submit_study() {
     const std::string side = std::to_string(kSide);
     const auto submitted =
-        run_oblique(folder_, {"submit", "--server", server_->client_url(), "--H", "1", "--mu",
-                              "0.1:2.0:" + side, "--e", "0.5:1.0:" + side, "--name",
-                              "study" + std::to_string(++studies_)});
+        run_oblique(folder_, {"submit", "--server", server_->client_url(), "--keys",
+                              key_of("client"), "--H", "1", "--mu", "0.1:2.0:" + side, "--e",
+                              "0.5:1.0:" + side, "--name", "study" + std::to_string(++studies_)});
     ASSERT_EQ(submitted.exit_code, 0) << submitted.err;
   }
 
@@ -109,6 +117,9 @@ class SlurmTest : public ::testing::Test {
   static constexpr int kSide = 110;
 #endif
   static constexpr double kPoints = kSide * kSide;
+
+  /// Of jobs: those of a test that was killed end by themselves.
+  static constexpr const char* kTimeLimit = "--time=5";
 
   TemporaryFolder folder_;
   std::string database_{folder_.file("study.db")};
