@@ -33,7 +33,8 @@ Reach reach_of(const std::string& address) {
   if (inet_pton(AF_INET, address.c_str(), &v4) == 1) {
     return (ntohl(v4.s_addr) >> 24U) == 127 ? Reach::kThisMachine : Reach::kNetwork;
   }
-  if (inet_pton(AF_INET6, address.c_str(), &v6) == 1) {
+  // A link-local one may name its interface, as fe80::1%eth0.
+  if (inet_pton(AF_INET6, address.substr(0, address.find('%')).c_str(), &v6) == 1) {
     return IN6_IS_ADDR_LOOPBACK(&v6) ? Reach::kThisMachine : Reach::kNetwork;
   }
   return Reach::kNone;

@@ -25,7 +25,8 @@ TEST(DoorsTest, WithoutKeysOnlyLoopbackIsListenedOn) {
   EXPECT_EQ(address_to_bind({.listen = "localhost"}), "127.0.0.1");
   EXPECT_EQ(address_to_bind({.listen = "127.3.2.1"}), "127.3.2.1");
   EXPECT_EQ(address_to_bind({.listen = "::1"}), "::1");
-  for (const char* address : {"0.0.0.0", "*", "192.168.0.1", "::", "128.0.0.1", "fe80::1"}) {
+  for (const char* address :
+       {"0.0.0.0", "*", "192.168.0.1", "::", "128.0.0.1", "fe80::1", "fe80::1%eth0"}) {
     EXPECT_THAT(objection_to_doors({.listen = address}),
                 AllOf(HasSubstr("--listen " + std::string(address)), HasSubstr("oblique keygen"),
                       HasSubstr("--insecure")));
@@ -38,6 +39,7 @@ TEST(DoorsTest, WithKeysOrInsecurelyAnyAddressIsListenedOn) {
     EXPECT_EQ(address_to_bind(door), "0.0.0.0");
   }
   EXPECT_EQ(address_to_bind({"2001:db8::1", "server.key", false}), "2001:db8::1");
+  EXPECT_EQ(address_to_bind({"fe80::1%eth0", "server.key", false}), "fe80::1%eth0");
   EXPECT_THAT(address_to_bind({"*", "", true}), AnyOf("::", "0.0.0.0"));
 }
 
