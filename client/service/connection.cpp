@@ -6,6 +6,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/address.h"
 #include "proto/frames.h"
 #include "proto/socket/socket.h"
 #include "worker/solver/model/errors.h"
@@ -32,6 +33,15 @@ protocol::DealerSettings dealer_settings(const ConnectionSettings& settings) {
           .longest_pause_ms = 1000,
           .queues_unconnected = false,
           .key = settings.key};
+}
+
+/// Why nobody may have answered, and what to do about it.
+std::string guess_at_silence(const std::string& url) {
+  const std::string host = protocol::host_of(url);
+  const auto [has_v4, has_v6] = protocol::families_of(host);
+  return host.empty() || has_v4 || has_v6
+             ? "is a server running there? Start one with `oblique-server`"
+             : fmt::format("no address is known here for the name {}. Check it", host);
 }
 
 /// Where the page begins that follows the one after `asked`; 0: there is none. A page that does not
@@ -165,10 +175,10 @@ protocol::ClientReply Connection::answer_to(const protocol::ClientRequest& reque
         seconds_of(timeout), settings_.server_url,
         *outstanding.runs ? "works on it" : "is busy with the queries of others"));
   }
-  throw ConnectionError(
-      fmt::format("no answer from {} within {}: is a server running there? Start one with "
-                  "`oblique-server`, or say where it is with --server URL or OBLIQUE_SERVER",
-                  settings_.server_url, seconds_of(timeout)));
+  throw ConnectionError(fmt::format(
+      "no answer from {} within {}: {}, or say where it is with --server URL or "
+      "OBLIQUE_SERVER",
+      settings_.server_url, seconds_of(timeout), guess_at_silence(settings_.server_url)));
 }
 
 protocol::ClientReply Connection::call(protocol::ClientRequest request, const Tell& tell) {

@@ -39,6 +39,14 @@ TEST_F(ChangedAddresses, TheServersMachineGetsAnotherAddressUnderItsName) {
   });
 }
 
+TEST_F(ChangedAddresses, ANameThatHasNoneIsSaidToHaveNone) {
+  server_name_ = "nowhere";
+  const Outcome asked = client({"status", "--timeout", "0.2"})->outcome();
+  EXPECT_EQ(asked.exit_code, 1);
+  EXPECT_NE(asked.err.find("no address is known here for the name nowhere"), std::string::npos)
+      << asked.err;
+}
+
 using IPv6 = StudyOnLan;
 
 TEST_F(IPv6, CarriesAStudyFromEndToEnd) {
@@ -47,7 +55,9 @@ TEST_F(IPv6, CarriesAStudyFromEndToEnd) {
 }
 
 TEST_F(IPv6, CarriesAStudyOverLinkLocalAddresses) {
-  server_name_ = "[" + server_host_->link_local() + "%eth0]";
+  const std::string address = server_host_->link_local() + "%eth0";
+  server_name_ = "[" + address + "]";
+  start_server(address);
   goes_on_after([] {});
 }
 
