@@ -157,6 +157,21 @@ class Loop::Parts final : public Outbox {
   bool query(QueryJob job) override { return queries_.submit(std::move(job)); }
   void cancel_query(std::uint64_t ticket) override { queries_.cancel(ticket); }
   void read(ReadJob job) override { reader_.submit(std::move(job)); }
+  PeerCounts peer_counts() const override {
+    PeerCounts counts;
+    for (const auto& [key, share] : network_.key_shares().all()) {
+      auto& of_key = counts.keys[share.holder->name];
+      of_key = {share.holder->role, of_key.connections + share.connections};
+    }
+    const RefusalCounts& refusals = network_.refusals();
+    for (std::size_t cause = 0; cause < refusals.size(); ++cause) {
+      if (refusals.at(cause).count > 0) {
+        counts.refusals.emplace_back(name_of(static_cast<RefusalCause>(cause)),
+                                     refusals.at(cause).count);
+      }
+    }
+    return counts;
+  }
   void note(Severity severity, const std::string& text) override {
     constexpr std::array kLevels{spdlog::level::info, spdlog::level::warn, spdlog::level::err};
     spdlog::log(kLevels.at(static_cast<std::size_t>(severity)), "{}", text);
@@ -198,7 +213,7 @@ class Loop::Parts final : public Outbox {
         workers_, worker_traffic_,
         [this](const std::string& worker) { return service_->has_room_for(worker); },
         [this](const Incoming& incoming) {
-          service_->worker_frame(incoming.identity, frame_of(incoming), now());
+          service_->worker_frame(incoming.identity, frame_of(incoming), now(), incoming.holder);
         });
   }
 
@@ -208,7 +223,7 @@ class Loop::Parts final : public Outbox {
         clients_, client_traffic_,
         [this](const std::string& client) { return !network_.is_busy(client); },
         [this](const Incoming& incoming) {
-          service_->client_frame(incoming.identity, frame_of(incoming), now());
+          service_->client_frame(incoming.identity, frame_of(incoming), now(), incoming.holder);
         });
   }
 

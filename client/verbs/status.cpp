@@ -1,6 +1,7 @@
 #include <iostream>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "client/output/printer.h"
 #include "client/service/source_flags.h"
@@ -24,20 +25,25 @@ struct StatusFlags {
   SourceFlags source;
 };
 
-void add_column(protocol::QueryReply& table, const std::string& name, const std::string& value) {
-  table.add_columns(name);
-  for (auto& row : *table.mutable_rows()) {
-    add_value(row, value);
+/// What only programs ask for: who submitted each study, and who may come to the server.
+void add_details(protocol::QueryReply& table, const std::vector<protocol::StudyStatus>& studies,
+                 const std::string& access) {
+  table.add_columns("submitted_by");
+  table.add_columns("access");
+  for (int i = 0; i < table.rows_size(); ++i) {
+    add_value(*table.mutable_rows(i), studies.at(static_cast<std::size_t>(i)).submitted_by());
+    add_value(*table.mutable_rows(i), access);
   }
 }
 
 int status(const StatusFlags& flags) {
   const auto format = format_named(flags.format);
   const auto source = open_source(flags.source);
-  auto table = table_of(source->status(flags.study));
+  const auto studies = source->status(flags.study);
+  auto table = table_of(studies);
   tell_if_insecure(source->access(), source->place());
   if (!is_for_people(format)) {
-    add_column(table, "access", source->access());
+    add_details(table, studies, source->access());
   }
   print_out(table, format);
   return kDone;

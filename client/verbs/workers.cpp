@@ -26,10 +26,31 @@ struct WorkersFlags {
   SourceFlags source;
 };
 
+/// What the holders of keys have, and who was turned away.
+void tell_keys(const protocol::WorkersReply& reply) {
+  for (const auto& key : reply.keys()) {
+    if (!key.name().empty()) {
+      tell_line(fmt::format(
+          "key {}{}: {} connections, {} studies with {} points open, {} requests refused",
+          key.name(), key.role().empty() ? "" : fmt::format(" ({})", key.role()), key.connections(),
+          key.open_studies(), key.open_points(), key.refused()));
+    }
+  }
+  std::string refusals;
+  for (const auto& of_cause : reply.refusals()) {
+    refusals +=
+        fmt::format("{} {} ({})", refusals.empty() ? "" : ",", of_cause.reason(), of_cause.peers());
+  }
+  if (!refusals.empty()) {
+    tell_line("turned away since the server began:" + refusals);
+  }
+}
+
 protocol::QueryReply workers_of_server(const ConnectionSettings& settings) {
   protocol::QueryReply table;
-  for (const char* column : {"worker", "name", "threads", "instruction_set", "solver_version",
-                             "leased_points", "solved_points", "silent_ms", "losses", "standing"}) {
+  for (const char* column :
+       {"worker", "name", "threads", "instruction_set", "solver_version", "leased_points",
+        "solved_points", "silent_ms", "losses", "standing", "key"}) {
     table.add_columns(column);
   }
   const auto reply = Connection(settings).workers();
@@ -48,12 +69,14 @@ protocol::QueryReply workers_of_server(const ConnectionSettings& settings) {
     add_value(row, std::string(worker.set_aside() ? "set aside"
                                : worker.proven()  ? "proven"
                                                   : "new"));
+    add_value(row, worker.key());
   }
   if (reply.bad_frames() > 0) {
     std::cerr << fmt::format(
         "{} frames came that no sound worker or client sends; the server's log says from whom\n",
         reply.bad_frames());
   }
+  tell_keys(reply);
   return table;
 }
 

@@ -19,6 +19,7 @@ constexpr std::int64_t kMost = 1'000'000;                       ///< of things t
 constexpr std::int64_t kMostBytes = std::int64_t{1} << 40U;     ///< 1 TiB
 constexpr std::int64_t kOneMessage = protocol::kMaxFrameBytes;  ///< bytes of the longest
 constexpr std::int64_t kHour_ms = 3'600'000;
+constexpr std::int64_t kMostPoints = std::int64_t{1} << 60U;
 
 /// A check for whole numbers from `least` to `largest`.
 CLI::Validator whole_number(std::int64_t least, std::int64_t largest) {
@@ -120,6 +121,11 @@ void add_limits(CLI::App& app, NetworkLimits& network, ServiceSettings& service,
       "Queries of one client that wait");
   add("waiting-query-bytes", queries.most_waiting_bytes, 1, kMostBytes,
       "Statements of queries that wait");
+  // Studies. The bounds of a key are of what was submitted with it.
+  add("open-studies", service.bounds.studies, 1, kMostBytes, "Studies neither done nor cancelled");
+  add("open-points", service.bounds.points, 1, kMostPoints, "Points of these that are not settled");
+  add("open-studies-of-key", service.bounds.studies_of_key, 1, kMostBytes, "Open studies of a key");
+  add("open-points-of-key", service.bounds.points_of_key, 1, kMostPoints, "Open points of a key");
   // Workers.
   add("credit", service.scheduler.max_credit, 1, 65'536, "Batches that a worker may ask for");
 }

@@ -144,15 +144,18 @@ protocol::QueryReply Reader::run(const std::string& sql, const QueryLimits& limi
 std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name) {
   Statement schema(database_.get(), "PRAGMA user_version");
   constexpr int kFirstWithShares = 2;
-  const bool has_shares = schema.step() && schema.integer(0) >= kFirstWithShares;
+  constexpr int kFirstWithSubmitters = 6;
+  const std::int64_t version = schema.step() ? schema.integer(0) : 0;
   // Counts come from the indices of `results`: its rows are not touched.
-  Statement list(database_.get(),
-                 "SELECT s.study_id, s.name, s.state, s.points, s.created_at,"
-                 " (SELECT count(*) FROM results AS r WHERE r.study_id = s.study_id),"
-                 " (SELECT count(*) FROM results AS r WHERE r.study_id = s.study_id"
-                 " AND r.status = 'failed')" +
-                     std::string(has_shares ? ", s.priority, s.weight" : ", 0, 1.0") +
-                     " FROM studies AS s WHERE ?1 = '' OR s.name = ?1 ORDER BY s.study_id");
+  Statement list(
+      database_.get(),
+      "SELECT s.study_id, s.name, s.state, s.points, s.created_at,"
+      " (SELECT count(*) FROM results AS r WHERE r.study_id = s.study_id),"
+      " (SELECT count(*) FROM results AS r WHERE r.study_id = s.study_id"
+      " AND r.status = 'failed')" +
+          std::string(version >= kFirstWithShares ? ", s.priority, s.weight" : ", 0, 1.0") +
+          (version >= kFirstWithSubmitters ? ", coalesce(s.submitted_by, '')" : ", ''") +
+          " FROM studies AS s WHERE ?1 = '' OR s.name = ?1 ORDER BY s.study_id");
   list.bind(1, name);
   std::vector<protocol::StudyStatus> found;
   while (list.step()) {
@@ -168,6 +171,7 @@ std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name)
     status.set_solved(static_cast<std::uint64_t>(settled) - status.failed());
     status.set_priority(static_cast<std::int32_t>(list.integer(7)));
     status.set_weight(list.real(8));
+    status.set_submitted_by(list.text(9));
     found.push_back(std::move(status));
   }
   if (found.empty() && !name.empty()) {

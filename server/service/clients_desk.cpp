@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include <spdlog/fmt/fmt.h>
+
 #include "proto/frame_scan.h"
 #include "proto/frames.h"
 
@@ -24,18 +26,18 @@ ClientsDesk::ClientsDesk(const ClientsDeskSettings& settings, const Neighbours& 
       at_(neighbours),
       queries_(at_.clients, at_.readers, settings.still_working_every_ms) {}
 
-void ClientsDesk::take(const std::string& identity, std::string_view frame, Instant now) {
+void ClientsDesk::take(const std::string& identity, std::string_view frame, Instant now,
+                       const std::shared_ptr<const KeyHolder>& holder) {
   if (frame.size() > settings_.longest_inline_bytes) {
-    read_elsewhere(identity, frame);
+    read_elsewhere({identity, protocol::request_id_of(frame), holder}, frame);
     return;
   }
   const ReadRequest read = read_request(frame);
-  answer({identity, read.request_id}, read, now);
+  answer({identity, read.request_id, holder}, read, now);
 }
 
 /// Of one client few wait, so that the others find room.
-void ClientsDesk::read_elsewhere(const std::string& identity, std::string_view frame) {
-  const Client client{identity, protocol::request_id_of(frame)};
+void ClientsDesk::read_elsewhere(const Client& client, std::string_view frame) {
   std::size_t bytes = frame.size();
   std::size_t of_client = 0;
   for (const auto& [ticket, request] : long_requests_) {
@@ -43,7 +45,7 @@ void ClientsDesk::read_elsewhere(const std::string& identity, std::string_view f
       return;  // it is sent again because the answer takes long; it waits already
     }
     bytes += request.bytes;
-    of_client += request.client.identity == identity ? 1U : 0U;
+    of_client += request.client.identity == client.identity ? 1U : 0U;
   }
   if (stopping_) {
     at_.clients.reply_error(client, "the server is stopping: ask again when it is back");
@@ -63,9 +65,10 @@ void ClientsDesk::request_read(const ReadReport& report, Instant now) {
   if (found == long_requests_.end()) {
     return;
   }
-  const std::string identity = found->second.client.identity;
+  Client client = std::move(found->second.client);
   long_requests_.erase(found);
-  answer({identity, report.read.request_id}, report.read, now);
+  client.request_id = report.read.request_id;
+  answer(client, report.read, now);
 }
 
 /// Why the request is not answered, for a reason that does not lie in what is asked, or an empty
@@ -99,6 +102,9 @@ void ClientsDesk::answer(const Client& client, const ReadRequest& read, Instant 
     return;
   }
   const protocol::ClientRequest& request = read.request;
+  if (!may_ask(client, request)) {
+    return;
+  }
   using Kind = protocol::ClientRequest;
   switch (request.kind_case()) {
     case Kind::kSubmit:
@@ -121,6 +127,19 @@ void ClientsDesk::answer(const Client& client, const ReadRequest& read, Instant 
       at_.clients.reply_error(client, "the server does not know this kind of request");
       break;
   }
+}
+
+/// Whether the role of the client's key allows the request; else it is told.
+bool ClientsDesk::may_ask(const Client& client, const protocol::ClientRequest& request) {
+  if (!client.is_reader() || !(request.has_submit() || request.has_change())) {
+    return true;
+  }
+  at_.open.count_refusal(client.key());
+  at_.clients.reply_error(
+      client, fmt::format("the key \"{}\" is a reader's: it may look at studies, workers and "
+                          "results, and change nothing",
+                          client.key()));
+  return false;
 }
 
 void ClientsDesk::submit(const Client& client, const ReadRequest& read, Instant now) {
@@ -169,6 +188,9 @@ void ClientsDesk::workers(const Client& client, const protocol::WorkersRequest& 
   auto& fields = *reply.mutable_workers();
   fields.set_bad_frames(at_.bad_frames.total());
   fields.set_access(settings_.access);
+  if (request.after_worker_id() == 0) {
+    add_keys(fields);
+  }
   const std::size_t most = page_size(request.limit(), settings_.largest_page);
   for (auto id = at_.workers.next_after(request.after_worker_id()); id;
        id = at_.workers.next_after(*id)) {
@@ -180,6 +202,30 @@ void ClientsDesk::workers(const Client& client, const protocol::WorkersRequest& 
         to_message(view_of(*id, *at_.workers.find(*id), at_.sources.scheduler, now));
   }
   at_.clients.to_client(client.identity, reply);
+}
+
+/// Who was turned away, and what the holders of keys have.
+void ClientsDesk::add_keys(protocol::WorkersReply& reply) const {
+  const PeerCounts peers = at_.network.peer_counts();
+  for (const auto& [reason, count] : peers.refusals) {
+    auto& refusals = *reply.add_refusals();
+    refusals.set_reason(reason);
+    refusals.set_peers(count);
+  }
+  std::map<std::string, protocol::KeyStatus> keys;
+  for (const auto& [name, connected] : peers.keys) {
+    keys[name].set_role(std::string(protocol::name_of(connected.role)));
+    keys[name].set_connections(connected.connections);
+  }
+  for (const auto& [name, share] : at_.open.shares()) {
+    keys[name].set_open_studies(share.studies);
+    keys[name].set_open_points(share.points);
+    keys[name].set_refused(share.refused);
+  }
+  for (auto& [name, key] : keys) {
+    key.set_name(name);
+    *reply.add_keys() = std::move(key);
+  }
 }
 
 void ClientsDesk::stop() {

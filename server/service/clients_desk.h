@@ -44,11 +44,15 @@ class ClientsDesk {
     StudyChanges& changes;
     const WorkersDesk& workers;
     StudySources sources;
+    OpenStudies& open;
+    const ToNetwork& network;
   };
 
   ClientsDesk(const ClientsDeskSettings& settings, const Neighbours& neighbours);
 
-  void take(const std::string& identity, std::string_view frame, Instant now);
+  /// `holder`: of the client's key; null without keys.
+  void take(const std::string& identity, std::string_view frame, Instant now,
+            const std::shared_ptr<const KeyHolder>& holder);
   /// A long request was read.
   void request_read(const ReadReport& report, Instant now);
   void queried(QueryReport report) { queries_.report(std::move(report)); }
@@ -67,12 +71,14 @@ class ClientsDesk {
     std::size_t bytes;
   };
 
-  void read_elsewhere(const std::string& identity, std::string_view frame);
+  void read_elsewhere(const Client& client, std::string_view frame);
+  bool may_ask(const Client& client, const protocol::ClientRequest& request);
   std::string objection_to(const ReadRequest& read);
   void answer(const Client& client, const ReadRequest& read, Instant now);
   void submit(const Client& client, const ReadRequest& read, Instant now);
   void status(const Client& client, const protocol::StatusRequest& request, Instant now);
   void workers(const Client& client, const protocol::WorkersRequest& request, Instant now);
+  void add_keys(protocol::WorkersReply& reply) const;
 
   ClientsDeskSettings settings_;
   Neighbours at_;

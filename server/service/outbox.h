@@ -1,9 +1,14 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
+#include <memory>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "proto/oblique.pb.h"
+#include "server/network/curve/doorkeeper.h"
 #include "server/network/delivery.h"
 #include "server/queries/query_turns.h"
 #include "server/service/request_reader.h"
@@ -26,6 +31,11 @@ std::string iso_8601(Instant now);
 struct Client {
   std::string identity;
   std::uint64_t request_id;
+  std::shared_ptr<const KeyHolder> holder = {};  ///< null: there are no keys
+
+  /// Name of its key; empty: without keys.
+  std::string key() const { return holder == nullptr ? std::string() : holder->name; }
+  bool is_reader() const { return holder != nullptr && holder->role == protocol::Role::kReader; }
 
   bool operator==(const Client&) const = default;
 };
@@ -51,6 +61,24 @@ class ToClients {
 
   /// The client's request failed, for this reason.
   void reply_error(const Client& client, const std::string& message);
+};
+
+/// Connections of one key.
+struct KeyConnections {
+  protocol::Role role;
+  std::uint64_t connections = 0;
+};
+
+/// Who is connected and who was turned away.
+struct PeerCounts {
+  std::map<std::string, KeyConnections> keys;                     ///< by name
+  std::vector<std::pair<std::string, std::uint64_t>> refusals{};  ///< causes with how many peers
+};
+
+class ToNetwork {
+ public:
+  virtual ~ToNetwork() = default;
+  virtual PeerCounts peer_counts() const { return {}; }
 };
 
 class ToWriter {
@@ -84,6 +112,7 @@ class Outbox : public ToWorkers,
                public ToClients,
                public ToWriter,
                public ToReaders,
+               public ToNetwork,
                public ToLog {};
 
 }  // namespace oblique::server

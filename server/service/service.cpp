@@ -18,27 +18,33 @@ Service::Service(const ServiceSettings& settings, Outbox& outbox, std::vector<St
                 settings.solver_version, settings.database_id, settings.last_worker_id,
                 settings.clients.access == "insecure"},
                outbox, outbox, bad_frames_, ledger_),
+      open_(settings.bounds),
       changes_(settings.last_study_id, states_, ledger_, {scheduler_, states_, ledger_, rates_},
-               outbox, outbox),
+               open_, outbox, outbox),
       clients_(settings.clients, {outbox,
                                   outbox,
                                   bad_frames_,
                                   changes_,
                                   workers_,
-                                  {scheduler_, states_, ledger_, rates_}}) {
+                                  {scheduler_, states_, ledger_, rates_},
+                                  open_,
+                                  outbox}) {
   for (StoredStudy& study : studies) {
     states_.restore(study, now.steady_ms);
     feed(StudyAdded{study.study_id, study.table, std::move(study.settled), study.failures.size(),
                     study.state == StudyState::kCancelled, study.state == StudyState::kPaused,
                     study.terms, study.solver_version, std::move(study.attempts)},
          now);
+    changes_.recount(study.study_id);
   }
 }
 
 // ---- Messages, time ---------------------------------------------------------------------------
 
-void Service::worker_frame(const std::string& identity, std::string_view frame, Instant now) {
-  Heard heard = workers_.take(identity, frame, now);
+void Service::worker_frame(const std::string& identity, std::string_view frame, Instant now,
+                           const std::shared_ptr<const KeyHolder>& holder) {
+  Heard heard =
+      workers_.take(identity, frame, now, holder == nullptr ? std::string() : holder->name);
   for (const Event& event : heard.events) {
     handle(event, {now, &heard.results});
   }
@@ -46,8 +52,9 @@ void Service::worker_frame(const std::string& identity, std::string_view frame, 
   hand_out_or_hold(now);
 }
 
-void Service::client_frame(const std::string& identity, std::string_view frame, Instant now) {
-  clients_.take(identity, frame, now);
+void Service::client_frame(const std::string& identity, std::string_view frame, Instant now,
+                           const std::shared_ptr<const KeyHolder>& holder) {
+  clients_.take(identity, frame, now, holder);
 }
 
 void Service::tick(Instant now) {
@@ -177,6 +184,7 @@ void Service::perform(const StoreFailure& effect, Turn turn) {
 
 void Service::perform(const StudyFinished& effect, Turn turn) {
   if (states_.finish(effect.study)) {
+    open_.close(effect.study);
     outbox_.note(Severity::kInfo,
                  fmt::format("study {} is done", states_.record(effect.study).name));
     ledger_.write(SetStudyState{effect.study, StudyState::kDone, iso_8601(turn.now)}, QuietWrite{});
@@ -241,6 +249,9 @@ void Service::stored(const ResultsWrite& write, Instant now) {
     rates_.note(id, settled_of(id), states_.record(id).since_ms, now.steady_ms);
   }
   feed(write.event, now);
+  if (!write.event.outcomes.empty()) {
+    open_.set_points(id, scheduler_.study(id).points - settled_of(id));
+  }
 }
 
 void Service::stored(const StudyWrite& write, Instant now) {

@@ -9,9 +9,9 @@
 #include "proto/oblique.pb.h"
 #include "server/scheduler/scheduler.h"
 #include "server/service/clients_desk.h"
+#include "server/service/counts/settled_rates.h"
 #include "server/service/log_limits.h"
 #include "server/service/outbox.h"
-#include "server/service/settled_rates.h"
 #include "server/service/study_changes.h"
 #include "server/service/study_states.h"
 #include "server/service/workers_desk.h"
@@ -24,6 +24,7 @@ struct ServiceSettings {
   SchedulerSettings scheduler;
   LedgerLimits ledger;
   ClientsDeskSettings clients;
+  StudyBounds bounds;
   std::uint32_t heartbeat_interval_ms = 900;
   std::string solver_version;  ///< workers with another one are told so
   std::string database_id;
@@ -48,8 +49,11 @@ class Service {
   Service(const Service&) = delete;
   Service& operator=(const Service&) = delete;
 
-  void worker_frame(const std::string& identity, std::string_view frame, Instant now);
-  void client_frame(const std::string& identity, std::string_view frame, Instant now);
+  /// `holder`: of the peer's key; null without keys.
+  void worker_frame(const std::string& identity, std::string_view frame, Instant now,
+                    const std::shared_ptr<const KeyHolder>& holder = nullptr);
+  void client_frame(const std::string& identity, std::string_view frame, Instant now,
+                    const std::shared_ptr<const KeyHolder>& holder = nullptr);
   void written(const WriteReport& report, Instant now);
   void queried(QueryReport report) { clients_.queried(std::move(report)); }
   void request_read(const ReadReport& report, Instant now) { clients_.request_read(report, now); }
@@ -125,6 +129,7 @@ class Service {
   SettledRates rates_;
   BadFrames bad_frames_;
   WorkersDesk workers_;
+  OpenStudies open_;
   StudyChanges changes_;
   ClientsDesk clients_;
   StoredPoints stored_points_;

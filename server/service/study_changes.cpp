@@ -80,12 +80,42 @@ void StudyChanges::submit(const Client& client, const ReadRequest& read, Instant
 
 void StudyChanges::add(const Client& client, const ReadRequest& read, const StudyTerms& terms,
                        Instant now) {
+  if (!may_open(client, last_study_id_ + 1, client.key(), read.table.size())) {
+    return;
+  }
   const StudyId id = ++last_study_id_;
   const std::string& name = read.request.submit().name();
   const std::string created_at = iso_8601(now);
-  states_.add(id, {name, read.table, created_at, terms, {}, {}, now.steady_ms});
+  states_.add(id, {name, read.table, created_at, terms, {}, {}, now.steady_ms, client.key()});
+  recount(id);
   submitters_[id].push_back(client);
-  ledger_.write(AddStudy{id, name, read.table, created_at, terms}, StudyWrite{id});
+  ledger_.write(AddStudy{id, name, read.table, created_at, terms, client.key()}, StudyWrite{id});
+}
+
+/// Whether the study may have so many further points open; else the client is told why not.
+bool StudyChanges::may_open(const Client& client, StudyId id, const std::string& key,
+                            std::uint64_t points) {
+  const std::string objection = open_.objection_to(id, key, points);
+  if (objection.empty()) {
+    return true;
+  }
+  open_.count_refusal(client.key());
+  clients_.reply_error(client, objection);
+  return false;
+}
+
+/// The same of a study that is to get another state.
+bool StudyChanges::may_reopen(const Client& client, StudyId id, StudyState wanted) {
+  return wanted != StudyState::kRunning || states_.is_open(id) ||
+         may_open(client, id, states_.record(id).submitted_by, open_points_of(id, sources_));
+}
+
+void StudyChanges::recount(StudyId id) {
+  if (states_.contains(id) && states_.is_open(id)) {
+    open_.set(id, states_.record(id).submitted_by, open_points_of(id, sources_));
+  } else {
+    open_.close(id);
+  }
 }
 
 /// Submitted again.
@@ -93,7 +123,9 @@ void StudyChanges::go_on(const Client& client, StudyId id, Instant now) {
   if (!states_.is_durable(id)) {
     submitters_[id].push_back(client);
   } else if (states_.needs_write(id, StudyState::kRunning)) {
-    set_state(client, id, StudyState::kRunning, true, now);
+    if (may_reopen(client, id, StudyState::kRunning)) {
+      set_state(client, id, StudyState::kRunning, true, now);
+    }
   } else {
     reply_submitted(client, id, false, now);
   }
@@ -127,7 +159,9 @@ void StudyChanges::change(const Client& client, const protocol::ChangeRequest& r
       return;
   }
   if (states_.needs_write(*known, wanted)) {
-    set_state(client, *known, wanted, false, now);
+    if (may_reopen(client, *known, wanted)) {
+      set_state(client, *known, wanted, false, now);
+    }
   } else {
     reply_changed(client, *known, 0, now);
   }
@@ -136,6 +170,7 @@ void StudyChanges::change(const Client& client, const protocol::ChangeRequest& r
 void StudyChanges::set_state(const Client& client, StudyId id, StudyState state, bool submitted,
                              Instant now) {
   states_.change(id, state);
+  recount(id);
   ledger_.write(SetStudyState{id, state, iso_8601(now)}, StateWrite{id, state, client, submitted});
 }
 
@@ -150,6 +185,10 @@ void StudyChanges::retry(const Client& client, StudyId id, Instant now) {
   } catch (const std::runtime_error& error) {
     clients_.reply_error(client,
                          fmt::format("the recipe of the study cannot be read: {}", error.what()));
+    return;
+  }
+  const bool stays_closed = states_.state(id) == StudyState::kCancelled;
+  if (!stays_closed && !may_open(client, id, study.submitted_by, study.failures.size())) {
     return;
   }
   ledger_.write(ForgetFailures{id, study.failures, iso_8601(now)},
@@ -190,6 +229,7 @@ Event StudyChanges::stored(const FailuresWrite& write, Instant now) {
 }
 
 void StudyChanges::answer(const StudyWrite& write, Instant now) {
+  recount(write.study);
   const auto waiting = submitters_.extract(write.study);
   bool created = true;
   for (const Client& client : waiting.mapped()) {
@@ -198,6 +238,7 @@ void StudyChanges::answer(const StudyWrite& write, Instant now) {
 }
 
 void StudyChanges::answer(const StateWrite& write, Instant now) {
+  recount(write.study);
   if (write.submitted) {
     reply_submitted(write.client, write.study, false, now);
   } else {
@@ -210,11 +251,13 @@ void StudyChanges::answer(const TermsWrite& write, Instant now) {
 }
 
 void StudyChanges::answer(const FailuresWrite& write, Instant now) {
+  recount(write.study);
   reply_changed(write.client, write.study, write.points.size(), now);
 }
 
 void StudyChanges::refused(const StudyWrite& write, const std::string& error) {
   states_.remove(write.study);
+  recount(write.study);
   const auto waiting = submitters_.extract(write.study);
   for (const Client& client : waiting.mapped()) {
     clients_.reply_error(client, "the study was not stored: " + error);
@@ -223,6 +266,7 @@ void StudyChanges::refused(const StudyWrite& write, const std::string& error) {
 
 void StudyChanges::refused(const StateWrite& write, const std::string& error) {
   states_.refused(write.study);
+  recount(write.study);
   reply_unchanged(write.client, error);
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "server/scheduler/scheduler_events.h"
+#include "server/service/counts/open_studies.h"
 #include "server/service/outbox.h"
 #include "server/service/views.h"
 
@@ -18,11 +19,12 @@ class StudyChanges {
  public:
   /// `last_study_id` is the last one of the database. All of these must outlive this.
   StudyChanges(std::uint64_t last_study_id, StudyStates& states, WriteLedger& ledger,
-               StudySources sources, ToClients& clients, ToLog& log)
+               StudySources sources, OpenStudies& open, ToClients& clients, ToLog& log)
       : last_study_id_(last_study_id),
         states_(states),
         ledger_(ledger),
         sources_(sources),
+        open_(open),
         clients_(clients),
         log_(log) {}
 
@@ -30,6 +32,9 @@ class StudyChanges {
   void submit(const Client& client, const ReadRequest& read, Instant now);
   /// Pause, resume, cancel, retry.
   void change(const Client& client, const protocol::ChangeRequest& request, Instant now);
+
+  /// Tells what is open how it is with the study, whose state or points may be others than before.
+  void recount(StudyId id);
 
   Event stored(const StudyWrite& write, Instant now);
   Event stored(const StateWrite& write, Instant now);
@@ -50,6 +55,8 @@ class StudyChanges {
 
  private:
   void add(const Client& client, const ReadRequest& read, const StudyTerms& terms, Instant now);
+  bool may_open(const Client& client, StudyId id, const std::string& key, std::uint64_t points);
+  bool may_reopen(const Client& client, StudyId id, StudyState wanted);
   void go_on(const Client& client, StudyId id, Instant now);
   void set_state(const Client& client, StudyId id, StudyState state, bool submitted, Instant now);
   void retry(const Client& client, StudyId id, Instant now);
@@ -62,6 +69,7 @@ class StudyChanges {
   StudyStates& states_;
   WriteLedger& ledger_;
   StudySources sources_;
+  OpenStudies& open_;
   ToClients& clients_;
   ToLog& log_;
   std::map<StudyId, std::vector<Client>> submitters_;  // wait for the study to be durable

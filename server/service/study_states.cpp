@@ -34,7 +34,7 @@ void StudyStates::restore(const StoredStudy& stored, std::int64_t now_ms) {
   const StudyState state =
       stored.state == StudyState::kDone && lacks_rows ? StudyState::kRunning : stored.state;
   add(stored.study_id, {stored.name, stored.table, stored.created_at, stored.terms, stored.failures,
-                        stored.attempts, now_ms});
+                        stored.attempts, now_ms, stored.submitted_by});
   Study& study = studies_.at(stored.study_id);
   set_state(stored.study_id, study, state);
   study.durable_state = state;

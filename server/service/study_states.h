@@ -23,10 +23,11 @@ struct StudyRecord {
   std::string name;
   StudyTable table;
   std::string created_at;
-  StudyTerms terms;         ///< as the database has it
-  IntervalSet failures;     ///< points whose rows say failed
-  PointAttempts attempts;   ///< of points that failed, also of those that were forgotten
-  std::int64_t since_ms{};  ///< nothing is known of its rate before
+  StudyTerms terms;            ///< as the database has it
+  IntervalSet failures;        ///< points whose rows say failed
+  PointAttempts attempts;      ///< of points that failed, also of those that were forgotten
+  std::int64_t since_ms{};     ///< nothing is known of its rate before
+  std::string submitted_by{};  ///< name of the key; empty: without keys
 };
 
 /// The studies by number and name, and of each what the disk makes of its state: what is durable,
@@ -63,6 +64,10 @@ class StudyStates {
 
   /// As it was handed over last: what the study becomes unless that is refused.
   StudyState state(StudyId id) const { return studies_.at(id).state; }
+  /// It is neither done nor cancelled.
+  bool is_open(StudyId id) const {
+    return state(id) == StudyState::kRunning || state(id) == StudyState::kPaused;
+  }
   /// Whether that state must be written to be sure of it. One that is there already must, while
   /// another one is on its way or doubtful. What is done takes no other state.
   bool needs_write(StudyId id, StudyState wanted) const;

@@ -42,7 +42,8 @@ StudyView view_of(StudyId id, const StudySources& sources, Instant now) {
                  record.terms,
                  counts.solver_version,
                  {},
-                 0.0};
+                 0.0,
+                 record.submitted_by};
   const bool is_complete = view.settled() == view.points;
   if (is_complete) {
     view.state = StudyState::kDone;
@@ -70,7 +71,16 @@ protocol::StudyStatus to_message(const StudyView& view) {
   message.set_solver_version(view.solver_version);
   message.set_waits_for(view.waits_for);
   message.set_points_per_s(view.points_per_s);
+  message.set_submitted_by(view.submitted_by);
   return message;
+}
+
+std::uint64_t open_points_of(StudyId id, const StudySources& sources) {
+  if (!sources.states.is_durable(id)) {
+    return sources.states.record(id).table.size();
+  }
+  const StudyCounts counts = sources.scheduler.study(id);
+  return counts.points - counts.solved - counts.failed;
 }
 
 WorkerView view_of(WorkerId id, const WorkerRecord& worker, const Scheduler& scheduler,
@@ -80,7 +90,8 @@ WorkerView view_of(WorkerId id, const WorkerRecord& worker, const Scheduler& sch
           worker.threads,
           worker.instruction_set,
           worker.solver_version,
-          scheduler.worker(id, now.steady_ms)};
+          scheduler.worker(id, now.steady_ms),
+          worker.key};
 }
 
 protocol::WorkerStatus to_message(const WorkerView& view) {
@@ -96,6 +107,7 @@ protocol::WorkerStatus to_message(const WorkerView& view) {
   message.set_losses(view.counts.losses);
   message.set_set_aside(view.counts.is_set_aside);
   message.set_proven(view.counts.is_proven);
+  message.set_key(view.key);
   return message;
 }
 

@@ -5,7 +5,7 @@
 
 #include "proto/oblique.pb.h"
 #include "server/scheduler/scheduler.h"
-#include "server/service/settled_rates.h"
+#include "server/service/counts/settled_rates.h"
 #include "server/service/study_states.h"
 #include "server/service/workers_desk.h"
 #include "server/service/write_ledger.h"
@@ -27,6 +27,7 @@ struct StudyView {
   std::string solver_version;  ///< of its results; empty while there are none
   std::string waits_for;       ///< why a running study does not go on; empty: it does
   double points_per_s;         ///< settled, over the last seconds; 0 unless it runs
+  std::string submitted_by{};  ///< name of the key; empty: without keys
 
   std::uint64_t settled() const { return solved + failed; }
 };
@@ -50,7 +51,11 @@ struct WorkerView {
   std::string instruction_set;
   std::string solver_version;
   WorkerCounts counts;
+  std::string key{};  ///< its name; empty: without keys
 };
+
+/// Points that are neither solved nor failed.
+std::uint64_t open_points_of(StudyId id, const StudySources& sources);
 
 WorkerView view_of(WorkerId id, const WorkerRecord& worker, const Scheduler& scheduler,
                    Instant now);

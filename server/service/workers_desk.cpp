@@ -51,7 +51,8 @@ WorkersDesk::WorkersDesk(WorkersDeskSettings settings, ToWorkers& network, ToLog
       bad_frames_(bad_frames),
       ledger_(ledger) {}
 
-Heard WorkersDesk::take(const std::string& identity, std::string_view frame, Instant now) {
+Heard WorkersDesk::take(const std::string& identity, std::string_view frame, Instant now,
+                        const std::string& key) {
   Heard heard;
   if (!protocol::is_of_a_workers_size(frame)) {
     oversized(identity, heard);
@@ -64,7 +65,7 @@ Heard WorkersDesk::take(const std::string& identity, std::string_view frame, Ins
     return heard;
   }
   if (message.kind_case() == Kind::kHello) {
-    hello(identity, message.hello(), now, heard);
+    hello(identity, message.hello(), now, key, heard);
     return heard;
   }
   const auto known = ids_.find(identity);
@@ -111,7 +112,7 @@ Heard WorkersDesk::take(const std::string& identity, std::string_view frame, Ins
 }
 
 void WorkersDesk::hello(const std::string& identity, const protocol::WorkerHello& hello,
-                        Instant now, Heard& heard) {
+                        Instant now, const std::string& key, Heard& heard) {
   if (ledger_.takes_no_worker()) {
     return;  // it says it again
   }
@@ -138,12 +139,15 @@ void WorkersDesk::hello(const std::string& identity, const protocol::WorkerHello
                             plain(hello.instruction_set()),
                             iso_8601(now),
                             hellos,
+                            key,
                             now.steady_ms};
   if (!welcome(id, worker)) {
     return;
   }
   note(Severity::kInfo,
-       fmt::format("worker {} ({}, {} threads) joins", id, worker.name, worker.threads), now);
+       fmt::format("worker {} ({}, {} threads{}) joins", id, worker.name, worker.threads,
+                   key.empty() ? "" : ", key " + key),
+       now);
   workers_.emplace(id, worker);
   ids_[identity] = id;
   tell_of_version(id, now);

@@ -34,6 +34,7 @@ struct WorkerRecord {
   std::string instruction_set;
   std::string joined_at;
   std::uint32_t hellos = 1;
+  std::string key{};         ///< its name; empty: without keys
   std::int64_t told_ms = 0;  ///< when it was sent something, to a tick
   bool was_told = false;     ///< since the last tick
   bool is_busy = false;      ///< as the scheduler knows
@@ -54,7 +55,9 @@ class WorkersDesk {
   WorkersDesk(WorkersDeskSettings settings, ToWorkers& network, ToLog& log, BadFrames& bad_frames,
               const WriteLedger& ledger);
 
-  Heard take(const std::string& identity, std::string_view frame, Instant now);
+  /// `key`: name of the worker's; empty without keys.
+  Heard take(const std::string& identity, std::string_view frame, Instant now,
+             const std::string& key = {});
 
   // To workers that are known; others are passed over.
   void send(const SendBatch& batch);
@@ -91,7 +94,7 @@ class WorkersDesk {
 
  private:
   void hello(const std::string& identity, const protocol::WorkerHello& hello, Instant now,
-             Heard& heard);
+             const std::string& key, Heard& heard);
   bool refuse(const std::string& identity, const protocol::WorkerHello& hello);
   bool welcome(WorkerId id, const WorkerRecord& worker);
   void results(WorkerId worker, protocol::Results results, Heard& heard);

@@ -41,6 +41,7 @@ struct AddStudy {
   StudyTable table;
   std::string created_at;
   StudyTerms terms{};
+  std::string submitted_by = {};  ///< name of the key; empty: without keys
 };
 
 struct SetStudyTerms {

@@ -54,9 +54,9 @@ struct Store::Statements {
   explicit Statements(sqlite3* database)
       : add_study(database,
                   "INSERT INTO studies (study_id, name, recipe, points, state, created_at,"
-                  " changed_at, priority, weight, mixes_versions, checksum)"
+                  " changed_at, priority, weight, mixes_versions, checksum, submitted_by)"
                   " VALUES (?1, ?2, ?3, ?4, 'running', ?5, ?5, ?6, ?7, ?8,"
-                  " row_checksum(?1, ?2, ?3, ?4, ?5))"),
+                  " row_checksum(?1, ?2, ?3, ?4, ?5), nullif(?9, ''))"),
         set_state(database, "UPDATE studies SET state = ?2, changed_at = ?3 WHERE study_id = ?1"),
         set_terms(database,
                   "UPDATE studies SET priority = ?2, weight = ?3, mixes_versions = ?4"
@@ -188,6 +188,7 @@ void Store::add(const AddStudy& change) {
   insert.bind(6, std::int64_t{change.terms.priority});
   insert.bind(7, change.terms.weight);
   insert.bind(8, std::int64_t{change.terms.mixes_versions});
+  insert.bind(9, change.submitted_by);
   insert.run();
 }
 

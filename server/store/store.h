@@ -27,6 +27,7 @@ struct StoredStudy {
   IntervalSet settled;         ///< points that have a row
   IntervalSet failures;        ///< those whose row says failed
   PointAttempts attempts{};    ///< of these, and of those that failed and were forgotten
+  std::string submitted_by{};  ///< name of the key; empty: without keys
 };
 
 /// The SQLite database (schema.sql), opened for writing. Only one Store may have a file open;

@@ -121,9 +121,10 @@ std::string objection_to(const StoredStudy& study) {
 std::vector<StoredStudy> Store::studies() {
   std::vector<StoredStudy> found;
   Progress progress = progress_of_all(database_.get());
-  Statement list(database_.get(),
-                 "SELECT study_id, name, recipe, state, created_at, priority, weight,"
-                 " mixes_versions, points FROM studies ORDER BY study_id");
+  Statement list(
+      database_.get(),
+      "SELECT study_id, name, recipe, state, created_at, priority, weight,"
+      " mixes_versions, points, coalesce(submitted_by, '') FROM studies ORDER BY study_id");
   Statement version(database_.get(),
                     "SELECT solver_version FROM results WHERE study_id = ?"
                     " AND solver_version IS NOT NULL ORDER BY point LIMIT 1");
@@ -136,6 +137,7 @@ std::vector<StoredStudy> Store::studies() {
     study.state = state_named(list.text(3));
     study.created_at = list.text(4);
     study.terms = {static_cast<std::int32_t>(list.integer(5)), list.real(6), list.integer(7) != 0};
+    study.submitted_by = list.text(9);
     study.settled = settled.of(study);
     version.bind(1, study.study_id);
     study.solver_version = version.step() ? version.text(0) : "";

@@ -20,7 +20,8 @@ CREATE TABLE studies (
   priority    INTEGER NOT NULL DEFAULT 0,   -- studies of a higher one come first
   weight      REAL NOT NULL DEFAULT 1.0,    -- share of the workers among studies of one priority
   mixes_versions INTEGER NOT NULL DEFAULT 0, -- 1: results of several solver versions are allowed
-  checksum    INTEGER            -- CRC-32 of study_id, name, recipe, points and created_at
+  checksum    INTEGER,           -- CRC-32 of study_id, name, recipe, points and created_at
+  submitted_by TEXT              -- name of the key with which it was first submitted; NULL: without keys
 ) STRICT;
 
 -- Every parameter but H, mu and e; one row for each distinct model that has results. The columns

@@ -82,8 +82,9 @@ class ServiceTest : public testing::Test {
     service_.emplace(settings, outbox_, std::vector<StoredStudy>{}, now_);
   }
 
-  void request(const ClientRequest& message) {
-    service_->client_frame("client", protocol::encode(message), now_);
+  void request(const ClientRequest& message,
+               const std::shared_ptr<const KeyHolder>& holder = nullptr) {
+    service_->client_frame("client", protocol::encode(message), now_, holder);
     service_->scheduler().check_invariants();
   }
   ClientRequest submit_request(const std::string& name, std::uint64_t points = 10) {

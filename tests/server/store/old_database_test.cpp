@@ -28,6 +28,7 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 
 constexpr int kFirstWithChecksums = 4;
+constexpr int kFirstWithModelTexts = 5;
 
 /// A database as an earlier version of the schema had it: a study of ten points, of which one
 /// failed.
@@ -51,7 +52,7 @@ class OldDatabase : public testing::Test {
                          (has_share ? ", 0, 1)" : ")"));
     insert.bind_blob(1, table_of(10)->recipe().SerializeAsString());
     insert.run();
-    add_model(database.get(), 1, {});
+    add_model(database.get(), 1, {}, version);
     add_failure(database.get(), 2, 1);
     if (version >= kFirstWithChecksums) {
       add_row_checksum(database.get());
@@ -60,7 +61,8 @@ class OldDatabase : public testing::Test {
     }
   }
 
-  static void add_model(sqlite3* database, int model_id, const solver::ModelParameters& model) {
+  static void add_model(sqlite3* database, int model_id, const solver::ModelParameters& model,
+                        int version) {
     Statement insert(database,
                      "INSERT INTO models (model_id, links, length, lengths_m, E, A, I, rho, g,"
                      " elements_per_link, k, eta2, tip_mass, integrator, spectral_radius, dt,"
@@ -68,7 +70,11 @@ class OldDatabase : public testing::Test {
                      " 2.243e-8, 2700.0, 9.81, 4, 2.7e7, 1.2463, 0.0, 'explicit', 0.9, 0.0, 0.0,"
                      " ?)");
     insert.bind(1, std::int64_t{model_id});
-    insert.bind_blob(2, protocol::to_message(model).SerializeAsString());
+    if (version >= kFirstWithModelTexts) {
+      insert.bind(2, protocol::canonical_model(model));
+    } else {
+      insert.bind_blob(2, protocol::to_message(model).SerializeAsString());
+    }
     insert.run();
   }
 
@@ -112,6 +118,7 @@ TEST_P(OldDatabaseTest, IsBroughtToThePresentSchemaAndKeepsItsStudies) {
   EXPECT_EQ(studies[0].name, "old study");
   EXPECT_EQ(studies[0].state, StudyState::kCancelled);
   EXPECT_EQ(studies[0].terms, StudyTerms{});
+  EXPECT_EQ(studies[0].submitted_by, "");
   EXPECT_EQ(studies[0].settled, IntervalSet(2, 3));
   store.commit(std::vector<Change>{SetStudyState{3, StudyState::kPaused, "now"}});
   EXPECT_EQ(store.studies()[0].state, StudyState::kPaused);
@@ -155,6 +162,7 @@ TEST_P(OldDatabaseTest, CanBeReadAndCheckedAsItIs) {
   Reader reader(path_);
   EXPECT_EQ(reader.query("SELECT name FROM studies", kNoLimits).rows_size(), 1);
   EXPECT_EQ(reader.study_status("old study").at(0).weight(), 1.0);
+  EXPECT_EQ(reader.study_status("old study").at(0).submitted_by(), "");
   EXPECT_THAT(find_faults(path_), IsEmpty());
   execute(open_database(path_, SQLITE_OPEN_READWRITE).get(), "UPDATE models SET E = 1");
   EXPECT_THAT(find_faults(path_), ElementsAre("model 1: E is not that of its definition"));
@@ -210,7 +218,7 @@ TEST_F(OldDatabase, HasOneModelAfterwardsWhereTwoDifferedInTheSignOfAZero) {
     const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);
     solver::ModelParameters same;
     same.dt_s = -0.0;
-    add_model(database.get(), 2, same);
+    add_model(database.get(), 2, same, 4);
     add_failure(database.get(), 7, 2);
     add_row_checksum(database.get());
     execute(database.get(), "UPDATE results SET checksum = " + result_checksum_sql(4));

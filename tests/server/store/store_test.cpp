@@ -150,6 +150,21 @@ TEST_F(StoreTest, AStudyThatIsDoneIsTakenAtItsWordAndItsRowsAreNotCounted) {
   EXPECT_EQ(store.studies().at(0).settled.size(), 8U) << "one without its last point is";
 }
 
+TEST_F(StoreTest, WhoSubmittedAStudyIsKeptByTheNameOfTheKey) {
+  auto with_key = study_of(10);
+  with_key.submitted_by = "alice";
+  {
+    Store store(path_);
+    commit(store, {with_key, study_of(10, 2, "b")});
+  }
+  const auto studies = Store(path_).studies();
+  EXPECT_EQ(studies.at(0).submitted_by, "alice");
+  EXPECT_EQ(studies.at(1).submitted_by, "");
+  EXPECT_EQ(Reader(path_).study_status("a").at(0).submitted_by(), "alice");
+  const auto unknown = ask(path_, "SELECT submitted_by IS NULL FROM studies WHERE name = 'b'");
+  EXPECT_EQ(unknown.rows(0).values(0).integer(), 1);
+}
+
 TEST_F(StoreTest, DoublesComeBackWithTheSameBitsFromColumnsAndViews) {
   Store store(path_);
   const auto study = study_of(500);

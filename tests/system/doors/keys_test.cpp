@@ -74,7 +74,12 @@ TEST_F(KeysTest, WithTheKeysOfTheirRolesAStudyIsSubmittedSolvedAndRead) {
   EXPECT_EQ(read.exit_code, 0) << read.err;
   EXPECT_THAT(read.out, HasSubstr("solved"));
   EXPECT_THAT(ask({"status", "--format", "json"}, key("reader")).out,
-              HasSubstr(R"("access":"keys")"));
+              HasSubstr(R"("submitted_by":"client","access":"keys")"));
+  auto another = kFewPoints;
+  another[2] = "another";
+  const Outcome refused = ask(another, key("reader"));
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_THAT(refused.err, HasSubstr("is a reader's"));
 }
 
 TEST_F(KeysTest, AClientThatIsNotLetInSaysWhyAndWhoseKeyItShowed) {
@@ -88,6 +93,10 @@ TEST_F(KeysTest, AClientThatIsNotLetInSaysWhyAndWhoseKeyItShowed) {
   expect_turned_away(key("gone"), "not on the server's list, or was revoked");
   EXPECT_THAT(server_->process().err(),
               AllOf(HasSubstr("key of another role"), HasSubstr("wrong server key")));
+  const Outcome seen = ask({"workers"}, key("reader"));
+  EXPECT_THAT(seen.err, AllOf(HasSubstr("turned away since the server began: "),
+                              HasSubstr("key of another role (1)"),
+                              HasSubstr("key reader (reader): 1 connections")));
   EXPECT_EQ(ask({"status"}, key("server")).exit_code, 2) << "nobody but the server uses that";
 }
 

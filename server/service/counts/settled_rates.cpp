@@ -1,4 +1,4 @@
-#include "server/service/settled_rates.h"
+#include "server/service/counts/settled_rates.h"
 
 #include <algorithm>
 #include <iterator>
