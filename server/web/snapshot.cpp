@@ -48,7 +48,13 @@ void count_studies(const Service& service, std::int64_t now_ms, Snapshot& snapsh
     const PointCounts points = service.scheduler().points(id);
     snapshot.points_open += states.state(id) == StudyState::kRunning ? points.open() : 0;
     snapshot.points_leased += points.leased;
-    ranked.push_back({states.record(id).terms.priority, id});
+    const StudyRecord& record = states.record(id);
+    ranked.push_back({record.terms.priority, id});
+    if (!record.submitted_by.empty()) {
+      OpenNumbers& open = snapshot.open_by_key[record.submitted_by];
+      ++open.studies;
+      open.points += points.open();
+    }
   }
   const std::size_t listed = std::min(ranked.size(), kListedStudies);
   std::partial_sort(ranked.begin(), ranked.begin() + static_cast<std::ptrdiff_t>(listed),

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -46,6 +47,12 @@ struct KeyNumbers {
   std::uint64_t waiting_out_bytes = 0;
 };
 
+/// What the holder of a key has submitted that is not done.
+struct OpenNumbers {
+  std::uint64_t studies = 0;
+  std::uint64_t points = 0;  ///< without a result
+};
+
 /// How the server stands at one moment: plain values, made by the loop and shown by other threads.
 /// Points are of studies that run or are paused, unless something else is said.
 struct Snapshot {
@@ -60,6 +67,7 @@ struct Snapshot {
   /// Of the highest priority, the oldest first.
   std::vector<StudyNumbers> listed;
   std::uint64_t unlisted = 0;
+  std::map<std::string, OpenNumbers> open_by_key;  ///< by its name
 
   std::uint64_t batches_leased = 0;
   Histogram batch_s{{}};

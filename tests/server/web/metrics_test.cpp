@@ -22,6 +22,7 @@ Snapshot full_snapshot() {
   snapshot.thread_s_per_point = 0.6;
   snapshot.listed = {{"paper \"μ\"", 1, 2, 3, 4, 0.5}, {"b", 0, 0, 0, 1, 0.0}};
   snapshot.keys = {{"lab", protocol::Role::kWorker, 2, 3, 4}};
+  snapshot.open_by_key["lab"] = {2, 30};
   snapshot.batch_s = Histogram({1.0, 2.0});
   snapshot.batch_s.observe(1.5);
   snapshot.refusals.at(static_cast<std::size_t>(RefusalCause::kUnknownKey)) = 7;
@@ -83,6 +84,8 @@ TEST(Metrics, ShowWhatTheSnapshotHas) {
   EXPECT_EQ(value_of(metrics, "oblique_peers_refused_total", {{"cause", "unknown key"}}), 7.0);
   EXPECT_EQ(value_of(metrics, "oblique_key_connections", {{"key", "lab"}, {"role", "worker"}}),
             2.0);
+  EXPECT_EQ(value_of(metrics, "oblique_key_studies_open", {{"key", "lab"}}), 2.0);
+  EXPECT_EQ(value_of(metrics, "oblique_key_points_open", {{"key", "lab"}}), 30.0);
   EXPECT_EQ(value_of(metrics, "oblique_batch_duration_seconds_sum"), 1.5);
   EXPECT_EQ(value_of(metrics, "oblique_threads_wanted"), 10.0);  // 1000 points of 0.6 s in 60 s
   EXPECT_EQ(value_of(metrics, "oblique_http_requests_total", {{"code", "404"}}), 1.0);

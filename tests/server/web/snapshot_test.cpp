@@ -85,6 +85,17 @@ TEST_F(SnapshotTest, CountsOnlyWhatRunsAsOpen) {
   EXPECT_EQ(now.listed[1].name, "paused");
 }
 
+TEST_F(SnapshotTest, TellsWhatAKeyHasOpen) {
+  const auto holder = std::make_shared<const KeyHolder>(KeyHolder{"lab", protocol::Role::kClient});
+  service_->client_frame("client", protocol::encode(submit_request("a", 10)), now_, holder);
+  write_all();
+  submit("of nobody", 20);
+  const auto open = snapshot().open_by_key;
+  ASSERT_EQ(open.size(), 1U);
+  EXPECT_EQ(open.at("lab").studies, 1U);
+  EXPECT_EQ(open.at("lab").points, 10U);
+}
+
 TEST_F(SnapshotTest, ListsTheFiftyStudiesOfTheHighestPriority) {
   for (int i = 0; i < 120; ++i) {
     submit("study " + std::to_string(i), 10, i == 100 ? 5 : 0);
