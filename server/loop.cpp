@@ -144,6 +144,9 @@ class Loop::Parts final : public Outbox {
     return sent(network_.send(identity, frame), frame, worker_traffic_);
   }
   bool is_busy(const std::string& identity) const override { return network_.is_busy(identity); }
+  bool has_unheard(const std::string& identity) const override {
+    return network_.has_unheard(identity);
+  }
   bool to_client(const std::string& identity, const protocol::ClientReply& reply) override {
     return forward_to_client(identity, protocol::encode(reply));
   }

@@ -101,6 +101,8 @@ class Network {
   /// More waits to go out to it than a peer should have.
   bool is_busy(const std::string& identity) const;
   bool is_connected(const std::string& identity) const;
+  /// Something has come from it that was not taken yet.
+  bool has_unheard(const std::string& identity) const;
   /// Tries for so long to send what is kept.
   void flush(std::chrono::milliseconds longest);
 

@@ -13,6 +13,11 @@ bool Network::has_more() const {
          });
 }
 
+bool Network::has_unheard(const std::string& identity) const {
+  const Peer* const peer = find(identity);
+  return peer != nullptr && (peer->stands_in_line || peer->is_paused);
+}
+
 void Network::read_paused_again() {
   for (OpenPort& port : ports_) {
     if (port.paused.empty() || is_full(port)) {

@@ -49,6 +49,8 @@ class ToWorkers {
   virtual Delivery forward_to_worker(const std::string& identity, const std::string& frame) = 0;
   /// More waits to go out to that worker than should.
   virtual bool is_busy(const std::string& identity) const = 0;
+  /// Something has come from that worker that was not taken yet.
+  virtual bool has_unheard(const std::string& /*identity*/) const { return false; }
 };
 
 class ToClients {

@@ -286,7 +286,7 @@ void WorkersDesk::tick(const Silence& silent_ms, Instant now) {
       // would. And a worker whose messages wait here must hear something too.
       send(id, sign);
     }
-    if (is_silent && !ledger_.has_room_for(id)) {
+    if (is_silent && (!ledger_.has_room_for(id) || network_.has_unheard(worker.identity))) {
       found_.emplace_back(CreditGiven{id, 0});  // it is not silent: it is not heard
     }
     if (worker.is_busy && !network_.is_busy(worker.identity)) {

@@ -59,15 +59,16 @@ protocol::WorkerHello hello_of(std::size_t number) {
   return hello;
 }
 
+protocol::PointResult solved_result() {
+  return protocol::to_message(0, solver::Finger(solver::ModelParameters{}).solve(1.0, 0.4, 0.8));
+}
+
 }  // namespace
 
 class Crowd::Parts {
  public:
   explicit Parts(const CrowdSettings& settings)
-      : settings_(settings),
-        result_(protocol::to_message(
-            0, solver::Finger(solver::ModelParameters{}).solve(1.0, 0.4, 0.8))),
-        epoll_(epoll_create1(EPOLL_CLOEXEC)) {
+      : settings_(settings), result_(solved_result()), epoll_(epoll_create1(EPOLL_CLOEXEC)) {
     context_.set(zmq::ctxopt::max_sockets, 4 * static_cast<int>(settings.workers) + 64);
     for (std::size_t number = 0; number < settings.workers; ++number) {
       members_.push_back(std::make_unique<Member>(hello_of(number)));
@@ -265,6 +266,10 @@ class Crowd::Parts {
   std::atomic<bool> stopping_ = false;
   std::thread thread_;  // last: it uses all the others
 };
+
+std::size_t bytes_of_result() {
+  return solved_result().ByteSizeLong();
+}
 
 Crowd::Crowd(const CrowdSettings& settings) : parts_(std::make_unique<Parts>(settings)) {}
 Crowd::~Crowd() = default;

@@ -29,6 +29,9 @@ struct CrowdCounts {
   double longest_gap_s = 0.0;
 };
 
+/// Bytes of the result that each of them answers every point with.
+std::size_t bytes_of_result();
+
 /// Many workers on one thread, each with a socket and a conversation of its own, as real ones have,
 /// that solve nothing: the answer to every point is one result that was solved beforehand.
 class Crowd {

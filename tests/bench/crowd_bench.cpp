@@ -167,6 +167,7 @@ void bench(const Flags& flags, std::size_t workers, double point_ms, int scrape_
 
 void run(const Flags& flags) {
   take_all_descriptors();
+  std::printf("A result has %zu bytes on its way.\n", bytes_of_result());
   std::printf(
       "| workers | keys | point [ms] | results/s | batches/s | their messages/s | CPU: loop | "
       "writer | "

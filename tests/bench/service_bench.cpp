@@ -10,6 +10,7 @@
 #include <exception>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -18,17 +19,13 @@
 #include <utility>
 #include <vector>
 
-#include <sys/eventfd.h>
-
 #include <zmq.hpp>
 
 #include "proto/frames.h"
-#include "proto/result_message.h"
+#include "tests/bench/instant_worker.h"
 #include "tests/bench/process_usage.h"
 #include "tests/support/database.h"
 #include "tests/support/programs.h"
-#include "worker/session.h"
-#include "worker/solver/solve.h"
 
 /// Whole studies through real processes: what they take of the clock, of each process's CPU and
 /// memory, and of the disk. README.md says how to run it.
@@ -100,41 +97,6 @@ void bench_service(std::uint64_t points) {
               megabytes(study.file) + wal_MB);
   std::fflush(stdout);
 }
-
-/// A worker in this process that answers every point at once, with one result solved beforehand.
-class InstantWorker {
- public:
-  explicit InstantWorker(const std::string& server_url) : stop_(eventfd(0, EFD_CLOEXEC)) {
-    worker::SessionSettings settings;
-    settings.server = server_url;
-    settings.name = "instant";
-    settings.report_interval_ms = 10;
-    thread_ = std::thread([this, settings] {
-      worker::Session session(settings, [this](const auto&, const auto& next, const auto& take) {
-        while (const auto point = next()) {
-          protocol::PointResult result = result_;
-          result.set_point(*point);
-          take(std::move(result));
-        }
-      });
-      session.run(stop_, [] {});
-    });
-  }
-  ~InstantWorker() {
-    const std::uint64_t one = 1;
-    static_cast<void>(write(stop_, &one, sizeof(one)));
-    thread_.join();
-    close(stop_);
-  }
-  InstantWorker(const InstantWorker&) = delete;
-  InstantWorker& operator=(const InstantWorker&) = delete;
-
- private:
-  const protocol::PointResult result_ =
-      protocol::to_message(0, solver::Finger(solver::ModelParameters{}).solve(1.0, 0.4, 0.8));
-  int stop_;
-  std::thread thread_;
-};
 
 void bench_server_alone(std::uint64_t points) {
   Study study(points);
@@ -280,27 +242,52 @@ void submit_studies(const std::string& client_url, std::uint64_t studies) {
   }
 }
 
-/// Many studies: what it takes to submit them, to list them, and to start on them again.
-void bench_studies(std::uint64_t studies) {
+/// What the server takes of a core when nobody asks it for anything [%].
+double idle_cpu(test::Server& server) {
+  constexpr std::chrono::seconds kLong{2};
+  const double before_s = usage_of(server.process().pid()).cpu_s;
+  std::this_thread::sleep_for(kLong);
+  return 100.0 * (usage_of(server.process().pid()).cpu_s - before_s) /
+         static_cast<double>(kLong.count());
+}
+
+/// Many studies of a point each, open and then finished: what it takes to submit them, to list
+/// them, to keep them, and to start on them again.
+void bench_studies(std::uint64_t count) {
+  const auto studies = std::max<std::uint64_t>(count, 64);
   const test::TemporaryFolder folder;
   const std::string file = folder.file("bench.db");
-  test::Server server(folder, file);
+  const test::Database database(file);
+  auto server = std::make_unique<test::Server>(folder, file);
   const auto seconds_of = [](const std::function<void()>& work) {
     const auto began = Clock::now();
     work();
     return std::chrono::duration<double>(Clock::now() - began).count();
   };
-  const double submitted_s = seconds_of(
-      [&] { submit_studies(server.client_url(), std::max<std::uint64_t>(studies, 64)); });
+  const auto start_again = [&] {
+    server->process().send(SIGTERM);
+    server->process().wait();
+    return seconds_of([&] { server = std::make_unique<test::Server>(folder, file); });
+  };
+  const double submitted_s = seconds_of([&] { submit_studies(server->client_url(), studies); });
   const double listed_s = seconds_of([&] {
-    Study::check(test::run_oblique(folder, {"studies", "--server", server.client_url()}));
+    Study::check(test::run_oblique(folder, {"studies", "--server", server->client_url()}));
   });
-  const Usage serving = usage_of(server.process().pid());
-  server.process().send(SIGTERM);
-  server.process().wait();
-  const double started_s = seconds_of([&] { const test::Server again(folder, file); });
-  std::printf("| %.3g | %.2f | %.2f | %.2f | %.0f |\n", static_cast<double>(studies), submitted_s,
-              listed_s, started_s, serving.peak_MB);
+  const double idle_open = idle_cpu(*server);
+  const double peak_MB = usage_of(server->process().pid()).peak_MB;
+  const double started_open_s = start_again();
+  const double finished_s = seconds_of([&] {
+    const InstantWorker worker(server->worker_url());
+    wait_for([&] {
+      return database.number("SELECT count(*) FROM studies WHERE state = 'done'") >=
+             static_cast<double>(studies);
+    });
+  });
+  const double idle_finished = idle_cpu(*server);
+  const double started_finished_s = start_again();
+  std::printf("| %.3g | %.2f | %.2f | %.1f %% | %.2f | %.1f | %.1f %% | %.2f | %.0f |\n",
+              static_cast<double>(studies), submitted_s, listed_s, idle_open, started_open_s,
+              finished_s, idle_finished, started_finished_s, peak_MB);
 }
 
 void run_all(const std::string& what, const std::vector<std::uint64_t>& points) {
@@ -346,8 +333,10 @@ void run_all(const std::string& what, const std::vector<std::uint64_t>& points) 
         bench_server_killed);
   } else if (what == "studies") {
     table(
-        "| studies | submitted in [s] | listed in [s] | started again in [s] | server MB |\n"
-        "|---:|---:|---:|---:|---:|",
+        "| studies | submitted in [s] | listed in [s] | idle CPU, all open | started again in [s] "
+        "| "
+        "solved in [s] | idle CPU, all done | started again in [s] | server MB |\n"
+        "|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
         bench_studies);
   } else {
     throw std::invalid_argument("`" + what +

@@ -37,6 +37,7 @@ class FakeOutbox final : public Outbox {
     return to_worker(identity, message);
   }
   bool is_busy(const std::string& identity) const override { return identity == busy; }
+  bool has_unheard(const std::string& identity) const override { return identity == unheard; }
   bool to_client(const std::string& identity, const ClientReply& reply) override {
     if (identity == unreachable) {
       return false;
@@ -63,6 +64,7 @@ class FakeOutbox final : public Outbox {
 
   std::string unreachable;
   std::string busy;
+  std::string unheard;
   std::vector<ServerToWorker> worker_messages;
   std::vector<ClientReply> replies;
   std::vector<WriteJob> jobs;

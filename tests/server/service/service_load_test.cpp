@@ -133,6 +133,22 @@ TEST_F(ServiceLoadTest, AWorkerThatIsNotHeardIsNotTakenForSilentAndHearsThatTheS
   EXPECT_EQ(service_->scheduler().workers(), 0U) << "now it is silent indeed";
 }
 
+TEST_F(ServiceLoadTest, AWorkerWhoseMessagesWaitToBeTakenIsNotTakenForSilent) {
+  begin({});
+  outbox_.unheard = "worker";
+  const auto pass = [this] {
+    for (int i = 0; i < 100; ++i) {
+      now_.steady_ms += 100;
+      service_->tick(now_);
+    }
+  };
+  pass();
+  EXPECT_EQ(service_->scheduler().workers(), 1U);
+  outbox_.unheard.clear();
+  pass();
+  EXPECT_EQ(service_->scheduler().workers(), 0U);
+}
+
 TEST_F(ServiceLoadTest, AWorkerWhoseResultsWaitForTheDiskHearsSignsOfLifeThoughItGoesOnSpeaking) {
   begin({});
   outbox_.worker_messages.clear();
