@@ -23,12 +23,13 @@ namespace oblique::client {
 namespace {
 
 constexpr const char* kAutoscaleExamples = R"(Examples:
-  export OBLIQUE_WORKER_SERVER=tcp://head:7601 OBLIQUE_WORKER_KEYS=~/oblique/worker.key
   oblique autoscale slurm --max 10 --script oblique-workers.sbatch
   oblique autoscale slurm --min 1 --max 20 --target 1800 --sbatch-args "--partition=short -A lab7"
   oblique autoscale slurm --max 10 --dry-run          what it would do now
   oblique autoscale slurm --max 10 --once             one look, for cron
   oblique autoscale slurm --retire                    has all of its jobs leave
+Before, for the workers of the jobs:
+  export OBLIQUE_WORKER_SERVER=tcp://head:7601 OBLIQUE_WORKER_KEYS=~/oblique/worker.key
 
 Submits jobs with workers (deploy/slurm) while points are open, as many as settle them within the
 target, and has those leave that idle. Ctrl-C leaves the jobs running; started again it finds them.)";

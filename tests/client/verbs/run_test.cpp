@@ -1,6 +1,7 @@
 #include <signal.h>
 
 #include <chrono>
+#include <filesystem>
 #include <fstream>
 #include <functional>
 #include <string>
@@ -147,15 +148,23 @@ TEST(Run, OfAStudyThatSomebodyCancelsSaysSoAndEndsWithOne) {
   arguments.push_back("--verbose");
   test::Process program(folder, test::client_program(), arguments);
   wait_until_at_work(folder, program);
-  // The server's log says where it awaits clients.
+  // The server's log says where it awaits clients, and where the keys of this run are.
   const auto said = program.err();
-  const auto url = said.substr(said.find("clients at tcp://") + std::string("clients at ").size());
-  const auto cancel = test::run_oblique(
-      folder, {"cancel", "many", "--server", url.substr(0, url.find_first_of(",\n"))});
+  const auto word_after = [&said](const std::string& words) {
+    const auto rest = said.substr(said.find(words) + words.size());
+    return rest.substr(0, rest.find_first_of(",;\n"));
+  };
+  const std::filesystem::path keys = word_after("admits the 3 keys of ");
+  const std::string url = word_after("clients at ");
+  EXPECT_EQ(test::run_oblique(folder, {"cancel", "many", "--server", url}).exit_code, 1)
+      << "others on this machine have no key";
+  const auto cancel = test::run_oblique(folder, {"cancel", "many", "--server", url, "--keys",
+                                                 (keys.parent_path() / "client.key").string()});
   EXPECT_EQ(cancel.exit_code, 0) << cancel.err;
   const auto outcome = program.outcome();
   EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
   EXPECT_NE(outcome.err.find("The study is cancelled"), std::string::npos) << outcome.err;
+  EXPECT_FALSE(std::filesystem::exists(keys.parent_path())) << "the keys go with the run";
 }
 
 TEST(Watch, OfAFileOnWhichNobodyWorksSaysSo) {
