@@ -48,6 +48,11 @@ std::string_view flag_of(std::string_view argument) {
 }  // namespace
 
 SlurmEngine::SlurmEngine(SlurmSettings settings) : settings_(std::move(settings)) {
+  // squeue would take it for several names and find no job of ours, and more would be submitted.
+  if (settings_.job_name.find(',') != std::string::npos) {
+    throw solver::InputError(fmt::format("--name {} is not allowed: the name of jobs has no comma",
+                                         protocol::visible(settings_.job_name)));
+  }
   for (const auto& argument : settings_.sbatch_arguments) {
     if (is_any_of(flag_of(argument), {"--array", "-a", "--job-name", "-J", "--comment", "--wrap",
                                       "--test-only", "--wait", "-W"})) {

@@ -23,14 +23,31 @@ namespace {
 constexpr std::array<std::string_view, 4> kEntryFields{"name", "role", "public", "added_at"};
 constexpr std::array<std::string_view, 1> kTopFields{"key"};
 
-/// Whoever may write the list may admit himself.
-void check_writers(const std::string& path) {
+[[noreturn]] void refuse_writers(const std::string& what, mode_t mode, const std::string& path) {
+  throw solver::InputError(
+      fmt::format("{} has mode {:04o}: everybody could add a key, so it is not used. Mend it with: "
+                  "chmod o-w '{}'",
+                  what, mode & 07777U, path));
+}
+
+/// Whoever may write the list, or put another one in its place, may admit himself. A server that
+/// opens a pipe waits for somebody to write to it.
+void check_file(const std::string& path) {
   struct stat file {};
-  if (::stat(path.c_str(), &file) == 0 && S_ISREG(file.st_mode) && (file.st_mode & S_IWOTH) != 0) {
-    throw solver::InputError(
-        fmt::format("the list of keys {} has mode {:04o}: everybody could add a key, so it is not "
-                    "used. Mend it with: chmod o-w '{}'",
-                    path, file.st_mode & 07777U, path));
+  if (::stat(path.c_str(), &file) != 0) {
+    return;  // reading it tells why
+  }
+  if (!S_ISREG(file.st_mode)) {
+    throw solver::InputError(fmt::format("the list of keys {} is no regular file", path));
+  }
+  if ((file.st_mode & S_IWOTH) != 0) {
+    refuse_writers("the list of keys " + path, file.st_mode, path);
+  }
+  const std::string parent = std::filesystem::path(path).parent_path().string();
+  const std::string folder = parent.empty() ? "." : parent;
+  if (::stat(folder.c_str(), &file) == 0 && (file.st_mode & S_IWOTH) != 0 &&
+      (file.st_mode & S_ISVTX) == 0) {
+    refuse_writers("the folder of the list of keys, " + folder + ",", file.st_mode, folder);
   }
 }
 
@@ -116,7 +133,7 @@ std::string authorized_keys_beside(const std::string& server_key_file) {
 }
 
 AuthorizedKeys read_authorized_keys(const std::string& path) {
-  check_writers(path);
+  check_file(path);
   const TomlFile file(path, "the list of keys");
   TomlFields(path, file.top()).refuse_unknown(kTopFields, "a list of keys");
   AuthorizedKeys keys;
@@ -145,7 +162,14 @@ void change_authorized_keys(const std::string& path,
   const FileTurn turn(path);
   AuthorizedKeys keys = read_authorized_keys(path);
   change(keys);
-  turn.replace(text_of(keys));
+  const std::string text = text_of(keys);
+  if (text.size() > TomlFile::kMostBytes) {
+    throw solver::InputError(
+        fmt::format("the list of keys {} would have {} bytes, and one of more than {} is not read: "
+                    "revoke keys that nobody uses",
+                    path, text.size(), TomlFile::kMostBytes));
+  }
+  turn.replace(text);
 }
 
 std::string utc_now() {

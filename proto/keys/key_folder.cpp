@@ -63,7 +63,7 @@ CurveKey make_key_folder(const std::string& folder) {
   MadeFiles made;
   make_folder(folder, made);
   const std::string list = authorized_keys_in(folder);
-  if (std::filesystem::exists(list)) {
+  if (std::filesystem::exists(std::filesystem::symlink_status(list))) {
     throw std::runtime_error(list + " is there already, and is never overwritten");
   }
   const auto write = [&](const KeyFile& key) {

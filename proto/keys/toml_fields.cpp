@@ -15,7 +15,6 @@
 namespace oblique::protocol {
 
 TomlFile::TomlFile(const std::string& path, std::string_view what) {
-  constexpr std::size_t kMostBytes = std::size_t{1} << 20U;
   std::ifstream file(path, std::ios::binary);
   std::string text(kMostBytes + 1, '\0');
   if (file) {

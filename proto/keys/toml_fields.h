@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <span>
 #include <string>
 #include <string_view>
@@ -15,6 +16,8 @@ namespace oblique::protocol {
 /// A TOML file of at most 1 MiB.
 class TomlFile {
  public:
+  static constexpr std::size_t kMostBytes = std::size_t{1} << 20U;
+
   /// Throws solver::InputError when it cannot be read or is no TOML; `what` says what it should be.
   TomlFile(const std::string& path, std::string_view what);
 

@@ -4,6 +4,8 @@
 #include <cstring>
 #include <filesystem>
 #include <stdexcept>
+#include <system_error>
+#include <utility>
 
 #include <fcntl.h>
 #include <sys/file.h>
@@ -102,6 +104,11 @@ void write_new_file(const std::string& path, std::string_view text) {
 }
 
 FileTurn::FileTurn(std::string path) : path_(std::move(path)) {
+  // Of a link the file that it leads to is replaced: another one may lead there too.
+  std::error_code is_new;
+  if (auto real = std::filesystem::canonical(path_, is_new); !is_new) {
+    path_ = real.string();
+  }
   do {
     locked_ = Descriptor(::open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, kOwnersAlone));
     if (!locked_.is_open()) {

@@ -15,8 +15,8 @@ void write_new_file(const std::string& path, std::string_view text);
 /// locked is the file itself, which each change replaces.
 class FileTurn {
  public:
-  /// Waits until nobody else changes it. Makes the file, empty and of mode 0600, where there is
-  /// none. Throws std::runtime_error.
+  /// Waits until nobody else changes it. A link stays, and what it leads to is the file. Makes the
+  /// file, empty and of mode 0600, where there is none. Throws std::runtime_error.
   explicit FileTurn(std::string path);
 
   /// Replaces the file at once, keeping owner and mode: whoever reads it sees all of the old text

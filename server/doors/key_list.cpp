@@ -1,5 +1,7 @@
 #include "server/doors/key_list.h"
 
+#include <ctime>
+
 #include <spdlog/fmt/fmt.h>
 
 #include "worker/solver/model/errors.h"
@@ -17,7 +19,8 @@ void append(std::string& names, const std::string& name) {
 
 }  // namespace
 
-KeyList::KeyList(std::string path) : path_(std::move(path)), seen_(stamp()), holders_(read()) {}
+KeyList::KeyList(std::string path)
+    : path_(std::move(path)), seen_(stamp()), was_fresh_(is_fresh()), holders_(read()) {}
 
 std::optional<KeyList::Stamp> KeyList::stamp() const {
   struct stat file {};
@@ -26,6 +29,19 @@ std::optional<KeyList::Stamp> KeyList::stamp() const {
   }
   return Stamp{file.st_dev, file.st_ino, file.st_size, nanoseconds_of(file.st_mtim),
                nanoseconds_of(file.st_ctim)};
+}
+
+/// Of the file as it was seen. Systems count time in steps, some of a second: a change so soon
+/// after another one may leave the same stamp.
+bool KeyList::is_fresh() const {
+  constexpr std::int64_t kStep_ns = 2'000'000'000;
+  if (!seen_) {
+    return false;
+  }
+  timespec now{};
+  clock_gettime(CLOCK_REALTIME, &now);
+  const std::int64_t age_ns = nanoseconds_of(now) - std::get<4>(*seen_);
+  return age_ns > -kStep_ns && age_ns < kStep_ns;
 }
 
 KeyList::Holders KeyList::read() const {
@@ -40,10 +56,11 @@ KeyList::Holders KeyList::read() const {
 
 std::optional<KeyList::News> KeyList::look() {
   const auto now = stamp();
-  if (now == seen_) {
+  if (now == seen_ && !was_fresh_) {
     return std::nullopt;
   }
   seen_ = now;
+  was_fresh_ = is_fresh();
   try {
     Holders holders = read();
     const bool was_at_fault = !std::exchange(fault_, {}).empty();

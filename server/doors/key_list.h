@@ -43,11 +43,13 @@ class KeyList {
   using Holders = std::map<protocol::CurveKey, std::shared_ptr<const KeyHolder>>;
 
   std::optional<Stamp> stamp() const;
+  bool is_fresh() const;
   Holders read() const;
   std::string take(Holders holders);
 
   std::string path_;
   std::optional<Stamp> seen_;
+  bool was_fresh_;
   std::string fault_;
   Holders holders_;
   std::set<protocol::CurveKey> revoked_;

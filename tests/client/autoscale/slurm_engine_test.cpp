@@ -156,5 +156,11 @@ TEST_F(SlurmEngineTest, ArgumentsThatMakeOtherJobsAreWrongUsage) {
   }
 }
 
+TEST_F(SlurmEngineTest, ANameThatSqueueTakesForSeveralIsWrongUsage) {
+  auto wrong = settings();
+  wrong.job_name = "day,night";
+  EXPECT_THROW(SlurmEngine{wrong}, solver::InputError);
+}
+
 }  // namespace
 }  // namespace oblique::client

@@ -2,10 +2,12 @@
 
 #include <sys/stat.h>
 
+#include <filesystem>
 #include <fstream>
 #include <functional>
 #include <iterator>
 #include <stdexcept>
+#include <string>
 #include <thread>
 
 #include "tests/support/temporary_folder.h"
@@ -125,6 +127,41 @@ TEST_F(AuthorizedKeysTest, IsRefusedWhenEverybodyMayWriteIt) {
   add(key_called("a"));
   chmod(path_.c_str(), 0666);
   EXPECT_THAT(error_of(text()), HasSubstr("chmod o-w"));
+}
+
+TEST_F(AuthorizedKeysTest, IsRefusedInAFolderWhereEverybodyMayReplaceIt) {
+  add(key_called("a"));
+  const std::string list = text();
+  chmod(folder_.path().c_str(), 0777);
+  EXPECT_THAT(error_of(list), AllOf(HasSubstr("chmod o-w"), HasSubstr("the folder")));
+  chmod(folder_.path().c_str(), 01777);
+  EXPECT_THAT(read_authorized_keys(path_).all(), SizeIs(1)) << "there only owners replace files";
+}
+
+TEST_F(AuthorizedKeysTest, IsNotReadFromAPipeForWhichAServerWouldWait) {
+  ASSERT_EQ(mkfifo(path_.c_str(), 0600), 0);
+  EXPECT_THROW(read_authorized_keys(path_), solver::InputError);
+}
+
+TEST_F(AuthorizedKeysTest, IsChangedWhereALinkLeads) {
+  const std::string real = folder_.file("real.toml");
+  std::ofstream{real};
+  std::filesystem::create_symlink("real.toml", path_);
+  add(key_called("a"));
+  EXPECT_TRUE(std::filesystem::is_symlink(path_));
+  EXPECT_THAT(read_authorized_keys(real).all(), SizeIs(1));
+}
+
+TEST_F(AuthorizedKeysTest, NeverGrowsBeyondWhatIsRead) {
+  constexpr int kTooMany = 12'000;
+  const auto add_many = [](AuthorizedKeys& keys) {
+    for (int i = 0; i < kTooMany; ++i) {
+      keys.add(key_called("key" + std::to_string(i)));
+    }
+  };
+  add(key_called("a"));
+  EXPECT_THROW(change_authorized_keys(path_, add_many), solver::InputError);
+  EXPECT_THAT(read_authorized_keys(path_).all(), SizeIs(1));
 }
 
 TEST_F(AuthorizedKeysTest, NamesTheLineOfAnEntryThatIsWrongOrThereTwice) {

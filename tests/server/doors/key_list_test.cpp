@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 
 #include "server/doors/doors.h"
 #include "tests/support/temporary_folder.h"
@@ -29,6 +30,10 @@ class KeyListTest : public testing::Test {
   }
   void revoke(const std::string& name) {
     protocol::change_authorized_keys(path_, [&](AuthorizedKeys& keys) { keys.remove(name); });
+  }
+  std::string text() const {
+    std::ifstream file(path_);
+    return {std::istreambuf_iterator<char>(file), {}};
   }
   static RefusalCause cause_of(const Verdict& verdict) { return std::get<Refusal>(verdict).cause; }
   static std::string name_in(const Verdict& verdict) {
@@ -95,6 +100,19 @@ TEST_F(KeyListTest, AListThatIsBrokenOrGoneChangesNothingAndIsToldOnce) {
   EXPECT_TRUE(list->look()->admission_changed);
   EXPECT_EQ(cause_of(workers.judge(key)), RefusalCause::kRevokedKey);
   EXPECT_EQ(name_in(workers.judge(other)), "other");
+}
+
+TEST_F(KeyListTest, AChangeWithinTheSameTickOfTheClockIsSeen) {
+  add("w", Role::kWorker);
+  const std::string before = text();
+  std::string after = before;
+  after.replace(after.find("\"w\""), 3, "\"v\"");
+  for (int i = 0; i < 50; ++i) {
+    std::ofstream(path_) << before;
+    KeyList list(path_);
+    std::ofstream(path_) << after;  // of the same size, in the same file
+    EXPECT_TRUE(list.look());
+  }
 }
 
 TEST_F(KeyListTest, AServerTakesItsOwnKeyFileAndTheListBesideIt) {
