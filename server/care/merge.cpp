@@ -2,6 +2,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/frames.h"
 #include "server/care/merged_rows.h"
 #include "server/care/merged_studies.h"
 #include "server/database/open_for_reading.h"
@@ -11,6 +12,25 @@
 #include "server/store/store.h"
 
 namespace oblique::server {
+namespace {
+
+/// Views and columns that are computed can hold anything, without end. A value that a server stores
+/// came in one message.
+void bound_what_is_read(sqlite3* source) {
+  sqlite3_limit(source, SQLITE_LIMIT_LENGTH, static_cast<int>(2 * protocol::kMaxFrameBytes));
+  constexpr const char* kTables =
+      "COLLATE NOCASE IN ('about', 'studies', 'models', 'workers', 'results', 'retries')";
+  Statement list(source,
+                 fmt::format("SELECT t.name FROM pragma_table_list AS t WHERE t.name {}"
+                             " AND (t.type <> 'table' OR NOT t.strict OR EXISTS"
+                             " (SELECT 1 FROM pragma_table_xinfo(t.name) WHERE hidden > 1))",
+                             kTables));
+  if (list.step()) {
+    throw StorageError(fmt::format("{} in it is no table as servers make it", list.text(0)));
+  }
+}
+
+}  // namespace
 
 struct Merger::Parts {
   explicit Parts(const std::string& path)
@@ -42,6 +62,7 @@ Merged Merger::merge(const std::string& source, const MergeSettings& settings,
     merged.remarks.push_back(opened.remark);
   }
   try {
+    bound_what_is_read(from);
     execute(from, "BEGIN");  // one instant of it, whatever a server writes meanwhile
     Transaction transaction(to);
     StudyPlaces places = place_studies(from, to, settings, merged);

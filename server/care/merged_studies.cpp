@@ -1,16 +1,20 @@
 #include "server/care/merged_studies.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <optional>
+#include <stdexcept>
 #include <utility>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/study_name.h"
+#include "proto/recipe/study_terms.h"
 #include "server/care/table_columns.h"
 #include "server/scheduler/points/study_table.h"
 #include "server/store/result_row.h"
+#include "worker/solver/model/errors.h"
 
 namespace oblique::server {
 namespace {
@@ -23,6 +27,12 @@ struct StudyRow {
   bool mixes_versions;
   bool is_sound;
 };
+
+// Where they stand in what `study_columns_sql` asks for.
+constexpr int kCreatedAt = 7;
+constexpr int kChangedAt = 8;
+constexpr int kPriority = 9;
+constexpr int kWeight = 10;
 
 std::uint64_t number_in(const Statement& row, int column) {
   return static_cast<std::uint64_t>(row.integer(column));
@@ -46,6 +56,32 @@ std::string study_columns_sql(sqlite3* source) {
 StudyRow study_in(const Statement& row) {
   return {number_in(row, 0), row.text(1), StudyTable(row.text(2), number_in(row, 3)),
           row.integer(4) != 0, row.integer(5) != 0};
+}
+
+/// Why no server would have stored the study in that row, or an empty text. It would keep a server
+/// from starting, or could not be shown.
+std::string objection_to(const StudyRow& study, const Statement& row) {
+  constexpr std::size_t kLongestTime = 64;
+  std::string objection = protocol::objection_to_study_name(study.name);
+  if (objection.empty() &&
+      std::max(row.text(kCreatedAt).size(), row.text(kChangedAt).size()) > kLongestTime) {
+    objection = "its times are none";
+  }
+  if (objection.empty()) {
+    objection = protocol::objection_to_priority(row.integer(kPriority));
+  }
+  if (objection.empty()) {
+    objection = protocol::objection_to_weight(row.real(kWeight));
+  }
+  try {
+    (void)study.table.get();
+  } catch (const solver::InputError&) {
+    // Another version took it. This one leaves it as it is.
+  } catch (const std::runtime_error& error) {
+    objection = fmt::format("its recipe cannot be read: {}", error.what());
+  }
+  study.table.release();
+  return objection;
 }
 
 std::optional<StudyRow> study_named(sqlite3* target, const std::string& name) {
@@ -86,6 +122,10 @@ class Placing {
       if (!study.is_sound) {
         throw StorageError(fmt::format(
             "its study {} is not as it was stored: `oblique check` tells more", study.name));
+      }
+      if (const std::string objection = objection_to(study, list_); !objection.empty()) {
+        throw StorageError(fmt::format("its study number {} is none that a server stores: {}",
+                                       study.id, objection));
       }
       if (auto place = place_of(study)) {
         note_sharing(places, *place);

@@ -278,6 +278,32 @@ TEST_F(MergeTest, ARowThatIsNotAsItWasStoredRefusesTheWholeDatabase) {
   EXPECT_THROW(merge("one"), StorageError) << "of a study that is not there";
 }
 
+TEST_F(MergeTest, AStudyThatWouldKeepAServerFromStartingRefusesTheWholeDatabase) {
+  int number = 0;
+  for (const char* change :
+       {"points = 1000000000000000000", "points = -1", "recipe = x'ffffffff'", "weight = 0.0",
+        "weight = 9e999", "priority = 9223372036854775807", "name = ''", "name = char(27)",
+        "name = hex(zeroblob(1000))", "created_at = hex(zeroblob(1000))"}) {
+    const std::string source = "source" + std::to_string(++number);
+    store(source, {{.end = 3}});
+    texts(source, std::string("UPDATE studies SET checksum = NULL, ") + change);
+    EXPECT_THROW(merge(source), StorageError) << change;
+  }
+  EXPECT_EQ(text("all", "SELECT count(*) FROM studies"), "0");
+}
+
+TEST_F(MergeTest, WhatIsComputedIsNotRead) {
+  store("view", {{.end = 3}});
+  texts("view", "ALTER TABLE results RENAME TO stored");
+  texts("view",
+        "CREATE VIEW Results AS WITH RECURSIVE t (x) AS (SELECT 0 UNION ALL SELECT x FROM t)"
+        " SELECT stored.*, stored.rowid AS rowid FROM stored, t");
+  EXPECT_THROW(merge("view"), StorageError);
+  store("column", {{.end = 3}});
+  texts("column", "ALTER TABLE studies ADD COLUMN big BLOB AS (zeroblob(100000000))");
+  EXPECT_THROW(merge("column"), StorageError);
+}
+
 TEST_F(MergeTest, WhatIsMergedIsNotChangedAndItsStateGoesAlong) {
   store("one", {{.end = 5, .terms = {7, 2.5, false}}});
   Store(file("one")).commit(std::vector<Change>{SetStudyState{1, StudyState::kPaused, "later"}});
