@@ -22,6 +22,13 @@ bool is_any_of(std::string_view word, std::initializer_list<std::string_view> wo
   return std::find(words.begin(), words.end(), word) != words.end();
 }
 
+/// A long flag may be cut short, as --arr.
+bool begins_any_of(std::string_view flag, std::initializer_list<std::string_view> flags) {
+  return flag.size() > 1 && flag != "--" &&
+         std::any_of(flags.begin(), flags.end(),
+                     [flag](std::string_view one) { return one.starts_with(flag); });
+}
+
 /// What Slurm 22.05 calls states (squeue's %T), and what they mean here. One that nobody here knows
 /// counts as a job that is there.
 JobState state_named(std::string_view name) {
@@ -54,8 +61,8 @@ SlurmEngine::SlurmEngine(SlurmSettings settings) : settings_(std::move(settings)
                                          protocol::visible(settings_.job_name)));
   }
   for (const auto& argument : settings_.sbatch_arguments) {
-    if (is_any_of(flag_of(argument), {"--array", "-a", "--job-name", "-J", "--comment", "--wrap",
-                                      "--test-only", "--wait", "-W"})) {
+    if (begins_any_of(flag_of(argument), {"--array", "-a", "--job-name", "-J", "--comment",
+                                          "--wrap", "--test-only", "--wait", "-W"})) {
       throw solver::InputError(
           fmt::format("--sbatch-args {} is not allowed: each submission is one job, found again by "
                       "its name and comment, and runs the script",

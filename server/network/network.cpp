@@ -100,6 +100,7 @@ void Network::collect(std::int64_t now_ms) {
     }
   }
   shake_hands();
+  accept_again(now_ms);
   end_the_largest();
   if (now_ms >= next_look_ms_) {
     next_look_ms_ = now_ms + kLookInterval_ms;
@@ -113,6 +114,10 @@ void Network::accept_all(Port port, std::int64_t now_ms) {
   const bool has_keys = ports_[port].guard != nullptr;
   const std::size_t most = has_keys ? kStepsATurn / kStepsOfHandshake : kMostAtATime;
   for (std::size_t i = 0; i < most && handshakes_.size() < kMostWaitingSteps; ++i) {
+    if (must_newcomers_wait(now_ms)) {
+      let_newcomers_wait(port);
+      return;
+    }
     Listener::Accepted accepted = ports_[port].listener->accept();
     if (!accepted.socket.is_open()) {
       if (errno == EMFILE || errno == ENFILE) {

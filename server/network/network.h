@@ -35,7 +35,8 @@ struct NetworkLimits {
   std::int64_t handshake_ms = 10'000;  ///< for a new connection to say who it is
   /// A connection that said something so recently does not make room for a new one.
   std::int64_t active_ms = 5000;
-  std::size_t handshakes = 1024;  ///< under way at a time; the oldest of more is ended
+  /// Under way at a time. The oldest of more is ended once it has had a tenth of `handshake_ms`.
+  std::size_t handshakes = 1024;
   /// What the connections of one key may have together. One key can be all workers'.
   std::size_t connections_of_key = 3072;  ///< at most 7/8 of all
   std::size_t held_in_bytes_of_key = std::size_t{256} << 20U;
@@ -132,6 +133,7 @@ class Network {
     std::deque<Number> line;                       // peers with a message, in turn
     std::size_t held_in_bytes = 0;                 // of its peers
     std::vector<Number> paused{};                  // peers that are not read meanwhile
+    bool is_closed = false;                        // newcomers wait in the system
   };
   struct Peer {
     Peer(Listener::Accepted accepted, const PortGuard* guard)
@@ -174,6 +176,9 @@ class Network {
     return !port.line.empty() && port.held_in_bytes >= limits_.held_in_to_pause_bytes;
   }
   void read_paused_again();
+  bool must_newcomers_wait(std::int64_t now_ms);
+  void let_newcomers_wait(Port port);
+  void accept_again(std::int64_t now_ms);
   void end_the_largest();
   void end_the_largest_of_keys();
   bool end_oldest_handshake();

@@ -1,4 +1,6 @@
-// Who is not read while more has come than is taken.
+// Who is not read, or not accepted, while more has come than is taken.
+#include <sys/epoll.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -28,6 +30,40 @@ void Network::read_paused_again() {
         found->second->is_paused = false;
         settle(number, *found->second);
       }
+    }
+  }
+}
+
+/// As many handshakes are under way as may be, and the oldest has not had its time. Who is ended
+/// comes again at once: of a crowd that is slow nobody would ever get in.
+bool Network::must_newcomers_wait(std::int64_t now_ms) {
+  // Half of this is too short for thousands of one busy process. Those who never finish keep others
+  // waiting.
+  constexpr std::int64_t kPartOfTime = 10;
+  if (handshakes_under_way_ < limits_.handshakes) {
+    return false;
+  }
+  for (; !strangers_.empty(); strangers_.pop_front()) {
+    const auto oldest = peers_.find(strangers_.front());
+    if (oldest != peers_.end() && oldest->second->is_stranger) {
+      return now_ms - oldest->second->since_ms < limits_.handshake_ms / kPartOfTime;
+    }
+  }
+  return false;
+}
+
+void Network::let_newcomers_wait(Port port) {
+  ports_[port].is_closed = true;
+  epoll_event event{0, {.u64 = port}};
+  epoll_ctl(epoll_.number(), EPOLL_CTL_MOD, ports_[port].listener->descriptor(), &event);
+}
+
+void Network::accept_again(std::int64_t now_ms) {
+  for (Port port = 0; port < ports_.size(); ++port) {
+    if (ports_[port].is_closed && !must_newcomers_wait(now_ms)) {
+      ports_[port].is_closed = false;
+      epoll_event event{EPOLLIN, {.u64 = port}};
+      epoll_ctl(epoll_.number(), EPOLL_CTL_MOD, ports_[port].listener->descriptor(), &event);
     }
   }
 }

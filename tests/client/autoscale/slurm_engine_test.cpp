@@ -149,7 +149,8 @@ TEST_F(SlurmEngineTest, KnowsItsWorkersByTheirNames) {
 }
 
 TEST_F(SlurmEngineTest, ArgumentsThatMakeOtherJobsAreWrongUsage) {
-  for (const char* argument : {"--array=1-4", "-a1-4", "-J", "--job-name=x", "--comment", "-W"}) {
+  for (const char* argument :
+       {"--array=1-4", "-a1-4", "-J", "--job-name=x", "--comment", "-W", "--arr=1-4", "--comm=x"}) {
     auto wrong = settings();
     wrong.sbatch_arguments = {argument};
     EXPECT_THROW(SlurmEngine{wrong}, solver::InputError) << argument;

@@ -141,32 +141,61 @@ TEST_F(RefusedPeersTest, WhoIsInIsServedBetweenTheHandshakesOfAFlood) {
 
 class CrowdedNetworkTest : public RefusedPeersTest {
  protected:
-  CrowdedNetworkTest() : RefusedPeersTest({.handshakes = 100}) {}
+  CrowdedNetworkTest() : RefusedPeersTest({.handshakes = kMost}) {
+    for (std::size_t i = 0; i < kCrowd; ++i) {
+      crowd_.push_back(peer(worker_, server_.public_key));
+    }
+  }
+  void let_in_those_who_said_hello() {
+    std::vector<std::string> heard(kCrowd);
+    std::size_t let_in = 0;
+    turn_until([&] {
+      for (std::size_t i = 0; i < kCrowd; ++i) {
+        const std::size_t before = heard[i].size();
+        heard[i] += crowd_[i]->tcp.receive_what_is_there();
+        if (before < kWelcomedBytes && heard[i].size() >= kWelcomedBytes) {
+          crowd_[i]->curve.take_welcome(std::string_view(heard[i]).substr(kGreetingBytes + 10));
+          crowd_[i]->tcp.send(command_of("INITIATE", crowd_[i]->curve.initiate()));
+        }
+        let_in += before <= kWelcomedBytes && heard[i].size() > kWelcomedBytes ? 1U : 0U;
+      }
+      return let_in == kCrowd;
+    });
+  }
+
+  static constexpr std::size_t kMost = 100;
+  static constexpr std::size_t kCrowd = 300;
+  std::vector<std::unique_ptr<KeyedPeer>> crowd_;
 };
 
 TEST_F(CrowdedNetworkTest, ACrowdOfThoseWhoMayComeInIsLetInWithoutTurningAnyAway) {
-  constexpr std::size_t kCrowd = 300;
-  std::vector<std::unique_ptr<KeyedPeer>> crowd;
-  for (std::size_t i = 0; i < kCrowd; ++i) {
-    crowd.push_back(peer(worker_, server_.public_key));
-    crowd.back()->say_hello();
+  for (const auto& peer : crowd_) {
+    peer->say_hello();
   }
-  std::vector<std::string> heard(kCrowd);
-  std::size_t let_in = 0;
-  turn_until([&] {
-    for (std::size_t i = 0; i < kCrowd; ++i) {
-      const std::size_t before = heard[i].size();
-      heard[i] += crowd[i]->tcp.receive_what_is_there();
-      if (before < kWelcomedBytes && heard[i].size() >= kWelcomedBytes) {
-        crowd[i]->curve.take_welcome(std::string_view(heard[i]).substr(kGreetingBytes + 10));
-        crowd[i]->tcp.send(command_of("INITIATE", crowd[i]->curve.initiate()));
-      }
-      let_in += before <= kWelcomedBytes && heard[i].size() > kWelcomedBytes ? 1U : 0U;
-    }
-    return let_in == kCrowd;
-  });
+  let_in_those_who_said_hello();
   EXPECT_EQ(all_refused(), 0U);
   EXPECT_EQ(network_.connections(), kCrowd);
+}
+
+TEST_F(CrowdedNetworkTest, SoIsOneThatIsSlowToSayHello) {
+  turn_until([&] { return network_.connections() == kMost; });
+  for (int turn = 0; turn < 100; ++turn) {
+    network_.collect(now_ms_);
+  }
+  EXPECT_EQ(network_.connections(), kMost) << "the others wait in the system";
+  for (const auto& peer : crowd_) {
+    peer->say_hello();
+  }
+  let_in_those_who_said_hello();
+  EXPECT_EQ(all_refused(), 0U);
+  EXPECT_EQ(network_.connections(), kCrowd);
+}
+
+TEST_F(CrowdedNetworkTest, ThoseWhoSayNothingMakeRoomAfterAPartOfTheirTime) {
+  turn_until([&] { return network_.connections() == kMost; });
+  now_ms_ += NetworkLimits().handshake_ms / 10;
+  turn_until([&] { return refused(RefusalCause::kBound) == kMost; });
+  EXPECT_EQ(network_.connections(), kMost);
 }
 
 TEST_F(RefusedPeersTest, WhoConnectsAndLeavesWithoutAWordIsNoRefusedPeer) {
@@ -247,6 +276,7 @@ TEST_F(TightRefusedPeersTest, SoManyHandshakesAreUnderWayAndTheOldestMakesRoom) 
   std::vector<std::unique_ptr<KeyedPeer>> strangers;
   for (int i = 0; i < 8; ++i) {
     strangers.push_back(peer(worker_, server_.public_key));
+    now_ms_ += 10;
     turn_until([&, wanted = std::min(i + 2, 6)] {
       return network_.connections() == static_cast<std::size_t>(wanted) &&
              refused(RefusalCause::kBound) == static_cast<std::uint64_t>(std::max(i - 4, 0));
