@@ -49,14 +49,15 @@ TEST(InstallTest, EachPartHasItsProgramAndWhatBelongsToItAndNothingElse) {
   for (const std::string part : {"server", "worker", "client"}) {
     ASSERT_EQ(install(folder, "/usr", part, folder.file(part)).exit_code, 0) << part;
   }
-  EXPECT_THAT(files_below(folder.file("server")),
-              UnorderedElementsAre("usr/bin/oblique-server", "etc/oblique/server.toml",
-                                   "usr/lib/systemd/system/oblique-server.service",
-                                   "usr/lib/sysusers.d/oblique-server.conf",
-                                   "usr/share/doc/oblique-server/copyright",
-                                   "usr/share/doc/oblique-server/deploy/prometheus/README.md",
-                                   "usr/share/doc/oblique-server/deploy/prometheus/prometheus.yml",
-                                   "usr/share/doc/oblique-server/deploy/prometheus/oblique.rules.yml"));
+  EXPECT_THAT(
+      files_below(folder.file("server")),
+      UnorderedElementsAre("usr/bin/oblique-server", "etc/oblique/server.toml",
+                           "usr/lib/systemd/system/oblique-server.service",
+                           "usr/lib/sysusers.d/oblique-server.conf",
+                           "usr/share/doc/oblique-server/copyright",
+                           "usr/share/doc/oblique-server/deploy/prometheus/README.md",
+                           "usr/share/doc/oblique-server/deploy/prometheus/prometheus.yml",
+                           "usr/share/doc/oblique-server/deploy/prometheus/oblique.rules.yml"));
   EXPECT_THAT(files_below(folder.file("worker")),
               UnorderedElementsAre("usr/bin/oblique-worker", "etc/oblique/worker.toml",
                                    "usr/lib/systemd/system/oblique-worker.service",

@@ -16,12 +16,13 @@ protocol::PointResult answer_to(std::uint64_t study_size, std::uint64_t point) {
 }
 
 SimulatedWorker::SimulatedWorker(World& world, Network& network, std::uint64_t peer,
-                                 Killers killers, std::string solver_version)
+                                 Killers killers, std::string solver_version, bool leaves)
     : world_(world),
       network_(network),
       peer_(peer),
       killers_(std::move(killers)),
       solver_version_(std::move(solver_version)),
+      leaves_(leaves),
       ms_per_point_(world.chance(0.2) ? world.between(50, 400) : world.between(1, 20)) {}
 
 void SimulatedWorker::start() {
@@ -33,7 +34,7 @@ void SimulatedWorker::start() {
   hello.set_process_id(std::to_string(peer_) + " in life " + std::to_string(life_));
   planned_time_ms_ = -1;
   worker::ConversationSettings settings;
-  if (world_.chance(0.2)) {
+  if (leaves_ && world_.chance(0.2)) {
     settings.leaving.until_ms = world_.now_ms() + world_.between(3000, 60'000);
   }
   conversation_.emplace(hello, settings);

@@ -24,9 +24,10 @@ class SimulatedWorker {
   /// Points of studies of that size whose solving kills the process.
   using Killers = std::map<std::uint64_t, std::set<std::uint64_t>>;
 
-  /// `peer` is its number in the network.
+  /// `peer` is its number in the network. One that `leaves` has now and then a time by which it is
+  /// gone; another one comes then.
   SimulatedWorker(World& world, Network& network, std::uint64_t peer, Killers killers,
-                  std::string solver_version);
+                  std::string solver_version, bool leaves);
 
   /// The process, if there is one, dies; another one starts after a while. The first one starts so
   /// too.
@@ -60,6 +61,7 @@ class SimulatedWorker {
   std::uint64_t peer_;
   Killers killers_;
   std::string solver_version_;
+  bool leaves_;
   std::int64_t ms_per_point_;
   std::optional<worker::Conversation> conversation_;
   Network::LinkId link_ = 0;

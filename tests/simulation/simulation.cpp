@@ -92,7 +92,7 @@ class Simulation {
     for (std::int64_t i = 0; i < count; ++i) {
       workers_.push_back(std::make_unique<SimulatedWorker>(
           world_, workers_network_, static_cast<std::uint64_t>(i), killers_,
-          !settings_.storms && world_.chance(0.2) ? "2" : "1"));
+          !settings_.storms && world_.chance(0.2) ? "2" : "1", !settings_.storms));
       workers_.back()->restart(world_.between(0, 3000));
     }
   }
