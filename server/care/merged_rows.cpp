@@ -12,6 +12,7 @@
 #include "server/care/merged_references.h"
 #include "server/care/table_columns.h"
 #include "server/store/result_row.h"
+#include "worker/solver/model/result_fields.h"
 
 namespace oblique::server {
 namespace {
@@ -51,12 +52,19 @@ struct RowColumns {
     const auto has = [&](const std::string& name) {
       return std::find(there.begin(), there.end(), name) != there.end();
     };
-    std::string columns = fmt::format("{}, {}", result_soundness_sql(schema_of(source)),
-                                      has("checksum") ? "checksum IS NOT NULL" : "0");
+    std::string columns = has("checksum") ? "checksum IS NOT NULL" : "0";
     for (const std::string& name : names) {
       columns += ", " + (has(name) ? name : "NULL");
     }
-    return fmt::format("SELECT {}, rowid FROM results ORDER BY rowid", columns);
+    // One list that no JSON is would fail every query of the views that unfold it.
+    std::string sound = result_soundness_sql(schema_of(source));
+    for (const solver::ResultList* list : solver::result_lists()) {
+      const std::string column(list->column);
+      if (has(column)) {
+        sound += fmt::format(" AND ({0} IS NULL OR json_valid({0}))", column);
+      }
+    }
+    return fmt::format("SELECT {}, {}, rowid FROM results ORDER BY rowid", sound, columns);
   }
   /// The last parameter says whether the row gets a checksum: one of a row that had none would say
   /// that it was never changed.

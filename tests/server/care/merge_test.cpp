@@ -276,6 +276,9 @@ TEST_F(MergeTest, ARowThatIsNotAsItWasStoredRefusesTheWholeDatabase) {
   EXPECT_EQ(text("all", "SELECT count(*) FROM studies"), "0");
   texts("one", "UPDATE results SET checksum = NULL, study_id = 77 WHERE point = 8");
   EXPECT_THROW(merge("one"), StorageError) << "of a study that is not there";
+  texts("one", "UPDATE results SET checksum = NULL, study_id = 1 WHERE study_id = 77");
+  texts("one", "UPDATE results SET checksum = NULL, peaks = '[[1, 2' WHERE point = 8");
+  EXPECT_THROW(merge("one"), StorageError) << "with a list that no query could unfold";
 }
 
 TEST_F(MergeTest, AStudyThatWouldKeepAServerFromStartingRefusesTheWholeDatabase) {
