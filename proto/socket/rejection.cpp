@@ -1,5 +1,7 @@
 #include "proto/socket/rejection.h"
 
+#include <string_view>
+
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/socket/socket.h"
@@ -14,15 +16,35 @@ std::string key_of(const DealerSettings& settings) {
                      z85(settings.key->pair.public_key));
 }
 
+/// A server says the same of keys that it does not know and of such for its other port, which the
+/// address does not show unless its port is the usual one of this program.
+std::string unknown_key(const DealerSettings& settings) {
+  constexpr std::string_view kWorkersPort = "7601";
+  constexpr std::string_view kClientsPort = "7600";
+  const std::string_view ours = settings.is_worker ? kWorkersPort : kClientsPort;
+  const std::string_view others = settings.is_worker ? kClientsPort : kWorkersPort;
+  const std::string_view port = std::string_view(settings.url).substr(settings.url.rfind(':') + 1);
+  const std::string perhaps_other_port =
+      port == ours
+          ? ""
+          : fmt::format(
+                "either port {} is the server's port for {} (by default {}), and {} use another "
+                "one ({}); or ",
+                port, settings.is_worker ? "clients" : "workers", others,
+                settings.is_worker ? "workers" : "clients", ours);
+  return fmt::format(
+      "{}the key is not on the server's list, or was revoked. Where the server is, `oblique keys "
+      "list` shows the list and `oblique keys add` adds to it",
+      perhaps_other_port);
+}
+
 std::string refused_key(const DealerSettings& settings) {
   const bool is_for_workers = settings.key->role == Role::kWorker;
-  const std::string why =
-      is_for_workers == settings.is_worker
-          ? "the key is not on the server's list, or was revoked. Where the server is, `oblique "
-            "keys list` shows the list and `oblique keys add` adds to it"
-          : fmt::format("it is for {}, and this port is for {}",
-                        is_for_workers ? "workers" : "clients",
-                        settings.is_worker ? "workers" : "clients");
+  const std::string why = is_for_workers == settings.is_worker
+                              ? unknown_key(settings)
+                              : fmt::format("it is for {}, and this port is for {}",
+                                            is_for_workers ? "workers" : "clients",
+                                            settings.is_worker ? "workers" : "clients");
   return fmt::format("the server at {} did not accept this key ({}): {}", settings.url,
                      key_of(settings), why);
 }

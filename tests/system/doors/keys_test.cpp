@@ -100,6 +100,27 @@ TEST_F(KeysTest, AClientThatIsNotLetInSaysWhyAndWhoseKeyItShowed) {
   EXPECT_EQ(ask({"status"}, key("server")).exit_code, 2) << "nobody but the server uses that";
 }
 
+TEST_F(KeysTest, AGoodKeyAtTheOtherPortIsToldThatItMayBeThatOne) {
+  const Outcome outcome =
+      run_oblique(folder_, {"status", "--server", server_->worker_url(), "--keys", key("client")});
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr("the server's port for workers (by default 7601), and "
+                                           "clients use another one (7600); or the key is not on"),
+                                 HasSubstr(key("client"))));
+  const Worker worker(folder_, server_->client_url(), {"--keys", key("worker")});
+  wait_until_said(worker, "the server's port for clients (by default 7600), and workers use");
+}
+
+TEST_F(KeysTest, AServerThatIsGivenAKeyOfAnothersNamesTheVariableThatHoldsItAndItsOwn) {
+  Process server(folder_, server_program(),
+                 {"--db", folder_.file("a.db"), "--worker-port", "0", "--client-port", "0"},
+                 Environment{{"OBLIQUE_KEYS", key("client")}});
+  EXPECT_NE(server.wait(), 0);
+  EXPECT_THAT(server.err(),
+              AllOf(HasSubstr(key("client")), HasSubstr("environment variable OBLIQUE_KEYS"),
+                    HasSubstr("--keys or OBLIQUE_SERVER_KEYS")));
+}
+
 TEST_F(KeysTest, AKeyFileThatOthersMayReadIsWrongUsageWithTheRemedy) {
   std::filesystem::permissions(key("client"), std::filesystem::perms(0644));
   const Outcome outcome = ask({"status"}, key("client"));
