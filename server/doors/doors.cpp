@@ -9,12 +9,15 @@
 namespace oblique::server {
 namespace {
 
-protocol::KeyFile servers_key(const std::string& file) {
-  protocol::KeyFile key = protocol::read_key_file(file);
+protocol::KeyFile servers_key(const DoorSettings& settings) {
+  protocol::KeyFile key = protocol::read_key_file(settings.keys);
   if (key.role != protocol::Role::kServer) {
     throw solver::InputError(fmt::format(
-        "{} is the key of a {}: a server takes its own, as DIR/server.key of `oblique keygen DIR`",
-        file, name_of(key.role)));
+        "{}{} is the key of a {}: a server takes its own, as DIR/server.key of `oblique keygen "
+        "DIR`, by --keys or OBLIQUE_SERVER_KEYS",
+        settings.keys,
+        settings.keys_origin.empty() ? "" : fmt::format(" ({})", settings.keys_origin),
+        name_of(key.role)));
   }
   return key;
 }
@@ -24,7 +27,7 @@ protocol::KeyFile servers_key(const std::string& file) {
 Doors::Doors(const DoorSettings& settings)
     : address_(address_to_bind(settings)), access_(access_of(settings)) {
   if (access_ == Access::kKeys) {
-    key_ = servers_key(settings.keys);
+    key_ = servers_key(settings);
     list_ = std::make_shared<KeyList>(protocol::authorized_keys_beside(settings.keys));
   }
 }

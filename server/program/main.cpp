@@ -152,6 +152,7 @@ std::optional<int> finish_options(const CLI::App& app, const Configuration& conf
     std::cout << configuration.printed();
     return oblique::protocol::kDone;
   }
+  loop.doors.keys_origin = configuration.origin_of("--keys");
   loop.worker_port = options.worker_port == 0 ? "*" : std::to_string(options.worker_port);
   loop.client_port = options.client_port == 0 ? "*" : std::to_string(options.client_port);
   loop.service.solver_version = oblique::solver::solver_version();

@@ -123,6 +123,7 @@ void Configuration::add_short_form(CLI::Option* brief, CLI::Option* option,
 
 std::optional<int> Configuration::parse(int argc, const char* const* argv) {
   collect_settings();
+  tell_of_places();
   if (const auto exit_code = parse_command_line(app_, argc, argv)) {
     return exit_code;
   }
@@ -149,6 +150,21 @@ void Configuration::collect_settings() {
                          option->get_envname(), option->get_name()});
     // CLI11 would take it for one of the command line.
     option->envname("");
+  }
+}
+
+/// Below the options of --help, by an example.
+void Configuration::tell_of_places() {
+  const auto has_words = [](const Setting& setting) {
+    return setting.option->get_items_expected_min() > 0 &&
+           setting.key.find('_') != std::string::npos && setting.key.find('.') == std::string::npos;
+  };
+  const auto example = std::find_if(settings_.begin(), settings_.end(), has_words);
+  if (example != settings_.end()) {
+    app_.footer(
+        fmt::format("Every option may also be an environment variable ({}: {}) or a key of "
+                    "the file ({});\n--print-config shows what holds, and from where.",
+                    example->flag, example->variable, example->key));
   }
 }
 
@@ -274,6 +290,13 @@ void Configuration::check_exclusions() const {
       }
     }
   }
+}
+
+std::string Configuration::origin_of(const std::string& flag) const {
+  const auto found = std::find_if(settings_.begin(), settings_.end(), [&](const Setting& setting) {
+    return setting.option->get_name() == flag;
+  });
+  return found == settings_.end() ? "" : found->origin;
 }
 
 std::string Configuration::printed() const {

@@ -46,6 +46,9 @@ class Configuration {
 
   /// Whether what holds is to be printed, and nothing done.
   bool is_to_be_printed() const { return print_; }
+  /// Where the value of an option is from, as "environment variable OBLIQUE_KEYS"; "default" where
+  /// nobody gave one. After `parse`.
+  std::string origin_of(const std::string& flag) const;
   /// What holds, as a file that gives the same, with the place of each value in a comment.
   std::string printed() const;
 
@@ -65,6 +68,7 @@ class Configuration {
   };
 
   void collect_settings();
+  void tell_of_places();
   void expand_short_forms();
   std::string key_of(const std::string& flag) const;
   void read_places();

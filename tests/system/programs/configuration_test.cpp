@@ -76,6 +76,20 @@ TEST(ConfigurationOfProgramsTest, ServerAndWorkerRunOnFilesAlone) {
   }
 }
 
+TEST(ConfigurationOfProgramsTest, HelpEndsWithTheVariableAndTheKeyThatAnOptionMayAlsoBe) {
+  const TemporaryFolder folder;
+  for (const auto& [program, words] : std::vector<std::pair<std::string, std::string>>{
+           {server_program(), "(--worker-port: OBLIQUE_SERVER_WORKER_PORT)"},
+           {worker_program(), "(--idle-exit: OBLIQUE_WORKER_IDLE_EXIT)"}}) {
+    Process process(folder, program, {"--help"});
+    EXPECT_EQ(process.wait(), 0);
+    const auto said = process.out().find(words);
+    ASSERT_NE(said, std::string::npos) << process.out();
+    EXPECT_GT(said, process.out().rfind("\n  --"));
+    EXPECT_NE(process.out().find("--print-config shows", said), std::string::npos);
+  }
+}
+
 TEST(ConfigurationOfProgramsTest, AnUnknownKeyEndsBothWithTwoAndTheNearestName) {
   const TemporaryFolder folder;
   for (const auto& [program, text, named] :
