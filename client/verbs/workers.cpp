@@ -26,35 +26,69 @@ struct WorkersFlags {
   SourceFlags source;
 };
 
-/// What the holders of keys have, and who was turned away.
-void tell_keys(const protocol::WorkersReply& reply) {
+/// "1 study", "2 studies".
+std::string counted(std::uint64_t count, const char* one, const char* several) {
+  return fmt::format("{} {}", count, count == 1 ? one : several);
+}
+
+/// What the holder of a key has, of that only what is not nothing; empty where all is nothing.
+std::string shown_key(const protocol::KeyStatus& key) {
+  std::string has;
+  const auto add = [&has](const std::string& part) { has += (has.empty() ? "" : ", ") + part; };
+  if (key.connections() > 0) {
+    add(counted(key.connections(), "connection", "connections"));
+  }
+  if (key.open_studies() > 0) {
+    add(fmt::format("{} with {} open", counted(key.open_studies(), "study", "studies"),
+                    counted(key.open_points(), "point", "points")));
+  }
+  if (key.refused() > 0) {
+    add(counted(key.refused(), "request refused", "requests refused"));
+  }
+  return has.empty() ? has
+                     : fmt::format("key {}{}: {}", key.name(),
+                                   key.role().empty() ? "" : fmt::format(" ({})", key.role()), has);
+}
+
+/// A cause of the server's as people know it: who has no key comes with another mechanism.
+std::string shown_cause(const protocol::WorkersReply& reply, const std::string& reason) {
+  const bool is_mechanism = reason == "other mechanism";
+  return !is_mechanism              ? reason
+         : reply.access() == "keys" ? "without a key"
+                                    : "with a key, where there are none";
+}
+
+/// What the holders of keys have, who was turned away, and what no sound peer sends.
+void tell_access(const protocol::WorkersReply& reply) {
   for (const auto& key : reply.keys()) {
-    if (!key.name().empty()) {
-      tell_line(fmt::format(
-          "key {}{}: {} connections, {} studies with {} points open, {} requests refused",
-          key.name(), key.role().empty() ? "" : fmt::format(" ({})", key.role()), key.connections(),
-          key.open_studies(), key.open_points(), key.refused()));
+    if (const auto shown = shown_key(key); !key.name().empty() && !shown.empty()) {
+      tell_line(shown);
     }
   }
   std::string refusals;
   for (const auto& of_cause : reply.refusals()) {
-    refusals +=
-        fmt::format("{} {} ({})", refusals.empty() ? "" : ",", of_cause.reason(), of_cause.peers());
+    if (of_cause.peers() > 0) {
+      refusals += fmt::format("{} {} ({})", refusals.empty() ? "" : ",",
+                              shown_cause(reply, of_cause.reason()), of_cause.peers());
+    }
   }
   if (!refusals.empty()) {
     tell_line("turned away since the server began:" + refusals);
   }
+  if (reply.bad_frames() > 0) {
+    tell_line(
+        fmt::format("{} came that no sound worker or client sends; the server's log says from whom",
+                    counted(reply.bad_frames(), "frame", "frames")));
+  }
 }
 
-protocol::QueryReply workers_of_server(const ConnectionSettings& settings) {
+protocol::QueryReply table_of_workers(const protocol::WorkersReply& reply) {
   protocol::QueryReply table;
   for (const char* column :
        {"worker", "name", "threads", "instruction_set", "solver_version", "leased_points",
         "solved_points", "silent_ms", "losses", "standing", "key"}) {
     table.add_columns(column);
   }
-  const auto reply = Connection(settings).workers();
-  tell_if_insecure(reply.access(), settings.server_url);
   for (const auto& worker : reply.workers()) {
     auto& row = *table.add_rows();
     add_value(row, static_cast<std::int64_t>(worker.worker_id()));
@@ -71,19 +105,18 @@ protocol::QueryReply workers_of_server(const ConnectionSettings& settings) {
                                                   : "new"));
     add_value(row, worker.key());
   }
-  if (reply.bad_frames() > 0) {
-    std::cerr << fmt::format(
-        "{} frames came that no sound worker or client sends; the server's log says from whom\n",
-        reply.bad_frames());
-  }
-  tell_keys(reply);
   return table;
 }
 
 int workers(const WorkersFlags& flags) {
   const auto format = format_named(flags.format);
   if (flags.source.database.empty()) {
-    print_out(workers_of_server(connection_settings(flags.source)), format);
+    const auto settings = connection_settings(flags.source);
+    const auto reply = Connection(settings).workers();
+    tell_if_insecure(reply.access(), settings.server_url);
+    print_out(table_of_workers(reply), format);
+    std::cout.flush();  // where both are one terminal, what follows stands below the table
+    tell_access(reply);
     return kDone;
   }
   const auto source = open_database(flags.source.database);
