@@ -19,8 +19,11 @@ constexpr std::chrono::milliseconds kBetweenLooks{5};
 constexpr std::size_t kMostBytes = std::size_t{16} << 20U;
 
 /// One line, for a sentence.
-std::string with_words(const std::string& what, const ChildProcess& child) {
+std::string with_words(const std::string& what, const ChildProcess& child, bool last_line) {
   auto words = child.last_words();
+  if (last_line) {
+    words.erase(0, words.rfind('\n') + 1);
+  }
   std::replace(words.begin(), words.end(), '\n', ' ');
   return words.empty() ? what : fmt::format("{}: {}", what, words);
 }
@@ -39,14 +42,17 @@ std::string output_of(const CommandSettings& command) {
       if (Clock::now() > deadline) {
         throw CommandError(with_words(fmt::format("{} took longer than {} s", command.program,
                                                   solver::readable_number(command.timeout_s)),
-                                      child));
+                                      child, command.tells_last_line));
       }
       std::this_thread::sleep_for(kBetweenLooks);
     }
     if (!child.succeeded()) {
-      throw CommandError(with_words(fmt::format("{} {}", command.program, child.ending()), child));
+      throw CommandError(with_words(fmt::format("{} {}", command.program, child.ending()), child,
+                                    command.tells_last_line));
     }
     return child.output(kMostBytes);
+  } catch (const ProgramNotFound&) {
+    throw CommandNotFound(command.program + " is not in PATH");
   } catch (const ProcessError& error) {
     throw CommandError(fmt::format("{}: {}", command.program, error.what()));
   }

@@ -11,6 +11,7 @@ namespace oblique::client {
 struct CommandSettings {
   std::string program;  ///< without a slash: as found in PATH
   std::vector<std::string> arguments;
+  bool tells_last_line = false;    ///< of standard error, when it fails, and not all
   double timeout_s = 30.0;         ///< then it is killed
   std::string hidden_variables{};  ///< see ChildSettings
 };
@@ -21,9 +22,15 @@ class CommandError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// The program is nowhere in PATH.
+class CommandNotFound : public CommandError {
+ public:
+  using CommandError::CommandError;
+};
+
 /// Runs the program and gives what it wrote to standard output, at most 16 MiB. Throws CommandError
-/// naming the program when it cannot be started, fails, or takes too long, with what it wrote to
-/// standard error.
+/// naming the program when it cannot be started (CommandNotFound when it is not there), fails, or
+/// takes too long, with what it wrote to standard error.
 std::string output_of(const CommandSettings& command);
 
 }  // namespace oblique::client

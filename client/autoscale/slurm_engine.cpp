@@ -76,8 +76,12 @@ std::string SlurmEngine::run(const std::string& program, std::vector<std::string
     // Variables that filter what squeue lists would hide jobs, and more would be submitted.
     return output_of({.program = program,
                       .arguments = std::move(arguments),
+                      // Slurm says the same in several lines while it tries again.
+                      .tells_last_line = program == "squeue",
                       .timeout_s = settings_.command_timeout_s,
                       .hidden_variables = "SQUEUE_"});
+  } catch (const CommandNotFound& error) {
+    throw EngineError(fmt::format("Slurm's {}: run this where sbatch works", error.what()));
   } catch (const CommandError& error) {
     throw EngineError(error.what());
   }

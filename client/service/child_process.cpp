@@ -117,8 +117,11 @@ ChildProcess::ChildProcess(const ChildSettings& settings) {
                                  arguments.data(), variables.data());
   if (error != 0) {
     pid_ = -1;
-    throw ProcessError(
-        fmt::format("cannot start {}: {}", settings.program.string(), reason(error)));
+    const auto what = fmt::format("cannot start {}: {}", settings.program.string(), reason(error));
+    if (error == ENOENT) {
+      throw ProgramNotFound(what);
+    }
+    throw ProcessError(what);
   }
 }
 

@@ -19,6 +19,12 @@ class ProcessError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// There is no such program.
+class ProgramNotFound : public ProcessError {
+ public:
+  using ProcessError::ProcessError;
+};
+
 using protocol::Descriptor;
 
 /// Both ends of a pipe, closed in children unless handed to them.

@@ -1,8 +1,11 @@
 #include <chrono>
 #include <cmath>
 #include <cstddef>
+#include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <iostream>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <string>
@@ -59,6 +62,36 @@ std::string installed_script() {
   return std::filesystem::exists(script) ? script.string() : std::string();
 }
 
+bool is_set(const char* variable) {
+  const char* value = std::getenv(variable);
+  return value != nullptr && *value != '\0';
+}
+
+/// Jobs whose script has no server to go to would fail one after the other.
+void check_variables(const AutoscaleFlags& flags, const std::string& script) {
+  constexpr const char* kServer = "OBLIQUE_WORKER_SERVER";
+  constexpr const char* kKeys = "OBLIQUE_WORKER_KEYS";
+  const auto is_given = [&flags](const char* variable) {
+    // --sbatch-args "--export=ALL,OBLIQUE_WORKER_SERVER=..." will do too.
+    return is_set(variable) || flags.sbatch_arguments.find(variable) != std::string::npos;
+  };
+  std::ifstream file(script);
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  if (text.find(fmt::format("${{{}:?", kServer)) != std::string::npos && !is_given(kServer)) {
+    throw solver::InputError(
+        fmt::format("{} is not set, and {} needs it: export {}=tcp://HOST:7601, where the server "
+                    "awaits workers",
+                    kServer, script, kServer));
+  }
+  const bool has_keys = !flags.source.keys.empty() || is_set("OBLIQUE_KEYS");
+  if (has_keys && text.find(kKeys) != std::string::npos && !is_given(kKeys)) {
+    tell_line(
+        fmt::format("{} is not set, and this server has keys: without a worker's key file "
+                    "the workers of the jobs are turned away.",
+                    kKeys));
+  }
+}
+
 SlurmSettings slurm_settings(const AutoscaleFlags& flags, const std::string& server_url) {
   auto settings = flags.slurm;
   for (const auto argument : protocol::split(flags.sbatch_arguments, ' ')) {
@@ -78,6 +111,9 @@ SlurmSettings slurm_settings(const AutoscaleFlags& flags, const std::string& ser
   }
   if (submits && !std::filesystem::exists(settings.script)) {
     throw solver::InputError(fmt::format("--script {}: there is no such file", settings.script));
+  }
+  if (submits) {
+    check_variables(flags, settings.script);
   }
   return settings;
 }
@@ -167,7 +203,7 @@ void add_scaling_flags(CLI::App& verb, AutoscaleFlags& flags) {
       ->check(CLI::Range(std::size_t{0}, kMostJobs))
       ->type_name("N")
       ->capture_default_str();
-  verb.add_option("--max", flags.most, "most jobs at a time")
+  verb.add_option("--max", flags.most, "most jobs at a time; REQUIRED unless --retire")
       ->check(CLI::Range(std::size_t{1}, kMostJobs))
       ->type_name("N");
   verb.add_option("--target", scaling.target_s, "what is open should be done in so long [s]")

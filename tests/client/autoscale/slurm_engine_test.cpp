@@ -101,6 +101,16 @@ TEST_F(SlurmEngineTest, AControllerThatIsAwayIsAnErrorWithItsWords) {
             "controller");
 }
 
+TEST_F(SlurmEngineTest, OfWhatSqueueSaysInManyLinesTheLastIsTold) {
+  pretend("squeue", "echo 'squeue: error: trying again' >&2; echo 'squeue: away' >&2; exit 1");
+  EXPECT_EQ(listing_error(), "squeue ended with exit code 1: squeue: away");
+}
+
+TEST_F(SlurmEngineTest, WhereThereIsNoSlurmItSaysWhereItShouldRun) {
+  setenv("PATH", folder_.path().c_str(), 1);
+  EXPECT_EQ(listing_error(), "Slurm's squeue is not in PATH: run this where sbatch works");
+}
+
 TEST_F(SlurmEngineTest, VariablesThatFilterTheListHaveNoEffect) {
   setenv("SQUEUE_PARTITION", "other", 1);
   pretend("squeue", "echo \"12|RUNNING|${SQUEUE_PARTITION}oblique autoscale for tcp://head:7600\"");
