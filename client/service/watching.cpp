@@ -1,5 +1,6 @@
 #include "client/service/watching.h"
 
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -28,6 +29,14 @@ Seconds pause_after(Seconds elapsed) {
   return std::clamp(elapsed / 40, kShortest, kLongest);
 }
 
+// Of the terminal that progress is drawn on.
+std::size_t terminal_columns() {
+  constexpr std::size_t kUnlessTold = 80;
+  struct winsize size {};
+  return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col
+                                                                         : kUnlessTold;
+}
+
 void tell_failures(const protocol::StudyStatus& status,
                    const std::function<protocol::QueryReply(const std::string&)>& query) {
   std::cerr << fmt::format("{} of {} points failed:\n", status.failed(), status.points());
@@ -48,7 +57,7 @@ void tell_line(const std::string& sentence) {
 }
 
 protocol::StudyStatus watch_study(const AskStatus& ask, protocol::StopSignals& stop) {
-  Progress progress(std::cerr, isatty(STDERR_FILENO) == 1);
+  Progress progress(std::cerr, isatty(STDERR_FILENO) == 1, terminal_columns);
   const Tell tell = [&progress](const std::string& sentence) {
     progress.finish();
     tell_line(sentence);

@@ -78,10 +78,64 @@ TEST(Progress, WeighsSamplesByTheTimeBetweenThem) {
   }
   update(5.0, 400);
   EXPECT_NE(last_bar().find(" 80 points/s"), std::string::npos) << last_bar();
-  // Nothing is looked at for a minute: the rate is that minute's.
-  update(65.0, 1000);
-  EXPECT_NE(last_bar().find(" 10 points/s"), std::string::npos) << last_bar();
-  EXPECT_NE(last_bar().find(" 6 min 40 s left"), std::string::npos) << last_bar();
+}
+
+TEST(Progress, LeavesOutTheTimeThatAServerWasAwayAndSaysNoRateUntilSomethingHasCome) {
+  std::ostringstream out;
+  Progress progress(out, true);
+  const auto bar_after = [&](double elapsed_s, std::uint64_t settled) {
+    progress.update({.study = "s", .points = 5000, .settled = settled, .elapsed_s = elapsed_s});
+    const auto text = out.str();
+    return text.substr(text.rfind('\r'));
+  };
+  bar_after(0.0, 0);
+  EXPECT_NE(bar_after(0.5, 50).find(" 100 points/s"), std::string::npos);
+  EXPECT_EQ(bar_after(600.0, 51).find("points/s"), std::string::npos);
+  EXPECT_EQ(bar_after(600.5, 51).find("left"), std::string::npos);
+  const auto bar = bar_after(601.0, 151);
+  EXPECT_NE(bar.find(" 100 points/s, 48 s left"), std::string::npos) << bar;
+}
+
+TEST(Progress, KnowsARateWhereEveryAnswerTakesLong) {
+  std::ostringstream out;
+  Progress progress(out, true);
+  for (int i = 0; i <= 3; ++i) {
+    progress.update({.study = "s",
+                     .points = 5000,
+                     .settled = static_cast<std::uint64_t>(200 * i),
+                     .elapsed_s = 20.0 * i});
+  }
+  const auto text = out.str();
+  EXPECT_NE(text.substr(text.rfind('\r')).find(" 10 points/s"), std::string::npos) << text;
+}
+
+TEST(Progress, KeepsToTheWidthOfTheTerminalTheBarFirst) {
+  const ProgressState state{.study = "abc\u00e9",
+                            .points = 1'000'000,
+                            .settled = 500'000,
+                            .failed = 12,
+                            .points_per_s = 1234.5};
+  const std::string end = " 500000/1000000 50 %, 12 failed, 1234 points/s, 6 min 45 s left";
+  EXPECT_EQ(progress_bar(state, 79), "abc\u00e9 [####-----]" + end);
+  EXPECT_EQ(progress_bar(state, end.size() + 10), "abc\u00e9" + end) << "a bar too short to read";
+  EXPECT_EQ(progress_bar(state, end.size() + 3), "abc" + end);
+  EXPECT_EQ(progress_bar(state, 10), end.substr(0, 10));
+  EXPECT_EQ(progress_bar(state, 0), "");
+}
+
+TEST(Progress, IsDrawnTenTimesASecondAtMostAndAsWideAsTheTerminalIsThen) {
+  std::ostringstream out;
+  std::size_t columns = 80;
+  Progress progress(out, true, [&columns] { return columns; });
+  for (int i = 0; i < 1000; ++i) {
+    columns = i < 500 ? 80 : 20;
+    progress.update({.study = "s", .points = 10, .settled = 5, .elapsed_s = 0.001 * i});
+  }
+  const auto text = out.str();
+  const auto drawn = std::count(text.begin(), text.end(), '\r');
+  EXPECT_GE(drawn, 9);
+  EXPECT_LE(drawn, 11);
+  EXPECT_LE(text.size() - text.rfind('\r'), 19U + std::string("\r\x1b[K").size());
 }
 
 TEST(Progress, ShowsTheNameOfAStudyWithoutSteeringTheTerminal) {
