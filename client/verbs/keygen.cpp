@@ -1,9 +1,12 @@
+#include <filesystem>
 #include <iostream>
 #include <memory>
+#include <stdexcept>
 #include <string>
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/verbs/printed_rows.h"
 #include "client/verbs/verbs.h"
 #include "proto/keys/key_folder.h"
 
@@ -22,6 +25,13 @@ submit studies, a reader's to those who only look.)";
 
 int keygen(const std::string& folder) {
   using protocol::key_file_in;
+  const std::string list = protocol::authorized_keys_in(folder);
+  if (std::filesystem::exists(std::filesystem::symlink_status(list))) {
+    throw std::runtime_error(
+        fmt::format("{} is there already, and is never overwritten; one more key for its server: "
+                    "oblique keys add NAME --role ROLE --dir {}",
+                    list, shell_word(folder)));
+  }
   const auto server = protocol::make_key_folder(folder);
   std::cout << fmt::format(
       "{}  oblique-server --keys: stays on its machine\n"

@@ -2,6 +2,7 @@
 #include <iostream>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
 
 #include <spdlog/fmt/fmt.h>
@@ -9,6 +10,7 @@
 #include "client/output/printer.h"
 #include "client/verbs/printed_rows.h"
 #include "client/verbs/verbs.h"
+#include "proto/keys/key_file.h"
 #include "proto/keys/key_folder.h"
 #include "proto/text.h"
 #include "worker/solver/model/errors.h"
@@ -25,7 +27,7 @@ constexpr const char* kKeysExamples = R"(Examples:
 A running server heeds a change within a second; the connections of a revoked key are ended.)";
 
 struct KeysFlags {
-  std::string folder{"."};
+  std::string folder;  // empty: not given
   std::string name;
   std::string role;
   std::string public_key;  // empty: a new pair
@@ -54,13 +56,68 @@ std::optional<protocol::CurveKey> public_key_of(const std::string& text) {
   return key;
 }
 
+bool is_there(const std::string& path) {
+  return std::filesystem::exists(std::filesystem::symlink_status(path));
+}
+
+/// The folder that was named, else this one or the `keys` in it, whichever has a list.
+std::string folder_of(const KeysFlags& flags) {
+  const auto has_keys = [](const std::string& folder) {
+    return is_there(protocol::authorized_keys_in(folder)) ||
+           is_there(protocol::key_file_in(folder, "server"));
+  };
+  std::string folder = flags.folder;
+  if (folder.empty()) {
+    folder = !has_keys(".") && has_keys("keys") ? "keys" : ".";
+  }
+  if (!has_keys(folder)) {
+    throw solver::InputError(
+        fmt::format("there is no {}: name the folder of the server's keys with --dir DIR",
+                    protocol::authorized_keys_in(folder)));
+  }
+  return folder;
+}
+
+std::optional<protocol::KeyFile> key_in(const std::string& path) {
+  try {
+    return protocol::read_key_file(path);
+  } catch (const solver::InputError&) {
+    return std::nullopt;
+  }
+}
+
+/// A file with a key for this server that its list lacks is that of a revoked one: throws
+/// std::runtime_error with what to do about it.
+void check_not_revoked(const std::string& folder, const std::string& name) {
+  const std::string path = protocol::key_file_in(folder, name);
+  const std::string list = protocol::authorized_keys_in(folder);
+  if (!protocol::objection_to_key_name(name).empty() || !is_there(path) || !is_there(list)) {
+    return;
+  }
+  const auto listed = protocol::read_authorized_keys(list);
+  const auto server = key_in(protocol::key_file_in(folder, "server"));
+  const auto key = key_in(path);
+  if (server && key && key->server == server->pair.public_key &&
+      listed.find(key->pair.public_key) == nullptr && listed.find(name) == nullptr) {
+    throw std::runtime_error(fmt::format(
+        "{} is there already, and is the key of {}, which was revoked: remove the file for a new "
+        "key, or list this one again with oblique keys add {} --role {} --dir {} --public='{}'",
+        path, key->name, name, name_of(key->role), shell_word(folder),
+        protocol::z85(key->pair.public_key)));
+  }
+}
+
 int add(const KeysFlags& flags) {
-  const auto key = protocol::add_key(flags.folder, flags.name, role_of(flags.role),
-                                     public_key_of(flags.public_key));
-  std::cerr << fmt::format("{} ({}) is listed{}.\n", key.name, flags.role,
-                           flags.public_key.empty()
-                               ? "; its key is in " + protocol::key_file_in(flags.folder, key.name)
-                               : "");
+  const auto role = role_of(flags.role);
+  const auto public_key = public_key_of(flags.public_key);
+  const std::string folder = folder_of(flags);
+  if (!public_key) {
+    check_not_revoked(folder, flags.name);
+  }
+  const auto key = protocol::add_key(folder, flags.name, role, public_key);
+  std::cerr << fmt::format(
+      "{} ({}) is listed{}.\n", key.name, flags.role,
+      flags.public_key.empty() ? "; its key is in " + protocol::key_file_in(folder, key.name) : "");
   return kDone;
 }
 
@@ -70,7 +127,7 @@ int list(const KeysFlags& flags) {
   for (const char* column : {"name", "role", "public", "added_at"}) {
     table.add_columns(column);
   }
-  const auto keys = protocol::read_authorized_keys(protocol::authorized_keys_in(flags.folder));
+  const auto keys = protocol::read_authorized_keys(protocol::authorized_keys_in(folder_of(flags)));
   for (const auto& key : keys.all()) {
     auto& row = *table.add_rows();
     add_value(row, key.name);
@@ -83,13 +140,17 @@ int list(const KeysFlags& flags) {
 }
 
 int revoke(const KeysFlags& flags) {
-  const std::string path = protocol::authorized_keys_in(flags.folder);
+  const std::string folder = folder_of(flags);
+  const std::string path = protocol::authorized_keys_in(folder);
   if (!std::filesystem::exists(path)) {
     throw solver::InputError(fmt::format("there is no {}: say where it is with --dir", path));
   }
   protocol::change_authorized_keys(
       path, [&](protocol::AuthorizedKeys& keys) { keys.remove(flags.name); });
   std::cerr << fmt::format("{} is revoked: its key is worth nothing from now on.\n", flags.name);
+  if (const auto file = protocol::key_file_in(folder, flags.name); is_there(file)) {
+    std::cerr << fmt::format("The file {} stays, and is worth nothing.\n", file);
+  }
   return kDone;
 }
 
@@ -102,9 +163,10 @@ void add_keys(CLI::App& app, Command& command) {
   verb->require_subcommand(1);
   const auto add_action = [&](const char* name, const char* help, int (*action)(const KeysFlags&)) {
     auto* added = verb->add_subcommand(name, help);
-    added->add_option("--dir", flags->folder, "folder of the server's key and the list")
-        ->type_name("DIR")
-        ->capture_default_str();
+    added
+        ->add_option("--dir", flags->folder,
+                     "folder of the server's key and the list; default: this one, else keys")
+        ->type_name("DIR");
     added->callback(
         [flags, action, &command] { command = [flags, action] { return action(*flags); }; });
     return added;

@@ -1,6 +1,7 @@
 #include "client/verbs/printed_rows.h"
 
 #include <iostream>
+#include <string_view>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -26,6 +27,19 @@ int print_whole(const protocol::QueryReply& rows, Format format) {
       "read the database itself with --db FILE.\n",
       rows.rows_size());
   return protocol::kFailed;
+}
+
+std::string shell_word(const std::string& text) {
+  constexpr std::string_view kPlain =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-./:";
+  if (!text.empty() && text.find_first_not_of(kPlain) == std::string::npos) {
+    return text;
+  }
+  std::string quoted = "'";
+  for (const char letter : text) {
+    quoted += letter == '\'' ? std::string("'\\''") : std::string(1, letter);
+  }
+  return quoted + "'";
 }
 
 void print_first(const protocol::QueryReply& rows, std::uint64_t points) {

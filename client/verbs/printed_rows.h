@@ -17,6 +17,9 @@ void add_format_flag(CLI::App& verb, std::string& format);
 /// gives kFailed, else kDone.
 int print_whole(const protocol::QueryReply& rows, Format format);
 
+/// `text` as one word of a shell.
+std::string shell_word(const std::string& text);
+
 /// Prints the first rows of a study as a table, in the units that people read. When there are more
 /// `points`, says so on standard error.
 void print_first(const protocol::QueryReply& rows, std::uint64_t points);

@@ -30,20 +30,6 @@ struct RunFlags {
   RunSettings settings;
 };
 
-/// `text` as one word of a shell.
-std::string shell_word(const std::string& text) {
-  constexpr std::string_view kPlain =
-      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-./";
-  if (!text.empty() && text.find_first_not_of(kPlain) == std::string::npos) {
-    return text;
-  }
-  std::string quoted = "'";
-  for (const char letter : text) {
-    quoted += letter == '\'' ? std::string("'\\''") : std::string(1, letter);
-  }
-  return quoted + "'";
-}
-
 int run(const RunFlags& flags) {
   const auto study = study_of_flags(flags.study, tip_reach());
   check_settings(flags.settings);

@@ -190,7 +190,36 @@ TEST_F(KeysTest, ListsThatCannotBeChangedAsAskedStayAsTheyAre) {
   EXPECT_EQ(change_keys({"add", "../x", "--role", "client"}).exit_code, 2);
   EXPECT_THAT(change_keys({"revoke", "nobody"}).err, HasSubstr("client, worker, reader"));
   EXPECT_EQ(change_keys({"list", "--format", "csv"}).out, before);
-  EXPECT_EQ(run_oblique(folder_, {"keygen", keys_}).exit_code, 1);
+  const Outcome again = run_oblique(folder_, {"keygen", keys_});
+  EXPECT_EQ(again.exit_code, 1);
+  EXPECT_THAT(again.err, HasSubstr("oblique keys add NAME --role ROLE --dir "));
+}
+
+TEST_F(KeysTest, ARevokedKeysFileStaysAndWhoAddsItsNameAgainIsToldWhatItIs) {
+  ASSERT_EQ(change_keys({"add", "anna", "--role", "client"}).exit_code, 0);
+  EXPECT_THAT(change_keys({"revoke", "anna"}).err,
+              HasSubstr("The file " + key("anna") + " stays, and is worth nothing"));
+  const Outcome again = change_keys({"add", "anna", "--role", "client"});
+  EXPECT_EQ(again.exit_code, 1);
+  EXPECT_THAT(again.err, AllOf(HasSubstr("the key of anna, which was revoked: remove the file"),
+                               HasSubstr("--public='")));
+  std::filesystem::remove(key("anna"));
+  EXPECT_EQ(change_keys({"add", "anna", "--role", "client"}).exit_code, 0);
+}
+
+TEST_F(KeysTest, TheFolderCalledKeysIsTakenWhereThisOneHasNone) {
+  EXPECT_THAT(run_oblique(folder_, {"keys", "list"}).out, HasSubstr("reader"));
+  EXPECT_EQ(run_oblique(folder_, {"keys", "add", "anna", "--role", "client"}).exit_code, 0);
+  EXPECT_TRUE(std::filesystem::exists(key("anna")));
+  EXPECT_EQ(run_oblique(folder_, {"keys", "revoke", "anna"}).exit_code, 0);
+  const TemporaryFolder empty;
+  for (const auto& arguments : {std::vector<std::string>{"keys", "list"},
+                                {"keys", "add", "anna", "--role", "client"},
+                                {"keys", "revoke", "anna"}}) {
+    const Outcome outcome = run_oblique(empty, arguments);
+    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_THAT(outcome.err, HasSubstr("--dir DIR"));
+  }
 }
 
 TEST(OpenDoorsTest, BeyondLoopbackAServerNeedsKeysOrTheWordInsecure) {
