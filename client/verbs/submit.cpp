@@ -17,6 +17,7 @@
 #include "client/verbs/verbs.h"
 #include "proto/program/usage.h"
 #include "proto/recipe/study_terms.h"
+#include "worker/solver/model/number.h"
 
 namespace oblique::client {
 namespace {
@@ -38,13 +39,32 @@ struct SubmitFlags {
   StudyTerms terms;
 };
 
-void tell_submitted(const Study& study, const protocol::SubmitReply& reply) {
+void tell_submitted(const Study& study, const protocol::SubmitReply& reply,
+                    const StudyTerms& terms) {
+  std::string known;
+  if (!reply.created()) {
+    known = "; the server had it already";
+    if (terms.priority) {
+      known += fmt::format("; its priority is now {}", *terms.priority);
+    }
+    if (terms.weight) {
+      known += fmt::format("; its weight is now {}", solver::exact_number(*terms.weight));
+    }
+  }
   std::cout << study.name << ": " << reply.points() << " points, " << reply.settled() << " done"
-            << (reply.created() ? "" : "; the server had it already") << std::endl;
+            << known << std::endl;
 }
 
-int watch(const Study& study, std::int64_t rows, Connection& connection,
-          protocol::StopSignals& stop) {
+/// The command that asks this server for more of a study.
+std::string query_for_more(const Study& study, const ConnectionSettings& server) {
+  const std::string key = server.key ? server.key->path : "";
+  return fmt::format("oblique query {} --server {}{}", shell_word(study.name),
+                     shell_word(server.server_url),
+                     key.empty() ? "" : " --keys " + shell_word(key));
+}
+
+int watch(const Study& study, std::int64_t rows, const std::string& for_more,
+          Connection& connection, protocol::StopSignals& stop) {
   const auto ask = [&](const Tell& tell) {
     const auto status = connection.status(study.name, tell);
     if (status.studies_size() != 1) {
@@ -62,6 +82,7 @@ int watch(const Study& study, std::int64_t rows, Connection& connection,
   };
   if (rows > 0) {
     print_first(query(statement_of_first_results(study, rows)), status.points());
+    std::cerr << "More: " << for_more << '\n';
   }
   return tell_end(status, query);
 }
@@ -78,13 +99,15 @@ int submit(const SubmitFlags& flags) {
   check(flags.terms);
   const auto study = study_of_flags(flags.study, tip_reach());
   protocol::StopSignals stop;
-  Connection connection(connection_settings(flags.source), [&stop] { return !stop.requested(); });
+  const auto server = connection_settings(flags.source);
+  Connection connection(server, [&stop] { return !stop.requested(); });
   bool submitted = false;
   try {
-    tell_submitted(study, connection.submit(study, flags.terms));
+    tell_submitted(study, connection.submit(study, flags.terms), flags.terms);
     tell_mesh(std::cerr, study.recipe);
     submitted = true;
-    return flags.watch || flags.rows ? watch(study, flags.rows.value_or(0), connection, stop)
+    return flags.watch || flags.rows ? watch(study, flags.rows.value_or(0),
+                                             query_for_more(study, server), connection, stop)
                                      : kDone;
   } catch (const Interrupted&) {
     std::cerr << (submitted ? "No longer watching; the study goes on at "
