@@ -32,7 +32,7 @@ constexpr std::chrono::milliseconds kShareOfTurn{5};
 /// When the database is gone, peers can still ask for so long why.
 constexpr std::chrono::seconds kFarewell{3};
 /// What has arrived when the server is told to stop is still read, for so long at most.
-constexpr std::chrono::milliseconds kLongestDrain{1000};
+constexpr std::chrono::milliseconds kLongestLastRead{1000};
 
 Instant now() {
   using std::chrono::duration_cast;
@@ -76,7 +76,9 @@ const std::string& safe_path(const LoopSettings& settings) {
 class Loop::Parts final : public Outbox {
  public:
   explicit Parts(LoopSettings settings)
-      : doors_(settings.doors),
+      : drain_(settings.drain),
+        on_turn_(settings.on_turn),
+        doors_(settings.doors),
         store_(safe_path(settings)),
         writer_(store_, [this](std::vector<WriteReport> r) { written_.put(std::move(r)); }),
         queries_(settings.database, settings.queries,
@@ -105,7 +107,7 @@ class Loop::Parts final : public Outbox {
     }
   }
 
-  LoopEnd run(int stop_fd) {
+  LoopEnd run(int stop_fd, const std::function<void()>& take_stop) {
     auto next_tick = Clock::now();
     std::array<pollfd, 5> items{{{network_.descriptor(), POLLIN, 0},
                                  {written_.descriptor(), POLLIN, 0},
@@ -114,7 +116,10 @@ class Loop::Parts final : public Outbox {
                                  {stop_fd, POLLIN, 0}}};
     bool has_more = false;
     std::optional<Clock::time_point> farewell_until;
-    while (items.back().revents == 0 && (!farewell_until || Clock::now() < *farewell_until)) {
+    while (!farewell_until || Clock::now() < *farewell_until) {
+      if ((items.back().revents != 0 && !begin_drain(take_stop)) || is_drained()) {
+        break;
+      }
       const auto wait = std::chrono::ceil<std::chrono::milliseconds>(next_tick - Clock::now());
       ::poll(items.data(), items.size(),
              has_more ? 0 : static_cast<int>(std::max<std::int64_t>(wait.count(), 0)));
@@ -127,6 +132,7 @@ class Loop::Parts final : public Outbox {
         service_->tick(now());
         look_at_doors();
         show();
+        tell_turn(drain_until_ ? LoopTurn::Stage::kDrains : LoopTurn::Stage::kRuns);
         next_tick = Clock::now() + kTick;
       }
       if (service_->storage_is_gone() && !farewell_until) {
@@ -282,13 +288,54 @@ class Loop::Parts final : public Outbox {
     }
   }
 
+  void tell_turn(LoopTurn::Stage stage) const {
+    if (on_turn_) {
+      on_turn_({stage, service_->scheduler().workers(), service_->scheduler().leases()});
+    }
+  }
+
+  /// Whether the loop goes on although it was told to stop.
+  bool begin_drain(const std::function<void()>& take_stop) {
+    if (drain_until_ || drain_.count() == 0 || !take_stop) {
+      return false;
+    }
+    take_stop();
+    drain_until_ = Clock::now() + drain_;
+    spdlog::info(
+        "draining: nothing more is handed out; waits up to {} s for {} batches that are with "
+        "workers. A second signal ends it at once",
+        std::chrono::duration<double>(drain_).count(), service_->scheduler().leases());
+    service_->drain(now());
+    show();
+    tell_turn(LoopTurn::Stage::kDrains);
+    return true;
+  }
+
+  /// Whether nothing is left to wait for, or no time.
+  bool is_drained() const {
+    if (!drain_until_) {
+      return false;
+    }
+    if (service_->is_drained()) {
+      spdlog::info("drained: all that was handed out is stored or given back");
+      return true;
+    }
+    if (Clock::now() >= *drain_until_) {
+      spdlog::warn("not drained in time: {} batches are with workers, who deliver them later",
+                   service_->scheduler().leases());
+      return true;
+    }
+    return false;
+  }
+
   LoopEnd finish() {
     spdlog::info("stopping");
+    tell_turn(LoopTurn::Stage::kEnds);
     is_ending_ = true;
     queries_.stop();
     service_->stop(now());
     show();
-    const auto until = Clock::now() + kLongestDrain;
+    const auto until = Clock::now() + kLongestLastRead;
     bool has_more = true;
     while (has_more && Clock::now() < until) {
       pollfd item{network_.descriptor(), POLLIN, 0};
@@ -323,6 +370,9 @@ class Loop::Parts final : public Outbox {
     }
   }
 
+  const std::chrono::milliseconds drain_;
+  const std::function<void(const LoopTurn&)> on_turn_;
+  std::optional<Clock::time_point> drain_until_;  ///< none: it does not drain
   Doors doors_;
   Store store_;
   ReportBox written_;
@@ -356,8 +406,8 @@ std::string Loop::worker_endpoint() const {
 std::string Loop::http_url() const {
   return parts_->http_url();
 }
-LoopEnd Loop::run(int stop_fd) {
-  return parts_->run(stop_fd);
+LoopEnd Loop::run(int stop_fd, const std::function<void()>& take_stop) {
+  return parts_->run(stop_fd, take_stop);
 }
 
 }  // namespace oblique::server

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -12,6 +14,14 @@
 
 namespace oblique::server {
 
+/// How the loop is.
+struct LoopTurn {
+  enum class Stage { kRuns, kDrains, kEnds };
+  Stage stage;
+  std::size_t workers;
+  std::size_t leases;  ///< batches that are with workers
+};
+
 struct LoopSettings {
   std::string database;              ///< file
   bool allow_network_disk = false;   ///< the file may lie on a network file system
@@ -21,7 +31,11 @@ struct LoopSettings {
   QueryPoolSettings queries;
   NetworkLimits network;
   std::optional<WebSettings> web;  ///< database and solver version are those of the server
-  ServiceSettings service;         ///< solver_version must be set; the rest from the database
+  /// When it is told to stop, it waits so long for results under way; 0: it ends at once.
+  std::chrono::milliseconds drain{0};
+  /// Called on the loop's thread several times a second, and once as the loop ends.
+  std::function<void(const LoopTurn&)> on_turn;
+  ServiceSettings service;  ///< solver_version must be set; the rest from the database
 };
 
 /// What the loop ended with.
@@ -50,7 +64,9 @@ class Loop {
 
   /// Runs until `stop_fd` becomes readable, or a little longer than the database is there; then
   /// tells the workers, makes what was received durable, acknowledges it and returns.
-  LoopEnd run(int stop_fd);
+  /// With `drain` it first waits for results under way, when `take_stop` reads `stop_fd`, so that
+  /// a second request can be told from the first: that one ends it at once.
+  LoopEnd run(int stop_fd, const std::function<void()>& take_stop = {});
 
  private:
   class Parts;

@@ -62,6 +62,8 @@ class Conversation {
   /// After a stop: no point is being solved any more, and all that was is reported.
   Effects on_solver_idle(std::int64_t now_ms);
   bool is_stopping() const { return stopping_; }
+  /// Where it is, as a sentence part for people.
+  std::string status() const;
 
   std::int64_t next_deadline_ms() const;
   /// Whether further points may be solved: false while too many results wait to be acknowledged.

@@ -155,4 +155,12 @@ void Conversation::leave_if_due() {
   }
 }
 
+std::string Conversation::status() const {
+  if (stopping_) {
+    return "stopping: " + std::to_string(outbox_.results()) + " results are to be delivered";
+  }
+  return state_ == State::kWelcomed ? std::to_string(held_.size()) + " batches from the server"
+                                    : "looks for the server";
+}
+
 }  // namespace oblique::worker

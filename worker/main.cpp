@@ -20,6 +20,7 @@
 #include "proto/program/configuration/log_flags.h"
 #include "proto/program/exit_code.h"
 #include "proto/program/log.h"
+#include "proto/program/notify.h"
 #include "proto/program/parent.h"
 #include "proto/program/stop_signals.h"
 #include "proto/program/until.h"
@@ -88,7 +89,8 @@ oblique::worker::LeavingSettings leaving_settings(const Ending& ending) {
   return settings;
 }
 
-int run_worker(const SessionSettings& settings, const StopWithParent& parent) {
+int run_worker(SessionSettings settings, const StopWithParent& parent) {
+  oblique::protocol::Notifier notifier;
   oblique::protocol::StopSignals stop;  // before any thread starts
   oblique::protocol::survive_failed_writes();
   if (!parent.begin()) {
@@ -96,6 +98,11 @@ int run_worker(const SessionSettings& settings, const StopWithParent& parent) {
     return oblique::protocol::kDone;
   }
   oblique::worker::PointSolver points(settings.models_kept);
+  const oblique::worker::Session* running = nullptr;
+  settings.on_turn = [&] {
+    notifier.status(running->status());
+    notifier.turn(oblique::protocol::Notifier::Clock::now());
+  };
   oblique::worker::Session session(settings,
                                    [&](const auto& batch, const auto& next, const auto& take) {
                                      points.solve(batch, next, take);
@@ -103,7 +110,13 @@ int run_worker(const SessionSettings& settings, const StopWithParent& parent) {
   spdlog::info("worker {}, solver {} ({}), threads {}, server {}", settings.name,
                oblique::solver::solver_version(), oblique::solver::instruction_set(),
                settings.threads, settings.server);
-  const int exit_code = session.run(stop.descriptor(), [&stop] { stop.requested(); });
+  running = &session;
+  notifier.ready("looks for the server");  // which may come later
+  const int exit_code = session.run(stop.descriptor(), [&] {
+    stop.requested();
+    constexpr std::chrono::seconds kLongestEnd{5};
+    notifier.stopping("stopping", kLongestEnd);
+  });
   if (session.is_solving()) {
     // Points cannot be interrupted and may take long; nobody waits for them any more.
     spdlog::default_logger()->flush();

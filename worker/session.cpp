@@ -111,6 +111,9 @@ int Session::run(int stop_descriptor, const std::function<void()>& on_stop) {
       }
       continue;
     }
+    if (settings_.on_turn) {
+      settings_.on_turn();
+    }
     receive_all();
     note_rejection();
     if ((items[1].revents & ZMQ_POLLIN) != 0 || now_ms() >= report_due_ms_) {

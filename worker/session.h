@@ -24,6 +24,7 @@ struct SessionSettings {
   std::string host;                             ///< name of this machine, for people
   std::size_t threads = 1;                      ///< that solve points
   std::size_t models_kept = 8;                  ///< falls kept
+  std::function<void()> on_turn;                ///< called several times a second
   std::int64_t report_interval_ms = 100;        ///< solved points wait at most so long
   std::optional<protocol::KeyFile> key = {};    ///< its own; none: plain text
   ConversationSettings conversation;
@@ -43,6 +44,9 @@ class Session {
   /// request can be told from the first. Throws solver::InputError unless `settings.server` is an
   /// address.
   int run(int stop_descriptor, const std::function<void()>& on_stop);
+
+  /// Where the conversation is, as a sentence part.
+  std::string status() const { return conversation_.status(); }
 
   /// Whether a point is still being solved: destruction would wait for it.
   bool is_solving() const { return solver_.is_solving(); }

@@ -34,8 +34,8 @@ std::string with_last_words(const std::string& what, const ChildProcess& child) 
 ChildSettings server_settings(const ServiceSettings& settings, const KeysForARun& keys, int ready) {
   ChildSettings child{
       .program = sibling_program("oblique-server"),
-      .arguments = {"--no-config", "--db", settings.database.string(), "--worker-port", "0",
-                    "--client-port", "0", "--http", "off", "--ready-fd",
+      .arguments = {"--no-config", "--db", settings.database.string(), "--drain", "0",
+                    "--worker-port", "0", "--client-port", "0", "--http", "off", "--ready-fd",
                     std::to_string(ChildProcess::kHandedOver), "--stop-with-parent",
                     std::to_string(getpid()), "--keys", keys.file_of(protocol::Role::kServer)},
       .show_errors = settings.verbose,

@@ -1,5 +1,7 @@
 // oblique-server: command line, signals and exit codes around the loop.
 #include <cerrno>
+#include <chrono>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <exception>
@@ -13,6 +15,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
@@ -22,6 +25,7 @@
 #include "proto/program/configuration/log_flags.h"
 #include "proto/program/exit_code.h"
 #include "proto/program/log.h"
+#include "proto/program/notify.h"
 #include "proto/program/parent.h"
 #include "proto/program/stop_signals.h"
 #include "proto/program/usage.h"
@@ -34,11 +38,15 @@
 namespace {
 
 using oblique::protocol::Configuration;
+using oblique::protocol::Notifier;
 using oblique::protocol::StopWithParent;
 using oblique::server::Loop;
 using oblique::server::LoopSettings;
+using oblique::server::LoopTurn;
 
 constexpr const char* kProgram = "oblique-server";
+/// The last commit may take so long on a slow disk.
+constexpr std::chrono::seconds kLongestEnd{60};
 
 /// What people choose.
 struct Options {
@@ -47,6 +55,7 @@ struct Options {
   std::uint16_t client_port = 7600;
   oblique::server::HttpOptions http;
   int ready_fd = -1;
+  double drain_s = 5.0;
   oblique::protocol::LogSettings log;
 };
 
@@ -82,14 +91,35 @@ void tell_ready(int fd, const Loop& loop) {
   ::close(fd);
 }
 
-int run(const LoopSettings& settings, int ready_fd, const StopWithParent& parent) {
-  const oblique::protocol::StopSignals stop;  // before any thread starts
+/// Tells the service manager how the loop is.
+void tell_turn(Notifier& notifier, const LoopTurn& turn, std::chrono::milliseconds drain) {
+  switch (turn.stage) {
+    case LoopTurn::Stage::kRuns:
+      notifier.status(fmt::format("{} workers", turn.workers));
+      break;
+    case LoopTurn::Stage::kDrains:
+      notifier.stopping(fmt::format("draining: {} batches are with workers", turn.leases),
+                        drain + kLongestEnd);
+      break;
+    case LoopTurn::Stage::kEnds:
+      notifier.stopping("stopping", kLongestEnd);
+      break;
+  }
+  notifier.turn(Notifier::Clock::now());
+}
+
+int run(LoopSettings settings, int ready_fd, const StopWithParent& parent) {
+  Notifier notifier;
+  oblique::protocol::StopSignals stop;  // before any thread starts
   oblique::protocol::survive_failed_writes();
   if (!parent.begin()) {
     spdlog::warn("the parent process was gone before this one began");
     return oblique::protocol::kDone;
   }
   take_all_descriptors();
+  settings.on_turn = [&notifier, drain = settings.drain](const LoopTurn& turn) {
+    tell_turn(notifier, turn, drain);
+  };
   Loop loop(settings);
   spdlog::info("database {}, clients at {}, workers at {}, metrics at {}", settings.database,
                loop.client_endpoint(), loop.worker_endpoint(),
@@ -97,7 +127,8 @@ int run(const LoopSettings& settings, int ready_fd, const StopWithParent& parent
   if (ready_fd >= 0) {
     tell_ready(ready_fd, loop);
   }
-  const auto end = loop.run(stop.descriptor());
+  notifier.ready(fmt::format("clients at {}", loop.client_endpoint()));
+  const auto end = loop.run(stop.descriptor(), [&stop] { stop.requested(); });
   return end.lost_writes == 0 && !end.lost_database ? oblique::protocol::kDone
                                                     : oblique::protocol::kFailed;
 }
@@ -128,6 +159,11 @@ void add_options(CLI::App& app, Configuration& configuration, StopWithParent& pa
                                "once the server can be used; -1: none")
                     ->check(objection_to_descriptor);
   options.http.add_to(app);
+  constexpr double kLongestDrain_s = 1e6;
+  app.add_option("--drain", options.drain_s,
+                 "When told to stop, wait so long for results under way; 0: end at once")
+      ->type_name("SECONDS")
+      ->check(oblique::protocol::number_between(0.0, kLongestDrain_s));
   configuration.keep_to_command_line(ready);
   configuration.keep_to_command_line(parent.add_to(app));
   add_log_flags(app, configuration, options.log);
@@ -155,6 +191,8 @@ std::optional<int> finish_options(const CLI::App& app, const Configuration& conf
   loop.doors.keys_origin = configuration.origin_of("--keys");
   loop.worker_port = options.worker_port == 0 ? "*" : std::to_string(options.worker_port);
   loop.client_port = options.client_port == 0 ? "*" : std::to_string(options.client_port);
+  constexpr double kMillisecondsASecond = 1000.0;
+  loop.drain = std::chrono::milliseconds(std::llround(options.drain_s * kMillisecondsASecond));
   loop.service.solver_version = oblique::solver::solver_version();
   return std::nullopt;
 }

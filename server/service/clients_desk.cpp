@@ -145,9 +145,22 @@ bool ClientsDesk::may_ask(const Client& client, const protocol::ClientRequest& r
 void ClientsDesk::submit(const Client& client, const ReadRequest& read, Instant now) {
   if (stopping_) {
     at_.clients.reply_error(client, "the server is stopping: submit again when it is back");
+  } else if (draining_) {
+    at_.clients.reply_error(client,
+                            "the server is draining, that is, it waits for results under way "
+                            "and then stops: submit again when it is back");
   } else {
     at_.changes.submit(client, read, now);
   }
+}
+
+protocol::StudyStatus ClientsDesk::status_of(StudyId id, Instant now) const {
+  const StudyView view = view_of(id, at_.sources, now);
+  protocol::StudyStatus message = to_message(view);
+  if (draining_ && view.state == StudyState::kRunning) {
+    message.set_waits_for("the server, which is draining, to be started again");
+  }
+  return message;
 }
 
 void ClientsDesk::status(const Client& client, const protocol::StatusRequest& request,
@@ -155,6 +168,7 @@ void ClientsDesk::status(const Client& client, const protocol::StatusRequest& re
   protocol::ClientReply reply;
   reply.set_request_id(client.request_id);
   auto& fields = *reply.mutable_status();
+  fields.set_draining(draining_);
   fields.set_workers(static_cast<std::uint32_t>(at_.sources.scheduler.workers()));
   fields.set_access(settings_.access);
   if (!request.study().empty()) {
@@ -163,7 +177,7 @@ void ClientsDesk::status(const Client& client, const protocol::StatusRequest& re
       at_.clients.reply_error(client, unknown_study(request.study()));
       return;
     }
-    *fields.add_studies() = to_message(view_of(*known, at_.sources, now));
+    *fields.add_studies() = status_of(*known, now);
     at_.clients.to_client(client.identity, reply);
     return;
   }
@@ -175,7 +189,7 @@ void ClientsDesk::status(const Client& client, const protocol::StatusRequest& re
       fields.set_next_after(fields.studies(fields.studies_size() - 1).study_id());
       break;
     }
-    *fields.add_studies() = to_message(view_of(*id, at_.sources, now));
+    *fields.add_studies() = status_of(*id, now);
     bytes += fields.studies(fields.studies_size() - 1).ByteSizeLong();
   }
   at_.clients.to_client(client.identity, reply);

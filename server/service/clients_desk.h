@@ -60,6 +60,8 @@ class ClientsDesk {
   void client_left(std::string_view identity) { queries_.client_left(identity); }
   /// To be called several times a second.
   void tick(Instant now) { queries_.tick(now); }
+  /// The server will stop: no study is taken any more.
+  void drain() { draining_ = true; }
   /// The server stops: who waits here is told, and what is asked from now on is refused.
   void stop();
 
@@ -76,6 +78,7 @@ class ClientsDesk {
   std::string objection_to(const ReadRequest& read);
   void answer(const Client& client, const ReadRequest& read, Instant now);
   void submit(const Client& client, const ReadRequest& read, Instant now);
+  protocol::StudyStatus status_of(StudyId id, Instant now) const;
   void status(const Client& client, const protocol::StatusRequest& request, Instant now);
   void workers(const Client& client, const protocol::WorkersRequest& request, Instant now);
   void add_keys(protocol::WorkersReply& reply) const;
@@ -86,6 +89,7 @@ class ClientsDesk {
   std::map<std::uint64_t, LongRequest> long_requests_;  // by ticket
   std::uint64_t last_ticket_ = 0;
   bool stopping_ = false;
+  bool draining_ = false;
 };
 
 }  // namespace oblique::server

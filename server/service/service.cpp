@@ -64,6 +64,13 @@ void Service::tick(Instant now) {
   rates_.sample([this](StudyId id) { return settled_of(id); }, now.steady_ms);
 }
 
+void Service::drain(Instant now) {
+  draining_ = true;
+  hand_out_or_hold(now);
+  workers_.stop();
+  clients_.drain();
+}
+
 void Service::stop(Instant now) {
   stopping_ = true;
   hand_out_or_hold(now);
@@ -103,7 +110,7 @@ void Service::handle_found(Instant now) {
 }
 
 void Service::hand_out_or_hold(Instant now) {
-  const bool holds = stopping_ || ledger_.holds_batches();
+  const bool holds = stopping_ || draining_ || ledger_.holds_batches();
   if (std::exchange(holds_batches_, holds) != holds) {
     feed(DispatchHeld{holds}, now);
   }

@@ -61,6 +61,10 @@ class Service {
   void client_left(std::string_view identity) { clients_.client_left(identity); }
   /// To be called several times a second.
   void tick(Instant now);
+  /// Nothing is handed out and no study taken any more; results are, and all else goes on.
+  void drain(Instant now);
+  /// Nothing is with workers, or on its way to the disk.
+  bool is_drained() const { return scheduler_.leases() == 0 && ledger_.is_empty(); }
   /// Tells the workers that the server stops. Nothing is handed out afterwards; results are still
   /// taken.
   void stop(Instant now);
@@ -82,7 +86,7 @@ class Service {
   const StoredPoints& stored_points() const { return stored_points_; }
   /// Of all studies, over the last seconds.
   double points_per_s(std::int64_t now_ms) const;
-  bool is_stopping() const { return stopping_; }
+  bool is_stopping() const { return stopping_ || draining_; }
 
  private:
   /// What the events that are fed have in common.
@@ -134,6 +138,7 @@ class Service {
   ClientsDesk clients_;
   StoredPoints stored_points_;
   bool stopping_ = false;
+  bool draining_ = false;
   bool holds_batches_ = false;  // as the scheduler knows
 };
 

@@ -83,7 +83,9 @@ void WorkersDesk::notice_to(WorkerId worker, const std::string& text) {
 }
 
 void WorkersDesk::stop() {
-  stopping_ = true;
+  if (std::exchange(stopping_, true)) {
+    return;
+  }
   protocol::ServerToWorker message;
   message.mutable_stopping();
   for (const auto& [id, worker] : workers_) {

@@ -73,7 +73,12 @@ void Server::start(const TemporaryFolder& folder, std::vector<std::string> argum
   }
   arguments.insert(arguments.end(),
                    {"--http", "127.0.0.1:0", "--ready-fd", "3", "--stop-with-parent"});
-  process_.emplace(folder, server_program(), arguments, environment, ready[1]);
+  // Whoever does not test how it drains has it end at once.
+  Environment with_drain{{"OBLIQUE_SERVER_DRAIN", "0"}};
+  for (const auto& [name, value] : environment) {
+    with_drain[name] = value;
+  }
+  process_.emplace(folder, server_program(), arguments, with_drain, ready[1]);
   close(ready[1]);
   const std::string line = read_line(ready[0]);
   close(ready[0]);

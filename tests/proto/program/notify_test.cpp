@@ -1,0 +1,135 @@
+#include "proto/program/notify.h"
+
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <cstdlib>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/support/temporary_folder.h"
+
+namespace oblique::protocol {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// A service manager's socket.
+class NotifierTest : public testing::Test {
+ protected:
+  ~NotifierTest() override {
+    close(socket_);
+    for (const char* name : {"NOTIFY_SOCKET", "WATCHDOG_USEC", "WATCHDOG_PID"}) {
+      unsetenv(name);
+    }
+  }
+
+  void listen(const std::string& name) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    std::memcpy(address.sun_path, name.data(), name.size());
+    const bool is_abstract = name.front() == '@';
+    address.sun_path[0] = is_abstract ? '\0' : name.front();
+    const auto length = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + name.size() +
+                                               (is_abstract ? 0 : 1));
+    ASSERT_EQ(bind(socket_, reinterpret_cast<const sockaddr*>(&address), length), 0);
+    setenv("NOTIFY_SOCKET", name.c_str(), 1);
+  }
+
+  /// All that has come.
+  std::vector<std::string> heard() const {
+    std::vector<std::string> all;
+    std::array<char, 4096> bytes{};
+    ssize_t got = 0;
+    while ((got = recv(socket_, bytes.data(), bytes.size(), MSG_DONTWAIT)) > 0) {
+      all.emplace_back(bytes.data(), static_cast<std::size_t>(got));
+    }
+    return all;
+  }
+
+  test::TemporaryFolder folder_;
+  int socket_ = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  Notifier::Clock::time_point now_;
+};
+
+TEST_F(NotifierTest, SaysThatTheProgramIsReadyAtAPathOrAnAbstractName) {
+  for (const std::string& name :
+       {folder_.file("notify"), "@oblique-test-" + std::to_string(getpid())}) {
+    close(socket_);
+    socket_ = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    listen(name);
+    Notifier notifier;
+    notifier.ready("clients at x");
+    EXPECT_EQ(heard(), std::vector<std::string>{"READY=1\nSTATUS=clients at x"}) << name;
+  }
+}
+
+TEST_F(NotifierTest, AStatusIsSaidOnceAndInOneLine) {
+  listen(folder_.file("notify"));
+  Notifier notifier;
+  notifier.status("one\nREADY=1");
+  notifier.status("one\nREADY=1");
+  notifier.status("two");
+  EXPECT_EQ(heard(), (std::vector<std::string>{"STATUS=one\\nREADY=1", "STATUS=two"}));
+}
+
+TEST_F(NotifierTest, AnEndThatTakesLongIsGivenTheTime) {
+  listen(folder_.file("notify"));
+  Notifier notifier;
+  notifier.stopping("draining", 120s);
+  EXPECT_EQ(heard(),
+            std::vector<std::string>{"STOPPING=1\nSTATUS=draining\nEXTEND_TIMEOUT_USEC=120000000"});
+}
+
+TEST_F(NotifierTest, SaysThatItLivesAtHalfOfTheTimeAndOnlyWhenItTurns) {
+  listen(folder_.file("notify"));
+  setenv("WATCHDOG_USEC", "1000000", 1);
+  setenv("WATCHDOG_PID", std::to_string(getpid()).c_str(), 1);
+  Notifier notifier;
+  std::size_t said = 0;
+  for (int turn = 0; turn < 100; ++turn, now_ += 100ms) {  // 10 s
+    notifier.turn(now_);
+    said += heard().size();
+  }
+  EXPECT_EQ(said, 20U);
+  now_ += 10s;
+  EXPECT_TRUE(heard().empty());
+}
+
+TEST_F(NotifierTest, AWatchdogOfAnotherProcessIsNotFed) {
+  listen(folder_.file("notify"));
+  setenv("WATCHDOG_USEC", "1000000", 1);
+  setenv("WATCHDOG_PID", "1", 1);
+  Notifier notifier;
+  notifier.turn(now_);
+  EXPECT_TRUE(heard().empty());
+}
+
+TEST_F(NotifierTest, ChildrenDoNotInheritTheSocket) {
+  listen(folder_.file("notify"));
+  setenv("WATCHDOG_USEC", "1000000", 1);
+  const Notifier notifier;
+  EXPECT_EQ(std::getenv("NOTIFY_SOCKET"), nullptr);
+  EXPECT_EQ(std::getenv("WATCHDOG_USEC"), nullptr);
+}
+
+TEST_F(NotifierTest, WithoutASocketOrWithABrokenOneNothingHappens) {
+  for (const std::string& name : {std::string(), std::string("relative"), std::string("@"),
+                                  std::string(1000, '/'), folder_.file("nobody")}) {
+    setenv("NOTIFY_SOCKET", name.c_str(), 1);
+    Notifier notifier;
+    notifier.ready("ready");
+    notifier.turn(now_);
+    notifier.stopping("stopping", 1s);
+  }
+}
+
+}  // namespace
+}  // namespace oblique::protocol

@@ -1,0 +1,132 @@
+// A server that is told to stop while results are under way, and what systemd is told meanwhile.
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <array>
+#include <csignal>
+#include <cstddef>
+#include <cstring>
+#include <stdexcept>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "tests/support/programs.h"
+
+namespace oblique::test {
+namespace {
+
+/// A service manager's socket.
+class Manager {
+ public:
+  explicit Manager(const TemporaryFolder& folder) : path_(folder.file("notify")) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    std::memcpy(address.sun_path, path_.data(), path_.size());
+    if (bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0) {
+      throw std::runtime_error("cannot listen at " + path_);
+    }
+  }
+  ~Manager() { close(socket_); }
+  Manager(const Manager&) = delete;
+  Manager& operator=(const Manager&) = delete;
+
+  Environment environment() const {
+    return {{"NOTIFY_SOCKET", path_}, {"WATCHDOG_USEC", "400000"}, {"OBLIQUE_SERVER_DRAIN", "60"}};
+  }
+  /// Whether that was said so far.
+  bool heard(const std::string& what) {
+    std::array<char, 4096> bytes{};
+    ssize_t got = 0;
+    while ((got = recv(socket_, bytes.data(), bytes.size(), MSG_DONTWAIT)) > 0) {
+      all_ += std::string(bytes.data(), static_cast<std::size_t>(got)) + "\n";
+    }
+    return all_.find(what) != std::string::npos;
+  }
+  void forget() { all_.clear(); }
+
+ private:
+  std::string path_;
+  int socket_ = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  std::string all_;
+};
+
+class DrainTest : public testing::Test {
+ protected:
+  /// Points whose fall takes seconds.
+  void submit() {
+    const Outcome outcome = run_oblique(
+        folder_, {"submit", "--server", server_.client_url(), "--H", "1", "--mu", "0.1:2:40", "--e",
+                  "1", "--elements-per-link", "8", "--name", "study"});
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  }
+  Outcome status() {
+    return run_oblique(folder_,
+                       {"status", "study", "--server", server_.client_url(), "--format", "json"});
+  }
+  void wait_until_leased() {
+    wait_until("a batch is with the worker", [&] {
+      return status().out.find("\"leased\":0") == std::string::npos &&
+             status().out.find("\"leased\": 0") == std::string::npos;
+    });
+  }
+
+  TemporaryFolder folder_;
+  Manager manager_{folder_};
+  Server server_{folder_, folder_.file("a.db"), manager_.environment()};
+};
+
+TEST_F(DrainTest, WaitsForWhatIsUnderWayAndSaysSoToClientsAndToTheManager) {
+  submit();
+  Worker worker(folder_, server_.worker_url(), {"--threads", "1"});
+  wait_until_leased();
+  ::kill(worker.pid(), SIGSTOP);
+  server_.process().send(SIGTERM);
+  wait_until("it drains", [&] { return manager_.heard("STATUS=draining"); });
+  EXPECT_TRUE(manager_.heard("STOPPING=1"));
+  const Outcome refused =
+      run_oblique(folder_, {"submit", "--server", server_.client_url(), "--H", "1", "--mu", "0.5",
+                            "--e", "1", "--name", "another"});
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_NE(refused.err.find("draining"), std::string::npos) << refused.err;
+  EXPECT_NE(status().out.find("draining"), std::string::npos);
+  ::kill(worker.pid(), SIGCONT);
+  EXPECT_EQ(server_.process().wait(), 0);
+  const std::string log = server_.process().err();
+  EXPECT_NE(log.find(" drained: "), std::string::npos) << log;
+}
+
+TEST_F(DrainTest, ASecondSignalEndsItAtOnce) {
+  submit();
+  Worker worker(folder_, server_.worker_url(), {"--threads", "1"});
+  wait_until_leased();
+  ::kill(worker.pid(), SIGSTOP);
+  server_.process().send(SIGTERM);
+  wait_until("it drains", [&] { return manager_.heard("STATUS=draining"); });
+  server_.process().send(SIGINT);
+  EXPECT_EQ(server_.process().wait(), 0);
+  EXPECT_EQ(server_.process().err().find(" drained: "), std::string::npos);
+  ::kill(worker.pid(), SIGCONT);
+}
+
+TEST_F(DrainTest, WithNothingUnderWayItEndsAtOnce) {
+  server_.process().send(SIGTERM);
+  EXPECT_EQ(server_.process().wait(), 0);
+  EXPECT_NE(server_.process().err().find(" drained: "), std::string::npos);
+}
+
+TEST_F(DrainTest, ServerAndWorkerTellTheManagerThatTheyAreReadyAndAlive) {
+  wait_until("it is ready", [&] { return manager_.heard("READY=1"); });
+  wait_until("it lives", [&] { return manager_.heard("WATCHDOG=1"); });
+  manager_.forget();
+  Worker worker(folder_, server_.worker_url(), {}, manager_.environment());
+  wait_until("the worker lives", [&] { return manager_.heard("WATCHDOG=1"); });
+  EXPECT_TRUE(manager_.heard("READY=1"));
+  worker.send(SIGTERM);
+  EXPECT_EQ(worker.wait(), 0);
+  EXPECT_TRUE(manager_.heard("STOPPING=1"));
+}
+
+}  // namespace
+}  // namespace oblique::test
