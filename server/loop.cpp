@@ -62,15 +62,6 @@ std::unique_ptr<Web> web_of(const LoopSettings& settings) {
   }
 }
 
-/// Throws StorageError for a path where a database would be in danger.
-const std::string& safe_path(const LoopSettings& settings) {
-  const std::string objection = objection_to_shared_disk(settings.database);
-  if (!objection.empty() && !settings.allow_network_disk) {
-    throw StorageError(objection);
-  }
-  return settings.database;
-}
-
 }  // namespace
 
 class Loop::Parts final : public Outbox {
@@ -79,7 +70,7 @@ class Loop::Parts final : public Outbox {
       : drain_(settings.drain),
         on_turn_(settings.on_turn),
         doors_(settings.doors),
-        store_(safe_path(settings)),
+        store_(path_on_own_disk(settings.database, settings.allow_network_disk)),
         writer_(store_, [this](std::vector<WriteReport> r) { written_.put(std::move(r)); }),
         queries_(settings.database, settings.queries,
                  [this](QueryReport r) { queried_.put(std::array{std::move(r)}); }),
@@ -289,9 +280,7 @@ class Loop::Parts final : public Outbox {
   }
 
   void tell_turn(LoopTurn::Stage stage) const {
-    if (on_turn_) {
-      on_turn_({stage, service_->scheduler().workers(), service_->scheduler().leases()});
-    }
+    on_turn_({stage, service_->scheduler().workers(), service_->scheduler().leases()});
   }
 
   /// Whether the loop goes on although it was told to stop.
@@ -306,26 +295,20 @@ class Loop::Parts final : public Outbox {
         "workers. A second signal ends it at once",
         std::chrono::duration<double>(drain_).count(), service_->scheduler().leases());
     service_->drain(now());
-    show();
-    tell_turn(LoopTurn::Stage::kDrains);
     return true;
   }
 
   /// Whether nothing is left to wait for, or no time.
   bool is_drained() const {
-    if (!drain_until_) {
-      return false;
-    }
-    if (service_->is_drained()) {
+    const bool is_complete = drain_until_ && service_->is_drained();
+    const bool is_late = drain_until_ && Clock::now() >= *drain_until_;
+    if (is_complete) {
       spdlog::info("drained: all that was handed out is stored or given back");
-      return true;
-    }
-    if (Clock::now() >= *drain_until_) {
+    } else if (is_late) {
       spdlog::warn("not drained in time: {} batches are with workers, who deliver them later",
                    service_->scheduler().leases());
-      return true;
     }
-    return false;
+    return is_complete || is_late;
   }
 
   LoopEnd finish() {

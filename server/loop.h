@@ -34,7 +34,7 @@ struct LoopSettings {
   /// When it is told to stop, it waits so long for results under way; 0: it ends at once.
   std::chrono::milliseconds drain{0};
   /// Called on the loop's thread several times a second, and once as the loop ends.
-  std::function<void(const LoopTurn&)> on_turn;
+  std::function<void(const LoopTurn&)> on_turn = [](const LoopTurn&) {};
   ServiceSettings service;  ///< solver_version must be set; the rest from the database
 };
 

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <iostream>
 #include <memory>
 #include <string>
@@ -10,6 +11,8 @@
 #include "client/service/watching.h"
 #include "client/verbs/printed_rows.h"
 #include "client/verbs/verbs.h"
+#include "proto/text.h"
+#include "worker/solver/model/number.h"
 
 namespace oblique::client {
 namespace {
@@ -82,11 +85,21 @@ void tell_access(const protocol::WorkersReply& reply) {
   }
 }
 
-protocol::QueryReply table_of_workers(const protocol::WorkersReply& reply) {
+std::string standing_of(const protocol::WorkerStatus& worker) {
+  return worker.set_aside() ? "set aside" : worker.proven() ? "proven" : "new";
+}
+
+/// Older servers do not say it.
+std::string state_of(const protocol::WorkerStatus& worker) {
+  return !worker.state().empty() ? worker.state() : worker.leased_points() > 0 ? "working" : "idle";
+}
+
+/// All that is known, for programs.
+protocol::QueryReply full_table(const protocol::WorkersReply& reply) {
   protocol::QueryReply table;
-  for (const char* column :
-       {"worker", "name", "threads", "instruction_set", "solver_version", "leased_points",
-        "solved_points", "silent_ms", "losses", "standing", "key"}) {
+  for (const char* column : {"worker", "name", "threads", "instruction_set", "solver_version",
+                             "leased_points", "solved_points", "silent_ms", "losses", "standing",
+                             "host", "points_per_s", "state", "key"}) {
     table.add_columns(column);
   }
   for (const auto& worker : reply.workers()) {
@@ -100,10 +113,48 @@ protocol::QueryReply table_of_workers(const protocol::WorkersReply& reply) {
     add_value(row, static_cast<std::int64_t>(worker.solved_points()));
     add_value(row, static_cast<std::int64_t>(worker.silent_ms()));
     add_value(row, static_cast<std::int64_t>(worker.losses()));
-    add_value(row, std::string(worker.set_aside() ? "set aside"
-                               : worker.proven()  ? "proven"
-                                                  : "new"));
+    add_value(row, standing_of(worker));
+    add_value(row, worker.host());
+    row.add_values()->set_real(worker.points_per_s());
+    add_value(row, state_of(worker));
     add_value(row, worker.key());
+  }
+  return table;
+}
+
+/// What people look for, in 100 columns. A name that begins with the host goes on without it.
+protocol::QueryReply table_for_people(const protocol::WorkersReply& reply) {
+  constexpr double kMillisecondsASecond = 1000.0;
+  const bool has_keys = std::any_of(reply.workers().begin(), reply.workers().end(),
+                                    [](const auto& worker) { return !worker.key().empty(); });
+  const std::size_t host_bytes = has_keys ? 12 : 18;
+  const std::size_t name_bytes = has_keys ? 10 : 12;
+  constexpr std::size_t kKeyBytes = 9;
+  protocol::QueryReply table;
+  for (const char* column :
+       {"worker", "host", "name", "threads", "cpu", "version", "points/s", "silent_s", "state"}) {
+    table.add_columns(column);
+  }
+  if (has_keys) {
+    table.add_columns("key");
+  }
+  for (const auto& worker : reply.workers()) {
+    const bool has_host = !worker.host().empty() && worker.name().starts_with(worker.host() + ":");
+    const std::string name =
+        has_host ? worker.name().substr(worker.host().size() + 1) : worker.name();
+    auto& row = *table.add_rows();
+    add_value(row, static_cast<std::int64_t>(worker.worker_id()));
+    add_value(row, protocol::shortened(worker.host(), host_bytes));
+    add_value(row, protocol::shortened(name, name_bytes));
+    add_value(row, static_cast<std::int64_t>(worker.threads()));
+    add_value(row, worker.instruction_set());
+    add_value(row, worker.solver_version());
+    add_value(row, solver::fixed_number(worker.points_per_s(), 1));
+    add_value(row, solver::fixed_number(worker.silent_ms() / kMillisecondsASecond, 1));
+    add_value(row, state_of(worker));
+    if (has_keys) {
+      add_value(row, protocol::shortened(worker.key(), kKeyBytes));
+    }
   }
   return table;
 }
@@ -114,7 +165,7 @@ int workers(const WorkersFlags& flags) {
     const auto settings = connection_settings(flags.source);
     const auto reply = Connection(settings).workers();
     tell_if_insecure(reply.access(), settings.server_url);
-    print_out(table_of_workers(reply), format);
+    print_out(is_for_people(format) ? table_for_people(reply) : full_table(reply), format);
     std::cout.flush();  // where both are one terminal, what follows stands below the table
     tell_access(reply);
     return kDone;

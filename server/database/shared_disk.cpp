@@ -10,6 +10,8 @@
 #include <system_error>
 #include <vector>
 
+#include "server/database/sqlite.h"
+
 namespace oblique::server {
 namespace {
 
@@ -79,6 +81,14 @@ std::string objection_to_shared_disk(const std::string& path) {
          "), where two machines could write at once and damage the database: name a file on a "
          "local "
          "disk, or pass --allow-network-disk if no other machine uses it";
+}
+
+const std::string& path_on_own_disk(const std::string& path, bool allows_network_disk) {
+  const std::string objection = objection_to_shared_disk(path);
+  if (!objection.empty() && !allows_network_disk) {
+    throw StorageError(objection);
+  }
+  return path;
 }
 
 }  // namespace oblique::server

@@ -13,4 +13,7 @@ std::string file_system_of(const std::string& path, const std::string& mounts);
 /// that SQLite's write-ahead log needs: two machines could write at once and damage the file.
 std::string objection_to_shared_disk(const std::string& path);
 
+/// `path`. Throws StorageError when there is an objection and network disks are not allowed.
+const std::string& path_on_own_disk(const std::string& path, bool allows_network_disk);
+
 }  // namespace oblique::server

@@ -100,6 +100,8 @@ class Scheduler {
   double thread_s_per_point() const { return pace_points_ > 0.0 ? pace_s_ / pace_points_ : 0.0; }
   /// Throws std::out_of_range for an unknown worker.
   WorkerCounts worker(WorkerId worker, std::int64_t now_ms) const;
+  /// The same.
+  std::uint64_t solved_points(WorkerId worker) const { return workers_.at(worker).solved_points; }
   /// Since its last message. Throws std::out_of_range for an unknown worker.
   std::int64_t silent_ms(WorkerId worker, std::int64_t now_ms) const;
   /// Which points of the study have a row. Throws std::out_of_range for an unknown study.

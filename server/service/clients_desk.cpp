@@ -212,8 +212,8 @@ void ClientsDesk::workers(const Client& client, const protocol::WorkersRequest& 
       fields.set_next_after(fields.workers(fields.workers_size() - 1).worker_id());
       break;
     }
-    *fields.add_workers() =
-        to_message(view_of(*id, *at_.workers.find(*id), at_.sources.scheduler, now));
+    *fields.add_workers() = to_message(
+        view_of(*id, *at_.workers.find(*id), at_.sources.scheduler, at_.worker_rates, now));
   }
   at_.clients.to_client(client.identity, reply);
 }

@@ -46,6 +46,7 @@ class ClientsDesk {
     StudySources sources;
     OpenStudies& open;
     const ToNetwork& network;
+    const SettledRates& worker_rates;
   };
 
   ClientsDesk(const ClientsDeskSettings& settings, const Neighbours& neighbours);

@@ -28,7 +28,8 @@ Service::Service(const ServiceSettings& settings, Outbox& outbox, std::vector<St
                                   workers_,
                                   {scheduler_, states_, ledger_, rates_},
                                   open_,
-                                  outbox}) {
+                                  outbox,
+                                  worker_rates_}) {
   for (StoredStudy& study : studies) {
     states_.restore(study, now.steady_ms);
     feed(StudyAdded{study.study_id, study.table, std::move(study.settled), study.failures.size(),
@@ -62,6 +63,12 @@ void Service::tick(Instant now) {
   feed(Tick{}, now);
   clients_.tick(now);
   rates_.sample([this](StudyId id) { return settled_of(id); }, now.steady_ms);
+  // One that is gone comes to rest at 0.
+  worker_rates_.sample(
+      [this](WorkerId id) {
+        return scheduler_.knows_worker(id) ? scheduler_.solved_points(id) : 0;
+      },
+      now.steady_ms);
 }
 
 void Service::drain(Instant now) {
@@ -254,6 +261,10 @@ void Service::stored(const ResultsWrite& write, Instant now) {
   }
   if (!write.event.outcomes.empty()) {
     rates_.note(id, settled_of(id), states_.record(id).since_ms, now.steady_ms);
+  }
+  const WorkerId worker = write.event.worker;
+  if (scheduler_.knows_worker(worker) && !worker_rates_.knows(worker)) {
+    worker_rates_.note(worker, scheduler_.solved_points(worker), 0, now.steady_ms);
   }
   feed(write.event, now);
   if (!write.event.outcomes.empty()) {

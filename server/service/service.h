@@ -131,6 +131,7 @@ class Service {
   WriteLedger ledger_;
   StudyStates states_;
   SettledRates rates_;
+  SettledRates worker_rates_;  // by worker
   BadFrames bad_frames_;
   WorkersDesk workers_;
   OpenStudies open_;

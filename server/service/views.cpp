@@ -84,14 +84,27 @@ std::uint64_t open_points_of(StudyId id, const StudySources& sources) {
 }
 
 WorkerView view_of(WorkerId id, const WorkerRecord& worker, const Scheduler& scheduler,
-                   Instant now) {
+                   const SettledRates& rates, Instant now) {
+  const WorkerCounts counts = scheduler.worker(id, now.steady_ms);
   return {id,
           worker.name,
           worker.threads,
           worker.instruction_set,
           worker.solver_version,
-          scheduler.worker(id, now.steady_ms),
+          counts,
+          worker.host,
+          rates.points_per_s(id, counts.solved_points, now.steady_ms),
+          worker.is_busy,
           worker.key};
+}
+
+std::string state_of(const WorkerView& view) {
+  constexpr std::int64_t kSilentAfter_ms = 1500;  // heartbeats come every 900 ms
+  return view.counts.silent_ms > kSilentAfter_ms ? "silent"
+         : view.counts.is_set_aside              ? "set aside"
+         : view.is_busy                          ? "busy"
+         : view.counts.leased_points > 0         ? "working"
+                                                 : "idle";
 }
 
 protocol::WorkerStatus to_message(const WorkerView& view) {
@@ -108,6 +121,9 @@ protocol::WorkerStatus to_message(const WorkerView& view) {
   message.set_set_aside(view.counts.is_set_aside);
   message.set_proven(view.counts.is_proven);
   message.set_key(view.key);
+  message.set_host(view.host);
+  message.set_points_per_s(view.points_per_s);
+  message.set_state(state_of(view));
   return message;
 }
 

@@ -51,14 +51,19 @@ struct WorkerView {
   std::string instruction_set;
   std::string solver_version;
   WorkerCounts counts;
-  std::string key{};  ///< its name; empty: without keys
+  std::string host;
+  double points_per_s;  ///< solved and stored, over the last seconds
+  bool is_busy;         ///< it does not read what it is sent
+  std::string key{};    ///< its name; empty: without keys
 };
 
 /// Points that are neither solved nor failed.
 std::uint64_t open_points_of(StudyId id, const StudySources& sources);
 
 WorkerView view_of(WorkerId id, const WorkerRecord& worker, const Scheduler& scheduler,
-                   Instant now);
+                   const SettledRates& rates, Instant now);
+/// "working", "idle", "silent" (nothing came of it lately), "busy" or "set aside".
+std::string state_of(const WorkerView& view);
 protocol::WorkerStatus to_message(const WorkerView& view);
 
 }  // namespace oblique::server

@@ -132,15 +132,18 @@ void WorkersDesk::hello(const std::string& identity, const protocol::WorkerHello
     return;
   }
   const WorkerId id = ++settings_.last_worker_id;
-  const WorkerRecord worker{identity,
-                            plain(hello.name()),
-                            std::clamp(hello.threads(), 1U, kMostThreads),
-                            plain(hello.solver_version()),
-                            plain(hello.instruction_set()),
-                            iso_8601(now),
-                            hellos,
-                            key,
-                            now.steady_ms};
+  WorkerRecord worker{identity,
+                      plain(hello.name()),
+                      std::clamp(hello.threads(), 1U, kMostThreads),
+                      plain(hello.solver_version()),
+                      plain(hello.instruction_set()),
+                      iso_8601(now),
+                      hellos,
+                      key,
+                      now.steady_ms};
+  // Of older workers the name is HOST:PROCESS when they are given no other.
+  worker.host =
+      hello.host().empty() ? worker.name.substr(0, worker.name.rfind(':')) : plain(hello.host());
   if (!welcome(id, worker)) {
     return;
   }

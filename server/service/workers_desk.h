@@ -39,6 +39,7 @@ struct WorkerRecord {
   bool was_told = false;     ///< since the last tick
   bool is_busy = false;      ///< as the scheduler knows
   bool has_row = false;      ///< in the database, since its first result
+  std::string host{};        ///< its machine; as its name says, if it does not
 };
 
 /// What a frame of a worker comes to.

@@ -19,6 +19,8 @@ class SettledRates {
   void note(StudyId study, std::uint64_t settled, std::int64_t since_ms, std::int64_t now_ms);
   /// To be called several times a second; `settled` tells how many points of a study are settled.
   void sample(const std::function<std::uint64_t(StudyId)>& settled, std::int64_t now_ms);
+  /// Whether something of the study was settled lately.
+  bool knows(StudyId study) const { return samples_.contains(study); }
   /// What was noted of the study does not count any more.
   void forget(StudyId study) { samples_.erase(study); }
 
