@@ -116,6 +116,10 @@ class Manifests(unittest.TestCase):
             mounted = [m["name"] for m in container(workload)["volumeMounts"]]
             self.assertEqual(sorted(mounted), sorted(claims + volumes))
 
+    def test_pods_end_later_than_what_they_wait_for(self):
+        self.assertGreater(pod(SERVER)["terminationGracePeriodSeconds"],
+                           int(variables(SERVER)["OBLIQUE_SERVER_DRAIN"]))
+
     def test_pods_keep_to_the_restricted_standard(self):
         namespace = OBJECTS["Namespace", "oblique"]["metadata"]["labels"]
         self.assertEqual(namespace["pod-security.kubernetes.io/enforce"], "restricted")

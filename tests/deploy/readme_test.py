@@ -69,8 +69,8 @@ class Readmes(unittest.TestCase):
 
     def test_settings_that_are_named_exist(self):
         printed = settings()
-        named = re.findall(r"^\| 760\d \(`(\w+)`\)", MAIN, re.M) + ["insecure"]
-        self.assertEqual(len(named), 4)
+        named = re.findall(r"^\| 760\d \(`(\w+)`\)", MAIN, re.M) + ["drain", "insecure"]
+        self.assertEqual(len(named), 5)
         for key in named:
             self.assertIn(f"`{key}`", MAIN)
             self.assertRegex(printed, rf"(?m)^(# )?{key}\b", f"there is no setting {key}")
