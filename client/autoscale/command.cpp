@@ -8,6 +8,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/service/child_process.h"
+#include "client/service/connection.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {
@@ -39,6 +40,9 @@ std::string output_of(const CommandSettings& command) {
     const auto deadline = Clock::now() + std::chrono::duration_cast<Clock::duration>(
                                              std::chrono::duration<double>(command.timeout_s));
     while (child.is_running()) {
+      if (command.keep_waiting && !command.keep_waiting()) {
+        throw Interrupted("stopped while waiting for " + command.program);
+      }
       if (Clock::now() > deadline) {
         throw CommandError(with_words(fmt::format("{} took longer than {} s", command.program,
                                                   solver::readable_number(command.timeout_s)),

@@ -54,7 +54,8 @@ std::string_view flag_of(std::string_view argument) {
 
 }  // namespace
 
-SlurmEngine::SlurmEngine(SlurmSettings settings) : settings_(std::move(settings)) {
+SlurmEngine::SlurmEngine(SlurmSettings settings, std::function<bool()> keep_waiting)
+    : settings_(std::move(settings)), keep_waiting_(std::move(keep_waiting)) {
   // squeue would take it for several names and find no job of ours, and more would be submitted.
   if (settings_.job_name.find(',') != std::string::npos) {
     throw solver::InputError(fmt::format("--name {} is not allowed: the name of jobs has no comma",
@@ -71,7 +72,8 @@ SlurmEngine::SlurmEngine(SlurmSettings settings) : settings_(std::move(settings)
   }
 }
 
-std::string SlurmEngine::run(const std::string& program, std::vector<std::string> arguments) const {
+std::string SlurmEngine::run(const std::string& program, std::vector<std::string> arguments,
+                             const std::function<bool()>& keep_waiting) const {
   try {
     // Variables that filter what squeue lists would hide jobs, and more would be submitted.
     return output_of({.program = program,
@@ -79,7 +81,8 @@ std::string SlurmEngine::run(const std::string& program, std::vector<std::string
                       // Slurm says the same in several lines while it tries again.
                       .tells_last_line = program == "squeue",
                       .timeout_s = settings_.command_timeout_s,
-                      .hidden_variables = "SQUEUE_"});
+                      .hidden_variables = "SQUEUE_",
+                      .keep_waiting = keep_waiting});
   } catch (const CommandNotFound& error) {
     throw EngineError(fmt::format("Slurm's {}: run this where sbatch works", error.what()));
   } catch (const CommandError& error) {
@@ -88,8 +91,10 @@ std::string SlurmEngine::run(const std::string& program, std::vector<std::string
 }
 
 std::vector<ListedJob> SlurmEngine::jobs() {
-  const auto output = run("squeue", {"--noheader", "--me", "--array", "--states=all",
-                                     "--name=" + settings_.job_name, "--format=%A|%T|%k"});
+  const auto output = run("squeue",
+                          {"--noheader", "--me", "--array", "--states=all",
+                           "--name=" + settings_.job_name, "--format=%A|%T|%k"},
+                          keep_waiting_);
   std::vector<ListedJob> jobs;
   for (const auto line : protocol::split(output, '\n')) {
     if (line.empty()) {

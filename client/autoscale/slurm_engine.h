@@ -1,5 +1,7 @@
 #pragma once
 
+#include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,7 +23,9 @@ struct SlurmSettings {
 class SlurmEngine : public Engine {
  public:
   /// Throws solver::InputError for arguments of sbatch that would make jobs it cannot find again.
-  explicit SlurmEngine(SlurmSettings settings);
+  /// `keep_waiting` may end the wait for a list of jobs, which then throws Interrupted. Orders are
+  /// waited for: what becomes of them should be known.
+  explicit SlurmEngine(SlurmSettings settings, std::function<bool()> keep_waiting = {});
 
   std::vector<ListedJob> jobs() override;
   std::string submit() override;
@@ -33,11 +37,13 @@ class SlurmEngine : public Engine {
   std::string submission() const override;
 
  private:
-  std::string run(const std::string& program, std::vector<std::string> arguments) const;
+  std::string run(const std::string& program, std::vector<std::string> arguments,
+                  const std::function<bool()>& keep_waiting = {}) const;
   void cancel(std::vector<std::string> arguments, const Ids& ids) const;
   std::vector<std::string> submit_arguments() const;
 
   const SlurmSettings settings_;
+  const std::function<bool()> keep_waiting_;
 };
 
 }  // namespace oblique::client

@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -140,9 +141,13 @@ int retire(Engine& engine, const AutoscaleFlags& flags, protocol::StopSignals& s
   const auto wait = [&](double seconds) {
     return !flags.once && !stop.wait(std::chrono::nanoseconds(std::llround(seconds * 1e9)));
   };
-  if (retire_all(engine, flags.scaling.patience_s, wait, tell_line)) {
-    std::cerr << "No job is left.\n";
-    return kDone;
+  try {
+    if (retire_all(engine, flags.scaling.patience_s, wait, tell_line)) {
+      std::cerr << "No job is left.\n";
+      return kDone;
+    }
+  } catch (const Interrupted&) {
+    return stop.exit_code();
   }
   return flags.once ? kDone : stop.exit_code();
 }
@@ -157,12 +162,14 @@ int keep_scaling(Autoscaler& autoscaler, const AutoscaleFlags& flags, protocol::
 int autoscale(const AutoscaleFlags& flags) {
   const auto server = connection_settings(flags.source);
   const auto scaling = flags.retires ? flags.scaling : scaling_settings(flags);
-  SlurmEngine engine(slurm_settings(flags, server.server_url));
+  auto slurm = slurm_settings(flags, server.server_url);
   protocol::StopSignals stop;  // before any thread starts
+  const auto goes_on = [&stop] { return !stop.requested(); };
+  SlurmEngine engine(std::move(slurm), goes_on);
   if (flags.retires) {
     return retire(engine, flags, stop);
   }
-  Connection connection(server, [&stop] { return !stop.requested(); });
+  Connection connection(server, goes_on);
   const auto ask = [&] {
     return demand_of(connection.status(""), connection.workers(),
                      [&](const std::string& name) { return engine.job_of_worker(name); });

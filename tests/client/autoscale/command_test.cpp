@@ -6,6 +6,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "client/service/connection.h"
+
 namespace oblique::client {
 namespace {
 
@@ -40,6 +42,12 @@ TEST(Command, AProgramThatHangsIsEnded) {
   auto command = command_line("exec sleep 600");
   command.timeout_s = 0.05;
   EXPECT_EQ(error_of_running(command), "sh took longer than 0.05 s");
+}
+
+TEST(Command, WaitingCanBeEnded) {
+  auto command = command_line("exec sleep 600");
+  command.keep_waiting = [looks = 0]() mutable { return ++looks < 3; };
+  EXPECT_THROW(output_of(command), Interrupted);
 }
 
 TEST(Command, OutputWithoutEndIsRefused) {
