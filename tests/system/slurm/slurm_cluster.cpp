@@ -55,7 +55,6 @@ PreemptType=preempt/partition_prio
 PreemptMode=REQUEUE
 KillWait=5
 MessageTimeout=3
-MinJobAge=2
 ReturnToService=2
 PartitionName=work Nodes=ALL Default=YES State=UP PriorityTier=10 PreemptMode=REQUEUE
 PartitionName=grace Nodes=ALL State=UP PriorityTier=10 PreemptMode=REQUEUE GraceTime=30
