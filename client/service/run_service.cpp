@@ -11,6 +11,7 @@
 #include "client/service/result_query.h"
 #include "client/service/watching.h"
 #include "proto/text.h"
+#include "worker/solver/model/errors.h"
 
 namespace oblique::client {
 namespace {

@@ -1,6 +1,8 @@
 #include "server/doors/key_list.h"
 
+#include <cstdint>
 #include <ctime>
+#include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
