@@ -14,10 +14,10 @@ constexpr std::int64_t kLongestInterval_ms = 600'000;
 
 Conversation::Conversation(protocol::WorkerHello hello, ConversationSettings settings)
     : hello_(std::move(hello)),
-      settings_(settings),
-      hello_timeout_ms_(settings.hello_timeout_ms),
-      outbox_(settings.outbox),
-      leaving_(settings.leaving, hello_.threads()) {}
+      settings_(std::move(settings)),
+      hello_timeout_ms_(settings_.hello_timeout_ms),
+      outbox_(settings_.outbox),
+      leaving_(settings_.leaving, hello_.threads()) {}
 
 Effects Conversation::take_effects() {
   return std::exchange(effects_, {});
@@ -27,6 +27,7 @@ Effects Conversation::take_effects() {
 
 Effects Conversation::start(std::int64_t now_ms) {
   now_ms_ = now_ms;
+  start_ms_ = now_ms;
   leaving_.note_work(now_ms);
   connect("");
   return take_effects();
@@ -49,7 +50,10 @@ void Conversation::connect_after_backoff(const std::string& reason) {
     connect(reason);
     return;
   }
-  effects_.emplace_back(Note{reason + ": trying again in " + std::to_string(backoff_ms_) + " ms"});
+  if (!reason.empty()) {
+    effects_.emplace_back(
+        Note{reason + ": trying again in " + std::to_string(backoff_ms_) + " ms"});
+  }
   state_ = State::kWaiting;
   deadline_ms_ = now_ms_ + backoff_ms_;
 }
@@ -68,8 +72,10 @@ Effects Conversation::on_rejected(const std::string& reason, std::int64_t now_ms
   if (state_ == State::kGreeting || state_ == State::kWelcomed) {
     rejected_ms_ =
         std::clamp(2 * rejected_ms_, settings_.shortest_rejected_ms, settings_.longest_rejected_ms);
-    effects_.emplace_back(Note{
-        reason + ": trying again in " + std::to_string(rejected_ms_ / kSecond_ms) + " s", true});
+    const bool is_known = std::exchange(rejection_, reason) == reason;
+    effects_.emplace_back(Note{(is_known ? "still refused, " : reason + ": ") + "trying again in " +
+                                   std::to_string(rejected_ms_ / kSecond_ms) + " s",
+                               true});
     state_ = State::kWaiting;
     deadline_ms_ = now_ms_ + rejected_ms_;
   }
@@ -79,7 +85,7 @@ Effects Conversation::on_rejected(const std::string& reason, std::int64_t now_ms
 Effects Conversation::on_time(std::int64_t now_ms) {
   now_ms_ = now_ms;
   if (stopping_ && now_ms_ >= stop_deadline_ms_) {
-    finish(0, stop_reason_);
+    finish(stop_exit_code_, stop_reason_);
   }
   finish_if_delivered();
   leave_if_due();
@@ -88,7 +94,8 @@ Effects Conversation::on_time(std::int64_t now_ms) {
       if (now_ms_ >= deadline_ms_) {
         // Handshake and hello may take longer than that on a long line.
         hello_timeout_ms_ = std::min(2 * hello_timeout_ms_, settings_.longest_hello_timeout_ms);
-        connect_after_backoff("the server does not answer");
+        effects_.emplace_back(TellSilence{});
+        connect_after_backoff("");
       }
       break;
     case State::kWaiting:
@@ -202,6 +209,8 @@ void Conversation::on(const protocol::Welcome& welcome) {
   state_ = State::kWelcomed;
   hello_timeout_ms_ = settings_.hello_timeout_ms;
   rejected_ms_ = 0;
+  rejection_.clear();
+  was_welcomed_ = true;
   heartbeat_interval_ms_ = std::clamp<std::int64_t>(welcome.heartbeat_interval_ms(),
                                                     kShortestInterval_ms, kLongestInterval_ms);
   lost_after_ms_ = std::clamp<std::int64_t>(welcome.lost_after_ms(), 2 * heartbeat_interval_ms_,
@@ -338,9 +347,10 @@ Effects Conversation::on_solver_idle(std::int64_t now_ms) {
   return take_effects();
 }
 
-void Conversation::begin_stop(const std::string& reason, bool points_are_solved) {
+void Conversation::begin_stop(const std::string& reason, bool points_are_solved, int exit_code) {
   stopping_ = true;
   stop_reason_ = reason;
+  stop_exit_code_ = exit_code;
   stop_deadline_ms_ = now_ms_ + settings_.stop_timeout_ms;
   last_points_until_ms_ = now_ms_ + (points_are_solved ? settings_.last_points_ms : 0);
   // Points of results that still wait here must not be handed out again.
@@ -354,7 +364,7 @@ void Conversation::begin_stop(const std::string& reason, bool points_are_solved)
 
 void Conversation::finish_if_delivered() {
   if (stopping_ && outbox_.is_empty() && now_ms_ >= last_points_until_ms_) {
-    finish(0, stop_reason_);
+    finish(stop_exit_code_, stop_reason_);
   }
 }
 

@@ -18,7 +18,8 @@ namespace oblique::worker {
 
 /// What the conversation with the server keeps to.
 struct ConversationSettings {
-  std::uint32_t batches_held = 2;  ///< one is solved, the next waits ready
+  std::string server = "the server";  ///< what it is called in sentences: its address
+  std::uint32_t batches_held = 2;     ///< one is solved, the next waits ready
   OutboxLimits outbox;
   std::size_t results_a_message = 1000;
   std::size_t bytes_a_message = std::size_t{64} << 10U;  ///< then another one begins
@@ -106,7 +107,8 @@ class Conversation {
   void give_back(std::uint64_t first_batch);
   void give_back_what_takes_too_long();
   void leave_if_due();
-  void begin_stop(const std::string& reason, bool points_are_solved);
+  void begin_stop(const std::string& reason, bool points_are_solved, int exit_code = 0);
+  void leave(const std::string& reason, bool points_are_solved);
   void finish_if_delivered();
   void finish(int exit_code, const std::string& reason);
   Effects take_effects();
@@ -123,8 +125,12 @@ class Conversation {
   std::int64_t lost_after_ms_ = 3000;
   std::int64_t backoff_ms_ = 0;   ///< 0: the last attempt came to something
   std::int64_t rejected_ms_ = 0;  ///< pause after the last rejection; 0: welcomed since
+  std::string rejection_;         ///< what the last one was for; empty: welcomed since
+  std::int64_t start_ms_ = 0;
+  bool was_welcomed_ = false;  ///< ever
   bool stopping_ = false;
   std::string stop_reason_;
+  int stop_exit_code_ = 0;
   std::int64_t stop_deadline_ms_ = 0;
   std::int64_t last_points_until_ms_ = 0;
   std::int64_t stop_repeats_until_ms_ = 0;

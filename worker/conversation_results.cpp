@@ -1,11 +1,25 @@
 // The part of the conversation that delivers what was solved and asks for more.
 #include <algorithm>
+#include <cmath>
 #include <utility>
+
+#include <spdlog/fmt/fmt.h>
 
 #include "proto/result_message.h"
 #include "worker/conversation.h"
 
 namespace oblique::worker {
+namespace {
+
+/// To a tenth of a second.
+std::string seconds_of(std::int64_t duration_ms) {
+  constexpr double kTenth_ms = 100.0;
+  constexpr double kTenths = 10.0;
+  return fmt::format("{:.12g} s",
+                     std::round(static_cast<double>(duration_ms) / kTenth_ms) / kTenths);
+}
+
+}  // namespace
 
 Effects Conversation::on_progress(std::vector<Progress> progress, std::int64_t now_ms) {
   now_ms_ = now_ms;
@@ -138,6 +152,18 @@ void Conversation::give_back_what_takes_too_long() {
   }
 }
 
+/// A worker that no server ever welcomed was of no use, and who started it should know.
+void Conversation::leave(const std::string& reason, bool points_are_solved) {
+  if (was_welcomed_) {
+    begin_stop(reason, points_are_solved);
+    return;
+  }
+  begin_stop(fmt::format("leaving: {} {} in {}", settings_.server,
+                         rejection_.empty() ? "was never reached" : "never let this worker in",
+                         seconds_of(now_ms_ - start_ms_)),
+             points_are_solved, 1);
+}
+
 void Conversation::leave_if_due() {
   if (stopping_ || state_ == State::kFinished) {
     return;
@@ -147,11 +173,13 @@ void Conversation::leave_if_due() {
     leaving_.note_work(now_ms_);
   }
   if (leaving_.is_due(now_ms_)) {
-    begin_stop("the time to work is over", !is_without_work);
+    leave("leaving: --until " + settings_.leaving.until, !is_without_work);
   } else if (is_without_work && !leaving_.has_time_for_more({}, now_ms_)) {
-    begin_stop("no further batch would end before the time to leave", false);
+    leave("leaving: no further batch would end before --until " + settings_.leaving.until, false);
   } else if (leaving_.is_idle_for_too_long(now_ms_)) {
-    begin_stop("nothing to do for long enough", false);
+    leave(fmt::format("no work for {}: leaving (--idle-exit)",
+                      seconds_of(settings_.leaving.idle_exit_ms)),
+          false);
   }
 }
 

@@ -31,6 +31,8 @@ struct DropBatch {
 };
 /// Drop all batches: whoever gets their points now is the server's to say.
 struct DropAll {};
+/// Hello had no answer: people are to know why, as far as the socket shows it.
+struct TellSilence {};
 /// Worth a line in the log.
 struct Note {
   std::string text;
@@ -42,7 +44,8 @@ struct Finish {
   std::string reason;
 };
 
-using Effect = std::variant<Connect, Send, Solve, DropStudy, DropBatch, DropAll, Note, Finish>;
+using Effect =
+    std::variant<Connect, Send, Solve, DropStudy, DropBatch, DropAll, TellSilence, Note, Finish>;
 using Effects = std::vector<Effect>;
 
 }  // namespace oblique::worker

@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <span>
+#include <string>
 
 namespace oblique::worker {
 
@@ -14,6 +15,7 @@ inline constexpr std::int64_t kNever_ms = std::numeric_limits<std::int64_t>::max
 /// When a worker ends by itself.
 struct LeavingSettings {
   std::int64_t until_ms = kNever_ms;      ///< the process has ended by then; same clock as `now_ms`
+  std::string until = {};                 ///< the same as people said it
   std::int64_t idle_exit_ms = kNever_ms;  ///< so long without work
   std::int64_t farewell_ms = 3000;        ///< that leaving takes at most
 };

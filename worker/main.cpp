@@ -12,6 +12,7 @@
 #include <string>
 #include <thread>
 
+#include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
 
@@ -81,12 +82,26 @@ oblique::worker::LeavingSettings leaving_settings(const Ending& ending) {
   if (const auto left =
           oblique::protocol::time_until(ending.until, std::chrono::system_clock::now())) {
     const auto now = std::chrono::steady_clock::now().time_since_epoch();
+    settings.until = ending.until;
     settings.until_ms = (duration_cast<milliseconds>(now) + *left).count();
   }
   if (ending.idle_exit_s > 0.0) {
     settings.idle_exit_ms = std::max<std::int64_t>(std::llround(ending.idle_exit_s * 1000.0), 1);
   }
   return settings;
+}
+
+/// Empty unless the worker would have to leave before it works, and then what is wrong.
+std::string objection_to_end(const std::string& until, std::int64_t farewell_ms) {
+  const auto left = oblique::protocol::time_until(until, std::chrono::system_clock::now());
+  if (!left || left->count() > farewell_ms) {
+    return {};
+  }
+  constexpr std::int64_t kSecond_ms = 1000;
+  return left->count() < 0
+             ? fmt::format("--until {} is in the past", until)
+             : fmt::format("--until {} leaves no time to work: leaving begins {} s before it",
+                           until, farewell_ms / kSecond_ms);
 }
 
 int run_worker(SessionSettings settings, const StopWithParent& parent) {
@@ -175,6 +190,11 @@ int run_program(int argc, char** argv, LogSettings& log) {
   if (configuration.is_to_be_printed()) {
     std::cout << configuration.printed();
     return oblique::protocol::kDone;
+  }
+  if (const std::string objection =
+          objection_to_end(ending.until, settings.conversation.leaving.farewell_ms);
+      !objection.empty()) {
+    return oblique::protocol::tell_wrong_usage(app.get_name(), objection);
   }
   settings.host = host_name();
   if (settings.name.empty()) {

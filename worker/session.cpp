@@ -11,6 +11,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include "proto/address.h"
 #include "proto/frames.h"
 #include "proto/result_message.h"
 #include "proto/socket/socket.h"
@@ -52,6 +53,12 @@ protocol::WorkerHello hello_of(const SessionSettings& settings) {
   return hello;
 }
 
+ConversationSettings conversation_settings(const SessionSettings& settings) {
+  ConversationSettings conversation = settings.conversation;
+  conversation.server = settings.server;
+  return conversation;
+}
+
 template <class... Handlers>
 struct Overloaded : Handlers... {
   using Handlers::operator()...;
@@ -63,7 +70,7 @@ Overloaded(Handlers...) -> Overloaded<Handlers...>;
 
 Session::Session(SessionSettings settings, BatchSolver::SolvePoints solve)
     : settings_(std::move(settings)),
-      conversation_(hello_of(settings_), settings_.conversation),
+      conversation_(hello_of(settings_), conversation_settings(settings_)),
       solver_(
           std::move(solve), [this] { batch_ended_.wake(); }, settings_.threads) {}
 
@@ -93,6 +100,31 @@ void Session::note_rejection() {
   if (const auto rejection = link_->monitor.rejection()) {
     apply(
         conversation_.on_rejected(protocol::sentence_of(*rejection, dealer_settings()), now_ms()));
+  }
+}
+
+std::string Session::cause_of_silence() {
+  // In the time that a hello is waited for, attempts that are refused are more, those that nothing
+  // answers fewer.
+  constexpr unsigned kManyAttempts = 4;
+  const auto attempts = link_->monitor.attempts();
+  if (attempts.was_accepted) {
+    return "connections are accepted, but no worker is welcomed: is this its port for workers?";
+  }
+  const std::string host = protocol::host_of(settings_.server);
+  const auto [has_v4, has_v6] = protocol::families_of(host);
+  if (!host.empty() && !has_v4 && !has_v6) {
+    return fmt::format("no address is known here for the name {}", host);
+  }
+  return attempts.failed >= kManyAttempts
+             ? "connections fail at once: is it running there?"
+             : "attempts to connect get no answer: does a firewall drop them?";
+}
+
+void Session::tell_silence() {
+  const std::string cause = cause_of_silence();
+  if (told_causes_.insert(cause).second) {
+    spdlog::warn("no server answers at {} ({}); trying again", settings_.server, cause);
   }
 }
 
@@ -167,6 +199,9 @@ void Session::receive_all() {
       continue;
     }
     was_heard_ = true;
+    if (message.has_welcome()) {
+      told_causes_.clear();
+    }
     apply(conversation_.on_message(message, now_ms()));
   }
 }
@@ -199,6 +234,7 @@ void Session::apply(Effects effects) {
       [&](const DropStudy& effect) { solver_.drop_study(effect.study_id); },
       [&](const DropBatch& effect) { solver_.drop_batch(effect.number); },
       [&](const DropAll&) { solver_.drop_all(); },
+      [&](const TellSilence&) { tell_silence(); },
       [&](const Note& note) {
         spdlog::log(note.is_warning ? spdlog::level::warn : spdlog::level::info, "{}", note.text);
       },

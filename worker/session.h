@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <set>
 #include <string>
 
 #include <zmq.hpp>
@@ -55,7 +56,7 @@ class Session {
   /// The socket of the present attempt.
   struct Link {
     Link(zmq::context_t& context, const protocol::DealerSettings& settings)
-        : socket(protocol::made_dealer(context, settings)), monitor(context, socket) {}
+        : socket(protocol::made_dealer(context, settings)), monitor(context, socket, true) {}
     zmq::socket_t socket;
     protocol::SocketMonitor monitor;
   };
@@ -63,6 +64,8 @@ class Session {
   protocol::DealerSettings dealer_settings() const;
   void open_socket();
   void note_rejection();
+  void tell_silence();
+  std::string cause_of_silence();
   void apply(Effects effects);
   /// False when the message could not be handed to the socket.
   bool send(const protocol::WorkerMessage& message);
@@ -75,6 +78,7 @@ class Session {
   std::optional<Link> link_;
   unsigned attempt_ = 0;   ///< to connect: which of the families of addresses the host has is tried
   bool was_heard_ = true;  ///< something came over this socket
+  std::set<std::string> told_causes_;  ///< of the server's silence, since it last welcomed us
   protocol::WakeUp batch_ended_;
   Conversation conversation_;
   std::optional<int> exit_code_;

@@ -10,12 +10,14 @@ namespace {
 constexpr int kEvents = ZMQ_EVENT_HANDSHAKE_SUCCEEDED | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH |
                         ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL;
 
-/// Lets libzmq tell what happens to `socket`, under a name that is free: that of a socket which was
+constexpr int kAttemptEvents = ZMQ_EVENT_CONNECTED | ZMQ_EVENT_CONNECT_RETRIED;
+
+/// Lets libzmq tell `events` of `socket`, under a name that is free: that of a socket which was
 /// closed just now may not be yet.
-std::string monitored(zmq::socket_t& socket) {
+std::string monitored(zmq::socket_t& socket, int events) {
   for (int number = 0;; ++number) {
     std::string name = "inproc://connections-" + std::to_string(number);
-    if (zmq_socket_monitor(socket.handle(), name.c_str(), kEvents) == 0) {
+    if (zmq_socket_monitor(socket.handle(), name.c_str(), events) == 0) {
       return name;
     }
     if (zmq_errno() != EADDRINUSE) {
@@ -39,9 +41,9 @@ Rejection rejection_of(std::uint16_t event, std::uint32_t value) {
 
 }  // namespace
 
-SocketMonitor::SocketMonitor(zmq::context_t& context, zmq::socket_t& socket)
+SocketMonitor::SocketMonitor(zmq::context_t& context, zmq::socket_t& socket, bool with_attempts)
     : socket_(socket), events_(context, zmq::socket_type::pair) {
-  const std::string name = monitored(socket_);
+  const std::string name = monitored(socket_, kEvents | (with_attempts ? kAttemptEvents : 0));
   events_.set(zmq::sockopt::linger, 0);
   events_.connect(name);
 }
@@ -61,7 +63,11 @@ void SocketMonitor::take_events() {
     }
     std::memcpy(&event, frame.data(), sizeof event);
     std::memcpy(&value, frame.data<char>() + sizeof event, sizeof value);
-    if (event == ZMQ_EVENT_HANDSHAKE_SUCCEEDED) {
+    if (event == ZMQ_EVENT_CONNECTED) {
+      attempts_.was_accepted = true;
+    } else if (event == ZMQ_EVENT_CONNECT_RETRIED) {
+      ++attempts_.failed;
+    } else if (event == ZMQ_EVENT_HANDSHAKE_SUCCEEDED) {
       ++connections_;
       rejection_.reset();
     } else {
@@ -73,6 +79,11 @@ void SocketMonitor::take_events() {
 std::uint64_t SocketMonitor::connections() {
   take_events();
   return connections_;
+}
+
+SocketMonitor::Attempts SocketMonitor::attempts() {
+  take_events();
+  return attempts_;
 }
 
 std::optional<Rejection> SocketMonitor::rejection() {

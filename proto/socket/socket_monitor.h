@@ -14,8 +14,9 @@ namespace oblique::protocol {
 /// that connection, and only this tells.
 class SocketMonitor {
  public:
-  /// `socket` must not be connected yet, and it and `context` must live as long.
-  SocketMonitor(zmq::context_t& context, zmq::socket_t& socket);
+  /// `socket` must not be connected yet, and it and `context` must live as long. Whoever wants the
+  /// attempts to connect too must ask often, for libzmq waits where too much of that is not taken.
+  SocketMonitor(zmq::context_t& context, zmq::socket_t& socket, bool with_attempts = false);
   ~SocketMonitor();
   SocketMonitor(const SocketMonitor&) = delete;
   SocketMonitor& operator=(const SocketMonitor&) = delete;
@@ -28,6 +29,13 @@ class SocketMonitor {
   /// Why the other end turned the socket away, which then does not try again: a new socket must.
   std::optional<Rejection> rejection();
 
+  /// What became of attempts to connect; nothing unless asked for `with_attempts`.
+  struct Attempts {
+    bool was_accepted = false;  ///< something took a connection, whatever came over it
+    unsigned failed = 0;
+  };
+  Attempts attempts();
+
  private:
   void take_events();
 
@@ -35,6 +43,7 @@ class SocketMonitor {
   zmq::socket_t events_;
   std::uint64_t connections_ = 0;
   std::optional<Rejection> rejection_;
+  Attempts attempts_;
 };
 
 }  // namespace oblique::protocol

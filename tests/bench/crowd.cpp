@@ -243,6 +243,7 @@ class Crowd::Parts {
           drop([&](const worker::Batch& batch) { return batch.number == effect.number; });
         },
         [&](const worker::DropAll&) { member.jobs.clear(); },
+        [](const worker::TellSilence&) {},
         [](const worker::Note&) {},
         [](const worker::Finish& finish) {
           std::fprintf(stderr, "a worker ended: %s\n", finish.reason.c_str());

@@ -196,7 +196,16 @@ TEST_F(LeavingConversationTest, AWorkerThatNoServerAnswersIsIdleToo) {
   }
   pass(100);
   ASSERT_TRUE(finish());
+  EXPECT_EQ(finish()->exit_code, 1);
+  EXPECT_EQ(finish()->reason, "leaving: the server was never reached in 5 s");
+}
+
+TEST_F(LeavingConversationTest, AWorkerThatWasWelcomedOnceLeavesWithZeroThoughItsServerIsGone) {
+  leave_within(kNever_ms, 5000);
+  pass(5000);
+  ASSERT_TRUE(finish());
   EXPECT_EQ(finish()->exit_code, 0);
+  EXPECT_EQ(finish()->reason, "no work for 5 s: leaving (--idle-exit)");
 }
 
 TEST_F(LeavingConversationTest, TheNextDeadlineIsNeverLaterThanTheTimeToLeave) {

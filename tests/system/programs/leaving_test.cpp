@@ -100,13 +100,30 @@ TEST_F(LeavingProgramTest, AWorkerIsGoneByTheTimeThatItIsGiven) {
 TEST_F(LeavingProgramTest, AWorkerWithoutWorkLeaves) {
   Worker worker(folder_, server_.worker_url(), {"--idle-exit", "0.3"});
   EXPECT_EQ(worker.wait(), 0) << worker.err();
-  EXPECT_NE(worker.err().find("nothing to do"), std::string::npos) << worker.err();
+  EXPECT_NE(worker.err().find("no work for 0.3 s: leaving (--idle-exit)"), std::string::npos)
+      << worker.err();
   EXPECT_NE(server_.process().err().find(" leaves"), std::string::npos);
 }
 
-TEST_F(LeavingProgramTest, AWorkerWhoseServerIsNotThereLeavesToo) {
-  Worker worker(folder_, "tcp://127.0.0.1:1", {"--idle-exit", "0.3"});
-  EXPECT_EQ(worker.wait(), 0) << worker.err();
+TEST_F(LeavingProgramTest, AWorkerWhoseServerIsNotThereLeavesTooWithOneAndTheServersAddress) {
+  for (const std::vector<std::string>& end :
+       {std::vector<std::string>{"--idle-exit", "0.3"}, {"--until", "4s"}}) {
+    Worker worker(folder_, "tcp://127.0.0.1:1", end);
+    EXPECT_EQ(worker.wait(), 1) << worker.err();
+    EXPECT_NE(worker.err().find("leaving: tcp://127.0.0.1:1 was never reached in "),
+              std::string::npos)
+        << worker.err();
+  }
+}
+
+TEST_F(LeavingProgramTest, AWorkerWithoutServerSaysWhy) {
+  Worker refused(folder_, "tcp://127.0.0.1:1", {"--idle-exit", "3.5"});
+  EXPECT_EQ(refused.wait(), 1);  // after the first attempt
+  const std::string said = refused.err();
+  EXPECT_NE(said.find("no server answers at tcp://127.0.0.1:1 (connections fail at once"),
+            std::string::npos)
+      << said;
+  EXPECT_EQ(said.find("no server answers"), said.rfind("no server answers")) << said;
 }
 
 TEST(LeavingFlagsTest, NonsenseIsWrongUsage) {
@@ -115,11 +132,14 @@ TEST(LeavingFlagsTest, NonsenseIsWrongUsage) {
        std::vector<std::pair<std::string, std::string>>{{"--until", "soon"},
                                                         {"--until", "2026-02-30T00:00:00Z"},
                                                         {"--until", "-5"},
+                                                        {"--until", "2020-01-01T00:00:00Z"},
+                                                        {"--until", "2s"},
                                                         {"--idle-exit", "-1"},
                                                         {"--idle-exit", "nan"},
                                                         {"--idle-exit", "x"}}) {
     Process process(folder, worker_program(), {flag, value});
     EXPECT_EQ(process.wait(), 2) << flag << value;
+    EXPECT_NE(process.err().find(value), std::string::npos) << process.err();
     EXPECT_NE(process.err().find(flag), std::string::npos) << process.err();
   }
 }
