@@ -65,6 +65,9 @@ std::optional<KeyList::News> KeyList::look() {
   was_fresh_ = is_fresh();
   try {
     Holders holders = read();
+    if (holders.empty() && !holders_.empty() && was_fresh_) {
+      return std::nullopt;  // perhaps being written in place: what is there in 2 s counts
+    }
     const bool was_at_fault = !std::exchange(fault_, {}).empty();
     std::string changes = take(std::move(holders));
     if (changes.empty() && !was_at_fault) {

@@ -3,9 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <thread>
 
 #include "server/doors/doors.h"
 #include "tests/support/temporary_folder.h"
@@ -100,6 +102,18 @@ TEST_F(KeyListTest, AListThatIsBrokenOrGoneChangesNothingAndIsToldOnce) {
   EXPECT_TRUE(list->look()->admission_changed);
   EXPECT_EQ(cause_of(workers.judge(key)), RefusalCause::kRevokedKey);
   EXPECT_EQ(name_in(workers.judge(other)), "other");
+}
+
+TEST_F(KeyListTest, AListThatIsEmptiedCountsWhenItStaysSo) {
+  const auto key = add("w", Role::kWorker);
+  const auto list = std::make_shared<KeyList>(path_);
+  const PortKeeper workers(list, PortKeeper::Port::kWorkers);
+  std::ofstream(path_, std::ios::trunc).close();  // as by an editor that goes on to write
+  EXPECT_FALSE(list->look());
+  EXPECT_EQ(name_in(workers.judge(key)), "w");
+  std::this_thread::sleep_for(std::chrono::milliseconds(2100));
+  EXPECT_TRUE(list->look());
+  EXPECT_EQ(cause_of(workers.judge(key)), RefusalCause::kRevokedKey);
 }
 
 TEST_F(KeyListTest, AChangeWithinTheSameTickOfTheClockIsSeen) {
