@@ -3,84 +3,86 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <utility>
 
-#include "worker/solver/chain/chain.h"
 #include "worker/solver/contact/solve_contact.h"
+#include "worker/solver/falls.h"
 #include "worker/solver/lanes/lane_batch.h"
-#include "worker/solver/motion/fall.h"
-#include "worker/solver/motion/generalized_alpha.h"
 #include "worker/solver/step_choice.h"
 
 namespace oblique::solver {
-namespace {
 
-std::shared_ptr<const Motion> make_motion(const ModelParameters& model, const Chain& chain) {
-  if (model.integrator == Integrator::kGeneralizedAlpha) {
-    return std::make_shared<GeneralizedAlphaMotion>(model);
+class Finger::Parts {
+ public:
+  explicit Parts(const ModelParameters& model)
+      : model_(validated(model)),
+        prepared_(std::make_shared<const PreparedChain>(model)),
+        steps_(prepared_->chain(), model) {}
+  Parts(const ModelParameters& model, std::shared_ptr<const FallenChain> fallen)
+      : model_(validated(model)),
+        prepared_(fallen->prepared()),
+        steps_(prepared_->chain(), model),
+        fall_({std::move(fallen), {}}) {
+    if (!(fall_model(model) == prepared_->model())) {
+      throw std::invalid_argument("the fall is of another model");
+    }
+    std::call_once(fall_once_, [] {});
   }
-  return std::make_shared<ExplicitMotion>(chain);
-}
 
-}  // namespace
-
-struct Finger::Parts {
-  explicit Parts(ModelParameters parameters)
-      : model(std::move(parameters)),
-        chain(model),
-        steps(chain, model),
-        motion(make_motion(model, chain)) {}
+  const ModelParameters& model() const { return model_; }
+  const Chain& chain() const { return prepared_->chain(); }
+  const StepChoice& steps() const { return steps_; }
 
   /// Throws SolveError when the fall has no end, again and at once for every point: what one long
   /// computation has said need not be computed again.
   const Fall& solved_fall() const {
-    std::call_once(fall_once, [this] {
-      try {
-        fall.emplace(motion, steps.fall_s(), longest_fall_s(chain));
-      } catch (const SolveError& error) {
-        fall_error = error.what();
-      }
-    });
-    if (!fall) {
-      throw SolveError(fall_error);
+    std::call_once(fall_once_, [this] { fall_ = solve_falls({&prepared_, 1}).front(); });
+    if (!fall_.fallen) {
+      throw SolveError(fall_.error);
     }
-    return *fall;
+    return fall_.fallen->fall();
   }
 
   /// Throws InputError for a value outside its range, a step that is too long, an H never reached.
   void check(double H_m, double mu, double e_star) const {
-    validate_point(model, H_m, mu, e_star);
-    steps.contact(e_star);
+    validate_point(model_, H_m, mu, e_star);
+    steps_.contact(e_star);
     if (H_m > solved_fall().largest_drop_m()) {
       solved_fall().state_at(H_m);
     }
   }
   ContactParameters contact_parameters(double mu, double e_star) const {
-    return {model.k_N_m, model.eta2, mu, e_star};
+    return {model_.k_N_m, model_.eta2, mu, e_star};
   }
   void sign(SolverReport& report) const {
-    report.integrator = integrator_name(model.integrator);
+    report.integrator = integrator_name(model_.integrator);
     report.version = solver_version();
   }
   CaseResult solve_by_motion(const PointRequest& point, const Tracing& tracing) const {
     ChainState touch = solved_fall().state_at(point.H_m);
     const double fall_time_s = touch.t_s;
-    CaseResult result = solve_contact(*motion, contact_parameters(point.mu, point.e_star),
-                                      steps.contact(point.e_star), std::move(touch), tracing);
+    CaseResult result =
+        solve_contact(prepared_->motion(), contact_parameters(point.mu, point.e_star),
+                      steps_.contact(point.e_star), std::move(touch), tracing);
     result.H_m = point.H_m;
     result.fall_time_s = fall_time_s;
     sign(result.solver);
     return result;
   }
 
-  ModelParameters model;
-  Chain chain;
-  StepChoice steps;
-  std::shared_ptr<const Motion> motion;
-  mutable std::once_flag fall_once;
-  mutable std::optional<Fall> fall;
-  mutable std::string fall_error;  ///< why there is no fall, once that is known
+ private:
+  static const ModelParameters& validated(const ModelParameters& model) {
+    validate(model);
+    return model;
+  }
+
+  ModelParameters model_;
+  std::shared_ptr<const PreparedChain> prepared_;
+  StepChoice steps_;
+  mutable std::once_flag fall_once_;
+  mutable FallOutcome fall_;
 };
 
 namespace {
@@ -104,7 +106,7 @@ class TouchCache {
     }
     auto found = steps_.find(e_star);
     if (found == steps_.end()) {
-      found = steps_.emplace(e_star, parts_.steps.contact(e_star)).first;
+      found = steps_.emplace(e_star, parts_.steps().contact(e_star)).first;
     }
     return found->second;
   }
@@ -124,13 +126,12 @@ std::string instruction_set() {
   return std::string(runnable_lane_kernels().front().name);
 }
 
-Finger::Finger(ModelParameters model) : parts_(std::make_unique<Parts>(std::move(model))) {}
-Finger::~Finger() = default;
-Finger::Finger(Finger&&) noexcept = default;
-Finger& Finger::operator=(Finger&&) noexcept = default;
+Finger::Finger(const ModelParameters& model) : parts_(std::make_shared<const Parts>(model)) {}
+Finger::Finger(const ModelParameters& model, std::shared_ptr<const FallenChain> fallen)
+    : parts_(std::make_shared<const Parts>(model, std::move(fallen))) {}
 
 const ModelParameters& Finger::model() const {
-  return parts_->model;
+  return parts_->model();
 }
 double Finger::largest_drop_m() const {
   return parts_->solved_fall().largest_drop_m();
@@ -142,7 +143,7 @@ CaseResult Finger::solve(double H_m, double mu, double e_star) const {
 
 CaseResult Finger::solve(double H_m, double mu, double e_star, const Tracing& tracing) const {
   parts_->check(H_m, mu, e_star);
-  if (parts_->model.integrator != Integrator::kExplicit) {
+  if (parts_->model().integrator != Integrator::kExplicit) {
     return parts_->solve_by_motion({0, H_m, mu, e_star}, tracing);
   }
   std::optional<PointRequest> request = PointRequest{0, H_m, mu, e_star};
@@ -157,7 +158,7 @@ CaseResult Finger::solve(double H_m, double mu, double e_star, const Tracing& tr
 
 void Finger::solve_points(const std::function<std::optional<PointRequest>()>& source,
                           const std::function<void(PointOutcome&&)>& sink) const {
-  if (parts_->model.integrator == Integrator::kExplicit) {
+  if (parts_->model().integrator == Integrator::kExplicit) {
     solve_in_lanes(source, sink, Tracing{});
     return;
   }
@@ -188,7 +189,7 @@ void Finger::solve_in_lanes(const std::function<std::optional<PointRequest>()>& 
   const auto take = [&]() -> std::optional<ContactCase> {
     while (const auto request = source()) {
       try {
-        validate_point(parts_->model, request->H_m, request->mu, request->e_star);
+        validate_point(parts_->model(), request->H_m, request->mu, request->e_star);
         const ContactSteps steps = touches.steps(request->e_star);
         const ChainState& touch = touches.at(request->H_m);
         group += last && last->H_m == request->H_m && last->mu == request->mu ? 0U : 1U;
@@ -212,7 +213,7 @@ void Finger::solve_in_lanes(const std::function<std::optional<PointRequest>()>& 
     }
     sink({entry.request.number, std::move(contact.result), std::move(contact.error)});
   };
-  LaneBatch batch(parts_->chain, runnable_lane_kernels().front());
+  LaneBatch batch(parts_->chain(), runnable_lane_kernels().front());
   batch.solve(take, give, tracing);
 }
 

@@ -14,6 +14,8 @@
 
 namespace oblique::solver {
 
+class FallenChain;  // falls.h
+
 /// Instruction set the solver runs with on this machine, as "avx2".
 std::string instruction_set();
 
@@ -32,18 +34,19 @@ struct PointOutcome {
   std::string error;
 };
 
-/// Solves points of one model. The fall is solved once, when first needed, and shared by all
-/// points. Const members may be called from several threads at once. A point's result has the same
-/// bits whatever was solved before or beside it.
+/// Solves points of one model: its contact's parameters and steps over a fall, which models may
+/// share. Copies are cheap and share everything. Const members may be called from several threads
+/// at once. A point's result has the same bits whatever was solved before or beside it.
 class Finger {
  public:
-  struct Parts;  ///< of the implementation
+  class Parts;  ///< of the implementation
 
-  /// Throws InputError when `model` is outside its domain.
-  explicit Finger(ModelParameters model);
-  ~Finger();
-  Finger(Finger&&) noexcept;
-  Finger& operator=(Finger&&) noexcept;
+  /// The fall is solved once, when first needed. Throws InputError when `model` is outside its
+  /// domain.
+  explicit Finger(const ModelParameters& model);
+  /// Over a fall that is solved. Throws InputError when `model` is outside its domain,
+  /// std::invalid_argument when its fall is another one.
+  Finger(const ModelParameters& model, std::shared_ptr<const FallenChain> fallen);
 
   const ModelParameters& model() const;
 
@@ -67,7 +70,7 @@ class Finger {
   void solve_in_lanes(const std::function<std::optional<PointRequest>()>& source,
                       const std::function<void(PointOutcome&&)>& sink,
                       const Tracing& tracing) const;
-  std::unique_ptr<Parts> parts_;
+  std::shared_ptr<const Parts> parts_;
 };
 
 }  // namespace oblique::solver

@@ -1,0 +1,110 @@
+#include "worker/solver/falls.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "tests/worker/solver/cases/same_bits.h"
+#include "tests/worker/solver/cases/shared_fingers.h"
+
+namespace oblique::solver {
+namespace {
+
+using testing::HasSubstr;
+
+/// Models that differ in what a fall does not depend on.
+std::vector<ModelParameters> models_of_one_fall() {
+  std::vector<ModelParameters> models(5, coarse_model());
+  models[1].k_N_m = 1.3e7;
+  models[2].eta2 = 2.0;
+  models[3].dt_s = 1e-6;
+  models[4].k_N_m = 5e7;
+  models[4].eta2 = 0.8;
+  return models;
+}
+
+TEST(Falls, ModelsThatDifferInContactAloneShareOne) {
+  for (const ModelParameters& model : models_of_one_fall()) {
+    EXPECT_EQ(fall_model(model), coarse_model());
+  }
+}
+
+TEST(Falls, WhatMovesAChainMakesAnother) {
+  ModelParameters model = coarse_model();
+  model.spectral_radius = 0.5;
+  EXPECT_EQ(fall_model(model), coarse_model()) << "the explicit integrator has none";
+  model.integrator = Integrator::kGeneralizedAlpha;
+  EXPECT_EQ(fall_model(model), model);
+  for (const ParameterKey& key : model_keys()) {
+    if (key.name == "k" || key.name == "eta2" || key.name == "dt" ||
+        key.name == "spectral_radius") {
+      continue;
+    }
+    ModelParameters other = coarse_model();
+    key.set(other, key.name == "integrator" ? 1.0 : 2.0 * key.get(other) + 1.0);
+    EXPECT_NE(fall_model(other), coarse_model()) << key.name;
+  }
+}
+
+TEST(Falls, ASharedFallGivesEachModelTheBitsOfItsOwn) {
+  const auto models = models_of_one_fall();
+  const auto fallen = solve_falls({models.data(), 1}).front().fallen;
+  for (const ModelParameters& model : models) {
+    const CaseResult shared = Finger(model, fallen).solve(0.9, 0.4, 0.7);
+    expect_same_bits(shared, Finger(model).solve(0.9, 0.4, 0.7));
+  }
+}
+
+TEST(Falls, ThatOfAnotherModelIsRefused) {
+  const ModelParameters other = coarse_model(2);
+  const auto fallen = solve_falls({&other, 1}).front().fallen;
+  EXPECT_THROW(Finger(coarse_model(), fallen), std::invalid_argument);
+  ModelParameters wrong = other;
+  wrong.k_N_m = -1.0;
+  EXPECT_THROW(Finger(wrong, fallen), InputError);
+}
+
+TEST(Falls, SolvedTogetherTheyAreThoseSolvedAlone) {
+  std::vector<ModelParameters> models(11, coarse_model());
+  for (std::size_t i = 0; i < models.size(); ++i) {
+    models[i].E_Pa *= 1.0 + 0.1 * static_cast<double>(i);
+    models[i].lengths_m[i % 3] *= 1.0 + 0.02 * static_cast<double>(i);
+  }
+  const std::vector<FallOutcome> together = solve_falls(models);
+  ASSERT_EQ(together.size(), models.size());
+  for (std::size_t i = 0; i < models.size(); ++i) {
+    SCOPED_TRACE(i);
+    ASSERT_TRUE(together[i].fallen) << together[i].error;
+    const Fall& fall = together[i].fallen->fall();
+    const auto alone = solve_falls({&models[i], 1}).front().fallen;
+    EXPECT_EQ(fall.largest_drop_m(), alone->fall().largest_drop_m());
+    const ChainState touch = fall.state_at(0.7);
+    const ChainState touch_alone = alone->fall().state_at(0.7);
+    EXPECT_EQ(touch.t_s, touch_alone.t_s);
+    EXPECT_EQ(touch.q, touch_alone.q);
+    EXPECT_EQ(touch.v, touch_alone.v);
+  }
+}
+
+TEST(Falls, OneThatFailsLeavesTheOthersAlone) {
+  std::vector<ModelParameters> models(4, coarse_model());
+  models[1].E_Pa = -1.0;
+  models[2].dt_fall_s = 1e-300;
+  models[3].integrator = Integrator::kGeneralizedAlpha;
+  models[3].dt_fall_s = 0.025;  // some steps on, Newton's method does not converge
+  const std::vector<FallOutcome> outcomes = solve_falls(models);
+  EXPECT_TRUE(outcomes[0].fallen);
+  EXPECT_THAT(outcomes[1].error, HasSubstr("E = -1"));
+  EXPECT_THAT(outcomes[2].error, HasSubstr("more than 1e+09 steps"));
+  EXPECT_NE(outcomes[3].error, "");
+  for (std::size_t i = 1; i < outcomes.size(); ++i) {
+    EXPECT_FALSE(outcomes[i].fallen) << i;
+  }
+}
+
+}  // namespace
+}  // namespace oblique::solver
