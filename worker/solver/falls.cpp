@@ -19,8 +19,8 @@ std::shared_ptr<const Motion> make_motion(const ModelParameters& model, const Ch
 FallOutcome solve_fall(const std::shared_ptr<const PreparedChain>& chain) {
   try {
     return {std::make_shared<const FallenChain>(
-                chain,
-                Fall(chain->shared_motion(), chain->fall_step_s(), longest_fall_s(chain->chain()))),
+                chain, Fall(chain->shared_motion(), chain->fall_step_s(),
+                            longest_fall_s(chain->chain()), &chain->fall_progress())),
             {}};
   } catch (const std::exception& error) {
     return {nullptr, error.what()};

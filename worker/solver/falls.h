@@ -9,12 +9,14 @@
 #include "worker/solver/model/fall_model.h"
 #include "worker/solver/model/parameters.h"
 #include "worker/solver/motion/fall.h"
+#include "worker/solver/motion/fall_progress.h"
 #include "worker/solver/motion/motion.h"
 
 namespace oblique::solver {
 
 /// A chain set up to fall: all that models with one fall_model share before it is solved.
-/// Immutable; Motion and whatever else keeps a reference into it need it at one address.
+/// Immutable but for how far its fall is; Motion and whatever else keeps a reference into it need
+/// it at one address.
 class PreparedChain {
  public:
   /// Throws InputError when `model` is outside its domain or its dt_fall is above its limit.
@@ -29,12 +31,15 @@ class PreparedChain {
   const Motion& motion() const { return *motion_; }
   std::shared_ptr<const Motion> shared_motion() const { return motion_; }
   double fall_step_s() const { return fall_step_s_; }
+  /// How far its fall is, told while solve_falls() is at it.
+  FallProgress& fall_progress() const { return fall_progress_; }
 
  private:
   ModelParameters model_;
   Chain chain_;
   std::shared_ptr<const Motion> motion_;
   double fall_step_s_;
+  mutable FallProgress fall_progress_;
 };
 
 /// The chain with its fall: what points of all models with one fall_model share. Immutable.

@@ -34,6 +34,7 @@ class Finger::Parts {
   const ModelParameters& model() const { return model_; }
   const Chain& chain() const { return prepared_->chain(); }
   const StepChoice& steps() const { return steps_; }
+  const FallProgress& fall_progress() const { return prepared_->fall_progress(); }
 
   /// Throws SolveError when the fall has no end, again and at once for every point: what one long
   /// computation has said need not be computed again.
@@ -135,6 +136,9 @@ const ModelParameters& Finger::model() const {
 }
 double Finger::largest_drop_m() const {
   return parts_->solved_fall().largest_drop_m();
+}
+const FallProgress& Finger::fall_progress() const {
+  return parts_->fall_progress();
 }
 
 CaseResult Finger::solve(double H_m, double mu, double e_star) const {

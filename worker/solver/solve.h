@@ -11,6 +11,7 @@
 #include "worker/solver/model/parameters.h"
 #include "worker/solver/model/trace.h"
 #include "worker/solver/model/version.h"
+#include "worker/solver/motion/fall_progress.h"
 
 namespace oblique::solver {
 
@@ -53,6 +54,10 @@ class Finger {
   /// Largest drop of the tip before it first turns back [m]. Throws SolveError when the fall has no
   /// answer.
   double largest_drop_m() const;
+
+  /// How far the fall is while another thread solves it; of a fall given at the start, where that
+  /// ended. Lives as long as a copy of this.
+  const FallProgress& fall_progress() const;
 
   /// Solves one point. Throws InputError for a value outside its range, SolveError when there is
   /// no answer.

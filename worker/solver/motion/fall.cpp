@@ -29,7 +29,8 @@ double longest_fall_s(const Chain& chain) {
 Fall::Fall(const Chain& chain, double dt_s)
     : Fall(std::make_shared<ExplicitMotion>(chain), dt_s, longest_fall_s(chain)) {}
 
-Fall::Fall(std::shared_ptr<const Motion> motion, double dt_s, double longest_s)
+Fall::Fall(std::shared_ptr<const Motion> motion, double dt_s, double longest_s,
+           FallProgress* progress)
     : motion_(std::move(motion)), dt_s_(dt_s) {
   if (!(longest_s <= kLongestFall * kMostSteps * dt_s)) {
     throw SolveError("the fall would take more than " + exact_number(kMostSteps) +
@@ -55,6 +56,9 @@ Fall::Fall(std::shared_ptr<const Motion> motion, double dt_s, double longest_s)
     if (state.t_s > longest_s) {
       throw SolveError("the tip did not turn back within " + readable_number(longest_s) +
                        " s of falling");
+    }
+    if (progress != nullptr) {
+      progress->reach(state.t_s, -tip.y_m);
     }
     keep(step, state);
     std::swap(before, state);

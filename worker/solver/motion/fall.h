@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "worker/solver/motion/fall_progress.h"
 #include "worker/solver/motion/motion.h"
 
 namespace oblique::solver {
@@ -18,8 +19,10 @@ double longest_fall_s(const Chain& chain);
 class Fall {
  public:
   /// Solves the fall with steps of dt_s up to the first turn of the tip. Throws SolveError when it
-  /// diverges, lasts longer than `longest_s` or would take more than 1e9 steps.
-  Fall(std::shared_ptr<const Motion> motion, double dt_s, double longest_s);
+  /// diverges, lasts longer than `longest_s` or would take more than 1e9 steps. Tells `progress`,
+  /// if there is one, how far it is.
+  Fall(std::shared_ptr<const Motion> motion, double dt_s, double longest_s,
+       FallProgress* progress = nullptr);
   /// The same by the explicit integrator; `longest_s` is 100 times the time of a free fall from
   /// the chain's length. `chain` must outlive this.
   Fall(const Chain& chain, double dt_s);

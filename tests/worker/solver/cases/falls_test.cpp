@@ -50,6 +50,35 @@ TEST(Falls, WhatMovesAChainMakesAnother) {
   }
 }
 
+TEST(Falls, SayHowFarTheyAre) {
+  ModelParameters other = coarse_model();
+  other.E_Pa *= 2.0;
+  ModelParameters implicit = coarse_model();
+  implicit.integrator = Integrator::kGeneralizedAlpha;
+  std::vector<std::shared_ptr<const PreparedChain>> chains;
+  for (const ModelParameters& model : {coarse_model(), other, implicit}) {
+    chains.push_back(std::make_shared<const PreparedChain>(model));
+    EXPECT_EQ(chains.back()->fall_progress().time_s(), 0.0);
+  }
+  const auto outcomes = solve_falls(chains);
+  for (std::size_t i = 0; i < chains.size(); ++i) {
+    const Fall& fall = outcomes[i].fallen->fall();
+    const double turn_m = fall.largest_drop_m();
+    // Told now and then, so the end is not told to the last digit.
+    EXPECT_NEAR(chains[i]->fall_progress().drop_m(), turn_m, 0.02 * turn_m) << i;
+    EXPECT_NEAR(chains[i]->fall_progress().time_s(), fall.state_at(turn_m).t_s, 0.02) << i;
+  }
+}
+
+TEST(Falls, AFingerSaysHowFarItsFallIsAndWhatASharedOneCameTo) {
+  const Finger finger(coarse_model());
+  EXPECT_EQ(finger.fall_progress().drop_m(), 0.0);
+  const double turn_m = finger.largest_drop_m();
+  EXPECT_NEAR(finger.fall_progress().drop_m(), turn_m, 0.02 * turn_m);
+  const auto fallen = solve_falls(std::vector{coarse_model()}).front().fallen;
+  EXPECT_NEAR(Finger(coarse_model(), fallen).fall_progress().drop_m(), turn_m, 0.02 * turn_m);
+}
+
 TEST(Falls, ASharedFallGivesEachModelTheBitsOfItsOwn) {
   const auto models = models_of_one_fall();
   const auto fallen = solve_falls({models.data(), 1}).front().fallen;
