@@ -23,12 +23,59 @@ using Numbers = google::protobuf::RepeatedField<double>;
 /// Longest text that a result may have, in bytes.
 constexpr std::size_t kLongestText = 65536;
 
-template <class T>
-int number_sent() {
-  int number = 0;
-  for_each_sent<T>([&](const ResultField&, const Member<T>&) { ++number; });
-  return number;
+/// Calls `take` with every field that is sent with a result and its member, in the order of
+/// `sent_outputs()`.
+template <class Take>
+void for_each_scalar(const Take& take) {
+  for_each_sent<double>(take);
+  for_each_sent<std::int64_t>(take);
+  for_each_sent<std::string>(take);
 }
+
+/// The scalars of one type in a message.
+const Numbers& sent(const PointResult& message, const Member<double>& /*type*/) {
+  return message.reals();
+}
+const google::protobuf::RepeatedField<std::int64_t>& sent(const PointResult& message,
+                                                          const Member<std::int64_t>& /*type*/) {
+  return message.whole_numbers();
+}
+const google::protobuf::RepeatedPtrField<std::string>& sent(const PointResult& message,
+                                                            const Member<std::string>& /*type*/) {
+  return message.texts();
+}
+
+void add(PointResult& message, double value) {
+  message.add_reals(value);
+}
+void add(PointResult& message, std::int64_t value) {
+  message.add_whole_numbers(value);
+}
+void add(PointResult& message, const std::string& value) {
+  message.add_texts(value);
+}
+
+/// Told of one scalar after the other, says which of them a message lacks.
+class AbsentScalars {
+ public:
+  explicit AbsentScalars(const PointResult& message) : absent_(message.absent()) {}
+
+  /// Whether it lacks the next one.
+  bool lacks_next() {
+    const bool lacks =
+        named_ < absent_.size() && absent_[named_] == static_cast<std::uint32_t>(place_);
+    named_ += lacks ? 1 : 0;
+    ++place_;
+    return lacks;
+  }
+  /// Whether every place that the message names was come to.
+  bool all_found() const { return named_ == absent_.size(); }
+
+ private:
+  const google::protobuf::RepeatedField<std::uint32_t>& absent_;
+  int named_ = 0;
+  int place_ = 0;
+};
 
 void add_lists(const CaseResult& result, PointResult& message) {
   for (std::size_t i = 0; i < result.peaks.size(); ++i) {
@@ -101,12 +148,13 @@ void read_lists(const PointResult& message, CaseResult& result) {
   });
 }
 
-/// Reads the scalars of one type, as far as they go.
-template <class Values>
-void read_sent(const Values& values, CaseResult& result) {
+/// Reads the scalars of type T, as far as they go.
+template <class T>
+void read_sent(const PointResult& message, AbsentScalars& absent, CaseResult& result) {
   int i = 0;
-  for_each_sent<typename Values::value_type>([&](const ResultField&, const auto& member) {
-    if (i < values.size()) {
+  for_each_sent<T>([&](const ResultField&, const Member<T>& member) {
+    const auto& values = sent(message, member);
+    if (!absent.lacks_next() && i < values.size()) {
       member.in(result) = values[i++];
     }
   });
@@ -135,10 +183,30 @@ std::string fault_of_lists(const PointResult& message) {
   return {};
 }
 
+/// How many scalars of type T the message ought to have; adds to `wrongly_absent` those that no
+/// result may lack.
+template <class T>
+int number_expected(AbsentScalars& absent, int& wrongly_absent) {
+  int number = 0;
+  for_each_sent<T>([&](const ResultField&, const Member<T>& member) {
+    if (!absent.lacks_next()) {
+      ++number;
+    } else if (!member.may_be_absent) {
+      ++wrongly_absent;
+    }
+  });
+  return number;
+}
+
 std::string fault_of_scalars(const PointResult& message) {
-  const int reals = number_sent<double>();
-  const int whole_numbers = number_sent<std::int64_t>();
-  const int texts = number_sent<std::string>();
+  AbsentScalars absent(message);
+  int wrongly_absent = 0;
+  const int reals = number_expected<double>(absent, wrongly_absent);
+  const int whole_numbers = number_expected<std::int64_t>(absent, wrongly_absent);
+  const int texts = number_expected<std::string>(absent, wrongly_absent);
+  if (wrongly_absent > 0 || !absent.all_found()) {
+    return "the worker sent a result that lacks what no result may lack";
+  }
   if (message.reals_size() != reals || message.whole_numbers_size() != whole_numbers ||
       message.texts_size() != texts) {
     return fmt::format(
@@ -148,9 +216,10 @@ std::string fault_of_scalars(const PointResult& message) {
         whole_numbers, texts);
   }
   std::string fault;
+  AbsentScalars passed(message);
   int i = 0;
   for_each_sent<double>([&](const ResultField& field, const Member<double>&) {
-    if (!std::isfinite(message.reals(i++)) && fault.empty()) {
+    if (!passed.lacks_next() && !std::isfinite(message.reals(i++)) && fault.empty()) {
       fault = fmt::format("the worker sent a {} that is not a finite number", field.column);
     }
   });
@@ -166,14 +235,14 @@ bool is_too_long(const std::string& text) {
 PointResult to_message(std::uint64_t point, const CaseResult& result) {
   PointResult message;
   message.set_point(point);
-  for_each_sent<double>([&](const ResultField&, const Member<double>& member) {
-    message.add_reals(member.of(result));
-  });
-  for_each_sent<std::int64_t>([&](const ResultField&, const Member<std::int64_t>& member) {
-    message.add_whole_numbers(member.of(result));
-  });
-  for_each_sent<std::string>([&](const ResultField&, const Member<std::string>& member) {
-    message.add_texts(member.of(result));
+  std::uint32_t place = 0;
+  for_each_scalar([&](const ResultField&, const auto& member) {
+    if (const auto* value = member.of(result)) {
+      add(message, *value);
+    } else {
+      message.add_absent(place);
+    }
+    ++place;
   });
   add_lists(result, message);
   return message;
@@ -181,9 +250,10 @@ PointResult to_message(std::uint64_t point, const CaseResult& result) {
 
 CaseResult from_message(const PointResult& message) {
   CaseResult result{};
-  read_sent(message.reals(), result);
-  read_sent(message.whole_numbers(), result);
-  read_sent(message.texts(), result);
+  AbsentScalars absent(message);
+  read_sent<double>(message, absent, result);
+  read_sent<std::int64_t>(message, absent, result);
+  read_sent<std::string>(message, absent, result);
   read_lists(message, result);
   return result;
 }
@@ -214,13 +284,10 @@ void say_protocol(WorkerHello& hello) {
 
 std::string sent_outputs() {
   std::string names;
-  const auto add = [&](const ResultField& field, const auto&) {
+  for_each_scalar([&](const ResultField& field, const auto&) {
     names += names.empty() ? "" : " ";
     names += field.column;
-  };
-  for_each_sent<double>(add);
-  for_each_sent<std::int64_t>(add);
-  for_each_sent<std::string>(add);
+  });
   return names;
 }
 

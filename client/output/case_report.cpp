@@ -59,7 +59,8 @@ ordered_json json_of(const CaseResult& result, const solver::ListPart& part) {
 
 template <class T>
 ordered_json json_of(const CaseResult& result, const solver::Member<T>& member) {
-  return member.of(result);
+  const T* value = member.of(result);
+  return value == nullptr ? ordered_json(nullptr) : ordered_json(*value);
 }
 
 void print_peaks(std::ostream& out, const CaseResult& result) {

@@ -1,5 +1,6 @@
 #include "server/care/merged_references.h"
 
+#include <algorithm>
 #include <cstddef>
 
 #include <spdlog/fmt/fmt.h>
@@ -14,11 +15,14 @@ namespace {
       "a result names {} {}, which is not there: `oblique check` tells more", what, number));
 }
 
-/// The columns of a model but its number, the definition first.
-std::vector<std::string> columns_of_models(sqlite3* target) {
+/// The columns of a model but its number, the definition first. What an earlier schema of `source`
+/// lacks has its default in `target`.
+std::vector<std::string> columns_of_models(sqlite3* source, sqlite3* target) {
   std::vector<std::string> columns{"definition"};
+  const auto there = columns_of(source, "models");
   for (const std::string& name : columns_of(target, "models")) {
-    if (name != "model_id" && name != "definition") {
+    const bool is_there = std::find(there.begin(), there.end(), name) != there.end();
+    if (is_there && name != "model_id" && name != "definition") {
       columns.push_back(name);
     }
   }
@@ -41,7 +45,7 @@ std::string marks(std::size_t count) {
 }  // namespace
 
 MergedModels::MergedModels(sqlite3* source, sqlite3* target)
-    : MergedModels(source, target, columns_of_models(target)) {}
+    : MergedModels(source, target, columns_of_models(source, target)) {}
 
 MergedModels::MergedModels(sqlite3* source, sqlite3* target,
                            const std::vector<std::string>& columns)

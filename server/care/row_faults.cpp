@@ -12,6 +12,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/point_table.h"
+#include "server/care/table_columns.h"
 #include "server/store/model_rows.h"
 #include "server/store/packed_arrays.h"
 #include "server/store/result_row.h"
@@ -70,9 +71,14 @@ std::string misplaced_outputs_sql(int schema) {
 
 /// Holds each row of a model against its definition.
 void check_models(sqlite3* database, int schema, Found& found) {
+  const auto there = columns_of(database, "models");
   std::string columns = "model_id, definition";
+  std::vector<solver::ParameterKey> keys;  // that this schema has
   for (const auto& key : solver::model_keys()) {
-    columns += ", " + std::string(key.name);
+    if (std::find(there.begin(), there.end(), key.name) != there.end()) {
+      keys.push_back(key);
+      columns += ", " + std::string(key.name);
+    }
   }
   Statement rows(database, "SELECT " + columns + " FROM models");
   while (!found.is_full() && rows.step()) {
@@ -85,7 +91,7 @@ void check_models(sqlite3* database, int schema, Found& found) {
       continue;
     }
     int column = 2;
-    for (const auto& key : solver::model_keys()) {
+    for (const auto& key : keys) {
       const bool agrees = key.name == "integrator"
                               ? rows.text(column) == solver::integrator_name(model.integrator)
                               : rows.is_null(column) || rows.real(column) == key.get(model);

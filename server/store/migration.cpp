@@ -38,7 +38,7 @@ void create_schema(sqlite3* database) {
 
 void migrate(sqlite3* database) {
   constexpr std::array kSteps{kMigrateFrom1Sql, kMigrateFrom2Sql, kMigrateFrom3Sql,
-                              kMigrateFrom4Sql, kMigrateFrom5Sql};
+                              kMigrateFrom4Sql, kMigrateFrom5Sql, kMigrateFrom6Sql};
   static_assert(kSteps.size() == kSchemaVersion - 1, "a step from each schema to the next");
   add_model_definition(database);
   Statement version(database, "PRAGMA user_version");

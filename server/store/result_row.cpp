@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 
@@ -24,8 +25,8 @@ constexpr std::array<std::string_view, 5> kTailColumns{"worker", "solver_version
                                                        "instruction_set", "attempt", "solved_at"};
 
 /// Calls `take(column, since_schema, value)` with the outputs that schemas from `first` to `last`
-/// brought, in the order of the bindings: by type, each in the order of the solver's tables.
-/// `value(result)` is what is stored.
+/// brought, by type, each in the order of the solver's tables. `value(result)` points to what is
+/// stored, or to nothing.
 template <class Take>
 void for_each_output(int first, int last, const Take& take) {
   const auto take_one = [&](const auto& output, const auto& value) {
@@ -40,29 +41,49 @@ void for_each_output(int first, int last, const Take& take) {
   solver::for_each_sent<std::int64_t>(take_field);
   solver::for_each_sent<std::string>(take_field);
   for (const solver::ResultList* list : solver::result_lists()) {
-    take_one(*list, [list](const CaseResult& result) { return packed(*list, result); });
+    take_one(*list, [list](const CaseResult& result) {
+      std::optional<std::string> text = packed(*list, result);
+      // Rows may lack a list that a later schema brought, and so may results.
+      if (list->since_schema > 1 && *text == "[]") {
+        text.reset();
+      }
+      return text;
+    });
   }
 }
 
-/// Binds the outputs that schemas from `first` to `last` brought, from `index` on, and gives the
-/// next index. Without a result they stay unbound, and so NULL.
-int bind_outputs(Statement& insert, int index, int first, int last, const CaseResult* result) {
-  for_each_output(first, last, [&](std::string_view, int since_schema, const auto& value) {
-    if (result != nullptr) {
-      const auto& stored = value(*result);
-      if constexpr (std::is_convertible_v<decltype(stored), std::string_view>) {
-        // Rows may lack a list that a later schema brought, and so may results.
-        if (since_schema > 1 && stored == "[]") {
-          ++index;
-          return;
-        }
-      }
-      insert.bind(index, stored);
-    }
-    ++index;
-  });
-  return index;
+/// The same with those that came after checksums, schema by schema: what a later one brings counts
+/// in checksums behind what earlier rows have.
+template <class Take>
+void for_each_later_output(int last, const Take& take) {
+  for (int schema = kFirstWithChecksums + 1; schema <= last; ++schema) {
+    for_each_output(schema, schema, take);
+  }
 }
+
+/// Binds outputs to the parameters from `index` on. Those that are absent stay unbound, and so
+/// NULL.
+class OutputBinding {
+ public:
+  OutputBinding(Statement& insert, int index, const CaseResult* result)
+      : insert_(insert), index_(index), result_(result) {}
+
+  void operator()(std::string_view /*column*/, int /*since_schema*/, const auto& value) {
+    if (result_ != nullptr) {
+      if (const auto& stored = value(*result_)) {
+        insert_.bind(index_, *stored);
+      }
+    }
+    ++index_;
+  }
+  /// The parameter behind them.
+  int index() const { return index_; }
+
+ private:
+  Statement& insert_;
+  int index_;
+  const CaseResult* result_;
+};
 
 }  // namespace
 
@@ -71,7 +92,7 @@ std::vector<std::string_view> result_columns(int schema) {
   const auto add = [&](std::string_view column, int, const auto&) { names.push_back(column); };
   for_each_output(1, kFirstWithChecksums, add);
   names.insert(names.end(), kTailColumns.begin(), kTailColumns.end());
-  for_each_output(kFirstWithChecksums + 1, schema, add);
+  for_each_later_output(schema, add);
   return names;
 }
 
@@ -120,8 +141,9 @@ void bind_result(Statement& insert, const RowContext& context, const PointResult
     insert.bind(8, result.error());
   }
   const CaseResult* const bound = outputs ? &*outputs : nullptr;
-  const int first = static_cast<int>(kHeadColumns.size()) + 1;
-  const int index = bind_outputs(insert, first, 1, kFirstWithChecksums, bound);
+  OutputBinding early(insert, static_cast<int>(kHeadColumns.size()) + 1, bound);
+  for_each_output(1, kFirstWithChecksums, std::ref(early));
+  const int index = early.index();
   if (context.worker_id != 0) {
     insert.bind(index, context.worker_id);
     insert.bind(index + 1, context.solver_version);
@@ -129,8 +151,8 @@ void bind_result(Statement& insert, const RowContext& context, const PointResult
   }
   insert.bind(index + 3, std::uint64_t{context.attempt});
   insert.bind(index + 4, context.solved_at);
-  bind_outputs(insert, index + static_cast<int>(kTailColumns.size()), kFirstWithChecksums + 1,
-               kSchemaVersion, bound);
+  OutputBinding late(insert, index + static_cast<int>(kTailColumns.size()), bound);
+  for_each_later_output(kSchemaVersion, std::ref(late));
 }
 
 }  // namespace oblique::server

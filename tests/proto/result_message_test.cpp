@@ -38,6 +38,8 @@ solver::CaseResult distinct_result() {
   result.vn_out_m_s = 2.0;
   result.mode = "SC SR sR";
   result.major_mode = "SC SR";
+  result.margin = 0.021;
+  result.margin_event = "turn";
   result.stick_total_s = 7e-5;
   result.stick_intervals = {{0.0, 6e-5}, {8e-5, 9e-5}};
   result.reaction_peaks = {{3.2e-4, 5053.0}, {3.4e-4, 4611.0}};
@@ -57,20 +59,22 @@ TEST(PointResultTest, ScalarsTravelByTypeInTheOrderThatTheWorkerSays) {
   EXPECT_EQ(message.point(), 42U);
   EXPECT_TRUE(message.error().empty());
   // As rows of the database were made of them before they stood in one table.
-  EXPECT_EQ(sent_outputs(),
-            "fall_time_s impact_x_m vt_in_m_s vn_in_m_s duration_s fn_peak_N ft_peak_N"
-            " impulse_n_Ns impulse_t_Ns slide_m vt_out_m_s vn_out_m_s stick_total_s kinetic_in_J"
-            " friction_J restitution_J kinetic_change_J strain_change_J gravity_change_J"
-            " exchanged_J closure dt_s wall_s steps mode major_mode");
+  EXPECT_EQ(
+      sent_outputs(),
+      "fall_time_s impact_x_m vt_in_m_s vn_in_m_s duration_s fn_peak_N ft_peak_N"
+      " impulse_n_Ns impulse_t_Ns slide_m vt_out_m_s vn_out_m_s margin stick_total_s kinetic_in_J"
+      " friction_J restitution_J kinetic_change_J strain_change_J gravity_change_J"
+      " exchanged_J closure dt_s wall_s steps mode major_mode margin_event");
   EXPECT_EQ(numbers(message.reals()),
             (std::vector<double>{0.43, 0.58, -5.7, -5.2, 5.5e-4, 5057.0, 2023.0, 0.7,
-                                 0.3,  1e-3, -4.0, 2.0,  7e-5,   1.0,    2.0,    3.0,
-                                 4.0,  5.0,  6.0,  7.0,  8.0,    4e-6,   3e-4}));
+                                 0.3,  1e-3, -4.0, 2.0,  0.021,  7e-5,   1.0,    2.0,
+                                 3.0,  4.0,  5.0,  6.0,  7.0,    8.0,    4e-6,   3e-4}));
   ASSERT_EQ(message.whole_numbers_size(), 1);
   EXPECT_EQ(message.whole_numbers(0), 138);
-  ASSERT_EQ(message.texts_size(), 2);
+  ASSERT_EQ(message.texts_size(), 3);
   EXPECT_EQ(message.texts(0), "SC SR sR");
   EXPECT_EQ(message.texts(1), "SC SR");
+  EXPECT_EQ(message.texts(2), "turn");
 }
 
 TEST(PointResultTest, ListsOfAResultArePackedInOrder) {
@@ -94,7 +98,7 @@ TEST(PointResultTest, AResultComesBackFromItsFrame) {
   const auto received = from_message(message);
   for (const auto& field : solver::result_fields()) {
     if (const auto* number = std::get_if<solver::Member<double>>(&field.value)) {
-      EXPECT_EQ(number->of(received), number->of(sent)) << field.name;
+      EXPECT_EQ(*number->of(received), *number->of(sent)) << field.name;
     }
   }
   EXPECT_EQ(received.phases.at(1).kind, solver::PhaseKind::kRestitution);
@@ -102,6 +106,45 @@ TEST(PointResultTest, AResultComesBackFromItsFrame) {
   EXPECT_FALSE(received.peaks.at(1).major);
   EXPECT_TRUE(received.peaks.at(2).major);
   EXPECT_EQ(encode(to_message(42, received)), encode(message)) << "every other member";
+}
+
+TEST(PointResultTest, WhatAResultLacksIsLeftOutAndTheOthersKeepTheirPlaces) {
+  auto lacking = distinct_result();
+  lacking.margin.reset();
+  for (const bool has_event : {true, false}) {
+    if (!has_event) {
+      lacking.margin_event.reset();
+    }
+    const PointResult message = to_message(0, lacking);
+    EXPECT_EQ(message.reals_size(), 23);
+    EXPECT_EQ(message.texts_size(), has_event ? 3 : 2);
+    EXPECT_EQ(fault_of(message), "");
+    const auto received = from_message(message);
+    EXPECT_FALSE(received.margin.has_value());
+    EXPECT_EQ(received.margin_event, lacking.margin_event);
+    EXPECT_EQ(received.stick_total_s, 7e-5) << "that stands behind it";
+    EXPECT_EQ(received.major_mode, "SC SR");
+  }
+}
+
+TEST(PointResultTest, OnlyWhatMayBeAbsentIs) {
+  auto lacking = distinct_result();
+  lacking.margin.reset();
+  PointResult sound = to_message(0, lacking);
+  ASSERT_EQ(sound.absent_size(), 1);
+  PointResult longer = sound;
+  longer.add_reals(1.0);
+  EXPECT_THAT(fault_of(longer), HasSubstr("24 real numbers")) << "and one of them named absent";
+  PointResult twice = sound;
+  twice.add_absent(sound.absent(0));
+  EXPECT_THAT(fault_of(twice), HasSubstr("no result may lack")) << "places ascend";
+  PointResult beyond = sound;
+  beyond.add_absent(1000);
+  EXPECT_THAT(fault_of(beyond), HasSubstr("no result may lack"));
+  PointResult without_peak = to_message(0, distinct_result());
+  without_peak.mutable_reals()->RemoveLast();
+  without_peak.add_absent(5);  // fn_peak_N
+  EXPECT_THAT(fault_of(without_peak), HasSubstr("no result may lack"));
 }
 
 TEST(PointResultTest, AFailedPointAlwaysHasAReason) {
@@ -119,7 +162,7 @@ TEST(PointResultTest, ANumberThatIsNotFiniteIsFoundWhereverItIs) {
     EXPECT_THAT(fault_of(message), HasSubstr("not a finite number")) << i;
   }
   PointResult closing = sound;
-  closing.set_reals(20, std::numeric_limits<double>::infinity());
+  closing.set_reals(21, std::numeric_limits<double>::infinity());
   EXPECT_THAT(fault_of(closing), HasSubstr("closure"));
   for (auto* (PointResult::*list)() :
        {&PointResult::mutable_peaks, &PointResult::mutable_ft_peaks,
@@ -135,7 +178,7 @@ TEST(PointResultTest, WhatIsNoResultIsRefused) {
   const PointResult sound = to_message(0, distinct_result());
   PointResult shorter = sound;
   shorter.mutable_reals()->RemoveLast();
-  EXPECT_THAT(fault_of(shorter), HasSubstr("22 real numbers"));
+  EXPECT_THAT(fault_of(shorter), HasSubstr("23 real numbers"));
   PointResult silent = sound;
   silent.clear_texts();
   EXPECT_THAT(fault_of(silent), HasSubstr("0 texts"));

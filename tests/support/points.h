@@ -26,6 +26,8 @@ inline protocol::PointResult solved_point(std::uint64_t point) {
   result.energy.closure = third * 1e-9;
   result.mode = "SC SR sR";
   result.major_mode = "SC SR";
+  result.margin = third * 1e-3;
+  result.margin_event = "turn";
   result.peaks = {{0.0, third, 2.0, false}, {1e-5 / 3.0, third * 7.0, 1e300 / 3.0, true}};
   result.ft_peaks = {{third, -third}};
   result.phases = {{solver::PhaseKind::kCompression, 0.0, third * 1e-4},

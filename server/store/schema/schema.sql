@@ -46,7 +46,9 @@ CREATE TABLE models (
   dt_fall     REAL NOT NULL,     -- 0: chosen for the integrator
   -- All of them as one text, by which models are told apart: 'oblique-model-1 lengths=0.4,0.4,0.4 E=7e+10
   -- A=0.0005309 ...'. proto/recipe/README.md gives it byte by byte.
-  definition  TEXT NOT NULL UNIQUE
+  definition  TEXT NOT NULL UNIQUE,
+  -- Relative error that chosen steps leave. Models of earlier schemas have the default.
+  tolerance   REAL NOT NULL DEFAULT 1e-5
 ) STRICT;
 
 -- One row for each session of a worker in which it delivered a result.
@@ -110,6 +112,10 @@ CREATE TABLE results (
   -- CRC-32 of the other columns (server/database/row_checksum.h), which `oblique check` compares with them.
   -- NULL: the row is of an earlier schema. Whoever changes a row sets it to NULL.
   checksum         INTEGER,
+  -- How far the contact kept from another order of events, and the event that came nearest.
+  -- NULL: the row is of an earlier schema or solver.
+  margin           REAL,
+  margin_event     TEXT,
   UNIQUE (study_id, point)
 ) STRICT;
 

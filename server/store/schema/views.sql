@@ -45,7 +45,7 @@ SELECT s.name AS study, r.study_id AS study_id, r.point AS point, r.H AS H, r.mu
        r.vt_out_m_s AS vt_out_m_s, r.vn_out_m_s AS vn_out_m_s, r.mode AS mode,
        r.major_mode AS major_mode, r.stick_total_s AS stick_total_s, r.peaks AS peaks,
        r.ft_peaks AS ft_peaks, r.phases AS phases, r.stick_intervals AS stick_intervals,
-       r.reaction_peaks AS reaction_peaks,
+       r.reaction_peaks AS reaction_peaks, r.margin AS margin, r.margin_event AS margin_event,
        r.kinetic_in_J AS kinetic_in_J, r.friction_J AS friction_J,
        r.restitution_J AS restitution_J, r.kinetic_change_J AS kinetic_change_J,
        r.strain_change_J AS strain_change_J, r.gravity_change_J AS gravity_change_J,

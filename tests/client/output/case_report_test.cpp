@@ -51,6 +51,8 @@ TEST(SolveJson, HasExactlyTheFieldsThatAreDocumented) {
                                           "vn_out_m_s",
                                           "mode",
                                           "major_mode",
+                                          "margin",
+                                          "margin_event",
                                           "stick_total_s",
                                           "stick_intervals_s",
                                           "phases",
@@ -67,6 +69,16 @@ TEST(SolveJson, ListsAllPeaksAndTheMajorOnes) {
   EXPECT_EQ(json["stick_intervals_s"], nlohmann::json::parse("[[0.0, 1e-5]]"));
   EXPECT_EQ(json["phases"][1]["kind"], "restitution");
   EXPECT_EQ(json["solver"]["steps"], 30);
+}
+
+TEST(SolveJson, HasNullForWhatAResultLacks) {
+  auto result = some_result();
+  EXPECT_TRUE(json_of(result)["margin"].is_null());
+  EXPECT_TRUE(json_of(result)["margin_event"].is_null());
+  result.margin = 0.25;
+  result.margin_event = "turn";
+  EXPECT_EQ(json_of(result)["margin"], 0.25);
+  EXPECT_EQ(json_of(result)["margin_event"], "turn");
 }
 
 TEST(SolveJson, GivesTheLargestReactionAtThePinAndAtEachJoint) {

@@ -177,6 +177,7 @@ TEST_P(OldDatabaseTest, DefinesItsModelsByTheirTextAfterwardsAndNewResultsFindTh
               ElementsAre(protocol::canonical_model(table->model(0))));
   EXPECT_THAT(texts("SELECT count(*) FROM runs WHERE study = 'old study' AND k = 2.7e7"),
               ElementsAre("2"));
+  EXPECT_THAT(texts("SELECT tolerance FROM models"), ElementsAre("1.0e-05"));
   EXPECT_THAT(find_faults(path_), IsEmpty());
 }
 

@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/care/diagnosis.h"
 #include "server/database/row_checksum.h"
 #include "server/store/store.h"
 #include "tests/support/points.h"
@@ -37,6 +38,51 @@ TEST(ResultRow, ARowThatBreaksARuleOfTheTableIsAnErrorAndNotPassedOver) {
   Statement count(database.get(), "SELECT count(*) FROM results");
   ASSERT_TRUE(count.step());
   EXPECT_EQ(count.integer(0), 1);
+}
+
+TEST(ResultRow, HasNullForWhatAResultLacksAndNoCheckMissesIt) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("studies.db");
+  const auto table = table_of(2);
+  auto lacking = protocol::from_message(solved_point(1));
+  lacking.margin.reset();
+  lacking.margin_event.reset();
+  {
+    Store store(path);
+    store.commit(std::vector<Change>{
+        AddStudy{1, "a", table, "then"}, AddWorker{1, "host", 2, "0.1", "avx2", "then"},
+        AddResults{1,
+                   table,
+                   1,
+                   "0.1",
+                   "avx2",
+                   1,
+                   "now",
+                   {solved_point(0), protocol::to_message(1, lacking)}}});
+  }
+  const DatabaseHandle database = open_database(path, SQLITE_OPEN_READONLY);
+  Statement rows(database.get(),
+                 "SELECT margin IS NULL, margin_event IS NULL, closure > 0 FROM runs"
+                 " ORDER BY point");
+  for (const std::int64_t lacks : {0, 1}) {
+    ASSERT_TRUE(rows.step());
+    EXPECT_EQ(rows.integer(0), lacks);
+    EXPECT_EQ(rows.integer(1), lacks);
+    EXPECT_EQ(rows.integer(2), 1);
+  }
+  for (const std::string& fault : find_faults(path)) {
+    // The made-up lists of these points are not those of their scalars.
+    EXPECT_THAT(fault, testing::HasSubstr("its phases"));
+  }
+}
+
+TEST(ResultRow, OutputsOfEachLaterSchemaCountBehindThoseOfTheSchemasBefore) {
+  for (int schema = kFirstWithChecksums; schema < kSchemaVersion; ++schema) {
+    const auto before = result_columns(schema);
+    auto after = result_columns(schema + 1);
+    after.resize(before.size());
+    EXPECT_EQ(after, before) << schema;
+  }
 }
 
 }  // namespace

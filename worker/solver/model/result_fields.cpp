@@ -3,17 +3,40 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
+#include <type_traits>
+#include <utility>
 
 namespace oblique::solver {
 namespace {
 
+/// A member that every result has.
+template <class T>
+struct Held {
+  using Value = T;
+  static constexpr bool kMayBeAbsent = false;
+  static const T* of(const T& member) { return &member; }
+  static T& in(T& member) { return member; }
+};
+
+/// One that results may lack.
+template <class T>
+struct Held<std::optional<T>> {
+  using Value = T;
+  static constexpr bool kMayBeAbsent = true;
+  static const T* of(const std::optional<T>& member) { return member ? &*member : nullptr; }
+  static T& in(std::optional<T>& member) { return member ? *member : member.emplace(); }
+};
+
 /// The member that is reached by these steps from a CaseResult.
 template <auto... steps>
 constexpr auto at = [] {
-  using Value = std::remove_cvref_t<decltype((std::declval<CaseResult&>().*....*steps))>;
+  using Kind = Held<std::remove_cvref_t<decltype((std::declval<CaseResult&>().*....*steps))>>;
+  using Value = typename Kind::Value;
   return Member<Value>{
-      [](const CaseResult& result) -> const Value& { return (result.*....*steps); },
-      [](CaseResult& result) -> Value& { return (result.*....*steps); }};
+      [](const CaseResult& result) -> const Value* { return Kind::of((result.*....*steps)); },
+      [](CaseResult& result) -> Value& { return Kind::in((result.*....*steps)); },
+      Kind::kMayBeAbsent};
 }();
 
 template <class... Values>
@@ -173,6 +196,15 @@ constexpr std::array kFields{
     ResultField{.name = "major_mode",
                 .meaning = "the same with ripples merged",
                 .value = at<&CaseResult::major_mode>},
+    ResultField{.name = "margin",
+                .meaning = "how far the contact kept from another order of events, from 0; near 0 "
+                           "the mode is not to be trusted",
+                .value = at<&CaseResult::margin>,
+                .since_schema = 7},
+    ResultField{.name = "margin_event",
+                .meaning = "the event that came so near to happening, or to not happening",
+                .value = at<&CaseResult::margin_event>,
+                .since_schema = 7},
     ResultField{.name = "stick_total_s",
                 .unit = "s",
                 .meaning = "total time in stick",
@@ -287,7 +319,8 @@ const ResultList* find_result_list(std::string_view column) {
 bool is_finite(const CaseResult& result) {
   bool finite = true;
   for_each_sent<double>([&](const ResultField&, const Member<double>& member) {
-    finite = finite && std::isfinite(member.of(result));
+    const double* number = member.of(result);
+    finite = finite && (number == nullptr || std::isfinite(*number));
   });
   for (const ResultList* list : kLists) {
     list->each(result, [&](std::span<const Cell> element) {

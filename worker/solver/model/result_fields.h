@@ -14,11 +14,14 @@ namespace oblique::solver {
 // What solving a point gives, as one table. Messages, database rows and their checks, `solve
 // --json`, tables for people and `oblique columns` walk it, so that an output is named once.
 
-/// A member of a CaseResult, or of a struct in one.
+/// A member of a CaseResult, or of a struct in one: a T, or a std::optional<T> where results may
+/// lack it. What is absent is NULL in the database, null in JSON and nothing in tables.
 template <class T>
 struct Member {
-  const T& (*of)(const CaseResult& result);
-  T& (*in)(CaseResult& result);
+  using Value = T;
+  const T* (*of)(const CaseResult& result);  ///< nullptr: the result lacks it
+  T& (*in)(CaseResult& result);              ///< a result that lacks it has it from then on
+  bool may_be_absent = false;
 };
 
 /// One value of an element of a list. `bool` is 1 or 0 in JSON.

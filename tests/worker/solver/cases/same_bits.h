@@ -27,6 +27,8 @@ inline void expect_same_bits(const CaseResult& a, const CaseResult& b) {
   EXPECT_EQ(a.vn_out_m_s, b.vn_out_m_s);
   EXPECT_EQ(a.mode, b.mode);
   EXPECT_EQ(a.major_mode, b.major_mode);
+  EXPECT_EQ(a.margin, b.margin);
+  EXPECT_EQ(a.margin_event, b.margin_event);
   EXPECT_EQ(a.stick_total_s, b.stick_total_s);
   ASSERT_EQ(a.peaks.size(), b.peaks.size());
   for (std::size_t i = 0; i < a.peaks.size(); ++i) {

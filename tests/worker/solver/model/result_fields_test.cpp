@@ -30,8 +30,9 @@ TEST(ResultFields, StandForAMemberEachAndHaveAColumnEach) {
     std::visit(
         [&](const auto& value) {
           if constexpr (requires { value.in(result); }) {
+            EXPECT_EQ(value.of(result) == nullptr, value.may_be_absent) << field.column;
             EXPECT_TRUE(members.insert(&value.in(result)).second) << field.column;
-            EXPECT_EQ(&value.of(result), &value.in(result)) << field.column;
+            EXPECT_EQ(value.of(result), &value.in(result)) << field.column;
           }
         },
         field.value);
@@ -59,6 +60,18 @@ TEST(ResultFields, OfListsNameMembersThatTheirElementsHave) {
                   std::find(members.begin(), members.end(), member) != members.end())
           << field.column << " has no " << member;
     }
+  }
+}
+
+TEST(ResultFields, ThatResultsMayLackCameLaterThanTheFirstSchemaWhoseRowsHaveEveryOutput) {
+  for (const auto& field : result_fields()) {
+    std::visit(
+        [&](const auto& value) {
+          if constexpr (requires { value.may_be_absent; }) {
+            EXPECT_TRUE(!value.may_be_absent || field.since_schema > 1) << field.column;
+          }
+        },
+        field.value);
   }
 }
 
