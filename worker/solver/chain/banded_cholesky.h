@@ -48,8 +48,8 @@ class BandedMatrix {
 class BandedCholesky {
  public:
   /// Factors `matrix`; `positive_definite()` tells whether that succeeded.
-  explicit BandedCholesky(const BandedMatrix& matrix) : rows_(matrix.rows()) {
-    std::vector<double> pivots(matrix.rows());
+  explicit BandedCholesky(const BandedMatrix& matrix) : rows_(matrix.rows() + kHalfBandwidth) {
+    std::vector<double> pivots(rows_.size());
     for (std::size_t i = 0; i < matrix.rows(); ++i) {
       for (std::size_t d = kHalfBandwidth; d >= 1; --d) {
         if (d > i) {
@@ -71,32 +71,31 @@ class BandedCholesky {
         return;
       }
       rows_[i].inverse_pivot = 1.0 / pivots[i];
-      for (std::size_t d = 1; d <= kHalfBandwidth && d <= i; ++d) {
-        rows_[i - d].below[d - 1] = rows_[i].left[d - 1];
-      }
     }
   }
 
   bool positive_definite() const { return positive_definite_; }
 
   /// Solves A z = f in place for two right-hand sides interleaved by rows: f[2 i + c].
-  /// `Real` is a number or a vector of lanes. Needs positive_definite().
+  /// `Real` is a number or a pack of lanes. Needs positive_definite().
   template <class Real>
   void solve_pairs(Real* f) const {
     ForwardSubstitution<Real> forward;
-    for (std::size_t i = 0; i < rows_.size(); ++i) {
+    const std::size_t rows = rows_.size() - kHalfBandwidth;
+    for (std::size_t i = 0; i < rows; ++i) {
       put_pair(f, i, forward.next(rows_[i], pair_at(f, i)));
     }
     BackSubstitution<Real> backward;
-    for (std::size_t i = rows_.size(); i-- > 0;) {
-      put_pair(f, i, backward.next(rows_[i], pair_at(f, i)));
+    for (std::size_t i = rows; i-- > 0;) {
+      put_pair(f, i, backward.next(&rows_[i], pair_at(f, i)));
     }
   }
 
-  const FactorRow* data() const { return rows_.data(); }
+  /// Its rows, and kHalfBandwidth more of zeros.
+  const FactorRow<double>* data() const { return rows_.data(); }
 
  private:
-  std::vector<FactorRow> rows_;
+  std::vector<FactorRow<double>> rows_;
   bool positive_definite_ = true;
 };
 

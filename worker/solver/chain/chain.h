@@ -65,7 +65,7 @@ class Chain {
   ChainState at_rest() const;
 
   /// The tables that the kernels of chain_kernel.h read.
-  ChainTables tables() const {
+  ChainTables<double> tables() const {
     return {static_cast<std::size_t>(rows_),
             static_cast<std::size_t>(tip_row()),
             links(),
@@ -115,11 +115,11 @@ class Chain {
   double gravity_m_s2_;
   double mass_per_length_;
   std::vector<Element> elements_;
-  std::vector<std::size_t> first_element_;   ///< of each link
-  std::vector<ElasticConstants> constants_;  ///< of an element of each link
+  std::vector<std::size_t> first_element_;           ///< of each link
+  std::vector<ElasticConstants<double>> constants_;  ///< of an element of each link
   Eigen::VectorXd weight_N_;     ///< generalised gravity along y [N] and [N m], one a row
   Eigen::VectorXd momentum_kg_;  ///< what a rate adds to the momentum [kg] and [kg m]
-  std::vector<LinkBalance> balance_;
+  std::vector<LinkBalance<double>> balance_;
   BandedMatrix mass_;  ///< of the free rows; row 0 is a unit row
   BandedCholesky mass_factor_;
   BandedMatrix along_;  ///< stiffness of the straight chain along itself: axial and bending

@@ -4,38 +4,43 @@
 
 #include "worker/solver/chain/elastic_kernel.h"
 
-/// The innermost loops: the chain's accelerations for one number or a vector of lanes. Plain tables
+/// The innermost loops: the chain's accelerations for one number or a pack of lanes. Plain tables
 /// and templates over `Real` only, so that one source serves every instruction set: nothing here
-/// may call an ordinary inline function that other translation units share.
+/// may call an ordinary inline function that other translation units share. `Constant` is a number,
+/// shared by all lanes, or a pack that gives each lane a chain of its own; with multiply-adds by
+/// name both round alike.
 namespace oblique::solver {
 
 /// Half-bandwidth of every matrix of the eliminated chain: an element spans four consecutive rows.
 inline constexpr std::size_t kHalfBandwidth = 3;
 
 /// One row of A = L D Lᵀ, L with unit diagonal. Entries beyond the matrix are zero.
+template <class Constant>
 struct FactorRow {
-  double left[kHalfBandwidth];   ///< L(i, i-1), L(i, i-2), L(i, i-3)
-  double below[kHalfBandwidth];  ///< L(i+1, i), L(i+2, i), L(i+3, i)
-  double inverse_pivot;
+  Constant left[kHalfBandwidth];  ///< L(i, i-1), L(i, i-2), L(i, i-3)
+  Constant inverse_pivot;
 };
 
 /// What the momentum of a link and all beyond it asks for besides the weights of its rows.
+template <class Constant>
 struct LinkBalance {
-  double inner_end_kg;     ///< the link's own share of the row in which its inner end lies
-  double weight_beyond_N;  ///< of the link and all beyond it
+  Constant inner_end_kg;     ///< the link's own share of the row in which its inner end lies
+  Constant weight_beyond_N;  ///< of the link and all beyond it
 };
 
-/// What the loops read. Points into a Chain, which must outlive it.
+/// What the loops read. Points into what it was made from (a Chain, LaneChains), which must outlive
+/// it. Elements of a link have one length: weights and momenta of the slopes between them are zero.
+template <class Constant>
 struct ChainTables {
   std::size_t rows;
   std::size_t tip_row;
   std::size_t links;
   std::size_t elements_per_link;
-  const ElasticConstants* link;  ///< of an element of each link
-  const FactorRow* mass_factor;
-  const double* weight_N;      ///< generalised gravity along y, one a row; there is none along x
-  const double* momentum_kg;   ///< one a row: the chain's momentum is the sum of these times v
-  const LinkBalance* balance;  ///< of each link
+  const ElasticConstants<Constant>* link;  ///< of an element of each link
+  const FactorRow<Constant>* mass_factor;  ///< `rows`, and kHalfBandwidth more of zeros
+  const Constant* weight_N;     ///< generalised gravity along y, one a row; there is none along x
+  const Constant* momentum_kg;  ///< one a row: the chain's momentum is the sum of these times v
+  const LinkBalance<Constant>* balance;  ///< of each link
 };
 
 /// L y = f, row by row downwards. The row just before comes last into each sum: what rows wait for
@@ -43,10 +48,10 @@ struct ChainTables {
 template <class Real>
 class ForwardSubstitution {
  public:
-  inline PlanarVector<Real> next(const FactorRow& row, PlanarVector<Real> f) {
+  template <class Constant>
+  inline PlanarVector<Real> next(const FactorRow<Constant>& row, PlanarVector<Real> f) {
     for (std::size_t d = kHalfBandwidth; d >= 1; --d) {
-      f.x -= row.left[d - 1] * before_[d - 1].x;
-      f.y -= row.left[d - 1] * before_[d - 1].y;
+      f = less_product(f, row.left[d - 1], before_[d - 1]);
     }
     before_[2] = before_[1];
     before_[1] = before_[0];
@@ -62,11 +67,12 @@ class ForwardSubstitution {
 template <class Real>
 class BackSubstitution {
  public:
-  inline PlanarVector<Real> next(const FactorRow& row, const PlanarVector<Real>& y) {
-    PlanarVector<Real> z{y.x * row.inverse_pivot, y.y * row.inverse_pivot};
+  /// The kHalfBandwidth rows after `row` are read too.
+  template <class Constant>
+  inline PlanarVector<Real> next(const FactorRow<Constant>* row, const PlanarVector<Real>& y) {
+    PlanarVector<Real> z = row->inverse_pivot * y;
     for (std::size_t d = kHalfBandwidth; d >= 1; --d) {
-      z.x -= row.below[d - 1] * after_[d - 1].x;
-      z.y -= row.below[d - 1] * after_[d - 1].y;
+      z = less_product(z, row[d].left[d - 1], after_[d - 1]);
     }
     after_[2] = after_[1];
     after_[1] = after_[0];
@@ -91,21 +97,19 @@ inline void put_pair(Real* values, std::size_t row, const PlanarVector<Real>& pa
 
 /// The way down: y = L^-1 (Q_gravity + S_tipᵀ F - dU/dq), forces and substitution in one pass along
 /// the chain. `q` and `y` have 2 rows entries. What it says of the pin's row has no meaning.
-template <class Real>
-inline void substitute_forces(const ChainTables& chain, const Real* q, const Real& ft_N,
+template <class Constant, class Real>
+inline void substitute_forces(const ChainTables<Constant>& chain, const Real* q, const Real& ft_N,
                               const Real& fn_N, Real* y) {
+  using Vector = PlanarVector<Real>;
   ForwardSubstitution<Real> forward;
-  const auto finish = [&](std::size_t row, const PlanarVector<Real>& force) {
+  const auto finish = [&](std::size_t row, const Vector& force) {
     put_pair(y, row, forward.next(chain.mass_factor[row], force));
   };
-  const auto weight = [&](std::size_t row) {
-    return PlanarVector<Real>{Real{}, Real{} + chain.weight_N[row]};
-  };
-  std::size_t row = 0;  // of the position at the element's left end
-  PlanarVector<Real> on_p = weight(row);
+  std::size_t row = 0;      // of the position at the element's left end
+  Vector pull_from_left{};  // by the elements to the left: what they take from p and s
   for (std::size_t link = 0; link < chain.links; ++link) {
-    const ElasticConstants constants = chain.link[link];  // a copy: nothing written below is in it
-    PlanarVector<Real> on_s = weight(row + 1);
+    const ElasticConstants<Constant> constants = chain.link[link];  // a copy: no store is into it
+    Vector turn_from_left{Real{}, Real{} - chain.weight_N[row + 1]};
     for (std::size_t e = 1; e <= chain.elements_per_link; ++e) {
       // At a joint the inner link's slope comes before the position.
       const bool ends_at_joint = e == chain.elements_per_link && link + 1 < chain.links;
@@ -113,36 +117,39 @@ inline void substitute_forces(const ChainTables& chain, const Real* q, const Rea
       const std::size_t s_row = row + (ends_at_joint ? 2 : 3);
       const ElasticForces<Real> elastic = elastic_forces(
           pair_at(q, row), pair_at(q, row + 1), pair_at(q, p_row), pair_at(q, s_row), constants);
-      finish(row, {on_p.x + elastic.pull.x, on_p.y + elastic.pull.y});
-      finish(row + 1,
-             {on_s.x + elastic.by_d.x - elastic.by_t.x, on_s.y + elastic.by_d.y - elastic.by_t.y});
-      on_p = {Real{} - elastic.pull.x, chain.weight_N[p_row] - elastic.pull.y};
-      on_s = {Real{} - elastic.by_d.x - elastic.by_t.x,
-              chain.weight_N[s_row] - elastic.by_d.y - elastic.by_t.y};
+      finish(row, {elastic.pull.x - pull_from_left.x,
+                   elastic.pull.y - pull_from_left.y + chain.weight_N[row]});
+      finish(row + 1, {(elastic.by_d.x - elastic.by_t.x) - turn_from_left.x,
+                       (elastic.by_d.y - elastic.by_t.y) - turn_from_left.y});
+      pull_from_left.x = elastic.pull.x;
+      pull_from_left.y = elastic.pull.y;
+      turn_from_left.x = elastic.by_d.x + elastic.by_t.x;
+      turn_from_left.y = elastic.by_d.y + elastic.by_t.y;
       row = p_row;
     }
     if (link + 1 < chain.links) {
-      finish(row - 1, on_s);
+      finish(row - 1, {Real{} - turn_from_left.x, chain.weight_N[row - 1] - turn_from_left.y});
     } else {
-      finish(row, {on_p.x + ft_N, on_p.y + fn_N});
-      finish(row + 1, on_s);
+      finish(row, {ft_N - pull_from_left.x, fn_N + chain.weight_N[row] - pull_from_left.y});
+      finish(row + 1, {Real{} - turn_from_left.x, chain.weight_N[row + 1] - turn_from_left.y});
     }
   }
 }
 
 /// The way up: q'' = L^-T D^-1 y, given to `take(row, q'')` from the tip to the row after the pin,
 /// which does not move.
-template <class Real, class Take>
-inline void substitute_accelerations(const ChainTables& chain, const Real* y, const Take& take) {
+template <class Constant, class Real, class Take>
+inline void substitute_accelerations(const ChainTables<Constant>& chain, const Real* y,
+                                     const Take& take) {
   BackSubstitution<Real> backward;
   for (std::size_t row = chain.rows; row-- > 1;) {
-    take(row, backward.next(chain.mass_factor[row], pair_at(y, row)));
+    take(row, backward.next(chain.mass_factor + row, pair_at(y, row)));
   }
 }
 
 /// q'' = M^-1 (Q_gravity + S_tipᵀ F - dU/dq). `q` and `acceleration` have 2 rows entries.
-template <class Real>
-inline void chain_accelerations(const ChainTables& chain, const Real* q, const Real& ft_N,
+template <class Constant, class Real>
+inline void chain_accelerations(const ChainTables<Constant>& chain, const Real* q, const Real& ft_N,
                                 const Real& fn_N, Real* acceleration) {
   substitute_forces(chain, q, ft_N, fn_N, acceleration);
   substitute_accelerations(chain, acceleration,
@@ -154,24 +161,29 @@ inline void chain_accelerations(const ChainTables& chain, const Real* q, const R
 
 /// Momentum of each link and all beyond it, x and y in turn, gathered as rates come row by row from
 /// the tip to the row after the pin.
-template <class Real>
+template <class Constant, class Real>
 class LinkMomenta {
  public:
   /// Writes 2 links entries of `momenta_Ns`.
-  LinkMomenta(const ChainTables& chain, Real* momenta_Ns)
-      : chain_(chain), momenta_Ns_(momenta_Ns), link_(chain.links - 1) {}
+  LinkMomenta(const ChainTables<Constant>& chain, Real* momenta_Ns)
+      : chain_(chain),
+        momenta_Ns_(momenta_Ns),
+        link_(chain.links - 1),
+        inner_end_(link_ * rows_a_link()) {}
 
   inline void add(std::size_t row, const PlanarVector<Real>& v) {
-    const double kg = chain_.momentum_kg[row];
-    if (row == link_ * (2 * chain_.elements_per_link + 1)) {
-      const double own_kg = chain_.balance[link_].inner_end_kg;
-      put_pair(momenta_Ns_, link_,
-               PlanarVector<Real>{sum_.x + own_kg * v.x, sum_.y + own_kg * v.y});
+    if (row == inner_end_) {
+      put_pair(momenta_Ns_, link_, plus_product(sum_, chain_.balance[link_].inner_end_kg, v));
       --link_;
+      inner_end_ -= rows_a_link();
+      sum_ = plus_product(sum_, chain_.momentum_kg[row], v);
+      return;
     }
-    if (kg != 0.0) {  // as it is for slopes between elements of one length
-      sum_.x += kg * v.x;
-      sum_.y += kg * v.y;
+    // Slopes between elements carry none.
+    const std::size_t place = row - inner_end_;
+    const bool is_slope_between = place % 2 == 1 && place > 1 && place + 1 < rows_a_link();
+    if (!is_slope_between) {
+      sum_ = plus_product(sum_, chain_.momentum_kg[row], v);
     }
     if (row == 1) {  // the pin does not move
       put_pair(momenta_Ns_, 0, sum_);
@@ -179,27 +191,29 @@ class LinkMomenta {
   }
 
  private:
-  const ChainTables& chain_;
+  std::size_t rows_a_link() const { return 2 * chain_.elements_per_link + 1; }
+
+  const ChainTables<Constant>& chain_;
   Real* momenta_Ns_;
-  std::size_t link_;  ///< whose inner end comes next
+  std::size_t link_;       ///< whose inner end comes next
+  std::size_t inner_end_;  ///< its row
   PlanarVector<Real> sum_{};
 };
 
 /// Squared mean of the reaction on each link's inner end over a step of h seconds, one a link: the
 /// change of the momentum of all beyond it, less the impulses of the contact forces and of the
 /// weight, over h. Exact but for the step's own error.
-template <class Real>
-inline void mean_reactions_squared(const ChainTables& chain, const Real* momenta_before_Ns,
-                                   const Real* momenta_after_Ns,
+template <class Constant, class Real>
+inline void mean_reactions_squared(const ChainTables<Constant>& chain,
+                                   const Real* momenta_before_Ns, const Real* momenta_after_Ns,
                                    const PlanarVector<Real>& contact_impulse_Ns,
                                    const Real& inverse_h_Hz, Real* squared_N2) {
   for (std::size_t link = 0; link < chain.links; ++link) {
     const PlanarVector<Real> before = pair_at(momenta_before_Ns, link);
     const PlanarVector<Real> after = pair_at(momenta_after_Ns, link);
-    const Real x = (after.x - before.x - contact_impulse_Ns.x) * inverse_h_Hz;
-    const Real y = (after.y - before.y - contact_impulse_Ns.y) * inverse_h_Hz +
-                   chain.balance[link].weight_beyond_N;
-    squared_N2[link] = x * x + y * y;
+    PlanarVector<Real> mean = inverse_h_Hz * (after - before - contact_impulse_Ns);
+    mean.y = mean.y + chain.balance[link].weight_beyond_N;
+    squared_N2[link] = dot(mean, mean);
   }
 }
 

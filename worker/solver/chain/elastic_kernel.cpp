@@ -2,12 +2,12 @@
 
 namespace oblique::solver {
 
-ElasticConstants elastic_constants(double length_m, double half_EA_length, double bending) {
+ElasticConstants<double> elastic_constants(double length_m, double half_EA_length, double bending) {
   const double l = length_m;
   const double S = 2.0 * half_EA_length;
-  ElasticConstants k{};
+  ElasticConstants<double> k{};
   k.two_inverse_length = 2.0 / l;
-  k.k00 = S / (2.0 * l * l);
+  k.k00 = -S / (2.0 * l * l);
   k.k00_uu = S / (2.0 * l * l * l * l);
   k.k00_dd = S / (24.0 * l * l);
   k.k00_tt = S / (40.0 * l * l);

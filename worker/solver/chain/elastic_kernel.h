@@ -1,5 +1,7 @@
 #pragma once
 
+#include "worker/solver/chain/planar_vector.h"
+
 /// Elastic forces of the beam element in closed form, for the innermost loops.
 ///
 /// With S = EA l and eps = sum E_k P_k, dU/dc_a = S sum_b K_ab c_b, K_ab = 1/2 int eps P_a P_b
@@ -12,27 +14,22 @@
 /// Five Gauss points give the same, being exact for these integrands, at half as much work again.
 /// Scaled coordinates u = p_j - p_i = l c0, d = s_j - s_i = 2 c1 and t = 2 c2 leave the constants
 /// to a table.
-/// By hand, and without Eigen: `Real` is a number or a vector of lanes.
 namespace oblique::solver {
 
-template <class Real>
-struct PlanarVector {
-  Real x;
-  Real y;
-};
-
+/// Of one element length. `Constant` is a number, or a pack where each lane has its own.
+template <class Constant>
 struct ElasticConstants {
-  double two_inverse_length;
-  double k00, k00_uu, k00_dd, k00_tt;
-  double k01_ud, k01_dt;
-  double k02_ut, k02_dd, k02_tt;
-  double k11, k11_k00, k11_k02;
-  double k12_k01, k12_dt;
-  double k22, k22_k00, k22_k02, k22_tt;
+  Constant two_inverse_length;
+  Constant k00, k00_uu, k00_dd, k00_tt;
+  Constant k01_ud, k01_dt;
+  Constant k02_ut, k02_dd, k02_tt;
+  Constant k11, k11_k00, k11_k02;
+  Constant k12_k01, k12_dt;
+  Constant k22, k22_k00, k22_k02, k22_tt;
 };
 
 /// half_EA_length = EA l/2 [N m]; bending = 2 EI/l [N m].
-ElasticConstants elastic_constants(double length_m, double half_EA_length, double bending);
+ElasticConstants<double> elastic_constants(double length_m, double half_EA_length, double bending);
 
 /// What one element's strain energy U does: -dU/dq is pull on p_i, -pull on p_j, by_d - by_t on s_i
 /// and -by_d - by_t on s_j.
@@ -43,32 +40,33 @@ struct ElasticForces {
   PlanarVector<Real> by_t;  ///< dU/dt
 };
 
-template <class Real>
+template <class Real, class Constant>
 inline ElasticForces<Real> elastic_forces(const PlanarVector<Real>& p_i,
                                           const PlanarVector<Real>& s_i,
                                           const PlanarVector<Real>& p_j,
                                           const PlanarVector<Real>& s_j,
-                                          const ElasticConstants& k) {
+                                          const ElasticConstants<Constant>& k) {
   using Vector = PlanarVector<Real>;
-  const Vector u{p_j.x - p_i.x, p_j.y - p_i.y};
-  const Vector d{s_j.x - s_i.x, s_j.y - s_i.y};
-  const Vector t{s_i.x + s_j.x - k.two_inverse_length * u.x,
-                 s_i.y + s_j.y - k.two_inverse_length * u.y};
-  const auto dot = [](const Vector& a, const Vector& b) { return a.x * b.x + a.y * b.y; };
+  const Vector u = p_j - p_i;
+  const Vector d = s_j - s_i;
+  const Vector t = less_product(s_i + s_j, k.two_inverse_length, u);
   const Real dd = dot(d, d);
   const Real tt = dot(t, t);
   const Real dt = dot(d, t);
-  const Real k00 = k.k00_uu * dot(u, u) + k.k00_dd * dd + k.k00_tt * tt - k.k00;
-  const Real k01 = k.k01_ud * dot(u, d) + k.k01_dt * dt;
-  const Real k02 = k.k02_ut * dot(u, t) + k.k02_dd * dd + k.k02_tt * tt;
-  const Real k11 = k.k11_k00 * k00 + k.k11_k02 * k02 + k.k11;
-  const Real k12 = k.k12_k01 * k01 + k.k12_dt * dt;
-  const Real k22 = k.k22_k00 * k00 + k.k22_k02 * k02 + k.k22_tt * tt + k.k22;
-  const Vector by_u{k00 * u.x + k01 * d.x + k02 * t.x, k00 * u.y + k01 * d.y + k02 * t.y};
-  const Vector by_d{k01 * u.x + k11 * d.x + k12 * t.x, k01 * u.y + k11 * d.y + k12 * t.y};
-  const Vector by_t{k02 * u.x + k12 * d.x + k22 * t.x, k02 * u.y + k12 * d.y + k22 * t.y};
-  return {
-      {by_u.x - k.two_inverse_length * by_t.x, by_u.y - k.two_inverse_length * by_t.y}, by_d, by_t};
+  Real k00 = plus_product(k.k00, k.k00_uu, dot(u, u));
+  k00 = plus_product(plus_product(k00, k.k00_dd, dd), k.k00_tt, tt);
+  const Real k01 = plus_product(k.k01_ud * dot(u, d), k.k01_dt, dt);
+  const Real k02 = plus_product(plus_product(k.k02_ut * dot(u, t), k.k02_dd, dd), k.k02_tt, tt);
+  const Real k11 = plus_product(plus_product(k.k11, k.k11_k00, k00), k.k11_k02, k02);
+  const Real k12 = plus_product(k.k12_k01 * k01, k.k12_dt, dt);
+  Real k22 = plus_product(k.k22, k.k22_tt, tt);
+  k22 = plus_product(plus_product(k22, k.k22_k00, k00), k.k22_k02, k02);
+  const Vector by_u = plus_product(plus_product(k00 * u, k01, d), k02, t);
+  const Vector by_d = plus_product(plus_product(k01 * u, k11, d), k12, t);
+  const Vector by_t = plus_product(plus_product(k02 * u, k12, d), k22, t);
+  const Vector pull = less_product(by_u, k.two_inverse_length, by_t);
+  // By components: compilers copy whole pairs of packs through memory.
+  return {{pull.x, pull.y}, {by_d.x, by_d.y}, {by_t.x, by_t.y}};
 }
 
 }  // namespace oblique::solver

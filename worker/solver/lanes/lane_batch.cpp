@@ -67,7 +67,7 @@ void LaneBatch::fill(std::size_t lane, const Source& source, const Tracing& trac
   }
   const auto next = upcoming_ ? std::exchange(upcoming_, std::nullopt) : source();
   if (!next) {
-    stepper_.set_step(lane, 0.0);  // idle lanes stand still
+    stepper_.idle(lane);
     return;
   }
   start(lane, *next);
@@ -84,7 +84,7 @@ void LaneBatch::start(std::size_t lane, const ContactCase& next) {
   slot.contact_case = next;
   slot.started = Clock::now();
   const ChainState& touch = *next.touch;
-  stepper_.load(lane, touch.q.data(), touch.v.data());
+  stepper_.load(lane, chain_.tables(), touch.q.data(), touch.v.data());
   slot.touch = chain_.tip(touch);
   slot.in = motion_.energies(touch);
   reactions_.restart(lane);
@@ -127,7 +127,7 @@ void LaneBatch::start_branch(std::size_t lane) {
   reactions_.put_in(lane, trunk.reactions);
   slot.contact.emplace(
       trunk.contact.branched(branch.contact_case.parameters.e_star, branch.contact_case.steps));
-  stepper_.load(lane, trunk.state.q.data(), trunk.state.v.data());
+  stepper_.load(lane, chain_.tables(), trunk.state.q.data(), trunk.state.v.data());
   stepper_.set_step(lane, slot.contact->trial_step_s());
   stepper_.set_force(lane, slot.contact->force());
 }

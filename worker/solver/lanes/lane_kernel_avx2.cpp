@@ -4,15 +4,13 @@
 namespace oblique::solver {
 namespace {
 
-struct Avx2Vectors {
-  using Vector = double __attribute__((vector_size(32), may_alias));
-};
 using Pack = LanePack<Avx2Vectors, 1>;
 
 }  // namespace
 
 LaneKernel avx2_kernel() {
-  return {"avx2", Pack::kLanes, &step_lanes<Pack>, reaction_loops<Avx2Vectors>()};
+  return {"avx2", Pack::kLanes, &step_one_chain<Pack>, &step_chains<Pack>,
+          reaction_loops<Avx2Vectors>()};
 }
 
 }  // namespace oblique::solver

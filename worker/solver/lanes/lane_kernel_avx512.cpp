@@ -4,15 +4,13 @@
 namespace oblique::solver {
 namespace {
 
-struct Avx512Vectors {
-  using Vector = double __attribute__((vector_size(64), may_alias));
-};
 using Pack = LanePack<Avx512Vectors, 1>;
 
 }  // namespace
 
 LaneKernel avx512_kernel() {
-  return {"avx512", Pack::kLanes, &step_lanes<Pack>, reaction_loops<Avx512Vectors>()};
+  return {"avx512", Pack::kLanes, &step_one_chain<Pack>, &step_chains<Pack>,
+          reaction_loops<Avx512Vectors>()};
 }
 
 }  // namespace oblique::solver

@@ -4,15 +4,13 @@
 namespace oblique::solver {
 namespace {
 
-struct BaselineVectors {
-  using Vector = double __attribute__((vector_size(16), may_alias));
-};
 using Pack = LanePack<BaselineVectors, 2>;
 
 }  // namespace
 
 LaneKernel baseline_kernel() {
-  return {"baseline", Pack::kLanes, &step_lanes<Pack>, reaction_loops<BaselineVectors>()};
+  return {"baseline", Pack::kLanes, &step_one_chain<Pack>, &step_chains<Pack>,
+          reaction_loops<BaselineVectors>()};
 }
 
 }  // namespace oblique::solver

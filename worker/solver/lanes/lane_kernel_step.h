@@ -1,6 +1,6 @@
 #pragma once
 
-#include "worker/solver/lanes/lane_pack.h"
+#include "worker/solver/chain/lane_pack.h"
 #include "worker/solver/lanes/lane_stepper.h"
 
 namespace oblique::solver {
@@ -11,19 +11,19 @@ ReactionLoops reaction_loops() {
 }
 
 /// Gathers the momenta of all links at both ends of a step.
-template <class Pack>
+template <class Constant, class Pack>
 struct MomentaOfStep {
-  LinkMomenta<Pack> before;
-  LinkMomenta<Pack> after;
+  LinkMomenta<Constant, Pack> before;
+  LinkMomenta<Constant, Pack> after;
 
   void start(std::size_t row, const PlanarVector<Pack>& v) { before.add(row, v); }
   void end(std::size_t row, const PlanarVector<Pack>& v) { after.add(row, v); }
 };
 
-/// One step of all lanes of `Pack`, a LanePack. Compiled once in each lane_kernel_*.cpp with the
-/// flags of its instruction set.
-template <class Pack>
-void step_lanes(const ChainTables& chain, const LaneArrays& arrays) {
+/// One step of all lanes of `Pack`, a LanePack, with constants shared by all lanes or a pack of
+/// them. Compiled in each lane_kernel_*.cpp with the flags of its instruction set.
+template <class Pack, class Constant>
+void step_packs(const ChainTables<Constant>& chain, const LaneArrays& arrays) {
   const auto packs = [](auto* numbers) { return reinterpret_cast<Pack*>(numbers); };
   const auto constant = [](const double* numbers) {
     return reinterpret_cast<const Pack*>(numbers);
@@ -35,13 +35,23 @@ void step_lanes(const ChainTables& chain, const LaneArrays& arrays) {
   const ContactIntegrals<Pack> integrals =
       pefrl_step(chain, force, *constant(arrays.h_s), constant(arrays.q), constant(arrays.v),
                  packs(arrays.q_next), packs(arrays.v_next), packs(arrays.scratch),
-                 MomentaOfStep<Pack>{{chain, momenta_before}, {chain, momenta_after}});
+                 MomentaOfStep<Constant, Pack>{{chain, momenta_before}, {chain, momenta_after}});
   packs(arrays.integrals)[0] = integrals.impulse_n;
   packs(arrays.integrals)[1] = integrals.impulse_t;
   packs(arrays.integrals)[2] = integrals.work_t;
   mean_reactions_squared(chain, momenta_before, momenta_after,
                          {integrals.impulse_t, integrals.impulse_n}, *constant(arrays.inverse_h_Hz),
                          packs(arrays.reactions));
+}
+
+template <class Pack>
+[[gnu::flatten]] void step_one_chain(const ChainTables<double>& chain, const LaneArrays& arrays) {
+  step_packs<Pack>(chain, arrays);
+}
+
+template <class Pack>
+[[gnu::flatten]] void step_chains(const LaneTables& chains, const LaneArrays& arrays) {
+  step_packs<Pack>(chains.of<Pack>(), arrays);
 }
 
 }  // namespace oblique::solver

@@ -32,8 +32,11 @@ std::span<const LaneKernel> runnable_lane_kernels() {
   return kernels;
 }
 
-LaneStepper::LaneStepper(const ChainTables& chain, const LaneKernel& kernel)
-    : chain_(chain), kernel_(kernel), size_(2 * chain.rows) {
+LaneStepper::LaneStepper(const ChainTables<double>& chain, const LaneKernel& kernel)
+    : kernel_(kernel),
+      size_(2 * chain.rows),
+      chains_(kernel.lanes),
+      is_side_by_side_(kernel.lanes, 0) {
   const std::size_t state = size_ * lanes();
   const std::size_t small = std::max(lanes(), kAlignment / sizeof(double));
   memory_.assign(5 * state + (2 + 7 + 3 + 5 * chain.links) * small + kAlignment / sizeof(double),
@@ -58,10 +61,34 @@ LaneStepper::LaneStepper(const ChainTables& chain, const LaneKernel& kernel)
   reactions_ = take(chain.links * small);
 }
 
-void LaneStepper::load(std::size_t lane, const double* q, const double* v) {
+void LaneStepper::load(std::size_t lane, const ChainTables<double>& chain, const double* q,
+                       const double* v) {
+  chains_[lane] = chain;
+  is_side_by_side_[lane] = 0;
+  compare_chains();
   for (std::size_t i = 0; i < size_; ++i) {
     q_[i * lanes() + lane] = q[i];
     v_[i * lanes() + lane] = v[i];
+  }
+}
+
+void LaneStepper::idle(std::size_t lane) {
+  chains_[lane].reset();
+  set_step(lane, 0.0);
+  compare_chains();
+}
+
+void LaneStepper::compare_chains() {
+  one_chain_ = nullptr;
+  for (const auto& chain : chains_) {
+    if (!chain) {
+      continue;
+    }
+    if (one_chain_ != nullptr && !are_equal(*one_chain_, *chain)) {
+      one_chain_ = nullptr;
+      return;
+    }
+    one_chain_ = &*chain;
   }
 }
 
@@ -82,8 +109,27 @@ void LaneStepper::set_force(std::size_t lane, const AffineContactForce<double>& 
 }
 
 void LaneStepper::step() {
-  kernel_.step(chain_, {q_, v_, q_next_, v_next_, scratch_, h_s_, inverse_h_Hz_, force_, integrals_,
-                        momenta_, reactions_});
+  const LaneArrays arrays{q_,     v_,         q_next_,  v_next_,   scratch_, h_s_, inverse_h_Hz_,
+                          force_, integrals_, momenta_, reactions_};
+  if (one_chain_ != nullptr) {
+    kernel_.step_one_chain(*one_chain_, arrays);
+    return;
+  }
+  for (std::size_t lane = 0; lane < lanes(); ++lane) {
+    if (!chains_[lane]) {
+      continue;
+    }
+    if (!side_by_side_) {
+      side_by_side_.emplace(*chains_[lane], lanes());
+    }
+    if (is_side_by_side_[lane] == 0) {
+      side_by_side_->set(lane, *chains_[lane]);
+      is_side_by_side_[lane] = 1;
+    }
+  }
+  if (side_by_side_) {
+    kernel_.step_chains(side_by_side_->tables(), arrays);
+  }
 }
 
 ContactIntegrals<double> LaneStepper::integrals(std::size_t lane) const {

@@ -1,12 +1,12 @@
 #pragma once
 
 #include <cstddef>
-#include <memory>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
 
-#include "worker/solver/chain/chain_kernel.h"
+#include "worker/solver/chain/lane_chains.h"
 #include "worker/solver/contact/reaction_peaks.h"
 #include "worker/solver/motion/pefrl.h"
 
@@ -27,11 +27,13 @@ struct LaneArrays {
   double* reactions;    ///< squared means of the reactions: for each link one a lane
 };
 
-/// The PEFRL step compiled for one instruction set.
+/// The PEFRL step compiled for one instruction set: of lanes that share a chain's constants, and of
+/// lanes with chains of their own. A lane gets the same bits from both.
 struct LaneKernel {
   std::string_view name;  ///< of the instruction set
   std::size_t lanes;
-  void (*step)(const ChainTables& chain, const LaneArrays& arrays);
+  void (*step_one_chain)(const ChainTables<double>& chain, const LaneArrays& arrays);
+  void (*step_chains)(const LaneTables& chains, const LaneArrays& arrays);
   ReactionLoops reaction_loops;
 };
 
@@ -39,16 +41,20 @@ struct LaneKernel {
 std::span<const LaneKernel> runnable_lane_kernels();
 
 /// States of as many cases as the kernel has lanes, side by side (structure of arrays, lane =
-/// case), with a step length and a force law each. Every lane is accepted or refused on its own.
+/// case), with a chain, a step length and a force law each. Every lane is accepted or refused on
+/// its own. While the chains of all lanes are equal, their constants are read once for all.
 class LaneStepper {
  public:
-  /// `chain` must outlive this.
-  LaneStepper(const ChainTables& chain, const LaneKernel& kernel);
+  /// For chains of the shape of `chain`, which need not outlive this. All lanes stand idle.
+  LaneStepper(const ChainTables<double>& chain, const LaneKernel& kernel);
 
   std::size_t lanes() const { return kernel_.lanes; }
 
-  /// Puts a state (2 rows entries each) into a lane.
-  void load(std::size_t lane, const double* q, const double* v);
+  /// Puts a state (2 rows entries each) of `chain` into a lane. What `chain` points to must live
+  /// until the lane is loaded again or idle.
+  void load(std::size_t lane, const ChainTables<double>& chain, const double* q, const double* v);
+  /// Makes a lane stand still.
+  void idle(std::size_t lane);
   /// Takes the accepted state of a lane out.
   void store(std::size_t lane, double* q, double* v) const;
 
@@ -73,9 +79,14 @@ class LaneStepper {
   void settle(std::span<const unsigned char> accept);
 
  private:
-  ChainTables chain_;
+  void compare_chains();
+
   LaneKernel kernel_;
-  std::size_t size_;  ///< entries of one state
+  std::size_t size_;                                        ///< entries of one state
+  std::vector<std::optional<ChainTables<double>>> chains_;  ///< none: the lane is idle
+  const ChainTables<double>* one_chain_ = nullptr;  ///< of all lanes that are not idle, if one
+  std::optional<LaneChains> side_by_side_;          ///< once it was needed
+  std::vector<unsigned char> is_side_by_side_;      ///< whether it holds the lane's chain
   std::vector<double> memory_;
   double* q_;
   double* v_;

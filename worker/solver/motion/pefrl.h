@@ -34,8 +34,8 @@ struct UnwatchedStep {
 /// and v themselves. `scratch` has the same size. As chain_kernel.h, for numbers and lanes. `watch`
 /// is told the rates at the start and at the end of the step, row by row from the tip to the row
 /// after the pin, while they are in registers.
-template <class Real, class Watch = UnwatchedStep<Real>>
-inline ContactIntegrals<Real> pefrl_step(const ChainTables& chain,
+template <class Constant, class Real, class Watch = UnwatchedStep<Real>>
+inline ContactIntegrals<Real> pefrl_step(const ChainTables<Constant>& chain,
                                          const AffineContactForce<Real>& force, const Real& h_s,
                                          const Real* q, const Real* v, Real* q_next, Real* v_next,
                                          Real* scratch, Watch&& watch = {}) {
@@ -45,7 +45,7 @@ inline ContactIntegrals<Real> pefrl_step(const ChainTables& chain,
   put_pair(v_next, 0, pair_at(v, 0));
   const Real first_drift_s = Pefrl::drift[0] * h_s;
   for (std::size_t i = 2; i < 2 * chain.rows; ++i) {
-    q_next[i] = q[i] + first_drift_s * v[i];
+    q_next[i] = plus_product(q[i], first_drift_s, v[i]);
   }
   for (std::size_t stage = 0; stage < Pefrl::kKicks; ++stage) {
     const Real* v_from = stage == 0 ? v : v_next;
@@ -58,7 +58,7 @@ inline ContactIntegrals<Real> pefrl_step(const ChainTables& chain,
     // Kick, and drift on, as the accelerations come.
     substitute_accelerations(chain, scratch, [&](std::size_t row, const PlanarVector<Real>& a) {
       const PlanarVector<Real> v_before = pair_at(v_from, row);
-      const PlanarVector<Real> v_row{v_before.x + kick_s * a.x, v_before.y + kick_s * a.y};
+      const PlanarVector<Real> v_row = plus_product(v_before, kick_s, a);
       if (stage == 0) {
         watch.start(row, v_before);
       }
@@ -66,8 +66,7 @@ inline ContactIntegrals<Real> pefrl_step(const ChainTables& chain,
         watch.end(row, v_row);
       }
       put_pair(v_next, row, v_row);
-      q_next[2 * row] += drift_s * v_row.x;
-      q_next[2 * row + 1] += drift_s * v_row.y;
+      put_pair(q_next, row, plus_product(pair_at(q_next, row), drift_s, v_row));
     });
     integrals.impulse_n += kick_s * fn;
     integrals.impulse_t += kick_s * ft;

@@ -1,0 +1,124 @@
+#pragma once
+
+#include <cstddef>
+#if defined(__x86_64__)
+#include <immintrin.h>
+#elif defined(__aarch64__)
+#include <arm_neon.h>
+#endif
+
+namespace oblique::solver {
+
+/// Vectors of the instruction sets that a source is compiled for, with their multiply-adds: c + a b
+/// and c - a b, which round once where the hardware can. The type's name keeps instances for
+/// different instruction sets apart.
+struct BaselineVectors {
+  using Vector = double __attribute__((vector_size(16), may_alias));
+#if defined(__aarch64__)
+  static inline Vector plus_product(Vector c, Vector a, Vector b) {
+    return vfmaq_f64(c, a, b);
+  }
+  static inline Vector less_product(Vector c, Vector a, Vector b) {
+    return vfmsq_f64(c, a, b);
+  }
+#else
+  static inline Vector plus_product(Vector c, Vector a, Vector b) {
+    return c + a * b;
+  }
+  static inline Vector less_product(Vector c, Vector a, Vector b) {
+    return c - a * b;
+  }
+#endif
+};
+
+#if defined(__AVX2__) && defined(__FMA__)
+struct Avx2Vectors {
+  using Vector = double __attribute__((vector_size(32), may_alias));
+  static inline Vector plus_product(Vector c, Vector a, Vector b) {
+    return _mm256_fmadd_pd(a, b, c);
+  }
+  static inline Vector less_product(Vector c, Vector a, Vector b) {
+    return _mm256_fnmadd_pd(a, b, c);
+  }
+};
+#endif
+
+#if defined(__AVX512F__)
+struct Avx512Vectors {
+  using Vector = double __attribute__((vector_size(64), may_alias));
+  static inline Vector plus_product(Vector c, Vector a, Vector b) {
+    return _mm512_fmadd_pd(a, b, c);
+  }
+  static inline Vector less_product(Vector c, Vector a, Vector b) {
+    return _mm512_fnmadd_pd(a, b, c);
+  }
+};
+#endif
+
+/// `count` hardware vectors used as one: lanes of independent cases. More than one vector hides the
+/// latency of the banded solve, whose rows depend on each other. Arithmetic only; a number beside a
+/// pack goes to all lanes.
+template <class Hardware, std::size_t count>
+struct LanePack {
+  using Vector = typename Hardware::Vector;
+  static constexpr std::size_t kLanes = count * sizeof(Vector) / sizeof(double);
+
+  Vector part[count];
+
+  template <class Operation>
+  static inline LanePack each(Operation operation) {
+    LanePack result;
+    for (std::size_t i = 0; i < count; ++i) {
+      result.part[i] = operation(i);
+    }
+    return result;
+  }
+  /// `value` in all lanes.
+  static inline LanePack all(double value) {
+    return each([&](std::size_t) { return value - Vector{}; });
+  }
+  static inline const LanePack& all(const LanePack& value) { return value; }
+
+  friend inline LanePack operator+(const LanePack& a, const LanePack& b) {
+    return each([&](std::size_t i) { return a.part[i] + b.part[i]; });
+  }
+  friend inline LanePack operator-(const LanePack& a, const LanePack& b) {
+    return each([&](std::size_t i) { return a.part[i] - b.part[i]; });
+  }
+  friend inline LanePack operator*(const LanePack& a, const LanePack& b) {
+    return each([&](std::size_t i) { return a.part[i] * b.part[i]; });
+  }
+  friend inline LanePack operator+(const LanePack& a, double b) { return a + all(b); }
+  friend inline LanePack operator-(const LanePack& a, double b) { return a - all(b); }
+  friend inline LanePack operator*(const LanePack& a, double b) { return a * all(b); }
+  friend inline LanePack operator+(double a, const LanePack& b) { return all(a) + b; }
+  friend inline LanePack operator-(double a, const LanePack& b) { return all(a) - b; }
+  friend inline LanePack operator*(double a, const LanePack& b) { return all(a) * b; }
+  inline LanePack& operator+=(const LanePack& b) { return *this = *this + b; }
+  inline LanePack& operator-=(const LanePack& b) { return *this = *this - b; }
+};
+
+/// As those of planar_vector.h; c and a are packs of the same kind or numbers.
+template <class C, class A, class Hardware, std::size_t count>
+inline LanePack<Hardware, count> plus_product(const C& c, const A& a,
+                                              const LanePack<Hardware, count>& b) {
+  using Pack = LanePack<Hardware, count>;
+  const Pack& c_pack = Pack::all(c);
+  const Pack& a_pack = Pack::all(a);
+  return Pack::each([&](std::size_t i) {
+    return Hardware::plus_product(c_pack.part[i], a_pack.part[i], b.part[i]);
+  });
+}
+
+template <class C, class A, class Hardware, std::size_t count>
+inline LanePack<Hardware, count> less_product(const C& c, const A& a,
+                                              const LanePack<Hardware, count>& b) {
+  using Pack = LanePack<Hardware, count>;
+  const Pack& c_pack = Pack::all(c);
+  const Pack& a_pack = Pack::all(a);
+  return Pack::each([&](std::size_t i) {
+    return Hardware::less_product(c_pack.part[i], a_pack.part[i], b.part[i]);
+  });
+}
+
+}  // namespace oblique::solver
