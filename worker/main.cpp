@@ -112,7 +112,7 @@ int run_worker(SessionSettings settings, const StopWithParent& parent) {
     spdlog::warn("the parent process was gone before this one began");
     return oblique::protocol::kDone;
   }
-  oblique::worker::PointSolver points(settings.models_kept);
+  oblique::worker::PointSolver points(settings.threads);
   const oblique::worker::Session* running = nullptr;
   settings.on_turn = [&] {
     notifier.status(running->status());

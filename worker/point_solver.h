@@ -4,24 +4,31 @@
 
 #include "worker/batch.h"
 #include "worker/batch_solver.h"
-#include "worker/fall_cache.h"
+#include "worker/solver/fall_cache.h"
+#include "worker/solver/solve.h"
 
 namespace oblique::worker {
 
 /// Solves points of batches. May be used from several threads.
 class PointSolver {
  public:
-  /// Keeps the falls of `models_kept` models.
-  explicit PointSolver(std::size_t models_kept);
+  /// Keeps falls for so many threads.
+  explicit PointSolver(std::size_t threads);
+  explicit PointSolver(const solver::FallCache::Bounds& bounds,
+                       const solver::FallCache::Solve& solve)
+      : falls_(bounds, solve) {}
 
-  /// Solves the points that `next` gives, side by side, and hands each result to `take`. A point
-  /// that has no answer, and one with a value that is not finite, becomes a failed point with the
-  /// reason; nothing is thrown for it.
+  /// Solves the points that `next` gives, each of its own model, side by side, and hands each
+  /// result to `take`. A fall that a point misses is solved beside those that later points of the
+  /// batch miss. A point that has no answer, one whose fall has none, and one with a value that is
+  /// not finite, becomes a failed point with the reason; nothing is thrown for it.
   void solve(const Batch& batch, const BatchSolver::NextPoint& next,
              const BatchSolver::TakeResult& take);
 
  private:
-  FallCache fingers_;
+  class BatchPoints;
+
+  solver::FallCache falls_;
 };
 
 }  // namespace oblique::worker

@@ -24,7 +24,6 @@ struct SessionSettings {
   std::string name;                             ///< for people
   std::string host;                             ///< name of this machine, for people
   std::size_t threads = 1;                      ///< that solve points
-  std::size_t models_kept = 8;                  ///< falls kept
   std::function<void()> on_turn;                ///< called several times a second
   std::int64_t report_interval_ms = 100;        ///< solved points wait at most so long
   std::optional<protocol::KeyFile> key = {};    ///< its own; none: plain text

@@ -1,9 +1,14 @@
 #include "worker/point_solver.h"
 
-#include <limits>
+#include <algorithm>
+#include <atomic>
+#include <cstdint>
 #include <memory>
+#include <mutex>
 #include <optional>
+#include <span>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -12,58 +17,87 @@
 #include "proto/recipe/model_message.h"
 #include "proto/result_message.h"
 #include "tests/worker/conversation_fixture.h"
-#include "worker/fall_cache.h"
+#include "worker/solver/lanes/lane_stepper.h"
 
 namespace oblique::worker {
 namespace {
-
-solver::ModelParameters model_with_k(double k_N_m) {
-  solver::ModelParameters model;
-  model.k_N_m = k_N_m;
-  return model;
-}
-
-TEST(FallCacheTest, EqualModelsShareOneFinger) {
-  FallCache cache(8);
-  EXPECT_EQ(cache.finger(model_with_k(1e7)), cache.finger(model_with_k(1e7)));
-  EXPECT_NE(cache.finger(model_with_k(1e7)), cache.finger(model_with_k(2e7)));
-}
-
-TEST(FallCacheTest, TheFingerNotUsedForLongestMakesRoomForANewOne) {
-  FallCache cache(2);
-  const auto first = cache.finger(model_with_k(1e7));
-  const auto second = cache.finger(model_with_k(2e7));
-  EXPECT_EQ(cache.finger(model_with_k(1e7)), first);
-  cache.finger(model_with_k(3e7));
-  EXPECT_EQ(cache.finger(model_with_k(1e7)), first);
-  EXPECT_NE(cache.finger(model_with_k(2e7)), second);
-  EXPECT_EQ(second->model().k_N_m, 2e7);
-}
-
-TEST(FallCacheTest, AModelOutsideItsDomainIsAnErrorAndIsNotKept) {
-  FallCache cache(2);
-  EXPECT_THROW(cache.finger(model_with_k(-1.0)), solver::InputError);
-  EXPECT_THROW(cache.finger(model_with_k(-1.0)), solver::InputError);
-}
 
 Batch batch_of(const protocol::Recipe& recipe) {
   const auto points = std::make_shared<const protocol::PointTable>(recipe);
   return {1, 7, 0, 0, points->size(), points};
 }
 
-/// Solves all points of a batch; the results in the order of the points.
-std::vector<protocol::PointResult> solved(const Batch& batch) {
-  PointSolver solver(2);
+/// Solves all points of a batch on so many threads; the results in the order of the points.
+std::vector<protocol::PointResult> solved(const Batch& batch, PointSolver& solver,
+                                          std::size_t threads = 1) {
   std::vector<protocol::PointResult> results(batch.count);
-  std::uint64_t given = 0;
-  solver.solve(
-      batch,
-      [&] {
-        return given < batch.count ? std::optional(batch.first_point + given++) : std::nullopt;
-      },
-      [&](protocol::PointResult&& result) { results.at(result.point()) = std::move(result); });
+  std::atomic<std::uint64_t> given = 0;
+  const auto next = [&]() -> std::optional<std::uint64_t> {
+    const std::uint64_t index = given++;
+    return index < batch.count ? std::optional(batch.first_point + index) : std::nullopt;
+  };
+  const auto take = [&](protocol::PointResult&& result) {
+    const std::uint64_t point = result.point();
+    EXPECT_EQ(results.at(point).reals_size(), 0) << "point " << point << " came twice";
+    results.at(point) = std::move(result);
+  };
+  std::vector<std::jthread> workers;
+  for (std::size_t i = 0; i < threads; ++i) {
+    workers.emplace_back([&] { solver.solve(batch, next, take); });
+  }
+  workers.clear();
   return results;
 }
+
+std::vector<protocol::PointResult> solved(const Batch& batch) {
+  PointSolver solver(1);
+  return solved(batch, solver);
+}
+
+/// Behind the other model axes of the only block, before H, mu and e.
+void add_model_axis(protocol::Recipe& recipe, const char* key, const std::vector<double>& values) {
+  protocol::Block& block = *recipe.mutable_blocks(0);
+  protocol::Axis& axis = *block.add_axes();
+  axis.set_key(key);
+  for (const double value : values) {
+    axis.add_values(value);
+  }
+  const int last = block.axes_size() - 1;
+  for (int i = last; i > last - 3; --i) {
+    block.mutable_axes()->SwapElements(i, i - 1);
+  }
+}
+
+/// Axes over E and k for each of `points` points of a coarse mesh.
+protocol::Recipe recipe_with_models(std::uint64_t points, const std::vector<double>& E_Pa,
+                                    const std::vector<double>& k_N_m) {
+  protocol::Recipe recipe = recipe_with_points(points);
+  solver::ModelParameters model;
+  model.elements_per_link = 1;
+  *recipe.mutable_model() = protocol::to_message(model);
+  add_model_axis(recipe, "E", E_Pa);
+  add_model_axis(recipe, "k", k_N_m);
+  return recipe;
+}
+
+/// Falls that are counted.
+struct CountedFalls {
+  solver::FallCache::Solve solve = [this](std::span<const solver::ModelParameters> models) {
+    const std::lock_guard lock(mutex);
+    solved.emplace_back(models.begin(), models.end());
+    return solver::solve_falls(models);
+  };
+  std::size_t count() const {
+    std::size_t falls = 0;
+    for (const auto& together : solved) {
+      falls += together.size();
+    }
+    return falls;
+  }
+
+  std::mutex mutex;
+  std::vector<std::vector<solver::ModelParameters>> solved;
+};
 
 TEST(PointSolverTest, EveryPointGivesWhatTheFingerGivesForItAlone) {
   const Batch batch = batch_of(recipe_with_points(12));
@@ -100,6 +134,61 @@ TEST(PointSolverTest, AModelThatMakesNoFingerFailsEachPointWithTheReason) {
   for (const auto& result : results) {
     EXPECT_NE(result.error().find("dt = 1"), std::string::npos) << result.error();
   }
+}
+
+TEST(PointSolverTest, PointsOfManyModelsGiveWhatTheirFingersGiveForThemAlone) {
+  const Batch batch = batch_of(recipe_with_models(3, {6e10, 7e10, 8e10}, {2e7, 3e7}));
+  ASSERT_EQ(batch.count, 18U);
+  CountedFalls falls;
+  PointSolver one({}, falls.solve);
+  PointSolver several({}, falls.solve);
+  const auto results = solved(batch, one);
+  EXPECT_EQ(falls.count(), 3U) << "k does not enter the fall";
+  const auto by_threads = solved(batch, several, 3);
+  EXPECT_EQ(falls.count(), 6U) << "threads do not solve each other's falls again";
+  for (std::uint64_t i = 0; i < batch.count; ++i) {
+    const protocol::Point point = batch.points->point(i);
+    const solver::CaseResult expected =
+        solver::Finger(batch.points->model(point.model)).solve(point.H_m, point.mu, point.e_star);
+    for (const auto* result : {&results[i], &by_threads[i]}) {
+      EXPECT_EQ(result->error(), "");
+      const auto outputs = protocol::from_message(*result);
+      EXPECT_EQ(outputs.fn_peak_N, expected.fn_peak_N) << i;
+      EXPECT_EQ(outputs.vn_out_m_s, expected.vn_out_m_s) << i;
+    }
+  }
+}
+
+TEST(PointSolverTest, FallsThatLaterPointsMissAreSolvedBesideTheFirst) {
+  const Batch batch = batch_of(recipe_with_models(2, {5e10, 6e10, 7e10, 8e10}, {2e7, 3e7}));
+  CountedFalls falls;
+  PointSolver solver({}, falls.solve);
+  solved(batch, solver);
+  ASSERT_FALSE(falls.solved.empty());
+  const std::size_t lanes = solver::runnable_lane_kernels().front().lanes;
+  EXPECT_EQ(falls.solved.front().size(), std::min<std::size_t>(lanes, 4));
+  EXPECT_EQ(falls.count(), 4U);
+}
+
+TEST(PointSolverTest, AFallThatFailsIsSolvedOnceAndFailsThePointsOfItsModelsAlone) {
+  protocol::Recipe recipe = recipe_with_models(4, {7e10}, {2e7, 3e7});
+  solver::ModelParameters model;
+  model.elements_per_link = 1;
+  model.integrator = solver::Integrator::kGeneralizedAlpha;
+  *recipe.mutable_model() = protocol::to_message(model);
+  add_model_axis(recipe, "dt_fall", {0.025, 1e-4});  // Newton's method fails in the first
+  const Batch batch = batch_of(recipe);
+  CountedFalls falls;
+  PointSolver solver({}, falls.solve);
+  for (int again = 0; again < 2; ++again) {
+    const auto results = solved(batch, solver);
+    for (const auto& result : results) {
+      const bool fails =
+          batch.points->model(batch.points->point(result.point()).model).dt_fall_s == 0.025;
+      EXPECT_EQ(result.error().empty(), !fails) << result.error();
+    }
+  }
+  EXPECT_EQ(falls.count(), 2U);
 }
 
 }  // namespace

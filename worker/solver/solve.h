@@ -64,18 +64,28 @@ class Finger {
   CaseResult solve(double H_m, double mu, double e_star) const;
   CaseResult solve(double H_m, double mu, double e_star, const Tracing& tracing) const;
 
-  /// Solves the points that `source` gives until it gives nothing more, side by side in vector
-  /// lanes where the integrator allows, and hands each outcome to `sink`, in the order in which
-  /// they are done. Points of equal H should follow each other: the state at touch is found once
-  /// for them. Throws nothing of its own; what goes wrong with a point is in its outcome.
+  /// As the function below, for points of this finger alone.
   void solve_points(const std::function<std::optional<PointRequest>()>& source,
                     const std::function<void(PointOutcome&&)>& sink) const;
 
+  /// For the implementation.
+  const std::shared_ptr<const Parts>& parts() const { return parts_; }
+
  private:
-  void solve_in_lanes(const std::function<std::optional<PointRequest>()>& source,
-                      const std::function<void(PointOutcome&&)>& sink,
-                      const Tracing& tracing) const;
   std::shared_ptr<const Parts> parts_;
 };
+
+struct FingerPoint {
+  Finger finger;
+  PointRequest point;
+};
+
+/// Solves the points that `source` gives until it gives nothing more, those of any fingers side by
+/// side in vector lanes where integrator and shape of the chains allow, and hands each outcome to
+/// `sink`, in the order in which they are done. Points of one finger and of equal H should follow
+/// each other: the state at touch is found once for them. Throws nothing of its own; what goes
+/// wrong with a point is in its outcome.
+void solve_points(const std::function<std::optional<FingerPoint>()>& source,
+                  const std::function<void(PointOutcome&&)>& sink);
 
 }  // namespace oblique::solver

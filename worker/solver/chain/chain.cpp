@@ -1,5 +1,6 @@
 #include "worker/solver/chain/chain.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 
@@ -34,17 +35,28 @@ void add_element(BandedMatrix& matrix, const std::array<Eigen::Index, 4>& row,
   }
 }
 
-/// Largest lambda with det(K - lambda M) = 0: lambda M - K is positive definite exactly above it.
+constexpr double kEigenvalueAccuracy = 1e-10;  ///< relative
+
+/// lambda M - K, with a unit row for the pin.
+BandedMatrix shifted(double lambda, const BandedMatrix& stiffness, const BandedMatrix& mass) {
+  BandedMatrix matrix(mass.rows());
+  matrix.at(0, 0) = 1.0;
+  for (std::size_t i = 1; i < mass.rows(); ++i) {
+    for (std::size_t d = 0; d <= kHalfBandwidth; ++d) {
+      matrix.at(i, d) = lambda * mass.at(i, d) - stiffness.at(i, d);
+    }
+  }
+  return matrix;
+}
+
+/// lambda M - K is positive definite exactly above the largest lambda with det(K - lambda M) = 0.
+bool is_above_eigenvalues(double lambda, const BandedMatrix& stiffness, const BandedMatrix& mass) {
+  return BandedCholesky(shifted(lambda, stiffness, mass)).positive_definite();
+}
+
 double largest_eigenvalue(const BandedMatrix& stiffness, const BandedMatrix& mass) {
   const auto is_above = [&](double lambda) {
-    BandedMatrix shifted(mass.rows());
-    shifted.at(0, 0) = 1.0;
-    for (std::size_t i = 1; i < mass.rows(); ++i) {
-      for (std::size_t d = 0; d <= kHalfBandwidth; ++d) {
-        shifted.at(i, d) = lambda * mass.at(i, d) - stiffness.at(i, d);
-      }
-    }
-    return BandedCholesky(shifted).positive_definite();
+    return is_above_eigenvalues(lambda, stiffness, mass);
   };
   double high = 1.0;
   while (!is_above(high)) {
@@ -56,7 +68,7 @@ double largest_eigenvalue(const BandedMatrix& stiffness, const BandedMatrix& mas
     }
   }
   double low = 0.25 * high;
-  while (high - low > 1e-10 * high) {
+  while (high - low > kEigenvalueAccuracy * high) {
     const double middle = 0.5 * (low + high);
     (is_above(middle) ? high : low) = middle;
   }
@@ -95,6 +107,7 @@ Chain::Chain(const ModelParameters& model)
         "the mass matrix of this model is not positive definite: rho, A and the lengths "
         "are too far apart in magnitude");
   }
+  free_eigenvalue_ = largest_eigenvalue(along_, mass_);
 }
 
 void Chain::number_rows(const ModelParameters& model) {
@@ -204,9 +217,43 @@ Eigen::Vector2d Chain::inner_end_force(std::size_t link, const Coordinates& q,
 
 double Chain::highest_frequency_rad_s(double tip_stiffness_N_m) const {
   // Across, the stiffness is the smaller by the axial part, so the highest frequency lies along.
+  if (tip_stiffness_N_m == 0.0) {
+    return std::sqrt(free_eigenvalue_);
+  }
+  const double risen = risen_eigenvalue(tip_stiffness_N_m);
   BandedMatrix held = along_;
   held.at(static_cast<std::size_t>(tip_row()), 0) += tip_stiffness_N_m;
+  if (is_above_eigenvalues((1.0 + kEigenvalueAccuracy) * risen, held, mass_)) {
+    return std::sqrt(risen);
+  }
   return std::sqrt(largest_eigenvalue(held, mass_));
+}
+
+/// Where a spring of that stiffness s at the tip lifts the largest eigenvalue to. It is the root of
+/// 1 / (e^T (lambda M - K)^-1 e) = s above that of the free chain. The left side rises with lambda
+/// and is concave, so Newton's steps stay below the root; each is the Rayleigh quotient of
+/// z = (lambda M - K)^-1 e, so it errs by no more than it is below.
+double Chain::risen_eigenvalue(double tip_stiffness_N_m) const {
+  constexpr int kMostSteps = 30;
+  const std::size_t tip = 2 * static_cast<std::size_t>(tip_row());
+  std::vector<double> z(2 * mass_.rows());
+  double lambda = free_eigenvalue_;
+  for (int i = 0; i < kMostSteps; ++i) {
+    const BandedCholesky factor(shifted(lambda, along_, mass_));
+    if (!factor.positive_definite()) {
+      break;
+    }
+    std::fill(z.begin(), z.end(), 0.0);
+    z[tip] = 1.0;
+    factor.solve_pairs(z.data());
+    const double rise =
+        (tip_stiffness_N_m * z[tip] - 1.0) * z[tip] / mass_.bilinear(z.data(), z.data(), 2);
+    if (!(rise > 0.01 * kEigenvalueAccuracy * lambda)) {
+      break;
+    }
+    lambda += rise;
+  }
+  return lambda;
 }
 
 }  // namespace oblique::solver

@@ -110,6 +110,7 @@ class Chain {
   static GradientCoefficients gradient(const Element& element, const Coordinates& q);
   void number_rows(const ModelParameters& model);
   void balance_links(double tip_mass_kg);
+  double risen_eigenvalue(double tip_stiffness_N_m) const;
 
   Eigen::Index rows_;
   double gravity_m_s2_;
@@ -123,6 +124,7 @@ class Chain {
   BandedMatrix mass_;  ///< of the free rows; row 0 is a unit row
   BandedCholesky mass_factor_;
   BandedMatrix along_;  ///< stiffness of the straight chain along itself: axial and bending
+  double free_eigenvalue_ = 0.0;  ///< square of the highest frequency without springs
 };
 
 }  // namespace oblique::solver

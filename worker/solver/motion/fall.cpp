@@ -118,6 +118,15 @@ ChainState Fall::state_at(double H_m) const {
   return locate(H_m, before);
 }
 
+std::size_t Fall::bytes() const {
+  const auto numbers = [](const ChainState& state) {
+    return state.q.size() + state.v.size() + state.acceleration.size() +
+           state.algorithmic_offset_rate.size() + state.multipliers_N.size();
+  };
+  const auto a_state = static_cast<std::size_t>(numbers(kept_.front())) * sizeof(double);
+  return kept_.size() * (sizeof(ChainState) + a_state);
+}
+
 ChainState Fall::locate(double H_m, const ChainState& before) const {
   // Newton on the drop, kept inside the step; near the largest drop, where the speed vanishes, it
   // falls back on bisection.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -33,6 +34,9 @@ class Fall {
   /// The state in which the tip has dropped H_m, located to rounding. Throws InputError when H_m is
   /// not in (0, largest_drop_m()], naming that bound.
   ChainState state_at(double H_m) const;
+
+  /// Memory that its states take.
+  std::size_t bytes() const;
 
  private:
   void locate_turn(const ChainState& before);

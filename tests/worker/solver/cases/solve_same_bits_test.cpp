@@ -11,6 +11,7 @@
 #include "tests/worker/solver/cases/same_bits.h"
 #include "tests/worker/solver/cases/shared_fingers.h"
 #include "worker/solver/contact/solve_contact.h"
+#include "worker/solver/falls.h"
 #include "worker/solver/lanes/lane_batch.h"
 #include "worker/solver/motion/fall.h"
 #include "worker/solver/step_choice.h"
@@ -101,6 +102,74 @@ TEST(SameBits, FromSeveralThreadsAtOnceThatShareAFinger) {
   for (const Results& results : by_thread) {
     expect_same(results, alone);
   }
+}
+
+/// Points of models that share a fall, of models that share the shape of their chains, and of
+/// others, numbered from 0 and mixed.
+std::vector<FingerPoint> crowd() {
+  std::vector<ModelParameters> models(8, coarse_model());
+  models[1].k_N_m = 1.3e7;
+  models[2].eta2 = 2.0;
+  models[3].E_Pa = 5e10;
+  models[4].lengths_m = {0.4, 0.3, 0.45};
+  models[4].tip_mass_kg = 0.1;
+  models[5].elements_per_link = 2;
+  models[6].integrator = Integrator::kGeneralizedAlpha;
+  models[6].dt_fall_s = 1e-4;
+  models[7].dt_s = 5e-7;
+  const std::vector<FallOutcome> falls = solve_falls(models);
+  std::vector<FingerPoint> crowd;
+  for (std::size_t i = 0; i < models.size(); ++i) {
+    const Finger finger(models[i], falls[i].fallen);
+    for (const double mu : {0.4, 1.2}) {
+      for (const double e_star : {1.0, 0.6}) {
+        crowd.push_back({finger, {crowd.size(), 0.9, mu, e_star}});
+        crowd.push_back({finger, {crowd.size(), 0.5, mu, e_star}});
+      }
+    }
+  }
+  return crowd;
+}
+
+Results solved_as_crowd(const std::vector<FingerPoint>& list) {
+  Results results;
+  std::size_t next = 0;
+  solve_points(
+      [&]() -> std::optional<FingerPoint> {
+        return next < list.size() ? std::optional(list[next++]) : std::nullopt;
+      },
+      [&results](PointOutcome&& outcome) {
+        EXPECT_TRUE(outcome.result) << outcome.error;
+        EXPECT_TRUE(results.emplace(outcome.number, std::move(*outcome.result)).second);
+      });
+  return results;
+}
+
+TEST(SameBits, InAMixedCrowdOfModels) {
+  auto list = crowd();
+  Results alone;
+  for (const auto& [finger, point] : list) {
+    alone.emplace(point.number, finger.solve(point.H_m, point.mu, point.e_star));
+  }
+  expect_same(solved_as_crowd(list), alone);
+  std::mt19937_64 generator(2);
+  for (int shuffle = 0; shuffle < 3; ++shuffle) {
+    std::shuffle(list.begin(), list.end(), generator);
+    expect_same(solved_as_crowd(list), alone);
+  }
+}
+
+TEST(SameBits, InCrowdsOnSeveralThreadsThatShareTheFingers) {
+  const auto list = crowd();
+  std::vector<Results> by_thread(3);
+  {
+    std::vector<std::jthread> threads;
+    for (Results& results : by_thread) {
+      threads.emplace_back([&] { results = solved_as_crowd(list); });
+    }
+  }
+  expect_same(by_thread[1], by_thread[0]);
+  expect_same(by_thread[2], by_thread[0]);
 }
 
 TEST(SameBits, WithATraceOrWithout) {

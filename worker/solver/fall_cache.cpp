@@ -1,0 +1,150 @@
+#include "worker/solver/fall_cache.h"
+
+#include <algorithm>
+#include <exception>
+#include <iterator>
+#include <utility>
+
+#include "worker/solver/lanes/lane_stepper.h"
+
+namespace oblique::solver {
+namespace {
+
+/// Whether falls of the two can be solved side by side.
+bool can_share_lanes(const ModelParameters& a, const ModelParameters& b) {
+  return a.integrator == Integrator::kExplicit && b.integrator == Integrator::kExplicit &&
+         a.lengths_m.size() == b.lengths_m.size() && a.elements_per_link == b.elements_per_link;
+}
+
+std::size_t bytes_of(const std::optional<FallOutcome>& outcome) {
+  return outcome && outcome->fallen ? outcome->fallen->fall().bytes() : 0;
+}
+
+}  // namespace
+
+FallCache::FallCache(const Bounds& bounds)
+    : FallCache(bounds,
+                [](std::span<const ModelParameters> models) { return solve_falls(models); }) {}
+
+FallOutcome FallCache::fall(const ModelParameters& model, std::span<const ModelParameters> ahead) {
+  const ModelParameters falling = fall_model(model);
+  std::unique_lock lock(mutex_);
+  while (true) {
+    const auto found = find(falling);
+    if (found != entries_.end() && found->outcome) {
+      return use(found);
+    }
+    const auto claimed = claim(falling, ahead);
+    if (claimed.empty()) {
+      solved_.wait(lock);  // and look again: it may have been solved and forgotten meanwhile
+    } else {
+      solve(claimed, lock);
+    }
+  }
+}
+
+std::optional<FallOutcome> FallCache::kept_fall(const ModelParameters& model) {
+  const ModelParameters falling = fall_model(model);
+  const std::lock_guard lock(mutex_);
+  const auto found = find(falling);
+  if (found == entries_.end() || !found->outcome) {
+    return std::nullopt;
+  }
+  return use(found);
+}
+
+FallCache::Entries::iterator FallCache::find(const ModelParameters& falling) {
+  return std::find_if(entries_.begin(), entries_.end(),
+                      [&](const Entry& entry) { return entry.model == falling; });
+}
+
+FallOutcome FallCache::use(Entries::iterator entry) {
+  entries_.splice(entries_.begin(), entries_, entry);
+  entry->is_used = true;
+  return *entry->outcome;
+}
+
+/// Makes entries for what this thread is to solve now: none when others solve it all.
+std::vector<FallCache::Entries::iterator> FallCache::claim(const ModelParameters& falling,
+                                                           std::span<const ModelParameters> ahead) {
+  const bool in_lanes = falling.integrator == Integrator::kExplicit;
+  const std::size_t most = in_lanes ? runnable_lane_kernels().front().lanes : 1;
+  std::vector<Entries::iterator> claimed;
+  const auto claim_if_missing = [&](const ModelParameters& missing) {
+    if (find(missing) == entries_.end()) {
+      entries_.push_back({missing, std::nullopt});
+      claimed.push_back(std::prev(entries_.end()));
+    }
+  };
+  claim_if_missing(falling);
+  for (const ModelParameters& model : ahead) {
+    if (claimed.size() >= most || !has_room_ahead()) {
+      break;
+    }
+    if (ModelParameters next = fall_model(model); !in_lanes || can_share_lanes(falling, next)) {
+      claim_if_missing(next);
+    }
+  }
+  return claimed;
+}
+
+void FallCache::solve(const std::vector<Entries::iterator>& claimed,
+                      std::unique_lock<std::mutex>& lock) {
+  std::vector<ModelParameters> models;
+  models.reserve(claimed.size());
+  for (const auto& entry : claimed) {
+    models.push_back(entry->model);
+  }
+  lock.unlock();
+  std::vector<FallOutcome> outcomes;
+  try {
+    outcomes = solve_(models);
+  } catch (const std::exception& error) {  // no memory: others wait for these entries
+    outcomes.assign(models.size(), {nullptr, error.what()});
+  }
+  lock.lock();
+  for (std::size_t i = claimed.size(); i-- > 0;) {  // the one wanted first is to stay longest
+    claimed[i]->outcome = std::move(outcomes[i]);
+    entries_.splice(entries_.begin(), entries_, claimed[i]);
+  }
+  make_room();
+  solved_.notify_all();
+}
+
+/// Falls solved ahead may take half of the room.
+bool FallCache::has_room_ahead() const {
+  std::size_t falls = 0;
+  std::size_t bytes = 0;
+  for (const Entry& entry : entries_) {
+    if (!entry.is_used) {
+      ++falls;
+      bytes += bytes_of(entry.outcome);
+    }
+  }
+  return 2 * falls < bounds_.falls && 2 * bytes < bounds_.bytes;
+}
+
+/// Forgets what was not used for longest, of falls solved ahead only when no other are left.
+void FallCache::make_room() {
+  std::size_t falls = 0;
+  std::size_t bytes = 0;
+  for (const Entry& entry : entries_) {
+    falls += entry.outcome ? 1U : 0U;
+    bytes += bytes_of(entry.outcome);
+  }
+  for (const bool used : {true, false}) {
+    for (auto entry = entries_.end(); entry != entries_.begin();) {
+      --entry;
+      if (falls <= 1 || (falls <= bounds_.falls && bytes <= bounds_.bytes)) {
+        return;
+      }
+      if (entry->outcome && entry->is_used == used) {
+        --falls;
+        bytes -= bytes_of(entry->outcome);
+        entry = entries_.erase(entry);
+      }
+    }
+  }
+}
+
+}  // namespace oblique::solver

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstddef>
+#include <functional>
+#include <list>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "worker/solver/falls.h"
+#include "worker/solver/model/parameters.h"
+
+namespace oblique::solver {
+
+/// Keeps the falls that were used last, so that one fall serves all points of all models that share
+/// it. A fall that fails fails once: its error is kept as a fall is. May be used from several
+/// threads; the falls are solved on the threads that ask for them.
+class FallCache {
+ public:
+  struct Bounds {
+    std::size_t falls = 1024;  ///< at least one is kept
+    std::size_t bytes = std::size_t{1} << 30;
+  };
+
+  using Solve = std::function<std::vector<FallOutcome>(std::span<const ModelParameters>)>;
+
+  /// Solves missing falls by `solve`.
+  FallCache(const Bounds& bounds, Solve solve) : bounds_(bounds), solve_(std::move(solve)) {}
+  explicit FallCache(const Bounds& bounds);
+  FallCache() : FallCache(Bounds{}) {}
+
+  /// The fall of `model`; fall_model() need not have gone through. What is not kept is solved, and
+  /// beside it, as far as lanes go, those of `ahead`, the first first, that nobody has solved or is
+  /// solving; when another thread solves that of `model`, those of `ahead` are solved while it
+  /// does. Does not wait for falls of `ahead` that others solve.
+  FallOutcome fall(const ModelParameters& model, std::span<const ModelParameters> ahead = {});
+
+  /// The fall of `model` when it is kept; solves and waits for nothing.
+  std::optional<FallOutcome> kept_fall(const ModelParameters& model);
+
+ private:
+  struct Entry {
+    ModelParameters model;               ///< as fall_model() gives it
+    std::optional<FallOutcome> outcome;  ///< empty while it is being solved
+    bool is_used = false;                ///< somebody asked for it, not only ahead of others
+  };
+  using Entries = std::list<Entry>;
+
+  Entries::iterator find(const ModelParameters& falling);
+  FallOutcome use(Entries::iterator entry);
+  std::vector<Entries::iterator> claim(const ModelParameters& falling,
+                                       std::span<const ModelParameters> ahead);
+  void solve(const std::vector<Entries::iterator>& claimed, std::unique_lock<std::mutex>& lock);
+  bool has_room_ahead() const;
+  void make_room();
+
+  const Bounds bounds_;
+  const Solve solve_;
+  mutable std::mutex mutex_;
+  std::condition_variable solved_;
+  Entries entries_;  ///< the one used last comes first
+};
+
+}  // namespace oblique::solver
