@@ -129,8 +129,12 @@ class Crowd {
       group_ += continues_group(point) ? 0U : 1U;
       last_ = point;
       under_way_.insert_or_assign(next_tag_, Entry{point, touch.t_s});
-      return ContactCase{next_tag_++, group_,
-                         finger->contact_parameters(request.mu, request.e_star), steps, &touch};
+      return ContactCase{next_tag_++,
+                         group_,
+                         &finger->chain(),
+                         finger->contact_parameters(request.mu, request.e_star),
+                         steps,
+                         &touch};
     } catch (const std::exception& error) {
       sink_({request.number, std::nullopt, error.what()});
       return std::nullopt;

@@ -7,14 +7,13 @@
 
 namespace oblique::solver {
 
-LaneBatch::LaneBatch(const Chain& chain, const LaneKernel& kernel)
-    : chain_(chain),
-      motion_(chain),
-      stepper_(chain.tables(), kernel),
+LaneBatch::LaneBatch(const Chain& shape, const LaneKernel& kernel)
+    : tip_row_(shape.tables().tip_row),
+      stepper_(shape.tables(), kernel),
       lanes_(kernel.lanes),
-      reactions_(chain.links(), kernel.lanes, kernel.reaction_loops),
+      reactions_(shape.links(), kernel.lanes, kernel.reaction_loops),
       accept_(kernel.lanes, 0),
-      column_(chain.at_rest()) {}
+      column_(shape.at_rest()) {}
 
 void LaneBatch::solve(const Source& source, const Sink& sink, const Tracing& tracing) {
   for (std::size_t lane = 0; lane < lanes_.size(); ++lane) {
@@ -72,25 +71,36 @@ void LaneBatch::fill(std::size_t lane, const Source& source, const Tracing& trac
   }
   start(lane, *next);
   if (tracing.sink) {
-    slot.tracer.emplace(motion_, tracing, slot.touch);
+    slot.tracer.emplace(*slot.motion, tracing, slot.touch);
     slot.tracer->accepted(*slot.contact, *next->touch);
   } else {
     take_followers(slot, source);
   }
 }
 
-void LaneBatch::start(std::size_t lane, const ContactCase& next) {
+void LaneBatch::take(std::size_t lane, const ContactCase& next) {
   Lane& slot = lanes_[lane];
   slot.contact_case = next;
+  slot.motion.emplace(*next.chain);
   slot.started = Clock::now();
+}
+
+void LaneBatch::put_in(std::size_t lane, Contact contact, const ChainState& state) {
+  Lane& slot = lanes_[lane];
+  stepper_.load(lane, slot.contact_case.chain->tables(), state.q.data(), state.v.data());
+  stepper_.set_step(lane, contact.trial_step_s());
+  stepper_.set_force(lane, contact.force());
+  slot.contact = std::move(contact);
+}
+
+void LaneBatch::start(std::size_t lane, const ContactCase& next) {
+  take(lane, next);
+  Lane& slot = lanes_[lane];
   const ChainState& touch = *next.touch;
-  stepper_.load(lane, chain_.tables(), touch.q.data(), touch.v.data());
-  slot.touch = chain_.tip(touch);
-  slot.in = motion_.energies(touch);
+  slot.touch = slot.motion->tip(touch);
+  slot.in = slot.motion->energies(touch);
   reactions_.restart(lane);
-  slot.contact.emplace(next.parameters, slot.touch, next.steps);
-  stepper_.set_step(lane, slot.contact->trial_step_s());
-  stepper_.set_force(lane, slot.contact->force());
+  put_in(lane, Contact(next.parameters, slot.touch, next.steps), touch);
 }
 
 /// The state at touch of the case just started is in its lane by now: the source may move on.
@@ -120,21 +130,18 @@ void LaneBatch::start_branch(std::size_t lane) {
   const Branch branch = std::move(branches_.front());
   branches_.pop_front();
   const Trunk& trunk = *branch.trunk;
-  slot.contact_case = branch.contact_case;
-  slot.started = Clock::now();
+  take(lane, branch.contact_case);
   slot.touch = trunk.touch;
   slot.in = trunk.in;
   reactions_.put_in(lane, trunk.reactions);
-  slot.contact.emplace(
-      trunk.contact.branched(branch.contact_case.parameters.e_star, branch.contact_case.steps));
-  stepper_.load(lane, chain_.tables(), trunk.state.q.data(), trunk.state.v.data());
-  stepper_.set_step(lane, slot.contact->trial_step_s());
-  stepper_.set_force(lane, slot.contact->force());
+  put_in(lane,
+         trunk.contact.branched(branch.contact_case.parameters.e_star, branch.contact_case.steps),
+         trunk.state);
 }
 
 bool LaneBatch::advance(std::size_t lane, const Sink& sink) {
   Lane& slot = lanes_[lane];
-  const std::size_t tip = 2 * chain_.tables().tip_row;
+  const std::size_t tip = 2 * tip_row_;
   const TipState end{stepper_.trial_q(lane, tip), stepper_.trial_q(lane, tip + 1),
                      stepper_.trial_v(lane, tip), stepper_.trial_v(lane, tip + 1)};
   const int events = slot.contact->events();
@@ -144,6 +151,7 @@ bool LaneBatch::advance(std::size_t lane, const Sink& sink) {
     is_accepted = slot.contact->judge(end, stepper_.integrals(lane));
   } catch (const SolveError& error) {
     slot.failed = true;
+    stepper_.idle(lane);  // from here on the caller may drop its chain
     sink({slot.contact_case.tag, std::nullopt, error.what()});
     for (const ContactCase& follower : slot.followers) {
       sink({follower.tag, std::nullopt, error.what()});  // it would come the same way
@@ -166,7 +174,7 @@ void LaneBatch::finish(std::size_t lane, std::size_t busy, const Sink& sink) {
   ContactOutcome outcome{slot.contact_case.tag, std::nullopt, {}};
   try {
     CaseResult result = contact_result(*slot.contact, slot.contact_case.parameters, slot.touch,
-                                       slot.in, motion_.energies(stored(lane)));
+                                       slot.in, slot.motion->energies(stored(lane)));
     result.reaction_peaks = reaction_peaks(lane);
     result.solver.dt_s = slot.contact_case.steps.compression_s;
     result.solver.steps = slot.contact->steps();
@@ -177,6 +185,7 @@ void LaneBatch::finish(std::size_t lane, std::size_t busy, const Sink& sink) {
   } catch (const SolveError& error) {
     outcome.error = error.what();
   }
+  stepper_.idle(lane);  // from here on the caller may drop its chain
   sink(std::move(outcome));
 }
 
@@ -188,7 +197,7 @@ std::vector<ReactionPeak> LaneBatch::reaction_peaks(std::size_t lane) {
   const Contact& contact = *lanes_[lane].contact;
   ReactionPeaks with_end = reactions_.taken_out(lane);
   Eigen::Matrix2Xd reactions_N;
-  motion_.reactions(contact.force(), stored(lane), reactions_N);
+  lanes_[lane].motion->reactions(contact.force(), stored(lane), reactions_N);
   const Eigen::RowVectorXd squared_N2 = reactions_N.colwise().squaredNorm();
   with_end.set_span(0, contact.time_s(), 0.0);
   with_end.add(squared_N2.data());

@@ -21,6 +21,7 @@ namespace oblique::solver {
 struct ContactCase {
   std::uint64_t tag;    ///< the caller's name for it
   std::uint64_t group;  ///< cases of one group that follow each other differ in e* only
+  const Chain* chain;   ///< must live until the outcome is given
   ContactParameters parameters;
   ContactSteps steps;
   const ChainState* touch;  ///< of the eliminated chain; read when the case is taken
@@ -37,14 +38,16 @@ struct ContactOutcome {
 /// ends takes the next case at once, and a lane that locates an event steps from its own saved
 /// state with a length of its own while the others go on. Cases of a group share the contact up to
 /// its first turn, where e* begins to count. A case has the same bits whatever lane, neighbours and
-/// group it had. Not for use from two threads at once.
+/// group it had, and whether these have its chain or others. Cases of equal chains that follow each
+/// other are the fastest. Not for use from two threads at once.
 class LaneBatch {
  public:
   using Source = std::function<std::optional<ContactCase>()>;
   using Sink = std::function<void(ContactOutcome&&)>;
 
-  /// `chain` must outlive this.
-  LaneBatch(const Chain& chain, const LaneKernel& kernel);
+  /// For cases of chains of the shape of `shape` (links, elements a link), which need not outlive
+  /// this.
+  LaneBatch(const Chain& shape, const LaneKernel& kernel);
 
   /// Solves what `source` gives until it gives nothing more. Outcomes come in the order in which
   /// contacts end. With `tracing`, every case is traced.
@@ -62,6 +65,7 @@ class LaneBatch {
   struct Lane {
     std::optional<Contact> contact;  ///< empty: the lane idles
     ContactCase contact_case{};
+    std::optional<ExplicitMotion> motion;
     TipState touch{};
     Energies in{};
     std::vector<ContactCase> followers;  ///< the rest of the group, before the first turn
@@ -81,7 +85,10 @@ class LaneBatch {
     std::shared_ptr<const Trunk> trunk;
     ContactCase contact_case;
   };
+  /// Contact and state of a case into its lane.
+  void put_in(std::size_t lane, Contact contact, const ChainState& state);
   void fill(std::size_t lane, const Source& source, const Tracing& tracing);
+  void take(std::size_t lane, const ContactCase& next);
   void start(std::size_t lane, const ContactCase& next);
   void start_branch(std::size_t lane);
   void take_followers(Lane& slot, const Source& source);
@@ -92,8 +99,7 @@ class LaneBatch {
   std::size_t busy_lanes() const;
   const ChainState& stored(std::size_t lane);
 
-  const Chain& chain_;
-  ExplicitMotion motion_;
+  std::size_t tip_row_;
   LaneStepper stepper_;
   std::vector<Lane> lanes_;
   ReactionPeaks reactions_;

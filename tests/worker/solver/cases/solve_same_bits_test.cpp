@@ -201,7 +201,7 @@ TEST(Lanes, EveryInstructionSetGivesTheSameAnswersButForRounding) {
       std::size_t done = 0;
       batch.solve(
           [&]() -> std::optional<ContactCase> {
-            return given < cases ? std::optional(ContactCase{given++, 0, parameters,
+            return given < cases ? std::optional(ContactCase{given++, 0, &chain, parameters,
                                                              steps.contact(0.8), &touch})
                                  : std::nullopt;
           },

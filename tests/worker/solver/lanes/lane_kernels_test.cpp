@@ -54,6 +54,7 @@ std::vector<CaseResult> solve_by(const LaneKernel& kernel) {
             const std::size_t number = next++;
             return ContactCase{number,
                                number / 3,
+                               &chain,
                                {model.k_N_m, model.eta2, c.mu, c.e_star},
                                steps.contact(c.e_star),
                                &touch};
