@@ -131,7 +131,7 @@ class Crowd {
       under_way_.insert_or_assign(next_tag_, Entry{point, touch.t_s});
       return ContactCase{next_tag_++,
                          group_,
-                         &finger->chain(),
+                         &finger->prepared()->chain(),
                          finger->contact_parameters(request.mu, request.e_star),
                          steps,
                          &touch};
