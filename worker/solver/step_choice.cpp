@@ -47,6 +47,7 @@ StepChoice::StepChoice(const Chain& chain, const ModelParameters& model)
       integrator_(model.integrator),
       asked_contact_s_(model.dt_s),
       implicit_contact_s_(kImplicitContactFraction * std::sqrt(link_mass_kg(model) / model.k_N_m)),
+      step_factor_(model.step_factor),
       fall_s_(chosen_fall_s(chain, model)) {}
 
 ContactSteps StepChoice::contact_limits(double e_star) const {
@@ -58,6 +59,21 @@ ContactSteps StepChoice::contact_limits(double e_star) const {
 }
 
 ContactSteps StepChoice::contact(double e_star) const {
+  ContactSteps steps = single_contact(e_star);
+  if (step_factor_ == 1.0) {
+    return steps;
+  }
+  steps.compression_s *= step_factor_;
+  steps.restitution_s *= step_factor_;
+  if (integrator_ == Integrator::kExplicit) {
+    const ContactSteps limits = contact_limits(e_star);
+    steps.compression_s = std::min(steps.compression_s, kLongestFraction * limits.compression_s);
+    steps.restitution_s = std::min(steps.restitution_s, kLongestFraction * limits.restitution_s);
+  }
+  return steps;
+}
+
+ContactSteps StepChoice::single_contact(double e_star) const {
   if (e_star < kSmallestRestitution) {
     throw SolveError("e = " + exact_number(e_star) +
                      " cannot be solved in double precision: the restitution spring k/e^2 is too "

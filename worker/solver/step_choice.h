@@ -25,25 +25,31 @@ class StepChoice {
   /// it is faster than the chain's own response to contact, and steps in restitution shrink with
   /// it.
   static constexpr double kFastRestitution = 0.4;
+  /// Steps that a step factor above 1 makes longer stay below this fraction of the stability limit.
+  static constexpr double kLongestFraction = 0.9;
 
   /// Throws InputError when model.dt_fall_s is above its limit.
   StepChoice(const Chain& chain, const ModelParameters& model);
 
   double fall_s() const { return fall_s_; }
   /// Steps in a contact with restitution e_star. Throws InputError when model.dt_s is above its
-  /// limit, SolveError when e_star is below kSmallestRestitution.
+  /// limit, SolveError when e_star is below kSmallestRestitution. The model's step factor counts.
   ContactSteps contact(double e_star) const;
   /// Longest stable steps of the explicit integrator in such a contact. In restitution the tip is
   /// held by k/e*^2.
   ContactSteps contact_limits(double e_star) const;
 
  private:
+  /// Steps before the step factor counts.
+  ContactSteps single_contact(double e_star) const;
+
   const Chain& chain_;
   double k_N_m_;
   double tangential_ratio_;  ///< of the tangential stiffness to k
   Integrator integrator_;
   double asked_contact_s_;
   double implicit_contact_s_;
+  double step_factor_;
   double fall_s_;
 };
 

@@ -61,6 +61,21 @@ struct ContactEnergy {
   double closure;      ///< what does not add up, relative to exchanged_J; never negative
 };
 
+/// Estimated errors of outputs, dimensionless and never negative: relative to the output's own
+/// scale (worker/solver/estimate.h). Absent when no errors were asked for, or the coarser solution
+/// of the point has no answer.
+struct ErrorEstimate {
+  std::optional<std::int64_t> mode_same;  ///< 1: both solutions have one major mode, else 0
+  std::optional<double> fn_peak;
+  std::optional<double> ft_peak;
+  std::optional<double> duration;
+  std::optional<double> stick_total;
+  std::optional<double> slide;
+  std::optional<double> impulse_n;
+  std::optional<double> impulse_t;
+  std::optional<double> v_out;  ///< of the exit velocity, both components together
+};
+
 struct SolverReport {
   std::string integrator;
   double dt_s;          ///< step in contact (in compression; restitution at low e* steps shorter)
@@ -100,6 +115,7 @@ struct CaseResult {
   std::vector<Phase> phases;
   std::vector<ReactionPeak> reaction_peaks;  ///< O first, then each joint
   ContactEnergy energy;
+  ErrorEstimate errors;
   SolverReport solver;
 };
 

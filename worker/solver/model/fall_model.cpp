@@ -8,6 +8,7 @@ ModelParameters fall_model(const ModelParameters& model) {
   falling.k_N_m = defaults.k_N_m;
   falling.eta2 = defaults.eta2;
   falling.dt_s = defaults.dt_s;
+  falling.step_factor = defaults.step_factor;
   if (falling.integrator != Integrator::kGeneralizedAlpha) {
     falling.spectral_radius = defaults.spectral_radius;
   }

@@ -1,0 +1,156 @@
+#include "worker/solver/estimate.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "tests/worker/solver/cases/shared_fingers.h"
+#include "worker/solver/chain/chain.h"
+#include "worker/solver/model/fall_model.h"
+#include "worker/solver/solve.h"
+#include "worker/solver/step_choice.h"
+
+namespace oblique::solver {
+namespace {
+
+ContactSteps steps_of(const ModelParameters& model, double e_star) {
+  const Chain chain(model);
+  return StepChoice(chain, model).contact(e_star);
+}
+
+/// Contacts so soft that two elements a link carry their waves.
+ModelParameters soft_model(int elements_per_link) {
+  ModelParameters model = coarse_model(elements_per_link);
+  model.k_N_m *= 0.01;
+  return model;
+}
+
+CaseResult some_result() {
+  static const CaseResult result = coarse_finger().solve(0.8, 1.2, 0.7);
+  return result;
+}
+
+TEST(Companion, HasHalfTheElementsRoundedDownAndOneAtLeast) {
+  for (const auto& [elements, half] : std::vector<std::pair<int, int>>{
+           {1, 1}, {2, 1}, {3, 1}, {4, 2}, {5, 2}, {16, 8}, {256, 128}}) {
+    EXPECT_EQ(companion_model(coarse_model(elements)).elements_per_link, half) << elements;
+  }
+}
+
+TEST(Companion, TakesTwiceTheStepsWhetherTheyAreChosenOrAskedFor) {
+  for (const Integrator integrator : {Integrator::kExplicit, Integrator::kGeneralizedAlpha}) {
+    for (const double dt_s : {0.0, 1e-7}) {
+      ModelParameters model = coarse_model();
+      model.integrator = integrator;
+      model.dt_s = dt_s;
+      for (const double e_star : {0.1, 1.0}) {
+        const ContactSteps steps = steps_of(model, e_star);
+        const ContactSteps doubled = steps_of(companion_model(model), e_star);
+        EXPECT_EQ(doubled.compression_s, 2.0 * steps.compression_s);
+        EXPECT_EQ(doubled.restitution_s, 2.0 * steps.restitution_s);
+      }
+    }
+  }
+}
+
+TEST(Companion, TakesTheLongestStableStepWhereTwiceTheStepIsNotStable) {
+  ModelParameters model = coarse_model();
+  const Chain chain(model);
+  const double limit_s = StepChoice(chain, model).contact_limits(1.0).restitution_s;
+  model.dt_s = 0.8 * limit_s;
+  const double step_s = steps_of(companion_model(model), 1.0).restitution_s;
+  EXPECT_GT(step_s, model.dt_s);
+  EXPECT_LT(step_s, limit_s);
+}
+
+TEST(Companion, OfOneElementSharesItsFall) {
+  const ModelParameters model = coarse_model();
+  EXPECT_EQ(fall_model(companion_model(model)), fall_model(model));
+}
+
+TEST(EstimatedErrors, AreNoneWhereBothSolutionsAreOne) {
+  const ErrorEstimate errors = estimated_errors(coarse_model(4), some_result(), some_result());
+  EXPECT_EQ(errors.mode_same, 1);
+  for (const auto& error : {errors.fn_peak, errors.ft_peak, errors.duration, errors.stick_total,
+                            errors.slide, errors.impulse_n, errors.impulse_t, errors.v_out}) {
+    EXPECT_EQ(error, 0.0);
+  }
+}
+
+TEST(EstimatedErrors, GrowWithTheDifferenceAndWithWavesThatTheHalvedMeshDoesNotCarry) {
+  CaseResult near = some_result();
+  near.duration_s *= 1.01;
+  CaseResult far = some_result();
+  far.duration_s *= 1.02;
+  far.major_mode = "sC sR";
+  const auto error = [](int elements_per_link, const CaseResult& companion) {
+    return *estimated_errors(coarse_model(elements_per_link), some_result(), companion).duration;
+  };
+  EXPECT_NEAR(error(16, far) / error(16, near), 2.0, 1e-9);
+  EXPECT_GT(error(4, near), 5.0 * error(16, near));
+  // Once the waves are carried, that of order 3 and a factor of 2: d/7.
+  EXPECT_NEAR(error(64, near), 0.01 / 7.0, 1e-5);
+  EXPECT_EQ(estimated_errors(coarse_model(4), some_result(), near).mode_same, 1);
+  EXPECT_EQ(estimated_errors(coarse_model(4), some_result(), far).mode_same, 0);
+}
+
+TEST(EstimatedErrors, OfOneComponentOfTheExitVelocityCountForBoth) {
+  CaseResult companion = some_result();
+  companion.vt_out_m_s += 0.1;
+  const double one = *estimated_errors(coarse_model(8), some_result(), companion).v_out;
+  companion.vn_out_m_s += 0.1;
+  const double both = *estimated_errors(coarse_model(8), some_result(), companion).v_out;
+  EXPECT_NEAR(both / one, std::sqrt(2.0), 1e-9);
+}
+
+TEST(EstimatedErrors, AreAbsentWhereTheScaleIsZero) {
+  CaseResult result = some_result();
+  result.fn_peak_N = 0.0;
+  const ErrorEstimate errors = estimated_errors(coarse_model(4), result, some_result());
+  EXPECT_FALSE(errors.fn_peak);
+  EXPECT_FALSE(errors.ft_peak);
+  EXPECT_TRUE(errors.duration);
+}
+
+TEST(EstimatedErrors, OfGeneralizedAlphaCountOnNoHigherOrderThanItHas) {
+  CaseResult companion = some_result();
+  companion.duration_s *= 1.01;
+  ModelParameters model = coarse_model(64);
+  const double explicitly = *estimated_errors(model, some_result(), companion).duration;
+  model.integrator = Integrator::kGeneralizedAlpha;
+  EXPECT_GT(*estimated_errors(model, some_result(), companion).duration, 2.0 * explicitly);
+}
+
+TEST(EstimatedErrors, TwiceTheEstimateHoldsTheDifferenceToAFinerMesh) {
+  const ModelParameters model = soft_model(2);
+  const Finger finger(model);
+  const Finger companion(companion_model(model));
+  const Finger finer(soft_model(4));
+  int held = 0;
+  int judged = 0;
+  const auto judge = [&](const std::optional<double>& estimate, double truth) {
+    held += std::abs(truth) <= 2.0 * *estimate + 1e-9 ? 1 : 0;
+    ++judged;
+  };
+  for (const double H_m : {0.4, 0.7, 1.0}) {
+    for (const double mu : {0.3, 1.3}) {
+      for (const double e_star : {0.6, 1.0}) {
+        const CaseResult result = finger.solve(H_m, mu, e_star);
+        const CaseResult truth = finer.solve(H_m, mu, e_star);
+        const ErrorEstimate errors =
+            estimated_errors(model, result, companion.solve(H_m, mu, e_star));
+        judge(errors.fn_peak, (result.fn_peak_N - truth.fn_peak_N) / result.fn_peak_N);
+        judge(errors.duration, (result.duration_s - truth.duration_s) / result.duration_s);
+        judge(errors.impulse_n, (result.impulse_n_Ns - truth.impulse_n_Ns) / result.impulse_n_Ns);
+      }
+    }
+  }
+  EXPECT_GE(held, judged * 9 / 10) << "of " << judged;
+}
+
+}  // namespace
+}  // namespace oblique::solver
