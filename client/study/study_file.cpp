@@ -26,7 +26,7 @@ namespace {
 
 using solver::InputError;
 
-constexpr std::array<std::string_view, 3> kTopKeys{"name", "model", "block"};
+constexpr std::array<std::string_view, 4> kTopKeys{"name", "errors", "model", "block"};
 constexpr std::array<std::string_view, 4> kRangeKeys{"from", "to", "count", "step"};
 constexpr std::string_view kAxisForms =
     "a number, a list of numbers, { from, to, count } or { from, to, step }";
@@ -56,6 +56,7 @@ class Reader {
 
   void check_top_keys(const toml::table& top) const;
   std::string name(const toml::table& top) const;
+  bool errors(const toml::table& top) const;
   solver::ModelParameters model(const toml::node& node) const;
   void add_model_key(protocol::WrittenModel& model, std::string_view name,
                      const toml::node& value) const;
@@ -98,10 +99,11 @@ double Reader::axis_number(const solver::ParameterKey& key, const toml::node& no
 void Reader::check_top_keys(const toml::table& top) const {
   for (const auto& [key, value] : top) {
     if (std::find(kTopKeys.begin(), kTopKeys.end(), key.str()) == kTopKeys.end()) {
-      fail(value, "unknown key `" + std::string(key.str()) + "`" +
-                      protocol::did_you_mean(key.str(), kTopKeys) +
-                      ": a study file has name, [model] and one or more [[block]]; H, mu and e "
-                      "stand in a block");
+      fail(value,
+           "unknown key `" + std::string(key.str()) + "`" +
+               protocol::did_you_mean(key.str(), kTopKeys) +
+               ": a study file has name, errors, [model] and one or more [[block]]; H, mu and e "
+               "stand in a block");
     }
   }
 }
@@ -124,6 +126,18 @@ std::string Reader::name(const toml::table& top) const {
     fail(*node, objection);
   }
   return text;
+}
+
+bool Reader::errors(const toml::table& top) const {
+  const auto* node = top.get("errors");
+  if (node == nullptr) {
+    return false;
+  }
+  if (!node->is_boolean()) {
+    fail(*node,
+         fmt::format("errors = {} is {}: it must be true or false", shown(*node), kind_of(*node)));
+  }
+  return *node->value<bool>();
 }
 
 void Reader::add_model_key(protocol::WrittenModel& model, std::string_view name,
@@ -244,6 +258,7 @@ Study Reader::study(const toml::table& top) const {
   check_top_keys(top);
   Study study;
   study.name = name(top);
+  study.recipe.set_errors(errors(top));
   if (const auto* node = top.get("model")) {
     *study.recipe.mutable_model() = protocol::to_message(model(*node));
   } else {

@@ -24,6 +24,10 @@ void add_study_flags(CLI::App& verb, StudyFlags& flags) {
   verb.add_option("--name", flags.name,
                   "name of the study; by default the file's, or `sweep-` and a hash of the flags")
       ->type_name("NAME");
+  verb.add_flag("--errors", flags.errors,
+                "estimate errors: solve each point also on half the mesh and at twice the step, at "
+                "about a third more cost")
+      ->group("Points");
   add_point_flags(verb, flags.points, FlagValues::kMany);
 }
 
@@ -42,9 +46,12 @@ Study study_of_flags(const StudyFlags& flags, const ReachCheck& check_reach) {
   Study study;
   if (flags.file.empty()) {
     study.recipe = recipe_of_flags(flags.points, check_reach);
-    study.name = name_of_recipe(study.recipe);
   } else {
     study = read_study_file(flags.file, check_reach);
+  }
+  study.recipe.set_errors(study.recipe.errors() || flags.errors);
+  if (flags.file.empty()) {
+    study.name = name_of_recipe(study.recipe);
   }
   if (!flags.name.empty()) {
     if (const auto objection = protocol::objection_to_study_name(flags.name); !objection.empty()) {

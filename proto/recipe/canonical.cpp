@@ -15,6 +15,8 @@ namespace {
 
 constexpr std::string_view kModelHead = "oblique-model-1";
 constexpr std::string_view kRecipeHead = "oblique-recipe-1\n";
+/// Only where errors are asked for, so that recipes from before they could be keep their texts.
+constexpr std::string_view kErrorsLine = "errors\n";
 /// The keys of version 1 behind `lengths`, always written. Keys that came later are written behind
 /// them, by name, where they are not at their default: what was encoded before they came stays so.
 constexpr std::array<std::string_view, 13> kFirstKeys{"E",
@@ -210,6 +212,9 @@ void write_canonical(const Recipe& recipe, const std::function<void(std::string_
   const auto model =
       recipe.has_model() ? unjudged_from_message(recipe.model()) : solver::ModelParameters();
   out << kRecipeHead << "model" << model_fields(model, solver::model_keys()) << "\n";
+  if (recipe.errors()) {
+    out << kErrorsLine;
+  }
   for (const Block& block : recipe.blocks()) {
     out << "block";
     for (const Axis& axis : block.axes()) {

@@ -36,6 +36,8 @@ class PointTable {
   explicit PointTable(Recipe recipe);
 
   const Recipe& recipe() const { return recipe_; }
+  /// Whether results are to have estimated errors.
+  bool wants_errors() const { return recipe_.errors(); }
   std::uint64_t size() const;    ///< number of points
   std::uint64_t models() const;  ///< number of models
 

@@ -46,6 +46,7 @@ solver::CaseResult distinct_result() {
   result.phases = {{solver::PhaseKind::kCompression, 0.0, 6.8e-5},
                    {solver::PhaseKind::kRestitution, 6.8e-5, 5.5e-4}};
   result.energy = {1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0};
+  result.errors = {1, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08};
   result.solver = {"", 4e-6, 138, 3e-4, ""};
   return result;
 }
@@ -64,13 +65,18 @@ TEST(PointResultTest, ScalarsTravelByTypeInTheOrderThatTheWorkerSays) {
       "fall_time_s impact_x_m vt_in_m_s vn_in_m_s duration_s fn_peak_N ft_peak_N"
       " impulse_n_Ns impulse_t_Ns slide_m vt_out_m_s vn_out_m_s margin stick_total_s kinetic_in_J"
       " friction_J restitution_J kinetic_change_J strain_change_J gravity_change_J"
-      " exchanged_J closure dt_s wall_s steps mode major_mode margin_event");
-  EXPECT_EQ(numbers(message.reals()),
-            (std::vector<double>{0.43, 0.58, -5.7, -5.2, 5.5e-4, 5057.0, 2023.0, 0.7,
-                                 0.3,  1e-3, -4.0, 2.0,  0.021,  7e-5,   1.0,    2.0,
-                                 3.0,  4.0,  5.0,  6.0,  7.0,    8.0,    4e-6,   3e-4}));
-  ASSERT_EQ(message.whole_numbers_size(), 1);
-  EXPECT_EQ(message.whole_numbers(0), 138);
+      " exchanged_J closure fn_peak_error ft_peak_error duration_error stick_total_error "
+      "slide_error"
+      " impulse_n_error impulse_t_error v_out_error dt_s wall_s mode_same steps mode major_mode"
+      " margin_event");
+  EXPECT_EQ(
+      numbers(message.reals()),
+      (std::vector<double>{0.43, 0.58,  -5.7, -5.2, 5.5e-4, 5057.0, 2023.0, 0.7,  0.3,  1e-3, -4.0,
+                           2.0,  0.021, 7e-5, 1.0,  2.0,    3.0,    4.0,    5.0,  6.0,  7.0,  8.0,
+                           0.01, 0.02,  0.03, 0.04, 0.05,   0.06,   0.07,   0.08, 4e-6, 3e-4}));
+  ASSERT_EQ(message.whole_numbers_size(), 2);
+  EXPECT_EQ(message.whole_numbers(0), 1);
+  EXPECT_EQ(message.whole_numbers(1), 138);
   ASSERT_EQ(message.texts_size(), 3);
   EXPECT_EQ(message.texts(0), "SC SR sR");
   EXPECT_EQ(message.texts(1), "SC SR");
@@ -116,7 +122,7 @@ TEST(PointResultTest, WhatAResultLacksIsLeftOutAndTheOthersKeepTheirPlaces) {
       lacking.margin_event.reset();
     }
     const PointResult message = to_message(0, lacking);
-    EXPECT_EQ(message.reals_size(), 23);
+    EXPECT_EQ(message.reals_size(), 31);
     EXPECT_EQ(message.texts_size(), has_event ? 3 : 2);
     EXPECT_EQ(fault_of(message), "");
     const auto received = from_message(message);
@@ -134,7 +140,7 @@ TEST(PointResultTest, OnlyWhatMayBeAbsentIs) {
   ASSERT_EQ(sound.absent_size(), 1);
   PointResult longer = sound;
   longer.add_reals(1.0);
-  EXPECT_THAT(fault_of(longer), HasSubstr("24 real numbers")) << "and one of them named absent";
+  EXPECT_THAT(fault_of(longer), HasSubstr("32 real numbers")) << "and one of them named absent";
   PointResult twice = sound;
   twice.add_absent(sound.absent(0));
   EXPECT_THAT(fault_of(twice), HasSubstr("no result may lack")) << "places ascend";
@@ -178,7 +184,7 @@ TEST(PointResultTest, WhatIsNoResultIsRefused) {
   const PointResult sound = to_message(0, distinct_result());
   PointResult shorter = sound;
   shorter.mutable_reals()->RemoveLast();
-  EXPECT_THAT(fault_of(shorter), HasSubstr("23 real numbers"));
+  EXPECT_THAT(fault_of(shorter), HasSubstr("31 real numbers"));
   PointResult silent = sound;
   silent.clear_texts();
   EXPECT_THAT(fault_of(silent), HasSubstr("0 texts"));

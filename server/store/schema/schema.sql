@@ -116,6 +116,18 @@ CREATE TABLE results (
   -- NULL: the row is of an earlier schema or solver.
   margin           REAL,
   margin_event     TEXT,
+  -- Estimated errors, each as a fraction of its scale (worker/solver/README.md), and whether half the mesh
+  -- and twice the step give the same mode (1) or another (0). NULL: the study did not ask for them, the
+  -- coarser solution has no answer, or the row is of an earlier schema.
+  mode_same        INTEGER,
+  fn_peak_error    REAL,
+  ft_peak_error    REAL,
+  duration_error   REAL,
+  stick_total_error REAL,
+  slide_error      REAL,
+  impulse_n_error  REAL,
+  impulse_t_error  REAL,
+  v_out_error      REAL,
   UNIQUE (study_id, point)
 ) STRICT;
 

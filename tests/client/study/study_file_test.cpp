@@ -31,6 +31,15 @@ TEST(StudyFile, MultipliesAxesInsideABlockWithHSlowestAndEFastest) {
   EXPECT_EQ(table.point(4).H_m, 1.0);
 }
 
+TEST(StudyFile, AsksForErrorsWhenItSaysSo) {
+  const auto asks = [](const std::string& head) {
+    return protocol::PointTable(parsed(head + block_with("mu = 0.4"), "x").recipe).wants_errors();
+  };
+  EXPECT_TRUE(asks("errors = true\n"));
+  EXPECT_FALSE(asks("errors = false\n"));
+  EXPECT_FALSE(asks(""));
+}
+
 TEST(StudyFile, PutsModelAxesBeforeThePointAxes) {
   const auto study = parsed(
       "[[block]]\nH = 1\nmu = [0.1, 0.2]\ne = 1\nk = [1e7, 2e7]\nintegrator = 'explicit'\n", "x");

@@ -34,5 +34,19 @@ TEST(StudyFlags, WantAFileOrPointsAndNotBoth) {
   EXPECT_THROW(study_of_flags(flags, pretended_reach()), solver::InputError);
 }
 
+TEST(StudyFlags, AskForErrorsOfPointsAndOfFiles) {
+  StudyFlags flags;
+  flags.points = flags_of({});
+  const auto without = study_of_flags(flags, pretended_reach());
+  flags.errors = true;
+  const auto with = study_of_flags(flags, pretended_reach());
+  EXPECT_FALSE(without.recipe.errors());
+  EXPECT_TRUE(with.recipe.errors());
+  EXPECT_NE(with.name, without.name) << "another study";
+  flags.points = {};
+  flags.file = std::string(OBLIQUE_SOURCE_DIR) + "/deploy/studies/paper.toml";
+  EXPECT_TRUE(study_of_flags(flags, pretended_reach()).recipe.errors());
+}
+
 }  // namespace
 }  // namespace oblique::client

@@ -68,6 +68,18 @@ TEST(Canonical, TheTextAndDigestOfARecipeAreTheSameForEver) {
             "078f885505efaf4635dbaa137a21fde2a38c6e7c1189af1683f91fadf4ba61bb");
 }
 
+TEST(Canonical, ErrorsAreNamedOnlyWhereTheyAreAskedForAndBeforeTheBlocks) {
+  Recipe recipe = recipe_of({kPoint});
+  const std::string without = canonical_recipe(recipe);
+  recipe.set_errors(true);
+  const std::string with = canonical_recipe(recipe);
+  const auto blocks = without.find("block ");
+  EXPECT_EQ(with, without.substr(0, blocks) + "errors\n" + without.substr(blocks));
+  EXPECT_NE(recipe_digest(recipe), recipe_digest(recipe_of({kPoint})));
+  *recipe.add_blocks() = recipe.blocks(0);
+  EXPECT_THAT(canonical_recipe(recipe), StartsWith(with)) << "a study that grows";
+}
+
 TEST(Canonical, AModelComesBackFromItsText) {
   std::vector<solver::ModelParameters> models{unusual_model()};
   for (const auto name : solver::preset_names()) {

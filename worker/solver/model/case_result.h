@@ -74,6 +74,8 @@ struct ErrorEstimate {
   std::optional<double> impulse_n;
   std::optional<double> impulse_t;
   std::optional<double> v_out;  ///< of the exit velocity, both components together
+
+  bool operator==(const ErrorEstimate&) const = default;
 };
 
 struct SolverReport {

@@ -115,8 +115,10 @@ constexpr ResultList kReactionPeaks{
 constexpr std::array kLists{&kPeaks, &kFtPeaks, &kPhases, &kStickIntervals, &kReactionPeaks};
 
 constexpr std::string_view kEnergy = "energy";
+constexpr std::string_view kErrors = "errors";
 constexpr std::string_view kSolver = "solver";
 constexpr auto kEnergyOf = &CaseResult::energy;
+constexpr auto kErrorsOf = &CaseResult::errors;
 constexpr auto kSolverOf = &CaseResult::solver;
 
 constexpr std::array kFields{
@@ -264,6 +266,64 @@ constexpr std::array kFields{
                 .meaning = "what does not add up in the energy balance, relative to exchanged_J; "
                            "never negative",
                 .value = at<kEnergyOf, &ContactEnergy::closure>},
+    ResultField{
+        .name = "mode_same",
+        .group = kErrors,
+        .column = "mode_same",
+        .meaning = "1: half the mesh and twice the step give the same mode, ripples merged; 0: "
+                   "another. This and the errors below are there only when they were asked for",
+        .value = at<kErrorsOf, &ErrorEstimate::mode_same>,
+        .since_schema = 7},
+    ResultField{.name = "fn_peak",
+                .group = kErrors,
+                .column = "fn_peak_error",
+                .meaning = "estimated error of fn_peak_N, as a fraction of it",
+                .value = at<kErrorsOf, &ErrorEstimate::fn_peak>,
+                .since_schema = 7},
+    ResultField{.name = "ft_peak",
+                .group = kErrors,
+                .column = "ft_peak_error",
+                .meaning = "estimated error of ft_peak_N, as a fraction of fn_peak_N",
+                .value = at<kErrorsOf, &ErrorEstimate::ft_peak>,
+                .since_schema = 7},
+    ResultField{.name = "duration",
+                .group = kErrors,
+                .column = "duration_error",
+                .meaning = "estimated error of duration_s, as a fraction of it",
+                .value = at<kErrorsOf, &ErrorEstimate::duration>,
+                .since_schema = 7},
+    ResultField{.name = "stick_total",
+                .group = kErrors,
+                .column = "stick_total_error",
+                .meaning = "estimated error of stick_total_s, as a fraction of duration_s",
+                .value = at<kErrorsOf, &ErrorEstimate::stick_total>,
+                .since_schema = 7},
+    ResultField{
+        .name = "slide",
+        .group = kErrors,
+        .column = "slide_error",
+        .meaning = "estimated error of slide_m, as a fraction of speed at touch times duration_s",
+        .value = at<kErrorsOf, &ErrorEstimate::slide>,
+        .since_schema = 7},
+    ResultField{.name = "impulse_n",
+                .group = kErrors,
+                .column = "impulse_n_error",
+                .meaning = "estimated error of impulse_n_Ns, as a fraction of it",
+                .value = at<kErrorsOf, &ErrorEstimate::impulse_n>,
+                .since_schema = 7},
+    ResultField{.name = "impulse_t",
+                .group = kErrors,
+                .column = "impulse_t_error",
+                .meaning = "estimated error of impulse_t_Ns, as a fraction of impulse_n_Ns",
+                .value = at<kErrorsOf, &ErrorEstimate::impulse_t>,
+                .since_schema = 7},
+    ResultField{.name = "v_out",
+                .group = kErrors,
+                .column = "v_out_error",
+                .meaning = "estimated error of the velocity at separation (vt_out_m_s and "
+                           "vn_out_m_s as one vector), as a fraction of the speed at touch",
+                .value = at<kErrorsOf, &ErrorEstimate::v_out>,
+                .since_schema = 7},
     ResultField{.name = "integrator",
                 .group = kSolver,
                 .meaning = "how the equations of motion are stepped: explicit or generalized-alpha",

@@ -67,6 +67,7 @@ inline void expect_same_bits(const CaseResult& a, const CaseResult& b) {
   EXPECT_EQ(a.energy.gravity_change_J, b.energy.gravity_change_J);
   EXPECT_EQ(a.energy.exchanged_J, b.energy.exchanged_J);
   EXPECT_EQ(a.energy.closure, b.energy.closure);
+  EXPECT_EQ(a.errors, b.errors);
   EXPECT_EQ(a.solver.dt_s, b.solver.dt_s);
   EXPECT_EQ(a.solver.steps, b.solver.steps);
 }
