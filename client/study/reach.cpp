@@ -8,6 +8,7 @@
 
 #include "proto/recipe/axes.h"
 #include "proto/recipe/blocks.h"
+#include "worker/solver/model/fall_model.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {
@@ -45,12 +46,7 @@ void ReachChecker::operator()(const protocol::PointTable& block) {
 
 /// The fall of a model, known or new; null for a new one when there are enough.
 ReachChecker::Fall* ReachChecker::fall_of(const solver::ModelParameters& model) {
-  // A fall does not depend on these keys; models that differ there alone share one.
-  solver::ModelParameters falling = model;
-  const solver::ModelParameters defaults;
-  falling.k_N_m = defaults.k_N_m;
-  falling.eta2 = defaults.eta2;
-  falling.dt_s = defaults.dt_s;
+  const solver::ModelParameters falling = solver::fall_model(model);
   const auto known = std::find_if(falls_.begin(), falls_.end(),
                                   [&](const Fall& fall) { return fall.model == falling; });
   if (known != falls_.end()) {

@@ -2,14 +2,20 @@
 
 #include <atomic>
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <optional>
+#include <span>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "worker/solver/chain/chain.h"
 #include "worker/solver/contact/solve_contact.h"
+#include "worker/solver/fall_cache.h"
+#include "worker/solver/falls.h"
+#include "worker/solver/lanes/lane_stepper.h"
 #include "worker/solver/motion/fall.h"
 #include "worker/solver/solve.h"
 #include "worker/solver/step_choice.h"
@@ -20,6 +26,7 @@ namespace {
 using solver::Chain;
 using solver::Fall;
 using solver::Finger;
+using solver::FingerPoint;
 using solver::ModelParameters;
 using solver::PointRequest;
 
@@ -119,6 +126,73 @@ BENCHMARK(lanes_and_threads)
     ->Args({4, 4})
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);
+
+/// Solves points 0, 1, ... that `point_at` gives, as a worker's thread does.
+void solve_all(std::size_t count, const std::function<FingerPoint(std::size_t)>& point_at) {
+  std::size_t next = 0;
+  solver::solve_points(
+      [&]() -> std::optional<FingerPoint> {
+        return next < count ? std::optional(point_at(next++)) : std::nullopt;
+      },
+      [](solver::PointOutcome&& outcome) {
+        if (!outcome.result) {
+          throw std::runtime_error(outcome.error);
+        }
+        benchmark::DoNotOptimize(outcome);
+      });
+}
+
+/// Every case has k and eta2 of its own; one fall serves all, the same drop or one of 8 drops.
+void distinct_contacts(benchmark::State& bench) {
+  const ModelParameters model;
+  const auto fallen = solver::solve_falls({&model, 1}).front().fallen;
+  const auto drops = static_cast<std::size_t>(bench.range(0));
+  constexpr std::size_t kCases = 512;
+  for (auto _ : bench) {
+    solve_all(kCases, [&](std::size_t i) {
+      const double part = static_cast<double>(i) / kCases;
+      ModelParameters mine = model;
+      mine.k_N_m *= 0.5 + part;
+      mine.eta2 *= 1.0 + 0.3 * part;
+      const double H_m = 0.3 + 0.1 * static_cast<double>(i % drops);
+      return FingerPoint{Finger(mine, fallen), {i, H_m, 0.05 + part, 1.0 - 0.6 * part}};
+    });
+  }
+  count_cases(bench, kCases);
+}
+BENCHMARK(distinct_contacts)->ArgName("drops")->Arg(1)->Arg(8)->Unit(benchmark::kMillisecond);
+
+/// Every case has E, I and lengths of its own, so a fall of its own too; two sets of lanes each.
+void distinct_chains(benchmark::State& bench) {
+  const std::size_t cases = 2 * solver::runnable_lane_kernels().front().lanes;
+  int round = 0;
+  for (auto _ : bench) {
+    ++round;
+    std::vector<ModelParameters> models(cases, with_elements(bench.range(0)));
+    for (std::size_t i = 0; i < cases; ++i) {
+      const double part = static_cast<double>(i) / static_cast<double>(cases);
+      models[i].E_Pa *= 0.8 + 0.4 * part + 1e-6 * round;
+      models[i].I_m4 *= 1.1 - 0.2 * part;
+      models[i].lengths_m[1] *= 0.9 + 0.2 * part;
+    }
+    solver::FallCache falls;
+    solve_all(cases, [&](std::size_t i) {
+      const auto fallen = falls.fall(models[i], std::span(models).subspan(i)).fallen;
+      return FingerPoint{Finger(models[i], fallen), {i, 0.8, 0.4, 0.9}};
+    });
+  }
+  count_cases(bench, cases);
+}
+BENCHMARK(distinct_chains)->ArgName("n")->Arg(4)->Arg(16)->Unit(benchmark::kMillisecond);
+
+/// One point of a model that nobody has solved before.
+void fresh_point(benchmark::State& bench) {
+  for (auto _ : bench) {
+    benchmark::DoNotOptimize(Finger(with_elements(bench.range(0))).solve(1.0, 0.4, 1.0));
+  }
+  count_cases(bench, 1);
+}
+BENCHMARK(fresh_point)->ArgName("n")->Arg(4)->Arg(16)->Arg(32)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace oblique::bench

@@ -4,6 +4,7 @@
 #include <optional>
 #include <utility>
 
+#include "worker/solver/chain/lane_chains.h"
 #include "worker/solver/finger_parts.h"
 #include "worker/solver/lanes/lane_batch.h"
 #include "worker/solver/solve.h"
@@ -96,7 +97,7 @@ class Crowd {
     const auto prepared = upcoming_->finger.parts()->prepared();
     LaneBatch batch(prepared->chain(), runnable_lane_kernels().front());
     const auto take = [&]() -> std::optional<ContactCase> {
-      while (fetch() && shares_lanes_of(*prepared)) {
+      while (fetch() && shares_lanes_of(prepared->chain())) {
         if (const auto next = begun(*std::exchange(upcoming_, std::nullopt))) {
           return next;
         }
@@ -115,8 +116,9 @@ class Crowd {
     }
     return upcoming_.has_value();
   }
-  bool shares_lanes_of(const PreparedChain& chain) const {
-    return is_for_lanes(*upcoming_) && upcoming_->finger.parts()->prepared().get() == &chain;
+  bool shares_lanes_of(const Chain& chain) const {
+    return is_for_lanes(*upcoming_) &&
+           have_one_shape(upcoming_->finger.parts()->prepared()->chain().tables(), chain.tables());
   }
 
   std::optional<ContactCase> begun(FingerPoint&& point) {
