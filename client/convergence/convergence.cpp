@@ -1,26 +1,16 @@
 #include "client/convergence/convergence.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <mutex>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
-
-#include "client/convergence/parallel.h"
-#include "worker/solver/chain/chain.h"
-#include "worker/solver/solve.h"
-#include "worker/solver/step_choice.h"
 
 namespace oblique::client {
 namespace {
 
 using solver::CaseResult;
 
-/// Part of the stability limit that the explicit fall takes here; the frequencies of the moving
-/// chain stay within the rest.
-constexpr double kLongFallFraction = 0.9;
 constexpr double kRoundingFraction = 1e-9;
 
 // The states of `mode` ("sC sR sC sR") up to the peak of that number, from 0: all up to the first
@@ -100,66 +90,6 @@ std::vector<Output> outputs_of(const CaseResult& result) {
   outputs.push_back({"vt_out_m_s", result.vt_out_m_s, speed, mode});
   outputs.push_back({"vn_out_m_s", result.vn_out_m_s, speed, mode});
   return outputs;
-}
-
-std::vector<Level> mesh_levels(const solver::ModelParameters& model, int coarsest, int finest) {
-  std::vector<Level> levels;
-  int n = coarsest;
-  for (; n <= finest; n *= 2) {
-    Level level{fmt::format("n = {}", n), model};
-    level.model.elements_per_link = n;
-    solver::validate(level.model);
-    if (model.integrator == solver::Integrator::kExplicit) {
-      level.model.dt_s = 0.0;
-      level.model.dt_fall_s = 0.0;
-      const solver::Chain chain(level.model);
-      level.model.dt_fall_s = solver::StepChoice(chain, level.model).fall_s() *
-                              (kLongFallFraction / solver::StepChoice::kFallFraction);
-    }
-    levels.push_back(std::move(level));
-  }
-  constexpr std::size_t kFewest = 3;  // for an order
-  if (levels.size() < kFewest || n != 2 * finest) {
-    throw solver::InputError(fmt::format(
-        "--finest {} is not allowed: it must be 4, 8, 16, ... times the {} elements a link of "
-        "the coarsest mesh",
-        finest, coarsest));
-  }
-  return levels;
-}
-
-std::vector<Level> step_levels(const solver::ModelParameters& model, double e_star, int halvings) {
-  const solver::Chain chain(model);
-  const solver::StepChoice steps(chain, model);
-  std::vector<Level> levels;
-  for (int i = 0; i <= halvings; ++i) {
-    Level level{i == 0 ? "dt" : fmt::format("dt/{:.0f}", std::exp2(i)), model};
-    level.model.dt_s = std::ldexp(steps.contact(e_star).restitution_s, -i);
-    level.model.dt_fall_s = std::ldexp(steps.fall_s(), -i);
-    levels.push_back(std::move(level));
-  }
-  return levels;
-}
-
-std::vector<SolvedLevel> solve_levels(const std::vector<Level>& levels,
-                                      const std::vector<ContactPoint>& points,
-                                      const std::function<void(const SolvedLevel&)>& after_each) {
-  std::vector<SolvedLevel> solved(levels.size());
-  std::mutex telling;
-  for_each_in_parallel(levels.size(), [&](std::size_t turn) {
-    const std::size_t i = levels.size() - 1 - turn;
-    const auto started = std::chrono::steady_clock::now();
-    const solver::Finger finger(levels[i].model);
-    solved[i].level = levels[i];
-    for (const auto& point : points) {
-      solved[i].results.push_back(finger.solve(point.H_m, point.mu, point.e_star));
-    }
-    solved[i].wall_s =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
-    const std::lock_guard lock(telling);
-    after_each(solved[i]);
-  });
-  return solved;
 }
 
 PointConvergence convergence_of(std::span<const CaseResult> results, double highest_order) {

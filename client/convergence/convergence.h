@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstddef>
-#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -10,7 +9,6 @@
 #include "client/convergence/contact_changes.h"
 #include "client/convergence/richardson.h"
 #include "worker/solver/model/case_result.h"
-#include "worker/solver/model/parameters.h"
 
 namespace oblique::client {
 
@@ -28,43 +26,6 @@ struct Output {
 
 /// fn_peak, ft_peak, every major peak, duration, stick, slide, impulses and exit velocity.
 std::vector<Output> outputs_of(const solver::CaseResult& result);
-
-/// One refinement: a model and its name, as "n = 8".
-struct Level {
-  std::string name;
-  solver::ModelParameters model;
-};
-
-/// Meshes from `coarsest` to `finest` elements a link, doubled each time. The steps of the
-/// explicit integrator are those it chooses on each mesh, except that the fall takes the longest
-/// that are safe (its steps are far shorter than its motion asks for, and most of the work); those
-/// of generalized-alpha do not depend on the mesh and stay. Throws InputError unless finest is
-/// coarsest times 4, 8, 16, ...
-std::vector<Level> mesh_levels(const solver::ModelParameters& model, int coarsest, int finest);
-
-/// Steps of contact and fall, both halved each time, from those that the model takes at e_star;
-/// where it steps shorter in restitution, the shorter step throughout.
-std::vector<Level> step_levels(const solver::ModelParameters& model, double e_star, int halvings);
-
-struct ContactPoint {
-  double H_m;
-  double mu;
-  double e_star;
-};
-
-/// What one level gave, in the order of the points.
-struct SolvedLevel {
-  Level level;
-  std::vector<solver::CaseResult> results;
-  double wall_s = 0.0;  ///< fall and contacts
-};
-
-/// Solves `points` on every level, the levels side by side on the cores of this machine, the last
-/// (dearest) first. `after_each` is called as each level ends, from its thread, one call at a time.
-/// Throws what the solver throws.
-std::vector<SolvedLevel> solve_levels(const std::vector<Level>& levels,
-                                      const std::vector<ContactPoint>& points,
-                                      const std::function<void(const SolvedLevel&)>& after_each);
 
 /// One output over the levels.
 struct OutputConvergence {

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/convergence/convergence.h"
+#include "client/convergence/levels.h"
 
 namespace oblique::client {
 

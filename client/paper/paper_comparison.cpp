@@ -144,8 +144,7 @@ DifferenceSummary summary_of(const std::vector<Difference>& differences) {
 }
 
 std::vector<std::optional<OwnCase>> solved_cases(const PublishedTable& table,
-                                                 const solver::ModelParameters& model) {
-  const solver::Finger finger(model);
+                                                 const solver::Finger& finger) {
   std::vector<std::optional<OwnCase>> own(table.cases.size());
   std::size_t next = 0;
   std::string error;

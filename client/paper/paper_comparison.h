@@ -10,7 +10,7 @@
 #include "client/paper/published_table.h"
 #include "proto/oblique.pb.h"
 #include "worker/solver/model/case_result.h"
-#include "worker/solver/model/parameters.h"
+#include "worker/solver/solve.h"
 
 namespace oblique::client {
 
@@ -54,9 +54,9 @@ struct DifferenceSummary {
 };
 DifferenceSummary summary_of(const std::vector<Difference>& differences);
 
-/// Solves the cases with `model`. Throws solver::SolveError when one cannot be solved.
+/// Solves the cases with `finger`. Throws solver::SolveError when one cannot be solved.
 std::vector<std::optional<OwnCase>> solved_cases(const PublishedTable& table,
-                                                 const solver::ModelParameters& model);
+                                                 const solver::Finger& finger);
 
 /// Reads the cases from rows of `runs` with the columns point, H, mu, e, peaks, phases,
 /// stick_total_s and major_mode. A case without a solved point is nothing, and phases from the

@@ -82,7 +82,7 @@ class Residuals : public Eigen::DenseFunctor<double> {
 
 std::vector<Difference> differences_of(const PublishedTable& published,
                                        const solver::ModelParameters& model) {
-  return compare(published, solved_cases(published, model));
+  return compare(published, solved_cases(published, solver::Finger(model)));
 }
 
 FitStep fit_parameters(const PublishedTable& published, const solver::ModelParameters& start,

@@ -1,8 +1,5 @@
 #include "client/service/watching.h"
 
-#include <sys/ioctl.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <chrono>
 #include <iostream>
@@ -11,6 +8,7 @@
 
 #include "client/output/printer.h"
 #include "client/output/progress.h"
+#include "client/output/terminal.h"
 #include "client/service/watch_teller.h"
 #include "client/sql/sql_expression.h"
 #include "proto/program/exit_code.h"
@@ -27,14 +25,6 @@ Seconds pause_after(Seconds elapsed) {
   constexpr Seconds kShortest{0.004};
   constexpr Seconds kLongest{0.5};
   return std::clamp(elapsed / 40, kShortest, kLongest);
-}
-
-// Of the terminal that progress is drawn on.
-std::size_t terminal_columns() {
-  constexpr std::size_t kUnlessTold = 80;
-  struct winsize size {};
-  return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col
-                                                                         : kUnlessTold;
 }
 
 void tell_failures(const protocol::StudyStatus& status,
@@ -57,7 +47,7 @@ void tell_line(const std::string& sentence) {
 }
 
 protocol::StudyStatus watch_study(const AskStatus& ask, protocol::StopSignals& stop) {
-  Progress progress(std::cerr, isatty(STDERR_FILENO) == 1, terminal_columns);
+  Progress progress(std::cerr, draws_on_terminal(), terminal_columns);
   const Tell tell = [&progress](const std::string& sentence) {
     progress.finish();
     tell_line(sentence);

@@ -8,6 +8,8 @@
 
 #include "client/convergence/convergence.h"
 #include "client/convergence/convergence_report.h"
+#include "client/convergence/levels.h"
+#include "client/output/work_line.h"
 #include "client/study/point_flags.h"
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
@@ -50,14 +52,35 @@ std::vector<ContactPoint> points_of(const protocol::PointTable& table) {
   return points;
 }
 
-std::vector<SolvedLevel> solved(const char* what, const std::vector<Level>& levels,
-                                const std::vector<ContactPoint>& points) {
+void tell_levels(const char* what, const std::vector<Level>& levels) {
   std::cerr << fmt::format("{}: {} levels, {} to {}\n", what, levels.size(), levels.front().name,
                            levels.back().name);
-  return solve_levels(levels, points, [what](const SolvedLevel& level) {
-    std::cerr << fmt::format("{}: {} solved in {} s\n", what, level.level.name,
-                             solver::fixed_number(level.wall_s, 1));
+}
+
+std::vector<SolvedLevel> solved(const std::vector<Level>& levels,
+                                const std::vector<ContactPoint>& points, WorkLine& line) {
+  return solve_levels(levels, points, line, [&line](const SolvedLevel& level) {
+    line.tell(
+        fmt::format("{} solved in {} s", level.level.name, solver::fixed_number(level.wall_s, 1)));
   });
+}
+
+/// One point refined in both ways, all levels side by side.
+struct BothRefinements {
+  Refinement mesh;
+  Refinement step;
+};
+
+BothRefinements refined(const std::vector<Level>& meshes, const std::vector<Level>& steps,
+                        const std::vector<ContactPoint>& points, WorkLine& line) {
+  tell_levels("mesh", meshes);
+  tell_levels("step", steps);
+  auto levels = meshes;
+  levels.insert(levels.end(), steps.begin(), steps.end());
+  auto both = solved(levels, points, line);
+  const auto end_of_meshes = both.begin() + static_cast<std::ptrdiff_t>(meshes.size());
+  return {.mesh = refinement_of("mesh", {both.begin(), end_of_meshes}, 0),
+          .step = refinement_of("step", {end_of_meshes, both.end()}, 0)};
 }
 
 std::string shown(const ContactPoint& point) {
@@ -69,7 +92,7 @@ nlohmann::ordered_json json_of_point(const ContactPoint& point) {
   return {{"H", point.H_m}, {"mu", point.mu}, {"e", point.e_star}};
 }
 
-int converge(const ConvergeFlags& flags, const protocol::PointTable& table) {
+int converge(const ConvergeFlags& flags, const protocol::PointTable& table, WorkLine& line) {
   const auto points = points_of(table);
   if (points.size() != 1) {
     throw solver::InputError(fmt::format(
@@ -87,8 +110,7 @@ int converge(const ConvergeFlags& flags, const protocol::PointTable& table) {
   const int finest = flags.finest == 0 ? std::max(kFinest, 4 * flags.coarsest) : flags.finest;
   const auto meshes = mesh_levels(model, flags.coarsest, finest);
   const auto steps = step_levels(model, points[0].e_star, flags.halvings);
-  const auto step = refinement_of("step", solved("step", steps, points), 0);
-  const auto mesh = refinement_of("mesh", solved("mesh", meshes, points), 0);
+  const auto [mesh, step] = refined(meshes, steps, points, line);
   if (flags.json) {
     auto json = json_of_point(points[0]);
     json["mesh"] = json_of(mesh);
@@ -117,14 +139,16 @@ std::optional<std::size_t> choice_of(const std::vector<Refinement>& refinements,
   return chosen;
 }
 
-int mesh_study(const ConvergeFlags& flags, const protocol::PointTable& table) {
+int mesh_study(const ConvergeFlags& flags, const protocol::PointTable& table, WorkLine& line) {
   if (table.models() != 1) {
     throw solver::InputError(
         fmt::format("the flags make {} models, and a mesh study takes one", table.models()));
   }
   const auto points = points_of(table);
   const int finest = flags.finest == 0 ? kStudyFinest : flags.finest;
-  const auto levels = solved("mesh", mesh_levels(table.model(0), flags.coarsest, finest), points);
+  const auto meshes = mesh_levels(table.model(0), flags.coarsest, finest);
+  tell_levels("mesh", meshes);
+  const auto levels = solved(meshes, points, line);
   std::vector<Refinement> refinements;
   for (std::size_t i = 0; i < points.size(); ++i) {
     refinements.push_back(refinement_of("mesh", levels, i));
@@ -160,7 +184,8 @@ int converge_of_flags(ConvergeFlags flags) {
     flags.points.axes.try_emplace("e", "1");
   }
   const protocol::PointTable table(recipe_of_flags(flags.points, tip_reach()));
-  return flags.mesh_study ? mesh_study(flags, table) : converge(flags, table);
+  WorkLine line;
+  return flags.mesh_study ? mesh_study(flags, table, line) : converge(flags, table, line);
 }
 
 }  // namespace

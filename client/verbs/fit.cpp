@@ -1,3 +1,4 @@
+#include <atomic>
 #include <cmath>
 #include <iostream>
 #include <memory>
@@ -7,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/output/printer.h"
+#include "client/output/work_line.h"
 #include "client/paper/parameter_fit.h"
 #include "client/verbs/verbs.h"
 #include "proto/suggestion.h"
@@ -42,17 +44,16 @@ std::string heading(std::string_view name) {
   return key.unit.empty() ? std::string(name) : fmt::format("{} [{}]", name, key.unit);
 }
 
-void tell(const FitStep& step) {
-  std::cerr << fmt::format("iteration {:>2}:", step.iteration);
+std::string shown(const FitStep& step) {
+  std::string text = fmt::format("iteration {:>2}:", step.iteration);
   for (const auto name : kFittedKeys) {
-    std::cerr << fmt::format("  {} = {}", name,
-                             readable_number(fitted_key(name).get(step.model), 5));
+    text += fmt::format("  {} = {}", name, readable_number(fitted_key(name).get(step.model), 5));
   }
-  std::cerr << fmt::format("  rms {} %", fixed_number(step.summary.rms_percent, 3));
+  text += fmt::format("  rms {} %", fixed_number(step.summary.rms_percent, 3));
   if (step.summary.missing > 0) {
-    std::cerr << fmt::format(" ({} numbers missing)", step.summary.missing);
+    text += fmt::format(" ({} numbers missing)", step.summary.missing);
   }
-  std::cerr << '\n';
+  return text;
 }
 
 double percent_from(double value, double reference) {
@@ -103,11 +104,24 @@ void print_json(const FitStep& end) {
   std::cout << json.dump(2) << '\n';
 }
 
+FitStep fitted(const solver::ModelParameters& start) {
+  std::atomic<int> iteration{0};
+  WorkLine line;
+  const auto fitting = line.begin([&] {
+    return fmt::format("iteration {}, falls on {} elements a link", iteration.load(),
+                       start.elements_per_link);
+  });
+  return fit_parameters(published_table(), start, [&](const FitStep& step) {
+    line.tell(shown(step));
+    iteration = step.iteration + 1;
+  });
+}
+
 int fit(const FitFlags& flags) {
   auto start = solver::preset(flags.from);
   start.elements_per_link = flags.elements_per_link;
   solver::validate(start);
-  const auto end = fit_parameters(published_table(), start, tell);
+  const auto end = fitted(start);
   if (flags.json) {
     print_json(end);
   } else {

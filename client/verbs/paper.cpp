@@ -7,11 +7,13 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/output/printer.h"
+#include "client/output/work_line.h"
 #include "client/paper/paper_comparison.h"
 #include "client/service/source.h"
 #include "client/service/watching.h"
 #include "client/sql/sql_expression.h"
 #include "client/verbs/printed_rows.h"
+#include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
 #include "proto/suggestion.h"
 #include "worker/solver/model/parameters.h"
@@ -50,7 +52,11 @@ std::vector<std::optional<OwnCase>> cases_of(const PublishedTable& published,
   const auto model = solver::preset(flags.preset);
   std::cerr << fmt::format("{} impacts of the preset {}, {} elements a link\n",
                            published.cases.size(), flags.preset, model.elements_per_link);
-  return solved_cases(published, model);
+  const solver::Finger finger(model);
+  WorkLine line;
+  static_cast<void>(largest_drop_m(finger, line));
+  const auto touching = line.begin(fmt::format("{} contacts", published.cases.size()));
+  return solved_cases(published, finger);
 }
 
 int paper(const PaperFlags& flags) {

@@ -5,9 +5,14 @@
 #include <string>
 #include <utility>
 
+#include <unistd.h>
+
+#include <spdlog/fmt/fmt.h>
+
 #include "client/output/case_report.h"
 #include "client/output/mesh_note.h"
 #include "client/output/trace_table.h"
+#include "client/output/work_line.h"
 #include "client/study/point_flags.h"
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
@@ -63,6 +68,8 @@ class TraceOutput {
   }
 
   bool is_standard_output() const { return where_ == "-"; }
+  /// Whether its rows come to where progress is shown.
+  bool fills_terminal() const { return is_standard_output() && isatty(STDOUT_FILENO) == 1; }
   void begin(const solver::ModelParameters& model, bool shape) {
     const std::size_t links = model.lengths_m.size();
     const auto elements = links * static_cast<std::size_t>(model.elements_per_link);
@@ -83,6 +90,17 @@ class TraceOutput {
   std::ofstream file_;
 };
 
+solver::CaseResult solved(const solver::Finger& finger, const protocol::Point& point,
+                          const solver::Tracing& tracing, bool is_terminal_taken) {
+  WorkLineSettings settings;
+  settings.on_terminal = settings.on_terminal && !is_terminal_taken;
+  WorkLine line(std::cerr, settings);
+  static_cast<void>(largest_drop_m(finger, line));
+  const auto touching =
+      line.begin(fmt::format("on {} elements a link: contact", finger.model().elements_per_link));
+  return finger.solve(point.H_m, point.mu, point.e_star, tracing);
+}
+
 int solve(const SolveFlags& flags) {
   const protocol::PointTable table(recipe_of_flags(flags.points, tip_reach()));
   check_one_point(table);
@@ -96,7 +114,7 @@ int solve(const SolveFlags& flags) {
     tracing.sink = [&trace](const solver::TraceRow& row) { trace->add(row); };
     tracing.with_shape = flags.trace_shape;
   }
-  const auto result = finger.solve(point.H_m, point.mu, point.e_star, tracing);
+  const auto result = solved(finger, point, tracing, trace && trace->fills_terminal());
   if (flags.json) {
     std::cout << json_of(result).dump(2) << '\n';
   } else {

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "client/convergence/convergence_report.h"
+#include "client/convergence/levels.h"
 #include "worker/solver/solve.h"
 
 namespace oblique::client {
@@ -187,8 +188,10 @@ TEST(Convergence, NamesTheGrazingTurnThatComesAndGoesWithTheStep) {
 TEST(Convergence, OfTheExplicitStepIsOfOrderFourOnARealImpact) {
   solver::ModelParameters model;
   model.elements_per_link = 2;
+  std::ostringstream shown;
+  WorkLine line(shown);
   const auto levels =
-      solve_levels(step_levels(model, 1.0, 2), {{1.0, 0.4, 1.0}}, [](const SolvedLevel&) {});
+      solve_levels(step_levels(model, 1.0, 2), {{1.0, 0.4, 1.0}}, line, [](const SolvedLevel&) {});
   const auto refinement = refinement_of("step", levels, 0);
   EXPECT_TRUE(converges(refinement));
   // The exit speed converges last and is far above rounding; 3.8 is what is asked of the method.
