@@ -143,22 +143,24 @@ DifferenceSummary summary_of(const std::vector<Difference>& differences) {
   return summary;
 }
 
-std::vector<std::optional<OwnCase>> solved_cases(const PublishedTable& table,
-                                                 const solver::Finger& finger) {
-  std::vector<std::optional<OwnCase>> own(table.cases.size());
+std::vector<std::vector<std::optional<OwnCase>>> solved_cases(
+    const PublishedTable& table, std::span<const solver::Finger> fingers) {
+  const std::size_t cases = table.cases.size();
+  std::vector own(fingers.size(), std::vector<std::optional<OwnCase>>(cases));
   std::size_t next = 0;
   std::string error;
-  finger.solve_points(
-      [&]() -> std::optional<solver::PointRequest> {
-        if (next == table.cases.size()) {
+  solver::solve_points(
+      [&]() -> std::optional<solver::FingerPoint> {
+        if (next == fingers.size() * cases) {
           return std::nullopt;
         }
-        const auto& asked = table.cases[next];
-        return solver::PointRequest{next++, asked.H_m, asked.mu, asked.e_star};
+        const auto& asked = table.cases[next % cases];
+        const auto& finger = fingers[next / cases];
+        return solver::FingerPoint{finger, {next++, asked.H_m, asked.mu, asked.e_star}};
       },
       [&](solver::PointOutcome&& outcome) {
         if (outcome.result) {
-          own[outcome.number] = own_case(*outcome.result);
+          own[outcome.number / cases][outcome.number % cases] = own_case(*outcome.result);
         } else {
           error = outcome.error;
         }

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <optional>
 #include <ostream>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -54,9 +55,10 @@ struct DifferenceSummary {
 };
 DifferenceSummary summary_of(const std::vector<Difference>& differences);
 
-/// Solves the cases with `finger`. Throws solver::SolveError when one cannot be solved.
-std::vector<std::optional<OwnCase>> solved_cases(const PublishedTable& table,
-                                                 const solver::Finger& finger);
+/// Solves the cases with each finger, all side by side: a list for each. Throws solver::SolveError
+/// when one cannot be solved.
+std::vector<std::vector<std::optional<OwnCase>>> solved_cases(
+    const PublishedTable& table, std::span<const solver::Finger> fingers);
 
 /// Reads the cases from rows of `runs` with the columns point, H, mu, e, peaks, phases,
 /// stick_total_s and major_mode. A case without a solved point is nothing, and phases from the

@@ -1,12 +1,13 @@
 #include "client/paper/parameter_fit.h"
 
 #include <cmath>
-#include <future>
 
 #include <spdlog/fmt/fmt.h>
 #include <unsupported/Eigen/LevenbergMarquardt>
 
+#include "worker/solver/fall_cache.h"
 #include "worker/solver/model/errors.h"
+#include "worker/solver/solve.h"
 
 namespace oblique::client {
 namespace {
@@ -24,10 +25,12 @@ constexpr double kDifferenceStep = 1e-4;
 /// r_i(x) = ours_i / published_i - 1 with the parameters start exp(x).
 class Residuals : public Eigen::DenseFunctor<double> {
  public:
-  Residuals(const PublishedTable& published, const solver::ModelParameters& start, int values)
+  Residuals(const PublishedTable& published, const solver::ModelParameters& start, int values,
+            solver::FallCache& falls)
       : Eigen::DenseFunctor<double>(int{kFittedKeys.size()}, values),
         published_(published),
-        start_(start) {}
+        start_(start),
+        falls_(falls) {}
 
   solver::ModelParameters model_at(const VectorXd& x) const {
     auto model = start_;
@@ -48,27 +51,22 @@ class Residuals : public Eigen::DenseFunctor<double> {
   }
 
   int operator()(const VectorXd& x, VectorXd& residuals) const {
-    residuals = of(differences_of(published_, model_at(x)));
+    const solver::ModelParameters model = model_at(x);
+    residuals = of(differences_of(published_, {&model, 1}, falls_).front());
     return 0;
   }
 
   int df(const VectorXd& x, MatrixXd& jacobian) const {
-    std::vector<VectorXd> at(kFittedKeys.size() + 1);  // the last one undisturbed
-    std::vector<std::future<void>> solved;
-    for (std::size_t i = 0; i < at.size(); ++i) {
-      solved.push_back(std::async(std::launch::async, [&, i] {
-        VectorXd disturbed = x;
-        if (i < kFittedKeys.size()) {
-          disturbed[static_cast<Index>(i)] += kDifferenceStep;
-        }
-        (*this)(disturbed, at[i]);
-      }));
+    std::vector<solver::ModelParameters> models{model_at(x)};
+    for (Index i = 0; i < Index{kFittedKeys.size()}; ++i) {
+      VectorXd disturbed = x;
+      disturbed[i] += kDifferenceStep;
+      models.push_back(model_at(disturbed));
     }
-    for (auto& each : solved) {
-      each.get();
-    }
+    const auto differences = differences_of(published_, models, falls_);
+    const VectorXd here = of(differences.front());
     for (std::size_t i = 0; i < kFittedKeys.size(); ++i) {
-      jacobian.col(static_cast<Index>(i)) = (at[i] - at.back()) / kDifferenceStep;
+      jacobian.col(static_cast<Index>(i)) = (of(differences[i + 1]) - here) / kDifferenceStep;
     }
     return 0;
   }
@@ -76,24 +74,39 @@ class Residuals : public Eigen::DenseFunctor<double> {
  private:
   const PublishedTable& published_;
   const solver::ModelParameters& start_;
+  solver::FallCache& falls_;
 };
 
 }  // namespace
 
-std::vector<Difference> differences_of(const PublishedTable& published,
-                                       const solver::ModelParameters& model) {
-  return compare(published, solved_cases(published, solver::Finger(model)));
+std::vector<std::vector<Difference>> differences_of(const PublishedTable& published,
+                                                    std::span<const solver::ModelParameters> models,
+                                                    solver::FallCache& falls) {
+  std::vector<solver::Finger> fingers;
+  for (std::size_t i = 0; i < models.size(); ++i) {
+    const auto fall = falls.fall(models[i], models.subspan(i));
+    if (!fall.fallen) {
+      throw solver::SolveError(fall.error);
+    }
+    fingers.emplace_back(models[i], fall.fallen);
+  }
+  std::vector<std::vector<Difference>> differences;
+  for (const auto& cases : solved_cases(published, fingers)) {
+    differences.push_back(compare(published, cases));
+  }
+  return differences;
 }
 
 FitStep fit_parameters(const PublishedTable& published, const solver::ModelParameters& start,
                        const std::function<void(const FitStep&)>& after_each) {
-  FitStep step{.iteration = 0,
-               .model = start,
-               .differences = differences_of(published, start),
-               .summary = {}};
+  solver::FallCache falls;
+  const auto differences_at = [&](const solver::ModelParameters& model) {
+    return differences_of(published, {&model, 1}, falls).front();
+  };
+  FitStep step{.iteration = 0, .model = start, .differences = differences_at(start), .summary = {}};
   step.summary = summary_of(step.differences);
   after_each(step);
-  Residuals residuals(published, start, static_cast<int>(step.differences.size()));
+  Residuals residuals(published, start, static_cast<int>(step.differences.size()), falls);
   Eigen::LevenbergMarquardt<Residuals> method(residuals);
   method.setXtol(kSmallestStep);
   method.setFtol(kSmallestGain);
@@ -108,7 +121,7 @@ FitStep fit_parameters(const PublishedTable& published, const solver::ModelParam
     status = method.minimizeOneStep(x);
     step = {.iteration = step.iteration + 1,
             .model = residuals.model_at(x),
-            .differences = differences_of(published, residuals.model_at(x)),
+            .differences = differences_at(residuals.model_at(x)),
             .summary = {}};
     step.summary = summary_of(step.differences);
     after_each(step);

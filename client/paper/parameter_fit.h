@@ -2,11 +2,13 @@
 
 #include <array>
 #include <functional>
+#include <span>
 #include <string_view>
 #include <vector>
 
 #include "client/paper/paper_comparison.h"
 #include "client/paper/published_table.h"
+#include "worker/solver/fall_cache.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::client {
@@ -22,10 +24,11 @@ struct FitStep {
   DifferenceSummary summary;
 };
 
-/// Every published number beside what `model` gives. Throws solver::InputError or SolveError when
-/// the model cannot be solved.
-std::vector<Difference> differences_of(const PublishedTable& published,
-                                       const solver::ModelParameters& model);
+/// Every published number beside what each of the models gives. Falls that `falls` does not keep
+/// are solved together. Throws solver::InputError or SolveError when a model cannot be solved.
+std::vector<std::vector<Difference>> differences_of(const PublishedTable& published,
+                                                    std::span<const solver::ModelParameters> models,
+                                                    solver::FallCache& falls);
 
 /// Fits the parameters of kFittedKeys, from where `start` has them, so that the sum of squared
 /// relative differences from all published numbers is least (Levenberg-Marquardt on the logarithms

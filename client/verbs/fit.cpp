@@ -27,7 +27,7 @@ constexpr const char* kFitExamples = R"(Examples:
   oblique fit --elements-per-link 5       the same on another mesh, which fits far worse
   oblique fit --json > fit.json
 
-Some ten falls an iteration are solved on all cores of this machine: some seconds in all.)";
+Three falls an iteration, those of A and I side by side: some seconds in all.)";
 
 struct FitFlags {
   std::string from{"printed"};

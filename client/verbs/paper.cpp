@@ -56,7 +56,7 @@ std::vector<std::optional<OwnCase>> cases_of(const PublishedTable& published,
   WorkLine line;
   static_cast<void>(largest_drop_m(finger, line));
   const auto touching = line.begin(fmt::format("{} contacts", published.cases.size()));
-  return solved_cases(published, finger);
+  return solved_cases(published, {&finger, 1}).front();
 }
 
 int paper(const PaperFlags& flags) {
