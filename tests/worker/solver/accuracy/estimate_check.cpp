@@ -19,7 +19,7 @@
 #include "worker/solver/estimate.h"
 #include "worker/solver/solve.h"
 
-namespace oblique::bench {
+namespace oblique::accuracy {
 namespace {
 
 using solver::CaseResult;
@@ -234,14 +234,14 @@ void add_flags(CLI::App& app, Settings& settings) {
 }
 
 }  // namespace
-}  // namespace oblique::bench
+}  // namespace oblique::accuracy
 
 int main(int argc, char** argv) {
   CLI::App app("How often true errors of contacts are within the estimated ones");
-  oblique::bench::Settings settings;
+  oblique::accuracy::Settings settings;
   app.option_defaults()->always_capture_default();
-  oblique::bench::add_flags(app, settings);
+  oblique::accuracy::add_flags(app, settings);
   CLI11_PARSE(app, argc, argv);
-  oblique::bench::check(settings);
+  oblique::accuracy::check(settings);
   return 0;
 }
