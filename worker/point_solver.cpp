@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "proto/result_message.h"
+#include "worker/solver/estimate.h"
 #include "worker/solver/model/fall_model.h"
 #include "worker/solver/model/result_fields.h"
 
@@ -139,12 +140,29 @@ class PointSolver::BatchPoints {
   std::uint64_t model_ = 0;                   ///< its model's number
 };
 
+std::vector<solver::FallOutcome> PointSolver::falls_of(
+    std::span<const solver::ModelParameters> models) {
+  std::vector<solver::FallOutcome> falls;
+  for (std::size_t i = 0; i < models.size(); ++i) {
+    falls.push_back(falls_.fall(models[i], models.subspan(i + 1)));
+  }
+  return falls;
+}
+
 void PointSolver::solve(const Batch& batch, const BatchSolver::NextPoint& next,
                         const BatchSolver::TakeResult& take) {
   BatchPoints points(falls_, batch, next, take);
+  const auto next_of_run = [&] { return points.next(); };
+  const auto take_outcome = [&](solver::PointOutcome&& outcome) { take(message_of(outcome)); };
   while (points.begin_run()) {
-    solver::solve_points([&] { return points.next(); },
-                         [&](solver::PointOutcome&& outcome) { take(message_of(outcome)); });
+    if (batch.points->wants_errors()) {
+      solver::solve_points_with_errors(
+          next_of_run,
+          [this](std::span<const solver::ModelParameters> models) { return falls_of(models); },
+          take_outcome);
+    } else {
+      solver::solve_points(next_of_run, take_outcome);
+    }
   }
 }
 

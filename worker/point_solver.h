@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
+#include <vector>
 
 #include "worker/batch.h"
 #include "worker/batch_solver.h"
@@ -21,12 +23,16 @@ class PointSolver {
   /// Solves the points that `next` gives, each of its own model, side by side, and hands each
   /// result to `take`. A fall that a point misses is solved beside those that later points of the
   /// batch miss. A point that has no answer, one whose fall has none, and one with a value that is
-  /// not finite, becomes a failed point with the reason; nothing is thrown for it.
+  /// not finite, becomes a failed point with the reason; nothing is thrown for it. Results have
+  /// estimated errors where the study wants them.
   void solve(const Batch& batch, const BatchSolver::NextPoint& next,
              const BatchSolver::TakeResult& take);
 
  private:
   class BatchPoints;
+
+  /// One for each model; those that are missing are solved side by side.
+  std::vector<solver::FallOutcome> falls_of(std::span<const solver::ModelParameters> models);
 
   solver::FallCache falls_;
 };

@@ -1,6 +1,7 @@
 #include "client/output/case_report.h"
 
 #include <algorithm>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -99,6 +100,28 @@ void print_reactions(std::ostream& out, const std::vector<solver::ReactionPeak>&
   }
 }
 
+/// Each as a percentage of its scale, which README.md of worker/solver names.
+void print_errors(std::ostream& out, const solver::ErrorEstimate& errors) {
+  if (!errors.mode_same) {
+    return;
+  }
+  out << "errors      estimated [%]:";
+  const char* separator = " ";
+  const auto add = [&](std::string_view name, const std::optional<double>& error) {
+    out << separator << name << ' ' << (error ? readable_number(100.0 * *error, 2) : "-");
+    separator = ", ";
+  };
+  add("F_n", errors.fn_peak);
+  add("F_t", errors.ft_peak);
+  add("contact", errors.duration);
+  add("stick", errors.stick_total);
+  add("slide", errors.slide);
+  add("impulses", errors.impulse_n);
+  add("tangential", errors.impulse_t);
+  add("exit velocity", errors.v_out);
+  out << (*errors.mode_same == 1 ? "; the same mode" : "; another mode") << " on half the mesh\n";
+}
+
 }  // namespace
 
 ordered_json json_of(const CaseResult& result) {
@@ -130,7 +153,9 @@ void print_summary(std::ostream& out, const CaseResult& result) {
   print_reactions(out, result.reaction_peaks);
   const auto& energy = result.energy;
   const auto& report = result.solver;
-  out << fmt::format("\nslide       P slides {} mm along the ground\n",
+  out << '\n';
+  print_errors(out, result.errors);
+  out << fmt::format("slide       P slides {} mm along the ground\n",
                      fixed_number(result.slide_m * kMilli, 5))
       << fmt::format("impulses    normal {}, tangential {} N s\n",
                      fixed_number(result.impulse_n_Ns, 6), fixed_number(result.impulse_t_Ns, 6))

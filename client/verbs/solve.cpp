@@ -17,6 +17,7 @@
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
 #include "proto/recipe/point_table.h"
+#include "worker/solver/estimate.h"
 #include "worker/solver/solve.h"
 
 namespace oblique::client {
@@ -25,6 +26,7 @@ namespace {
 constexpr const char* kSolveExamples = R"(Examples:
   oblique solve --H 1 --mu 0.4 --e 1
   oblique solve --H 1 --mu 1.2 --e 0.8 --json
+  oblique solve --H 1 --mu 1.2 --e 0.8 --errors
   oblique solve --H 1 --mu 0.4 --e 1 --trace impact.csv --trace-shape
   oblique solve --H 1 --mu 0.4 --e 1 --trace - > impact.csv
   oblique solve --H 0.6 --mu 0.4 --e 1 --preset converged --lengths 0.4,0.4,0.2)";
@@ -34,7 +36,21 @@ struct SolveFlags {
   bool json = false;
   std::optional<std::string> trace;  // where to; "-" is standard output
   bool trace_shape = false;
+  bool errors = false;
 };
+
+/// Nothing when the coarser solution of the point has no answer.
+solver::ErrorEstimate errors_of(const solver::ModelParameters& model,
+                                const solver::CaseResult& result) {
+  try {
+    const solver::Finger companion(solver::companion_model(model));
+    return solver::estimated_errors(model, result,
+                                    companion.solve(result.H_m, result.mu, result.e_star));
+  } catch (const std::exception& error) {
+    std::cerr << "Errors cannot be estimated: on half the mesh, " << error.what() << '\n';
+    return {};
+  }
+}
 
 void check_one_point(const protocol::PointTable& table) {
   if (table.size() == 1) {
@@ -114,7 +130,10 @@ int solve(const SolveFlags& flags) {
     tracing.sink = [&trace](const solver::TraceRow& row) { trace->add(row); };
     tracing.with_shape = flags.trace_shape;
   }
-  const auto result = solved(finger, point, tracing, trace && trace->fills_terminal());
+  auto result = solved(finger, point, tracing, trace && trace->fills_terminal());
+  if (flags.errors) {
+    result.errors = errors_of(finger.model(), result);
+  }
   if (flags.json) {
     std::cout << json_of(result).dump(2) << '\n';
   } else {
@@ -141,6 +160,8 @@ void add_solve(CLI::App& app, Command& command) {
   verb->add_flag("--trace-shape", flags->trace_shape,
                  "add the positions of the chain's nodes to the trace")
       ->needs(trace);
+  verb->add_flag("--errors", flags->errors,
+                 "estimate errors: solve the point also on half the mesh and at twice the step");
   add_point_flags(*verb, flags->points, FlagValues::kOne);
   verb->callback([flags, &command] { command = [flags] { return solve(*flags); }; });
 }

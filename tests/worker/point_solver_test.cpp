@@ -191,5 +191,22 @@ TEST(PointSolverTest, AFallThatFailsIsSolvedOnceAndFailsThePointsOfItsModelsAlon
   EXPECT_EQ(falls.count(), 2U);
 }
 
+TEST(PointSolverTest, ResultsHaveErrorsWhereTheStudyWantsThemAndElseTheSameNumbers) {
+  protocol::Recipe recipe = recipe_with_models(3, {7e10, 6e10}, {2.7e7, 1e7});
+  const auto without = solved(batch_of(recipe));
+  recipe.set_errors(true);
+  const auto with = solved(batch_of(recipe));
+  ASSERT_EQ(with.size(), without.size());
+  for (std::size_t i = 0; i < with.size(); ++i) {
+    solver::CaseResult result = protocol::from_message(with[i]);
+    EXPECT_TRUE(result.errors.mode_same);
+    EXPECT_TRUE(result.errors.v_out);
+    EXPECT_FALSE(protocol::from_message(without[i]).errors.mode_same);
+    result.errors = {};
+    result.solver.wall_s = protocol::from_message(without[i]).solver.wall_s;
+    EXPECT_EQ(protocol::to_message(i, result).SerializeAsString(), without[i].SerializeAsString());
+  }
+}
+
 }  // namespace
 }  // namespace oblique::worker

@@ -1,9 +1,12 @@
 #include "worker/solver/estimate.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <numbers>
-#include <optional>
+#include <utility>
 
 namespace oblique::solver {
 namespace {
@@ -53,6 +56,113 @@ double factor(const ModelParameters& model, int order) {
   return (1.0 + unresolved) / (std::pow(ratio, order) - 1.0);
 }
 
+/// Points that are solved by their own models first and then by the companions of these: chains of
+/// two shapes share no lanes.
+class EstimatedGroup {
+ public:
+  using Source = std::function<std::optional<FingerPoint>()>;
+  using Sink = std::function<void(PointOutcome&&)>;
+
+  EstimatedGroup(const Source& source, const Sink& sink) : source_(source), sink_(sink) {}
+
+  /// Solves the next points of the source, as many as a group has. Hands those that fail on.
+  void solve() {
+    solve_points([this] { return next(); },
+                 [this](PointOutcome&& outcome) {
+                   Waiting& waiting = points_[outcome.number];
+                   waiting.result = std::move(outcome.result);
+                   if (!waiting.result) {
+                     outcome.number = waiting.point.number;
+                     sink_(std::move(outcome));
+                   }
+                 });
+  }
+  /// Solves their companions, and hands all results on.
+  void estimate(const FallSource& companion_falls) {
+    const auto companions = fingers_of(companion_falls);
+    std::size_t last = 0;
+    solve_points([&] { return next_companion(companions, last); },
+                 [this](PointOutcome&& companion) {
+                   Waiting& waiting = points_[companion.number];
+                   if (companion.result) {
+                     waiting.result->errors = estimated_errors(models_[waiting.model],
+                                                               *waiting.result, *companion.result);
+                   }
+                   hand_on(waiting);
+                 });
+  }
+  bool source_has_ended() const { return source_has_ended_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::size_t kMostPoints = 256;
+  static constexpr std::chrono::seconds kLongest{1};
+
+  struct Waiting {
+    std::size_t model;
+    PointRequest point;
+    std::optional<CaseResult> result;
+  };
+
+  std::optional<FingerPoint> next() {
+    if (points_.size() >= kMostPoints || Clock::now() - begun_ > kLongest) {
+      return std::nullopt;
+    }
+    auto point = source_();
+    if (!point) {
+      source_has_ended_ = true;
+      return std::nullopt;
+    }
+    if (models_.empty() || !(models_.back() == point->finger.model())) {
+      models_.push_back(point->finger.model());
+    }
+    points_.push_back({models_.size() - 1, point->point, std::nullopt});
+    point->point.number = points_.size() - 1;
+    return point;
+  }
+
+  /// Nothing for a companion without a fall.
+  std::vector<std::optional<Finger>> fingers_of(const FallSource& companion_falls) const {
+    std::vector<ModelParameters> companions;
+    for (const ModelParameters& model : models_) {
+      companions.push_back(companion_model(model));
+    }
+    const std::vector<FallOutcome> falls = companion_falls(companions);
+    std::vector<std::optional<Finger>> fingers;
+    for (std::size_t i = 0; i < companions.size(); ++i) {
+      fingers.push_back(falls[i].fallen ? std::optional(Finger(companions[i], falls[i].fallen))
+                                        : std::nullopt);
+    }
+    return fingers;
+  }
+
+  std::optional<FingerPoint> next_companion(const std::vector<std::optional<Finger>>& companions,
+                                            std::size_t& last) {
+    for (; last < points_.size(); ++last) {
+      Waiting& waiting = points_[last];
+      if (!waiting.result) {
+        continue;
+      }
+      if (const auto& finger = companions[waiting.model]) {
+        PointRequest request = waiting.point;
+        request.number = last++;
+        return FingerPoint{*finger, request};
+      }
+      hand_on(waiting);
+    }
+    return std::nullopt;
+  }
+
+  void hand_on(Waiting& waiting) { sink_({waiting.point.number, std::move(waiting.result), {}}); }
+
+  const Source& source_;
+  const Sink& sink_;
+  const Clock::time_point begun_ = Clock::now();
+  bool source_has_ended_ = false;
+  std::vector<ModelParameters> models_;  ///< those of points that follow each other once
+  std::vector<Waiting> points_;
+};
+
 /// Nothing where the scale is 0, or the quotient is no number.
 std::optional<double> relative(double difference, double scale) {
   const double quotient = std::abs(difference) / std::abs(scale);
@@ -90,6 +200,18 @@ ErrorEstimate estimated_errors(const ModelParameters& model, const CaseResult& r
                                              result.vn_out_m_s - companion.vn_out_m_s),
                           speed_m_s);
   return errors;
+}
+
+void solve_points_with_errors(const std::function<std::optional<FingerPoint>()>& source,
+                              const FallSource& companion_falls,
+                              const std::function<void(PointOutcome&&)>& sink) {
+  bool has_ended = false;
+  while (!has_ended) {
+    EstimatedGroup group(source, sink);
+    group.solve();
+    group.estimate(companion_falls);
+    has_ended = group.source_has_ended();
+  }
 }
 
 }  // namespace oblique::solver

@@ -1,7 +1,14 @@
 #pragma once
 
+#include <functional>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "worker/solver/falls.h"
 #include "worker/solver/model/case_result.h"
 #include "worker/solver/model/parameters.h"
+#include "worker/solver/solve.h"
 
 namespace oblique::solver {
 
@@ -19,5 +26,16 @@ ModelParameters companion_model(const ModelParameters& model);
 /// duration, of speeds to the speed at touch. Absent where that is 0.
 ErrorEstimate estimated_errors(const ModelParameters& model, const CaseResult& result,
                                const CaseResult& companion);
+
+/// Gives the falls of some models, as solve_falls() does.
+using FallSource = std::function<std::vector<FallOutcome>(std::span<const ModelParameters>)>;
+
+/// As solve_points(), and each result has its estimated errors, where its companion has an answer;
+/// every other number has the same bits. Some hundred points at a time, of about a second at most,
+/// are solved before their companions, whose falls `companion_falls` gives, so outcomes come in
+/// bursts.
+void solve_points_with_errors(const std::function<std::optional<FingerPoint>()>& source,
+                              const FallSource& companion_falls,
+                              const std::function<void(PointOutcome&&)>& sink);
 
 }  // namespace oblique::solver

@@ -2,15 +2,20 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <map>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
+#include "tests/worker/solver/cases/same_bits.h"
 #include "tests/worker/solver/cases/shared_fingers.h"
 #include "worker/solver/chain/chain.h"
 #include "worker/solver/model/fall_model.h"
+#include "worker/solver/model/result_fields.h"
 #include "worker/solver/solve.h"
 #include "worker/solver/step_choice.h"
 
@@ -150,6 +155,101 @@ TEST(EstimatedErrors, TwiceTheEstimateHoldsTheDifferenceToAFinerMesh) {
     }
   }
   EXPECT_GE(held, judged * 9 / 10) << "of " << judged;
+}
+
+using Outcomes = std::map<std::uint64_t, PointOutcome>;
+
+/// What became of the points, each asked for and answered once.
+Outcomes solved_with_errors(const std::vector<FingerPoint>& points, const FallSource& falls) {
+  Outcomes outcomes;
+  std::size_t next = 0;
+  solve_points_with_errors(
+      [&] { return next < points.size() ? std::optional(points[next++]) : std::nullopt; }, falls,
+      [&](PointOutcome&& outcome) {
+        EXPECT_TRUE(outcomes.emplace(outcome.number, std::move(outcome)).second);
+      });
+  EXPECT_EQ(outcomes.size(), points.size());
+  return outcomes;
+}
+
+std::vector<FallOutcome> solved_falls(std::span<const ModelParameters> models) {
+  return solve_falls(models);
+}
+
+/// Points of several models of two elements a link, more than are solved in one go; H = 1.1999 is
+/// reached by none of them.
+std::vector<FingerPoint> mixed_points() {
+  std::vector<ModelParameters> models(3, coarse_model(2));
+  models[1].k_N_m *= 0.5;
+  models[2].E_Pa *= 0.9;
+  const auto falls = solve_falls(models);
+  std::vector<FingerPoint> points;
+  for (std::size_t i = 0; i < models.size(); ++i) {
+    const Finger finger(models[i], falls[i].fallen);
+    for (const double H_m : {0.5, 1.0, 1.1999}) {
+      for (int j = 0; j < 40; ++j) {
+        points.push_back({finger, {1000 + points.size(), H_m, 0.05 * j, 0.8}});
+      }
+    }
+  }
+  return points;
+}
+
+TEST(SolvedWithErrors, EveryOtherNumberHasTheBitsOfThePointWithoutErrors) {
+  const auto points = mixed_points();
+  const Outcomes outcomes = solved_with_errors(points, solved_falls);
+  int estimated = 0;
+  std::size_t next = 0;
+  solve_points([&] { return next < points.size() ? std::optional(points[next++]) : std::nullopt; },
+               [&](PointOutcome&& without) {
+                 PointOutcome with = outcomes.at(without.number);
+                 EXPECT_EQ(with.error, without.error);
+                 ASSERT_EQ(with.result.has_value(), without.result.has_value());
+                 if (with.result) {
+                   estimated += with.result->errors.mode_same ? 1 : 0;
+                   with.result->errors = {};
+                   expect_same_bits(*with.result, *without.result);
+                 }
+               });
+  EXPECT_EQ(estimated, 240) << "all but those that are never reached";
+}
+
+TEST(SolvedWithErrors, AreTheEstimatesOfThePointAlone) {
+  const auto points = mixed_points();
+  const Outcomes outcomes = solved_with_errors(points, solved_falls);
+  for (const std::size_t i : {0U, 130U, 279U}) {
+    const auto& [finger, request] = points[i];
+    const Finger companion(companion_model(finger.model()));
+    EXPECT_EQ(outcomes.at(request.number).result->errors,
+              estimated_errors(finger.model(), finger.solve(request.H_m, request.mu, 0.8),
+                               companion.solve(request.H_m, request.mu, 0.8)));
+  }
+}
+
+TEST(SolvedWithErrors, ACompanionWithoutAnAnswerLeavesThePointAndNoErrors) {
+  const auto points = mixed_points();
+  const Outcomes outcomes = solved_with_errors(points, [](auto models) {
+    return std::vector<FallOutcome>(models.size(), FallOutcome{nullptr, "no fall today"});
+  });
+  EXPECT_TRUE(outcomes.at(1000).result);
+  EXPECT_EQ(outcomes.at(1000).result->errors, ErrorEstimate{});
+}
+
+TEST(SolvedWithErrors, FrictionlessAndInelasticContactsHaveErrorsToo) {
+  for (const Integrator integrator : {Integrator::kExplicit, Integrator::kGeneralizedAlpha}) {
+    ModelParameters model = coarse_model(2);
+    model.integrator = integrator;
+    model.dt_fall_s = integrator == Integrator::kExplicit ? 0.0 : 1e-4;
+    const Finger finger(model);
+    const Outcomes outcomes = solved_with_errors(
+        {{finger, {0, 0.9, 0.0, 0.05}}, {finger, {1, 0.9, 3.0, 0.01}}}, solved_falls);
+    EXPECT_EQ(outcomes.at(0).result->errors.ft_peak, 0.0);
+    EXPECT_EQ(outcomes.at(0).result->errors.stick_total, 0.0);
+    for (const auto& [number, outcome] : outcomes) {
+      EXPECT_GT(outcome.result->errors.duration, 0.0);
+      EXPECT_TRUE(is_finite(*outcome.result));
+    }
+  }
 }
 
 }  // namespace
