@@ -58,6 +58,7 @@ TEST(SolveJson, HasExactlyTheFieldsThatAreDocumented) {
                                           "phases",
                                           "reaction_peaks",
                                           "energy",
+                                          "errors",
                                           "solver"}));
 }
 
@@ -106,6 +107,19 @@ TEST(Summary, NeverShowsMinusZeroOrAnExponentWherePlainDigitsDo) {
   EXPECT_EQ(out.str().find("-0.0"), std::string::npos) << out.str();
   EXPECT_EQ(out.str().find("e+"), std::string::npos) << out.str();
   EXPECT_NE(out.str().find("123 ms"), std::string::npos) << out.str();
+}
+
+TEST(Summary, TellsErrorsWhereTheyWereEstimated) {
+  auto result = some_result();
+  std::ostringstream without;
+  print_summary(without, result);
+  EXPECT_EQ(without.str().find("errors"), std::string::npos);
+  result.errors.mode_same = 0;
+  result.errors.fn_peak = 0.0123;
+  std::ostringstream with;
+  print_summary(with, result);
+  EXPECT_NE(with.str().find("[%]: F_n 1.2, F_t -"), std::string::npos) << with.str();
+  EXPECT_NE(with.str().find("another mode on half the mesh"), std::string::npos) << with.str();
 }
 
 }  // namespace

@@ -4,10 +4,11 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <future>
+#include <ctime>
 #include <iostream>
 #include <optional>
 #include <random>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -42,6 +43,7 @@ struct Settings {
   double least_e = 0.4;
   double largest_e = 1.0;
   std::string integrator = "explicit";
+  bool cost = false;
 };
 
 ModelParameters model_of(const Settings& settings, int elements_per_link) {
@@ -209,7 +211,59 @@ void check_mesh(const ModelParameters& model, const std::vector<solver::PointReq
   tell_modes(results, truth, errors);
 }
 
+double cpu_s() {
+  return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
+}
+
+/// CPU time of a sweep over 10 drops, 10 frictions and 10 restitutions, falls aside.
+double sweep_s(const solver::Finger& finger, const solver::FallSource* companion_falls) {
+  static constexpr std::uint64_t kSide = 10;
+  std::uint64_t next = 0;
+  const auto source = [&]() -> std::optional<solver::FingerPoint> {
+    if (next == kSide * kSide * kSide) {
+      return std::nullopt;
+    }
+    const auto part = [](std::uint64_t i) { return static_cast<double>(i % kSide) / (kSide - 1); };
+    const std::uint64_t i = next++;
+    return solver::FingerPoint{finger,
+                               {i, 0.1 + 1.05 * part(i / (kSide * kSide)),
+                                0.05 + 0.9 * part(i / kSide), 0.2 + 0.8 * part(i)}};
+  };
+  const auto sink = [](solver::PointOutcome&&) {};
+  const double begun_s = cpu_s();
+  if (companion_falls == nullptr) {
+    solver::solve_points(source, sink);
+  } else {
+    solver::solve_points_with_errors(source, *companion_falls, sink);
+  }
+  return cpu_s() - begun_s;
+}
+
+/// With and without errors in turn, the best of three each.
+void tell_cost(const ModelParameters& model) {
+  const std::array models{model, solver::companion_model(model)};
+  const auto falls = solver::solve_falls(models);
+  const solver::FallSource companion_falls = [&](std::span<const ModelParameters>) {
+    return std::vector<solver::FallOutcome>{falls[1]};
+  };
+  const solver::Finger finger(model, falls[0].fallen);
+  double without_s = HUGE_VAL;
+  double with_s = HUGE_VAL;
+  for (int turn = 0; turn < 3; ++turn) {
+    without_s = std::min(without_s, sweep_s(finger, nullptr));
+    with_s = std::min(with_s, sweep_s(finger, &companion_falls));
+  }
+  fmt::print("n = {}: {:.0f} cases/s without errors, {:.0f} with, {:.2f} times the cost\n",
+             model.elements_per_link, 1000.0 / without_s, 1000.0 / with_s, with_s / without_s);
+}
+
 void check(const Settings& settings) {
+  if (settings.cost) {
+    for (const int mesh : settings.meshes) {
+      tell_cost(model_of(settings, mesh));
+    }
+    return;
+  }
   const auto points = random_points(settings);
   const Results truth = solve(model_of(settings, settings.truth), points);
   for (const int mesh : settings.meshes) {
@@ -231,6 +285,7 @@ void add_flags(CLI::App& app, Settings& settings) {
   app.add_option("--e-from", settings.least_e, "least restitution");
   app.add_option("--e-to", settings.largest_e, "largest restitution");
   app.add_option("--integrator", settings.integrator, "explicit or generalized-alpha");
+  app.add_flag("--cost", settings.cost, "CPU time of a sweep with and without errors instead");
 }
 
 }  // namespace
