@@ -39,19 +39,6 @@ struct SolveFlags {
   bool errors = false;
 };
 
-/// Nothing when the coarser solution of the point has no answer.
-solver::ErrorEstimate errors_of(const solver::ModelParameters& model,
-                                const solver::CaseResult& result) {
-  try {
-    const solver::Finger companion(solver::companion_model(model));
-    return solver::estimated_errors(model, result,
-                                    companion.solve(result.H_m, result.mu, result.e_star));
-  } catch (const std::exception& error) {
-    std::cerr << "Errors cannot be estimated: on half the mesh, " << error.what() << '\n';
-    return {};
-  }
-}
-
 void check_one_point(const protocol::PointTable& table) {
   if (table.size() == 1) {
     return;
@@ -117,6 +104,19 @@ solver::CaseResult solved(const solver::Finger& finger, const protocol::Point& p
   return finger.solve(point.H_m, point.mu, point.e_star, tracing);
 }
 
+/// Nothing when the coarser solution of the point has no answer.
+solver::ErrorEstimate errors_of(const solver::ModelParameters& model,
+                                const solver::CaseResult& result, bool is_terminal_taken) {
+  try {
+    const solver::Finger companion(solver::companion_model(model));
+    const protocol::Point point{0, result.H_m, result.mu, result.e_star};
+    return solver::estimated_errors(model, result, solved(companion, point, {}, is_terminal_taken));
+  } catch (const std::exception& error) {
+    std::cerr << "Errors cannot be estimated: on half the mesh, " << error.what() << '\n';
+    return {};
+  }
+}
+
 int solve(const SolveFlags& flags) {
   const protocol::PointTable table(recipe_of_flags(flags.points, tip_reach()));
   check_one_point(table);
@@ -130,9 +130,10 @@ int solve(const SolveFlags& flags) {
     tracing.sink = [&trace](const solver::TraceRow& row) { trace->add(row); };
     tracing.with_shape = flags.trace_shape;
   }
-  auto result = solved(finger, point, tracing, trace && trace->fills_terminal());
+  const bool is_terminal_taken = trace && trace->fills_terminal();
+  auto result = solved(finger, point, tracing, is_terminal_taken);
   if (flags.errors) {
-    result.errors = errors_of(finger.model(), result);
+    result.errors = errors_of(finger.model(), result, is_terminal_taken);
   }
   if (flags.json) {
     std::cout << json_of(result).dump(2) << '\n';
