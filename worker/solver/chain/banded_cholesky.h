@@ -83,12 +83,11 @@ class BandedCholesky {
     ForwardSubstitution<Real> forward;
     const std::size_t rows = rows_.size() - kHalfBandwidth;
     for (std::size_t i = 0; i < rows; ++i) {
-      put_pair(f, i, forward.next(rows_[i], pair_at(f, i)));
+      put_pair(f, i, forward.next(rows_[i], f[2 * i], f[2 * i + 1]));
     }
-    BackSubstitution<Real> backward;
-    for (std::size_t i = rows; i-- > 0;) {
-      put_pair(f, i, backward.next(&rows_[i], pair_at(f, i)));
-    }
+    substitute_back(rows_.data(), rows, 0, f, [&](std::size_t i, const Real& x, const Real& y) {
+      put_pair(f, i, PlanarVector<Real>{x, y});
+    });
   }
 
   /// Its rows, and kHalfBandwidth more of zeros.

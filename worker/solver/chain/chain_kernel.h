@@ -43,47 +43,6 @@ struct ChainTables {
   const LinkBalance<Constant>* balance;  ///< of each link
 };
 
-/// L y = f, row by row downwards. The row just before comes last into each sum: what rows wait for
-/// is then one multiply-add.
-template <class Real>
-class ForwardSubstitution {
- public:
-  template <class Constant>
-  inline PlanarVector<Real> next(const FactorRow<Constant>& row, PlanarVector<Real> f) {
-    for (std::size_t d = kHalfBandwidth; d >= 1; --d) {
-      f = less_product(f, row.left[d - 1], before_[d - 1]);
-    }
-    before_[2] = before_[1];
-    before_[1] = before_[0];
-    before_[0] = f;
-    return f;
-  }
-
- private:
-  PlanarVector<Real> before_[kHalfBandwidth]{};
-};
-
-/// D Lᵀ z = y, row by row upwards.
-template <class Real>
-class BackSubstitution {
- public:
-  /// The kHalfBandwidth rows after `row` are read too.
-  template <class Constant>
-  inline PlanarVector<Real> next(const FactorRow<Constant>* row, const PlanarVector<Real>& y) {
-    PlanarVector<Real> z = row->inverse_pivot * y;
-    for (std::size_t d = kHalfBandwidth; d >= 1; --d) {
-      z = less_product(z, row[d].left[d - 1], after_[d - 1]);
-    }
-    after_[2] = after_[1];
-    after_[1] = after_[0];
-    after_[0] = z;
-    return z;
-  }
-
- private:
-  PlanarVector<Real> after_[kHalfBandwidth]{};
-};
-
 template <class Real>
 inline PlanarVector<Real> pair_at(const Real* values, std::size_t row) {
   return {values[2 * row], values[2 * row + 1]};
@@ -95,6 +54,67 @@ inline void put_pair(Real* values, std::size_t row, const PlanarVector<Real>& pa
   values[2 * row + 1] = pair.y;
 }
 
+/// L y = f, row by row downwards. The row just before comes last into each sum: what rows wait for
+/// is then one multiply-add. Component by component, here and below: compilers copy pairs of packs
+/// through memory.
+template <class Real>
+class ForwardSubstitution {
+ public:
+  template <class Constant>
+  inline PlanarVector<Real> next(const FactorRow<Constant>& row, const Real& fx, const Real& fy) {
+    const Real x = after_three(row, fx, x_);
+    const Real y = after_three(row, fy, y_);
+    x_[2] = x_[1];
+    y_[2] = y_[1];
+    x_[1] = x_[0];
+    y_[1] = y_[0];
+    x_[0] = x;
+    y_[0] = y;
+    return {x, y};
+  }
+
+ private:
+  template <class Constant>
+  static inline Real after_three(const FactorRow<Constant>& row, const Real& f,
+                                 const Real (&before)[kHalfBandwidth]) {
+    const Real far = less_product(f, row.left[2], before[2]);
+    return less_product(less_product(far, row.left[1], before[1]), row.left[0], before[0]);
+  }
+
+  Real x_[kHalfBandwidth]{};  ///< of the rows before, the last one first
+  Real y_[kHalfBandwidth]{};
+};
+
+/// D Lᵀ z = y: gives `take(row, x, y)`, the row's pair of z, from row `rows` - 1 up to `first`.
+/// `rows` of `factor`, and kHalfBandwidth more of zeros.
+template <class Constant, class Real, class Take>
+inline void substitute_back(const FactorRow<Constant>* factor, std::size_t rows, std::size_t first,
+                            const Real* y, const Take& take) {
+  // Three rows a turn, each into the variables of the row three after it: nothing need be moved.
+  Real ax{}, ay{}, bx{}, by{}, cx{}, cy{};
+  const auto next = [&](std::size_t row, Real& zx, Real& zy, const Real& x_1, const Real& y_1,
+                        const Real& x_2, const Real& y_2) {
+    const FactorRow<Constant>* l = factor + row;
+    const Real far_x = less_product(l->inverse_pivot * y[2 * row], l[3].left[2], zx);
+    const Real far_y = less_product(l->inverse_pivot * y[2 * row + 1], l[3].left[2], zy);
+    zx = less_product(less_product(far_x, l[2].left[1], x_2), l[1].left[0], x_1);
+    zy = less_product(less_product(far_y, l[2].left[1], y_2), l[1].left[0], y_1);
+    take(row, zx, zy);
+  };
+  std::size_t end = rows;
+  for (; end >= first + 3; end -= 3) {
+    next(end - 1, cx, cy, ax, ay, bx, by);
+    next(end - 2, bx, by, cx, cy, ax, ay);
+    next(end - 3, ax, ay, bx, by, cx, cy);
+  }
+  if (end > first) {
+    next(end - 1, cx, cy, ax, ay, bx, by);
+  }
+  if (end > first + 1) {
+    next(end - 2, bx, by, cx, cy, ax, ay);
+  }
+}
+
 /// The way down: y = L^-1 (Q_gravity + S_tipᵀ F - dU/dq), forces and substitution in one pass along
 /// the chain. `q` and `y` have 2 rows entries. What it says of the pin's row has no meaning.
 template <class Constant, class Real>
@@ -102,13 +122,15 @@ inline void substitute_forces(const ChainTables<Constant>& chain, const Real* q,
                               const Real& fn_N, Real* y) {
   using Vector = PlanarVector<Real>;
   ForwardSubstitution<Real> forward;
-  const auto finish = [&](std::size_t row, const Vector& force) {
-    put_pair(y, row, forward.next(chain.mass_factor[row], force));
+  const auto finish = [&](std::size_t row, const Real& fx, const Real& fy) {
+    const PlanarVector<Real> y_row = forward.next(chain.mass_factor[row], fx, fy);
+    y[2 * row] = y_row.x;
+    y[2 * row + 1] = y_row.y;
   };
   std::size_t row = 0;      // of the position at the element's left end
   Vector pull_from_left{};  // by the elements to the left: what they take from p and s
   for (std::size_t link = 0; link < chain.links; ++link) {
-    const ElasticConstants<Constant> constants = chain.link[link];  // a copy: no store is into it
+    const ElasticConstants<Constant>& constants = chain.link[link];
     Vector turn_from_left{Real{}, Real{} - chain.weight_N[row + 1]};
     for (std::size_t e = 1; e <= chain.elements_per_link; ++e) {
       // At a joint the inner link's slope comes before the position.
@@ -117,10 +139,10 @@ inline void substitute_forces(const ChainTables<Constant>& chain, const Real* q,
       const std::size_t s_row = row + (ends_at_joint ? 2 : 3);
       const ElasticForces<Real> elastic = elastic_forces(
           pair_at(q, row), pair_at(q, row + 1), pair_at(q, p_row), pair_at(q, s_row), constants);
-      finish(row, {elastic.pull.x - pull_from_left.x,
-                   elastic.pull.y - pull_from_left.y + chain.weight_N[row]});
-      finish(row + 1, {(elastic.by_d.x - elastic.by_t.x) - turn_from_left.x,
-                       (elastic.by_d.y - elastic.by_t.y) - turn_from_left.y});
+      finish(row, elastic.pull.x - pull_from_left.x,
+             elastic.pull.y - pull_from_left.y + chain.weight_N[row]);
+      finish(row + 1, (elastic.by_d.x - elastic.by_t.x) - turn_from_left.x,
+             (elastic.by_d.y - elastic.by_t.y) - turn_from_left.y);
       pull_from_left.x = elastic.pull.x;
       pull_from_left.y = elastic.pull.y;
       turn_from_left.x = elastic.by_d.x + elastic.by_t.x;
@@ -128,23 +150,20 @@ inline void substitute_forces(const ChainTables<Constant>& chain, const Real* q,
       row = p_row;
     }
     if (link + 1 < chain.links) {
-      finish(row - 1, {Real{} - turn_from_left.x, chain.weight_N[row - 1] - turn_from_left.y});
+      finish(row - 1, Real{} - turn_from_left.x, chain.weight_N[row - 1] - turn_from_left.y);
     } else {
-      finish(row, {ft_N - pull_from_left.x, fn_N + chain.weight_N[row] - pull_from_left.y});
-      finish(row + 1, {Real{} - turn_from_left.x, chain.weight_N[row + 1] - turn_from_left.y});
+      finish(row, ft_N - pull_from_left.x, fn_N + chain.weight_N[row] - pull_from_left.y);
+      finish(row + 1, Real{} - turn_from_left.x, chain.weight_N[row + 1] - turn_from_left.y);
     }
   }
 }
 
-/// The way up: q'' = L^-T D^-1 y, given to `take(row, q'')` from the tip to the row after the pin,
-/// which does not move.
+/// The way up: q'' = L^-T D^-1 y, given to `take(row, x'', y'')` from the tip to the row after the
+/// pin, which does not move.
 template <class Constant, class Real, class Take>
 inline void substitute_accelerations(const ChainTables<Constant>& chain, const Real* y,
                                      const Take& take) {
-  BackSubstitution<Real> backward;
-  for (std::size_t row = chain.rows; row-- > 1;) {
-    take(row, backward.next(chain.mass_factor + row, pair_at(y, row)));
-  }
+  substitute_back(chain.mass_factor, chain.rows, 1, y, take);
 }
 
 /// q'' = M^-1 (Q_gravity + S_tipᵀ F - dU/dq). `q` and `acceleration` have 2 rows entries.
@@ -153,8 +172,8 @@ inline void chain_accelerations(const ChainTables<Constant>& chain, const Real* 
                                 const Real& fn_N, Real* acceleration) {
   substitute_forces(chain, q, ft_N, fn_N, acceleration);
   substitute_accelerations(chain, acceleration,
-                           [&](std::size_t row, const PlanarVector<Real>& value) {
-                             put_pair(acceleration, row, value);
+                           [&](std::size_t row, const Real& ax, const Real& ay) {
+                             put_pair(acceleration, row, PlanarVector<Real>{ax, ay});
                            });
   put_pair(acceleration, 0, PlanarVector<Real>{});
 }

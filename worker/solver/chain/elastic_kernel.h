@@ -46,10 +46,12 @@ inline ElasticForces<Real> elastic_forces(const PlanarVector<Real>& p_i,
                                           const PlanarVector<Real>& p_j,
                                           const PlanarVector<Real>& s_j,
                                           const ElasticConstants<Constant>& k) {
+  // By components, not pairs, which compilers copy through memory.
   using Vector = PlanarVector<Real>;
-  const Vector u = p_j - p_i;
-  const Vector d = s_j - s_i;
-  const Vector t = less_product(s_i + s_j, k.two_inverse_length, u);
+  const Vector u{p_j.x - p_i.x, p_j.y - p_i.y};
+  const Vector d{s_j.x - s_i.x, s_j.y - s_i.y};
+  const Vector t{less_product(s_i.x + s_j.x, k.two_inverse_length, u.x),
+                 less_product(s_i.y + s_j.y, k.two_inverse_length, u.y)};
   const Real dd = dot(d, d);
   const Real tt = dot(t, t);
   const Real dt = dot(d, t);
@@ -61,12 +63,16 @@ inline ElasticForces<Real> elastic_forces(const PlanarVector<Real>& p_i,
   const Real k12 = plus_product(k.k12_k01 * k01, k.k12_dt, dt);
   Real k22 = plus_product(k.k22, k.k22_tt, tt);
   k22 = plus_product(plus_product(k22, k.k22_k00, k00), k.k22_k02, k02);
-  const Vector by_u = plus_product(plus_product(k00 * u, k01, d), k02, t);
-  const Vector by_d = plus_product(plus_product(k01 * u, k11, d), k12, t);
-  const Vector by_t = plus_product(plus_product(k02 * u, k12, d), k22, t);
-  const Vector pull = less_product(by_u, k.two_inverse_length, by_t);
-  // By components: compilers copy whole pairs of packs through memory.
-  return {{pull.x, pull.y}, {by_d.x, by_d.y}, {by_t.x, by_t.y}};
+  const auto times = [](const Real& a, const Real& b, const Real& c, const Real& of_u,
+                        const Real& of_d, const Real& of_t) {
+    return plus_product(plus_product(a * of_u, b, of_d), c, of_t);
+  };
+  const Vector by_d{times(k01, k11, k12, u.x, d.x, t.x), times(k01, k11, k12, u.y, d.y, t.y)};
+  const Vector by_t{times(k02, k12, k22, u.x, d.x, t.x), times(k02, k12, k22, u.y, d.y, t.y)};
+  return {{less_product(times(k00, k01, k02, u.x, d.x, t.x), k.two_inverse_length, by_t.x),
+           less_product(times(k00, k01, k02, u.y, d.y, t.y), k.two_inverse_length, by_t.y)},
+          {by_d.x, by_d.y},
+          {by_t.x, by_t.y}};
 }
 
 }  // namespace oblique::solver

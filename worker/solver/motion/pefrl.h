@@ -56,18 +56,31 @@ inline ContactIntegrals<Real> pefrl_step(const ChainTables<Constant>& chain,
     const Real drift_s = Pefrl::drift[stage + 1] * h_s;
     const Real vt_before = v_from[tip];
     // Kick, and drift on, as the accelerations come.
-    substitute_accelerations(chain, scratch, [&](std::size_t row, const PlanarVector<Real>& a) {
-      const PlanarVector<Real> v_before = pair_at(v_from, row);
-      const PlanarVector<Real> v_row = plus_product(v_before, kick_s, a);
-      if (stage == 0) {
-        watch.start(row, v_before);
-      }
-      if (stage + 1 == Pefrl::kKicks) {
-        watch.end(row, v_row);
-      }
-      put_pair(v_next, row, v_row);
-      put_pair(q_next, row, plus_product(pair_at(q_next, row), drift_s, v_row));
-    });
+    const auto sweep = [&](const auto& tell) {
+      substitute_accelerations(
+          chain, scratch, [&](std::size_t row, const Real& ax, const Real& ay) {
+            const Real vx_before = v_from[2 * row];
+            const Real vy_before = v_from[2 * row + 1];
+            const Real vx = plus_product(vx_before, kick_s, ax);
+            const Real vy = plus_product(vy_before, kick_s, ay);
+            v_next[2 * row] = vx;
+            v_next[2 * row + 1] = vy;
+            q_next[2 * row] = plus_product(q_next[2 * row], drift_s, vx);
+            q_next[2 * row + 1] = plus_product(q_next[2 * row + 1], drift_s, vy);
+            tell(row, vx_before, vy_before, vx, vy);
+          });
+    };
+    if (stage == 0) {
+      sweep([&](std::size_t row, const Real& vx, const Real& vy, const Real&, const Real&) {
+        watch.start(row, {vx, vy});
+      });
+    } else if (stage + 1 == Pefrl::kKicks) {
+      sweep([&](std::size_t row, const Real&, const Real&, const Real& vx, const Real& vy) {
+        watch.end(row, {vx, vy});
+      });
+    } else {
+      sweep([](std::size_t, const Real&, const Real&, const Real&, const Real&) {});
+    }
     integrals.impulse_n += kick_s * fn;
     integrals.impulse_t += kick_s * ft;
     integrals.work_t += kick_s * ft * (0.5 * (vt_before + v_next[tip]));
