@@ -10,8 +10,8 @@
 namespace oblique::server {
 
 struct MergeSettings {
-  /// Goes before the name of a study whose name is taken by one with other points or another model;
-  /// empty: such a database is refused.
+  /// Goes before the name of a study whose name is taken by one with other points, another model or
+  /// another choice of errors; empty: such a database is refused.
   std::string rename_prefix;
   /// Results of several solver versions may stand in one study.
   bool mixes_versions = false;

@@ -158,7 +158,9 @@ class Placing {
     }
     if (known && !known->table.is_of_the_recipe_of(study.table)) {
       conflicts_.push_back(
-          fmt::format("there is a study called \"{}\" with other points or another model", name));
+          fmt::format("there is a study called \"{}\" with other points, another model or another "
+                      "choice of errors",
+                      name));
       return std::nullopt;
     }
     if (const std::string objection =

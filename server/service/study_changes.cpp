@@ -67,10 +67,10 @@ void StudyChanges::submit(const Client& client, const ReadRequest& read, Instant
   }
   const StudyRecord& study = states_.record(*known);
   if (!study.table.is_of_the_recipe_of(read.table)) {
-    clients_.reply_error(
-        client, fmt::format("there is a study called \"{}\" with other points or another model: "
-                            "give this one another name, or use another database",
-                            request.name()));
+    clients_.reply_error(client, fmt::format("there is a study called \"{}\" with other points, "
+                                             "another model or another choice of errors: "
+                                             "give this one another name, or use another database",
+                                             request.name()));
   } else if (states_.is_durable(*known) && !(study.terms == terms)) {
     ledger_.write(SetStudyTerms{*known, terms}, TermsWrite{*known, terms, client});
   } else {
