@@ -88,6 +88,30 @@ TEST(Run, SolvesAStudyAndItsResultsAreThereForEveryVerbThatReads) {
   EXPECT_NE(compared.out.find("63 trustworthy published numbers: rms"), std::string::npos);
 }
 
+TEST(Run, WithErrorsGivesThemToEveryPointAndWithoutToNone) {
+  const test::TemporaryFolder folder;
+  std::vector<std::string> arguments{"run", "--H", "0.9,1", "--mu", "0.4", "--e", "1"};
+  for (const char* one : {"--elements-per-link", "2", "--name", "without"}) {
+    arguments.emplace_back(one);
+  }
+  EXPECT_EQ(test::run_oblique(folder, arguments).exit_code, 0);
+  arguments.back() = "with";
+  arguments.emplace_back("--errors");
+  EXPECT_EQ(test::run_oblique(folder, arguments).exit_code, 0);
+  const auto sql = test::run_oblique(
+      folder, {"sql",
+               "SELECT study, count(*), count(mode_same), count(fn_peak_error), count(v_out_error)"
+               " FROM runs GROUP BY study ORDER BY study",
+               "--format", "csv"});
+  EXPECT_NE(sql.out.find("with,2,2,2,2\nwithout,2,0,0,0\n"), std::string::npos) << sql.out;
+  EXPECT_EQ(test::run_oblique(folder, {"check"}).exit_code, 0);
+  // The same name with another choice is another study.
+  arguments.pop_back();
+  const auto refused = test::run_oblique(folder, arguments);
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_NE(refused.err.find("choice of errors"), std::string::npos) << refused.err;
+}
+
 TEST(Run, OfAStudyThatIsDoneShowsItsResultsAgain) {
   const test::TemporaryFolder folder;
   const std::vector<std::string> arguments{"run", "--H", "1", "--mu", "0.4", "--e", "1"};
