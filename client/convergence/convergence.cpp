@@ -89,6 +89,10 @@ std::vector<Output> outputs_of(const CaseResult& result) {
   outputs.push_back({"impulse_t_Ns", result.impulse_t_Ns, result.impulse_n_Ns, mode});
   outputs.push_back({"vt_out_m_s", result.vt_out_m_s, speed, mode});
   outputs.push_back({"vn_out_m_s", result.vn_out_m_s, speed, mode});
+  for (std::size_t i = 0; i < result.reaction_peaks.size(); ++i) {
+    outputs.push_back(
+        {fmt::format("reaction_{}_N", i), result.reaction_peaks[i].force_N, force, mode});
+  }
   return outputs;
 }
 

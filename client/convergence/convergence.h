@@ -24,7 +24,8 @@ struct Output {
   std::string mode;
 };
 
-/// fn_peak, ft_peak, every major peak, duration, stick, slide, impulses and exit velocity.
+/// fn_peak, ft_peak, every major peak, duration, stick, slide, impulses, exit velocity and the
+/// largest reactions (reaction_0_N at the pin, reaction_1_N at the first joint, ...).
 std::vector<Output> outputs_of(const solver::CaseResult& result);
 
 /// One output over the levels.

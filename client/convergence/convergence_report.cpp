@@ -214,11 +214,6 @@ ordered_json json_of(const OutputConvergence& output) {
           {"trend", name_of(extrapolation.trend)}};
 }
 
-bool decides_the_mesh(const OutputConvergence& output) {
-  return output.name.starts_with("major_peak") || output.name == "duration_s" ||
-         output.name == "stick_total_s";
-}
-
 }  // namespace
 
 Refinement refinement_of(std::string what, const std::vector<SolvedLevel>& levels,
@@ -292,9 +287,6 @@ void print_errors(std::ostream& out, const Refinement& refinement) {
     table.add_columns(column);
   }
   for (const auto& output : refinement.convergence.outputs) {
-    if (!decides_the_mesh(output)) {
-      continue;
-    }
     auto& row = *table.add_rows();
     const auto shown = shown_column(output.name);
     add_value(row, shown.heading);
@@ -309,25 +301,6 @@ void print_errors(std::ostream& out, const Refinement& refinement) {
     add_rough(row, output.extrapolation.order);
   }
   print(out, table, Format::kTable);
-}
-
-std::optional<std::size_t> coarsest_within(const Refinement& refinement, double tolerance) {
-  const auto& outputs = refinement.convergence.outputs;
-  const auto is_within = [&](std::size_t level) {
-    return std::all_of(outputs.begin(), outputs.end(), [&](const OutputConvergence& output) {
-      if (!decides_the_mesh(output)) {
-        return true;
-      }
-      const auto& value = output.values[level];
-      return value && std::abs(*value - output.extrapolation.limit) <=
-                          tolerance * std::abs(output.extrapolation.limit);
-    });
-  };
-  std::optional<std::size_t> coarsest;
-  for (std::size_t level = refinement.levels.size(); level-- > 0 && is_within(level);) {
-    coarsest = level;
-  }
-  return coarsest;
 }
 
 }  // namespace oblique::client

@@ -45,11 +45,7 @@ void print_modes(std::ostream& out, const Refinement& refinement);
 /// Levels, outputs, changes and verdict as one JSON object.
 nlohmann::ordered_json json_of(const Refinement& refinement);
 
-/// Differences of major peaks, duration and stick from their limits on each level [%].
+/// Differences of outputs from their limits on each level [%].
 void print_errors(std::ostream& out, const Refinement& refinement);
-
-/// The coarsest level from which on every major peak, the duration and the stick time are within
-/// `tolerance` (relative) of their limits; nothing when not even the finest is.
-std::optional<std::size_t> coarsest_within(const Refinement& refinement, double tolerance);
 
 }  // namespace oblique::client

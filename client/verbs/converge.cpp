@@ -9,6 +9,7 @@
 #include "client/convergence/convergence.h"
 #include "client/convergence/convergence_report.h"
 #include "client/convergence/levels.h"
+#include "client/convergence/mesh_study.h"
 #include "client/output/work_line.h"
 #include "client/study/point_flags.h"
 #include "client/verbs/tip_reach.h"
@@ -126,19 +127,6 @@ int converge(const ConvergeFlags& flags, const protocol::PointTable& table, Work
   return kDone;
 }
 
-// The smallest mesh good enough for every point.
-std::optional<std::size_t> choice_of(const std::vector<Refinement>& refinements, double tolerance) {
-  std::size_t chosen = 0;
-  for (const auto& refinement : refinements) {
-    const auto level = coarsest_within(refinement, tolerance);
-    if (!level) {
-      return std::nullopt;
-    }
-    chosen = std::max(chosen, *level);
-  }
-  return chosen;
-}
-
 int mesh_study(const ConvergeFlags& flags, const protocol::PointTable& table, WorkLine& line) {
   if (table.models() != 1) {
     throw solver::InputError(
@@ -153,10 +141,9 @@ int mesh_study(const ConvergeFlags& flags, const protocol::PointTable& table, Wo
   for (std::size_t i = 0; i < points.size(); ++i) {
     refinements.push_back(refinement_of("mesh", levels, i));
   }
-  const auto choice = choice_of(refinements, flags.tolerance_percent / 100.0);
+  const auto study = study_of(refinements, flags.tolerance_percent / 100.0);
   if (flags.json) {
-    nlohmann::ordered_json json = {{"tolerance_percent", flags.tolerance_percent}};
-    json["chosen"] = choice ? nlohmann::ordered_json(levels[*choice].level.name) : nullptr;
+    auto json = json_of(study);
     for (std::size_t i = 0; i < points.size(); ++i) {
       auto point = json_of_point(points[i]);
       point["mesh"] = json_of(refinements[i]);
@@ -165,23 +152,22 @@ int mesh_study(const ConvergeFlags& flags, const protocol::PointTable& table, Wo
     std::cout << json.dump(2) << '\n';
     return kDone;
   }
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    std::cout << shown(points[i]) << ": difference from the extrapolated value\n\n";
+  constexpr std::size_t kFew = 4;  // points that are shown one by one
+  for (std::size_t i = 0; i < points.size() && points.size() <= kFew; ++i) {
+    std::cout << shown(points[i]) << ": difference from the limit\n\n";
     print_errors(std::cout, refinements[i]);
     print_modes(std::cout, refinements[i]);
     std::cout << '\n';
   }
-  std::cout << fmt::format("The coarsest mesh with all of these within {} %: {}.\n",
-                           solver::exact_number(flags.tolerance_percent),
-                           choice ? levels[*choice].level.name : std::string("none"));
+  print_study(std::cout, study, points);
   return kDone;
 }
 
 int converge_of_flags(ConvergeFlags flags) {
   if (flags.mesh_study) {
-    flags.points.axes.try_emplace("H", "1");
-    flags.points.axes.try_emplace("mu", "0.4,1.2");
-    flags.points.axes.try_emplace("e", "1");
+    flags.points.axes.try_emplace("H", "0.4,0.7,1");
+    flags.points.axes.try_emplace("mu", "0.1,0.4,0.8,1.2,1.6");
+    flags.points.axes.try_emplace("e", "1,0.6");
   }
   const protocol::PointTable table(recipe_of_flags(flags.points, tip_reach()));
   WorkLine line;
@@ -207,9 +193,9 @@ void add_converge(CLI::App& app, Command& command) {
   verb->add_option("--halvings", flags->halvings, "how often the step is halved")
       ->type_name("N")
       ->capture_default_str();
-  auto* study = verb->add_flag(
-      "--mesh-study", flags->mesh_study,
-      "mesh alone, at H = 1, mu = 0.4 and 1.2, e = 1 unless said otherwise: errors of every mesh");
+  auto* study =
+      verb->add_flag("--mesh-study", flags->mesh_study,
+                     "mesh alone, at thirty points unless said otherwise: errors of every mesh");
   verb->add_option("--tolerance", flags->tolerance_percent,
                    "of the mesh study: largest difference of a mesh that is good enough [%]")
       ->type_name("PERCENT")

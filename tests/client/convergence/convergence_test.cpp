@@ -38,6 +38,7 @@ CaseResult second_order(double h) {
   result.vn_in_m_s = -5.0;
   result.vt_out_m_s = -1.0 * factor;
   result.vn_out_m_s = 2.0 * factor;
+  result.reaction_peaks = {{1e-5, 900.0 * factor}, {2e-5, 700.0 * factor}};
   return result;
 }
 
@@ -53,10 +54,10 @@ TEST(Outputs, HaveOneMajorPeakEachAndNoRipples) {
   for (const auto& output : outputs_of(result)) {
     names.push_back(output.name);
   }
-  EXPECT_EQ(names,
-            (std::vector<std::string>{"fn_peak_N", "major_peak_1_N", "major_peak_2_N", "ft_peak_N",
-                                      "duration_s", "stick_total_s", "slide_m", "impulse_n_Ns",
-                                      "impulse_t_Ns", "vt_out_m_s", "vn_out_m_s"}));
+  EXPECT_EQ(names, (std::vector<std::string>{"fn_peak_N", "major_peak_1_N", "major_peak_2_N",
+                                             "ft_peak_N", "duration_s", "stick_total_s", "slide_m",
+                                             "impulse_n_Ns", "impulse_t_Ns", "vt_out_m_s",
+                                             "vn_out_m_s", "reaction_0_N", "reaction_1_N"}));
 }
 
 TEST(Outputs, AreTheSameQuantityUpToWhereModesPart) {
@@ -271,15 +272,6 @@ TEST(Verdict, TakesChangesBelowAThousandthOfTheScaleForSettled) {
   auto coarsest = second_order(0.1);
   coarsest.vt_out_m_s = -1.001;
   EXPECT_TRUE(converges(refinement_with({coarsest, middle, finest})));
-}
-
-TEST(CoarsestWithin, IsTheFirstLevelFromWhichOnAllIsCloseEnough) {
-  const auto refinement = refinement_with(
-      {second_order(0.4), second_order(0.1), second_order(0.05), second_order(0.025)});
-  EXPECT_EQ(coarsest_within(refinement, 0.2), 0U);
-  EXPECT_EQ(coarsest_within(refinement, 0.011), 1U);
-  EXPECT_EQ(coarsest_within(refinement, 0.003), 2U);
-  EXPECT_FALSE(coarsest_within(refinement, 1e-5));
 }
 
 }  // namespace
