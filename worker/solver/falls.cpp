@@ -3,11 +3,15 @@
 #include <exception>
 #include <utility>
 
+#include "worker/solver/fall/collocation_fall.h"
 #include "worker/solver/motion/generalized_alpha.h"
 #include "worker/solver/step_choice.h"
 
 namespace oblique::solver {
 namespace {
+
+/// Relative accuracy of contact outputs that falls are solved for.
+constexpr double kFallAccuracy = 1e-5;
 
 std::shared_ptr<const Motion> make_motion(const ModelParameters& model, const Chain& chain) {
   if (model.integrator == Integrator::kGeneralizedAlpha) {
@@ -16,7 +20,10 @@ std::shared_ptr<const Motion> make_motion(const ModelParameters& model, const Ch
   return std::make_shared<ExplicitMotion>(chain);
 }
 
-FallOutcome solve_fall(const std::shared_ptr<const PreparedChain>& chain) {
+using SharedChain = std::shared_ptr<const PreparedChain>;
+
+/// By steps of the length asked for.
+FallOutcome solve_by_steps(const SharedChain& chain) {
   try {
     return {std::make_shared<const FallenChain>(
                 chain, Fall(chain->shared_motion(), chain->fall_step_s(),
@@ -24,6 +31,30 @@ FallOutcome solve_fall(const std::shared_ptr<const PreparedChain>& chain) {
             {}};
   } catch (const std::exception& error) {
     return {nullptr, error.what()};
+  }
+}
+
+/// Whether no step was asked for: steps are then as long as accuracy allows.
+bool falls_by_collocation(const PreparedChain& chain) {
+  return chain.model().integrator == Integrator::kExplicit && chain.model().dt_fall_s == 0.0;
+}
+
+/// Solves the falls at `places` side by side.
+void solve_in_lanes(std::span<const SharedChain> chains, const std::vector<std::size_t>& places,
+                    std::vector<FallOutcome>& outcomes) {
+  std::vector<FallRequest> requests;
+  for (const std::size_t place : places) {
+    const PreparedChain& chain = *chains[place];
+    requests.push_back({&chain.chain(), &chain.model(), kFallAccuracy, &chain.fall_progress()});
+  }
+  std::vector<FallSolution> solutions = solve_by_collocation(requests);
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    FallOutcome& outcome = outcomes[places[i]];
+    outcome.error = std::move(solutions[i].error);
+    if (solutions[i].path) {
+      outcome.fallen = std::make_shared<const FallenChain>(chains[places[i]],
+                                                           Fall(std::move(solutions[i].path)));
+    }
   }
 }
 
@@ -36,11 +67,16 @@ PreparedChain::PreparedChain(const ModelParameters& model)
       fall_step_s_(StepChoice(chain_, model_).fall_s()) {}
 
 std::vector<FallOutcome> solve_falls(std::span<const std::shared_ptr<const PreparedChain>> chains) {
-  std::vector<FallOutcome> outcomes;
-  outcomes.reserve(chains.size());
-  for (const auto& chain : chains) {
-    outcomes.push_back(solve_fall(chain));
+  std::vector<FallOutcome> outcomes(chains.size());
+  std::vector<std::size_t> in_lanes;
+  for (std::size_t i = 0; i < chains.size(); ++i) {
+    if (falls_by_collocation(*chains[i])) {
+      in_lanes.push_back(i);
+    } else {
+      outcomes[i] = solve_by_steps(chains[i]);
+    }
   }
+  solve_in_lanes(chains, in_lanes, outcomes);
   return outcomes;
 }
 

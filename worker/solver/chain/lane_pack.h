@@ -94,6 +94,9 @@ struct LanePack {
   friend inline LanePack operator+(double a, const LanePack& b) { return all(a) + b; }
   friend inline LanePack operator-(double a, const LanePack& b) { return all(a) - b; }
   friend inline LanePack operator*(double a, const LanePack& b) { return all(a) * b; }
+  friend inline LanePack operator/(double a, const LanePack& b) {
+    return each([&](std::size_t i) { return a / b.part[i]; });
+  }
   inline LanePack& operator+=(const LanePack& b) { return *this = *this + b; }
   inline LanePack& operator-=(const LanePack& b) { return *this = *this - b; }
 };

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <string>
+#include <vector>
 
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
@@ -19,18 +21,31 @@ constexpr double kMostSteps = 1e9;
 
 constexpr AffineContactForce<double> kNoContact{};
 
-}  // namespace
+/// Steps of one length by any integrator. States are kept at intervals, and the state at a drop is
+/// stepped to from the one before.
+class SteppedPath : public FallPath {
+ public:
+  SteppedPath(std::shared_ptr<const Motion> motion, double dt_s, double longest_s,
+              FallProgress* progress);
+  double largest_drop_m() const override { return largest_drop_m_; }
+  ChainState state_at(double H_m) const override;
+  std::size_t bytes() const override;
 
-double longest_fall_s(const Chain& chain) {
-  const double length_m = chain.tip(chain.at_rest()).x_m;
-  return kLongestFall * std::sqrt(2.0 * length_m / chain.gravity_m_s2());
-}
+ private:
+  void locate_turn(const ChainState& before);
+  void keep(std::int64_t step, const ChainState& state);
+  /// Steps from `before` to the instant of the drop H_m, which lies within one step of it.
+  ChainState locate(double H_m, const ChainState& before) const;
 
-Fall::Fall(const Chain& chain, double dt_s)
-    : Fall(std::make_shared<ExplicitMotion>(chain), dt_s, longest_fall_s(chain)) {}
+  std::shared_ptr<const Motion> motion_;
+  double dt_s_;
+  double largest_drop_m_ = 0.0;
+  std::int64_t steps_kept_ = 1;   ///< steps from one kept state to the next
+  std::vector<ChainState> kept_;  ///< drops increasing; bounded, whatever the number of steps
+};
 
-Fall::Fall(std::shared_ptr<const Motion> motion, double dt_s, double longest_s,
-           FallProgress* progress)
+SteppedPath::SteppedPath(std::shared_ptr<const Motion> motion, double dt_s, double longest_s,
+                         FallProgress* progress)
     : motion_(std::move(motion)), dt_s_(dt_s) {
   if (!(longest_s <= kLongestFall * kMostSteps * dt_s)) {
     throw SolveError("the fall would take more than " + exact_number(kMostSteps) +
@@ -65,7 +80,7 @@ Fall::Fall(std::shared_ptr<const Motion> motion, double dt_s, double longest_s,
   }
 }
 
-void Fall::locate_turn(const ChainState& before) {
+void SteppedPath::locate_turn(const ChainState& before) {
   ChainState state;
   const auto tip_after = [&](double h_s) {
     motion_->step(before, kNoContact, h_s, state);
@@ -80,7 +95,7 @@ void Fall::locate_turn(const ChainState& before) {
   largest_drop_m_ = -tip_after(low).y_m;
 }
 
-void Fall::keep(std::int64_t step, const ChainState& state) {
+void SteppedPath::keep(std::int64_t step, const ChainState& state) {
   if (step % steps_kept_ != 0) {
     return;
   }
@@ -95,12 +110,7 @@ void Fall::keep(std::int64_t step, const ChainState& state) {
   steps_kept_ *= 2;
 }
 
-ChainState Fall::state_at(double H_m) const {
-  if (!(H_m > 0.0 && H_m <= largest_drop_m_)) {
-    throw InputError("H = " + exact_number(H_m) +
-                     " m is not allowed: the tip of this model drops at most " +
-                     readable_number(largest_drop_m_, 7) + " m before it turns back");
-  }
+ChainState SteppedPath::state_at(double H_m) const {
   const auto drop = [this](const ChainState& state) { return -motion_->tip(state).y_m; };
   auto after = std::upper_bound(kept_.begin(), kept_.end(), H_m,
                                 [&](double H, const ChainState& state) { return H < drop(state); });
@@ -118,7 +128,7 @@ ChainState Fall::state_at(double H_m) const {
   return locate(H_m, before);
 }
 
-std::size_t Fall::bytes() const {
+std::size_t SteppedPath::bytes() const {
   const auto numbers = [](const ChainState& state) {
     return state.q.size() + state.v.size() + state.acceleration.size() +
            state.algorithmic_offset_rate.size() + state.multipliers_N.size();
@@ -127,7 +137,7 @@ std::size_t Fall::bytes() const {
   return kept_.size() * (sizeof(ChainState) + a_state);
 }
 
-ChainState Fall::locate(double H_m, const ChainState& before) const {
+ChainState SteppedPath::locate(double H_m, const ChainState& before) const {
   // Newton on the drop, kept inside the step; near the largest drop, where the speed vanishes, it
   // falls back on bisection.
   double low = 0.0;
@@ -151,6 +161,29 @@ ChainState Fall::locate(double H_m, const ChainState& before) const {
     h = next;
   }
   return state;
+}
+
+}  // namespace
+
+double longest_fall_s(const Chain& chain) {
+  const double length_m = chain.tip(chain.at_rest()).x_m;
+  return kLongestFall * std::sqrt(2.0 * length_m / chain.gravity_m_s2());
+}
+
+Fall::Fall(const Chain& chain, double dt_s)
+    : Fall(std::make_shared<ExplicitMotion>(chain), dt_s, longest_fall_s(chain)) {}
+
+Fall::Fall(std::shared_ptr<const Motion> motion, double dt_s, double longest_s,
+           FallProgress* progress)
+    : path_(std::make_shared<SteppedPath>(std::move(motion), dt_s, longest_s, progress)) {}
+
+ChainState Fall::state_at(double H_m) const {
+  if (!(H_m > 0.0 && H_m <= largest_drop_m())) {
+    throw InputError("H = " + exact_number(H_m) +
+                     " m is not allowed: the tip of this model drops at most " +
+                     readable_number(largest_drop_m(), 7) + " m before it turns back");
+  }
+  return path_->state_at(H_m);
 }
 
 }  // namespace oblique::solver

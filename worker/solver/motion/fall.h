@@ -1,9 +1,8 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 #include <memory>
-#include <vector>
+#include <utility>
 
 #include "worker/solver/motion/fall_progress.h"
 #include "worker/solver/motion/motion.h"
@@ -13,12 +12,24 @@ namespace oblique::solver {
 /// 100 times the time of a free fall from the chain's length [s]: a fall that lasts longer is none.
 double longest_fall_s(const Chain& chain);
 
+/// The way of a chain from rest to the first turn of its tip, solved. Immutable.
+class FallPath {
+ public:
+  virtual ~FallPath() = default;
+  /// Largest drop of the tip before it first turns back [m].
+  virtual double largest_drop_m() const = 0;
+  /// As Fall::state_at, for 0 < H_m <= largest_drop_m().
+  virtual ChainState state_at(double H_m) const = 0;
+  /// Memory that its states take, or may come to take.
+  virtual std::size_t bytes() const = 0;
+};
+
 /// The free fall from rest up to the instant at which the tip first turns back. One fall passes
-/// every drop H, and nothing in it depends on mu, e*, k or eta2. Immutable after construction:
-/// states are kept at intervals, and the state at a drop is stepped to from the one before, so its
-/// bits do not depend on what was asked before.
+/// every drop H, and nothing in it depends on mu, e*, k or eta2. Immutable; a copy is the same
+/// fall.
 class Fall {
  public:
+  explicit Fall(std::shared_ptr<const FallPath> path) : path_(std::move(path)) {}
   /// Solves the fall with steps of dt_s up to the first turn of the tip. Throws SolveError when it
   /// diverges, lasts longer than `longest_s` or would take more than 1e9 steps. Tells `progress`,
   /// if there is one, how far it is.
@@ -29,26 +40,18 @@ class Fall {
   Fall(const Chain& chain, double dt_s);
 
   /// Largest drop of the tip before it first turns back [m].
-  double largest_drop_m() const { return largest_drop_m_; }
+  double largest_drop_m() const { return path_->largest_drop_m(); }
 
-  /// The state in which the tip has dropped H_m, located to rounding. Throws InputError when H_m is
-  /// not in (0, largest_drop_m()], naming that bound.
+  /// The state in which the tip has dropped H_m, located to rounding; its bits do not depend on
+  /// what was asked before. Throws InputError when H_m is not in (0, largest_drop_m()], naming that
+  /// bound.
   ChainState state_at(double H_m) const;
 
-  /// Memory that its states take.
-  std::size_t bytes() const;
+  /// Memory that its states take, or may come to take.
+  std::size_t bytes() const { return path_->bytes(); }
 
  private:
-  void locate_turn(const ChainState& before);
-  void keep(std::int64_t step, const ChainState& state);
-  /// Steps from `before` to the instant of the drop H_m, which lies within one step of it.
-  ChainState locate(double H_m, const ChainState& before) const;
-
-  std::shared_ptr<const Motion> motion_;
-  double dt_s_;
-  double largest_drop_m_ = 0.0;
-  std::int64_t steps_kept_ = 1;   ///< steps from one kept state to the next
-  std::vector<ChainState> kept_;  ///< drops increasing; bounded, whatever the number of steps
+  std::shared_ptr<const FallPath> path_;
 };
 
 }  // namespace oblique::solver

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "worker/solver/chain/chain.h"
+#include "worker/solver/fall/collocation_kernels.h"
+#include "worker/solver/model/parameters.h"
+#include "worker/solver/motion/fall.h"
+
+namespace oblique::solver {
+
+/// A chain whose fall is wanted. What is pointed to must outlive the fall, `progress` only its
+/// solution.
+struct FallRequest {
+  const Chain* chain;
+  const ModelParameters* model;      ///< of the chain
+  double accuracy;                   ///< relative, of what a contact after the fall gives
+  FallProgress* progress = nullptr;  ///< told how far the fall is, where there is one
+};
+
+/// The fall, or the reason why there is none.
+struct FallSolution {
+  std::shared_ptr<const FallPath> path;
+  std::string error;
+};
+
+/// Solves falls by Gauss collocation, those of one shape side by side in lanes, in the order asked
+/// for. A fall has the same bits whatever was solved beside it.
+std::vector<FallSolution> solve_by_collocation(
+    std::span<const FallRequest> requests,
+    const CollocationKernel& kernel = runnable_collocation_kernels().front());
+
+}  // namespace oblique::solver

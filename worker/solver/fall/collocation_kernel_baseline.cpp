@@ -1,0 +1,9 @@
+#include "worker/solver/fall/collocation_kernel.h"
+
+namespace oblique::solver {
+
+CollocationKernel baseline_collocation() {
+  return collocation_kernel_of<LanePack<BaselineVectors, 2>>("baseline");
+}
+
+}  // namespace oblique::solver
