@@ -39,6 +39,9 @@ double Contact::phi(ContactEvent event, const TipState& tip) const {
 
 std::optional<Contact::Candidate> Contact::earliest_event(const TipState& end, double h_s) const {
   std::optional<Candidate> earliest;
+  if (is_far_from_events(law_, tip_, end, h_s, vt_sign_)) {
+    return earliest;
+  }
   const PossibleEvents possible = possible_events(law_);
   for (std::size_t i = 0; i < possible.count; ++i) {
     const ContactEvent event = possible.events[i];

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <functional>
+#include <random>
 #include <vector>
 
 namespace oblique::solver {
@@ -200,6 +201,47 @@ TEST(GuessEvent, FunctionThatIsZeroThroughoutIsNoEvent) {
     EXPECT_FALSE(guess(slip, ContactEvent::kStick, straight_down, fresh));
     EXPECT_FALSE(guess(stick, ContactEvent::kTangentialExtremum, straight_down, fresh));
   }
+}
+
+TEST(FarFromEvents, OnlyWhereNoEventIsGuessedAndNearlyAlwaysThere) {
+  std::mt19937_64 generator(5);
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  int far = 0;
+  int without_guess = 0;
+  constexpr double h_s = 1e-6;
+  const auto random_start = [&](double vx_m_s, double vy_m_s) {
+    return TipState{1.5e-5 * uniform(generator), -2e-5 + 1e-5 * uniform(generator),
+                    vx_m_s + uniform(generator), vy_m_s + 1.1 * uniform(generator)};
+  };
+  const auto random_end = [&](const TipState& start) {
+    TipState end = start;
+    end.vx_m_s += 0.2 * uniform(generator);
+    end.vy_m_s += 0.2 * uniform(generator);
+    end.x_m += h_s * (0.5 * (start.vx_m_s + end.vx_m_s) + 0.02 * uniform(generator));
+    end.y_m += h_s * (0.5 * (start.vy_m_s + end.vy_m_s) + 0.02 * uniform(generator));
+    return end;
+  };
+  for (const bool compression : {true, false}) {
+    for (const bool stick : {true, false}) {
+      for (int trial = 0; trial < 20'000; ++trial) {
+        SCOPED_TRACE(trial);
+        const ContactLaw law = compression ? (stick ? sticking() : slipping()) : restitution(stick);
+        const double normal_m_s = compression ? -1.0 : 1.0;
+        const TipState start = random_start(stick ? 0.5 : 1.0, normal_m_s);
+        const TipState end = random_end(start);
+        bool is_guessed = false;
+        for (const ContactEvent event : possible(law)) {
+          is_guessed = is_guessed || guess_event(law, event, start, end, h_s, 1.0, false);
+        }
+        const bool is_far = is_far_from_events(law, start, end, h_s, 1.0);
+        EXPECT_FALSE(is_far && is_guessed);
+        far += is_far ? 1 : 0;
+        without_guess += is_guessed ? 0 : 1;
+      }
+    }
+  }
+  EXPECT_GT(far, 1000);
+  EXPECT_GT(far, 0.8 * without_guess);
 }
 
 }  // namespace
