@@ -31,7 +31,8 @@ Contact::Contact(const ContactParameters& parameters, const TipState& touch,
       trial_s_(steps.compression_s),
       // Both forces are zero at touch, so both sides of the cone are.
       fresh_(bit(ContactEvent::kSlipForward) | bit(ContactEvent::kSlipBackward)),
-      record_(law_, touch) {}
+      record_(law_, touch),
+      margin_(law_, touch) {}
 
 double Contact::phi(ContactEvent event, const TipState& tip) const {
   return event_function(law_, event, tip, vt_sign_).value;
@@ -162,6 +163,7 @@ double Contact::full_step_s() const {
 
 void Contact::accept(const TipState& end, const ContactIntegrals<double>& integrals) {
   record_.add_step(law_, tip_, end, integrals);
+  margin_.add_step(law_, tip_, end, trial_s_);
   tip_ = end;
   t_s_ += trial_s_;
   ++steps_;
@@ -185,6 +187,7 @@ void Contact::happen(ContactEvent event) {
     throw SolveError("the contact has more than " + std::to_string(kMostEvents) +
                      " events within " + readable_number(t_s_) + " s");
   }
+  margin_.add_event(law_, event, tip_);
   const double ft = law_.ft_N(tip_);
   const double ft_rate_before = sign_of(ft) * law_.ft_rate_N_s(tip_);
   switch (event) {

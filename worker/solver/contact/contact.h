@@ -5,6 +5,7 @@
 
 #include "worker/solver/contact/contact_events.h"
 #include "worker/solver/contact/contact_law.h"
+#include "worker/solver/contact/contact_margin.h"
 #include "worker/solver/contact/contact_record.h"
 
 namespace oblique::solver {
@@ -48,6 +49,7 @@ class Contact {
 
   /// What has been gathered so far; whole once finished.
   const ContactRecord& record() const { return record_; }
+  const ContactMargin& margin() const { return margin_; }
   double time_s() const { return t_s_; }
   std::int64_t steps() const { return steps_; }
   /// Number of events so far; when it grows, force() has changed.
@@ -95,6 +97,7 @@ class Contact {
   unsigned refuted_ = 0;  ///< events seen inside the present step that turned out not to happen
   Search search_;
   ContactRecord record_;
+  ContactMargin margin_;
 };
 
 }  // namespace oblique::solver

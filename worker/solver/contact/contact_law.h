@@ -53,8 +53,12 @@ class ContactLaw {
     return stick_ ? -tangential_stiffness_N_m_ * tip.vx_m_s
                   : -s_ * parameters_.mu * fn_rate_N_s(tip);
   }
+  /// mu eta2 k_n/k in the present phase: P's velocity in slip per normal velocity of the tip.
+  double slip_coupling() const { return slip_coupling_; }
   /// Tangential deformation u_x = -F_t eta2 / k [m].
   double ux_m(const TipState& tip) const { return -ft_N(tip) / tangential_stiffness_N_m(); }
+  /// Position of P along the ground [m].
+  double xP_m(const TipState& tip) const { return tip.x_m - ux_m(tip); }
   /// Velocity that P has in slip: V_t + s mu eta2 (k_n/k) V_n (paper, eq. 24).
   double slip_velocity_m_s(const TipState& tip) const {
     return tip.vx_m_s + s_ * slip_coupling_ * tip.vy_m_s;
@@ -83,7 +87,7 @@ class ContactLaw {
   double tangential_stiffness_N_m_;
   PhaseKind phase_{};
   double normal_stiffness_N_m_{};  ///< in the present phase
-  double slip_coupling_{};         ///< mu eta2 k_n/k in the present phase
+  double slip_coupling_{};         ///< in the present phase
   bool stick_;
   double s_;
   double x_anchor_m_;

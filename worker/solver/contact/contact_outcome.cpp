@@ -71,6 +71,9 @@ CaseResult contact_result(const Contact& contact, const ContactParameters& param
   result.vt_out_m_s = contact.tip().vx_m_s;
   result.vn_out_m_s = contact.tip().vy_m_s;
   contact.record().write_to(result);
+  const ContactMargin::Nearest nearest = contact.margin().nearest(result.fn_peak_N);
+  result.margin = nearest.distance;
+  result.margin_event = ContactMargin::name_of(nearest.event);
   balance(in, out, contact.record(), result.energy);
   return result;
 }

@@ -9,14 +9,10 @@ namespace {
 
 constexpr double kRippleFraction = 0.05;
 
-double position_of_P(const ContactLaw& law, const TipState& tip) {
-  return tip.x_m - law.ux_m(tip);
-}
-
 }  // namespace
 
 ContactRecord::ContactRecord(const ContactLaw& law, const TipState& touch)
-    : xP_m_(position_of_P(law, touch)) {
+    : xP_m_(law.xP_m(touch)) {
   states_.push_back({law.is_stick(), law.is_compression(), 0.0});
 }
 
@@ -48,7 +44,7 @@ void ContactRecord::add_tangential_peak(double ft_N, double t_s) {
 }
 
 void ContactRecord::close_slide(const ContactLaw& law, const TipState& tip) {
-  const double xP = position_of_P(law, tip);
+  const double xP = law.xP_m(tip);
   if (!states_.back().stick) {
     slide_m_ += std::abs(xP - xP_m_);
   }
