@@ -10,12 +10,6 @@
 namespace oblique::solver {
 namespace {
 
-/// Whether falls of the two can be solved side by side.
-bool can_share_lanes(const ModelParameters& a, const ModelParameters& b) {
-  return a.integrator == Integrator::kExplicit && b.integrator == Integrator::kExplicit &&
-         a.lengths_m.size() == b.lengths_m.size() && a.elements_per_link == b.elements_per_link;
-}
-
 std::size_t bytes_of(const std::optional<FallOutcome>& outcome) {
   return outcome && outcome->fallen ? outcome->fallen->fall().bytes() : 0;
 }
@@ -67,7 +61,7 @@ FallOutcome FallCache::use(Entries::iterator entry) {
 /// Makes entries for what this thread is to solve now: none when others solve it all.
 std::vector<FallCache::Entries::iterator> FallCache::claim(const ModelParameters& falling,
                                                            std::span<const ModelParameters> ahead) {
-  const bool in_lanes = falling.integrator == Integrator::kExplicit;
+  const bool in_lanes = fall_side_by_side(falling, falling);
   const std::size_t most = in_lanes ? runnable_lane_kernels().front().lanes : 1;
   std::vector<Entries::iterator> claimed;
   const auto claim_if_missing = [&](const ModelParameters& missing) {
@@ -81,7 +75,7 @@ std::vector<FallCache::Entries::iterator> FallCache::claim(const ModelParameters
     if (claimed.size() >= most || !has_room_ahead()) {
       break;
     }
-    if (ModelParameters next = fall_model(model); !in_lanes || can_share_lanes(falling, next)) {
+    if (ModelParameters next = fall_model(model); !in_lanes || fall_side_by_side(falling, next)) {
       claim_if_missing(next);
     }
   }

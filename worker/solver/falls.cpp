@@ -35,8 +35,8 @@ FallOutcome solve_by_steps(const SharedChain& chain) {
 }
 
 /// Whether no step was asked for: steps are then as long as accuracy allows.
-bool falls_by_collocation(const PreparedChain& chain) {
-  return chain.model().integrator == Integrator::kExplicit && chain.model().dt_fall_s == 0.0;
+bool falls_by_collocation(const ModelParameters& model) {
+  return model.integrator == Integrator::kExplicit && model.dt_fall_s == 0.0;
 }
 
 /// Solves the falls at `places` side by side.
@@ -66,11 +66,16 @@ PreparedChain::PreparedChain(const ModelParameters& model)
       motion_(make_motion(model_, chain_)),
       fall_step_s_(StepChoice(chain_, model_).fall_s()) {}
 
+bool fall_side_by_side(const ModelParameters& a, const ModelParameters& b) {
+  return falls_by_collocation(a) && falls_by_collocation(b) &&
+         a.lengths_m.size() == b.lengths_m.size() && a.elements_per_link == b.elements_per_link;
+}
+
 std::vector<FallOutcome> solve_falls(std::span<const std::shared_ptr<const PreparedChain>> chains) {
   std::vector<FallOutcome> outcomes(chains.size());
   std::vector<std::size_t> in_lanes;
   for (std::size_t i = 0; i < chains.size(); ++i) {
-    if (falls_by_collocation(*chains[i])) {
+    if (falls_by_collocation(chains[i]->model())) {
       in_lanes.push_back(i);
     } else {
       outcomes[i] = solve_by_steps(chains[i]);

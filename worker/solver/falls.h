@@ -65,6 +65,9 @@ struct FallOutcome {
   std::string error;
 };
 
+/// Whether solve_falls() solves the two side by side, so that both cost hardly more than one.
+bool fall_side_by_side(const ModelParameters& a, const ModelParameters& b);
+
 /// Solves the falls of some chains, side by side where their integrator and shapes allow, and gives
 /// the outcomes in the same order. A fall has the same bits whatever was solved beside it, and one
 /// that fails leaves the others alone.

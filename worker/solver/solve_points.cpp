@@ -128,8 +128,9 @@ class Crowd {
       validate_point(finger->model(), request.H_m, request.mu, request.e_star);
       const ContactSteps steps = touches_.steps(finger, request.e_star);
       const ChainState& touch = touches_.touch(*finger, request.H_m);
-      group_ += continues_group(point) ? 0U : 1U;
+      group_ += continues_group(point, steps) ? 0U : 1U;
       last_ = point;
+      last_compression_s_ = steps.compression_s;
       under_way_.insert_or_assign(next_tag_, Entry{point, touch.t_s});
       return ContactCase{next_tag_++,
                          group_,
@@ -143,9 +144,11 @@ class Crowd {
     }
   }
 
-  bool continues_group(const FingerPoint& point) const {
+  /// Whether the contact comes the same way as that begun last up to its first turn.
+  bool continues_group(const FingerPoint& point, const ContactSteps& steps) const {
     return last_ && last_->finger.parts() == point.finger.parts() &&
-           last_->point.H_m == point.point.H_m && last_->point.mu == point.point.mu;
+           last_->point.H_m == point.point.H_m && last_->point.mu == point.point.mu &&
+           last_compression_s_ == steps.compression_s;
   }
 
   void give(ContactOutcome&& contact) {
@@ -166,6 +169,7 @@ class Crowd {
   std::optional<FingerPoint> upcoming_;  ///< taken from the source, not begun
   bool has_ended_ = false;
   std::optional<FingerPoint> last_;  ///< begun last in lanes
+  double last_compression_s_ = 0.0;  ///< its step
   std::map<std::uint64_t, Entry> under_way_;
   std::uint64_t next_tag_ = 0;
   std::uint64_t group_ = 0;

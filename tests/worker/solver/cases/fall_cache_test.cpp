@@ -106,15 +106,16 @@ TEST(FallCacheTest, MissingFallsAreSolvedBesideTheOneAskedForUntilTheLanesAreFul
 
 TEST(FallCacheTest, FallsOfOtherShapesOrIntegratorsAreNotSolvedBeside) {
   CountedFalls falls;
-  std::vector<ModelParameters> ahead(4, coarse_model());
+  std::vector<ModelParameters> ahead(5, coarse_model());
   ahead[0].elements_per_link = 2;
   ahead[1].lengths_m = {0.4, 0.4};
   ahead[2].integrator = Integrator::kGeneralizedAlpha;
-  ahead[3].E_Pa = 6e10;
+  ahead[3].dt_fall_s = 1e-5;  // by steps of this length, which have no lanes
+  ahead[4].E_Pa = 6e10;
   falls.cache.fall(coarse_model(), ahead);
   ASSERT_EQ(falls.solved.size(), 1U);
   ASSERT_EQ(falls.solved[0].size(), 2U);
-  EXPECT_EQ(falls.solved[0][1], ahead[3]);
+  EXPECT_EQ(falls.solved[0][1], ahead[4]);
   falls.cache.fall(model_that_fails(), ahead);
   EXPECT_EQ(falls.solved.back().size(), 1U) << "generalized-alpha has no lanes";
 }
