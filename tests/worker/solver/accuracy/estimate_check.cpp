@@ -215,19 +215,25 @@ double cpu_s() {
   return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
 }
 
-/// CPU time of a sweep over 10 drops, 10 frictions and 10 restitutions, falls aside.
-double sweep_s(const solver::Finger& finger, const solver::FallSource* companion_falls) {
-  static constexpr std::uint64_t kSide = 10;
-  std::uint64_t next = 0;
-  const auto source = [&]() -> std::optional<solver::FingerPoint> {
-    if (next == kSide * kSide * kSide) {
-      return std::nullopt;
-    }
-    const auto part = [](std::uint64_t i) { return static_cast<double>(i % kSide) / (kSide - 1); };
-    const std::uint64_t i = next++;
-    return solver::FingerPoint{finger,
-                               {i, 0.1 + 1.05 * part(i / (kSide * kSide)),
-                                0.05 + 0.9 * part(i / kSide), 0.2 + 0.8 * part(i)}};
+/// 10 drops, 10 frictions and 10 restitutions.
+std::vector<solver::PointRequest> sweep() {
+  constexpr std::uint64_t kSide = 10;
+  std::vector<solver::PointRequest> points;
+  for (std::uint64_t i = 0; i < kSide * kSide * kSide; ++i) {
+    const auto part = [](std::uint64_t of) { return static_cast<double>(of % 10) / 9.0; };
+    points.push_back({i, 0.1 + 1.05 * part(i / (kSide * kSide)), 0.05 + 0.9 * part(i / kSide),
+                      0.2 + 0.8 * part(i)});
+  }
+  return points;
+}
+
+/// CPU time of the points, falls aside.
+double cost_s(const solver::Finger& finger, const std::vector<solver::PointRequest>& points,
+              const solver::FallSource* companion_falls) {
+  std::size_t next = 0;
+  const auto source = [&] {
+    return next < points.size() ? std::optional(solver::FingerPoint{finger, points[next++]})
+                                : std::nullopt;
   };
   const auto sink = [](solver::PointOutcome&&) {};
   const double begun_s = cpu_s();
@@ -240,7 +246,8 @@ double sweep_s(const solver::Finger& finger, const solver::FallSource* companion
 }
 
 /// With and without errors in turn, the best of three each.
-void tell_cost(const ModelParameters& model) {
+void tell_cost(const ModelParameters& model, std::string_view name,
+               const std::vector<solver::PointRequest>& points) {
   const std::array models{model, solver::companion_model(model)};
   const auto falls = solver::solve_falls(models);
   const solver::FallSource companion_falls = [&](std::span<const ModelParameters>) {
@@ -250,17 +257,19 @@ void tell_cost(const ModelParameters& model) {
   double without_s = HUGE_VAL;
   double with_s = HUGE_VAL;
   for (int turn = 0; turn < 3; ++turn) {
-    without_s = std::min(without_s, sweep_s(finger, nullptr));
-    with_s = std::min(with_s, sweep_s(finger, &companion_falls));
+    without_s = std::min(without_s, cost_s(finger, points, nullptr));
+    with_s = std::min(with_s, cost_s(finger, points, &companion_falls));
   }
-  fmt::print("n = {}: {:.0f} cases/s without errors, {:.0f} with, {:.2f} times the cost\n",
-             model.elements_per_link, 1000.0 / without_s, 1000.0 / with_s, with_s / without_s);
+  const auto count = static_cast<double>(points.size());
+  fmt::print("n = {}, {}: {:.0f} cases/s without errors, {:.0f} with, {:.2f} times the cost\n",
+             model.elements_per_link, name, count / without_s, count / with_s, with_s / without_s);
 }
 
 void check(const Settings& settings) {
   if (settings.cost) {
     for (const int mesh : settings.meshes) {
-      tell_cost(model_of(settings, mesh));
+      tell_cost(model_of(settings, mesh), "sweep", sweep());
+      tell_cost(model_of(settings, mesh), "random", random_points(settings));
     }
     return;
   }
