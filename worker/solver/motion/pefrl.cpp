@@ -1,25 +1,25 @@
 #include "worker/solver/motion/pefrl.h"
 
-#include <cmath>
-
 namespace oblique::solver {
+namespace {
 
-double Pefrl::stability_limit() {
-  // The map of q'' = -q over one step is stable while |trace| <= 2.
-  const auto is_stable = [](double h) {
-    double half_trace = 0.0;
-    for (int column = 0; column < 2; ++column) {
-      double q = column == 0 ? 1.0 : 0.0;
-      double v = column == 0 ? 0.0 : 1.0;
-      for (std::size_t i = 0; i < kKicks; ++i) {
-        q += drift[i] * h * v;
-        v -= kick[i] * h * q;
-      }
-      q += drift[kKicks] * h * v;
-      half_trace += 0.5 * (column == 0 ? q : v);
+/// The map of q'' = -q over one step h is stable while |trace| <= 2.
+constexpr bool is_stable(double h) {
+  double half_trace = 0.0;
+  for (int column = 0; column < 2; ++column) {
+    double q = column == 0 ? 1.0 : 0.0;
+    double v = column == 0 ? 0.0 : 1.0;
+    for (std::size_t i = 0; i < Pefrl::kKicks; ++i) {
+      q += Pefrl::drift[i] * h * v;
+      v -= Pefrl::kick[i] * h * q;
     }
-    return std::abs(half_trace) <= 1.0;
-  };
+    q += Pefrl::drift[Pefrl::kKicks] * h * v;
+    half_trace += 0.5 * (column == 0 ? q : v);
+  }
+  return half_trace <= 1.0 && half_trace >= -1.0;
+}
+
+constexpr double longest_stable() {
   double stable = 1.0;
   while (is_stable(stable + 0.01)) {
     stable += 0.01;
@@ -30,6 +30,13 @@ double Pefrl::stability_limit() {
     (is_stable(middle) ? stable : unstable) = middle;
   }
   return stable;
+}
+
+}  // namespace
+
+double Pefrl::stability_limit() {
+  constexpr double kLimit = longest_stable();  // found by the compiler: points ask for it often
+  return kLimit;
 }
 
 }  // namespace oblique::solver
