@@ -87,13 +87,15 @@ class StepControl {
 /// A fall on its way, in a lane.
 class FallingChain {
  public:
-  FallingChain(const CollocationKernel& kernel, const FallRequest& request, FallSolution& solution)
+  FallingChain(const CollocationKernel& kernel, const std::shared_ptr<const GaussCollocation>& rule,
+               const FallRequest& request, FallSolution& solution)
       : request_(request),
         solution_(solution),
         length_m_(request.chain->tip(request.chain->at_rest()).x_m),
         longest_s_(longest_fall_s(*request.chain)),
         error_m_(length_m_ * std::max(kSmallestPositionError, kPositionError * request.accuracy)),
-        path_(std::make_shared<CollocationPath>(kernel, *request.chain, *request.model, error_m_)),
+        path_(std::make_shared<CollocationPath>(kernel, rule, *request.chain, *request.model,
+                                                error_m_)),
         control_(std::sqrt(length_m_ / gravity_m_s2()),
                  kUnresolved * request.accuracy * std::sqrt(length_m_ * gravity_m_s2())) {}
 
@@ -154,7 +156,8 @@ class FallingChain {
 void solve_in_lanes(const CollocationKernel& kernel, std::span<const FallRequest> requests,
                     std::span<const std::size_t> places, std::vector<FallSolution>& solutions) {
   const FallRequest& first = requests[places.front()];
-  CollocationLanes lanes(kernel, *first.chain, *first.model);
+  const auto rule = std::make_shared<const GaussCollocation>(kernel.stages);
+  CollocationLanes lanes(kernel, *rule, *first.chain, *first.model);
   std::vector<std::optional<FallingChain>> falling(lanes.lanes());
   std::vector<double> h_s(lanes.lanes());
   std::vector<double> error_m(lanes.lanes());
@@ -168,7 +171,7 @@ void solve_in_lanes(const CollocationKernel& kernel, std::span<const FallRequest
       if (!here && next < places.size()) {
         const std::size_t place = places[next++];
         lanes.load(lane, *requests[place].chain, *requests[place].model);
-        here.emplace(kernel, requests[place], solutions[place]);
+        here.emplace(kernel, rule, requests[place], solutions[place]);
       }
       h_s[lane] = here ? here->h_s() : 0.0;
       error_m[lane] = here ? here->error_m() : 0.0;

@@ -6,14 +6,14 @@
 #include "worker/solver/chain/lane_pack.h"
 #include "worker/solver/fall/collocation_kernels.h"
 #include "worker/solver/fall/front_kernel.h"
-#include "worker/solver/fall/gauss_rule.h"
+#include "worker/solver/fall/gauss_collocation.h"
 
 namespace oblique::solver {
 
 /// One step of Gauss collocation for the lanes of `Pack`, a LanePack; compiled once for each
 /// instruction set. Unknowns are the accelerations of all stages, found by a simplified Newton
 /// method: one tangent a step, at the middle of what is predicted.
-template <class Pack>
+template <class Pack, std::size_t stages>
 class CollocationStep {
  public:
   explicit CollocationStep(const CollocationArrays& arrays)
@@ -34,8 +34,8 @@ class CollocationStep {
 
  private:
   using Vector = PlanarVector<Pack>;
-  static constexpr std::size_t kStages = GaussRule6::kStages;
-  static constexpr std::size_t kPairs = GaussRule6::kPairs;
+  static constexpr std::size_t kStages = stages;
+  static constexpr std::size_t kPairs = GaussCollocation::pairs_of(stages);
 
   static const Pack* packs(const double* numbers) { return reinterpret_cast<const Pack*>(numbers); }
   static Pack* packs(double* numbers) { return reinterpret_cast<Pack*>(numbers); }
@@ -50,15 +50,15 @@ class CollocationStep {
   inline void iterate() const;
   inline void finish() const;
 
-  const GaussRule6& rule_;
+  const GaussCollocation& rule_;
   const CollocationArrays& arrays_;
   ChainTables<Pack> chain_;
   FrontChain<Pack> fronts_;
   std::size_t size_;  ///< entries of a vector
 };
 
-template <class Pack>
-void CollocationStep<Pack>::prepare() const {
+template <class Pack, std::size_t stages>
+void CollocationStep<Pack, stages>::prepare() const {
   const Pack h = *packs(arrays_.h_s);
   const Pack squared_h = h * h;
   const Pack* q = packs(arrays_.q);
@@ -84,10 +84,10 @@ void CollocationStep<Pack>::prepare() const {
   }
 }
 
-template <class Pack>
-void CollocationStep<Pack>::put_tangents() const {
-  const Pack* before = packs(arrays_.stage_q) + (kStages / 2 - 1) * size_;
-  const Pack* after = before + size_;
+template <class Pack, std::size_t stages>
+void CollocationStep<Pack, stages>::put_tangents() const {
+  const Pack* before = packs(arrays_.stage_q) + (kStages - 1) / 2 * size_;
+  const Pack* after = packs(arrays_.stage_q) + kStages / 2 * size_;
   const auto middle = [&](std::size_t row) {
     return 0.5 * (pair_at(before, row) + pair_at(after, row));
   };
@@ -106,8 +106,8 @@ void CollocationStep<Pack>::put_tangents() const {
 }
 
 /// Q_gravity - dU/dq - M a of a stage.
-template <class Pack>
-void CollocationStep<Pack>::put_residual(std::size_t stage) const {
+template <class Pack, std::size_t stages>
+void CollocationStep<Pack, stages>::put_residual(std::size_t stage) const {
   const Pack* q = packs(arrays_.stage_q) + stage * size_;
   const Pack* a = packs(arrays_.stage_a) + stage * size_;
   Pack* residual = packs(arrays_.work) + stage * size_;
@@ -150,8 +150,8 @@ void CollocationStep<Pack>::put_residual(std::size_t stage) const {
   put_pair(residual, 0, Vector{});
 }
 
-template <class Pack>
-void CollocationStep<Pack>::iterate() const {
+template <class Pack, std::size_t stages>
+void CollocationStep<Pack, stages>::iterate() const {
   for (std::size_t stage = 0; stage < kStages; ++stage) {
     put_residual(stage);
   }
@@ -207,8 +207,8 @@ void CollocationStep<Pack>::iterate() const {
   *packs(arrays_.squares) = squares;
 }
 
-template <class Pack>
-void CollocationStep<Pack>::finish() const {
+template <class Pack, std::size_t stages>
+void CollocationStep<Pack, stages>::finish() const {
   const Pack h = *packs(arrays_.h_s);
   Pack squares{};
   for (std::size_t i = 0; i < size_; ++i) {
@@ -234,10 +234,10 @@ void CollocationStep<Pack>::finish() const {
   *packs(arrays_.squares) = (h * h) * squares;
 }
 
-template <class Pack>
+template <class Pack, std::size_t stages>
 CollocationKernel collocation_kernel_of(std::string_view name) {
-  return {name, Pack::kLanes, &CollocationStep<Pack>::prepare, &CollocationStep<Pack>::iterate,
-          &CollocationStep<Pack>::finish};
+  using Step = CollocationStep<Pack, stages>;
+  return {name, Pack::kLanes, stages, &Step::prepare, &Step::iterate, &Step::finish};
 }
 
 }  // namespace oblique::solver

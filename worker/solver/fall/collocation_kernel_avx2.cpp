@@ -3,7 +3,7 @@
 namespace oblique::solver {
 
 CollocationKernel avx2_collocation() {
-  return collocation_kernel_of<LanePack<Avx2Vectors, 1>>("avx2");
+  return collocation_kernel_of<LanePack<Avx2Vectors, 1>, kCollocationStages>("avx2");
 }
 
 }  // namespace oblique::solver

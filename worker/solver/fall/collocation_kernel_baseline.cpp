@@ -3,7 +3,7 @@
 namespace oblique::solver {
 
 CollocationKernel baseline_collocation() {
-  return collocation_kernel_of<LanePack<BaselineVectors, 2>>("baseline");
+  return collocation_kernel_of<LanePack<BaselineVectors, 2>, kCollocationStages>("baseline");
 }
 
 }  // namespace oblique::solver

@@ -5,14 +5,14 @@
 #include <string_view>
 
 #include "worker/solver/chain/lane_chains.h"
-#include "worker/solver/fall/gauss_rule.h"
+#include "worker/solver/fall/gauss_collocation.h"
 
 namespace oblique::solver {
 
 /// What one step of all lanes reads and writes: each number stands once a lane, element
 /// [i * lanes + lane], aligned for the widest vectors. A vector has 2 rows entries.
 struct CollocationArrays {
-  const GaussRule6* rule;
+  const GaussCollocation* rule;
   LaneTables chain;
   const double* elements;  ///< ElementConstants of each link
   const double* tip_mass_kg;
@@ -38,6 +38,7 @@ struct CollocationArrays {
 struct CollocationKernel {
   std::string_view name;  ///< of the instruction set
   std::size_t lanes;
+  std::size_t stages;
   /// Predicts, and factors the matrices of Newton's method.
   void (*prepare)(const CollocationArrays& arrays);
   /// One iteration. Leaves in `squares` the sum over stages and rows of mass times squared
@@ -47,6 +48,9 @@ struct CollocationKernel {
   /// squares of the two highest Legendre coefficients of the accelerations [kg m^2/s^2].
   void (*finish)(const CollocationArrays& arrays);
 };
+
+/// Stages of the kernels below, chosen by work and precision (README.md).
+inline constexpr std::size_t kCollocationStages = 6;
 
 /// Kernels that this machine can run, the fastest first; never empty.
 std::span<const CollocationKernel> runnable_collocation_kernels();

@@ -29,16 +29,16 @@ constexpr std::size_t numbers_of() {
 
 }  // namespace
 
-CollocationLanes::CollocationLanes(const CollocationKernel& kernel, const Chain& chain,
-                                   const ModelParameters& model)
+CollocationLanes::CollocationLanes(const CollocationKernel& kernel, const GaussCollocation& rule,
+                                   const Chain& chain, const ModelParameters& model)
     : kernel_(kernel),
       size_(2 * static_cast<std::size_t>(chain.rows())),
       chains_(chain.tables(), kernel.lanes),
       total_kg_(kernel.lanes) {
   const std::size_t links = chain.links();
   const std::size_t elements = links * chain.tables().elements_per_link;
-  constexpr std::size_t kPairs = GaussRule6::kPairs;
-  constexpr std::size_t kStages = GaussRule6::kStages;
+  const std::size_t stages = kernel.stages;
+  const std::size_t pairs = GaussCollocation::pairs_of(stages);
   std::vector<std::pair<double**, std::size_t>> parts{
       {&elements_, links * numbers_of<Constants>()},
       {&tip_mass_kg_, 1},
@@ -47,12 +47,12 @@ CollocationLanes::CollocationLanes(const CollocationKernel& kernel, const Chain&
       {&active_, 1},
       {&state_, 3 * size_},
       {&next_, 3 * size_},
-      {&arrays_.stage_q, kStages * size_},
-      {&arrays_.stage_a, kStages * size_},
-      {&arrays_.work, kStages * size_},
+      {&arrays_.stage_q, stages * size_},
+      {&arrays_.stage_a, stages * size_},
+      {&arrays_.work, 2 * pairs * size_},
       {&arrays_.tangents, elements * numbers_of<TangentBlocks<double>>()},
-      {&arrays_.fronts, kPairs * elements * numbers_of<ElementFront<double>>()},
-      {&arrays_.ends, kPairs * links * numbers_of<EndFront<double>>()},
+      {&arrays_.fronts, pairs * elements * numbers_of<ElementFront<double>>()},
+      {&arrays_.ends, pairs * links * numbers_of<EndFront<double>>()},
       {&arrays_.squares, 1}};
   // Every part begins on a line, whatever the number of lanes.
   constexpr std::size_t kLine = numbers_of<Line>();
@@ -67,7 +67,7 @@ CollocationLanes::CollocationLanes(const CollocationKernel& kernel, const Chain&
     *start = next->numbers;
     next += lines(count);
   }
-  arrays_.rule = &rule_;
+  arrays_.rule = &rule;
   arrays_.chain = chains_.tables();
   arrays_.elements = elements_;
   arrays_.tip_mass_kg = tip_mass_kg_;
@@ -197,7 +197,7 @@ void CollocationLanes::copy_state(std::size_t lane, double* q_v_mean) const {
 }
 
 void CollocationLanes::copy_stages(std::size_t lane, double* accelerations) const {
-  for (std::size_t i = 0; i < GaussRule6::kStages * size_; ++i) {
+  for (std::size_t i = 0; i < kernel_.stages * size_; ++i) {
     accelerations[i] = arrays_.stage_a[i * lanes() + lane];
   }
 }

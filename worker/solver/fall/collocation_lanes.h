@@ -7,7 +7,7 @@
 #include "worker/solver/chain/chain.h"
 #include "worker/solver/chain/lane_chains.h"
 #include "worker/solver/fall/collocation_kernels.h"
-#include "worker/solver/fall/gauss_rule.h"
+#include "worker/solver/fall/gauss_collocation.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::solver {
@@ -17,8 +17,9 @@ namespace oblique::solver {
 class CollocationLanes {
  public:
   /// Lanes for chains of the shape of `chain`, whose model is `model`.
-  CollocationLanes(const CollocationKernel& kernel, const Chain& chain,
-                   const ModelParameters& model);
+  /// `rule` has the kernel's stages and must outlive this.
+  CollocationLanes(const CollocationKernel& kernel, const GaussCollocation& rule,
+                   const Chain& chain, const ModelParameters& model);
   CollocationLanes(const CollocationLanes&) = delete;
   CollocationLanes& operator=(const CollocationLanes&) = delete;
   ~CollocationLanes() = default;
@@ -26,7 +27,6 @@ class CollocationLanes {
   std::size_t lanes() const { return kernel_.lanes; }
   /// Entries of a vector of positions, rates or accelerations: 2 rows.
   std::size_t size() const { return size_; }
-  const GaussRule6& rule() const { return rule_; }
 
   /// Puts a chain with its state into a lane: position, rates, and the mean acceleration over the
   /// step that led there.
@@ -67,7 +67,6 @@ class CollocationLanes {
   void set_constants(std::size_t lane, const Chain& chain, const ModelParameters& model);
 
   CollocationKernel kernel_;
-  GaussRule6 rule_;
   std::size_t size_;
   LaneChains chains_;
   std::vector<Line> memory_;

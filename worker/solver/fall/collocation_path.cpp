@@ -8,7 +8,7 @@
 namespace oblique::solver {
 namespace {
 
-constexpr std::size_t kStages = GaussRule6::kStages;
+constexpr std::size_t kMostStages = GaussCollocation::kMostStages;
 /// Numbers that a fall keeps at most, of states and of intervals each: 16 MB. All steps of the
 /// default model fit.
 constexpr std::size_t kMostNumbers = (std::size_t{16} << 20) / sizeof(double);
@@ -16,17 +16,17 @@ constexpr std::size_t kMostNumbers = (std::size_t{16} << 20) / sizeof(double);
 /// What the accelerations of the stages do up to the fraction c of a step: v + h sum by_v a and
 /// q + c h v + h^2 sum by_q a.
 struct DenseWeights {
-  DenseWeights(const GaussRule6& rule, double c) {
+  DenseWeights(const GaussCollocation& rule, double c) {
     rule.integrals(c, by_v);
-    for (std::size_t k = 0; k < kStages; ++k) {
+    for (std::size_t k = 0; k < rule.stages; ++k) {
       by_q[k] = 0.0;
-      for (std::size_t j = 0; j < kStages; ++j) {
+      for (std::size_t j = 0; j < rule.stages; ++j) {
         by_q[k] += by_v[j] * rule.integral[j][k];
       }
     }
   }
-  double by_v[kStages];
-  double by_q[kStages];
+  double by_v[kMostStages];
+  double by_q[kMostStages];
 };
 
 }  // namespace
@@ -34,7 +34,7 @@ struct DenseWeights {
 double TipOverStep::y_m(double c) const {
   const DenseWeights weights(rule_, c);
   double shift = 0.0;
-  for (std::size_t k = 0; k < kStages; ++k) {
+  for (std::size_t k = 0; k < rule_.stages; ++k) {
     shift += weights.by_q[k] * ay_m_s2_[k];
   }
   return y_m_ + (c * h_s_ * vy_m_s_ + h_s_ * h_s_ * shift);
@@ -42,22 +42,22 @@ double TipOverStep::y_m(double c) const {
 
 double TipOverStep::vy_by(const double* weights) const {
   double change = 0.0;
-  for (std::size_t k = 0; k < kStages; ++k) {
+  for (std::size_t k = 0; k < rule_.stages; ++k) {
     change += weights[k] * ay_m_s2_[k];
   }
   return vy_m_s_ + h_s_ * change;
 }
 
 double TipOverStep::vy_m_s(double c) const {
-  double b[kStages];
+  double b[kMostStages];
   rule_.integrals(c, b);
   return vy_by(b);
 }
 
 double TipOverStep::turn() const {
   double low = 0.0;
-  for (std::size_t place = 0; place <= kStages; ++place) {
-    const bool is_stage = place < kStages;
+  for (std::size_t place = 0; place <= rule_.stages; ++place) {
+    const bool is_stage = place < rule_.stages;
     double high = is_stage ? rule_.node[place] : 1.0;
     if (vy_by(is_stage ? rule_.integral[place] : rule_.weight) < 0.0) {
       low = high;
@@ -96,12 +96,12 @@ double TipOverStep::at_drop(double H_m, double last) const {
 }
 
 bool CollocationPath::append(const CollocationLanes& lanes, std::size_t lane, double h_s) {
-  std::array<double, kStages> ay{};
-  for (std::size_t stage = 0; stage < kStages; ++stage) {
+  std::array<double, kMostStages> ay{};
+  for (std::size_t stage = 0; stage < kernel_.stages; ++stage) {
     ay[stage] = lanes.stage_a(lane, stage, tip());
   }
   const double y_m = lanes.q(lane, tip());
-  const TipOverStep step(rule_, h_s, y_m, lanes.v(lane, tip()), ay);
+  const TipOverStep step(*rule_, h_s, y_m, lanes.v(lane, tip()), ay);
   keep(lanes, lane);
   steps_.push_back({time_s_, -y_m, h_s});
   const double turn = step.turn();
@@ -120,16 +120,14 @@ void CollocationPath::keep(const CollocationLanes& lanes, std::size_t lane) {
     return;
   }
   const std::size_t state = 3 * size();
-  states_.resize(states_.size() + state);
-  lanes.copy_state(lane, states_.data() + states_.size() - state);
-  if (states_.size() <= kMostNumbers) {
+  lanes.copy_state(lane, states_.emplace_back(state).data());
+  if (states_.size() * state <= kMostNumbers) {
     return;
   }
-  const std::size_t kept = states_.size() / state;
-  for (std::size_t i = 1; 2 * i < kept; ++i) {
-    std::copy_n(states_.data() + 2 * i * state, state, states_.data() + i * state);
+  for (std::size_t i = 1; 2 * i < states_.size(); ++i) {
+    states_[i] = std::move(states_[2 * i]);
   }
-  states_.resize((kept + 1) / 2 * state);
+  states_.resize((states_.size() + 1) / 2);
   steps_kept_ *= 2;
 }
 
@@ -154,14 +152,14 @@ std::shared_ptr<const CollocationPath::Interval> CollocationPath::solve_again(
     std::size_t number) const {
   const std::size_t first = number * steps_kept_;
   const std::size_t last = std::min(first + steps_kept_, steps_.size());
-  CollocationLanes lanes(kernel_, chain_, model_);
-  const double* start = states_.data() + number * 3 * size();
+  CollocationLanes lanes(kernel_, *rule_, chain_, model_);
+  const double* start = states_[number].data();
   lanes.set_state(0, start, start + size(), start + 2 * size());
   std::vector<double> h_s(lanes.lanes(), 0.0);
   const std::vector<double> error_m(lanes.lanes(), error_m_);
   std::vector<CollocationLanes::Attempt> attempts(lanes.lanes());
   const std::vector<unsigned char> accept(lanes.lanes(), 1);
-  auto interval = std::make_shared<Interval>((last - first) * (2 + kStages) * size());
+  auto interval = std::make_shared<Interval>((last - first) * step_size());
   double* next = interval->data();
   std::vector<double> state(3 * size());
   for (std::size_t step = first; step < last; ++step) {
@@ -170,16 +168,15 @@ std::shared_ptr<const CollocationPath::Interval> CollocationPath::solve_again(
     lanes.attempt(h_s, error_m, attempts);
     next = std::copy_n(state.data(), 2 * size(), next);
     lanes.copy_stages(0, next);
-    next += kStages * size();
+    next += kernel_.stages * size();
     lanes.settle(accept);
   }
   return interval;
 }
 
 std::size_t CollocationPath::bytes() const {
-  const std::size_t all = steps_.size() * (2 + kStages) * size();
-  return steps_.size() * sizeof(Step) +
-         sizeof(double) * (states_.size() + std::min(all, kMostNumbers));
+  const std::lock_guard lock(mutex_);
+  return steps_.size() * sizeof(Step) + sizeof(double) * (states_.size() * 3 * size() + numbers_);
 }
 
 ChainState CollocationPath::state_at(double H_m) const {
@@ -188,16 +185,16 @@ ChainState CollocationPath::state_at(double H_m) const {
   const auto number = static_cast<std::size_t>(after - steps_.begin() - 1);
   const Step& step = steps_[number];
   const auto kept = interval(number / steps_kept_);
-  const double* q = kept->data() + number % steps_kept_ * (2 + kStages) * size();
+  const double* q = kept->data() + number % steps_kept_ * step_size();
   const double* v = q + size();
   const double* stages = v + size();
-  std::array<double, kStages> ay{};
-  for (std::size_t stage = 0; stage < kStages; ++stage) {
+  std::array<double, kMostStages> ay{};
+  for (std::size_t stage = 0; stage < kernel_.stages; ++stage) {
     ay[stage] = stages[stage * size() + tip()];
   }
-  const TipOverStep over(rule_, step.h_s, q[tip()], v[tip()], ay);
+  const TipOverStep over(*rule_, step.h_s, q[tip()], v[tip()], ay);
   const double c = over.at_drop(H_m, number + 1 == steps_.size() ? last_turn_ : 1.0);
-  const DenseWeights weights(rule_, c);
+  const DenseWeights weights(*rule_, c);
   ChainState touch;
   touch.t_s = step.t_s + c * step.h_s;
   touch.q.resize(2, chain_.rows());
@@ -206,7 +203,7 @@ ChainState CollocationPath::state_at(double H_m) const {
   for (std::size_t i = 0; i < size(); ++i) {
     double by_v = 0.0;
     double by_q = 0.0;
-    for (std::size_t stage = 0; stage < kStages; ++stage) {
+    for (std::size_t stage = 0; stage < kernel_.stages; ++stage) {
       by_v += weights.by_v[stage] * stages[stage * size() + i];
       by_q += weights.by_q[stage] * stages[stage * size() + i];
     }

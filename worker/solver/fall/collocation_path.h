@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <memory>
 #include <mutex>
+#include <utility>
 #include <vector>
 
 #include "worker/solver/fall/collocation_lanes.h"
@@ -14,8 +15,8 @@ namespace oblique::solver {
 /// The tip's height over one step: the polynomial through the stages.
 class TipOverStep {
  public:
-  TipOverStep(const GaussRule6& rule, double h_s, double y_m, double vy_m_s,
-              const std::array<double, GaussRule6::kStages>& ay_m_s2)
+  TipOverStep(const GaussCollocation& rule, double h_s, double y_m, double vy_m_s,
+              const std::array<double, GaussCollocation::kMostStages>& ay_m_s2)
       : rule_(rule), h_s_(h_s), y_m_(y_m), vy_m_s_(vy_m_s), ay_m_s2_(ay_m_s2) {}
 
   /// At the fraction c of the step.
@@ -30,11 +31,11 @@ class TipOverStep {
  private:
   double vy_by(const double* weights) const;
 
-  const GaussRule6& rule_;
+  const GaussCollocation& rule_;
   double h_s_;
   double y_m_;
   double vy_m_s_;
-  std::array<double, GaussRule6::kStages> ay_m_s2_;
+  std::array<double, GaussCollocation::kMostStages> ay_m_s2_;
 };
 
 /// A fall solved by Gauss collocation. The polynomial through the stages of a step gives the states
@@ -43,9 +44,9 @@ class TipOverStep {
 class CollocationPath : public FallPath {
  public:
   /// `chain` and `model` must outlive this. `error_m` is what CollocationLanes::attempt is given.
-  CollocationPath(const CollocationKernel& kernel, const Chain& chain, const ModelParameters& model,
-                  double error_m)
-      : kernel_(kernel), chain_(chain), model_(model), error_m_(error_m) {}
+  CollocationPath(const CollocationKernel& kernel, std::shared_ptr<const GaussCollocation> rule,
+                  const Chain& chain, const ModelParameters& model, double error_m)
+      : kernel_(kernel), rule_(std::move(rule)), chain_(chain), model_(model), error_m_(error_m) {}
 
   /// Takes the last attempt of `lanes`, a step of h_s seconds, before it is accepted. True when the
   /// tip turns within it: the fall is then complete.
@@ -72,11 +73,13 @@ class CollocationPath : public FallPath {
   void keep(const CollocationLanes& lanes, std::size_t lane);
   std::shared_ptr<const Interval> interval(std::size_t number) const;
   std::shared_ptr<const Interval> solve_again(std::size_t number) const;
+  /// Numbers of one step in an interval.
+  std::size_t step_size() const { return (2 + kernel_.stages) * size(); }
   std::size_t size() const { return 2 * static_cast<std::size_t>(chain_.rows()); }
   std::size_t tip() const { return 2 * static_cast<std::size_t>(chain_.tip_row()) + 1; }
 
   CollocationKernel kernel_;
-  GaussRule6 rule_;
+  std::shared_ptr<const GaussCollocation> rule_;
   const Chain& chain_;
   const ModelParameters& model_;
   double error_m_;
@@ -84,9 +87,9 @@ class CollocationPath : public FallPath {
   double largest_drop_m_ = 0.0;
   double last_turn_ = 1.0;  ///< where the tip turns, as a fraction of the last step
   std::vector<Step> steps_;
-  std::size_t steps_kept_ = 2;  ///< steps from one kept state to the next: an interval
-  std::vector<double> states_;  ///< position, rates and mean acceleration of kept states
-  mutable std::mutex mutex_;    ///< of what follows
+  std::size_t steps_kept_ = 2;               ///< steps from one kept state to the next: an interval
+  std::vector<std::vector<double>> states_;  ///< kept: position, rates, mean acceleration
+  mutable std::mutex mutex_;                 ///< of what follows
   mutable std::vector<std::shared_ptr<const Interval>> intervals_;
   mutable std::size_t numbers_ = 0;  ///< in intervals_
 };

@@ -20,7 +20,7 @@ class FallPath {
   virtual double largest_drop_m() const = 0;
   /// As Fall::state_at, for 0 < H_m <= largest_drop_m().
   virtual ChainState state_at(double H_m) const = 0;
-  /// Memory that its states take, or may come to take.
+  /// Memory that its states take now.
   virtual std::size_t bytes() const = 0;
 };
 
@@ -47,7 +47,7 @@ class Fall {
   /// bound.
   ChainState state_at(double H_m) const;
 
-  /// Memory that its states take, or may come to take.
+  /// Memory that its states take now.
   std::size_t bytes() const { return path_->bytes(); }
 
  private:

@@ -9,7 +9,7 @@
 #include "worker/solver/chain/beam_tangent.h"
 #include "worker/solver/fall/collocation_lanes.h"
 #include "worker/solver/fall/front_kernel.h"
-#include "worker/solver/fall/gauss_rule.h"
+#include "worker/solver/fall/gauss_collocation.h"
 #include "worker/solver/fall/tangent_kernel.h"
 
 namespace oblique::solver {
@@ -130,39 +130,39 @@ TEST(FrontKernel, SolvesWhatTheDenseMatrixSolves) {
   }
 }
 
-TEST(GaussRule, IntegratesPolynomialsExactly) {
-  const GaussRule6 rule;
+TEST(GaussCollocation, IntegratesPolynomialsExactly) {
+  const GaussCollocation rule(kCollocationStages);
   for (int degree = 0; degree < 12; ++degree) {
     double sum = 0.0;
-    for (std::size_t i = 0; i < GaussRule6::kStages; ++i) {
+    for (std::size_t i = 0; i < kCollocationStages; ++i) {
       sum += rule.weight[i] * std::pow(rule.node[i], degree);
     }
     EXPECT_NEAR(sum, 1.0 / (degree + 1), 1e-15) << degree;
   }
   for (int degree = 0; degree < 6; ++degree) {
-    double b[GaussRule6::kStages];
+    double b[GaussCollocation::kMostStages];
     rule.integrals(0.37, b);
     double sum = 0.0;
-    for (std::size_t i = 0; i < GaussRule6::kStages; ++i) {
+    for (std::size_t i = 0; i < kCollocationStages; ++i) {
       sum += b[i] * std::pow(rule.node[i], degree);
     }
     EXPECT_NEAR(sum, std::pow(0.37, degree + 1) / (degree + 1), 1e-15) << degree;
   }
 }
 
-TEST(GaussRule, DiagonalisesTheSquareOfItsMatrix) {
-  const GaussRule6 rule;
-  for (std::size_t i = 0; i < GaussRule6::kStages; ++i) {
-    for (std::size_t j = 0; j < GaussRule6::kStages; ++j) {
+TEST(GaussCollocation, DiagonalisesTheSquareOfItsMatrix) {
+  const GaussCollocation rule(kCollocationStages);
+  for (std::size_t i = 0; i < kCollocationStages; ++i) {
+    for (std::size_t j = 0; j < kCollocationStages; ++j) {
       double unit = 0.0;
       double square = 0.0;
-      for (std::size_t k = 0; k < GaussRule6::kPairs; ++k) {
+      for (std::size_t k = 0; k < GaussCollocation::pairs_of(kCollocationStages); ++k) {
         unit += rule.back_re[i][k] * rule.into_re[k][j] + rule.back_im[i][k] * rule.into_im[k][j];
         square +=
             rule.shift_re[i][k] * rule.into_re[k][j] + rule.shift_im[i][k] * rule.into_im[k][j];
       }
       double exact = 0.0;
-      for (std::size_t k = 0; k < GaussRule6::kStages; ++k) {
+      for (std::size_t k = 0; k < kCollocationStages; ++k) {
         exact += rule.integral[i][k] * rule.integral[k][j];
       }
       EXPECT_NEAR(unit, i == j ? 1.0 : 0.0, 1e-12);
@@ -178,7 +178,8 @@ TEST(CollocationLanes, StepsOfHalfTheLengthErrByTheOrderOfTheMethod) {
   model.E_Pa = 1e5;
   const Chain chain(model);
   const auto state_after = [&](int steps) {
-    CollocationLanes lanes(runnable_collocation_kernels().front(), chain, model);
+    const GaussCollocation rule(kCollocationStages);
+    CollocationLanes lanes(runnable_collocation_kernels().front(), rule, chain, model);
     const std::vector<double> h_s(lanes.lanes(), 0.2 / steps);
     const std::vector<double> error_m(lanes.lanes(), 1e-14);
     const std::vector<unsigned char> accept(lanes.lanes(), 1);
