@@ -21,7 +21,7 @@ constexpr int kRunsAhead = 512;
 constexpr std::size_t kFallsAhead = 64;
 
 /// Falls of a model of usual size that a thread has in hand, and as many ahead.
-constexpr std::size_t kBytesAThread = std::size_t{64} << 20;
+constexpr std::size_t kBytesAThread = std::size_t{96} << 20;
 constexpr std::size_t kFewestBytes = std::size_t{256} << 20;
 
 protocol::PointResult message_of(const solver::PointOutcome& outcome) {

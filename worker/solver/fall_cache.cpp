@@ -99,20 +99,21 @@ void FallCache::solve(const std::vector<Entries::iterator>& claimed,
   lock.lock();
   for (std::size_t i = claimed.size(); i-- > 0;) {  // the one wanted first is to stay longest
     claimed[i]->outcome = std::move(outcomes[i]);
+    usual_bytes_ = std::max(bytes_of(claimed[i]->outcome), usual_bytes_ / 2);
     entries_.splice(entries_.begin(), entries_, claimed[i]);
   }
   make_room();
   solved_.notify_all();
 }
 
-/// Falls solved ahead may take half of the room.
+/// Falls solved ahead, and those under way, may take half of the room.
 bool FallCache::has_room_ahead() const {
   std::size_t falls = 0;
   std::size_t bytes = 0;
   for (const Entry& entry : entries_) {
     if (!entry.is_used) {
       ++falls;
-      bytes += bytes_of(entry.outcome);
+      bytes += entry.outcome ? bytes_of(entry.outcome) : usual_bytes_;
     }
   }
   return 2 * falls < bounds_.falls && 2 * bytes < bounds_.bytes;

@@ -61,7 +61,8 @@ class FallCache {
   const Solve solve_;
   mutable std::mutex mutex_;
   std::condition_variable solved_;
-  Entries entries_;  ///< the one used last comes first
+  Entries entries_;              ///< the one used last comes first
+  std::size_t usual_bytes_ = 0;  ///< of falls solved lately
 };
 
 }  // namespace oblique::solver

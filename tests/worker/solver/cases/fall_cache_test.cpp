@@ -187,6 +187,15 @@ TEST(FallCacheTest, MemoryBoundsWhatIsKeptButForTheFallInUse) {
   EXPECT_EQ(none.solved.front().size(), 1U) << "nothing ahead without room for it";
 }
 
+TEST(FallCacheTest, FallsAheadTakeHalfOfTheMemory) {
+  const auto models = models_with_E(lanes() + 1);
+  const std::size_t bytes = solve_falls({models.data(), 1}).front().fallen->fall().bytes();
+  CountedFalls falls({.bytes = 6 * bytes});
+  falls.cache.fall(models[0]);
+  falls.cache.fall(models[1], models);
+  EXPECT_EQ(falls.solved.back().size(), 3U);
+}
+
 TEST(FallCacheTest, FallsSolvedAheadStayUntilTheyAreUsed) {
   CountedFalls falls({.falls = 4});
   const auto models = models_with_E(6);
