@@ -24,6 +24,9 @@ using solver::readable_number;
 
 constexpr double kMicro = 1e6;
 constexpr double kMilli = 1e3;
+/// Nearer than this, changes in the fifth digit of H, mu or e* change modes
+/// (worker/solver/contact/README.md).
+constexpr double kDoubtfulMargin = 1e-4;
 
 ordered_json json_of(const solver::Cell& cell) {
   return std::visit([](const auto& value) { return ordered_json(value); }, cell);
@@ -62,6 +65,14 @@ template <class T>
 ordered_json json_of(const CaseResult& result, const solver::Member<T>& member) {
   const T* value = member.of(result);
   return value == nullptr ? ordered_json(nullptr) : ordered_json(*value);
+}
+
+void print_margin(std::ostream& out, const CaseResult& result) {
+  if (result.margin && result.margin_event) {
+    out << fmt::format("margin      {} to another order of events, nearest: {}{}\n",
+                       readable_number(*result.margin, 2), *result.margin_event,
+                       *result.margin < kDoubtfulMargin ? "; the mode is not to be trusted" : "");
+  }
 }
 
 void print_peaks(std::ostream& out, const CaseResult& result) {
@@ -147,7 +158,9 @@ void print_summary(std::ostream& out, const CaseResult& result) {
   if (result.mode != result.major_mode) {
     out << fmt::format("  (with ripples: {})", result.mode);
   }
-  out << "\n\n";
+  out << '\n';
+  print_margin(out, result);
+  out << '\n';
   print_peaks(out, result);
   print_spans(out, result);
   print_reactions(out, result.reaction_peaks);

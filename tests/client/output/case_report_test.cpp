@@ -1,5 +1,6 @@
 #include "client/output/case_report.h"
 
+#include <optional>
 #include <set>
 #include <sstream>
 #include <string>
@@ -88,6 +89,22 @@ TEST(SolveJson, GivesTheLargestReactionAtThePinAndAtEachJoint) {
   EXPECT_EQ(json_of(result)["reaction_peaks"],
             nlohmann::ordered_json::parse(
                 R"([{"t_s": 2e-5, "force_N": 900.0}, {"t_s": 3e-5, "force_N": 1800.0}])"));
+}
+
+TEST(Summary, SaysHowNearAnotherModeIsAndWhenThatIsTooNear) {
+  auto result = some_result();
+  const auto text_with = [&](std::optional<double> margin) {
+    result.margin = margin;
+    std::ostringstream out;
+    print_summary(out, result);
+    return out.str();
+  };
+  EXPECT_EQ(text_with(std::nullopt).find("margin"), std::string::npos);
+  result.margin_event = "turn";
+  EXPECT_NE(text_with(0.0361).find("margin      0.036 to another order of events, nearest: turn\n"),
+            std::string::npos);
+  EXPECT_NE(text_with(3e-7).find("nearest: turn; the mode is not to be trusted\n"),
+            std::string::npos);
 }
 
 TEST(Summary, TellsRipplesFromPeaks) {
