@@ -13,7 +13,6 @@ struct Batch {
   std::uint64_t
       number;  ///< counts this worker's batches; lease numbers may come again, these do not
   std::uint64_t study_id;
-  std::uint64_t model;
   std::uint64_t first_point;
   std::uint64_t count;
   std::shared_ptr<const protocol::PointTable> points;

@@ -265,7 +265,6 @@ void Conversation::on(const protocol::Batch& batch) {
   }
   const auto study = studies_.find(batch.study_id());
   const bool is_sound = study != studies_.end() && batch.count() > 0 &&
-                        batch.model() < study->second->models() &&
                         batch.first_point() < study->second->size() &&
                         batch.count() <= study->second->size() - batch.first_point();
   if (!is_sound) {
@@ -277,8 +276,8 @@ void Conversation::on(const protocol::Batch& batch) {
   held_[number] = {batch.study_id(), batch.lease_id(), batch.attempt(), batch.count()};
   leaving_.note_work(now_ms_);
   leaving_.note_batch({batch.study_id(), batch.count()});
-  effects_.emplace_back(Solve{{number, batch.study_id(), batch.model(), batch.first_point(),
-                               batch.count(), study->second}});
+  effects_.emplace_back(
+      Solve{{number, batch.study_id(), batch.first_point(), batch.count(), study->second}});
   give_back_what_takes_too_long();
 }
 

@@ -122,7 +122,8 @@ class Scheduler {
     bool paused;
     bool finished;
     StudyTerms terms;
-    double served = 0.0;  ///< batches handed out over the weight, since the study was last open
+    /// Batches handed out over the weight, since the study was last open; long ones count for more.
+    double served = 0.0;
     std::string solver_version{};  ///< of its results and leases; empty while there are none
     LeaseIndex leases{};
     bool overlaps = false;  ///< a point of it may be under several of these leases
@@ -141,9 +142,15 @@ class Scheduler {
     std::int64_t granted_ms;
     LeaseId twin = 0;  ///< of another worker, for what is left of the same batch; 0: none
   };
+  /// How a worker gets on with a study.
   struct Pace {
-    double s_per_point = 0.0;  ///< 0: unknown
-    std::uint64_t last_batch_points = 0;
+    double busy_s = 0.0;  ///< of a thread, for so many points: the last messages, weighted
+    double points = 0.0;
+    std::uint64_t last_batch_points = 0;  ///< that it was fit for
+    std::uint64_t last_end = 0;           ///< of its last batch; 0: it had none
+    std::uint64_t held_points = 0;        ///< of its leases
+
+    double s_per_point() const { return points > 0.0 ? busy_s / points : 0.0; }  ///< 0: unknown
   };
   struct Worker {
     std::uint32_t threads;
@@ -218,7 +225,10 @@ class Scheduler {
   double least_served(StudyId but) const;
   StudyId next_suspect_study(const Worker& worker) const;
   void set_draining(Worker& worker, bool is_draining);
-  std::uint64_t batch_points(const Worker& worker, StudyId study) const;
+  double target_s() const;
+  Portion portion_for(const Worker& worker, StudyId study, bool fills_lanes) const;
+  void fill_lanes(Portion& wanted, const StudyPoints& points, std::uint32_t threads,
+                  const Pace& pace) const;
   LeaseId grant(WorkerId id, Worker& worker, StudyId study, const Batch& batch, bool alone);
   void queue(WorkerId id, Worker& worker);
 

@@ -61,8 +61,12 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
   if (study == 0) {
     return seeks_stragglers_ && serve_straggler(id, worker);
   }
-  if (const auto batch = studies_.at(study).points.take(batch_points(worker, study))) {
+  const Portion wanted = portion_for(worker, study, true);
+  if (const auto batch = studies_.at(study).points.take(wanted)) {
     grant(id, worker, study, *batch, false);
+    // What ended before says nothing of how much the worker can do.
+    auto& fit_for = worker.paces.at(study).last_batch_points;
+    fit_for = std::max(fit_for, wanted.points);
   }
   return true;
 }
@@ -71,8 +75,9 @@ bool Scheduler::serve_suspect(WorkerId id, Worker& worker) {
   const StudyId id_of_study = next_suspect_study(worker);
   Study& study = studies_.at(id_of_study);
   set_draining(worker, false);
-  const std::uint64_t at_most = batch_points(worker, id_of_study);
-  if (const auto batch = study.points.take(*suspect_for(study, worker), at_most)) {
+  // The sooner these are known to be sound, the better: its lanes may stay empty.
+  const Portion wanted = portion_for(worker, id_of_study, false);
+  if (const auto batch = study.points.take(*suspect_for(study, worker), wanted)) {
     grant(id, worker, id_of_study, *batch, true);
   }
   return true;
@@ -98,7 +103,7 @@ bool Scheduler::serve_straggler(WorkerId id, Worker& worker) {
   const auto left =
       study.points.leased_set().within(straggler.batch.first_point, straggler.batch.end());
   study.overlaps = true;
-  const Batch rest{straggler.batch.model, left.front().begin, left.back().end - left.front().begin,
+  const Batch rest{left.front().begin, left.back().end - left.front().begin,
                    straggler.batch.attempts + 1, straggler.batch.losses};
   const LeaseId twin = grant(id, worker, straggler.study, rest, false);
   straggler.twin = twin;
@@ -120,9 +125,9 @@ bool Scheduler::is_straggling(const Lease& lease, const Worker& helper) const {
   }
   for (const Worker* judge : {&helper, &holder}) {
     const auto pace = judge->paces.find(lease.study);
-    if (pace != judge->paces.end() && pace->second.s_per_point > 0.0) {
-      const double expected_ms =
-          1e3 * pace->second.s_per_point * static_cast<double>(lease.batch.count) / judge->threads;
+    if (pace != judge->paces.end() && pace->second.s_per_point() > 0.0) {
+      const double expected_ms = 1e3 * pace->second.s_per_point() *
+                                 static_cast<double>(lease.batch.count) / judge->threads;
       return static_cast<double>(age_ms) > settings_.straggler_factor * expected_ms;
     }
   }
@@ -173,23 +178,66 @@ void Scheduler::set_draining(Worker& worker, bool is_draining) {
   }
 }
 
-std::uint64_t Scheduler::batch_points(const Worker& worker, StudyId id) const {
+/// Time that a batch takes.
+double Scheduler::target_s() const {
+  return std::max(settings_.batch_target_s,
+                  static_cast<double>(workers_.size()) / settings_.most_batches_per_s);
+}
+
+/// How many points the worker should get of the study.
+Portion Scheduler::portion_for(const Worker& worker, StudyId id, bool fills_lanes) const {
+  const auto known = worker.paces.find(id);
+  const Pace pace = known == worker.paces.end() ? Pace{} : known->second;
   std::uint64_t points = settings_.first_batch_points * worker.threads;
-  const auto pace = worker.paces.find(id);
-  if (pace != worker.paces.end() && pace->second.s_per_point > 0.0) {
-    const double target_s =
-        std::max(settings_.batch_target_s,
-                 static_cast<double>(workers_.size()) / settings_.most_batches_per_s);
-    const double wanted = target_s * worker.threads / pace->second.s_per_point;
+  if (pace.s_per_point() > 0.0) {
+    const double by_pace = target_s() * worker.threads / pace.s_per_point();
     const auto largest = static_cast<double>(
         std::min(settings_.largest_batch_points * worker.threads,
-                 settings_.growth * std::max<std::uint64_t>(pace->second.last_batch_points, 1)));
-    points = static_cast<std::uint64_t>(std::min(wanted, largest));
+                 settings_.growth * std::max<std::uint64_t>(pace.last_batch_points, 1)));
+    points = static_cast<std::uint64_t>(std::min(by_pace, largest));
   }
   const std::uint64_t shares = settings_.tail_batches_per_thread * threads_;
   const std::uint64_t fair =
       studies_.at(id).points.free() / std::max<std::uint64_t>(shares, 1) * worker.threads;
-  return std::max<std::uint64_t>(std::min(points, fair), 1);
+  Portion wanted{std::max<std::uint64_t>(std::min(points, fair), 1)};
+  if (pace.last_end != 0) {
+    wanted.follows = pace.last_end;
+  }
+  if (fills_lanes) {
+    fill_lanes(wanted, studies_.at(id).points, worker.threads, pace);
+  }
+  return wanted;
+}
+
+/// More points, or models, where a batch would leave lanes empty and take nearly as long.
+void Scheduler::fill_lanes(Portion& wanted, const StudyPoints& points, std::uint32_t threads,
+                           const Pace& pace) const {
+  const auto lanes = static_cast<double>(settings_.lanes);
+  const bool has_models = points.models() > 1;
+  if (!has_models && pace.s_per_point() * lanes <= target_s()) {
+    return;  // of quick points of one model a batch has enough
+  }
+  // Not more than its part of all that is open, of which it may hold something already: at the end
+  // of a study every worker has a part.
+  const std::uint64_t open = points.free() + points.leased();
+  const std::uint64_t all_threads = std::max<std::uint64_t>(threads_, 1);
+  const std::uint64_t part = (open * threads + all_threads - 1) / all_threads;
+  const std::uint64_t share = part - std::min(part, pace.held_points);
+  const double s_per_point = pace.s_per_point();
+  const double a_thread =
+      s_per_point > 0.0 ? std::clamp(settings_.lanes_batch_s / s_per_point, 1.0, lanes) : lanes;
+  wanted.points =
+      std::max(wanted.points, std::min(static_cast<std::uint64_t>(a_thread) * threads, share));
+  if (has_models && s_per_point > 0.0) {
+    const double in_time = std::max(settings_.models_batch_s, target_s()) * threads / s_per_point;
+    const std::uint64_t grown =
+        settings_.growth *
+        std::min(pace.last_batch_points, settings_.largest_batch_points * threads);
+    const std::uint64_t most = std::min(grown, share);
+    wanted.most_points =
+        in_time < static_cast<double>(most) ? static_cast<std::uint64_t>(in_time) : most;
+  }
+  wanted.models = has_models ? settings_.lanes * threads : 1;
 }
 
 LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Batch& batch,
@@ -198,7 +246,11 @@ LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Batch
     effects_.emplace_back(DefineStudy{id, study});
   }
   Study& served = studies_.at(study);
-  served.served += 1.0 / served.terms.weight;
+  Pace& pace = worker.paces[study];
+  const double takes_s = pace.s_per_point() * static_cast<double>(batch.count) / worker.threads;
+  // Whatever a worker says of its pace, no batch is to make its study wait for ever.
+  const double counted_s = std::clamp(takes_s, target_s(), settings_.lanes_batch_s + target_s());
+  served.served += counted_s / target_s() / served.terms.weight;
   if (served.solver_version.empty()) {
     served.solver_version = worker.solver_version;
   }
@@ -207,10 +259,12 @@ LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Batch
   served.leases.insert(lease, batch);
   worker.leases.insert(lease);
   --worker.credit;
-  worker.paces[study].last_batch_points = batch.count;
+  pace.last_batch_points = batch.count;
+  pace.last_end = batch.end();
+  pace.held_points += batch.count;
   requeue(study);
   effects_.emplace_back(
-      SendBatch{id, study, batch.model, batch.first_point, batch.count, batch.attempts + 1, lease});
+      SendBatch{id, study, batch.first_point, batch.count, batch.attempts + 1, lease});
   return lease;
 }
 

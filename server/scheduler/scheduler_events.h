@@ -26,7 +26,12 @@ struct SchedulerSettings {
   double most_batches_per_s = 10'000;
   std::uint64_t first_batch_points = 4;       ///< a thread, in a batch to a worker of unknown pace
   std::uint64_t largest_batch_points = 4096;  ///< a thread
-  std::uint64_t growth = 4;  ///< a batch is at most so many times the worker's last one
+  /// Points, and falls of models, that a thread solves side by side in nearly the time of one:
+  /// while a study has them, a batch has so many points a thread, or so many models.
+  std::uint64_t lanes = 8;
+  double lanes_batch_s = 10.0;  ///< a batch is not made longer than this to fill lanes with points,
+  double models_batch_s = 1.0;  ///< nor than this to end with a model, or to fill them with models
+  std::uint64_t growth = 4;     ///< a batch is at most so many times the worker's last one
   /// While free points last, at least so many more batches are left for each thread: the tail of a
   /// study goes out in ever smaller batches and all workers finish together.
   std::uint64_t tail_batches_per_thread = 3;
@@ -176,7 +181,6 @@ struct DefineStudy {
 struct SendBatch {
   WorkerId worker;
   StudyId study;
-  std::uint64_t model;
   std::uint64_t first_point;
   std::uint64_t count;
   std::uint32_t attempt;

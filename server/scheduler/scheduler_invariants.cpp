@@ -57,6 +57,13 @@ void Scheduler::check_invariants() const {
   std::size_t draining = 0;
   std::map<std::string, std::size_t> versions;
   for (const auto& [id, worker] : workers_) {
+    std::map<StudyId, std::uint64_t> held;
+    for (const LeaseId lease : worker.leases) {
+      held[leases_.at(lease).study] += leases_.at(lease).batch.count;
+    }
+    for (const auto& [study, pace] : worker.paces) {
+      require(pace.held_points == held[study], "points that a worker holds are miscounted");
+    }
     threads += worker.threads;
     leases += worker.leases.size();
     draining += worker.draining ? 1U : 0U;

@@ -8,7 +8,7 @@
 namespace oblique::server {
 namespace {
 
-/// Weight of the newest measurement in a worker's pace.
+/// Weight of the newest message in a worker's pace.
 constexpr double kPaceWeight = 0.5;
 
 /// What a message weighs in the pace of all workers when the next has come.
@@ -21,7 +21,9 @@ constexpr double kLongestPoint_s = 86'400.0;
 void Scheduler::end_lease(LeaseId id, const std::optional<Loss>& loss) {
   const Lease lease = leases_.at(id);
   leases_.erase(id);
-  workers_.at(lease.worker).leases.erase(id);
+  Worker& worker = workers_.at(lease.worker);
+  worker.leases.erase(id);
+  worker.paces.at(lease.study).held_points -= lease.batch.count;
   ready_workers_.wake(lease.worker);
   if (const auto twin = leases_.find(lease.twin); twin != leases_.end()) {
     twin->second.twin = 0;
@@ -119,13 +121,18 @@ void Scheduler::learn_pace(Worker& worker, const ResultsReceived& event) {
   if (event.outcomes.empty() || !std::isfinite(event.busy_s) || event.busy_s <= 0.0) {
     return;
   }
-  const double s_per_point = event.busy_s / static_cast<double>(event.outcomes.size());
-  if (s_per_point <= kLongestPoint_s) {
-    pace_s_ = kPaceFades * pace_s_ + event.busy_s;
-    pace_points_ = kPaceFades * pace_points_ + static_cast<double>(event.outcomes.size());
+  const auto points = static_cast<double>(event.outcomes.size());
+  if (event.busy_s / points > kLongestPoint_s) {
+    return;
   }
-  double& known = worker.paces[event.study].s_per_point;
-  known = known > 0.0 ? known + kPaceWeight * (s_per_point - known) : s_per_point;
+  pace_s_ = kPaceFades * pace_s_ + event.busy_s;
+  pace_points_ = kPaceFades * pace_points_ + points;
+  // Time and points by themselves: the first points of a model come with its fall, which says
+  // little of those that follow.
+  Pace& known = worker.paces[event.study];
+  const double weight = known.points > 0.0 ? kPaceWeight : 1.0;
+  known.busy_s += weight * (event.busy_s - known.busy_s);
+  known.points += weight * (points - known.points);
 }
 
 void Scheduler::on(const ResultsStored& event) {

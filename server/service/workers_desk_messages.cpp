@@ -26,7 +26,6 @@ void WorkersDesk::send(const SendBatch& batch) {
   protocol::ServerToWorker message;
   auto& fields = *message.mutable_batch();
   fields.set_study_id(batch.study);
-  fields.set_model(batch.model);
   fields.set_first_point(batch.first_point);
   fields.set_count(batch.count);
   fields.set_attempt(batch.attempt);
@@ -39,7 +38,7 @@ void WorkersDesk::send(const SendProbe& probe) {
   definition.mutable_study()->set_study_id(kProbeStudy);
   *definition.mutable_study()->mutable_recipe() = probe_recipe();
   send(probe.worker, definition);
-  send(SendBatch{probe.worker, kProbeStudy, 0, 0, 1, 1, probe.lease});
+  send(SendBatch{probe.worker, kProbeStudy, 0, 1, 1, probe.lease});
 }
 
 void WorkersDesk::send(const AcknowledgeResults& stored) {

@@ -74,9 +74,10 @@ std::string insert_model_sql() {
          ") ON CONFLICT (definition) DO NOTHING";
 }
 
-void bind_model(Statement& insert, const solver::ModelParameters& model) {
+void bind_model(Statement& insert, const solver::ModelParameters& model,
+                std::string_view definition) {
   insert.reset();
-  insert.bind(1, std::string_view(protocol::canonical_model(model)));
+  insert.bind(1, definition);
   insert.bind(2, nlohmann::json(model.lengths_m).dump());
   int index = 3;
   for (const auto& key : solver::model_keys()) {

@@ -20,9 +20,10 @@ std::string definition_of(const solver::ModelParameters& model, int schema);
 solver::ModelParameters model_of_definition(std::string_view definition, int schema);
 
 /// Inserts a model unless there is one of the same definition. Its parameters are those of
-/// `bind_model`.
+/// `bind_model`, which takes the model's definition of the present schema too.
 std::string insert_model_sql();
-void bind_model(Statement& insert, const solver::ModelParameters& model);
+void bind_model(Statement& insert, const solver::ModelParameters& model,
+                std::string_view definition);
 
 /// Gives the connection the SQL function `model_definition(blob)`: the present definition of a
 /// model for one of the schemas before `kFirstWithCanonicalModels`. What cannot be read becomes

@@ -257,17 +257,25 @@ std::int64_t Store::model_id(const AddResults& change, std::uint64_t model) {
     return known->second;
   }
   const solver::ModelParameters parameters = change.table->model(model);
-  bind_model(statements_->add_model, parameters);
+  const std::string definition = definition_of(parameters, kSchemaVersion);
+  bind_model(statements_->add_model, parameters, definition);
   statements_->add_model.run();
-  Statement& find = statements_->find_model;
-  find.bind(1, std::string_view(definition_of(parameters, kSchemaVersion)));
-  find.step();
-  const std::int64_t id = find.integer(0);
-  find.reset();
+  const bool is_new = sqlite3_changes(database_.get()) > 0;
+  const std::int64_t id =
+      is_new ? sqlite3_last_insert_rowid(database_.get()) : known_model(definition);
   if (model_ids_.size() >= kMostCachedModels) {
     model_ids_.clear();
   }
   model_ids_.emplace(key, id);
+  return id;
+}
+
+std::int64_t Store::known_model(std::string_view definition) {
+  Statement& find = statements_->find_model;
+  find.bind(1, definition);
+  find.step();
+  const std::int64_t id = find.integer(0);
+  find.reset();
   return id;
 }
 

@@ -4,6 +4,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "server/database/sqlite.h"
@@ -81,6 +82,7 @@ class Store final : public Storage {
   void add(const AddWorker& change);
   void add(const AddResults& change);
   std::int64_t model_id(const AddResults& change, std::uint64_t model);
+  std::int64_t known_model(std::string_view definition);
   void set_sync(bool full);
   std::uint64_t highest(const std::string& sql);
 

@@ -45,6 +45,13 @@ std::vector<std::string> study_of(std::uint64_t points) {
           "--e", "0.2:1.0" + count,  "--name", "bench"};
 }
 
+/// As many points, each of a model of its own.
+std::vector<std::string> models_of(std::uint64_t points) {
+  return {
+      "--k",  "1e7:9e7:" + std::to_string(points), "--H", "1", "--mu", "0.4", "--e", "1", "--name",
+      "bench"};
+}
+
 double megabytes(const std::string& file) {
   std::error_code missing;
   const auto bytes = std::filesystem::file_size(file, missing);
@@ -53,7 +60,8 @@ double megabytes(const std::string& file) {
 
 /// One study, submitted and watched to its end by `oblique`.
 struct Study {
-  explicit Study(std::uint64_t points) : arguments(study_of(points)) {}
+  explicit Study(std::uint64_t points) : Study(study_of(points)) {}
+  explicit Study(std::vector<std::string> flags) : arguments(std::move(flags)) {}
 
   void run() {
     std::vector<std::string> submit{"submit", "--server", server.client_url()};
@@ -83,8 +91,8 @@ struct Study {
   double rows = 0.0;
 };
 
-void bench_service(std::uint64_t points) {
-  Study study(points);
+void bench_service(const std::vector<std::string>& flags) {
+  Study study(flags);
   test::Worker worker(study.folder, study.server.worker_url());
   study.run();
   const Usage solving = usage_of(worker.pid());
@@ -98,8 +106,8 @@ void bench_service(std::uint64_t points) {
   std::fflush(stdout);
 }
 
-void bench_server_alone(std::uint64_t points) {
-  Study study(points);
+void bench_server_alone(const std::vector<std::string>& flags) {
+  Study study(flags);
   const InstantWorker worker(study.server.worker_url());
   const double before_s = usage_of(getpid()).cpu_s;
   study.run();
@@ -297,20 +305,24 @@ void run_all(const std::string& what, const std::vector<std::uint64_t>& points) 
       row(count);
     }
   };
-  if (what == "service") {
+  const auto row_of = [](const auto& flags_of, const auto& bench) {
+    return std::function<void(std::uint64_t)>([=](std::uint64_t count) { bench(flags_of(count)); });
+  };
+  if (what == "service" || what == "models") {
     table(
         "| points | wall [s] | points/s | worker CPU [s] | server CPU [s] | server's share | "
         "server "
         "us a point | worker MB | server MB | database MB |\n"
         "|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
-        bench_service);
-  } else if (what == "server-alone") {
+        what == "models" ? row_of(models_of, bench_service) : row_of(study_of, bench_service));
+  } else if (what == "server-alone" || what == "server-alone-models") {
     table(
         "| results | wall [s] | results/s | server CPU [s] | us a result | worker us a result | "
         "server "
         "MB |\n"
         "|---:|---:|---:|---:|---:|---:|---:|",
-        bench_server_alone);
+        what == "server-alone" ? row_of(study_of, bench_server_alone)
+                               : row_of(models_of, bench_server_alone));
   } else if (what == "submission") {
     table(
         "| points | submitted in [s] | server before MB | after MB |\n"
@@ -340,8 +352,8 @@ void run_all(const std::string& what, const std::vector<std::uint64_t>& points) 
         bench_studies);
   } else {
     throw std::invalid_argument("`" + what +
-                                "` is none of service, server-alone, submission, studies, "
-                                "merge, worker-killed and server-killed");
+                                "` is none of service, models, server-alone, server-alone-models, "
+                                "submission, studies, merge, worker-killed and server-killed");
   }
 }
 
@@ -353,8 +365,8 @@ int main(int argc, char** argv) {
     if (argc < 3) {
       throw std::invalid_argument(
           "usage: oblique-service-bench "
-          "service|server-alone|submission|studies|merge|worker-killed|server-killed "
-          "POINTS...");
+          "service|models|server-alone|server-alone-models|submission|studies|merge|"
+          "worker-killed|server-killed POINTS...");
     }
     std::vector<std::uint64_t> points;
     for (int i = 2; i < argc; ++i) {

@@ -9,9 +9,42 @@ namespace oblique::simulation {
 
 using server::StudyState;
 
+namespace {
+
+/// `points` points, in models of `points_a_model` and, if some are left, one more.
+protocol::Recipe recipe_of_models(std::uint64_t points, std::uint64_t points_a_model) {
+  using protocol::listed;
+  using protocol::range;
+  const auto axis = [](const char* key, double from, double to, std::uint64_t count) {
+    return count == 1 ? listed(key, {from}) : range(key, from, to, count);
+  };
+  const std::uint64_t models = points / points_a_model;
+  const std::uint64_t rest = points % points_a_model;
+  protocol::Recipe recipe;
+  if (models > 0) {
+    recipe = protocol::recipe_of({{axis("k", 1e7, 2e7, models), listed("H", {1.0}),
+                                   axis("mu", 0.5, 1.0, points_a_model), listed("e", {1.0})}});
+  }
+  if (rest > 0) {
+    recipe.MergeFrom(protocol::recipe_of(
+        {{listed("H", {1.0}), axis("mu", 0.0, 0.4, rest), listed("e", {1.0})}}));
+  }
+  return recipe;
+}
+
+}  // namespace
+
 SimulatedClient::SimulatedClient(World& world, Network& network, std::uint64_t peer,
                                  std::string name, std::uint64_t points)
-    : world_(world), network_(network), peer_(peer), name_(std::move(name)), points_(points) {}
+    : world_(world),
+      network_(network),
+      peer_(peer),
+      name_(std::move(name)),
+      points_(points),
+      recipe_(recipe_of_models(points, world.chance(0.3) ? points + 1
+                                       : world.chance(0.5)
+                                           ? std::uint64_t{1}
+                                           : static_cast<std::uint64_t>(world.between(2, 40)))) {}
 
 void SimulatedClient::start() {
   connect();
@@ -49,9 +82,7 @@ void SimulatedClient::ask() {
       request.mutable_submit()->set_priority(static_cast<std::int32_t>(world_.between(-2, 2)));
       request.mutable_submit()->set_weight(static_cast<double>(world_.between(1, 8)) / 4.0);
     }
-    *request.mutable_submit()->mutable_recipe() = protocol::recipe_of(
-        {{protocol::listed("H", {1.0}), protocol::range("mu", 0.0, 1.0, points_),
-          protocol::listed("e", {1.0})}});
+    *request.mutable_submit()->mutable_recipe() = recipe_;
   }
   network_.send(link_, protocol::encode(request), false);
   world_.after(2000, [this, number = request_] {

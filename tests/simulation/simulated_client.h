@@ -5,6 +5,7 @@
 #include <set>
 #include <string>
 
+#include "proto/oblique.pb.h"
 #include "server/store/changes.h"
 #include "tests/simulation/network.h"
 #include "tests/simulation/world.h"
@@ -15,7 +16,7 @@ namespace oblique::simulation {
 /// with it.
 class SimulatedClient {
  public:
-  /// `peer` is its number in the network.
+  /// `peer` is its number in the network. Most studies have several models, of a point or a few.
   SimulatedClient(World& world, Network& network, std::uint64_t peer, std::string name,
                   std::uint64_t points);
 
@@ -43,6 +44,7 @@ class SimulatedClient {
   std::uint64_t peer_;
   std::string name_;
   std::uint64_t points_;
+  protocol::Recipe recipe_;
   Network::LinkId link_ = 0;
   std::uint64_t request_ = 0;
   bool acknowledged_ = false;

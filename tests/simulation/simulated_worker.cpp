@@ -23,7 +23,8 @@ SimulatedWorker::SimulatedWorker(World& world, Network& network, std::uint64_t p
       killers_(std::move(killers)),
       solver_version_(std::move(solver_version)),
       leaves_(leaves),
-      ms_per_point_(world.chance(0.2) ? world.between(50, 400) : world.between(1, 20)) {}
+      ms_per_point_(world.chance(0.2) ? world.between(50, 400) : world.between(1, 20)),
+      ms_per_fall_(world.chance(0.3) ? world.between(5, 50) : 0) {}
 
 void SimulatedWorker::start() {
   protocol::WorkerHello hello;
@@ -48,6 +49,7 @@ void SimulatedWorker::restart(std::int64_t away_ms) {
   link_ = 0;
   batches_.clear();
   solving_ = false;
+  fallen_model_ = {};
   frozen_until_ms_ = 0;
   conversation_.reset();
   sent_.clear();
@@ -142,7 +144,8 @@ void SimulatedWorker::plan_solving() {
     return;
   }
   solving_ = true;
-  world_.after(ms_per_point_, [this, life = life_] {
+  busy_ms_ = ms_per_point_ + (next_model() == fallen_model_ ? 0 : ms_per_fall_);
+  world_.after(busy_ms_, [this, life = life_] {
     if (life == life_) {
       when_awake([this, life] {
         if (life == life_) {
@@ -152,6 +155,12 @@ void SimulatedWorker::plan_solving() {
       });
     }
   });
+}
+
+std::pair<std::uint64_t, std::uint64_t> SimulatedWorker::next_model() const {
+  const Work& work = batches_.front();
+  const std::uint64_t point = work.batch.first_point + work.solved;
+  return {work.batch.study_id, work.batch.points->point(point).model};
 }
 
 void SimulatedWorker::solve_some() {
@@ -167,11 +176,12 @@ void SimulatedWorker::solve_some() {
     restart(world_.between(100, 1000));
     return;
   }
+  fallen_model_ = next_model();
   ++work.solved;
   worker::Progress progress{work.batch.number,
                             work.batch.study_id,
                             {answer_to(size, point)},
-                            1e-3 * static_cast<double>(ms_per_point_),
+                            1e-3 * static_cast<double>(busy_ms_),
                             work.solved == work.batch.count};
   if (progress.batch_done) {
     batches_.pop_front();

@@ -24,8 +24,9 @@ class SimulatedWorker {
   /// Points of studies of that size whose solving kills the process.
   using Killers = std::map<std::uint64_t, std::set<std::uint64_t>>;
 
-  /// `peer` is its number in the network. One that `leaves` has now and then a time by which it is
-  /// gone; another one comes then.
+  /// `peer` is its number in the network. A model's first point takes some of them longer than the
+  /// others. One that `leaves` has now and then a time by which it
+  /// is gone; another one comes then.
   SimulatedWorker(World& world, Network& network, std::uint64_t peer, Killers killers,
                   std::string solver_version, bool leaves);
 
@@ -55,6 +56,7 @@ class SimulatedWorker {
   void plan_time();
   void plan_solving();
   void solve_some();
+  std::pair<std::uint64_t, std::uint64_t> next_model() const;
 
   World& world_;
   Network& network_;
@@ -63,6 +65,9 @@ class SimulatedWorker {
   std::string solver_version_;
   bool leaves_;
   std::int64_t ms_per_point_;
+  std::int64_t ms_per_fall_;
+  std::int64_t busy_ms_ = 0;                                // with the next point
+  std::pair<std::uint64_t, std::uint64_t> fallen_model_{};  // study and model solved last
   std::optional<worker::Conversation> conversation_;
   Network::LinkId link_ = 0;
   std::deque<Work> batches_;

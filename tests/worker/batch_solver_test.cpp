@@ -19,7 +19,7 @@ namespace {
 
 Batch batch(std::uint64_t number, std::uint64_t first, std::uint64_t count,
             std::uint64_t study_id = 7) {
-  return {number, study_id, 0, first, count, nullptr};
+  return {number, study_id, first, count, nullptr};
 }
 
 /// Lets the test decide when each point ends.

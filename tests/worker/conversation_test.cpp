@@ -201,11 +201,9 @@ TEST_F(ConversationTest, ABatchOfAStudyNeverDefinedBeginsTheConversationAnew) {
 
 TEST_F(ConversationTest, ABatchBeyondItsStudyBeginsTheConversationAnew) {
   const auto max = std::numeric_limits<std::uint64_t>::max();
-  protocol::ServerToWorker wrong_model = batch_message(7, 31);
-  wrong_model.mutable_batch()->set_model(1);
   for (const auto& batch :
        {batch_message(7, 31, 95, 6), batch_message(7, 31, 100, 1), batch_message(7, 31, 0, 0),
-        batch_message(7, 31, 50, max), batch_message(7, 31, max, 2), wrong_model}) {
+        batch_message(7, 31, 50, max), batch_message(7, 31, max, 2)}) {
     use(ConversationSettings{});
     join();
     receive(heartbeat_reply_message());

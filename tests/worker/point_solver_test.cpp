@@ -24,7 +24,7 @@ namespace {
 
 Batch batch_of(const protocol::Recipe& recipe) {
   const auto points = std::make_shared<const protocol::PointTable>(recipe);
-  return {1, 7, 0, 0, points->size(), points};
+  return {1, 7, 0, points->size(), points};
 }
 
 /// Solves all points of a batch on so many threads; the results in the order of the points.

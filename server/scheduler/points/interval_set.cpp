@@ -51,6 +51,14 @@ bool IntervalSet::contains(std::uint64_t point) const {
   return next != ends_.begin() && std::prev(next)->second > point;
 }
 
+std::optional<Interval> IntervalSet::first_from(std::uint64_t point) const {
+  auto next = ends_.upper_bound(point);
+  if (next != ends_.begin() && std::prev(next)->second > point) {
+    return Interval{point, std::prev(next)->second};
+  }
+  return next == ends_.end() ? std::nullopt : std::optional(Interval{next->first, next->second});
+}
+
 std::vector<Interval> IntervalSet::within(std::uint64_t begin, std::uint64_t end) const {
   std::vector<Interval> parts;
   auto next = ends_.upper_bound(begin);

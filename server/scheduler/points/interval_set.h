@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <vector>
 
 namespace oblique::server {
@@ -41,6 +42,9 @@ class IntervalSet {
 
   /// The lowest interval. The set must not be empty.
   Interval front() const { return {ends_.begin()->first, ends_.begin()->second}; }
+
+  /// The lowest part of an interval that lies at `point` or above; nothing when there is none.
+  std::optional<Interval> first_from(std::uint64_t point) const;
 
   /// The parts of the set that lie in [begin, end), in order.
   std::vector<Interval> within(std::uint64_t begin, std::uint64_t end) const;

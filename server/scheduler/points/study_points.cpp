@@ -18,36 +18,48 @@ StudyPoints::StudyPoints(StudyTable table, IntervalSet settled, const LossLimits
       [this](const Interval& interval) { fresh_.erase(interval.begin, interval.end); });
 }
 
-std::optional<Batch> StudyPoints::take(std::uint64_t at_most) {
+std::optional<Batch> StudyPoints::take(const Portion& wanted) {
   if (has(Standing::kSound)) {
-    return take(Standing::kSound, at_most);
+    return take(Standing::kSound, wanted);
   }
+  const auto free = next_fresh(wanted.follows);
+  if (!free) {
+    return std::nullopt;
+  }
+  const std::uint64_t end = end_of_batch(*table_.get(), *free, wanted);
+  fresh_.erase(free->begin, end);
+  leased_.insert(free->begin, end);
+  begun_until_ = std::max(begun_until_, end_of_model(*table_.get(), end));
+  return Batch{free->begin, end - free->begin, 0, {}};
+}
+
+std::optional<Interval> StudyPoints::next_fresh(std::optional<std::uint64_t> follows) const {
   if (fresh_.empty()) {
     return std::nullopt;
   }
-  const Interval interval = fresh_.front();
-  const protocol::Segment segment = table_->segment_at(interval.begin);
-  const std::uint64_t end =
-      std::min({interval.end, segment.first_point + segment.count, interval.begin + at_most});
-  fresh_.erase(interval.begin, end);
-  leased_.insert(interval.begin, end);
-  return Batch{segment.model, interval.begin, end - interval.begin, 0, {}};
+  if (follows) {
+    const auto rest = fresh_.first_from(*follows);
+    if (rest && rest->begin < end_of_model(*table_.get(), *follows)) {
+      return rest;
+    }
+  }
+  const auto begun_by_nobody = fresh_.first_from(begun_until_);
+  return begun_by_nobody ? *begun_by_nobody : fresh_.front();
 }
 
-std::optional<Batch> StudyPoints::take(Standing standing, std::uint64_t at_most) {
+std::optional<Batch> StudyPoints::take(Standing standing, const Portion& wanted) {
   Returned& intervals = returned(standing);
   if (intervals.empty()) {
     return std::nullopt;
   }
   const auto [first, history] = *intervals.begin();
-  const std::uint64_t end = std::min(history.end, first + at_most);
+  const std::uint64_t end = end_of_batch(*table_.get(), {first, history.end}, wanted);
   intervals.erase(intervals.begin());
   if (end < history.end) {
     intervals.emplace(end, history);
   }
   leased_.insert(first, end);
-  return Batch{table_->segment_at(first).model, first, end - first, history.attempts,
-               history.losses};
+  return Batch{first, end - first, history.attempts, history.losses};
 }
 
 std::optional<Batch> StudyPoints::take_condemned(std::uint64_t point, std::int64_t until_ms) {
@@ -59,7 +71,7 @@ std::optional<Batch> StudyPoints::take_condemned(std::uint64_t point, std::int64
   const History history = found->second;
   condemned.erase(found);
   leased_.insert(point);
-  return Batch{table_->segment_at(point).model, point, 1, history.attempts, history.losses};
+  return Batch{point, 1, history.attempts, history.losses};
 }
 
 void StudyPoints::give_back(const Interval& range, std::uint32_t attempts,
@@ -144,13 +156,9 @@ void StudyPoints::count_attempts(const PointAttempts& attempts) {
   attempts.for_each([this](const Interval& counted, std::uint32_t times) {
     for (const Interval& interval : fresh_.within(counted.begin, counted.end)) {
       fresh_.erase(interval.begin, interval.end);
-      for (std::uint64_t first = interval.begin; first < interval.end;) {
-        const protocol::Segment segment = table_->segment_at(first);
-        const std::uint64_t end = std::min(interval.end, segment.first_point + segment.count);
-        returned(Standing::kSound)
-            .emplace(first, History{end, times < kMostAttempts ? times : kMostAttempts, {}, 0});
-        first = end;
-      }
+      returned(Standing::kSound)
+          .emplace(interval.begin,
+                   History{interval.end, times < kMostAttempts ? times : kMostAttempts, {}, 0});
     }
   });
 }

@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "server/scheduler/points/batch_cut.h"
 #include "server/scheduler/points/interval_set.h"
 #include "server/scheduler/points/loss_history.h"
 #include "server/scheduler/points/point_attempts.h"
@@ -25,9 +26,8 @@ struct StudyTerms {
   bool operator==(const StudyTerms&) const = default;
 };
 
-/// Points that are handed out together, under one lease: one model, no gap.
+/// Points that are handed out together, under one lease: no gap, one model or several.
 struct Batch {
-  std::uint64_t model;
   std::uint64_t first_point;
   std::uint64_t count;
   std::uint32_t attempts;  ///< how often these points had been leased before
@@ -46,14 +46,17 @@ class StudyPoints {
   StudyPoints(StudyTable table, IntervalSet settled, const LossLimits& limits);
 
   std::uint64_t size() const { return table_.size(); }
+  /// How many models they have; the table is made when there is none.
+  std::uint64_t models() const { return table_->models(); }
   /// Nothing is handed out for a while: the table is forgotten until something is.
   void rest() { table_.release(); }
 
-  /// Takes up to `at_most` points out of the returned sound ones or, when there are none, the fresh
-  /// ones. Nothing when there are neither.
-  std::optional<Batch> take(std::uint64_t at_most);
+  /// Takes points out of the returned sound ones or, when there are none, the fresh ones: those
+  /// that are left of the model that `wanted` follows, then models of which nothing was taken yet,
+  /// then what is left of any. Nothing when there are none.
+  std::optional<Batch> take(const Portion& wanted);
   /// The same out of the returned ones of that standing.
-  std::optional<Batch> take(Standing standing, std::uint64_t at_most);
+  std::optional<Batch> take(Standing standing, const Portion& wanted);
   /// The condemned point if it came back at `until_ms` or before, else nothing.
   std::optional<Batch> take_condemned(std::uint64_t point, std::int64_t until_ms);
 
@@ -114,11 +117,13 @@ class StudyPoints {
   const Returned& returned(Standing standing) const {
     return returned_.at(static_cast<std::size_t>(standing));
   }
+  std::optional<Interval> next_fresh(std::optional<std::uint64_t> follows) const;
   static bool erase_from(Returned& intervals, std::uint64_t point);
 
   StudyTable table_;
   LossLimits limits_;
   IntervalSet fresh_;
+  std::uint64_t begun_until_ = 0;     // of all models before, points were taken
   std::array<Returned, 4> returned_;  // by standing
   IntervalSet leased_;
   IntervalSet committing_;

@@ -83,6 +83,12 @@ class SchedulerBench {
     return effects;
   }
 
+  /// What the worker gets once it has solved the batch at so many seconds a point.
+  SendBatch next_after(const SendBatch& batch, double s_per_point) {
+    solve_and_store(batch, s_per_point * static_cast<double>(batch.count));
+    return only<SendBatch>(feed(CreditGiven{batch.worker, 1})).at(0);
+  }
+
   /// Time passes in steps as in the server's loop; `alive` send heartbeats with what they hold.
   /// Returns all effects.
   std::vector<Effect> pass(std::int64_t duration_ms, const std::vector<WorkerId>& alive = {}) {

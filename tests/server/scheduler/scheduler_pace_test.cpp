@@ -15,16 +15,10 @@ SchedulerSettings by_pace_alone() {
   return settings;
 }
 
-/// What the worker gets once it has solved the batch at so many seconds a point.
-SendBatch next_after(SchedulerBench& bench, const SendBatch& batch, double s_per_point) {
-  bench.solve_and_store(batch, s_per_point * static_cast<double>(batch.count));
-  return only<SendBatch>(bench.feed(CreditGiven{batch.worker, 1})).at(0);
-}
-
 TEST(SchedulerPace, ABatchTakesTheTimeAimedAt) {
   SchedulerBench bench(by_pace_alone());
   bench.feed(StudyAdded{1, table_of(1'000'000), {}});
-  const SendBatch next = next_after(bench, bench.join(1, 1).at(0), 1e-3);
+  const SendBatch next = bench.next_after(bench.join(1, 1).at(0), 1e-3);
   EXPECT_EQ(next.count, 100U) << "0.1 s at 1 ms a point";
 }
 
@@ -37,14 +31,44 @@ TEST(SchedulerPace, WithMoreWorkersThanTheServerServesAtThatPaceBatchesTakeLonge
   for (WorkerId worker = 2; worker <= 8; ++worker) {
     bench.join(worker, 0);
   }
-  EXPECT_EQ(next_after(bench, first, 1e-3).count, 400U) << "8 workers, each a batch in 0.4 s";
+  EXPECT_EQ(bench.next_after(first, 1e-3).count, 400U) << "8 workers, each a batch in 0.4 s";
 }
 
-TEST(SchedulerPace, OneSlowBatchCountsHalfAgainstWhatWasKnown) {
+TEST(SchedulerPace, OneSlowBatchCountsHalfAgainstOneOfItsSizeThatIsKnown) {
+  SchedulerSettings settings = by_pace_alone();
+  settings.first_batch_points = 100;
+  SchedulerBench bench(settings);
+  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  const SendBatch second = bench.next_after(bench.join(1, 1).at(0), 1e-3);
+  EXPECT_EQ(bench.next_after(second, 3e-3).count, 50U) << "0.1 s at 2 ms a point";
+}
+
+TEST(SchedulerPace, AMessageCountsByItsPointsSoThatAFallBeforeTheFirstOnesSaysLittleOfOthers) {
+  SchedulerSettings settings = by_pace_alone();
+  settings.first_batch_points = 1000;
+  SchedulerBench bench(settings);
+  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  const SendBatch first = bench.join(1, 1).at(0);
+  const auto part = [&](std::uint64_t from, std::uint64_t to, double busy_s, bool is_last) {
+    ResultsReceived message{1, 1, first.lease, ++bench.sequence, is_last, busy_s, {}};
+    for (std::uint64_t point = from; point < to; ++point) {
+      message.outcomes.push_back({point, false});
+    }
+    bench.feed(message);
+  };
+  part(0, 10, 0.2, false);
+  part(10, 1000, 0.099, true);
+  const SendBatch next = only<SendBatch>(bench.feed(CreditGiven{1, 1})).at(0);
+  EXPECT_NEAR(static_cast<double>(next.count), 0.1 / (0.299 / 1000), 5.0);
+}
+
+TEST(SchedulerPace, SlowPointsOfOneModelFillTheLanesOfAWorker) {
   SchedulerBench bench(by_pace_alone());
   bench.feed(StudyAdded{1, table_of(1'000'000), {}});
-  const SendBatch second = next_after(bench, bench.join(1, 1).at(0), 1e-3);
-  EXPECT_EQ(next_after(bench, second, 3e-3).count, 50U) << "0.1 s at 2 ms a point";
+  const SendBatch second = bench.next_after(bench.join(1, 1).at(0), 0.5);
+  EXPECT_EQ(second.count, 8U) << "0.5 s a point, and eight at a time take little longer than one";
+  const SendBatch third = bench.next_after(second, 5.0);
+  EXPECT_LT(third.count, 4U) << "but not when they take minutes";
 }
 
 TEST(SchedulerPace, ABatchGrowsToSoManyTimesTheLastOneAtMost) {
@@ -53,7 +77,7 @@ TEST(SchedulerPace, ABatchGrowsToSoManyTimesTheLastOneAtMost) {
   SchedulerBench bench(settings);
   bench.feed(StudyAdded{1, table_of(1'000'000), {}});
   const SendBatch first = bench.join(1, 1).at(0);
-  EXPECT_EQ(next_after(bench, first, 1e-6).count, 4 * first.count);
+  EXPECT_EQ(bench.next_after(first, 1e-6).count, 4 * first.count);
 }
 
 }  // namespace

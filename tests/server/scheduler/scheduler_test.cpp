@@ -131,30 +131,6 @@ TEST(SchedulerTest, TheTailGoesOutInEverSmallerBatches) {
   EXPECT_TRUE(std::is_sorted(largest, sizes.end(), std::greater<>()));
 }
 
-TEST(SchedulerTest, ABatchNeverCrossesModelsOrBlocks) {
-  using namespace protocol;
-  auto table = std::make_shared<const PointTable>(
-      recipe_of({{listed("k", {1e7, 2e7, 3e7}), listed("H", {0.9, 1.0}), listed("mu", {0.4}),
-                  listed("e", {1.0})},
-                 {listed("H", {0.9}), listed("mu", {0.1, 0.2, 0.3}), listed("e", {1.0})}}));
-  SchedulerSettings settings = trusting();
-  settings.first_batch_points = 100;
-  settings.tail_batches_per_thread = 0;
-  SchedulerBench bench(settings);
-  bench.feed(StudyAdded{1, table, {}});
-  const auto batches = bench.join(1, 100);
-  ASSERT_EQ(batches.size(), 4U);
-  std::uint64_t next_point = 0;
-  for (const auto& batch : batches) {
-    EXPECT_EQ(batch.first_point, next_point);
-    next_point += batch.count;
-    for (std::uint64_t i = 0; i < batch.count; ++i) {
-      EXPECT_EQ(table->point(batch.first_point + i).model, batch.model);
-    }
-  }
-  EXPECT_EQ(next_point, table->size());
-}
-
 TEST(SchedulerTest, ResultsAreAcknowledgedOnlyAfterTheyAreStored) {
   SchedulerBench bench;
   bench.feed(StudyAdded{1, table_of(1), {}});

@@ -71,9 +71,9 @@ TEST(LeaseIndexTest, OfManyLeasesOnlyTheNeighboursOfAChunkAreLookedAt) {
   LeaseIndex index;
   constexpr std::uint64_t kLeases = 56'000;
   for (std::uint64_t lease = 1; lease <= kLeases; ++lease) {
-    index.insert(lease, Batch{0, 4 * lease, 4, 0, {}});
+    index.insert(lease, Batch{4 * lease, 4, 0, {}});
   }
-  const Batch batch{0, 4 * 30'000 + 1, 3, 0, {}};
+  const Batch batch{4 * 30'000 + 1, 3, 0, {}};
   const auto near = index.near(batch);
   EXPECT_LE(near.size(), 3U);
   EXPECT_NE(std::find(near.begin(), near.end(), 30'000U), near.end());
@@ -81,11 +81,11 @@ TEST(LeaseIndexTest, OfManyLeasesOnlyTheNeighboursOfAChunkAreLookedAt) {
 
 TEST(LeaseIndexTest, ALongLeaseIsFoundByEachOfItsPoints) {
   LeaseIndex index;
-  index.insert(1, Batch{0, 0, 1000, 0, {}});
-  index.insert(2, Batch{0, 400, 10, 0, {}});
-  index.insert(3, Batch{0, 2000, 10, 0, {}});
-  EXPECT_EQ(index.near(Batch{0, 999, 1, 0, {}}), (std::vector<std::uint64_t>{1, 2}));
-  index.erase(1, Batch{0, 0, 1000, 0, {}});
+  index.insert(1, Batch{0, 1000, 0, {}});
+  index.insert(2, Batch{400, 10, 0, {}});
+  index.insert(3, Batch{2000, 10, 0, {}});
+  EXPECT_EQ(index.near(Batch{999, 1, 0, {}}), (std::vector<std::uint64_t>{1, 2}));
+  index.erase(1, Batch{0, 1000, 0, {}});
   EXPECT_EQ(index.size(), 2U);
   EXPECT_EQ(index.all(), (std::vector<std::uint64_t>{2, 3}));
 }

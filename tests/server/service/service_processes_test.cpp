@@ -135,5 +135,17 @@ TEST_F(ProcessesTest, ABatchThatAnotherWorkerSolvedIsReleased) {
   EXPECT_EQ(releases, 1);
 }
 
+TEST_F(ProcessesTest, ABatchMayBeOfSeveralModels) {
+  ClientRequest submit = submit_request("models");
+  *submit.mutable_submit()->mutable_recipe() =
+      protocol::recipe_of({{protocol::range("k", 1e7, 2e7, 100), protocol::listed("H", {1.0}),
+                            protocol::listed("mu", {0.4}), protocol::listed("e", {1.0})}});
+  request(submit);
+  write_all();
+  hello();
+  credit(1);
+  EXPECT_EQ(last_message().batch().count(), 8U);
+}
+
 }  // namespace
 }  // namespace oblique::server

@@ -95,8 +95,8 @@ void SimulatedDisk::check_rows() {
                     " that is not there");
   }
   Statement rows(database.get(),
-                 "SELECT study_id, point, mu, coalesce(error, ''), duration_s, fn_peak_N"
-                 " FROM results ORDER BY study_id, point");
+                 "SELECT study_id, point, mu, coalesce(error, ''), duration_s, fn_peak_N, k"
+                 " FROM results JOIN models USING (model_id) ORDER BY study_id, point");
   std::map<std::uint64_t, std::size_t> counts;
   while (rows.step()) {
     const auto study_id = static_cast<std::uint64_t>(rows.integer(0));
@@ -109,8 +109,9 @@ void SimulatedDisk::check_rows() {
       return result.error() == rows.text(3) && outputs.duration_s == rows.real(4) &&
              outputs.fn_peak_N == rows.real(5);
     };
-    if (row == expected.end() || !agrees(*row->second) ||
-        model_.study(study_id)->table->point(point).mu != rows.real(2)) {
+    const auto& table = *model_.study(study_id)->table.get();
+    if (row == expected.end() || !agrees(*row->second) || table.point(point).mu != rows.real(2) ||
+        table.model(table.point(point).model).k_N_m != rows.real(6)) {
       throw Violation("the row of point " + std::to_string(point) + " of study " +
                       std::to_string(study_id) + " is not what was stored");
     }

@@ -50,6 +50,11 @@ TEST(IntervalSetTest, BehavesAsASetOfPointsUnderRandomChanges) {
     ASSERT_EQ(set.size(), reference.size()) << "step " << step;
     for (std::uint64_t point = 0; point < 75; ++point) {
       ASSERT_EQ(set.contains(point), reference.contains(point)) << "step " << step;
+      const auto from = reference.lower_bound(point);
+      const auto part = set.first_from(point);
+      ASSERT_EQ(part.has_value(), from != reference.end()) << "step " << step;
+      ASSERT_TRUE(!part || part->begin == *from) << "step " << step;
+      ASSERT_TRUE(!part || !set.contains(part->end)) << "step " << step;
     }
     std::uint64_t last_end = 0;
     bool first = true;
