@@ -41,7 +41,7 @@ struct ConvergeFlags {
   int coarsest = 4;
   int finest = 0;  // 0: not given
   int halvings = 2;
-  double tolerance_percent = 0.5;
+  double within_percent = 0.5;
 };
 
 std::vector<ContactPoint> points_of(const protocol::PointTable& table) {
@@ -141,7 +141,7 @@ int mesh_study(const ConvergeFlags& flags, const protocol::PointTable& table, Wo
   for (std::size_t i = 0; i < points.size(); ++i) {
     refinements.push_back(refinement_of("mesh", levels, i));
   }
-  const auto study = study_of(refinements, flags.tolerance_percent / 100.0);
+  const auto study = study_of(refinements, flags.within_percent / 100.0);
   if (flags.json) {
     auto json = json_of(study);
     for (std::size_t i = 0; i < points.size(); ++i) {
@@ -196,7 +196,7 @@ void add_converge(CLI::App& app, Command& command) {
   auto* study =
       verb->add_flag("--mesh-study", flags->mesh_study,
                      "mesh alone, at thirty points unless said otherwise: errors of every mesh");
-  verb->add_option("--tolerance", flags->tolerance_percent,
+  verb->add_option("--within", flags->within_percent,
                    "of the mesh study: largest difference of a mesh that is good enough [%]")
       ->type_name("PERCENT")
       ->check(protocol::number_between(1e-9, 100.0))

@@ -27,6 +27,7 @@ ModelParameters to_message(const solver::ModelParameters& model) {
   message.set_dt_s(model.dt_s);
   message.set_dt_fall_s(model.dt_fall_s);
   message.set_spectral_radius(model.spectral_radius);
+  message.set_tolerance(model.tolerance);
   return message;
 }
 
@@ -47,6 +48,9 @@ solver::ModelParameters unjudged_from_message(const ModelParameters& message) {
   model.dt_s = message.dt_s();
   model.dt_fall_s = message.dt_fall_s();
   model.spectral_radius = message.spectral_radius();
+  if (message.tolerance() != 0.0) {
+    model.tolerance = message.tolerance();
+  }
   return model;
 }
 

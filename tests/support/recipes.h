@@ -26,6 +26,7 @@ inline solver::ModelParameters unusual_model() {
   model.spectral_radius = 0.5;
   model.dt_s = 1e-6;
   model.dt_fall_s = 2e-6;
+  model.tolerance = 1e-6;
   return model;
 }
 

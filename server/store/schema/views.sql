@@ -61,7 +61,8 @@ SELECT s.name AS study, r.study_id AS study_id, r.point AS point, r.H AS H, r.mu
        m.length AS length, m.lengths_m AS lengths_m, m.E AS E_Pa, m.A AS A, m.I AS I, m.rho AS rho,
        m.g AS g, m.elements_per_link AS elements_per_link, m.k AS k, m.eta2 AS eta2,
        m.tip_mass AS tip_mass, m.integrator AS integrator,
-       m.spectral_radius AS spectral_radius, m.dt AS dt, m.dt_fall AS dt_fall
+       m.spectral_radius AS spectral_radius, m.dt AS dt, m.dt_fall AS dt_fall,
+       m.tolerance AS tolerance
 FROM results AS r
 JOIN studies AS s ON s.study_id = r.study_id
 JOIN models AS m ON m.model_id = r.model_id

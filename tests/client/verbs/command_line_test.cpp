@@ -78,7 +78,8 @@ TEST(CommandLine, AnswersWrongUsageWithExitCodeTwoAndASentence) {
       {{"converge", "--H", "1", "--mu", "0.4,0.6", "--e", "1"}, "2 points, and converge takes one"},
       {{"converge", "--H", "1", "--mu", "0.4", "--e", "1", "--finest", "24"}, "--finest 24"},
       {{"converge", "--H", "1", "--mu", "0.4", "--e", "1", "--halvings", "1"}, "--halvings 1"},
-      {{"converge", "--tolerance", "1"}, "--mesh-study"},
+      {{"converge", "--within", "1"}, "--mesh-study"},
+      {{"solve", "--H", "1", "--mu", "0.4", "--e", "1", "--tolerance", "0.1"}, "tolerance = 0.1"},
       {{"fit", "--from", "papre"}, "papre"},
       {{"fit", "--elements-per-link", "0"}, "elements_per_link = 0"},
   };

@@ -45,7 +45,7 @@ TEST(Canonical, TheTextOfAModelIsTheSameForEver) {
   EXPECT_EQ(canonical_model(unusual_model()),
             "oblique-model-1 lengths=0.5,0.25 E=1e+09 A=0.0002 I=3e-08 rho=1000 g=1.62 "
             "elements_per_link=7 k=5e+06 eta2=1.5 tip_mass=0.125 integrator=generalized-alpha "
-            "spectral_radius=0.5 dt=1e-06 dt_fall=2e-06");
+            "spectral_radius=0.5 dt=1e-06 dt_fall=2e-06 tolerance=1e-06");
 }
 
 TEST(Canonical, TheTextAndDigestOfARecipeAreTheSameForEver) {
@@ -109,6 +109,13 @@ TEST(Canonical, ATextThatIsNotThatOfAModelIsRefused) {
   }
 }
 
+TEST(Canonical, TheToleranceIsWrittenOnlyWhereItIsNotAtItsDefault) {
+  solver::ModelParameters model;
+  model.tolerance = 1e-6;
+  EXPECT_EQ(canonical_model(model), canonical_model({}) + " tolerance=1e-06");
+  EXPECT_THROW(model_of_canonical(canonical_model({}) + " tolerance=1e-05"), solver::InputError);
+}
+
 TEST(Canonical, AKeyThatComesLaterChangesNoTextWhereItIsAtItsDefault) {
   std::vector<solver::ParameterKey> keys(solver::model_keys().begin(), solver::model_keys().end());
   // As a key of the future does: a field that has a default.
@@ -121,12 +128,12 @@ TEST(Canonical, AKeyThatComesLaterChangesNoTextWhereItIsAtItsDefault) {
                                 [](const solver::ModelParameters& m) { return m.tip_mass_kg; },
                                 nullptr};
   };
-  keys.insert(keys.begin(), future("tolerance"));
+  keys.insert(keys.begin(), future("zeal"));
   keys.push_back(future("damping"));
   EXPECT_EQ(canonical_model({}, keys), canonical_model({}));
   solver::ModelParameters damped;
   damped.tip_mass_kg = 0.5;
-  EXPECT_EQ(canonical_model(damped, keys), canonical_model(damped) + " damping=0.5 tolerance=0.5");
+  EXPECT_EQ(canonical_model(damped, keys), canonical_model(damped) + " damping=0.5 zeal=0.5");
 }
 
 TEST(Canonical, AnAbsentModelIsThePaperWrittenOut) {

@@ -30,6 +30,14 @@ TEST(ModelMessageTest, WholeNumbersThatNoModelCouldHoldAreRefused) {
   EXPECT_THROW(from_message(message), solver::InputError);
 }
 
+TEST(ModelMessageTest, AModelOfAnOlderClientHasTheDefaultTolerance) {
+  ModelParameters message = to_message(unusual_model());
+  message.clear_tolerance();
+  EXPECT_EQ(from_message(message).tolerance, solver::ModelParameters{}.tolerance);
+  message.set_tolerance(-1e-5);
+  EXPECT_THROW(from_message(message), solver::InputError);
+}
+
 TEST(ModelMessageTest, AModelWithNothingSetIsRefused) {
   EXPECT_THROW(from_message(ModelParameters{}), solver::InputError);
 }

@@ -1,5 +1,7 @@
 #include "worker/solver/model/fall_model.h"
 
+#include <algorithm>
+
 namespace oblique::solver {
 
 ModelParameters fall_model(const ModelParameters& model) {
@@ -9,6 +11,7 @@ ModelParameters fall_model(const ModelParameters& model) {
   falling.eta2 = defaults.eta2;
   falling.dt_s = defaults.dt_s;
   falling.step_factor = defaults.step_factor;
+  falling.tolerance = std::min(falling.tolerance, defaults.tolerance);
   if (falling.integrator != Integrator::kGeneralizedAlpha) {
     falling.spectral_radius = defaults.spectral_radius;
   }

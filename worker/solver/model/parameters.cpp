@@ -30,7 +30,12 @@ constexpr std::array<std::string_view, 3> kPresetNames{"paper", "printed", "conv
 
 using Model = ModelParameters;
 
-constexpr std::array<ParameterKey, 15> kModelKeys{{
+/// Below the least, rounding and the location of events leave more; above the largest, modes are
+/// not those of the equations, and the stability limit decides anyway.
+constexpr double kLeastTolerance = 1e-9;
+constexpr double kLargestTolerance = 1e-2;
+
+constexpr std::array<ParameterKey, 16> kModelKeys{{
     {"links", "", "number of links", "a whole number from 1 to 64",
      [](double v) { return is_whole(v) && v >= 1 && v <= kMaxLinks; },
      [](const Model& m) { return static_cast<double>(m.lengths_m.size()); },
@@ -68,10 +73,14 @@ constexpr std::array<ParameterKey, 15> kModelKeys{{
      ">= 0 and < 1 (at 1 nothing damps the multipliers, and they never settle)",
      [](double v) { return v >= 0.0 && v < 1.0; }, [](const Model& m) { return m.spectral_radius; },
      [](Model& m, double v) { m.spectral_radius = v; }},
-    {"dt", "s", "step in contact; 0: chosen for the integrator", ">= 0", not_negative,
+    {"dt", "s", "step in contact; 0: chosen by the tolerance", ">= 0", not_negative,
      [](const Model& m) { return m.dt_s; }, [](Model& m, double v) { m.dt_s = v; }},
     {"dt_fall", "s", "step in the fall; 0: chosen for the integrator", ">= 0", not_negative,
      [](const Model& m) { return m.dt_fall_s; }, [](Model& m, double v) { m.dt_fall_s = v; }},
+    {"tolerance", "", "relative error that chosen steps leave in the outputs of a contact",
+     "from 1e-9 (rounding leaves more below) to 0.01 (modes mean nothing above)",
+     [](double v) { return v >= kLeastTolerance && v <= kLargestTolerance; },
+     [](const Model& m) { return m.tolerance; }, [](Model& m, double v) { m.tolerance = v; }},
 }};
 
 constexpr std::array<ParameterKey, 3> kPointKeys{{

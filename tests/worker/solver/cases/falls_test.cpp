@@ -21,6 +21,7 @@ std::vector<ModelParameters> models_of_one_fall() {
   std::vector<ModelParameters> models(5, coarse_model());
   models[1].k_N_m = 1.3e7;
   models[2].eta2 = 2.0;
+  models[2].tolerance = 1e-4;
   models[3].dt_s = 1e-6;
   models[4].k_N_m = 5e7;
   models[4].eta2 = 0.8;
@@ -41,13 +42,16 @@ TEST(Falls, WhatMovesAChainMakesAnother) {
   EXPECT_EQ(fall_model(model), model);
   for (const ParameterKey& key : model_keys()) {
     if (key.name == "k" || key.name == "eta2" || key.name == "dt" ||
-        key.name == "spectral_radius") {
+        key.name == "spectral_radius" || key.name == "tolerance") {
       continue;
     }
     ModelParameters other = coarse_model();
     key.set(other, key.name == "integrator" ? 1.0 : 2.0 * key.get(other) + 1.0);
     EXPECT_NE(fall_model(other), coarse_model()) << key.name;
   }
+  ModelParameters tighter = coarse_model();
+  tighter.tolerance *= 0.5;
+  EXPECT_EQ(fall_model(tighter), tighter);
 }
 
 TEST(Falls, SayHowFarTheyAre) {

@@ -69,6 +69,17 @@ TEST(Parameters, AValueThatIsNotAllowedIsNamedWithItsUnitAndWhatIs) {
   EXPECT_NE(objection_to(*find_model_key("spectral_radius"), 1.0), "");
 }
 
+TEST(Parameters, AToleranceThatNoStepCouldKeepOrThatMeansNothingIsRefusedByName) {
+  const ParameterKey& tolerance = *find_model_key("tolerance");
+  for (const double allowed : {1e-9, 1e-5, 0.01}) {
+    EXPECT_EQ(objection_to(tolerance, allowed), "");
+  }
+  for (const double refused : {0.0, 0.99e-9, 0.0101}) {
+    EXPECT_THAT(objection_to(tolerance, refused),
+                AllOf(HasSubstr("tolerance = "), HasSubstr("from 1e-9"), HasSubstr("to 0.01")));
+  }
+}
+
 TEST(Parameters, ADropIsAtMostTheLengthOfTheChain) {
   ModelParameters model;
   model.lengths_m = {0.5, 0.25};
