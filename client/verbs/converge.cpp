@@ -10,6 +10,8 @@
 #include "client/convergence/convergence_report.h"
 #include "client/convergence/levels.h"
 #include "client/convergence/mesh_study.h"
+#include "client/convergence/step_study.h"
+#include "client/output/printer.h"
 #include "client/output/work_line.h"
 #include "client/study/point_flags.h"
 #include "client/verbs/tip_reach.h"
@@ -26,6 +28,7 @@ constexpr const char* kConvergeExamples = R"(Examples:
   oblique converge --H 1 --mu 0.6 --e 0.8 --finest 16 --json
   oblique converge --H 1 --mu 0.4 --e 1 --integrator generalized-alpha
   oblique converge --mesh-study                     the study that the preset `converged` rests on
+  oblique converge --step-study                     the study that chosen steps rest on
 
 Work grows with the cube of the mesh for the explicit integrator: the finest mesh of 32 takes about
 a minute, one of 64 about eight.)";
@@ -37,6 +40,7 @@ constexpr int kMostElements = 1024;
 struct ConvergeFlags {
   PointFlags points;
   bool mesh_study = false;
+  bool step_study = false;
   bool json = false;
   int coarsest = 4;
   int finest = 0;  // 0: not given
@@ -163,14 +167,25 @@ int mesh_study(const ConvergeFlags& flags, const protocol::PointTable& table, Wo
   return kDone;
 }
 
+int step_study_around(const solver::ModelParameters& model, Format format, WorkLine& line) {
+  const auto results = step_study(step_study_cases(model), [&line](const StepStudyResult& result) {
+    line.tell(fmt::format("steps: {} done", result.name));
+  });
+  print_step_study(std::cout, results, format);
+  return kDone;
+}
+
 int converge_of_flags(ConvergeFlags flags) {
-  if (flags.mesh_study) {
+  if (flags.mesh_study || flags.step_study) {
     flags.points.axes.try_emplace("H", "0.4,0.7,1");
     flags.points.axes.try_emplace("mu", "0.1,0.4,0.8,1.2,1.6");
     flags.points.axes.try_emplace("e", "1,0.6");
   }
   const protocol::PointTable table(recipe_of_flags(flags.points, tip_reach()));
   WorkLine line;
+  if (flags.step_study) {
+    return step_study_around(table.model(0), flags.json ? Format::kJson : Format::kTable, line);
+  }
   return flags.mesh_study ? mesh_study(flags, table, line) : converge(flags, table, line);
 }
 
@@ -196,6 +211,10 @@ void add_converge(CLI::App& app, Command& command) {
   auto* study =
       verb->add_flag("--mesh-study", flags->mesh_study,
                      "mesh alone, at thirty points unless said otherwise: errors of every mesh");
+  verb->add_flag("--step-study", flags->step_study,
+                 "steps alone, over many points and models around the one given: what they leave "
+                 "against far shorter ones on the same mesh (half a minute)")
+      ->excludes(study);
   verb->add_option("--within", flags->within_percent,
                    "of the mesh study: largest difference of a mesh that is good enough [%]")
       ->type_name("PERCENT")

@@ -10,9 +10,6 @@
 namespace oblique::solver {
 namespace {
 
-/// Relative accuracy of contact outputs that falls are solved for.
-constexpr double kFallAccuracy = 1e-5;
-
 std::shared_ptr<const Motion> make_motion(const ModelParameters& model, const Chain& chain) {
   if (model.integrator == Integrator::kGeneralizedAlpha) {
     return std::make_shared<GeneralizedAlphaMotion>(model);
@@ -45,7 +42,8 @@ void solve_in_lanes(std::span<const SharedChain> chains, const std::vector<std::
   std::vector<FallRequest> requests;
   for (const std::size_t place : places) {
     const PreparedChain& chain = *chains[place];
-    requests.push_back({&chain.chain(), &chain.model(), kFallAccuracy, &chain.fall_progress()});
+    requests.push_back(
+        {&chain.chain(), &chain.model(), chain.model().tolerance, &chain.fall_progress()});
   }
   std::vector<FallSolution> solutions = solve_by_collocation(requests);
   for (std::size_t i = 0; i < places.size(); ++i) {

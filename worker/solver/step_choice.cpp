@@ -11,31 +11,60 @@
 namespace oblique::solver {
 namespace {
 
-double checked(const char* key, double asked_s, double limit_s, double fraction) {
-  if (asked_s == 0.0) {
-    return fraction * limit_s;
-  }
+constexpr double kPefrlOrder = 4.0;
+constexpr double kGeneralizedAlphaOrder = 2.0;
+
+void check_asked(const char* key, double asked_s, double limit_s) {
   if (asked_s > limit_s) {
     throw InputError(std::string(key) + " = " + exact_number(asked_s) +
                      " s is not allowed: the explicit integrator is stable up to " +
                      readable_number(limit_s) + " s here (0 chooses a step)");
   }
-  return asked_s;
+}
+
+/// What `order` makes of the model's tolerance: steps at it over those at the default one.
+double at_tolerance(const ModelParameters& model, double order) {
+  return std::pow(model.tolerance / ModelParameters().tolerance, 1.0 / order);
+}
+
+double limit_s(const Chain& chain, double tip_stiffness_N_m) {
+  return Pefrl::stability_limit() / chain.highest_frequency_rad_s(tip_stiffness_N_m);
 }
 
 double chosen_fall_s(const Chain& chain, const ModelParameters& model) {
-  if (model.integrator == Integrator::kGeneralizedAlpha) {
-    return model.dt_fall_s != 0.0 ? model.dt_fall_s
-                                  : StepChoice::kImplicitFallFraction *
-                                        std::sqrt(model.lengths_m.back() / model.g_m_s2);
+  const bool implicit = model.integrator == Integrator::kGeneralizedAlpha;
+  const double longest_s = implicit ? 0.0 : limit_s(chain, 0.0);
+  if (model.dt_fall_s != 0.0) {
+    if (!implicit) {
+      check_asked("dt_fall", model.dt_fall_s, longest_s);
+    }
+    return model.dt_fall_s;
   }
-  return checked("dt_fall", model.dt_fall_s,
-                 Pefrl::stability_limit() / chain.highest_frequency_rad_s(0.0),
-                 StepChoice::kFallFraction);
+  // A looser tolerance is for the contact alone: one fall serves models that differ in it.
+  if (implicit) {
+    return StepChoice::kImplicitFallFraction * std::sqrt(model.lengths_m.back() / model.g_m_s2) *
+           std::min(1.0, at_tolerance(model, kGeneralizedAlphaOrder));
+  }
+  return StepChoice::kFallFraction * longest_s * std::min(1.0, at_tolerance(model, kPefrlOrder));
 }
 
 double link_mass_kg(const ModelParameters& model) {
   return model.rho_kg_m3 * model.A_m2 * model.lengths_m.back() + model.tip_mass_kg;
+}
+
+double stiffest_N_m(const ModelParameters& model) {
+  return model.k_N_m * std::max(1.0, 1.0 / model.eta2);
+}
+
+double chosen_contact_s(const ModelParameters& model, double tip_inertia_kg, double limit_s) {
+  if (model.integrator == Integrator::kGeneralizedAlpha) {
+    return StepChoice::kImplicitContactFraction * std::sqrt(link_mass_kg(model) / model.k_N_m) *
+           at_tolerance(model, kGeneralizedAlphaOrder);
+  }
+  const double tip_rad_s = std::sqrt(model.k_N_m / tip_inertia_kg);
+  const double highest_rad_s = Pefrl::stability_limit() / limit_s;
+  return std::pow(model.tolerance / StepChoice::kErrorFactor, 1.0 / kPefrlOrder) /
+         (std::pow(tip_rad_s, 0.75) * std::pow(highest_rad_s, 0.25));
 }
 
 }  // namespace
@@ -46,16 +75,27 @@ StepChoice::StepChoice(const Chain& chain, const ModelParameters& model)
       tangential_ratio_(1.0 / model.eta2),
       integrator_(model.integrator),
       asked_contact_s_(model.dt_s),
-      implicit_contact_s_(kImplicitContactFraction * std::sqrt(link_mass_kg(model) / model.k_N_m)),
+      tip_inertia_kg_(chain.tip_inertia_kg()),
+      compression_limit_s_(limit_s(chain, stiffest_N_m(model))),
+      chosen_contact_s_(chosen_contact_s(model, tip_inertia_kg_, compression_limit_s_)),
       step_factor_(model.step_factor),
       fall_s_(chosen_fall_s(chain, model)) {}
 
 ContactSteps StepChoice::contact_limits(double e_star) const {
-  const auto limit_s = [this](double stiffness_ratio) {
-    const double stiffest_N_m = k_N_m_ * std::max(stiffness_ratio, tangential_ratio_);
-    return Pefrl::stability_limit() / chain_.highest_frequency_rad_s(stiffest_N_m);
-  };
-  return {limit_s(1.0), limit_s(1.0 / (e_star * e_star))};
+  const double stiffest_N_m = k_N_m_ * std::max(1.0 / (e_star * e_star), tangential_ratio_);
+  return {compression_limit_s_, limit_s(chain_, stiffest_N_m)};
+}
+
+ContactSteps StepChoice::stable(const ContactSteps& steps, double e_star) const {
+  // A spring at the tip raises the square of the highest frequency by its stiffness over the tip's
+  // inertia at most. That spares each e* a search for the frequency itself.
+  const double added_N_m = k_N_m_ * (std::max(1.0 / (e_star * e_star), tangential_ratio_) -
+                                     std::max(1.0, tangential_ratio_));
+  const double part = compression_limit_s_ / Pefrl::stability_limit();
+  const double slower = std::sqrt(1.0 + added_N_m / tip_inertia_kg_ * part * part);
+  const double longest_s = kLongestFraction * compression_limit_s_;
+  return {std::min(steps.compression_s, longest_s),
+          std::min(steps.restitution_s, longest_s / slower)};
 }
 
 ContactSteps StepChoice::contact(double e_star) const {
@@ -65,12 +105,7 @@ ContactSteps StepChoice::contact(double e_star) const {
   }
   steps.compression_s *= step_factor_;
   steps.restitution_s *= step_factor_;
-  if (integrator_ == Integrator::kExplicit) {
-    const ContactSteps limits = contact_limits(e_star);
-    steps.compression_s = std::min(steps.compression_s, kLongestFraction * limits.compression_s);
-    steps.restitution_s = std::min(steps.restitution_s, kLongestFraction * limits.restitution_s);
-  }
-  return steps;
+  return integrator_ == Integrator::kExplicit ? stable(steps, e_star) : steps;
 }
 
 ContactSteps StepChoice::single_contact(double e_star) const {
@@ -82,18 +117,17 @@ ContactSteps StepChoice::single_contact(double e_star) const {
   }
   if (asked_contact_s_ != 0.0) {
     if (integrator_ == Integrator::kExplicit) {
-      checked("dt", asked_contact_s_, contact_limits(e_star).restitution_s, kContactFraction);
+      check_asked("dt", asked_contact_s_, contact_limits(e_star).restitution_s);
     }
     return {asked_contact_s_, asked_contact_s_};
   }
-  const double faster = std::min(1.0, e_star / kFastRestitution);
+  const auto slower = [](double e) { return std::min(1.0, e / kFastRestitution); };
   if (integrator_ != Integrator::kExplicit) {
-    return {implicit_contact_s_, implicit_contact_s_ * faster};
+    return {chosen_contact_s_, chosen_contact_s_ * slower(e_star)};
   }
-  // Far below kFastRestitution the limit itself falls as e* does.
-  const ContactSteps limits = contact_limits(e_star);
-  return {kContactFraction * limits.compression_s,
-          kContactFraction * std::min(limits.restitution_s, limits.compression_s * faster)};
+  const double compression_e_star = std::max(e_star, kFastestForCompression);
+  return stable(
+      {chosen_contact_s_ * slower(compression_e_star), chosen_contact_s_ * slower(e_star)}, e_star);
 }
 
 }  // namespace oblique::solver

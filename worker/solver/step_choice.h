@@ -8,25 +8,34 @@ namespace oblique::solver {
 
 /// Step lengths: what the user asked for, or what is chosen for the integrator.
 ///
-/// Explicit: fractions of the stability limit, which is PEFRL's omega h over the highest frequency
-/// of the chain, in contact with its tip on the stiffest contact spring; a longer step is refused.
-/// Generalized-alpha: fractions of the times that the motion itself takes, on any mesh.
+/// Explicit: the longest step that keeps the model's tolerance by an error model, on
+///
+///   error = kErrorFactor (omega_tip h)^3 (omega_max h),
+///
+/// and stays below kLongestFraction of the stability limit, which is PEFRL's omega h over
+/// omega_max; a longer step asked for is refused above the limit. omega_max is the highest
+/// frequency of the chain, in contact with its tip on the stiffest contact spring, omega_tip that
+/// of the tip's own inertia on that spring in compression. Generalized-alpha: fractions of the
+/// times that the motion itself takes, on any mesh. README.md has what the numbers were measured
+/// by.
 class StepChoice {
  public:
-  /// Fractions of the stability limit taken when no step is asked for. Chosen by work and precision
-  /// (README.md).
+  static constexpr double kErrorFactor = 0.032;
+  /// Steps chosen, or made longer by a step factor, stay below this fraction of the stability
+  /// limit.
+  static constexpr double kLongestFraction = 0.9;
+  /// In the fall: fraction of the stability limit at the default tolerance, or a looser one.
   static constexpr double kFallFraction = 0.5;
-  static constexpr double kContactFraction = 0.2;
-  /// Generalized-alpha: fraction of sqrt(length/g) in the fall (5 us for the default model) and of
-  /// sqrt(mass of the last link/k) in contact (0.1 us).
+  /// Generalized-alpha at the default tolerance: fraction of sqrt(length/g) in the fall (5 us for
+  /// the default model) and of sqrt(mass of the last link/k) in contact (0.1 us).
   static constexpr double kImplicitFallFraction = 1.0 / 40'000.0;
   static constexpr double kImplicitContactFraction = 1.0 / 1500.0;
   /// The restitution spring is e*^-2 times stiffer and its motion e*^-1 times faster. Below this e*
-  /// it is faster than the chain's own response to contact, and steps in restitution shrink with
-  /// it.
+  /// that is faster than the chain's own response to contact, and steps shrink with e*.
   static constexpr double kFastRestitution = 0.4;
-  /// Steps that a step factor above 1 makes longer stay below this fraction of the stability limit.
-  static constexpr double kLongestFraction = 0.9;
+  /// Compression, which is as fast at any e*, has shorter steps only for the vibrations that
+  /// restitution leaves in it: no shorter ones than for this e*.
+  static constexpr double kFastestForCompression = 0.05;
 
   /// Throws InputError when model.dt_fall_s is above its limit.
   StepChoice(const Chain& chain, const ModelParameters& model);
@@ -42,13 +51,17 @@ class StepChoice {
  private:
   /// Steps before the step factor counts.
   ContactSteps single_contact(double e_star) const;
+  /// `steps`, at most kLongestFraction of the stability limit in such a contact.
+  ContactSteps stable(const ContactSteps& steps, double e_star) const;
 
   const Chain& chain_;
   double k_N_m_;
   double tangential_ratio_;  ///< of the tangential stiffness to k
   Integrator integrator_;
   double asked_contact_s_;
-  double implicit_contact_s_;
+  double tip_inertia_kg_;
+  double compression_limit_s_;  ///< of the explicit integrator
+  double chosen_contact_s_;     ///< by the tolerance alone, where restitution is not fast
   double step_factor_;
   double fall_s_;
 };

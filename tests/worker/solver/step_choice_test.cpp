@@ -31,19 +31,86 @@ TEST(StepChoice, LimitsAreThoseOfTheStiffestSpringOfEachPhase) {
   EXPECT_DOUBLE_EQ(limits(0.125, 0.25).restitution_s, limit_s(chain, 16.0 * k));
 }
 
-TEST(StepChoice, WithoutAStepAskedForFractionsOfTheLimitsAreTaken) {
+TEST(StepChoice, TheStepChosenMakesTheErrorModelTheTolerance) {
+  ModelParameters model;
+  for (const double tolerance : {1e-5, 1e-7}) {
+    model.tolerance = tolerance;
+    const Chain chain(model);
+    const double h_s = StepChoice(chain, model).contact(1.0).compression_s;
+    const double tip = h_s * std::sqrt(model.k_N_m / chain.tip_inertia_kg());
+    const double highest = h_s * chain.highest_frequency_rad_s(model.k_N_m);
+    EXPECT_NEAR(StepChoice::kErrorFactor * tip * tip * tip * highest, tolerance, 1e-9 * tolerance);
+  }
+  EXPECT_DOUBLE_EQ(StepChoice(Chain(model), model).contact(0.4).restitution_s,
+                   StepChoice(Chain(model), model).contact(1.0).compression_s);
+}
+
+TEST(StepChoice, StepsShrinkWithFastRestitutionInBothPhases) {
   const ModelParameters model;
   const Chain chain(model);
   const StepChoice steps(chain, model);
-  EXPECT_DOUBLE_EQ(steps.fall_s(), StepChoice::kFallFraction * limit_s(chain, 0.0));
-  EXPECT_DOUBLE_EQ(steps.contact(1.0).compression_s,
-                   StepChoice::kContactFraction * steps.contact_limits(1.0).compression_s);
-  // Restitution steps shrink when it is fast, and never grow.
-  EXPECT_LE(steps.contact(1.0).restitution_s, steps.contact(1.0).compression_s);
-  EXPECT_LT(steps.contact(0.1).restitution_s, 0.5 * steps.contact(0.1).compression_s);
-  for (const double e_star : {0.001, 0.02, 0.1, 0.5}) {
-    EXPECT_LT(steps.contact(e_star).restitution_s, steps.contact_limits(e_star).restitution_s);
+  const double usual_s = steps.contact(1.0).compression_s;
+  EXPECT_DOUBLE_EQ(steps.contact(0.1).restitution_s, usual_s / 4.0);
+  EXPECT_DOUBLE_EQ(steps.contact(0.1).compression_s, usual_s / 4.0);
+  EXPECT_DOUBLE_EQ(steps.contact(0.001).restitution_s, usual_s / 400.0);
+  EXPECT_DOUBLE_EQ(steps.contact(0.001).compression_s, usual_s / 8.0);
+}
+
+TEST(StepChoice, ChosenStepsStayBelowTheLimitWhateverTheModel) {
+  const auto expect_below = [](const ModelParameters& model) {
+    const Chain chain(model);
+    const StepChoice steps(chain, model);
+    for (const double e_star : {0.001, 0.02, 0.4, 1.0}) {
+      const ContactSteps limits = steps.contact_limits(e_star);
+      const ContactSteps chosen = steps.contact(e_star);
+      EXPECT_GT(chosen.restitution_s, 0.0);
+      EXPECT_LE(chosen.compression_s, StepChoice::kLongestFraction * limits.compression_s);
+      EXPECT_LE(chosen.restitution_s, StepChoice::kLongestFraction * limits.restitution_s);
+    }
+    EXPECT_LT(steps.fall_s(), limit_s(chain, 0.0));
+  };
+  for (const int elements : {1, 4, 64}) {
+    for (const double k : {1.0, 2.7e7, 1e12}) {
+      for (const double tolerance : {1e-9, 1e-5, 1e-2}) {
+        ModelParameters model;
+        model.elements_per_link = elements;
+        model.k_N_m = k;
+        model.tolerance = tolerance;
+        expect_below(model);
+      }
+    }
   }
+  ModelParameters heavy;
+  heavy.tip_mass_kg = 100.0;
+  expect_below(heavy);
+  const Chain chain(heavy);
+  EXPECT_DOUBLE_EQ(
+      StepChoice(chain, heavy).contact(1.0).compression_s,
+      StepChoice::kLongestFraction * StepChoice(chain, heavy).contact_limits(1.0).compression_s)
+      << "a tip so heavy is slow: stability alone bounds the step";
+}
+
+TEST(StepChoice, AFallIsAsExactAsTheContactButNotLessExactThanByDefault) {
+  for (const auto integrator : {Integrator::kExplicit, Integrator::kGeneralizedAlpha}) {
+    ModelParameters model;
+    model.integrator = integrator;
+    const Chain chain(model);
+    const double usual_s = StepChoice(chain, model).fall_s();
+    model.tolerance = 1e-3;
+    EXPECT_EQ(StepChoice(chain, model).fall_s(), usual_s);
+    model.tolerance = 1e-9;
+    EXPECT_DOUBLE_EQ(StepChoice(chain, model).fall_s(),
+                     usual_s * (integrator == Integrator::kExplicit ? 0.1 : 0.01));
+  }
+}
+
+TEST(StepChoice, GeneralizedAlphaFollowsTheToleranceByItsOrder) {
+  ModelParameters model;
+  model.integrator = Integrator::kGeneralizedAlpha;
+  const Chain chain(model);
+  const double usual_s = StepChoice(chain, model).contact(1.0).compression_s;
+  model.tolerance = 1e-7;
+  EXPECT_DOUBLE_EQ(StepChoice(chain, model).contact(1.0).compression_s, 0.1 * usual_s);
 }
 
 TEST(StepChoice, StepAskedForIsTakenUpToTheLimitAndRefusedAbove) {

@@ -215,6 +215,13 @@ Eigen::Vector2d Chain::inner_end_force(std::size_t link, const Coordinates& q,
   return force;
 }
 
+double Chain::tip_inertia_kg() const {
+  Coordinates acceleration = Coordinates::Zero(2, rows_);
+  acceleration(0, tip_row()) = 1.0;
+  mass_factor_.solve_pairs(acceleration.data());
+  return 1.0 / acceleration(0, tip_row());
+}
+
 double Chain::highest_frequency_rad_s(double tip_stiffness_N_m) const {
   // Across, the stiffness is the smaller by the axial part, so the highest frequency lies along.
   if (tip_stiffness_N_m == 0.0) {

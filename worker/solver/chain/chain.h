@@ -100,6 +100,10 @@ class Chain {
   /// `tip_stiffness_N_m` in both directions. To a relative 1e-10.
   double highest_frequency_rad_s(double tip_stiffness_N_m) const;
 
+  /// Mass that the tip shows to a sudden force across or along the chain [kg]: 1/(M^-1) at the tip,
+  /// tip_mass and about a sixteenth of the last element.
+  double tip_inertia_kg() const;
+
  private:
   struct Element {
     std::array<Eigen::Index, 4> row;  ///< of p_i, s_i, p_j, s_j

@@ -99,7 +99,7 @@ TEST(SolveErrors, ContactThatOutlastsTheStatedTimeIsGivenUp) {
   EXPECT_THAT(message_of<SolveError>([&] { soft.solve(0.5, 0.4, 1.0); }),
               HasSubstr("did not end within 0.02 s"));
   model = coarse_model();
-  model.tip_mass_kg = 1e6;
+  model.tip_mass_kg = 1e4;
   const Finger heavy{model};
   EXPECT_THAT(message_of<SolveError>([&] { heavy.solve(0.5, 0.4, 1.0); }),
               HasSubstr("did not end within 0.02 s"));

@@ -262,5 +262,14 @@ TEST(Chain, ModelOutsideItsDomainIsRefused) {
   EXPECT_THROW(Chain{model}, InputError);
 }
 
+TEST(Chain, TheTipShowsItsOwnMassAndAPartOfTheLastElement) {
+  ModelParameters model;
+  const double bare_kg = Chain(model).tip_inertia_kg();
+  const double element_kg = model.rho_kg_m3 * model.A_m2 * model.lengths_m.back() / 4.0;
+  EXPECT_NEAR(bare_kg, element_kg / 16.0, 0.02 * element_kg);
+  model.tip_mass_kg = 0.3;
+  EXPECT_NEAR(Chain(model).tip_inertia_kg(), bare_kg + 0.3, 1e-12);
+}
+
 }  // namespace
 }  // namespace oblique::solver
