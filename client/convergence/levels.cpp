@@ -25,10 +25,6 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using solver::CaseResult;
 
-/// Part of the stability limit that the explicit fall takes here; the frequencies of the moving
-/// chain stay within the rest.
-constexpr double kLongFallFraction = 0.9;
-
 // Long computations begin first, so that no core is left alone with one at the end.
 std::vector<std::size_t> dearest_first(const std::vector<Level>& levels) {
   std::vector<std::size_t> turns(levels.size());
@@ -120,9 +116,6 @@ std::vector<Level> mesh_levels(const solver::ModelParameters& model, int coarses
     if (model.integrator == solver::Integrator::kExplicit) {
       level.model.dt_s = 0.0;
       level.model.dt_fall_s = 0.0;
-      const solver::Chain chain(level.model);
-      level.model.dt_fall_s = solver::StepChoice(chain, level.model).fall_s() *
-                              (kLongFallFraction / solver::StepChoice::kFallFraction);
     }
     levels.push_back(std::move(level));
   }

@@ -17,10 +17,8 @@ struct Level {
 };
 
 /// Meshes from `coarsest` to `finest` elements a link, doubled each time. The steps of the
-/// explicit integrator are those it chooses on each mesh, except that the fall takes the longest
-/// that are safe (its steps are far shorter than its motion asks for, and most of the work); those
-/// of generalized-alpha do not depend on the mesh and stay. Throws InputError unless finest is
-/// coarsest times 4, 8, 16, ...
+/// explicit integrator are those it chooses on each mesh; those of generalized-alpha do not depend
+/// on the mesh and stay. Throws InputError unless finest is coarsest times 4, 8, 16, ...
 std::vector<Level> mesh_levels(const solver::ModelParameters& model, int coarsest, int finest);
 
 /// Steps of contact and fall, both halved each time, from those that the model takes at e_star;
