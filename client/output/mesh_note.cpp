@@ -8,6 +8,10 @@
 namespace oblique::client {
 namespace {
 
+/// Elements a link from which on all but exit velocities and reactions are within 0.5 % of their
+/// limits (worker/solver/README.md, Which mesh).
+constexpr int kForcesConverge = 16;
+
 /// Elements a link on the coarsest mesh of the study.
 int coarsest(const protocol::Recipe& recipe) {
   int least = 0;
@@ -36,6 +40,13 @@ void tell_mesh(std::ostream& out, const protocol::Recipe& recipe) {
   const int converged = solver::preset("converged").elements_per_link;
   const int elements = coarsest(recipe);
   if (elements >= converged) {
+    return;
+  }
+  if (elements >= kForcesConverge) {
+    out << "Note: on " << elements
+        << " elements a link forces, times and impulses are converged, exit velocities and "
+           "reactions less so; --preset converged has "
+        << converged << " (README.md, Limits).\n";
     return;
   }
   out << "Note: the mesh, " << elements << " elements a link"

@@ -30,10 +30,12 @@ constexpr const char* kConvergeExamples = R"(Examples:
   oblique converge --mesh-study                     the study that the preset `converged` rests on
   oblique converge --step-study                     the study that chosen steps rest on
 
-Work grows with the cube of the mesh for the explicit integrator: the finest mesh of 32 takes about
-a minute, one of 64 about eight.)";
+A finest mesh of 32 takes some seconds. The work of a contact grows with the cube of the mesh for the
+explicit integrator, that of a fall with the mesh.)";
 
-constexpr int kStudyFinest = 64;
+constexpr int kCoarsest = 4;
+constexpr int kStudyCoarsest = 6;
+constexpr int kStudyFinest = 96;
 // The check of the mesh itself says what a model may have.
 constexpr int kMostElements = 1024;
 
@@ -42,8 +44,8 @@ struct ConvergeFlags {
   bool mesh_study = false;
   bool step_study = false;
   bool json = false;
-  int coarsest = 4;
-  int finest = 0;  // 0: not given
+  int coarsest = 0;  // 0: not given
+  int finest = 0;
   int halvings = 2;
   double within_percent = 0.5;
 };
@@ -112,8 +114,9 @@ int converge(const ConvergeFlags& flags, const protocol::PointTable& table, Work
   }
   constexpr int kFinest = 32;
   const auto model = table.model(0);
-  const int finest = flags.finest == 0 ? std::max(kFinest, 4 * flags.coarsest) : flags.finest;
-  const auto meshes = mesh_levels(model, flags.coarsest, finest);
+  const int coarsest = flags.coarsest == 0 ? kCoarsest : flags.coarsest;
+  const int finest = flags.finest == 0 ? std::max(kFinest, 4 * coarsest) : flags.finest;
+  const auto meshes = mesh_levels(model, coarsest, finest);
   const auto steps = step_levels(model, points[0].e_star, flags.halvings);
   const auto [mesh, step] = refined(meshes, steps, points, line);
   if (flags.json) {
@@ -137,8 +140,9 @@ int mesh_study(const ConvergeFlags& flags, const protocol::PointTable& table, Wo
         fmt::format("the flags make {} models, and a mesh study takes one", table.models()));
   }
   const auto points = points_of(table);
-  const int finest = flags.finest == 0 ? kStudyFinest : flags.finest;
-  const auto meshes = mesh_levels(table.model(0), flags.coarsest, finest);
+  const int coarsest = flags.coarsest == 0 ? kStudyCoarsest : flags.coarsest;
+  const int finest = flags.finest == 0 ? std::max(kStudyFinest, 4 * coarsest) : flags.finest;
+  const auto meshes = mesh_levels(table.model(0), coarsest, finest);
   tell_levels("mesh", meshes);
   const auto levels = solved(meshes, points, line);
   std::vector<Refinement> refinements;
@@ -197,12 +201,12 @@ void add_converge(CLI::App& app, Command& command) {
       "converge", "Refine mesh and step of one point and estimate the error of every output");
   verb->footer(kConvergeExamples);
   verb->add_flag("--json", flags->json, "print one JSON object (SI units)");
-  verb->add_option("--coarsest", flags->coarsest, "elements a link of the coarsest mesh")
+  verb->add_option("--coarsest", flags->coarsest,
+                   "elements a link of the coarsest mesh; default 4, for the mesh study 6")
       ->check(CLI::Range(1, kMostElements))
-      ->type_name("N")
-      ->capture_default_str();
+      ->type_name("N");
   verb->add_option("--finest", flags->finest,
-                   "elements a link of the finest mesh; default 32, for the mesh study 64")
+                   "elements a link of the finest mesh; default 32, for the mesh study 96")
       ->check(CLI::Range(1, kMostElements))
       ->type_name("N");
   verb->add_option("--halvings", flags->halvings, "how often the step is halved")

@@ -30,8 +30,18 @@ TEST(MeshNote, SaysInOneLineThatThePublishedMeshIsNotConvergedAndWhatIs) {
 
 TEST(MeshNote, SaysNothingOfAConvergedMesh) {
   EXPECT_EQ(note_of("preset = 'converged'"), "");
-  EXPECT_EQ(note_of("elements_per_link = 16"), "");
-  EXPECT_EQ(note_of("", "elements_per_link = [16, 32]\n"), "");
+  EXPECT_EQ(note_of("elements_per_link = 48"), "");
+  EXPECT_EQ(note_of("", "elements_per_link = [48, 64]\n"), "");
+}
+
+TEST(MeshNote, SaysWhatIsNotConvergedWhereForcesAre) {
+  for (const char* model : {"elements_per_link = 16", "elements_per_link = 47"}) {
+    const auto line = note_of(model);
+    EXPECT_NE(line.find("forces, times and impulses are converged"), std::string::npos) << line;
+    EXPECT_NE(line.find("--preset converged has 48"), std::string::npos) << line;
+    EXPECT_EQ(std::count(line.begin(), line.end(), '\n'), 1);
+  }
+  EXPECT_NE(note_of("elements_per_link = 15").find("is not converged"), std::string::npos);
 }
 
 TEST(MeshNote, LooksAtTheCoarsestMeshOfAStudy) {

@@ -180,7 +180,7 @@ ModelParameters preset(std::string_view name) {
     model.k_N_m = 2.5e7;
     model.eta2 = 1.21;
   } else if (name == "converged") {
-    model.elements_per_link = 16;
+    model.elements_per_link = 48;
   } else if (name != "paper") {
     throw InputError("preset = \"" + std::string(name) + "\" is not allowed: preset must be " +
                      joined(kPresetNames));

@@ -75,7 +75,7 @@ TEST_F(SolveConvergence, EverythingIsOfOrderFourThoughEventsLieInsideSteps) {
 }
 
 TEST_F(SolveConvergence, DefaultStepOnTheConvergedMeshGivesTheKnownConvergedImpacts) {
-  // n = 16 and 32 agree to 2 N.
+  // n = 16, 32 and 48 agree to 2 N.
   const Finger finger{preset("converged")};
   const CaseResult slip = finger.solve(1.0, 0.4, 1.0);
   const CaseResult stick = finger.solve(1.0, 1.2, 1.0);
