@@ -214,6 +214,27 @@ ordered_json json_of(const OutputConvergence& output) {
           {"trend", name_of(extrapolation.trend)}};
 }
 
+double fall_tolerance(const Refinement& step) {
+  return std::min(step.levels.front().level.model.tolerance, solver::ModelParameters().tolerance);
+}
+
+using FallChanges = std::vector<std::pair<std::string, std::optional<double>>>;
+
+// Relative changes of the outputs; nothing when the mode is another one.
+std::optional<FallChanges> changes_of_fall(const Refinement& step, const SolvedLevel& exact_fall) {
+  const auto& exact = exact_fall.results[step.point];
+  if (step.result(0).major_mode != exact.major_mode) {
+    return std::nullopt;
+  }
+  const auto ours = outputs_of(step.result(0));
+  const auto truth = outputs_of(exact);
+  FallChanges changes;
+  for (std::size_t i = 0; i < truth.size() && i < ours.size(); ++i) {
+    changes.emplace_back(truth[i].name, relative_error(ours[i].value, truth[i].value));
+  }
+  return changes;
+}
+
 }  // namespace
 
 Refinement refinement_of(std::string what, const std::vector<SolvedLevel>& levels,
@@ -240,6 +261,36 @@ void print_refinement(std::ostream& out, const Refinement& refinement) {
   print_outputs(out, refinement);
   print_modes(out, refinement);
   print_verdict(out, refinement);
+}
+
+std::string fall_sentence(const Refinement& step, const SolvedLevel& exact_fall) {
+  const auto changes = changes_of_fall(step, exact_fall);
+  const auto solved_for = readable_number(fall_tolerance(step), 2);
+  const auto exact = readable_number(exact_fall.level.model.tolerance, 2);
+  if (!changes) {
+    return fmt::format(
+        "The fall, solved for {}, does not settle the mode: one solved for {} gives another.\n",
+        solved_for, exact);
+  }
+  Worst worst;
+  for (const auto& [name, change] : *changes) {
+    worst.add(name, change);
+  }
+  return fmt::format(
+      "The fall, solved for {}, changes outputs by {} at most beside one solved for {}.\n",
+      solved_for, worst.shown(), exact);
+}
+
+ordered_json json_of_fall(const Refinement& step, const SolvedLevel& exact_fall) {
+  ordered_json outputs = ordered_json::array();
+  const auto changes = changes_of_fall(step, exact_fall);
+  for (const auto& [name, change] : changes.value_or(FallChanges{})) {
+    outputs.push_back({{"name", name}, {"relative_change", json_of_value(change)}});
+  }
+  return {{"tolerance", fall_tolerance(step)},
+          {"exact_tolerance", exact_fall.level.model.tolerance},
+          {"same_mode", changes.has_value()},
+          {"outputs", outputs}};
 }
 
 void print_modes(std::ostream& out, const Refinement& refinement) {

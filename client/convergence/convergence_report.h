@@ -39,6 +39,13 @@ bool converges(const Refinement& refinement);
 /// verdict.
 void print_refinement(std::ostream& out, const Refinement& refinement);
 
+/// "The fall, solved for 1e-05, changes outputs by ... % at most": between the first level of
+/// `step` and the same contact on the fall of exact_fall_level().
+std::string fall_sentence(const Refinement& step, const SolvedLevel& exact_fall);
+
+/// The same as a JSON object.
+nlohmann::ordered_json json_of_fall(const Refinement& step, const SolvedLevel& exact_fall);
+
 /// The mode on every level, ripples merged.
 void print_modes(std::ostream& out, const Refinement& refinement);
 

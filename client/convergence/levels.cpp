@@ -25,6 +25,11 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using solver::CaseResult;
 
+/// Whether the fall chooses its steps by the tolerance and has none to halve.
+bool falls_by_accuracy(const solver::ModelParameters& model) {
+  return model.integrator == solver::Integrator::kExplicit && model.dt_fall_s == 0.0;
+}
+
 // Long computations begin first, so that no core is left alone with one at the end.
 std::vector<std::size_t> dearest_first(const std::vector<Level>& levels) {
   std::vector<std::size_t> turns(levels.size());
@@ -136,10 +141,21 @@ std::vector<Level> step_levels(const solver::ModelParameters& model, double e_st
   for (int i = 0; i <= halvings; ++i) {
     Level level{i == 0 ? "dt" : fmt::format("dt/{:.0f}", std::exp2(i)), model};
     level.model.dt_s = std::ldexp(steps.contact(e_star).restitution_s, -i);
-    level.model.dt_fall_s = std::ldexp(steps.fall_s(), -i);
+    if (!falls_by_accuracy(model)) {
+      level.model.dt_fall_s = std::ldexp(steps.fall_s(), -i);
+    }
     levels.push_back(std::move(level));
   }
   return levels;
+}
+
+std::optional<Level> exact_fall_level(const Level& level) {
+  if (!falls_by_accuracy(level.model)) {
+    return std::nullopt;
+  }
+  Level exact{"exact fall", level.model};
+  exact.model.tolerance = kExactFall;
+  return exact;
 }
 
 std::vector<SolvedLevel> solve_levels(const std::vector<Level>& levels,

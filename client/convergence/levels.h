@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,8 +23,16 @@ struct Level {
 std::vector<Level> mesh_levels(const solver::ModelParameters& model, int coarsest, int finest);
 
 /// Steps of contact and fall, both halved each time, from those that the model takes at e_star;
-/// where it steps shorter in restitution, the shorter step throughout.
+/// where it steps shorter in restitution, the shorter step throughout. Where the fall chooses its
+/// steps by the tolerance, all levels share it; see exact_fall_level().
 std::vector<Level> step_levels(const solver::ModelParameters& model, double e_star, int halvings);
+
+/// The least tolerance that models may have.
+inline constexpr double kExactFall = 1e-9;
+
+/// `level` with its contact as it is, of a step that is given, on a fall solved for kExactFall:
+/// what changes is the error of the fall. Nothing where the fall has a step to halve.
+std::optional<Level> exact_fall_level(const Level& level);
 
 struct ContactPoint {
   double H_m;

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -76,6 +77,7 @@ std::vector<SolvedLevel> solved(const std::vector<Level>& levels,
 struct BothRefinements {
   Refinement mesh;
   Refinement step;
+  std::optional<SolvedLevel> exact_fall;  ///< where the fall has no step to halve
 };
 
 BothRefinements refined(const std::vector<Level>& meshes, const std::vector<Level>& steps,
@@ -84,10 +86,16 @@ BothRefinements refined(const std::vector<Level>& meshes, const std::vector<Leve
   tell_levels("step", steps);
   auto levels = meshes;
   levels.insert(levels.end(), steps.begin(), steps.end());
-  auto both = solved(levels, points, line);
-  const auto end_of_meshes = both.begin() + static_cast<std::ptrdiff_t>(meshes.size());
-  return {.mesh = refinement_of("mesh", {both.begin(), end_of_meshes}, 0),
-          .step = refinement_of("step", {end_of_meshes, both.end()}, 0)};
+  const auto exact_fall = exact_fall_level(steps.front());
+  if (exact_fall) {
+    levels.push_back(*exact_fall);
+  }
+  const auto all = solved(levels, points, line);
+  const auto end_of_meshes = all.begin() + static_cast<std::ptrdiff_t>(meshes.size());
+  const auto end_of_steps = end_of_meshes + static_cast<std::ptrdiff_t>(steps.size());
+  return {.mesh = refinement_of("mesh", {all.begin(), end_of_meshes}, 0),
+          .step = refinement_of("step", {end_of_meshes, end_of_steps}, 0),
+          .exact_fall = exact_fall ? std::optional(all.back()) : std::nullopt};
 }
 
 std::string shown(const ContactPoint& point) {
@@ -118,19 +126,25 @@ int converge(const ConvergeFlags& flags, const protocol::PointTable& table, Work
   const int finest = flags.finest == 0 ? std::max(kFinest, 4 * coarsest) : flags.finest;
   const auto meshes = mesh_levels(model, coarsest, finest);
   const auto steps = step_levels(model, points[0].e_star, flags.halvings);
-  const auto [mesh, step] = refined(meshes, steps, points, line);
+  const auto [mesh, step, exact_fall] = refined(meshes, steps, points, line);
   if (flags.json) {
     auto json = json_of_point(points[0]);
     json["mesh"] = json_of(mesh);
     json["step"] = json_of(step);
+    if (exact_fall) {
+      json["fall"] = json_of_fall(step, *exact_fall);
+    }
     std::cout << json.dump(2) << '\n';
     return kDone;
   }
   std::cout << shown(points[0]) << "\n\nMesh: n elements a link, doubled\n\n";
   print_refinement(std::cout, mesh);
-  std::cout << fmt::format("\nStep: steps of contact and fall, halved, on n = {}\n\n",
-                           model.elements_per_link);
+  std::cout << fmt::format("\nStep: steps of contact{}, halved, on n = {}\n\n",
+                           exact_fall ? "" : " and fall", model.elements_per_link);
   print_refinement(std::cout, step);
+  if (exact_fall) {
+    std::cout << fall_sentence(step, *exact_fall);
+  }
   return kDone;
 }
 

@@ -10,6 +10,7 @@
 
 #include "client/convergence/convergence_report.h"
 #include "client/convergence/levels.h"
+#include "worker/solver/model/fall_model.h"
 #include "worker/solver/solve.h"
 
 namespace oblique::client {
@@ -116,12 +117,13 @@ TEST(Convergence, IsDeniedWhereTheModeChangesOnTheFinestLevels) {
 TEST(MeshLevels, DoubleTheMeshAndChooseStepsForEach) {
   solver::ModelParameters model;
   model.dt_s = 1e-6;
+  model.dt_fall_s = 1e-6;
   const auto levels = mesh_levels(model, 2, 8);
   ASSERT_EQ(levels.size(), 3U);
   EXPECT_EQ(levels[2].name, "n = 8");
   EXPECT_EQ(levels[1].model.elements_per_link, 4);
   EXPECT_EQ(levels[1].model.dt_s, 0.0);
-  EXPECT_LT(levels[2].model.dt_fall_s, levels[1].model.dt_fall_s);
+  EXPECT_EQ(levels[2].model.dt_fall_s, 0.0);
   EXPECT_THROW(mesh_levels(model, 4, 24), solver::InputError);
   EXPECT_THROW(mesh_levels(model, 4, 8), solver::InputError);
   EXPECT_THROW(mesh_levels(model, 0, 8), solver::InputError);
@@ -142,9 +144,47 @@ TEST(StepLevels, HalveBothStepsFromTheShortestTheModelTakes) {
   ASSERT_EQ(levels.size(), 3U);
   EXPECT_EQ(levels[1].name, "dt/2");
   EXPECT_DOUBLE_EQ(levels[1].model.dt_s, levels[0].model.dt_s / 2.0);
-  EXPECT_DOUBLE_EQ(levels[2].model.dt_fall_s, levels[0].model.dt_fall_s / 4.0);
   // Restitution at e* = 0.2 steps shorter than compression.
   EXPECT_LT(levels[0].model.dt_s, step_levels({}, 1.0, 2)[0].model.dt_s);
+  solver::ModelParameters model;
+  model.dt_fall_s = 2e-6;
+  EXPECT_EQ(step_levels(model, 1.0, 2)[2].model.dt_fall_s, 0.5e-6);
+  model.integrator = solver::Integrator::kGeneralizedAlpha;
+  model.dt_fall_s = 0.0;
+  const auto implicit = step_levels(model, 1.0, 2);
+  EXPECT_DOUBLE_EQ(implicit[2].model.dt_fall_s, implicit[0].model.dt_fall_s / 4.0);
+  EXPECT_EQ(implicit[2].model.tolerance, model.tolerance);
+}
+
+TEST(StepLevels, ShareTheFallThatChoosesItsStepsByTheTolerance) {
+  solver::ModelParameters model;
+  model.tolerance = 1e-4;
+  const auto levels = step_levels(model, 1.0, 2);
+  for (const auto& level : levels) {
+    EXPECT_EQ(solver::fall_model(level.model), solver::fall_model(model));
+  }
+  const auto exact = exact_fall_level(levels[0]);
+  ASSERT_TRUE(exact);
+  EXPECT_EQ(exact->model.dt_s, levels[0].model.dt_s);
+  EXPECT_EQ(exact->model.tolerance, kExactFall);
+  EXPECT_NO_THROW(solver::validate(exact->model));
+  model.dt_fall_s = 2e-6;
+  EXPECT_FALSE(exact_fall_level({"dt", model})) << "its step is halved";
+}
+
+TEST(FallSentence, NamesTheOutputThatTheFallMovesMost) {
+  Refinement step{.what = "step", .levels = {}, .convergence = {}};
+  step.levels.push_back({.level = {"dt", {}}, .results = {second_order(0.0)}, .wall_s = 0.0});
+  SolvedLevel exact{.level = {"exact fall", {}}, .results = {second_order(0.0)}, .wall_s = 0.0};
+  exact.level.model.tolerance = kExactFall;
+  exact.results[0].vt_out_m_s *= 1.0 + 1e-6;
+  EXPECT_EQ(fall_sentence(step, exact),
+            "The fall, solved for 1e-05, changes outputs by 0.0001 % (vt_out_m_s) at most beside "
+            "one solved for 1e-09.\n");
+  EXPECT_EQ(json_of_fall(step, exact)["same_mode"], true);
+  exact.results[0].major_mode = "sC sR";
+  EXPECT_NE(fall_sentence(step, exact).find("gives another"), std::string::npos);
+  EXPECT_EQ(json_of_fall(step, exact)["same_mode"], false);
 }
 
 // On two elements a link the second compression appears between mu = 0.5 and 0.6.
