@@ -50,7 +50,7 @@ struct CollocationKernel {
 };
 
 /// Stages of the kernels below, chosen by work and precision (README.md).
-inline constexpr std::size_t kCollocationStages = 6;
+inline constexpr std::size_t kCollocationStages = 8;
 
 /// Kernels that this machine can run, the fastest first; never empty.
 std::span<const CollocationKernel> runnable_collocation_kernels();

@@ -11,6 +11,8 @@ namespace {
 
 /// After so many iterations the step is taken to be too long.
 constexpr int kMostIterations = 10;
+/// Corrections that no longer shrink are rounding when they are below this many errors allowed.
+constexpr double kRoundingErrors = 1000.0;
 
 using Constants = ElementConstants<double>;
 
@@ -163,8 +165,10 @@ void CollocationLanes::attempt(std::span<const double> h_s, std::span<const doub
       const double size_m = std::sqrt(arrays_.squares[lane] / total_kg_[lane]);
       // What is left is the next correction and those after it: a geometric series.
       const double ratio = iteration > 1 ? size_m / before_m[lane] : 1.0;
-      attempt.converged =
-          size_m <= error_m[lane] || (ratio < 0.5 && size_m * ratio <= error_m[lane]);
+      const bool is_rounding =
+          iteration > 2 && ratio > 0.1 && size_m <= kRoundingErrors * error_m[lane];
+      attempt.converged = size_m <= error_m[lane] || is_rounding ||
+                          (ratio < 0.5 && size_m * ratio <= error_m[lane]);
       const bool is_hopeless =
           !std::isfinite(size_m) || ratio > 2.0 || iteration >= kMostIterations;
       if (attempt.converged || is_hopeless) {
