@@ -154,7 +154,8 @@ std::optional<Level> exact_fall_level(const Level& level) {
     return std::nullopt;
   }
   Level exact{"exact fall", level.model};
-  exact.model.tolerance = kExactFall;
+  const double solved_for = std::min(level.model.tolerance, solver::ModelParameters().tolerance);
+  exact.model.tolerance = std::max(kExactFall * solved_for, kTightestFall);
   return exact;
 }
 

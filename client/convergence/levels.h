@@ -27,11 +27,13 @@ std::vector<Level> mesh_levels(const solver::ModelParameters& model, int coarses
 /// steps by the tolerance, all levels share it; see exact_fall_level().
 std::vector<Level> step_levels(const solver::ModelParameters& model, double e_star, int halvings);
 
-/// The least tolerance that models may have.
-inline constexpr double kExactFall = 1e-9;
+/// Part of the fall's tolerance for which a fall counts as exact beside it, and the least tolerance
+/// that models may have.
+inline constexpr double kExactFall = 0.1;
+inline constexpr double kTightestFall = 1e-9;
 
-/// `level` with its contact as it is, of a step that is given, on a fall solved for kExactFall:
-/// what changes is the error of the fall. Nothing where the fall has a step to halve.
+/// `level` with its contact as it is, of a step that is given, on an exact fall: what changes is
+/// the error of the fall. Nothing where the fall has a step to halve.
 std::optional<Level> exact_fall_level(const Level& level);
 
 struct ContactPoint {

@@ -19,7 +19,7 @@ std::shared_ptr<const Motion> make_motion(const ModelParameters& model, const Ch
 
 using SharedChain = std::shared_ptr<const PreparedChain>;
 
-/// By steps of the length asked for.
+/// By steps of one length.
 FallOutcome solve_by_steps(const SharedChain& chain) {
   try {
     return {std::make_shared<const FallenChain>(
@@ -31,9 +31,10 @@ FallOutcome solve_by_steps(const SharedChain& chain) {
   }
 }
 
-/// Whether no step was asked for: steps are then as long as accuracy allows.
+/// Whether no step was asked for, nor an accuracy for which explicit steps are quicker.
 bool falls_by_collocation(const ModelParameters& model) {
-  return model.integrator == Integrator::kExplicit && model.dt_fall_s == 0.0;
+  return model.integrator == Integrator::kExplicit && model.dt_fall_s == 0.0 &&
+         model.tolerance >= kTightestCollocation;
 }
 
 /// Solves the falls at `places` side by side.

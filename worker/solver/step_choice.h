@@ -24,8 +24,10 @@ class StepChoice {
   /// Steps chosen, or made longer by a step factor, stay below this fraction of the stability
   /// limit.
   static constexpr double kLongestFraction = 0.9;
-  /// In the fall: fraction of the stability limit at the default tolerance, or a looser one.
+  /// In the fall: fraction of the stability limit, and the tolerance that it is good for. It is
+  /// shorter for a tighter one.
   static constexpr double kFallFraction = 0.5;
+  static constexpr double kFallTolerance = 3e-7;
   /// Generalized-alpha at the default tolerance: fraction of sqrt(length/g) in the fall (5 us for
   /// the default model) and of sqrt(mass of the last link/k) in contact (0.1 us).
   static constexpr double kImplicitFallFraction = 1.0 / 40'000.0;

@@ -166,7 +166,7 @@ TEST(StepLevels, ShareTheFallThatChoosesItsStepsByTheTolerance) {
   const auto exact = exact_fall_level(levels[0]);
   ASSERT_TRUE(exact);
   EXPECT_EQ(exact->model.dt_s, levels[0].model.dt_s);
-  EXPECT_EQ(exact->model.tolerance, kExactFall);
+  EXPECT_EQ(exact->model.tolerance, 1e-6) << "a tenth of what the fall is solved for";
   EXPECT_NO_THROW(solver::validate(exact->model));
   model.dt_fall_s = 2e-6;
   EXPECT_FALSE(exact_fall_level({"dt", model})) << "its step is halved";
@@ -176,11 +176,11 @@ TEST(FallSentence, NamesTheOutputThatTheFallMovesMost) {
   Refinement step{.what = "step", .levels = {}, .convergence = {}};
   step.levels.push_back({.level = {"dt", {}}, .results = {second_order(0.0)}, .wall_s = 0.0});
   SolvedLevel exact{.level = {"exact fall", {}}, .results = {second_order(0.0)}, .wall_s = 0.0};
-  exact.level.model.tolerance = kExactFall;
+  exact.level.model.tolerance = 1e-6;
   exact.results[0].vt_out_m_s *= 1.0 + 1e-6;
   EXPECT_EQ(fall_sentence(step, exact),
             "The fall, solved for 1e-05, changes outputs by 0.0001 % (vt_out_m_s) at most beside "
-            "one solved for 1e-09.\n");
+            "one solved for 1e-06.\n");
   EXPECT_EQ(json_of_fall(step, exact)["same_mode"], true);
   exact.results[0].major_mode = "sC sR";
   EXPECT_NE(fall_sentence(step, exact).find("gives another"), std::string::npos);
