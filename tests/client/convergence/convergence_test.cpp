@@ -166,7 +166,7 @@ TEST(StepLevels, ShareTheFallThatChoosesItsStepsByTheTolerance) {
   const auto exact = exact_fall_level(levels[0]);
   ASSERT_TRUE(exact);
   EXPECT_EQ(exact->model.dt_s, levels[0].model.dt_s);
-  EXPECT_EQ(exact->model.tolerance, 1e-6) << "a tenth of what the fall is solved for";
+  EXPECT_DOUBLE_EQ(exact->model.tolerance, 1e-6) << "a tenth of what the fall is solved for";
   EXPECT_NO_THROW(solver::validate(exact->model));
   model.dt_fall_s = 2e-6;
   EXPECT_FALSE(exact_fall_level({"dt", model})) << "its step is halved";
