@@ -22,7 +22,8 @@ solver::CaseResult from_message(const PointResult& message);
 PointResult failed_point(std::uint64_t point, const std::string& reason);
 
 /// Why a result from the network is none, or an empty text: another number of scalars than results
-/// have, or none where no result may lack one, a number that is not finite, lists of impossible length, texts too long.
+/// have, or none where no result may lack one, a number that is not finite, lists of impossible
+/// length, texts too long.
 std::string fault_of(const PointResult& message);
 
 /// Sets what a worker of this build says of its messages: their version, and what its results have.

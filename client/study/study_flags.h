@@ -19,7 +19,8 @@ struct StudyFlags {
   bool errors = false;  ///< estimated errors, also where the file does not ask for them
 };
 
-/// Adds the STUDY.toml argument, --name, --errors and the point flags. `flags` must live as long as `verb`.
+/// Adds the STUDY.toml argument, --name, --errors and the point flags. `flags` must live as long as
+/// `verb`.
 void add_study_flags(CLI::App& verb, StudyFlags& flags);
 
 /// Throws InputError when both a file and flags say what the points are, or none, and for what

@@ -27,7 +27,7 @@ double operations_an_evaluation(const Chain& chain) {
   std::vector<CountedNumber> scratch = state;
   const std::uint64_t before = CountedNumber::operations();
   solver::pefrl_step<double, CountedNumber>(chain.tables(), {}, CountedNumber(1e-6), state.data(),
-                                    state.data(), q.data(), v.data(), scratch.data());
+                                            state.data(), q.data(), v.data(), scratch.data());
   return static_cast<double>(CountedNumber::operations() - before) / solver::Pefrl::kKicks;
 }
 

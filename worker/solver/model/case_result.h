@@ -108,8 +108,8 @@ struct CaseResult {
   std::string mode;        ///< order of states, as "SC SR sR sC sR"
   std::string major_mode;  ///< the same with ripples merged
   /// How far the contact kept from another order of events, as a fraction of the force, speed or
-  /// time that the nearest other order would have needed to differ; >= 0, and near 0 the mode is not
-  /// to be trusted. Absent from results of earlier solvers, as is the event's name.
+  /// time that the nearest other order would have needed to differ; >= 0, and near 0 the mode is
+  /// not to be trusted. Absent from results of earlier solvers, as is the event's name.
   std::optional<double> margin;
   std::optional<std::string> margin_event;
   double stick_total_s;

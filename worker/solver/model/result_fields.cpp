@@ -266,14 +266,14 @@ constexpr std::array kFields{
                 .meaning = "what does not add up in the energy balance, relative to exchanged_J; "
                            "never negative",
                 .value = at<kEnergyOf, &ContactEnergy::closure>},
-    ResultField{
-        .name = "mode_same",
-        .group = kErrors,
-        .column = "mode_same",
-        .meaning = "1: half the mesh and twice the step give the same mode, ripples merged; 0: "
-                   "another. This and the errors below are there only when they were asked for",
-        .value = at<kErrorsOf, &ErrorEstimate::mode_same>,
-        .since_schema = 7},
+    ResultField{.name = "mode_same",
+                .group = kErrors,
+                .column = "mode_same",
+                .meaning =
+                    "1: half the mesh and twice the step give the same mode, ripples merged; 0: "
+                    "another. This and the errors below are there only when they were asked for",
+                .value = at<kErrorsOf, &ErrorEstimate::mode_same>,
+                .since_schema = 7},
     ResultField{.name = "fn_peak",
                 .group = kErrors,
                 .column = "fn_peak_error",
