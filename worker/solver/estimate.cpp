@@ -48,12 +48,8 @@ double factor(const ModelParameters& model, int order) {
     order = std::min(order, kImplicitOrder);
   }
   const ModelParameters companion = companion_model(model);
-  const bool same_mesh = companion.elements_per_link == model.elements_per_link;
-  const double ratio =
-      same_mesh ? kRefinement
-                : static_cast<double>(model.elements_per_link) / companion.elements_per_link;
-  const double unresolved = same_mesh ? 0.0 : unresolved_waves(companion);
-  return (1.0 + unresolved) / (std::pow(ratio, order) - 1.0);
+  const double ratio = static_cast<double>(model.elements_per_link) / companion.elements_per_link;
+  return (1.0 + unresolved_waves(companion)) / (std::pow(ratio, order) - 1.0);
 }
 
 /// Points that are solved by their own models first and then by the companions of these: chains of
@@ -121,7 +117,7 @@ class EstimatedGroup {
     return point;
   }
 
-  /// Nothing for a companion without a fall.
+  /// Nothing for a companion without a fall, nor where there is no coarser mesh.
   std::vector<std::optional<Finger>> fingers_of(const FallSource& companion_falls) const {
     std::vector<ModelParameters> companions;
     for (const ModelParameters& model : models_) {
@@ -130,8 +126,10 @@ class EstimatedGroup {
     const std::vector<FallOutcome> falls = companion_falls(companions);
     std::vector<std::optional<Finger>> fingers;
     for (std::size_t i = 0; i < companions.size(); ++i) {
-      fingers.push_back(falls[i].fallen ? std::optional(Finger(companions[i], falls[i].fallen))
-                                        : std::nullopt);
+      const bool is_coarser = companions[i].elements_per_link < models_[i].elements_per_link;
+      fingers.push_back(falls[i].fallen && is_coarser
+                            ? std::optional(Finger(companions[i], falls[i].fallen))
+                            : std::nullopt);
     }
     return fingers;
   }

@@ -13,7 +13,7 @@
 namespace oblique::solver {
 
 /// The model whose solution of a point is held against that of `model`: half as many elements a
-/// link, rounded down (1 stays 1), and twice the steps in contact where these are stable. It costs
+/// link, rounded down (1 stays 1, and has no estimate), and twice the steps in contact where these are stable. It costs
 /// about a quarter, its fall aside, which depends on the mesh alone.
 ModelParameters companion_model(const ModelParameters& model);
 

@@ -1,9 +1,13 @@
 #include "worker/solver/falls.h"
 
+#include <cstddef>
 #include <exception>
+#include <map>
+#include <tuple>
 #include <utility>
 
 #include "worker/solver/fall/collocation_fall.h"
+#include "worker/solver/lanes/lane_falls.h"
 #include "worker/solver/motion/generalized_alpha.h"
 #include "worker/solver/step_choice.h"
 
@@ -19,42 +23,57 @@ std::shared_ptr<const Motion> make_motion(const ModelParameters& model, const Ch
 
 using SharedChain = std::shared_ptr<const PreparedChain>;
 
-/// By steps of one length.
-FallOutcome solve_by_steps(const SharedChain& chain) {
+/// Explicit steps in sqrt(2 length / g), up to which they are quicker than collocation
+/// (fall/README.md).
+constexpr double kFewSteps = 150'000.0;
+
+enum class WayToFall { kStepsAlone, kSteps, kCollocation };
+
+WayToFall way_to_fall(const PreparedChain& chain) {
+  const ModelParameters& model = chain.model();
+  if (model.integrator != Integrator::kExplicit) {
+    return WayToFall::kStepsAlone;
+  }
+  const double steps = longest_fall_s(chain.chain()) / kLongestFall / chain.fall_step_s();
+  return model.dt_fall_s != 0.0 || model.tolerance < kTightestCollocation || steps <= kFewSteps
+             ? WayToFall::kSteps
+             : WayToFall::kCollocation;
+}
+
+FallSolution solve_alone(const SharedChain& chain) {
   try {
-    return {std::make_shared<const FallenChain>(
-                chain, Fall(chain->shared_motion(), chain->fall_step_s(),
-                            longest_fall_s(chain->chain()), &chain->fall_progress())),
+    return {Fall(chain->shared_motion(), chain->fall_step_s(), longest_fall_s(chain->chain()),
+                 &chain->fall_progress())
+                .path(),
             {}};
   } catch (const std::exception& error) {
     return {nullptr, error.what()};
   }
 }
 
-/// Whether no step was asked for, nor an accuracy for which explicit steps are quicker.
-bool falls_by_collocation(const ModelParameters& model) {
-  return model.integrator == Integrator::kExplicit && model.dt_fall_s == 0.0 &&
-         model.tolerance >= kTightestCollocation;
-}
-
-/// Solves the falls at `places` side by side.
-void solve_in_lanes(std::span<const SharedChain> chains, const std::vector<std::size_t>& places,
-                    std::vector<FallOutcome>& outcomes) {
-  std::vector<FallRequest> requests;
-  for (const std::size_t place : places) {
-    const PreparedChain& chain = *chains[place];
-    requests.push_back(
-        {&chain.chain(), &chain.model(), chain.model().tolerance, &chain.fall_progress()});
-  }
-  std::vector<FallSolution> solutions = solve_by_collocation(requests);
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    FallOutcome& outcome = outcomes[places[i]];
-    outcome.error = std::move(solutions[i].error);
-    if (solutions[i].path) {
-      outcome.fallen = std::make_shared<const FallenChain>(chains[places[i]],
-                                                           Fall(std::move(solutions[i].path)));
+/// Solves the falls of `chains`, all in one way and, for kSteps, of one shape.
+std::vector<FallSolution> solve(WayToFall way, const std::vector<SharedChain>& chains) {
+  if (way == WayToFall::kCollocation) {
+    std::vector<FallRequest> requests;
+    for (const auto& chain : chains) {
+      requests.push_back(
+          {&chain->chain(), &chain->model(), chain->model().tolerance, &chain->fall_progress()});
     }
+    return solve_by_collocation(requests);
   }
+  if (way == WayToFall::kSteps) {
+    std::vector<SteppedFall> falls;
+    for (const auto& chain : chains) {
+      falls.push_back(
+          {&chain->chain(), chain->shared_motion(), chain->fall_step_s(), &chain->fall_progress()});
+    }
+    return solve_by_steps(falls);
+  }
+  std::vector<FallSolution> solutions;
+  for (const auto& chain : chains) {
+    solutions.push_back(solve_alone(chain));
+  }
+  return solutions;
 }
 
 }  // namespace
@@ -66,21 +85,33 @@ PreparedChain::PreparedChain(const ModelParameters& model)
       fall_step_s_(StepChoice(chain_, model_).fall_s()) {}
 
 bool fall_side_by_side(const ModelParameters& a, const ModelParameters& b) {
-  return falls_by_collocation(a) && falls_by_collocation(b) &&
+  return a.integrator == Integrator::kExplicit && b.integrator == Integrator::kExplicit &&
          a.lengths_m.size() == b.lengths_m.size() && a.elements_per_link == b.elements_per_link;
 }
 
-std::vector<FallOutcome> solve_falls(std::span<const std::shared_ptr<const PreparedChain>> chains) {
-  std::vector<FallOutcome> outcomes(chains.size());
-  std::vector<std::size_t> in_lanes;
+std::vector<FallOutcome> solve_falls(std::span<const SharedChain> chains) {
+  using Kind = std::tuple<WayToFall, std::size_t, int>;  // with links and elements a link
+  std::map<Kind, std::vector<std::size_t>> places;
   for (std::size_t i = 0; i < chains.size(); ++i) {
-    if (falls_by_collocation(chains[i]->model())) {
-      in_lanes.push_back(i);
-    } else {
-      outcomes[i] = solve_by_steps(chains[i]);
+    const ModelParameters& model = chains[i]->model();
+    places[{way_to_fall(*chains[i]), model.lengths_m.size(), model.elements_per_link}].push_back(i);
+  }
+  std::vector<FallOutcome> outcomes(chains.size());
+  for (const auto& [kind, alike] : places) {
+    std::vector<SharedChain> group;
+    for (const std::size_t place : alike) {
+      group.push_back(chains[place]);
+    }
+    std::vector<FallSolution> solutions = solve(std::get<WayToFall>(kind), group);
+    for (std::size_t i = 0; i < alike.size(); ++i) {
+      FallOutcome& outcome = outcomes[alike[i]];
+      outcome.error = std::move(solutions[i].error);
+      if (solutions[i].path) {
+        outcome.fallen =
+            std::make_shared<const FallenChain>(group[i], Fall(std::move(solutions[i].path)));
+      }
     }
   }
-  solve_in_lanes(chains, in_lanes, outcomes);
   return outcomes;
 }
 

@@ -22,10 +22,9 @@ void check_asked(const char* key, double asked_s, double limit_s) {
   }
 }
 
-/// What `order` makes of the model's tolerance: steps at it over those at `known`.
-double at_tolerance(const ModelParameters& model, double order,
-                    double known = ModelParameters().tolerance) {
-  return std::pow(model.tolerance / known, 1.0 / order);
+/// What `order` makes of the model's tolerance: steps at it over those at the default one.
+double at_tolerance(const ModelParameters& model, double order) {
+  return std::pow(model.tolerance / ModelParameters().tolerance, 1.0 / order);
 }
 
 double limit_s(const Chain& chain, double tip_stiffness_N_m) {
@@ -46,8 +45,10 @@ double chosen_fall_s(const Chain& chain, const ModelParameters& model) {
     return StepChoice::kImplicitFallFraction * std::sqrt(model.lengths_m.back() / model.g_m_s2) *
            std::min(1.0, at_tolerance(model, kGeneralizedAlphaOrder));
   }
-  return StepChoice::kFallFraction * longest_s *
-         std::min(1.0, at_tolerance(model, kPefrlOrder, StepChoice::kFallTolerance));
+  const double tolerance = std::min(model.tolerance, ModelParameters().tolerance);
+  const double fraction = StepChoice::kFallFraction *
+                          std::pow(tolerance / StepChoice::kFallTolerance, 1.0 / kPefrlOrder);
+  return longest_s * std::min(fraction, StepChoice::kLongestFraction);
 }
 
 double link_mass_kg(const ModelParameters& model) {

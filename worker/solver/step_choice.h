@@ -20,12 +20,12 @@ namespace oblique::solver {
 /// by.
 class StepChoice {
  public:
-  static constexpr double kErrorFactor = 0.032;
+  static constexpr double kErrorFactor = 0.045;
   /// Steps chosen, or made longer by a step factor, stay below this fraction of the stability
   /// limit.
   static constexpr double kLongestFraction = 0.9;
-  /// In the fall: fraction of the stability limit, and the tolerance that it is good for. It is
-  /// shorter for a tighter one.
+  /// In the fall: fraction of the stability limit, and the tolerance that it is good for; for
+  /// another one it follows by order 4, up to kLongestFraction.
   static constexpr double kFallFraction = 0.5;
   static constexpr double kFallTolerance = 3e-7;
   /// Generalized-alpha at the default tolerance: fraction of sqrt(length/g) in the fall (5 us for

@@ -14,7 +14,7 @@ namespace {
 
 /// A step is as long as leaves this times the accuracy asked for unresolved, in parts of sqrt(g
 /// length): README.md.
-constexpr double kUnresolved = 5.0;
+constexpr double kUnresolved = 1.5;
 /// First step, in parts of sqrt(length/g).
 constexpr double kFirstStep = 1.0 / 4000.0;
 /// No step is longer, in the same parts: the chain turns by some 0.1 then.

@@ -9,7 +9,10 @@
 
 namespace oblique::solver {
 
-/// 100 times the time of a free fall from the chain's length [s]: a fall that lasts longer is none.
+/// A fall that lasts this many times sqrt(2 length / g) is not one.
+inline constexpr double kLongestFall = 100.0;
+
+/// kLongestFall times the time of a free fall from the chain's length [s].
 double longest_fall_s(const Chain& chain);
 
 /// The way of a chain from rest to the first turn of its tip, solved. Immutable.
@@ -49,6 +52,7 @@ class Fall {
 
   /// Memory that its states take now.
   std::size_t bytes() const { return path_->bytes(); }
+  const std::shared_ptr<const FallPath>& path() const { return path_; }
 
  private:
   std::shared_ptr<const FallPath> path_;

@@ -110,12 +110,13 @@ TEST(FallCacheTest, FallsOfOtherShapesOrIntegratorsAreNotSolvedBeside) {
   ahead[0].elements_per_link = 2;
   ahead[1].lengths_m = {0.4, 0.4};
   ahead[2].integrator = Integrator::kGeneralizedAlpha;
-  ahead[3].dt_fall_s = 1e-5;  // by steps of this length, which have no lanes
+  ahead[3].dt_fall_s = 1e-5;
   ahead[4].E_Pa = 6e10;
   falls.cache.fall(coarse_model(), ahead);
   ASSERT_EQ(falls.solved.size(), 1U);
-  ASSERT_EQ(falls.solved[0].size(), 2U);
-  EXPECT_EQ(falls.solved[0][1], ahead[4]);
+  ASSERT_EQ(falls.solved[0].size(), 3U);
+  EXPECT_EQ(falls.solved[0][1], ahead[3]) << "steps of any length have lanes";
+  EXPECT_EQ(falls.solved[0][2], ahead[4]);
   falls.cache.fall(model_that_fails(), ahead);
   EXPECT_EQ(falls.solved.back().size(), 1U) << "generalized-alpha has no lanes";
 }
