@@ -66,7 +66,8 @@ TEST_F(ComparisonTest, OfDatabasesSeesWhatMustNotDifferAndNothingElse) {
        {"UPDATE results SET fn_peak_N = fn_peak_N * (1 + 3e-16) WHERE point = 700",
         "UPDATE results SET mode = 'sC' WHERE point = 5",
         "UPDATE results SET error = 'another' WHERE status = 'failed'",
-        "UPDATE results SET model_id = 1 WHERE point = 700",
+        "UPDATE results SET model_id = (SELECT min(models.model_id) FROM models"
+        " WHERE models.model_id != results.model_id) WHERE point = 700",
         "UPDATE results SET point = 5000 WHERE point = 700",
         "DELETE FROM results WHERE point = (SELECT max(point) FROM results)",
         "UPDATE studies SET state = 'paused'", "UPDATE models SET dt = 1 WHERE model_id = 2",
