@@ -13,8 +13,8 @@
 namespace oblique::solver {
 
 /// The model whose solution of a point is held against that of `model`: half as many elements a
-/// link, rounded down (1 stays 1, and has no estimate), and twice the steps in contact where these are stable. It costs
-/// about a quarter, its fall aside, which depends on the mesh alone.
+/// link, rounded down (1 stays 1, and has no estimate), and twice the steps in contact where these
+/// are stable. It costs about a quarter, its fall aside, which depends on the mesh alone.
 ModelParameters companion_model(const ModelParameters& model);
 
 /// Estimated errors of `result`, the solution of a point of `model`, from its differences d to
