@@ -82,33 +82,6 @@ class FallsOfLevels {
   std::list<Entry> entries_;
 };
 
-// Side by side in lanes. Throws what the first point that fails throws when it is alone.
-std::vector<CaseResult> contacts_of(const solver::Finger& finger,
-                                    const std::vector<ContactPoint>& points) {
-  std::vector<CaseResult> results(points.size());
-  std::size_t next = 0;
-  std::size_t failed = points.size();
-  finger.solve_points(
-      [&]() -> std::optional<solver::PointRequest> {
-        if (next == points.size()) {
-          return std::nullopt;
-        }
-        const auto& point = points[next];
-        return solver::PointRequest{next++, point.H_m, point.mu, point.e_star};
-      },
-      [&](solver::PointOutcome&& outcome) {
-        if (outcome.result) {
-          results[outcome.number] = std::move(*outcome.result);
-        } else {
-          failed = std::min<std::size_t>(failed, outcome.number);
-        }
-      });
-  if (failed < points.size()) {
-    results[failed] = finger.solve(points[failed].H_m, points[failed].mu, points[failed].e_star);
-  }
-  return results;
-}
-
 }  // namespace
 
 std::vector<Level> mesh_levels(const solver::ModelParameters& model, int coarsest, int finest) {
@@ -178,6 +151,32 @@ std::vector<SolvedLevel> solve_levels(const std::vector<Level>& levels,
     after_each(mine);
   });
   return solved;
+}
+
+std::vector<CaseResult> contacts_of(const solver::Finger& finger,
+                                    const std::vector<ContactPoint>& points) {
+  std::vector<CaseResult> results(points.size());
+  std::size_t next = 0;
+  std::size_t failed = points.size();
+  finger.solve_points(
+      [&]() -> std::optional<solver::PointRequest> {
+        if (next == points.size()) {
+          return std::nullopt;
+        }
+        const auto& point = points[next];
+        return solver::PointRequest{next++, point.H_m, point.mu, point.e_star};
+      },
+      [&](solver::PointOutcome&& outcome) {
+        if (outcome.result) {
+          results[outcome.number] = std::move(*outcome.result);
+        } else {
+          failed = std::min<std::size_t>(failed, outcome.number);
+        }
+      });
+  if (failed < points.size()) {
+    results[failed] = finger.solve(points[failed].H_m, points[failed].mu, points[failed].e_star);
+  }
+  return results;
 }
 
 }  // namespace oblique::client

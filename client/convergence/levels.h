@@ -8,6 +8,7 @@
 #include "client/output/work_line.h"
 #include "worker/solver/model/case_result.h"
 #include "worker/solver/model/parameters.h"
+#include "worker/solver/solve.h"
 
 namespace oblique::client {
 
@@ -41,6 +42,11 @@ struct ContactPoint {
   double mu;
   double e_star;
 };
+
+/// The contacts of `points`, side by side in lanes, in their order. Throws what the first point
+/// that fails throws when it is alone.
+std::vector<solver::CaseResult> contacts_of(const solver::Finger& finger,
+                                            const std::vector<ContactPoint>& points);
 
 /// What one level gave, in the order of the points.
 struct SolvedLevel {

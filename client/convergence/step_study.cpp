@@ -34,24 +34,7 @@ std::vector<CaseResult> solved(const solver::ModelParameters& model,
                                const std::vector<ContactPoint>& points, double factor) {
   solver::ModelParameters stepped = model;
   stepped.step_factor = factor;
-  const solver::Finger finger(stepped, fallen);
-  std::vector<CaseResult> results(points.size());
-  std::size_t next = 0;
-  finger.solve_points(
-      [&]() -> std::optional<solver::PointRequest> {
-        if (next == points.size()) {
-          return std::nullopt;
-        }
-        const ContactPoint& point = points[next];
-        return solver::PointRequest{next++, point.H_m, point.mu, point.e_star};
-      },
-      [&](solver::PointOutcome&& outcome) {
-        if (!outcome.result) {
-          throw solver::SolveError(outcome.error);
-        }
-        results[outcome.number] = std::move(*outcome.result);
-      });
-  return results;
+  return contacts_of(solver::Finger(stepped, fallen), points);
 }
 
 double relative(double value, double reference) {

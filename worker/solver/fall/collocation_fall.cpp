@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "worker/solver/chain/instruction_sets.h"
 #include "worker/solver/fall/collocation_lanes.h"
 #include "worker/solver/fall/collocation_path.h"
 #include "worker/solver/model/errors.h"
@@ -199,10 +200,10 @@ void solve_in_lanes(const CollocationKernel& kernel, std::span<const FallRequest
 std::vector<CollocationKernel> find_kernels() {
   std::vector<CollocationKernel> kernels;
 #if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512dq") != 0) {
+  if (has_avx512()) {
     kernels.push_back(avx512_collocation());
   }
-  if (__builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0) {
+  if (has_avx2()) {
     kernels.push_back(avx2_collocation());
   }
 #endif

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "worker/solver/chain/instruction_sets.h"
 #include "worker/solver/lanes/lane_kernels.h"
 
 namespace oblique::solver {
@@ -14,10 +15,10 @@ constexpr std::size_t kAlignment = 64;
 std::vector<LaneKernel> find_kernels() {
   std::vector<LaneKernel> kernels;
 #if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512dq") != 0) {
+  if (has_avx512()) {
     kernels.push_back(avx512_kernel());
   }
-  if (__builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0) {
+  if (has_avx2()) {
     kernels.push_back(avx2_kernel());
   }
 #endif
