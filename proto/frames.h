@@ -13,9 +13,9 @@ namespace oblique::protocol {
 /// Version spoken here, and the oldest ones that the server still speaks to clients and to workers.
 /// Peers of any other one are refused with the numbers in the reason. protocol.md says what each
 /// version brought.
-inline constexpr std::uint32_t kProtocolVersion = 4;
+inline constexpr std::uint32_t kProtocolVersion = 5;
 inline constexpr std::uint32_t kOldestClientsVersion = 3;
-inline constexpr std::uint32_t kOldestWorkersVersion = 4;
+inline constexpr std::uint32_t kOldestWorkersVersion = 5;
 
 /// Largest frame that either side takes; a longer one is a foreign or broken peer.
 inline constexpr std::size_t kMaxFrameBytes = std::size_t{16} * 1024 * 1024;

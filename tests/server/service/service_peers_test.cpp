@@ -93,7 +93,7 @@ TEST_F(ServiceTest, AWorkerOfThePreviousProtocolVersionIsRefusedForItsResultsWou
       "\x28\x01",
       17);
   service_->worker_frame("worker", hello, now_);
-  EXPECT_THAT(last_message().refused().reason(), HasSubstr("version 4, the worker 2"));
+  EXPECT_THAT(last_message().refused().reason(), HasSubstr("version 5, the worker 2"));
   EXPECT_EQ(service_->scheduler().workers(), 0U);
 }
 
@@ -109,16 +109,16 @@ TEST_F(ServiceTest, AWorkerWhoseResultsHaveOtherOutputsIsRefused) {
 }
 
 TEST_F(ServiceTest, PeersOfAnyOtherProtocolVersionAreRefusedWithTheVersions) {
-  for (const std::uint32_t version : {0U, protocol::kProtocolVersion + 1, 77U}) {
+  for (const std::uint32_t version : {0U, 4U, protocol::kProtocolVersion + 1, 77U}) {
     worker_says(hello_of(version, "1.0"));
-    EXPECT_THAT(last_message().refused().reason(), HasSubstr("version 4"));
+    EXPECT_THAT(last_message().refused().reason(), HasSubstr("version 5"));
     EXPECT_THAT(last_message().refused().reason(), HasSubstr(std::to_string(version)));
   }
   EXPECT_EQ(service_->scheduler().workers(), 0U);
   ClientRequest message = submit_request("a");
   message.set_protocol_version(77);
   request(message);
-  EXPECT_THAT(last_reply().error().message(), HasSubstr("versions 3 to 4"));
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("versions 3 to 5"));
   EXPECT_THAT(last_reply().error().message(), HasSubstr("77"));
 }
 
