@@ -5,13 +5,19 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/output/columns.h"
-#include "client/sql/sql_expression.h"
+#include "server/asking/columns.h"
+#include "server/asking/sql_expression.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::client {
 namespace {
+
+using server::check_case_of_columns;
+using server::check_sql_part;
+using server::rows_of_queries;
+using server::sql_text;
+using server::SqlPart;
 
 constexpr const char* kWhere = "--where";
 constexpr const char* kSelect = "--select";
@@ -55,7 +61,7 @@ void check(const ResultQuery& query) {
 void check_columns(const ResultQuery& query, Source& source) {
   const auto runs = source.query(fmt::format("SELECT * FROM {} LIMIT 0", rows_of_queries()));
   const std::vector<std::string> columns(runs.columns().begin(), runs.columns().end());
-  const auto names_given = names_given_in(query.select);
+  const auto names_given = server::names_given_in(query.select);
   check_case_of_columns(kSelect, query.select, columns, names_given);
   check_case_of_columns(kWhere, query.where, columns, names_given);
   check_case_of_columns(kOrder, query.order, columns, names_given);

@@ -10,9 +10,9 @@
 #include "client/output/progress.h"
 #include "client/output/terminal.h"
 #include "client/service/watch_teller.h"
-#include "client/sql/sql_expression.h"
 #include "proto/program/exit_code.h"
 #include "proto/text.h"
+#include "server/asking/sql_expression.h"
 
 namespace oblique::client {
 namespace {
@@ -33,7 +33,7 @@ void tell_failures(const protocol::StudyStatus& status,
   const auto reasons = query(fmt::format(
       "SELECT error, count(*), min(point) FROM runs WHERE study = {} AND status = 'failed' "
       "GROUP BY error ORDER BY count(*) DESC LIMIT 10",
-      sql_text(status.name())));
+      server::sql_text(status.name())));
   for (const auto& row : reasons.rows()) {
     tell_line(fmt::format("  {} x {} (first at point {})", row.values(1).integer(),
                           row.values(0).text(), row.values(2).integer()));

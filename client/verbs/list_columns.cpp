@@ -2,10 +2,10 @@
 #include <memory>
 #include <string>
 
-#include "client/output/columns.h"
 #include "client/output/printer.h"
 #include "client/verbs/printed_rows.h"
 #include "client/verbs/verbs.h"
+#include "server/asking/columns.h"
 
 namespace oblique::client {
 namespace {
@@ -23,7 +23,7 @@ int list_columns(const std::string& format) {
   for (const char* heading : {"column", "unit", "kind", "solve --json", "meaning"}) {
     table.add_columns(heading);
   }
-  for (const auto& column : all_columns()) {
+  for (const auto& column : server::all_columns()) {
     auto& row = *table.add_rows();
     add_value(row, column.name);
     add_value(row, column.unit);

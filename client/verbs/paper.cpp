@@ -11,11 +11,11 @@
 #include "client/paper/paper_comparison.h"
 #include "client/service/source.h"
 #include "client/service/watching.h"
-#include "client/sql/sql_expression.h"
 #include "client/verbs/printed_rows.h"
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
 #include "proto/suggestion.h"
+#include "server/asking/sql_expression.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::client {
@@ -41,7 +41,7 @@ protocol::QueryReply rows_of_study(Source& source, const std::string& study) {
   study_named(source, study);
   return source.query(
       "SELECT point, H, mu, e, peaks, phases, stick_total_s, major_mode FROM runs WHERE study = " +
-      sql_text(study) + " AND status = 'solved'");
+      server::sql_text(study) + " AND status = 'solved'");
 }
 
 std::vector<std::optional<OwnCase>> cases_of(const PublishedTable& published,

@@ -14,6 +14,7 @@
 #include "client/verbs/verbs.h"
 #include "proto/program/usage.h"
 #include "proto/suggestion.h"
+#include "server/asking/columns.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::client {
@@ -44,7 +45,8 @@ std::string with_columns(const std::string& message, Source& source) {
     return message;
   }
   const auto wrong = message.substr(at + kNoColumn.size());
-  const auto runs = source.query(fmt::format("SELECT * FROM {} LIMIT 0", rows_of_queries()));
+  const auto runs =
+      source.query(fmt::format("SELECT * FROM {} LIMIT 0", server::rows_of_queries()));
   const std::vector<std::string_view> columns(runs.columns().begin(), runs.columns().end());
   return message + protocol::did_you_mean(wrong, columns) + "; the columns are " +
          protocol::joined(columns);

@@ -6,7 +6,7 @@
 
 #include <unistd.h>
 
-#include "client/sql/sql_expression.h"
+#include "server/asking/sql_expression.h"
 #include "server/reading/reader.h"
 #include "server/store/store.h"
 #include "worker/solver/model/errors.h"
@@ -30,7 +30,7 @@ oblique::server::Reader& reader() {
 /// Whether the command line takes `condition`.
 bool is_taken(const std::string& condition) {
   try {
-    oblique::client::check_sql_part("--where", condition, oblique::client::SqlPart::kCondition);
+    oblique::server::check_sql_part("--where", condition, oblique::server::SqlPart::kCondition);
     return true;
   } catch (const oblique::solver::InputError&) {
     return false;

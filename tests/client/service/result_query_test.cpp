@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "client/output/columns.h"
+#include "server/asking/columns.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::client {
@@ -98,7 +98,7 @@ TEST(ResultQuery, AConditionCannotWidenWhatItStandsIn) {
     q.limit = 5;
   });
   EXPECT_THAT(statement_of(query, 2),
-              HasSubstr(rows_of_queries() +
+              HasSubstr(server::rows_of_queries() +
                         " WHERE study = 'it''s') WHERE (mu > 1 OR 1) ORDER BY mu DESC LIMIT 3 "
                         "OFFSET 2"));
 }

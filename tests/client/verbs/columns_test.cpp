@@ -1,4 +1,4 @@
-#include "client/output/columns.h"
+#include "server/asking/columns.h"
 
 #include <map>
 #include <set>
@@ -17,7 +17,7 @@ namespace {
 
 std::set<std::string> described_columns() {
   std::set<std::string> names;
-  for (const auto& column : all_columns()) {
+  for (const auto& column : server::all_columns()) {
     EXPECT_TRUE(names.insert(column.name).second) << column.name << " is described twice";
   }
   return names;
@@ -70,7 +70,7 @@ TEST_F(TwoWays, EveryColumnOfQueriesIsDescribedAndNoOther) {
 
 TEST_F(TwoWays, EveryMemberOfSolveJsonIsDescribedAndNoOther) {
   std::set<std::string> names;
-  for (const auto& column : all_columns()) {
+  for (const auto& column : server::all_columns()) {
     if (!column.solve_json.empty()) {
       names.insert(column.solve_json);
     }
@@ -79,7 +79,7 @@ TEST_F(TwoWays, EveryMemberOfSolveJsonIsDescribedAndNoOther) {
 }
 
 TEST_F(TwoWays, ColumnsAndMembersOfOneNameAreTheSameToTheLastBit) {
-  for (const auto& column : all_columns()) {
+  for (const auto& column : server::all_columns()) {
     if (column.solve_json.empty() || column.name == "wall_s") {
       continue;
     }
@@ -104,7 +104,7 @@ TEST_F(TwoWays, ListsOfTheDatabaseAreArraysToo) {
 TEST(Columns, SayTheUnitThatTheirNameEndsIn) {
   const std::map<std::string, std::string> units{
       {"_m_s", "m/s"}, {"_Ns", "N s"}, {"_N", "N"}, {"_J", "J"}, {"_Pa", "Pa"}};
-  for (const auto& column : all_columns()) {
+  for (const auto& column : server::all_columns()) {
     EXPECT_FALSE(column.meaning.empty()) << column.name;
     for (const auto& [end, unit] : units) {
       if (column.name.ends_with(end)) {

@@ -4,12 +4,13 @@
 #include <string_view>
 #include <vector>
 
-namespace oblique::client {
+namespace oblique::server {
 
 /// What a flag's text is to be in the statement that it becomes a part of.
 enum class SqlPart {
   kCondition,  ///< one expression, as after WHERE
   kColumns,    ///< expressions between commas, each with a name of its own if need be
+  kGroup,      ///< expressions between commas
   kOrder,      ///< expressions between commas, each with ASC or DESC if need be
 };
 
@@ -32,4 +33,4 @@ std::vector<std::string> names_given_in(std::string_view text);
 /// A text as SQL writes it, in single quotes.
 std::string sql_text(const std::string& text);
 
-}  // namespace oblique::client
+}  // namespace oblique::server

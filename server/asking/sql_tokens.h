@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-namespace oblique::client {
+namespace oblique::server {
 
 /// A piece of SQL.
 struct SqlToken {
@@ -29,4 +29,4 @@ std::vector<SqlToken> sql_tokens(std::string_view text);
 /// Whether two names are one to SQLite, which takes no notice of case in ASCII.
 bool same_but_case(std::string_view a, std::string_view b);
 
-}  // namespace oblique::client
+}  // namespace oblique::server

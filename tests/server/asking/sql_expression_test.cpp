@@ -1,11 +1,11 @@
-#include "client/sql/sql_expression.h"
+#include "server/asking/sql_expression.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "worker/solver/model/errors.h"
 
-namespace oblique::client {
+namespace oblique::server {
 namespace {
 
 using testing::AllOf;
@@ -121,4 +121,4 @@ TEST(SqlExpression, NothingReachesBeyondItsPart) {
 }
 
 }  // namespace
-}  // namespace oblique::client
+}  // namespace oblique::server

@@ -1,4 +1,4 @@
-#include "client/sql/sql_expression.h"
+#include "server/asking/sql_expression.h"
 
 #include <algorithm>
 #include <array>
@@ -6,10 +6,10 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/sql/sql_tokens.h"
+#include "server/asking/sql_tokens.h"
 #include "worker/solver/model/errors.h"
 
-namespace oblique::client {
+namespace oblique::server {
 namespace {
 
 bool is_word(const SqlToken& token, std::string_view word) {
@@ -71,6 +71,8 @@ std::string what_is_allowed(SqlPart part) {
       return fmt::format(
           "it must be columns or expressions of them, as in \"mu, fn_peak_N / 1000 AS fn_kN\"{}",
           kWithout);
+    case SqlPart::kGroup:
+      return fmt::format("it must be columns to group by, as in \"major_mode, e\"{}", kWithout);
     case SqlPart::kOrder:
       break;
   }
@@ -183,4 +185,4 @@ std::string sql_text(const std::string& text) {
   return quoted;
 }
 
-}  // namespace oblique::client
+}  // namespace oblique::server

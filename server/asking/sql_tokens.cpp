@@ -1,4 +1,4 @@
-#include "client/sql/sql_tokens.h"
+#include "server/asking/sql_tokens.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -6,7 +6,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-namespace oblique::client {
+namespace oblique::server {
 namespace {
 
 bool is_digit(char c) {
@@ -141,4 +141,4 @@ bool same_but_case(std::string_view a, std::string_view b) {
                     [](char x, char y) { return lower(x) == lower(y); });
 }
 
-}  // namespace oblique::client
+}  // namespace oblique::server

@@ -1,0 +1,125 @@
+#include "server/asking/columns.h"
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "worker/solver/model/parameters.h"
+#include "worker/solver/model/result_fields.h"
+
+namespace oblique::server {
+namespace {
+
+struct Described {
+  std::string_view name;
+  std::string_view meaning;
+};
+
+constexpr std::array<Described, 11> kRowColumns{{
+    {"study", "name of the study"},
+    {"study_id", "its number in the database"},
+    {"point", "number of the point in its study, from 0"},
+    {"model_id", "number of the model in the database"},
+    {"status", "solved or failed"},
+    {"error", "why it failed"},
+    {"worker", "number of the worker that solved it"},
+    {"worker_name", "that worker's name"},
+    {"instruction_set", "vector instructions that it used"},
+    {"attempt", "number of the lease under which it was solved"},
+    {"solved_at", "when the result arrived (UTC)"},
+}};
+
+/// What the view `runs` has of a list of `solve --json`, as an expression for SQL. The numbers stay
+/// texts, so that no bit of them is lost; a damaged list is NULL and does not spoil the query.
+std::string list_sql(const solver::ListPart& part) {
+  const std::string packed = fmt::format("runs.{}", part.list->column);
+  if (part.member.empty()) {
+    return packed;
+  }
+  const auto number_of = [&](std::string_view member) {
+    const auto& members = part.list->members;
+    return std::find(members.begin(), members.end(), member) - members.begin();
+  };
+  const std::string where =
+      part.where.empty() ? "" : fmt::format(" WHERE item.value ->> {}", number_of(part.where));
+  return fmt::format(
+      "CASE WHEN json_valid({0}) THEN '[' || coalesce((SELECT group_concat(item.value -> {1}) FROM "
+      "json_each({0}) AS item{2}), '') || ']' END",
+      packed, number_of(part.member), where);
+}
+
+std::string place_in_json(const solver::ResultField& field) {
+  return field.group.empty() ? std::string(field.name)
+                             : std::string(field.group) + '.' + std::string(field.name);
+}
+
+Column input(const solver::ParameterKey& key, std::string place) {
+  return {std::string(key.name), std::string(key.unit), "input", std::move(place),
+          fmt::format("{}; {}", key.meaning, key.allowed)};
+}
+
+void add_inputs(std::vector<Column>& columns) {
+  for (const auto& key : solver::point_keys()) {
+    columns.push_back(input(key, std::string(key.name)));
+  }
+  for (const auto& key : solver::model_keys()) {
+    const auto* output = solver::find_result_column(key.name);
+    auto column = input(key, output == nullptr ? std::string() : place_in_json(*output));
+    if (key.name == "E") {
+      column.name = "E_Pa";  // SQL does not tell E from e
+      column.meaning += " (E on flags and in study files)";
+    }
+    columns.push_back(std::move(column));
+    if (key.name == "length") {
+      columns.push_back(
+          {"lengths_m", "m", "input", "", "length of each link, from the pin outwards; each > 0"});
+    }
+  }
+}
+
+void add_outputs(std::vector<Column>& columns) {
+  for (const auto& field : solver::result_fields()) {
+    if (solver::find_model_key(field.column) == nullptr) {
+      columns.push_back({std::string(field.column), std::string(field.unit), "output",
+                         place_in_json(field), std::string(field.meaning)});
+    }
+  }
+}
+
+/// Lists as the database packs them, where `solve --json` says less.
+void add_packed_lists(std::vector<Column>& columns) {
+  for (const auto* list : solver::result_lists()) {
+    if (solver::find_result_column(list->column) == nullptr) {
+      columns.push_back({std::string(list->column), std::string(list->unit), "output", "",
+                         std::string(list->meaning)});
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<Column> all_columns() {
+  std::vector<Column> columns;
+  add_inputs(columns);
+  add_outputs(columns);
+  add_packed_lists(columns);
+  for (const auto& [name, meaning] : kRowColumns) {
+    columns.push_back({std::string(name), "", "row", "", std::string(meaning)});
+  }
+  return columns;
+}
+
+std::string rows_of_queries() {
+  std::string lists;
+  for (const auto& field : solver::result_fields()) {
+    const auto* part = std::get_if<solver::ListPart>(&field.value);
+    if (part != nullptr && field.column != part->list->column) {
+      lists += fmt::format(", {} AS {}", list_sql(*part), field.column);
+    }
+  }
+  return fmt::format("(SELECT *{} FROM runs)", lists);
+}
+
+}  // namespace oblique::server

@@ -1,0 +1,158 @@
+#include "server/asking/plan.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "proto/result_message.h"
+#include "server/database/open_for_reading.h"
+#include "server/reading/reader.h"
+#include "server/store/store.h"
+#include "tests/support/points.h"
+#include "tests/support/temporary_folder.h"
+#include "worker/solver/model/errors.h"
+
+namespace oblique::server {
+namespace {
+
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+/// Study "a" has points 0, 1, 2 and 4 of 5 (mu from 0 to 1), the last of them failed; "it's" has
+/// one of 2.
+class PlanTest : public testing::Test {
+ protected:
+  PlanTest() {
+    Store store(path_);
+    const auto a = table_of(5);
+    const auto other = table_of(2);
+    const std::vector<Change> changes{AddStudy{1, "a", a, "2024-01-01T00:00:00.000Z"},
+                                      AddStudy{2, "it's", other, "2024-01-02T00:00:00.000Z"},
+                                      AddResults{1,
+                                                 a,
+                                                 0,
+                                                 "",
+                                                 "",
+                                                 1,
+                                                 "now",
+                                                 {solved_point(2), solved_point(0), solved_point(1),
+                                                  protocol::failed_point(4, "no")}},
+                                      AddResults{2, other, 0, "", "", 1, "now", {solved_point(1)}}};
+    store.commit(changes);
+  }
+
+  static protocol::StudyQuery question(const std::string& select, const std::string& where = {}) {
+    protocol::StudyQuery question;
+    question.set_study("a");
+    question.add_select(select);
+    question.set_where(where);
+    return question;
+  }
+
+  Plan plan_of(const protocol::StudyQuery& question) const {
+    return plan(open_for_reading(path_).database.get(), question);
+  }
+
+  /// The first value of each row, as a number.
+  std::vector<double> answer(const protocol::StudyQuery& question) const {
+    std::vector<double> values;
+    for (const auto& row : Reader(path_).query(plan_of(question).statement, {}).rows()) {
+      const auto& value = row.values(0);
+      values.push_back(value.has_real() ? value.real() : static_cast<double>(value.integer()));
+    }
+    return values;
+  }
+
+  std::string objection(const protocol::StudyQuery& question) const {
+    try {
+      plan_of(question);
+    } catch (const solver::InputError& error) {
+      return error.what();
+    }
+    return {};
+  }
+
+  test::TemporaryFolder folder_;
+  std::string path_ = folder_.file("studies.db");
+};
+
+TEST_F(PlanTest, AStudyIsAnsweredInTheOrderOfItsPoints) {
+  EXPECT_THAT(answer(question("point")), ElementsAre(0, 1, 2, 4));
+  EXPECT_THAT(answer(question("mu", "status = 'solved' AND mu > 0")), ElementsAre(0.25, 0.5));
+}
+
+TEST_F(PlanTest, WithoutColumnsTheUsualOnesAreAnswered) {
+  protocol::StudyQuery all;
+  all.set_study("a");
+  const auto columns = plan_of(all).columns;
+  ASSERT_FALSE(columns.empty());
+  EXPECT_EQ(columns.front().name, "point");
+  EXPECT_EQ(columns.back().name, "major_mode");
+}
+
+TEST_F(PlanTest, AConditionCannotReachOtherStudies) {
+  EXPECT_THAT(answer(question("point", "mu = 7 OR 1")), ElementsAre(0, 1, 2, 4));
+  EXPECT_THAT(answer(question("point", "study = 'it''s'")), IsEmpty());
+  auto other = question("study_id");
+  other.set_study("it's");
+  EXPECT_THAT(answer(other), ElementsAre(2));
+}
+
+TEST_F(PlanTest, AnAnswerInTheOrderOfPointsGoesOnAfterOne) {
+  auto first = question("mu");
+  first.set_limit(2);
+  const auto planned = plan_of(first);
+  EXPECT_TRUE(planned.goes_on_by_point);
+  EXPECT_THAT(planned.columns, ElementsAre(PlannedColumn{"mu", planned.columns[0].unit}));
+  const auto rows = Reader(path_).query(planned.statement, {});
+  ASSERT_EQ(rows.columns_size(), 2);
+  ASSERT_EQ(rows.rows_size(), 2);
+  EXPECT_EQ(rows.rows(1).values(1).integer(), 1);
+  auto rest = question("point");
+  rest.set_after_point(1);
+  EXPECT_THAT(answer(rest), ElementsAre(2, 4));
+}
+
+TEST_F(PlanTest, WhatGathersOrSortsDoesNotGoOn) {
+  for (const char* select : {"count(*)", "DISTINCT mode", "max(mu)", "avg ( mu )",
+                             "row_number() OVER (ORDER BY mu)", "(SELECT max(mu) FROM runs)"}) {
+    EXPECT_FALSE(plan_of(question(select)).goes_on_by_point) << select;
+  }
+  auto sorted = question("point");
+  sorted.set_order("mu DESC");
+  EXPECT_FALSE(plan_of(sorted).goes_on_by_point);
+  EXPECT_THAT(answer(sorted), ElementsAre(4, 2, 1, 0));
+}
+
+TEST_F(PlanTest, AGroupIsARow) {
+  auto grouped = question("status, count(*)");
+  grouped.set_group("status");
+  const auto planned = plan_of(grouped);
+  EXPECT_FALSE(planned.goes_on_by_point);
+  const auto rows = Reader(path_).query(planned.statement, {}).rows();
+  ASSERT_EQ(rows.size(), 2);
+  EXPECT_EQ(rows[0].values(0).text(), "failed");
+  EXPECT_EQ(rows[0].values(1).integer(), 1);
+  EXPECT_EQ(rows[1].values(1).integer(), 3);
+}
+
+TEST_F(PlanTest, WhatIsWrongIsNamed) {
+  EXPECT_THAT(objection(question("mu FROM runs --")), HasSubstr("--select"));
+  EXPECT_THAT(objection(question("mu", "mu > 0.5 --")), HasSubstr("--where"));
+  EXPECT_THAT(objection(question("mu", "E > 1")), HasSubstr("E_Pa"));
+  EXPECT_THAT(objection(question("fn_peak")),
+              AllOf(HasSubstr("no such column: fn_peak"), HasSubstr("fn_peak_N")));
+  auto wrong = question("mu");
+  wrong.set_group("mu ORDER BY 1");
+  EXPECT_THAT(objection(wrong), HasSubstr("--group"));
+  wrong.clear_group();
+  wrong.set_order("mu LIMIT 1");
+  EXPECT_THAT(objection(wrong), HasSubstr("--order"));
+  wrong = question("mu");
+  wrong.set_study("b");
+  EXPECT_THAT(objection(wrong), HasSubstr("no study called \"b\""));
+}
+
+}  // namespace
+}  // namespace oblique::server
