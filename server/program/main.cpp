@@ -29,7 +29,7 @@
 #include "proto/program/parent.h"
 #include "proto/program/stop_signals.h"
 #include "proto/program/usage.h"
-#include "server/loop.h"
+#include "server/loop/loop.h"
 #include "server/program/limits.h"
 #include "server/queries/reader_program.h"
 #include "server/web/http_options.h"

@@ -25,7 +25,7 @@ void SimulatedServer::start() {
   on_started(found);
   server::ServiceSettings settings;
   settings.scheduler.loss_limits.condemned_after = max_losses_;
-  // As server/loop.cpp does.
+  // As server/loop/loop.cpp does.
   settings.scheduler.first_lease_id = found.starts << 40U;
   settings.solver_version = "1";
   settings.database_id = "disk";

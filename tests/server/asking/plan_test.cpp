@@ -57,7 +57,8 @@ class PlanTest : public testing::Test {
   /// The first value of each row, as a number.
   std::vector<double> answer(const protocol::StudyQuery& question) const {
     std::vector<double> values;
-    for (const auto& row : Reader(path_).query(plan_of(question).statement, {}).rows()) {
+    const auto reply = Reader(path_).query(plan_of(question).statement, {});
+    for (const auto& row : reply.rows()) {
       const auto& value = row.values(0);
       values.push_back(value.has_real() ? value.real() : static_cast<double>(value.integer()));
     }
@@ -130,7 +131,8 @@ TEST_F(PlanTest, AGroupIsARow) {
   grouped.set_group("status");
   const auto planned = plan_of(grouped);
   EXPECT_FALSE(planned.goes_on_by_point);
-  const auto rows = Reader(path_).query(planned.statement, {}).rows();
+  const auto reply = Reader(path_).query(planned.statement, {});
+  const auto& rows = reply.rows();
   ASSERT_EQ(rows.size(), 2);
   EXPECT_EQ(rows[0].values(0).text(), "failed");
   EXPECT_EQ(rows[0].values(1).integer(), 1);

@@ -11,7 +11,7 @@
 
 #include "proto/result_message.h"
 #include "tests/server/network/raw_peer.h"
-#include "tests/server/running_server.h"
+#include "tests/server/loop/running_server.h"
 #include "tests/support/temporary_folder.h"
 
 namespace oblique::server {

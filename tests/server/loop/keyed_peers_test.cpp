@@ -13,7 +13,7 @@
 #include "proto/keys/authorized_keys.h"
 #include "proto/keys/key_file.h"
 #include "tests/server/network/keyed_peer.h"
-#include "tests/server/running_server.h"
+#include "tests/server/loop/running_server.h"
 #include "tests/support/temporary_folder.h"
 
 namespace oblique::server {

@@ -1,12 +1,12 @@
 // The whole server in this process, over real sockets of the loopback device, with a pretended
 // worker and client.
-#include "server/loop.h"
+#include "server/loop/loop.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "server/reading/reader.h"
-#include "tests/server/running_server.h"
+#include "tests/server/loop/running_server.h"
 #include "tests/support/temporary_folder.h"
 
 namespace oblique::server {

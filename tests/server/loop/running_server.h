@@ -17,7 +17,7 @@
 
 #include "proto/frames.h"
 #include "proto/result_message.h"
-#include "server/loop.h"
+#include "server/loop/loop.h"
 #include "tests/support/points.h"
 
 namespace oblique::server {

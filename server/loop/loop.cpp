@@ -1,4 +1,4 @@
-#include "server/loop.h"
+#include "server/loop/loop.h"
 
 #include <algorithm>
 #include <array>
@@ -17,7 +17,7 @@
 #include "server/database/shared_disk.h"
 #include "server/doors/doors.h"
 #include "server/network/network.h"
-#include "server/report_box.h"
+#include "server/loop/report_box.h"
 
 namespace oblique::server {
 namespace {
