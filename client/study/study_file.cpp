@@ -16,9 +16,9 @@
 #include "proto/recipe/keys.h"
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
-#include "proto/recipe/study_name.h"
-#include "proto/recipe/written_axis.h"
-#include "proto/recipe/written_model.h"
+#include "proto/recipe/written/study_name.h"
+#include "proto/recipe/written/written_axis.h"
+#include "proto/recipe/written/written_model.h"
 #include "proto/suggestion.h"
 
 namespace oblique::client {

@@ -6,7 +6,7 @@
 
 #include "client/study/study_file.h"
 #include "proto/recipe/canonical.h"
-#include "proto/recipe/study_name.h"
+#include "proto/recipe/written/study_name.h"
 
 namespace oblique::client {
 

@@ -16,7 +16,7 @@
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
 #include "proto/program/usage.h"
-#include "proto/recipe/study_terms.h"
+#include "proto/recipe/written/study_terms.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {

@@ -9,8 +9,8 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/recipe/study_name.h"
-#include "proto/recipe/study_terms.h"
+#include "proto/recipe/written/study_name.h"
+#include "proto/recipe/written/study_terms.h"
 #include "server/care/table_columns.h"
 #include "server/scheduler/points/study_table.h"
 #include "server/store/result_row.h"

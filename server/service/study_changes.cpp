@@ -5,8 +5,8 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/recipe/study_name.h"
-#include "proto/recipe/study_terms.h"
+#include "proto/recipe/written/study_name.h"
+#include "proto/recipe/written/study_terms.h"
 #include "proto/text.h"
 
 namespace oblique::server {

@@ -1,4 +1,4 @@
-#include "proto/recipe/written_axis.h"
+#include "proto/recipe/written/written_axis.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "proto/recipe/written_model.h"
+#include "proto/recipe/written/written_model.h"
 
 #include <functional>
 #include <string>

@@ -1,4 +1,4 @@
-#include "proto/recipe/study_terms.h"
+#include "proto/recipe/written/study_terms.h"
 
 #include <spdlog/fmt/fmt.h>
 

@@ -1,4 +1,4 @@
-#include "proto/recipe/study_name.h"
+#include "proto/recipe/written/study_name.h"
 
 #include <string>
 
