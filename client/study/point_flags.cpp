@@ -1,23 +1,18 @@
 #include "client/study/point_flags.h"
 
-#include <algorithm>
-#include <charconv>
-#include <cstdint>
-#include <optional>
 #include <utility>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/study/flag_axis.h"
 #include "proto/recipe/axes.h"
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/checks.h"
 #include "proto/recipe/keys.h"
 #include "proto/recipe/model_message.h"
-#include "proto/recipe/written/written_axis.h"
 #include "proto/recipe/written/written_model.h"
 #include "proto/suggestion.h"
-#include "proto/text.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {
@@ -26,63 +21,15 @@ namespace {
 using solver::InputError;
 using solver::ParameterKey;
 
-/// Runs `work` and puts the flag, as it was typed, before what it throws.
-template <typename Work>
-auto at_flag(std::string_view flag, std::string_view text, Work work) {
-  try {
-    return work();
-  } catch (const InputError& error) {
-    throw InputError(fmt::format("{} {}: {}", flag, text, error.what()));
-  }
-}
-
-/// The number that a part of a flag's text says.
-double flag_number(std::string_view part) {
-  const auto value = solver::number_of(part);
-  if (!value) {
-    throw InputError(
-        (part.empty() ? "a value is missing" : fmt::format("\"{}\" is not a number", part)) +
-        "; write one value (0.4), a list (0.4,0.6,0.8) or a range from:to:count (0.1:2.0:40)");
-  }
-  return *value;
-}
-
-std::vector<double> flag_numbers(std::string_view text) {
-  std::vector<double> values;
-  for (const auto part : protocol::split(text, ',')) {
-    values.push_back(flag_number(part));
-  }
-  return values;
-}
-
-protocol::Axis range_of_flag(const ParameterKey& key, std::string_view text) {
-  const auto parts = protocol::split(text, ':');
-  if (parts.size() != 3) {
-    throw InputError("this is not a range: write from:to:count, as 0.1:2.0:40");
-  }
-  const double from = flag_number(parts[0]);
-  const double to = flag_number(parts[1]);
-  std::int64_t count = 0;
-  const auto [end, error] =
-      std::from_chars(parts[2].data(), parts[2].data() + parts[2].size(), count);
-  if (error != std::errc() || end != parts[2].data() + parts[2].size()) {
-    protocol::throw_wrong_count(key, parts[2]);
-  }
-  return protocol::counted_axis(key, from, to, count);
-}
-
-std::vector<double> integrators(std::string_view text) {
-  std::vector<double> values;
-  for (const auto name : protocol::split(text, ',')) {
-    values.push_back(static_cast<double>(solver::integrator_named(name)));
-  }
-  return values;
-}
-
 std::string described(const ParameterKey& key) {
   std::string text(key.meaning);
   text += key.unit.empty() ? "; " : " [" + std::string(key.unit) + "]; ";
   return text + std::string(key.allowed);
+}
+
+/// One number, which may as well stand in the model.
+bool is_one_value(const protocol::Axis& axis) {
+  return axis.expression().empty() && !axis.has_distribution() && protocol::axis_size(axis) == 1;
 }
 
 std::string default_of(const ParameterKey& key) {
@@ -93,13 +40,26 @@ std::string default_of(const ParameterKey& key) {
   return solver::exact_number(key.get(defaults));
 }
 
-}  // namespace
-
-std::string flag_of_key(std::string_view key) {
-  std::string flag = "--" + std::string(key);
-  std::replace(flag.begin(), flag.end(), '_', '-');
-  return flag;
+/// How the axes of the flags are put together.
+void add_block_flags(CLI::App& verb, PointFlags& flags) {
+  verb.add_flag("--zip", flags.zip,
+                "take the axes side by side, the first value of each, the second of each, ..., "
+                "instead of multiplying them; single values serve all")
+      ->group("Points");
+  verb.add_option(
+          "--sample", flags.sample,
+          "draw points: KIND:COUNT:SEED with the kind random, lhs (Latin hypercube) or sobol; "
+          "axes are then FROM:TO, normal(MEAN,SD), normal(MEAN,SD,FROM,TO), "
+          "uniform(FROM,TO), log-uniform(FROM,TO) or one value")
+      ->type_name("SAMPLE")
+      ->group("Points");
+  verb.add_option("--where", flags.where,
+                  "leave out the points for which this is not true, as \"mu > 0.5 * e\"")
+      ->type_name("CONDITION")
+      ->group("Points");
 }
+
+}  // namespace
 
 void add_point_flags(CLI::App& verb, PointFlags& flags, FlagValues values) {
   const std::string type = values == FlagValues::kOne ? "VALUE" : "VALUES";
@@ -114,6 +74,9 @@ void add_point_flags(CLI::App& verb, PointFlags& flags, FlagValues values) {
   };
   for (const auto& key : solver::point_keys()) {
     add(key, "Points");
+  }
+  if (values == FlagValues::kMany) {
+    add_block_flags(verb, flags);
   }
   const std::string group = "Model (defaults: the preset `" + flags.preset + "`)";
   verb.add_option("--preset", flags.preset,
@@ -130,35 +93,31 @@ void add_point_flags(CLI::App& verb, PointFlags& flags, FlagValues values) {
   }
 }
 
-protocol::Axis axis_of_flag(const ParameterKey& key, std::string_view text) {
-  return at_flag(flag_of_key(key.name), text, [&] {
-    if (key.name == "integrator") {
-      return protocol::listed_axis(key, integrators(text));
-    }
-    return text.find(':') != std::string_view::npos
-               ? range_of_flag(key, text)
-               : protocol::listed_axis(key, flag_numbers(text));
-  });
-}
-
 protocol::Recipe recipe_of_flags(const PointFlags& flags, const ReachCheck& check_reach) {
   protocol::WrittenModel model;
   at_flag("--preset", flags.preset, [&] { model.set_preset(flags.preset); });
+  const AxisSurroundings around{flags.zip, !flags.sample.empty()};
+  CsvFiles files(".");
   std::vector<protocol::Axis> axes;
   for (const auto& [name, text] : flags.axes) {
-    auto axis = axis_of_flag(protocol::axis_key(name), text);
-    if (solver::find_model_key(name) != nullptr && protocol::axis_size(axis) == 1) {
+    auto axis = axis_of_flag(protocol::axis_key(name), text, around, files);
+    if (solver::find_model_key(name) != nullptr && is_one_value(axis)) {
       model.set(name, protocol::axis_value(axis, 0));
     } else {
       axes.push_back(std::move(axis));
     }
   }
   if (!flags.lengths.empty()) {
-    at_flag("--lengths", flags.lengths, [&] { model.set_lengths(flag_numbers(flags.lengths)); });
+    at_flag("--lengths", flags.lengths, [&] { model.set_lengths(numbers_of_flag(flags.lengths)); });
   }
   protocol::Recipe recipe;
   *recipe.mutable_model() = protocol::to_message(model.model());
-  *recipe.add_blocks() = protocol::block_of(std::move(axes));
+  protocol::Block& block = *recipe.add_blocks() = protocol::block_of(std::move(axes));
+  block.set_zip(flags.zip);
+  block.set_where(flags.where);
+  if (around.is_sample) {
+    *block.mutable_sample() = sample_of_flag(flags.sample);
+  }
   try {
     check_reach(protocol::PointTable(recipe));
   } catch (const protocol::MissingKey& error) {

@@ -17,6 +17,9 @@ struct PointFlags {
   std::string preset{"paper"};
   std::string lengths;                      ///< "0.4,0.4,0.3"; empty: by links and length
   std::map<std::string, std::string> axes;  ///< text of each given flag, by key
+  bool zip = false;
+  std::string sample;  ///< "sobol:1000:1"; empty: none
+  std::string where;   ///< empty: all points
 };
 
 /// Whether flags may give one value only (`solve`) or lists and ranges as well.
@@ -26,15 +29,8 @@ enum class FlagValues { kOne, kMany };
 /// long as `verb`.
 void add_point_flags(CLI::App& verb, PointFlags& flags, FlagValues values);
 
-/// The axis that a flag's text means: `0.4`, `0.4,0.6,0.8` or `0.1:2.0:40` (from:to:count, both
-/// ends in). Throws InputError naming flag, value and what is allowed.
-protocol::Axis axis_of_flag(const solver::ParameterKey& key, std::string_view text);
-
 /// The recipe of all flags together, judged as study files are, also by `check_reach`. Model keys
 /// with one value shape the model; with several they are axes. Throws InputError.
 protocol::Recipe recipe_of_flags(const PointFlags& flags, const ReachCheck& check_reach);
-
-/// How a key is written as a flag: `tip_mass` is --tip-mass.
-std::string flag_of_key(std::string_view key);
 
 }  // namespace oblique::client

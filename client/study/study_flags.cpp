@@ -34,7 +34,8 @@ void add_study_flags(CLI::App& verb, StudyFlags& flags) {
 Study study_of_flags(const StudyFlags& flags, const ReachCheck& check_reach) {
   const PointFlags none;
   const bool by_flags = !flags.points.axes.empty() || !flags.points.lengths.empty() ||
-                        flags.points.preset != none.preset;
+                        flags.points.preset != none.preset || flags.points.zip ||
+                        !flags.points.sample.empty() || !flags.points.where.empty();
   if (flags.file.empty() && !by_flags) {
     throw InputError("no points: give a study file, or --H, --mu and --e");
   }

@@ -41,11 +41,13 @@ void throw_wrong_count(const solver::ParameterKey& key, std::string_view written
                   key.name, written));
 }
 
-Axis counted_axis(const solver::ParameterKey& key, double from, double to, std::int64_t count) {
+Axis counted_axis(const solver::ParameterKey& key, double from, double to, std::int64_t count,
+                  Spacing spacing) {
   if (count < 1) {
     throw_wrong_count(key, std::to_string(count));
   }
   Axis axis = range_axis(key, from, to, static_cast<std::uint64_t>(count));
+  axis.set_spacing(spacing);
   check_axis(axis);
   return axis;
 }

@@ -13,7 +13,8 @@ namespace oblique::protocol {
 Axis listed_axis(const solver::ParameterKey& key, const std::vector<double>& values);
 
 /// `count` values with both ends in.
-Axis counted_axis(const solver::ParameterKey& key, double from, double to, std::int64_t count);
+Axis counted_axis(const solver::ParameterKey& key, double from, double to, std::int64_t count,
+                  Spacing spacing = SPACING_LINEAR);
 
 /// Values `step` apart, of which the last is `to`.
 Axis stepped_axis(const solver::ParameterKey& key, double from, double to, double step);

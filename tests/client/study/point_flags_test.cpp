@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "client/study/flag_axis.h"
 #include "proto/recipe/axes.h"
 #include "proto/recipe/keys.h"
 #include "proto/recipe/point_table.h"
@@ -22,6 +23,12 @@ std::vector<double> values(const protocol::Axis& axis) {
   return all;
 }
 
+protocol::Axis axis_of(const std::string& key, const std::string& text,
+                       const AxisSurroundings& around = {}) {
+  CsvFiles files(".");
+  return axis_of_flag(protocol::axis_key(key), text, around, files);
+}
+
 std::string error_of(const PointFlags& flags) {
   try {
     recipe_of_flags(flags, pretended_reach());
@@ -32,18 +39,17 @@ std::string error_of(const PointFlags& flags) {
 }
 
 TEST(PointFlags, TakeOneValueAListOrARange) {
-  EXPECT_EQ(values(axis_of_flag(protocol::axis_key("mu"), "0.4")), (std::vector{0.4}));
-  EXPECT_EQ(values(axis_of_flag(protocol::axis_key("mu"), "0.4,0.6,0.8")),
-            (std::vector{0.4, 0.6, 0.8}));
-  const auto range = values(axis_of_flag(protocol::axis_key("mu"), "0.1:2.0:40"));
+  EXPECT_EQ(values(axis_of("mu", "0.4")), (std::vector{0.4}));
+  EXPECT_EQ(values(axis_of("mu", "0.4,0.6,0.8")), (std::vector{0.4, 0.6, 0.8}));
+  const auto range = values(axis_of("mu", "0.1:2.0:40"));
   ASSERT_EQ(range.size(), 40U);
   EXPECT_EQ(range.front(), 0.1);
   EXPECT_EQ(range.back(), 2.0);
 }
 
 TEST(PointFlags, TakeIntegratorsByName) {
-  EXPECT_EQ(values(axis_of_flag(protocol::axis_key("integrator"), "explicit")), (std::vector{0.0}));
-  EXPECT_THROW(axis_of_flag(protocol::axis_key("integrator"), "euler"), solver::InputError);
+  EXPECT_EQ(values(axis_of("integrator", "explicit")), (std::vector{0.0}));
+  EXPECT_THROW(axis_of("integrator", "euler"), solver::InputError);
 }
 
 TEST(PointFlags, RefuseWhatIsNoValueWithASentence) {

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "client/study/axis_surroundings.h"
+#include "client/study/csv_file.h"
+#include "proto/oblique.pb.h"
+#include "worker/solver/model/parameters.h"
+
+namespace oblique::client {
+
+/// The axis that a flag's text means: `0.4`, `0.4,0.6,0.8`, `0.1:2.0:40` (from:to:count, both ends
+/// in), `0.01:2:40:log`, `0.5:1:step=0.05`, `@measured.csv:drop`, `normal(0.4,0.05)`, or an
+/// expression, `A^2/(4*pi)`; `0.3:1.1` in a sample. Throws InputError naming flag, value and what
+/// is allowed.
+protocol::Axis axis_of_flag(const solver::ParameterKey& key, std::string_view text,
+                            const AxisSurroundings& around, CsvFiles& files);
+
+/// What `--sample` means: `sobol:100000:1`, kind:count:seed, or kind:count.
+protocol::Sample sample_of_flag(std::string_view text);
+
+/// The numbers of a list, as of --lengths.
+std::vector<double> numbers_of_flag(std::string_view text);
+
+/// How a key is written as a flag: `tip_mass` is --tip-mass.
+std::string flag_of_key(std::string_view key);
+
+/// Runs `work` and puts the flag, as it was typed, before what it throws.
+template <typename Work>
+auto at_flag(std::string_view flag, std::string_view text, Work work) {
+  try {
+    return work();
+  } catch (const solver::InputError& error) {
+    throw solver::InputError(std::string(flag) + " " + std::string(text) + ": " + error.what());
+  }
+}
+
+}  // namespace oblique::client

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <toml++/toml.h>
+
+#include "client/study/csv_file.h"
+#include "client/study/toml_place.h"
+#include "proto/oblique.pb.h"
+
+namespace oblique::client {
+
+/// A [[block]]: its axes, put together as `zip` and `sample` say, with the columns of the file
+/// `csv` beside them, and `where`. Judges single axes alone. Throws solver::InputError with the
+/// place.
+protocol::Block block_of_toml(const TomlPlace& place, const toml::node& node, CsvFiles& files);
+
+}  // namespace oblique::client

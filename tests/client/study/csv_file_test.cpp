@@ -1,0 +1,99 @@
+#include "client/study/csv_file.h"
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "proto/recipe/keys.h"
+
+namespace oblique::client {
+namespace {
+
+using testing::HasSubstr;
+
+std::vector<double> column(const std::string& text, const std::string& name = "drop") {
+  return CsvFile::parse(text, "measured.csv").values(name, protocol::axis_key("mu"));
+}
+
+std::string csv_error(const std::string& text, const std::string& name = "drop") {
+  try {
+    column(text, name);
+  } catch (const solver::InputError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(CsvFile, GivesTheNumbersOfAColumn) {
+  EXPECT_EQ(column("drop,speed\n0.4,1\n0.6,2\n"), (std::vector{0.4, 0.6}));
+  EXPECT_EQ(column("speed,drop\n1,0.4"), (std::vector{0.4})) << "without a line break at the end";
+}
+
+TEST(CsvFile, TakesWhatSpreadsheetsWrite) {
+  EXPECT_EQ(column("\xef\xbb\xbf"
+                   "drop\r\n0.4\r\n\r\n0.6\r\n"),
+            (std::vector{0.4, 0.6}))
+      << "byte order mark, CRLF, empty lines";
+  EXPECT_EQ(column("\"a \"\"b\"\", c\",\"drop\"\n\"x,\ny\",\" 0.4\"\n , +6e-1 \n"),
+            (std::vector{0.4, 0.6}))
+      << "quotes, commas, doubled quotes and line breaks in them; spaces; signs and exponents";
+}
+
+TEST(CsvFile, TakesIntegratorsByName) {
+  const auto file = CsvFile::parse("integrator\nexplicit\ngeneralized-alpha\n", "x.csv");
+  EXPECT_EQ(file.values("integrator", protocol::axis_key("integrator")), (std::vector{0.0, 1.0}));
+}
+
+TEST(CsvFile, TakesAHundredThousandLines) {
+  std::string text = "n,drop\n";
+  for (int i = 0; i < 100'000; ++i) {
+    text += std::to_string(i) + ",0.5\n";
+  }
+  EXPECT_EQ(column(text).size(), 100'000U);
+}
+
+// A line is that of the file, also behind line breaks in quotes.
+TEST(CsvFile, NamesFileLineAndColumnOfWhatIsWrong) {
+  EXPECT_THAT(csv_error("drop\n0.4\n0.x\n"),
+              HasSubstr("measured.csv:3: column `drop`: \"0.x\" is not a number"));
+  EXPECT_THAT(csv_error("drop,b\n0.4,\"\n\n\"\n,1\n"),
+              HasSubstr("measured.csv:5: column `drop`: the field is empty"));
+  EXPECT_THAT(csv_error("drop\n-1\n"), HasSubstr("measured.csv:2: column `drop`: mu = -1"));
+  EXPECT_THAT(csv_error("drop\nnan\n"), HasSubstr("measured.csv:2: column `drop`: mu = nan"));
+  EXPECT_THAT(csv_error("drop\ninf\n"), HasSubstr("mu = inf"));
+  EXPECT_THAT(csv_error("drop,b\n1\n"), HasSubstr("measured.csv:2: the line has 1 fields"));
+  EXPECT_THAT(csv_error("drop\n0,4\n"), HasSubstr("measured.csv:2: the line has 2 fields"));
+  EXPECT_THAT(csv_error("drop\n\"1\n"), HasSubstr("measured.csv:2: a quote is opened"));
+  EXPECT_THAT(csv_error("drop\n\"1\"2\n"), HasSubstr("measured.csv:2: text follows"));
+  EXPECT_THAT(csv_error("drop\n\x1b[2J\n"), HasSubstr("\\x1b[2J"));
+}
+
+TEST(CsvFile, WantsNamesAboveItsColumns) {
+  EXPECT_THAT(csv_error(""), HasSubstr("it is empty"));
+  EXPECT_THAT(csv_error("drop\n"), HasSubstr("no line with values"));
+  EXPECT_THAT(csv_error("0.4,0.5\n0.6,0.7\n"), HasSubstr("it must name the columns"));
+  EXPECT_THAT(csv_error("drop;mu\n1;2\n"), HasSubstr("semicolons"));
+  EXPECT_THAT(csv_error("drop,\n1,2\n"), HasSubstr("column 2 has no name"));
+  EXPECT_THAT(csv_error("drop,drop\n1,2\n"), HasSubstr("two columns are called `drop`"));
+  EXPECT_THAT(csv_error("dorp,b\n1,2\n"), HasSubstr("no column `drop` (did you mean `dorp`?)"));
+  EXPECT_THAT(csv_error("drop\n\xff\n"), HasSubstr("UTF-8"));
+}
+
+TEST(CsvFiles, AreFoundBesideTheStudyAndMustBeFiles) {
+  const std::filesystem::path folder = testing::TempDir();
+  { std::ofstream(folder / "beside.csv") << "drop\n0.4\n"; }
+  CsvFiles files(folder);
+  EXPECT_EQ(files.at("beside.csv").rows(), 1U);
+  EXPECT_EQ(files.at((folder / "beside.csv").string()).rows(), 1U) << "also by the whole path";
+  for (const std::string path : {"nowhere.csv", ".", "/dev/zero"}) {
+    EXPECT_THROW(files.at(path), solver::InputError) << path;
+  }
+  std::filesystem::remove(folder / "beside.csv");
+}
+
+}  // namespace
+}  // namespace oblique::client
