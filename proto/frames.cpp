@@ -57,6 +57,12 @@ std::string definition_around(std::uint64_t study_id, std::string_view encoded_r
       encode(number).append(field_around(StudyDefinition::kRecipeFieldNumber, encoded_recipe)));
 }
 
+std::string description_around(std::uint64_t request_id, std::string_view encoded_recipe) {
+  return with_request_id(
+      request_id, field_around(ClientReply::kDescribeFieldNumber,
+                               field_around(DescribeReply::kRecipeFieldNumber, encoded_recipe)));
+}
+
 std::string with_request_id(std::uint64_t request_id, std::string_view encoded_reply) {
   ClientReply number;
   number.set_request_id(request_id);

@@ -31,6 +31,9 @@ std::string encode(const google::protobuf::MessageLite& message);
 /// The bytes of a ClientReply that holds nothing but a QueryReply, which is encoded already.
 std::string reply_around(std::string_view encoded_query_reply);
 
+/// The frame of a ClientReply with a DescribeReply around a Recipe that is encoded already.
+std::string description_around(std::uint64_t request_id, std::string_view encoded_recipe);
+
 /// The frame of the same ClientReply, whose bytes lack only that number. Nothing is parsed.
 std::string with_request_id(std::uint64_t request_id, std::string_view encoded_reply);
 

@@ -243,6 +243,14 @@ protocol::StatusReply Connection::status(const std::string& study, const Tell& t
   return all;
 }
 
+protocol::StatusReply Connection::status_of(const std::string& study, std::uint64_t study_id,
+                                            const Tell& tell) {
+  protocol::ClientRequest request;
+  request.mutable_status()->set_study(study);
+  request.mutable_status()->set_study_id(study_id);
+  return call(std::move(request), tell).status();
+}
+
 protocol::WorkersReply Connection::workers() {
   protocol::WorkersReply all;
   std::uint64_t after = 0;
@@ -261,6 +269,30 @@ protocol::ChangeReply Connection::change(const std::string& study, protocol::Stu
   request.mutable_change()->set_study(study);
   request.mutable_change()->set_change(change);
   return call(std::move(request)).change();
+}
+
+protocol::ChangeReply Connection::rename(const protocol::StudyStatus& study,
+                                         const std::string& name) {
+  protocol::ClientRequest request;
+  request.mutable_change()->set_study(study.name());
+  request.mutable_change()->set_study_id(study.study_id());
+  request.mutable_change()->set_change(protocol::STUDY_CHANGE_RENAME);
+  request.mutable_change()->set_new_name(name);
+  return call(std::move(request)).change();
+}
+
+protocol::ChangeReply Connection::remove(const protocol::StudyStatus& study) {
+  protocol::ClientRequest request;
+  request.mutable_change()->set_study(study.name());
+  request.mutable_change()->set_study_id(study.study_id());
+  request.mutable_change()->set_change(protocol::STUDY_CHANGE_DELETE);
+  return call(std::move(request)).change();
+}
+
+protocol::Recipe Connection::describe(const std::string& study) {
+  protocol::ClientRequest request;
+  request.mutable_describe()->set_study(study);
+  return call(std::move(request)).describe().recipe();
 }
 
 protocol::QueryReply Connection::query(const std::string& sql, std::uint64_t max_rows,

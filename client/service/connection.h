@@ -79,9 +79,18 @@ class Connection {
   protocol::SubmitReply submit(const Study& study, const StudyTerms& terms = {});
   /// The study of that name, or all of them when it is empty, however many pages they fill.
   protocol::StatusReply status(const std::string& study, const Tell& tell = {});
+  /// The same of one study by its number, whatever it is called by now; `study` is for older
+  /// servers, which know no numbers.
+  protocol::StatusReply status_of(const std::string& study, std::uint64_t study_id,
+                                  const Tell& tell = {});
   /// All workers, likewise.
   protocol::WorkersReply workers();
   protocol::ChangeReply change(const std::string& study, protocol::StudyChange change);
+  /// Gives the study of that number, as `status` has it, another name.
+  protocol::ChangeReply rename(const protocol::StudyStatus& study, const std::string& name);
+  /// Deletes it with its results.
+  protocol::ChangeReply remove(const protocol::StudyStatus& study);
+  protocol::Recipe describe(const std::string& study);
   /// Runs one statement that only reads, for no longer than an answer is waited for; `max_rows` 0
   /// leaves that limit to the server.
   protocol::QueryReply query(const std::string& sql, std::uint64_t max_rows = 0,

@@ -49,6 +49,12 @@ class DatabaseSource : public Source {
       throw server::QueryError(fmt::format("{} in {}", error.what(), file_));
     }
   }
+  std::vector<protocol::StudyStatus> status_of(const std::string& study, std::uint64_t study_id,
+                                               const Tell& tell) override {
+    const auto name = reader_.query(
+        fmt::format("SELECT name FROM studies WHERE study_id = {}", study_id), limits_);
+    return status(name.rows_size() == 1 ? name.rows(0).values(0).text() : study, tell);
+  }
   std::string place() const override { return file_; }
 
  private:
@@ -77,6 +83,11 @@ class ServerSource : public Source {
   std::vector<protocol::StudyStatus> status(const std::string& study, const Tell& tell) override {
     const auto reply = connection_.status(study, tell);
     access_ = reply.access();
+    return {reply.studies().begin(), reply.studies().end()};
+  }
+  std::vector<protocol::StudyStatus> status_of(const std::string& study, std::uint64_t study_id,
+                                               const Tell& tell) override {
+    const auto reply = connection_.status_of(study, study_id, tell);
     return {reply.studies().begin(), reply.studies().end()};
   }
   std::string access() const override { return access_; }

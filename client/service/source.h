@@ -27,6 +27,10 @@ class Source {
   /// `tell`, waits for a server that is away; see Connection.
   virtual std::vector<protocol::StudyStatus> status(const std::string& study, const Tell& tell) = 0;
   std::vector<protocol::StudyStatus> status(const std::string& study) { return status(study, {}); }
+  /// The study of that number, whatever it is called by now; `study` was its name.
+  virtual std::vector<protocol::StudyStatus> status_of(const std::string& study,
+                                                       std::uint64_t study_id,
+                                                       const Tell& tell) = 0;
   /// Who may come there, as StatusReply.access of the last status said; empty for a file.
   virtual std::string access() const { return {}; }
   /// "oblique.db" or "tcp://127.0.0.1:7600", for messages.

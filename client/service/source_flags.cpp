@@ -89,15 +89,20 @@ ConnectionSettings connection_settings(const SourceFlags& flags) {
   return settings;
 }
 
+std::string database_meant(const SourceFlags& flags) {
+  if (!flags.database.empty()) {
+    return flags.database;
+  }
+  const bool server_named = !flags.server.empty() || !server_of_environment().empty();
+  return !server_named && std::filesystem::exists(DatabaseSettings().file) ? DatabaseSettings().file
+                                                                           : std::string();
+}
+
 std::unique_ptr<Source> open_source(const SourceFlags& flags,
                                     Connection::KeepWaiting keep_waiting) {
   const auto database_timeout_ms = timeout_of(flags, DatabaseSettings().timeout_ms);
-  if (!flags.database.empty()) {
-    return open_database(flags.database, database_timeout_ms);
-  }
-  const bool server_named = !flags.server.empty() || !server_of_environment().empty();
-  if (!server_named && std::filesystem::exists(DatabaseSettings().file)) {
-    return open_database(DatabaseSettings().file, database_timeout_ms);
+  if (const std::string database = database_meant(flags); !database.empty()) {
+    return open_database(database, database_timeout_ms);
   }
   return open_server(connection_settings(flags), std::move(keep_waiting));
 }

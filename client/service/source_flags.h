@@ -29,6 +29,10 @@ void add_source_flags(CLI::App& verb, SourceFlags& flags);
 /// not positive and a key file that cannot be used.
 ConnectionSettings connection_settings(const SourceFlags& flags);
 
+/// The database that the flags name: --db, or oblique.db when it is in this folder and no server is
+/// named; empty: a server is meant.
+std::string database_meant(const SourceFlags& flags);
+
 /// Opens what the flags name: --db, else --server or OBLIQUE_SERVER, else oblique.db when it is in
 /// this folder, else the server at its default address.
 /// `keep_waiting` may end the wait for a server's answer; see Connection.

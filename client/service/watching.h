@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/service/source.h"
@@ -24,6 +26,19 @@ void tell_line(const std::string& sentence);
 /// The one study of that name in an answer to a status question. Given a `tell`, waits for a server
 /// that is away.
 protocol::StudyStatus study_named(Source& source, const std::string& name, const Tell& tell = {});
+
+/// Asks for one study again and again: by name first, then by its number, so that it is found under
+/// another name too. Throws as `study_named`.
+class WatchedStudy {
+ public:
+  WatchedStudy(Source& source, std::string name) : source_(source), name_(std::move(name)) {}
+  protocol::StudyStatus ask(const Tell& tell);
+
+ private:
+  Source& source_;
+  std::string name_;
+  std::uint64_t study_id_ = 0;  // 0: it was not found yet
+};
 
 /// Tells on standard error how a watched study stands: failed points with their reasons, or that
 /// it was cancelled. Gives the exit code: kDone when every point is solved.

@@ -17,6 +17,7 @@
 #include "client/verbs/verbs.h"
 #include "proto/program/usage.h"
 #include "proto/recipe/written/study_terms.h"
+#include "proto/text.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {
@@ -29,7 +30,9 @@ constexpr const char* kSubmitExamples = R"(Examples:
   oblique submit --H 1 --mu 0.1:2.0:40 --e 0.6,0.8,1 --name friction
 
 A study is safe in the server's database once this returns. Submitting the same study again
-goes on with it; another study under a taken name is refused.)";
+goes on with it. One whose blocks begin with those that the server has grows by the rest, and runs
+again, whether it was done, paused or cancelled; so does one whose last block is a random or Sobol
+sample with a larger count. Any other study under a taken name is refused, with what differs.)";
 
 struct SubmitFlags {
   StudyFlags study;
@@ -43,7 +46,9 @@ void tell_submitted(const Study& study, const protocol::SubmitReply& reply,
                     const StudyTerms& terms) {
   std::string known;
   if (!reply.created()) {
-    known = "; the server had it already";
+    known = reply.appended() > 0 ? fmt::format("; {} points are appended to it, which was {}",
+                                               reply.appended(), protocol::visible(reply.was()))
+                                 : "; the server had it already";
     if (terms.priority) {
       known += fmt::format("; its priority is now {}", *terms.priority);
     }
@@ -63,10 +68,10 @@ std::string query_for_more(const Study& study, const ConnectionSettings& server)
                      key.empty() ? "" : " --keys " + shell_word(key));
 }
 
-int watch(const Study& study, std::int64_t rows, const std::string& for_more,
-          Connection& connection, protocol::StopSignals& stop) {
+int watch(const Study& study, std::uint64_t study_id, std::int64_t rows,
+          const std::string& for_more, Connection& connection, protocol::StopSignals& stop) {
   const auto ask = [&](const Tell& tell) {
-    const auto status = connection.status(study.name, tell);
+    const auto status = connection.status_of(study.name, study_id, tell);
     if (status.studies_size() != 1) {
       throw ServerError("the server no longer knows the study \"" + study.name + "\"");
     }
@@ -103,10 +108,11 @@ int submit(const SubmitFlags& flags) {
   Connection connection(server, [&stop] { return !stop.requested(); });
   bool submitted = false;
   try {
-    tell_submitted(study, connection.submit(study, flags.terms), flags.terms);
+    const auto reply = connection.submit(study, flags.terms);
+    tell_submitted(study, reply, flags.terms);
     tell_mesh(std::cerr, study.recipe);
     submitted = true;
-    return flags.watch || flags.rows ? watch(study, flags.rows.value_or(0),
+    return flags.watch || flags.rows ? watch(study, reply.study_id(), flags.rows.value_or(0),
                                              query_for_more(study, server), connection, stop)
                                      : kDone;
   } catch (const Interrupted&) {

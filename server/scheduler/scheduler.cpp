@@ -39,15 +39,26 @@ void Scheduler::on(const StudyCancelled& event) {
     return;
   }
   found->second.cancelled = true;
-  found->second.overlaps = false;  // all leases end: whose point it was does not matter
-  for (const LeaseId id : found->second.leases.all()) {
-    end_lease(id, std::nullopt);
-  }
+  end_all_leases(event.study);
   found->second.points.rest();
   requeue(event.study);
+  withdraw(event.study);
+}
+
+/// None of its points counts as lost.
+void Scheduler::end_all_leases(StudyId id) {
+  Study& study = studies_.at(id);
+  study.overlaps = false;  // all leases end: whose point it was does not matter
+  for (const LeaseId lease : study.leases.all()) {
+    end_lease(lease, std::nullopt);
+  }
+}
+
+/// Who was told of the study is told to drop it.
+void Scheduler::withdraw(StudyId study) {
   for (auto& [id, worker] : workers_) {
-    if (worker.defined.erase(event.study) != 0) {
-      effects_.emplace_back(WithdrawStudy{id, event.study});
+    if (worker.defined.erase(study) != 0) {
+      effects_.emplace_back(WithdrawStudy{id, study});
     }
   }
 }
@@ -105,6 +116,40 @@ void Scheduler::on(const FailuresForgotten& event) {
     study.served = least_served(event.study);
   }
   requeue(event.study);
+}
+
+void Scheduler::on(const StudyGrown& event) {
+  const auto found = studies_.find(event.study);
+  if (found == studies_.end() || event.table.size() <= found->second.points.size()) {
+    return;
+  }
+  Study& study = found->second;
+  const bool was_open = study.is_open();
+  study.points.grow(event.table);
+  study.cancelled = false;
+  study.paused = false;
+  study.finished = false;
+  if (!was_open || !(study.terms == event.terms)) {
+    study.terms = event.terms;
+    study.served = least_served(event.study);
+  }
+  requeue(event.study);
+}
+
+void Scheduler::on(const StudyRemoved& event) {
+  if (!studies_.contains(event.study)) {
+    return;
+  }
+  end_all_leases(event.study);
+  withdraw(event.study);
+  for (auto& [id, worker] : workers_) {
+    worker.paces.erase(event.study);
+  }
+  std::erase_if(condemned_, [&](const Condemned& point) { return point.study == event.study; });
+  processes_.forget_study(event.study);
+  queue_.put(event.study, {});
+  studies_.erase(event.study);
+  ready_workers_.wake_all();  // suspect points of it may have kept some from others
 }
 
 /// Where a study begins that opens now: level with the one served least, so that it neither waits

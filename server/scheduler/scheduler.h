@@ -164,7 +164,7 @@ class Scheduler {
     std::int64_t last_heard_ms;
     std::uint64_t solved_points = 0;
     std::set<LeaseId> leases;
-    std::set<StudyId> defined;
+    std::map<StudyId, std::uint64_t> defined;  ///< with so many points, as it was told
     std::map<StudyId, Pace> paces;
   };
   using Effects = std::vector<Effect>;
@@ -175,6 +175,8 @@ class Scheduler {
   void on(const StudyReopened& event);
   void on(const StudyTermsChanged& event);
   void on(const FailuresForgotten& event);
+  void on(const StudyGrown& event);
+  void on(const StudyRemoved& event);
   void on(const WorkerJoined& event);
   void on(const CreditGiven& event);
   void on(const ResultsReceived& event);
@@ -188,6 +190,8 @@ class Scheduler {
   void on(const Tick& event);
 
   enum class WorkerEnd { kLeft, kReplaced, kLost };
+  void end_all_leases(StudyId id);
+  void withdraw(StudyId id);
   Worker* heard_from(WorkerId worker);
   /// `loss`: who went with it without an answer; nothing: its points are given back.
   void end_lease(LeaseId lease, const std::optional<Loss>& loss);

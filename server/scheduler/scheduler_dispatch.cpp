@@ -242,7 +242,10 @@ void Scheduler::fill_lanes(Portion& wanted, const StudyPoints& points, std::uint
 
 LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Batch& batch,
                          bool alone) {
-  if (worker.defined.insert(study).second) {
+  // A study may have grown since the worker was told of it.
+  std::uint64_t& told_points = worker.defined[study];
+  if (told_points < batch.end()) {
+    told_points = studies_.at(study).points.size();
     effects_.emplace_back(DefineStudy{id, study});
   }
   Study& served = studies_.at(study);

@@ -105,6 +105,16 @@ struct FailuresForgotten {
   IntervalSet points;
   PointAttempts attempts{};  ///< in which they failed
 };
+/// It is durable that the study has further points behind those that it had, and runs.
+struct StudyGrown {
+  StudyId study;
+  StudyTable table;  ///< of all its points
+  StudyTerms terms{};
+};
+/// It is durable that there is no such study any more. Numbers of studies are never used twice.
+struct StudyRemoved {
+  StudyId study;
+};
 /// A worker said hello. Worker numbers are never used twice.
 struct WorkerJoined {
   WorkerId worker;
@@ -166,14 +176,16 @@ struct DispatchHeld {
 /// Time has passed.
 struct Tick {};
 
-using Event = std::variant<StudyAdded, StudyCancelled, StudyPaused, StudyReopened,
-                           StudyTermsChanged, FailuresForgotten, WorkerJoined, CreditGiven,
-                           ResultsReceived, ResultsStored, HeartbeatReceived, BatchesReturned,
-                           WorkerLeft, WorkerUnreachable, WorkerBusy, DispatchHeld, Tick>;
+using Event =
+    std::variant<StudyAdded, StudyCancelled, StudyPaused, StudyReopened, StudyTermsChanged,
+                 FailuresForgotten, StudyGrown, StudyRemoved, WorkerJoined, CreditGiven,
+                 ResultsReceived, ResultsStored, HeartbeatReceived, BatchesReturned, WorkerLeft,
+                 WorkerUnreachable, WorkerBusy, DispatchHeld, Tick>;
 
 // ---- Effects ----------------------------------------------------------------------------------
 
-/// Tell the worker the recipe: its first batch of the study follows.
+/// Tell the worker the recipe: its first batch of the study, or of points that the study has got
+/// since, follows.
 struct DefineStudy {
   WorkerId worker;
   StudyId study;

@@ -48,6 +48,12 @@ void WorkerProcesses::forget(ProcessNumber number) {
   processes_.erase(number);
 }
 
+void WorkerProcesses::forget_study(StudyId study) {
+  for (auto& [number, process] : processes_) {
+    process.in_histories.erase(study);
+  }
+}
+
 std::size_t WorkerProcesses::workers() const {
   return std::accumulate(
       processes_.begin(), processes_.end(), std::size_t{0},

@@ -39,6 +39,9 @@ class WorkerProcesses {
   /// The connection ended. The process may be forgotten.
   void leave(ProcessNumber number, WorkerId worker);
 
+  /// No points of that study are in any history any more.
+  void forget_study(StudyId study);
+
   /// Throws std::out_of_range for one that is not remembered.
   WorkerProcess& at(ProcessNumber number) { return processes_.at(number); }
   const WorkerProcess& at(ProcessNumber number) const { return processes_.at(number); }

@@ -122,6 +122,9 @@ void ClientsDesk::answer(const Client& client, const ReadRequest& read, Instant 
     case Kind::kQuery:
       queries_.ask(client, request.query(), now);
       break;
+    case Kind::kDescribe:
+      describe(client, request.describe());
+      break;
     case Kind::KIND_NOT_SET:
       at_.bad_frames.count("a client");
       at_.clients.reply_error(client, "the server does not know this kind of request");
@@ -171,10 +174,16 @@ void ClientsDesk::status(const Client& client, const protocol::StatusRequest& re
   fields.set_draining(draining_);
   fields.set_workers(static_cast<std::uint32_t>(at_.sources.scheduler.workers()));
   fields.set_access(settings_.access);
-  if (!request.study().empty()) {
-    const auto known = at_.sources.states.find_durable(request.study());
+  if (!request.study().empty() || request.study_id() != 0) {
+    const StudyStates& states = at_.sources.states;
+    auto known = states.find_durable(request.study());
+    if (request.study_id() != 0) {
+      const bool is_there =
+          states.contains(request.study_id()) && states.is_durable(request.study_id());
+      known = is_there ? std::optional(request.study_id()) : std::nullopt;
+    }
     if (!known) {
-      at_.clients.reply_error(client, unknown_study(request.study()));
+      at_.clients.reply_error(client, unknown_study(request.study(), states));
       return;
     }
     *fields.add_studies() = status_of(*known, now);
@@ -193,6 +202,19 @@ void ClientsDesk::status(const Client& client, const protocol::StatusRequest& re
     bytes += fields.studies(fields.studies_size() - 1).ByteSizeLong();
   }
   at_.clients.to_client(client.identity, reply);
+}
+
+/// The recipe goes out as it is kept.
+void ClientsDesk::describe(const Client& client, const protocol::DescribeRequest& request) {
+  const StudyStates& states = at_.sources.states;
+  const auto known = states.find_durable(request.study());
+  if (!known) {
+    at_.clients.reply_error(client, unknown_study(request.study(), states));
+    return;
+  }
+  const std::string& recipe = states.record(*known).table.recipe_bytes();
+  at_.clients.forward_to_client(client.identity,
+                                protocol::description_around(client.request_id, recipe));
 }
 
 void ClientsDesk::workers(const Client& client, const protocol::WorkersRequest& request,

@@ -81,6 +81,7 @@ class ClientsDesk {
   void submit(const Client& client, const ReadRequest& read, Instant now);
   protocol::StudyStatus status_of(StudyId id, Instant now) const;
   void status(const Client& client, const protocol::StatusRequest& request, Instant now);
+  void describe(const Client& client, const protocol::DescribeRequest& request);
   void workers(const Client& client, const protocol::WorkersRequest& request, Instant now);
   void add_keys(protocol::WorkersReply& reply) const;
 

@@ -197,6 +197,9 @@ void Service::perform(const StoreFailure& effect, Turn turn) {
 }
 
 void Service::perform(const StudyFinished& effect, Turn turn) {
+  if (changes_.puts_off_end(effect.study)) {
+    return;  // further points of it are on their way to the disk
+  }
   if (states_.finish(effect.study)) {
     open_.close(effect.study);
     outbox_.note(Severity::kInfo,
@@ -234,7 +237,7 @@ void Service::written(const WriteReport& report, Instant now) {
       break;
     case WriteReport::Kind::kRefused:
       if (const auto meaning = ledger_.settle(report.ticket)) {
-        std::visit([&](const auto& write) { refused(write, report.error); }, *meaning);
+        std::visit([&](const auto& write) { refused(write, report.error, now); }, *meaning);
       }
       break;
   }
@@ -245,7 +248,7 @@ void Service::written(const WriteReport& report, Instant now) {
 void Service::lose_storage(const std::string& error, Instant now) {
   outbox_.note(Severity::kError, error);
   for (const Meaning& meaning : ledger_.abandon(error)) {
-    std::visit([&](const auto& write) { refused(write, error); }, meaning);
+    std::visit([&](const auto& write) { refused(write, error, now); }, meaning);
   }
   workers_.notice(error);
   stop(now);
@@ -253,6 +256,10 @@ void Service::lose_storage(const std::string& error, Instant now) {
 
 void Service::stored(const ResultsWrite& write, Instant now) {
   const StudyId id = write.event.study;
+  if (!states_.contains(id)) {
+    feed(write.event, now);  // it was deleted meanwhile, and the database dropped these
+    return;
+  }
   for (const PointOutcome& outcome : write.event.outcomes) {
     if (outcome.failed) {
       states_.point_failed(id, outcome.point, write.attempt);
@@ -293,26 +300,58 @@ void Service::stored(const FailuresWrite& write, Instant now) {
   changes_.answer(write, now);
 }
 
+void Service::stored(const GrowthWrite& write, Instant now) {
+  feed(changes_.stored(write, now), now);
+  changes_.answer(write, now);
+}
+
+void Service::stored(const NameWrite& write, Instant now) {
+  changes_.stored(write);
+  changes_.answer(write, now);
+}
+
+void Service::stored(const RemovalWrite& write, Instant now) {
+  rates_.forget(write.study);
+  feed(changes_.stored(write, now), now);
+  changes_.answer(write, now);
+}
+
 void Service::stored(const QuietWrite& /*write*/, Instant /*now*/) {}
 
 /// The writer keeps these until it can write them; when the database is gone, workers keep results.
-void Service::refused(const ResultsWrite& /*write*/, const std::string& /*error*/) {}
-void Service::refused(const QuietWrite& /*write*/, const std::string& /*error*/) {}
+void Service::refused(const ResultsWrite& /*write*/, const std::string& /*error*/,
+                      Instant /*now*/) {}
+void Service::refused(const QuietWrite& /*write*/, const std::string& /*error*/, Instant /*now*/) {}
 
-void Service::refused(const StudyWrite& write, const std::string& error) {
+void Service::refused(const StudyWrite& write, const std::string& error, Instant now) {
+  changes_.refused(write, error, now);
+}
+
+void Service::refused(const StateWrite& write, const std::string& error, Instant /*now*/) {
   changes_.refused(write, error);
 }
 
-void Service::refused(const StateWrite& write, const std::string& error) {
+void Service::refused(const TermsWrite& write, const std::string& error, Instant now) {
+  changes_.refused(write, error, now);
+}
+
+void Service::refused(const FailuresWrite& write, const std::string& error, Instant /*now*/) {
   changes_.refused(write, error);
 }
 
-void Service::refused(const TermsWrite& write, const std::string& error) {
-  changes_.refused(write, error);
+void Service::refused(const GrowthWrite& write, const std::string& error, Instant now) {
+  changes_.refused(write, error, now);
+  if (changes_.takes_end(write.study)) {
+    perform(StudyFinished{write.study}, {now});
+  }
 }
 
-void Service::refused(const FailuresWrite& write, const std::string& error) {
-  changes_.refused(write, error);
+void Service::refused(const NameWrite& write, const std::string& error, Instant now) {
+  changes_.refused(write, error, now);
+}
+
+void Service::refused(const RemovalWrite& write, const std::string& error, Instant now) {
+  changes_.refused(write, error, now);
 }
 
 }  // namespace oblique::server

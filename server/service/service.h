@@ -13,7 +13,7 @@
 #include "server/service/log_limits.h"
 #include "server/service/outbox.h"
 #include "server/service/study_changes.h"
-#include "server/service/study_states.h"
+#include "server/service/counts/study_states.h"
 #include "server/service/workers_desk.h"
 #include "server/service/write_ledger.h"
 #include "server/store/store.h"
@@ -118,13 +118,19 @@ class Service {
   void stored(const StateWrite& write, Instant now);
   void stored(const TermsWrite& write, Instant now);
   void stored(const FailuresWrite& write, Instant now);
+  void stored(const GrowthWrite& write, Instant now);
+  void stored(const NameWrite& write, Instant now);
+  void stored(const RemovalWrite& write, Instant now);
   void stored(const QuietWrite& write, Instant now);
-  void refused(const ResultsWrite& write, const std::string& error);
-  void refused(const StudyWrite& write, const std::string& error);
-  void refused(const StateWrite& write, const std::string& error);
-  void refused(const TermsWrite& write, const std::string& error);
-  void refused(const FailuresWrite& write, const std::string& error);
-  void refused(const QuietWrite& write, const std::string& error);
+  void refused(const ResultsWrite& write, const std::string& error, Instant now);
+  void refused(const StudyWrite& write, const std::string& error, Instant now);
+  void refused(const StateWrite& write, const std::string& error, Instant now);
+  void refused(const TermsWrite& write, const std::string& error, Instant now);
+  void refused(const FailuresWrite& write, const std::string& error, Instant now);
+  void refused(const GrowthWrite& write, const std::string& error, Instant now);
+  void refused(const NameWrite& write, const std::string& error, Instant now);
+  void refused(const RemovalWrite& write, const std::string& error, Instant now);
+  void refused(const QuietWrite& write, const std::string& error, Instant now);
 
   Outbox& outbox_;
   Scheduler scheduler_;

@@ -13,6 +13,8 @@ namespace oblique::server {
 namespace {
 
 constexpr std::size_t kLongestShownName = 200;
+/// Of one study, for a change of it to be durable.
+constexpr std::size_t kMostWaiting = 1000;
 
 /// Why no study can have these terms, or an empty text.
 std::string objection_to_terms(const StudyTerms& terms) {
@@ -36,9 +38,11 @@ StudyTerms asked_terms(const protocol::SubmitRequest& request, StudyTerms terms)
 
 }  // namespace
 
-std::string unknown_study(const std::string& name) {
-  return fmt::format("there is no study called \"{}\": `oblique studies` lists all",
-                     protocol::shortened(name, kLongestShownName));
+std::string unknown_study(const std::string& name, const StudyStates& states) {
+  const std::string nearest = states.nearest(name);
+  return fmt::format("there is no study called \"{}\"{}: `oblique studies` lists all",
+                     protocol::shortened(name, kLongestShownName),
+                     nearest.empty() ? "" : fmt::format(" (did you mean `{}`?)", nearest));
 }
 
 // ---- What is asked ----------------------------------------------------------------------------
@@ -65,17 +69,104 @@ void StudyChanges::submit(const Client& client, const ReadRequest& read, Instant
     add(client, read, terms, now);
     return;
   }
+  if (const auto turn = turns_.find(*known); turn != turns_.end() &&
+                                             !turn->second.submitters.empty() &&
+                                             turn->second.grown.is_of_the_recipe_of(read.table)) {
+    turn->second.submitters.push_back(client);
+    return;
+  }
+  if (waits(client, *known, [this, client, read](Instant then) { submit(client, read, then); })) {
+    return;
+  }
   const StudyRecord& study = states_.record(*known);
   if (!study.table.is_of_the_recipe_of(read.table)) {
-    clients_.reply_error(client, fmt::format("there is a study called \"{}\" with other points, "
-                                             "another model or another choice of errors: "
-                                             "give this one another name, or use another database",
-                                             request.name()));
+    grow(client, *known, read, terms, now);
   } else if (states_.is_durable(*known) && !(study.terms == terms)) {
+    turns_[*known];
     ledger_.write(SetStudyTerms{*known, terms}, TermsWrite{*known, terms, client});
   } else {
     go_on(client, *known, now);
   }
+}
+
+/// The recipe is not that of the study: the study grows by what it has more, or it is refused.
+void StudyChanges::grow(const Client& client, StudyId id, const ReadRequest& read,
+                        const StudyTerms& terms, Instant now) {
+  const StudyRecord& study = states_.record(id);
+  Growth growth{Growth::Kind::kOther, "the stored one cannot be read"};
+  try {
+    growth = study.table.growth_to(read.table);
+  } catch (const std::runtime_error&) {
+    // Only another version can.
+  }
+  if (growth.kind != Growth::Kind::kLonger || read.table.size() <= study.table.size()) {
+    refuse_recipe(client, study.name, growth);
+    return;
+  }
+  if (!states_.is_durable(id)) {
+    turns_[id].later.emplace_back(
+        [this, client, read](Instant then) { submit(client, read, then); });
+    return;
+  }
+  const std::uint64_t appended = read.table.size() - study.table.size();
+  if (!may_open(client, id, study.submitted_by, open_points_of(id, sources_) + appended)) {
+    return;
+  }
+  const GrowthWrite write{id, read.table, terms, study.table.size(),
+                          view_of(id, sources_, now).state};
+  Turn& turn = turns_[id];
+  turn.grown = read.table;
+  turn.submitters.push_back(client);
+  states_.change(id, StudyState::kRunning);
+  recount(id);
+  ledger_.write(GrowStudy{id, read.table, terms, iso_8601(now)}, write);
+}
+
+void StudyChanges::refuse_recipe(const Client& client, const std::string& name,
+                                 const Growth& growth) {
+  const bool is_shorter = growth.kind == Growth::Kind::kShorter;
+  clients_.reply_error(
+      client, fmt::format("there is a study called \"{}\" with {}. A study may grow by blocks "
+                          "behind those that it has, and never change:\n{}\n"
+                          "Give this one another name, or use another database",
+                          name, is_shorter ? "more points" : "another recipe", growth.difference));
+}
+
+/// Whether the request waits until the change of the study that is on its way is durable or
+/// refused; it is asked again then.
+bool StudyChanges::waits(const Client& client, StudyId id, std::function<void(Instant)> later) {
+  const auto turn = turns_.find(id);
+  if (turn == turns_.end()) {
+    return false;
+  }
+  if (turn->second.later.size() >= kMostWaiting) {
+    clients_.reply_error(client, "too many changes of that study wait already: ask again later");
+  } else {
+    turn->second.later.push_back(std::move(later));
+  }
+  return true;
+}
+
+void StudyChanges::end_turn(StudyId id, Instant now) {
+  const auto turn = turns_.extract(id);
+  if (turn) {
+    for (const auto& later : turn.mapped().later) {
+      later(now);
+    }
+  }
+}
+
+bool StudyChanges::puts_off_end(StudyId id) {
+  const auto turn = turns_.find(id);
+  if (turn == turns_.end() || turn->second.submitters.empty()) {
+    return false;
+  }
+  turn->second.end_is_put_off = true;
+  return true;
+}
+
+bool StudyChanges::takes_end(StudyId id) {
+  return ends_put_off_.erase(id) != 0;
 }
 
 void StudyChanges::add(const Client& client, const ReadRequest& read, const StudyTerms& terms,
@@ -133,11 +224,39 @@ void StudyChanges::go_on(const Client& client, StudyId id, Instant now) {
 
 void StudyChanges::change(const Client& client, const protocol::ChangeRequest& request,
                           Instant now) {
-  const auto known = states_.find_durable(request.study());
+  std::optional<StudyId> known = states_.find_durable(request.study());
+  if (request.study_id() != 0) {
+    known = states_.contains(request.study_id()) && states_.is_durable(request.study_id())
+                ? std::optional(request.study_id())
+                : std::nullopt;
+  }
   if (!known) {
-    clients_.reply_error(client, unknown_study(request.study()));
+    reply_gone(client, request);
+  } else if (!waits(client, *known,
+                    [this, client, request](Instant then) { change(client, request, then); })) {
+    change_one(client, request, *known, now);
+  }
+}
+
+/// There is no study of that name or number. One that was deleted before is deleted.
+void StudyChanges::reply_gone(const Client& client, const protocol::ChangeRequest& request) {
+  if (request.change() != protocol::STUDY_CHANGE_DELETE || request.study_id() == 0 ||
+      request.study_id() > last_study_id_) {
+    clients_.reply_error(client, unknown_study(request.study(), states_));
     return;
   }
+  protocol::ClientReply reply;
+  reply.set_request_id(client.request_id);
+  auto& status = *reply.mutable_change()->mutable_study();
+  status.set_study_id(request.study_id());
+  status.set_name(request.study());
+  status.set_state(kDeletedState);
+  clients_.to_client(client.identity, reply);
+}
+
+void StudyChanges::change_one(const Client& client, const protocol::ChangeRequest& request,
+                              StudyId id, Instant now) {
+  const std::optional known(id);
   StudyState wanted{};
   switch (request.change()) {
     case protocol::STUDY_CHANGE_CANCEL:
@@ -154,6 +273,12 @@ void StudyChanges::change(const Client& client, const protocol::ChangeRequest& r
     case protocol::STUDY_CHANGE_RETRY:
       retry(client, *known, now);
       return;
+    case protocol::STUDY_CHANGE_RENAME:
+      rename(client, request, id, now);
+      return;
+    case protocol::STUDY_CHANGE_DELETE:
+      remove(client, id);
+      return;
     default:
       clients_.reply_error(client, "the server does not know this change of a study");
       return;
@@ -165,6 +290,36 @@ void StudyChanges::change(const Client& client, const protocol::ChangeRequest& r
   } else {
     reply_changed(client, *known, 0, now);
   }
+}
+
+void StudyChanges::rename(const Client& client, const protocol::ChangeRequest& request, StudyId id,
+                          Instant now) {
+  const std::string& name = request.new_name();
+  if (const std::string reason = protocol::objection_to_study_name(name); !reason.empty()) {
+    clients_.reply_error(client, reason);
+    return;
+  }
+  const auto taken = states_.find(name);
+  if (taken == id) {
+    reply_changed(client, id, 0, now);
+    return;
+  }
+  if (taken) {
+    if (!waits(client, *taken,
+               [this, client, request](Instant then) { change(client, request, then); })) {
+      clients_.reply_error(
+          client, fmt::format("there is a study called \"{}\" already: choose another name", name));
+    }
+    return;
+  }
+  states_.reserve(id, name);
+  turns_[id];
+  ledger_.write(RenameStudy{id, name}, NameWrite{id, name, client});
+}
+
+void StudyChanges::remove(const Client& client, StudyId id) {
+  turns_[id];
+  ledger_.write(DeleteStudy{id}, RemovalWrite{id, client});
 }
 
 void StudyChanges::set_state(const Client& client, StudyId id, StudyState state, bool submitted,
@@ -193,120 +348,6 @@ void StudyChanges::retry(const Client& client, StudyId id, Instant now) {
   }
   ledger_.write(ForgetFailures{id, study.failures, iso_8601(now)},
                 FailuresWrite{id, study.failures, client});
-}
-
-// ---- What became of it ------------------------------------------------------------------------
-
-Event StudyChanges::stored(const StudyWrite& write, Instant now) {
-  states_.added(write.study, now.steady_ms);
-  const StudyRecord& study = states_.record(write.study);
-  note(write.study, fmt::format("of {} points begins", study.table.size()));
-  return StudyAdded{write.study, study.table, {}, 0, false, false, study.terms};
-}
-
-Event StudyChanges::stored(const StateWrite& write, Instant /*now*/) {
-  states_.changed(write.study, write.state);
-  if (write.state == StudyState::kRunning) {
-    note(write.study, "goes on");
-    return StudyReopened{write.study};
-  }
-  note(write.study, fmt::format("is {}", state_name(write.state)));
-  if (write.state == StudyState::kPaused) {
-    return StudyPaused{write.study};
-  }
-  return StudyCancelled{write.study};
-}
-
-Event StudyChanges::stored(const TermsWrite& write, Instant /*now*/) {
-  states_.set_terms(write.study, write.terms);
-  return StudyTermsChanged{write.study, write.terms};
-}
-
-Event StudyChanges::stored(const FailuresWrite& write, Instant now) {
-  states_.forget_failures(write.study, write.points, now.steady_ms);
-  note(write.study, fmt::format("tries its failed points again: {}", write.points.size()));
-  return FailuresForgotten{write.study, write.points, states_.record(write.study).attempts};
-}
-
-void StudyChanges::answer(const StudyWrite& write, Instant now) {
-  recount(write.study);
-  const auto waiting = submitters_.extract(write.study);
-  bool created = true;
-  for (const Client& client : waiting.mapped()) {
-    reply_submitted(client, write.study, std::exchange(created, false), now);
-  }
-}
-
-void StudyChanges::answer(const StateWrite& write, Instant now) {
-  recount(write.study);
-  if (write.submitted) {
-    reply_submitted(write.client, write.study, false, now);
-  } else {
-    reply_changed(write.client, write.study, 0, now);
-  }
-}
-
-void StudyChanges::answer(const TermsWrite& write, Instant now) {
-  go_on(write.client, write.study, now);
-}
-
-void StudyChanges::answer(const FailuresWrite& write, Instant now) {
-  recount(write.study);
-  reply_changed(write.client, write.study, write.points.size(), now);
-}
-
-void StudyChanges::refused(const StudyWrite& write, const std::string& error) {
-  states_.remove(write.study);
-  recount(write.study);
-  const auto waiting = submitters_.extract(write.study);
-  for (const Client& client : waiting.mapped()) {
-    clients_.reply_error(client, "the study was not stored: " + error);
-  }
-}
-
-void StudyChanges::refused(const StateWrite& write, const std::string& error) {
-  states_.refused(write.study);
-  recount(write.study);
-  reply_unchanged(write.client, error);
-}
-
-void StudyChanges::refused(const TermsWrite& write, const std::string& error) {
-  reply_unchanged(write.client, error);
-}
-
-void StudyChanges::refused(const FailuresWrite& write, const std::string& error) {
-  reply_unchanged(write.client, error);
-}
-
-// ---- Replies ----------------------------------------------------------------------------------
-
-void StudyChanges::reply_submitted(const Client& client, StudyId id, bool created, Instant now) {
-  const StudyView view = view_of(id, sources_, now);
-  protocol::ClientReply reply;
-  reply.set_request_id(client.request_id);
-  auto& fields = *reply.mutable_submit();
-  fields.set_study_id(id);
-  fields.set_points(view.points);
-  fields.set_settled(view.settled());
-  fields.set_created(created);
-  clients_.to_client(client.identity, reply);
-}
-
-void StudyChanges::reply_changed(const Client& client, StudyId id, std::uint64_t retried,
-                                 Instant now) {
-  protocol::ClientReply reply;
-  reply.set_request_id(client.request_id);
-  *reply.mutable_change()->mutable_study() = to_message(view_of(id, sources_, now));
-  reply.mutable_change()->set_retried(retried);
-  clients_.to_client(client.identity, reply);
-}
-
-void StudyChanges::reply_unchanged(const Client& client, const std::string& error) {
-  clients_.reply_error(client, "the change was not stored, the study is as before: " + error);
-}
-
-void StudyChanges::note(StudyId id, const std::string& what) {
-  log_.note(Severity::kInfo, fmt::format("study {} {}", states_.record(id).name, what));
 }
 
 }  // namespace oblique::server

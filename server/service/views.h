@@ -6,7 +6,7 @@
 #include "proto/oblique.pb.h"
 #include "server/scheduler/scheduler.h"
 #include "server/service/counts/settled_rates.h"
-#include "server/service/study_states.h"
+#include "server/service/counts/study_states.h"
 #include "server/service/workers_desk.h"
 #include "server/service/write_ledger.h"
 

@@ -24,6 +24,15 @@ bool is_change_of(const TermsWrite&) {
 bool is_change_of(const FailuresWrite&) {
   return true;
 }
+bool is_change_of(const GrowthWrite&) {
+  return true;
+}
+bool is_change_of(const NameWrite&) {
+  return true;
+}
+bool is_change_of(const RemovalWrite&) {
+  return true;
+}
 bool is_change_of(const QuietWrite&) {
   return false;
 }

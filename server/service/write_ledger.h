@@ -40,11 +40,28 @@ struct FailuresWrite {
   IntervalSet points;  ///< whose failures are forgotten
   Client client;
 };
+/// The study has all the points of the table.
+struct GrowthWrite {
+  StudyId study;
+  StudyTable table;
+  StudyTerms terms;
+  std::uint64_t points_before;
+  StudyState state_before;
+};
+struct NameWrite {
+  StudyId study;
+  std::string name;  ///< the new one
+  Client client;
+};
+struct RemovalWrite {
+  StudyId study;
+  Client client;
+};
 /// Nothing follows.
 struct QuietWrite {};
 
-using Meaning =
-    std::variant<ResultsWrite, StudyWrite, StateWrite, TermsWrite, FailuresWrite, QuietWrite>;
+using Meaning = std::variant<ResultsWrite, StudyWrite, StateWrite, TermsWrite, FailuresWrite,
+                             GrowthWrite, NameWrite, RemovalWrite, QuietWrite>;
 
 struct LedgerLimits {
   /// Results messages of one worker that wait for the disk. A sound worker stops long before.

@@ -84,8 +84,27 @@ struct AddResults {
   std::vector<protocol::PointResult> results;
 };
 
-using Change =
-    std::variant<AddStudy, SetStudyState, SetStudyTerms, ForgetFailures, AddWorker, AddResults>;
+/// The study has further points, behind those that it had, and runs on these terms.
+struct GrowStudy {
+  std::uint64_t study_id;
+  StudyTable table;  ///< of all its points
+  StudyTerms terms;
+  std::string changed_at;
+};
+
+struct RenameStudy {
+  std::uint64_t study_id;
+  std::string name;
+};
+
+/// There is no such study any more, its name is free, and results of it are dropped from then on.
+/// Its rows go a few at a time (`Storage::clear_away`).
+struct DeleteStudy {
+  std::uint64_t study_id;
+};
+
+using Change = std::variant<AddStudy, SetStudyState, SetStudyTerms, ForgetFailures, GrowStudy,
+                            RenameStudy, DeleteStudy, AddWorker, AddResults>;
 
 /// What the writer needs of a database. Tests put a failing one in its place.
 class Storage {
@@ -99,6 +118,10 @@ class Storage {
 
   /// Throws StorageGone when the database is not where it was opened.
   virtual void check() {}
+
+  /// Deletes, durably, a part of what deleted studies left: at most about so many rows, or pages of
+  /// the file. False when nothing is left of them. Throws as `commit` does.
+  virtual bool clear_away(std::size_t /*most*/) { return false; }
 
   /// Moves the write-ahead log into the database and empties it, so that the one file holds all.
   /// False when a reader keeps it from doing so: to be tried again. Throws StorageError.

@@ -41,6 +41,15 @@ bool is_lasting(const SetStudyTerms& /*change*/) {
 bool is_lasting(const ForgetFailures& /*change*/) {
   return true;
 }
+bool is_lasting(const GrowStudy& /*change*/) {
+  return true;
+}
+bool is_lasting(const RenameStudy& /*change*/) {
+  return true;
+}
+bool is_lasting(const DeleteStudy& /*change*/) {
+  return true;
+}
 bool is_lasting(const AddWorker& /*change*/) {
   return false;
 }
@@ -75,6 +84,14 @@ struct Store::Statements {
         reopen(database,
                "UPDATE studies SET state = 'running', changed_at = ?2"
                " WHERE study_id = ?1 AND state = 'done'"),
+        grow(database,
+             "UPDATE studies SET recipe = ?2, points = ?3, state = 'running', changed_at = ?4,"
+             " priority = ?5, weight = ?6, mixes_versions = ?7,"
+             " checksum = row_checksum(study_id, name, ?2, ?3, created_at) WHERE study_id = ?1"),
+        rename(database,
+               "UPDATE studies SET name = ?2,"
+               " checksum = row_checksum(study_id, ?2, recipe, points, created_at)"
+               " WHERE study_id = ?1"),
         add_worker(database,
                    "INSERT INTO workers (worker_id, name, threads, solver_version,"
                    " instruction_set, joined_at) VALUES (?, ?, ?, ?, ?, ?)"),
@@ -88,6 +105,8 @@ struct Store::Statements {
   Statement note_retries;
   Statement forget_failures;
   Statement reopen;
+  Statement grow;
+  Statement rename;
   Statement add_worker;
   Statement find_model;
   Statement add_model;
@@ -219,6 +238,33 @@ void Store::add(const ForgetFailures& change) {
   reopen.bind(1, change.study_id);
   reopen.bind(2, change.changed_at);
   reopen.run();
+}
+
+void Store::add(const GrowStudy& change) {
+  Statement& update = statements_->grow;
+  update.bind(1, change.study_id);
+  update.bind_blob(2, change.table.recipe_bytes());
+  update.bind(3, change.table.size());
+  update.bind(4, change.changed_at);
+  update.bind(5, std::int64_t{change.terms.priority});
+  update.bind(6, change.terms.weight);
+  update.bind(7, std::int64_t{change.terms.mixes_versions});
+  update.run();
+}
+
+void Store::add(const RenameStudy& change) {
+  Statement& update = statements_->rename;
+  update.bind(1, change.study_id);
+  update.bind(2, change.name);
+  update.run();
+}
+
+void Store::add(const DeleteStudy& change) {
+  for (const char* table : {"results", "retries", "studies"}) {
+    Statement remove(database_.get(), std::string("DELETE FROM ") + table + " WHERE study_id = ?");
+    remove.bind(1, change.study_id);
+    remove.run();
+  }
 }
 
 void Store::add(const SetStudyState& change) {

@@ -79,6 +79,9 @@ class Store final : public Storage {
   void add(const SetStudyState& change);
   void add(const SetStudyTerms& change);
   void add(const ForgetFailures& change);
+  void add(const GrowStudy& change);
+  void add(const RenameStudy& change);
+  void add(const DeleteStudy& change);
   void add(const AddWorker& change);
   void add(const AddResults& change);
   std::int64_t model_id(const AddResults& change, std::uint64_t model);

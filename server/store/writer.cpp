@@ -47,6 +47,15 @@ std::uint64_t study_of(const SetStudyTerms& change) {
 std::uint64_t study_of(const ForgetFailures& change) {
   return change.study_id;
 }
+std::uint64_t study_of(const GrowStudy& change) {
+  return change.study_id;
+}
+std::uint64_t study_of(const RenameStudy& change) {
+  return change.study_id;
+}
+std::uint64_t study_of(const DeleteStudy& change) {
+  return change.study_id;
+}
 std::uint64_t study_of(const AddWorker& /*change*/) {
   return 0;
 }

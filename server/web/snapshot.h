@@ -9,7 +9,7 @@
 
 #include "server/network/network.h"
 #include "server/scheduler/scheduler.h"
-#include "server/service/study_states.h"
+#include "server/service/counts/study_states.h"
 #include "server/service/waiting_queries.h"
 #include "server/store/writer.h"
 

@@ -138,6 +138,11 @@ bool StudyPoints::settle(std::uint64_t point) {
   return true;
 }
 
+void StudyPoints::grow(StudyTable table) {
+  fresh_.insert(table_.size(), table.size());
+  table_ = std::move(table);
+}
+
 std::uint64_t StudyPoints::reopen(const IntervalSet& points) {
   std::uint64_t reopened = 0;
   points.for_each([&](const Interval& asked) {

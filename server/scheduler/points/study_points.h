@@ -75,6 +75,10 @@ class StudyPoints {
   /// The result of a committing point is durable. False when the point was not committing.
   bool settle(std::uint64_t point);
 
+  /// The study has got points behind those that it had, which are those of `table` too: they are
+  /// fresh.
+  void grow(StudyTable table);
+
   /// The settled ones among these points become fresh. Returns how many they were.
   std::uint64_t reopen(const IntervalSet& points);
 

@@ -47,6 +47,10 @@ const protocol::Sha256::Digest& StudyTable::digest() const {
   return *shared_->digest;
 }
 
+Growth StudyTable::growth_to(const StudyTable& other) const {
+  return growth_of(parsed(recipe_bytes()), parsed(other.recipe_bytes()));
+}
+
 bool StudyTable::is_of_the_recipe_of(const StudyTable& other) const {
   if (recipe_bytes() == other.recipe_bytes()) {
     return true;

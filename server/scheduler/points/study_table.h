@@ -7,6 +7,7 @@
 
 #include "proto/recipe/point_table.h"
 #include "proto/recipe/sha256.h"
+#include "server/scheduler/points/recipe_growth.h"
 
 namespace oblique::server {
 
@@ -30,6 +31,10 @@ class StudyTable {
   /// they differ and the sizes do not, once for each table a pass over the recipe, as long as it
   /// is.
   bool is_of_the_recipe_of(const StudyTable& other) const;
+
+  /// What another recipe is to this one. Costs in proportion to both. Throws std::runtime_error
+  /// when one of them cannot be read.
+  Growth growth_to(const StudyTable& other) const;
 
   /// The table, made when there is none. Throws solver::InputError for a recipe that this version
   /// does not take, and std::runtime_error for bytes that are no recipe of so many points.

@@ -48,7 +48,7 @@ TEST_F(ServiceTest, TheSamePointsWrittenInAnotherWayAreTheSameStudy) {
   EXPECT_EQ(last_reply().submit().study_id(), 1U);
   model.set_k_n_m(1e7);
   request(written);
-  EXPECT_THAT(last_reply().error().message(), HasSubstr("another model"));
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("model, k: stored 2.7e+07, given 1e+07"));
 }
 
 TEST_F(ServiceTest, TwoWhoSubmitTheSameBeforeItIsStoredAreBothAnswered) {

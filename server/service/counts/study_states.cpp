@@ -1,6 +1,9 @@
-#include "server/service/study_states.h"
+#include "server/service/counts/study_states.h"
 
 #include <utility>
+#include <vector>
+
+#include "proto/suggestion.h"
 
 namespace oblique::server {
 namespace {
@@ -69,6 +72,21 @@ std::optional<StudyId> StudyStates::find_durable(std::string_view name) const {
   return id && is_durable(*id) ? id : std::nullopt;
 }
 
+std::string StudyStates::nearest(std::string_view name) const {
+  constexpr std::size_t kMostCompared = 10'000;
+  if (ids_.size() > kMostCompared) {
+    return {};
+  }
+  std::vector<std::string_view> names;
+  names.reserve(ids_.size());
+  for (const auto& [known, id] : ids_) {
+    if (is_durable(id)) {
+      names.emplace_back(known);
+    }
+  }
+  return std::string(protocol::nearest(name, names));
+}
+
 std::optional<StudyId> StudyStates::durable_after(StudyId id) const {
   auto study = studies_.upper_bound(id);
   while (study != studies_.end() && !study->second.is_durable) {
@@ -106,6 +124,19 @@ void StudyStates::refused(StudyId id) {
   if (study.on_their_way == 0) {
     set_state(id, study, study.durable_state);
   }
+}
+
+void StudyStates::rename(StudyId id, const std::string& name) {
+  StudyRecord& record = studies_.at(id).record;
+  ids_.erase(record.name);
+  record.name = name;
+  ids_.insert_or_assign(name, id);
+}
+
+void StudyStates::grow(StudyId id, const StudyTable& table, const StudyTerms& terms) {
+  StudyRecord& record = studies_.at(id).record;
+  record.table = table;
+  record.terms = terms;
 }
 
 bool StudyStates::finish(StudyId id) {

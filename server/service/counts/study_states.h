@@ -44,13 +44,16 @@ class StudyStates {
   void add(StudyId id, StudyRecord record);
   /// It is durable.
   void added(StudyId id, std::int64_t now_ms);
-  /// It was refused, and is unknown from now on.
+  /// It was refused or is deleted, and is unknown from now on.
   void remove(StudyId id);
 
   /// The study of that name, durable or on its way.
   std::optional<StudyId> find(std::string_view name) const;
   /// The same when it is durable.
   std::optional<StudyId> find_durable(std::string_view name) const;
+  /// The name that differs least from this one, if any is near it; empty: none, or there are very
+  /// many studies.
+  std::string nearest(std::string_view name) const;
   /// The durable study of the lowest number above this one.
   std::optional<StudyId> durable_after(StudyId id) const;
   bool contains(StudyId id) const { return studies_.contains(id); }
@@ -80,6 +83,15 @@ class StudyStates {
 
   /// All points are settled. False when that is known.
   bool finish(StudyId id);
+
+  /// The name, which no study has, is kept for this one, ...
+  void reserve(StudyId id, const std::string& name) { ids_.emplace(name, id); }
+  /// ... and is not any more, ...
+  void release(const std::string& name) { ids_.erase(name); }
+  /// ... or is durably its only one.
+  void rename(StudyId id, const std::string& name);
+  /// It is durable that the study has all the points of the table.
+  void grow(StudyId id, const StudyTable& table, const StudyTerms& terms);
 
   void set_terms(StudyId id, const StudyTerms& terms) { studies_.at(id).record.terms = terms; }
   /// It is durable that the point failed in that attempt.

@@ -1,4 +1,4 @@
-#include "server/service/study_states.h"
+#include "server/service/counts/study_states.h"
 
 #include <stdexcept>
 
