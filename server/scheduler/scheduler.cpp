@@ -29,6 +29,34 @@ void Scheduler::on(const StudyAdded& event) {
                          event.failed, event.cancelled, event.paused, false, event.terms,
                          least_served(event.study), event.solver_version});
   studies_.at(event.study).points.count_attempts(event.attempts);
+  studies_.at(event.study).held = event.held;
+  finish_if_complete(event.study);
+  requeue(event.study);
+}
+
+void Scheduler::on(const StudyHeld& event) {
+  const auto found = studies_.find(event.study);
+  if (found == studies_.end() || found->second.held == event.held) {
+    return;
+  }
+  found->second.held = event.held;
+  found->second.served = least_served(event.study);
+  requeue(event.study);
+}
+
+void Scheduler::on(const PointsTaken& event) {
+  const auto found = studies_.find(event.study);
+  if (found == studies_.end()) {
+    return;
+  }
+  Study& study = found->second;
+  const std::uint64_t settled = study.points.settle_unsolved(event.points);
+  if (settled > 0 && study.solver_version.empty()) {
+    study.solver_version = event.solver_version;
+  }
+  for (const LeaseId id : study.leases.all()) {
+    release_if_answered(id);
+  }
   finish_if_complete(event.study);
   requeue(event.study);
 }
@@ -65,7 +93,7 @@ void Scheduler::withdraw(StudyId study) {
 
 void Scheduler::on(const StudyPaused& event) {
   const auto found = studies_.find(event.study);
-  if (found != studies_.end() && found->second.is_open()) {
+  if (found != studies_.end() && !found->second.cancelled && !found->second.finished) {
     found->second.paused = true;
     requeue(event.study);
   }

@@ -126,9 +126,10 @@ class Scheduler {
     double served = 0.0;
     std::string solver_version{};  ///< of its results and leases; empty while there are none
     LeaseIndex leases{};
+    bool held = false;
     bool overlaps = false;  ///< a point of it may be under several of these leases
 
-    bool is_open() const { return !cancelled && !paused && !finished; }
+    bool is_open() const { return !cancelled && !paused && !finished && !held; }
     bool has_suspect() const {
       return points.has(Standing::kSuspect) || points.has(Standing::kAccused);
     }
@@ -170,6 +171,8 @@ class Scheduler {
   using Effects = std::vector<Effect>;
 
   void on(const StudyAdded& event);
+  void on(const StudyHeld& event);
+  void on(const PointsTaken& event);
   void on(const StudyCancelled& event);
   void on(const StudyPaused& event);
   void on(const StudyReopened& event);

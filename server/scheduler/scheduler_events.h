@@ -82,6 +82,18 @@ struct StudyAdded {
   StudyTerms terms{};
   std::string solver_version{};  ///< of its results; empty while there are none
   PointAttempts attempts{};      ///< of points that failed, also of those that were forgotten
+  bool held = false;             ///< as StudyHeld says
+};
+/// While a study is held nothing of it is handed out, whatever else happens to it.
+struct StudyHeld {
+  StudyId study;
+  bool held;
+};
+/// It is durable that these points, which are of that solver version, have rows from elsewhere.
+struct PointsTaken {
+  StudyId study;
+  IntervalSet points;
+  std::string solver_version;
 };
 /// The study's cancellation is durable.
 struct StudyCancelled {
@@ -177,10 +189,10 @@ struct DispatchHeld {
 struct Tick {};
 
 using Event =
-    std::variant<StudyAdded, StudyCancelled, StudyPaused, StudyReopened, StudyTermsChanged,
-                 FailuresForgotten, StudyGrown, StudyRemoved, WorkerJoined, CreditGiven,
-                 ResultsReceived, ResultsStored, HeartbeatReceived, BatchesReturned, WorkerLeft,
-                 WorkerUnreachable, WorkerBusy, DispatchHeld, Tick>;
+    std::variant<StudyAdded, StudyHeld, PointsTaken, StudyCancelled, StudyPaused, StudyReopened,
+                 StudyTermsChanged, FailuresForgotten, StudyGrown, StudyRemoved, WorkerJoined,
+                 CreditGiven, ResultsReceived, ResultsStored, HeartbeatReceived, BatchesReturned,
+                 WorkerLeft, WorkerUnreachable, WorkerBusy, DispatchHeld, Tick>;
 
 // ---- Effects ----------------------------------------------------------------------------------
 

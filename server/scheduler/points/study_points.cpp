@@ -143,6 +143,52 @@ void StudyPoints::grow(StudyTable table) {
   table_ = std::move(table);
 }
 
+std::uint64_t StudyPoints::settle_unsolved(const IntervalSet& points) {
+  std::uint64_t settled = 0;
+  const auto settle_all = [&](const std::vector<Interval>& intervals) {
+    for (const Interval& interval : intervals) {
+      settled_.insert(interval.begin, interval.end);
+      settled += interval.end - interval.begin;
+    }
+  };
+  points.for_each([&](const Interval& range) {
+    for (IntervalSet* place : {&fresh_, &leased_}) {
+      settle_all(place->within(range.begin, range.end));
+      place->erase(range.begin, range.end);
+    }
+    for (Returned& intervals : returned_) {
+      settle_all(extract_from(intervals, range));
+    }
+  });
+  return settled;
+}
+
+/// The parts of the intervals that lie in the range, which they lose.
+std::vector<Interval> StudyPoints::extract_from(Returned& intervals, const Interval& range) {
+  std::vector<Interval> parts;
+  auto interval = intervals.upper_bound(range.begin);
+  if (interval != intervals.begin()) {
+    --interval;
+  }
+  while (interval != intervals.end() && interval->first < range.end) {
+    const std::uint64_t first = interval->first;
+    const History history = interval->second;
+    if (history.end <= range.begin) {
+      ++interval;
+      continue;
+    }
+    interval = intervals.erase(interval);
+    parts.push_back({std::max(first, range.begin), std::min(history.end, range.end)});
+    if (first < range.begin) {
+      intervals.emplace(first, history).first->second.end = range.begin;
+    }
+    if (range.end < history.end) {
+      intervals.emplace(range.end, history);
+    }
+  }
+  return parts;
+}
+
 std::uint64_t StudyPoints::reopen(const IntervalSet& points) {
   std::uint64_t reopened = 0;
   points.for_each([&](const Interval& asked) {

@@ -79,6 +79,10 @@ class StudyPoints {
   /// fresh.
   void grow(StudyTable table);
 
+  /// Those of these points that are not settled, nor on their way, have a row from elsewhere and
+  /// are settled. Returns how many they were.
+  std::uint64_t settle_unsolved(const IntervalSet& points);
+
   /// The settled ones among these points become fresh. Returns how many they were.
   std::uint64_t reopen(const IntervalSet& points);
 
@@ -123,6 +127,7 @@ class StudyPoints {
   }
   std::optional<Interval> next_fresh(std::optional<std::uint64_t> follows) const;
   static bool erase_from(Returned& intervals, std::uint64_t point);
+  static std::vector<Interval> extract_from(Returned& intervals, const Interval& range);
 
   StudyTable table_;
   LossLimits limits_;
