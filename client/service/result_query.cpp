@@ -6,7 +6,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "server/asking/columns.h"
-#include "server/asking/sql_expression.h"
+#include "server/asking/sql/sql_expression.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/parameters.h"
 

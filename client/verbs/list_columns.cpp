@@ -1,29 +1,76 @@
+#include <algorithm>
 #include <iostream>
 #include <memory>
 #include <string>
+#include <string_view>
+#include <vector>
+
+#include <spdlog/fmt/fmt.h>
 
 #include "client/output/printer.h"
 #include "client/verbs/printed_rows.h"
 #include "client/verbs/verbs.h"
+#include "proto/suggestion.h"
 #include "server/asking/columns.h"
+#include "worker/solver/model/errors.h"
 
 namespace oblique::client {
 namespace {
 
 constexpr const char* kListColumnsExamples = R"(Examples:
   oblique columns
+  oblique columns fn_peak_N
+  oblique columns "*peak*"                  names that match: * any text, ? any character
   oblique columns --format csv
 
-Inputs and outputs: columns of `oblique query`, and where `oblique solve --json` has them. Values
-are in SI units; tables show short times in us or ms and slides in mm, and say so in the heading.
-x points from the pin to the released tip, y up; times of a contact count from touch.)";
+Inputs and outputs: columns of `oblique query`, and where `oblique solve --json` has them; then
+elements of lists, counted from 0, and functions, which `oblique query` takes too. Values are in SI
+units; tables show short times in us or ms and slides in mm, and say so in the heading. x points
+from the pin to the released tip, y up; times of a contact count from touch.)";
 
-int list_columns(const std::string& format) {
+/// Whether `name` is what the pattern says: * is any text, ? any character.
+bool matches(std::string_view pattern, std::string_view name) {
+  if (pattern.empty()) {
+    return name.empty();
+  }
+  if (pattern.front() == '*') {
+    return matches(pattern.substr(1), name) || (!name.empty() && matches(pattern, name.substr(1)));
+  }
+  return !name.empty() && (pattern.front() == '?' || pattern.front() == name.front()) &&
+         matches(pattern.substr(1), name.substr(1));
+}
+
+/// Those that the pattern names; all for none. Throws solver::InputError for one that names
+/// nothing.
+std::vector<server::Column> columns_like(const std::string& pattern) {
+  auto columns = server::columns_and_functions();
+  if (pattern.empty()) {
+    return columns;
+  }
+  std::vector<std::string_view> names;
+  for (const auto& column : columns) {
+    names.push_back(column.name);
+  }
+  const auto nearest = protocol::did_you_mean(pattern, names);
+  std::vector<server::Column> found;
+  std::copy_if(columns.begin(), columns.end(), std::back_inserter(found),
+               [&](const server::Column& column) {
+                 // A function goes by its name alone too.
+                 return matches(pattern, column.name) || column.name.starts_with(pattern + "(");
+               });
+  if (found.empty()) {
+    throw solver::InputError(
+        fmt::format("there is no column {}{}; `oblique columns` lists all", pattern, nearest));
+  }
+  return found;
+}
+
+int list_columns(const std::string& pattern, const std::string& format) {
   protocol::QueryReply table;
   for (const char* heading : {"column", "unit", "kind", "solve --json", "meaning"}) {
     table.add_columns(heading);
   }
-  for (const auto& column : server::all_columns()) {
+  for (const auto& column : columns_like(pattern)) {
     auto& row = *table.add_rows();
     add_value(row, column.name);
     add_value(row, column.unit);
@@ -39,10 +86,15 @@ int list_columns(const std::string& format) {
 
 void add_columns(CLI::App& app, Command& command) {
   auto format = std::make_shared<std::string>("table");
+  auto pattern = std::make_shared<std::string>();
   auto* verb = app.add_subcommand("columns", "Name, unit and meaning of every input and output");
   verb->footer(kListColumnsExamples);
+  verb->add_option("NAME", *pattern, "a column, or a pattern of * and ?; all when left out")
+      ->type_name("");
   add_format_flag(*verb, *format);
-  verb->callback([format, &command] { command = [format] { return list_columns(*format); }; });
+  verb->callback([format, pattern, &command] {
+    command = [format, pattern] { return list_columns(*pattern, *format); };
+  });
 }
 
 }  // namespace oblique::client

@@ -15,7 +15,7 @@
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
 #include "proto/suggestion.h"
-#include "server/asking/sql_expression.h"
+#include "server/asking/sql/sql_expression.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::client {

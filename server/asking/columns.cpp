@@ -6,6 +6,8 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "server/asking/elements.h"
+#include "server/asking/sql/sql_functions.h"
 #include "worker/solver/model/parameters.h"
 #include "worker/solver/model/result_fields.h"
 
@@ -111,15 +113,44 @@ std::vector<Column> all_columns() {
   return columns;
 }
 
-std::string rows_of_queries() {
-  std::string lists;
+std::vector<Column> columns_and_functions() {
+  auto columns = all_columns();
+  for (const WrittenForm& element : element_forms()) {
+    columns.push_back({element.form, element.unit, "element", "", element.meaning});
+  }
+  for (const DescribedFunction& function : described_functions()) {
+    columns.push_back(
+        {std::string(function.form), "", "function", "", std::string(function.meaning)});
+  }
+  return columns;
+}
+
+std::vector<ListColumn> lists_of_queries() {
+  std::vector<ListColumn> lists;
   for (const auto& field : solver::result_fields()) {
     const auto* part = std::get_if<solver::ListPart>(&field.value);
     if (part != nullptr && field.column != part->list->column) {
-      lists += fmt::format(", {} AS {}", list_sql(*part), field.column);
+      lists.push_back({std::string(field.column), list_sql(*part)});
     }
   }
+  return lists;
+}
+
+std::string rows_of_queries() {
+  std::string lists;
+  for (const ListColumn& list : lists_of_queries()) {
+    lists += fmt::format(", {} AS {}", list.sql, list.name);
+  }
   return fmt::format("(SELECT *{} FROM runs)", lists);
+}
+
+std::string unit_of_column(std::string_view name) {
+  for (const Column& column : all_columns()) {
+    if (column.name == name) {
+      return column.unit.find(',') == std::string::npos ? column.unit : "";
+    }
+  }
+  return {};
 }
 
 }  // namespace oblique::server

@@ -1,8 +1,6 @@
 #include "server/asking/plan.h"
 
 #include <algorithm>
-#include <array>
-#include <cstdint>
 #include <string_view>
 #include <utility>
 
@@ -10,142 +8,168 @@
 
 #include "proto/suggestion.h"
 #include "server/asking/columns.h"
+#include "server/asking/elements.h"
+#include "server/asking/grouping.h"
 #include "server/asking/question.h"
-#include "server/asking/sql_expression.h"
-#include "server/asking/sql_tokens.h"
+#include "server/asking/sql/sql_expression.h"
+#include "server/asking/sql/sql_items.h"
+#include "server/asking/statement.h"
+#include "server/asking/units.h"
 #include "server/database/sqlite.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::server {
 namespace {
 
-constexpr std::string_view kPoint = "point";
-
-std::vector<std::string> column_names(sqlite3_stmt* statement) {
-  std::vector<std::string> names;
-  for (int i = 0; i < sqlite3_column_count(statement); ++i) {
-    const char* name = sqlite3_column_name(statement, i);
-    names.emplace_back(name == nullptr ? "" : name);
-  }
-  return names;
-}
-
-using PreparedQuestion = std::unique_ptr<sqlite3_stmt, int (*)(sqlite3_stmt*)>;
-
-/// Throws solver::InputError with what SQLite says against it.
-PreparedQuestion prepared(sqlite3* database, const std::string& sql) {
-  sqlite3_stmt* raw = nullptr;
-  const int code =
-      sqlite3_prepare_v2(database, sql.data(), static_cast<int>(sql.size()), &raw, nullptr);
-  PreparedQuestion statement(raw, &sqlite3_finalize);
-  if (code != SQLITE_OK) {
-    throw solver::InputError(fmt::format("the question is wrong: {}", sqlite3_errmsg(database)));
-  }
-  return statement;
-}
-
-/// The columns that questions may name.
-std::vector<std::string> columns_of(sqlite3* database) {
-  const auto statement =
-      prepared(database, fmt::format("SELECT * FROM {} LIMIT 0", rows_of_queries()));
-  return column_names(statement.get());
-}
-
-/// The error of a wrong column, with the columns there are.
-std::string with_columns(const std::string& message, const std::vector<std::string>& columns) {
+/// What there is to say of a column that is not there.
+std::string with_columns(sqlite3* database, const std::string& message,
+                         const std::vector<std::string>& columns) {
   constexpr std::string_view kNoColumn = "no such column: ";
   const auto at = message.find(kNoColumn);
   if (at == std::string::npos) {
     return message;
   }
   const auto wrong = message.substr(at + kNoColumn.size());
+  Statement schema(database, "PRAGMA user_version");
+  const std::int64_t version = schema.step() ? schema.integer(0) : kSchemaVersion;
+  const auto all = all_columns();
+  const bool is_newer = std::any_of(all.begin(), all.end(),
+                                    [&](const Column& column) { return column.name == wrong; });
+  if (is_newer && version < kSchemaVersion) {
+    return fmt::format(
+        "{} in this database, which an earlier version wrote (its schema is {}, ours {}): the "
+        "start "
+        "of a server on it brings it up to date, as does one on a copy that `oblique backup` makes",
+        message, version, kSchemaVersion);
+  }
   const std::vector<std::string_view> known(columns.begin(), columns.end());
   return fmt::format("{}{}; the columns are {}", message, protocol::did_you_mean(wrong, known),
                      protocol::joined(known));
 }
 
-std::int64_t number_of_study(sqlite3* database, const std::string& name) {
-  Statement study(database, "SELECT study_id FROM studies WHERE name = ?1");
-  study.bind(1, name);
-  if (!study.step()) {
-    throw solver::InputError(fmt::format("there is no study called \"{}\"", name));
+/// Names and units. `text` is what was selected, as it was written.
+std::vector<PlannedColumn> planned_columns(std::vector<std::string> names,
+                                           const std::string& text) {
+  const auto tokens = sql_tokens(text);
+  const auto items = sql_items(tokens);
+  std::vector<PlannedColumn> columns;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const std::string unit =
+        items.size() == names.size() ? unit_of(items[i]) : unit_of_column(names[i]);
+    columns.push_back({std::move(names[i]), unit});
   }
-  return study.integer(0);
+  return columns;
 }
 
-/// Whether each row that is selected is that of one point: nothing is gathered, and no row is left
-/// out for being like another.
-bool gives_points(const std::string& selected) {
-  constexpr std::array<std::string_view, 9> kGatherers{
-      "distinct", "over", "select", "count", "sum", "total", "avg", "group_concat", "filter"};
-  const auto tokens = sql_tokens(selected);
-  for (std::size_t i = 0; i < tokens.size(); ++i) {
-    const bool gathers =
-        std::any_of(kGatherers.begin(), kGatherers.end(),
-                    [&](std::string_view word) { return same_but_case(tokens[i].text, word); });
-    const bool calls = i + 1 < tokens.size() && tokens[i + 1].is_sign('(');
-    // Functions that nobody here knows may gather.
-    if (gathers || (tokens[i].is_name() && calls)) {
-      return false;
-    }
-  }
-  return true;
-}
-
-bool is_natural(const std::string& order) {
-  const auto tokens = sql_tokens(order);
-  return tokens.empty() || (tokens.size() == 1 && tokens.front().text == kPoint);
-}
-
-/// The clauses behind the rows of the study.
-std::string clauses(const protocol::StudyQuery& question) {
+std::string shown(const std::vector<PointSpan>& spans) {
+  constexpr std::size_t kShown = 4;
   std::string text;
-  if (!question.where().empty()) {
-    text += fmt::format(" WHERE ({})", question.where());
+  for (std::size_t i = 0; i < std::min(kShown, spans.size()); ++i) {
+    text += fmt::format("{}{}", i == 0 ? "" : ", ", spans[i].first);
+    text += spans[i].last > spans[i].first ? fmt::format("-{}", spans[i].last) : "";
   }
+  return text + (spans.size() > kShown ? fmt::format(", ... {}", spans.back().last) : "");
+}
+
+std::string how_rows_are_found(const AskedStudy& study, const RowsAsked& rows) {
+  if (!rows.by_spans) {
+    return fmt::format("points     all {}: the condition says nothing of the recipe\n",
+                       study.points);
+  }
+  if (rows.spans.empty()) {
+    return fmt::format("points     none of {} can meet the condition\n", study.points);
+  }
+  const std::uint64_t points = points_in(rows.spans);
+  return fmt::format("points     {} of {} by the recipe, in {} range{}: {}\n", points, study.points,
+                     rows.spans.size(), rows.spans.size() == 1 ? "" : "s", shown(rows.spans));
+}
+
+std::string how_rows_are_ordered(const protocol::StudyQuery& question, const RowsAsked& rows) {
   if (!question.group().empty()) {
-    text += fmt::format(" GROUP BY {}", question.group());
+    return fmt::format("groups     by {}\n", question.group());
   }
-  if (!question.order().empty()) {
-    text += fmt::format(" ORDER BY {}", question.order());
-  } else {
-    text += fmt::format(" ORDER BY {}", question.group().empty() ? kPoint : question.group());
+  if (is_in_point_order(question)) {
+    return fmt::format("order      that of points, as {} are read\n",
+                       rows.spans.size() > 1 ? "the ranges" : "rows");
   }
-  if (question.has_limit()) {
-    text += fmt::format(" LIMIT {}", std::min<std::uint64_t>(question.limit(), INT64_MAX));
+  return fmt::format("order      {}\n", question.order());
+}
+
+/// SQLite's own plan, a line a step.
+std::string plan_of_sqlite(sqlite3* database, const std::string& statement) {
+  Statement steps(database, "EXPLAIN QUERY PLAN " + statement);
+  std::string text;
+  while (steps.step()) {
+    text += fmt::format("SQLite     {}\n", steps.text(3));
   }
   return text;
+}
+
+/// A statement as people are shown it: long lists of ranges are cut.
+std::string shown_statement(const std::string& statement) {
+  constexpr std::size_t kMost = 60;
+  constexpr std::string_view kBegin = "json_each('{";
+  const auto begin = statement.find(kBegin);
+  const auto end = begin == std::string::npos ? begin : statement.find("}')", begin);
+  if (end == std::string::npos || end - begin <= kMost) {
+    return statement;
+  }
+  const auto cut = statement.find(',', begin + kMost / 2);
+  return statement.substr(0, std::min(cut, end)) + ",..." + statement.substr(end);
+}
+
+std::string explanation_of(sqlite3* database, const protocol::StudyQuery& question,
+                           const AskedStudy& study, const RowsAsked& rows,
+                           const std::string& statement) {
+  const std::uint64_t most = rows.by_spans ? points_in(rows.spans) : study.points;
+  return how_rows_are_found(study, rows) +
+         fmt::format("reads      at most {} rows, by their key (study_id, point)\n", most) +
+         how_rows_are_ordered(question, rows) +
+         fmt::format("statement  {}\n", shown_statement(statement)) +
+         plan_of_sqlite(database, statement);
+}
+
+/// A statement that gives the lines of a text.
+std::string statement_of_lines(const std::string& text) {
+  std::string values;
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    values += fmt::format("{}({})", values.empty() ? "" : ", ",
+                          sql_text(text.substr(begin, end - begin)));
+    begin = end + 1;
+  }
+  return fmt::format("SELECT column1 AS plan FROM (VALUES {})", values);
 }
 
 }  // namespace
 
 Plan plan(sqlite3* database, const protocol::StudyQuery& question) {
   check(question);
-  const auto known = columns_of(database);
+  const auto known =
+      columns_of_statement(database, fmt::format("SELECT * FROM {} LIMIT 0", rows_of_queries()));
   check_columns(question, known);
+  const AskedStudy study = asked_study(database, question.study());
+  const RowsAsked rows = rows_asked(question, study);
+  const std::string written = selected_by(question);
   Plan plan;
-  const std::string selected = selected_by(question);
-  plan.goes_on_by_point =
-      question.group().empty() && is_natural(question.order()) && gives_points(selected);
-  const std::int64_t study = number_of_study(database, question.study());
-  const std::string after =
-      question.has_after_point()
-          ? fmt::format(" AND point > {}",
-                        std::min<std::uint64_t>(question.after_point(), INT64_MAX))
-          : "";
-  // The study is chosen inside, where no condition can widen it.
-  plan.statement = fmt::format("SELECT {}{} FROM (SELECT * FROM {} WHERE study_id = {}{}){}",
-                               selected, plan.goes_on_by_point ? ", point" : "", rows_of_queries(),
-                               study, after, clauses(question));
+  plan.goes_on_by_point = is_in_point_order(question) && gives_points(written);
+  std::string selected = columns_with_elements(written);
+  selected += plan.goes_on_by_point ? ", point" : "";
+  plan.statement = statement_of(database, question, selected, study, rows);
   try {
-    for (std::string& name : column_names(prepared(database, plan.statement).get())) {
-      plan.columns.push_back({std::move(name), {}});
+    auto names = columns_of_statement(database, plan.statement);
+    if (plan.goes_on_by_point) {
+      names.pop_back();
     }
+    plan.columns = planned_columns(std::move(names), written);
   } catch (const solver::InputError& error) {
-    throw solver::InputError(with_columns(error.what(), known));
+    throw solver::InputError(with_columns(database, error.what(), known));
   }
-  if (plan.goes_on_by_point) {
-    plan.columns.pop_back();
+  if (question.explain()) {
+    plan.explanation = explanation_of(database, question, study, rows, plan.statement);
+    plan.statement = statement_of_lines(plan.explanation);
+    plan.columns = {{"plan", ""}};
+    plan.goes_on_by_point = false;
   }
   return plan;
 }

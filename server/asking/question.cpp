@@ -2,7 +2,8 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "server/asking/sql_expression.h"
+#include "server/asking/grouping.h"
+#include "server/asking/sql/sql_expression.h"
 
 namespace oblique::server {
 namespace {
@@ -43,6 +44,12 @@ void check_columns(const protocol::StudyQuery& question, const std::vector<std::
   check_case_of_columns(kWhere, question.where(), columns, names_given);
   check_case_of_columns(kGroup, question.group(), columns, names_given);
   check_case_of_columns(kOrder, question.order(), columns, names_given);
+  if (!question.group().empty()) {
+    check_gathered(kSelect, selected, question.group(), columns, {});
+    if (!question.order().empty()) {
+      check_gathered(kOrder, question.order(), question.group(), columns, names_given);
+    }
+  }
 }
 
 }  // namespace oblique::server

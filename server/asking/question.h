@@ -18,8 +18,8 @@ std::string selected_by(const protocol::StudyQuery& question);
 /// check_sql_part.
 void check(const protocol::StudyQuery& question);
 
-/// Throws solver::InputError for names that differ from one of `columns` only in case. The question
-/// was checked.
+/// Throws solver::InputError for names that differ from one of `columns` only in case, and for
+/// columns that have many values in a group. The question was checked.
 void check_columns(const protocol::StudyQuery& question, const std::vector<std::string>& columns);
 
 }  // namespace oblique::server

@@ -5,6 +5,7 @@
 #include <string_view>
 #include <utility>
 
+#include "server/asking/sql/sql_functions.h"
 #include "server/database/sqlite.h"
 
 namespace oblique::server {
@@ -84,6 +85,7 @@ void restrict_to_reading(sqlite3* database) {
   }
   // SQLite makes these tables of functions when they are first named, which would be refused then.
   execute(database, "SELECT 1 FROM json_each('[]'), json_tree('[]')");
+  add_functions(database);
   sqlite3_set_authorizer(database, &authorize, nullptr);
 }
 

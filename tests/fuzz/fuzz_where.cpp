@@ -6,7 +6,7 @@
 
 #include <unistd.h>
 
-#include "server/asking/sql_expression.h"
+#include "server/asking/sql/sql_expression.h"
 #include "server/reading/reader.h"
 #include "server/store/store.h"
 #include "worker/solver/model/errors.h"

@@ -1,4 +1,4 @@
-#include "server/asking/sql_expression.h"
+#include "server/asking/sql/sql_expression.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

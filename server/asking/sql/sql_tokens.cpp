@@ -1,4 +1,4 @@
-#include "server/asking/sql_tokens.h"
+#include "server/asking/sql/sql_tokens.h"
 
 #include <algorithm>
 #include <cstddef>

@@ -1,4 +1,4 @@
-#include "server/asking/sql_expression.h"
+#include "server/asking/sql/sql_expression.h"
 
 #include <algorithm>
 #include <array>
@@ -6,15 +6,12 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "server/asking/sql_tokens.h"
+#include "server/asking/sql/sql_items.h"
+#include "server/asking/sql/sql_tokens.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::server {
 namespace {
-
-bool is_word(const SqlToken& token, std::string_view word) {
-  return token.kind == SqlToken::Kind::kName && same_but_case(token.text, word);
-}
 
 /// A word with which another clause or statement begins.
 bool begins_clause(const std::vector<SqlToken>& tokens, std::size_t i) {
@@ -82,23 +79,6 @@ std::string what_is_allowed(SqlPart part) {
 std::string not_allowed(std::string_view flag, std::string_view text, const std::string& why) {
   // An error ends at a zero byte, so what it quotes must end before.
   return fmt::format("{} \"{}\" is not allowed: {}", flag, text.substr(0, text.find('\0')), why);
-}
-
-/// The name that a token writes, without its quotes.
-std::string name_of(const SqlToken& token) {
-  if (token.kind == SqlToken::Kind::kName) {
-    return std::string(token.text);
-  }
-  const char quote = token.text.back();
-  std::string name;
-  const std::string_view inside = token.text.substr(1, token.text.size() - 2);
-  for (std::size_t i = 0; i < inside.size(); ++i) {
-    name += inside[i];
-    if (inside[i] == quote && quote != ']') {
-      ++i;  // a doubled quote stands for itself
-    }
-  }
-  return name;
 }
 
 bool contains(const std::vector<std::string>& names, std::string_view name) {

@@ -1,0 +1,111 @@
+#include "server/asking/grouping.h"
+
+#include <algorithm>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "server/asking/elements.h"
+#include "server/asking/sql/sql_items.h"
+#include "worker/solver/model/errors.h"
+
+namespace oblique::server {
+namespace {
+
+using GroupTokens = std::span<const SqlToken>;
+
+bool is_same(GroupTokens a, GroupTokens b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](const SqlToken& x, const SqlToken& y) { return x.text == y.text; });
+}
+
+bool calls(GroupTokens tokens, std::size_t i) {
+  return i + 1 < tokens.size() && tokens[i].kind == SqlToken::Kind::kName &&
+         tokens[i + 1].is_sign('(');
+}
+
+bool gathers(GroupTokens tokens, std::size_t i) {
+  const std::size_t close = closing_bracket(tokens, i + 1);
+  return is_aggregate(tokens[i].text, arguments_in(tokens, i + 1, close));
+}
+
+/// The first column in `tokens` that is neither gathered nor one of `group`; empty: none.
+std::string loose_column(GroupTokens tokens, const std::vector<SqlItem>& group,
+                         const std::vector<std::string>& columns) {
+  const auto is_grouped = [&](GroupTokens part) {
+    return std::any_of(group.begin(), group.end(),
+                       [&](const SqlItem& item) { return is_same(item.tokens, part); });
+  };
+  if (is_grouped(tokens)) {
+    return {};
+  }
+  for (std::size_t i = 0; i < tokens.size(); ++i) {
+    const auto element = element_at(tokens.subspan(i));
+    if (calls(tokens, i) && gathers(tokens, i)) {
+      i = closing_bracket(tokens, i + 1);
+      // FILTER (WHERE ...) chooses among the rows of the group.
+      if (i + 2 < tokens.size() && is_word(tokens[i + 1], "filter")) {
+        i = closing_bracket(tokens, i + 2);
+      }
+      continue;
+    }
+    if (tokens[i].is_sign('(') && i + 1 < tokens.size() && is_word(tokens[i + 1], "select")) {
+      i = closing_bracket(tokens, i);
+      continue;
+    }
+    const std::size_t length = std::max<std::size_t>(element.tokens, 1);
+    const bool is_column = element.tokens > 0 || (tokens[i].is_name() && !calls(tokens, i) &&
+                                                  std::find(columns.begin(), columns.end(),
+                                                            name_of(tokens[i])) != columns.end());
+    if (is_column && !is_grouped(tokens.subspan(i, length))) {
+      const auto& last = tokens[i + length - 1].text;
+      return {tokens[i].text.data(), last.data() + last.size()};
+    }
+    i += length - 1;
+  }
+  return {};
+}
+
+}  // namespace
+
+void check_gathered(std::string_view flag, std::string_view text, std::string_view group,
+                    const std::vector<std::string>& columns,
+                    const std::vector<std::string>& names_given) {
+  const auto tokens = sql_tokens(text);
+  const auto group_tokens = sql_tokens(group);
+  const auto groups = sql_items(group_tokens);
+  std::vector<std::string> known = columns;
+  std::erase_if(known, [&](const std::string& column) {
+    return std::find(names_given.begin(), names_given.end(), column) != names_given.end();
+  });
+  for (const SqlItem& item : sql_items(tokens)) {
+    // A name that is given may be what is grouped by.
+    const bool is_named_group =
+        !item.name.empty() && std::any_of(groups.begin(), groups.end(), [&](const SqlItem& named) {
+          return named.text == item.name;
+        });
+    const bool is_all = item.text.starts_with("*");
+    const std::string column = is_named_group ? ""
+                               : is_all       ? "*"
+                                              : loose_column(item.tokens, groups, known);
+    if (!column.empty()) {
+      throw solver::InputError(fmt::format(
+          "{} \"{}\" is not allowed with --group {}: {} has many values in a group; gather it, as "
+          "with avg(), min(), max(), median() or count(), or group by it too",
+          flag, text, group, column));
+    }
+  }
+}
+
+bool gives_points(std::string_view selected) {
+  const auto tokens = sql_tokens(selected);
+  const GroupTokens all(tokens);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (is_word(all[i], "distinct") || is_word(all[i], "over") || is_word(all[i], "select") ||
+        (calls(all, i) && gathers(all, i))) {
+      return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace oblique::server

@@ -1,0 +1,260 @@
+#include "server/asking/point_spans.h"
+
+#include <algorithm>
+#include <span>
+#include <string>
+
+#include "proto/recipe/axes.h"
+
+namespace oblique::server {
+namespace {
+
+using Spans = std::vector<PointSpan>;
+
+/// Reading so many rows in between costs less than looking for the next one.
+constexpr std::uint64_t kReadOver = 2;
+/// Values of axes side by side are looked at one by one, up to so many.
+constexpr std::uint64_t kMostLookedAt = 2'000'000;
+
+/// Joins what overlaps, and what at most `between` numbers are between. `spans` must rise.
+Spans joined(const Spans& spans, std::uint64_t between) {
+  Spans whole;
+  for (const PointSpan& span : spans) {
+    if (!whole.empty() && span.first <= whole.back().last + 1 + between) {
+      whole.back().last = std::max(whole.back().last, span.last);
+    } else {
+      whole.push_back(span);
+    }
+  }
+  return whole;
+}
+
+Spans in_order(Spans spans, std::uint64_t between) {
+  std::sort(spans.begin(), spans.end(),
+            [](const PointSpan& a, const PointSpan& b) { return a.first < b.first; });
+  return joined(spans, between);
+}
+
+/// Joins neighbours until at most `most` are left, the nearest to each other first.
+Spans coarsened(Spans spans, std::size_t most) {
+  if (spans.size() <= most) {
+    return spans;
+  }
+  std::vector<std::uint64_t> gaps;
+  for (std::size_t i = 1; i < spans.size(); ++i) {
+    gaps.push_back(spans[i].first - spans[i - 1].last - 1);
+  }
+  const auto kept = gaps.end() - static_cast<std::ptrdiff_t>(most) + 1;
+  std::nth_element(gaps.begin(), kept - 1, gaps.end());
+  return joined(spans, *(kept - 1));
+}
+
+/// The first number below `size` for which `is_behind` is true, which stays true from there on.
+template <class IsBehind>
+std::uint64_t first_behind(std::uint64_t size, const IsBehind& is_behind) {
+  std::uint64_t low = 0;
+  std::uint64_t high = size;
+  while (low < high) {
+    const std::uint64_t middle = low + (high - low) / 2;
+    if (is_behind(middle)) {
+      high = middle;
+    } else {
+      low = middle + 1;
+    }
+  }
+  return low;
+}
+
+/// Numbers of the values of an axis that rise, in any of `values`.
+Spans numbers_in_range(const protocol::Axis& axis, const ValueSet& values) {
+  Spans numbers;
+  for (const ValueRange& interval : values.intervals()) {
+    const std::uint64_t begin = first_behind(axis.count(), [&](std::uint64_t i) {
+      const double value = protocol::axis_value(axis, i);
+      return interval.low_is_open ? value > interval.low : value >= interval.low;
+    });
+    const std::uint64_t end = first_behind(axis.count(), [&](std::uint64_t i) {
+      const double value = protocol::axis_value(axis, i);
+      return interval.high_is_open ? value >= interval.high : value > interval.high;
+    });
+    if (begin < end) {
+      numbers.push_back({begin, end - 1});
+    }
+  }
+  return in_order(std::move(numbers), 0);
+}
+
+Spans numbers_in(const protocol::Axis& axis, const ValueSet& values) {
+  if (axis.count() > 0) {
+    return numbers_in_range(axis, values);
+  }
+  Spans numbers;
+  for (int i = 0; i < axis.values_size(); ++i) {
+    if (values.contains(axis.values(i))) {
+      numbers.push_back({static_cast<std::uint64_t>(i), static_cast<std::uint64_t>(i)});
+    }
+  }
+  return joined(numbers, 0);
+}
+
+bool has_values(const protocol::Axis& axis) {
+  return axis.expression().empty() && !axis.has_distribution();
+}
+
+std::uint64_t size_of(const protocol::Axis& axis) {
+  return has_values(axis) ? protocol::axis_size(axis) : 1;
+}
+
+std::uint64_t size_of(const protocol::Block& block) {
+  if (block.has_sample()) {
+    return block.sample().count();
+  }
+  std::uint64_t size = 1;
+  for (const protocol::Axis& axis : block.axes()) {
+    size = block.zip() ? std::max(size, size_of(axis)) : size * size_of(axis);
+  }
+  return size;
+}
+
+/// What `box` wants of an axis; nullptr: nothing that the axis alone decides.
+const ValueSet* wanted(const protocol::Block& block, const protocol::Axis& axis, const Box& box) {
+  const auto found = box.find(axis.key() == "E" ? "E_Pa" : axis.key());
+  // The column `length` is that of every link, and single lengths are axes too.
+  const bool is_of_many = axis.key() == "length" &&
+                          std::any_of(block.axes().begin(), block.axes().end(), [](const auto& a) {
+                            return a.key() != "length" && a.key().starts_with("length");
+                          });
+  return found == box.end() || is_of_many || !has_values(axis) ? nullptr : &found->second;
+}
+
+/// Points of a product of axes, numbered from 0. Built from the fastest axis outwards.
+Spans in_product(const protocol::Block& block, const Box& box) {
+  Spans spans{{0, 0}};
+  std::uint64_t stride = 1;
+  for (int a = block.axes_size(); a-- > 0;) {
+    const protocol::Axis& axis = block.axes(a);
+    const std::uint64_t size = size_of(axis);
+    const ValueSet* const values = wanted(block, axis, box);
+    const Spans numbers = values == nullptr ? Spans{{0, size - 1}} : numbers_in(axis, *values);
+    if (numbers.empty()) {
+      return {};
+    }
+    const std::uint64_t count = points_in(numbers);
+    const bool is_whole = spans.size() == 1 && spans[0] == PointSpan{0, stride - 1};
+    // Where there would be too many, each value of this axis is one span, or each run of values.
+    if (!is_whole && count > kMostSpans / spans.size()) {
+      spans = {{spans.front().first, spans.back().last}};
+    }
+    Spans wider;
+    for (const PointSpan& run : numbers) {
+      if (is_whole || (spans.size() == 1 && count > kMostSpans)) {
+        wider.push_back({run.first * stride + spans[0].first, run.last * stride + spans[0].last});
+        continue;
+      }
+      for (std::uint64_t i = run.first; i <= run.last; ++i) {
+        for (const PointSpan& span : spans) {
+          wider.push_back({i * stride + span.first, i * stride + span.last});
+        }
+      }
+    }
+    spans = joined(wider, kReadOver);
+    stride *= size;
+  }
+  return spans;
+}
+
+/// Points of axes side by side; those with one value have it in every point.
+Spans in_zip(const protocol::Block& block, const Box& box) {
+  const std::uint64_t size = size_of(block);
+  if (size > kMostLookedAt) {
+    return {{0, size - 1}};
+  }
+  std::vector<bool> is_in(size, true);
+  for (const protocol::Axis& axis : block.axes()) {
+    const ValueSet* const values = wanted(block, axis, box);
+    if (values == nullptr) {
+      continue;
+    }
+    const std::uint64_t own = size_of(axis);
+    for (std::uint64_t i = 0; i < size; ++i) {
+      is_in[i] = is_in[i] && values->contains(protocol::axis_value(axis, own == 1 ? 0 : i));
+    }
+  }
+  Spans spans;
+  for (std::uint64_t i = 0; i < size; ++i) {
+    if (is_in[i]) {
+      spans.push_back({i, i});
+    }
+  }
+  return joined(spans, kReadOver);
+}
+
+Spans in_block(const protocol::Block& block, const Box& box) {
+  const std::uint64_t size = size_of(block);
+  if (size == 0) {
+    return {};
+  }
+  if (block.has_sample()) {
+    return {{0, size - 1}};
+  }
+  return block.zip() ? in_zip(block, box) : in_product(block, box);
+}
+
+/// What of `spans` has a number that the box wants.
+Spans with_wanted_numbers(const Spans& spans, const Box& box) {
+  const auto wanted_points = box.find("point");
+  if (wanted_points == box.end()) {
+    return spans;
+  }
+  Spans left;
+  for (const ValueRange& interval : wanted_points->second.intervals()) {
+    for (const PointSpan& span : spans) {
+      if (static_cast<double>(span.last) >= interval.low &&
+          static_cast<double>(span.first) <= interval.high) {
+        const double first = std::max(static_cast<double>(span.first), interval.low);
+        const double last = std::min(static_cast<double>(span.last), interval.high);
+        if (first <= last) {
+          left.push_back({static_cast<std::uint64_t>(first), static_cast<std::uint64_t>(last)});
+        }
+      }
+    }
+  }
+  return left;
+}
+
+}  // namespace
+
+std::vector<PointSpan> spans_of(const protocol::Recipe& recipe, const Boxes& boxes) {
+  Spans all;
+  for (const Box& box : boxes) {
+    std::uint64_t first = 0;
+    Spans of_box;
+    for (const protocol::Block& block : recipe.blocks()) {
+      for (const PointSpan& span : in_block(block, box)) {
+        of_box.push_back({first + span.first, first + span.last});
+      }
+      first += size_of(block);
+    }
+    const Spans kept = with_wanted_numbers(coarsened(joined(of_box, 0), kMostSpans), box);
+    all.insert(all.end(), kept.begin(), kept.end());
+  }
+  return coarsened(in_order(std::move(all), kReadOver), kMostSpans);
+}
+
+std::uint64_t points_of(const protocol::Recipe& recipe) {
+  std::uint64_t points = 0;
+  for (const protocol::Block& block : recipe.blocks()) {
+    points += size_of(block);
+  }
+  return points;
+}
+
+std::uint64_t points_in(const std::vector<PointSpan>& spans) {
+  std::uint64_t points = 0;
+  for (const PointSpan& span : spans) {
+    points += span.last - span.first + 1;
+  }
+  return points;
+}
+
+}  // namespace oblique::server

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "proto/oblique.pb.h"
+#include "server/asking/conditions.h"
+
+namespace oblique::server {
+
+/// Points that follow each other, both ends in.
+struct PointSpan {
+  std::uint64_t first;
+  std::uint64_t last;
+
+  bool operator==(const PointSpan&) const = default;
+};
+
+/// Most spans that a study is cut into: beyond it neighbours are joined over what is between them.
+inline constexpr std::size_t kMostSpans = 20'000;
+
+/// Spans of points, rising and apart, outside which no point of `recipe` lies in any of `boxes`:
+/// the values of axes stand in the recipe, so that no row is read for it. Samples, expressions and
+/// models of more than one length restrict nothing. Work by the number of listed values, of spans,
+/// and the logarithm of what ranges have. Throws nothing for a recipe that was judged.
+std::vector<PointSpan> spans_of(const protocol::Recipe& recipe, const Boxes& boxes);
+
+/// Number of points of a recipe, filters left aside.
+std::uint64_t points_of(const protocol::Recipe& recipe);
+
+/// Points in all of them.
+std::uint64_t points_in(const std::vector<PointSpan>& spans);
+
+}  // namespace oblique::server

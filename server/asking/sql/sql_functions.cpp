@@ -1,0 +1,170 @@
+#include "server/asking/sql/sql_functions.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <string>
+
+#include "server/database/sqlite.h"
+
+namespace oblique::server {
+namespace {
+
+constexpr double kHalf = 50.0;
+constexpr double kWhole = 100.0;
+
+/// The numbers of a group. SQLite gives it zeroed, and takes it back when the group ends.
+struct Numbers {
+  double* values;
+  std::uint64_t count;
+  std::uint64_t capacity;
+  double percent;
+  bool failed;
+};
+
+/// Mean and sum of squared differences from it, without cancellation (Welford 1962).
+struct Moments {
+  std::uint64_t count;
+  double mean;
+  double squares;
+};
+
+/// Whether the value is a number. NULL counts as none; for others the statement fails.
+bool is_number(sqlite3_context* context, sqlite3_value* value) {
+  switch (sqlite3_value_type(value)) {
+    case SQLITE_INTEGER:
+    case SQLITE_FLOAT:
+      return true;
+    case SQLITE_NULL:
+      return false;
+    default:
+      sqlite3_result_error(context, "median, percentile, variance and stddev take numbers", -1);
+      return false;
+  }
+}
+
+void add_number(sqlite3_context* context, sqlite3_value* value, double percent) {
+  auto* const numbers = static_cast<Numbers*>(sqlite3_aggregate_context(context, sizeof(Numbers)));
+  if (numbers == nullptr) {
+    sqlite3_result_error_nomem(context);
+    return;
+  }
+  if (numbers->failed || !is_number(context, value)) {
+    return;
+  }
+  if (numbers->count > 0 && numbers->percent != percent) {
+    numbers->failed = true;
+    sqlite3_result_error(context, "percentile takes one percentage for all rows of a group", -1);
+    return;
+  }
+  numbers->percent = percent;
+  if (numbers->count == numbers->capacity) {
+    constexpr std::uint64_t kFirst = 64;
+    const std::uint64_t more = std::max(kFirst, 2 * numbers->capacity);
+    auto* const grown =
+        static_cast<double*>(sqlite3_realloc64(numbers->values, more * sizeof(double)));
+    if (grown == nullptr) {
+      numbers->failed = true;
+      sqlite3_result_error_nomem(context);
+      return;
+    }
+    numbers->values = grown;
+    numbers->capacity = more;
+  }
+  numbers->values[numbers->count++] = sqlite3_value_double(value);
+}
+
+void median_step(sqlite3_context* context, int, sqlite3_value** arguments) {
+  add_number(context, arguments[0], kHalf);
+}
+
+void percentile_step(sqlite3_context* context, int, sqlite3_value** arguments) {
+  const int type = sqlite3_value_type(arguments[1]);
+  const double percent = sqlite3_value_double(arguments[1]);
+  if ((type != SQLITE_INTEGER && type != SQLITE_FLOAT) || !(percent >= 0.0 && percent <= kWhole)) {
+    sqlite3_result_error(context, "percentile(x, p) takes a percentage p from 0 to 100", -1);
+    return;
+  }
+  add_number(context, arguments[0], percent);
+}
+
+/// Between the two numbers nearest to the place, in proportion.
+void numbers_final(sqlite3_context* context) {
+  auto* const numbers = static_cast<Numbers*>(sqlite3_aggregate_context(context, 0));
+  if (numbers == nullptr) {
+    return;
+  }
+  if (numbers->count > 0 && !numbers->failed) {
+    double* const begin = numbers->values;
+    double* const end = begin + numbers->count;
+    const double place = numbers->percent / kWhole * static_cast<double>(numbers->count - 1);
+    double* const lower = begin + static_cast<std::ptrdiff_t>(place);
+    std::nth_element(begin, lower, end);
+    const double part = place - std::floor(place);
+    const double upper = part > 0.0 ? *std::min_element(lower + 1, end) : *lower;
+    sqlite3_result_double(context, part > 0.0 ? *lower * (1.0 - part) + upper * part : *lower);
+  }
+  sqlite3_free(numbers->values);
+  numbers->values = nullptr;
+}
+
+void moments_step(sqlite3_context* context, int, sqlite3_value** arguments) {
+  auto* const moments = static_cast<Moments*>(sqlite3_aggregate_context(context, sizeof(Moments)));
+  if (moments == nullptr) {
+    sqlite3_result_error_nomem(context);
+    return;
+  }
+  if (!is_number(context, arguments[0])) {
+    return;
+  }
+  const double value = sqlite3_value_double(arguments[0]);
+  ++moments->count;
+  const double step = value - moments->mean;
+  moments->mean += step / static_cast<double>(moments->count);
+  moments->squares += step * (value - moments->mean);
+}
+
+/// Of a sample: divided by one less than there are; NULL for fewer than two.
+template <bool is_root>
+void moments_final(sqlite3_context* context) {
+  const auto* const moments = static_cast<const Moments*>(sqlite3_aggregate_context(context, 0));
+  if (moments != nullptr && moments->count > 1) {
+    const double variance = moments->squares / static_cast<double>(moments->count - 1);
+    sqlite3_result_double(context, is_root ? std::sqrt(variance) : variance);
+  }
+}
+
+constexpr std::array<DescribedFunction, 8> kFunctions{{
+    {"median(x)", "the middle value; half way between the two middle ones of an even number"},
+    {"percentile(x, p)", "the value that p percent lie below, between neighbours in proportion"},
+    {"stddev(x)", "standard deviation of a sample (n - 1)"},
+    {"variance(x)", "its square"},
+    {"count_mode('SC SR')",
+     "points whose major_mode is that; of others count(*) FILTER (WHERE e = 1)"},
+    {"avg(x), min(x), max(x), sum(x)", "of the points, or of each group of --group"},
+    {"count(*)", "number of points"},
+    {"round(x, n), abs(x)", "of one value"},
+}};
+
+}  // namespace
+
+void add_functions(sqlite3* database) {
+  constexpr int kFlags = SQLITE_UTF8 | SQLITE_DETERMINISTIC | SQLITE_INNOCUOUS;
+  const auto add = [&](const char* name, int arguments, auto step, auto last) {
+    if (sqlite3_create_function_v2(database, name, arguments, kFlags, nullptr, nullptr, step, last,
+                                   nullptr) != SQLITE_OK) {
+      throw StorageError(std::string("no function ") + name + ": " + sqlite3_errmsg(database));
+    }
+  };
+  add("median", 1, &median_step, &numbers_final);
+  add("percentile", 2, &percentile_step, &numbers_final);
+  add("variance", 1, &moments_step, &moments_final<false>);
+  add("stddev", 1, &moments_step, &moments_final<true>);
+}
+
+std::span<const DescribedFunction> described_functions() {
+  return kFunctions;
+}
+
+}  // namespace oblique::server

@@ -1,0 +1,126 @@
+#include "server/asking/sql/sql_items.h"
+
+#include <algorithm>
+#include <array>
+
+namespace oblique::server {
+namespace {
+
+using ItemTokens = std::span<const SqlToken>;
+
+std::string_view text_over(ItemTokens tokens) {
+  if (tokens.empty()) {
+    return {};
+  }
+  const char* const begin = tokens.front().text.data();
+  const std::string_view last = tokens.back().text;
+  return {begin, static_cast<std::size_t>(last.data() + last.size() - begin)};
+}
+
+/// Whether an operand may end with this token, so that a name behind it is given to the operand.
+bool ends_operand(const SqlToken& token) {
+  constexpr std::array<std::string_view, 13> kJoins{"and",  "or",   "not",     "is",   "in",
+                                                    "like", "glob", "between", "case", "when",
+                                                    "then", "else", "collate"};
+  const bool joins = std::any_of(kJoins.begin(), kJoins.end(),
+                                 [&](std::string_view word) { return is_word(token, word); });
+  return !joins && (token.kind == SqlToken::Kind::kLiteral || token.is_name() ||
+                    token.is_sign(')') || token.is_sign('*'));
+}
+
+/// A word that ends an expression and is no name.
+bool is_last_word(const SqlToken& token) {
+  return is_word(token, "end") || is_word(token, "isnull") || is_word(token, "notnull");
+}
+
+SqlItem item_of(ItemTokens tokens) {
+  SqlItem item{tokens, {}, text_over(tokens), {}};
+  const std::size_t count = tokens.size();
+  if (count >= 3 && is_word(tokens[count - 2], "as")) {
+    item.name = name_of(tokens.back());
+    item.tokens = tokens.first(count - 2);
+  } else if (count >= 2 && tokens.back().is_name() && !is_last_word(tokens.back()) &&
+             ends_operand(tokens[count - 2]) && !is_word(tokens[0], "distinct") &&
+             tokens.back().text.front() != '[') {
+    item.name = name_of(tokens.back());
+    item.tokens = tokens.first(count - 1);
+  }
+  item.text = text_over(item.tokens);
+  return item;
+}
+
+}  // namespace
+
+std::vector<SqlItem> sql_items(const std::vector<SqlToken>& tokens) {
+  const ItemTokens all(tokens);
+  std::vector<SqlItem> items;
+  std::size_t begin = 0;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (all[i].is_sign('(')) {
+      i = closing_bracket(all, i);
+    } else if (all[i].is_sign(',')) {
+      items.push_back(item_of(all.subspan(begin, i - begin)));
+      begin = i + 1;
+    }
+  }
+  items.push_back(item_of(all.subspan(std::min(begin, all.size()))));
+  return items;
+}
+
+bool is_word(const SqlToken& token, std::string_view word) {
+  return token.kind == SqlToken::Kind::kName && same_but_case(token.text, word);
+}
+
+std::size_t closing_bracket(std::span<const SqlToken> tokens, std::size_t open) {
+  std::size_t depth = 0;
+  for (std::size_t i = open; i < tokens.size(); ++i) {
+    depth += tokens[i].is_sign('(') ? 1U : 0U;
+    if (tokens[i].is_sign(')') && --depth == 0) {
+      return i;
+    }
+  }
+  return tokens.size();
+}
+
+std::string name_of(const SqlToken& token) {
+  if (token.kind == SqlToken::Kind::kName) {
+    return std::string(token.text);
+  }
+  const char quote = token.text.back();
+  std::string name;
+  const std::string_view inside = token.text.substr(1, token.text.size() - 2);
+  for (std::size_t i = 0; i < inside.size(); ++i) {
+    name += inside[i];
+    if (inside[i] == quote && quote != ']') {
+      ++i;  // a doubled quote stands for itself
+    }
+  }
+  return name;
+}
+
+bool is_aggregate(std::string_view name, std::size_t arguments) {
+  constexpr std::array<std::string_view, 13> kGather{
+      "count",     "sum",        "total",  "avg",      "group_concat", "json_group_array",
+      "median",    "percentile", "stddev", "variance", "count_mode",   "json_group_object",
+      "string_agg"};
+  const auto is_it = [&](std::string_view known) { return same_but_case(known, name); };
+  return std::any_of(kGather.begin(), kGather.end(), is_it) ||
+         (arguments == 1 && (is_it("min") || is_it("max")));
+}
+
+std::size_t arguments_in(std::span<const SqlToken> tokens, std::size_t open, std::size_t close) {
+  if (close <= open + 1) {
+    return 0;
+  }
+  std::size_t arguments = 1;
+  for (std::size_t i = open + 1; i < close; ++i) {
+    if (tokens[i].is_sign('(')) {
+      i = closing_bracket(tokens, i);
+    } else if (tokens[i].is_sign(',')) {
+      ++arguments;
+    }
+  }
+  return arguments;
+}
+
+}  // namespace oblique::server

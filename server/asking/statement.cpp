@@ -1,0 +1,203 @@
+#include "server/asking/statement.h"
+
+#include <algorithm>
+#include <memory>
+#include <string_view>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "server/asking/columns.h"
+#include "server/asking/conditions.h"
+#include "server/asking/elements.h"
+#include "server/asking/sql/sql_expression.h"
+#include "server/asking/sql/sql_items.h"
+#include "server/asking/sql/sql_literals.h"
+#include "server/database/sqlite.h"
+#include "worker/solver/model/errors.h"
+
+namespace oblique::server {
+namespace {
+
+/// Finding the first row of a span costs about so many rows that follow each other.
+constexpr std::uint64_t kRowsASpan = 3;
+
+bool is_order(const protocol::StudyQuery& question, std::string_view direction) {
+  const auto tokens = sql_tokens(question.order());
+  return question.group().empty() && !tokens.empty() && tokens.size() <= 2 &&
+         tokens[0].text == "point" &&
+         (tokens.size() == 2 ? is_word(tokens[1], direction) : direction == "asc");
+}
+
+std::string join_of(const std::vector<PointSpan>& spans) {
+  // A list of JSON is read faster than VALUES is compiled.
+  std::string list;
+  for (const PointSpan& span : spans) {
+    list += fmt::format("{}\"{}\":{}", list.empty() ? "" : ",", span.first, span.last);
+  }
+  return fmt::format("json_each('{{{}}}') AS span CROSS JOIN ", list);
+}
+
+/// Which points of the study, as conditions behind the study's own.
+std::string points_in_sql(const RowsAsked& rows) {
+  if (!rows.by_spans) {
+    return {};
+  }
+  if (rows.spans.empty()) {
+    return " AND 0";
+  }
+  if (rows.spans.size() == 1) {
+    return fmt::format(" AND runs.point BETWEEN {} AND {}", rows.spans[0].first,
+                       rows.spans[0].last);
+  }
+  return " AND runs.point BETWEEN CAST(span.key AS INTEGER) AND span.value";
+}
+
+/// What a question names, of whatever kind.
+struct Named {
+  std::vector<std::string> names;
+  bool all_columns = false;
+
+  bool has(std::string_view name) const {
+    return std::any_of(names.begin(), names.end(),
+                       [&](const std::string& known) { return same_but_case(known, name); });
+  }
+};
+
+Named named_in(const std::vector<std::string>& texts) {
+  Named named;
+  for (const std::string& text : texts) {
+    const auto tokens = sql_tokens(text);
+    for (const SqlItem& item : sql_items(tokens)) {
+      named.all_columns = named.all_columns || item.text.starts_with("*");
+    }
+    for (const SqlToken& token : tokens) {
+      if (token.is_name()) {
+        named.names.push_back(name_of(token));
+      }
+    }
+  }
+  return named;
+}
+
+/// Whether the results alone have every column that is named, and none that the view `runs` has
+/// not: then models and workers need not be looked up for each row.
+bool needs_results_alone(sqlite3* database, const Named& named) {
+  const auto runs = columns_of_statement(database, "SELECT * FROM runs LIMIT 0");
+  const auto results = columns_of_statement(database, "SELECT * FROM results LIMIT 0");
+  const auto names_one_of = [&](const std::vector<std::string>& here,
+                                const std::vector<std::string>& there) {
+    return std::any_of(here.begin(), here.end(), [&](const std::string& name) {
+      return name != "study" && named.has(name) &&
+             std::find(there.begin(), there.end(), name) == there.end();
+    });
+  };
+  return !named.all_columns && !named.has("runs") && !names_one_of(runs, results) &&
+         !names_one_of(results, runs);
+}
+
+/// The columns of the rows that a question selects from.
+std::string columns_of_rows(const protocol::StudyQuery& question, const Named& named,
+                            bool is_alone) {
+  std::string columns =
+      is_alone ? fmt::format("{} AS study, runs.*", sql_text(question.study())) : "runs.*";
+  for (const ListColumn& list : lists_of_queries()) {
+    if (named.all_columns || named.has(list.name)) {
+      columns += fmt::format(", {} AS {}", list.sql, list.name);
+    }
+  }
+  return columns;
+}
+
+}  // namespace
+
+AskedStudy asked_study(sqlite3* database, const std::string& name) {
+  Statement study(database, "SELECT study_id, points, recipe FROM studies WHERE name = ?1");
+  study.bind(1, name);
+  if (!study.step()) {
+    throw solver::InputError(fmt::format("there is no study called \"{}\"", name));
+  }
+  AskedStudy found{study.integer(0), static_cast<std::uint64_t>(study.integer(1)), {}};
+  // Points of a recipe that cannot be read are all looked at.
+  if (!found.recipe.ParseFromString(study.text(2))) {
+    found.recipe.Clear();
+  }
+  return found;
+}
+
+bool is_in_point_order(const protocol::StudyQuery& question) {
+  return question.group().empty() && (question.order().empty() || is_order(question, "asc"));
+}
+
+std::vector<std::string> columns_of_statement(sqlite3* database, const std::string& sql) {
+  sqlite3_stmt* raw = nullptr;
+  const int code =
+      sqlite3_prepare_v2(database, sql.data(), static_cast<int>(sql.size()), &raw, nullptr);
+  const std::unique_ptr<sqlite3_stmt, int (*)(sqlite3_stmt*)> statement(raw, &sqlite3_finalize);
+  if (code != SQLITE_OK) {
+    throw solver::InputError(fmt::format("the question is wrong: {}", sqlite3_errmsg(database)));
+  }
+  std::vector<std::string> names;
+  for (int i = 0; i < sqlite3_column_count(raw); ++i) {
+    const char* name = sqlite3_column_name(raw, i);
+    names.emplace_back(name == nullptr ? "" : name);
+  }
+  return names;
+}
+
+RowsAsked rows_asked(const protocol::StudyQuery& question, const AskedStudy& study) {
+  RowsAsked rows;
+  Boxes boxes = boxes_of(question.where());
+  if (question.has_after_point()) {
+    for (Box& box : boxes) {
+      const ValueSet behind({static_cast<double>(question.after_point()) + 1, 1e18});
+      box.try_emplace("point", ValueSet::all()).first->second.intersect(behind);
+    }
+  }
+  const auto is_free = [](const Box& box) { return box.empty(); };
+  if (std::any_of(boxes.begin(), boxes.end(), is_free) || study.points == 0) {
+    return rows;
+  }
+  if (points_of(study.recipe) != study.points) {
+    return rows;  // not the recipe that numbered these points
+  }
+  auto spans = spans_of(study.recipe, boxes);
+  const std::uint64_t points = points_in(spans);
+  const bool is_few = points + kRowsASpan * spans.size() <= study.points - study.points / 10;
+  if (spans.size() > 1 && (!is_few || (is_order(question, "desc") && points > study.points / 8))) {
+    spans = {{spans.front().first, spans.back().last}};
+  }
+  rows.by_spans = true;
+  rows.spans = std::move(spans);
+  rows.come_in_order = is_in_point_order(question) && rows.spans.size() > 1;
+  return rows;
+}
+
+std::string statement_of(sqlite3* database, const protocol::StudyQuery& question,
+                         const std::string& selected, const AskedStudy& study,
+                         const RowsAsked& rows) {
+  const std::string where =
+      question.where().empty()
+          ? ""
+          : fmt::format(" WHERE ({})",
+                        with_exact_numbers(database, with_elements(question.where())));
+  const std::string group = with_elements(question.group());
+  std::string order = with_elements(question.order());
+  if (order.empty()) {
+    order = group.empty() ? "point" : group;
+  }
+  const Named named = named_in({selected, where, group, order});
+  const bool is_alone = needs_results_alone(database, named);
+  // The study is chosen inside, where no condition can widen it.
+  return fmt::format(
+      "SELECT {} FROM (SELECT {} FROM {}{} AS runs WHERE runs.study_id = {}{}){}{}{}{}", selected,
+      columns_of_rows(question, named, is_alone), rows.spans.size() > 1 ? join_of(rows.spans) : "",
+      is_alone ? "results" : "runs", study.study_id, points_in_sql(rows), where,
+      group.empty() ? "" : fmt::format(" GROUP BY {}", group),
+      // Spans are read one after another, and rows in them by their key.
+      rows.come_in_order ? "" : fmt::format(" ORDER BY {}", order),
+      question.has_limit()
+          ? fmt::format(" LIMIT {}", std::min<std::uint64_t>(question.limit(), INT64_MAX))
+          : "");
+}
+
+}  // namespace oblique::server

@@ -1,0 +1,194 @@
+#include <cmath>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/asking/plan.h"
+#include "server/asking/sql/sql_literals.h"
+#include "server/database/open_for_reading.h"
+#include "server/reading/query_rules.h"
+#include "server/store/store.h"
+#include "tests/support/points.h"
+#include "tests/support/temporary_folder.h"
+#include "worker/solver/model/errors.h"
+
+namespace oblique::server {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+/// Study "a" has ten solved points, e = 1, H = 1, mu from 0 to 1.
+class Answers : public testing::Test {
+ protected:
+  Answers() {
+    Store store(path_);
+    const auto table = table_of(10);
+    AddResults results{1, table, 0, "", "", 1, "now", {}};
+    for (std::uint64_t point = 0; point < 10; ++point) {
+      results.results.push_back(solved_point(point));
+    }
+    store.commit(std::vector<Change>{AddStudy{1, "a", table, "2024-01-01T00:00:00.000Z"}, results});
+    database_ = open_for_reading(path_).database;
+    restrict_to_reading(database_.get());
+  }
+
+  static protocol::StudyQuery question(const std::string& select, const std::string& where = {},
+                                       const std::string& group = {}) {
+    protocol::StudyQuery question;
+    question.set_study("a");
+    question.add_select(select);
+    question.set_where(where);
+    question.set_group(group);
+    return question;
+  }
+
+  double number(const protocol::StudyQuery& asked) const {
+    Statement statement(database_.get(), plan(database_.get(), asked).statement);
+    return statement.step() ? statement.real(0) : -1.0;
+  }
+  double number(const std::string& select, const std::string& where = {}) const {
+    return number(question(select, where));
+  }
+  /// The same by plain SQL.
+  double plain(const std::string& sql) const {
+    Statement statement(database_.get(), sql);
+    return statement.step() ? statement.real(0) : -1.0;
+  }
+  PlannedColumn column(const std::string& select) const {
+    return plan(database_.get(), question(select)).columns.at(0);
+  }
+
+  std::string objection(const protocol::StudyQuery& asked) const {
+    try {
+      plan(database_.get(), asked);
+    } catch (const solver::InputError& error) {
+      return error.what();
+    }
+    return {};
+  }
+
+  test::TemporaryFolder folder_;
+  std::string path_ = folder_.file("studies.db");
+  DatabaseHandle database_;
+};
+
+TEST_F(Answers, FunctionsGatherTheNumbersOfRows) {
+  EXPECT_DOUBLE_EQ(number("median(point)"), 4.5);
+  EXPECT_DOUBLE_EQ(number("median(point)", "point < 3"), 1.0);
+  EXPECT_DOUBLE_EQ(number("percentile(point, 0)"), 0.0);
+  EXPECT_DOUBLE_EQ(number("percentile(point, 100)"), 9.0);
+  EXPECT_DOUBLE_EQ(number("percentile(point, 25)"), 2.25);
+  EXPECT_DOUBLE_EQ(number("variance(point)"), 82.5 / 9.0);
+  EXPECT_DOUBLE_EQ(number("stddev(point)"), std::sqrt(82.5 / 9.0));
+  EXPECT_DOUBLE_EQ(number("median(point)", "point = 3"), 3.0);
+  EXPECT_DOUBLE_EQ(number("stddev(point) IS NULL", "point = 3"), 1.0);
+  EXPECT_DOUBLE_EQ(number("median(point) IS NULL AND variance(point) IS NULL", "point < 0"), 1.0);
+  EXPECT_DOUBLE_EQ(number("median(nullif(point, 9))"), 4.0);
+}
+
+TEST_F(Answers, FunctionsRefuseWhatIsNoNumber) {
+  const auto failure = [&](const std::string& expression) -> std::string {
+    try {
+      plain("SELECT " + expression + " FROM results");
+    } catch (const StorageError& error) {
+      return error.what();
+    }
+    return {};
+  };
+  EXPECT_THAT(failure("median('x')"), HasSubstr("take numbers"));
+  EXPECT_THAT(failure("stddev(x'00')"), HasSubstr("take numbers"));
+  EXPECT_THAT(failure("percentile(mu, 101)"), HasSubstr("from 0 to 100"));
+  EXPECT_THAT(failure("percentile(mu, 'x')"), HasSubstr("from 0 to 100"));
+  EXPECT_THAT(failure("percentile(mu, point)"), HasSubstr("one percentage"));
+}
+
+TEST_F(Answers, ElementsOfListsCountFromZero) {
+  const auto view = [&](const std::string& column, const std::string& list, int seq) {
+    return plain("SELECT " + column + " FROM " + list +
+                 " WHERE point = 4 AND seq = " + std::to_string(seq));
+  };
+  const std::string at = "point = 4";
+  EXPECT_EQ(number("peaks[1].fn_N", at), view("fn_N", "peaks", 1));
+  EXPECT_EQ(number("peaks[-1].t_s", at), view("t_s", "peaks", 1));
+  EXPECT_EQ(number("phases[2].t1_s", at), view("t1_s", "phases", 2));
+  EXPECT_EQ(number("first_stick.t1_s", at), view("t1_s", "stick_intervals", 0));
+  EXPECT_EQ(number("reaction_peaks[2].force_N", at), view("force_N", "reaction_peaks", 2));
+  EXPECT_EQ(
+      number("longest_phase.t1_s", at),
+      plain("SELECT t1_s FROM phases WHERE point = 4 ORDER BY t1_s - t0_s DESC, seq LIMIT 1"));
+  EXPECT_EQ(number("largest_peak.fn_N", at), plain("SELECT max(fn_N) FROM peaks WHERE point = 4"));
+  EXPECT_EQ(number("peaks.count", at), 2.0);
+  EXPECT_EQ(number("peaks[7].fn_N IS NULL", at), 1.0);
+  EXPECT_EQ(number("fn_peaks_N[0]", at), view("fn_N", "peaks", 0));
+  EXPECT_EQ(number("count(*)", "peaks[1].fn_N > 0 AND stick_intervals.count = 1"), 10.0);
+  EXPECT_EQ(column("peaks[1].fn_N"), (PlannedColumn{"peaks[1].fn_N", "N"}));
+  EXPECT_EQ(column("peaks[1].fn_N AS second").name, "second");
+  EXPECT_THAT(objection(question("peaks[0].fn")),
+              AllOf(HasSubstr("peaks[0].fn"), HasSubstr("fn_N")));
+  EXPECT_THAT(objection(question("peaks[x].fn_N")), HasSubstr("whole number"));
+}
+
+TEST_F(Answers, ModesAreCounted) {
+  EXPECT_EQ(number("count_mode('SC SR')"), 10.0);
+  EXPECT_EQ(number("count_mode('x')"), 0.0);
+  EXPECT_THAT(objection(question("count_mode(mu)")), HasSubstr("count_mode('SC SR')"));
+}
+
+TEST_F(Answers, UnitsFollowFromThoseOfColumns) {
+  EXPECT_EQ(column("avg(fn_peak_N)").unit, "N");
+  EXPECT_EQ(column("max(duration_s) - min(duration_s)").unit, "s");
+  EXPECT_EQ(column("percentile(slide_m, 90)").unit, "m");
+  EXPECT_EQ(column("variance(duration_s)").unit, "s^2");
+  EXPECT_EQ(column("longest_phase.duration_s").unit, "s");
+  for (const char* pure : {"count(fn_peak_N)", "fn_peak_N / 1000", "fn_peak_N / ft_peak_N", "mode",
+                           "fn_peak_N + slide_m", "peaks", "fn_peak_N > 3"}) {
+    EXPECT_EQ(column(pure).unit, "") << pure;
+  }
+}
+
+TEST_F(Answers, AGroupHasOneValueOfWhatItIsAskedFor) {
+  const auto said = [&](const std::string& select, const std::string& group) {
+    return objection(question(select, "", group));
+  };
+  EXPECT_EQ(said("major_mode, count(*), avg(fn_peak_N)", "major_mode"), "");
+  EXPECT_EQ(said("round(mu, 1) AS m, max(fn_peak_N)", "m"), "");
+  EXPECT_EQ(said("round(mu, 1), max(fn_peak_N) / 1000", "round(mu, 1)"), "");
+  EXPECT_EQ(said("peaks.count, count(*) FILTER (WHERE e = 1)", "peaks.count"), "");
+  EXPECT_EQ(said("mu + e, count(*)", "mu, e"), "");
+  EXPECT_THAT(said("mu, count(*)", "e"), AllOf(HasSubstr("--select"), HasSubstr("mu has many")));
+  EXPECT_THAT(said("*", "e"), HasSubstr("* has many"));
+  EXPECT_THAT(said("e, max(mu, H)", "e"), HasSubstr("mu has many"));
+  EXPECT_THAT(said("peaks[0].fn_N", "e"), HasSubstr("peaks[0].fn_N has many"));
+  auto sorted = question("e, count(*)", "", "e");
+  sorted.set_order("mu");
+  EXPECT_THAT(objection(sorted), AllOf(HasSubstr("--order"), HasSubstr("mu has many")));
+  sorted.set_order("count(*) DESC");
+  EXPECT_EQ(objection(sorted), "");
+}
+
+TEST_F(Answers, APlanCanBeSeen) {
+  auto asked = question("mu", "mu > 0.5 AND fn_peak_N > 0");
+  asked.set_explain(true);
+  const auto planned = plan(database_.get(), asked);
+  EXPECT_THAT(planned.explanation, AllOf(HasSubstr("5 of 10 by the recipe, in 1 range: 5-9"),
+                                         HasSubstr("at most 5 rows"), HasSubstr("SQLite ")));
+  Statement lines(database_.get(), planned.statement);
+  ASSERT_TRUE(lines.step());
+  EXPECT_THAT(lines.text(0), HasSubstr("5 of 10"));
+  EXPECT_EQ(planned.columns, (std::vector<PlannedColumn>{{"plan", ""}}));
+}
+
+TEST_F(Answers, NumbersAreThoseThatWereTyped) {
+  // SQLite 3.40 reads the neighbour of each of these.
+  for (const char* typed : {"0.1166477", "0.6341252", "0.2611956", "0.863579242346664"}) {
+    const std::string exact = with_exact_numbers(database_.get(), typed);
+    EXPECT_EQ(plain("SELECT " + exact), std::stod(typed)) << exact;
+  }
+  EXPECT_EQ(with_exact_numbers(database_.get(), "H = 0.3 AND x = '0.1166477'"),
+            "H = 0.3 AND x = '0.1166477'");
+}
+
+}  // namespace
+}  // namespace oblique::server

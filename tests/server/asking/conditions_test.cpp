@@ -1,0 +1,114 @@
+#include "server/asking/conditions.h"
+
+#include <gtest/gtest.h>
+
+#include "server/asking/point_spans.h"
+#include "tests/support/recipes.h"
+
+namespace oblique::server {
+namespace {
+
+using protocol::listed;
+using protocol::range;
+using protocol::Recipe;
+using Spans = std::vector<PointSpan>;
+
+/// A hundred values each of H, mu and e.
+Recipe cube() {
+  return protocol::recipe_of(
+      {{range("H", 0.01, 1.0, 100), range("mu", 0.02, 2.0, 100), range("e", 0.505, 1.0, 100)}});
+}
+
+Spans spans(const Recipe& recipe, const std::string& condition) {
+  return spans_of(recipe, boxes_of(condition));
+}
+
+std::uint64_t count(const std::string& condition) {
+  return points_in(spans(cube(), condition));
+}
+
+TEST(Conditions, ASliceIsTheRowsOfItsLine) {
+  const auto line = spans(cube(), "H = 0.3 AND e = 1");
+  ASSERT_EQ(line.size(), 100U);
+  EXPECT_EQ(line.front(), (PointSpan{29 * 10'000 + 99, 29 * 10'000 + 99}));
+  EXPECT_EQ(line.back(), (PointSpan{29 * 10'000 + 9'999, 29 * 10'000 + 9'999}));
+  EXPECT_EQ(spans(cube(), "H = 0.3"), (Spans{{290'000, 299'999}}));
+  EXPECT_EQ(spans(cube(), "H = 0.3 AND mu BETWEEN 0.02 AND 0.04"), (Spans{{290'000, 290'199}}));
+}
+
+TEST(Conditions, EndsAreInOrOut) {
+  EXPECT_EQ(count("H < 0.3"), 29U * 10'000);
+  EXPECT_EQ(count("H <= 0.3"), 30U * 10'000);
+  EXPECT_EQ(count("H > 0.3"), 70U * 10'000);
+  EXPECT_EQ(count("H >= 0.3"), 71U * 10'000);
+  EXPECT_EQ(count("0.3 > H"), 29U * 10'000);
+  EXPECT_EQ(count("H = 0.305"), 0U);
+  EXPECT_EQ(count("H IN (0.3, 0.5, 0.305)"), 2U * 10'000);
+  EXPECT_EQ(count("H = -0.3"), 0U);
+  EXPECT_EQ(count("H = 1 OR H = 0.01"), 2U * 10'000);
+}
+
+TEST(Conditions, WhatIsNotUnderstoodRestrictsNothing) {
+  for (const char* condition :
+       {"NOT H = 0.3", "H <> 0.3", "H = 0.3 = 1", "H + 0 = 0.3", "fn_peak_N > 3", "H = mu",
+        "CASE WHEN mu > 1 AND H = 0.3 AND e = 1 THEN 1 END", "H = '0.3'", "H = 0x1",
+        "H = 0.3 OR fn_peak_N > 1", "H NOT IN (0.3)", "H NOT BETWEEN 0.1 AND 0.2",
+        "H = 12345678901234567890", "integrator = 0", "E = 7e10", "H = 0.3 COLLATE NOCASE"}) {
+    EXPECT_EQ(count(condition), 1'000'000U) << condition;
+  }
+}
+
+TEST(Conditions, WhatIsUnderstoodRestrictsBesideWhatIsNot) {
+  EXPECT_EQ(count("H = 0.3 AND fn_peak_N > 3000"), 10'000U);
+  EXPECT_EQ(count("(H = 0.3 OR H = 0.4) AND NOT (mu > 1) AND e = 1"), 200U);
+  EXPECT_EQ(count("H BETWEEN 0.1 AND 0.2 AND e = 1 AND mu = 0.02"), 11U);
+}
+
+TEST(Conditions, NumbersOfPointsCountToo) {
+  EXPECT_EQ(spans(cube(), "point = 7"), (Spans{{7, 7}}));
+  EXPECT_EQ(spans(cube(), "point >= 5 AND point <= 9 AND H = 0.01"), (Spans{{5, 9}}));
+  EXPECT_EQ(spans(cube(), "point BETWEEN 9 AND 5"), Spans());
+  EXPECT_EQ(spans(cube(), "point < -1"), Spans());
+}
+
+TEST(Conditions, AxesOfModelsAndSeveralBlocksAreKnown) {
+  const auto recipe = protocol::recipe_of(
+      {{listed("k", {3e7, 1e7}), listed("H", {0.5}), listed("mu", {0.1, 0.2}), listed("e", {1.0})},
+       {listed("H", {0.5, 0.6}), listed("mu", {0.3}), listed("e", {1.0})}});
+  EXPECT_EQ(spans(recipe, "k = 1e7 AND mu = 0.2"), (Spans{{3, 3}}));
+  EXPECT_EQ(spans(recipe, "mu = 0.3 AND H > 0.5"), (Spans{{5, 5}}));
+  EXPECT_EQ(spans(recipe, "mu = 0.1 AND H = 0.5"), (Spans{{0, 2}}));
+}
+
+TEST(Conditions, SamplesAndExpressionsRestrictNothing) {
+  auto recipe = cube();
+  recipe.mutable_blocks(0)->mutable_axes(1)->Clear();
+  recipe.mutable_blocks(0)->mutable_axes(1)->set_key("mu");
+  recipe.mutable_blocks(0)->mutable_axes(1)->set_expression("H / 2");
+  EXPECT_EQ(points_of(recipe), 10'000U);
+  EXPECT_EQ(points_in(spans(recipe, "mu = 0.1 AND H = 0.5")), 100U);
+  recipe.mutable_blocks(0)->mutable_sample()->set_count(500);
+  EXPECT_EQ(spans(recipe, "H = 0.5"), (Spans{{0, 499}}));
+}
+
+TEST(Conditions, AxesSideBySideAreLookedThrough) {
+  auto recipe = protocol::recipe_of(
+      {{range("H", 0.1, 1.0, 10), range("mu", 0.0, 0.9, 10), listed("e", {1.0})}});
+  recipe.mutable_blocks(0)->set_zip(true);
+  EXPECT_EQ(spans(recipe, "H = 0.3 AND e = 1"), (Spans{{2, 2}}));
+  EXPECT_EQ(spans(recipe, "H = 0.3 AND mu = 0.3"), Spans());
+  EXPECT_EQ(spans(recipe, "mu >= 0.8"), (Spans{{8, 9}}));
+}
+
+TEST(Conditions, HugeStudiesCostNoMoreAndSpansStayBounded) {
+  const auto recipe =
+      protocol::recipe_of({{range("H", 0.1, 1.0, 10'000), range("mu", 0.0, 1.0, 10'001),
+                            range("e", 0.1, 1.0, 10'000)}});
+  EXPECT_EQ(points_in(spans(recipe, "H = 0.1 AND mu = 0.5 AND e = 1")), 1U);
+  const auto many = spans(recipe, "e = 1");
+  EXPECT_LE(many.size(), kMostSpans);
+  EXPECT_EQ(many.back().last, 10'000ULL * 10'001 * 10'000 - 1);
+}
+
+}  // namespace
+}  // namespace oblique::server
