@@ -92,7 +92,8 @@ std::string how_rows_are_ordered(const protocol::StudyQuery& question, const Row
     return fmt::format("order      that of points, as {} are read\n",
                        rows.spans.size() > 1 ? "the ranges" : "rows");
   }
-  return fmt::format("order      {}\n", question.order());
+  return fmt::format("order      {}{}\n", question.order(),
+                     rows.come_in_order ? ", as the ranges are read" : ", sorted in memory");
 }
 
 /// SQLite's own plan, a line a step.

@@ -16,6 +16,14 @@ constexpr std::uint64_t kReadOver = 2;
 /// Values of axes side by side are looked at one by one, up to so many.
 constexpr std::uint64_t kMostLookedAt = 2'000'000;
 
+/// How spans are made. Those that are read in the order of something else than points hold no point
+/// that was not asked for.
+struct Cut {
+  bool is_exact = false;
+  bool has_too_many = false;  ///< an exact cut would take too many spans
+  std::uint64_t read_over() const { return is_exact ? 0 : kReadOver; }
+};
+
 /// Joins what overlaps, and what at most `between` numbers are between. `spans` must rise.
 Spans joined(const Spans& spans, std::uint64_t between) {
   Spans whole;
@@ -128,7 +136,7 @@ const ValueSet* wanted(const protocol::Block& block, const protocol::Axis& axis,
 }
 
 /// Points of a product of axes, numbered from 0. Built from the fastest axis outwards.
-Spans in_product(const protocol::Block& block, const Box& box) {
+Spans in_product(const protocol::Block& block, const Box& box, Cut& cut) {
   Spans spans{{0, 0}};
   std::uint64_t stride = 1;
   for (int a = block.axes_size(); a-- > 0;) {
@@ -143,6 +151,10 @@ Spans in_product(const protocol::Block& block, const Box& box) {
     const bool is_whole = spans.size() == 1 && spans[0] == PointSpan{0, stride - 1};
     // Where there would be too many, each value of this axis is one span, or each run of values.
     if (!is_whole && count > kMostSpans / spans.size()) {
+      if (cut.is_exact) {
+        cut.has_too_many = true;
+        return {};
+      }
       spans = {{spans.front().first, spans.back().last}};
     }
     Spans wider;
@@ -157,16 +169,17 @@ Spans in_product(const protocol::Block& block, const Box& box) {
         }
       }
     }
-    spans = joined(wider, kReadOver);
+    spans = joined(wider, cut.read_over());
     stride *= size;
   }
   return spans;
 }
 
 /// Points of axes side by side; those with one value have it in every point.
-Spans in_zip(const protocol::Block& block, const Box& box) {
+Spans in_zip(const protocol::Block& block, const Box& box, Cut& cut) {
   const std::uint64_t size = size_of(block);
   if (size > kMostLookedAt) {
+    cut.has_too_many = true;
     return {{0, size - 1}};
   }
   std::vector<bool> is_in(size, true);
@@ -186,10 +199,10 @@ Spans in_zip(const protocol::Block& block, const Box& box) {
       spans.push_back({i, i});
     }
   }
-  return joined(spans, kReadOver);
+  return joined(spans, cut.read_over());
 }
 
-Spans in_block(const protocol::Block& block, const Box& box) {
+Spans in_block(const protocol::Block& block, const Box& box, Cut& cut) {
   const std::uint64_t size = size_of(block);
   if (size == 0) {
     return {};
@@ -197,7 +210,7 @@ Spans in_block(const protocol::Block& block, const Box& box) {
   if (block.has_sample()) {
     return {{0, size - 1}};
   }
-  return block.zip() ? in_zip(block, box) : in_product(block, box);
+  return block.zip() ? in_zip(block, box, cut) : in_product(block, box, cut);
 }
 
 /// What of `spans` has a number that the box wants.
@@ -222,23 +235,104 @@ Spans with_wanted_numbers(const Spans& spans, const Box& box) {
   return left;
 }
 
-}  // namespace
-
-std::vector<PointSpan> spans_of(const protocol::Recipe& recipe, const Boxes& boxes) {
+Spans cut_by(const protocol::Recipe& recipe, const Boxes& boxes, Cut& cut) {
   Spans all;
   for (const Box& box : boxes) {
     std::uint64_t first = 0;
     Spans of_box;
     for (const protocol::Block& block : recipe.blocks()) {
-      for (const PointSpan& span : in_block(block, box)) {
+      for (const PointSpan& span : in_block(block, box, cut)) {
         of_box.push_back({first + span.first, first + span.last});
       }
       first += size_of(block);
     }
     const Spans kept = with_wanted_numbers(coarsened(joined(of_box, 0), kMostSpans), box);
+    cut.has_too_many = cut.has_too_many || of_box.size() > kMostSpans;
     all.insert(all.end(), kept.begin(), kept.end());
   }
-  return coarsened(in_order(std::move(all), kReadOver), kMostSpans);
+  return in_order(std::move(all), cut.read_over());
+}
+
+/// The values of an axis in all blocks, each once; none where a block has no such axis, or there
+/// are too many.
+std::optional<std::vector<double>> values_of(const protocol::Recipe& recipe,
+                                             const std::string& column) {
+  const Box anything{{column, ValueSet::all()}};
+  std::vector<double> values;
+  for (const protocol::Block& block : recipe.blocks()) {
+    const auto axis = std::find_if(
+        block.axes().begin(), block.axes().end(),
+        [&](const protocol::Axis& known) { return wanted(block, known, anything) != nullptr; });
+    if (block.has_sample() || axis == block.axes().end() ||
+        values.size() + size_of(*axis) > kMostSpans) {
+      return std::nullopt;
+    }
+    for (std::uint64_t i = 0; i < size_of(*axis); ++i) {
+      values.push_back(protocol::axis_value(*axis, i));
+    }
+  }
+  std::sort(values.begin(), values.end());
+  values.erase(std::unique(values.begin(), values.end()), values.end());
+  return values;
+}
+
+/// Appends to `sorted` what `boxes` hold, sorted by `keys`. False: it takes too many spans.
+bool add_sorted(const protocol::Recipe& recipe, const Boxes& boxes, std::span<const SortKey> keys,
+                Spans& sorted) {
+  if (keys.empty()) {
+    Cut cut{.is_exact = true};
+    const Spans spans = cut_by(recipe, boxes, cut);
+    sorted.insert(sorted.end(), spans.begin(), spans.end());
+    return !cut.has_too_many && sorted.size() <= kMostSpans;
+  }
+  auto values = values_of(recipe, keys.front().column);
+  if (!values) {
+    return false;
+  }
+  if (keys.front().falls) {
+    std::reverse(values->begin(), values->end());
+  }
+  return std::all_of(values->begin(), values->end(), [&](double value) {
+    Boxes narrowed = boxes;
+    for (Box& box : narrowed) {
+      box.try_emplace(keys.front().column, ValueSet::all())
+          .first->second.intersect(ValueSet({value, value}));
+    }
+    return add_sorted(recipe, narrowed, keys.subspan(1), sorted);
+  });
+}
+
+}  // namespace
+
+std::vector<PointSpan> spans_of(const protocol::Recipe& recipe, const Boxes& boxes) {
+  Cut cut;
+  return coarsened(cut_by(recipe, boxes, cut), kMostSpans);
+}
+
+std::optional<std::vector<PointSpan>> sorted_spans_of(const protocol::Recipe& recipe,
+                                                      const Boxes& boxes,
+                                                      std::span<const SortKey> keys) {
+  // Each combination of values walks the axes once.
+  std::uint64_t walks = 1;
+  std::uint64_t listed = 1;
+  for (const SortKey& key : keys) {
+    const auto values = values_of(recipe, key.column);
+    walks *= values ? std::max<std::uint64_t>(values->size(), 1) : kMostSpans + 1;
+    if (walks > kMostSpans) {
+      return std::nullopt;
+    }
+  }
+  for (const protocol::Block& block : recipe.blocks()) {
+    for (const protocol::Axis& axis : block.axes()) {
+      listed += static_cast<std::uint64_t>(axis.values_size()) + 1;
+    }
+    listed += block.zip() ? size_of(block) : 0;
+  }
+  Spans sorted;
+  if (listed > kMostLookedAt / walks / boxes.size() || !add_sorted(recipe, boxes, keys, sorted)) {
+    return std::nullopt;
+  }
+  return sorted;
 }
 
 std::uint64_t points_of(const protocol::Recipe& recipe) {

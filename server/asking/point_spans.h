@@ -2,6 +2,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "proto/oblique.pb.h"
@@ -25,6 +28,20 @@ inline constexpr std::size_t kMostSpans = 20'000;
 /// models of more than one length restrict nothing. Work by the number of listed values, of spans,
 /// and the logarithm of what ranges have. Throws nothing for a recipe that was judged.
 std::vector<PointSpan> spans_of(const protocol::Recipe& recipe, const Boxes& boxes);
+
+/// A column that rows are sorted by.
+struct SortKey {
+  std::string column;
+  bool falls = false;
+};
+
+/// The same points in spans that, read one after another, give them sorted by `keys`, then by their
+/// number: for each value of the first key those of each value of the second, and so on. None where
+/// that takes more than `kMostSpans`, or where a key is no axis with values of its own in every
+/// block.
+std::optional<std::vector<PointSpan>> sorted_spans_of(const protocol::Recipe& recipe,
+                                                      const Boxes& boxes,
+                                                      std::span<const SortKey> keys);
 
 /// Number of points of a recipe, filters left aside.
 std::uint64_t points_of(const protocol::Recipe& recipe);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <string_view>
 
 #include <spdlog/fmt/fmt.h>
@@ -9,6 +10,8 @@
 #include "server/asking/columns.h"
 #include "server/asking/conditions.h"
 #include "server/asking/elements.h"
+#include "server/asking/grouping.h"
+#include "server/asking/question.h"
 #include "server/asking/sql/sql_expression.h"
 #include "server/asking/sql/sql_items.h"
 #include "server/asking/sql/sql_literals.h"
@@ -21,11 +24,50 @@ namespace {
 /// Finding the first row of a span costs about so many rows that follow each other.
 constexpr std::uint64_t kRowsASpan = 3;
 
-bool is_order(const protocol::StudyQuery& question, std::string_view direction) {
+/// The columns that rows are to be sorted by; none where it is by something else.
+std::optional<std::vector<SortKey>> sort_keys(const protocol::StudyQuery& question) {
+  std::vector<SortKey> keys;
   const auto tokens = sql_tokens(question.order());
-  return question.group().empty() && !tokens.empty() && tokens.size() <= 2 &&
-         tokens[0].text == "point" &&
-         (tokens.size() == 2 ? is_word(tokens[1], direction) : direction == "asc");
+  if (tokens.empty()) {
+    return keys;
+  }
+  for (const SqlItem& item : sql_items(tokens)) {
+    const bool falls = same_but_case(item.name, "desc");
+    const bool is_column = item.tokens.size() == 1 &&
+                           item.tokens[0].kind == SqlToken::Kind::kName &&
+                           (item.name.empty() || falls || same_but_case(item.name, "asc"));
+    if (!is_column) {
+      return std::nullopt;
+    }
+    keys.push_back({std::string(item.tokens[0].text), falls});
+  }
+  return keys;
+}
+
+bool is_by_point(const std::vector<SortKey>& keys, bool falls) {
+  return keys.size() == 1 && keys[0].column == "point" && keys[0].falls == falls;
+}
+
+/// Spans in the order of axes, where rows are to be sorted so and spans can be; else none.
+std::vector<PointSpan> sorted_spans(const protocol::StudyQuery& question, const AskedStudy& study,
+                                    const Boxes& boxes) {
+  auto keys = sort_keys(question);
+  if (!keys || keys->empty() || !question.group().empty() || !gives_points(selected_by(question))) {
+    return {};
+  }
+  // Rows of one value of each axis come by their number anyway.
+  if (keys->back().column == "point" && !keys->back().falls) {
+    keys->pop_back();
+  }
+  const auto names = names_given_in(selected_by(question));
+  const auto is_no_axis = [&](const SortKey& key) {
+    return key.column == "point" ||
+           std::find(names.begin(), names.end(), key.column) != names.end();
+  };
+  if (keys->empty() || std::any_of(keys->begin(), keys->end(), is_no_axis)) {
+    return {};
+  }
+  return sorted_spans_of(study.recipe, boxes, *keys).value_or(std::vector<PointSpan>());
 }
 
 std::string join_of(const std::vector<PointSpan>& spans) {
@@ -125,7 +167,8 @@ AskedStudy asked_study(sqlite3* database, const std::string& name) {
 }
 
 bool is_in_point_order(const protocol::StudyQuery& question) {
-  return question.group().empty() && (question.order().empty() || is_order(question, "asc"));
+  const auto keys = sort_keys(question);
+  return question.group().empty() && keys && (keys->empty() || is_by_point(*keys, false));
 }
 
 std::vector<std::string> columns_of_statement(sqlite3* database, const std::string& sql) {
@@ -153,17 +196,26 @@ RowsAsked rows_asked(const protocol::StudyQuery& question, const AskedStudy& stu
       box.try_emplace("point", ValueSet::all()).first->second.intersect(behind);
     }
   }
-  const auto is_free = [](const Box& box) { return box.empty(); };
-  if (std::any_of(boxes.begin(), boxes.end(), is_free) || study.points == 0) {
+  if (study.points == 0 || points_of(study.recipe) != study.points) {
+    return rows;  // not the recipe that numbered these points
+  }
+  rows.spans = sorted_spans(question, study, boxes);
+  if (rows.spans.size() > 1) {
+    rows.by_spans = true;
+    rows.come_in_order = true;
     return rows;
   }
-  if (points_of(study.recipe) != study.points) {
-    return rows;  // not the recipe that numbered these points
+  rows.spans.clear();
+  const auto is_free = [](const Box& box) { return box.empty(); };
+  if (std::any_of(boxes.begin(), boxes.end(), is_free)) {
+    return rows;
   }
   auto spans = spans_of(study.recipe, boxes);
   const std::uint64_t points = points_in(spans);
   const bool is_few = points + kRowsASpan * spans.size() <= study.points - study.points / 10;
-  if (spans.size() > 1 && (!is_few || (is_order(question, "desc") && points > study.points / 8))) {
+  const auto keys = sort_keys(question);
+  const bool is_backwards = question.group().empty() && keys && is_by_point(*keys, true);
+  if (spans.size() > 1 && (!is_few || (is_backwards && points > study.points / 8))) {
     spans = {{spans.front().first, spans.back().last}};
   }
   rows.by_spans = true;

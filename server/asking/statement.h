@@ -25,7 +25,7 @@ AskedStudy asked_study(sqlite3* database, const std::string& name);
 struct RowsAsked {
   bool by_spans = false;  ///< only rows in `spans`, else all
   std::vector<PointSpan> spans;
-  bool come_in_order = false;  ///< rows are read in the order of their points, and asked for so
+  bool come_in_order = false;  ///< spans are read in the order that is asked for
 };
 
 /// Chooses how rows are found: by the spans that the condition leaves of the recipe, unless they

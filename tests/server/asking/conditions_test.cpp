@@ -100,6 +100,22 @@ TEST(Conditions, AxesSideBySideAreLookedThrough) {
   EXPECT_EQ(spans(recipe, "mu >= 0.8"), (Spans{{8, 9}}));
 }
 
+TEST(Conditions, SpansAreReadInTheOrderOfAxesWhereTheyAreNotTooMany) {
+  const auto sorted = [](const std::string& condition, const std::vector<SortKey>& keys) {
+    return sorted_spans_of(cube(), boxes_of(condition), keys);
+  };
+  const auto by_mu = sorted("H > 0.5", {{"mu", true}});
+  ASSERT_TRUE(by_mu.has_value());
+  ASSERT_EQ(by_mu->size(), 5'000U);
+  EXPECT_EQ(by_mu->front(), (PointSpan{509'900, 509'999}));
+  EXPECT_EQ(by_mu->at(50), (PointSpan{509'800, 509'899}));
+  EXPECT_EQ(by_mu->back(), (PointSpan{990'000, 990'099}));
+  EXPECT_EQ(sorted("", {{"H"}, {"mu"}}).value_or(Spans()).size(), 10'000U);
+  EXPECT_FALSE(sorted("", {{"e"}}).has_value());
+  EXPECT_FALSE(sorted("", {{"fn_peak_N"}}).has_value());
+  EXPECT_FALSE(sorted("", {{"k"}}).has_value());
+}
+
 TEST(Conditions, HugeStudiesCostNoMoreAndSpansStayBounded) {
   const auto recipe =
       protocol::recipe_of({{range("H", 0.1, 1.0, 10'000), range("mu", 0.0, 1.0, 10'001),

@@ -166,7 +166,9 @@ TEST_F(SameRows, APlanGivesTheRowsThatSqliteGivesWithoutIt) {
       question.set_study("s" + std::to_string(number));
       question.set_where(drawn.condition(recipes[number - 1]));
       question.add_select("point");
-      question.set_order(drawn.of<std::string>({"", "", "point DESC", "mu, H DESC, e, k, point"}));
+      question.set_order(
+          drawn.of<std::string>({"", "", "point DESC", "mu, H DESC, e, k, point", "mu, point",
+                                 "H DESC, mu, point", "e DESC, point"}));
       if (drawn.once_in(3)) {
         question.set_limit(drawn.below(20));
       }
