@@ -171,9 +171,7 @@ ElementReference counted_mode(ElementTokens tokens) {
   return {4, fmt::format("count(*) FILTER (WHERE major_mode = {})", tokens[2].text), {}};
 }
 
-}  // namespace
-
-ElementReference element_at(ElementTokens tokens) {
+ElementReference sound_element_at(ElementTokens tokens) {
   if (tokens.size() < 2 || tokens[0].kind != SqlToken::Kind::kName) {
     return {};
   }
@@ -193,12 +191,32 @@ ElementReference element_at(ElementTokens tokens) {
   return chosen(tokens);
 }
 
-std::string with_elements(std::string_view text) {
+/// The list that an element is written with: "phases" of "phases" and "longest_phase".
+std::string_view list_of(std::string_view written) {
+  const auto rest = written.substr(std::min(written.size(), written.find('_') + 1));
+  const auto single = std::find_if(kSingles.begin(), kSingles.end(),
+                                   [&](const Single& known) { return known.name == rest; });
+  return single == kSingles.end() ? written : single->list;
+}
+
+}  // namespace
+
+ElementReference element_at(ElementTokens tokens, Lists lists) {
+  auto reference = sound_element_at(tokens);
+  // Counts of modes are of no list.
+  if (reference.tokens > 0 && lists == Lists::kMaybeDamaged && !is_word(tokens[0], "count_mode")) {
+    reference.sql =
+        fmt::format("CASE WHEN json_valid({}) THEN {} END", list_of(tokens[0].text), reference.sql);
+  }
+  return reference;
+}
+
+std::string with_elements(std::string_view text, Lists lists) {
   const auto tokens = sql_tokens(text);
   std::string sql;
   std::size_t copied = 0;
   for (std::size_t i = 0; i < tokens.size(); ++i) {
-    const auto reference = element_at(ElementTokens(tokens).subspan(i));
+    const auto reference = element_at(ElementTokens(tokens).subspan(i), lists);
     if (reference.tokens == 0) {
       continue;
     }
@@ -212,11 +230,11 @@ std::string with_elements(std::string_view text) {
   return sql;
 }
 
-std::string columns_with_elements(std::string_view text) {
+std::string columns_with_elements(std::string_view text, Lists lists) {
   const auto tokens = sql_tokens(text);
   std::string columns;
   for (const SqlItem& item : sql_items(tokens)) {
-    const std::string sql = with_elements(item.text);
+    const std::string sql = with_elements(item.text, lists);
     columns += columns.empty() ? "" : ", ";
     if (sql == item.text) {
       columns += item.whole;

@@ -18,16 +18,20 @@ struct ElementReference {
   std::string unit;
 };
 
+/// What is known of the texts of lists: before schema 8 they are stored as they are given, and one
+/// that is damaged must not spoil a question.
+enum class Lists { kSound, kMaybeDamaged };
+
 /// What stands at the beginning of `tokens`. Throws solver::InputError for an element of a list
 /// that has no such member, or a number that is none.
-ElementReference element_at(std::span<const SqlToken> tokens);
+ElementReference element_at(std::span<const SqlToken> tokens, Lists lists = Lists::kSound);
 
 /// `text` with elements, and counts of modes as count_mode('SC SR'), as SQLite understands them.
 /// Throws as element_at does.
-std::string with_elements(std::string_view text);
+std::string with_elements(std::string_view text, Lists lists);
 
 /// The same for columns: those that were changed keep what was written as their name.
-std::string columns_with_elements(std::string_view text);
+std::string columns_with_elements(std::string_view text, Lists lists);
 
 /// How elements and the like are written, with unit and meaning, for listings.
 struct WrittenForm {

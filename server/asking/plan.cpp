@@ -154,7 +154,7 @@ Plan plan(sqlite3* database, const protocol::StudyQuery& question) {
   const std::string written = selected_by(question);
   Plan plan;
   plan.goes_on_by_point = is_in_point_order(question) && gives_points(written);
-  std::string selected = columns_with_elements(written);
+  std::string selected = columns_with_elements(written, study.lists);
   selected += plan.goes_on_by_point ? ", point" : "";
   plan.statement = statement_of(database, question, selected, study, rows);
   try {

@@ -9,7 +9,6 @@
 
 #include "server/asking/columns.h"
 #include "server/asking/conditions.h"
-#include "server/asking/elements.h"
 #include "server/asking/grouping.h"
 #include "server/asking/question.h"
 #include "server/asking/sql/sql_expression.h"
@@ -158,7 +157,13 @@ AskedStudy asked_study(sqlite3* database, const std::string& name) {
   if (!study.step()) {
     throw solver::InputError(fmt::format("there is no study called \"{}\"", name));
   }
-  AskedStudy found{study.integer(0), static_cast<std::uint64_t>(study.integer(1)), {}};
+  constexpr std::int64_t kFirstWithSoundLists = 8;
+  Statement schema(database, "PRAGMA user_version");
+  const bool has_sound_lists = schema.step() && schema.integer(0) >= kFirstWithSoundLists;
+  AskedStudy found{study.integer(0),
+                   static_cast<std::uint64_t>(study.integer(1)),
+                   {},
+                   has_sound_lists ? Lists::kSound : Lists::kMaybeDamaged};
   // Points of a recipe that cannot be read are all looked at.
   if (!found.recipe.ParseFromString(study.text(2))) {
     found.recipe.Clear();
@@ -231,9 +236,9 @@ std::string statement_of(sqlite3* database, const protocol::StudyQuery& question
       question.where().empty()
           ? ""
           : fmt::format(" WHERE ({})",
-                        with_exact_numbers(database, with_elements(question.where())));
-  const std::string group = with_elements(question.group());
-  std::string order = with_elements(question.order());
+                        with_exact_numbers(database, with_elements(question.where(), study.lists)));
+  const std::string group = with_elements(question.group(), study.lists);
+  std::string order = with_elements(question.order(), study.lists);
   if (order.empty()) {
     order = group.empty() ? "point" : group;
   }

@@ -7,6 +7,7 @@
 #include <sqlite3.h>
 
 #include "proto/oblique.pb.h"
+#include "server/asking/elements.h"
 #include "server/asking/point_spans.h"
 
 namespace oblique::server {
@@ -16,6 +17,7 @@ struct AskedStudy {
   std::int64_t study_id;
   std::uint64_t points;
   protocol::Recipe recipe;
+  Lists lists;
 };
 
 /// Throws solver::InputError for a name that no study has.

@@ -6,25 +6,40 @@
 
 #include <unistd.h>
 
+#include "server/asking/plan.h"
 #include "server/asking/sql/sql_expression.h"
+#include "server/database/open_for_reading.h"
+#include "server/reading/query_rules.h"
 #include "server/reading/reader.h"
 #include "server/store/store.h"
+#include "tests/support/points.h"
 #include "worker/solver/model/errors.h"
 
 namespace {
 
-/// A reader of an empty database of ours, whose file is gone once it is open.
-oblique::server::Reader& reader() {
+using oblique::server::Change;
+
+/// A database of ours with a study of points that have no rows, whose file is gone once it is open.
+struct Opened {
+  oblique::server::Reader reader;
+  oblique::server::DatabaseHandle database;
+};
+
+Opened& opened() {
   const std::string path = (std::filesystem::temp_directory_path() /
                             ("oblique-fuzz-" + std::to_string(getpid()) + ".db"))
                                .string();
-  const oblique::server::Store store(path);
-  static oblique::server::Reader opened(path);
-  opened.query("SELECT 1", {});
+  oblique::server::Store store(path);
+  store.commit(std::vector<Change>{oblique::server::AddStudy{1, "a", oblique::server::table_of(100),
+                                                             "2024-01-01T00:00:00.000Z"}});
+  static Opened files{oblique::server::Reader(path),
+                      oblique::server::open_for_reading(path).database};
+  files.reader.query("SELECT 1", {});
+  oblique::server::restrict_to_reading(files.database.get());
   for (const char* suffix : {"", "-wal", "-shm"}) {
     std::filesystem::remove(path + suffix);
   }
-  return opened;
+  return files;
 }
 
 /// Whether the command line takes `condition`.
@@ -48,19 +63,47 @@ void expect_no_row(oblique::server::Reader& database, const std::string& conditi
   }
 }
 
+/// The same as a question, in each of its parts: a plan or an InputError.
+void ask(sqlite3* database, const std::string& text) {
+  for (int part = 0; part < 4; ++part) {
+    oblique::protocol::StudyQuery question;
+    question.set_study("a");
+    question.set_limit(5);
+    switch (part) {
+      case 0:
+        question.set_where(text);
+        break;
+      case 1:
+        question.add_select(text);
+        break;
+      case 2:
+        question.set_order(text);
+        break;
+      default:
+        question.set_group(text);
+        break;
+    }
+    try {
+      static_cast<void>(oblique::server::plan(database, question));
+    } catch (const oblique::solver::InputError&) {
+    }
+  }
+}
+
 }  // namespace
 
 /// A condition on results, as users write it behind --where: an answer or a QueryError, and never a
 /// change of the database.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static oblique::server::Reader& database = reader();
+  static Opened& files = opened();
   const std::string condition(reinterpret_cast<const char*>(data), size);
+  ask(files.database.get(), condition);
   try {
     if (is_taken(condition)) {
-      expect_no_row(database, condition);
+      expect_no_row(files.reader, condition);
     }
-    database.query("SELECT point FROM runs WHERE (" + condition + "\n) LIMIT 5",
-                   {10, 10'000, 50, 1'000'000});
+    files.reader.query("SELECT point FROM runs WHERE (" + condition + "\n) LIMIT 5",
+                       {10, 10'000, 50, 1'000'000});
   } catch (const oblique::server::QueryError&) {
   }
   return 0;

@@ -104,6 +104,17 @@ TEST_F(Answers, FunctionsRefuseWhatIsNoNumber) {
   EXPECT_THAT(failure("percentile(mu, point)"), HasSubstr("one percentage"));
 }
 
+TEST_F(Answers, WhatAFunctionKeepsIsBoundedByTheLimitOnMemory) {
+  const std::int64_t before = sqlite3_hard_heap_limit64(std::int64_t{16} << 20U);
+  Statement statement(database_.get(),
+                      "WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM c LIMIT "
+                      "4000000) SELECT median(x) FROM c");
+  EXPECT_THROW(statement.step(), StorageError);
+  statement.reset();
+  sqlite3_hard_heap_limit64(before);
+  EXPECT_EQ(number("median(point)"), 4.5);
+}
+
 TEST_F(Answers, ElementsOfListsCountFromZero) {
   const auto view = [&](const std::string& column, const std::string& list, int seq) {
     return plain("SELECT " + column + " FROM " + list +

@@ -141,7 +141,7 @@ void store_study(Store& store, std::uint64_t number, const Recipe& recipe) {
 
 class SameRows : public testing::Test {
  protected:
-  static constexpr std::uint64_t kStudies = 16;
+  static constexpr std::uint64_t kStudies = 10;
   static constexpr int kConditions = 60;
 };
 
