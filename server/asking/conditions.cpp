@@ -20,7 +20,7 @@ using Tokens = std::span<const SqlToken>;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// More boxes than this, or more values of one column, are one without limits.
 constexpr std::size_t kMostBoxes = 64;
-constexpr std::size_t kMostIntervals = 1000;
+constexpr std::size_t kMostRanges = 1000;
 constexpr std::size_t kDeepest = 50;
 
 Boxes anything() {
@@ -132,7 +132,7 @@ Boxes listed(Tokens tokens) {
     const auto end =
         std::find_if(begin, last, [](const SqlToken& token) { return token.is_sign(','); });
     const auto number = number_in({begin, end});
-    if (!number || values.intervals().size() >= kMostIntervals) {
+    if (!number || values.ranges().size() >= kMostRanges) {
       return anything();
     }
     values.unite(ValueSet({*number, *number}));
@@ -152,8 +152,7 @@ Boxes both(const Boxes& a, const Boxes& b) {
       Box box = first;
       for (const auto& [column, values] : second) {
         const auto [known, is_new] = box.try_emplace(column, values);
-        if (!is_new && known->second.intervals().size() * values.intervals().size() <=
-                           kMostIntervals * kMostIntervals) {
+        if (!is_new) {
           known->second.intersect(values);
         }
       }
@@ -172,7 +171,7 @@ Boxes either(Boxes a, const Boxes& b) {
       a.front().begin()->first == b.front().begin()->first) {
     ValueSet& values = a.front().begin()->second;
     values.unite(b.front().begin()->second);
-    return values.intervals().size() <= kMostIntervals ? a : anything();
+    return values.ranges().size() <= kMostRanges ? a : anything();
   }
   a.insert(a.end(), b.begin(), b.end());
   return a.size() <= kMostBoxes ? a : anything();

@@ -76,14 +76,14 @@ std::uint64_t first_behind(std::uint64_t size, const IsBehind& is_behind) {
 /// Numbers of the values of an axis that rise, in any of `values`.
 Spans numbers_in_range(const protocol::Axis& axis, const ValueSet& values) {
   Spans numbers;
-  for (const ValueRange& interval : values.intervals()) {
+  for (const ValueRange& range : values.ranges()) {
     const std::uint64_t begin = first_behind(axis.count(), [&](std::uint64_t i) {
       const double value = protocol::axis_value(axis, i);
-      return interval.low_is_open ? value > interval.low : value >= interval.low;
+      return range.low_is_open ? value > range.low : value >= range.low;
     });
     const std::uint64_t end = first_behind(axis.count(), [&](std::uint64_t i) {
       const double value = protocol::axis_value(axis, i);
-      return interval.high_is_open ? value >= interval.high : value > interval.high;
+      return range.high_is_open ? value >= range.high : value > range.high;
     });
     if (begin < end) {
       numbers.push_back({begin, end - 1});
@@ -220,12 +220,12 @@ Spans with_wanted_numbers(const Spans& spans, const Box& box) {
     return spans;
   }
   Spans left;
-  for (const ValueRange& interval : wanted_points->second.intervals()) {
+  for (const ValueRange& range : wanted_points->second.ranges()) {
     for (const PointSpan& span : spans) {
-      if (static_cast<double>(span.last) >= interval.low &&
-          static_cast<double>(span.first) <= interval.high) {
-        const double first = std::max(static_cast<double>(span.first), interval.low);
-        const double last = std::min(static_cast<double>(span.last), interval.high);
+      if (static_cast<double>(span.last) >= range.low &&
+          static_cast<double>(span.first) <= range.high) {
+        const double first = std::max(static_cast<double>(span.first), range.low);
+        const double last = std::min(static_cast<double>(span.last), range.high);
         if (first <= last) {
           left.push_back({static_cast<std::uint64_t>(first), static_cast<std::uint64_t>(last)});
         }

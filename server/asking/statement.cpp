@@ -201,8 +201,11 @@ RowsAsked rows_asked(const protocol::StudyQuery& question, const AskedStudy& stu
       box.try_emplace("point", ValueSet::all()).first->second.intersect(behind);
     }
   }
-  if (study.points == 0 || points_of(study.recipe) != study.points) {
-    return rows;  // not the recipe that numbered these points
+  constexpr std::size_t kMostBlocksAndBoxes = 200'000;
+  const auto blocks = static_cast<std::size_t>(study.recipe.blocks_size());
+  if (study.points == 0 || blocks * boxes.size() > kMostBlocksAndBoxes ||
+      points_of(study.recipe) != study.points) {
+    return rows;  // too long to look through, or not the recipe that numbered these points
   }
   rows.spans = sorted_spans(question, study, boxes);
   if (rows.spans.size() > 1) {

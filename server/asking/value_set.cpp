@@ -1,39 +1,81 @@
 #include "server/asking/value_set.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <iterator>
 #include <limits>
+#include <utility>
 
 namespace oblique::server {
+namespace {
+
+bool begins_before(const ValueRange& a, const ValueRange& b) {
+  return a.low < b.low || (a.low == b.low && !a.low_is_open && b.low_is_open);
+}
+
+bool ends_before(const ValueRange& a, const ValueRange& b) {
+  return a.high < b.high || (a.high == b.high && a.high_is_open && !b.high_is_open);
+}
+
+/// Whether no number lies between `a` and `b`, which begins behind it.
+bool meets(const ValueRange& a, const ValueRange& b) {
+  return b.low < a.high || (b.low == a.high && !(a.high_is_open && b.low_is_open));
+}
+
+}  // namespace
 
 ValueSet ValueSet::all() {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   return ValueSet({-kInfinity, kInfinity});
 }
 
+ValueSet::ValueSet(ValueRange range) {
+  if (!range.is_empty()) {
+    ranges_.push_back(range);
+  }
+}
+
 bool ValueSet::contains(double value) const {
-  return std::any_of(intervals_.begin(), intervals_.end(),
-                     [value](const ValueRange& interval) { return interval.contains(value); });
+  const auto behind =
+      std::upper_bound(ranges_.begin(), ranges_.end(), value,
+                       [](double v, const ValueRange& range) { return v < range.low; });
+  return std::any_of(behind - std::min<std::ptrdiff_t>(behind - ranges_.begin(), 2), behind,
+                     [value](const ValueRange& range) { return range.contains(value); });
 }
 
 void ValueSet::unite(const ValueSet& other) {
-  intervals_.insert(intervals_.end(), other.intervals_.begin(), other.intervals_.end());
+  std::vector<ValueRange> both;
+  std::merge(ranges_.begin(), ranges_.end(), other.ranges_.begin(), other.ranges_.end(),
+             std::back_inserter(both), begins_before);
+  ranges_.clear();
+  for (const ValueRange& range : both) {
+    if (ranges_.empty() || !meets(ranges_.back(), range)) {
+      ranges_.push_back(range);
+    } else if (ends_before(ranges_.back(), range)) {
+      ranges_.back().high = range.high;
+      ranges_.back().high_is_open = range.high_is_open;
+    }
+  }
 }
 
 void ValueSet::intersect(const ValueSet& other) {
   std::vector<ValueRange> common;
-  for (const ValueRange& a : intervals_) {
-    for (const ValueRange& b : other.intervals_) {
-      const ValueRange& lower = a.low > b.low || (a.low == b.low && a.low_is_open) ? a : b;
-      const ValueRange& upper = a.high < b.high || (a.high == b.high && a.high_is_open) ? a : b;
-      const ValueRange both{lower.low, upper.high, lower.low_is_open, upper.high_is_open};
-      const bool is_empty = both.low > both.high ||
-                            (both.low == both.high && (both.low_is_open || both.high_is_open));
-      if (!is_empty) {
-        common.push_back(both);
-      }
+  auto a = ranges_.begin();
+  auto b = other.ranges_.begin();
+  while (a != ranges_.end() && b != other.ranges_.end()) {
+    const ValueRange& lower = begins_before(*a, *b) ? *b : *a;
+    const ValueRange& upper = ends_before(*a, *b) ? *a : *b;
+    const ValueRange both{lower.low, upper.high, lower.low_is_open, upper.high_is_open};
+    if (!both.is_empty()) {
+      common.push_back(both);
+    }
+    if (ends_before(*a, *b)) {
+      ++a;
+    } else {
+      ++b;
     }
   }
-  intervals_ = std::move(common);
+  ranges_ = std::move(common);
 }
 
 }  // namespace oblique::server

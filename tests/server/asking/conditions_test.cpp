@@ -36,6 +36,23 @@ TEST(Conditions, ASliceIsTheRowsOfItsLine) {
   EXPECT_EQ(spans(cube(), "H = 0.3 AND mu BETWEEN 0.02 AND 0.04"), (Spans{{290'000, 290'199}}));
 }
 
+TEST(Conditions, SetsOfNumbersAreJoinedAndCut) {
+  ValueSet set({1.0, 2.0, false, true});
+  set.unite(ValueSet({2.0, 3.0}));
+  set.unite(ValueSet({5.0, 5.0}));
+  set.unite(ValueSet({7.0, 6.0}));
+  ASSERT_EQ(set.ranges().size(), 2U);
+  EXPECT_TRUE(set.contains(1.0) && set.contains(2.0) && set.contains(3.0) && set.contains(5.0));
+  EXPECT_FALSE(set.contains(0.9) || set.contains(4.0) || set.contains(6.5));
+  ValueSet open({0.0, 2.0, true, true});
+  open.unite(ValueSet({2.0, 4.0, true, false}));
+  EXPECT_EQ(open.ranges().size(), 2U);
+  EXPECT_FALSE(open.contains(2.0) || open.contains(0.0));
+  set.intersect(open);
+  EXPECT_TRUE(set.contains(1.0) && set.contains(1.5) && set.contains(3.0));
+  EXPECT_FALSE(set.contains(2.0) || set.contains(5.0));
+}
+
 TEST(Conditions, EndsAreInOrOut) {
   EXPECT_EQ(count("H < 0.3"), 29U * 10'000);
   EXPECT_EQ(count("H <= 0.3"), 30U * 10'000);
