@@ -198,6 +198,12 @@ Effects Conversation::on_message(const protocol::ServerToWorker& message, std::i
     case protocol::ServerToWorker::kNotice:
       effects_.emplace_back(Note{message.notice().text()});
       break;
+    case protocol::ServerToWorker::kTraceOrder:
+      on(message.trace_order());
+      break;
+    case protocol::ServerToWorker::kTraceCancel:
+      effects_.emplace_back(CancelTrace{message.trace_cancel().trace_id()});
+      break;
     case protocol::ServerToWorker::kWelcome:  // said twice: the first one counts
     case protocol::ServerToWorker::KIND_NOT_SET:
       break;
@@ -223,6 +229,7 @@ void Conversation::on(const protocol::Welcome& welcome) {
 
   // The server has given up what this worker held and hands it out anew.
   effects_.emplace_back(DropAll{});
+  effects_.emplace_back(DropTraces{});
   held_.clear();
   studies_.clear();
   open_credit_ = 0;
@@ -357,6 +364,7 @@ void Conversation::begin_stop(const std::string& reason, bool points_are_solved,
     give_back(0);
   }
   effects_.emplace_back(DropAll{});
+  effects_.emplace_back(DropTraces{});
   held_.clear();
   finish_if_delivered();
 }

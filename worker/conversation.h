@@ -50,6 +50,8 @@ class Conversation {
   Effects start(std::int64_t now_ms);
   Effects on_message(const protocol::ServerToWorker& message, std::int64_t now_ms);
   Effects on_progress(std::vector<Progress> progress, std::int64_t now_ms);
+  /// What the tracing of a point gave so far.
+  Effects on_trace_parts(std::vector<protocol::TracePart> parts, std::int64_t now_ms);
   /// A message could not be sent; what follows it of the same effects must not be sent either.
   Effects on_send_failed(std::int64_t now_ms);
   /// The server has turned the socket away, for this reason, and people must mend that.
@@ -94,6 +96,7 @@ class Conversation {
   void on(const protocol::ResultsStored& stored);
   void on(const protocol::Withdraw& withdraw);
   void on(const protocol::Release& release);
+  void on(const protocol::TraceOrder& order);
   void on(const protocol::HelloAgain& again);
   void on(const protocol::HeartbeatReply& reply);
   void on(const protocol::ServerStopping& stopping);

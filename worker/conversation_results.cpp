@@ -112,6 +112,32 @@ void Conversation::give_credit() {
   open_credit_ = settings_.batches_held - static_cast<std::uint32_t>(held_.size());
 }
 
+// ---- Traces -----------------------------------------------------------------------------------
+
+void Conversation::on(const protocol::TraceOrder& order) {
+  leaving_.note_work(now_ms_);
+  if (!stopping_) {
+    effects_.emplace_back(SolveTrace{order});
+    return;
+  }
+  protocol::WorkerMessage message;
+  message.mutable_trace_part()->set_trace_id(order.trace_id());
+  message.mutable_trace_part()->set_last(true);
+  message.mutable_trace_part()->set_not_taken(true);
+  send(std::move(message));
+}
+
+Effects Conversation::on_trace_parts(std::vector<protocol::TracePart> parts, std::int64_t now_ms) {
+  now_ms_ = now_ms;
+  for (protocol::TracePart& part : parts) {
+    leaving_.note_work(now_ms);
+    protocol::WorkerMessage message;
+    *message.mutable_trace_part() = std::move(part);
+    send(std::move(message));
+  }
+  return take_effects();
+}
+
 // ---- Time that is over ------------------------------------------------------------------------
 
 std::vector<HeldPoints> Conversation::held_points() const {

@@ -31,6 +31,16 @@ struct DropBatch {
 };
 /// Drop all batches: whoever gets their points now is the server's to say.
 struct DropAll {};
+/// Solve that point beside all batches.
+struct SolveTrace {
+  protocol::TraceOrder order;
+};
+/// Nobody waits for that trace any more.
+struct CancelTrace {
+  std::uint64_t trace_id;
+};
+/// Whoever ordered traces has forgotten them.
+struct DropTraces {};
 /// Hello had no answer: people are to know why, as far as the socket shows it.
 struct TellSilence {};
 /// Worth a line in the log.
@@ -45,7 +55,8 @@ struct Finish {
 };
 
 using Effect =
-    std::variant<Connect, Send, Solve, DropStudy, DropBatch, DropAll, TellSilence, Note, Finish>;
+    std::variant<Connect, Send, Solve, DropStudy, DropBatch, DropAll, SolveTrace, CancelTrace,
+                 DropTraces, TellSilence, Note, Finish>;
 using Effects = std::vector<Effect>;
 
 }  // namespace oblique::worker

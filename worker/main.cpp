@@ -118,10 +118,12 @@ int run_worker(SessionSettings settings, const StopWithParent& parent) {
     notifier.status(running->status());
     notifier.turn(oblique::protocol::Notifier::Clock::now());
   };
-  oblique::worker::Session session(settings,
-                                   [&](const auto& batch, const auto& next, const auto& take) {
-                                     points.solve(batch, next, take);
-                                   });
+  oblique::worker::Session session(
+      settings,
+      [&](const auto& batch, const auto& next, const auto& take) {
+        points.solve(batch, next, take);
+      },
+      [&](const auto& order, const auto& sink) { return points.trace(order, sink); });
   spdlog::info("worker {}, solver {} ({}), threads {}, server {}", settings.name,
                oblique::solver::solver_version(), oblique::solver::instruction_set(),
                settings.threads, settings.server);

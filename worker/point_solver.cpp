@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "proto/recipe/model_message.h"
 #include "proto/result_message.h"
 #include "worker/solver/estimate.h"
 #include "worker/solver/model/fall_model.h"
@@ -163,6 +164,28 @@ void PointSolver::solve(const Batch& batch, const BatchSolver::NextPoint& next,
     } else {
       solver::solve_points(next_of_run, take_outcome);
     }
+  }
+}
+
+protocol::PointResult PointSolver::trace(const protocol::TraceOrder& order,
+                                         const solver::Tracing::Sink& sink) {
+  constexpr std::uint64_t kNumber = 0;
+  try {
+    const solver::ModelParameters model = protocol::from_message(order.model());
+    const solver::FallOutcome fall = falls_.fall(model);
+    if (!fall.fallen) {
+      throw solver::SolveError(fall.error);
+    }
+    const solver::Finger finger(model, fall.fallen);
+    auto result = finger.solve(order.h_m(), order.mu(), order.e_star(), {sink, order.shape()});
+    if (order.errors()) {
+      result.errors = solver::errors_by_companion(
+          model, result,
+          [this](std::span<const solver::ModelParameters> models) { return falls_of(models); });
+    }
+    return message_of({kNumber, std::move(result), {}});
+  } catch (const std::exception& error) {
+    return protocol::failed_point(kNumber, error.what());
   }
 }
 

@@ -68,11 +68,13 @@ Overloaded(Handlers...) -> Overloaded<Handlers...>;
 
 }  // namespace
 
-Session::Session(SessionSettings settings, BatchSolver::SolvePoints solve)
+Session::Session(SessionSettings settings, BatchSolver::SolvePoints solve,
+                 TraceSolver::Solve trace)
     : settings_(std::move(settings)),
       conversation_(hello_of(settings_), conversation_settings(settings_)),
       solver_(
-          std::move(solve), [this] { batch_ended_.wake(); }, settings_.threads) {}
+          std::move(solve), [this] { news_.wake(); }, settings_.threads),
+      tracer_(std::move(trace), [this] { news_.wake(); }) {}
 
 Session::~Session() = default;
 
@@ -132,7 +134,7 @@ int Session::run(int stop_descriptor, const std::function<void()>& on_stop) {
   apply(conversation_.start(now_ms()));
   while (!exit_code_) {
     zmq::pollitem_t items[] = {{link_->socket.handle(), 0, ZMQ_POLLIN, 0},
-                               {nullptr, batch_ended_.descriptor(), ZMQ_POLLIN, 0},
+                               {nullptr, news_.descriptor(), ZMQ_POLLIN, 0},
                                {nullptr, stop_descriptor, ZMQ_POLLIN, 0},
                                {link_->monitor.handle(), 0, ZMQ_POLLIN, 0}};
     try {
@@ -149,7 +151,7 @@ int Session::run(int stop_descriptor, const std::function<void()>& on_stop) {
     receive_all();
     note_rejection();
     if ((items[1].revents & ZMQ_POLLIN) != 0 || now_ms() >= report_due_ms_) {
-      batch_ended_.clear();
+      news_.clear();
       report_progress();
     }
     if ((items[2].revents & ZMQ_POLLIN) != 0) {
@@ -176,6 +178,7 @@ std::int64_t Session::poll_timeout_ms() const {
 
 void Session::report_progress() {
   apply(conversation_.on_progress(solver_.collect(), now_ms()));
+  apply(conversation_.on_trace_parts(tracer_.collect(), now_ms()));
   report_due_ms_ =
       now_ms() + (conversation_.is_stopping() ? kLastReports_ms : settings_.report_interval_ms);
 }
@@ -234,6 +237,9 @@ void Session::apply(Effects effects) {
       [&](const DropStudy& effect) { solver_.drop_study(effect.study_id); },
       [&](const DropBatch& effect) { solver_.drop_batch(effect.number); },
       [&](const DropAll&) { solver_.drop_all(); },
+      [&](SolveTrace& effect) { tracer_.take(std::move(effect.order)); },
+      [&](const CancelTrace& effect) { tracer_.cancel(effect.trace_id); },
+      [&](const DropTraces&) { tracer_.drop_all(); },
       [&](const TellSilence&) { tell_silence(); },
       [&](const Note& note) {
         spdlog::log(note.is_warning ? spdlog::level::warn : spdlog::level::info, "{}", note.text);

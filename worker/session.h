@@ -15,6 +15,7 @@
 #include "proto/system/wake_up.h"
 #include "worker/batch_solver.h"
 #include "worker/conversation.h"
+#include "worker/trace_solver.h"
 
 namespace oblique::worker {
 
@@ -30,11 +31,12 @@ struct SessionSettings {
   ConversationSettings conversation;
 };
 
-/// Runs a worker: the socket and the heartbeats on the calling thread, solving on another.
+/// Runs a worker: the socket and the heartbeats on the calling thread, solving on others.
 class Session {
  public:
-  /// Solves points by `solve`. Connects to nothing yet.
-  Session(SessionSettings settings, BatchSolver::SolvePoints solve);
+  /// Solves points of batches by `solve`, and those that somebody wants to look at by `trace`.
+  /// Connects to nothing yet.
+  Session(SessionSettings settings, BatchSolver::SolvePoints solve, TraceSolver::Solve trace);
   ~Session();
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
@@ -49,7 +51,7 @@ class Session {
   std::string status() const { return conversation_.status(); }
 
   /// Whether a point is still being solved: destruction would wait for it.
-  bool is_solving() const { return solver_.is_solving(); }
+  bool is_solving() const { return solver_.is_solving() || tracer_.is_solving(); }
 
  private:
   /// The socket of the present attempt.
@@ -78,11 +80,12 @@ class Session {
   unsigned attempt_ = 0;   ///< to connect: which of the families of addresses the host has is tried
   bool was_heard_ = true;  ///< something came over this socket
   std::set<std::string> told_causes_;  ///< of the server's silence, since it last welcomed us
-  protocol::WakeUp batch_ended_;
+  protocol::WakeUp news_;  ///< a batch ended, or there is more of a trace
   Conversation conversation_;
   std::optional<int> exit_code_;
   std::int64_t report_due_ms_ = 0;
-  BatchSolver solver_;  // last: its thread uses the ones above
+  BatchSolver solver_;  // these two last: their threads use the ones above
+  TraceSolver tracer_;
 };
 
 }  // namespace oblique::worker

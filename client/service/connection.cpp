@@ -160,7 +160,7 @@ protocol::ClientReply Connection::answer_to(const protocol::ClientRequest& reque
       if (!reply->has_still_working()) {
         return *std::move(reply);
       }
-      note_word(outstanding, reply->still_working(), tell != nullptr);
+      note_word(outstanding, reply->still_working(), tell != nullptr || request.has_trace());
     }
     if (tell && !said_silent && Clock::now() - outstanding.heard > kSilence) {
       tell(fmt::format("no answer from {} for {}: waiting until it is back", settings_.server_url,
@@ -262,6 +262,12 @@ protocol::WorkersReply Connection::workers() {
     all.MergeFrom(page);
   } while (after != 0);
   return all;
+}
+
+protocol::TraceReply Connection::trace(protocol::TraceRequest trace) {
+  protocol::ClientRequest request;
+  *request.mutable_trace() = std::move(trace);
+  return call(std::move(request)).trace();
 }
 
 protocol::ChangeReply Connection::change(const std::string& study, protocol::StudyChange change) {

@@ -85,6 +85,8 @@ class Connection {
                                   const Tell& tell = {});
   /// All workers, likewise.
   protocol::WorkersReply workers();
+  /// Waits for as long as the server says that it has the request, whose time limit it keeps.
+  protocol::TraceReply trace(protocol::TraceRequest trace);
   protocol::ChangeReply change(const std::string& study, protocol::StudyChange change);
   /// Gives the study of that number, as `status` has it, another name.
   protocol::ChangeReply rename(const protocol::StudyStatus& study, const std::string& name);

@@ -12,12 +12,11 @@
 #include "client/output/case_report.h"
 #include "client/output/mesh_note.h"
 #include "client/output/trace_table.h"
-#include "client/output/work_line.h"
 #include "client/study/point_flags.h"
+#include "client/verbs/solve_here.h"
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
 #include "proto/recipe/point_table.h"
-#include "worker/solver/estimate.h"
 #include "worker/solver/solve.h"
 
 namespace oblique::client {
@@ -49,11 +48,11 @@ void check_one_point(const protocol::PointTable& table) {
 }
 
 /// Where a trace goes: a file, or standard output.
-class TraceOutput {
+class SolveTraceOutput {
  public:
   /// Throws InputError when `where` is not a file that can be written, or standard output that
   /// `json` has already.
-  TraceOutput(std::string where, bool json) : where_(std::move(where)) {
+  SolveTraceOutput(std::string where, bool json) : where_(std::move(where)) {
     if (where_.empty()) {
       throw solver::InputError("--trace is empty: name a file, or - for standard output");
     }
@@ -74,9 +73,9 @@ class TraceOutput {
   /// Whether its rows come to where progress is shown.
   bool fills_terminal() const { return is_standard_output() && isatty(STDOUT_FILENO) == 1; }
   void begin(const solver::ModelParameters& model, bool shape) {
-    const std::size_t links = model.lengths_m.size();
-    const auto elements = links * static_cast<std::size_t>(model.elements_per_link);
-    print_trace_header(out(), links, shape ? elements + 1 : 0);
+    print_trace_header(
+        out(), solver::trace_shape(model.lengths_m.size(),
+                                   static_cast<std::size_t>(model.elements_per_link), shape));
   }
   void add(const solver::TraceRow& row) { print_trace_row(out(), row); }
   void finish() {
@@ -93,36 +92,12 @@ class TraceOutput {
   std::ofstream file_;
 };
 
-solver::CaseResult solved(const solver::Finger& finger, const protocol::Point& point,
-                          const solver::Tracing& tracing, bool is_terminal_taken) {
-  WorkLineSettings settings;
-  settings.on_terminal = settings.on_terminal && !is_terminal_taken;
-  WorkLine line(std::cerr, settings);
-  static_cast<void>(largest_drop_m(finger, line));
-  const auto touching =
-      line.begin(fmt::format("on {} elements a link: contact", finger.model().elements_per_link));
-  return finger.solve(point.H_m, point.mu, point.e_star, tracing);
-}
-
-/// Nothing when the coarser solution of the point has no answer.
-solver::ErrorEstimate errors_of(const solver::ModelParameters& model,
-                                const solver::CaseResult& result, bool is_terminal_taken) {
-  try {
-    const solver::Finger companion(solver::companion_model(model));
-    const protocol::Point point{0, result.H_m, result.mu, result.e_star};
-    return solver::estimated_errors(model, result, solved(companion, point, {}, is_terminal_taken));
-  } catch (const std::exception& error) {
-    std::cerr << "Errors cannot be estimated: on half the mesh, " << error.what() << '\n';
-    return {};
-  }
-}
-
 int solve(const SolveFlags& flags) {
   const protocol::PointTable table(recipe_of_flags(flags.points, tip_reach()));
   check_one_point(table);
   const auto point = table.point(0);
   const solver::Finger finger(table.model(0));
-  std::optional<TraceOutput> trace;
+  std::optional<SolveTraceOutput> trace;
   solver::Tracing tracing;
   if (flags.trace) {
     trace.emplace(*flags.trace, flags.json);
@@ -131,10 +106,8 @@ int solve(const SolveFlags& flags) {
     tracing.with_shape = flags.trace_shape;
   }
   const bool is_terminal_taken = trace && trace->fills_terminal();
-  auto result = solved(finger, point, tracing, is_terminal_taken);
-  if (flags.errors) {
-    result.errors = errors_of(finger.model(), result, is_terminal_taken);
-  }
+  const auto result = solve_here(finger, {point.H_m, point.mu, point.e_star, flags.errors}, tracing,
+                                 is_terminal_taken);
   if (flags.json) {
     std::cout << json_of(result).dump(2) << '\n';
   } else {

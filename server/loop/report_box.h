@@ -7,7 +7,7 @@
 
 #include "proto/system/wake_up.h"
 #include "server/queries/query_pool.h"
-#include "server/service/request_reader.h"
+#include "server/service/outbox/request_reader.h"
 #include "server/store/writer.h"
 
 namespace oblique::server {

@@ -61,6 +61,10 @@ void ClientsDesk::read_elsewhere(const Client& client, std::string_view frame) {
 }
 
 void ClientsDesk::request_read(const ReadReport& report, Instant now) {
+  if (report.point) {
+    at_.traces.point_read(report.ticket, *report.point, now);
+    return;
+  }
   const auto found = long_requests_.find(report.ticket);
   if (found == long_requests_.end()) {
     return;
@@ -124,6 +128,9 @@ void ClientsDesk::answer(const Client& client, const ReadRequest& read, Instant 
       break;
     case Kind::kDescribe:
       describe(client, request.describe());
+      break;
+    case Kind::kTrace:
+      trace(client, request.trace(), now);
       break;
     case Kind::KIND_NOT_SET:
       at_.bad_frames.count("a client");
@@ -240,6 +247,27 @@ void ClientsDesk::workers(const Client& client, const protocol::WorkersRequest& 
   at_.clients.to_client(client.identity, reply);
 }
 
+void ClientsDesk::trace(const Client& client, const protocol::TraceRequest& request, Instant now) {
+  const auto known = at_.sources.states.find_durable(request.study());
+  if (!known) {
+    at_.clients.reply_error(client, unknown_study(request.study()));
+    return;
+  }
+  const StudyRecord& study = at_.sources.states.record(*known);
+  if (request.point() >= study.table.size()) {
+    at_.clients.reply_error(
+        client, fmt::format("the study \"{}\" has no point {}: its points are 0 to {}",
+                            study.name, request.point(), study.table.size() - 1));
+  } else if (study.failures.contains(request.point()) && !request.only_point()) {
+    at_.clients.reply_error(client, fmt::format("point {} of the study \"{}\" failed and has no "
+                                                "trace: `oblique retry` solves it again",
+                                                request.point(), study.name));
+  } else {
+    at_.traces.ask(client, request,
+                   {*known, study.table, at_.sources.scheduler.study(*known).solver_version}, now);
+  }
+}
+
 /// Who was turned away, and what the holders of keys have.
 void ClientsDesk::add_keys(protocol::WorkersReply& reply) const {
   const PeerCounts peers = at_.network.peer_counts();
@@ -270,6 +298,7 @@ void ClientsDesk::stop() {
     at_.clients.reply_error(request.client, "the server is stopping: ask again when it is back");
   }
   queries_.stop();
+  at_.traces.stop();
 }
 
 }  // namespace oblique::server

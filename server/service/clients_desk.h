@@ -8,10 +8,11 @@
 #include <utility>
 
 #include "proto/oblique.pb.h"
-#include "server/service/log_limits.h"
-#include "server/service/outbox.h"
-#include "server/service/request_reader.h"
+#include "server/service/outbox/log_limits.h"
+#include "server/service/outbox/outbox.h"
+#include "server/service/outbox/request_reader.h"
 #include "server/service/study_changes.h"
+#include "server/service/traces/trace_desk.h"
 #include "server/service/views.h"
 #include "server/service/waiting_queries.h"
 #include "server/service/workers_desk.h"
@@ -47,6 +48,7 @@ class ClientsDesk {
     OpenStudies& open;
     const ToNetwork& network;
     const SettledRates& worker_rates;
+    TraceDesk& traces;
   };
 
   ClientsDesk(const ClientsDeskSettings& settings, const Neighbours& neighbours);
@@ -58,9 +60,15 @@ class ClientsDesk {
   void request_read(const ReadReport& report, Instant now);
   void queried(QueryReport report) { queries_.report(std::move(report)); }
   /// The connection of that client is gone, and nothing of it waits to be taken.
-  void client_left(std::string_view identity) { queries_.client_left(identity); }
+  void client_left(std::string_view identity) {
+    queries_.client_left(identity);
+    at_.traces.client_left(identity);
+  }
   /// To be called several times a second.
-  void tick(Instant now) { queries_.tick(now); }
+  void tick(Instant now) {
+    queries_.tick(now);
+    at_.traces.tick(now);
+  }
   /// The server will stop: no study is taken any more.
   void drain() { draining_ = true; }
   /// The server stops: who waits here is told, and what is asked from now on is refused.
@@ -84,6 +92,7 @@ class ClientsDesk {
   void describe(const Client& client, const protocol::DescribeRequest& request);
   void workers(const Client& client, const protocol::WorkersRequest& request, Instant now);
   void add_keys(protocol::WorkersReply& reply) const;
+  void trace(const Client& client, const protocol::TraceRequest& request, Instant now);
 
   ClientsDeskSettings settings_;
   Neighbours at_;

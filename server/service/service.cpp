@@ -21,6 +21,8 @@ Service::Service(const ServiceSettings& settings, Outbox& outbox, std::vector<St
       open_(settings.bounds),
       changes_(settings.last_study_id, states_, ledger_, {scheduler_, states_, ledger_, rates_},
                open_, outbox, outbox),
+      traces_(settings.traces, settings.solver_version, outbox, outbox,
+              settings.clients.still_working_every_ms),
       clients_(settings.clients, {outbox,
                                   outbox,
                                   bad_frames_,
@@ -29,7 +31,8 @@ Service::Service(const ServiceSettings& settings, Outbox& outbox, std::vector<St
                                   {scheduler_, states_, ledger_, rates_},
                                   open_,
                                   outbox,
-                                  worker_rates_}) {
+                                  worker_rates_,
+                                  traces_}) {
   for (StoredStudy& study : studies) {
     states_.restore(study, now.steady_ms);
     feed(StudyAdded{study.study_id, study.table, std::move(study.settled), study.failures.size(),
@@ -49,19 +52,35 @@ void Service::worker_frame(const std::string& identity, std::string_view frame, 
   for (const Event& event : heard.events) {
     handle(event, {now, &heard.results});
   }
+  if (heard.trace_of != 0) {
+    traces_.part(heard.trace_of, heard.trace_part);
+  }
   handle_found(now);
   hand_out_or_hold(now);
+  send_traces();
 }
 
 void Service::client_frame(const std::string& identity, std::string_view frame, Instant now,
                            const std::shared_ptr<const KeyHolder>& holder) {
   clients_.take(identity, frame, now, holder);
+  send_traces();
+}
+
+void Service::request_read(const ReadReport& report, Instant now) {
+  clients_.request_read(report, now);
+  send_traces();
+}
+
+void Service::client_left(std::string_view identity) {
+  clients_.client_left(identity);
+  send_traces();
 }
 
 void Service::tick(Instant now) {
   workers_.tick([&](WorkerId id) { return scheduler_.silent_ms(id, now.steady_ms); }, now);
   feed(Tick{}, now);
   clients_.tick(now);
+  send_traces();
   rates_.sample([this](StudyId id) { return settled_of(id); }, now.steady_ms);
   // One that is gone comes to rest at 0.
   worker_rates_.sample(
@@ -83,6 +102,7 @@ void Service::stop(Instant now) {
   hand_out_or_hold(now);
   workers_.stop();
   clients_.stop();
+  send_traces();
 }
 
 double Service::points_per_s(std::int64_t now_ms) const {
@@ -104,6 +124,30 @@ void Service::feed(const Event& event, Instant now) {
 void Service::handle(const Event& event, Turn turn) {
   for (const Effect& effect : scheduler_.handle(event, turn.now.steady_ms)) {
     std::visit([&](const auto& kind) { perform(kind, turn); }, effect);
+  }
+  tell_traces(event);
+}
+
+/// Those who solve traces are the workers.
+void Service::tell_traces(const Event& event) {
+  if (const auto* joined = std::get_if<WorkerJoined>(&event)) {
+    if (const WorkerRecord* worker = workers_.find(joined->worker)) {
+      traces_.joined(joined->worker, worker->name, worker->solver_version, worker->instruction_set);
+    }
+  } else if (const auto* left = std::get_if<WorkerLeft>(&event)) {
+    traces_.left(left->worker);
+  } else if (const auto* busy = std::get_if<WorkerBusy>(&event)) {
+    traces_.set_busy(busy->worker, busy->is_busy);
+  }
+}
+
+void Service::send_traces() {
+  for (const TraceEffect& effect : traces_.take_orders()) {
+    if (const auto* order = std::get_if<SendOrder>(&effect)) {
+      workers_.send(*order);
+    } else if (const auto* cancel = std::get_if<CancelOrder>(&effect)) {
+      workers_.send(*cancel);
+    }
   }
 }
 
@@ -152,6 +196,7 @@ void Service::perform(const ReleaseBatch& effect, Turn /*turn*/) {
 }
 
 void Service::perform(const DropWorker& effect, Turn turn) {
+  traces_.left(effect.worker);
   workers_.drop(effect, turn.now);
 }
 

@@ -10,10 +10,11 @@
 #include "server/scheduler/scheduler.h"
 #include "server/service/clients_desk.h"
 #include "server/service/counts/settled_rates.h"
-#include "server/service/log_limits.h"
-#include "server/service/outbox.h"
+#include "server/service/outbox/log_limits.h"
+#include "server/service/outbox/outbox.h"
 #include "server/service/study_changes.h"
 #include "server/service/counts/study_states.h"
+#include "server/service/traces/trace_desk.h"
 #include "server/service/workers_desk.h"
 #include "server/service/write_ledger.h"
 #include "server/store/store.h"
@@ -25,6 +26,7 @@ struct ServiceSettings {
   LedgerLimits ledger;
   ClientsDeskSettings clients;
   StudyBounds bounds;
+  TraceLimits traces;
   std::uint32_t heartbeat_interval_ms = 900;
   std::string solver_version;  ///< workers with another one are told so
   std::string database_id;
@@ -56,9 +58,9 @@ class Service {
                     const std::shared_ptr<const KeyHolder>& holder = nullptr);
   void written(const WriteReport& report, Instant now);
   void queried(QueryReport report) { clients_.queried(std::move(report)); }
-  void request_read(const ReadReport& report, Instant now) { clients_.request_read(report, now); }
+  void request_read(const ReadReport& report, Instant now);
   /// The connection of that client is gone.
-  void client_left(std::string_view identity) { clients_.client_left(identity); }
+  void client_left(std::string_view identity);
   /// To be called several times a second.
   void tick(Instant now);
   /// Nothing is handed out and no study taken any more; results are, and all else goes on.
@@ -99,6 +101,8 @@ class Service {
   void handle(const Event& event, Turn turn);
   void handle_found(Instant now);
   void hand_out_or_hold(Instant now);
+  void tell_traces(const Event& event);
+  void send_traces();
   std::uint64_t settled_of(StudyId id) const;
 
   void perform(const DefineStudy& effect, Turn turn);
@@ -142,6 +146,7 @@ class Service {
   WorkersDesk workers_;
   OpenStudies open_;
   StudyChanges changes_;
+  TraceDesk traces_;
   ClientsDesk clients_;
   StoredPoints stored_points_;
   bool stopping_ = false;

@@ -9,7 +9,7 @@
 
 #include "server/scheduler/scheduler_events.h"
 #include "server/service/counts/open_studies.h"
-#include "server/service/outbox.h"
+#include "server/service/outbox/outbox.h"
 #include "server/service/views.h"
 
 namespace oblique::server {

@@ -7,7 +7,7 @@
 
 #include "proto/oblique.pb.h"
 #include "server/queries/query_pool.h"
-#include "server/service/outbox.h"
+#include "server/service/outbox/outbox.h"
 
 namespace oblique::server {
 

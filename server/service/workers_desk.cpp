@@ -99,6 +99,11 @@ Heard WorkersDesk::take(const std::string& identity, std::string_view frame, Ins
       heard.events.emplace_back(BatchesReturned{worker, {leases.begin(), leases.end()}});
       break;
     }
+    case Kind::kTracePart:
+      heard.events.emplace_back(CreditGiven{worker, 0});  // it lives
+      heard.trace_of = worker;
+      heard.trace_part = std::move(*message.mutable_trace_part());
+      break;
     case Kind::kGoodbye:
       note(Severity::kInfo, fmt::format("worker {} leaves", worker), now);
       forget(worker);

@@ -10,8 +10,9 @@
 
 #include "proto/oblique.pb.h"
 #include "server/scheduler/scheduler_events.h"
-#include "server/service/log_limits.h"
-#include "server/service/outbox.h"
+#include "server/service/outbox/log_limits.h"
+#include "server/service/outbox/outbox.h"
+#include "server/service/traces/trace_orders.h"
 #include "server/service/write_ledger.h"
 
 namespace oblique::server {
@@ -46,6 +47,8 @@ struct WorkerRecord {
 struct Heard {
   std::vector<Event> events;  ///< for the scheduler, in order
   protocol::Results results;  ///< that a ResultsReceived among them tells of
+  WorkerId trace_of = 0;      ///< worker that sent a part of a trace; 0: none did
+  protocol::TracePart trace_part;
 };
 
 /// Speaks with workers: makes the scheduler's events of their messages, and messages of what the
@@ -66,6 +69,8 @@ class WorkersDesk {
   void send(const AcknowledgeResults& stored);
   void send(const WithdrawStudy& withdraw);
   void send(const ReleaseBatch& release);
+  void send(const SendOrder& order);
+  void send(const CancelOrder& cancel);
   /// The recipe goes out as it is kept: encoding a long one again for each worker would hold up the
   /// others.
   void define(const DefineStudy& define, const std::string& recipe_bytes);

@@ -59,6 +59,18 @@ void WorkersDesk::send(const ReleaseBatch& release) {
   send(release.worker, message);
 }
 
+void WorkersDesk::send(const SendOrder& order) {
+  protocol::ServerToWorker message;
+  *message.mutable_trace_order() = order.order;
+  send(order.worker, message);
+}
+
+void WorkersDesk::send(const CancelOrder& cancel) {
+  protocol::ServerToWorker message;
+  message.mutable_trace_cancel()->set_trace_id(cancel.trace_id);
+  send(cancel.worker, message);
+}
+
 void WorkersDesk::define(const DefineStudy& define, const std::string& recipe_bytes) {
   const auto known = workers_.find(define.worker);
   if (known == workers_.end()) {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "server/scheduler/scheduler_events.h"
-#include "server/service/outbox.h"
+#include "server/service/outbox/outbox.h"
 
 namespace oblique::server {
 

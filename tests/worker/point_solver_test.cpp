@@ -209,5 +209,68 @@ TEST(PointSolverTest, ResultsHaveErrorsWhereTheStudyWantsThemAndElseTheSameNumbe
   }
 }
 
+/// The bytes of a result but for its number and the time that it took.
+std::string bits_of(const protocol::PointResult& result) {
+  auto outputs = protocol::from_message(result);
+  outputs.solver.wall_s = 0.0;
+  return protocol::to_message(0, outputs).SerializeAsString();
+}
+
+/// The order for a point of a recipe.
+protocol::TraceOrder order_of(const Batch& batch, std::uint64_t number) {
+  const protocol::Point point = batch.points->point(number);
+  protocol::TraceOrder order;
+  *order.mutable_model() = protocol::to_message(batch.points->model(point.model));
+  order.set_h_m(point.H_m);
+  order.set_mu(point.mu);
+  order.set_e_star(point.e_star);
+  order.set_errors(batch.points->wants_errors());
+  return order;
+}
+
+TEST(PointSolverTest, ATracedPointHasTheBitsThatItHadInItsBatch) {
+  for (const solver::Integrator integrator :
+       {solver::Integrator::kExplicit, solver::Integrator::kGeneralizedAlpha}) {
+    for (const bool errors : {false, true}) {
+      solver::ModelParameters model;
+      model.integrator = integrator;
+      model.elements_per_link = 2;
+      protocol::Recipe recipe = recipe_with_points(integrator == solver::Integrator::kExplicit ? 12 : 2);
+      *recipe.mutable_model() = protocol::to_message(model);
+      add_model_axis(recipe, "k", {2e7, 3e7});
+      recipe.set_errors(errors);
+      const Batch batch = batch_of(recipe);
+      PointSolver solver(1);
+      const auto results = solved(batch, solver);
+      for (const bool shape : {false, true}) {
+        for (const std::uint64_t number : {std::uint64_t{0}, batch.count - 1}) {
+          std::size_t rows = 0;
+          protocol::TraceOrder order = order_of(batch, number);
+          order.set_shape(shape);
+          const auto traced = solver.trace(order, [&](const solver::TraceRow& row) {
+            ++rows;
+            EXPECT_EQ(row.nodes_m.empty(), !shape);
+          });
+          ASSERT_EQ(traced.error(), "");
+          EXPECT_EQ(bits_of(traced), bits_of(results[number]))
+              << "errors " << errors << " shape " << shape << " point " << number;
+          EXPECT_GT(rows, 10U);
+        }
+      }
+    }
+  }
+}
+
+TEST(PointSolverTest, ATraceWithoutAnswerFailsWithTheReasonOfItsPoint) {
+  PointSolver solver(1);
+  const Batch batch = batch_of(recipe_with_points(2));
+  protocol::TraceOrder order = order_of(batch, 0);
+  order.set_h_m(1.19);  // beyond the largest drop
+  const auto nothing = [](const solver::TraceRow&) {};
+  EXPECT_NE(solver.trace(order, nothing).error().find("1.19"), std::string::npos);
+  order.mutable_model()->set_e_pa(-1.0);
+  EXPECT_NE(solver.trace(order, nothing).error().find("E = -1"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace oblique::worker

@@ -80,7 +80,7 @@ class ScriptedServer {
 class RunningWorker {
  public:
   explicit RunningWorker(const std::string& server, BatchSolver::SolvePoints solve)
-      : session_(settings(server), std::move(solve)),
+      : session_(settings(server), std::move(solve), fails_the_trace),
         exit_code_(std::async(std::launch::async, [this] {
           return session_.run(stop_.descriptor(), [this] { stop_.clear(); });
         })) {}
@@ -92,6 +92,10 @@ class RunningWorker {
   int exit_code() { return exit_code_.get(); }
 
  private:
+  static protocol::PointResult fails_the_trace(const protocol::TraceOrder& order,
+                                               const solver::Tracing::Sink& /*sink*/) {
+    return protocol::failed_point(0, "H = " + std::to_string(order.h_m()) + " for the test");
+  }
   static SessionSettings settings(const std::string& server) {
     SessionSettings settings;
     settings.server = server;
@@ -127,6 +131,29 @@ TEST(SessionTest, ABatchIsSolvedAndReportedAndAStoppedWorkerSaysGoodbye) {
   worker.stop();
   server.wait_for(WorkerMessage::kGoodbye);
   EXPECT_EQ(worker.exit_code(), 0);
+}
+
+TEST(SessionTest, ATraceIsSolvedBesideABatchThatTakesLong) {
+  ScriptedServer server;
+  std::promise<void> release;
+  const std::shared_future<void> released(release.get_future());
+  RunningWorker worker(server.endpoint(),
+                       [&](const Batch& batch, const auto& next, const auto& take) {
+                         released.wait();
+                         solved_at_once(batch, next, take);
+                       });
+  server.welcome_and_hand_out(1);
+  protocol::ServerToWorker order;
+  order.mutable_trace_order()->set_trace_id(5);
+  order.mutable_trace_order()->set_h_m(3.0);
+  server.send(order);
+  const auto part = server.wait_for(WorkerMessage::kTracePart).trace_part();
+  EXPECT_EQ(part.trace_id(), 5U);
+  EXPECT_TRUE(part.last());
+  EXPECT_NE(part.result().error().find("H = 3"), std::string::npos);
+  release.set_value();
+  const auto results = server.wait_for(WorkerMessage::kResults).results();
+  server.send(stored_message(results.sequence()));
 }
 
 TEST(SessionTest, HeartbeatsGoOnWhileAPointIsSolved) {
@@ -204,7 +231,7 @@ TEST(SessionTest, AnAddressThatIsNoneIsAnErrorThatNamesIt) {
   for (const std::string address : {"", "localhost", "tcp://127.0.0.1", "tcp://127.0.0.1:port"}) {
     SessionSettings settings;
     settings.server = address;
-    Session session(settings, solved_at_once);
+    Session session(settings, solved_at_once, {});
     const protocol::WakeUp stop;
     try {
       session.run(stop.descriptor(), [] {});

@@ -200,6 +200,25 @@ ErrorEstimate estimated_errors(const ModelParameters& model, const CaseResult& r
   return errors;
 }
 
+ErrorEstimate errors_by_companion(const ModelParameters& model, const CaseResult& result,
+                                  const FallSource& companion_falls) {
+  const ModelParameters companion = companion_model(model);
+  if (companion.elements_per_link >= model.elements_per_link) {
+    return {};
+  }
+  const FallOutcome fall = companion_falls({&companion, 1}).front();
+  try {
+    return fall.fallen ? estimated_errors(model, result,
+                                          Finger(companion, fall.fallen)
+                                              .solve(result.H_m, result.mu, result.e_star))
+                       : ErrorEstimate{};
+  } catch (const SolveError&) {
+    return {};
+  } catch (const InputError&) {  // beyond the drop of the companion's fall
+    return {};
+  }
+}
+
 void solve_points_with_errors(const std::function<std::optional<FingerPoint>()>& source,
                               const FallSource& companion_falls,
                               const std::function<void(PointOutcome&&)>& sink) {

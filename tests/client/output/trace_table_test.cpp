@@ -33,7 +33,7 @@ solver::TraceRow row_of_two_links() {
 
 TEST(TraceTable, HasAColumnForEveryHeading) {
   std::ostringstream out;
-  print_trace_header(out, 2, 0);
+  print_trace_header(out, {2, 0});
   print_trace_row(out, row_of_two_links());
   EXPECT_EQ(out.str(),
             "t_s,fn_N,ft_N,uy_m,ux_m,xP_m,vP_m_s,x_m,y_m,vt_m_s,vn_m_s,state,"
@@ -44,7 +44,7 @@ TEST(TraceTable, HasAColumnForEveryHeading) {
 
 TEST(TraceTable, HasTwoColumnsForEachNodeOfAShape) {
   std::ostringstream header;
-  print_trace_header(header, 1, 2);
+  print_trace_header(header, {1, 2});
   EXPECT_TRUE(header.str().ends_with("momentum_y_Ns,node0x_m,node0y_m,node1x_m,node1y_m\n"))
       << header.str();
   solver::TraceRow row = row_of_two_links();

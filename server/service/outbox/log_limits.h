@@ -6,7 +6,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "server/service/outbox.h"
+#include "server/service/outbox/outbox.h"
 
 // What peers can cause without end must not become a flood of lines in the log.
 namespace oblique::server {

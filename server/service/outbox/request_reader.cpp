@@ -1,4 +1,4 @@
-#include "server/service/request_reader.h"
+#include "server/service/outbox/request_reader.h"
 
 #include <exception>
 #include <memory>
@@ -7,8 +7,48 @@
 #include "proto/frame_scan.h"
 #include "proto/frames.h"
 #include "proto/recipe/checks.h"
+#include "proto/recipe/model_message.h"
 
 namespace oblique::server {
+namespace {
+
+TracedPoint read_point(const std::string& recipe_bytes, std::uint64_t point) {
+  TracedPoint traced;
+  protocol::Recipe recipe;
+  if (!recipe.ParseFromString(recipe_bytes)) {
+    traced.objection = "the bytes of its study are damaged";
+    return traced;
+  }
+  try {
+    return traced_point(protocol::PointTable(std::move(recipe)), point);
+  } catch (const std::exception& error) {
+    traced.objection = error.what();
+    return traced;
+  }
+}
+
+}  // namespace
+
+TracedPoint traced_point(const protocol::PointTable& table, std::uint64_t point) {
+  const protocol::Point values = table.point(point);
+  return {protocol::to_message(table.model(values.model)),
+          values.H_m,
+          values.mu,
+          values.e_star,
+          table.wants_errors(),
+          {}};
+}
+
+protocol::TraceReply said_of(const TracedPoint& point) {
+  protocol::TraceReply reply;
+  *reply.mutable_model() = point.model;
+  reply.set_h_m(point.H_m);
+  reply.set_mu(point.mu);
+  reply.set_e_star(point.e_star);
+  reply.set_errors(point.errors);
+  return reply;
+}
+
 ReadRequest read_request(std::string_view frame) {
   // Padding cannot make much of a shorter frame.
   constexpr std::size_t kLookedAtAbove = std::size_t{64} * 1024;
@@ -62,8 +102,15 @@ void RequestReader::run() {
     }
     ReadReport report{job.ticket, {}};
     try {
-      report.read = read_request(job.frame);
+      if (job.of_study) {
+        report.point = read_point(job.of_study->recipe_bytes(), job.point);
+      } else {
+        report.read = read_request(job.frame);
+      }
     } catch (const std::exception&) {  // there is no memory for it
+      if (job.of_study) {
+        report.point.emplace().objection = "there is no memory to read its study";
+      }
       report.read.request_id = protocol::request_id_of(job.frame);
     }
     report_(std::move(report));

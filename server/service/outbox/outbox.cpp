@@ -1,4 +1,4 @@
-#include "server/service/outbox.h"
+#include "server/service/outbox/outbox.h"
 
 #include <ctime>
 

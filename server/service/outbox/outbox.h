@@ -11,7 +11,7 @@
 #include "server/network/curve/doorkeeper.h"
 #include "server/network/delivery.h"
 #include "server/queries/query_turns.h"
-#include "server/service/request_reader.h"
+#include "server/service/outbox/request_reader.h"
 #include "server/store/writer.h"
 
 // What the service asks of the world around it, by whom it asks it. Nothing here may block or call

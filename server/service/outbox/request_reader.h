@@ -5,6 +5,7 @@
 #include <deque>
 #include <functional>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -27,18 +28,36 @@ struct ReadRequest {
 /// with empty messages is not read.
 ReadRequest read_request(std::string_view frame);
 
-/// A frame that is too long to be read in the loop.
+/// One point of a study, with all that solving it needs.
+struct TracedPoint {
+  protocol::ModelParameters model;
+  double H_m = 0.0;
+  double mu = 0.0;
+  double e_star = 0.0;
+  bool errors = false;    ///< its study wants estimated errors
+  std::string objection;  ///< why there is no such point; empty: there is
+};
+
+TracedPoint traced_point(const protocol::PointTable& table, std::uint64_t point);
+/// The reply that says what the point is, and nothing of its trace.
+protocol::TraceReply said_of(const TracedPoint& point);
+
+/// What is too long to be read in the loop: a frame, or where `of_study` is set the recipe of a
+/// study, of which one point is wanted.
 struct ReadJob {
   std::uint64_t ticket;
   std::string frame;
+  std::optional<StudyTable> of_study = {};  ///< only its bytes are looked at
+  std::uint64_t point = 0;
 };
 struct ReadReport {
   std::uint64_t ticket;
   ReadRequest read;
+  std::optional<TracedPoint> point = {};
 };
 
-/// Reads long requests one after another on a thread of its own, so that a large recipe holds up
-/// nothing but other large requests.
+/// Reads long requests and recipes one after another on a thread of its own, so that a large recipe
+/// holds up nothing but other large ones.
 class RequestReader {
  public:
   using Report = std::function<void(ReadReport)>;

@@ -1,0 +1,190 @@
+#include "client/trace/stored_row.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <stdexcept>
+#include <utility>
+
+#include <stdlib.h>
+
+#include <nlohmann/json.hpp>
+#include <spdlog/fmt/fmt.h>
+
+#include "server/asking/sql_expression.h"
+#include "proto/recipe/model_message.h"
+#include "proto/recipe/point_table.h"
+#include "proto/result_message.h"
+#include "server/database/sqlite.h"
+#include "server/reading/reader.h"
+#include "server/store/store.h"
+#include "worker/solver/model/result_fields.h"
+
+namespace oblique::client {
+namespace {
+
+using protocol::Value;
+
+constexpr const char* kStudyOfOne = "one";
+
+/// A folder that is gone with this.
+class ShortLivedFolder {
+ public:
+  ShortLivedFolder() {
+    std::string name = (std::filesystem::temp_directory_path() / "oblique-trace-XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr) {
+      throw server::StorageError("no folder can be made in " +
+                                 std::filesystem::temp_directory_path().string());
+    }
+    path_ = name;
+  }
+  ~ShortLivedFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  ShortLivedFolder(const ShortLivedFolder&) = delete;
+  ShortLivedFolder& operator=(const ShortLivedFolder&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+protocol::Recipe recipe_of(const PointAtHand& point) {
+  protocol::Recipe recipe;
+  *recipe.mutable_model() = protocol::to_message(point.model);
+  recipe.set_errors(point.errors);
+  auto& block = *recipe.add_blocks();
+  for (const auto& [key, value] :
+       {std::pair{"H", point.H_m}, {"mu", point.mu}, {"e", point.e_star}}) {
+    auto& axis = *block.add_axes();
+    axis.set_key(key);
+    axis.add_values(value);
+  }
+  return recipe;
+}
+
+/// The row that this database has of a result when it is stored.
+StoredRow row_once_stored(const PointAtHand& point, const solver::CaseResult& result) {
+  constexpr std::uint64_t kStudy = 1;
+  constexpr const char* kAnyTime = "2000-01-01T00:00:00.000Z";
+  const ShortLivedFolder folder;
+  const std::string file = (folder.path() / "one.db").string();
+  server::Store store(file);
+  const auto table = std::make_shared<const protocol::PointTable>(recipe_of(point));
+  const std::vector<server::Change> changes{
+      server::AddStudy{kStudy, kStudyOfOne, table, kAnyTime},
+      server::AddResults{
+          kStudy, table, 0, result.solver.version, "", 1, kAnyTime, {protocol::to_message(0, result)}}};
+  store.commit(changes);
+  return StoredRow(server::Reader(file).query("SELECT * FROM runs", server::kNoLimits));
+}
+
+nlohmann::json json_of_cells(std::span<const solver::Cell> cells) {
+  auto array = nlohmann::json::array();
+  for (const auto& cell : cells) {
+    std::visit(
+        [&](const auto& value) {
+          using Type = std::decay_t<decltype(value)>;
+          if constexpr (std::is_same_v<Type, bool>) {
+            array.push_back(value ? 1 : 0);
+          } else {
+            array.push_back(value);
+          }
+        },
+        cell);
+  }
+  return array;
+}
+
+/// Whether a packed list is that of the result, with every digit.
+bool is_list_of(const Value& packed, const solver::ResultList& list,
+                const solver::CaseResult& result) {
+  auto all = nlohmann::json::array();
+  list.each(result, [&](std::span<const solver::Cell> cells) { all.push_back(json_of_cells(cells)); });
+  return nlohmann::json::parse(packed.text(), nullptr, false) == all;
+}
+
+template <class T>
+bool is_value_of(const Value& stored, const T* value) {
+  if (value == nullptr) {
+    return stored.kind_case() == Value::KIND_NOT_SET;
+  }
+  if constexpr (std::is_same_v<T, double>) {
+    return stored.has_real() && stored.real() == *value;
+  } else if constexpr (std::is_same_v<T, std::string>) {
+    return stored.text() == *value;
+  } else {
+    return stored.integer() == *value;
+  }
+}
+
+/// Whether a stored value is that of the result with every digit, as earlier schemas have it.
+bool is_exact(const Value& stored, const solver::ResultField& field,
+              const solver::CaseResult& result) {
+  if (const auto* list = std::get_if<solver::ListPart>(&field.value)) {
+    return is_list_of(stored, *list->list, result);
+  }
+  return std::visit(
+      [&](const auto& member) {
+        if constexpr (std::is_same_v<std::decay_t<decltype(member)>, solver::ListPart>) {
+          return false;
+        } else {
+          return is_value_of(stored, member.of(result));
+        }
+      },
+      field.value);
+}
+
+bool is_same(const Value& a, const Value& b) {
+  return a.SerializeAsString() == b.SerializeAsString();
+}
+
+}  // namespace
+
+std::optional<Value> StoredRow::value(const std::string& column) const {
+  const auto& columns = rows_.columns();
+  const auto found = std::find(columns.begin(), columns.end(), column);
+  return found == columns.end() || rows_.rows().empty()
+             ? std::nullopt
+             : std::optional(rows_.rows(0).values(static_cast<int>(found - columns.begin())));
+}
+
+std::string StoredRow::text(const std::string& column) const {
+  const auto found = value(column);
+  return found ? found->text() : std::string();
+}
+
+std::optional<StoredRow> stored_row(Source& source, const std::string& study, std::uint64_t point) {
+  auto rows = source.query(fmt::format("SELECT * FROM runs WHERE study = {} AND point = {}",
+                                       sql_text(study), point));
+  return rows.rows().empty() ? std::nullopt : std::optional(StoredRow(std::move(rows)));
+}
+
+std::vector<std::string> differences(const StoredRow& stored, const PointAtHand& point,
+                                     const solver::CaseResult& result) {
+  const StoredRow again = row_once_stored(point, result);
+  std::vector<std::string> columns;
+  const auto compare = [&](std::string_view name, const auto& has_all_digits) {
+    const std::string column(name);
+    const auto before = stored.value(column);
+    const auto now = again.value(column);
+    if (before && now && !is_same(*before, *now) && !has_all_digits(*before)) {
+      columns.push_back(column);
+    }
+  };
+  for (const auto& field : solver::result_fields()) {
+    if (field.sent_with == solver::SentWith::kResult && field.name != "wall_s") {
+      compare(field.column,
+              [&](const Value& value) { return is_exact(value, field, result); });
+    }
+  }
+  for (const auto* list : solver::result_lists()) {
+    if (solver::find_result_column(list->column) == nullptr) {
+      compare(list->column, [&](const Value& value) { return is_list_of(value, *list, result); });
+    }
+  }
+  return columns;
+}
+
+}  // namespace oblique::client

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/service/source.h"
+#include "client/trace/point_at_hand.h"
+#include "proto/oblique.pb.h"
+#include "worker/solver/model/case_result.h"
+
+namespace oblique::client {
+
+/// What a database has of one point.
+class StoredRow {
+ public:
+  /// `rows`: of the view `runs`, one row at most.
+  explicit StoredRow(protocol::QueryReply rows) : rows_(std::move(rows)) {}
+
+  /// The value of that column of the view `runs`; nothing: the view has no such column.
+  std::optional<protocol::Value> value(const std::string& column) const;
+  /// The text of a column; empty where it is NULL or missing.
+  std::string text(const std::string& column) const;
+  bool has_failed() const { return text("status") == "failed"; }
+
+ private:
+  protocol::QueryReply rows_;
+};
+
+/// The row of that point; nothing: it is not solved yet.
+std::optional<StoredRow> stored_row(Source& source, const std::string& study, std::uint64_t point);
+
+/// The outputs, by column, in which the stored row is another one than `result`, the same point
+/// solved again. A database keeps the digits that outputs are accurate to: the result is stored, in
+/// a database of its own that is gone afterwards, and what comes out of both is compared bit by
+/// bit; a database of an earlier schema may have all digits. Left out is what differs from run to
+/// run: the time that it took. Throws server::StorageError when nothing can be stored here.
+std::vector<std::string> differences(const StoredRow& stored, const PointAtHand& point,
+                                     const solver::CaseResult& result);
+
+}  // namespace oblique::client

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "client/service/connection.h"
+#include "client/trace/point_at_hand.h"
+#include "proto/oblique.pb.h"
+#include "worker/solver/model/case_result.h"
+#include "worker/solver/model/trace_columns.h"
+
+namespace oblique::client {
+
+/// What a worker said of a point.
+struct SolvedByWorker {
+  PointAtHand point;
+  std::string error;                         ///< why it has no answer; empty: it has
+  std::optional<solver::CaseResult> result;  ///< none: it has outputs that are unknown here
+  std::string worker;                        ///< its name
+  std::string solver_version;
+  std::string instruction_set;
+};
+
+/// What is wanted of a trace.
+struct TraceWishes {
+  bool with_shape = false;
+  std::int64_t time_limit_ms = 0;  ///< 0: the server's own
+};
+
+/// Gets the shape of a trace, before its first row.
+using BeginTrace = std::function<void(const solver::TraceShape&)>;
+
+/// What the point is, as the server says; nothing is solved.
+PointAtHand point_at(Connection& connection, const std::string& study, std::uint64_t point);
+
+/// Has a worker solve the point and gives its instants, part by part, to `row`. Throws what the
+/// connection throws, and ConnectionError for rows that are none.
+SolvedByWorker trace_by_worker(Connection& connection, const std::string& study,
+                               std::uint64_t point, const TraceWishes& wishes,
+                               const BeginTrace& begin, const solver::Tracing::Sink& row);
+
+}  // namespace oblique::client

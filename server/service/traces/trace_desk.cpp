@@ -1,0 +1,196 @@
+#include "server/service/traces/trace_desk.h"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include <spdlog/fmt/fmt.h>
+
+namespace oblique::server {
+namespace {
+
+/// Number of no request: a reply with it is passed over by clients that do not know its kind.
+constexpr std::uint64_t kNoRequest = UINT64_MAX;
+/// Recipes of more bytes are read on a thread of their own.
+constexpr std::size_t kLongestInlineBytes = std::size_t{64} * 1024;
+
+constexpr const char* kTooManyTraces =
+    "too many traces are waited for already: ask again later";
+constexpr const char* kStoppingTraces = "the server is stopping: ask again when it runs";
+
+protocol::ClientReply reply_to(const Client& client, protocol::TraceReply trace) {
+  protocol::ClientReply reply;
+  reply.set_request_id(client.request_id);
+  *reply.mutable_trace() = std::move(trace);
+  return reply;
+}
+
+}  // namespace
+
+void TraceDesk::ask(const Client& client, const protocol::TraceRequest& request,
+                    const StudyToLookAt& study, Instant now) {
+  const bool is_known = std::any_of(waiting_.begin(), waiting_.end(), [&](const auto& entry) {
+    return entry.second.client == client;
+  });
+  if (is_known) {
+    return;  // the answer is on its way
+  }
+  // Who has a key has one share, however many connections that is.
+  const std::string asker = client.holder == nullptr ? client.identity : "key " + client.key();
+  const auto of_asker = std::count_if(waiting_.begin(), waiting_.end(), [&](const auto& entry) {
+    return entry.second.asker == asker;
+  });
+  const bool is_full = static_cast<std::size_t>(of_asker) >= limits_.most_of_one ||
+                       waiting_.size() >= limits_.most_waiting;
+  if (stopping_ || is_full) {
+    clients_.reply_error(client, stopping_ ? kStoppingTraces : kTooManyTraces);
+    return;
+  }
+  const std::uint64_t ticket = ++last_ticket_;
+  constexpr auto kLongest = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
+  const TraceQuestion question{
+      ticket,
+      {study.id, request.point(), request.shape()},
+      request.first_row(),
+      static_cast<std::int64_t>(std::min(request.time_limit_ms(), kLongest))};
+  waiting_.emplace(ticket, Waiting{client, asker, question, study.solver_version, request.only_point(),
+                                   now.steady_ms + word_every_ms_});
+  if (!request.only_point() && orders_.answer(question, now.steady_ms)) {
+    answer_what_is_done();
+  } else if (!study.table.is_made() && study.table.recipe_bytes().size() > kLongestInlineBytes) {
+    readers_.read({ticket, {}, study.table, request.point()});
+  } else {
+    const bool is_kept = study.table.is_made();
+    TracedPoint point;
+    try {
+      point = traced_point(*study.table.get(), request.point());
+    } catch (const std::exception& error) {
+      point.objection = error.what();
+    }
+    if (!is_kept) {
+      study.table.release();
+    }
+    found(ticket, point, now);
+  }
+}
+
+void TraceDesk::point_read(std::uint64_t ticket, const TracedPoint& point, Instant now) {
+  found(ticket, point, now);
+}
+
+/// It is known what the point is; who asked may be gone.
+void TraceDesk::found(std::uint64_t ticket, const TracedPoint& point, Instant now) {
+  const auto entry = waiting_.find(ticket);
+  if (entry == waiting_.end()) {
+    return;
+  }
+  const Waiting& waiting = entry->second;
+  if (!point.objection.empty() || waiting.only_point) {
+    const Client client = waiting.client;
+    protocol::TraceReply said = said_of(point);
+    said.set_study_id(waiting.question.key.study);
+    waiting_.erase(entry);
+    if (!point.objection.empty()) {
+      clients_.reply_error(client, "the point cannot be had: " + point.objection);
+    } else {
+      clients_.to_client(client.identity, reply_to(client, std::move(said)));
+    }
+    return;
+  }
+  orders_.order(waiting.question, point, waiting.version, now.steady_ms);
+  answer_what_is_done();
+}
+
+void TraceDesk::answer_what_is_done() {
+  for (TraceEffect& effect : orders_.take_effects()) {
+    auto* answer = std::get_if<AnswerTrace>(&effect);
+    auto* refusal = std::get_if<RefuseTrace>(&effect);
+    if (answer == nullptr && refusal == nullptr) {
+      to_workers_.push_back(std::move(effect));
+      continue;
+    }
+    const auto entry = waiting_.find(answer != nullptr ? answer->ticket : refusal->ticket);
+    if (entry == waiting_.end()) {
+      continue;
+    }
+    const Client client = std::move(entry->second.client);
+    waiting_.erase(entry);
+    if (answer != nullptr) {
+      clients_.to_client(client.identity, reply_to(client, std::move(answer->reply)));
+    } else {
+      clients_.reply_error(client, refusal->reason);
+    }
+  }
+}
+
+void TraceDesk::client_left(std::string_view identity) {
+  std::erase_if(waiting_, [&](const auto& entry) {
+    if (entry.second.client.identity != identity) {
+      return false;
+    }
+    orders_.leave(entry.first);
+    return true;
+  });
+  answer_what_is_done();
+}
+
+void TraceDesk::tick(Instant now) {
+  orders_.tick(now.steady_ms);
+  answer_what_is_done();
+  for (auto entry = waiting_.begin(); entry != waiting_.end();) {
+    auto& [ticket, waiting] = *entry;
+    if (now.steady_ms < waiting.next_word_ms) {
+      ++entry;
+      continue;
+    }
+    waiting.next_word_ms = now.steady_ms + word_every_ms_;
+    if (tell(waiting)) {
+      ++entry;
+    } else {
+      orders_.leave(ticket);
+      entry = waiting_.erase(entry);
+    }
+  }
+  answer_what_is_done();
+}
+
+/// False when the client is gone.
+bool TraceDesk::tell(const Waiting& waiting) {
+  protocol::ClientReply word;
+  word.set_request_id(kNoRequest);
+  word.mutable_still_working()->set_request_id(waiting.client.request_id);
+  word.mutable_still_working()->set_runs(orders_.is_at_work(waiting.question.ticket));
+  return clients_.to_client(waiting.client.identity, word);
+}
+
+void TraceDesk::stop() {
+  stopping_ = true;
+  orders_.stop(kStoppingTraces);
+  answer_what_is_done();
+  for (const auto& [ticket, waiting] : std::exchange(waiting_, {})) {
+    clients_.reply_error(waiting.client, kStoppingTraces);
+  }
+}
+
+void TraceDesk::joined(WorkerId worker, const std::string& name, const std::string& version,
+                       const std::string& instruction_set) {
+  orders_.joined(worker, name, version, instruction_set);
+  answer_what_is_done();
+}
+
+void TraceDesk::left(WorkerId worker) {
+  orders_.left(worker);
+  answer_what_is_done();
+}
+
+void TraceDesk::set_busy(WorkerId worker, bool is_busy) {
+  orders_.set_busy(worker, is_busy);
+  answer_what_is_done();
+}
+
+void TraceDesk::part(WorkerId worker, const protocol::TracePart& part) {
+  orders_.part(worker, part);
+  answer_what_is_done();
+}
+
+}  // namespace oblique::server
