@@ -54,9 +54,8 @@ struct Finish {
   std::string reason;
 };
 
-using Effect =
-    std::variant<Connect, Send, Solve, DropStudy, DropBatch, DropAll, SolveTrace, CancelTrace,
-                 DropTraces, TellSilence, Note, Finish>;
+using Effect = std::variant<Connect, Send, Solve, DropStudy, DropBatch, DropAll, SolveTrace,
+                            CancelTrace, DropTraces, TellSilence, Note, Finish>;
 using Effects = std::vector<Effect>;
 
 }  // namespace oblique::worker

@@ -31,8 +31,7 @@ class PointSolver {
   /// Solves the point of an order and gives its instants to `sink`: the same bits as in a batch.
   /// The result's number is 0. Nothing is thrown for a point without an answer, nor for an order
   /// that makes no sense: it fails.
-  protocol::PointResult trace(const protocol::TraceOrder& order,
-                              const solver::Tracing::Sink& sink);
+  protocol::PointResult trace(const protocol::TraceOrder& order, const solver::Tracing::Sink& sink);
 
  private:
   class BatchPoints;

@@ -68,8 +68,7 @@ Overloaded(Handlers...) -> Overloaded<Handlers...>;
 
 }  // namespace
 
-Session::Session(SessionSettings settings, BatchSolver::SolvePoints solve,
-                 TraceSolver::Solve trace)
+Session::Session(SessionSettings settings, BatchSolver::SolvePoints solve, TraceSolver::Solve trace)
     : settings_(std::move(settings)),
       conversation_(hello_of(settings_), conversation_settings(settings_)),
       solver_(

@@ -80,7 +80,7 @@ class Session {
   unsigned attempt_ = 0;   ///< to connect: which of the families of addresses the host has is tried
   bool was_heard_ = true;  ///< something came over this socket
   std::set<std::string> told_causes_;  ///< of the server's silence, since it last welcomed us
-  protocol::WakeUp news_;  ///< a batch ended, or there is more of a trace
+  protocol::WakeUp news_;              ///< a batch ended, or there is more of a trace
   Conversation conversation_;
   std::optional<int> exit_code_;
   std::int64_t report_due_ms_ = 0;

@@ -116,9 +116,9 @@ void TraceSolver::end(protocol::PointResult result) {
     return;
   }
   if (result.error().empty() && job.bytes > job.order.most_bytes()) {
-    result = protocol::failed_point(
-        0, "its trace has more than the " + std::to_string(job.order.most_bytes()) +
-               " bytes that pass through a server");
+    result = protocol::failed_point(0, "its trace has more than the " +
+                                           std::to_string(job.order.most_bytes()) +
+                                           " bytes that pass through a server");
   }
   job.part.set_last(true);
   *job.part.mutable_result() = std::move(result);

@@ -7,8 +7,8 @@
 
 namespace oblique::client {
 
-/// Heading and lines of a trace (CSV, SI units), one line an accepted instant. The columns are those
-/// of solver::trace_columns(), which says what each means.
+/// Heading and lines of a trace (CSV, SI units), one line an accepted instant. The columns are
+/// those of solver::trace_columns(), which says what each means.
 void print_trace_header(std::ostream& out, const solver::TraceShape& shape);
 void print_trace_row(std::ostream& out, const solver::TraceRow& row);
 

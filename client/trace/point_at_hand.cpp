@@ -6,10 +6,10 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "server/asking/sql_expression.h"
 #include "client/service/watching.h"
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
+#include "server/asking/sql_expression.h"
 
 namespace oblique::client {
 namespace {
@@ -31,8 +31,8 @@ std::string bytes_of(std::string_view text) {
 }  // namespace
 
 PointAtHand point_in(Source& source, const std::string& study, std::uint64_t point) {
-  const auto found = source.query(
-      fmt::format("SELECT CAST(recipe AS BLOB) FROM studies WHERE name = {}", sql_text(study)));
+  const auto found = source.query(fmt::format(
+      "SELECT CAST(recipe AS BLOB) FROM studies WHERE name = {}", server::sql_text(study)));
   if (found.rows_size() != 1) {
     study_named(source, study);  // says so
     throw std::runtime_error(fmt::format("the study \"{}\" has no recipe", study));
@@ -53,8 +53,9 @@ PointAtHand point_in(Source& source, const std::string& study, std::uint64_t poi
 
 PointAtHand point_of(const std::string& study, std::uint64_t point,
                      const protocol::TraceReply& reply) {
-  return {study,      point,          protocol::from_message(reply.model()), reply.h_m(),
-          reply.mu(), reply.e_star(), reply.errors()};
+  return {study,         point,      protocol::from_message(reply.model()),
+          reply.h_m(),   reply.mu(), reply.e_star(),
+          reply.errors()};
 }
 
 }  // namespace oblique::client

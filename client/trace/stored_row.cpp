@@ -8,13 +8,13 @@
 
 #include <stdlib.h>
 
-#include <nlohmann/json.hpp>
 #include <spdlog/fmt/fmt.h>
+#include <nlohmann/json.hpp>
 
-#include "server/asking/sql_expression.h"
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
 #include "proto/result_message.h"
+#include "server/asking/sql_expression.h"
 #include "server/database/sqlite.h"
 #include "server/reading/reader.h"
 #include "server/store/store.h"
@@ -72,10 +72,15 @@ StoredRow row_once_stored(const PointAtHand& point, const solver::CaseResult& re
   const std::string file = (folder.path() / "one.db").string();
   server::Store store(file);
   const auto table = std::make_shared<const protocol::PointTable>(recipe_of(point));
-  const std::vector<server::Change> changes{
-      server::AddStudy{kStudy, kStudyOfOne, table, kAnyTime},
-      server::AddResults{
-          kStudy, table, 0, result.solver.version, "", 1, kAnyTime, {protocol::to_message(0, result)}}};
+  const std::vector<server::Change> changes{server::AddStudy{kStudy, kStudyOfOne, table, kAnyTime},
+                                            server::AddResults{kStudy,
+                                                               table,
+                                                               0,
+                                                               result.solver.version,
+                                                               "",
+                                                               1,
+                                                               kAnyTime,
+                                                               {protocol::to_message(0, result)}}};
   store.commit(changes);
   return StoredRow(server::Reader(file).query("SELECT * FROM runs", server::kNoLimits));
 }
@@ -101,7 +106,8 @@ nlohmann::json json_of_cells(std::span<const solver::Cell> cells) {
 bool is_list_of(const Value& packed, const solver::ResultList& list,
                 const solver::CaseResult& result) {
   auto all = nlohmann::json::array();
-  list.each(result, [&](std::span<const solver::Cell> cells) { all.push_back(json_of_cells(cells)); });
+  list.each(result,
+            [&](std::span<const solver::Cell> cells) { all.push_back(json_of_cells(cells)); });
   return nlohmann::json::parse(packed.text(), nullptr, false) == all;
 }
 
@@ -157,7 +163,7 @@ std::string StoredRow::text(const std::string& column) const {
 
 std::optional<StoredRow> stored_row(Source& source, const std::string& study, std::uint64_t point) {
   auto rows = source.query(fmt::format("SELECT * FROM runs WHERE study = {} AND point = {}",
-                                       sql_text(study), point));
+                                       server::sql_text(study), point));
   return rows.rows().empty() ? std::nullopt : std::optional(StoredRow(std::move(rows)));
 }
 
@@ -175,8 +181,7 @@ std::vector<std::string> differences(const StoredRow& stored, const PointAtHand&
   };
   for (const auto& field : solver::result_fields()) {
     if (field.sent_with == solver::SentWith::kResult && field.name != "wall_s") {
-      compare(field.column,
-              [&](const Value& value) { return is_exact(value, field, result); });
+      compare(field.column, [&](const Value& value) { return is_exact(value, field, result); });
     }
   }
   for (const auto* list : solver::result_lists()) {

@@ -41,12 +41,9 @@ std::size_t give_rows(const protocol::TraceRows& rows, const solver::TraceShape&
 
 SolvedByWorker solved_by_worker(const std::string& study, std::uint64_t point,
                                 const protocol::TraceReply& reply) {
-  SolvedByWorker solved{point_of(study, point, reply),
-                        reply.result().error(),
-                        std::nullopt,
-                        reply.worker(),
-                        reply.solver_version(),
-                        reply.instruction_set()};
+  SolvedByWorker solved{
+      point_of(study, point, reply), reply.result().error(), std::nullopt, reply.worker(),
+      reply.solver_version(),        reply.instruction_set()};
   if (solved.error.empty() && reply.outputs() == protocol::sent_outputs() &&
       protocol::fault_of(reply.result()).empty()) {
     auto& result = solved.result.emplace(protocol::from_message(reply.result()));

@@ -10,8 +10,8 @@
 #include <system_error>
 #include <utility>
 
-#include <nlohmann/json.hpp>
 #include <spdlog/fmt/fmt.h>
+#include <nlohmann/json.hpp>
 
 #include "client/output/case_report.h"
 #include "client/output/trace_table.h"

@@ -13,6 +13,7 @@
 #include "proto/suggestion.h"
 #include "server/asking/columns.h"
 #include "worker/solver/model/errors.h"
+#include "worker/solver/model/trace_columns.h"
 
 namespace oblique::client {
 namespace {
@@ -22,6 +23,7 @@ constexpr const char* kListColumnsExamples = R"(Examples:
   oblique columns fn_peak_N
   oblique columns "*peak*"                  names that match: * any text, ? any character
   oblique columns --format csv
+  oblique columns --trace                   those of the files that `oblique trace` writes
 
 Inputs and outputs: columns of `oblique query`, and where `oblique solve --json` has them; then
 elements of lists, counted from 0, and functions, which `oblique query` takes too. Values are in SI
@@ -65,12 +67,49 @@ std::vector<server::Column> columns_like(const std::string& pattern) {
   return found;
 }
 
-int list_columns(const std::string& pattern, const std::string& format) {
+/// As files have them: "R0x_N, R0y_N, R1x_N, ..." for columns that are numbered.
+std::string names_of(const solver::TraceColumn& column) {
+  const std::size_t space = column.name.find(' ');
+  if (space == std::string_view::npos) {
+    return std::string(column.name);
+  }
+  const std::string_view x = column.name.substr(0, space);
+  const std::string_view y = column.name.substr(space + 1);
+  return fmt::format(fmt::runtime("{}, {}, {}, ..."), fmt::format(fmt::runtime(x), 0),
+                     fmt::format(fmt::runtime(y), 0), fmt::format(fmt::runtime(x), 1));
+}
+
+int list_trace_columns(Format format) {
+  protocol::QueryReply table;
+  for (const char* heading : {"column", "unit", "meaning"}) {
+    table.add_columns(heading);
+  }
+  for (const auto& column : solver::trace_columns()) {
+    auto& row = *table.add_rows();
+    add_value(row, names_of(column));
+    add_value(row, std::string(column.unit));
+    add_value(row, std::string(column.meaning));
+  }
+  print(std::cout, table, format);
+  return kDone;
+}
+
+struct ColumnsFlags {
+  std::string pattern;
+  std::string format{"table"};
+  bool trace = false;
+};
+
+int list_columns(const ColumnsFlags& flags) {
+  const Format format = format_named(flags.format);
+  if (flags.trace) {
+    return list_trace_columns(format);
+  }
   protocol::QueryReply table;
   for (const char* heading : {"column", "unit", "kind", "solve --json", "meaning"}) {
     table.add_columns(heading);
   }
-  for (const auto& column : columns_like(pattern)) {
+  for (const auto& column : columns_like(flags.pattern)) {
     auto& row = *table.add_rows();
     add_value(row, column.name);
     add_value(row, column.unit);
@@ -78,23 +117,21 @@ int list_columns(const std::string& pattern, const std::string& format) {
     add_value(row, column.solve_json);
     add_value(row, column.meaning);
   }
-  print(std::cout, table, format_named(format));
+  print(std::cout, table, format);
   return kDone;
 }
 
 }  // namespace
 
 void add_columns(CLI::App& app, Command& command) {
-  auto format = std::make_shared<std::string>("table");
-  auto pattern = std::make_shared<std::string>();
+  auto flags = std::make_shared<ColumnsFlags>();
   auto* verb = app.add_subcommand("columns", "Name, unit and meaning of every input and output");
   verb->footer(kListColumnsExamples);
-  verb->add_option("NAME", *pattern, "a column, or a pattern of * and ?; all when left out")
+  verb->add_option("NAME", flags->pattern, "a column, or a pattern of * and ?; all when left out")
       ->type_name("");
-  add_format_flag(*verb, *format);
-  verb->callback([format, pattern, &command] {
-    command = [format, pattern] { return list_columns(*pattern, *format); };
-  });
+  verb->add_flag("--trace", flags->trace, "those of a trace, as `oblique trace` writes it");
+  add_format_flag(*verb, flags->format);
+  verb->callback([flags, &command] { command = [flags] { return list_columns(*flags); }; });
 }
 
 }  // namespace oblique::client

@@ -82,8 +82,8 @@ Solved solve_by_worker(const TraceFlags& flags, Connection& connection, TraceOut
   WorkLineSettings settings;
   settings.on_terminal = settings.on_terminal && !output.fills_terminal();
   WorkLine line(std::cerr, settings);
-  const auto waiting = line.begin(
-      fmt::format("a worker of {} solves point {} of {}", connection.url(), flags.point, flags.study));
+  const auto waiting = line.begin(fmt::format("a worker of {} solves point {} of {}",
+                                              connection.url(), flags.point, flags.study));
   const auto solved = trace_by_worker(
       connection, flags.study, static_cast<std::uint64_t>(flags.point),
       {.with_shape = flags.shape,
@@ -120,24 +120,24 @@ void tell_comparison(const std::optional<StoredRow>& stored, const Solved& solve
     names += (names.empty() ? "" : ", ") + column;
   }
   tell_line(fmt::format("{}, other than stored in {}: {}.", again, names,
-                        stored_version == version
-                            ? fmt::format("both by solver {}", version)
-                            : fmt::format("stored by solver {}, now by {}", stored_version, version)));
+                        stored_version == version ? fmt::format("both by solver {}", version)
+                                                  : fmt::format("stored by solver {}, now by {}",
+                                                                stored_version, version)));
 }
 
 /// A failed point is not solved again: where solving kills, it may kill again.
 void refuse_failed(const TraceFlags& flags, const std::optional<StoredRow>& stored) {
   if (stored && stored->has_failed()) {
-    throw std::runtime_error(
-        fmt::format("point {} of {} failed and has no trace: {}. `oblique retry {}` solves it again, "
-                    "`oblique solve --trace` with its values shows how far it comes",
-                    flags.point, flags.study, stored->text("error"), flags.study));
+    throw std::runtime_error(fmt::format(
+        "point {} of {} failed and has no trace: {}. `oblique retry {}` solves it again, "
+        "`oblique solve --trace` with its values shows how far it comes",
+        flags.point, flags.study, stored->text("error"), flags.study));
   }
 }
 
 int trace(const TraceFlags& flags) {
   const TraceFormat format = trace_format(flags.format, flags.out);
-  const bool is_file = !database_of(flags.source).empty();
+  const bool is_file = !database_meant(flags.source).empty();
   if (is_file && flags.on_worker) {
     throw solver::InputError(
         "--on-worker needs a server, and a database file is read here: name one with --server URL");

@@ -66,16 +66,6 @@ void Service::client_frame(const std::string& identity, std::string_view frame, 
   send_traces();
 }
 
-void Service::request_read(const ReadReport& report, Instant now) {
-  clients_.request_read(report, now);
-  send_traces();
-}
-
-void Service::client_left(std::string_view identity) {
-  clients_.client_left(identity);
-  send_traces();
-}
-
 void Service::tick(Instant now) {
   workers_.tick([&](WorkerId id) { return scheduler_.silent_ms(id, now.steady_ms); }, now);
   feed(Tick{}, now);
@@ -138,16 +128,6 @@ void Service::tell_traces(const Event& event) {
     traces_.left(left->worker);
   } else if (const auto* busy = std::get_if<WorkerBusy>(&event)) {
     traces_.set_busy(busy->worker, busy->is_busy);
-  }
-}
-
-void Service::send_traces() {
-  for (const TraceEffect& effect : traces_.take_orders()) {
-    if (const auto* order = std::get_if<SendOrder>(&effect)) {
-      workers_.send(*order);
-    } else if (const auto* cancel = std::get_if<CancelOrder>(&effect)) {
-      workers_.send(*cancel);
-    }
   }
 }
 

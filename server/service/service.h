@@ -58,9 +58,15 @@ class Service {
                     const std::shared_ptr<const KeyHolder>& holder = nullptr);
   void written(const WriteReport& report, Instant now);
   void queried(QueryReport report) { clients_.queried(std::move(report)); }
-  void request_read(const ReadReport& report, Instant now);
+  void request_read(const ReadReport& report, Instant now) {
+    clients_.request_read(report, now);
+    send_traces();
+  }
   /// The connection of that client is gone.
-  void client_left(std::string_view identity);
+  void client_left(std::string_view identity) {
+    clients_.client_left(identity);
+    send_traces();
+  }
   /// To be called several times a second.
   void tick(Instant now);
   /// Nothing is handed out and no study taken any more; results are, and all else goes on.
@@ -102,7 +108,7 @@ class Service {
   void handle_found(Instant now);
   void hand_out_or_hold(Instant now);
   void tell_traces(const Event& event);
-  void send_traces();
+  void send_traces() { workers_.send(traces_.take_orders()); }
   std::uint64_t settled_of(StudyId id) const;
 
   void perform(const DefineStudy& effect, Turn turn);

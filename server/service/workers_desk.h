@@ -69,8 +69,8 @@ class WorkersDesk {
   void send(const AcknowledgeResults& stored);
   void send(const WithdrawStudy& withdraw);
   void send(const ReleaseBatch& release);
-  void send(const SendOrder& order);
-  void send(const CancelOrder& cancel);
+  /// The orders and cancellations among them.
+  void send(const std::vector<TraceEffect>& orders);
   /// The recipe goes out as it is kept: encoding a long one again for each worker would hold up the
   /// others.
   void define(const DefineStudy& define, const std::string& recipe_bytes);

@@ -235,7 +235,8 @@ TEST(PointSolverTest, ATracedPointHasTheBitsThatItHadInItsBatch) {
       solver::ModelParameters model;
       model.integrator = integrator;
       model.elements_per_link = 2;
-      protocol::Recipe recipe = recipe_with_points(integrator == solver::Integrator::kExplicit ? 12 : 2);
+      protocol::Recipe recipe =
+          recipe_with_points(integrator == solver::Integrator::kExplicit ? 12 : 2);
       *recipe.mutable_model() = protocol::to_message(model);
       add_model_axis(recipe, "k", {2e7, 3e7});
       recipe.set_errors(errors);

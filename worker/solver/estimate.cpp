@@ -208,10 +208,11 @@ ErrorEstimate errors_by_companion(const ModelParameters& model, const CaseResult
   }
   const FallOutcome fall = companion_falls({&companion, 1}).front();
   try {
-    return fall.fallen ? estimated_errors(model, result,
-                                          Finger(companion, fall.fallen)
-                                              .solve(result.H_m, result.mu, result.e_star))
-                       : ErrorEstimate{};
+    return fall.fallen
+               ? estimated_errors(
+                     model, result,
+                     Finger(companion, fall.fallen).solve(result.H_m, result.mu, result.e_star))
+               : ErrorEstimate{};
   } catch (const SolveError&) {
     return {};
   } catch (const InputError&) {  // beyond the drop of the companion's fall

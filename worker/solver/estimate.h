@@ -30,9 +30,9 @@ ErrorEstimate estimated_errors(const ModelParameters& model, const CaseResult& r
 /// Gives the falls of some models, as solve_falls() does.
 using FallSource = std::function<std::vector<FallOutcome>(std::span<const ModelParameters>)>;
 
-/// The same of the result of one point, its companion solved here over a fall that `companion_falls`
-/// gives: the bits that solve_points_with_errors() gives it. Empty where there is no coarser mesh,
-/// and where the companion has no answer.
+/// The same of the result of one point, its companion solved here over a fall that
+/// `companion_falls` gives: the bits that solve_points_with_errors() gives it. Empty where there is
+/// no coarser mesh, and where the companion has no answer.
 ErrorEstimate errors_by_companion(const ModelParameters& model, const CaseResult& result,
                                   const FallSource& companion_falls);
 

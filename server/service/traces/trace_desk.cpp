@@ -14,8 +14,7 @@ constexpr std::uint64_t kNoRequest = UINT64_MAX;
 /// Recipes of more bytes are read on a thread of their own.
 constexpr std::size_t kLongestInlineBytes = std::size_t{64} * 1024;
 
-constexpr const char* kTooManyTraces =
-    "too many traces are waited for already: ask again later";
+constexpr const char* kTooManyTraces = "too many traces are waited for already: ask again later";
 constexpr const char* kStoppingTraces = "the server is stopping: ask again when it runs";
 
 protocol::ClientReply reply_to(const Client& client, protocol::TraceReply trace) {
@@ -53,8 +52,8 @@ void TraceDesk::ask(const Client& client, const protocol::TraceRequest& request,
       {study.id, request.point(), request.shape()},
       request.first_row(),
       static_cast<std::int64_t>(std::min(request.time_limit_ms(), kLongest))};
-  waiting_.emplace(ticket, Waiting{client, asker, question, study.solver_version, request.only_point(),
-                                   now.steady_ms + word_every_ms_});
+  waiting_.emplace(ticket, Waiting{client, asker, question, study.solver_version,
+                                   request.only_point(), now.steady_ms + word_every_ms_});
   if (!request.only_point() && orders_.answer(question, now.steady_ms)) {
     answer_what_is_done();
   } else if (!study.table.is_made() && study.table.recipe_bytes().size() > kLongestInlineBytes) {

@@ -36,9 +36,9 @@ std::string TraceOrders::objection_to(const TraceQuestion& question) const {
 
 TraceOrders::Waiter TraceOrders::waiter_of(const TraceQuestion& question,
                                            std::int64_t now_ms) const {
-  const std::int64_t time_ms =
-      question.time_limit_ms <= 0 ? limits_.time_ms
-                                  : std::min(question.time_limit_ms, limits_.longest_time_ms);
+  const std::int64_t time_ms = question.time_limit_ms <= 0
+                                   ? limits_.time_ms
+                                   : std::min(question.time_limit_ms, limits_.longest_time_ms);
   return {question.ticket, question.first_row, now_ms + time_ms};
 }
 
@@ -73,9 +73,13 @@ void TraceOrders::order(const TraceQuestion& question, const TracedPoint& point,
   order.set_errors(point.errors);
   order.set_shape(question.key.shape);
   order.set_most_bytes(limits_.most_bytes);
-  jobs_.emplace(question.key, Job{std::move(order), version,
+  jobs_.emplace(question.key, Job{std::move(order),
+                                  version,
                                   SolvedTrace(question.key, point, limits_.most_bytes),
-                                  {waiter_of(question, now_ms)}, std::nullopt, {}, 0});
+                                  {waiter_of(question, now_ms)},
+                                  std::nullopt,
+                                  {},
+                                  0});
   tickets_.emplace(question.ticket, question.key);
   queue_.push_back(question.key);
   dispatch();
@@ -116,9 +120,8 @@ void TraceOrders::left(WorkerId worker) {
   if (solvers_.erase(worker) == 0) {
     return;
   }
-  const auto held = std::find_if(jobs_.begin(), jobs_.end(), [&](const auto& entry) {
-    return entry.second.worker == worker;
-  });
+  const auto held = std::find_if(jobs_.begin(), jobs_.end(),
+                                 [&](const auto& entry) { return entry.second.worker == worker; });
   if (held != jobs_.end()) {
     Job& job = held->second;
     job.worker.reset();
@@ -149,7 +152,7 @@ int TraceOrders::rank(const Solver& solver, const Job& job) const {
   constexpr int kOfStudy = 0;
   constexpr int kOfServer = 1;
   constexpr int kOther = 2;
-  return solver.version == job.version ? kOfStudy
+  return solver.version == job.version       ? kOfStudy
          : solver.version == server_version_ ? kOfServer
                                              : kOther;
 }
@@ -211,9 +214,8 @@ void TraceOrders::part(WorkerId worker, const protocol::TracePart& part) {
   if (part.last()) {
     solver.order = 0;
   }
-  const auto held = std::find_if(jobs_.begin(), jobs_.end(), [&](const auto& entry) {
-    return entry.second.worker == worker;
-  });
+  const auto held = std::find_if(jobs_.begin(), jobs_.end(),
+                                 [&](const auto& entry) { return entry.second.worker == worker; });
   if (held != jobs_.end()) {
     Job& job = held->second;
     std::string fault = job.trace.add(part.rows());
@@ -226,9 +228,9 @@ void TraceOrders::part(WorkerId worker, const protocol::TracePart& part) {
       job.trace.start_over();
       queue_.push_front(held->first);
     } else if (part.last()) {
-      fault = fault.empty() ? job.trace.finish(part, solver.name, solver.version,
-                                               solver.instruction_set)
-                            : fault;
+      fault = fault.empty()
+                  ? job.trace.finish(part, solver.name, solver.version, solver.instruction_set)
+                  : fault;
     }
     if (!fault.empty()) {
       take_from(job);

@@ -121,7 +121,8 @@ TraceRow trace_row(const TraceShape& shape, std::span<const double> numbers,
       numbers = numbers.subspan(1);
     } else if (const auto* vectors = std::get_if<TraceVectors>(&column.value)) {
       const std::size_t count = 2 * count_of(*vectors, shape);
-      (row.*(vectors->values)).assign(numbers.begin(), numbers.begin() + static_cast<std::ptrdiff_t>(count));
+      (row.*(vectors->values))
+          .assign(numbers.begin(), numbers.begin() + static_cast<std::ptrdiff_t>(count));
       numbers = numbers.subspan(count);
     }
   }

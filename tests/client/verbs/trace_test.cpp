@@ -1,0 +1,186 @@
+// Points looked at again, by the program itself: here, by a worker, and when neither can.
+#include <csignal>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "server/store/store.h"
+#include "tests/support/points.h"
+#include "tests/support/programs.h"
+
+namespace oblique::client {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+/// A study over models, with errors, and one by steps; both coarse, for they are solved here.
+constexpr const char* kStudies[][2] = {{"models", R"(name = "models"
+errors = true
+[model]
+elements_per_link = 2
+[[block]]
+E = [6e10, 7e10]
+H = [0.9, 1.0]
+mu = { from = 0.2, to = 2.0, count = 5 }
+e = [0.8, 1.0]
+)"},
+                                       {"steps", R"(name = "steps"
+[model]
+integrator = "generalized-alpha"
+elements_per_link = 1
+[[block]]
+H = 0.9
+mu = [0.4, 1.2]
+e = 0.8
+)"}};
+
+class TraceVerb : public testing::Test {
+ protected:
+  test::Outcome run(const std::vector<std::string>& arguments) {
+    return test::run_oblique(folder_, arguments);
+  }
+  /// Names of the studies, solved in oblique.db.
+  void solve_studies() {
+    for (const auto& [name, text] : kStudies) {
+      std::ofstream(folder_.path() / (std::string(name) + ".toml")) << text;
+      const auto outcome = run({"run", std::string(name) + ".toml"});
+      ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+    }
+  }
+
+  test::TemporaryFolder folder_;
+};
+
+TEST_F(TraceVerb, APointSolvedHereIsTheStoredOneWhateverStudyAndIntegratorItHas) {
+  solve_studies();
+  for (const auto& [study, point] : {std::pair{"models", "0"}, {"models", "39"}, {"steps", "1"}}) {
+    const auto csv = run({"trace", study, point});
+    EXPECT_EQ(csv.exit_code, 0) << csv.err;
+    EXPECT_THAT(csv.out, StartsWith("t_s,fn_N,ft_N,"));
+    EXPECT_THAT(csv.err, HasSubstr("solved here, same as stored.")) << study << ' ' << point;
+  }
+  const auto json = run({"trace", "models", "39", "--shape", "--out", "trace.json"});
+  EXPECT_EQ(json.exit_code, 0) << json.err;
+  EXPECT_EQ(json.out, "");
+  const auto all = nlohmann::json::parse(std::ifstream(folder_.path() / "trace.json"));
+  EXPECT_EQ(all["point"], 39);
+  EXPECT_EQ(all["result"]["mu"], 2.0);
+  EXPECT_EQ(all["trace"]["t_s"][0], 0.0);
+  EXPECT_EQ(all["trace"]["node6y_m"].size(), all["trace"]["state"].size());
+}
+
+TEST_F(TraceVerb, HasTheRowsOfSolve) {
+  solve_studies();
+  const auto trace = run({"trace", "models", "39", "--out", "trace.csv"});
+  EXPECT_EQ(trace.exit_code, 0) << trace.err;
+  const auto solve = run({"solve", "--E", "7e10", "--H", "1", "--mu", "2", "--e", "1",
+                          "--elements-per-link", "2", "--trace", "solve.csv"});
+  EXPECT_EQ(solve.exit_code, 0) << solve.err;
+  const auto text_of = [&](const char* name) {
+    std::ifstream file(folder_.path() / name);
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  };
+  EXPECT_EQ(text_of("trace.csv"), text_of("solve.csv"));
+}
+
+TEST_F(TraceVerb, WhatIsNotThereOrCannotBeWrittenIsNamed) {
+  solve_studies();
+  const auto says = [&](std::vector<std::string> words, int exit_code, const char* sentence) {
+    words.insert(words.begin(), "trace");
+    const auto outcome = run(words);
+    EXPECT_EQ(outcome.exit_code, exit_code) << testing::PrintToString(words) << outcome.err;
+    EXPECT_EQ(outcome.out, "");
+    EXPECT_THAT(outcome.err, HasSubstr(sentence));
+  };
+  says({"model", "0"}, 1, "no study called \"model\"");
+  says({"models", "40"}, 1, "its points are 0 to 39");
+  says({"models", "-1"}, 2, "POINT");
+  says({"models", "first"}, 2, "POINT");
+  says({"models"}, 2, "POINT");
+  says({"models", "0", "--out", "/nowhere/x.csv"}, 2, "/nowhere/x.csv");
+  says({"models", "0", "--out", "x.jsn"}, 2, "end its name in .csv");
+  says({"models", "0", "--format", "jsn"}, 2, "did you mean `json`?");
+  says({"models", "0", "--on-worker"}, 2, "--on-worker needs a server");
+  says({"models", "0", "--here", "--on-worker"}, 2, "--here");
+}
+
+TEST_F(TraceVerb, ARowThatIsNotThePointsIsToldWithTheColumnsInWhichItDiffers) {
+  {
+    server::Store store((folder_.path() / "oblique.db").string());
+    const auto table = server::table_of(2);
+    const std::vector<server::Change> changes{
+        server::AddStudy{1, "made-up", table, "2024-01-01T00:00:00.000Z"},
+        server::AddResults{1,
+                           table,
+                           0,
+                           "0.1",
+                           "",
+                           1,
+                           "2024-01-01T00:00:00.000Z",
+                           {server::solved_point(0), protocol::failed_point(1, "it never ends")}}};
+    store.commit(changes);
+  }
+  const auto outcome = run({"trace", "made-up", "0", "--out", "x.csv"});
+  EXPECT_EQ(outcome.exit_code, 0) << "the trace is what was asked for";
+  EXPECT_THAT(outcome.err, HasSubstr("other than stored"));
+  EXPECT_THAT(outcome.err, HasSubstr("fn_peak_N"));
+  EXPECT_THAT(outcome.err, HasSubstr("stored by solver 0.1, now by "));
+
+  const auto failed = run({"trace", "made-up", "1", "--out", "failed.csv"});
+  EXPECT_EQ(failed.exit_code, 1);
+  EXPECT_THAT(failed.err, HasSubstr("point 1 of made-up failed and has no trace: it never ends"));
+  EXPECT_FALSE(std::filesystem::exists(folder_.path() / "failed.csv"));
+}
+
+TEST_F(TraceVerb, AWorkerSolvesForWhoAsksAServer) {
+  solve_studies();
+  const test::Server server(folder_, "oblique.db");
+  const auto ask = [&](std::vector<std::string> words) {
+    words.insert(words.begin(), "trace");
+    words.insert(words.end(), {"--server", server.client_url()});
+    return run(words);
+  };
+  const auto nobody = ask({"models", "3"});
+  EXPECT_EQ(nobody.exit_code, 1);
+  EXPECT_THAT(nobody.err, HasSubstr("no worker is connected"));
+  const auto here = ask({"models", "3", "--here", "--out", "here.csv"});
+  EXPECT_EQ(here.exit_code, 0) << here.err;
+  EXPECT_THAT(here.err, HasSubstr("solved here, same as stored."));
+
+  const test::Worker worker(folder_, server.worker_url(), {"--threads", "1", "--name", "ann"});
+  test::wait_until("the worker is there", [&] {
+    return run({"workers", "--server", server.client_url()}).out.find("ann") != std::string::npos;
+  });
+  const auto there = ask({"models", "3"});
+  EXPECT_EQ(there.exit_code, 0) << there.err;
+  EXPECT_THAT(there.err, HasSubstr("solved by worker ann ("));
+  EXPECT_THAT(there.err, HasSubstr("same as stored."));
+  std::ifstream file(folder_.path() / "here.csv");
+  EXPECT_EQ(there.out, std::string(std::istreambuf_iterator<char>(file), {}));
+  EXPECT_THAT(ask({"model", "3"}).err, HasSubstr("no study called \"model\""));
+  EXPECT_THAT(ask({"models", "40"}).err, HasSubstr("its points are 0 to 39"));
+
+  // A study that is held back: its points are solved for those who look, and stored later.
+  std::ofstream(folder_.path() / "fine.toml") << R"(name = "fine"
+[model]
+elements_per_link = 24
+[[block]]
+H = 1.0
+mu = [0.3, 0.5]
+e = 0.9
+)";
+  run({"submit", "fine.toml", "--server", server.client_url(), "--priority", "-1000"});
+  test::Process trace(folder_, test::client_program(),
+                      {"trace", "fine", "0", "--server", server.client_url()});
+  const test::Worker other(folder_, server.worker_url(), {"--threads", "1", "--name", "bob"});
+  worker.send(SIGKILL);
+  const auto outcome = trace.outcome();
+  EXPECT_EQ(outcome.exit_code, 0) << "another worker solves it: " << outcome.err;
+  EXPECT_THAT(outcome.out, StartsWith("t_s,"));
+}
+
+}  // namespace
+}  // namespace oblique::client
