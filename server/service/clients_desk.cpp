@@ -250,7 +250,7 @@ void ClientsDesk::workers(const Client& client, const protocol::WorkersRequest& 
 void ClientsDesk::trace(const Client& client, const protocol::TraceRequest& request, Instant now) {
   const auto known = at_.sources.states.find_durable(request.study());
   if (!known) {
-    at_.clients.reply_error(client, unknown_study(request.study()));
+    at_.clients.reply_error(client, unknown_study(request.study(), at_.sources.states));
     return;
   }
   const StudyRecord& study = at_.sources.states.record(*known);

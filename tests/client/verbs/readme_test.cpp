@@ -47,6 +47,14 @@ TEST(Readme, SummarisesTheComparisonInTheNumbersThatItsCommandPrints) {
   EXPECT_NE(summary.find("the largest, " + number.str(3)), std::string::npos);
 }
 
+TEST(Readme, DescribesEveryColumnOfATrace) {
+  const auto printed = test::run_oblique({"columns", "--trace", "--format", "markdown"});
+  ASSERT_EQ(printed.exit_code, 0) << printed.err;
+  EXPECT_EQ(shown(text_of("worker/solver/README.md"), "oblique columns --trace --format markdown"),
+            "\n" + printed.out + "\n")
+      << ".ci/tables writes the tables into worker/solver/README.md";
+}
+
 TEST(Readme, DescribesEveryColumn) {
   const auto printed = test::run_oblique({"columns", "--format", "markdown"});
   ASSERT_EQ(printed.exit_code, 0) << printed.err;
