@@ -36,7 +36,7 @@ class Session {
  public:
   /// Solves points of batches by `solve`, and those that somebody wants to look at by `trace`.
   /// Connects to nothing yet.
-  Session(SessionSettings settings, BatchSolver::SolvePoints solve, TraceSolver::Solve trace);
+  Session(SessionSettings settings, BatchSolver::SolvePoints solve, TraceSolver::Solve trace = {});
   ~Session();
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;

@@ -31,7 +31,7 @@ TraceSolver::~TraceSolver() {
 
 void TraceSolver::take(protocol::TraceOrder order) {
   const std::lock_guard lock(mutex_);
-  if (job_) {
+  if (job_ || !solve_) {
     parts_.push_back(not_taken(order.trace_id()));
     has_part_();
     return;

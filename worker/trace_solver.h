@@ -19,7 +19,8 @@ namespace oblique::worker {
 /// ends it.
 class TraceSolver {
  public:
-  /// Solves the point of an order and gives its instants to the sink. Must not throw.
+  /// Solves the point of an order and gives its instants to the sink. Must not throw. Where there
+  /// is none, no order is taken.
   using Solve = std::function<protocol::PointResult(const protocol::TraceOrder&,
                                                     const solver::Tracing::Sink&)>;
 

@@ -9,7 +9,7 @@
 #include "client/service/watching.h"
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
-#include "server/asking/sql_expression.h"
+#include "server/asking/sql/sql_expression.h"
 
 namespace oblique::client {
 namespace {

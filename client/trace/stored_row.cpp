@@ -14,7 +14,7 @@
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
 #include "proto/result_message.h"
-#include "server/asking/sql_expression.h"
+#include "server/asking/sql/sql_expression.h"
 #include "server/database/sqlite.h"
 #include "server/reading/reader.h"
 #include "server/store/store.h"

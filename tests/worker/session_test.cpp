@@ -231,7 +231,7 @@ TEST(SessionTest, AnAddressThatIsNoneIsAnErrorThatNamesIt) {
   for (const std::string address : {"", "localhost", "tcp://127.0.0.1", "tcp://127.0.0.1:port"}) {
     SessionSettings settings;
     settings.server = address;
-    Session session(settings, solved_at_once, {});
+    Session session(settings, solved_at_once);
     const protocol::WakeUp stop;
     try {
       session.run(stop.descriptor(), [] {});

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "client/output/columns.h"
 #include "client/output/printer.h"
 #include "tests/support/programs.h"
 
