@@ -113,11 +113,12 @@ TEST_F(TraceVerb, ARowThatIsNotThePointsIsToldWithTheColumnsInWhichItDiffers) {
     const auto table = server::table_of(2);
     const std::vector<server::Change> changes{
         server::AddStudy{1, "made-up", table, "2024-01-01T00:00:00.000Z"},
+        server::AddWorker{1, "ann", 1, "0.1", "avx2", "2024-01-01T00:00:00.000Z"},
         server::AddResults{1,
                            table,
-                           0,
+                           1,
                            "0.1",
-                           "",
+                           "avx2",
                            1,
                            "2024-01-01T00:00:00.000Z",
                            {server::solved_point(0), protocol::failed_point(1, "it never ends")}}};
