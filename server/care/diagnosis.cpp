@@ -3,12 +3,14 @@
 #include <cstddef>
 #include <utility>
 
+#include <spdlog/fmt/fmt.h>
+
 #include "server/care/row_faults.h"
 #include "server/care/table_columns.h"
 #include "server/database/open_for_reading.h"
 #include "server/database/row_checksum.h"
 #include "server/database/sqlite.h"
-#include "server/store/result_row.h"
+#include "server/store/rows/row_columns.h"
 
 namespace oblique::server {
 namespace {
@@ -25,9 +27,11 @@ std::vector<std::string> texts(sqlite3* database, const std::string& sql) {
 }
 
 /// Every study beside the number of its results, for FROM.
-std::string counted_studies() {
-  return "(SELECT *, (SELECT count(*) FROM results AS r WHERE r.study_id = s.study_id) AS results"
-         " FROM studies AS s)";
+std::string counted_studies(int schema) {
+  return fmt::format(
+      "(SELECT *, (SELECT count(*) FROM {} AS r WHERE r.study_id = s.study_id) AS results"
+      " FROM studies AS s)",
+      results_table(schema));
 }
 
 }  // namespace
@@ -53,39 +57,45 @@ Diagnosis diagnose(const std::string& path) {
     return found;  // what damaged pages say of anything else means nothing
   }
   add_row_checksum(database);
+  const int schema = schema_of(database);
+  const std::string table(results_table(schema));
   const auto add = [&](std::vector<std::string>& to, const std::string& sql) {
     for (auto& text : texts(database, sql)) {
       to.push_back(std::move(text));
     }
   };
   add(found.faults,
-      "SELECT 'table ' || \"table\" || ', row ' || rowid || ': refers to a row of ' || parent ||"
+      "SELECT 'table ' || \"table\" || coalesce(', row ' || rowid, '') || ': refers to a row of ' "
+      "|| parent ||"
       " ' that is not there' FROM pragma_foreign_key_check LIMIT 20");
   add(found.faults,
       "SELECT 'study ' || name || ': ' || count(*) || ' results of points that it does not have'"
-      " FROM results JOIN studies USING (study_id) WHERE point < 0 OR point >= points"
-      " GROUP BY study_id LIMIT 20");
+      " FROM " +
+          table +
+          " JOIN studies USING (study_id) WHERE point < 0 OR point >= studies.points"
+          " GROUP BY study_id LIMIT 20");
   add(found.faults,
       "SELECT 'study ' || name || ' is called done with ' || results || ' of ' || points ||"
       " ' results' FROM " +
-          counted_studies() +
+          counted_studies(schema) +
           " WHERE state = 'done' AND results <> points"
           " LIMIT 20");
-  const int schema = schema_of(database);
   for (auto& fault : faults_of_rows(database, schema, kMostOfAKind)) {
     found.faults.push_back(std::move(fault));
   }
   add(found.remarks,
       "SELECT 'study ' || name || ' is ' || state || ': ' || results || ' of ' || points ||"
       " ' points have a result' FROM " +
-          counted_studies() +
+          counted_studies(schema) +
           " WHERE results < points"
           " ORDER BY study_id");
   if (schema >= kFirstWithChecksums) {
     add(found.remarks,
-        "SELECT count(*) || ' of ' || (SELECT count(*) FROM results) || ' results have no checksum,"
-        " for they are of an earlier schema: a flipped bit in them may go unseen'"
-        " FROM results WHERE checksum IS NULL HAVING count(*) > 0");
+        fmt::format(
+            "SELECT count(*) || ' of ' || (SELECT count(*) FROM {0}) || ' results have no checksum,"
+            " for they are of an earlier schema: a flipped bit in them may go unseen'"
+            " FROM {0} WHERE checksum IS NULL HAVING count(*) > 0",
+            table));
   }
   return found;
 }

@@ -5,10 +5,12 @@
 #include "proto/frames.h"
 #include "server/care/merged_rows.h"
 #include "server/care/merged_studies.h"
+#include "server/care/table_columns.h"
 #include "server/database/open_for_reading.h"
 #include "server/database/row_checksum.h"
 #include "server/database/sqlite.h"
-#include "server/store/model_rows.h"
+#include "server/store/rows/model_rows.h"
+#include "server/store/rows/row_columns.h"
 #include "server/store/store.h"
 
 namespace oblique::server {
@@ -18,13 +20,14 @@ namespace {
 /// came in one message.
 void bound_what_is_read(sqlite3* source) {
   sqlite3_limit(source, SQLITE_LIMIT_LENGTH, static_cast<int>(2 * protocol::kMaxFrameBytes));
-  constexpr const char* kTables =
-      "COLLATE NOCASE IN ('about', 'studies', 'models', 'workers', 'results', 'retries')";
+  const std::string tables = fmt::format(
+      "COLLATE NOCASE IN ('about', 'studies', 'models', 'workers', 'texts', '{}', 'retries')",
+      results_table(schema_of(source)));
   Statement list(source,
                  fmt::format("SELECT t.name FROM pragma_table_list AS t WHERE t.name {}"
                              " AND (t.type <> 'table' OR NOT t.strict OR EXISTS"
                              " (SELECT 1 FROM pragma_table_xinfo(t.name) WHERE hidden > 1))",
-                             kTables));
+                             tables));
   if (list.step()) {
     throw StorageError(fmt::format("{} in it is no table as servers make it", list.text(0)));
   }

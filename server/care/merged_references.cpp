@@ -6,6 +6,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "server/care/table_columns.h"
+#include "server/store/rows/row_columns.h"
 
 namespace oblique::server {
 namespace {
@@ -34,6 +35,15 @@ std::int64_t highest(sqlite3* target, const std::string& sql) {
   return statement.step() ? statement.integer(0) : 0;
 }
 
+void remember(std::unordered_map<std::int64_t, std::int64_t>& known, std::int64_t in_source,
+              std::int64_t in_target) {
+  constexpr std::size_t kMostKnown = 65536;
+  if (known.size() >= kMostKnown) {
+    known.clear();
+  }
+  known.emplace(in_source, in_target);
+}
+
 std::string marks(std::size_t count) {
   std::string text = "?";
   for (std::size_t i = 1; i < count; ++i) {
@@ -58,7 +68,6 @@ MergedModels::MergedModels(sqlite3* source, sqlite3* target,
       last_(highest(target, "SELECT max(model_id) FROM models")) {}
 
 std::int64_t MergedModels::in_target(std::int64_t in_source) {
-  constexpr std::size_t kMostKnown = 65536;
   if (const auto known = known_.find(in_source); known != known_.end()) {
     return known->second;
   }
@@ -78,21 +87,20 @@ std::int64_t MergedModels::in_target(std::int64_t in_source) {
     insert_.run();
   }
   read_.reset();
-  if (known_.size() >= kMostKnown) {
-    known_.clear();
-  }
-  known_.emplace(in_source, number);
+  remember(known_, in_source, number);
   return number;
 }
 
 MergedWorkers::MergedWorkers(sqlite3* source, sqlite3* target)
-    : read_(source,
+    : target_(target),
+      read_(source,
             "SELECT name, threads, solver_version, instruction_set, joined_at FROM workers"
             " WHERE worker_id = ?"),
-      insert_(target,
-              "INSERT INTO workers (worker_id, name, threads, solver_version, instruction_set,"
-              " joined_at) VALUES (?, ?, ?, ?, ?, ?)"),
-      last_(highest(target, "SELECT max(worker_id) FROM workers")) {
+      insert_(
+          target,
+          "INSERT INTO workers (worker_id, name, threads, solver_version, instruction_set,"
+          " joined_at, checksum) SELECT n, ?1, ?2, ?3, ?4, ?5, row_checksum(n, ?1, ?2, ?3, ?4, ?5)"
+          " FROM (SELECT coalesce(max(worker_id), 0) + 1 AS n FROM workers)") {
   Statement all(target,
                 "SELECT name, threads, solver_version, instruction_set, joined_at, worker_id"
                 " FROM workers");
@@ -118,18 +126,41 @@ std::int64_t MergedWorkers::in_target(std::int64_t in_source) {
   if (!read_.step()) {
     missing("worker", in_source);
   }
-  const auto [there, is_new] = there_.try_emplace(session_in(read_), last_ + 1);
+  const auto [there, is_new] = there_.try_emplace(session_in(read_), 0);
   if (is_new) {
-    last_ = there->second;
-    insert_.bind(1, last_);
-    for (int column = 0; column < 5; ++column) {
-      insert_.bind_column(column + 2, read_, column);
-    }
-    insert_.run();
+    there->second = insert_session();
   }
   read_.reset();
   known_.emplace(in_source, there->second);
   return there->second;
+}
+
+/// The one that `read_` has; gives its number.
+std::int64_t MergedWorkers::insert_session() {
+  for (int column = 0; column < 5; ++column) {
+    insert_.bind_column(column + 1, read_, column);
+  }
+  insert_.run();
+  return sqlite3_last_insert_rowid(target_);
+}
+
+MergedTexts::MergedTexts(sqlite3* source, TextNumbers& target)
+    : read_(source, "SELECT text, checksum IS NULL OR checksum = " + text_checksum_sql() +
+                        " FROM texts WHERE text_id = ?"),
+      target_(target) {}
+
+std::int64_t MergedTexts::in_target(std::int64_t in_source) {
+  if (const auto known = known_.find(in_source); known != known_.end()) {
+    return known->second;
+  }
+  read_.bind(1, in_source);
+  if (!read_.step() || read_.integer(1) == 0) {
+    missing("text", in_source);
+  }
+  const std::int64_t number = target_.number_of(read_.text(0));
+  read_.reset();
+  remember(known_, in_source, number);
+  return number;
 }
 
 }  // namespace oblique::server

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "server/database/sqlite.h"
+#include "server/store/rows/text_numbers.h"
 
 // What results refer to, of a database that is merged, in the target.
 namespace oblique::server {
@@ -39,13 +40,28 @@ class MergedWorkers {
   std::int64_t in_target(std::int64_t in_source);
 
  private:
+  std::int64_t insert_session();
   static std::string session_in(const Statement& row);
 
+  sqlite3* target_;
   Statement read_;
   Statement insert_;
-  std::int64_t last_ = 0;
   std::unordered_map<std::string, std::int64_t> there_;  // by all that is known of the session
   std::unordered_map<std::int64_t, std::int64_t> known_;
+};
+
+/// The table `texts`, which sources before schema `kFirstPacked` lack.
+class MergedTexts {
+ public:
+  MergedTexts(sqlite3* source, TextNumbers& target);
+
+  /// As of MergedModels.
+  std::int64_t in_target(std::int64_t in_source);
+
+ private:
+  Statement read_;
+  TextNumbers& target_;
+  std::unordered_map<std::int64_t, std::int64_t> known_;  // some of them
 };
 
 }  // namespace oblique::server

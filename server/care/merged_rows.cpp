@@ -1,18 +1,17 @@
 #include "server/care/merged_rows.h"
 
 #include <algorithm>
-#include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
 
-#include "server/care/merged_references.h"
-#include "server/care/table_columns.h"
-#include "server/store/result_row.h"
-#include "worker/solver/model/result_fields.h"
+#include "server/care/merge_source.h"
+#include "server/store/rows/packed_row.h"
+#include "server/store/rows/row_columns.h"
 
 namespace oblique::server {
 namespace {
@@ -20,68 +19,32 @@ namespace {
 constexpr std::size_t kMostRemarks = 10;
 constexpr std::uint64_t kRowsBetweenReports = 4096;
 
-/// "?1, ?2, ..., ?count".
-std::string numbered_marks(std::size_t count) {
-  std::string text = "?1";
-  for (std::size_t i = 2; i <= count; ++i) {
-    text += fmt::format(", ?{}", i);
-  }
-  return text;
-}
-
-/// The columns of a row of the present schema, and where they stand in what is read.
-struct RowColumns {
-  /// `read` has two columns before them.
-  static constexpr int kBefore = 2;
-
-  std::vector<std::string> names;
-
-  RowColumns() {
-    for (const std::string_view name : result_columns(kSchemaVersion)) {
-      names.emplace_back(name);
-    }
-  }
-  /// Of what is bound, from 1.
-  int bound(std::string_view name) const {
-    return 1 + static_cast<int>(std::find(names.begin(), names.end(), name) - names.begin());
-  }
-  int read(std::string_view name) const { return bound(name) - 1 + kBefore; }
-
-  std::string select_sql(sqlite3* source) const {
-    const auto there = columns_of(source, "results");
-    const auto has = [&](const std::string& name) {
-      return std::find(there.begin(), there.end(), name) != there.end();
-    };
-    std::string columns = has("checksum") ? "checksum IS NOT NULL" : "0";
-    for (const std::string& name : names) {
-      columns += ", " + (has(name) ? name : "NULL");
-    }
-    // One list that no JSON is would fail every query of the views that unfold it.
-    std::string sound = result_soundness_sql(schema_of(source));
-    for (const solver::ResultList* list : solver::result_lists()) {
-      const std::string column(list->column);
-      if (has(column)) {
-        sound += fmt::format(" AND ({0} IS NULL OR json_valid({0}))", column);
-      }
-    }
-    return fmt::format("SELECT {}, {}, rowid FROM results ORDER BY rowid", sound, columns);
-  }
-  /// The last parameter says whether the row gets a checksum: one of a row that had none would say
-  /// that it was never changed.
-  std::string insert_sql() const {
-    const std::string marks = numbered_marks(names.size());
-    return fmt::format(
-        "INSERT INTO results ({}, checksum) VALUES ({}, CASE WHEN ?{} THEN row_checksum({}) END)",
-        fmt::join(names, ", "), marks, names.size() + 1, marks);
-  }
+/// Columns of `packed_results`, counted once.
+struct Columns {
+  int study_id = packed_column("study_id");
+  int point = packed_column("point");
+  int model_id = packed_column("model_id");
+  int error = packed_column("error");
+  int worker = packed_column("worker");
 };
 
-/// What the solver makes of a point, however long that took it.
-std::vector<std::string> compared_columns(int schema) {
-  auto names = output_columns(std::min(schema, kSchemaVersion));
-  std::erase(names, "wall_s");
-  std::sort(names.begin(), names.end());
-  return names;
+bool is_null(const PackedValue& value) {
+  return value.type == PackedValue::Type::kNull;
+}
+
+/// What the solver makes of a point, however long that took it, that is another in both rows; what
+/// one lacks, as one of an older schema may, says nothing.
+std::vector<std::string> differing_outputs(const PackedRow& a, const PackedRow& b) {
+  std::vector<std::string> differing;
+  for (const std::string_view name : packed_outputs()) {
+    const int column = packed_column(name);
+    const PackedValue& here = a.at(column);
+    const PackedValue& there = b.at(column);
+    if (name != "wall" && !is_null(here) && !is_null(there) && here != there) {
+      differing.emplace_back(shown_name(name));
+    }
+  }
+  return differing;
 }
 
 class RowMerge {
@@ -89,56 +52,51 @@ class RowMerge {
   RowMerge(sqlite3* source, sqlite3* target, StudyPlaces& places, Merged& merged)
       : places_(places),
         merged_(merged),
-        compared_(compared_columns(schema_of(source))),
-        models_(source, target),
-        workers_(source, target),
-        read_(source, columns_.select_sql(source)),
-        insert_(target, columns_.insert_sql()),
-        remove_(target, "DELETE FROM results WHERE study_id = ? AND point = ?"),
-        known_(target, known_sql()) {
-    Statement last(source, "SELECT max(rowid) FROM results");
-    rows_ = last.step() ? static_cast<std::uint64_t>(last.integer(0)) : 0;
-  }
+        source_(MergeSource::of(source, target)),
+        insert_(target),
+        remove_(target, "DELETE FROM packed_results WHERE study_id = ? AND point = ?"),
+        known_(target, fmt::format("SELECT {}, (SELECT w.solver_version FROM workers AS w"
+                                   " WHERE w.worker_id = packed_results.worker)"
+                                   " FROM packed_results WHERE study_id = ? AND point = ?",
+                                   fmt::join(packed_columns(), ", "))) {}
 
   void run(const Merger::Progress& progress) {
+    const std::uint64_t rows = source_->rows();
     std::uint64_t looked_at = 0;
-    while (read_.step()) {
+    while (source_->next()) {
       take_row();
       if (++looked_at % kRowsBetweenReports == 0) {
-        progress(number(read_.columns() - 1), rows_);
+        progress(looked_at, std::max(rows, looked_at));
       }
     }
-    progress(rows_, rows_);
+    progress(looked_at, looked_at);
   }
 
  private:
-  std::uint64_t number(int column) const {
-    return static_cast<std::uint64_t>(read_.integer(column));
-  }
-
-  /// A query that is given a row and says of the one that the target has: its status, and of each
-  /// compared column whether both have the same.
-  std::string known_sql() const {
-    std::string sql = "SELECT status, solver_version IS ?3";
-    for (std::size_t i = 0; i < compared_.size(); ++i) {
-      // Rows may lack what a later schema brought.
-      sql += fmt::format(", {0} IS ?{1} OR ?{1} IS NULL OR {0} IS NULL", compared_[i], i + 4);
-    }
-    return sql + " FROM results WHERE study_id = ?1 AND point = ?2";
+  static std::uint64_t whole(const PackedRow& row, int column) {
+    return static_cast<std::uint64_t>(row.at(column).whole);
   }
 
   void take_row() {
-    const std::uint64_t point = number(columns_.read("point"));
-    const auto found = places_.find(number(columns_.read("study_id")));
-    if (read_.integer(0) == 0 || found == places_.end() || point >= found->second.points) {
-      throw StorageError(fmt::format(
-          "the result of point {} in row {} is not as it was stored: `oblique check` tells more, "
-          "and `oblique backup --salvage` saves what can be merged",
-          point, number(read_.columns() - 1)));
+    PackedRow& row = source_->row();
+    const std::uint64_t point = whole(row, columns_.point);
+    const auto found = places_.find(whole(row, columns_.study_id));
+    if (!source_->is_sound() || found == places_.end() || point >= found->second.points) {
+      throw StorageError(
+          fmt::format("the result of point {} of study number {} is not as it was stored: `oblique "
+                      "check` tells "
+                      "more, and `oblique backup --salvage` saves what can be merged",
+                      point, whole(row, columns_.study_id)));
     }
     StudyPlace& place = found->second;
+    row.at(columns_.study_id).whole = static_cast<std::int64_t>(place.id);
+    source_->take_texts();
     if (place.is_new || is_wanted(place, point)) {
-      insert(place);
+      check_version(place);
+      source_->take_references();
+      insert_.run(row, source_->has_checksum());
+      ++place.rows_changed;
+      ++merged_.results_added;
     }
   }
 
@@ -146,16 +104,13 @@ class RowMerge {
   bool is_wanted(const StudyPlace& place, std::uint64_t point) {
     known_.bind(1, place.id);
     known_.bind(2, point);
-    known_.bind_column(3, read_, columns_.read("solver_version"));
-    for (std::size_t i = 0; i < compared_.size(); ++i) {
-      known_.bind_column(static_cast<int>(i) + 4, read_, columns_.read(compared_[i]));
-    }
     if (!known_.step()) {
       known_.reset();
       return true;
     }
-    const bool is_solved = read_.text(columns_.read("status")) == "solved";
-    const bool was_solved = known_.text(0) == "solved";
+    there_.read(known_, 0);
+    const bool is_solved = is_null(source_->row().at(columns_.error));
+    const bool was_solved = is_null(there_.at(columns_.error));
     if (is_solved && was_solved) {
       compare(place, point);
     }
@@ -173,63 +128,37 @@ class RowMerge {
 
   /// Both solved it.
   void compare(const StudyPlace& place, std::uint64_t point) {
-    std::vector<std::string> differing;
-    for (int column = 1; column < known_.columns(); ++column) {
-      if (known_.integer(column) == 0) {
-        differing.push_back(column == 1 ? "solver_version"
-                                        : compared_[static_cast<std::size_t>(column) - 2]);
-      }
+    std::vector<std::string> differing = differing_outputs(source_->row(), there_);
+    if (known_.text(known_.columns() - 1) != source_->solver_version()) {
+      differing.insert(differing.begin(), "solver_version");
     }
-    if (differing.empty()) {
-      return;
-    }
-    if (++merged_.results_differing <= kMostRemarks) {
+    if (!differing.empty() && ++merged_.results_differing <= kMostRemarks) {
       merged_.remarks.push_back(fmt::format("study {}, point {} differs in {}", place.name, point,
                                             fmt::join(differing, ", ")));
     }
   }
 
-  void insert(StudyPlace& place) {
-    check_version(place);
-    for (int i = 0; i < static_cast<int>(columns_.names.size()); ++i) {
-      insert_.bind_column(i + 1, read_, i + RowColumns::kBefore);
-    }
-    insert_.bind(columns_.bound("study_id"), place.id);
-    insert_.bind(columns_.bound("model_id"),
-                 models_.in_target(read_.integer(columns_.read("model_id"))));
-    if (const int worker = columns_.read("worker"); !read_.is_null(worker)) {
-      insert_.bind(columns_.bound("worker"), workers_.in_target(read_.integer(worker)));
-    }
-    insert_.bind_column(static_cast<int>(columns_.names.size()) + 1, read_, 1);
-    insert_.run();
-    ++place.rows_changed;
-    ++merged_.results_added;
-  }
-
   /// Results of a study come from one solver, unless it was said that they need not.
   void check_version(const StudyPlace& place) const {
-    const int column = columns_.read("solver_version");
-    if (place.mixes_versions || place.solver_version.empty() || read_.is_null(column) ||
-        read_.text(column) == place.solver_version) {
+    const std::string& version = source_->solver_version();
+    if (place.mixes_versions || place.solver_version.empty() || version.empty() ||
+        version == place.solver_version) {
       return;
     }
     throw MergeRefused(fmt::format(
         "its results of study {} come from solver version {}, those that are there from {}: "
         "--mix-versions unites them all the same",
-        place.name, read_.text(column), place.solver_version));
+        place.name, version, place.solver_version));
   }
 
+  const Columns columns_;
   StudyPlaces& places_;
   Merged& merged_;
-  const RowColumns columns_;
-  const std::vector<std::string> compared_;
-  MergedModels models_;
-  MergedWorkers workers_;
-  Statement read_;
-  Statement insert_;
+  std::unique_ptr<MergeSource> source_;
+  RowInsert insert_;
   Statement remove_;
   Statement known_;
-  std::uint64_t rows_ = 0;
+  PackedRow there_;
 };
 
 }  // namespace

@@ -5,12 +5,18 @@
 #include <string_view>
 #include <vector>
 
+#include <spdlog/fmt/fmt.h>
+
 #include "server/care/table_columns.h"
 #include "server/database/draft_file.h"
 #include "server/database/open_for_reading.h"
 #include "server/database/row_checksum.h"
 #include "server/database/sqlite.h"
-#include "server/store/model_rows.h"
+#include "server/store/rows/model_rows.h"
+#include "server/store/rows/old_rows.h"
+#include "server/store/rows/old_workers.h"
+#include "server/store/rows/packed_row.h"
+#include "server/store/rows/row_columns.h"
 #include "server/store/store.h"
 
 namespace oblique::server {
@@ -38,26 +44,26 @@ void check_tables(sqlite3* database, const std::string& path) {
   throw StorageError(path + " is empty: no study was ever stored in it");
 }
 
-/// Says of each row of the table whether it is as it was written, as far as that can be told.
-std::string soundness_sql(sqlite3* database, const std::string& table) {
-  return table == "results" ? result_soundness_sql(schema_of(database)) : "1";
+/// The copy could not take a row: damaged, or there is no room for it.
+void note_refused(sqlite3* to, std::uint64_t& unreadable) {
+  const auto code = static_cast<unsigned>(sqlite3_errcode(to)) & 0xffU;
+  if (code != SQLITE_CONSTRAINT && code != SQLITE_MISMATCH) {
+    throw SaveError();
+  }
+  ++unreadable;
 }
 
-/// Copies the rows of one table in the order of their numbers, and passes over what cannot be read.
-class TableCopy {
+/// Copies rows in the order of a number that each has, and passes over what cannot be read.
+class RowsCopy {
  public:
-  TableCopy(sqlite3* from, sqlite3* to, const std::string& table)
-      : to_(to),
-        columns_(common_columns(from, to, table)),
-        read_(from, "SELECT rowid, " + soundness_sql(from, table) + ", " +
-                        present_values_sql(schema_of(from), table, columns_) + " FROM " + table +
-                        " WHERE rowid > ? ORDER BY rowid"),
-        insert_(to, "INSERT INTO " + table + " (" + columns_ + ") VALUES (" + marks() + ")") {}
+  virtual ~RowsCopy() = default;
 
   std::uint64_t rows() const { return rows_; }
   std::uint64_t unreadable_places() const { return unreadable_; }
 
-  void run() {
+  /// From behind that number on.
+  void run(std::int64_t last) {
+    last_ = last;
     // After an unreadable place the next readable row is sought in growing leaps, so that a long
     // one costs little and a short one takes few rows with it.
     std::int64_t leap = 0;
@@ -72,7 +78,75 @@ class TableCopy {
     }
   }
 
+ protected:
+  /// A query of the rows behind its last parameter, whose number is its first column.
+  virtual Statement& read_behind(std::int64_t last) = 0;
+  /// Copies the present row; false when it is not as it was stored. Throws StorageError when the
+  /// copy does not take it.
+  virtual bool copy(Statement& row) = 0;
+  /// Makes ready for the next row after that.
+  virtual void give_up() = 0;
+
+  explicit RowsCopy(sqlite3* to) : to_(to) {}
+
  private:
+  /// True at the end of the table.
+  bool copy_until_unreadable() {
+    copied_since_ = false;
+    Statement& row = read_behind(last_);
+    try {
+      while (row.step()) {
+        last_ = row.integer(0);
+        copied_since_ = true;
+        copy_row(row);
+      }
+      row.reset();
+      return true;
+    } catch (const StorageError&) {
+      return false;
+    }
+  }
+
+  /// A row that the schema does not take is damaged, too.
+  void copy_row(Statement& row) {
+    try {
+      ++(copy(row) ? rows_ : unreadable_);
+    } catch (const StorageError&) {
+      note_refused(to_, unreadable_);
+      give_up();
+    }
+  }
+
+  sqlite3* to_;
+  /// No table has so many rows: behind such a leap is nothing.
+  static constexpr std::int64_t kLongestLeap = std::int64_t{1} << 42U;
+  std::int64_t last_ = 0;
+  bool copied_since_ = false;
+  std::uint64_t rows_ = 0;
+  std::uint64_t unreadable_ = 0;
+};
+
+/// All of a table whose columns mean the same in every schema.
+class TableCopy final : public RowsCopy {
+ public:
+  TableCopy(sqlite3* from, sqlite3* to, const std::string& table)
+      : RowsCopy(to),
+        columns_(common_columns(from, to, table)),
+        read_(from, "SELECT rowid, " + soundness_sql(from, table) + ", " +
+                        present_values_sql(schema_of(from), table, columns_) + " FROM " + table +
+                        " WHERE rowid > ? ORDER BY rowid"),
+        insert_(to, "INSERT INTO " + table + " (" + columns_ + ") VALUES (" + marks() + ")") {}
+
+ private:
+  /// Words that others took the place of would say wrong things of many rows.
+  static std::string soundness_sql(sqlite3* from, const std::string& table) {
+    if (schema_of(from) < kFirstPacked || (table != "texts" && table != "workers")) {
+      return "1";
+    }
+    return "(checksum IS NULL OR checksum = " +
+           (table == "texts" ? text_checksum_sql() : worker_checksum_sql()) + ")";
+  }
+
   std::string marks() const {
     std::string text = "?";
     for (const char letter : columns_) {
@@ -81,86 +155,163 @@ class TableCopy {
     return text;
   }
 
-  /// True at the end of the table.
-  bool copy_until_unreadable() {
-    copied_since_ = false;
+  Statement& read_behind(std::int64_t last) override {
     read_.reset();
-    read_.bind(1, last_);
-    try {
-      while (read_.step()) {
-        last_ = read_.integer(0);
-        copied_since_ = true;
-        insert_row();
-      }
-      read_.reset();
-      return true;
-    } catch (const StorageError&) {
+    read_.bind(1, last);
+    return read_;
+  }
+  bool copy(Statement& row) override {
+    if (row.integer(1) == 0) {
       return false;
     }
-  }
-
-  /// A row that the schema does not take is damaged, too.
-  void insert_row() {
-    if (read_.integer(1) == 0) {
-      ++unreadable_;
-      return;
+    for (int column = 2; column < row.columns(); ++column) {
+      insert_.bind_column(column - 1, row, column);
     }
-    try {
-      for (int column = 2; column < read_.columns(); ++column) {
-        insert_.bind_column(column - 1, read_, column);
-      }
-      insert_.run();
-      ++rows_;
-    } catch (const StorageError&) {
-      const auto code = static_cast<unsigned>(sqlite3_errcode(to_)) & 0xffU;
-      if (code != SQLITE_CONSTRAINT && code != SQLITE_MISMATCH) {
-        throw SaveError();
-      }
-      insert_.reset();
-      ++unreadable_;
-    }
+    insert_.run();
+    return true;
   }
+  void give_up() override { insert_.reset(); }
 
-  sqlite3* to_;
   std::string columns_;
   Statement read_;
   Statement insert_;
-  /// No table has so many rows: behind such a leap is nothing.
-  static constexpr std::int64_t kLongestLeap = std::int64_t{1} << 42U;
-  std::int64_t last_ = 0;  // SQLite counts rows from 1
-  bool copied_since_ = false;
-  std::uint64_t rows_ = 0;
-  std::uint64_t unreadable_ = 0;
 };
 
-/// The tables that are copied, each after those that it refers to.
-std::vector<const char*> tables_of(sqlite3* database) {
-  std::vector<const char*> tables{"studies", "models", "workers", "results"};
-  if (!columns_of(database, "retries").empty()) {
-    tables.push_back("retries");
+/// The results of one study of this schema.
+class PackedCopy final : public RowsCopy {
+ public:
+  PackedCopy(sqlite3* from, sqlite3* to, std::int64_t study)
+      : RowsCopy(to),
+        study_(study),
+        read_(from, fmt::format("SELECT point, {} AND {}, checksum IS NOT NULL, {} FROM"
+                                " packed_results WHERE study_id = ?1 AND point > ?2 ORDER BY point",
+                                result_soundness_sql(kSchemaVersion), lists_are_json_sql(),
+                                fmt::join(packed_columns(), ", "))),
+        insert_(to) {}
+
+ private:
+  Statement& read_behind(std::int64_t last) override {
+    read_.reset();
+    read_.bind(1, study_);
+    read_.bind(2, last);
+    return read_;
   }
-  return tables;
+  bool copy(Statement& row) override {
+    packed_.read(row, 3);
+    return row.integer(1) != 0 && insert_.run(packed_, row.integer(2) != 0);
+  }
+  void give_up() override { insert_.give_up(); }
+
+  std::int64_t study_;
+  Statement read_;
+  RowInsert insert_;
+  PackedRow packed_;
+};
+
+/// The results of an earlier schema.
+class OldCopy final : public RowsCopy {
+ public:
+  OldCopy(sqlite3* from, sqlite3* to)
+      : RowsCopy(to),
+        old_(from, schema_of(from)),
+        texts_(to),
+        workers_(to),
+        read_(from,
+              fmt::format("SELECT rowid, {}, {}, {} FROM results WHERE rowid > ? ORDER BY rowid",
+                          result_soundness_sql(schema_of(from)),
+                          schema_of(from) >= kFirstWithChecksums ? "checksum IS NOT NULL" : "0",
+                          OldRows::columns_sql(schema_of(from)))),
+        insert_(to) {}
+
+ private:
+  static constexpr int kFirst = 3;
+
+  Statement& read_behind(std::int64_t last) override {
+    read_.reset();
+    read_.bind(1, last);
+    return read_;
+  }
+  bool copy(Statement& row) override {
+    if (row.integer(1) == 0 || !old_.pack(row, kFirst, texts_, packed_)) {
+      return false;
+    }
+    OldRows::name_worker(row, kFirst, workers_, packed_);
+    return insert_.run(packed_, row.integer(2) != 0);
+  }
+  void give_up() override { insert_.give_up(); }
+
+  OldRows old_;
+  TextNumbers texts_;
+  OldWorkers workers_;
+  Statement read_;
+  RowInsert insert_;
+  PackedRow packed_;
+};
+
+std::vector<std::int64_t> studies_in(sqlite3* database) {
+  Statement list(database, "SELECT study_id FROM studies");
+  std::vector<std::int64_t> studies;
+  while (list.step()) {
+    studies.push_back(list.integer(0));
+  }
+  return studies;
+}
+
+/// Copies the results of all studies that were saved. Those of others tell nothing.
+void copy_results(sqlite3* from, sqlite3* to, Salvaged& saved) {
+  const auto run = [&](RowsCopy& copy) {
+    copy.run(-1);  // points are counted from 0
+    saved.unreadable_places += copy.unreadable_places();
+  };
+  if (schema_of(from) < kFirstPacked) {
+    OldCopy copy(from, to);
+    run(copy);
+    return;
+  }
+  for (const std::int64_t study : studies_in(to)) {
+    PackedCopy copy(from, to, study);
+    run(copy);
+  }
+}
+
+/// Copies the tables, each after those that it refers to.
+void copy_tables(sqlite3* from, sqlite3* to, Salvaged& saved) {
+  for (const std::string table : {"studies", "models", "workers", "texts", "retries"}) {
+    if (columns_of(from, table).empty()) {
+      continue;  // an earlier schema has none
+    }
+    TableCopy copy(from, to, table);
+    copy.run(0);  // SQLite counts rows from 1
+    saved.unreadable_places += copy.unreadable_places();
+    saved.studies += table == "studies" ? copy.rows() : 0;
+  }
+  copy_results(from, to, saved);
 }
 
 /// Makes an end of what refers to rows that were not saved.
 void mend_references(sqlite3* database) {
-  // Rows of a study or model that is gone tell nothing.
+  // Rows of a study or model that is gone tell nothing, nor do those whose words are lost.
   execute(database,
-          "DELETE FROM results WHERE study_id NOT IN (SELECT study_id FROM studies)"
-          " OR model_id NOT IN (SELECT model_id FROM models)");
+          "DELETE FROM packed_results WHERE study_id NOT IN (SELECT study_id FROM studies)"
+          " OR model_id NOT IN (SELECT model_id FROM models)"
+          " OR (mode IS NOT NULL AND mode NOT IN (SELECT text_id FROM texts))"
+          " OR (major_mode IS NOT NULL AND major_mode NOT IN (SELECT text_id FROM texts))"
+          " OR (margin_event IS NOT NULL AND margin_event NOT IN (SELECT text_id FROM texts))");
   execute(database, "DELETE FROM retries WHERE study_id NOT IN (SELECT study_id FROM studies)");
-  // A worker's number that is known to be right stays, so that the row keeps its checksum.
+  // A worker's number that is known to be right stays, so that the row keeps its checksum. Of a
+  // lost worker's solver nothing is known but that databases mostly have results of one version.
   execute(
       database,
-      "INSERT INTO workers SELECT worker, 'lost with a damaged file', 1, min(solver_version),"
-      " min(instruction_set), min(solved_at) FROM results WHERE checksum IS NOT NULL"
-      " AND worker IS NOT NULL AND worker NOT IN (SELECT worker_id FROM workers) GROUP BY worker");
-  execute(database,
-          "UPDATE results SET worker = NULL"
-          " WHERE worker NOT IN (SELECT worker_id FROM workers)");
+      "INSERT INTO workers (worker_id, name, threads, solver_version, instruction_set, joined_at)"
+      " SELECT DISTINCT worker, 'lost with a damaged file', 1,"
+      " (SELECT CASE count(DISTINCT solver_version) WHEN 1 THEN min(solver_version)"
+      " ELSE 'unknown' END FROM workers), 'unknown', '' FROM packed_results"
+      " WHERE worker NOT IN (SELECT worker_id FROM workers)");
+  // The points are counted when a server starts.
+  execute(database, "UPDATE studies SET counted = 0");
   execute(database,
           "UPDATE studies SET state = 'running' WHERE state = 'done' AND points <>"
-          " (SELECT count(*) FROM results AS r WHERE r.study_id = studies.study_id)");
+          " (SELECT count(*) FROM packed_results AS r WHERE r.study_id = studies.study_id)");
 }
 
 }  // namespace
@@ -180,16 +331,12 @@ Salvaged salvage(const std::string& from, const std::string& to) {
   { const Store with_schema(draft.path()); }
   {
     const DatabaseHandle target = open_database(draft.path(), SQLITE_OPEN_READWRITE);
+    add_row_checksum(target.get());
     Transaction transaction(target.get());
-    for (const char* table : tables_of(source.get())) {
-      TableCopy copy(source.get(), target.get(), table);
-      copy.run();
-      saved.unreadable_places += copy.unreadable_places();
-      saved.studies += table == std::string_view("studies") ? copy.rows() : 0;
-    }
+    copy_tables(source.get(), target.get(), saved);
     mend_references(target.get());
     transaction.commit();
-    Statement count(target.get(), "SELECT count(*) FROM results");
+    Statement count(target.get(), "SELECT count(*) FROM packed_results");
     count.step();
     saved.results = static_cast<std::uint64_t>(count.integer(0));
     count.reset();

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <string_view>
 
-#include "server/store/model_rows.h"
-#include "server/store/result_row.h"
+#include "server/store/rows/model_rows.h"
+#include "server/store/rows/row_columns.h"
 
 namespace oblique::server {
 

@@ -1,15 +1,39 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
 #include <sqlite3.h>
 
 namespace oblique::server {
 
-/// Gives the connection the SQL function `row_checksum(value, ...)`: the CRC-32 (as zlib computes
-/// it) of its arguments, an integer from 0 to 2^32 - 1. Each argument counts with its type and
-/// bytes: 'n' for NULL; 'i' and eight bytes, least first; 'r' and the eight bytes of the double,
-/// likewise, a negative zero as zero; 't' or 'b', the length in eight bytes, and the bytes of the
-/// text or blob. NULLs behind all other arguments do not count, so that a row keeps its checksum
-/// when its table gets a column that it lacks. Throws StorageError.
+/// The checksum of a row: the CRC-32 (as zlib computes it) of its values. Each counts with its type
+/// and bytes: 'n' for NULL; 'i' and eight bytes, least first; 'r' and the eight bytes of the
+/// double, likewise, a negative zero as zero; 't' or 'b', the length in eight bytes, and the bytes
+/// of the text or blob. NULLs behind all other values do not count, so that a row keeps its
+/// checksum when its table gets a column that it lacks.
+class RowChecksum {
+ public:
+  void clear();
+  void add_null() { bytes_ += 'n'; }
+  void add(std::int64_t value);
+  void add(double value);
+  void add(std::string_view text) { add_bytes('t', text); }
+  void add_blob(std::string_view blob) { add_bytes('b', blob); }
+  std::uint32_t sum() const;
+
+ private:
+  void add_word(char type, std::uint64_t word);
+  void add_bytes(char type, std::string_view bytes);
+
+  std::string bytes_;    // keeps its room
+  std::size_t end_ = 0;  // behind the last value that is not NULL
+};
+
+/// Gives the connection the SQL function `row_checksum(value, ...)`: the checksum of its arguments,
+/// an integer from 0 to 2^32 - 1. Throws StorageError.
 void add_row_checksum(sqlite3* database);
 
 }  // namespace oblique::server

@@ -66,6 +66,11 @@ void Statement::bind(int index, std::string_view text) {
                             SQLITE_UTF8));
 }
 
+void Statement::bind_lasting(int index, std::string_view text) {
+  check(sqlite3_bind_text64(statement_.get(), index, text.data(), text.size(), SQLITE_STATIC,
+                            SQLITE_UTF8));
+}
+
 void Statement::bind_blob(int index, std::string_view bytes) {
   check(sqlite3_bind_blob64(statement_.get(), index, bytes.data(), bytes.size(), SQLITE_TRANSIENT));
 }
@@ -83,8 +88,12 @@ int Statement::columns() const {
   return sqlite3_column_count(statement_.get());
 }
 
+int Statement::type(int column) const {
+  return sqlite3_column_type(statement_.get(), column);
+}
+
 bool Statement::is_null(int column) const {
-  return sqlite3_column_type(statement_.get(), column) == SQLITE_NULL;
+  return type(column) == SQLITE_NULL;
 }
 
 bool Statement::step() {
@@ -122,9 +131,13 @@ std::int64_t Statement::integer(int column) const {
 }
 
 std::string Statement::text(int column) const {
+  return std::string(bytes(column));
+}
+
+std::string_view Statement::bytes(int column) const {
   const void* bytes = sqlite3_column_blob(statement_.get(), column);
   const auto size = static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column));
-  return size == 0 ? std::string() : std::string(static_cast<const char*>(bytes), size);
+  return size == 0 ? std::string_view() : std::string_view(static_cast<const char*>(bytes), size);
 }
 
 Transaction::Transaction(sqlite3* database) : database_(database) {

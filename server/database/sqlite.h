@@ -46,6 +46,8 @@ class Statement {
   void bind(int index, std::uint64_t value);
   void bind(int index, double value);  ///< a NaN is stored as NULL
   void bind(int index, std::string_view text);
+  /// The same without a copy: the text must stay where it is until the statement was reset.
+  void bind_lasting(int index, std::string_view text);
   void bind_blob(int index, std::string_view bytes);
   void bind_null(int index);
   /// The value, of whatever type, that another statement's row has in that column.
@@ -59,10 +61,13 @@ class Statement {
   void reset();
 
   int columns() const;
+  int type(int column) const;  ///< SQLITE_INTEGER and so on
   bool is_null(int column) const;
   std::int64_t integer(int column) const;
   double real(int column) const;
   std::string text(int column) const;  ///< bytes of a text or blob
+  /// The same without a copy, until the statement goes on.
+  std::string_view bytes(int column) const;
 
  private:
   struct Finalize {
@@ -92,7 +97,7 @@ class Transaction {
 
 /// The schema that this program writes, and the marks that tell its databases from others.
 inline constexpr std::int32_t kApplicationId = 0x6f626c71;  // "oblq"
-inline constexpr std::int32_t kSchemaVersion = 7;
+inline constexpr std::int32_t kSchemaVersion = 8;
 
 enum class DatabaseKind { kEmpty, kOurs, kOlder };
 

@@ -146,13 +146,22 @@ std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name)
   constexpr int kFirstWithShares = 2;
   constexpr int kFirstWithSubmitters = 6;
   const std::int64_t version = schema.step() ? schema.integer(0) : 0;
-  // Counts come from the indices of `results`: its rows are not touched.
+  constexpr int kFirstPacked = 8;
+  // Counts come from indices and the table for them where they can: rows are not touched.
+  const std::string counts =
+      version >= kFirstPacked
+          ? " CASE s.counted WHEN 1 THEN (SELECT coalesce(sum(c.points), 0) FROM settled_points AS "
+            "c"
+            " WHERE c.study_id = s.study_id) ELSE"
+            " (SELECT count(*) FROM packed_results AS r WHERE r.study_id = s.study_id) END,"
+            " (SELECT count(*) FROM packed_results AS r WHERE r.study_id = s.study_id"
+            " AND r.error IS NOT NULL)"
+          : " (SELECT count(*) FROM results AS r WHERE r.study_id = s.study_id),"
+            " (SELECT count(*) FROM results AS r WHERE r.study_id = s.study_id"
+            " AND r.status = 'failed')";
   Statement list(
       database_.get(),
-      "SELECT s.study_id, s.name, s.state, s.points, s.created_at,"
-      " (SELECT count(*) FROM results AS r WHERE r.study_id = s.study_id),"
-      " (SELECT count(*) FROM results AS r WHERE r.study_id = s.study_id"
-      " AND r.status = 'failed')" +
+      "SELECT s.study_id, s.name, s.state, s.points, s.created_at," + counts +
           std::string(version >= kFirstWithShares ? ", s.priority, s.weight" : ", 0, 1.0") +
           (version >= kFirstWithSubmitters ? ", coalesce(s.submitted_by, '')" : ", ''") +
           " FROM studies AS s WHERE ?1 = '' OR s.name = ?1 ORDER BY s.study_id");

@@ -1,16 +1,28 @@
 #include "server/store/migration.h"
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <random>
-#include <string>
 #include <string_view>
 
-#include "server/store/model_rows.h"
+#include <spdlog/fmt/fmt.h>
+
+#include "server/store/migrated_rows.h"
+#include "server/store/rows/model_rows.h"
+#include "server/store/rows/row_columns.h"
 #include "server/store/schema.h"
 
 namespace oblique::server {
 namespace {
+
+using Notice = std::function<void(const std::string&)>;
+
+/// Measured on one core of a machine of 2025.
+constexpr double kRowsPerSecond = 50'000.0;
+/// Below so many rows nobody need be told to wait.
+constexpr std::uint64_t kManyRows = 100'000;
 
 std::string random_id() {
   std::random_device source;
@@ -22,11 +34,58 @@ std::string random_id() {
   return id;
 }
 
+std::int64_t number(sqlite3* database, const std::string& sql) {
+  Statement statement(database, sql);
+  return statement.step() ? statement.integer(0) : 0;
+}
+
+double megabytes(sqlite3* database) {
+  return static_cast<double>(number(database, "PRAGMA page_count")) *
+         static_cast<double>(number(database, "PRAGMA page_size")) / 1e6;
+}
+
+void tell(const Notice& notice, const std::string& sentence) {
+  if (notice) {
+    notice(sentence);
+  }
+}
+
+void say_what_begins(sqlite3* database, int found, std::uint64_t rows, const Notice& notice) {
+  const double size_MB = megabytes(database);
+  tell(notice,
+       fmt::format(
+           "the database is brought from schema {} to {}, with about {} results: some {:.0f} "
+           "s, and up to {:.0f} MB more on its disk meanwhile. Whoever ends it before loses "
+           "nothing, and the next start begins again",
+           found, kSchemaVersion, rows,
+           std::max(1.0, 2.0 * static_cast<double>(rows) / kRowsPerSecond), size_MB));
+}
+
+/// The steps to schema `kFirstPacked`, in the open transaction.
+MigratedRows take_steps(sqlite3* database, int found, std::uint64_t rows, const Notice& notice) {
+  constexpr std::array kSteps{kMigrateFrom1Sql, kMigrateFrom2Sql, kMigrateFrom3Sql,
+                              kMigrateFrom4Sql, kMigrateFrom5Sql, kMigrateFrom6Sql,
+                              kMigrateFrom7Sql};
+  static_assert(kSteps.size() == kSchemaVersion - 1, "a step from each schema to the next");
+  for (std::size_t step = static_cast<std::size_t>(found); step < kSchemaVersion; ++step) {
+    execute(database, kSteps.at(step - 1));
+  }
+  execute(database, kResultsSql);
+  const MigratedRows migrated = migrate_rows(database, [&](std::uint64_t looked_at) {
+    if (rows >= kManyRows && looked_at % (rows / 10 / 10'000 * 10'000) == 0) {
+      tell(notice, fmt::format("{} of about {} results", looked_at, rows));
+    }
+  });
+  execute(database, "DROP TABLE results_7");
+  return migrated;
+}
+
 }  // namespace
 
 void create_schema(sqlite3* database) {
   Transaction transaction(database);
   execute(database, kSchemaSql);
+  execute(database, kResultsSql);
   execute(database, kViewsSql);
   execute(database, "PRAGMA application_id = " + std::to_string(kApplicationId));
   execute(database, "PRAGMA user_version = " + std::to_string(kSchemaVersion));
@@ -36,22 +95,51 @@ void create_schema(sqlite3* database) {
   transaction.commit();
 }
 
-void migrate(sqlite3* database) {
-  constexpr std::array kSteps{kMigrateFrom1Sql, kMigrateFrom2Sql, kMigrateFrom3Sql,
-                              kMigrateFrom4Sql, kMigrateFrom5Sql, kMigrateFrom6Sql};
-  static_assert(kSteps.size() == kSchemaVersion - 1, "a step from each schema to the next");
+void migrate(sqlite3* database, const Notice& notice) {
   add_model_definition(database);
-  Statement version(database, "PRAGMA user_version");
-  version.step();
-  const auto found = static_cast<std::size_t>(version.integer(0));
-  version.reset();
-  Transaction transaction(database);
-  for (std::size_t step = found; step < kSchemaVersion; ++step) {
-    execute(database, kSteps.at(step - 1));
+  const auto found = static_cast<int>(number(database, "PRAGMA user_version"));
+  try {
+    const auto rows =
+        static_cast<std::uint64_t>(number(database, "SELECT max(rowid) FROM results"));
+    say_what_begins(database, found, rows, notice);
+    Transaction transaction(database);
+    const MigratedRows migrated = take_steps(database, found, rows, notice);
+    execute(database, kViewsSql);
+    execute(database, "PRAGMA user_version = " + std::to_string(kSchemaVersion));
+    transaction.commit();
+    tell(notice, fmt::format("{} results are brought over", migrated.kept));
+    if (migrated.left_out > 0) {
+      tell(notice, fmt::format("{} results were not as they were stored: they are left out, and "
+                               "their points are solved again",
+                               migrated.left_out));
+    }
+  } catch (const StorageGone&) {
+    throw;
+  } catch (const StorageError& error) {
+    throw StorageError(
+        fmt::format("the database cannot be brought from schema {} to {}, and stays as it is: {}",
+                    found, kSchemaVersion, error.what()));
   }
-  execute(database, kViewsSql);
-  execute(database, "PRAGMA user_version = " + std::to_string(kSchemaVersion));
-  transaction.commit();
+}
+
+bool gives_space_back(sqlite3* database) {
+  constexpr std::int64_t kIncremental = 2;
+  return number(database, "PRAGMA auto_vacuum") == kIncremental;
+}
+
+void make_it_give_space_back(sqlite3* database, const Notice& notice) {
+  const double before_MB = megabytes(database);
+  try {
+    execute(database, "PRAGMA auto_vacuum = INCREMENTAL");
+    execute(database, "VACUUM");
+    tell(notice, fmt::format("the database was written again without its empty pages: {:.1f} MB, "
+                             "from {:.1f} MB",
+                             megabytes(database), before_MB));
+  } catch (const StorageError& error) {
+    tell(notice, fmt::format("the database keeps its empty pages, and cannot give back space until "
+                             "a start can write it again: {}",
+                             error.what()));
+  }
 }
 
 }  // namespace oblique::server

@@ -1,11 +1,14 @@
 #include "server/store/store.h"
 
 #include <algorithm>
+#include <optional>
 
+#include "proto/result_message.h"
 #include "server/database/row_checksum.h"
 #include "server/store/migration.h"
-#include "server/store/model_rows.h"
-#include "server/store/result_row.h"
+#include "server/store/rows/model_rows.h"
+#include "server/store/rows/packed_row.h"
+#include "server/store/rows/row_columns.h"
 
 namespace oblique::server {
 namespace {
@@ -76,11 +79,11 @@ struct Store::Statements {
                      " SELECT ?1, min(point), count(*), attempt, ?4 FROM"
                      " (SELECT point, attempt,"
                      " point - row_number() OVER (PARTITION BY attempt ORDER BY point) AS run"
-                     " FROM results WHERE study_id = ?1 AND point >= ?2 AND point < ?3"
-                     " AND status = 'failed') GROUP BY attempt, run"),
+                     " FROM packed_results WHERE study_id = ?1 AND point >= ?2 AND point < ?3"
+                     " AND error IS NOT NULL) GROUP BY attempt, run"),
         forget_failures(database,
-                        "DELETE FROM results WHERE study_id = ?1 AND point >= ?2 AND point < ?3"
-                        " AND status = 'failed'"),
+                        "DELETE FROM packed_results WHERE study_id = ?1 AND point >= ?2"
+                        " AND point < ?3 AND error IS NOT NULL"),
         reopen(database,
                "UPDATE studies SET state = 'running', changed_at = ?2"
                " WHERE study_id = ?1 AND state = 'done'"),
@@ -94,10 +97,12 @@ struct Store::Statements {
                " WHERE study_id = ?1"),
         add_worker(database,
                    "INSERT INTO workers (worker_id, name, threads, solver_version,"
-                   " instruction_set, joined_at) VALUES (?, ?, ?, ?, ?, ?)"),
+                   " instruction_set, joined_at, checksum) VALUES (?1, ?2, ?3, ?4, ?5, ?6,"
+                   " row_checksum(?1, ?2, ?3, ?4, ?5, ?6))"),
         find_model(database, "SELECT model_id FROM models WHERE definition = ?"),
         add_model(database, insert_model_sql()),
-        add_result(database, insert_result_sql()) {}
+        texts(database),
+        add_result(database) {}
 
   Statement add_study;
   Statement set_state;
@@ -110,10 +115,12 @@ struct Store::Statements {
   Statement add_worker;
   Statement find_model;
   Statement add_model;
-  Statement add_result;
+  TextNumbers texts;
+  RowInsert add_result;
+  PackedRow row;
 };
 
-Store::Store(const std::string& path) {
+Store::Store(const std::string& path, const Notice& notice) {
   check_path(path);
   files_ = std::make_unique<DatabaseFiles>(path);
   database_ = open_database(path, SQLITE_OPEN_READWRITE);
@@ -121,6 +128,10 @@ Store::Store(const std::string& path) {
   add_row_checksum(database_.get());
   log_ = std::make_unique<WriteAheadLog>(database_.get());
   const DatabaseKind kind = identify(database_.get(), path);
+  if (kind == DatabaseKind::kEmpty) {
+    // What is deleted is given back in small steps. To be said before anything is written.
+    execute(database_.get(), "PRAGMA auto_vacuum = INCREMENTAL");
+  }
   Statement journal(database_.get(), "PRAGMA journal_mode = WAL");
   if (!journal.step() || journal.text(0) != "wal") {
     throw StorageError("the file system of " + path + " cannot hold a write-ahead log");
@@ -132,7 +143,12 @@ Store::Store(const std::string& path) {
     create_schema(database_.get());
     log_->merge();  // the file is a whole database from the start
   } else if (kind == DatabaseKind::kOlder) {
-    migrate(database_.get());
+    migrate(database_.get(), notice);
+    log_->merge();
+  }
+  if (!gives_space_back(database_.get())) {
+    make_it_give_space_back(database_.get(), notice);
+    log_->merge();
   }
   statements_ = std::make_unique<Statements>(database_.get());
   files_->expect(database_.get(), database_id());
@@ -184,7 +200,8 @@ void Store::commit(std::span<const Change> changes) {
     files_->check();  // or it was committed to a file that nobody will find
     log_->shorten();
   } catch (...) {
-    model_ids_.clear();
+    models_.clear();
+    statements_->texts.forget();
     log_->suspect();
     throw;
   }
@@ -260,7 +277,7 @@ void Store::add(const RenameStudy& change) {
 }
 
 void Store::add(const DeleteStudy& change) {
-  for (const char* table : {"results", "retries", "studies"}) {
+  for (const char* table : {"packed_results", "settled_points", "retries", "studies"}) {
     Statement remove(database_.get(), std::string("DELETE FROM ") + table + " WHERE study_id = ?");
     remove.bind(1, change.study_id);
     remove.run();
@@ -287,19 +304,26 @@ void Store::add(const AddWorker& change) {
 }
 
 void Store::add(const AddResults& change) {
+  PackedRow& row = statements_->row;
   for (const protocol::PointResult& result : change.results) {
     const protocol::Point point = change.table->point(result.point());
-    const RowContext context{
-        change.study_id,       model_id(change, point.model), point,          change.worker_id,
-        change.solver_version, change.instruction_set,        change.attempt, change.solved_at};
-    bind_result(statements_->add_result, context, result);
-    statements_->add_result.run();
+    const StoredModel model = stored_model(change, point.model);
+    const RowContext context{change.study_id, model.id,         model.accuracy,
+                             point,           result.point(),   change.worker_id,
+                             change.attempt,  change.solved_at, {}};
+    if (result.error().empty()) {
+      const solver::CaseResult outputs = protocol::from_message(result);
+      row.pack(context, &outputs, {}, statements_->texts);
+    } else {
+      row.pack(context, nullptr, result.error(), statements_->texts);
+    }
+    statements_->add_result.run(row);
   }
 }
 
-std::int64_t Store::model_id(const AddResults& change, std::uint64_t model) {
+Store::StoredModel Store::stored_model(const AddResults& change, std::uint64_t model) {
   const std::pair key{change.study_id, model};
-  if (const auto known = model_ids_.find(key); known != model_ids_.end()) {
+  if (const auto known = models_.find(key); known != models_.end()) {
     return known->second;
   }
   const solver::ModelParameters parameters = change.table->model(model);
@@ -307,13 +331,14 @@ std::int64_t Store::model_id(const AddResults& change, std::uint64_t model) {
   bind_model(statements_->add_model, parameters, definition);
   statements_->add_model.run();
   const bool is_new = sqlite3_changes(database_.get()) > 0;
-  const std::int64_t id =
-      is_new ? sqlite3_last_insert_rowid(database_.get()) : known_model(definition);
-  if (model_ids_.size() >= kMostCachedModels) {
-    model_ids_.clear();
+  const StoredModel stored{
+      is_new ? sqlite3_last_insert_rowid(database_.get()) : known_model(definition),
+      accuracy_of(parameters)};
+  if (models_.size() >= kMostCachedModels) {
+    models_.clear();
   }
-  model_ids_.emplace(key, id);
-  return id;
+  models_.emplace(key, stored);
+  return stored;
 }
 
 std::int64_t Store::known_model(std::string_view definition) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -37,10 +38,13 @@ struct StoredStudy {
 /// again), studies with a full sync.
 class Store final : public Storage {
  public:
+  /// Told in a sentence what takes long, and what came of it.
+  using Notice = std::function<void(const std::string&)>;
+
   /// Opens the database at `path`, or makes it; one of an older schema is brought to the present
   /// one. Throws StorageError naming what was found: a directory, a foreign file, a newer schema, a
   /// damaged or unwritable file, one that is open elsewhere.
-  explicit Store(const std::string& path);
+  explicit Store(const std::string& path, const Notice& notice = {});
   ~Store() override;
 
   void commit(std::span<const Change> changes) override;
@@ -84,7 +88,12 @@ class Store final : public Storage {
   void add(const DeleteStudy& change);
   void add(const AddWorker& change);
   void add(const AddResults& change);
-  std::int64_t model_id(const AddResults& change, std::uint64_t model);
+  /// Row of `models`, and the accuracy of its results.
+  struct StoredModel {
+    std::int64_t id;
+    double accuracy;
+  };
+  StoredModel stored_model(const AddResults& change, std::uint64_t model);
   std::int64_t known_model(std::string_view definition);
   void set_sync(bool full);
   std::uint64_t highest(const std::string& sql);
@@ -93,8 +102,8 @@ class Store final : public Storage {
   DatabaseHandle database_;
   std::unique_ptr<WriteAheadLog> log_;
   std::unique_ptr<Statements> statements_;
-  // Row of `models` by study and model number; emptied when it grows or a transaction fails.
-  std::map<std::pair<std::uint64_t, std::uint64_t>, std::int64_t> model_ids_;
+  // By study and model number; emptied when it grows or a transaction fails.
+  std::map<std::pair<std::uint64_t, std::uint64_t>, StoredModel> models_;
   bool full_sync_ = true;
   std::vector<std::string> left_out_;
 };

@@ -39,7 +39,7 @@ Progress progress_of_all(sqlite3* database) {
                                               static_cast<std::uint32_t>(retries.integer(3)));
   }
   Statement failed(database,
-                   "SELECT study_id, point, attempt FROM results WHERE status = 'failed'"
+                   "SELECT study_id, point, attempt FROM packed_results WHERE error IS NOT NULL"
                    " ORDER BY study_id, point");
   while (failed.step()) {
     const std::uint64_t point = number(failed, 1);
@@ -75,10 +75,11 @@ IntervalSet points_of(Statement& query, std::uint64_t study_id) {
 class SettledPoints {
  public:
   explicit SettledPoints(sqlite3* database)
-      : ends_(database,
-              "SELECT (SELECT point FROM results WHERE study_id = ?1 ORDER BY point LIMIT 1),"
-              " (SELECT point FROM results WHERE study_id = ?1 ORDER BY point DESC LIMIT 1)"),
-        all_(database, "SELECT point FROM results WHERE study_id = ? ORDER BY point") {}
+      : ends_(
+            database,
+            "SELECT (SELECT point FROM packed_results WHERE study_id = ?1 ORDER BY point LIMIT 1),"
+            " (SELECT point FROM packed_results WHERE study_id = ?1 ORDER BY point DESC LIMIT 1)"),
+        all_(database, "SELECT point FROM packed_results WHERE study_id = ? ORDER BY point") {}
 
   IntervalSet of(const StoredStudy& study) {
     ends_.bind(1, study.study_id);

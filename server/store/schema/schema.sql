@@ -1,7 +1,8 @@
 -- The database is a public interface: read it with any SQLite tool while the server runs.
 -- SI units, named in the columns. Times count from touch unless a name says otherwise.
--- PRAGMA application_id names the program, PRAGMA user_version the version of this schema. The views
--- are in views.sql.
+-- PRAGMA application_id names the program, PRAGMA user_version the version of this schema. What people
+-- ask is in the views (views.sql): `runs`, `results`, `peaks`, `phases`, `stick_intervals` and
+-- `reaction_peaks`. The tables of results are in results.sql.
 
 -- One row. Workers know by it which database their results are meant for.
 CREATE TABLE about (
@@ -21,7 +22,8 @@ CREATE TABLE studies (
   weight      REAL NOT NULL DEFAULT 1.0,    -- share of the workers among studies of one priority
   mixes_versions INTEGER NOT NULL DEFAULT 0, -- 1: results of several solver versions are allowed
   checksum    INTEGER,           -- CRC-32 of study_id, name, recipe, points and created_at
-  submitted_by TEXT              -- name of the key with which it was first submitted; NULL: without keys
+  submitted_by TEXT,             -- name of the key with which it was first submitted; NULL: without keys
+  counted     INTEGER NOT NULL DEFAULT 0    -- 1: `settled_points` says which points have a row
 ) STRICT;
 
 -- Every parameter but H, mu and e; one row for each distinct model that has results. The columns
@@ -58,77 +60,8 @@ CREATE TABLE workers (
   threads         INTEGER NOT NULL,
   solver_version  TEXT NOT NULL,
   instruction_set TEXT NOT NULL,
-  joined_at       TEXT NOT NULL
-) STRICT;
-
--- One row for each settled point. Outputs of a failed point are NULL and `error` says why.
-CREATE TABLE results (
-  study_id         INTEGER NOT NULL REFERENCES studies (study_id),
-  point            INTEGER NOT NULL,
-  model_id         INTEGER NOT NULL REFERENCES models (model_id),
-  H                REAL NOT NULL,
-  mu               REAL NOT NULL,
-  e                REAL NOT NULL,
-  status           TEXT NOT NULL CHECK (status IN ('solved', 'failed')),
-  error            TEXT,
-  fall_time_s      REAL,
-  impact_x_m       REAL,
-  vt_in_m_s        REAL,
-  vn_in_m_s        REAL,
-  duration_s       REAL,
-  fn_peak_N        REAL,
-  ft_peak_N        REAL,
-  impulse_n_Ns     REAL,
-  impulse_t_Ns     REAL,
-  slide_m          REAL,
-  vt_out_m_s       REAL,
-  vn_out_m_s       REAL,
-  mode             TEXT,
-  major_mode       TEXT,
-  stick_total_s    REAL,
-  peaks            TEXT,         -- JSON [[t_s, fn_N, ft_N, major], ...], major 1 or 0
-  ft_peaks         TEXT,         -- JSON [[t_s, ft_N], ...]
-  phases           TEXT,         -- JSON [["compression", t0_s, t1_s], ...]
-  stick_intervals  TEXT,         -- JSON [[t0_s, t1_s], ...]
-  kinetic_in_J     REAL,
-  friction_J       REAL,
-  restitution_J    REAL,
-  kinetic_change_J REAL,
-  strain_change_J  REAL,
-  gravity_change_J REAL,
-  exchanged_J      REAL,
-  closure          REAL,
-  dt_s             REAL,
-  steps            INTEGER,
-  wall_s           REAL,
-  worker           INTEGER REFERENCES workers (worker_id),  -- NULL: the server failed the point
-  solver_version   TEXT,
-  instruction_set  TEXT,
-  attempt          INTEGER NOT NULL,
-  solved_at        TEXT NOT NULL,
-  -- Largest force on the outer link at the pin O, then at each joint: JSON [[t_s, force_N], ...].
-  -- NULL: the row is of an earlier schema or worker.
-  reaction_peaks   TEXT,
-  -- CRC-32 of the other columns (server/database/row_checksum.h), which `oblique check` compares with them.
-  -- NULL: the row is of an earlier schema. Whoever changes a row sets it to NULL.
-  checksum         INTEGER,
-  -- How far the contact kept from another order of events, and the event that came nearest.
-  -- NULL: the row is of an earlier schema or solver.
-  margin           REAL,
-  margin_event     TEXT,
-  -- Estimated errors, each as a fraction of its scale (worker/solver/README.md), and whether half the mesh
-  -- and twice the step give the same mode (1) or another (0). NULL: the study did not ask for them, the
-  -- coarser solution has no answer, or the row is of an earlier schema.
-  mode_same        INTEGER,
-  fn_peak_error    REAL,
-  ft_peak_error    REAL,
-  duration_error   REAL,
-  stick_total_error REAL,
-  slide_error      REAL,
-  impulse_n_error  REAL,
-  impulse_t_error  REAL,
-  v_out_error      REAL,
-  UNIQUE (study_id, point)
+  joined_at       TEXT NOT NULL,
+  checksum        INTEGER        -- CRC-32 of the other columns
 ) STRICT;
 
 -- Failed points that were forgotten to be solved again: runs of neighbours that had failed in one
@@ -140,5 +73,3 @@ CREATE TABLE retries (
   attempt     INTEGER NOT NULL,  -- that failed; the next one has a higher number
   retried_at  TEXT NOT NULL
 ) STRICT;
-
-CREATE INDEX failed_points ON results (study_id, point) WHERE status = 'failed';

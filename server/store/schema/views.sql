@@ -4,35 +4,121 @@ DROP VIEW IF EXISTS reaction_peaks;
 DROP VIEW IF EXISTS stick_intervals;
 DROP VIEW IF EXISTS phases;
 DROP VIEW IF EXISTS peaks;
+DROP VIEW IF EXISTS results;
 
--- The packed arrays as rows; `seq` counts from 0.
+-- One row for each settled point, in SI units. Dividing by a power of ten gives the double that is
+-- nearest to the decimal number. Lists are JSON arrays with an array for each element.
+CREATE VIEW results AS
+SELECT p.study_id AS study_id, p.point AS point, p.model_id AS model_id, p.H AS H, p.mu AS mu, p.e AS e,
+       CASE WHEN p.error IS NULL THEN 'solved' ELSE 'failed' END AS status, p.error AS error,
+       p.fall_time / 1e9 AS fall_time_s, p.impact_x / 1e9 AS impact_x_m, p.vt_in / 1e8 AS vt_in_m_s,
+       p.vn_in / 1e8 AS vn_in_m_s, p.duration / 1e12 AS duration_s, p.fn_peak / 1e5 AS fn_peak_N,
+       p.ft_peak / 1e5 AS ft_peak_N, p.impulse_n / 1e9 AS impulse_n_Ns,
+       p.impulse_t / 1e9 AS impulse_t_Ns, p.slide / 1e11 AS slide_m, p.vt_out / 1e8 AS vt_out_m_s,
+       p.vn_out / 1e8 AS vn_out_m_s, mode.text AS mode, major_mode.text AS major_mode,
+       p.stick_total / 1e12 AS stick_total_s,
+       CASE WHEN p.peaks IS NOT NULL THEN
+         (SELECT json_group_array(json_array(
+                   t.value / 1e12, abs(p.peaks ->> (t.key + 1)) / 1e5, (p.peaks ->> (t.key + 2)) / 1e5,
+                   p.peaks ->> (t.key + 1) >= 0))
+          FROM json_each(p.peaks) AS t WHERE t.key % 3 = 0) END AS peaks,
+       CASE WHEN p.peaks IS NOT NULL THEN CASE WHEN p.ft_peaks IS NOT NULL THEN
+         (SELECT json_group_array(json_array(t.value / 1e12, (p.ft_peaks ->> (t.key + 1)) / 1e5))
+          FROM json_each(p.ft_peaks) AS t WHERE t.key % 2 = 0) ELSE
+         (SELECT json_group_array(json_array(t.value / 1e12, (p.peaks ->> (t.key + 2)) / 1e5))
+          FROM json_each(p.peaks) AS t WHERE t.key % 3 = 0) END END AS ft_peaks,
+       CASE WHEN p.peaks IS NOT NULL THEN
+         (SELECT json_group_array(json_array(
+                   CASE t.key % 2 WHEN 0 THEN 'compression' ELSE 'restitution' END,
+                   CASE t.key WHEN 0 THEN 0.0 ELSE (p.phases ->> (t.key - 1)) / 1e12 END,
+                   t.value / 1e12))
+          FROM json_each(json_insert(p.phases, '$[#]', p.duration)) AS t) END AS phases,
+       CASE WHEN p.stick_intervals IS NOT NULL THEN
+         (SELECT json_group_array(json_array(
+                   t.value / 1e12, (p.stick_intervals ->> (t.key + 1)) / 1e12))
+          FROM json_each(p.stick_intervals) AS t WHERE t.key % 2 = 0) END AS stick_intervals,
+       p.kinetic_in / 1e8 AS kinetic_in_J, p.friction / 1e9 AS friction_J,
+       p.restitution / 1e9 AS restitution_J, p.kinetic_change / 1e9 AS kinetic_change_J,
+       p.strain_change / 1e9 AS strain_change_J, p.gravity_change / 1e9 AS gravity_change_J,
+       p.exchanged / 1e9 AS exchanged_J, p.closure / 1e14 AS closure, p.dt / 1e15 AS dt_s,
+       p.steps AS steps, p.wall / 1e9 AS wall_s, p.worker AS worker,
+       worker.solver_version AS solver_version, worker.instruction_set AS instruction_set,
+       p.attempt AS attempt,
+       CASE typeof(p.solved_at) WHEN 'integer'
+            THEN strftime('%Y-%m-%dT%H:%M:%fZ', p.solved_at / 1000.0, 'unixepoch') ELSE p.solved_at END AS solved_at,
+       CASE WHEN p.reaction_peaks IS NOT NULL THEN
+         (SELECT json_group_array(json_array(t.value / 1e12, (p.reaction_peaks ->> (t.key + 1)) / 1e5))
+          FROM json_each(p.reaction_peaks) AS t WHERE t.key % 2 = 0) END AS reaction_peaks,
+       p.checksum AS checksum, p.margin / 1e9 AS margin, margin_event.text AS margin_event,
+       p.mode_same AS mode_same, p.fn_peak_error / 1e9 AS fn_peak_error,
+       p.ft_peak_error / 1e9 AS ft_peak_error, p.duration_error / 1e9 AS duration_error,
+       p.stick_total_error / 1e9 AS stick_total_error, p.slide_error / 1e9 AS slide_error,
+       p.impulse_n_error / 1e9 AS impulse_n_error, p.impulse_t_error / 1e9 AS impulse_t_error,
+       p.v_out_error / 1e9 AS v_out_error, p.taken_from AS taken_from
+FROM packed_results AS p
+LEFT JOIN texts AS mode ON mode.text_id = p.mode
+LEFT JOIN texts AS major_mode ON major_mode.text_id = p.major_mode
+LEFT JOIN texts AS margin_event ON margin_event.text_id = p.margin_event
+LEFT JOIN workers AS worker ON worker.worker_id = p.worker;
+
+-- Rows may be deleted by hand, and a checksum set to NULL.
+CREATE TRIGGER delete_results INSTEAD OF DELETE ON results
+BEGIN
+  DELETE FROM packed_results WHERE study_id = OLD.study_id AND point = OLD.point;
+END;
+
+CREATE TRIGGER update_results INSTEAD OF UPDATE ON results
+BEGIN
+  SELECT RAISE(ABORT, 'only the checksum of results can be changed; the rest stands in packed_results')
+  WHERE (NEW.study_id, NEW.point, NEW.model_id, NEW.H, NEW.mu, NEW.e, NEW.status, NEW.error,
+         NEW.fall_time_s, NEW.impact_x_m, NEW.vt_in_m_s, NEW.vn_in_m_s, NEW.duration_s, NEW.fn_peak_N,
+         NEW.ft_peak_N, NEW.impulse_n_Ns, NEW.impulse_t_Ns, NEW.slide_m, NEW.vt_out_m_s, NEW.vn_out_m_s,
+         NEW.mode, NEW.major_mode, NEW.stick_total_s, NEW.peaks, NEW.ft_peaks, NEW.phases,
+         NEW.stick_intervals, NEW.kinetic_in_J, NEW.friction_J, NEW.restitution_J, NEW.kinetic_change_J,
+         NEW.strain_change_J, NEW.gravity_change_J, NEW.exchanged_J, NEW.closure, NEW.dt_s, NEW.steps,
+         NEW.wall_s, NEW.worker, NEW.solver_version, NEW.instruction_set, NEW.attempt, NEW.solved_at,
+         NEW.reaction_peaks, NEW.margin, NEW.margin_event, NEW.mode_same, NEW.fn_peak_error,
+         NEW.ft_peak_error, NEW.duration_error, NEW.stick_total_error, NEW.slide_error,
+         NEW.impulse_n_error, NEW.impulse_t_error, NEW.v_out_error, NEW.taken_from)
+    IS NOT (OLD.study_id, OLD.point, OLD.model_id, OLD.H, OLD.mu, OLD.e, OLD.status, OLD.error,
+            OLD.fall_time_s, OLD.impact_x_m, OLD.vt_in_m_s, OLD.vn_in_m_s, OLD.duration_s,
+            OLD.fn_peak_N, OLD.ft_peak_N, OLD.impulse_n_Ns, OLD.impulse_t_Ns, OLD.slide_m,
+            OLD.vt_out_m_s, OLD.vn_out_m_s, OLD.mode, OLD.major_mode, OLD.stick_total_s, OLD.peaks,
+            OLD.ft_peaks, OLD.phases, OLD.stick_intervals, OLD.kinetic_in_J, OLD.friction_J,
+            OLD.restitution_J, OLD.kinetic_change_J, OLD.strain_change_J, OLD.gravity_change_J,
+            OLD.exchanged_J, OLD.closure, OLD.dt_s, OLD.steps, OLD.wall_s, OLD.worker,
+            OLD.solver_version, OLD.instruction_set, OLD.attempt, OLD.solved_at, OLD.reaction_peaks,
+            OLD.margin, OLD.margin_event, OLD.mode_same, OLD.fn_peak_error, OLD.ft_peak_error,
+            OLD.duration_error, OLD.stick_total_error, OLD.slide_error, OLD.impulse_n_error,
+            OLD.impulse_t_error, OLD.v_out_error, OLD.taken_from);
+  UPDATE packed_results SET checksum = NEW.checksum
+  WHERE study_id = OLD.study_id AND point = OLD.point;
+END;
+
+-- The lists as rows; `seq` counts from 0.
 CREATE VIEW peaks AS
-SELECT r.study_id AS study_id, r.point AS point, item.key AS seq,
-       json_extract(item.value, '$[0]') AS t_s,
-       json_extract(item.value, '$[1]') AS fn_N,
-       json_extract(item.value, '$[2]') AS ft_N,
-       json_extract(item.value, '$[3]') AS major
-FROM results AS r, json_each(r.peaks) AS item;
+SELECT p.study_id AS study_id, p.point AS point, t.key / 3 AS seq, t.value / 1e12 AS t_s,
+       abs(p.peaks ->> (t.key + 1)) / 1e5 AS fn_N, (p.peaks ->> (t.key + 2)) / 1e5 AS ft_N,
+       p.peaks ->> (t.key + 1) >= 0 AS major
+FROM packed_results AS p, json_each(p.peaks) AS t WHERE t.key % 3 = 0;
 
 CREATE VIEW phases AS
-SELECT r.study_id AS study_id, r.point AS point, item.key AS seq,
-       json_extract(item.value, '$[0]') AS kind,
-       json_extract(item.value, '$[1]') AS t0_s,
-       json_extract(item.value, '$[2]') AS t1_s
-FROM results AS r, json_each(r.phases) AS item;
+SELECT p.study_id AS study_id, p.point AS point, t.key AS seq,
+       CASE t.key % 2 WHEN 0 THEN 'compression' ELSE 'restitution' END AS kind,
+       CASE t.key WHEN 0 THEN 0.0 ELSE (p.phases ->> (t.key - 1)) / 1e12 END AS t0_s,
+       t.value / 1e12 AS t1_s
+FROM packed_results AS p, json_each(json_insert(p.phases, '$[#]', p.duration)) AS t;
 
 CREATE VIEW stick_intervals AS
-SELECT r.study_id AS study_id, r.point AS point, item.key AS seq,
-       json_extract(item.value, '$[0]') AS t0_s,
-       json_extract(item.value, '$[1]') AS t1_s
-FROM results AS r, json_each(r.stick_intervals) AS item;
+SELECT p.study_id AS study_id, p.point AS point, t.key / 2 AS seq, t.value / 1e12 AS t0_s,
+       (p.stick_intervals ->> (t.key + 1)) / 1e12 AS t1_s
+FROM packed_results AS p, json_each(p.stick_intervals) AS t WHERE t.key % 2 = 0;
 
 -- `seq` 0 is the pin O, 1 the first joint from there.
 CREATE VIEW reaction_peaks AS
-SELECT r.study_id AS study_id, r.point AS point, item.key AS seq,
-       json_extract(item.value, '$[0]') AS t_s,
-       json_extract(item.value, '$[1]') AS force_N
-FROM results AS r, json_each(r.reaction_peaks) AS item;
+SELECT p.study_id AS study_id, p.point AS point, t.key / 2 AS seq, t.value / 1e12 AS t_s,
+       (p.reaction_peaks ->> (t.key + 1)) / 1e5 AS force_N
+FROM packed_results AS p, json_each(p.reaction_peaks) AS t WHERE t.key % 2 = 0;
 
 -- For people: study name, outputs and model beside each other. Young's modulus is E_Pa here, for
 -- column names do not tell E from e.
@@ -62,7 +148,7 @@ SELECT s.name AS study, r.study_id AS study_id, r.point AS point, r.H AS H, r.mu
        m.g AS g, m.elements_per_link AS elements_per_link, m.k AS k, m.eta2 AS eta2,
        m.tip_mass AS tip_mass, m.integrator AS integrator,
        m.spectral_radius AS spectral_radius, m.dt AS dt, m.dt_fall AS dt_fall,
-       m.tolerance AS tolerance
+       m.tolerance AS tolerance, r.taken_from AS taken_from
 FROM results AS r
 JOIN studies AS s ON s.study_id = r.study_id
 JOIN models AS m ON m.model_id = r.model_id

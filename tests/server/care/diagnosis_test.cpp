@@ -51,8 +51,9 @@ TEST_F(CareTest, EveryColumnOfAResultIsUnderItsChecksum) {
   std::vector<std::string> columns;
   {
     const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READONLY);
-    Statement names(database.get(),
-                    "SELECT name FROM pragma_table_info('results') WHERE name <> 'checksum'");
+    Statement names(
+        database.get(),
+        "SELECT name FROM pragma_table_info('packed_results') WHERE name <> 'checksum'");
     while (names.step()) {
       columns.push_back(names.text(0));
     }
@@ -64,7 +65,7 @@ TEST_F(CareTest, EveryColumnOfAResultIsUnderItsChecksum) {
     {
       const DatabaseHandle database = open_database(copy, SQLITE_OPEN_READWRITE);
       execute(database.get(), "PRAGMA ignore_check_constraints = ON");
-      execute(database.get(), "UPDATE results SET " + column + " = CASE typeof(" + column +
+      execute(database.get(), "UPDATE packed_results SET " + column + " = CASE typeof(" + column +
                                   ") WHEN 'text' THEN " + column + " || ' ' WHEN 'null' THEN 1" +
                                   " ELSE " + column + " + 1 END WHERE point = 4");
     }
@@ -106,7 +107,7 @@ TEST_F(CareTest, ADamagedDatabaseIsRefusedWithTheWayOut) {
 TEST_F(CareTest, ARowOfAPointThatTheStudyDoesNotHaveIsNamed) {
   store_.reset();
   const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);
-  execute(database.get(), "UPDATE results SET point = 77 WHERE point = 4");
+  execute(database.get(), "UPDATE packed_results SET point = 77 WHERE point = 4");
   EXPECT_THAT(find_faults(path_), testing::Contains(HasSubstr("study a")));
 }
 

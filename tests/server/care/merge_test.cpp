@@ -271,13 +271,13 @@ TEST_F(MergeTest, AStudyThatMixesVersionsElsewhereMixesThemHere) {
 
 TEST_F(MergeTest, ARowThatIsNotAsItWasStoredRefusesTheWholeDatabase) {
   store("one", {{.study = "b", .end = 2}, {.end = 9}});
-  texts("one", "UPDATE results SET fn_peak_N = fn_peak_N + 1 WHERE point = 8");
+  texts("one", "UPDATE packed_results SET fn_peak = fn_peak + 1 WHERE point = 8");
   EXPECT_THROW(merge("one"), StorageError);
   EXPECT_EQ(text("all", "SELECT count(*) FROM studies"), "0");
-  texts("one", "UPDATE results SET checksum = NULL, study_id = 77 WHERE point = 8");
+  texts("one", "UPDATE packed_results SET checksum = NULL, study_id = 77 WHERE point = 8");
   EXPECT_THROW(merge("one"), StorageError) << "of a study that is not there";
-  texts("one", "UPDATE results SET checksum = NULL, study_id = 1 WHERE study_id = 77");
-  texts("one", "UPDATE results SET checksum = NULL, peaks = '[[1, 2' WHERE point = 8");
+  texts("one", "UPDATE packed_results SET checksum = NULL, study_id = 1 WHERE study_id = 77");
+  texts("one", "UPDATE packed_results SET checksum = NULL, peaks = '[1, 2' WHERE point = 8");
   EXPECT_THROW(merge("one"), StorageError) << "with a list that no query could unfold";
 }
 
@@ -297,10 +297,10 @@ TEST_F(MergeTest, AStudyThatWouldKeepAServerFromStartingRefusesTheWholeDatabase)
 
 TEST_F(MergeTest, WhatIsComputedIsNotRead) {
   store("view", {{.end = 3}});
-  texts("view", "ALTER TABLE results RENAME TO stored");
+  texts("view", "ALTER TABLE packed_results RENAME TO stored");
   texts("view",
-        "CREATE VIEW Results AS WITH RECURSIVE t (x) AS (SELECT 0 UNION ALL SELECT x FROM t)"
-        " SELECT stored.*, stored.rowid AS rowid FROM stored, t");
+        "CREATE VIEW Packed_Results AS WITH RECURSIVE t (x) AS (SELECT 0 UNION ALL SELECT x FROM t)"
+        " SELECT stored.* FROM stored, t");
   EXPECT_THROW(merge("view"), StorageError);
   store("column", {{.end = 3}});
   texts("column", "ALTER TABLE studies ADD COLUMN big BLOB AS (zeroblob(100000000))");

@@ -78,36 +78,36 @@ TEST_F(RowFaultsTest, AColumnThatDisagreesWithTheRecipeOrAnotherColumnIsNamed) {
       {"H = 1.0000000000000002", "H is 1.0000000000000002"},
       {"mu = mu + 0.125", "mu is"},
       {"e = 0.5", "e is"},
-      {"duration_s = duration_s * 2", "duration"},
-      {"fn_peak_N = 5001", "fn_peak_N"},
-      {"ft_peak_N = 2001", "ft_peak_N"},
-      {"stick_total_s = 0", "stick_total_s"},
-      {"mode = 'SC sC sR'", "mode"},
-      {"peaks = replace(peaks, '5000', '4000')", "fn_peak_N"},
-      {"peaks = replace(peaks, ']]', ']')", "peaks"},
-      {"peaks = '[[2e-4,5000.0,1.0,1],[1e-4,1.0,1.0,1]]'", "peaks"},
-      {"peaks = '[[1e-4,5000.0,1]]'", "peaks"},
-      {"ft_peaks = '[[1e-4,1e999]]'", "ft_peaks"},
-      {"phases = replace(phases, 'compression', 'compressiom')", "phases"},
-      {"phases = '[[\"compression\",0.0,1e-4],[\"restitution\",2e-4,3e-4]]'", "phases"},
-      {"stick_intervals = replace(stick_intervals, '2e-05', '3e-05')", "stick_total_s"},
-      {"reaction_peaks = '[[1e-4,true]]'", "reaction_peaks"},
-      {"impulse_n_Ns = NULL", "outputs are missing"},
-      {"error = 'none'", "its error says otherwise"}};
+      {"fn_peak = 500100000", "fn_peak_N"},
+      {"ft_peak = 200100000", "ft_peak_N"},
+      {"stick_total = 0", "stick_total_s"},
+      {"mode = major_mode", "mode"},
+      {"peaks = replace(peaks, '500000000', '400000000')", "fn_peak_N"},
+      {"peaks = replace(peaks, ']', '')", "one of its lists cannot be read"},
+      {"peaks = '[200000000,500000000,1,100000000,1,1]'", "peaks"},
+      {"peaks = '[100000000,500000000,1,2]'", "peaks"},
+      {"ft_peaks = '[100000000,1e999]'", "ft_peaks"},
+      {"phases = '[200000000,100000000]'", "phases"},
+      {"phases = '[100000000]'", "phases"},
+      {"stick_intervals = replace(stick_intervals, '20000000', '30000000')", "stick_total_s"},
+      {"reaction_peaks = '[100000000]'", "reaction_peaks"},
+      {"impulse_n = NULL", "outputs are missing"},
+      {"error = 'none'", "it is failed, and has outputs"}};
   for (const auto& [change, said] : damages) {
     const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);
-    execute(database.get(), "CREATE TEMP TABLE before AS SELECT * FROM results WHERE point = 1");
-    execute(database.get(), "UPDATE results SET " + change + " WHERE point = 1");
+    execute(database.get(),
+            "CREATE TEMP TABLE before AS SELECT * FROM packed_results WHERE point = 1");
+    execute(database.get(), "UPDATE packed_results SET " + change + " WHERE point = 1");
     EXPECT_THAT(find_faults(path_), Contains(testing::AllOf(HasSubstr("point 1"), HasSubstr(said))))
         << change;
-    execute(database.get(), "DELETE FROM results WHERE point = 1");
-    execute(database.get(), "INSERT INTO results SELECT * FROM before");
+    execute(database.get(), "DELETE FROM packed_results WHERE point = 1");
+    execute(database.get(), "INSERT INTO packed_results SELECT * FROM before");
     EXPECT_THAT(find_faults(path_), IsEmpty()) << "after " << change;
   }
 }
 
 TEST_F(RowFaultsTest, AFailedPointWithOutputsIsNamed) {
-  run("UPDATE results SET fn_peak_N = 1 WHERE point = 2");
+  run("UPDATE packed_results SET fn_peak = 1 WHERE point = 2");
   EXPECT_THAT(find_faults(path_), Contains(HasSubstr("point 2: it is failed, and has outputs")));
 }
 

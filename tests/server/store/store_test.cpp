@@ -1,5 +1,6 @@
 #include "server/store/store.h"
 
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
 
@@ -163,77 +164,6 @@ TEST_F(StoreTest, WhoSubmittedAStudyIsKeptByTheNameOfTheKey) {
   EXPECT_EQ(Reader(path_).study_status("a").at(0).submitted_by(), "alice");
   const auto unknown = ask(path_, "SELECT submitted_by IS NULL FROM studies WHERE name = 'b'");
   EXPECT_EQ(unknown.rows(0).values(0).integer(), 1);
-}
-
-TEST_F(StoreTest, DoublesComeBackWithTheSameBitsFromColumnsAndViews) {
-  Store store(path_);
-  const auto study = study_of(500);
-  std::vector<protocol::PointResult> results;
-  for (std::uint64_t point = 0; point < 500; ++point) {
-    results.push_back(solved_point(point));
-  }
-  commit(store, {study, results_of(study, results)});
-  const auto scalars = ask(path_,
-                           "SELECT fall_time_s, duration_s, fn_peak_N, closure, mu FROM results"
-                           " ORDER BY point");
-  const auto peaks = ask(path_, "SELECT t_s, fn_N, ft_N FROM peaks ORDER BY point, seq");
-  const auto phases = ask(path_, "SELECT t0_s, t1_s FROM phases ORDER BY point, seq");
-  const auto sticks = ask(path_, "SELECT t0_s, t1_s FROM stick_intervals ORDER BY point, seq");
-  ASSERT_EQ(scalars.rows_size(), 500);
-  ASSERT_EQ(peaks.rows_size(), 1000);
-  for (int i = 0; i < 500; ++i) {
-    const auto& result = results[static_cast<std::size_t>(i)];
-    const auto outputs = protocol::from_message(result);
-    const auto& row = scalars.rows(i);
-    EXPECT_EQ(row.values(0).real(), outputs.fall_time_s);
-    EXPECT_EQ(row.values(1).real(), outputs.duration_s);
-    EXPECT_EQ(row.values(2).real(), outputs.fn_peak_N);
-    EXPECT_EQ(row.values(3).real(), outputs.energy.closure);
-    EXPECT_EQ(row.values(4).real(), study.table->point(result.point()).mu);
-    for (int j = 0; j < 6; ++j) {
-      EXPECT_EQ(peaks.rows(2 * i + j / 3).values(j % 3).real(), result.peaks(j));
-    }
-    EXPECT_EQ(phases.rows(3 * i + 1).values(0).real(), result.phase_ends_s(0));
-    EXPECT_EQ(phases.rows(3 * i + 1).values(1).real(), result.phase_ends_s(1));
-    EXPECT_EQ(sticks.rows(i).values(1).real(), result.stick_intervals(1));
-  }
-}
-
-TEST_F(StoreTest, ViewsUnfoldThePackedArrays) {
-  Store store(path_);
-  const auto study = study_of(3);
-  commit(store, {study, results_of(study, {solved_point(2)})});
-  const auto peaks = ask(path_, "SELECT study_id, point, seq, typeof(t_s), major FROM peaks");
-  ASSERT_EQ(peaks.rows_size(), 2);
-  EXPECT_EQ(peaks.rows(0).values(1).integer(), 2);
-  EXPECT_EQ(peaks.rows(0).values(2).integer(), 0);
-  EXPECT_EQ(peaks.rows(0).values(3).text(), "real");  // 0.0 is no integer
-  EXPECT_EQ(peaks.rows(0).values(4).integer(), 0);
-  EXPECT_EQ(peaks.rows(1).values(2).integer(), 1);
-  EXPECT_EQ(peaks.rows(1).values(4).integer(), 1);
-  const auto phases = ask(path_, "SELECT group_concat(kind) FROM phases");
-  EXPECT_EQ(phases.rows(0).values(0).text(), "compression,restitution,compression");
-}
-
-TEST_F(StoreTest, TheLargestReactionsComeBackWithTheSameBitsThePinFirst) {
-  Store store(path_);
-  const auto study = study_of(3);
-  auto of_older_worker = solved_point(2);
-  of_older_worker.clear_reaction_peaks();
-  const auto result = solved_point(1);
-  commit(store, {study, results_of(study, {result, of_older_worker})});
-  const auto peaks = ask(path_, "SELECT point, seq, t_s, force_N FROM reaction_peaks ORDER BY seq");
-  ASSERT_EQ(peaks.rows_size(), 3);
-  for (int joint = 0; joint < 3; ++joint) {
-    const auto& row = peaks.rows(joint);
-    EXPECT_EQ(row.values(0).integer(), 1);
-    EXPECT_EQ(row.values(1).integer(), joint);
-    EXPECT_EQ(row.values(2).real(), result.reaction_peaks(2 * joint));
-    EXPECT_EQ(row.values(3).real(), result.reaction_peaks(2 * joint + 1));
-  }
-  const auto in_runs = ask(path_, "SELECT reaction_peaks IS NULL FROM runs ORDER BY point");
-  EXPECT_EQ(in_runs.rows(0).values(0).integer(), 0);
-  EXPECT_EQ(in_runs.rows(1).values(0).integer(), 1) << "its worker did not send any";
 }
 
 TEST_F(StoreTest, AFailedPointHasAReasonAndNoOutputs) {

@@ -61,14 +61,15 @@ class ComparisonTest : public ::testing::Test {
 
 TEST_F(ComparisonTest, OfDatabasesSeesWhatMustNotDifferAndNothingElse) {
   EXPECT_EQ(difference_after("SELECT 1"), "");
-  EXPECT_EQ(difference_after("UPDATE results SET attempt = 7, wall_s = 1, solved_at = 'then'"), "");
+  EXPECT_EQ(difference_after("UPDATE packed_results SET attempt = 7, wall = 1, solved_at = 'then'"),
+            "");
   for (const char* change :
-       {"UPDATE results SET fn_peak_N = fn_peak_N * (1 + 3e-16) WHERE point = 700",
-        "UPDATE results SET mode = 'sC' WHERE point = 5",
-        "UPDATE results SET error = 'another' WHERE status = 'failed'",
-        "UPDATE results SET model_id = (SELECT min(models.model_id) FROM models"
-        " WHERE models.model_id != results.model_id) WHERE point = 700",
-        "UPDATE results SET point = 5000 WHERE point = 700",
+       {"UPDATE packed_results SET fn_peak = fn_peak + 1 WHERE point = 700",
+        "UPDATE packed_results SET mode = mode + 1 WHERE point = 5",
+        "UPDATE packed_results SET error = 'another' WHERE error IS NOT NULL",
+        "UPDATE packed_results SET model_id = (SELECT min(models.model_id) FROM models"
+        " WHERE models.model_id != packed_results.model_id) WHERE point = 700",
+        "UPDATE packed_results SET point = 5000 WHERE point = 700",
         "DELETE FROM results WHERE point = (SELECT max(point) FROM results)",
         "UPDATE studies SET state = 'paused'", "UPDATE models SET dt = 1 WHERE model_id = 2",
         "INSERT INTO studies (study_id, name, recipe, points, state, created_at, changed_at,"

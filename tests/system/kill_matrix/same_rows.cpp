@@ -21,7 +21,10 @@ struct Table {
 
 std::vector<Table> tables() {
   return {
-      {"studies", {"created_at", "changed_at", "checksum", "submitted_by"}, "", "study_id"},
+      {"studies",
+       {"created_at", "changed_at", "checksum", "submitted_by", "counted"},
+       "",
+       "study_id"},
       {"models", {"model_id"}, "", "definition"},
       // The model's number is one by order of arrival, so its definition stands in for it.
       {"results",

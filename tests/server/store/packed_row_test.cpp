@@ -1,4 +1,4 @@
-#include "server/store/result_row.h"
+#include "server/store/rows/packed_row.h"
 
 #include <cmath>
 #include <limits>
@@ -9,6 +9,7 @@
 
 #include "server/care/diagnosis.h"
 #include "server/database/row_checksum.h"
+#include "server/store/rows/row_columns.h"
 #include "server/store/store.h"
 #include "tests/support/points.h"
 #include "tests/support/temporary_folder.h"
@@ -16,31 +17,33 @@
 namespace oblique::server {
 namespace {
 
-TEST(ResultRow, ARowThatBreaksARuleOfTheTableIsAnErrorAndNotPassedOver) {
+TEST(PackedRow, ThatBreaksARuleOfTheTableIsAnErrorAndNotPassedOver) {
   const test::TemporaryFolder folder;
   const std::string path = folder.file("studies.db");
   { const Store store(path); }
   const DatabaseHandle database = open_database(path, SQLITE_OPEN_READWRITE);
   add_row_checksum(database.get());
-  Statement insert(database.get(), insert_result_sql());
-  RowContext context{1, 1, {0, 1.0, 0.5, 1.0}, 0, "", "", 1, "now"};
+  TextNumbers texts(database.get());
+  RowInsert insert(database.get());
+  PackedRow row;
+  RowContext context{1, 1, 1e-5, {0, 1.0, 0.5, 1.0}, 0, 0, 1, "now", ""};
+  const auto outputs = protocol::from_message(solved_point(0));
   for (const double H_m : {std::numeric_limits<double>::quiet_NaN(), 1.0}) {
     context.point.H_m = H_m;
-    bind_result(insert, context, solved_point(0));
+    row.pack(context, &outputs, "", texts);
     if (std::isnan(H_m)) {
-      EXPECT_THROW(insert.run(), StorageError) << "SQLite stores a NaN as NULL";
+      EXPECT_THROW(insert.run(row), StorageError) << "SQLite stores a NaN as NULL";
     } else {
-      EXPECT_NO_THROW(insert.run());
+      EXPECT_TRUE(insert.run(row));
     }
   }
-  bind_result(insert, context, solved_point(0));
-  EXPECT_NO_THROW(insert.run()) << "a point that has a row is passed over";
+  EXPECT_FALSE(insert.run(row)) << "a point that has a row is passed over";
   Statement count(database.get(), "SELECT count(*) FROM results");
   ASSERT_TRUE(count.step());
   EXPECT_EQ(count.integer(0), 1);
 }
 
-TEST(ResultRow, HasNullForWhatAResultLacksAndNoCheckMissesIt) {
+TEST(PackedRow, HasNullForWhatAResultLacksAndNoCheckMissesIt) {
   const test::TemporaryFolder folder;
   const std::string path = folder.file("studies.db");
   const auto table = table_of(2);
@@ -76,8 +79,8 @@ TEST(ResultRow, HasNullForWhatAResultLacksAndNoCheckMissesIt) {
   }
 }
 
-TEST(ResultRow, OutputsOfEachLaterSchemaCountBehindThoseOfTheSchemasBefore) {
-  for (int schema = kFirstWithChecksums; schema < kSchemaVersion; ++schema) {
+TEST(PackedRow, OutputsOfEachEarlierSchemaCountBehindThoseOfTheSchemasBefore) {
+  for (int schema = kFirstWithChecksums; schema + 1 < kFirstPacked; ++schema) {
     const auto before = result_columns(schema);
     auto after = result_columns(schema + 1);
     after.resize(before.size());

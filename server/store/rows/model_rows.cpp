@@ -1,4 +1,4 @@
-#include "server/store/model_rows.h"
+#include "server/store/rows/model_rows.h"
 
 #include <algorithm>
 #include <cstddef>

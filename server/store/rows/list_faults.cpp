@@ -1,4 +1,4 @@
-#include "server/store/packed_arrays.h"
+#include "server/store/rows/list_faults.h"
 
 #include <algorithm>
 #include <array>
@@ -12,7 +12,7 @@
 #include <spdlog/fmt/fmt.h>
 #include <nlohmann/json.hpp>
 
-#include "worker/solver/model/number.h"
+#include "server/store/rows/stored_units.h"
 
 namespace oblique::server {
 namespace {
@@ -20,7 +20,6 @@ namespace {
 using Json = nlohmann::json;
 using Rows = std::vector<std::vector<double>>;
 using Lists = std::map<std::string_view, Rows>;  // by column
-using solver::Cell;
 using solver::PhaseKind;
 using solver::ResultList;
 
@@ -28,17 +27,6 @@ using solver::ResultList;
 constexpr std::array<std::string_view, 5> kOutputs{"duration_s", "fn_peak_N", "ft_peak_N",
                                                    "stick_total_s", "mode"};
 enum : int { kDuration, kFnPeak, kFtPeak, kStickTotal, kMode };
-
-std::string packed_cell(const Cell& cell) {
-  if (const auto* number = std::get_if<double>(&cell)) {
-    return solver::exact_real(*number);
-  }
-  if (const auto* truth = std::get_if<bool>(&cell)) {
-    return *truth ? "1" : "0";
-  }
-  // Our own words, which need no escaping.
-  return fmt::format("\"{}\"", std::get<std::string_view>(cell));
-}
 
 /// A finite number, or the number of a kind of phase.
 std::optional<double> number_of(const Json& value) {
@@ -90,10 +78,10 @@ double largest(const Rows& rows, std::size_t column) {
   return value;
 }
 
-/// Sums and maxima of the solver may round otherwise than ours.
-bool about(double a, double b) {
+/// Sums and maxima of the solver may round otherwise than ours, and what is stored is rounded.
+bool about(double a, double b, double rounding = 0.0) {
   constexpr double kRelative = 1e-9;
-  return std::abs(a - b) <= kRelative * std::max(std::abs(a), std::abs(b));
+  return std::abs(a - b) <= rounding + kRelative * std::max(std::abs(a), std::abs(b));
 }
 
 /// Compressions and restitutions in turn, as "CRCR", by the states of a mode as "SC SR sR sC sR".
@@ -140,31 +128,21 @@ std::string disagreement(const Statement& row, int first, const Lists& lists) {
   for (const auto& interval : lists.at("stick_intervals")) {
     stick_s += interval[1] - interval[0];
   }
-  return about(stick_s, row.real(first + kStickTotal))
+  const double roundings_s =
+      static_cast<double>(2 * lists.at("stick_intervals").size() + 1) / kListTime.per_unit;
+  return about(stick_s, row.real(first + kStickTotal), roundings_s)
              ? ""
              : "its stick_total_s is not that of its stick_intervals";
 }
 
 }  // namespace
 
-std::string packed(const ResultList& list, const solver::CaseResult& result) {
-  std::string text = "[";
-  list.each(result, [&](std::span<const Cell> element) {
-    text += text.size() == 1 ? "[" : ",[";
-    for (std::size_t i = 0; i < element.size(); ++i) {
-      text += i == 0 ? "" : ",";
-      text += packed_cell(element[i]);
-    }
-    text += ']';
-  });
-  return text + "]";
-}
-
-std::string array_columns_sql(int schema) {
+std::string array_columns_sql(int schema, const std::string& when) {
   std::string columns(fmt::to_string(fmt::join(kOutputs, ", ")));
   for (const ResultList* list : solver::result_lists()) {
-    columns += ", ";
-    columns += list->since_schema <= schema ? list->column : "NULL";
+    columns += list->since_schema <= schema
+                   ? fmt::format(", CASE WHEN {} THEN {} END", when, list->column)
+                   : ", NULL";
   }
   return columns;
 }

@@ -1,0 +1,92 @@
+-- Results, and what they share.
+
+-- Words that many results have, each by a number: modes, and events near to which a contact came.
+CREATE TABLE texts (
+  text_id     INTEGER PRIMARY KEY,
+  text        TEXT NOT NULL UNIQUE,
+  checksum    INTEGER            -- CRC-32 of the other columns
+) STRICT;
+
+-- One row for each settled point, packed: ask the view `results`, which has names, units and all that
+-- follows from other tables. Outputs of a failed point are NULL and `error` says why. Outputs without
+-- a unit in their name are multiples of a small one (README.md of server/store has them), whole where
+-- that is finer than the result is accurate; lists are JSON arrays of such numbers.
+CREATE TABLE packed_results (
+  study_id         INTEGER NOT NULL REFERENCES studies (study_id),
+  point            INTEGER NOT NULL,
+  model_id         INTEGER NOT NULL REFERENCES models (model_id),
+  H                REAL NOT NULL,
+  mu               REAL NOT NULL,
+  e                REAL NOT NULL,
+  error            TEXT,         -- NULL: it is solved
+  fall_time        ANY,          -- 1e-9 s
+  impact_x         ANY,          -- 1e-9 m
+  vt_in            ANY,          -- 1e-8 m/s
+  vn_in            ANY,          -- 1e-8 m/s
+  duration         ANY,          -- 1e-12 s
+  fn_peak          ANY,          -- 1e-5 N
+  ft_peak          ANY,          -- 1e-5 N
+  impulse_n        ANY,          -- 1e-9 N s
+  impulse_t        ANY,          -- 1e-9 N s
+  slide            ANY,          -- 1e-11 m
+  vt_out           ANY,          -- 1e-8 m/s
+  vn_out           ANY,          -- 1e-8 m/s
+  margin           ANY,          -- 1e-9
+  stick_total      ANY,          -- 1e-12 s
+  kinetic_in       ANY,          -- 1e-8 J
+  friction         ANY,          -- 1e-9 J
+  restitution      ANY,          -- 1e-9 J
+  kinetic_change   ANY,          -- 1e-9 J
+  strain_change    ANY,          -- 1e-9 J
+  gravity_change   ANY,          -- 1e-9 J
+  exchanged        ANY,          -- 1e-9 J
+  closure          ANY,          -- 1e-14
+  fn_peak_error    ANY,          -- 1e-9, as the errors below
+  ft_peak_error    ANY,
+  duration_error   ANY,
+  stick_total_error ANY,
+  slide_error      ANY,
+  impulse_n_error  ANY,
+  impulse_t_error  ANY,
+  v_out_error      ANY,
+  dt               ANY,          -- 1e-15 s
+  wall             ANY,          -- 1e-9 s
+  steps            INTEGER,
+  mode_same        INTEGER,
+  mode             INTEGER REFERENCES texts (text_id),
+  major_mode       INTEGER REFERENCES texts (text_id),
+  margin_event     INTEGER REFERENCES texts (text_id),
+  peaks            TEXT,         -- [t, fn, ft, ...] in 1e-12 s and 1e-5 N; fn of a ripple is negative
+  ft_peaks         TEXT,         -- [t, ft, ...]; NULL of a solved point: t and ft of `peaks`
+  phases           TEXT,         -- [t, ...], the ends of all phases but the last, a compression first;
+                                 -- the last ends with `duration`. NULL of a solved point: it has none
+  stick_intervals  TEXT,         -- [t0, t1, ...]
+  reaction_peaks   TEXT,         -- [t, force, ...]
+  worker           INTEGER REFERENCES workers (worker_id),  -- NULL: the server failed the point
+  attempt          INTEGER NOT NULL,
+  solved_at        ANY,          -- milliseconds since 1970; a text: what stood there in an older schema
+  taken_from       TEXT,         -- STUDY/POINT whose result this is; NULL: it was solved for this point
+  -- CRC-32 of the other columns (server/database/row_checksum.h), which `oblique check` compares with
+  -- them. NULL: the row is of an earlier schema. Whoever changes a row sets it to NULL.
+  checksum         INTEGER,
+  PRIMARY KEY (study_id, point)
+) STRICT, WITHOUT ROWID;
+
+CREATE INDEX failed_points ON packed_results (study_id, point) WHERE error IS NOT NULL;
+
+-- Points that have a row, as runs of neighbours, so that a server that starts need not look at the rows.
+-- Right for studies that are `counted`; it is changed together with the rows.
+CREATE TABLE settled_points (
+  study_id    INTEGER NOT NULL REFERENCES studies (study_id),
+  first_point INTEGER NOT NULL,
+  points      INTEGER NOT NULL,
+  PRIMARY KEY (study_id, first_point)
+) STRICT, WITHOUT ROWID;
+
+-- Rows that go, by whatever hand: the next start of a server counts again. A program that takes them
+-- out of `settled_points` too sets `counted` to what it was.
+CREATE TRIGGER rows_are_gone AFTER DELETE ON packed_results
+WHEN (SELECT counted FROM studies WHERE study_id = OLD.study_id)
+BEGIN
+  UPDATE studies SET counted = 0 WHERE study_id = OLD.study_id;
+END;

@@ -1,0 +1,112 @@
+// What views show of what was stored.
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "proto/result_message.h"
+#include "server/reading/reader.h"
+#include "server/store/store.h"
+#include "tests/support/points.h"
+#include "tests/support/temporary_folder.h"
+
+namespace oblique::server {
+namespace {
+
+class ViewsTest : public testing::Test {
+ protected:
+  /// A study with these results.
+  void store(std::uint64_t points, const std::vector<protocol::PointResult>& results) {
+    Store store(path_);
+    store.commit(std::vector<Change>{
+        AddStudy{1, "a", table_of(points), "then", {}},
+        AddWorker{1, "host", 2, "0.1", "avx2", "then"},
+        AddResults{1, table_of(points), 1, "0.1", "avx2", 1, "2024-01-01T00:00:01.000Z", results}});
+  }
+  protocol::QueryReply ask(const std::string& sql) const {
+    return Reader(path_).query(sql, kNoLimits);
+  }
+
+  test::TemporaryFolder folder_;
+  std::string path_ = folder_.file("studies.db");
+};
+
+/// Models have a tolerance of 1e-5; what is measured by more than itself is as fine as that.
+void expect_near(double shown, double output, double scale = 0.0) {
+  EXPECT_NEAR(shown, output, 1e-7 * std::max(std::abs(output), scale));
+}
+
+TEST_F(ViewsTest, NumbersComeBackFromColumnsAndViewsAHundredTimesFinerThanTheyAreAccurate) {
+  std::vector<protocol::PointResult> results;
+  for (std::uint64_t point = 0; point < 500; ++point) {
+    results.push_back(solved_point(point));
+  }
+  store(500, results);
+  const auto table = table_of(500);
+  const auto scalars =
+      ask("SELECT fall_time_s, duration_s, fn_peak_N, closure, mu FROM results"
+          " ORDER BY point");
+  const auto peaks = ask("SELECT t_s, fn_N, ft_N FROM peaks ORDER BY point, seq");
+  const auto phases = ask("SELECT t0_s, t1_s FROM phases ORDER BY point, seq");
+  const auto sticks = ask("SELECT t0_s, t1_s FROM stick_intervals ORDER BY point, seq");
+  ASSERT_EQ(scalars.rows_size(), 500);
+  ASSERT_EQ(peaks.rows_size(), 1000);
+  for (int i = 0; i < 500; ++i) {
+    const auto& result = results[static_cast<std::size_t>(i)];
+    const auto outputs = protocol::from_message(result);
+    const auto& row = scalars.rows(i);
+    expect_near(row.values(0).real(), outputs.fall_time_s);
+    expect_near(row.values(1).real(), outputs.duration_s);
+    expect_near(row.values(2).real(), outputs.fn_peak_N);
+    expect_near(row.values(3).real(), outputs.energy.closure, 1.0);
+    EXPECT_EQ(row.values(4).real(), table->point(result.point()).mu);
+    for (int j = 0; j < 6; ++j) {
+      const double scale = j % 3 == 0 ? outputs.duration_s : outputs.fn_peak_N;
+      expect_near(peaks.rows(2 * i + j / 3).values(j % 3).real(), result.peaks(j), scale);
+    }
+    expect_near(phases.rows(3 * i + 1).values(0).real(), result.phase_ends_s(0),
+                outputs.duration_s);
+    expect_near(phases.rows(3 * i + 1).values(1).real(), result.phase_ends_s(1),
+                outputs.duration_s);
+    expect_near(phases.rows(3 * i + 2).values(1).real(), outputs.duration_s);  // its last one
+    expect_near(sticks.rows(i).values(1).real(), result.stick_intervals(1), outputs.duration_s);
+  }
+}
+
+TEST_F(ViewsTest, ViewsUnfoldThePackedArrays) {
+  store(3, {solved_point(2)});
+  const auto peaks = ask("SELECT study_id, point, seq, typeof(t_s), major FROM peaks");
+  ASSERT_EQ(peaks.rows_size(), 2);
+  EXPECT_EQ(peaks.rows(0).values(1).integer(), 2);
+  EXPECT_EQ(peaks.rows(0).values(2).integer(), 0);
+  EXPECT_EQ(peaks.rows(0).values(3).text(), "real");  // 0.0 is no integer
+  EXPECT_EQ(peaks.rows(0).values(4).integer(), 0);
+  EXPECT_EQ(peaks.rows(1).values(2).integer(), 1);
+  EXPECT_EQ(peaks.rows(1).values(4).integer(), 1);
+  const auto phases = ask("SELECT group_concat(kind) FROM phases");
+  EXPECT_EQ(phases.rows(0).values(0).text(), "compression,restitution,compression");
+}
+
+TEST_F(ViewsTest, TheLargestReactionsComeBackThePinFirst) {
+  auto of_older_worker = solved_point(2);
+  of_older_worker.clear_reaction_peaks();
+  const auto result = solved_point(1);
+  store(3, {result, of_older_worker});
+  const auto peaks = ask("SELECT point, seq, t_s, force_N FROM reaction_peaks ORDER BY seq");
+  ASSERT_EQ(peaks.rows_size(), 3);
+  for (int joint = 0; joint < 3; ++joint) {
+    const auto& row = peaks.rows(joint);
+    EXPECT_EQ(row.values(0).integer(), 1);
+    EXPECT_EQ(row.values(1).integer(), joint);
+    expect_near(row.values(2).real(), result.reaction_peaks(2 * joint));
+    expect_near(row.values(3).real(), result.reaction_peaks(2 * joint + 1));
+  }
+  const auto in_runs = ask("SELECT reaction_peaks IS NULL FROM runs ORDER BY point");
+  EXPECT_EQ(in_runs.rows(0).values(0).integer(), 0);
+  EXPECT_EQ(in_runs.rows(1).values(0).integer(), 1) << "its worker did not send any";
+}
+
+}  // namespace
+}  // namespace oblique::server
