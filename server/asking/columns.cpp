@@ -19,7 +19,7 @@ struct Described {
   std::string_view meaning;
 };
 
-constexpr std::array<Described, 11> kRowColumns{{
+constexpr std::array<Described, 12> kRowColumns{{
     {"study", "name of the study"},
     {"study_id", "its number in the database"},
     {"point", "number of the point in its study, from 0"},
@@ -31,6 +31,7 @@ constexpr std::array<Described, 11> kRowColumns{{
     {"instruction_set", "vector instructions that it used"},
     {"attempt", "number of the lease under which it was solved"},
     {"solved_at", "when the result arrived (UTC)"},
+    {"taken_from", "the point that has the same inputs and whose result this is, as STUDY/POINT"},
 }};
 
 /// What the view `runs` has of a list of `solve --json`, as an expression for SQL. The numbers stay
