@@ -39,6 +39,8 @@ void add_verbs(CLI::App& app, Command& command) {
   add_pause(app, command);
   add_resume(app, command);
   add_retry(app, command);
+  add_rename(app, command);
+  add_delete(app, command);
   add_query(app, command);
   add_sql(app, command);
   add_trace(app, command);

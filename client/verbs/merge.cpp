@@ -29,8 +29,8 @@ constexpr const char* kMergeExamples = R"(Examples:
 
 Studies and results of the databases come into the one of --db, which is made when it is not there. A
 study is the one of the same name and recipe: their points are united, and where both have a result
-that of --db stays. A database with a study of a name that is taken by another recipe is refused as a
-whole. What is merged is only read, also while a server works on it; merged again it brings what is
+that of --db stays. One that grew in one of them is united with what it was. A database with a study
+of a name that is taken by another recipe is refused as a whole, with what differs. What is merged is only read, also while a server works on it; merged again it brings what is
 new since. No server may be at work on the database of --db.)";
 
 struct MergeFlags {
@@ -74,6 +74,9 @@ void tell(const std::string& source, const std::string& target, const server::Me
   std::cerr << fmt::format(
       "{}: {} studies new in {} and {} united with those there; {} results added", source,
       merged.studies_added, target, merged.studies_united, merged.results_added);
+  if (merged.studies_grown > 0) {
+    std::cerr << fmt::format("; studies that grew: {}", merged.studies_grown);
+  }
   if (merged.failures_replaced > 0) {
     std::cerr << fmt::format(", {} of them for points that had failed", merged.failures_replaced);
   }

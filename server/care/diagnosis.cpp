@@ -64,10 +64,25 @@ Diagnosis diagnose(const std::string& path) {
       to.push_back(std::move(text));
     }
   };
-  add(found.faults,
-      "SELECT 'table ' || \"table\" || coalesce(', row ' || rowid, '') || ': refers to a row of ' "
-      "|| parent ||"
-      " ' that is not there' FROM pragma_foreign_key_check LIMIT 20");
+  // Rows of a study that is being deleted refer to none.
+  const bool deletes = !deleted_studies(database).empty();
+  add(found.faults, fmt::format("SELECT 'table ' || \"table\" || coalesce(', row ' || rowid, '') ||"
+                                " ': refers to a row of ' || parent || ' that is not there'"
+                                " FROM pragma_foreign_key_check WHERE {} LIMIT 20",
+                                deletes ? "parent <> 'studies'" : "1"));
+  if (deletes) {
+    add(found.faults,
+        fmt::format("SELECT DISTINCT 'table {0}: refers to study number ' || study_id ||"
+                    " ', which is not there' FROM {0} WHERE study_id NOT IN"
+                    " (SELECT study_id FROM studies UNION SELECT study_id FROM deletions)"
+                    " LIMIT 20",
+                    table));
+    add(found.remarks,
+        fmt::format("SELECT count(*) || ' results of deleted studies are left; the next server"
+                    " deletes them' FROM {} WHERE study_id IN (SELECT study_id FROM deletions)"
+                    " HAVING count(*) > 0",
+                    table));
+  }
   add(found.faults,
       "SELECT 'study ' || name || ': ' || count(*) || ' results of points that it does not have'"
       " FROM " +

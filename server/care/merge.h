@@ -20,7 +20,8 @@ struct MergeSettings {
 /// What came of one database.
 struct Merged {
   std::uint64_t studies_added = 0;
-  std::uint64_t studies_united = 0;  ///< with one of the same name and recipe
+  std::uint64_t studies_united = 0;  ///< with one of the same name and recipe, or of its beginning
+  std::uint64_t studies_grown = 0;   ///< of these: the one that came had more points
   std::uint64_t results_added = 0;
   /// Points that had a result before which a study of another database has too. Theirs stay.
   std::uint64_t results_known = 0;
@@ -38,7 +39,8 @@ class MergeRefused : public std::runtime_error {
 };
 
 /// Unites databases: brings studies and results of others into one. A study is the one of the same
-/// name and recipe, and its points are united; a row that is there stays, but that of a failed
+/// name and recipe, or of one that is the beginning of the other, as that of a study that grew in
+/// one of them; its points are united. A row that is there stays, but that of a failed
 /// point gives way to a solved one. Databases that are merged are only read. No server may be at
 /// work on the target; on the others it may.
 class Merger {

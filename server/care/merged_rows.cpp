@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <memory>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -10,6 +11,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "server/care/merge_source.h"
+#include "server/care/table_columns.h"
 #include "server/store/rows/packed_row.h"
 #include "server/store/rows/row_columns.h"
 
@@ -52,6 +54,7 @@ class RowMerge {
   RowMerge(sqlite3* source, sqlite3* target, StudyPlaces& places, Merged& merged)
       : places_(places),
         merged_(merged),
+        deleted_(deleted_studies(source)),
         source_(MergeSource::of(source, target)),
         insert_(target),
         remove_(target, "DELETE FROM packed_results WHERE study_id = ? AND point = ?"),
@@ -81,7 +84,10 @@ class RowMerge {
     PackedRow& row = source_->row();
     const std::uint64_t point = whole(row, columns_.point);
     const auto found = places_.find(whole(row, columns_.study_id));
-    if (!source_->is_sound() || found == places_.end() || point >= found->second.points) {
+    if (found == places_.end() && deleted_.contains(whole(row, columns_.study_id))) {
+      return;  // the server there has not come to it yet
+    }
+    if (!source_->is_sound() || found == places_.end() || point >= found->second.points_in_source) {
       throw StorageError(
           fmt::format("the result of point {} of study number {} is not as it was stored: `oblique "
                       "check` tells "
@@ -154,6 +160,7 @@ class RowMerge {
   const Columns columns_;
   StudyPlaces& places_;
   Merged& merged_;
+  const std::set<std::uint64_t> deleted_;
   std::unique_ptr<MergeSource> source_;
   RowInsert insert_;
   Statement remove_;

@@ -110,8 +110,13 @@ class Placing {
                 " changed_at, priority, weight, mixes_versions, checksum)"
                 " VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10,"
                 " row_checksum(?1, ?2, ?3, ?4, ?6))"),
-        mix_(target, "UPDATE studies SET mixes_versions = 1 WHERE study_id = ?") {
-    Statement last(target, "SELECT max(study_id) FROM studies");
+        mix_(target, "UPDATE studies SET mixes_versions = 1 WHERE study_id = ?"),
+        grow_(target,
+              "UPDATE studies SET recipe = ?2, points = ?3,"
+              " checksum = row_checksum(study_id, name, ?2, ?3, created_at) WHERE study_id = ?1") {
+    Statement last(target,
+                   "SELECT max(last_study_id, coalesce((SELECT max(study_id) FROM studies), 0))"
+                   " FROM about");
     last_id_ = last.step() ? number_in(last, 0) : 0;
   }
 
@@ -130,6 +135,7 @@ class Placing {
       if (auto place = place_of(study)) {
         note_sharing(places, *place);
         ++(place->is_new ? merged.studies_added : merged.studies_united);
+        merged.studies_grown += place->has_grown ? 1U : 0U;
         places.emplace(study.id, std::move(*place));
       }
     }
@@ -143,6 +149,7 @@ class Placing {
     for (auto& [from, other] : places) {
       if (!place.is_new && other.id == place.id) {
         other.is_new = false;
+        other.points = place.points;
       }
     }
   }
@@ -151,16 +158,16 @@ class Placing {
   std::optional<StudyPlace> place_of(const StudyRow& study) {
     std::string name = study.name;
     auto known = study_named(target_, name);
-    if (known && !known->table.is_of_the_recipe_of(study.table) &&
-        !settings_.rename_prefix.empty()) {
+    Growth growth = growth_of_known(known, study);
+    if (growth.kind == Growth::Kind::kOther && !settings_.rename_prefix.empty()) {
       name = settings_.rename_prefix + name;
       known = study_named(target_, name);
+      growth = growth_of_known(known, study);
     }
-    if (known && !known->table.is_of_the_recipe_of(study.table)) {
-      conflicts_.push_back(
-          fmt::format("there is a study called \"{}\" with other points, another model or another "
-                      "choice of errors",
-                      name));
+    if (growth.kind == Growth::Kind::kOther) {
+      std::replace(growth.difference.begin(), growth.difference.end(), '\n', ';');
+      conflicts_.push_back(fmt::format("there is a study called \"{}\" with another recipe ({})",
+                                       name, growth.difference));
       return std::nullopt;
     }
     if (const std::string objection =
@@ -169,7 +176,31 @@ class Placing {
       conflicts_.push_back(objection);
       return std::nullopt;
     }
-    return known ? united(study, *known) : added(study, name);
+    if (!known) {
+      return added(study, name);
+    }
+    StudyPlace place = united(study, *known);
+    if (growth.kind == Growth::Kind::kLonger) {
+      grow_.bind(1, place.id);
+      grow_.bind_blob(2, study.table.recipe_bytes());
+      grow_.bind(3, study.table.size());
+      grow_.run();
+      place.points = study.table.size();
+      place.has_grown = true;
+    }
+    return place;
+  }
+
+  /// What the study is to the one that is there, if any.
+  static Growth growth_of_known(const std::optional<StudyRow>& known, const StudyRow& study) {
+    if (!known || known->table.is_of_the_recipe_of(study.table)) {
+      return {Growth::Kind::kSame, {}};
+    }
+    try {
+      return known->table.growth_to(study.table);
+    } catch (const std::runtime_error& error) {
+      return {Growth::Kind::kOther, error.what()};
+    }
   }
 
   StudyPlace united(const StudyRow& study, const StudyRow& known) {
@@ -178,7 +209,12 @@ class Placing {
       mix_.bind(1, known.id);
       mix_.run();
     }
-    return {known.id, known.name, false, known.table.size(), solver_version_of(target_, known.id),
+    return {known.id,
+            known.name,
+            false,
+            known.table.size(),
+            study.table.size(),
+            solver_version_of(target_, known.id),
             mixes};
   }
 
@@ -193,7 +229,7 @@ class Placing {
     }
     insert_.bind(10, std::int64_t{study.mixes_versions});
     insert_.run();
-    return {id, name, true, study.table.size(), {}, true};
+    return {id, name, true, study.table.size(), study.table.size(), {}, true};
   }
 
   sqlite3* target_;
@@ -201,6 +237,7 @@ class Placing {
   Statement list_;
   Statement insert_;
   Statement mix_;
+  Statement grow_;
   std::uint64_t last_id_ = 0;
   std::vector<std::string> conflicts_;
 };
@@ -272,7 +309,7 @@ void settle_studies(sqlite3* source, sqlite3* target, const StudyPlaces& places)
   // Its points are counted again when a server starts.
   Statement uncount(target, "UPDATE studies SET counted = 0 WHERE study_id = ?1");
   for (const auto& [from, place] : places) {
-    if (!place.is_new && place.rows_changed == 0) {
+    if (!place.is_new && !place.has_grown && place.rows_changed == 0) {
       continue;
     }
     count.bind(1, place.id);

@@ -15,9 +15,11 @@ struct StudyPlace {
   std::string name;  ///< there
   bool is_new;
   std::uint64_t points;
+  std::uint64_t points_in_source;  ///< which may be fewer
   /// Of the results that the target had; empty: it had none, and rows of any version may come.
   std::string solver_version;
   bool mixes_versions;
+  bool has_grown = false;  ///< the source had more points of it
   std::uint64_t rows_changed = 0;
 };
 

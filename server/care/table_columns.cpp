@@ -33,6 +33,17 @@ std::string common_columns(sqlite3* from, sqlite3* to, const std::string& table)
   return list;
 }
 
+std::set<std::uint64_t> deleted_studies(sqlite3* database) {
+  std::set<std::uint64_t> studies;
+  if (!columns_of(database, "deletions").empty()) {
+    Statement list(database, "SELECT study_id FROM deletions");
+    while (list.step()) {
+      studies.insert(static_cast<std::uint64_t>(list.integer(0)));
+    }
+  }
+  return studies;
+}
+
 std::string present_values_sql(int schema, const std::string& table, std::string columns) {
   if (constexpr std::string_view kColumn = "definition";
       table == "models" && schema < kFirstWithCanonicalModels) {

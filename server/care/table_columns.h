@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -16,6 +18,9 @@ std::vector<std::string> columns_of(sqlite3* database, const std::string& table)
 
 /// The columns that both have, as a list for SQL, in the order of `to`.
 std::string common_columns(sqlite3* from, sqlite3* to, const std::string& table);
+
+/// Studies that are deleted, of which rows may be left.
+std::set<std::uint64_t> deleted_studies(sqlite3* database);
 
 /// `columns` of the table of a database of that schema as expressions for the values that the
 /// present schema has in them. The connection must have `model_definition`.

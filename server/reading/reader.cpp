@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <chrono>
+#include <string_view>
 #include <utility>
+#include <vector>
 
+#include "proto/suggestion.h"
 #include "proto/text.h"
 #include "server/database/open_for_reading.h"
 #include "server/reading/query_values.h"
@@ -141,6 +144,17 @@ protocol::QueryReply Reader::run(const std::string& sql, const QueryLimits& limi
   return reply;
 }
 
+/// " (did you mean `x`?)" with the study whose name is nearest, or nothing.
+std::string Reader::nearest_study(const std::string& name) {
+  constexpr std::size_t kMostCompared = 10'000;
+  Statement list(database_.get(), "SELECT name FROM studies");
+  std::vector<std::string> names;
+  while (names.size() < kMostCompared && list.step()) {
+    names.push_back(list.text(0));
+  }
+  return protocol::did_you_mean(name, std::vector<std::string_view>(names.begin(), names.end()));
+}
+
 std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name) {
   Statement schema(database_.get(), "PRAGMA user_version");
   constexpr int kFirstWithShares = 2;
@@ -184,7 +198,7 @@ std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name)
     found.push_back(std::move(status));
   }
   if (found.empty() && !name.empty()) {
-    throw QueryError("there is no study called \"" + name + "\"");
+    throw QueryError("there is no study called \"" + name + "\"" + nearest_study(name));
   }
   return found;
 }

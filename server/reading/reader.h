@@ -41,6 +41,7 @@ class Reader {
   void interrupt() { interrupted_ = true; }
 
  private:
+  std::string nearest_study(const std::string& name);
   struct Deadline;
   using TakeRow = std::function<void(protocol::Row&)>;
 

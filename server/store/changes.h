@@ -106,6 +106,13 @@ struct DeleteStudy {
 using Change = std::variant<AddStudy, SetStudyState, SetStudyTerms, ForgetFailures, GrowStudy,
                             RenameStudy, DeleteStudy, AddWorker, AddResults>;
 
+/// How much of what deleted studies left is gone.
+enum class ClearedAway {
+  kAll,
+  kPart,
+  kMustWait,  ///< nothing more for now: readers keep the write-ahead log long
+};
+
 /// What the writer needs of a database. Tests put a failing one in its place.
 class Storage {
  public:
@@ -119,9 +126,9 @@ class Storage {
   /// Throws StorageGone when the database is not where it was opened.
   virtual void check() {}
 
-  /// Deletes, durably, a part of what deleted studies left: at most about so many rows, or pages of
-  /// the file. False when nothing is left of them. Throws as `commit` does.
-  virtual bool clear_away(std::size_t /*most*/) { return false; }
+  /// Deletes a part of what deleted studies left, in one transaction: at most about so many rows,
+  /// or what takes as long. Throws as `commit` does.
+  virtual ClearedAway clear_away(std::size_t /*most*/) { return ClearedAway::kAll; }
 
   /// Moves the write-ahead log into the database and empties it, so that the one file holds all.
   /// False when a reader keeps it from doing so: to be tried again. Throws StorageError.

@@ -151,6 +151,7 @@ Store::Store(const std::string& path, const Notice& notice) {
     log_->merge();
   }
   statements_ = std::make_unique<Statements>(database_.get());
+  clearing_ = std::make_unique<Clearing>(database_.get());
   files_->expect(database_.get(), database_id());
 }
 
@@ -199,7 +200,9 @@ void Store::commit(std::span<const Change> changes) {
     transaction.commit();
     files_->check();  // or it was committed to a file that nobody will find
     log_->shorten();
+    clearing_->kept();
   } catch (...) {
+    clearing_->undo();
     models_.clear();
     statements_->texts.forget();
     log_->suspect();
@@ -212,6 +215,36 @@ bool Store::merge_log() {
   // A reader may take long, and results would wait.
   const Impatience impatience(database_.get());
   return log_->merge();
+}
+
+ClearedAway Store::clear_away(std::size_t most) {
+  if (clearing_->is_idle()) {
+    return ClearedAway::kAll;
+  }
+  try {
+    files_->check();
+    log_->make_sure();
+    log_->shorten();
+    if (log_->is_held_long()) {
+      return ClearedAway::kMustWait;
+    }
+    set_sync(false);  // what losing power undoes is deleted again
+    if (clearing_->gives_back()) {
+      clearing_->step(most);
+    } else {
+      Transaction transaction(database_.get());
+      if (clearing_->step(most)) {
+        models_.clear();
+      }
+      transaction.commit();
+    }
+    files_->check();
+  } catch (...) {
+    clearing_->failed();
+    log_->suspect();
+    throw;
+  }
+  return clearing_->is_idle() ? ClearedAway::kAll : ClearedAway::kPart;
 }
 
 void Store::add(const AddStudy& change) {
@@ -238,6 +271,9 @@ void Store::add(const SetStudyTerms& change) {
 }
 
 void Store::add(const ForgetFailures& change) {
+  if (clearing_->is_deleted(change.study_id)) {
+    return;
+  }
   change.points.for_each([&](const Interval& interval) {
     Statement& note = statements_->note_retries;
     note.bind(1, change.study_id);
@@ -277,11 +313,7 @@ void Store::add(const RenameStudy& change) {
 }
 
 void Store::add(const DeleteStudy& change) {
-  for (const char* table : {"packed_results", "settled_points", "retries", "studies"}) {
-    Statement remove(database_.get(), std::string("DELETE FROM ") + table + " WHERE study_id = ?");
-    remove.bind(1, change.study_id);
-    remove.run();
-  }
+  clearing_->remove(change.study_id);
 }
 
 void Store::add(const SetStudyState& change) {
@@ -304,10 +336,14 @@ void Store::add(const AddWorker& change) {
 }
 
 void Store::add(const AddResults& change) {
+  if (clearing_->is_deleted(change.study_id)) {
+    return;
+  }
   PackedRow& row = statements_->row;
   for (const protocol::PointResult& result : change.results) {
     const protocol::Point point = change.table->point(result.point());
     const StoredModel model = stored_model(change, point.model);
+    clearing_->note_use(model.id, change.worker_id);
     const RowContext context{change.study_id, model.id,         model.accuracy,
                              point,           result.point(),   change.worker_id,
                              change.attempt,  change.solved_at, {}};
@@ -348,36 +384,6 @@ std::int64_t Store::known_model(std::string_view definition) {
   const std::int64_t id = find.integer(0);
   find.reset();
   return id;
-}
-
-std::uint64_t Store::highest(const std::string& sql) {
-  Statement statement(database_.get(), sql);
-  return statement.step() ? static_cast<std::uint64_t>(statement.integer(0)) : 0;
-}
-
-std::uint64_t Store::last_study_id() {
-  return highest("SELECT max(study_id) FROM studies");
-}
-
-std::uint64_t Store::last_worker_id() {
-  return highest("SELECT max(worker_id) FROM workers");
-}
-
-std::uint64_t Store::count_start() {
-  log_->make_sure();
-  set_sync(true);
-  Transaction transaction(database_.get());
-  execute(database_.get(), "UPDATE about SET starts = starts + 1");
-  transaction.commit();
-  return highest("SELECT starts FROM about");
-}
-
-std::string Store::database_id() {
-  Statement statement(database_.get(), "SELECT database_id FROM about");
-  if (!statement.step()) {
-    throw StorageError("the database has lost its identity: the table about is empty");
-  }
-  return statement.text(0);
 }
 
 }  // namespace oblique::server

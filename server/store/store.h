@@ -12,6 +12,7 @@
 #include "server/scheduler/points/interval_set.h"
 #include "server/scheduler/points/point_attempts.h"
 #include "server/store/changes.h"
+#include "server/store/clearing.h"
 #include "server/store/database_files.h"
 #include "server/store/write_ahead_log.h"
 
@@ -50,6 +51,9 @@ class Store final : public Storage {
   void commit(std::span<const Change> changes) override;
   void check() override { files_->check(); }
   bool merge_log() override;
+  ClearedAway clear_away(std::size_t most) override;
+  /// Rows that `clear_away` has deleted.
+  std::uint64_t cleared_rows() const { return clearing_->rows(); }
 
   /// There was no file; it was made.
   bool is_new() const { return files_->were_made(); }
@@ -101,6 +105,7 @@ class Store final : public Storage {
   std::unique_ptr<DatabaseFiles> files_;  // outlives the connection
   DatabaseHandle database_;
   std::unique_ptr<WriteAheadLog> log_;
+  std::unique_ptr<Clearing> clearing_;
   std::unique_ptr<Statements> statements_;
   // By study and model number; emptied when it grows or a transaction fails.
   std::map<std::pair<std::uint64_t, std::uint64_t>, StoredModel> models_;

@@ -1,4 +1,4 @@
-// Reading back what studies there are and how far they are.
+// Reading back what studies there are and how far they are, and the numbers that were given.
 #include <map>
 #include <stdexcept>
 #include <string>
@@ -155,6 +155,38 @@ std::vector<StoredStudy> Store::studies() {
     found.push_back(std::move(study));
   }
   return found;
+}
+
+std::uint64_t Store::highest(const std::string& sql) {
+  Statement statement(database_.get(), sql);
+  return statement.step() ? static_cast<std::uint64_t>(statement.integer(0)) : 0;
+}
+
+std::uint64_t Store::last_study_id() {
+  return highest(
+      "SELECT max(last_study_id, coalesce((SELECT max(study_id) FROM studies), 0))"
+      " FROM about");
+}
+
+std::uint64_t Store::last_worker_id() {
+  return highest("SELECT max(worker_id) FROM workers");
+}
+
+std::uint64_t Store::count_start() {
+  log_->make_sure();
+  set_sync(true);
+  Transaction transaction(database_.get());
+  execute(database_.get(), "UPDATE about SET starts = starts + 1");
+  transaction.commit();
+  return highest("SELECT starts FROM about");
+}
+
+std::string Store::database_id() {
+  Statement statement(database_.get(), "SELECT database_id FROM about");
+  if (!statement.step()) {
+    throw StorageError("the database has lost its identity: the table about is empty");
+  }
+  return statement.text(0);
 }
 
 }  // namespace oblique::server

@@ -64,10 +64,15 @@ void WriteAheadLog::shorten() {
   if (pages_ < long_pages_) {
     return;
   }
+  int in_log = 0;
+  int moved = 0;
   const int code =
-      sqlite3_wal_checkpoint_v2(database_, "main", SQLITE_CHECKPOINT_PASSIVE, nullptr, nullptr);
+      sqlite3_wal_checkpoint_v2(database_, "main", SQLITE_CHECKPOINT_PASSIVE, &in_log, &moved);
   // Readers may keep it from doing all, which is no fault.
   is_suspect_ = code != SQLITE_OK && code != SQLITE_BUSY;
+  if (code == SQLITE_OK && in_log == moved) {
+    pages_ = 0;  // the next commit begins it anew
+  }
 }
 
 bool WriteAheadLog::merge() {

@@ -25,6 +25,8 @@ class WriteAheadLog {
   void make_sure();
   /// Moves a long log into the database. What was committed stands, also when this fails.
   void shorten();
+  /// It stays many times as long as it should be, for readers that need it.
+  bool is_held_long() const { return pages_ > kHeldLong * long_pages_; }
   /// Moves all of it into the database and empties it. False when a reader still needs it. Throws
   /// StorageError.
   bool merge();
@@ -40,6 +42,7 @@ class WriteAheadLog {
   bool is_suspect_ = true;
   int pages_ = 0;
   int long_pages_ = 1000;
+  static constexpr int kHeldLong = 16;
 };
 
 }  // namespace oblique::server

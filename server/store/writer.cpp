@@ -22,6 +22,14 @@ constexpr std::chrono::milliseconds kRetryPause{500};
 /// While nothing is to be written the database is looked after so often.
 constexpr std::chrono::milliseconds kTendPause{1000};
 
+/// What deleted studies left is cleared away in steps that take about so long, between which
+/// whatever waits is written; after a step that failed or must wait, none is tried for so long.
+constexpr std::chrono::milliseconds kShortStep{2};
+constexpr std::chrono::milliseconds kLongStep{5};
+constexpr std::size_t kFewestRows = 16;
+constexpr std::size_t kMostRows = 16'384;
+constexpr std::chrono::milliseconds kClearPause{1000};
+
 /// So often a log that readers hold is tried before that is said.
 constexpr int kQuietTries = 5;
 
@@ -101,7 +109,7 @@ void Writer::run() {
       std::unique_lock lock(mutex_);
       if (commits_.is_faulty() || commits_.is_gone()) {
         wake_.wait_for(lock, kRetryPause, [this] { return finishing_; });
-      } else if (jobs.empty()) {
+      } else if (jobs.empty() && !may_clear()) {
         wake_.wait_for(lock, kTendPause, [this] { return finishing_ || !queue_.empty(); });
       }
       std::move(queue_.begin(), queue_.end(), std::back_inserter(jobs));
@@ -109,7 +117,12 @@ void Writer::run() {
       last_round = finishing_;
     }
     const bool was_faulty = commits_.is_faulty();
-    auto reports = jobs.empty() ? commits_.tend() : write(jobs);
+    auto reports = !jobs.empty() ? write(jobs)
+                   : may_clear() ? std::vector<WriteReport>()
+                                 : commits_.tend();
+    if (may_clear() && !last_round) {
+      clear_some(reports);
+    }
     if (!reports.empty()) {
       report_(std::move(reports));
     }
@@ -131,6 +144,25 @@ std::vector<WriteReport> Writer::write(std::deque<WriteJob>& jobs) {
   counts_.duration_s.observe(taken.count());
   counts_.rows.observe(static_cast<double>(commits_.rows() - rows_before));
   return reports;
+}
+
+bool Writer::may_clear() const {
+  return commits_.has_to_clear() && !commits_.is_faulty() &&
+         std::chrono::steady_clock::now() >= clears_from_;
+}
+
+void Writer::clear_some(std::vector<WriteReport>& reports) {
+  const auto began = std::chrono::steady_clock::now();
+  if (!commits_.clear(rows_to_clear_, reports)) {
+    clears_from_ = std::chrono::steady_clock::now() + kClearPause;
+    return;
+  }
+  const auto taken = std::chrono::steady_clock::now() - began;
+  if (taken > kLongStep) {
+    rows_to_clear_ = std::max(rows_to_clear_ / 2, kFewestRows);
+  } else if (taken < kShortStep) {
+    rows_to_clear_ = std::min(rows_to_clear_ * 2, kMostRows);
+  }
 }
 
 CommitCounts Writer::commits() const {
@@ -183,6 +215,25 @@ std::vector<WriteReport> GroupCommit::tend() {
   return reports;
 }
 
+bool GroupCommit::clear(std::size_t most, std::vector<WriteReport>& reports) {
+  try {
+    const ClearedAway cleared = storage_.clear_away(most);
+    if (cleared == ClearedAway::kAll) {
+      to_be_merged_ = to_be_merged_ || std::exchange(any_is_cleared_, false);  // the file shrinks
+      tries_ = 0;
+      clears_ = false;
+    } else {
+      any_is_cleared_ = true;
+    }
+    return cleared != ClearedAway::kMustWait;
+  } catch (const StorageGone& error) {
+    note_gone(error, reports);
+  } catch (const std::exception&) {
+    // As when the disk is full: what waits to be written finds out, and says so. Tried again.
+  }
+  return false;
+}
+
 bool GroupCommit::merge(std::vector<WriteReport>& reports) {
   try {
     to_be_merged_ = !storage_.merge_log();
@@ -201,6 +252,9 @@ void GroupCommit::note_committed(std::span<const Change> changes) {
     const auto* results = std::get_if<AddResults>(&change);
     rows_ += results == nullptr ? 0 : results->results.size();
   }
+  clears_ = clears_ || std::any_of(changes.begin(), changes.end(), [](const Change& change) {
+              return std::holds_alternative<DeleteStudy>(change);
+            });
   if (std::any_of(changes.begin(), changes.end(), ends_a_study)) {
     to_be_merged_ = true;
     tries_ = 0;

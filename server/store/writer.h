@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
@@ -64,6 +65,11 @@ class GroupCommit {
   /// The database is not where it was; nothing is written any more.
   bool is_gone() const { return gone_; }
 
+  /// Whether something of deleted studies may be left to be cleared away.
+  bool has_to_clear() const { return clears_ && !gone_; }
+  /// Clears away a part of it: at most about so many rows. False when that must wait a while.
+  bool clear(std::size_t most, std::vector<WriteReport>& reports);
+
   /// To be called now and then while nothing waits: looks whether the database is still there, and
   /// merges its log once a study is done.
   std::vector<WriteReport> tend();
@@ -84,6 +90,8 @@ class GroupCommit {
   std::uint64_t rows_ = 0;
   bool faulty_ = false;
   bool gone_ = false;
+  bool clears_ = true;  // nobody knows yet what an earlier process left
+  bool any_is_cleared_ = false;
   bool to_be_merged_ = false;  // a study is done
   int tries_ = 0;              // to merge since then
   std::string why_unmerged_;
@@ -114,17 +122,21 @@ class Writer {
  private:
   void run();
   std::vector<WriteReport> write(std::deque<WriteJob>& jobs);
+  bool may_clear() const;
+  void clear_some(std::vector<WriteReport>& reports);
   void merge_before_the_end();
 
   GroupCommit commits_;  // of the thread
   Report report_;
   mutable std::mutex mutex_;
   std::condition_variable wake_;
-  std::deque<WriteJob> queue_;  // guarded by mutex_
-  bool finishing_ = false;      // guarded by mutex_
-  CommitCounts counts_;         // guarded by mutex_
-  std::size_t left_over_ = 0;   // written by the thread, read after it ended
-  std::thread thread_;          // last: it uses all the others
+  std::deque<WriteJob> queue_;      // guarded by mutex_
+  bool finishing_ = false;          // guarded by mutex_
+  CommitCounts counts_;             // guarded by mutex_
+  std::size_t left_over_ = 0;       // written by the thread, read after it ended
+  std::size_t rows_to_clear_ = 64;  // of the thread: so many take about as long as they may
+  std::chrono::steady_clock::time_point clears_from_{};  // of the thread
+  std::thread thread_;                                   // last: it uses all the others
 };
 
 }  // namespace oblique::server

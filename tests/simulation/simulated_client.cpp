@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "proto/frames.h"
+#include "tests/simulation/simulated_worker.h"
 #include "tests/support/recipes.h"
 
 namespace oblique::simulation {
@@ -11,8 +12,8 @@ using server::StudyState;
 
 namespace {
 
-/// `points` points, in models of `points_a_model` and, if some are left, one more.
-protocol::Recipe recipe_of_models(std::uint64_t points, std::uint64_t points_a_model) {
+/// `points` points, in models of `points_a_model` and, if some are left, one more. H has the mark.
+protocol::Recipe recipe_of_models(std::uint64_t points, std::uint64_t points_a_model, double H) {
   using protocol::listed;
   using protocol::range;
   const auto axis = [](const char* key, double from, double to, std::uint64_t count) {
@@ -22,12 +23,12 @@ protocol::Recipe recipe_of_models(std::uint64_t points, std::uint64_t points_a_m
   const std::uint64_t rest = points % points_a_model;
   protocol::Recipe recipe;
   if (models > 0) {
-    recipe = protocol::recipe_of({{axis("k", 1e7, 2e7, models), listed("H", {1.0}),
+    recipe = protocol::recipe_of({{axis("k", 1e7, 2e7, models), listed("H", {H}),
                                    axis("mu", 0.5, 1.0, points_a_model), listed("e", {1.0})}});
   }
   if (rest > 0) {
-    recipe.MergeFrom(protocol::recipe_of(
-        {{listed("H", {1.0}), axis("mu", 0.0, 0.4, rest), listed("e", {1.0})}}));
+    recipe.MergeFrom(
+        protocol::recipe_of({{listed("H", {H}), axis("mu", 0.0, 0.4, rest), listed("e", {1.0})}}));
   }
   return recipe;
 }
@@ -35,16 +36,40 @@ protocol::Recipe recipe_of_models(std::uint64_t points, std::uint64_t points_a_m
 }  // namespace
 
 SimulatedClient::SimulatedClient(World& world, Network& network, std::uint64_t peer,
-                                 std::string name, std::uint64_t points)
+                                 std::string name, std::uint64_t points, std::uint64_t mark)
     : world_(world),
       network_(network),
       peer_(peer),
       name_(std::move(name)),
       points_(points),
-      recipe_(recipe_of_models(points, world.chance(0.3) ? points + 1
-                                       : world.chance(0.5)
+      mark_(mark) {
+  set_recipe(points);
+}
+
+/// A recipe of its own; behind the one that is there, if any.
+void SimulatedClient::set_recipe(std::uint64_t points) {
+  const std::uint64_t points_a_model = world_.chance(0.3) ? points + 1
+                                       : world_.chance(0.5)
                                            ? std::uint64_t{1}
-                                           : static_cast<std::uint64_t>(world.between(2, 40)))) {}
+                                           : static_cast<std::uint64_t>(world_.between(2, 40));
+  recipe_.MergeFrom(recipe_of_models(points, points_a_model, marked_H(mark_)));
+}
+
+void SimulatedClient::grow() {
+  appended_ = static_cast<std::uint64_t>(world_.between(1, 60));
+  set_recipe(appended_);
+  points_ += appended_;
+}
+
+/// The study was deleted: another one under its name.
+void SimulatedClient::begin_anew() {
+  acknowledged_ = false;
+  study_id_ = 0;
+  mark_ += kClients;
+  recipe_.Clear();
+  points_ = static_cast<std::uint64_t>(world_.between(1, 300));
+  set_recipe(points_);
+}
 
 void SimulatedClient::start() {
   connect();
@@ -68,7 +93,13 @@ void SimulatedClient::ask() {
   protocol::ClientRequest request;
   request.set_protocol_version(protocol::kProtocolVersion);
   request.set_request_id(request_);
-  if (cancelling_) {
+  if (intent_ == Intent::kRename || intent_ == Intent::kDelete) {
+    request.mutable_change()->set_study(name_);
+    request.mutable_change()->set_study_id(study_id_);
+    request.mutable_change()->set_new_name(new_name_);
+    request.mutable_change()->set_change(
+        intent_ == Intent::kRename ? protocol::STUDY_CHANGE_RENAME : protocol::STUDY_CHANGE_DELETE);
+  } else if (intent_ == Intent::kChange) {
     request.mutable_change()->set_study(name_);
     // Any of cancel, pause, resume and retry.
     const auto asked = static_cast<protocol::StudyChange>(world_.between(1, 4));
@@ -99,7 +130,7 @@ void SimulatedClient::answered(const std::string& frame) {
     return;
   }
   if (reply.has_error()) {
-    if (acknowledged_ && reply.error().message().find("was not stored") == std::string::npos) {
+    if (acknowledged_ && reply.error().message().find("not stored") == std::string::npos) {
       throw Violation("an acknowledged study is refused: " + reply.error().message());
     }
     return;  // asked again later
@@ -109,8 +140,27 @@ void SimulatedClient::answered(const std::string& frame) {
     if (acknowledged_ && reply.submit().created()) {
       throw Violation("an acknowledged study was forgotten");
     }
+    if (reply.submit().points() != points_ ||
+        (reply.submit().appended() != 0 && reply.submit().appended() != appended_)) {
+      throw Violation("a study of " + std::to_string(points_) + " points, of which " +
+                      std::to_string(appended_) + " were appended, is called one of " +
+                      std::to_string(reply.submit().points()) + " and " +
+                      std::to_string(reply.submit().appended()));
+    }
     acknowledged_ = true;
+    study_id_ = reply.submit().study_id();
     possible_ = {StudyState::kRunning};
+    return;
+  }
+  if (intent_ == Intent::kRename) {
+    if (reply.change().study().name() != new_name_) {
+      throw Violation("a renamed study is called " + reply.change().study().name());
+    }
+    name_ = new_name_;
+    return;
+  }
+  if (intent_ == Intent::kDelete) {
+    begin_anew();
     return;
   }
   const std::string& told = reply.change().study().state();
@@ -144,14 +194,30 @@ void SimulatedClient::check_found(StudyState state) const {
 void SimulatedClient::change_mind() {
   // Once faults end the study is submitted for the last time.
   const bool last = !world_.faults;
-  if (settled_request_ && (!last || cancelling_)) {
-    cancelling_ = !last && !cancelling_ && world_.chance(0.3);
+  if (settled_request_ && (!last || intent_ != Intent::kSubmit)) {
+    const bool is_free = !last && intent_ == Intent::kSubmit && acknowledged_;
+    intent_ = Intent::kSubmit;
+    appended_ = 0;
+    if (is_free && world_.chance(0.3)) {
+      intent_ = Intent::kChange;
+    } else if (is_free && world_.chance(0.15)) {
+      intent_ = Intent::kRename;
+      new_name_ = name_.ends_with("'") ? name_.substr(0, name_.size() - 1) : name_ + "'";
+      ++renamings;
+    } else if (is_free && world_.chance(0.15)) {
+      intent_ = Intent::kDelete;
+      possible_.reset();
+      ++deletions;
+    } else if (is_free && world_.chance(0.3)) {
+      grow();
+      ++growths;
+    }
     settled_request_ = false;
     asked_.clear();
     ++request_;
     ask();
   }
-  if (!last || !settled_request_ || cancelling_) {
+  if (!last || !settled_request_ || intent_ != Intent::kSubmit) {
     world_.after(world_.between(500, 4000), [this] { change_mind(); });
   }
 }

@@ -33,6 +33,7 @@ void SimulatedServer::start() {
   settings.last_worker_id = found.last_worker_id;
   commits_.emplace(disk_);
   service_.emplace(settings, *this, std::move(found.studies), now());
+  clear_some();
   tick();
 }
 
@@ -42,6 +43,7 @@ void SimulatedServer::end() {
   jobs_.clear();
   held_.clear();
   writing_ = false;
+  clearing_ = false;
   frozen_until_ms_ = 0;
   workers->break_all();
   clients->break_all();
@@ -156,6 +158,31 @@ void SimulatedServer::write(server::WriteJob job) {
   }
 }
 
+/// As the writer does, between groups, in steps of some rows.
+void SimulatedServer::clear_some() {
+  if (clearing_ || !commits_->has_to_clear()) {
+    return;
+  }
+  clearing_ = true;
+  after(world_.between(1, 40), [this] {
+    clearing_ = false;
+    std::vector<server::WriteReport> reports;
+    const bool goes_on = commits_->clear(static_cast<std::size_t>(world_.between(1, 30)), reports);
+    if (disk_.died()) {
+      crash(world_.chance(0.4));
+      return;
+    }
+    for (const auto& report : reports) {
+      service_->written(report, now());
+    }
+    if (goes_on) {
+      clear_some();
+    } else {
+      after(500, [this] { clear_some(); });
+    }
+  });
+}
+
 void SimulatedServer::write_group() {
   const auto reports = commits_->write(jobs_);
   // In the middle of a write, or after the commit and before anybody knows of it.
@@ -164,6 +191,7 @@ void SimulatedServer::write_group() {
     return;
   }
   writing_ = false;
+  clear_some();
   for (const auto& report : reports) {
     service_->written(report, now());
   }

@@ -33,6 +33,8 @@ class SimulatedServer final : public server::Outbox {
   /// The process stands still for a while, as after SIGSTOP.
   void freeze(std::int64_t duration_ms) { frozen_until_ms_ = world_.now_ms() + duration_ms; }
   bool runs() const { return service_.has_value(); }
+  /// Nothing of deleted studies is left.
+  bool has_cleared() const { return commits_.has_value() && !commits_->has_to_clear(); }
   const server::Service& service() const { return *service_; }
 
   void worker_frame(const std::string& identity, const std::string& frame);
@@ -67,6 +69,7 @@ class SimulatedServer final : public server::Outbox {
   void end();
   void tick();
   void write_group();
+  void clear_some();
 
   World& world_;
   SimulatedDisk& disk_;
@@ -75,6 +78,7 @@ class SimulatedServer final : public server::Outbox {
   std::optional<server::GroupCommit> commits_;
   std::deque<server::WriteJob> jobs_;
   bool writing_ = false;
+  bool clearing_ = false;  // a step is to come
   std::int64_t frozen_until_ms_ = 0;
   std::deque<std::function<void()>> held_;  // frames that came meanwhile, in order
   std::uint64_t life_ = 0;  // counts starts: what an earlier life planned does not happen

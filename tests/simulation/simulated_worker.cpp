@@ -8,9 +8,23 @@
 
 namespace oblique::simulation {
 
-protocol::PointResult answer_to(std::uint64_t study_size, std::uint64_t point) {
+namespace {
+
+constexpr double kMarkInH = 0x1p-20;
+
+std::uint64_t mark_of(double H) {
+  return static_cast<std::uint64_t>((H - 1.0) / kMarkInH);
+}
+
+}  // namespace
+
+double marked_H(std::uint64_t mark) {
+  return 1.0 + static_cast<double>(mark) * kMarkInH;
+}
+
+protocol::PointResult answer_to(std::uint64_t mark, std::uint64_t point) {
   solver::CaseResult result{};
-  result.duration_s = static_cast<double>(study_size);
+  result.duration_s = static_cast<double>(mark);
   result.fn_peak_N = static_cast<double>(point);
   return protocol::to_message(point, result);
 }
@@ -168,9 +182,9 @@ void SimulatedWorker::solve_some() {
     return;
   }
   Work& work = batches_.front();
-  const std::uint64_t size = work.batch.points->size();
   const std::uint64_t point = work.batch.first_point + work.solved;
-  const auto killers = killers_.find(size);
+  const std::uint64_t mark = mark_of(work.batch.points->point(point).H_m);
+  const auto killers = killers_.find(mark);
   if (killers != killers_.end() && killers->second.contains(point)) {
     ++deaths_;
     restart(world_.between(100, 1000));
@@ -180,7 +194,7 @@ void SimulatedWorker::solve_some() {
   ++work.solved;
   worker::Progress progress{work.batch.number,
                             work.batch.study_id,
-                            {answer_to(size, point)},
+                            {answer_to(mark, point)},
                             1e-3 * static_cast<double>(busy_ms_),
                             work.solved == work.batch.count};
   if (progress.batch_done) {

@@ -14,14 +14,18 @@
 
 namespace oblique::simulation {
 
-/// The made-up answer to a point; whoever checks it knows that it is of this study and point.
-protocol::PointResult answer_to(std::uint64_t study_size, std::uint64_t point);
+/// The made-up answer to a point; whoever checks it knows that it is of this study, by its mark,
+/// and point.
+protocol::PointResult answer_to(std::uint64_t mark, std::uint64_t point);
+
+/// H of all points of the study with that mark.
+double marked_H(std::uint64_t mark);
 
 /// The real conversation of a worker around a pretended solver. It can be killed, stopped for a
 /// while, or told to end; it always starts again.
 class SimulatedWorker {
  public:
-  /// Points of studies of that size whose solving kills the process.
+  /// Points of studies with that mark whose solving kills the process.
   using Killers = std::map<std::uint64_t, std::set<std::uint64_t>>;
 
   /// `peer` is its number in the network. A model's first point takes some of them longer than the

@@ -55,6 +55,12 @@ class Simulation {
         healed_ms + settings_.healing_ms, [this] { return is_over(); }, [this] { check(); });
     outcome_.healed_after_ms = world_.now_ms() - healed_ms;
     check_end();
+    for (const auto& client : clients_) {
+      outcome_.growths += client->growths;
+      outcome_.renamings += client->renamings;
+      outcome_.deletions += client->deletions;
+    }
+    outcome_.cleared_rows = disk_.cleared_rows;
     outcome_.vanished_peers = vanishing_peers_.vanished();
     outcome_.server_kills = server_.crashes - server_.power_losses;
     outcome_.power_losses = server_.power_losses;
@@ -69,15 +75,15 @@ class Simulation {
   void add_clients() {
     const std::int64_t count = world_.between(1, 3);
     for (std::int64_t i = 0; i < count; ++i) {
-      // Sizes differ, for answers name their study by its size.
       const auto points = static_cast<std::uint64_t>(world_.between(1, 60) * 7 + i);
+      const auto mark = static_cast<std::uint64_t>(i + 1);
       clients_.push_back(
           std::make_unique<SimulatedClient>(world_, clients_network_, static_cast<std::uint64_t>(i),
-                                            "study " + std::to_string(i), points + 2));
+                                            "study " + std::to_string(i), points + 2, mark));
       outcome_.points += clients_.back()->points();
       clients_.back()->start();
       if (settings_.killers) {
-        auto& killers = killers_[points + 2];
+        auto& killers = killers_[mark];
         const std::int64_t killing = world_.between(0, 2);
         while (static_cast<std::int64_t>(killers.size()) < killing) {
           killers.insert(
@@ -241,7 +247,9 @@ class Simulation {
     for (const auto& worker : workers_) {
       const auto* results = worker->sent(link, sequence);
       // What a worker of another solver version solved is acknowledged, for it is not wanted.
+      // What is of a deleted study is not wanted either.
       if (results == nullptr || results->study_id() == server::kProbeStudy ||
+          disk_.model().study(results->study_id()) == nullptr ||
           server_.service().scheduler().study(results->study_id()).solver_version !=
               worker->solver_version()) {
         continue;
@@ -274,7 +282,7 @@ class Simulation {
         return false;
       }
     }
-    return server_.runs();
+    return server_.runs() && server_.has_cleared();
   }
 
   void check_end() {
@@ -295,7 +303,7 @@ class Simulation {
                         server::state_name(study->state) + ", with " +
                         std::to_string(server_.service().scheduler().workers()) + " workers");
       }
-      check_rows(client->points(), results);
+      check_rows(client->mark(), results);
       if (study->state != server::StudyState::kDone) {
         throw Violation(client->name() + " is complete and not done");
       }
@@ -312,7 +320,7 @@ class Simulation {
   void check_deaths() {
     constexpr std::uint64_t kMostOfAKiller = 8;
     std::uint64_t killing = 0;
-    for (const auto& [size, points] : killers_) {
+    for (const auto& [mark, points] : killers_) {
       killing += points.size();
     }
     for (const auto& worker : workers_) {
@@ -324,13 +332,13 @@ class Simulation {
     }
   }
 
-  void check_rows(std::uint64_t size, const StoreModel::Rows& results) {
-    const auto killers = killers_.find(size);
+  void check_rows(std::uint64_t mark, const StoreModel::Rows& results) {
+    const auto killers = killers_.find(mark);
     for (const auto& [point, result] : results) {
       const bool kills = killers != killers_.end() && killers->second.contains(point);
       outcome_.failed_points += kills ? 1U : 0U;
       if (kills ? result->error().empty()
-                : result->SerializeAsString() != answer_to(size, point).SerializeAsString()) {
+                : result->SerializeAsString() != answer_to(mark, point).SerializeAsString()) {
         throw Violation("the row of point " + std::to_string(point) + " is wrong" +
                         (result->error().empty() ? "" : ": " + result->error()));
       }
@@ -351,43 +359,6 @@ class Simulation {
 };
 
 }  // namespace
-
-SimulationOutcome& SimulationOutcome::operator+=(const SimulationOutcome& other) {
-  points += other.points;
-  failed_points += other.failed_points;
-  server_kills += other.server_kills;
-  power_losses += other.power_losses;
-  deaths_in_writes += other.deaths_in_writes;
-  server_stops += other.server_stops;
-  undone_commits += other.undone_commits;
-  refused_kept += other.refused_kept;
-  worker_faults += other.worker_faults;
-  disk_faults += other.disk_faults;
-  failed_commits += other.failed_commits;
-  partitions += other.partitions;
-  clock_jumps += other.clock_jumps;
-  cuts += other.cuts;
-  vanished_peers += other.vanished_peers;
-  deaths += other.deaths;
-  events += other.events;
-  healed_after_ms = std::max(healed_after_ms, other.healed_after_ms);
-  return *this;
-}
-
-std::string SimulationOutcome::text() const {
-  using std::to_string;
-  return to_string(points) + " points, " + to_string(failed_points) + " of them killers of " +
-         to_string(deaths) + " workers; " + to_string(server_kills) + " servers killed, " +
-         to_string(power_losses) + " losses of power, " + to_string(deaths_in_writes) +
-         " of these in the middle of a write, " + to_string(server_stops) + " servers stopped; " +
-         to_string(undone_commits) + " commits undone by losing power, " + to_string(refused_kept) +
-         " refused ones found after a crash; " + to_string(disk_faults) + " faults of disks, " +
-         to_string(failed_commits) + " commits failed; " + to_string(worker_faults) +
-         " faults of workers, " + to_string(partitions) + " partitions, " + to_string(clock_jumps) +
-         " jumps of the clock, " + to_string(cuts) + " connections cut, " +
-         to_string(vanished_peers) + " peers vanished with batches; " + to_string(events) +
-         " events; healed after at most " + to_string(healed_after_ms) + " ms";
-}
 
 SimulationOutcome simulate(std::uint64_t seed, const SimulationSettings& settings) {
   return Simulation(seed, settings).run();

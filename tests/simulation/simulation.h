@@ -35,7 +35,11 @@ struct SimulationOutcome {
   std::uint64_t clock_jumps = 0;
   std::uint64_t cuts = 0;            ///< of single connections, in storms
   std::uint64_t vanished_peers = 0;  ///< with batches
-  std::uint64_t deaths = 0;          ///< of workers, by points that kill
+  std::uint64_t growths = 0;         ///< of studies
+  std::uint64_t renamings = 0;
+  std::uint64_t deletions = 0;
+  std::uint64_t cleared_rows = 0;  ///< of deleted studies
+  std::uint64_t deaths = 0;        ///< of workers, by points that kill
   std::uint64_t events = 0;
   std::int64_t healed_after_ms = 0;  ///< from the last fault to the end of the last study, at most
 

@@ -40,6 +40,10 @@ TEST_P(SimulationTest, EveryPointEndsWithOneRightRowWhateverBreaks) {
   EXPECT_GT(all.worker_faults, kSeeds);
   EXPECT_GT(all.partitions, kSeeds / 4);
   EXPECT_GT(all.clock_jumps, kSeeds / 4);
+  EXPECT_GT(all.growths, kSeeds / 4);
+  EXPECT_GT(all.renamings, kSeeds / 4);
+  EXPECT_GT(all.deletions, kSeeds / 4);
+  EXPECT_GT(all.cleared_rows, kSeeds);
   EXPECT_EQ(all.failed_points, 0U);
 }
 

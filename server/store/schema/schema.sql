@@ -7,7 +7,8 @@
 -- One row. Workers know by it which database their results are meant for.
 CREATE TABLE about (
   database_id TEXT NOT NULL,     -- drawn at random when the file was made
-  starts      INTEGER NOT NULL DEFAULT 0  -- how often a server began to work on it
+  starts      INTEGER NOT NULL DEFAULT 0, -- how often a server began to work on it
+  last_study_id INTEGER NOT NULL DEFAULT 0  -- highest number of a study that was deleted: none gets it again
 ) STRICT;
 
 CREATE TABLE studies (
@@ -62,6 +63,11 @@ CREATE TABLE workers (
   instruction_set TEXT NOT NULL,
   joined_at       TEXT NOT NULL,
   checksum        INTEGER        -- CRC-32 of the other columns
+) STRICT;
+
+-- Studies that are deleted, of which rows may be left: these go a few at a time, while a server works.
+CREATE TABLE deletions (
+  study_id    INTEGER PRIMARY KEY
 ) STRICT;
 
 -- Failed points that were forgotten to be solved again: runs of neighbours that had failed in one

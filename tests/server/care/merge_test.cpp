@@ -350,5 +350,50 @@ TEST_F(MergeTest, OnlyADatabaseOfOursIsMerged) {
   EXPECT_EQ(text("all", "SELECT count(*) FROM studies"), "0");
 }
 
+/// Ten points, and as many behind them.
+Table grown_table() {
+  protocol::Recipe recipe = table_of(10)->recipe();
+  recipe.MergeFrom(table_of(10)->recipe());
+  return std::make_shared<const protocol::PointTable>(recipe);
+}
+
+TEST_F(MergeTest, AStudyThatGrewInOneDatabaseIsUnitedWithWhatItWas) {
+  for (const bool source_grew : {true, false}) {
+    const std::string name = source_grew ? "grown" : "shorter";
+    store("all", {{.study = name, .table = source_grew ? table_of(10) : grown_table(), .end = 5}});
+    store(name, {{.study = name,
+                  .table = source_grew ? grown_table() : table_of(10),
+                  .first = 3,
+                  .end = source_grew ? 15U : 10U}});
+    Store(file("all"))
+        .commit(
+            std::vector<Change>{SetStudyState{source_grew ? 1U : 2U, StudyState::kDone, "then"}});
+    const Merged merged = merge(name);
+    EXPECT_EQ(merged.studies_united, 1U);
+    EXPECT_EQ(merged.studies_grown, source_grew ? 1U : 0U);
+    EXPECT_EQ(merged.results_known, 2U);
+    const std::string where = " FROM runs WHERE study = '" + name + "'";
+    EXPECT_EQ(text("all", "SELECT count(*)" + where), source_grew ? "15" : "10");
+    EXPECT_EQ(text("all", "SELECT state || points FROM studies WHERE name = '" + name + "'"),
+              "running20");
+    EXPECT_THAT(find_faults(file("all")), IsEmpty());
+    EXPECT_EQ(merge(name).results_added, 0U) << "merged again";
+  }
+}
+
+TEST_F(MergeTest, AConflictSaysWhatDiffers) {
+  store("all", {{.end = 5}});
+  store("other", {{.table = table_of(12), .end = 5}});
+  EXPECT_THAT(refusal("other"), HasSubstr("block 1, mu: stored 0:1:10, given 0:1:12"));
+}
+
+TEST_F(MergeTest, NumbersOfDeletedStudiesAreNotGivenAgain) {
+  store("all", {{.study = "a"}, {.study = "b"}});
+  Store(file("all")).commit(std::vector<Change>{DeleteStudy{2}});
+  store("other", {{.study = "c"}});
+  merge("other");
+  EXPECT_EQ(text("all", "SELECT study_id FROM studies WHERE name = 'c'"), "3");
+}
+
 }  // namespace
 }  // namespace oblique::server

@@ -36,6 +36,27 @@ class FailingStorage final : public Storage {
     }
   }
 
+  /// As many steps as `leave` said.
+  ClearedAway clear_away(std::size_t /*most*/) override {
+    const std::lock_guard lock(mutex_);
+    if (full_) {
+      throw StorageError("the disk is full");
+    }
+    if (left_ == 0) {
+      return ClearedAway::kAll;
+    }
+    --left_;
+    return ClearedAway::kPart;
+  }
+  void leave(int steps) {
+    const std::lock_guard lock(mutex_);
+    left_ = steps;
+  }
+  int left() {
+    const std::lock_guard lock(mutex_);
+    return left_;
+  }
+
   static constexpr std::uint64_t kBad = 666;  // a change of this study always fails
 
   void set_full(bool full) {
@@ -60,6 +81,7 @@ class FailingStorage final : public Storage {
   bool full_ = false;
   bool out_of_memory_ = false;
   int attempts_ = 0;
+  int left_ = 0;
   std::vector<std::uint64_t> committed_;
 };
 
@@ -292,6 +314,36 @@ TEST_F(WriterTest, FinishingSaysHowManyChangesWereNotMadeDurable) {
   writer_.submit(kept(1));
   writer_.submit(kept(2));
   EXPECT_EQ(writer_.finish(), 2U);
+}
+
+TEST_F(WriterTest, WhatDeletedStudiesLeftIsClearedAwayBetweenWritesAndWithoutAny) {
+  writer_.submit(kept(1));
+  ASSERT_EQ(reports_.wait_for_ticket(1), Kind::kStored);
+  constexpr int kSteps = 300;
+  storage_.leave(kSteps);
+  writer_.submit({2, DeleteStudy{7}, true});
+  ASSERT_EQ(reports_.wait_for_ticket(2), Kind::kStored);
+  for (std::uint64_t ticket = 3; storage_.left() > 0; ++ticket) {
+    writer_.submit(kept(ticket));
+    EXPECT_EQ(reports_.wait_for_ticket(ticket), Kind::kStored) << "written meanwhile";
+  }
+  EXPECT_EQ(writer_.finish(), 0U);
+}
+
+TEST(GroupCommitTest, AStepThatFailsIsTakenAgainAndDisturbsNothing) {
+  FailingStorage storage;
+  GroupCommit commits(storage);
+  storage.leave(2);
+  std::vector<WriteReport> reports;
+  EXPECT_TRUE(commits.clear(10, reports));
+  storage.set_full(true);
+  EXPECT_FALSE(commits.clear(10, reports));
+  EXPECT_TRUE(commits.has_to_clear());
+  storage.set_full(false);
+  EXPECT_TRUE(commits.clear(10, reports));
+  EXPECT_TRUE(commits.clear(10, reports));
+  EXPECT_FALSE(commits.has_to_clear());
+  EXPECT_TRUE(reports.empty());
 }
 
 }  // namespace

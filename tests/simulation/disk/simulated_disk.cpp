@@ -89,6 +89,13 @@ bool SimulatedDisk::merge_log() {
   return store_->merge_log();
 }
 
+server::ClearedAway SimulatedDisk::clear_away(std::size_t most) {
+  const std::uint64_t before = store_->cleared_rows();
+  const auto cleared = store_->clear_away(most);
+  cleared_rows += store_->cleared_rows() - before;
+  return cleared;
+}
+
 void SimulatedDisk::check_rows() {
   using server::Statement;
   const auto database = server::open_database(files_.path(), SQLITE_OPEN_READONLY);

@@ -36,6 +36,8 @@ class SimulatedDisk final : public server::Storage {
   void commit(std::span<const server::Change> changes) override;
   void check() override { store_->check(); }
   bool merge_log() override;
+  server::ClearedAway clear_away(std::size_t most) override;
+  std::uint64_t cleared_rows = 0;  ///< of deleted studies
 
   /// Compares every row with the model's, and lets SQLite look for damage. Throws Violation.
   void check_rows();

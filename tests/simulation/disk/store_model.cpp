@@ -11,13 +11,17 @@ using server::AddResults;
 using server::AddStudy;
 using server::AddWorker;
 using server::Change;
+using server::DeleteStudy;
 using server::ForgetFailures;
+using server::GrowStudy;
+using server::RenameStudy;
 using server::SetStudyState;
 using server::SetStudyTerms;
 using server::StudyState;
 
 bool StoreModel::apply(const Change& change, Contents& contents) {
   if (const auto* study = std::get_if<AddStudy>(&change)) {
+    contents.last_study_id = std::max(contents.last_study_id, study->study_id);
     contents.studies[study->study_id] = {study->study_id,
                                          study->name,
                                          study->table,
@@ -29,23 +33,62 @@ bool StoreModel::apply(const Change& change, Contents& contents) {
                                          {}};
     return true;
   }
-  if (const auto* state = std::get_if<SetStudyState>(&change)) {
-    contents.studies.at(state->study_id).state = state->state;
-    return true;
-  }
-  if (const auto* terms = std::get_if<SetStudyTerms>(&change)) {
-    auto& now = contents.studies.at(terms->study_id).terms;
-    const bool changes = !(now == terms->terms);
-    now = terms->terms;
-    return changes;
-  }
   if (const auto* worker = std::get_if<AddWorker>(&change)) {
     contents.last_worker_id = std::max(contents.last_worker_id, worker->worker_id);
     return true;
   }
-  const auto* forget = std::get_if<ForgetFailures>(&change);
-  return forget != nullptr ? apply(*forget, contents)
-                           : apply(std::get<AddResults>(change), contents);
+  return apply_to_study(change, contents);
+}
+
+/// Of one that is there: results of a deleted study are dropped.
+bool StoreModel::apply_to_study(const Change& change, Contents& contents) {
+  const auto study_of = [&](const auto& one) { return contents.studies.find(one.study_id); };
+  const auto none = contents.studies.end();
+  if (const auto* state = std::get_if<SetStudyState>(&change)) {
+    const auto study = study_of(*state);
+    if (study != none) {
+      study->second.state = state->state;
+    }
+    return study != none;
+  }
+  if (const auto* terms = std::get_if<SetStudyTerms>(&change)) {
+    const auto study = study_of(*terms);
+    const bool changes = study != none && !(study->second.terms == terms->terms);
+    if (changes) {
+      study->second.terms = terms->terms;
+    }
+    return changes;
+  }
+  if (const auto* name = std::get_if<RenameStudy>(&change)) {
+    contents.studies.at(name->study_id).name = name->name;
+    return true;
+  }
+  if (const auto* growth = std::get_if<GrowStudy>(&change)) {
+    return apply(*growth, contents);
+  }
+  if (const auto* deletion = std::get_if<DeleteStudy>(&change)) {
+    return apply(*deletion, contents);
+  }
+  if (const auto* forget = std::get_if<ForgetFailures>(&change)) {
+    return study_of(*forget) != none && apply(*forget, contents);
+  }
+  const auto& results = std::get<AddResults>(change);
+  return study_of(results) != none && apply(results, contents);
+}
+
+bool StoreModel::apply(const GrowStudy& change, Contents& contents) {
+  auto& study = contents.studies.at(change.study_id);
+  study.table = change.table;
+  study.terms = change.terms;
+  study.state = StudyState::kRunning;
+  return true;
+}
+
+bool StoreModel::apply(const DeleteStudy& change, Contents& contents) {
+  contents.studies.erase(change.study_id);
+  contents.rows.erase(change.study_id);
+  contents.has_deleted = true;
+  return true;
 }
 
 bool StoreModel::apply(const ForgetFailures& change, Contents& contents) {
@@ -143,6 +186,7 @@ void StoreModel::restarted(const Found& found, bool power_was_lost) {
   undone_commits += undone;
   refused_kept += came_back != entries_.end() ? 1U : 0U;
   now_ = std::move(*matching);
+  now_.last_worker_id = found.last_worker_id;
   if (power_was_lost) {
     synced_ = now_;
     entries_.clear();
@@ -164,6 +208,7 @@ void StoreModel::refuse(const Found& found, bool power_was_lost) const {
   for (const auto& study : found.studies) {
     there.studies[study.study_id] = study;
   }
+  there.last_study_id = found.last_study_id;
   there.last_worker_id = found.last_worker_id;
   throw Violation("after a restart the store has " + there.description() + " and not " +
                   now_.description() +
@@ -171,8 +216,9 @@ void StoreModel::refuse(const Found& found, bool power_was_lost) const {
 }
 
 bool StoreModel::Contents::operator==(const Found& found) const {
-  const std::uint64_t last = studies.empty() ? 0 : studies.rbegin()->first;
-  return last == found.last_study_id && last_worker_id == found.last_worker_id &&
+  return last_study_id == found.last_study_id &&
+         (last_worker_id == found.last_worker_id ||
+          (has_deleted && found.last_worker_id < last_worker_id)) &&
          std::equal(studies.begin(), studies.end(), found.studies.begin(), found.studies.end(),
                     [](const auto& entry, const server::StoredStudy& there) {
                       const server::StoredStudy& here = entry.second;

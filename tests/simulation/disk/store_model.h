@@ -51,7 +51,9 @@ class StoreModel {
   struct Contents {
     std::map<std::uint64_t, server::StoredStudy> studies;
     std::map<std::uint64_t, Rows> rows;
+    std::uint64_t last_study_id = 0;  ///< of deleted ones too
     std::uint64_t last_worker_id = 0;
+    bool has_deleted = false;  ///< then rows of workers may be gone, the last one's too
 
     bool operator==(const Found& found) const;
     std::string description() const;
@@ -63,6 +65,9 @@ class StoreModel {
   /// Says whether anything had to be written.
   static bool apply(const server::Change& change, Contents& contents);
   static bool apply(const server::AddResults& change, Contents& contents);
+  static bool apply(const server::GrowStudy& change, Contents& contents);
+  static bool apply(const server::DeleteStudy& change, Contents& contents);
+  static bool apply_to_study(const server::Change& change, Contents& contents);
   static bool apply(const server::ForgetFailures& change, Contents& contents);
   static void apply_all(const Entry& entry, Contents& contents);
   [[noreturn]] void refuse(const Found& found, bool power_was_lost) const;

@@ -1,0 +1,229 @@
+#include "server/store/clearing.h"
+
+#include <algorithm>
+#include <limits>
+#include <string>
+
+namespace oblique::server {
+namespace {
+
+/// Fewer free pages are left for what comes.
+constexpr std::int64_t kFewPages = 16;
+/// To give a page back takes as long as to delete about so many rows.
+constexpr std::size_t kRowsAPage = 8;
+
+std::int64_t number_of(sqlite3* database, const char* sql) {
+  Statement statement(database, sql);
+  return statement.step() ? statement.integer(0) : 0;
+}
+
+void run_for(sqlite3* database, const char* sql, std::uint64_t study_id) {
+  Statement statement(database, sql);
+  statement.bind(1, study_id);
+  statement.run();
+}
+
+}  // namespace
+
+Clearing::Clearing(sqlite3* database)
+    : database_(database),
+      last_worker_(number_of(database_, "SELECT max(worker_id) FROM workers")) {
+  begin();
+}
+
+/// As the database says.
+void Clearing::begin() {
+  left_.clear();
+  doubtful_ = {};
+  Statement list(database_, "SELECT study_id FROM deletions");
+  while (list.step()) {
+    left_.insert(static_cast<std::uint64_t>(list.integer(0)));
+  }
+  doubts_all_ = !left_.empty();
+  if (!left_.empty()) {
+    phase_ = Phase::kRows;
+  } else {
+    phase_ = pages_to_give_back() > kFewPages ? Phase::kGivesBack : Phase::kIdle;
+  }
+  must_begin_anew_ = false;
+}
+
+void Clearing::remove(std::uint64_t study_id) {
+  run_for(database_, "UPDATE about SET last_study_id = max(last_study_id, ?)", study_id);
+  run_for(database_, "INSERT OR IGNORE INTO deletions (study_id) VALUES (?)", study_id);
+  run_for(database_, "DELETE FROM retries WHERE study_id = ?", study_id);
+  run_for(database_, "DELETE FROM studies WHERE study_id = ?", study_id);
+  removed_now_.insert(study_id);
+  deleted_.insert(study_id);
+  left_.insert(study_id);
+  phase_ = Phase::kRows;
+}
+
+void Clearing::undo() {
+  for (const std::uint64_t study : removed_now_) {
+    deleted_.erase(study);
+  }
+  must_begin_anew_ = must_begin_anew_ || !removed_now_.empty();
+  removed_now_.clear();
+}
+
+void Clearing::note_use(std::int64_t model, std::uint64_t worker) {
+  doubtful_.models.erase(model);
+  doubtful_.workers.erase(static_cast<std::int64_t>(worker));
+}
+
+bool Clearing::step(std::size_t most) {
+  if (must_begin_anew_) {
+    begin();
+  }
+  switch (phase_) {
+    case Phase::kRows:
+      delete_rows(most);
+      return false;
+    case Phase::kUses:
+      look_for_uses(most);
+      return false;
+    case Phase::kReferences:
+      return delete_references(most);
+    case Phase::kEntries:
+      if (!keeps_entries_) {
+        execute(database_, "DELETE FROM deletions");
+      }
+      phase_ = Phase::kGivesBack;
+      return false;
+    case Phase::kGivesBack:
+      execute(database_, "PRAGMA incremental_vacuum(" +
+                             std::to_string(std::max<std::size_t>(most / kRowsAPage, 1)) + ")");
+      phase_ = pages_to_give_back() > kFewPages ? Phase::kGivesBack : Phase::kIdle;
+      return false;
+    case Phase::kIdle:
+      return false;
+  }
+  return false;
+}
+
+void Clearing::delete_rows(std::size_t most) {
+  if (left_.empty()) {
+    if (doubts_all_) {
+      doubt_all();
+    }
+    looked_until_ = {std::numeric_limits<std::int64_t>::min(), 0};
+    phase_ = doubtful_.empty() ? Phase::kEntries : Phase::kUses;
+    return;
+  }
+  const std::uint64_t study = *left_.begin();
+  Statement rows(database_,
+                 "SELECT point, model_id, worker FROM packed_results WHERE study_id = ?"
+                 " ORDER BY point LIMIT ?");
+  rows.bind(1, study);
+  rows.bind(2, std::uint64_t{most});
+  std::int64_t last_point = -1;
+  std::uint64_t found = 0;
+  while (rows.step()) {
+    last_point = rows.integer(0);
+    ++found;
+    if (!doubts_all_) {
+      doubtful_.insert(rows, 1, 2);
+    }
+  }
+  rows.reset();
+  Statement remove(database_, "DELETE FROM packed_results WHERE study_id = ? AND point <= ?");
+  remove.bind(1, study);
+  remove.bind(2, last_point);
+  remove.run();
+  rows_ += found;
+  if (found < most) {
+    // Runs of neighbours: few beside the rows, and one for each row at worst.
+    Statement settled(database_,
+                      "DELETE FROM settled_points WHERE study_id = ?1 AND first_point <= coalesce("
+                      "(SELECT first_point FROM settled_points WHERE study_id = ?1"
+                      " ORDER BY first_point LIMIT 1 OFFSET ?2), 9223372036854775807)");
+    settled.bind(1, study);
+    settled.bind(2, std::uint64_t{most});
+    settled.run();
+    Statement more(database_, "SELECT 1 FROM settled_points WHERE study_id = ?");
+    more.bind(1, study);
+    if (!more.step()) {
+      left_.erase(study);
+    }
+  }
+}
+
+/// All that there are may be named by no row. Those that come later are named by the row with which
+/// they come.
+void Clearing::doubt_all() {
+  Statement models(database_, "SELECT model_id, NULL FROM models");
+  while (models.step()) {
+    doubtful_.insert(models, 0, 1);
+  }
+  Statement workers(database_, "SELECT worker_id FROM workers");
+  while (workers.step()) {
+    doubtful_.workers.insert(workers.integer(0));
+  }
+  doubts_all_ = false;
+}
+
+void Clearing::look_for_uses(std::size_t most) {
+  Statement rows(database_,
+                 "SELECT study_id, point, model_id, worker FROM packed_results"
+                 " WHERE (study_id, point) > (?, ?) ORDER BY study_id, point LIMIT ?");
+  rows.bind(1, looked_until_.first);
+  rows.bind(2, looked_until_.second);
+  rows.bind(3, std::uint64_t{most});
+  std::size_t found = 0;
+  while (rows.step()) {
+    ++found;
+    looked_until_ = {rows.integer(0), rows.integer(1)};
+    doubtful_.erase(rows, 2, 3);
+  }
+  if (doubtful_.empty()) {
+    phase_ = Phase::kEntries;
+  } else if (found < most) {
+    phase_ = Phase::kReferences;
+  }
+}
+
+bool Clearing::delete_references(std::size_t most) {
+  const auto later = doubtful_.workers.upper_bound(last_worker_);
+  keeps_entries_ = keeps_entries_ || later != doubtful_.workers.end();
+  doubtful_.workers.erase(later, doubtful_.workers.end());
+  std::size_t deleted = 0;
+  const auto remove = [&](std::set<std::int64_t>& ids, const char* sql) {
+    Statement statement(database_, sql);
+    for (; !ids.empty() && deleted < most; ++deleted) {
+      statement.bind(1, *ids.begin());
+      statement.run();
+      ids.erase(ids.begin());
+    }
+  };
+  const bool any_model = !doubtful_.models.empty();
+  remove(doubtful_.models, "DELETE FROM models WHERE model_id = ?");
+  remove(doubtful_.workers, "DELETE FROM workers WHERE worker_id = ?");
+  if (doubtful_.empty()) {
+    phase_ = Phase::kEntries;
+  }
+  return any_model;
+}
+
+std::int64_t Clearing::pages_to_give_back() {
+  constexpr std::int64_t kIncremental = 2;
+  return number_of(database_, "PRAGMA auto_vacuum") == kIncremental
+             ? number_of(database_, "PRAGMA freelist_count")
+             : 0;
+}
+
+void Clearing::References::insert(const Statement& row, int model, int worker) {
+  models.insert(row.integer(model));
+  if (!row.is_null(worker)) {
+    workers.insert(row.integer(worker));
+  }
+}
+
+void Clearing::References::erase(const Statement& row, int model, int worker) {
+  models.erase(row.integer(model));
+  if (!row.is_null(worker)) {
+    workers.erase(row.integer(worker));
+  }
+}
+
+}  // namespace oblique::server

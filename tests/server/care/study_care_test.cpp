@@ -1,0 +1,87 @@
+#include "server/care/study_care.h"
+
+#include <filesystem>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/care/diagnosis.h"
+#include "server/care/merge.h"
+#include "tests/server/care/care_fixture.h"
+
+namespace oblique::server {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+class StudyCareTest : public CareTest {
+ protected:
+  std::string refusal_of_renaming(std::uint64_t study, const std::string& name) {
+    try {
+      rename_study(path_, study, name);
+    } catch (const StudyRefused& error) {
+      return error.what();
+    }
+    return "it was renamed";
+  }
+};
+
+TEST_F(StudyCareTest, AStudyGetsAnotherNameUnlessThatIsTakenOrNone) {
+  store_->commit(std::vector<Change>{AddStudy{2, "b", table_, "2024-01-01T00:00:00.000Z"}});
+  store_.reset();
+  rename_study(path_, 1, "friction");
+  EXPECT_EQ(Store(path_).studies().at(0).name, "friction");
+  EXPECT_THAT(refusal_of_renaming(1, "b"), HasSubstr("there is a study called \"b\""));
+  EXPECT_THAT(refusal_of_renaming(1, ""), HasSubstr("name"));
+  EXPECT_THAT(refusal_of_renaming(7, "c"), HasSubstr("no longer"));
+  EXPECT_THAT(find_faults(path_), IsEmpty());
+}
+
+TEST_F(StudyCareTest, ADatabaseAtWorkIsNotChanged) {
+  EXPECT_THROW(rename_study(path_, 1, "b"), StorageError);
+  EXPECT_THROW(delete_study(path_, 1, [](auto) {}), StorageError);
+  EXPECT_EQ(store_->studies().at(0).name, "a");
+}
+
+TEST_F(StudyCareTest, ADeletedStudyLeavesNothingBehind) {
+  add_results(*store_, 5, 10, false);
+  store_.reset();
+  std::uint64_t rows = 0;
+  EXPECT_TRUE(delete_study(path_, 1, [&](std::uint64_t deleted) { rows = deleted; }));
+  EXPECT_EQ(rows, 10U);
+  const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READONLY);
+  for (const char* table : {"studies", "models", "workers", "packed_results", "settled_points",
+                            "deletions", "retries"}) {
+    Statement count(database.get(), std::string("SELECT count(*) FROM ") + table);
+    ASSERT_TRUE(count.step());
+    EXPECT_EQ(count.integer(0), 0) << table;
+  }
+  EXPECT_THROW(delete_study(path_, 1, [](auto) {}), StudyRefused);
+}
+
+TEST_F(StudyCareTest, AMissingDatabaseIsNotMade) {
+  EXPECT_THROW(rename_study(copy_, 1, "b"), StorageError);
+  EXPECT_FALSE(std::filesystem::exists(copy_));
+}
+
+TEST_F(StudyCareTest, TheRecipeIsThatWhichWasStoredAlsoWhileAServerWorks) {
+  EXPECT_EQ(stored_recipe(path_, 1).SerializeAsString(), table_->recipe().SerializeAsString());
+  EXPECT_THROW(stored_recipe(path_, 2), StudyRefused);
+}
+
+TEST_F(StudyCareTest, RowsThatADeletionHasLeftAreNoFaultsAndAreNotMerged) {
+  store_->commit(
+      std::vector<Change>{AddStudy{2, "b", table_, "2024-01-01T00:00:00.000Z"}, DeleteStudy{1}});
+  store_.reset();
+  const Diagnosis found = diagnose(path_);
+  EXPECT_THAT(found.faults, IsEmpty());
+  EXPECT_THAT(found.remarks.at(0), HasSubstr("5 results of deleted studies are left"));
+  Merger merger(copy_);
+  const Merged merged = merger.merge(path_, {}, [](auto, auto) {});
+  EXPECT_EQ(merged.studies_added, 1U);
+  EXPECT_EQ(merged.results_added, 0U);
+}
+
+}  // namespace
+}  // namespace oblique::server

@@ -1,0 +1,243 @@
+// Studies that grow, get another name or are deleted, as the database has it.
+#include <filesystem>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/care/diagnosis.h"
+#include "server/reading/reader.h"
+#include "server/store/store.h"
+#include "tests/support/points.h"
+#include "tests/support/temporary_folder.h"
+
+namespace oblique::server {
+namespace {
+
+using testing::IsEmpty;
+using testing::SizeIs;
+
+/// `points` points of a model with this k.
+std::shared_ptr<const protocol::PointTable> table_with_k(double k, std::uint64_t points) {
+  return std::make_shared<const protocol::PointTable>(protocol::recipe_of(
+      {{protocol::listed("k", {k}), protocol::listed("H", {1.0}),
+        protocol::range("mu", 0.0, 1.0, points), protocol::listed("e", {1.0})}}));
+}
+
+class ClearingTest : public testing::Test {
+ protected:
+  void commit(std::vector<Change> changes) { store_->commit(changes); }
+  void reopen() {
+    store_.reset();
+    store_.emplace(path_);
+  }
+  /// A study called by its number, all of whose points are solved by that worker.
+  std::vector<Change> solved_study(std::uint64_t id, const StudyTable& table,
+                                   std::uint64_t worker) {
+    std::vector<Change> changes{
+        AddStudy{id, "study " + std::to_string(id), table, "2024-01-01T00:00:00.000Z", {}},
+        AddWorker{worker, "host", 1, "0.1", "avx2", "then"}};
+    changes.emplace_back(results_of(id, table, worker));
+    return changes;
+  }
+  static AddResults results_of(std::uint64_t id, const StudyTable& table, std::uint64_t worker) {
+    AddResults results{id, table.get(), worker, "0.1", "avx2", 1, "2024-01-01T00:00:01.000Z", {}};
+    for (std::uint64_t point = 0; point < table.size(); ++point) {
+      results.results.push_back(solved_point(point));
+    }
+    return results;
+  }
+  std::int64_t number(const std::string& sql) {
+    return Reader(path_).query(sql, kNoLimits).rows(0).values(0).integer();
+  }
+  std::int64_t rows_of(std::uint64_t id) {
+    return number("SELECT count(*) FROM packed_results WHERE study_id = " + std::to_string(id));
+  }
+  /// Steps until all is cleared away; how many that took.
+  int clear_all(std::size_t most) {
+    int steps = 1;
+    while (store_->clear_away(most) != ClearedAway::kAll) {
+      ++steps;
+    }
+    return steps;
+  }
+
+  test::TemporaryFolder folder_;
+  std::string path_ = folder_.file("studies.db");
+  std::optional<Store> store_{path_};
+};
+
+TEST_F(ClearingTest, AStudyThatGrowsHasItsRowsAndFurtherPointsAndRuns) {
+  commit(solved_study(1, table_of(3), 1));
+  commit({SetStudyState{1, StudyState::kDone, "then"}});
+  commit({GrowStudy{1, table_of(5), {2, 0.5, true}, "now"}});
+  reopen();
+  const auto study = store_->studies().at(0);
+  EXPECT_EQ(study.table.size(), 5U);
+  EXPECT_EQ(study.state, StudyState::kRunning);
+  EXPECT_EQ(study.settled, IntervalSet(0, 3));
+  EXPECT_EQ(study.terms, (StudyTerms{2, 0.5, true}));
+  EXPECT_EQ(study.created_at, "2024-01-01T00:00:00.000Z");
+}
+
+TEST_F(ClearingTest, TheChecksumsOfStudiesThatGrewOrWereRenamedAreRight) {
+  const StudyTable table = table_of(3);
+  const auto recipe = [](std::uint64_t further) {
+    protocol::Recipe all = table_of(3)->recipe();
+    all.MergeFrom(table_of(further)->recipe());
+    return std::make_shared<const protocol::PointTable>(all);
+  };
+  commit(solved_study(1, table, 1));
+  commit({GrowStudy{1, recipe(4), {}, "now"}, RenameStudy{1, "another name"}});
+  reopen();
+  EXPECT_EQ(store_->studies().at(0).name, "another name");
+  EXPECT_THAT(find_faults(path_), IsEmpty());
+}
+
+TEST_F(ClearingTest, ADeletedStudyIsGoneAtOnceAndItsRowsGoAFewAtATime) {
+  commit(solved_study(1, table_of(100), 1));
+  commit(solved_study(2, table_of(50), 2));
+  commit({DeleteStudy{1}});
+  EXPECT_THAT(store_->studies(), SizeIs(1));
+  EXPECT_EQ(number("SELECT count(*) FROM runs"), 50);
+  EXPECT_EQ(rows_of(1), 100);
+  EXPECT_EQ(store_->clear_away(10), ClearedAway::kPart);
+  EXPECT_EQ(rows_of(1), 90);
+  EXPECT_GT(clear_all(10), 9);
+  EXPECT_EQ(rows_of(1), 0);
+  EXPECT_EQ(rows_of(2), 50);
+  EXPECT_EQ(number("SELECT count(*) FROM settled_points WHERE study_id = 1"), 0);
+  EXPECT_EQ(store_->cleared_rows(), 100U);
+  EXPECT_EQ(store_->clear_away(10), ClearedAway::kAll);
+}
+
+TEST_F(ClearingTest, WhereverItIsKilledTheNextProcessEndsIt) {
+  for (int steps = 0; steps < 15; ++steps) {
+    const std::uint64_t id = static_cast<std::uint64_t>(2 * steps + 1);
+    commit(solved_study(id, table_of(20), id));
+    commit(solved_study(id + 1, table_with_k(1e7 + steps, 20), id + 1));
+    commit({DeleteStudy{id + 1}});
+    for (int step = 0; step < steps; ++step) {
+      (void)store_->clear_away(4);
+    }
+    reopen();
+    EXPECT_THAT(find_faults(path_), IsEmpty()) << "after step " << steps;
+    clear_all(4);
+    EXPECT_EQ(rows_of(id + 1), 0);
+    EXPECT_EQ(number("SELECT count(*) FROM packed_results"), 20 * (steps + 1));
+    EXPECT_EQ(number("SELECT count(*) FROM models"), 1);
+    EXPECT_EQ(number("SELECT count(*) FROM workers"), steps + 1);
+    EXPECT_EQ(number("SELECT count(*) FROM deletions"), 0);
+    EXPECT_EQ(store_->last_study_id(), id + 1);
+  }
+  EXPECT_THAT(find_faults(path_), IsEmpty());
+}
+
+TEST_F(ClearingTest, ItsNumberIsNeverGivenAgainAndItsNameIsFreeAtOnce) {
+  commit(solved_study(1, table_of(5), 1));
+  commit({DeleteStudy{1}, AddStudy{2, "study 1", table_of(4), "now"}});
+  EXPECT_EQ(store_->studies().at(0).table.size(), 4U);
+  commit({DeleteStudy{2}});
+  clear_all(100);
+  reopen();
+  EXPECT_EQ(store_->last_study_id(), 2U);
+}
+
+TEST_F(ClearingTest, LateResultsOfADeletedStudyAreDropped) {
+  commit(solved_study(1, table_of(5), 1));
+  commit({DeleteStudy{1}, results_of(1, table_of(5), 1)});
+  clear_all(100);
+  commit({results_of(1, table_of(5), 1), SetStudyState{1, StudyState::kDone, "now"}});
+  IntervalSet failed(0, 5);
+  commit({ForgetFailures{1, failed, "now"}});
+  EXPECT_EQ(rows_of(1), 0);
+  EXPECT_THAT(store_->studies(), IsEmpty());
+}
+
+TEST_F(ClearingTest, ADeletionThatIsRolledBackDeletesNothing) {
+  commit(solved_study(1, table_of(5), 1));
+  EXPECT_THROW(commit({DeleteStudy{1}, AddStudy{2, "b", table_of(1), "now"},
+                       AddStudy{3, "b", table_of(1), "now"}}),
+               StorageError);
+  (void)store_->clear_away(100);
+  clear_all(100);
+  EXPECT_THAT(store_->studies(), SizeIs(1));
+  EXPECT_EQ(rows_of(1), 5);
+  commit({GrowStudy{1, table_of(6), {}, "now"}});
+  AddResults late = results_of(1, table_of(6), 1);
+  commit({late});
+  EXPECT_EQ(rows_of(1), 6) << "it is not taken for deleted";
+}
+
+TEST_F(ClearingTest, ModelsThatOthersHaveStayAndSoDoThoseThatComeIntoUseMeanwhile) {
+  commit(solved_study(1, table_with_k(1e7, 20), 1));
+  commit(solved_study(2, table_with_k(2e7, 20), 2));
+  commit(solved_study(3, table_with_k(2e7, 20), 3));
+  commit({DeleteStudy{1}, DeleteStudy{2}});
+  while (rows_of(1) + rows_of(2) > 0) {
+    (void)store_->clear_away(7);
+  }
+  // Of the study with the lowest number, whose rows have been looked at by then.
+  (void)store_->clear_away(1);
+  (void)store_->clear_away(1);
+  commit(solved_study(4, table_with_k(1e7, 3), 4));
+  clear_all(1);
+  EXPECT_EQ(number("SELECT count(*) FROM models"), 2);
+  EXPECT_EQ(number("SELECT count(*) FROM results JOIN models USING (model_id)"), 23);
+  commit({DeleteStudy{4}});
+  clear_all(100);
+  EXPECT_EQ(number("SELECT count(*) FROM models"), 1);
+  commit(solved_study(5, table_with_k(1e7, 3), 5));
+  EXPECT_EQ(number("SELECT count(*) FROM results JOIN models USING (model_id) WHERE k = 1e7"), 3)
+      << "a model that was deleted comes again";
+}
+
+TEST_F(ClearingTest, WorkersThatMayStillStoreResultsStayUntilTheNextStart) {
+  commit(solved_study(1, table_of(5), 1));
+  commit({DeleteStudy{1}});
+  clear_all(100);
+  EXPECT_EQ(number("SELECT count(*) FROM workers"), 1);
+  commit({AddStudy{2, "b", table_of(1), "now"}, results_of(2, table_of(1), 1)});
+  reopen();
+  clear_all(100);
+  EXPECT_EQ(number("SELECT count(*) FROM workers"), 1);
+  commit({DeleteStudy{2}});
+  clear_all(100);
+  EXPECT_EQ(number("SELECT count(*) FROM workers"), 0);
+  EXPECT_EQ(number("SELECT count(*) FROM deletions"), 0);
+}
+
+TEST_F(ClearingTest, TheFileGetsSmaller) {
+  commit(solved_study(1, table_of(5000), 1));
+  commit(solved_study(2, table_of(10), 2));
+  ASSERT_TRUE(store_->merge_log());
+  const auto before = std::filesystem::file_size(path_);
+  commit({DeleteStudy{1}});
+  clear_all(500);
+  ASSERT_TRUE(store_->merge_log());
+  EXPECT_LT(std::filesystem::file_size(path_), before / 4);
+  EXPECT_EQ(std::filesystem::file_size(path_ + "-wal"), 0U);
+  EXPECT_THAT(find_faults(path_), IsEmpty());
+}
+
+TEST_F(ClearingTest, WhileAReaderKeepsTheLogLongItWaits) {
+  commit(solved_study(1, table_of(2000), 1));
+  commit(solved_study(2, table_of(2000), 2));
+  store_->checkpoint_at(1);
+  const DatabaseHandle reader = open_database(path_, SQLITE_OPEN_READONLY);
+  execute(reader.get(), "BEGIN");
+  Statement first(reader.get(), "SELECT count(*) FROM packed_results");
+  ASSERT_TRUE(first.step());
+  commit({DeleteStudy{1}});
+  ClearedAway cleared = ClearedAway::kPart;
+  for (int step = 0; step < 1000 && cleared == ClearedAway::kPart; ++step) {
+    cleared = store_->clear_away(50);
+  }
+  EXPECT_EQ(cleared, ClearedAway::kMustWait);
+  first.reset();
+  execute(reader.get(), "COMMIT");
+  clear_all(500);
+  EXPECT_EQ(rows_of(1), 0);
+}
+
+}  // namespace
+}  // namespace oblique::server
