@@ -2,8 +2,8 @@
 
 -- Words that many results have, each by a number: modes, and events near to which a contact came.
 CREATE TABLE texts (
-  text_id     INTEGER PRIMARY KEY,
-  text        TEXT NOT NULL UNIQUE,
+  text_id     INTEGER PRIMARY KEY,  -- its number
+  text        TEXT NOT NULL UNIQUE, -- the words
   checksum    INTEGER            -- CRC-32 of the other columns
 ) STRICT;
 
@@ -12,13 +12,13 @@ CREATE TABLE texts (
 -- a unit in their name are multiples of a small one (README.md of server/store has them), whole where
 -- that is finer than the result is accurate; lists are JSON arrays of such numbers.
 CREATE TABLE packed_results (
-  study_id         INTEGER NOT NULL REFERENCES studies (study_id),
-  point            INTEGER NOT NULL,
-  model_id         INTEGER NOT NULL REFERENCES models (model_id),
-  H                REAL NOT NULL,
-  mu               REAL NOT NULL,
-  e                REAL NOT NULL,
-  error            TEXT,         -- NULL: it is solved
+  study_id         INTEGER NOT NULL REFERENCES studies (study_id), -- of which it is
+  point            INTEGER NOT NULL, -- its number in the study, from 0
+  model_id         INTEGER NOT NULL REFERENCES models (model_id),  -- every parameter but H, mu and e
+  H                REAL NOT NULL, -- drop of the tip at touch, m; exact
+  mu               REAL NOT NULL, -- coefficient of friction; exact
+  e                REAL NOT NULL, -- coefficient of restitution; exact
+  error            TEXT,         -- why it failed; NULL: it is solved
   fall_time        ANY,          -- 1e-9 s
   impact_x         ANY,          -- 1e-9 m
   vt_in            ANY,          -- 1e-8 m/s
@@ -41,29 +41,30 @@ CREATE TABLE packed_results (
   gravity_change   ANY,          -- 1e-9 J
   exchanged        ANY,          -- 1e-9 J
   closure          ANY,          -- 1e-14
-  fn_peak_error    ANY,          -- 1e-9, as the errors below
-  ft_peak_error    ANY,
-  duration_error   ANY,
-  stick_total_error ANY,
-  slide_error      ANY,
-  impulse_n_error  ANY,
-  impulse_t_error  ANY,
-  v_out_error      ANY,
+  fn_peak_error    ANY,          -- 1e-9
+  ft_peak_error    ANY,          -- 1e-9
+  duration_error   ANY,          -- 1e-9
+  stick_total_error ANY,         -- 1e-9
+  slide_error      ANY,          -- 1e-9
+  impulse_n_error  ANY,          -- 1e-9
+  impulse_t_error  ANY,          -- 1e-9
+  v_out_error      ANY,          -- 1e-9
   dt               ANY,          -- 1e-15 s
   wall             ANY,          -- 1e-9 s
-  steps            INTEGER,
-  mode_same        INTEGER,
-  mode             INTEGER REFERENCES texts (text_id),
-  major_mode       INTEGER REFERENCES texts (text_id),
-  margin_event     INTEGER REFERENCES texts (text_id),
+  steps            INTEGER,      -- as in runs
+  mode_same        INTEGER,      -- as in runs
+  mode             INTEGER REFERENCES texts (text_id), -- a text
+  major_mode       INTEGER REFERENCES texts (text_id), -- a text
+  margin_event     INTEGER REFERENCES texts (text_id), -- a text
   peaks            TEXT,         -- [t, fn, ft, ...] in 1e-12 s and 1e-5 N; fn of a ripple is negative
   ft_peaks         TEXT,         -- [t, ft, ...]; NULL of a solved point: t and ft of `peaks`
-  phases           TEXT,         -- [t, ...], the ends of all phases but the last, a compression first;
-                                 -- the last ends with `duration`. NULL of a solved point: it has none
+  -- [t, ...], the ends of all phases but the last, a compression first; the last ends with
+  -- `duration`. NULL of a solved point: it has none
+  phases           TEXT,
   stick_intervals  TEXT,         -- [t0, t1, ...]
   reaction_peaks   TEXT,         -- [t, force, ...]
   worker           INTEGER REFERENCES workers (worker_id),  -- NULL: the server failed the point
-  attempt          INTEGER NOT NULL,
+  attempt          INTEGER NOT NULL, -- number of the lease under which it was solved
   solved_at        ANY,          -- milliseconds since 1970; a text: what stood there in an older schema
   taken_from       TEXT,         -- STUDY/POINT whose result this is; NULL: it was solved for this point
   -- CRC-32 of the other columns (server/database/row_checksum.h), which `oblique check` compares with
@@ -77,9 +78,9 @@ CREATE INDEX failed_points ON packed_results (study_id, point) WHERE error IS NO
 -- Points that have a row, as runs of neighbours, so that a server that starts need not look at the rows.
 -- Right for studies that are `counted`; it is changed together with the rows.
 CREATE TABLE settled_points (
-  study_id    INTEGER NOT NULL REFERENCES studies (study_id),
-  first_point INTEGER NOT NULL,
-  points      INTEGER NOT NULL,
+  study_id    INTEGER NOT NULL REFERENCES studies (study_id), -- whose points they are
+  first_point INTEGER NOT NULL,  -- of the run
+  points      INTEGER NOT NULL,  -- how many
   PRIMARY KEY (study_id, first_point)
 ) STRICT, WITHOUT ROWID;
 

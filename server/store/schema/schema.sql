@@ -12,11 +12,11 @@ CREATE TABLE about (
 ) STRICT;
 
 CREATE TABLE studies (
-  study_id    INTEGER PRIMARY KEY,
-  name        TEXT NOT NULL UNIQUE,
+  study_id    INTEGER PRIMARY KEY,  -- its number
+  name        TEXT NOT NULL UNIQUE, -- by which people know it
   recipe      BLOB NOT NULL,     -- oblique.protocol.Recipe, serialised: point i is a function of it
-  points      INTEGER NOT NULL,
-  state       TEXT NOT NULL CHECK (state IN ('running', 'paused', 'cancelled', 'done')),
+  points      INTEGER NOT NULL,     -- how many it has
+  state       TEXT NOT NULL CHECK (state IN ('running', 'paused', 'cancelled', 'done')), -- what becomes of it
   created_at  TEXT NOT NULL,     -- UTC, ISO 8601
   changed_at  TEXT NOT NULL,     -- when `state` was last set
   priority    INTEGER NOT NULL DEFAULT 0,   -- studies of a higher one come first
@@ -30,23 +30,23 @@ CREATE TABLE studies (
 -- Every parameter but H, mu and e; one row for each distinct model that has results. The columns
 -- are the model keys of study files, in SI units.
 CREATE TABLE models (
-  model_id    INTEGER PRIMARY KEY,
-  links       INTEGER NOT NULL,
-  length      REAL,              -- of every link; NULL where they differ
-  lengths_m   TEXT NOT NULL,     -- JSON array, one a link, from the pin outwards
-  E           REAL NOT NULL,
-  A           REAL NOT NULL,
-  I           REAL NOT NULL,
-  rho         REAL NOT NULL,
-  g           REAL NOT NULL,
-  elements_per_link INTEGER NOT NULL,
-  k           REAL NOT NULL,
-  eta2        REAL NOT NULL,
-  tip_mass    REAL NOT NULL,
-  integrator  TEXT NOT NULL,
-  spectral_radius REAL NOT NULL, -- of generalized-alpha
-  dt          REAL NOT NULL,     -- 0: chosen for the integrator
-  dt_fall     REAL NOT NULL,     -- 0: chosen for the integrator
+  model_id    INTEGER PRIMARY KEY, -- its number
+  links       INTEGER NOT NULL,    -- number of links
+  length      REAL,              -- of every link, m; NULL where they differ
+  lengths_m   TEXT NOT NULL,     -- lengths in m as a JSON array, one a link, from the pin outwards
+  E           REAL NOT NULL,     -- Young's modulus, Pa
+  A           REAL NOT NULL,     -- cross-section area, m^2
+  I           REAL NOT NULL,     -- second moment of area, m^4
+  rho         REAL NOT NULL,     -- density, kg/m^3
+  g           REAL NOT NULL,     -- gravity, downwards, m/s^2
+  elements_per_link INTEGER NOT NULL, -- elements a link
+  k           REAL NOT NULL,     -- normal contact stiffness in compression, N/m
+  eta2        REAL NOT NULL,     -- ratio of normal to tangential contact stiffness
+  tip_mass    REAL NOT NULL,     -- point mass at the tip, kg
+  integrator  TEXT NOT NULL,     -- explicit or generalized-alpha
+  spectral_radius REAL NOT NULL, -- spectral radius of generalized-alpha
+  dt          REAL NOT NULL,     -- step in contact, s; 0: chosen for the integrator
+  dt_fall     REAL NOT NULL,     -- step in the fall, s; 0: chosen for the integrator
   -- All of them as one text, by which models are told apart: 'oblique-model-1 lengths=0.4,0.4,0.4 E=7e+10
   -- A=0.0005309 ...'. proto/recipe/README.md gives it byte by byte.
   definition  TEXT NOT NULL UNIQUE,
@@ -56,26 +56,26 @@ CREATE TABLE models (
 
 -- One row for each session of a worker in which it delivered a result.
 CREATE TABLE workers (
-  worker_id       INTEGER PRIMARY KEY,
-  name            TEXT NOT NULL,
-  threads         INTEGER NOT NULL,
-  solver_version  TEXT NOT NULL,
-  instruction_set TEXT NOT NULL,
-  joined_at       TEXT NOT NULL,
+  worker_id       INTEGER PRIMARY KEY, -- its number
+  name            TEXT NOT NULL,       -- host and process, for people
+  threads         INTEGER NOT NULL,    -- on how many it solves
+  solver_version  TEXT NOT NULL,       -- of all its results
+  instruction_set TEXT NOT NULL,       -- vector instructions that it uses
+  joined_at       TEXT NOT NULL,       -- UTC, ISO 8601
   checksum        INTEGER        -- CRC-32 of the other columns
 ) STRICT;
 
 -- Studies that are deleted, of which rows may be left: these go a few at a time, while a server works.
 CREATE TABLE deletions (
-  study_id    INTEGER PRIMARY KEY
+  study_id    INTEGER PRIMARY KEY   -- its number
 ) STRICT;
 
 -- Failed points that were forgotten to be solved again: runs of neighbours that had failed in one
 -- attempt. Where several rows name a point the last one counts.
 CREATE TABLE retries (
-  study_id    INTEGER NOT NULL REFERENCES studies (study_id),
-  first_point INTEGER NOT NULL,
-  points      INTEGER NOT NULL,
+  study_id    INTEGER NOT NULL REFERENCES studies (study_id), -- whose points they are
+  first_point INTEGER NOT NULL,  -- of the run
+  points      INTEGER NOT NULL,  -- how many
   attempt     INTEGER NOT NULL,  -- that failed; the next one has a higher number
-  retried_at  TEXT NOT NULL
+  retried_at  TEXT NOT NULL      -- UTC, ISO 8601
 ) STRICT;

@@ -1,0 +1,20 @@
+"""A grid as a labelled cube over H, mu and e: the same forces as forces.py, and where P sticks longest."""
+import sqlite3
+import sys
+
+import pandas
+
+database = sqlite3.connect(f"file:{sys.argv[1]}?mode=ro", uri=True)
+runs = pandas.read_sql_query(
+    "SELECT H, mu, e, fn_peak_N, stick_total_s FROM runs"
+    " WHERE study_id = (SELECT min(study_id) FROM studies) AND status = 'solved'",
+    database,
+)
+cube = runs.set_index(["H", "mu", "e"]).to_xarray()  # an xarray.Dataset; needs a grid's values
+forces = cube.fn_peak_N.isel(e=-1).to_dataframe().reset_index()[["H", "mu", "fn_peak_N"]]
+print(forces.to_csv(index=False), end="")
+
+# Lists are views of their own: one row a span in which P does not move.
+spans = pandas.read_sql_query("SELECT point, t0_s, t1_s FROM stick_intervals", database)
+longest = (spans.t1_s - spans.t0_s).max()
+print(f"longest span in stick: {longest * 1e6:.1f} us" if len(spans) else "P never sticks", file=sys.stderr)
