@@ -1,6 +1,9 @@
 #include "client/command_line.h"
 
+#include <unistd.h>
+
 #include <algorithm>
+#include <chrono>
 #include <exception>
 #include <iostream>
 #include <string>
@@ -9,6 +12,9 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/output/human_units.h"
+#include "client/output/speech.h"
+#include "client/output/terminal.h"
 #include "client/verbs/verbs.h"
 #include "proto/program/usage.h"
 #include "proto/suggestion.h"
@@ -56,19 +62,39 @@ void add_verbs(CLI::App& app, Command& command) {
   add_keys(app, command);
 }
 
-// The verb that was parsed, or the program itself.
-CLI::App& parsed_verb(CLI::App& app) {
-  const auto verbs = app.get_subcommands();
-  return verbs.empty() ? app : *verbs.front();
+/// What people want to be told; as of all verbs.
+struct SpeechFlags {
+  bool quiet = false;
+  bool verbose = false;
+};
+
+void add_speech_flags(CLI::App& verb, SpeechFlags& flags) {
+  verb.add_flag("--quiet", flags.quiet, "say nothing but data and errors");
+  if (verb.get_option_no_throw("--verbose") == nullptr) {
+    verb.add_flag("--verbose", flags.verbose, "say what is done, where, and how long it took");
+  }
+  for (auto* each : verb.get_subcommands({})) {
+    add_speech_flags(*each, flags);
+  }
 }
 
-// Names of verbs, or of the flags of one verb, for suggestions.
-std::vector<std::string> known_words(CLI::App& app, const CLI::App& verb) {
+/// The verb that was parsed, of a verb of verbs the inner one, or the program itself.
+CLI::App& parsed_verb(CLI::App& app) {
+  const auto verbs = app.get_subcommands();
+  return verbs.empty() ? app : parsed_verb(*verbs.front());
+}
+
+/// As it is typed: "oblique keys list".
+std::string words_of(const CLI::App& verb) {
+  const CLI::App* parent = verb.get_parent();
+  return parent == nullptr ? verb.get_name() : words_of(*parent) + ' ' + verb.get_name();
+}
+
+/// Names of the verbs of a verb or the program, and of its flags, for suggestions.
+std::vector<std::string> known_words(CLI::App& verb) {
   std::vector<std::string> words;
-  if (&verb == &app) {
-    for (const auto* each : app.get_subcommands({})) {
-      words.push_back(each->get_name());
-    }
+  for (const auto* each : verb.get_subcommands({})) {
+    words.push_back(each->get_name());
   }
   for (const auto* option : verb.get_options()) {
     for (const auto& name : option->get_lnames()) {
@@ -79,19 +105,17 @@ std::vector<std::string> known_words(CLI::App& app, const CLI::App& verb) {
 }
 
 std::string unexpected_words(CLI::App& app, CLI::App& verb) {
-  const auto words = known_words(app, verb);
+  const auto words = known_words(verb);
   const std::vector<std::string_view> candidates(words.begin(), words.end());
   const auto unexpected = app.remaining(true);
   const std::string first = unexpected.empty() ? std::string() : unexpected.front();
-  const bool is_verb = &verb == &app && !first.starts_with("-");
+  const bool is_verb = !verb.get_subcommands({}).empty() && !first.starts_with("-");
   return fmt::format("{} `{}`{}", is_verb ? "unknown verb" : "unexpected", first,
                      protocol::did_you_mean(first.substr(0, first.find('=')), candidates));
 }
 
-int wrong_usage(const CLI::App& app, const CLI::App& verb, const std::string& message) {
-  return protocol::tell_wrong_usage(
-      &verb == &app ? app.get_name() : fmt::format("{} {}", app.get_name(), verb.get_name()),
-      message);
+int wrong_usage(const CLI::App& verb, const std::string& message) {
+  return protocol::tell_wrong_usage(words_of(verb), message);
 }
 
 int parse(CLI::App& app, int argc, const char* const* argv) {
@@ -105,28 +129,51 @@ int parse(CLI::App& app, int argc, const char* const* argv) {
     // A word too many says more than the missing verb or flag that it may have been meant for.
     auto& verb = parsed_verb(app);
     const bool word_too_many = !app.remaining(true).empty();
-    return wrong_usage(app, verb, word_too_many ? unexpected_words(app, verb) : error.what());
+    return wrong_usage(verb, word_too_many ? unexpected_words(app, verb) : error.what());
   }
 }
 
-int execute(CLI::App& app, const Command& command) {
-  const auto& verb = parsed_verb(app);
-  const std::string words = fmt::format("{} {}: ", app.get_name(), verb.get_name());
+/// An error for people, as "oblique query: ...".
+int tell_error(const std::string& words, const std::string& message, int exit_code) {
+  const ErrorOn error(std::cerr);
+  const bool is_coloured = may_colour(STDERR_FILENO);
+  std::cerr << fmt::format("{}{}:{} {}\n", is_coloured ? "\x1b[1;31m" : "", words,
+                           is_coloured ? "\x1b[0m" : "", protocol::visible_lines(message));
+  return exit_code;
+}
+
+int carried_out(const std::string& words, const Command& command) {
   try {
     const int code = command();
     if (!std::cout.flush()) {
-      std::cerr << words << "standard output could not be written\n";
-      return kFailed;
+      return tell_error(words, "standard output could not be written", kFailed);
     }
     return code;
   } catch (const solver::InputError& error) {
-    std::cerr << words << protocol::visible_lines(error.what()) << '\n';
-    return kWrongUsage;
+    return tell_error(words, error.what(), kWrongUsage);
   } catch (const std::exception& error) {
     std::cout.flush();
-    std::cerr << words << protocol::visible_lines(error.what()) << '\n';
-    return kFailed;
+    return tell_error(words, error.what(), kFailed);
   }
+}
+
+int execute(CLI::App& app, const Command& command, const SpeechFlags& flags) {
+  const auto& verb = parsed_verb(app);
+  const bool verbose = flags.verbose || verb.count("--verbose") > 0;
+  if (flags.quiet && verbose) {
+    return wrong_usage(verb, "--quiet and --verbose want opposite things: give one of them");
+  }
+  const SpeechOf speech(std::cerr, flags.quiet ? Speech::kQuiet
+                                   : verbose   ? Speech::kVerbose
+                                               : Speech::kUsual);
+  const auto began = std::chrono::steady_clock::now();
+  tell_detail(std::cerr, fmt::format("{}, version {}", words_of(verb), solver::solver_version()));
+  const int code = carried_out(words_of(verb), command);
+  const std::chrono::duration<double> lasted = std::chrono::steady_clock::now() - began;
+  tell_detail(std::cerr, fmt::format("{} {} after {}", words_of(verb),
+                                     code == kDone ? "is done" : "has failed",
+                                     shown_duration(lasted.count())));
+  return code;
 }
 
 }  // namespace
@@ -140,12 +187,14 @@ int run_command_line(int argc, const char* const* argv) {
   app.get_formatter()->column_width(28);
   Command command;
   add_verbs(app, command);
+  SpeechFlags speech;
+  add_speech_flags(app, speech);
   protocol::refuse_empty_values(app);
   if (argc == 1) {
-    return wrong_usage(app, app, "no verb given, as in `oblique run STUDY.toml`");
+    return wrong_usage(app, "no verb given, as in `oblique run STUDY.toml`");
   }
   const int code = parse(app, argc, argv);
-  return command ? execute(app, command) : code;
+  return command ? execute(app, command, speech) : code;
 }
 
 }  // namespace oblique::client

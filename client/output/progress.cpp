@@ -20,10 +20,6 @@ int percent(const ProgressState& state) {
                                               static_cast<double>(state.points));
 }
 
-std::string shown_rate(double points_per_s) {
-  return solver::readable_number(points_per_s, 3);
-}
-
 std::optional<double> seconds_left(const ProgressState& state) {
   if (!state.points_per_s || *state.points_per_s <= 0.0) {
     return std::nullopt;
@@ -45,35 +41,13 @@ std::string first_characters(std::string_view text, std::size_t count) {
   return std::string(text.substr(0, bytes));
 }
 
-std::string two_units(std::int64_t large, const char* large_unit, std::int64_t small,
-                      const char* small_unit) {
-  return fmt::format("{} {} {:02} {}", large, large_unit, small, small_unit);
-}
-
 }  // namespace
 
-std::string shown_duration(double seconds) {
-  if (seconds < 9.95) {
-    return fmt::format("{} s", solver::fixed_number(std::max(seconds, 0.0), 1));
-  }
-  constexpr double kLongest_s = 1e12;
-  const auto whole = static_cast<std::int64_t>(std::llround(std::min(seconds, kLongest_s)));
-  if (whole < 60) {
-    return fmt::format("{} s", whole);
-  }
-  if (whole < 3600) {
-    return two_units(whole / 60, "min", whole % 60, "s");
-  }
-  if (whole < 86400) {
-    return two_units(whole / 3600, "h", whole % 3600 / 60, "min");
-  }
-  return two_units(whole / 86400, "d", whole % 86400 / 3600, "h");
-}
-
 std::string progress_bar(const ProgressState& state, std::size_t columns) {
-  std::string end = fmt::format(" {}/{} {} %", state.settled, state.points, percent(state));
+  std::string end = fmt::format(" {}/{} {} %", shown_count(state.settled),
+                                shown_count(state.points), percent(state));
   if (state.failed > 0) {
-    end += fmt::format(", {} failed", state.failed);
+    end += fmt::format(", {} failed", shown_count(state.failed));
   }
   if (state.points_per_s) {
     end += fmt::format(", {} points/s", shown_rate(*state.points_per_s));
@@ -99,10 +73,11 @@ std::string progress_bar(const ProgressState& state, std::size_t columns) {
 }
 
 std::string progress_line(const ProgressState& state) {
-  std::string text = fmt::format("{}: {} of {} points ({} %)", protocol::visible(state.study),
-                                 state.settled, state.points, percent(state));
+  std::string text =
+      fmt::format("{}: {} of {} points ({} %)", protocol::visible(state.study),
+                  shown_count(state.settled), shown_count(state.points), percent(state));
   if (state.failed > 0) {
-    text += fmt::format(", {} of them failed", state.failed);
+    text += fmt::format(", {} of them failed", shown_count(state.failed));
   }
   if (state.points_per_s) {
     text += fmt::format(", {} points/s", shown_rate(*state.points_per_s));

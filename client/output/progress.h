@@ -8,6 +8,8 @@
 #include <string>
 #include <utility>
 
+#include "client/output/human_units.h"
+
 namespace oblique::client {
 
 /// How far a study is.
@@ -26,9 +28,6 @@ std::string progress_bar(const ProgressState& state, std::size_t columns = 1000)
 
 /// "study: 5 of 10 points (50 %), 3.1 points/s, 2 s left", for logs.
 std::string progress_line(const ProgressState& state);
-
-/// A length of time for people: "0.4 s", "12 s", "3 min 05 s", "2 h 10 min", "3 d 4 h".
-std::string shown_duration(double seconds);
 
 /// Draws the progress of one study: a bar over itself on a terminal, else a plain line now and
 /// then. The clock is the caller's.

@@ -11,4 +11,8 @@ bool draws_on_terminal();
 /// change meanwhile.
 std::size_t terminal_columns();
 
+/// Whether what is written to that descriptor may have colours: it is a terminal that knows them,
+/// and NO_COLOR is not set.
+bool may_colour(int descriptor);
+
 }  // namespace oblique::client

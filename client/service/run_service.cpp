@@ -7,11 +7,13 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/output/human_units.h"
 #include "client/service/connection.h"
 #include "client/service/result_query.h"
 #include "client/service/watching.h"
 #include "proto/text.h"
 #include "worker/solver/model/errors.h"
+#include "worker/solver/model/version.h"
 
 namespace oblique::client {
 namespace {
@@ -35,6 +37,26 @@ void tell_of_log(const std::filesystem::path& database) {
   }
 }
 
+/// Why the rest of a study is not solved by the workers of this run, and what to do; empty: it is.
+std::string objection_to_waiting(const protocol::StudyStatus& status) {
+  const std::string own = solver::solver_version();
+  if (status.state() == "paused" && status.leased() == 0) {
+    return fmt::format("somebody has paused \"{}\": the same command again goes on with it",
+                       status.name());
+  }
+  if (status.state() != "running" || status.mixes_versions() || status.solver_version().empty() ||
+      status.solver_version() == own || status.leased() > 0) {
+    return {};
+  }
+  return fmt::format(
+      "the results of \"{0}\" are of solver {1}, and the workers here have {2}: nobody here may "
+      "solve "
+      "its other {3} points. Go on with --mix-versions, where each row says which solver it is of, "
+      "with workers of {1}, or under another name, as --name {0}-{2}",
+      status.name(), status.solver_version(), own,
+      shown_count(status.points() - status.solved() - status.failed()));
+}
+
 RunEnd submit_and_wait(const Study& study, const RunSettings& settings, EmbeddedService& service,
                        protocol::StopSignals& stop) {
   const auto look_after = [&] {
@@ -51,13 +73,16 @@ RunEnd submit_and_wait(const Study& study, const RunSettings& settings, Embedded
   const auto submitted = connection.submit(study, settings.terms);
   if (!submitted.created()) {
     std::cerr << fmt::format("Going on with \"{}\": {} of {} points are done.\n", study.name,
-                             submitted.settled(), submitted.points());
+                             shown_count(submitted.settled()), shown_count(submitted.points()));
   }
   const auto ask = [&](const Tell& tell) {
     look_after();
     const auto reply = connection.status(study.name, tell);
     if (reply.studies_size() != 1) {
       throw ServerError(fmt::format("the server no longer knows the study \"{}\"", study.name));
+    }
+    if (const auto reason = objection_to_waiting(reply.studies(0)); !reason.empty()) {
+      throw std::runtime_error(reason);
     }
     return reply.studies(0);
   };

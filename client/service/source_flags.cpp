@@ -3,10 +3,12 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <iostream>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/output/speech.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
 
@@ -83,6 +85,9 @@ ConnectionSettings connection_settings(const SourceFlags& flags) {
     settings.server_url = from_environment;
   }
   const std::string keys = flags.keys.empty() ? of_environment(kKeysVariable) : flags.keys;
+  tell_detail(std::cerr,
+              fmt::format("asks the server at {}{}", settings.server_url,
+                          keys.empty() ? std::string() : fmt::format(" with the key {}", keys)));
   if (!keys.empty()) {
     settings.key = protocol::read_key_file(keys);
   }
@@ -102,6 +107,7 @@ std::unique_ptr<Source> open_source(const SourceFlags& flags,
                                     Connection::KeepWaiting keep_waiting) {
   const auto database_timeout_ms = timeout_of(flags, DatabaseSettings().timeout_ms);
   if (const std::string database = database_meant(flags); !database.empty()) {
+    tell_detail(std::cerr, fmt::format("reads the database {} itself", database));
     return open_database(database, database_timeout_ms);
   }
   return open_server(connection_settings(flags), std::move(keep_waiting));

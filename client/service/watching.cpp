@@ -8,6 +8,7 @@
 
 #include "client/output/printer.h"
 #include "client/output/progress.h"
+#include "client/output/speech.h"
 #include "client/output/terminal.h"
 #include "client/service/watch_teller.h"
 #include "proto/program/exit_code.h"
@@ -29,7 +30,8 @@ Seconds pause_after(Seconds elapsed) {
 
 void tell_failures(const protocol::StudyStatus& status,
                    const std::function<protocol::QueryReply(const std::string&)>& query) {
-  std::cerr << fmt::format("{} of {} points failed:\n", status.failed(), status.points());
+  std::cerr << fmt::format("{} of {} points failed:\n", shown_count(status.failed()),
+                           shown_count(status.points()));
   const auto reasons = query(fmt::format(
       "SELECT error, count(*), min(point) FROM runs WHERE study = {} AND status = 'failed' "
       "GROUP BY error ORDER BY count(*) DESC LIMIT 10",
@@ -105,6 +107,7 @@ protocol::StudyStatus WatchedStudy::ask(const Tell& tell) {
 
 int tell_end(const protocol::StudyStatus& status,
              const std::function<protocol::QueryReply(const std::string&)>& query) {
+  const ErrorOn error(std::cerr);
   if (status.failed() > 0) {
     tell_failures(status, query);
   }

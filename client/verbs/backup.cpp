@@ -1,9 +1,12 @@
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <string>
+#include <system_error>
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/output/human_units.h"
 #include "client/service/source.h"
 #include "client/verbs/verbs.h"
 #include "server/care/backup.h"
@@ -31,7 +34,8 @@ int save_what_can_be_read(const BackupFlags& flags) {
   std::cerr << fmt::format(
       "{} has {} studies and {} results of {}; rows were passed over at {} places. A server that "
       "goes on with it solves again what is missing.\n",
-      flags.copy, saved.studies, saved.results, flags.database.file, saved.unreadable_places);
+      flags.copy, shown_count(saved.studies), shown_count(saved.results), flags.database.file,
+      shown_count(saved.unreadable_places));
   return kDone;
 }
 
@@ -40,7 +44,9 @@ int backup(const BackupFlags& flags) {
     return save_what_can_be_read(flags);
   }
   server::back_up(flags.database.file, flags.copy);
-  std::cerr << fmt::format("{} is a copy of {}.\n", flags.copy, flags.database.file);
+  std::error_code ignored;
+  std::cerr << fmt::format("{} is a copy of {}, {}.\n", flags.copy, flags.database.file,
+                           shown_bytes(std::filesystem::file_size(flags.copy, ignored)));
   return kDone;
 }
 

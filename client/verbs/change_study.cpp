@@ -4,6 +4,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/output/human_units.h"
 #include "client/service/connection.h"
 #include "client/service/source_flags.h"
 #include "client/verbs/verbs.h"
@@ -23,11 +24,12 @@ int change(const ChangeFlags& flags, protocol::StudyChange change) {
   const auto& status = reply.study();
   const std::string again =
       change == protocol::STUDY_CHANGE_RETRY
-          ? fmt::format(", {} failed ones to be solved again", reply.retried())
+          ? fmt::format(", {} failed ones to be solved again", shown_count(reply.retried()))
           : "";
   std::cout << fmt::format("{}: {}, {} of {} points done{}\n", protocol::visible(status.name()),
-                           protocol::visible(status.state()), status.solved() + status.failed(),
-                           status.points(), again);
+                           protocol::visible(status.state()),
+                           shown_count(status.solved() + status.failed()),
+                           shown_count(status.points()), again);
   return kDone;
 }
 

@@ -3,6 +3,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/output/speech.h"
 #include "client/service/source.h"
 #include "client/verbs/verbs.h"
 #include "proto/text.h"
@@ -31,6 +32,7 @@ int check(const DatabaseSettings& database) {
     std::cerr << fmt::format("{} is sound.\n", database.file);
     return kDone;
   }
+  const ErrorOn error(std::cerr);
   std::cerr << fmt::format(
       "{0} is damaged. What can be read is saved by:\n  oblique backup saved.db --db {0} "
       "--salvage\n",

@@ -15,6 +15,7 @@ namespace {
 
 constexpr const char* kKeygenExamples = R"(Examples:
   oblique keygen keys
+  oblique keygen /etc/oblique/keys
   oblique-server --listen '*' --keys keys/server.key        with worker.key on another machine:
   oblique-worker --server tcp://host:7601 --keys worker.key
   oblique status --server tcp://host:7600 --keys keys/client.key

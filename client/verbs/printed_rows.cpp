@@ -6,6 +6,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/output/columns.h"
+#include "client/output/speech.h"
 #include "proto/program/exit_code.h"
 
 namespace oblique::client {
@@ -21,6 +22,7 @@ int print_whole(const protocol::QueryReply& rows, Format format) {
   if (!rows.truncated()) {
     return protocol::kDone;
   }
+  const ErrorOn error(std::cerr);
   std::cerr << fmt::format(
       "Only the first {} rows: the server sends no more at once. Narrow it with WHERE and LIMIT, "
       "or "

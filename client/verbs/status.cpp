@@ -1,13 +1,19 @@
+#include <algorithm>
+#include <cstdint>
 #include <iostream>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include <spdlog/fmt/fmt.h>
+
+#include "client/output/human_units.h"
 #include "client/output/printer.h"
 #include "client/service/source_flags.h"
 #include "client/service/watching.h"
 #include "client/verbs/printed_rows.h"
 #include "client/verbs/verbs.h"
+#include "proto/text.h"
 
 namespace oblique::client {
 namespace {
@@ -30,9 +36,79 @@ void add_details(protocol::QueryReply& table, const std::vector<protocol::StudyS
                  const std::string& access) {
   table.add_columns("submitted_by");
   table.add_columns("access");
+  table.add_columns("solver_version");
+  table.add_columns("mixes_versions");
   for (int i = 0; i < table.rows_size(); ++i) {
     add_value(*table.mutable_rows(i), studies.at(static_cast<std::size_t>(i)).submitted_by());
     add_value(*table.mutable_rows(i), access);
+    add_value(*table.mutable_rows(i), studies.at(static_cast<std::size_t>(i)).solver_version());
+    add_value(*table.mutable_rows(i),
+              std::int64_t{studies.at(static_cast<std::size_t>(i)).mixes_versions() ? 1 : 0});
+  }
+}
+
+/// The solver of a study's results, or that it takes any.
+std::string version_of(const protocol::StudyStatus& study) {
+  return study.mixes_versions() ? "mixed" : study.solver_version();
+}
+
+int percent_done(const protocol::StudyStatus& study) {
+  // Rounded down: 100 % is said of nothing unfinished.
+  const auto done = static_cast<double>(study.solved() + study.failed());
+  return study.points() == 0 ? 100
+                             : static_cast<int>(100.0 * done / static_cast<double>(study.points()));
+}
+
+/// What people look for, in 80 columns; what a study waits for stands below, in sentences.
+protocol::QueryReply table_for_people(const std::vector<protocol::StudyStatus>& studies) {
+  constexpr std::size_t kNameBytes = 18;
+  const bool any_failed = std::any_of(studies.begin(), studies.end(),
+                                      [](const auto& study) { return study.failed() > 0; });
+  // A file does not say it.
+  const bool any_version = std::any_of(studies.begin(), studies.end(), [](const auto& study) {
+    return !version_of(study).empty();
+  });
+  protocol::QueryReply table;
+  for (const char* column : {"study", "state", "points", "done"}) {
+    table.add_columns(column);
+  }
+  if (any_failed) {
+    table.add_columns("failed");
+  }
+  for (const char* column : {"points/s", "prio", "weight"}) {
+    table.add_columns(column);
+  }
+  if (any_version) {
+    table.add_columns("solver");
+  }
+  for (const auto& study : studies) {
+    auto& row = *table.add_rows();
+    // With one study there is room for its name.
+    add_value(row,
+              studies.size() == 1 ? study.name() : protocol::shortened(study.name(), kNameBytes));
+    add_value(row, study.state());
+    add_value(row, shown_count(study.points()));
+    add_value(row, fmt::format("{} %", percent_done(study)));
+    if (any_failed) {
+      add_value(row, shown_count(study.failed()));
+    }
+    add_value(row, study.points_per_s() > 0 ? shown_rate(study.points_per_s()) : std::string());
+    add_value(row, static_cast<std::int64_t>(study.priority()));
+    add_value(row, study.weight());
+    if (any_version) {
+      add_value(row, version_of(study));
+    }
+  }
+  return table;
+}
+
+void print_for_people(const std::vector<protocol::StudyStatus>& studies, Format format) {
+  print_out(table_for_people(studies), format);
+  for (const auto& study : studies) {
+    if (!study.waits_for().empty()) {
+      std::cout << fmt::format("{} waits for {}.\n", protocol::visible(study.name()),
+                               protocol::visible(study.waits_for()));
+    }
   }
 }
 
@@ -40,11 +116,13 @@ int status(const StatusFlags& flags) {
   const auto format = format_named(flags.format);
   const auto source = open_source(flags.source);
   const auto studies = source->status(flags.study);
-  auto table = table_of(studies);
   tell_if_insecure(source->access(), source->place());
-  if (!is_for_people(format)) {
-    add_details(table, studies, source->access());
+  if (is_for_people(format)) {
+    print_for_people(studies, format);
+    return kDone;
   }
+  auto table = table_of(studies);
+  add_details(table, studies, source->access());
   print_out(table, format);
   return kDone;
 }

@@ -5,6 +5,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/output/human_units.h"
 #include "client/output/printer.h"
 #include "client/service/connection.h"
 #include "client/service/source_flags.h"
@@ -149,7 +150,7 @@ protocol::QueryReply table_for_people(const protocol::WorkersReply& reply) {
     add_value(row, static_cast<std::int64_t>(worker.threads()));
     add_value(row, worker.instruction_set());
     add_value(row, worker.solver_version());
-    add_value(row, solver::fixed_number(worker.points_per_s(), 1));
+    add_value(row, shown_rate(worker.points_per_s()));
     add_value(row, solver::fixed_number(worker.silent_ms() / kMillisecondsASecond, 1));
     add_value(row, state_of(worker));
     if (has_keys) {

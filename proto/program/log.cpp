@@ -105,8 +105,11 @@ std::unique_ptr<spdlog::formatter> formatter_for(const LogSettings& settings) {
 }  // namespace
 
 void set_up_log(const std::string& program, const LogSettings& settings) {
+  const char* no_colour = std::getenv("NO_COLOR");
+  const bool wants_none = no_colour != nullptr && *no_colour != '\0';
   auto logger = std::make_shared<spdlog::logger>(
-      program, std::make_shared<spdlog::sinks::stderr_color_sink_mt>());
+      program, std::make_shared<spdlog::sinks::stderr_color_sink_mt>(
+                   wants_none ? spdlog::color_mode::never : spdlog::color_mode::automatic));
   logger->set_formatter(formatter_for(settings));
   logger->set_level(spdlog::level::from_str(settings.level));
   spdlog::set_default_logger(std::move(logger));
