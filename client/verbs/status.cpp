@@ -65,9 +65,8 @@ protocol::QueryReply table_for_people(const std::vector<protocol::StudyStatus>& 
   const bool any_failed = std::any_of(studies.begin(), studies.end(),
                                       [](const auto& study) { return study.failed() > 0; });
   // A file does not say it.
-  const bool any_version = std::any_of(studies.begin(), studies.end(), [](const auto& study) {
-    return !version_of(study).empty();
-  });
+  const bool any_version = std::any_of(
+      studies.begin(), studies.end(), [](const auto& study) { return !version_of(study).empty(); });
   protocol::QueryReply table;
   for (const char* column : {"study", "state", "points", "done"}) {
     table.add_columns(column);

@@ -34,6 +34,10 @@ class PagingSource final : public Source {
     return reply;
   }
   std::vector<protocol::StudyStatus> status(const std::string&, const Tell&) override { return {}; }
+  std::vector<protocol::StudyStatus> status_of(const std::string&, std::uint64_t,
+                                               const Tell&) override {
+    return {};
+  }
   std::string place() const override { return "here"; }
 
   std::vector<std::string> statements;
