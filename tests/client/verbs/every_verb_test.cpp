@@ -211,6 +211,9 @@ TEST_F(EveryVerbThatReads, SuggestsTheNearestStudyAndFailsWithOneWhereAStudyIsNo
     if (rest.size() > 1) {
       words = with(words, {rest.begin() + 1, rest.end()});
     }
+    if (verb.help.find("\n  --yes") != std::string::npos) {
+      words.emplace_back("--yes");  // nobody can be asked here
+    }
     const auto outcome = test::run_oblique(folder_, words);
     EXPECT_EQ(outcome.exit_code, 1) << PrintToString(words) << outcome.err;
     EXPECT_THAT(outcome.err, HasSubstr("(did you mean `friction`?)")) << PrintToString(words);
