@@ -12,6 +12,13 @@
 
 namespace oblique::protocol {
 
+BlockKind block_kind(const Block& block) {
+  if (block.has_sample()) {
+    return BlockKind::kSample;
+  }
+  return block.zip() ? BlockKind::kZip : BlockKind::kProduct;
+}
+
 std::span<const Axis* const> model_axes(const Block& block) {
   return {block.axes().data(), static_cast<std::size_t>(block.axes_size()) - kPointKeyOrder.size()};
 }
@@ -38,6 +45,49 @@ std::uint64_t combinations(std::span<const Axis* const> axes) {
     count = checked_product(count, axis_size(*axis));
   }
   return count;
+}
+
+std::uint64_t points_of_block(const Block& block) {
+  if (block.has_sample()) {
+    if (block.sample().count() > kMaxPoints) {
+      throw_too_many_points();
+    }
+    return block.sample().count();
+  }
+  if (!block.zip()) {
+    return combinations({block.axes().data(), static_cast<std::size_t>(block.axes_size())});
+  }
+  std::uint64_t longest = 1;
+  for (const Axis& axis : block.axes()) {
+    longest = std::max(longest, axis_size(axis));
+  }
+  return checked_product(longest, 1);
+}
+
+std::vector<AxisLayout> layout_of(const Block& block) {
+  const BlockKind kind = block_kind(block);
+  std::vector<AxisLayout> layout;
+  for (const Axis& axis : block.axes()) {
+    layout.push_back({&axis, key_number(axis.key()), axis_size(axis), 1});
+    if (kind == BlockKind::kSample && is_drawn(axis)) {
+      layout.back().values = 0;
+    }
+  }
+  if (kind == BlockKind::kProduct) {
+    for (std::size_t i = layout.size(); i-- > 1;) {
+      layout[i - 1].stride = layout[i].stride * layout[i].values;
+    }
+  }
+  return layout;
+}
+
+bool is_drawn(const Axis& axis) {
+  return axis.has_distribution() || axis_size(axis) > 1;
+}
+
+bool is_plain_product(const Block& block) {
+  return block_kind(block) == BlockKind::kProduct && block.where().empty() &&
+         std::all_of(block.axes().begin(), block.axes().end(), has_own_values);
 }
 
 Block block_of(std::vector<Axis> axes) {

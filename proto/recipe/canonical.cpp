@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "proto/recipe/axes.h"
+#include "proto/recipe/expressions/expression_text.h"
 #include "proto/recipe/model_message.h"
 #include "proto/text.h"
 #include "worker/solver/model/number.h"
@@ -91,25 +92,34 @@ std::string model_fields(const solver::ModelParameters& model,
   return text;
 }
 
-/// The count of the range that has the listed values, or 0.
-std::uint64_t count_as_range(const Axis& axis) {
+/// The range that has the listed values, or one of no values.
+Axis as_range(const Axis& axis) {
   constexpr int kFewest = 3;  // two values are a range in any case
   if (axis.values_size() < kFewest || is_integrator(axis.key())) {
-    return 0;
+    return {};
   }
   Axis range;
   range.set_from(axis.values(0));
   range.set_to(axis.values(axis.values_size() - 1));
   range.set_count(static_cast<std::uint64_t>(axis.values_size()));
   if (!(range.from() < range.to())) {
-    return 0;
+    return {};
   }
-  for (int i = 1; i < axis.values_size(); ++i) {
-    if (axis.values(i) != axis_value(range, static_cast<std::uint64_t>(i))) {
-      return 0;
+  for (const Spacing spacing : {SPACING_LINEAR, SPACING_LOGARITHMIC}) {
+    if (spacing == SPACING_LOGARITHMIC && !(range.from() > 0.0)) {
+      break;
+    }
+    range.set_spacing(spacing);
+    const RangeValues values(range);
+    int i = 1;
+    while (i < axis.values_size() && axis.values(i) == values.at(static_cast<std::uint64_t>(i))) {
+      ++i;
+    }
+    if (i == axis.values_size()) {
+      return range;
     }
   }
-  return range.count();
+  return {};
 }
 
 /// Gathers text and gives it away in pieces.
@@ -134,20 +144,81 @@ class Pieces {
   std::string text_;
 };
 
+void write_range(const Axis& range, Pieces& out) {
+  out << number(range.from()) << ":" << number(range.to()) << ":" << std::to_string(range.count());
+  if (range.spacing() == SPACING_LOGARITHMIC) {
+    out << ":log";
+  }
+}
+
+void write_distribution(const Distribution& drawn, Pieces& out) {
+  const std::string from = drawn.has_from() ? number(drawn.from()) : "";
+  const std::string to = drawn.has_to() ? number(drawn.to()) : "";
+  switch (drawn.kind()) {
+    case DISTRIBUTION_NORMAL:
+      out << "normal(" << number(drawn.mean()) << "," << number(drawn.sd()) << "," << from << ","
+          << to << ")";
+      break;
+    case DISTRIBUTION_LOG_UNIFORM:
+      out << "log-uniform(" << from << "," << to << ")";
+      break;
+    default:
+      out << "uniform(" << from << "," << to << ")";
+  }
+}
+
+/// The tokens of an expression; of a text that is none, which nobody computes with, the text.
+std::string expression(const std::string& text) {
+  std::string bracketed("(");
+  try {
+    bracketed += expressions::read_expression(text).canonical;
+  } catch (const solver::InputError&) {
+    bracketed += text;
+  }
+  bracketed += ')';
+  return bracketed;
+}
+
 /// An axis counts by its values: equally spaced ones are a range however they were written.
 void write_axis(const Axis& axis, Pieces& out) {
+  constexpr std::uint64_t kFewest = 3;  // two values are a range in any case
   out << " " << axis.key() << "=";
-  const std::uint64_t listed_range = axis.count() == 0 ? count_as_range(axis) : 0;
-  const std::uint64_t count = axis.count() > 2 ? axis.count() : listed_range;
-  if (count > 0) {
-    const std::uint64_t last = axis_size(axis) - 1;
-    out << number(axis_value(axis, 0)) << ":" << number(axis_value(axis, last)) << ":"
-        << std::to_string(count);
+  if (axis.has_distribution()) {
+    write_distribution(axis.distribution(), out);
+    return;
+  }
+  if (!axis.expression().empty()) {
+    out << expression(axis.expression());
+    return;
+  }
+  if (const Axis range = axis.count() == 0 ? as_range(axis) : axis; range.count() >= kFewest) {
+    write_range(range, out);
     return;
   }
   for (std::uint64_t i = 0; i < axis_size(axis); ++i) {
     out << (i == 0 ? "" : ",") << value_of(axis.key(), axis_value(axis, i));
   }
+}
+
+void write_block(const Block& block, Pieces& out) {
+  out << "block";
+  if (block.has_sample()) {
+    const Sample& sample = block.sample();
+    out << " sample="
+        << (sample.kind() == SAMPLE_SOBOL             ? "sobol"
+            : sample.kind() == SAMPLE_LATIN_HYPERCUBE ? "latin-hypercube"
+                                                      : "random")
+        << ":" << std::to_string(sample.count()) << ":" << std::to_string(sample.seed());
+  } else if (block.zip()) {
+    out << " zip";
+  }
+  for (const Axis& axis : block.axes()) {
+    write_axis(axis, out);
+  }
+  if (!block.where().empty()) {
+    out << " where=" << expression(block.where());
+  }
+  out << "\n";
 }
 
 [[noreturn]] void throw_not_canonical() {
@@ -216,11 +287,7 @@ void write_canonical(const Recipe& recipe, const std::function<void(std::string_
     out << kErrorsLine;
   }
   for (const Block& block : recipe.blocks()) {
-    out << "block";
-    for (const Axis& axis : block.axes()) {
-      write_axis(axis, out);
-    }
-    out << "\n";
+    write_block(block, out);
   }
   out.finish();
 }

@@ -1,5 +1,7 @@
 #include "proto/recipe/keys.h"
 
+#include <array>
+#include <utility>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
@@ -11,14 +13,61 @@ namespace oblique::protocol {
 namespace {
 
 constexpr std::size_t kLongestQuoted = 64;
+constexpr std::string_view kSingleLength = "length";
+
+/// "length1", "length2", ... where it stays.
+template <std::size_t link>
+struct LengthName {
+  static constexpr std::size_t kDigits = link + 1 < 10 ? 1 : 2;
+  static constexpr auto text = [] {
+    std::array<char, kSingleLength.size() + kDigits> name{};
+    kSingleLength.copy(name.data(), kSingleLength.size());
+    std::size_t rest = link + 1;
+    for (std::size_t i = name.size(); i > kSingleLength.size(); --i, rest /= 10) {
+      name[i - 1] = static_cast<char>('0' + rest % 10);
+    }
+    return name;
+  }();
+};
+
+template <std::size_t link>
+constexpr solver::ParameterKey length_key() {
+  const auto& name = LengthName<link>::text;
+  return {{name.data(), name.size()},
+          "m",
+          "length of one link, counted from the pin",
+          "> 0",
+          [](double value) { return value > 0.0; },
+          [](const solver::ModelParameters& m) {
+            return link < m.lengths_m.size() ? m.lengths_m[link] : 0.0;
+          },
+          [](solver::ModelParameters& m, double value) {
+            if (link < m.lengths_m.size()) {
+              m.lengths_m[link] = value;
+            }
+          }};
+}
+
+template <std::size_t... links>
+constexpr std::array<solver::ParameterKey, sizeof...(links)> length_keys(
+    std::index_sequence<links...>) {
+  return {length_key<links>()...};
+}
+
+constexpr auto kLengthKeys = length_keys(std::make_index_sequence<kMostLinks>());
 
 std::vector<std::string_view> all_keys() {
   std::vector<std::string_view> names;
   for (const auto& key : solver::model_keys()) {
     names.push_back(key.name);
   }
+  names.insert(names.end(), {kLengthKeys[0].name, kLengthKeys[1].name, kLengthKeys[2].name, "..."});
   names.insert(names.end(), kPointKeyOrder.begin(), kPointKeyOrder.end());
   return names;
+}
+
+std::size_t first_point_key() {
+  return solver::model_keys().size() + kMostLinks;
 }
 
 }  // namespace
@@ -37,7 +86,14 @@ std::size_t key_number(std::string_view name) {
   }
   for (std::size_t i = 0; i < kPointKeyOrder.size(); ++i) {
     if (name == kPointKeyOrder[i]) {
-      return model_keys.size() + i;
+      return first_point_key() + i;
+    }
+  }
+  if (name.starts_with(kSingleLength)) {
+    for (std::size_t link = 0; link < kMostLinks; ++link) {
+      if (name == kLengthKeys[link].name) {
+        return model_keys.size() + link;
+      }
     }
   }
   if (name == "preset" || name == "lengths") {
@@ -51,12 +107,25 @@ std::size_t key_number(std::string_view name) {
 
 const solver::ParameterKey& key_numbered(std::size_t number) {
   const auto model_keys = solver::model_keys();
+  if (const auto link = link_of_key(number)) {
+    return kLengthKeys.at(*link);
+  }
   return number < model_keys.size() ? model_keys[number]
-                                    : solver::point_keys()[number - model_keys.size()];
+                                    : solver::point_keys()[number - first_point_key()];
 }
 
 std::size_t key_count() {
-  return solver::model_keys().size() + kPointKeyOrder.size();
+  return first_point_key() + kPointKeyOrder.size();
+}
+
+bool is_point_key(std::size_t number) {
+  return number >= first_point_key();
+}
+
+std::optional<std::size_t> link_of_key(std::size_t number) {
+  const std::size_t first = solver::model_keys().size();
+  return number >= first && number < first_point_key() ? std::optional(number - first)
+                                                       : std::nullopt;
 }
 
 const solver::ParameterKey& axis_key(std::string_view name) {

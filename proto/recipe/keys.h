@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -9,8 +10,12 @@
 
 namespace oblique::protocol {
 
-/// Keys of axes have numbers: those of a model in the order of listings and, after them, H, mu and
-/// e. Throws InputError for an unknown one, with the nearest and the list of all.
+/// Most links of a model, and so most single lengths.
+inline constexpr std::size_t kMostLinks = 64;
+
+/// Keys of axes have numbers: those of a model in the order of listings, then the single lengths
+/// `length1`, `length2`, ..., of the links from the pin outwards, then H, mu and e. Throws
+/// InputError for an unknown one, with the nearest and the list of all.
 std::size_t key_number(std::string_view name);
 
 /// The key of that number, and how many there are.
@@ -19,6 +24,13 @@ std::size_t key_count();
 
 /// The model or point key called `name`. Throws as `key_number` does.
 const solver::ParameterKey& axis_key(std::string_view name);
+
+/// Whether the key of that number belongs to the point, as H, mu and e do, and not to its model.
+bool is_point_key(std::size_t number);
+
+/// The link, from 0, whose length the key of that number is; nothing for all other keys. Single
+/// lengths act on what `links` and `length` have made.
+std::optional<std::size_t> link_of_key(std::size_t number);
 
 /// A key from outside that is none, for the beginning of a sentence, with the nearest of `known`:
 /// "unknown key `muu` (did you mean `mu`?)". Long ones only by their length.

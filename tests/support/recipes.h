@@ -48,6 +48,66 @@ inline Axis range(const std::string& key, double from, double to, std::uint64_t 
   return axis;
 }
 
+/// The same with equal ratios.
+inline Axis log_range(const std::string& key, double from, double to, std::uint64_t count) {
+  Axis axis = range(key, from, to, count);
+  axis.set_spacing(SPACING_LOGARITHMIC);
+  return axis;
+}
+
+/// An axis whose value follows from others.
+inline Axis following(const std::string& key, const std::string& expression) {
+  Axis axis;
+  axis.set_key(key);
+  axis.set_expression(expression);
+  return axis;
+}
+
+/// An axis of a sample, drawn between two values with equal chances.
+inline Axis uniform(const std::string& key, double from, double to) {
+  Axis axis;
+  axis.set_key(key);
+  axis.mutable_distribution()->set_from(from);
+  axis.mutable_distribution()->set_to(to);
+  return axis;
+}
+
+/// The points of a block of these axes, filtered by `where`.
+inline Block filtered(const std::vector<Axis>& axes, const std::string& where) {
+  Block block;
+  for (const Axis& axis : axes) {
+    *block.add_axes() = axis;
+  }
+  block.set_where(where);
+  return block;
+}
+
+/// A block whose axes go side by side.
+inline Block zipped(const std::vector<Axis>& axes) {
+  Block block = filtered(axes, "");
+  block.set_zip(true);
+  return block;
+}
+
+/// A sample of `count` points.
+inline Block sampled(const std::vector<Axis>& axes, SampleKind kind, std::uint64_t count,
+                     std::uint64_t seed = 1) {
+  Block block = filtered(axes, "");
+  block.mutable_sample()->set_kind(kind);
+  block.mutable_sample()->set_count(count);
+  block.mutable_sample()->set_seed(seed);
+  return block;
+}
+
+/// A recipe of the given blocks, without a model.
+inline Recipe recipe_of_blocks(const std::vector<Block>& blocks) {
+  Recipe recipe;
+  for (const Block& block : blocks) {
+    *recipe.add_blocks() = block;
+  }
+  return recipe;
+}
+
 /// A recipe of the given blocks, each a list of axes, without a model.
 inline Recipe recipe_of(const std::vector<std::vector<Axis>>& blocks) {
   Recipe recipe;
