@@ -134,9 +134,17 @@ void BatchSolver::work(const std::stop_token& stop) {
 }
 
 std::optional<std::uint64_t> BatchSolver::next_point(Task& task, const std::stop_token& stop) {
-  if (task.next < task.end) {
-    return task.next++;
-  }
+  do {
+    task.next = task.batch->batch.points->first_left_in(task.next, task.end);
+    if (task.next < task.end) {
+      return task.next++;
+    }
+  } while (take_more(task, stop));
+  return std::nullopt;
+}
+
+/// Takes the next part of the batch, in which a filter may leave nothing. False when none is left.
+bool BatchSolver::take_more(Task& task, const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   hand_on(task);
   OpenBatch& open = *task.batch;
@@ -146,7 +154,7 @@ std::optional<std::uint64_t> BatchSolver::next_point(Task& task, const std::stop
   }
   const std::uint64_t left = open.batch.count - open.given;
   if (open.dropped || stop.stop_requested() || left == 0) {
-    return std::nullopt;
+    return false;
   }
   // Ever smaller tasks towards the end, so that the threads finish together.
   const std::uint64_t count =
@@ -154,7 +162,7 @@ std::optional<std::uint64_t> BatchSolver::next_point(Task& task, const std::stop
   task.next = open.batch.first_point + open.given;
   task.end = task.next + count;
   open.given += count;
-  return task.next++;
+  return true;
 }
 
 void BatchSolver::take(Task& task, protocol::PointResult&& result) {

@@ -280,9 +280,10 @@ void Conversation::on(const protocol::Batch& batch) {
   }
   backoff_ms_ = 0;
   const std::uint64_t number = next_batch_++;
-  held_[number] = {batch.study_id(), batch.lease_id(), batch.attempt(), batch.count()};
+  const std::uint64_t points = points_to_solve(*study->second, batch.first_point(), batch.count());
+  held_[number] = {batch.study_id(), batch.lease_id(), batch.attempt(), points};
   leaving_.note_work(now_ms_);
-  leaving_.note_batch({batch.study_id(), batch.count()});
+  leaving_.note_batch({batch.study_id(), points});
   effects_.emplace_back(
       Solve{{number, batch.study_id(), batch.first_point(), batch.count(), study->second}});
   give_back_what_takes_too_long();

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <exception>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -45,8 +46,12 @@ std::vector<solver::ModelParameters> models_ahead(const Batch& batch, std::uint6
     if (models.empty() || !(models.back() == model)) {
       models.push_back(std::move(model));
     }
-    point = segment.first_point + segment.count;
-    if (point >= end) {
+    const std::uint64_t segment_end = segment.first_point + segment.count;
+    if (segment_end >= end) {
+      break;
+    }
+    point = batch.points->first_left_in(segment_end, end);
+    if (point == end) {
       break;
     }
   }
@@ -110,6 +115,9 @@ class PointSolver::BatchPoints {
   template <class FallOf>
   std::optional<solver::FingerPoint> point_of(std::uint64_t number, const FallOf& fall_of) {
     try {
+      if (const std::string fault = batch_.points->fault(number); !fault.empty()) {
+        throw solver::InputError(fault);
+      }
       const protocol::Point point = batch_.points->point(number);
       if (!finger_ || point.model != model_) {
         finger_.reset();

@@ -160,7 +160,9 @@ protocol::ClientReply Connection::answer_to(const protocol::ClientRequest& reque
       if (!reply->has_still_working()) {
         return *std::move(reply);
       }
-      note_word(outstanding, reply->still_working(), tell != nullptr || request.has_trace());
+      // A trace may take long, and so may the points of a study, each of which is looked at.
+      const bool may_take_long = tell || request.has_trace() || request.has_submit();
+      note_word(outstanding, reply->still_working(), may_take_long);
     }
     if (tell && !said_silent && Clock::now() - outstanding.heard > kSilence) {
       tell(fmt::format("no answer from {} for {}: waiting until it is back", settings_.server_url,

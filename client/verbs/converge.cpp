@@ -53,7 +53,8 @@ struct ConvergeFlags {
 
 std::vector<ContactPoint> points_of(const protocol::PointTable& table) {
   std::vector<ContactPoint> points;
-  for (std::uint64_t i = 0; i < table.size(); ++i) {
+  for (std::uint64_t i = table.first_left_in(0, table.size()); i < table.size();
+       i = table.first_left_in(i + 1, table.size())) {
     const auto point = table.point(i);
     points.push_back({point.H_m, point.mu, point.e_star});
   }

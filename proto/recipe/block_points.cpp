@@ -8,6 +8,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/keys.h"
+#include "proto/text.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::protocol {
@@ -42,6 +43,12 @@ auto named(const std::string& what, Make make) {
 
 }  // namespace
 
+std::string expression_in_words(std::string_view key, const std::string& text) {
+  constexpr std::size_t kLongest = 80;
+  const std::string shown = shortened(visible(text), kLongest);
+  return fmt::format("{} = \"{}{}\"", key, shown, shown.size() < text.size() ? "..." : "");
+}
+
 sampling::Distribution distribution_of(const Axis& axis) {
   const Distribution& drawn = axis.distribution();
   const double from = smallest_value(axis);
@@ -74,12 +81,14 @@ BlockPoints::BlockPoints(const solver::ModelParameters& base, const Block& block
   for (std::size_t i = 0; i < axes; ++i) {
     const Axis& axis = block.axes(static_cast<int>(i));
     if (follows(axis)) {
-      formulas.push_back(named(axis.key(), [&] { return formula_of(axis.expression(), i); }));
+      formulas.push_back(named(expression_in_words(axis.key(), axis.expression()),
+                               [&] { return formula_of(axis.expression(), i); }));
     }
   }
   put_in_order(std::move(formulas));
   if (!block.where().empty()) {
-    filter_.emplace(named("where", [&] { return formula_of(block.where(), kNoAxis); }));
+    filter_.emplace(named(expression_in_words("where", block.where()),
+                          [&] { return formula_of(block.where(), kNoAxis); }));
   }
   points_ = points_of_block(block);
   count_models();

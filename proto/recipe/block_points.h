@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "proto/oblique.pb.h"
@@ -20,6 +21,9 @@ namespace oblique::protocol {
 /// What an axis with a distribution is drawn from. Of one that was judged, or whose distribution is
 /// sound but for its ends' being allowed.
 sampling::Distribution distribution_of(const Axis& axis);
+
+/// For the beginning of a sentence: `I = "A^2 / (4 * pi)"`.
+std::string expression_in_words(std::string_view key, const std::string& text);
 
 /// The points of one block of any kind, one after another: its values by the number of the point
 /// alone. Not thread-safe, and no part of it outlives the block.

@@ -174,11 +174,15 @@ void check_distribution(const solver::ParameterKey& key, const Axis& axis) {
   }
 }
 
+/// Of the text and of what it names; whether it makes an expression shows in its block.
 void check_expression(const Axis& axis) {
   try {
-    expressions::read_expression(axis.expression());
+    for (const std::string& name : expressions::read_expression(axis.expression()).names) {
+      key_number(name);
+    }
   } catch (const InputError& fault) {
-    throw InputError(fmt::format("{}: {}", axis.key(), fault.what()));
+    throw InputError(
+        fmt::format("{}: {}", expression_in_words(axis.key(), axis.expression()), fault.what()));
   }
 }
 

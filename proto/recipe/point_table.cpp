@@ -112,6 +112,9 @@ PointTable::PointTable(Recipe recipe) : recipe_(std::make_unique<Recipe>(std::mo
       check_block(base_model_, block);
       add_block(block);
     } catch (const solver::InputError& error) {
+      if (recipe_->blocks_size() == 1) {
+        throw;
+      }
       throw solver::InputError(of_block(*recipe_, blocks_.size(), error.what()));
     }
   }
@@ -270,7 +273,7 @@ bool PointTable::is_left_in(std::uint64_t index) const {
 }
 
 std::uint64_t PointTable::first_left_in(std::uint64_t begin, std::uint64_t end) const {
-  while (begin < end) {
+  while (has_filter_ && begin < end) {
     const std::size_t block = block_of_point(begin);
     if (message(block).where().empty()) {
       return begin;
@@ -292,7 +295,7 @@ std::uint64_t PointTable::first_left_in(std::uint64_t begin, std::uint64_t end) 
     }
     begin = block_end;
   }
-  return end;
+  return std::min(begin, end);
 }
 
 std::string PointTable::fault(std::uint64_t index) const {
@@ -325,6 +328,9 @@ bool PointTable::survey(const std::function<bool()>& goes_on) {
         return false;
       }
     } catch (const solver::InputError& error) {
+      if (recipe_->blocks_size() == 1) {
+        throw;
+      }
       throw solver::InputError(of_block(*recipe_, i, error.what()));
     }
   }
@@ -359,7 +365,7 @@ bool PointTable::survey_block(std::size_t number, const std::function<bool()>& g
   }
   if (has_filter) {
     if (left_in == 0) {
-      throw solver::InputError("where = \"" + block.where() + "\" leaves no point in");
+      throw solver::InputError(expression_in_words("where", block.where()) + " leaves no point in");
     }
     block.set_points_left_in(left_in);
   }

@@ -157,6 +157,9 @@ class StudyCheck {
 
   /// Whether H, mu, e and model are the recipe's.
   std::string fault_of_place(const protocol::PointTable& table, std::uint64_t number) {
+    if (!table.is_left_in(number)) {
+      return "the study's filter leaves it out, and it has a row";
+    }
     const protocol::Point point = table.point(number);
     const std::pair<const char*, double> expected[]{
         {"H", point.H_m}, {"mu", point.mu}, {"e", point.e_star}};
@@ -207,9 +210,9 @@ void check_studies(sqlite3* database, int schema, Found& found) {
         throw std::runtime_error("its bytes are damaged");
       }
       const protocol::PointTable table(std::move(recipe));
-      if (table.size() != static_cast<std::uint64_t>(studies.integer(3))) {
+      if (table.points() != static_cast<std::uint64_t>(studies.integer(3))) {
         found.add("study " + name + ": it has " + std::to_string(studies.integer(3)) +
-                  " points, and " + std::to_string(table.size()) + " by its recipe");
+                  " points, and " + std::to_string(table.points()) + " by its recipe");
       }
       check.run(studies.integer(0), name, table, found);
     } catch (const StorageError&) {

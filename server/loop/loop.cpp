@@ -16,8 +16,8 @@
 #include "proto/frames.h"
 #include "server/database/shared_disk.h"
 #include "server/doors/doors.h"
-#include "server/network/network.h"
 #include "server/loop/report_box.h"
+#include "server/network/network.h"
 
 namespace oblique::server {
 namespace {
@@ -119,6 +119,7 @@ class Loop::Parts final : public Outbox {
       take_reports();
       has_more = take_worker_messages();
       has_more = take_client_messages() || has_more || network_.has_more();
+      has_more = service_->go_on_searching(now()) || has_more;
       note_departures();
       if (Clock::now() >= next_tick) {
         service_->tick(now());
@@ -158,6 +159,7 @@ class Loop::Parts final : public Outbox {
   bool query(QueryJob job) override { return queries_.submit(std::move(job)); }
   void cancel_query(std::uint64_t ticket) override { queries_.cancel(ticket); }
   void read(ReadJob job) override { reader_.submit(std::move(job)); }
+  void cancel_read(std::uint64_t ticket) override { reader_.cancel(ticket); }
   PeerCounts peer_counts() const override {
     PeerCounts counts;
     for (const auto& [key, share] : network_.key_shares().all()) {

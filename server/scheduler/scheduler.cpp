@@ -8,6 +8,7 @@ namespace oblique::server {
 std::vector<Effect> Scheduler::handle(const Event& event, std::int64_t now_ms) {
   now_ms_ = std::max(now_ms_, now_ms);
   effects_.clear();
+  looks_left_ = settings_.most_looks;
   seeks_stragglers_ = std::holds_alternative<Tick>(event);
   std::visit([this](const auto& e) { on(e); }, event);
   dispatch();
@@ -148,7 +149,7 @@ void Scheduler::on(const FailuresForgotten& event) {
 
 void Scheduler::on(const StudyGrown& event) {
   const auto found = studies_.find(event.study);
-  if (found == studies_.end() || event.table.size() <= found->second.points.size()) {
+  if (found == studies_.end() || event.table.numbers() <= found->second.points.numbers()) {
     return;
   }
   Study& study = found->second;
@@ -176,6 +177,7 @@ void Scheduler::on(const StudyRemoved& event) {
   std::erase_if(condemned_, [&](const Condemned& point) { return point.study == event.study; });
   processes_.forget_study(event.study);
   queue_.put(event.study, {});
+  searching_.erase(event.study);
   studies_.erase(event.study);
   ready_workers_.wake_all();  // suspect points of it may have kept some from others
 }
@@ -187,10 +189,12 @@ double Scheduler::least_served(StudyId but) const {
 }
 
 StudyQueue::Place Scheduler::place_of(const Study& study) const {
-  if (!study.has_work()) {
+  const bool has_free =
+      study.points.has_free() && (!study.searches || study.points.has(Standing::kSound));
+  if (!study.is_open() || !(has_free || study.has_suspect())) {
     return {};
   }
-  return {study.points.has_free(), study.has_suspect(), study.terms.priority, study.served,
+  return {has_free, study.has_suspect(), study.terms.priority, study.served,
           study.terms.mixes_versions ? std::string() : study.solver_version};
 }
 

@@ -80,6 +80,9 @@ class Scheduler {
   /// that the table names.
   std::vector<Effect> handle(const Event& event, std::int64_t now_ms);
 
+  /// Workers wait for points of a study of which nobody knows yet where the next is that its filter
+  /// leaves in: say SearchGoesOn as soon as nothing else waits.
+  bool is_searching() const { return !searching_.empty() && !held_ && ready_workers_.size() > 0; }
   bool knows_worker(WorkerId worker) const { return workers_.contains(worker); }
   bool knows_study(StudyId study) const { return studies_.contains(study); }
   std::size_t workers() const { return workers_.size(); }
@@ -128,6 +131,7 @@ class Scheduler {
     LeaseIndex leases{};
     bool held = false;
     bool overlaps = false;  ///< a point of it may be under several of these leases
+    bool searches = false;  ///< for its next point that its filter leaves in
 
     bool is_open() const { return !cancelled && !paused && !finished && !held; }
     bool has_suspect() const {
@@ -190,6 +194,7 @@ class Scheduler {
   void on(const WorkerUnreachable& event);
   void on(const WorkerBusy& event);
   void on(const DispatchHeld& event);
+  void on(const SearchGoesOn& event);
   void on(const Tick& event);
 
   enum class WorkerEnd { kLeft, kReplaced, kLost };
@@ -228,6 +233,7 @@ class Scheduler {
   bool serve_straggler(WorkerId id, Worker& worker);
   bool is_straggling(const Lease& lease, const Worker& helper) const;
   static bool admits(const Study& study, const Worker& worker);
+  void set_searching(StudyId id, bool searches);
   StudyId next_free_study(const Worker& worker) const;
   double least_served(StudyId but) const;
   StudyId next_suspect_study(const Worker& worker) const;
@@ -258,6 +264,9 @@ class Scheduler {
   std::map<std::string, std::size_t> versions_;  // workers by solver version
   std::size_t draining_ = 0;                     // workers
   std::uint64_t looks_ = 0;
+  std::set<StudyId> searching_;
+  StudyId searched_last_ = 0;
+  std::uint64_t looks_left_ = 0;  // at points, whether they are left in; of the event being handled
   // By solver version, of its workers, and of all under the empty one; emptied when it may change.
   mutable std::map<std::string, std::optional<std::int64_t>> longest_proven_since_ms_;
   std::uint64_t threads_ = 0;

@@ -28,6 +28,33 @@ void Scheduler::dispatch() {
   }
 }
 
+/// While a study looks for its next point that is left in, others get the workers.
+void Scheduler::set_searching(StudyId id, bool searches) {
+  studies_.at(id).searches = searches;
+  if (searches) {
+    searching_.insert(id);
+  } else {
+    searching_.erase(id);
+  }
+}
+
+/// Each study in turn looks at as many points as an event has room for.
+void Scheduler::on(const SearchGoesOn& /*event*/) {
+  if (searching_.empty()) {
+    return;
+  }
+  const auto after = searching_.upper_bound(searched_last_);
+  const StudyId id = after == searching_.end() ? *searching_.begin() : *after;
+  searched_last_ = id;
+  Study& study = studies_.at(id);
+  // One that is not open does not search; it begins anew when it goes on.
+  if (!study.is_open() || study.points.search(looks_left_) || !study.points.has_free()) {
+    set_searching(id, false);
+    finish_if_complete(id);
+    requeue(id);
+  }
+}
+
 bool Scheduler::serve(WorkerId id, Worker& worker) {
   if (worker.is_busy) {
     return false;
@@ -62,11 +89,19 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
     return seeks_stragglers_ && serve_straggler(id, worker);
   }
   const Portion wanted = portion_for(worker, study, true);
-  if (const auto batch = studies_.at(study).points.take(wanted)) {
+  StudyPoints& points = studies_.at(study).points;
+  // With few looks left a batch would be small: it is cut in the next event.
+  const bool is_short = points.has_filter() && !points.has(Standing::kSound) &&
+                        looks_left_ < settings_.most_looks / 2;
+  if (const auto batch = is_short ? std::nullopt : points.take(wanted, looks_left_)) {
     grant(id, worker, study, *batch, false);
     // What ended before says nothing of how much the worker can do.
     auto& fit_for = worker.paces.at(study).last_batch_points;
     fit_for = std::max(fit_for, wanted.points);
+  } else {
+    set_searching(study, points.has_free());
+    finish_if_complete(study);
+    requeue(study);
   }
   return true;
 }
@@ -77,7 +112,7 @@ bool Scheduler::serve_suspect(WorkerId id, Worker& worker) {
   set_draining(worker, false);
   // The sooner these are known to be sound, the better: its lanes may stay empty.
   const Portion wanted = portion_for(worker, id_of_study, false);
-  if (const auto batch = study.points.take(*suspect_for(study, worker), wanted)) {
+  if (const auto batch = study.points.take(*suspect_for(study, worker), wanted, looks_left_)) {
     grant(id, worker, id_of_study, *batch, true);
   }
   return true;
@@ -104,7 +139,7 @@ bool Scheduler::serve_straggler(WorkerId id, Worker& worker) {
       study.points.leased_set().within(straggler.batch.first_point, straggler.batch.end());
   study.overlaps = true;
   const Batch rest{left.front().begin, left.back().end - left.front().begin,
-                   straggler.batch.attempts + 1, straggler.batch.losses};
+                   straggler.batch.attempts + 1, straggler.batch.losses, size_of(left)};
   const LeaseId twin = grant(id, worker, straggler.study, rest, false);
   straggler.twin = twin;
   leases_.at(twin).twin = longest->first;
@@ -127,7 +162,7 @@ bool Scheduler::is_straggling(const Lease& lease, const Worker& helper) const {
     const auto pace = judge->paces.find(lease.study);
     if (pace != judge->paces.end() && pace->second.s_per_point() > 0.0) {
       const double expected_ms = 1e3 * pace->second.s_per_point() *
-                                 static_cast<double>(lease.batch.count) / judge->threads;
+                                 static_cast<double>(lease.batch.points) / judge->threads;
       return static_cast<double>(age_ms) > settings_.straggler_factor * expected_ms;
     }
   }
@@ -245,12 +280,12 @@ LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Batch
   // A study may have grown since the worker was told of it.
   std::uint64_t& told_points = worker.defined[study];
   if (told_points < batch.end()) {
-    told_points = studies_.at(study).points.size();
+    told_points = studies_.at(study).points.numbers();
     effects_.emplace_back(DefineStudy{id, study});
   }
   Study& served = studies_.at(study);
   Pace& pace = worker.paces[study];
-  const double takes_s = pace.s_per_point() * static_cast<double>(batch.count) / worker.threads;
+  const double takes_s = pace.s_per_point() * static_cast<double>(batch.points) / worker.threads;
   // Whatever a worker says of its pace, no batch is to make its study wait for ever.
   const double counted_s = std::clamp(takes_s, target_s(), settings_.lanes_batch_s + target_s());
   served.served += counted_s / target_s() / served.terms.weight;
@@ -262,9 +297,9 @@ LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Batch
   served.leases.insert(lease, batch);
   worker.leases.insert(lease);
   --worker.credit;
-  pace.last_batch_points = batch.count;
+  pace.last_batch_points = batch.points;
   pace.last_end = batch.end();
-  pace.held_points += batch.count;
+  pace.held_points += batch.points;
   requeue(study);
   effects_.emplace_back(
       SendBatch{id, study, batch.first_point, batch.count, batch.attempts + 1, lease});

@@ -58,6 +58,9 @@ struct SchedulerSettings {
   std::size_t newcomer_batches = 2;          ///< are with a worker that has solved nothing yet
   std::size_t most_absent_processes = 1024;  ///< are remembered, of newcomers and of others each
   std::uint32_t max_credit = 1024;           ///< batches a worker may ask for at a time
+  /// So many points are looked at in one event, whether a filter leaves them in: about a
+  /// millisecond.
+  std::uint64_t most_looks = 2048;
   /// Leases are numbered from here. A server that restarts begins above all earlier numbers, so
   /// that results of an earlier run never close a lease of this one.
   LeaseId first_lease_id = 1;
@@ -185,6 +188,8 @@ struct WorkerBusy {
 struct DispatchHeld {
   bool held;
 };
+/// There is time to look for points that a filter leaves in.
+struct SearchGoesOn {};
 /// Time has passed.
 struct Tick {};
 
@@ -192,7 +197,7 @@ using Event =
     std::variant<StudyAdded, StudyHeld, PointsTaken, StudyCancelled, StudyPaused, StudyReopened,
                  StudyTermsChanged, FailuresForgotten, StudyGrown, StudyRemoved, WorkerJoined,
                  CreditGiven, ResultsReceived, ResultsStored, HeartbeatReceived, BatchesReturned,
-                 WorkerLeft, WorkerUnreachable, WorkerBusy, DispatchHeld, Tick>;
+                 WorkerLeft, WorkerUnreachable, WorkerBusy, DispatchHeld, SearchGoesOn, Tick>;
 
 // ---- Effects ----------------------------------------------------------------------------------
 

@@ -25,7 +25,8 @@ void Scheduler::check_invariants() const {
             "a lease has no worker");
     require(studies_.contains(lease.study), "a lease has no study");
     require(!lease.alone || worker->second.leases.size() == 1, "a suspect lease is not alone");
-    require(lease.batch.count > 0 && id < next_lease_, "a lease is malformed");
+    require(lease.batch.points > 0 && lease.batch.points <= lease.batch.count && id < next_lease_,
+            "a lease is malformed");
     IntervalSet& covered = under_lease[lease.study];
     require(studies_.at(lease.study).overlaps ||
                 covered.within(lease.batch.first_point, lease.batch.end()).empty(),
@@ -42,6 +43,7 @@ void Scheduler::check_invariants() const {
     study.points.check_invariants();
     require(study.finished == study.points.is_complete(), "a study is finished and is not");
     require(study.failed <= study.points.settled(), "more points failed than were settled");
+    require(study.searches == searching_.contains(id), "a study's search is forgotten");
     require(!study.cancelled || study.points.leased() == 0, "a cancelled study holds leases");
     require(study.leases.size() == leases_of[id], "a study's leases are miscounted");
     const StudyQueue::Place* place = queue_.find(id);
@@ -59,7 +61,7 @@ void Scheduler::check_invariants() const {
   for (const auto& [id, worker] : workers_) {
     std::map<StudyId, std::uint64_t> held;
     for (const LeaseId lease : worker.leases) {
-      held[leases_.at(lease).study] += leases_.at(lease).batch.count;
+      held[leases_.at(lease).study] += leases_.at(lease).batch.points;
     }
     for (const auto& [study, pace] : worker.paces) {
       require(pace.held_points == held[study], "points that a worker holds are miscounted");

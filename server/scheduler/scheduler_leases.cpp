@@ -23,7 +23,7 @@ void Scheduler::end_lease(LeaseId id, const std::optional<Loss>& loss) {
   leases_.erase(id);
   Worker& worker = workers_.at(lease.worker);
   worker.leases.erase(id);
-  worker.paces.at(lease.study).held_points -= lease.batch.count;
+  worker.paces.at(lease.study).held_points -= lease.batch.points;
   ready_workers_.wake(lease.worker);
   if (const auto twin = leases_.find(lease.twin); twin != leases_.end()) {
     twin->second.twin = 0;
@@ -33,10 +33,8 @@ void Scheduler::end_lease(LeaseId id, const std::optional<Loss>& loss) {
   const std::vector<Interval> held = held_by(lease);
   if (loss) {
     note_loss(lease, held, *loss);
-  } else {
-    for (const Interval& interval : held) {
-      study.points.give_back(interval, lease.batch.attempts + 1, lease.batch.losses, now_ms_);
-    }
+  } else if (!held.empty()) {
+    study.points.give_back(held, lease.batch.attempts + 1, lease.batch.losses, now_ms_);
   }
   if (study.leases.empty()) {
     study.overlaps = false;

@@ -9,20 +9,24 @@
 namespace oblique::server {
 namespace {
 
-std::uint64_t size_of(const std::vector<Interval>& intervals) {
-  std::uint64_t points = 0;
+/// The intervals in up to `parts` parts of nearly one size, each of intervals or pieces of them
+/// that follow each other.
+std::vector<std::vector<Interval>> split(const std::vector<Interval>& intervals,
+                                         std::uint64_t parts) {
+  const std::uint64_t size = (size_of(intervals) + parts - 1) / parts;
+  std::vector<std::vector<Interval>> all;
+  std::uint64_t room = 0;
   for (const Interval& interval : intervals) {
-    points += interval.end - interval.begin;
-  }
-  return points;
-}
-
-/// The interval in up to `parts` parts of nearly one size.
-std::vector<Interval> split(const Interval& interval, std::uint64_t parts) {
-  const std::uint64_t size = (interval.end - interval.begin + parts - 1) / parts;
-  std::vector<Interval> all;
-  for (std::uint64_t begin = interval.begin; begin < interval.end; begin += size) {
-    all.push_back({begin, std::min(begin + size, interval.end)});
+    for (std::uint64_t begin = interval.begin; begin < interval.end;) {
+      if (room == 0) {
+        all.emplace_back();
+        room = size;
+      }
+      const std::uint64_t end = std::min(begin + room, interval.end);
+      all.back().push_back({begin, end});
+      room -= end - begin;
+      begin = end;
+    }
   }
   return all;
 }
@@ -53,9 +57,16 @@ void Scheduler::note_loss(const Lease& lease, const std::vector<Interval>& held,
   const Standing standing = losses.standing(settings_.loss_limits);
   // The parts are suspect too: those without the killer are solved, the other is split again.
   const std::uint64_t parts = standing == Standing::kSound ? 1 : settings_.suspect_parts;
-  for (const Interval& interval : held) {
-    for (const Interval& part : split(interval, parts)) {
+  const auto give_back = [&](const std::vector<Interval>& together) {
+    for (const auto& part : split(together, parts)) {
       points.give_back(part, lease.batch.attempts + 1, losses, now_ms_);
+    }
+  };
+  if (points.has_filter()) {  // what lies between the intervals is left out, or was answered
+    give_back(held);
+  } else {
+    for (const Interval& interval : held) {
+      give_back({interval});
     }
   }
   if (standing == Standing::kCondemned) {

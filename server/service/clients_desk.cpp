@@ -32,8 +32,43 @@ void ClientsDesk::take(const std::string& identity, std::string_view frame, Inst
     read_elsewhere({identity, protocol::request_id_of(frame), holder}, frame);
     return;
   }
-  const ReadRequest read = read_request(frame);
-  answer({identity, read.request_id, holder}, read, now);
+  const ReadRequest read = read_request(frame, {});
+  const Client client{identity, read.request_id, holder};
+  if (read.needs_survey && objection_to(read).empty() && !client.is_reader()) {
+    read_elsewhere(client, frame);
+  } else {
+    answer(client, read, now);
+  }
+}
+
+void ClientsDesk::client_left(std::string_view identity) {
+  std::erase_if(long_requests_, [&](const auto& entry) {
+    const bool is_of_client = entry.second.client.identity == identity;
+    if (is_of_client) {
+      at_.readers.cancel_read(entry.first);
+    }
+    return is_of_client;
+  });
+  queries_.client_left(identity);
+  at_.traces.client_left(identity);
+}
+
+void ClientsDesk::tick(Instant now) {
+  queries_.tick(now);
+  at_.traces.tick(now);
+  if (now.steady_ms - told_ms_ < settings_.still_working_every_ms) {
+    return;
+  }
+  told_ms_ = now.steady_ms;
+  for (const auto& [ticket, request] : long_requests_) {
+    if (request.client.request_id != 0) {
+      protocol::ClientReply word;
+      word.set_request_id(kNobodysRequest);
+      word.mutable_still_working()->set_request_id(request.client.request_id);
+      word.mutable_still_working()->set_runs(true);
+      at_.clients.to_client(request.client.identity, word);
+    }
+  }
 }
 
 /// Of one client few wait, so that the others find room.

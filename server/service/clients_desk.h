@@ -20,8 +20,8 @@
 namespace oblique::server {
 
 struct ClientsDeskSettings {
-  /// How often a client hears that its query waits or runs, by which the server also finds out that
-  /// the client is gone.
+  /// How often a client hears that its query or long request waits or runs, by which the server
+  /// also finds out that the client is gone.
   std::int64_t still_working_every_ms = 1000;
   /// Longer requests are read on a thread of their own; so many of them wait there at most.
   std::size_t longest_inline_bytes = std::size_t{64} * 1024;
@@ -60,15 +60,9 @@ class ClientsDesk {
   void request_read(const ReadReport& report, Instant now);
   void queried(QueryReport report) { queries_.report(std::move(report)); }
   /// The connection of that client is gone, and nothing of it waits to be taken.
-  void client_left(std::string_view identity) {
-    queries_.client_left(identity);
-    at_.traces.client_left(identity);
-  }
+  void client_left(std::string_view identity);
   /// To be called several times a second.
-  void tick(Instant now) {
-    queries_.tick(now);
-    at_.traces.tick(now);
-  }
+  void tick(Instant now);
   /// The server will stop: no study is taken any more.
   void drain() { draining_ = true; }
   /// The server stops: who waits here is told, and what is asked from now on is refused.
@@ -99,6 +93,7 @@ class ClientsDesk {
   WaitingQueries queries_;
   std::map<std::uint64_t, LongRequest> long_requests_;  // by ticket
   std::uint64_t last_ticket_ = 0;
+  std::int64_t told_ms_ = 0;  // when those who wait for long requests last heard of them
   bool stopping_ = false;
   bool draining_ = false;
 };

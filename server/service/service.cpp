@@ -80,6 +80,13 @@ void Service::tick(Instant now) {
       now.steady_ms);
 }
 
+bool Service::go_on_searching(Instant now) {
+  if (scheduler_.is_searching()) {
+    feed(SearchGoesOn{}, now);
+  }
+  return scheduler_.is_searching();
+}
+
 void Service::drain(Instant now) {
   draining_ = true;
   hand_out_or_hold(now);

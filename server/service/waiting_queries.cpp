@@ -8,9 +8,6 @@
 namespace oblique::server {
 namespace {
 
-/// Number of no request: a reply with it is passed over by clients that do not know its kind.
-constexpr std::uint64_t kNobodysRequest = UINT64_MAX;
-
 constexpr const char* kStopping = "the server is stopping: ask again when it runs";
 
 }  // namespace

@@ -11,6 +11,9 @@
 
 namespace oblique::server {
 
+/// Number of no request: a reply with it is passed over by clients that do not know its kind.
+inline constexpr std::uint64_t kNobodysRequest = UINT64_MAX;
+
 struct QueryCounts {
   std::uint64_t waiting = 0;
   std::uint64_t running = 0;

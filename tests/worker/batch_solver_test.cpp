@@ -5,21 +5,34 @@
 #include <condition_variable>
 #include <cstdint>
 #include <cstdlib>
+#include <memory>
 #include <mutex>
 #include <set>
+#include <string>
 #include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "proto/result_message.h"
+#include "tests/support/points.h"
 
 namespace oblique::worker {
 namespace {
 
+/// Of a study in which nothing is left out.
 Batch batch(std::uint64_t number, std::uint64_t first, std::uint64_t count,
             std::uint64_t study_id = 7) {
-  return {number, study_id, first, count, nullptr};
+  return {number, study_id, first, count, server::table_of(1'000'000'000)};
+}
+
+/// Of a study of a thousand points with mu from 0 to 999.
+Batch filtered_batch(std::uint64_t first, std::uint64_t count, const std::string& where) {
+  const auto points = std::make_shared<const protocol::PointTable>(protocol::recipe_of_blocks(
+      {protocol::filtered({protocol::listed("H", {1.0}), protocol::range("mu", 0.0, 999.0, 1000),
+                           protocol::listed("e", {1.0})},
+                          where)}));
+  return {1, 7, first, count, points};
 }
 
 /// Lets the test decide when each point ends.
@@ -94,6 +107,29 @@ TEST_F(BatchSolverTest, BatchesAreSolvedPointByPointInTheOrderTheyWereAdded) {
   EXPECT_TRUE(progress[0].batch_done);
   EXPECT_EQ(progress[1].results.size(), 2U);
   EXPECT_TRUE(solver_.collect().empty());
+}
+
+TEST_F(BatchSolverTest, PointsThatAFilterLeavesOutArePassedOver) {
+  gate_.open(1000);
+  solver_.add(filtered_batch(100, 300, "floor(mu / 10) == mu / 10 && mu < 200"));
+  wait_batches_ended(1);
+  const auto progress = solver_.collect();
+  ASSERT_EQ(progress.size(), 1U);
+  EXPECT_TRUE(progress[0].batch_done);
+  std::set<std::uint64_t> solved;
+  for (const auto& result : progress[0].results) {
+    solved.insert(result.point());
+  }
+  EXPECT_EQ(solved, (std::set<std::uint64_t>{100, 110, 120, 130, 140, 150, 160, 170, 180, 190}));
+}
+
+TEST_F(BatchSolverTest, ABatchOfWhichNothingIsLeftInEndsWithoutAResult) {
+  solver_.add(filtered_batch(0, 500, "mu > 900"));
+  wait_batches_ended(1);
+  const auto progress = solver_.collect();
+  ASSERT_EQ(progress.size(), 1U);
+  EXPECT_TRUE(progress[0].batch_done);
+  EXPECT_TRUE(progress[0].results.empty());
 }
 
 TEST_F(BatchSolverTest, PartOfABatchCanBeCollectedWhileItIsSolved) {

@@ -16,6 +16,7 @@
 
 #include "proto/recipe/model_message.h"
 #include "proto/result_message.h"
+#include "tests/support/recipes.h"
 #include "tests/worker/conversation_fixture.h"
 #include "worker/solver/lanes/lane_stepper.h"
 
@@ -121,6 +122,16 @@ TEST(PointSolverTest, APointWithoutAnswerFailsWithTheReasonAndTheOthersAreSolved
   ASSERT_EQ(results.size(), 4U);
   EXPECT_EQ(results[1].error(), "");
   EXPECT_NE(results[2].error().find("1.19"), std::string::npos) << results[2].error();
+}
+
+TEST(PointSolverTest, APointWithAValueThatIsNotAllowedFailsWithTheValues) {
+  const Batch batch = batch_of(protocol::recipe_of(
+      {{protocol::following("k", "if(mu < 0.5, 2.7e7, -1)"), protocol::listed("H", {0.5}),
+        protocol::listed("mu", {0.4, 0.6}), protocol::listed("e", {1.0})}}));
+  const auto results = solved(batch);
+  EXPECT_EQ(results[0].error(), "");
+  EXPECT_NE(results[1].error().find("k = -1 N/m is not allowed"), std::string::npos);
+  EXPECT_NE(results[1].error().find("mu = 0.6"), std::string::npos);
 }
 
 TEST(PointSolverTest, AModelThatMakesNoFingerFailsEachPointWithTheReason) {

@@ -84,7 +84,7 @@ Axis drawn_axis(const solver::ParameterKey& key, const WrittenDistribution& writ
   }
   distribution.set_mean(written.mean.value_or(0.0));
   distribution.set_sd(written.sd.value_or(0.0));
-  check_axis(axis);
+  check_axis(axis, BlockKind::kSample);
   return axis;
 }
 

@@ -15,6 +15,15 @@ struct Interval {
   bool operator==(const Interval&) const = default;
 };
 
+/// Number of points of intervals that do not overlap.
+inline std::uint64_t size_of(const std::vector<Interval>& intervals) {
+  std::uint64_t points = 0;
+  for (const Interval& interval : intervals) {
+    points += interval.end - interval.begin;
+  }
+  return points;
+}
+
 /// A set of points kept as disjoint, non-touching intervals: its cost grows with the number of
 /// intervals, not of points.
 class IntervalSet {

@@ -17,6 +17,8 @@ struct Loss {
   ProcessNumber process;  ///< that went with it; kNobody when it ended the lease and lives on
   /// The process had solved points before and held this one point and nothing else.
   bool alone;
+
+  bool operator==(const Loss&) const = default;
 };
 
 /// What losses make of points. Of the later ones the earlier ones hold too.
@@ -46,6 +48,8 @@ class LossHistory {
   std::size_t alone() const;
   bool empty() const { return losses_.empty(); }
   Standing standing(const LossLimits& limits) const;
+
+  bool operator==(const LossHistory&) const = default;
 
  private:
   std::vector<Loss> losses_;  // few: more than make points suspect are noted only when alone

@@ -10,27 +10,110 @@ namespace oblique::server {
 
 StudyPoints::StudyPoints(StudyTable table, IntervalSet settled, const LossLimits& limits)
     : table_(std::move(table)),
+      points_(table_.size()),
       limits_(limits),
-      fresh_(0, table_.size()),
       settled_(std::move(settled)) {
-  settled_.erase(table_.size(), std::numeric_limits<std::uint64_t>::max());
+  if (settled_.first_from(points_)) {  // there is a filter, or the rows are of other points
+    settled_.erase(table_.numbers(), std::numeric_limits<std::uint64_t>::max());
+  }
+  knows_left_out_ = !is_complete();
+  if (!knows_left_out_) {
+    return;
+  }
+  fresh_.insert(0, table_.numbers());
   settled_.for_each(
       [this](const Interval& interval) { fresh_.erase(interval.begin, interval.end); });
 }
 
-std::optional<Batch> StudyPoints::take(const Portion& wanted) {
+std::optional<Batch> StudyPoints::take(const Portion& wanted, std::uint64_t& looks) {
   if (has(Standing::kSound)) {
-    return take(Standing::kSound, wanted);
+    return take(Standing::kSound, wanted, looks);
   }
-  const auto free = next_fresh(wanted.follows);
+  const auto free = next_left_in(wanted.follows, looks);
   if (!free) {
     return std::nullopt;
   }
-  const std::uint64_t end = end_of_batch(*table_.get(), *free, wanted);
-  fresh_.erase(free->begin, end);
-  leased_.insert(free->begin, end);
+  const std::uint64_t leased_before = leased_.size();
+  const std::uint64_t end = lease_fresh(*free, wanted, looks);
   begun_until_ = std::max(begun_until_, end_of_model(*table_.get(), end));
-  return Batch{free->begin, end - free->begin, 0, {}};
+  return Batch{free->begin, end - free->begin, 0, {}, leased_.size() - leased_before};
+}
+
+bool StudyPoints::search(std::uint64_t& looks) {
+  return has(Standing::kSound) || next_left_in(std::nullopt, looks).has_value();
+}
+
+/// Leases fresh points from the beginning of `free` on, which is left in. Returns where they end.
+std::uint64_t StudyPoints::lease_fresh(const Interval& free, const Portion& wanted,
+                                       std::uint64_t& looks) {
+  const protocol::PointTable& table = *table_.get();
+  const std::uint64_t cut = end_of_batch(table, free, wanted);
+  if (!table.has_filter()) {
+    fresh_.erase(free.begin, cut);
+    leased_.insert(free.begin, cut);
+    return cut;
+  }
+  // As many points as the cut has numbers. Where it has half of them that is enough, for it may end
+  // with a model.
+  const std::uint64_t enough = cut - free.begin;
+  const std::uint64_t last = free.begin + std::min(looks, free.end - free.begin);
+  std::uint64_t taken = 0;
+  std::uint64_t end = free.begin;
+  std::uint64_t at = free.begin;
+  while (at < last && taken < enough && !(at == cut && 2 * taken >= enough)) {
+    const std::uint64_t next = std::min(at < cut ? cut : free.end, last);
+    const std::uint64_t found = table.first_left_in(at, next);
+    leave_out({at, found});
+    at = found;
+    if (found < next) {
+      fresh_.erase(found);
+      leased_.insert(found);
+      ++taken;
+      end = ++at;
+    }
+  }
+  looks -= at - free.begin;
+  if (taken == 0) {  // no look was left for the first one, of which it is known
+    fresh_.erase(free.begin);
+    leased_.insert(free.begin);
+    end = free.begin + 1;
+  }
+  return end;
+}
+
+/// The next fresh points, from one that is left in.
+std::optional<Interval> StudyPoints::next_left_in(std::optional<std::uint64_t> follows,
+                                                  std::uint64_t& looks) {
+  while (auto free = next_fresh(follows)) {
+    if (!table_->has_filter()) {
+      return free;
+    }
+    const std::uint64_t last = free->begin + std::min(looks, free->end - free->begin);
+    const std::uint64_t found = table_->first_left_in(free->begin, last);
+    leave_out({free->begin, found});
+    looks -= found - free->begin;
+    if (found < last) {
+      return Interval{found, free->end};
+    }
+    if (looks == 0) {
+      return std::nullopt;
+    }
+  }
+  forget_excess();
+  return std::nullopt;
+}
+
+/// Points that were found to be left out.
+void StudyPoints::leave_out(const Interval& range) {
+  fresh_.erase(range.begin, range.end);
+  settled_.insert(range.begin, range.end);
+  left_out_ += range.end - range.begin;
+}
+
+/// All were looked at: when there are fewer points than was counted, the count was wrong, and
+/// nobody must wait for them.
+void StudyPoints::forget_excess() {
+  points_ = settled() + committing_.size() + leased_.size() + returned_points_;
 }
 
 std::optional<Interval> StudyPoints::next_fresh(std::optional<std::uint64_t> follows) const {
@@ -47,19 +130,39 @@ std::optional<Interval> StudyPoints::next_fresh(std::optional<std::uint64_t> fol
   return begun_by_nobody ? *begun_by_nobody : fresh_.front();
 }
 
-std::optional<Batch> StudyPoints::take(Standing standing, const Portion& wanted) {
+std::optional<Batch> StudyPoints::take(Standing standing, const Portion& wanted,
+                                       std::uint64_t& looks) {
   Returned& intervals = returned(standing);
   if (intervals.empty()) {
     return std::nullopt;
   }
   const auto [first, history] = *intervals.begin();
-  const std::uint64_t end = end_of_batch(*table_.get(), {first, history.end}, wanted);
+  std::uint64_t end = end_of_batch(*table_.get(), {first, history.end}, wanted);
   intervals.erase(intervals.begin());
   if (end < history.end) {
     intervals.emplace(end, history);
   }
   leased_.insert(first, end);
-  return Batch{first, end - first, history.attempts, history.losses};
+  std::uint64_t points = end - first;
+  // Between points that came back together there may be some that are left out.
+  const bool may_join = table_->has_filter() && end == history.end;
+  while (may_join && points < wanted.points && end < history.part_end && !intervals.empty()) {
+    const auto next = intervals.begin();
+    const std::uint64_t gap = next->first - end;
+    if (next->second.part_end != history.part_end || next->second.attempts != history.attempts ||
+        !(next->second.losses == history.losses) || gap > looks ||
+        next->second.end - next->first > wanted.points - points ||
+        table_->first_left_in(end, next->first) != next->first) {
+      break;
+    }
+    looks -= gap;
+    leased_.insert(next->first, next->second.end);
+    points += next->second.end - next->first;
+    end = next->second.end;
+    intervals.erase(next);
+  }
+  returned_points_ -= points;
+  return Batch{first, end - first, history.attempts, history.losses, points};
 }
 
 std::optional<Batch> StudyPoints::take_condemned(std::uint64_t point, std::int64_t until_ms) {
@@ -71,16 +174,21 @@ std::optional<Batch> StudyPoints::take_condemned(std::uint64_t point, std::int64
   const History history = found->second;
   condemned.erase(found);
   leased_.insert(point);
-  return Batch{point, 1, history.attempts, history.losses};
+  --returned_points_;
+  return Batch{point, 1, history.attempts, history.losses, 1};
 }
 
-void StudyPoints::give_back(const Interval& range, std::uint32_t attempts,
+void StudyPoints::give_back(std::span<const Interval> parts, std::uint32_t attempts,
                             const LossHistory& losses, std::int64_t now_ms) {
   Returned& intervals = returned(losses.standing(limits_));
-  for (const Interval& interval : leased_.within(range.begin, range.end)) {
-    intervals.emplace(interval.begin, History{interval.end, attempts, losses, now_ms});
+  for (const Interval& part : parts) {
+    for (const Interval& interval : leased_.within(part.begin, part.end)) {
+      intervals.emplace(interval.begin,
+                        History{interval.end, attempts, losses, now_ms, parts.back().end});
+      returned_points_ += interval.end - interval.begin;
+    }
+    leased_.erase(part.begin, part.end);
   }
-  leased_.erase(range.begin, range.end);
 }
 
 void StudyPoints::take_back_losses(ProcessNumber process) {
@@ -103,6 +211,9 @@ bool StudyPoints::receive(std::uint64_t point) {
   if (leased_.contains(point)) {
     leased_.erase(point);
   } else if (fresh_.contains(point)) {
+    if (!table_->is_left_in(point)) {
+      return false;
+    }
     fresh_.erase(point);
   } else if (std::none_of(returned_.begin(), returned_.end(),
                           [&](Returned& intervals) { return erase_from(intervals, point); })) {
@@ -126,6 +237,7 @@ bool StudyPoints::erase_from(Returned& intervals, std::uint64_t point) {
   if (point + 1 < history.end) {
     intervals.emplace(point + 1, history);
   }
+  --returned_points_;
   return true;
 }
 
@@ -139,7 +251,8 @@ bool StudyPoints::settle(std::uint64_t point) {
 }
 
 void StudyPoints::grow(StudyTable table) {
-  fresh_.insert(table_.size(), table.size());
+  fresh_.insert(table_.numbers(), table.numbers());
+  points_ += table.size() - std::min(table.size(), table_.size());
   table_ = std::move(table);
 }
 
@@ -179,6 +292,7 @@ std::vector<Interval> StudyPoints::extract_from(Returned& intervals, const Inter
     }
     interval = intervals.erase(interval);
     parts.push_back({std::max(first, range.begin), std::min(history.end, range.end)});
+    returned_points_ -= parts.back().end - parts.back().begin;
     if (first < range.begin) {
       intervals.emplace(first, history).first->second.end = range.begin;
     }
@@ -208,8 +322,12 @@ void StudyPoints::count_attempts(const PointAttempts& attempts) {
     for (const Interval& interval : fresh_.within(counted.begin, counted.end)) {
       fresh_.erase(interval.begin, interval.end);
       returned(Standing::kSound)
-          .emplace(interval.begin,
-                   History{interval.end, times < kMostAttempts ? times : kMostAttempts, {}, 0});
+          .emplace(interval.begin, History{interval.end,
+                                           times < kMostAttempts ? times : kMostAttempts,
+                                           {},
+                                           0,
+                                           interval.end});
+      returned_points_ += interval.end - interval.begin;
     }
   });
 }
@@ -223,18 +341,20 @@ std::vector<std::uint64_t> StudyPoints::condemned() const {
 }
 
 std::uint64_t StudyPoints::free() const {
-  return table_.size() - leased_.size() - committing_.size() - settled_.size();
+  const std::uint64_t taken = leased_.size() + committing_.size() + settled();
+  return points_ - std::min(points_, taken);
 }
 
 void StudyPoints::check_invariants() const {
   IntervalSet all;
-  std::uint64_t points = 0;
+  std::uint64_t numbers = 0;
+  std::uint64_t came_back = 0;
   const auto add = [&](const Interval& interval) {
     if (interval.begin >= interval.end) {
       throw std::logic_error("a study holds an empty interval of points");
     }
     all.insert(interval.begin, interval.end);
-    points += interval.end - interval.begin;
+    numbers += interval.end - interval.begin;
   };
   for (const auto* set : {&fresh_, &leased_, &committing_, &settled_}) {
     set->for_each(add);
@@ -243,13 +363,20 @@ void StudyPoints::check_invariants() const {
        {Standing::kSound, Standing::kSuspect, Standing::kAccused, Standing::kCondemned}) {
     for (const auto& [first, history] : returned(standing)) {
       add({first, history.end});
+      came_back += history.end - first;
       if (history.losses.standing(limits_) != standing) {
         throw std::logic_error("returned points are in the place of another standing");
       }
+      if (history.part_end < history.end) {
+        throw std::logic_error("returned points end behind their part");
+      }
     }
   }
-  if (points != table_.size() || !(all == IntervalSet(0, table_.size()))) {
+  if (numbers != all.size() || (knows_left_out_ && !(all == IntervalSet(0, table_.numbers())))) {
     throw std::logic_error("a point of a study is in no place or in two");
+  }
+  if (came_back != returned_points_) {
+    throw std::logic_error("returned points are miscounted");
   }
 }
 

@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "server/scheduler/points/batch_cut.h"
@@ -26,12 +27,14 @@ struct StudyTerms {
   bool operator==(const StudyTerms&) const = default;
 };
 
-/// Points that are handed out together, under one lease: no gap, one model or several.
+/// Points that are handed out together, under one lease: a run of numbers, of one model or several.
+/// What a filter leaves out of it, the worker knows by itself.
 struct Batch {
   std::uint64_t first_point;
   std::uint64_t count;
-  std::uint32_t attempts;  ///< how often these points had been leased before
-  LossHistory losses;      ///< of the leases before
+  std::uint32_t attempts;        ///< how often these points had been leased before
+  LossHistory losses;            ///< of the leases before
+  std::uint64_t points = count;  ///< of these numbers, those that no filter leaves out
 
   std::uint64_t end() const { return first_point + count; }
 };
@@ -40,12 +43,21 @@ struct Batch {
 /// this run of the server), returned with one of the four standings that its losses give it,
 /// leased, committing (its result is on the way to the disk) or settled. The cost grows with the
 /// number of intervals, not of points.
+///
+/// A point that a filter leaves out is fresh until somebody comes across it, and then among the
+/// settled ones, though it counts as none: so the sets stay whole intervals, and nothing that is
+/// leased or returned is left out. Coming across them costs a look at each, of which the caller
+/// says how many may be taken.
 class StudyPoints {
  public:
-  /// `settled` are the points that have a row already.
+  /// `settled` are the points that have a row already. Of a study that is complete the table is not
+  /// made.
   StudyPoints(StudyTable table, IntervalSet settled, const LossLimits& limits);
 
-  std::uint64_t size() const { return table_.size(); }
+  /// How many points there are, without those that are left out.
+  std::uint64_t size() const { return points_; }
+  /// How many point numbers.
+  std::uint64_t numbers() const { return table_.numbers(); }
   /// How many models they have; the table is made when there is none.
   std::uint64_t models() const { return table_->models(); }
   /// Nothing is handed out for a while: the table is forgotten until something is.
@@ -53,16 +65,20 @@ class StudyPoints {
 
   /// Takes points out of the returned sound ones or, when there are none, the fresh ones: those
   /// that are left of the model that `wanted` follows, then models of which nothing was taken yet,
-  /// then what is left of any. Nothing when there are none.
-  std::optional<Batch> take(const Portion& wanted);
-  /// The same out of the returned ones of that standing.
-  std::optional<Batch> take(Standing standing, const Portion& wanted);
+  /// then what is left of any. Nothing when there are none, or when `looks` came to 0 before one
+  /// was found: it says how many points may be looked at, whether they are left in, and is counted
+  /// down.
+  std::optional<Batch> take(const Portion& wanted, std::uint64_t& looks);
+  /// The same out of the returned ones of that standing. These cost no look but between them.
+  std::optional<Batch> take(Standing standing, const Portion& wanted, std::uint64_t& looks);
+  /// Goes on to look for the next fresh point that is left in. True when there is one to take.
+  bool search(std::uint64_t& looks);
   /// The condemned point if it came back at `until_ms` or before, else nothing.
   std::optional<Batch> take_condemned(std::uint64_t point, std::int64_t until_ms);
 
-  /// The points of [begin, end) that are still leased are returned at `now_ms`, with the history
-  /// given.
-  void give_back(const Interval& range, std::uint32_t attempts, const LossHistory& losses,
+  /// The points of `parts`, in order, that are still leased are returned at `now_ms`, with the
+  /// history given. Those between the parts stay where they are.
+  void give_back(std::span<const Interval> parts, std::uint32_t attempts, const LossHistory& losses,
                  std::int64_t now_ms);
 
   /// The losses of returned points that went with this process are taken back.
@@ -90,22 +106,24 @@ class StudyPoints {
   /// or before they were reopened.
   void count_attempts(const PointAttempts& attempts);
 
-  bool has_free() const { return has(Standing::kSound) || !fresh_.empty(); }
+  bool has_free() const { return has(Standing::kSound) || free() > returned_points_; }
+  bool has_filter() const { return table_->has_filter(); }
   /// Returned points of that standing.
   bool has(Standing standing) const { return !returned(standing).empty(); }
   /// When the next points to be taken of that standing came back. There must be one.
   std::int64_t returned_ms(Standing standing) const {
     return returned(standing).begin()->second.returned_ms;
   }
-  bool is_complete() const { return settled_.size() == table_.size(); }
+  bool is_complete() const { return settled() >= points_; }
   /// Some point has a result, durable or on its way.
-  bool has_results() const { return !settled_.empty() || !committing_.empty(); }
+  bool has_results() const { return settled() > 0 || !committing_.empty(); }
 
   std::vector<std::uint64_t> condemned() const;  ///< points
 
   std::uint64_t free() const;  ///< fresh and returned points
-  std::uint64_t settled() const { return settled_.size(); }
+  std::uint64_t settled() const { return settled_.size() - left_out_; }
   std::uint64_t leased() const { return leased_.size(); }
+  /// With those that were found to be left out.
   const IntervalSet& settled_set() const { return settled_; }
   const IntervalSet& leased_set() const { return leased_; }
 
@@ -118,6 +136,7 @@ class StudyPoints {
     std::uint32_t attempts;
     LossHistory losses;
     std::int64_t returned_ms;
+    std::uint64_t part_end;  ///< of the points that came back together and may go out together
   };
   using Returned = std::map<std::uint64_t, History>;  // by first point
 
@@ -126,10 +145,15 @@ class StudyPoints {
     return returned_.at(static_cast<std::size_t>(standing));
   }
   std::optional<Interval> next_fresh(std::optional<std::uint64_t> follows) const;
-  static bool erase_from(Returned& intervals, std::uint64_t point);
-  static std::vector<Interval> extract_from(Returned& intervals, const Interval& range);
+  std::optional<Interval> next_left_in(std::optional<std::uint64_t> follows, std::uint64_t& looks);
+  std::uint64_t lease_fresh(const Interval& free, const Portion& wanted, std::uint64_t& looks);
+  void leave_out(const Interval& range);
+  void forget_excess();
+  bool erase_from(Returned& intervals, std::uint64_t point);
+  std::vector<Interval> extract_from(Returned& intervals, const Interval& range);
 
   StudyTable table_;
+  std::uint64_t points_;
   LossLimits limits_;
   IntervalSet fresh_;
   std::uint64_t begun_until_ = 0;     // of all models before, points were taken
@@ -137,6 +161,10 @@ class StudyPoints {
   IntervalSet leased_;
   IntervalSet committing_;
   IntervalSet settled_;
+  /// False of a study that was complete at first: what is left out is in none of the sets.
+  bool knows_left_out_ = true;
+  std::uint64_t left_out_ = 0;         // among the settled ones
+  std::uint64_t returned_points_ = 0;  // of any standing
 };
 
 }  // namespace oblique::server

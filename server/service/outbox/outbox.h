@@ -99,6 +99,8 @@ class ToReaders {
   virtual void cancel_query(std::uint64_t ticket) = 0;
   /// `Service::request_read` is called with what the frame says.
   virtual void read(ReadJob job) = 0;
+  /// Nobody waits for that report any more.
+  virtual void cancel_read(std::uint64_t /*ticket*/) {}
 };
 
 enum class Severity { kInfo, kWarning, kError };

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
@@ -22,11 +23,18 @@ struct ReadRequest {
   protocol::ClientRequest request;  ///< its recipe is moved into the table
   StudyTable table;                 ///< of a submission that has no fault
   std::string objection;            ///< what is wrong with the recipe; empty: nothing
+  bool needs_survey = false;        ///< the points of the recipe must be looked at, and were not
 };
 
 /// Reads one frame. Costs time and memory in proportion to its bytes: a long one that is padded
-/// with empty messages is not read.
-ReadRequest read_request(std::string_view frame);
+/// with empty messages is not read. Where points of a recipe must be looked at, to count what a
+/// filter leaves in or to judge what follows from an expression, it takes up to minutes more:
+/// `goes_on` is asked now and then, and false ends it with an objection. Without `goes_on` nobody
+/// looks, and the request `needs_survey`.
+ReadRequest read_request(std::string_view frame, const std::function<bool()>& goes_on);
+inline ReadRequest read_request(std::string_view frame) {
+  return read_request(frame, [] { return true; });
+}
 
 /// One point of a study, with all that solving it needs.
 struct TracedPoint {
@@ -57,12 +65,13 @@ struct ReadReport {
 };
 
 /// Reads long requests and recipes one after another on a thread of its own, so that a large recipe
-/// holds up nothing but other large ones.
+/// holds up nothing but other large ones. Recipes whose points must be looked at go on to a second
+/// thread, and hold up nothing but each other.
 class RequestReader {
  public:
   using Report = std::function<void(ReadReport)>;
 
-  /// `report` is called on the reader's thread.
+  /// `report` is called on the reader's threads.
   explicit RequestReader(Report report);
   /// Drops what waits, and waits for the one that is being read.
   ~RequestReader();
@@ -70,16 +79,27 @@ class RequestReader {
   RequestReader& operator=(const RequestReader&) = delete;
 
   void submit(ReadJob job);
+  /// Nobody waits for the answer any more: the report may not come, or with an objection.
+  void cancel(std::uint64_t ticket);
 
  private:
-  void run();
+  /// One of the threads: what waits for it, and what it is at.
+  struct Line {
+    std::deque<ReadJob> waiting;
+    std::uint64_t ticket = 0;
+    bool is_wanted = false;
+  };
+
+  void run(Line& line, bool surveys);
+  ReadReport read(const ReadJob& job, bool surveys);
 
   Report report_;
   std::mutex mutex_;
   std::condition_variable wake_;
-  std::deque<ReadJob> queue_;  // guarded by mutex_
-  bool stopping_ = false;      // guarded by mutex_
-  std::thread thread_;         // last: it uses all the others
+  Line reading_;                        // guarded by mutex_
+  Line surveying_;                      // guarded by mutex_
+  bool stopping_ = false;               // guarded by mutex_
+  std::array<std::thread, 2> threads_;  // last: they use all the others
 };
 
 }  // namespace oblique::server

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <set>
 #include <thread>
 #include <vector>
 
@@ -272,7 +271,7 @@ TEST(BlockKindsTest, ExpressionsThatGoRoundInACircleOrAskForUnknownKeysAreRefuse
   EXPECT_THAT(with(following("E", "E * 2"), listed("k", {1e7})), HasSubstr("circle"));
   EXPECT_THAT(with(following("E", "muu * 2"), listed("k", {1e7})), HasSubstr("did you mean `mu`?"));
   EXPECT_THAT(with(following("E", "2 +"), listed("k", {1e7})),
-              HasSubstr("E: it makes no expression"));
+              HasSubstr("E = \"2 +\": it makes no expression"));
 }
 
 TEST(BlockKindsTest, AStudyHasABoundedNumberOfExpressions) {

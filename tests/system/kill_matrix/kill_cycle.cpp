@@ -25,7 +25,8 @@ constexpr int kMostAttempts = 6;
 constexpr int kPointsFailed = 1;  ///< exit code: the study is at its end, with its failures
 
 // Several models, so that batches end before the study does. The points of the first block take
-// long enough for heartbeats and for a score of commits. The last two have no answer.
+// long enough for heartbeats and for a score of commits. Of the second a filter leaves half out. The
+// last two have no answer.
 constexpr const char* kStudy = R"(name = "matrix"
 [[block]]
 dt = 1e-6
@@ -35,8 +36,9 @@ e = { from = 0.5, to = 1.0, count = 25 }
 [[block]]
 dt = [4e-6, 2e-6]
 H = [0.98, 1.0]
-mu = { from = 0.1, to = 2.0, count = 10 }
+mu = { from = 0.1, to = 2.0, count = 20 }
 e = { from = 0.5, to = 1.0, count = 10 }
+where = "sin(1e4 * mu) > 0"
 [[block]]
 dt = 2e-5
 H = 1.0
