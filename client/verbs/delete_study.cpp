@@ -46,11 +46,15 @@ bool is_confirmed(const protocol::StudyStatus& study, const std::string& place) 
 
 /// In a database file; says so when the file could not be made smaller.
 void delete_from(const std::string& database, const protocol::StudyStatus& study) {
-  Progress progress(std::cerr, isatty(STDERR_FILENO) != 0);
+  Progress progress(std::cerr, true);
+  const bool draws = isatty(STDERR_FILENO) != 0;
   const std::uint64_t rows = study.solved() + study.failed();
   const auto began = std::chrono::steady_clock::now();
   const bool is_merged =
       server::delete_study(database, study.study_id(), [&](std::uint64_t deleted) {
+        if (!draws) {
+          return;
+        }
         const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - began;
         progress.update({.study = study.name(),
                          .points = rows,

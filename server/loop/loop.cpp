@@ -100,6 +100,7 @@ class Loop::Parts final : public Outbox {
   }
 
   LoopEnd run(int stop_fd, const std::function<void()>& take_stop) {
+    writer_.clear_leavings();  // from here on it alone uses the store
     auto next_tick = Clock::now();
     std::array<pollfd, 5> items{{{network_.descriptor(), POLLIN, 0},
                                  {written_.descriptor(), POLLIN, 0},

@@ -9,8 +9,9 @@ namespace {
 
 /// Fewer free pages are left for what comes.
 constexpr std::int64_t kFewPages = 16;
-/// To give a page back takes as long as to delete about so many rows.
-constexpr std::size_t kRowsAPage = 8;
+/// To give a page back takes as long as to delete about so many rows, for it is moved with what
+/// names it.
+constexpr std::size_t kRowsAPage = 128;
 
 std::int64_t number_of(sqlite3* database, const char* sql) {
   Statement statement(database, sql);

@@ -24,10 +24,10 @@ constexpr std::chrono::milliseconds kTendPause{1000};
 
 /// What deleted studies left is cleared away in steps that take about so long, between which
 /// whatever waits is written; after a step that failed or must wait, none is tried for so long.
-constexpr std::chrono::milliseconds kShortStep{2};
-constexpr std::chrono::milliseconds kLongStep{5};
+constexpr std::chrono::milliseconds kShortStep{1};
+constexpr std::chrono::milliseconds kLongStep{3};
 constexpr std::size_t kFewestRows = 16;
-constexpr std::size_t kMostRows = 16'384;
+constexpr std::size_t kMostRows = 4096;
 constexpr std::chrono::milliseconds kClearPause{1000};
 
 /// So often a log that readers hold is tried before that is said.
@@ -89,6 +89,12 @@ void Writer::submit(WriteJob job) {
   wake_.notify_one();
 }
 
+void Writer::clear_leavings() {
+  const std::lock_guard lock(mutex_);
+  has_leavings_ = true;
+  wake_.notify_one();
+}
+
 std::size_t Writer::finish() {
   {
     const std::lock_guard lock(mutex_);
@@ -110,11 +116,15 @@ void Writer::run() {
       if (commits_.is_faulty() || commits_.is_gone()) {
         wake_.wait_for(lock, kRetryPause, [this] { return finishing_; });
       } else if (jobs.empty() && !may_clear()) {
-        wake_.wait_for(lock, kTendPause, [this] { return finishing_ || !queue_.empty(); });
+        wake_.wait_for(lock, kTendPause,
+                       [this] { return finishing_ || has_leavings_ || !queue_.empty(); });
       }
       std::move(queue_.begin(), queue_.end(), std::back_inserter(jobs));
       queue_.clear();
       last_round = finishing_;
+      if (std::exchange(has_leavings_, false)) {
+        commits_.look_for_leavings();
+      }
     }
     const bool was_faulty = commits_.is_faulty();
     auto reports = !jobs.empty() ? write(jobs)

@@ -65,6 +65,8 @@ class GroupCommit {
   /// The database is not where it was; nothing is written any more.
   bool is_gone() const { return gone_; }
 
+  /// Something of deleted studies may be left by an earlier process.
+  void look_for_leavings() { clears_ = true; }
   /// Whether something of deleted studies may be left to be cleared away.
   bool has_to_clear() const { return clears_ && !gone_; }
   /// Clears away a part of it: at most about so many rows. False when that must wait a while.
@@ -90,7 +92,7 @@ class GroupCommit {
   std::uint64_t rows_ = 0;
   bool faulty_ = false;
   bool gone_ = false;
-  bool clears_ = true;  // nobody knows yet what an earlier process left
+  bool clears_ = false;  // something of deleted studies may be left
   bool any_is_cleared_ = false;
   bool to_be_merged_ = false;  // a study is done
   int tries_ = 0;              // to merge since then
@@ -112,6 +114,10 @@ class Writer {
 
   void submit(WriteJob job);
 
+  /// Clears away what an earlier process left of deleted studies. To be called once nobody but this
+  /// thread uses the storage.
+  void clear_leavings();
+
   /// Writes what waits, merges the log and ends the thread. Returns how many jobs could not be made
   /// durable.
   std::size_t finish();
@@ -132,6 +138,7 @@ class Writer {
   std::condition_variable wake_;
   std::deque<WriteJob> queue_;      // guarded by mutex_
   bool finishing_ = false;          // guarded by mutex_
+  bool has_leavings_ = false;       // guarded by mutex_
   CommitCounts counts_;             // guarded by mutex_
   std::size_t left_over_ = 0;       // written by the thread, read after it ended
   std::size_t rows_to_clear_ = 64;  // of the thread: so many take about as long as they may

@@ -229,7 +229,7 @@ Growth growth_of(const protocol::Recipe& stored, const protocol::Recipe& given) 
       difference.compare(fmt::format("block {}", i + 1), line_of(was), line_of(is));
     }
   }
-  if (shrinks && given.blocks_size() < stored.blocks_size()) {
+  if (!differs && given.blocks_size() < stored.blocks_size()) {
     difference.add(
         fmt::format("stored {} blocks, given {}", stored.blocks_size(), given.blocks_size()));
   }

@@ -4,6 +4,7 @@
 #include <map>
 #include <mutex>
 #include <new>
+#include <thread>
 
 #include <gtest/gtest.h>
 
@@ -330,9 +331,22 @@ TEST_F(WriterTest, WhatDeletedStudiesLeftIsClearedAwayBetweenWritesAndWithoutAny
   EXPECT_EQ(writer_.finish(), 0U);
 }
 
+TEST_F(WriterTest, WhatAnEarlierProcessLeftIsClearedAwayWhenItIsTold) {
+  storage_.leave(3);
+  writer_.submit(kept(1));
+  ASSERT_EQ(reports_.wait_for_ticket(1), Kind::kStored);
+  EXPECT_EQ(storage_.left(), 3) << "others may still use the storage";
+  writer_.clear_leavings();
+  while (storage_.left() > 0) {
+    std::this_thread::yield();
+  }
+}
+
 TEST(GroupCommitTest, AStepThatFailsIsTakenAgainAndDisturbsNothing) {
   FailingStorage storage;
   GroupCommit commits(storage);
+  EXPECT_FALSE(commits.has_to_clear()) << "not before it is told";
+  commits.look_for_leavings();
   storage.leave(2);
   std::vector<WriteReport> reports;
   EXPECT_TRUE(commits.clear(10, reports));
