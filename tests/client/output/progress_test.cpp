@@ -116,7 +116,7 @@ TEST(Progress, KeepsToTheWidthOfTheTerminalTheBarFirst) {
                             .failed = 12,
                             .points_per_s = 1234.5};
   const std::string end = " 500,000/1,000,000 50 %, 12 failed, 1,230 points/s, 6 min 45 s left";
-  EXPECT_EQ(progress_bar(state, 79), "abc\u00e9 [####-----]" + end);
+  EXPECT_EQ(progress_bar(state, 79), "abc\u00e9 [##---]" + end);
   EXPECT_EQ(progress_bar(state, end.size() + 10), "abc\u00e9" + end) << "a bar too short to read";
   EXPECT_EQ(progress_bar(state, end.size() + 3), "abc" + end);
   EXPECT_EQ(progress_bar(state, 10), end.substr(0, 10));
