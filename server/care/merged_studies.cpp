@@ -84,6 +84,18 @@ std::string objection_to(const StudyRow& study, const Statement& row) {
   return objection;
 }
 
+/// So many numbers its points have, those too that a filter leaves out; as many as it has points
+/// where only another version can tell.
+std::uint64_t numbers_of(const StudyTable& table) {
+  try {
+    const std::uint64_t numbers = table.numbers();
+    table.release();
+    return numbers;
+  } catch (const std::runtime_error&) {
+    return table.size();
+  }
+}
+
 std::optional<StudyRow> study_named(sqlite3* target, const std::string& name) {
   Statement find(target, "SELECT " + study_columns_sql(target) + " FROM studies WHERE name = ?");
   find.bind(1, std::string_view(name));
@@ -213,7 +225,7 @@ class Placing {
             known.name,
             false,
             known.table.size(),
-            study.table.size(),
+            numbers_of(study.table),
             solver_version_of(target_, known.id),
             mixes};
   }
@@ -229,7 +241,7 @@ class Placing {
     }
     insert_.bind(10, std::int64_t{study.mixes_versions});
     insert_.run();
-    return {id, name, true, study.table.size(), study.table.size(), {}, true};
+    return {id, name, true, study.table.size(), numbers_of(study.table), {}, true};
   }
 
   sqlite3* target_;

@@ -15,7 +15,7 @@ struct StudyPlace {
   std::string name;  ///< there
   bool is_new;
   std::uint64_t points;
-  std::uint64_t points_in_source;  ///< which may be fewer
+  std::uint64_t points_in_source;  ///< numbers of its points are lower
   /// Of the results that the target had; empty: it had none, and rows of any version may come.
   std::string solver_version;
   bool mixes_versions;

@@ -94,12 +94,14 @@ void StudyChanges::grow(const Client& client, StudyId id, const ReadRequest& rea
                         const StudyTerms& terms, Instant now) {
   const StudyRecord& study = states_.record(id);
   Growth growth{Growth::Kind::kOther, "the stored one cannot be read"};
+  bool has_more = false;
   try {
     growth = study.table.growth_to(read.table);
+    has_more = read.table.numbers() > study.table.numbers();
   } catch (const std::runtime_error&) {
     // Only another version can.
   }
-  if (growth.kind != Growth::Kind::kLonger || read.table.size() <= study.table.size()) {
+  if (growth.kind != Growth::Kind::kLonger || !has_more) {
     refuse_recipe(client, study.name, growth);
     return;
   }
