@@ -1,8 +1,10 @@
 #include "tests/simulation/simulated_client.h"
 
+#include <optional>
 #include <utility>
 
 #include "proto/frames.h"
+#include "proto/recipe/point_table.h"
 #include "tests/simulation/simulated_worker.h"
 #include "tests/support/recipes.h"
 
@@ -33,31 +35,52 @@ protocol::Recipe recipe_of_models(std::uint64_t points, std::uint64_t points_a_m
   return recipe;
 }
 
+/// The same with a filter in every block that leaves out points here and there; nothing if one
+/// leaves none in.
+std::optional<protocol::PointTable> filtered_here_and_there(protocol::Recipe recipe,
+                                                            const char* filter) {
+  for (protocol::Block& block : *recipe.mutable_blocks()) {
+    block.set_where(filter);
+  }
+  try {
+    protocol::PointTable table(std::move(recipe));
+    table.survey([] { return true; });
+    return table;
+  } catch (const solver::InputError&) {
+    return std::nullopt;
+  }
+}
+
 }  // namespace
 
 SimulatedClient::SimulatedClient(World& world, Network& network, std::uint64_t peer,
                                  std::string name, std::uint64_t points, std::uint64_t mark)
-    : world_(world),
-      network_(network),
-      peer_(peer),
-      name_(std::move(name)),
-      points_(points),
-      mark_(mark) {
-  set_recipe(points);
+    : world_(world), network_(network), peer_(peer), name_(std::move(name)), mark_(mark) {
+  points_ = set_recipe(points);
 }
 
-/// A recipe of its own; behind the one that is there, if any.
-void SimulatedClient::set_recipe(std::uint64_t points) {
+/// A recipe of its own, of so many points or, with a filter, fewer; behind the one that is there,
+/// if any. Returns how many they are.
+std::uint64_t SimulatedClient::set_recipe(std::uint64_t points) {
   const std::uint64_t points_a_model = world_.chance(0.3) ? points + 1
                                        : world_.chance(0.5)
                                            ? std::uint64_t{1}
                                            : static_cast<std::uint64_t>(world_.between(2, 40));
-  recipe_.MergeFrom(recipe_of_models(points, points_a_model, marked_H(mark_)));
+  const protocol::Recipe recipe = recipe_of_models(points, points_a_model, marked_H(mark_));
+  if (world_.chance(0.4)) {
+    const char* filter = world_.chance(0.3) ? "sin(1234.5 * mu + k) > 0.9"  // a few are left in
+                                            : "sin(1234.5 * mu + k) > -0.3";
+    if (const auto table = filtered_here_and_there(recipe, filter)) {
+      recipe_.MergeFrom(table->recipe());
+      return table->points();
+    }
+  }
+  recipe_.MergeFrom(recipe);
+  return points;
 }
 
 void SimulatedClient::grow() {
-  appended_ = static_cast<std::uint64_t>(world_.between(1, 60));
-  set_recipe(appended_);
+  appended_ = set_recipe(static_cast<std::uint64_t>(world_.between(1, 60)));
   points_ += appended_;
 }
 
@@ -67,8 +90,7 @@ void SimulatedClient::begin_anew() {
   study_id_ = 0;
   mark_ += kClients;
   recipe_.Clear();
-  points_ = static_cast<std::uint64_t>(world_.between(1, 300));
-  set_recipe(points_);
+  points_ = set_recipe(static_cast<std::uint64_t>(world_.between(1, 300)));
 }
 
 void SimulatedClient::start() {

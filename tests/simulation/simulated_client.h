@@ -47,7 +47,7 @@ class SimulatedClient {
   enum class Intent { kSubmit, kChange, kRename, kDelete };
 
   void connect();
-  void set_recipe(std::uint64_t points);
+  std::uint64_t set_recipe(std::uint64_t points);
   void grow();
   void begin_anew();
   void ask();
@@ -59,7 +59,7 @@ class SimulatedClient {
   Network& network_;
   std::uint64_t peer_;
   std::string name_;
-  std::uint64_t points_;
+  std::uint64_t points_ = 0;  // without those that filters leave out
   std::uint64_t mark_;
   std::uint64_t study_id_ = 0;  // as it was acknowledged
   std::string new_name_;

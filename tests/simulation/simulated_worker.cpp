@@ -171,9 +171,18 @@ void SimulatedWorker::plan_solving() {
   });
 }
 
+/// The next point of the batch that its study's filter leaves in, or its end.
+std::uint64_t SimulatedWorker::next_point(const Work& work) {
+  return work.batch.points->first_left_in(work.batch.first_point + work.solved,
+                                          work.batch.first_point + work.batch.count);
+}
+
 std::pair<std::uint64_t, std::uint64_t> SimulatedWorker::next_model() const {
   const Work& work = batches_.front();
-  const std::uint64_t point = work.batch.first_point + work.solved;
+  const std::uint64_t point = next_point(work);
+  if (point == work.batch.first_point + work.batch.count) {
+    return fallen_model_;
+  }
   return {work.batch.study_id, work.batch.points->point(point).model};
 }
 
@@ -182,21 +191,23 @@ void SimulatedWorker::solve_some() {
     return;
   }
   Work& work = batches_.front();
-  const std::uint64_t point = work.batch.first_point + work.solved;
-  const std::uint64_t mark = mark_of(work.batch.points->point(point).H_m);
-  const auto killers = killers_.find(mark);
-  if (killers != killers_.end() && killers->second.contains(point)) {
-    ++deaths_;
-    restart(world_.between(100, 1000));
-    return;
+  const std::uint64_t end = work.batch.first_point + work.batch.count;
+  const std::uint64_t point = next_point(work);
+  worker::Progress progress{
+      work.batch.number, work.batch.study_id, {}, 1e-3 * static_cast<double>(busy_ms_), false};
+  if (point < end) {
+    const std::uint64_t mark = mark_of(work.batch.points->point(point).H_m);
+    const auto killers = killers_.find(mark);
+    if (killers != killers_.end() && killers->second.contains(point)) {
+      ++deaths_;
+      restart(world_.between(100, 1000));
+      return;
+    }
+    fallen_model_ = next_model();
+    work.solved = point + 1 - work.batch.first_point;
+    progress.results.push_back(answer_to(mark, point));
   }
-  fallen_model_ = next_model();
-  ++work.solved;
-  worker::Progress progress{work.batch.number,
-                            work.batch.study_id,
-                            {answer_to(mark, point)},
-                            1e-3 * static_cast<double>(busy_ms_),
-                            work.solved == work.batch.count};
+  progress.batch_done = next_point(work) == end;
   if (progress.batch_done) {
     batches_.pop_front();
   }

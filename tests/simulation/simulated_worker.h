@@ -60,6 +60,7 @@ class SimulatedWorker {
   void plan_time();
   void plan_solving();
   void solve_some();
+  static std::uint64_t next_point(const Work& work);
   std::pair<std::uint64_t, std::uint64_t> next_model() const;
 
   World& world_;
