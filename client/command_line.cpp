@@ -36,6 +36,7 @@ Exit codes: 0 done, 1 failed, 2 wrong usage; stopped by a signal: 128 and its nu
 void add_verbs(CLI::App& app, Command& command) {
   add_solve(app, command);
   add_run(app, command);
+  add_study(app, command);
   add_submit(app, command);
   add_status(app, command);
   add_watch(app, command);

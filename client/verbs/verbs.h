@@ -22,6 +22,7 @@ void add_run(CLI::App& app, Command& command);
 void add_submit(CLI::App& app, Command& command);
 void add_status(CLI::App& app, Command& command);
 void add_watch(CLI::App& app, Command& command);
+void add_study(CLI::App& app, Command& command);
 void add_studies(CLI::App& app, Command& command);
 void add_workers(CLI::App& app, Command& command);
 void add_cancel(CLI::App& app, Command& command);

@@ -1,0 +1,82 @@
+#include <fstream>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "tests/support/programs.h"
+
+namespace oblique::client {
+namespace {
+
+using testing::HasSubstr;
+
+const std::string kStudies = std::string(OBLIQUE_SOURCE_DIR) + "/deploy/studies/";
+
+TEST(StudyCheck, SaysPointsBlocksModelsFallsTimeAndSize) {
+  const auto outcome = test::run_oblique({"study", "check", kStudies + "sticking.toml", "--json"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const auto json = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(json["study"], "sticking");
+  EXPECT_EQ(json["points"], 615);
+  EXPECT_EQ(json["numbers"], 1650);
+  EXPECT_EQ(json["models"], 1);
+  EXPECT_EQ(json["falls"], 1);
+  ASSERT_EQ(json["blocks"].size(), 1U);
+  const auto& block = json["blocks"][0];
+  EXPECT_EQ(block["points"], 615);
+  EXPECT_EQ(block["last"]["point"], 1649);
+  EXPECT_EQ(block["last"]["mu"], 2.0);
+  EXPECT_GT(block["first"]["mu"], 0.25) << "the first that is left in";
+  EXPECT_GT(json["time_s"], 0.0);
+  EXPECT_GT(json["solved_points"], 0);
+  EXPECT_GT(json["bytes"], 0.0);
+}
+
+// 3 lengths x 5 areas are 15 fingers that fall alike for two values of mu.
+TEST(StudyCheck, CountsModelsAndTheFallsThatTheyShare) {
+  const auto check = [](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"study", "check", "--json", "--no-rate",
+                                       "--H",   "0.9",   "--e",    "1"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const auto outcome = test::run_oblique(arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return nlohmann::json::parse(outcome.out);
+  };
+  const auto fingers = check(
+      {"--mu", "0.4,1.2", "--A", "4e-4:6e-4:5", "--length3", "0.35,0.4,0.45", "--I", "A^2/(4*pi)"});
+  EXPECT_EQ(fingers["points"], 30);
+  EXPECT_EQ(fingers["models"], 15);
+  EXPECT_EQ(fingers["falls"], 15);
+  EXPECT_FALSE(fingers.contains("time_s"));
+  EXPECT_EQ(check({"--mu", "0.4", "--k", "1e7:4e7:4"})["falls"], 1) << "k acts in contact alone";
+}
+
+TEST(StudyCheck, OfAThousandMillionPointsCostsNoMoreThanOfAFew) {
+  const auto outcome =
+      test::run_oblique({"study", "check", "--no-rate", "--sample", "sobol:1000000000:1", "--H",
+                         "0.3:1.1", "--mu", "normal(0.4,0.05,0,)", "--e", "0.9"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("points  1000000000\n"));
+  EXPECT_THAT(outcome.out, HasSubstr("sobol sample of H, mu, e"));
+  EXPECT_THAT(outcome.out, HasSubstr("size    about 500 GB"));
+}
+
+TEST(StudyCheck, EndsWithTwoAndThePlaceForWhatIsWrong) {
+  const test::TemporaryFolder folder;
+  std::ofstream(folder.path() / "wrong.toml")
+      << "[[block]]\nH = 1\nmu = 0.4\ne = 1\nwhere = \"mu > f\"\n";
+  const auto file = test::run_oblique(folder, {"study", "check", "wrong.toml"});
+  EXPECT_EQ(file.exit_code, 2);
+  EXPECT_THAT(file.err, HasSubstr("wrong.toml:5:9: where: unknown key `f`"));
+  const auto flags = test::run_oblique(
+      {"study", "check", "--H", "1", "--mu", "0.4", "--e", "1", "--where", "mu > 1"});
+  EXPECT_EQ(flags.exit_code, 2);
+  EXPECT_THAT(flags.err, HasSubstr("leaves no point in"));
+  EXPECT_EQ(test::run_oblique({"study"}).exit_code, 2);
+  EXPECT_EQ(test::run_oblique({"study", "chekc"}).exit_code, 2);
+}
+
+}  // namespace
+}  // namespace oblique::client
