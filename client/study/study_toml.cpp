@@ -1,0 +1,187 @@
+#include "client/study/study_toml.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <iterator>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "proto/recipe/axes.h"
+#include "proto/recipe/model_message.h"
+#include "proto/recipe/written/written_sample.h"
+#include "worker/solver/model/number.h"
+
+namespace oblique::client {
+namespace {
+
+using solver::exact_number;
+
+/// Longest line of a list.
+constexpr std::size_t kWidth = 100;
+
+/// A string of TOML: all but quotes, backslashes and control characters stands for itself.
+std::string toml_string(std::string_view text) {
+  std::string line = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') {
+      line += '\\';
+      line += c;
+    } else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) {
+      line += fmt::format("\\u{:04x}", static_cast<unsigned>(c));
+    } else {
+      line += c;
+    }
+  }
+  return line + '"';
+}
+
+/// [0.1, 0.2], on several lines where it is long.
+std::string list(const std::vector<std::string>& items) {
+  std::string text = "[";
+  std::size_t line = kWidth / 4;  // room for the key
+  for (std::size_t i = 0; i < items.size(); ++i) {
+    line += items[i].size() + 2;
+    if (line > kWidth) {
+      text += "\n   ";
+      line = items[i].size() + 5;
+    }
+    text += (i == 0 || text.ends_with(' ') ? "" : " ") + items[i];
+    text += i + 1 < items.size() ? "," : "";
+  }
+  return text + "]";
+}
+
+std::string value_of(std::string_view key, double value) {
+  return key == "integrator"
+             ? toml_string(solver::integrator_names()[static_cast<std::size_t>(value)])
+             : exact_number(value + 0.0);  // zero has no sign
+}
+
+std::string list_of_values(std::string_view key, const protocol::Axis& axis) {
+  std::vector<std::string> items;
+  for (std::uint64_t i = 0; i < protocol::axis_size(axis); ++i) {
+    items.push_back(value_of(key, protocol::axis_value(axis, i)));
+  }
+  return items.size() == 1 ? items.front() : list(items);
+}
+
+std::string distribution(const protocol::Distribution& drawn) {
+  std::string text = fmt::format("{{ distribution = {}", toml_string(name_of(drawn.kind())));
+  if (drawn.kind() == protocol::DISTRIBUTION_NORMAL) {
+    text +=
+        fmt::format(", mean = {}, sd = {}", exact_number(drawn.mean()), exact_number(drawn.sd()));
+  }
+  if (drawn.has_from()) {
+    text += ", from = " + exact_number(drawn.from());
+  }
+  if (drawn.has_to()) {
+    text += ", to = " + exact_number(drawn.to());
+  }
+  return text + " }";
+}
+
+std::string axis_text(const protocol::Axis& axis) {
+  if (!axis.expression().empty()) {
+    return toml_string(axis.expression());
+  }
+  if (axis.has_distribution()) {
+    return distribution(axis.distribution());
+  }
+  constexpr std::uint64_t kFewestOfARange = 3;
+  if (axis.count() < kFewestOfARange || axis.key() == "integrator") {
+    return list_of_values(axis.key(), axis);
+  }
+  return fmt::format("{{ from = {}, to = {}, count = {}{} }}", exact_number(axis.from()),
+                     exact_number(axis.to()), axis.count(),
+                     axis.spacing() == protocol::SPACING_LOGARITHMIC ? ", spacing = \"log\"" : "");
+}
+
+std::string block_text(const protocol::Block& block) {
+  std::string text = "\n[[block]]\n";
+  if (block.zip()) {
+    text += "zip = true\n";
+  }
+  if (block.has_sample()) {
+    text += fmt::format("sample = {{ kind = {}, count = {}, seed = {} }}\n",
+                        toml_string(name_of(block.sample().kind())), block.sample().count(),
+                        block.sample().seed());
+  }
+  for (const auto& axis : block.axes()) {
+    text += fmt::format("{} = {}\n", axis.key(), axis_text(axis));
+  }
+  if (!block.where().empty()) {
+    text += fmt::format("where = {}\n", toml_string(block.where()));
+  }
+  return text;
+}
+
+bool is_length(std::string_view key) {
+  return key == "links" || key == "length";
+}
+
+/// The keys in which a model differs from a preset, as lines of TOML.
+std::vector<std::string> overrides(const solver::ModelParameters& model,
+                                   const solver::ModelParameters& preset) {
+  std::vector<std::string> lines;
+  const auto& lengths_m = model.lengths_m;
+  const bool are_alike = std::adjacent_find(lengths_m.begin(), lengths_m.end(),
+                                            std::not_equal_to<>()) == lengths_m.end();
+  if (lengths_m != preset.lengths_m && !are_alike) {
+    std::vector<std::string> items;
+    std::transform(lengths_m.begin(), lengths_m.end(), std::back_inserter(items), exact_number);
+    lines.push_back("lengths = " + list(items));
+  }
+  for (const auto& key : solver::model_keys()) {
+    const bool differs = is_length(key.name) ? are_alike && lengths_m != preset.lengths_m
+                                             : key.get(model) != key.get(preset);
+    if (differs) {
+      lines.push_back(fmt::format("{} = {}", key.name, value_of(key.name, key.get(model))));
+    }
+  }
+  return lines;
+}
+
+/// [model] with the preset that leaves the fewest keys to say; nothing for the preset that a study
+/// has without one.
+std::string model_text(const solver::ModelParameters& model) {
+  std::string_view best;
+  std::vector<std::string> fewest;
+  for (const std::string_view name : solver::preset_names()) {
+    auto lines = overrides(model, solver::preset(name));
+    if (best.empty() || lines.size() < fewest.size()) {
+      best = name;
+      fewest = std::move(lines);
+    }
+  }
+  if (fewest.empty() && model == solver::ModelParameters()) {
+    return "";
+  }
+  std::string text = fmt::format("\n[model]\npreset = {}\n", toml_string(best));
+  for (const auto& line : fewest) {
+    text += line + "\n";
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string study_toml(const std::string& name, const protocol::Recipe& recipe) {
+  std::string text = fmt::format("name = {}\n", toml_string(name));
+  if (recipe.errors()) {
+    text += "errors = true\n";
+  }
+  if (recipe.has_model()) {
+    text += model_text(protocol::from_message(recipe.model()));
+  }
+  for (const auto& block : recipe.blocks()) {
+    text += block_text(block);
+  }
+  return text;
+}
+
+}  // namespace oblique::client

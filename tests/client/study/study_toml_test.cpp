@@ -1,0 +1,194 @@
+#include "client/study/study_toml.h"
+
+#include <cstdint>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "client/study/study_file.h"
+#include "proto/recipe/canonical.h"
+#include "proto/recipe/keys.h"
+#include "proto/recipe/model_message.h"
+#include "proto/recipe/point_table.h"
+#include "proto/recipe/written/written_axis.h"
+#include "proto/recipe/written/written_sample.h"
+
+namespace oblique::client {
+namespace {
+
+using protocol::BlockKind;
+using testing::HasSubstr;
+
+/// What is left out: whether the tip reaches H.
+void no_reach_check(const protocol::PointTable&) {}
+
+/// Recipes of every kind, drawn.
+class DrawnRecipe {
+ public:
+  explicit DrawnRecipe(unsigned seed) : random_(seed) {}
+
+  protocol::Recipe recipe() {
+    protocol::Recipe recipe;
+    recipe.set_errors(chance(0.2));
+    if (chance(0.8)) {
+      *recipe.mutable_model() = protocol::to_message(model());
+    }
+    for (std::uint64_t i = 0; i <= below(3); ++i) {
+      *recipe.add_blocks() = block();
+    }
+    return recipe;
+  }
+
+ private:
+  std::uint64_t below(std::uint64_t n) {
+    return std::uniform_int_distribution<std::uint64_t>(0, n - 1)(random_);
+  }
+  bool chance(double part) { return real(0.0, 1.0) < part; }
+  double real(double from, double to) {
+    return std::uniform_real_distribution<double>(from, to)(random_);
+  }
+
+  solver::ModelParameters model() {
+    auto model = solver::preset(solver::preset_names()[below(3)]);
+    if (chance(0.3)) {
+      model.lengths_m.assign(3 + below(2), real(0.3, 0.5));
+    } else if (chance(0.4)) {
+      model.lengths_m = {real(0.3, 0.5), real(0.3, 0.5), 0.4};
+    }
+    if (chance(0.5)) {
+      model.rho_kg_m3 = real(1000.0, 8000.0);
+    }
+    model.integrator = static_cast<solver::Integrator>(below(2));
+    if (chance(0.3)) {
+      model.dt_s = 1e-6;
+      model.tolerance = 1e-6;
+    }
+    return model;
+  }
+
+  protocol::Axis axis(const std::string& name, BlockKind kind, double from, double to) {
+    const auto& key = protocol::axis_key(name);
+    switch (below(5)) {
+      case 0:
+        return protocol::listed_axis(key, {real(from, to)}, kind);
+      case 1:
+        return protocol::listed_axis(key, several(from, to), kind);
+      case 2:
+        return kind == BlockKind::kSample
+                   ? protocol::drawn_axis(
+                         key, {protocol::DISTRIBUTION_LOG_UNIFORM, from, to, {}, {}}, kind)
+                   : protocol::counted_axis(
+                         key, from, to, kCount,
+                         chance(0.5) ? protocol::SPACING_LOGARITHMIC : protocol::SPACING_LINEAR);
+      case 3:
+        return kind == BlockKind::kSample
+                   ? protocol::drawn_axis(
+                         key,
+                         {protocol::DISTRIBUTION_NORMAL, from, to, real(from, to), real(0.1, 1.0)},
+                         kind)
+                   : protocol::counted_axis(key, from, from, 1);
+      default:
+        return kind == BlockKind::kSample
+                   ? protocol::drawn_axis(key, {protocol::DISTRIBUTION_UNIFORM, from, to, {}, {}},
+                                          kind)
+                   : protocol::expressed_axis(key, std::to_string(from) + " + 0 * (e - e)");
+    }
+  }
+
+  std::vector<double> several(double from, double to) {
+    std::vector<double> values;
+    for (int i = 0; i < kCount; ++i) {
+      values.push_back(real(from, to));
+    }
+    return values;
+  }
+
+  protocol::Block block() {
+    const auto kind = static_cast<BlockKind>(below(3));
+    std::vector<protocol::Axis> axes{axis("H", kind, 0.2, 0.8), axis("mu", kind, 0.1, 2.0)};
+    // At least one that is drawn, and none that asks for itself.
+    axes.push_back(kind == BlockKind::kSample
+                       ? protocol::drawn_axis(protocol::axis_key("e"),
+                                              {protocol::DISTRIBUTION_UNIFORM, 0.5, 1.0, {}, {}},
+                                              kind)
+                       : protocol::listed_axis(protocol::axis_key("e"), several(0.5, 1.0), kind));
+    if (chance(0.4)) {
+      axes.push_back(axis("k", kind, 1e7, 4e7));
+    }
+    if (chance(0.3)) {
+      axes.push_back(axis("length2", kind, 0.35, 0.45));
+    }
+    if (chance(0.3)) {
+      axes.push_back(protocol::listed_axis(protocol::axis_key("integrator"), {1.0, 0.0}, kind));
+      if (kind == BlockKind::kZip) {
+        axes.pop_back();
+      }
+    }
+    if (chance(0.3)) {
+      axes.push_back(protocol::expressed_axis(protocol::axis_key("I"), "A^2 / (4 * pi)"));
+    }
+    auto block = protocol::block_of(std::move(axes));
+    block.set_zip(kind == BlockKind::kZip);
+    if (kind == BlockKind::kSample) {
+      constexpr const char* kKinds[] = {"random", "lhs", "sobol"};
+      *block.mutable_sample() =
+          protocol::written_sample(kKinds[below(3)], 1 + static_cast<std::int64_t>(below(1000)),
+                                   static_cast<std::int64_t>(below(std::uint64_t{1} << 62)));
+    }
+    if (chance(0.4)) {
+      block.set_where("mu > 0.5 * e and H <= 1 || A<1e300");
+    }
+    return block;
+  }
+
+  static constexpr int kCount = 4;
+  std::mt19937 random_;
+};
+
+TEST(StudyToml, ReadsBackAsTheSameRecipeOfEveryKind) {
+  for (unsigned seed = 0; seed < 500; ++seed) {
+    const auto recipe = DrawnRecipe(seed).recipe();
+    ASSERT_NO_THROW(protocol::PointTable{recipe}) << protocol::canonical_recipe(recipe);
+    const std::string text = study_toml("drawn", recipe);
+    const auto again = parse_study(text, "again.toml", no_reach_check);
+    EXPECT_EQ(again.name, "drawn");
+    ASSERT_EQ(protocol::canonical_recipe(again.recipe), protocol::canonical_recipe(recipe)) << text;
+  }
+}
+
+std::string written(const std::string& text, const std::string& name = "x") {
+  return study_toml(name, parse_study(text, "x.toml", no_reach_check).recipe);
+}
+
+TEST(StudyToml, IsAsAPersonWouldWriteIt) {
+  EXPECT_EQ(written("[[block]]\nH=1\nmu={from=0.1,to=2,step=0.1}\ne=[0.5,1]\n", "friction"),
+            "name = \"friction\"\n\n[[block]]\nH = 1\nmu = { from = 0.1, to = 2, count = 20 }\n"
+            "e = [0.5, 1]\n");
+  EXPECT_EQ(written("errors=true\n[model]\npreset='printed'\nk=1e7\n[[block]]\nsample={kind='lhs',"
+                    "count=9}\nH={from=0.5,to=1}\nmu=1\ne=1\nI='A^2'\nwhere='mu>e'\n"),
+            "name = \"x\"\nerrors = true\n\n[model]\npreset = \"printed\"\nk = 1e+07\n\n[[block]]\n"
+            "sample = { kind = \"lhs\", count = 9, seed = 1 }\nI = \"A^2\"\n"
+            "H = { distribution = \"uniform\", from = 0.5, to = 1 }\nmu = 1\ne = 1\n"
+            "where = \"mu>e\"\n");
+}
+
+TEST(StudyToml, EscapesWhatANameMayHoldAndBreaksLongLists) {
+  const std::string name = "\"quoted\\ \xc3\xa9";
+  std::string list;
+  for (int i = 1; i < 100; ++i) {
+    list += std::to_string(i * i) + ".5, ";
+  }
+  const auto text = written("[[block]]\nH=1\nmu=[" + list + "]\ne=1\n", name);
+  EXPECT_EQ(parse_study(text, "x.toml", no_reach_check).name, name);
+  for (std::size_t begin = 0; begin < text.size();) {
+    const auto end = text.find('\n', begin);
+    EXPECT_LE(end - begin, 100U);
+    begin = end + 1;
+  }
+}
+
+}  // namespace
+}  // namespace oblique::client
