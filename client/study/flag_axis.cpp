@@ -8,6 +8,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/recipe/keys.h"
 #include "proto/recipe/written/written_axis.h"
 #include "proto/recipe/written/written_sample.h"
 #include "proto/suggestion.h"
@@ -50,13 +51,14 @@ protocol::Spacing spacing_of(std::string_view part) {
   return part == "log" ? protocol::SPACING_LOGARITHMIC : protocol::SPACING_LINEAR;
 }
 
-protocol::Axis range_of_flag(const ParameterKey& key, std::string_view text, bool is_sample) {
+protocol::Axis range_of_flag(const ParameterKey& key, std::string_view text,
+                             protocol::BlockKind kind) {
   constexpr std::size_t kMostParts = 4;
   const auto parts = protocol::split(text, ':');
-  if (is_sample && parts.size() == 2) {
+  if (kind == protocol::BlockKind::kSample && parts.size() == 2) {
     return protocol::drawn_axis(
-        key,
-        {protocol::DISTRIBUTION_UNIFORM, flag_number(parts[0]), flag_number(parts[1]), {}, {}});
+        key, {protocol::DISTRIBUTION_UNIFORM, flag_number(parts[0]), flag_number(parts[1]), {}, {}},
+        kind);
   }
   if (parts.size() < 3 || parts.size() > kMostParts) {
     throw InputError(
@@ -82,7 +84,7 @@ protocol::Axis range_of_flag(const ParameterKey& key, std::string_view text, boo
 
 /// @FILE:COLUMN, or @FILE for its only column or the one that is called as the key.
 protocol::Axis column_of_flag(const ParameterKey& key, std::string_view text,
-                              const AxisSurroundings& around, CsvFiles& files) {
+                              protocol::BlockKind kind, CsvFiles& files) {
   const auto colon = text.rfind(':');
   const std::string path(text.substr(1, colon == std::string_view::npos ? colon : colon - 1));
   const CsvFile& file = files.at(path);
@@ -92,7 +94,7 @@ protocol::Axis column_of_flag(const ParameterKey& key, std::string_view text,
   } else if (file.columns().size() == 1) {
     column = file.columns().front();
   }
-  return around.listed(key, file.values(column, key));
+  return protocol::listed_axis(key, file.values(column, key), kind);
 }
 
 /// normal(MEAN,SD), normal(MEAN,SD,FROM,TO) with either end left empty, uniform(FROM,TO) or
@@ -139,7 +141,7 @@ bool is_expression(std::string_view text) {
     return false;
   }
   return text.find_first_of("+-*/^()<>=!&|") != std::string_view::npos ||
-         solver::find_model_key(text) != nullptr || text == "H" || text == "mu" || text == "e";
+         protocol::is_axis_key(text);
 }
 
 std::vector<double> integrators(std::string_view text) {
@@ -167,22 +169,22 @@ std::vector<double> numbers_of_flag(std::string_view text) {
 }
 
 protocol::Axis axis_of_flag(const ParameterKey& key, std::string_view text,
-                            const AxisSurroundings& around, CsvFiles& files) {
+                            protocol::BlockKind kind, CsvFiles& files) {
   return at_flag(flag_of_key(key.name), text, [&] {
     if (text.starts_with('@')) {
-      return column_of_flag(key, text, around, files);
+      return column_of_flag(key, text, kind, files);
     }
     if (key.name == "integrator") {
-      return around.listed(key, integrators(text));
+      return protocol::listed_axis(key, integrators(text), kind);
     }
     if (const auto written = distribution_of_flag(text)) {
-      return protocol::drawn_axis(key, *written);
+      return protocol::drawn_axis(key, *written, kind);
     }
     if (text.find(':') != std::string_view::npos) {
-      return range_of_flag(key, text, around.is_sample);
+      return range_of_flag(key, text, kind);
     }
     return is_expression(text) ? protocol::expressed_axis(key, text)
-                               : around.listed(key, numbers_of_flag(text));
+                               : protocol::listed_axis(key, numbers_of_flag(text), kind);
   });
 }
 

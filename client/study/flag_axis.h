@@ -4,9 +4,9 @@
 #include <string_view>
 #include <vector>
 
-#include "client/study/axis_surroundings.h"
 #include "client/study/csv_file.h"
 #include "proto/oblique.pb.h"
+#include "proto/recipe/blocks.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::client {
@@ -16,7 +16,7 @@ namespace oblique::client {
 /// expression, `A^2/(4*pi)`; `0.3:1.1` in a sample. Throws InputError naming flag, value and what
 /// is allowed.
 protocol::Axis axis_of_flag(const solver::ParameterKey& key, std::string_view text,
-                            const AxisSurroundings& around, CsvFiles& files);
+                            protocol::BlockKind kind, CsvFiles& files);
 
 /// What `--sample` means: `sobol:100000:1`, kind:count:seed, or kind:count.
 protocol::Sample sample_of_flag(std::string_view text);

@@ -27,9 +27,28 @@ std::string described(const ParameterKey& key) {
   return text + std::string(key.allowed);
 }
 
+/// The flag, as it was typed, whose key a sentence about the points begins with; nothing for
+/// others.
+std::string flag_named_by(const PointFlags& flags, std::string_view sentence) {
+  const std::string key(sentence.substr(0, sentence.find_first_of(" :")));
+  if (key == "where") {
+    return fmt::format("--where {}: ", flags.where);
+  }
+  if (key == "sample") {
+    return fmt::format("--sample {}: ", flags.sample);
+  }
+  const auto axis = flags.axes.find(key);
+  return axis != flags.axes.end() ? fmt::format("{} {}: ", flag_of_key(key), axis->second) : "";
+}
+
+protocol::BlockKind kind_of_block(const PointFlags& flags) {
+  using enum protocol::BlockKind;
+  return !flags.sample.empty() ? kSample : flags.zip ? kZip : kProduct;
+}
+
 /// One number, which may as well stand in the model.
 bool is_one_value(const protocol::Axis& axis) {
-  return axis.expression().empty() && !axis.has_distribution() && protocol::axis_size(axis) == 1;
+  return protocol::has_own_values(axis) && protocol::axis_size(axis) == 1;
 }
 
 std::string default_of(const ParameterKey& key) {
@@ -85,22 +104,28 @@ void add_point_flags(CLI::App& verb, PointFlags& flags, FlagValues values) {
       ->type_name("NAME")
       ->group(group)
       ->capture_default_str();
-  verb.add_option("--lengths", flags.lengths, "length of each link, from the pin outwards [m]; > 0")
+  verb.add_option(
+          "--lengths", flags.lengths,
+          "length of each link, from the pin outwards [m]; > 0; --length1, --length2, ... set that "
+          "of one link")
       ->type_name("L1,L2,...")
       ->group(group);
   for (const auto& key : solver::model_keys()) {
     add(key, group)->default_str(default_of(key));
+  }
+  for (std::size_t link = 1; link <= protocol::kMostLinks; ++link) {
+    add(protocol::axis_key(fmt::format("length{}", link)), "");  // help would have no end
   }
 }
 
 protocol::Recipe recipe_of_flags(const PointFlags& flags, const ReachCheck& check_reach) {
   protocol::WrittenModel model;
   at_flag("--preset", flags.preset, [&] { model.set_preset(flags.preset); });
-  const AxisSurroundings around{flags.zip, !flags.sample.empty()};
+  const auto kind = kind_of_block(flags);
   CsvFiles files(".");
   std::vector<protocol::Axis> axes;
   for (const auto& [name, text] : flags.axes) {
-    auto axis = axis_of_flag(protocol::axis_key(name), text, around, files);
+    auto axis = axis_of_flag(protocol::axis_key(name), text, kind, files);
     if (solver::find_model_key(name) != nullptr && is_one_value(axis)) {
       model.set(name, protocol::axis_value(axis, 0));
     } else {
@@ -115,13 +140,15 @@ protocol::Recipe recipe_of_flags(const PointFlags& flags, const ReachCheck& chec
   protocol::Block& block = *recipe.add_blocks() = protocol::block_of(std::move(axes));
   block.set_zip(flags.zip);
   block.set_where(flags.where);
-  if (around.is_sample) {
+  if (!flags.sample.empty()) {
     *block.mutable_sample() = sample_of_flag(flags.sample);
   }
   try {
     check_reach(protocol::PointTable(recipe));
   } catch (const protocol::MissingKey& error) {
     throw InputError(std::string("--") + error.what());  // it begins with the key
+  } catch (const InputError& error) {
+    throw InputError(flag_named_by(flags, error.what()) + error.what());
   }
   protocol::check_size(recipe);
   return recipe;

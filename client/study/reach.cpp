@@ -1,6 +1,7 @@
 #include "client/study/reach.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <utility>
 
@@ -13,6 +14,24 @@
 
 namespace oblique::client {
 
+namespace {
+
+/// The largest H of a block of which every model has it; nothing (0) where that depends on the
+/// point.
+double largest_H_m(const protocol::PointTable& table) {
+  const protocol::Block& block = table.recipe().blocks(0);
+  const protocol::Axis& H = *protocol::point_axes(block)[0];
+  const bool is_shared =
+      table.models() == 1 || protocol::block_kind(block) == protocol::BlockKind::kProduct;
+  if (!is_shared || !H.expression().empty() || !block.where().empty()) {
+    return 0.0;
+  }
+  const double H_m = protocol::largest_value(H);
+  return std::isfinite(H_m) ? H_m : 0.0;
+}
+
+}  // namespace
+
 ReachChecker::ReachChecker(LargestDrop largest_drop_m)
     : largest_drop_m_(std::move(largest_drop_m)) {}
 
@@ -22,7 +41,7 @@ void ReachChecker::operator()(const protocol::PointTable& block) {
   if (block.models() > kMostFalls) {
     return;
   }
-  const double H_m = protocol::largest_value(*protocol::point_axes(block.recipe().blocks(0))[0]);
+  const double H_m = largest_H_m(block);
   for (std::uint64_t at = 0; at < block.size();) {
     const auto segment = block.segment_at(at);
     at = segment.first_point + segment.count;

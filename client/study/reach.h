@@ -27,10 +27,11 @@ class ReachChecker {
 
   explicit ReachChecker(LargestDrop largest_drop_m);
 
-  /// Throws InputError unless every model of the block reaches the block's largest H. Only an H
-  /// near the length of the chain is looked into, by the fall (on a coarse mesh, which mostly
-  /// settles it, and then on the model's own). What is beyond `kMostFalls` is not: there an H out
-  /// of reach shows as failed points.
+  /// Throws InputError unless every model of the block reaches the block's largest H, as far as all
+  /// models have that one: not where an expression or a filter decides, nor for points side by side
+  /// or drawn of several models. Only an H near the length of the chain is looked into, by the fall
+  /// (on a coarse mesh, which mostly settles it, and then on the model's own). What is beyond
+  /// `kMostFalls` is not: there an H out of reach shows as failed points.
   void operator()(const protocol::PointTable& block);
 
   /// How many falls were asked for so far.

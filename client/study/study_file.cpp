@@ -148,13 +148,25 @@ const toml::array& StudyReader::blocks(const toml::table& top) const {
   return *blocks->as_array();
 }
 
+/// The value of the key that a sentence about a block begins with, else the block.
+const toml::node& named_value(const toml::node& block, std::string_view sentence) {
+  const auto* table = block.as_table();
+  const auto* value =
+      table != nullptr ? table->get(sentence.substr(0, sentence.find_first_of(" :"))) : nullptr;
+  return value != nullptr ? *value : block;
+}
+
 /// Each block is checked alone, so that the error can say where it stands.
 void StudyReader::add_block(Study& study, const toml::node& node) {
   *study.recipe.add_blocks() = block_of_toml(place_, node, files_);
   protocol::Recipe alone;
   *alone.mutable_model() = study.recipe.model();
   *alone.add_blocks() = study.recipe.blocks(study.recipe.blocks_size() - 1);
-  place_.located(node, [&] { check_reach_(protocol::PointTable(alone)); });
+  try {
+    check_reach_(protocol::PointTable(alone));
+  } catch (const InputError& error) {
+    place_.fail(named_value(node, error.what()), error.what());
+  }
 }
 
 Study StudyReader::study(const toml::table& top) {

@@ -19,7 +19,11 @@ std::string name_of_recipe(const protocol::Recipe& recipe) {
 }
 
 void add_study_flags(CLI::App& verb, StudyFlags& flags) {
-  verb.add_option("STUDY.toml", flags.file, "study file; or say the points by the flags below")
+  verb.add_option(
+          "STUDY.toml", flags.file,
+          "study file; or say the points by the flags below, whose VALUES are 0.4, 0.4,0.6, "
+          "FROM:TO:COUNT, FROM:TO:COUNT:log, FROM:TO:step=STEP, @FILE.csv:COLUMN or an "
+          "expression of other keys, as \"A^2/(4*pi)\"")
       ->type_name("");
   verb.add_option("--name", flags.name,
                   "name of the study; by default the file's, or `sweep-` and a hash of the flags")

@@ -33,15 +33,15 @@ class AxisTable {
   AxisTable(const TomlPlace& place, const solver::ParameterKey& key, const toml::table& table)
       : place_(place), key_(key), table_(table) {}
 
-  protocol::Axis axis(const AxisSurroundings& around, CsvFiles& files) const {
+  protocol::Axis axis(protocol::BlockKind kind, CsvFiles& files) const {
     if (table_.contains("csv") || table_.contains("column")) {
-      return csv_column(around, files);
+      return csv_column(kind, files);
     }
     if (table_.contains("distribution")) {
-      return distribution();
+      return distribution(kind);
     }
-    return around.is_sample && !table_.contains("count") && !table_.contains("step") &&
-                   !table_.contains("spacing")
+    return kind == protocol::BlockKind::kSample && !table_.contains("count") &&
+                   !table_.contains("step") && !table_.contains("spacing")
                ? uniform()
                : range();
   }
@@ -66,7 +66,7 @@ class AxisTable {
     return place_.text(fmt::format("{}: {}", key_.name, part), *table_.get(part), expected);
   }
 
-  protocol::Axis csv_column(const AxisSurroundings& around, CsvFiles& files) const {
+  protocol::Axis csv_column(protocol::BlockKind kind, CsvFiles& files) const {
     check_parts(kCsvParts, "a column of a file is { csv = \"FILE.csv\", column = \"NAME\" }");
     if (!table_.contains("csv")) {
       place_.fail(table_, fmt::format("{}: `column` stands without `csv`, the file", key_.name));
@@ -79,11 +79,11 @@ class AxisTable {
                                  : table_.contains("column")
                                      ? text("column", "the name of a column, in quotes")
                                      : std::string(key_.name);
-      return around.listed(key_, file.values(column, key_));
+      return protocol::listed_axis(key_, file.values(column, key_), kind);
     });
   }
 
-  protocol::Axis distribution() const {
+  protocol::Axis distribution(protocol::BlockKind kind) const {
     check_parts(kDistributionParts,
                 "a distribution is { distribution = \"uniform\", from, to }, the same with "
                 "\"log-uniform\", or { distribution = \"normal\", mean, sd } with `from` and `to` "
@@ -91,8 +91,10 @@ class AxisTable {
     const std::string name = text("distribution", "uniform, log-uniform or normal, in quotes");
     return place_.located(table_, [&] {
       return protocol::drawn_axis(
-          key_, {protocol::distribution_named(name), number_if_there("from"), number_if_there("to"),
-                 number_if_there("mean"), number_if_there("sd")});
+          key_,
+          {protocol::distribution_named(name), number_if_there("from"), number_if_there("to"),
+           number_if_there("mean"), number_if_there("sd")},
+          kind);
     });
   }
 
@@ -101,7 +103,8 @@ class AxisTable {
     return place_.located(table_, [&] {
       return protocol::drawn_axis(
           key_,
-          {protocol::DISTRIBUTION_UNIFORM, number_if_there("from"), number_if_there("to"), {}, {}});
+          {protocol::DISTRIBUTION_UNIFORM, number_if_there("from"), number_if_there("to"), {}, {}},
+          protocol::BlockKind::kSample);
     });
   }
 
@@ -166,11 +169,11 @@ double toml_number(const TomlPlace& place, const solver::ParameterKey& key, cons
 }
 
 protocol::Axis axis_of_toml(const TomlPlace& place, std::string_view name, const toml::node& value,
-                            const AxisSurroundings& around, CsvFiles& files) {
+                            protocol::BlockKind kind, CsvFiles& files) {
   const auto& key = place.located(
       value, [&]() -> auto& { return protocol::axis_key(name); });
   if (const auto* table = value.as_table()) {
-    return AxisTable(place, key, *table).axis(around, files);
+    return AxisTable(place, key, *table).axis(kind, files);
   }
   if (value.is_string() && key.name != "integrator") {
     return place.located(
@@ -185,7 +188,7 @@ protocol::Axis axis_of_toml(const TomlPlace& place, std::string_view name, const
   } else {
     values.push_back(toml_number(place, key, value, kAxisForms));
   }
-  return place.located(value, [&] { return around.listed(key, values); });
+  return place.located(value, [&] { return protocol::listed_axis(key, values, kind); });
 }
 
 }  // namespace oblique::client

@@ -24,15 +24,6 @@ namespace {
 constexpr std::array<std::string_view, 5> kBlockKeys{"zip", "sample", "where", "csv", "columns"};
 constexpr std::array<std::string_view, 3> kSampleParts{"kind", "count", "seed"};
 
-bool is_axis_key(std::string_view name) {
-  try {
-    protocol::axis_key(name);
-    return true;
-  } catch (const solver::InputError&) {
-    return false;
-  }
-}
-
 /// One [[block]].
 class BlockReader {
  public:
@@ -47,10 +38,13 @@ class BlockReader {
     const bool is_zip =
         has_file || (table_.contains("zip") && place_.yes("zip", *table_.get("zip")));
     const bool is_sample = table_.contains("sample");
+    const auto kind = is_sample ? protocol::BlockKind::kSample
+                      : is_zip  ? protocol::BlockKind::kZip
+                                : protocol::BlockKind::kProduct;
     std::vector<protocol::Axis> axes;
     for (const auto& [key, value] : table_) {
       if (!is_block_key(key.str(), value)) {
-        axes.push_back(axis_of_toml(place_, key.str(), value, {is_zip, is_sample}, files_));
+        axes.push_back(axis_of_toml(place_, key.str(), value, kind, files_));
       }
     }
     if (has_file) {
@@ -73,7 +67,7 @@ class BlockReader {
     if (std::find(kBlockKeys.begin(), kBlockKeys.end(), key) != kBlockKeys.end()) {
       return true;
     }
-    if (!protocol::nearest(key, kBlockKeys).empty() && !is_axis_key(key)) {
+    if (!protocol::nearest(key, kBlockKeys).empty() && !protocol::is_axis_key(key)) {
       place_.fail(value, fmt::format("unknown key `{}`{}: beside its axes a block has {}", key,
                                      protocol::did_you_mean(key, kBlockKeys),
                                      protocol::joined(kBlockKeys)));
@@ -146,14 +140,15 @@ class BlockReader {
         throw solver::InputError(fmt::format(
             "{} is given twice: by the block and by a column of {}", name, file.name()));
       }
-      if (!table_.contains("columns") && !is_axis_key(name)) {
+      if (!table_.contains("columns") && !protocol::is_axis_key(name)) {
         throw solver::InputError(
             fmt::format("the column `{}` of {} is called as no key: name the columns to take, as "
                         "columns = {{ H = \"drop\", mu = \"friction\" }}",
                         protocol::visible(name), file.name()));
       }
       const auto& key = protocol::axis_key(name);
-      axes.push_back(protocol::column_axis(key, file.values(column, key)));
+      axes.push_back(
+          protocol::listed_axis(key, file.values(column, key), protocol::BlockKind::kZip));
     });
   }
 

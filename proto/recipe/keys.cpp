@@ -132,4 +132,13 @@ const solver::ParameterKey& axis_key(std::string_view name) {
   return key_numbered(key_number(name));
 }
 
+bool is_axis_key(std::string_view name) {
+  try {
+    key_number(name);
+    return true;
+  } catch (const solver::InputError&) {
+    return false;
+  }
+}
+
 }  // namespace oblique::protocol

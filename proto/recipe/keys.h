@@ -25,6 +25,9 @@ std::size_t key_count();
 /// The model or point key called `name`. Throws as `key_number` does.
 const solver::ParameterKey& axis_key(std::string_view name);
 
+/// Whether there is such a key.
+bool is_axis_key(std::string_view name);
+
 /// Whether the key of that number belongs to the point, as H, mu and e do, and not to its model.
 bool is_point_key(std::size_t number);
 

@@ -27,11 +27,12 @@ Axis range_axis(const solver::ParameterKey& key, double from, double to, std::ui
 
 }  // namespace
 
-Axis listed_axis(const solver::ParameterKey& key, const std::vector<double>& values) {
+Axis listed_axis(const solver::ParameterKey& key, const std::vector<double>& values,
+                 BlockKind kind) {
   Axis axis;
   axis.set_key(std::string(key.name));
   axis.mutable_values()->Assign(values.begin(), values.end());
-  check_axis(axis);
+  check_axis(axis, kind);
   return axis;
 }
 

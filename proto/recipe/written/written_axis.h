@@ -5,12 +5,15 @@
 #include <vector>
 
 #include "proto/oblique.pb.h"
+#include "proto/recipe/blocks.h"
 #include "worker/solver/model/parameters.h"
 
 // Axes of what people wrote. Each throws InputError naming key, value and what is allowed.
 namespace oblique::protocol {
 
-Axis listed_axis(const solver::ParameterKey& key, const std::vector<double>& values);
+/// Of a block of that kind: side by side a value may come twice.
+Axis listed_axis(const solver::ParameterKey& key, const std::vector<double>& values,
+                 BlockKind kind = BlockKind::kProduct);
 
 /// `count` values with both ends in.
 Axis counted_axis(const solver::ParameterKey& key, double from, double to, std::int64_t count,

@@ -71,7 +71,8 @@ DistributionKind distribution_named(std::string_view name) {
       number_of_name(name, distribution_names(), "the distribution"));
 }
 
-Axis drawn_axis(const solver::ParameterKey& key, const WrittenDistribution& written) {
+Axis drawn_axis(const solver::ParameterKey& key, const WrittenDistribution& written,
+                BlockKind kind) {
   check_parts(key, written);
   Axis axis = axis_of(key);
   Distribution& distribution = *axis.mutable_distribution();
@@ -84,7 +85,7 @@ Axis drawn_axis(const solver::ParameterKey& key, const WrittenDistribution& writ
   }
   distribution.set_mean(written.mean.value_or(0.0));
   distribution.set_sd(written.sd.value_or(0.0));
-  check_axis(axis, BlockKind::kSample);
+  check_axis(axis, kind);
   return axis;
 }
 
@@ -92,15 +93,6 @@ Axis expressed_axis(const solver::ParameterKey& key, std::string_view text) {
   Axis axis = axis_of(key);
   axis.set_expression(std::string(text));
   check_axis(axis);
-  return axis;
-}
-
-Axis column_axis(const solver::ParameterKey& key, const std::vector<double>& values) {
-  Axis axis = axis_of(key);
-  axis.mutable_values()->Assign(values.begin(), values.end());
-  for (const double value : values) {
-    solver::check_value(key, value);
-  }
   return axis;
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "proto/oblique.pb.h"
+#include "proto/recipe/blocks.h"
 #include "worker/solver/model/parameters.h"
 
 // What people wrote of samples, distributions and expressions. Each throws InputError naming key,
@@ -22,14 +23,12 @@ struct WrittenDistribution {
   std::optional<double> sd;
 };
 
-/// An axis of a sample.
-Axis drawn_axis(const solver::ParameterKey& key, const WrittenDistribution& distribution);
+/// An axis that is drawn, as only a block of kind `kSample` may have one.
+Axis drawn_axis(const solver::ParameterKey& key, const WrittenDistribution& distribution,
+                BlockKind kind);
 
 /// An axis that follows from others, as "A^2 / (4 * pi)".
 Axis expressed_axis(const solver::ParameterKey& key, std::string_view text);
-
-/// Values of a block whose axes go side by side, where one may come twice.
-Axis column_axis(const solver::ParameterKey& key, const std::vector<double>& values);
 
 /// `kind` goes by its name: random, lhs or sobol.
 Sample written_sample(std::string_view kind, std::int64_t count, std::int64_t seed);

@@ -1,5 +1,8 @@
 #include "client/study/point_flags.h"
 
+#include <filesystem>
+#include <fstream>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -24,9 +27,9 @@ std::vector<double> values(const protocol::Axis& axis) {
 }
 
 protocol::Axis axis_of(const std::string& key, const std::string& text,
-                       const AxisSurroundings& around = {}) {
+                       protocol::BlockKind kind = protocol::BlockKind::kProduct) {
   CsvFiles files(".");
-  return axis_of_flag(protocol::axis_key(key), text, around, files);
+  return axis_of_flag(protocol::axis_key(key), text, kind, files);
 }
 
 std::string error_of(const PointFlags& flags) {
@@ -47,6 +50,68 @@ TEST(PointFlags, TakeOneValueAListOrARange) {
   EXPECT_EQ(range.back(), 2.0);
 }
 
+TEST(PointFlags, TakeLogarithmicRangesAndSteps) {
+  EXPECT_EQ(values(axis_of("mu", "0.01:1:3:log")), (std::vector{0.01, 0.1, 1.0}));
+  EXPECT_EQ(values(axis_of("mu", "0:1:3:linear")), (std::vector{0.0, 0.5, 1.0}));
+  EXPECT_EQ(values(axis_of("mu", "0.5:1:step=0.25")), (std::vector{0.5, 0.75, 1.0}));
+}
+
+TEST(PointFlags, TakeColumnsOfFiles) {
+  const std::string path = testing::TempDir() + "flags.csv";
+  std::ofstream(path) << "mu,drop\n0.4,0.5\n0.6,0.5\n";
+  EXPECT_EQ(values(axis_of("mu", "@" + path)), (std::vector{0.4, 0.6}));
+  const auto side_by_side = protocol::BlockKind::kZip;
+  EXPECT_EQ(values(axis_of("H", "@" + path + ":drop", side_by_side)), (std::vector{0.5, 0.5}));
+  const auto message = error_of(flags_of({{"H", "@" + path + ":dorp"}}));
+  EXPECT_TRUE(message.starts_with("--H @")) << message;
+  EXPECT_NE(message.find("did you mean `drop`"), std::string::npos) << message;
+  std::filesystem::remove(path);
+}
+
+TEST(PointFlags, TakeDistributionsInSamplesAndExpressions) {
+  auto flags = flags_of({{"H", "0.3:1.1"},
+                         {"mu", "normal(0.4,0.05,0,)"},
+                         {"k", "log-uniform(1e7,2e7)"},
+                         {"I", "A^2/(4*pi)"}});
+  flags.sample = "sobol:100000:5";
+  flags.where = "mu > 0.5 * e";
+  const auto recipe = recipe_of_flags(flags, pretended_reach());
+  const auto& block = recipe.blocks(0);
+  EXPECT_EQ(block.sample().kind(), protocol::SAMPLE_SOBOL);
+  EXPECT_EQ(block.sample().count(), 100'000U);
+  EXPECT_EQ(block.sample().seed(), 5U);
+  EXPECT_EQ(block.where(), "mu > 0.5 * e");
+  EXPECT_EQ(block.axes(0).expression(), "A^2/(4*pi)");
+  EXPECT_EQ(block.axes(1).distribution().kind(), protocol::DISTRIBUTION_LOG_UNIFORM);
+  EXPECT_EQ(block.axes(3).distribution().mean(), 0.4);
+  EXPECT_TRUE(block.axes(3).distribution().has_from());
+  EXPECT_FALSE(block.axes(3).distribution().has_to());
+}
+
+TEST(PointFlags, TakeAxesSideBySide) {
+  auto flags = flags_of({{"H", "0.5,0.6"}, {"mu", "0.4,0.4"}, {"length2", "0.3,0.4"}});
+  flags.zip = true;
+  const protocol::PointTable table(recipe_of_flags(flags, pretended_reach()));
+  EXPECT_EQ(table.size(), 2U);
+  EXPECT_EQ(table.model(table.point(0).model).lengths_m[1], 0.3);
+}
+
+TEST(PointFlags, SayWhatIsWrongWithASample) {
+  for (const auto& [text, says] :
+       std::map<std::string, std::string>{{"sobol", "kind:count:seed"},
+                                          {"sobol:x", "kind:count:seed"},
+                                          {"sobol:1:2:3", "kind:count:seed"},
+                                          {"sobl:10", "did you mean `sobol`"},
+                                          {"lhs:0", "count = 0"},
+                                          {"lhs:10:-1", "seed = -1"}}) {
+    auto flags = flags_of({{"H", "0.3:1.1"}});
+    flags.sample = text;
+    const auto message = error_of(flags);
+    EXPECT_NE(message.find(says), std::string::npos) << message;
+    EXPECT_TRUE(message.starts_with("--sample " + text + ": ")) << message;
+  }
+}
+
 TEST(PointFlags, TakeIntegratorsByName) {
   EXPECT_EQ(values(axis_of("integrator", "explicit")), (std::vector{0.0}));
   EXPECT_THROW(axis_of("integrator", "euler"), solver::InputError);
@@ -63,7 +128,15 @@ TEST(PointFlags, RefuseWhatIsNoValueWithASentence) {
       {"0.4x", "\"0.4x\" is not a number"},
       {"0.4 ", "is not a number"},
       {"0.1:2", "from:to:count"},
-      {"0.1:2:4:5", "from:to:count"},
+      {"0.1:2:4:5", "from:to:count:log"},
+      {"0:2:4:log", "above 0"},
+      {"0:1:step=0.3", "step = 0.3"},
+      {"0:1:step=0.5:log", "a step has no spacing"},
+      {"1:2:3:4:5", "from:to:count"},
+      {"normal(0.4,0.05)", "`sample`"},
+      {"normal(0.4)", "normal(MEAN,SD)"},
+      {"uniform(1)", "uniform(FROM,TO)"},
+      {"@nowhere.csv:a", "nowhere.csv"},
       {"0.1:2:4.5", "count = 4.5"},
       {"0.1:2:x", "count = x"},
       {"0.1:2:0", "count = 0"},

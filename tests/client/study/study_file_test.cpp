@@ -135,14 +135,133 @@ TEST(StudyFile, ThatIsEmptyHasNoBlock) {
   std::filesystem::remove(file);
 }
 
+/// A folder with a CSV file, for studies beside it.
+class StudyBesideAFile : public testing::Test {
+ protected:
+  StudyBesideAFile() {
+    std::filesystem::create_directories(folder_);
+    std::ofstream(folder_ / "measured.csv") << "drop,friction,H\n0.5,0.4,0.7\n0.5,0.6,0.8\n";
+  }
+  ~StudyBesideAFile() override { std::filesystem::remove_all(folder_); }
+  protocol::PointTable table(const std::string& text) const {
+    return protocol::PointTable(parsed(text, (folder_ / "study.toml").string()).recipe);
+  }
+  std::string error(const std::string& text) const {
+    try {
+      table(text);
+    } catch (const solver::InputError& error) {
+      return error.what();
+    }
+    return "accepted";
+  }
+
+  const std::filesystem::path folder_ =
+      std::filesystem::path(testing::TempDir()) / "study-beside-a-file";
+};
+
+TEST_F(StudyBesideAFile, TakesAColumnAsAnAxis) {
+  const auto points = table(block_with("mu = { csv = 'measured.csv', column = 'friction' }"));
+  ASSERT_EQ(points.size(), 2U);
+  EXPECT_EQ(points.point(1).mu, 0.6);
+  EXPECT_EQ(table("[[block]]\nH = { csv = 'measured.csv' }\nmu = 1\ne = 1\n").point(0).H_m, 0.7)
+      << "the column that is called as the key";
+}
+
+TEST_F(StudyBesideAFile, TakesTheLinesAsPoints) {
+  const auto points = table(
+      "[[block]]\ncsv = 'measured.csv'\ncolumns = { H = 'drop', mu = 'friction' }\ne = 0.9\n");
+  ASSERT_EQ(points.size(), 2U);
+  EXPECT_EQ(points.point(0).H_m, 0.5);
+  EXPECT_EQ(points.point(1).H_m, 0.5) << "a value may come twice";
+  EXPECT_EQ(points.point(1).mu, 0.6);
+  EXPECT_EQ(points.point(1).e_star, 0.9);
+}
+
+TEST_F(StudyBesideAFile, NamesThePlaceInBothFiles) {
+  const auto expect = [&](const std::string& text, const std::vector<std::string>& says) {
+    for (const auto& part : says) {
+      EXPECT_THAT(error(text), testing::HasSubstr(part));
+    }
+  };
+  expect(block_with("mu = { csv = 'measured.csv', column = 'fricton' }"),
+         {"study.toml:3:6: ", "no column `fricton` (did you mean `friction`?)"});
+  expect("[[block]]\ncsv = 'measured.csv'\nmu = 1\ne = 1\n",
+         {"study.toml:2:7: ", "the column `drop` of", "columns = {"});
+  expect("[[block]]\ncsv = 'measured.csv'\ncolumns = { H = 'drop' }\nH = 1\nmu = 1\ne = 1\n",
+         {"study.toml:3:17: ", "H is given twice"});
+  expect("[[block]]\ncsv = 'nowhere.csv'\nmu = 1\ne = 1\n",
+         {"study.toml:2:7: cannot read the CSV file", "nowhere.csv"});
+  std::ofstream(folder_ / "measured.csv") << "mu\n0.5\n-1\n";
+  expect(block_with("mu = { csv = 'measured.csv' }"),
+         {"study.toml:3:6: ", "measured.csv:3: column `mu`: mu = -1 is not allowed"});
+}
+
+TEST(StudyFile, TakesLogarithmicRanges) {
+  const protocol::PointTable table(
+      parsed(block_with("mu = { from = 0.01, to = 1, count = 3, spacing = 'log' }"), "x").recipe);
+  ASSERT_EQ(table.size(), 3U);
+  EXPECT_EQ(table.point(0).mu, 0.01);
+  EXPECT_EQ(table.point(1).mu, 0.1);
+  EXPECT_EQ(table.point(2).mu, 1.0);
+}
+
+TEST(StudyFile, TakesAxesSideBySide) {
+  const protocol::PointTable table(
+      parsed("[[block]]\nzip = true\nH = [0.5, 0.6]\nmu = [0.4, 0.4]\ne = 1\n", "x").recipe);
+  ASSERT_EQ(table.size(), 2U);
+  EXPECT_EQ(table.point(1).H_m, 0.6);
+  EXPECT_EQ(table.point(1).mu, 0.4);
+}
+
+TEST(StudyFile, TakesSamplesOfDistributions) {
+  const protocol::PointTable table(
+      parsed("[[block]]\nsample = { kind = 'sobol', count = 1000000000, seed = 7 }\n"
+             "H = { from = 0.3, to = 1 }\n"
+             "mu = { distribution = 'normal', mean = 0.4, sd = 0.05, from = 0.39 }\n"
+             "k = { distribution = 'log-uniform', from = 1e7, to = 2e7 }\ne = [0.5, 1]\n",
+             "x")
+          .recipe);
+  ASSERT_EQ(table.size(), 1'000'000'000U);
+  for (const std::uint64_t i : {0U, 1U, 999'999'999U}) {
+    const auto point = table.point(i);
+    EXPECT_THAT(point.H_m, testing::AllOf(testing::Gt(0.3), testing::Lt(1.0)));
+    EXPECT_GE(point.mu, 0.39);
+    EXPECT_THAT(point.e_star, testing::AnyOf(0.5, 1.0));
+    EXPECT_THAT(table.model(point.model).k_N_m, testing::AllOf(testing::Gt(1e7), testing::Lt(2e7)));
+  }
+}
+
+TEST(StudyFile, TakesExpressionsFiltersAndSingleLengths) {
+  protocol::PointTable table(
+      parsed("[[block]]\nA = [4e-4, 5e-4]\nI = 'A^2 / (4 * pi)'\nlength2 = [0.3, 0.4]\nH = 0.5\n"
+             "mu = [0.4, 0.6]\ne = 1\nwhere = 'mu > 0.5 * e'\n",
+             "x")
+          .recipe);
+  ASSERT_EQ(table.size(), 8U);
+  const auto model = table.model(table.point(7).model);
+  EXPECT_DOUBLE_EQ(model.I_m4, 25e-8 / 4.0 / 3.14159265358979312);
+  EXPECT_EQ(model.lengths_m, (std::vector{0.4, 0.4, 0.4}));
+  EXPECT_EQ(table.model(0).lengths_m, (std::vector{0.4, 0.3, 0.4}));
+  EXPECT_FALSE(table.is_left_in(0));
+  EXPECT_TRUE(table.is_left_in(1));
+  EXPECT_TRUE(table.survey([] { return true; }));
+  EXPECT_EQ(table.points(), 4U);
+}
+
 TEST(ExampleStudies, HaveThePointsThatTheirCommentsPromise) {
   const std::string folder = std::string(OBLIQUE_SOURCE_DIR) + "/deploy/studies/";
   const auto points = [&](const std::string& name) {
     const auto study = read_study_file(folder + name + ".toml", pretended_reach());
     EXPECT_EQ(study.name, name);
-    return protocol::PointTable(study.recipe).size();
+    protocol::PointTable table(study.recipe);
+    EXPECT_TRUE(table.survey([] { return true; }));
+    return table.points();
   };
   EXPECT_EQ(points("paper"), 10U);
+  EXPECT_EQ(points("uncertainty"), 1024U);
+  EXPECT_EQ(points("measured"), 12U);
+  EXPECT_EQ(points("sticking"), 615U);
+  EXPECT_EQ(points("round-sections"), 30U);
   EXPECT_EQ(points("friction-and-restitution"), 440U);
   EXPECT_EQ(points("mesh"), 6U);
 }
