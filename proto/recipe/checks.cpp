@@ -303,6 +303,14 @@ void check_sample(const Block& block) {
   if (!SampleKind_IsValid(sample.kind())) {
     throw InputError("sample: its kind is unknown");
   }
+  constexpr auto kLargestSeed =
+      static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
+  if (sample.seed() > kLargestSeed) {
+    throw InputError(
+        fmt::format("sample: seed = {} is not allowed: it must be at most {}, which a "
+                    "study file can say",
+                    sample.seed(), kLargestSeed));
+  }
   if (sample.count() < 1) {
     throw InputError("sample: count = 0 is not allowed: count must be at least 1");
   }

@@ -49,5 +49,26 @@ TEST(Reach, ADropBelowTheLargestByFarIsSettledOnACoarseMesh) {
   EXPECT_EQ(checker.falls_solved(), 2U) << "it is remembered";
 }
 
+TEST(Reach, ADropThatDependsOnThePointIsNotLookedInto) {
+  ReachChecker checker(pretended_drop_m);
+  for (const char* text :
+       {"[[block]]\nH = [1, 1.19]\nmu = 0.4\ne = 1\nwhere = 'H < 1.1'\n",
+        "[[block]]\nH = '0.9 + 0.1 * e'\nmu = 0.4\ne = [0.9, 1]\n",
+        "[[block]]\nzip = true\nlength3 = [0.4, 0.5]\nH = [1, 1.25]\nmu = 1\ne = 1\n",
+        "[[block]]\nsample = { kind = 'lhs', count = 9 }\n"
+        "H = { distribution = 'normal', mean = 1, sd = 0.1, from = 0.5 }\nmu = 1\ne = 1\n"}) {
+    EXPECT_NO_THROW(parse_study(text, "x.toml", std::ref(checker))) << text;
+  }
+  EXPECT_EQ(checker.falls_solved(), 0U);
+}
+
+TEST(Reach, TheEndOfADistributionMustBeReached) {
+  ReachChecker checker(pretended_drop_m);
+  EXPECT_THROW(parse_study("[[block]]\nsample = { kind = 'lhs', count = 9 }\n"
+                           "H = { from = 0.5, to = 1.19 }\nmu = 1\ne = 1\n",
+                           "x.toml", std::ref(checker)),
+               solver::InputError);
+}
+
 }  // namespace
 }  // namespace oblique::client
