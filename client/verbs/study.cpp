@@ -41,7 +41,7 @@ Nothing is submitted. The time is estimated from some points of the study that a
 all cores, for about a second; the size from what a result takes in a database on average.)";
 
 /// What a result takes in a database, on average (server/store/README.md).
-constexpr double kBytesAResult = 500.0;
+constexpr double kBytesAResult = 450.0;
 /// Models that are looked at for how many falls they share.
 constexpr std::uint64_t kMostModels = 20'000;
 

@@ -60,7 +60,7 @@ TEST(StudyCheck, OfAThousandMillionPointsCostsNoMoreThanOfAFew) {
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("points  1000000000\n"));
   EXPECT_THAT(outcome.out, HasSubstr("sobol sample of H, mu, e"));
-  EXPECT_THAT(outcome.out, HasSubstr("size    about 500 GB"));
+  EXPECT_THAT(outcome.out, HasSubstr("size    about 450 GB"));
 }
 
 TEST(StudyCheck, EndsWithTwoAndThePlaceForWhatIsWrong) {
