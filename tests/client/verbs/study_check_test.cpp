@@ -12,10 +12,11 @@ namespace {
 
 using testing::HasSubstr;
 
-const std::string kStudies = std::string(OBLIQUE_SOURCE_DIR) + "/deploy/studies/";
+const std::string kExampleStudies = std::string(OBLIQUE_SOURCE_DIR) + "/deploy/studies/";
 
 TEST(StudyCheck, SaysPointsBlocksModelsFallsTimeAndSize) {
-  const auto outcome = test::run_oblique({"study", "check", kStudies + "sticking.toml", "--json"});
+  const auto outcome =
+      test::run_oblique({"study", "check", kExampleStudies + "sticking.toml", "--json"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   const auto json = nlohmann::json::parse(outcome.out);
   EXPECT_EQ(json["study"], "sticking");
@@ -69,7 +70,7 @@ TEST(StudyCheck, EndsWithTwoAndThePlaceForWhatIsWrong) {
       << "[[block]]\nH = 1\nmu = 0.4\ne = 1\nwhere = \"mu > f\"\n";
   const auto file = test::run_oblique(folder, {"study", "check", "wrong.toml"});
   EXPECT_EQ(file.exit_code, 2);
-  EXPECT_THAT(file.err, HasSubstr("wrong.toml:5:9: where: unknown key `f`"));
+  EXPECT_THAT(file.err, HasSubstr("wrong.toml:5:9: where = \"mu > f\": unknown key `f`"));
   const auto flags = test::run_oblique(
       {"study", "check", "--H", "1", "--mu", "0.4", "--e", "1", "--where", "mu > 1"});
   EXPECT_EQ(flags.exit_code, 2);
