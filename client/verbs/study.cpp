@@ -9,8 +9,8 @@
 #include <spdlog/fmt/fmt.h>
 #include <nlohmann/json.hpp>
 
+#include "client/output/human_units.h"
 #include "client/output/mesh_note.h"
-#include "client/output/progress.h"
 #include "client/output/work_line.h"
 #include "client/study/study_flags.h"
 #include "client/verbs/solving_rate.h"
@@ -41,7 +41,7 @@ Nothing is submitted. The time is estimated from some points of the study that a
 all cores, for about a second; the size from what a result takes in a database on average.)";
 
 /// What a result takes in a database, on average (server/store/README.md).
-constexpr double kBytesAResult = 450.0;
+constexpr std::uint64_t kBytesAResult = 450;
 /// Models that are looked at for how many falls they share.
 constexpr std::uint64_t kMostModels = 20'000;
 
@@ -164,16 +164,6 @@ std::string counted(std::uint64_t count, std::string_view one, std::string_view 
   return fmt::format("{} {}", count, count == 1 ? one : many);
 }
 
-std::string shown_size(double bytes) {
-  for (const auto& [unit, size] :
-       {std::pair("TB", 1e12), std::pair("GB", 1e9), std::pair("MB", 1e6), std::pair("kB", 1e3)}) {
-    if (bytes >= size) {
-      return fmt::format("{} {}", solver::readable_number(bytes / size, 2), unit);
-    }
-  }
-  return fmt::format("{} bytes", solver::readable_number(bytes, 3));
-}
-
 void print(const Report& report, bool wants_errors) {
   std::cout << "study   " << report.name << (wants_errors ? ", with estimated errors" : "") << '\n';
   std::cout << "points  " << report.points;
@@ -201,7 +191,7 @@ void print(const Report& report, bool wants_errors) {
         counted(rate.falls, "fall", "falls"));
   }
   std::cout << fmt::format("size    about {} in a database\n",
-                           shown_size(kBytesAResult * static_cast<double>(report.points)));
+                           shown_bytes(kBytesAResult * report.points));
 }
 
 nlohmann::ordered_json json_of(const ShownPoint& point) {
@@ -239,7 +229,7 @@ nlohmann::ordered_json json_of(const Report& report, bool wants_errors) {
     json["solved_points"] = rate.points;
     json["solved_falls"] = rate.falls;
   }
-  json["bytes"] = kBytesAResult * static_cast<double>(report.points);
+  json["bytes"] = kBytesAResult * report.points;
   return json;
 }
 
