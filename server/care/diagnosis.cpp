@@ -1,6 +1,9 @@
 #include "server/care/diagnosis.h"
 
+#include <algorithm>
 #include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
@@ -11,6 +14,7 @@
 #include "server/database/row_checksum.h"
 #include "server/database/sqlite.h"
 #include "server/store/rows/row_columns.h"
+#include "server/store/settled_runs.h"
 
 namespace oblique::server {
 namespace {
@@ -26,12 +30,58 @@ std::vector<std::string> texts(sqlite3* database, const std::string& sql) {
   return found;
 }
 
+/// The lowest point that is in one of the sets alone; they differ.
+std::uint64_t first_difference(const IntervalSet& a, const IntervalSet& b) {
+  std::uint64_t point = 0;
+  while (true) {
+    const auto of_a = a.first_from(point);
+    const auto of_b = b.first_from(point);
+    if (!of_a || !of_b || of_a->begin != of_b->begin) {
+      return std::min(of_a ? of_a->begin : of_b->begin, of_b ? of_b->begin : of_a->begin);
+    }
+    if (of_a->end != of_b->end) {
+      return std::min(of_a->end, of_b->end);
+    }
+    point = of_a->end;
+  }
+}
+
 /// Every study beside the number of its results, for FROM.
 std::string counted_studies(int schema) {
   return fmt::format(
       "(SELECT *, (SELECT count(*) FROM {} AS r WHERE r.study_id = s.study_id) AS results"
       " FROM studies AS s)",
       results_table(schema));
+}
+
+/// What the runs of settled points say that the rows do not. One instant of both, whatever a server
+/// writes meanwhile.
+void compare_settled_points(sqlite3* database, Diagnosis& found) {
+  constexpr auto kLast = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
+  execute(database, "SAVEPOINT settled");
+  const auto noted = noted_points(database);
+  Statement studies(database, "SELECT study_id, name FROM studies ORDER BY study_id");
+  while (studies.step()) {
+    const auto id = static_cast<std::uint64_t>(studies.integer(0));
+    const auto known = noted.find(id);
+    if (known != noted.end() && !known->second) {
+      found.remarks.push_back(
+          fmt::format("study {}: another program deleted results; they are counted when a server "
+                      "starts",
+                      studies.text(1)));
+      continue;
+    }
+    const IntervalSet said = known == noted.end() ? IntervalSet() : *known->second;
+    const IntervalSet there = points_with_row(database, id, {0, kLast});
+    if (!(said == there) && found.faults.size() < kMostOfAKind) {
+      found.faults.push_back(fmt::format(
+          "study {}: settled_points has {} points and results {}, and from point {} on not the same "
+          "ones. UPDATE studies SET counted = 0 WHERE study_id = {} has them counted when a server "
+          "starts",
+          studies.text(1), said.size(), there.size(), first_difference(said, there), id));
+    }
+  }
+  execute(database, "RELEASE settled");
 }
 
 }  // namespace
@@ -95,6 +145,9 @@ Diagnosis diagnose(const std::string& path) {
           counted_studies(schema) +
           " WHERE state = 'done' AND results <> points"
           " LIMIT 20");
+  if (schema >= kFirstPacked) {
+    compare_settled_points(database, found);
+  }
   for (auto& fault : faults_of_rows(database, schema, kMostOfAKind)) {
     found.faults.push_back(std::move(fault));
   }

@@ -14,6 +14,7 @@
 #include "server/care/table_columns.h"
 #include "server/scheduler/points/study_table.h"
 #include "server/store/rows/row_columns.h"
+#include "server/store/settled_runs.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::server {
@@ -313,17 +314,17 @@ void settle_studies(sqlite3* source, sqlite3* target, const StudyPlaces& places)
       retries.bring(from, place.id);
     }
   }
-  Statement count(target, "SELECT count(*) FROM packed_results WHERE study_id = ?");
+  SettledRuns settled(target);
+  Statement count(target, "SELECT sum(points) FROM settled_points WHERE study_id = ?");
   Statement set(target,
                 "UPDATE studies SET state = ?2,"
                 " changed_at = strftime('%Y-%m-%dT%H:%M:%fZ', 'now')"
                 " WHERE study_id = ?1 AND (state = 'done') <> (?2 = 'done')");
-  // Its points are counted again when a server starts.
-  Statement uncount(target, "UPDATE studies SET counted = 0 WHERE study_id = ?1");
   for (const auto& [from, place] : places) {
     if (!place.is_new && !place.has_grown && place.rows_changed == 0) {
       continue;
     }
+    settled.count_again(place.id);
     count.bind(1, place.id);
     count.step();
     const bool is_done = number_in(count, 0) == place.points;
@@ -332,8 +333,6 @@ void settle_studies(sqlite3* source, sqlite3* target, const StudyPlaces& places)
     set.bind(1, place.id);
     set.bind(2, std::string_view(is_done ? "done" : "running"));
     set.run();
-    uncount.bind(1, place.id);
-    uncount.run();
   }
 }
 

@@ -17,6 +17,7 @@
 #include "server/store/rows/old_workers.h"
 #include "server/store/rows/packed_row.h"
 #include "server/store/rows/row_columns.h"
+#include "server/store/settled_runs.h"
 #include "server/store/store.h"
 
 namespace oblique::server {
@@ -288,6 +289,14 @@ void copy_tables(sqlite3* from, sqlite3* to, Salvaged& saved) {
   copy_results(from, to, saved);
 }
 
+void count_settled_points(sqlite3* database) {
+  SettledRuns settled(database);
+  Statement studies(database, "SELECT study_id FROM studies");
+  while (studies.step()) {
+    settled.count_again(static_cast<std::uint64_t>(studies.integer(0)));
+  }
+}
+
 /// Makes an end of what refers to rows that were not saved.
 void mend_references(sqlite3* database) {
   // Rows of a study or model that is gone tell nothing, nor do those whose words are lost.
@@ -307,11 +316,11 @@ void mend_references(sqlite3* database) {
       " (SELECT CASE count(DISTINCT solver_version) WHEN 1 THEN min(solver_version)"
       " ELSE 'unknown' END FROM workers), 'unknown', '' FROM packed_results"
       " WHERE worker NOT IN (SELECT worker_id FROM workers)");
-  // The points are counted when a server starts.
-  execute(database, "UPDATE studies SET counted = 0");
+  count_settled_points(database);
   execute(database,
           "UPDATE studies SET state = 'running' WHERE state = 'done' AND points <>"
-          " (SELECT count(*) FROM packed_results AS r WHERE r.study_id = studies.study_id)");
+          " (SELECT coalesce(sum(p.points), 0) FROM settled_points AS p"
+          " WHERE p.study_id = studies.study_id)");
 }
 
 }  // namespace

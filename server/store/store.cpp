@@ -66,9 +66,9 @@ struct Store::Statements {
   explicit Statements(sqlite3* database)
       : add_study(database,
                   "INSERT INTO studies (study_id, name, recipe, points, state, created_at,"
-                  " changed_at, priority, weight, mixes_versions, checksum, submitted_by)"
+                  " changed_at, priority, weight, mixes_versions, checksum, submitted_by, counted)"
                   " VALUES (?1, ?2, ?3, ?4, 'running', ?5, ?5, ?6, ?7, ?8,"
-                  " row_checksum(?1, ?2, ?3, ?4, ?5), nullif(?9, ''))"),
+                  " row_checksum(?1, ?2, ?3, ?4, ?5), nullif(?9, ''), 1)"),
         set_state(database, "UPDATE studies SET state = ?2, changed_at = ?3 WHERE study_id = ?1"),
         set_terms(database,
                   "UPDATE studies SET priority = ?2, weight = ?3, mixes_versions = ?4"
@@ -152,6 +152,7 @@ Store::Store(const std::string& path, const Notice& notice) {
   }
   statements_ = std::make_unique<Statements>(database_.get());
   clearing_ = std::make_unique<Clearing>(database_.get());
+  settled_ = std::make_unique<SettledRuns>(database_.get());
   files_->expect(database_.get(), database_id());
 }
 
@@ -197,6 +198,7 @@ void Store::commit(std::span<const Change> changes) {
     for (const Change& change : changes) {
       std::visit([this](const auto& kind) { add(kind); }, change);
     }
+    settled_->flush();
     transaction.commit();
     files_->check();  // or it was committed to a file that nobody will find
     log_->shorten();
@@ -205,6 +207,7 @@ void Store::commit(std::span<const Change> changes) {
     clearing_->undo();
     models_.clear();
     statements_->texts.forget();
+    settled_->forget();
     log_->suspect();
     throw;
   }
@@ -274,6 +277,8 @@ void Store::add(const ForgetFailures& change) {
   if (clearing_->is_deleted(change.study_id)) {
     return;
   }
+  settled_->flush();
+  const bool was_doubtful = settled_->is_doubtful(change.study_id);
   change.points.for_each([&](const Interval& interval) {
     Statement& note = statements_->note_retries;
     note.bind(1, change.study_id);
@@ -286,6 +291,7 @@ void Store::add(const ForgetFailures& change) {
     forget.bind(2, interval.begin);
     forget.bind(3, interval.end);
     forget.run();
+    settled_->look_again(change.study_id, interval, was_doubtful);
   });
   Statement& reopen = statements_->reopen;
   reopen.bind(1, change.study_id);
@@ -353,7 +359,9 @@ void Store::add(const AddResults& change) {
     } else {
       row.pack(context, nullptr, result.error(), statements_->texts);
     }
-    statements_->add_result.run(row);
+    if (statements_->add_result.run(row)) {  // else the point has a row already
+      settled_->add(change.study_id, result.point());
+    }
   }
 }
 

@@ -14,6 +14,7 @@
 #include "server/store/changes.h"
 #include "server/store/clearing.h"
 #include "server/store/database_files.h"
+#include "server/store/settled_runs.h"
 #include "server/store/write_ahead_log.h"
 
 namespace oblique::server {
@@ -61,8 +62,9 @@ class Store final : public Storage {
   /// The log is moved into the database when it has so many pages; 1000 unless told.
   void checkpoint_at(int pages) { log_->shorten_at(pages); }
 
-  /// All studies in the order of their numbers, with what is settled. Throws StorageError, also for
-  /// a recipe that cannot be read.
+  /// All studies in the order of their numbers, with what is settled. Rows of those that are in
+  /// doubt (SettledRuns) are counted again. Throws StorageError, also for a recipe that cannot be
+  /// read.
   std::vector<StoredStudy> studies();
   /// A sentence about each study that `studies` left out, because an earlier version took what this
   /// one does not.
@@ -101,12 +103,14 @@ class Store final : public Storage {
   std::int64_t known_model(std::string_view definition);
   void set_sync(bool full);
   std::uint64_t highest(const std::string& sql);
+  PointsOfStudies settled_points();
 
   std::unique_ptr<DatabaseFiles> files_;  // outlives the connection
   DatabaseHandle database_;
   std::unique_ptr<WriteAheadLog> log_;
   std::unique_ptr<Clearing> clearing_;
   std::unique_ptr<Statements> statements_;
+  std::unique_ptr<SettledRuns> settled_;
   // By study and model number; emptied when it grows or a transaction fails.
   std::map<std::pair<std::uint64_t, std::uint64_t>, StoredModel> models_;
   bool full_sync_ = true;

@@ -1,5 +1,6 @@
 // Reading back what studies there are and how far they are, and the numbers that were given.
 #include <map>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -50,56 +51,6 @@ Progress progress_of_all(sqlite3* database) {
   return progress;
 }
 
-/// The points of a study that have a row.
-IntervalSet points_of(Statement& query, std::uint64_t study_id) {
-  IntervalSet points;
-  Interval interval{0, 0};
-  query.reset();
-  query.bind(1, study_id);
-  while (query.step()) {
-    const std::uint64_t point = number(query, 0);
-    if (point != interval.end) {
-      points.insert(interval.begin, interval.end);
-      interval.begin = point;
-    }
-    interval.end = point + 1;
-  }
-  points.insert(interval.begin, interval.end);
-  query.reset();
-  return points;
-}
-
-/// Which points of a study have a row. One that is done is taken at its word when its first and
-/// last point have one: what is finished must not cost each start of a server a look at all its
-/// rows.
-class SettledPoints {
- public:
-  explicit SettledPoints(sqlite3* database)
-      : ends_(
-            database,
-            "SELECT (SELECT point FROM packed_results WHERE study_id = ?1 ORDER BY point LIMIT 1),"
-            " (SELECT point FROM packed_results WHERE study_id = ?1 ORDER BY point DESC LIMIT 1)"),
-        all_(database, "SELECT point FROM packed_results WHERE study_id = ? ORDER BY point") {}
-
-  IntervalSet of(const StoredStudy& study) {
-    ends_.bind(1, study.study_id);
-    ends_.step();
-    const bool has_none = ends_.is_null(0);
-    const bool has_ends =
-        !has_none && number(ends_, 0) == 0 && number(ends_, 1) + 1 == study.table.size();
-    ends_.reset();
-    if (has_none) {
-      return {};
-    }
-    return has_ends && study.state == StudyState::kDone ? IntervalSet(0, study.table.size())
-                                                        : points_of(all_, study.study_id);
-  }
-
- private:
-  Statement ends_;
-  Statement all_;
-};
-
 /// Makes sure that points can be handed out; afterwards, those of a study that rests need no table.
 /// Gives why this version takes no such study, or an empty text. Throws StorageError for a recipe
 /// that cannot be read.
@@ -119,6 +70,30 @@ std::string objection_to(const StoredStudy& study) {
 
 }  // namespace
 
+/// What is in doubt is counted in one transaction.
+PointsOfStudies Store::settled_points() {
+  auto found = noted_points(database_.get());
+  std::optional<Transaction> counting;
+  for (const auto& [study_id, points] : found) {
+    if (!points) {
+      if (!counting) {
+        log_->make_sure();
+        counting.emplace(database_.get());
+      }
+      settled_->count_again(study_id);
+    }
+  }
+  if (counting) {
+    counting->commit();
+    found = noted_points(database_.get());
+  }
+  PointsOfStudies settled;
+  for (auto& [study_id, points] : found) {
+    settled.emplace(study_id, std::move(points).value_or(IntervalSet()));
+  }
+  return settled;
+}
+
 std::vector<StoredStudy> Store::studies() {
   std::vector<StoredStudy> found;
   Progress progress = progress_of_all(database_.get());
@@ -129,7 +104,7 @@ std::vector<StoredStudy> Store::studies() {
   Statement version(database_.get(),
                     "SELECT solver_version FROM results WHERE study_id = ?"
                     " AND solver_version IS NOT NULL ORDER BY point LIMIT 1");
-  SettledPoints settled(database_.get());
+  PointsOfStudies settled = settled_points();
   while (list.step()) {
     StoredStudy study{};
     study.study_id = number(list, 0);
@@ -139,7 +114,7 @@ std::vector<StoredStudy> Store::studies() {
     study.created_at = list.text(4);
     study.terms = {static_cast<std::int32_t>(list.integer(5)), list.real(6), list.integer(7) != 0};
     study.submitted_by = list.text(9);
-    study.settled = settled.of(study);
+    study.settled = std::move(settled[study.study_id]);
     version.bind(1, study.study_id);
     study.solver_version = version.step() ? version.text(0) : "";
     version.reset();

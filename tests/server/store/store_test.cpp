@@ -128,29 +128,6 @@ TEST_F(StoreTest, TheStateOfAStudyIsKept) {
   EXPECT_EQ(Store(path_).studies().at(0).state, StudyState::kCancelled);
 }
 
-TEST_F(StoreTest, AStudyThatIsDoneIsTakenAtItsWordAndItsRowsAreNotCounted) {
-  Store store(path_);
-  const auto remove = [this](int point) {
-    const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);
-    execute(database.get(), "DELETE FROM results WHERE point = " + std::to_string(point));
-  };
-  std::vector<protocol::PointResult> all;
-  for (std::uint64_t point = 0; point < 10; ++point) {
-    all.push_back(solved_point(point));
-  }
-  store.commit(std::vector<Change>{AddStudy{1, "a", table_of(10), "then", {}},
-                                   AddWorker{1, "host", 1, "0.1", "avx2", "then"},
-                                   AddResults{1, table_of(10), 1, "0.1", "avx2", 1, "then", all},
-                                   SetStudyState{1, StudyState::kDone, "now"}});
-  remove(5);
-  EXPECT_EQ(store.studies().at(0).settled, IntervalSet(0, 10));
-  store.commit(std::vector<Change>{SetStudyState{1, StudyState::kRunning, "now"}});
-  EXPECT_EQ(store.studies().at(0).settled.size(), 9U) << "one that runs is looked at";
-  store.commit(std::vector<Change>{SetStudyState{1, StudyState::kDone, "now"}});
-  remove(9);
-  EXPECT_EQ(store.studies().at(0).settled.size(), 8U) << "one without its last point is";
-}
-
 TEST_F(StoreTest, WhoSubmittedAStudyIsKeptByTheNameOfTheKey) {
   auto with_key = study_of(10);
   with_key.submitted_by = "alice";
