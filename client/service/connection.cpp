@@ -228,6 +228,7 @@ protocol::SubmitReply Connection::submit(const Study& study, const StudyTerms& t
   if (terms.mixes_versions) {
     request.mutable_submit()->set_mixes_versions(true);
   }
+  request.mutable_submit()->set_fresh(terms.fresh);
   return call(std::move(request)).submit();
 }
 

@@ -50,6 +50,7 @@ struct StudyTerms {
   std::optional<std::int32_t> priority = {};  ///< studies of a higher one come first
   std::optional<double> weight = {};          ///< share of the workers among those of one priority
   bool mixes_versions = false;                ///< workers of any solver version take part
+  bool fresh = false;  ///< points are solved that other studies have solved, too
 };
 
 /// Takes in a sentence for people.

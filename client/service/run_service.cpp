@@ -75,6 +75,9 @@ RunEnd submit_and_wait(const Study& study, const RunSettings& settings, Embedded
     std::cerr << fmt::format("Going on with \"{}\": {} of {} points are done.\n", study.name,
                              shown_count(submitted.settled()), shown_count(submitted.points()));
   }
+  if (const std::string taken = taken_over(submitted.taken()); !taken.empty()) {
+    std::cerr << fmt::format("\"{}\": {}\n", study.name, taken);
+  }
   const auto ask = [&](const Tell& tell) {
     look_after();
     const auto reply = connection.status(study.name, tell);

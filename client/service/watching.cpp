@@ -126,11 +126,38 @@ void tell_if_insecure(const std::string& access, const std::string& place) {
   }
 }
 
+std::string taken_over(const protocol::TakenOver& taken) {
+  if (taken.points() == 0 && !taken.under_way() && !taken.cut_short()) {
+    return {};
+  }
+  std::string text = fmt::format("{} {} taken over{}", taken.points(),
+                                 taken.points() == 1 ? "point is" : "points are",
+                                 taken.under_way() ? " so far" : "");
+  std::uint64_t named = 0;
+  for (int i = 0; i < taken.from_size(); ++i) {
+    named += taken.from(i).points();
+    text += fmt::format("{} {} of {}", i == 0 ? ":" : ",", taken.from(i).points(),
+                        protocol::visible(taken.from(i).study()));
+  }
+  if (named < taken.points()) {
+    text += fmt::format(", {} of others", taken.points() - named);
+  }
+  if (taken.cut_short()) {
+    text += "; to look for more would have taken too long";
+  }
+  return text;
+}
+
 protocol::QueryReply table_of(const std::vector<protocol::StudyStatus>& studies) {
   protocol::QueryReply table;
   for (const char* column : {"study", "state", "points", "solved", "failed", "leased",
                              "points_per_s", "created_at", "priority", "weight", "waits_for"}) {
     table.add_columns(column);
+  }
+  const bool any_taken = std::any_of(studies.begin(), studies.end(),
+                                     [](const auto& study) { return study.taken().points() > 0; });
+  if (any_taken) {
+    table.add_columns("taken_over");
   }
   for (const auto& study : studies) {
     auto& row = *table.add_rows();
@@ -144,6 +171,9 @@ protocol::QueryReply table_of(const std::vector<protocol::StudyStatus>& studies)
     add_value(row, static_cast<std::int64_t>(study.priority()));
     add_value(row, study.weight());
     add_value(row, study.waits_for());
+    if (any_taken) {
+      add_value(row, static_cast<std::int64_t>(study.taken().points()));
+    }
   }
   return table;
 }

@@ -49,6 +49,9 @@ int tell_end(const protocol::StudyStatus& status,
 /// says.
 void tell_if_insecure(const std::string& access, const std::string& place);
 
+/// "12 points are taken over: 7 of a, 5 of b", or an empty text when none are.
+std::string taken_over(const protocol::TakenOver& taken);
+
 /// Columns and rows of studies for `status` and `studies`.
 protocol::QueryReply table_of(const std::vector<protocol::StudyStatus>& studies);
 

@@ -56,6 +56,9 @@ void tell_submitted(const Study& study, const protocol::SubmitReply& reply,
       known += fmt::format("; its weight is now {}", solver::exact_number(*terms.weight));
     }
   }
+  if (const std::string taken = taken_over(reply.taken()); !taken.empty()) {
+    known += "; " + taken;
+  }
   std::cout << study.name << ": " << reply.points() << " points, " << reply.settled() << " done"
             << known << std::endl;
 }
@@ -147,6 +150,8 @@ void add_submit(CLI::App& app, Command& command) {
   verb->add_flag("--mix-versions", flags->terms.mixes_versions,
                  "workers of any solver version take part; the column solver_version says which "
                  "solved a point");
+  verb->add_flag("--fresh", flags->terms.fresh,
+                 "solve every point, also those that another study of the database has solved");
   add_study_flags(*verb, flags->study);
   verb->callback([flags, &command] { command = [flags] { return submit(*flags); }; });
 }

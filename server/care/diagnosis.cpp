@@ -14,7 +14,7 @@
 #include "server/database/row_checksum.h"
 #include "server/database/sqlite.h"
 #include "server/store/rows/row_columns.h"
-#include "server/store/settled_runs.h"
+#include "server/store/rows/settled_runs.h"
 
 namespace oblique::server {
 namespace {

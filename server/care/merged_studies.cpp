@@ -14,7 +14,7 @@
 #include "server/care/table_columns.h"
 #include "server/scheduler/points/study_table.h"
 #include "server/store/rows/row_columns.h"
-#include "server/store/settled_runs.h"
+#include "server/store/rows/settled_runs.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::server {

@@ -17,7 +17,7 @@
 #include "server/store/rows/old_workers.h"
 #include "server/store/rows/packed_row.h"
 #include "server/store/rows/row_columns.h"
-#include "server/store/settled_runs.h"
+#include "server/store/rows/settled_runs.h"
 #include "server/store/store.h"
 
 namespace oblique::server {

@@ -17,6 +17,7 @@
 #include "server/database/shared_disk.h"
 #include "server/doors/doors.h"
 #include "server/loop/report_box.h"
+#include "server/loop/shown_web.h"
 #include "server/network/network.h"
 
 namespace oblique::server {
@@ -41,27 +42,6 @@ Instant now() {
           duration_cast<milliseconds>(std::chrono::system_clock::now().time_since_epoch()).count()};
 }
 
-/// Null when nothing is to be shown over HTTP, or cannot be and need not.
-std::unique_ptr<Web> web_of(const LoopSettings& settings) {
-  if (!settings.web) {
-    return nullptr;
-  }
-  WebSettings web = *settings.web;
-  web.database = settings.database;
-  web.solver_version = settings.service.solver_version;
-  try {
-    return std::make_unique<Web>(std::move(web));
-  } catch (const std::runtime_error& error) {
-    const std::string what =
-        std::string(error.what()) + " (--http names another address, or \"off\")";
-    if (!settings.web->may_be_missing) {
-      throw std::runtime_error(what);
-    }
-    spdlog::warn("no metrics over HTTP: {}", what);
-    return nullptr;
-  }
-}
-
 }  // namespace
 
 class Loop::Parts final : public Outbox {
@@ -75,7 +55,9 @@ class Loop::Parts final : public Outbox {
         writer_(store_, [this](std::vector<WriteReport> r) { written_.put(std::move(r)); }),
         queries_(settings.database, settings.queries,
                  [this](QueryReport r) { queried_.put(std::array{std::move(r)}); }),
-        reader_([this](ReadReport r) { requests_read_.put(std::array{std::move(r)}); }),
+        reader_([this](ReadReport r) { done_aside_.put(std::array{std::move(r)}); }),
+        finder_({settings.database, settings.service.solver_version},
+                [this](KnownReport r) { done_aside_.put(std::array{std::move(r)}); }),
         network_(settings.network),
         workers_(network_.listen(doors_.address(), settings.worker_port,
                                  doors_.guard(PortKeeper::Port::kWorkers))),
@@ -105,7 +87,7 @@ class Loop::Parts final : public Outbox {
     std::array<pollfd, 5> items{{{network_.descriptor(), POLLIN, 0},
                                  {written_.descriptor(), POLLIN, 0},
                                  {queried_.descriptor(), POLLIN, 0},
-                                 {requests_read_.descriptor(), POLLIN, 0},
+                                 {done_aside_.descriptor(), POLLIN, 0},
                                  {stop_fd, POLLIN, 0}}};
     bool has_more = false;
     std::optional<Clock::time_point> farewell_until;
@@ -161,6 +143,7 @@ class Loop::Parts final : public Outbox {
   void cancel_query(std::uint64_t ticket) override { queries_.cancel(ticket); }
   void read(ReadJob job) override { reader_.submit(std::move(job)); }
   void cancel_read(std::uint64_t ticket) override { reader_.cancel(ticket); }
+  KnownSeeker& finder() override { return finder_; }
   PeerCounts peer_counts() const override {
     PeerCounts counts;
     for (const auto& [key, share] : network_.key_shares().all()) {
@@ -206,8 +189,12 @@ class Loop::Parts final : public Outbox {
     for (auto& report : queried_.take()) {
       service_->queried(std::get<QueryReport>(std::move(report)));
     }
-    for (auto& report : requests_read_.take()) {
-      service_->request_read(std::get<ReadReport>(std::move(report)), now());
+    for (auto& report : done_aside_.take()) {
+      if (auto* known = std::get_if<KnownReport>(&report)) {
+        service_->known(std::move(*known));
+      } else {
+        service_->request_read(std::get<ReadReport>(std::move(report)), now());
+      }
     }
   }
 
@@ -364,10 +351,11 @@ class Loop::Parts final : public Outbox {
   Store store_;
   ReportBox written_;
   ReportBox queried_;
-  ReportBox requests_read_;
+  ReportBox done_aside_;
   Writer writer_;
   QueryPool queries_;
   RequestReader reader_;
+  KnownFinder finder_;
   Network network_;
   Network::Port workers_;
   Network::Port clients_;

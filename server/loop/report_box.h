@@ -8,6 +8,7 @@
 #include "proto/system/wake_up.h"
 #include "server/queries/query_pool.h"
 #include "server/service/outbox/request_reader.h"
+#include "server/store/known/known_finder.h"
 #include "server/store/writer.h"
 
 namespace oblique::server {
@@ -15,7 +16,7 @@ namespace oblique::server {
 /// Reports of the other threads, kept for the loop, which a descriptor wakes.
 class ReportBox {
  public:
-  using Item = std::variant<WriteReport, QueryReport, ReadReport>;
+  using Item = std::variant<WriteReport, QueryReport, ReadReport, KnownReport>;
 
   /// From any thread.
   template <typename Reports>

@@ -43,6 +43,25 @@ Fit copy_row(sqlite3* database, sqlite3_stmt* statement, std::uint64_t most_byte
   return Fit::kYes;
 }
 
+/// What the study took over from others.
+void add_taken(sqlite3* database, protocol::StudyStatus& status) {
+  constexpr int kMostNamed = 20;
+  Statement origins(database,
+                    "SELECT origin, points FROM taken_points WHERE study_id = ?"
+                    " ORDER BY points DESC");
+  origins.bind(1, status.study_id());
+  while (origins.step()) {
+    auto& taken = *status.mutable_taken();
+    const auto points = static_cast<std::uint64_t>(origins.integer(1));
+    taken.set_points(taken.points() + points);
+    if (taken.from_size() < kMostNamed) {
+      auto& from = *taken.add_from();
+      from.set_study(origins.text(0));
+      from.set_points(points);
+    }
+  }
+}
+
 }  // namespace
 
 struct Reader::Deadline {
@@ -168,8 +187,8 @@ std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name)
             "c"
             " WHERE c.study_id = s.study_id) ELSE"
             " (SELECT count(*) FROM packed_results AS r WHERE r.study_id = s.study_id) END,"
-            " (SELECT count(*) FROM packed_results AS r WHERE r.study_id = s.study_id"
-            " AND r.error IS NOT NULL)"
+            " (SELECT count(*) FROM packed_results AS r INDEXED BY failed_points"
+            " WHERE r.study_id = s.study_id AND r.error IS NOT NULL)"
           : " (SELECT count(*) FROM results AS r WHERE r.study_id = s.study_id),"
             " (SELECT count(*) FROM results AS r WHERE r.study_id = s.study_id"
             " AND r.status = 'failed')";
@@ -195,6 +214,9 @@ std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name)
     status.set_priority(static_cast<std::int32_t>(list.integer(7)));
     status.set_weight(list.real(8));
     status.set_submitted_by(list.text(9));
+    if (version >= kFirstPacked) {
+      add_taken(database_.get(), status);
+    }
     found.push_back(std::move(status));
   }
   if (found.empty() && !name.empty()) {

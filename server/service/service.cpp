@@ -13,14 +13,16 @@ Service::Service(const ServiceSettings& settings, Outbox& outbox, std::vector<St
     : outbox_(outbox),
       scheduler_(settings.scheduler),
       ledger_(settings.ledger, outbox),
+      known_(settings.solver_version),
       bad_frames_(outbox),
       workers_({settings.heartbeat_interval_ms, settings.scheduler.lost_after_ms,
                 settings.solver_version, settings.database_id, settings.last_worker_id,
                 settings.clients.access == "insecure"},
                outbox, outbox, bad_frames_, ledger_),
       open_(settings.bounds),
-      changes_(settings.last_study_id, states_, ledger_, {scheduler_, states_, ledger_, rates_},
-               open_, outbox, outbox),
+      changes_(settings.last_study_id, states_, ledger_,
+               {scheduler_, states_, ledger_, rates_, known_}, known_, open_, outbox,
+               outbox.finder(), outbox),
       traces_(settings.traces, settings.solver_version, outbox, outbox,
               settings.clients.still_working_every_ms),
       clients_(settings.clients, {outbox,
@@ -28,17 +30,25 @@ Service::Service(const ServiceSettings& settings, Outbox& outbox, std::vector<St
                                   bad_frames_,
                                   changes_,
                                   workers_,
-                                  {scheduler_, states_, ledger_, rates_},
+                                  {scheduler_, states_, ledger_, rates_, known_},
                                   open_,
                                   outbox,
                                   worker_rates_,
                                   traces_}) {
   for (StoredStudy& study : studies) {
     states_.restore(study, now.steady_ms);
+    if (!study.settled.empty()) {
+      note_source(study.study_id);
+    }
+    known_.restore(study.study_id, study.taken);
+    const bool seeks = study.takes_over && outbox.finder().can_seek();
     feed(StudyAdded{study.study_id, study.table, std::move(study.settled), study.failures.size(),
                     study.state == StudyState::kCancelled, study.state == StudyState::kPaused,
-                    study.terms, study.solver_version, std::move(study.attempts)},
+                    study.terms, study.solver_version, std::move(study.attempts), seeks},
          now);
+    if (seeks) {  // it was not at its end when the server ended
+      seek_known(study.study_id);
+    }
     changes_.recount(study.study_id);
   }
 }
@@ -71,6 +81,7 @@ void Service::tick(Instant now) {
   feed(Tick{}, now);
   clients_.tick(now);
   send_traces();
+  changes_.release_replies(now);
   rates_.sample([this](StudyId id) { return settled_of(id); }, now.steady_ms);
   // One that is gone comes to rest at 0.
   worker_rates_.sample(
@@ -307,17 +318,16 @@ void Service::stored(const ResultsWrite& write, Instant now) {
   }
   feed(write.event, now);
   if (!write.event.outcomes.empty()) {
+    note_source(id);
     open_.set_points(id, scheduler_.study(id).points - settled_of(id));
   }
 }
 
-void Service::stored(const StudyWrite& write, Instant now) {
-  feed(changes_.stored(write, now), now);
-  changes_.answer(write, now);
-}
-
 void Service::stored(const StateWrite& write, Instant now) {
   feed(changes_.stored(write, now), now);
+  if (write.state == StudyState::kCancelled) {
+    outbox_.finder().stop_seeking(write.study);
+  }
   changes_.answer(write, now);
 }
 
@@ -328,11 +338,6 @@ void Service::stored(const TermsWrite& write, Instant now) {
 
 void Service::stored(const FailuresWrite& write, Instant now) {
   rates_.forget(write.study);  // fewer points are settled now: no rate can be had of that
-  feed(changes_.stored(write, now), now);
-  changes_.answer(write, now);
-}
-
-void Service::stored(const GrowthWrite& write, Instant now) {
   feed(changes_.stored(write, now), now);
   changes_.answer(write, now);
 }

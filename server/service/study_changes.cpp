@@ -114,14 +114,16 @@ void StudyChanges::grow(const Client& client, StudyId id, const ReadRequest& rea
   if (!may_open(client, id, study.submitted_by, open_points_of(id, sources_) + appended)) {
     return;
   }
-  const GrowthWrite write{id, read.table, terms, study.table.size(),
-                          view_of(id, sources_, now).state};
+  const StudyView view = view_of(id, sources_, now);
+  const bool takes_over = !read.request.submit().fresh() && finder_.can_seek() &&
+                          known_.should_seek(id, view.solver_version, terms.mixes_versions);
+  const GrowthWrite write{id, read.table, terms, study.table.size(), view.state, takes_over};
   Turn& turn = turns_[id];
   turn.grown = read.table;
   turn.submitters.push_back(client);
   states_.change(id, StudyState::kRunning);
   recount(id);
-  ledger_.write(GrowStudy{id, read.table, terms, iso_8601(now)}, write);
+  ledger_.write(GrowStudy{id, read.table, terms, iso_8601(now), takes_over}, write);
 }
 
 void StudyChanges::refuse_recipe(const Client& client, const std::string& name,
@@ -182,7 +184,10 @@ void StudyChanges::add(const Client& client, const ReadRequest& read, const Stud
   states_.add(id, {name, read.table, created_at, terms, {}, {}, now.steady_ms, client.key()});
   recount(id);
   submitters_[id].push_back(client);
-  ledger_.write(AddStudy{id, name, read.table, created_at, terms, client.key()}, StudyWrite{id});
+  const bool takes_over = !read.request.submit().fresh() && finder_.can_seek() &&
+                          known_.should_seek(id, {}, terms.mixes_versions);
+  ledger_.write(AddStudy{id, name, read.table, created_at, terms, client.key(), takes_over},
+                StudyWrite{id, takes_over});
 }
 
 /// Whether the study may have so many further points open; else the client is told why not.

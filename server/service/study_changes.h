@@ -22,13 +22,16 @@ class StudyChanges {
  public:
   /// `last_study_id` is the last one of the database. All of these must outlive this.
   StudyChanges(std::uint64_t last_study_id, StudyStates& states, WriteLedger& ledger,
-               StudySources sources, OpenStudies& open, ToClients& clients, ToLog& log)
+               StudySources sources, TakeOvers& known, OpenStudies& open, ToClients& clients,
+               KnownSeeker& finder, ToLog& log)
       : last_study_id_(last_study_id),
         states_(states),
         ledger_(ledger),
         sources_(sources),
+        known_(known),
         open_(open),
         clients_(clients),
+        finder_(finder),
         log_(log) {}
 
   /// A study whose recipe was read and judged: a new one, or one that is there and goes on.
@@ -64,6 +67,10 @@ class StudyChanges {
   void refused(const GrowthWrite& write, const std::string& error, Instant now);
   void refused(const NameWrite& write, const std::string& error, Instant now);
   void refused(const RemovalWrite& write, const std::string& error, Instant now);
+
+  /// Answers who submitted studies of which nothing is sought in others any more, or waited long
+  /// for that; of that study all.
+  void release_replies(Instant now, StudyId id = 0);
 
   /// All points that the study had are settled. True while further ones are on their way to the
   /// disk: then it has not ended, unless `takes_end` says so later.
@@ -102,6 +109,7 @@ class StudyChanges {
   protocol::ClientReply submitted(const Client& client, StudyId id, bool created,
                                   Instant now) const;
   void reply_submitted(const Client& client, StudyId id, bool created, Instant now);
+  void send_submitted(HeldReply reply, Instant now);
   void reply_changed(const Client& client, StudyId id, std::uint64_t retried, Instant now);
   void reply_unchanged(const Client& client, const std::string& error);
   void note(StudyId id, const std::string& what);
@@ -110,8 +118,10 @@ class StudyChanges {
   StudyStates& states_;
   WriteLedger& ledger_;
   StudySources sources_;
+  TakeOvers& known_;
   OpenStudies& open_;
   ToClients& clients_;
+  KnownSeeker& finder_;
   ToLog& log_;
   std::map<StudyId, std::vector<Client>> submitters_;  // wait for the study to be durable
   std::map<StudyId, Turn> turns_;

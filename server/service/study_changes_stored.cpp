@@ -13,7 +13,9 @@ Event StudyChanges::stored(const StudyWrite& write, Instant now) {
   states_.added(write.study, now.steady_ms);
   const StudyRecord& study = states_.record(write.study);
   note(write.study, fmt::format("of {} points begins", study.table.size()));
-  return StudyAdded{write.study, study.table, {}, 0, false, false, study.terms};
+  StudyAdded added{write.study, study.table, {}, 0, false, false, study.terms};
+  added.held = write.takes_over;
+  return added;
 }
 
 Event StudyChanges::stored(const StateWrite& write, Instant /*now*/) {
@@ -62,6 +64,10 @@ Event StudyChanges::stored(const RemovalWrite& write, Instant now) {
   note(write.study, "is deleted");
   open_.close(write.study);
   states_.remove(write.study);
+  finder_.stop_seeking(write.study);
+  finder_.drop_source(write.study);
+  known_.forget(write.study);
+  release_replies(now, write.study);
   return StudyRemoved{write.study};
 }
 
@@ -100,7 +106,7 @@ void StudyChanges::answer(const GrowthWrite& write, Instant now) {
     protocol::ClientReply reply = submitted(client, write.study, false, now);
     reply.mutable_submit()->set_appended(write.table.size() - write.points_before);
     reply.mutable_submit()->set_was(state_name(write.state_before));
-    clients_.to_client(client.identity, reply);
+    send_submitted({write.study, client.identity, std::move(reply)}, now);
   }
   end_turn(write.study, now);
 }
@@ -180,7 +186,32 @@ protocol::ClientReply StudyChanges::submitted(const Client& client, StudyId id, 
 }
 
 void StudyChanges::reply_submitted(const Client& client, StudyId id, bool created, Instant now) {
-  clients_.to_client(client.identity, submitted(client, id, created, now));
+  send_submitted({id, client.identity, submitted(client, id, created, now)}, now);
+}
+
+/// While points are sought in other studies the reply waits for these, but not long.
+void StudyChanges::send_submitted(HeldReply reply, Instant now) {
+  constexpr std::int64_t kLongestWait_ms = 1500;
+  if (known_.is_under_way(reply.study_id)) {
+    reply.until_ms = now.steady_ms + kLongestWait_ms;
+    known_.hold(std::move(reply));
+  } else {
+    clients_.to_client(reply.client, reply.reply);
+  }
+}
+
+void StudyChanges::release_replies(Instant now, StudyId id) {
+  for (HeldReply& held : known_.release(now.steady_ms, id)) {
+    if (!states_.contains(held.study_id)) {
+      clients_.reply_error({held.client, held.reply.request_id()},
+                           "the study was deleted meanwhile");
+      continue;
+    }
+    const StudyView view = view_of(held.study_id, sources_, now);
+    held.reply.mutable_submit()->set_settled(view.settled());
+    *held.reply.mutable_submit()->mutable_taken() = view.taken;
+    clients_.to_client(held.client, held.reply);
+  }
 }
 
 void StudyChanges::reply_changed(const Client& client, StudyId id, std::uint64_t retried,

@@ -5,13 +5,18 @@
 namespace oblique::server {
 namespace {
 
-std::string what_it_waits_for(const StudySources& sources, const StudyCounts& counts) {
+std::string what_it_waits_for(const StudySources& sources, const StudyCounts& counts,
+                              const protocol::TakenOver& taken) {
   const WriteLedger& ledger = sources.ledger;
   if (ledger.is_gone()) {
     return ledger.fault();
   }
   if (!ledger.fault().empty()) {
     return "the database, which takes no results: " + ledger.fault();
+  }
+  if (taken.under_way()) {
+    return fmt::format("known points to be taken over from other studies, {} so far",
+                       taken.points());
   }
   if (sources.scheduler.workers() == 0) {
     return "a worker";
@@ -43,14 +48,15 @@ StudyView view_of(StudyId id, const StudySources& sources, Instant now) {
                  counts.solver_version,
                  {},
                  0.0,
-                 record.submitted_by};
+                 record.submitted_by,
+                 sources.known.message_of(id)};
   const bool is_complete = view.settled() == view.points;
   if (is_complete) {
     view.state = StudyState::kDone;
   }
   if (state == StudyState::kRunning) {
     view.points_per_s = sources.rates.points_per_s(id, view.settled(), now.steady_ms);
-    view.waits_for = is_complete ? std::string() : what_it_waits_for(sources, counts);
+    view.waits_for = is_complete ? std::string() : what_it_waits_for(sources, counts, view.taken);
   }
   return view;
 }
@@ -72,6 +78,9 @@ protocol::StudyStatus to_message(const StudyView& view) {
   message.set_waits_for(view.waits_for);
   message.set_points_per_s(view.points_per_s);
   message.set_submitted_by(view.submitted_by);
+  if (view.taken.points() > 0 || view.taken.under_way() || view.taken.cut_short()) {
+    *message.mutable_taken() = view.taken;
+  }
   return message;
 }
 

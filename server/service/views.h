@@ -9,6 +9,7 @@
 #include "server/service/counts/study_states.h"
 #include "server/service/workers_desk.h"
 #include "server/service/write_ledger.h"
+#include "server/store/known/take_overs.h"
 
 // Studies and workers as others see them: plain values, from which replies are made, and whatever
 // else shows how things stand.
@@ -24,10 +25,11 @@ struct StudyView {
   std::uint64_t leased;
   std::string created_at;  ///< UTC, ISO 8601
   StudyTerms terms;
-  std::string solver_version;  ///< of its results; empty while there are none
-  std::string waits_for;       ///< why a running study does not go on; empty: it does
-  double points_per_s;         ///< settled, over the last seconds; 0 unless it runs
-  std::string submitted_by{};  ///< name of the key; empty: without keys
+  std::string solver_version;   ///< of its results; empty while there are none
+  std::string waits_for;        ///< why a running study does not go on; empty: it does
+  double points_per_s;          ///< settled, over the last seconds; 0 unless it runs
+  std::string submitted_by{};   ///< name of the key; empty: without keys
+  protocol::TakenOver taken{};  ///< from other studies
 
   std::uint64_t settled() const { return solved + failed; }
 };
@@ -38,6 +40,7 @@ struct StudySources {
   const StudyStates& states;
   const WriteLedger& ledger;
   const SettledRates& rates;
+  const TakeOvers& known;
 };
 
 /// Throws std::out_of_range for a study that is not durable.

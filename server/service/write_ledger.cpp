@@ -33,6 +33,12 @@ bool is_change_of(const NameWrite&) {
 bool is_change_of(const RemovalWrite&) {
   return true;
 }
+bool is_change_of(const TakingWrite&) {
+  return false;
+}
+bool is_change_of(const EndTakingWrite&) {
+  return false;
+}
 bool is_change_of(const QuietWrite&) {
   return false;
 }

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <variant>
@@ -23,6 +24,7 @@ struct ResultsWrite {
 };
 struct StudyWrite {
   StudyId study;
+  bool takes_over = false;  ///< points that other studies have solved are to be sought
 };
 struct StateWrite {
   StudyId study;
@@ -47,6 +49,7 @@ struct GrowthWrite {
   StudyTerms terms;
   std::uint64_t points_before;
   StudyState state_before;
+  bool takes_over = false;  ///< as in StudyWrite
 };
 struct NameWrite {
   StudyId study;
@@ -57,11 +60,21 @@ struct RemovalWrite {
   StudyId study;
   Client client;
 };
+/// Rows that were copied from another study.
+struct TakingWrite {
+  StudyId study;
+  std::shared_ptr<TakenResults> taken;
+};
+struct EndTakingWrite {
+  StudyId study;
+  bool is_cut_short;
+};
 /// Nothing follows.
 struct QuietWrite {};
 
-using Meaning = std::variant<ResultsWrite, StudyWrite, StateWrite, TermsWrite, FailuresWrite,
-                             GrowthWrite, NameWrite, RemovalWrite, QuietWrite>;
+using Meaning =
+    std::variant<ResultsWrite, StudyWrite, StateWrite, TermsWrite, FailuresWrite, GrowthWrite,
+                 NameWrite, RemovalWrite, TakingWrite, EndTakingWrite, QuietWrite>;
 
 struct LedgerLimits {
   /// Results messages of one worker that wait for the disk. A sound worker stops long before.

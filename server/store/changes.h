@@ -42,6 +42,7 @@ struct AddStudy {
   std::string created_at;
   StudyTerms terms{};
   std::string submitted_by = {};  ///< name of the key; empty: without keys
+  bool takes_over = false;        ///< points that other studies have solved are sought
 };
 
 struct SetStudyTerms {
@@ -90,6 +91,38 @@ struct GrowStudy {
   StudyTable table;  ///< of all its points
   StudyTerms terms;
   std::string changed_at;
+  bool takes_over = false;  ///< as in AddStudy
+};
+
+/// Points of one study that are points of another, neighbours in both: `count` from `point` on are
+/// those from `source_point` on.
+struct SharedRun {
+  std::uint64_t point;
+  std::uint64_t source_point;
+  std::uint64_t count;
+
+  bool operator==(const SharedRun&) const = default;
+};
+
+/// What became of a TakeResults. Read it when the change is durable.
+struct TakenResults {
+  IntervalSet points;  ///< that got a row
+  std::string origin;  ///< what the source is called; empty: it is deleted
+};
+
+/// Copies of the solved points of another study that are of that solver version. A point that has a
+/// row already keeps it.
+struct TakeResults {
+  std::uint64_t study_id;
+  std::uint64_t source_id;
+  std::vector<SharedRun> runs;
+  std::string solver_version;
+  std::shared_ptr<TakenResults> taken;  ///< is filled in
+};
+
+/// No more points are sought for it in other studies.
+struct EndTaking {
+  std::uint64_t study_id;
 };
 
 struct RenameStudy {
@@ -103,8 +136,9 @@ struct DeleteStudy {
   std::uint64_t study_id;
 };
 
-using Change = std::variant<AddStudy, SetStudyState, SetStudyTerms, ForgetFailures, GrowStudy,
-                            RenameStudy, DeleteStudy, AddWorker, AddResults>;
+using Change =
+    std::variant<AddStudy, SetStudyState, SetStudyTerms, ForgetFailures, GrowStudy, RenameStudy,
+                 DeleteStudy, TakeResults, EndTaking, AddWorker, AddResults>;
 
 /// How much of what deleted studies left is gone.
 enum class ClearedAway {

@@ -53,6 +53,7 @@ void Clearing::remove(std::uint64_t study_id) {
   run_for(database_, "UPDATE about SET last_study_id = max(last_study_id, ?)", study_id);
   run_for(database_, "INSERT OR IGNORE INTO deletions (study_id) VALUES (?)", study_id);
   run_for(database_, "DELETE FROM retries WHERE study_id = ?", study_id);
+  run_for(database_, "DELETE FROM taken_points WHERE study_id = ?", study_id);
   run_for(database_, "DELETE FROM studies WHERE study_id = ?", study_id);
   removed_now_.insert(study_id);
   deleted_.insert(study_id);

@@ -14,9 +14,9 @@ constexpr int kSchema = kFirstPacked - 1;
 constexpr std::uint64_t kRowsBetweenReports = 10'000;
 
 /// Points in ascending order as runs of neighbours.
-class SettledRuns {
+class GatheredRuns {
  public:
-  explicit SettledRuns(sqlite3* database)
+  explicit GatheredRuns(sqlite3* database)
       : insert_(database,
                 "INSERT INTO settled_points (study_id, first_point, points) VALUES (?, ?, ?)") {}
 
@@ -88,7 +88,7 @@ class RowMigration {
   TextNumbers texts_;
   OldWorkers workers_;
   RowInsert insert_;
-  SettledRuns settled_;
+  GatheredRuns settled_;
   PackedRow row_;
   Statement read_;
 };

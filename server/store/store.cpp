@@ -50,6 +50,12 @@ bool is_lasting(const GrowStudy& /*change*/) {
 bool is_lasting(const RenameStudy& /*change*/) {
   return true;
 }
+bool is_lasting(const TakeResults& /*change*/) {
+  return false;
+}
+bool is_lasting(const EndTaking& /*change*/) {
+  return false;
+}
 bool is_lasting(const DeleteStudy& /*change*/) {
   return true;
 }
@@ -66,9 +72,10 @@ struct Store::Statements {
   explicit Statements(sqlite3* database)
       : add_study(database,
                   "INSERT INTO studies (study_id, name, recipe, points, state, created_at,"
-                  " changed_at, priority, weight, mixes_versions, checksum, submitted_by, counted)"
+                  " changed_at, priority, weight, mixes_versions, checksum, submitted_by, counted, "
+                  "takes_over)"
                   " VALUES (?1, ?2, ?3, ?4, 'running', ?5, ?5, ?6, ?7, ?8,"
-                  " row_checksum(?1, ?2, ?3, ?4, ?5), nullif(?9, ''), 1)"),
+                  " row_checksum(?1, ?2, ?3, ?4, ?5), nullif(?9, ''), 1, ?10)"),
         set_state(database, "UPDATE studies SET state = ?2, changed_at = ?3 WHERE study_id = ?1"),
         set_terms(database,
                   "UPDATE studies SET priority = ?2, weight = ?3, mixes_versions = ?4"
@@ -79,17 +86,19 @@ struct Store::Statements {
                      " SELECT ?1, min(point), count(*), attempt, ?4 FROM"
                      " (SELECT point, attempt,"
                      " point - row_number() OVER (PARTITION BY attempt ORDER BY point) AS run"
-                     " FROM packed_results WHERE study_id = ?1 AND point >= ?2 AND point < ?3"
-                     " AND error IS NOT NULL) GROUP BY attempt, run"),
+                     " FROM packed_results INDEXED BY failed_points WHERE study_id = ?1"
+                     " AND point >= ?2 AND point < ?3 AND error IS NOT NULL)"
+                     " GROUP BY attempt, run"),
         forget_failures(database,
-                        "DELETE FROM packed_results WHERE study_id = ?1 AND point >= ?2"
+                        "DELETE FROM packed_results INDEXED BY failed_points WHERE study_id = ?1 "
+                        "AND point >= ?2"
                         " AND point < ?3 AND error IS NOT NULL"),
         reopen(database,
                "UPDATE studies SET state = 'running', changed_at = ?2"
                " WHERE study_id = ?1 AND state = 'done'"),
         grow(database,
              "UPDATE studies SET recipe = ?2, points = ?3, state = 'running', changed_at = ?4,"
-             " priority = ?5, weight = ?6, mixes_versions = ?7,"
+             " priority = ?5, weight = ?6, mixes_versions = ?7, takes_over = takes_over OR ?8,"
              " checksum = row_checksum(study_id, name, ?2, ?3, created_at) WHERE study_id = ?1"),
         rename(database,
                "UPDATE studies SET name = ?2,"
@@ -153,6 +162,7 @@ Store::Store(const std::string& path, const Notice& notice) {
   statements_ = std::make_unique<Statements>(database_.get());
   clearing_ = std::make_unique<Clearing>(database_.get());
   settled_ = std::make_unique<SettledRuns>(database_.get());
+  copy_ = std::make_unique<ResultCopy>(database_.get(), *settled_, *clearing_);
   files_->expect(database_.get(), database_id());
 }
 
@@ -162,20 +172,6 @@ Store::~Store() {
     log_->before_closing();
   } catch (const StorageGone&) {
     leave_files();
-  }
-}
-
-/// Whoever comes after must not find our log beside another database, where SQLite would take it
-/// for that one's. What was acknowledged goes into our own file, wherever that may be now.
-void Store::leave_files() {
-  try {
-    if (files_->were_overwritten()) {
-      log_->discard();
-    } else {
-      log_->merge();
-    }
-  } catch (const StorageError&) {
-    // Nothing more can be done for it.
   }
 }
 
@@ -261,6 +257,7 @@ void Store::add(const AddStudy& change) {
   insert.bind(7, change.terms.weight);
   insert.bind(8, std::int64_t{change.terms.mixes_versions});
   insert.bind(9, change.submitted_by);
+  insert.bind(10, std::int64_t{change.takes_over});
   insert.run();
 }
 
@@ -308,6 +305,7 @@ void Store::add(const GrowStudy& change) {
   update.bind(5, std::int64_t{change.terms.priority});
   update.bind(6, change.terms.weight);
   update.bind(7, std::int64_t{change.terms.mixes_versions});
+  update.bind(8, std::int64_t{change.takes_over});
   update.run();
 }
 

@@ -14,7 +14,8 @@
 #include "server/store/changes.h"
 #include "server/store/clearing.h"
 #include "server/store/database_files.h"
-#include "server/store/settled_runs.h"
+#include "server/store/result_copy.h"
+#include "server/store/rows/settled_runs.h"
 #include "server/store/write_ahead_log.h"
 
 namespace oblique::server {
@@ -32,6 +33,8 @@ struct StoredStudy {
   IntervalSet failures;        ///< those whose row says failed
   PointAttempts attempts{};    ///< of these, and of those that failed and were forgotten
   std::string submitted_by{};  ///< name of the key; empty: without keys
+  bool takes_over = false;     ///< points that other studies have solved are still sought
+  std::map<std::string, std::uint64_t> taken{};  ///< points that it took over, by their origins
 };
 
 /// The SQLite database (schema.sql), opened for writing. Only one Store may have a file open;
@@ -92,6 +95,8 @@ class Store final : public Storage {
   void add(const GrowStudy& change);
   void add(const RenameStudy& change);
   void add(const DeleteStudy& change);
+  void add(const TakeResults& change) { copy_->run(change); }
+  void add(const EndTaking& change) { copy_->end(change); }
   void add(const AddWorker& change);
   void add(const AddResults& change);
   /// Row of `models`, and the accuracy of its results.
@@ -111,6 +116,7 @@ class Store final : public Storage {
   std::unique_ptr<Clearing> clearing_;
   std::unique_ptr<Statements> statements_;
   std::unique_ptr<SettledRuns> settled_;
+  std::unique_ptr<ResultCopy> copy_;
   // By study and model number; emptied when it grows or a transaction fails.
   std::map<std::pair<std::uint64_t, std::uint64_t>, StoredModel> models_;
   bool full_sync_ = true;

@@ -40,7 +40,8 @@ Progress progress_of_all(sqlite3* database) {
                                               static_cast<std::uint32_t>(retries.integer(3)));
   }
   Statement failed(database,
-                   "SELECT study_id, point, attempt FROM packed_results WHERE error IS NOT NULL"
+                   "SELECT study_id, point, attempt FROM packed_results INDEXED BY failed_points"
+                   " WHERE error IS NOT NULL"
                    " ORDER BY study_id, point");
   while (failed.step()) {
     const std::uint64_t point = number(failed, 1);
@@ -97,13 +98,15 @@ PointsOfStudies Store::settled_points() {
 std::vector<StoredStudy> Store::studies() {
   std::vector<StoredStudy> found;
   Progress progress = progress_of_all(database_.get());
-  Statement list(
-      database_.get(),
-      "SELECT study_id, name, recipe, state, created_at, priority, weight,"
-      " mixes_versions, points, coalesce(submitted_by, '') FROM studies ORDER BY study_id");
+  Statement list(database_.get(),
+                 "SELECT study_id, name, recipe, state, created_at, priority, weight,"
+                 " mixes_versions, points, coalesce(submitted_by, ''), takes_over FROM studies "
+                 "ORDER BY study_id");
   Statement version(database_.get(),
-                    "SELECT solver_version FROM results WHERE study_id = ?"
-                    " AND solver_version IS NOT NULL ORDER BY point LIMIT 1");
+                    "SELECT w.solver_version FROM packed_results AS r"
+                    " CROSS JOIN workers AS w ON w.worker_id = r.worker"
+                    " WHERE r.study_id = ? ORDER BY r.point LIMIT 1");
+  Statement taken(database_.get(), "SELECT origin, points FROM taken_points WHERE study_id = ?");
   PointsOfStudies settled = settled_points();
   while (list.step()) {
     StoredStudy study{};
@@ -114,6 +117,12 @@ std::vector<StoredStudy> Store::studies() {
     study.created_at = list.text(4);
     study.terms = {static_cast<std::int32_t>(list.integer(5)), list.real(6), list.integer(7) != 0};
     study.submitted_by = list.text(9);
+    study.takes_over = list.integer(10) != 0;
+    taken.bind(1, study.study_id);
+    while (taken.step()) {
+      study.taken[taken.text(0)] = number(taken, 1);
+    }
+    taken.reset();
     study.settled = std::move(settled[study.study_id]);
     version.bind(1, study.study_id);
     study.solver_version = version.step() ? version.text(0) : "";
@@ -162,6 +171,20 @@ std::string Store::database_id() {
     throw StorageError("the database has lost its identity: the table about is empty");
   }
   return statement.text(0);
+}
+
+/// Whoever comes after must not find our log beside another database, where SQLite would take it
+/// for that one's. What was acknowledged goes into our own file, wherever that may be now.
+void Store::leave_files() {
+  try {
+    if (files_->were_overwritten()) {
+      log_->discard();
+    } else {
+      log_->merge();
+    }
+  } catch (const StorageError&) {
+    // Nothing more can be done for it.
+  }
 }
 
 }  // namespace oblique::server

@@ -61,6 +61,12 @@ std::uint64_t study_of(const GrowStudy& change) {
 std::uint64_t study_of(const RenameStudy& change) {
   return change.study_id;
 }
+std::uint64_t study_of(const TakeResults& change) {
+  return change.study_id;
+}
+std::uint64_t study_of(const EndTaking& change) {
+  return change.study_id;
+}
 std::uint64_t study_of(const DeleteStudy& change) {
   return change.study_id;
 }

@@ -12,6 +12,7 @@ PRAGMA legacy_alter_table = OFF;
 ALTER TABLE studies ADD COLUMN counted INTEGER NOT NULL DEFAULT 0;
 ALTER TABLE about ADD COLUMN last_study_id INTEGER NOT NULL DEFAULT 0;
 CREATE TABLE deletions (study_id INTEGER PRIMARY KEY) STRICT;
+ALTER TABLE studies ADD COLUMN takes_over INTEGER NOT NULL DEFAULT 0;
 ALTER TABLE workers ADD COLUMN checksum INTEGER;
 UPDATE workers SET checksum =
   row_checksum(worker_id, name, threads, solver_version, instruction_set, joined_at);

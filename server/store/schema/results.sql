@@ -84,6 +84,14 @@ CREATE TABLE settled_points (
   PRIMARY KEY (study_id, first_point)
 ) STRICT, WITHOUT ROWID;
 
+-- How many results a study has taken over from others.
+CREATE TABLE taken_points (
+  study_id    INTEGER NOT NULL REFERENCES studies (study_id), -- that has them
+  origin      TEXT NOT NULL,     -- name of the study that they come from, as it was called then
+  points      INTEGER NOT NULL,  -- how many
+  PRIMARY KEY (study_id, origin)
+) STRICT, WITHOUT ROWID;
+
 -- Rows that go, by whatever hand: the next start of a server counts again. A program that takes them
 -- out of `settled_points` too sets `counted` to what it was.
 CREATE TRIGGER rows_are_gone AFTER DELETE ON packed_results

@@ -24,7 +24,8 @@ CREATE TABLE studies (
   mixes_versions INTEGER NOT NULL DEFAULT 0, -- 1: results of several solver versions are allowed
   checksum    INTEGER,           -- CRC-32 of study_id, name, recipe, points and created_at
   submitted_by TEXT,             -- name of the key with which it was first submitted; NULL: without keys
-  counted     INTEGER NOT NULL DEFAULT 0    -- 1: `settled_points` says which points have a row
+  counted     INTEGER NOT NULL DEFAULT 0,   -- 1: `settled_points` says which points have a row
+  takes_over  INTEGER NOT NULL DEFAULT 0    -- 1: points that other studies have solved are still sought
 ) STRICT;
 
 -- Every parameter but H, mu and e; one row for each distinct model that has results. The columns

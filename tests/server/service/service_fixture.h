@@ -21,6 +21,25 @@ using protocol::ClientRequest;
 using protocol::ServerToWorker;
 using protocol::WorkerMessage;
 
+/// Keeps what is asked of a finder, and finds nothing.
+struct FakeFinder final : KnownSeeker {
+  bool can_seek() const override { return can; }
+  void note_source(std::uint64_t study_id, const StudyTable&) override {
+    sources.push_back(study_id);
+  }
+  void drop_source(std::uint64_t study_id) override { dropped.push_back(study_id); }
+  void seek(KnownQuestion question) override { questions.push_back(std::move(question)); }
+  void go_on() override { ++done; }
+  void stop_seeking(std::uint64_t study_id) override { stopped.push_back(study_id); }
+
+  bool can = false;
+  std::vector<std::uint64_t> sources;
+  std::vector<std::uint64_t> dropped;
+  std::vector<KnownQuestion> questions;
+  std::vector<std::uint64_t> stopped;
+  int done = 0;
+};
+
 /// Keeps what the service sends, and writes only when told to.
 class FakeOutbox final : public Outbox {
  public:
@@ -57,11 +76,13 @@ class FakeOutbox final : public Outbox {
   }
   void cancel_query(std::uint64_t ticket) override { cancelled_queries.push_back(ticket); }
   void read(ReadJob job) override { reads.push_back(std::move(job)); }
+  KnownSeeker& finder() override { return seeker; }
   void note(Severity, const std::string& text) override {
     ++notes;
     log.push_back(text);
   }
 
+  FakeFinder seeker;
   std::string unreachable;
   std::string busy;
   std::string unheard;

@@ -1,4 +1,4 @@
-#include "server/store/settled_runs.h"
+#include "server/store/rows/settled_runs.h"
 
 #include <algorithm>
 #include <numeric>

@@ -1,4 +1,4 @@
-#include "server/store/settled_runs.h"
+#include "server/store/rows/settled_runs.h"
 
 #include <algorithm>
 #include <limits>
@@ -37,7 +37,8 @@ std::map<std::uint64_t, std::optional<IntervalSet>> noted_points(sqlite3* databa
   std::map<std::uint64_t, std::optional<IntervalSet>> found;
   Statement studies(database, "SELECT study_id, counted FROM studies");
   while (studies.step()) {
-    found[number(studies, 0)] = studies.integer(1) != 0 ? std::optional(IntervalSet()) : std::nullopt;
+    found[number(studies, 0)] =
+        studies.integer(1) != 0 ? std::optional(IntervalSet()) : std::nullopt;
   }
   Statement runs(database,
                  "SELECT study_id, first_point, points FROM settled_points"

@@ -20,6 +20,9 @@ IntervalSet points_with_row(sqlite3* database, std::uint64_t study_id, const Int
 /// which come with nothing. Throws StorageError.
 std::map<std::uint64_t, std::optional<IntervalSet>> noted_points(sqlite3* database);
 
+/// The same of one study.
+std::optional<IntervalSet> noted_points_of(sqlite3* database, std::uint64_t study_id);
+
 /// The table `settled_points`: which points of each study have a row, as runs of neighbours, so
 /// that nobody need look at the rows to know. Whoever changes rows says so here, in the same
 /// transaction. What other programs delete is noted by the schema's triggers: the study is in doubt

@@ -16,10 +16,10 @@
 #include <CLI/CLI.hpp>
 
 #include "proto/keys/key_file.h"
-#include "tests/bench/crowd.h"
+#include "tests/bench/crowd/crowd.h"
+#include "tests/bench/crowd/status_probe.h"
 #include "tests/bench/process_usage.h"
 #include "tests/bench/scraper.h"
-#include "tests/bench/status_probe.h"
 #include "tests/support/database.h"
 #include "tests/support/programs.h"
 

@@ -1,0 +1,109 @@
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "server/database/sqlite.h"
+#include "server/scheduler/points/study_table.h"
+#include "server/store/known/known_points.h"
+
+namespace oblique::server {
+
+struct KnownFinderSettings {
+  std::string database;                   ///< file
+  std::string solver_version;             ///< of the results that may be taken
+  std::uint64_t most_work = 100'000'000;  ///< numbers a study, about
+  std::uint64_t chunk_points = 4096;      ///< in a report, about
+};
+
+/// A study of which points are sought, those without a row.
+struct KnownQuestion {
+  std::uint64_t study_id;
+  StudyTable table;
+  bool is_unwanted = false;  ///< nothing is to be found any more, but its end
+};
+
+/// Points of a study that are known from another, ...
+struct KnownReport {
+  std::uint64_t study_id;
+  std::uint64_t source_id;
+  std::vector<SharedRun> runs;
+  bool is_end = false;        ///< ... or that no more are sought,
+  bool is_cut_short = false;  ///< for it took too long
+};
+
+/// Where points that are known are sought. This one finds none and is never asked.
+class KnownSeeker {
+ public:
+  virtual ~KnownSeeker() = default;
+
+  /// Whether anything can be found here.
+  virtual bool can_seek() const { return false; }
+  /// The study has results; with another table from now on, if it was known.
+  virtual void note_source(std::uint64_t /*study_id*/, const StudyTable& /*table*/) {}
+  /// It is deleted.
+  virtual void drop_source(std::uint64_t /*study_id*/) {}
+  /// Reports follow, the last of which is an end.
+  virtual void seek(KnownQuestion /*question*/) {}
+  /// A report, no end, was dealt with.
+  virtual void go_on() {}
+  /// Nobody wants points of that study any more: its end follows soon.
+  virtual void stop_seeking(std::uint64_t /*study_id*/) {}
+};
+
+/// Seeks points that other studies of the database have solved, on a thread of its own and one
+/// study after the other. Who takes reports says for each that it is done with: only two are out at
+/// a time. Not thread-safe but for `note_source` and what follows.
+class KnownFinder final : public KnownSeeker {
+ public:
+  using Report = std::function<void(KnownReport)>;
+
+  /// `report` is called on the finder's thread.
+  KnownFinder(KnownFinderSettings settings, Report report);
+  /// Ends what is sought; nothing is reported of it.
+  ~KnownFinder() override;
+  KnownFinder(const KnownFinder&) = delete;
+  KnownFinder& operator=(const KnownFinder&) = delete;
+
+  bool can_seek() const override { return true; }
+  void note_source(std::uint64_t study_id, const StudyTable& table) override;
+  void drop_source(std::uint64_t study_id) override;
+  void seek(KnownQuestion question) override;
+  void go_on() override;
+  void stop_seeking(std::uint64_t study_id) override;
+
+ private:
+  class Chunks;
+
+  void run();
+  void answer(const KnownQuestion& question);
+  void seek_in_all(const KnownQuestion& question, const protocol::PointTable& table, Work& work);
+  static void add_sound(const protocol::PointTable& table, const SharedRun& run, Work& work,
+                        Chunks& chunks);
+  bool hand_over(KnownReport report);
+  sqlite3* database();
+
+  KnownFinderSettings settings_;
+  Report report_;
+  DatabaseHandle database_;
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  std::deque<KnownQuestion> questions_;                            // guarded by mutex_
+  std::map<std::uint64_t, std::shared_ptr<KnownSource>> sources_;  // guarded by mutex_, the map
+  std::uint64_t current_ = 0;                                      // study; guarded by mutex_
+  std::size_t reports_out_ = 0;                                    // guarded by mutex_
+  bool stopping_ = false;                                          // guarded by mutex_
+  std::atomic<bool> is_unwanted_ = false;
+  std::thread thread_;  // last: it uses all the others
+};
+
+}  // namespace oblique::server

@@ -1,0 +1,98 @@
+#include "server/store/known/take_overs.h"
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+namespace oblique::server {
+namespace {
+
+/// Origins that a message names.
+constexpr std::size_t kMostNamed = 20;
+
+}  // namespace
+
+bool TakeOvers::should_seek(std::uint64_t study_id, std::string_view version,
+                            bool mixes_versions) const {
+  const bool is_only_source = sources_.size() == 1 && sources_.contains(study_id);
+  return !solver_version_.empty() && !sources_.empty() && !is_only_source &&
+         (version.empty() || mixes_versions || version == solver_version_);
+}
+
+void TakeOvers::restore(std::uint64_t study_id, const std::map<std::string, std::uint64_t>& from) {
+  for (const auto& [origin, points] : from) {
+    add(study_id, origin, points);
+  }
+}
+
+void TakeOvers::add(std::uint64_t study_id, const std::string& origin, std::uint64_t points) {
+  if (points > 0) {
+    Taken& taken = taken_[study_id];
+    taken.from[origin] += points;
+    taken.points += points;
+  }
+}
+
+bool TakeOvers::end(std::uint64_t study_id, bool is_cut_short) {
+  const auto known = taken_.find(study_id);
+  if (known == taken_.end() || known->second.under_way == 0) {
+    return false;
+  }
+  Taken& taken = known->second;
+  taken.cut_short = taken.cut_short || is_cut_short;
+  const bool is_last = --taken.under_way == 0;
+  if (is_last && taken.points == 0 && !taken.cut_short) {
+    taken_.erase(known);
+  }
+  return is_last;
+}
+
+void TakeOvers::forget(std::uint64_t study_id) {
+  taken_.erase(study_id);
+  sources_.erase(study_id);
+}
+
+bool TakeOvers::is_under_way(std::uint64_t study_id) const {
+  const auto known = taken_.find(study_id);
+  return known != taken_.end() && known->second.under_way > 0;
+}
+
+std::uint64_t TakeOvers::points(std::uint64_t study_id) const {
+  const auto known = taken_.find(study_id);
+  return known == taken_.end() ? 0 : known->second.points;
+}
+
+protocol::TakenOver TakeOvers::message_of(std::uint64_t study_id) const {
+  protocol::TakenOver message;
+  const auto known = taken_.find(study_id);
+  if (known == taken_.end()) {
+    return message;
+  }
+  message.set_points(known->second.points);
+  message.set_under_way(known->second.under_way > 0);
+  message.set_cut_short(known->second.cut_short);
+  std::vector<std::pair<std::string, std::uint64_t>> from(known->second.from.begin(),
+                                                          known->second.from.end());
+  std::stable_sort(from.begin(), from.end(),
+                   [](const auto& a, const auto& b) { return a.second > b.second; });
+  from.resize(std::min(from.size(), kMostNamed));
+  for (const auto& [study, points] : from) {
+    auto& part = *message.add_from();
+    part.set_study(study);
+    part.set_points(points);
+  }
+  return message;
+}
+
+std::vector<HeldReply> TakeOvers::release(std::int64_t now_ms, std::uint64_t study_id) {
+  const auto waits = [&](const HeldReply& held) {
+    return held.study_id != study_id && held.until_ms > now_ms && is_under_way(held.study_id);
+  };
+  const auto first = std::stable_partition(held_.begin(), held_.end(), waits);
+  std::vector<HeldReply> released(std::make_move_iterator(first),
+                                  std::make_move_iterator(held_.end()));
+  held_.erase(first, held_.end());
+  return released;
+}
+
+}  // namespace oblique::server

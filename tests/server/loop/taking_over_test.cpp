@@ -1,0 +1,191 @@
+// Points that another study has solved are taken over, in the whole server.
+#include "server/loop/loop.h"
+
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/reading/reader.h"
+#include "tests/server/loop/running_server.h"
+#include "tests/support/recipes.h"
+#include "tests/support/temporary_folder.h"
+
+namespace oblique::server {
+namespace {
+
+using protocol::listed;
+using protocol::range;
+using protocol::recipe_of;
+
+protocol::Recipe grid(double first_mu, double last_mu, std::uint64_t count) {
+  return recipe_of(
+      {{listed("H", {0.9, 1.0}), range("mu", first_mu, last_mu, count), listed("e", {0.5, 1.0})}});
+}
+
+class TakingOverTest : public testing::Test {
+ protected:
+  void start() {
+    server_.reset();
+    server_ = std::make_unique<RunningServer>(path_);
+    client_ = std::make_unique<PretendedClient>(server_->client_endpoint());
+  }
+  void stop() {
+    client_.reset();
+    server_.reset();
+  }
+  protocol::SubmitReply submit(const std::string& name, const protocol::Recipe& recipe,
+                               bool fresh = false) {
+    ClientRequest request;
+    request.mutable_submit()->set_name(name);
+    *request.mutable_submit()->mutable_recipe() = recipe;
+    request.mutable_submit()->set_fresh(fresh);
+    const ClientReply reply = client_->ask(request);
+    EXPECT_TRUE(reply.has_submit()) << reply.error().message();
+    return reply.submit();
+  }
+  void work(std::uint64_t points) {
+    PretendedWorker worker(server_->worker_endpoint());
+    worker.hello();
+    worker.work(points);
+  }
+  std::int64_t number(const std::string& sql) {
+    return Reader(path_).query(sql, kNoLimits).rows(0).values(0).integer();
+  }
+  void by_hand(const std::string& sql) {
+    const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);
+    execute(database.get(), sql);
+  }
+
+  test::TemporaryFolder folder_;
+  std::string path_ = folder_.file("studies.db");
+  std::unique_ptr<RunningServer> server_;
+  std::unique_ptr<PretendedClient> client_;
+};
+
+TEST_F(TakingOverTest, TheSamePointsUnderAnotherNameAreCopiesOfTheRowsBitByBit) {
+  start();
+  submit("a", grid(0.0, 1.0, 5));
+  work(20);
+  const auto reply = submit("b", grid(0.0, 1.0, 5));
+  EXPECT_EQ(reply.settled(), 20U);
+  EXPECT_EQ(reply.taken().points(), 20U);
+  ASSERT_EQ(reply.taken().from_size(), 1);
+  EXPECT_EQ(reply.taken().from(0).study(), "a");
+  EXPECT_EQ(reply.taken().from(0).points(), 20U);
+  const auto status = client_->status("b");
+  EXPECT_EQ(status.state(), "done");
+  EXPECT_EQ(status.solved(), 20U);
+  EXPECT_EQ(status.taken().points(), 20U);
+  EXPECT_EQ(number("SELECT count(*) FROM runs AS a JOIN runs AS b USING (point, H, mu, e, status,"
+                   " duration_s, fn_peak_N, ft_peak_N, mode, peaks, phases, stick_intervals,"
+                   " reaction_peaks, worker, solver_version, attempt, solved_at, model_id)"
+                   " WHERE a.study = 'a' AND b.study = 'b' AND a.taken_from IS NULL"
+                   " AND b.taken_from = 'a/' || point"),
+            20);
+  stop();
+  EXPECT_EQ(Reader(path_).study_status("b").at(0).taken().points(), 20U);
+}
+
+TEST_F(TakingOverTest, OfAGridThatOverlapsOnlyTheRestIsSolved) {
+  start();
+  submit("a", grid(0.0, 1.0, 11));
+  work(44);
+  const auto reply = submit("b", grid(0.5, 1.5, 11));  // mu 0.5 to 1.0 is known
+  EXPECT_EQ(reply.taken().points(), 24U);
+  EXPECT_EQ(client_->status("b").state(), "running");
+  work(20);
+  EXPECT_EQ(client_->status("b").state(), "done");
+  EXPECT_EQ(number("SELECT count(*) FROM runs WHERE study = 'b' AND taken_from IS NULL"
+                   " AND mu > 1.0"),
+            20);
+}
+
+TEST_F(TakingOverTest, WhatAFilterLeavesOutIsNotTaken) {
+  start();
+  submit("a", grid(0.0, 1.0, 5));
+  work(20);
+  auto filtered = grid(0.0, 1.0, 5);
+  filtered.mutable_blocks(0)->set_where("mu > 0.3");
+  const auto reply = submit("b", filtered);
+  EXPECT_EQ(reply.points(), 12U);
+  EXPECT_EQ(reply.taken().points(), 12U);
+  EXPECT_EQ(client_->status("b").state(), "done");
+  EXPECT_EQ(number("SELECT count(*) FROM runs WHERE study = 'b' AND mu < 0.3"), 0);
+}
+
+TEST_F(TakingOverTest, NothingIsTakenWhenAllIsToBeSolved) {
+  start();
+  submit("a", grid(0.0, 1.0, 5));
+  work(20);
+  const auto reply = submit("b", grid(0.0, 1.0, 5), true);
+  EXPECT_EQ(reply.settled(), 0U);
+  work(20);
+  EXPECT_EQ(number("SELECT count(*) FROM runs WHERE taken_from IS NOT NULL"), 0);
+}
+
+TEST_F(TakingOverTest, WhatAnotherSolverVersionSolvedIsNotTaken) {
+  start();
+  submit("a", grid(0.0, 1.0, 5));
+  work(20);
+  stop();
+  by_hand("UPDATE workers SET solver_version = '0.9'");
+  start();
+  EXPECT_EQ(submit("b", grid(0.0, 1.0, 5)).taken().points(), 0U);
+  EXPECT_EQ(client_->status("b").state(), "running");
+}
+
+TEST_F(TakingOverTest, RowsThatWereTakenStayWhenTheirOriginIsDeleted) {
+  start();
+  submit("a", grid(0.0, 1.0, 5));
+  work(20);
+  submit("b", grid(0.0, 1.0, 5));
+  ClientRequest request;
+  request.mutable_change()->set_study("a");
+  request.mutable_change()->set_change(protocol::STUDY_CHANGE_DELETE);
+  EXPECT_TRUE(client_->ask(request).has_change());
+  EXPECT_EQ(number("SELECT count(*) FROM runs WHERE study = 'b' AND taken_from LIKE 'a/%'"), 20);
+  // And what is deleted gives nothing; b gives what it took.
+  const auto reply = submit("c", grid(0.0, 1.0, 5));
+  ASSERT_EQ(reply.taken().from_size(), 1);
+  EXPECT_EQ(reply.taken().from(0).study(), "b");
+}
+
+TEST_F(TakingOverTest, AStudyThatGrowsTakesOverForItsNewPoints) {
+  start();
+  submit("a", grid(0.0, 1.0, 5));
+  work(20);
+  auto growing = grid(2.0, 3.0, 5);
+  submit("b", growing);
+  work(20);
+  *growing.add_blocks() = grid(0.5, 1.5, 5).blocks(0);
+  const auto reply = submit("b", growing);
+  EXPECT_EQ(reply.appended(), 20U);
+  EXPECT_EQ(reply.taken().points(), 12U);
+  work(8);
+  EXPECT_EQ(client_->status("b").state(), "done");
+}
+
+TEST_F(TakingOverTest, AServerThatWasKilledMeanwhileGoesOnWithIt) {
+  start();
+  submit("a", grid(0.0, 1.0, 5));
+  work(20);
+  submit("b", grid(0.0, 1.0, 5));
+  stop();
+  // As if it had been killed after some rows.
+  by_hand("DELETE FROM results WHERE study_id = 2 AND point > 3");
+  by_hand("UPDATE studies SET state = 'running', takes_over = 1 WHERE study_id = 2");
+  by_hand("UPDATE taken_points SET points = 4");
+  start();
+  protocol::StudyStatus status;
+  do {
+    status = client_->status("b");
+  } while (status.taken().under_way());
+  EXPECT_EQ(status.state(), "done");
+  EXPECT_EQ(status.taken().points(), 20U);
+  EXPECT_EQ(number("SELECT count(*) FROM runs WHERE study = 'b' AND taken_from IS NOT NULL"), 20);
+  EXPECT_EQ(number("SELECT count(*) FROM studies WHERE takes_over"), 0);
+}
+
+}  // namespace
+}  // namespace oblique::server
