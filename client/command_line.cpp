@@ -46,6 +46,7 @@ void add_verbs(CLI::App& app, Command& command) {
   add_pause(app, command);
   add_resume(app, command);
   add_retry(app, command);
+  add_describe(app, command);
   add_rename(app, command);
   add_delete(app, command);
   add_query(app, command);

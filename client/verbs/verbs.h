@@ -29,6 +29,7 @@ void add_cancel(CLI::App& app, Command& command);
 void add_pause(CLI::App& app, Command& command);
 void add_resume(CLI::App& app, Command& command);
 void add_retry(CLI::App& app, Command& command);
+void add_describe(CLI::App& app, Command& command);
 void add_rename(CLI::App& app, Command& command);
 void add_delete(CLI::App& app, Command& command);
 void add_query(CLI::App& app, Command& command);

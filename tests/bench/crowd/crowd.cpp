@@ -243,6 +243,9 @@ class Crowd::Parts {
           drop([&](const worker::Batch& batch) { return batch.number == effect.number; });
         },
         [&](const worker::DropAll&) { member.jobs.clear(); },
+        [](const worker::SolveTrace&) {},
+        [](const worker::CancelTrace&) {},
+        [](const worker::DropTraces&) {},
         [](const worker::TellSilence&) {},
         [](const worker::Note&) {},
         [](const worker::Finish& finish) {

@@ -68,6 +68,16 @@ TEST_F(StudyCareVerbs, AStudyGetsAnotherName) {
   EXPECT_EQ(ask({"rename", "slip", std::string(500, 'x')}).exit_code, 2);
 }
 
+TEST_F(StudyCareVerbs, AStudyIsDescribedAsTheFileThatGivesItAgain) {
+  ASSERT_EQ(run_study(2).exit_code, 0);
+  const auto described = ask({"describe", "friction"});
+  EXPECT_EQ(described.exit_code, 0) << described.err;
+  std::ofstream(folder_.file("again.toml")) << described.out;
+  const auto again = ask({"run", "again.toml"});
+  EXPECT_EQ(again.exit_code, 0) << "the same study, which is done: " << again.err;
+  EXPECT_EQ(ask({"describe", "frictoin"}).exit_code, 1);
+}
+
 TEST_F(StudyCareVerbs, AStudyIsDeletedWhenSomebodySaysYes) {
   ASSERT_EQ(run_study(1).exit_code, 0);
   const auto asked = ask({"delete", "friction"});
