@@ -3,7 +3,9 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
+#include <csignal>
 #include <exception>
 #include <iostream>
 #include <string>
@@ -12,6 +14,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/formats/sink.h"
 #include "client/output/human_units.h"
 #include "client/output/speech.h"
 #include "client/output/terminal.h"
@@ -135,6 +138,9 @@ int parse(CLI::App& app, int argc, const char* const* argv) {
   }
 }
 
+/// Of a program that a broken pipe ended (SIGPIPE), which is what happens unless that is ignored.
+constexpr int kReaderGone = 128 + SIGPIPE;
+
 /// An error for people, as "oblique query: ...".
 int tell_error(const std::string& words, const std::string& message, int exit_code) {
   const ErrorOn error(std::cerr);
@@ -147,10 +153,16 @@ int tell_error(const std::string& words, const std::string& message, int exit_co
 int carried_out(const std::string& words, const Command& command) {
   try {
     const int code = command();
+    errno = 0;
     if (!std::cout.flush()) {
+      if (errno == EPIPE) {
+        return kReaderGone;
+      }
       return tell_error(words, "standard output could not be written", kFailed);
     }
     return code;
+  } catch (const ClosedPipe&) {
+    return kReaderGone;
   } catch (const solver::InputError& error) {
     return tell_error(words, error.what(), kWrongUsage);
   } catch (const std::exception& error) {

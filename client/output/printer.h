@@ -5,31 +5,17 @@
 #include <string>
 #include <string_view>
 
+#include "client/formats/row_printer.h"
 #include "proto/oblique.pb.h"
 
 namespace oblique::client {
 
-enum class Format { kTable, kCsv, kJson, kMarkdown };
-
-/// The format of that name: `table`, `csv`, `json` or `markdown`. Throws solver::InputError for
-/// other names.
-Format format_named(std::string_view name);
-
-/// Whether it is for reading, not for other programs.
-inline bool is_for_people(Format format) {
-  return format == Format::kTable || format == Format::kMarkdown;
-}
-
-/// Prints columns and rows. Tables, plain or in Markdown, are for reading: numbers of
-/// six digits, aligned. CSV (RFC 4180,
-/// a header line) and JSON (an array of objects) hold every number so that it reads back as the
-/// same bits; NULL is an empty field, respectively null. In JSON the second of two columns of one
-/// name is called name_2, and lists that columns pack as text are arrays; see packed_columns.h.
+/// Prints columns and rows that are there already, in one of the formats of made_printer.
 void print(std::ostream& out, const protocol::QueryReply& rows, Format format);
 
 /// The same to standard output. In tables and on a terminal texts from outside are made visible
 /// (proto/text.h); in JSON their characters are escaped as JSON does. CSV in a file or a
-/// pipe holds them byte for byte.
+/// pipe holds them byte for byte. Throws solver::InputError for NumPy's archive on a terminal.
 void print_out(const protocol::QueryReply& rows, Format format);
 
 /// One field of CSV, in quotes where it needs them.

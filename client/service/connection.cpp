@@ -184,6 +184,12 @@ protocol::ClientReply Connection::answer_to(const protocol::ClientRequest& reque
 }
 
 protocol::ClientReply Connection::call(protocol::ClientRequest request, const Tell& tell) {
+  return call_numbered(request, tell);
+}
+
+protocol::ClientReply Connection::call_numbered(protocol::ClientRequest& request,
+                                                const Tell& tell) {
+  end_rows();
   request.set_protocol_version(protocol::kProtocolVersion);
   request.set_request_id(++last_request_id_);
   auto frame = protocol::encode(request);
@@ -199,6 +205,12 @@ protocol::ClientReply Connection::call(protocol::ClientRequest request, const Te
                           .resend_after = std::chrono::milliseconds(settings_.resend_after_ms),
                           .sent = Clock::now()},
                          tell);
+  check(reply, request);
+  return reply;
+}
+
+void Connection::check(const protocol::ClientReply& reply,
+                       const protocol::ClientRequest& request) const {
   if (reply.has_error() && reply.error().wrong_request()) {
     throw solver::InputError(reply.error().message());
   }
@@ -212,7 +224,6 @@ protocol::ClientReply Connection::call(protocol::ClientRequest request, const Te
                     "the address and port ({} is for clients; the port for workers is another one)",
                     settings_.server_url, ConnectionSettings().server_url));
   }
-  return reply;
 }
 
 protocol::SubmitReply Connection::submit(const Study& study, const StudyTerms& terms) {
@@ -310,7 +321,12 @@ protocol::QueryReply Connection::query(const std::string& sql, std::uint64_t max
   request.mutable_query()->set_sql(sql);
   request.mutable_query()->set_max_rows(max_rows);
   request.mutable_query()->set_time_limit_ms(static_cast<std::uint64_t>(settings_.timeout_ms));
-  return call(std::move(request), tell).query();
+  protocol::ClientReply reply = call(std::move(request), tell);
+  if (reply.query().truncated()) {
+    throw ServerError(fmt::format("{} gave only the first {} rows of an answer",
+                                  settings_.server_url, reply.query().rows_size()));
+  }
+  return std::move(*reply.mutable_query());
 }
 
 }  // namespace oblique::client

@@ -6,6 +6,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include <zmq.hpp>
 
@@ -95,12 +96,31 @@ class Connection {
   protocol::ChangeReply remove(const protocol::StudyStatus& study);
   protocol::Recipe describe(const std::string& study);
   /// Runs one statement that only reads, for no longer than an answer is waited for; `max_rows` 0
-  /// leaves that limit to the server.
+  /// leaves that limit to the server. For answers that fit into one reply; a longer one is a
+  /// ServerError.
   protocol::QueryReply query(const std::string& sql, std::uint64_t max_rows = 0,
                              const Tell& tell = {});
 
+  /// Asks for an answer in chunks. It is given by `next_rows` and ended by `end_rows`, or by any
+  /// other request.
+  void ask_for_rows(protocol::QueryRequest request);
+  /// The next chunk of it, the first being asked for again over a new connection as any answer. A
+  /// connection that is lost after that is a ConnectionError, and so is a chunk that is missing.
+  protocol::QueryReply next_rows();
+  /// Nothing more of it is wanted.
+  void end_rows();
+
  private:
   using Clock = std::chrono::steady_clock;
+
+  /// An answer in chunks.
+  struct Rows {
+    protocol::ClientRequest request;
+    std::uint64_t connection = 0;  ///< over which it comes
+    std::uint64_t chunks = 0;      ///< that were given
+    std::uint64_t rows = 0;
+    std::vector<std::string> columns = {};
+  };
 
   /// A request that is not answered yet.
   struct Outstanding {
@@ -114,8 +134,17 @@ class Connection {
   };
 
   protocol::ClientReply call(protocol::ClientRequest request, const Tell& tell = {});
+  /// The same, and numbers the request.
+  protocol::ClientReply call_numbered(protocol::ClientRequest& request, const Tell& tell);
+  /// Throws what the server's error says, or what is wrong with its reply.
+  void check(const protocol::ClientReply& reply, const protocol::ClientRequest& request) const;
   protocol::ClientReply answer_to(const protocol::ClientRequest& request, Outstanding outstanding,
                                   const Tell& tell);
+  /// Waits for a chunk after the first.
+  protocol::QueryReply more_rows();
+  void tell_of_rows(const protocol::ClientRequest& wish);
+  /// Throws ConnectionError for an answer that broke off, for this reason.
+  [[noreturn]] void broke_off(const std::string& why) const;
   /// Whether no connection has taken it, or only one that there was before the present one.
   bool is_unsent(const Outstanding& outstanding);
   /// Sends it if a connection takes it that has not yet; connects again when nothing was heard for
@@ -140,6 +169,7 @@ class Connection {
   Clock::time_point connecting_since_ = Clock::now();
   std::uint64_t connections_before_ = 0;  ///< the present attempt to connect began
   std::uint64_t last_request_id_ = 0;
+  std::optional<Rows> rows_;  ///< under way
 };
 
 }  // namespace oblique::client

@@ -5,7 +5,6 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "server/asking/columns.h"
 #include "server/asking/sql/sql_expression.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/parameters.h"
@@ -13,9 +12,7 @@
 namespace oblique::client {
 namespace {
 
-using server::check_case_of_columns;
 using server::check_sql_part;
-using server::rows_of_queries;
 using server::sql_text;
 using server::SqlPart;
 
@@ -58,37 +55,17 @@ void check(const ResultQuery& query) {
   }
 }
 
-void check_columns(const ResultQuery& query, Source& source) {
-  const auto runs = source.query(fmt::format("SELECT * FROM {} LIMIT 0", rows_of_queries()));
-  const std::vector<std::string> columns(runs.columns().begin(), runs.columns().end());
-  const auto names_given = server::names_given_in(query.select);
-  check_case_of_columns(kSelect, query.select, columns, names_given);
-  check_case_of_columns(kWhere, query.where, columns, names_given);
-  check_case_of_columns(kOrder, query.order, columns, names_given);
-}
-
-std::string statement_of(const ResultQuery& query, std::int64_t skipped) {
-  // The study is chosen inside, where no --where can widen it.
-  const std::string where = query.where.empty() ? "" : fmt::format(" WHERE ({})", query.where);
-  const std::string order = query.order.empty() ? "" : fmt::format(" ORDER BY {}", query.order);
-  // SQL wants a limit before an offset; -1 is none.
-  const std::int64_t limit = query.limit ? *query.limit - skipped : -1;
-  return fmt::format("SELECT {} FROM (SELECT * FROM {} WHERE study = {}){}{} LIMIT {} OFFSET {}",
-                     query.select, rows_of_queries(), sql_text(query.study), where, order, limit,
-                     skipped);
-}
-
-protocol::QueryReply all_rows(Source& source, const ResultQuery& query, bool at_rest) {
-  auto rows = source.query(statement_of(query, 0));
-  while (rows.truncated() && at_rest) {
-    const auto more = source.query(statement_of(query, rows.rows_size()));
-    if (more.rows().empty()) {
-      break;
-    }
-    rows.mutable_rows()->MergeFrom(more.rows());
-    rows.set_truncated(more.truncated());
+protocol::QueryRequest request_for(const ResultQuery& query) {
+  protocol::QueryRequest request;
+  auto& question = *request.mutable_question();
+  question.set_study(query.study);
+  question.add_select(query.select);
+  question.set_where(query.where);
+  question.set_order(query.order);
+  if (query.limit) {
+    question.set_limit(static_cast<std::uint64_t>(*query.limit));
   }
-  return rows;
+  return request;
 }
 
 }  // namespace oblique::client

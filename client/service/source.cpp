@@ -1,13 +1,13 @@
 #include "client/service/source.h"
 
-#include <chrono>
 #include <iostream>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/service/time_guard.h"
+#include "client/service/database_rows.h"
 #include "proto/text.h"
+#include "proto/wire/chunk_writer.h"
 #include "server/database/database_in_use.h"
 #include "server/reading/reader.h"
 #include "worker/solver/model/errors.h"
@@ -27,16 +27,8 @@ class DatabaseSource : public Source {
     }
   }
 
-  protocol::QueryReply query(const std::string& sql) override {
-    // Some functions of SQL do not look at the clock.
-    constexpr std::chrono::milliseconds kGrace{500};
-    const TimeGuard guard(std::chrono::milliseconds(limits_.time_limit_ms) + kGrace,
-                          fmt::format("oblique: {}", server::took_too_long(limits_.time_limit_ms)));
-    try {
-      return reader_.query(sql, limits_);
-    } catch (const server::StatementError& error) {
-      throw solver::InputError(error.what());
-    }
+  std::unique_ptr<RowStream> rows(protocol::QueryRequest request) override {
+    return std::make_unique<DatabaseRows>(file_, reader_, std::move(request), limits_);
   }
   std::vector<protocol::StudyStatus> status(const std::string& study, const Tell&) override {
     try {
@@ -70,8 +62,23 @@ class DatabaseSource : public Source {
 
   std::string file_;
   server::Reader reader_;
-  // Nobody else is kept waiting, and an answer may be as long as memory is.
-  server::QueryLimits limits_{UINT64_MAX, UINT64_MAX, 0, std::int64_t{64} << 20U};
+  // Nobody else is kept waiting.
+  server::QueryLimits limits_{UINT64_MAX, UINT64_MAX, 0, std::int64_t{64} << 20U, 0};
+};
+
+class ServerRows : public RowStream {
+ public:
+  ServerRows(Connection& connection, protocol::QueryRequest request) : connection_(connection) {
+    connection_.ask_for_rows(std::move(request));
+  }
+  ~ServerRows() override { connection_.end_rows(); }
+  ServerRows(const ServerRows&) = delete;
+  ServerRows& operator=(const ServerRows&) = delete;
+
+  protocol::QueryReply next() override { return connection_.next_rows(); }
+
+ private:
+  Connection& connection_;
 };
 
 class ServerSource : public Source {
@@ -79,7 +86,9 @@ class ServerSource : public Source {
   ServerSource(ConnectionSettings settings, Connection::KeepWaiting keep_waiting)
       : connection_(std::move(settings), std::move(keep_waiting)) {}
 
-  protocol::QueryReply query(const std::string& sql) override { return connection_.query(sql); }
+  std::unique_ptr<RowStream> rows(protocol::QueryRequest request) override {
+    return std::make_unique<ServerRows>(connection_, std::move(request));
+  }
   std::vector<protocol::StudyStatus> status(const std::string& study, const Tell& tell) override {
     const auto reply = connection_.status(study, tell);
     access_ = reply.access();
@@ -99,6 +108,21 @@ class ServerSource : public Source {
 };
 
 }  // namespace
+
+protocol::QueryReply Source::query(const std::string& sql) {
+  protocol::QueryRequest request;
+  request.set_sql(sql);
+  const auto stream = rows(std::move(request));
+  protocol::QueryReply whole;
+  for (bool ends = false; !ends;) {
+    const protocol::QueryReply chunk = stream->next();
+    protocol::QueryReply part = protocol::as_rows(chunk);
+    whole.mutable_columns()->Swap(part.mutable_columns());
+    whole.mutable_rows()->MergeFrom(part.rows());
+    ends = chunk.ends();
+  }
+  return whole;
+}
 
 std::unique_ptr<Source> open_server(ConnectionSettings settings,
                                     Connection::KeepWaiting keep_waiting) {

@@ -16,13 +16,28 @@ struct DatabaseSettings {
   std::int64_t timeout_ms = 60'000;  ///< for one statement
 };
 
+/// The rows of an answer as they come, in chunks (proto/wire). Its source must outlive it and
+/// answers nothing else until it has ended. One that is destroyed before ends the work at the
+/// source.
+class RowStream {
+ public:
+  virtual ~RowStream() = default;
+
+  /// The next chunk, a sound one; it waits for it. `ends` is set in the last one: only then was all
+  /// given. Throws what the source throws, also in the middle of an answer. Not to be called after
+  /// the end.
+  virtual protocol::QueryReply next() = 0;
+};
+
 /// Where answers come from: a database file or a server.
 class Source {
  public:
   virtual ~Source() = default;
-  /// Runs one statement that only reads. Throws solver::InputError for a wrong one, and what the
-  /// source throws.
-  virtual protocol::QueryReply query(const std::string& sql) = 0;
+  /// The answer to a statement that only reads, or to a question, as it comes. Throws
+  /// solver::InputError for a wrong one, and what the source throws, then or with the first chunk.
+  virtual std::unique_ptr<RowStream> rows(protocol::QueryRequest request) = 0;
+  /// The whole answer to one statement, however long.
+  protocol::QueryReply query(const std::string& sql);
   /// The study of that name, or all of them when it is empty. Throws for an unknown name. Given a
   /// `tell`, waits for a server that is away; see Connection.
   virtual std::vector<protocol::StudyStatus> status(const std::string& study, const Tell& tell) = 0;

@@ -2,33 +2,51 @@
 
 #include <iostream>
 #include <string_view>
+#include <vector>
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/formats/row_output.h"
 #include "client/output/columns.h"
-#include "client/output/speech.h"
 #include "proto/program/exit_code.h"
 
 namespace oblique::client {
 
 void add_format_flag(CLI::App& verb, std::string& format) {
-  verb.add_option("--format", format, "table, csv, json or markdown")
+  verb.add_option("--format", format, "table, csv, json, jsonl, npz or markdown")
       ->type_name("FORMAT")
       ->capture_default_str();
 }
 
-int print_whole(const protocol::QueryReply& rows, Format format) {
-  print_out(rows, format);
-  if (!rows.truncated()) {
-    return protocol::kDone;
+void add_output_flags(CLI::App& verb, OutputFlags& flags) {
+  add_format_flag(verb, flags.format);
+  verb.add_option("--out", flags.file, "file to write, which appears when it is whole")
+      ->type_name("FILE");
+  verb.add_flag("--no-pager", flags.no_pager,
+                "print long tables on a terminal without $OBLIQUE_PAGER, $PAGER or less");
+}
+
+int print_stream(RowStream& stream, const OutputFlags& flags, bool in_shown_units) {
+  const Format format = format_named(flags.format);
+  // Nothing is begun, and no file, before there is a first answer.
+  protocol::QueryReply chunk = stream.next();
+  RowOutput out({.format = format,
+                 .file = flags.file,
+                 .may_page = !flags.no_pager,
+                 .shown = in_shown_units ? shown_columns(chunk) : std::vector<ShownColumn>()});
+  try {
+    out.print(chunk);
+    while (!chunk.ends()) {
+      chunk = stream.next();
+      out.print(chunk);
+    }
+    out.finish();
+  } catch (const ClosedPipe&) {
+    if (!out.is_paged()) {
+      throw;
+    }
   }
-  const ErrorOn error(std::cerr);
-  std::cerr << fmt::format(
-      "Only the first {} rows: the server sends no more at once. Narrow it with WHERE and LIMIT, "
-      "or "
-      "read the database itself with --db FILE.\n",
-      rows.rows_size());
-  return protocol::kFailed;
+  return protocol::kDone;
 }
 
 std::string shell_word(const std::string& text) {

@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 
 #include "client/output/printer.h"
+#include "client/service/source.h"
 #include "proto/oblique.pb.h"
 
 namespace oblique::client {
@@ -13,9 +14,18 @@ namespace oblique::client {
 /// Adds --format.
 void add_format_flag(CLI::App& verb, std::string& format);
 
-/// Prints rows to standard output. When the source cut them off, says so on standard error and
-/// gives kFailed, else kDone.
-int print_whole(const protocol::QueryReply& rows, Format format);
+/// Where and how a long answer is printed.
+struct OutputFlags {
+  std::string format{"table"};
+  std::string file;
+  bool no_pager = false;
+};
+/// Adds --format, --out and --no-pager.
+void add_output_flags(CLI::App& verb, OutputFlags& flags);
+
+/// Prints an answer as it comes, tables for people in the units that people read if
+/// `in_shown_units`. Gives the exit code. Throws what the source throws, and what RowOutput does.
+int print_stream(RowStream& stream, const OutputFlags& flags, bool in_shown_units);
 
 /// `text` as one word of a shell.
 std::string shell_word(const std::string& text);

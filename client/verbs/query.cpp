@@ -1,21 +1,13 @@
 #include <memory>
 #include <string>
-#include <string_view>
-#include <vector>
 
-#include <spdlog/fmt/fmt.h>
-
-#include "client/output/columns.h"
-#include "client/output/printer.h"
 #include "client/service/result_query.h"
 #include "client/service/source_flags.h"
 #include "client/service/watching.h"
 #include "client/verbs/printed_rows.h"
 #include "client/verbs/verbs.h"
 #include "proto/program/usage.h"
-#include "proto/suggestion.h"
-#include "server/asking/columns.h"
-#include "worker/solver/model/parameters.h"
+#include "worker/solver/model/errors.h"
 
 namespace oblique::client {
 namespace {
@@ -33,38 +25,20 @@ brackets in the heading.)";
 
 struct QueryFlags {
   ResultQuery query;
-  std::string format{"table"};
+  OutputFlags output;
   SourceFlags source;
 };
 
-// A wrong column's error, with the columns there are.
-std::string with_columns(const std::string& message, Source& source) {
-  constexpr std::string_view kNoColumn = "no such column: ";
-  const auto at = message.find(kNoColumn);
-  if (at == std::string::npos) {
-    return message;
-  }
-  const auto wrong = message.substr(at + kNoColumn.size());
-  const auto runs =
-      source.query(fmt::format("SELECT * FROM {} LIMIT 0", server::rows_of_queries()));
-  const std::vector<std::string_view> columns(runs.columns().begin(), runs.columns().end());
-  return message + protocol::did_you_mean(wrong, columns) + "; the columns are " +
-         protocol::joined(columns);
-}
-
 int query(const QueryFlags& flags) {
-  const auto format = format_named(flags.format);
+  (void)format_named(flags.output.format);
   check(flags.query);
   const auto source = open_source(flags.source);
-  const auto study = study_named(*source, flags.query.study);
-  check_columns(flags.query, *source);
-  protocol::QueryReply rows;
   try {
-    rows = all_rows(*source, flags.query, study.state() != "running");
-  } catch (const solver::InputError& error) {
-    throw solver::InputError(with_columns(error.what(), *source));
+    return print_stream(*source->rows(request_for(flags.query)), flags.output, true);
+  } catch (const solver::InputError&) {
+    (void)study_named(*source, flags.query.study);  // which is no wrong usage when it is not there
+    throw;
   }
-  return print_whole(is_for_people(format) ? in_shown_units(std::move(rows)) : rows, format);
 }
 
 }  // namespace
@@ -85,7 +59,7 @@ void add_query(CLI::App& app, Command& command) {
   verb->add_option("--limit", flags->query.limit, "most rows shown; all when left out")
       ->check(protocol::whole_number_from(0))
       ->type_name("N");
-  add_format_flag(*verb, flags->format);
+  add_output_flags(*verb, flags->output);
   add_source_flags(*verb, flags->source);
   verb->callback([flags, &command] { command = [flags] { return query(*flags); }; });
 }

@@ -1,6 +1,6 @@
-#include <iostream>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "client/output/printer.h"
 #include "client/service/source_flags.h"
@@ -19,14 +19,16 @@ One statement that only reads.)";
 
 struct SqlFlags {
   std::string statement;
-  std::string format{"table"};
+  OutputFlags output;
   SourceFlags source;
 };
 
 int sql(const SqlFlags& flags) {
-  const auto format = format_named(flags.format);
+  (void)format_named(flags.output.format);
   const auto source = open_source(flags.source);
-  return print_whole(source->query(flags.statement), format);
+  protocol::QueryRequest request;
+  request.set_sql(flags.statement);
+  return print_stream(*source->rows(std::move(request)), flags.output, false);
 }
 
 }  // namespace
@@ -38,7 +40,7 @@ void add_sql(CLI::App& app, Command& command) {
   verb->add_option("STATEMENT", flags->statement, "the statement, in quotes")
       ->required()
       ->type_name("");
-  add_format_flag(*verb, flags->format);
+  add_output_flags(*verb, flags->output);
   add_source_flags(*verb, flags->source);
   verb->callback([flags, &command] { command = [flags] { return sql(*flags); }; });
 }

@@ -140,6 +140,7 @@ class Loop::Parts final : public Outbox {
   }
   void write(WriteJob job) override { writer_.submit(std::move(job)); }
   bool query(QueryJob job) override { return queries_.submit(std::move(job)); }
+  void more_rows(std::uint64_t query, std::uint64_t taken) override { queries_.more(query, taken); }
   void cancel_query(std::uint64_t ticket) override { queries_.cancel(ticket); }
   void read(ReadJob job) override { reader_.submit(std::move(job)); }
   void cancel_read(std::uint64_t ticket) override { reader_.cancel(ticket); }
@@ -238,8 +239,7 @@ class Loop::Parts final : public Outbox {
                                       : std::string_view("\xff", 1);
   }
 
-  /// Nobody waits for the queries of a client that has gone. A flood of connections that must be
-  /// ended must not become a flood of lines.
+  /// Nobody waits for queries of a client that has gone. A flood of ends becomes none of lines.
   void note_departures() {
     for (const Departure& departure : network_.take_departures()) {
       service_->client_left(departure.identity);

@@ -137,7 +137,10 @@ bool ReaderProcess::send_some() {
 /// False when the process is gone, or says what no reader says.
 bool ReaderProcess::receive_some() {
   std::array<char, kReadBytes> bytes;
-  while (true) {
+  while (look_for_frame()) {
+    if (state_ == State::kAnswered) {
+      return true;
+    }
     const ssize_t got = ::recv(channel_, bytes.data(), bytes.size(), 0);
     if (got < 0 && errno == EINTR) {
       continue;
@@ -146,28 +149,42 @@ bool ReaderProcess::receive_some() {
       return got < 0 && errno == EAGAIN;
     }
     in_.append(bytes.data(), static_cast<std::size_t>(got));
-    FrameLength length = 0;
-    if (in_.size() < sizeof length) {
-      continue;
-    }
-    std::memcpy(&length, in_.data(), sizeof length);
-    if (state_ != State::kWorking || length > protocol::kMaxFrameBytes ||
-        in_.size() > sizeof length + length) {
-      return false;
-    }
-    if (in_.size() == sizeof length + length) {
-      state_ = State::kAnswered;
-      return true;
-    }
   }
+  return false;
 }
 
-std::string ReaderProcess::take_answer() {
-  std::string answer = std::exchange(in_, {});
-  answer.erase(0, sizeof(FrameLength));
-  out_ = {};
-  sent_ = 0;
-  state_ = State::kIdle;
+/// Answered when `in_` begins with a whole frame. False when no reader says what it begins with.
+bool ReaderProcess::look_for_frame() {
+  if (in_.size() < sizeof(AnswerHead)) {
+    return in_.empty() || state_ == State::kWorking;
+  }
+  const std::size_t length = head().length;
+  if (state_ != State::kWorking || length > protocol::kMaxFrameBytes) {
+    return false;
+  }
+  if (in_.size() >= sizeof(AnswerHead) + length) {
+    state_ = State::kAnswered;
+  }
+  return true;
+}
+
+AnswerHead ReaderProcess::head() const {
+  AnswerHead head{};
+  std::memcpy(&head, in_.data(), sizeof head);
+  return head;
+}
+
+ReaderAnswer ReaderProcess::take_answer() {
+  ReaderAnswer answer{head(), {}};
+  answer.reply = in_.substr(sizeof answer.head, answer.head.length);
+  in_.erase(0, sizeof answer.head + answer.head.length);
+  if (answer.head.ends == 0) {
+    state_ = State::kWorking;
+  } else {
+    out_ = {};
+    sent_ = 0;
+    state_ = State::kIdle;
+  }
   return answer;
 }
 

@@ -5,7 +5,15 @@
 
 #include <sys/types.h>
 
+#include "server/queries/reader_program.h"
+
 namespace oblique::server {
+
+/// One frame of an answer; see AnswerHead.
+struct ReaderAnswer {
+  AnswerHead head;
+  std::string reply;
+};
 
 /// One process that reads a database for this one, one query at a time; see reader_program.h. It is
 /// killed when this is destroyed, when its owner says so, or when the thread that made this ends.
@@ -22,10 +30,14 @@ class ReaderProcess {
   void ask(const std::string& request);
 
   enum class State { kIdle, kWorking, kAnswered, kEnded };
-  /// Moves bytes both ways as far as they go without waiting. Throws std::bad_alloc.
+  /// Moves bytes both ways as far as they go without waiting, until a frame of the answer has come.
+  /// Throws std::bad_alloc.
   State advance();
-  /// The answer, once.
-  std::string take_answer();
+  State state() const { return state_; }
+  /// What stands before that frame.
+  AnswerHead head() const;
+  /// That frame, once. Until it is taken the process is read no further, and so soon stands still.
+  ReaderAnswer take_answer();
 
   /// To be polled for `events()` before the next `advance`; -1 when it has nothing more to say.
   int descriptor() const { return state_ == State::kEnded ? -1 : channel_; }
@@ -40,6 +52,7 @@ class ReaderProcess {
  private:
   bool send_some();
   bool receive_some();
+  bool look_for_frame();
 
   int channel_ = -1;
   pid_t pid_ = -1;
@@ -48,7 +61,7 @@ class ReaderProcess {
   State state_ = State::kIdle;
   std::string out_;
   std::size_t sent_ = 0;  ///< of out_
-  std::string in_;        ///< the length and what has come of the answer
+  std::string in_;        ///< what has come of the answer and was not taken
 };
 
 }  // namespace oblique::server

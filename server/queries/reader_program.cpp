@@ -5,6 +5,7 @@
 #include <cstring>
 #include <exception>
 #include <fstream>
+#include <functional>
 #include <iostream>
 #include <new>
 #include <optional>
@@ -23,6 +24,7 @@
 #include "proto/text.h"
 #include "server/reading/query_values.h"
 #include "server/reading/reader.h"
+#include "worker/solver/model/errors.h"
 
 namespace oblique::server {
 namespace {
@@ -102,13 +104,26 @@ bool receive_all(void* to, std::size_t size) {
   return true;
 }
 
-bool send_all(const void* from, std::size_t size) {
+/// Waits until the server takes more; calls `stalls` when that is not before long.
+void wait_for_server(const std::function<void()>& stalls) {
+  constexpr int kSoon_ms = 100;
+  pollfd channel{kReaderChannel, POLLOUT, 0};
+  if (::poll(&channel, 1, kSoon_ms) == 0) {
+    stalls();
+    (void)::poll(&channel, 1, -1);
+  }
+}
+
+/// False when the server has gone.
+bool send_all(const void* from, std::size_t size, const std::function<void()>& stalls) {
   const auto* at = static_cast<const char*>(from);
   while (size > 0) {
-    const ssize_t sent = ::send(kReaderChannel, at, size, MSG_NOSIGNAL);
+    const ssize_t sent = ::send(kReaderChannel, at, size, MSG_NOSIGNAL | MSG_DONTWAIT);
     if (sent >= 0) {
       at += sent;
       size -= static_cast<std::size_t>(sent);
+    } else if (errno == EAGAIN) {
+      wait_for_server(stalls);
     } else if (errno != EINTR) {
       return false;
     }
@@ -129,22 +144,69 @@ std::optional<protocol::QueryRequest> next_request() {
   return request;
 }
 
-std::string answer(std::optional<Reader>& reader, const std::string& path,
-                   const protocol::QueryRequest& request) {
+/// False when the server has gone.
+bool send_answer(
+    AnswerHead head, const std::string& reply, const std::function<void()>& stalls = [] {}) {
+  head.length = static_cast<std::uint32_t>(reply.size());
+  return send_all(&head, sizeof head, stalls) && send_all(reply.data(), reply.size(), stalls);
+}
+
+constexpr AnswerHead kLast{
+    .length = 0, .ends = 1, .can_go_on = 0, .reserved = 0, .last_point = 0, .rows = 0, .chunks = 0};
+
+/// Gives chunk by chunk what the server takes; waits for it in between, in which the processor's
+/// time and the query's stand still. False when the server has gone.
+bool send_chunks(Reader& reader, const protocol::QueryRequest& request, const QueryLimits& limits) {
+  Answer answer = reader.answer(request, limits);
+  while (true) {
+    limit_cpu(limits.time_limit_ms);
+    const protocol::QueryReply chunk = answer.next();
+    const protocol::GivenRows& given = answer.given();
+    const AnswerHead head{.length = 0,
+                          .ends = static_cast<std::uint8_t>(chunk.ends() ? 1 : 0),
+                          .can_go_on = static_cast<std::uint8_t>(answer.can_go_on() ? 1 : 0),
+                          .reserved = 0,
+                          .last_point = given.last_point(),
+                          .rows = given.rows(),
+                          .chunks = given.chunks()};
+    const auto rest = [&answer] {
+      if (answer.can_go_on()) {
+        answer.rest();
+      }
+    };
+    if (!send_answer(head, protocol::reply_around(protocol::encode(chunk)), rest)) {
+      return false;
+    }
+    if (chunk.ends()) {
+      return true;
+    }
+  }
+}
+
+/// False when the server has gone.
+bool answer(std::optional<Reader>& reader, const std::string& path,
+            const protocol::QueryRequest& request) {
   const QueryLimits limits = limits_of(request);
+  std::string reply;
   try {
     limit_cpu(limits.time_limit_ms);
     if (!reader) {
       reader.emplace(path);
     }
-    return protocol::reply_around(reader->encoded_query(request.sql(), limits));
+    if (request.in_chunks() || request.has_question()) {
+      return send_chunks(*reader, request, limits);
+    }
+    reply = protocol::reply_around(reader->encoded_query(request.sql(), limits));
   } catch (const std::bad_alloc&) {
-    return encoded_error("the answer needs more memory than a query may have");
+    reply = encoded_error("the answer needs more memory than a query may have");
   } catch (const StatementError& error) {
-    return encoded_error(error.what(), true);
+    reply = encoded_error(error.what(), true);
+  } catch (const solver::InputError& error) {
+    reply = encoded_error(error.what(), true);
   } catch (const std::exception& error) {
-    return encoded_error(error.what());
+    reply = encoded_error(error.what());
   }
+  return send_answer(kLast, reply);
 }
 
 }  // namespace
@@ -168,9 +230,7 @@ int run_reader_program(const std::string& path) {
     }
     std::optional<Reader> reader;
     while (const auto request = next_request()) {
-      const std::string reply = answer(reader, path, *request);
-      const auto length = static_cast<FrameLength>(reply.size());
-      if (!send_all(&length, sizeof length) || !send_all(reply.data(), reply.size())) {
+      if (!answer(reader, path, *request)) {
         return 1;
       }
       malloc_trim(0);  // what one query had is not kept for the next

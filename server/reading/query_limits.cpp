@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <filesystem>
+#include <system_error>
 
 namespace oblique::server {
 
@@ -16,6 +18,12 @@ QueryLimits limits_of(const protocol::QueryRequest& request) {
         request.time_limit_ms(), static_cast<std::uint64_t>(kLongestTimeLimit_ms)));
   }
   return limits;
+}
+
+std::uint64_t log_bytes(const std::string& path) {
+  std::error_code none;
+  const auto bytes = std::filesystem::file_size(path + "-wal", none);
+  return none ? 0 : static_cast<std::uint64_t>(bytes);
 }
 
 std::string took_too_long(std::int64_t time_limit_ms) {

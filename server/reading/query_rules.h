@@ -23,9 +23,9 @@ class StatementError : public QueryError {
 /// Longest statement [bytes].
 inline constexpr int kLongestSql = 1'000'000;
 
-/// Lets statements on `database` read and compute, nothing else, with our functions beside SQLite's,
-/// and bounds what one statement may be made of. What does not fit into memory is not put into
-/// files.
+/// Lets statements on `database` read and compute, nothing else, with our functions beside
+/// SQLite's, and bounds what one statement may be made of. What does not fit into memory is not put
+/// into files.
 void restrict_to_reading(sqlite3* database);
 
 using StatementHandle = std::unique_ptr<sqlite3_stmt, int (*)(sqlite3_stmt*)>;

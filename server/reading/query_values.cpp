@@ -10,8 +10,9 @@ std::uint64_t hexadecimal_bytes(std::uint64_t size) {
   return 2 * size + 3;
 }
 
-Copied copy_bytes(sqlite3_stmt* statement, int column, std::uint64_t most_bytes,
-                  protocol::Value& value) {
+/// Gives the bytes of a text or blob to `take(std::string_view)`.
+template <typename Take>
+Copied copy_bytes(sqlite3_stmt* statement, int column, std::uint64_t most_bytes, const Take& take) {
   const bool is_text = sqlite3_column_type(statement, column) == SQLITE_TEXT;
   // Asked first: a zeroblob has its size before it has its bytes.
   const auto size = static_cast<std::uint64_t>(sqlite3_column_bytes(statement, column));
@@ -24,13 +25,13 @@ Copied copy_bytes(sqlite3_stmt* statement, int column, std::uint64_t most_bytes,
   }
   const std::string_view bytes(size == 0 ? "" : static_cast<const char*>(data), size);
   if (is_text && protocol::is_utf8(bytes)) {
-    value.set_text(std::string(bytes));
+    take(bytes);
     return Copied::kYes;
   }
   if (hexadecimal_bytes(size) > most_bytes) {
     return Copied::kTooLarge;
   }
-  value.set_text(hexadecimal(bytes));
+  take(hexadecimal(bytes));
   return Copied::kYes;
 }
 
@@ -63,7 +64,26 @@ Copied copy_value(sqlite3_stmt* statement, int column, std::uint64_t most_bytes,
     case SQLITE_NULL:
       return Copied::kYes;
     default:
-      return copy_bytes(statement, column, most_bytes, value);
+      return copy_bytes(statement, column, most_bytes,
+                        [&value](std::string_view text) { value.set_text(std::string(text)); });
+  }
+}
+
+Copied copy_value(sqlite3_stmt* statement, int column, std::uint64_t most_bytes,
+                  protocol::ChunkWriter& rows) {
+  switch (sqlite3_column_type(statement, column)) {
+    case SQLITE_INTEGER:
+      rows.integer(sqlite3_column_int64(statement, column));
+      return Copied::kYes;
+    case SQLITE_FLOAT:
+      rows.real(sqlite3_column_double(statement, column));
+      return Copied::kYes;
+    case SQLITE_NULL:
+      rows.null();
+      return Copied::kYes;
+    default:
+      return copy_bytes(statement, column, most_bytes,
+                        [&rows](std::string_view text) { rows.text(text); });
   }
 }
 

@@ -7,6 +7,7 @@
 #include <sqlite3.h>
 
 #include "proto/oblique.pb.h"
+#include "proto/wire/chunk_writer.h"
 
 namespace oblique::server {
 
@@ -21,5 +22,10 @@ enum class Copied { kYes, kTooLarge, kNoMemory };
 /// copied.
 Copied copy_value(sqlite3_stmt* statement, int column, std::uint64_t most_bytes,
                   protocol::Value& value);
+
+/// The same into the next column of the row that `rows` is at; nothing is written unless it is
+/// copied.
+Copied copy_value(sqlite3_stmt* statement, int column, std::uint64_t most_bytes,
+                  protocol::ChunkWriter& rows);
 
 }  // namespace oblique::server

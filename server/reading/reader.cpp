@@ -1,7 +1,6 @@
 #include "server/reading/reader.h"
 
 #include <algorithm>
-#include <chrono>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -10,13 +9,12 @@
 #include "proto/text.h"
 #include "server/database/open_for_reading.h"
 #include "server/reading/query_values.h"
+#include "server/reading/running_time.h"
 
 namespace oblique::server {
 namespace {
 
 constexpr int kBusyTimeout_ms = 2000;
-/// Instructions of SQLite's machine between two looks at the clock.
-constexpr int kInstructionsPerLook = 10'000;
 /// What a message takes in the one around it beside its own bytes, at most.
 constexpr std::uint64_t kFieldBytes = 8;
 
@@ -64,31 +62,6 @@ void add_taken(sqlite3* database, protocol::StudyStatus& status) {
 
 }  // namespace
 
-struct Reader::Deadline {
-  using Clock = std::chrono::steady_clock;
-
-  /// Watches the queries of `database` until it is destroyed.
-  Deadline(sqlite3* watched, const std::atomic<bool>& interrupt, std::int64_t limit_ms)
-      : database(watched), interrupted(interrupt), time_limit_ms(limit_ms) {
-    sqlite3_progress_handler(
-        database, kInstructionsPerLook,
-        [](void* self) { return static_cast<const Deadline*>(self)->is_over() ? 1 : 0; }, this);
-  }
-  ~Deadline() { sqlite3_progress_handler(database, 0, nullptr, nullptr); }
-  Deadline(const Deadline&) = delete;
-  Deadline& operator=(const Deadline&) = delete;
-
-  bool is_over() const {
-    return interrupted ||
-           (time_limit_ms > 0 && Clock::now() - start > std::chrono::milliseconds(time_limit_ms));
-  }
-
-  sqlite3* database;
-  const std::atomic<bool>& interrupted;
-  std::int64_t time_limit_ms;
-  Clock::time_point start = Clock::now();
-};
-
 Reader::Reader(const std::string& path) {
   auto opened = open_for_reading(path);
   database_ = std::move(opened.database);
@@ -125,7 +98,7 @@ protocol::QueryReply Reader::run(const std::string& sql, const QueryLimits& limi
                                  const TakeRow& take) {
   sqlite3* const database = database_.get();
   sqlite3_limit(database, SQLITE_LIMIT_LENGTH, static_cast<int>(limits.max_value_bytes));
-  const Deadline deadline(database, interrupted_, limits.time_limit_ms);
+  const RunningTime watch(database, interrupted_, limits.time_limit_ms);
   const StatementHandle statement = prepare_query(database, sql);
   protocol::QueryReply reply;
   for (int i = 0; i < sqlite3_column_count(statement.get()); ++i) {
@@ -161,6 +134,10 @@ protocol::QueryReply Reader::run(const std::string& sql, const QueryLimits& limi
     throw failure(database, code);
   }
   return reply;
+}
+
+Answer Reader::answer(const protocol::QueryRequest& request, const QueryLimits& limits) {
+  return {database_.get(), request, limits, interrupted_};
 }
 
 /// " (did you mean `x`?)" with the study whose name is nearest, or nothing.

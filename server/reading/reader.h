@@ -8,6 +8,7 @@
 
 #include "proto/oblique.pb.h"
 #include "server/database/sqlite.h"
+#include "server/reading/answer.h"
 #include "server/reading/query_limits.h"
 #include "server/reading/query_rules.h"
 
@@ -33,6 +34,11 @@ class Reader {
   /// The same as the bytes of an encoded QueryReply, which takes hardly more memory than those.
   std::string encoded_query(const std::string& sql, const QueryLimits& limits);
 
+  /// The answer to `request`, to be taken in chunks, after what `request.after()` says was given.
+  /// Throws as `query` does, and solver::InputError for a wrong question. The reader must outlive
+  /// it and answers nothing else meanwhile.
+  Answer answer(const protocol::QueryRequest& request, const QueryLimits& limits);
+
   /// Where the study called `name` stands, or all of them when `name` is empty. Nothing is leased
   /// and the rate is 0, for that only a server knows. Throws QueryError for an unknown name.
   std::vector<protocol::StudyStatus> study_status(const std::string& name = {});
@@ -42,7 +48,6 @@ class Reader {
 
  private:
   std::string nearest_study(const std::string& name);
-  struct Deadline;
   using TakeRow = std::function<void(protocol::Row&)>;
 
   /// Gives columns and `truncated`; each row goes to `take`.

@@ -5,7 +5,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/frame_scan.h"
+#include "proto/wire/frame_scan.h"
 #include "proto/frames.h"
 
 namespace oblique::server {
@@ -166,6 +166,12 @@ void ClientsDesk::answer(const Client& client, const ReadRequest& read, Instant 
       break;
     case Kind::kTrace:
       trace(client, request.trace(), now);
+      break;
+    case Kind::kMoreRows:
+      queries_.more(client, request.more_rows());
+      break;
+    case Kind::kEndQuery:
+      queries_.end(client.identity, request.end_query().request_id());
       break;
     case Kind::KIND_NOT_SET:
       at_.bad_frames.count("a client");

@@ -13,10 +13,7 @@ constexpr const char* kStopping = "the server is stopping: ask again when it run
 }  // namespace
 
 void WaitingQueries::ask(const Client& client, const protocol::QueryRequest& request, Instant now) {
-  const bool is_known = std::any_of(queries_.begin(), queries_.end(), [&](const auto& entry) {
-    return entry.second.client == client;
-  });
-  if (is_known) {
+  if (find(client.identity, client.request_id) != queries_.end()) {
     return;  // the answer is on its way
   }
   if (stopping_) {
@@ -26,11 +23,46 @@ void WaitingQueries::ask(const Client& client, const protocol::QueryRequest& req
   const std::uint64_t ticket = ++last_ticket_;
   // Who has a key has one share, however many connections that is.
   const std::string asker = client.holder == nullptr ? client.identity : "key " + client.key();
-  if (!readers_.query({ticket, asker, request})) {
+  QueryJob job{ticket, asker, request};
+  job.request.clear_after();  // the server keeps it itself
+  if (!readers_.query(std::move(job))) {
     clients_.reply_error(client, "too many queries wait already: ask again later");
     return;
   }
   queries_.emplace(ticket, Query{client, now.steady_ms + word_every_ms_});
+}
+
+WaitingQueries::Queries::iterator WaitingQueries::find(std::string_view identity,
+                                                       std::uint64_t request_id) {
+  return std::find_if(queries_.begin(), queries_.end(), [&](const auto& entry) {
+    const Client& client = entry.second.client;
+    return client.request_id == request_id && client.identity == identity;
+  });
+}
+
+void WaitingQueries::cancel(Queries::iterator query) {
+  readers_.cancel_query(query->first);
+  queries_.erase(query);
+}
+
+void WaitingQueries::more(const Client& client, const protocol::MoreRows& wish) {
+  const Client asker{client.identity, wish.request_id(), client.holder};
+  const auto found = find(asker.identity, asker.request_id);
+  if (found == queries_.end()) {
+    clients_.reply_error(asker, "no answer to that request is under way");
+  } else if (wish.taken() > found->second.given) {
+    cancel(found);
+    clients_.reply_error(asker, "more of the answer was taken than was given");
+  } else if (wish.taken() > found->second.taken) {
+    found->second.taken = wish.taken();
+    readers_.more_rows(found->first, wish.taken());
+  }
+}
+
+void WaitingQueries::end(std::string_view identity, std::uint64_t request_id) {
+  if (const auto found = find(identity, request_id); found != queries_.end()) {
+    cancel(found);
+  }
 }
 
 void WaitingQueries::report(QueryReport report) {
@@ -38,8 +70,18 @@ void WaitingQueries::report(QueryReport report) {
   if (found == queries_.end()) {
     return;
   }
-  if (report.kind != QueryReport::Kind::kAnswered) {
-    found->second.runs = report.kind == QueryReport::Kind::kBegun;
+  using Kind = QueryReport::Kind;
+  if (report.kind == Kind::kBegun || report.kind == Kind::kPutBack) {
+    found->second.runs = report.kind == Kind::kBegun;
+    return;
+  }
+  if (report.kind == Kind::kRows) {
+    const Client& asker = found->second.client;
+    ++found->second.given;
+    if (!clients_.forward_to_client(asker.identity,
+                                    protocol::with_request_id(asker.request_id, report.reply))) {
+      cancel(found);
+    }
     return;
   }
   const Client client = std::move(found->second.client);
@@ -63,6 +105,9 @@ void WaitingQueries::tick(Instant now) {
 /// False when the client is gone.
 bool WaitingQueries::tell(Query& query, Instant now) {
   query.next_word_ms = now.steady_ms + word_every_ms_;
+  if (query.waits_for_client()) {
+    return true;
+  }
   protocol::ClientReply word;
   word.set_request_id(kNobodysRequest);
   word.mutable_still_working()->set_request_id(query.client.request_id);

@@ -29,6 +29,10 @@ class WaitingQueries {
 
   /// Under the number of a query that waits or runs already, it is that query.
   void ask(const Client& client, const protocol::QueryRequest& request, Instant now);
+  /// The client has taken so many chunks of an answer. It is told when there is no such answer.
+  void more(const Client& client, const protocol::MoreRows& wish);
+  /// The client wants nothing more of that answer.
+  void end(std::string_view identity, std::uint64_t request_id);
   /// The pool tells how it is with a query.
   void report(QueryReport report);
   /// To be called several times a second.
@@ -45,13 +49,22 @@ class WaitingQueries {
     Client client;
     std::int64_t next_word_ms;  // when the client is to hear of it again
     bool runs = false;
+    std::uint64_t given = 0;  // chunks
+    std::uint64_t taken = 0;
+
+    /// Whether it is the client who is waited for.
+    bool waits_for_client() const { return given == taken + kChunksAhead; }
   };
+  using Queries = std::map<std::uint64_t, Query>;
+
   bool tell(Query& query, Instant now);
+  Queries::iterator find(std::string_view identity, std::uint64_t request_id);
+  void cancel(Queries::iterator query);
 
   ToClients& clients_;
   ToReaders& readers_;
   std::int64_t word_every_ms_;
-  std::map<std::uint64_t, Query> queries_;  // by ticket
+  Queries queries_;  // by ticket
   std::uint64_t last_ticket_ = 0;
   bool stopping_ = false;
 };

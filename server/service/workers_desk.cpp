@@ -6,7 +6,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/frame_scan.h"
+#include "proto/wire/frame_scan.h"
 #include "proto/frames.h"
 #include "proto/result_message.h"
 #include "proto/text.h"

@@ -26,6 +26,7 @@ class Sink final : public Outbox {
   bool forward_to_client(const std::string&, const std::string&) override { return true; }
   void write(WriteJob job) override { jobs.push_back(std::move(job)); }
   bool query(QueryJob) override { return true; }
+  void more_rows(std::uint64_t, std::uint64_t) override {}
   void cancel_query(std::uint64_t) override {}
   void read(ReadJob) override {}
   void note(Severity, const std::string&) override {}

@@ -49,6 +49,7 @@ class SimulatedServer final : public server::Outbox {
   bool forward_to_client(const std::string& identity, const std::string& frame) override;
   void write(server::WriteJob job) override;
   bool query(server::QueryJob) override { return false; }
+  void more_rows(std::uint64_t, std::uint64_t) override {}
   void cancel_query(std::uint64_t) override {}
   void read(server::ReadJob job) override;
   void note(server::Severity, const std::string&) override {}

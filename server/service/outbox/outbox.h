@@ -107,6 +107,8 @@ class ToReaders {
   virtual ~ToReaders() = default;
   /// `Service::queried` is called with the answer. False when too many queries wait.
   virtual bool query(QueryJob job) = 0;
+  /// The client of an answer in chunks has taken so many of them.
+  virtual void more_rows(std::uint64_t ticket, std::uint64_t taken) = 0;
   /// Nobody waits for that query any more.
   virtual void cancel_query(std::uint64_t ticket) = 0;
   /// `Service::request_read` is called with what the frame says.

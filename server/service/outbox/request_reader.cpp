@@ -5,7 +5,7 @@
 #include <memory>
 #include <utility>
 
-#include "proto/frame_scan.h"
+#include "proto/wire/frame_scan.h"
 #include "proto/frames.h"
 #include "proto/recipe/checks.h"
 #include "proto/recipe/model_message.h"

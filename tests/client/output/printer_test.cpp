@@ -144,7 +144,7 @@ TEST(Json, GivesEachColumnAKeyOfItsOwn) {
             "[\n{\"a\":1,\"b\":2,\"a_3\":3,\"a_4\":4,\"a_2\":5}\n]\n");
 }
 
-TEST(Table, AlignsNumbersToTheRightAndTextsToTheLeft) {
+TEST(Table, AlignsNumbersAtThePointAndTextsToTheLeft) {
   protocol::QueryReply rows;
   rows.add_columns("mode");
   rows.add_columns("fn_peak_N");
@@ -157,7 +157,7 @@ TEST(Table, AlignsNumbersToTheRightAndTextsToTheLeft) {
             "mode   fn_peak_N\n"
             "-----  ---------\n"
             "SC SR    5057.63\n"
-            "sC          12.5\n");
+            "sC         12.5\n");
 }
 
 TEST(Table, ShowsNullAsADashAndKeepsToOneLineARow) {
@@ -172,7 +172,7 @@ TEST(Table, ShowsNumbersForReading) {
   for (const double value : {-0.0, 0.1 + 0.2, 14300.0, 7e10}) {
     add_value(*rows.add_rows(), value);
   }
-  EXPECT_EQ(printed(rows, Format::kTable), "    x\n-----\n    0\n  0.3\n14300\n7e+10\n");
+  EXPECT_EQ(printed(rows, Format::kTable), "      x\n-------\n    0\n    0.3\n14300\n7e+10\n");
 }
 
 TEST(Table, CountsCharactersNotBytes) {

@@ -1,57 +1,80 @@
 // What the program makes of a server's answers, honest ones and others.
-#include <algorithm>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <iterator>
 #include <string>
 #include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "proto/wire/chunk_writer.h"
 #include "tests/client/service/scripted_server.h"
 #include "tests/support/programs.h"
+#include "tests/support/temporary_folder.h"
 
 namespace oblique::client {
 namespace {
 
-/// The number behind `word` in a statement; 0 where the word is not.
-int number_after(const std::string& sql, const std::string& word) {
-  const auto at = sql.rfind(word);
-  return at == std::string::npos ? 0 : std::stoi(sql.substr(at + word.size()));
-}
-
-/// Rows of one number, from that of `OFFSET` on, but never more than two at once.
-protocol::QueryReply two_rows(const std::string& sql) {
-  constexpr int kAll = 100;
-  constexpr int kMost = 2;
-  const int limit = number_after(sql, "LIMIT ");
-  const int offset = number_after(sql, "OFFSET ");
-  const int wanted = limit < 0 ? kAll - offset : std::min(limit, kAll - offset);
-  protocol::QueryReply rows;
-  rows.add_columns("point");
-  for (int i = 0; i < std::min(wanted, kMost); ++i) {
-    rows.add_rows()->add_values()->set_integer(offset + i);
+/// A chunk of an answer: rows of one number, `point`.
+protocol::QueryReply chunk_of(std::uint64_t number, const std::vector<std::int64_t>& points,
+                              bool ends) {
+  protocol::ChunkWriter rows({"point"});
+  for (const std::int64_t point : points) {
+    rows.integer(point);
+    rows.end_row();
   }
-  rows.set_truncated(wanted > kMost);
-  return rows;
+  protocol::QueryReply chunk = rows.take();
+  chunk.set_chunk(number);
+  chunk.set_ends(ends);
+  return chunk;
 }
 
-/// A server with one study in `state`, that cuts every answer off after two rows.
-ScriptedServer::Answer cuts_off(const std::string& state) {
+std::string frame_of(std::uint64_t request_id, const protocol::QueryReply& chunk) {
+  protocol::ClientReply reply;
+  reply.set_request_id(request_id);
+  *reply.mutable_query() = chunk;
+  return protocol::encode(reply);
+}
+
+/// A server that gives two rows for a query, and then what `more` gives to each wish for more.
+ScriptedServer::Answer gives(
+    std::function<std::vector<std::string>(std::uint64_t request_id, std::uint64_t taken)> more) {
+  return [more](const protocol::ClientRequest& request) -> std::vector<std::string> {
+    if (request.has_more_rows()) {
+      return more(request.more_rows().request_id(), request.more_rows().taken());
+    }
+    if (request.has_query()) {
+      EXPECT_TRUE(request.query().in_chunks());
+      return {frame_of(request.request_id(), chunk_of(1, {0, 1}, false))};
+    }
+    return {};
+  };
+}
+
+/// A server with one study in `state`.
+ScriptedServer::Answer has_study(const std::string& state) {
   return [state](const protocol::ClientRequest& request) {
     auto reply = reply_to(request);
-    if (request.has_status()) {
-      auto& study = *reply.mutable_status()->add_studies();
-      study.set_name("s");
-      study.set_state(state);
-      study.set_points(100);
-      study.set_solved(state == "done" ? 100 : 50);
-    } else if (request.query().sql().find("LIMIT ") == std::string::npos) {
-      reply.mutable_query()->add_columns("n");
-      reply.mutable_query()->add_rows()->add_values()->set_integer(1);
-      reply.mutable_query()->set_truncated(true);
-    } else {
-      *reply.mutable_query() = two_rows(request.query().sql());
-    }
+    auto& study = *reply.mutable_status()->add_studies();
+    study.set_name("s");
+    study.set_state(state);
+    study.set_points(100);
+    study.set_solved(state == "done" ? 100 : 50);
     return std::vector{protocol::encode(reply)};
   };
+}
+
+std::string contents_of(const std::string& file) {
+  std::ifstream in(file);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+std::size_t files_in(const std::filesystem::path& folder) {
+  return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(folder),
+                                                std::filesystem::directory_iterator()));
 }
 
 test::Outcome ask(const ScriptedServer& server, std::vector<std::string> words) {
@@ -59,35 +82,90 @@ test::Outcome ask(const ScriptedServer& server, std::vector<std::string> words) 
   return test::run_oblique(words);
 }
 
-TEST(CutAnswers, AreAsFarAsLimitGoesPutTogetherAgain) {
-  const ScriptedServer server(cuts_off("done"));
-  const auto five =
-      ask(server, {"query", "s", "--select", "point", "--limit", "5", "--format", "csv"});
-  EXPECT_EQ(five.exit_code, 0) << five.err;
-  EXPECT_EQ(five.out, "point\n0\n1\n2\n3\n4\n");
-  const auto none =
-      ask(server, {"query", "s", "--select", "point", "--limit", "0", "--format", "csv"});
-  EXPECT_EQ(none.exit_code, 0) << none.err;
-  EXPECT_EQ(none.out, "point\n");
-  const auto all = ask(server, {"query", "s", "--select", "point", "--format", "csv"});
-  EXPECT_EQ(all.exit_code, 0) << all.err;
-  EXPECT_EQ(std::count(all.out.begin(), all.out.end(), '\n'), 101);
+TEST(Answers, OfSeveralPartsArePutTogether) {
+  const ScriptedServer server(gives([](std::uint64_t id, std::uint64_t taken) {
+    return std::vector{frame_of(id, chunk_of(taken + 1, {2}, taken == 3))};
+  }));
+  for (const auto& words : {std::vector<std::string>{"query", "s", "--format", "csv"},
+                            std::vector<std::string>{"sql", "SELECT 1", "--format", "csv"}}) {
+    const auto all = ask(server, words);
+    EXPECT_EQ(all.exit_code, 0) << all.err;
+    EXPECT_EQ(all.out, "point\n0\n1\n2\n2\n2\n");
+  }
 }
 
-TEST(CutAnswers, OfAStudyThatGrowsAndOfStatementsAreShownAndEndWithOne) {
-  const ScriptedServer server(cuts_off("running"));
-  const auto query = ask(server, {"query", "s", "--select", "point", "--format", "csv"});
-  EXPECT_EQ(query.exit_code, 1) << query.err;
-  EXPECT_EQ(query.out, "point\n0\n1\n");
-  EXPECT_NE(query.err.find("Only the first 2 rows"), std::string::npos) << query.err;
-  const auto sql = ask(server, {"sql", "SELECT n FROM numbers", "--format", "csv"});
-  EXPECT_EQ(sql.exit_code, 1) << sql.err;
-  EXPECT_EQ(sql.out, "n\n1\n");
-  EXPECT_NE(sql.err.find("Only the first 1 rows"), std::string::npos) << sql.err;
+TEST(Answers, ThatEndWithAnErrorInTheMiddleSaySoAndEndWithOne) {
+  const ScriptedServer server(gives([](std::uint64_t id, std::uint64_t) {
+    protocol::ClientReply reply;
+    reply.set_request_id(id);
+    reply.mutable_error()->set_message("the disk is \x1b[2J gone");
+    return std::vector{protocol::encode(reply)};
+  }));
+  const auto csv = ask(server, {"query", "s", "--format", "csv"});
+  EXPECT_EQ(csv.exit_code, 1);
+  EXPECT_THAT(csv.err, testing::HasSubstr("the disk is \\x1b[2J gone"));
+}
+
+TEST(Answers, ThatLackAPartOrAreNotSoundSaySoAndEndWithOne) {
+  const auto lacking = [](std::uint64_t id, std::uint64_t) {
+    return std::vector{frame_of(id, chunk_of(3, {4, 5}, true))};
+  };
+  const auto unsound = [](std::uint64_t id, std::uint64_t) {
+    auto chunk = chunk_of(2, {4, 5}, true);
+    chunk.set_chunk_rows(1'000'000);
+    return std::vector{frame_of(id, chunk)};
+  };
+  const auto of_old_times = [](std::uint64_t id, std::uint64_t) {
+    protocol::QueryReply whole;
+    whole.add_columns("point");
+    return std::vector{frame_of(id, whole)};
+  };
+  const auto of_more_columns = [](std::uint64_t id, std::uint64_t) {
+    protocol::QueryReply wider = protocol::ChunkWriter({"point", "H"}).take();
+    wider.set_chunk(2);
+    wider.set_ends(true);
+    return std::vector{frame_of(id, wider)};
+  };
+  for (const auto& answer :
+       {gives(lacking), gives(unsound), gives(of_old_times), gives(of_more_columns)}) {
+    const ScriptedServer server(answer);
+    const auto csv = ask(server, {"query", "s", "--format", "csv"});
+    EXPECT_EQ(csv.exit_code, 1);
+    EXPECT_THAT(csv.err, testing::HasSubstr("the answer broke off after 2 rows"));
+  }
+}
+
+TEST(Answers, ThatComeNoFurtherEndWithOne) {
+  const ScriptedServer server(
+      gives([](std::uint64_t, std::uint64_t) { return std::vector<std::string>(); }));
+  const auto csv = ask(server, {"query", "s", "--format", "csv", "--timeout", "0.2"});
+  EXPECT_EQ(csv.exit_code, 1);
+  EXPECT_THAT(csv.err, testing::HasSubstr("broke off after 2 rows: nothing came from"));
+}
+
+TEST(Answers, MakeAFileOnlyWhenTheyAreWhole) {
+  const test::TemporaryFolder folder;
+  const std::string file = folder.file("points.csv");
+  std::ofstream(file) << "of before\n";
+  const ScriptedServer breaks(gives([](std::uint64_t id, std::uint64_t) {
+    return std::vector{frame_of(id, chunk_of(9, {}, true))};
+  }));
+  const std::vector<std::string> words{"query", "s", "--format", "csv", "--out", file};
+  EXPECT_EQ(ask(breaks, words).exit_code, 1);
+  EXPECT_EQ(contents_of(file), "of before\n");
+  EXPECT_EQ(files_in(folder.path()), 1U) << "no draft is left";
+  const ScriptedServer gives_all(gives([](std::uint64_t id, std::uint64_t taken) {
+    return std::vector{frame_of(id, chunk_of(taken + 1, {}, true))};
+  }));
+  const auto whole = ask(gives_all, words);
+  EXPECT_EQ(whole.exit_code, 0) << whole.err;
+  EXPECT_EQ(whole.out, "");
+  EXPECT_EQ(contents_of(file), "point\n0\n1\n");
+  EXPECT_EQ(files_in(folder.path()), 1U);
 }
 
 TEST(Watch, OfACancelledStudySaysSoAndEndsWithOne) {
-  const ScriptedServer server(cuts_off("cancelled"));
+  const ScriptedServer server(has_study("cancelled"));
   const auto watch = ask(server, {"watch", "s"});
   EXPECT_EQ(watch.exit_code, 1);
   EXPECT_NE(watch.err.find("The study is cancelled; oblique resume goes on"), std::string::npos)
@@ -95,7 +173,7 @@ TEST(Watch, OfACancelledStudySaysSoAndEndsWithOne) {
 }
 
 TEST(Watch, OfAStudyThatIsDoneEndsWithZero) {
-  const ScriptedServer server(cuts_off("done"));
+  const ScriptedServer server(has_study("done"));
   EXPECT_EQ(ask(server, {"watch", "s"}).exit_code, 0);
 }
 
@@ -110,10 +188,14 @@ TEST(Watch, TellsHowManyPointsFailedAndWhyAndEndsWithOne) {
       study.set_solved(7);
       study.set_failed(3);
     } else {
-      auto& row = *reply.mutable_query()->add_rows();
-      row.add_values()->set_text("no \x1b[2J answer");
-      row.add_values()->set_integer(3);
-      row.add_values()->set_integer(4);
+      protocol::ChunkWriter rows({"error", "points", "first"});
+      rows.text("no \x1b[2J answer");
+      rows.integer(3);
+      rows.integer(4);
+      rows.end_row();
+      *reply.mutable_query() = rows.take();
+      reply.mutable_query()->set_chunk(1);
+      reply.mutable_query()->set_ends(true);
     }
     return std::vector{protocol::encode(reply)};
   });
@@ -147,8 +229,12 @@ std::vector<std::string> steering(const protocol::ClientRequest& request) {
     reply.mutable_change()->mutable_study()->set_name(kSteering);
     reply.mutable_change()->mutable_study()->set_state(kSteering);
   } else if (request.has_query()) {
-    reply.mutable_query()->add_columns(kSteering);
-    reply.mutable_query()->add_rows()->add_values()->set_text(kSteering);
+    protocol::ChunkWriter rows({kSteering});
+    rows.text(kSteering);
+    rows.end_row();
+    *reply.mutable_query() = rows.take();
+    reply.mutable_query()->set_chunk(1);
+    reply.mutable_query()->set_ends(true);
   }
   return {protocol::encode(reply)};
 }

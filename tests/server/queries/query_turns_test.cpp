@@ -165,5 +165,104 @@ TEST_F(QueryTurnsTest, AQueryThatNobodyWantsIsGoneWhereverItIs) {
   turns_.remove(4711);
 }
 
+TEST_F(QueryTurnsTest, OneReaderIsAlwaysLeftToQueriesThatCanBeginAnew) {
+  for (const char* client : {"a", "b", "c", "d"}) {
+    ask(client);
+  }
+  begin();
+  EXPECT_TRUE(turns_.bind(1));
+  EXPECT_TRUE(turns_.bind(2));
+  EXPECT_TRUE(turns_.bind(3));
+  EXPECT_FALSE(turns_.bind(4));
+  EXPECT_TRUE(turns_.bind(1)) << "it is bound already";
+  now_ms_ += 1000;
+  ask("e");
+  EXPECT_EQ(turns_.put_back(now_ms_), 4U);
+  EXPECT_EQ(begin(), Names{"e:5"});
+  turns_.remove(1);
+  EXPECT_TRUE(turns_.bind(5));
+}
+
+TEST_F(QueryTurnsTest, ABoundQueryIsNotPutBackThoughItBeganLast) {
+  for (const char* client : {"a", "b", "c", "d"}) {
+    ask(client);
+  }
+  begin();
+  turns_.bind(4);
+  now_ms_ += 1000;
+  ask("e");
+  EXPECT_EQ(turns_.put_back(now_ms_), 3U);
+}
+
+TEST_F(QueryTurnsTest, AQueryThatIsPutBackGoesOnFromWhatItGave) {
+  for (const char* client : {"a", "b", "c", "d"}) {
+    ask(client);
+  }
+  begin();
+  protocol::GivenRows given;
+  given.set_last_point(17);
+  turns_.note_given(4, given);
+  now_ms_ += 1000;
+  ask("e");
+  EXPECT_EQ(turns_.put_back(now_ms_), 4U);
+  for (std::uint64_t ticket = 1; ticket <= 3; ++ticket) {
+    turns_.remove(ticket);
+  }
+  EXPECT_EQ(turns_.begin(now_ms_)->ticket, 4U);
+}
+
+TEST_F(QueryTurnsTest, AParkedQueryLeavesItsReaderAndComesBackWithWhatItGave) {
+  for (const char* client : {"a", "b", "c", "d", "e"}) {
+    ask(client);
+  }
+  begin();
+  protocol::GivenRows given;
+  given.set_last_point(17);
+  turns_.note_given(2, given);
+  EXPECT_TRUE(turns_.is_in_the_way(2));
+  EXPECT_TRUE(turns_.park(2));
+  EXPECT_EQ(begin(), Names{"e:5"});
+  EXPECT_EQ(turns_.waiting(), 0U);
+  EXPECT_EQ(turns_.parked(), 1U);
+  turns_.unpark(2);
+  turns_.unpark(2);
+  EXPECT_EQ(turns_.waiting(), 1U);
+  turns_.remove(1);
+  const auto back = turns_.begin(now_ms_);
+  ASSERT_TRUE(back.has_value());
+  EXPECT_EQ(back->ticket, 2U);
+  EXPECT_EQ(back->request.after().last_point(), 17);
+}
+
+TEST_F(QueryTurnsTest, AQueryIsInTheWayOnlyOfThoseWhoCouldRunInItsPlace) {
+  ask("a");
+  ask("a");
+  ask("b");
+  begin();
+  EXPECT_FALSE(turns_.is_in_the_way(1));
+  ask("a");
+  EXPECT_TRUE(begin().empty()) << "one client has two readers at most";
+  EXPECT_TRUE(turns_.is_in_the_way(1));
+  EXPECT_FALSE(turns_.is_in_the_way(3)) << "the reader of b would help nobody";
+}
+
+TEST_F(QueryTurnsTest, ParkedQueriesAreBoundedAndCountAsTheirClients) {
+  TurnSettings settings;
+  settings.most_parked = 1;
+  turns_ = QueryTurns(settings);
+  ask("a");
+  ask("b");
+  begin();
+  EXPECT_TRUE(turns_.park(1));
+  EXPECT_FALSE(turns_.park(2));
+  for (std::size_t i = 1; i < settings.most_waiting_each; ++i) {
+    EXPECT_TRUE(ask("a"));
+  }
+  EXPECT_FALSE(ask("a"));
+  turns_.remove(1);
+  EXPECT_TRUE(turns_.park(2));
+  EXPECT_TRUE(ask("a"));
+}
+
 }  // namespace
 }  // namespace oblique::server

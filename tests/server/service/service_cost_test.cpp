@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "proto/frame_scan.h"
+#include "proto/wire/frame_scan.h"
 #include "tests/server/service/service_fixture.h"
 
 namespace oblique::server {

@@ -74,6 +74,9 @@ class FakeOutbox final : public Outbox {
     queries.push_back(std::move(job));
     return queries.size() < 3;
   }
+  void more_rows(std::uint64_t ticket, std::uint64_t taken) override {
+    wishes.emplace_back(ticket, taken);
+  }
   void cancel_query(std::uint64_t ticket) override { cancelled_queries.push_back(ticket); }
   void read(ReadJob job) override { reads.push_back(std::move(job)); }
   KnownSeeker& finder() override { return seeker; }
@@ -91,6 +94,7 @@ class FakeOutbox final : public Outbox {
   std::vector<WriteJob> jobs;
   std::vector<QueryJob> queries;
   std::vector<std::uint64_t> cancelled_queries;
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> wishes;  // ticket, chunks taken
   std::vector<ReadJob> reads;
   int notes = 0;
   std::vector<std::string> log;

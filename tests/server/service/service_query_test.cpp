@@ -16,6 +16,29 @@ class ServiceQueryTest : public ServiceTest {
     message.mutable_query()->set_sql("SELECT 1");
     service_->client_frame(identity, protocol::encode(message), now_);
   }
+  void want_more(std::uint64_t request_id, std::uint64_t taken,
+                 const std::string& identity = "client") {
+    ClientRequest message;
+    message.set_protocol_version(protocol::kProtocolVersion);
+    message.set_request_id(request_id);
+    message.mutable_more_rows()->set_request_id(request_id);
+    message.mutable_more_rows()->set_taken(taken);
+    service_->client_frame(identity, protocol::encode(message), now_);
+  }
+  void end(std::uint64_t request_id, const std::string& identity = "client") {
+    ClientRequest message;
+    message.set_protocol_version(protocol::kProtocolVersion);
+    message.set_request_id(request_id);
+    message.mutable_end_query()->set_request_id(request_id);
+    service_->client_frame(identity, protocol::encode(message), now_);
+  }
+  /// A reader gives another chunk of the answer.
+  void give(std::size_t index) {
+    protocol::QueryReply chunk;
+    chunk.set_chunk_rows(1);
+    service_->queried({QueryReport::Kind::kRows, outbox_.queries.at(index).ticket,
+                       protocol::reply_around(protocol::encode(chunk))});
+  }
   void pass(std::int64_t duration_ms) {
     for (const std::int64_t end_ms = now_.steady_ms + duration_ms; now_.steady_ms < end_ms;) {
       now_.steady_ms += 100;
@@ -97,6 +120,83 @@ TEST_F(ServiceQueryTest, AStoppingServerAnswersThoseWhoWait) {
   EXPECT_EQ(outbox_.queries.size(), 1U);
   EXPECT_EQ(last_reply().request_id(), 8U);
   EXPECT_THAT(last_reply().error().message(), testing::HasSubstr("stopping"));
+}
+
+TEST_F(ServiceQueryTest, PartsOfAnAnswerGoOutAsTheyComeAndMoreIsAskedOfTheReaders) {
+  using Wishes = std::vector<std::pair<std::uint64_t, std::uint64_t>>;
+  ask(7);
+  give(0);
+  give(0);
+  EXPECT_EQ(outbox_.replies.size(), 2U);
+  EXPECT_EQ(last_reply().request_id(), 7U);
+  want_more(7, 1);
+  want_more(7, 1);
+  want_more(7, 2);
+  want_more(7, 1);
+  const std::uint64_t ticket = outbox_.queries[0].ticket;
+  EXPECT_EQ(outbox_.wishes, (Wishes{{ticket, 1}, {ticket, 2}}));
+  answer_query(0, protocol::reply_around({}));
+  EXPECT_EQ(outbox_.replies.size(), 3U);
+  want_more(7, 3);
+  EXPECT_THAT(last_reply().error().message(), testing::HasSubstr("no answer"));
+  EXPECT_EQ(last_reply().request_id(), 7U);
+}
+
+TEST_F(ServiceQueryTest, WhoSaysToHaveTakenWhatWasNotGivenLosesTheAnswer) {
+  ask(7);
+  give(0);
+  want_more(7, UINT64_MAX);
+  EXPECT_THAT(last_reply().error().message(), testing::HasSubstr("than was given"));
+  EXPECT_EQ(outbox_.cancelled_queries, std::vector{outbox_.queries[0].ticket});
+  EXPECT_TRUE(outbox_.wishes.empty());
+}
+
+TEST_F(ServiceQueryTest, AnswersOfOthersCanBeNeitherTakenNorEnded) {
+  ask(7);
+  give(0);
+  want_more(7, 1, "another");
+  EXPECT_THAT(last_reply().error().message(), testing::HasSubstr("no answer"));
+  end(7, "another");
+  EXPECT_TRUE(outbox_.wishes.empty());
+  EXPECT_TRUE(outbox_.cancelled_queries.empty());
+}
+
+TEST_F(ServiceQueryTest, AnAnswerThatItsClientEndsIsCancelledWithoutAReply) {
+  ask(7);
+  give(0);
+  end(7);
+  EXPECT_EQ(outbox_.cancelled_queries, std::vector{outbox_.queries[0].ticket});
+  give(0);
+  EXPECT_EQ(outbox_.replies.size(), 1U);
+  end(7);
+  EXPECT_EQ(outbox_.replies.size(), 1U);
+}
+
+TEST_F(ServiceQueryTest, NobodyIsToldToWaitWhileHeIsWaitedFor) {
+  ask(7);
+  for (std::uint64_t i = 0; i < kChunksAhead; ++i) {
+    give(0);
+  }
+  pass(10'000);
+  EXPECT_EQ(outbox_.replies.size(), kChunksAhead);
+  want_more(7, 1);
+  pass(1000);
+  EXPECT_TRUE(last_reply().has_still_working());
+}
+
+TEST_F(ServiceQueryTest, APartThatCannotBeDeliveredCancelsTheQuery) {
+  ask(7);
+  outbox_.unreachable = "client";
+  give(0);
+  EXPECT_EQ(outbox_.cancelled_queries, std::vector{outbox_.queries[0].ticket});
+}
+
+TEST_F(ServiceQueryTest, AClientCannotSayWhatAReaderGave) {
+  ClientRequest message;
+  message.set_protocol_version(protocol::kProtocolVersion);
+  message.mutable_query()->mutable_after()->set_chunks(UINT64_MAX);
+  service_->client_frame("client", protocol::encode(message), now_);
+  EXPECT_FALSE(outbox_.queries.at(0).request.has_after());
 }
 
 }  // namespace

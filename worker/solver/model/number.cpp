@@ -1,5 +1,7 @@
 #include "worker/solver/model/number.h"
 
+#include "worker/solver/model/written_number.h"
+
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -43,10 +45,17 @@ std::string without_end_zeros(std::string text) {
 
 }  // namespace
 
-std::string exact_number(double value) {
+char* write_exact_number(double value, char* at) {
   const double size = std::abs(value);
   const bool is_plain = size == 0.0 || (size >= kSmallestPlain && size < 1e6);
-  return is_plain ? formatted(value, std::chars_format::fixed) : formatted(value);
+  char* const end = at + kLongestExactNumber;
+  return is_plain ? std::to_chars(at, end, value, std::chars_format::fixed).ptr
+                  : std::to_chars(at, end, value).ptr;
+}
+
+std::string exact_number(double value) {
+  std::array<char, kLongestExactNumber> text;
+  return {text.data(), write_exact_number(value, text.data())};
 }
 
 std::string exact_real(double value) {

@@ -1,4 +1,4 @@
-#include "proto/frame_scan.h"
+#include "proto/wire/frame_scan.h"
 
 #include <string>
 

@@ -8,6 +8,9 @@
 
 namespace oblique::client {
 
+/// Whether queries' column of that name may pack a list.
+bool is_packed(std::string_view column);
+
 /// The list that `text` of column `column` packs; elements with names become objects, as in
 /// `solve --json`. Nothing where the column of queries is not packed or the text is not such a
 /// list.

@@ -1,4 +1,4 @@
-#include "client/output/packed_columns.h"
+#include "client/formats/packed_columns.h"
 
 #include <string>
 

@@ -1,4 +1,4 @@
-#include "client/output/packed_columns.h"
+#include "client/formats/packed_columns.h"
 
 #include <algorithm>
 #include <span>
@@ -57,6 +57,10 @@ std::optional<ordered_json> named(const ordered_json& list, Members members) {
 }
 
 }  // namespace
+
+bool is_packed(std::string_view column) {
+  return members_of(column).has_value();
+}
 
 std::optional<ordered_json> unpacked(std::string_view column, const std::string& text) {
   const auto members = members_of(column);

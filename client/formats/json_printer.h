@@ -1,0 +1,38 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "client/formats/row_printer.h"
+#include "proto/wire/cell.h"
+
+namespace oblique::client {
+
+/// See made_printer.
+class JsonPrinter : public RowPrinter {
+ public:
+  enum class Shape { kArray, kLines };
+
+  JsonPrinter(Sink& sink, Shape shape) : sink_(sink), shape_(shape) {}
+
+  void print(const protocol::QueryReply& chunk) override;
+  void end() override;
+
+ private:
+  struct Key {
+    std::string column;
+    std::string text;  // as it stands before each value: "name":
+    bool is_packed;
+  };
+
+  void begin(const protocol::QueryReply& chunk);
+  static void append_value(std::string& out, const Key& key, const protocol::Cell& cell);
+
+  Sink& sink_;
+  Shape shape_;
+  std::vector<Key> keys_;
+  bool has_begun_ = false;
+  bool has_rows_ = false;
+};
+
+}  // namespace oblique::client

@@ -1,0 +1,48 @@
+#include "client/formats/npz_printer.h"
+
+#include <zlib.h>
+
+#include "client/formats/zip_writer.h"
+#include "proto/wire/chunk_rows.h"
+
+namespace oblique::client {
+namespace {
+
+std::uint32_t crc_of(NpyColumn& column) {
+  uLong crc = crc32_z(0, nullptr, 0);
+  column.write([&crc](std::string_view bytes) {
+    crc = crc32_z(crc, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size());
+  });
+  return static_cast<std::uint32_t>(crc);
+}
+
+}  // namespace
+
+void NpzPrinter::print(const protocol::QueryReply& chunk) {
+  if (columns_.empty()) {
+    names_ = distinct_names(chunk);
+    for (std::size_t i = 0; i < names_.size(); ++i) {
+      columns_.push_back(std::make_unique<NpyColumn>(folder_));
+    }
+  }
+  protocol::ChunkRows rows(chunk);
+  while (rows.next()) {
+    for (std::size_t i = 0; i < columns_.size(); ++i) {
+      columns_[i]->add(rows.cell(i));
+    }
+  }
+}
+
+void NpzPrinter::end() {
+  ZipWriter archive(sink_);
+  for (std::size_t i = 0; i < columns_.size(); ++i) {
+    NpyColumn& column = *columns_[i];
+    // The longest text is known to fit once this was done.
+    const std::uint32_t crc = crc_of(column);
+    archive.begin(names_[i] + ".npy", column.bytes_in_all(), crc);
+    column.write([&archive](std::string_view bytes) { archive.append(bytes); });
+  }
+  archive.end();
+}
+
+}  // namespace oblique::client

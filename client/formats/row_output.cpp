@@ -1,0 +1,68 @@
+#include "client/formats/row_output.h"
+
+#include <filesystem>
+#include <utility>
+
+#include "client/formats/pager.h"
+#include "worker/solver/model/errors.h"
+
+namespace oblique::client {
+namespace {
+
+std::unique_ptr<Sink> sink_for(const OutputSettings& settings, const TerminalSize& terminal) {
+  if (!settings.file.empty()) {
+    return std::make_unique<NewFile>(settings.file);
+  }
+  if (terminal.lines == 0) {
+    return std::make_unique<StandardOutput>();
+  }
+  if (settings.format == Format::kNpz) {
+    throw solver::InputError(
+        "--format npz is not text, and standard output is a terminal: write it to a file with "
+        "--out FILE.npz");
+  }
+  if (settings.may_page && is_for_people(settings.format)) {
+    return std::make_unique<PagedOutput>(terminal.lines - 1, pager_command());
+  }
+  return std::make_unique<StandardOutput>();
+}
+
+PrinterSettings printer_settings(const OutputSettings& settings, const TerminalSize& terminal) {
+  PrinterSettings of_printer;
+  of_printer.shown = settings.shown;
+  if (settings.file.empty() && terminal.lines > 0) {
+    of_printer.width = settings.may_leave_out ? terminal.columns : 0;
+    of_printer.first_rows = terminal.lines;
+  }
+  if (!settings.file.empty()) {
+    // Its own disk has the room that it needs, or it finds none there either.
+    of_printer.folder = std::filesystem::absolute(settings.file).parent_path();
+  }
+  return of_printer;
+}
+
+}  // namespace
+
+RowOutput::RowOutput(OutputSettings settings) {
+  const TerminalSize terminal = terminal_size();
+  sink_ = sink_for(settings, terminal);
+  printer_ = made_printer(settings.format, *sink_, printer_settings(settings, terminal));
+}
+
+RowOutput::~RowOutput() = default;
+
+void RowOutput::print(const protocol::QueryReply& chunk) {
+  printer_->print(chunk);
+}
+
+void RowOutput::finish() {
+  printer_->end();
+  sink_->finish();
+}
+
+bool RowOutput::is_paged() const {
+  const auto* paged = dynamic_cast<const PagedOutput*>(sink_.get());
+  return paged != nullptr && paged->is_paged();
+}
+
+}  // namespace oblique::client

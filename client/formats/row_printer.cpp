@@ -1,0 +1,67 @@
+#include "client/formats/row_printer.h"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "client/formats/csv_printer.h"
+#include "client/formats/json_printer.h"
+#include "client/formats/npz_printer.h"
+#include "client/formats/table_printer.h"
+#include "proto/suggestion.h"
+#include "worker/solver/model/errors.h"
+
+namespace oblique::client {
+namespace {
+
+constexpr std::array<std::string_view, 6> kFormatNames{"table", "csv", "json",
+                                                       "jsonl", "npz", "markdown"};
+
+}  // namespace
+
+Format format_named(std::string_view name) {
+  const auto found = std::find(kFormatNames.begin(), kFormatNames.end(), name);
+  if (found == kFormatNames.end()) {
+    throw solver::InputError("format = \"" + std::string(name) +
+                             "\" is not allowed: it must be one of " +
+                             protocol::joined(kFormatNames));
+  }
+  return static_cast<Format>(found - kFormatNames.begin());
+}
+
+std::unique_ptr<RowPrinter> made_printer(Format format, Sink& sink, PrinterSettings settings) {
+  switch (format) {
+    case Format::kCsv:
+      return std::make_unique<CsvPrinter>(sink);
+    case Format::kJson:
+      return std::make_unique<JsonPrinter>(sink, JsonPrinter::Shape::kArray);
+    case Format::kJsonLines:
+      return std::make_unique<JsonPrinter>(sink, JsonPrinter::Shape::kLines);
+    case Format::kNpz:
+      return std::make_unique<NpzPrinter>(sink, std::move(settings.folder));
+    case Format::kMarkdown:
+      return std::make_unique<MarkdownPrinter>(sink, std::move(settings.shown));
+    case Format::kTable:
+      break;
+  }
+  return std::make_unique<TablePrinter>(sink, std::move(settings));
+}
+
+std::vector<std::string> distinct_names(const protocol::QueryReply& chunk) {
+  std::vector<std::string> names;
+  const auto is_taken = [&](const std::string& name) {
+    return std::find(names.begin(), names.end(), name) != names.end() ||
+           std::find(chunk.columns().begin(), chunk.columns().end(), name) != chunk.columns().end();
+  };
+  for (const std::string& column : chunk.columns()) {
+    std::string name = column;
+    const bool is_first = std::find(names.begin(), names.end(), name) == names.end();
+    for (int i = 2; !is_first && is_taken(name); ++i) {
+      name = column + "_" + std::to_string(i);
+    }
+    names.push_back(std::move(name));
+  }
+  return names;
+}
+
+}  // namespace oblique::client

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "client/formats/sink.h"
+#include "proto/oblique.pb.h"
+
+namespace oblique::client {
+
+enum class Format { kTable, kCsv, kJson, kJsonLines, kNpz, kMarkdown };
+
+/// The format of that name: `table`, `csv`, `json`, `jsonl`, `npz` or `markdown`. Throws
+/// solver::InputError for other names.
+Format format_named(std::string_view name);
+
+/// Whether it is for reading, not for other programs.
+inline bool is_for_people(Format format) {
+  return format == Format::kTable || format == Format::kMarkdown;
+}
+
+/// How tables for people show a column.
+struct ShownColumn {
+  std::string heading;    ///< its name, with the unit in brackets where that is not the SI one
+  double per_unit = 1.0;  ///< so much is shown for 1 in SI units
+};
+
+/// Prints the rows of one answer as they come. What it holds does not grow with them.
+class RowPrinter {
+ public:
+  virtual ~RowPrinter() = default;
+
+  /// The rows of a sound chunk (proto/wire); the first one, with or without rows, names the
+  /// columns.
+  virtual void print(const protocol::QueryReply& chunk) = 0;
+  /// There are no more rows. What was printed is nothing whole before.
+  virtual void end() = 0;
+};
+
+struct PrinterSettings {
+  /// Of a table: a line has so many characters at most; 0: as many as it takes.
+  std::size_t width = 0;
+  /// Of a table: widths of columns are those of so many rows at its beginning.
+  std::size_t first_rows = 1000;
+  /// Of a table, plain or in Markdown: how each column is shown; where there is none, by its name.
+  std::vector<ShownColumn> shown = {};
+  /// Of NumPy's archives: where columns are kept until they are whole.
+  std::string folder = {};
+};
+
+/// Prints to `sink`, which must outlive it.
+///
+/// Tables, plain or in Markdown, are for reading: numbers of six digits, in a plain table aligned
+/// at the point. CSV (RFC 4180, a header line), JSON (an array of objects) and JSON lines (an
+/// object a line) hold every number as the shortest text that reads back as the same bits; NULL is
+/// an empty field, respectively null. In JSON the second of two columns of one name is called
+/// name_2, and lists that columns pack as text are arrays; see packed_columns.h. NumPy's archive
+/// (.npz) has an array a column: int64, float64, in which NULL is nan, or text of fixed width.
+std::unique_ptr<RowPrinter> made_printer(Format format, Sink& sink, PrinterSettings settings = {});
+
+/// A key stands for one value only: of equal names the second becomes name_2, and so on.
+std::vector<std::string> distinct_names(const protocol::QueryReply& chunk);
+
+}  // namespace oblique::client

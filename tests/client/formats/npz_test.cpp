@@ -1,0 +1,136 @@
+// Archives for NumPy, read back by NumPy.
+#include <array>
+#include <cstdio>
+#include <fstream>
+#include <limits>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "client/formats/zip_writer.h"
+#include "tests/client/formats/rows_of_tests.h"
+#include "tests/support/temporary_folder.h"
+#include "worker/solver/model/errors.h"
+
+namespace oblique::client {
+namespace {
+
+using test::chunk_of;
+using test::printed;
+
+class Npz : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (said_by("import numpy; print('there')") != "there\n") {
+      GTEST_SKIP() << "there is no python3-numpy here";
+    }
+  }
+  /// What a program in Python prints.
+  std::string said_by(const std::string& program) {
+    const std::string script = folder_.file("script.py");
+    std::ofstream(script) << program;
+    const std::string command = std::string("'") + OBLIQUE_PYTHON + "' '" + script + "' 2>&1";
+    FILE* const pipe = popen(command.c_str(), "r");
+    std::string said;
+    std::array<char, 4096> part;
+    for (std::size_t got = 0; (got = fread(part.data(), 1, part.size(), pipe)) > 0;) {
+      said.append(part.data(), got);
+    }
+    pclose(pipe);
+    return said;
+  }
+  /// What one prints who has loaded the archive of these chunks as `a`.
+  std::string of(const std::vector<protocol::QueryReply>& chunks, const std::string& program) {
+    std::ofstream(folder_.file("a.npz"), std::ios::binary) << printed(Format::kNpz, chunks);
+    return said_by("import numpy\nimport zipfile\na = numpy.load('" + folder_.file("a.npz") +
+                   "')\nassert zipfile.ZipFile('" + folder_.file("a.npz") +
+                   "').testzip() is None\n" + program);
+  }
+
+  oblique::test::TemporaryFolder folder_;
+};
+
+TEST_F(Npz, HasAnArrayAColumnOfTheKindOfItsValues) {
+  const auto rows =
+      chunk_of({"point", "fn_N", "mode", "none"}, {{std::int64_t{1}, 0.1, "SC SR", nullptr},
+                                                   {std::int64_t{-2}, 1e300, "µ", nullptr},
+                                                   {std::int64_t{3}, nullptr, nullptr, nullptr}});
+  EXPECT_EQ(of({rows},
+               "print(a.files)\n"
+               "for name in a.files: print(a[name].dtype.str, a[name].tolist())"),
+            "['point', 'fn_N', 'mode', 'none']\n"
+            "<i8 [1, -2, 3]\n"
+            "<f8 [0.1, 1e+300, nan]\n"
+            "<U5 ['SC SR', 'µ', '']\n"
+            "<f8 [nan, nan, nan]\n");
+}
+
+TEST_F(Npz, ChangesTheKindOfAColumnWithTheFirstValueThatNeedsIt) {
+  const auto ints = chunk_of({"a", "b", "c"}, {{std::int64_t{1}, std::int64_t{1}, 2.5},
+                                               {std::int64_t{2}, std::int64_t{2}, nullptr}});
+  const auto others = chunk_of({"a", "b", "c"}, {{nullptr, "x", "y"}});
+  EXPECT_EQ(
+      of({ints, others, ints}, "for name in a.files: print(a[name].dtype.str, a[name].tolist())"),
+      "<f8 [1.0, 2.0, nan, 1.0, 2.0]\n"
+      "<U1 ['1', '2', 'x', '1', '2']\n"
+      "<U3 ['2.5', '', 'y', '2.5', '']\n");
+}
+
+TEST_F(Npz, OfManyRowsHasThemAll) {
+  std::vector<protocol::QueryReply> chunks;
+  for (std::int64_t part = 0; part < 20; ++part) {
+    test::TestRows rows;
+    for (std::int64_t i = 0; i < 1000; ++i) {
+      rows.push_back({part * 1000 + i, std::string(static_cast<std::size_t>(i % 7), 'x')});
+    }
+    chunks.push_back(chunk_of({"n", "text"}, rows));
+  }
+  EXPECT_EQ(
+      of(chunks, "print((a['n'] == numpy.arange(20000)).all(), len(a['text']), a['text'][19996])"),
+      "True 20000 xx\n");
+}
+
+TEST_F(Npz, OfNoRowsAndOfEqualNamesIsRead) {
+  EXPECT_EQ(of({chunk_of({"a", "a"}, {})}, "print(a.files, a['a'].shape)"), "['a', 'a_2'] (0,)\n");
+}
+
+TEST_F(Npz, TakesTextsThatAreNotUtf8) {
+  EXPECT_EQ(of({chunk_of({"a"}, {{"x\xff"}})}, "print(ascii(a['a'][0]))"), "'x\\ufffd'\n");
+}
+
+TEST(NpzTexts, ThatAreTooLongForAnArrayAreRefused) {
+  EXPECT_THROW(printed(Format::kNpz, {chunk_of({"a"}, {{std::string(200'000, 'x')}})}),
+               solver::InputError);
+}
+
+/// Counts what is written and keeps its end.
+class EndOfArchive : public Sink {
+ public:
+  std::uint64_t bytes = 0;
+  std::string end;
+
+ protected:
+  void write(std::string_view part) override {
+    bytes += part.size();
+    end = (end + std::string(part))
+              .substr(end.size() + part.size() > 1000 ? end.size() + part.size() - 1000 : 0);
+  }
+};
+
+TEST(ZipWriter, WritesMembersOfMoreThanFourGigabytes) {
+  // Sizes are what it is told: nobody appends so much here.
+  EndOfArchive sink;
+  ZipWriter archive(sink);
+  constexpr std::uint64_t kHuge = (std::uint64_t{1} << 32U) + 5;
+  archive.begin("a.npy", kHuge, 0);
+  archive.end();
+  sink.finish();
+  std::string huge;
+  for (unsigned i = 0; i < 8; ++i) {
+    huge += static_cast<char>((kHuge >> (8 * i)) & 0xffU);
+  }
+  EXPECT_THAT(sink.end, testing::HasSubstr(huge + huge));
+}
+
+}  // namespace
+}  // namespace oblique::client

@@ -1,0 +1,115 @@
+// Rows in chunks: what is written is read, and what does not fit together is found out.
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "proto/wire/chunk_rows.h"
+#include "proto/wire/chunk_writer.h"
+
+namespace oblique::protocol {
+namespace {
+
+QueryReply two_rows() {
+  ChunkWriter writer({"point", "fn", "mode"});
+  writer.integer(std::numeric_limits<std::int64_t>::min());
+  writer.real(-0.0);
+  writer.text("SC");
+  writer.end_row();
+  writer.integer(1);
+  writer.null();
+  writer.text("");
+  writer.end_row();
+  return writer.take();
+}
+
+TEST(Chunk, IsReadAsItWasWritten) {
+  const QueryReply chunk = two_rows();
+  ASSERT_TRUE(is_sound(chunk));
+  ChunkRows rows(chunk);
+  ASSERT_TRUE(rows.next());
+  EXPECT_EQ(rows.cell(0).integer, std::numeric_limits<std::int64_t>::min());
+  EXPECT_TRUE(std::signbit(rows.cell(1).real));
+  EXPECT_EQ(rows.cell(2).text, "SC");
+  ASSERT_TRUE(rows.next());
+  EXPECT_EQ(rows.cell(0).integer, 1);
+  EXPECT_EQ(rows.cell(1).kind, CellKind::kNull);
+  EXPECT_EQ(rows.cell(2).kind, CellKind::kText);
+  EXPECT_EQ(rows.cell(2).text, "");
+  EXPECT_FALSE(rows.next());
+  EXPECT_FALSE(rows.next());
+}
+
+TEST(Chunk, WithoutRowsHasItsColumnsOnly) {
+  ChunkWriter writer({"a"});
+  const QueryReply chunk = writer.take();
+  EXPECT_TRUE(is_sound(chunk));
+  EXPECT_EQ(chunk.columns_size(), 1);
+  EXPECT_FALSE(ChunkRows(chunk).next());
+  EXPECT_TRUE(is_sound(QueryReply()));
+}
+
+TEST(Chunk, TheNextOneBeginsAfresh) {
+  ChunkWriter writer({"a"});
+  for (std::int64_t i = 0; i < 3; ++i) {
+    writer.integer(i);
+    writer.end_row();
+    const QueryReply chunk = writer.take();
+    ASSERT_TRUE(is_sound(chunk));
+    ASSERT_EQ(chunk.chunk_rows(), 1U);
+    ChunkRows rows(chunk);
+    ASSERT_TRUE(rows.next());
+    EXPECT_EQ(rows.cell(0).integer, i);
+  }
+}
+
+TEST(Chunk, ARowHasAValueForEachColumn) {
+  ChunkWriter writer({"a", "b"});
+  writer.integer(1);
+  EXPECT_THROW(writer.end_row(), std::logic_error);
+  writer.integer(2);
+  EXPECT_THROW(writer.integer(3), std::logic_error);
+}
+
+TEST(Chunk, OfOneKindNamesItOnce) {
+  ChunkWriter writer({"a"});
+  for (int i = 0; i < 1000; ++i) {
+    writer.real(i);
+    writer.end_row();
+  }
+  const QueryReply chunk = writer.take();
+  EXPECT_EQ(chunk.parts(0).kinds().size(), 1U);
+  EXPECT_TRUE(is_sound(chunk));
+}
+
+TEST(Chunk, FromAWholeAnswerAndBackIsTheSame) {
+  const QueryReply whole = as_rows(two_rows());
+  ASSERT_EQ(whole.rows_size(), 2);
+  EXPECT_EQ(as_rows(as_chunk(whole)).SerializeAsString(), whole.SerializeAsString());
+}
+
+TEST(Chunk, ThatDoesNotFitTogetherIsNotSound) {
+  const auto broken = [](auto&& breaking) {
+    QueryReply chunk = two_rows();
+    breaking(chunk);
+    return is_sound(chunk);
+  };
+  EXPECT_TRUE(broken([](QueryReply&) {}));
+  EXPECT_FALSE(broken([](QueryReply& chunk) { chunk.set_chunk_rows(3); }));
+  EXPECT_FALSE(broken([](QueryReply& chunk) { chunk.set_chunk_rows(UINT64_MAX); }));
+  EXPECT_FALSE(broken([](QueryReply& chunk) { chunk.add_columns("more"); }));
+  EXPECT_FALSE(broken([](QueryReply& chunk) { chunk.mutable_parts(0)->clear_integers(); }));
+  EXPECT_FALSE(broken([](QueryReply& chunk) { chunk.mutable_parts(1)->add_reals(1.0); }));
+  EXPECT_FALSE(broken([](QueryReply& chunk) { chunk.mutable_parts(1)->set_kinds("\x02\x07"); }));
+  EXPECT_FALSE(broken([](QueryReply& chunk) { chunk.mutable_parts(2)->set_texts("S"); }));
+  EXPECT_FALSE(
+      broken([](QueryReply& chunk) { chunk.mutable_parts(2)->set_text_bytes(0, UINT32_MAX); }));
+  QueryReply endless;
+  endless.set_chunk_rows(UINT64_MAX);
+  EXPECT_FALSE(is_sound(endless));
+}
+
+}  // namespace
+}  // namespace oblique::protocol
