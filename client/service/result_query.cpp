@@ -18,6 +18,7 @@ using server::SqlPart;
 
 constexpr const char* kWhere = "--where";
 constexpr const char* kSelect = "--select";
+constexpr const char* kGroup = "--group";
 constexpr const char* kOrder = "--order";
 
 }  // namespace
@@ -50,6 +51,9 @@ void check(const ResultQuery& query) {
   if (!query.where.empty()) {
     check_sql_part(kWhere, query.where, SqlPart::kCondition);
   }
+  if (!query.group.empty()) {
+    check_sql_part(kGroup, query.group, SqlPart::kGroup);
+  }
   if (!query.order.empty()) {
     check_sql_part(kOrder, query.order, SqlPart::kOrder);
   }
@@ -59,9 +63,17 @@ protocol::QueryRequest request_for(const ResultQuery& query) {
   protocol::QueryRequest request;
   auto& question = *request.mutable_question();
   question.set_study(query.study);
-  question.add_select(query.select);
+  // With a group, what was left as it is means its columns and how many points each has.
+  const ResultQuery untold;
+  if (query.group.empty() || query.select != untold.select) {
+    question.add_select(query.select);
+  }
   question.set_where(query.where);
-  question.set_order(query.order);
+  question.set_group(query.group);
+  if (query.group.empty() || query.order != untold.order) {
+    question.set_order(query.order);
+  }
+  question.set_explain(query.explain);
   if (query.limit) {
     question.set_limit(static_cast<std::uint64_t>(*query.limit));
   }

@@ -15,8 +15,10 @@ struct ResultQuery {
   std::string where;  ///< empty: all points
   std::string select{
       "point,H,mu,e,status,fn_peak_N,ft_peak_N,duration_s,slide_m,stick_total_s,major_mode"};
-  std::string order{"point"};         ///< empty: as it comes
+  std::string group;                  ///< columns of which each row has other values; empty: none
+  std::string order{"point"};         ///< with a group, left so: its columns
   std::optional<std::int64_t> limit;  ///< none: all rows
+  bool explain = false;               ///< the plan of the answer, and not the answer
 };
 
 /// Throws solver::InputError, naming the flag, for a limit below 0 and for texts that are no part

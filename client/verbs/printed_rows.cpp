@@ -9,6 +9,8 @@
 #include "client/formats/row_output.h"
 #include "client/output/columns.h"
 #include "proto/program/exit_code.h"
+#include "proto/text.h"
+#include "proto/wire/chunk_rows.h"
 
 namespace oblique::client {
 
@@ -45,6 +47,18 @@ int print_stream(RowStream& stream, const OutputFlags& flags, bool in_shown_unit
     if (!out.is_paged()) {
       throw;
     }
+  }
+  return protocol::kDone;
+}
+
+int print_lines(RowStream& stream) {
+  for (bool ends = false; !ends;) {
+    const protocol::QueryReply chunk = stream.next();
+    protocol::ChunkRows rows(chunk);
+    while (rows.next()) {
+      std::cout << protocol::visible(std::string(rows.cell(0).text)) << '\n';
+    }
+    ends = chunk.ends();
   }
   return protocol::kDone;
 }

@@ -27,6 +27,9 @@ void add_output_flags(CLI::App& verb, OutputFlags& flags);
 /// `in_shown_units`. Gives the exit code. Throws what the source throws, and what RowOutput does.
 int print_stream(RowStream& stream, const OutputFlags& flags, bool in_shown_units);
 
+/// Prints an answer of one column of texts, a line each. Gives the exit code.
+int print_lines(RowStream& stream);
+
 /// `text` as one word of a shell.
 std::string shell_word(const std::string& text);
 

@@ -32,6 +32,22 @@ TEST(ResultQuery, IsAQuestionOfTheSameParts) {
   EXPECT_FALSE(request_for(with([](ResultQuery&) {})).question().has_limit());
 }
 
+TEST(ResultQuery, AGroupHasItsOwnColumnsAndOrderWhereNoneAreGiven) {
+  const auto grouped = request_for(with([](ResultQuery& q) { q.group = "e"; })).question();
+  EXPECT_EQ(grouped.group(), "e");
+  EXPECT_TRUE(grouped.select().empty());
+  EXPECT_EQ(grouped.order(), "");
+  const auto chosen = request_for(with([](ResultQuery& q) {
+                        q.group = "e";
+                        q.select = "e, avg(mu)";
+                        q.order = "avg(mu)";
+                        q.explain = true;
+                      })).question();
+  EXPECT_EQ(chosen.select(0), "e, avg(mu)");
+  EXPECT_EQ(chosen.order(), "avg(mu)");
+  EXPECT_TRUE(chosen.explain());
+}
+
 TEST(ResultQuery, EachFlagIsCheckedAndNamed) {
   const auto objection = [](const std::function<void(ResultQuery&)>& change) -> std::string {
     try {
@@ -46,6 +62,7 @@ TEST(ResultQuery, EachFlagIsCheckedAndNamed) {
   EXPECT_THAT(objection([](ResultQuery& q) { q.select = "mu FROM runs --"; }),
               HasSubstr("--select"));
   EXPECT_THAT(objection([](ResultQuery& q) { q.order = "mu LIMIT 1"; }), HasSubstr("--order"));
+  EXPECT_THAT(objection([](ResultQuery& q) { q.group = "mu ORDER BY 1"; }), HasSubstr("--group"));
   EXPECT_THAT(objection([](ResultQuery& q) { q.limit = -1; }), HasSubstr("--limit -1"));
 }
 
