@@ -78,9 +78,23 @@ void add_block_flags(CLI::App& verb, PointFlags& flags) {
       ->group("Points");
 }
 
+constexpr std::string_view kSingleLengths = "Single lengths";
+
+/// Help with 64 single lengths would have no end: those of `--lengths` name them. A hidden flag
+/// would have no name in messages.
+class BriefHelp : public CLI::Formatter {
+ public:
+  std::string make_group(std::string group, bool is_positional,
+                         std::vector<const CLI::Option*> options) const override {
+    return group == kSingleLengths ? std::string()
+                                   : CLI::Formatter::make_group(group, is_positional, options);
+  }
+};
+
 }  // namespace
 
 void add_point_flags(CLI::App& verb, PointFlags& flags, FlagValues values) {
+  verb.formatter(std::make_shared<BriefHelp>());
   const std::string type = values == FlagValues::kOne ? "VALUE" : "VALUES";
   const auto add = [&](const ParameterKey& key, const std::string& group) {
     const std::string name(key.name);
@@ -114,7 +128,7 @@ void add_point_flags(CLI::App& verb, PointFlags& flags, FlagValues values) {
     add(key, group)->default_str(default_of(key));
   }
   for (std::size_t link = 1; link <= protocol::kMostLinks; ++link) {
-    add(protocol::axis_key(fmt::format("length{}", link)), "");  // help would have no end
+    add(protocol::axis_key(fmt::format("length{}", link)), std::string(kSingleLengths));
   }
 }
 

@@ -75,7 +75,8 @@ void compare_settled_points(sqlite3* database, Diagnosis& found) {
     const IntervalSet there = points_with_row(database, id, {0, kLast});
     if (!(said == there) && found.faults.size() < kMostOfAKind) {
       found.faults.push_back(fmt::format(
-          "study {}: settled_points has {} points and results {}, and from point {} on not the same "
+          "study {}: settled_points has {} points and results {}, and from point {} on not the "
+          "same "
           "ones. UPDATE studies SET counted = 0 WHERE study_id = {} has them counted when a server "
           "starts",
           studies.text(1), said.size(), there.size(), first_difference(said, there), id));
@@ -133,12 +134,6 @@ Diagnosis diagnose(const std::string& path) {
                     " HAVING count(*) > 0",
                     table));
   }
-  add(found.faults,
-      "SELECT 'study ' || name || ': ' || count(*) || ' results of points that it does not have'"
-      " FROM " +
-          table +
-          " JOIN studies USING (study_id) WHERE point < 0 OR point >= studies.points"
-          " GROUP BY study_id LIMIT 20");
   add(found.faults,
       "SELECT 'study ' || name || ' is called done with ' || results || ' of ' || points ||"
       " ' results' FROM " +

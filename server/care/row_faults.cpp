@@ -118,10 +118,12 @@ class StudyCheck {
     segment_.reset();
     rows_.reset();
     rows_.bind(1, study_id);
+    std::uint64_t of_no_point = 0;
     while (!found.is_full() && rows_.step()) {
-      const auto number = static_cast<std::uint64_t>(rows_.integer(0));
+      const auto number = static_cast<std::uint64_t>(rows_.integer(0));  // below 0: beyond all
       if (number >= table.size()) {
-        continue;  // reported with all of its kind
+        ++of_no_point;
+        continue;
       }
       std::string fault = fault_of_place(table, number);
       if (fault.empty() && rows_.integer(5) != 0) {
@@ -130,6 +132,10 @@ class StudyCheck {
       if (!fault.empty()) {
         found.add("study " + name + ", point " + std::to_string(number) + ": " + fault);
       }
+    }
+    if (of_no_point > 0) {
+      found.add(
+          fmt::format("study {}: {} results of points that it does not have", name, of_no_point));
     }
     rows_.reset();
   }

@@ -5,8 +5,8 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/wire/frame_scan.h"
 #include "proto/frames.h"
+#include "proto/wire/frame_scan.h"
 
 namespace oblique::server {
 namespace {

@@ -6,10 +6,10 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/wire/frame_scan.h"
 #include "proto/frames.h"
 #include "proto/result_message.h"
 #include "proto/text.h"
+#include "proto/wire/frame_scan.h"
 
 namespace oblique::server {
 namespace {

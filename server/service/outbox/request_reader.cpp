@@ -5,10 +5,10 @@
 #include <memory>
 #include <utility>
 
-#include "proto/wire/frame_scan.h"
 #include "proto/frames.h"
 #include "proto/recipe/checks.h"
 #include "proto/recipe/model_message.h"
+#include "proto/wire/frame_scan.h"
 
 namespace oblique::server {
 namespace {

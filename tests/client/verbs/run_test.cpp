@@ -109,7 +109,7 @@ TEST(Run, WithErrorsGivesThemToEveryPointAndWithoutToNone) {
   arguments.pop_back();
   const auto refused = test::run_oblique(folder, arguments);
   EXPECT_EQ(refused.exit_code, 1);
-  EXPECT_NE(refused.err.find("choice of errors"), std::string::npos) << refused.err;
+  EXPECT_NE(refused.err.find("errors: stored true, given false"), std::string::npos) << refused.err;
 }
 
 TEST(Run, OfAStudyThatIsDoneShowsItsResultsAgain) {

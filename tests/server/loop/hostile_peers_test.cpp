@@ -10,8 +10,8 @@
 #include <gtest/gtest.h>
 
 #include "proto/result_message.h"
-#include "tests/server/network/raw_peer.h"
 #include "tests/server/loop/running_server.h"
+#include "tests/server/network/raw_peer.h"
 #include "tests/support/temporary_folder.h"
 
 namespace oblique::server {

@@ -12,8 +12,8 @@
 
 #include "proto/keys/authorized_keys.h"
 #include "proto/keys/key_file.h"
-#include "tests/server/network/keyed_peer.h"
 #include "tests/server/loop/running_server.h"
+#include "tests/server/network/keyed_peer.h"
 #include "tests/support/temporary_folder.h"
 
 namespace oblique::server {

@@ -25,8 +25,8 @@ constexpr int kMostAttempts = 6;
 constexpr int kPointsFailed = 1;  ///< exit code: the study is at its end, with its failures
 
 // Several models, so that batches end before the study does. The points of the first block take
-// long enough for heartbeats and for a score of commits. Of the second a filter leaves half out. The
-// last two have no answer.
+// long enough for heartbeats and for a score of commits. Of the second a filter leaves half out.
+// The last two have no answer.
 constexpr const char* kStudy = R"(name = "matrix"
 [[block]]
 dt = 1e-6
