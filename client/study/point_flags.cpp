@@ -1,5 +1,6 @@
 #include "client/study/point_flags.h"
 
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -94,7 +95,9 @@ class BriefHelp : public CLI::Formatter {
 }  // namespace
 
 void add_point_flags(CLI::App& verb, PointFlags& flags, FlagValues values) {
-  verb.formatter(std::make_shared<BriefHelp>());
+  const auto help = std::make_shared<BriefHelp>();
+  help->column_width(verb.get_formatter()->get_column_width());
+  verb.formatter(help);
   const std::string type = values == FlagValues::kOne ? "VALUE" : "VALUES";
   const auto add = [&](const ParameterKey& key, const std::string& group) {
     const std::string name(key.name);
