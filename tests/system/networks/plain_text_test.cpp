@@ -27,7 +27,7 @@ class PlainText : public StudyOnLan {
          {Words{"submit", "--watch", "--name", "conspicuous", "--H", "1", "--mu", "1.2", "--e",
                 "1"},
           Words{"query", "conspicuous", "--select", "fn_peak_N,mode", "--where", "e > 0.95"},
-          Words{"workers"}}) {
+          Words{"sql", "SELECT count(*) FROM runs"}, Words{"workers"}}) {
       const Outcome ran = client(asked)->outcome();
       EXPECT_EQ(ran.exit_code, 0) << ran.err;
     }
