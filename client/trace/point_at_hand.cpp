@@ -46,6 +46,13 @@ PointAtHand point_in(Source& source, const std::string& study, std::uint64_t poi
     throw std::runtime_error(fmt::format("the study \"{}\" has no point {}: its points are 0 to {}",
                                          study, point, table.size() - 1));
   }
+  if (!table.is_left_in(point)) {
+    throw std::runtime_error(
+        fmt::format("point {} of the study \"{}\" is left out by its filter", point, study));
+  }
+  if (const std::string fault = table.fault(point); !fault.empty()) {
+    throw std::runtime_error(fault);
+  }
   const protocol::Point values = table.point(point);
   return {study,     point,         table.model(values.model), values.H_m,
           values.mu, values.e_star, table.wants_errors()};

@@ -5,6 +5,8 @@
 #include <memory>
 #include <utility>
 
+#include <spdlog/fmt/fmt.h>
+
 #include "proto/frames.h"
 #include "proto/recipe/checks.h"
 #include "proto/recipe/model_message.h"
@@ -55,6 +57,13 @@ void judge(protocol::Recipe recipe, const std::function<bool()>& goes_on, ReadRe
 }  // namespace
 
 TracedPoint traced_point(const protocol::PointTable& table, std::uint64_t point) {
+  TracedPoint objected;
+  objected.objection = table.is_left_in(point)
+                           ? table.fault(point)
+                           : fmt::format("point {} is left out by the study's filter", point);
+  if (!objected.objection.empty()) {
+    return objected;
+  }
   const protocol::Point values = table.point(point);
   return {protocol::to_message(table.model(values.model)),
           values.H_m,
