@@ -42,7 +42,8 @@ double ulps_off(double result, long double reference) {
   const auto nearest = static_cast<double>(reference);
   const double unit = std::max(std::nextafter(std::abs(nearest), kInfinite) - std::abs(nearest),
                                std::numeric_limits<double>::denorm_min());
-  return static_cast<double>(std::abs(static_cast<long double>(result) - reference) / unit);
+  return static_cast<double>(std::abs(static_cast<long double>(result) - reference) /
+                             static_cast<long double>(unit));
 }
 
 /// The largest distance over draws of the argument.
