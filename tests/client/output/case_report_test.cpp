@@ -65,10 +65,10 @@ TEST(SolveJson, HasExactlyTheFieldsThatAreDocumented) {
 
 TEST(SolveJson, ListsAllPeaksAndTheMajorOnes) {
   const auto json = json_of(some_result());
-  EXPECT_EQ(json["fn_peaks_N"], nlohmann::json::parse("[4000.0, 3990.0]"));
-  EXPECT_EQ(json["major_peaks_N"], nlohmann::json::parse("[4000.0]"));
-  EXPECT_EQ(json["ft_peaks_N"], nlohmann::json::parse("[2100.0]"));
-  EXPECT_EQ(json["stick_intervals_s"], nlohmann::json::parse("[[0.0, 1e-5]]"));
+  EXPECT_EQ(json["fn_peaks_N"], nlohmann::ordered_json::parse("[4000.0, 3990.0]"));
+  EXPECT_EQ(json["major_peaks_N"], nlohmann::ordered_json::parse("[4000.0]"));
+  EXPECT_EQ(json["ft_peaks_N"], nlohmann::ordered_json::parse("[2100.0]"));
+  EXPECT_EQ(json["stick_intervals_s"], nlohmann::ordered_json::parse("[[0.0, 1e-5]]"));
   EXPECT_EQ(json["phases"][1]["kind"], "restitution");
   EXPECT_EQ(json["solver"]["steps"], 30);
 }
