@@ -22,9 +22,8 @@ std::string field_around(int number, std::string_view encoded) {
     google::protobuf::io::CodedOutputStream out(&stream);
     out.WriteTag(WireFormatLite::MakeTag(number, WireFormatLite::WIRETYPE_LENGTH_DELIMITED));
     out.WriteVarint32(static_cast<std::uint32_t>(encoded.size()));
-    out.WriteRaw(encoded.data(), static_cast<int>(encoded.size()));
   }
-  return bytes;
+  return bytes.append(encoded);
 }
 
 }  // namespace

@@ -51,7 +51,7 @@ FallSolution solve_alone(const SharedChain& chain) {
   }
 }
 
-/// Solves the falls of `chains`, all in one way and, for kSteps, of one shape.
+/// Solves the falls of `chains`, all in one way and of one shape.
 std::vector<FallSolution> solve(WayToFall way, const std::vector<SharedChain>& chains) {
   if (way == WayToFall::kCollocation) {
     std::vector<FallRequest> requests;

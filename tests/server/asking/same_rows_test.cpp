@@ -46,7 +46,11 @@ class Drawn {
       axes.push_back(axis("mu", 0.0, 2.0, 1 + below(7)));
       axes.push_back(axis("e", 0.1, 1.0, 1 + below(6)));
     }
-    return protocol::recipe_of(blocks);
+    Recipe recipe = protocol::recipe_of(blocks);
+    for (protocol::Block& block : *recipe.mutable_blocks()) {
+      make_unusual(block);
+    }
+    return recipe;
   }
 
   /// Over what the recipe knows and what it does not, with values of its axes and others.
@@ -73,9 +77,44 @@ class Drawn {
   }
 
  private:
+  /// Axes side by side, a sample, an axis that follows from others, or a filter; or none of it.
+  void make_unusual(protocol::Block& block) {
+    auto& e = *block.mutable_axes(block.axes_size() - 1);
+    switch (below(8)) {
+      case 0:
+        for (Axis& side : *block.mutable_axes()) {
+          side = once_in(4) ? protocol::listed(side.key(), {0.5}) : axis(side.key(), 0.1, 0.9, 5);
+        }
+        block.set_zip(true);
+        break;
+      case 1:
+        e.Clear();
+        e.set_key("e");
+        e.mutable_distribution()->set_from(0.2);
+        e.mutable_distribution()->set_to(0.9);
+        block.mutable_sample()->set_count(40);
+        block.mutable_sample()->set_seed(below(1000));
+        break;
+      case 2:
+        e.Clear();
+        e.set_key("e");
+        e.set_expression("0.5 + H / 4");
+        break;
+      case 3:
+        block.set_where("mu > 0.5 * e");
+        break;
+      default:
+        break;
+    }
+  }
+
   Axis axis(const std::string& key, double from, double to, std::size_t count) {
     if (count > 1 && once_in(2)) {
-      return protocol::range(key, from, to, count);
+      Axis range = protocol::range(key, from, to, count);
+      if (from > 0.0 && once_in(2)) {
+        range.set_spacing(protocol::SPACING_LOGARITHMIC);
+      }
+      return range;
     }
     std::vector<double> values;
     for (std::size_t i = 0; i < count; ++i) {
@@ -97,7 +136,9 @@ class Drawn {
       if (column == "point") {
         return std::to_string(below(200));
       }
-      const double chosen = protocol::axis_value(drawn, below(protocol::axis_size(drawn)));
+      const double chosen = protocol::has_own_values(drawn)
+                                ? protocol::axis_value(drawn, below(protocol::axis_size(drawn)))
+                                : 0.5 + static_cast<double>(below(10)) / 40.0;
       return solver::exact_number(once_in(4) ? chosen * 1.01 : chosen);
     };
     const std::vector<std::string> signs{"=", "==", "<", "<=", ">", ">=", "<>", "!=", "IS"};

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <stdexcept>
 
 #include "worker/solver/chain/instruction_sets.h"
 #include "worker/solver/fall/collocation_lanes.h"
@@ -153,50 +154,6 @@ class FallingChain {
   StepControl control_;
 };
 
-/// Solves falls of one shape; a lane that ends takes the next.
-void solve_in_lanes(const CollocationKernel& kernel, std::span<const FallRequest> requests,
-                    std::span<const std::size_t> places, std::vector<FallSolution>& solutions) {
-  const FallRequest& first = requests[places.front()];
-  const auto rule = std::make_shared<const GaussCollocation>(kernel.stages);
-  CollocationLanes lanes(kernel, *rule, *first.chain, *first.model);
-  std::vector<std::optional<FallingChain>> falling(lanes.lanes());
-  std::vector<double> h_s(lanes.lanes());
-  std::vector<double> error_m(lanes.lanes());
-  std::vector<CollocationLanes::Attempt> attempts(lanes.lanes());
-  std::vector<unsigned char> accept(lanes.lanes());
-  std::size_t next = 0;
-  for (;;) {
-    bool any = false;
-    for (std::size_t lane = 0; lane < lanes.lanes(); ++lane) {
-      std::optional<FallingChain>& here = falling[lane];
-      if (!here && next < places.size()) {
-        const std::size_t place = places[next++];
-        lanes.load(lane, *requests[place].chain, *requests[place].model);
-        here.emplace(kernel, rule, requests[place], solutions[place]);
-      }
-      h_s[lane] = here ? here->h_s() : 0.0;
-      error_m[lane] = here ? here->error_m() : 0.0;
-      any = any || here;
-    }
-    if (!any) {
-      return;
-    }
-    lanes.attempt(h_s, error_m, attempts);
-    for (std::size_t lane = 0; lane < lanes.lanes(); ++lane) {
-      accept[lane] = 1;
-      if (!falling[lane]) {
-        continue;
-      }
-      const FallingChain::Fate fate = falling[lane]->take(attempts[lane], lanes, lane);
-      accept[lane] = fate == FallingChain::Fate::kOn ? 1 : 0;
-      if (fate == FallingChain::Fate::kOver) {
-        falling[lane].reset();
-      }
-    }
-    lanes.settle(accept);
-  }
-}
-
 std::vector<CollocationKernel> find_kernels() {
   std::vector<CollocationKernel> kernels;
 #if defined(__x86_64__)
@@ -221,22 +178,52 @@ std::span<const CollocationKernel> runnable_collocation_kernels() {
 std::vector<FallSolution> solve_by_collocation(std::span<const FallRequest> requests,
                                                const CollocationKernel& kernel) {
   std::vector<FallSolution> solutions(requests.size());
-  std::vector<bool> is_placed(requests.size(), false);
-  for (std::size_t i = 0; i < requests.size(); ++i) {
-    if (is_placed[i]) {
-      continue;
+  if (requests.empty()) {
+    return solutions;
+  }
+  for (const FallRequest& request : requests) {
+    if (!have_one_shape(request.chain->tables(), requests.front().chain->tables())) {
+      throw std::invalid_argument("falls side by side are of chains of one shape");
     }
-    std::vector<std::size_t> places;
-    for (std::size_t j = i; j < requests.size(); ++j) {
-      if (!is_placed[j] &&
-          have_one_shape(requests[i].chain->tables(), requests[j].chain->tables())) {
-        is_placed[j] = true;
-        places.push_back(j);
+  }
+  const auto rule = std::make_shared<const GaussCollocation>(kernel.stages);
+  CollocationLanes lanes(kernel, *rule, *requests.front().chain, *requests.front().model);
+  std::vector<std::optional<FallingChain>> falling(lanes.lanes());
+  std::vector<double> h_s(lanes.lanes());
+  std::vector<double> error_m(lanes.lanes());
+  std::vector<CollocationLanes::Attempt> attempts(lanes.lanes());
+  std::vector<unsigned char> accept(lanes.lanes());
+  std::size_t next = 0;
+  for (;;) {
+    bool any = false;
+    for (std::size_t lane = 0; lane < lanes.lanes(); ++lane) {
+      std::optional<FallingChain>& here = falling[lane];
+      if (!here && next < requests.size()) {
+        lanes.load(lane, *requests[next].chain, *requests[next].model);
+        here.emplace(kernel, rule, requests[next], solutions[next]);
+        ++next;
+      }
+      h_s[lane] = here ? here->h_s() : 0.0;
+      error_m[lane] = here ? here->error_m() : 0.0;
+      any = any || here;
+    }
+    if (!any) {
+      return solutions;
+    }
+    lanes.attempt(h_s, error_m, attempts);
+    for (std::size_t lane = 0; lane < lanes.lanes(); ++lane) {
+      accept[lane] = 1;
+      if (!falling[lane]) {
+        continue;
+      }
+      const FallingChain::Fate fate = falling[lane]->take(attempts[lane], lanes, lane);
+      accept[lane] = fate == FallingChain::Fate::kOn ? 1 : 0;
+      if (fate == FallingChain::Fate::kOver) {
+        falling[lane].reset();
       }
     }
-    solve_in_lanes(kernel, requests, places, solutions);
+    lanes.settle(accept);
   }
-  return solutions;
 }
 
 }  // namespace oblique::solver

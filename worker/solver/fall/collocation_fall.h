@@ -1,9 +1,7 @@
 #pragma once
 
 #include <cstddef>
-#include <memory>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "worker/solver/chain/chain.h"
@@ -26,14 +24,9 @@ struct FallRequest {
   FallProgress* progress = nullptr;  ///< told how far the fall is, where there is one
 };
 
-/// The fall, or the reason why there is none.
-struct FallSolution {
-  std::shared_ptr<const FallPath> path;
-  std::string error;
-};
-
-/// Solves falls by Gauss collocation, those of one shape side by side in lanes, in the order asked
-/// for. A fall has the same bits whatever was solved beside it.
+/// Solves falls of chains of one shape by Gauss collocation, side by side in lanes, and gives them
+/// in the order asked for. A fall has the same bits whatever was solved beside it. Throws
+/// std::invalid_argument where shapes differ.
 std::vector<FallSolution> solve_by_collocation(
     std::span<const FallRequest> requests,
     const CollocationKernel& kernel = runnable_collocation_kernels().front());

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "worker/solver/chain/chain.h"
-#include "worker/solver/fall/collocation_fall.h"
 #include "worker/solver/lanes/lane_stepper.h"
+#include "worker/solver/motion/fall.h"
 #include "worker/solver/motion/fall_progress.h"
 #include "worker/solver/motion/motion.h"
 

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <string>
 #include <utility>
 
 #include "worker/solver/motion/fall_progress.h"
@@ -25,6 +26,12 @@ class FallPath {
   virtual ChainState state_at(double H_m) const = 0;
   /// Memory that its states take now.
   virtual std::size_t bytes() const = 0;
+};
+
+/// A fall, or the reason why there is none.
+struct FallSolution {
+  std::shared_ptr<const FallPath> path;
+  std::string error;
 };
 
 /// The free fall from rest up to the instant at which the tip first turns back. One fall passes

@@ -74,6 +74,28 @@ TEST(Falls, SayHowFarTheyAre) {
   }
 }
 
+TEST(Falls, OfDifferentShapesAndWaysAreThoseThatEachHasAlone) {
+  std::vector<ModelParameters> models(6);
+  for (std::size_t i = 0; i < models.size(); ++i) {
+    // Fine meshes fall by collocation, coarse ones and those with a step of their own by steps.
+    models[i].elements_per_link = i % 2 == 0 ? 8 : 9;
+    models[i].E_Pa *= 1.0 + 0.1 * static_cast<double>(i);
+  }
+  models[2] = coarse_model();
+  models[3].dt_fall_s = 1.5e-6;
+  const std::vector<FallOutcome> together = solve_falls(models);
+  for (std::size_t i = 0; i < models.size(); ++i) {
+    SCOPED_TRACE(i);
+    const FallOutcome alone = solve_falls({&models[i], 1}).front();
+    ASSERT_EQ(together[i].error, "");
+    const Fall& fall = together[i].fallen->fall();
+    const double drop_m = 0.7 * fall.largest_drop_m();
+    EXPECT_EQ(fall.largest_drop_m(), alone.fallen->fall().largest_drop_m());
+    EXPECT_EQ(fall.state_at(drop_m).q, alone.fallen->fall().state_at(drop_m).q);
+    EXPECT_EQ(fall.state_at(drop_m).v, alone.fallen->fall().state_at(drop_m).v);
+  }
+}
+
 TEST(Falls, AFingerSaysHowFarItsFallIsAndWhatASharedOneCameTo) {
   const Finger finger(coarse_model());
   EXPECT_EQ(finger.fall_progress().drop_m(), 0.0);

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <vector>
@@ -190,7 +191,7 @@ std::deque<ModelParameters> different_models(int elements_per_link) {
   std::deque<ModelParameters> models;
   for (int i = 0; i < 11; ++i) {
     const double more = 1.0 + 0.13 * i;
-    ModelParameters model = model_of(i == 5 ? elements_per_link + 1 : elements_per_link);
+    ModelParameters model = model_of(elements_per_link);
     model.E_Pa *= more * (i % 3 == 0 ? 1e-3 : 1.0);
     model.I_m4 *= i % 2 == 0 ? more : 1.0;
     model.lengths_m = {0.3 * more, 0.4, 0.35};
@@ -231,6 +232,16 @@ TEST(CollocationFall, HasTheSameBitsAloneAndBesideOthers) {
       expect_same_bits(Fall(alone.path), Fall(backwards[requests.size() - 1 - i].path));
     }
   }
+}
+
+TEST(CollocationFall, RefusesChainsOfDifferentShapes) {
+  const ModelParameters one = model_of(1);
+  const ModelParameters other = model_of(2);
+  const Chain chain(one);
+  const Chain longer(other);
+  const std::vector<FallRequest> requests{{&chain, &one, kAccuracy, nullptr},
+                                          {&longer, &other, kAccuracy, nullptr}};
+  EXPECT_THROW(solve_by_collocation(requests), std::invalid_argument);
 }
 
 TEST(CollocationFall, StateAtADropHasTheSameBitsWhateverWasAskedBeforeAndInWhichThread) {
