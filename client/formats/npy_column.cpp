@@ -210,8 +210,14 @@ std::string NpyColumn::header() const {
   const std::string type = kind_ == Kind::kText      ? fmt::format("U{}", longest_)
                            : kind_ == Kind::kInteger ? "i8"
                                                      : "f8";
-  std::string words = fmt::format("{{'descr': '{}{}', 'fortran_order': False, 'shape': ({},), }}",
-                                  kOrder, type, rows_);
+  std::uint64_t rows = rows_;
+  std::string row_shape;
+  for (const std::uint64_t size : row_shape_) {
+    rows /= size;
+    row_shape += fmt::format(" {},", size);
+  }
+  std::string words = fmt::format("{{'descr': '{}{}', 'fortran_order': False, 'shape': ({},{}), }}",
+                                  kOrder, type, rows, row_shape);
   // Magic, version and length before; all of it a multiple of 64, ended by a line feed.
   constexpr std::size_t kBefore = 10;
   constexpr std::size_t kAlignment = 64;

@@ -5,6 +5,8 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "proto/wire/cell.h"
 
@@ -37,8 +39,10 @@ class ScratchFile {
 /// is a text. Values are kept in a file.
 class NpyColumn {
  public:
-  /// `folder` as for ScratchFile.
-  explicit NpyColumn(std::string folder) : folder_(std::move(folder)) {}
+  /// `folder` as for ScratchFile. `row_shape`: the sizes of an array that stands in each row,
+  /// whose values are added one after the other, the last index fastest; empty: one value.
+  explicit NpyColumn(std::string folder, std::vector<std::uint64_t> row_shape = {})
+      : folder_(std::move(folder)), row_shape_(std::move(row_shape)) {}
 
   void add(const protocol::Cell& cell);
 
@@ -59,9 +63,10 @@ class NpyColumn {
   void write_texts(const std::function<void(std::string_view)>& take);
 
   std::string folder_;
+  std::vector<std::uint64_t> row_shape_;
   Kind kind_ = Kind::kNull;
   std::unique_ptr<ScratchFile> values_;  // none while all are NULL
-  std::uint64_t rows_ = 0;
+  std::uint64_t rows_ = 0;     // of values: each row of the array has as many as its shape says
   std::uint64_t longest_ = 1;  // characters of a text
 };
 

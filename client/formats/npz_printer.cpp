@@ -1,5 +1,7 @@
 #include "client/formats/npz_printer.h"
 
+#include <utility>
+
 #include <zlib.h>
 
 #include "client/formats/zip_writer.h"
@@ -18,31 +20,33 @@ std::uint32_t crc_of(NpyColumn& column) {
 
 }  // namespace
 
+void write_npz(const std::vector<NamedColumn>& columns, Sink& sink) {
+  ZipWriter archive(sink);
+  for (const auto& [name, column] : columns) {
+    // The longest text is known to fit once this was done.
+    const std::uint32_t crc = crc_of(*column);
+    archive.begin(name + ".npy", column->bytes_in_all(), crc);
+    column->write([&archive](std::string_view bytes) { archive.append(bytes); });
+  }
+  archive.end();
+}
+
 void NpzPrinter::print(const protocol::QueryReply& chunk) {
   if (columns_.empty()) {
-    names_ = distinct_names(chunk);
-    for (std::size_t i = 0; i < names_.size(); ++i) {
-      columns_.push_back(std::make_unique<NpyColumn>(folder_));
+    for (std::string& name : distinct_names(chunk)) {
+      columns_.push_back({std::move(name), std::make_unique<NpyColumn>(folder_)});
     }
   }
   protocol::ChunkRows rows(chunk);
   while (rows.next()) {
     for (std::size_t i = 0; i < columns_.size(); ++i) {
-      columns_[i]->add(rows.cell(i));
+      columns_[i].column->add(rows.cell(i));
     }
   }
 }
 
 void NpzPrinter::end() {
-  ZipWriter archive(sink_);
-  for (std::size_t i = 0; i < columns_.size(); ++i) {
-    NpyColumn& column = *columns_[i];
-    // The longest text is known to fit once this was done.
-    const std::uint32_t crc = crc_of(column);
-    archive.begin(names_[i] + ".npy", column.bytes_in_all(), crc);
-    column.write([&archive](std::string_view bytes) { archive.append(bytes); });
-  }
-  archive.end();
+  write_npz(columns_, sink_);
 }
 
 }  // namespace oblique::client

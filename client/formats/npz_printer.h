@@ -9,6 +9,15 @@
 
 namespace oblique::client {
 
+/// An array of an archive for NumPy.
+struct NamedColumn {
+  std::string name;
+  std::unique_ptr<NpyColumn> column;
+};
+
+/// Writes the archive of these arrays. Throws as NpyColumn::write does.
+void write_npz(const std::vector<NamedColumn>& columns, Sink& sink);
+
 /// See made_printer. Nothing goes to the sink before the end.
 class NpzPrinter : public RowPrinter {
  public:
@@ -21,8 +30,7 @@ class NpzPrinter : public RowPrinter {
  private:
   Sink& sink_;
   std::string folder_;
-  std::vector<std::string> names_;
-  std::vector<std::unique_ptr<NpyColumn>> columns_;
+  std::vector<NamedColumn> columns_;
 };
 
 }  // namespace oblique::client

@@ -58,11 +58,11 @@ void StandardOutput::write(std::string_view bytes) {
   }
 }
 
-NewFile::NewFile(std::string path) : path_(std::move(path)) {
+NewFile::NewFile(std::string path, std::string_view flag) : path_(std::move(path)) {
   struct stat found {};
   const bool is_there = ::stat(path_.c_str(), &found) == 0;
   if (is_there && S_ISDIR(found.st_mode)) {
-    throw solver::InputError(fmt::format("--out {} is a folder", path_));
+    throw solver::InputError(fmt::format("{} {} is a folder", flag, path_));
   }
   constexpr mode_t kMode = 0666;
   if (is_there && !S_ISREG(found.st_mode)) {
@@ -73,7 +73,7 @@ NewFile::NewFile(std::string path) : path_(std::move(path)) {
   }
   if (descriptor_ < 0) {
     throw solver::InputError(
-        fmt::format("--out {} cannot be written: {}", path_, reason_of(errno)));
+        fmt::format("{} {} cannot be written: {}", flag, path_, reason_of(errno)));
   }
 }
 

@@ -66,8 +66,8 @@ class StandardOutput : public Sink {
 /// happens, what was there under the name stays.
 class NewFile : public Sink {
  public:
-  /// Throws solver::InputError when it cannot be made.
-  explicit NewFile(std::string path);
+  /// `flag` named it. Throws solver::InputError when it cannot be made.
+  explicit NewFile(std::string path, std::string_view flag = "--out");
   ~NewFile() override;
 
   void finish() override;

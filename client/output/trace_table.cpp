@@ -8,19 +8,19 @@
 
 namespace oblique::client {
 
-void print_trace_header(std::ostream& out, const solver::TraceShape& shape) {
+void append_trace_header(std::string& text, const solver::TraceShape& shape) {
   std::string_view separator;
   for (const auto& heading : solver::trace_headings(shape)) {
-    out << separator << heading;
+    text.append(separator).append(heading);
     separator = ",";
   }
-  out << '\n';
+  text += '\n';
 }
 
-void print_trace_row(std::ostream& out, const solver::TraceRow& row) {
+void append_trace_row(std::string& text, const solver::TraceRow& row) {
   std::string_view separator;
   const auto put = [&](double value) {
-    out << separator << solver::exact_number(value);
+    text.append(separator).append(solver::exact_number(value));
     separator = ",";
   };
   for (const auto& column : solver::trace_columns()) {
@@ -31,10 +31,11 @@ void print_trace_row(std::ostream& out, const solver::TraceRow& row) {
         put(value);
       }
     } else {
-      out << separator << csv_field(row.*std::get<std::string solver::TraceRow::*>(column.value));
+      text.append(separator).append(
+          csv_field(row.*std::get<std::string solver::TraceRow::*>(column.value)));
     }
   }
-  out << '\n';
+  text += '\n';
 }
 
 }  // namespace oblique::client

@@ -4,10 +4,7 @@
 
 #include <array>
 #include <filesystem>
-#include <iostream>
-#include <stdexcept>
 #include <string_view>
-#include <system_error>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
@@ -21,11 +18,12 @@
 namespace oblique::client {
 namespace {
 
-constexpr std::array<std::string_view, 2> kFormats{"csv", "json"};
+constexpr std::array<std::string_view, 3> kFormats{"csv", "json", "npz"};
 
 std::optional<TraceFormat> format_called(std::string_view name) {
   return name == kFormats[0]   ? std::optional(TraceFormat::kCsv)
          : name == kFormats[1] ? std::optional(TraceFormat::kJson)
+         : name == kFormats[2] ? std::optional(TraceFormat::kNpz)
                                : std::nullopt;
 }
 
@@ -48,33 +46,23 @@ TraceFormat trace_format(const std::string& flag, const std::string& file) {
     return *format;
   }
   throw solver::InputError(
-      fmt::format("--out {} does not say in which format: end its name in .csv or .json, or give "
-                  "--format",
+      fmt::format("--out {} does not say in which format: end its name in .csv, .json or .npz, or "
+                  "give --format",
                   file));
 }
 
-TraceOutput::TraceOutput(std::string file, TraceFormat format)
+TraceOutput::TraceOutput(std::string file, TraceFormat format, std::string_view flag)
     : path_(std::move(file)), format_(format) {
   if (!path_.empty()) {
-    file_.open(path_);
-    if (!file_) {
-      throw solver::InputError("cannot write the trace to " + path_);
-    }
+    sink_ = std::make_unique<NewFile>(path_, flag);
+    return;
   }
-}
-
-TraceOutput::~TraceOutput() {
-  if (!path_.empty() && !is_finished_) {
-    file_.close();
-    std::error_code ignored;
-    if (std::filesystem::is_regular_file(path_, ignored)) {
-      std::filesystem::remove(path_, ignored);
-    }
+  if (format_ == TraceFormat::kNpz && fills_terminal()) {
+    throw solver::InputError(
+        "--format npz is not text, and standard output is a terminal: write it to a file with "
+        "--out FILE.npz");
   }
-}
-
-std::ostream& TraceOutput::out() {
-  return path_.empty() ? std::cout : file_;
+  sink_ = std::make_unique<StandardOutput>();
 }
 
 bool TraceOutput::fills_terminal() const {
@@ -84,18 +72,29 @@ bool TraceOutput::fills_terminal() const {
 void TraceOutput::begin(const solver::TraceShape& shape) {
   shape_ = shape;
   if (format_ == TraceFormat::kCsv) {
-    print_trace_header(out(), shape);
+    append_trace_header(sink_->held(), shape);
+  } else if (format_ == TraceFormat::kNpz) {
+    // The file's own disk has the room that it needs, or it finds none there either.
+    archive_ = std::make_unique<TraceArchive>(
+        shape, path_.empty() ? "" : std::filesystem::absolute(path_).parent_path().string());
   }
 }
 
 void TraceOutput::add(const solver::TraceRow& row) {
-  ++rows_;
-  if (format_ == TraceFormat::kCsv) {
-    print_trace_row(out(), row);
-    return;
+  switch (format_) {
+    case TraceFormat::kCsv:
+      append_trace_row(sink_->held(), row);
+      sink_->flush_if_long();
+      break;
+    case TraceFormat::kNpz:
+      archive_->add(row);
+      break;
+    case TraceFormat::kJson:
+      ++rows_;
+      solver::append_numbers(row, numbers_);
+      states_.push_back(row.state);
+      break;
   }
-  solver::append_numbers(row, numbers_);
-  states_.push_back(row.state);
 }
 
 void TraceOutput::print_json(const PointAtHand& point,
@@ -119,19 +118,17 @@ void TraceOutput::print_json(const PointAtHand& point,
   all["point"] = point.point;
   all["result"] = result ? json_of(*result) : nlohmann::ordered_json();
   all["trace"] = std::move(columns);
-  out() << all.dump(-1, ' ', true) << '\n';
+  sink_->append(all.dump(-1, ' ', true) + '\n');
 }
 
 void TraceOutput::finish(const PointAtHand& point,
                          const std::optional<solver::CaseResult>& result) {
   if (format_ == TraceFormat::kJson) {
     print_json(point, result);
+  } else if (format_ == TraceFormat::kNpz) {
+    archive_->write(*sink_);
   }
-  if (!out().flush()) {
-    throw std::runtime_error("the trace could not be written whole to " +
-                             (path_.empty() ? "standard output" : path_));
-  }
-  is_finished_ = true;
+  sink_->finish();
 }
 
 }  // namespace oblique::client

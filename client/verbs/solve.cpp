@@ -1,18 +1,12 @@
-#include <fstream>
 #include <iostream>
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
-
-#include <unistd.h>
-
-#include <spdlog/fmt/fmt.h>
 
 #include "client/output/case_report.h"
 #include "client/output/mesh_note.h"
-#include "client/output/trace_table.h"
 #include "client/study/point_flags.h"
+#include "client/trace/trace_output.h"
 #include "client/verbs/solve_here.h"
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
@@ -27,8 +21,11 @@ constexpr const char* kSolveExamples = R"(Examples:
   oblique solve --H 1 --mu 1.2 --e 0.8 --json
   oblique solve --H 1 --mu 1.2 --e 0.8 --errors
   oblique solve --H 1 --mu 0.4 --e 1 --trace impact.csv --trace-shape
+  oblique solve --H 1 --mu 0.4 --e 1 --trace impact.npz
   oblique solve --H 1 --mu 0.4 --e 1 --trace - > impact.csv
   oblique solve --H 0.6 --mu 0.4 --e 1 --preset converged --lengths 0.4,0.4,0.2)";
+
+constexpr const char* kStandardOutput = "-";
 
 struct SolveFlags {
   PointFlags points;
@@ -47,61 +44,33 @@ void check_one_point(const protocol::PointTable& table) {
                            "run` for all of them");
 }
 
-/// Where a trace goes: a file, or standard output.
-class SolveTraceOutput {
- public:
-  /// Throws InputError when `where` is not a file that can be written, or standard output that
-  /// `json` has already.
-  SolveTraceOutput(std::string where, bool json) : where_(std::move(where)) {
-    if (where_.empty()) {
-      throw solver::InputError("--trace is empty: name a file, or - for standard output");
-    }
-    if (is_standard_output()) {
-      if (json) {
-        throw solver::InputError(
-            "--trace - and --json both write to standard output: give the trace a file");
-      }
-      return;
-    }
-    file_.open(where_);
-    if (!file_) {
-      throw solver::InputError("cannot write the trace to " + where_);
-    }
+/// Where the trace goes. Throws InputError when `where` is not a file that can be written, or
+/// standard output that `json` has already.
+TraceOutput trace_output(const std::string& where, bool json) {
+  if (where.empty()) {
+    throw solver::InputError("--trace is empty: name a file, or - for standard output");
   }
-
-  bool is_standard_output() const { return where_ == "-"; }
-  /// Whether its rows come to where progress is shown.
-  bool fills_terminal() const { return is_standard_output() && isatty(STDOUT_FILENO) == 1; }
-  void begin(const solver::ModelParameters& model, bool shape) {
-    print_trace_header(
-        out(), solver::trace_shape(model.lengths_m.size(),
-                                   static_cast<std::size_t>(model.elements_per_link), shape));
+  if (where == kStandardOutput && json) {
+    throw solver::InputError(
+        "--trace - and --json both write to standard output: give the trace a file");
   }
-  void add(const solver::TraceRow& row) { print_trace_row(out(), row); }
-  void finish() {
-    if (!out().flush()) {
-      throw std::runtime_error("the trace could not be written whole to " +
-                               (is_standard_output() ? "standard output" : where_));
-    }
-  }
-
- private:
-  std::ostream& out() { return is_standard_output() ? std::cout : file_; }
-
-  std::string where_;
-  std::ofstream file_;
-};
+  return {where == kStandardOutput ? "" : where,
+          where.ends_with(".npz") ? TraceFormat::kNpz : TraceFormat::kCsv, "--trace"};
+}
 
 int solve(const SolveFlags& flags) {
   const protocol::PointTable table(recipe_of_flags(flags.points, tip_reach()));
   check_one_point(table);
   const auto point = table.point(0);
   const solver::Finger finger(table.model(0));
-  std::optional<SolveTraceOutput> trace;
+  std::optional<TraceOutput> trace;
   solver::Tracing tracing;
   if (flags.trace) {
-    trace.emplace(*flags.trace, flags.json);
-    trace->begin(finger.model(), flags.trace_shape);
+    trace.emplace(trace_output(*flags.trace, flags.json));
+    const auto& model = finger.model();
+    trace->begin(solver::trace_shape(model.lengths_m.size(),
+                                     static_cast<std::size_t>(model.elements_per_link),
+                                     flags.trace_shape));
     tracing.sink = [&trace](const solver::TraceRow& row) { trace->add(row); };
     tracing.with_shape = flags.trace_shape;
   }
@@ -111,10 +80,10 @@ int solve(const SolveFlags& flags) {
   if (flags.json) {
     std::cout << json_of(result).dump(2) << '\n';
   } else {
-    print_summary(trace && trace->is_standard_output() ? std::cerr : std::cout, result);
+    print_summary(flags.trace == kStandardOutput ? std::cerr : std::cout, result);
   }
   if (trace) {
-    trace->finish();
+    trace->finish({}, result);
   }
   tell_mesh(std::cerr, table.recipe());
   return kDone;
@@ -128,8 +97,9 @@ void add_solve(CLI::App& app, Command& command) {
   verb->footer(kSolveExamples);
   verb->add_flag("--json", flags->json, "print the result as one JSON object (SI units)");
   auto* trace = verb->add_option("--trace", flags->trace,
-                                 "write the time histories of the contact to FILE (CSV, SI "
-                                 "units); - is standard output")
+                                 "write the time histories of the contact to FILE (CSV, or "
+                                 "NumPy's archive where it ends in .npz; SI units); - is standard "
+                                 "output")
                     ->type_name("FILE");
   verb->add_flag("--trace-shape", flags->trace_shape,
                  "add the positions of the chain's nodes to the trace")

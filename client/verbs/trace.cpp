@@ -23,12 +23,14 @@ namespace {
 
 constexpr const char* kTraceExamples = R"(Examples:
   oblique trace paper 3 > point3.csv
-  oblique trace paper 3 --out point3.json --shape
+  oblique trace paper 3 --out point3.npz --shape
+  oblique trace paper 3 --format json > point3.json
   oblique trace paper 3 --server tcp://127.0.0.1:7600 --on-worker --out point3.csv
 
 The point is solved again with the model of its study, here when the database is a file and by a
 worker of the server otherwise, and held against the stored row: standard error says whether they
-are the same. `oblique columns --trace` says what the columns of a trace mean.)";
+are the same. `oblique columns --trace` says what the columns of a trace mean. NumPy's archive has
+an array a column, a["fn_N"], and the nodes of --shape as one, a["nodes_m"][instant, node, 0 or 1].)";
 
 struct TraceFlags {
   std::string study;
@@ -178,7 +180,7 @@ void add_trace(CLI::App& app, Command& command) {
   verb->add_option("--out", flags->out, "file that is written; standard output when left out")
       ->type_name("FILE");
   verb->add_option("--format", flags->format,
-                   "csv or json; as the file's name ends when left out, else csv")
+                   "csv, json or npz; as the file's name ends when left out, else csv")
       ->type_name("FORMAT");
   verb->add_flag("--shape", flags->shape, "add the positions of the chain's nodes");
   auto* here = verb->add_flag("--here", flags->here, "solve it in this process");

@@ -80,9 +80,11 @@ void Server::start(const TemporaryFolder& folder, std::vector<std::string> argum
   }
   process_.emplace(folder, server_program(), arguments, with_drain, ready[1]);
   close(ready[1]);
-  const std::string line = read_line(ready[0]);
+  auto urls = nlohmann::json::parse(read_line(ready[0]), nullptr, false);
+  while (urls.is_object() && urls.contains("notice")) {
+    urls = nlohmann::json::parse(read_line(ready[0]), nullptr, false);
+  }
   close(ready[0]);
-  const auto urls = nlohmann::json::parse(line, nullptr, false);
   if (!urls.is_object()) {
     throw std::runtime_error("the server did not start: " + process_->err());
   }

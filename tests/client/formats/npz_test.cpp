@@ -1,6 +1,4 @@
 // Archives for NumPy, read back by NumPy.
-#include <array>
-#include <cstdio>
 #include <fstream>
 #include <limits>
 
@@ -9,7 +7,7 @@
 
 #include "client/formats/zip_writer.h"
 #include "tests/client/formats/rows_of_tests.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/python.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::client {
@@ -21,30 +19,17 @@ using test::printed;
 class Npz : public testing::Test {
  protected:
   void SetUp() override {
-    if (said_by("import numpy; print('there')") != "there\n") {
+    if (!oblique::test::has_numpy(folder_)) {
       GTEST_SKIP() << "there is no python3-numpy here";
     }
-  }
-  /// What a program in Python prints.
-  std::string said_by(const std::string& program) {
-    const std::string script = folder_.file("script.py");
-    std::ofstream(script) << program;
-    const std::string command = std::string("'") + OBLIQUE_PYTHON + "' '" + script + "' 2>&1";
-    FILE* const pipe = popen(command.c_str(), "r");
-    std::string said;
-    std::array<char, 4096> part;
-    for (std::size_t got = 0; (got = fread(part.data(), 1, part.size(), pipe)) > 0;) {
-      said.append(part.data(), got);
-    }
-    pclose(pipe);
-    return said;
   }
   /// What one prints who has loaded the archive of these chunks as `a`.
   std::string of(const std::vector<protocol::QueryReply>& chunks, const std::string& program) {
     std::ofstream(folder_.file("a.npz"), std::ios::binary) << printed(Format::kNpz, chunks);
-    return said_by("import numpy\nimport zipfile\na = numpy.load('" + folder_.file("a.npz") +
-                   "')\nassert zipfile.ZipFile('" + folder_.file("a.npz") +
-                   "').testzip() is None\n" + program);
+    return oblique::test::said_by_python(folder_,
+                                         "import numpy\nimport zipfile\na = numpy.load('a.npz')\n"
+                                         "assert zipfile.ZipFile('a.npz').testzip() is None\n" +
+                                             program);
   }
 
   oblique::test::TemporaryFolder folder_;

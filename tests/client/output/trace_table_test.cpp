@@ -1,6 +1,5 @@
 #include "client/output/trace_table.h"
 
-#include <sstream>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -32,10 +31,10 @@ solver::TraceRow row_of_two_links() {
 }
 
 TEST(TraceTable, HasAColumnForEveryHeading) {
-  std::ostringstream out;
-  print_trace_header(out, {2, 0});
-  print_trace_row(out, row_of_two_links());
-  EXPECT_EQ(out.str(),
+  std::string out;
+  append_trace_header(out, {2, 0});
+  append_trace_row(out, row_of_two_links());
+  EXPECT_EQ(out,
             "t_s,fn_N,ft_N,uy_m,ux_m,xP_m,vP_m_s,x_m,y_m,vt_m_s,vn_m_s,state,"
             "R0x_N,R0y_N,R1x_N,R1y_N,"
             "kinetic_J,strain_J,gravity_J,momentum_x_Ns,momentum_y_Ns\n"
@@ -43,15 +42,14 @@ TEST(TraceTable, HasAColumnForEveryHeading) {
 }
 
 TEST(TraceTable, HasTwoColumnsForEachNodeOfAShape) {
-  std::ostringstream header;
-  print_trace_header(header, {1, 2});
-  EXPECT_TRUE(header.str().ends_with("momentum_y_Ns,node0x_m,node0y_m,node1x_m,node1y_m\n"))
-      << header.str();
+  std::string header;
+  append_trace_header(header, {1, 2});
+  EXPECT_TRUE(header.ends_with("momentum_y_Ns,node0x_m,node0y_m,node1x_m,node1y_m\n")) << header;
   solver::TraceRow row = row_of_two_links();
   row.nodes_m = {0, 0, 0.5, -0.25};
-  std::ostringstream line;
-  print_trace_row(line, row);
-  EXPECT_TRUE(line.str().ends_with(",18,-19,0,0,0.5,-0.25\n")) << line.str();
+  std::string line;
+  append_trace_row(line, row);
+  EXPECT_TRUE(line.ends_with(",18,-19,0,0,0.5,-0.25\n")) << line;
 }
 
 }  // namespace

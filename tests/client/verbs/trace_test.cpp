@@ -1,12 +1,16 @@
 // Points looked at again, by the program itself: here, by a worker, and when neither can.
 #include <csignal>
 #include <fstream>
+#include <map>
+#include <memory>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "client/study/study_file.h"
 #include "server/store/store.h"
+#include "tests/client/study/pretended_fall.h"
 #include "tests/support/points.h"
 #include "tests/support/programs.h"
 
@@ -17,17 +21,17 @@ using testing::HasSubstr;
 using testing::StartsWith;
 
 /// A study over models, with errors, and one by steps; both coarse, for they are solved here.
-constexpr const char* kStudies[][2] = {{"models", R"(name = "models"
+const std::map<std::string, const char*> kStudies{{"models", R"(name = "models"
 errors = true
 [model]
 elements_per_link = 2
 [[block]]
 E = [6e10, 7e10]
 H = [0.9, 1.0]
-mu = { from = 0.2, to = 2.0, count = 5 }
+mu = [0.2, 2.0]
 e = [0.8, 1.0]
 )"},
-                                       {"steps", R"(name = "steps"
+                                                  {"steps", R"(name = "steps"
 [model]
 integrator = "generalized-alpha"
 elements_per_link = 1
@@ -42,52 +46,71 @@ class TraceVerb : public testing::Test {
   test::Outcome run(const std::vector<std::string>& arguments) {
     return test::run_oblique(folder_, arguments);
   }
-  /// Names of the studies, solved in oblique.db.
-  void solve_studies() {
-    for (const auto& [name, text] : kStudies) {
-      std::ofstream(folder_.path() / (std::string(name) + ".toml")) << text;
-      const auto outcome = run({"run", std::string(name) + ".toml"});
-      ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-    }
+  /// Has that study solved in oblique.db.
+  void solve_study(const std::string& name) {
+    write_file(name);
+    const auto outcome = run({"run", name + ".toml"});
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  }
+  /// Puts that study into oblique.db with no point solved.
+  void store_study(const std::string& name) {
+    write_file(name);
+    const Study study = parse_study(kStudies.at(name), name + ".toml", pretended_reach());
+    const auto table = std::make_shared<const protocol::PointTable>(study.recipe);
+    server::Store store((folder_.path() / "oblique.db").string());
+    store.commit(std::vector<server::Change>{
+        server::AddStudy{1, study.name, table, "2024-01-01T00:00:00.000Z"}});
+  }
+  std::string text_of(const char* name) {
+    std::ifstream file(folder_.path() / name);
+    return {std::istreambuf_iterator<char>(file), {}};
   }
 
   test::TemporaryFolder folder_;
+
+ private:
+  void write_file(const std::string& name) {
+    std::ofstream(folder_.path() / (name + ".toml")) << kStudies.at(name);
+  }
 };
 
 TEST_F(TraceVerb, APointSolvedHereIsTheStoredOneWhateverStudyAndIntegratorItHas) {
-  solve_studies();
-  for (const auto& [study, point] : {std::pair{"models", "0"}, {"models", "39"}, {"steps", "1"}}) {
+  solve_study("models");
+  solve_study("steps");
+  for (const auto& [study, point] : {std::pair{"models", "0"}, {"models", "15"}, {"steps", "1"}}) {
     const auto csv = run({"trace", study, point});
     EXPECT_EQ(csv.exit_code, 0) << csv.err;
     EXPECT_THAT(csv.out, StartsWith("t_s,fn_N,ft_N,"));
     EXPECT_THAT(csv.err, HasSubstr("solved here, same as stored.")) << study << ' ' << point;
   }
-  const auto json = run({"trace", "models", "39", "--shape", "--out", "trace.json"});
+  const auto json = run({"trace", "models", "15", "--shape", "--out", "trace.json"});
   EXPECT_EQ(json.exit_code, 0) << json.err;
   EXPECT_EQ(json.out, "");
   const auto all = nlohmann::json::parse(std::ifstream(folder_.path() / "trace.json"));
-  EXPECT_EQ(all["point"], 39);
+  EXPECT_EQ(all["point"], 15);
   EXPECT_EQ(all["result"]["mu"], 2.0);
   EXPECT_EQ(all["trace"]["t_s"][0], 0.0);
   EXPECT_EQ(all["trace"]["node6y_m"].size(), all["trace"]["state"].size());
 }
 
 TEST_F(TraceVerb, HasTheRowsOfSolve) {
-  solve_studies();
-  const auto trace = run({"trace", "models", "39", "--out", "trace.csv"});
-  EXPECT_EQ(trace.exit_code, 0) << trace.err;
-  const auto solve = run({"solve", "--E", "7e10", "--H", "1", "--mu", "2", "--e", "1",
-                          "--elements-per-link", "2", "--trace", "solve.csv"});
-  EXPECT_EQ(solve.exit_code, 0) << solve.err;
-  const auto text_of = [&](const char* name) {
-    std::ifstream file(folder_.path() / name);
-    return std::string(std::istreambuf_iterator<char>(file), {});
-  };
-  EXPECT_EQ(text_of("trace.csv"), text_of("solve.csv"));
+  store_study("models");
+  for (const std::string ending : {"csv", "npz"}) {
+    const auto trace = run({"trace", "models", "15", "--shape", "--out", "trace." + ending});
+    EXPECT_EQ(trace.exit_code, 0) << trace.err;
+    EXPECT_THAT(trace.err, HasSubstr("not stored yet"));
+    const auto solve =
+        run({"solve", "--E", "7e10", "--H", "1", "--mu", "2", "--e", "1", "--elements-per-link",
+             "2", "--trace-shape", "--trace", "solve." + ending});
+    EXPECT_EQ(solve.exit_code, 0) << solve.err;
+    EXPECT_EQ(text_of(("trace." + ending).c_str()), text_of(("solve." + ending).c_str()));
+  }
+  EXPECT_THAT(text_of("trace.npz"), StartsWith("PK"));
+  EXPECT_EQ(run({"trace", "models", "15", "--shape", "--format", "npz"}).out, text_of("trace.npz"));
 }
 
 TEST_F(TraceVerb, WhatIsNotThereOrCannotBeWrittenIsNamed) {
-  solve_studies();
+  store_study("models");
   const auto says = [&](std::vector<std::string> words, int exit_code, const char* sentence) {
     words.insert(words.begin(), "trace");
     const auto outcome = run(words);
@@ -96,7 +119,7 @@ TEST_F(TraceVerb, WhatIsNotThereOrCannotBeWrittenIsNamed) {
     EXPECT_THAT(outcome.err, HasSubstr(sentence));
   };
   says({"model", "0"}, 1, "no study called \"model\"");
-  says({"models", "40"}, 1, "its points are 0 to 39");
+  says({"models", "16"}, 1, "its points are 0 to 15");
   says({"models", "-1"}, 2, "POINT");
   says({"models", "first"}, 2, "POINT");
   says({"models"}, 2, "POINT");
@@ -137,7 +160,7 @@ TEST_F(TraceVerb, ARowThatIsNotThePointsIsToldWithTheColumnsInWhichItDiffers) {
 }
 
 TEST_F(TraceVerb, AWorkerSolvesForWhoAsksAServer) {
-  solve_studies();
+  solve_study("models");
   const test::Server server(folder_, "oblique.db");
   const auto ask = [&](std::vector<std::string> words) {
     words.insert(words.begin(), "trace");
@@ -159,15 +182,20 @@ TEST_F(TraceVerb, AWorkerSolvesForWhoAsksAServer) {
   EXPECT_EQ(there.exit_code, 0) << there.err;
   EXPECT_THAT(there.err, HasSubstr("solved by worker ann ("));
   EXPECT_THAT(there.err, HasSubstr("same as stored."));
-  std::ifstream file(folder_.path() / "here.csv");
-  EXPECT_EQ(there.out, std::string(std::istreambuf_iterator<char>(file), {}));
+  EXPECT_EQ(there.out, text_of("here.csv"));
+  for (const char* file : {"here.npz", "there.npz"}) {
+    const bool is_here = file == std::string_view("here.npz");
+    ask({"models", "3", "--shape", is_here ? "--here" : "--on-worker", "--out", file});
+  }
+  EXPECT_THAT(text_of("here.npz"), StartsWith("PK"));
+  EXPECT_EQ(text_of("there.npz"), text_of("here.npz"));
   EXPECT_THAT(ask({"model", "3"}).err, HasSubstr("no study called \"model\""));
-  EXPECT_THAT(ask({"models", "40"}).err, HasSubstr("its points are 0 to 39"));
+  EXPECT_THAT(ask({"models", "16"}).err, HasSubstr("its points are 0 to 15"));
 
   // A study that is held back: its points are solved for those who look, and stored later.
   std::ofstream(folder_.path() / "fine.toml") << R"(name = "fine"
 [model]
-elements_per_link = 24
+elements_per_link = 12
 [[block]]
 H = 1.0
 mu = [0.3, 0.5]
