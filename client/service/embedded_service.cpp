@@ -63,36 +63,51 @@ void end_all(const std::vector<ChildProcess*>& children) {
   }
 }
 
-// The line that the server writes once it listens; empty when it closes the pipe without one.
-std::string read_ready_line(const Descriptor& ready, ChildProcess& server,
-                            protocol::StopSignals& stop) {
-  std::string line;
-  const auto deadline = Clock::now() + kReadyWithin;
-  while (line.find('\n') == std::string::npos) {
-    if (stop.requested()) {
-      throw Interrupted("stopped before the server was ready");
+/// The lines that a server writes while it starts.
+class ReadyLines {
+ public:
+  ReadyLines(const Descriptor& ready, ChildProcess& server) : ready_(ready), server_(server) {}
+
+  /// The next one; empty when the server closes the pipe without one. Throws ProcessError when none
+  /// comes in time, and Interrupted when `stop` is requested.
+  std::string next(protocol::StopSignals& stop) {
+    const auto deadline = Clock::now() + kReadyWithin;
+    std::size_t end = 0;
+    while ((end = held_.find('\n')) == std::string::npos) {
+      if (stop.requested()) {
+        throw Interrupted("stopped before the server was ready");
+      }
+      if (!has_told_ && Clock::now() > deadline) {
+        throw ProcessError(with_last_words("the server was not ready in time", server_));
+      }
+      pollfd waited{ready_.number(), POLLIN, 0};
+      constexpr int kSlice_ms = 50;
+      if (poll(&waited, 1, kSlice_ms) > 0 && !read_more()) {
+        return {};
+      }
     }
-    if (Clock::now() > deadline) {
-      throw ProcessError(with_last_words("the server was not ready in time", server));
-    }
-    pollfd waited{ready.number(), POLLIN, 0};
-    constexpr int kSlice_ms = 50;
-    if (poll(&waited, 1, kSlice_ms) <= 0) {
-      continue;
-    }
-    std::array<char, 512> bytes{};
-    const auto got = read(ready.number(), bytes.data(), bytes.size());
-    if (got == 0) {
-      return {};
-    }
-    if (got > 0) {
-      line.append(bytes.data(), static_cast<std::size_t>(got));
-    } else if (errno != EINTR) {
-      return {};
-    }
+    // Who says what it is at may take as long as that takes.
+    has_told_ = true;
+    const std::string line = held_.substr(0, end);
+    held_.erase(0, end + 1);
+    return line;
   }
-  return line;
-}
+
+ private:
+  bool read_more() {
+    std::array<char, 512> bytes{};
+    const auto got = read(ready_.number(), bytes.data(), bytes.size());
+    if (got > 0) {
+      held_.append(bytes.data(), static_cast<std::size_t>(got));
+    }
+    return got > 0 || (got < 0 && errno == EINTR);
+  }
+
+  const Descriptor& ready_;
+  ChildProcess& server_;
+  std::string held_;
+  bool has_told_ = false;
+};
 
 /// Threads of each worker, so that all together use the cores of this machine.
 unsigned threads_each(int workers) {
@@ -107,7 +122,7 @@ EmbeddedService::EmbeddedService(const ServiceSettings& settings, protocol::Stop
   server_ = std::make_unique<ChildProcess>(server_settings(settings, keys_, ready.write.number()));
   // Only the server holds it now, so its end shows on ours.
   ready.write.close();
-  wait_until_ready(ready.read, stop);
+  wait_until_ready(ready.read, settings, stop);
   for (int i = 0; i < settings.workers; ++i) {
     workers_.push_back(std::make_unique<ChildProcess>(
         ChildSettings{.program = worker_program,
@@ -123,9 +138,14 @@ EmbeddedService::~EmbeddedService() {
   stop();
 }
 
-void EmbeddedService::wait_until_ready(const Descriptor& ready, protocol::StopSignals& stop) {
-  const auto line = read_ready_line(ready, *server_, stop);
-  const auto urls = nlohmann::json::parse(line, nullptr, false);
+void EmbeddedService::wait_until_ready(const Descriptor& ready, const ServiceSettings& settings,
+                                       protocol::StopSignals& stop) {
+  ReadyLines lines(ready, *server_);
+  auto urls = nlohmann::json::parse(lines.next(stop), nullptr, false);
+  while (urls.is_object() && urls.contains("notice") && urls["notice"].is_string()) {
+    settings.on_long_start(urls["notice"]);
+    urls = nlohmann::json::parse(lines.next(stop), nullptr, false);
+  }
   if (urls.is_object() && urls.contains("client") && urls.contains("worker") &&
       urls["client"].is_string() && urls["worker"].is_string()) {
     client_url_ = urls["client"];

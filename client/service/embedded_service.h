@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <set>
 #include <string>
@@ -18,6 +19,8 @@ struct ServiceSettings {
   int workers = 1;                  ///< processes, which share the cores
   bool allow_network_disk = false;  ///< the database may lie on a network file system
   bool verbose = false;             ///< what server and workers say goes to our standard error
+  /// Told what the server is at while its start takes long.
+  std::function<void(const std::string&)> on_long_start = [](const std::string&) {};
 };
 
 /// Starts `oblique-server` on loopback, at ports that the system picks, and workers that ask it
@@ -50,7 +53,8 @@ class EmbeddedService {
   void stop();
 
  private:
-  void wait_until_ready(const Descriptor& ready, protocol::StopSignals& stop);
+  void wait_until_ready(const Descriptor& ready, const ServiceSettings& settings,
+                        protocol::StopSignals& stop);
 
   KeysForARun keys_;
   std::unique_ptr<ChildProcess> server_;

@@ -51,7 +51,10 @@ class Loop::Parts final : public Outbox {
         on_turn_(settings.on_turn),
         doors_(settings.doors),
         store_(path_on_own_disk(settings.database, settings.allow_network_disk),
-               [](const std::string& sentence) { spdlog::info("{}", sentence); }),
+               [tell = settings.on_long_start](const std::string& sentence) {
+                 spdlog::info("{}", sentence);
+                 tell(sentence);
+               }),
         writer_(store_, [this](std::vector<WriteReport> r) { written_.put(std::move(r)); }),
         queries_(settings.database, settings.queries,
                  [this](QueryReport r) { queried_.put(std::array{std::move(r)}); }),

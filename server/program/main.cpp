@@ -78,16 +78,21 @@ std::string objection_to_descriptor(const std::string& text) {
              : "\"" + text + "\" is no open file descriptor";
 }
 
+/// Writes one line of JSON to the descriptor of --ready-fd.
+void tell_line(int fd, const nlohmann::json& told) {
+  const std::string line = told.dump(-1, ' ', true) + "\n";
+  if (::write(fd, line.data(), line.size()) != static_cast<ssize_t>(line.size())) {
+    throw std::runtime_error("cannot write to the file descriptor of --ready-fd: " +
+                             std::string(std::strerror(errno)));
+  }
+}
+
 void tell_ready(int fd, const Loop& loop) {
   nlohmann::json ends{{"client", loop.client_endpoint()}, {"worker", loop.worker_endpoint()}};
   if (!loop.http_url().empty()) {
     ends["http"] = loop.http_url();
   }
-  const std::string line = ends.dump() + "\n";
-  if (::write(fd, line.data(), line.size()) != static_cast<ssize_t>(line.size())) {
-    throw std::runtime_error("cannot write to the file descriptor of --ready-fd: " +
-                             std::string(std::strerror(errno)));
-  }
+  tell_line(fd, ends);
   ::close(fd);
 }
 
@@ -120,6 +125,11 @@ int run(LoopSettings settings, int ready_fd, const StopWithParent& parent) {
   settings.on_turn = [&notifier, drain = settings.drain](const LoopTurn& turn) {
     tell_turn(notifier, turn, drain);
   };
+  if (ready_fd >= 0) {
+    settings.on_long_start = [ready_fd](const std::string& sentence) {
+      tell_line(ready_fd, {{"notice", sentence}});
+    };
+  }
   Loop loop(settings);
   spdlog::info("database {}, clients at {}, workers at {}, metrics at {}", settings.database,
                loop.client_endpoint(), loop.worker_endpoint(),
@@ -156,7 +166,8 @@ void add_options(CLI::App& app, Configuration& configuration, StopWithParent& pa
       ->check(port);
   auto* ready = app.add_option("--ready-fd", options.ready_fd,
                                "File descriptor that gets one line of JSON with both endpoints "
-                               "once the server can be used; -1: none")
+                               "once the server can be used, and before it a line with a notice "
+                               "for each step of a start that takes long; -1: none")
                     ->check(objection_to_descriptor);
   options.http.add_to(app);
   constexpr double kLongestDrain_s = 1e6;

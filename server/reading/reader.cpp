@@ -41,6 +41,14 @@ Fit copy_row(sqlite3* database, sqlite3_stmt* statement, std::uint64_t most_byte
   return Fit::kYes;
 }
 
+/// The solver of a study's results, which are all of one unless it mixes them.
+constexpr const char* kVersionOfRows =
+    "SELECT w.solver_version FROM packed_results AS r CROSS JOIN workers AS w"
+    " ON w.worker_id = r.worker WHERE r.study_id = s.study_id ORDER BY r.point LIMIT 1";
+constexpr const char* kVersionOfOlderRows =
+    "SELECT r.solver_version FROM results AS r WHERE r.study_id = s.study_id"
+    " ORDER BY r.point LIMIT 1";
+
 /// What the study took over from others.
 void add_taken(sqlite3* database, protocol::StudyStatus& status) {
   constexpr int kMostNamed = 20;
@@ -154,6 +162,7 @@ std::string Reader::nearest_study(const std::string& name) {
 std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name) {
   Statement schema(database_.get(), "PRAGMA user_version");
   constexpr int kFirstWithShares = 2;
+  constexpr int kFirstThatMixes = 3;
   constexpr int kFirstWithSubmitters = 6;
   const std::int64_t version = schema.step() ? schema.integer(0) : 0;
   constexpr int kFirstPacked = 8;
@@ -174,6 +183,9 @@ std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name)
       "SELECT s.study_id, s.name, s.state, s.points, s.created_at," + counts +
           std::string(version >= kFirstWithShares ? ", s.priority, s.weight" : ", 0, 1.0") +
           (version >= kFirstWithSubmitters ? ", coalesce(s.submitted_by, '')" : ", ''") +
+          (version >= kFirstThatMixes ? ", s.mixes_versions" : ", 0") + ", coalesce((" +
+          (version >= kFirstPacked ? kVersionOfRows : kVersionOfOlderRows) +
+          "), '')"
           " FROM studies AS s WHERE ?1 = '' OR s.name = ?1 ORDER BY s.study_id");
   list.bind(1, name);
   std::vector<protocol::StudyStatus> found;
@@ -191,6 +203,8 @@ std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name)
     status.set_priority(static_cast<std::int32_t>(list.integer(7)));
     status.set_weight(list.real(8));
     status.set_submitted_by(list.text(9));
+    status.set_mixes_versions(list.integer(10) != 0);
+    status.set_solver_version(list.text(11));
     if (version >= kFirstPacked) {
       add_taken(database_.get(), status);
     }

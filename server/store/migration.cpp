@@ -54,8 +54,8 @@ void say_what_begins(sqlite3* database, int found, std::uint64_t rows, const Not
   const double size_MB = megabytes(database);
   tell(notice,
        fmt::format(
-           "the database is brought from schema {} to {}, with about {} results: some {:.0f} "
-           "s, and up to {:.0f} MB more on its disk meanwhile. Whoever ends it before loses "
+           "the database is brought from schema {} to {}, once, with about {} results: some "
+           "{:.0f} s, and up to {:.0f} MB more on its disk meanwhile. Whoever ends it before loses "
            "nothing, and the next start begins again",
            found, kSchemaVersion, rows,
            std::max(1.0, 2.0 * static_cast<double>(rows) / kRowsPerSecond), size_MB));
