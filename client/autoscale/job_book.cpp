@@ -5,7 +5,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "worker/solver/model/number.h"
+#include "client/output/human_units.h"
 
 namespace oblique::client {
 bool JobBook::stays(const Job& job) {
@@ -83,8 +83,8 @@ std::vector<std::string> JobBook::judge(double now_s) {
     if (job.absent_since_s && now_s - *job.absent_since_s >= forget_after_s_) {
       sentences.push_back(
           fmt::format("job {} vanished: it is not listed any more, and nothing was heard of a "
-                      "worker of it for {} s; it is forgotten",
-                      id, solver::readable_number(now_s - *job.absent_since_s, 3)));
+                      "worker of it for {}; it is forgotten",
+                      id, shown_duration(now_s - *job.absent_since_s)));
       entry = jobs_.erase(entry);
       continue;
     }
@@ -92,8 +92,8 @@ std::vector<std::string> JobBook::judge(double now_s) {
         now_s - job.running_since_s >= forget_after_s_) {
       job.was_named = true;
       sentences.push_back(fmt::format(
-          "job {} has run for {} s, and the server has heard of no worker of it: see what it wrote",
-          id, solver::readable_number(now_s - job.running_since_s, 3)));
+          "job {} has run for {}, and the server has heard of no worker of it: see what it wrote",
+          id, shown_duration(now_s - job.running_since_s)));
     }
     ++entry;
   }

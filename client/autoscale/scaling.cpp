@@ -7,7 +7,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/autoscale/need.h"
-#include "worker/solver/model/number.h"
+#include "client/output/human_units.h"
 
 namespace oblique::client {
 namespace {
@@ -110,9 +110,8 @@ void Scaling::end_those_that_stay(double now_s, Decision& decision) {
   for (const auto& id : decision.end) {
     book_.note_retired(id, now_s);
     decision.sentences.push_back(
-        fmt::format("job {} was asked to leave {} s ago and is there still: "
-                    "it is ended",
-                    id, solver::readable_number(settings_.patience_s)));
+        fmt::format("job {} was asked to leave {} ago and is there still: it is ended", id,
+                    shown_duration(settings_.patience_s)));
   }
 }
 
@@ -134,11 +133,11 @@ void Scaling::note_submission_failed(double now_s) {
 
 std::string Scaling::why(const Demand& demand, std::size_t wanted) const {
   const auto rate = rate_.points_per_s_a_thread();
-  const std::string speed = rate ? fmt::format("{} points/s a thread, {} threads",
-                                               solver::readable_number(*rate, 3), demand.threads)
-                                 : fmt::format("no rate measured yet, {} threads", demand.threads);
-  return fmt::format("{} points are open ({}): {} wanted, {} there", demand.open_points, speed,
-                     counted(wanted), book_.count());
+  const std::string speed =
+      rate ? fmt::format("{} points/s a thread, {} threads", shown_rate(*rate), demand.threads)
+           : fmt::format("no rate measured yet, {} threads", demand.threads);
+  return fmt::format("{} points are open ({}): {} wanted, {} there",
+                     shown_count(demand.open_points), speed, counted(wanted), book_.count());
 }
 
 }  // namespace oblique::client

@@ -1,5 +1,8 @@
 #include "client/output/printer.h"
 
+#include <algorithm>
+#include <cstddef>
+
 #include "client/formats/cell_text.h"
 #include "client/formats/row_output.h"
 #include "client/formats/sink.h"
@@ -26,6 +29,24 @@ void print_out(const protocol::QueryReply& rows, Format format) {
   RowOutput out({.format = format, .may_page = false, .may_leave_out = false});
   out.print(protocol::as_chunk(rows));
   out.finish();
+}
+
+void align_right(protocol::QueryReply& rows, const std::vector<std::string>& columns) {
+  for (int column = 0; column < rows.columns_size(); ++column) {
+    if (std::find(columns.begin(), columns.end(), rows.columns(column)) == columns.end()) {
+      continue;
+    }
+    std::size_t width = rows.columns(column).size();
+    for (const auto& row : rows.rows()) {
+      width = std::max(width, row.values(column).text().size());
+    }
+    for (auto& row : *rows.mutable_rows()) {
+      std::string& text = *row.mutable_values(column)->mutable_text();
+      text.insert(0, width - text.size(), ' ');
+    }
+    std::string& heading = *rows.mutable_columns(column);
+    heading.insert(0, width - heading.size(), ' ');
+  }
 }
 
 void add_value(protocol::Row& row, const std::string& text) {

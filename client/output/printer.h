@@ -4,6 +4,7 @@
 #include <ostream>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "client/formats/row_printer.h"
 #include "proto/oblique.pb.h"
@@ -20,6 +21,10 @@ void print_out(const protocol::QueryReply& rows, Format format);
 
 /// One field of CSV, in quotes where it needs them.
 std::string csv_field(std::string_view text);
+
+/// Pads headings and texts of these columns from the left to one width: numbers that are texts
+/// already.
+void align_right(protocol::QueryReply& rows, const std::vector<std::string>& columns);
 
 /// Appends one value to a row of an answer.
 void add_value(protocol::Row& row, const std::string& text);

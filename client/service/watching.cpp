@@ -6,6 +6,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/output/human_units.h"
 #include "client/output/printer.h"
 #include "client/output/progress.h"
 #include "client/output/speech.h"
@@ -37,7 +38,8 @@ void tell_failures(const protocol::StudyStatus& status,
       "GROUP BY error ORDER BY count(*) DESC LIMIT 10",
       server::sql_text(status.name())));
   for (const auto& row : reasons.rows()) {
-    tell_line(fmt::format("  {} x {} (first at point {})", row.values(1).integer(),
+    tell_line(fmt::format("  {} x {} (first at point {})",
+                          shown_count(static_cast<std::uint64_t>(row.values(1).integer())),
                           row.values(0).text(), row.values(2).integer()));
   }
 }
@@ -130,17 +132,17 @@ std::string taken_over(const protocol::TakenOver& taken) {
   if (taken.points() == 0 && !taken.under_way() && !taken.cut_short()) {
     return {};
   }
-  std::string text = fmt::format("{} {} taken over{}", taken.points(),
+  std::string text = fmt::format("{} {} taken over{}", shown_count(taken.points()),
                                  taken.points() == 1 ? "point is" : "points are",
                                  taken.under_way() ? " so far" : "");
   std::uint64_t named = 0;
   for (int i = 0; i < taken.from_size(); ++i) {
     named += taken.from(i).points();
-    text += fmt::format("{} {} of {}", i == 0 ? ":" : ",", taken.from(i).points(),
+    text += fmt::format("{} {} of {}", i == 0 ? ":" : ",", shown_count(taken.from(i).points()),
                         protocol::visible(taken.from(i).study()));
   }
   if (named < taken.points()) {
-    text += fmt::format(", {} of others", taken.points() - named);
+    text += fmt::format(", {} of others", shown_count(taken.points() - named));
   }
   if (taken.cut_short()) {
     text += "; to look for more would have taken too long";

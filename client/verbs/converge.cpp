@@ -12,6 +12,7 @@
 #include "client/convergence/levels.h"
 #include "client/convergence/mesh_study.h"
 #include "client/convergence/step_study.h"
+#include "client/output/human_units.h"
 #include "client/output/printer.h"
 #include "client/output/work_line.h"
 #include "client/study/point_flags.h"
@@ -69,8 +70,7 @@ void tell_levels(const char* what, const std::vector<Level>& levels) {
 std::vector<SolvedLevel> solved(const std::vector<Level>& levels,
                                 const std::vector<ContactPoint>& points, WorkLine& line) {
   return solve_levels(levels, points, line, [&line](const SolvedLevel& level) {
-    line.tell(
-        fmt::format("{} solved in {} s", level.level.name, solver::fixed_number(level.wall_s, 1)));
+    line.tell(fmt::format("{} solved in {}", level.level.name, shown_duration(level.wall_s)));
   });
 }
 

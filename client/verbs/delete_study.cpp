@@ -7,6 +7,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/output/human_units.h"
 #include "client/output/progress.h"
 #include "client/service/source_flags.h"
 #include "client/service/watching.h"
@@ -38,7 +39,8 @@ struct DeleteFlags {
 bool is_confirmed(const protocol::StudyStatus& study, const std::string& place) {
   std::cerr << fmt::format("Delete {}, {}, {} points of which {} have results, from {}? [y/N] ",
                            protocol::visible(study.name()), protocol::visible(study.state()),
-                           study.points(), study.solved() + study.failed(), place);
+                           shown_count(study.points()),
+                           shown_count(study.solved() + study.failed()), place);
   std::string answer;
   std::getline(std::cin, answer);
   return answer == "y" || answer == "Y" || answer == "yes";
@@ -93,8 +95,8 @@ int delete_study(const DeleteFlags& flags) {
     delete_from(database, study);
   }
   std::cout << fmt::format("{} is deleted: {} points, {} results\n",
-                           protocol::visible(study.name()), study.points(),
-                           study.solved() + study.failed());
+                           protocol::visible(study.name()), shown_count(study.points()),
+                           shown_count(study.solved() + study.failed()));
   return kDone;
 }
 

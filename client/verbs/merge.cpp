@@ -10,6 +10,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/output/human_units.h"
 #include "client/output/progress.h"
 #include "client/service/source.h"
 #include "client/verbs/verbs.h"
@@ -73,20 +74,22 @@ std::vector<std::string> judged_sources(const MergeFlags& flags) {
 void tell(const std::string& source, const std::string& target, const server::Merged& merged) {
   std::cerr << fmt::format(
       "{}: {} studies new in {} and {} united with those there; {} results added", source,
-      merged.studies_added, target, merged.studies_united, merged.results_added);
+      shown_count(merged.studies_added), target, shown_count(merged.studies_united),
+      shown_count(merged.results_added));
   if (merged.studies_grown > 0) {
-    std::cerr << fmt::format("; studies that grew: {}", merged.studies_grown);
+    std::cerr << fmt::format("; studies that grew: {}", shown_count(merged.studies_grown));
   }
   if (merged.failures_replaced > 0) {
-    std::cerr << fmt::format(", {} of them for points that had failed", merged.failures_replaced);
+    std::cerr << fmt::format(", {} of them for points that had failed",
+                             shown_count(merged.failures_replaced));
   }
   if (merged.results_known > 0) {
-    std::cerr << fmt::format("; {} were there already", merged.results_known);
+    std::cerr << fmt::format("; {} were there already", shown_count(merged.results_known));
   }
   if (merged.results_differing > 0) {
     std::cerr << fmt::format(
         ", {} of these with other numbers or of another solver version: those of {} stay",
-        merged.results_differing, target);
+        shown_count(merged.results_differing), target);
   }
   std::cerr << ".\n";
   for (const std::string& remark : merged.remarks) {

@@ -8,6 +8,7 @@
 
 #include "client/formats/row_output.h"
 #include "client/output/columns.h"
+#include "client/output/human_units.h"
 #include "proto/program/exit_code.h"
 #include "proto/text.h"
 #include "proto/wire/chunk_rows.h"
@@ -79,7 +80,9 @@ std::string shell_word(const std::string& text) {
 void print_first(const protocol::QueryReply& rows, std::uint64_t points) {
   print_out(in_shown_units(rows), Format::kTable);
   if (static_cast<std::uint64_t>(rows.rows_size()) < points) {
-    std::cerr << fmt::format("The first {} of {} points are shown.\n", rows.rows_size(), points);
+    std::cerr << fmt::format("The first {} of {} points are shown.\n",
+                             shown_count(static_cast<std::uint64_t>(rows.rows_size())),
+                             shown_count(points));
   }
 }
 

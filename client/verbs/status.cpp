@@ -98,6 +98,7 @@ protocol::QueryReply table_for_people(const std::vector<protocol::StudyStatus>& 
       add_value(row, version_of(study));
     }
   }
+  align_right(table, {"points", "done", "failed", "points/s"});
   return table;
 }
 

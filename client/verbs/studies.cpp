@@ -2,6 +2,7 @@
 #include <memory>
 #include <string>
 
+#include "client/output/human_units.h"
 #include "client/output/printer.h"
 #include "client/service/source_flags.h"
 #include "client/verbs/printed_rows.h"
@@ -30,9 +31,17 @@ int studies(const StudiesFlags& flags) {
     auto& row = *table.add_rows();
     add_value(row, study.name());
     add_value(row, study.state());
-    add_value(row, static_cast<std::int64_t>(study.points()));
-    add_value(row, static_cast<std::int64_t>(study.solved() + study.failed()));
+    for (const auto count : {study.points(), study.solved() + study.failed()}) {
+      if (is_for_people(format)) {
+        add_value(row, shown_count(count));
+      } else {
+        add_value(row, static_cast<std::int64_t>(count));
+      }
+    }
     add_value(row, study.created_at());
+  }
+  if (is_for_people(format)) {
+    align_right(table, {"points", "done"});
   }
   print_out(table, format);
   return kDone;

@@ -161,16 +161,16 @@ std::string shown(const ShownPoint& point) {
 }
 
 std::string counted(std::uint64_t count, std::string_view one, std::string_view many) {
-  return fmt::format("{} {}", count, count == 1 ? one : many);
+  return fmt::format("{} {}", shown_count(count), count == 1 ? one : many);
 }
 
 void print(const Report& report, bool wants_errors) {
   std::cout << "study   " << report.name << (wants_errors ? ", with estimated errors" : "") << '\n';
-  std::cout << "points  " << report.points;
+  std::cout << "points  " << shown_count(report.points);
   if (report.points != report.numbers) {
-    std::cout << " of " << report.numbers << ", left in by where";
+    std::cout << " of " << shown_count(report.numbers) << ", left in by where";
   }
-  std::cout << "\nmodels  " << report.models << ", with "
+  std::cout << "\nmodels  " << shown_count(report.models) << ", with "
             << (report.falls ? counted(*report.falls, "fall", "different falls")
                              : "a fall each at most")
             << '\n';

@@ -6,6 +6,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/output/human_units.h"
 #include "client/output/mesh_note.h"
 #include "client/service/connection.h"
 #include "client/service/result_query.h"
@@ -46,9 +47,10 @@ void tell_submitted(const Study& study, const protocol::SubmitReply& reply,
                     const StudyTerms& terms) {
   std::string known;
   if (!reply.created()) {
-    known = reply.appended() > 0 ? fmt::format("; {} points are appended to it, which was {}",
-                                               reply.appended(), protocol::visible(reply.was()))
-                                 : "; the server had it already";
+    known = reply.appended() > 0
+                ? fmt::format("; {} points are appended to it, which was {}",
+                              shown_count(reply.appended()), protocol::visible(reply.was()))
+                : "; the server had it already";
     if (terms.priority) {
       known += fmt::format("; its priority is now {}", *terms.priority);
     }
@@ -59,8 +61,9 @@ void tell_submitted(const Study& study, const protocol::SubmitReply& reply,
   if (const std::string taken = taken_over(reply.taken()); !taken.empty()) {
     known += "; " + taken;
   }
-  std::cout << study.name << ": " << reply.points() << " points, " << reply.settled() << " done"
-            << known << std::endl;
+  std::cout << fmt::format("{}: {} points, {} done{}", study.name, shown_count(reply.points()),
+                           shown_count(reply.settled()), known)
+            << std::endl;
 }
 
 /// The command that asks this server for more of a study.

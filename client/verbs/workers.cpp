@@ -13,7 +13,6 @@
 #include "client/verbs/printed_rows.h"
 #include "client/verbs/verbs.h"
 #include "proto/text.h"
-#include "worker/solver/model/number.h"
 
 namespace oblique::client {
 namespace {
@@ -32,7 +31,7 @@ struct WorkersFlags {
 
 /// "1 study", "2 studies".
 std::string counted(std::uint64_t count, const char* one, const char* several) {
-  return fmt::format("{} {}", count, count == 1 ? one : several);
+  return fmt::format("{} {}", shown_count(count), count == 1 ? one : several);
 }
 
 /// What the holder of a key has, of that only what is not nothing; empty where all is nothing.
@@ -133,7 +132,7 @@ protocol::QueryReply table_for_people(const protocol::WorkersReply& reply) {
   constexpr std::size_t kKeyBytes = 9;
   protocol::QueryReply table;
   for (const char* column :
-       {"worker", "host", "name", "threads", "cpu", "version", "points/s", "silent_s", "state"}) {
+       {"worker", "host", "name", "threads", "cpu", "version", "points/s", "silent", "state"}) {
     table.add_columns(column);
   }
   if (has_keys) {
@@ -151,7 +150,7 @@ protocol::QueryReply table_for_people(const protocol::WorkersReply& reply) {
     add_value(row, worker.instruction_set());
     add_value(row, worker.solver_version());
     add_value(row, shown_rate(worker.points_per_s()));
-    add_value(row, solver::fixed_number(worker.silent_ms() / kMillisecondsASecond, 1));
+    add_value(row, shown_duration(worker.silent_ms() / kMillisecondsASecond));
     add_value(row, state_of(worker));
     if (has_keys) {
       add_value(row, protocol::shortened(worker.key(), kKeyBytes));

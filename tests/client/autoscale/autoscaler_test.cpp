@@ -96,13 +96,13 @@ class AutoscalerTest : public ::testing::Test {
 TEST_F(AutoscalerTest, SubmitsAndSaysWhy) {
   EXPECT_TRUE(look(0.0));
   EXPECT_EQ(engine_.jobs_.size(), 1U);
-  EXPECT_THAT(told_, ElementsAre(HasSubstr("1000 points are open"), "submitted: job 1"));
+  EXPECT_THAT(told_, ElementsAre(HasSubstr("1,000 points are open"), "submitted: job 1"));
 }
 
 TEST_F(AutoscalerTest, ADryRunOnlySaysWhatItWouldDo) {
   EXPECT_TRUE(look(0.0, true));
   EXPECT_TRUE(engine_.jobs_.empty());
-  EXPECT_THAT(told_, ElementsAre(HasSubstr("1000 points are open"),
+  EXPECT_THAT(told_, ElementsAre(HasSubstr("1,000 points are open"),
                                  "would submit a job with: sbatch workers"));
 }
 
@@ -127,7 +127,7 @@ TEST_F(AutoscalerTest, AnEngineThatIsAwayIsNamedOnceAndAskedAgain) {
   engine_.away_ = false;
   EXPECT_TRUE(look(200.0));
   EXPECT_THAT(told_, ElementsAre("the list of jobs is there again",
-                                 HasSubstr("1000 points are open"), "submitted: job 1"));
+                                 HasSubstr("1,000 points are open"), "submitted: job 1"));
 }
 
 TEST_F(AutoscalerTest, ARefusedSubmissionIsToldOnceAndTriedAgainLater) {

@@ -59,7 +59,7 @@ TEST(StudyCheck, OfAThousandMillionPointsCostsNoMoreThanOfAFew) {
       test::run_oblique({"study", "check", "--no-rate", "--sample", "sobol:1000000000:1", "--H",
                          "0.3:1.1", "--mu", "normal(0.4,0.05,0,)", "--e", "0.9"});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_THAT(outcome.out, HasSubstr("points  1000000000\n"));
+  EXPECT_THAT(outcome.out, HasSubstr("points  1,000,000,000\n"));
   EXPECT_THAT(outcome.out, HasSubstr("sobol sample of H, mu, e"));
   EXPECT_THAT(outcome.out, HasSubstr("size    about 450 GB"));
 }
