@@ -1,11 +1,11 @@
 #pragma once
 
-#include <compare>
 #include <cstddef>
 #include <cstdint>
 #include <list>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "proto/oblique.pb.h"
@@ -20,7 +20,10 @@ struct TraceKey {
   std::uint64_t point = 0;
   bool shape = false;  ///< with the positions of the nodes
 
-  auto operator<=>(const TraceKey&) const = default;
+  bool operator==(const TraceKey&) const = default;
+  bool operator<(const TraceKey& other) const {
+    return std::tie(study, point, shape) < std::tie(other.study, other.point, other.shape);
+  }
 };
 
 /// A trace as it comes in from a worker. What comes is taken for hostile.

@@ -59,7 +59,8 @@ std::vector<std::pair<std::uint64_t, std::uint64_t>> shared_values(const protoco
   const std::uint64_t size_of_first = protocol::axis_size(first);
   const std::uint64_t size_of_second = protocol::axis_size(second);
   std::vector<std::pair<std::uint64_t, std::uint64_t>> shared;
-  if (!work.spend(static_cast<std::uint64_t>(first.values_size() + second.values_size()))) {
+  if (!work.spend(static_cast<std::uint64_t>(first.values_size()) +
+                  static_cast<std::uint64_t>(second.values_size()))) {
     return shared;
   }
   const bool looks_in_second = size_of_first <= size_of_second;
