@@ -12,6 +12,8 @@ constexpr std::int64_t kFewPages = 16;
 /// To give a page back takes as long as to delete about so many rows, for it is moved with what
 /// names it.
 constexpr std::size_t kRowsAPage = 128;
+/// So many rows are looked at while one is deleted.
+constexpr std::size_t kLooksARow = 16;
 
 std::int64_t number_of(sqlite3* database, const char* sql) {
   Statement statement(database, sql);
@@ -54,6 +56,10 @@ void Clearing::remove(std::uint64_t study_id) {
   run_for(database_, "INSERT OR IGNORE INTO deletions (study_id) VALUES (?)", study_id);
   run_for(database_, "DELETE FROM retries WHERE study_id = ?", study_id);
   run_for(database_, "DELETE FROM taken_points WHERE study_id = ?", study_id);
+  run_for(database_,
+          "UPDATE origins SET name = name || ' (deleted)' WHERE origin_id = ?1"
+          " AND EXISTS (SELECT 1 FROM studies WHERE study_id = ?1)",
+          study_id);
   run_for(database_, "DELETE FROM studies WHERE study_id = ?", study_id);
   removed_now_.insert(study_id);
   deleted_.insert(study_id);
@@ -83,13 +89,16 @@ bool Clearing::step(std::size_t most) {
       delete_rows(most);
       return false;
     case Phase::kUses:
-      look_for_uses(most);
+      look_for_uses(kLooksARow * most);
       return false;
     case Phase::kReferences:
       return delete_references(most);
     case Phase::kEntries:
       if (!keeps_entries_) {
         execute(database_, "DELETE FROM deletions");
+        execute(database_,
+                "DELETE FROM origins WHERE origin_id NOT IN (SELECT study_id FROM studies)"
+                " AND origin_id NOT IN (SELECT origin_id FROM taken_points)");
       }
       phase_ = Phase::kGivesBack;
       return false;

@@ -36,7 +36,8 @@ class Clearing {
   bool is_idle() const { return phase_ == Phase::kIdle; }
   /// The next step needs no transaction.
   bool gives_back() const { return phase_ == Phase::kGivesBack; }
-  /// Takes one step: at most so many rows are deleted or looked at, or what takes as long. In a
+  /// Takes one step: at most so many rows are deleted, or what takes about as long: more are looked
+  /// at, or fewer pages given back. In a
   /// transaction of the caller, who calls `failed` when it is rolled back. True when models were
   /// deleted. Throws StorageError.
   bool step(std::size_t most);

@@ -27,7 +27,7 @@ constexpr std::chrono::milliseconds kTendPause{1000};
 constexpr std::chrono::milliseconds kShortStep{1};
 constexpr std::chrono::milliseconds kLongStep{3};
 constexpr std::size_t kFewestRows = 16;
-constexpr std::size_t kMostRows = 4096;
+constexpr std::size_t kMostRows = 512;  // some ms, whatever kind of step comes next
 constexpr std::chrono::milliseconds kClearPause{1000};
 
 /// So often a log that readers hold is tried before that is said.

@@ -1,5 +1,6 @@
 #include "server/store/writer.h"
 
+#include <algorithm>
 #include <condition_variable>
 #include <map>
 #include <mutex>
@@ -38,8 +39,9 @@ class FailingStorage final : public Storage {
   }
 
   /// As many steps as `leave` said.
-  ClearedAway clear_away(std::size_t /*most*/) override {
+  ClearedAway clear_away(std::size_t most) override {
     const std::lock_guard lock(mutex_);
+    most_in_a_step_ = std::max(most_in_a_step_, most);
     if (full_) {
       throw StorageError("the disk is full");
     }
@@ -48,6 +50,10 @@ class FailingStorage final : public Storage {
     }
     --left_;
     return ClearedAway::kPart;
+  }
+  std::size_t most_in_a_step() {
+    const std::lock_guard lock(mutex_);
+    return most_in_a_step_;
   }
   void leave(int steps) {
     const std::lock_guard lock(mutex_);
@@ -83,6 +89,7 @@ class FailingStorage final : public Storage {
   bool out_of_memory_ = false;
   int attempts_ = 0;
   int left_ = 0;
+  std::size_t most_in_a_step_ = 0;
   std::vector<std::uint64_t> committed_;
 };
 
@@ -329,6 +336,18 @@ TEST_F(WriterTest, WhatDeletedStudiesLeftIsClearedAwayBetweenWritesAndWithoutAny
     EXPECT_EQ(reports_.wait_for_ticket(ticket), Kind::kStored) << "written meanwhile";
   }
   EXPECT_EQ(writer_.finish(), 0U);
+}
+
+TEST_F(WriterTest, StepsOfClearingAwayThatWereQuickDoNotMakeTheNextOneLong) {
+  storage_.leave(500);  // which take no time
+  writer_.clear_leavings();
+  while (storage_.left() > 0) {
+    std::this_thread::yield();
+  }
+  EXPECT_EQ(writer_.finish(), 0U);
+  EXPECT_GT(storage_.most_in_a_step(), 16U);
+  EXPECT_LE(storage_.most_in_a_step(), 512U)
+      << "rows: a step of another kind takes longer for each";
 }
 
 TEST_F(WriterTest, WhatAnEarlierProcessLeftIsClearedAwayWhenItIsTold) {
