@@ -31,7 +31,9 @@ constexpr std::array<Described, 12> kRowColumns{{
     {"instruction_set", "vector instructions that it used"},
     {"attempt", "number of the lease under which it was solved"},
     {"solved_at", "when the result arrived (UTC)"},
-    {"taken_from", "the point that has the same inputs and whose result this is, as STUDY/POINT"},
+    {"taken_from",
+     "the point that has the same inputs and whose result this is, as STUDY/POINT; the name is the "
+     "study's present one, with (deleted) the last that it had"},
 }};
 
 /// What the view `runs` has of a list of `solve --json`, as an expression for SQL. The numbers stay

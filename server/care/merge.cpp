@@ -21,7 +21,8 @@ namespace {
 void bound_what_is_read(sqlite3* source) {
   sqlite3_limit(source, SQLITE_LIMIT_LENGTH, static_cast<int>(2 * protocol::kMaxFrameBytes));
   const std::string tables = fmt::format(
-      "COLLATE NOCASE IN ('about', 'studies', 'models', 'workers', 'texts', '{}', 'retries',"
+      "COLLATE NOCASE IN ('about', 'studies', 'models', 'workers', 'texts', '{}', 'retries', "
+      "'origins',"
       " 'deletions')",
       results_table(schema_of(source)));
   Statement list(source,

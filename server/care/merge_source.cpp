@@ -4,6 +4,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "server/care/merged_origins.h"
 #include "server/care/merged_references.h"
 #include "server/care/table_columns.h"
 #include "server/store/rows/old_rows.h"
@@ -42,8 +43,9 @@ class References {
 
 class PackedSource final : public MergeSource {
  public:
-  PackedSource(sqlite3* source, sqlite3* target)
+  PackedSource(sqlite3* source, sqlite3* target, const StudyPlaces& places)
       : references_(source, target),
+        origins_(source, target, places),
         target_texts_(target),
         texts_(source, target_texts_),
         read_(
@@ -67,7 +69,12 @@ class PackedSource final : public MergeSource {
     return true;
   }
 
-  void take_references() override { references_.map(row_); }
+  void take_references() override {
+    references_.map(row_);
+    if (PackedValue& origin = row_.at(taken_from_); origin.type != PackedValue::Type::kNull) {
+      origin.text = origins_.in_target(origin.text);
+    }
+  }
   void take_texts() override {
     for (const int column : text_columns_) {
       if (PackedValue& text = row_.at(column); text.type != PackedValue::Type::kNull) {
@@ -79,7 +86,9 @@ class PackedSource final : public MergeSource {
  private:
   const std::array<int, 3> text_columns_{packed_column("mode"), packed_column("major_mode"),
                                          packed_column("margin_event")};
+  const int taken_from_ = packed_column("taken_from");
   References references_;
+  MergedOrigins origins_;
   TextNumbers target_texts_;
   MergedTexts texts_;
   Statement read_;
@@ -128,9 +137,10 @@ class OldSource final : public MergeSource {
 
 }  // namespace
 
-std::unique_ptr<MergeSource> MergeSource::of(sqlite3* source, sqlite3* target) {
+std::unique_ptr<MergeSource> MergeSource::of(sqlite3* source, sqlite3* target,
+                                             const StudyPlaces& places) {
   if (schema_of(source) >= kFirstPacked) {
-    return std::make_unique<PackedSource>(source, target);
+    return std::make_unique<PackedSource>(source, target, places);
   }
   return std::make_unique<OldSource>(source, target);
 }

@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "server/care/merged_studies.h"
 #include "server/database/sqlite.h"
 #include "server/store/rows/packed_row.h"
 
@@ -12,8 +13,10 @@ namespace oblique::server {
 /// The results of a database of this or an earlier schema, one after the other as packed rows.
 class MergeSource {
  public:
-  /// Both connections must have `row_checksum`, and the source `model_definition`.
-  static std::unique_ptr<MergeSource> of(sqlite3* source, sqlite3* target);
+  /// Both connections must have `row_checksum`, and the source `model_definition`. All must outlive
+  /// it.
+  static std::unique_ptr<MergeSource> of(sqlite3* source, sqlite3* target,
+                                         const StudyPlaces& places);
   virtual ~MergeSource() = default;
 
   /// Goes to the next row; false when there is none. Throws StorageError.
@@ -21,7 +24,7 @@ class MergeSource {
   /// Numbers of texts of the present row become those of the target, where they are brought, so
   /// that outputs can be compared. Throws StorageError for one that is not there.
   virtual void take_texts() = 0;
-  /// The same with its model and worker.
+  /// The same with its model, its worker and the study that it was taken from.
   virtual void take_references() = 0;
 
   PackedRow& row() { return row_; }

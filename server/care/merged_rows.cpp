@@ -55,7 +55,7 @@ class RowMerge {
       : places_(places),
         merged_(merged),
         deleted_(deleted_studies(source)),
-        source_(MergeSource::of(source, target)),
+        source_(MergeSource::of(source, target, places)),
         insert_(target),
         remove_(target, "DELETE FROM packed_results WHERE study_id = ? AND point = ?"),
         known_(target, fmt::format("SELECT {}, (SELECT w.solver_version FROM workers AS w"

@@ -11,6 +11,7 @@
 
 #include "proto/recipe/written/study_name.h"
 #include "proto/recipe/written/study_terms.h"
+#include "server/care/merged_origins.h"
 #include "server/care/table_columns.h"
 #include "server/scheduler/points/study_table.h"
 #include "server/store/rows/row_columns.h"
@@ -325,6 +326,7 @@ void settle_studies(sqlite3* source, sqlite3* target, const StudyPlaces& places)
       continue;
     }
     settled.count_again(place.id);
+    count_taken_points(target, place.id);
     count.bind(1, place.id);
     count.step();
     const bool is_done = number_in(count, 0) == place.points;

@@ -7,6 +7,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "server/care/merged_origins.h"
 #include "server/care/table_columns.h"
 #include "server/database/draft_file.h"
 #include "server/database/open_for_reading.h"
@@ -277,7 +278,7 @@ void copy_results(sqlite3* from, sqlite3* to, Salvaged& saved) {
 
 /// Copies the tables, each after those that it refers to.
 void copy_tables(sqlite3* from, sqlite3* to, Salvaged& saved) {
-  for (const std::string table : {"studies", "models", "workers", "texts", "retries"}) {
+  for (const std::string table : {"studies", "models", "workers", "texts", "retries", "origins"}) {
     if (columns_of(from, table).empty()) {
       continue;  // an earlier schema has none
     }
@@ -289,11 +290,11 @@ void copy_tables(sqlite3* from, sqlite3* to, Salvaged& saved) {
   copy_results(from, to, saved);
 }
 
-void count_settled_points(sqlite3* database) {
+void count_rows(sqlite3* database) {
   SettledRuns settled(database);
-  Statement studies(database, "SELECT study_id FROM studies");
-  while (studies.step()) {
-    settled.count_again(static_cast<std::uint64_t>(studies.integer(0)));
+  for (const std::int64_t study : studies_in(database)) {
+    settled.count_again(static_cast<std::uint64_t>(study));
+    count_taken_points(database, static_cast<std::uint64_t>(study));
   }
 }
 
@@ -316,7 +317,7 @@ void mend_references(sqlite3* database) {
       " (SELECT CASE count(DISTINCT solver_version) WHEN 1 THEN min(solver_version)"
       " ELSE 'unknown' END FROM workers), 'unknown', '' FROM packed_results"
       " WHERE worker NOT IN (SELECT worker_id FROM workers)");
-  count_settled_points(database);
+  count_rows(database);
   execute(database,
           "UPDATE studies SET state = 'running' WHERE state = 'done' AND points <>"
           " (SELECT coalesce(sum(p.points), 0) FROM settled_points AS p"

@@ -53,7 +53,8 @@ constexpr const char* kVersionOfOlderRows =
 void add_taken(sqlite3* database, protocol::StudyStatus& status) {
   constexpr int kMostNamed = 20;
   Statement origins(database,
-                    "SELECT origin, points FROM taken_points WHERE study_id = ?"
+                    "SELECT o.name, t.points FROM taken_points AS t"
+                    " JOIN origins AS o USING (origin_id) WHERE t.study_id = ?"
                     " ORDER BY points DESC");
   origins.bind(1, status.study_id());
   while (origins.step()) {

@@ -52,6 +52,7 @@ Event StudyChanges::stored(const GrowthWrite& write, Instant /*now*/) {
 
 void StudyChanges::stored(const NameWrite& write) {
   note(write.study, fmt::format("is called {} from now on", write.name));
+  known_.rename_origin(states_.record(write.study).name, write.name);
   states_.rename(write.study, write.name);
 }
 
@@ -66,6 +67,8 @@ Event StudyChanges::stored(const RemovalWrite& write, Instant now) {
   states_.remove(write.study);
   finder_.stop_seeking(write.study);
   finder_.drop_source(write.study);
+  known_.rename_origin(reply.change().study().name(),
+                       fmt::format("{} (deleted)", reply.change().study().name()));
   known_.forget(write.study);
   release_replies(now, write.study);
   return StudyRemoved{write.study};

@@ -34,8 +34,9 @@ ResultCopy::ResultCopy(sqlite3* database, SettledRuns& settled, Clearing& cleari
       clearing_(clearing),
       name_(database, "SELECT name FROM studies WHERE study_id = ?"),
       read_(database, read_sql()),
+      name_origin_(database, "INSERT OR IGNORE INTO origins (origin_id, name) VALUES (?, ?)"),
       count_(database,
-             "INSERT INTO taken_points (study_id, origin, points) VALUES (?1, ?2, ?3)"
+             "INSERT INTO taken_points (study_id, origin_id, points) VALUES (?1, ?2, ?3)"
              " ON CONFLICT DO UPDATE SET points = points + excluded.points"),
       end_(database, "UPDATE studies SET takes_over = 0 WHERE study_id = ?"),
       insert_(database) {}
@@ -61,8 +62,11 @@ void ResultCopy::run(const TakeResults& change) {
     copy(change, run);
   }
   if (!change.taken->points.empty()) {
+    name_origin_.bind(1, change.source_id);
+    name_origin_.bind(2, change.taken->origin);
+    name_origin_.run();
     count_.bind(1, change.study_id);
-    count_.bind(2, change.taken->origin);
+    count_.bind(2, change.source_id);
     count_.bind(3, change.taken->points.size());
     count_.run();
   }
@@ -92,7 +96,7 @@ void ResultCopy::copy(const TakeResults& change, const SharedRun& run) {
     set_whole(row_.at(kPoint), point);
     PackedValue& origin = row_.at(kTakenFrom);
     origin.type = PackedValue::Type::kText;
-    origin.text = fmt::format("{}/{}", change.taken->origin, source_point);
+    origin.text = fmt::format("{}/{}", change.source_id, source_point);
     if (insert_.run(row_)) {
       change.taken->points.insert(point);
       settled_.add(change.study_id, point);

@@ -30,6 +30,7 @@ class ResultCopy {
   Clearing& clearing_;
   Statement name_;
   Statement read_;
+  Statement name_origin_;
   Statement count_;
   Statement end_;
   RowInsert insert_;

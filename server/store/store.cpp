@@ -104,6 +104,7 @@ struct Store::Statements {
                "UPDATE studies SET name = ?2,"
                " checksum = row_checksum(study_id, ?2, recipe, points, created_at)"
                " WHERE study_id = ?1"),
+        rename_origin(database, "UPDATE origins SET name = ?2 WHERE origin_id = ?1"),
         add_worker(database,
                    "INSERT INTO workers (worker_id, name, threads, solver_version,"
                    " instruction_set, joined_at, checksum) VALUES (?1, ?2, ?3, ?4, ?5, ?6,"
@@ -121,6 +122,7 @@ struct Store::Statements {
   Statement reopen;
   Statement grow;
   Statement rename;
+  Statement rename_origin;
   Statement add_worker;
   Statement find_model;
   Statement add_model;
@@ -135,6 +137,8 @@ Store::Store(const std::string& path, const Notice& notice) {
   database_ = open_database(path, SQLITE_OPEN_READWRITE);
   sqlite3_busy_timeout(database_.get(), kBusyTimeout_ms);
   add_row_checksum(database_.get());
+  // Zeros over what is deleted would go through the log, page by page.
+  execute(database_.get(), "PRAGMA secure_delete = OFF");
   log_ = std::make_unique<WriteAheadLog>(database_.get());
   const DatabaseKind kind = identify(database_.get(), path);
   if (kind == DatabaseKind::kEmpty) {
@@ -310,10 +314,11 @@ void Store::add(const GrowStudy& change) {
 }
 
 void Store::add(const RenameStudy& change) {
-  Statement& update = statements_->rename;
-  update.bind(1, change.study_id);
-  update.bind(2, change.name);
-  update.run();
+  for (Statement* update : {&statements_->rename, &statements_->rename_origin}) {
+    update->bind(1, change.study_id);
+    update->bind(2, change.name);
+    update->run();
+  }
 }
 
 void Store::add(const DeleteStudy& change) {

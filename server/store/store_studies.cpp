@@ -106,7 +106,9 @@ std::vector<StoredStudy> Store::studies() {
                     "SELECT w.solver_version FROM packed_results AS r"
                     " CROSS JOIN workers AS w ON w.worker_id = r.worker"
                     " WHERE r.study_id = ? ORDER BY r.point LIMIT 1");
-  Statement taken(database_.get(), "SELECT origin, points FROM taken_points WHERE study_id = ?");
+  Statement taken(database_.get(),
+                  "SELECT o.name, t.points FROM taken_points AS t"
+                  " JOIN origins AS o USING (origin_id) WHERE t.study_id = ?");
   PointsOfStudies settled = settled_points();
   while (list.step()) {
     StoredStudy study{};
@@ -120,7 +122,7 @@ std::vector<StoredStudy> Store::studies() {
     study.takes_over = list.integer(10) != 0;
     taken.bind(1, study.study_id);
     while (taken.step()) {
-      study.taken[taken.text(0)] = number(taken, 1);
+      study.taken[taken.text(0)] += number(taken, 1);
     }
     taken.reset();
     study.settled = std::move(settled[study.study_id]);

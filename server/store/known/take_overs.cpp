@@ -33,6 +33,14 @@ void TakeOvers::add(std::uint64_t study_id, const std::string& origin, std::uint
   }
 }
 
+void TakeOvers::rename_origin(const std::string& before, const std::string& name) {
+  for (auto& [study_id, taken] : taken_) {
+    if (auto origin = taken.from.extract(before); !origin.empty()) {
+      taken.from[name] += origin.mapped();
+    }
+  }
+}
+
 bool TakeOvers::end(std::uint64_t study_id, bool is_cut_short) {
   const auto known = taken_.find(study_id);
   if (known == taken_.end() || known->second.under_way == 0) {

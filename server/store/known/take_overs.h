@@ -40,6 +40,8 @@ class TakeOvers {
   /// Points are sought; as often as it is said they must end.
   void begin(std::uint64_t study_id) { ++taken_[study_id].under_way; }
   void add(std::uint64_t study_id, const std::string& origin, std::uint64_t points);
+  /// An origin is called otherwise from now on.
+  void rename_origin(const std::string& before, const std::string& name);
   /// `is_cut_short`: not all that may be known was found. True when nothing is sought any more.
   bool end(std::uint64_t study_id, bool is_cut_short);
   /// It is deleted.

@@ -66,7 +66,7 @@ CREATE TABLE packed_results (
   worker           INTEGER REFERENCES workers (worker_id),  -- NULL: the server failed the point
   attempt          INTEGER NOT NULL, -- number of the lease under which it was solved
   solved_at        ANY,          -- milliseconds since 1970; a text: what stood there in an older schema
-  taken_from       TEXT,         -- STUDY/POINT whose result this is; NULL: it was solved for this point
+  taken_from       TEXT,         -- origin_id/POINT whose result this is; NULL: it was solved for this point
   -- CRC-32 of the other columns (server/database/row_checksum.h), which `oblique check` compares with
   -- them. NULL: the row is of an earlier schema. Whoever changes a row sets it to NULL.
   checksum         INTEGER,
@@ -84,12 +84,18 @@ CREATE TABLE settled_points (
   PRIMARY KEY (study_id, first_point)
 ) STRICT, WITHOUT ROWID;
 
+-- Studies from which others have taken results over.
+CREATE TABLE origins (
+  origin_id   INTEGER PRIMARY KEY,  -- number of the study; where it came by a merge without it: one that none has
+  name        TEXT NOT NULL      -- what the study is called, also after a rename; 'NAME (deleted)': what it was called last
+) STRICT;
+
 -- How many results a study has taken over from others.
 CREATE TABLE taken_points (
   study_id    INTEGER NOT NULL REFERENCES studies (study_id), -- that has them
-  origin      TEXT NOT NULL,     -- name of the study that they come from, as it was called then
+  origin_id   INTEGER NOT NULL REFERENCES origins (origin_id), -- the study that they come from
   points      INTEGER NOT NULL,  -- how many
-  PRIMARY KEY (study_id, origin)
+  PRIMARY KEY (study_id, origin_id)
 ) STRICT, WITHOUT ROWID;
 
 -- Rows that go, by whatever hand: the next start of a server counts again. A program that takes them

@@ -58,7 +58,11 @@ SELECT p.study_id AS study_id, p.point AS point, p.model_id AS model_id, p.H AS 
        p.ft_peak_error / 1e9 AS ft_peak_error, p.duration_error / 1e9 AS duration_error,
        p.stick_total_error / 1e9 AS stick_total_error, p.slide_error / 1e9 AS slide_error,
        p.impulse_n_error / 1e9 AS impulse_n_error, p.impulse_t_error / 1e9 AS impulse_t_error,
-       p.v_out_error / 1e9 AS v_out_error, p.taken_from AS taken_from
+       p.v_out_error / 1e9 AS v_out_error,
+       CASE WHEN p.taken_from IS NOT NULL THEN
+         coalesce((SELECT o.name FROM origins AS o WHERE o.origin_id = CAST(p.taken_from AS INTEGER)),
+                  'study number ' || CAST(p.taken_from AS INTEGER))
+         || substr(p.taken_from, instr(p.taken_from, '/')) END AS taken_from
 FROM packed_results AS p
 LEFT JOIN texts AS mode ON mode.text_id = p.mode
 LEFT JOIN texts AS major_mode ON major_mode.text_id = p.major_mode;

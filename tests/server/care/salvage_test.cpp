@@ -182,5 +182,26 @@ TEST_F(SalvageTest, RowsThatAreOnlyInTheLogAreSavedTooAndTheLogStaysAsItIs) {
   EXPECT_EQ(std::filesystem::file_size(crashed + "-wal"), log);
 }
 
+TEST_F(SalvageTest, StudiesWithFiltersAreDoneAndRowsThatWereTakenOverAreCountedAgain) {
+  protocol::Recipe recipe = table_->recipe();
+  recipe.mutable_blocks(0)->set_where("mu < 0.4");  // points 0 to 3 of 10
+  protocol::PointTable counted(recipe);
+  counted.survey([] { return true; });
+  const auto filtered = std::make_shared<const protocol::PointTable>(std::move(counted));
+  const auto taken = std::make_shared<TakenResults>();
+  store_->commit(std::vector<Change>{
+      AddStudy{2, "b", filtered, "now"}, TakeResults{2, 1, {{0, 0, 4}}, "0.1", taken},
+      SetStudyState{2, StudyState::kDone, "now"}, RenameStudy{1, "first"}});
+  store_.reset();
+  execute(open_database(path_, SQLITE_OPEN_READWRITE).get(), "DELETE FROM taken_points");
+  salvage(path_, copy_);
+  EXPECT_THAT(find_faults(copy_), testing::IsEmpty());
+  Store saved(copy_);
+  const auto study = saved.studies().at(1);
+  EXPECT_EQ(study.state, StudyState::kDone);
+  EXPECT_EQ(study.settled, IntervalSet(0, 4));
+  EXPECT_EQ(study.taken, (std::map<std::string, std::uint64_t>{{"first", 4}}));
+}
+
 }  // namespace
 }  // namespace oblique::server

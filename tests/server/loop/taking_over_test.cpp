@@ -144,11 +144,43 @@ TEST_F(TakingOverTest, RowsThatWereTakenStayWhenTheirOriginIsDeleted) {
   request.mutable_change()->set_study("a");
   request.mutable_change()->set_change(protocol::STUDY_CHANGE_DELETE);
   EXPECT_TRUE(client_->ask(request).has_change());
-  EXPECT_EQ(number("SELECT count(*) FROM runs WHERE study = 'b' AND taken_from LIKE 'a/%'"), 20);
+  EXPECT_EQ(
+      number(
+          "SELECT count(*) FROM runs WHERE study = 'b' AND taken_from = 'a (deleted)/' || point"),
+      20);
+  ASSERT_EQ(client_->status("b").taken().from_size(), 1);
+  EXPECT_EQ(client_->status("b").taken().from(0).study(), "a (deleted)");
   // And what is deleted gives nothing; b gives what it took.
   const auto reply = submit("c", grid(0.0, 1.0, 5));
   ASSERT_EQ(reply.taken().from_size(), 1);
   EXPECT_EQ(reply.taken().from(0).study(), "b");
+}
+
+TEST_F(TakingOverTest, RowsNameTheirOriginAsItIsCalledNowAlsoAfterARename) {
+  start();
+  submit("a", grid(0.0, 1.0, 5));
+  work(20);
+  submit("b", grid(0.0, 1.0, 5));
+  ClientRequest request;
+  request.mutable_change()->set_study("a");
+  request.mutable_change()->set_change(protocol::STUDY_CHANGE_RENAME);
+  request.mutable_change()->set_new_name("another/a");
+  EXPECT_TRUE(client_->ask(request).has_change());
+  submit("a", grid(3.0, 4.0, 5));  // the name may come to mean another study
+  for (const bool is_new_server : {false, true}) {
+    if (is_new_server) {
+      stop();
+      EXPECT_EQ(Reader(path_).study_status("b").at(0).taken().from(0).study(), "another/a");
+      start();
+    }
+    EXPECT_EQ(number("SELECT count(*) FROM runs WHERE study = 'b'"
+                     " AND taken_from = 'another/a/' || point"),
+              20);
+    const auto taken = client_->status("b").taken();
+    ASSERT_EQ(taken.from_size(), 1);
+    EXPECT_EQ(taken.from(0).study(), "another/a");
+    EXPECT_EQ(taken.from(0).points(), 20U);
+  }
 }
 
 TEST_F(TakingOverTest, AStudyThatGrowsTakesOverForItsNewPoints) {
