@@ -40,9 +40,9 @@ void tell_of_log(const std::filesystem::path& database) {
 /// Why the rest of a study is not solved by the workers of this run, and what to do; empty: it is.
 std::string objection_to_waiting(const protocol::StudyStatus& status) {
   const std::string own = solver::solver_version();
-  if ((status.state() == "paused" || status.state() == "cancelled") && status.leased() == 0) {
-    return fmt::format("somebody has {} \"{}\": the same command again goes on with it",
-                       status.state(), status.name());
+  if (status.state() == "paused" && status.leased() == 0) {
+    return fmt::format("somebody has paused \"{}\": the same command again goes on with it",
+                       status.name());
   }
   if (status.state() != "running" || status.mixes_versions() || status.solver_version().empty() ||
       status.solver_version() == own || status.leased() > 0) {

@@ -165,8 +165,8 @@ TEST(Run, NoticesThatTheServerDied) {
   expect_gone(processes);
 }
 
-TEST(Run, OfAStudyThatSomebodyCancelsSaysSoAndEndsWithOne) {
-  const test::TemporaryFolder folder;
+/// What a run of a long study says to which its user gives that order from another shell.
+test::Outcome ordered_run(const test::TemporaryFolder& folder, const std::string& order) {
   write_study(folder, 100000);
   auto arguments = run_arguments();
   arguments.push_back("--verbose");
@@ -180,15 +180,36 @@ TEST(Run, OfAStudyThatSomebodyCancelsSaysSoAndEndsWithOne) {
   };
   const std::filesystem::path keys = word_after("admits the 3 keys of ");
   const std::string url = word_after("clients at ");
-  EXPECT_EQ(test::run_oblique(folder, {"cancel", "many", "--server", url}).exit_code, 1)
+  EXPECT_EQ(test::run_oblique(folder, {order, "many", "--server", url}).exit_code, 1)
       << "others on this machine have no key";
-  const auto cancel = test::run_oblique(folder, {"cancel", "many", "--server", url, "--keys",
-                                                 (keys.parent_path() / "client.key").string()});
-  EXPECT_EQ(cancel.exit_code, 0) << cancel.err;
-  const auto outcome = program.outcome();
+  const auto ordered = test::run_oblique(folder, {order, "many", "--server", url, "--keys",
+                                                  (keys.parent_path() / "client.key").string()});
+  EXPECT_EQ(ordered.exit_code, 0) << ordered.err;
+  auto outcome = program.outcome();
+  EXPECT_FALSE(std::filesystem::exists(keys.parent_path())) << "the keys go with the run";
+  return outcome;
+}
+
+TEST(Run, OfAStudyThatSomebodyCancelsSaysSoAndEndsWithOne) {
+  const test::TemporaryFolder folder;
+  const auto outcome = ordered_run(folder, "cancel");
   EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
   EXPECT_NE(outcome.err.find("The study is cancelled"), std::string::npos) << outcome.err;
-  EXPECT_FALSE(std::filesystem::exists(keys.parent_path())) << "the keys go with the run";
+}
+
+TEST(Run, OfAStudyThatSomebodyPausesSaysHowToGoOnAndEndsWithOne) {
+  const test::TemporaryFolder folder;
+  const auto outcome = ordered_run(folder, "pause");
+  EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
+  EXPECT_EQ(outcome.out, "");
+  EXPECT_NE(
+      outcome.err.find("somebody has paused \"many\": the same command again goes on with it"),
+      std::string::npos)
+      << outcome.err;
+  EXPECT_NE(test::run_oblique(folder, {"status"}).out.find("paused"), std::string::npos);
+  const auto before = solved(folder);
+  test::Process again(folder, test::client_program(), run_arguments());
+  wait_for([&] { return solved(folder) > before; });
 }
 
 TEST(Watch, OfAFileOnWhichNobodyWorksSaysSo) {
