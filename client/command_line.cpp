@@ -8,13 +8,16 @@
 #include <csignal>
 #include <exception>
 #include <iostream>
+#include <sstream>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/formats/pager.h"
 #include "client/formats/sink.h"
+#include "client/output/help_text.h"
 #include "client/output/human_units.h"
 #include "client/output/speech.h"
 #include "client/output/terminal.h"
@@ -28,11 +31,14 @@
 namespace oblique::client {
 namespace {
 
+/// Of the meanings of flags and verbs.
+constexpr std::size_t kHelpColumn = 28;
+
 constexpr const char* kExamples = R"(Examples:
   oblique solve --H 1 --mu 0.4 --e 1               one impact, here and now
-  oblique run deploy/studies/paper.toml            a study: server, workers and database here
+  oblique run deploy/studies/paper.toml            a study, solved here
   oblique query paper --where "mu > 0.5"           its results
-  oblique VERB --help                              flags, defaults and examples of a verb
+  oblique VERB --help                              flags and examples of a verb
 
 Exit codes: 0 done, 1 failed, 2 wrong usage; stopped by a signal: 128 and its number, 130 for Ctrl-C.)";
 
@@ -129,7 +135,11 @@ int parse(CLI::App& app, int argc, const char* const* argv) {
     return kDone;
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) {
-      return app.exit(error, std::cout, std::cerr);
+      std::ostringstream help;
+      const int exit_code = app.exit(error, help, std::cerr);
+      const std::size_t width = terminal_size().columns;
+      std::cout << (width > 0 ? fitted_help(help.str(), width, kHelpColumn) : help.str());
+      return exit_code;
     }
     // A word too many says more than the missing verb or flag that it may have been meant for.
     auto& verb = parsed_verb(app);
@@ -198,7 +208,7 @@ int run_command_line(int argc, const char* const* argv) {
   app.set_version_flag("--version", "oblique " + solver::solver_version());
   app.footer(kExamples);
   app.require_subcommand(1);
-  app.get_formatter()->column_width(28);
+  app.get_formatter()->column_width(kHelpColumn);
   Command command;
   add_verbs(app, command);
   SpeechFlags speech;

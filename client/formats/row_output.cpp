@@ -30,8 +30,10 @@ std::unique_ptr<Sink> sink_for(const OutputSettings& settings, const TerminalSiz
 PrinterSettings printer_settings(const OutputSettings& settings, const TerminalSize& terminal) {
   PrinterSettings of_printer;
   of_printer.shown = settings.shown;
+  of_printer.way_to_all = settings.way_to_all;
   if (settings.file.empty() && terminal.lines > 0) {
-    of_printer.width = settings.may_leave_out ? terminal.columns : 0;
+    of_printer.width = terminal.columns;
+    of_printer.keeps_all = !settings.may_leave_out;
     of_printer.first_rows = terminal.lines;
   }
   if (!settings.file.empty()) {

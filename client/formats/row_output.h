@@ -12,10 +12,11 @@ namespace oblique::client {
 
 struct OutputSettings {
   Format format = Format::kTable;
-  std::string file = {};                ///< empty: standard output
-  bool may_page = true;                 ///< a long table on a terminal goes to a pager
-  bool may_leave_out = true;            ///< a table is made to fit the terminal
-  std::vector<ShownColumn> shown = {};  ///< see PrinterSettings
+  std::string file = {};      ///< empty: standard output
+  bool may_page = true;       ///< a long table on a terminal goes to a pager
+  bool may_leave_out = true;  ///< a table that does not fit the terminal lacks columns
+  std::string way_to_all = PrinterSettings().way_to_all;  ///< see PrinterSettings
+  std::vector<ShownColumn> shown = {};                    ///< see PrinterSettings
 };
 
 /// Where the rows of an answer go: standard output, a pager where that is a terminal, or a file,

@@ -43,6 +43,11 @@ class RowPrinter {
 struct PrinterSettings {
   /// Of a table: a line has so many characters at most; 0: as many as it takes.
   std::size_t width = 0;
+  /// Of a table with such a width: no column is left out. Texts of the last one, where they are
+  /// sentences, go on in further lines.
+  bool keeps_all = false;
+  /// Of a table: how to see columns that were left out.
+  std::string way_to_all = "csv and json have all";
   /// Of a table: widths of columns are those of so many rows at its beginning.
   std::size_t first_rows = 1000;
   /// Of a table, plain or in Markdown: how each column is shown; where there is none, by its name.

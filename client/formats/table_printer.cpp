@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <sstream>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
@@ -20,6 +21,8 @@ constexpr std::size_t kGap = 2;     // between columns
 constexpr const char* kMore = "…";  // ends a heading that lacks columns
 /// Texts are not shortened below that.
 constexpr std::size_t kShortestText = 12;
+/// Nor are sentences wrapped into less.
+constexpr std::size_t kNarrowestSentence = 16;
 
 ShownColumn shown_as(const std::vector<ShownColumn>& shown, const protocol::QueryReply& chunk,
                      int column) {
@@ -49,6 +52,21 @@ std::string shortened_to(const std::string& text, std::size_t width) {
         protocol::first_character(std::string_view(text).substr(bytes)).bytes, 1);
   }
   return text.substr(0, bytes) + "…";
+}
+
+/// The words of a text in lines of at most `width` characters, where they are not longer.
+std::vector<std::string> wrapped(const std::string& text, std::size_t width) {
+  std::vector<std::string> lines(1);
+  std::istringstream words(text);
+  for (std::string word; words >> word;) {
+    std::string& line = lines.back();
+    if (!line.empty() && width_of(line) + 1 + width_of(word) > width) {
+      lines.push_back(word);
+    } else {
+      line += (line.empty() ? "" : " ") + word;
+    }
+  }
+  return lines;
 }
 
 /// Words with commas between them, in lines of at most `width` characters where they can be.
@@ -128,13 +146,23 @@ std::size_t TablePrinter::line_width() const {
   return all - std::min(all, kGap) + (has_all ? 0 : kGap + width_of(kMore));
 }
 
-/// Makes lines fit: the widest text is shortened first, and at least one column stays.
+bool TablePrinter::wraps(const Column& column) const {
+  return settings_.keeps_all && settings_.width > 0 && !column.has_numbers &&
+         &column == &columns_.back();
+}
+
+/// Makes lines fit: sentences in the last column are wrapped where all columns are kept, then the
+/// widest text is shortened, and at least one column stays.
 void TablePrinter::fit() {
   while (settings_.width > 0 && line_width() > settings_.width) {
+    if (Column& end = columns_.back(); wraps(end) && end.width > kNarrowestSentence) {
+      end.width -= std::min(end.width - kNarrowestSentence, line_width() - settings_.width);
+      continue;
+    }
     Column* widest = nullptr;
     for (Column& column : columns_) {
       const std::size_t least = std::max(kShortestText, width_of(column.heading));
-      if (!column.has_numbers && !column.is_left_out && column.width > least &&
+      if (!column.has_numbers && !column.is_left_out && !wraps(column) && column.width > least &&
           (widest == nullptr || column.width > widest->width)) {
         widest = &column;
       }
@@ -146,7 +174,7 @@ void TablePrinter::fit() {
     }
     const auto last = std::find_if(columns_.rbegin(), columns_.rend(),
                                    [](const Column& column) { return !column.is_left_out; });
-    if (last + 1 == columns_.rend()) {
+    if (settings_.keeps_all || last + 1 == columns_.rend()) {
       return;
     }
     last->is_left_out = true;
@@ -171,6 +199,7 @@ void TablePrinter::print_cells(const std::vector<std::string>& cells, const std:
 
 void TablePrinter::print_line(const Line& line) {
   std::vector<std::string> cells;
+  std::vector<std::string> more;  // lines of the last one
   for (std::size_t i = 0; i < line.size(); ++i) {
     const auto& [text, is_number] = line[i];
     const Column& column = columns_[i];
@@ -178,12 +207,20 @@ void TablePrinter::print_line(const Line& line) {
       const std::size_t after = text.size() - before_point(text);
       cells.push_back(text +
                       std::string(column.after_point - std::min(column.after_point, after), ' '));
+    } else if (wraps(column)) {
+      more = wrapped(text, column.width);
+      cells.push_back(more.front());
     } else {
       cells.push_back(settings_.width > 0 && !column.is_left_out ? shortened_to(text, column.width)
                                                                  : text);
     }
   }
   print_cells(cells);
+  for (std::size_t i = 1; i < more.size(); ++i) {
+    std::vector<std::string> rest(cells.size());
+    rest.back() = more[i];
+    print_cells(rest);
+  }
 }
 
 void TablePrinter::print_head() {
@@ -223,7 +260,7 @@ void TablePrinter::end() {
   }
   if (!left_out.empty()) {
     const std::string beginning =
-        fmt::format("Left out, for a width of {} (csv and json have all):", settings_.width);
+        fmt::format("Left out, for a width of {} ({}):", settings_.width, settings_.way_to_all);
     sink_.append(beginning + in_lines(left_out, width_of(beginning), settings_.width));
   }
 }

@@ -38,6 +38,7 @@ class TablePrinter : public RowPrinter {
   void widen(const Line& line);
   void fit();
   std::size_t line_width() const;
+  bool wraps(const Column& column) const;
   void print_head();
   void print_first_rows();
   void print_line(const Line& line);

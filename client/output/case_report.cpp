@@ -148,9 +148,10 @@ ordered_json json_of(const CaseResult& result) {
 void print_summary(std::ostream& out, const CaseResult& result) {
   out << fmt::format("H = {} m, mu = {}, e* = {}\n", exact_number(result.H_m),
                      exact_number(result.mu), exact_number(result.e_star))
-      << fmt::format("fall        {} s; the tip lands at x = {} m with V_t = {}, V_n = {} m/s\n",
-                     fixed_number(result.fall_time_s, 6), fixed_number(result.impact_x_m, 5),
-                     fixed_number(result.vt_in_m_s, 4), fixed_number(result.vn_in_m_s, 4))
+      << fmt::format("fall        {} s; the tip lands at x = {} m\n",
+                     fixed_number(result.fall_time_s, 6), fixed_number(result.impact_x_m, 5))
+      << fmt::format("            with V_t = {}, V_n = {} m/s\n", fixed_number(result.vt_in_m_s, 4),
+                     fixed_number(result.vn_in_m_s, 4))
       << fmt::format("contact     {} us, leaving with V_t = {}, V_n = {} m/s\n",
                      fixed_number(result.duration_s * kMicro, 2),
                      fixed_number(result.vt_out_m_s, 4), fixed_number(result.vn_out_m_s, 4))
@@ -172,9 +173,11 @@ void print_summary(std::ostream& out, const CaseResult& result) {
                      fixed_number(result.slide_m * kMilli, 5))
       << fmt::format("impulses    normal {}, tangential {} N s\n",
                      fixed_number(result.impulse_n_Ns, 6), fixed_number(result.impulse_t_Ns, 6))
-      << fmt::format("energy      {} J in; friction takes {} J, restitution {} J; closure {}\n",
+      << fmt::format("energy      {} J in; friction takes {} J, restitution {} J\n",
                      fixed_number(energy.kinetic_in_J, 4), fixed_number(energy.friction_J, 6),
-                     fixed_number(energy.restitution_J, 6), readable_number(energy.closure, 2))
+                     fixed_number(energy.restitution_J, 6))
+      << fmt::format("            does not add up by {} of what was exchanged\n",
+                     readable_number(energy.closure, 2))
       << fmt::format("solver      {} {}, {} steps of {} us, {} ms\n", report.integrator,
                      report.version, report.steps, readable_number(report.dt_s * kMicro, 3),
                      readable_number(report.wall_s * kMilli, 2));

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <iostream>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -90,7 +89,7 @@ int list_trace_columns(Format format) {
     add_value(row, std::string(column.unit));
     add_value(row, std::string(column.meaning));
   }
-  print(std::cout, table, format);
+  print_out(table, format);
   return kDone;
 }
 
@@ -117,7 +116,7 @@ int list_columns(const ColumnsFlags& flags) {
     add_value(row, column.solve_json);
     add_value(row, column.meaning);
   }
-  print(std::cout, table, format);
+  print_out(table, format);
   return kDone;
 }
 

@@ -31,8 +31,9 @@ constexpr const char* kMergeExamples = R"(Examples:
 Studies and results of the databases come into the one of --db, which is made when it is not there. A
 study is the one of the same name and recipe: their points are united, and where both have a result
 that of --db stays. One that grew in one of them is united with what it was. A database with a study
-of a name that is taken by another recipe is refused as a whole, with what differs. What is merged is only read, also while a server works on it; merged again it brings what is
-new since. No server may be at work on the database of --db.)";
+of a name that is taken by another recipe is refused as a whole, with what differs. What is merged is
+only read, also while a server works on it; merged again it brings what is new since. No server may be
+at work on the database of --db.)";
 
 struct MergeFlags {
   std::vector<std::string> sources;

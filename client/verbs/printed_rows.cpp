@@ -12,6 +12,7 @@
 #include "proto/program/exit_code.h"
 #include "proto/text.h"
 #include "proto/wire/chunk_rows.h"
+#include "proto/wire/chunk_writer.h"
 
 namespace oblique::client {
 
@@ -29,13 +30,15 @@ void add_output_flags(CLI::App& verb, OutputFlags& flags) {
                 "print long tables on a terminal without $OBLIQUE_PAGER, $PAGER or less");
 }
 
-int print_stream(RowStream& stream, const OutputFlags& flags, bool in_shown_units) {
+int print_stream(RowStream& stream, const OutputFlags& flags, bool in_shown_units,
+                 const std::string& way_to_all) {
   const Format format = format_named(flags.format);
   // Nothing is begun, and no file, before there is a first answer.
   protocol::QueryReply chunk = stream.next();
   RowOutput out({.format = format,
                  .file = flags.file,
                  .may_page = !flags.no_pager,
+                 .way_to_all = way_to_all,
                  .shown = in_shown_units ? shown_columns(chunk) : std::vector<ShownColumn>()});
   try {
     out.print(chunk);
@@ -78,7 +81,9 @@ std::string shell_word(const std::string& text) {
 }
 
 void print_first(const protocol::QueryReply& rows, std::uint64_t points) {
-  print_out(in_shown_units(rows), Format::kTable);
+  RowOutput out({.may_page = false});
+  out.print(protocol::as_chunk(in_shown_units(rows)));
+  out.finish();
   if (static_cast<std::uint64_t>(rows.rows_size()) < points) {
     std::cerr << fmt::format("The first {} of {} points are shown.\n",
                              shown_count(static_cast<std::uint64_t>(rows.rows_size())),

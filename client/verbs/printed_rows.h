@@ -24,8 +24,10 @@ struct OutputFlags {
 void add_output_flags(CLI::App& verb, OutputFlags& flags);
 
 /// Prints an answer as it comes, tables for people in the units that people read if
-/// `in_shown_units`. Gives the exit code. Throws what the source throws, and what RowOutput does.
-int print_stream(RowStream& stream, const OutputFlags& flags, bool in_shown_units);
+/// `in_shown_units`; `way_to_all` as in PrinterSettings. Gives the exit code. Throws what the
+/// source throws, and what RowOutput does.
+int print_stream(RowStream& stream, const OutputFlags& flags, bool in_shown_units,
+                 const std::string& way_to_all = "csv and json have all");
 
 /// Prints an answer of one column of texts, a line each. Gives the exit code.
 int print_lines(RowStream& stream);

@@ -40,7 +40,8 @@ int query(const QueryFlags& flags) {
     const auto answer = source->rows(request_for(flags.query));
     return flags.query.explain && flags.output.format == "table"
                ? print_lines(*answer)
-               : print_stream(*answer, flags.output, true);
+               : print_stream(*answer, flags.output, true,
+                              "--select names columns, csv and json have all");
   } catch (const solver::InputError&) {
     (void)study_named(*source, flags.query.study);  // which is no wrong usage when it is not there
     throw;

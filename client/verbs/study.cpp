@@ -185,7 +185,7 @@ void print(const Report& report, bool wants_errors) {
   if (report.rate) {
     const auto& rate = *report.rate;
     std::cout << fmt::format(
-        "time    about {} on {} here, as busy as it is now ({} and {} were solved)\n",
+        "time    about {} on {} here, as busy as it is now\n        ({} and {} were solved)\n",
         shown_duration(rate.time_s(report.points, falls_to_solve(report, wants_errors))),
         counted(rate.threads, "thread", "threads"), counted(rate.points, "point", "points"),
         counted(rate.falls, "fall", "falls"));

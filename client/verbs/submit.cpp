@@ -27,7 +27,7 @@ namespace {
 constexpr const char* kSubmitExamples = R"(Examples:
   oblique submit deploy/studies/paper.toml
   oblique submit sweep.toml --server tcp://127.0.0.1:7600 --watch
-  oblique submit sweep.toml --rows 20      watch it, and show the first 20 points at the end
+  oblique submit sweep.toml --rows 20      watch it, then show 20 points
   oblique submit --H 1 --mu 0.1:2.0:40 --e 0.6,0.8,1 --name friction
 
 A study is safe in the server's database once this returns. Submitting the same study again

@@ -90,6 +90,22 @@ TEST(Table, FitsATerminalAndSaysWhatItLeavesOut) {
   EXPECT_THAT(printed(Format::kTable, {rows}, settings), testing::HasSubstr(long_text));
 }
 
+TEST(Table, ThatKeepsAllColumnsWrapsSentencesInTheLast) {
+  PrinterSettings settings;
+  settings.width = 40;
+  settings.keeps_all = true;
+  const auto rows = chunk_of({"column", "n", "meaning"},
+                             {{"a", std::int64_t{1}, "what stands here is longer than the line"},
+                              {std::string(20, 'x'), std::int64_t{2}, "short"}});
+  EXPECT_EQ(printed(Format::kTable, {rows}, settings),
+            "column               n  meaning\n"
+            "-------------------  -  ----------------\n"
+            "a                    1  what stands here\n"
+            "                        is longer than\n"
+            "                        the line\n"
+            "xxxxxxxxxxxxxxxxxx…  2  short\n");
+}
+
 TEST(Table, ShortensTextsBetweenCharacters) {
   PrinterSettings settings;
   settings.width = 12;
