@@ -15,7 +15,10 @@ constexpr const char* kSqlExamples = R"(Examples:
   oblique sql "SELECT * FROM peaks WHERE study_id = 1 AND major" --format csv
   oblique sql "SELECT name, sql FROM sqlite_schema"     tables and views
 
-One statement that only reads.)";
+One statement that only reads, in SQLite's SQL with median(x), percentile(x, p), stddev(x) and
+variance(x) beside its functions. Of `oblique query` alone are elements as peaks[0].fn_N, here
+peaks ->> '$[0][1]' or the views peaks, phases, stick_intervals and reaction_peaks; count_mode('SC SR'), here
+count(*) FILTER (WHERE major_mode = 'SC SR'); and that LIKE tells capitals apart, here GLOB 'SC*'.)";
 
 struct SqlFlags {
   std::string statement;

@@ -7,8 +7,8 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/suggestion.h"
 #include "server/asking/sql/sql_items.h"
+#include "server/asking/suggestions.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
 #include "worker/solver/model/result_fields.h"
@@ -51,15 +51,20 @@ std::string unit_of_member(std::string_view member) {
   return {};
 }
 
+std::vector<std::string> members_of(const solver::ResultList& list) {
+  std::vector<std::string> members(list.members.begin(), list.members.end());
+  if (lasts(list)) {
+    members.emplace_back(kDuration);
+  }
+  return members;
+}
+
 [[noreturn]] void refuse(const solver::ResultList& list, std::string_view written,
                          std::string_view member) {
-  std::vector<std::string_view> members(list.members.begin(), list.members.end());
-  if (lasts(list)) {
-    members.push_back(kDuration);
-  }
+  const auto members = members_of(list);
   throw solver::InputError(fmt::format("{}.{} is not allowed: the elements of {} have {}{}",
-                                       written, member, list.column, protocol::joined(members),
-                                       protocol::did_you_mean(member, members)));
+                                       written, member, list.column, fmt::join(members, ", "),
+                                       did_you_mean_some(member, members)));
 }
 
 /// A member of the element that `element` is in SQL.
@@ -126,6 +131,31 @@ ElementReference numbered(ElementTokens tokens) {
   return reference;
 }
 
+/// Whether a name and what stands in brackets behind it are meant to be an element: for SQL both
+/// together are a column and another name for it.
+bool is_meant_as_element(ElementTokens tokens) {
+  const std::string_view brackets = tokens[1].text;
+  const bool touches = tokens[0].text.data() + tokens[0].text.size() == brackets.data();
+  const bool has_number =
+      brackets.size() > 2 && brackets.find_first_not_of("-0123456789[]") == std::string_view::npos;
+  return (touches && has_number) || (tokens.size() > 2 && tokens[2].is_sign('.'));
+}
+
+[[noreturn]] void refuse_as_list(ElementTokens tokens) {
+  std::vector<std::string> lists{"lengths_m"};
+  for (const auto* list : solver::result_lists()) {
+    lists.emplace_back(list->column);
+  }
+  for (const solver::ResultField& field : solver::result_fields()) {
+    if (unit_of_plain_list(field.column)) {
+      lists.emplace_back(field.column);
+    }
+  }
+  throw solver::InputError(
+      fmt::format("{0}{1} is not allowed: {0} is no list{2}; `oblique columns` lists elements",
+                  tokens[0].text, tokens[1].text, did_you_mean_some(tokens[0].text, lists)));
+}
+
 /// The one element of a list that is the first of some order.
 std::string element_by(std::string_view list, const std::string& order) {
   return fmt::format("(SELECT item.value FROM json_each({}) AS item ORDER BY {} LIMIT 1)", list,
@@ -179,7 +209,11 @@ ElementReference sound_element_at(ElementTokens tokens) {
     return counted_mode(tokens);
   }
   if (tokens[1].text.front() == '[') {
-    return numbered(tokens);
+    auto reference = numbered(tokens);
+    if (reference.tokens == 0 && is_meant_as_element(tokens)) {
+      refuse_as_list(tokens);
+    }
+    return reference;
   }
   if (tokens.size() < 3 || !tokens[1].is_sign('.') || !tokens[2].is_name()) {
     return {};
@@ -248,6 +282,21 @@ std::string columns_with_elements(std::string_view text, Lists lists) {
     columns += fmt::format("{} AS \"{}\"", sql, name);
   }
   return columns;
+}
+
+std::vector<std::string> all_elements() {
+  std::vector<std::string> elements;
+  for (const Single& single : kSingles) {
+    const auto& list = *solver::find_result_list(single.list);
+    elements.push_back(fmt::format("{}.count", list.column));
+    for (const std::string& member : members_of(list)) {
+      elements.push_back(fmt::format("{}[0].{}", list.column, member));
+      for (const std::string_view choice : {"first", "last", lasts(list) ? "longest" : "largest"}) {
+        elements.push_back(fmt::format("{}_{}.{}", choice, single.name, member));
+      }
+    }
+  }
+  return elements;
 }
 
 std::vector<WrittenForm> element_forms() {

@@ -33,6 +33,9 @@ std::string with_elements(std::string_view text, Lists lists);
 /// The same for columns: those that were changed keep what was written as their name.
 std::string columns_with_elements(std::string_view text, Lists lists);
 
+/// Every element of a list by itself, as peaks[0].fn_N and longest_phase.t1_s, for comparing.
+std::vector<std::string> all_elements();
+
 /// How elements and the like are written, with unit and meaning, for listings.
 struct WrittenForm {
   std::string form;

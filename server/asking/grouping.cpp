@@ -28,6 +28,32 @@ bool gathers(GroupTokens tokens, std::size_t i) {
   return is_aggregate(tokens[i].text, arguments_in(tokens, i + 1, close));
 }
 
+/// The token behind what is called at `i`, FILTER (WHERE ...) included, which chooses among rows.
+std::size_t end_of_call(GroupTokens tokens, std::size_t i) {
+  const std::size_t close = closing_bracket(tokens, i + 1);
+  const bool is_filtered = close + 2 < tokens.size() && is_word(tokens[close + 1], "filter");
+  return std::min(tokens.size(), (is_filtered ? closing_bracket(tokens, close + 2) : close) + 1);
+}
+
+bool begins_question(GroupTokens tokens, std::size_t i) {
+  return tokens[i].is_sign('(') && i + 1 < tokens.size() && is_word(tokens[i + 1], "select");
+}
+
+/// The first function that makes one row of many; empty: none.
+std::string first_gathering(GroupTokens tokens) {
+  for (std::size_t i = 0; i < tokens.size(); ++i) {
+    if (begins_question(tokens, i)) {
+      i = closing_bracket(tokens, i);
+    } else if (calls(tokens, i) && gathers(tokens, i)) {
+      const std::size_t end = end_of_call(tokens, i);
+      if (end == tokens.size() || !is_word(tokens[end], "over")) {
+        return std::string(tokens[i].text);
+      }
+    }
+  }
+  return {};
+}
+
 /// The first column in `tokens` that is neither gathered nor one of `group`; empty: none.
 std::string loose_column(GroupTokens tokens, const std::vector<SqlItem>& group,
                          const std::vector<std::string>& columns) {
@@ -41,14 +67,10 @@ std::string loose_column(GroupTokens tokens, const std::vector<SqlItem>& group,
   for (std::size_t i = 0; i < tokens.size(); ++i) {
     const auto element = element_at(tokens.subspan(i));
     if (calls(tokens, i) && gathers(tokens, i)) {
-      i = closing_bracket(tokens, i + 1);
-      // FILTER (WHERE ...) chooses among the rows of the group.
-      if (i + 2 < tokens.size() && is_word(tokens[i + 1], "filter")) {
-        i = closing_bracket(tokens, i + 2);
-      }
+      i = end_of_call(tokens, i) - 1;
       continue;
     }
-    if (tokens[i].is_sign('(') && i + 1 < tokens.size() && is_word(tokens[i + 1], "select")) {
+    if (begins_question(tokens, i)) {
       i = closing_bracket(tokens, i);
       continue;
     }
@@ -93,6 +115,30 @@ void check_gathered(std::string_view flag, std::string_view text, std::string_vi
           "with avg(), min(), max(), median() or count(), or group by it too",
           flag, text, group, column));
     }
+  }
+}
+
+void check_gathered_into_one(std::string_view flag, std::string_view text,
+                             const std::vector<std::string>& columns) {
+  const auto tokens = sql_tokens(text);
+  const std::string function = first_gathering(tokens);
+  if (function.empty()) {
+    return;
+  }
+  for (const SqlItem& item : sql_items(tokens)) {
+    const std::string column =
+        item.text.starts_with("*") ? "*" : loose_column(item.tokens, {}, columns);
+    if (column.empty()) {
+      continue;
+    }
+    const bool chooses = same_but_case(function, "min") || same_but_case(function, "max");
+    throw solver::InputError(fmt::format(
+        "{} \"{}\" is not allowed: {}() makes one row of all, in which {} has many values; gather "
+        "it too, as with avg(), min(), max(), median() or count(), or{}{}",
+        flag, text, function, column,
+        column == "*" ? " ask for it alone" : fmt::format(" group by it: --group \"{}\"", column),
+        chooses ? "; the row that has the largest value comes by --order \"... DESC\" --limit 1"
+                : ""));
   }
 }
 

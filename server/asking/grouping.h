@@ -13,6 +13,11 @@ void check_gathered(std::string_view flag, std::string_view text, std::string_vi
                     const std::vector<std::string>& columns,
                     const std::vector<std::string>& names_given);
 
+/// Throws solver::InputError, naming `flag`, when a function in `text` gathers all rows into one
+/// and an item of it has one of `columns` beside that, whose value SQL would take from any row.
+void check_gathered_into_one(std::string_view flag, std::string_view text,
+                             const std::vector<std::string>& columns);
+
 /// Whether each row that `selected` gives is one of a point: no function gathers, and no row is
 /// left out for being like another.
 bool gives_points(std::string_view selected);

@@ -6,7 +6,6 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/suggestion.h"
 #include "server/asking/columns.h"
 #include "server/asking/elements.h"
 #include "server/asking/grouping.h"
@@ -14,38 +13,13 @@
 #include "server/asking/sql/sql_expression.h"
 #include "server/asking/sql/sql_items.h"
 #include "server/asking/statement.h"
+#include "server/asking/suggestions.h"
 #include "server/asking/units.h"
 #include "server/database/sqlite.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::server {
 namespace {
-
-/// What there is to say of a column that is not there.
-std::string with_columns(sqlite3* database, const std::string& message,
-                         const std::vector<std::string>& columns) {
-  constexpr std::string_view kNoColumn = "no such column: ";
-  const auto at = message.find(kNoColumn);
-  if (at == std::string::npos) {
-    return message;
-  }
-  const auto wrong = message.substr(at + kNoColumn.size());
-  Statement schema(database, "PRAGMA user_version");
-  const std::int64_t version = schema.step() ? schema.integer(0) : kSchemaVersion;
-  const auto all = all_columns();
-  const bool is_newer = std::any_of(all.begin(), all.end(),
-                                    [&](const Column& column) { return column.name == wrong; });
-  if (is_newer && version < kSchemaVersion) {
-    return fmt::format(
-        "{} in this database, which an earlier version wrote (its schema is {}, ours {}): the "
-        "start "
-        "of a server on it brings it up to date, as does one on a copy that `oblique backup` makes",
-        message, version, kSchemaVersion);
-  }
-  const std::vector<std::string_view> known(columns.begin(), columns.end());
-  return fmt::format("{}{}; the columns are {}", message, protocol::did_you_mean(wrong, known),
-                     protocol::joined(known));
-}
 
 /// Names and units. `text` is what was selected, as it was written.
 std::vector<PlannedColumn> planned_columns(std::vector<std::string> names,
@@ -130,6 +104,32 @@ std::string explanation_of(sqlite3* database, const protocol::StudyQuery& questi
          plan_of_sqlite(database, statement);
 }
 
+/// Throws solver::InputError, naming the flag, for a text that alone is no SQL: what SQLite says of
+/// the whole statement speaks of what stands around it.
+void check_syntax(sqlite3* database, const protocol::StudyQuery& question, Lists lists) {
+  const auto check = [&](const char* flag, const std::string& text, const std::string& sql) {
+    if (text.empty()) {
+      return;
+    }
+    try {
+      (void)columns_of_statement(database, sql);
+    } catch (const solver::InputError& error) {
+      const std::string_view says = error.what();
+      const bool is_cut = says.find("incomplete input") != std::string_view::npos;
+      if (is_cut || says.find("syntax error") != std::string_view::npos) {
+        throw solver::InputError(fmt::format(
+            "{} \"{}\" is not allowed: {}", flag, text,
+            is_cut ? "something must follow its end" : says.substr(says.find(": ") + 2)));
+      }
+    }
+  };
+  const std::string selected = selected_by(question);
+  check("--select", selected, "SELECT " + columns_with_elements(selected, lists));
+  check("--where", question.where(), "SELECT 1 WHERE " + with_elements(question.where(), lists));
+  check("--group", question.group(), "SELECT 1 GROUP BY " + with_elements(question.group(), lists));
+  check("--order", question.order(), "SELECT 1 ORDER BY " + with_elements(question.order(), lists));
+}
+
 /// A statement that gives the lines of a text.
 std::string statement_of_lines(const std::string& text) {
   std::string values;
@@ -164,7 +164,8 @@ Plan plan(sqlite3* database, const protocol::StudyQuery& question) {
     }
     plan.columns = planned_columns(std::move(names), written);
   } catch (const solver::InputError& error) {
-    throw solver::InputError(with_columns(database, error.what(), known));
+    check_syntax(database, question, study.lists);
+    throw solver::InputError(with_suggestions(database, error.what(), known));
   }
   if (question.explain()) {
     plan.explanation = explanation_of(database, question, study, rows, plan.statement);

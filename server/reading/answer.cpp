@@ -49,6 +49,7 @@ std::string Answer::planned() {
 }
 
 void Answer::begin() {
+  let_like_tell_capitals_apart(database_, request_.has_question());
   statement_ = prepare_query(database_, request_.has_question() ? planned() : request_.sql());
   begun_ = Clock::now();
   columns_ = sqlite3_column_count(statement_.get()) - (by_point_ ? 1 : 0);
@@ -120,7 +121,7 @@ bool Answer::step() {
                                   : took_too_long(limits_.time_limit_ms));
   }
   if (code != SQLITE_DONE) {
-    throw failure(database_, code);
+    throw_failure(database_, code);
   }
   return false;
 }

@@ -54,6 +54,15 @@ bool is_blank(std::string_view text) {
   return text.find_first_not_of(" \t\r\n;") == std::string_view::npos;
 }
 
+bool like_tells_capitals_apart(sqlite3* database) {
+  const StatementHandle statement = prepare_query(database, "SELECT 'a' LIKE 'A'");
+  const int code = sqlite3_step(statement.get());
+  if (code != SQLITE_ROW) {
+    throw failure(database, code);
+  }
+  return sqlite3_column_int(statement.get(), 0) == 0;
+}
+
 std::string mebibytes(std::int64_t bytes) {
   return std::to_string(bytes >> 20U) + " MiB";
 }
@@ -126,6 +135,33 @@ StatementHandle prepare_query(sqlite3* database, const std::string& sql) {
                          ", which has no value: write the value itself, a text in single quotes");
   }
   return statement;
+}
+
+void let_like_tell_capitals_apart(sqlite3* database, bool does) {
+  if (like_tells_capitals_apart(database) == does) {
+    return;
+  }
+  // Nobody else may set anything.
+  sqlite3_set_authorizer(database, nullptr, nullptr);
+  const int code = sqlite3_exec(
+      database, does ? "PRAGMA case_sensitive_like = ON" : "PRAGMA case_sensitive_like = OFF",
+      nullptr, nullptr, nullptr);
+  sqlite3_set_authorizer(database, &authorize, nullptr);
+  if (code != SQLITE_OK) {
+    throw failure(database, code);
+  }
+  // SQLite says nothing where it could not.
+  if (like_tells_capitals_apart(database) != does) {
+    throw QueryError("another statement is still running");
+  }
+}
+
+void throw_failure(sqlite3* database, int code) {
+  const QueryError error = failure(database, code);
+  if (static_cast<int>(static_cast<unsigned>(code) & 0xffU) == kWrongArgument) {
+    throw StatementError(error.what());
+  }
+  throw error;
 }
 
 QueryError failure(sqlite3* database, int code) {

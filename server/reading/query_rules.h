@@ -35,7 +35,16 @@ using StatementHandle = std::unique_ptr<sqlite3_stmt, int (*)(sqlite3_stmt*)>;
 /// one that needs too much.
 StatementHandle prepare_query(sqlite3* database, const std::string& sql);
 
+/// Whether LIKE tells capitals apart in statements that are prepared on `database` from now on. In
+/// modes S is stick and s slip, but SQLite's own LIKE takes one for the other. Throws QueryError
+/// while a statement runs there.
+void let_like_tell_capitals_apart(sqlite3* database, bool does);
+
 /// What a failed call on `database` means to the one who asked. `code` is what SQLite returned.
 QueryError failure(sqlite3* database, int code);
+
+/// Throws what a statement that failed while it ran means: StatementError where its functions were
+/// given what they do not take, else QueryError.
+[[noreturn]] void throw_failure(sqlite3* database, int code);
 
 }  // namespace oblique::server

@@ -108,6 +108,7 @@ protocol::QueryReply Reader::run(const std::string& sql, const QueryLimits& limi
   sqlite3* const database = database_.get();
   sqlite3_limit(database, SQLITE_LIMIT_LENGTH, static_cast<int>(limits.max_value_bytes));
   const RunningTime watch(database, interrupted_, limits.time_limit_ms);
+  let_like_tell_capitals_apart(database, false);
   const StatementHandle statement = prepare_query(database, sql);
   protocol::QueryReply reply;
   for (int i = 0; i < sqlite3_column_count(statement.get()); ++i) {
@@ -140,7 +141,7 @@ protocol::QueryReply Reader::run(const std::string& sql, const QueryLimits& limi
                                   : took_too_long(limits.time_limit_ms));
   }
   if (code != SQLITE_DONE) {
-    throw failure(database, code);
+    throw_failure(database, code);
   }
   return reply;
 }

@@ -30,6 +30,12 @@ struct Moments {
   double squares;
 };
 
+/// Fails the statement by the fault of whoever wrote it.
+void refuse(sqlite3_context* context, const char* why) {
+  sqlite3_result_error(context, why, -1);
+  sqlite3_result_error_code(context, kWrongArgument);
+}
+
 /// Whether the value is a number. NULL counts as none; for others the statement fails.
 bool is_number(sqlite3_context* context, sqlite3_value* value) {
   switch (sqlite3_value_type(value)) {
@@ -39,7 +45,7 @@ bool is_number(sqlite3_context* context, sqlite3_value* value) {
     case SQLITE_NULL:
       return false;
     default:
-      sqlite3_result_error(context, "median, percentile, variance and stddev take numbers", -1);
+      refuse(context, "median, percentile, variance and stddev take numbers");
       return false;
   }
 }
@@ -55,7 +61,7 @@ void add_number(sqlite3_context* context, sqlite3_value* value, double percent) 
   }
   if (numbers->count > 0 && numbers->percent != percent) {
     numbers->failed = true;
-    sqlite3_result_error(context, "percentile takes one percentage for all rows of a group", -1);
+    refuse(context, "percentile takes one percentage for all rows of a group");
     return;
   }
   numbers->percent = percent;
@@ -83,7 +89,7 @@ void percentile_step(sqlite3_context* context, int, sqlite3_value** arguments) {
   const int type = sqlite3_value_type(arguments[1]);
   const double percent = sqlite3_value_double(arguments[1]);
   if ((type != SQLITE_INTEGER && type != SQLITE_FLOAT) || !(percent >= 0.0 && percent <= kWhole)) {
-    sqlite3_result_error(context, "percentile(x, p) takes a percentage p from 0 to 100", -1);
+    refuse(context, "percentile(x, p) takes a percentage p from 0 to 100");
     return;
   }
   add_number(context, arguments[0], percent);

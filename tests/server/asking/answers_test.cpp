@@ -179,6 +179,55 @@ TEST_F(Answers, AGroupHasOneValueOfWhatItIsAskedFor) {
   EXPECT_EQ(objection(sorted), "");
 }
 
+TEST_F(Answers, AColumnBesideWhatMakesOneRowOfAllIsRefused) {
+  const auto said = [&](const std::string& select) { return objection(question(select)); };
+  EXPECT_THAT(said("median(mu), mode"),
+              AllOf(HasSubstr("--select"), HasSubstr("median()"), HasSubstr("mode has many values"),
+                    HasSubstr("--group \"mode\"")));
+  EXPECT_THAT(said("mu, count(*) FILTER (WHERE e = 1)"), HasSubstr("mu has many"));
+  EXPECT_THAT(said("*, count(*)"), HasSubstr("* has many"));
+  EXPECT_THAT(said("peaks[0].fn_N, avg(mu)"), HasSubstr("peaks[0].fn_N has many"));
+  EXPECT_THAT(said("max(fn_peak_N), point"),
+              AllOf(HasSubstr("point has many"), HasSubstr("--order")));
+  for (const char* right :
+       {"median(mu), max(mu) - min(mu), 1", "count(*)", "mu, e", "mu, max(mu, e)",
+        "mu, avg(mu) OVER ()", "mu, (SELECT max(mu) FROM runs) AS most"}) {
+    EXPECT_EQ(said(right), "") << right;
+  }
+}
+
+TEST_F(Answers, WhatIsMisspeltIsNamedWithTheNearest) {
+  const auto said = [&](const std::string& select) { return objection(question(select)); };
+  EXPECT_THAT(said("media(mu)"), HasSubstr("did you mean `median(x)`?"));
+  EXPECT_THAT(said("peak[0].fn_N"), AllOf(HasSubstr("peak is no list"), HasSubstr("`peaks`")));
+  EXPECT_THAT(said("fn_peak_N[0]"), AllOf(HasSubstr("is no list"), HasSubstr("`fn_peaks_N`")));
+  EXPECT_THAT(said("peaks[0].fn"), HasSubstr("did you mean `fn_N`"));
+  EXPECT_THAT(said("longest_phse.duration_s"),
+              HasSubstr("did you mean `longest_phase.duration_s`?"));
+  EXPECT_THAT(said("peaks.cnt"), HasSubstr("`peaks.count`"));
+  EXPECT_THAT(said("fn_pk"), HasSubstr("did you mean `fn_peak_N`"));
+  EXPECT_THAT(said("mode, count"), HasSubstr("did you mean `count(*)`?"));
+  EXPECT_EQ(said("mu [0]"), "");  // a name with a number in it
+}
+
+TEST_F(Answers, AWrongColumnIsToldInALine) {
+  const std::string said = objection(question("stik_total_s"));
+  EXPECT_THAT(said, AllOf(HasSubstr("`stick_total_s`"), HasSubstr("oblique columns")));
+  EXPECT_LT(said.size(), 150U) << said;
+  EXPECT_THAT(objection(question("xyzzy")), testing::Not(HasSubstr("did you mean")));
+}
+
+TEST_F(Answers, WhatEndsTooEarlyIsNamedByItsFlag) {
+  EXPECT_THAT(objection(question("mu", "mu >")),
+              AllOf(HasSubstr("--where \"mu >\""), HasSubstr("must follow")));
+  EXPECT_THAT(objection(question("mu +")), HasSubstr("--select \"mu +\""));
+  EXPECT_THAT(objection(question("mu", "mu = = 1")),
+              AllOf(HasSubstr("--where"), HasSubstr("near \"=\"")));
+  auto sorted = question("mu");
+  sorted.set_order("mu DESC DESC");
+  EXPECT_THAT(objection(sorted), HasSubstr("--order \"mu DESC DESC\""));
+}
+
 TEST_F(Answers, APlanCanBeSeen) {
   auto asked = question("mu", "mu > 0.5 AND fn_peak_N > 0");
   asked.set_explain(true);

@@ -173,5 +173,38 @@ TEST_F(AnswerTest, ToAWrongQuestionIsWrongUsage) {
   EXPECT_THROW(reader.answer(request, {}), solver::InputError);
 }
 
+TEST_F(AnswerTest, LikeTellsCapitalsApartInAQuestionAndNotInSqlWhicheverComesFirst) {
+  Reader reader(path_);
+  const auto found = [&](const protocol::QueryRequest& request) {
+    const auto chunk = reader.answer(request, {}).next();
+    protocol::ChunkRows rows(chunk);
+    return rows.next() ? rows.cell(0).integer : -1;
+  };
+  const auto asked = [](const std::string& condition) {
+    protocol::QueryRequest request;
+    request.mutable_question()->set_study("a");
+    request.mutable_question()->add_select("count(*)");
+    request.mutable_question()->set_where(condition);
+    return request;
+  };
+  protocol::QueryRequest sql;
+  sql.set_sql("SELECT count(*) FROM runs WHERE mode LIKE lower(mode)");
+  for (int times = 0; times < 2; ++times) {
+    EXPECT_EQ(found(asked("mode LIKE lower(mode)")), 0);
+    EXPECT_EQ(found(asked("mode LIKE mode AND mode LIKE 'S%' ESCAPE '!'")), 9);
+    EXPECT_EQ(found(sql), 9);
+    EXPECT_EQ(reader.query(sql.sql(), {}).rows(0).values(0).integer(), 9);
+  }
+}
+
+TEST_F(AnswerTest, AFunctionThatIsGivenWhatItDoesNotTakeIsWrongUsage) {
+  Reader reader(path_);
+  protocol::QueryRequest request;
+  request.mutable_question()->set_study("a");
+  request.mutable_question()->add_select("percentile(mu, 100 + 20)");
+  EXPECT_THROW(reader.answer(request, {}).next(), StatementError);
+  EXPECT_THROW(reader.query("SELECT percentile(mu, 120) FROM runs", {}), StatementError);
+}
+
 }  // namespace
 }  // namespace oblique::server

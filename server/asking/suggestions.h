@@ -1,0 +1,22 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <sqlite3.h>
+
+namespace oblique::server {
+
+/// " (did you mean `a`, `b` or `c`?)" with those of `candidates` that `word` may be short for or
+/// misspelt from, the nearest first, or nothing. Letters that were left out count less than others,
+/// so fn_pk is near to fn_peak_N.
+std::string did_you_mean_some(std::string_view word, std::span<const std::string> candidates);
+
+/// What SQLite has against a question on `database`, with the columns, elements of lists or
+/// functions that may have been meant. `columns` are those that questions have there.
+std::string with_suggestions(sqlite3* database, const std::string& message,
+                             const std::vector<std::string>& columns);
+
+}  // namespace oblique::server
