@@ -123,7 +123,7 @@ TEST_F(MigratedValuesTest, AreInASoundFileThatHasNoEmptyPagesAndKnowsWhatIsSettl
   {
     const Store store(path_, [&](const std::string& sentence) { said.push_back(sentence); });
   }
-  EXPECT_THAT(said, testing::Contains(HasSubstr("from schema 7 to 8, with about 2")));
+  EXPECT_THAT(said, testing::Contains(HasSubstr("from schema 7 to 8, once, with about 2")));
   EXPECT_THAT(find_faults(path_), testing::IsEmpty());
   EXPECT_THAT(texts(path_, "PRAGMA auto_vacuum"), ElementsAre("2"));
   EXPECT_THAT(texts(path_, "PRAGMA freelist_count"), ElementsAre("0"));
