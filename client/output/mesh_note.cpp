@@ -26,6 +26,8 @@ int coarsest(const protocol::Recipe& recipe) {
       take(protocol::from_message(recipe.model()).elements_per_link);
     } else if (axis->count() > 0) {
       take(static_cast<int>(axis->from()));
+    } else if (axis->values().empty()) {
+      continue;  // only points tell
     } else {
       take(static_cast<int>(*std::min_element(axis->values().begin(), axis->values().end())));
     }
@@ -39,7 +41,7 @@ void tell_mesh(std::ostream& out, const protocol::Recipe& recipe) {
   const int published = solver::preset("paper").elements_per_link;
   const int converged = solver::preset("converged").elements_per_link;
   const int elements = coarsest(recipe);
-  if (elements >= converged) {
+  if (elements == 0 || elements >= converged) {
     return;
   }
   if (elements >= kForcesConverge) {

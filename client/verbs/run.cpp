@@ -4,6 +4,7 @@
 #include <string>
 
 #include "client/output/mesh_note.h"
+#include "client/output/unjudged_note.h"
 #include "client/service/connection.h"
 #include "client/service/embedded_service.h"
 #include "client/service/run_service.h"
@@ -34,6 +35,7 @@ int run(const RunFlags& flags) {
   const auto study = study_of_flags(flags.study, tip_reach());
   check_settings(flags.settings);
   tell_mesh(std::cerr, study.recipe);
+  tell_unjudged(std::cerr, study.recipe);
   // Before any thread is started; see StopSignals.
   protocol::StopSignals stop;
   const auto end = run_study(study, flags.settings, stop);

@@ -11,6 +11,7 @@
 
 #include "client/output/human_units.h"
 #include "client/output/mesh_note.h"
+#include "client/output/unjudged_note.h"
 #include "client/output/work_line.h"
 #include "client/study/study_flags.h"
 #include "client/verbs/solving_rate.h"
@@ -73,6 +74,7 @@ struct Report {
   std::uint64_t models;
   std::optional<std::uint64_t> falls;  ///< none where there are too many models to look at
   std::vector<BlockReport> blocks;
+  std::vector<std::uint64_t> unjudged;  ///< of the blocks, from 0
   std::optional<SolvingRate> rate;
 };
 
@@ -136,7 +138,14 @@ std::optional<std::uint64_t> falls_of(const protocol::PointTable& table) {
 
 Report report_of(const std::string& name,
                  const std::shared_ptr<const protocol::PointTable>& table) {
-  Report report{name, table->size(), table->points(), table->models(), falls_of(*table), {}, {}};
+  Report report{name,
+                table->size(),
+                table->points(),
+                table->models(),
+                falls_of(*table),
+                {},
+                unjudged_blocks(table->recipe()),
+                {}};
   for (int i = 0; i < table->recipe().blocks_size(); ++i) {
     report.blocks.push_back(report_of_block(*table, i));
   }
@@ -222,6 +231,7 @@ nlohmann::ordered_json json_of(const Report& report, bool wants_errors) {
                               {"first", json_of(block.first)},
                               {"last", json_of(block.last)}});
   }
+  json["blocks_not_judged"] = report.unjudged;
   if (report.rate) {
     const auto& rate = *report.rate;
     json["time_s"] = rate.time_s(report.points, falls_to_solve(report, wants_errors));
@@ -264,6 +274,7 @@ int check_study(const CheckFlags& flags) {
   } else {
     print(report, wants_errors);
     tell_mesh(std::cerr, table->recipe());
+    tell_unjudged(std::cerr, table->recipe());
   }
   return kDone;
 }

@@ -8,6 +8,7 @@
 
 #include "client/output/human_units.h"
 #include "client/output/mesh_note.h"
+#include "client/output/unjudged_note.h"
 #include "client/service/connection.h"
 #include "client/service/result_query.h"
 #include "client/service/source_flags.h"
@@ -117,6 +118,7 @@ int submit(const SubmitFlags& flags) {
     const auto reply = connection.submit(study, flags.terms);
     tell_submitted(study, reply, flags.terms);
     tell_mesh(std::cerr, study.recipe);
+    tell_unjudged(std::cerr, study.recipe);
     submitted = true;
     return flags.watch || flags.rows ? watch(study, reply.study_id(), flags.rows.value_or(0),
                                              query_for_more(study, server), connection, stop)

@@ -16,6 +16,8 @@ namespace oblique::server {
 namespace {
 
 constexpr std::size_t kMostLines = 10;
+/// Where more blocks differ no further ones are compared.
+constexpr std::size_t kMostCompared = 200;
 constexpr std::size_t kLongestShown = 60;
 
 /// "key=value" of a line of a canonical text.
@@ -142,9 +144,12 @@ class Difference {
       add(fmt::format("{}: stored {}, given {}, in another order", where, keys(was), keys(is)));
     }
   }
+  /// Enough is found to be shown.
+  bool is_long() const { return found_ >= kMostCompared; }
   std::string text() const {
     std::string text = fmt::format("{}", fmt::join(lines_, "\n"));
-    return found_ > lines_.size() ? fmt::format("{}\nand {} more", text, found_ - lines_.size())
+    return found_ > lines_.size() ? fmt::format("{}\nand {} more{}", text, found_ - lines_.size(),
+                                                is_long() ? " at least" : "")
                                   : text;
   }
 
@@ -206,7 +211,7 @@ Growth growth_of(const protocol::Recipe& stored, const protocol::Recipe& given) 
   const int common = std::min(stored.blocks_size(), given.blocks_size());
   bool grows = given.blocks_size() > stored.blocks_size();
   bool shrinks = given.blocks_size() < stored.blocks_size();
-  for (int i = 0; i < common; ++i) {
+  for (int i = 0; i < common && !difference.is_long(); ++i) {
     const protocol::Block& was = stored.blocks(i);
     const protocol::Block& is = given.blocks(i);
     if (are_same(was, is)) {

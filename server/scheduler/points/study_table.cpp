@@ -16,6 +16,18 @@ protocol::Recipe parsed(const std::string& bytes) {
   return recipe;
 }
 
+/// Whether a message is another with blocks, and nothing else, put behind it. Messages of one kind
+/// one behind the other are one: lists go on. As most studies grow; no look at what is there.
+bool is_longer_by_blocks(const std::string& bytes, const std::string& longer) {
+  protocol::Recipe rest;
+  if (longer.size() <= bytes.size() || !longer.starts_with(bytes) ||
+      !rest.ParseFromString(longer.substr(bytes.size())) || rest.blocks_size() == 0) {
+    return false;
+  }
+  rest.clear_blocks();
+  return rest.ByteSizeLong() == 0;
+}
+
 }  // namespace
 
 StudyTable::StudyTable(std::shared_ptr<const protocol::PointTable> table)
@@ -57,7 +69,15 @@ const protocol::Sha256::Digest& StudyTable::digest() const {
 }
 
 Growth StudyTable::growth_to(const StudyTable& other) const {
-  return growth_of(parsed(recipe_bytes()), parsed(other.recipe_bytes()));
+  if (is_longer_by_blocks(recipe_bytes(), other.recipe_bytes())) {
+    return {Growth::Kind::kLonger, {}};
+  }
+  const auto recipe_in = [](const StudyTable& table, protocol::Recipe& own) -> const auto& {
+    return table.is_made() ? table.get()->recipe() : own = parsed(table.recipe_bytes());
+  };
+  protocol::Recipe own;
+  protocol::Recipe others;
+  return growth_of(recipe_in(*this, own), recipe_in(other, others));
 }
 
 bool StudyTable::is_of_the_recipe_of(const StudyTable& other) const {

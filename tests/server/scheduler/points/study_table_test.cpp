@@ -36,6 +36,28 @@ TEST(StudyTable, IsOfTheRecipeOfAnotherThatIsWrittenInAnotherWay) {
   EXPECT_TRUE(judged(as_range).is_of_the_recipe_of(stored(as_list, 5)));
 }
 
+TEST(StudyTable, GrowsByBlocksWhicheverOfBothTablesIsMadeAndByNothingElse) {
+  protocol::Recipe before = recipe_of_mu(listed("mu", {0.1, 0.2}));
+  protocol::Recipe longer = before;
+  *longer.add_blocks() = recipe_of_mu(listed("mu", {0.3})).blocks(0);
+  for (const bool with_errors : {false, true}) {
+    before.set_errors(with_errors);
+    longer.set_errors(with_errors);
+    for (const StudyTable& one : {judged(before), stored(before, 2)}) {
+      for (const StudyTable& other : {judged(longer), stored(longer, 3)}) {
+        EXPECT_EQ(one.growth_to(other).kind, Growth::Kind::kLonger);
+        EXPECT_EQ(other.growth_to(one).kind, Growth::Kind::kShorter);
+        EXPECT_EQ(one.growth_to(one).kind, Growth::Kind::kSame);
+      }
+    }
+  }
+  before.set_errors(false);
+  EXPECT_EQ(judged(before).growth_to(judged(longer)).kind, Growth::Kind::kOther) << "errors differ";
+  longer.set_errors(false);
+  *longer.mutable_model() = protocol::to_message(solver::preset("converged"));
+  EXPECT_EQ(judged(before).growth_to(judged(longer)).kind, Growth::Kind::kOther) << "models differ";
+}
+
 TEST(StudyTable, IsNotOfARecipeWithAnotherPointOrModel) {
   const auto table = judged(recipe_of_mu(listed("mu", {0.1, 0.2})));
   EXPECT_FALSE(table.is_of_the_recipe_of(judged(recipe_of_mu(listed("mu", {0.2, 0.1})))));
