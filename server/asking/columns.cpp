@@ -50,9 +50,11 @@ std::string list_sql(const solver::ListPart& part) {
   const std::string where =
       part.where.empty() ? "" : fmt::format(" WHERE item.value ->> {}", number_of(part.where));
   return fmt::format(
-      "CASE WHEN json_valid({0}) THEN '[' || coalesce((SELECT group_concat(item.value -> {1}) FROM "
-      "json_each({0}) AS item{2}), '') || ']' END",
-      packed, number_of(part.member), where);
+      "coalesce(list_member({0}, {1}, {3}), CASE WHEN json_valid({0}) THEN '[' || "
+      "coalesce((SELECT group_concat(item.value -> {1}) FROM json_each({0}) AS item{2}), '') || "
+      "']' "
+      "END)",
+      packed, number_of(part.member), where, part.where.empty() ? -1 : number_of(part.where));
 }
 
 std::string place_in_json(const solver::ResultField& field) {

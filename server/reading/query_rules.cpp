@@ -5,6 +5,8 @@
 #include <string_view>
 #include <utility>
 
+#include "server/asking/lists/list_functions.h"
+#include "server/asking/lists/quick_views.h"
 #include "server/asking/sql/sql_functions.h"
 #include "server/database/sqlite.h"
 
@@ -95,6 +97,8 @@ void restrict_to_reading(sqlite3* database) {
   // SQLite makes these tables of functions when they are first named, which would be refused then.
   execute(database, "SELECT 1 FROM json_each('[]'), json_tree('[]')");
   add_functions(database);
+  add_list_functions(database);
+  add_quick_views(database);
   sqlite3_set_authorizer(database, &authorize, nullptr);
 }
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "proto/result_message.h"
+#include "server/asking/lists/list_functions.h"
 #include "server/database/open_for_reading.h"
 #include "server/reading/reader.h"
 #include "server/store/store.h"
@@ -51,7 +52,9 @@ class PlanTest : public testing::Test {
   }
 
   Plan plan_of(const protocol::StudyQuery& question) const {
-    return plan(open_for_reading(path_).database.get(), question);
+    const auto database = open_for_reading(path_).database;
+    add_list_functions(database.get());
+    return plan(database.get(), question);
   }
 
   /// The first value of each row, as a number.
