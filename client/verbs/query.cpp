@@ -22,10 +22,10 @@ constexpr const char* kQueryExamples = R"(Examples:
   oblique query friction --where "H = 1 AND e = 1" --explain
 
 `oblique columns` lists columns, elements of lists (from 0) and functions, in the case in which they
-are written: e is the restitution coefficient, E_Pa Young's modulus. LIKE tells capitals apart, as in
-"mode LIKE 'SC%'": S is stick and s slip. EXPR and COLUMNS are SQL
-expressions, without comments and parameters, over values in SI units. Tables show some columns in
-other units, which stand in brackets in the heading.)";
+are written: e is the restitution coefficient, E_Pa Young's modulus. LIKE tells capitals apart, as
+in "mode LIKE 'SC%'": S is stick and s slip. EXPR and COLUMNS are SQL expressions, without comments
+and parameters, over values in SI units. Tables show some columns in other units, which stand in
+brackets in the heading.)";
 
 struct QueryFlags {
   ResultQuery query;

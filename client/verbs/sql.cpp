@@ -16,9 +16,11 @@ constexpr const char* kSqlExamples = R"(Examples:
   oblique sql "SELECT name, sql FROM sqlite_schema"     tables and views
 
 One statement that only reads, in SQLite's SQL with median(x), percentile(x, p), stddev(x) and
-variance(x) beside its functions. Of `oblique query` alone are elements as peaks[0].fn_N, here
-peaks ->> '$[0][1]' or the views peaks, phases, stick_intervals and reaction_peaks; count_mode('SC SR'), here
-count(*) FILTER (WHERE major_mode = 'SC SR'); and that LIKE tells capitals apart, here GLOB 'SC*'.)";
+variance(x) beside its functions. What `oblique query` alone knows is written otherwise here:
+  peaks[0].fn_N           peaks ->> '$[0][1]', or the views peaks, phases, stick_intervals and
+                          reaction_peaks
+  count_mode('SC SR')     count(*) FILTER (WHERE major_mode = 'SC SR')
+  mode LIKE 'SC%'         mode GLOB 'SC*': SQLite's LIKE takes s for S)";
 
 struct SqlFlags {
   std::string statement;
