@@ -202,14 +202,25 @@ void NpyColumn::add(const Cell& cell) {
   }
 }
 
+/// A column of nothing but NULL, or of nothing, is of its usual kind, as far as that has NULL.
+NpyColumn::Kind NpyColumn::kind_in_file() const {
+  if (kind_ != Kind::kNull) {
+    return kind_;
+  }
+  return usual_ == CellKind::kText                    ? Kind::kText
+         : usual_ == CellKind::kInteger && rows_ == 0 ? Kind::kInteger
+                                                      : Kind::kReal;
+}
+
 std::uint64_t NpyColumn::item_bytes() const {
-  return kind_ == Kind::kText ? longest_ * sizeof(char32_t) : sizeof(double);
+  return kind_in_file() == Kind::kText ? longest_ * sizeof(char32_t) : sizeof(double);
 }
 
 std::string NpyColumn::header() const {
-  const std::string type = kind_ == Kind::kText      ? fmt::format("U{}", longest_)
-                           : kind_ == Kind::kInteger ? "i8"
-                                                     : "f8";
+  const Kind kind = kind_in_file();
+  const std::string type = kind == Kind::kText      ? fmt::format("U{}", longest_)
+                           : kind == Kind::kInteger ? "i8"
+                                                    : "f8";
   std::uint64_t rows = rows_;
   std::string row_shape;
   for (const std::uint64_t size : row_shape_) {
@@ -278,8 +289,11 @@ void NpyColumn::write(const std::function<void(std::string_view)>& take) {
   } else if (values_ != nullptr) {
     values_->read(sizeof(double), take);
   } else {
+    const bool is_text = kind_in_file() == Kind::kText;
+    const std::string nothing =
+        is_text ? std::string(item_bytes(), '\0') : std::string(bytes_of(kNull));
     for (std::uint64_t row = 0; row < rows_; ++row) {
-      take(bytes_of(kNull));
+      take(nothing);
     }
   }
 }

@@ -34,7 +34,11 @@ void write_npz(const std::vector<NamedColumn>& columns, Sink& sink) {
 void NpzPrinter::print(const protocol::QueryReply& chunk) {
   if (columns_.empty()) {
     for (std::string& name : distinct_names(chunk)) {
-      columns_.push_back({std::move(name), std::make_unique<NpyColumn>(folder_)});
+      const std::size_t i = columns_.size();
+      columns_.push_back(
+          {std::move(name),
+           std::make_unique<NpyColumn>(folder_, std::vector<std::uint64_t>(),
+                                       i < usual_.size() ? usual_[i] : protocol::CellKind::kNull)});
     }
   }
   protocol::ChunkRows rows(chunk);

@@ -22,7 +22,9 @@ void write_npz(const std::vector<NamedColumn>& columns, Sink& sink);
 class NpzPrinter : public RowPrinter {
  public:
   /// Columns are kept in files without a name in `folder`; empty: in that for temporary files.
-  NpzPrinter(Sink& sink, std::string folder) : sink_(sink), folder_(std::move(folder)) {}
+  /// `usual` as in PrinterSettings.
+  NpzPrinter(Sink& sink, std::string folder, std::vector<protocol::CellKind> usual)
+      : sink_(sink), folder_(std::move(folder)), usual_(std::move(usual)) {}
 
   void print(const protocol::QueryReply& chunk) override;
   void end() override;
@@ -30,6 +32,7 @@ class NpzPrinter : public RowPrinter {
  private:
   Sink& sink_;
   std::string folder_;
+  std::vector<protocol::CellKind> usual_;
   std::vector<NamedColumn> columns_;
 };
 

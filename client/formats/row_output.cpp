@@ -1,8 +1,8 @@
 #include "client/formats/row_output.h"
 
-#include <filesystem>
 #include <utility>
 
+#include "client/formats/new_file.h"
 #include "client/formats/pager.h"
 #include "worker/solver/model/errors.h"
 
@@ -31,6 +31,7 @@ PrinterSettings printer_settings(const OutputSettings& settings, const TerminalS
   PrinterSettings of_printer;
   of_printer.shown = settings.shown;
   of_printer.way_to_all = settings.way_to_all;
+  of_printer.usual = settings.usual;
   if (settings.file.empty() && terminal.lines > 0) {
     of_printer.width = terminal.columns;
     of_printer.keeps_all = !settings.may_leave_out;
@@ -38,7 +39,7 @@ PrinterSettings printer_settings(const OutputSettings& settings, const TerminalS
   }
   if (!settings.file.empty()) {
     // Its own disk has the room that it needs, or it finds none there either.
-    of_printer.folder = std::filesystem::absolute(settings.file).parent_path();
+    of_printer.folder = scratch_folder(settings.file);
   }
   return of_printer;
 }

@@ -17,6 +17,7 @@ struct OutputSettings {
   bool may_leave_out = true;  ///< a table that does not fit the terminal lacks columns
   std::string way_to_all = PrinterSettings().way_to_all;  ///< see PrinterSettings
   std::vector<ShownColumn> shown = {};                    ///< see PrinterSettings
+  std::vector<protocol::CellKind> usual = {};             ///< see PrinterSettings
 };
 
 /// Where the rows of an answer go: standard output, a pager where that is a terminal, or a file,

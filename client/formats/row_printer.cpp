@@ -2,10 +2,14 @@
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
 #include <utility>
+
+#include <spdlog/fmt/fmt.h>
 
 #include "client/formats/csv_printer.h"
 #include "client/formats/json_printer.h"
+#include "client/formats/new_file.h"
 #include "client/formats/npz_printer.h"
 #include "client/formats/table_printer.h"
 #include "proto/suggestion.h"
@@ -29,6 +33,40 @@ Format format_named(std::string_view name) {
   return static_cast<Format>(found - kFormatNames.begin());
 }
 
+std::string contradiction(std::string_view flag, std::string_view ending, const std::string& file) {
+  return flag == ending
+             ? std::string()
+             : fmt::format(
+                   "--format {} and --out {} contradict each other: a name that ends so is "
+                   "for {}; leave the flag out, or give the file another ending",
+                   flag, file, ending);
+}
+
+Format format_of_output(const std::string& flag, const std::string& file) {
+  const std::string ending = std::filesystem::path(file).extension().string();
+  const std::string_view meant =
+      ending == ".md" ? "markdown" : std::string_view(ending).substr(ending.empty() ? 0 : 1);
+  const bool is_known = meant != "table" && std::find(kFormatNames.begin(), kFormatNames.end(),
+                                                      meant) != kFormatNames.end();
+  if (!flag.empty()) {
+    const Format format = format_named(flag);
+    if (const std::string wrong = contradiction(flag, meant, file); is_known && !wrong.empty()) {
+      throw solver::InputError(wrong);
+    }
+    return format;
+  }
+  if (is_known) {
+    return format_named(meant);
+  }
+  if (file.empty() || file_place(file).is_in_place) {
+    return Format::kTable;
+  }
+  throw solver::InputError(
+      fmt::format("--out {} does not say in which format: end its name in .csv, .json, .jsonl, "
+                  ".npz or .md, or give --format",
+                  file));
+}
+
 std::unique_ptr<RowPrinter> made_printer(Format format, Sink& sink, PrinterSettings settings) {
   switch (format) {
     case Format::kCsv:
@@ -38,7 +76,8 @@ std::unique_ptr<RowPrinter> made_printer(Format format, Sink& sink, PrinterSetti
     case Format::kJsonLines:
       return std::make_unique<JsonPrinter>(sink, JsonPrinter::Shape::kLines);
     case Format::kNpz:
-      return std::make_unique<NpzPrinter>(sink, std::move(settings.folder));
+      return std::make_unique<NpzPrinter>(sink, std::move(settings.folder),
+                                          std::move(settings.usual));
     case Format::kMarkdown:
       return std::make_unique<MarkdownPrinter>(sink, std::move(settings.shown));
     case Format::kTable:

@@ -8,6 +8,7 @@
 
 #include "client/formats/sink.h"
 #include "proto/oblique.pb.h"
+#include "proto/wire/cell.h"
 
 namespace oblique::client {
 
@@ -16,6 +17,16 @@ enum class Format { kTable, kCsv, kJson, kJsonLines, kNpz, kMarkdown };
 /// The format of that name: `table`, `csv`, `json`, `jsonl`, `npz` or `markdown`. Throws
 /// solver::InputError for other names.
 Format format_named(std::string_view name);
+
+/// The format that --format names or, where that is empty, the end of the file's name: .csv, .json,
+/// .jsonl, .npz or .md; a table for standard output (`file` empty), and for what is written in
+/// place, as /dev/stdout. Throws solver::InputError for names and ends of no format, and for a name
+/// that ends as another format than the flag names.
+Format format_of_output(const std::string& flag, const std::string& file);
+
+/// The sentence for a file whose name ends as format `ending` while --format names `flag`; empty
+/// where both are one.
+std::string contradiction(std::string_view flag, std::string_view ending, const std::string& file);
 
 /// Whether it is for reading, not for other programs.
 inline bool is_for_people(Format format) {
@@ -54,6 +65,9 @@ struct PrinterSettings {
   std::vector<ShownColumn> shown = {};
   /// Of NumPy's archives: where columns are kept until they are whole.
   std::string folder = {};
+  /// Of NumPy's archives: of which kind each column is when it has no values; where there is none,
+  /// real.
+  std::vector<protocol::CellKind> usual = {};
 };
 
 /// Prints to `sink`, which must outlive it.
@@ -63,7 +77,8 @@ struct PrinterSettings {
 /// object a line) hold every number as the shortest text that reads back as the same bits; NULL is
 /// an empty field, respectively null. In JSON the second of two columns of one name is called
 /// name_2, and lists that columns pack as text are arrays; see packed_columns.h. NumPy's archive
-/// (.npz) has an array a column: int64, float64, in which NULL is nan, or text of fixed width.
+/// (.npz) has an array a column: int64, float64, in which NULL is nan, or text of fixed width;
+/// lists are texts of JSON.
 std::unique_ptr<RowPrinter> made_printer(Format format, Sink& sink, PrinterSettings settings = {});
 
 /// A key stands for one value only: of equal names the second becomes name_2, and so on.

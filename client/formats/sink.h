@@ -62,25 +62,6 @@ class StandardOutput : public Sink {
   bool is_terminal_;
 };
 
-/// A file that appears under its name, whole, when it is finished. Before that, and if that never
-/// happens, what was there under the name stays.
-class NewFile : public Sink {
- public:
-  /// `flag` named it. Throws solver::InputError when it cannot be made.
-  explicit NewFile(std::string path, std::string_view flag = "--out");
-  ~NewFile() override;
-
-  void finish() override;
-
- protected:
-  void write(std::string_view bytes) override;
-
- private:
-  std::string path_;
-  std::string draft_;  // empty: written in place, as a device or a named pipe is
-  int descriptor_ = -1;
-};
-
 /// A text.
 class TextSink : public Sink {
  public:

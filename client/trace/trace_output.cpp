@@ -10,6 +10,8 @@
 #include <spdlog/fmt/fmt.h>
 #include <nlohmann/json.hpp>
 
+#include "client/formats/new_file.h"
+#include "client/formats/row_printer.h"
 #include "client/output/case_report.h"
 #include "client/output/trace_table.h"
 #include "proto/suggestion.h"
@@ -30,20 +32,22 @@ std::optional<TraceFormat> format_called(std::string_view name) {
 }  // namespace
 
 TraceFormat trace_format(const std::string& flag, const std::string& file) {
-  if (!flag.empty()) {
-    if (const auto format = format_called(flag)) {
-      return *format;
-    }
-    throw solver::InputError(fmt::format("--format {} is not allowed: it must be one of {}{}", flag,
-                                         protocol::joined(kFormats),
-                                         protocol::did_you_mean(flag, kFormats)));
-  }
   const std::string ending = std::filesystem::path(file).extension().string();
-  if (file.empty() || ending.empty()) {
-    return TraceFormat::kCsv;
-  }
-  if (const auto format = format_called(ending.substr(1))) {
+  const auto of_file = format_called(std::string_view(ending).substr(ending.empty() ? 0 : 1));
+  if (!flag.empty()) {
+    const auto format = format_called(flag);
+    if (!format) {
+      throw solver::InputError(fmt::format("--format {} is not allowed: it must be one of {}{}",
+                                           flag, protocol::joined(kFormats),
+                                           protocol::did_you_mean(flag, kFormats)));
+    }
+    if (of_file && of_file != format) {
+      throw solver::InputError(contradiction(flag, ending.substr(1), file));
+    }
     return *format;
+  }
+  if (of_file || file.empty() || ending.empty()) {
+    return of_file.value_or(TraceFormat::kCsv);
   }
   throw solver::InputError(
       fmt::format("--out {} does not say in which format: end its name in .csv, .json or .npz, or "
@@ -75,8 +79,7 @@ void TraceOutput::begin(const solver::TraceShape& shape) {
     append_trace_header(sink_->held(), shape);
   } else if (format_ == TraceFormat::kNpz) {
     // The file's own disk has the room that it needs, or it finds none there either.
-    archive_ = std::make_unique<TraceArchive>(
-        shape, path_.empty() ? "" : std::filesystem::absolute(path_).parent_path().string());
+    archive_ = std::make_unique<TraceArchive>(shape, path_.empty() ? "" : scratch_folder(path_));
   }
 }
 

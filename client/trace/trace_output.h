@@ -18,7 +18,7 @@ namespace oblique::client {
 enum class TraceFormat { kCsv, kJson, kNpz };
 
 /// The format that a flag names or, where it is empty, the end of the file's name; CSV unless told.
-/// Throws solver::InputError for other names.
+/// Throws solver::InputError for other names, and for a file whose name ends as another format.
 TraceFormat trace_format(const std::string& flag, const std::string& file);
 
 /// Where a trace goes: a file, which appears whole at the end only, or, where that is empty,

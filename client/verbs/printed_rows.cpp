@@ -2,6 +2,7 @@
 
 #include <iostream>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
@@ -13,6 +14,7 @@
 #include "proto/text.h"
 #include "proto/wire/chunk_rows.h"
 #include "proto/wire/chunk_writer.h"
+#include "server/asking/columns.h"
 
 namespace oblique::client {
 
@@ -23,23 +25,35 @@ void add_format_flag(CLI::App& verb, std::string& format) {
 }
 
 void add_output_flags(CLI::App& verb, OutputFlags& flags) {
-  add_format_flag(verb, flags.format);
+  verb.add_option("--format", flags.format,
+                  "table, csv, json, jsonl, npz or markdown; as the file's name ends when left "
+                  "out, else table")
+      ->type_name("FORMAT");
   verb.add_option("--out", flags.file, "file to write, which appears when it is whole")
       ->type_name("FILE");
   verb.add_flag("--no-pager", flags.no_pager,
                 "print long tables on a terminal without $OBLIQUE_PAGER, $PAGER or less");
 }
 
+Format format_of(const OutputFlags& flags) {
+  return format_of_output(flags.format, flags.file);
+}
+
 int print_stream(RowStream& stream, const OutputFlags& flags, bool in_shown_units,
                  const std::string& way_to_all) {
-  const Format format = format_named(flags.format);
+  const Format format = format_of(flags);
   // Nothing is begun, and no file, before there is a first answer.
   protocol::QueryReply chunk = stream.next();
+  std::vector<protocol::CellKind> usual;
+  for (const auto& column : chunk.columns()) {
+    usual.push_back(server::kind_of_values(column));
+  }
   RowOutput out({.format = format,
                  .file = flags.file,
                  .may_page = !flags.no_pager,
                  .way_to_all = way_to_all,
-                 .shown = in_shown_units ? shown_columns(chunk) : std::vector<ShownColumn>()});
+                 .shown = in_shown_units ? shown_columns(chunk) : std::vector<ShownColumn>(),
+                 .usual = std::move(usual)});
   try {
     out.print(chunk);
     while (!chunk.ends()) {

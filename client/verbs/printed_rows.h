@@ -16,12 +16,15 @@ void add_format_flag(CLI::App& verb, std::string& format);
 
 /// Where and how a long answer is printed.
 struct OutputFlags {
-  std::string format{"table"};
+  std::string format;  // empty: as the file's name ends, or a table
   std::string file;
   bool no_pager = false;
 };
 /// Adds --format, --out and --no-pager.
 void add_output_flags(CLI::App& verb, OutputFlags& flags);
+
+/// What they name; throws solver::InputError as format_of_output does.
+Format format_of(const OutputFlags& flags);
 
 /// Prints an answer as it comes, tables for people in the units that people read if
 /// `in_shown_units`; `way_to_all` as in PrinterSettings. Gives the exit code. Throws what the

@@ -15,7 +15,7 @@ namespace {
 constexpr const char* kQueryExamples = R"(Examples:
   oblique query paper
   oblique query paper --where "mu > 0.5 AND stick_total_s = 0" --order "fn_peak_N DESC"
-  oblique query friction --select mu,fn_peak_N,mode --format csv > friction.csv
+  oblique query friction --select mu,fn_peak_N,mode --out friction.csv
   oblique query friction --select "*" --limit 1 --format json
   oblique query friction --group major_mode --select "major_mode, count(*), median(mu) AS mid_mu"
   oblique query friction --select "mu, peaks[0].fn_N, longest_phase.duration_s" --where "e = 1"
@@ -34,12 +34,12 @@ struct QueryFlags {
 };
 
 int query(const QueryFlags& flags) {
-  (void)format_named(flags.output.format);
+  const Format format = format_of(flags.output);
   check(flags.query);
   const auto source = open_source(flags.source);
   try {
     const auto answer = source->rows(request_for(flags.query));
-    return flags.query.explain && flags.output.format == "table"
+    return flags.query.explain && format == Format::kTable && flags.output.file.empty()
                ? print_lines(*answer)
                : print_stream(*answer, flags.output, true,
                               "--select names columns, csv and json have all");

@@ -29,7 +29,7 @@ struct SqlFlags {
 };
 
 int sql(const SqlFlags& flags) {
-  (void)format_named(flags.output.format);
+  (void)format_of(flags.output);
   const auto source = open_source(flags.source);
   protocol::QueryRequest request;
   request.set_sql(flags.statement);

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <string_view>
+#include <variant>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -14,22 +16,25 @@
 namespace oblique::server {
 namespace {
 
+using protocol::CellKind;
+
 struct Described {
   std::string_view name;
   std::string_view meaning;
+  CellKind values = CellKind::kText;
 };
 
 constexpr std::array<Described, 12> kRowColumns{{
     {"study", "name of the study"},
-    {"study_id", "its number in the database"},
-    {"point", "number of the point in its study, from 0"},
-    {"model_id", "number of the model in the database"},
+    {"study_id", "its number in the database", CellKind::kInteger},
+    {"point", "number of the point in its study, from 0", CellKind::kInteger},
+    {"model_id", "number of the model in the database", CellKind::kInteger},
     {"status", "solved or failed"},
     {"error", "why it failed"},
-    {"worker", "number of the worker that solved it"},
+    {"worker", "number of the worker that solved it", CellKind::kInteger},
     {"worker_name", "that worker's name"},
     {"instruction_set", "vector instructions that it used"},
-    {"attempt", "number of the lease under which it was solved"},
+    {"attempt", "number of the lease under which it was solved", CellKind::kInteger},
     {"solved_at", "when the result arrived (UTC)"},
     {"taken_from",
      "the point that has the same inputs and whose result this is, as STUDY/POINT; the name is the "
@@ -112,7 +117,7 @@ std::vector<Column> all_columns() {
   add_inputs(columns);
   add_outputs(columns);
   add_packed_lists(columns);
-  for (const auto& [name, meaning] : kRowColumns) {
+  for (const auto& [name, meaning, values] : kRowColumns) {
     columns.push_back({std::string(name), "", "row", "", std::string(meaning)});
   }
   return columns;
@@ -147,6 +152,31 @@ std::string rows_of_queries() {
     lists += fmt::format(", {} AS {}", list.sql, list.name);
   }
   return fmt::format("(SELECT *{} FROM runs)", lists);
+}
+
+protocol::CellKind kind_of_values(std::string_view name) {
+  const auto* described =
+      std::find_if(kRowColumns.begin(), kRowColumns.end(),
+                   [&](const Described& column) { return column.name == name; });
+  if (described != kRowColumns.end()) {
+    return described->values;
+  }
+  if (const auto* field = solver::find_result_column(name)) {
+    return std::holds_alternative<solver::Member<double>>(field->value)         ? CellKind::kReal
+           : std::holds_alternative<solver::Member<std::int64_t>>(field->value) ? CellKind::kInteger
+                                                                                : CellKind::kText;
+  }
+  if (solver::find_result_list(name) != nullptr || name == "lengths_m" || name == "integrator") {
+    return CellKind::kText;
+  }
+  const auto columns = all_columns();
+  if (std::none_of(columns.begin(), columns.end(),
+                   [&](const Column& column) { return column.name == name; })) {
+    return CellKind::kNull;
+  }
+  const auto* key = solver::find_model_key(name);
+  const bool is_whole = key != nullptr && key->is_allowed(2.0) && !key->is_allowed(2.5);
+  return is_whole ? CellKind::kInteger : CellKind::kReal;
 }
 
 std::string unit_of_column(std::string_view name) {

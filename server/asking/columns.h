@@ -4,6 +4,8 @@
 #include <string_view>
 #include <vector>
 
+#include "proto/wire/cell.h"
+
 namespace oblique::server {
 
 /// What is known of one column of queries or one member of `solve --json`.
@@ -37,5 +39,8 @@ std::vector<ListColumn> lists_of_queries();
 /// The unit of a column, or of a member of `solve --json`; empty for pure numbers, texts, lists of
 /// several quantities and other names.
 std::string unit_of_column(std::string_view name);
+
+/// What the values of a column of queries are where they are not NULL; kNull for other names.
+protocol::CellKind kind_of_values(std::string_view name);
 
 }  // namespace oblique::server

@@ -79,6 +79,19 @@ TEST_F(Npz, OfNoRowsAndOfEqualNamesIsRead) {
   EXPECT_EQ(of({chunk_of({"a", "a"}, {})}, "print(a.files, a['a'].shape)"), "['a', 'a_2'] (0,)\n");
 }
 
+TEST_F(Npz, OfNoValuesHasColumnsOfTheirUsualKind) {
+  using enum protocol::CellKind;
+  const auto archive = [&](const test::TestRows& rows) {
+    std::ofstream(folder_.file("a.npz"), std::ios::binary)
+        << printed(Format::kNpz, {chunk_of({"status", "study_id", "mu", "new"}, rows)},
+                   {.usual = {kText, kInteger, kReal}});
+    return said_by("import numpy\na = numpy.load('" + folder_.file("a.npz") +
+                   "')\nfor name in a.files: print(a[name].dtype.kind, a[name].tolist())");
+  };
+  EXPECT_EQ(archive({}), "U []\ni []\nf []\nf []\n");
+  EXPECT_EQ(archive({{nullptr, nullptr, nullptr, nullptr}}), "U ['']\nf [nan]\nf [nan]\nf [nan]\n");
+}
+
 TEST_F(Npz, TakesTextsThatAreNotUtf8) {
   EXPECT_EQ(of({chunk_of({"a"}, {{"x\xff"}})}, "print(ascii(a['a'][0]))"), "'x\\ufffd'\n");
 }

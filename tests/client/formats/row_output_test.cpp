@@ -1,6 +1,7 @@
 // Where rows go: files that appear when they are whole.
 #include <fcntl.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <csignal>
@@ -50,6 +51,91 @@ TEST_F(RowOutputTest, AFileAppearsWhenItIsFinishedOnly) {
   out.finish();
   EXPECT_EQ(contents(), "a\n1\n");
   EXPECT_EQ(files(), 1U);
+}
+
+TEST_F(RowOutputTest, ALinkStaysAndWhatItLeadsToIsTheFile) {
+  namespace fs = std::filesystem;
+  const std::string link = folder_.file("link.csv");
+  for (const std::string target : {"target.csv", "not there yet.csv"}) {
+    fs::create_directory(folder_.file("behind"));
+    const std::string path = folder_.file("behind/" + target);
+    std::ofstream(folder_.file("behind/target.csv")) << "of before";
+    fs::create_symlink("behind/" + target, link);
+    RowOutput out({.format = Format::kCsv, .file = link});
+    out.print(row_);
+    out.finish();
+    EXPECT_TRUE(fs::is_symlink(link));
+    EXPECT_FALSE(fs::is_symlink(path));
+    std::ifstream written(path);
+    EXPECT_EQ(std::string(std::istreambuf_iterator<char>(written), {}), "a\n1\n");
+    EXPECT_EQ(files(), 2U) << "the link and the folder";
+    fs::remove(link);
+    fs::remove_all(folder_.file("behind"));
+  }
+}
+
+TEST_F(RowOutputTest, ALinkToADeviceOrInACircleIsNotReplaced) {
+  namespace fs = std::filesystem;
+  const std::string link = folder_.file("link.csv");
+  fs::create_symlink("/dev/null", link);
+  RowOutput out({.format = Format::kCsv, .file = link});
+  out.print(row_);
+  out.finish();
+  EXPECT_EQ(fs::read_symlink(link), "/dev/null");
+  const std::string circle = folder_.file("circle.csv");
+  fs::create_symlink("circle.csv", circle);
+  EXPECT_THROW(RowOutput({.format = Format::kCsv, .file = circle}), solver::InputError);
+}
+
+TEST_F(RowOutputTest, WhatIsOpenAlreadyIsWrittenBehindWhatStandsThere) {
+  const int open_file = open(file_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
+  ASSERT_EQ(write(open_file, "b\n", 2), 2);
+  const std::string link = folder_.file("stdout");  // as /dev/stdout is one
+  std::filesystem::create_symlink("/proc/self/fd/" + std::to_string(open_file), link);
+  for (const Format format : {Format::kCsv, Format::kNpz}) {
+    RowOutput out({.format = format, .file = link});
+    out.print(row_);
+    out.finish();
+  }
+  EXPECT_TRUE(contents().starts_with("b\na\n1\nPK"));
+  EXPECT_TRUE(std::filesystem::is_symlink(link));
+  EXPECT_EQ(files(), 2U);
+  close(open_file);
+}
+
+TEST_F(RowOutputTest, NothingIsLeftOfAFileWhoseProgramIsKilled) {
+  const pid_t child = fork();
+  if (child == 0) {
+    RowOutput out({.format = Format::kCsv, .file = file_});
+    out.print(row_);
+    raise(SIGKILL);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  EXPECT_TRUE(WIFSIGNALED(status));
+  EXPECT_EQ(files(), 0U);
+}
+
+TEST_F(RowOutputTest, TheFormatIsWhatTheEndOfTheNameSays) {
+  EXPECT_EQ(format_of_output("", ""), Format::kTable);
+  EXPECT_EQ(format_of_output("", "/dev/null"), Format::kTable);
+  EXPECT_EQ(format_of_output("", "x.csv"), Format::kCsv);
+  EXPECT_EQ(format_of_output("", "a.csv/x.jsonl"), Format::kJsonLines);
+  EXPECT_EQ(format_of_output("", "x.npz"), Format::kNpz);
+  EXPECT_EQ(format_of_output("", "x.md"), Format::kMarkdown);
+  EXPECT_EQ(format_of_output("csv", "x.csv"), Format::kCsv);
+  EXPECT_EQ(format_of_output("table", "x.txt"), Format::kTable);
+  EXPECT_EQ(format_of_output("json", "x"), Format::kJson);
+  for (const auto& [flag, file] : {std::pair{"", "x.txt"}, {"", "x"}, {"", "x.table"}}) {
+    try {
+      format_of_output(flag, file);
+      ADD_FAILURE() << file;
+    } catch (const solver::InputError& error) {
+      EXPECT_THAT(error.what(), testing::HasSubstr(".csv, .json, .jsonl, .npz or .md"));
+    }
+  }
+  EXPECT_THROW(format_of_output("csv", "x.npz"), solver::InputError);
+  EXPECT_THROW(format_of_output("table", "x.csv"), solver::InputError);
 }
 
 TEST_F(RowOutputTest, AFolderOrAFileThatCannotBeMadeIsWrongUsage) {

@@ -1,6 +1,8 @@
 // Questions to a database file, by the program itself.
 #include <chrono>
 #include <csignal>
+#include <fstream>
+#include <iterator>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -101,6 +103,21 @@ TEST_F(DatabaseQuery, AParameterHasNoValueAndIsRefused) {
     EXPECT_NE(outcome.exit_code, 0) << sql;
     EXPECT_THAT(outcome.err, HasSubstr("parameter")) << sql;
   }
+}
+
+TEST_F(DatabaseQuery, AFileIsOfTheFormatThatItsNameSays) {
+  EXPECT_EQ(ask({"query", "a", "--select", "point", "--limit", "1", "--out", "x.csv"}).exit_code,
+            0);
+  std::ifstream file(folder_.path() / "x.csv");
+  EXPECT_EQ(std::string(std::istreambuf_iterator<char>(file), {}), "point\n0\n");
+  for (const char* verb : {"query", "sql"}) {
+    const auto wrong = ask({verb, "a", "--out", "x.npz", "--format", "csv"});
+    EXPECT_EQ(wrong.exit_code, 2);
+    EXPECT_THAT(wrong.err, HasSubstr("contradict each other"));
+    EXPECT_THAT(ask({verb, "a", "--out", "x.txt"}).err, HasSubstr("end its name in .csv"));
+  }
+  EXPECT_THAT(ask({"query", "a", "--select", "point", "--out", "/dev/stdout"}).out,
+              testing::StartsWith("point\n"));
 }
 
 TEST_F(DatabaseQuery, ColumnsOfOneNameHaveKeysOfTheirOwnInJson) {
