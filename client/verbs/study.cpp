@@ -1,9 +1,9 @@
+#include <algorithm>
 #include <cstdint>
 #include <iostream>
 #include <memory>
 #include <optional>
 #include <string>
-#include <unordered_set>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
@@ -13,16 +13,15 @@
 #include "client/output/mesh_note.h"
 #include "client/output/unjudged_note.h"
 #include "client/output/work_line.h"
+#include "client/study/fall_count.h"
 #include "client/study/study_flags.h"
 #include "client/verbs/solving_rate.h"
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
 #include "proto/program/stop_signals.h"
 #include "proto/recipe/blocks.h"
-#include "proto/recipe/canonical.h"
 #include "proto/recipe/keys.h"
 #include "proto/recipe/written/written_sample.h"
-#include "worker/solver/model/fall_model.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {
@@ -39,12 +38,13 @@ constexpr const char* kCheckExamples = R"(Examples:
   oblique study check --H 1 --mu 0.01:2:40:log --e 0.6,0.8,1 --where "mu > 0.5 * e"
 
 Nothing is submitted. The time is estimated from some points of the study that are solved here, on
-all cores, for about a second; the size from what a result takes in a database on average.)";
+all cores, for about a second (of a fine mesh on coarser ones); the size from what a result and a
+model take in a database on average.)";
 
 /// What a result takes in a database, on average (server/store/README.md).
 constexpr std::uint64_t kBytesAResult = 450;
-/// Models that are looked at for how many falls they share.
-constexpr std::uint64_t kMostModels = 20'000;
+/// What a model takes there.
+constexpr std::uint64_t kBytesAModel = 600;
 
 struct CheckFlags {
   StudyFlags study;
@@ -72,7 +72,7 @@ struct Report {
   std::uint64_t numbers;  ///< of points, with those that are left out
   std::uint64_t points;
   std::uint64_t models;
-  std::optional<std::uint64_t> falls;  ///< none where there are too many models to look at
+  FallCount falls;
   std::vector<BlockReport> blocks;
   std::vector<std::uint64_t> unjudged;  ///< of the blocks, from 0
   std::optional<SolvingRate> rate;
@@ -124,16 +124,9 @@ BlockReport report_of_block(const protocol::PointTable& table, int number) {
           shown_point(table, block, first), shown_point(table, block, last)};
 }
 
-/// Different falls of the models; nothing where they are too many to look at.
-std::optional<std::uint64_t> falls_of(const protocol::PointTable& table) {
-  if (table.models() > kMostModels) {
-    return std::nullopt;
-  }
-  std::unordered_set<std::string> falls;
-  for (std::uint64_t model = 0; model < table.models(); ++model) {
-    falls.insert(protocol::canonical_model(solver::fall_model(table.model(model))));
-  }
-  return falls.size();
+/// What the study takes in a database. Points that a filter leaves out bring no model.
+std::uint64_t bytes_of(const Report& report) {
+  return kBytesAResult * report.points + kBytesAModel * std::min(report.models, report.points);
 }
 
 Report report_of(const std::string& name,
@@ -142,7 +135,7 @@ Report report_of(const std::string& name,
                 table->size(),
                 table->points(),
                 table->models(),
-                falls_of(*table),
+                count_falls(*table),
                 {},
                 unjudged_blocks(table->recipe()),
                 {}};
@@ -154,7 +147,7 @@ Report report_of(const std::string& name,
 
 /// Falls that are to be solved: an estimate of errors wants a second one, on half the mesh.
 std::uint64_t falls_to_solve(const Report& report, bool wants_errors) {
-  return report.falls.value_or(report.models) * (wants_errors ? 2 : 1);
+  return std::min(report.falls.falls, report.points) * (wants_errors ? 2 : 1);
 }
 
 std::string shown(const ShownPoint& point) {
@@ -180,9 +173,8 @@ void print(const Report& report, bool wants_errors) {
     std::cout << " of " << shown_count(report.numbers) << ", left in by where";
   }
   std::cout << "\nmodels  " << shown_count(report.models) << ", with "
-            << (report.falls ? counted(*report.falls, "fall", "different falls")
-                             : "a fall each at most")
-            << '\n';
+            << (report.falls.is_estimate ? "about " : "")
+            << counted(report.falls.falls, "fall", "different falls") << '\n';
   for (std::size_t i = 0; i < report.blocks.size(); ++i) {
     const auto& block = report.blocks[i];
     std::cout << fmt::format("block {}: {}, numbers {} to {}: {}\n", i + 1,
@@ -194,13 +186,16 @@ void print(const Report& report, bool wants_errors) {
   if (report.rate) {
     const auto& rate = *report.rate;
     std::cout << fmt::format(
-        "time    about {} on {} here, as busy as it is now\n        ({} and {} were solved)\n",
+        "time    about {} on {} here, as busy as it is now ({} and {} were solved{})\n",
         shown_duration(rate.time_s(report.points, falls_to_solve(report, wants_errors))),
         counted(rate.threads, "thread", "threads"), counted(rate.points, "point", "points"),
-        counted(rate.falls, "fall", "falls"));
+        counted(rate.falls, "fall", "falls"),
+        rate.elements_per_link == 0
+            ? ""
+            : fmt::format(" on {} elements a link and fewer, and the cost extrapolated",
+                          rate.elements_per_link));
   }
-  std::cout << fmt::format("size    about {} in a database\n",
-                           shown_bytes(kBytesAResult * report.points));
+  std::cout << fmt::format("size    about {} in a database\n", shown_bytes(bytes_of(report)));
 }
 
 nlohmann::ordered_json json_of(const ShownPoint& point) {
@@ -216,12 +211,13 @@ nlohmann::ordered_json json_of(const ShownPoint& point) {
 }
 
 nlohmann::ordered_json json_of(const Report& report, bool wants_errors) {
-  nlohmann::ordered_json json{{"study", report.name},    {"errors", wants_errors},
-                              {"points", report.points}, {"numbers", report.numbers},
-                              {"models", report.models}, {"falls", nullptr}};
-  if (report.falls) {
-    json["falls"] = *report.falls;
-  }
+  nlohmann::ordered_json json{{"study", report.name},
+                              {"errors", wants_errors},
+                              {"points", report.points},
+                              {"numbers", report.numbers},
+                              {"models", report.models},
+                              {"falls", report.falls.falls},
+                              {"falls_estimated", report.falls.is_estimate}};
   for (const auto& block : report.blocks) {
     json["blocks"].push_back({{"first_point", block.place.first_point},
                               {"numbers", block.place.points},
@@ -238,8 +234,11 @@ nlohmann::ordered_json json_of(const Report& report, bool wants_errors) {
     json["threads"] = rate.threads;
     json["solved_points"] = rate.points;
     json["solved_falls"] = rate.falls;
+    if (rate.elements_per_link != 0) {
+      json["extrapolated_from_elements_per_link"] = rate.elements_per_link;
+    }
   }
-  json["bytes"] = kBytesAResult * report.points;
+  json["bytes"] = bytes_of(report);
   return json;
 }
 

@@ -54,6 +54,42 @@ TEST(StudyCheck, CountsModelsAndTheFallsThatTheyShare) {
   EXPECT_EQ(check({"--mu", "0.4", "--k", "1e7:4e7:4"})["falls"], 1) << "k acts in contact alone";
 }
 
+// A study in which each point has its model takes 600 bytes more for each.
+TEST(StudyCheck, KnowsFallsAndSizeOfMoreModelsThanItLooksAt) {
+  const auto check = [](std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {"study", "check", "--json", "--no-rate"});
+    arguments.insert(arguments.end(), {"--H", "0.9", "--mu", "0.4", "--e", "1"});
+    const auto outcome = test::run_oblique(arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return nlohmann::json::parse(outcome.out);
+  };
+  const auto stiff = check({"--sample", "sobol:40000:1", "--k", "1e7:1e8", "--eta2", "1:2"});
+  EXPECT_EQ(stiff["models"], 40000);
+  EXPECT_EQ(stiff["falls"], 1) << "k and eta2 act in contact alone";
+  EXPECT_EQ(stiff["falls_estimated"], false);
+  EXPECT_EQ(stiff["bytes"], 40000 * (450 + 600));
+  const auto thick = check({"--sample", "sobol:40000:1", "--k", "1e7:1e8", "--A", "4e-4:6e-4"});
+  EXPECT_EQ(thick["falls"], 40000) << "every area falls in its own way";
+  EXPECT_EQ(thick["falls_estimated"], true);
+  const auto some =
+      check({"--sample", "random:40000:1", "--k", "1e7:1e8", "--A", "4e-4,5e-4,6e-4"});
+  EXPECT_EQ(some["falls"], 3);
+  const auto product =
+      check({"--k", "1e7:1e8:30000", "--A", "4e-4:6e-4:5", "--tolerance", "1e-5,1e-4"});
+  EXPECT_EQ(product["falls"], 5);
+  EXPECT_EQ(product["falls_estimated"], false);
+}
+
+TEST(StudyCheck, OfAFineMeshTriesCoarserOnesAndSaysThatTheCostIsExtrapolated) {
+  const auto outcome = test::run_oblique(
+      {"study", "check", "--json", "--preset", "converged", "--H", "1", "--mu", "0.4", "--e", "1"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const auto json = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(json["extrapolated_from_elements_per_link"], 16);
+  EXPECT_EQ(json["solved_falls"], 1) << "and by one thread";
+  EXPECT_GT(json["time_s"], 0.2);
+}
+
 TEST(StudyCheck, OfAThousandMillionPointsCostsNoMoreThanOfAFew) {
   const auto outcome =
       test::run_oblique({"study", "check", "--no-rate", "--sample", "sobol:1000000000:1", "--H",
