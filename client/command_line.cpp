@@ -10,8 +10,6 @@
 #include <iostream>
 #include <sstream>
 #include <string>
-#include <string_view>
-#include <vector>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -23,7 +21,6 @@
 #include "client/output/terminal.h"
 #include "client/verbs/verbs.h"
 #include "proto/program/usage.h"
-#include "proto/suggestion.h"
 #include "proto/text.h"
 #include "worker/solver/model/parameters.h"
 #include "worker/solver/model/version.h"
@@ -101,30 +98,6 @@ std::string words_of(const CLI::App& verb) {
   return parent == nullptr ? verb.get_name() : words_of(*parent) + ' ' + verb.get_name();
 }
 
-/// Names of the verbs of a verb or the program, and of its flags, for suggestions.
-std::vector<std::string> known_words(CLI::App& verb) {
-  std::vector<std::string> words;
-  for (const auto* each : verb.get_subcommands({})) {
-    words.push_back(each->get_name());
-  }
-  for (const auto* option : verb.get_options()) {
-    for (const auto& name : option->get_lnames()) {
-      words.push_back("--" + name);
-    }
-  }
-  return words;
-}
-
-std::string unexpected_words(CLI::App& app, CLI::App& verb) {
-  const auto words = known_words(verb);
-  const std::vector<std::string_view> candidates(words.begin(), words.end());
-  const auto unexpected = app.remaining(true);
-  const std::string first = unexpected.empty() ? std::string() : unexpected.front();
-  const bool is_verb = !verb.get_subcommands({}).empty() && !first.starts_with("-");
-  return fmt::format("{} `{}`{}", is_verb ? "unknown verb" : "unexpected", first,
-                     protocol::did_you_mean(first.substr(0, first.find('=')), candidates));
-}
-
 int wrong_usage(const CLI::App& verb, const std::string& message) {
   return protocol::tell_wrong_usage(words_of(verb), message);
 }
@@ -141,10 +114,8 @@ int parse(CLI::App& app, int argc, const char* const* argv) {
       std::cout << (width > 0 ? fitted_help(help.str(), width, kHelpColumn) : help.str());
       return exit_code;
     }
-    // A word too many says more than the missing verb or flag that it may have been meant for.
     auto& verb = parsed_verb(app);
-    const bool word_too_many = !app.remaining(true).empty();
-    return wrong_usage(verb, word_too_many ? unexpected_words(app, verb) : error.what());
+    return wrong_usage(verb, protocol::objection_of(app, verb, error));
   }
 }
 

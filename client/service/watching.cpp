@@ -129,7 +129,7 @@ void tell_if_insecure(const std::string& access, const std::string& place) {
 }
 
 std::string taken_over(const protocol::TakenOver& taken) {
-  if (taken.points() == 0 && !taken.under_way() && !taken.cut_short()) {
+  if (taken.points() == 0 && !taken.cut_short()) {
     return {};
   }
   std::string text = fmt::format("{} {} taken over{}", shown_count(taken.points()),

@@ -8,6 +8,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/recipe/expressions/expression_text.h"
 #include "proto/recipe/keys.h"
 #include "proto/recipe/written/written_axis.h"
 #include "proto/recipe/written/written_sample.h"
@@ -130,6 +131,24 @@ std::optional<protocol::WrittenDistribution> distribution_of_flag(std::string_vi
   return written;
 }
 
+/// A distribution that was misspelt would be called an unknown function.
+void check_distribution_name(std::string_view text, protocol::BlockKind kind) {
+  const std::string_view name = text.substr(0, std::min(text.find('('), text.size()));
+  auto known = expressions::function_names();
+  if (kind != protocol::BlockKind::kSample || name.size() == text.size() ||
+      std::find(known.begin(), known.end(), name) != known.end() ||
+      name.find_first_of("+*/^)<>=!&| ") != std::string_view::npos) {
+    return;
+  }
+  const auto& names = protocol::distribution_names();
+  known.insert(known.end(), names.begin(), names.end());
+  const auto nearest = protocol::nearest(name, known);
+  if (std::find(names.begin(), names.end(), nearest) != names.end()) {
+    throw InputError(fmt::format("there is no distribution `{}`{}; there are {}", name,
+                                 protocol::did_you_mean(name, known), protocol::joined(names)));
+  }
+}
+
 /// Whether a text that is no number means an expression: it computes, or names another key. What is
 /// neither is a slip, and better told so.
 bool is_expression(std::string_view text) {
@@ -180,6 +199,7 @@ protocol::Axis axis_of_flag(const ParameterKey& key, std::string_view text,
     if (const auto written = distribution_of_flag(text)) {
       return protocol::drawn_axis(key, *written, kind);
     }
+    check_distribution_name(text, kind);
     if (text.find(':') != std::string_view::npos) {
       return range_of_flag(key, text, kind);
     }

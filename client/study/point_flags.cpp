@@ -7,6 +7,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/study/flag_axis.h"
+#include "client/study/study.h"
 #include "proto/recipe/axes.h"
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/checks.h"
@@ -31,7 +32,7 @@ std::string described(const ParameterKey& key) {
 /// The flag, as it was typed, whose key a sentence about the points begins with; nothing for
 /// others.
 std::string flag_named_by(const PointFlags& flags, std::string_view sentence) {
-  const std::string key(sentence.substr(0, sentence.find_first_of(" :")));
+  const std::string key(subject_of(sentence).key);
   if (key == "where") {
     return fmt::format("--where {}: ", flags.where);
   }
@@ -165,10 +166,14 @@ protocol::Recipe recipe_of_flags(const PointFlags& flags, const ReachCheck& chec
   } catch (const protocol::MissingKey& error) {
     throw InputError(std::string("--") + error.what());  // it begins with the key
   } catch (const InputError& error) {
-    throw InputError(flag_named_by(flags, error.what()) + error.what());
+    throw InputError(with_flag(flags, error.what()));
   }
   protocol::check_size(recipe);
   return recipe;
+}
+
+std::string with_flag(const PointFlags& flags, const std::string& sentence) {
+  return flag_named_by(flags, sentence) + sentence;
 }
 
 }  // namespace oblique::client

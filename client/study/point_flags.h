@@ -33,4 +33,7 @@ void add_point_flags(CLI::App& verb, PointFlags& flags, FlagValues values);
 /// with one value shape the model; with several they are axes. Throws InputError.
 protocol::Recipe recipe_of_flags(const PointFlags& flags, const ReachCheck& check_reach);
 
+/// The sentence about the points, with the flag that it speaks of before it, as that was typed.
+std::string with_flag(const PointFlags& flags, const std::string& sentence);
+
 }  // namespace oblique::client

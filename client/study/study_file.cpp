@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <fstream>
+#include <functional>
 #include <iterator>
+#include <map>
 #include <utility>
 #include <vector>
 
@@ -49,8 +51,12 @@ class StudyReader {
   void add_lengths(protocol::WrittenModel& model, const toml::node& value) const;
   const toml::array& blocks(const toml::table& top) const;
   void add_block(Study& study, const toml::node& node);
+  /// By key, and by none the block itself; each as it stands before a sentence.
+  using BlockPlaces = std::map<std::string, std::string, std::less<>>;
+  BlockPlaces places_of(const toml::node& node) const;
 
   TomlPlace place_;
+  std::vector<BlockPlaces> places_;
   CsvFiles files_;
   const ReachCheck& check_reach_;
 };
@@ -58,7 +64,7 @@ class StudyReader {
 void StudyReader::check_top_keys(const toml::table& top) const {
   for (const auto& [key, value] : top) {
     if (std::find(kTopKeys.begin(), kTopKeys.end(), key.str()) == kTopKeys.end()) {
-      place_.fail(value,
+      place_.fail(key,
                   fmt::format("unknown key `{}`{}: a study file has name, errors, [model] and one "
                               "or more [[block]]; H, mu and e stand in a block",
                               key.str(), protocol::did_you_mean(key.str(), kTopKeys)));
@@ -124,6 +130,7 @@ solver::ModelParameters StudyReader::model(const toml::node& node) const {
       const auto preset = place_.text("preset", value, protocol::joined(solver::preset_names()));
       place_.located(value, [&] { model.set_preset(preset); });
     } else if (key.str() != protocol::WrittenModel::kLengths) {
+      place_.located(key, [&] { (void)protocol::model_key(key.str()); });
       add_model_key(model, key.str(), value);
     }
   }
@@ -156,8 +163,20 @@ const toml::node& named_value(const toml::node& block, std::string_view sentence
   return value != nullptr ? *value : block;
 }
 
+/// Where a block and its values stand, kept for sentences that come later.
+StudyReader::BlockPlaces StudyReader::places_of(const toml::node& node) const {
+  BlockPlaces places{{"", place_.before(node.source())}};
+  if (const auto* table = node.as_table()) {
+    for (const auto& [key, value] : *table) {
+      places.emplace(key.str(), place_.before(value.source()));
+    }
+  }
+  return places;
+}
+
 /// Each block is checked alone, so that the error can say where it stands.
 void StudyReader::add_block(Study& study, const toml::node& node) {
+  places_.push_back(places_of(node));
   *study.recipe.add_blocks() = block_of_toml(place_, node, files_);
   protocol::Recipe alone;
   *alone.mutable_model() = study.recipe.model();
@@ -181,6 +200,12 @@ Study StudyReader::study(const toml::table& top) {
   for (const auto& node : blocks(top)) {
     add_block(study, node);
   }
+  study.located = [places = places_](const std::string& sentence) {
+    const Subject subject = subject_of(sentence);
+    const BlockPlaces& block = places.at(std::min(subject.block, places.size() - 1));
+    const auto found = block.find(subject.key);
+    return (found != block.end() ? found : block.find(""))->second + sentence;
+  };
   try {
     const protocol::PointTable whole(study.recipe);
     protocol::check_size(study.recipe);

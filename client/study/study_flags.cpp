@@ -30,7 +30,7 @@ void add_study_flags(CLI::App& verb, StudyFlags& flags) {
       ->type_name("NAME");
   verb.add_flag("--errors", flags.errors,
                 "estimate errors: solve each point also on half the mesh and at twice the step, at "
-                "about a third more cost")
+                "a quarter more cost")
       ->group("Points");
   add_point_flags(verb, flags.points, FlagValues::kMany);
 }
@@ -51,9 +51,13 @@ Study study_of_flags(const StudyFlags& flags, const ReachCheck& check_reach) {
   Study study;
   if (flags.file.empty()) {
     study.recipe = recipe_of_flags(flags.points, check_reach);
+    study.located = [points = flags.points](const std::string& sentence) {
+      return with_flag(points, sentence);
+    };
   } else {
     study = read_study_file(flags.file, check_reach);
   }
+  judge_points(study);
   study.recipe.set_errors(study.recipe.errors() || flags.errors);
   if (flags.file.empty()) {
     study.name = name_of_recipe(study.recipe);

@@ -43,7 +43,8 @@ class BlockReader {
                                 : protocol::BlockKind::kProduct;
     std::vector<protocol::Axis> axes;
     for (const auto& [key, value] : table_) {
-      if (!is_block_key(key.str(), value)) {
+      if (!is_block_key(key)) {
+        place_.located(key, [&] { (void)protocol::axis_key(key.str()); });
         axes.push_back(axis_of_toml(place_, key.str(), value, kind, files_));
       }
     }
@@ -63,14 +64,15 @@ class BlockReader {
 
  private:
   /// Throws for a key that resembles one of a block and none of an axis.
-  bool is_block_key(std::string_view key, const toml::node& value) const {
+  bool is_block_key(const toml::key& written) const {
+    const std::string_view key = written.str();
     if (std::find(kBlockKeys.begin(), kBlockKeys.end(), key) != kBlockKeys.end()) {
       return true;
     }
     if (!protocol::nearest(key, kBlockKeys).empty() && !protocol::is_axis_key(key)) {
-      place_.fail(value, fmt::format("unknown key `{}`{}: beside its axes a block has {}", key,
-                                     protocol::did_you_mean(key, kBlockKeys),
-                                     protocol::joined(kBlockKeys)));
+      place_.fail(written, fmt::format("unknown key `{}`{}: beside its axes a block has {}", key,
+                                       protocol::did_you_mean(key, kBlockKeys),
+                                       protocol::joined(kBlockKeys)));
     }
     return false;
   }
@@ -80,7 +82,7 @@ class BlockReader {
         place_.table("sample", node, "{ kind = \"sobol\", count = 1000, seed = 1 }");
     for (const auto& [part, value] : sample) {
       if (std::find(kSampleParts.begin(), kSampleParts.end(), part.str()) == kSampleParts.end()) {
-        place_.fail(value,
+        place_.fail(part,
                     fmt::format("sample: unknown key `{}`{}: a sample is {{ kind, count, "
                                 "seed }}",
                                 part.str(), protocol::did_you_mean(part.str(), kSampleParts)));

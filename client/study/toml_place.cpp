@@ -14,9 +14,12 @@ std::string not_as_expected(std::string_view key, const toml::node& node,
 
 }  // namespace
 
-void TomlPlace::fail(const toml::node& at, std::string_view message) const {
-  const auto& begin = at.source().begin;
-  throw solver::InputError(fmt::format("{}:{}:{}: {}", file_, begin.line, begin.column, message));
+std::string TomlPlace::before(const toml::source_region& at) const {
+  return fmt::format("{}:{}:{}: ", file_, at.begin.line, at.begin.column);
+}
+
+void TomlPlace::fail(const toml::source_region& at, std::string_view message) const {
+  throw solver::InputError(fmt::format("{}{}", before(at), message));
 }
 
 double TomlPlace::number(std::string_view key, const toml::node& node,

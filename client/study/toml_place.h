@@ -19,11 +19,20 @@ class TomlPlace {
   const std::string& file() const { return file_; }
 
   /// Throws solver::InputError: "study.toml:3:6: " and the message.
-  [[noreturn]] void fail(const toml::node& at, std::string_view message) const;
+  [[noreturn]] void fail(const toml::node& at, std::string_view message) const {
+    fail(at.source(), message);
+  }
+  [[noreturn]] void fail(const toml::key& at, std::string_view message) const {
+    fail(at.source(), message);
+  }
+  [[noreturn]] void fail(const toml::source_region& at, std::string_view message) const;
+
+  /// "study.toml:3:6: "
+  std::string before(const toml::source_region& at) const;
 
   /// Runs `work` and puts the place before an InputError that it throws.
-  template <typename Work>
-  decltype(auto) located(const toml::node& at, Work work) const {
+  template <typename At, typename Work>
+  decltype(auto) located(const At& at, Work work) const {
     try {
       return work();
     } catch (const solver::InputError& error) {

@@ -1,3 +1,4 @@
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstddef>
@@ -9,6 +10,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
@@ -20,6 +22,7 @@
 #include "client/verbs/verbs.h"
 #include "proto/program/stop_signals.h"
 #include "proto/program/usage.h"
+#include "proto/suggestion.h"
 #include "proto/text.h"
 #include "worker/solver/model/errors.h"
 
@@ -242,7 +245,13 @@ void add_autoscale(CLI::App& app, Command& command) {
   verb->footer(kAutoscaleExamples);
   verb->add_option("ENGINE", flags->engine, "what runs the jobs: slurm")
       ->required()
-      ->check(CLI::IsMember({"slurm"}))
+      ->check([](const std::string& engine) {
+        constexpr std::array<std::string_view, 1> kEngines{"slurm"};
+        return engine == kEngines[0] ? std::string()
+                                     : fmt::format("there is no `{}`{}: jobs are run by {}", engine,
+                                                   protocol::did_you_mean(engine, kEngines),
+                                                   protocol::joined(kEngines));
+      })
       ->type_name("");
   add_scaling_flags(*verb, *flags);
   add_slurm_flags(*verb, *flags);

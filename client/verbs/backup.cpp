@@ -11,6 +11,7 @@
 #include "client/verbs/verbs.h"
 #include "server/care/backup.h"
 #include "server/care/salvage.h"
+#include "worker/solver/model/errors.h"
 
 namespace oblique::client {
 namespace {
@@ -39,7 +40,20 @@ int save_what_can_be_read(const BackupFlags& flags) {
   return kDone;
 }
 
+void check_copy(const std::string& copy) {
+  std::error_code ignored;
+  if (std::filesystem::exists(copy, ignored)) {
+    throw solver::InputError(copy + " exists already: name a file that does not");
+  }
+  const auto folder = std::filesystem::absolute(copy).parent_path();
+  if (!std::filesystem::is_directory(folder, ignored)) {
+    throw solver::InputError(
+        fmt::format("{} cannot be written: there is no folder {}", copy, folder.string()));
+  }
+}
+
 int backup(const BackupFlags& flags) {
+  check_copy(flags.copy);
   if (flags.salvage) {
     return save_what_can_be_read(flags);
   }

@@ -221,7 +221,8 @@ void add_converge(CLI::App& app, Command& command) {
       ->check(CLI::Range(1, kMostElements))
       ->type_name("N");
   verb->add_option("--finest", flags->finest,
-                   "elements a link of the finest mesh; default 32, for the mesh study 96")
+                   "elements a link of the finest mesh, at least 4 times the coarsest; default 32, "
+                   "for the mesh study 96")
       ->check(CLI::Range(1, kMostElements))
       ->type_name("N");
   verb->add_option("--halvings", flags->halvings, "how often the step is halved")

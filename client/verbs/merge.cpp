@@ -73,10 +73,11 @@ std::vector<std::string> judged_sources(const MergeFlags& flags) {
 }
 
 void tell(const std::string& source, const std::string& target, const server::Merged& merged) {
-  std::cerr << fmt::format(
-      "{}: {} studies new in {} and {} united with those there; {} results added", source,
-      shown_count(merged.studies_added), target, shown_count(merged.studies_united),
-      shown_count(merged.results_added));
+  std::cerr << fmt::format("{}: {} {} new in {} and {} united with those there; {} {} added",
+                           source, shown_count(merged.studies_added),
+                           merged.studies_added == 1 ? "study" : "studies", target,
+                           shown_count(merged.studies_united), shown_count(merged.results_added),
+                           merged.results_added == 1 ? "result" : "results");
   if (merged.studies_grown > 0) {
     std::cerr << fmt::format("; studies that grew: {}", shown_count(merged.studies_grown));
   }

@@ -95,6 +95,9 @@ std::string shell_word(const std::string& text) {
 }
 
 void print_first(const protocol::QueryReply& rows, std::uint64_t points) {
+  if (rows.rows().empty()) {
+    return;
+  }
   RowOutput out({.may_page = false});
   out.print(protocol::as_chunk(in_shown_units(rows)));
   out.finish();

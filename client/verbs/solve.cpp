@@ -3,8 +3,11 @@
 #include <optional>
 #include <string>
 
+#include <spdlog/fmt/fmt.h>
+
 #include "client/output/case_report.h"
 #include "client/output/mesh_note.h"
+#include "client/study/flag_axis.h"
 #include "client/study/point_flags.h"
 #include "client/trace/trace_output.h"
 #include "client/verbs/solve_here.h"
@@ -58,7 +61,20 @@ TraceOutput trace_output(const std::string& where, bool json) {
           where.ends_with(".npz") ? TraceFormat::kNpz : TraceFormat::kCsv, "--trace"};
 }
 
+/// Said before values are judged, which would speak of the largest of them.
+void check_one_value_each(const PointFlags& flags) {
+  for (const auto& [key, text] : flags.axes) {
+    const bool is_list = text.find(',') != std::string::npos && text.find('(') == std::string::npos;
+    if (is_list || text.find(':') != std::string::npos || text.starts_with('@')) {
+      throw solver::InputError(
+          fmt::format("{} {}: solve takes one value for each; `oblique run` takes lists and ranges",
+                      flag_of_key(key), text));
+    }
+  }
+}
+
 int solve(const SolveFlags& flags) {
+  check_one_value_each(flags.points);
   const protocol::PointTable table(recipe_of_flags(flags.points, tip_reach()));
   check_one_point(table);
   const auto point = table.point(0);

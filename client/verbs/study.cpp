@@ -177,9 +177,12 @@ void print(const Report& report, bool wants_errors) {
             << counted(report.falls.falls, "fall", "different falls") << '\n';
   for (std::size_t i = 0; i < report.blocks.size(); ++i) {
     const auto& block = report.blocks[i];
-    std::cout << fmt::format("block {}: {}, numbers {} to {}: {}\n", i + 1,
-                             counted(block.points, "point", "points"), block.place.first_point,
-                             block.place.first_point + block.place.points - 1, block.made_of);
+    const std::uint64_t last = block.place.first_point + block.place.points - 1;
+    std::cout << fmt::format(
+        "block {}: {}, {}: {}\n", i + 1, counted(block.points, "point", "points"),
+        block.place.points == 1 ? fmt::format("number {}", last)
+                                : fmt::format("numbers {} to {}", block.place.first_point, last),
+        block.made_of);
     std::cout << fmt::format("  first {}: {}\n", block.first.number, shown(block.first));
     std::cout << fmt::format("  last {}: {}\n", block.last.number, shown(block.last));
   }
@@ -244,21 +247,26 @@ nlohmann::ordered_json json_of(const Report& report, bool wants_errors) {
 
 /// Counts what filters leave in, and judges what only points tell. The exit code when that was
 /// stopped by a signal.
-std::optional<int> survey(protocol::PointTable& table) {
+std::optional<int> survey(const Study& study, protocol::PointTable& table) {
   if (!table.needs_survey()) {
     return std::nullopt;
   }
   protocol::StopSignals stop;
   WorkLine line;
   const auto counting = line.begin("looking at every point");
-  const bool is_done = table.survey([&stop] { return !stop.requested(); });
+  bool is_done = false;
+  try {
+    is_done = table.survey([&stop] { return !stop.requested(); });
+  } catch (const solver::InputError& error) {
+    throw solver::InputError(study.located(error.what()));
+  }
   return is_done ? std::nullopt : std::optional(stop.exit_code());
 }
 
 int check_study(const CheckFlags& flags) {
   const auto study = study_of_flags(flags.study, tip_reach());
   const auto table = std::make_shared<protocol::PointTable>(study.recipe);
-  if (const auto stopped = survey(*table)) {
+  if (const auto stopped = survey(study, *table)) {
     return *stopped;
   }
   Report report = report_of(study.name, table);

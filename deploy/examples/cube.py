@@ -11,10 +11,15 @@ runs = pandas.read_sql_query(
     database,
 )
 cube = runs.set_index(["H", "mu", "e"]).to_xarray()  # an xarray.Dataset; needs a grid's values
-forces = cube.fn_peak_N.isel(e=-1).to_dataframe().reset_index()[["H", "mu", "fn_peak_N"]]
+# A study that has grown by a block may leave cells of the cube empty.
+forces = cube.fn_peak_N.to_dataframe().dropna().reset_index().sort_values(["H", "mu", "e"])
+forces = forces.groupby(["H", "mu"], as_index=False).last()[["H", "mu", "fn_peak_N"]]
 print(forces.to_csv(index=False), end="")
 
 # Lists are views of their own: one row a span in which P does not move.
-spans = pandas.read_sql_query("SELECT point, t0_s, t1_s FROM stick_intervals", database)
+spans = pandas.read_sql_query(
+    "SELECT point, t0_s, t1_s FROM stick_intervals WHERE study_id = (SELECT min(study_id) FROM studies)",
+    database,
+)
 longest = (spans.t1_s - spans.t0_s).max()
 print(f"longest span in stick: {longest * 1e6:.1f} us" if len(spans) else "P never sticks", file=sys.stderr)

@@ -5,6 +5,8 @@
 #include <cstring>
 #include <ctime>
 #include <filesystem>
+#include <string_view>
+#include <vector>
 
 #include <sys/stat.h>
 
@@ -14,6 +16,7 @@
 #include "proto/keys/key_file.h"
 #include "proto/keys/toml_fields.h"
 #include "proto/keys/written_file.h"
+#include "proto/suggestion.h"
 #include "proto/text.h"
 #include "worker/solver/model/errors.h"
 
@@ -110,12 +113,16 @@ void AuthorizedKeys::add(AuthorizedKey key) {
 AuthorizedKey AuthorizedKeys::remove(std::string_view name) {
   const auto* found = find(name);
   if (found == nullptr) {
-    std::string names;
-    for (const AuthorizedKey& key : keys_) {
-      names += (names.empty() ? "" : ", ") + key.name;
-    }
-    throw solver::InputError(fmt::format("there is no key called {}; there {}", visible(name),
-                                         names.empty() ? "is none" : "are: " + names));
+    const std::vector<std::string_view> names = [this] {
+      std::vector<std::string_view> all;
+      for (const AuthorizedKey& key : keys_) {
+        all.emplace_back(key.name);
+      }
+      return all;
+    }();
+    throw solver::InputError(fmt::format("there is no key called {}{}; there {}", visible(name),
+                                         did_you_mean(name, names),
+                                         names.empty() ? "is none" : "are: " + joined(names)));
   }
   AuthorizedKey removed = *found;
   AuthorizedKeys others;

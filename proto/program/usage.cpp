@@ -1,16 +1,42 @@
 #include "proto/program/usage.h"
 
+#include <algorithm>
 #include <charconv>
 #include <iostream>
+#include <iterator>
 #include <sstream>
+#include <string_view>
+#include <vector>
 
+#include "proto/suggestion.h"
 #include "proto/text.h"
 
 namespace oblique::protocol {
 namespace {
 
-std::string objection_to_empty(const std::string& value) {
+std::string objection_to_empty_flag(const std::string& value) {
   return value.empty() ? "the value is empty: give one, or leave the flag out" : "";
+}
+std::string objection_to_empty_word(const std::string& value) {
+  return value.empty() ? "the value is empty: give one" : "";
+}
+
+/// Names of the verbs of a verb or the program, and of its flags.
+std::vector<std::string> known_words(const CLI::App& verb) {
+  std::vector<std::string> words;
+  for (const auto* each : verb.get_subcommands([](const CLI::App*) { return true; })) {
+    words.push_back(each->get_name());
+  }
+  for (const auto* option : verb.get_options()) {
+    for (const auto& name : option->get_lnames()) {
+      words.push_back("--" + name);
+    }
+  }
+  return words;
+}
+
+bool has_verbs(const CLI::App& verb) {
+  return !verb.get_subcommands([](const CLI::App*) { return true; }).empty();
 }
 
 std::string shown(double number) {
@@ -25,7 +51,8 @@ void refuse_empty_values(CLI::App& app) {
   for (auto* option : app.get_options()) {
     // An option that may stand without a value has none then.
     if (option->get_items_expected_min() > 0) {
-      option->check(objection_to_empty);
+      const bool is_flag = !option->get_lnames().empty() || !option->get_snames().empty();
+      option->check(is_flag ? objection_to_empty_flag : objection_to_empty_word);
     }
   }
   for (auto* verb : app.get_subcommands({})) {
@@ -60,6 +87,29 @@ CLI::Validator whole_number_from(std::int64_t least) {
       "");
 }
 
+std::string objection_of(const CLI::App& app, const CLI::App& verb, const CLI::ParseError& error) {
+  const auto words = known_words(verb);
+  const std::vector<std::string_view> candidates(words.begin(), words.end());
+  // A word too many says more than the missing verb or flag that it may have been meant for.
+  if (const auto unexpected = app.remaining(true); !unexpected.empty()) {
+    const std::string& first = unexpected.front();
+    const bool is_verb = has_verbs(verb) && !first.starts_with("-");
+    return std::string(is_verb ? "unknown verb" : "unexpected") + " `" + first + "`" +
+           did_you_mean(first.substr(0, first.find('=')), candidates);
+  }
+  const std::string message = error.what();
+  if (message.find("subcommand is required") != std::string::npos) {
+    std::vector<std::string_view> verbs;
+    std::copy_if(candidates.begin(), candidates.end(), std::back_inserter(verbs),
+                 [](std::string_view word) { return !word.starts_with("-"); });
+    return "no verb given; there are " + joined(verbs);
+  }
+  if (const auto at = message.find(": At Most 1 required"); at != std::string::npos) {
+    return message.substr(0, at) + " is given more than once: give it once";
+  }
+  return message;
+}
+
 int tell_wrong_usage(const std::string& words, const std::string& message) {
   std::cerr << words << ": " << visible_lines(message) << "\nTry `" << words << " --help`.\n";
   return kWrongUsage;
@@ -74,7 +124,7 @@ std::optional<int> parse_command_line(CLI::App& app, int argc, const char* const
     if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) {
       return app.exit(error, std::cout, std::cerr);
     }
-    return tell_wrong_usage(app.get_name(), error.what());
+    return tell_wrong_usage(app.get_name(), objection_of(app, app, error));
   }
 }
 

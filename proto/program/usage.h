@@ -22,6 +22,10 @@ CLI::Validator number_between(double least, double largest);
 /// A check for whole numbers from `least` on that 64 bits hold.
 CLI::Validator whole_number_from(std::int64_t least);
 
+/// What is wrong with what was typed, as a sentence: a word too many with the nearest that `verb`
+/// knows (of `app`, or `app` itself), or what the library says, in words that say what to do.
+std::string objection_of(const CLI::App& app, const CLI::App& verb, const CLI::ParseError& error);
+
 /// Tells on standard error what is wrong, as "oblique-server: ...", and where help is. `words` are
 /// what was typed to reach it: program and verb. Gives kWrongUsage.
 int tell_wrong_usage(const std::string& words, const std::string& message);

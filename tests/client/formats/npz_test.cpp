@@ -85,8 +85,10 @@ TEST_F(Npz, OfNoValuesHasColumnsOfTheirUsualKind) {
     std::ofstream(folder_.file("a.npz"), std::ios::binary)
         << printed(Format::kNpz, {chunk_of({"status", "study_id", "mu", "new"}, rows)},
                    {.usual = {kText, kInteger, kReal}});
-    return said_by("import numpy\na = numpy.load('" + folder_.file("a.npz") +
-                   "')\nfor name in a.files: print(a[name].dtype.kind, a[name].tolist())");
+    return oblique::test::said_by_python(
+        folder_,
+        "import numpy\na = numpy.load('a.npz')\n"
+        "for name in a.files: print(a[name].dtype.kind, a[name].tolist())");
   };
   EXPECT_EQ(archive({}), "U []\ni []\nf []\nf []\n");
   EXPECT_EQ(archive({{nullptr, nullptr, nullptr, nullptr}}), "U ['']\nf [nan]\nf [nan]\nf [nan]\n");

@@ -266,5 +266,28 @@ TEST(ExampleStudies, HaveThePointsThatTheirCommentsPromise) {
   EXPECT_EQ(points("mesh"), 6U);
 }
 
+/// What is said of the points of a study file.
+std::string judged(const std::string& text) {
+  try {
+    judge_points(parsed(text, "study.toml"));
+    return "";
+  } catch (const solver::InputError& error) {
+    return error.what();
+  }
+}
+
+TEST(StudyFile, SaysWhereWhatOnlyPointsTellIsWritten) {
+  EXPECT_EQ(judged(kPoint), "");
+  EXPECT_TRUE(judged("[[block]]\nH = 1\nmu = 'log(-1)'\ne = 1\n")
+                  .starts_with("study.toml:3:6: point 0: mu = nan is not allowed"));
+  EXPECT_TRUE(judged("[[block]]\nH = 1\nmu = '-1'\ne = 1\n")
+                  .starts_with("study.toml:3:6: point 0: mu = -1 is not allowed"));
+  EXPECT_TRUE(judged(std::string(kPoint) + "where = 'mu > 1'\n")
+                  .starts_with("study.toml:5:9: where = \"mu > 1\" leaves no point in"));
+  const std::string second =
+      judged(std::string(kPoint) + "[[block]]\nH = 1\nmu = [0.4, 0.5]\ne = 1\nI = 'log(-mu)'\n");
+  EXPECT_TRUE(second.starts_with("study.toml:9:5: block 2: point 1: I = nan")) << second;
+}
+
 }  // namespace
 }  // namespace oblique::client

@@ -1,3 +1,4 @@
+#include <filesystem>
 #include <fstream>
 #include <string>
 
@@ -111,6 +112,17 @@ TEST(StudyCheck, EndsWithTwoAndThePlaceForWhatIsWrong) {
       {"study", "check", "--H", "1", "--mu", "0.4", "--e", "1", "--where", "mu > 1"});
   EXPECT_EQ(flags.exit_code, 2);
   EXPECT_THAT(flags.err, HasSubstr("leaves no point in"));
+  EXPECT_THAT(flags.err, HasSubstr("--where mu > 1: where"));
+  EXPECT_THAT(test::run_oblique({"study"}).err, HasSubstr("no verb given; there are check"));
+  // The same mistake is wrong usage for every verb.
+  for (const auto& verb : std::vector<std::vector<std::string>>{{"study", "check"}, {"run"}}) {
+    auto arguments = verb;
+    arguments.insert(arguments.end(), {"--H", "0.5+mu", "--mu", "0.4,0.6,0.8", "--e", "1"});
+    const auto outcome = test::run_oblique(folder, arguments);
+    EXPECT_EQ(outcome.exit_code, 2) << outcome.err;
+    EXPECT_THAT(outcome.err, HasSubstr("--H 0.5+mu: point 2: H = "));
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "oblique.db"));
   EXPECT_EQ(test::run_oblique({"study"}).exit_code, 2);
   EXPECT_EQ(test::run_oblique({"study", "chekc"}).exit_code, 2);
 }

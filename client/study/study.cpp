@@ -1,0 +1,42 @@
+#include "client/study/study.h"
+
+#include <charconv>
+
+#include "proto/recipe/point_table.h"
+#include "worker/solver/model/errors.h"
+
+namespace oblique::client {
+
+Subject subject_of(std::string_view sentence) {
+  constexpr std::string_view kBlock = "block ";
+  constexpr std::string_view kPoint = "point ";
+  constexpr std::string_view kEnd = ": ";
+  const auto leave_out_first = [&] {
+    const auto end = sentence.find(kEnd);
+    sentence.remove_prefix(end == std::string_view::npos ? sentence.size() : end + kEnd.size());
+  };
+  std::size_t block = 1;
+  if (sentence.starts_with(kBlock)) {
+    std::from_chars(sentence.data() + kBlock.size(), sentence.data() + sentence.size(), block);
+    leave_out_first();
+  }
+  if (sentence.starts_with(kPoint)) {
+    leave_out_first();
+  }
+  return {block - 1, sentence.substr(0, sentence.find_first_of(" :"))};
+}
+
+void judge_points(const Study& study) {
+  constexpr std::uint64_t kMostJudged = 10'000'000;
+  protocol::PointTable table(study.recipe);
+  if (!table.needs_survey() || table.size() > kMostJudged) {
+    return;
+  }
+  try {
+    table.survey([] { return true; });
+  } catch (const solver::InputError& error) {
+    throw solver::InputError(study.located ? study.located(error.what()) : error.what());
+  }
+}
+
+}  // namespace oblique::client
