@@ -102,7 +102,7 @@ std::string objection_of(const CLI::App& app, const CLI::App& verb, const CLI::P
     std::vector<std::string_view> verbs;
     std::copy_if(candidates.begin(), candidates.end(), std::back_inserter(verbs),
                  [](std::string_view word) { return !word.starts_with("-"); });
-    return "no verb given; there are " + joined(verbs);
+    return "a verb is required; there are " + joined(verbs);
   }
   if (const auto at = message.find(": At Most 1 required"); at != std::string::npos) {
     return message.substr(0, at) + " is given more than once: give it once";

@@ -53,7 +53,7 @@ TEST(CommandLine, AnswersWrongUsageWithExitCodeTwoAndASentence) {
        "--priority: priority = 1001 is not allowed"},
       {{"submit", "--H", "1", "--mu", "0.4", "--e", "1", "--weight", "0"},
        "--weight: weight = 0 is not allowed"},
-      {{"solve", "--H", "1,1.1", "--mu", "0.4", "--e", "1"}, "2 points, and solve takes one"},
+      {{"solve", "--H", "1,1.1", "--mu", "0.4", "--e", "1"}, "solve takes one value for each"},
       {{"solve", "--H", "1", "--mu", "0.4", "--e", "1", "--trace", "/nowhere/x.csv"},
        "/nowhere/x.csv"},
       {{"solve", "--elements-per-lnk=3"}, "(did you mean `--elements-per-link`?)"},

@@ -113,7 +113,7 @@ TEST(StudyCheck, EndsWithTwoAndThePlaceForWhatIsWrong) {
   EXPECT_EQ(flags.exit_code, 2);
   EXPECT_THAT(flags.err, HasSubstr("leaves no point in"));
   EXPECT_THAT(flags.err, HasSubstr("--where mu > 1: where"));
-  EXPECT_THAT(test::run_oblique({"study"}).err, HasSubstr("no verb given; there are check"));
+  EXPECT_THAT(test::run_oblique({"study"}).err, HasSubstr("a verb is required; there are check"));
   // The same mistake is wrong usage for every verb.
   for (const auto& verb : std::vector<std::vector<std::string>>{{"study", "check"}, {"run"}}) {
     auto arguments = verb;
