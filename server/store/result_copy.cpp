@@ -1,5 +1,7 @@
 #include "server/store/result_copy.h"
 
+#include <algorithm>
+#include <array>
 #include <string_view>
 #include <vector>
 
@@ -16,7 +18,8 @@ std::string read_sql() {
     columns.push_back(fmt::format("r.{}", column));
   }
   return fmt::format(
-      "SELECT {} FROM packed_results AS r CROSS JOIN workers AS w ON w.worker_id = r.worker"
+      "SELECT r.checksum, {} FROM packed_results AS r CROSS JOIN workers AS w ON w.worker_id = "
+      "r.worker"
       " WHERE r.study_id = ?1 AND r.point >= ?2 AND r.point < ?3 AND r.error IS NULL"
       " AND w.solver_version = ?4 ORDER BY r.point",
       fmt::join(columns, ", "));
@@ -39,7 +42,37 @@ ResultCopy::ResultCopy(sqlite3* database, SettledRuns& settled, Clearing& cleari
              "INSERT INTO taken_points (study_id, origin_id, points) VALUES (?1, ?2, ?3)"
              " ON CONFLICT DO UPDATE SET points = points + excluded.points"),
       end_(database, "UPDATE studies SET takes_over = 0 WHERE study_id = ?"),
-      insert_(database) {}
+      insert_(database),
+      models_(database, "SELECT 1 FROM models WHERE model_id = ?"),
+      workers_(database,
+               "SELECT 1 FROM workers WHERE worker_id = ? AND checksum = " + worker_checksum_sql()),
+      texts_(database,
+             "SELECT 1 FROM texts WHERE text_id = ? AND checksum = " + text_checksum_sql()) {}
+
+bool ResultCopy::SoundNumbers::has(const PackedValue& number) {
+  if (number.type == PackedValue::Type::kNull) {
+    return true;
+  }
+  const auto [known, is_new] = known_.emplace(number.whole, false);
+  if (is_new) {
+    is_sound_.bind(1, number.whole);
+    known->second = is_sound_.step();
+    is_sound_.reset();
+  }
+  return known->second;
+}
+
+/// Whether the row that was read is the one that was stored.
+bool ResultCopy::is_sound() {
+  static const int kModel = packed_column("model_id");
+  static const int kWorker = packed_column("worker");
+  static const std::array<int, 3> kTexts{packed_column("mode"), packed_column("major_mode"),
+                                         packed_column("margin_event")};
+  return !read_.is_null(0) && read_.integer(0) == row_.checksum(checksum_) &&
+         models_.has(row_.at(kModel)) && workers_.has(row_.at(kWorker)) &&
+         std::all_of(kTexts.begin(), kTexts.end(),
+                     [&](int column) { return texts_.has(row_.at(column)); });
+}
 
 /// Empty: there is none of that number any more.
 std::string ResultCopy::name_of(std::uint64_t study_id) {
@@ -58,6 +91,9 @@ void ResultCopy::run(const TakeResults& change) {
   if (change.taken->origin.empty()) {
     return;
   }
+  models_.forget();
+  workers_.forget();
+  texts_.forget();
   for (const SharedRun& run : change.runs) {
     copy(change, run);
   }
@@ -89,7 +125,10 @@ void ResultCopy::copy(const TakeResults& change, const SharedRun& run) {
   read_.bind(3, run.source_point + run.count);
   read_.bind(4, change.solver_version);
   while (read_.step()) {
-    row_.read(read_, 0);
+    row_.read(read_, 1);
+    if (!is_sound()) {
+      continue;
+    }
     const auto source_point = static_cast<std::uint64_t>(row_.at(kPoint).whole);
     const std::uint64_t point = run.point + (source_point - run.source_point);
     set_whole(row_.at(kStudy), change.study_id);

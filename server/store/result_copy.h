@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <unordered_map>
 
 #include "server/database/sqlite.h"
 #include "server/store/changes.h"
@@ -12,7 +13,9 @@
 namespace oblique::server {
 
 /// Copies rows of one study to points of another, as TakeResults says: each is the same bits but
-/// for its study, its point, and where it was taken from.
+/// for its study, its point, and where it was taken from. A row that is not as it was stored is
+/// left where it is: one whose checksum does not fit or is missing, as it is in rows that were
+/// changed by hand, or whose model, worker or words are not there or not as they were stored.
 class ResultCopy {
  public:
   /// All must outlive this.
@@ -25,6 +28,19 @@ class ResultCopy {
  private:
   std::string name_of(std::uint64_t study_id);
   void copy(const TakeResults& change, const SharedRun& run);
+  bool is_sound();
+
+  /// Which numbers of a table have a sound row; of each it is asked once a change.
+  class SoundNumbers {
+   public:
+    SoundNumbers(sqlite3* database, const std::string& sql) : is_sound_(database, sql) {}
+    bool has(const PackedValue& number);
+    void forget() { known_.clear(); }
+
+   private:
+    Statement is_sound_;
+    std::unordered_map<std::int64_t, bool> known_;
+  };
 
   SettledRuns& settled_;
   Clearing& clearing_;
@@ -35,6 +51,10 @@ class ResultCopy {
   Statement end_;
   RowInsert insert_;
   PackedRow row_;
+  RowChecksum checksum_;
+  SoundNumbers models_;
+  SoundNumbers workers_;
+  SoundNumbers texts_;
 };
 
 }  // namespace oblique::server

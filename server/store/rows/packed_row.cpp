@@ -208,6 +208,26 @@ void PackedRow::read(const Statement& row, int first) {
   }
 }
 
+std::int64_t PackedRow::checksum(RowChecksum& sum) const {
+  sum.clear();
+  for (const PackedValue& value : values_) {
+    switch (value.type) {
+      case PackedValue::Type::kWhole:
+        sum.add(value.whole);
+        break;
+      case PackedValue::Type::kReal:
+        sum.add(value.real);
+        break;
+      case PackedValue::Type::kText:
+        sum.add(std::string_view(value.text));
+        break;
+      case PackedValue::Type::kNull:
+        sum.add_null();
+    }
+  }
+  return sum.sum();
+}
+
 RowInsert::RowInsert(sqlite3* database)
     : database_(database), insert_(database, [] {
         std::string marks = "?1";
@@ -223,29 +243,25 @@ RowInsert::RowInsert(sqlite3* database)
 
 bool RowInsert::run(const PackedRow& row, bool with_checksum) {
   insert_.reset();
-  checksum_.clear();
   int index = 1;
   for (const PackedValue& value : row.values()) {
     switch (value.type) {
       case PackedValue::Type::kWhole:
         insert_.bind(index, value.whole);
-        checksum_.add(value.whole);
         break;
       case PackedValue::Type::kReal:
         insert_.bind(index, value.real);
-        checksum_.add(value.real);
         break;
       case PackedValue::Type::kText:
         insert_.bind_lasting(index, value.text);
-        checksum_.add(std::string_view(value.text));
         break;
       case PackedValue::Type::kNull:
-        checksum_.add_null();
+        break;
     }
     ++index;
   }
   if (with_checksum) {
-    insert_.bind(index, std::int64_t{checksum_.sum()});
+    insert_.bind(index, row.checksum(checksum_));
   }
   insert_.run();
   return sqlite3_changes(database_) > 0;

@@ -53,6 +53,9 @@ class PackedRow {
   /// packed_columns().
   void read(const Statement& row, int first);
 
+  /// What its checksum must be.
+  std::int64_t checksum(RowChecksum& sum) const;
+
   PackedValue& at(int column) { return values_[static_cast<std::size_t>(column)]; }
   const PackedValue& at(int column) const { return values_[static_cast<std::size_t>(column)]; }
   std::span<const PackedValue> values() const { return values_; }
