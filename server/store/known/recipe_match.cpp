@@ -37,17 +37,38 @@ class TabledPoints {
           return false;
         }
         const protocol::Point at = table_.point(point);
-        points_.emplace(key_of(model_of(table_, at.model, own_models_, work), at), point);
+        const auto [same, is_new] = points_.emplace(
+            key_of(model_of(table_, at.model, own_models_, work), at), Ends{point, point});
+        if (!is_new) {
+          next_[same->second.last] = point;
+          same->second.last = point;
+        }
       }
     }
     return true;
   }
 
-  /// The lowest point of another study's values.
+  /// The lowest of the points that have another study's values.
   std::optional<std::uint64_t> find(const protocol::PointTable& other, const protocol::Point& at,
                                     Work& work) {
     const auto found = points_.find(key_of(model_of(other, at.model, other_models_, work), at));
-    return found == points_.end() ? std::nullopt : std::optional(found->second);
+    return found == points_.end() ? std::nullopt : std::optional(found->second.first);
+  }
+  /// Gives all of them, and never again.
+  template <typename Give>
+  void take_out(const protocol::PointTable& other, const protocol::Point& at, Work& work,
+                const Give& give) {
+    const auto found = points_.find(key_of(model_of(other, at.model, other_models_, work), at));
+    if (found == points_.end()) {
+      return;
+    }
+    std::optional<std::uint64_t> point = found->second.first;
+    points_.erase(found);
+    while (point && work.spend(1)) {
+      give(*point);
+      const auto next = next_.find(*point);
+      point = next == next_.end() ? std::nullopt : std::optional(next->second);
+    }
   }
 
  private:
@@ -84,7 +105,13 @@ class TabledPoints {
   std::map<std::string, std::uint64_t> texts_;
   Models own_models_;
   Models other_models_;
-  std::unordered_map<Key, std::uint64_t, Hash> points_;
+  /// Points of the same values: the lowest and the highest.
+  struct Ends {
+    std::uint64_t first;
+    std::uint64_t last;
+  };
+  std::unordered_map<Key, Ends, Hash> points_;
+  std::unordered_map<std::uint64_t, std::uint64_t> next_;  // higher one of the same values
 };
 
 std::uint64_t count(const std::vector<Interval>& intervals) {
@@ -146,17 +173,18 @@ struct BlockPair {
     }
   }
 
-  /// Looks the points of one side up in the other, where `find` finds them.
+  /// Looks the points of one side up in the other, where `find` gives those that are the same.
   template <typename Find>
   void look_up(bool of_target, Find find) const {
     RunGatherer runs(take, work);
     const protocol::PointTable& table = of_target ? *target.table : *source.table;
     for (const Interval& interval : of_target ? open_here : known_here) {
       for (std::uint64_t point = interval.begin; point < interval.end && work.spend(1); ++point) {
-        const std::optional<std::uint64_t> other = find(table, table.point(point));
-        if (other && (of_target ? known : open).contains(*other)) {
-          runs.add(of_target ? point : *other, of_target ? *other : point);
-        }
+        find(table, table.point(point), [&](std::uint64_t other) {
+          if ((of_target ? known : open).contains(other)) {
+            runs.add(of_target ? point : other, of_target ? other : point);
+          }
+        });
       }
     }
     runs.finish();
@@ -165,13 +193,17 @@ struct BlockPair {
 
 void look_up_in_product(const BlockPair& pair, bool of_target) {
   ProductInverse inverse(of_target ? pair.source : pair.target);
-  pair.look_up(of_target, [&](const protocol::PointTable& table, const protocol::Point& at) {
-    if (inverse.knows_model(at.model)) {
-      return inverse.find(at.model, {}, at.H_m, at.mu, at.e_star);
-    }
-    pair.work.spend(kModelWork);
-    return inverse.find(at.model, table.model(at.model), at.H_m, at.mu, at.e_star);
-  });
+  pair.look_up(of_target,
+               [&](const protocol::PointTable& table, const protocol::Point& at, const auto& give) {
+                 solver::ModelParameters model;
+                 if (!inverse.knows_model(at.model)) {
+                   pair.work.spend(kModelWork);
+                   model = table.model(at.model);
+                 }
+                 if (const auto found = inverse.find(at.model, model, at.H_m, at.mu, at.e_star)) {
+                   give(*found);
+                 }
+               });
 }
 
 void look_up_in_table(const BlockPair& pair) {
@@ -183,8 +215,15 @@ void look_up_in_table(const BlockPair& pair) {
   }
   TabledPoints points(of_target ? *pair.source.table : *pair.target.table);
   if (points.add(tabled, pair.work)) {
-    pair.look_up(of_target, [&](const protocol::PointTable& table, const protocol::Point& at) {
-      return points.find(table, at, pair.work);
+    // Of a value that the target has often each of its points is wanted; of one that the source has
+    // often any will do.
+    pair.look_up(of_target, [&](const protocol::PointTable& table, const protocol::Point& at,
+                                const auto& give) {
+      if (!of_target) {
+        points.take_out(table, at, pair.work, give);
+      } else if (const auto found = points.find(table, at, pair.work)) {
+        give(*found);
+      }
     });
   }
 }
@@ -209,6 +248,12 @@ bool is_same_sample(const PlacedBlock& target, const PlacedBlock& source) {
   return text(target) == text(source);
 }
 
+/// Whether all values of a sample are listed, so that later points may be those of earlier ones.
+bool repeats_points(const protocol::Block& block) {
+  return std::none_of(block.axes().begin(), block.axes().end(),
+                      [](const protocol::Axis& axis) { return axis.has_distribution(); });
+}
+
 void match_blocks(const BlockPair& pair) {
   if (pair.open_here.empty() || pair.known_here.empty() || pair.work.is_over()) {
     return;
@@ -225,8 +270,13 @@ void match_blocks(const BlockPair& pair) {
       look_up_in_product(pair, open <= known);
     }
   } else if (is_same_sample(pair.target, pair.source)) {
-    pair.give({pair.target.first_point, pair.source.first_point,
-               std::min(pair.target.points, pair.source.points)});
+    const std::uint64_t same = std::min(pair.target.points, pair.source.points);
+    pair.give({pair.target.first_point, pair.source.first_point, same});
+    if (repeats_points(*pair.target.block)) {
+      look_up_in_table({pair.target, pair.source, pair.open, pair.known,
+                        pair.open.within(pair.target.first_point + same, pair.target.end()),
+                        pair.known_here, pair.work, pair.take});
+    }
   } else if (source_is_product) {
     look_up_in_product(pair, true);
   } else if (target_is_product) {

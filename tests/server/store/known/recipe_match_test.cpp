@@ -155,6 +155,35 @@ TEST(RecipeMatch, SamplesAndPointsSideBySideAreLookedUpInGridsAndInEachOther) {
   EXPECT_THAT(runs_of(longer, sample), ElementsAre(SharedRun{0, 0, 64}));
 }
 
+TEST(RecipeMatch, EachOfEqualPointsIsFoundWhicheverSideHasMore) {
+  const auto zip = [](std::vector<double> H) {
+    return protocol::recipe_of_blocks(
+        {protocol::zipped({listed("H", H), listed("mu", {0.5}), listed("e", {0.9})})});
+  };
+  const auto few = zip({0.5, 0.9, 0.5});
+  const auto many = zip({0.5, 0.5, 0.9, 0.7, 0.7, 0.9, 0.5, 0.6});
+  const auto others = zip({0.5, 0.9, 0.7, 0.8, 0.65, 0.55, 0.45, 0.35, 0.9, 0.25});
+  expect_all_found(few, many);
+  expect_all_found(many, few);
+  expect_all_found(many, others);
+  expect_all_found(others, many);
+}
+
+TEST(RecipeMatch, EqualPointsOfSamplesOfListedValuesAreFoundInEachOther) {
+  const auto sample = [](std::uint64_t count, std::uint64_t seed) {
+    return protocol::recipe_of_blocks({protocol::sampled(
+        {listed("H", {0.9, 0.5}), listed("mu", {0.5, 0.7, 0.9}), listed("e", {0.9})},
+        protocol::SAMPLE_RANDOM, count, seed)});
+  };
+  const auto points = [](const protocol::Recipe& target, const protocol::Recipe& source) {
+    EXPECT_EQ(pairs_of(runs_of(target, source)).size(), all_pairs(target, source).size());
+  };
+  points(sample(16, 2), sample(40, 1));
+  points(sample(40, 1), sample(16, 2));
+  points(sample(40, 1), sample(16, 1));
+  points(sample(16, 1), sample(40, 1));
+}
+
 TEST(RecipeMatch, OnlyOpenPointsAreWantedAndOnlyKnownOnesGiven) {
   const auto recipe =
       recipe_of({{listed("H", {1.0}), range("mu", 0.0, 1.0, 100), listed("e", {1.0})}});
