@@ -333,6 +333,7 @@ void Service::stored(const StateWrite& write, Instant now) {
 
 void Service::stored(const TermsWrite& write, Instant now) {
   feed(changes_.stored(write, now), now);
+  outbox_.finder().set_priority(write.study, write.terms.priority);
   changes_.answer(write, now);
 }
 

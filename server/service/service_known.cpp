@@ -30,7 +30,8 @@ void Service::note_source(StudyId id) {
 
 void Service::seek_known(StudyId id) {
   known_.begin(id);
-  outbox_.finder().seek({id, states_.record(id).table});
+  const auto& record = states_.record(id);
+  outbox_.finder().seek({id, record.table, record.terms.priority});
 }
 
 void Service::stored(const StudyWrite& write, Instant now) {

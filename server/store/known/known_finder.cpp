@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <tuple>
 #include <utility>
 
 #include "proto/recipe/point_table.h"
@@ -33,39 +34,49 @@ class KnownFinder::Chunks {
       flush();
     }
   }
-  /// The points that were found.
   void flush() {
     std::sort(runs_.begin(), runs_.end(),
               [](const SharedRun& a, const SharedRun& b) { return a.point < b.point; });
-    std::vector<SharedRun> chunk;
     std::uint64_t points = 0;
-    for (SharedRun run : runs_) {
-      found_.insert(run.point, run.point + run.count);
+    for (SharedRun run : std::exchange(runs_, {})) {
       while (run.count > 0) {
         const std::uint64_t part = std::min(run.count, finder_.settings_.chunk_points - points);
-        chunk.push_back({run.point, run.source_point, part});
+        chunk_.push_back({run.point, run.source_point, part});
         run = {run.point + part, run.source_point + part, run.count - part};
         points += part;
         if (points == finder_.settings_.chunk_points) {
-          if (!finder_.hand_over({study_id_, source_id_, std::exchange(chunk, {})})) {
+          if (!hand_over()) {
             return;
           }
           points = 0;
         }
       }
     }
-    if (!chunk.empty()) {
-      finder_.hand_over({study_id_, source_id_, std::move(chunk)});
+    if (!chunk_.empty()) {
+      hand_over();
     }
-    runs_.clear();
   }
+  /// The points that were handed over.
   const IntervalSet& found() const { return found_; }
 
  private:
+  /// What is not handed over at the end of a turn is found again in the next one.
+  bool hand_over() {
+    std::vector<SharedRun> chunk = std::exchange(chunk_, {});
+    if (finder_.is_turn_over() || !finder_.hand_over({study_id_, source_id_, chunk})) {
+      return false;
+    }
+    for (const SharedRun& run : chunk) {
+      found_.insert(run.point, run.point + run.count);
+    }
+    return true;
+  }
+
   KnownFinder& finder_;
   std::uint64_t study_id_;
   std::uint64_t source_id_;
   std::vector<SharedRun> runs_;
+  std::vector<SharedRun> chunk_;
   IntervalSet found_;
 };
 
@@ -94,8 +105,20 @@ void KnownFinder::drop_source(std::uint64_t study_id) {
 
 void KnownFinder::seek(KnownQuestion question) {
   const std::lock_guard lock(mutex_);
-  questions_.push_back(std::move(question));
+  waiting_.push_back({std::move(question), {}, 0, 0, ++last_wait_});
   wake_.notify_all();
+}
+
+void KnownFinder::set_priority(std::uint64_t study_id, std::int32_t priority) {
+  const std::lock_guard lock(mutex_);
+  if (current_.question.study_id == study_id) {
+    current_.question.priority = priority;
+  }
+  for (Waiting& waiting : waiting_) {
+    if (waiting.question.study_id == study_id) {
+      waiting.question.priority = priority;
+    }
+  }
 }
 
 void KnownFinder::go_on() {
@@ -106,58 +129,107 @@ void KnownFinder::go_on() {
 
 void KnownFinder::stop_seeking(std::uint64_t study_id) {
   const std::lock_guard lock(mutex_);
-  if (current_ == study_id) {
+  if (current_.question.study_id == study_id) {
     is_unwanted_ = true;
     wake_.notify_all();
-    return;
   }
   // One that waits has nothing to find.
-  for (KnownQuestion& question : questions_) {
-    if (question.study_id == study_id) {
-      question.is_unwanted = true;
+  for (Waiting& waiting : waiting_) {
+    if (waiting.question.study_id == study_id) {
+      waiting.question.is_unwanted = true;
     }
   }
 }
 
 void KnownFinder::run() {
   while (true) {
-    KnownQuestion question{};
     {
       std::unique_lock lock(mutex_);
-      current_ = 0;
-      wake_.wait(lock, [this] { return stopping_ || !questions_.empty(); });
+      current_ = {};
+      wake_.wait(lock, [this] { return stopping_ || !waiting_.empty(); });
       if (stopping_) {
         return;
       }
-      question = std::move(questions_.front());
-      questions_.pop_front();
-      current_ = question.study_id;
-      is_unwanted_ = false;
+      current_ = next();
+      is_unwanted_ = current_.question.is_unwanted;
     }
-    answer(question);
+    turn_ = {Clock::now(), {}, false, false};
+    answer();
   }
 }
 
-void KnownFinder::answer(const KnownQuestion& question) {
-  KnownReport end{question.study_id, 0, {}, true, false};
+/// The one that is at turn: one that only has to end, else one of the highest priority.
+KnownFinder::Waiting KnownFinder::next() {
+  const bool longest_waiting = ++turns_ % 2 == 0;
+  const auto rank = [&](const Waiting& waiting) {
+    return std::tuple(!waiting.question.is_unwanted, -std::int64_t{waiting.question.priority},
+                      longest_waiting ? 0 : waiting.turns,
+                      longest_waiting ? 0 : waiting.question.table.size(), waiting.waits_from);
+  };
+  const auto first =
+      std::min_element(waiting_.begin(), waiting_.end(),
+                       [&](const Waiting& a, const Waiting& b) { return rank(a) < rank(b); });
+  Waiting waiting = std::move(*first);
+  waiting_.erase(first);
+  return waiting;
+}
+
+/// Whether others are at turn.
+bool KnownFinder::is_turn_over() {
+  if (turn_.is_over) {
+    return true;
+  }
+  const auto past = Clock::now() - turn_.began;
+  const auto searched = past - turn_.waited;
+  if (past < settings_.turn) {
+    return false;
+  }
+  const bool is_long = searched >= settings_.turn * (std::int64_t{1} << current_.long_turns);
+  // What was sought long is taken as long, for the next turn seeks it again.
+  const bool is_taken = turn_.waited >= 2 * std::max<Clock::duration>(settings_.turn, searched);
+  const std::lock_guard lock(mutex_);
+  const std::int32_t priority = current_.question.priority;
+  turn_.is_over = std::any_of(waiting_.begin(), waiting_.end(), [&](const Waiting& waiting) {
+    return waiting.question.priority > priority ||
+           (waiting.question.priority == priority && (is_long || is_taken));
+  });
+  if (turn_.is_over && is_long && ++current_.long_turns >= settings_.most_turns) {
+    turn_.is_cut_short = true;
+  }
+  return turn_.is_over;
+}
+
+void KnownFinder::answer() {
+  KnownReport end{current_.question.study_id, 0, {}, true, false};
   try {
     protocol::Recipe recipe;
-    if (!question.is_unwanted && recipe.ParseFromString(question.table.recipe_bytes())) {
-      Work work(settings_.most_work, is_unwanted_);
-      seek_in_all(question, protocol::PointTable(std::move(recipe)), work);
-      end.is_cut_short = work.is_spent();
+    if (!is_unwanted_ && recipe.ParseFromString(current_.question.table.recipe_bytes())) {
+      Work work(settings_.most_work, is_unwanted_, [this] { return is_turn_over(); });
+      seek_in_all(protocol::PointTable(std::move(recipe)), work);
+      end.is_cut_short = work.is_spent() || turn_.is_cut_short;
     }
   } catch (const std::exception&) {
     end.is_cut_short = true;  // what is not found is solved
   }
+  end_or_wait(std::move(end));
+}
+
+void KnownFinder::end_or_wait(KnownReport end) {
   const std::lock_guard lock(mutex_);
-  if (!stopping_) {
+  if (stopping_) {
+    return;
+  }
+  if (turn_.is_over && !end.is_cut_short) {
+    ++current_.turns;
+    current_.waits_from = ++last_wait_;
+    current_.question.is_unwanted = is_unwanted_;
+    waiting_.push_back(std::move(current_));
+  } else {
     report_(std::move(end));
   }
 }
 
-void KnownFinder::seek_in_all(const KnownQuestion& question, const protocol::PointTable& table,
-                              Work& work) {
+void KnownFinder::seek_in_all(const protocol::PointTable& table, Work& work) {
   std::vector<std::shared_ptr<KnownSource>> sources;
   {
     const std::lock_guard lock(mutex_);
@@ -165,17 +237,19 @@ void KnownFinder::seek_in_all(const KnownQuestion& question, const protocol::Poi
       sources.push_back(source);
     }
   }
-  IntervalSet open = open_points(database(), question.study_id, table.size());
+  const std::uint64_t study_id = current_.question.study_id;
+  IntervalSet open = open_points(database(), study_id, table.size());
+  current_.found.for_each([&](const Interval& run) { open.erase(run.begin, run.end); });
   const PointBox box = box_of(table.recipe());
   const bool looks = needs_look(table);
   for (const auto& source : sources) {
-    if (open.empty() || !work.spend(1)) {
+    if (open.empty() || turn_.is_over || !work.spend(1)) {
       return;
     }
-    if (source->study_id() == question.study_id || !source->may_have(table.recipe(), box, work)) {
+    if (source->study_id() == study_id || !source->may_have(table.recipe(), box, work)) {
       continue;
     }
-    Chunks chunks(*this, question.study_id, source->study_id());
+    Chunks chunks(*this, study_id, source->study_id());
     find_known(database(), table, open, *source, settings_.solver_version, work,
                [&](const SharedRun& run) {
                  if (looks) {
@@ -185,7 +259,10 @@ void KnownFinder::seek_in_all(const KnownQuestion& question, const protocol::Poi
                  }
                });
     chunks.flush();
-    chunks.found().for_each([&](const Interval& run) { open.erase(run.begin, run.end); });
+    chunks.found().for_each([&](const Interval& run) {
+      open.erase(run.begin, run.end);
+      current_.found.insert(run.begin, run.end);
+    });
   }
 }
 
@@ -201,8 +278,10 @@ void KnownFinder::add_sound(const protocol::PointTable& table, const SharedRun& 
 
 /// False when nobody wants it any more.
 bool KnownFinder::hand_over(KnownReport report) {
+  const auto from = Clock::now();
   std::unique_lock lock(mutex_);
   wake_.wait(lock, [this] { return is_unwanted_ || reports_out_ < kMostReportsOut; });
+  turn_.waited += Clock::now() - from;
   if (is_unwanted_) {
     return false;
   }

@@ -30,6 +30,9 @@ struct FakeFinder final : KnownSeeker {
   void drop_source(std::uint64_t study_id) override { dropped.push_back(study_id); }
   void seek(KnownQuestion question) override { questions.push_back(std::move(question)); }
   void go_on() override { ++done; }
+  void set_priority(std::uint64_t study_id, std::int32_t priority) override {
+    priorities.emplace_back(study_id, priority);
+  }
   void stop_seeking(std::uint64_t study_id) override { stopped.push_back(study_id); }
 
   bool can = false;
@@ -37,6 +40,7 @@ struct FakeFinder final : KnownSeeker {
   std::vector<std::uint64_t> dropped;
   std::vector<KnownQuestion> questions;
   std::vector<std::uint64_t> stopped;
+  std::vector<std::pair<std::uint64_t, std::int32_t>> priorities;
   int done = 0;
 };
 

@@ -1,6 +1,8 @@
 #include "server/store/known/known_finder.h"
 
 #include <chrono>
+#include <map>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -174,6 +176,81 @@ TEST_F(KnownFinderTest, WhatNobodyWantsAnyMoreEndsAndTheNextStudyIsServed) {
   report = next_report();
   EXPECT_EQ(report.study_id, 3U);
   EXPECT_TRUE(report.is_end);
+}
+
+TEST_F(KnownFinderTest, AStudyOfAHigherPriorityDoesNotWaitForTheRestOfALargerOne) {
+  settings_.chunk_points = 10;
+  settings_.turn = std::chrono::milliseconds(0);
+  add_study(1, 101);
+  add_study(2, 101);
+  add_study(3, 101);
+  add_results(1, 101, IntervalSet(0, 101));
+  finder().seek({2, table_of(101), 0});
+  EXPECT_EQ(next_report().study_id, 2U);
+  EXPECT_EQ(next_report().study_id, 2U);
+  finder().seek({3, table_of(101), 1});
+  std::vector<std::uint64_t> ends;
+  std::map<std::uint64_t, IntervalSet> found;
+  found[2] = IntervalSet(0, 20);
+  finder().go_on();
+  finder().go_on();
+  while (ends.size() < 2) {
+    const KnownReport report = next_report();
+    if (report.is_end) {
+      EXPECT_FALSE(report.is_cut_short);
+      ends.push_back(report.study_id);
+      continue;
+    }
+    for (const SharedRun& run : report.runs) {
+      for (std::uint64_t i = 0; i < run.count; ++i) {
+        EXPECT_FALSE(found[report.study_id].contains(run.point + i)) << "handed over once";
+        found[report.study_id].insert(run.point + i);
+      }
+    }
+    finder().go_on();
+  }
+  EXPECT_THAT(ends, ElementsAre(3, 2));
+  EXPECT_EQ(found[2].size(), 101U);
+  EXPECT_EQ(found[3].size(), 101U);
+}
+
+TEST_F(KnownFinderTest, ASmallStudyOfTheSamePriorityDoesNotWaitForTheRestOfALargerOne) {
+  settings_.chunk_points = 10;
+  settings_.turn = std::chrono::milliseconds(1);
+  settings_.most_turns = 30;
+  add_study(1, 10'001);
+  add_study(2, 10'001);
+  add_study(3, 5);
+  add_results(1, 10'001, IntervalSet(0, 10'001));
+  finder().seek({2, table_of(10'001)});
+  EXPECT_EQ(next_report().study_id, 2U);
+  finder().seek({3, table_of(5)});
+  finder().go_on();
+  KnownReport report = next_report();
+  for (; !report.is_end; report = next_report()) {
+    finder().go_on();
+  }
+  EXPECT_EQ(report.study_id, 3U);
+}
+
+TEST_F(KnownFinderTest, ASearchThatTakesTooManyTurnsOfOthersIsCutShort) {
+  settings_.chunk_points = 10;
+  settings_.turn = std::chrono::milliseconds(0);
+  settings_.most_turns = 1;
+  add_study(1, 101);
+  add_study(2, 101);
+  add_study(3, 101);
+  add_results(1, 101, IntervalSet(0, 101));
+  finder().seek({2, table_of(101)});
+  EXPECT_EQ(next_report().study_id, 2U);
+  finder().seek({3, table_of(101)});
+  finder().go_on();
+  KnownReport report = next_report();
+  for (; !report.is_end; report = next_report()) {
+    finder().go_on();
+  }
+  EXPECT_EQ(report.study_id, 2U);
+  EXPECT_TRUE(report.is_cut_short);
 }
 
 TEST_F(KnownFinderTest, ADatabaseThatCannotBeReadEndsTheSearch) {

@@ -77,6 +77,20 @@ TEST_F(ServiceKnownTest, WhileKnownPointsAreSoughtNothingIsHandedOutAndTheReplyW
   EXPECT_EQ(status_of("b").waits_for(), "");
 }
 
+TEST_F(ServiceKnownTest, PointsAreSoughtWithThePriorityOfTheStudyAlsoWhenItChanges) {
+  solve_some();
+  auto urgent = submit_request("b");
+  urgent.mutable_submit()->set_priority(7);
+  request(urgent);
+  write_all();
+  ASSERT_THAT(outbox_.seeker.questions, SizeIs(1));
+  EXPECT_EQ(outbox_.seeker.questions[0].priority, 7);
+  urgent.mutable_submit()->set_priority(9);
+  request(urgent);
+  write_all();
+  EXPECT_THAT(outbox_.seeker.priorities, ElementsAre(std::pair(2U, 9)));
+}
+
 TEST_F(ServiceKnownTest, TheReplyWaitsNotForEver) {
   solve_some();
   request(submit_request("b"));
