@@ -319,7 +319,8 @@ bool PointTable::needs_survey() const {
 }
 
 bool PointTable::survey(const std::function<bool()>& goes_on) {
-  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+  for (; surveyed_.block < blocks_.size(); surveyed_ = {surveyed_.block + 1, 0, 0}) {
+    const std::size_t i = surveyed_.block;
     if (is_simple_[i] || !is_judged_by_points(base_model_, message(i))) {
       continue;
     }
@@ -338,7 +339,7 @@ bool PointTable::survey(const std::function<bool()>& goes_on) {
 }
 
 bool PointTable::survey_block(std::size_t number, const std::function<bool()>& goes_on) {
-  constexpr std::uint64_t kAsksEvery = 4096;
+  constexpr std::uint64_t kAsksEvery = 1024;
   Block& block = *recipe_->mutable_blocks(static_cast<int>(number));
   const BlockPlace& place = blocks_[number];
   const bool has_filter = !block.where().empty();
@@ -352,8 +353,9 @@ bool PointTable::survey_block(std::size_t number, const std::function<bool()>& g
     return true;
   }
   BlockPoints points(base_model_, block);
-  std::uint64_t left_in = 0;
-  for (std::uint64_t i = 0; i < place.points; ++i) {
+  std::uint64_t& i = surveyed_.points;
+  std::uint64_t& left_in = surveyed_.left_in;
+  for (; i < place.points; ++i) {
     if (i % kAsksEvery == 0 && !goes_on()) {
       return false;
     }

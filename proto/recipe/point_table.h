@@ -71,10 +71,10 @@ class PointTable {
   bool needs_survey() const;
   /// Looks at the points of such blocks one by one: counts what filters leave in, which the recipe
   /// has from then on, and judges every value. Takes about a second for 10^7 points. `goes_on` is
-  /// asked now and then; false ends it with false. Throws solver::InputError that names block,
-  /// point and values for a value that is not allowed, for a filter over more than `kMostCounted`
-  /// points and for one that leaves nothing in. Blocks without filter that have more are passed
-  /// over: a point of theirs that is not allowed fails (`fault`).
+  /// asked now and then; false ends it with false, and the next call goes on from there. Throws
+  /// solver::InputError that names block, point and values for a value that is not allowed, for a
+  /// filter over more than `kMostCounted` points and for one that leaves nothing in. Blocks without
+  /// filter that have more are passed over: a point of theirs that is not allowed fails (`fault`).
   bool survey(const std::function<bool()>& goes_on);
   static constexpr std::uint64_t kMostCounted = 100'000'000;
 
@@ -105,6 +105,13 @@ class PointTable {
   void add_to_base_segments(std::uint64_t block_points);
   bool survey_block(std::size_t number, const std::function<bool()>& goes_on);
   std::size_t block_of_model(std::uint64_t index) const;
+
+  /// Where a survey goes on.
+  struct Surveyed {
+    std::size_t block = 0;
+    std::uint64_t points = 0;  ///< of that block
+    std::uint64_t left_in = 0;
+  };
   const Block& message(std::size_t block) const { return recipe_->blocks(static_cast<int>(block)); }
 
   std::unique_ptr<Recipe> recipe_;  ///< stays where it is when the table moves
@@ -118,6 +125,7 @@ class PointTable {
   std::uint64_t models_ = 0;
   std::size_t expressions_ = 0;
   bool has_filter_ = false;
+  Surveyed surveyed_;
   std::unique_ptr<Compiled> compiled_;  ///< of the other blocks; null when there are none
 };
 

@@ -91,7 +91,8 @@ void ClientsDesk::read_elsewhere(const Client& client, std::string_view frame) {
   } else {
     const std::uint64_t ticket = ++last_ticket_;
     long_requests_.emplace(ticket, LongRequest{client, frame.size()});
-    at_.readers.read({ticket, std::string(frame)});
+    at_.readers.read(
+        {ticket, std::string(frame), {}, 0, client.key().empty() ? client.identity : client.key()});
   }
 }
 

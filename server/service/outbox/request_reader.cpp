@@ -1,5 +1,6 @@
 #include "server/service/outbox/request_reader.h"
 
+#include <algorithm>
 #include <chrono>
 #include <exception>
 #include <memory>
@@ -30,28 +31,49 @@ TracedPoint read_point(const std::string& recipe_bytes, std::uint64_t point) {
   }
 }
 
-/// Whoever asks for more should make several studies.
+/// Whoever asks for more should make several studies. Of all recipes of a client that wait.
 constexpr std::chrono::minutes kLongestSurvey{10};
+/// While others wait.
+constexpr std::chrono::milliseconds kSurveyTurn{50};
+
+/// Looks at points until all are seen, and makes it the table; false: it was ended before.
+bool survey_of(ReadRequest& read, const std::function<bool()>& goes_on) {
+  try {
+    if (!read.unsurveyed->survey(goes_on)) {
+      return false;
+    }
+    read.table = std::make_shared<const protocol::PointTable>(std::move(*read.unsurveyed));
+  } catch (const solver::InputError& error) {
+    read.objection = error.what();
+  }
+  read.needs_survey = false;
+  read.unsurveyed.reset();
+  return true;
+}
+
+void end_survey(ReadRequest& read) {
+  read.needs_survey = false;
+  read.unsurveyed.reset();
+  read.objection =
+      "the points of the study are looked at one by one, for its filters and expressions, and "
+      "that was ended because it took too long: make several studies, or a simpler expression";
+}
 
 /// The table of a recipe. What a client says of counts does not count.
 void judge(protocol::Recipe recipe, const std::function<bool()>& goes_on, ReadRequest& read) {
   for (protocol::Block& block : *recipe.mutable_blocks()) {
     block.clear_points_left_in();
   }
-  protocol::PointTable table(std::move(recipe));
-  if (table.needs_survey()) {
-    if (!goes_on) {
-      read.needs_survey = true;
-      return;
-    }
-    if (!table.survey(goes_on)) {
-      read.objection =
-          "the points of the study are looked at one by one, for its filters and expressions, and "
-          "that was ended because it took too long: make several studies, or a simpler expression";
-      return;
-    }
+  auto table = std::make_shared<protocol::PointTable>(std::move(recipe));
+  read.needs_survey = table->needs_survey();
+  if (!read.needs_survey) {
+    read.table = std::make_shared<const protocol::PointTable>(std::move(*table));
+    return;
   }
-  read.table = std::make_shared<const protocol::PointTable>(std::move(table));
+  read.unsurveyed = std::move(table);
+  if (goes_on && !survey_of(read, goes_on)) {
+    end_survey(read);
+  }
 }
 
 }  // namespace
@@ -121,30 +143,46 @@ RequestReader::~RequestReader() {
 
 void RequestReader::submit(ReadJob job) {
   const std::lock_guard lock(mutex_);
-  reading_.waiting.push_back(std::move(job));
+  const std::uint64_t bytes = job.of_study ? job.of_study->recipe_bytes().size() : job.frame.size();
+  reading_.waiting.push_back({std::move(job), bytes});
   wake_.notify_all();
 }
 
 void RequestReader::cancel(std::uint64_t ticket) {
   const std::lock_guard lock(mutex_);
   for (Line* line : {&reading_, &surveying_}) {
-    std::erase_if(line->waiting, [&](const ReadJob& job) { return job.ticket == ticket; });
+    std::erase_if(line->waiting,
+                  [&](const Waiting& waiting) { return waiting.job.ticket == ticket; });
     line->is_wanted = line->is_wanted && line->ticket != ticket;
   }
 }
 
-ReadReport RequestReader::read(const ReadJob& job, bool surveys) {
+/// The one whose turn it is.
+RequestReader::Waiting RequestReader::next(Line& line) {
+  std::erase_if(line.spent, [&](const auto& entry) {
+    return std::none_of(line.waiting.begin(), line.waiting.end(),
+                        [&](const Waiting& waiting) { return waiting.job.client == entry.first; });
+  });
+  auto first = line.waiting.begin();
+  if (++line.turns % 2 == 1) {
+    const auto rank = [&](const Waiting& waiting) {
+      return std::pair(line.spent[waiting.job.client], waiting.size);
+    };
+    first = std::min_element(line.waiting.begin(), line.waiting.end(),
+                             [&](const Waiting& a, const Waiting& b) { return rank(a) < rank(b); });
+  }
+  Waiting waiting = std::move(*first);
+  line.waiting.erase(first);
+  return waiting;
+}
+
+ReadReport RequestReader::read(const ReadJob& job) {
   ReadReport report{job.ticket, {}};
-  const auto until = std::chrono::steady_clock::now() + kLongestSurvey;
-  const std::function<bool()> goes_on = [&] {
-    const std::lock_guard lock(mutex_);
-    return !stopping_ && surveying_.is_wanted && std::chrono::steady_clock::now() < until;
-  };
   try {
     if (job.of_study) {
       report.point = read_point(job.of_study->recipe_bytes(), job.point);
     } else {
-      report.read = read_request(job.frame, surveys ? goes_on : std::function<bool()>());
+      report.read = read_request(job.frame, {});
     }
   } catch (const std::exception&) {  // there is no memory for it
     if (job.of_study) {
@@ -155,6 +193,35 @@ ReadReport RequestReader::read(const ReadJob& job, bool surveys) {
   return report;
 }
 
+/// One turn; true when it came to an end. `spent` on its client before.
+bool RequestReader::survey(Waiting& waiting, Clock::duration spent) {
+  std::optional<Clock::time_point> began;  // asking, so that each turn sees points
+  bool is_too_long = false;
+  const auto goes_on = [&] {
+    const auto now = Clock::now();
+    const auto past = now - began.value_or(now);
+    began = now - past;
+    is_too_long = spent + past >= kLongestSurvey;
+    const std::lock_guard lock(mutex_);
+    return !is_too_long && !stopping_ && surveying_.is_wanted &&
+           (past < kSurveyTurn || surveying_.waiting.empty());
+  };
+  try {
+    if (survey_of(waiting.read, goes_on)) {
+      return true;
+    }
+    if (is_too_long) {
+      end_survey(waiting.read);
+    }
+    return is_too_long;
+  } catch (const std::exception&) {  // there is no memory for it
+    const std::uint64_t request_id = waiting.read.request_id;
+    waiting.read = {};
+    waiting.read.request_id = request_id;
+    return true;
+  }
+}
+
 void RequestReader::run(Line& line, bool surveys) {
   std::unique_lock lock(mutex_);
   while (true) {
@@ -162,19 +229,31 @@ void RequestReader::run(Line& line, bool surveys) {
     if (stopping_) {
       return;
     }
-    ReadJob job = std::move(line.waiting.front());
-    line.waiting.pop_front();
-    line.ticket = job.ticket;
+    Waiting waiting = next(line);
+    const Clock::duration spent = line.spent[waiting.job.client];
+    line.ticket = waiting.job.ticket;
     line.is_wanted = true;
     lock.unlock();
-    ReadReport report = read(job, surveys);
-    const bool needs_survey = report.read.needs_survey;
-    if (!needs_survey) {
+    const auto began = Clock::now();
+    ReadReport report{waiting.job.ticket, {}};
+    bool is_done = true;
+    if (surveys) {
+      is_done = survey(waiting, spent);
+      report.read = std::move(waiting.read);
+    } else {
+      report = read(waiting.job);
+      is_done = !report.read.needs_survey;
+    }
+    if (is_done) {
       report_(std::move(report));
     }
     lock.lock();
-    if (needs_survey && line.is_wanted) {
-      surveying_.waiting.push_back(std::move(job));
+    line.spent[waiting.job.client] += Clock::now() - began;
+    if (!is_done && line.is_wanted) {
+      waiting.job.frame.clear();
+      waiting.read = std::move(report.read);
+      waiting.size = waiting.read.unsurveyed->size();
+      surveying_.waiting.push_back(std::move(waiting));
       wake_.notify_all();
     }
   }

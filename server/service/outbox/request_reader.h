@@ -1,10 +1,13 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <map>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -24,6 +27,7 @@ struct ReadRequest {
   StudyTable table;                 ///< of a submission that has no fault
   std::string objection;            ///< what is wrong with the recipe; empty: nothing
   bool needs_survey = false;        ///< the points of the recipe must be looked at, and were not
+  std::shared_ptr<protocol::PointTable> unsurveyed;  ///< of such a recipe
 };
 
 /// Reads one frame. Costs time and memory in proportion to its bytes: a long one that is padded
@@ -57,6 +61,7 @@ struct ReadJob {
   std::string frame;
   std::optional<StudyTable> of_study = {};  ///< only its bytes are looked at
   std::uint64_t point = 0;
+  std::string client = {};  ///< whose it is: a key's holder, or a connection
 };
 struct ReadReport {
   std::uint64_t ticket;
@@ -64,9 +69,10 @@ struct ReadReport {
   std::optional<TracedPoint> point = {};
 };
 
-/// Reads long requests and recipes one after another on a thread of its own, so that a large recipe
-/// holds up nothing but other large ones. Recipes whose points must be looked at go on to a second
-/// thread, and hold up nothing but each other.
+/// Reads long requests and recipes on a thread of its own, so that a large recipe holds up nothing
+/// but other large ones. Recipes whose points must be looked at go on to a second thread, a short
+/// time each while others wait. Whose turn it is: by turns that of the client whose requests took
+/// least time, its smallest one, and that of the request that waits the longest.
 class RequestReader {
  public:
   using Report = std::function<void(ReadReport)>;
@@ -83,15 +89,26 @@ class RequestReader {
   void cancel(std::uint64_t ticket);
 
  private:
-  /// One of the threads: what waits for it, and what it is at.
+  using Clock = std::chrono::steady_clock;
+
+  struct Waiting {
+    ReadJob job;
+    std::uint64_t size = 0;  ///< bytes, or points to look at
+    ReadRequest read = {};   ///< where it is to be surveyed
+  };
+  /// One of the threads: what waits for it, in the order in which it began to, and what it is at.
   struct Line {
-    std::deque<ReadJob> waiting;
+    std::deque<Waiting> waiting;
     std::uint64_t ticket = 0;
     bool is_wanted = false;
+    std::uint64_t turns = 0;
+    std::map<std::string, Clock::duration> spent;  ///< on clients of whom something waits
   };
 
   void run(Line& line, bool surveys);
-  ReadReport read(const ReadJob& job, bool surveys);
+  Waiting next(Line& line);
+  static ReadReport read(const ReadJob& job);
+  bool survey(Waiting& waiting, Clock::duration spent);
 
   Report report_;
   std::mutex mutex_;

@@ -126,6 +126,20 @@ TEST(SurveyTest, ASurveyCanBeEnded) {
   EXPECT_FALSE(table.recipe().blocks(0).has_points_left_in());
 }
 
+TEST(SurveyTest, ASurveyThatWasEndedGoesOnWhereItWas) {
+  const auto many = [](const char* where) {
+    return filtered({listed("H", {0.5}), range("mu", 0.0, 1.0, 5001), listed("e", {1.0})}, where);
+  };
+  PointTable table(recipe_of_blocks({grid(""), many("mu > 0.25"), many("mu > 0.75")}));
+  int ended = 0;
+  for (bool ends = false; !table.survey([&] { return ends = !ends; }); ends = false) {
+    ASSERT_LT(++ended, 100) << "every call looks at further points";
+  }
+  EXPECT_GT(ended, 2);
+  EXPECT_EQ(table.recipe().blocks(1).points_left_in(), 3750U);
+  EXPECT_EQ(table.recipe().blocks(2).points_left_in(), 1250U);
+}
+
 TEST(SurveyTest, ATableOfACountedRecipeNeedsNoCounting) {
   PointTable counted(recipe_of_blocks({grid("mu > 1.6 * e")}));
   counted.survey(kGoesOn);

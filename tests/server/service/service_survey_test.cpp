@@ -121,6 +121,11 @@ class Reports {
     return *found;
   }
 
+  std::size_t count() {
+    const std::lock_guard lock(mutex_);
+    return reports_.size();
+  }
+
  private:
   std::mutex mutex_;
   std::condition_variable came_;
@@ -152,6 +157,27 @@ TEST(RequestReaderSurveyTest, ALongSurveyHoldsUpNoOtherRequestAndCanBeCancelled)
   reader.submit({3, frame_of(11)});
   reader.cancel(1);
   EXPECT_EQ(reports.wait_for(3).read.table.size(), 5U);
+}
+
+TEST(RequestReaderSurveyTest, TheLongSurveysOfSomeHoldUpNoSmallOneOfAnother) {
+  Reports reports;
+  RequestReader reader([&](ReadReport report) { reports.put(std::move(report)); });
+  for (const std::uint64_t ticket : {1U, 2U, 3U, 4U}) {
+    reader.submit({ticket, frame_of(100'000'000), {}, 0, ticket % 2 == 0 ? "one" : "other"});
+  }
+  reader.submit({5, frame_of(11), {}, 0, "third"});
+  EXPECT_EQ(reports.wait_for(5).read.table.size(), 5U);
+  EXPECT_EQ(reports.count(), 1U) << "the others are still at it";
+}
+
+TEST(RequestReaderSurveyTest, SurveysThatTakeTurnsCountAsIfTheyHadNone) {
+  constexpr std::uint64_t kPoints = 2'000'001;
+  Reports reports;
+  RequestReader reader([&](ReadReport report) { reports.put(std::move(report)); });
+  reader.submit({1, frame_of(kPoints), {}, 0, "one"});
+  reader.submit({2, frame_of(kPoints), {}, 0, "other"});
+  EXPECT_EQ(reports.wait_for(1).read.table.size(), kPoints / 2);
+  EXPECT_EQ(reports.wait_for(2).read.table.size(), kPoints / 2);
 }
 
 TEST(RequestReaderSurveyTest, AReaderThatEndsDoesNotWaitForASurvey) {
