@@ -71,21 +71,26 @@ void ClientsDesk::tick(Instant now) {
   }
 }
 
-/// Of one client few wait, so that the others find room.
+/// Of one client few wait, and of all connections with one key a quarter, so that the others find
+/// room.
 void ClientsDesk::read_elsewhere(const Client& client, std::string_view frame) {
   std::size_t bytes = frame.size();
   std::size_t of_client = 0;
+  std::size_t of_key = 0;
   for (const auto& [ticket, request] : long_requests_) {
     if (client.request_id != 0 && request.client == client) {
       return;  // it is sent again because the answer takes long; it waits already
     }
     bytes += request.bytes;
     of_client += request.client.identity == client.identity ? 1U : 0U;
+    of_key += !client.key().empty() && request.client.key() == client.key() ? 1U : 0U;
   }
   if (stopping_) {
     at_.clients.reply_error(client, "the server is stopping: ask again when it is back");
   } else if (long_requests_.size() >= settings_.most_long_requests ||
              of_client >= settings_.most_long_requests_of_one ||
+             of_key >=
+                 std::max(settings_.most_long_requests_of_one, settings_.most_long_requests / 4) ||
              bytes > settings_.most_long_bytes) {
     at_.clients.reply_error(client, "too many long requests wait already: ask again later");
   } else {

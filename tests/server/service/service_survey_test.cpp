@@ -1,6 +1,7 @@
 // Studies whose points must be looked at before they are taken: filters, expressions.
 #include <algorithm>
 #include <condition_variable>
+#include <memory>
 #include <mutex>
 #include <vector>
 
@@ -89,6 +90,20 @@ TEST_F(ServiceSurveyTest, WhoWaitsHearsOfItAndWhoIsGoneIsForgotten) {
   read_all();
   EXPECT_THAT(outbox_.replies, IsEmpty());
   EXPECT_THAT(outbox_.jobs, IsEmpty());
+}
+
+TEST_F(ServiceSurveyTest, OneKeyWithManyConnectionsLeavesRoomForOthers) {
+  const auto submit = [&](const std::string& client, const std::string& key) {
+    const auto holder = std::make_shared<const KeyHolder>(KeyHolder{key, protocol::Role::kClient});
+    service_->client_frame(client, protocol::encode(filtered_request("mu > 0.75")), now_, holder);
+  };
+  for (int i = 0; i < 100; ++i) {
+    submit("connection " + std::to_string(i), "one");
+  }
+  EXPECT_EQ(outbox_.reads.size(), 16U);
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("too many long requests"));
+  submit("another connection", "other");
+  EXPECT_EQ(outbox_.reads.size(), 17U);
 }
 
 TEST_F(ServiceSurveyTest, TheSameStudySubmittedAgainIsThatStudy) {
