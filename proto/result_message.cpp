@@ -160,15 +160,35 @@ void read_sent(const PointResult& message, AbsentScalars& absent, CaseResult& re
   });
 }
 
-bool all_finite(const Numbers& numbers) {
-  return std::all_of(numbers.begin(), numbers.end(), [](double v) { return std::isfinite(v); });
+/// What is wrong with a number, as "is not a finite number"; nullptr: nothing.
+const char* fault_of_number(double number) {
+  if (std::abs(number) <= kLargestOutput) {
+    return nullptr;
+  }
+  return std::isfinite(number) ? "is too large to be stored" : "is not a finite number";
 }
 
+/// A list of a message, and how many of its numbers are an element of it.
+struct List {
+  const char* name;
+  const Numbers* numbers;
+  int per_element;
+};
+
 std::string fault_of_lists(const PointResult& message) {
-  for (const Numbers* numbers : {&message.peaks(), &message.ft_peaks(), &message.phase_ends_s(),
-                                 &message.stick_intervals(), &message.reaction_peaks()}) {
-    if (!all_finite(*numbers)) {
-      return "the worker sent a list with a number that is not finite";
+  for (const List& list : {List{"peaks", &message.peaks(), 3},
+                           {"ft_peaks", &message.ft_peaks(), 2},
+                           {"phases", &message.phase_ends_s(), 1},
+                           {"stick_intervals", &message.stick_intervals(), 2},
+                           {"reaction_peaks", &message.reaction_peaks(), 2}}) {
+    if (list.numbers->size() / list.per_element > kMostListElements) {
+      return fmt::format("the worker sent {} {}, and a result has at most {}",
+                         list.numbers->size() / list.per_element, list.name, kMostListElements);
+    }
+    for (const double number : *list.numbers) {
+      if (const char* fault = fault_of_number(number)) {
+        return fmt::format("the worker sent a number in {} that {}", list.name, fault);
+      }
     }
   }
   if (message.peaks_size() % 3 != 0 || message.ft_peaks_size() % 2 != 0 ||
@@ -219,8 +239,12 @@ std::string fault_of_scalars(const PointResult& message) {
   AbsentScalars passed(message);
   int i = 0;
   for_each_sent<double>([&](const ResultField& field, const Member<double>&) {
-    if (!passed.lacks_next() && !std::isfinite(message.reals(i++)) && fault.empty()) {
-      fault = fmt::format("the worker sent a {} that is not a finite number", field.column);
+    if (passed.lacks_next()) {
+      return;
+    }
+    const char* const found = fault_of_number(message.reals(i++));
+    if (found != nullptr && fault.empty()) {
+      fault = fmt::format("the worker sent a {} that {}", field.column, found);
     }
   });
   return fault;
@@ -269,6 +293,10 @@ std::string fault_of(const PointResult& message) {
   if (is_too_long(message.error()) ||
       std::any_of(message.texts().begin(), message.texts().end(), is_too_long)) {
     return "the worker sent a text that is too long";
+  }
+  if (message.ByteSizeLong() > kMostResultBytes) {
+    return fmt::format("the worker sent a result of {} bytes, and one has at most {}",
+                       message.ByteSizeLong(), kMostResultBytes);
   }
   if (!message.error().empty()) {
     return {};

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 
@@ -7,6 +8,15 @@
 #include "worker/solver/model/case_result.h"
 
 namespace oblique::protocol {
+
+/// Largest magnitude of a number in a result, in SI units. Far beyond anything that happens to a
+/// finger, and small enough that it stays finite in every unit in which databases keep it
+/// (server/store/rows/stored_units.h).
+inline constexpr double kLargestOutput = 1e100;
+/// Most elements of a list in a result, as peaks. Honest ones have dozens.
+inline constexpr int kMostListElements = 4096;
+/// Most bytes of a result.
+inline constexpr std::size_t kMostResultBytes = std::size_t{1} << 20U;
 
 // What a worker sends of a solved point. The scalars are those of solver::result_fields(), in its
 // order and without their names, which the worker says once, when it joins.
@@ -22,8 +32,9 @@ solver::CaseResult from_message(const PointResult& message);
 PointResult failed_point(std::uint64_t point, const std::string& reason);
 
 /// Why a result from the network is none, or an empty text: another number of scalars than results
-/// have, or none where no result may lack one, a number that is not finite, lists of impossible
-/// length, texts too long.
+/// have, or none where no result may lack one, a number that is not finite or beyond
+/// kLargestOutput, lists of impossible length, more elements, bytes or longer texts than results
+/// have.
 std::string fault_of(const PointResult& message);
 
 /// Sets what a worker of this build says of its messages: their version, and what its results have.

@@ -16,6 +16,7 @@
 #include "server/store/rows/list_faults.h"
 #include "server/store/rows/model_rows.h"
 #include "server/store/rows/row_columns.h"
+#include "server/store/rows/stored_units.h"
 
 namespace oblique::server {
 namespace {
@@ -68,6 +69,23 @@ std::string misplaced_outputs_sql(int schema) {
       " CASE status WHEN 'solved' THEN {} > 0 ELSE {} < {} END",
       status, results_table(schema), number_missing(certain_columns(schema)), number_missing(all),
       all.size());
+}
+
+/// Numbers that were too large for the unit in which they are stored, or set so by hand.
+std::string infinite_outputs_sql(int schema) {
+  const auto columns = output_columns(schema);
+  std::string what;
+  for (const StoredUnit& unit : stored_units()) {
+    const std::string_view name = schema >= kFirstPacked ? unit.stored : unit.column;
+    if (std::find(columns.begin(), columns.end(), name) != columns.end()) {
+      what += fmt::format(" WHEN abs({}) >= 9e999 THEN '{}'", name, unit.column);
+    }
+  }
+  return fmt::format(
+      "SELECT 'study ' || study_id || ', point ' || point || ': its ' || what ||"
+      " ' is not a finite number' FROM (SELECT study_id, point, CASE{} END AS what FROM {})"
+      " WHERE what IS NOT NULL",
+      what, results_table(schema));
 }
 
 /// Holds each row of a model against its definition.
@@ -262,6 +280,7 @@ std::vector<std::string> faults_of_rows(sqlite3* database, int schema, std::size
                        result_checksum_sql(schema));
   }
   kind().add_all(database, misplaced_outputs_sql(schema));
+  kind().add_all(database, infinite_outputs_sql(schema));
   auto models = kind();
   check_models(database, schema, models);
   auto studies = kind();

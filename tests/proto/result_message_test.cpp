@@ -176,8 +176,46 @@ TEST(PointResultTest, ANumberThatIsNotFiniteIsFoundWhereverItIs) {
         &PointResult::mutable_reaction_peaks}) {
     PointResult message = sound;
     (message.*list)()->Set(1, kNotANumber);
-    EXPECT_THAT(fault_of(message), HasSubstr("not finite"));
+    EXPECT_THAT(fault_of(message), HasSubstr("not a finite number"));
   }
+}
+
+TEST(PointResultTest, ANumberThatNoUnitOfADatabaseHoldsIsFoundWhereverItIs) {
+  const PointResult sound = to_message(0, distinct_result());
+  for (const double number : {1e308, -1e300, 1.1e100}) {
+    for (int i = 0; i < sound.reals_size(); ++i) {
+      PointResult message = sound;
+      message.set_reals(i, number);
+      EXPECT_THAT(fault_of(message), HasSubstr("too large to be stored")) << i;
+    }
+    for (auto* (PointResult::*list)() :
+         {&PointResult::mutable_peaks, &PointResult::mutable_ft_peaks,
+          &PointResult::mutable_phase_ends_s, &PointResult::mutable_stick_intervals,
+          &PointResult::mutable_reaction_peaks}) {
+      PointResult message = sound;
+      (message.*list)()->Set(1, number);
+      EXPECT_THAT(fault_of(message), HasSubstr("too large to be stored"));
+    }
+  }
+  PointResult largest = sound;
+  largest.set_reals(0, 1e100);
+  largest.mutable_peaks()->Set(1, -1e100);
+  EXPECT_EQ(fault_of(largest), "");
+}
+
+TEST(PointResultTest, AListHasAtMost4096ElementsAndAResultAMebibyte) {
+  PointResult message = to_message(0, distinct_result());
+  message.clear_peaks();
+  message.clear_major_peaks();
+  message.mutable_peaks()->Resize(3 * 4096, 1e-5);
+  EXPECT_EQ(fault_of(message), "");
+  message.mutable_peaks()->Resize(3 * 100'000, 1e-5);
+  EXPECT_THAT(fault_of(message), HasSubstr("bytes, and one has at most 1048576"));
+  message.mutable_peaks()->Resize(3 * 4097, 1e-5);
+  EXPECT_EQ(fault_of(message), "the worker sent 4097 peaks, and a result has at most 4096");
+  PointResult failed = failed_point(0, "why");
+  failed.mutable_major_peaks()->Resize(1 << 20, 300);
+  EXPECT_THAT(fault_of(failed), HasSubstr("and one has at most 1048576"));
 }
 
 TEST(PointResultTest, WhatIsNoResultIsRefused) {

@@ -31,7 +31,7 @@ inline protocol::PointResult solved_point(std::uint64_t point) {
   result.errors.mode_same = point % 2 == 0 ? 1 : 0;
   result.errors.fn_peak = third * 1e-2;
   result.errors.v_out = third * 1e-1;
-  result.peaks = {{0.0, third, 2.0, false}, {1e-5 / 3.0, third * 7.0, 1e300 / 3.0, true}};
+  result.peaks = {{0.0, third, 2.0, false}, {1e-5 / 3.0, third * 7.0, 1e30 / 3.0, true}};
   result.ft_peaks = {{third, -third}};
   result.phases = {{solver::PhaseKind::kCompression, 0.0, third * 1e-4},
                    {solver::PhaseKind::kRestitution, third * 1e-4, third * 2e-4},

@@ -9,6 +9,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/result_message.h"
 #include "server/store/rows/model_rows.h"
 #include "server/store/rows/row_columns.h"
 #include "worker/solver/model/result_fields.h"
@@ -66,6 +67,10 @@ const std::vector<int>& scalar_places() {
     return found;
   }();
   return all;
+}
+
+bool is_storable(double number) {
+  return std::abs(number) <= protocol::kLargestOutput;  // no NaN is
 }
 
 /// Reads the JSON of a list: arrays of so many values in an array. The name of a kind of phase
@@ -131,7 +136,7 @@ class ListText {
     double number = 0.0;
     const char* const end = rest_.data() + rest_.size();
     const auto [behind, error] = std::from_chars(rest_.data(), end, number);
-    if (error != std::errc() || !std::isfinite(number)) {
+    if (error != std::errc() || !is_storable(number)) {
       return false;
     }
     rest_.remove_prefix(static_cast<std::size_t>(behind - rest_.data()));
@@ -231,7 +236,11 @@ bool OldRows::read_outputs(const Statement& row, int first) {
     }
   };
   solver::for_each_sent<double>([&](const auto& field, const auto& member) {
-    read(field, member, [&](int column) { return row.real(column); });
+    read(field, member, [&](int column) {
+      const double number = row.real(column);
+      is_whole = is_whole && is_storable(number);
+      return number;
+    });
   });
   solver::for_each_sent<std::int64_t>([&](const auto& field, const auto& member) {
     read(field, member, [&](int column) { return row.integer(column); });

@@ -1,6 +1,10 @@
 #include "server/store/rows/stored_units.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
+
+#include "proto/result_message.h"
 
 namespace oblique::server {
 namespace {
@@ -38,6 +42,13 @@ constexpr std::array kUnits{
     StoredUnit{"v_out_error", "v_out_error", 1e9, Scale::kOne},
     StoredUnit{"dt_s", "dt", 1e15, Scale::kStep},
     StoredUnit{.column = "wall_s", .stored = "wall", .per_unit = 1e9, .follows_accuracy = false}};
+
+static_assert(std::ranges::all_of(kUnits,
+                                  [](const StoredUnit& unit) {
+                                    return unit.per_unit * protocol::kLargestOutput <
+                                           std::numeric_limits<double>::max();
+                                  }),
+              "the largest output is finite in every unit");
 
 /// What is stored is so many times finer than what is accurate.
 constexpr double kFiner = 100.0;

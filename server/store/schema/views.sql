@@ -7,7 +7,8 @@ DROP VIEW IF EXISTS peaks;
 DROP VIEW IF EXISTS results;
 
 -- One row for each settled point, in SI units. Dividing by a power of ten gives the double that is
--- nearest to the decimal number. Lists are JSON arrays with an array for each element. Modes are joined
+-- nearest to the decimal number. Lists are JSON arrays with an array for each element; one that is damaged
+-- is NULL and makes no rows, so that the others can be asked for (`oblique check` names it). Modes are joined
 -- because most questions show them; other texts are looked up, which costs nothing where a question does
 -- without: SQLite 3.40 keeps joins that an aggregate does not need.
 CREATE VIEW results AS
@@ -19,23 +20,23 @@ SELECT p.study_id AS study_id, p.point AS point, p.model_id AS model_id, p.H AS 
        p.impulse_t / 1e9 AS impulse_t_Ns, p.slide / 1e11 AS slide_m, p.vt_out / 1e8 AS vt_out_m_s,
        p.vn_out / 1e8 AS vn_out_m_s, mode.text AS mode, major_mode.text AS major_mode,
        p.stick_total / 1e12 AS stick_total_s,
-       CASE WHEN p.peaks IS NOT NULL THEN
+       CASE WHEN json_valid(p.peaks) THEN
          (SELECT json_group_array(json_array(
                    t.value / 1e12, abs(p.peaks ->> (t.key + 1)) / 1e5, (p.peaks ->> (t.key + 2)) / 1e5,
                    p.peaks ->> (t.key + 1) >= 0))
           FROM json_each(p.peaks) AS t WHERE t.key % 3 = 0) END AS peaks,
-       CASE WHEN p.peaks IS NOT NULL THEN CASE WHEN p.ft_peaks IS NOT NULL THEN
+       CASE WHEN p.peaks IS NOT NULL THEN CASE WHEN p.ft_peaks IS NOT NULL THEN CASE WHEN json_valid(p.ft_peaks) THEN
          (SELECT json_group_array(json_array(t.value / 1e12, (p.ft_peaks ->> (t.key + 1)) / 1e5))
-          FROM json_each(p.ft_peaks) AS t WHERE t.key % 2 = 0) ELSE
+          FROM json_each(p.ft_peaks) AS t WHERE t.key % 2 = 0) END WHEN json_valid(p.peaks) THEN
          (SELECT json_group_array(json_array(t.value / 1e12, (p.peaks ->> (t.key + 2)) / 1e5))
           FROM json_each(p.peaks) AS t WHERE t.key % 3 = 0) END END AS ft_peaks,
-       CASE WHEN p.peaks IS NOT NULL THEN
+       CASE WHEN p.peaks IS NOT NULL AND (p.phases IS NULL OR json_valid(p.phases)) AND abs(p.duration) < 9e999 THEN
          (SELECT json_group_array(json_array(
                    CASE t.key % 2 WHEN 0 THEN 'compression' ELSE 'restitution' END,
                    CASE t.key WHEN 0 THEN 0.0 ELSE (p.phases ->> (t.key - 1)) / 1e12 END,
                    t.value / 1e12))
           FROM json_each(json_insert(p.phases, '$[#]', p.duration)) AS t) END AS phases,
-       CASE WHEN p.stick_intervals IS NOT NULL THEN
+       CASE WHEN json_valid(p.stick_intervals) THEN
          (SELECT json_group_array(json_array(
                    t.value / 1e12, (p.stick_intervals ->> (t.key + 1)) / 1e12))
           FROM json_each(p.stick_intervals) AS t WHERE t.key % 2 = 0) END AS stick_intervals,
@@ -49,7 +50,7 @@ SELECT p.study_id AS study_id, p.point AS point, p.model_id AS model_id, p.H AS 
        p.attempt AS attempt,
        CASE typeof(p.solved_at) WHEN 'integer'
             THEN strftime('%Y-%m-%dT%H:%M:%fZ', p.solved_at / 1000.0, 'unixepoch') ELSE p.solved_at END AS solved_at,
-       CASE WHEN p.reaction_peaks IS NOT NULL THEN
+       CASE WHEN json_valid(p.reaction_peaks) THEN
          (SELECT json_group_array(json_array(t.value / 1e12, (p.reaction_peaks ->> (t.key + 1)) / 1e5))
           FROM json_each(p.reaction_peaks) AS t WHERE t.key % 2 = 0) END AS reaction_peaks,
        p.checksum AS checksum, p.margin / 1e9 AS margin,
@@ -106,25 +107,29 @@ CREATE VIEW peaks AS
 SELECT p.study_id AS study_id, p.point AS point, t.key / 3 AS seq, t.value / 1e12 AS t_s,
        abs(p.peaks ->> (t.key + 1)) / 1e5 AS fn_N, (p.peaks ->> (t.key + 2)) / 1e5 AS ft_N,
        p.peaks ->> (t.key + 1) >= 0 AS major
-FROM packed_results AS p, json_each(p.peaks) AS t WHERE t.key % 3 = 0;
+FROM packed_results AS p, json_each(CASE WHEN json_valid(p.peaks) THEN p.peaks END) AS t
+WHERE t.key % 3 = 0;
 
 CREATE VIEW phases AS
 SELECT p.study_id AS study_id, p.point AS point, t.key AS seq,
        CASE t.key % 2 WHEN 0 THEN 'compression' ELSE 'restitution' END AS kind,
        CASE t.key WHEN 0 THEN 0.0 ELSE (p.phases ->> (t.key - 1)) / 1e12 END AS t0_s,
        t.value / 1e12 AS t1_s
-FROM packed_results AS p, json_each(json_insert(p.phases, '$[#]', p.duration)) AS t;
+FROM packed_results AS p, json_each(CASE WHEN json_valid(p.phases) AND abs(p.duration) < 9e999
+                                         THEN json_insert(p.phases, '$[#]', p.duration) END) AS t;
 
 CREATE VIEW stick_intervals AS
 SELECT p.study_id AS study_id, p.point AS point, t.key / 2 AS seq, t.value / 1e12 AS t0_s,
        (p.stick_intervals ->> (t.key + 1)) / 1e12 AS t1_s
-FROM packed_results AS p, json_each(p.stick_intervals) AS t WHERE t.key % 2 = 0;
+FROM packed_results AS p, json_each(CASE WHEN json_valid(p.stick_intervals) THEN p.stick_intervals END) AS t
+WHERE t.key % 2 = 0;
 
 -- `seq` 0 is the pin O, 1 the first joint from there.
 CREATE VIEW reaction_peaks AS
 SELECT p.study_id AS study_id, p.point AS point, t.key / 2 AS seq, t.value / 1e12 AS t_s,
        (p.reaction_peaks ->> (t.key + 1)) / 1e5 AS force_N
-FROM packed_results AS p, json_each(p.reaction_peaks) AS t WHERE t.key % 2 = 0;
+FROM packed_results AS p, json_each(CASE WHEN json_valid(p.reaction_peaks) THEN p.reaction_peaks END) AS t
+WHERE t.key % 2 = 0;
 
 -- For people: study name, outputs and model beside each other. Young's modulus is E_Pa here, for
 -- column names do not tell E from e.

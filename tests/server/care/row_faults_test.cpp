@@ -91,6 +91,9 @@ TEST_F(RowFaultsTest, AColumnThatDisagreesWithTheRecipeOrAnotherColumnIsNamed) {
       {"phases = '[100000000]'", "phases"},
       {"stick_intervals = replace(stick_intervals, '20000000', '30000000')", "stick_total_s"},
       {"reaction_peaks = '[100000000]'", "reaction_peaks"},
+      {"duration = 9e999", "its duration_s is not a finite number"},
+      {"closure = -9e999", "its closure is not a finite number"},
+      {"phases = '[inf]'", "one of its lists cannot be read"},
       {"impulse_n = NULL", "outputs are missing"},
       {"error = 'none'", "it is failed, and has outputs"}};
   for (const auto& [change, said] : damages) {

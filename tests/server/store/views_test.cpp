@@ -89,6 +89,35 @@ TEST_F(ViewsTest, ViewsUnfoldThePackedArrays) {
   EXPECT_EQ(phases.rows(0).values(0).text(), "compression,restitution,compression");
 }
 
+TEST_F(ViewsTest, AListThatIsDamagedIsNullAndTheOtherRowsAreShown) {
+  store(4, {solved_point(0), solved_point(1), solved_point(2), solved_point(3)});
+  const std::string all =
+      "SELECT point, peaks IS NULL, ft_peaks IS NULL, phases IS NULL, stick_intervals IS NULL,"
+      " reaction_peaks IS NULL FROM runs ORDER BY point";
+  const auto unfolded = [&](const std::string& view) {
+    return ask("SELECT count(DISTINCT point) FROM " + view).rows(0).values(0).integer();
+  };
+  for (const std::string list :
+       {"peaks", "ft_peaks", "phases", "stick_intervals", "reaction_peaks"}) {
+    execute(open_database(path_, SQLITE_OPEN_READWRITE).get(),
+            "UPDATE packed_results SET " + list + " = '[1,inf]' WHERE point = 1");
+    const auto rows = ask(all);
+    ASSERT_EQ(rows.rows_size(), 4) << list;
+  }
+  const auto rows = ask(all);
+  for (int i = 1; i < 6; ++i) {
+    EXPECT_EQ(rows.rows(0).values(i).integer(), 0) << i;
+    EXPECT_EQ(rows.rows(1).values(i).integer(), 1) << i;
+  }
+  for (const std::string view : {"peaks", "phases", "stick_intervals", "reaction_peaks"}) {
+    EXPECT_EQ(unfolded(view), 3) << view;
+  }
+  execute(open_database(path_, SQLITE_OPEN_READWRITE).get(),
+          "UPDATE packed_results SET duration = 9e999 WHERE point = 2");
+  EXPECT_EQ(unfolded("phases"), 2);
+  EXPECT_EQ(ask(all).rows(2).values(3).integer(), 1);
+}
+
 TEST_F(ViewsTest, TheLargestReactionsComeBackThePinFirst) {
   auto of_older_worker = solved_point(2);
   of_older_worker.clear_reaction_peaks();

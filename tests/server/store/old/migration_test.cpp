@@ -214,6 +214,24 @@ TEST_F(MigrationTest, KeepsTablesAndViewsThatPeopleMadeAndIndicesOfColumnsThatAr
   EXPECT_THAT(find_faults(path), IsEmpty());
 }
 
+TEST_F(MigrationTest, LeavesOutARowWithANumberThatNoUnitHolds) {
+  const std::string path = old_file("edited.db");
+  const auto said = said_of(
+      path,
+      "UPDATE results SET peaks = '[[1e-5,1e308,0,1]]', checksum = NULL"
+      " WHERE study_id = 1 AND point = 1;"
+      "UPDATE results SET fn_peak_N = 9e999, checksum = NULL WHERE study_id = 1 AND point = 2;"
+      "UPDATE results SET duration_s = 1e300, checksum = NULL WHERE study_id = 1 AND point = 3;");
+  EXPECT_THAT(said, Contains(HasSubstr("3 results were not as they were stored: they are left "
+                                       "out, and their points are solved again")));
+  EXPECT_THAT(texts(path, "SELECT count(*) FROM runs WHERE study_id = 1 AND point IN (1, 2, 3)"),
+              ElementsAre("0"));
+  EXPECT_THAT(texts(path,
+                    "SELECT sum(json_valid(peaks) AND json_valid(phases)) FROM runs"
+                    " WHERE status = 'solved'"),
+              texts(path, "SELECT count(*) FROM runs WHERE status = 'solved'"));
+}
+
 TEST_F(MigrationTest, KeepsAddedColumnsInATableAndNamesThem) {
   const std::string path = old_file("added.db");
   const auto said = said_of(path,
