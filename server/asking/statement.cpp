@@ -15,6 +15,7 @@
 #include "server/asking/sql/sql_items.h"
 #include "server/asking/sql/sql_literals.h"
 #include "server/database/sqlite.h"
+#include "server/store/schema/standing_views.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::server {
@@ -182,7 +183,14 @@ std::vector<std::string> columns_of_statement(sqlite3* database, const std::stri
       sqlite3_prepare_v2(database, sql.data(), static_cast<int>(sql.size()), &raw, nullptr);
   const std::unique_ptr<sqlite3_stmt, int (*)(sqlite3_stmt*)> statement(raw, &sqlite3_finalize);
   if (code != SQLITE_OK) {
-    throw solver::InputError(fmt::format("the question is wrong: {}", sqlite3_errmsg(database)));
+    const std::string reason = sqlite3_errmsg(database);
+    if (const auto missing = missing_views(database); !missing.empty()) {
+      throw solver::InputError(fmt::format(
+          "the question cannot be answered: the database lacks its view {0} ({1}). A server, or "
+          "`oblique run`, makes it again when it starts on this file; `oblique check` names all",
+          fmt::join(missing, ", "), reason));
+    }
+    throw solver::InputError(fmt::format("the question is wrong: {}", reason));
   }
   std::vector<std::string> names;
   for (int i = 0; i < sqlite3_column_count(raw); ++i) {

@@ -15,6 +15,7 @@
 #include "server/database/sqlite.h"
 #include "server/store/rows/row_columns.h"
 #include "server/store/rows/settled_runs.h"
+#include "server/store/schema/standing_views.h"
 
 namespace oblique::server {
 namespace {
@@ -142,6 +143,10 @@ Diagnosis diagnose(const std::string& path) {
           " LIMIT 20");
   if (schema >= kFirstPacked) {
     compare_settled_points(database, found);
+    if (const auto faults = faults_of_views(database); !faults.empty()) {
+      found.faults.insert(found.faults.end(), faults.begin(), faults.end());
+      shadow_views(database);  // the rows are looked at all the same
+    }
   }
   for (auto& fault : faults_of_rows(database, schema, kMostOfAKind)) {
     found.faults.push_back(std::move(fault));

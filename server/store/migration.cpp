@@ -16,7 +16,7 @@
 #include "server/store/rows/model_rows.h"
 #include "server/store/rows/old_additions.h"
 #include "server/store/rows/row_columns.h"
-#include "server/store/schema.h"
+#include "server/store/schema/schema.h"
 
 namespace oblique::server {
 namespace {

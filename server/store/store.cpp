@@ -9,6 +9,7 @@
 #include "server/store/rows/model_rows.h"
 #include "server/store/rows/packed_row.h"
 #include "server/store/rows/row_columns.h"
+#include "server/store/schema/standing_views.h"
 
 namespace oblique::server {
 namespace {
@@ -145,19 +146,19 @@ Store::Store(const std::string& path, const Notice& notice) {
     // What is deleted is given back in small steps. To be said before anything is written.
     execute(database_.get(), "PRAGMA auto_vacuum = INCREMENTAL");
   }
-  Statement journal(database_.get(), "PRAGMA journal_mode = WAL");
-  if (!journal.step() || journal.text(0) != "wal") {
+  if (Statement journal(database_.get(), "PRAGMA journal_mode = WAL");
+      !journal.step() || journal.text(0) != "wal") {
     throw StorageError("the file system of " + path + " cannot hold a write-ahead log");
   }
-  journal.reset();
   execute(database_.get(), "PRAGMA synchronous = FULL");
   log_->make_sure();
   if (kind == DatabaseKind::kEmpty) {
     create_schema(database_.get());
-    log_->merge();  // the file is a whole database from the start
   } else if (kind == DatabaseKind::kOlder) {
     migrate(database_.get(), notice);
-    log_->merge();
+  }
+  if (kind != DatabaseKind::kOurs || restore_views(database_.get(), notice)) {
+    log_->merge();  // a new file is a whole database from the start
   }
   if (!gives_space_back(database_.get())) {
     make_it_give_space_back(database_.get(), notice);
@@ -187,7 +188,7 @@ void Store::set_sync(bool full) {
 }
 
 void Store::commit(std::span<const Change> changes) {
-  const bool any_is_lasting = std::any_of(changes.begin(), changes.end(), [](const Change& change) {
+  const bool any_is_lasting = std::ranges::any_of(changes, [](const Change& change) {
     return std::visit([](const auto& kind) { return is_lasting(kind); }, change);
   });
   try {
@@ -378,9 +379,9 @@ Store::StoredModel Store::stored_model(const AddResults& change, std::uint64_t m
   bind_model(statements_->add_model, parameters, definition);
   statements_->add_model.run();
   const bool is_new = sqlite3_changes(database_.get()) > 0;
-  const StoredModel stored{
-      is_new ? sqlite3_last_insert_rowid(database_.get()) : known_model(definition),
-      accuracy_of(parameters)};
+  const std::int64_t id =
+      is_new ? sqlite3_last_insert_rowid(database_.get()) : known_model(definition);
+  const StoredModel stored{id, accuracy_of(parameters)};
   if (models_.size() >= kMostCachedModels) {
     models_.clear();
   }
@@ -391,8 +392,7 @@ Store::StoredModel Store::stored_model(const AddResults& change, std::uint64_t m
 std::int64_t Store::known_model(std::string_view definition) {
   Statement& find = statements_->find_model;
   find.bind(1, definition);
-  find.step();
-  const std::int64_t id = find.integer(0);
+  const std::int64_t id = find.step() ? find.integer(0) : 0;
   find.reset();
   return id;
 }

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "server/database/sqlite.h"
+
+// Views, triggers and indices that every database of this schema has. Other programs may have
+// dropped or replaced some; what people made under other names is theirs.
+namespace oblique::server {
+
+/// A sentence for each one that is missing or other than ours, and each whose name something else
+/// has. The database has the present schema. Throws StorageError.
+std::vector<std::string> faults_of_views(sqlite3* database);
+
+/// The names of those of our views that are missing; none where the schema is another one.
+std::vector<std::string> missing_views(sqlite3* database);
+
+/// Makes those again, in one transaction, and says so. What has the name of one and is none is
+/// named and left as it is; triggers that people put on a view of ours are kept. Says whether
+/// anything was done. Throws StorageError.
+bool restore_views(sqlite3* database, const std::function<void(const std::string&)>& notice);
+
+/// Makes our views for this connection alone, before those of the file. Throws StorageError.
+void shadow_views(sqlite3* database);
+
+}  // namespace oblique::server
