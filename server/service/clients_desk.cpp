@@ -301,11 +301,7 @@ void ClientsDesk::trace(const Client& client, const protocol::TraceRequest& requ
     return;
   }
   const StudyRecord& study = at_.sources.states.record(*known);
-  if (request.point() >= study.table.size()) {
-    at_.clients.reply_error(
-        client, fmt::format("the study \"{}\" has no point {}: its points are 0 to {}", study.name,
-                            request.point(), study.table.size() - 1));
-  } else if (study.failures.contains(request.point()) && !request.only_point()) {
+  if (study.failures.contains(request.point()) && !request.only_point()) {
     at_.clients.reply_error(client, fmt::format("point {} of the study \"{}\" failed and has no "
                                                 "trace: `oblique retry` solves it again",
                                                 request.point(), study.name));

@@ -40,6 +40,12 @@ StudyTerms asked_terms(const protocol::SubmitRequest& request, StudyTerms terms)
 
 std::string unknown_study(const std::string& name, const StudyStates& states) {
   const std::string nearest = states.nearest(name);
+  if (!name.empty() && nearest == name) {  // who asked gave a number, too
+    return fmt::format(
+        "the study that is called \"{}\" is another one than was asked for: `oblique "
+        "studies` lists all",
+        protocol::shortened(name, kLongestShownName));
+  }
   return fmt::format("there is no study called \"{}\"{}: `oblique studies` lists all",
                      protocol::shortened(name, kLongestShownName),
                      nearest.empty() ? "" : fmt::format(" (did you mean `{}`?)", nearest));

@@ -80,6 +80,11 @@ void judge(protocol::Recipe recipe, const std::function<bool()>& goes_on, ReadRe
 
 TracedPoint traced_point(const protocol::PointTable& table, std::uint64_t point) {
   TracedPoint objected;
+  if (point >= table.size()) {
+    objected.objection =
+        fmt::format("the study has no point {}: its points are 0 to {}", point, table.size() - 1);
+    return objected;
+  }
   objected.objection = table.is_left_in(point)
                            ? table.fault(point)
                            : fmt::format("point {} is left out by the study's filter", point);

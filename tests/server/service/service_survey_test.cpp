@@ -38,6 +38,37 @@ TEST_F(ServiceSurveyTest, AFilterIsCountedElsewhereAndTheStudyHasThePointsThatAr
   EXPECT_EQ(status_of("filtered").points(), 3U);
 }
 
+TEST_F(ServiceSurveyTest, PointsOfAFilteredStudyHaveTracesByTheirNumbers) {
+  request(filtered_request("mu > 0.75"));
+  read_all();
+  write_all();
+  hello();
+  const auto ask = [&](std::uint64_t point) {
+    outbox_.replies.clear();
+    ClientRequest message;
+    message.set_protocol_version(protocol::kProtocolVersion);
+    message.set_request_id(7);
+    message.mutable_trace()->set_study("filtered");
+    message.mutable_trace()->set_point(point);
+    message.mutable_trace()->set_only_point(true);
+    request(message);
+    return last_reply();
+  };
+  EXPECT_NEAR(ask(9).trace().mu(), 0.9, 1e-12);
+  EXPECT_THAT(ask(3).error().message(), HasSubstr("point 3 is left out by the study's filter"));
+  EXPECT_THAT(ask(11).error().message(), HasSubstr("its points are 0 to 10"));
+}
+
+TEST_F(ServiceSurveyTest, AChangeOfTheRightNameAndAWrongNumberSaysWhatIsWrong) {
+  request(submit_request("a"));
+  write_all();
+  ClientRequest message = change_request("a", protocol::STUDY_CHANGE_DELETE);
+  message.mutable_change()->set_study_id(9);
+  request(message);
+  EXPECT_THAT(last_reply().error().message(),
+              HasSubstr("the study that is called \"a\" is another one"));
+}
+
 TEST_F(ServiceSurveyTest, WhatAClientSaysOfCountsDoesNotCount) {
   ClientRequest message = filtered_request("mu > 0.75");
   message.mutable_submit()->mutable_recipe()->mutable_blocks(0)->set_points_left_in(11);
