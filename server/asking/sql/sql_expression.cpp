@@ -6,6 +6,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/text.h"
 #include "server/asking/sql/sql_items.h"
 #include "server/asking/sql/sql_tokens.h"
 #include "worker/solver/model/errors.h"
@@ -77,8 +78,12 @@ std::string what_is_allowed(SqlPart part) {
 }
 
 std::string not_allowed(std::string_view flag, std::string_view text, const std::string& why) {
+  constexpr std::size_t kLongest = 200;
   // An error ends at a zero byte, so what it quotes must end before.
-  return fmt::format("{} \"{}\" is not allowed: {}", flag, text.substr(0, text.find('\0')), why);
+  const std::string quoted(text.substr(0, text.find('\0')));
+  const std::string shown = protocol::shortened(quoted, kLongest);
+  return fmt::format("{} \"{}{}\" is not allowed: {}", flag, shown,
+                     shown.size() < quoted.size() ? "..." : "", why);
 }
 
 bool contains(const std::vector<std::string>& names, std::string_view name) {

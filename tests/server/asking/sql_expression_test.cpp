@@ -73,6 +73,12 @@ TEST(SqlExpression, ANameThatDiffersFromAColumnInCaseIsRefusedWithTheRightOne) {
   EXPECT_THAT(objection("E DESC", SqlPart::kOrder), HasSubstr("write e"));
 }
 
+TEST(SqlExpression, AnErrorShowsTheBeginningOfALongText) {
+  const std::string long_text = "mu > 1 AND (" + std::string(100'000, '1');
+  EXPECT_LT(objection(long_text).size(), 1000U);
+  EXPECT_THAT(objection(long_text), HasSubstr("--where \"mu > 1 AND (111"));
+}
+
 TEST(SqlExpression, NamesGivenToColumnsMayBeUsedInTheirOwnCase) {
   EXPECT_THAT(names_given_in("max(mu) AS E, e as \"Two \"\"words\"\"\", k"),
               ElementsAre("E", "Two \"words\""));
