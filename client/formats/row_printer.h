@@ -78,7 +78,8 @@ struct PrinterSettings {
 /// an empty field, respectively null. In JSON the second of two columns of one name is called
 /// name_2, and lists that columns pack as text are arrays; see packed_columns.h. NumPy's archive
 /// (.npz) has an array a column: int64, float64, in which NULL is nan, or text of fixed width;
-/// lists are texts of JSON.
+/// lists are texts of JSON. An array is called as its column, but for letters that no file may have
+/// in its name (/ becomes _) and what goes beyond 200 bytes.
 std::unique_ptr<RowPrinter> made_printer(Format format, Sink& sink, PrinterSettings settings = {});
 
 /// A key stands for one value only: of equal names the second becomes name_2, and so on.

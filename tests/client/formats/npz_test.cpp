@@ -61,6 +61,25 @@ TEST_F(Npz, ChangesTheKindOfAColumnWithTheFirstValueThatNeedsIt) {
       "<U3 ['2.5', '', 'y', '2.5', '']\n");
 }
 
+TEST_F(Npz, NamesItsArraysSoThatEveryoneCanReadAndUnpackThem) {
+  const std::string longest(70'000, 'x');
+  const auto rows =
+      chunk_of({longest + "1", longest + "2", "a/b", "../c", std::string("d\0e", 3), "..", "a_b",
+                "\xc2\xb5/2"},
+               {{std::int64_t{1}, std::int64_t{2}, std::int64_t{3}, std::int64_t{4},
+                 std::int64_t{5}, std::int64_t{6}, std::int64_t{7}, std::int64_t{8}}});
+  EXPECT_EQ(
+      of({rows}, "for name in a.files: print(name.replace('x' * 200, '200x'), a[name].tolist())"),
+      "200x [1]\n"
+      "200x_2 [2]\n"
+      "a_b_2 [3]\n"
+      ".._c [4]\n"
+      "d_x00e [5]\n"
+      ".._ [6]\n"
+      "a_b [7]\n"
+      "\xc2\xb5_2 [8]\n");
+}
+
 TEST_F(Npz, OfManyRowsHasThemAll) {
   std::vector<protocol::QueryReply> chunks;
   for (std::int64_t part = 0; part < 20; ++part) {
