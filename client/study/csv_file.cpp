@@ -42,10 +42,14 @@ class Rows {
       line = line_;
       fields.clear();
       do {
+        if (fields.size() == CsvFile::kMostColumns) {
+          throw InputError(fmt::format("{}:{}: the line has more than {} fields", name_, line_,
+                                       CsvFile::kMostColumns));
+        }
         fields.push_back(field());
       } while (take(','));
-      take('\r');
-      if (take('\n')) {
+      const bool is_ended = take('\r');
+      if (take('\n') || is_ended) {
         ++line_;
       } else if (!rest_.empty()) {
         throw InputError(

@@ -13,18 +13,19 @@ namespace oblique::client {
 
 /// A table of numbers with names above its columns, as spreadsheets export it (RFC 4180): fields
 /// with commas between them, in quotes where they hold commas, quotes (doubled) or line breaks;
-/// lines end with LF or CRLF; a byte order mark and empty lines are passed over, as are spaces
+/// lines end with LF, CRLF or CR; a byte order mark and empty lines are passed over, as are spaces
 /// around a field.
 class CsvFile {
  public:
   /// Throws solver::InputError, with the line where there is one, for what is no regular file of at
-  /// most `kMostBytes`, not UTF-8, a quote that is not closed, rows of different lengths, a
-  /// missing row of names, a name that is missing or there twice.
+  /// most `kMostBytes`, not UTF-8, a quote that is not closed, rows of different lengths or more
+  /// than `kMostColumns` fields, a missing row of names, a name that is missing or there twice.
   static CsvFile read(const std::filesystem::path& path);
   /// The same of a text; `name` is what errors call it.
   static CsvFile parse(std::string_view text, std::string name);
 
   static constexpr std::size_t kMostBytes = std::size_t{256} << 20;
+  static constexpr std::size_t kMostColumns = 4096;
 
   const std::string& name() const { return name_; }
   const std::vector<std::string>& columns() const { return columns_; }

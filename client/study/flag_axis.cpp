@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -177,6 +178,12 @@ std::string flag_of_key(std::string_view key) {
   std::string flag = "--" + std::string(key);
   std::replace(flag.begin(), flag.end(), '_', '-');
   return flag;
+}
+
+std::string shown_flag(std::string_view flag, std::string_view text) {
+  constexpr std::size_t kLongest = 80;
+  const std::string shown = protocol::shortened(std::string(text), kLongest);
+  return fmt::format("{} {}{}", flag, shown, shown.size() < text.size() ? "..." : "");
 }
 
 std::vector<double> numbers_of_flag(std::string_view text) {

@@ -27,13 +27,16 @@ std::vector<double> numbers_of_flag(std::string_view text);
 /// How a key is written as a flag: `tip_mass` is --tip-mass.
 std::string flag_of_key(std::string_view key);
 
-/// Runs `work` and puts the flag, as it was typed, before what it throws.
+/// A flag as it was typed, shortened for a message.
+std::string shown_flag(std::string_view flag, std::string_view text);
+
+/// Runs `work` and puts the flag before what it throws.
 template <typename Work>
 auto at_flag(std::string_view flag, std::string_view text, Work work) {
   try {
     return work();
   } catch (const solver::InputError& error) {
-    throw solver::InputError(std::string(flag) + " " + std::string(text) + ": " + error.what());
+    throw solver::InputError(shown_flag(flag, text) + ": " + error.what());
   }
 }
 

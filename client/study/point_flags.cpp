@@ -34,13 +34,13 @@ std::string described(const ParameterKey& key) {
 std::string flag_named_by(const PointFlags& flags, std::string_view sentence) {
   const std::string key(subject_of(sentence).key);
   if (key == "where") {
-    return fmt::format("--where {}: ", flags.where);
+    return shown_flag("--where", flags.where) + ": ";
   }
   if (key == "sample") {
-    return fmt::format("--sample {}: ", flags.sample);
+    return shown_flag("--sample", flags.sample) + ": ";
   }
   const auto axis = flags.axes.find(key);
-  return axis != flags.axes.end() ? fmt::format("{} {}: ", flag_of_key(key), axis->second) : "";
+  return axis != flags.axes.end() ? shown_flag(flag_of_key(key), axis->second) + ": " : "";
 }
 
 protocol::BlockKind kind_of_block(const PointFlags& flags) {

@@ -218,6 +218,7 @@ Study StudyReader::study(const toml::table& top) {
 }  // namespace
 
 Study parse_study(std::string_view text, const std::string& file, const ReachCheck& check_reach) {
+  check_keys(text, file);
   try {
     return StudyReader(file, check_reach).study(toml::parse(text, file));
   } catch (const toml::parse_error& error) {

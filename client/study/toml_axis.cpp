@@ -175,6 +175,9 @@ protocol::Axis axis_of_toml(const TomlPlace& place, std::string_view name, const
   if (const auto* table = value.as_table()) {
     return AxisTable(place, key, *table).axis(kind, files);
   }
+  if (value.is_string() && value.value<std::string>()->empty()) {
+    place.fail(value, fmt::format("{} = \"\" is empty: it must be {}", key.name, kAxisForms));
+  }
   if (value.is_string() && key.name != "integrator") {
     return place.located(
         value, [&] { return protocol::expressed_axis(key, *value.value<std::string>()); });

@@ -1,7 +1,14 @@
 #include "client/study/toml_text.h"
 
+#include <algorithm>
+#include <cctype>
+#include <cstddef>
+#include <optional>
 #include <sstream>
 
+#include <spdlog/fmt/fmt.h>
+
+#include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {
@@ -59,6 +66,82 @@ std::string shown(const toml::node& node) {
   }
   line = line.substr(0, line.find('\n'));
   return line.size() > kMost ? line.substr(0, kMost) + "..." : line;
+}
+
+namespace {
+
+/// Goes through a TOML file as far as it takes to tell keys from texts and comments.
+class KeyScan {
+ public:
+  explicit KeyScan(std::string_view text) : text_(text) {}
+
+  /// Where a key begins that has too many parts; nothing: there is none.
+  std::optional<std::size_t> too_long_key() {
+    std::size_t begin = 0;  // of the word with dots at hand
+    int parts = 1;
+    while (at_ < text_.size()) {
+      const char letter = text_[at_];
+      if (letter == '"' || letter == '\'') {
+        pass_text(letter);
+      } else if (letter == '#') {
+        at_ = std::min(text_.find('\n', at_), text_.size());
+      } else {
+        ++at_;
+        if (letter == '.') {
+          ++parts;
+        } else if (!is_of_key(letter)) {
+          parts = 1;
+          begin = at_;
+        }
+      }
+      if (parts > kMostKeyParts) {
+        return begin;
+      }
+    }
+    return std::nullopt;
+  }
+
+ private:
+  static bool is_of_key(char letter) {
+    return std::isalnum(static_cast<unsigned char>(letter)) != 0 || letter == '_' ||
+           letter == '-' || letter == ' ' || letter == '\t' ||
+           static_cast<unsigned char>(letter) >= 0x80;
+  }
+  /// Behind the text in quotes that begins here.
+  void pass_text(char quote) {
+    const std::string three(3, quote);
+    const bool is_long = text_.substr(at_).starts_with(three);
+    const std::string_view end = std::string_view(three).substr(0, is_long ? 3 : 1);
+    for (at_ += end.size(); at_ < text_.size(); ++at_) {
+      if (text_.substr(at_).starts_with(end)) {
+        at_ += end.size();
+        return;
+      }
+      if (!is_long && text_[at_] == '\n') {
+        return;  // never closed, which the parser says
+      }
+      at_ += quote == '"' && text_[at_] == '\\' ? 1U : 0U;
+    }
+  }
+
+  std::string_view text_;
+  std::size_t at_ = 0;
+};
+
+}  // namespace
+
+void check_keys(std::string_view text, const std::string& file) {
+  if (const auto found = KeyScan(text).too_long_key()) {
+    std::size_t begin = std::min(text.find_first_not_of(" \t", *found), text.size());
+    const auto before = text.substr(0, begin);
+    const auto line = std::count(before.begin(), before.end(), '\n') + 1;
+    const auto line_begin = before.rfind('\n');
+    const std::size_t column =
+        line_begin == std::string_view::npos ? begin + 1 : begin - line_begin;
+    throw solver::InputError(
+        fmt::format("{}:{}:{}: a key has more than {} parts with dots between them", file, line,
+                    column, kMostKeyParts));
+  }
 }
 
 bool is_number(const toml::node& node) {

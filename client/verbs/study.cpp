@@ -19,8 +19,9 @@
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
 #include "proto/program/stop_signals.h"
+#include "proto/recipe/block_points.h"
 #include "proto/recipe/blocks.h"
-#include "proto/recipe/keys.h"
+#include "proto/recipe/model_message.h"
 #include "proto/recipe/written/written_sample.h"
 #include "worker/solver/model/number.h"
 
@@ -78,17 +79,16 @@ struct Report {
   std::optional<SolvingRate> rate;
 };
 
-ShownPoint shown_point(const protocol::PointTable& table, const protocol::Block& block,
-                       std::uint64_t number) {
-  const auto point = table.point(number);
-  const auto model = table.model(point.model);
+/// By the axes, not by the model: of length and length1 both have a value.
+ShownPoint shown_point(const protocol::PointTable& table, int block, std::uint64_t number) {
+  const auto& axes = table.recipe().blocks(block).axes();
+  protocol::BlockPoints points(protocol::from_message(table.recipe().model()),
+                               table.recipe().blocks(block));
+  points.go_to(number - table.block(static_cast<std::size_t>(block)).first_point);
   ShownPoint shown{number, {}};
-  for (const auto* axis : protocol::model_axes(block)) {
-    shown.values.emplace_back(axis->key(), protocol::axis_key(axis->key()).get(model));
+  for (int i = 0; i < axes.size(); ++i) {
+    shown.values.emplace_back(axes[i].key(), points.values()[static_cast<std::size_t>(i)]);
   }
-  shown.values.emplace_back("H", point.H_m);
-  shown.values.emplace_back("mu", point.mu);
-  shown.values.emplace_back("e", point.e_star);
   return shown;
 }
 
@@ -121,7 +121,7 @@ BlockReport report_of_block(const protocol::PointTable& table, int number) {
     --last;
   }
   return {place, block.has_points_left_in() ? block.points_left_in() : place.points, made_of(block),
-          shown_point(table, block, first), shown_point(table, block, last)};
+          shown_point(table, number, first), shown_point(table, number, last)};
 }
 
 /// What the study takes in a database. Points that a filter leaves out bring no model.

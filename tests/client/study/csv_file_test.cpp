@@ -43,6 +43,23 @@ TEST(CsvFile, TakesWhatSpreadsheetsWrite) {
       << "quotes, commas, doubled quotes and line breaks in them; spaces; signs and exponents";
 }
 
+TEST(CsvFile, TakesLinesThatEndAsOldMacsEndThem) {
+  EXPECT_EQ(column("drop,speed\r0.4,1\r\r0.6,2\r"), (std::vector{0.4, 0.6}));
+  EXPECT_THAT(csv_error("drop\r0.4\r0.x\r"), HasSubstr("measured.csv:3: column `drop`"));
+}
+
+TEST(CsvFile, HasAtMost4096Columns) {
+  std::string names = "drop";
+  std::string values = "0.5";
+  for (int i = 1; i < 4096; ++i) {
+    names += ",c" + std::to_string(i);
+    values += ",1";
+  }
+  EXPECT_EQ(column(names + "\n" + values + "\n"), std::vector{0.5});
+  EXPECT_THAT(csv_error(names + ",one\n" + values + ",1\n"),
+              HasSubstr("measured.csv:1: the line has more than 4096 fields"));
+}
+
 TEST(CsvFile, TakesIntegratorsByName) {
   const auto file = CsvFile::parse("integrator\nexplicit\ngeneralized-alpha\n", "x.csv");
   EXPECT_EQ(file.values("integrator", protocol::axis_key("integrator")), (std::vector{0.0, 1.0}));

@@ -9,6 +9,14 @@
 namespace oblique::client {
 namespace {
 
+std::string dotted(const std::string& part, int parts) {
+  std::string key = part;
+  for (int i = 1; i < parts; ++i) {
+    key += "." + part;
+  }
+  return key;
+}
+
 struct WrongFile {
   std::string name;  // a sentence about what is wrong
   std::string text;
@@ -57,6 +65,14 @@ std::vector<WrongFile> wrong_tables() {
       {"ModelKeyNoNumber",
        "[model]\nk = 'stiff'\n" + std::string(kPoint),
        {":2:", "k = ", "stiff", "a number"}},
+      {"KeyOfMoreThanEightParts",
+       "name = 'x'\n  " + dotted("a", 9) + " = 1\n",
+       {":2:3: ", "8 parts"}},
+      {"KeyOfFiftyThousandParts", dotted("a", 50'000) + " = 1\n", {":1:1: ", "8 parts"}},
+      {"TableOfFiftyThousandParts",
+       "[" + dotted(" 'a.\"' ", 50'000) + "]\n",
+       {":1:3: ", "8 parts"}},
+      {"KeyOfEightParts", dotted("a", 8) + " = 1\n", {":1:", "unknown key `a`"}},
       {"ModelKeyList",
        "[model]\nk = [1e7, 2e7]\n" + std::string(kPoint),
        {":2:", "k = [1e+07, 2e+07]", "[[block]]"}},
@@ -226,6 +242,7 @@ std::vector<WrongFile> wrong_forms() {
       {"ZipOfDifferentLengths",
        "[[block]]\nzip = true\nH = [0.5, 0.6]\nmu = [0.4, 0.5, 0.6]\ne = 1\n",
        {":3:5: ", "H has 2 values", "3"}},
+      {"AxisOfAnEmptyText", block_with("mu = \"\""), {":3:6: ", "mu = \"\" is empty", "a number"}},
       {"BlockKeyMisspelt", block_with("e = 1\nwheer = 'mu > 1'"), {":5:1: ", "`wheer`", "`where`"}},
       {"ColumnsWithoutCsv", block_with("e = 1\ncolumns = { H = 'a' }"), {":5:11: ", "`csv`"}},
       {"SampleNoTable",

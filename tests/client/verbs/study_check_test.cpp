@@ -81,6 +81,18 @@ TEST(StudyCheck, KnowsFallsAndSizeOfMoreModelsThanItLooksAt) {
   EXPECT_EQ(product["falls_estimated"], false);
 }
 
+TEST(StudyCheck, ShowsTheValuesOfTheAxesAlsoWhereOneOverridesAnother) {
+  const auto outcome =
+      test::run_oblique({"study", "check", "--json", "--no-rate", "--length", "0.4,0.5",
+                         "--length1", "0.3", "--H", "0.9", "--mu", "1", "--e", "0.9"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const auto block = nlohmann::json::parse(outcome.out)["blocks"][0];
+  EXPECT_EQ(block["first"]["length"], 0.4);
+  EXPECT_EQ(block["last"]["length"], 0.5);
+  EXPECT_EQ(block["last"]["length1"], 0.3);
+  EXPECT_EQ(block["last"]["H"], 0.9);
+}
+
 TEST(StudyCheck, OfAFineMeshTriesCoarserOnesAndSaysThatTheCostIsExtrapolated) {
   const auto outcome = test::run_oblique(
       {"study", "check", "--json", "--preset", "converged", "--H", "1", "--mu", "0.4", "--e", "1"});
