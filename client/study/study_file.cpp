@@ -6,6 +6,7 @@
 #include <functional>
 #include <iterator>
 #include <map>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -130,8 +131,9 @@ solver::ModelParameters StudyReader::model(const toml::node& node) const {
       const auto preset = place_.text("preset", value, protocol::joined(solver::preset_names()));
       place_.located(value, [&] { model.set_preset(preset); });
     } else if (key.str() != protocol::WrittenModel::kLengths) {
-      place_.located(key, [&] { (void)protocol::model_key(key.str()); });
-      add_model_key(model, key.str(), value);
+      const std::string_view name = key.str();
+      place_.located(key, [name] { (void)protocol::model_key(name); });
+      add_model_key(model, name, value);
     }
   }
   if (const auto* lengths = table->get(protocol::WrittenModel::kLengths)) {

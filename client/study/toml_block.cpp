@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -44,8 +45,9 @@ class BlockReader {
     std::vector<protocol::Axis> axes;
     for (const auto& [key, value] : table_) {
       if (!is_block_key(key)) {
-        place_.located(key, [&] { (void)protocol::axis_key(key.str()); });
-        axes.push_back(axis_of_toml(place_, key.str(), value, kind, files_));
+        const std::string_view name = key.str();
+        place_.located(key, [name] { (void)protocol::axis_key(name); });
+        axes.push_back(axis_of_toml(place_, name, value, kind, files_));
       }
     }
     if (has_file) {

@@ -251,12 +251,13 @@ void RequestReader::run(Line& line, bool surveys) {
     }
     if (is_done) {
       report_(std::move(report));
+    } else {
+      waiting.job.frame.clear();
+      waiting.read = std::move(report.read);
     }
     lock.lock();
     line.spent[waiting.job.client] += Clock::now() - began;
     if (!is_done && line.is_wanted) {
-      waiting.job.frame.clear();
-      waiting.read = std::move(report.read);
       waiting.size = waiting.read.unsurveyed->size();
       surveying_.waiting.push_back(std::move(waiting));
       wake_.notify_all();
