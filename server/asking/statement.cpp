@@ -10,6 +10,7 @@
 #include "server/asking/columns.h"
 #include "server/asking/conditions.h"
 #include "server/asking/grouping.h"
+#include "server/asking/lists/quick_views.h"
 #include "server/asking/question.h"
 #include "server/asking/sql/sql_expression.h"
 #include "server/asking/sql/sql_items.h"
@@ -137,6 +138,16 @@ bool needs_results_alone(sqlite3* database, const Named& named) {
          !names_one_of(results, runs);
 }
 
+/// The view whose rows a question selects from.
+const char* view_of(sqlite3* database, const Named& named, bool is_alone) {
+  if (!is_alone) {
+    return "runs";
+  }
+  return named.has("mode") || named.has("major_mode") || !has_unjoined_results(database)
+             ? "results"
+             : kUnjoinedResults;
+}
+
 /// The columns of the rows that a question selects from.
 std::string columns_of_rows(const protocol::StudyQuery& question, const Named& named,
                             bool is_alone) {
@@ -259,7 +270,7 @@ std::string statement_of(sqlite3* database, const protocol::StudyQuery& question
   return fmt::format(
       "SELECT {} FROM (SELECT {} FROM {}{} AS runs WHERE runs.study_id = {}{}){}{}{}{}", selected,
       columns_of_rows(question, named, is_alone), rows.spans.size() > 1 ? join_of(rows.spans) : "",
-      is_alone ? "results" : "runs", study.study_id, points_in_sql(rows), where,
+      view_of(database, named, is_alone), study.study_id, points_in_sql(rows), where,
       group.empty() ? "" : fmt::format(" GROUP BY {}", group),
       // Spans are read one after another, and rows in them by their key.
       rows.come_in_order ? "" : fmt::format(" ORDER BY {}", order),

@@ -88,7 +88,38 @@ std::string quick_runs(const std::string& view) {
                    view.substr(static_cast<std::size_t>(tokens[select].text.data() - view.data())));
 }
 
+/// Puts `by` in the place of `text`; false where that does not stand there once.
+bool replace_once(std::string& where, std::string_view text, std::string_view by) {
+  const std::size_t at = where.find(text);
+  if (at == std::string::npos || where.find(text, at + 1) != std::string::npos) {
+    return false;
+  }
+  where.replace(at, text.size(), by);
+  return true;
+}
+
+/// The quick view `results` with modes that are looked up instead of joined; empty: it is not as we
+/// know it.
+std::string unjoined_results(std::string view) {
+  const bool is_ours =
+      replace_once(view, "TEMP VIEW results AS",
+                   fmt::format("TEMP VIEW {} AS", kUnjoinedResults)) &&
+      replace_once(view, " mode.text AS mode,",
+                   " (SELECT text FROM texts WHERE text_id = p.mode) AS mode,") &&
+      replace_once(view, " major_mode.text AS major_mode,",
+                   " (SELECT text FROM texts WHERE text_id = p.major_mode) AS major_mode,") &&
+      replace_once(view, "LEFT JOIN texts AS mode ON mode.text_id = p.mode", "") &&
+      replace_once(view, "LEFT JOIN texts AS major_mode ON major_mode.text_id = p.major_mode", "");
+  return is_ours ? view : "";
+}
+
 }  // namespace
+
+bool has_unjoined_results(sqlite3* database) {
+  Statement view(database, "SELECT 1 FROM temp.sqlite_schema WHERE type = 'view' AND name = ?1");
+  view.bind(1, kUnjoinedResults);
+  return view.step();
+}
 
 void add_quick_views(sqlite3* database) {
   Statement schema(database, "PRAGMA user_version");
@@ -105,10 +136,15 @@ void add_quick_views(sqlite3* database) {
     execute(database, results);
     execute(database, runs);
     const Statement check(database, "SELECT * FROM temp.runs LIMIT 0");
+    if (const std::string unjoined = unjoined_results(results); !unjoined.empty()) {
+      execute(database, unjoined);
+    }
   } catch (const NotSqlPart&) {
     return;  // nothing was made yet
   } catch (const StorageError&) {
-    execute(database, "DROP VIEW IF EXISTS temp.runs; DROP VIEW IF EXISTS temp.results");
+    for (const char* const view : {"runs", "results", kUnjoinedResults}) {
+      execute(database, fmt::format("DROP VIEW IF EXISTS temp.{}", view));
+    }
   }
 }
 

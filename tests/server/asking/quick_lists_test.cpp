@@ -10,7 +10,9 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "server/asking/columns.h"
+#include "server/asking/lists/quick_views.h"
 #include "server/asking/lists/unpacking.h"
+#include "server/asking/plan.h"
 #include "server/database/open_for_reading.h"
 #include "server/reading/query_rules.h"
 #include "server/store/store.h"
@@ -193,6 +195,29 @@ TEST_F(QuickLists, AViewThatIsNotAsUsualStays) {
   open();
   EXPECT_EQ(answer("SELECT count(*) FROM results"), "1:200\n");
   EXPECT_EQ(answer("SELECT count(*) FROM sqlite_temp_schema"), "1:0\n");
+}
+
+TEST_F(QuickLists, ModesThatAreLookedUpAreThoseThatAreJoined) {
+  set(3, "mode", "NULL");
+  set(4, "major_mode", "12345");  // of no text
+  open();
+  const std::string joined = answer("SELECT * FROM main.results ORDER BY point");
+  EXPECT_EQ(answer(fmt::format("SELECT * FROM {} ORDER BY point", kUnjoinedResults)), joined);
+  EXPECT_NE(joined, "");
+}
+
+TEST_F(QuickLists, QuestionsThatNameNoModeReadNoTexts) {
+  open();
+  const auto reads_texts = [&](const char* select, const char* group) {
+    protocol::StudyQuery question;
+    question.set_study("a");
+    question.add_select(select);
+    question.set_group(group);
+    const std::string sql = plan(database_.get(), question).statement;
+    return answer("EXPLAIN QUERY PLAN " + sql).find("mode") != std::string::npos;
+  };
+  EXPECT_FALSE(reads_texts("e, avg(fn_peak_N)", "e"));
+  EXPECT_TRUE(reads_texts("major_mode, avg(fn_peak_N)", "major_mode"));
 }
 
 TEST(Unpacking, WritesNumbersAsSqliteDoes) {
