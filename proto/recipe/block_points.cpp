@@ -130,6 +130,11 @@ std::size_t BlockPoints::input_called(const std::string& name) {
     if (const std::size_t axis = axis_of(key_number("length")); axis < keys_.size()) {
       return axis;
     }
+    // `links` makes all of them as long as the first.
+    if (const std::size_t axis = axis_of(key_number("links")); axis < keys_.size()) {
+      constants_.push_back(base_.lengths_m.front());
+      return keys_.size() + constants_.size() - 1;
+    }
     if (*link >= base_.lengths_m.size()) {
       throw InputError(fmt::format("`{}` is the length of no link: the model has {}", name,
                                    base_.lengths_m.size()));
@@ -204,6 +209,11 @@ void BlockPoints::count_models() {
 }
 
 void BlockPoints::go_to(std::uint64_t point) {
+  if (point == at_) {
+    return;
+  }
+  at_ = ~std::uint64_t{0};  // until all is computed
+  filter_value_.reset();
   for (std::size_t i = 0; i < sources_.size(); ++i) {
     const Axis& axis = block_.axes(static_cast<int>(i));
     if (!follows(axis)) {
@@ -213,6 +223,7 @@ void BlockPoints::go_to(std::uint64_t point) {
   for (Formula& formula : formulas_) {
     values_[formula.axis] = result_of(formula);
   }
+  at_ = point;
 }
 
 double BlockPoints::value_from(Source& source, const Axis& axis, std::uint64_t point) const {
@@ -247,8 +258,15 @@ bool BlockPoints::is_left_in() {
   if (!filter_) {
     return true;
   }
-  const double value = result_of(*filter_);
+  const double value = filter_value();
   return !std::isnan(value) && value != 0.0;
+}
+
+double BlockPoints::filter_value() {
+  if (!filter_value_) {
+    filter_value_ = result_of(*filter_);
+  }
+  return *filter_value_;
 }
 
 solver::ModelParameters BlockPoints::model() const {
@@ -267,7 +285,7 @@ solver::ModelParameters BlockPoints::model() const {
 
 std::string BlockPoints::fault() {
   if (filter_) {
-    const double value = result_of(*filter_);
+    const double value = filter_value();
     if (std::isnan(value)) {
       return fmt::format("where has no value: {}", values_in_words());
     }

@@ -38,10 +38,8 @@ class BlockPoints {
   /// Number of models of the block. Those of a product follow its model axes; where a model depends
   /// on what every point has of its own, there are as many as points.
   std::uint64_t models() const { return models_; }
-  /// The block has expressions or a filter.
-  bool has_expressions() const { return !formulas_.empty() || filter_.has_value(); }
-
-  /// Goes to a point. Neighbours are cheap: what they share is not computed again.
+  /// Goes to a point. Neighbours are cheap: what they share is not computed again; the point that
+  /// is there costs nothing.
   void go_to(std::uint64_t point);
 
   /// Of the point that was gone to: the values of the axes in their order, as they come. Those of
@@ -80,6 +78,7 @@ class BlockPoints {
   std::vector<bool> axes_behind(std::size_t axis) const;
   double value_from(Source& source, const Axis& axis, std::uint64_t point) const;
   double result_of(Formula& formula);
+  double filter_value();
   std::string values_in_words() const;
 
   const solver::ModelParameters& base_;
@@ -89,9 +88,11 @@ class BlockPoints {
   std::vector<Source> sources_;    // of the axes; of those that follow unused
   std::vector<Formula> formulas_;  // in an order in which each has what it asks for
   std::optional<Formula> filter_;
-  std::vector<double> values_;     // of the axes
-  std::vector<double> constants_;  // of the base model
-  std::vector<double> inputs_;     // of the formula being computed
+  std::vector<double> values_;            // of the axes
+  std::uint64_t at_ = ~std::uint64_t{0};  // the point that was gone to
+  std::optional<double> filter_value_;    // of that point, once it was asked for
+  std::vector<double> constants_;         // of the base model
+  std::vector<double> inputs_;            // of the formula being computed
   std::uint64_t points_ = 0;
   std::uint64_t models_ = 1;
 };

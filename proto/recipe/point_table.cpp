@@ -137,8 +137,9 @@ void PointTable::add_block(const Block& block) {
   const bool is_plain = is_plain_product(block);
   std::uint64_t block_models = is_of_base_model ? 1 : 0;
   if (block_models == 0) {
-    block_models =
-        is_plain ? combinations(model_axes(block)) : BlockPoints(base_model_, block).models();
+    block_models = is_plain ? combinations(model_axes(block))
+                            : compiled_->with(blocks_.size(),
+                                              [](BlockPoints& points) { return points.models(); });
   }
   const bool is_base_model_known = is_of_base_model && base_model_number_.has_value();
   const std::uint64_t first_model = is_base_model_known ? *base_model_number_ : models_;
@@ -152,6 +153,7 @@ void PointTable::add_block(const Block& block) {
   }
   blocks_.push_back({points_, block_points, first_model, block_models});
   is_simple_.push_back(is_simple(block));
+  is_judged_by_points_.push_back(!is_simple_.back() && is_judged_by_points(base_model_, block));
   has_filter_ = has_filter_ || !block.where().empty();
   points_ += block_points;
 }
@@ -300,7 +302,7 @@ std::uint64_t PointTable::first_left_in(std::uint64_t begin, std::uint64_t end) 
 
 std::string PointTable::fault(std::uint64_t index) const {
   const std::size_t block = block_of_point(index);
-  if (is_simple_[block] || !is_judged_by_points(base_model_, message(block))) {
+  if (!is_judged_by_points_[block]) {
     return {};
   }
   return compiled_->with(block, [&](BlockPoints& points) {
@@ -310,18 +312,14 @@ std::string PointTable::fault(std::uint64_t index) const {
 }
 
 bool PointTable::needs_survey() const {
-  for (std::size_t i = 0; i < blocks_.size(); ++i) {
-    if (!is_simple_[i] && is_judged_by_points(base_model_, message(i))) {
-      return true;
-    }
-  }
-  return false;
+  return std::find(is_judged_by_points_.begin(), is_judged_by_points_.end(), true) !=
+         is_judged_by_points_.end();
 }
 
 bool PointTable::survey(const std::function<bool()>& goes_on) {
   for (; surveyed_.block < blocks_.size(); surveyed_ = {surveyed_.block + 1, 0, 0}) {
     const std::size_t i = surveyed_.block;
-    if (is_simple_[i] || !is_judged_by_points(base_model_, message(i))) {
+    if (!is_judged_by_points_[i]) {
       continue;
     }
     try {

@@ -118,6 +118,7 @@ class PointTable {
   solver::ModelParameters base_model_;
   std::vector<BlockPlace> blocks_;
   std::vector<bool> is_simple_;            ///< blocks whose values only have to be looked up
+  std::vector<bool> is_judged_by_points_;  ///< blocks of which only the points tell what is wrong
   std::vector<Segment> base_segments_;     ///< of the blocks without model axes, in order
   std::vector<std::size_t> model_blocks_;  ///< blocks that bring models of their own, in order
   std::optional<std::uint64_t> base_model_number_;  ///< shared by all blocks without model axes

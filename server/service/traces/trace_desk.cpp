@@ -57,7 +57,7 @@ void TraceDesk::ask(const Client& client, const protocol::TraceRequest& request,
   if (!request.only_point() && orders_.answer(question, now.steady_ms)) {
     answer_what_is_done();
   } else if (!study.table.is_made() && study.table.recipe_bytes().size() > kLongestInlineBytes) {
-    readers_.read({ticket, {}, study.table, request.point()});
+    readers_.read({ticket, {}, study.table, request.point(), asker});
   } else {
     const bool is_kept = study.table.is_made();
     TracedPoint point;
@@ -128,6 +128,7 @@ void TraceDesk::client_left(std::string_view identity) {
       return false;
     }
     orders_.leave(entry.first);
+    readers_.cancel_read(entry.first);
     return true;
   });
   answer_what_is_done();
@@ -147,6 +148,7 @@ void TraceDesk::tick(Instant now) {
       ++entry;
     } else {
       orders_.leave(ticket);
+      readers_.cancel_read(ticket);
       entry = waiting_.erase(entry);
     }
   }

@@ -73,7 +73,8 @@ class TraceDesk {
   TraceOrders orders_;
   std::int64_t word_every_ms_;
   std::map<std::uint64_t, Waiting> waiting_;  // by ticket
-  std::uint64_t last_ticket_ = 0;
+  /// The readers get tickets of long requests too, which are counted from 1.
+  std::uint64_t last_ticket_ = std::uint64_t{1} << 63U;
   std::vector<TraceEffect> to_workers_;
   bool stopping_ = false;
 };

@@ -17,13 +17,17 @@ std::uint64_t bits_of(double value) {
 
 AxisInverse::AxisInverse(const protocol::Axis& axis)
     : axis_(&axis), size_(protocol::axis_size(axis)) {
-  for (std::uint64_t i = 0; axis.count() == 0 && i < size_; ++i) {
+  if (axis.count() > 0) {
+    range_.emplace(axis);
+    return;
+  }
+  for (std::uint64_t i = 0; i < size_; ++i) {
     listed_.emplace(bits_of(axis.values(static_cast<int>(i))), i);
   }
 }
 
 std::optional<std::uint64_t> AxisInverse::find(double value) const {
-  if (axis_->count() > 0) {
+  if (range_) {
     return guess(value);
   }
   const auto found = listed_.find(bits_of(value));
@@ -46,7 +50,7 @@ std::optional<std::uint64_t> AxisInverse::guess(double value) const {
       std::clamp(std::round(place), 0.0, static_cast<double>(size_ - 1)));
   const std::uint64_t last = std::min(nearest + kNear, size_ - 1);
   for (std::uint64_t i = nearest - std::min(nearest, kNear); i <= last; ++i) {
-    if (bits_of(protocol::axis_value(*axis_, i)) == bits_of(value)) {
+    if (bits_of(range_->at(i)) == bits_of(value)) {
       return i;
     }
   }
@@ -66,9 +70,14 @@ std::vector<std::pair<std::uint64_t, std::uint64_t>> shared_values(const protoco
   const bool looks_in_second = size_of_first <= size_of_second;
   const protocol::Axis& shorter = looks_in_second ? first : second;
   const AxisInverse longer(looks_in_second ? second : first);
+  std::optional<protocol::RangeValues> range;
+  if (shorter.count() > 0) {
+    range.emplace(shorter);
+  }
   const std::uint64_t size = std::min(size_of_first, size_of_second);
   for (std::uint64_t i = 0; i < size && work.spend(1); ++i) {
-    if (const auto found = longer.find(protocol::axis_value(shorter, i))) {
+    if (const auto found =
+            longer.find(range ? range->at(i) : shorter.values(static_cast<int>(i)))) {
       shared.emplace_back(looks_in_second ? i : *found, looks_in_second ? *found : i);
     }
   }

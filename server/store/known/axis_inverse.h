@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "proto/oblique.pb.h"
+#include "proto/recipe/axes.h"
 #include "server/store/known/work.h"
 
 namespace oblique::server {
@@ -25,6 +26,7 @@ class AxisInverse {
 
   const protocol::Axis* axis_;
   std::uint64_t size_;
+  std::optional<protocol::RangeValues> range_;
   std::unordered_map<std::uint64_t, std::uint64_t> listed_;  // by bits
 };
 

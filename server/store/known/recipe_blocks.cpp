@@ -31,7 +31,7 @@ PointBox box_of(const protocol::Block& block) {
   PointBox box{{-kNoLimit, -kNoLimit, -kNoLimit}, {kNoLimit, kNoLimit, kNoLimit}};
   for (std::size_t i = 0; i < protocol::kPointKeyOrder.size(); ++i) {
     const protocol::Axis* axis = axis_of(block, protocol::kPointKeyOrder.at(i));
-    if (axis != nullptr && (axis->count() > 0 || axis->values_size() > 0)) {
+    if (axis != nullptr && protocol::has_own_values(*axis)) {
       box.least.at(i) = protocol::smallest_value(*axis);
       box.largest.at(i) = protocol::largest_value(*axis);
     }

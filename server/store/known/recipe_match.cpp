@@ -114,14 +114,6 @@ class TabledPoints {
   std::unordered_map<std::uint64_t, std::uint64_t> next_;  // higher one of the same values
 };
 
-std::uint64_t count(const std::vector<Interval>& intervals) {
-  std::uint64_t points = 0;
-  for (const Interval& interval : intervals) {
-    points += interval.end - interval.begin;
-  }
-  return points;
-}
-
 /// Unites runs that follow each other before they are given away.
 class RunGatherer {
  public:
@@ -208,9 +200,9 @@ void look_up_in_product(const BlockPair& pair, bool of_target) {
 
 void look_up_in_table(const BlockPair& pair) {
   // The smaller side is put into the table.
-  const bool of_target = count(pair.open_here) >= count(pair.known_here);
+  const bool of_target = size_of(pair.open_here) >= size_of(pair.known_here);
   const auto& tabled = of_target ? pair.known_here : pair.open_here;
-  if (count(tabled) > kMostTabled) {
+  if (size_of(tabled) > kMostTabled) {
     return;
   }
   TabledPoints points(of_target ? *pair.source.table : *pair.target.table);
@@ -260,8 +252,8 @@ void match_blocks(const BlockPair& pair) {
   }
   const bool target_is_product = is_product(*pair.target.block);
   const bool source_is_product = is_product(*pair.source.block);
-  const std::uint64_t open = count(pair.open_here);
-  const std::uint64_t known = count(pair.known_here);
+  const std::uint64_t open = size_of(pair.open_here);
+  const std::uint64_t known = size_of(pair.known_here);
   if (target_is_product && source_is_product) {
     const auto match = ProductMatch::of(pair.target, pair.source, pair.work);
     if (match && match->runs() <= std::min(open, known)) {

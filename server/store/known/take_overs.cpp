@@ -65,11 +65,6 @@ bool TakeOvers::is_under_way(std::uint64_t study_id) const {
   return known != taken_.end() && known->second.under_way > 0;
 }
 
-std::uint64_t TakeOvers::points(std::uint64_t study_id) const {
-  const auto known = taken_.find(study_id);
-  return known == taken_.end() ? 0 : known->second.points;
-}
-
 protocol::TakenOver TakeOvers::message_of(std::uint64_t study_id) const {
   protocol::TakenOver message;
   const auto known = taken_.find(study_id);

@@ -31,8 +31,7 @@ class TakeOvers {
   /// The study has results; true when that is new.
   bool note_source(std::uint64_t study_id) { return sources_.insert(study_id).second; }
   bool is_source(std::uint64_t study_id) const { return sources_.contains(study_id); }
-  /// Whether points should be sought for a study whose results are of that version, or of any; 0
-  /// is a study that is new.
+  /// Whether points should be sought for a study whose results are of that version, or of any.
   bool should_seek(std::uint64_t study_id, std::string_view version, bool mixes_versions) const;
 
   /// From the database: points by the study that they came from.
@@ -48,7 +47,6 @@ class TakeOvers {
   void forget(std::uint64_t study_id);
 
   bool is_under_way(std::uint64_t study_id) const;
-  std::uint64_t points(std::uint64_t study_id) const;
   /// For people and programs; without fields when there is nothing to say.
   protocol::TakenOver message_of(std::uint64_t study_id) const;
 

@@ -30,7 +30,6 @@ class Work {
   }
   bool is_spent() const { return left_ == 0; }
   bool is_over() const { return is_spent() || is_turn_over_ || is_unwanted_; }
-  std::uint64_t left() const { return left_; }
 
  private:
   static constexpr std::uint64_t kAsksEvery = 10'000;

@@ -13,6 +13,7 @@
 #include "proto/recipe/canonical.h"
 #include "proto/recipe/checks.h"
 #include "proto/recipe/keys.h"
+#include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
 #include "tests/support/recipes.h"
 
@@ -323,6 +324,19 @@ TEST(BlockKindsTest, SingleLengthsActOnWhatLinksAndLengthHaveMade) {
   EXPECT_THAT(table.model(6).lengths_m, ElementsAre(0.3, 0.2, 0.3));
 }
 
+TEST(BlockKindsTest, AnExpressionSeesTheLengthThatLinksMake) {
+  Recipe recipe = recipe_of({{listed("links", {2, 3}), following("tip_mass", "length2"),
+                              listed("H", {0.2}), listed("mu", {0.4}), listed("e", {1.0})}});
+  solver::ModelParameters base;
+  base.lengths_m = {0.4, 0.3};
+  *recipe.mutable_model() = to_message(base);
+  const PointTable table(recipe);
+  for (const std::uint64_t point : {0U, 1U}) {
+    const auto model = table.model(table.point(point).model);
+    EXPECT_EQ(model.tip_mass_kg, model.lengths_m[1]) << point;
+  }
+}
+
 TEST(BlockKindsTest, ASingleLengthIsThatOfALinkAndCountsForTheReach) {
   const auto with = [](const Axis& axis, double H_m) {
     return objection_to(
@@ -344,56 +358,6 @@ TEST(BlockKindsTest, EveryKeyHasItsNumber) {
   EXPECT_FALSE(is_point_key(key_number("length64")));
   EXPECT_EQ(link_of_key(key_number("length2")), 1U);
   EXPECT_EQ(link_of_key(key_number("length")), std::nullopt);
-}
-
-// ---- Their text -------------------------------------------------------------------------------
-
-std::string blocks_text(const Recipe& recipe) {
-  const std::string text = canonical_recipe(recipe);
-  return text.substr(text.find("block"));
-}
-
-TEST(BlockKindsTest, TheCanonicalTextHoldsEveryKind) {
-  Axis normal = uniform("mu", 0.0, 1.0);
-  normal.mutable_distribution()->set_kind(DISTRIBUTION_NORMAL);
-  normal.mutable_distribution()->clear_to();
-  normal.mutable_distribution()->set_mean(0.4);
-  normal.mutable_distribution()->set_sd(0.05);
-  Axis logarithmic = uniform("e", 0.5, 1.0);
-  logarithmic.mutable_distribution()->set_kind(DISTRIBUTION_LOG_UNIFORM);
-  Block sample = sampled({uniform("H", 0.3, 1.1), normal, logarithmic}, SAMPLE_SOBOL, 100'000, 7);
-  sample.set_where(" mu > 0.5 * e");
-  const Recipe recipe = recipe_of_blocks(
-      {zipped({following("I", "A^2 / (4 * pi)"), listed("length1", {0.3, 0.3}),
-               listed("H", {0.3, 0.2}), log_range("mu", 0.01, 2.0, 2), listed("e", {0.9})}),
-       sample,
-       filtered({listed("H", {0.5}), log_range("mu", 0.01, 2.0, 50), listed("e", {1.0})}, "")});
-  EXPECT_EQ(
-      blocks_text(recipe),
-      "block zip I=(A^2/(4*pi)) length1=0.3,0.3 H=0.3,0.2 mu=0.01,2 e=0.9\n"
-      "block sample=sobol:100000:7 H=uniform(0.3,1.1) mu=normal(0.4,0.05,0,) e=log-uniform(0.5,1) "
-      "where=(mu>0.5*e)\n"
-      "block H=0.5 mu=0.01:2:50:log e=1\n");
-}
-
-TEST(BlockKindsTest, ListedValuesOfALogarithmicRangeAreThatRange) {
-  const Axis written = log_range("mu", 0.01, 2.0, 50);
-  std::vector<double> values;
-  for (std::uint64_t i = 0; i < 50; ++i) {
-    values.push_back(axis_value(written, i));
-  }
-  const auto with = [](const Axis& mu) {
-    return recipe_of({{listed("H", {0.5}), mu, listed("e", {1.0})}});
-  };
-  EXPECT_EQ(canonical_recipe(with(listed("mu", values))), canonical_recipe(with(written)));
-}
-
-TEST(BlockKindsTest, WhatTheServerCountedIsNoPartOfWhatABlockIs) {
-  Recipe recipe = recipe_of_blocks(
-      {filtered({listed("H", {0.5}), range("mu", 0.0, 1.0, 11), listed("e", {1.0})}, "mu > 0.5")});
-  const std::string before = canonical_recipe(recipe);
-  recipe.mutable_blocks(0)->set_points_left_in(5);
-  EXPECT_EQ(canonical_recipe(recipe), before);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // Questions about a study that is being written: each answer is of one moment.
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <exception>
 #include <mutex>
 #include <optional>
@@ -68,7 +69,7 @@ class PacedWorker {
       }
       stored += batch.count();
       while (answers_ < number) {
-        std::this_thread::yield();
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
       }
     }
   }
