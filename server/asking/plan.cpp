@@ -53,8 +53,9 @@ std::string how_rows_are_found(const AskedStudy& study, const RowsAsked& rows) {
   if (rows.spans.empty()) {
     return fmt::format("points     none of {} can meet the condition\n", study.points);
   }
-  const std::uint64_t points = points_in(rows.spans);
-  return fmt::format("points     {} of {} by the recipe, in {} range{}: {}\n", points, study.points,
+  const std::uint64_t all = points_of(study.recipe);
+  return fmt::format("points     {} of {} by the recipe{}, in {} range{}: {}\n",
+                     points_in(rows.spans), all, all == study.points ? "" : " before its filter",
                      rows.spans.size(), rows.spans.size() == 1 ? "" : "s", shown(rows.spans));
 }
 
@@ -96,7 +97,8 @@ std::string shown_statement(const std::string& statement) {
 std::string explanation_of(sqlite3* database, const protocol::StudyQuery& question,
                            const AskedStudy& study, const RowsAsked& rows,
                            const std::string& statement) {
-  const std::uint64_t most = rows.by_spans ? points_in(rows.spans) : study.points;
+  const std::uint64_t most =
+      rows.by_spans ? std::min(points_in(rows.spans), study.points) : study.points;
   return how_rows_are_found(study, rows) +
          fmt::format("reads      at most {} rows, by their key (study_id, point)\n", most) +
          how_rows_are_ordered(question, rows) +

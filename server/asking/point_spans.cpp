@@ -1,10 +1,12 @@
 #include "server/asking/point_spans.h"
 
 #include <algorithm>
+#include <optional>
 #include <span>
 #include <string>
 
 #include "proto/recipe/axes.h"
+#include "proto/recipe/blocks.h"
 
 namespace oblique::server {
 namespace {
@@ -43,7 +45,7 @@ Spans in_order(Spans spans, std::uint64_t between) {
   return joined(spans, between);
 }
 
-/// Joins neighbours until at most `most` are left, the nearest to each other first.
+/// Joins neighbours until `most` are left, the nearest to each other first.
 Spans coarsened(Spans spans, std::size_t most) {
   if (spans.size() <= most) {
     return spans;
@@ -52,10 +54,43 @@ Spans coarsened(Spans spans, std::size_t most) {
   for (std::size_t i = 1; i < spans.size(); ++i) {
     gaps.push_back(spans[i].first - spans[i - 1].last - 1);
   }
-  const auto kept = gaps.end() - static_cast<std::ptrdiff_t>(most) + 1;
-  std::nth_element(gaps.begin(), kept - 1, gaps.end());
-  return joined(spans, *(kept - 1));
+  const std::size_t joins = spans.size() - most;
+  auto sorted = gaps;
+  const auto widest = sorted.begin() + static_cast<std::ptrdiff_t>(joins) - 1;
+  std::nth_element(sorted.begin(), widest, sorted.end());
+  // Many gaps may be as wide as the widest that is joined: of these so many are.
+  auto as_wide = static_cast<std::ptrdiff_t>(joins) -
+                 std::count_if(sorted.begin(), widest, [&](auto gap) { return gap < *widest; });
+  Spans whole{spans.front()};
+  for (std::size_t i = 1; i < spans.size(); ++i) {
+    const std::uint64_t gap = gaps[i - 1];
+    if (gap < *widest || (gap == *widest && as_wide-- > 0)) {
+      whole.back().last = spans[i].last;
+    } else {
+      whole.push_back(spans[i]);
+    }
+  }
+  return whole;
 }
+
+/// The values of an axis that has its own, for many looks.
+class AxisValues {
+ public:
+  explicit AxisValues(const protocol::Axis& axis) : axis_(axis) {
+    if (axis.count() > 0) {
+      range_.emplace(axis);
+    }
+  }
+  /// Value `i`; the last one for numbers beyond.
+  double at(std::uint64_t i) const {
+    const std::uint64_t number = std::min(i, protocol::axis_size(axis_) - 1);
+    return range_ ? range_->at(number) : axis_.values(static_cast<int>(number));
+  }
+
+ private:
+  const protocol::Axis& axis_;
+  std::optional<protocol::RangeValues> range_;
+};
 
 /// The first number below `size` for which `is_behind` is true, which stays true from there on.
 template <class IsBehind>
@@ -75,14 +110,15 @@ std::uint64_t first_behind(std::uint64_t size, const IsBehind& is_behind) {
 
 /// Numbers of the values of an axis that rise, in any of `values`.
 Spans numbers_in_range(const protocol::Axis& axis, const ValueSet& values) {
+  const protocol::RangeValues range_values(axis);
   Spans numbers;
   for (const ValueRange& range : values.ranges()) {
     const std::uint64_t begin = first_behind(axis.count(), [&](std::uint64_t i) {
-      const double value = protocol::axis_value(axis, i);
+      const double value = range_values.at(i);
       return range.low_is_open ? value > range.low : value >= range.low;
     });
     const std::uint64_t end = first_behind(axis.count(), [&](std::uint64_t i) {
-      const double value = protocol::axis_value(axis, i);
+      const double value = range_values.at(i);
       return range.high_is_open ? value >= range.high : value > range.high;
     });
     if (begin < end) {
@@ -105,25 +141,6 @@ Spans numbers_in(const protocol::Axis& axis, const ValueSet& values) {
   return joined(numbers, 0);
 }
 
-bool has_values(const protocol::Axis& axis) {
-  return axis.expression().empty() && !axis.has_distribution();
-}
-
-std::uint64_t size_of(const protocol::Axis& axis) {
-  return has_values(axis) ? protocol::axis_size(axis) : 1;
-}
-
-std::uint64_t size_of(const protocol::Block& block) {
-  if (block.has_sample()) {
-    return block.sample().count();
-  }
-  std::uint64_t size = 1;
-  for (const protocol::Axis& axis : block.axes()) {
-    size = block.zip() ? std::max(size, size_of(axis)) : size * size_of(axis);
-  }
-  return size;
-}
-
 /// What `box` wants of an axis; nullptr: nothing that the axis alone decides.
 const ValueSet* wanted(const protocol::Block& block, const protocol::Axis& axis, const Box& box) {
   const auto found = box.find(axis.key() == "E" ? "E_Pa" : axis.key());
@@ -132,7 +149,8 @@ const ValueSet* wanted(const protocol::Block& block, const protocol::Axis& axis,
                           std::any_of(block.axes().begin(), block.axes().end(), [](const auto& a) {
                             return a.key() != "length" && a.key().starts_with("length");
                           });
-  return found == box.end() || is_of_many || !has_values(axis) ? nullptr : &found->second;
+  return found == box.end() || is_of_many || !protocol::has_own_values(axis) ? nullptr
+                                                                             : &found->second;
 }
 
 /// Points of a product of axes, numbered from 0. Built from the fastest axis outwards.
@@ -141,7 +159,7 @@ Spans in_product(const protocol::Block& block, const Box& box, Cut& cut) {
   std::uint64_t stride = 1;
   for (int a = block.axes_size(); a-- > 0;) {
     const protocol::Axis& axis = block.axes(a);
-    const std::uint64_t size = size_of(axis);
+    const std::uint64_t size = protocol::axis_size(axis);
     const ValueSet* const values = wanted(block, axis, box);
     const Spans numbers = values == nullptr ? Spans{{0, size - 1}} : numbers_in(axis, *values);
     if (numbers.empty()) {
@@ -177,7 +195,7 @@ Spans in_product(const protocol::Block& block, const Box& box, Cut& cut) {
 
 /// Points of axes side by side; those with one value have it in every point.
 Spans in_zip(const protocol::Block& block, const Box& box, Cut& cut) {
-  const std::uint64_t size = size_of(block);
+  const std::uint64_t size = protocol::points_of_block(block);
   if (size > kMostLookedAt) {
     cut.has_too_many = true;
     return {{0, size - 1}};
@@ -188,9 +206,9 @@ Spans in_zip(const protocol::Block& block, const Box& box, Cut& cut) {
     if (values == nullptr) {
       continue;
     }
-    const std::uint64_t own = size_of(axis);
+    const AxisValues own(axis);
     for (std::uint64_t i = 0; i < size; ++i) {
-      is_in[i] = is_in[i] && values->contains(protocol::axis_value(axis, own == 1 ? 0 : i));
+      is_in[i] = is_in[i] && values->contains(own.at(i));
     }
   }
   Spans spans;
@@ -203,12 +221,9 @@ Spans in_zip(const protocol::Block& block, const Box& box, Cut& cut) {
 }
 
 Spans in_block(const protocol::Block& block, const Box& box, Cut& cut) {
-  const std::uint64_t size = size_of(block);
-  if (size == 0) {
-    return {};
-  }
   if (block.has_sample()) {
-    return {{0, size - 1}};
+    const std::uint64_t size = protocol::points_of_block(block);
+    return size == 0 ? Spans() : Spans{{0, size - 1}};
   }
   return block.zip() ? in_zip(block, box, cut) : in_product(block, box, cut);
 }
@@ -244,7 +259,7 @@ Spans cut_by(const protocol::Recipe& recipe, const Boxes& boxes, Cut& cut) {
       for (const PointSpan& span : in_block(block, box, cut)) {
         of_box.push_back({first + span.first, first + span.last});
       }
-      first += size_of(block);
+      first += protocol::points_of_block(block);
     }
     const Spans kept = with_wanted_numbers(coarsened(joined(of_box, 0), kMostSpans), box);
     cut.has_too_many = cut.has_too_many || of_box.size() > kMostSpans;
@@ -264,16 +279,23 @@ std::optional<std::vector<double>> values_of(const protocol::Recipe& recipe,
         block.axes().begin(), block.axes().end(),
         [&](const protocol::Axis& known) { return wanted(block, known, anything) != nullptr; });
     if (block.has_sample() || axis == block.axes().end() ||
-        values.size() + size_of(*axis) > kMostSpans) {
+        values.size() + protocol::axis_size(*axis) > kMostSpans) {
       return std::nullopt;
     }
-    for (std::uint64_t i = 0; i < size_of(*axis); ++i) {
-      values.push_back(protocol::axis_value(*axis, i));
+    const AxisValues own(*axis);
+    for (std::uint64_t i = 0; i < protocol::axis_size(*axis); ++i) {
+      values.push_back(own.at(i));
     }
   }
   std::sort(values.begin(), values.end());
   values.erase(std::unique(values.begin(), values.end()), values.end());
   return values;
+}
+
+/// No recipe that was judged has one, and none can be counted with it.
+bool has_empty_axis(const protocol::Block& block) {
+  return std::any_of(block.axes().begin(), block.axes().end(),
+                     [](const protocol::Axis& axis) { return protocol::axis_size(axis) == 0; });
 }
 
 /// Appends to `sorted` what `boxes` hold, sorted by `keys`. False: it takes too many spans.
@@ -326,7 +348,7 @@ std::optional<std::vector<PointSpan>> sorted_spans_of(const protocol::Recipe& re
     for (const protocol::Axis& axis : block.axes()) {
       listed += static_cast<std::uint64_t>(axis.values_size()) + 1;
     }
-    listed += block.zip() ? size_of(block) : 0;
+    listed += block.zip() ? protocol::points_of_block(block) : 0;
   }
   Spans sorted;
   if (listed > kMostLookedAt / walks / boxes.size() || !add_sorted(recipe, boxes, keys, sorted)) {
@@ -338,7 +360,21 @@ std::optional<std::vector<PointSpan>> sorted_spans_of(const protocol::Recipe& re
 std::uint64_t points_of(const protocol::Recipe& recipe) {
   std::uint64_t points = 0;
   for (const protocol::Block& block : recipe.blocks()) {
-    points += size_of(block);
+    if (has_empty_axis(block)) {
+      return 0;
+    }
+    points += protocol::points_of_block(block);
+  }
+  return points;
+}
+
+std::uint64_t points_left_in(const protocol::Recipe& recipe) {
+  std::uint64_t points = points_of(recipe);
+  for (const protocol::Block& block : recipe.blocks()) {
+    if (points > 0 && !block.where().empty() && block.has_points_left_in()) {
+      const std::uint64_t all = protocol::points_of_block(block);
+      points -= all - std::min(all, block.points_left_in());
+    }
   }
   return points;
 }

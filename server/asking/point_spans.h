@@ -43,8 +43,12 @@ std::optional<std::vector<PointSpan>> sorted_spans_of(const protocol::Recipe& re
                                                       const Boxes& boxes,
                                                       std::span<const SortKey> keys);
 
-/// Number of points of a recipe, filters left aside.
+/// Number of points of a recipe, filters left aside; 0 where an axis has no value. Throws
+/// solver::InputError for a block of more points than a study may have.
 std::uint64_t points_of(const protocol::Recipe& recipe);
+
+/// The same with what filters leave in, where that was counted: the points that a study counts.
+std::uint64_t points_left_in(const protocol::Recipe& recipe);
 
 /// Points in all of them.
 std::uint64_t points_in(const std::vector<PointSpan>& spans);

@@ -81,9 +81,12 @@ std::string join_of(const std::vector<PointSpan>& spans) {
 }
 
 /// Which points of the study, as conditions behind the study's own.
-std::string points_in_sql(const RowsAsked& rows) {
+std::string points_in_sql(const protocol::StudyQuery& question, const RowsAsked& rows) {
   if (!rows.by_spans) {
-    return {};
+    return question.has_after_point()
+               ? fmt::format(" AND runs.point > {}",
+                             std::min<std::uint64_t>(question.after_point(), INT64_MAX))
+               : "";
   }
   if (rows.spans.empty()) {
     return " AND 0";
@@ -161,6 +164,15 @@ std::string columns_of_rows(const protocol::StudyQuery& question, const Named& n
   return columns;
 }
 
+/// Whether a recipe is that of so many points.
+bool tells_points(const protocol::Recipe& recipe, std::uint64_t points) {
+  try {
+    return points > 0 && points_left_in(recipe) == points;
+  } catch (const solver::InputError&) {
+    return false;  // more than any study may have
+  }
+}
+
 }  // namespace
 
 AskedStudy asked_study(sqlite3* database, const std::string& name) {
@@ -176,8 +188,8 @@ AskedStudy asked_study(sqlite3* database, const std::string& name) {
                    static_cast<std::uint64_t>(study.integer(1)),
                    {},
                    has_sound_lists ? Lists::kSound : Lists::kMaybeDamaged};
-  // Points of a recipe that cannot be read are all looked at.
-  if (!found.recipe.ParseFromString(study.text(2))) {
+  // Points of a recipe that does not tell where they are are all looked at.
+  if (!found.recipe.ParseFromString(study.text(2)) || !tells_points(found.recipe, found.points)) {
     found.recipe.Clear();
   }
   return found;
@@ -222,9 +234,8 @@ RowsAsked rows_asked(const protocol::StudyQuery& question, const AskedStudy& stu
   }
   constexpr std::size_t kMostBlocksAndBoxes = 200'000;
   const auto blocks = static_cast<std::size_t>(study.recipe.blocks_size());
-  if (study.points == 0 || blocks * boxes.size() > kMostBlocksAndBoxes ||
-      points_of(study.recipe) != study.points) {
-    return rows;  // too long to look through, or not the recipe that numbered these points
+  if (blocks == 0 || blocks * boxes.size() > kMostBlocksAndBoxes) {
+    return rows;  // nothing to look through, or too long
   }
   rows.spans = sorted_spans(question, study, boxes);
   if (rows.spans.size() > 1) {
@@ -239,10 +250,11 @@ RowsAsked rows_asked(const protocol::StudyQuery& question, const AskedStudy& stu
   }
   auto spans = spans_of(study.recipe, boxes);
   const std::uint64_t points = points_in(spans);
-  const bool is_few = points + kRowsASpan * spans.size() <= study.points - study.points / 10;
+  const std::uint64_t all = points_of(study.recipe);
+  const bool is_few = points + kRowsASpan * spans.size() <= all - all / 10;
   const auto keys = sort_keys(question);
   const bool is_backwards = question.group().empty() && keys && is_by_point(*keys, true);
-  if (spans.size() > 1 && (!is_few || (is_backwards && points > study.points / 8))) {
+  if (spans.size() > 1 && (!is_few || (is_backwards && points > all / 8))) {
     spans = {{spans.front().first, spans.back().last}};
   }
   rows.by_spans = true;
@@ -270,7 +282,7 @@ std::string statement_of(sqlite3* database, const protocol::StudyQuery& question
   return fmt::format(
       "SELECT {} FROM (SELECT {} FROM {}{} AS runs WHERE runs.study_id = {}{}){}{}{}{}", selected,
       columns_of_rows(question, named, is_alone), rows.spans.size() > 1 ? join_of(rows.spans) : "",
-      view_of(database, named, is_alone), study.study_id, points_in_sql(rows), where,
+      view_of(database, named, is_alone), study.study_id, points_in_sql(question, rows), where,
       group.empty() ? "" : fmt::format(" GROUP BY {}", group),
       // Spans are read one after another, and rows in them by their key.
       rows.come_in_order ? "" : fmt::format(" ORDER BY {}", order),

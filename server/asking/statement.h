@@ -15,8 +15,8 @@ namespace oblique::server {
 /// What is known of the study of a question.
 struct AskedStudy {
   std::int64_t study_id;
-  std::uint64_t points;
-  protocol::Recipe recipe;
+  std::uint64_t points;     ///< without those that filters leave out
+  protocol::Recipe recipe;  ///< empty: it cannot be read, or is not that of so many points
   Lists lists;
 };
 

@@ -134,13 +134,28 @@ TEST(Conditions, SpansAreReadInTheOrderOfAxesWhereTheyAreNotTooMany) {
 }
 
 TEST(Conditions, HugeStudiesCostNoMoreAndSpansStayBounded) {
-  const auto recipe =
-      protocol::recipe_of({{range("H", 0.1, 1.0, 10'000), range("mu", 0.0, 1.0, 10'001),
-                            range("e", 0.1, 1.0, 10'000)}});
+  const auto recipe = protocol::recipe_of(
+      {{range("H", 0.1, 1.0, 10'000), range("mu", 0.0, 1.0, 10'001), range("e", 0.1, 1.0, 9'999)}});
   EXPECT_EQ(points_in(spans(recipe, "H = 0.1 AND mu = 0.5 AND e = 1")), 1U);
   const auto many = spans(recipe, "e = 1");
   EXPECT_LE(many.size(), kMostSpans);
-  EXPECT_EQ(many.back().last, 10'000ULL * 10'001 * 10'000 - 1);
+  EXPECT_EQ(many.back().last, 10'000ULL * 10'001 * 9'999 - 1);
+}
+
+TEST(Conditions, AsManyGapsAreReadOverAsMustBe) {
+  const auto plane = [](std::uint64_t count) {
+    return std::vector<protocol::Axis>{listed("H", {0.5}), range("mu", 0.0, 1.0, 15'000),
+                                       range("e", 0.1, 1.0, count)};
+  };
+  // Twice 15 000 points with nine others between every two.
+  const auto alike = spans(protocol::recipe_of({plane(10), plane(10)}), "e = 1");
+  EXPECT_EQ(alike.size(), kMostSpans);
+  EXPECT_EQ(points_in(alike), 30'000U + 10'000 * 9);
+  // With four between the latter ones.
+  const auto differing = spans(protocol::recipe_of({plane(10), plane(5)}), "e = 1");
+  ASSERT_EQ(differing.size(), kMostSpans);
+  EXPECT_EQ(points_in(differing), 30'000U + 10'000 * 4);
+  EXPECT_EQ(differing[14'998], (PointSpan{149'989, 149'989}));
 }
 
 }  // namespace

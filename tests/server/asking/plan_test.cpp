@@ -1,5 +1,9 @@
 #include "server/asking/plan.h"
 
+#include <cstdint>
+#include <memory>
+#include <utility>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -116,6 +120,65 @@ TEST_F(PlanTest, AnAnswerInTheOrderOfPointsGoesOnAfterOne) {
   auto rest = question("point");
   rest.set_after_point(1);
   EXPECT_THAT(answer(rest), ElementsAre(2, 4));
+}
+
+TEST_F(PlanTest, AnAnswerGoesOnAfterAPointWhateverIsKnownOfTheRecipe) {
+  {
+    Store store(path_);
+    const auto table = table_of(5);
+    // As a damaged file has it: the recipe tells nothing of the points.
+    const std::vector<Change> changes{
+        AddStudy{3, "unread", StudyTable(std::string("\xff"), 5), "2024-01-03T00:00:00.000Z"},
+        AddResults{
+            3, table, 0, "", "", 1, "now", {solved_point(0), solved_point(1), solved_point(4)}}};
+    store.commit(changes);
+  }
+  auto rest = question("point");
+  rest.set_study("unread");
+  EXPECT_THAT(answer(rest), ElementsAre(0, 1, 4));
+  rest.set_after_point(0);
+  EXPECT_THAT(answer(rest), ElementsAre(1, 4));
+  rest.set_where("mu >= 0");
+  EXPECT_THAT(answer(rest), ElementsAre(1, 4));
+  rest.set_where("mu >= 0 OR 1");
+  rest.set_after_point(4);
+  EXPECT_THAT(answer(rest), IsEmpty());
+}
+
+TEST_F(PlanTest, AFilteredStudyIsPlannedByItsRecipe) {
+  protocol::PointTable table(protocol::recipe_of_blocks(
+      {protocol::filtered({protocol::range("H", 0.1, 1.0, 10), protocol::range("mu", 0.1, 1.0, 10),
+                           protocol::listed("e", {1.0})},
+                          "mu > 0.95 || H > 0.95")}));
+  table.survey([] { return true; });
+  const auto filtered = std::make_shared<const protocol::PointTable>(std::move(table));
+  {
+    Store store(path_);
+    AddResults results{3, filtered, 0, "", "", 1, "now", {}};
+    for (std::uint64_t point = 0; point < filtered->size(); ++point) {
+      if (filtered->is_left_in(point)) {
+        results.results.push_back(solved_point(point));
+      }
+    }
+    store.commit(std::vector<Change>{AddStudy{3, "filtered", filtered, "2024-01-03T00:00:00.000Z"},
+                                     results});
+  }
+  auto asked = question("point", "H = 0.5");
+  asked.set_study("filtered");
+  EXPECT_THAT(answer(asked), ElementsAre(49));
+  asked.set_where("H > 0.85");
+  asked.set_after_point(89);
+  EXPECT_THAT(answer(asked), ElementsAre(90, 91, 92, 93, 94, 95, 96, 97, 98, 99));
+  asked.clear_where();
+  asked.set_after_point(69);
+  EXPECT_THAT(answer(asked), ElementsAre(79, 89, 90, 91, 92, 93, 94, 95, 96, 97, 98, 99));
+  asked.clear_after_point();
+  asked.set_where("H >= 0.85");
+  EXPECT_THAT(plan_of(asked).statement, HasSubstr("BETWEEN 80 AND 99"));
+  asked.set_explain(true);
+  EXPECT_THAT(plan_of(asked).explanation,
+              AllOf(HasSubstr("20 of 100 by the recipe before its filter, in 1 range: 80-99"),
+                    HasSubstr("at most 19 rows")));
 }
 
 TEST_F(PlanTest, WhatGathersOrSortsDoesNotGoOn) {

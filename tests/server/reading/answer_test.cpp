@@ -77,6 +77,31 @@ TEST_F(AnswerTest, InTheOrderOfPointsGoesOnAfterARestWithWhatWasAddedBehind) {
   EXPECT_EQ(answer.given().rows(), 10U);
 }
 
+TEST_F(AnswerTest, OfAFilteredStudyGoesOnAfterARestBehindItsLastPoint) {
+  protocol::PointTable surveyed(protocol::recipe_of_blocks(
+      {protocol::filtered({protocol::listed("H", {1.0}), protocol::range("mu", 0.0, 1.0, 11),
+                           protocol::listed("e", {1.0})},
+                          "mu < 0.15 || mu > 0.35")}));
+  surveyed.survey([] { return true; });
+  const auto table = std::make_shared<const protocol::PointTable>(std::move(surveyed));
+  AddResults results{2, table, 0, "", "", 1, "now", {}};
+  for (const std::uint64_t point : {0U, 1U, 4U, 5U, 6U, 7U, 8U, 9U, 10U}) {
+    results.results.push_back(solved_point(point));
+  }
+  const std::vector<Change> changes{AddStudy{2, "filtered", table, "2024-01-01T00:00:00.000Z"},
+                                    std::move(results)};
+  store_.commit(changes);
+  auto request = wide_rows();
+  request.mutable_question()->set_study("filtered");
+  Reader reader(path_);
+  Answer answer = reader.answer(request, {});
+  EXPECT_THAT(points_of(answer.next()), ElementsAre(0, 1, 4, 5));
+  answer.rest();
+  EXPECT_THAT(points_of(answer.next()), ElementsAre(6, 7, 8, 9));
+  answer.rest();
+  EXPECT_THAT(points_of(answer.next()), ElementsAre(10));
+}
+
 TEST_F(AnswerTest, HoldsNoTransactionWhileItRests) {
   Reader reader(path_);
   Answer answer = reader.answer(wide_rows(), {});
