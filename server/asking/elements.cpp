@@ -8,6 +8,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "server/asking/sql/sql_items.h"
+#include "server/asking/sql/sql_literals.h"
 #include "server/asking/suggestions.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
@@ -245,7 +246,7 @@ ElementReference element_at(ElementTokens tokens, Lists lists) {
   return reference;
 }
 
-std::string with_elements(std::string_view text, Lists lists) {
+std::string in_sqlite(sqlite3* database, std::string_view text, Lists lists) {
   const auto tokens = sql_tokens(text);
   std::string sql;
   std::size_t copied = 0;
@@ -261,20 +262,24 @@ std::string with_elements(std::string_view text, Lists lists) {
     copied = static_cast<std::size_t>(tokens[i].text.data() + tokens[i].text.size() - text.data());
   }
   sql += text.substr(copied);
-  return sql;
+  return with_exact_numbers(database, sql);
 }
 
-std::string columns_with_elements(std::string_view text, Lists lists) {
+std::string columns_in_sqlite(sqlite3* database, std::string_view text, Lists lists) {
   const auto tokens = sql_tokens(text);
   std::string columns;
   for (const SqlItem& item : sql_items(tokens)) {
-    const std::string sql = with_elements(item.text, lists);
+    const std::string sql = in_sqlite(database, item.text, lists);
     columns += columns.empty() ? "" : ", ";
     if (sql == item.text) {
       columns += item.whole;
       continue;
     }
-    std::string name = item.name.empty() ? std::string(item.text) : item.name;
+    const bool is_distinct = is_word(item.tokens[0], "distinct") && item.tokens.size() > 1;
+    const auto begin = is_distinct ? item.tokens[1].text.data() - item.text.data() : 0;
+    std::string name = item.name.empty()
+                           ? std::string(item.text.substr(static_cast<std::size_t>(begin)))
+                           : item.name;
     for (std::size_t quote = name.find('"'); quote != std::string::npos;
          quote = name.find('"', quote + 2)) {
       name.insert(quote, 1, '"');

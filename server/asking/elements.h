@@ -5,6 +5,8 @@
 #include <string_view>
 #include <vector>
 
+#include <sqlite3.h>
+
 #include "server/asking/sql/sql_tokens.h"
 
 namespace oblique::server {
@@ -26,12 +28,12 @@ enum class Lists { kSound, kMaybeDamaged };
 /// that has no such member, or a number that is none.
 ElementReference element_at(std::span<const SqlToken> tokens, Lists lists = Lists::kSound);
 
-/// `text` with elements, and counts of modes as count_mode('SC SR'), as SQLite understands them.
-/// Throws as element_at does.
-std::string with_elements(std::string_view text, Lists lists);
+/// `text` with elements, counts of modes as count_mode('SC SR'), and numbers as SQLite understands
+/// them; see with_exact_numbers. Throws as element_at does.
+std::string in_sqlite(sqlite3* database, std::string_view text, Lists lists);
 
 /// The same for columns: those that were changed keep what was written as their name.
-std::string columns_with_elements(std::string_view text, Lists lists);
+std::string columns_in_sqlite(sqlite3* database, std::string_view text, Lists lists);
 
 /// Every element of a list by itself, as peaks[0].fn_N and longest_phase.t1_s, for comparing.
 std::vector<std::string> all_elements();

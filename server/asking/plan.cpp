@@ -126,10 +126,13 @@ void check_syntax(sqlite3* database, const protocol::StudyQuery& question, Lists
     }
   };
   const std::string selected = selected_by(question);
-  check("--select", selected, "SELECT " + columns_with_elements(selected, lists));
-  check("--where", question.where(), "SELECT 1 WHERE " + with_elements(question.where(), lists));
-  check("--group", question.group(), "SELECT 1 GROUP BY " + with_elements(question.group(), lists));
-  check("--order", question.order(), "SELECT 1 ORDER BY " + with_elements(question.order(), lists));
+  check("--select", selected, "SELECT " + columns_in_sqlite(database, selected, lists));
+  check("--where", question.where(),
+        "SELECT 1 WHERE " + in_sqlite(database, question.where(), lists));
+  check("--group", question.group(),
+        "SELECT 1 GROUP BY " + in_sqlite(database, question.group(), lists));
+  check("--order", question.order(),
+        "SELECT 1 ORDER BY " + in_sqlite(database, question.order(), lists));
 }
 
 /// A statement that gives the lines of a text.
@@ -156,7 +159,7 @@ Plan plan(sqlite3* database, const protocol::StudyQuery& question) {
   const std::string written = selected_by(question);
   Plan plan;
   plan.goes_on_by_point = is_in_point_order(question) && gives_points(written);
-  std::string selected = columns_with_elements(written, study.lists);
+  std::string selected = columns_in_sqlite(database, written, study.lists);
   selected += plan.goes_on_by_point ? ", point" : "";
   plan.statement = statement_of(database, question, selected, study, rows);
   try {

@@ -14,7 +14,6 @@
 #include "server/asking/question.h"
 #include "server/asking/sql/sql_expression.h"
 #include "server/asking/sql/sql_items.h"
-#include "server/asking/sql/sql_literals.h"
 #include "server/database/sqlite.h"
 #include "server/store/schema/standing_views.h"
 #include "worker/solver/model/errors.h"
@@ -269,10 +268,9 @@ std::string statement_of(sqlite3* database, const protocol::StudyQuery& question
   const std::string where =
       question.where().empty()
           ? ""
-          : fmt::format(" WHERE ({})",
-                        with_exact_numbers(database, with_elements(question.where(), study.lists)));
-  const std::string group = with_elements(question.group(), study.lists);
-  std::string order = with_elements(question.order(), study.lists);
+          : fmt::format(" WHERE ({})", in_sqlite(database, question.where(), study.lists));
+  const std::string group = in_sqlite(database, question.group(), study.lists);
+  std::string order = in_sqlite(database, question.order(), study.lists);
   if (order.empty()) {
     order = group.empty() ? "point" : group;
   }

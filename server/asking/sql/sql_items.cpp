@@ -24,8 +24,8 @@ bool ends_operand(const SqlToken& token) {
                                                     "then", "else", "collate"};
   const bool joins = std::any_of(kJoins.begin(), kJoins.end(),
                                  [&](std::string_view word) { return is_word(token, word); });
-  return !joins && (token.kind == SqlToken::Kind::kLiteral || token.is_name() ||
-                    token.is_sign(')') || token.is_sign('*'));
+  return !joins &&
+         (token.kind == SqlToken::Kind::kLiteral || token.is_name() || token.is_sign(')'));
 }
 
 /// A word that ends an expression and is no name.
@@ -40,7 +40,7 @@ SqlItem item_of(ItemTokens tokens) {
     item.name = name_of(tokens.back());
     item.tokens = tokens.first(count - 2);
   } else if (count >= 2 && tokens.back().is_name() && !is_last_word(tokens.back()) &&
-             ends_operand(tokens[count - 2]) && !is_word(tokens[0], "distinct") &&
+             ends_operand(tokens[count - 2]) && !(count == 2 && is_word(tokens[0], "distinct")) &&
              tokens.back().text.front() != '[') {
     item.name = name_of(tokens.back());
     item.tokens = tokens.first(count - 1);

@@ -250,5 +250,25 @@ TEST_F(Answers, NumbersAreThoseThatWereTyped) {
             "H = 0.3 AND x = '0.1166477'");
 }
 
+TEST_F(Answers, NumbersAreThoseThatWereTypedInWhateverPartOfAQuestion) {
+  EXPECT_EQ(number("0.1166477"), std::stod("0.1166477"));
+  EXPECT_EQ(number("DISTINCT 0.1166477"), std::stod("0.1166477"));
+  EXPECT_EQ(column("0.1166477 * mu").name, "0.1166477 * mu");
+  EXPECT_EQ(column("peaks[0].fn_N * mu").name, "peaks[0].fn_N * mu");
+  EXPECT_EQ(column("DISTINCT 0.1166477 * mu").name, "0.1166477 * mu");
+  EXPECT_EQ(column("DISTINCT 0.1166477 * mu x").name, "x");
+  EXPECT_EQ(column("0.1166477 AS \"x y\"").name, "x y");
+  // True of one row where both numbers are the same.
+  const std::string is_it =
+      "point = 3 AND 0.1166477 = " + with_exact_numbers(database_.get(), "0.1166477");
+  const auto grouped = question("count(*)", "", is_it);
+  Statement groups(database_.get(), plan(database_.get(), grouped).statement);
+  ASSERT_TRUE(groups.step());
+  EXPECT_EQ(groups.real(0), 9.0);
+  auto sorted = question("point");
+  sorted.set_order(is_it + " DESC");
+  EXPECT_EQ(number(sorted), 3.0);
+}
+
 }  // namespace
 }  // namespace oblique::server
