@@ -112,15 +112,18 @@ void add_packed_lists(std::vector<Column>& columns) {
 
 }  // namespace
 
-std::vector<Column> all_columns() {
-  std::vector<Column> columns;
-  add_inputs(columns);
-  add_outputs(columns);
-  add_packed_lists(columns);
-  for (const auto& [name, meaning, values] : kRowColumns) {
-    columns.push_back({std::string(name), "", "row", "", std::string(meaning)});
-  }
-  return columns;
+const std::vector<Column>& all_columns() {
+  static const std::vector<Column> all = [] {
+    std::vector<Column> columns;
+    add_inputs(columns);
+    add_outputs(columns);
+    add_packed_lists(columns);
+    for (const auto& [name, meaning, values] : kRowColumns) {
+      columns.push_back({std::string(name), "", "row", "", std::string(meaning)});
+    }
+    return columns;
+  }();
+  return all;
 }
 
 std::vector<Column> columns_and_functions() {
@@ -169,7 +172,7 @@ protocol::CellKind kind_of_values(std::string_view name) {
   if (solver::find_result_list(name) != nullptr || name == "lengths_m" || name == "integrator") {
     return CellKind::kText;
   }
-  const auto columns = all_columns();
+  const auto& columns = all_columns();
   if (std::none_of(columns.begin(), columns.end(),
                    [&](const Column& column) { return column.name == name; })) {
     return CellKind::kNull;

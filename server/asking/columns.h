@@ -19,7 +19,7 @@ struct Column {
 };
 
 /// All of them, in the order of listings: inputs, outputs, what else a row tells.
-std::vector<Column> all_columns();
+const std::vector<Column>& all_columns();
 
 /// The same, and what else questions may be made of: elements of lists, and functions.
 std::vector<Column> columns_and_functions();

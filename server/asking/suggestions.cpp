@@ -133,7 +133,7 @@ std::string with_suggestions(sqlite3* database, const std::string& message,
   }
   Statement schema(database, "PRAGMA user_version");
   const std::int64_t version = schema.step() ? schema.integer(0) : kSchemaVersion;
-  const auto all = all_columns();
+  const auto& all = all_columns();
   const bool is_newer = std::any_of(all.begin(), all.end(),
                                     [&](const Column& column) { return column.name == wrong; });
   if (is_newer && version < kSchemaVersion) {

@@ -321,6 +321,7 @@ bool QueryPool::give(Slot& slot, std::int64_t now_ms) {
       return false;
     }
   }
+  slot.stands_since_ms.reset();  // what it waited for was another reader, not its client
   slot.is_bound = !slot.can_go_on;
   slot.given = head.chunks;
   slot.deadline_ms = now_ms + slot.time_limit_ms + settings_.grace_ms;

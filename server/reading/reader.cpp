@@ -1,6 +1,7 @@
 #include "server/reading/reader.h"
 
 #include <algorithm>
+#include <optional>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -49,13 +50,13 @@ constexpr const char* kVersionOfOlderRows =
     "SELECT r.solver_version FROM results AS r WHERE r.study_id = s.study_id"
     " ORDER BY r.point LIMIT 1";
 
-/// What the study took over from others.
-void add_taken(sqlite3* database, protocol::StudyStatus& status) {
+/// For what a study took over from others.
+constexpr const char* kOrigins =
+    "SELECT o.name, t.points FROM taken_points AS t JOIN origins AS o USING (origin_id)"
+    " WHERE t.study_id = ? ORDER BY points DESC";
+
+void add_taken(Statement& origins, protocol::StudyStatus& status) {
   constexpr int kMostNamed = 20;
-  Statement origins(database,
-                    "SELECT o.name, t.points FROM taken_points AS t"
-                    " JOIN origins AS o USING (origin_id) WHERE t.study_id = ?"
-                    " ORDER BY points DESC");
   origins.bind(1, status.study_id());
   while (origins.step()) {
     auto& taken = *status.mutable_taken();
@@ -67,6 +68,7 @@ void add_taken(sqlite3* database, protocol::StudyStatus& status) {
       from.set_points(points);
     }
   }
+  origins.reset();
 }
 
 }  // namespace
@@ -190,6 +192,10 @@ std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name)
           "), '')"
           " FROM studies AS s WHERE ?1 = '' OR s.name = ?1 ORDER BY s.study_id");
   list.bind(1, name);
+  std::optional<Statement> origins;
+  if (version >= kFirstPacked) {
+    origins.emplace(database_.get(), kOrigins);
+  }
   std::vector<protocol::StudyStatus> found;
   while (list.step()) {
     protocol::StudyStatus status;
@@ -207,8 +213,8 @@ std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name)
     status.set_submitted_by(list.text(9));
     status.set_mixes_versions(list.integer(10) != 0);
     status.set_solver_version(list.text(11));
-    if (version >= kFirstPacked) {
-      add_taken(database_.get(), status);
+    if (origins) {
+      add_taken(*origins, status);
     }
     found.push_back(std::move(status));
   }

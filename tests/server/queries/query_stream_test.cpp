@@ -222,6 +222,24 @@ TEST_F(QueryStreamTest, WhoTakesNothingForLongLosesTheAnswerWhenOthersWait) {
   EXPECT_THAT(wait_for_end(idle).error, HasSubstr("others wait"));
 }
 
+TEST_F(QueryStreamTest, TimeInWhichAnAnswerWaitsForAReaderIsNotItsClients) {
+  settings_.patience_ms = 1500;
+  settings_.turns.most_running_each = 1;
+  settings_.turns.quick_ms = 60'000;
+  for (int i = 0; i < 3; ++i) {
+    wait_for_chunks(ask(kLong), kChunksAhead);
+  }
+  const auto fourth = ask(kLong, "a");
+  const auto behind_it = ask("SELECT 1", "a");
+  std::this_thread::sleep_for(std::chrono::milliseconds(settings_.patience_ms + 200));
+  pool().cancel(1);
+  wait_for_chunks(fourth, kChunksAhead);
+  const Answer answer = take_all(fourth);
+  EXPECT_EQ(answer.error, "");
+  EXPECT_EQ(answer.rows, 60'000U);
+  EXPECT_EQ(take_all(behind_it).rows, 1U);
+}
+
 TEST_F(QueryStreamTest, TimeInWhichNothingIsTakenDoesNotCount) {
   QueryJob job{50, "a", {}};
   job.request.set_sql(kLong);
