@@ -66,7 +66,8 @@ void delete_from(const std::string& database, const protocol::StudyStatus& study
   progress.finish();
   if (!is_merged) {
     std::cerr << fmt::format(
-        "Another program reads {}: the file gets smaller when the next server ends.\n", database);
+        "Another program reads {}: the file gets smaller when the next server has worked on it.\n",
+        database);
   }
 }
 

@@ -44,6 +44,23 @@ void remember(std::unordered_map<std::int64_t, std::int64_t>& known, std::int64_
   known.emplace(in_source, in_target);
 }
 
+/// Throws StorageError when the row of a worker is not as it was stored: of all its results nobody
+/// would know by which solver they are.
+void check_workers(sqlite3* source) {
+  if (schema_of(source) < kFirstPacked) {
+    return;  // without checksums
+  }
+  Statement damaged(source,
+                    "SELECT worker_id FROM workers WHERE checksum IS NOT NULL AND checksum <> " +
+                        worker_checksum_sql() + " LIMIT 1");
+  if (damaged.step()) {
+    throw StorageError(
+        fmt::format("worker {} is not as it was stored: `oblique check` tells more, and `oblique "
+                    "backup --salvage` saves what can be merged",
+                    damaged.integer(0)));
+  }
+}
+
 std::string marks(std::size_t count) {
   std::string text = "?";
   for (std::size_t i = 1; i < count; ++i) {
@@ -101,6 +118,7 @@ MergedWorkers::MergedWorkers(sqlite3* source, sqlite3* target)
           "INSERT INTO workers (worker_id, name, threads, solver_version, instruction_set,"
           " joined_at, checksum) SELECT n, ?1, ?2, ?3, ?4, ?5, row_checksum(n, ?1, ?2, ?3, ?4, ?5)"
           " FROM (SELECT coalesce(max(worker_id), 0) + 1 AS n FROM workers)") {
+  check_workers(source);
   Statement all(target,
                 "SELECT name, threads, solver_version, instruction_set, joined_at, worker_id"
                 " FROM workers");

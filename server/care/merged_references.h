@@ -34,6 +34,8 @@ class MergedModels {
 /// Sessions of workers. Two that began at one instant under one name are one.
 class MergedWorkers {
  public:
+  /// The source must have `row_checksum`. Throws StorageError when one of its workers is not as it
+  /// was stored.
   MergedWorkers(sqlite3* source, sqlite3* target);
 
   /// As of MergedModels.

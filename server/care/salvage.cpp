@@ -298,6 +298,17 @@ void count_rows(sqlite3* database) {
   }
 }
 
+/// No study that comes later may have a number by which rows know the study that they come from,
+/// whether that was deleted or could not be read.
+void keep_numbers(sqlite3* database) {
+  execute(database,
+          "DELETE FROM origins WHERE origin_id NOT IN (SELECT study_id FROM studies)"
+          " AND origin_id NOT IN (SELECT origin_id FROM taken_points)");
+  execute(database,
+          "UPDATE about SET last_study_id ="
+          " max(last_study_id, coalesce((SELECT max(origin_id) FROM origins), 0))");
+}
+
 /// Makes an end of what refers to rows that were not saved.
 void mend_references(sqlite3* database) {
   // Rows of a study or model that is gone tell nothing, nor do those whose words are lost.
@@ -318,6 +329,7 @@ void mend_references(sqlite3* database) {
       " ELSE 'unknown' END FROM workers), 'unknown', '' FROM packed_results"
       " WHERE worker NOT IN (SELECT worker_id FROM workers)");
   count_rows(database);
+  keep_numbers(database);
   execute(database,
           "UPDATE studies SET state = 'running' WHERE state = 'done' AND points <>"
           " (SELECT coalesce(sum(p.points), 0) FROM settled_points AS p"

@@ -1,6 +1,5 @@
 #include "server/care/study_care.h"
 
-#include <chrono>
 #include <optional>
 #include <string_view>
 #include <thread>
@@ -17,9 +16,6 @@ namespace {
 
 /// Rows that are deleted in one transaction.
 constexpr std::size_t kRowsAtOnce = 4096;
-/// For those who read the database to come to an end.
-constexpr std::chrono::milliseconds kPause{100};
-
 std::string gone_from(const std::string& path) {
   return fmt::format("the study is no longer in {}", path);
 }
@@ -69,18 +65,27 @@ void rename_study(const std::string& path, std::uint64_t study_id, const std::st
 bool delete_study(const std::string& path, std::uint64_t study_id, const RowsDeleted& deleted) {
   StoreWithStudy at(path, study_id);
   at.commit(DeleteStudy{study_id});
-  for (;;) {
-    switch (at.store().clear_away(kRowsAtOnce)) {
+  return clear_all_away(at.store(), [&] { deleted(at.store().cleared_rows()); }) &&
+         at.store().merge_log();
+}
+
+bool clear_all_away(Storage& storage, const std::function<void()>& part_is_done,
+                    const Patience& patience) {
+  for (int waits = 0; waits < patience.waits;) {
+    switch (storage.clear_away(kRowsAtOnce)) {
       case ClearedAway::kAll:
-        return at.store().merge_log();
+        return true;
       case ClearedAway::kPart:
-        deleted(at.store().cleared_rows());
+        waits = 0;
+        part_is_done();
         break;
       case ClearedAway::kMustWait:
-        std::this_thread::sleep_for(kPause);
+        ++waits;
+        std::this_thread::sleep_for(patience.pause);
         break;
     }
   }
+  return false;
 }
 
 protocol::Recipe stored_recipe(const std::string& path, std::uint64_t study_id) {

@@ -14,6 +14,8 @@ constexpr std::int64_t kFewPages = 16;
 constexpr std::size_t kRowsAPage = 128;
 /// So many rows are looked at while one is deleted.
 constexpr std::size_t kLooksARow = 16;
+/// Study and point of no row, below those of all.
+constexpr std::pair kBeforeAll{std::numeric_limits<std::int64_t>::min(), std::int64_t{0}};
 
 std::int64_t number_of(sqlite3* database, const char* sql) {
   Statement statement(database, sql);
@@ -28,16 +30,55 @@ void run_for(sqlite3* database, const char* sql, std::uint64_t study_id) {
 
 }  // namespace
 
-Clearing::Clearing(sqlite3* database)
+void DoubtfulNumbers::insert(std::uint64_t begin, std::uint64_t end) {
+  runs_.insert(begin, std::min(end, end_));
+  bound();
+}
+
+void DoubtfulNumbers::erase(std::uint64_t number) {
+  runs_.erase(number);
+  bound();  // it may have parted a run
+}
+
+void DoubtfulNumbers::clear() {
+  runs_ = {};
+  end_ = kNoEnd;
+}
+
+/// Leaves the higher half for later, so that this is seldom done.
+void DoubtfulNumbers::bound() {
+  if (runs_.intervals() <= most_runs_) {
+    return;
+  }
+  std::size_t left = (most_runs_ + 1) / 2;
+  runs_.for_each([&](const Interval& run) {
+    if (left == 0) {
+      end_ = std::min(end_, run.begin);
+    } else {
+      --left;
+    }
+  });
+  runs_.erase(end_, kNoEnd);
+}
+
+std::uint64_t DoubtfulNumbers::next_round() {
+  const std::uint64_t first = end_;
+  clear();
+  return first;
+}
+
+Clearing::Clearing(sqlite3* database, std::size_t most_runs)
     : database_(database),
-      last_worker_(number_of(database_, "SELECT max(worker_id) FROM workers")) {
+      last_worker_(number_of(database_, "SELECT max(worker_id) FROM workers")),
+      doubtful_{DoubtfulNumbers(most_runs), DoubtfulNumbers(most_runs)} {
   begin();
 }
 
 /// As the database says.
 void Clearing::begin() {
   left_.clear();
-  doubtful_ = {};
+  doubtful_.models.clear();
+  doubtful_.workers.clear();
   Statement list(database_, "SELECT study_id FROM deletions");
   while (list.step()) {
     left_.insert(static_cast<std::uint64_t>(list.integer(0)));
@@ -76,8 +117,8 @@ void Clearing::undo() {
 }
 
 void Clearing::note_use(std::int64_t model, std::uint64_t worker) {
-  doubtful_.models.erase(model);
-  doubtful_.workers.erase(static_cast<std::int64_t>(worker));
+  doubtful_.models.erase(static_cast<std::uint64_t>(model));
+  doubtful_.workers.erase(worker);
 }
 
 bool Clearing::step(std::size_t most) {
@@ -116,10 +157,14 @@ bool Clearing::step(std::size_t most) {
 void Clearing::delete_rows(std::size_t most) {
   if (left_.empty()) {
     if (doubts_all_) {
-      doubt_all();
+      doubt_all(0, 0);
+      doubts_all_ = false;
     }
-    looked_until_ = {std::numeric_limits<std::int64_t>::min(), 0};
-    phase_ = doubtful_.empty() ? Phase::kEntries : Phase::kUses;
+    looked_until_ = kBeforeAll;
+    phase_ = Phase::kUses;
+    if (doubtful_.empty()) {
+      end_round();
+    }
     return;
   }
   const std::uint64_t study = *left_.begin();
@@ -160,18 +205,18 @@ void Clearing::delete_rows(std::size_t most) {
   }
 }
 
-/// All that there are may be named by no row. Those that come later are named by the row with which
-/// they come.
-void Clearing::doubt_all() {
-  Statement models(database_, "SELECT model_id, NULL FROM models");
-  while (models.step()) {
-    doubtful_.insert(models, 0, 1);
-  }
-  Statement workers(database_, "SELECT worker_id FROM workers");
+/// All that there are from these on may be named by no row. Those that come later are named by the
+/// row with which they come.
+void Clearing::doubt_all(std::uint64_t first_model, std::uint64_t first_worker) {
+  doubtful_.models.insert(
+      first_model,
+      static_cast<std::uint64_t>(number_of(database_, "SELECT max(model_id) FROM models")) + 1);
+  Statement workers(database_, "SELECT worker_id FROM workers WHERE worker_id >= ?");
+  workers.bind(1, first_worker);
   while (workers.step()) {
-    doubtful_.workers.insert(workers.integer(0));
+    const auto worker = static_cast<std::uint64_t>(workers.integer(0));
+    doubtful_.workers.insert(worker, worker + 1);
   }
-  doubts_all_ = false;
 }
 
 void Clearing::look_for_uses(std::size_t most) {
@@ -188,32 +233,61 @@ void Clearing::look_for_uses(std::size_t most) {
     doubtful_.erase(rows, 2, 3);
   }
   if (doubtful_.empty()) {
-    phase_ = Phase::kEntries;
+    end_round();
   } else if (found < most) {
     phase_ = Phase::kReferences;
   }
 }
 
 bool Clearing::delete_references(std::size_t most) {
-  const auto later = doubtful_.workers.upper_bound(last_worker_);
-  keeps_entries_ = keeps_entries_ || later != doubtful_.workers.end();
-  doubtful_.workers.erase(later, doubtful_.workers.end());
-  std::size_t deleted = 0;
-  const auto remove = [&](std::set<std::int64_t>& ids, const char* sql) {
-    Statement statement(database_, sql);
-    for (; !ids.empty() && deleted < most; ++deleted) {
-      statement.bind(1, *ids.begin());
-      statement.run();
-      ids.erase(ids.begin());
+  const auto first_later = static_cast<std::uint64_t>(last_worker_) + 1;
+  if (doubtful_.workers.runs().first_from(first_later)) {
+    keeps_entries_ = true;
+    doubtful_.workers.erase({first_later, doubtful_.workers.end()});
+  }
+  std::size_t done = 0;
+  const auto remove = [&](DoubtfulNumbers& numbers, const std::string& table,
+                          const std::string& key) {
+    Statement find(database_, "SELECT count(*), max(n) FROM (SELECT " + key + " AS n FROM " +
+                                  table + " WHERE n >= ? AND n < ? ORDER BY n LIMIT ?)");
+    Statement remove_run(database_, "DELETE FROM " + table + " WHERE " + key + " BETWEEN ? AND ?");
+    while (!numbers.empty() && done < most) {
+      Interval run = numbers.runs().front();
+      find.bind(1, run.begin);
+      find.bind(2, run.end);
+      find.bind(3, std::uint64_t{most - done});
+      find.step();
+      const auto found = static_cast<std::size_t>(find.integer(0));
+      if (found == most - done) {
+        run.end = static_cast<std::uint64_t>(find.integer(1)) + 1;
+      }
+      find.reset();
+      remove_run.bind(1, run.begin);
+      remove_run.bind(2, run.end - 1);
+      remove_run.run();
+      numbers.erase(run);
+      done += found + 1;
     }
   };
   const bool any_model = !doubtful_.models.empty();
-  remove(doubtful_.models, "DELETE FROM models WHERE model_id = ?");
-  remove(doubtful_.workers, "DELETE FROM workers WHERE worker_id = ?");
+  remove(doubtful_.models, "models", "model_id");
+  remove(doubtful_.workers, "workers", "worker_id");
   if (doubtful_.empty()) {
-    phase_ = Phase::kEntries;
+    end_round();
   }
   return any_model;
+}
+
+/// What was left for later is in doubt now.
+void Clearing::end_round() {
+  if (!doubtful_.models.has_more() && !doubtful_.workers.has_more()) {
+    phase_ = Phase::kEntries;
+    return;
+  }
+  const std::uint64_t first_model = doubtful_.models.next_round();
+  doubt_all(first_model, doubtful_.workers.next_round());
+  looked_until_ = kBeforeAll;
+  phase_ = doubtful_.empty() ? Phase::kEntries : Phase::kUses;
 }
 
 std::int64_t Clearing::pages_to_give_back() {
@@ -224,16 +298,20 @@ std::int64_t Clearing::pages_to_give_back() {
 }
 
 void Clearing::References::insert(const Statement& row, int model, int worker) {
-  models.insert(row.integer(model));
+  const auto add = [&](DoubtfulNumbers& numbers, int column) {
+    const auto number = static_cast<std::uint64_t>(row.integer(column));
+    numbers.insert(number, number + 1);
+  };
+  add(models, model);
   if (!row.is_null(worker)) {
-    workers.insert(row.integer(worker));
+    add(workers, worker);
   }
 }
 
 void Clearing::References::erase(const Statement& row, int model, int worker) {
-  models.erase(row.integer(model));
+  models.erase(static_cast<std::uint64_t>(row.integer(model)));
   if (!row.is_null(worker)) {
-    workers.erase(row.integer(worker));
+    workers.erase(static_cast<std::uint64_t>(row.integer(worker)));
   }
 }
 

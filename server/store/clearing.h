@@ -2,12 +2,47 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <set>
 #include <utility>
 
 #include "server/database/sqlite.h"
+#include "server/scheduler/points/interval_set.h"
 
 namespace oblique::server {
+
+/// Numbers of models or workers that may be named by no row any more, as runs of neighbours. When
+/// they are too many runs, the higher ones are left for a later round, so that memory is bounded
+/// whatever the numbers are.
+class DoubtfulNumbers {
+ public:
+  static constexpr std::size_t kMostRuns = std::size_t{1} << 17U;  // some 8 MB
+  explicit DoubtfulNumbers(std::size_t most_runs = kMostRuns) : most_runs_(most_runs) {}
+
+  /// [begin, end) are in doubt; what is left for later, later.
+  void insert(std::uint64_t begin, std::uint64_t end);
+  void erase(std::uint64_t number);
+  void erase(const Interval& run) { runs_.erase(run.begin, run.end); }
+  void clear();
+
+  /// Nothing is to be judged in this round.
+  bool empty() const { return runs_.empty(); }
+  const IntervalSet& runs() const { return runs_; }
+  /// Numbers from this one on are left for later.
+  std::uint64_t end() const { return end_; }
+  bool has_more() const { return end_ < kNoEnd; }
+  /// Begins the next round, with nothing in it. From which number on all are in doubt.
+  std::uint64_t next_round();
+
+ private:
+  static constexpr std::uint64_t kNoEnd = std::numeric_limits<std::int64_t>::max();
+
+  void bound();
+
+  std::size_t most_runs_;
+  std::uint64_t end_ = kNoEnd;
+  IntervalSet runs_;
+};
 
 /// Deletes studies. A study is gone in one transaction; its rows, and the models and workers that
 /// no other row names, go afterwards, a few in each transaction, so that results are stored
@@ -15,8 +50,9 @@ namespace oblique::server {
 /// in the table `deletions` until all is done, so that another process goes on with it.
 class Clearing {
  public:
-  /// Of a database of the present schema, which must outlive this. Throws StorageError.
-  explicit Clearing(sqlite3* database);
+  /// Of a database of the present schema, which must outlive this. So many runs of models, and as
+  /// many of workers, are in doubt at most at a time. Throws StorageError.
+  explicit Clearing(sqlite3* database, std::size_t most_runs = DoubtfulNumbers::kMostRuns);
   Clearing(const Clearing&) = delete;
   Clearing& operator=(const Clearing&) = delete;
 
@@ -49,8 +85,8 @@ class Clearing {
  private:
   enum class Phase { kRows, kUses, kReferences, kEntries, kGivesBack, kIdle };
   struct References {
-    std::set<std::int64_t> models;
-    std::set<std::int64_t> workers;
+    DoubtfulNumbers models;
+    DoubtfulNumbers workers;
     bool empty() const { return models.empty() && workers.empty(); }
     void insert(const Statement& row, int model, int worker);
     void erase(const Statement& row, int model, int worker);
@@ -59,8 +95,9 @@ class Clearing {
   void delete_rows(std::size_t most);
   void look_for_uses(std::size_t most);
   bool delete_references(std::size_t most);
+  void end_round();
   void begin();
-  void doubt_all();
+  void doubt_all(std::uint64_t first_model, std::uint64_t first_worker);
   std::int64_t pages_to_give_back();
 
   sqlite3* database_;

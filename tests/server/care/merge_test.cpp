@@ -195,6 +195,17 @@ TEST_F(MergeTest, ARowThatIsNotAsItWasStoredRefusesTheWholeDatabase) {
   EXPECT_THROW(merge("one"), StorageError) << "with a list that no query could unfold";
 }
 
+TEST_F(MergeTest, AWorkerThatIsNotAsItWasStoredRefusesTheWholeDatabase) {
+  for (const char* change : {"solver_version = '0.2'", "name = 'another'", "threads = 3"}) {
+    store(change, {{.end = 5}});
+    texts(change, std::string("UPDATE workers SET ") + change);
+    EXPECT_THROW(merge(change, {.rename_prefix = "", .mixes_versions = true}), StorageError)
+        << change;
+    texts(change, "UPDATE workers SET checksum = NULL");
+    EXPECT_NO_THROW(merge(change, {.rename_prefix = "", .mixes_versions = true})) << change;
+  }
+}
+
 TEST_F(MergeTest, AStudyThatWouldKeepAServerFromStartingRefusesTheWholeDatabase) {
   int number = 0;
   for (const char* change :

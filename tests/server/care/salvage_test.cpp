@@ -1,10 +1,12 @@
 #include "server/care/salvage.h"
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -19,8 +21,23 @@ namespace {
 
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::SizeIs;
 
-class SalvageTest : public CareTest {};
+class SalvageTest : public CareTest {
+ protected:
+  /// Study, point and, by its checksum, all else of each row, in the order of the texts.
+  static std::vector<std::string> rows_of(const std::string& file) {
+    const DatabaseHandle database = open_database(file, SQLITE_OPEN_READONLY);
+    Statement rows(database.get(),
+                   "SELECT printf('%02d/%06d %d', study_id, point, checksum) FROM packed_results"
+                   " ORDER BY study_id, point");
+    std::vector<std::string> found;
+    while (rows.step()) {
+      found.push_back(rows.text(0));
+    }
+    return found;
+  }
+};
 
 TEST_F(SalvageTest, WhatCanBeReadOfADamagedDatabaseIsSavedAndTheRestIsPendingAgain) {
   constexpr std::uint64_t kPoints = 400;
@@ -31,6 +48,7 @@ TEST_F(SalvageTest, WhatCanBeReadOfADamagedDatabaseIsSavedAndTheRestIsPendingAga
     add_results(store, 0, kPoints, true);
     store.commit(std::vector<Change>{SetStudyState{1, StudyState::kDone, "now"}});
   }
+  const auto stored = rows_of(damaged);
   {
     // One page in the middle, where nearly all pages are rows of results.
     std::fstream file(damaged, std::ios::in | std::ios::out | std::ios::binary);
@@ -46,6 +64,8 @@ TEST_F(SalvageTest, WhatCanBeReadOfADamagedDatabaseIsSavedAndTheRestIsPendingAga
   EXPECT_LT(saved.results, kPoints);
   EXPECT_GT(saved.results, kPoints - 40);
   EXPECT_THAT(find_faults(copy_), IsEmpty());
+  EXPECT_THAT(rows_of(copy_), SizeIs(saved.results));
+  EXPECT_TRUE(std::ranges::includes(stored, rows_of(copy_)));
   Store copy(copy_);
   const auto studies = copy.studies();
   EXPECT_EQ(studies.at(0).settled.size(), saved.results);
@@ -61,6 +81,7 @@ TEST_F(SalvageTest, SalvagingEndsAlsoWhenTheFirstPagesOfATableAreGone) {
       Store store(damaged);
       add_results(store, 0, kPoints, true);
     }
+    const auto stored = rows_of(damaged);
     std::int64_t page = 0;
     {
       const DatabaseHandle database = open_database(damaged, SQLITE_OPEN_READONLY);
@@ -92,6 +113,7 @@ TEST_F(SalvageTest, SalvagingEndsAlsoWhenTheFirstPagesOfATableAreGone) {
     const auto saved = salvage(damaged, saved_file);
     EXPECT_GE(saved.unreadable_places, 1U) << damage;
     EXPECT_EQ(saved.results > kPoints - 40, damage == "first rows") << damage << saved.results;
+    EXPECT_TRUE(std::ranges::includes(stored, rows_of(saved_file))) << damage;
     EXPECT_THAT(find_faults(saved_file), IsEmpty()) << damage;
   }
 }
@@ -103,6 +125,8 @@ TEST_F(SalvageTest, AFlippedByteInAnyValueOfARowIsFoundAndTheRowIsNotSalvaged) {
     std::ifstream file(path_, std::ios::binary);
     bytes.assign(std::istreambuf_iterator<char>(file), {});
   }
+  auto others = rows_of(path_);
+  others.erase(others.begin() + 3);
   // The row of point 3 begins with the numbers that its columns do, near the end of the file; its
   // texts are found by what they say.
   const auto text_of = [&](const std::string& column) {
@@ -122,8 +146,10 @@ TEST_F(SalvageTest, AFlippedByteInAnyValueOfARowIsFoundAndTheRowIsNotSalvaged) {
     const std::string file = folder_.file(column + ".db");
     std::ofstream(file, std::ios::binary) << damaged;
     EXPECT_THAT(find_faults(file), testing::Contains(HasSubstr("point 3"))) << column;
-    const auto saved = salvage(file, folder_.file(column + " saved.db"));
+    const std::string saved_file = folder_.file(column + " saved.db");
+    const auto saved = salvage(file, saved_file);
     EXPECT_EQ(saved.results, 4U) << column;
+    EXPECT_EQ(rows_of(saved_file), others) << column;
     EXPECT_EQ(saved.unreadable_places, 1U) << column;
   }
 }
@@ -140,6 +166,7 @@ TEST_F(SalvageTest, ASoundDatabaseIsSalvagedWhole) {
   const auto saved = salvage(path_, copy_);
   EXPECT_EQ(saved.results, 5U);
   EXPECT_EQ(saved.unreadable_places, 0U);
+  EXPECT_EQ(rows_of(copy_), rows_of(path_));
   EXPECT_THROW(salvage(path_, copy_), StorageError) << "it exists";
 }
 
@@ -153,6 +180,7 @@ TEST_F(SalvageTest, OfATruncatedFileEveryRowThatIsLeftIsSavedAndTheFileStaysAsIt
       add_results(store, first, first + 100, first == 0);
     }
   }
+  const auto stored = rows_of(whole);
   const auto size = std::filesystem::file_size(whole);
   // In the middle of a page, at its end, and so that little more than the tables' heads is left.
   for (const std::uintmax_t cut : {size / 100 * 99 + 7, size / 4096 * 3 / 4 * 4096, size / 10}) {
@@ -167,6 +195,8 @@ TEST_F(SalvageTest, OfATruncatedFileEveryRowThatIsLeftIsSavedAndTheFileStaysAsIt
     EXPECT_GE(static_cast<double>(saved.results), (share - 0.2) * kPoints) << cut;
     EXPECT_LT(saved.results, kPoints) << cut;
     EXPECT_GE(saved.unreadable_places, 1U) << cut;
+    EXPECT_THAT(rows_of(saved_file), SizeIs(saved.results)) << cut;
+    EXPECT_TRUE(std::ranges::includes(stored, rows_of(saved_file))) << cut;
     EXPECT_THAT(find_faults(saved_file), IsEmpty()) << cut;
     EXPECT_EQ(std::filesystem::file_size(truncated), cut);
   }
@@ -201,6 +231,26 @@ TEST_F(SalvageTest, StudiesWithFiltersAreDoneAndRowsThatWereTakenOverAreCountedA
   EXPECT_EQ(study.state, StudyState::kDone);
   EXPECT_EQ(study.settled, IntervalSet(0, 4));
   EXPECT_EQ(study.taken, (std::map<std::string, std::uint64_t>{{"first", 4}}));
+}
+
+TEST_F(SalvageTest, TheNumberOfAStudyThatIsGoneIsNotGivenAgainWhereRowsNameIt) {
+  const auto taken = std::make_shared<TakenResults>();
+  store_->commit(std::vector<Change>{AddStudy{2, "b", table_, "now"},
+                                     AddStudy{3, "source", table_, "now"},
+                                     TakeResults{3, 1, {{0, 0, 4}}, "0.1", taken},
+                                     TakeResults{2, 3, {{0, 0, 4}}, "0.1", taken}, DeleteStudy{3}});
+  while (store_->clear_away(100) != ClearedAway::kAll) {
+  }
+  store_.reset();
+  for (const std::string loss : {"", "DELETE FROM origins WHERE origin_id = 3"}) {
+    execute(open_database(path_, SQLITE_OPEN_READWRITE).get(), loss);
+    const std::string file = folder_.file(loss + " saved.db");
+    salvage(path_, file);
+    Store saved(file);
+    ASSERT_EQ(saved.studies().back().study_id, 2U) << loss;
+    EXPECT_EQ(saved.last_study_id(), 3U) << loss;
+    EXPECT_THAT(find_faults(file), IsEmpty()) << loss;
+  }
 }
 
 }  // namespace

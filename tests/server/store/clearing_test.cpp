@@ -206,6 +206,57 @@ TEST_F(ClearingTest, WorkersThatMayStillStoreResultsStayUntilTheNextStart) {
   EXPECT_EQ(number("SELECT count(*) FROM deletions"), 0);
 }
 
+TEST_F(ClearingTest, ManyModelsThatOthersLieBetweenGoInRounds) {
+  constexpr std::uint64_t kStudies = 40;
+  for (std::uint64_t id = 1; id <= kStudies; ++id) {
+    commit(solved_study(id, table_with_k(1e7 + static_cast<double>(id), 2), id));
+  }
+  store_.reset();
+  const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);
+  for (const bool is_restarted : {false, true}) {  // then all models are in doubt
+    Clearing clearing(database.get(), 3);
+    const std::uint64_t first = is_restarted ? 1 : 2;
+    for (std::uint64_t id = first; id <= kStudies; id += is_restarted ? 4 : 2) {
+      clearing.remove(id);
+    }
+    clearing.kept();
+    std::optional<Clearing> restarted;
+    if (is_restarted) {
+      restarted.emplace(database.get(), 3);
+    }
+    Clearing& clears = is_restarted ? *restarted : clearing;
+    while (!clears.is_idle()) {
+      (void)clears.step(5);
+    }
+    const std::int64_t left = is_restarted ? 10 : 20;
+    EXPECT_EQ(number("SELECT count(*) FROM packed_results"), 2 * left);
+    EXPECT_EQ(number("SELECT count(*) FROM models"), left);
+    EXPECT_EQ(number("SELECT count(*) FROM workers"), left);
+    EXPECT_EQ(number("SELECT count(*) FROM results JOIN models USING (model_id)"), 2 * left);
+    EXPECT_EQ(number("SELECT count(*) FROM deletions"), 0);
+  }
+}
+
+TEST(DoubtfulNumbers, AreSoManyRunsAtMostAndTheHigherOnesAreLeftForLater) {
+  DoubtfulNumbers numbers(4);
+  for (std::uint64_t i = 0; i < 1000; ++i) {
+    numbers.insert(2 * i, 2 * i + 1);
+    EXPECT_LE(numbers.runs().intervals(), 4U);
+  }
+  EXPECT_TRUE(numbers.has_more());
+  EXPECT_EQ(numbers.runs().first_from(0)->begin, 0U);
+  const std::uint64_t judged = numbers.end();
+  EXPECT_EQ(numbers.next_round(), judged);
+  EXPECT_FALSE(numbers.has_more());
+  numbers.insert(judged, 2000);
+  for (std::uint64_t i = judged + 1; i < 2000; i += 2) {
+    numbers.erase(i);
+    EXPECT_LE(numbers.runs().intervals(), 4U);
+    EXPECT_FALSE(numbers.runs().contains(i));
+  }
+  EXPECT_GT(numbers.end(), judged);
+}
+
 TEST_F(ClearingTest, TheFileGetsSmaller) {
   commit(solved_study(1, table_of(5000), 1));
   commit(solved_study(2, table_of(10), 2));
