@@ -34,16 +34,31 @@ bool is_null(const PackedValue& value) {
   return value.type == PackedValue::Type::kNull;
 }
 
-/// What the solver makes of a point, however long that took it, that is another in both rows; what
-/// one lacks, as one of an older schema may, says nothing.
-std::vector<std::string> differing_outputs(const PackedRow& a, const PackedRow& b) {
-  std::vector<std::string> differing;
+/// What the solver makes of a point, however long that took it.
+struct Output {
+  int column;  ///< of `packed_results`
+  std::string_view shown;
+};
+
+std::vector<Output> compared_outputs() {
+  std::vector<Output> outputs;
   for (const std::string_view name : packed_outputs()) {
-    const int column = packed_column(name);
-    const PackedValue& here = a.at(column);
-    const PackedValue& there = b.at(column);
-    if (name != "wall" && !is_null(here) && !is_null(there) && here != there) {
-      differing.emplace_back(shown_name(name));
+    if (name != "wall") {
+      outputs.push_back({packed_column(name), shown_name(name)});
+    }
+  }
+  return outputs;
+}
+
+/// Those that are others in both rows; what one lacks, as one of an older schema may, says nothing.
+std::vector<std::string> differing_outputs(const std::vector<Output>& outputs, const PackedRow& a,
+                                           const PackedRow& b) {
+  std::vector<std::string> differing;
+  for (const Output& output : outputs) {
+    const PackedValue& here = a.at(output.column);
+    const PackedValue& there = b.at(output.column);
+    if (!is_null(here) && !is_null(there) && here != there) {
+      differing.emplace_back(output.shown);
     }
   }
   return differing;
@@ -134,7 +149,7 @@ class RowMerge {
 
   /// Both solved it.
   void compare(const StudyPlace& place, std::uint64_t point) {
-    std::vector<std::string> differing = differing_outputs(source_->row(), there_);
+    std::vector<std::string> differing = differing_outputs(outputs_, source_->row(), there_);
     if (known_.text(known_.columns() - 1) != source_->solver_version()) {
       differing.insert(differing.begin(), "solver_version");
     }
@@ -158,6 +173,7 @@ class RowMerge {
   }
 
   const Columns columns_;
+  const std::vector<Output> outputs_ = compared_outputs();
   StudyPlaces& places_;
   Merged& merged_;
   const std::set<std::uint64_t> deleted_;

@@ -6,44 +6,13 @@
 #include "server/store/rows/old_workers.h"
 #include "server/store/rows/packed_row.h"
 #include "server/store/rows/row_columns.h"
+#include "server/store/rows/settled_runs.h"
 
 namespace oblique::server {
 namespace {
 
 constexpr int kSchema = kFirstPacked - 1;
 constexpr std::uint64_t kRowsBetweenReports = 10'000;
-
-/// Points in ascending order as runs of neighbours.
-class GatheredRuns {
- public:
-  explicit GatheredRuns(sqlite3* database)
-      : insert_(database,
-                "INSERT INTO settled_points (study_id, first_point, points) VALUES (?, ?, ?)") {}
-
-  void add(std::int64_t study, std::int64_t point) {
-    if (study != study_ || point != end_) {
-      write();
-      study_ = study;
-      first_ = point;
-    }
-    end_ = point + 1;
-  }
-  void write() {
-    if (end_ > first_) {
-      insert_.bind(1, study_);
-      insert_.bind(2, first_);
-      insert_.bind(3, end_ - first_);
-      insert_.run();
-    }
-    first_ = end_;
-  }
-
- private:
-  Statement insert_;
-  std::int64_t study_ = -1;
-  std::int64_t first_ = 0;
-  std::int64_t end_ = 0;
-};
 
 class RowMigration {
  public:
@@ -63,11 +32,12 @@ class RowMigration {
       ++(take_row() ? rows.kept : rows.left_out);
       if (const std::uint64_t looked_at = rows.kept + rows.left_out;
           looked_at % kRowsBetweenReports == 0) {
+        settled_.flush();
         progress(looked_at);
       }
     }
     read_.reset();
-    settled_.write();
+    settled_.flush();
     return rows;
   }
 
@@ -80,7 +50,8 @@ class RowMigration {
     }
     OldRows::name_worker(read_, kFirst, workers_, row_);
     insert_.run(row_, read_.integer(0) == 0);
-    settled_.add(row_.at(0).whole, row_.at(1).whole);
+    settled_.add(static_cast<std::uint64_t>(row_.at(0).whole),
+                 static_cast<std::uint64_t>(row_.at(1).whole));
     return true;
   }
 
@@ -88,7 +59,7 @@ class RowMigration {
   TextNumbers texts_;
   OldWorkers workers_;
   RowInsert insert_;
-  GatheredRuns settled_;
+  SettledRuns settled_;
   PackedRow row_;
   Statement read_;
 };

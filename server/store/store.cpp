@@ -354,9 +354,8 @@ void Store::add(const AddResults& change) {
     const protocol::Point point = change.table->point(result.point());
     const StoredModel model = stored_model(change, point.model);
     clearing_->note_use(model.id, change.worker_id);
-    const RowContext context{change.study_id, model.id,         model.accuracy,
-                             point,           result.point(),   change.worker_id,
-                             change.attempt,  change.solved_at, {}};
+    const RowContext context{change.study_id, model.id,         model.accuracy, point,
+                             result.point(),  change.worker_id, change.attempt, change.solved_at};
     if (result.error().empty()) {
       const solver::CaseResult outputs = protocol::from_message(result);
       row.pack(context, &outputs, {}, statements_->texts);

@@ -125,13 +125,8 @@ class ListText {
   }
   bool read_value(std::vector<double>& numbers) {
     pass_spaces();
-    for (const auto kind : {solver::PhaseKind::kCompression, solver::PhaseKind::kRestitution}) {
-      const std::string word = fmt::format("\"{}\"", phase_kind_name(kind));
-      if (rest_.starts_with('"') && rest_.starts_with(word)) {
-        rest_.remove_prefix(word.size());
-        numbers.push_back(static_cast<double>(kind));
-        return true;
-      }
+    if (rest_.starts_with('"')) {
+      return read_kind(numbers);
     }
     double number = 0.0;
     const char* const end = rest_.data() + rest_.size();
@@ -142,6 +137,19 @@ class ListText {
     rest_.remove_prefix(static_cast<std::size_t>(behind - rest_.data()));
     numbers.push_back(number);
     return true;
+  }
+
+  bool read_kind(std::vector<double>& numbers) {
+    rest_.remove_prefix(1);
+    for (const auto kind : {solver::PhaseKind::kCompression, solver::PhaseKind::kRestitution}) {
+      const std::string_view word = solver::phase_kind_name(kind);
+      if (rest_.starts_with(word) && rest_.substr(word.size()).starts_with('"')) {
+        rest_.remove_prefix(word.size() + 1);
+        numbers.push_back(static_cast<double>(kind));
+        return true;
+      }
+    }
+    return false;
   }
 
   std::string_view rest_;
@@ -182,10 +190,6 @@ std::string OldRows::columns_sql(int schema) {
   return columns;
 }
 
-int OldRows::columns() {
-  return static_cast<int>(names().size());
-}
-
 std::string OldRows::solver_version(const Statement& row, int first) {
   return row.text(first + places().solver_version);
 }
@@ -217,8 +221,7 @@ bool OldRows::pack(const Statement& row, int first, TextNumbers& texts, PackedRo
       static_cast<std::uint64_t>(row.integer(first + at.point)),
       static_cast<std::uint64_t>(row.integer(first + at.worker)),
       static_cast<std::uint32_t>(row.integer(first + at.attempt)),
-      solved_at,
-      {}};
+      solved_at};
   to.pack(context, is_failed ? nullptr : &result_, row.bytes(first + at.error), texts);
   return true;
 }

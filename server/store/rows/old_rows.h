@@ -19,9 +19,8 @@ class OldRows {
   /// The connection must have `model_definition` and its models that schema's definitions.
   OldRows(sqlite3* database, int schema);
 
-  /// What `pack` needs, as a list for SQL: `columns()` of them.
+  /// What `pack` needs, as a list for SQL.
   static std::string columns_sql(int schema);
-  static int columns();
 
   /// Makes `to` the row whose columns stand from `first` on in `row`; model and worker are the
   /// numbers that stood there. False when that cannot be: outputs are missing, or a list is none.

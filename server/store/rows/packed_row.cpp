@@ -139,12 +139,7 @@ void PackedRow::pack(const RowContext& context, const solver::CaseResult* result
   } else {
     set(solved_at, context.solved_at);
   }
-  PackedValue& taken_from = next();
-  if (context.taken_from.empty()) {
-    clear(taken_from);
-  } else {
-    set(taken_from, context.taken_from);
-  }
+  clear(next());  // taken_from: it was solved for this point
 }
 
 void PackedRow::pack_outputs(const solver::CaseResult& result, double accuracy,

@@ -25,8 +25,7 @@ struct RowContext {
   std::uint64_t number;     ///< of the point
   std::uint64_t worker_id;  ///< 0: NULL
   std::uint32_t attempt;
-  std::string_view solved_at;   ///< UTC in ISO 8601; any other text is kept as it is
-  std::string_view taken_from;  ///< STUDY/POINT; empty: NULL
+  std::string_view solved_at;  ///< UTC in ISO 8601; any other text is kept as it is
 };
 
 /// A value of a row, of one of SQLite's types.

@@ -1,6 +1,5 @@
 #include "server/asking/columns.h"
 
-#include <cmath>
 #include <map>
 #include <set>
 #include <sstream>
@@ -13,6 +12,7 @@
 #include "client/output/columns.h"
 #include "client/output/printer.h"
 #include "tests/support/programs.h"
+#include "tests/support/stored_numbers.h"
 
 namespace oblique::client {
 namespace {
@@ -80,41 +80,40 @@ TEST_F(TwoWays, EveryMemberOfSolveJsonIsDescribedAndNoOther) {
   EXPECT_EQ(names, members_of(solved));
 }
 
-// Rows keep the digits that the accuracy of a result carries: units of a hundredth of the tolerance
-// of a value's natural scale at most (server/store/rows). Of energies that is what came in, of
-// velocities the speed at touch, of times the duration, and of forces the largest.
-double scale_of(const std::string& name, const nlohmann::ordered_json& solved) {
-  const auto of = [&](const char* key) { return std::abs(solved[key].get<double>()); };
-  if (name.ends_with("_J")) {
-    return solved["energy"]["kinetic_in_J"].get<double>();
-  }
-  if (name.ends_with("_m_s")) {
-    return std::hypot(of("vt_in_m_s"), of("vn_in_m_s"));
-  }
-  if (name.ends_with("_s") && name != "fall_time_s") {
-    return of("duration_s");
-  }
-  return name.ends_with("_N") ? of("fn_peak_N") : 1.0;
+// How finely a row has what `solve --json` says.
+server::StoredDigits digits_of(const nlohmann::ordered_json& solved) {
+  solver::CaseResult result{};
+  result.fall_time_s = solved["fall_time_s"];
+  result.impact_x_m = solved["impact_x_m"];
+  result.vt_in_m_s = solved["vt_in_m_s"];
+  result.vn_in_m_s = solved["vn_in_m_s"];
+  result.duration_s = solved["duration_s"];
+  result.fn_peak_N = solved["fn_peak_N"];
+  result.impulse_n_Ns = solved["impulse_n_Ns"];
+  result.energy.kinetic_in_J = solved["energy"]["kinetic_in_J"];
+  result.energy.exchanged_J = solved["energy"]["exchanged_J"];
+  result.solver.dt_s = solved["solver"]["dt_s"];
+  return {result, server::accuracy_of(solver::ModelParameters())};
 }
 
-void expect_as_stored(const nlohmann::ordered_json& stored, const nlohmann::ordered_json& member,
-                      const std::string& name, const nlohmann::ordered_json& solved) {
-  constexpr double kUnit = 1e-5 / 100;
+void expect_same(const nlohmann::ordered_json& stored, const nlohmann::ordered_json& member,
+                 const std::string& name, const server::StoredDigits& digits) {
   if (member.is_structured()) {
     ASSERT_EQ(stored.size(), member.size()) << name;
     auto kept = stored.begin();
     for (auto part = member.begin(); part != member.end(); ++part, ++kept) {
-      expect_as_stored(*kept, *part, member.is_object() ? part.key() : name, solved);
+      // Lists of numbers, as fn_peaks_N, have their unit in their own name.
+      expect_same(*kept, *part, member.is_object() ? part.key() : name, digits);
     }
   } else if (member.is_number_float()) {
-    EXPECT_NEAR(stored.get<double>(), member.get<double>(), kUnit / 2 * scale_of(name, solved))
-        << name;
+    server::expect_as_stored(stored.get<double>(), member.get<double>(), name, digits);
   } else {
     EXPECT_EQ(stored, member) << name;
   }
 }
 
 TEST_F(TwoWays, ColumnsAndMembersOfOneNameAreTheSameToTheDigitsThatRowsKeep) {
+  const server::StoredDigits digits = digits_of(solved);
   for (const auto& column : server::all_columns()) {
     if (column.solve_json.empty() || column.name == "wall_s") {
       continue;
@@ -124,7 +123,7 @@ TEST_F(TwoWays, ColumnsAndMembersOfOneNameAreTheSameToTheDigitsThatRowsKeep) {
         dot == std::string::npos
             ? solved[column.solve_json]
             : solved[column.solve_json.substr(0, dot)][column.solve_json.substr(dot + 1)];
-    expect_as_stored(row[column.name], member, column.name, solved);
+    expect_same(row[column.name], member, column.name, digits);
   }
 }
 
@@ -133,7 +132,7 @@ TEST_F(TwoWays, ListsOfTheDatabaseAreArraysToo) {
        {"peaks", "ft_peaks", "phases", "stick_intervals", "reaction_peaks", "lengths_m"}) {
     EXPECT_TRUE(row[name].is_array()) << name << row[name];
   }
-  expect_as_stored(row["peaks"][0]["fn_N"], solved["fn_peaks_N"][0], "fn_peaks_N", solved);
+  expect_same(row["peaks"][0]["fn_N"], solved["fn_peaks_N"][0], "fn_peaks_N", digits_of(solved));
   EXPECT_EQ(row["lengths_m"], nlohmann::ordered_json::parse("[0.4,0.4,0.4]"));
 }
 

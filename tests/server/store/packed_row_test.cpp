@@ -26,7 +26,7 @@ TEST(PackedRow, ThatBreaksARuleOfTheTableIsAnErrorAndNotPassedOver) {
   TextNumbers texts(database.get());
   RowInsert insert(database.get());
   PackedRow row;
-  RowContext context{1, 1, 1e-5, {0, 1.0, 0.5, 1.0}, 0, 0, 1, "now", ""};
+  RowContext context{1, 1, 1e-5, {0, 1.0, 0.5, 1.0}, 0, 0, 1, "now"};
   const auto outputs = protocol::from_message(solved_point(0));
   for (const double H_m : {std::numeric_limits<double>::quiet_NaN(), 1.0}) {
     context.point.H_m = H_m;

@@ -1,6 +1,4 @@
 // What views show of what was stored.
-#include <algorithm>
-#include <cmath>
 #include <string>
 #include <vector>
 
@@ -10,6 +8,7 @@
 #include "server/reading/reader.h"
 #include "server/store/store.h"
 #include "tests/support/points.h"
+#include "tests/support/stored_numbers.h"
 #include "tests/support/temporary_folder.h"
 
 namespace oblique::server {
@@ -33,11 +32,6 @@ class ViewsTest : public testing::Test {
   std::string path_ = folder_.file("studies.db");
 };
 
-/// Models have a tolerance of 1e-5; what is measured by more than itself is as fine as that.
-void expect_near(double shown, double output, double scale = 0.0) {
-  EXPECT_NEAR(shown, output, 1e-7 * std::max(std::abs(output), scale));
-}
-
 TEST_F(ViewsTest, NumbersComeBackFromColumnsAndViewsAHundredTimesFinerThanTheyAreAccurate) {
   std::vector<protocol::PointResult> results;
   for (std::uint64_t point = 0; point < 500; ++point) {
@@ -56,22 +50,23 @@ TEST_F(ViewsTest, NumbersComeBackFromColumnsAndViewsAHundredTimesFinerThanTheyAr
   for (int i = 0; i < 500; ++i) {
     const auto& result = results[static_cast<std::size_t>(i)];
     const auto outputs = protocol::from_message(result);
+    const StoredDigits digits(outputs, accuracy_of(table->model(0)));
     const auto& row = scalars.rows(i);
-    expect_near(row.values(0).real(), outputs.fall_time_s);
-    expect_near(row.values(1).real(), outputs.duration_s);
-    expect_near(row.values(2).real(), outputs.fn_peak_N);
-    expect_near(row.values(3).real(), outputs.energy.closure, 1.0);
+    expect_as_stored(row.values(0).real(), outputs.fall_time_s, "fall_time_s", digits);
+    expect_as_stored(row.values(1).real(), outputs.duration_s, "duration_s", digits);
+    expect_as_stored(row.values(2).real(), outputs.fn_peak_N, "fn_peak_N", digits);
+    expect_as_stored(row.values(3).real(), outputs.energy.closure, "closure", digits);
     EXPECT_EQ(row.values(4).real(), table->point(result.point()).mu);
     for (int j = 0; j < 6; ++j) {
-      const double scale = j % 3 == 0 ? outputs.duration_s : outputs.fn_peak_N;
-      expect_near(peaks.rows(2 * i + j / 3).values(j % 3).real(), result.peaks(j), scale);
+      expect_as_stored(peaks.rows(2 * i + j / 3).values(j % 3).real(), result.peaks(j),
+                       j % 3 == 0 ? "t_s" : "fn_N", digits);
     }
-    expect_near(phases.rows(3 * i + 1).values(0).real(), result.phase_ends_s(0),
-                outputs.duration_s);
-    expect_near(phases.rows(3 * i + 1).values(1).real(), result.phase_ends_s(1),
-                outputs.duration_s);
-    expect_near(phases.rows(3 * i + 2).values(1).real(), outputs.duration_s);  // its last one
-    expect_near(sticks.rows(i).values(1).real(), result.stick_intervals(1), outputs.duration_s);
+    const auto& phase = phases.rows(3 * i + 1);
+    expect_as_stored(phase.values(0).real(), result.phase_ends_s(0), "t0_s", digits);
+    expect_as_stored(phase.values(1).real(), result.phase_ends_s(1), "t1_s", digits);
+    const auto& last = phases.rows(3 * i + 2);
+    expect_as_stored(last.values(1).real(), outputs.duration_s, "t1_s", digits);
+    expect_as_stored(sticks.rows(i).values(1).real(), result.stick_intervals(1), "t1_s", digits);
   }
 }
 
@@ -125,12 +120,13 @@ TEST_F(ViewsTest, TheLargestReactionsComeBackThePinFirst) {
   store(3, {result, of_older_worker});
   const auto peaks = ask("SELECT point, seq, t_s, force_N FROM reaction_peaks ORDER BY seq");
   ASSERT_EQ(peaks.rows_size(), 3);
+  const StoredDigits digits(protocol::from_message(result), accuracy_of(table_of(3)->model(0)));
   for (int joint = 0; joint < 3; ++joint) {
     const auto& row = peaks.rows(joint);
     EXPECT_EQ(row.values(0).integer(), 1);
     EXPECT_EQ(row.values(1).integer(), joint);
-    expect_near(row.values(2).real(), result.reaction_peaks(2 * joint));
-    expect_near(row.values(3).real(), result.reaction_peaks(2 * joint + 1));
+    expect_as_stored(row.values(2).real(), result.reaction_peaks(2 * joint), "t_s", digits);
+    expect_as_stored(row.values(3).real(), result.reaction_peaks(2 * joint + 1), "force_N", digits);
   }
   const auto in_runs = ask("SELECT reaction_peaks IS NULL FROM runs ORDER BY point");
   EXPECT_EQ(in_runs.rows(0).values(0).integer(), 0);

@@ -5,11 +5,9 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cmath>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
-#include <map>
 #include <string>
 #include <vector>
 
@@ -20,6 +18,7 @@
 #include "server/care/diagnosis.h"
 #include "server/care/merge.h"
 #include "server/store/store.h"
+#include "tests/support/stored_numbers.h"
 #include "tests/support/temporary_folder.h"
 
 namespace oblique::server {
@@ -54,63 +53,78 @@ class MigratedValuesTest : public testing::Test {
   std::string before_ = folder_.file("before.db");
 };
 
-/// The largest magnitude in the elements of a list at each place, which its rounding counts by.
-void expect_same_list(const std::string& now, const std::string& then, double finest,
-                      const std::string& what) {
+/// How finely a row of schema 7, with the columns of its model, is stored now.
+StoredDigits digits_of(const Statement& row, const std::vector<std::string>& columns) {
+  const auto value = [&](const std::string& name) {
+    const auto column = std::find(columns.begin(), columns.end(), name);
+    return row.real(static_cast<int>(column - columns.begin()));
+  };
+  solver::CaseResult result{};
+  result.fall_time_s = value("fall_time_s");
+  result.impact_x_m = value("impact_x_m");
+  result.vt_in_m_s = value("vt_in_m_s");
+  result.vn_in_m_s = value("vn_in_m_s");
+  result.duration_s = value("duration_s");
+  result.fn_peak_N = value("fn_peak_N");
+  result.impulse_n_Ns = value("impulse_n_Ns");
+  result.energy.kinetic_in_J = value("kinetic_in_J");
+  result.energy.exchanged_J = value("exchanged_J");
+  result.solver.dt_s = value("dt_s");
+  return {result, value("dt") > 0.0 ? 0.0 : value("tolerance")};
+}
+
+void expect_same_list(const std::string& now, const std::string& then, const std::string& list,
+                      const StoredDigits& digits) {
   const auto a = nlohmann::json::parse(now);
   const auto b = nlohmann::json::parse(then);
-  ASSERT_EQ(a.size(), b.size()) << what;
-  std::map<std::size_t, double> largest;
-  for (const auto& element : b) {
-    for (std::size_t i = 0; i < element.size(); ++i) {
-      largest[i] =
-          element[i].is_number() ? std::max(largest[i], std::abs(element[i].get<double>())) : 0.0;
-    }
-  }
+  ASSERT_EQ(a.size(), b.size());
   for (std::size_t row = 0; row < b.size(); ++row) {
-    ASSERT_EQ(a[row].size(), b[row].size()) << what;
+    ASSERT_EQ(a[row].size(), b[row].size());
     for (std::size_t i = 0; i < b[row].size(); ++i) {
-      if (b[row][i].is_string()) {
-        EXPECT_EQ(a[row][i], b[row][i]) << what;
+      if (b[row][i].is_number_float()) {
+        const bool is_force = i > 0 && list.ends_with("peaks");
+        expect_as_stored(a[row][i].get<double>(), b[row][i].get<double>(),
+                         is_force ? "fn_N" : "t_s", digits);
       } else {
-        EXPECT_NEAR(a[row][i].get<double>(), b[row][i].get<double>(), finest * largest[i]) << what;
+        EXPECT_EQ(a[row][i], b[row][i]);  // the kind of a phase, or of a peak
       }
     }
   }
 }
 
-TEST_F(MigratedValuesTest, AreThoseOfBeforeTillFarBelowTheTolerance) {
+TEST_F(MigratedValuesTest, AreThoseOfBeforeToTheUnitsInWhichTheyAreStored) {
   { const Store store(path_); }
   const DatabaseHandle now = opened(path_);
   const DatabaseHandle then = opened(before_);
+  std::vector<std::string> columns{"tolerance", "dt"};
+  std::string list = "tolerance, dt";
   Statement names(then.get(), "SELECT name FROM pragma_table_info('results')");
-  std::string columns = "tolerance, dt";
   while (names.step()) {
     if (names.text(0) != "checksum") {
-      columns += ", results." + names.text(0);
+      columns.push_back(names.text(0));
+      list += ", results." + names.text(0);
     }
   }
   const std::string sql =
-      "SELECT " + columns + " FROM results JOIN models USING (model_id) ORDER BY study_id, point";
+      "SELECT " + list + " FROM results JOIN models USING (model_id) ORDER BY study_id, point";
   Statement rows(now.get(), sql);
   Statement rows_then(then.get(), sql);
   int count = 0;
   while (rows_then.step()) {
     ASSERT_TRUE(rows.step());
-    ++count;
-    const double finest = rows_then.real(1) > 0.0 ? 1e-14 : rows_then.real(0) / 100.0;
-    for (int column = 2; column < rows_then.columns(); ++column) {
-      const std::string what =
-          "row " + std::to_string(count) + ", column " + std::to_string(column);
-      ASSERT_EQ(rows.type(column), rows_then.type(column)) << what;
+    const StoredDigits digits = digits_of(rows_then, columns);
+    SCOPED_TRACE("row " + std::to_string(++count));
+    for (int column = 0; column < rows_then.columns(); ++column) {
+      const std::string& name = columns[static_cast<std::size_t>(column)];
+      SCOPED_TRACE(name);
+      ASSERT_EQ(rows.type(column), rows_then.type(column));
       const std::string text = rows_then.text(column);
       if (text.starts_with("[[")) {
-        expect_same_list(rows.text(column), text, finest, what);
+        expect_same_list(rows.text(column), text, name, digits);
       } else if (rows.type(column) == SQLITE_FLOAT) {
-        const double value = rows_then.real(column);
-        EXPECT_NEAR(rows.real(column), value, finest * std::max(1.0, std::abs(value))) << what;
+        expect_as_stored(rows.real(column), rows_then.real(column), name, digits);
       } else {
-        EXPECT_EQ(rows.text(column), text) << what;
+        EXPECT_EQ(rows.text(column), text);
       }
     }
   }
