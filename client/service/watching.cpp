@@ -44,6 +44,16 @@ void tell_failures(const protocol::StudyStatus& status,
   }
 }
 
+/// The study of that name, the only one that was found at `place`.
+template <class Studies>
+protocol::StudyStatus only_one(const Studies& found, const std::string& name,
+                               const std::string& place) {
+  if (found.size() != 1) {
+    throw std::runtime_error(fmt::format("there is no study called \"{}\" in {}", name, place));
+  }
+  return *found.begin();
+}
+
 }  // namespace
 
 void tell_line(const std::string& sentence) {
@@ -81,12 +91,11 @@ protocol::StudyStatus watch_study(const AskStatus& ask, protocol::StopSignals& s
 }
 
 protocol::StudyStatus study_named(Source& source, const std::string& name, const Tell& tell) {
-  const auto found = source.status(name, tell);
-  if (found.size() != 1) {
-    throw std::runtime_error(
-        fmt::format("there is no study called \"{}\" in {}", name, source.place()));
-  }
-  return found.front();
+  return only_one(source.status(name, tell), name, source.place());
+}
+
+protocol::StudyStatus study_named(Connection& connection, const std::string& name) {
+  return only_one(connection.status(name).studies(), name, connection.url());
 }
 
 protocol::StudyStatus WatchedStudy::ask(const Tell& tell) {

@@ -23,9 +23,10 @@ protocol::StudyStatus watch_study(const AskStatus& ask, protocol::StopSignals& s
 /// Writes one line to standard error, whatever is in it.
 void tell_line(const std::string& sentence);
 
-/// The one study of that name in an answer to a status question. Given a `tell`, waits for a server
-/// that is away.
+/// The one study of that name in an answer to a status question; std::runtime_error where there is
+/// none. Given a `tell`, waits for a server that is away.
 protocol::StudyStatus study_named(Source& source, const std::string& name, const Tell& tell = {});
+protocol::StudyStatus study_named(Connection& connection, const std::string& name);
 
 /// Asks for one study again and again: by name first, then by its number, so that it is found under
 /// another name too. Throws as `study_named`.

@@ -172,6 +172,12 @@ protocol::Recipe recipe_of_flags(const PointFlags& flags, const ReachCheck& chec
   return recipe;
 }
 
+protocol::PointTable points_of_flags(const PointFlags& flags, const ReachCheck& check_reach) {
+  protocol::PointTable table(recipe_of_flags(flags, check_reach));
+  judge_points(table, [&flags](const std::string& sentence) { return with_flag(flags, sentence); });
+  return table;
+}
+
 std::string with_flag(const PointFlags& flags, const std::string& sentence) {
   return flag_named_by(flags, sentence) + sentence;
 }

@@ -8,6 +8,7 @@
 
 #include "client/study/reach.h"
 #include "proto/oblique.pb.h"
+#include "proto/recipe/point_table.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::client {
@@ -30,8 +31,13 @@ enum class FlagValues { kOne, kMany };
 void add_point_flags(CLI::App& verb, PointFlags& flags, FlagValues values);
 
 /// The recipe of all flags together, judged as study files are, also by `check_reach`. Model keys
-/// with one value shape the model; with several they are axes. Throws InputError.
+/// with one value shape the model; with several they are axes. Throws InputError. What only its
+/// points tell, as of an expression, is not judged yet.
 protocol::Recipe recipe_of_flags(const PointFlags& flags, const ReachCheck& check_reach);
+
+/// The points of that recipe, for whoever solves them here: what only they tell is judged too, as
+/// `judge_points` does. Throws InputError.
+protocol::PointTable points_of_flags(const PointFlags& flags, const ReachCheck& check_reach);
 
 /// The sentence about the points, with the flag that it speaks of before it, as that was typed.
 std::string with_flag(const PointFlags& flags, const std::string& sentence);

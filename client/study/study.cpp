@@ -2,7 +2,6 @@
 
 #include <charconv>
 
-#include "proto/recipe/point_table.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::client {
@@ -26,16 +25,20 @@ Subject subject_of(std::string_view sentence) {
   return {block - 1, sentence.substr(0, sentence.find_first_of(" :"))};
 }
 
+bool judge_points(protocol::PointTable& table, const Located& located,
+                  const std::function<bool()>& goes_on) {
+  try {
+    return !table.needs_survey() || table.survey(goes_on);
+  } catch (const solver::InputError& error) {
+    throw solver::InputError(located ? located(error.what()) : error.what());
+  }
+}
+
 void judge_points(const Study& study) {
   constexpr std::uint64_t kMostJudged = 10'000'000;
   protocol::PointTable table(study.recipe);
-  if (!table.needs_survey() || table.size() > kMostJudged) {
-    return;
-  }
-  try {
-    table.survey([] { return true; });
-  } catch (const solver::InputError& error) {
-    throw solver::InputError(study.located ? study.located(error.what()) : error.what());
+  if (table.size() <= kMostJudged) {
+    judge_points(table, study.located);
   }
 }
 

@@ -57,7 +57,6 @@ Study study_of_flags(const StudyFlags& flags, const ReachCheck& check_reach) {
   } else {
     study = read_study_file(flags.file, check_reach);
   }
-  judge_points(study);
   study.recipe.set_errors(study.recipe.errors() || flags.errors);
   if (flags.file.empty()) {
     study.name = name_of_recipe(study.recipe);

@@ -24,7 +24,7 @@ struct StudyFlags {
 void add_study_flags(CLI::App& verb, StudyFlags& flags);
 
 /// Throws InputError when both a file and flags say what the points are, or none, and for what
-/// either says wrong, `check_reach` included.
+/// either says wrong, `check_reach` included. What only its points tell is left to `judge_points`.
 Study study_of_flags(const StudyFlags& flags, const ReachCheck& check_reach);
 
 /// "sweep-" and the first eight digits of the recipe's digest (proto/recipe/canonical.h), so that

@@ -19,7 +19,6 @@
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
 #include "proto/program/usage.h"
-#include "proto/recipe/point_table.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {
@@ -60,6 +59,11 @@ std::vector<ContactPoint> points_of(const protocol::PointTable& table) {
     points.push_back({point.H_m, point.mu, point.e_star});
   }
   return points;
+}
+
+/// That of the first point that is left in.
+solver::ModelParameters first_model(const protocol::PointTable& table) {
+  return table.model(table.point(table.first_left_in(0, table.size())).model);
 }
 
 void tell_levels(const char* what, const std::vector<Level>& levels) {
@@ -122,7 +126,7 @@ int converge(const ConvergeFlags& flags, const protocol::PointTable& table, Work
         flags.halvings, kMostHalvings));
   }
   constexpr int kFinest = 32;
-  const auto model = table.model(0);
+  const auto model = first_model(table);
   const int coarsest = flags.coarsest == 0 ? kCoarsest : flags.coarsest;
   const int finest = flags.finest == 0 ? std::max(kFinest, 4 * coarsest) : flags.finest;
   const auto meshes = mesh_levels(model, coarsest, finest);
@@ -157,7 +161,7 @@ int mesh_study(const ConvergeFlags& flags, const protocol::PointTable& table, Wo
   const auto points = points_of(table);
   const int coarsest = flags.coarsest == 0 ? kStudyCoarsest : flags.coarsest;
   const int finest = flags.finest == 0 ? std::max(kStudyFinest, 4 * coarsest) : flags.finest;
-  const auto meshes = mesh_levels(table.model(0), coarsest, finest);
+  const auto meshes = mesh_levels(first_model(table), coarsest, finest);
   tell_levels("mesh", meshes);
   const auto levels = solved(meshes, points, line);
   std::vector<Refinement> refinements;
@@ -200,10 +204,10 @@ int converge_of_flags(ConvergeFlags flags) {
     flags.points.axes.try_emplace("mu", "0.1,0.4,0.8,1.2,1.6");
     flags.points.axes.try_emplace("e", "1,0.6");
   }
-  const protocol::PointTable table(recipe_of_flags(flags.points, tip_reach()));
+  const auto table = points_of_flags(flags.points, tip_reach());
   WorkLine line;
   if (flags.step_study) {
-    return step_study_around(table.model(0), flags.json ? Format::kJson : Format::kTable, line);
+    return step_study_around(first_model(table), flags.json ? Format::kJson : Format::kTable, line);
   }
   return flags.mesh_study ? mesh_study(flags, table, line) : converge(flags, table, line);
 }

@@ -81,7 +81,7 @@ int delete_study(const DeleteFlags& flags) {
   protocol::StudyStatus study;
   if (database.empty()) {
     Connection connection(connection_settings(flags.source));
-    study = connection.status(flags.study).studies(0);
+    study = study_named(connection, flags.study);
     if (asks && !is_confirmed(study, connection.url())) {
       std::cerr << "Nothing is deleted.\n";
       return kFailed;

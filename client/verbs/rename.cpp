@@ -36,10 +36,7 @@ int rename(const RenameFlags& flags) {
   const std::string database = database_meant(flags.source);
   if (database.empty()) {
     Connection connection(connection_settings(flags.source));
-    const auto found = connection.status(flags.study);
-    if (found.studies_size() == 1) {
-      connection.rename(found.studies(0), flags.name);
-    }
+    connection.rename(study_named(connection, flags.study), flags.name);
   } else {
     const auto study = study_named(*open_source(flags.source), flags.study);
     server::rename_study(database, study.study_id(), flags.name);

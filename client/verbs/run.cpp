@@ -33,6 +33,7 @@ struct RunFlags {
 
 int run(const RunFlags& flags) {
   const auto study = study_of_flags(flags.study, tip_reach());
+  judge_points(study);
   check_settings(flags.settings);
   tell_mesh(std::cerr, study.recipe);
   tell_unjudged(std::cerr, study.recipe);

@@ -13,7 +13,6 @@
 #include "client/verbs/solve_here.h"
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
-#include "proto/recipe/point_table.h"
 #include "worker/solver/solve.h"
 
 namespace oblique::client {
@@ -75,7 +74,7 @@ void check_one_value_each(const PointFlags& flags) {
 
 int solve(const SolveFlags& flags) {
   check_one_value_each(flags.points);
-  const protocol::PointTable table(recipe_of_flags(flags.points, tip_reach()));
+  const auto table = points_of_flags(flags.points, tip_reach());
   check_one_point(table);
   const auto point = table.point(0);
   const solver::Finger finger(table.model(0));

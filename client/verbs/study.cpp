@@ -79,15 +79,13 @@ struct Report {
   std::optional<SolvingRate> rate;
 };
 
-/// By the axes, not by the model: of length and length1 both have a value.
-ShownPoint shown_point(const protocol::PointTable& table, int block, std::uint64_t number) {
-  const auto& axes = table.recipe().blocks(block).axes();
-  protocol::BlockPoints points(protocol::from_message(table.recipe().model()),
-                               table.recipe().blocks(block));
-  points.go_to(number - table.block(static_cast<std::size_t>(block)).first_point);
+/// The point that was gone to, by the axes, not by the model: of length and length1 both have a
+/// value.
+ShownPoint shown_point(const protocol::Block& block, const protocol::BlockPoints& points,
+                       std::uint64_t number) {
   ShownPoint shown{number, {}};
-  for (int i = 0; i < axes.size(); ++i) {
-    shown.values.emplace_back(axes[i].key(), points.values()[static_cast<std::size_t>(i)]);
+  for (int i = 0; i < block.axes_size(); ++i) {
+    shown.values.emplace_back(block.axes(i).key(), points.values()[static_cast<std::size_t>(i)]);
   }
   return shown;
 }
@@ -114,14 +112,19 @@ std::string made_of(const protocol::Block& block) {
 BlockReport report_of_block(const protocol::PointTable& table, int number) {
   const protocol::Block& block = table.recipe().blocks(number);
   const auto& place = table.block(static_cast<std::size_t>(number));
-  const std::uint64_t end = place.first_point + place.points;
-  const std::uint64_t first = table.first_left_in(place.first_point, end);
-  std::uint64_t last = end - 1;
-  while (last > first && !table.is_left_in(last)) {
+  const auto base = protocol::from_message(table.recipe().model());
+  protocol::BlockPoints points(base, block);  // of its own: nearly all numbers may be gone through
+  std::uint64_t first = 0;
+  for (points.go_to(first); first + 1 < place.points && !points.is_left_in(); points.go_to(first)) {
+    ++first;
+  }
+  const auto shown_first = shown_point(block, points, place.first_point + first);
+  std::uint64_t last = place.points - 1;
+  for (points.go_to(last); last > first && !points.is_left_in(); points.go_to(last)) {
     --last;
   }
   return {place, block.has_points_left_in() ? block.points_left_in() : place.points, made_of(block),
-          shown_point(table, number, first), shown_point(table, number, last)};
+          shown_first, shown_point(block, points, place.first_point + last)};
 }
 
 /// What the study takes in a database. Points that a filter leaves out bring no model.
@@ -254,12 +257,7 @@ std::optional<int> survey(const Study& study, protocol::PointTable& table) {
   protocol::StopSignals stop;
   WorkLine line;
   const auto counting = line.begin("looking at every point");
-  bool is_done = false;
-  try {
-    is_done = table.survey([&stop] { return !stop.requested(); });
-  } catch (const solver::InputError& error) {
-    throw solver::InputError(study.located(error.what()));
-  }
+  const bool is_done = judge_points(table, study.located, [&stop] { return !stop.requested(); });
   return is_done ? std::nullopt : std::optional(stop.exit_code());
 }
 

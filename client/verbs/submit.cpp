@@ -110,6 +110,7 @@ void check(const StudyTerms& terms) {
 int submit(const SubmitFlags& flags) {
   check(flags.terms);
   const auto study = study_of_flags(flags.study, tip_reach());
+  judge_points(study);
   protocol::StopSignals stop;
   const auto server = connection_settings(flags.source);
   Connection connection(server, [&stop] { return !stop.requested(); });

@@ -88,6 +88,20 @@ TEST(PointFlags, TakeDistributionsInSamplesAndExpressions) {
   EXPECT_FALSE(block.axes(3).distribution().has_to());
 }
 
+TEST(PointFlags, WhosePointsAreSolvedHereAreJudgedByTheirPoints) {
+  EXPECT_EQ(points_of_flags(flags_of({{"k", "1e7*mu"}}), pretended_reach()).model(0).k_N_m, 4e6);
+  for (const auto& [key, text] :
+       {std::pair{"k", "0-mu"}, {"H", "4*mu"}, {"mu", "log(0-H)"}, {"e", "2*mu*H+1"}}) {
+    try {
+      points_of_flags(flags_of({{key, text}}), pretended_reach());
+      ADD_FAILURE() << key;
+    } catch (const solver::InputError& error) {
+      const std::string start = std::string("--") + key + " " + text + ": point 0: " + key + " = ";
+      EXPECT_TRUE(std::string(error.what()).starts_with(start)) << error.what();
+    }
+  }
+}
+
 TEST(PointFlags, TakeAxesSideBySide) {
   auto flags = flags_of({{"H", "0.5,0.6"}, {"mu", "0.4,0.4"}, {"length2", "0.3,0.4"}});
   flags.zip = true;

@@ -48,5 +48,18 @@ TEST(StudyFlags, AskForErrorsOfPointsAndOfFiles) {
   EXPECT_TRUE(study_of_flags(flags, pretended_reach()).recipe.errors());
 }
 
+TEST(StudyFlags, LeaveWhatOnlyPointsTellToWhoeverHasThemSolved) {
+  StudyFlags flags;
+  flags.points = flags_of({{"k", "0-mu"}});
+  const auto study = study_of_flags(flags, pretended_reach());
+  try {
+    judge_points(study);
+    FAIL();
+  } catch (const solver::InputError& error) {
+    EXPECT_TRUE(std::string(error.what()).starts_with("--k 0-mu: point 0: k = -0.4 N/m is not"))
+        << error.what();
+  }
+}
+
 }  // namespace
 }  // namespace oblique::client

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <fstream>
+#include <regex>
 #include <sstream>
 #include <string>
 #include <utility>
@@ -49,6 +50,21 @@ TEST(CommandLine, AnswersWrongUsageWithExitCodeTwoAndASentence) {
       {{"run", "--H", "1.19", "--mu", "0.4", "--e", "1"}, "1.179156"},
       {{"submit", "--H", "1.19", "--mu", "0.4", "--e", "1"}, "1.179156"},
       {{"converge", "--H", "1.19", "--mu", "0.4", "--e", "1"}, "1.179156"},
+      {{"solve", "--H", "1", "--mu", "0.4", "--e", "1", "--k", "0-mu"},
+       "--k 0-mu: point 0: k = -0.4 N/m is not allowed"},
+      {{"solve", "--H", "1", "--mu", "log(0-H)", "--e", "1"}, "mu = nan is not allowed"},
+      {{"solve", "--H", "4*mu", "--mu", "0.4", "--e", "1"}, "--H 4*mu: point 0: H = 1.6 m"},
+      {{"converge", "--H", "1", "--mu", "0.4", "--e", "1", "--k", "0-mu"},
+       "--k 0-mu: point 0: k = -0.4 N/m is not allowed"},
+      {{"converge", "--mesh-study", "--k", "mu-1"}, "k = -0.9 N/m is not allowed"},
+      {{"converge", "--H", "1", "--mu", "0.4,0.6", "--e", "1", "--where", "mu > 1"},
+       "leaves no point in"},
+      {{"run", "--H", "1", "--mu", "0.4", "--e", "1", "--k", "0-mu"},
+       "--k 0-mu: point 0: k = -0.4 N/m is not allowed"},
+      {{"submit", "--H", "1", "--mu", "0.4", "--e", "1", "--k", "0-mu"},
+       "--k 0-mu: point 0: k = -0.4 N/m is not allowed"},
+      {{"study", "check", "--H", "1", "--mu", "0.4", "--e", "1", "--k", "0-mu"},
+       "--k 0-mu: point 0: k = -0.4 N/m is not allowed"},
       {{"submit", "--H", "1", "--mu", "0.4", "--e", "1", "--priority", "1001"},
        "--priority: priority = 1001 is not allowed"},
       {{"submit", "--H", "1", "--mu", "0.4", "--e", "1", "--weight", "0"},
@@ -139,6 +155,18 @@ TEST(CommandLine, SolvesOnePointAsOneJsonObject) {
   EXPECT_EQ(json["mode"], "sC sR sC sR sC sR");
   EXPECT_NEAR(json["fn_peak_N"], 5057.63, 0.15);
   EXPECT_EQ(json["major_peaks_N"].size(), 3U);
+}
+
+TEST(CommandLine, ConvergesWithTheModelOfThePointThatItsFilterLeavesIn) {
+  const auto converged = [](const std::vector<std::string>& more) {
+    std::vector<std::string> words{"converge", "--H",        "0.9", "--mu",     "0.4", "--e",
+                                   "1",        "--coarsest", "1",   "--finest", "4",   "--json"};
+    words.insert(words.end(), more.begin(), more.end());
+    const auto outcome = test::run_oblique(words);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return std::regex_replace(outcome.out, std::regex("\"wall_s\": [^,]*,"), "");
+  };
+  EXPECT_EQ(converged({"--k", "1e7,2e7", "--where", "k > 1.5e7"}), converged({"--k", "2e7"}));
 }
 
 TEST(CommandLine, SaysOnceAndBesideTheDataThatThePublishedMeshIsNotConverged) {

@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/client/service/scripted_server.h"
 #include "tests/support/programs.h"
 #include "tests/support/temporary_folder.h"
 
@@ -88,6 +89,23 @@ TEST_F(StudyCareVerbs, AStudyIsDeletedWhenSomebodySaysYes) {
   EXPECT_EQ(ask({"check"}).exit_code, 0);
   EXPECT_EQ(ask({"delete", "friction", "--yes"}).exit_code, 1);
   EXPECT_EQ(run_study(2).exit_code, 0) << "the name is free";
+}
+
+TEST_F(StudyCareVerbs, OfAServerThatDoesNotKnowTheStudyFailAndSayWhichIsNotThere) {
+  const ScriptedServer server([](const protocol::ClientRequest& request) {
+    EXPECT_TRUE(request.has_status()) << "nothing is changed";
+    auto reply = reply_to(request);
+    reply.mutable_status();
+    return std::vector{protocol::encode(reply)};
+  });
+  for (const auto& words : std::vector<std::vector<std::string>>{
+           {"rename", "friction", "slip", "--server", server.url()},
+           {"delete", "friction", "--yes", "--server", server.url()}}) {
+    const auto outcome = ask(words);
+    EXPECT_EQ(outcome.exit_code, 1) << words[0];
+    EXPECT_EQ(outcome.out, "") << words[0];
+    EXPECT_THAT(outcome.err, HasSubstr("no study called \"friction\" in " + server.url()));
+  }
 }
 
 }  // namespace

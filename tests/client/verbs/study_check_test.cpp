@@ -36,6 +36,19 @@ TEST(StudyCheck, SaysPointsBlocksModelsFallsTimeAndSize) {
   EXPECT_GT(json["bytes"], 0.0);
 }
 
+TEST(StudyCheck, ShowsTheFirstAndTheLastPointThatItsFilterLeavesIn) {
+  const auto outcome =
+      test::run_oblique({"study", "check", "--json", "--no-rate", "--H", "0.9", "--mu", "0.1:1:10",
+                         "--e", "1", "--where", "(mu - 0.45)^2 < 0.03"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const auto block = nlohmann::json::parse(outcome.out)["blocks"][0];
+  EXPECT_EQ(block["points"], 4);
+  EXPECT_EQ(block["first"]["point"], 2);
+  EXPECT_DOUBLE_EQ(block["first"]["mu"], 0.3);
+  EXPECT_EQ(block["last"]["point"], 5);
+  EXPECT_DOUBLE_EQ(block["last"]["mu"], 0.6);
+}
+
 // 3 lengths x 5 areas are 15 fingers that fall alike for two values of mu.
 TEST(StudyCheck, CountsModelsAndTheFallsThatTheyShare) {
   const auto check = [](const std::vector<std::string>& more) {
