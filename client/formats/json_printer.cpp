@@ -3,7 +3,6 @@
 #include <utility>
 
 #include "client/formats/cell_text.h"
-#include "client/formats/packed_columns.h"
 #include "proto/wire/chunk_rows.h"
 
 namespace oblique::client {
@@ -11,10 +10,9 @@ namespace oblique::client {
 void JsonPrinter::begin(const protocol::QueryReply& chunk) {
   const std::vector<std::string> names = distinct_names(chunk);
   for (std::size_t i = 0; i < names.size(); ++i) {
-    Key key{chunk.columns(static_cast<int>(i)), i > 0 ? "," : "", false};
+    Key key{i > 0 ? "," : "", packed_list(chunk.columns(static_cast<int>(i)))};
     append_json_text(key.text, names[i]);
     key.text += ':';
-    key.is_packed = is_packed(key.column);
     keys_.push_back(std::move(key));
   }
   if (shape_ == Shape::kArray) {
@@ -33,8 +31,7 @@ void JsonPrinter::append_value(std::string& out, const Key& key, const protocol:
       append_json_real(out, cell.real);
       break;
     case CellKind::kText:
-      if (const auto list =
-              key.is_packed ? unpacked(key.column, std::string(cell.text)) : std::nullopt) {
+      if (const auto list = key.packed ? unpacked(*key.packed, cell.text) : std::nullopt) {
         // Nothing that a terminal would act on is left.
         out += list->dump(-1, ' ', true, nlohmann::ordered_json::error_handler_t::replace);
       } else {

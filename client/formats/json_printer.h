@@ -1,8 +1,10 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "client/formats/packed_columns.h"
 #include "client/formats/row_printer.h"
 #include "proto/wire/cell.h"
 
@@ -20,9 +22,8 @@ class JsonPrinter : public RowPrinter {
 
  private:
   struct Key {
-    std::string column;
     std::string text;  // as it stands before each value: "name":
-    bool is_packed;
+    std::optional<PackedList> packed;
   };
 
   void begin(const protocol::QueryReply& chunk);

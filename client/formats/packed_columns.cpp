@@ -1,7 +1,6 @@
 #include "client/formats/packed_columns.h"
 
 #include <algorithm>
-#include <span>
 #include <utility>
 
 #include "worker/solver/model/result_fields.h"
@@ -11,23 +10,6 @@ namespace {
 
 using nlohmann::ordered_json;
 using Members = std::span<const std::string_view>;
-
-/// What the values of an element of a packed column are called; none: elements have no names.
-/// Nothing for columns that pack no list.
-std::optional<Members> members_of(std::string_view column) {
-  const auto* list = solver::find_result_list(column);
-  bool is_part = false;
-  if (const auto* field = solver::find_result_column(column)) {
-    if (const auto* part = std::get_if<solver::ListPart>(&field->value)) {
-      list = part->list;
-      is_part = !part->member.empty();
-    }
-  }
-  if (list != nullptr) {
-    return list->has_names && !is_part ? list->members : Members();
-  }
-  return column == "lengths_m" ? std::optional(Members()) : std::nullopt;
-}
 
 bool is_plain(const ordered_json& value) {
   return value.is_primitive();
@@ -58,21 +40,28 @@ std::optional<ordered_json> named(const ordered_json& list, Members members) {
 
 }  // namespace
 
-bool is_packed(std::string_view column) {
-  return members_of(column).has_value();
+std::optional<PackedList> packed_list(std::string_view column) {
+  const auto* list = solver::find_result_list(column);
+  bool is_part = false;
+  if (const auto* field = solver::find_result_column(column)) {
+    if (const auto* part = std::get_if<solver::ListPart>(&field->value)) {
+      list = part->list;
+      is_part = !part->member.empty();
+    }
+  }
+  if (list != nullptr) {
+    return PackedList{list->has_names && !is_part ? list->members : Members()};
+  }
+  return column == "lengths_m" ? std::optional(PackedList()) : std::nullopt;
 }
 
-std::optional<ordered_json> unpacked(std::string_view column, const std::string& text) {
-  const auto members = members_of(column);
-  if (!members) {
-    return std::nullopt;
-  }
-  auto list = ordered_json::parse(text, nullptr, false);
+std::optional<ordered_json> unpacked(const PackedList& packed, std::string_view text) {
+  auto list = ordered_json::parse(text.begin(), text.end(), nullptr, false);
   if (list.is_discarded() || !is_list(list)) {
     return std::nullopt;
   }
-  if (!members->empty()) {
-    return named(list, *members);
+  if (!packed.members.empty()) {
+    return named(list, packed.members);
   }
   return std::optional<ordered_json>(std::in_place, std::move(list));
 }

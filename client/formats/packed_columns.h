@@ -1,19 +1,23 @@
 #pragma once
 
 #include <optional>
-#include <string>
+#include <span>
 #include <string_view>
 
 #include <nlohmann/json.hpp>
 
 namespace oblique::client {
 
-/// Whether queries' column of that name may pack a list.
-bool is_packed(std::string_view column);
+/// A list that a column packs.
+struct PackedList {
+  std::span<const std::string_view> members;  ///< of an element; empty: they have no names
+};
 
-/// The list that `text` of column `column` packs; elements with names become objects, as in
-/// `solve --json`. Nothing where the column of queries is not packed or the text is not such a
-/// list.
-std::optional<nlohmann::ordered_json> unpacked(std::string_view column, const std::string& text);
+/// What queries' column of that name packs; nothing where it packs no list.
+std::optional<PackedList> packed_list(std::string_view column);
+
+/// The list that `text` packs; elements with names become objects, as in `solve --json`. Nothing
+/// where the text is not such a list.
+std::optional<nlohmann::ordered_json> unpacked(const PackedList& packed, std::string_view text);
 
 }  // namespace oblique::client

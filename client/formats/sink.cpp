@@ -35,10 +35,10 @@ void write_all(int descriptor, std::string_view bytes, const std::string& name) 
 
 void Sink::flush() {
   // What cannot be written is not tried again.
-  const std::string bytes = std::exchange(held_, {});
+  std::string bytes = std::exchange(held_, {});
   write(bytes);
-  held_ = bytes;
-  held_.clear();
+  bytes.clear();
+  held_ = std::move(bytes);  // with its room
 }
 
 StandardOutput::StandardOutput() : is_terminal_(isatty(STDOUT_FILENO) == 1) {
@@ -48,7 +48,7 @@ StandardOutput::StandardOutput() : is_terminal_(isatty(STDOUT_FILENO) == 1) {
 void StandardOutput::write(std::string_view bytes) {
   constexpr const char* kName = "standard output";
   if (is_terminal_) {
-    write_all(STDOUT_FILENO, protocol::visible_lines(std::string(bytes)), kName);
+    write_all(STDOUT_FILENO, protocol::visible_lines(bytes), kName);
   } else {
     write_all(STDOUT_FILENO, bytes, kName);
   }

@@ -182,19 +182,25 @@ void TablePrinter::fit() {
 }
 
 void TablePrinter::print_cells(const std::vector<std::string>& cells, const std::string& end) {
-  std::string line;
+  std::string& out = sink_.held();
+  const std::size_t begin = out.size();
   for (std::size_t i = 0; i < cells.size(); ++i) {
-    if (columns_[i].is_left_out) {
+    const Column& column = columns_[i];
+    if (column.is_left_out) {
       continue;
     }
-    const std::size_t width = width_of(cells[i]);
-    const std::string padding(columns_[i].width - std::min(columns_[i].width, width), ' ');
-    line += i > 0 ? std::string(kGap, ' ') : "";
-    line += columns_[i].has_numbers ? padding + cells[i] : cells[i] + padding;
+    const std::size_t padding = column.width - std::min(column.width, width_of(cells[i]));
+    out.append(i > 0 ? kGap : 0, ' ');
+    out.append(column.has_numbers ? padding : 0, ' ');
+    out += cells[i];
+    out.append(column.has_numbers ? 0 : padding, ' ');
   }
-  line += end;
-  line.erase(line.find_last_not_of(' ') + 1);
-  sink_.append(line + '\n');
+  out += end;
+  while (out.size() > begin && out.back() == ' ') {
+    out.pop_back();
+  }
+  out += '\n';
+  sink_.flush_if_long();
 }
 
 void TablePrinter::print_line(const Line& line) {
@@ -265,33 +271,38 @@ void TablePrinter::end() {
   }
 }
 
+void MarkdownPrinter::append_cell(const std::string& text) {
+  std::string& out = sink_.held();
+  out += ' ';
+  for (const char letter : text) {
+    out += letter == '|' ? "\\|" : std::string_view(&letter, 1);
+  }
+  out += " |";
+}
+
 void MarkdownPrinter::print(const protocol::QueryReply& chunk) {
-  const auto cell_text = [](const std::string& text) {
-    std::string cell;
-    for (const char letter : text) {
-      cell += letter == '|' ? "\\|" : std::string(1, letter);
-    }
-    return " " + cell + " |";
-  };
+  std::string& out = sink_.held();
   protocol::ChunkRows rows(chunk);
   bool has_row = rows.next();
   if (!std::exchange(has_head_, true)) {
-    std::string header = "|";
+    out += '|';
     std::string rule = "|";
     for (int i = 0; i < chunk.columns_size(); ++i) {
+      const ShownColumn shown = shown_as(shown_, chunk, i);
       const CellKind kind = has_row ? rows.cell(static_cast<std::size_t>(i)).kind : CellKind::kText;
-      header += cell_text(protocol::visible(shown_as(shown_, chunk, i).heading));
+      append_cell(protocol::visible(shown.heading));
       rule += kind == CellKind::kInteger || kind == CellKind::kReal ? "---:|" : "---|";
+      per_unit_.push_back(shown.per_unit);
     }
-    sink_.append(header + '\n' + rule + '\n');
+    out += '\n' + rule + '\n';
   }
   for (; has_row; has_row = rows.next()) {
-    std::string line = "|";
-    for (int i = 0; i < chunk.columns_size(); ++i) {
-      line += cell_text(cell_in_unit(rows.cell(static_cast<std::size_t>(i)),
-                                     shown_as(shown_, chunk, i).per_unit));
+    out += '|';
+    for (std::size_t i = 0; i < rows.columns(); ++i) {
+      append_cell(cell_in_unit(rows.cell(i), per_unit_[i]));
     }
-    sink_.append(line + '\n');
+    out += '\n';
+    sink_.flush_if_long();
   }
 }
 

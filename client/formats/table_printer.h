@@ -62,8 +62,11 @@ class MarkdownPrinter : public RowPrinter {
   void end() override {}
 
  private:
+  void append_cell(const std::string& text);
+
   Sink& sink_;
   std::vector<ShownColumn> shown_;
+  std::vector<double> per_unit_;  // of the columns
   bool has_head_ = false;
 };
 

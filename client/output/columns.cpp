@@ -38,18 +38,4 @@ std::vector<ShownColumn> shown_columns(const protocol::QueryReply& chunk) {
   return shown;
 }
 
-protocol::QueryReply in_shown_units(protocol::QueryReply rows) {
-  for (int i = 0; i < rows.columns_size(); ++i) {
-    const auto shown = shown_column(rows.columns(i));
-    rows.set_columns(i, shown.heading);
-    for (auto& row : *rows.mutable_rows()) {
-      auto& value = *row.mutable_values(i);
-      if (value.has_real()) {
-        value.set_real(value.real() * shown.per_unit);
-      }
-    }
-  }
-  return rows;
-}
-
 }  // namespace oblique::client

@@ -3,8 +3,7 @@
 #include <string_view>
 #include <variant>
 
-#include "client/output/printer.h"
-#include "worker/solver/model/number.h"
+#include "client/formats/cell_text.h"
 
 namespace oblique::client {
 
@@ -20,7 +19,8 @@ void append_trace_header(std::string& text, const solver::TraceShape& shape) {
 void append_trace_row(std::string& text, const solver::TraceRow& row) {
   std::string_view separator;
   const auto put = [&](double value) {
-    text.append(separator).append(solver::exact_number(value));
+    text.append(separator);
+    append_number(text, value);
     separator = ",";
   };
   for (const auto& column : solver::trace_columns()) {
@@ -31,8 +31,8 @@ void append_trace_row(std::string& text, const solver::TraceRow& row) {
         put(value);
       }
     } else {
-      text.append(separator).append(
-          csv_field(row.*std::get<std::string solver::TraceRow::*>(column.value)));
+      text.append(separator);
+      append_csv_field(text, row.*std::get<std::string solver::TraceRow::*>(column.value));
     }
   }
   text += '\n';

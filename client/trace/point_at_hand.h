@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <string>
 
-#include "client/service/source.h"
 #include "proto/oblique.pb.h"
 #include "worker/solver/model/parameters.h"
 
@@ -20,9 +19,10 @@ struct PointAtHand {
   bool errors = false;  ///< its study wants estimated errors
 };
 
-/// The point as the recipe in a database says. Throws what the source throws, and
-/// std::runtime_error for a study that is not there and a point that it does not have.
-PointAtHand point_in(Source& source, const std::string& study, std::uint64_t point);
+/// The point as the recipe in a database file says. Throws as server::stored_recipe does, and
+/// std::runtime_error for a point that the study does not have.
+PointAtHand point_in(const std::string& database, const protocol::StudyStatus& study,
+                     std::uint64_t point);
 
 /// The point as a server says.
 PointAtHand point_of(const std::string& study, std::uint64_t point,

@@ -98,8 +98,8 @@ void print_first(const protocol::QueryReply& rows, std::uint64_t points) {
   if (rows.rows().empty()) {
     return;
   }
-  RowOutput out({.may_page = false});
-  out.print(protocol::as_chunk(in_shown_units(rows)));
+  RowOutput out({.may_page = false, .shown = shown_columns(rows)});
+  out.print(protocol::as_chunk(rows));
   out.finish();
   if (static_cast<std::uint64_t>(rows.rows_size()) < points) {
     std::cerr << fmt::format("The first {} of {} points are shown.\n",

@@ -139,7 +139,8 @@ void refuse_failed(const TraceFlags& flags, const std::optional<StoredRow>& stor
 
 int trace(const TraceFlags& flags) {
   const TraceFormat format = trace_format(flags.format, flags.out);
-  const bool is_file = !database_meant(flags.source).empty();
+  const std::string database = database_meant(flags.source);
+  const bool is_file = !database.empty();
   if (is_file && flags.on_worker) {
     throw solver::InputError(
         "--on-worker needs a server, and a database file is read here: name one with --server URL");
@@ -153,7 +154,7 @@ int trace(const TraceFlags& flags) {
   const bool is_here = is_file || flags.here;
   std::optional<PointAtHand> point;
   if (is_here) {
-    point = is_file ? point_in(*source, flags.study, number)
+    point = is_file ? point_in(database, study_named(*source, flags.study), number)
                     : point_at(*connection, flags.study, number);
   }
   const auto stored = stored_row(*source, flags.study, number);

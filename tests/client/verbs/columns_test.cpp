@@ -2,15 +2,16 @@
 
 #include <map>
 #include <set>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "client/formats/row_printer.h"
 #include "client/output/columns.h"
 #include "client/output/printer.h"
+#include "proto/wire/chunk_writer.h"
 #include "tests/support/programs.h"
 #include "tests/support/stored_numbers.h"
 
@@ -158,9 +159,12 @@ TEST(Columns, OfShortTimesAreShownInTheUnitsOfTheReport) {
   for (const double value : {0.000543704, 0.00114159, 0.001, 1.0, 0.000543704}) {
     add_value(row, value);
   }
-  std::ostringstream out;
-  print(out, in_shown_units(rows), Format::kTable);
-  EXPECT_EQ(out.str(),
+  TextSink out;
+  const auto printer = made_printer(Format::kTable, out, {.shown = shown_columns(rows)});
+  printer->print(protocol::as_chunk(rows));
+  printer->end();
+  out.finish();
+  EXPECT_EQ(out.text(),
             "duration_s [us]  slide_m [mm]  wall_s [ms]  H  max(duration_s)\n"
             "---------------  ------------  -----------  -  ---------------\n"
             "        543.704       1.14159            1  1      0.000543704\n");
