@@ -9,7 +9,4 @@ namespace oblique::test {
 /// What a program in Python prints that runs with `folder` as its current one; errors too.
 std::string said_by_python(const TemporaryFolder& folder, const std::string& program);
 
-/// Whether its NumPy is there.
-bool has_numpy(const TemporaryFolder& folder);
-
 }  // namespace oblique::test

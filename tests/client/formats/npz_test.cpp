@@ -18,11 +18,6 @@ using test::printed;
 
 class Npz : public testing::Test {
  protected:
-  void SetUp() override {
-    if (!oblique::test::has_numpy(folder_)) {
-      GTEST_SKIP() << "there is no python3-numpy here";
-    }
-  }
   /// What one prints who has loaded the archive of these chunks as `a`.
   std::string of(const std::vector<protocol::QueryReply>& chunks, const std::string& program) {
     std::ofstream(folder_.file("a.npz"), std::ios::binary) << printed(Format::kNpz, chunks);

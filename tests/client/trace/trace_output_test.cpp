@@ -33,11 +33,6 @@ std::vector<solver::TraceRow> made_up_rows(std::size_t count, const solver::Trac
 
 class TraceArchives : public testing::Test {
  protected:
-  void SetUp() override {
-    if (!oblique::test::has_numpy(folder_)) {
-      GTEST_SKIP() << "there is no python3-numpy here";
-    }
-  }
   void write(const std::vector<solver::TraceRow>& rows, const solver::TraceShape& shape,
              const std::string& name) {
     const std::string file = folder_.file(name);

@@ -76,7 +76,7 @@ std::string usage_of(const Verb& verb) {
   return verb.help.substr(at, verb.help.find('\n', at) - at);
 }
 
-/// A word for each argument that it must have.
+/// A word for each argument that it must have, and the flags that it must have.
 Words needed_words(const Verb& verb) {
   Words words;
   std::istringstream usage(usage_of(verb).substr(std::string("Usage: oblique").size()));
@@ -86,6 +86,12 @@ Words needed_words(const Verb& verb) {
     if (skipped++ >= verb.words.size() && word.front() != '[' && word != "SUBCOMMAND") {
       words.push_back(word == "ENGINE" ? "slurm" : "1");
     }
+  }
+  const std::regex line("\n  (--[a-z0-9-]+) ([A-Z]+) REQUIRED");
+  for (std::sregex_iterator found(verb.help.begin(), verb.help.end(), line), end; found != end;
+       ++found) {
+    words.push_back((*found)[1]);
+    words.emplace_back((*found)[2] == "ROLE" ? "client" : "1");
   }
   return words;
 }
@@ -130,7 +136,8 @@ TEST(EveryVerb, CanBeQuietOrVerboseAndNotBoth) {
     EXPECT_THAT(verb.help, HasSubstr("\n  --quiet")) << PrintToString(verb.words);
     EXPECT_THAT(verb.help, HasSubstr("\n  --verbose")) << PrintToString(verb.words);
     if (listed_in(verb.help).empty()) {
-      expect_wrong_usage(with(with(verb.words, needed_words(verb)), {"--quiet", "--verbose"}), "");
+      expect_wrong_usage(with(with(verb.words, needed_words(verb)), {"--quiet", "--verbose"}),
+                         "--quiet and --verbose want opposite things");
     }
   }
 }
