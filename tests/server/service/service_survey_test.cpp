@@ -206,7 +206,7 @@ TEST(RequestReaderSurveyTest, ALongSurveyHoldsUpNoOtherRequest) {
 }
 
 TEST(RequestReaderSurveyTest, ASurveyThatIsCancelledIsNotEnded) {
-  constexpr std::uint64_t kPoints = 500'001;
+  constexpr std::uint64_t kPoints = 2'000'001;
   Reports reports;
   RequestReader reader([&](ReadReport report) { reports.put(std::move(report)); });
   // By turns the first of two that take as long would come to its end first.
