@@ -196,6 +196,20 @@ TEST_F(ReaderTest, TheStatusOfStudiesIsDerivedFromTheRows) {
   EXPECT_THROW(Reader(path_).study_status("c"), QueryError);
 }
 
+TEST_F(ReaderTest, EachStudyHasThePointsThatItTookOver) {
+  execute(open_database(path_, SQLITE_OPEN_READWRITE).get(),
+          "INSERT INTO origins VALUES (7, 'x'), (8, 'y');"
+          "INSERT INTO taken_points VALUES (1, 7, 1), (1, 8, 2), (2, 8, 5)");
+  const auto all = Reader(path_).study_status();
+  ASSERT_EQ(all.size(), 2U);
+  EXPECT_EQ(all[0].taken().points(), 3U);
+  ASSERT_EQ(all[0].taken().from_size(), 2);
+  EXPECT_EQ(all[0].taken().from(0).study(), "y");
+  EXPECT_EQ(all[1].taken().points(), 5U);
+  ASSERT_EQ(all[1].taken().from_size(), 1);
+  EXPECT_EQ(all[1].taken().from(0).study(), "y");
+}
+
 TEST_F(ReaderTest, AStudyWithAllItsRowsIsDone) {
   {
     Store store(path_);
