@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numeric>
 #include <string>
 
+#include "worker/solver/contact/contact.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
 #include "worker/solver/motion/pefrl.h"
@@ -51,6 +54,13 @@ double chosen_fall_s(const Chain& chain, const ModelParameters& model) {
   return longest_s * std::min(fraction, StepChoice::kLongestFraction);
 }
 
+/// Step in which the tip, fallen by about the chain's length, moves by less than rounding of its
+/// position.
+double rounding_step_s(const ModelParameters& model) {
+  const double length_m = std::accumulate(model.lengths_m.begin(), model.lengths_m.end(), 0.0);
+  return std::numeric_limits<double>::epsilon() * std::sqrt(length_m / model.g_m_s2);
+}
+
 double link_mass_kg(const ModelParameters& model) {
   return model.rho_kg_m3 * model.A_m2 * model.lengths_m.back() + model.tip_mass_kg;
 }
@@ -82,6 +92,7 @@ StepChoice::StepChoice(const Chain& chain, const ModelParameters& model)
       compression_limit_s_(limit_s(chain, stiffest_N_m(model))),
       chosen_contact_s_(chosen_contact_s(model, tip_inertia_kg_, compression_limit_s_)),
       step_factor_(model.step_factor),
+      rounding_step_s_(rounding_step_s(model)),
       fall_s_(chosen_fall_s(chain, model)) {}
 
 ContactSteps StepChoice::contact_limits(double e_star) const {
@@ -101,8 +112,24 @@ ContactSteps StepChoice::stable(const ContactSteps& steps, double e_star) const 
           std::min(steps.restitution_s, longest_s / slower)};
 }
 
+void StepChoice::check_can_end(double step_s) const {
+  if (step_s < rounding_step_s_) {
+    throw SolveError("steps of " + readable_number(step_s) +
+                     " s in contact are too short: the tip moves by less than rounding in them; a "
+                     "longer dt is needed or, with dt = 0, a smaller k (k = " +
+                     exact_number(k_N_m_) + " N/m here)");
+  }
+  const double shortest_s = kShortestContact * std::sqrt(tip_inertia_kg_ / k_N_m_);
+  if (step_s * static_cast<double>(Contact::kMostSteps) < shortest_s) {
+    throw SolveError("the contact would take more than " + std::to_string(Contact::kMostSteps) +
+                     " steps of " + readable_number(step_s) +
+                     " s: dt must be longer (0 chooses a step)");
+  }
+}
+
 ContactSteps StepChoice::contact(double e_star) const {
   ContactSteps steps = single_contact(e_star);
+  check_can_end(steps.compression_s);
   if (step_factor_ == 1.0) {
     return steps;
   }

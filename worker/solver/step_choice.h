@@ -38,19 +38,26 @@ class StepChoice {
   /// Compression, which is as fast at any e*, has shorter steps only for the vibrations that
   /// restitution leaves in it: no shorter ones than for this e*.
   static constexpr double kFastestForCompression = 0.05;
+  /// No contact is shorter than this times sqrt(inertia of the tip/k): compression alone takes a
+  /// quarter of the period, pi/2 of it.
+  static constexpr double kShortestContact = 0.1;
 
   /// Throws InputError when model.dt_fall_s is above its limit.
   StepChoice(const Chain& chain, const ModelParameters& model);
 
   double fall_s() const { return fall_s_; }
   /// Steps in a contact with restitution e_star. Throws InputError when model.dt_s is above its
-  /// limit, SolveError when e_star is below kSmallestRestitution. The model's step factor counts.
+  /// limit, SolveError when e_star is below kSmallestRestitution and when steps are so short that
+  /// the contact could never end with them. The model's step factor counts.
   ContactSteps contact(double e_star) const;
   /// Longest stable steps of the explicit integrator in such a contact. In restitution the tip is
   /// held by k/e*^2.
   ContactSteps contact_limits(double e_star) const;
 
  private:
+  /// Throws SolveError where steps of step_s in compression cannot bring a contact to its end:
+  /// sooner than by taking Contact::kMostSteps of them.
+  void check_can_end(double step_s) const;
   /// Steps before the step factor counts.
   ContactSteps single_contact(double e_star) const;
   /// `steps`, at most kLongestFraction of the stability limit in such a contact.
@@ -65,6 +72,7 @@ class StepChoice {
   double compression_limit_s_;  ///< of the explicit integrator
   double chosen_contact_s_;     ///< by the tolerance alone, where restitution is not fast
   double step_factor_;
+  double rounding_step_s_;  ///< shorter ones do not move the tip
   double fall_s_;
 };
 

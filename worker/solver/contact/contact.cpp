@@ -178,7 +178,8 @@ void Contact::accept(const TipState& end, const ContactIntegrals<double>& integr
   }
   if (steps_ > kMostSteps) {
     throw SolveError("the contact takes more than " + std::to_string(kMostSteps) + " steps of " +
-                     readable_number(full_step_s()) + " s");
+                     readable_number(full_step_s()) +
+                     " s: a longer dt, a looser tolerance or a smaller k takes fewer");
   }
 }
 

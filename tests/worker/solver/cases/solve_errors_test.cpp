@@ -116,6 +116,31 @@ TEST(SolveErrors, MagnitudesBeyondNumbersAreAnErrorInBoundedTime) {
               HasSubstr("more than 1e+09 steps"));
 }
 
+TEST(SolveErrors, StepsTooShortForAnyContactFailAtOnce) {
+  const auto error = [](const std::function<void(ModelParameters&)>& change) {
+    ModelParameters model = coarse_model();
+    change(model);
+    const Finger finger{model};
+    return message_of<SolveError>([&] { finger.solve(0.5, 0.4, 1.0); });
+  };
+  EXPECT_THAT(error([](ModelParameters& m) { m.dt_s = 1e-300; }),
+              AllOf(HasSubstr("steps of 1e-300 s"), HasSubstr("a longer dt")));
+  EXPECT_THAT(
+      error([](ModelParameters& m) { m.dt_s = 1e-14; }),
+      AllOf(HasSubstr("more than 5000000 steps of 1e-14 s"), HasSubstr("dt must be longer")));
+  EXPECT_THAT(error([](ModelParameters& m) { m.k_N_m = 1e30; }), HasSubstr("k = 1e+30 N/m"));
+  EXPECT_THAT(error([](ModelParameters& m) {
+                m.integrator = Integrator::kGeneralizedAlpha;
+                m.dt_s = 1e-300;
+              }),
+              HasSubstr("steps of 1e-300 s"));
+}
+
+TEST(SolveErrors, InfiniteValueIsToldToBeFinite) {
+  EXPECT_THAT(model_error([](ModelParameters& m) { m.k_N_m = HUGE_VAL; }),
+              HasSubstr("k = inf N/m is not allowed: k must be finite and > 0"));
+}
+
 TEST(SolveErrors, MachineRefusesStatesThatAreNoNumbersAndContactsWithoutEnd) {
   const ContactParameters parameters{1e6, 1.2, 0.5, 1.0};
   Contact contact(parameters, {0.0, 0.0, 1.0, -1.0}, {1e-5, 1e-5});
