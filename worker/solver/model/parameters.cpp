@@ -127,7 +127,8 @@ void check_value(const ParameterKey& key, double value) {
     message += ' ';
     message += key.unit;
   }
-  throw InputError(message + " is not allowed: " + name + " must be " + std::string(key.allowed));
+  throw InputError(message + " is not allowed: " + name + " must be " +
+                   (std::isfinite(value) ? "" : "finite and ") + std::string(key.allowed));
 }
 
 void validate(const ModelParameters& model) {
