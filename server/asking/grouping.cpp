@@ -1,12 +1,16 @@
 #include "server/asking/grouping.h"
 
 #include <algorithm>
+#include <array>
+#include <variant>
 
 #include <spdlog/fmt/fmt.h>
 
+#include "server/asking/columns.h"
 #include "server/asking/elements.h"
 #include "server/asking/sql/sql_items.h"
 #include "worker/solver/model/errors.h"
+#include "worker/solver/model/result_fields.h"
 
 namespace oblique::server {
 namespace {
@@ -87,7 +91,52 @@ std::string loose_column(GroupTokens tokens, const std::vector<SqlItem>& group,
   return {};
 }
 
+bool is_one_of(const SqlToken& token, std::span<const std::string_view> words) {
+  return std::any_of(words.begin(), words.end(),
+                     [&](std::string_view word) { return is_word(token, word); });
+}
+
+/// The column that is all that the function called at `i` is given first; empty: it is given more.
+std::string column_given(GroupTokens tokens, std::size_t i) {
+  const bool is_distinct = i + 2 < tokens.size() && is_word(tokens[i + 2], "distinct");
+  i += is_distinct ? 3U : 2U;
+  const bool is_alone = i + 1 < tokens.size() && tokens[i].is_name() &&
+                        (tokens[i + 1].is_sign(')') || tokens[i + 1].is_sign(','));
+  return is_alone ? name_of(tokens[i]) : std::string();
+}
+
+bool is_list(std::string_view column) {
+  const auto* field = solver::find_result_column(column);
+  return column == "lengths_m" || solver::find_result_list(column) != nullptr ||
+         (field != nullptr && std::holds_alternative<solver::ListPart>(field->value));
+}
+
 }  // namespace
+
+void check_numbers(std::string_view flag, std::string_view text,
+                   const std::vector<std::string>& names_given) {
+  constexpr std::array<std::string_view, 7> kOfNumbers{"avg",        "sum",    "total",   "median",
+                                                       "percentile", "stddev", "variance"};
+  constexpr std::array<std::string_view, 2> kOfValues{"min", "max"};
+  const auto tokens = sql_tokens(text);
+  const GroupTokens all(tokens);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const std::string column = calls(all, i) ? column_given(all, i) : std::string();
+    if (kind_of_values(column) != protocol::CellKind::kText ||
+        std::find(names_given.begin(), names_given.end(), column) != names_given.end()) {
+      continue;
+    }
+    const bool has_list = is_list(column);
+    const bool takes_numbers = is_one_of(all[i], kOfNumbers);
+    if (takes_numbers || (has_list && is_one_of(all[i], kOfValues) && gathers(all, i))) {
+      throw solver::InputError(fmt::format(
+          "{} \"{}\" is not allowed: {}() takes {}, and {} is {}; `oblique columns` lists {}", flag,
+          text, all[i].text, takes_numbers ? "numbers" : "numbers or texts", column,
+          has_list ? "a list" : "a text",
+          has_list ? "elements of lists, as peaks[0].fn_N and peaks.count" : "all columns"));
+    }
+  }
+}
 
 void check_gathered(std::string_view flag, std::string_view text, std::string_view group,
                     const std::vector<std::string>& columns,

@@ -18,6 +18,12 @@ void check_gathered(std::string_view flag, std::string_view text, std::string_vi
 void check_gathered_into_one(std::string_view flag, std::string_view text,
                              const std::vector<std::string>& columns);
 
+/// Throws solver::InputError, naming `flag`, when a function in `text` that computes with numbers
+/// is given a column of texts or lists, which SQL would take for 0, or min() or max() one of lists.
+/// `names_given` are other than the columns of these names.
+void check_numbers(std::string_view flag, std::string_view text,
+                   const std::vector<std::string>& names_given);
+
 /// Whether each row that `selected` gives is one of a point: no function gathers, and no row is
 /// left out for being like another.
 bool gives_points(std::string_view selected);

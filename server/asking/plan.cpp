@@ -170,7 +170,8 @@ Plan plan(sqlite3* database, const protocol::StudyQuery& question) {
     plan.columns = planned_columns(std::move(names), written);
   } catch (const solver::InputError& error) {
     check_syntax(database, question, study.lists);
-    throw solver::InputError(with_suggestions(database, error.what(), known));
+    throw solver::InputError(with_suggestions(database, error.what(), known) +
+                             what_quotes_mean(error.what(), plan.statement));
   }
   if (question.explain()) {
     plan.explanation = explanation_of(database, question, study, rows, plan.statement);

@@ -111,6 +111,14 @@ std::string behind(const std::string& message, std::string_view sign) {
   return at == std::string::npos ? "" : message.substr(at + sign.size());
 }
 
+/// The column that SQLite did not find; empty: it has something else against the statement.
+std::string missing_column(const std::string& message) {
+  const std::string wrong = behind(message, "no such column: ");
+  // From 3.42 on the name may be in quotes, with a remark behind it.
+  const auto remark = wrong.find("\" - should this");
+  return remark == std::string::npos ? wrong : wrong.substr(1, remark - 1);
+}
+
 }  // namespace
 
 std::string did_you_mean_some(std::string_view word, std::span<const std::string> candidates) {
@@ -121,13 +129,30 @@ std::string did_you_mean_some(std::string_view word, std::span<const std::string
   return suggestion(word, named);
 }
 
+std::string what_quotes_mean(const std::string& message, std::string_view sql) {
+  const std::string wrong = missing_column(message);
+  const bool is_quoted =
+      !wrong.empty() && sql.find(fmt::format("\"{}\"", wrong)) != std::string_view::npos;
+  if (!is_quoted) {
+    return {};
+  }
+  const bool is_element = wrong.find_first_of("[.") != std::string::npos;
+  return fmt::format("; in double quotes stands the name of a column, in single quotes a text{}",
+                     is_element ? ", and an element of a list stands in none" : "");
+}
+
 std::string with_suggestions(sqlite3* database, const std::string& message,
                              const std::vector<std::string>& columns) {
   constexpr std::string_view kListed = "; `oblique columns` lists all";
   if (const std::string wrong = behind(message, "no such function: "); !wrong.empty()) {
+    if (same_but_case(wrong, "regexp") || same_but_case(wrong, "match")) {
+      return fmt::format(
+          "{}; patterns are those of GLOB, as mode GLOB 'SC*', and of LIKE, as mode LIKE '%sR%'",
+          message);
+    }
     return fmt::format("{}{}{}", message, suggestion(wrong, functions()), kListed);
   }
-  const std::string wrong = behind(message, "no such column: ");
+  const std::string wrong = missing_column(message);
   if (wrong.empty()) {
     return message;
   }

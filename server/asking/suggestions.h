@@ -14,6 +14,10 @@ namespace oblique::server {
 /// so fn_pk is near to fn_peak_N.
 std::string did_you_mean_some(std::string_view word, std::span<const std::string> candidates);
 
+/// What to add to what SQLite has against `sql` when a name that it does not find stands there in
+/// double quotes, where a text may have been meant; else nothing.
+std::string what_quotes_mean(const std::string& message, std::string_view sql);
+
 /// What SQLite has against a question on `database`, with the columns, elements of lists or
 /// functions that may have been meant. `columns` are those that questions have there.
 std::string with_suggestions(sqlite3* database, const std::string& message,

@@ -5,9 +5,12 @@
 #include <string_view>
 #include <utility>
 
+#include <spdlog/fmt/fmt.h>
+
 #include "server/asking/lists/list_functions.h"
 #include "server/asking/lists/quick_views.h"
 #include "server/asking/sql/sql_functions.h"
+#include "server/asking/suggestions.h"
 #include "server/database/sqlite.h"
 
 namespace oblique::server {
@@ -86,8 +89,11 @@ void restrict_to_reading(sqlite3* database) {
     sqlite3_limit(database, limit, most);
   }
   // The schema stays trusted: SQLite 3.40 takes json_extract, which our views use, for unsafe.
-  constexpr std::array<std::pair<int, int>, 4> kSwitches{
+  // Without DQS_DML a name in double quotes that no column has is an error, no text. Views are read
+  // so too, and none of any schema of ours has such a text; DQS_DDL is of what a file defines.
+  constexpr std::array<std::pair<int, int>, 5> kSwitches{
       {{SQLITE_DBCONFIG_DEFENSIVE, 1},
+       {SQLITE_DBCONFIG_DQS_DML, 0},
        {SQLITE_DBCONFIG_ENABLE_FTS3_TOKENIZER, 0},
        {SQLITE_DBCONFIG_ENABLE_LOAD_EXTENSION, 0},
        {SQLITE_DBCONFIG_ENABLE_TRIGGER, 0}}};
@@ -117,7 +123,9 @@ StatementHandle prepare_query(sqlite3* database, const std::string& sql) {
                          sqlite3_errmsg(database));
   }
   if (primary == SQLITE_ERROR) {
-    throw StatementError(std::string("the statement is wrong: ") + sqlite3_errmsg(database));
+    const std::string reason = sqlite3_errmsg(database);
+    throw StatementError(
+        fmt::format("the statement is wrong: {}{}", reason, what_quotes_mean(reason, sql)));
   }
   if (primary != SQLITE_OK) {
     throw failure(database, code);

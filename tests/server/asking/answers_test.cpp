@@ -210,6 +210,52 @@ TEST_F(Answers, WhatIsMisspeltIsNamedWithTheNearest) {
   EXPECT_EQ(said("mu [0]"), "");  // a name with a number in it
 }
 
+TEST_F(Answers, ANameInDoubleQuotesIsNeverAText) {
+  const auto said = [&](const std::string& select, const std::string& where = {}) {
+    return objection(question(select, where));
+  };
+  EXPECT_THAT(said("count(*)", "\"mux\" > 0.5"),
+              AllOf(HasSubstr("no such column: mux"), HasSubstr("did you mean `mu`"),
+                    HasSubstr("in single quotes a text")));
+  EXPECT_THAT(said("avg(\"fn_peak_M\")"), HasSubstr("`fn_peak_N`"));
+  EXPECT_THAT(said("\"peaks[0].fn_N\""), HasSubstr("an element of a list stands in none"));
+  EXPECT_THAT(said("mu", "major_mode = \"SC\""), HasSubstr("no such column: SC"));
+  auto sorted = question("mu");
+  sorted.set_order("\"mux\"");
+  EXPECT_THAT(objection(sorted), HasSubstr("no such column: mux"));
+  EXPECT_THAT(objection(question("count(*)", "", "\"mux\"")), HasSubstr("no such column: mux"));
+  EXPECT_EQ(number("count(*)", "\"mu\" > 0.5"), number("count(*)", "mu > 0.5"));
+  EXPECT_EQ(said("mu AS \"my mu\", \"e\""), "");
+  EXPECT_THAT(said("mux"), testing::Not(HasSubstr("quotes")));
+}
+
+TEST_F(Answers, WhatTakesNumbersIsRefusedTextsAndLists) {
+  const auto said = [&](const std::string& select) { return objection(question(select)); };
+  for (const char* wrong : {"avg(mode)", "sum(DISTINCT mode)", "total(status)", "median(mode)",
+                            "SUM(\"mode\")", "round(avg(mode), 1)"}) {
+    EXPECT_THAT(said(wrong),
+                AllOf(HasSubstr("--select"), HasSubstr("takes numbers"), HasSubstr("is a text")))
+        << wrong;
+  }
+  for (const char* wrong : {"avg(peaks)", "sum(phases)", "max(lengths_m)", "min(fn_peaks_N)"}) {
+    EXPECT_THAT(said(wrong), AllOf(HasSubstr("is a list"), HasSubstr("peaks[0].fn_N"))) << wrong;
+  }
+  for (const char* right :
+       {"min(mode)", "max(solved_at)", "avg(mode_same)", "sum(fn_peak_N), avg(point), avg(E_Pa)",
+        "avg(peaks[0].fn_N)", "max(peaks.count)", "sum(mode = 'SC')", "avg(length(mode))",
+        "count(peaks)", "group_concat(mode)", "max(mode, 'SC')", "avg(links)"}) {
+    EXPECT_EQ(said(right), "") << right;
+  }
+  auto sorted = question("e, count(*)", "", "e");
+  sorted.set_order("avg(mode)");
+  EXPECT_THAT(objection(sorted), AllOf(HasSubstr("--order"), HasSubstr("mode is a text")));
+}
+
+TEST_F(Answers, ForPatternsOtherWaysAreNamed) {
+  EXPECT_THAT(objection(question("mu", "mode REGEXP 'S'")),
+              AllOf(HasSubstr("GLOB 'SC*'"), HasSubstr("LIKE '%sR%'")));
+}
+
 TEST_F(Answers, AWrongColumnIsToldInALine) {
   const std::string said = objection(question("stik_total_s"));
   EXPECT_THAT(said, AllOf(HasSubstr("`stick_total_s`"), HasSubstr("oblique columns")));

@@ -117,6 +117,8 @@ TEST_F(QueryPoolTest, AQueryIsAnsweredByAnotherProcess) {
   EXPECT_EQ(reply.query().rows(0).values(0).integer(), 5);
   EXPECT_EQ(reply.query().rows(0).values(1).text(), "x");
   EXPECT_THAT(error_of("SELECT nothing"), HasSubstr("nothing"));
+  EXPECT_THAT(error_of("SELECT count(*) FROM runs WHERE \"mux\" > 0.5"),
+              HasSubstr("no such column: mux"));
 }
 
 TEST_F(QueryPoolTest, AQueryThatNeverLooksAtTheClockIsKilledAtItsTime) {

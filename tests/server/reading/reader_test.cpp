@@ -93,6 +93,14 @@ TEST_F(ReaderTest, FunctionsThatReachOutOfTheDatabaseAreRefused) {
             "it ran");
 }
 
+TEST_F(ReaderTest, ANameInDoubleQuotesIsNeverAText) {
+  EXPECT_THAT(
+      refusal_of("SELECT count(*) FROM runs WHERE \"mux\" > 0.5"),
+      testing::AllOf(HasSubstr("no such column: mux"), HasSubstr("in single quotes a text")));
+  EXPECT_THAT(refusal_of("SELECT mux FROM runs"), testing::Not(HasSubstr("quotes")));
+  EXPECT_EQ(refusal_of("SELECT \"mu\" AS \"my mu\" FROM \"runs\" ORDER BY \"my mu\""), "it ran");
+}
+
 TEST_F(ReaderTest, AParameterIsRefusedForItHasNoValue) {
   EXPECT_THAT(refusal_of("SELECT ?"), HasSubstr("the parameter ?,"));
   EXPECT_THAT(refusal_of("SELECT 1 WHERE 1 > :mu"), HasSubstr("the parameter :mu,"));
