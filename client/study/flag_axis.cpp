@@ -9,6 +9,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/recipe/block_points.h"
 #include "proto/recipe/expressions/expression_text.h"
 #include "proto/recipe/keys.h"
 #include "proto/recipe/written/written_axis.h"
@@ -164,6 +165,22 @@ bool is_expression(std::string_view text) {
          protocol::is_axis_key(text);
 }
 
+std::vector<double> numbers_of_flag(std::string_view text) {
+  std::vector<double> values;
+  for (const auto part : protocol::split(text, ',')) {
+    values.push_back(flag_number(part));
+  }
+  return values;
+}
+
+protocol::Axis axis_of_expression(const ParameterKey& key, std::string_view text) {
+  try {
+    return protocol::expressed_axis(key, text);
+  } catch (const InputError& error) {
+    throw InputError(without_text(key.name, text, error.what()));
+  }
+}
+
 std::vector<double> integrators(std::string_view text) {
   std::vector<double> values;
   for (const auto name : protocol::split(text, ',')) {
@@ -186,12 +203,13 @@ std::string shown_flag(std::string_view flag, std::string_view text) {
   return fmt::format("{} {}{}", flag, shown, shown.size() < text.size() ? "..." : "");
 }
 
-std::vector<double> numbers_of_flag(std::string_view text) {
-  std::vector<double> values;
-  for (const auto part : protocol::split(text, ',')) {
-    values.push_back(flag_number(part));
+std::string without_text(std::string_view key, std::string_view text, const std::string& sentence) {
+  const std::string words = protocol::expression_in_words(key, std::string(text));
+  if (!sentence.starts_with(words)) {
+    return sentence;
   }
-  return values;
+  const std::string rest = sentence.substr(words.size());
+  return rest.starts_with(": ") ? rest.substr(2) : "it" + rest;
 }
 
 protocol::Axis axis_of_flag(const ParameterKey& key, std::string_view text,
@@ -207,11 +225,13 @@ protocol::Axis axis_of_flag(const ParameterKey& key, std::string_view text,
       return protocol::drawn_axis(key, *written, kind);
     }
     check_distribution_name(text, kind);
-    if (text.find(':') != std::string_view::npos) {
+    // As in C: the error of the expression tells how to choose.
+    const bool chooses = text.find('?') != std::string_view::npos;
+    if (!chooses && text.find(':') != std::string_view::npos) {
       return range_of_flag(key, text, kind);
     }
-    return is_expression(text) ? protocol::expressed_axis(key, text)
-                               : protocol::listed_axis(key, numbers_of_flag(text), kind);
+    return chooses || is_expression(text) ? axis_of_expression(key, text)
+                                          : protocol::listed_axis(key, numbers_of_flag(text), kind);
   });
 }
 

@@ -2,7 +2,6 @@
 
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "client/study/csv_file.h"
 #include "proto/oblique.pb.h"
@@ -21,14 +20,15 @@ protocol::Axis axis_of_flag(const solver::ParameterKey& key, std::string_view te
 /// What `--sample` means: `sobol:100000:1`, kind:count:seed, or kind:count.
 protocol::Sample sample_of_flag(std::string_view text);
 
-/// The numbers of a list, as of --lengths.
-std::vector<double> numbers_of_flag(std::string_view text);
-
 /// How a key is written as a flag: `tip_mass` is --tip-mass.
 std::string flag_of_key(std::string_view key);
 
 /// A flag as it was typed, shortened for a message.
 std::string shown_flag(std::string_view flag, std::string_view text);
+
+/// A sentence about an expression without the `key = "text"` that it may begin with, for where a
+/// flag that shows the text comes before it.
+std::string without_text(std::string_view key, std::string_view text, const std::string& sentence);
 
 /// Runs `work` and puts the flag before what it throws.
 template <typename Work>

@@ -15,6 +15,7 @@
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/written/written_model.h"
 #include "proto/suggestion.h"
+#include "proto/text.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {
@@ -46,6 +47,21 @@ std::string flag_named_by(const PointFlags& flags, std::string_view sentence) {
 protocol::BlockKind kind_of_block(const PointFlags& flags) {
   using enum protocol::BlockKind;
   return !flags.sample.empty() ? kSample : flags.zip ? kZip : kProduct;
+}
+
+std::vector<double> lengths_of_flag(std::string_view text) {
+  std::vector<double> lengths;
+  for (const auto part : protocol::split(text, ',')) {
+    const auto length = solver::number_of(part);
+    if (!length) {
+      throw InputError(fmt::format(
+          "{}; write the length of each link [m], as 0.4,0.3; --length1, --length2, ... take more "
+          "for one link, as --length1 0.2:0.4:5 or --length1 mu",
+          part.empty() ? "a value is missing" : fmt::format("\"{}\" is not a number", part)));
+    }
+    lengths.push_back(*length);
+  }
+  return lengths;
 }
 
 /// One number, which may as well stand in the model.
@@ -151,7 +167,7 @@ protocol::Recipe recipe_of_flags(const PointFlags& flags, const ReachCheck& chec
     }
   }
   if (!flags.lengths.empty()) {
-    at_flag("--lengths", flags.lengths, [&] { model.set_lengths(numbers_of_flag(flags.lengths)); });
+    at_flag("--lengths", flags.lengths, [&] { model.set_lengths(lengths_of_flag(flags.lengths)); });
   }
   protocol::Recipe recipe;
   *recipe.mutable_model() = protocol::to_message(model.model());
@@ -179,7 +195,13 @@ protocol::PointTable points_of_flags(const PointFlags& flags, const ReachCheck& 
 }
 
 std::string with_flag(const PointFlags& flags, const std::string& sentence) {
-  return flag_named_by(flags, sentence) + sentence;
+  const std::string flag = flag_named_by(flags, sentence);
+  const std::string key(subject_of(sentence).key);
+  const auto axis = flags.axes.find(key);
+  return flag.empty()
+             ? sentence
+             : flag + without_text(key, axis != flags.axes.end() ? axis->second : flags.where,
+                                   sentence);
 }
 
 }  // namespace oblique::client

@@ -118,6 +118,9 @@ class Reading {
     if (rest_[0] == '=') {
       throw InputError("`=` is no operator: `==` compares, and nothing is assigned");
     }
+    if (rest_[0] == '?') {
+      throw InputError("`?` means nothing in it: write if(e > 0.5, 0.4, 0.6) to choose");
+    }
     const bool is_plain = rest_[0] > ' ' && rest_[0] <= '~';
     throw InputError(is_plain ? fmt::format("`{}` means nothing in it", rest_[0])
                               : std::string("it has a character that means nothing in it"));

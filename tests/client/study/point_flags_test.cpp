@@ -200,6 +200,37 @@ TEST(PointFlags, TakeLengthsOneALinkButNotBesideLinks) {
   EXPECT_NE(error_of(flags).find("--lengths"), std::string::npos);
 }
 
+TEST(PointFlags, SayOnceWhatWasTyped) {
+  auto flags = flags_of({});
+  flags.where = "mu >";
+  EXPECT_TRUE(error_of(flags).starts_with("--where mu >: it makes no expression"))
+      << error_of(flags);
+  flags.where = "f > 1";
+  EXPECT_TRUE(error_of(flags).starts_with("--where f > 1: unknown key `f`")) << error_of(flags);
+  const auto axis = error_of(flags_of({{"k", "f*2"}}));
+  EXPECT_TRUE(axis.starts_with("--k f*2: unknown key `f`")) << axis;
+}
+
+TEST(PointFlags, ThatChooseAsInCAreToldHowToChoose) {
+  for (const char* text : {"e>0?0.4:0.5", "e?1:2"}) {
+    const auto message = error_of(flags_of({{"mu", text}}));
+    EXPECT_TRUE(message.starts_with(std::string("--mu ") + text + ": `?` means nothing"))
+        << message;
+    EXPECT_NE(message.find("if(e > 0.5, 0.4, 0.6)"), std::string::npos) << message;
+  }
+}
+
+TEST(PointFlags, OfLengthsTakeNumbersAndNameTheFlagsThatTakeMore) {
+  auto flags = flags_of({});
+  for (const char* text : {"mu,mu,mu", "0.4,x", "0.4,"}) {
+    flags.lengths = text;
+    const auto message = error_of(flags);
+    EXPECT_TRUE(message.starts_with(std::string("--lengths ") + text + ": ")) << message;
+    EXPECT_NE(message.find("--length1 mu"), std::string::npos) << message;
+    EXPECT_EQ(message.find("expression"), std::string::npos) << message;
+  }
+}
+
 TEST(PointFlags, NameTheFlagThatIsMissing) {
   auto flags = flags_of({});
   flags.axes.erase("e");

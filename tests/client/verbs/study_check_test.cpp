@@ -137,7 +137,7 @@ TEST(StudyCheck, EndsWithTwoAndThePlaceForWhatIsWrong) {
       {"study", "check", "--H", "1", "--mu", "0.4", "--e", "1", "--where", "mu > 1"});
   EXPECT_EQ(flags.exit_code, 2);
   EXPECT_THAT(flags.err, HasSubstr("leaves no point in"));
-  EXPECT_THAT(flags.err, HasSubstr("--where mu > 1: where"));
+  EXPECT_THAT(flags.err, HasSubstr("--where mu > 1: it leaves no point in"));
   EXPECT_THAT(test::run_oblique({"study"}).err, HasSubstr("a verb is required; there are check"));
   // The same mistake is wrong usage for every verb.
   for (const auto& verb : std::vector<std::vector<std::string>>{{"study", "check"}, {"run"}}) {
