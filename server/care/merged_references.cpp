@@ -5,6 +5,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "server/care/row_faults.h"
 #include "server/care/table_columns.h"
 #include "server/store/rows/row_columns.h"
 
@@ -61,6 +62,15 @@ void check_workers(sqlite3* source) {
   }
 }
 
+/// Throws StorageError when the columns of a model are not those of its definition: the whole would
+/// be damaged as well.
+void refuse_damaged_models(sqlite3* source) {
+  const auto faults = faults_of_models(source, schema_of(source), 1);
+  if (!faults.empty()) {
+    throw StorageError(faults.front() + ": `oblique check` tells more");
+  }
+}
+
 std::string marks(std::size_t count) {
   std::string text = "?";
   for (std::size_t i = 1; i < count; ++i) {
@@ -82,7 +92,9 @@ MergedModels::MergedModels(sqlite3* source, sqlite3* target,
       find_(target, "SELECT model_id FROM models WHERE definition = ?"),
       insert_(target, fmt::format("INSERT INTO models (model_id, {}) VALUES ({})",
                                   fmt::join(columns, ", "), marks(columns.size() + 1))),
-      last_(highest(target, "SELECT max(model_id) FROM models")) {}
+      last_(highest(target, "SELECT max(model_id) FROM models")) {
+  refuse_damaged_models(source);
+}
 
 std::int64_t MergedModels::in_target(std::int64_t in_source) {
   if (const auto known = known_.find(in_source); known != known_.end()) {

@@ -250,6 +250,13 @@ void check_studies(sqlite3* database, int schema, Found& found) {
 
 }  // namespace
 
+std::vector<std::string> faults_of_models(sqlite3* database, int schema, std::size_t at_most) {
+  std::vector<std::string> faults;
+  Found found(faults, at_most);
+  check_models(database, schema, found);
+  return faults;
+}
+
 std::vector<std::string> faults_of_rows(sqlite3* database, int schema, std::size_t at_most) {
   std::vector<std::string> faults;
   const auto kind = [&] { return Found(faults, at_most); };

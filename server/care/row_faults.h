@@ -16,4 +16,8 @@ namespace oblique::server {
 /// `row_checksum`. Reads everything.
 std::vector<std::string> faults_of_rows(sqlite3* database, int schema, std::size_t at_most);
 
+/// Those of them that are of models: columns that do not say what the definition does. A sentence
+/// each, at most `at_most`.
+std::vector<std::string> faults_of_models(sqlite3* database, int schema, std::size_t at_most);
+
 }  // namespace oblique::server

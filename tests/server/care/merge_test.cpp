@@ -206,6 +206,13 @@ TEST_F(MergeTest, AWorkerThatIsNotAsItWasStoredRefusesTheWholeDatabase) {
   }
 }
 
+TEST_F(MergeTest, AModelThatIsNotThatOfItsDefinitionRefusesTheWholeDatabase) {
+  store("one", {{.end = 5}});
+  texts("one", "UPDATE models SET k = -1");
+  EXPECT_THROW(merge("one"), StorageError);
+  EXPECT_EQ(text("all", "SELECT count(*) FROM models"), "0");
+}
+
 TEST_F(MergeTest, AStudyThatWouldKeepAServerFromStartingRefusesTheWholeDatabase) {
   int number = 0;
   for (const char* change :
