@@ -86,6 +86,31 @@ void compare_settled_points(sqlite3* database, Diagnosis& found) {
   execute(database, "RELEASE settled");
 }
 
+/// Rows that refer to one that is not there, each table by itself: a table that other people made
+/// may have a foreign key that cannot be checked. `which` is a condition in SQL on `parent`.
+void check_references(sqlite3* database, const std::string& which, Diagnosis& found) {
+  for (const std::string& table :
+       texts(database, "SELECT name FROM sqlite_schema WHERE type = 'table' ORDER BY name")) {
+    try {
+      Statement rows(database,
+                     "SELECT 'table ' || \"table\" || coalesce(', row ' || rowid, '') ||"
+                     " ': refers to a row of ' || parent || ' that is not there'"
+                     " FROM pragma_foreign_key_check(?) WHERE " +
+                         which);
+      rows.bind(1, table);
+      while (found.faults.size() < kMostOfAKind && rows.step()) {
+        found.faults.push_back(rows.text(0));
+      }
+    } catch (const StorageError& error) {
+      const bool is_ours =
+          table == "results" || std::count(our_tables().begin(), our_tables().end(), table) > 0;
+      (is_ours ? found.faults : found.remarks)
+          .push_back(fmt::format("the foreign keys of the table {} cannot be checked: {}", table,
+                                 error.what()));
+    }
+  }
+}
+
 }  // namespace
 
 std::vector<std::string> faults_of_pages(sqlite3* database) {
@@ -110,6 +135,17 @@ Diagnosis diagnose(const std::string& path) {
   }
   add_row_checksum(database);
   const int schema = schema_of(database);
+  if (schema >= kFirstPacked) {
+    for (const std::string& table : missing_tables(database)) {
+      found.faults.push_back(fmt::format(
+          "the table {} is missing, and no server starts on this file: `oblique backup --salvage` "
+          "makes one that has it, of all that can be read",
+          table));
+    }
+    if (!found.faults.empty()) {
+      return found;  // what would be asked next needs them
+    }
+  }
   const std::string table(results_table(schema));
   const auto add = [&](std::vector<std::string>& to, const std::string& sql) {
     for (auto& text : texts(database, sql)) {
@@ -118,10 +154,7 @@ Diagnosis diagnose(const std::string& path) {
   };
   // Rows of a study that is being deleted refer to none.
   const bool deletes = !deleted_studies(database).empty();
-  add(found.faults, fmt::format("SELECT 'table ' || \"table\" || coalesce(', row ' || rowid, '') ||"
-                                " ': refers to a row of ' || parent || ' that is not there'"
-                                " FROM pragma_foreign_key_check WHERE {} LIMIT 20",
-                                deletes ? "parent <> 'studies'" : "1"));
+  check_references(database, deletes ? "parent <> 'studies'" : "1", found);
   if (deletes) {
     add(found.faults,
         fmt::format("SELECT DISTINCT 'table {0}: refers to study number ' || study_id ||"

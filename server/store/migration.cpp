@@ -17,6 +17,7 @@
 #include "server/store/rows/old_additions.h"
 #include "server/store/rows/row_columns.h"
 #include "server/store/schema/schema.h"
+#include "server/store/schema/standing_views.h"
 
 namespace oblique::server {
 namespace {
@@ -102,6 +103,11 @@ Steps take_steps(sqlite3* database, int found, std::uint64_t rows, const Notice&
     execute(database, kSteps.at(step - 1));
   }
   OldAdditions additions(database);
+  std::vector<std::string> more = additions.names();
+  more.emplace_back("results_7");
+  if (const std::string taken = names_in_the_way(database, more); !taken.empty()) {
+    throw StorageError(taken);
+  }
   execute(database, kMigrateFrom7Sql);
   execute(database, kResultsSql);
   const MigratedRows migrated = migrate_rows(database, [&](std::uint64_t looked_at) {

@@ -61,7 +61,8 @@ std::string objection_to(const StoredStudy& study) {
   } catch (const solver::InputError& reason) {
     return reason.what();
   } catch (const std::runtime_error& reason) {
-    throw StorageError("the recipe of study " + study.name + " cannot be read: " + reason.what());
+    throw StorageError("the recipe of study " + study.name + " cannot be read: " + reason.what() +
+                       ". `oblique check` tells more");
   }
   if (study.state == StudyState::kCancelled || study.state == StudyState::kPaused) {
     study.table.release();

@@ -42,6 +42,29 @@ OldAdditions::OldAdditions(sqlite3* database) : database_(database) {
   while (triggers.step()) {
     triggers_.push_back({triggers.text(0), triggers.text(1)});
   }
+  find_references();
+}
+
+void OldAdditions::find_references() {
+  Statement tables(database_,
+                   "SELECT DISTINCT t.name FROM sqlite_schema AS t"
+                   " JOIN pragma_foreign_key_list(t.name) AS key WHERE t.type = 'table'"
+                   " AND key.\"table\" = 'results' COLLATE NOCASE ORDER BY t.name");
+  while (tables.step()) {
+    referring_.push_back(tables.text(0));
+  }
+}
+
+std::vector<std::string> OldAdditions::names() const {
+  std::vector<std::string> names;
+  if (!columns_.empty()) {
+    names = {"added_columns", "added_columns_by_point"};
+  }
+  if (!triggers_.empty() || std::any_of(indices_.begin(), indices_.end(),
+                                        [](const Index& index) { return index.columns.empty(); })) {
+    names.emplace_back("added_before_8");
+  }
+  return names;
 }
 
 void OldAdditions::find_indices() {
@@ -84,6 +107,13 @@ std::vector<std::string> OldAdditions::keep(const std::string& table) {
         fmt::format("the trigger {} on results does not work any more, for results is a view now; "
                     "its SQL stands in the table added_before_8",
                     trigger.name));
+  }
+  for (const std::string& name : referring_) {
+    said.push_back(
+        fmt::format("the table {} has a foreign key to results, which is a view now: its rows are "
+                    "kept, but nothing checks that key, and a program with PRAGMA foreign_keys = "
+                    "ON cannot write into it until it is made again without",
+                    name));
   }
   return said;
 }

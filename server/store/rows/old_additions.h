@@ -18,6 +18,9 @@ class OldAdditions {
   /// Throws StorageError.
   explicit OldAdditions(sqlite3* database);
 
+  /// Names of the tables and indices that `keep` makes.
+  std::vector<std::string> names() const;
+
   /// Keeps what can be kept, in the caller's transaction, while the old rows are in `table` and
   /// there is `packed_results`. Gives a sentence about each thing that is not as it was. Throws
   /// StorageError.
@@ -35,6 +38,7 @@ class OldAdditions {
   };
 
   void find_indices();
+  void find_references();
   std::string packed_columns_of(const std::string& index);
   void keep_columns(const std::string& table, std::vector<std::string>& said);
   void keep_indices(std::vector<std::string>& said);
@@ -44,6 +48,7 @@ class OldAdditions {
   std::vector<std::string> columns_;
   std::vector<Index> indices_;
   std::vector<Trigger> triggers_;
+  std::vector<std::string> referring_;  // tables whose foreign keys name `results`
 };
 
 /// A sentence about each view that people made and that cannot be read. Throws StorageError.

@@ -1,6 +1,7 @@
 #include "server/store/schema/standing_views.h"
 
 #include <algorithm>
+#include <array>
 #include <iterator>
 #include <string_view>
 
@@ -32,23 +33,30 @@ std::vector<Standing> standing_in(sqlite3* database, const std::string& sql) {
   return found;
 }
 
+/// What `sql` finds in a new database.
+std::vector<Standing> in_new_database(const std::string& sql) {
+  const DatabaseHandle database = open_database(":memory:", SQLITE_OPEN_READWRITE);
+  for (const char* part : {kSchemaSql, kResultsSql, kViewsSql}) {
+    execute(database.get(), part);
+  }
+  return standing_in(database.get(), sql);
+}
+
 /// Those of a new database, in an order in which they can be made.
 const std::vector<Standing>& ours() {
-  static const std::vector<Standing> all = [] {
-    const DatabaseHandle database = open_database(":memory:", SQLITE_OPEN_READWRITE);
-    for (const char* sql : {kSchemaSql, kResultsSql, kViewsSql}) {
-      execute(database.get(), sql);
-    }
-    return standing_in(database.get(), kStandingSql);
-  }();
+  static const std::vector<Standing> all = in_new_database(kStandingSql);
   return all;
 }
 
 enum class State { kSound, kMissing, kOther, kNameTaken };
 
 State state_of(sqlite3* database, const Standing& one) {
-  Statement find(database, "SELECT type, sql FROM sqlite_schema WHERE name = ? COLLATE NOCASE");
+  // Triggers have names of their own: a table may be called as one is.
+  Statement find(database,
+                 "SELECT type, sql FROM sqlite_schema WHERE name = ?1 COLLATE NOCASE"
+                 " AND (type = 'trigger') = (?2 = 'trigger')");
   find.bind(1, one.name);
+  find.bind(2, one.type);
   State state = State::kMissing;
   if (find.step()) {
     if (find.text(0) != one.type) {
@@ -88,7 +96,9 @@ std::string name_taken(const Standing& one) {
 std::vector<Standing> added_triggers(sqlite3* database, const std::vector<Standing>& views) {
   std::vector<Standing> added = standing_in(database, kStandingSql);
   std::erase_if(added, [&](const Standing& one) {
-    const auto has_name = [&](const Standing& other) { return other.name == one.name; };
+    const auto has_name = [&](const Standing& other) {
+      return other.type == one.type && other.name == one.name;
+    };
     return one.type != "trigger" || std::any_of(ours().begin(), ours().end(), has_name) ||
            std::none_of(views.begin(), views.end(),
                         [&](const Standing& view) { return view.name == one.table; });
@@ -96,7 +106,77 @@ std::vector<Standing> added_triggers(sqlite3* database, const std::vector<Standi
   return added;
 }
 
+/// How somebody gives another name to what has one that we want.
+std::string way_out(const std::string& type, const std::string& name) {
+  std::string quoted;
+  for (const char letter : name) {
+    quoted += letter == '"' ? "\"\"" : std::string(1, letter);
+  }
+  return type == "table"
+             ? fmt::format("ALTER TABLE \"{0}\" RENAME TO \"my_{0}\"", quoted)
+             : fmt::format("DROP {} \"{}\", and make it again under another name", type, quoted);
+}
+
 }  // namespace
+
+const std::vector<std::string>& our_tables() {
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> found;
+    for (const Standing& table :
+         in_new_database("SELECT type, name, tbl_name, sql FROM sqlite_schema"
+                         " WHERE type = 'table' AND name NOT LIKE 'sqlite_%' ORDER BY name")) {
+      found.push_back(table.name);
+    }
+    return found;
+  }();
+  return names;
+}
+
+std::vector<std::string> missing_tables(sqlite3* database) {
+  std::vector<std::string> missing;
+  Statement find(database,
+                 "SELECT 1 FROM sqlite_schema WHERE type = 'table' AND name = ? COLLATE NOCASE");
+  for (const std::string& name : our_tables()) {
+    find.bind(1, name);
+    if (!find.step()) {
+      missing.push_back(name);
+    }
+    find.reset();
+  }
+  return missing;
+}
+
+std::string names_in_the_way(sqlite3* database, const std::vector<std::string>& more) {
+  // Tables of the schema before this one; its views and indices make room for ours.
+  constexpr std::array<std::string_view, 6> kBefore{"about",   "studies", "models",
+                                                    "workers", "retries", "results"};
+  std::vector<Standing> wanted = ours();
+  for (const auto& names : {our_tables(), more}) {
+    for (const std::string& name : names) {
+      wanted.push_back({"table", name, name, {}});
+    }
+  }
+  Statement find(database,
+                 "SELECT type, name FROM sqlite_schema WHERE name = ?1 COLLATE NOCASE"
+                 " AND (type = 'trigger') = (?2 = 'trigger') AND NOT"
+                 " (type = 'trigger' AND tbl_name = 'results' COLLATE NOCASE)");  // goes with it
+  std::string said;
+  for (const Standing& one : wanted) {
+    if (std::find(kBefore.begin(), kBefore.end(), one.name) != kBefore.end()) {
+      continue;
+    }
+    find.bind(1, one.name);
+    find.bind(2, one.type);
+    const bool makes_room = one.type == "view" || one.type == "index";
+    if (find.step() && !(makes_room && find.text(0) == one.type)) {
+      said += fmt::format("{}the {} {} has a name that is needed for something else: {}",
+                          said.empty() ? "" : "; ", find.text(0), find.text(1),
+                          way_out(find.text(0), find.text(1)));
+    }
+    find.reset();
+  }
+  return said;
+}
 
 std::vector<std::string> faults_of_views(sqlite3* database) {
   std::vector<std::string> faults;

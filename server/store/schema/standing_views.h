@@ -7,8 +7,19 @@
 #include "server/database/sqlite.h"
 
 // Views, triggers and indices that every database of this schema has. Other programs may have
-// dropped or replaced some; what people made under other names is theirs.
+// dropped or replaced some; what people made under other names is theirs. Tables, which cannot be
+// made again with what they held, are only named.
 namespace oblique::server {
+
+/// The names of the tables of this schema.
+const std::vector<std::string>& our_tables();
+
+/// Those of them that a database of this schema lacks. Throws StorageError.
+std::vector<std::string> missing_tables(sqlite3* database);
+
+/// What has a name that this schema wants in a database of the one before it, or one of `more`
+/// names, and what to do about it, in one sentence; empty where nothing has. Throws StorageError.
+std::string names_in_the_way(sqlite3* database, const std::vector<std::string>& more);
 
 /// A sentence for each one that is missing or other than ours, and each whose name something else
 /// has. The database has the present schema. Throws StorageError.

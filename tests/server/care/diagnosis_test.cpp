@@ -125,6 +125,40 @@ TEST_F(CareTest, AStudyThatIsNotFinishedIsNamedThoughTheDatabaseIsSound) {
   EXPECT_THAT(diagnose(path_).remarks, IsEmpty());
 }
 
+TEST_F(CareTest, EveryTableThatIsMissingIsNamed) {
+  store_.reset();
+  std::vector<std::string> tables;
+  {
+    const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READONLY);
+    Statement names(database.get(), "SELECT name FROM sqlite_schema WHERE type = 'table'");
+    while (names.step()) {
+      tables.push_back(names.text(0));
+    }
+  }
+  EXPECT_THAT(tables, Contains("taken_points"));
+  for (const std::string& table : tables) {
+    const std::string copy = folder_.file("without_" + table + ".db");
+    std::filesystem::copy_file(path_, copy);
+    execute(open_database(copy, SQLITE_OPEN_READWRITE).get(), "DROP TABLE " + table);
+    EXPECT_THAT(find_faults(copy), Contains(HasSubstr("the table " + table + " is missing")));
+  }
+}
+
+TEST_F(CareTest, AForeignKeyOfAnotherTableThatCannotBeCheckedIsNamedAndTheRestIsChecked) {
+  store_.reset();
+  execute(open_database(path_, SQLITE_OPEN_READWRITE).get(),
+          "CREATE TABLE notes (study_id, point,"
+          " FOREIGN KEY (study_id, point) REFERENCES results (study_id, point));"
+          "INSERT INTO notes VALUES (1, 2);");
+  const auto found = diagnose(path_);
+  EXPECT_THAT(found.faults, IsEmpty());
+  EXPECT_THAT(found.remarks, Contains(HasSubstr("the foreign keys of the table notes")));
+  execute(open_database(path_, SQLITE_OPEN_READWRITE).get(),
+          "UPDATE packed_results SET worker = 99, checksum = NULL WHERE point = 2");
+  EXPECT_THAT(find_faults(path_),
+              Contains(HasSubstr("table packed_results: refers to a row of workers")));
+}
+
 TEST_F(CareTest, RowsWithoutChecksumsAreCounted) {
   execute(open_database(path_, SQLITE_OPEN_READWRITE).get(),
           "UPDATE results SET checksum = NULL WHERE point < 2");

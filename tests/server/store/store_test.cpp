@@ -295,7 +295,8 @@ TEST_F(StoreTest, ARecipeThatCannotBeReadIsAnErrorThatNamesTheStudy) {
     store.studies();
     FAIL() << "a damaged recipe was read";
   } catch (const StorageError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("recipe of study a"));
+    EXPECT_THAT(error.what(),
+                testing::AllOf(HasSubstr("recipe of study a"), HasSubstr("`oblique check`")));
   }
 }
 
