@@ -25,7 +25,7 @@ BatchSolver::~BatchSolver() {
 
 void BatchSolver::add(Batch batch) {
   const std::lock_guard lock(mutex_);
-  open_.push_back({std::move(batch)});
+  open_.emplace_back().batch = std::move(batch);
   changed_.notify_all();
 }
 
@@ -137,6 +137,9 @@ std::optional<std::uint64_t> BatchSolver::next_point(Task& task, const std::stop
   do {
     task.next = task.batch->batch.points->first_left_in(task.next, task.end);
     if (task.next < task.end) {
+      if (task.batch->dropped) {  // points may be slow: the rest of the task is not waited for
+        return std::nullopt;
+      }
       return task.next++;
     }
   } while (take_more(task, stop));

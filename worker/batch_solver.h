@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
@@ -71,8 +72,9 @@ class BatchSolver {
     Batch batch;
     std::uint64_t given = 0;  ///< points that a thread took
     std::size_t solvers = 0;  ///< threads at work on it
-    bool dropped = false;     ///< no further point is begun
-    bool unwanted = false;    ///< nor are results kept
+    /// No further point is begun; set under the lock, read before each point without it.
+    std::atomic<bool> dropped = false;
+    bool unwanted = false;  ///< nor are results kept
   };
   using OpenBatches = std::list<OpenBatch>;
   /// The part of a batch that one thread solves at a time, and then the next.

@@ -163,6 +163,19 @@ TEST_F(BatchSolverTest, ADroppedStudyLeavesNothingAndOthersGoOn) {
   EXPECT_EQ(progress[0].batch, 3U);
 }
 
+TEST_F(BatchSolverTest, ABatchThatIsDroppedIsLeftAtTheNextPointHoweverLongItIs) {
+  solver_.add(batch(1, 0, 1000));
+  gate_.wait_begun(1);
+  solver_.drop_study(7);
+  solver_.add(batch(2, 0, 1, 8));
+  gate_.open(1000);
+  wait_batches_ended(1);
+  EXPECT_EQ(gate_.begun(), 2) << "one of each";
+  const auto progress = solver_.collect();
+  ASSERT_EQ(progress.size(), 1U);
+  EXPECT_EQ(progress[0].batch, 2U);
+}
+
 TEST_F(BatchSolverTest, WhenAllIsDroppedWhatWasSolvedCanStillBeCollected) {
   solver_.add(batch(1, 0, 3));
   solver_.add(batch(2, 0, 3));
