@@ -10,6 +10,7 @@
 #include "client/formats/row_output.h"
 #include "client/output/columns.h"
 #include "client/output/human_units.h"
+#include "client/output/terminal.h"
 #include "proto/program/exit_code.h"
 #include "proto/text.h"
 #include "proto/wire/chunk_rows.h"
@@ -56,11 +57,16 @@ int print_stream(RowStream& stream, const OutputFlags& flags, bool in_shown_unit
                  .usual = std::move(usual)});
   try {
     out.print(chunk);
+    std::uint64_t rows = chunk.chunk_rows();
     while (!chunk.ends()) {
       chunk = stream.next();
       out.print(chunk);
+      rows += chunk.chunk_rows();
     }
     out.finish();
+    if (rows == 0 && draws_on_terminal()) {
+      std::cerr << "No rows.\n";
+    }
   } catch (const ClosedPipe&) {
     if (!out.is_paged()) {
       throw;
