@@ -58,6 +58,7 @@ void add_verbs(CLI::App& app, Command& command) {
   add_query(app, command);
   add_sql(app, command);
   add_trace(app, command);
+  add_plot(app, command);
   add_columns(app, command);
   add_paper(app, command);
   add_converge(app, command);

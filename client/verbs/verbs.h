@@ -35,6 +35,7 @@ void add_delete(CLI::App& app, Command& command);
 void add_query(CLI::App& app, Command& command);
 void add_sql(CLI::App& app, Command& command);
 void add_trace(CLI::App& app, Command& command);
+void add_plot(CLI::App& app, Command& command);
 void add_columns(CLI::App& app, Command& command);
 void add_paper(CLI::App& app, Command& command);
 void add_converge(CLI::App& app, Command& command);

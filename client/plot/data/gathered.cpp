@@ -1,0 +1,184 @@
+#include "client/plot/data/gathered.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+namespace oblique::client::plot {
+namespace {
+
+constexpr std::size_t kNowhere = SIZE_MAX;
+constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
+
+/// Puts rows into cells, one after another.
+class CellGatherer {
+ public:
+  CellGatherer(std::vector<double> x_edges, std::vector<double> y_edges) {
+    gathered_.cells.x_edges = std::move(x_edges);
+    gathered_.cells.y_edges = std::move(y_edges);
+    const std::size_t cells = gathered_.cells.columns() * gathered_.cells.rows();
+    gathered_.cells.values.assign(cells, 0.0);
+    gathered_.cells.states.assign(cells, CellState::kNoResult);
+    counts_.assign(cells, 0);
+  }
+
+  void add(const MapRows& rows, std::size_t row, std::size_t column_of_cell,
+           std::size_t row_of_cell) {
+    const std::size_t cell = row_of_cell * gathered_.cells.columns() + column_of_cell;
+    auto& state = gathered_.cells.states[cell];
+    ++gathered_.points;
+    if (rows.value.is_null(row)) {
+      // A cell with a value keeps it; one that failed says more than one without a value.
+      const bool failed = rows.status.text(row) == "failed";
+      if (state == CellState::kNoResult || (failed && state == CellState::kNoValue)) {
+        state = failed ? CellState::kFailed : CellState::kNoValue;
+      }
+      return;
+    }
+    if (rows.value.has_texts()) {
+      if (gathered_.names.empty()) {
+        gathered_.names.resize(counts_.size());
+      }
+      if (counts_[cell] == 0) {
+        // A column of texts may have numbers among them.
+        gathered_.names[cell] = rows.value.text(row);
+      }
+    } else {
+      gathered_.cells.values[cell] += rows.value.numbers[row];
+    }
+    ++counts_[cell];
+    state = CellState::kSolved;
+  }
+
+  GatheredCells gathered(const MapRows& rows) {
+    for (std::size_t i = 0; i < counts_.size(); ++i) {
+      auto& value = gathered_.cells.values[i];
+      value = counts_[i] == 0 ? kNoNumber : value / static_cast<double>(counts_[i]);
+      gathered_.most_in_a_cell = std::max(gathered_.most_in_a_cell, counts_[i]);
+    }
+    gathered_.has_names = rows.value.has_texts();
+    return std::move(gathered_);
+  }
+
+ private:
+  GatheredCells gathered_;
+  std::vector<std::uint64_t> counts_;
+};
+
+/// Where each row's value is among `values`, which rise and have it.
+std::vector<std::size_t> places_among(const std::vector<double>& values,
+                                      const AnswerColumn& column) {
+  std::vector<std::size_t> places;
+  places.reserve(column.numbers.size());
+  std::size_t last = 0;
+  for (const double number : column.numbers) {
+    if (last >= values.size() || values[last] != number) {
+      const auto found = std::lower_bound(values.begin(), values.end(), number);
+      last = static_cast<std::size_t>(found - values.begin());
+    }
+    places.push_back(last < values.size() && values[last] == number ? last : kNowhere);
+  }
+  return places;
+}
+
+std::vector<std::size_t> places_in_bins(const Scale& scale, std::size_t cells,
+                                        const AnswerColumn& column) {
+  std::vector<std::size_t> places;
+  places.reserve(column.numbers.size());
+  for (const double number : column.numbers) {
+    const double share = scale.share_of(number);
+    const bool is_in = share >= 0.0 && share <= 1.0;
+    places.push_back(
+        is_in ? std::min(static_cast<std::size_t>(share * static_cast<double>(cells)), cells - 1)
+              : kNowhere);
+  }
+  return places;
+}
+
+GatheredCells gathered_at(const MapRows& rows, const std::vector<std::size_t>& x,
+                          const std::vector<std::size_t>& y, CellGatherer gatherer) {
+  for (std::size_t row = 0; row < x.size(); ++row) {
+    if (x[row] != kNowhere && y[row] != kNowhere) {
+      gatherer.add(rows, row, x[row], y[row]);
+    }
+  }
+  return gatherer.gathered(rows);
+}
+
+std::vector<double> edges_of_bins(const Scale& scale, std::size_t cells) {
+  std::vector<double> edges;
+  for (std::size_t i = 0; i <= cells; ++i) {
+    edges.push_back(scale.value_at(static_cast<double>(i) / static_cast<double>(cells)));
+  }
+  return edges;
+}
+
+}  // namespace
+
+std::vector<double> axis_values(std::vector<double> of_study, const AnswerColumn& column) {
+  std::sort(of_study.begin(), of_study.end());
+  std::vector<double> others;
+  for (const double number : column.numbers) {
+    if (!std::isnan(number) && (others.empty() || others.back() != number) &&
+        !std::binary_search(of_study.begin(), of_study.end(), number)) {
+      others.push_back(number);
+    }
+  }
+  of_study.insert(of_study.end(), others.begin(), others.end());
+  std::sort(of_study.begin(), of_study.end());
+  of_study.erase(std::unique(of_study.begin(), of_study.end()), of_study.end());
+  return of_study;
+}
+
+GatheredCells gathered_on(const MapRows& rows, const std::vector<double>& x_values,
+                          const std::vector<double>& y_values, bool is_x_logarithmic,
+                          bool is_y_logarithmic) {
+  return gathered_at(rows, places_among(x_values, rows.x), places_among(y_values, rows.y),
+                     CellGatherer(edges_between(x_values, is_x_logarithmic),
+                                  edges_between(y_values, is_y_logarithmic)));
+}
+
+GatheredCells gathered_in_bins(const MapRows& rows, std::size_t x_cells, std::size_t y_cells,
+                               bool is_x_logarithmic, bool is_y_logarithmic) {
+  const auto scale_for = [](const AnswerColumn& column, bool is_logarithmic) {
+    const Range range = range_of(column.numbers, is_logarithmic);
+    return Scale(range.from, range.to, is_logarithmic);
+  };
+  const Scale x = scale_for(rows.x, is_x_logarithmic);
+  const Scale y = scale_for(rows.y, is_y_logarithmic);
+  return gathered_at(rows, places_in_bins(x, x_cells, rows.x), places_in_bins(y, y_cells, rows.y),
+                     CellGatherer(edges_of_bins(x, x_cells), edges_of_bins(y, y_cells)));
+}
+
+std::vector<Series> gathered_lines(const AnswerColumn& x, const AnswerColumn& y,
+                                   const AnswerColumn* by) {
+  struct Sum {
+    double sum = 0.0;
+    double count = 0.0;
+  };
+  std::map<double, std::map<double, Sum>> lines;
+  for (std::size_t row = 0; row < x.numbers.size(); ++row) {
+    const double value_of_by = by == nullptr ? 0.0 : by->numbers[row];
+    if (std::isnan(value_of_by) || std::isnan(x.numbers[row])) {
+      continue;
+    }
+    Sum& sum = lines[value_of_by][x.numbers[row]];
+    if (!std::isnan(y.numbers[row])) {
+      sum.sum += y.numbers[row];
+      sum.count += 1.0;
+    }
+  }
+  std::vector<Series> series;
+  for (const auto& [value, points] : lines) {
+    Series line{.by = value, .x = {}, .y = {}};
+    for (const auto& [at, sum] : points) {
+      line.x.push_back(at);
+      line.y.push_back(sum.count > 0.0 ? sum.sum / sum.count : kNoNumber);
+    }
+    series.push_back(std::move(line));
+  }
+  return series;
+}
+
+}  // namespace oblique::client::plot

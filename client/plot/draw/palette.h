@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "client/plot/draw/colour.h"
+
+namespace oblique::client::plot {
+
+/// Colours of a map. Both rise in lightness all the way, so that they read in grey and without
+/// telling red from green; cividis looks nearly the same to all.
+enum class Palette { kViridis, kCividis };
+
+/// Throws solver::InputError for a name that is neither `viridis` nor `cividis`.
+Palette palette_named(std::string_view name);
+
+/// Number of colours of a palette.
+inline constexpr std::size_t kShades = 256;
+Colour shade(Palette palette, std::size_t number);
+
+/// The shade of a share from 0 to 1; others take that of the nearer end.
+std::size_t shade_number(double share);
+
+/// A hatching, drawn over a colour, in the ink of text.
+enum class Hatch { kNone, kRising, kFalling, kCrossed, kDots, kLevel, kUpright, kGrid };
+inline constexpr std::size_t kHatches = 8;
+
+/// How an area of one of several kinds is filled. Kinds with the same colour differ in hatching.
+struct Fill {
+  Colour colour;
+  Hatch hatch;
+};
+
+/// The fills of kinds, from the one that is met most. So many differ; more begin again.
+inline constexpr std::size_t kFills = 24;
+Fill fill(std::size_t kind);
+/// Of what belongs to no kind of its own.
+inline constexpr Fill kFillOfOthers{colour_of(0xdddddd), Hatch::kDots};
+
+/// How a line is drawn. Its colour on white and on black, its dashes as SVG has them, and the shape
+/// of its marks.
+enum class Mark { kDisc, kSquare, kTriangle, kDiamond, kCross, kPlus };
+struct Stroke {
+  Colour on_light;
+  Colour on_dark;
+  std::string_view dashes;  ///< empty: none
+  Mark mark;
+};
+inline constexpr std::size_t kStrokes = 8;
+Stroke stroke(std::size_t number);
+
+}  // namespace oblique::client::plot

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/plot/figures/figure.h"
+#include "client/plot/figures/quantity.h"
+
+namespace oblique::client::plot {
+
+/// The two axes of a map.
+struct MapAxes {
+  Quantity x;
+  Quantity y;
+  bool is_x_logarithmic = false;
+  bool is_y_logarithmic = false;
+};
+
+/// How values become colours.
+struct ColourChoice {
+  Palette palette = Palette::kViridis;
+  bool is_logarithmic = false;
+  std::optional<Range> range = {};  ///< none: that of the values
+};
+
+/// A heat map of cells. On a logarithmic scale of colours values that are not positive are gaps.
+Figure heat_map(const MapAxes& axes, const Quantity& value, Cells cells,
+                const ColourChoice& choice = {});
+
+/// The colours of values, and whether some lie beyond.
+Colours colours_for(const Quantity& quantity, const std::vector<double>& values,
+                    const ColourChoice& choice);
+
+/// Most kinds that a map tells apart. Others, and those that have next to no cells, are gathered.
+inline constexpr std::size_t kMostKinds = 12;
+
+/// A map of kinds, as of modes: `names` has the kind of each solved cell.
+Figure kind_map(const MapAxes& axes, Cells cells, std::vector<std::string> names,
+                const std::string& plural = "kinds");
+
+}  // namespace oblique::client::plot

@@ -1,0 +1,184 @@
+#include "client/plot/picture_file.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+#include <string_view>
+#include <thread>
+#include <utility>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "client/formats/sink.h"
+#include "client/plot/figure_table.h"
+#include "client/plot/figures/svg_figure.h"
+#include "client/service/child_process.h"
+#include "proto/suggestion.h"
+#include "worker/solver/model/errors.h"
+#include "worker/solver/model/number.h"
+
+namespace oblique::client::plot {
+namespace {
+
+struct NamedFormat {
+  std::string_view name;
+  std::string_view ending;
+  PictureFormat format;
+};
+constexpr std::array<NamedFormat, 5> kFormats{{
+    {"svg", ".svg", PictureFormat::kSvg},
+    {"png", ".png", PictureFormat::kPng},
+    {"csv", ".csv", PictureFormat::kCsv},
+    {"gnuplot", ".gnuplot", PictureFormat::kGnuplot},
+    {"gnuplot", ".gp", PictureFormat::kGnuplot},
+}};
+
+/// A folder that is gone with what is in it.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::string name = (std::filesystem::temp_directory_path() / "oblique-plot-XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr) {
+      throw std::runtime_error("no temporary folder can be made for rsvg-convert");
+    }
+    path_ = name;
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+std::string png_made_of(const std::string& svg) {
+  const TemporaryFolder folder;
+  const auto from = folder.path() / "picture.svg";
+  const auto to = folder.path() / "picture.png";
+  std::ofstream(from, std::ios::binary) << svg;
+  try {
+    ChildProcess converter(
+        {.program = "rsvg-convert",
+         .arguments = {"--format", "png", "--zoom", "2", "--output", to.string(), from.string()}});
+    while (converter.is_running()) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    if (!converter.succeeded()) {
+      throw std::runtime_error(
+          fmt::format("rsvg-convert {}: {}", converter.ending(), converter.last_words()));
+    }
+  } catch (const ProgramNotFound&) {
+    throw std::runtime_error(
+        "PNG is made by rsvg-convert, which is not here: install it (Debian: librsvg2-bin), or "
+        "take "
+        "--format svg");
+  }
+  std::ifstream file(to, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+/// What a link names, so that the link stays one.
+std::string behind_links(const std::string& file) {
+  std::error_code failed;
+  const auto target = std::filesystem::is_symlink(file, failed)
+                          ? std::filesystem::weakly_canonical(file, failed)
+                          : std::filesystem::path(file);
+  return failed || target.empty() ? file : target.string();
+}
+
+}  // namespace
+
+PictureFormat picture_format(const std::string& name, const std::string& file) {
+  constexpr std::string_view kAllowed = "svg, png, csv or gnuplot";
+  std::vector<std::string_view> names;
+  for (const auto& format : kFormats) {
+    if (name == format.name) {
+      return format.format;
+    }
+    names.push_back(format.name);
+  }
+  if (!name.empty()) {
+    throw solver::InputError(fmt::format("--format {} is not known{}: it must be {}", name,
+                                         protocol::did_you_mean(name, names), kAllowed));
+  }
+  if (file.empty()) {
+    return PictureFormat::kSvg;
+  }
+  std::string ending = std::filesystem::path(file).extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char letter) {
+    return letter >= 'A' && letter <= 'Z' ? static_cast<char>(letter + 32)
+                                          : static_cast<char>(letter);
+  });
+  for (const auto& format : kFormats) {
+    if (ending == format.ending) {
+      return format.format;
+    }
+  }
+  if (std::filesystem::exists(file) && !std::filesystem::is_regular_file(file)) {
+    return PictureFormat::kSvg;  // a pipe or a device has no ending
+  }
+  throw solver::InputError(
+      fmt::format("--out {}: its ending says no format; it must be .svg, .png, .csv or .gnuplot, "
+                  "or --format {}",
+                  file, kAllowed));
+}
+
+std::string picture_of(const Figure& figure, PictureFormat format, const Size& size) {
+  switch (format) {
+    case PictureFormat::kSvg:
+      return svg_of(figure, size);
+    case PictureFormat::kPng:
+      return png_made_of(svg_of(figure, size));
+    case PictureFormat::kCsv:
+      return csv_of(figure);
+    case PictureFormat::kGnuplot:
+      return gnuplot_of(figure, size);
+  }
+  throw std::logic_error("a format that is none");
+}
+
+void write_picture(const std::string& picture, PictureFormat format, const std::string& file) {
+  if (!file.empty()) {
+    NewFile out(behind_links(file));
+    out.append(picture);
+    out.finish();
+    return;
+  }
+  if (format == PictureFormat::kPng && isatty(STDOUT_FILENO) == 1) {
+    throw solver::InputError(
+        "--format png is no text, and standard output is a terminal: write it to a file with --out "
+        "FILE.png");
+  }
+  StandardOutput out;
+  out.append(picture);
+  out.finish();
+}
+
+Size size_of(const std::string& text) {
+  const auto times = text.find('x');
+  const auto width = solver::number_of(text.substr(0, times));
+  const auto height =
+      times == std::string::npos ? std::nullopt : solver::number_of(text.substr(times + 1));
+  const auto is_allowed = [](double side) {
+    return side >= kSmallestSide && side <= kLargestSide && side == static_cast<int>(side);
+  };
+  if (!width || !height || !is_allowed(*width) || !is_allowed(*height)) {
+    throw solver::InputError(fmt::format(
+        "--size {} is not allowed: it must be WIDTHxHEIGHT, whole numbers from {} to {}", text,
+        solver::exact_number(kSmallestSide), solver::exact_number(kLargestSide)));
+  }
+  return {*width, *height};
+}
+
+}  // namespace oblique::client::plot
