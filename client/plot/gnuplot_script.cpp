@@ -145,13 +145,14 @@ void write_points(std::string& out, const Panel& panel, const Figure& figure, st
                               : curve.has_line                  ? "lines"
                                                                 : "points";
     add(curve.x, curve.y, {}, curve.shade.value_or(0.0),
-        curve.shade
-            ? "using 1:2:3 with lines palette notitle"
-            : fmt::format("using 1:2 with {} title {} noenhanced", style, gnuplot_text(curve.name)));
+        curve.shade ? "using 1:2:3 with lines palette notitle"
+                    : fmt::format("using 1:2 with {} title {} noenhanced", style,
+                                  gnuplot_text(curve.name)));
   }
   for (const KnownPoint& known : panel.known) {
     add({known.x}, {known.y}, {}, 0.0,
-        fmt::format("using 1:2 with points pointtype 12 title {} noenhanced", gnuplot_text(known.name)));
+        fmt::format("using 1:2 with points pointtype 12 title {} noenhanced",
+                    gnuplot_text(known.name)));
   }
   out += plots.empty() ? "plot NaN notitle\n" : "set key outside right\n" + plots + '\n';
 }
@@ -167,7 +168,8 @@ std::string gnuplot_of(const Figure& figure, const Size& size) {
     out += fmt::format("set multiplot layout {},1 title {} noenhanced\n", figure.panels.size(),
                        gnuplot_text(figure.title));
   } else {
-    out += fmt::format("set title {} noenhanced\n", gnuplot_text(figure.title + "\n" + figure.subtitle));
+    out += fmt::format("set title {} noenhanced\n",
+                       gnuplot_text(figure.title + "\n" + figure.subtitle));
   }
   if (figure.colours) {
     write_palette(out, *figure.colours);

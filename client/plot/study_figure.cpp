@@ -316,7 +316,8 @@ Figure Drawing::scattered() {
   }
   const std::uint64_t points = dots.x.size();
   Figure figure = scatter(quantity(x, answer[0]), quantity(y, answer[1]), colour, dots, choice);
-  entitle(figure, fmt::format("{} over {}", y.name, x.name), points);
+  const std::string what = fmt::format("{} over {}", y.name, x.name);
+  entitle(figure, colour ? fmt::format("{}, coloured by {}", what, colour->name) : what, points);
   return figure;
 }
 

@@ -6,9 +6,11 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/output/speech.h"
+#include "client/formats/pager.h"
+#include "client/formats/sink.h"
 #include "client/plot/picture_file.h"
 #include "client/plot/plot_request.h"
+#include "client/plot/terminal/terminal_figure.h"
 #include "client/service/source_flags.h"
 #include "client/service/watching.h"
 #include "client/verbs/verbs.h"
@@ -53,11 +55,25 @@ protocol::Recipe recipe_for(const PlotFlags& flags, Source& source) {
 int plot_study(const PlotFlags& flags) {
   const auto size = plot::size_of(flags.size);
   const auto format = plot::picture_format(flags.format, flags.out);
+  if (flags.show && flags.out.empty() && !flags.format.empty()) {
+    throw solver::InputError(
+        "--show draws on standard output: give the file for --format as --out FILE");
+  }
   plot::check(flags.request);
   const auto source = open_source(flags.source);
   const auto shape = plot::shape_of(recipe_for(flags, *source));
   const auto figure =
       plot::figure_of(*source, shape, plot::completed(flags.request, shape), tell_line);
+  const bool is_for_terminal =
+      flags.out.empty() && flags.format.empty() && terminal_size().lines > 0;
+  if (flags.show || is_for_terminal) {
+    std::cout.flush();
+    write_all(STDOUT_FILENO, plot::text_of(figure, plot::look_of_standard_output()),
+              "standard output");
+    if (flags.out.empty()) {
+      return kDone;
+    }
+  }
   plot::write_picture(plot::picture_of(figure, format, size), format, flags.out);
   return kDone;
 }

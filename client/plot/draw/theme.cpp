@@ -15,10 +15,12 @@ namespace {
 std::string colours_for(const Inks& inks, bool is_dark) {
   std::string css = fmt::format(
       ".paper{{fill:{0}}}text{{fill:{1}}}.muted,text.muted{{fill:{2}}}.frame,.tick{{stroke:{2}}}"
-      ".grid{{stroke:{3}}}.miss{{stroke:{2}}}.fail{{stroke:{4}}}.bar{{fill:{5};stroke:{0}}}",
+      ".plate{{fill:{6}}}.grid{{stroke:{3}}}.miss{{stroke:{2}}}.fail{{stroke:{4}}}.bar{{fill:{5};"
+      "stroke:{0}}}",
       hexadecimal(inks.paper), hexadecimal(inks.ink), hexadecimal(inks.muted),
       hexadecimal(inks.faint), hexadecimal(inks.alarm),
-      hexadecimal(is_dark ? stroke(0).on_dark : stroke(0).on_light));
+      hexadecimal(is_dark ? stroke(0).on_dark : stroke(0).on_light),
+      is_dark ? "#dfe3e8" : hexadecimal(inks.paper));
   for (std::size_t i = 0; i < kStrokes; ++i) {
     const auto colour = hexadecimal(is_dark ? stroke(i).on_dark : stroke(i).on_light);
     css += fmt::format(".s{0},.m{0}{{stroke:{1}}}.f{0}{{fill:{1};stroke:{1}}}", i, colour);
@@ -57,7 +59,7 @@ std::string style_sheet() {
       ".miss{{stroke-opacity:.45}}.bar{{stroke-width:.5}}.line{{fill:none;stroke-width:1.7;"
       "stroke-linejoin:round;stroke-linecap:butt}}.mark{{fill:none;stroke-width:1.4}}"
       ".thin{{fill:none;stroke-width:1.1;stroke-linejoin:round}}.known{{stroke-width:1.5}}"
-      ".cells{{image-rendering:pixelated}}",
+      ".cells{{image-rendering:pixelated}}.grid.pale{{stroke:#cdd3da}}",
       kFontFamilies, svg_number(kTextSize), svg_number(kTitleSize), svg_number(kSmallSize));
   for (std::size_t i = 0; i < kStrokes; ++i) {
     if (!stroke(i).dashes.empty()) {

@@ -98,6 +98,7 @@ class Arranger {
   Layout arranged() {
     place_texts();
     place_legend();
+    grow_if_low();
     place_colour_bar();
     place_panels();
     return std::move(layout_);
@@ -138,9 +139,23 @@ class Arranger {
       layout_.legend_x = room_.right() + kBesideFrame;
       layout_.legend_y = room_.y;
     } else {
+      is_legend_below_ = true;
       room_.height -= layout_.legend.height + 6.0;
       layout_.legend_x = room_.x;
       layout_.legend_y = room_.bottom() + 6.0;
+    }
+  }
+
+  /// Gives panels at least half of the height that was asked for, and what can be read.
+  void grow_if_low() {
+    constexpr double kLowestPanel = 90.0;
+    const double least = std::max({200.0, 0.5 * layout_.size.height,
+                                   kLowestPanel * static_cast<double>(figure_.panels.size())});
+    const double lacking = least - room_.height;
+    if (lacking > 0.0) {
+      layout_.size.height += lacking;
+      room_.height += lacking;
+      layout_.legend_y += is_legend_below_ ? lacking : 0.0;
     }
   }
 
@@ -177,7 +192,11 @@ class Arranger {
     const double below = kTickLabelHeight + kLabelHeight + 4.0;
     double heights =
         room_.height - kBetweenPanels * (count - 1.0) - below * (is_one_axis ? 1.0 : count);
-    const bool labels_above = panels.size() > 2;
+    // A label that is longer than its panel is high is written level.
+    const bool labels_above =
+        panels.size() > 2 || std::any_of(panels.begin(), panels.end(), [&](const Panel& panel) {
+          return text_width(panel.y.label, kTextSize) > heights / count + 20.0;
+        });
     for (const Panel& panel : panels) {
       heights -= labels_above ? kSubtitleHeight : 0.0;
       heights -= panel.title.empty() ? 0.0 : kSubtitleHeight;
@@ -225,6 +244,7 @@ class Arranger {
   const Figure& figure_;
   Layout layout_;
   Box room_;  // that is not given away yet
+  bool is_legend_below_ = false;
 };
 
 }  // namespace

@@ -36,7 +36,8 @@ struct PanelLayout {
   bool has_label_above = false;  ///< the vertical axis' label, written level
 };
 
-/// Where everything of a picture is. Nothing covers anything else.
+/// Where everything of a picture is. Nothing covers anything else: where texts and the legend leave
+/// too little of the height for the panels, the picture is higher than it was to be.
 struct Layout {
   Size size;
   std::vector<std::string> title;

@@ -50,7 +50,11 @@ Figure line_chart(const Quantity& x, const Quantity& y, const std::optional<Quan
     figure.colours = colours_for(*by, bys, colours);
   }
   Panel panel;
-  panel.x = axis_of(x, range_of(xs, choice.is_x_logarithmic), choice.is_x_logarithmic);
+  // Marks at the ends are whole.
+  const bool has_marks = !has_shades && !series.empty() && series.front().x.size() <= kMostMarked;
+  const Range ends = range_of(xs, choice.is_x_logarithmic);
+  panel.x = axis_of(x, has_marks ? widened(ends, 0.02, choice.is_x_logarithmic) : ends,
+                    choice.is_x_logarithmic);
   panel.y = axis_of(
       y,
       choice.range ? *choice.range
@@ -62,7 +66,7 @@ Figure line_chart(const Quantity& x, const Quantity& y, const std::optional<Quan
   std::size_t number = 0;
   for (Series& each : series) {
     Curve curve;
-    curve.has_marks = !has_shades && each.x.size() <= kMostMarked;
+    curve.has_marks = has_marks;
     curve.name = by ? shown_value(*by, each.by) : std::string();
     curve.stroke = number++;
     if (has_shades) {

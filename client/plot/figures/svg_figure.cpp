@@ -47,7 +47,7 @@ void draw_y_axis(SvgWriter& svg, const FigureAxis& axis, const PanelLayout& plac
 }
 
 /// Lines across at the marks, where no cells would hide them.
-void draw_grid(SvgWriter& svg, const Panel& panel, const PanelLayout& place) {
+void draw_grid(SvgWriter& svg, const Panel& panel, const PanelLayout& place, bool has_plate) {
   if (panel.cells || panel.kinds) {
     return;
   }
@@ -68,14 +68,20 @@ void draw_grid(SvgWriter& svg, const Panel& panel, const PanelLayout& place) {
       path.line_to(x, frame.bottom());
     }
   }
-  svg.path(path.text(), "grid");
+  svg.path(path.text(), has_plate ? "grid pale" : "grid");
 }
 
 void draw_contents(SvgWriter& svg, const Figure& figure, const Panel& panel,
                    const PanelLayout& place) {
   const Places places(panel, place.frame);
+  // Colours from dark to light want the same ground on light and dark screens.
+  const bool has_plate = figure.colours && !panel.cells && (panel.dots || !panel.curves.empty());
+  if (has_plate) {
+    const Box& frame = place.frame;
+    svg.rectangle(frame.x, frame.y, frame.width, frame.height, "plate");
+  }
   draw_spans(svg, panel, places);
-  draw_grid(svg, panel, place);
+  draw_grid(svg, panel, place, has_plate);
   if (panel.cells && figure.colours) {
     draw_cells(svg, *panel.cells, *figure.colours, places);
   }

@@ -11,8 +11,7 @@
 namespace oblique::client::plot {
 namespace {
 
-/// Places on a line, with no more of them than pixels can tell apart: of those in one column of
-/// pixels the first, the lowest, the highest and the last.
+/// A line through places, without those that it passes within a tenth of a pixel anyway.
 class Polyline {
  public:
   void add(double x, double y) {
@@ -20,21 +19,16 @@ class Polyline {
       end_piece();
       return;
     }
-    const double column = std::floor(x * 2.0);
-    if (held_ > 0 && column == column_) {
-      lowest_ = std::max(lowest_, y);
-      highest_ = std::min(highest_, y);
-      last_x_ = x;
-      last_y_ = y;
-      ++held_;
+    if (is_new_) {
+      path_.move_to(x, y);
+      anchor_ = {x, y};
+      is_new_ = false;
       return;
     }
-    flush();
-    put(x, y);
-    column_ = column;
-    lowest_ = highest_ = last_y_ = y;
-    last_x_ = x;
-    held_ = 1;
+    if (!passes_those_between({x, y})) {
+      keep_last();
+    }
+    between_.push_back({x, y});
   }
 
   std::string text() {
@@ -43,61 +37,52 @@ class Polyline {
   }
 
  private:
-  void put(double x, double y) {
-    if (is_new_) {
-      path_.move_to(x, y);
-    } else {
-      path_.line_to(x, y);
-    }
-    is_new_ = false;
+  struct Place {
+    double x;
+    double y;
+  };
+
+  /// Whether the line from the anchor to `end` is as good as that through all places between.
+  bool passes_those_between(const Place& end) const {
+    constexpr double kTolerance = 0.1;
+    constexpr std::size_t kMostBetween = 64;  // bounds the work
+    const double dx = end.x - anchor_.x;
+    const double dy = end.y - anchor_.y;
+    const double squared = dx * dx + dy * dy;
+    return between_.size() < kMostBetween &&
+           std::all_of(between_.begin(), between_.end(), [&](const Place& place) {
+             const double px = place.x - anchor_.x;
+             const double py = place.y - anchor_.y;
+             const double cross = px * dy - py * dx;
+             const double along = px * dx + py * dy;
+             return along >= 0.0 && along <= squared &&
+                    cross * cross <= kTolerance * kTolerance * squared;
+           });
   }
-  void flush() {
-    if (held_ > 3) {
-      put(last_x_, lowest_);
-      put(last_x_, highest_);
+  void keep_last() {
+    if (!between_.empty()) {
+      anchor_ = between_.back();
+      path_.line_to(anchor_.x, anchor_.y);
+      between_.clear();
     }
-    if (held_ > 1) {
-      put(last_x_, last_y_);
-    }
-    held_ = 0;
   }
   void end_piece() {
-    flush();
+    keep_last();
     is_new_ = true;
   }
 
   PathData path_;
   bool is_new_ = true;
-  std::size_t held_ = 0;
-  double column_ = 0.0;
-  double lowest_ = 0.0;
-  double highest_ = 0.0;
-  double last_x_ = 0.0;
-  double last_y_ = 0.0;
+  Place anchor_{};
+  std::vector<Place> between_;  // those after the anchor that are not drawn yet
 };
 
 std::string line_of(const Curve& curve, const Places& places) {
-  const bool rises = std::is_sorted(curve.x.begin(), curve.x.end());
   Polyline line;
-  PathData all;
-  bool is_new = true;
   for (std::size_t i = 0; i < curve.x.size(); ++i) {
-    const double x = places.x(curve.x[i]);
-    const double y = places.y(curve.y[i]);
-    if (rises) {
-      line.add(x, y);
-    } else if (std::isnan(x) || std::isnan(y)) {
-      is_new = true;
-    } else {
-      if (is_new) {
-        all.move_to(x, y);
-      } else {
-        all.line_to(x, y);
-      }
-      is_new = false;
-    }
+    line.add(places.x(curve.x[i]), places.y(curve.y[i]));
   }
-  return rises ? line.text() : all.text();
+  return line.text();
 }
 
 std::string marks_of(const Curve& curve, const Places& places, Mark mark) {

@@ -1,0 +1,248 @@
+#include "client/plot/terminal/terminal_figure.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cstdlib>
+#include <optional>
+#include <string_view>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "client/formats/pager.h"
+#include "client/output/human_units.h"
+#include "client/output/terminal.h"
+#include "client/plot/figures/legend.h"
+#include "client/plot/terminal/terminal_marks.h"
+#include "proto/text.h"
+#include "worker/solver/model/number.h"
+
+namespace oblique::client::plot {
+namespace {
+
+constexpr std::size_t kNarrow = 50;
+
+std::string_view of_environment(const char* variable) {
+  const char* value = std::getenv(variable);
+  return value == nullptr ? "" : value;
+}
+
+bool knows_utf8() {
+  for (const char* variable : {"LC_ALL", "LC_CTYPE", "LANG"}) {
+    std::string value(of_environment(variable));
+    if (!value.empty()) {
+      std::transform(value.begin(), value.end(), value.begin(),
+                     [](unsigned char letter) { return static_cast<char>(std::tolower(letter)); });
+      return value.find("utf-8") != std::string::npos || value.find("utf8") != std::string::npos;
+    }
+  }
+  return false;
+}
+
+/// What ASCII has instead.
+std::string plain(std::string text) {
+  constexpr std::pair<std::string_view, std::string_view> kInstead[] = {
+      {"\u03bc", "mu"},  {"\u00b5", "u"},  {"\u03b7", "eta"},
+      {"\u03c1", "rho"}, {"\u00b2", "^2"}, {"\u00d7", "x"}};
+  for (const auto& [letter, instead] : kInstead) {
+    for (auto at = text.find(letter); at != std::string::npos; at = text.find(letter)) {
+      text.replace(at, letter.size(), instead);
+    }
+  }
+  text.erase(
+      std::remove_if(text.begin(), text.end(),
+                     [](char letter) { return (static_cast<unsigned char>(letter) & 0x80U); }),
+      text.end());
+  return text;
+}
+
+/// Lays one panel out in characters.
+class PanelText {
+ public:
+  PanelText(const Figure& figure, const Panel& panel, const TerminalLook& look, std::size_t lines)
+      : figure_(figure), panel_(panel), look_(look), canvas_(look.columns, lines) {}
+
+  std::string drawn() {
+    const bool lists_names = panel_.bars && !panel_.bars->names.empty();
+    const std::size_t lines = canvas_.lines() - 4;  // labels above and below, the axis, its numbers
+    const Ticks y_ticks = ticks_of(scaled(panel_.y), std::max(2, static_cast<int>(lines / 4)));
+    std::size_t widest = 0;
+    for (const Tick& tick : y_ticks.ticks) {
+      widest = std::max(widest, tick.label.size());
+    }
+    for (std::size_t i = 0; lists_names && i < panel_.bars->names.size(); ++i) {
+      widest = std::max(widest, characters_of(panel_.bars->names[i]).size());
+    }
+    widest = std::min(widest, look_.columns / 2);
+    frame_ = {widest + 2, 1, look_.columns - widest - 3, lines};
+    canvas_.write(frame_.left - 1, 0, shown(panel_.y.label + y_ticks.factor()));
+    draw_panel_text(canvas_, figure_, panel_, frame_, look_);
+    draw_left(lists_names ? Ticks() : y_ticks);
+    for (std::size_t i = 0; lists_names && i < panel_.bars->names.size(); ++i) {
+      auto name = shown(protocol::visible(panel_.bars->names[i]));
+      name = name.size() > widest ? name.substr(0, widest) : name;
+      canvas_.write_before(frame_.left - 1, frame_.top + i, name);
+    }
+    draw_below();
+    return canvas_.text(look_.is_plain ? Shading::kNone : look_.shading);
+  }
+
+ private:
+  std::string shown(const std::string& text) const { return look_.is_plain ? plain(text) : text; }
+
+  static Scale scaled(const FigureAxis& axis) {
+    return {axis.range.from * axis.per_unit, axis.range.to * axis.per_unit, axis.is_logarithmic};
+  }
+
+  void draw_left(const Ticks& ticks) {
+    for (std::size_t line = 0; line < frame_.lines; ++line) {
+      canvas_.put(frame_.left - 1, frame_.top + line, look_.is_plain ? "|" : "\u2502");
+    }
+    for (const Tick& tick : ticks.ticks) {
+      const auto line = static_cast<std::size_t>(
+          std::clamp((1.0 - tick.share) * static_cast<double>(frame_.lines), 0.0,
+                     static_cast<double>(frame_.lines - 1)));
+      if (!tick.label.empty()) {
+        canvas_.write_before(frame_.left - 1, frame_.top + line, tick.label);
+        canvas_.put(frame_.left - 1, frame_.top + line, look_.is_plain ? "+" : "\u2524");
+      }
+    }
+  }
+
+  void draw_below() {
+    const std::size_t axis = frame_.top + frame_.lines;
+    canvas_.put(frame_.left - 1, axis, look_.is_plain ? "+" : "\u2514");
+    for (std::size_t column = 0; column < frame_.columns; ++column) {
+      canvas_.put(frame_.left + column, axis, look_.is_plain ? "-" : "\u2500");
+    }
+    int wanted = std::max(2, static_cast<int>(frame_.columns / 12));
+    const Ticks ticks = ticks_of(scaled(panel_.x), wanted);
+    std::size_t free_from = 0;
+    for (const Tick& tick : ticks.ticks) {
+      const auto column = frame_.left + static_cast<std::size_t>(std::clamp(
+                                            tick.share * static_cast<double>(frame_.columns), 0.0,
+                                            static_cast<double>(frame_.columns - 1)));
+      const std::size_t half = tick.label.size() / 2;
+      if (tick.label.empty() || (free_from > 0 && column < free_from + half)) {
+        continue;
+      }
+      canvas_.put(column, axis, look_.is_plain ? "+" : "\u252c");
+      canvas_.write_around(column, axis + 1, tick.label);
+      free_from = column + half + 2;
+    }
+    canvas_.write_around(frame_.left + frame_.columns / 2, axis + 2,
+                         shown(panel_.x.label + ticks.factor()));
+  }
+
+  const Figure& figure_;
+  const Panel& panel_;
+  const TerminalLook& look_;
+  TextCanvas canvas_;
+  TextFrame frame_{};
+};
+
+/// A sign in its colour, and what it means.
+std::string signed_line(const std::string& sign, const std::optional<Colour>& ink,
+                        const std::string& meaning, const TerminalLook& look) {
+  TextCanvas line(look.columns, 1);
+  std::size_t column = 0;
+  for (const auto& character : characters_of(sign)) {
+    line.put(column++, 0, character, ink);
+  }
+  line.write(column + 1, 0, look.is_plain ? plain(meaning) : meaning);
+  return line.text(look.is_plain ? Shading::kNone : look.shading);
+}
+
+std::string legend_line(const LegendEntry& entry, const TerminalLook& look) {
+  using Sign = LegendEntry::Sign;
+  const std::string block = "\u2588\u2588";
+  switch (entry.sign) {
+    case Sign::kCurve:
+      return signed_line(look.is_plain ? std::string(2, stroke_sign(entry.number)) : "\u2501\u2501",
+                         stroke_on_terminal(entry.number), entry.name, look);
+    case Sign::kKind:
+      return signed_line(look.is_plain ? letter_of(entry.number) + ' ' : block,
+                         fill(entry.number).colour, entry.name, look);
+    case Sign::kRest:
+      return signed_line(look.is_plain ? ". " : block, kFillOfOthers.colour, entry.name, look);
+    case Sign::kNoResult:
+      return signed_line(look.is_plain ? "? " : block, colour_of(0x6e6e6e), entry.name, look);
+    case Sign::kFailed:
+      return signed_line(look.is_plain ? "! " : block, colour_of(0xff0000), entry.name, look);
+    case Sign::kKnown:
+      return signed_line("P ", stroke_on_terminal(7), entry.name, look);
+    case Sign::kSpan:
+      return {};
+  }
+  return {};
+}
+
+/// The shades from the lowest value to the highest.
+std::string colour_line(const Colours& colours, const TerminalLook& look) {
+  const Scale scale(colours.axis.range.from, colours.axis.range.to, colours.axis.is_logarithmic);
+  TextCanvas line(look.columns, 1);
+  const auto number = [&](double value) {
+    return solver::readable_number(value * colours.axis.per_unit, 4);
+  };
+  std::size_t column = 0;
+  const auto write = [&](const std::string& text) {
+    line.write(column, 0, text);
+    column += characters_of(text).size();
+  };
+  write((colours.has_below ? "<= " : "") + number(scale.from()) + ' ');
+  const std::size_t steps = look.is_plain ? 10 : 20;
+  for (std::size_t i = 0; i < steps; ++i) {
+    const double share = (static_cast<double>(i) + 0.5) / static_cast<double>(steps);
+    line.put(column++, 0, look.is_plain ? std::string(1, shade_sign(share)) : "\u2588",
+             shade(colours.palette, shade_number(share)));
+  }
+  write((colours.has_above ? " <= " : " ") + number(scale.to()) + "  " +
+        (look.is_plain ? plain(colours.axis.label) : colours.axis.label));
+  return line.text(look.is_plain ? Shading::kNone : look.shading);
+}
+
+}  // namespace
+
+TerminalLook look_of_standard_output() {
+  const TerminalSize size = terminal_size();
+  TerminalLook look;
+  if (size.lines > 0) {
+    look.columns = std::clamp<std::size_t>(size.columns, 24, 160);
+    look.lines = std::clamp<std::size_t>(size.lines, 16, 50);
+  }
+  look.is_plain = !may_colour(STDOUT_FILENO) || size.columns < kNarrow || !knows_utf8();
+  const auto colours = of_environment("COLORTERM");
+  look.shading = colours == "truecolor" || colours == "24bit" ? Shading::kTrue : Shading::k256;
+  return look;
+}
+
+std::string text_of(const Figure& figure, const TerminalLook& look) {
+  std::string after;
+  if (figure.colours) {
+    after += colour_line(*figure.colours, look);
+  }
+  for (const LegendEntry& entry : legend_of(figure)) {
+    after += legend_line(entry, look);
+  }
+  const auto note = [&look](const std::string& text) {
+    return protocol::visible(look.is_plain ? plain(text) : text) + '\n';
+  };
+  for (const auto& text : figure.notes) {
+    after += note(text);
+  }
+  std::string text = note(figure.title) + note(figure.subtitle);
+  const auto taken = static_cast<std::size_t>(std::count(after.begin(), after.end(), '\n')) + 3;
+  const std::size_t panels = std::max<std::size_t>(1, figure.panels.size());
+  for (const Panel& panel : figure.panels) {
+    const std::size_t room = look.lines > taken ? (look.lines - taken) / panels : 0;
+    std::size_t lines = std::max<std::size_t>(room, panels == 1 ? 16 : 12);
+    if (panel.bars && !panel.bars->names.empty()) {
+      lines = panel.bars->names.size() + 4;
+    }
+    text += PanelText(figure, panel, look, lines).drawn();
+  }
+  return text + after;
+}
+
+}  // namespace oblique::client::plot
