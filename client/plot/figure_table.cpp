@@ -58,8 +58,10 @@ std::string_view name_of(CellState state) {
 
 template <class Write>
 void each_cell(const Cells& cells, const Panel& panel, const Write& write) {
-  const auto x = middles_of(cells.x_edges, panel.x.is_logarithmic);
-  const auto y = middles_of(cells.y_edges, panel.y.is_logarithmic);
+  const auto x =
+      cells.x_values.empty() ? middles_of(cells.x_edges, panel.x.is_logarithmic) : cells.x_values;
+  const auto y =
+      cells.y_values.empty() ? middles_of(cells.y_edges, panel.y.is_logarithmic) : cells.y_values;
   for (std::size_t row = 0; row < y.size(); ++row) {
     for (std::size_t column = 0; column < x.size(); ++column) {
       write(x[column], y[row], row * x.size() + column);
@@ -120,25 +122,32 @@ void append_dots(std::string& out, const Panel& panel, const Figure& figure) {
   }
 }
 
-void append_curves(std::string& out, const Panel& panel, const Figure& figure) {
-  const bool has_shades = figure.colours.has_value();
-  CsvRow(out)
-      .text(has_shades ? figure.colours->axis.name : "line")
-      .text(panel.x.name)
-      .text(panel.y.name);
+void append_curves(std::string& out, const Panel& panel) {
+  const bool has_known = !panel.known.empty();
+  const bool is_told_apart = panel.curves.size() > 1 || has_known || !panel.by_name.empty();
+  {
+    CsvRow header(out);
+    if (is_told_apart) {
+      header.text(panel.by_name.empty() ? "line" : panel.by_name);
+    }
+    header.text(panel.x.name).text(panel.y.name);
+  }
+  const auto append = [&](const Curve* curve, const std::string& name, double x, double y) {
+    CsvRow row(out);
+    if (is_told_apart && curve != nullptr && curve->by) {
+      row.number(*curve->by);
+    } else if (is_told_apart) {
+      row.text(name);
+    }
+    row.number(x).number(y);
+  };
   for (const Curve& curve : panel.curves) {
     for (std::size_t i = 0; i < curve.x.size(); ++i) {
-      CsvRow row(out);
-      if (curve.shade) {
-        row.number(*curve.shade);
-      } else {
-        row.text(curve.name);
-      }
-      row.number(curve.x[i]).number(curve.y[i]);
+      append(&curve, curve.name, curve.x[i], curve.y[i]);
     }
   }
   for (const KnownPoint& known : panel.known) {
-    CsvRow(out).text(known.name).number(known.x).number(known.y);
+    append(nullptr, known.name, known.x, known.y);
   }
 }
 
@@ -152,13 +161,13 @@ std::string csv_of(const Figure& figure) {
       out += "\r\n";
     }
     if (panel.cells || panel.kinds) {
-      append_cells(out, panel, figure.colours ? figure.colours->axis.name : "kind");
+      append_cells(out, panel, panel.kinds ? panel.kinds->name : figure.colours->axis.name);
     } else if (panel.bars) {
       append_bars(out, panel);
     } else if (panel.dots) {
       append_dots(out, panel, figure);
     } else {
-      append_curves(out, panel, figure);
+      append_curves(out, panel);
     }
   }
   return out;

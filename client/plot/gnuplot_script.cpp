@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -74,7 +75,8 @@ void write_cells(std::string& out, const Panel& panel, const Figure& figure, std
   }
   out += "EOD\n";
   if (panel.kinds) {
-    out += fmt::format("set cbrange [-0.5:{}.5]\nunset colorbox\n", panel.kinds->kinds.size() - 1);
+    out += fmt::format("set cbrange [0:{}]\nunset colorbox\n",
+                       std::max<std::size_t>(2, panel.kinds->kinds.size()) - 1);
     out += "set palette defined (";
     for (std::size_t i = 0; i < panel.kinds->kinds.size(); ++i) {
       const Colour colour = panel.kinds->kinds[i].is_rest ? kFillOfOthers.colour : fill(i).colour;
@@ -169,7 +171,7 @@ std::string gnuplot_of(const Figure& figure, const Size& size) {
                        gnuplot_text(figure.title));
   } else {
     out += fmt::format("set title {} noenhanced\n",
-                       gnuplot_text(figure.title + "\n" + figure.subtitle));
+                       gnuplot_text(figure.title + ", " + figure.subtitle));
   }
   if (figure.colours) {
     write_palette(out, *figure.colours);

@@ -164,7 +164,6 @@ Figure Drawing::map() {
   }
   const bool are_axes = x.axis != nullptr && y.axis != nullptr;
   condition_ = condition_of(request_, shape_, {x, y}, are_axes && shape_.is_grid);
-  say(condition_);
   const auto answer = ask({x.column, y.column, request_.map, "status"});
   refuse_log_of_nothing("--log-colour", request_.is_colour_logarithmic, answer[2]);
   const MapRows rows{answer[0], answer[1], answer[2], answer[3]};
@@ -198,10 +197,10 @@ Figure Drawing::map() {
     gathered = gathered_in_bins(rows, side, side, axes.is_x_logarithmic, axes.is_y_logarithmic);
   }
   const std::string plural = request_.map.find("mode") != std::string::npos ? "modes" : "kinds";
-  Figure figure = gathered.has_names
-                      ? kind_map(axes, std::move(gathered.cells), std::move(gathered.names), plural)
-                      : heat_map(axes, quantity_of(answer[2].name, answer[2].unit),
-                                 std::move(gathered.cells), colours());
+  Figure figure = gathered.has_names ? kind_map(axes, answer[2].name, std::move(gathered.cells),
+                                                std::move(gathered.names), plural)
+                                     : heat_map(axes, quantity_of(answer[2].name, answer[2].unit),
+                                                std::move(gathered.cells), colours());
   if (gathered.most_in_a_cell > 1) {
     figure.notes.push_back(fmt::format("Cells hold up to {} points and show {}.",
                                        shown_count(gathered.most_in_a_cell),
@@ -217,6 +216,7 @@ Figure Drawing::map() {
       }
     }
   }
+  say(condition_);
   entitle(figure, answer[2].name, gathered.points);
   return figure;
 }
@@ -255,7 +255,6 @@ Figure Drawing::lines() {
     columns.push_back(by->column);
   }
   condition_ = condition_of(request_, shape_, drawn, x.axis != nullptr && shape_.is_grid);
-  say(condition_);
   const auto answer = ask(columns);
   if (answer[1].has_texts()) {
     throw solver::InputError(
@@ -280,6 +279,7 @@ Figure Drawing::lines() {
         "{} without a value: gaps in the lines.",
         gaps == 1 ? "1 point is" : shown_count(static_cast<std::uint64_t>(gaps)) + " points are"));
   }
+  say(condition_);
   entitle(figure, answer[1].name, answer[0].numbers.size());
   return figure;
 }
@@ -304,8 +304,8 @@ Figure Drawing::scattered() {
   refuse_log_of_nothing("--log-x", request_.is_x_logarithmic, answer[0]);
   refuse_log_of_nothing("--log-y", request_.is_y_logarithmic, answer[1]);
   ChartChoice choice;
-  choice.is_x_logarithmic = request_.is_x_logarithmic;
-  choice.is_y_logarithmic = request_.is_y_logarithmic;
+  choice.is_x_logarithmic = request_.is_x_logarithmic || is_logarithmic_by_study(x);
+  choice.is_y_logarithmic = request_.is_y_logarithmic || is_logarithmic_by_study(y);
   choice.colours = colours();
   std::optional<Quantity> colour;
   Dots dots{std::move(answer[0].numbers), std::move(answer[1].numbers), {}};

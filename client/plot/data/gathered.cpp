@@ -134,9 +134,12 @@ std::vector<double> axis_values(std::vector<double> of_study, const AnswerColumn
 GatheredCells gathered_on(const MapRows& rows, const std::vector<double>& x_values,
                           const std::vector<double>& y_values, bool is_x_logarithmic,
                           bool is_y_logarithmic) {
-  return gathered_at(rows, places_among(x_values, rows.x), places_among(y_values, rows.y),
-                     CellGatherer(edges_between(x_values, is_x_logarithmic),
-                                  edges_between(y_values, is_y_logarithmic)));
+  auto gathered = gathered_at(rows, places_among(x_values, rows.x), places_among(y_values, rows.y),
+                              CellGatherer(edges_between(x_values, is_x_logarithmic),
+                                           edges_between(y_values, is_y_logarithmic)));
+  gathered.cells.x_values = x_values;
+  gathered.cells.y_values = y_values;
+  return gathered;
 }
 
 GatheredCells gathered_in_bins(const MapRows& rows, std::size_t x_cells, std::size_t y_cells,

@@ -104,10 +104,11 @@ std::vector<Outline> outlines_of(const KindGrid& grid, int kind) {
 
 std::vector<Outline> boundaries_of(const KindGrid& grid) {
   std::vector<Outline> lines;
+  const auto differ = [](int one, int other) { return one != other && one >= 0 && other >= 0; };
   for (std::size_t y = 1; y < grid.rows; ++y) {
     for (std::size_t x = 0; x < grid.columns; ++x) {
       const std::size_t begin = x;
-      while (x < grid.columns && grid.at(x, y) != grid.at(x, y - 1)) {
+      while (x < grid.columns && differ(grid.at(x, y), grid.at(x, y - 1))) {
         ++x;
       }
       if (x > begin) {
@@ -118,7 +119,7 @@ std::vector<Outline> boundaries_of(const KindGrid& grid) {
   for (std::size_t x = 1; x < grid.columns; ++x) {
     for (std::size_t y = 0; y < grid.rows; ++y) {
       const std::size_t begin = y;
-      while (y < grid.rows && grid.at(x, y) != grid.at(x - 1, y)) {
+      while (y < grid.rows && differ(grid.at(x, y), grid.at(x - 1, y))) {
         ++y;
       }
       if (y > begin) {

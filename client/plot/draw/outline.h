@@ -33,7 +33,7 @@ struct KindGrid {
 std::vector<Outline> outlines_of(const KindGrid& grid, int kind);
 
 /// Lines between cells of different kinds, in straight pieces, each once; none along the grid's own
-/// border.
+/// border, nor along cells of a kind below 0.
 std::vector<Outline> boundaries_of(const KindGrid& grid);
 
 /// A cell of that kind with as much of its kind around it as there is: the side of the largest

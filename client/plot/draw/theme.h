@@ -29,8 +29,9 @@ inline constexpr Inks kDarkInks{colour_of(0x14171c), colour_of(0xe8eaed), colour
 inline constexpr std::size_t kSpanKinds = 4;
 
 /// The styles of all classes that pictures use, light, and dark on screens of those who want that.
-/// Classes: paper, title, text, small, muted, faint, frame, tick, grid, letter, plate (of colours on light and dark alike), boundary, missing,
-/// failed, s0 to s7 and m0 to m7 for lines and marks, p0 to p3 for spans, bar.
+/// Classes: paper, title, text, small, muted, faint, frame, tick, grid, letter, plate (of colours
+/// on light and dark alike), boundary, missing, failed, s0 to s7 and m0 to m7 for lines and marks,
+/// p0 to p3 for spans, bar.
 std::string style_sheet();
 
 /// Patterns for hatchings: their id is "h1" for Hatch 1 and so on, and "missing" and "failed".

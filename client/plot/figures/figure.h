@@ -20,6 +20,7 @@ struct FigureAxis {
   Range range{0.0, 1.0};
   bool is_logarithmic = false;
   double per_unit = 1.0;  ///< so much is written at a tick for 1 in SI units
+  bool is_whole = false;  ///< of numbers of points: marked at whole ones only
 };
 
 /// A line through points in their order, marks at them, or both. NaN is a gap.
@@ -29,6 +30,7 @@ struct Curve {
   std::vector<double> y = {};
   std::size_t stroke = 0;            ///< colour, dashes and shape of marks; see plot::stroke
   std::optional<double> shade = {};  ///< instead: a value of the figure's colours
+  std::optional<double> by = {};     ///< the value that tells it from others, for tables
   bool has_line = true;
   bool has_marks = false;
 };
@@ -57,6 +59,8 @@ struct Cells {
   std::vector<double> y_edges = {};
   std::vector<double> values = {};  ///< NaN where the state is another than kSolved
   std::vector<CellState> states = {};
+  std::vector<double> x_values = {};  ///< where the cells stand for one value each; else none
+  std::vector<double> y_values = {};
 
   std::size_t columns() const { return x_edges.empty() ? 0 : x_edges.size() - 1; }
   std::size_t rows() const { return y_edges.empty() ? 0 : y_edges.size() - 1; }
@@ -72,7 +76,8 @@ struct Kind {
 
 /// Cells of which each is of a kind: `values` of the cells are numbers of kinds.
 struct KindCells {
-  Cells cells;
+  std::string name;  ///< of the column, for tables
+  Cells cells = {};
   std::vector<Kind> kinds = {};
   std::vector<std::string> names = {};  ///< of the cells before kinds were gathered, for tables
 };
@@ -98,6 +103,7 @@ struct Panel {
   bool has_equal_aspect = false;  ///< a metre is as long upwards as sideways
   double share = 1.0;             ///< of the height that panels have together
   std::string title = {};
+  std::string by_name = {};  ///< of the column that tells curves apart, for tables
   std::vector<Span> spans = {};
   std::optional<Cells> cells = {};
   std::optional<KindCells> kinds = {};

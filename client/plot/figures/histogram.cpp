@@ -43,6 +43,11 @@ int bins_for(const std::vector<double>& places, const Scale& scale) {
       std::clamp(width > 0.0 ? std::ceil(1.0 / width) : kFewest, kFewest, 1.0 * kMostBins));
 }
 
+/// number * step of a step that is 1, 2 or 5 times a power of ten: the double that people write.
+double multiple(double number, double step) {
+  return step < 1.0 ? number / std::round(1.0 / step) : number * step;
+}
+
 /// Edges at round values, from below the smallest to above the largest; on a logarithmic scale
 /// equal ratios.
 std::vector<double> edges_for(const Scale& scale, int bins) {
@@ -60,7 +65,7 @@ std::vector<double> edges_for(const Scale& scale, int bins) {
   const double step = ticks.ticks[1].value - ticks.ticks[0].value;
   const double first = std::floor(scale.from() / step + 1e-9);
   for (int i = 0; i <= 2 * kMostBins; ++i) {
-    edges.push_back((first + i) * step);
+    edges.push_back(multiple(first + i, step));
     if (edges.back() > scale.to()) {
       break;
     }
@@ -117,6 +122,7 @@ Figure histogram(const Quantity& quantity, const std::vector<double>& values,
              is_y_logarithmic ? Range{0.5, std::max(tallest * 1.5, 1.5)}
                               : Range{0.0, std::max(tallest * 1.05, 1.0)},
              is_y_logarithmic};
+  panel.y.is_whole = true;
   panel.bars = std::move(bars);
   figure.panels.push_back(std::move(panel));
   say_left_out(figure, values.size(), kept.size());
@@ -154,6 +160,7 @@ Figure name_counts(const Quantity& quantity, const std::vector<std::string>& nam
              quantity.name,
              {0.0, std::max<double>(1.0, static_cast<double>(bars.names.size()))},
              false};
+  panel.x.is_whole = true;
   if (bars.names.empty()) {
     figure.notes.emplace_back("Nothing to draw: no point has a value.");
   } else {

@@ -43,8 +43,16 @@ bool labels_fit(const Ticks& ticks, double width) {
   return true;
 }
 
+/// So many marks that there are no halves between whole numbers.
+int fewer_if_whole(const FigureAxis& axis, int wanted) {
+  const double span = axis.range.to - axis.range.from;
+  return axis.is_whole && !axis.is_logarithmic
+             ? static_cast<int>(std::clamp(span, 1.0, static_cast<double>(wanted)))
+             : wanted;
+}
+
 Ticks level_ticks(const FigureAxis& axis, double width) {
-  int wanted = std::clamp(static_cast<int>(width / 60.0), 1, 10);
+  int wanted = fewer_if_whole(axis, std::clamp(static_cast<int>(width / 60.0), 1, 10));
   Ticks ticks = ticks_of(scale_of(axis), wanted);
   while (wanted > 1 && !labels_fit(ticks, width)) {
     ticks = ticks_of(scale_of(axis), --wanted);
@@ -53,7 +61,8 @@ Ticks level_ticks(const FigureAxis& axis, double width) {
 }
 
 Ticks upright_ticks(const FigureAxis& axis, double height) {
-  return ticks_of(scale_of(axis), std::clamp(static_cast<int>(height / 38.0), 2, 10));
+  return ticks_of(scale_of(axis),
+                  fewer_if_whole(axis, std::clamp(static_cast<int>(height / 38.0), 2, 10)));
 }
 
 /// Marks of a vertical axis that lists names, from above.
@@ -132,7 +141,9 @@ class Arranger {
     }
     const LegendLayout beside =
         laid_out_beside(layout_.entries, std::min(0.36 * room_.width, 290.0));
-    const bool is_beside = layout_.size.width >= kFewestSideBySide && beside.height <= room_.height;
+    // A colour bar has the place beside.
+    const bool is_beside = !figure_.colours && layout_.size.width >= kFewestSideBySide &&
+                           beside.height <= room_.height;
     layout_.legend = is_beside ? beside : laid_out_below(layout_.entries, room_.width);
     if (is_beside) {
       room_.width -= beside.width + kBesideFrame;

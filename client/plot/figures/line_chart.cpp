@@ -69,6 +69,10 @@ Figure line_chart(const Quantity& x, const Quantity& y, const std::optional<Quan
     curve.has_marks = has_marks;
     curve.name = by ? shown_value(*by, each.by) : std::string();
     curve.stroke = number++;
+    if (by) {
+      curve.by = each.by;
+      panel.by_name = by->name;
+    }
     if (has_shades) {
       curve.shade = each.by;
     }

@@ -99,6 +99,10 @@ Figure heat_map(const MapAxes& axes, const Quantity& value, Cells cells,
   Panel panel = panel_of(axes, cells);
   panel.cells = std::move(cells);
   figure.panels.push_back(std::move(panel));
+  if (const Range all = range_of(drawn); drawn.size() > 1 && all.from == all.to) {
+    figure.notes.push_back(
+        fmt::format("All cells have one value: {}.", shown_value(value, all.from)));
+  }
   if (drawn.empty()) {
     figure.notes.emplace_back("Nothing to draw: no cell has a value.");
   }
@@ -106,21 +110,21 @@ Figure heat_map(const MapAxes& axes, const Quantity& value, Cells cells,
   return figure;
 }
 
-Figure kind_map(const MapAxes& axes, Cells cells, std::vector<std::string> names,
-                const std::string& plural) {
+Figure kind_map(const MapAxes& axes, const std::string& name, Cells cells,
+                std::vector<std::string> names, const std::string& plural) {
   std::map<std::string, std::uint64_t> counts;
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (cells.states[i] == CellState::kSolved) {
       ++counts[names[i]];
     }
   }
-  KindCells map;
+  KindCells map{.name = name};
   map.kinds = gathered(counts, plural);
   std::map<std::string, std::size_t> numbers;
   for (std::size_t k = 0; k < map.kinds.size(); ++k) {
     numbers.emplace(map.kinds[k].name, k);
-    for (const auto& name : map.kinds[k].gathered) {
-      numbers.emplace(name, k);
+    for (const auto& each : map.kinds[k].gathered) {
+      numbers.emplace(each, k);
     }
   }
   for (std::size_t i = 0; i < names.size(); ++i) {

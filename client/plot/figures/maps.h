@@ -36,7 +36,7 @@ Colours colours_for(const Quantity& quantity, const std::vector<double>& values,
 inline constexpr std::size_t kMostKinds = 12;
 
 /// A map of kinds, as of modes: `names` has the kind of each solved cell.
-Figure kind_map(const MapAxes& axes, Cells cells, std::vector<std::string> names,
-                const std::string& plural = "kinds");
+Figure kind_map(const MapAxes& axes, const std::string& name, Cells cells,
+                std::vector<std::string> names, const std::string& plural = "kinds");
 
 }  // namespace oblique::client::plot
