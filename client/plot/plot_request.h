@@ -13,21 +13,21 @@ namespace oblique::client::plot {
 /// What to draw of a study, as flags say it. Texts are SQL over the columns of queries. At most one
 /// of the first four is given; with none of them what suits the study is drawn.
 struct PlotRequest {
-  std::string study;
-  std::string map;        ///< an output over two axes
-  std::string lines;      ///< an output over one axis
-  std::string scatter;    ///< two columns: "X,Y"
-  std::string histogram;  ///< a column
-  std::string x;          ///< empty: chosen
-  std::string y;
-  std::string by;
-  std::string colour;
-  std::string where;
-  std::vector<std::string> at;  ///< "KEY=VALUE"
+  std::string study{};
+  std::string map{};        ///< an output over two axes
+  std::string lines{};      ///< an output over one axis
+  std::string scatter{};    ///< two columns: "X,Y"
+  std::string histogram{};  ///< a column
+  std::string x{};          ///< empty: chosen
+  std::string y{};
+  std::string by{};
+  std::string colour{};
+  std::string where{};
+  std::vector<std::string> at{};  ///< "KEY=VALUE"
   bool is_x_logarithmic = false;
   bool is_y_logarithmic = false;
   bool is_colour_logarithmic = false;
-  std::string range;  ///< "FROM:TO"
+  std::string range{};  ///< "FROM:TO"
   std::string palette{"viridis"};
 };
 

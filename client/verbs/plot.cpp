@@ -8,7 +8,7 @@
 
 #include "client/formats/pager.h"
 #include "client/formats/sink.h"
-#include "client/plot/picture_file.h"
+#include "client/plot/files/picture_file.h"
 #include "client/plot/plot_request.h"
 #include "client/plot/terminal/terminal_figure.h"
 #include "client/service/source_flags.h"

@@ -154,11 +154,11 @@ GatheredCells gathered_in_bins(const MapRows& rows, std::size_t x_cells, std::si
                      CellGatherer(edges_of_bins(x, x_cells), edges_of_bins(y, y_cells)));
 }
 
-std::vector<Series> gathered_lines(const AnswerColumn& x, const AnswerColumn& y,
-                                   const AnswerColumn* by) {
+GatheredLines gathered_lines(const AnswerColumn& x, const AnswerColumn& y, const AnswerColumn* by,
+                             const std::vector<double>& x_values) {
   struct Sum {
     double sum = 0.0;
-    double count = 0.0;
+    std::uint64_t count = 0;
   };
   std::map<double, std::map<double, Sum>> lines;
   for (std::size_t row = 0; row < x.numbers.size(); ++row) {
@@ -169,19 +169,28 @@ std::vector<Series> gathered_lines(const AnswerColumn& x, const AnswerColumn& y,
     Sum& sum = lines[value_of_by][x.numbers[row]];
     if (!std::isnan(y.numbers[row])) {
       sum.sum += y.numbers[row];
-      sum.count += 1.0;
+      ++sum.count;
     }
   }
-  std::vector<Series> series;
-  for (const auto& [value, points] : lines) {
+  GatheredLines gathered;
+  for (auto& [value, points] : lines) {
+    const double first = points.begin()->first;
+    const double last = points.rbegin()->first;
+    for (const double at : x_values) {
+      if (at > first && at < last) {
+        points.try_emplace(at);
+      }
+    }
     Series line{.by = value, .x = {}, .y = {}};
     for (const auto& [at, sum] : points) {
       line.x.push_back(at);
-      line.y.push_back(sum.count > 0.0 ? sum.sum / sum.count : kNoNumber);
+      line.y.push_back(sum.count > 0 ? sum.sum / static_cast<double>(sum.count) : kNoNumber);
+      gathered.gaps += sum.count > 0 ? 0U : 1U;
+      gathered.most_at_a_place = std::max(gathered.most_at_a_place, sum.count);
     }
-    series.push_back(std::move(line));
+    gathered.series.push_back(std::move(line));
   }
-  return series;
+  return gathered;
 }
 
 }  // namespace oblique::client::plot

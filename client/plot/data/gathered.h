@@ -40,9 +40,17 @@ GatheredCells gathered_on(const MapRows& rows, const std::vector<double>& x_valu
 GatheredCells gathered_in_bins(const MapRows& rows, std::size_t x_cells, std::size_t y_cells,
                                bool is_x_logarithmic, bool is_y_logarithmic);
 
-/// Rows as lines, one a value of `by` (nullptr: one line), each by rising x; several rows at one x
-/// give their mean. Failed points are gaps.
-std::vector<Series> gathered_lines(const AnswerColumn& x, const AnswerColumn& y,
-                                   const AnswerColumn* by);
+/// Rows as lines.
+struct GatheredLines {
+  std::vector<Series> series = {};
+  std::uint64_t gaps = 0;             ///< places without a value
+  std::uint64_t most_at_a_place = 0;  ///< rows with a value
+};
+
+/// One line a value of `by` (nullptr: one line), each by rising x; several rows at one x give their
+/// mean. Rows without a value are gaps, and so are the `x_values` between the ends of a line that
+/// have no row.
+GatheredLines gathered_lines(const AnswerColumn& x, const AnswerColumn& y, const AnswerColumn* by,
+                             const std::vector<double>& x_values);
 
 }  // namespace oblique::client::plot

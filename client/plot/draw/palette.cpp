@@ -56,10 +56,11 @@ std::size_t shade_number(double share) {
 }
 
 Fill fill(std::size_t kind) {
-  // Neighbours in the order differ in both; the first, which has most of the area, has no hatching.
+  // Kinds with the same hatching have colours that all eyes tell apart (palette_test); the first,
+  // which has most of the area, has none.
   const std::size_t number = kind % kFills;
   const std::size_t round = number / kFillColours.size();
-  const std::size_t hatch = (number + round * 3) % kHatches;
+  const std::size_t hatch = (number + round * 4) % kHatches;
   return {colour_of(kFillColours[number % kFillColours.size()]), static_cast<Hatch>(hatch)};
 }
 

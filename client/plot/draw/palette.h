@@ -34,7 +34,7 @@ struct Fill {
 };
 
 /// The fills of kinds, from the one that is met most. So many differ; more begin again.
-inline constexpr std::size_t kFills = 24;
+inline constexpr std::size_t kFills = 16;
 Fill fill(std::size_t kind);
 /// Of what belongs to no kind of its own.
 inline constexpr Fill kFillOfOthers{colour_of(0xdddddd), Hatch::kDots};

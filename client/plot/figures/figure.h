@@ -15,8 +15,8 @@ namespace oblique::client::plot {
 
 /// One axis of a panel.
 struct FigureAxis {
-  std::string label;  ///< for people, with its unit: "contact duration [us]"
-  std::string name;   ///< of the column, for tables
+  std::string label{};  ///< for people, with its unit: "contact duration [us]"
+  std::string name;     ///< of the column, for tables
   Range range{0.0, 1.0};
   bool is_logarithmic = false;
   double per_unit = 1.0;  ///< so much is written at a tick for 1 in SI units
@@ -25,7 +25,7 @@ struct FigureAxis {
 
 /// A line through points in their order, marks at them, or both. NaN is a gap.
 struct Curve {
-  std::string name;  ///< for the legend; empty: it has no entry
+  std::string name{};  ///< for the legend; empty: it has no entry
   std::vector<double> x = {};
   std::vector<double> y = {};
   std::size_t stroke = 0;            ///< colour, dashes and shape of marks; see plot::stroke
@@ -51,7 +51,13 @@ struct KnownPoint {
 };
 
 /// What is known of a cell of a map.
-enum class CellState : std::uint8_t { kSolved, kNoResult, kFailed, kNoValue };
+enum class CellState : std::uint8_t {
+  kSolved,
+  kNoResult,  ///< not solved yet, or left out by a condition
+  kFailed,
+  kNoValue,  ///< solved, but without that output, or with one that has no place
+  kNoPoint,  ///< the study has no point there
+};
 
 /// Cells between edges, with a value each, row by row from the lowest.
 struct Cells {
@@ -68,7 +74,7 @@ struct Cells {
 
 /// A kind of cells in a map of kinds, as a mode.
 struct Kind {
-  std::string name;
+  std::string name{};
   std::uint64_t cells = 0;
   bool is_rest = false;                    ///< stands for all that have no kind of their own
   std::vector<std::string> gathered = {};  ///< of the rest: the names
@@ -98,8 +104,8 @@ struct Dots {
 
 /// A frame with two axes and what is in it.
 struct Panel {
-  FigureAxis x;
-  FigureAxis y;
+  FigureAxis x{};
+  FigureAxis y{};
   bool has_equal_aspect = false;  ///< a metre is as long upwards as sideways
   double share = 1.0;             ///< of the height that panels have together
   std::string title = {};
@@ -115,7 +121,7 @@ struct Panel {
 
 /// What colours mean.
 struct Colours {
-  FigureAxis axis;
+  FigureAxis axis{};
   Palette palette = Palette::kViridis;
   bool has_below = false;  ///< there are values below the range, drawn as its lower end
   bool has_above = false;
@@ -129,7 +135,7 @@ struct Gaps {
 };
 
 struct Figure {
-  std::string title;
+  std::string title{};
   std::string subtitle = {};
   std::vector<Panel> panels = {};  ///< one below the other
   std::optional<Colours> colours = {};

@@ -43,6 +43,18 @@ bool labels_fit(const Ticks& ticks, double width) {
   return true;
 }
 
+/// Labels one below the other do not touch.
+bool lines_fit(const Ticks& ticks, double height) {
+  double last = -1e9;
+  for (const Tick& tick : ticks.ticks) {
+    if (!tick.label.empty() && tick.share * height < last + kSmallSize + 2.0) {
+      return false;
+    }
+    last = tick.label.empty() ? last : tick.share * height;
+  }
+  return true;
+}
+
 /// So many marks that there are no halves between whole numbers.
 int fewer_if_whole(const FigureAxis& axis, int wanted) {
   const double span = axis.range.to - axis.range.from;
@@ -61,8 +73,20 @@ Ticks level_ticks(const FigureAxis& axis, double width) {
 }
 
 Ticks upright_ticks(const FigureAxis& axis, double height) {
-  return ticks_of(scale_of(axis),
-                  fewer_if_whole(axis, std::clamp(static_cast<int>(height / 38.0), 2, 10)));
+  int wanted = fewer_if_whole(axis, std::clamp(static_cast<int>(height / 38.0), 1, 10));
+  Ticks ticks = ticks_of(scale_of(axis), wanted);
+  while (wanted > 1 && !lines_fit(ticks, height)) {
+    ticks = ticks_of(scale_of(axis), --wanted);
+  }
+  if (!lines_fit(ticks, height)) {
+    // The lowest alone.
+    bool is_first = true;
+    for (Tick& tick : ticks.ticks) {
+      tick.label = is_first ? tick.label : std::string();
+      is_first = is_first && tick.label.empty();
+    }
+  }
+  return ticks;
 }
 
 /// Marks of a vertical axis that lists names, from above.
@@ -159,7 +183,7 @@ class Arranger {
 
   /// Gives panels at least half of the height that was asked for, and what can be read.
   void grow_if_low() {
-    constexpr double kLowestPanel = 90.0;
+    constexpr double kLowestPanel = 120.0;
     const double least = std::max({200.0, 0.5 * layout_.size.height,
                                    kLowestPanel * static_cast<double>(figure_.panels.size())});
     const double lacking = least - room_.height;

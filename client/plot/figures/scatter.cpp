@@ -49,8 +49,7 @@ Cells gathered_in_cells(const Dots& dots, const Scale& x, const Scale& y) {
     cells.values.push_back(counts[i] == 0        ? std::numeric_limits<double>::quiet_NaN()
                            : dots.shades.empty() ? n
                                                  : sums[i] / n);
-    // A cell without points is empty, not unknown.
-    cells.states.push_back(counts[i] == 0 ? CellState::kNoValue : CellState::kSolved);
+    cells.states.push_back(counts[i] == 0 ? CellState::kNoPoint : CellState::kSolved);
   }
   return cells;
 }

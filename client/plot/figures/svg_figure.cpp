@@ -82,10 +82,11 @@ void draw_contents(SvgWriter& svg, const Figure& figure, const Panel& panel,
   }
   draw_spans(svg, panel, places);
   draw_grid(svg, panel, place, has_plate);
-  if (panel.cells && figure.colours) {
+  const auto has_cells = [](const Cells& cells) { return cells.columns() > 0 && cells.rows() > 0; };
+  if (panel.cells && figure.colours && has_cells(*panel.cells)) {
     draw_cells(svg, *panel.cells, *figure.colours, places);
   }
-  if (panel.kinds) {
+  if (panel.kinds && has_cells(panel.kinds->cells)) {
     draw_kinds(svg, *panel.kinds, places);
   }
   if (panel.bars) {

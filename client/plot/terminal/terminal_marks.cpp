@@ -48,6 +48,7 @@ class MapLook {
       case CellState::kFailed:
         return colour_of(0xff0000);
       case CellState::kNoValue:
+      case CellState::kNoPoint:
         return std::nullopt;
       case CellState::kSolved:
         break;
@@ -66,6 +67,7 @@ class MapLook {
       case CellState::kFailed:
         return "!";
       case CellState::kNoValue:
+      case CellState::kNoPoint:
         return " ";
       case CellState::kSolved:
         break;

@@ -1,4 +1,4 @@
-#include "client/plot/figure_table.h"
+#include "client/plot/files/figure_table.h"
 
 #include <cmath>
 #include <vector>
@@ -15,7 +15,7 @@ namespace {
 class CsvRow {
  public:
   explicit CsvRow(std::string& out) : out_(out) {}
-  ~CsvRow() { out_ += "\r\n"; }
+  ~CsvRow() { out_ += "\n"; }
   CsvRow(const CsvRow&) = delete;
   CsvRow& operator=(const CsvRow&) = delete;
 
@@ -52,6 +52,8 @@ std::string_view name_of(CellState state) {
       return "failed";
     case CellState::kNoValue:
       return "no value";
+    case CellState::kNoPoint:
+      return "no point";
   }
   return "";
 }
@@ -158,7 +160,7 @@ std::string csv_of(const Figure& figure) {
   for (std::size_t i = 0; i < figure.panels.size(); ++i) {
     const Panel& panel = figure.panels[i];
     if (i > 0) {
-      out += "\r\n";
+      out += "\n";
     }
     if (panel.cells || panel.kinds) {
       append_cells(out, panel, panel.kinds ? panel.kinds->name : figure.colours->axis.name);

@@ -5,7 +5,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/plot/draw/palette.h"
-#include "client/plot/figure_table.h"
+#include "client/plot/files/figure_table.h"
 #include "proto/text.h"
 #include "worker/solver/model/number.h"
 

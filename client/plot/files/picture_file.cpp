@@ -1,4 +1,4 @@
-#include "client/plot/picture_file.h"
+#include "client/plot/files/picture_file.h"
 
 #include <unistd.h>
 
@@ -17,8 +17,8 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/formats/sink.h"
-#include "client/plot/figure_table.h"
 #include "client/plot/figures/svg_figure.h"
+#include "client/plot/files/figure_table.h"
 #include "client/service/child_process.h"
 #include "proto/suggestion.h"
 #include "worker/solver/model/errors.h"

@@ -1,0 +1,74 @@
+#include "client/plot/plot_request.h"
+
+#include <utility>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "client/plot/axis_choice.h"
+#include "client/plot/drawing.h"
+#include "server/asking/sql/sql_expression.h"
+#include "worker/solver/model/errors.h"
+
+namespace oblique::client::plot {
+
+void check(const PlotRequest& request) {
+  using server::SqlPart;
+  const std::vector<std::pair<const char*, const std::string*>> texts{
+      {"--map", &request.map},
+      {"--lines", &request.lines},
+      {"--scatter", &request.scatter},
+      {"--histogram", &request.histogram},
+      {"--x", &request.x},
+      {"--y", &request.y},
+      {"--by", &request.by},
+      {"--colour", &request.colour}};
+  for (const auto& [flag, text] : texts) {
+    if (!text->empty()) {
+      server::check_sql_part(flag, *text, SqlPart::kColumns);
+    }
+  }
+  if (!request.where.empty()) {
+    server::check_sql_part("--where", request.where, SqlPart::kCondition);
+  }
+  if (!request.scatter.empty() && names_in(request.scatter).size() != 2) {
+    throw solver::InputError(fmt::format(
+        "--scatter {} is not allowed: it must be two columns, as mu,fn_peak_N", request.scatter));
+  }
+  (void)palette_named(request.palette);
+  (void)range_given(request.range);
+}
+
+PlotRequest completed(PlotRequest request, const StudyShape& shape) {
+  const bool is_told = !request.map.empty() || !request.lines.empty() || !request.scatter.empty() ||
+                       !request.histogram.empty();
+  if (is_told) {
+    return request;
+  }
+  const auto axes = by_preference(shape);
+  if (!request.by.empty()) {
+    request.lines = kUsualOutput;
+  } else if (!request.y.empty() || (shape.is_grid && axes.size() >= 2 + request.at.size())) {
+    request.map = kUsualOutput;
+  } else if (shape.is_grid && !axes.empty()) {
+    request.lines = kUsualOutput;
+  } else if (axes.size() >= 2) {
+    request.scatter = fmt::format("{},{}", axes[0]->key, axes[1]->key);
+    request.colour = request.colour.empty() ? kUsualOutput : request.colour;
+  } else if (!axes.empty()) {
+    request.scatter = fmt::format("{},{}", axes[0]->key, kUsualOutput);
+  } else {
+    request.histogram = kUsualOutput;
+  }
+  return request;
+}
+
+Figure figure_of(Source& source, const StudyShape& shape, const PlotRequest& request,
+                 const Tell& tell) {
+  Drawing drawing(source, shape, request, tell);
+  return !request.map.empty()       ? drawing.map()
+         : !request.lines.empty()   ? drawing.lines()
+         : !request.scatter.empty() ? drawing.scattered()
+                                    : drawing.counts();
+}
+
+}  // namespace oblique::client::plot

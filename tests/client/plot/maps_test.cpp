@@ -1,0 +1,150 @@
+// Maps: what colours and kinds say, and what is missing.
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "client/plot/figures/legend.h"
+#include "client/plot/figures/svg_figure.h"
+#include "tests/client/plot/figures_of_tests.h"
+#include "tests/client/plot/png_reader.h"
+
+namespace oblique::client::plot {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+std::uint32_t opaque(const Colour& colour) {
+  return static_cast<std::uint32_t>(colour.red) << 24U |
+         static_cast<std::uint32_t>(colour.green) << 16U |
+         static_cast<std::uint32_t>(colour.blue) << 8U | 0xffU;
+}
+
+TEST(HeatMap, HasTheLowestValueBelowOnTheLeftInTheDarkestColour) {
+  const Figure figure =
+      heat_map(test::usual_axes(), quantity_of("fn_peak_N", "N"), test::counted_cells(8, 5));
+  const auto pixels = test::pixels_in(svg_of(figure));
+  EXPECT_EQ(pixels.width % 8, 0U) << "cells are whole pixels";
+  EXPECT_EQ(pixels.height % 5, 0U);
+  EXPECT_EQ(pixels.colours[(pixels.height - 1) * pixels.width],
+            opaque(shade(Palette::kViridis, 0)));
+  EXPECT_EQ(pixels.colours[pixels.width - 1], opaque(shade(Palette::kViridis, 255)));
+}
+
+TEST(HeatMap, OfCellsOfUnequalWidthHasEachWhereItIs) {
+  Cells cells{{0.0, 0.9, 1.0}, {0.0, 1.0}, {1.0, 2.0}, {CellState::kSolved, CellState::kSolved}};
+  const auto pixels = test::pixels_in(
+      svg_of(heat_map(test::usual_axes(), quantity_of("fn_peak_N", "N"), std::move(cells))));
+  EXPECT_EQ(pixels.colours[pixels.width * 88 / 100], opaque(shade(Palette::kViridis, 0)));
+  EXPECT_EQ(pixels.colours[pixels.width * 92 / 100], opaque(shade(Palette::kViridis, 255)));
+}
+
+TEST(HeatMap, ShowsWhatIsMissingAndWhatFailedAsSuchAndNotAsAValue) {
+  const Figure figure = test::gappy_map();
+  EXPECT_EQ(figure.gaps.no_result, 2U);
+  EXPECT_EQ(figure.gaps.failed, 1U);
+  const auto svg = svg_of(figure);
+  EXPECT_THAT(svg, HasSubstr("no result (2)"));
+  EXPECT_THAT(svg, HasSubstr("failed (1)"));
+  EXPECT_THAT(svg, HasSubstr("fill=\"url(#missing)\""));
+  EXPECT_THAT(svg, HasSubstr("fill=\"url(#failed)\""));
+  EXPECT_THAT(svg, HasSubstr("1 cell is blank: solved, but without this value."));
+  const auto pixels = test::pixels_in(svg);
+  const std::size_t cell = pixels.width / 6;
+  const std::size_t last_row = (pixels.height - 1) * pixels.width;
+  EXPECT_EQ(pixels.colours[last_row + 3 * cell + cell / 2] & 0xffU, 0U) << "clear";
+  EXPECT_EQ(pixels.colours[last_row + 2 * cell + cell / 2] & 0xffU, 0xffU);
+}
+
+TEST(HeatMap, OfNothingAndOfOneValueSaysSo) {
+  EXPECT_THAT(svg_of(heat_map(test::usual_axes(), quantity_of("fn_peak_N", "N"), {})),
+              HasSubstr("Nothing to draw"));
+  Cells cells = test::counted_cells(3, 3);
+  cells.values.assign(9, 4.0);
+  EXPECT_THAT(svg_of(heat_map(test::usual_axes(), quantity_of("fn_peak_N", "N"), cells)),
+              HasSubstr("All cells have one value: fn_peak_N = 4 N."));
+}
+
+TEST(HeatMap, ByLogarithmsLeavesOutWhatHasNone) {
+  const Figure figure = heat_map(test::usual_axes(), quantity_of("stick_total_s", "s"),
+                                 test::counted_cells(3, 3), {.is_logarithmic = true});
+  EXPECT_EQ(figure.gaps.no_value, 1U) << "the 0";
+  EXPECT_EQ(figure.colours->axis.range, (Range{1.0, 8.0}));
+}
+
+TEST(HeatMap, WithARangeSaysThatThereIsMoreBeyond) {
+  const Figure figure = heat_map(test::usual_axes(), quantity_of("fn_peak_N", "N"),
+                                 test::counted_cells(3, 3), {.range = Range{2.0, 20.0}});
+  EXPECT_TRUE(figure.colours->has_below);
+  EXPECT_FALSE(figure.colours->has_above);
+}
+
+TEST(HeatMap, Of256By256CellsTakesLessThan200Kilobytes) {
+  Cells cells = test::counted_cells(256, 256);
+  for (std::size_t i = 0; i < cells.values.size(); ++i) {
+    const double x = static_cast<double>(i % 256) / 255.0;
+    const double y = static_cast<double>(i / 256) / 255.0;
+    cells.values[i] = std::sin(9.0 * x * y) * std::exp(x) + std::cos(17.0 * y);
+  }
+  EXPECT_LT(svg_of(heat_map(test::usual_axes(), quantity_of("fn_peak_N", "N"), cells)).size(),
+            200'000U);
+}
+
+TEST(KindMap, NamesThoseWithTheMostCellsAndGathersTheOthers) {
+  const Figure figure = test::striped_kinds(40);
+  const auto& kinds = figure.panels[0].kinds->kinds;
+  ASSERT_EQ(kinds.size(), kMostKinds + 1);
+  EXPECT_TRUE(kinds.back().is_rest);
+  EXPECT_THAT(kinds.back().name, HasSubstr("modes"));
+  std::uint64_t cells = 0;
+  for (const Kind& kind : kinds) {
+    cells += kind.cells;
+  }
+  EXPECT_EQ(cells, 2400U);
+  EXPECT_EQ(kinds.size() - 1 + kinds.back().gathered.size(), 41U);
+  for (std::size_t i = 1; i + 1 < kinds.size(); ++i) {
+    EXPECT_GE(kinds[i - 1].cells, kinds[i].cells);
+  }
+}
+
+TEST(KindMap, OfFewKindsNamesAll) {
+  const Figure figure = test::striped_kinds(4);
+  EXPECT_FALSE(figure.panels[0].kinds->kinds.back().is_rest);
+  EXPECT_THAT(figure.notes, testing::IsEmpty());
+}
+
+TEST(KindMap, HatchesAndLettersItsAreas) {
+  const auto svg = svg_of(test::striped_kinds(4));
+  EXPECT_THAT(svg, HasSubstr(">A</text>"));
+  EXPECT_THAT(svg, HasSubstr("<pattern id=\"h1\""));
+  EXPECT_THAT(svg, HasSubstr("class=\"boundary\""));
+}
+
+TEST(KindMap, ShowsNamesOfOthersAsTextAlone) {
+  Cells cells = test::counted_cells(1, 1);
+  const auto svg = svg_of(kind_map(test::usual_axes(), "mode", cells, {"<b>\x1b[2J"}));
+  EXPECT_THAT(svg, Not(HasSubstr("<b>")));
+  EXPECT_THAT(svg, Not(HasSubstr("\x1b")));
+  EXPECT_THAT(svg, HasSubstr("&lt;b&gt;\\x1b[2J"));
+}
+
+TEST(Letters, GoOnBehindZ) {
+  EXPECT_EQ(letter_of(0), "A");
+  EXPECT_EQ(letter_of(25), "Z");
+  EXPECT_EQ(letter_of(26), "AA");
+}
+
+TEST(Edges, LieHalfwayBetweenValues) {
+  EXPECT_THAT(edges_between({1.0, 2.0, 4.0}, false), testing::ElementsAre(0.5, 1.5, 3.0, 5.0));
+  EXPECT_THAT(
+      edges_between({1.0, 4.0}, true),
+      testing::ElementsAre(testing::DoubleEq(0.5), testing::DoubleEq(2.0), testing::DoubleEq(8.0)));
+  EXPECT_THAT(edges_between({0.0}, false), testing::ElementsAre(-0.5, 0.5));
+  EXPECT_THAT(edges_between({}, false), testing::IsEmpty());
+}
+
+}  // namespace
+}  // namespace oblique::client::plot

@@ -1,0 +1,97 @@
+// Pictures in a terminal.
+#include <algorithm>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "client/plot/terminal/terminal_figure.h"
+#include "tests/client/plot/figures_of_tests.h"
+
+namespace oblique::client::plot {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+constexpr TerminalLook kPlain{60, 24, true, Shading::kNone};
+constexpr TerminalLook kColoured{60, 24, false, Shading::kTrue};
+
+std::vector<Figure> figures_for_terminals() {
+  return {test::gappy_map(),           test::striped_kinds(40),       test::lines_of_count(3),
+          test::lines_of_count(30),    test::dots_of_count(50),       test::dots_of_count(20'000),
+          test::histogram_of_count(0), test::histogram_of_count(900), test::panels()};
+}
+
+TEST(PlainTerminal, GetsAsciiWithoutEscapesInItsWidth) {
+  for (const Figure& figure : figures_for_terminals()) {
+    for (const std::size_t columns : {24U, 40U, 80U}) {
+      const auto text = text_of(figure, {columns, 24, true, Shading::kTrue});
+      EXPECT_TRUE(std::all_of(text.begin(), text.end(), [](char letter) {
+        return letter == '\n' || (letter >= ' ' && letter <= '~');
+      })) << text;
+      std::istringstream lines(text);
+      std::string line;
+      std::size_t drawn = 0;
+      while (std::getline(lines, line)) {
+        drawn += line.size() <= columns ? 1U : 0U;
+      }
+      EXPECT_GE(drawn, 12U);
+    }
+  }
+}
+
+TEST(PlainTerminal, DrawsKindsAsTheirLettersAndNamesThem) {
+  const auto text = text_of(test::striped_kinds(4), kPlain);
+  EXPECT_THAT(text, HasSubstr("|AAAA"));
+  EXPECT_THAT(text, HasSubstr("\nA  SC sR 0 (3"));
+}
+
+TEST(PlainTerminal, MarksWhatIsMissingAndWhatFailed) {
+  const auto text = text_of(test::gappy_map(), kPlain);
+  EXPECT_THAT(text, HasSubstr("????"));
+  EXPECT_THAT(text, HasSubstr("!!!!"));
+  EXPECT_THAT(text, HasSubstr("no result (2)"));
+  EXPECT_THAT(text, HasSubstr("failed (1)"));
+}
+
+TEST(ColouredTerminal, DrawsMapsInHalfBlocksAndLinesInDots) {
+  const auto map = text_of(test::gappy_map(), kColoured);
+  EXPECT_THAT(map, HasSubstr("\u2580"));
+  EXPECT_THAT(map, HasSubstr("\x1b[0;38;2;"));
+  const auto lines = text_of(test::lines_of_count(3), kColoured);
+  EXPECT_THAT(lines, HasSubstr("\xe2\xa0"));
+  EXPECT_THAT(lines, HasSubstr("\u2501\u2501"));
+  EXPECT_THAT(text_of(test::histogram_of_count(900), kColoured), HasSubstr("\u2588"));
+}
+
+TEST(ColouredTerminal, GetsTheColoursThatItKnows) {
+  const auto text = text_of(test::gappy_map(), {60, 24, false, Shading::k256});
+  EXPECT_THAT(text, HasSubstr("\x1b[0;38;5;"));
+  EXPECT_THAT(text, Not(HasSubstr(";2;")));
+}
+
+TEST(ColouredTerminal, IsLeftAsItWas) {
+  for (const Figure& figure : figures_for_terminals()) {
+    const auto text = text_of(figure, kColoured);
+    const auto last = text.rfind("\x1b[");
+    EXPECT_TRUE(last == std::string::npos || text.substr(last, 4) == "\x1b[0m");
+  }
+}
+
+TEST(Terminal, IsNotSteeredByNamesOfOthers) {
+  const auto text = text_of(
+      kind_map(test::usual_axes(), "mode", test::counted_cells(1, 1), {"a\x1b[2J"}), kColoured);
+  EXPECT_THAT(text, Not(HasSubstr("\x1b[2J")));
+  EXPECT_THAT(text, HasSubstr("\\x1b[2J"));
+}
+
+TEST(Terminal, DrawsTheRangeOfColours) {
+  const auto text = text_of(test::gappy_map(), kPlain);
+  EXPECT_THAT(text, HasSubstr("0 .:-=+*oO#@ 2.3e+07  duration of contact [us]"));
+}
+
+}  // namespace
+}  // namespace oblique::client::plot
