@@ -111,11 +111,15 @@ void make_equal(Box& frame, const Panel& panel) {
            height};
 }
 
-bool have_one_x_axis(const std::vector<Panel>& panels) {
-  return std::all_of(panels.begin(), panels.end(), [&panels](const Panel& panel) {
-    return panel.x.label == panels.front().x.label && panel.x.range == panels.front().x.range &&
-           !panel.has_equal_aspect;
-  });
+/// Whether a panel's horizontal axis is that of the one below, which has the numbers then.
+bool shares_axis_below(const std::vector<Panel>& panels, std::size_t number) {
+  if (number + 1 >= panels.size()) {
+    return false;
+  }
+  const Panel& one = panels[number];
+  const Panel& below = panels[number + 1];
+  return one.x.label == below.x.label && one.x.range == below.x.range && !one.has_equal_aspect &&
+         !below.has_equal_aspect;
 }
 
 /// Shares out what is left between the margins.
@@ -222,11 +226,12 @@ class Arranger {
 
   void place_panels() {
     const auto& panels = figure_.panels;
-    const bool is_one_axis = !panels.empty() && have_one_x_axis(panels);
     const auto count = static_cast<double>(panels.size());
     const double below = kTickLabelHeight + kLabelHeight + 4.0;
-    double heights =
-        room_.height - kBetweenPanels * (count - 1.0) - below * (is_one_axis ? 1.0 : count);
+    double heights = room_.height - kBetweenPanels * (count - 1.0);
+    for (std::size_t i = 0; i < panels.size(); ++i) {
+      heights -= shares_axis_below(panels, i) ? 0.0 : below;
+    }
     // A label that is longer than its panel is high is written level.
     const bool labels_above =
         panels.size() > 2 || std::any_of(panels.begin(), panels.end(), [&](const Panel& panel) {
@@ -243,7 +248,7 @@ class Arranger {
       const double height = heights * std::max(panels[i].share, 0.01) / share_of_heights();
       PanelLayout place;
       place.has_label_above = labels_above;
-      place.has_x_labels = !is_one_axis || i + 1 == panels.size();
+      place.has_x_labels = !shares_axis_below(panels, i);
       y += (labels_above ? kSubtitleHeight : 0.0) +
            (panels[i].title.empty() ? 0.0 : kSubtitleHeight);
       place.frame = {0.0, y, 0.0, height};

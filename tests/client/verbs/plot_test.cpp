@@ -1,0 +1,135 @@
+// `oblique plot` as people call it.
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/store/store.h"
+#include "tests/support/points.h"
+#include "tests/support/programs.h"
+
+namespace oblique::client {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+/// A folder with oblique.db: a study `a` of which 4 of 12 points have a result.
+class Plot : public testing::Test {
+ protected:
+  Plot() {
+    server::Store store((folder_.path() / "oblique.db").string());
+    const auto table = server::table_of(12);
+    const std::vector<server::Change> changes{
+        server::AddStudy{1, "a", table, "2024-01-01T00:00:00.000Z"},
+        server::AddResults{1,
+                           table,
+                           0,
+                           "",
+                           "",
+                           1,
+                           "now",
+                           {server::solved_point(0), server::solved_point(1),
+                            server::solved_point(2), server::solved_point(3)}}};
+    store.commit(changes);
+  }
+  test::Outcome plot(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), "plot");
+    return test::run_oblique(folder_, arguments);
+  }
+  std::string file(const std::string& name) const {
+    std::ifstream in(folder_.path() / name, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  }
+
+  test::TemporaryFolder folder_;
+};
+
+TEST_F(Plot, DrawsAStudyWithoutBeingToldWhat) {
+  const auto outcome = plot({"a"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_TRUE(outcome.out.starts_with("<svg ")) << outcome.out.substr(0, 100);
+  EXPECT_TRUE(outcome.out.ends_with("</svg>\n"));
+  EXPECT_THAT(outcome.out, HasSubstr("a: fn_peak_N"));
+}
+
+TEST_F(Plot, DrawsTheSameBytesTwice) {
+  EXPECT_EQ(plot({"a"}).out, plot({"a"}).out);
+}
+
+TEST_F(Plot, WritesWhatTheFilesEndingSays) {
+  EXPECT_EQ(plot({"a", "--out", "a.svg"}).exit_code, 0);
+  EXPECT_EQ(plot({"a", "--out", "a.csv"}).exit_code, 0);
+  EXPECT_EQ(plot({"a", "--out", "a.gnuplot"}).exit_code, 0);
+  EXPECT_EQ(plot({"a", "--out", "a.txt", "--format", "csv"}).out, "");
+  EXPECT_TRUE(file("a.svg").starts_with("<svg "));
+  EXPECT_THAT(file("a.csv"), HasSubstr("fn_peak_N"));
+  EXPECT_EQ(file("a.csv"), file("a.txt"));
+  EXPECT_THAT(file("a.gnuplot"), HasSubstr("set terminal svg"));
+}
+
+TEST_F(Plot, WritesThroughALink) {
+  std::filesystem::create_directory(folder_.path() / "pictures");
+  std::ofstream(folder_.path() / "pictures" / "old.svg") << "old";
+  std::filesystem::create_symlink("pictures/old.svg", folder_.path() / "link.svg");
+  EXPECT_EQ(plot({"a", "--out", "link.svg"}).exit_code, 0);
+  EXPECT_TRUE(std::filesystem::is_symlink(folder_.path() / "link.svg"));
+  EXPECT_TRUE(file("pictures/old.svg").starts_with("<svg "));
+}
+
+TEST_F(Plot, LeavesNoFileWhereItFails) {
+  EXPECT_EQ(plot({"a", "--map", "fn_peak", "--x", "mu", "--y", "H", "--out", "a.svg"}).exit_code,
+            2);
+  EXPECT_FALSE(std::filesystem::exists(folder_.path() / "a.svg"));
+}
+
+TEST_F(Plot, ShowsAsciiInAPipe) {
+  const auto outcome = plot({"a", "--histogram", "fn_peak_N", "--show"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("a: fn_peak_N"));
+  EXPECT_THAT(outcome.out, Not(HasSubstr("\x1b")));
+  EXPECT_THAT(outcome.out, Not(HasSubstr("<svg")));
+}
+
+TEST_F(Plot, DrawsNothingOfNothingAndSaysSo) {
+  const auto outcome = plot({"a", "--histogram", "fn_peak_N", "--where", "mu > 1e9"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("Nothing to draw"));
+  EXPECT_THAT(outcome.out, HasSubstr("0 points"));
+}
+
+TEST_F(Plot, OfAWrongFlagNamesItAndWhatIsAllowed) {
+  struct Wrong {
+    std::vector<std::string> arguments;
+    std::string says;
+    int exit_code = 2;
+  };
+  for (const Wrong& wrong :
+       std::vector<Wrong>{{{"b"}, "no study called", 1},
+                          {{"a", "--histogram", "fn_peak"}, "did you mean `fn_peak_N`"},
+                          {{"a", "--histogram", "mu;"}, "--histogram"},
+                          {{"a", "--histogram", "fn_peak_N", "--where", "mu) OR (1"}, "--where"},
+                          {{"a", "--map", "mode", "--lines", "mu"}, "excludes"},
+                          {{"a", "--scatter", "mu"}, "two columns"},
+                          {{"a", "--scatter", "mu,major_mode"}, "texts"},
+                          {{"a", "--at", "q=1"}, "no axis q"},
+                          {{"a", "--palette", "jet"}, "viridis, cividis"},
+                          {{"a", "--range", "1"}, "FROM:TO"},
+                          {{"a", "--size", "1x1"}, "WIDTHxHEIGHT"},
+                          {{"a", "--out", "a.bmp"}, ".svg, .png, .csv or .gnuplot"},
+                          {{"a", "--format", "jpg"}, "svg, png, csv or gnuplot"},
+                          {{"a", "--show", "--format", "csv"}, "--out FILE"},
+                          {{"a", "--out", "no/such/folder.svg"}, "cannot be written"}}) {
+    const auto outcome = plot(wrong.arguments);
+    EXPECT_EQ(outcome.exit_code, wrong.exit_code) << wrong.says << outcome.err;
+    EXPECT_THAT(outcome.err, HasSubstr(wrong.says));
+    EXPECT_EQ(outcome.out, "") << wrong.says;
+  }
+}
+
+}  // namespace
+}  // namespace oblique::client
