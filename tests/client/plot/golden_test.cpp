@@ -10,8 +10,8 @@
 #include <gtest/gtest.h>
 
 #include "client/plot/figures/svg_figure.h"
+#include "tests/client/plot/draw/png_reader.h"
 #include "tests/client/plot/figures_of_tests.h"
-#include "tests/client/plot/png_reader.h"
 
 namespace oblique::client::plot {
 namespace {

@@ -1,4 +1,5 @@
 // `oblique plot` as people call it.
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -79,6 +80,28 @@ TEST_F(Plot, WritesThroughALink) {
   EXPECT_EQ(plot({"a", "--out", "link.svg"}).exit_code, 0);
   EXPECT_TRUE(std::filesystem::is_symlink(folder_.path() / "link.svg"));
   EXPECT_TRUE(file("pictures/old.svg").starts_with("<svg "));
+}
+
+TEST_F(Plot, MakesPngWhereTheProgramForItIs) {
+  if (std::system("command -v rsvg-convert > /dev/null 2>&1") != 0) {
+    GTEST_SKIP() << "rsvg-convert is not here (Debian: librsvg2-bin)";
+  }
+  const auto outcome = plot({"a", "--size", "400x300", "--out", "a.png"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  const std::string png = file("a.png");
+  EXPECT_TRUE(png.starts_with("\x89PNG")) << png.size();
+  ASSERT_GT(png.size(), 24U);
+  EXPECT_EQ(png.substr(16, 4), std::string("\x00\x00\x03\x20", 4)) << "two pixels for one";
+}
+
+TEST_F(Plot, SaysWhichProgramPngNeeds) {
+  test::Process program(folder_, test::client_program(), {"plot", "a", "--out", "a.png"},
+                        {{"PATH", "/nowhere"}});
+  const auto outcome = program.outcome();
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("librsvg2-bin"));
+  EXPECT_THAT(outcome.err, HasSubstr("--format svg"));
+  EXPECT_FALSE(std::filesystem::exists(folder_.path() / "a.png"));
 }
 
 TEST_F(Plot, LeavesNoFileWhereItFails) {

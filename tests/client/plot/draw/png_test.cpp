@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "client/plot/draw/png.h"
-#include "tests/client/plot/png_reader.h"
+#include "tests/client/plot/draw/png_reader.h"
 
 namespace oblique::client::plot {
 namespace {
