@@ -45,7 +45,9 @@ PlotRequest completed(PlotRequest request, const StudyShape& shape) {
     return request;
   }
   const auto axes = by_preference(shape);
-  if (!request.by.empty()) {
+  if (!request.colour.empty() && axes.size() >= 2) {
+    request.scatter = fmt::format("{},{}", axes[0]->key, axes[1]->key);
+  } else if (!request.by.empty()) {
     request.lines = kUsualOutput;
   } else if (!request.y.empty() || (shape.is_grid && axes.size() >= 2 + request.at.size())) {
     request.map = kUsualOutput;

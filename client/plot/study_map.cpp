@@ -41,12 +41,19 @@ std::size_t side_for(std::size_t points) {
       std::clamp(std::sqrt(static_cast<double>(points) / 3.0), 8.0, 160.0));
 }
 
-/// The values of an axis of cells; none where cells are to gather them.
-std::vector<double> cell_values(const ChosenAxis& axis, const AnswerColumn& column) {
+/// The values of an axis of cells; none where cells are to gather them. Of an axis that `where`
+/// speaks of only the part that has rows is drawn.
+std::vector<double> cell_values(const ChosenAxis& axis, const AnswerColumn& column,
+                                const std::string& where) {
   if (axis.axis == nullptr || !axis.axis->is_listed) {
     return {};
   }
-  auto values = axis_values(axis.axis->values, column);
+  std::vector<double> of_study = axis.axis->values;
+  if (!where.empty() && names_axis(where, *axis.axis) && !column.numbers.empty()) {
+    const Range part = range_of(column.numbers);
+    std::erase_if(of_study, [&part](double v) { return v < part.from || v > part.to; });
+  }
+  auto values = axis_values(std::move(of_study), column);
   return values.size() <= kMostCellsAlong ? values : std::vector<double>();
 }
 
@@ -72,8 +79,8 @@ Figure Drawing::map() {
                      request_.is_x_logarithmic || is_logarithmic_by_study(x),
                      request_.is_y_logarithmic || is_logarithmic_by_study(y)};
   const MapRows rows{answer[0], answer[1], answer[2], answer[3]};
-  const auto x_values = cell_values(x, answer[0]);
-  const auto y_values = cell_values(y, answer[1]);
+  const auto x_values = cell_values(x, answer[0], request_.where);
+  const auto y_values = cell_values(y, answer[1], request_.where);
   GatheredCells gathered;
   if (shape_.is_grid && !x_values.empty() && !y_values.empty()) {
     refuse_log_of_axis("--log-x", axes.is_x_logarithmic, x_values);
@@ -91,6 +98,9 @@ Figure Drawing::map() {
                                                 std::move(gathered.names), plural)
                                      : heat_map(axes, quantity_of(answer[2].name, answer[2].unit),
                                                 std::move(gathered.cells), colours());
+  if (!request_.where.empty()) {
+    figure.gaps.no_result_name = "no result, or left out by --where";
+  }
   say_gathered(figure, gathered);
   entitle(figure, answer[2].name, gathered.points);
   return figure;

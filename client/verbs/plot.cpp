@@ -3,6 +3,7 @@
 #include <iostream>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -78,6 +79,46 @@ int plot_study(const PlotFlags& flags) {
   return kDone;
 }
 
+CLI::Option* add_text(CLI::App& verb, const std::string& flag, std::string& value,
+                      const std::string& help, const std::string& type) {
+  return verb.add_option(flag, value, help)->type_name(type);
+}
+
+/// What would be of no effect beside others is refused.
+void exclude(CLI::Option* option, const std::vector<CLI::Option*>& others) {
+  for (auto* other : others) {
+    if (other != option) {
+      option->excludes(other);
+    }
+  }
+}
+
+/// The kinds of pictures, and the axes that each has.
+void add_kinds_of_pictures(CLI::App& verb, plot::PlotRequest& request) {
+  auto* map = add_text(verb, "--map", request.map,
+                       "an output over two axes, in colours; of modes a map of them", "OUTPUT");
+  auto* lines = add_text(verb, "--lines", request.lines,
+                         "an output over one axis, a line a value of another", "OUTPUT");
+  auto* scatter = add_text(verb, "--scatter", request.scatter, "points over two columns", "X,Y");
+  auto* histogram = add_text(verb, "--histogram", request.histogram,
+                             "how often values of a column are met", "COL");
+  for (auto* kind : {map, lines, scatter, histogram}) {
+    exclude(kind, {map, lines, scatter, histogram});
+  }
+  exclude(add_text(verb, "--x", request.x,
+                   "horizontal axis of --map and --lines; default: mu if that varies", "KEY"),
+          {scatter, histogram});
+  exclude(
+      add_text(verb, "--y", request.y, "vertical axis of --map; default: H if that varies", "KEY"),
+      {lines, scatter, histogram});
+  exclude(add_text(verb, "--by", request.by,
+                   "whose values are the lines of --lines; default: that with the fewest", "KEY"),
+          {map, scatter, histogram});
+  exclude(add_text(verb, "--colour", request.colour,
+                   "column whose values colour the points of --scatter", "COL"),
+          {map, lines, histogram});
+}
+
 }  // namespace
 
 void add_plot(CLI::App& app, Command& command) {
@@ -86,46 +127,25 @@ void add_plot(CLI::App& app, Command& command) {
   auto* verb = app.add_subcommand("plot", "Draw results of a study");
   verb->footer(kPlotExamples);
   verb->add_option("STUDY", request.study, "name of the study")->required()->type_name("");
-  const auto text = [verb](const std::string& flag, std::string& value, const std::string& help,
-                           const std::string& type) {
-    return verb->add_option(flag, value, help)->type_name(type);
-  };
-  auto* map = text("--map", request.map,
-                   "an output over two axes, in colours; of modes a map of them", "OUTPUT");
-  auto* lines = text("--lines", request.lines, "an output over one axis, a line a value of another",
-                     "OUTPUT");
-  auto* scatter = text("--scatter", request.scatter, "points over two columns", "X,Y");
-  auto* histogram =
-      text("--histogram", request.histogram, "how often values of a column are met", "COL");
-  for (auto* one : {map, lines, scatter, histogram}) {
-    for (auto* other : {map, lines, scatter, histogram}) {
-      if (one != other) {
-        one->excludes(other);
-      }
-    }
-  }
-  text("--x", request.x, "horizontal axis of --map and --lines; default: mu if that varies", "KEY");
-  text("--y", request.y, "vertical axis of --map; default: H if that varies", "KEY")
-      ->excludes(lines);
-  text("--by", request.by, "whose values are the lines of --lines; default: that with the fewest",
-       "KEY")
-      ->excludes(map);
-  text("--colour", request.colour, "column whose values colour the points of --scatter", "COL");
-  text("--where", request.where, "condition that points must meet", "EXPR");
+  add_kinds_of_pictures(*verb, request);
+  add_text(*verb, "--where", request.where, "condition that points must meet", "EXPR");
   verb->add_option("--at", request.at, "value of another axis; may be given for several")
       ->type_name("KEY=VALUE");
   verb->add_flag("--log-x", request.is_x_logarithmic, "a logarithmic horizontal axis");
   verb->add_flag("--log-y", request.is_y_logarithmic, "a logarithmic vertical axis");
   verb->add_flag("--log-colour", request.is_colour_logarithmic, "colours by logarithms");
-  text("--range", request.range,
-       "values that colours span, or the vertical axis of --lines, or the bins of --histogram",
-       "FROM:TO");
-  text("--palette", request.palette, "colours of maps: viridis or cividis", "NAME")
+  add_text(*verb, "--range", request.range,
+           "values that colours span, or the vertical axis of --lines, or the bins of --histogram",
+           "FROM:TO");
+  add_text(*verb, "--palette", request.palette, "colours of maps: viridis or cividis", "NAME")
       ->capture_default_str();
-  text("--size", flags->size, "width and height in pixels", "WxH")->capture_default_str();
-  text("--out", flags->out, "file to write, which appears when it is whole", "FILE");
-  text("--format", flags->format,
-       "svg, png, csv or gnuplot; as the file's name ends when left out, else svg", "FORMAT");
+  add_text(*verb, "--size", flags->size,
+           "width and height in pixels, of PNG twice as many; higher where a legend needs it",
+           "WxH")
+      ->capture_default_str();
+  add_text(*verb, "--out", flags->out, "file to write, which appears when it is whole", "FILE");
+  add_text(*verb, "--format", flags->format,
+           "svg, png, csv or gnuplot; as the file's name ends when left out, else svg", "FORMAT");
   verb->add_flag("--show", flags->show, "draw on the terminal");
   add_source_flags(*verb, flags->source);
   verb->callback([flags, &command] { command = [flags] { return plot_study(*flags); }; });

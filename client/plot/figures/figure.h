@@ -132,6 +132,7 @@ struct Gaps {
   std::uint64_t no_result = 0;  ///< not solved yet, or left out by a condition
   std::uint64_t failed = 0;
   std::uint64_t no_value = 0;  ///< solved, but without that output, or with one that has no place
+  std::string no_result_name{"no result"};  ///< for the legend
 };
 
 struct Figure {

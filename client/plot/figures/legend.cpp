@@ -132,7 +132,8 @@ std::vector<LegendEntry> legend_of(const Figure& figure) {
   }
   if (figure.gaps.no_result > 0) {
     entries.push_back({.sign = Sign::kNoResult,
-                       .name = fmt::format("no result ({})", shown_count(figure.gaps.no_result))});
+                       .name = fmt::format("{} ({})", figure.gaps.no_result_name,
+                                           shown_count(figure.gaps.no_result))});
   }
   if (figure.gaps.failed > 0) {
     entries.push_back({.sign = Sign::kFailed,

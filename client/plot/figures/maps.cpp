@@ -24,9 +24,9 @@ Panel panel_of(const MapAxes& axes, const Cells& cells) {
 
 void say_no_value(Figure& figure) {
   if (figure.gaps.no_value > 0) {
-    figure.notes.push_back(fmt::format("{} {} blank: solved, but without this value.",
-                                       shown_count(figure.gaps.no_value),
-                                       figure.gaps.no_value == 1 ? "cell is" : "cells are"));
+    figure.notes.push_back(fmt::format(
+        "{} {} blank: solved, but without a value that can be drawn.",
+        shown_count(figure.gaps.no_value), figure.gaps.no_value == 1 ? "cell is" : "cells are"));
   }
 }
 

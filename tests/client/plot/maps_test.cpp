@@ -51,7 +51,7 @@ TEST(HeatMap, ShowsWhatIsMissingAndWhatFailedAsSuchAndNotAsAValue) {
   EXPECT_THAT(svg, HasSubstr("failed (1)"));
   EXPECT_THAT(svg, HasSubstr("fill=\"url(#missing)\""));
   EXPECT_THAT(svg, HasSubstr("fill=\"url(#failed)\""));
-  EXPECT_THAT(svg, HasSubstr("1 cell is blank: solved, but without this value."));
+  EXPECT_THAT(svg, HasSubstr("1 cell is blank: solved, but without a value that can be drawn."));
   const auto pixels = test::pixels_in(svg);
   const std::size_t cell = pixels.width / 6;
   const std::size_t last_row = (pixels.height - 1) * pixels.width;
