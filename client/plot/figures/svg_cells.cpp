@@ -99,6 +99,18 @@ std::string path_of(const std::vector<Outline>& outlines, const Cells& cells, co
   return path.text();
 }
 
+/// Edges of areas that are few enough to be seen. Of a map like noise they would hide the colours,
+/// and take megabytes.
+constexpr std::size_t kMostCorners = 60'000;
+
+std::size_t corners_of(const std::vector<Outline>& outlines) {
+  std::size_t corners = 0;
+  for (const Outline& outline : outlines) {
+    corners += outline.corners.size();
+  }
+  return corners;
+}
+
 void fill_path(SvgWriter& svg, const std::string& data, const std::string& filling) {
   if (!data.empty()) {
     svg.element("path", {{"fill", filling}, {"fill-rule", "evenodd"}, {"d", data}});
@@ -184,14 +196,17 @@ void draw_kinds(SvgWriter& svg, const KindCells& map, const Places& places) {
   }
   draw_gaps(svg, cells, places);
   draw_image(svg, cells, numbers, std::move(colours), places);
-  for (std::size_t i = 0; i < map.kinds.size(); ++i) {
-    const Hatch hatch = map.kinds[i].is_rest ? kFillOfOthers.hatch : fill(i).hatch;
-    if (hatch != Hatch::kNone) {
-      fill_path(svg, path_of(outlines_of(grid, static_cast<int>(i)), cells, places, true),
-                hatch_link(hatch));
+  if (const auto boundaries = boundaries_of(grid); corners_of(boundaries) <= kMostCorners) {
+    // Outlines turn where boundaries do: they are as few.
+    for (std::size_t i = 0; i < map.kinds.size(); ++i) {
+      const Hatch hatch = map.kinds[i].is_rest ? kFillOfOthers.hatch : fill(i).hatch;
+      if (hatch != Hatch::kNone) {
+        fill_path(svg, path_of(outlines_of(grid, static_cast<int>(i)), cells, places, true),
+                  hatch_link(hatch));
+      }
     }
+    svg.path(path_of(boundaries, cells, places, false), "boundary");
   }
-  svg.path(path_of(boundaries_of(grid), cells, places, false), "boundary");
   for (std::size_t i = 0; i < map.kinds.size(); ++i) {
     if (!map.kinds[i].is_rest) {
       draw_letter(svg, grid, i, cells, places);

@@ -16,6 +16,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/formats/new_file.h"
 #include "client/formats/sink.h"
 #include "client/plot/figures/svg_figure.h"
 #include "client/plot/files/figure_table.h"
@@ -88,15 +89,6 @@ std::string png_made_of(const std::string& svg) {
   return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
 }
 
-/// What a link names, so that the link stays one.
-std::string behind_links(const std::string& file) {
-  std::error_code failed;
-  const auto target = std::filesystem::is_symlink(file, failed)
-                          ? std::filesystem::weakly_canonical(file, failed)
-                          : std::filesystem::path(file);
-  return failed || target.empty() ? file : target.string();
-}
-
 }  // namespace
 
 PictureFormat picture_format(const std::string& name, const std::string& file) {
@@ -150,7 +142,7 @@ std::string picture_of(const Figure& figure, PictureFormat format, const Size& s
 
 void write_picture(const std::string& picture, PictureFormat format, const std::string& file) {
   if (!file.empty()) {
-    NewFile out(behind_links(file));
+    NewFile out(file);
     out.append(picture);
     out.finish();
     return;

@@ -123,6 +123,15 @@ TEST(KindMap, HatchesAndLettersItsAreas) {
   EXPECT_THAT(svg, HasSubstr("class=\"boundary\""));
 }
 
+TEST(KindMap, LikeNoiseIsColoursAlone) {
+  Cells cells = test::counted_cells(300, 300);
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < 90'000; ++i) {
+    names.push_back(std::to_string((i % 300 * 7 + i / 300 * 11) % 5));
+  }
+  EXPECT_LT(svg_of(kind_map(test::usual_axes(), "mode", cells, names)).size(), 200'000U);
+}
+
 TEST(KindMap, ShowsNamesOfOthersAsTextAlone) {
   Cells cells = test::counted_cells(1, 1);
   const auto svg = svg_of(kind_map(test::usual_axes(), "mode", cells, {"<b>\x1b[2J"}));
