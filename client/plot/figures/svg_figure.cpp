@@ -99,11 +99,12 @@ void draw_contents(SvgWriter& svg, const Figure& figure, const Panel& panel,
   draw_known(svg, panel, places);
 }
 
-void draw_panel(SvgWriter& svg, const Figure& figure, std::size_t number, const Layout& layout) {
+void draw_panel(SvgWriter& svg, const Figure& figure, std::size_t number, const Layout& layout,
+                std::size_t first_frame) {
   const Panel& panel = figure.panels[number];
   const PanelLayout& place = layout.panels[number];
   const Box& frame = place.frame;
-  svg.open("g", {{"clip-path", fmt::format("url(#frame{})", number)}});
+  svg.open("g", {{"clip-path", fmt::format("url(#frame{})", first_frame + number)}});
   draw_contents(svg, figure, panel, place);
   svg.close("g");
   svg.rectangle(frame.x, frame.y, frame.width, frame.height, "frame");
@@ -171,12 +172,12 @@ std::vector<Hatch> hatches_of(const Figure& figure) {
   return {used.begin(), used.end()};
 }
 
-void define(SvgWriter& svg, const Figure& figure, const Layout& layout) {
-  svg.verbatim(style_sheet());
-  svg.verbatim(pattern_definitions(hatches_of(figure)));
+}  // namespace
+
+void define_frames(SvgWriter& svg, const Layout& layout, std::size_t first_frame) {
   for (std::size_t i = 0; i < layout.panels.size(); ++i) {
     const Box& frame = layout.panels[i].frame;
-    svg.open("clipPath", {{"id", fmt::format("frame{}", i)}});
+    svg.open("clipPath", {{"id", fmt::format("frame{}", first_frame + i)}});
     svg.rectangle(frame.x, frame.y, frame.width, frame.height, "clip");
     svg.close("clipPath");
   }
@@ -193,13 +194,8 @@ std::string description_of(const Figure& figure) {
   return text;
 }
 
-}  // namespace
-
-std::string svg_of(const Figure& figure, const Size& size) {
-  const Layout layout = layout_of(figure, size);
-  SvgWriter svg(layout.size.width, layout.size.height, figure.title, description_of(figure));
-  define(svg, figure, layout);
-  svg.rectangle(0.0, 0.0, layout.size.width, layout.size.height, "paper");
+void draw_figure(SvgWriter& svg, const Figure& figure, const Layout& layout,
+                 std::size_t first_frame) {
   double y = kMargin;
   for (const auto& line : layout.title) {
     svg.text(kMargin, y + 13.0, "title", "start", line);
@@ -210,7 +206,7 @@ std::string svg_of(const Figure& figure, const Size& size) {
     y += kSubtitleHeight;
   }
   for (std::size_t i = 0; i < figure.panels.size(); ++i) {
-    draw_panel(svg, figure, i, layout);
+    draw_panel(svg, figure, i, layout, first_frame);
   }
   if (figure.colours) {
     draw_colour_bar(svg, *figure.colours, layout);
@@ -221,6 +217,16 @@ std::string svg_of(const Figure& figure, const Size& size) {
     svg.text(kMargin, y, "muted small", "start", line);
     y += kNoteHeight;
   }
+}
+
+std::string svg_of(const Figure& figure, const Size& size) {
+  const Layout layout = layout_of(figure, size);
+  SvgWriter svg(layout.size.width, layout.size.height, figure.title, description_of(figure));
+  svg.verbatim(style_sheet());
+  svg.verbatim(pattern_definitions(hatches_of(figure)));
+  define_frames(svg, layout, 0);
+  svg.rectangle(0.0, 0.0, layout.size.width, layout.size.height, "paper");
+  draw_figure(svg, figure, layout, 0);
   return std::move(svg).finished();
 }
 

@@ -140,6 +140,17 @@ std::string picture_of(const Figure& figure, PictureFormat format, const Size& s
   throw std::logic_error("a format that is none");
 }
 
+std::string picture_of(const Sheet& sheet, PictureFormat format, const Size& size) {
+  switch (format) {
+    case PictureFormat::kSvg:
+      return svg_of(sheet, size);
+    case PictureFormat::kPng:
+      return png_made_of(svg_of(sheet, size));
+    default:
+      return picture_of(flattened(sheet), format, size);
+  }
+}
+
 void write_picture(const std::string& picture, PictureFormat format, const std::string& file) {
   if (!file.empty()) {
     NewFile out(file);

@@ -4,6 +4,7 @@
 
 #include "client/plot/figures/figure.h"
 #include "client/plot/figures/layout.h"
+#include "client/plot/sheets/sheet.h"
 
 namespace oblique::client::plot {
 
@@ -16,6 +17,8 @@ PictureFormat picture_format(const std::string& name, const std::string& file);
 /// The figure in that format. PNG is made by rsvg-convert, two pixels each way for one of SVG;
 /// throws std::runtime_error where that program is missing or fails.
 std::string picture_of(const Figure& figure, PictureFormat format, const Size& size);
+/// The same of several figures; tables and scripts have their panels one after another.
+std::string picture_of(const Sheet& sheet, PictureFormat format, const Size& size);
 
 /// Writes it to a file, which appears when it is whole, through a link where the name is one, or to
 /// standard output where `file` is empty. Throws solver::InputError for a file that cannot be made,
