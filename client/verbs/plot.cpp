@@ -1,22 +1,14 @@
-#include <unistd.h>
-
-#include <iostream>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include <spdlog/fmt/fmt.h>
-
-#include "client/formats/pager.h"
-#include "client/formats/sink.h"
-#include "client/plot/files/picture_file.h"
 #include "client/plot/plot_request.h"
-#include "client/plot/terminal/terminal_figure.h"
 #include "client/service/source_flags.h"
 #include "client/service/watching.h"
+#include "client/verbs/picture_flags.h"
+#include "client/verbs/plot_point.h"
 #include "client/verbs/verbs.h"
 #include "server/care/study_care.h"
-#include "worker/solver/model/errors.h"
 
 namespace oblique::client {
 namespace {
@@ -28,20 +20,22 @@ constexpr const char* kPlotExamples = R"(Examples:
   oblique plot friction --lines duration_s --x mu --by e --log-x --out duration.png
   oblique plot friction --scatter slide_m,friction_J --colour mu --out slide.svg
   oblique plot friction --histogram margin --log-x --show
+  oblique plot friction --point 7 --out impact.svg      time histories of one point
+  oblique plot friction --point 7 --panel loop --show
+  oblique plot --H 1 --mu 1.2 --e 1 --out impact.svg    of a point of no study
 
 OUTPUT and COL are columns of `oblique query`, or SQL expressions over them, as ft_peak_N/fn_peak_N;
 KEY is an axis of the study. Of an axis that is left open the first value is drawn, and said. Maps of
 texts, as of modes, name those that are met most. Cells without a result are hatched, failed ones
 crossed. Where points lie scattered, or are too many to draw each, cells gather them, and the picture
 says so. PNG needs rsvg-convert. Without --out the picture is drawn on a terminal, and as SVG into a
-pipe. --range and --at are in SI units.)";
+pipe. --range and --at are in SI units. A point is solved again for its time histories, here when the
+database is a file or the point is of no study, and by a worker of the server otherwise.)";
 
 struct PlotFlags {
   plot::PlotRequest request;
-  std::string size{"760x520"};
-  std::string out;
-  std::string format;
-  bool show = false;
+  PointPictureFlags point;
+  PictureFlags picture;
   SourceFlags source;
 };
 
@@ -54,29 +48,22 @@ protocol::Recipe recipe_for(const PlotFlags& flags, Source& source) {
 }
 
 int plot_study(const PlotFlags& flags) {
-  const auto size = plot::size_of(flags.size);
-  const auto format = plot::picture_format(flags.format, flags.out);
-  if (flags.show && flags.out.empty() && !flags.format.empty()) {
-    throw solver::InputError(
-        "--show draws on standard output: give the file for --format as --out FILE");
-  }
+  const auto size = picture_size(flags.picture, {});
+  static_cast<void>(picture_choice(flags.picture));
   plot::check(flags.request);
   const auto source = open_source(flags.source);
   const auto shape = plot::shape_of(recipe_for(flags, *source));
   const auto figure =
       plot::figure_of(*source, shape, plot::completed(flags.request, shape), tell_line);
-  const bool is_for_terminal =
-      flags.out.empty() && flags.format.empty() && terminal_size().lines > 0;
-  if (flags.show || is_for_terminal) {
-    std::cout.flush();
-    write_all(STDOUT_FILENO, plot::text_of(figure, plot::look_of_standard_output()),
-              "standard output");
-    if (flags.out.empty()) {
-      return kDone;
-    }
-  }
-  plot::write_picture(plot::picture_of(figure, format, size), format, flags.out);
+  put_out(flags.picture, figure,
+          [&](plot::PictureFormat format) { return plot::picture_of(figure, format, size); });
   return kDone;
+}
+
+int plot_what_is_meant(PlotFlags& flags) {
+  flags.point.study = flags.request.study;
+  return is_point_meant(flags.point) ? plot_point(flags.point, flags.picture, flags.source)
+                                     : plot_study(flags);
 }
 
 CLI::Option* add_text(CLI::App& verb, const std::string& flag, std::string& value,
@@ -124,9 +111,9 @@ void add_kinds_of_pictures(CLI::App& verb, plot::PlotRequest& request) {
 void add_plot(CLI::App& app, Command& command) {
   auto flags = std::make_shared<PlotFlags>();
   auto& request = flags->request;
-  auto* verb = app.add_subcommand("plot", "Draw results of a study");
+  auto* verb = app.add_subcommand("plot", "Draw results of a study, or one point");
   verb->footer(kPlotExamples);
-  verb->add_option("STUDY", request.study, "name of the study")->required()->type_name("");
+  verb->add_option("STUDY", request.study, "name of the study")->type_name("");
   add_kinds_of_pictures(*verb, request);
   add_text(*verb, "--where", request.where, "condition that points must meet", "EXPR");
   verb->add_option("--at", request.at, "value of another axis; may be given for several")
@@ -139,16 +126,15 @@ void add_plot(CLI::App& app, Command& command) {
            "FROM:TO");
   add_text(*verb, "--palette", request.palette, "colours of maps: viridis or cividis", "NAME")
       ->capture_default_str();
-  add_text(*verb, "--size", flags->size,
-           "width and height in pixels, of PNG twice as many; higher where a legend needs it",
-           "WxH")
-      ->capture_default_str();
-  add_text(*verb, "--out", flags->out, "file to write, which appears when it is whole", "FILE");
-  add_text(*verb, "--format", flags->format,
-           "svg, png, csv or gnuplot; as the file's name ends when left out, else svg", "FORMAT");
-  verb->add_flag("--show", flags->show, "draw on the terminal");
+  add_picture_flags(*verb, flags->picture);
+  add_point_picture_flags(*verb, flags->point);
+  for (const char* of_study :
+       {"--map", "--lines", "--scatter", "--histogram", "--x", "--y", "--by", "--colour", "--where",
+        "--at", "--range", "--log-x", "--log-y", "--log-colour"}) {
+    verb->get_option("--point")->excludes(verb->get_option(of_study));
+  }
   add_source_flags(*verb, flags->source);
-  verb->callback([flags, &command] { command = [flags] { return plot_study(*flags); }; });
+  verb->callback([flags, &command] { command = [flags] { return plot_what_is_meant(*flags); }; });
 }
 
 }  // namespace oblique::client

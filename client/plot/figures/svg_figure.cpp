@@ -99,6 +99,19 @@ void draw_contents(SvgWriter& svg, const Figure& figure, const Panel& panel,
   draw_known(svg, panel, places);
 }
 
+/// Where the label of the vertical axis stands: at the picture's edge, for all panels alike, but
+/// beside a frame that is narrower than its room.
+double label_place(const Panel& panel, const PanelLayout& place) {
+  if (!panel.has_equal_aspect) {
+    return kMargin + 11.0;
+  }
+  double widest = 0.0;
+  for (const Tick& tick : place.y_ticks.ticks) {
+    widest = std::max(widest, text_width(tick.label, kSmallSize));
+  }
+  return place.frame.x - kTickLength - widest - 9.0;
+}
+
 void draw_panel(SvgWriter& svg, const Figure& figure, std::size_t number, const Layout& layout,
                 std::size_t first_frame) {
   const Panel& panel = figure.panels[number];
@@ -109,7 +122,7 @@ void draw_panel(SvgWriter& svg, const Figure& figure, std::size_t number, const 
   svg.close("g");
   svg.rectangle(frame.x, frame.y, frame.width, frame.height, "frame");
   draw_x_axis(svg, panel.x, place);
-  draw_y_axis(svg, panel.y, place, kMargin + 11.0);
+  draw_y_axis(svg, panel.y, place, label_place(panel, place));
   if (!panel.title.empty()) {
     const double above = place.has_label_above ? kSubtitleHeight : 0.0;
     svg.text(frame.x, frame.y - 6.0 - above, "text", "start", panel.title);

@@ -19,8 +19,8 @@ void add_spans(std::vector<Span>& spans, const PointHistory& history, std::size_
     if (!is_inside(rows[i].state)) {
       continue;
     }
-    const bool goes_on = !spans.empty() && spans.back().kind == kind && i > 0 &&
-                         is_inside(rows[i - 1].state);
+    const bool goes_on =
+        !spans.empty() && spans.back().kind == kind && i > 0 && is_inside(rows[i - 1].state);
     if (goes_on) {
       spans.back().to = rows[i + 1].t_s;
     } else {
@@ -52,7 +52,10 @@ double duration_s(const PointHistory& history) {
 }
 
 FigureAxis time_axis(double duration_s) {
-  return {"time since touch [\u00b5s]", "t_s", {0.0, duration_s > 0.0 ? duration_s : 1e-6}, false,
+  return {"time since touch [\u00b5s]",
+          "t_s",
+          {0.0, duration_s > 0.0 ? duration_s : 1e-6},
+          false,
           kMicro};
 }
 
@@ -67,8 +70,7 @@ FigureAxis axis_around(std::string label, std::string name, double per_unit,
   const Range range = range_of(ends);
   constexpr double kMore = 0.05;
   const double more = (range.to - range.from) * kMore;
-  return {std::move(label), std::move(name), {range.from - more, range.to + more}, false,
-          per_unit};
+  return {std::move(label), std::move(name), {range.from - more, range.to + more}, false, per_unit};
 }
 
 }  // namespace oblique::client::plot

@@ -17,8 +17,8 @@ namespace {
 using solver::TraceRow;
 
 /// A panel over time, with phases and stick shaded.
-Panel over_time(const PointHistory& history, std::string title, std::string label,
-                std::string name, double per_unit, std::vector<Curve> curves) {
+Panel over_time(const PointHistory& history, std::string title, std::string label, std::string name,
+                double per_unit, std::vector<Curve> curves) {
   Panel panel;
   panel.title = std::move(title);
   panel.x = time_axis(duration_s(history));
@@ -39,8 +39,8 @@ Curve curve_of(const PointHistory& history, std::string name, std::size_t stroke
 Panel forces_panel(const PointHistory& history) {
   return over_time(
       history, "Contact forces", "force [N]", "force_N", 1.0,
-      {curve_of(history, "normal force Fn", 0, [](const TraceRow& row) { return row.fn_N; }),
-       curve_of(history, "tangential force Ft", 1, [](const TraceRow& row) { return row.ft_N; })});
+      {curve_of(history, "normal force F_n", 0, [](const TraceRow& row) { return row.fn_N; }),
+       curve_of(history, "tangential force F_t", 1, [](const TraceRow& row) { return row.ft_N; })});
 }
 
 /// The rows of compression, or of restitution, with gaps between.
@@ -68,28 +68,26 @@ Panel loop_panel(const PointHistory& history) {
   panel.title = "Hysteresis of the normal element";
   panel.curves = {branch_of(history, 'C', "compression", 0),
                   branch_of(history, 'R', "restitution", 1)};
-  panel.x = axis_around("compression \u2212u_y [\u00b5m]", "minus_uy_m", kMicro, panel.curves, true);
-  panel.y = axis_around("normal force Fn [N]", "fn_N", 1.0, panel.curves, false);
+  panel.x =
+      axis_around("compression \u2212u_y [\u00b5m]", "minus_uy_m", kMicro, panel.curves, true);
+  panel.y = axis_around("normal force F_n [N]", "fn_N", 1.0, panel.curves, false);
   return panel;
 }
 
 Panel deformation_panel(const PointHistory& history) {
-  return over_time(history, "Deformation of the contact", "deformation [\u00b5m]",
-                   "deformation_m", kMicro,
-                   {curve_of(history, "normal u_y", 0,
-                             [](const TraceRow& row) { return row.uy_m; }),
-                    curve_of(history, "tangential u_x", 1,
-                             [](const TraceRow& row) { return row.ux_m; })});
+  return over_time(
+      history, "Deformation of the contact", "deformation [\u00b5m]", "deformation_m", kMicro,
+      {curve_of(history, "normal u_y", 0, [](const TraceRow& row) { return row.uy_m; }),
+       curve_of(history, "tangential u_x", 1, [](const TraceRow& row) { return row.ux_m; })});
 }
 
 Panel velocities_panel(const PointHistory& history) {
-  return over_time(history, "Velocities", "velocity [m/s]", "velocity_m_s", 1.0,
-                   {curve_of(history, "tip, tangential", 0,
-                             [](const TraceRow& row) { return row.vt_m_s; }),
-                    curve_of(history, "tip, normal", 1,
-                             [](const TraceRow& row) { return row.vn_m_s; }),
-                    curve_of(history, "P, along the ground", 2,
-                             [](const TraceRow& row) { return row.vP_m_s; })});
+  return over_time(
+      history, "Velocities", "velocity [m/s]", "velocity_m_s", 1.0,
+      {curve_of(history, "tip, tangential", 0, [](const TraceRow& row) { return row.vt_m_s; }),
+       curve_of(history, "tip, normal", 1, [](const TraceRow& row) { return row.vn_m_s; }),
+       curve_of(history, "P, along the ground", 2,
+                [](const TraceRow& row) { return row.vP_m_s; })});
 }
 
 Panel energies_panel(const PointHistory& history) {
@@ -98,12 +96,12 @@ Panel energies_panel(const PointHistory& history) {
   const auto curve = [&t_s](std::string name, std::size_t stroke, const std::vector<double>& y) {
     return Curve{.name = std::move(name), .x = t_s, .y = y, .stroke = stroke};
   };
-  return over_time(history, "Energies since touch", "energy [J]", "energy_J", 1.0,
-                   {curve("kinetic, change", 0, energies.kinetic),
-                    curve("strain, change", 2, energies.strain),
-                    curve("gravity, change", 6, energies.gravity),
-                    curve("lost to friction", 1, energies.friction),
-                    curve("in the normal and tangential element", 3, energies.element)});
+  return over_time(
+      history, "Energies since touch", "energy [J]", "energy_J", 1.0,
+      {curve("kinetic, change", 0, energies.kinetic), curve("strain, change", 2, energies.strain),
+       curve("gravity, change", 6, energies.gravity),
+       curve("lost to friction", 1, energies.friction),
+       curve("in the normal and tangential element", 3, energies.element)});
 }
 
 Panel panel_of(const PointHistory& history, PointPanel panel) {
@@ -125,16 +123,26 @@ Panel panel_of(const PointHistory& history, PointPanel panel) {
 }
 
 std::string outcome_of(const PointHistory& history) {
-  std::string text =
-      fmt::format("{}; {} elements a link; contact {} \u00b5s", values_of(history),
-                  history.model.elements_per_link,
-                  solver::readable_number(duration_s(history) * kMicro, 5));
+  std::string text = fmt::format("{}; {} elements a link; contact {} \u00b5s", values_of(history),
+                                 history.model.elements_per_link,
+                                 solver::readable_number(duration_s(history) * kMicro, 5));
   if (history.result) {
-    text += fmt::format(", Fn up to {} N, mode {}",
+    text += fmt::format(", F_n up to {} N, mode {}",
                         solver::readable_number(history.result->fn_peak_N, 5),
                         history.result->major_mode);
   }
   return text;
+}
+
+std::string energy_note(const solver::ContactEnergy& energy) {
+  // With e* = 1 nothing is lost but what rounding makes of it.
+  const double lost_J =
+      energy.restitution_J > 1e-12 * energy.exchanged_J ? energy.restitution_J : 0.0;
+  return fmt::format(
+      "The energy balance closes to {} of what is exchanged in contact; {} J are lost to friction, "
+      "{} J in restitution.",
+      solver::readable_number(energy.closure, 2), solver::readable_number(energy.friction_J, 4),
+      solver::readable_number(lost_J, 4));
 }
 
 }  // namespace
@@ -178,12 +186,10 @@ Sheet sheet_of(const PointHistory& history, std::optional<PointPanel> panel) {
     sheet.notes.push_back(shape_note(history));
   }
   if (shows(PointPanel::kEnergies) && history.result) {
-    sheet.notes.push_back(
-        fmt::format("The energy balance closes to {} of what is exchanged in contact; {} J are "
-                    "lost to friction, {} J in restitution.",
-                    solver::readable_number(history.result->energy.closure, 2),
-                    solver::readable_number(history.result->energy.friction_J, 4),
-                    solver::readable_number(history.result->energy.restitution_J, 4)));
+    sheet.notes.push_back(energy_note(history.result->energy));
+  }
+  if (shows(PointPanel::kLoop) && history.e_star == 1.0) {
+    sheet.notes.push_back("With e* = 1 restitution goes back as compression came.");
   }
   return sheet;
 }

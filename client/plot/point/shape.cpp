@@ -65,8 +65,8 @@ std::string shape_note(const PointHistory& history) {
   const auto& before = history.rows.front().nodes_m;
   for (const auto& row : history.rows) {
     for (std::size_t i = 0; i + 1 < before.size() && i + 1 < row.nodes_m.size(); i += 2) {
-      largest_m = std::max(largest_m, std::hypot(row.nodes_m[i] - before[i],
-                                                 row.nodes_m[i + 1] - before[i + 1]));
+      largest_m = std::max(
+          largest_m, std::hypot(row.nodes_m[i] - before[i], row.nodes_m[i + 1] - before[i + 1]));
     }
   }
   return fmt::format("From touch to separation no node moves farther than {} mm.",

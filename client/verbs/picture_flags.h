@@ -1,0 +1,38 @@
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "client/plot/figures/figure.h"
+#include "client/plot/files/picture_file.h"
+
+namespace oblique::client {
+
+/// Where a picture goes, and how large it is.
+struct PictureFlags {
+  std::string size;  ///< empty: its own
+  std::string out;
+  std::string format;
+  bool show = false;
+};
+
+/// Adds --size, --out, --format and --show. `flags` must live as long as `verb`.
+void add_picture_flags(CLI::App& verb, PictureFlags& flags);
+
+/// What the flags say together. Throws solver::InputError, naming the flag.
+struct PictureChoice {
+  plot::PictureFormat format;
+  bool is_shown;    ///< on standard output, as text
+  bool is_written;  ///< to a file or to standard output
+};
+PictureChoice picture_choice(const PictureFlags& flags);
+/// The size asked for, else `own`.
+plot::Size picture_size(const PictureFlags& flags, const plot::Size& own);
+
+/// Shows the figure on the terminal, writes the picture, or both. `made` gives the picture.
+void put_out(const PictureFlags& flags, const plot::Figure& figure,
+             const std::function<std::string(plot::PictureFormat)>& made);
+
+}  // namespace oblique::client

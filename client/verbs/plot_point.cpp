@@ -1,0 +1,205 @@
+#include "client/verbs/plot_point.h"
+
+#include <iostream>
+#include <stdexcept>
+#include <utility>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "client/output/mesh_note.h"
+#include "client/output/work_line.h"
+#include "client/plot/point/panels.h"
+#include "client/service/watching.h"
+#include "client/trace/stored_row.h"
+#include "client/trace/trace_of_worker.h"
+#include "client/verbs/solve_here.h"
+#include "client/verbs/tip_reach.h"
+#include "client/verbs/verbs.h"
+#include "proto/program/usage.h"
+#include "proto/recipe/point_table.h"
+#include "worker/solver/solve.h"
+
+namespace oblique::client {
+namespace {
+
+using plot::PointHistory;
+
+/// Where the finger is when its tip has dropped a quarter, a half and three quarters of H: where it
+/// would touch, had the ground been there.
+void add_falls(PointHistory& history, const solver::Finger& finger) {
+  for (const double share : {0.25, 0.5, 0.75}) {
+    const double drop_m = share * history.H_m;
+    std::vector<double> nodes_m;
+    try {
+      static_cast<void>(finger.solve(drop_m, history.mu, history.e_star,
+                                     {[&nodes_m](const solver::TraceRow& row) {
+                                        if (nodes_m.empty()) {
+                                          nodes_m = row.nodes_m;
+                                        }
+                                      },
+                                      true}));
+    } catch (const solver::SolveError&) {
+      // Its contact has no answer; where it began is known.
+    }
+    if (!nodes_m.empty()) {
+      history.falls.push_back({drop_m, std::move(nodes_m)});
+    }
+  }
+}
+
+void solve_history(PointHistory& history) {
+  const solver::Finger finger(history.model);
+  const solver::Tracing tracing{
+      [&history](const solver::TraceRow& row) { history.rows.push_back(row); }, true};
+  history.result = solve_here(finger, {history.H_m, history.mu, history.e_star}, tracing, false);
+  add_falls(history, finger);
+}
+
+PointHistory history_of(const PointAtHand& point) {
+  return {.name = fmt::format("Point {} of {}", point.point, point.study),
+          .model = point.model,
+          .H_m = point.H_m,
+          .mu = point.mu,
+          .e_star = point.e_star};
+}
+
+[[noreturn]] void throw_unsolved(const PointPictureFlags& flags, const std::string& reason) {
+  throw std::runtime_error(
+      fmt::format("point {} of {} has no answer: {}", *flags.point, flags.study, reason));
+}
+
+PointHistory history_by_worker(const PointPictureFlags& flags, const SourceFlags& source,
+                               Connection& connection) {
+  WorkLine line(std::cerr);
+  const auto waiting = line.begin(fmt::format("a worker of {} solves point {} of {}",
+                                              connection.url(), *flags.point, flags.study));
+  std::vector<solver::TraceRow> rows;
+  const auto solved = trace_by_worker(
+      connection, flags.study, static_cast<std::uint64_t>(*flags.point),
+      {.with_shape = true,
+       .time_limit_ms = source.timeout_s ? connection_settings(source).timeout_ms : 0},
+      [](const solver::TraceShape&) {},
+      [&rows](const solver::TraceRow& row) { rows.push_back(row); });
+  if (!solved.error.empty()) {
+    throw_unsolved(flags, solved.error);
+  }
+  PointHistory history = history_of(solved.point);
+  history.rows = std::move(rows);
+  history.result = solved.result;
+  return history;
+}
+
+void refuse_failed_point(const PointPictureFlags& flags, const std::optional<StoredRow>& stored) {
+  if (stored && stored->has_failed()) {
+    throw std::runtime_error(fmt::format(
+        "point {} of {} failed and has no time histories: {}. `oblique retry {}` solves it again",
+        *flags.point, flags.study, stored->text("error"), flags.study));
+  }
+}
+
+PointHistory history_of_study(const PointPictureFlags& flags, const SourceFlags& source_flags) {
+  const bool is_file = !database_meant(source_flags).empty();
+  if (is_file && flags.on_worker) {
+    throw solver::InputError(
+        "--on-worker needs a server, and a database file is read here: name one with --server URL");
+  }
+  const auto source = open_source(source_flags);
+  const auto number = static_cast<std::uint64_t>(*flags.point);
+  std::optional<Connection> connection;
+  if (!is_file) {
+    connection.emplace(connection_settings(source_flags));
+  }
+  refuse_failed_point(flags, stored_row(*source, flags.study, number));
+  if (!is_file && !flags.here) {
+    return history_by_worker(flags, source_flags, *connection);
+  }
+  PointHistory history = history_of(is_file ? point_in(*source, flags.study, number)
+                                            : point_at(*connection, flags.study, number));
+  try {
+    solve_history(history);
+  } catch (const solver::SolveError& error) {
+    throw_unsolved(flags, error.what());
+  } catch (const solver::InputError& error) {  // the study was taken with it: no wrong usage here
+    throw_unsolved(flags, error.what());
+  }
+  return history;
+}
+
+PointHistory history_of_values(const PointPictureFlags& flags) {
+  const protocol::PointTable table(recipe_of_flags(flags.values, tip_reach()));
+  if (table.size() != 1) {
+    throw solver::InputError(fmt::format(
+        "the flags make {} points, and the time histories of one are drawn: give one value each",
+        table.size()));
+  }
+  const auto point = table.point(0);
+  PointHistory history{.name = {},
+                       .model = table.model(0),
+                       .H_m = point.H_m,
+                       .mu = point.mu,
+                       .e_star = point.e_star};
+  solve_history(history);
+  tell_mesh(std::cerr, table.recipe());
+  return history;
+}
+
+}  // namespace
+
+void add_point_picture_flags(CLI::App& verb, PointPictureFlags& flags) {
+  const std::string group = "One point";
+  verb.add_option("--point", flags.point,
+                  "draw the time histories of that point of the study, solved again")
+      ->check(protocol::whole_number_from(0))
+      ->type_name("N")
+      ->group(group);
+  verb.add_option("--panel", flags.panel,
+                  "of a point one panel alone: forces, loop, deformation, velocities, energies or "
+                  "shape")
+      ->type_name("NAME")
+      ->group(group);
+  auto* here = verb.add_flag("--here", flags.here, "solve the point in this process");
+  here->group(group);
+  verb.add_flag("--on-worker", flags.on_worker, "have a worker of the server solve the point")
+      ->excludes(here)
+      ->group(group);
+  add_point_flags(verb, flags.values, FlagValues::kOne);
+}
+
+bool is_point_meant(const PointPictureFlags& flags) {
+  const bool has_values = !flags.values.axes.empty() || !flags.values.lengths.empty();
+  if (flags.study.empty() && !has_values) {
+    throw solver::InputError(
+        "plot needs the name of a study, or the values of a point as --H 1 --mu 0.4 --e 1");
+  }
+  if (!flags.study.empty() && has_values) {
+    throw solver::InputError(fmt::format(
+        "{} is a study, and its points have their values: draw one of them with --point N, or "
+        "leave the study out",
+        flags.study));
+  }
+  if (flags.study.empty() && flags.point) {
+    throw solver::InputError("--point is a number in a study: name the study");
+  }
+  static_cast<void>(plot::point_panel_named(flags.panel));
+  const bool is_point = has_values || flags.point;
+  if (!is_point && (!flags.panel.empty() || flags.here || flags.on_worker)) {
+    throw solver::InputError(
+        "--panel, --here and --on-worker are of one point: name it with --point N");
+  }
+  return is_point;
+}
+
+int plot_point(const PointPictureFlags& flags, const PictureFlags& picture,
+               const SourceFlags& source) {
+  static_cast<void>(picture_choice(picture));
+  const auto panel = plot::point_panel_named(flags.panel);
+  const auto history =
+      flags.study.empty() ? history_of_values(flags) : history_of_study(flags, source);
+  const auto sheet = plot::sheet_of(history, panel);
+  const auto size = picture_size(picture, plot::usual_size(sheet));
+  put_out(picture, plot::flattened(sheet),
+          [&](plot::PictureFormat format) { return plot::picture_of(sheet, format, size); });
+  return kDone;
+}
+
+}  // namespace oblique::client
