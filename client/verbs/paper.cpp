@@ -1,3 +1,4 @@
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -8,7 +9,9 @@
 
 #include "client/output/printer.h"
 #include "client/output/work_line.h"
+#include "client/paper/figures/paper_figures.h"
 #include "client/paper/paper_comparison.h"
+#include "client/plot/files/picture_file.h"
 #include "client/service/source.h"
 #include "client/service/watching.h"
 #include "client/verbs/printed_rows.h"
@@ -27,7 +30,8 @@ constexpr const char* kPaperExamples = R"(Examples:
   oblique paper --preset printed
   oblique paper --format markdown           the tables of README.md
   oblique paper --db oblique.db --study paper
-  oblique paper --format csv > differences.csv)";
+  oblique paper --format csv > differences.csv
+  oblique paper --figures figures           Figs. 3 to 7 as SVG files in that folder)";
 
 struct PaperFlags {
   std::string preset{"paper"};
@@ -35,6 +39,7 @@ struct PaperFlags {
   std::string database;  // empty: solve the cases now
   std::string format{"table"};
   bool modes = false;
+  std::string figures;  // folder; empty: tables
 };
 
 protocol::QueryReply rows_of_study(Source& source, const std::string& study) {
@@ -59,7 +64,35 @@ std::vector<std::optional<OwnCase>> cases_of(const PublishedTable& published,
   return solved_cases(published, {&finger, 1}).front();
 }
 
+/// Writes the figures into the folder, which is made.
+int draw_figures(const PaperFlags& flags) {
+  std::error_code failed;
+  std::filesystem::create_directories(flags.figures, failed);
+  if (failed) {
+    throw solver::InputError(fmt::format("--figures {}: this folder cannot be made: {}",
+                                         flags.figures, failed.message()));
+  }
+  const solver::Finger finger(solver::preset(flags.preset));
+  WorkLine line;
+  static_cast<void>(largest_drop_m(finger, line));
+  PaperGroups groups;
+  {
+    const auto touching = line.begin("contacts");
+    groups = solved_groups(published_table(), finger);
+  }
+  for (const auto& [name, sheet] : paper_figures(groups)) {
+    const auto file = (std::filesystem::path(flags.figures) / (name + ".svg")).string();
+    plot::write_picture(plot::svg_of(sheet, plot::usual_size(sheet)), plot::PictureFormat::kSvg,
+                        file);
+    std::cerr << fmt::format("{}: {}\n", file, sheet.title);
+  }
+  return kDone;
+}
+
 int paper(const PaperFlags& flags) {
+  if (!flags.figures.empty()) {
+    return draw_figures(flags);
+  }
   const auto format = format_named(flags.format);
   const auto published = published_table();
   const auto own = cases_of(published, flags);
@@ -90,8 +123,15 @@ void add_paper(CLI::App& app, Command& command) {
       ->type_name("NAME")
       ->needs(database)
       ->capture_default_str();
-  verb->add_flag("--modes", flags->modes, "peaks and modes alone (in tables for people)");
+  auto* modes =
+      verb->add_flag("--modes", flags->modes, "peaks and modes alone (in tables for people)");
   add_format_flag(*verb, flags->format);
+  verb->add_option("--figures", flags->figures,
+                   "draw the paper's figures 3 to 7 as SVG files in that folder, instead of tables")
+      ->type_name("DIR")
+      ->excludes(database)
+      ->excludes(modes)
+      ->excludes(verb->get_option("--format"));
   verb->callback([flags, &command] { command = [flags] { return paper(*flags); }; });
 }
 

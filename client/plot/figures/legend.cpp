@@ -92,6 +92,7 @@ void draw_sign(SvgWriter& svg, const LegendEntry& entry, double x, double y) {
       break;
     case Sign::kSpan:
       svg.rectangle(x, y - 6.0, width - 2.0, 12.0, fmt::format("p{}", entry.number % kSpanKinds));
+      svg.rectangle(x, y - 6.0, width - 2.0, 12.0, "frame");
       break;
     case Sign::kKnown:
       svg.path(mark_path(Mark::kDiamond, x + width / 2.0, y, 4.5), "known");
