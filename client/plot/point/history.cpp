@@ -63,6 +63,9 @@ FigureAxis axis_around(std::string label, std::string name, double per_unit,
                        const std::vector<Curve>& curves, bool of_x) {
   std::vector<double> ends;
   for (const Curve& curve : curves) {
+    if (curve.x.empty()) {
+      continue;
+    }
     const Range range = range_of(of_x ? curve.x : curve.y);
     ends.push_back(range.from);
     ends.push_back(range.to);

@@ -1,0 +1,111 @@
+// `oblique plot` of one point, and `oblique paper --figures`, as people call them.
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/store/store.h"
+#include "tests/support/points.h"
+#include "tests/support/programs.h"
+
+namespace oblique::client {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+/// A folder with oblique.db: a study `a` of 12 points, of which the first has a result.
+class PlotPoint : public testing::Test {
+ protected:
+  PlotPoint() {
+    server::Store store((folder_.path() / "oblique.db").string());
+    const auto table = server::table_of(12);
+    const std::vector<server::Change> changes{
+        server::AddStudy{1, "a", table, "2024-01-01T00:00:00.000Z"},
+        server::AddResults{1, table, 0, "", "", 1, "now", {server::solved_point(0)}}};
+    store.commit(changes);
+  }
+  test::Outcome plot(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), "plot");
+    return test::run_oblique(folder_, arguments);
+  }
+
+  test::TemporaryFolder folder_;
+};
+
+TEST_F(PlotPoint, DrawsAPointOfAStudySolvedAgainOrForTheFirstTime) {
+  for (const char* point : {"0", "11"}) {
+    const auto outcome = plot({"a", "--point", point});
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    EXPECT_TRUE(outcome.out.starts_with("<svg "));
+    EXPECT_THAT(outcome.out, HasSubstr("Point " + std::string(point) + " of a"));
+    EXPECT_THAT(outcome.out, HasSubstr("Shape of the finger"));
+  }
+}
+
+TEST_F(PlotPoint, DrawsAPointOfNoStudy) {
+  const auto outcome =
+      plot({"--H", "1", "--mu", "1.2", "--e", "1", "--panel", "forces", "--tip-mass", "0.001"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("Contact forces"));
+  EXPECT_THAT(outcome.out, Not(HasSubstr("Shape of the finger")));
+}
+
+TEST_F(PlotPoint, ShowsItInTheTerminal) {
+  const auto outcome = plot({"a", "--point", "0", "--panel", "loop", "--show"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("** compression"));
+}
+
+TEST_F(PlotPoint, SaysWhatIsWrongWithTheFlags) {
+  const auto refused = [this](const std::vector<std::string>& arguments) {
+    const auto outcome = plot(arguments);
+    EXPECT_EQ(outcome.exit_code, 2) << outcome.err;
+    EXPECT_EQ(outcome.out, "");
+    return outcome.err;
+  };
+  EXPECT_THAT(refused({}), HasSubstr("the name of a study, or the values of a point"));
+  EXPECT_THAT(refused({"a", "--H", "1"}), HasSubstr("--point N"));
+  EXPECT_THAT(refused({"--point", "3"}), HasSubstr("name the study"));
+  EXPECT_THAT(refused({"a", "--panel", "loop"}), HasSubstr("--point N"));
+  EXPECT_THAT(refused({"a", "--point", "3", "--panel", "lop"}), HasSubstr("did you mean `loop`"));
+  EXPECT_THAT(refused({"a", "--point", "3", "--map", "fn_peak_N"}), HasSubstr("--map"));
+  EXPECT_THAT(refused({"a", "--point", "3", "--on-worker"}), HasSubstr("--server"));
+  EXPECT_THAT(refused({"--H", "0.5,1", "--mu", "1", "--e", "1"}), HasSubstr("one value each"));
+}
+
+TEST_F(PlotPoint, ThatTheStudyLacksIsNoWrongUsage) {
+  const auto outcome = plot({"a", "--point", "12"});
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("0 to 11"));
+}
+
+TEST(PaperFiguresVerb, WritesFiveFilesIntoAFolderOfItsOwn) {
+  const test::TemporaryFolder folder;
+  const auto outcome = test::run_oblique(folder, {"paper", "--figures", "made/here"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(outcome.out, "");
+  std::size_t files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder.path() / "made" / "here")) {
+    std::ifstream file(entry.path(), std::ios::binary);
+    const std::string svg{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+    EXPECT_TRUE(svg.starts_with("<svg ") && svg.ends_with("</svg>\n")) << entry.path();
+    ++files;
+  }
+  EXPECT_EQ(files, 5U);
+}
+
+TEST(PaperFiguresVerb, RefusesAFolderThatIsAFile) {
+  const test::TemporaryFolder folder;
+  std::ofstream(folder.path() / "taken") << "x";
+  const auto outcome = test::run_oblique(folder, {"paper", "--figures", "taken"});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("--figures taken"));
+}
+
+}  // namespace
+}  // namespace oblique::client
