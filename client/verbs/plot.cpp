@@ -49,8 +49,6 @@ protocol::Recipe recipe_for(const PlotFlags& flags, Source& source) {
 
 int plot_study(const PlotFlags& flags) {
   const auto size = picture_size(flags.picture, {});
-  static_cast<void>(picture_choice(flags.picture));
-  plot::check(flags.request);
   const auto source = open_source(flags.source);
   const auto shape = plot::shape_of(recipe_for(flags, *source));
   const auto figure =
@@ -61,6 +59,9 @@ int plot_study(const PlotFlags& flags) {
 }
 
 int plot_what_is_meant(PlotFlags& flags) {
+  static_cast<void>(picture_choice(flags.picture));
+  static_cast<void>(picture_size(flags.picture, {}));
+  plot::check(flags.request);
   flags.point.study = flags.request.study;
   return is_point_meant(flags.point) ? plot_point(flags.point, flags.picture, flags.source)
                                      : plot_study(flags);

@@ -191,7 +191,6 @@ bool is_point_meant(const PointPictureFlags& flags) {
 
 int plot_point(const PointPictureFlags& flags, const PictureFlags& picture,
                const SourceFlags& source) {
-  static_cast<void>(picture_choice(picture));
   const auto panel = plot::point_panel_named(flags.panel);
   const auto history =
       flags.study.empty() ? history_of_values(flags) : history_of_study(flags, source);
