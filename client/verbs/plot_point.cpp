@@ -2,7 +2,9 @@
 
 #include <iostream>
 #include <stdexcept>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -17,6 +19,7 @@
 #include "client/verbs/verbs.h"
 #include "proto/program/usage.h"
 #include "proto/recipe/point_table.h"
+#include "worker/solver/model/errors.h"
 #include "worker/solver/solve.h"
 
 namespace oblique::client {

@@ -151,10 +151,16 @@ void write_points(std::string& out, const Panel& panel, const Figure& figure, st
                     : fmt::format("using 1:2 with {} title {} noenhanced", style,
                                   gnuplot_text(curve.name)));
   }
-  for (const KnownPoint& known : panel.known) {
-    add({known.x}, {known.y}, {}, 0.0,
-        fmt::format("using 1:2 with points pointtype 12 title {} noenhanced",
-                    gnuplot_text(known.name)));
+  for (std::size_t i = 0; i < panel.known.size();) {
+    const std::string& name = panel.known[i].name;
+    std::vector<double> x;
+    std::vector<double> y;
+    for (; i < panel.known.size() && panel.known[i].name == name; ++i) {
+      x.push_back(panel.known[i].x);
+      y.push_back(panel.known[i].y);
+    }
+    add(x, y, {}, 0.0,
+        fmt::format("using 1:2 with points pointtype 12 title {} noenhanced", gnuplot_text(name)));
   }
   out += plots.empty() ? "plot NaN notitle\n" : "set key outside right\n" + plots + '\n';
 }
