@@ -19,6 +19,7 @@
 #include "client/verbs/verbs.h"
 #include "proto/suggestion.h"
 #include "server/asking/sql/sql_expression.h"
+#include "worker/solver/model/errors.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::client {
@@ -72,13 +73,14 @@ int draw_figures(const PaperFlags& flags) {
     throw solver::InputError(fmt::format("--figures {}: this folder cannot be made: {}",
                                          flags.figures, failed.message()));
   }
+  const auto published = published_table();
   const solver::Finger finger(solver::preset(flags.preset));
   WorkLine line;
   static_cast<void>(largest_drop_m(finger, line));
   PaperGroups groups;
   {
-    const auto touching = line.begin("contacts");
-    groups = solved_groups(published_table(), finger);
+    const auto touching = line.begin(fmt::format("{} contacts", published.cases.size()));
+    groups = solved_groups(published, finger);
   }
   for (const auto& [name, sheet] : paper_figures(groups)) {
     const auto file = (std::filesystem::path(flags.figures) / (name + ".svg")).string();

@@ -18,7 +18,7 @@ struct PaperCase {
 /// Cases that differ in one parameter.
 struct PaperGroup {
   enum class Key { kH, kMu, kE };
-  Key key;
+  Key key = Key::kH;
   std::string title;  ///< "drop H, at \u03bc = 0.4, e* = 1"
   std::vector<PaperCase> cases;
 };

@@ -71,7 +71,7 @@ Panel group_panel(const PaperGroup& group, const PanelPlan& plan) {
   all = panel.curves;
   for (const KnownPoint& known : panel.known) {
     longest_s = std::max(longest_s, known.x);
-    all.push_back({.x = {known.x}, .y = {known.y}});
+    all.push_back({.name = {}, .x = {known.x}, .y = {known.y}});
   }
   panel.x = plot::time_axis(longest_s);
   panel.y = plot::axis_around(plan.label, plan.name, plan.per_unit, all, false);

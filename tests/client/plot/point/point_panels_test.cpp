@@ -17,6 +17,7 @@ using testing::Contains;
 using testing::ElementsAre;
 using testing::Field;
 using testing::HasSubstr;
+using testing::Not;
 
 TEST(PointSpans, ArePhasesAndOverThemStick) {
   const auto spans = spans_of(test::small_history());
