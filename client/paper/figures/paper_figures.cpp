@@ -73,7 +73,7 @@ Panel group_panel(const PaperGroup& group, const PanelPlan& plan) {
     longest_s = std::max(longest_s, known.x);
     all.push_back({.name = {}, .x = {known.x}, .y = {known.y}});
   }
-  panel.x = plot::time_axis(longest_s);
+  panel.x = plot::time_axis(1.02 * longest_s);  // marks at the end are whole
   panel.y = plot::axis_around(plan.label, plan.name, plan.per_unit, all, false);
   return panel;
 }

@@ -14,8 +14,8 @@ namespace oblique::client {
 namespace {
 
 const std::vector<PaperFigure>& figures() {
-  static const auto all = paper_figures(
-      solved_groups(published_table(), solver::Finger(solver::preset("paper"))));
+  static const auto all =
+      paper_figures(solved_groups(published_table(), solver::Finger(solver::preset("paper"))));
   return all;
 }
 

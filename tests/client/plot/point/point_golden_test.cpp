@@ -1,5 +1,5 @@
-// The bytes of a point's picture. OBLIQUE_WRITE_GOLDEN=1 writes the file anew: look at it before it is
-// committed.
+// The bytes of a point's picture. OBLIQUE_WRITE_GOLDEN=1 writes the file anew: look at it before it
+// is committed.
 #include <cstdlib>
 #include <fstream>
 #include <iterator>

@@ -53,11 +53,11 @@ TEST(Sheet, IsHigherWhereItsPartsNeedIt) {
 
 TEST(Sheet, AsATableHasAllPanels) {
   const auto csv = csv_of(flattened(sheet_of(test::small_history(), {})));
-  for (const char* heading : {"line,t_s,force_N\r\n", "line,minus_uy_m,fn_N\r\n",
-                              "line,t_s,energy_J\r\n", "line,x_m,y_m\r\n"}) {
+  for (const char* heading :
+       {"line,t_s,force_N\n", "line,minus_uy_m,fn_N\n", "line,t_s,energy_J\n", "line,x_m,y_m\n"}) {
     EXPECT_THAT(csv, HasSubstr(heading));
   }
-  EXPECT_THAT(csv, HasSubstr("normal force F_n,0.0001,1000\r\n"));
+  EXPECT_THAT(csv, HasSubstr("normal force F_n,0.0001,1000\n"));
 }
 
 }  // namespace

@@ -31,8 +31,8 @@ std::string without_cells(std::string svg) {
   return svg;
 }
 
-/// Where two pictures part, with numbers that differ by less than is seen taken as the same: another
-/// instruction set rounds otherwise. Empty: nowhere.
+/// Where two pictures part, with numbers that differ by less than is seen taken as the same:
+/// another instruction set rounds otherwise. Empty: nowhere.
 std::string first_difference(const std::string& kept, const std::string& drawn) {
   constexpr double kUnseen = 0.05;  // pixels
   const char* a = kept.c_str();
@@ -80,9 +80,9 @@ TEST(ReadmePictures, TheImpactIsThatOfItsPoint) {
 TEST(ReadmePictures, TheForcesAreThePapersFigure) {
   const test::TemporaryFolder folder;
   ASSERT_EQ(test::run_oblique(folder, {"paper", "--figures", "."}).exit_code, 0);
-  EXPECT_EQ(first_difference(kept_picture("forces.svg"),
-                             text_of_file(folder.path() / "fig4_forces.svg")),
-            "");
+  EXPECT_EQ(
+      first_difference(kept_picture("forces.svg"), text_of_file(folder.path() / "fig4_forces.svg")),
+      "");
 }
 
 TEST(ReadmePictures, AreShownThere) {
