@@ -170,6 +170,9 @@ void add_point_picture_flags(CLI::App& verb, PointPictureFlags& flags) {
 
 bool is_point_meant(const PointPictureFlags& flags) {
   const bool has_values = !flags.values.axes.empty() || !flags.values.lengths.empty();
+  if (flags.study.empty() && flags.point) {
+    throw solver::InputError("--point is a number in a study: name the study");
+  }
   if (flags.study.empty() && !has_values) {
     throw solver::InputError(
         "plot needs the name of a study, or the values of a point as --H 1 --mu 0.4 --e 1");
@@ -179,9 +182,6 @@ bool is_point_meant(const PointPictureFlags& flags) {
         "{} is a study, and its points have their values: draw one of them with --point N, or "
         "leave the study out",
         flags.study));
-  }
-  if (flags.study.empty() && flags.point) {
-    throw solver::InputError("--point is a number in a study: name the study");
   }
   static_cast<void>(plot::point_panel_named(flags.panel));
   const bool is_point = has_values || flags.point;
