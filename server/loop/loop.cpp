@@ -87,7 +87,8 @@ class Loop::Parts final : public Outbox {
   LoopEnd run(int stop_fd, const std::function<void()>& take_stop) {
     writer_.clear_leavings();  // from here on it alone uses the store
     auto next_tick = Clock::now();
-    std::array<pollfd, 5> items{{{network_.descriptor(), POLLIN, 0},
+    std::array<pollfd, 6> items{{{network_.descriptor(), POLLIN, 0},
+                                 {web_ ? web_->descriptor() : -1, POLLIN, 0},
                                  {written_.descriptor(), POLLIN, 0},
                                  {queried_.descriptor(), POLLIN, 0},
                                  {done_aside_.descriptor(), POLLIN, 0},
@@ -105,6 +106,7 @@ class Loop::Parts final : public Outbox {
       take_reports();
       has_more = take_worker_messages();
       has_more = take_client_messages() || has_more || network_.has_more();
+      take_page_requests();
       has_more = service_->go_on_searching(now()) || has_more;
       note_departures();
       if (Clock::now() >= next_tick) {
@@ -136,6 +138,10 @@ class Loop::Parts final : public Outbox {
     return forward_to_client(identity, protocol::encode(reply));
   }
   bool forward_to_client(const std::string& identity, const std::string& frame) override {
+    if (identity == Web::kPageClient) {
+      web_->put_reply(frame);
+      return true;
+    }
     if (is_ending_) {
       last_answered_.push_back(identity);
     }
@@ -171,6 +177,7 @@ class Loop::Parts final : public Outbox {
   std::string client_endpoint() const { return network_.endpoint(clients_); }
   std::string worker_endpoint() const { return network_.endpoint(workers_); }
   std::string http_url() const { return web_ ? web_->url() : std::string(); }
+  std::string page_url() const { return web_ ? web_->page_url() : std::string(); }
 
  private:
   static Delivery sent(Delivery delivery, std::string_view frame, PortTraffic& traffic) {
@@ -220,6 +227,14 @@ class Loop::Parts final : public Outbox {
         [this](const Incoming& incoming) {
           service_->client_frame(incoming.identity, frame_of(incoming), now(), incoming.holder);
         });
+  }
+
+  void take_page_requests() {
+    if (web_) {
+      for (const std::string& frame : web_->take_requests()) {
+        service_->client_frame(Web::kPageClient, frame, now(), nullptr);
+      }
+    }
   }
 
   template <typename Take>
@@ -383,6 +398,9 @@ std::string Loop::worker_endpoint() const {
 }
 std::string Loop::http_url() const {
   return parts_->http_url();
+}
+std::string Loop::page_url() const {
+  return parts_->page_url();
 }
 LoopEnd Loop::run(int stop_fd, const std::function<void()>& take_stop) {
   return parts_->run(stop_fd, take_stop);

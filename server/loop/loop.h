@@ -63,6 +63,8 @@ class Loop {
   std::string worker_endpoint() const;
   /// As http://127.0.0.1:7602; empty: nothing is shown over HTTP.
   std::string http_url() const;
+  /// The address of the page with its token; empty without HTTP.
+  std::string page_url() const;
 
   /// Runs until `stop_fd` becomes readable, or a little longer than the database is there; then
   /// tells the workers, makes what was received durable, acknowledges it and returns.

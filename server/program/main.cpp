@@ -91,6 +91,7 @@ void tell_ready(int fd, const Loop& loop) {
   nlohmann::json ends{{"client", loop.client_endpoint()}, {"worker", loop.worker_endpoint()}};
   if (!loop.http_url().empty()) {
     ends["http"] = loop.http_url();
+    ends["page"] = loop.page_url();
   }
   tell_line(fd, ends);
   ::close(fd);
@@ -136,6 +137,10 @@ int run(LoopSettings settings, int ready_fd, const StopWithParent& parent) {
                loop.http_url().empty() ? "no address" : loop.http_url() + "/metrics");
   if (ready_fd >= 0) {
     tell_ready(ready_fd, loop);
+  }
+  if (!loop.page_url().empty() && ::isatty(STDERR_FILENO) == 1) {
+    // Not in the log: whoever has it may change studies.
+    std::cerr << "The page of this server: " << loop.page_url() << "\n";
   }
   notifier.ready(fmt::format("clients at {}", loop.client_endpoint()));
   const auto end = loop.run(stop.descriptor(), [&stop] { stop.requested(); });

@@ -100,6 +100,11 @@ class Service {
   /// Of all studies, over the last seconds.
   double points_per_s(std::int64_t now_ms) const;
   bool is_stopping() const { return stopping_ || draining_; }
+  /// A study that is durable, and the first so many workers, as clients see them.
+  StudyView study_view(StudyId id, Instant now) const {
+    return view_of(id, {scheduler_, states_, ledger_, rates_, known_}, now);
+  }
+  std::vector<WorkerView> worker_views(std::size_t most, Instant now) const;
 
  private:
   /// What the events that are fed have in common.

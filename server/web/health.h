@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "server/web/http_server.h"
+#include "server/web/http/http_server.h"
 #include "server/web/snapshot.h"
 
 // Whether the server lives and takes work, as answers of one sentence.

@@ -25,6 +25,8 @@ class HttpOptions {
  private:
   std::string address_ = "127.0.0.1:7602";
   std::vector<std::string> names_;
+  bool shows_to_all_ = false;
+  std::string token_file_;
   const CLI::Option* address_option_ = nullptr;
 };
 

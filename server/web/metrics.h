@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <string>
 
-#include "server/web/http_server.h"
+#include "server/web/http/http_server.h"
 #include "server/web/process_numbers.h"
 #include "server/web/snapshot.h"
 

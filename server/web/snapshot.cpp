@@ -36,7 +36,7 @@ StudyNumbers numbers_of(StudyId id, const Service& service, std::int64_t now_ms)
           service.rates().points_per_s(id, points.settled, now_ms)};
 }
 
-void count_studies(const Service& service, std::int64_t now_ms, Snapshot& snapshot) {
+void count_studies(const Service& service, std::int64_t now_ms, bool for_page, Snapshot& snapshot) {
   const StudyStates& states = service.states();
   snapshot.studies = states.counts();
   std::vector<Ranked> ranked;
@@ -63,6 +63,9 @@ void count_studies(const Service& service, std::int64_t now_ms, Snapshot& snapsh
   ranked.resize(listed);
   for (const Ranked& study : ranked) {
     snapshot.listed.push_back(numbers_of(study.id, service, now_ms));
+    if (for_page) {
+      snapshot.shown_studies.push_back(service.study_view(study.id, {now_ms, 0}));
+    }
   }
 }
 
@@ -109,7 +112,7 @@ std::uint64_t Snapshot::threads_wanted() const {
                                                     : static_cast<std::uint64_t>(wanted);
 }
 
-Snapshot take_snapshot(const SnapshotSources& sources, std::int64_t now_ms) {
+Snapshot take_snapshot(const SnapshotSources& sources, std::int64_t now_ms, bool for_page) {
   const Service& service = sources.service;
   const Scheduler& scheduler = service.scheduler();
   Snapshot snapshot;
@@ -118,7 +121,10 @@ Snapshot take_snapshot(const SnapshotSources& sources, std::int64_t now_ms) {
   snapshot.points_failed = service.stored_points().failed;
   snapshot.points_per_s = service.points_per_s(now_ms);
   snapshot.thread_s_per_point = scheduler.thread_s_per_point();
-  count_studies(service, now_ms, snapshot);
+  count_studies(service, now_ms, for_page, snapshot);
+  if (for_page) {
+    snapshot.shown_workers = service.worker_views(kShownWorkers, {now_ms, 0});
+  }
   snapshot.batches_leased = scheduler.leases();
   snapshot.batch_s = scheduler.batch_s();
   snapshot.crews = scheduler.crews(now_ms, kSilentAfter_ms);

@@ -10,6 +10,7 @@
 #include "server/network/network.h"
 #include "server/scheduler/scheduler.h"
 #include "server/service/counts/study_states.h"
+#include "server/service/views.h"
 #include "server/service/waiting_queries.h"
 #include "server/store/writer.h"
 
@@ -67,6 +68,10 @@ struct Snapshot {
   /// Of the highest priority, the oldest first.
   std::vector<StudyNumbers> listed;
   std::uint64_t unlisted = 0;
+  /// The same studies, and the first workers, with all that is known of them; of a snapshot for the
+  /// page only.
+  std::vector<StudyView> shown_studies;
+  std::vector<WorkerView> shown_workers;
   std::map<std::string, OpenNumbers> open_by_key;  ///< by its name
 
   std::uint64_t batches_leased = 0;
@@ -106,9 +111,11 @@ struct SnapshotSources {
 };
 
 /// Costs in proportion to the studies that run or are paused, and to the workers.
-Snapshot take_snapshot(const SnapshotSources& sources, std::int64_t now_ms);
+Snapshot take_snapshot(const SnapshotSources& sources, std::int64_t now_ms, bool for_page = false);
 
 /// So many studies have numbers of their own at most: each is a few series more to keep.
 inline constexpr std::size_t kListedStudies = 50;
+/// So many workers are shown on the page.
+inline constexpr std::size_t kShownWorkers = 100;
 
 }  // namespace oblique::server

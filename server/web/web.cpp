@@ -8,6 +8,8 @@
 #include "server/web/metric_text.h"
 #include "server/web/metrics.h"
 #include "server/web/notice_board.h"
+#include "server/web/overview.h"
+#include "server/web/page/live_text.h"
 #include "server/web/process_numbers.h"
 
 namespace oblique::server {
@@ -15,6 +17,11 @@ namespace {
 
 constexpr unsigned kNotFound = 404;
 constexpr unsigned kServiceUnavailable = 503;
+
+WebSettings with_version(WebSettings settings) {
+  settings.page.version = OBLIQUE_VERSION;
+  return settings;
+}
 
 constexpr const char* kPlainText = "text/plain; charset=utf-8";
 
@@ -29,16 +36,33 @@ std::int64_t steady_ms() {
 class Web::Parts {
  public:
   explicit Parts(WebSettings settings)
-      : settings_(std::move(settings)),
+      : settings_(with_version(std::move(settings))),
         http_(settings_.address, {is_loopback(settings_.address.address), settings_.names},
               settings_.limits,
-              [this](const HttpServer::Question& question) { return answer(question); }) {}
+              [this](const HttpServer::Question& question) { return answer(question); },
+              {&Page::takes_changes,
+               [this](const HttpServer::Question& question) {
+                 return page_.objection_to_change(question);
+               },
+               [this](std::uint64_t number) { page_.gone(number); }}) {}
+
+  ~Parts() { answers_.stop(); }  // it wakes the HTTP server
+  Parts(const Parts&) = delete;
+  Parts& operator=(const Parts&) = delete;
 
   std::string url() const { return http_.url(); }
+  std::string page_url() const { return url() + "/?token=" + page_.key().token(); }
+
+  int descriptor() const { return line_.descriptor(); }
+  std::vector<std::string> take_requests() { return line_.take(); }
+  void put_reply(const std::string& frame) {
+    line_.put(frame);
+    http_.wake();
+  }
 
   void tick(const SnapshotSources& sources, std::int64_t now_ms) {
     board_.turned(now_ms);
-    if (board_.is_due(now_ms) && board_.put(take_snapshot(sources, now_ms))) {
+    if (board_.is_due(now_ms) && board_.put(take_snapshot(sources, now_ms, board_.is_for_page()))) {
       http_.wake();
     }
   }
@@ -48,9 +72,13 @@ class Web::Parts {
     if (question.path == "/healthz") {
       return health(board_.turned_ms(), steady_ms());
     }
+    if (Page::has(question.path)) {
+      return page_.answer(question);
+    }
     const bool wants_metrics = question.path == "/metrics";
     if (!wants_metrics && question.path != "/readyz") {
-      return HttpAnswer{kNotFound, kPlainText, "there are /metrics, /healthz and /readyz\n"};
+      return HttpAnswer{kNotFound, kPlainText,
+                        "there are a page at /, /metrics, /healthz and /readyz\n"};
     }
     const NoticeBoard::Shared latest = board_.latest();
     const std::int64_t asked_ms = steady_ms() - question.waited.count();
@@ -65,8 +93,20 @@ class Web::Parts {
     if (!latest) {
       return HttpAnswer{kServiceUnavailable, kPlainText, "the server has just begun\n"};
     }
-    return wants_metrics ? metrics(latest, question.counts)
+    return wants_metrics ? metrics(latest, *question.counts)
                          : readiness(*latest, disk_numbers(settings_.database).free_bytes);
+  }
+
+  /// The overview, where it is another one than at the last look; asks for the next.
+  std::optional<std::string> look() {
+    const NoticeBoard::Shared latest = board_.latest();
+    board_.want_for_page();
+    if (!latest || latest == told_ || latest->shown_studies.size() != latest->listed.size()) {
+      return std::nullopt;
+    }
+    told_ = latest;
+    std::string overview = overview_json(*latest);
+    return overview == std::exchange(overview_, overview) ? std::nullopt : std::optional(overview);
   }
 
   /// Written once for each snapshot, however often it is asked for.
@@ -89,7 +129,13 @@ class Web::Parts {
   NoticeBoard board_{began_ms_};
   NoticeBoard::Shared shown_;  // of the HTTP server's thread
   std::string text_;           // the same
-  HttpServer http_;            // last: its thread uses all the others
+  NoticeBoard::Shared told_;   // the same
+  std::string overview_;       // the same
+  ServiceLine line_;
+  LiveText live_{[this] { return look(); }, began_ms_};
+  AnswerPool answers_{settings_.database, [this] { http_.wake(); }};
+  Page page_{settings_.page, {line_, answers_, live_}};
+  HttpServer http_;  // last: its thread uses all the others
 };
 
 Web::Web(WebSettings settings) : parts_(std::make_unique<Parts>(std::move(settings))) {}
@@ -97,6 +143,22 @@ Web::~Web() = default;
 
 std::string Web::url() const {
   return parts_->url();
+}
+
+std::string Web::page_url() const {
+  return parts_->page_url();
+}
+
+int Web::descriptor() const {
+  return parts_->descriptor();
+}
+
+std::vector<std::string> Web::take_requests() {
+  return parts_->take_requests();
+}
+
+void Web::put_reply(const std::string& frame) {
+  parts_->put_reply(frame);
 }
 
 void Web::tick(const SnapshotSources& sources, std::int64_t now_ms) {

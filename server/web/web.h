@@ -5,8 +5,10 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <vector>
 
-#include "server/web/http_server.h"
+#include "server/web/http/http_server.h"
+#include "server/web/page/page.h"
 #include "server/web/snapshot.h"
 
 namespace oblique::server {
@@ -20,11 +22,12 @@ struct WebSettings {
   /// A loop that makes no snapshot in this time is held up, and the last one is shown.
   std::chrono::milliseconds patience{2000};
   std::string database;  ///< file
+  PageSettings page;
   std::string solver_version;
 };
 
-/// The server as machines of its operator see it: metrics, health, readiness, over HTTP. The loop
-/// is asked for a snapshot only when one is to be shown.
+/// The server over HTTP: metrics, health and readiness for machines, and the page for people. The
+/// loop is asked for a snapshot only when one is to be shown.
 class Web {
  public:
   /// Answers from now on. Throws std::runtime_error, naming the address, when it cannot.
@@ -35,6 +38,18 @@ class Web {
 
   /// As http://127.0.0.1:7602.
   std::string url() const;
+
+  /// The same with the token that lets a browser in.
+  std::string page_url() const;
+
+  /// As what the page is a client of the service; of the loop.
+  static constexpr const char* kPageClient = ServiceLine::kIdentity;
+  /// Readable when the page has requests.
+  int descriptor() const;
+  /// Their frames.
+  std::vector<std::string> take_requests();
+  /// The frame of a reply to the page.
+  void put_reply(const std::string& frame);
 
   /// From the loop, several times a second; costs nothing while nobody asks.
   void tick(const SnapshotSources& sources, std::int64_t now_ms);

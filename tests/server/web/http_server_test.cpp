@@ -1,5 +1,5 @@
 // Over real sockets of the loopback device, with what sound and hostile peers send.
-#include "server/web/http_server.h"
+#include "server/web/http/http_server.h"
 
 #include <atomic>
 #include <cstdint>
@@ -26,8 +26,8 @@ class EchoServer {
   explicit EchoServer(const HttpLimits& limits = {})
       : server_({"127.0.0.1", "*"}, {}, limits,
                 [this](const HttpServer::Question& question) -> std::optional<HttpAnswer> {
-                  slow_ = question.counts.ended_as_slow;
-                  crowded_ = question.counts.ended_for_others;
+                  slow_ = question.counts->ended_as_slow;
+                  crowded_ = question.counts->ended_for_others;
                   if (question.path == "/wait" && !is_open_) {
                     ++asked_;
                     return std::nullopt;

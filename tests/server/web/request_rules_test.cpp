@@ -1,4 +1,4 @@
-#include "server/web/request_rules.h"
+#include "server/web/http/request_rules.h"
 
 #include <set>
 #include <stdexcept>
@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 #include <CLI/CLI.hpp>
 
-#include "server/web/http_address.h"
+#include "server/web/http/http_address.h"
 #include "server/web/http_options.h"
 
 namespace oblique::server {

@@ -4,13 +4,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 
-#include "server/web/http_address.h"
-#include "server/web/request_rules.h"
+#include "server/web/http/http_address.h"
+#include "server/web/http/http_message.h"
+#include "server/web/http/request_rules.h"
 
 namespace oblique::server {
 
@@ -22,38 +22,39 @@ struct HttpLimits {
   std::size_t connections_of_one_address = 32;
   /// A connection's memory for request line, headers and the headers of the answer.
   std::size_t bytes_of_connection = std::size_t{16} * 1024;
-  /// From the first byte to the last one of the answer.
+  /// From the first byte to the last one of the answer. Of a stream: for its peer to take what is
+  /// there.
   std::chrono::milliseconds longest{10'000};
+  /// That go on for as long as both ends want, beside the connections above.
+  std::size_t streams = 32;
 };
 
-struct HttpAnswer {
-  unsigned status;
-  std::string content_type;
-  std::string body;
-};
-
-/// Since the server began.
-struct HttpCounts {
-  std::map<unsigned, std::uint64_t> answers;  ///< by status
-  std::size_t connections = 0;                ///< that are there
-  std::uint64_t ended_as_slow = 0;
-  std::uint64_t ended_for_others = 0;
-};
-
-/// Answers GET and HEAD over HTTP/1.0 and 1.1 on a thread of its own. One that has nothing to say
-/// yet lets its connection wait, and nobody else.
+/// Answers GET, HEAD, and changes by POST, over HTTP/1.0 and 1.1 on a thread of its own. One that
+/// has nothing to say yet lets its connection wait, and nobody else.
 class HttpServer {
  public:
-  struct Question {
-    std::string path;                    ///< without what follows a question mark
-    std::chrono::milliseconds waited{};  ///< since it was asked
-    const HttpCounts& counts;
-  };
+  using Question = HttpQuestion;
   /// Called on the server's thread, and again after each `wake` until there is an answer.
   using Answer = std::function<std::optional<HttpAnswer>(const Question&)>;
 
+  /// What else the server asks whom it serves, on its thread.
+  struct Rules {
+    /// Whether something can be changed at that path, by POST.
+    std::function<bool(const std::string& path)> takes_changes = [](const std::string&) {
+      return false;
+    };
+    /// Why a change is refused, asked before its body is read.
+    std::function<std::optional<HttpAnswer>(const Question&)> objection = [](const Question&) {
+      return std::nullopt;
+    };
+    /// Nobody waits for the answer to the request of that number any more.
+    std::function<void(std::uint64_t number)> gone = [](std::uint64_t) {};
+  };
+
   /// Listens from now on. Throws std::runtime_error, naming the address, when it cannot.
   HttpServer(const HttpAddress& address, OwnNames names, const HttpLimits& limits, Answer answer);
+  HttpServer(const HttpAddress& address, OwnNames names, const HttpLimits& limits, Answer answer,
+             Rules rules);
   /// Ends the thread; who waits for an answer gets none.
   ~HttpServer();
   HttpServer(const HttpServer&) = delete;

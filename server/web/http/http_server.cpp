@@ -1,4 +1,4 @@
-#include "server/web/http_server.h"
+#include "server/web/http/http_server.h"
 
 #include <algorithm>
 #include <array>
@@ -14,11 +14,11 @@
 
 #include <microhttpd.h>
 #include <poll.h>
-#include <strings.h>
 #include <sys/socket.h>
 
 #include "proto/system/wake_up.h"
 #include "server/network/listener.h"
+#include "server/web/http/http_parts.h"
 
 namespace oblique::server {
 namespace {
@@ -46,64 +46,24 @@ std::string host_of(const PeerAddress& address) {
   return text.substr(0, text.rfind(':'));
 }
 
-RequestHead head_of(MHD_Connection* connection, const char* method) {
-  RequestHead head;
-  head.method = method;
-  const auto take = [](void* into, MHD_ValueKind, const char* key, const char* value) {
-    const auto is = [key](const char* name) { return strcasecmp(key, name) == 0; };
-    RequestHead& taken = *static_cast<RequestHead*>(into);
-    const std::string text = value == nullptr ? "" : value;
-    if (is(MHD_HTTP_HEADER_HOST)) {
-      taken.hosts.push_back(text);
-    } else if (is(MHD_HTTP_HEADER_ORIGIN)) {
-      taken.origins.push_back(text);
-    } else if (is("Sec-Fetch-Site")) {
-      taken.fetch_sites.push_back(text);
-    } else if (is(MHD_HTTP_HEADER_TRANSFER_ENCODING) ||
-               (is(MHD_HTTP_HEADER_CONTENT_LENGTH) && text != "0")) {
-      taken.has_body = true;
-    }
-    return MHD_YES;
-  };
-  MHD_get_connection_values(connection, MHD_HEADER_KIND, take, &head);
-  return head;
-}
-
-void add_headers(MHD_Response* response, const HttpAnswer& answer) {
-  const std::array<std::pair<const char*, const char*>, 7> headers{
-      {{MHD_HTTP_HEADER_CONTENT_TYPE, answer.content_type.c_str()},
-       {MHD_HTTP_HEADER_CONNECTION, "close"},
-       {MHD_HTTP_HEADER_CACHE_CONTROL, "no-store"},
-       {MHD_HTTP_HEADER_X_CONTENT_TYPE_OPTIONS, "nosniff"},
-       {"Content-Security-Policy", "default-src 'none'; frame-ancestors 'none'"},
-       {"Cross-Origin-Resource-Policy", "same-origin"},
-       {"Referrer-Policy", "no-referrer"}}};
-  for (const auto& [name, value] : headers) {
-    MHD_add_response_header(response, name, value);
-  }
-  if (answer.status == MHD_HTTP_METHOD_NOT_ALLOWED) {
-    MHD_add_response_header(response, MHD_HTTP_HEADER_ALLOW, "GET, HEAD");
-  }
-  if (answer.status == MHD_HTTP_SERVICE_UNAVAILABLE) {
-    MHD_add_response_header(response, MHD_HTTP_HEADER_RETRY_AFTER, "1");
-  }
-}
-
 }  // namespace
 
 class HttpServer::Parts {
  public:
-  Parts(const HttpAddress& address, OwnNames names, const HttpLimits& limits, Answer answer)
+  Parts(const HttpAddress& address, OwnNames names, const HttpLimits& limits, Answer answer,
+        Rules rules)
       : names_(std::move(names)),
         limits_(limits),
         answer_(std::move(answer)),
+        rules_(std::move(rules)),
         listener_(address.address, address.port),
-        daemon_(MHD_start_daemon(
-            MHD_USE_EPOLL | MHD_USE_NO_LISTEN_SOCKET | MHD_ALLOW_SUSPEND_RESUME, 0, nullptr,
-            nullptr, &Parts::asked, this, MHD_OPTION_NOTIFY_CONNECTION, &Parts::noticed, this,
-            MHD_OPTION_CONNECTION_MEMORY_LIMIT, limits.bytes_of_connection,
-            MHD_OPTION_CONNECTION_LIMIT, static_cast<unsigned>(2 * limits.connections),
-            MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_END)) {
+        daemon_(
+            MHD_start_daemon(MHD_USE_EPOLL | MHD_USE_NO_LISTEN_SOCKET | MHD_ALLOW_SUSPEND_RESUME, 0,
+                             nullptr, nullptr, &Parts::asked, this, MHD_OPTION_NOTIFY_CONNECTION,
+                             &Parts::noticed, this, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
+                             limits.bytes_of_connection, MHD_OPTION_CONNECTION_LIMIT,
+                             static_cast<unsigned>(2 * limits.connections + limits.streams),
+                             MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_END)) {
     if (daemon_ == nullptr) {
       throw std::runtime_error("the HTTP server cannot start");
     }
@@ -129,8 +89,12 @@ class HttpServer::Parts {
     std::optional<Clock::time_point> asked;
     bool waits = false;     // suspended
     bool answered = false;  // an answer is under way
+    Asked request = {};     // once its head has come
+    std::shared_ptr<HttpStream> stream = {};
+    std::string unsent = {};  // of the stream
   };
   using Peers = std::map<MHD_Connection*, Peer>;
+  using StreamPlace = std::pair<Parts*, MHD_Connection*>;
 
   void run() {
     std::array<pollfd, 3> items{
@@ -163,7 +127,7 @@ class HttpServer::Parts {
       until = std::min(until, accept_again_);
     }
     for (const auto& [connection, peer] : peers_) {
-      until = std::min(until, peer.since + limits_.longest);
+      until = is_quiet_stream(peer) ? until : std::min(until, peer.since + limits_.longest);
       until = peer.waits ? std::min(until, now + kLongestWait) : until;
     }
     return std::max(milliseconds(0), std::chrono::ceil<milliseconds>(until - now));
@@ -188,15 +152,19 @@ class HttpServer::Parts {
 
   void make_room_for(const std::string& address) {
     std::map<std::string, std::size_t> counts;
+    std::size_t connections = 0;
     for (const auto& [connection, peer] : peers_) {
-      ++counts[peer.address];
+      if (!peer.stream) {
+        ++connections;
+        ++counts[peer.address];
+      }
     }
     const auto most = std::max_element(
         counts.begin(), counts.end(),
         [](const auto& one, const auto& other) { return one.second < other.second; });
     if (counts[address] >= limits_.connections_of_one_address) {
       end_oldest_of(address);
-    } else if (peers_.size() >= limits_.connections) {
+    } else if (connections >= limits_.connections) {
       end_oldest_of(most->first);
     }
   }
@@ -204,7 +172,7 @@ class HttpServer::Parts {
   void end_oldest_of(const std::string& address) {
     auto oldest = peers_.end();
     for (auto peer = peers_.begin(); peer != peers_.end(); ++peer) {
-      if (peer->second.address == address &&
+      if (peer->second.address == address && !peer->second.stream &&
           (oldest == peers_.end() || peer->second.since < oldest->second.since)) {
         oldest = peer;
       }
@@ -218,7 +186,7 @@ class HttpServer::Parts {
   void end_overdue(Clock::time_point now) {
     for (auto peer = peers_.begin(); peer != peers_.end();) {
       const auto this_one = peer++;
-      if (now - this_one->second.since >= limits_.longest) {
+      if (!is_quiet_stream(this_one->second) && now - this_one->second.since >= limits_.longest) {
         ++counts_.ended_as_slow;
         end(this_one, kTooSlow);
       }
@@ -235,22 +203,64 @@ class HttpServer::Parts {
     if (peer->second.waits) {
       MHD_resume_connection(peer->first);
     }
+    tell_gone(peer->second);
     peers_.erase(peer);
   }
 
+  void tell_gone(const Peer& peer) const {
+    if (peer.asked && !peer.answered) {
+      rules_.gone(peer.request.question.number);
+    }
+  }
+
+  /// A stream whose peer has taken all that there was.
+  static bool is_quiet_stream(const Peer& peer) { return peer.stream && peer.waits; }
+
   void ask_again() {
     for (auto& [connection, peer] : peers_) {
-      if (std::exchange(peer.waits, false)) {
+      if (peer.waits && (is_stopping_ || !peer.stream || peer.stream->has_news())) {
+        peer.waits = false;
+        peer.since = peer.stream ? Clock::now() : peer.since;
         MHD_resume_connection(connection);
       }
     }
+  }
+
+  /// The library asks for more of a stream; what is given has gone to the system when it asks
+  /// again.
+  static ssize_t stream_on(void* context, std::uint64_t /*position*/, char* into,
+                           std::size_t most) {
+    const auto& [parts, connection] = *static_cast<StreamPlace*>(context);
+    const auto found = parts->peers_.find(connection);
+    if (found == parts->peers_.end() || parts->is_stopping_) {
+      return MHD_CONTENT_READER_END_OF_STREAM;
+    }
+    Peer& peer = found->second;
+    try {
+      peer.unsent = peer.unsent.empty() ? peer.stream->next() : std::move(peer.unsent);
+    } catch (const std::exception&) {
+      return MHD_CONTENT_READER_END_WITH_ERROR;
+    }
+    peer.since = Clock::now();
+    if (peer.unsent.empty()) {
+      peer.waits = true;
+      MHD_suspend_connection(connection);
+      return 0;
+    }
+    const std::size_t count = std::min(most, peer.unsent.size());
+    std::memcpy(into, peer.unsent.data(), count);
+    peer.unsent.erase(0, count);
+    return static_cast<ssize_t>(count);
   }
 
   static void noticed(void* self, MHD_Connection* connection, void** /*context*/,
                       MHD_ConnectionNotificationCode what) {
     Parts& parts = *static_cast<Parts*>(self);
     if (what == MHD_CONNECTION_NOTIFY_CLOSED) {
-      parts.peers_.erase(connection);
+      if (const auto peer = parts.peers_.find(connection); peer != parts.peers_.end()) {
+        parts.tell_gone(peer->second);
+        parts.peers_.erase(peer);
+      }
       return;
     }
     const int descriptor =
@@ -259,34 +269,58 @@ class HttpServer::Parts {
   }
 
   static MHD_Result asked(void* self, MHD_Connection* connection, const char* url,
-                          const char* method, const char* /*version*/, const char* /*upload*/,
+                          const char* method, const char* /*version*/, const char* upload,
                           std::size_t* upload_bytes, void** state) {
     Parts& parts = *static_cast<Parts*>(self);
     const auto peer = parts.peers_.find(connection);
     if (peer == parts.peers_.end()) {
       return MHD_NO;  // it was ended
     }
-    *upload_bytes = 0;
+    const std::size_t bytes = std::exchange(*upload_bytes, 0);
     try {
       if (std::exchange(*state, &parts) == nullptr) {  // the head has come
-        const auto refusal = objection_to(head_of(connection, method), parts.names_);
-        return refusal ? parts.send(peer, {refusal->status, kPlainText, refusal->sentence + "\n"})
-                       : MHD_YES;
+        return parts.head_came(peer, method, url);
       }
-      return parts.answer(peer, url);
+      std::string& body = peer->second.request.question.body;
+      if (bytes == 0) {
+        return parts.answer(peer);
+      }
+      if (peer->second.answered || body.size() + bytes > kMostBodyBytes) {
+        return peer->second.answered ? MHD_YES : MHD_NO;
+      }
+      body.append(upload, bytes);
+      return MHD_YES;
     } catch (const std::exception&) {
       return MHD_NO;  // no memory: the connection ends
     }
   }
 
-  MHD_Result answer(Peers::iterator peer, const char* url) {
+  MHD_Result head_came(Peers::iterator peer, const char* method, const char* path) {
+    Asked& request = peer->second.request;
+    request = asked_on(peer->first, method, path);
+    request.head.takes_changes = rules_.takes_changes(request.question.path);
+    request.question.number = ++last_number_;
+    request.question.counts = &counts_;
+    if (const auto refusal = objection_to(request.head, names_)) {
+      return send(peer, {refusal->status, kPlainText, refusal->sentence + "\n"});
+    }
+    if (request.question.method == "POST") {
+      if (const auto objection = rules_.objection(request.question)) {
+        return send(peer, *objection);
+      }
+    }
+    return MHD_YES;
+  }
+
+  MHD_Result answer(Peers::iterator peer) {
     const auto now = Clock::now();
     if (!peer->second.asked) {
       peer->second.asked = now;
     }
-    const auto waited = std::chrono::duration_cast<milliseconds>(now - *peer->second.asked);
+    HttpQuestion& question = peer->second.request.question;
+    question.waited = std::chrono::duration_cast<milliseconds>(now - *peer->second.asked);
     counts_.connections = peers_.size();
-    const auto answer = is_stopping_ ? std::nullopt : answer_({url, waited, counts_});
+    const auto answer = is_stopping_ ? std::nullopt : answer_(question);
     if (answer) {
       return send(peer, *answer);
     }
@@ -299,13 +333,18 @@ class HttpServer::Parts {
   }
 
   MHD_Result send(Peers::iterator peer, const HttpAnswer& answer) {
-    // The library only reads what it copies.
-    MHD_Response* const response = MHD_create_response_from_buffer(
-        answer.body.size(), const_cast<char*>(answer.body.data()), MHD_RESPMEM_MUST_COPY);
+    const auto streams = static_cast<std::size_t>(std::count_if(
+        peers_.begin(), peers_.end(), [](const auto& other) { return other.second.stream; }));
+    if (answer.stream && streams >= limits_.streams) {
+      return send(peer, {MHD_HTTP_SERVICE_UNAVAILABLE, kPlainText,
+                         "too many pages are open already: close some\n"});
+    }
+    MHD_Response* const response = answer.stream ? streaming(peer->first) : buffered(answer);
     if (response == nullptr) {
       return MHD_NO;
     }
     add_headers(response, answer);
+    peer->second.stream = answer.stream;
     const MHD_Result queued = MHD_queue_response(peer->first, answer.status, response);
     MHD_destroy_response(response);
     peer->second.answered = true;
@@ -313,17 +352,31 @@ class HttpServer::Parts {
     return queued;
   }
 
+  MHD_Response* streaming(MHD_Connection* connection) {
+    constexpr std::size_t kBlock = 4096;
+    auto place = std::make_unique<StreamPlace>(this, connection);
+    MHD_Response* const response = MHD_create_response_from_callback(
+        MHD_SIZE_UNKNOWN, kBlock, &Parts::stream_on, place.get(),
+        [](void* context) { delete static_cast<StreamPlace*>(context); });
+    if (response != nullptr) {
+      static_cast<void>(place.release());  // the library deletes it
+    }
+    return response;
+  }
+
   static constexpr const char* kPlainText = "text/plain; charset=utf-8";
 
   OwnNames names_;
   HttpLimits limits_;
   Answer answer_;
+  Rules rules_;
   Listener listener_;
   protocol::WakeUp wake_up_;
   std::atomic<bool> is_stopping_ = false;
   // Of the thread, from here on.
   Peers peers_;
   HttpCounts counts_;
+  std::uint64_t last_number_ = 0;
   std::string accepted_host_;  // of the connection that is being taken
   Clock::time_point accept_again_{};
   MHD_Daemon* daemon_;
@@ -332,7 +385,11 @@ class HttpServer::Parts {
 
 HttpServer::HttpServer(const HttpAddress& address, OwnNames names, const HttpLimits& limits,
                        Answer answer)
-    : parts_(std::make_unique<Parts>(address, std::move(names), limits, std::move(answer))) {}
+    : HttpServer(address, std::move(names), limits, std::move(answer), Rules()) {}
+HttpServer::HttpServer(const HttpAddress& address, OwnNames names, const HttpLimits& limits,
+                       Answer answer, Rules rules)
+    : parts_(std::make_unique<Parts>(address, std::move(names), limits, std::move(answer),
+                                     std::move(rules))) {}
 HttpServer::~HttpServer() = default;
 
 std::string HttpServer::url() const {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <set>
 #include <string>
@@ -11,9 +12,11 @@ namespace oblique::server {
 struct RequestHead {
   std::string method;
   bool has_body = false;
-  std::vector<std::string> hosts;        ///< every Host header
-  std::vector<std::string> origins;      ///< every Origin header
-  std::vector<std::string> fetch_sites;  ///< every Sec-Fetch-Site header
+  std::vector<std::string> hosts;                ///< every Host header
+  std::vector<std::string> origins;              ///< every Origin header
+  std::vector<std::string> fetch_sites;          ///< every Sec-Fetch-Site header
+  bool takes_changes = false;                    ///< something can be changed at its path, by POST
+  std::optional<std::uint64_t> body_bytes = {};  ///< as Content-Length says
 };
 
 /// By what a server may be called in a request. A page of a stranger, opened in a browser on this
@@ -31,7 +34,12 @@ struct HttpRefusal {
   std::string sentence;
 };
 
-/// Why the request gets no answer; nothing: it gets one.
+/// A change has so many bytes at most.
+inline constexpr std::uint64_t kMostBodyBytes = std::uint64_t{256} * 1024;
+
+/// Why the request gets no answer; nothing: it gets one. What changes something must come from a
+/// page of this server, which says so by `Origin`; who else asks, as a program, has the port of the
+/// clients.
 std::optional<HttpRefusal> objection_to(const RequestHead& head, const OwnNames& own);
 
 /// The host of a Host header, in lower case and without port and brackets: "127.0.0.1" of

@@ -1,4 +1,4 @@
-#include "server/web/request_rules.h"
+#include "server/web/http/request_rules.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -10,7 +10,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/text.h"
-#include "server/web/http_address.h"
+#include "server/web/http/http_address.h"
 
 namespace oblique::server {
 namespace {
@@ -57,6 +57,19 @@ std::optional<HttpRefusal> objection_to_hosts(const RequestHead& head, const Own
 bool is_own_origin(const std::string& origin, const RequestHead& head) {
   constexpr std::string_view kScheme = "http://";
   return head.hosts.size() == 1 && origin == std::string(kScheme) + head.hosts.front();
+}
+
+std::optional<HttpRefusal> objection_to_change(const RequestHead& head) {
+  if (head.origins.size() != 1 || std::any_of(head.fetch_sites.begin(), head.fetch_sites.end(),
+                                              [](const auto& s) { return s != "same-origin"; })) {
+    return HttpRefusal{kForbidden, "changes come from a page of this server only"};
+  }
+  if (head.has_body && (!head.body_bytes || *head.body_bytes > kMostBodyBytes)) {
+    return HttpRefusal{
+        kContentTooLarge,
+        fmt::format("a change says its length, and has at most {} bytes", kMostBodyBytes)};
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -107,6 +120,9 @@ std::optional<HttpRefusal> objection_to(const RequestHead& head, const OwnNames&
                   [](const std::string& site) { return site == "same-origin" || site == "none"; });
   if (!is_of_ours) {
     return HttpRefusal{kForbidden, "pages of other sites get nothing from this server"};
+  }
+  if (head.method == "POST" && head.takes_changes) {
+    return objection_to_change(head);
   }
   if (head.method != "GET" && head.method != "HEAD") {
     return HttpRefusal{kMethodNotAllowed, "only GET and HEAD are answered"};

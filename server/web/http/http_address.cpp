@@ -1,4 +1,4 @@
-#include "server/web/http_address.h"
+#include "server/web/http/http_address.h"
 
 #include <charconv>
 #include <cstdint>

@@ -1,0 +1,73 @@
+// @ts-check
+// All that the page asks of its server; server/web/page/README.md has every path and field.
+
+/** An answer that is an error, with the server's sentence. */
+export class Refusal extends Error {
+  /** @param {number} status @param {string} sentence */
+  constructor(status, sentence) {
+    super(sentence);
+    this.status = status;
+  }
+}
+
+/** @param {Response} answer */
+async function refusal(answer) {
+  let sentence = `${answer.status} ${answer.statusText}`;
+  try {
+    sentence = (await answer.json()).error ?? sentence;
+  } catch { /* an answer without JSON */ }
+  return new Refusal(answer.status, sentence);
+}
+
+/** @param {string} path @param {AbortSignal} [signal] @returns {Promise<any>} */
+export async function json(path, signal) {
+  const answer = await fetch(path, { signal });
+  if (!answer.ok) throw await refusal(answer);
+  return answer.json();
+}
+
+/** Asks for a change. @param {string} path @param {object} [body] @returns {Promise<any>} */
+export async function change(path, body) {
+  const answer = await fetch(path, {
+    method: "POST", body: JSON.stringify(body ?? {}), headers: { "Content-Type": "application/json" } });
+  if (!answer.ok) throw await refusal(answer);
+  return answer.json();
+}
+
+/**
+ * Numbers behind a head: the head, the bytes, and where the numbers begin in them.
+ * @param {string} path @param {AbortSignal} [signal]
+ * @returns {Promise<{head: any, bytes: ArrayBuffer, begin: number} | null>} null: not yet, ask again
+ */
+export async function numbers(path, signal) {
+  const answer = await fetch(path, { signal });
+  if (answer.status === 202) return null;
+  if (!answer.ok) throw await refusal(answer);
+  const bytes = await answer.arrayBuffer();
+  const length = new DataView(bytes).getUint32(0, true);
+  return { head: JSON.parse(new TextDecoder().decode(new Uint8Array(bytes, 4, length))), bytes, begin: 4 + length };
+}
+
+/** @returns {Promise<{version: string, may_look: boolean, may_change: boolean, how_to_enter: string}>} */
+export const session = () => json("/api/session");
+
+/**
+ * Follows the overview while the page is seen.
+ * @param {(now: any) => void} take @param {(text: string) => void} say
+ */
+export function follow(take, say) {
+  /** @type {EventSource | null} */
+  let source = null;
+  const look = () => {
+    if (document.hidden) {
+      source?.close();
+      source = null;
+    } else if (!source) {
+      source = new EventSource("/api/events");
+      source.addEventListener("overview", (event) => take(JSON.parse(event.data)));
+      source.addEventListener("error", () => say("The server does not answer; trying again."));
+    }
+  };
+  document.addEventListener("visibilitychange", look);
+  look();
+}

@@ -1,0 +1,158 @@
+#include "server/web/answers/answer_pool.h"
+
+#include <algorithm>
+#include <chrono>
+#include <stdexcept>
+#include <utility>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "server/database/open_for_reading.h"
+#include "server/web/http/json_answer.h"
+
+namespace oblique::server {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::size_t kThreads = 2;
+constexpr std::size_t kMostWaiting = 64;
+constexpr std::chrono::seconds kLongestJob{7};
+/// A column of a large study takes longer, once.
+constexpr std::chrono::seconds kLongestFill{60};
+/// SQLite looks at the clock after so many of its steps.
+constexpr int kStepsBetweenLooks = 10'000;
+/// Rows that a slice reads lie apart: pages of the tree are worth keeping.
+constexpr const char* kPageCache = "PRAGMA cache_size = -65536";
+
+}  // namespace
+
+struct AnswerPool::Desk {
+  DatabaseHandle database;
+  Clock::time_point until;
+  const std::atomic<bool>* is_unwanted = nullptr;
+
+  static int is_over(void* self) {
+    const Desk& desk = *static_cast<Desk*>(self);
+    return *desk.is_unwanted || Clock::now() >= desk.until ? 1 : 0;
+  }
+};
+
+AnswerPool::AnswerPool(std::string database, std::function<void()> done)
+    : database_(std::move(database)), done_(std::move(done)) {
+  for (std::size_t i = 0; i < kThreads; ++i) {
+    threads_.emplace_back([this] { run(); });
+  }
+}
+
+AnswerPool::~AnswerPool() {
+  stop();
+}
+
+void AnswerPool::stop() {
+  {
+    const std::lock_guard lock(mutex_);
+    is_stopping_ = true;
+    for (const auto& [number, is_unwanted] : at_work_) {
+      *is_unwanted = true;
+    }
+  }
+  woken_.notify_all();
+  for (std::thread& thread : threads_) {
+    thread.join();
+  }
+  threads_.clear();
+}
+
+bool AnswerPool::submit(std::uint64_t number, Job job) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (is_stopping_ || waiting_.size() >= kMostWaiting) {
+      return false;
+    }
+    waiting_.push_back({number, std::move(job), std::make_shared<std::atomic<bool>>(false)});
+  }
+  woken_.notify_one();
+  return true;
+}
+
+std::optional<HttpAnswer> AnswerPool::take(std::uint64_t number) {
+  const std::lock_guard lock(mutex_);
+  auto answer = answers_.extract(number);
+  return answer.empty() ? std::nullopt : std::optional(std::move(answer.mapped()));
+}
+
+void AnswerPool::forget(std::uint64_t number) {
+  const std::lock_guard lock(mutex_);
+  std::erase_if(waiting_, [number](const Order& order) { return order.number == number; });
+  answers_.erase(number);
+  if (const auto order = at_work_.find(number); order != at_work_.end()) {
+    *order->second = true;
+  }
+}
+
+void AnswerPool::run() {
+  Desk desk;
+  std::unique_lock lock(mutex_);
+  while (!is_stopping_) {
+    // One of the threads may fill a column when nobody waits; the others stay free.
+    const bool may_fill = waiting_.empty() && !is_filling_ && columns_.has_wishes();
+    if (waiting_.empty() && !may_fill) {
+      woken_.wait(lock);
+      continue;
+    }
+    constexpr std::uint64_t kFilling = UINT64_MAX;
+    Order order{kFilling,
+                [](const AnswerDesk& at) {
+                  at.columns.fill_one(at.database);
+                  return HttpAnswer{};
+                },
+                std::make_shared<std::atomic<bool>>(false)};
+    if (!may_fill) {
+      order = std::move(waiting_.front());
+      waiting_.pop_front();
+    }
+    is_filling_ = is_filling_ || may_fill;
+    at_work_[order.number] = order.is_unwanted;
+    lock.unlock();
+    desk.until = Clock::now() + (may_fill ? kLongestFill : kLongestJob);
+    HttpAnswer answer = answer_to(order, desk);
+    lock.lock();
+    at_work_.erase(order.number);
+    is_filling_ = is_filling_ && !may_fill;
+    if (columns_.has_wishes()) {
+      woken_.notify_one();
+    }
+    if (!may_fill && !*order.is_unwanted) {
+      answers_.insert_or_assign(order.number, std::move(answer));
+      done_();
+    }
+  }
+}
+
+HttpAnswer AnswerPool::answer_to(const Order& order, Desk& desk) {
+  constexpr unsigned kBadQuestion = 400;
+  constexpr unsigned kNotThere = 404;
+  constexpr unsigned kFailed = 500;
+  constexpr unsigned kNotNow = 503;
+  desk.is_unwanted = order.is_unwanted.get();
+  try {
+    if (!desk.database) {
+      desk.database = open_stored(database_).database;
+      execute(desk.database.get(), kPageCache);
+      sqlite3_progress_handler(desk.database.get(), kStepsBetweenLooks, &Desk::is_over, &desk);
+    }
+    return order.job({desk.database.get(), studies_, columns_});
+  } catch (const std::invalid_argument& error) {
+    return error_answer(kBadQuestion, error.what());
+  } catch (const NothingThere& error) {
+    return error_answer(kNotThere, error.what());
+  } catch (const StorageError& error) {
+    const bool is_late = Clock::now() >= desk.until;
+    return error_answer(kNotNow, is_late ? "that takes too long: ask for less" : error.what());
+  } catch (const std::exception& error) {
+    return error_answer(kFailed, error.what());
+  }
+}
+
+}  // namespace oblique::server

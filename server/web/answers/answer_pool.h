@@ -1,0 +1,85 @@
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "server/web/answers/column_store.h"
+#include "server/web/answers/study_book.h"
+#include "server/web/http/http_message.h"
+
+namespace oblique::server {
+
+/// What a job has: a connection to the database that only reads, and what all jobs share.
+struct AnswerDesk {
+  sqlite3* database;
+  StudyBook& studies;
+  ColumnStore& columns;
+};
+
+/// Answers that are made of the database, on a few threads of their own with a connection each: a
+/// statement here is ours, reads by key, and ends in time or when nobody waits for it any more.
+class AnswerPool {
+ public:
+  /// Throws std::invalid_argument for a wrong question, NothingThere, StorageError.
+  using Job = std::function<HttpAnswer(const AnswerDesk&)>;
+
+  /// `done` is called on a thread of the pool when an answer can be taken. The database is opened
+  /// by the first job.
+  AnswerPool(std::string database, std::function<void()> done);
+  /// Stops.
+  ~AnswerPool();
+  AnswerPool(const AnswerPool&) = delete;
+  AnswerPool& operator=(const AnswerPool&) = delete;
+
+  /// Ends all jobs; `done` is not called any more, and nothing is taken.
+  void stop();
+
+  /// False when too many wait already, and after `stop`.
+  bool submit(std::uint64_t number, Job job);
+  /// The answer, once; nothing: it is not made yet.
+  std::optional<HttpAnswer> take(std::uint64_t number);
+  /// Nobody waits for it any more.
+  void forget(std::uint64_t number);
+
+ private:
+  struct Order {
+    std::uint64_t number;
+    Job job;
+    std::shared_ptr<std::atomic<bool>> is_unwanted;
+  };
+  struct Desk;
+
+  void run();
+  HttpAnswer answer_to(const Order& order, Desk& desk);
+
+  const std::string database_;
+  const std::function<void()> done_;
+  StudyBook studies_;
+  ColumnStore columns_;
+  std::mutex mutex_;
+  std::condition_variable woken_;
+  std::deque<Order> waiting_;                                            // guarded by mutex_
+  std::map<std::uint64_t, std::shared_ptr<std::atomic<bool>>> at_work_;  // guarded by mutex_
+  std::map<std::uint64_t, HttpAnswer> answers_;                          // guarded by mutex_
+  bool is_filling_ = false;                                              // guarded by mutex_
+  bool is_stopping_ = false;                                             // guarded by mutex_
+  std::vector<std::thread> threads_;  // last: they use all the others
+};
+
+/// What is asked for is not in the database.
+class NothingThere : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+}  // namespace oblique::server

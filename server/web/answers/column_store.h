@@ -1,0 +1,101 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <list>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <vector>
+
+#include <sqlite3.h>
+
+#include "server/web/answers/column_source.h"
+
+namespace oblique::server {
+
+/// Points that follow each other, the end out.
+struct PointRun {
+  std::uint64_t begin;
+  std::uint64_t end;
+
+  bool operator==(const PointRun&) const = default;
+};
+
+/// A column of a study, whole: a float32 a point.
+class StoredColumn {
+ public:
+  StoredColumn(std::uint64_t study, ColumnSource source, std::uint64_t points);
+
+  std::uint64_t study() const { return study_; }
+  std::uint64_t points() const { return points_; }
+  const ColumnSource& source() const { return source_; }
+  std::size_t bytes() const { return points_ * sizeof(float); }
+
+  /// Makes it what the database holds now, by which points have come and gone since the last time,
+  /// not oftener than twice a second. False: it has too much to do to be waited for, unless it may
+  /// `take_long`.
+  bool bring_up_to_date(sqlite3* database, bool may_take_long);
+  /// What it has of these points, in their order.
+  void gather(std::span<const std::uint64_t> points, std::vector<float>& into);
+  /// Gives `take` the values; they stay as they are meanwhile.
+  template <typename Take>
+  void look(const Take& take) {
+    const std::lock_guard lock(mutex_);
+    take(std::span<const float>(values_));
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  void read(sqlite3* database, const std::vector<PointRun>& runs);
+
+  const std::uint64_t study_;
+  const ColumnSource source_;
+  const std::uint64_t points_;
+  std::mutex mutex_;
+  std::vector<float> values_;          // guarded by mutex_
+  std::vector<PointRun> settled_;      // guarded by mutex_: what was read
+  std::vector<std::uint64_t> failed_;  // guarded by mutex_: of these, the first so many that failed
+  Clock::time_point looked_{};         // guarded by mutex_
+};
+
+/// Runs of points that are in `of` and not in `without`; both rising and apart.
+std::vector<PointRun> difference(const std::vector<PointRun>& of,
+                                 const std::vector<PointRun>& without);
+
+/// Columns that were looked at last, as far as a bound on memory goes. One that is wanted is read
+/// when nobody waits; meanwhile pictures read their rows by key.
+class ColumnStore {
+ public:
+  using Shared = std::shared_ptr<StoredColumn>;
+
+  /// The column, whole and as the database has it now. Null: not yet, or never, because the study
+  /// is too large.
+  Shared find(sqlite3* database, std::uint64_t study, const ColumnSource& source,
+              std::uint64_t points);
+  /// The same at once, however long it takes; null: the study is too large.
+  Shared read(sqlite3* database, std::uint64_t study, const ColumnSource& source,
+              std::uint64_t points);
+
+  bool has_wishes() const;
+  /// Reads a column that is wanted.
+  void fill_one(sqlite3* database);
+
+  /// Studies with more points are never read whole.
+  static constexpr std::uint64_t kMostPoints = 32'000'000;
+
+ private:
+  static constexpr std::size_t kMostBytes = std::size_t{256} << 20U;
+
+  Shared known(std::uint64_t study, const ColumnSource& source, std::uint64_t points);
+  void keep(const Shared& column);
+
+  mutable std::mutex mutex_;
+  std::list<Shared> kept_;     // guarded by mutex_; the one looked at last comes first
+  std::deque<Shared> wished_;  // guarded by mutex_
+  Shared under_way_;           // guarded by mutex_
+};
+
+}  // namespace oblique::server

@@ -1,0 +1,61 @@
+#include "server/web/answers/fields.h"
+
+#include <charconv>
+#include <cmath>
+#include <stdexcept>
+#include <system_error>
+
+#include <spdlog/fmt/fmt.h>
+
+namespace oblique::server {
+namespace {
+
+template <typename Number>
+std::optional<Number> read_as(const std::string& text) {
+  Number number{};
+  const char* const end = text.data() + text.size();
+  const auto [rest, error] = std::from_chars(text.data(), end, number);
+  return error == std::errc() && rest == end ? std::optional(number) : std::nullopt;
+}
+
+}  // namespace
+
+std::optional<std::string> FieldReader::text(const std::string& name) const {
+  const auto field = fields_.find(name);
+  return field == fields_.end() || field->second.empty() ? std::nullopt
+                                                         : std::optional(field->second);
+}
+
+std::optional<std::uint64_t> FieldReader::whole(const std::string& name) const {
+  const auto field = text(name);
+  if (!field) {
+    return std::nullopt;
+  }
+  const auto number = read_as<std::uint64_t>(*field);
+  if (!number) {
+    throw std::invalid_argument(fmt::format("{} must be a whole number from 0", name));
+  }
+  return number;
+}
+
+std::optional<double> FieldReader::number(const std::string& name) const {
+  const auto field = text(name);
+  if (!field) {
+    return std::nullopt;
+  }
+  const auto number = read_as<double>(*field);
+  if (!number || !std::isfinite(*number)) {
+    throw std::invalid_argument(fmt::format("{} must be a number", name));
+  }
+  return number;
+}
+
+std::uint64_t FieldReader::pixels(const std::string& name, std::uint64_t usual) const {
+  const std::uint64_t pixels = whole(name).value_or(usual);
+  if (pixels < 1 || pixels > kMostPixels) {
+    throw std::invalid_argument(fmt::format("{} must be from 1 to {}", name, kMostPixels));
+  }
+  return pixels;
+}
+
+}  // namespace oblique::server

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+
+namespace oblique::server {
+
+/// What follows the question mark of a request, read field by field. Each throws
+/// std::invalid_argument, naming the field and what is allowed.
+class FieldReader {
+ public:
+  explicit FieldReader(const std::map<std::string, std::string>& fields) : fields_(fields) {}
+
+  std::optional<std::string> text(const std::string& name) const;
+  std::optional<std::uint64_t> whole(const std::string& name) const;
+  std::optional<double> number(const std::string& name) const;
+  /// From 1 to the most pixels of a side.
+  std::uint64_t pixels(const std::string& name, std::uint64_t usual) const;
+
+  static constexpr std::uint64_t kMostPixels = 1024;
+
+ private:
+  const std::map<std::string, std::string>& fields_;
+};
+
+}  // namespace oblique::server

@@ -1,0 +1,223 @@
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <map>
+#include <numeric>
+#include <stdexcept>
+#include <utility>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "proto/text.h"
+#include "server/web/answers/fields.h"
+#include "server/web/answers/grid.h"
+#include "server/web/answers/study_answers.h"
+#include "server/web/http/json_answer.h"
+
+namespace oblique::server {
+namespace {
+
+using nlohmann::ordered_json;
+
+/// Rows that lie so near to each other are read in one go.
+constexpr std::uint64_t kNear = 4;
+
+template <typename Number>
+void append(const std::vector<Number>& numbers, std::string& bytes) {
+  const std::size_t at = bytes.size();
+  bytes.resize(at + numbers.size() * sizeof(Number));
+  std::memcpy(bytes.data() + at, numbers.data(), numbers.size() * sizeof(Number));
+}
+
+/// Values of points, read by key. Neighbours are read together.
+std::vector<float> read_by_key(const AnswerDesk& desk, std::uint64_t study,
+                               const ColumnSource& source,
+                               const std::vector<std::uint64_t>& points) {
+  std::vector<std::size_t> order(points.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  const auto is_before = [&](std::size_t a, std::size_t b) { return points[a] < points[b]; };
+  if (!std::is_sorted(order.begin(), order.end(), is_before)) {
+    std::sort(order.begin(), order.end(), is_before);
+  }
+  std::vector<float> values(points.size(), no_result());
+  ColumnReader reader(desk.database, study, source);
+  for (std::size_t begin = 0; begin < order.size();) {
+    std::size_t end = begin + 1;
+    while (end < order.size() && points[order[end]] - points[order[end - 1]] <= kNear) {
+      ++end;
+    }
+    std::size_t next = begin;
+    reader.read(points[order[begin]], points[order[end - 1]],
+                [&](std::uint64_t point, float value) {
+                  while (next < end && points[order[next]] < point) {
+                    ++next;
+                  }
+                  if (next < end && points[order[next]] == point) {
+                    values[order[next]] = value;
+                  }
+                });
+    begin = end;
+  }
+  return values;
+}
+
+struct Tally {
+  std::uint64_t solved = 0;
+  std::uint64_t failed = 0;
+  std::uint64_t left_out = 0;
+  std::uint64_t missing = 0;
+  double least = 0.0;
+  double most = 0.0;
+};
+
+/// Marks what a filter leaves out, and counts.
+Tally tally(const LookedAtStudy& study, const std::vector<std::uint64_t>& points,
+            std::vector<float>& values) {
+  Tally tally;
+  const bool has_filter = study.table->has_filter();
+  bool has_value = false;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    float& value = values[i];
+    if (is_same_mark(value, no_result()) && has_filter && !study.table->is_left_in(points[i])) {
+      value = left_out();
+      ++tally.left_out;
+    } else if (is_same_mark(value, no_result())) {
+      ++tally.missing;
+    } else if (is_same_mark(value, failed_point())) {
+      ++tally.failed;
+    } else {
+      ++tally.solved;
+    }
+    if (std::isfinite(value)) {
+      const auto number = static_cast<double>(value);
+      tally.least = has_value ? std::min(tally.least, number) : number;
+      tally.most = has_value ? std::max(tally.most, number) : number;
+      has_value = true;
+    }
+  }
+  return tally;
+}
+
+constexpr std::uint16_t kFirstMark = 0xfffc;
+
+/// Codes of texts, the most frequent first, and these texts.
+std::vector<std::uint16_t> coded(const AnswerDesk& desk, const std::vector<float>& values,
+                                 ordered_json& dictionary) {
+  std::map<std::int64_t, std::uint64_t> counts;
+  for (const float value : values) {
+    if (std::isfinite(value)) {
+      ++counts[static_cast<std::int64_t>(value)];
+    }
+  }
+  std::vector<std::pair<std::int64_t, std::uint64_t>> ranked(counts.begin(), counts.end());
+  std::stable_sort(ranked.begin(), ranked.end(),
+                   [](const auto& a, const auto& b) { return a.second > b.second; });
+  std::map<std::int64_t, std::uint16_t> codes;
+  Statement text(desk.database, "SELECT text FROM texts WHERE text_id = ?1");
+  for (const auto& [id, count] : ranked) {
+    if (codes.size() == kFirstMark) {
+      break;
+    }
+    text.bind(1, id);
+    dictionary.push_back({{"text", text.step() ? text.text(0) : ""}, {"cells", count}});
+    text.reset();
+    codes.emplace(id, static_cast<std::uint16_t>(codes.size()));
+  }
+  std::vector<std::uint16_t> coded(values.size());
+  std::transform(values.begin(), values.end(), coded.begin(), [&](float value) -> std::uint16_t {
+    if (std::isfinite(value)) {
+      const auto code = codes.find(static_cast<std::int64_t>(value));
+      return code == codes.end() ? kFirstMark : code->second;
+    }
+    return is_same_mark(value, no_result())      ? 0xffff
+           : is_same_mark(value, failed_point()) ? 0xfffe
+           : is_same_mark(value, left_out())     ? 0xfffd
+                                                 : kFirstMark;
+  });
+  return coded;
+}
+
+ordered_json side_json(const GridSide& side) {
+  if (side.key.empty()) {
+    return nullptr;
+  }
+  return {
+      {"key", side.key},       {"of", side.of},
+      {"first", side.first},   {"last", side.last},
+      {"stride", side.stride}, {"all_lines", side.numbers.size() == side.last - side.first + 1}};
+}
+
+HttpAnswer slice_answer(const AnswerDesk& desk, std::uint64_t id, const Fields& asked) {
+  const LookedAtStudy study = desk.studies.study(desk.database, id);
+  const FieldReader fields(asked);
+  const std::string z = fields.text("z").value_or("");
+  const auto source = column_source(z);
+  if (!source) {
+    throw std::invalid_argument(fmt::format(
+        "z must be a column of numbers or categories; \"{}\" is none", protocol::visible(z)));
+  }
+  const GridSlice slice = grid_slice(*study.table, fields);
+  const std::size_t nx = slice.x.numbers.size();
+  const std::size_t ny = slice.y.numbers.size();
+  std::vector<std::uint64_t> points(nx * ny);
+  for (std::size_t row = 0; row < ny; ++row) {
+    for (std::size_t column = 0; column < nx; ++column) {
+      points[row * nx + column] = slice.point(column, row);
+    }
+  }
+  std::vector<float> values;
+  // Looking up a row takes as long as reading eight that follow each other.
+  const bool is_most_of_it = study.points / 8 <= points.size();
+  const auto column = is_most_of_it ? desk.columns.read(desk.database, id, *source, study.points)
+                                    : desk.columns.find(desk.database, id, *source, study.points);
+  if (column) {
+    column->gather(points, values);
+  } else {
+    values = read_by_key(desk, id, *source, points);
+  }
+  const Tally counts = tally(study, points, values);
+  ordered_json at = ordered_json::array();
+  for (const GridPlace& place : slice.at) {
+    at.push_back(
+        {{"key", place.key}, {"of", place.of}, {"number", place.number}, {"value", place.value}});
+  }
+  ordered_json head{{"study", id},
+                    {"block", slice.block},
+                    {"z",
+                     {{"name", source->name},
+                      {"unit", source->unit},
+                      {"kind", source->is_category ? "categories" : "numbers"}}},
+                    {"x", side_json(slice.x)},
+                    {"y", side_json(slice.y)},
+                    {"at", std::move(at)},
+                    {"nx", nx},
+                    {"ny", ny},
+                    {"first_point", slice.first_point},
+                    {"solved", counts.solved},
+                    {"failed", counts.failed},
+                    {"left_out", counts.left_out},
+                    {"missing", counts.missing}};
+  std::string numbers;
+  append(slice.x.values, numbers);
+  append(slice.y.values, numbers);
+  if (source->is_category) {
+    ordered_json dictionary = ordered_json::array();
+    append(coded(desk, values, dictionary), numbers);
+    head["dictionary"] = std::move(dictionary);
+  } else {
+    const bool has_values = counts.solved > 0;
+    head["least"] = has_values ? ordered_json(counts.least) : nullptr;
+    head["most"] = has_values ? ordered_json(counts.most) : nullptr;
+    append(values, numbers);
+  }
+  return numbers_answer(head, numbers);
+}
+
+}  // namespace
+
+AnswerPool::Job slice_job(std::uint64_t study, const Fields& fields) {
+  return [study, fields](const AnswerDesk& desk) { return slice_answer(desk, study, fields); };
+}
+
+}  // namespace oblique::server

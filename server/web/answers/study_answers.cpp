@@ -1,0 +1,187 @@
+#include "server/web/answers/study_answers.h"
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+#include <utility>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "proto/recipe/axes.h"
+#include "proto/recipe/blocks.h"
+#include "proto/recipe/keys.h"
+#include "server/asking/columns.h"
+#include "server/web/http/json_answer.h"
+#include "worker/solver/model/parameters.h"
+
+namespace oblique::server {
+namespace {
+
+using nlohmann::ordered_json;
+using protocol::Axis;
+
+/// Longer lists of values are given by slices, as far as they are shown.
+constexpr std::uint64_t kMostListed = 4096;
+
+ordered_json distribution_json(const protocol::Distribution& from) {
+  constexpr std::array<std::string_view, 3> kNames{"uniform", "log-uniform", "normal"};
+  ordered_json json{{"kind", kNames.at(static_cast<std::size_t>(from.kind()))}};
+  if (from.has_from()) {
+    json["from"] = from.from();
+  }
+  if (from.has_to()) {
+    json["to"] = from.to();
+  }
+  if (from.kind() == protocol::DISTRIBUTION_NORMAL) {
+    json["mean"] = from.mean();
+    json["sd"] = from.sd();
+  }
+  return json;
+}
+
+ordered_json axis_json(const protocol::AxisLayout& layout) {
+  const Axis& axis = *layout.axis;
+  const auto& key = protocol::key_numbered(layout.key);
+  ordered_json json{{"key", axis.key()},
+                    {"unit", key.unit},
+                    {"meaning", key.meaning},
+                    {"values", layout.values},
+                    {"stride", layout.stride}};
+  if (axis.has_distribution()) {
+    json["distribution"] = distribution_json(axis.distribution());
+  } else if (!axis.expression().empty()) {
+    json["expression"] = axis.expression();
+  } else if (axis.count() > 0) {
+    json["range"] = {
+        {"from", axis.from()},
+        {"to", axis.to()},
+        {"count", axis.count()},
+        {"spacing", axis.spacing() == protocol::SPACING_LOGARITHMIC ? "log" : "linear"}};
+  } else if (protocol::axis_size(axis) <= kMostListed) {
+    json["list"] = std::vector<double>(axis.values().begin(), axis.values().end());
+  }
+  return json;
+}
+
+ordered_json block_json(const protocol::Block& block, const protocol::BlockPlace& place) {
+  constexpr std::array<std::string_view, 3> kKinds{"grid", "zip", "sample"};
+  ordered_json axes = ordered_json::array();
+  for (const protocol::AxisLayout& layout : protocol::layout_of(block)) {
+    axes.push_back(axis_json(layout));
+  }
+  ordered_json json{{"kind", kKinds.at(static_cast<std::size_t>(protocol::block_kind(block)))},
+                    {"first_point", place.first_point},
+                    {"points", place.points},
+                    {"where", block.where()},
+                    {"axes", std::move(axes)}};
+  if (block.has_sample()) {
+    constexpr std::array<std::string_view, 3> kSamples{"random", "lhs", "sobol"};
+    json["sample"] = {{"kind", kSamples.at(static_cast<std::size_t>(block.sample().kind()))},
+                      {"count", block.sample().count()},
+                      {"seed", block.sample().seed()}};
+  }
+  return json;
+}
+
+ordered_json columns_json() {
+  ordered_json columns = ordered_json::array();
+  for (const Column& column : all_columns()) {
+    const auto source = column_source(column.name);
+    columns.push_back({{"name", column.name},
+                       {"unit", column.unit},
+                       {"kind", column.kind},
+                       {"meaning", column.meaning},
+                       {"picture", !source               ? "none"
+                                   : source->is_category ? "categories"
+                                                         : "numbers"}});
+  }
+  return columns;
+}
+
+HttpAnswer study_answer(const AnswerDesk& desk, std::uint64_t id) {
+  const LookedAtStudy study = desk.studies.study(desk.database, id);
+  const protocol::Recipe& recipe = study.table->recipe();
+  constexpr int kMostBlocks = 1000;
+  ordered_json blocks = ordered_json::array();
+  for (int i = 0; i < std::min(recipe.blocks_size(), kMostBlocks); ++i) {
+    blocks.push_back(block_json(recipe.blocks(i), study.table->block(static_cast<std::size_t>(i))));
+  }
+  return json_answer({{"id", study.id},
+                      {"name", study.name},
+                      {"state", study.state},
+                      {"points", study.table->points()},
+                      {"numbers", study.table->size()},
+                      {"models", study.table->models()},
+                      {"errors", recipe.errors()},
+                      {"blocks", std::move(blocks)},
+                      {"blocks_left_out", std::max(recipe.blocks_size() - kMostBlocks, 0)},
+                      {"columns", columns_json()}});
+}
+
+ordered_json value_of(const Statement& row, int column) {
+  switch (row.type(column)) {
+    case SQLITE_INTEGER:
+      return row.integer(column);
+    case SQLITE_FLOAT:
+      return row.real(column);
+    case SQLITE_NULL:
+      return nullptr;
+    default:
+      break;
+  }
+  std::string text = row.text(column);
+  if (text.starts_with('[')) {  // a list
+    auto list = ordered_json::parse(text, nullptr, false);
+    return list.is_discarded() ? ordered_json(std::move(text)) : list;
+  }
+  return text;
+}
+
+HttpAnswer point_answer(const AnswerDesk& desk, std::uint64_t id, std::uint64_t number) {
+  const LookedAtStudy study = desk.studies.study(desk.database, id);
+  if (number >= study.table->size()) {
+    throw NothingThere(fmt::format("the study \"{}\" has no point {}", study.name, number));
+  }
+  const protocol::Point point = study.table->point(number);
+  const std::size_t block = study.table->block_of_point(number);
+  ordered_json answer{{"study", study.id},
+                      {"name", study.name},
+                      {"point", number},
+                      {"block", block},
+                      {"H", point.H_m},
+                      {"mu", point.mu},
+                      {"e", point.e_star},
+                      {"left_out", !study.table->is_left_in(number)},
+                      {"fault", study.table->fault(number)}};
+  std::vector<std::string> names;
+  std::string list;
+  for (const Column& column : all_columns()) {
+    names.push_back(column.name);
+    list += (list.empty() ? "" : ", ") + column.name;
+  }
+  Statement row(desk.database, fmt::format("SELECT {} FROM {} WHERE study_id = ?1 AND point = ?2",
+                                           list, rows_of_queries()));
+  row.bind(1, study.id);
+  row.bind(2, number);
+  answer["row"] = nullptr;
+  if (row.step()) {
+    ordered_json values;
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      values[names[i]] = value_of(row, static_cast<int>(i));
+    }
+    answer["row"] = std::move(values);
+  }
+  return json_answer(answer);
+}
+
+}  // namespace
+
+AnswerPool::Job study_job(std::uint64_t study) {
+  return [study](const AnswerDesk& desk) { return study_answer(desk, study); };
+}
+
+AnswerPool::Job point_job(std::uint64_t study, std::uint64_t point) {
+  return [study, point](const AnswerDesk& desk) { return point_answer(desk, study, point); };
+}
+
+}  // namespace oblique::server

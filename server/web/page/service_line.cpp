@@ -1,0 +1,73 @@
+#include "server/web/page/service_line.h"
+
+#include <utility>
+
+#include "proto/frames.h"
+
+namespace oblique::server {
+
+void ServiceLine::ask(std::uint64_t number, protocol::ClientRequest request) {
+  request.set_request_id(number);
+  Awaited& awaited = awaited_[number];
+  awaited.is_query = awaited.is_query || request.has_query();
+  send(request);
+}
+
+std::optional<protocol::ClientReply> ServiceLine::reply(std::uint64_t number) {
+  std::vector<std::string> frames;
+  {
+    const std::lock_guard lock(mutex_);
+    frames = std::exchange(frames_, {});
+  }
+  for (const std::string& frame : frames) {
+    protocol::ClientReply reply;
+    // What tells that something takes long has the number of no request.
+    const bool is_reply = protocol::decode(frame, reply);
+    const auto awaited = awaited_.find(reply.request_id());
+    if (is_reply && awaited != awaited_.end()) {
+      const bool is_part = reply.has_query() && !reply.query().ends();
+      awaited->second.is_query = awaited->second.is_query && is_part;
+      awaited->second.replies.push_back(std::move(reply));
+    }
+  }
+  const auto found = awaited_.find(number);
+  if (found == awaited_.end() || found->second.replies.empty()) {
+    return std::nullopt;
+  }
+  auto reply = std::move(found->second.replies.front());
+  found->second.replies.pop_front();
+  return reply;
+}
+
+void ServiceLine::forget(std::uint64_t number) {
+  const auto awaited = awaited_.extract(number);
+  if (!awaited.empty() && awaited.mapped().is_query) {
+    protocol::ClientRequest request;
+    request.mutable_end_query()->set_request_id(number);
+    send(request);
+  }
+}
+
+void ServiceLine::send(const protocol::ClientRequest& request) {
+  protocol::ClientRequest versioned = request;
+  versioned.set_protocol_version(protocol::kProtocolVersion);
+  std::string frame = protocol::encode(versioned);
+  {
+    const std::lock_guard lock(mutex_);
+    requests_.push_back(std::move(frame));
+  }
+  woken_.wake();
+}
+
+std::vector<std::string> ServiceLine::take() {
+  woken_.clear();
+  const std::lock_guard lock(mutex_);
+  return std::exchange(requests_, {});
+}
+
+void ServiceLine::put(std::string frame) {
+  const std::lock_guard lock(mutex_);
+  frames_.push_back(std::move(frame));
+}
+
+}  // namespace oblique::server
