@@ -106,7 +106,6 @@ class Loop::Parts final : public Outbox {
       take_reports();
       has_more = take_worker_messages();
       has_more = take_client_messages() || has_more || network_.has_more();
-      take_page_requests();
       has_more = service_->go_on_searching(now()) || has_more;
       note_departures();
       if (Clock::now() >= next_tick) {
@@ -139,8 +138,7 @@ class Loop::Parts final : public Outbox {
   }
   bool forward_to_client(const std::string& identity, const std::string& frame) override {
     if (identity == Web::kPageClient) {
-      web_->put_reply(frame);
-      return true;
+      return web_->put_reply(frame);
     }
     if (is_ending_) {
       last_answered_.push_back(identity);
@@ -176,8 +174,7 @@ class Loop::Parts final : public Outbox {
 
   std::string client_endpoint() const { return network_.endpoint(clients_); }
   std::string worker_endpoint() const { return network_.endpoint(workers_); }
-  std::string http_url() const { return web_ ? web_->url() : std::string(); }
-  std::string page_url() const { return web_ ? web_->page_url() : std::string(); }
+  const Web* web() const { return web_.get(); }
 
  private:
   static Delivery sent(Delivery delivery, std::string_view frame, PortTraffic& traffic) {
@@ -194,6 +191,9 @@ class Loop::Parts final : public Outbox {
   }
 
   void take_reports() {
+    for (const auto& frame : web_ ? web_->take_requests() : std::vector<std::string>()) {
+      service_->client_frame(Web::kPageClient, frame, now());
+    }
     for (const auto& report : written_.take()) {
       service_->written(std::get<WriteReport>(report), now());
     }
@@ -227,14 +227,6 @@ class Loop::Parts final : public Outbox {
         [this](const Incoming& incoming) {
           service_->client_frame(incoming.identity, frame_of(incoming), now(), incoming.holder);
         });
-  }
-
-  void take_page_requests() {
-    if (web_) {
-      for (const std::string& frame : web_->take_requests()) {
-        service_->client_frame(Web::kPageClient, frame, now(), nullptr);
-      }
-    }
   }
 
   template <typename Take>
@@ -350,9 +342,7 @@ class Loop::Parts final : public Outbox {
   /// the end gets the time to read it, and mostly goes by itself then.
   void let_clients_read() {
     const auto until = Clock::now() + kLinger;
-    const auto is_there = [this](const std::string& client) {
-      return network_.is_connected(client);
-    };
+    const auto is_there = [this](const auto& client) { return network_.is_connected(client); };
     while (std::any_of(last_answered_.begin(), last_answered_.end(), is_there) &&
            Clock::now() < until) {
       constexpr int kSlice_ms = 10;
@@ -397,10 +387,10 @@ std::string Loop::worker_endpoint() const {
   return parts_->worker_endpoint();
 }
 std::string Loop::http_url() const {
-  return parts_->http_url();
+  return parts_->web() != nullptr ? parts_->web()->url() : std::string();
 }
 std::string Loop::page_url() const {
-  return parts_->page_url();
+  return parts_->web() != nullptr ? parts_->web()->page_url() : std::string();
 }
 LoopEnd Loop::run(int stop_fd, const std::function<void()>& take_stop) {
   return parts_->run(stop_fd, take_stop);

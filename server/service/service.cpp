@@ -113,14 +113,6 @@ void Service::stop(Instant now) {
   send_traces();
 }
 
-std::vector<WorkerView> Service::worker_views(std::size_t most, Instant now) const {
-  std::vector<WorkerView> views;
-  for (auto id = workers_.next_after(0); id && views.size() < most; id = workers_.next_after(*id)) {
-    views.push_back(view_of(*id, *workers_.find(*id), scheduler_, worker_rates_, now));
-  }
-  return views;
-}
-
 double Service::points_per_s(std::int64_t now_ms) const {
   return rates_.points_per_s([this](StudyId id) { return settled_of(id); }, now_ms);
 }

@@ -104,7 +104,9 @@ class Service {
   StudyView study_view(StudyId id, Instant now) const {
     return view_of(id, {scheduler_, states_, ledger_, rates_, known_}, now);
   }
-  std::vector<WorkerView> worker_views(std::size_t most, Instant now) const;
+  std::vector<WorkerView> worker_views(std::size_t most, Instant now) const {
+    return first_workers(most, workers_, scheduler_, worker_rates_, now);
+  }
 
  private:
   /// What the events that are fed have in common.

@@ -107,6 +107,16 @@ WorkerView view_of(WorkerId id, const WorkerRecord& worker, const Scheduler& sch
           worker.key};
 }
 
+std::vector<WorkerView> first_workers(std::size_t most, const WorkersDesk& workers,
+                                      const Scheduler& scheduler, const SettledRates& rates,
+                                      Instant now) {
+  std::vector<WorkerView> views;
+  for (auto id = workers.next_after(0); id && views.size() < most; id = workers.next_after(*id)) {
+    views.push_back(view_of(*id, *workers.find(*id), scheduler, rates, now));
+  }
+  return views;
+}
+
 std::string state_of(const WorkerView& view) {
   constexpr std::int64_t kSilentAfter_ms = 1500;  // heartbeats come every 900 ms
   return view.counts.silent_ms > kSilentAfter_ms ? "silent"

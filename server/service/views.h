@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "proto/oblique.pb.h"
 #include "server/scheduler/scheduler.h"
@@ -65,6 +66,10 @@ std::uint64_t open_points_of(StudyId id, const StudySources& sources);
 
 WorkerView view_of(WorkerId id, const WorkerRecord& worker, const Scheduler& scheduler,
                    const SettledRates& rates, Instant now);
+/// The first so many workers.
+std::vector<WorkerView> first_workers(std::size_t most, const WorkersDesk& workers,
+                                      const Scheduler& scheduler, const SettledRates& rates,
+                                      Instant now);
 /// "working", "idle", "silent" (nothing came of it lately), "busy" or "set aside".
 std::string state_of(const WorkerView& view);
 protocol::WorkerStatus to_message(const WorkerView& view);

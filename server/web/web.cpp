@@ -157,8 +157,9 @@ std::vector<std::string> Web::take_requests() {
   return parts_->take_requests();
 }
 
-void Web::put_reply(const std::string& frame) {
+bool Web::put_reply(const std::string& frame) {
   parts_->put_reply(frame);
+  return true;
 }
 
 void Web::tick(const SnapshotSources& sources, std::int64_t now_ms) {

@@ -48,8 +48,8 @@ class Web {
   int descriptor() const;
   /// Their frames.
   std::vector<std::string> take_requests();
-  /// The frame of a reply to the page.
-  void put_reply(const std::string& frame);
+  /// The frame of a reply to the page; true.
+  bool put_reply(const std::string& frame);
 
   /// From the loop, several times a second; costs nothing while nobody asks.
   void tick(const SnapshotSources& sources, std::int64_t now_ms);

@@ -46,7 +46,7 @@ class HttpStream {
 
   /// Whether `next` would give something.
   virtual bool has_news() = 0;
-  /// What goes out next; empty: nothing now.
+  /// What goes out next; empty: nothing now. Throws nothing.
   virtual std::string next() = 0;
 };
 

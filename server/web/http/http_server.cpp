@@ -10,7 +10,6 @@
 #include <string_view>
 #include <thread>
 #include <utility>
-#include <vector>
 
 #include <microhttpd.h>
 #include <poll.h>
@@ -226,8 +225,7 @@ class HttpServer::Parts {
     }
   }
 
-  /// The library asks for more of a stream; what is given has gone to the system when it asks
-  /// again.
+  /// The library asks for more of a stream, when what it has was sent.
   static ssize_t stream_on(void* context, std::uint64_t /*position*/, char* into,
                            std::size_t most) {
     const auto& [parts, connection] = *static_cast<StreamPlace*>(context);
@@ -236,14 +234,12 @@ class HttpServer::Parts {
       return MHD_CONTENT_READER_END_OF_STREAM;
     }
     Peer& peer = found->second;
-    try {
-      peer.unsent = peer.unsent.empty() ? peer.stream->next() : std::move(peer.unsent);
-    } catch (const std::exception&) {
-      return MHD_CONTENT_READER_END_WITH_ERROR;
-    }
     peer.since = Clock::now();
     if (peer.unsent.empty()) {
-      peer.waits = true;
+      peer.unsent = peer.stream->next();
+      peer.waits = peer.unsent.empty();
+    }
+    if (peer.waits) {
       MHD_suspend_connection(connection);
       return 0;
     }

@@ -58,6 +58,19 @@ class RawHttp {
       all.append(some, 0, static_cast<std::size_t>(count));
     }
   }
+  /// What comes until those bytes have; what follows them waits.
+  std::string read_until(const std::string& end) {
+    std::string all;
+    char one = 0;
+    while (!all.ends_with(end)) {
+      pollfd item{number(), POLLIN, 0};
+      if (::poll(&item, 1, kLongest_ms) != 1 || ::recv(number(), &one, 1, 0) != 1) {
+        throw std::runtime_error("the server says no more than: " + all);
+      }
+      all += one;
+    }
+    return all;
+  }
   std::string ask(const std::string& bytes) {
     send(bytes);
     return read_to_the_end();

@@ -67,7 +67,7 @@ TEST_F(WebTest, SaysThatItLivesAndTakesWork) {
 }
 
 TEST_F(WebTest, SaysWhatThereIs) {
-  for (const std::string path : {"/", "/metrics/", "/Metrics", "//metrics", "/../metrics", "*"}) {
+  for (const std::string path : {"/metrics/", "/Metrics", "//metrics", "/../metrics", "*"}) {
     const std::string answer = get(server_.http_url(), path);
     EXPECT_EQ(status_of_answer(answer), 404) << path;
     EXPECT_THAT(answer, testing::HasSubstr("/metrics, /healthz and /readyz")) << path;

@@ -1,0 +1,95 @@
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/server/loop/running_server.h"
+#include "tests/server/web/raw_http.h"
+#include "tests/support/temporary_folder.h"
+
+namespace oblique::server {
+
+inline constexpr const char* kTestToken = "0123456789abcdef0123456789abcdef";
+
+inline WebSettings page_settings(bool shows_without_token = false) {
+  WebSettings settings;
+  settings.address = {"127.0.0.1", "*"};
+  settings.page.token = kTestToken;
+  settings.page.shows_without_token = shows_without_token;
+  return settings;
+}
+
+/// Of numbers behind a head.
+struct Numbers {
+  nlohmann::json head;
+  std::string bytes;
+
+  template <typename Number>
+  std::vector<Number> read(std::size_t from_byte, std::size_t count) const {
+    std::vector<Number> numbers(count);
+    if (from_byte + count * sizeof(Number) > bytes.size()) {
+      throw std::runtime_error("there are fewer numbers");
+    }
+    std::memcpy(numbers.data(), bytes.data() + from_byte, count * sizeof(Number));
+    return numbers;
+  }
+};
+
+/// A whole server, and a browser that it has let in.
+class PageServer {
+ public:
+  explicit PageServer(const WebSettings& web = page_settings())
+      : server_(folder_.file("a.db"), {}, {}, {}, {}, web) {
+    const std::string answer = ask("GET", std::string("/?token=") + kTestToken, "");
+    const std::string name = "Set-Cookie: ";
+    const std::size_t at = answer.find(name);
+    if (at != std::string::npos) {
+      cookie_ = answer.substr(at + name.size(), answer.find(';', at) - at - name.size());
+    }
+  }
+
+  const RunningServer& server() const { return server_; }
+  std::string url() const { return server_.http_url(); }
+  std::string host() const { return url().substr(std::string("http://").size()); }
+  std::string cookie_header() const { return "Cookie: " + cookie_ + "\r\n"; }
+
+  std::string ask(const std::string& method, const std::string& path, const std::string& headers,
+                  const std::string& body = "") const {
+    return RawHttp(url()).ask(method + " " + path + " HTTP/1.1\r\nHost: " + host() + "\r\n" +
+                              headers + "\r\n" + body);
+  }
+  /// As the page asks.
+  std::string get(const std::string& path) const { return ask("GET", path, cookie_header()); }
+  nlohmann::json json(const std::string& path) const {
+    return nlohmann::json::parse(body_of(get(path)));
+  }
+  std::string post(const std::string& path, const std::string& body = "{}") const {
+    return ask("POST", path,
+               cookie_header() + "Origin: " + url() +
+                   "\r\nSec-Fetch-Site: same-origin\r\nContent-Length: " +
+                   std::to_string(body.size()) + "\r\n",
+               body);
+  }
+  Numbers numbers(const std::string& path) const {
+    const std::string body = body_of(get(path));
+    std::uint32_t length = 0;
+    if (body.size() < sizeof length) {
+      throw std::runtime_error("the answer has no head: " + body);
+    }
+    std::memcpy(&length, body.data(), sizeof length);
+    return {nlohmann::json::parse(body.substr(sizeof length, length)),
+            body.substr(sizeof length + length)};
+  }
+
+ private:
+  test::TemporaryFolder folder_;
+  RunningServer server_;
+  std::string cookie_;
+};
+
+}  // namespace oblique::server
