@@ -59,6 +59,7 @@ void add_verbs(CLI::App& app, Command& command) {
   add_sql(app, command);
   add_trace(app, command);
   add_plot(app, command);
+  add_view(app, command);
   add_columns(app, command);
   add_paper(app, command);
   add_converge(app, command);

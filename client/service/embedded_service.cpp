@@ -35,8 +35,8 @@ ChildSettings server_settings(const ServiceSettings& settings, const KeysForARun
   ChildSettings child{
       .program = sibling_program("oblique-server"),
       .arguments = {"--no-config", "--db", settings.database.string(), "--drain", "0",
-                    "--worker-port", "0", "--client-port", "0", "--http", "off", "--ready-fd",
-                    std::to_string(ChildProcess::kHandedOver), "--stop-with-parent",
+                    "--worker-port", "0", "--client-port", "0", "--http", settings.http,
+                    "--ready-fd", std::to_string(ChildProcess::kHandedOver), "--stop-with-parent",
                     std::to_string(getpid()), "--keys", keys.file_of(protocol::Role::kServer)},
       .show_errors = settings.verbose,
       .handed_over = ready};
@@ -150,6 +150,7 @@ void EmbeddedService::wait_until_ready(const Descriptor& ready, const ServiceSet
       urls["client"].is_string() && urls["worker"].is_string()) {
     client_url_ = urls["client"];
     worker_url_ = urls["worker"];
+    page_url_ = urls.value("page", std::string());
     return;
   }
   // It closed the pipe because it ends: let it, so that its last words are whole.

@@ -18,6 +18,7 @@ struct ServiceSettings {
   std::filesystem::path database;
   int workers = 1;                  ///< processes, which share the cores
   bool allow_network_disk = false;  ///< the database may lie on a network file system
+  std::string http = "off";         ///< where its page is: ADDRESS:PORT
   bool verbose = false;             ///< what server and workers say goes to our standard error
   /// Told what the server is at while its start takes long.
   std::function<void(const std::string&)> on_long_start = [](const std::string&) {};
@@ -36,6 +37,8 @@ class EmbeddedService {
 
   /// Where clients connect.
   const std::string& client_url() const { return client_url_; }
+  /// The address of the page, with the token that lets a browser in; empty without one.
+  const std::string& page_url() const { return page_url_; }
   /// With which they do: the service has keys of its own, for other users of this machine reach
   /// its ports too.
   protocol::KeyFile client_key() const {
@@ -62,6 +65,7 @@ class EmbeddedService {
   std::set<pid_t> reported_;  ///< workers whose end `news` has told
   std::string client_url_;
   std::string worker_url_;
+  std::string page_url_;
 };
 
 }  // namespace oblique::client

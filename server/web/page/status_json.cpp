@@ -1,6 +1,12 @@
 #include "server/web/page/status_json.h"
 
 namespace oblique::server {
+namespace {
+
+/// Heartbeats come in between, and say nothing that people want to see.
+constexpr std::uint32_t kSilence_ms = 2000;
+
+}  // namespace
 
 nlohmann::ordered_json study_json(const protocol::StudyStatus& study) {
   const auto open = static_cast<double>(study.points() - study.solved() - study.failed());
@@ -32,7 +38,7 @@ nlohmann::ordered_json worker_json(const protocol::WorkerStatus& worker) {
           {"points_per_s", worker.points_per_s()},
           {"leased_points", worker.leased_points()},
           {"solved_points", worker.solved_points()},
-          {"silent_ms", worker.silent_ms()},
+          {"silent_s", worker.silent_ms() < kSilence_ms ? 0 : worker.silent_ms() / 1000},
           {"losses", worker.losses()},
           {"solver_version", worker.solver_version()},
           {"instruction_set", worker.instruction_set()}};

@@ -1,0 +1,95 @@
+#include <chrono>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "client/service/connection.h"
+#include "client/service/embedded_service.h"
+#include "client/service/run_service.h"
+#include "client/verbs/verbs.h"
+#include "proto/program/stop_signals.h"
+#include "proto/program/usage.h"
+#include "proto/text.h"
+
+namespace oblique::client {
+namespace {
+
+constexpr const char* kViewExamples = R"(Examples:
+  oblique view oblique.db
+  oblique view big.db --port 8000
+
+Open the address that it prints in a browser on this machine; Ctrl-C ends it. Over ssh, forward the
+port: ssh -L 8000:127.0.0.1:8000 HOST. Studies that are not done go on meanwhile, as with a server.)";
+
+struct ViewFlags {
+  RunSettings settings{.service = {.database = {}}, .terms = {}};
+  int port = 0;
+};
+
+/// Until it is told to stop. Throws ProcessError when server or workers end.
+void wait_for_the_end(EmbeddedService& service, protocol::StopSignals& stop) {
+  constexpr std::chrono::milliseconds kLook{500};
+  while (!stop.wait(kLook)) {
+    service.check();
+    if (const auto news = service.news(); !news.empty()) {
+      std::cerr << protocol::visible_lines(news) << '\n';
+    }
+  }
+}
+
+int view(ViewFlags flags) {
+  check_settings(flags.settings);
+  ServiceSettings& how = flags.settings.service;
+  if (!std::filesystem::exists(how.database)) {
+    throw std::runtime_error(fmt::format("there is no file {}: `oblique run` makes a database",
+                                         protocol::visible(how.database.string())));
+  }
+  how.http = fmt::format("127.0.0.1:{}", flags.port);
+  // Before any thread is started; see StopSignals.
+  protocol::StopSignals stop;
+  if (!how.verbose) {
+    how.on_long_start = [&how](const std::string& sentence) {
+      std::cerr << fmt::format("{}: {}.\n", how.database.string(), sentence);
+    };
+  }
+  try {
+    EmbeddedService service(how, stop);
+    // Whoever reads it may change studies, so it is for who started this alone.
+    std::cout << service.page_url() << std::endl;
+    std::cerr << "Open this address in a browser; Ctrl-C ends it.\n";
+    wait_for_the_end(service, stop);
+    service.stop();
+  } catch (const Interrupted&) {
+    return stop.exit_code();
+  }
+  return kDone;
+}
+
+}  // namespace
+
+void add_view(CLI::App& app, Command& command) {
+  auto flags = std::make_shared<ViewFlags>();
+  auto* verb = app.add_subcommand(
+      "view",
+      "Show a database as a page in a browser: a server and a worker for as long as it is open");
+  verb->footer(kViewExamples);
+  verb->add_option("file", flags->settings.service.database, "database")
+      ->required()
+      ->type_name("FILE");
+  constexpr double kLargestPort = 65535;
+  verb->add_option("--port", flags->port, "port of the page; 0: the system picks one")
+      ->check(protocol::number_between(0, kLargestPort))
+      ->type_name("N")
+      ->capture_default_str();
+  verb->add_flag(
+      "--allow-network-disk", flags->settings.service.allow_network_disk,
+      "take a database on a network file system, where a second machine could damage it");
+  add_worker_flags(*verb, flags->settings);
+  verb->callback([flags, &command] { command = [flags] { return view(*flags); }; });
+}
+
+}  // namespace oblique::client
