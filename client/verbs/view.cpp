@@ -10,6 +10,7 @@
 #include "client/service/connection.h"
 #include "client/service/embedded_service.h"
 #include "client/service/run_service.h"
+#include "client/service/watching.h"
 #include "client/verbs/verbs.h"
 #include "proto/program/stop_signals.h"
 #include "proto/program/usage.h"
@@ -53,14 +54,14 @@ int view(ViewFlags flags) {
   protocol::StopSignals stop;
   if (!how.verbose) {
     how.on_long_start = [&how](const std::string& sentence) {
-      std::cerr << fmt::format("{}: {}.\n", how.database.string(), sentence);
+      tell_line(fmt::format("{}: {}.", how.database.string(), sentence));
     };
   }
   try {
     EmbeddedService service(how, stop);
     // Whoever reads it may change studies, so it is for who started this alone.
     std::cout << service.page_url() << std::endl;
-    std::cerr << "Open this address in a browser; Ctrl-C ends it.\n";
+    tell_line("Open this address in a browser; Ctrl-C ends it.");
     wait_for_the_end(service, stop);
     service.stop();
   } catch (const Interrupted&) {

@@ -167,8 +167,8 @@ HttpAnswer slice_answer(const AnswerDesk& desk, std::uint64_t id, const Fields& 
     }
   }
   std::vector<float> values;
-  // Looking up a row takes as long as reading eight that follow each other.
-  const bool is_most_of_it = study.points / 8 <= points.size();
+  // Looking up a row takes as long as reading sixteen that follow each other.
+  const bool is_most_of_it = study.points / 16 <= points.size();
   const auto column = is_most_of_it ? desk.columns.read(desk.database, id, *source, study.points)
                                     : desk.columns.find(desk.database, id, *source, study.points);
   if (column) {

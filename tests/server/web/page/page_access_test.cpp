@@ -1,10 +1,13 @@
 // Who is let in: a matrix of hostile and sound requests against a whole server.
+#include <filesystem>
+#include <fstream>
 #include <memory>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "server/web/page/page_key.h"
+#include "server/web/page/token_file.h"
 #include "tests/server/web/page/page_server.h"
 
 namespace oblique::server {
@@ -40,10 +43,11 @@ TEST(PageAccess, WithoutTheCookieNothingIsShown) {
        {"/api/events", "/api/studies", "/api/workers", "/api/studies/1", "/api/studies/1/rows",
         "/api/studies/1/slice?z=fn_peak_N&x=mu", "/api/studies/1/points/0",
         "/api/studies/1/points/0/trace", "/api/anything"}) {
-    for (const std::string& cookies : {std::string(), std::string("Cookie: oblique-1=1\r\n"),
-                                      right.substr(0, right.size() - 3) + "\r\n",
-                                      "Cookie: oblique-1" + right.substr(right.find('=')),
-                                      "Cookie: x" + right.substr(std::string("Cookie: ").size())}) {
+    for (const std::string& cookies :
+         {std::string(), std::string("Cookie: oblique-1=1\r\n"),
+          right.substr(0, right.size() - 3) + "\r\n",
+          "Cookie: oblique-1" + right.substr(right.find('=')),
+          "Cookie: x" + right.substr(std::string("Cookie: ").size())}) {
       const std::string answer = page.ask("GET", path, cookies);
       EXPECT_EQ(status_of_answer(answer), 401) << path << ' ' << cookies;
       EXPECT_THAT(answer, HasSubstr("token")) << path;
@@ -57,7 +61,7 @@ TEST(PageAccess, ACookieIsFoundAmongOthers) {
   const std::string own = page.cookie_header().substr(std::string("Cookie: ").size());
   const std::string pair = own.substr(0, own.size() - 2);
   for (const std::string& cookies : {"Cookie: a=b; " + pair, "Cookie: " + pair + "; a=b",
-                                    "Cookie: a;;  " + pair + ";", "cookie: a=b;" + pair}) {
+                                     "Cookie: a;;  " + pair + ";", "cookie: a=b;" + pair}) {
     EXPECT_EQ(status_of_answer(page.ask("GET", "/api/studies", cookies + "\r\n")), 200) << cookies;
   }
 }
@@ -167,6 +171,32 @@ TEST(PageKey, TokensDifferAndACookieFollowsFromItsToken) {
   EXPECT_EQ(PageKey(one.token()).cookie_for("localhost:1"), one.cookie_for("localhost:1"));
   EXPECT_THAT(one.cookie_for("[::1]:7602"), testing::StartsWith("oblique-7602="));
   EXPECT_THAT(one.cookie_for("[::1]"), testing::StartsWith("oblique-80="));
+}
+
+TEST(TokenFile, IsMadeForItsOwnerAndReadAgain) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("token");
+  const std::string token = token_of_file(path);
+  EXPECT_EQ(token.size(), 64U);
+  EXPECT_EQ(token_of_file(path), token);
+  using std::filesystem::perms;
+  EXPECT_EQ(std::filesystem::status(path).permissions(), perms::owner_read | perms::owner_write);
+  std::filesystem::permissions(path, perms::group_read, std::filesystem::perm_options::add);
+  EXPECT_THROW(token_of_file(path), std::runtime_error);
+}
+
+TEST(TokenFile, HasLettersAndDigitsEnough) {
+  const test::TemporaryFolder folder;
+  int number = 0;
+  for (const std::string& text :
+       {std::string(), std::string(31, 'a'), std::string(129, 'a'), std::string(40, ' '),
+        std::string(32, 'a') + "\n" + std::string(8, 'b'), std::string(32, ';')}) {
+    const std::string path = folder.file(std::to_string(++number));
+    std::ofstream(path) << text << '\n';
+    std::filesystem::permissions(path, std::filesystem::perms::owner_read);
+    EXPECT_THROW(token_of_file(path), std::runtime_error) << text;
+  }
+  EXPECT_THROW(token_of_file(folder.file("no/folder")), std::runtime_error);
 }
 
 }  // namespace

@@ -1,0 +1,74 @@
+// `oblique view`: a database, its page and a worker, from a program that a browser could ask.
+#include <csignal>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/server/web/raw_http.h"
+#include "tests/support/programs.h"
+
+namespace oblique::test {
+namespace {
+
+using server::body_of;
+using server::RawHttp;
+using server::status_of_answer;
+using testing::HasSubstr;
+
+/// Waits for the address that it prints.
+std::string printed_url(const Process& view) {
+  wait_until("the address is printed", [&] { return view.out().ends_with("\n"); });
+  return view.out().substr(0, view.out().size() - 1);
+}
+
+/// As a browser does with what it is given.
+class Browser {
+ public:
+  explicit Browser(const std::string& address)
+      : url_(address.substr(0, address.find("/?"))), host_(url_.substr(url_.find("//") + 2)) {
+    const std::string answer = ask(address.substr(url_.size()));
+    const std::string name = "Set-Cookie: ";
+    const std::size_t at = answer.find(name) + name.size();
+    cookie_ = answer.substr(at, answer.find(';', at) - at);
+  }
+  std::string ask(const std::string& path) const {
+    return RawHttp(url_).ask("GET " + path + " HTTP/1.1\r\nHost: " + host_ +
+                             "\r\nCookie: " + cookie_ + "\r\n\r\n");
+  }
+
+ private:
+  std::string url_;
+  std::string host_;
+  std::string cookie_;
+};
+
+TEST(View, ShowsADatabaseAndItsPointsUntilItIsStopped) {
+  const TemporaryFolder folder;
+  const Outcome made = run_oblique(folder, {"run", "--H", "0.5", "--mu", "0.1:1:4", "--e", "1",
+                                            "--name", "small", "--db", "small.db"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  Process view(folder, client_program(), {"view", "small.db"});
+  const Browser browser(printed_url(view));
+  EXPECT_THAT(browser.ask("/"), HasSubstr("<title>oblique</title>"));
+  EXPECT_THAT(browser.ask("/api/studies"), HasSubstr("\"name\":\"small\""));
+  std::string trace;
+  wait_until("a worker has solved the point again", [&] {
+    trace = browser.ask("/api/studies/1/points/2/trace?shape=1");
+    return status_of_answer(trace) == 200;
+  });
+  EXPECT_THAT(body_of(trace), HasSubstr("\"nodes\":13"));
+  view.send(SIGINT);
+  EXPECT_EQ(view.wait(), 0);
+  wait_until("server and worker have ended", [&] { return processes_of(folder).empty(); });
+}
+
+TEST(View, AFileThatIsNotThereIsNotMade) {
+  const TemporaryFolder folder;
+  const Outcome outcome = run_oblique(folder, {"view", "nothing.db"});
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("there is no file nothing.db"));
+}
+
+}  // namespace
+}  // namespace oblique::test
