@@ -44,7 +44,8 @@ class Web::Parts {
                [this](const HttpServer::Question& question) {
                  return page_.objection_to_change(question);
                },
-               [this](std::uint64_t number) { page_.gone(number); }}) {}
+               [this](std::uint64_t number) { page_.gone(number); },
+               [this] { return page_.tick(); }}) {}
 
   ~Parts() { answers_.stop(); }  // it wakes the HTTP server
   Parts(const Parts&) = delete;

@@ -10,6 +10,9 @@ namespace oblique::server {
 namespace {
 
 constexpr std::chrono::milliseconds kLookEvery{500};
+/// Of small studies, that may be solved while one looks.
+constexpr std::chrono::milliseconds kLookOften{50};
+constexpr std::uint64_t kSmall = 65'536;
 /// Reading so many rows is not waited for.
 constexpr std::uint64_t kMostAtOnce = 50'000;
 /// Points that failed are looked up again, for they may be solved later: the first so many.
@@ -88,7 +91,7 @@ bool StoredColumn::bring_up_to_date(sqlite3* database, bool may_take_long) {
     return false;  // it is being read
   }
   const auto now = Clock::now();
-  if (!values_.empty() && now - looked_ < kLookEvery) {
+  if (!values_.empty() && now - looked_ < (points_ <= kSmall ? kLookOften : kLookEvery)) {
     return true;
   }
   // One state of the database for both questions and all rows.

@@ -106,6 +106,7 @@ class HttpServer::Parts {
       ::poll(items.data(), accepts ? items.size() : items.size() - 1,
              static_cast<int>(wait_from(now).count()));
       wake_up_.clear();
+      turn_again_ = rules_.turn();
       end_overdue(Clock::now());
       accept_all();
       ask_again();
@@ -118,13 +119,11 @@ class HttpServer::Parts {
 
   milliseconds wait_from(Clock::time_point now) const {
     MHD_UNSIGNED_LONG_LONG limit_ms = 0;
-    auto until = now + limits_.longest;
+    auto until = now + std::min(limits_.longest, turn_again_.value_or(limits_.longest));
     if (MHD_get_timeout(daemon_, &limit_ms) == MHD_YES) {
       until = std::min(until, now + milliseconds(limit_ms));
     }
-    if (now < accept_again_) {
-      until = std::min(until, accept_again_);
-    }
+    until = now < accept_again_ ? std::min(until, accept_again_) : until;
     for (const auto& [connection, peer] : peers_) {
       until = is_quiet_stream(peer) ? until : std::min(until, peer.since + limits_.longest);
       until = peer.waits ? std::min(until, now + kLongestWait) : until;
@@ -373,6 +372,7 @@ class HttpServer::Parts {
   Peers peers_;
   HttpCounts counts_;
   std::uint64_t last_number_ = 0;
+  std::optional<milliseconds> turn_again_ = milliseconds(0);
   std::string accepted_host_;  // of the connection that is being taken
   Clock::time_point accept_again_{};
   MHD_Daemon* daemon_;

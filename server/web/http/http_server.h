@@ -49,6 +49,9 @@ class HttpServer {
     };
     /// Nobody waits for the answer to the request of that number any more.
     std::function<void(std::uint64_t number)> gone = [](std::uint64_t) {};
+    /// Called whenever the thread turns; gives the time after which it is to turn again.
+    std::function<std::optional<std::chrono::milliseconds>()> turn =
+        []() -> std::optional<std::chrono::milliseconds> { return std::nullopt; };
   };
 
   /// Listens from now on. Throws std::runtime_error, naming the address, when it cannot.

@@ -21,6 +21,7 @@ constexpr unsigned kTryLater = 503;
 
 constexpr std::string_view kApi = "/api/";
 constexpr std::string_view kStudies = "/api/studies";
+constexpr std::string_view kLook = "/api/look";
 
 /// Browsers wait so long for one answer; what takes longer is asked for again.
 constexpr std::chrono::milliseconds kPatience{8000};
@@ -50,18 +51,29 @@ Page::Page(const PageSettings& settings, const Neighbours& neighbours)
     : shows_without_token_(settings.shows_without_token),
       version_(settings.version),
       key_(settings.token.empty() ? PageKey() : PageKey(settings.token)),
-      at_(neighbours) {}
+      at_(neighbours),
+      looks_(neighbours.service, settings.looks_kept) {}
 
 bool Page::has(const std::string& path) {
   return path.starts_with(kApi) || is_page_file(path);
 }
 
 bool Page::takes_changes(const std::string& path) {
-  if (path == kStudies) {
+  if (path == kStudies || path == kLook || kept_by(path)) {
     return true;
   }
   const auto place = place_of(path);
   return place && !place->point && change_talk(place->study, place->part).has_value();
+}
+
+std::optional<std::uint64_t> Page::kept_by(const std::string& path) {
+  std::string_view rest = path;
+  if (!rest.starts_with(kLook) || !rest.substr(kLook.size()).starts_with('/')) {
+    return std::nullopt;
+  }
+  rest.remove_prefix(kLook.size() + 1);
+  const auto study = take_number(rest);
+  return rest == "/keep" ? study : std::nullopt;
 }
 
 std::optional<Page::Place> Page::place_of(const std::string& path) {
@@ -185,6 +197,7 @@ std::optional<HttpAnswer> Page::begin(const HttpQuestion& question) {
 }
 
 std::optional<HttpAnswer> Page::begin_study(const HttpQuestion& question, const Place& place) {
+  looks_.seen(place.study);
   if (place.point && place.part == "/trace") {
     return begin(question, trace_talk(place.study, *place.point, question));
   }
@@ -207,6 +220,13 @@ std::optional<HttpAnswer> Page::begin_study(const HttpQuestion& question, const 
 std::optional<HttpAnswer> Page::begin_change(const HttpQuestion& question) {
   if (question.path == kStudies) {
     return begin(question, submit_talk(question));
+  }
+  if (question.path == kLook) {
+    return begin(question, looks_.begin(question));
+  }
+  if (const auto study = kept_by(question.path)) {
+    auto keeping = looks_.keep(*study, question);
+    return keeping ? begin(question, std::move(*keeping)) : nothing_there();
   }
   const auto place = place_of(question.path);
   auto talk = place ? change_talk(place->study, place->part) : std::nullopt;

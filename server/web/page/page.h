@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -8,6 +9,7 @@
 #include "server/web/answers/answer_pool.h"
 #include "server/web/http/http_message.h"
 #include "server/web/page/live_text.h"
+#include "server/web/page/looks.h"
 #include "server/web/page/page_key.h"
 #include "server/web/page/service_line.h"
 #include "server/web/page/talks.h"
@@ -19,6 +21,8 @@ struct PageSettings {
   std::string token;
   /// Who comes without it may look, and change nothing.
   bool shows_without_token = false;
+  /// A study that was made to be looked at goes when nobody has for so long.
+  std::chrono::milliseconds looks_kept{6000};
   std::string version;
 };
 
@@ -45,6 +49,8 @@ class Page {
   /// Nothing: it is asked for again.
   std::optional<HttpAnswer> answer(const HttpQuestion& question);
   void gone(std::uint64_t number);
+  /// Looks after what nobody asks for. Gives the time after which it wants to be called again.
+  std::optional<std::chrono::milliseconds> tick() { return looks_.tick(); }
 
  private:
   /// A path below /api/studies/, taken apart.
@@ -54,6 +60,8 @@ class Page {
     std::optional<std::uint64_t> point;
   };
   static std::optional<Place> place_of(const std::string& path);
+  /// The study of a path /api/look/ID/keep.
+  static std::optional<std::uint64_t> kept_by(const std::string& path);
 
   bool is_trusted(const HttpQuestion& question) const;
   std::optional<HttpAnswer> enter(const HttpQuestion& question) const;
@@ -69,6 +77,7 @@ class Page {
   std::string version_;
   PageKey key_;
   Neighbours at_;
+  Looks looks_;
   std::map<std::uint64_t, std::optional<Talk>> under_way_;  // none: with the pool
 };
 

@@ -40,6 +40,13 @@ ClientRequest status_of_number(std::uint64_t study) {
 
 }  // namespace
 
+ClientRequest status_of_all(std::uint64_t after) {
+  ClientRequest request;
+  request.mutable_status()->set_after_study_id(after);
+  request.mutable_status()->set_limit(kMostLines);
+  return request;
+}
+
 HttpAnswer too_slow() {
   return error_answer(kUnavailable, "the server takes too long: ask again later");
 }

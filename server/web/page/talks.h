@@ -23,6 +23,9 @@ struct Talk {
 /// That it takes too long.
 HttpAnswer too_slow();
 
+/// Asks for a page of studies, those with a higher number.
+protocol::ClientRequest status_of_all(std::uint64_t after);
+
 /// A talk about a study of that number. Most requests want its name: `ask` makes one with it, and
 /// `go_on` hears the replies to that.
 Talk talk_by_name(std::uint64_t study,
