@@ -40,6 +40,7 @@ function table(title, heads, rows, none) {
   const body = made.createTBody();
   rows.forEach((cells) => body.insertRow().append(...cells));
   const scroll = cell("div", made, "scroll");
+  scroll.tabIndex = 0; // so that the keyboard scrolls it
   section.append(scroll);
   return section;
 }
