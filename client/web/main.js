@@ -1,25 +1,82 @@
 // @ts-check
-// The first view: how the server stands, live.
+// Which view an address means. Views are functions: they fill an element and give what ends them.
+import { h } from "/parts/dom.js";
 import { session, follow } from "/server.js";
 import { overview } from "/overview.js";
 
+/**
+ * @typedef {object} Place what an address says
+ * @property {URLSearchParams} fields
+ * @property {(fields: URLSearchParams) => void} keep writes them into the address
+ * @property {boolean} may_change
+ * @property {() => any} now the last overview, or null
+ * @property {(links: (string | Node)[]) => void} trail what stands beside the name
+ * @typedef {{close?: () => void, take?: (now: any) => void}} View
+ */
+
 const view = /** @type {HTMLElement} */ (document.getElementById("view"));
 const pace = /** @type {HTMLElement} */ (document.getElementById("pace"));
+const trail = /** @type {HTMLElement} */ (document.getElementById("trail"));
 
-/** @param {string} text */
-function say(text) {
-  const p = document.createElement("p");
-  p.textContent = text;
-  view.replaceChildren(p);
+/** @type {View} */
+let shown = {};
+/** @type {any} */
+let now = null;
+let turn = 0;
+let may_change = false;
+
+function links(/** @type {(string | Node)[]} */ parts) {
+  trail.replaceChildren(...parts.flatMap((part) => [h("span", { "aria-hidden": "true" }, "/"), part]));
+  const last = parts.at(-1);
+  document.title = last ? `${typeof last === "string" ? last : last.textContent} – oblique` : "oblique";
+}
+
+async function show() {
+  const mine = ++turn;
+  shown.close?.();
+  shown = {};
+  const [path, query] = location.hash.replace(/^#/, "").split("?", 2);
+  const root = h("div", {});
+  /** @type {Place} */
+  const place = { fields: new URLSearchParams(query ?? ""), may_change, now: () => now, trail: links,
+    keep: (fields) => history.replaceState(null, "", `#${path}?${fields}`) };
+  links([]);
+  view.replaceChildren(root);
+  try {
+    const point = /^\/study\/(\d+)\/point\/(\d+)$/.exec(path);
+    const study = /^\/study\/(\d+)$/.exec(path);
+    /** @type {View} */
+    let made;
+    if (point) made = await (await import("/point/point.js")).point_view(root, place, Number(point[1]), Number(point[2]));
+    else if (study) made = await (await import("/study/study.js")).study_view(root, place, Number(study[1]));
+    else if (path === "/new") made = await (await import("/start.js")).start_view(root, place);
+    else made = overview(root, place);
+    if (mine !== turn) {
+      made.close?.();
+      return;
+    }
+    shown = made;
+    if (now) shown.take?.(now);
+  } catch (error) {
+    if (mine === turn) root.replaceChildren(h("p", { role: "alert", class: "bad" }, String(/** @type {Error} */ (error).message ?? error)));
+  }
 }
 
 try {
   const here = await session();
+  may_change = here.may_change;
   if (here.may_look) {
-    follow((now) => overview(view, pace, now), (text) => { pace.textContent = text; });
+    follow((told) => {
+      now = told;
+      pace.textContent = told.database_fault || `${Math.round(told.points_per_s)} points/s`;
+      pace.className = told.database_fault ? "bad" : "";
+      shown.take?.(told);
+    }, (text) => { pace.textContent = text; });
+    addEventListener("hashchange", show);
+    await show();
   } else {
-    say(here.how_to_enter);
+    view.replaceChildren(h("p", {}, here.how_to_enter));
   }
 } catch (error) {
-  say(String(error));
+  view.replaceChildren(h("p", { role: "alert", class: "bad" }, String(error)));
 }

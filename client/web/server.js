@@ -59,7 +59,7 @@ export function follow(take, say) {
   /** @type {EventSource | null} */
   let source = null;
   const look = () => {
-    if (document.hidden) {
+    if (document.hidden) {  // nobody looks
       source?.close();
       source = null;
     } else if (!source) {

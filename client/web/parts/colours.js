@@ -1,0 +1,71 @@
+// @ts-check
+// Colours of values and of categories, readable by the colour-blind.
+
+const kStops = {
+  viridis: "440154 482475 414487 355f8d 2a788e 21918c 22a884 44bf70 7ad151 bddf26 fde725",
+  cividis: "00224e 123570 3b496c 575d6d 707173 8a8678 a59c74 c3b369 e1cc55 fee838",
+};
+
+/** @param {string} hex @returns {[number, number, number]} */
+const rgb = (hex) => [parseInt(hex.slice(0, 2), 16), parseInt(hex.slice(2, 4), 16), parseInt(hex.slice(4, 6), 16)];
+
+/** One pixel of an ImageData, opaque. @param {number[]} colour */
+const packed = ([r, g, b]) => ((255 << 24) | (b << 16) | (g << 8) | r) >>> 0;
+
+/** 256 colours from the least to the most. @param {string} name @returns {Uint32Array} */
+export function palette(name) {
+  const stops = (kStops[/** @type {keyof typeof kStops} */ (name)] ?? kStops.viridis).split(" ").map(rgb);
+  return Uint32Array.from({ length: 256 }, (_, i) => {
+    const at = (i / 255) * (stops.length - 1);
+    const k = Math.min(Math.floor(at), stops.length - 2);
+    return packed(stops[k].map((c, j) => Math.round(c + (at - k) * (stops[k + 1][j] - c))));
+  });
+}
+
+/** @param {Uint32Array} colours @param {number} i */
+export function css_colour(colours, i) {
+  const c = colours[i];
+  return `rgb(${c & 255} ${(c >> 8) & 255} ${(c >> 16) & 255})`;
+}
+
+const kFills = "77aadd eedd88 ee8866 44bb99 ffaabb 99ddff bbcc33".split(" ").map(rgb);
+const kOther = rgb("b8b8b8");
+
+/** How many categories have a look of their own; the others look the same. */
+export const kLooks = 2 * kFills.length;
+
+/** Whether a pixel lies on a category's hatching, which tells neighbours apart without colour. */
+const kHatchings = [
+  () => false,
+  (/** @type {number} */ x, /** @type {number} */ y) => (x + y) % 9 < 2,
+  (/** @type {number} */ x, /** @type {number} */ y) => (x - y + 9000000) % 9 < 2,
+  (/** @type {number} */ x, /** @type {number} */ y) => x % 7 < 2 && y % 7 < 2,
+  (/** @type {number} */ _, /** @type {number} */ y) => y % 8 < 2,
+  (/** @type {number} */ x) => x % 8 < 2,
+];
+
+/** The colour of a pixel of a category. @param {number} code @param {number} x @param {number} y */
+export function category_pixel(code, x, y) {
+  const colour = code < kLooks ? kFills[code % kFills.length] : kOther;
+  const is_hatched = code < kLooks && kHatchings[(code + (code >= kFills.length ? 3 : 0)) % kHatchings.length](x, y);
+  return packed(is_hatched ? colour.map((c) => Math.round(c * 0.68)) : colour);
+}
+
+/** What stands for a pixel without a value. @param {"missing" | "failed" | "left_out" | "none"} why @param {number} x @param {number} y @param {boolean} is_dark */
+export function empty_pixel(why, x, y, is_dark) {
+  const ground = is_dark ? 0xff211e1c : 0xfff4f4f2;
+  const ink = is_dark ? 0xff5c5650 : 0xffc4beb8;
+  if (why === "left_out") return ground;
+  if (why === "failed") return (x + y) % 8 < 2 || (x - y + 8000000) % 8 < 2 ? (is_dark ? 0xff7d8aff : 0xff1c26a8) : ground;
+  if (why === "none") return y % 4 < 1 ? ink : ground;
+  return (x + y) % 8 < 1 ? ink : ground;
+}
+
+export const is_dark = () => matchMedia("(prefers-color-scheme: dark)").matches;
+/** A colour of the page's style. @param {string} name */
+export const ink = (name) => {
+  const probe = document.getElementById("ink");
+  if (!probe) return "#888";
+  probe.className = `ink-${name}`;
+  return getComputedStyle(probe).color;
+};

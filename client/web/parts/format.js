@@ -1,0 +1,44 @@
+// @ts-check
+// Numbers as people read them.
+
+/** A whole number, its thousands apart. @param {number} value */
+export function count(value) {
+  return Math.round(value).toLocaleString("en").replaceAll(",", "\u202f");
+}
+
+/**
+ * A measured value, to that many digits.
+ * @param {number | null | undefined} value @param {number} [digits]
+ */
+export function shown(value, digits = 5) {
+  if (value === null || value === undefined || Number.isNaN(value)) return "–";
+  if (value === 0) return "0";
+  const size = Math.abs(value);
+  if (size >= 1e6 || size < 1e-4) return value.toExponential(digits - 1).replace(/\.?0+e/, "e").replace("e+", "e");
+  return String(Number(value.toPrecision(digits)));
+}
+
+/** @param {number | null | undefined} value @param {string} unit */
+export function with_unit(value, unit) {
+  return unit && unit !== "1" ? `${shown(value)} ${unit}` : shown(value);
+}
+
+/** What an axis or a column is called: its name and unit. @param {string} name @param {string} unit */
+export function heading(name, unit) {
+  if (!unit || unit === "1") return name;
+  const suffix = `_${unit.replace("/", "_").replaceAll(" ", "")}`;
+  return `${name.endsWith(suffix) ? name.slice(0, -suffix.length) : name} [${unit}]`;
+}
+
+/** A time that is left. @param {number | null} seconds */
+export function time_left(seconds) {
+  if (seconds === null) return "";
+  if (seconds < 90) return `${Math.ceil(seconds)} s`;
+  if (seconds < 5400) return `${Math.round(seconds / 60)} min`;
+  return seconds < 172800 ? `${(seconds / 3600).toFixed(1)} h` : `${Math.round(seconds / 86400)} days`;
+}
+
+/** For a command line. @param {string} text */
+export function quoted(text) {
+  return /^[A-Za-z0-9_.,:=/@%+-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`;
+}

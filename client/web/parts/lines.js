@@ -1,0 +1,108 @@
+// @ts-check
+// Lines over an axis, by uPlot: with keys to move the cursor, a spoken value, and spans shaded behind.
+import uPlot from "/vendor/uPlot.esm.js";
+import { h } from "/parts/dom.js";
+import { ink } from "/parts/colours.js";
+import { heading, shown } from "/parts/format.js";
+import { tick_text } from "/parts/scale.js";
+
+const kDashes = [[], [7, 3], [2, 3], [9, 3, 2, 3], [14, 4], [4, 2], [1, 4], [12, 3, 3, 3]];
+const kInks = ["line0", "line1", "line2", "line3", "line4", "line5", "line6", "line7"];
+
+/**
+ * @typedef {{label: string, values: ArrayLike<number | null>, colour?: number}} Series
+ * @typedef {{from: number, to: number, ink: string}} Span
+ * @typedef {object} Lines
+ * @property {string} title
+ * @property {{name: string, unit: string, values: ArrayLike<number>, is_log?: boolean}} x
+ * @property {{name: string, unit: string, is_log?: boolean}} y
+ * @property {Series[]} series
+ * @property {Span[]} [spans]
+ * @property {boolean} [as_bars]
+ * @property {boolean} [as_path] x does not rise: a loop
+ * @property {number} [height]
+ * @property {(i: number) => void} [moved] the cursor is over value `i`
+ */
+
+/** @param {Lines} of */
+export function line_plot(of) {
+  const said = h("p", { class: "reading", "aria-live": "polite" });
+  const place = h("div", { class: "plot", tabIndex: 0, role: "application", "aria-roledescription": "plot",
+    "aria-label": `${of.title}; arrow keys move the cursor` });
+  const legend = h("ul", { class: "legend" }, ...(of.series.length > 1 ? of.series : []).map((one, i) => h("li", {},
+    h("span", { class: `dash ink-${kInks[(one.colour ?? i) % 8]}` }), one.label)));
+  const element = h("figure", { class: "lines" }, h("figcaption", {}, of.title), legend, place, said);
+  /** @type {any} */
+  let plot = null;
+  let at = -1;
+
+  const read = (/** @type {number} */ i) => {
+    const x = of.x.values[i];
+    said.textContent = x === undefined ? "" : `${of.x.name} ${shown(x)} ${of.x.unit}: ` + of.series.map((one) =>
+      `${of.series.length > 1 ? `${one.label} ` : ""}${shown(one.values[i])} ${of.y.unit}`).join(", ");
+  };
+  const options = (/** @type {number} */ width) => {
+    const axis = { stroke: ink("text"), grid: { stroke: ink("grid"), width: 1 }, ticks: { stroke: ink("weak"), width: 1 },
+      font: "12px system-ui, sans-serif", labelFont: "13px system-ui, sans-serif",
+      values: (/** @type {any} */ _, /** @type {number[]} */ splits) => splits.map((v) => (v === null ? "" : tick_text(v))) };
+    return { width, height: of.height ?? 240, legend: { show: false }, ms: 1,
+      cursor: { points: { size: 7 }, drag: { x: !of.as_path, y: false }, ...(of.as_path ? { show: true } : {}) },
+      scales: { x: { time: false, distr: of.x.is_log ? 3 : 1 }, y: { distr: of.y.is_log ? 3 : 1 } },
+      axes: [{ ...axis, label: heading(of.x.name, of.x.unit), labelSize: 22, size: 34 },
+        { ...axis, label: heading(of.y.name, of.y.unit), labelSize: 22, size: 62 }],
+      series: [{}, ...of.series.map((one, i) => ({ label: one.label, stroke: ink(kInks[(one.colour ?? i) % 8]), width: 1.6,
+        dash: kDashes[(one.colour ?? i) % 8], spanGaps: false, points: { show: of.x.values.length < 60 && !of.as_bars, size: 4 },
+        ...(of.as_bars ? { paths: uPlot.paths.bars({ size: [1, Infinity] }), fill: ink("bar"), dash: [], stroke: ink("weak"), width: 0.5 } : {}) }))],
+      hooks: {
+        drawClear: [(/** @type {any} */ u) => {
+          for (const span of of.spans ?? []) {
+            const from = Math.max(u.valToPos(span.from, "x", true), u.bbox.left);
+            const to = Math.min(u.valToPos(span.to, "x", true), u.bbox.left + u.bbox.width);
+            if (to <= from) continue;
+            u.ctx.fillStyle = ink(span.ink);
+            u.ctx.fillRect(from, u.bbox.top, to - from, u.bbox.height);
+          }
+        }],
+        setCursor: [(/** @type {any} */ u) => {
+          const i = u.cursor.idx;
+          if (i === null || i === undefined || i === at) return;
+          at = i;
+          read(i);
+          if (!quiet) of.moved?.(i);
+        }],
+      } };
+  };
+  let quiet = false;
+  const move = (/** @type {number} */ i) => {
+    if (!plot || of.x.values[i] === undefined) return;
+    const y = of.series[0]?.values[i];
+    plot.setCursor({ left: plot.valToPos(of.x.values[i], "x"), top: typeof y === "number" ? plot.valToPos(y, "y") : -1 });
+  };
+  place.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
+    const last = of.x.values.length - 1;
+    const step = Math.max(Math.round(last / 200), 1);
+    const to = /** @type {Record<string, number>} */ ({ ArrowLeft: Math.max(at - step, 0), ArrowRight: Math.min(at + step, last), Home: 0, End: last })[event.key];
+    if (to === undefined) return;
+    event.preventDefault();
+    move(to);
+  });
+  const watch = new ResizeObserver(() => {
+    const width = place.clientWidth;
+    if (width < 60) return;
+    if (plot) plot.setSize({ width, height: of.height ?? 240 });
+    else plot = new uPlot(options(width), [of.x.values, ...of.series.map((one) => one.values)], place);
+  });
+  watch.observe(place);
+  return { element,
+    /** Puts the cursor at value `i` without telling. @param {number} i */
+    point_at(i) {
+      quiet = true;
+      at = -1;
+      move(i);
+      quiet = false;
+    },
+    close() {
+      watch.disconnect();
+      plot?.destroy();
+    } };
+}

@@ -1,0 +1,44 @@
+// @ts-check
+// What a study's recipe says about its axes.
+
+/**
+ * @typedef {{key: string, unit: string, meaning: string, values: number, list?: number[], stride: number,
+ *   range?: {from: number, to: number, count: number, spacing: string}, expression?: string, distribution?: object}} Axis
+ * @typedef {{kind: string, first_point: number, points: number, where: string, axes: Axis[]}} Block
+ */
+
+/** Axes of a grid that have values of their own. @param {Block} block */
+export function own_axes(block) {
+  return block.kind === "grid" ? block.axes.filter((axis) => !axis.expression && !axis.distribution) : [];
+}
+
+/** Those that vary. @param {Block} block */
+export const varying = (block) => own_axes(block).filter((axis) => axis.values > 1);
+
+/** Value `i` of an axis; undefined where the server did not list it. @param {Axis} axis @param {number} i */
+export function axis_value(axis, i) {
+  if (axis.list) return axis.list[i];
+  const range = axis.range;
+  if (!range) return undefined;
+  if (range.count === 1) return range.from;
+  const share = i / (range.count - 1);
+  if (i === range.count - 1) return range.to;
+  return range.spacing === "log" ? range.from * (range.to / range.from) ** share : range.from + share * (range.to - range.from);
+}
+
+/** The block that shows most, and the axes that people look at first. @param {Block[]} blocks */
+export function usual_block(blocks) {
+  let best = -1;
+  blocks.forEach((block, i) => {
+    if (varying(block).length > 0 && (best < 0 || block.points > blocks[best].points)) best = i;
+  });
+  return best;
+}
+
+/** @param {Block} block @returns {[string, string]} */
+export function usual_axes(block) {
+  const keys = varying(block).map((axis) => axis.key);
+  const x = keys.includes("mu") ? "mu" : keys.at(-1) ?? "";
+  const others = keys.filter((key) => key !== x);
+  return [x, others.includes("H") ? "H" : others[0] ?? ""];
+}

@@ -1,0 +1,126 @@
+// @ts-check
+// Rows of a study, a page at a time.
+import { h, named } from "/parts/dom.js";
+import { count, heading, shown } from "/parts/format.js";
+import { rows, rows_path } from "./picture.js";
+
+const kPage = 25;
+/** Pages are cut from what is asked for in order; beyond that a file is the better way. */
+const kDeepest = 10_000;
+const kMostInFile = 100_000;
+
+/**
+ * @param {{study: number, points: number, columns: () => string[], where: () => string, may_say: (text: string) => void,
+ *   chosen: (point: number) => void, keep_where: (where: string) => void, order: () => string, keep_order: (order: string) => void}} of
+ */
+export function row_table(of) {
+  const filter = h("input", { type: "search", value: of.where(), placeholder: "mu > 0.5 AND fn_peak_N > 20", spellcheck: false,
+    onchange: () => set_filter(), onkeydown: (/** @type {KeyboardEvent} */ e) => { if (e.key === "Enter") set_filter(); } });
+  const said = h("p", { role: "status", class: "weak" });
+  const table = h("table", {}, h("caption", { class: "unseen" }, "Points of the study"));
+  const back = h("button", { type: "button", onclick: () => turn(-1) }, "Previous");
+  const next = h("button", { type: "button", onclick: () => turn(1) }, "Next");
+  const file = h("a", { class: "button", download: "rows.csv" }, "CSV");
+  const element = h("section", { class: "rows" }, h("h2", {}, "Points"), named("show points where (as with --where)", filter),
+    h("div", { class: "scroll", tabIndex: 0, role: "region", "aria-label": "Points" }, table),
+    h("div", { class: "row" }, back, next, file), said);
+  let page = 0;
+  /** @type {AbortController | null} */
+  let asked = null;
+  /** How many meet the filter; null: not known. @type {number | null} */
+  let total = null;
+  let counted = "\0";
+  let chosen = -1;
+
+  function set_filter() {
+    if (filter.value.trim() === of.where()) return;
+    of.keep_where(filter.value.trim());
+    page = 0;
+    load();
+  }
+  function turn(/** @type {number} */ by) {
+    page = Math.max(page + by, 0);
+    load();
+  }
+  /** Sorts by a column, then the other way round, then by number again. @param {string} column */
+  function sort(column) {
+    const now = of.order();
+    of.keep_order(now === column ? `${column} DESC` : now === `${column} DESC` ? "" : column);
+    page = 0;
+    load();
+  }
+
+  async function count_rows(/** @type {AbortSignal} */ signal) {
+    const where = of.where();
+    if (counted === where) return;
+    total = null;
+    const answer = await rows(of.study, { where, select: "count(*)", limit: 1 }, signal);
+    total = Number(answer.rows[0]?.[0] ?? 0);
+    counted = where;
+  }
+
+  function head(/** @type {any} */ answer) {
+    const now = of.order();
+    return h("thead", {}, h("tr", {}, ...answer.columns.map((/** @type {string} */ name, /** @type {number} */ i) => {
+      const sign = now === name ? " ▲" : now === `${name} DESC` ? " ▼" : "";
+      return h("th", { scope: "col", class: answer.rows.some((/** @type {any} */ r) => typeof r[i] === "number") ? "number" : "",
+        "aria-sort": now === name ? "ascending" : now === `${name} DESC` ? "descending" : "none" },
+      h("button", { type: "button", class: "plain", onclick: () => sort(name) }, heading(name, answer.units[i]) + sign));
+    })));
+  }
+
+  async function load() {
+    asked?.abort();
+    const mine = asked = new AbortController();
+    const columns = of.columns();
+    const where = of.where();
+    file.href = rows_path(of.study, { where, order: of.order() || "point", select: columns.join(","), limit: kMostInFile, format: "csv" });
+    try {
+      const first = page * kPage;
+      const answer = await rows(of.study, { where, order: of.order() || "point", select: columns.join(","), limit: first + kPage + 1 }, mine.signal);
+      const some = answer.rows.slice(first, first + kPage);
+      const has_more = answer.rows.length > first + kPage;
+      filter.setAttribute("aria-invalid", "false");
+      table.replaceChildren(table.caption ?? "", head(answer), h("tbody", {}, ...some.map((/** @type {any[]} */ row) => {
+        const made = h("tr", { "data-point": row[0], "aria-selected": undefined, onclick: () => of.chosen(row[0]) },
+          ...row.map((value, i) => h("td", { class: typeof value === "number" ? "number" : "" },
+            i === 0 ? h("a", { href: `#/study/${of.study}/point/${value}` }, count(value))
+              : typeof value === "number" ? shown(value) : value ?? "–")));
+        return made;
+      })));
+      mark();
+      back.disabled = page === 0;
+      next.disabled = !has_more || first + 2 * kPage > kDeepest;
+      const range = some.length > 0 ? `${count(first + 1)} to ${count(first + some.length)}` : "None";
+      const tail = has_more && first + 2 * kPage > kDeepest ? " Further rows are in the CSV or asked for by a narrower filter." : "";
+      said.className = "weak";
+      const say = () => {
+        const of_all = total === null ? "" : ` of ${count(total)} rows`;
+        const cut = total !== null && total > kMostInFile ? ` The CSV has the first ${count(kMostInFile)}; oblique query gives all.` : "";
+        said.textContent = `${range}${of_all}.${tail}${cut}`;
+      };
+      say();
+      await count_rows(mine.signal);
+      say();
+    } catch (error) {
+      if (mine.signal.aborted) return;
+      filter.setAttribute("aria-invalid", "true");
+      said.className = "bad";
+      said.textContent = String(/** @type {Error} */ (error).message);
+    }
+  }
+
+  function mark() {
+    for (const row of table.querySelectorAll("tr[data-point]")) {
+      row.classList.toggle("chosen", Number(/** @type {HTMLElement} */ (row).dataset.point) === chosen);
+    }
+  }
+
+  return { element, load,
+    /** Marks the row of a point. @param {number} point */
+    choose(point) {
+      chosen = point;
+      mark();
+    },
+    close: () => asked?.abort() };
+}
