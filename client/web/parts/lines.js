@@ -11,7 +11,7 @@ const kInks = ["line0", "line1", "line2", "line3", "line4", "line5", "line6", "l
 
 /**
  * @typedef {{label: string, values: ArrayLike<number | null>, colour?: number}} Series
- * @typedef {{from: number, to: number, ink: string}} Span
+ * @typedef {{from: number, to: number, ink: string, is_band?: boolean}} Span a band is a bar at the foot
  * @typedef {object} Lines
  * @property {string} title
  * @property {{name: string, unit: string, values: ArrayLike<number>, is_log?: boolean}} x
@@ -24,17 +24,31 @@ const kInks = ["line0", "line1", "line2", "line3", "line4", "line5", "line6", "l
  * @property {(i: number) => void} [moved] the cursor is over value `i`
  */
 
+/** A line as it is drawn. @param {number} look */
+function sample(look) {
+  const canvas = h("canvas", { width: 34, height: 10, class: "sample", "aria-hidden": "true" });
+  const context = canvas.getContext("2d");
+  context.strokeStyle = ink(kInks[look]);
+  context.lineWidth = 2.4;
+  context.setLineDash(kDashes[look]);
+  context.moveTo(0, 5);
+  context.lineTo(34, 5);
+  context.stroke();
+  return canvas;
+}
+
 /** @param {Lines} of */
 export function line_plot(of) {
   const said = h("p", { class: "reading", "aria-live": "polite" });
   const place = h("div", { class: "plot", tabIndex: 0, role: "application", "aria-roledescription": "plot",
     "aria-label": `${of.title}; arrow keys move the cursor` });
   const legend = h("ul", { class: "legend" }, ...(of.series.length > 1 ? of.series : []).map((one, i) => h("li", {},
-    h("span", { class: `dash ink-${kInks[(one.colour ?? i) % 8]}` }), one.label)));
+    sample((one.colour ?? i) % 8), one.label)));
   const element = h("figure", { class: "lines" }, h("figcaption", {}, of.title), legend, place, said);
   /** @type {any} */
   let plot = null;
   let at = -1;
+  let quiet = false;
 
   const read = (/** @type {number} */ i) => {
     const x = of.x.values[i];
@@ -60,19 +74,20 @@ export function line_plot(of) {
             const to = Math.min(u.valToPos(span.to, "x", true), u.bbox.left + u.bbox.width);
             if (to <= from) continue;
             u.ctx.fillStyle = ink(span.ink);
-            u.ctx.fillRect(from, u.bbox.top, to - from, u.bbox.height);
+            const high = span.is_band ? 10 * (window.devicePixelRatio || 1) : u.bbox.height;
+            u.ctx.fillRect(from, u.bbox.top + u.bbox.height - high, to - from, high);
           }
         }],
         setCursor: [(/** @type {any} */ u) => {
           const i = u.cursor.idx;
           if (i === null || i === undefined || i === at) return;
           at = i;
+          if (quiet) return;
           read(i);
-          if (!quiet) of.moved?.(i);
+          of.moved?.(i);
         }],
       } };
   };
-  let quiet = false;
   const move = (/** @type {number} */ i) => {
     if (!plot || of.x.values[i] === undefined) return;
     const y = of.series[0]?.values[i];
@@ -96,8 +111,8 @@ export function line_plot(of) {
   return { element,
     /** Puts the cursor at value `i` without telling. @param {number} i */
     point_at(i) {
+      if (i === at) return;
       quiet = true;
-      at = -1;
       move(i);
       quiet = false;
     },

@@ -1,0 +1,105 @@
+// @ts-check
+// A point: its numbers, its contact over time, and the finger moving.
+import { copied, h, save } from "/parts/dom.js";
+import { count, quoted, shown, with_unit } from "/parts/format.js";
+import { line_plot } from "/parts/lines.js";
+import { json } from "/server.js";
+import { finger } from "./finger.js";
+import { loop_plot } from "./loop.js";
+import { point_numbers } from "./numbers.js";
+import { player } from "./player.js";
+import { trace_of } from "./trace.js";
+
+/**
+ * @param {HTMLElement} root @param {import("/main.js").Place} place @param {number} study @param {number} point
+ * @returns {Promise<import("/main.js").View>}
+ */
+export async function point_view(root, place, study, point) {
+  const [told, whole] = await Promise.all([json(`/api/studies/${study}/points/${point}`), json(`/api/studies/${study}`)]);
+  place.trail([h("a", { href: `#/study/${study}?cell=${point}` }, told.name), `point ${count(point)}`]);
+  const stop = new AbortController();
+  const said = h("p", { role: "status", class: "said" }, "A worker solves this point again.");
+  const pictures = h("section", { "aria-label": "The contact over time" }, said);
+  const neighbours = h("div", { class: "row" },
+    point > 0 && h("a", { class: "button", href: `#/study/${study}/point/${point - 1}` }, "Previous point"),
+    point + 1 < whole.numbers && h("a", { class: "button", href: `#/study/${study}/point/${point + 1}` }, "Next point"));
+  const row = told.row;
+  const facts = [["H", `${shown(told.H)} m`], ["mu", shown(told.mu)], ["e", shown(told.e)],
+    ...(row && row.status === "solved" ? [["F_n peak", with_unit(row.fn_peak_N, "N")], ["F_t peak", with_unit(row.ft_peak_N, "N")],
+      ["contact", `${shown(row.duration_s * 1e6, 4)} µs`], ["stick", `${shown(row.stick_total_s * 1e6, 4)} µs`], ["mode", row.mode]] : [])];
+  const standing = told.fault || (told.left_out ? "The study's filter leaves this point out." : "")
+    || (!row ? "This point is not solved yet." : row.error ? `It failed: ${row.error}` : "");
+  root.append(h("h2", { class: "name" }, `${told.name}, point ${count(point)}`), neighbours,
+    h("dl", { class: "figures" }, ...facts.map(([name, value]) => h("div", {}, h("dt", {}, name), h("dd", {}, value)))),
+    standing ? h("p", { class: row?.error ? "bad" : "weak" }, standing) : "", pictures,
+    ...(row ? [point_numbers(row, whole.columns)] : []),
+    h("section", {}, h("h2", {}, "Take it with you"),
+      h("p", {}, "Its time histories:"), copied("the command of the trace", `oblique trace ${quoted(told.name)} ${point} --out trace.csv`),
+      h("p", {}, "Its row:"), copied("the command of the row", `oblique query ${quoted(told.name)} --where 'point = ${point}'`)));
+  /** @type {{close: () => void}[]} */
+  const parts = [];
+  trace_of(study, point, stop.signal, (text) => { said.textContent = text; }).then((trace) => {
+    if (stop.signal.aborted) return;
+    parts.push(...show_trace(pictures, trace, `point-${study}-${point}.csv`));
+  }).catch((error) => {
+    if (stop.signal.aborted) return;
+    said.className = "said bad";
+    said.textContent = `No time histories: ${error.message}`;
+  });
+  return { close() {
+    stop.abort();
+    parts.forEach((part) => part.close());
+  } };
+}
+
+/** @param {import("./trace.js").Trace} trace @param {string} name */
+function save_trace(trace, name) {
+  const columns = trace.head.columns.filter((/** @type {any} */ c) => c.numbers === 1);
+  const values = columns.map((/** @type {any} */ c) => trace.column(c.name));
+  const lines = [[...columns.map((/** @type {any} */ c) => c.name), "state"].join(",")];
+  for (let i = 0; i < trace.rows; ++i) lines.push([...values.map((/** @type {Float64Array} */ v) => v[i]), trace.state(i)].join(","));
+  save(name, "text/csv", lines.join("\r\n") + "\r\n");
+}
+
+/** @param {HTMLElement} place @param {import("./trace.js").Trace} trace @param {string} file */
+function show_trace(place, trace, file) {
+  const times = trace.column("t_s");
+  const micro = times.map((t) => t * 1e6);
+  const spans = [...trace.phases, ...trace.sticks].map((one) => ({ from: one.from * 1e6, to: one.to * 1e6, ink: one.kind, is_band: one.kind === "stick" }));
+  const change = (/** @type {string} */ name) => {
+    const values = trace.column(name);
+    return values.map((v) => v - values[0]);
+  };
+  const t = { name: "t", unit: "µs", values: micro };
+  const moved = (/** @type {number} */ i) => watch.show(i);
+  const [kinetic, strain, gravity] = ["kinetic_J", "strain_J", "gravity_J"].map(change);
+  const plots = [
+    line_plot({ title: "Forces on the tip", x: t, y: { name: "force", unit: "N" }, spans, moved,
+      series: [{ label: "F_n", values: trace.column("fn_N") }, { label: "F_t", values: trace.column("ft_N") }] }),
+    line_plot({ title: "Velocities", x: t, y: { name: "velocity", unit: "m/s" }, spans, moved,
+      series: [{ label: "tip, normal", values: trace.column("vn_m_s") }, { label: "tip, along the ground", values: trace.column("vt_m_s") },
+        { label: "P", values: trace.column("vP_m_s"), colour: 3 }] }),
+    line_plot({ title: "Deformation of the contact", x: t, y: { name: "deformation", unit: "µm" }, spans, moved,
+      series: [{ label: "normal", values: trace.column("uy_m").map((v) => v * 1e6) }, { label: "tangential", values: trace.column("ux_m").map((v) => v * 1e6) }] }),
+    line_plot({ title: "Energies, less those at touch", x: t, y: { name: "energy", unit: "J" }, spans, moved,
+      series: [{ label: "kinetic", values: kinetic }, { label: "strain", values: strain }, { label: "gravity", values: gravity },
+        { label: "sum", values: kinetic.map((v, i) => v + strain[i] + gravity[i]), colour: 7 }] }),
+  ];
+  const loops = [
+    loop_plot("Normal force over deformation", { name: "pressed by", unit: "µm", values: trace.column("uy_m").map((v) => -v * 1e6) },
+      { name: "F_n", unit: "N", values: trace.column("fn_N") }, 0),
+    loop_plot("Tangential force over deformation", { name: "u_x", unit: "µm", values: trace.column("ux_m").map((v) => v * 1e6) },
+      { name: "F_t", unit: "N", values: trace.column("ft_N") }, 1),
+  ];
+  const body = finger(trace);
+  const all = [...plots, ...loops, body];
+  const watch = player(times, (row) => all.forEach((part) => part.point_at(row)));
+  const key = h("ul", { class: "legend" }, ...[["compression", "compression"], ["restitution", "restitution"], ["stick", "stick: the bar below"]]
+    .map(([ink, text]) => h("li", {}, h("span", { class: `shade ink-${ink}` }), text)));
+  place.replaceChildren(h("h2", {}, "The contact"), body.element, watch.element, key,
+    h("div", { class: "two" }, ...plots.map((plot) => plot.element), ...loops.map((loop) => loop.element)),
+    h("p", {}, h("button", { type: "button", onclick: () => save_trace(trace, file) }, "Time histories as CSV"), " ",
+      h("span", { class: "weak" }, `${count(trace.rows)} instants, solved again by ${trace.head.worker}, solver ${trace.head.solver_version}, ${trace.head.instruction_set}.`)));
+  watch.begin();
+  return [...all, watch];
+}

@@ -1,0 +1,82 @@
+// @ts-check
+// The time histories of a point, column by column.
+import { numbers } from "/server.js";
+
+const kAskAgain_ms = 300;
+
+/**
+ * @typedef {{from: number, to: number, kind: "stick" | "compression" | "restitution"}} Interval
+ * @typedef {object} Trace
+ * @property {any} head
+ * @property {number} rows
+ * @property {(name: string) => Float64Array} column
+ * @property {(row: number) => Float64Array} nodes x and y by turns, the pin first
+ * @property {(row: number) => string} state
+ * @property {Interval[]} phases
+ * @property {Interval[]} sticks
+ */
+
+/**
+ * Waits until a worker has solved it again.
+ * @param {number} study @param {number} point @param {AbortSignal} signal @param {(text: string) => void} say
+ * @returns {Promise<Trace>}
+ */
+export async function trace_of(study, point, signal, say) {
+  for (;;) {
+    const answer = await numbers(`/api/studies/${study}/points/${point}/trace?shape=1`, signal);
+    if (answer) return taken_apart(answer);
+    say("A worker is waited for, or solves this point again.");
+    await new Promise((go_on) => setTimeout(go_on, kAskAgain_ms));
+    if (signal.aborted) throw new Error("nobody waits any more");
+  }
+}
+
+/** @param {{head: any, bytes: ArrayBuffer, begin: number}} answer @returns {Trace} */
+function taken_apart({ head, bytes, begin }) {
+  const { rows, row_numbers } = head;
+  const all = new Float64Array(bytes, begin, rows * row_numbers);
+  const states = new Uint8Array(bytes, begin + 8 * rows * row_numbers, rows);
+  /** @type {Map<string, number>} */
+  const first = new Map();
+  let at = 0;
+  for (const column of head.columns) {
+    first.set(column.name, at);
+    at += column.numbers;
+  }
+  const column = (/** @type {string} */ name) => {
+    const place = first.get(name);
+    if (place === undefined) throw new Error(`the trace has no ${name}`);
+    return Float64Array.from({ length: rows }, (_, row) => all[row * row_numbers + place]);
+  };
+  const t = column("t_s");
+  /** Spans of rows that have one sign. @param {(code: number) => string} kind_of @returns {Interval[]} */
+  const spans = (kind_of) => {
+    const found = /** @type {Interval[]} */ ([]);
+    for (let row = 0; row + 1 < rows; ++row) {
+      const kind = /** @type {any} */ (kind_of(states[row]));
+      const last = found.at(-1);
+      if (last && last.kind === kind && last.to === t[row]) last.to = t[row + 1];
+      else if (kind) found.push({ from: t[row], to: t[row + 1], kind });
+    }
+    return found;
+  };
+  const nodes_at = first.get("node{}x_m node{}y_m") ?? 0;
+  return { head, rows, column,
+    nodes: (row) => all.subarray(row * row_numbers + nodes_at, row * row_numbers + nodes_at + 2 * head.nodes),
+    state: (row) => head.states[states[row]],
+    // The codes' bits: 1 is restitution, 2 is slip.
+    phases: spans((code) => (code & 1 ? "restitution" : "compression")),
+    sticks: spans((code) => (code & 2 ? "" : "stick")) };
+}
+
+/** The row whose time is the last at or before `t`. @param {Float64Array} times @param {number} t */
+export function row_at(times, t) {
+  let low = 0;
+  let high = times.length - 1;
+  while (low < high) {
+    const middle = (low + high + 1) >> 1;
+    if (times[middle] <= t) low = middle;
+    else high = middle - 1;
+  }
+  return low;
+}
