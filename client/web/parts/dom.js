@@ -62,21 +62,10 @@ export function copied(name, text) {
 
 /** Saves a text as a file of this machine. @param {string} name @param {string} type @param {string} text */
 export function save(name, type, text) {
-  const link = h("a", { href: `data:${type};charset=utf-8,${encodeURIComponent(text)}`, download: name });
+  const address = URL.createObjectURL(new Blob([text], { type: `${type};charset=utf-8` }));
+  const link = h("a", { href: address, download: name });
   document.body.append(link);
   link.click();
   link.remove();
-}
-
-/** Calls in the next frame, once however often it is asked for. @param {() => void} work */
-export function once_a_frame(work) {
-  let waits = false;
-  return () => {
-    if (waits) return;
-    waits = true;
-    requestAnimationFrame(() => {
-      waits = false;
-      work();
-    });
-  };
+  setTimeout(() => URL.revokeObjectURL(address), 10_000);
 }

@@ -44,14 +44,14 @@ export async function slice(study, asked, signal, unit_of) {
   const { head, bytes, begin } = answer;
   const { nx, ny } = head;
   const ys_at = begin + 8 * nx;
-  const cells_at = ys_at + 8 * ny;
+  const cells_at = ys_at + (head.y ? 8 * ny : 0);  // a line has no values upwards
   const is_category = head.z.kind === "categories";
   const values = is_category ? new Uint16Array(bytes, cells_at, nx * ny) : new Float32Array(bytes, cells_at, nx * ny);
   const bits = is_category ? null : new Uint32Array(bytes, cells_at, nx * ny);
   const side = (/** @type {any} */ told, /** @type {Float64Array} */ all) => ({ name: told?.key ?? "", unit: told ? unit_of(told.key) : "",
     values: all, numbers: told ? numbers_of(told, all.length) : [0], is_whole: told?.all_lines ?? true });
   const x = side(head.x, new Float64Array(bytes, begin, nx));
-  const y = side(head.y, new Float64Array(bytes, ys_at, ny));
+  const y = side(head.y, head.y ? new Float64Array(bytes, ys_at, ny) : new Float64Array(1));
   const x_stride = head.x.stride;
   const y_stride = head.y?.stride ?? 0;
   return {

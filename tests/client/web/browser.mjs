@@ -1,0 +1,109 @@
+// A server with a small database, and a browser that writes down all it objects to.
+import { spawn, spawnSync } from "node:child_process";
+import { mkdtempSync, rmSync } from "node:fs";
+import { createRequire } from "node:module";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+
+const need = createRequire(join(process.env.OBLIQUE_NODE_MODULES, "x"));
+const puppeteer = need("puppeteer-core");
+const axe_source = need("axe-core").source;
+
+/** Makes studies, shows them as `oblique view` does, until `stop`. */
+export class Server {
+  constructor(oblique) {
+    this.oblique = oblique;
+    this.folder = mkdtempSync(join(tmpdir(), "oblique-page-"));
+    this.database = join(this.folder, "page.db");
+  }
+
+  run(...flags) {
+    const made = spawnSync(this.oblique, ["run", ...flags, "--db", this.database, "--workers", "1"], { encoding: "utf8" });
+    if (made.status !== 0) throw new Error(made.stderr);
+  }
+
+  async start() {
+    this.process = spawn(this.oblique, ["view", this.database, "--port", "0"], { stdio: ["ignore", "pipe", "pipe"] });
+    this.said = "";
+    this.process.stderr.on("data", (text) => { this.said += text; });
+    this.address = await new Promise((take, fail) => {
+      this.process.stdout.once("data", (text) => take(String(text).trim().split("\n")[0]));
+      this.process.once("exit", () => fail(new Error(`oblique view ended: ${this.said}`)));
+    });
+    this.origin = new URL(this.address).origin;
+  }
+
+  async stop() {
+    if (this.process && this.process.exitCode === null) {
+      const ended = new Promise((take) => { this.process.once("exit", take); });
+      this.process.kill("SIGINT");
+      await ended;
+    }
+    rmSync(this.folder, { recursive: true, force: true });
+  }
+}
+
+/** A browser in which every objection is an entry of `objections`. */
+export class Browser {
+  async start(server) {
+    this.server = server;
+    this.objections = [];
+    this.browser = await puppeteer.launch({ executablePath: process.env.OBLIQUE_CHROMIUM,
+      args: ["--disable-gpu", "--disable-dev-shm-usage", ...(process.getuid() === 0 ? ["--no-sandbox"] : [])] });
+    const first = await this.browser.newPage();
+    await first.goto(server.address);  // the token becomes a cookie
+    await first.close();
+  }
+
+  /** A tab at a view. */
+  async open(view, { width = 1280, scheme = "light", motion = "no-preference" } = {}) {
+    const page = await this.browser.newPage();
+    await page.setViewport({ width, height: 900 });
+    await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: scheme }, { name: "prefers-reduced-motion", value: motion }]);
+    page.on("console", (line) => {
+      if (["error", "warn"].includes(line.type())) this.objections.push(`${view}: console: ${line.text()}`);
+    });
+    page.on("pageerror", (error) => this.objections.push(`${view}: ${error.message}`));
+    page.on("request", (request) => {
+      const url = request.url();
+      if (!url.startsWith(this.server.origin) && !/^(data|blob):/.test(url)) this.objections.push(`${view}: asks ${url}`);
+    });
+    await page.exposeFunction("objected", (text) => this.objections.push(`${view}: ${text}`));
+    await page.evaluateOnNewDocument(() => {
+      document.addEventListener("securitypolicyviolation", (event) => window.objected(`policy: ${event.violatedDirective} ${event.blockedURI}`));
+      const Real = window.EventSource;
+      window.open_streams = 0;
+      window.EventSource = class extends Real {
+        constructor(url) {
+          super(url);
+          ++window.open_streams;
+        }
+        close() {
+          --window.open_streams;
+          super.close();
+        }
+      };
+    });
+    await page.goto(`${this.server.origin}/${view}`);
+    return page;
+  }
+
+  /** What axe-core finds wrong with what a tab shows. */
+  async faults(page) {
+    await page.evaluate(axe_source);
+    return page.evaluate(async () => (await window.axe.run(document)).violations.map((one) =>
+      `${one.id}: ${one.nodes.slice(0, 3).map((node) => node.html.slice(0, 120)).join(" | ")}`));
+  }
+
+  stop() {
+    return this.browser?.close();
+  }
+}
+
+/** Waits until `look` in the tab gives something, and gives that. */
+export async function until(page, look, ...given) {
+  const found = await page.waitForFunction(look, { timeout: 20_000, polling: 50 }, ...given);
+  return found.jsonValue();
+}
+
+export const text_of = (page, selector) => page.$eval(selector, (one) => one.textContent);
