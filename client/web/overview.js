@@ -6,6 +6,9 @@ import { change, json } from "/server.js";
 
 const kStudiesAtOnce = 200;
 
+/** What somebody looks at and nobody keeps: see server/web/page. */
+const is_look = (/** @type {any} */ study) => /^look-[0-9a-f]{16}$/.test(study.name);
+
 /** What may be asked of a study in a state. @type {Record<string, string[]>} */
 const kChanges = { running: ["pause", "cancel"], paused: ["resume", "cancel"], cancelled: ["resume"], done: [] };
 
@@ -108,7 +111,7 @@ export function overview(root, place) {
   function draw() {
     const wanted = filter.value.toLowerCase();
     const rank = (/** @type {any} */ s) => (s.state === "running" ? 0 : s.state === "paused" ? 1 : 2);
-    const lines = [...known.values()].filter((s) => s.name.toLowerCase().includes(wanted))
+    const lines = [...known.values()].filter((s) => !is_look(s) && s.name.toLowerCase().includes(wanted))
       .sort((a, b) => rank(a) - rank(b) || b.id - a.id);
     studies.element.hidden = lines.length === 0;
     no_studies.hidden = lines.length > 0;

@@ -42,3 +42,35 @@ export function usual_axes(block) {
   const others = keys.filter((key) => key !== x);
   return [x, others.includes("H") ? "H" : others[0] ?? ""];
 }
+
+/** Fills in what an address leaves open, and mends what does not fit the study. @param {URLSearchParams} fields @param {any} study */
+export function fill_in(fields, study) {
+  const is = (/** @type {string} */ name) => fields.get(name) ?? "";
+  const numbers = study.columns.filter((/** @type {any} */ c) => c.picture === "numbers");
+  const usual = usual_block(study.blocks);
+  if (!is("pic")) fields.set("pic", usual >= 0 ? (varying(study.blocks[usual]).length > 1 ? "map" : "lines") : "gathered");
+  if (is("pic") === "map" || is("pic") === "lines") {
+    const wanted = Number(is("block") || usual);
+    const block = study.blocks[wanted];
+    if (block && varying(block).length > 0) {
+      fields.set("block", String(wanted));
+      const keys = varying(block).map((a) => a.key);
+      const [x, y] = usual_axes(block);
+      if (!keys.includes(is("x"))) fields.set("x", x);
+      if (is("y") && !keys.includes(is("y"))) fields.delete("y");
+      if (is("y") === is("x")) fields.delete("y");
+      if (!is("y") && is("pic") === "map") {
+        const other = [y, ...keys].find((key) => key && key !== is("x"));
+        if (other) fields.set("y", other);
+        else fields.set("pic", "lines");
+      }
+    }
+  } else {
+    const has = (/** @type {string} */ name) => numbers.some((/** @type {any} */ c) => c.name === name);
+    if (!has(is("x"))) fields.set("x", is("pic") === "histogram" ? "fn_peak_N" : "mu");
+    if (is("pic") === "gathered" && !has(is("y"))) fields.set("y", "H");
+  }
+  const is_there = study.columns.some((/** @type {any} */ c) => c.name === is("z") && c.picture !== "none");
+  if (!is_there && !(is("pic") === "gathered" && fields.has("z"))) fields.set("z", "fn_peak_N");
+  if (is("pic") !== "map" && study.columns.find((/** @type {any} */ c) => c.name === is("z"))?.picture === "categories") fields.set("z", "fn_peak_N");
+}

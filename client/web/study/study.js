@@ -1,19 +1,22 @@
 // @ts-check
 // A study: a picture of any output over any axes, what it means, and the rows beside it.
-import { copied, h, named, picker, save, tick } from "/parts/dom.js";
+import { copied, h, save } from "/parts/dom.js";
 import { palette } from "/parts/colours.js";
-import { count, heading, shown } from "/parts/format.js";
+import { count } from "/parts/format.js";
 import { json } from "/server.js";
 import { progress_of, study_buttons } from "/overview.js";
-import { axis_value, own_axes, usual_axes, usual_block, varying } from "./axes.js";
+import { fill_in, own_axes, varying } from "./axes.js";
 import { plot_command, query_command } from "./command.js";
-import { categories, colour_bar, colour_controls, gaps } from "./legend.js";
+import { show_controls } from "./controls.js";
+import { categories, colour_bar, gaps } from "./legend.js";
+import { finer, keep } from "./look.js";
 import { MapCanvas } from "./map.js";
 import { bins, slice } from "./picture.js";
 import { row_table } from "./table.js";
+import { cells_csv, facts, sentence } from "./words.js";
 
 const kMostCells = 512; // a side of a picture
-const kBins = 64;
+const kMostBins = 96;
 const kMostLines = 8;
 const kLookAgain_ms = 1500;
 
@@ -27,7 +30,7 @@ export async function study_view(root, place, id) {
   return new StudyView(root, place, study).begin();
 }
 
-class StudyView {
+export class StudyView {
   /** @param {HTMLElement} root @param {import("/main.js").Place} place @param {any} study */
   constructor(root, place, study) {
     this.root = root;
@@ -44,9 +47,11 @@ class StudyView {
     this.picture = null;
     /** @type {any} */
     this.lines = null;
+    /** While what the study lacks is solved: its end, and the study that has it. @type {{stop: AbortController, id: number} | null} */
+    this.looking = null;
     this.loaded_ms = 0;
     this.settled = "";
-    this.#fill_in();
+    fill_in(this.fields, this.study);
   }
 
   is(/** @type {string} */ name) {
@@ -66,36 +71,6 @@ class StudyView {
   unit_of = (/** @type {string} */ key) => this.columns.find((c) => c.name === key)?.unit
     ?? this.study.blocks.flatMap((/** @type {any} */ b) => b.axes).find((/** @type {any} */ a) => a.key === key)?.unit ?? "";
 
-  /** What the address leaves open. */
-  #fill_in() {
-    const usual = usual_block(this.study.blocks);
-    if (!this.is("pic")) this.fields.set("pic", usual >= 0 ? (varying(this.study.blocks[usual]).length > 1 ? "map" : "lines") : "gathered");
-    if (this.is("pic") === "map" || this.is("pic") === "lines") {
-      const wanted = Number(this.is("block") || usual);
-      const block = this.study.blocks[wanted];
-      if (block && varying(block).length > 0) {
-        this.fields.set("block", String(wanted));
-        const keys = varying(block).map((a) => a.key);
-        const [x, y] = usual_axes(block);
-        if (!keys.includes(this.is("x"))) this.fields.set("x", x);
-        if (this.is("y") && !keys.includes(this.is("y"))) this.fields.delete("y");
-        if (this.is("y") === this.is("x")) this.fields.delete("y");
-        if (!this.is("y") && this.is("pic") === "map") {
-          const other = [y, ...keys].find((key) => key && key !== this.is("x"));
-          if (other) this.fields.set("y", other);
-          else this.fields.set("pic", "lines");
-        }
-      }
-    } else {
-      const has = (/** @type {string} */ name) => this.numbers.some((c) => c.name === name);
-      if (!has(this.is("x"))) this.fields.set("x", this.is("pic") === "histogram" ? "fn_peak_N" : "mu");
-      if (this.is("pic") === "gathered" && !has(this.is("y"))) this.fields.set("y", "H");
-    }
-    const is_there = this.columns.some((c) => c.name === this.is("z") && c.picture !== "none");
-    if (!is_there && !(this.is("pic") === "gathered" && this.fields.has("z"))) this.fields.set("z", "fn_peak_N");
-    if (this.is("pic") !== "map" && this.columns.find((c) => c.name === this.is("z"))?.picture === "categories") this.fields.set("z", "fn_peak_N");
-  }
-
   begin() {
     this.said = h("p", { role: "status", class: "said" });
     this.spoken = h("p", { class: "reading", "aria-live": "polite" }, "Point at a cell, or move with the arrow keys.");
@@ -107,6 +82,7 @@ class StudyView {
     this.commands = h("div", { class: "commands" });
     this.facts = h("p", { class: "weak facts" });
     this.choice = h("p", { class: "choice" });
+    this.solving = h("div", { class: "row" });
     this.lines_place = h("div", {});
     this.map = new MapCanvas({
       hover: (cell) => this.#speak(cell ?? this.map.chosen),
@@ -121,16 +97,17 @@ class StudyView {
     this.root.append(h("h2", { class: "name" }, this.study.name), this.standing, this.said,
       h("div", { class: "beside" },
         h("section", { class: "picture", "aria-label": "Picture" }, this.controls, this.sliders, this.map.element, this.lines_place,
-          this.spoken, this.choice, this.legend, this.colour_row, this.facts),
+          this.spoken, this.choice, this.solving, this.legend, this.colour_row, this.facts),
         this.table.element),
       h("section", {}, h("h2", {}, "Take it with you"), this.commands));
-    this.#controls();
+    show_controls(this);
     this.load();
     this.table.load();
     return this;
   }
 
   close() {
+    this.looking?.stop.abort();
     this.asked?.abort();
     this.table.close();
     this.map.close();
@@ -150,7 +127,7 @@ class StudyView {
       }, () => {});
     }
     const settled = told ? `${told.solved + told.failed}` : "";
-    if (settled !== this.settled) {
+    if (settled !== this.settled && !this.looking) {
       this.settled = settled;
       const wait = Math.max(kLookAgain_ms - (performance.now() - this.loaded_ms), 0);
       clearTimeout(this.later);
@@ -181,61 +158,8 @@ class StudyView {
     return [...keys];
   }
 
-  #controls() {
-    const kind = this.is("pic");
-    const again = (/** @type {Record<string, string>} */ changes) => {
-      this.set({ ...changes, x0: "", x1: "", y0: "", y1: "" });
-      this.#fill_in();
-      this.place.keep(this.fields);
-      this.map.choose(null);
-      this.choice.replaceChildren();
-      this.#controls();
-      this.load();
-      this.table.load();
-    };
-    const kinds = [...(this.grids.some((/** @type {any} */ g) => varying(g.b).length > 1) ? [["map", "map"]] : []),
-      ...(this.grids.length > 0 ? [["lines", "lines"]] : []), ["gathered", "gathered points"], ["histogram", "histogram"]];
-    const on_grid = kind === "map" || kind === "lines";
-    const axes = on_grid ? varying(this.block).map((a) => [a.key, heading(a.key, a.unit)])
-      : this.numbers.map((c) => [c.name, heading(c.name, c.unit)]);
-    const outputs = this.columns.filter((c) => c.picture === "numbers" || (kind === "map" && c.picture === "categories"))
-      .map((c) => [c.name, heading(c.name, c.unit)]);
-    const parts = [named("picture", picker(kinds, kind, (pic) => again({ pic, y: "", from: "", to: "" })))];
-    if (kind !== "histogram") {
-      parts.push(named(kind === "gathered" ? "colour" : "output", picker(kind === "gathered" ? [["", "number of points"], ...outputs] : outputs, this.is("z"), (z) => {
-        if (z === "") this.fields.set("z", "");
-        again({ ...(z === "" ? {} : { z }), from: "", to: "" });
-      })));
-    }
-    if (on_grid && this.grids.length > 1) {
-      parts.push(named("block", picker(this.grids.map((/** @type {any} */ g) => [String(g.i), `${g.i + 1}: ${varying(g.b).map((a) => `${a.values} ${a.key}`).join(" × ")}`]),
-        this.is("block"), (block) => again({ block, at: "" }))));
-    }
-    parts.push(named(kind === "histogram" ? "of" : "across", picker(axes, this.is("x"), (x) => again({ x, ...(x === this.is("y") ? { y: on_grid ? this.is("x") : "" } : {}) }))));
-    if (kind !== "histogram" && axes.length > 1) {
-      parts.push(named(kind === "lines" ? "a line for each" : "upwards", picker(kind === "lines" ? [["", "none"], ...axes.filter(([k]) => k !== this.is("x"))] : axes,
-        this.is("y"), (y) => again({ y, ...(y === this.is("x") ? { x: this.is("y") } : {}) }))));
-    }
-    const redraw = (/** @type {Record<string, string>} */ changes) => {
-      this.set(changes);
-      if (kind === "map") this.#show();
-      else this.load();
-    };
-    parts.push(h("div", { class: "ticks" }, tick(`log ${this.is("x")}`, this.is("xlog") !== "", (is) => redraw({ xlog: is ? "1" : "" })),
-      kind === "histogram" ? null : tick(kind === "lines" ? "log output" : `log ${this.is("y")}`, this.is("ylog") !== "", (is) => redraw({ ylog: is ? "1" : "" }))));
-    this.controls.replaceChildren(...parts);
-    this.#sliders(on_grid);
-    const has_bar = (kind === "map" || kind === "gathered") && this.columns.find((c) => c.name === this.is("z"))?.picture !== "categories";
-    this.colour_row.replaceChildren(...(has_bar ? [colour_controls({ from: this.is("from"), to: this.is("to"), is_log: this.is("zlog") !== "", palette: this.is("pal") || "viridis" },
-      (changed) => {
-        this.set(/** @type {any} */ (changed));
-        if ("from" in changed && "to" in changed) this.#controls();
-        this.#show();
-      })] : []));
-  }
-
   /** Numbers of the values at which the other axes are held. @returns {Map<string, number>} */
-  #at() {
+  places() {
     const places = new Map();
     for (const one of this.is("at").split(",").filter((text) => text.includes("@"))) {
       const [key, number] = one.split("@");
@@ -244,47 +168,26 @@ class StudyView {
     return places;
   }
 
-  #sliders(/** @type {boolean} */ on_grid) {
-    const others = on_grid ? varying(this.block).filter((a) => a.key !== this.is("x") && a.key !== this.is("y")) : [];
-    const places = this.#at();
-    this.sliders.replaceChildren(...others.map((axis) => {
-      const number = Math.min(places.get(axis.key) ?? 0, axis.values - 1);
-      const out = h("output", { "data-axis": axis.key }, this.#held(axis, number));
-      const slider = h("input", { type: "range", min: 0, max: axis.values - 1, step: 1, value: number, "aria-label": `${axis.key}, held at`,
-        "aria-valuetext": this.#held(axis, number), oninput: () => {
-          const now = this.#at();
-          now.set(axis.key, Number(slider.value));
-          out.textContent = this.#held(axis, Number(slider.value));
-          slider.setAttribute("aria-valuetext", out.textContent);
-          this.set({ at: [...now].map(([key, n]) => `${key}@${n}`).join(",") });
-          this.load();
-        } });
-      return h("div", { class: "slider" }, h("span", {}, axis.key), slider, out);
-    }));
-  }
-
-  /** @param {any} axis @param {number} number */
-  #held(axis, number) {
-    const value = axis_value(axis, number);
-    return value === undefined ? `value ${number + 1} of ${count(axis.values)}` : `${shown(value)} ${axis.unit === "1" ? "" : axis.unit}`;
-  }
-
   /** What the server is asked for. */
   #question() {
     const kind = this.is("pic");
     const zoom = Object.fromEntries(["x0", "x1", "y0", "y1"].filter((name) => this.is(name)).map((name) => [name, this.is(name)]));
     if (kind === "map" || kind === "lines") {
       const keys = own_axes(this.block).map((a) => a.key);
-      const at = [...this.#at()].filter(([key]) => keys.includes(key) && key !== this.is("x") && key !== this.is("y")).map(([key, n]) => `${key}@${n}`).join(",");
+      const at = [...this.places()].filter(([key]) => keys.includes(key) && key !== this.is("x") && key !== this.is("y")).map(([key, n]) => `${key}@${n}`).join(",");
       return { z: this.is("z"), x: this.is("x"), ...(this.is("y") ? { y: this.is("y") } : {}), ...(at ? { at } : {}), block: this.is("block"),
         nx: kMostCells, ny: kind === "lines" ? kMostLines : kMostCells, ...zoom };
     }
-    return { x: this.is("x"), nx: kBins, ...(this.is("xlog") ? { xlog: 1 } : {}), ...zoom,
-      ...(kind === "gathered" ? { y: this.is("y"), ny: kBins, ...(this.is("ylog") ? { ylog: 1 } : {}), ...(this.is("z") ? { z: this.is("z") } : {}) } : {}) };
+    // A few points a bin.
+    const bins_a_side = Math.round(Math.min(Math.max(Math.sqrt(this.study.points / 3), 6), kMostBins));
+    return { x: this.is("x"), nx: kind === "histogram" ? Math.min(bins_a_side * 2, 64) : bins_a_side, ...(this.is("xlog") ? { xlog: 1 } : {}), ...zoom,
+      ...(kind === "gathered" ? { y: this.is("y"), ny: bins_a_side, ...(this.is("ylog") ? { ylog: 1 } : {}), ...(this.is("z") ? { z: this.is("z") } : {}) } : {}) };
   }
 
   /** Asks for the picture; what is asked for meanwhile comes after it, and only the last of that. */
   async load() {
+    this.looking?.stop.abort();
+    this.looking = null;
     if (this.asked) {
       this.wants_more = true;
       return;
@@ -296,15 +199,13 @@ class StudyView {
       const begun = performance.now();
       const ask = kind === "map" || kind === "lines" ? slice : bins;
       this.picture = await ask(this.study.id, /** @type {any} */ (this.#question()), signal, this.unit_of);
-      if (signal.aborted) return;
+      if (signal.aborted || this.looking) return;
       this.loaded_ms = performance.now();
-      if (kind === this.is("pic")) this.#show();
+      if (kind === this.is("pic")) this.show();
       this.root.dataset.pictureMs = String(Math.round(performance.now() - begun));
       this.said.textContent = "";
     } catch (error) {
-      if (signal.aborted) return;
-      this.said.textContent = String(/** @type {Error} */ (error).message);
-      this.said.className = "said bad";
+      if (!signal.aborted) this.#complain(error);
     } finally {
       this.asked = null;
     }
@@ -314,7 +215,7 @@ class StudyView {
     }
   }
 
-  #show() {
+  show() {
     const picture = this.picture;
     if (!picture) return;
     const kind = this.is("pic");
@@ -331,10 +232,79 @@ class StudyView {
       this.legend.append(picture.z.is_category ? categories(picture) : colour_bar(picture, look), gaps(picture));
       if (!this.map.chosen && this.is("cell")) this.#choose_point(Number(this.is("cell")));
     } else {
-      this.#draw_lines(picture);
+      import("./drawn_lines.js").then(({ drawn_lines }) => {
+        if (picture !== this.picture) return;
+        this.lines?.close();
+        this.lines = drawn_lines(picture, { as_bars: kind === "histogram", x_log: this.is("xlog") !== "", y_log: this.is("ylog") !== "" });
+        this.lines_place.replaceChildren(this.lines.element);
+      });
     }
     this.#tell_facts(picture);
     this.#tell_commands();
+    this.#offer_solving();
+  }
+
+  #offer_solving() {
+    const may = this.place.may_change && this.is("pic") === "map";
+    this.solving.replaceChildren();
+    if (!may) return;
+    if (!this.looking) {
+      this.solving.append(h("button", { type: "button", class: "finer", onclick: () => this.#solve() }, "Solve what lies between"));
+      return;
+    }
+    const { id } = this.looking;
+    const name = h("input", { type: "text", placeholder: "name", "aria-label": "Name under which it is kept", size: 12 });
+    this.solving.append(h("button", { type: "button", onclick: () => this.load() }, "Back to the study"), ...(id ? [name,
+      h("button", { type: "button", onclick: async () => {
+        try {
+          const kept = await keep(id, name.value.trim());
+          this.said.replaceChildren("Kept as ", h("a", { href: `#/study/${kept.id}` }, kept.name));
+          this.said.className = "said";
+        } catch (error) {
+          this.#complain(error);
+        }
+      } }, "Keep it as a study")] : []));
+  }
+
+  #complain(/** @type {any} */ error) {
+    this.said.textContent = String(error.message);
+    this.said.className = "said bad";
+  }
+
+  /** Solves the picture finer than the study has it, or a part of it. @param {[number, number]} [from] @param {[number, number]} [to] */
+  async #solve(from, to) {
+    const picture = this.picture;
+    if (!picture) return;
+    this.looking?.stop.abort();
+    this.asked?.abort();
+    const looking = this.looking = { stop: new AbortController(), id: 0 };
+    const ends = (/** @type {import("./picture.js").Side} */ side, /** @type {number} */ i, /** @type {string} */ log) => {
+      const values = from && to ? [side.values[from[i]], side.values[to[i]]] : [...side.values];
+      return { from: Math.min(...values), to: Math.max(...values), is_log: this.is(log) !== "" && Math.min(...values) > 0 };
+    };
+    const ranges = { [picture.x.name]: ends(picture.x, 0, "xlog"), [picture.y.name]: ends(picture.y, 1, "ylog") };
+    const held = Object.fromEntries(picture.head.at.map((/** @type {any} */ one) => [one.key, one.value]));
+    this.map.choose(null);
+    this.choice.replaceChildren();
+    try {
+      const near = this.near ?? picture.head.first_point;
+      this.near = near;
+      for await (const step of finer({ study: this.study.id, block: this.block, near, z: this.is("z"), ranges, held }, looking.stop.signal, this.unit_of)) {
+        if (looking.stop.signal.aborted) return;
+        looking.id = step.id;
+        this.picture = step.picture;
+        this.root.dataset.side = String(step.is_whole ? step.side : 0);
+        if (!this.solving.contains(document.activeElement) || !step.is_whole) this.show();
+        else this.map.show(step.picture, this.#look(step.picture));
+      }
+    } catch (error) {
+      if (!looking.stop.signal.aborted) this.#complain(error);
+    }
+  }
+
+  /** The study that has the points of the picture. */
+  get shown_study() {
+    return this.looking?.id || this.study.id;
   }
 
   /** @param {import("./picture.js").Picture} picture @returns {import("./map.js").Look} */
@@ -346,40 +316,9 @@ class StudyView {
       x_log: this.is("xlog") !== "", y_log: this.is("ylog") !== "" };
   }
 
-  /** @param {import("./picture.js").Picture} picture */
-  async #draw_lines(picture) {
-    const { line_plot } = await import("/parts/lines.js");
-    if (picture !== this.picture) return;
-    const order = Array.from(picture.x.values.keys()).sort((a, b) => picture.x.values[a] - picture.x.values[b]);
-    const nx = picture.x.values.length;
-    const as_bars = this.is("pic") === "histogram";
-    const series = Array.from(picture.y.values.keys()).map((row) => ({
-      label: picture.y.name ? `${picture.y.name} = ${shown(picture.y.values[row])}` : picture.z.name,
-      values: order.map((i) => {
-        const value = as_bars ? picture.head.counts[i] : picture.values[row * nx + i];
-        return Number.isFinite(value) && !(this.is("ylog") && value <= 0) ? value : null;
-      }) }));
-    const xs = order.map((i) => picture.x.values[i]);
-    this.lines?.close();
-    this.lines = line_plot({ title: as_bars ? `How often values of ${picture.x.name} are met` : `${picture.z.name} over ${picture.x.name}`,
-      x: { name: picture.x.name, unit: picture.x.unit, values: xs, is_log: this.is("xlog") !== "" && xs[0] > 0 },
-      y: { name: as_bars ? "points" : picture.z.name, unit: as_bars ? "" : picture.z.unit, is_log: this.is("ylog") !== "" && !as_bars }, series, as_bars, height: 380 });
-    this.lines_place.replaceChildren(this.lines.element);
-  }
-
   /** What is shown of how much. @param {import("./picture.js").Picture} picture */
   #tell_facts(picture) {
-    const parts = [];
-    if (picture.head.nx !== undefined) {
-      const whole = (/** @type {any} */ side, /** @type {any} */ told) => told && !side.is_whole;
-      parts.push(`${count(picture.head.nx)}${picture.y.name ? ` × ${count(picture.head.ny)}` : ""} cells, ${count(picture.head.solved)} solved.`);
-      for (const [side, told] of [[picture.x, picture.head.x], [picture.y, picture.head.y]]) {
-        if (whole(side, told)) parts.push(`Of ${count(told.last - told.first + 1)} values of ${side.name}, ${count(side.values.length)} are shown, evenly chosen${this.is("pic") === "lines" ? "" : ": zoom in for the others"}.`);
-      }
-      for (const one of picture.head.at.filter((/** @type {any} */ a) => a.of > 1)) parts.push(`${one.key} = ${shown(one.value)}.`);
-    } else {
-      parts.push(`${count(picture.head.points)} points in ${count(picture.values.length)} bins${picture.head.outside > 0 ? `, ${count(picture.head.outside)} outside` : ""}.`);
-    }
+    const parts = facts(picture, this.is("pic"));
     if (this.is("x0") || this.is("y0")) {
       this.facts.replaceChildren(parts.join(" "), " ", h("button", { type: "button", onclick: () => this.#zoom(null) }, "Show all"));
     } else {
@@ -401,39 +340,13 @@ class StudyView {
       h("p", {}, "The picture, as SVG:"), copied("the command of the picture", plot_command(this.study.name, this.fields, at, inside)),
       h("p", {}, "The rows:"), copied("the command of the rows", query_command(this.study.name, this.#row_columns(), this.is("where"), this.is("order"))),
       h("p", { class: "weak" }, "Add --db FILE or --server ADDRESS where the database is not oblique.db. The address of this view is a link to it."),
-      h("div", { class: "row" }, h("button", { type: "button", onclick: () => this.#save_cells() }, "Picture's numbers as CSV"),
+      h("div", { class: "row" }, h("button", { type: "button", onclick: () => save("picture.csv", "text/csv", cells_csv(picture)) }, "Picture's numbers as CSV"),
         h("button", { type: "button", onclick: () => navigator.clipboard?.writeText(location.href) }, "Copy the link")));
-  }
-
-  #save_cells() {
-    const picture = /** @type {import("./picture.js").Picture} */ (this.picture);
-    const nx = picture.x.values.length;
-    const lines = [[picture.x.name, ...(picture.y.name ? [picture.y.name] : []), picture.z.name, "point"].join(",")];
-    for (let cell = 0; cell < picture.values.length; ++cell) {
-      const column = cell % nx;
-      const row = Math.floor(cell / nx);
-      const value = picture.why_empty(cell) ? "" : picture.z.is_category ? picture.dictionary[picture.values[cell]].text : picture.values[cell];
-      lines.push([picture.x.values[column], ...(picture.y.name ? [picture.y.values[row]] : []), value, picture.point(column, row) ?? ""].join(","));
-    }
-    save("picture.csv", "text/csv", lines.join("\r\n") + "\r\n");
-  }
-
-  /** What a cell shows, in words. @param {[number, number]} cell */
-  #sentence([column, row]) {
-    const picture = /** @type {import("./picture.js").Picture} */ (this.picture);
-    const cell = row * picture.x.values.length + column;
-    const why = picture.why_empty(cell);
-    const text = why ? { missing: "not solved", failed: "failed", left_out: picture.head.counts ? "no points" : "left out", none: "no value" }[why]
-      : picture.z.is_category ? picture.dictionary[picture.values[cell]].text
-        : `${shown(picture.values[cell])} ${picture.z.unit}`;
-    const side = (/** @type {any} */ s, /** @type {number} */ i) => `${s.name} ${shown(s.values[i])}${s.unit && s.unit !== "1" ? ` ${s.unit}` : ""}`;
-    const many = picture.head.counts ? `, ${count(picture.head.counts[cell])} points` : "";
-    return `${side(picture.x, column)}, ${side(picture.y, row)}: ${picture.z.name} ${text}${many}`;
   }
 
   /** @param {[number, number] | null} cell */
   #speak(cell) {
-    this.spoken.textContent = cell && this.picture ? this.#sentence(cell) : "Point at a cell, or move with the arrow keys.";
+    this.spoken.textContent = cell && this.picture ? sentence(this.picture, cell) : "Point at a cell, or move with the arrow keys.";
   }
 
   /** @param {[number, number]} cell */
@@ -442,8 +355,9 @@ class StudyView {
     const point = this.picture?.point(...cell) ?? null;
     this.choice.replaceChildren();
     if (point === null) return;
-    this.choice.append(h("a", { class: "button", href: `#/study/${this.study.id}/point/${point}` }, `Open point ${count(point)}`),
+    this.choice.append(h("a", { class: "button", href: `#/study/${this.shown_study}/point/${point}` }, `Open point ${count(point)}`),
       h("span", { class: "weak" }, " or press Enter, or click twice"));
+    if (this.looking) return;
     this.table.choose(point);
     this.set({ cell: String(point) });
   }
@@ -451,7 +365,7 @@ class StudyView {
   /** @param {[number, number]} cell */
   #open(cell) {
     const point = this.picture?.point(...cell) ?? null;
-    if (point !== null) location.hash = `#/study/${this.study.id}/point/${point}`;
+    if (point !== null) location.hash = `#/study/${this.shown_study}/point/${point}`;
   }
 
   /** Marks the cell of a point, where the picture shows it. @param {number} point */
@@ -478,6 +392,10 @@ class StudyView {
   #zoom(from, to) {
     const picture = this.picture;
     if (!picture) return;
+    if (this.looking && from && to) {
+      this.#solve(from, to);
+      return;
+    }
     if (!from || !to) {
       this.set({ x0: "", x1: "", y0: "", y1: "" });
     } else {

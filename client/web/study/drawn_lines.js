@@ -1,0 +1,23 @@
+// @ts-check
+// A picture as lines over an axis, or as bars.
+import { shown } from "/parts/format.js";
+import { line_plot } from "/parts/lines.js";
+
+/**
+ * @param {import("./picture.js").Picture} picture
+ * @param {{as_bars: boolean, x_log: boolean, y_log: boolean}} how
+ */
+export function drawn_lines(picture, { as_bars, x_log, y_log }) {
+  const order = Array.from(picture.x.values.keys()).sort((a, b) => picture.x.values[a] - picture.x.values[b]);
+  const nx = picture.x.values.length;
+  const series = Array.from(picture.y.values.keys()).map((row) => ({
+    label: picture.y.name ? `${picture.y.name} = ${shown(picture.y.values[row])}` : picture.z.name,
+    values: order.map((i) => {
+      const value = as_bars ? picture.head.counts[i] : picture.values[row * nx + i];
+      return Number.isFinite(value) && !(y_log && value <= 0) ? value : null;
+    }) }));
+  const xs = order.map((i) => picture.x.values[i]);
+  return line_plot({ title: as_bars ? `How often values of ${picture.x.name} are met` : `${picture.z.name} over ${picture.x.name}`,
+    x: { name: picture.x.name, unit: picture.x.unit, values: xs, is_log: x_log && xs[0] > 0 },
+    y: { name: as_bars ? "points" : picture.z.name, unit: as_bars ? "" : picture.z.unit, is_log: y_log && !as_bars }, series, as_bars, height: 380 });
+}
