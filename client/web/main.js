@@ -11,6 +11,7 @@ import { overview } from "/overview.js";
  * @property {boolean} may_change
  * @property {() => any} now the last overview, or null
  * @property {(links: (string | Node)[]) => void} trail what stands beside the name
+ * @property {(path: string) => string} last how that view was left
  * @typedef {{close?: () => void, take?: (now: any) => void}} View
  */
 
@@ -24,6 +25,8 @@ let shown = {};
 let now = null;
 let turn = 0;
 let may_change = false;
+/** How views were left. @type {Map<string, string>} */
+const left = new Map();
 
 function links(/** @type {(string | Node)[]} */ parts) {
   trail.replaceChildren(...parts.flatMap((part) => [h("span", { "aria-hidden": "true" }, "/"), part]));
@@ -39,7 +42,12 @@ async function show() {
   const root = h("div", {});
   /** @type {Place} */
   const place = { fields: new URLSearchParams(query ?? ""), may_change, now: () => now, trail: links,
-    keep: (fields) => history.replaceState(null, "", `#${path}?${fields}`) };
+    last: (of) => left.get(of) ?? `#${of}`,
+    keep: (fields) => {
+      history.replaceState(null, "", `#${path}?${fields}`);
+      left.set(path, location.hash);
+    } };
+  left.set(path, location.hash);
   links([]);
   view.replaceChildren(root);
   try {

@@ -35,8 +35,20 @@ function live_table(caption, heads) {
   const body = h("tbody");
   const table = h("table", {}, h("caption", { class: "unseen" }, caption),
     h("thead", {}, h("tr", {}, ...heads.map((head) => h("th", { scope: "col", class: head.startsWith("#") ? "number" : "" }, head.replace("#", ""))))), body);
-  /** @type {Map<number, {told: string, row: HTMLElement}>} */
+  /** @type {Map<number, {told: string, row: HTMLTableRowElement}>} */
   const kept = new Map();
+  /** Changes the cells that say something else, so that a button stays under the finger that presses it. @param {HTMLTableRowElement} row @param {any[]} contents */
+  const update = (row, contents) => contents.forEach((content, i) => {
+    const made = h(i === 0 ? "th" : "td", { class: heads[i].startsWith("#") ? "number" : "", scope: i === 0 ? "row" : undefined }, content);
+    const old = row.cells[i];
+    if (!old) {
+      row.append(made);
+    } else if (old.outerHTML !== made.outerHTML) {
+      const had_focus = old.contains(document.activeElement);
+      old.replaceWith(made);
+      if (had_focus) made.querySelector("a, button")?.focus();
+    }
+  });
   return {
     element: h("div", { class: "scroll", tabIndex: 0, role: "region", "aria-label": caption }, table),
     /** @param {any[]} lines @param {(line: any) => any[]} cells */
@@ -45,14 +57,15 @@ function live_table(caption, heads) {
         const told = JSON.stringify(line);
         let known = kept.get(line.id);
         if (!known) kept.set(line.id, known = { told: "", row: h("tr") });
-        if (known.told !== told && !(known.told && known.row.querySelector("button:focus"))) {
-          known.told = told;
-          known.row.replaceChildren(...cells(line).map((content, i) => h(i === 0 ? "th" : "td",
-            { class: heads[i].startsWith("#") ? "number" : "", scope: i === 0 ? "row" : undefined }, content)));
-        }
+        if (known.told !== told) update(known.row, cells(line));
+        known.told = told;
         return known.row;
       });
-      if (rows.length !== body.rows.length || rows.some((row, i) => row !== body.rows[i])) body.replaceChildren(...rows);
+      if (rows.length !== body.rows.length || rows.some((row, i) => row !== body.rows[i])) {
+        const focused = /** @type {HTMLElement | null} */ (document.activeElement);
+        body.replaceChildren(...rows);
+        if (focused && body.contains(focused)) focused.focus();
+      }
       for (const id of kept.keys()) if (!lines.some((line) => line.id === id)) kept.delete(id);
     },
   };

@@ -16,7 +16,7 @@ import { trace_of } from "./trace.js";
  */
 export async function point_view(root, place, study, point) {
   const [told, whole] = await Promise.all([json(`/api/studies/${study}/points/${point}`), json(`/api/studies/${study}`)]);
-  place.trail([h("a", { href: `#/study/${study}?cell=${point}` }, told.name), `point ${count(point)}`]);
+  place.trail([h("a", { href: place.last(`/study/${study}`) }, told.name), `point ${count(point)}`]);
   const stop = new AbortController();
   const said = h("p", { role: "status", class: "said" }, "A worker solves this point again.");
   const pictures = h("section", { "aria-label": "The contact over time" }, said);

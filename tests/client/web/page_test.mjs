@@ -169,6 +169,19 @@ test("maps are zoomed by dragging and by keys, and lines, gathered points and hi
   await page.close();
 });
 
+test("what lies between the cells of a map is solved while one looks, and is kept as a study", async () => {
+  const page = await study();
+  await page.click(".finer");
+  await until(page, () => document.querySelector(".facts").textContent.includes("33 × 33 cells, 1\u202f089 solved"));
+  await until(page, () => document.querySelector(".facts").textContent.includes("129 × 129"));
+  await page.type('[aria-label^="Name under which"]', "kept");
+  await page.evaluate(() => [...document.querySelectorAll("button")].find((one) => one.textContent === "Keep it as a study").click());
+  await until(page, () => document.querySelector("p.said a")?.textContent === "kept");
+  await page.evaluate(() => [...document.querySelectorAll("button")].find((one) => one.textContent === "Back to the study").click());
+  await until(page, () => document.querySelector(".facts").textContent.includes("12 × 7"));
+  await page.close();
+});
+
 test("rows are filtered as with --where, a page at a time, and nothing is truncated unsaid", async () => {
   const page = await study();
   await until(page, () => document.querySelector(".rows p[role=status]").textContent === "1 to 25 of 252 rows.");
@@ -232,7 +245,7 @@ test("who wants little motion sees the finger move only when asked", async () =>
 });
 
 test("what is not there is said", async () => {
-  for (const [view, sentence] of [["#/study/999", /no study/], ["#/study/1/point/999999", /no point/]]) {
+  for (const [view, sentence] of [["#/study/999", /no such study/], ["#/study/1/point/999999", /no point/]]) {
     const page = await browser.open(view);
     await page.waitForSelector("[role=alert]");
     assert.match(await text_of(page, "[role=alert]"), sentence);
