@@ -11,7 +11,7 @@ import { colour_controls } from "./legend.js";
 export function show_controls(view) {
   const kind = view.is("pic");
   const again = (/** @type {Record<string, string>} */ changes) => {
-    view.set({ ...changes, x0: "", x1: "", y0: "", y1: "" });
+    view.set({ ...changes, x0: "", x1: "", y0: "", y1: "", cell: "" });
     fill_in(view.fields, view.study);
     view.place.keep(view.fields);
     view.map.choose(null);

@@ -199,9 +199,10 @@ export class StudyView {
       const begun = performance.now();
       const ask = kind === "map" || kind === "lines" ? slice : bins;
       this.picture = await ask(this.study.id, /** @type {any} */ (this.#question()), signal, this.unit_of);
+      this.picture_kind = kind;
       if (signal.aborted || this.looking) return;
       this.loaded_ms = performance.now();
-      if (kind === this.is("pic")) this.show();
+      this.show();
       this.root.dataset.pictureMs = String(Math.round(performance.now() - begun));
       this.said.textContent = "";
     } catch (error) {
@@ -215,10 +216,11 @@ export class StudyView {
     }
   }
 
-  show() {
+  /** @param {boolean} [is_naming] somebody writes into a field beside the picture */
+  show(is_naming = false) {
     const picture = this.picture;
-    if (!picture) return;
     const kind = this.is("pic");
+    if (!picture || kind !== this.picture_kind) return;
     const is_map = kind === "map" || kind === "gathered";
     this.map.element.hidden = !is_map;
     this.spoken.hidden = !is_map;
@@ -230,7 +232,9 @@ export class StudyView {
       const look = this.#look(picture);
       this.map.show(picture, look);
       this.legend.append(picture.z.is_category ? categories(picture) : colour_bar(picture, look), gaps(picture));
-      if (!this.map.chosen && this.is("cell")) this.#choose_point(Number(this.is("cell")));
+      const chosen = this.map.chosen;
+      if (chosen && chosen[0] < picture.x.values.length && chosen[1] < picture.y.values.length) this.#choose(chosen);
+      else if (this.is("cell") && !this.looking) this.#choose_point(Number(this.is("cell")));
     } else {
       import("./drawn_lines.js").then(({ drawn_lines }) => {
         if (picture !== this.picture) return;
@@ -241,7 +245,7 @@ export class StudyView {
     }
     this.#tell_facts(picture);
     this.#tell_commands();
-    this.#offer_solving();
+    if (!is_naming) this.#offer_solving();
   }
 
   #offer_solving() {
@@ -257,7 +261,7 @@ export class StudyView {
     this.solving.append(h("button", { type: "button", onclick: () => this.load() }, "Back to the study"), ...(id ? [name,
       h("button", { type: "button", onclick: async () => {
         try {
-          const kept = await keep(id, name.value.trim());
+          const kept = await keep(this.looking?.id ?? id, name.value.trim());
           this.said.replaceChildren("Kept as ", h("a", { href: `#/study/${kept.id}` }, kept.name));
           this.said.className = "said";
         } catch (error) {
@@ -294,8 +298,8 @@ export class StudyView {
         looking.id = step.id;
         this.picture = step.picture;
         this.root.dataset.side = String(step.is_whole ? step.side : 0);
-        if (!this.solving.contains(document.activeElement) || !step.is_whole) this.show();
-        else this.map.show(step.picture, this.#look(step.picture));
+        this.picture_kind = "map";
+        this.show(document.activeElement instanceof HTMLInputElement && this.solving.contains(document.activeElement));
       }
     } catch (error) {
       if (!looking.stop.signal.aborted) this.#complain(error);
