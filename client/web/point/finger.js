@@ -208,6 +208,7 @@ export function finger(trace) {
   return { element,
     /** @param {number} i */
     point_at(i) {
+      if (i === at) return;
       at = i;
       draw();
     },

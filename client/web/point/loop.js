@@ -87,6 +87,7 @@ export function loop_plot(title, x, y, colour) {
   return { element: h("figure", { class: "lines" }, h("figcaption", {}, title), place),
     /** @param {number} i */
     point_at(i) {
+      if (i === at) return;
       at = i;
       draw();
     },
