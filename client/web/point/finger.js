@@ -176,12 +176,13 @@ export function finger(trace) {
     c.fill();
     c.textAlign = "center";
     c.textBaseline = "top";
-    c.fillText("P", px(xP[at]), level + 12);
+    c.fillText("P", px(xP[at]), level + 20);
     const per_N = (kHeight * 0.3) / largest;
     arrow(c, [px(x[at]), py(y[at])], [0, -fn[at] * per_N], ink("line0"));
     arrow(c, [px(x[at]), py(y[at])], [ft[at] * per_N, 0], ink("line1"));
     c.textAlign = "left";
     c.textBaseline = "top";
+    c.fillStyle = ink("text");
     const what = { S: "stick", s: "slip", C: "compression", R: "restitution" };
     c.fillText([...trace.state(at)].map((one) => what[/** @type {keyof typeof what} */ (one)]).join(", "), 10, 10);
     c.fillStyle = ink("line0");
