@@ -1,7 +1,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <optional>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
@@ -18,10 +20,12 @@ using nlohmann::ordered_json;
 
 constexpr std::uint64_t kUsualBins = 64;
 
+/// Columns are looked at in parts, so that no second copy of them is held.
+constexpr std::size_t kPart = 65'536;
+
 /// The bins along one column.
 struct BinSide {
-  ColumnSource source;
-  std::vector<float> values;  ///< of all points
+  ColumnStore::Shared column;  ///< null: there is one bin
   std::uint64_t bins = 1;
   bool is_logarithmic = false;
   double least = 0.0;
@@ -29,28 +33,26 @@ struct BinSide {
 
   double place_of(double value) const { return is_logarithmic ? std::log(value) : value; }
   bool takes(double value) const {
-    return value >= least && value <= most && (!is_logarithmic || value > 0.0);
+    return !column || (value >= least && value <= most && (!is_logarithmic || value > 0.0));
   }
   /// Both ends are in.
   std::uint64_t bin_of(double value) const {
     const double from = place_of(least);
     const double width = place_of(most) - from;
-    const double share = width > 0.0 ? (place_of(value) - from) / width : 0.0;
+    const double share = column && width > 0.0 ? (place_of(value) - from) / width : 0.0;
     return std::min(static_cast<std::uint64_t>(share * static_cast<double>(bins)), bins - 1);
   }
 };
 
-std::vector<float> whole_column(const AnswerDesk& desk, const LookedAtStudy& study,
-                                const ColumnSource& source) {
-  const auto column = desk.columns.read(desk.database, study.id, source, study.points);
+ColumnStore::Shared whole_column(const AnswerDesk& desk, const LookedAtStudy& study,
+                                 const ColumnSource& source) {
+  auto column = desk.columns.read(desk.database, study.id, source, study.points);
   if (!column) {
     throw std::invalid_argument(
         fmt::format("the study has {} points, and bins are made of at most {}: ask for rows",
                     study.points, ColumnStore::kMostPoints));
   }
-  std::vector<float> values;
-  column->look([&](std::span<const float> all) { values.assign(all.begin(), all.end()); });
-  return values;
+  return column;
 }
 
 ColumnSource numbers_source(const FieldReader& fields, const std::string& name) {
@@ -63,86 +65,106 @@ ColumnSource numbers_source(const FieldReader& fields, const std::string& name) 
   return *std::move(source);
 }
 
-BinSide side_of(const AnswerDesk& desk, const LookedAtStudy& study, const FieldReader& fields,
-                const std::string& name) {
-  BinSide side{numbers_source(fields, name), {}, 1, false, 0.0, 0.0};
-  side.values = whole_column(desk, study, side.source);
-  side.bins = fields.pixels("n" + name, kUsualBins);
-  side.is_logarithmic = fields.text(name + "log").value_or("") == "1";
-  bool has_any = false;
-  for (const float stored : side.values) {
-    const auto value = static_cast<double>(stored);
-    if (std::isfinite(value) && (!side.is_logarithmic || value > 0.0)) {
-      side.least = has_any ? std::min(side.least, value) : value;
-      side.most = has_any ? std::max(side.most, value) : value;
-      has_any = true;
+/// The least and the largest value that can be shown; nothing: there is none.
+std::optional<std::pair<double, double>> range_of(const BinSide& side) {
+  std::optional<std::pair<double, double>> range;
+  for (std::uint64_t first = 0; first < side.column->points(); first += kPart) {
+    for (const float stored : side.column->part(first, kPart)) {
+      const auto value = static_cast<double>(stored);
+      if (std::isfinite(value) && (!side.is_logarithmic || value > 0.0)) {
+        range = range ? std::pair(std::min(range->first, value), std::max(range->second, value))
+                      : std::pair(value, value);
+      }
     }
   }
-  side.least = fields.number(name + "0").value_or(side.least);
-  side.most = fields.number(name + "1").value_or(side.most);
-  if (side.least > side.most || (side.is_logarithmic && has_any && side.least <= 0.0)) {
+  return range;
+}
+
+BinSide side_of(const AnswerDesk& desk, const LookedAtStudy& study, const FieldReader& fields,
+                const std::string& name) {
+  BinSide side;
+  side.column = whole_column(desk, study, numbers_source(fields, name));
+  side.bins = fields.pixels("n" + name, kUsualBins);
+  side.is_logarithmic = fields.text(name + "log").value_or("") == "1";
+  const auto range = range_of(side);
+  side.least = fields.number(name + "0").value_or(range ? range->first : 0.0);
+  side.most = fields.number(name + "1").value_or(range ? range->second : 0.0);
+  if (side.least > side.most || (side.is_logarithmic && range && side.least <= 0.0)) {
     throw std::invalid_argument(
         fmt::format("{0}0 must be at most {0}1, and above 0 where the scale is logarithmic", name));
   }
   return side;
 }
 
+/// What lies where.
+struct Bins {
+  std::vector<std::uint32_t> counts;
+  std::vector<double> sums;           ///< of the third column; empty: none is wanted
+  std::vector<std::uint32_t> summed;  ///< points with such a value
+  std::uint64_t inside = 0;
+  std::uint64_t outside = 0;
+};
+
+Bins bins_of(const BinSide& x, const BinSide& y, const ColumnStore::Shared& z) {
+  const std::size_t size = x.bins * y.bins;
+  Bins bins{std::vector<std::uint32_t>(size), std::vector<double>(z ? size : 0),
+            std::vector<std::uint32_t>(z ? size : 0)};
+  for (std::uint64_t first = 0; first < x.column->points(); first += kPart) {
+    const std::vector<float> x_part = x.column->part(first, kPart);
+    const std::vector<float> y_part = y.column ? y.column->part(first, kPart) : x_part;
+    const std::vector<float> z_part = z ? z->part(first, kPart) : std::vector<float>();
+    for (std::size_t i = 0; i < x_part.size(); ++i) {
+      const auto x_value = static_cast<double>(x_part[i]);
+      const auto y_value = static_cast<double>(y_part[i]);
+      if (!std::isfinite(x_value) || !std::isfinite(y_value)) {
+        continue;
+      }
+      if (!x.takes(x_value) || !y.takes(y_value)) {
+        ++bins.outside;
+        continue;
+      }
+      const std::uint64_t bin = y.bin_of(y_value) * x.bins + x.bin_of(x_value);
+      ++bins.counts[bin];
+      ++bins.inside;
+      if (z && std::isfinite(z_part[i])) {
+        bins.sums[bin] += static_cast<double>(z_part[i]);
+        ++bins.summed[bin];
+      }
+    }
+  }
+  return bins;
+}
+
 ordered_json side_json(const BinSide& side) {
-  return {{"column", side.source.name}, {"unit", side.source.unit}, {"least", side.least},
-          {"most", side.most},          {"bins", side.bins},        {"log", side.is_logarithmic}};
+  const ColumnSource& source = side.column->source();
+  return {{"column", source.name}, {"unit", source.unit}, {"least", side.least},
+          {"most", side.most},     {"bins", side.bins},   {"log", side.is_logarithmic}};
 }
 
 HttpAnswer bins_answer(const AnswerDesk& desk, std::uint64_t id, const Fields& asked) {
   const LookedAtStudy study = desk.studies.study(desk.database, id);
   const FieldReader fields(asked);
   const BinSide x = side_of(desk, study, fields, "x");
-  const bool has_y = fields.text("y").has_value();
-  const bool has_z = fields.text("z").has_value();
-  const BinSide y = has_y ? side_of(desk, study, fields, "y") : BinSide{{}, {}, 1, false, 0.0, 0.0};
-  std::vector<float> z;
-  if (has_z) {
-    z = whole_column(desk, study, numbers_source(fields, "z"));
-  }
-  std::vector<std::uint32_t> counts(x.bins * y.bins, 0);
-  std::vector<double> sums(has_z ? counts.size() : 0, 0.0);
-  std::vector<std::uint32_t> summed(sums.size(), 0);
-  std::uint64_t inside = 0;
-  std::uint64_t outside = 0;
-  for (std::size_t i = 0; i < x.values.size(); ++i) {
-    const auto x_value = static_cast<double>(x.values[i]);
-    const double y_value = has_y ? static_cast<double>(y.values[i]) : 0.0;
-    if (!std::isfinite(x_value) || !std::isfinite(y_value)) {
-      continue;
-    }
-    if (!x.takes(x_value) || (has_y && !y.takes(y_value))) {
-      ++outside;
-      continue;
-    }
-    const std::uint64_t row = has_y ? y.bin_of(y_value) : 0;
-    const std::uint64_t bin = row * x.bins + x.bin_of(x_value);
-    ++counts[bin];
-    ++inside;
-    if (has_z && std::isfinite(z[i])) {
-      sums[bin] += static_cast<double>(z[i]);
-      ++summed[bin];
-    }
-  }
-  std::string numbers(counts.size() * sizeof(counts[0]), '\0');
-  std::memcpy(numbers.data(), counts.data(), numbers.size());
-  for (std::size_t i = 0; i < sums.size(); ++i) {
-    const float mean =
-        summed[i] > 0 ? static_cast<float>(sums[i] / static_cast<double>(summed[i])) : no_result();
+  const BinSide y = fields.text("y") ? side_of(desk, study, fields, "y") : BinSide();
+  const ColumnStore::Shared z =
+      fields.text("z") ? whole_column(desk, study, numbers_source(fields, "z")) : nullptr;
+  const Bins bins = bins_of(x, y, z);
+  std::string numbers(bins.counts.size() * sizeof(bins.counts[0]), '\0');
+  std::memcpy(numbers.data(), bins.counts.data(), numbers.size());
+  for (std::size_t i = 0; i < bins.sums.size(); ++i) {
+    const float mean = bins.summed[i] > 0
+                           ? static_cast<float>(bins.sums[i] / static_cast<double>(bins.summed[i]))
+                           : no_result();
     numbers.append(reinterpret_cast<const char*>(&mean), sizeof mean);
   }
-  return numbers_answer(
-      {{"study", id},
-       {"x", side_json(x)},
-       {"y", has_y ? side_json(y) : ordered_json(nullptr)},
-       {"z", has_z ? ordered_json(*fields.text("z")) : ordered_json(nullptr)},
-       {"points", inside},
-       {"outside", outside},
-       {"most", counts.empty() ? 0 : *std::max_element(counts.begin(), counts.end())}},
-      numbers);
+  return numbers_answer({{"study", id},
+                         {"x", side_json(x)},
+                         {"y", y.column ? side_json(y) : ordered_json(nullptr)},
+                         {"z", z ? ordered_json(z->source().name) : ordered_json(nullptr)},
+                         {"points", bins.inside},
+                         {"outside", bins.outside},
+                         {"most", *std::max_element(bins.counts.begin(), bins.counts.end())}},
+                        numbers);
 }
 
 }  // namespace

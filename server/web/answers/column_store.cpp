@@ -145,6 +145,14 @@ void StoredColumn::gather(std::span<const std::uint64_t> points, std::vector<flo
                  [this](std::uint64_t point) { return values_.at(point); });
 }
 
+std::vector<float> StoredColumn::part(std::uint64_t first, std::size_t count) {
+  const std::lock_guard lock(mutex_);
+  const std::size_t begin = std::min<std::size_t>(first, values_.size());
+  const std::size_t end = std::min(begin + count, values_.size());
+  return {values_.begin() + static_cast<std::ptrdiff_t>(begin),
+          values_.begin() + static_cast<std::ptrdiff_t>(end)};
+}
+
 ColumnStore::Shared ColumnStore::known(std::uint64_t study, const ColumnSource& source,
                                        std::uint64_t points) {
   const auto found = std::find_if(kept_.begin(), kept_.end(), [&](const Shared& column) {

@@ -40,12 +40,8 @@ class StoredColumn {
   bool bring_up_to_date(sqlite3* database, bool may_take_long);
   /// What it has of these points, in their order.
   void gather(std::span<const std::uint64_t> points, std::vector<float>& into);
-  /// Gives `take` the values; they stay as they are meanwhile.
-  template <typename Take>
-  void look(const Take& take) {
-    const std::lock_guard lock(mutex_);
-    take(std::span<const float>(values_));
-  }
+  /// The values of so many points from `first` on, as far as there are any.
+  std::vector<float> part(std::uint64_t first, std::size_t count);
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -20,4 +20,7 @@ AnswerPool::Job slice_job(std::uint64_t study, const Fields& fields);
 /// How many points, and the mean of a column, in cells over one or two columns.
 AnswerPool::Job bins_job(std::uint64_t study, const Fields& fields);
 
+/// Whether a recipe, as the body of a submission has it, is one, and what it would come to.
+AnswerPool::Job check_job(const std::string& body);
+
 }  // namespace oblique::server

@@ -22,6 +22,7 @@ constexpr unsigned kTryLater = 503;
 constexpr std::string_view kApi = "/api/";
 constexpr std::string_view kStudies = "/api/studies";
 constexpr std::string_view kLook = "/api/look";
+constexpr std::string_view kCheck = "/api/check";
 
 /// Browsers wait so long for one answer; what takes longer is asked for again.
 constexpr std::chrono::milliseconds kPatience{8000};
@@ -59,7 +60,7 @@ bool Page::has(const std::string& path) {
 }
 
 bool Page::takes_changes(const std::string& path) {
-  if (path == kStudies || path == kLook || kept_by(path)) {
+  if (path == kStudies || path == kLook || path == kCheck || kept_by(path)) {
     return true;
   }
   const auto place = place_of(path);
@@ -220,6 +221,9 @@ std::optional<HttpAnswer> Page::begin_study(const HttpQuestion& question, const 
 std::optional<HttpAnswer> Page::begin_change(const HttpQuestion& question) {
   if (question.path == kStudies) {
     return begin(question, submit_talk(question));
+  }
+  if (question.path == kCheck) {
+    return begin(question, check_job(question.body));
   }
   if (question.path == kLook) {
     return begin(question, looks_.begin(question));

@@ -1,10 +1,17 @@
 #include "server/web/page/service_line.h"
 
+#include <cstddef>
 #include <utility>
 
 #include "proto/frames.h"
 
 namespace oblique::server {
+namespace {
+
+/// So that the loop looks at others in between.
+constexpr std::size_t kMostOfATurn = 8;
+
+}  // namespace
 
 void ServiceLine::ask(std::uint64_t number, protocol::ClientRequest request) {
   request.set_request_id(number);
@@ -62,7 +69,15 @@ void ServiceLine::send(const protocol::ClientRequest& request) {
 std::vector<std::string> ServiceLine::take() {
   woken_.clear();
   const std::lock_guard lock(mutex_);
-  return std::exchange(requests_, {});
+  std::vector<std::string> some;
+  while (!requests_.empty() && some.size() < kMostOfATurn) {
+    some.push_back(std::move(requests_.front()));
+    requests_.pop_front();
+  }
+  if (!requests_.empty()) {
+    woken_.wake();
+  }
+  return some;
 }
 
 void ServiceLine::put(std::string frame) {

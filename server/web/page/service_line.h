@@ -31,15 +31,15 @@ class ServiceLine {
   // ---- Of the loop.
   /// Readable when there is something to take.
   int descriptor() const { return woken_.descriptor(); }
-  /// Frames of ClientRequest.
+  /// Frames of ClientRequest, a few at a time.
   std::vector<std::string> take();
   void put(std::string frame);
 
  private:
   protocol::WakeUp woken_;
   std::mutex mutex_;
-  std::vector<std::string> requests_;  // guarded by mutex_
-  std::vector<std::string> frames_;    // guarded by mutex_
+  std::deque<std::string> requests_;  // guarded by mutex_
+  std::vector<std::string> frames_;   // guarded by mutex_
 
   struct Awaited {
     bool is_query = false;  // that has not ended
