@@ -32,6 +32,8 @@ class AnswerPool {
  public:
   /// Throws std::invalid_argument for a wrong question, NothingThere, StorageError.
   using Job = std::function<HttpAnswer(const AnswerDesk&)>;
+  /// Status of what a job gives that is only the first step to an answer.
+  static constexpr unsigned kStep = 0;
 
   /// `done` is called on a thread of the pool when an answer can be taken. The database is opened
   /// by the first job.

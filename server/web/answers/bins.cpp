@@ -8,7 +8,6 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/text.h"
 #include "server/web/answers/fields.h"
 #include "server/web/answers/study_answers.h"
 #include "server/web/http/json_answer.h"
@@ -46,32 +45,31 @@ struct BinSide {
 
 ColumnStore::Shared whole_column(const AnswerDesk& desk, const LookedAtStudy& study,
                                  const ColumnSource& source) {
-  auto column = desk.columns.read(desk.database, study.id, source, study.points);
-  if (!column) {
-    throw std::invalid_argument(
-        fmt::format("the study has {} points, and bins are made of at most {}: ask for rows",
-                    study.points, ColumnStore::kMostPoints));
-  }
-  return column;
+  ColumnStore::check_size(study.points);
+  return desk.columns.read(desk.database, study.id, source, study.points);
 }
 
-ColumnSource numbers_source(const FieldReader& fields, const std::string& name) {
-  const std::string column = fields.text(name).value_or("");
-  auto source = column_source(column);
-  if (!source || source->is_category) {
-    throw std::invalid_argument(fmt::format("{} must be a column of numbers; \"{}\" is none", name,
-                                            protocol::visible(column)));
-  }
-  return *std::move(source);
-}
+/// Which points are counted: those that meet a condition, or all.
+class Chosen {
+ public:
+  explicit Chosen(const PointSet* points) : points_(points) {}
+  bool has(std::uint64_t point) { return points_ == nullptr || points_->has(point, near_); }
+
+ private:
+  const PointSet* points_;
+  std::size_t near_ = 0;
+};
 
 /// The least and the largest value that can be shown; nothing: there is none.
-std::optional<std::pair<double, double>> range_of(const BinSide& side) {
+std::optional<std::pair<double, double>> range_of(const BinSide& side, const PointSet* chosen) {
+  Chosen is_chosen(chosen);
   std::optional<std::pair<double, double>> range;
   for (std::uint64_t first = 0; first < side.column->points(); first += kPart) {
-    for (const float stored : side.column->part(first, kPart)) {
-      const auto value = static_cast<double>(stored);
-      if (std::isfinite(value) && (!side.is_logarithmic || value > 0.0)) {
+    const std::vector<float> part = side.column->part(first, kPart);
+    for (std::size_t i = 0; i < part.size(); ++i) {
+      const auto value = static_cast<double>(part[i]);
+      if (std::isfinite(value) && (!side.is_logarithmic || value > 0.0) &&
+          is_chosen.has(first + i)) {
         range = range ? std::pair(std::min(range->first, value), std::max(range->second, value))
                       : std::pair(value, value);
       }
@@ -81,12 +79,12 @@ std::optional<std::pair<double, double>> range_of(const BinSide& side) {
 }
 
 BinSide side_of(const AnswerDesk& desk, const LookedAtStudy& study, const FieldReader& fields,
-                const std::string& name) {
+                const std::string& name, const PointSet* chosen) {
   BinSide side;
-  side.column = whole_column(desk, study, numbers_source(fields, name));
+  side.column = whole_column(desk, study, picture_column(fields, name, false));
   side.bins = fields.pixels("n" + name, kUsualBins);
   side.is_logarithmic = fields.text(name + "log").value_or("") == "1";
-  const auto range = range_of(side);
+  const auto range = range_of(side, chosen);
   side.least = fields.number(name + "0").value_or(range ? range->first : 0.0);
   side.most = fields.number(name + "1").value_or(range ? range->second : 0.0);
   if (side.least > side.most || (side.is_logarithmic && range && side.least <= 0.0)) {
@@ -103,9 +101,12 @@ struct Bins {
   std::vector<std::uint32_t> summed;  ///< points with such a value
   std::uint64_t inside = 0;
   std::uint64_t outside = 0;
+  std::uint64_t filtered = 0;
 };
 
-Bins bins_of(const BinSide& x, const BinSide& y, const ColumnStore::Shared& z) {
+Bins bins_of(const BinSide& x, const BinSide& y, const ColumnStore::Shared& z,
+             const PointSet* chosen) {
+  Chosen is_chosen(chosen);
   const std::size_t size = x.bins * y.bins;
   Bins bins{std::vector<std::uint32_t>(size), std::vector<double>(z ? size : 0),
             std::vector<std::uint32_t>(z ? size : 0)};
@@ -117,6 +118,10 @@ Bins bins_of(const BinSide& x, const BinSide& y, const ColumnStore::Shared& z) {
       const auto x_value = static_cast<double>(x_part[i]);
       const auto y_value = static_cast<double>(y_part[i]);
       if (!std::isfinite(x_value) || !std::isfinite(y_value)) {
+        continue;
+      }
+      if (!is_chosen.has(first + i)) {
+        ++bins.filtered;
         continue;
       }
       if (!x.takes(x_value) || !y.takes(y_value)) {
@@ -141,14 +146,15 @@ ordered_json side_json(const BinSide& side) {
           {"most", side.most},     {"bins", side.bins},   {"log", side.is_logarithmic}};
 }
 
-HttpAnswer bins_answer(const AnswerDesk& desk, std::uint64_t id, const Fields& asked) {
+HttpAnswer bins_answer(const AnswerDesk& desk, std::uint64_t id, const Fields& asked,
+                       const PointSet* chosen) {
   const LookedAtStudy study = desk.studies.study(desk.database, id);
   const FieldReader fields(asked);
-  const BinSide x = side_of(desk, study, fields, "x");
-  const BinSide y = fields.text("y") ? side_of(desk, study, fields, "y") : BinSide();
+  const BinSide x = side_of(desk, study, fields, "x", chosen);
+  const BinSide y = fields.text("y") ? side_of(desk, study, fields, "y", chosen) : BinSide();
   const ColumnStore::Shared z =
-      fields.text("z") ? whole_column(desk, study, numbers_source(fields, "z")) : nullptr;
-  const Bins bins = bins_of(x, y, z);
+      fields.text("z") ? whole_column(desk, study, picture_column(fields, "z", false)) : nullptr;
+  const Bins bins = bins_of(x, y, z, chosen);
   std::string numbers(bins.counts.size() * sizeof(bins.counts[0]), '\0');
   std::memcpy(numbers.data(), bins.counts.data(), numbers.size());
   for (std::size_t i = 0; i < bins.sums.size(); ++i) {
@@ -163,14 +169,18 @@ HttpAnswer bins_answer(const AnswerDesk& desk, std::uint64_t id, const Fields& a
                          {"z", z ? ordered_json(z->source().name) : ordered_json(nullptr)},
                          {"points", bins.inside},
                          {"outside", bins.outside},
+                         {"filtered", bins.filtered},
                          {"most", *std::max_element(bins.counts.begin(), bins.counts.end())}},
                         numbers);
 }
 
 }  // namespace
 
-AnswerPool::Job bins_job(std::uint64_t study, const Fields& fields) {
-  return [study, fields](const AnswerDesk& desk) { return bins_answer(desk, study, fields); };
+AnswerPool::Job bins_job(std::uint64_t study, const Fields& fields,
+                         std::shared_ptr<const PointSet> chosen) {
+  return [study, fields, chosen = std::move(chosen)](const AnswerDesk& desk) {
+    return bins_answer(desk, study, fields, chosen.get());
+  };
 }
 
 }  // namespace oblique::server

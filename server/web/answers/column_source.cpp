@@ -60,6 +60,9 @@ float left_out() {
 float no_value() {
   return std::bit_cast<float>(0x7fc00003U);
 }
+float filtered_out() {
+  return std::bit_cast<float>(0x7fc00004U);
+}
 
 bool is_same_mark(float one, float other) {
   return std::bit_cast<std::uint32_t>(one) == std::bit_cast<std::uint32_t>(other);

@@ -27,6 +27,7 @@ float no_result();
 float failed_point();
 float left_out();
 float no_value();
+float filtered_out();  ///< it is there, and does not meet the condition of who asks
 /// By the bits; NaNs are never equal.
 bool is_same_mark(float one, float other);
 

@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <iterator>
+#include <stdexcept>
 #include <utility>
+
+#include <spdlog/fmt/fmt.h>
 
 #include "server/database/sqlite.h"
 
@@ -221,6 +224,14 @@ ColumnStore::Shared ColumnStore::read(sqlite3* database, std::uint64_t study,
   column->bring_up_to_date(database, true);
   keep(column);
   return column;
+}
+
+void ColumnStore::check_size(std::uint64_t points) {
+  if (points > kMostPoints) {
+    throw std::invalid_argument(
+        fmt::format("the study has {} points, and bins are made of at most {}: ask for rows",
+                    points, kMostPoints));
+  }
 }
 
 bool ColumnStore::has_wishes() const {

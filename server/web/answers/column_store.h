@@ -81,6 +81,8 @@ class ColumnStore {
 
   /// Studies with more points are never read whole.
   static constexpr std::uint64_t kMostPoints = 32'000'000;
+  /// Throws std::invalid_argument, for people, for a study of more points.
+  static void check_size(std::uint64_t points);
 
  private:
   static constexpr std::size_t kMostBytes = std::size_t{256} << 20U;

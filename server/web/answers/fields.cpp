@@ -4,8 +4,11 @@
 #include <cmath>
 #include <stdexcept>
 #include <system_error>
+#include <utility>
 
 #include <spdlog/fmt/fmt.h>
+
+#include "proto/text.h"
 
 namespace oblique::server {
 namespace {
@@ -56,6 +59,18 @@ std::uint64_t FieldReader::pixels(const std::string& name, std::uint64_t usual) 
     throw std::invalid_argument(fmt::format("{} must be from 1 to {}", name, kMostPixels));
   }
   return pixels;
+}
+
+ColumnSource picture_column(const FieldReader& fields, const std::string& name,
+                            bool may_be_category) {
+  const std::string column = fields.text(name).value_or("");
+  auto source = column_source(column);
+  if (!source || (source->is_category && !may_be_category)) {
+    throw std::invalid_argument(fmt::format("{} must be a column of numbers{}; \"{}\" is none",
+                                            name, may_be_category ? " or categories" : "",
+                                            protocol::visible(column)));
+  }
+  return *std::move(source);
 }
 
 }  // namespace oblique::server

@@ -5,6 +5,8 @@
 #include <optional>
 #include <string>
 
+#include "server/web/answers/column_source.h"
+
 namespace oblique::server {
 
 /// What follows the question mark of a request, read field by field. Each throws
@@ -24,5 +26,10 @@ class FieldReader {
  private:
   const std::map<std::string, std::string>& fields_;
 };
+
+/// The column that a field names. Throws std::invalid_argument unless it is one of numbers, or,
+/// where it may be, of categories.
+ColumnSource picture_column(const FieldReader& fields, const std::string& name,
+                            bool may_be_category);
 
 }  // namespace oblique::server

@@ -9,7 +9,6 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/text.h"
 #include "server/web/answers/fields.h"
 #include "server/web/answers/grid.h"
 #include "server/web/answers/study_answers.h"
@@ -67,16 +66,18 @@ struct Tally {
   std::uint64_t failed = 0;
   std::uint64_t left_out = 0;
   std::uint64_t missing = 0;
+  std::uint64_t filtered = 0;
   double least = 0.0;
   double most = 0.0;
+  bool has_value = false;
 };
 
-/// Marks what a filter leaves out, and counts.
+/// Marks what a filter of the study leaves out, and results that are not `chosen`, and counts.
 Tally tally(const LookedAtStudy& study, const std::vector<std::uint64_t>& points,
-            std::vector<float>& values) {
+            std::vector<float>& values, const PointSet* chosen) {
   Tally tally;
+  std::size_t near = 0;
   const bool has_filter = study.table->has_filter();
-  bool has_value = false;
   for (std::size_t i = 0; i < values.size(); ++i) {
     float& value = values[i];
     if (is_same_mark(value, no_result()) && has_filter && !study.table->is_left_in(points[i])) {
@@ -84,6 +85,9 @@ Tally tally(const LookedAtStudy& study, const std::vector<std::uint64_t>& points
       ++tally.left_out;
     } else if (is_same_mark(value, no_result())) {
       ++tally.missing;
+    } else if (chosen != nullptr && !chosen->has(points[i], near)) {
+      value = filtered_out();
+      ++tally.filtered;
     } else if (is_same_mark(value, failed_point())) {
       ++tally.failed;
     } else {
@@ -91,15 +95,15 @@ Tally tally(const LookedAtStudy& study, const std::vector<std::uint64_t>& points
     }
     if (std::isfinite(value)) {
       const auto number = static_cast<double>(value);
-      tally.least = has_value ? std::min(tally.least, number) : number;
-      tally.most = has_value ? std::max(tally.most, number) : number;
-      has_value = true;
+      tally.least = tally.has_value ? std::min(tally.least, number) : number;
+      tally.most = tally.has_value ? std::max(tally.most, number) : number;
+      tally.has_value = true;
     }
   }
   return tally;
 }
 
-constexpr std::uint16_t kFirstMark = 0xfffc;
+constexpr std::uint16_t kFirstMark = 0xfffb;
 
 /// Codes of texts, the most frequent first, and these texts.
 std::vector<std::uint16_t> coded(const AnswerDesk& desk, const std::vector<float>& values,
@@ -128,11 +132,12 @@ std::vector<std::uint16_t> coded(const AnswerDesk& desk, const std::vector<float
   std::transform(values.begin(), values.end(), coded.begin(), [&](float value) -> std::uint16_t {
     if (std::isfinite(value)) {
       const auto code = codes.find(static_cast<std::int64_t>(value));
-      return code == codes.end() ? kFirstMark : code->second;
+      return code == codes.end() ? 0xfffc : code->second;
     }
     return is_same_mark(value, no_result())      ? 0xffff
            : is_same_mark(value, failed_point()) ? 0xfffe
            : is_same_mark(value, left_out())     ? 0xfffd
+           : is_same_mark(value, no_value())     ? 0xfffc
                                                  : kFirstMark;
   });
   return coded;
@@ -148,15 +153,11 @@ ordered_json side_json(const GridSide& side) {
       {"stride", side.stride}, {"all_lines", side.numbers.size() == side.last - side.first + 1}};
 }
 
-HttpAnswer slice_answer(const AnswerDesk& desk, std::uint64_t id, const Fields& asked) {
+HttpAnswer slice_answer(const AnswerDesk& desk, std::uint64_t id, const Fields& asked,
+                        const PointSet* chosen) {
   const LookedAtStudy study = desk.studies.study(desk.database, id);
   const FieldReader fields(asked);
-  const std::string z = fields.text("z").value_or("");
-  const auto source = column_source(z);
-  if (!source) {
-    throw std::invalid_argument(fmt::format(
-        "z must be a column of numbers or categories; \"{}\" is none", protocol::visible(z)));
-  }
+  const ColumnSource source = picture_column(fields, "z", true);
   const GridSlice slice = grid_slice(*study.table, fields);
   const std::size_t nx = slice.x.numbers.size();
   const std::size_t ny = slice.y.numbers.size();
@@ -169,14 +170,14 @@ HttpAnswer slice_answer(const AnswerDesk& desk, std::uint64_t id, const Fields& 
   std::vector<float> values;
   // Looking up a row takes as long as reading sixteen that follow each other.
   const bool is_most_of_it = study.points / 16 <= points.size();
-  const auto column = is_most_of_it ? desk.columns.read(desk.database, id, *source, study.points)
-                                    : desk.columns.find(desk.database, id, *source, study.points);
+  const auto column = is_most_of_it ? desk.columns.read(desk.database, id, source, study.points)
+                                    : desk.columns.find(desk.database, id, source, study.points);
   if (column) {
     column->gather(points, values);
   } else {
-    values = read_by_key(desk, id, *source, points);
+    values = read_by_key(desk, id, source, points);
   }
-  const Tally counts = tally(study, points, values);
+  const Tally counts = tally(study, points, values, chosen);
   ordered_json at = ordered_json::array();
   for (const GridPlace& place : slice.at) {
     at.push_back(
@@ -185,9 +186,9 @@ HttpAnswer slice_answer(const AnswerDesk& desk, std::uint64_t id, const Fields& 
   ordered_json head{{"study", id},
                     {"block", slice.block},
                     {"z",
-                     {{"name", source->name},
-                      {"unit", source->unit},
-                      {"kind", source->is_category ? "categories" : "numbers"}}},
+                     {{"name", source.name},
+                      {"unit", source.unit},
+                      {"kind", source.is_category ? "categories" : "numbers"}}},
                     {"x", side_json(slice.x)},
                     {"y", side_json(slice.y)},
                     {"at", std::move(at)},
@@ -197,18 +198,18 @@ HttpAnswer slice_answer(const AnswerDesk& desk, std::uint64_t id, const Fields& 
                     {"solved", counts.solved},
                     {"failed", counts.failed},
                     {"left_out", counts.left_out},
-                    {"missing", counts.missing}};
+                    {"missing", counts.missing},
+                    {"filtered", counts.filtered}};
   std::string numbers;
   append(slice.x.values, numbers);
   append(slice.y.values, numbers);
-  if (source->is_category) {
+  if (source.is_category) {
     ordered_json dictionary = ordered_json::array();
     append(coded(desk, values, dictionary), numbers);
     head["dictionary"] = std::move(dictionary);
   } else {
-    const bool has_values = counts.solved > 0;
-    head["least"] = has_values ? ordered_json(counts.least) : nullptr;
-    head["most"] = has_values ? ordered_json(counts.most) : nullptr;
+    head["least"] = counts.has_value ? ordered_json(counts.least) : nullptr;
+    head["most"] = counts.has_value ? ordered_json(counts.most) : nullptr;
     append(values, numbers);
   }
   return numbers_answer(head, numbers);
@@ -216,8 +217,11 @@ HttpAnswer slice_answer(const AnswerDesk& desk, std::uint64_t id, const Fields& 
 
 }  // namespace
 
-AnswerPool::Job slice_job(std::uint64_t study, const Fields& fields) {
-  return [study, fields](const AnswerDesk& desk) { return slice_answer(desk, study, fields); };
+AnswerPool::Job slice_job(std::uint64_t study, const Fields& fields,
+                          std::shared_ptr<const PointSet> chosen) {
+  return [study, fields, chosen = std::move(chosen)](const AnswerDesk& desk) {
+    return slice_answer(desk, study, fields, chosen.get());
+  };
 }
 
 }  // namespace oblique::server

@@ -5,6 +5,7 @@
 #include <string_view>
 #include <utility>
 
+#include "server/web/answers/fields.h"
 #include "server/web/answers/study_answers.h"
 #include "server/web/http/json_answer.h"
 #include "server/web/page/page_files.h"
@@ -30,6 +31,8 @@ constexpr std::chrono::milliseconds kPatience{8000};
 constexpr const char* kHowToEnter =
     "this server shows its page to who has its token: open the address that it printed when it "
     "started, or that `oblique view` prints";
+
+constexpr const char* kTooManyPictures = "too many pictures are asked for at once: ask again later";
 
 HttpAnswer nothing_there() {
   return error_answer(kNothingThere, "there is nothing here");
@@ -146,10 +149,11 @@ std::optional<HttpAnswer> Page::answer(const HttpQuestion& question) {
       return error_answer(kWrongQuestion, error.what());
     }
   }
-  auto answer = known->second ? go_on(question, *known->second) : at_.answers.take(question.number);
+  auto answer = go_on(question, known->second);
   if (!answer && question.waited > kPatience) {
-    answer = known->second ? known->second->meanwhile
-                           : error_answer(kTryLater, "the server takes too long: ask again later");
+    answer = known->second.talk
+                 ? known->second.talk->meanwhile
+                 : error_answer(kTryLater, "the server takes too long: ask again later");
     gone(question.number);
   }
   if (answer) {
@@ -160,7 +164,7 @@ std::optional<HttpAnswer> Page::answer(const HttpQuestion& question) {
 
 void Page::gone(std::uint64_t number) {
   const auto known = under_way_.extract(number);
-  if (!known.empty() && known.mapped()) {
+  if (!known.empty() && known.mapped().talk) {
     at_.service.forget(number);
   } else if (!known.empty()) {
     at_.answers.forget(number);
@@ -205,12 +209,17 @@ std::optional<HttpAnswer> Page::begin_study(const HttpQuestion& question, const 
   if (!place.point && place.part == "rows") {
     return begin(question, rows_talk(place.study, question));
   }
+  const bool is_slice = place.part == "slice";
+  if (!place.point && (is_slice || place.part == "bins") &&
+      FieldReader(question.fields).text("where")) {
+    return begin(question, filters_.begin(place.study, question, is_slice));
+  }
   std::optional<AnswerPool::Job> job;
   if (place.point && place.part.empty()) {
     job = point_job(place.study, *place.point);
   } else if (!place.point && place.part.empty()) {
     job = study_job(place.study);
-  } else if (!place.point && place.part == "slice") {
+  } else if (!place.point && is_slice) {
     job = slice_job(place.study, question.fields);
   } else if (!place.point && place.part == "bins") {
     job = bins_job(place.study, question.fields);
@@ -239,26 +248,57 @@ std::optional<HttpAnswer> Page::begin_change(const HttpQuestion& question) {
 
 std::optional<HttpAnswer> Page::begin(const HttpQuestion& question, Talk talk) {
   at_.service.ask(question.number, talk.first);
-  under_way_.emplace(question.number, std::move(talk));
+  under_way_.emplace(question.number, UnderWay{std::move(talk)});
   return std::nullopt;
 }
 
 std::optional<HttpAnswer> Page::begin(const HttpQuestion& question, AnswerPool::Job job) {
   if (!at_.answers.submit(question.number, std::move(job))) {
-    return error_answer(kTryLater, "too many pictures are asked for at once: ask again later");
+    return error_answer(kTryLater, kTooManyPictures);
   }
-  under_way_.emplace(question.number, std::nullopt);
+  under_way_.emplace(question.number, UnderWay());
   return std::nullopt;
 }
 
-std::optional<HttpAnswer> Page::go_on(const HttpQuestion& question, Talk& talk) {
+std::optional<HttpAnswer> Page::begin(const HttpQuestion& question, FilteredPicture picture) {
+  auto answer = begin(question, std::move(picture.first));
+  if (!answer) {
+    under_way_.at(question.number).then = std::move(picture.then);
+  }
+  return answer;
+}
+
+std::optional<HttpAnswer> Page::go_on(const HttpQuestion& question, UnderWay& under_way) {
+  if (under_way.talk) {
+    return go_on_talking(question, under_way);
+  }
+  auto answer = at_.answers.take(question.number);
+  if (!answer || answer->status != AnswerPool::kStep) {
+    return answer;
+  }
+  under_way.talk = under_way.then();
+  at_.service.ask(question.number, under_way.talk->first);
+  return std::nullopt;
+}
+
+std::optional<HttpAnswer> Page::go_on_talking(const HttpQuestion& question, UnderWay& under_way) {
+  const Talk& talk = *under_way.talk;
   while (const auto reply = at_.service.reply(question.number)) {
-    Talk::Next next = reply->has_error() ? failure(reply->error()) : talk.go_on(*reply);
+    Talk::Next next = !reply->has_error() ? talk.go_on(*reply)
+                      : talk.failed       ? talk.failed(reply->error())
+                                          : failure(reply->error());
+    if (auto* request = std::get_if<protocol::ClientRequest>(&next)) {
+      at_.service.ask(question.number, std::move(*request));
+      continue;
+    }
+    at_.service.forget(question.number);
     if (auto* answer = std::get_if<HttpAnswer>(&next)) {
-      at_.service.forget(question.number);
       return std::move(*answer);
     }
-    at_.service.ask(question.number, std::get<protocol::ClientRequest>(std::move(next)));
+    under_way.talk.reset();
+    const bool is_taken =
+        at_.answers.submit(question.number, std::get<AnswerPool::Job>(std::move(next)));
+    return is_taken ? std::nullopt : std::optional(error_answer(kTryLater, kTooManyPictures));
   }
   return std::nullopt;
 }

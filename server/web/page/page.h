@@ -8,6 +8,7 @@
 
 #include "server/web/answers/answer_pool.h"
 #include "server/web/http/http_message.h"
+#include "server/web/page/filter_talk.h"
 #include "server/web/page/live_text.h"
 #include "server/web/page/looks.h"
 #include "server/web/page/page_key.h"
@@ -71,14 +72,22 @@ class Page {
   std::optional<HttpAnswer> begin_change(const HttpQuestion& question);
   std::optional<HttpAnswer> begin(const HttpQuestion& question, Talk talk);
   std::optional<HttpAnswer> begin(const HttpQuestion& question, AnswerPool::Job job);
-  std::optional<HttpAnswer> go_on(const HttpQuestion& question, Talk& talk);
+  /// What a request waits for: a reply to a talk or, without one, a job of the pool.
+  struct UnderWay {
+    std::optional<Talk> talk = {};
+    std::function<Talk()> then = {};  ///< what follows a job that is but the first step
+  };
+  std::optional<HttpAnswer> begin(const HttpQuestion& question, FilteredPicture picture);
+  std::optional<HttpAnswer> go_on(const HttpQuestion& question, UnderWay& under_way);
+  std::optional<HttpAnswer> go_on_talking(const HttpQuestion& question, UnderWay& under_way);
 
   bool shows_without_token_;
   std::string version_;
   PageKey key_;
   Neighbours at_;
   Looks looks_;
-  std::map<std::uint64_t, std::optional<Talk>> under_way_;  // none: with the pool
+  PointFilters filters_;
+  std::map<std::uint64_t, UnderWay> under_way_;  // by number of the request
 };
 
 }  // namespace oblique::server

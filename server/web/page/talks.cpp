@@ -32,13 +32,17 @@ std::uint32_t lines_of(const FieldReader& fields) {
       std::clamp<std::uint64_t>(fields.whole("limit").value_or(kMostLines), 1, kMostLines));
 }
 
+}  // namespace
+
 ClientRequest status_of_number(std::uint64_t study) {
   ClientRequest request;
   request.mutable_status()->set_study_id(study);
   return request;
 }
 
-}  // namespace
+HttpAnswer no_such_study() {
+  return error_answer(kNotFound, "there is no such study");
+}
 
 ClientRequest status_of_all(std::uint64_t after) {
   ClientRequest request;
@@ -60,7 +64,7 @@ Talk talk_by_name(std::uint64_t study, std::function<ClientRequest(const std::st
             }
             return reply.status().studies_size() == 1
                        ? Talk::Next(ask(reply.status().studies(0).name()))
-                       : Talk::Next(error_answer(kNotFound, "there is no such study"));
+                       : Talk::Next(no_such_study());
           },
           std::move(meanwhile)};
 }

@@ -6,23 +6,31 @@
 #include <variant>
 
 #include "proto/oblique.pb.h"
+#include "server/web/answers/answer_pool.h"
 #include "server/web/http/http_message.h"
 
 namespace oblique::server {
 
 /// What the page and the service say to each other for one request of a browser.
 struct Talk {
-  using Next = std::variant<HttpAnswer, protocol::ClientRequest>;
+  using Next = std::variant<HttpAnswer, protocol::ClientRequest, AnswerPool::Job>;
   protocol::ClientRequest first;
-  /// What follows from a reply that is no error: the answer, or what is asked next.
+  /// What follows from a reply that is no error: the answer, what is asked next, or who makes the
+  /// answer.
   std::function<Next(const protocol::ClientReply&)> go_on;
   /// The answer while the service takes longer than a browser should wait.
   HttpAnswer meanwhile;
+  /// What follows from an error, where that is not its sentence.
+  std::function<Next(const protocol::ErrorReply&)> failed = {};
 };
 
 /// That it takes too long.
 HttpAnswer too_slow();
 
+/// Asks for the study of that number.
+protocol::ClientRequest status_of_number(std::uint64_t study);
+/// That there is none.
+HttpAnswer no_such_study();
 /// Asks for a page of studies, those with a higher number.
 protocol::ClientRequest status_of_all(std::uint64_t after);
 

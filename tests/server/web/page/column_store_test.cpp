@@ -1,5 +1,7 @@
 #include "server/web/answers/column_store.h"
 
+#include "server/web/answers/point_set.h"
+
 #include <random>
 #include <set>
 
@@ -49,13 +51,35 @@ TEST(Difference, IsThatOfTheSetsOfPoints) {
   }
 }
 
+TEST(PointSet, HasWhatWasAddedWhateverItIsAskedBefore) {
+  std::mt19937 random(5);  // the same sets in every run
+  for (int round = 0; round < 200; ++round) {
+    PointSet set;
+    std::set<std::uint64_t> points;
+    for (std::uint64_t point = 0; point < 40; ++point) {
+      if (random() % 3 == 0) {
+        points.insert(point);
+        EXPECT_TRUE(set.add(point));
+        EXPECT_FALSE(set.add(point)) << "it is there";
+      }
+    }
+    EXPECT_EQ(set.runs(), runs_of(points).size());
+    std::size_t near = 0;
+    for (int i = 0; i < 100; ++i) {
+      const std::uint64_t point = i < 42 ? static_cast<std::uint64_t>(i) : random() % 42;
+      EXPECT_EQ(set.has(point, near), points.contains(point)) << point;
+    }
+  }
+}
+
 TEST(ColumnSource, MarksDifferFromEachOtherAndAreNoNumbers) {
-  for (const float mark : {no_result(), failed_point(), left_out(), no_value()}) {
+  for (const float mark : {no_result(), failed_point(), left_out(), no_value(), filtered_out()}) {
     EXPECT_TRUE(mark != mark);
     EXPECT_TRUE(is_same_mark(mark, mark));
   }
   EXPECT_FALSE(is_same_mark(no_result(), failed_point()));
   EXPECT_FALSE(is_same_mark(left_out(), no_value()));
+  EXPECT_FALSE(is_same_mark(filtered_out(), no_value()));
 }
 
 TEST(ColumnSource, ListsAndWordsAboutRowsAreNoPictures) {
