@@ -20,6 +20,7 @@ constexpr unsigned kServiceUnavailable = 503;
 
 WebSettings with_version(WebSettings settings) {
   settings.page.version = OBLIQUE_VERSION;
+  settings.page.pictures.database = settings.database;
   return settings;
 }
 
@@ -47,7 +48,10 @@ class Web::Parts {
                [this](std::uint64_t number) { page_.gone(number); },
                [this] { return page_.tick(); }}) {}
 
-  ~Parts() { answers_.stop(); }  // it wakes the HTTP server
+  ~Parts() {  // they wake the HTTP server
+    answers_.stop();
+    drawings_.stop();
+  }
   Parts(const Parts&) = delete;
   Parts& operator=(const Parts&) = delete;
 
@@ -135,7 +139,8 @@ class Web::Parts {
   ServiceLine line_;
   LiveText live_{[this] { return look(); }, began_ms_};
   AnswerPool answers_{settings_.database, [this] { http_.wake(); }};
-  Page page_{settings_.page, {line_, answers_, live_}};
+  AnswerPool drawings_{settings_.database, [this] { http_.wake(); }};
+  Page page_{settings_.page, {line_, answers_, drawings_, live_}};
   HttpServer http_;  // last: its thread uses all the others
 };
 

@@ -144,7 +144,8 @@ HttpAnswer AnswerPool::answer_to(const Order& order, Desk& desk) {
       add_list_functions(desk.database.get());
       sqlite3_progress_handler(desk.database.get(), kStepsBetweenLooks, &Desk::is_over, &desk);
     }
-    return order.job({desk.database.get(), studies_, columns_});
+    return order.job(
+        {desk.database.get(), studies_, columns_, [&desk] { return Desk::is_over(&desk) != 0; }});
   } catch (const std::invalid_argument& error) {
     return error_answer(kBadQuestion, error.what());
   } catch (const NothingThere& error) {

@@ -24,6 +24,7 @@ struct AnswerDesk {
   sqlite3* database;
   StudyBook& studies;
   ColumnStore& columns;
+  std::function<bool()> is_over;  ///< nobody waits any more, or the time is up
 };
 
 /// Answers that are made of the database, on a few threads of their own with a connection each: a

@@ -120,7 +120,37 @@ GridPlace place_of(const std::vector<AxisLayout>& axes, std::string_view text) {
   return {std::string(key), axis->values, number, protocol::axis_value(*axis->axis, number)};
 }
 
+/// All entries of `at`.
+std::vector<GridPlace> places_at(const std::vector<AxisLayout>& axes, std::string_view at) {
+  std::vector<GridPlace> places;
+  while (!at.empty()) {
+    const std::string_view one = at.substr(0, at.find(','));
+    at.remove_prefix(std::min(at.size(), one.size() + 1));
+    places.push_back(place_of(axes, one));
+  }
+  return places;
+}
+
 }  // namespace
+
+std::vector<GridPlace> grid_places(const protocol::PointTable& table, const FieldReader& fields) {
+  const std::string at = fields.text("at").value_or("");
+  const auto has_all = [&](const std::vector<AxisLayout>& axes) {
+    for (const std::string_view one : protocol::split(at, ',')) {
+      if (find(axes, one.substr(0, one.find_first_of(":@"))) == nullptr) {
+        return false;
+      }
+    }
+    return true;
+  };
+  std::vector<AxisLayout> axes;
+  for (const protocol::Block& block : table.recipe().blocks()) {
+    if (is_grid(block) && !has_all(axes)) {
+      axes = protocol::layout_of(block);
+    }
+  }
+  return places_at(axes, at);
+}
 
 GridSlice grid_slice(const protocol::PointTable& table, const FieldReader& fields) {
   const std::string x = fields.text("x").value_or("");
@@ -142,13 +172,7 @@ GridSlice grid_slice(const protocol::PointTable& table, const FieldReader& field
   if (y_axis != nullptr) {
     slice.y = side_of(*y_axis, fields, "y");
   }
-  std::vector<GridPlace> asked;
-  const std::string at = fields.text("at").value_or("");
-  for (std::string_view rest = at; !rest.empty();) {
-    const std::string_view one = rest.substr(0, rest.find(','));
-    rest.remove_prefix(std::min(rest.size(), one.size() + 1));
-    asked.push_back(place_of(axes, one));
-  }
+  const std::vector<GridPlace> asked = places_at(axes, fields.text("at").value_or(""));
   slice.first_point = table.block(slice.block).first_point;
   for (const AxisLayout& axis : axes) {
     const std::string& key = axis.axis->key();

@@ -49,4 +49,8 @@ struct GridSlice {
 /// std::invalid_argument naming the field and what is allowed.
 GridSlice grid_slice(const protocol::PointTable& table, const FieldReader& fields);
 
+/// What `at` holds fixed, and only that, of the first block that has all its axes. Throws as
+/// `grid_slice` does.
+std::vector<GridPlace> grid_places(const protocol::PointTable& table, const FieldReader& fields);
+
 }  // namespace oblique::server

@@ -56,7 +56,8 @@ Page::Page(const PageSettings& settings, const Neighbours& neighbours)
       version_(settings.version),
       key_(settings.token.empty() ? PageKey() : PageKey(settings.token)),
       at_(neighbours),
-      looks_(neighbours.service, settings.looks_kept) {}
+      looks_(neighbours.service, settings.looks_kept),
+      pictures_(settings.pictures) {}
 
 bool Page::has(const std::string& path) {
   return path.starts_with(kApi) || is_page_file(path);
@@ -167,7 +168,7 @@ void Page::gone(std::uint64_t number) {
   if (!known.empty() && known.mapped().talk) {
     at_.service.forget(number);
   } else if (!known.empty()) {
-    at_.answers.forget(number);
+    known.mapped().pool->forget(number);
   }
 }
 
@@ -214,6 +215,10 @@ std::optional<HttpAnswer> Page::begin_study(const HttpQuestion& question, const 
       FieldReader(question.fields).text("where")) {
     return begin(question, filters_.begin(place.study, question, is_slice));
   }
+  if (place.part == (place.point ? "/picture" : "picture")) {
+    return begin(question, at_.drawings,
+                 picture_job(pictures_, place.study, place.point, question.fields));
+  }
   std::optional<AnswerPool::Job> job;
   if (place.point && place.part.empty()) {
     job = point_job(place.study, *place.point);
@@ -224,7 +229,7 @@ std::optional<HttpAnswer> Page::begin_study(const HttpQuestion& question, const 
   } else if (!place.point && place.part == "bins") {
     job = bins_job(place.study, question.fields);
   }
-  return job ? begin(question, std::move(*job)) : nothing_there();
+  return job ? begin(question, at_.answers, std::move(*job)) : nothing_there();
 }
 
 std::optional<HttpAnswer> Page::begin_change(const HttpQuestion& question) {
@@ -232,7 +237,7 @@ std::optional<HttpAnswer> Page::begin_change(const HttpQuestion& question) {
     return begin(question, submit_talk(question));
   }
   if (question.path == kCheck) {
-    return begin(question, check_job(question.body));
+    return begin(question, at_.answers, check_job(question.body));
   }
   if (question.path == kLook) {
     return begin(question, looks_.begin(question));
@@ -252,16 +257,17 @@ std::optional<HttpAnswer> Page::begin(const HttpQuestion& question, Talk talk) {
   return std::nullopt;
 }
 
-std::optional<HttpAnswer> Page::begin(const HttpQuestion& question, AnswerPool::Job job) {
-  if (!at_.answers.submit(question.number, std::move(job))) {
+std::optional<HttpAnswer> Page::begin(const HttpQuestion& question, AnswerPool& pool,
+                                      AnswerPool::Job job) {
+  if (!pool.submit(question.number, std::move(job))) {
     return error_answer(kTryLater, kTooManyPictures);
   }
-  under_way_.emplace(question.number, UnderWay());
+  under_way_.emplace(question.number, UnderWay{{}, &pool});
   return std::nullopt;
 }
 
 std::optional<HttpAnswer> Page::begin(const HttpQuestion& question, FilteredPicture picture) {
-  auto answer = begin(question, std::move(picture.first));
+  auto answer = begin(question, at_.answers, std::move(picture.first));
   if (!answer) {
     under_way_.at(question.number).then = std::move(picture.then);
   }
@@ -272,7 +278,7 @@ std::optional<HttpAnswer> Page::go_on(const HttpQuestion& question, UnderWay& un
   if (under_way.talk) {
     return go_on_talking(question, under_way);
   }
-  auto answer = at_.answers.take(question.number);
+  auto answer = under_way.pool->take(question.number);
   if (!answer || answer->status != AnswerPool::kStep) {
     return answer;
   }
@@ -295,7 +301,7 @@ std::optional<HttpAnswer> Page::go_on_talking(const HttpQuestion& question, Unde
     if (auto* answer = std::get_if<HttpAnswer>(&next)) {
       return std::move(*answer);
     }
-    under_way.talk.reset();
+    under_way = {{}, &at_.answers};
     const bool is_taken =
         at_.answers.submit(question.number, std::get<AnswerPool::Job>(std::move(next)));
     return is_taken ? std::nullopt : std::optional(error_answer(kTryLater, kTooManyPictures));

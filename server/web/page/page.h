@@ -14,6 +14,7 @@
 #include "server/web/page/page_key.h"
 #include "server/web/page/service_line.h"
 #include "server/web/page/talks.h"
+#include "server/web/pictures/picture_job.h"
 
 namespace oblique::server {
 
@@ -24,6 +25,7 @@ struct PageSettings {
   bool shows_without_token = false;
   /// A study that was made to be looked at goes when nobody has for so long.
   std::chrono::milliseconds looks_kept{6000};
+  PictureSettings pictures = {};
   std::string version;
 };
 
@@ -35,6 +37,7 @@ class Page {
   struct Neighbours {
     ServiceLine& service;
     AnswerPool& answers;
+    AnswerPool& drawings;  ///< where the program that draws is waited for
     LiveText& overview;
   };
 
@@ -71,10 +74,12 @@ class Page {
   std::optional<HttpAnswer> begin_study(const HttpQuestion& question, const Place& place);
   std::optional<HttpAnswer> begin_change(const HttpQuestion& question);
   std::optional<HttpAnswer> begin(const HttpQuestion& question, Talk talk);
-  std::optional<HttpAnswer> begin(const HttpQuestion& question, AnswerPool::Job job);
-  /// What a request waits for: a reply to a talk or, without one, a job of the pool.
+  std::optional<HttpAnswer> begin(const HttpQuestion& question, AnswerPool& pool,
+                                  AnswerPool::Job job);
+  /// What a request waits for: a reply to a talk or, without one, a job of a pool.
   struct UnderWay {
     std::optional<Talk> talk = {};
+    AnswerPool* pool = nullptr;
     std::function<Talk()> then = {};  ///< what follows a job that is but the first step
   };
   std::optional<HttpAnswer> begin(const HttpQuestion& question, FilteredPicture picture);
@@ -86,6 +91,7 @@ class Page {
   PageKey key_;
   Neighbours at_;
   Looks looks_;
+  PictureSettings pictures_;
   PointFilters filters_;
   std::map<std::uint64_t, UnderWay> under_way_;  // by number of the request
 };

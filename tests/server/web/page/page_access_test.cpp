@@ -41,8 +41,9 @@ TEST(PageAccess, WithoutTheCookieNothingIsShown) {
   const std::string right = page.cookie_header();
   for (const std::string path :
        {"/api/events", "/api/studies", "/api/workers", "/api/studies/1", "/api/studies/1/rows",
-        "/api/studies/1/slice?z=fn_peak_N&x=mu", "/api/studies/1/points/0",
-        "/api/studies/1/points/0/trace", "/api/anything"}) {
+        "/api/studies/1/slice?z=fn_peak_N&x=mu", "/api/studies/1/slice?z=fn_peak_N&x=mu&where=1",
+        "/api/studies/1/bins?x=mu&where=1", "/api/studies/1/picture", "/api/studies/1/points/0",
+        "/api/studies/1/points/0/picture", "/api/studies/1/points/0/trace", "/api/anything"}) {
     for (const std::string& cookies :
          {std::string(), std::string("Cookie: oblique-1=1\r\n"),
           right.substr(0, right.size() - 3) + "\r\n",
@@ -127,7 +128,8 @@ TEST(PageAccess, OnlyChangesHaveAnotherMethod) {
   for (const std::string path :
        {"/", "/page.css", "/metrics", "/api/session", "/api/studies/1", "/api/studies/1/rows",
         "/api/studies/1/delete", "/api/studies/0/pause", "/api/studies/x/pause",
-        "/api/studies/1/pause/", "/api/studies/1/points/1/pause"}) {
+        "/api/studies/1/pause/", "/api/studies/1/points/1/pause", "/api/studies/1/slice",
+        "/api/studies/1/bins", "/api/studies/1/picture", "/api/studies/1/points/1/picture"}) {
     EXPECT_EQ(status_of_answer(page.ask("POST", path, headers)), 405) << path;
   }
   for (const std::string method : {"PUT", "DELETE", "OPTIONS", "PATCH", "TRACE", "get"}) {

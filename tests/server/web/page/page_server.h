@@ -54,6 +54,7 @@ class PageServer {
   }
 
   const RunningServer& server() const { return server_; }
+  std::string database() const { return folder_.file("a.db"); }
   std::string url() const { return server_.http_url(); }
   std::string host() const { return url().substr(std::string("http://").size()); }
   std::string cookie_header() const { return "Cookie: " + cookie_ + "\r\n"; }
