@@ -1,5 +1,6 @@
 #include "server/web/http/http_parts.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cstdint>
@@ -8,6 +9,7 @@
 #include <system_error>
 #include <utility>
 
+#include <poll.h>
 #include <strings.h>
 
 namespace oblique::server {
@@ -104,6 +106,24 @@ void add_headers(MHD_Response* response, const HttpAnswer& answer) {
   if (answer.status == MHD_HTTP_SERVICE_UNAVAILABLE) {
     MHD_add_response_header(response, MHD_HTTP_HEADER_RETRY_AFTER, "1");
   }
+}
+
+std::string host_of(const PeerAddress& address) {
+  const std::string text = address.text();
+  return text.substr(0, text.rfind(':'));
+}
+
+std::vector<bool> who_is_gone(const std::vector<int>& descriptors) {
+  std::vector<pollfd> items;
+  for (const int descriptor : descriptors) {
+    items.push_back({descriptor, POLLRDHUP, 0});
+  }
+  std::vector<bool> gone(descriptors.size());
+  if (!items.empty() && ::poll(items.data(), items.size(), 0) > 0) {
+    std::transform(items.begin(), items.end(), gone.begin(),
+                   [](const pollfd& item) { return item.revents != 0; });
+  }
+  return gone;
 }
 
 }  // namespace oblique::server

@@ -32,19 +32,6 @@ constexpr milliseconds kLongestWait{200};
 /// New connections in one turn.
 constexpr int kMostAccepted = 64;
 
-/// To who has not asked yet; nothing of an answer is under way then.
-constexpr std::string_view kTooSlow =
-    "HTTP/1.1 408 Request Timeout\r\nConnection: close\r\nContent-Length: 0\r\n\r\n";
-constexpr std::string_view kCrowded =
-    "HTTP/1.1 503 Service Unavailable\r\nRetry-After: 1\r\nConnection: close\r\n"
-    "Content-Length: 0\r\n\r\n";
-
-/// Without the port; of IPv4 also where it came by an IPv6 socket.
-std::string host_of(const PeerAddress& address) {
-  const std::string text = address.text();
-  return text.substr(0, text.rfind(':'));
-}
-
 }  // namespace
 
 class HttpServer::Parts {
@@ -108,6 +95,7 @@ class HttpServer::Parts {
       wake_up_.clear();
       turn_again_ = rules_.turn();
       end_overdue(Clock::now());
+      end_gone();
       accept_all();
       ask_again();
       MHD_run(daemon_);
@@ -187,6 +175,21 @@ class HttpServer::Parts {
       if (!is_quiet_stream(this_one->second) && now - this_one->second.since >= limits_.longest) {
         ++counts_.ended_as_slow;
         end(this_one, kTooSlow);
+      }
+    }
+  }
+
+  /// The library does not look at a connection that waits.
+  void end_gone() {
+    std::vector<int> descriptors;
+    for (const auto& [connection, peer] : peers_) {
+      descriptors.push_back(peer.waits ? peer.descriptor : -1);
+    }
+    auto peer = peers_.begin();
+    for (const bool gone : who_is_gone(descriptors)) {
+      const auto this_one = peer++;
+      if (gone) {
+        end(this_one, {});
       }
     }
   }
@@ -315,12 +318,11 @@ class HttpServer::Parts {
     HttpQuestion& question = peer->second.request.question;
     question.waited = std::chrono::duration_cast<milliseconds>(now - *peer->second.asked);
     counts_.connections = peers_.size();
-    const auto answer = is_stopping_ ? std::nullopt : answer_(question);
-    if (answer) {
-      return send(peer, *answer);
-    }
     if (is_stopping_) {
       return MHD_NO;
+    }
+    if (const auto answer = answer_(question)) {
+      return send(peer, *answer);
     }
     peer->second.waits = true;
     MHD_suspend_connection(peer->first);
@@ -379,9 +381,6 @@ class HttpServer::Parts {
   std::thread thread_;  // last: it uses all the others
 };
 
-HttpServer::HttpServer(const HttpAddress& address, OwnNames names, const HttpLimits& limits,
-                       Answer answer)
-    : HttpServer(address, std::move(names), limits, std::move(answer), Rules()) {}
 HttpServer::HttpServer(const HttpAddress& address, OwnNames names, const HttpLimits& limits,
                        Answer answer, Rules rules)
     : parts_(std::make_unique<Parts>(address, std::move(names), limits, std::move(answer),

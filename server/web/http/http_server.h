@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "server/web/http/http_address.h"
 #include "server/web/http/http_message.h"
@@ -55,7 +56,8 @@ class HttpServer {
   };
 
   /// Listens from now on. Throws std::runtime_error, naming the address, when it cannot.
-  HttpServer(const HttpAddress& address, OwnNames names, const HttpLimits& limits, Answer answer);
+  HttpServer(const HttpAddress& address, OwnNames names, const HttpLimits& limits, Answer answer)
+      : HttpServer(address, std::move(names), limits, std::move(answer), Rules()) {}
   HttpServer(const HttpAddress& address, OwnNames names, const HttpLimits& limits, Answer answer,
              Rules rules);
   /// Ends the thread; who waits for an answer gets none.

@@ -19,23 +19,45 @@ using std::chrono::milliseconds;
 using testing::HasSubstr;
 using testing::Not;
 
-/// Repeats the path that it is asked for; to /wait there is no answer before `is_open`, and that to
-/// /long has more bytes than fit on their way.
+/// One that always, or never, has more.
+class EndlessStream final : public HttpStream {
+ public:
+  explicit EndlessStream(bool has_more) : has_more_(has_more) {}
+  bool has_news() override { return has_more_; }
+  std::string next() override {
+    constexpr std::size_t kPart = 100'000;
+    return has_more_ ? std::string(kPart, 'x') : std::string();
+  }
+
+ private:
+  bool has_more_;
+};
+
+/// Repeats the path that it is asked for; to /wait there is no answer before `is_open`, that to
+/// /long has more bytes than fit on their way, and those to /loud and /quiet never end.
 class EchoServer {
  public:
   explicit EchoServer(const HttpLimits& limits = {})
-      : server_({"127.0.0.1", "*"}, {}, limits,
-                [this](const HttpServer::Question& question) -> std::optional<HttpAnswer> {
-                  slow_ = question.counts->ended_as_slow;
-                  crowded_ = question.counts->ended_for_others;
-                  if (question.path == "/wait" && !is_open_) {
-                    ++asked_;
-                    return std::nullopt;
-                  }
-                  return HttpAnswer{
-                      200, "text/plain",
-                      question.path == "/long" ? std::string(kLong, 'x') : question.path};
-                }) {}
+      : server_(
+            {"127.0.0.1", "*"}, {}, limits,
+            [this](const HttpServer::Question& question) -> std::optional<HttpAnswer> {
+              slow_ = question.counts->ended_as_slow;
+              crowded_ = question.counts->ended_for_others;
+              if (question.path == "/wait" && !is_open_) {
+                ++asked_;
+                return std::nullopt;
+              }
+              if (question.path == "/loud" || question.path == "/quiet") {
+                return HttpAnswer{200,
+                                  "text/plain",
+                                  {},
+                                  {},
+                                  std::make_shared<EndlessStream>(question.path == "/loud")};
+              }
+              return HttpAnswer{200, "text/plain",
+                                question.path == "/long" ? std::string(kLong, 'x') : question.path};
+            },
+            rules()) {}
 
   static constexpr std::size_t kLong = std::size_t{64} << 20U;
 
@@ -47,12 +69,20 @@ class EchoServer {
   std::uint64_t asked() const { return asked_; }
   std::uint64_t slow() const { return slow_; }
   std::uint64_t crowded() const { return crowded_; }
+  std::uint64_t gone() const { return gone_; }
 
  private:
+  HttpServer::Rules rules() {
+    HttpServer::Rules rules;
+    rules.gone = [this](std::uint64_t) { ++gone_; };
+    return rules;
+  }
+
   std::atomic<bool> is_open_ = false;
   std::atomic<std::uint64_t> asked_ = 0;
   std::atomic<std::uint64_t> slow_ = 0;
   std::atomic<std::uint64_t> crowded_ = 0;
+  std::atomic<std::uint64_t> gone_ = 0;
   HttpServer server_;  // last: its thread uses the others
 };
 
@@ -204,6 +234,56 @@ TEST(HttpServer, WhoTakesTooLongIsEnded) {
     get(server.url(), "/");
   }
   EXPECT_LT(reading_nothing.read_to_the_end().size(), EchoServer::kLong);
+}
+
+TEST(HttpServer, AStreamThatIsNotTakenIsEndedAndAQuietOneIsNot) {
+  HttpLimits limits;
+  limits.longest = milliseconds(50);
+  EchoServer server(limits);
+  const std::string rest = " HTTP/1.1\r\nHost: localhost\r\n\r\n";
+  RawHttp quiet(server.url());
+  quiet.send("GET /quiet" + rest);
+  quiet.read_until("\r\n\r\n");
+  RawHttp taking(server.url());
+  taking.send("GET /loud" + rest);
+  taking.read_until("\r\n\r\n");
+  RawHttp taking_nothing(server.url());
+  taking_nothing.send("GET /loud" + rest);
+  std::string some(std::size_t{1} << 20U, '\0');
+  while (server.slow() < 1) {
+    ASSERT_GT(::recv(taking.number(), some.data(), some.size(), 0), 0) << "it takes what comes";
+    get(server.url(), "/");
+  }
+  EXPECT_FALSE(quiet.has_news()) << "it takes all that there is";
+  while (::recv(taking_nothing.number(), some.data(), some.size(), 0) > 0) {
+    // What was on its way comes, and then the end.
+  }
+}
+
+TEST(HttpServer, WhoGoesBeforeTheAnswerIsNoticed) {
+  EchoServer server;
+  const std::string question = "GET /wait HTTP/1.1\r\nHost: localhost\r\n\r\n";
+  RawHttp staying(server.url());
+  staying.send(question);
+  for (const bool closes : {true, false}) {
+    auto going = std::make_unique<RawHttp>(server.url());
+    going->send(question);
+    const std::uint64_t asked = server.asked();
+    while (server.asked() < asked + 4) {
+      get(server.url(), "/");
+    }
+    const std::uint64_t gone = server.gone();
+    if (closes) {
+      going.reset();
+    } else {
+      ::shutdown(going->number(), SHUT_WR);
+    }
+    while (server.gone() == gone) {
+      get(server.url(), "/");
+    }
+  }
+  EXPECT_EQ(server.gone(), 2U);
+  EXPECT_FALSE(staying.has_news());
 }
 
 TEST(HttpServer, WhoWaitsForAnAnswerHoldsUpNobody) {
