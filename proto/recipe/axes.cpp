@@ -81,6 +81,20 @@ double axis_value(const Axis& axis, std::uint64_t i) {
   return axis.count() == 0 ? axis.values(static_cast<int>(i)) : RangeValues(axis).at(i);
 }
 
+std::uint64_t first_value_from(const Axis& axis, double value) {
+  std::uint64_t first = 0;
+  std::uint64_t end = axis_size(axis);
+  while (first < end) {
+    const std::uint64_t middle = first + (end - first) / 2;
+    if (axis_value(axis, middle) < value) {
+      first = middle + 1;
+    } else {
+      end = middle;
+    }
+  }
+  return first;
+}
+
 double smallest_value(const Axis& axis) {
   if (axis.has_distribution()) {
     const Distribution& drawn = axis.distribution();

@@ -36,6 +36,10 @@ class RangeValues {
   exact_math::TwoDoubles log_ratio_{};
 };
 
+/// Number of the first value of a rising axis, which every range is, that is at least `value`, and
+/// the axis' size when there is none: its inverse.
+std::uint64_t first_value_from(const Axis& axis, double value);
+
 /// Bounds of the values of a list, a range or a distribution; of the last they may be infinite.
 double smallest_value(const Axis& axis);
 double largest_value(const Axis& axis);
