@@ -10,6 +10,7 @@
 #include "proto/recipe/axes.h"
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/keys.h"
+#include "proto/recipe/model_message.h"
 #include "server/asking/columns.h"
 #include "server/web/http/json_answer.h"
 #include "worker/solver/model/parameters.h"
@@ -98,6 +99,28 @@ ordered_json columns_json() {
   return columns;
 }
 
+/// The model that blocks without model axes have, key by key.
+ordered_json model_json(const protocol::Recipe& recipe) {
+  const solver::ModelParameters model = recipe.has_model()
+                                            ? protocol::unjudged_from_message(recipe.model())
+                                            : solver::ModelParameters();
+  ordered_json keys = ordered_json::array();
+  for (const solver::ParameterKey& key : solver::model_keys()) {
+    const bool is_word = key.name == "integrator";
+    ordered_json value = is_word ? ordered_json(solver::integrator_name(model.integrator))
+                                 : ordered_json(key.get(model));  // what is no number becomes null
+    keys.push_back({{"key", key.name},
+                    {"unit", key.unit},
+                    {"meaning", key.meaning},
+                    {"value", std::move(value)}});
+  }
+  keys.push_back({{"key", "lengths"},
+                  {"unit", "m"},
+                  {"meaning", "of each link, from the pin outwards"},
+                  {"value", model.lengths_m}});
+  return keys;
+}
+
 HttpAnswer study_answer(const AnswerDesk& desk, std::uint64_t id) {
   const LookedAtStudy study = desk.studies.study(desk.database, id);
   const protocol::Recipe& recipe = study.table->recipe();
@@ -113,6 +136,7 @@ HttpAnswer study_answer(const AnswerDesk& desk, std::uint64_t id) {
                       {"numbers", study.table->size()},
                       {"models", study.table->models()},
                       {"errors", recipe.errors()},
+                      {"model", model_json(recipe)},
                       {"blocks", std::move(blocks)},
                       {"blocks_left_out", std::max(recipe.blocks_size() - kMostBlocks, 0)},
                       {"columns", columns_json()}});

@@ -1,6 +1,7 @@
 // What the page asks a whole server with a pretended worker.
 #include <bit>
 #include <cmath>
+#include <map>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -92,6 +93,14 @@ TEST_F(PageAnswersTest, AStudyIsItsRecipeAndColumns) {
   const json study = page_.json("/api/studies/1");
   EXPECT_EQ(study["name"], "grid");
   EXPECT_EQ(study["points"], 24);
+  std::map<std::string, json> model;
+  for (const json& key : study["model"]) {
+    model[key["key"]] = key;
+  }
+  EXPECT_EQ(model.at("E")["value"], 70e9);
+  EXPECT_EQ(model.at("E")["unit"], "Pa");
+  EXPECT_EQ(model.at("lengths")["value"], json({0.4, 0.4, 0.4}));
+  EXPECT_EQ(model.at("integrator")["value"], "explicit");
   const json& block = study["blocks"][0];
   EXPECT_EQ(block["kind"], "grid");
   EXPECT_EQ(block["axes"][0]["list"], json({1.0, 0.9, 0.8}));
