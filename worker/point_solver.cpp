@@ -185,7 +185,8 @@ protocol::PointResult PointSolver::trace(const protocol::TraceOrder& order,
       throw solver::SolveError(fall.error);
     }
     const solver::Finger finger(model, fall.fallen);
-    auto result = finger.solve(order.h_m(), order.mu(), order.e_star(), {sink, order.shape()});
+    auto result =
+        finger.solve(order.h_m(), order.mu(), order.e_star(), {sink, order.shape(), order.fall()});
     if (order.errors()) {
       result.errors = solver::errors_by_companion(
           model, result,

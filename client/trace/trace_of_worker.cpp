@@ -69,6 +69,7 @@ SolvedByWorker trace_by_worker(Connection& connection, const std::string& study,
                                const BeginTrace& begin, const solver::Tracing::Sink& row) {
   protocol::TraceRequest request = request_for(study, point);
   request.set_shape(wishes.with_shape);
+  request.set_fall(wishes.with_fall);
   request.set_time_limit_ms(static_cast<std::uint64_t>(wishes.time_limit_ms));
   protocol::TraceReply reply = connection.trace(request);
   const SolvedByWorker solved = solved_by_worker(study, point, reply);

@@ -26,6 +26,7 @@ struct SolvedByWorker {
 /// What is wanted of a trace.
 struct TraceWishes {
   bool with_shape = false;
+  bool with_fall = false;          ///< older servers and workers give none all the same
   std::int64_t time_limit_ms = 0;  ///< 0: the server's own
 };
 

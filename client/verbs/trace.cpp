@@ -23,7 +23,7 @@ namespace {
 
 constexpr const char* kTraceExamples = R"(Examples:
   oblique trace paper 3 > point3.csv
-  oblique trace paper 3 --out point3.npz --shape
+  oblique trace paper 3 --out point3.npz --shape --fall
   oblique trace paper 3 --format json > point3.json
   oblique trace paper 3 --server tcp://127.0.0.1:7600 --on-worker --out point3.csv
 
@@ -38,6 +38,7 @@ struct TraceFlags {
   std::string out;     // empty: standard output
   std::string format;  // empty: as the file's name ends, or CSV
   bool shape = false;
+  bool fall = false;
   bool here = false;
   bool on_worker = false;
   SourceFlags source;
@@ -67,7 +68,8 @@ Solved solve_in_this_process(const TraceFlags& flags, const PointAtHand& point,
   output.begin(solver::trace_shape(point.model.lengths_m.size(),
                                    static_cast<std::size_t>(point.model.elements_per_link),
                                    flags.shape));
-  const solver::Tracing tracing{[&](const solver::TraceRow& row) { output.add(row); }, flags.shape};
+  const solver::Tracing tracing{[&](const solver::TraceRow& row) { output.add(row); }, flags.shape,
+                                flags.fall};
   try {
     return {point,
             solve_here(finger, {point.H_m, point.mu, point.e_star, point.errors}, tracing,
@@ -86,14 +88,24 @@ Solved solve_by_worker(const TraceFlags& flags, Connection& connection, TraceOut
   WorkLine line(std::cerr, settings);
   const auto waiting = line.begin(fmt::format("a worker of {} solves point {} of {}",
                                               connection.url(), flags.point, flags.study));
+  bool has_fall = false;
   const auto solved = trace_by_worker(
       connection, flags.study, static_cast<std::uint64_t>(flags.point),
       {.with_shape = flags.shape,
+       .with_fall = flags.fall,
        .time_limit_ms = flags.source.timeout_s ? connection_settings(flags.source).timeout_ms : 0},
       [&](const solver::TraceShape& shape) { output.begin(shape); },
-      [&](const solver::TraceRow& row) { output.add(row); });
+      [&](const solver::TraceRow& row) {
+        output.add(row);
+        has_fall = has_fall || row.state == solver::kFalling;
+      });
   if (!solved.error.empty()) {
     throw_failure(flags, solved.error);
+  }
+  if (flags.fall && !has_fall) {
+    tell_line(
+        "The trace has no rows of the fall: the server or its worker is older than these. --here "
+        "solves the point in this process.");
   }
   return {solved.point, solved.result,
           fmt::format("by worker {} ({})", solved.worker, solved.instruction_set)};
@@ -184,6 +196,10 @@ void add_trace(CLI::App& app, Command& command) {
                    "csv, json or npz; as the file's name ends when left out, else csv")
       ->type_name("FORMAT");
   verb->add_flag("--shape", flags->shape, "add the positions of the chain's nodes");
+  verb->add_flag(
+      "--fall", flags->fall,
+      "begin with 121 rows of the fall, from release to touch: times are negative there, "
+      "the state is falling");
   auto* here = verb->add_flag("--here", flags->here, "solve it in this process");
   verb->add_flag("--on-worker", flags->on_worker, "have a worker of the server solve it")
       ->excludes(here);

@@ -283,6 +283,24 @@ TEST(PointSolverTest, ATraceByGeneralizedAlphaHasTheBitsOfItsBatchToo) {
   expect_traces_to_repeat(solver::Integrator::kGeneralizedAlpha, 2, false, true);
 }
 
+TEST(PointSolverTest, ATraceBeginsWithTheFallWhereThatIsOrdered) {
+  solver::ModelParameters model;
+  model.elements_per_link = 1;
+  protocol::Recipe recipe = recipe_with_points(2);
+  *recipe.mutable_model() = protocol::to_message(model);
+  PointSolver solver(1);
+  protocol::TraceOrder order = order_of(batch_of(recipe), 0);
+  for (const bool fall : {false, true}) {
+    order.set_fall(fall);
+    std::vector<std::string> states;
+    solver.trace(order, [&](const solver::TraceRow& row) { states.push_back(row.state); });
+    ASSERT_FALSE(states.empty());
+    EXPECT_EQ(std::count(states.begin(), states.end(), solver::kFalling),
+              fall ? solver::kFallRows : 0);
+    EXPECT_EQ(states.front() == solver::kFalling, fall);
+  }
+}
+
 TEST(PointSolverTest, ATraceWithoutAnswerFailsWithTheReasonOfItsPoint) {
   PointSolver solver(1);
   const Batch batch = batch_of(recipe_with_points(2));

@@ -6,6 +6,7 @@
 
 #include "worker/solver/finger_parts.h"
 #include "worker/solver/lanes/lane_stepper.h"
+#include "worker/solver/motion/trace_of_chain.h"
 
 namespace oblique::solver {
 
@@ -33,6 +34,9 @@ CaseResult Finger::solve(double H_m, double mu, double e_star) const {
 
 CaseResult Finger::solve(double H_m, double mu, double e_star, const Tracing& tracing) const {
   parts_->check(H_m, mu, e_star);
+  if (tracing.sink && tracing.with_fall) {
+    trace_fall(parts_->prepared()->motion(), parts_->fall(), H_m, tracing);
+  }
   std::optional<FingerPoint> point = FingerPoint{*this, {0, H_m, mu, e_star}};
   PointOutcome outcome{};
   solver::solve_points([&point] { return std::exchange(point, std::nullopt); },

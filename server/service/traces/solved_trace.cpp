@@ -26,6 +26,7 @@ std::size_t numbers_of(const protocol::ModelParameters& model, bool shape) {
 SolvedTrace::SolvedTrace(const TraceKey& key, const TracedPoint& point, std::size_t most_bytes)
     : head_(said_of(point)),
       numbers_a_row_(numbers_of(point.model, key.shape)),
+      has_fall_(key.fall),
       most_bytes_(most_bytes) {
   head_.set_study_id(key.study);
 }
@@ -43,6 +44,9 @@ std::string SolvedTrace::add(const protocol::TraceRows& rows) {
   const bool are_states = std::all_of(rows.states().begin(), rows.states().end(), [](char code) {
     return static_cast<unsigned char>(code) < solver::kTraceStates.size();
   });
+  if (const std::string fault = fault_of_fall(rows.states()); !fault.empty()) {
+    return fault;
+  }
   const bool are_finite = std::all_of(rows.values().begin(), rows.values().end(),
                                       [](double value) { return std::isfinite(value); });
   if (!are_states || !are_finite) {
@@ -50,6 +54,20 @@ std::string SolvedTrace::add(const protocol::TraceRows& rows) {
   }
   values_.insert(values_.end(), rows.values().begin(), rows.values().end());
   states_ += rows.states();
+  return {};
+}
+
+/// Clients that did not ask for the fall do not know its state, and those that did cut it off.
+std::string SolvedTrace::fault_of_fall(const std::string& states) const {
+  const auto is_falling = [](char code) {
+    return static_cast<unsigned char>(code) == solver::kFallingCode;
+  };
+  const bool falls = std::any_of(states.begin(), states.end(), is_falling);
+  const bool has_touched = !states_.empty() && !is_falling(states_.back());
+  if (falls && (!has_fall_ || has_touched ||
+                !std::is_partitioned(states.begin(), states.end(), is_falling))) {
+    return has_fall_ ? "it falls again after the touch" : "it has rows of the fall, unasked";
+  }
   return {};
 }
 

@@ -1,11 +1,11 @@
 #pragma once
 
+#include <compare>
 #include <cstddef>
 #include <cstdint>
 #include <list>
 #include <optional>
 #include <string>
-#include <tuple>
 #include <vector>
 
 #include "proto/oblique.pb.h"
@@ -19,11 +19,9 @@ struct TraceKey {
   StudyId study = 0;
   std::uint64_t point = 0;
   bool shape = false;  ///< with the positions of the nodes
+  bool fall = false;   ///< with rows of the fall
 
-  bool operator==(const TraceKey&) const = default;
-  bool operator<(const TraceKey& other) const {
-    return std::tie(study, point, shape) < std::tie(other.study, other.point, other.shape);
-  }
+  auto operator<=>(const TraceKey&) const = default;
 };
 
 /// A trace as it comes in from a worker. What comes is taken for hostile.
@@ -47,8 +45,11 @@ class SolvedTrace {
   protocol::TraceReply reply(std::uint64_t first_row) const;
 
  private:
+  std::string fault_of_fall(const std::string& states) const;
+
   protocol::TraceReply head_;  // without rows
   std::size_t numbers_a_row_;
+  bool has_fall_;
   std::size_t most_bytes_;
   std::vector<double> values_;
   std::string states_;

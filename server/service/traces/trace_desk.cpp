@@ -49,7 +49,7 @@ void TraceDesk::ask(const Client& client, const protocol::TraceRequest& request,
   constexpr auto kLongest = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
   const TraceQuestion question{
       ticket,
-      {study.id, request.point(), request.shape()},
+      {study.id, request.point(), request.shape(), request.fall()},
       request.first_row(),
       static_cast<std::int64_t>(std::min(request.time_limit_ms(), kLongest))};
   waiting_.emplace(ticket, Waiting{client, asker, question, study.solver_version,

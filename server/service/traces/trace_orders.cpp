@@ -72,6 +72,7 @@ void TraceOrders::order(const TraceQuestion& question, const TracedPoint& point,
   order.set_e_star(point.e_star);
   order.set_errors(point.errors);
   order.set_shape(question.key.shape);
+  order.set_fall(question.key.fall);
   order.set_most_bytes(limits_.most_bytes);
   jobs_.emplace(question.key, Job{std::move(order),
                                   version,

@@ -23,6 +23,7 @@ struct ComingTrace {
   std::string study;
   std::uint64_t point;
   bool shape;
+  bool fall;
   protocol::TraceReply head;
   std::vector<double> values{};
   std::string states{};
@@ -34,6 +35,7 @@ protocol::ClientRequest trace_request(const ComingTrace& trace) {
   asked.set_study(trace.study);
   asked.set_point(trace.point);
   asked.set_shape(trace.shape);
+  asked.set_fall(trace.fall);
   asked.set_first_row(trace.states.size());
   return request;
 }
@@ -74,6 +76,7 @@ HttpAnswer whole(const ComingTrace& trace) {
                          {"elements_per_link", model.elements_per_link},
                          {"lengths_m", model.lengths_m},
                          {"rows", trace.states.size()},
+                         {"fall_rows", std::ranges::count(trace.states, solver::kFallingCode)},
                          {"row_numbers", solver::trace_numbers(shape)},
                          {"columns", columns_of(shape)},
                          {"states", solver::kTraceStates},
@@ -86,10 +89,14 @@ HttpAnswer whole(const ComingTrace& trace) {
 }  // namespace
 
 Talk trace_talk(std::uint64_t study, std::uint64_t point, const HttpQuestion& question) {
-  const auto field = question.fields.find("shape");
+  const auto is_asked_for = [&question](const char* name) {
+    const auto field = question.fields.find(name);
+    return field != question.fields.end() && field->second == "1";
+  };
   auto trace = std::make_shared<ComingTrace>();
   trace->point = point;
-  trace->shape = field != question.fields.end() && field->second == "1";
+  trace->shape = is_asked_for("shape");
+  trace->fall = is_asked_for("fall");
   protocol::ClientRequest first;
   first.mutable_status()->set_study_id(study);
   return {

@@ -3,6 +3,7 @@
 #include <fstream>
 #include <map>
 #include <memory>
+#include <sstream>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -109,6 +110,29 @@ TEST_F(TraceVerb, HasTheRowsOfSolve) {
   EXPECT_EQ(run({"trace", "models", "15", "--shape", "--format", "npz"}).out, text_of("trace.npz"));
 }
 
+TEST_F(TraceVerb, BeginsWithTheFallWhereThatIsAskedFor) {
+  store_study("steps");
+  const auto lines_of = [](const std::string& text) {
+    std::istringstream stream(text);
+    std::vector<std::string> lines;
+    for (std::string line; std::getline(stream, line);) {
+      lines.push_back(line);
+    }
+    return lines;
+  };
+  const auto contact = lines_of(run({"trace", "steps", "1"}).out);
+  const auto whole = lines_of(run({"trace", "steps", "1", "--fall"}).out);
+  ASSERT_EQ(whole.size(), contact.size() + 121);
+  EXPECT_EQ(whole[0], contact[0]) << "the same columns";
+  EXPECT_THAT(whole[1], StartsWith("-0.4"));
+  EXPECT_THAT(whole[121], StartsWith("0,0,0,0,0,"));
+  for (std::size_t i = 1; i <= 121; ++i) {
+    EXPECT_THAT(whole[i], HasSubstr(",falling,"));
+  }
+  EXPECT_EQ(std::vector(whole.begin() + 122, whole.end()),
+            std::vector(contact.begin() + 1, contact.end()));
+}
+
 TEST_F(TraceVerb, WhatIsNotThereOrCannotBeWrittenIsNamed) {
   store_study("models");
   const auto says = [&](std::vector<std::string> words, int exit_code, const char* sentence) {
@@ -186,7 +210,7 @@ TEST_F(TraceVerb, AWorkerSolvesForWhoAsksAServer) {
   EXPECT_EQ(there.out, text_of("here.csv"));
   for (const char* file : {"here.npz", "there.npz"}) {
     const bool is_here = file == std::string_view("here.npz");
-    ask({"models", "3", "--shape", is_here ? "--here" : "--on-worker", "--out", file});
+    ask({"models", "3", "--shape", "--fall", is_here ? "--here" : "--on-worker", "--out", file});
   }
   EXPECT_THAT(text_of("here.npz"), StartsWith("PK"));
   EXPECT_EQ(text_of("there.npz"), text_of("here.npz"));

@@ -54,10 +54,11 @@ TEST(View, ShowsADatabaseAndItsPointsUntilItIsStopped) {
   EXPECT_THAT(browser.ask("/api/studies"), HasSubstr("\"name\":\"small\""));
   std::string trace;
   wait_until("a worker has solved the point again", [&] {
-    trace = browser.ask("/api/studies/1/points/2/trace?shape=1");
+    trace = browser.ask("/api/studies/1/points/2/trace?shape=1&fall=1");
     return status_of_answer(trace) == 200;
   });
   EXPECT_THAT(body_of(trace), HasSubstr("\"nodes\":13"));
+  EXPECT_THAT(body_of(trace), HasSubstr("\"fall_rows\":121"));
   view.send(SIGINT);
   EXPECT_EQ(view.wait(), 0);
   wait_until("server and worker have ended", [&] { return processes_of(folder).empty(); });

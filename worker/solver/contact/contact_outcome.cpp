@@ -2,10 +2,10 @@
 
 #include <cmath>
 #include <string>
-#include <vector>
 
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
+#include "worker/solver/motion/trace_of_chain.h"
 
 namespace oblique::solver {
 namespace {
@@ -80,22 +80,7 @@ CaseResult contact_result(const Contact& contact, const ContactParameters& param
 
 void ContactTracer::accepted(const Contact& contact, const ChainState& state) const {
   TraceRow row = trace_row(contact, touch_y_m_);
-  const auto in_turn = [](const Eigen::Matrix2Xd& columns) {
-    return std::vector<double>(columns.data(), columns.data() + columns.size());
-  };
-  Eigen::Matrix2Xd reactions_N;
-  motion_.reactions(contact.force(), state, reactions_N);
-  row.reactions_N = in_turn(reactions_N);
-  const Energies energies = motion_.energies(state);
-  row.kinetic_J = energies.kinetic_J;
-  row.strain_J = energies.strain_J;
-  row.gravity_J = energies.gravity_J;
-  const Eigen::Vector2d momentum_Ns = motion_.momentum_Ns(state);
-  row.momentum_x_Ns = momentum_Ns.x();
-  row.momentum_y_Ns = momentum_Ns.y();
-  if (tracing_.with_shape) {
-    row.nodes_m = in_turn(motion_.node_positions_m(state));
-  }
+  tell_chain(motion_, contact.force(), state, tracing_.with_shape, row);
   tracing_.sink(row);
 }
 

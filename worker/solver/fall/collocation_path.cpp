@@ -131,13 +131,16 @@ void CollocationPath::keep(const CollocationLanes& lanes, std::size_t lane) {
   steps_kept_ *= 2;
 }
 
+std::shared_ptr<const CollocationPath::Interval> CollocationPath::kept_interval(
+    std::size_t number) const {
+  const std::lock_guard lock(mutex_);
+  return intervals_[number];
+}
+
 std::shared_ptr<const CollocationPath::Interval> CollocationPath::interval(
     std::size_t number) const {
-  {
-    const std::lock_guard lock(mutex_);
-    if (intervals_[number]) {
-      return intervals_[number];
-    }
+  if (auto kept = kept_interval(number)) {
+    return kept;
   }
   auto solved = solve_again(number);
   const std::lock_guard lock(mutex_);
@@ -193,12 +196,30 @@ ChainState CollocationPath::state_at(double H_m) const {
     ay[stage] = stages[stage * size() + tip()];
   }
   const TipOverStep over(*rule_, step.h_s, q[tip()], v[tip()], ay);
-  const double c = over.at_drop(H_m, number + 1 == steps_.size() ? last_turn_ : 1.0);
+  return within(step, q, over.at_drop(H_m, number + 1 == steps_.size() ? last_turn_ : 1.0));
+}
+
+ChainState CollocationPath::state_at_time(double t_s) const {
+  const auto after = std::upper_bound(steps_.begin(), steps_.end(), t_s,
+                                      [](double t, const Step& step) { return t < step.t_s; });
+  const auto number = static_cast<std::size_t>(after - steps_.begin() - 1);
+  const Step& step = steps_[number];
+  auto numbers = kept_interval(number / steps_kept_);
+  if (!numbers) {
+    numbers = solve_again(number / steps_kept_);
+  }
+  const double* q = numbers->data() + number % steps_kept_ * step_size();
+  return within(step, q, std::min((t_s - step.t_s) / step.h_s, 1.0));
+}
+
+ChainState CollocationPath::within(const Step& step, const double* q, double c) const {
+  const double* v = q + size();
+  const double* stages = v + size();
   const DenseWeights weights(*rule_, c);
-  ChainState touch;
-  touch.t_s = step.t_s + c * step.h_s;
-  touch.q.resize(2, chain_.rows());
-  touch.v.resize(2, chain_.rows());
+  ChainState state;
+  state.t_s = step.t_s + c * step.h_s;
+  state.q.resize(2, chain_.rows());
+  state.v.resize(2, chain_.rows());
   const double h_s = step.h_s;
   for (std::size_t i = 0; i < size(); ++i) {
     double by_v = 0.0;
@@ -207,10 +228,10 @@ ChainState CollocationPath::state_at(double H_m) const {
       by_v += weights.by_v[stage] * stages[stage * size() + i];
       by_q += weights.by_q[stage] * stages[stage * size() + i];
     }
-    touch.q.data()[i] = q[i] + (c * h_s * v[i] + h_s * h_s * by_q);
-    touch.v.data()[i] = v[i] + h_s * by_v;
+    state.q.data()[i] = q[i] + (c * h_s * v[i] + h_s * h_s * by_q);
+    state.v.data()[i] = v[i] + h_s * by_v;
   }
-  return touch;
+  return state;
 }
 
 }  // namespace oblique::solver

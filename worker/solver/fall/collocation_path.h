@@ -55,6 +55,8 @@ class CollocationPath : public FallPath {
   double largest_drop_m() const override { return largest_drop_m_; }
   /// May be called from several threads at once.
   ChainState state_at(double H_m) const override;
+  /// Likewise.
+  ChainState state_at_time(double t_s) const override;
 
   std::size_t bytes() const override;
 
@@ -72,7 +74,10 @@ class CollocationPath : public FallPath {
 
   void keep(const CollocationLanes& lanes, std::size_t lane);
   std::shared_ptr<const Interval> interval(std::size_t number) const;
+  std::shared_ptr<const Interval> kept_interval(std::size_t number) const;
   std::shared_ptr<const Interval> solve_again(std::size_t number) const;
+  /// At the fraction c of that step, whose numbers lie at `q`.
+  ChainState within(const Step& step, const double* q, double c) const;
   /// Numbers of one step in an interval.
   std::size_t step_size() const { return (2 + kernel_.stages) * size(); }
   std::size_t size() const { return 2 * static_cast<std::size_t>(chain_.rows()); }

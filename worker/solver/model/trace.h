@@ -2,13 +2,14 @@
 
 #include <functional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace oblique::solver {
 
-/// One accepted instant of a contact, for traces.
+/// One accepted instant of a contact, or an instant of the fall before it, for traces.
 struct TraceRow {
-  double t_s;
+  double t_s;  ///< since touch
   double fn_N;
   double ft_N;
   double uy_m;  ///< normal deformation
@@ -19,7 +20,7 @@ struct TraceRow {
   double y_m;
   double vt_m_s;
   double vn_m_s;
-  std::string state;  ///< SC, SR, sC or sR
+  std::string state;  ///< SC, SR, sC or sR; kFalling in the fall
   double kinetic_J;   ///< of the whole chain
   double strain_J;    ///< 0 when unstressed
   double gravity_J;   ///< 0 at the height of O
@@ -31,11 +32,18 @@ struct TraceRow {
   std::vector<double> nodes_m;
 };
 
+/// TraceRow::state before touch. Nothing is deformed and no force acts then, and P goes along with
+/// the tip.
+inline constexpr std::string_view kFalling = "falling";
+/// The instants of the fall that a trace has: from release to touch, both ends in, evenly spaced.
+inline constexpr int kFallRows = 121;
+
 /// What is wanted of the time histories of a contact, and where they go.
 struct Tracing {
   using Sink = std::function<void(const TraceRow&)>;
   Sink sink;  ///< called at every accepted step, from touch to separation; may be none
   bool with_shape = false;  ///< fill TraceRow::nodes_m
+  bool with_fall = false;   ///< call `sink` at kFallRows instants of the fall before that
 };
 
 }  // namespace oblique::solver

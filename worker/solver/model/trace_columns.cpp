@@ -7,7 +7,7 @@ namespace oblique::solver {
 namespace {
 
 constexpr std::array kColumns{
-    TraceColumn{"t_s", "s", "time since touch", &TraceRow::t_s},
+    TraceColumn{"t_s", "s", "time since touch; negative in the fall", &TraceRow::t_s},
     TraceColumn{"fn_N", "N", "normal force on the tip, upwards, never negative", &TraceRow::fn_N},
     TraceColumn{"ft_N", "N", "tangential force on the tip, along x", &TraceRow::ft_N},
     TraceColumn{"uy_m", "m",
@@ -22,7 +22,11 @@ constexpr std::array kColumns{
     TraceColumn{"y_m", "m", "position of the tip along y", &TraceRow::y_m},
     TraceColumn{"vt_m_s", "m/s", "velocity of the tip along x", &TraceRow::vt_m_s},
     TraceColumn{"vn_m_s", "m/s", "velocity of the tip along y", &TraceRow::vn_m_s},
-    TraceColumn{"state", "", "SC, SR, sC or sR, from this instant on", &TraceRow::state},
+    TraceColumn{
+        "state", "",
+        "SC, SR, sC or sR, from this instant on; only where the fall is asked for: falling, "
+        "when forces and deformations are 0 and P goes along with the tip",
+        &TraceRow::state},
     TraceColumn{"R{}x_N R{}y_N", "N",
                 "force on the outer link at O (0) and at each joint (1, 2, ...), along x and y",
                 TraceVectors{&TraceRow::reactions_N, true}},

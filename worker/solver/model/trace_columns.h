@@ -48,8 +48,9 @@ TraceShape trace_shape(std::size_t links, std::size_t elements_per_link, bool wi
 /// One heading a column of a file.
 std::vector<std::string> trace_headings(const TraceShape& shape);
 
-/// The states of a contact; their places here are their codes in messages.
-inline constexpr std::array<std::string_view, 4> kTraceStates{"SC", "SR", "sC", "sR"};
+/// The states of a contact, and that before it; their places here are their codes in messages.
+inline constexpr std::array<std::string_view, 5> kTraceStates{"SC", "SR", "sC", "sR", kFalling};
+inline constexpr std::uint8_t kFallingCode = 4;
 /// Throws std::invalid_argument for another text.
 std::uint8_t code_of_state(std::string_view state);
 

@@ -24,6 +24,10 @@ class FallPath {
   virtual double largest_drop_m() const = 0;
   /// As Fall::state_at, for 0 < H_m <= largest_drop_m().
   virtual ChainState state_at(double H_m) const = 0;
+  /// The state t_s seconds after release, for t_s from 0 to the time of a state_at(). A path that
+  /// takes steps may give the state at the step before, when that is less than a thousandth of a
+  /// step away: its time says so. Keeps nothing that bytes() counts.
+  virtual ChainState state_at_time(double t_s) const = 0;
   /// Memory that its states take now.
   virtual std::size_t bytes() const = 0;
 };

@@ -100,6 +100,27 @@ ChainState SteppedPath::state_at(double H_m) const {
   return locate(H_m, before);
 }
 
+ChainState SteppedPath::state_at_time(double t_s) const {
+  auto last_step = static_cast<std::int64_t>(t_s / dt_s_);
+  last_step -= time_s(last_step) > t_s ? 1 : 0;  // the quotient was rounded up
+  const auto number =
+      std::min<std::int64_t>(last_step / steps_kept_, static_cast<std::int64_t>(kept_.size()) - 1);
+  ChainState state = kept_[static_cast<std::size_t>(number)];
+  ChainState before;
+  for (std::int64_t step = number * steps_kept_; step < last_step; ++step) {
+    std::swap(before, state);
+    motion_->step(before, kNoContact, dt_s_, state);
+  }
+  state.t_s = time_s(last_step);
+  const double h_s = t_s - state.t_s;
+  // Shorter implicit steps would divide rounding by their square.
+  if (h_s > 1e-3 * dt_s_) {
+    std::swap(before, state);
+    motion_->step(before, kNoContact, h_s, state);
+  }
+  return state;
+}
+
 std::size_t SteppedPath::bytes() const {
   const auto numbers = [](const ChainState& state) {
     return state.q.size() + state.v.size() + state.acceleration.size() +

@@ -38,6 +38,7 @@ class SteppedPath : public FallPath {
 
   double largest_drop_m() const override { return largest_drop_m_; }
   ChainState state_at(double H_m) const override;
+  ChainState state_at_time(double t_s) const override;
   std::size_t bytes() const override;
 
  private:

@@ -66,6 +66,24 @@ struct Known {
   double vy_m_s;
 };
 
+TEST(CollocationFall, StateAtATimeIsTheOneThatTheTipPassesThenAndIsKeptNowhere) {
+  const Fallen fallen{model_of(1)};
+  const FallPath& path = *fallen.fall.path();
+  const std::size_t bytes = fallen.fall.bytes();
+  EXPECT_EQ(path.state_at_time(0.0).q, fallen.chain.at_rest().q);
+  std::vector<ChainState> at_times;
+  for (int i = 0; i < 40; ++i) {
+    at_times.push_back(path.state_at_time(0.01 * i));
+  }
+  EXPECT_EQ(fallen.fall.bytes(), bytes);
+  for (const ChainState& state : at_times) {
+    const double H_m = -fallen.chain.tip(state).y_m;
+    if (H_m > 0.0) {
+      EXPECT_NEAR(fallen.fall.state_at(H_m).t_s, state.t_s, 1e-12) << H_m;
+    }
+  }
+}
+
 TEST(CollocationFall, TipHasTheKnownStateAtTheDropsOfThePaper) {
   // An independent explicit solution, converged to nine digits.
   for (const Known& known : {Known{0.96, 0.42263713, 0.6273702, -5.23465, -5.34110},

@@ -76,6 +76,24 @@ TEST(Fall, DropIsLocatedToRounding) {
   }
 }
 
+TEST(Fall, StateAtATimeIsTheOneThatTheTipPassesThenAndIsKeptNowhere) {
+  const FallOf coarse(coarse_model(), 9e-6);
+  const std::size_t bytes = coarse.fall.bytes();
+  const FallPath& path = *coarse.fall.path();
+  EXPECT_EQ(path.state_at_time(0.0).q, coarse.chain.at_rest().q);
+  for (const double H_m : {1e-9, 1e-3, 0.1, 0.5, 1.0, 1.17}) {
+    const ChainState by_drop = coarse.fall.state_at(H_m);
+    const ChainState by_time = path.state_at_time(by_drop.t_s);
+    EXPECT_NEAR(by_time.t_s, by_drop.t_s, 9e-9);
+    EXPECT_NEAR(coarse.chain.tip(by_time).y_m, -H_m, 9e-9 * 6.0) << "at 6 m/s at most";
+    EXPECT_NEAR(coarse.energy_J(by_time), coarse.energy_J(by_drop), 1e-7);
+  }
+  for (const double steps : {1.0, 2.0, 4095.0, 4096.0, 4097.0, 40'000.0}) {
+    EXPECT_EQ(path.state_at_time(steps * 9e-6).t_s, steps * 9e-6) << "a whole step is taken whole";
+  }
+  EXPECT_EQ(coarse.fall.bytes(), bytes);
+}
+
 TEST(Fall, StateAtADropHasTheSameBitsWhateverWasAskedBefore) {
   const FallOf one(coarse_model(), 9e-6);
   const FallOf other(coarse_model(), 9e-6);

@@ -327,7 +327,7 @@ TEST_F(ServiceTraceTest, WhatNoWorkerSendsFailsTheTraceAndNothingElse) {
   };
   EXPECT_THAT(with([](auto& part) { part.mutable_rows()->add_values(1.0); }),
               HasSubstr("other columns"));
-  EXPECT_THAT(with([](auto& part) { part.mutable_rows()->set_states("\x02\x04"); }),
+  EXPECT_THAT(with([](auto& part) { part.mutable_rows()->set_states("\x02\x05"); }),
               HasSubstr("a state that no contact has"));
   EXPECT_THAT(with([](auto& part) { part.mutable_rows()->set_values(0, std::nan("")); }),
               HasSubstr("not finite"));
