@@ -3,20 +3,22 @@
 import { h, named, picker } from "/parts/dom.js";
 import { ink } from "/parts/colours.js";
 import { shown } from "/parts/format.js";
+import { arrow, begin, draw_ground, draw_length, kHeight, length_text } from "./strokes.js";
 
 const kEnlargements = ["1", "10", "30", "100"];
-const kHeight = 330;
-
-/** @param {number} size @returns {number} a round length at most that long */
-function round_length(size) {
-  const power = 10 ** Math.floor(Math.log10(size));
-  return [5, 2, 1].map((digit) => digit * power).find((length) => length <= size) ?? power;
-}
-
-/** A length in the unit that suits it. @param {number} metres */
-function length_text(metres) {
-  if (metres >= 0.1) return `${shown(metres, 3)} m`;
-  return metres >= 1e-3 ? `${shown(metres * 1e3, 3)} mm` : `${shown(metres * 1e6, 3)} µm`;
+/** What the finger reaches from release to touch. @param {import("./trace.js").Trace} trace @param {number} ground */
+function reach_of(trace, ground) {
+  const box = { left: 0, right: 0, top: 0, bottom: ground };
+  const all = [trace.nodes(0), ...Array.from({ length: trace.fall.rows }, (_, row) => trace.fall.nodes(row))];
+  for (const nodes of all) {
+    for (let i = 0; i < nodes.length; i += 2) {
+      box.left = Math.min(box.left, nodes[i]);
+      box.right = Math.max(box.right, nodes[i]);
+      box.top = Math.max(box.top, nodes[i + 1]);
+      box.bottom = Math.min(box.bottom, nodes[i + 1]);
+    }
+  }
+  return box;
 }
 
 /** @param {import("./trace.js").Trace} trace */
@@ -27,6 +29,8 @@ export function finger(trace) {
   const near_place = h("div", { class: "plot" }, near);
   let enlargement = 30;
   let at = 0;
+  /** Where it is before touch; -1: it touches. */
+  let falling = -1;
   const x = trace.column("x_m");
   const y = trace.column("y_m");
   const xP = trace.column("xP_m");
@@ -35,89 +39,30 @@ export function finger(trace) {
   const rest = trace.nodes(0);
   const ground = -trace.head.H;
   const largest = Math.max(1e-9, ...fn, ...Array.from(ft, Math.abs));
-
-  /** @param {any} canvas @param {HTMLElement} place */
-  const begin = (canvas, place) => {
-    const width = place.clientWidth;
-    if (width < 60) return null;
-    const ratio = window.devicePixelRatio || 1;
-    canvas.width = width * ratio;
-    canvas.height = kHeight * ratio;
-    canvas.style.height = `${kHeight}px`;
-    const c = canvas.getContext("2d");
-    c.scale(ratio, ratio);
-    c.font = "12px system-ui, sans-serif";
-    c.lineJoin = c.lineCap = "round";
-    return { c, width };
-  };
-  /** @param {any} c @param {number} width @param {number} level */
-  const draw_ground = (c, width, level) => {
-    c.strokeStyle = ink("ground");
-    c.lineWidth = 1.5;
-    c.beginPath();
-    c.moveTo(0, level);
-    c.lineTo(width, level);
-    c.stroke();
-    c.lineWidth = 0.7;
-    c.beginPath();
-    for (let gx = -12; gx < width; gx += 11) {
-      c.moveTo(gx + 10, level);
-      c.lineTo(gx, level + 9);
-    }
-    c.stroke();
-  };
-  /** @param {any} c @param {number} width @param {number} metres_per_px */
-  const draw_length = (c, width, metres_per_px) => {
-    const metres = round_length(width * 0.3 * metres_per_px);
-    const w = metres / metres_per_px;
-    c.strokeStyle = c.fillStyle = ink("text");
-    c.lineWidth = 2;
-    c.beginPath();
-    c.moveTo(width - 12 - w, 14);
-    c.lineTo(width - 12, 14);
-    c.stroke();
-    c.textAlign = "right";
-    c.textBaseline = "top";
-    c.fillText(length_text(metres), width - 12, 19);
-  };
-  /** @param {any} c @param {number[]} from @param {number[]} by pixels @param {string} colour */
-  const arrow = (c, [x0, y0], [dx, dy], colour) => {
-    const length = Math.hypot(dx, dy);
-    if (length < 3) return;
-    const [ux, uy] = [dx / length, dy / length];
-    c.strokeStyle = c.fillStyle = colour;
-    c.lineWidth = 2.2;
-    c.beginPath();
-    c.moveTo(x0, y0);
-    c.lineTo(x0 + dx - 6 * ux, y0 + dy - 6 * uy);
-    c.stroke();
-    c.beginPath();
-    c.moveTo(x0 + dx, y0 + dy);
-    c.lineTo(x0 + dx - 9 * ux - 4 * uy, y0 + dy - 9 * uy + 4 * ux);
-    c.lineTo(x0 + dx - 9 * ux + 4 * uy, y0 + dy - 9 * uy - 4 * ux);
-    c.fill();
-  };
+  const fall = trace.fall.rows > 0 ? { x: trace.fall.column("x_m"), y: trace.fall.column("y_m"), v: trace.fall.column("vn_m_s") } : { x: [], y: [], v: [] };
+  const box = reach_of(trace, ground);
 
   function draw_whole() {
     const made = begin(whole, whole_place);
     if (!made) return;
     const { c, width } = made;
-    const length = trace.head.lengths_m.reduce((/** @type {number} */ a, /** @type {number} */ b) => a + b, 0);
-    const metres_per_px = Math.max((length * 1.12) / (width - 20), (trace.head.H * 1.25 + 0.1) / (kHeight - 30));
-    const left = (width - length / metres_per_px) / 2;
-    const px = (/** @type {number} */ v) => left + v / metres_per_px;
-    const py = (/** @type {number} */ v) => kHeight - 26 + (ground - v) / metres_per_px;
+    const metres_per_px = Math.max((box.right - box.left) / (width - 40), (box.top - box.bottom) / (kHeight - 70));
+    const left = (width - (box.right - box.left) / metres_per_px) / 2;
+    const px = (/** @type {number} */ v) => left + (v - box.left) / metres_per_px;
+    const py = (/** @type {number} */ v) => kHeight - 26 + (box.bottom - v) / metres_per_px;
     draw_ground(c, width, py(ground));
-    const now = trace.nodes(at);
-    const moved = now.map((v, i) => rest[i] + enlargement * (v - rest[i]));
+    const moved = falling >= 0 ? trace.fall.nodes(falling) : trace.nodes(at).map((v, i) => rest[i] + enlargement * (v - rest[i]));
     const path = (/** @type {ArrayLike<number>} */ nodes) => {
       c.beginPath();
       for (let i = 0; i < nodes.length; i += 2) c.lineTo(px(nodes[i]), py(nodes[i + 1]));
       c.stroke();
     };
     c.strokeStyle = ink("weak");
-    c.setLineDash([3, 4]);
     c.lineWidth = 1;
+    c.beginPath();
+    for (let i = 0; i <= (falling >= 0 ? falling : fall.x.length - 1); ++i) c.lineTo(px(fall.x[i]), py(fall.y[i]));
+    c.stroke();
+    c.setLineDash([3, 4]);
     path(rest);
     c.setLineDash([]);
     c.strokeStyle = ink("finger");
@@ -132,6 +77,8 @@ export function finger(trace) {
     c.textAlign = "left";
     c.textBaseline = "bottom";
     c.fillText("O", px(0) + 8, py(0) - 6);
+    c.textBaseline = "top";
+    c.fillText(falling >= 0 ? `falls, ${shown(-fall.v[falling], 3)} m/s downwards` : `touches, motion enlarged ${enlargement} times`, 10, 10);
     draw_length(c, width, metres_per_px);
   }
 
@@ -139,6 +86,14 @@ export function finger(trace) {
     const made = begin(near, near_place);
     if (!made) return;
     const { c, width } = made;
+    if (falling >= 0) {
+      draw_ground(c, width, kHeight * 0.6);
+      c.fillStyle = ink("text");
+      c.textAlign = "left";
+      c.textBaseline = "top";
+      c.fillText(`falls: the tip is ${length_text(Math.max(fall.y[falling] - ground, 0))} above the ground`, 10, 10);
+      return;
+    }
     // All places of tip and P during the contact fit in.
     const [x0, x1] = [Math.min(...x, ...xP), Math.max(...x, ...xP)];
     const [y0, y1] = [Math.min(...y, ground), Math.max(...y, ground)];
@@ -207,10 +162,11 @@ export function finger(trace) {
       }))),
     h("figure", { class: "lines" }, h("figcaption", {}, "The tip at the ground, with the forces on it"), near_place));
   return { element,
-    /** @param {number} i */
-    point_at(i) {
-      if (i === at) return;
-      at = i;
+    /** @param {import("./player.js").Instant} instant */
+    stand_at({ row, is_falling }) {
+      if (is_falling ? row === falling : falling < 0 && row === at) return;
+      falling = is_falling ? row : -1;
+      at = is_falling ? 0 : row;
       draw();
     },
     close: () => watch.disconnect() };

@@ -92,14 +92,17 @@ function show_trace(place, trace, file) {
       { name: "F_t", unit: "N", values: trace.column("ft_N") }, 1),
   ];
   const body = finger(trace);
-  const all = [...plots, ...loops, body];
-  const watch = player(times, (row) => all.forEach((part) => part.point_at(row)));
+  const all = [...plots, ...loops];
+  const watch = player(times, trace.fall.rows > 0 ? trace.fall.column("t_s") : new Float64Array(0), (at) => {
+    body.stand_at(at);
+    all.forEach((part) => part.point_at(at.is_falling ? 0 : at.row));
+  });
   const key = h("ul", { class: "legend" }, ...[["compression", "compression"], ["restitution", "restitution"], ["stick", "stick: the bar below"]]
     .map(([ink, text]) => h("li", {}, h("span", { class: `shade ink-${ink}` }), text)));
-  place.replaceChildren(h("h2", {}, "The contact"), body.element, watch.element, key,
+  place.replaceChildren(h("h2", {}, trace.fall.rows > 0 ? "The fall and the contact" : "The contact"), body.element, watch.element, key,
     h("div", { class: "two" }, ...plots.map((plot) => plot.element), ...loops.map((loop) => loop.element)),
     h("p", {}, h("button", { type: "button", onclick: () => save_trace(trace, file) }, "Time histories as CSV"), " ",
       h("span", { class: "weak" }, `${count(trace.rows)} instants, solved again by ${trace.head.worker}, solver ${trace.head.solver_version}, ${trace.head.instruction_set}.`)));
   watch.begin();
-  return [...all, watch];
+  return [...all, body, watch];
 }

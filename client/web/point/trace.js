@@ -6,12 +6,17 @@ const kAskAgain_ms = 300;
 
 /**
  * @typedef {{from: number, to: number, kind: "stick" | "compression" | "restitution"}} Interval
+ * @typedef {object} Fall from release to touch, evenly spaced in time
+ * @property {number} rows 0: the worker sends none
+ * @property {(name: string) => Float64Array} column
+ * @property {(row: number) => Float64Array} nodes
  * @typedef {object} Trace
  * @property {any} head
- * @property {number} rows
- * @property {(name: string) => Float64Array} column
+ * @property {number} rows of the contact
+ * @property {(name: string) => Float64Array} column of the contact
  * @property {(row: number) => Float64Array} nodes x and y by turns, the pin first
  * @property {(row: number) => string} state
+ * @property {Fall} fall
  * @property {Interval[]} phases
  * @property {Interval[]} sticks
  */
@@ -23,7 +28,7 @@ const kAskAgain_ms = 300;
  */
 export async function trace_of(study, point, signal, say) {
   for (;;) {
-    const answer = await numbers(`/api/studies/${study}/points/${point}/trace?shape=1`, signal);
+    const answer = await numbers(`/api/studies/${study}/points/${point}/trace?shape=1&fall=1`, signal);
     if (answer) return taken_apart(answer);
     say("A worker is waited for, or solves this point again.");
     await new Promise((go_on) => setTimeout(go_on, kAskAgain_ms));
@@ -33,9 +38,11 @@ export async function trace_of(study, point, signal, say) {
 
 /** @param {{head: any, bytes: ArrayBuffer, begin: number}} answer @returns {Trace} */
 function taken_apart({ head, bytes, begin }) {
-  const { rows, row_numbers } = head;
-  const all = new Float64Array(bytes, begin, rows * row_numbers);
-  const states = new Uint8Array(bytes, begin + 8 * rows * row_numbers, rows);
+  const { row_numbers } = head;
+  const before = head.fall_rows ?? 0;
+  const rows = head.rows - before;
+  const all = new Float64Array(bytes, begin, head.rows * row_numbers);
+  const states = new Uint8Array(bytes, begin + 8 * head.rows * row_numbers + before, rows);
   /** @type {Map<string, number>} */
   const first = new Map();
   let at = 0;
@@ -43,11 +50,12 @@ function taken_apart({ head, bytes, begin }) {
     first.set(column.name, at);
     at += column.numbers;
   }
-  const column = (/** @type {string} */ name) => {
+  const part = (/** @type {number} */ from, /** @type {number} */ length) => (/** @type {string} */ name) => {
     const place = first.get(name);
     if (place === undefined) throw new Error(`the trace has no ${name}`);
-    return Float64Array.from({ length: rows }, (_, row) => all[row * row_numbers + place]);
+    return Float64Array.from({ length }, (_, row) => all[(from + row) * row_numbers + place]);
   };
+  const column = part(before, rows);
   const t = column("t_s");
   /** Spans of rows that have one sign. @param {(code: number) => string} kind_of @returns {Interval[]} */
   const spans = (kind_of) => {
@@ -61,8 +69,8 @@ function taken_apart({ head, bytes, begin }) {
     return found;
   };
   const nodes_at = first.get("node{}x_m node{}y_m") ?? 0;
-  return { head, rows, column,
-    nodes: (row) => all.subarray(row * row_numbers + nodes_at, row * row_numbers + nodes_at + 2 * head.nodes),
+  const nodes = (/** @type {number} */ row) => all.subarray(row * row_numbers + nodes_at, row * row_numbers + nodes_at + 2 * head.nodes);
+  return { head, rows, column, nodes: (row) => nodes(before + row), fall: { rows: before, column: part(0, before), nodes },
     state: (row) => head.states[states[row]],
     // The codes' bits: 1 is restitution, 2 is slip.
     phases: spans((code) => (code & 1 ? "restitution" : "compression")),
