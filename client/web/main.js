@@ -66,7 +66,8 @@ async function show() {
     shown = made;
     if (now) shown.take?.(now);
   } catch (error) {
-    if (mine === turn) root.replaceChildren(h("p", { role: "alert", class: "bad" }, String(/** @type {Error} */ (error).message ?? error)));
+    if (mine === turn) root.replaceChildren(h("p", { role: "alert", class: "bad" }, String(/** @type {Error} */ (error).message ?? error)),
+      h("p", {}, h("a", { href: "#/" }, "All studies")));
   }
 }
 
@@ -81,6 +82,8 @@ try {
       shown.take?.(told);
     }, (text) => { pace.textContent = text; });
     addEventListener("hashchange", show);
+    // Drawings have the colours of when they were drawn.
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", show);
     await show();
   } else {
     view.replaceChildren(h("p", {}, here.how_to_enter));

@@ -50,7 +50,7 @@ function live_table(caption, heads) {
     }
   });
   return {
-    element: h("div", { class: "scroll", tabIndex: 0, role: "region", "aria-label": caption }, table),
+    element: h("div", { class: "scroll live", tabIndex: 0, role: "region", "aria-label": caption }, table),
     /** @param {any[]} lines @param {(line: any) => any[]} cells */
     show(lines, cells) {
       const rows = lines.map((line) => {

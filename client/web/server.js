@@ -51,6 +51,8 @@ export async function numbers(path, signal) {
 /** @returns {Promise<{version: string, may_look: boolean, may_change: boolean, how_to_enter: string}>} */
 export const session = () => json("/api/session");
 
+const kTryAgain_ms = 3000;
+
 /**
  * Follows the overview while the page is seen.
  * @param {(now: any) => void} take @param {(text: string) => void} say
@@ -58,16 +60,28 @@ export const session = () => json("/api/session");
 export function follow(take, say) {
   /** @type {EventSource | null} */
   let source = null;
+  let later = 0;
+  const end = () => {
+    clearTimeout(later);
+    source?.close();
+    source = null;
+  };
   const look = () => {
     if (document.hidden) {  // nobody looks
-      source?.close();
-      source = null;
+      end();
     } else if (!source) {
       source = new EventSource("/api/events");
       source.addEventListener("overview", (event) => take(JSON.parse(event.data)));
-      source.addEventListener("error", () => say("The server does not answer; trying again."));
+      source.addEventListener("error", () => {
+        say("The server does not answer; trying again.");
+        if (source?.readyState !== EventSource.CLOSED) return;
+        end();  // it was refused, and browsers do not ask again then
+        later = setTimeout(look, kTryAgain_ms);
+      });
     }
   };
   document.addEventListener("visibilitychange", look);
+  addEventListener("pagehide", end);
+  addEventListener("pageshow", look);
   look();
 }

@@ -51,11 +51,12 @@ export function category_pixel(code, x, y) {
   return packed(is_hatched ? colour.map((c) => Math.round(c * 0.68)) : colour);
 }
 
-/** What stands for a pixel without a value. @param {"missing" | "failed" | "left_out" | "none"} why @param {number} x @param {number} y @param {boolean} is_dark */
+/** What stands for a pixel without a value. @param {"missing" | "failed" | "left_out" | "none" | "filtered"} why @param {number} x @param {number} y @param {boolean} is_dark */
 export function empty_pixel(why, x, y, is_dark) {
   const ground = is_dark ? 0xff211e1c : 0xfff4f4f2;
   const ink = is_dark ? 0xff5c5650 : 0xffc4beb8;
   if (why === "left_out") return ground;
+  if (why === "filtered") return x % 5 < 1 && y % 5 < 1 ? (is_dark ? 0xff686460 : 0xffb0aca8) : (is_dark ? 0xff3a3632 : 0xffe2dedb);
   if (why === "failed") return (x + y) % 8 < 2 || (x - y + 8000000) % 8 < 2 ? (is_dark ? 0xff7d8aff : 0xff1c26a8) : ground;
   if (why === "none") return y % 4 < 1 ? ink : ground;
   return (x + y) % 8 < 1 ? ink : ground;
