@@ -3,7 +3,8 @@
 import { h, named, picker, tick } from "/parts/dom.js";
 import { count, heading, shown } from "/parts/format.js";
 import { axis_value, fill_in, varying } from "./axes.js";
-import { colour_controls } from "./legend.js";
+import { colour_controls } from "./drawn/legend.js";
+import { show_takeaways } from "./take.js";
 
 /** @typedef {import("./study.js").StudyView} View */
 
@@ -14,14 +15,13 @@ export function show_controls(view) {
     view.set({ ...changes, x0: "", x1: "", y0: "", y1: "", cell: "" });
     fill_in(view.fields, view.study);
     view.place.keep(view.fields);
-    view.map.choose(null);
-    view.choice.replaceChildren();
+    view.choice.none();
     show_controls(view);
     view.load();
     view.table.load();
   };
   const kinds = [...(view.grids.some((/** @type {any} */ g) => varying(g.b).length > 1) ? [["map", "map"]] : []),
-    ...(view.grids.length > 0 ? [["lines", "lines"]] : []), ["gathered", "gathered points"], ["histogram", "histogram"]];
+    ...(view.grids.length > 0 ? [["lines", "lines"]] : []), ["gathered", "scatter"], ["histogram", "histogram"]];
   const on_grid = kind === "map" || kind === "lines";
   const axes = on_grid ? varying(view.block).map((a) => [a.key, heading(a.key, a.unit)])
     : view.numbers.map((c) => [c.name, heading(c.name, c.unit)]);
@@ -29,7 +29,7 @@ export function show_controls(view) {
     .map((c) => [c.name, heading(c.name, c.unit)]);
   const parts = [named("picture", picker(kinds, kind, (pic) => again({ pic, y: "", from: "", to: "" })))];
   if (kind !== "histogram") {
-    parts.push(named(kind === "gathered" ? "colour" : "output", picker(kind === "gathered" ? [["", "number of points"], ...outputs] : outputs, view.is("z"), (z) => {
+    parts.push(named(kind === "gathered" ? "colour" : "output", picker(kind === "gathered" ? [["", "none"], ...outputs] : outputs, view.is("z"), (z) => {
       if (z === "") view.fields.set("z", "");
       again({ ...(z === "" ? {} : { z }), from: "", to: "" });
     })));
@@ -45,11 +45,21 @@ export function show_controls(view) {
   }
   const redraw = (/** @type {Record<string, string>} */ changes) => {
     view.set(changes);
-    if (kind === "map") view.show();
+    if (kind === "map") view.drawing.draw();
     else view.load();
+    show_takeaways(view);
   };
   parts.push(h("div", { class: "ticks" }, tick(`log ${view.is("x")}`, view.is("xlog") !== "", (is) => redraw({ xlog: is ? "1" : "" })),
     kind === "histogram" ? null : tick(kind === "lines" ? "log output" : `log ${view.is("y")}`, view.is("ylog") !== "", (is) => redraw({ ylog: is ? "1" : "" }))));
+  if (kind !== "lines") {
+    const drags = picker([["zoom", "zooms in"], ["mark", "marks points"]], view.is("drag") === "mark" ? "mark" : "zoom", (drag) => {
+      view.set({ drag: drag === "mark" ? "mark" : "" });
+      view.map.let_drag(drag === "mark" ? "mark" : "zoom");
+      view.drawing.draw();
+    });
+    drags.title = "with Shift a map takes the other one";
+    parts.push(named("dragging", drags));
+  }
   // Who chose by keys goes on where they were.
   const focused = [...view.controls.querySelectorAll("select, input")].indexOf(/** @type {any} */ (document.activeElement));
   view.controls.replaceChildren(...parts);
@@ -60,7 +70,8 @@ export function show_controls(view) {
     (changed) => {
       view.set(/** @type {any} */ (changed));
       if ("from" in changed && "to" in changed) show_controls(view);
-      view.show();
+      view.drawing.draw();
+      show_takeaways(view);
     })] : []));
 }
 

@@ -1,8 +1,9 @@
 // @ts-check
 // Rows of a study, a page at a time.
-import { h, named } from "/parts/dom.js";
+import { h, tick } from "/parts/dom.js";
 import { count, heading, shown } from "/parts/format.js";
-import { rows, rows_path } from "./picture.js";
+import { rows, rows_path } from "./asked/picture.js";
+import { joined } from "./conditions.js";
 
 const kPage = 25;
 /** Pages are cut from what is asked for in order; beyond that a file is the better way. */
@@ -10,18 +11,21 @@ const kDeepest = 10_000;
 const kMostInFile = 100_000;
 
 /**
- * @param {{study: number, points: number, columns: () => string[], where: () => string, may_say: (text: string) => void,
- *   chosen: (point: number) => void, keep_where: (where: string) => void, order: () => string, keep_order: (order: string) => void}} of
+ * @param {{study: number, points: number, columns: () => string[], where: () => string, marked: () => string, wrong: (error: any) => void,
+ *   chosen: (point: number) => void, order: () => string, keep_order: (order: string) => void}} of
  */
 export function row_table(of) {
-  const filter = h("input", { type: "search", value: of.where(), placeholder: "mu > 0.5 AND fn_peak_N > 20", spellcheck: false,
-    onchange: () => set_filter(), onkeydown: (/** @type {KeyboardEvent} */ e) => { if (e.key === "Enter") set_filter(); } });
   const said = h("p", { role: "status", class: "weak" });
   const table = h("table", {}, h("caption", { class: "unseen" }, "Points of the study"));
   const back = h("button", { type: "button", onclick: () => turn(-1) }, "Previous");
   const next = h("button", { type: "button", onclick: () => turn(1) }, "Next");
-  const file = h("a", { class: "button", download: "rows.csv" }, "CSV");
-  const element = h("section", { class: "rows" }, h("h2", {}, "Points"), named("show points where (as with --where)", filter),
+  const file = h("a", { class: "button", download: "rows.csv" }, "Table as CSV");
+  let shows_marked_only = true;
+  const only = h("div", { class: "only" }, tick("marked points only", true, (is) => {
+    shows_marked_only = is;
+    begin();
+  }));
+  const element = h("section", { class: "rows" }, h("h2", {}, "Points"), only,
     h("div", { class: "scroll", tabIndex: 0, role: "region", "aria-label": "Points" }, table),
     h("div", { class: "row" }, back, next, file), said);
   let page = 0;
@@ -31,13 +35,15 @@ export function row_table(of) {
   let total = null;
   let counted = "\0";
   let chosen = -1;
+  /** @type {number[]} */
+  let points_here = [];
 
-  function set_filter() {
-    if (filter.value.trim() === of.where()) return;
-    of.keep_where(filter.value.trim());
+  function begin() {
     page = 0;
     load();
   }
+  /** Which points are shown. */
+  const condition = () => joined(of.where(), shows_marked_only ? of.marked() : "");
   function turn(/** @type {number} */ by) {
     page = Math.max(page + by, 0);
     load();
@@ -46,12 +52,11 @@ export function row_table(of) {
   function sort(column) {
     const now = of.order();
     of.keep_order(now === column ? `${column} DESC` : now === `${column} DESC` ? "" : column);
-    page = 0;
-    load();
+    begin();
   }
 
   async function count_rows(/** @type {AbortSignal} */ signal) {
-    const where = of.where();
+    const where = condition();
     if (counted === where) return;
     total = null;
     const answer = await rows(of.study, { where, select: "count(*)", limit: 1 }, signal);
@@ -73,14 +78,14 @@ export function row_table(of) {
     asked?.abort();
     const mine = asked = new AbortController();
     const columns = of.columns();
-    const where = of.where();
+    const where = condition();
+    only.hidden = of.marked() === "";
     file.href = rows_path(of.study, { where, order: of.order() || "point", select: columns.join(","), limit: kMostInFile, format: "csv" });
     try {
       const first = page * kPage;
       const answer = await rows(of.study, { where, order: of.order() || "point", select: columns.join(","), limit: first + kPage + 1 }, mine.signal);
       const some = answer.rows.slice(first, first + kPage);
       const has_more = answer.rows.length > first + kPage;
-      filter.setAttribute("aria-invalid", "false");
       table.replaceChildren(table.caption ?? "", head(answer), h("tbody", {}, ...some.map((/** @type {any[]} */ row) => {
         const made = h("tr", { "data-point": row[0], "aria-selected": undefined, onclick: () => of.chosen(row[0]) },
           ...row.map((value, i) => h("td", { class: typeof value === "number" ? "number" : "" },
@@ -88,7 +93,9 @@ export function row_table(of) {
               : typeof value === "number" ? shown(value) : value ?? "–")));
         return made;
       })));
+      points_here = some.map((/** @type {any[]} */ row) => row[0]);
       mark();
+      mark_rows(mine.signal).catch(() => {});
       back.disabled = page === 0;
       next.disabled = !has_more || first + 2 * kPage > kDeepest;
       const range = some.length > 0 ? `${count(first + 1)} to ${count(first + some.length)}` : "None";
@@ -104,10 +111,19 @@ export function row_table(of) {
       say();
     } catch (error) {
       if (mine.signal.aborted) return;
-      filter.setAttribute("aria-invalid", "true");
-      said.className = "bad";
-      said.textContent = String(/** @type {Error} */ (error).message);
+      table.replaceChildren(table.caption ?? "");
+      said.textContent = "";
+      of.wrong(error);
     }
+  }
+
+  /** Which of the rows that are shown are marked. @param {AbortSignal} signal */
+  async function mark_rows(signal) {
+    const condition_ = of.marked();
+    if (condition_ === "" || points_here.length === 0) return;
+    const all = shows_marked_only ? points_here : (await rows(of.study, { select: "point", where: joined(`point IN (${points_here.join(",")})`, condition_), limit: kPage }, signal))
+      .rows.map((/** @type {number[]} */ row) => row[0]);
+    for (const row of table.querySelectorAll("tr[data-point]")) row.classList.toggle("marked", all.includes(Number(/** @type {HTMLElement} */ (row).dataset.point)));
   }
 
   function mark() {
@@ -116,7 +132,12 @@ export function row_table(of) {
     }
   }
 
-  return { element, load,
+  return { element, load, begin, condition,
+    /** Other points have results now. */
+    again() {
+      counted = "\0";
+      if (!element.contains(document.activeElement)) load();
+    },
     /** Marks the row of a point. @param {number} point */
     choose(point) {
       chosen = point;

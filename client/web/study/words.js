@@ -1,21 +1,29 @@
 // @ts-check
 // Pictures in words and numbers.
 import { count, shown } from "/parts/format.js";
+import { kMostDots } from "./asked/dots.js";
 
-/** @typedef {import("./picture.js").Picture} Picture */
+/** @typedef {import("./asked/picture.js").Picture} Picture */
+
+const many = (/** @type {number} */ n, /** @type {string} */ what) => `${count(n)} ${what}${n === 1 ? "" : "s"}`;
 
 /** What is shown, of how much. @param {Picture} picture @param {string} kind */
 export function facts(picture, kind) {
   const parts = [];
   if (picture.head.nx !== undefined) {
     const whole = (/** @type {any} */ side, /** @type {any} */ told) => told && !side.is_whole;
-    parts.push(`${count(picture.head.nx)}${picture.y.name ? ` × ${count(picture.head.ny)}` : ""} cells, ${count(picture.head.solved)} solved.`);
+    parts.push(`${count(picture.head.nx)}${picture.y.name ? ` × ${count(picture.head.ny)}` : ""} cells, ${count(picture.head.solved)} solved${picture.head.filtered > 0 ? " that meet the condition" : ""}.`);
     for (const [side, told] of [[picture.x, picture.head.x], [picture.y, picture.head.y]]) {
       if (whole(side, told)) parts.push(`Of ${count(told.last - told.first + 1)} values of ${side.name}, ${count(side.values.length)} are shown, evenly chosen${kind === "lines" ? "" : ": zoom in for the others"}.`);
     }
     for (const one of picture.head.at.filter((/** @type {any} */ a) => a.of > 1)) parts.push(`${one.key} = ${shown(one.value)}.`);
+  } else if (picture.dots) {
+    parts.push(`${many(picture.head.points, "point")}, each drawn.`);
+    if (picture.head.without > 0) parts.push(`${many(picture.head.without, "other")} without values that can be shown.`);
   } else {
-    parts.push(`${count(picture.head.points)} points in ${count(picture.values.length)} bins${picture.head.outside > 0 ? `, ${count(picture.head.outside)} outside` : ""}.`);
+    parts.push(`${many(picture.head.points, "point")} in ${many(picture.values.length, "bin")}${picture.head.outside > 0 ? `, ${count(picture.head.outside)} outside` : ""}.`);
+    if (picture.head.filtered > 0) parts.push(`${many(picture.head.filtered, "other")} where the condition is not met.`);
+    if (picture.y.name) parts.push(`Up to ${count(kMostDots)} points are drawn one by one, more are gathered.`);
   }
   return parts;
 }
@@ -24,16 +32,18 @@ export function facts(picture, kind) {
 export function sentence(picture, [column, row]) {
   const cell = row * picture.x.values.length + column;
   const why = picture.why_empty(cell);
-  const text = why ? { missing: "not solved", failed: "failed", left_out: picture.head.counts ? "no points" : "left out", none: "no value" }[why]
+  const text = why ? { missing: "not solved", failed: "failed", left_out: picture.head.counts ? "no points" : "left out", none: "no value", filtered: "does not meet the condition" }[why]
     : picture.z.is_category ? picture.dictionary[picture.values[cell]].text
       : `${shown(picture.values[cell])} ${picture.z.unit}`;
-  const side = (/** @type {any} */ s, /** @type {number} */ i) => `${s.name} ${shown(s.values[i])}${s.unit && s.unit !== "1" ? ` ${s.unit}` : ""}`;
-  const many = picture.head.counts ? `, ${count(picture.head.counts[cell])} points` : "";
-  return `${side(picture.x, column)}, ${side(picture.y, row)}: ${picture.z.name} ${text}${many}`;
+  const side = (/** @type {any} */ s, /** @type {number} */ i) => `${s.name} ${s.edges ? `${shown(s.edges[i], 4)} to ${shown(s.edges[i + 1], 4)}` : shown(s.values[i])}${s.unit && s.unit !== "1" ? ` ${s.unit}` : ""}`;
+  const place = `${side(picture.x, column)}, ${side(picture.y, row)}`;
+  if (picture.dots) return `${place}: ${many(picture.head.counts[cell], "point")}`;
+  return `${place}: ${picture.z.name} ${text}${picture.head.counts ? `, ${many(picture.head.counts[cell], "point")}` : ""}`;
 }
 
 /** Its cells, one a line. @param {Picture} picture */
 export function cells_csv(picture) {
+  if (picture.dots) return dots_csv(picture, picture.dots);
   const nx = picture.x.values.length;
   const lines = [[picture.x.name, ...(picture.y.name ? [picture.y.name] : []), picture.z.name, "point"].join(",")];
   for (let cell = 0; cell < picture.values.length; ++cell) {
@@ -42,5 +52,12 @@ export function cells_csv(picture) {
     const value = picture.why_empty(cell) ? "" : picture.z.is_category ? picture.dictionary[picture.values[cell]].text : picture.values[cell];
     lines.push([picture.x.values[column], ...(picture.y.name ? [picture.y.values[row]] : []), value, picture.point(column, row) ?? ""].join(","));
   }
+  return lines.join("\r\n") + "\r\n";
+}
+
+/** @param {Picture} picture @param {import("./asked/picture.js").Dots} dots */
+function dots_csv(picture, dots) {
+  const lines = [["point", picture.x.name, picture.y.name, ...(dots.z ? [picture.z.name] : [])].join(",")];
+  dots.points.forEach((point, i) => lines.push([point, dots.x[i], dots.y[i], ...(dots.z ? [dots.z[i] ?? ""] : [])].join(",")));
   return lines.join("\r\n") + "\r\n";
 }

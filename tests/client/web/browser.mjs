@@ -58,8 +58,7 @@ export class Browser {
   /** A tab at a view. */
   async open(view, { width = 1280, scheme = "light", motion = "no-preference" } = {}) {
     const page = await this.browser.newPage();
-    await page.setViewport({ width, height: 900 });
-    await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: scheme }, { name: "prefers-reduced-motion", value: motion }]);
+    await this.look(page, { width, scheme, motion });
     page.on("console", (line) => {
       if (["error", "warn"].includes(line.type())) this.objections.push(`${view}: console: ${line.text()}`);
     });
@@ -88,9 +87,15 @@ export class Browser {
     return page;
   }
 
+  /** In what window, and by whose taste, a tab is looked at. */
+  async look(page, { width, scheme, motion }) {
+    await page.setViewport({ width, height: 900 });
+    await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: scheme }, { name: "prefers-reduced-motion", value: motion }]);
+  }
+
   /** What axe-core finds wrong with what a tab shows. */
   async faults(page) {
-    await page.evaluate(axe_source);
+    if (!await page.evaluate(() => "axe" in window)) await page.evaluate(axe_source);
     return page.evaluate(async () => (await window.axe.run(document)).violations.map((one) =>
       `${one.id}: ${one.nodes.slice(0, 3).map((node) => node.html.slice(0, 120)).join(" | ")}`));
   }

@@ -6,7 +6,7 @@ import { count, heading, shown } from "/parts/format.js";
 import { scale, ticks, tick_text } from "/parts/scale.js";
 
 /**
- * @param {import("./picture.js").Picture} picture @param {import("./map.js").Look} look
+ * @param {import("../asked/picture.js").Picture} picture @param {import("./cells.js").Look} look
  */
 export function colour_bar(picture, look) {
   const canvas = h("canvas", { role: "img",
@@ -23,7 +23,8 @@ export function colour_bar(picture, look) {
     const left = 14;
     const w = width - 2 * left;
     for (let i = 0; i < w; ++i) {
-      context.fillStyle = css_colour(look.colours, Math.round((i / Math.max(w - 1, 1)) * 255));
+      // One value has one colour.
+      context.fillStyle = css_colour(look.colours, look.from === look.to ? 0 : Math.round((i / Math.max(w - 1, 1)) * 255));
       context.fillRect(left + i, 2, 1.5, 16);
     }
     context.strokeStyle = context.fillStyle = ink("text");
@@ -58,7 +59,7 @@ function swatch(pixel) {
   return canvas;
 }
 
-/** @param {import("./picture.js").Picture} picture */
+/** @param {import("../asked/picture.js").Picture} picture */
 export function categories(picture) {
   const cells = picture.values.length;
   const line = (/** @type {{text: string, cells: number}} */ one, /** @type {number} */ code) => h("li", {},
@@ -74,13 +75,13 @@ export function categories(picture) {
     h("ul", {}, ...rest.map((one) => h("li", {}, one.text, h("span", { class: "weak" }, ` ${count(one.cells)} cells`))))));
 }
 
-/** What is missing, in words and pattern. @param {import("./picture.js").Picture} picture */
+/** What is missing, in words and pattern. @param {import("../asked/picture.js").Picture} picture */
 export function gaps(picture) {
   const dark = is_dark();
-  const told = [["missing", "not solved"], ["failed", "failed"], ["left_out", "left out by the study's filter"]]
-    .filter(([why]) => picture.head[why] > 0);
+  const told = [["missing", "not solved"], ["failed", "failed"], ["left_out", "left out by the study's filter"], ["filtered", "where the condition is not met"]]
+    .filter(([why]) => picture.head.nx !== undefined && picture.head[why] > 0);
   return h("ul", { class: "gaps" }, ...told.map(([why, text]) => h("li", {},
-    swatch((x, y) => empty_pixel(/** @type {any} */ (why), x, y, dark)), `${count(picture.head[why])} cells ${text}`)));
+    swatch((x, y) => empty_pixel(/** @type {any} */ (why), x, y, dark)), `${count(picture.head[why])} ${picture.head[why] === 1 ? "cell" : "cells"} ${text}`)));
 }
 
 /**

@@ -21,10 +21,16 @@ import { json, numbers } from "/server.js";
  * @property {number | null} most
  * @property {any} head
  * @property {(column: number, row: number) => number | null} point
- * @property {(cell: number) => "" | "missing" | "failed" | "left_out" | "none"} why_empty
+ * @property {(cell: number) => Empty} why_empty
+ * @property {Dots} [dots] the points themselves, where they are few; the cells say how many lie where
+ *
+ * @typedef {"" | "missing" | "failed" | "left_out" | "none" | "filtered"} Empty
+ * @typedef {{points: number[], x: number[], y: number[], z: (number | null)[] | null}} Dots
  */
 
-const kMarks = /** @type {const} */ (["missing", "failed", "left_out", "none"]);
+/** By the bits of a cell without a value. */
+export const kEmpty = /** @type {const} */ (["missing", "failed", "left_out", "none", "filtered"]);
+const kFirstMark = 0x10000 - kEmpty.length;
 
 /** The number of the values that are shown, as the server chooses them. @param {any} side @param {number} shown */
 function numbers_of(side, shown) {
@@ -59,23 +65,43 @@ export async function slice(study, asked, signal, unit_of) {
     z: { name: head.z.name, unit: head.z.unit, is_category },
     point: (column, row) => head.first_point + x.numbers[column] * x_stride + y.numbers[row] * y_stride,
     why_empty(cell) {
-      if (bits) return Number.isNaN(values[cell]) ? kMarks[bits[cell] & 3] : "";
+      if (bits) return Number.isNaN(values[cell]) ? kEmpty[bits[cell] & 7] : "";
       const code = values[cell];
-      return code < 0xfffc ? "" : kMarks[0xffff - code];
+      return code < kFirstMark ? "" : kEmpty[0xffff - code];
     },
   };
 }
 
-/** @param {any} side */
-function bin_side(side) {
-  const inner = side.log ? Math.log : (/** @type {number} */ v) => v;
-  const outer = side.log ? Math.exp : (/** @type {number} */ v) => v;
-  const from = inner(side.least);
-  // A column of one value has one bin with some width.
-  const width = (inner(side.most) - from) || 1e-9;
-  const edges = Array.from({ length: side.bins + 1 }, (_, i) => outer(from + (width * i) / side.bins));
-  const values = Float64Array.from({ length: side.bins }, (_, i) => outer(from + (width * (i + 0.5)) / side.bins));
-  return { name: side.column, unit: side.unit, values, edges, is_whole: true };
+/**
+ * Equal steps from the least to the most, or one around a value that all have.
+ * @param {string} name @param {string} unit @param {number} least @param {number} most @param {number} bins @param {boolean} is_log
+ * @returns {Side}
+ */
+export function steps(name, unit, least, most, bins, is_log) {
+  if (!(most > least)) {
+    const half = Math.abs(least) * 0.05 || 0.5;
+    return { name, unit, values: Float64Array.of(least), edges: [least - half, least + half], is_whole: true };
+  }
+  const inner = is_log ? Math.log : (/** @type {number} */ v) => v;
+  const outer = is_log ? Math.exp : (/** @type {number} */ v) => v;
+  const from = inner(least);
+  const width = inner(most) - from;
+  const at = (/** @type {number} */ i) => outer(from + (width * i) / bins);
+  const edges = Array.from({ length: bins + 1 }, (_, i) => (i === 0 ? least : i === bins ? most : at(i)));
+  return { name, unit, values: Float64Array.from({ length: bins }, (_, i) => at(i + 0.5)), edges, is_whole: true };
+}
+
+/** @param {ArrayLike<number | null>} values @returns {[number | null, number | null]} */
+export function ends_of(values) {
+  let least = /** @type {number | null} */ (null);
+  let most = /** @type {number | null} */ (null);
+  for (let i = 0; i < values.length; ++i) {
+    const value = values[i];
+    if (value === null || Number.isNaN(value)) continue;
+    least = least === null ? value : Math.min(least, value);
+    most = most === null ? value : Math.max(most, value);
+  }
+  return [least, most];
 }
 
 /**
@@ -87,18 +113,26 @@ export async function bins(study, asked, signal, unit_of) {
   const answer = await numbers(`/api/studies/${study}/bins?${new URLSearchParams(/** @type {any} */ (asked))}`, signal);
   if (!answer) throw new Error("the server is not ready: ask again");
   const { head, bytes, begin } = answer;
-  const x = bin_side(head.x);
-  const y = head.y ? bin_side(head.y) : { name: "", unit: "", values: new Float64Array(1), is_whole: true };
-  const cells = x.values.length * y.values.length;
-  const counts = new Uint32Array(bytes, begin, cells);
-  const values = head.z ? new Float32Array(bytes, begin + 4 * cells, cells) : Float32Array.from(counts, (n) => (n > 0 ? n : NaN));
-  let least = null;
-  let most = null;
-  for (const value of values) {
-    if (Number.isNaN(value)) continue;
-    least = least === null ? value : Math.min(least, value);
-    most = most === null ? value : Math.max(most, value);
+  const side = (/** @type {any} */ of) => steps(of.column, of.unit, of.least, of.most, of.bins, of.log);
+  const x = side(head.x);
+  const y = head.y ? side(head.y) : { name: "", unit: "", values: new Float64Array(1), is_whole: true };
+  const told = head.x.bins * (head.y?.bins ?? 1);
+  const [nx, ny] = [x.values.length, y.values.length];
+  let counts = new Uint32Array(bytes, begin, told);
+  let means = head.z ? new Float32Array(bytes, begin + 4 * told, told) : null;
+  if (nx * ny < told) {  // a column of one value: one of its bins has all
+    const all = counts;
+    const old = means;
+    counts = new Uint32Array(nx * ny);
+    means = old && new Float32Array(nx * ny).fill(NaN);
+    for (let i = 0; i < told; ++i) {
+      const cell = Math.min(Math.floor(i / head.x.bins), ny - 1) * nx + Math.min(i % head.x.bins, nx - 1);
+      counts[cell] += all[i];
+      if (old && means && all[i] > 0) means[cell] = old[i];
+    }
   }
+  const values = means ?? Float32Array.from(counts, (n) => (n > 0 ? n : NaN));
+  const [least, most] = ends_of(values);
   return { x, y, values, head: { ...head, counts }, dictionary: [], least, most,
     z: { name: head.z ? `mean of ${head.z}` : "points", unit: head.z ? unit_of(head.z) : "", is_category: false },
     point: () => null, why_empty: (cell) => (Number.isNaN(values[cell]) ? "left_out" : "") };

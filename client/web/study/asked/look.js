@@ -29,11 +29,12 @@ async function model_of(study, near) {
 /**
  * @typedef {object} Wanted
  * @property {number} study
- * @property {import("./axes.js").Block} block
+ * @property {import("../axes.js").Block} block
  * @property {number} near a point of the study there
  * @property {string} z
  * @property {Record<string, {from: number, to: number, is_log: boolean}>} ranges of the two axes
  * @property {Record<string, number>} held values of the others
+ * @property {string} where which cells are shown; empty: all
  */
 
 /** @param {Wanted} wanted @param {any} model @param {number} side */
@@ -60,7 +61,7 @@ export async function* finer(wanted, signal, unit_of) {
   for (const side of kSides) {
     ({ id } = await change("/api/look", { recipe: recipe_of(wanted, model, side) }));
     for (let is_whole = false; !is_whole && !signal.aborted;) {
-      const picture = await slice(id, { z: wanted.z, x, y, nx: side, ny: side }, signal, unit_of);
+      const picture = await slice(id, { z: wanted.z, x, y, nx: side, ny: side, ...(wanted.where ? { where: wanted.where } : {}) }, signal, unit_of);
       is_whole = picture.head.missing === 0;
       // Half of a finer picture is worse than all of the coarser one.
       if (is_whole || side === kSides[0]) yield { id, side, is_whole, picture };

@@ -1,0 +1,92 @@
+// @ts-check
+// What the server is asked for a picture, as the address says it.
+import { own_axes } from "../axes.js";
+import { joined } from "../conditions.js";
+import { dots, kMostDots } from "./dots.js";
+import { bins, slice } from "./picture.js";
+
+const kMostCells = 512; // a side of a picture
+const kMostBins = 96;
+const kMostLines = 8;
+
+/** @typedef {import("../study.js").StudyView} View */
+
+export const is_slice = (/** @type {string} */ kind) => kind === "map" || kind === "lines";
+
+const ends_of = (/** @type {View} */ view) =>
+  Object.fromEntries(["x0", "x1", "y0", "y1"].filter((name) => view.is(name)).map((name) => [name, view.is(name)]));
+
+/** @param {View} view @returns {Record<string, string | number>} */
+function slice_fields(view) {
+  const kind = view.is("pic");
+  const keys = own_axes(view.block).map((a) => a.key);
+  const at = [...view.places()].filter(([key]) => keys.includes(key) && key !== view.is("x") && key !== view.is("y"))
+    .map(([key, n]) => `${key}@${n}`).join(",");
+  return { z: view.is("z"), x: view.is("x"), ...(view.is("y") ? { y: view.is("y") } : {}), ...(at ? { at } : {}), block: view.is("block"),
+    nx: kMostCells, ny: kind === "lines" ? kMostLines : kMostCells, ...ends_of(view) };
+}
+
+/** @param {View} view @returns {Record<string, string | number>} */
+function bins_fields(view) {
+  const kind = view.is("pic");
+  // A few points a bin.
+  const a_side = Math.round(Math.min(Math.max(Math.sqrt(view.study.points / 3), 6), kMostBins));
+  return { x: view.is("x"), nx: kind === "histogram" ? Math.min(a_side * 2, 64) : a_side, ...(view.is("xlog") ? { xlog: 1 } : {}), ...ends_of(view),
+    ...(kind === "gathered" ? { y: view.is("y"), ny: a_side, ...(view.is("ylog") ? { ylog: 1 } : {}), ...(view.is("z") ? { z: view.is("z") } : {}) } : {}) };
+}
+
+/** The points themselves where they are few, else bins of them. @param {View} view @param {AbortSignal} signal */
+async function scatter(view, signal) {
+  const single = () => dots(view.study.id, { x: view.is("x"), y: view.is("y"), z: view.is("z"), where: view.is("where"), xlog: view.is("xlog") !== "",
+    ylog: view.is("ylog") !== "", ends: ends_of(view) }, signal, view.unit_of);
+  if (view.study.points <= kMostDots) {
+    const all = await single();
+    if (all) return all;
+  }
+  try {
+    const gathered = await bins(view.study.id, { ...bins_fields(view), ...filter_of(view) }, signal, view.unit_of);
+    const few = gathered.head.points <= kMostDots ? await single() : null;
+    return few ?? gathered;
+  } catch (error) {
+    // Of studies that are too large for bins a few points may be solved.
+    const few = !signal.aborted && /** @type {any} */ (error).status === 400 ? await single().catch(() => null) : null;
+    if (few) return few;
+    throw error;
+  }
+}
+
+const filter_of = (/** @type {View} */ view) => (view.is("where") ? { where: view.is("where") } : {});
+
+/** The picture of a view. @param {View} view @param {AbortSignal} signal */
+export function ask(view, signal) {
+  const kind = view.is("pic");
+  if (kind === "gathered") return scatter(view, signal);
+  return is_slice(kind) ? slice(view.study.id, { ...slice_fields(view), ...filter_of(view) }, signal, view.unit_of)
+    : bins(view.study.id, { ...bins_fields(view), ...filter_of(view) }, signal, view.unit_of);
+}
+
+/**
+ * Which cells of a picture have points that meet a condition too, or which of its points do.
+ * @typedef {{cells: Uint8Array, counts: Uint32Array | null, points: Set<number> | null}} Marks
+ * @param {View} view @param {import("./picture.js").Picture} picture @param {string} condition @param {AbortSignal} signal
+ * @returns {Promise<Marks>}
+ */
+export async function ask_marks(view, picture, condition, signal) {
+  const where = joined(view.is("where"), condition);
+  const size = picture.values.length;
+  if (picture.dots) {
+    const { rows } = await import("./picture.js");
+    const answer = await rows(view.study.id, { select: "point", where, limit: 100_000 }, signal);
+    const points = new Set(answer.rows.map((/** @type {number[]} */ row) => row[0]));
+    return { cells: new Uint8Array(size), counts: null, points };
+  }
+  if (picture.head.counts) {
+    const ends = Object.fromEntries(["x", "y"].filter((name) => picture.head[name])
+      .flatMap((name) => [[`${name}0`, picture.head[name].least], [`${name}1`, picture.head[name].most]]));
+    const told = await bins(view.study.id, { ...bins_fields(view), ...ends, where }, signal, view.unit_of);
+    return { cells: Uint8Array.from(told.head.counts, (n) => (n > 0 ? 1 : 0)), counts: told.head.counts, points: null };
+  }
+  const told = await slice(view.study.id, { ...slice_fields(view), where }, signal, view.unit_of);
+  const cells = Uint8Array.from({ length: size }, (_, cell) => (["missing", "left_out", "filtered"].includes(told.why_empty(cell)) ? 0 : 1));
+  return { cells, counts: null, points: null };
+}

@@ -1,0 +1,82 @@
+// @ts-check
+// The cell or point that is chosen in a picture: spoken, marked in the table, opened.
+import { h } from "/parts/dom.js";
+import { count } from "/parts/format.js";
+import { step_of } from "./asked/dots.js";
+import { sentence } from "./words.js";
+
+/** @param {import("./study.js").StudyView} view */
+export function choice_of(view) {
+  const spoken = h("p", { class: "reading", "aria-live": "polite" });
+  const line = h("p", { class: "choice" });
+  const { map } = view;
+  const link = (/** @type {number} */ study, /** @type {number} */ point, /** @type {string} */ text) => line.replaceChildren(
+    h("a", { class: "button", href: `#/study/${study}/point/${point}` }, `Open point ${count(point)}`), h("span", { class: "weak" }, text));
+
+  /** The cell of a point, where the picture shows it. @param {number} point @returns {[number, number] | null} */
+  function cell_of(point) {
+    const { picture } = view;
+    if (!picture) return null;
+    const i = picture.dots?.points.indexOf(point) ?? -1;
+    if (picture.dots && i >= 0) return [step_of(picture.x, picture.dots.x[i], view.is("xlog") !== ""), step_of(picture.y, picture.dots.y[i], view.is("ylog") !== "")];
+    if (!picture.head.x?.stride) return null;
+    const numbers = picture.x.numbers ?? [];
+    for (let row = 0; row < picture.y.values.length; ++row) {
+      const column = (point - /** @type {number} */ (picture.point(0, row))) / picture.head.x.stride;
+      const found = numbers.indexOf(column + (numbers[0] ?? 0));
+      if (Number.isInteger(column) && found >= 0) return [found, row];
+    }
+    return null;
+  }
+
+  return { spoken, line,
+    /** @param {[number, number] | null} cell */
+    speak(cell) {
+      spoken.textContent = cell && view.picture ? sentence(view.picture, cell) : "Point at a cell, or move with the arrow keys.";
+    },
+    /** @param {[number, number]} cell @param {number | null} [which] of several points of a cell */
+    choose(cell, which = null) {
+      this.speak(cell);
+      const point = which ?? view.picture?.point(...cell) ?? null;
+      line.replaceChildren();
+      if (point === null) return;
+      link(view.shown_study, point, " or press Enter, or click twice");
+      if (view.solving.is_on) return;
+      view.table.choose(point);
+      view.set({ cell: String(point) });
+    },
+    /** @param {[number, number]} cell */
+    open(cell) {
+      const point = (map.chosen_point !== null && String(cell) === String(map.chosen) ? map.chosen_point : view.picture?.point(...cell)) ?? null;
+      if (point !== null) location.hash = `#/study/${view.shown_study}/point/${point}`;
+    },
+    /** Marks a point of the study where the picture has it. @param {number} point */
+    choose_point(point) {
+      view.table.choose(point);
+      const cell = cell_of(point);
+      map.choose(cell, view.picture?.dots ? point : null);
+      if (cell) {
+        this.choose(cell, point);
+      } else {
+        link(view.study.id, point, view.has_map ? " (it lies outside this picture)" : "");
+        view.set({ cell: String(point) });
+      }
+    },
+    /** After another picture has come. */
+    again() {
+      const { picture } = view;
+      const { chosen } = map;
+      if (!view.has_map || !picture) {
+        line.replaceChildren();
+      } else if (chosen && !picture.dots && chosen[0] < picture.x.values.length && chosen[1] < picture.y.values.length) {
+        this.choose(chosen);
+      } else if (view.is("cell") && !view.solving.is_on) {
+        this.choose_point(Number(view.is("cell")));
+      }
+    },
+    none() {
+      map.choose(null);
+      line.replaceChildren();
+      this.speak(null);
+    } };
+}

@@ -1,0 +1,68 @@
+// @ts-check
+// What is drawn of a picture: a map or points on a canvas, lines, bars; with what colours mean and how much is shown.
+import { h } from "/parts/dom.js";
+import { palette } from "/parts/colours.js";
+import { part_of } from "./conditions.js";
+import { categories, colour_bar, gaps } from "./drawn/legend.js";
+import { facts } from "./words.js";
+
+/** @param {import("./study.js").StudyView} view */
+export function drawing_of(view) {
+  const lines_place = h("div", {});
+  const legend = h("div", { class: "colours" });
+  const told = h("p", { class: "weak facts" });
+  /** @type {any} */
+  let lines = null;
+  let turn = 0;
+
+  function end() {
+    ++turn;
+    lines?.close();
+    lines = null;
+    lines_place.replaceChildren();
+  }
+  /** @param {import("./asked/picture.js").Picture} picture @returns {import("./drawn/map.js").Look} */
+  function look_of(picture) {
+    let from = view.is("from") === "" ? picture.least ?? 0 : Number(view.is("from"));
+    let to = view.is("to") === "" ? picture.most ?? 1 : Number(view.is("to"));
+    if (to < from) [from, to] = [to, from];
+    return { colours: palette(view.is("pal") || "viridis"), from, to, z_log: view.is("zlog") !== "" && from > 0,
+      x_log: view.is("xlog") !== "", y_log: view.is("ylog") !== "" };
+  }
+  /** @param {import("./asked/picture.js").Picture} picture */
+  async function draw_lines(picture) {
+    const mine = ++turn;
+    const as_bars = view.is("pic") === "histogram";
+    const { drawn_lines } = await import("./drawn/drawn_lines.js");
+    if (mine !== turn) return;
+    lines?.close();
+    const brushes = as_bars && view.is("drag") === "mark";
+    lines = drawn_lines(picture, { as_bars, x_log: view.is("xlog") !== "", y_log: view.is("ylog") !== "", counts: view.marking.marks?.counts,
+      ...(brushes ? { brushed: (from, to) => view.marking.mark(part_of(picture.x, [], [from, to])) } : {}) });
+    lines_place.replaceChildren(lines.element);
+  }
+  return { lines_place, legend, told, end,
+    /** By the colours and scales that the address says. */
+    draw() {
+      const { picture } = view;
+      if (!picture) return;
+      legend.replaceChildren();
+      if (view.has_map) {
+        end();
+        const look = look_of(picture);
+        view.map.show(picture, look, view.marking.marks);
+        if (picture.z.is_category) legend.append(categories(picture));
+        else if (!picture.dots || picture.dots.z) legend.append(colour_bar(picture, look));
+        legend.append(gaps(picture));
+      } else {
+        draw_lines(picture);
+      }
+      told.textContent = facts(picture, view.is("pic")).join(" ");
+      if (view.is("x0") || view.is("y0")) told.append(" ", h("button", { type: "button", onclick: () => view.zoom(null) }, "Show all"));
+    },
+    /** Only what is marked is another. */
+    mark() {
+      if (view.has_map) view.map.mark(view.marking.marks);
+      else if (view.is("pic") === "histogram" && view.picture) draw_lines(view.picture);
+    } };
+}

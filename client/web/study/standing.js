@@ -1,0 +1,40 @@
+// @ts-check
+// How far a study is, and what may be done with it.
+import { h } from "/parts/dom.js";
+import { count } from "/parts/format.js";
+import { json } from "/server.js";
+import { progress_of, study_buttons } from "/overview.js";
+
+/** @param {import("./study.js").StudyView} view @param {(settled: string) => void} moved other points are settled than before */
+export function standing_row(view, moved) {
+  const element = h("div", { class: "row standing" });
+  let stood = "";
+  let settled = "";
+  /** @param {any} told */
+  const show = (told) => {
+    const text = JSON.stringify([told.state, told.solved, told.failed, told.waits_for]);
+    if (text === stood) return;
+    stood = text;
+    element.replaceChildren(told.state, progress_of(told), `${count(told.points)} ${told.points === 1 ? "point" : "points"}`,
+      told.failed > 0 ? h("span", { class: "bad" }, `${count(told.failed)} failed`) : "",
+      told.state === "running" && told.waits_for ? h("span", { class: "weak" }, `waits for ${told.waits_for}`) : "",
+      view.place.may_change ? study_buttons(told, (text_, is_bad = false) => view.say(text_, is_bad)) : "");
+    const now = `${told.solved + told.failed}`;
+    if (now === settled) return;
+    if (settled !== "") moved(now);
+    settled = now;
+  };
+  const ask = () => json(`/api/studies?limit=1&after=${view.study.id - 1}`).then((page) => {
+    if (page.studies[0]?.id === view.study.id) show(page.studies[0]);
+  }, () => {});
+  ask();
+  let was_listed = false;
+  return { element,
+    /** @param {any} now the overview */
+    take(now) {
+      const told = now.studies.find((/** @type {any} */ one) => one.id === view.study.id);
+      if (told) show(told);
+      else if (was_listed) ask(); // it ended
+      was_listed = !!told;
+    } };
+}

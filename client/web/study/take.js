@@ -1,0 +1,39 @@
+// @ts-check
+// What people take with them: the picture as files, the view as a link, and the commands that make both.
+import { copied, h, save } from "/parts/dom.js";
+import { picture_fields, plot_command, query_command } from "./command.js";
+import { cells_csv } from "./words.js";
+
+/** @param {import("./study.js").StudyView} view */
+export function show_takeaways(view) {
+  const { picture } = view;
+  if (!picture) return;
+  if (view.solving.is_on) {
+    view.commands.replaceChildren(h("p", { class: "weak" }, "What is solved while one looks goes when nobody looks: keep it as a study to take it with you."), numbers(picture));
+    return;
+  }
+  const file = (/** @type {string} */ format) => h("a", { class: "button", download: `${view.study.name}.${format}`, href: picture_path(view, format) }, format.toUpperCase());
+  const said = h("span", { role: "status", class: "weak" });
+  view.commands.replaceChildren(
+    h("p", {}, "The picture, as oblique plot draws it:"), h("div", { class: "row files" }, file("svg"), file("png"), file("csv"), numbers(picture)),
+    copied("the command of the picture", plot_command(view)),
+    h("p", {}, "The rows of the table:"), copied("the command of the rows", query_command(view)),
+    h("p", { class: "weak" }, "Add --db FILE or --server ADDRESS where the database is not oblique.db. The address of this view is a link to it."),
+    h("div", { class: "row" }, h("button", { type: "button", onclick: async () => {
+      try {
+        await navigator.clipboard.writeText(location.href);
+        said.textContent = "copied";
+      } catch {
+        said.textContent = "copy it from the address of this page";
+      }
+    } }, "Copy the link"), said));
+}
+
+/** @param {import("./asked/picture.js").Picture} picture */
+const numbers = (picture) => h("button", { type: "button", onclick: () => save("picture.csv", "text/csv", cells_csv(picture)) }, "Numbers on screen as CSV");
+
+/** @param {import("./study.js").StudyView} view @param {string} format */
+function picture_path(view, format) {
+  const fields = Object.entries({ ...picture_fields(view), format }).filter(([, value]) => value !== "");
+  return `/api/studies/${view.study.id}/picture?${new URLSearchParams(fields)}`;
+}

@@ -1,0 +1,62 @@
+// The server and the browser of all tests, and tabs at its views.
+import { join } from "node:path";
+import { Browser, Server, until } from "./browser.mjs";
+
+export { text_of, until } from "./browser.mjs";
+
+export const server = new Server(join(process.env.OBLIQUE_BIN, "oblique"));
+export const browser = new Browser();
+export const kMap = ".map canvas[tabindex]";
+
+/** Studies by their numbers: a grid, scattered points, more of these than are drawn one by one, a single point. */
+export const kGrid = 1;
+export const kScattered = 2;
+export const kMany = 3;
+export const kOne = 4;
+
+export async function begin() {
+  server.run("--name", "friction", "--H", "0.5:1.1:7", "--mu", "0.1:2:12", "--e", "0.6,0.8,1");
+  server.run("--name", "scattered", "--sample", "sobol:300:7", "--H", "0.3:1.1", "--mu", "0.05:2", "--e", "0.4:1");
+  server.run("--name", "many", "--sample", "sobol:20100:3", "--H", "0.3:1.1", "--mu", "0.05:2", "--e", "0.4:1", "--elements-per-link", "1", "--tolerance", "0.01");
+  server.run("--name", "one", "--H", "1", "--mu", "1", "--e", "1");
+  await server.start();
+  await browser.start(server);
+}
+
+export async function end() {
+  await browser.stop();
+  await server.stop();
+}
+
+/** A tab that shows the picture of a study. */
+export async function study(view = "#/study/1", how = {}) {
+  const page = await browser.open(view, how);
+  await until(page, () => /solved|points?[ ,]/.test(document.querySelector(".facts")?.textContent ?? ""));
+  await until(page, () => document.querySelectorAll(".rows tbody tr").length > 0);
+  return page;
+}
+
+/** A tab whose point has been solved again. */
+export async function point(how = {}) {
+  const page = await browser.open("#/study/1/point/100", how);
+  await until(page, () => document.querySelectorAll(".uplot").length === 4);
+  return page;
+}
+
+/** Fills a field and leaves it by Enter. */
+export async function write(page, selector, text) {
+  await page.click(selector, { clickCount: 3 });
+  if (text === "") await page.keyboard.press("Backspace");
+  else await page.type(selector, text);
+  await page.keyboard.press("Enter");
+}
+
+/** Drags the mouse over the map, from and to shares of its area. */
+export async function drag(page, [x0, y0], [x1, y1]) {
+  const box = await (await page.$(kMap)).boundingBox();
+  const at = (x, y) => [box.x + 64 + x * (box.width - 78), box.y + 10 + (1 - y) * (box.height - 56)];
+  await page.mouse.move(...at(x0, y0));
+  await page.mouse.down();
+  await page.mouse.move(...at(x1, y1), { steps: 3 });
+  await page.mouse.up();
+}

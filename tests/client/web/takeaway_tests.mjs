@@ -1,0 +1,85 @@
+// What people take with them: files, links, commands.
+import assert from "node:assert/strict";
+import { spawnSync } from "node:child_process";
+import { readFileSync } from "node:fs";
+import { join } from "node:path";
+import { test } from "node:test";
+import { browser, kOne, kScattered, server, study, text_of, until } from "./here.mjs";
+
+/** What a link of the page gives. */
+const file = (page, text) => page.evaluate(async (wanted) => {
+  const link = [...document.querySelectorAll("a[download]")].find((one) => one.textContent === wanted);
+  const answer = await fetch(link.href);
+  return { name: link.download, status: answer.status, text: await answer.text() };
+}, text);
+
+/** Runs a command that the page shows, as a shell would, on the database of the page. */
+function made_by(command, out) {
+  const [, ...words] = ["oblique", ...command.replace(/^oblique /, "").replace("--out picture.svg", `--out ${out}`)
+    .match(/'(?:[^']|'\\'')*'|\S+/g).map((word) => word.replace(/^'|'$/g, "").replaceAll("'\\''", "'"))];
+  const made = spawnSync(server.oblique, [...words, "--db", server.database], { encoding: "utf8" });
+  assert.equal(made.status, 0, made.stderr);
+  return made.stdout;
+}
+
+const kViews = ["#/study/1?at=e@2", "#/study/1?pic=map&z=mode&at=e@1&where=mu%20%3E%200.3", "#/study/1?x0=2&x1=8&y0=1&y1=5&pal=cividis", "#/study/1?pic=lines&y=e&xlog=1",
+  `#/study/${kScattered}?pic=gathered&x=mu&y=fn_peak_N&z=H`, `#/study/${kScattered}?pic=histogram&x=duration_s`, `#/study/${kOne}`];
+
+test("the SVG that a view gives is what its command draws", async () => {
+  for (const view of kViews) {
+    const page = await study(view);
+    await page.waitForSelector(".files");
+    const taken = await file(page, "SVG");
+    assert.equal(taken.status, 200, `${view}: ${taken.text}`);
+    const out = join(server.folder, "command.svg");
+    made_by(await text_of(page, ".commands code"), out);
+    assert.equal(taken.text, readFileSync(out, "utf8"), view);
+    await page.close();
+  }
+});
+
+test("pictures are also taken as PNG and CSV, and tables as CSV, which is what the command of the rows gives", async () => {
+  const page = await study("#/study/1?at=e@2&where=mu%20%3C%201&order=mu%20DESC");
+  const csv = await file(page, "CSV");
+  assert.match(csv.text, /fn_peak/);
+  assert.ok(csv.text.trim().split("\n").length > 20, csv.text.slice(0, 200));
+  const png = await page.evaluate(async () => {
+    const link = [...document.querySelectorAll("a[download]")].find((one) => one.textContent === "PNG");
+    const answer = await fetch(link.href);
+    return [answer.status, answer.headers.get("Content-Type"), (await answer.arrayBuffer()).byteLength];
+  });
+  if (png[0] === 200) assert.deepEqual([png[1], png[2] > 1000], ["image/png", true]);  // it needs rsvg-convert
+  const table = await file(page, "Table as CSV");
+  const [, command] = await page.$$eval(".commands code", (all) => all.map((one) => one.textContent));
+  const cells = (text) => text.trim().split(/\r?\n/).map((line) => line.split(",").map((cell) => (cell === "" || Number.isNaN(Number(cell)) ? cell : Number(cell))));
+  assert.deepEqual(cells(table.text), cells(made_by(`${command} --format csv`, "")));
+  browser.objections = browser.objections.filter((one) => !one.includes("status of 422"));
+  await page.close();
+});
+
+test("the numbers on screen are saved as a file", async () => {
+  const page = await study("#/study/1?at=e@2");
+  await page.waitForSelector(".files");
+  await page.evaluate(() => {
+    const make = URL.createObjectURL;
+    URL.createObjectURL = (blob) => {
+      blob.text().then((text) => { window.saved = text; });
+      return make.call(URL, blob);
+    };
+    [...document.querySelectorAll("button")].find((one) => one.textContent === "Numbers on screen as CSV").click();
+  });
+  const lines = (await until(page, () => window.saved)).trim().split("\r\n");
+  assert.equal(lines[0], "mu,H,fn_peak_N,point");
+  assert.equal(lines.length, 85);
+  await page.close();
+});
+
+test("the address of a view is all of it", async () => {
+  const page = await study("#/study/1?pic=map&z=mode&at=e@2&where=mu%20%3E%200.2&mark=H%20%3E%200.8&order=mu%20DESC&pal=cividis&drag=mark");
+  const told = (one) => one.evaluate(() => [location.hash, document.querySelector(".facts").textContent, document.querySelector(".marks input").value,
+    document.querySelector(".rows tbody").textContent]);
+  const other = await study(await page.evaluate(() => location.hash));
+  assert.deepEqual(await told(other), await told(page));
+  await other.close();
+  await page.close();
+});
