@@ -101,7 +101,8 @@ void refuse_failed_point(const PointPictureFlags& flags, const std::optional<Sto
 }
 
 PointHistory history_of_study(const PointPictureFlags& flags, const SourceFlags& source_flags) {
-  const bool is_file = !database_meant(source_flags).empty();
+  const std::string database = database_meant(source_flags);
+  const bool is_file = !database.empty();
   if (is_file && flags.on_worker) {
     throw solver::InputError(
         "--on-worker needs a server, and a database file is read here: name one with --server URL");
@@ -116,9 +117,9 @@ PointHistory history_of_study(const PointPictureFlags& flags, const SourceFlags&
   if (!is_file && !flags.here) {
     return history_by_worker(flags, source_flags, *connection);
   }
-  PointHistory history = history_of(
-      is_file ? point_in(database_meant(source_flags), study_named(*source, flags.study), number)
-              : point_at(*connection, flags.study, number));
+  PointHistory history =
+      history_of(is_file ? point_in(database, study_named(*source, flags.study), number)
+                         : point_at(*connection, flags.study, number));
   try {
     solve_history(history);
   } catch (const solver::SolveError& error) {
