@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <ranges>
 #include <stdexcept>
 #include <string_view>
 
@@ -83,13 +82,12 @@ GridSide side_of(const AxisLayout& layout, const FieldReader& fields, const std:
 std::uint64_t nearest(const protocol::Axis& axis, double value) {
   const std::uint64_t size = protocol::axis_size(axis);
   if (axis.count() > 0) {
-    const protocol::RangeValues values(axis);  // they rise
-    const auto numbers = std::views::iota(std::uint64_t{0}, size);
-    const std::uint64_t from = *std::ranges::partition_point(
-        numbers, [&](std::uint64_t number) { return values.at(number) < value; });
-    const std::uint64_t above = std::min(from, size - 1);
+    const std::uint64_t above = std::min(protocol::first_value_from(axis, value), size - 1);
     const std::uint64_t below = above == 0 ? 0 : above - 1;
-    return std::abs(values.at(below) - value) < std::abs(values.at(above) - value) ? below : above;
+    return std::abs(protocol::axis_value(axis, below) - value) <
+                   std::abs(protocol::axis_value(axis, above) - value)
+               ? below
+               : above;
   }
   const auto& values = axis.values();
   const auto found =

@@ -1,15 +1,13 @@
 // What the page asks a whole server with a pretended worker.
-#include <bit>
-#include <cmath>
 #include <map>
+#include <memory>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "server/web/answers/column_source.h"
-#include "tests/server/web/page/page_server.h"
-#include "tests/support/points.h"
-#include "tests/support/recipes.h"
+#include "tests/server/web/page/page_study.h"
 
 namespace oblique::server {
 namespace {
@@ -17,34 +15,7 @@ namespace {
 using nlohmann::json;
 using testing::HasSubstr;
 
-/// As `solved_point` makes it.
-float force_of(std::uint64_t point) {
-  return static_cast<float>(std::round((1.0 / 3.0 + static_cast<double>(point)) * 1e4 * 1e5) / 1e5);
-}
-
-class PageAnswersTest : public testing::Test {
- protected:
-  void submit(const std::string& name, const protocol::Recipe& recipe) {
-    ClientRequest request;
-    request.mutable_submit()->set_name(name);
-    *request.mutable_submit()->mutable_recipe() = recipe;
-    ASSERT_TRUE(client_.ask(request).has_submit());
-  }
-  void solve(std::uint64_t points) {
-    PretendedWorker worker(page_.server().worker_endpoint());
-    worker.hello();
-    worker.work(points);
-  }
-  /// 3 heights, 4 frictions, 2 restitutions.
-  void submit_grid() {
-    submit("grid", protocol::recipe_of(
-                       {{protocol::listed("H", {1.0, 0.9, 0.8}), protocol::range("mu", 0.0, 0.6, 4),
-                         protocol::listed("e", {1.0, 0.5})}}));
-  }
-
-  PageServer page_;
-  PretendedClient client_{page_.server().client_endpoint()};
-};
+using PageAnswersTest = PageStudyTest;
 
 TEST_F(PageAnswersTest, TheOverviewIsToldOnceAndThenWhatChanges) {
   RawHttp tab(page_.url());
@@ -225,79 +196,6 @@ TEST_F(PageAnswersTest, BinsCountEveryPointOnce) {
   EXPECT_EQ(some.head["outside"], 12);
   EXPECT_EQ(status_of_answer(page_.get("/api/studies/1/bins?x=mode")), 400);
   EXPECT_EQ(status_of_answer(page_.get("/api/studies/1/bins?x=mu&xlog=1&x0=0")), 400);
-}
-
-TEST_F(PageAnswersTest, ASliceMarksWhatDoesNotMeetACondition) {
-  submit_grid();
-  solve(24);
-  const std::string slice = "/api/studies/1/slice?x=mu&y=H&at=e@1&z=";
-  const Numbers some =
-      page_.numbers(slice + "fn_peak_N&where=point%20%3E%203%20AND%20fn_peak_N%20%3C%20140000");
-  EXPECT_EQ(some.head["filtered"], 7);  // of 1, 3, ..., 23 all but 5, 7, ..., 13
-  EXPECT_EQ(some.head["solved"], 5);
-  EXPECT_EQ(some.head["least"], force_of(5));
-  EXPECT_EQ(some.head["most"], force_of(13));
-  const auto bits = some.read<std::uint32_t>(56, 12);
-  EXPECT_EQ(bits[1], 0x7fc00004U);
-  EXPECT_EQ(std::bit_cast<float>(bits[2]), force_of(5));
-  const Numbers modes = page_.numbers(slice + "mode&where=mu%20%3C%200.3");
-  EXPECT_EQ(modes.read<std::uint16_t>(56, 4), (std::vector<std::uint16_t>{0, 0, 0xfffb, 0xfffb}));
-  EXPECT_EQ(modes.head["dictionary"][0]["cells"], 6);
-  EXPECT_EQ(page_.numbers(slice + "mode").head["filtered"], 0);
-  EXPECT_EQ(page_.numbers(slice + "mode&where=1").head["filtered"], 0);
-  EXPECT_EQ(page_.numbers(slice + "mode&where=NULL").head["filtered"], 12);
-}
-
-TEST_F(PageAnswersTest, WhatWasNotSolvedIsNotLeftOutByACondition) {
-  submit_grid();
-  solve(4);
-  const std::string slice = "/api/studies/1/slice?x=mu&y=H&z=mode&where=mu%20%3E%200.1";
-  EXPECT_EQ(page_.numbers(slice).head["filtered"], 1);
-  EXPECT_EQ(page_.numbers(slice).head["missing"], 10);
-  solve(20);  // what is known of the condition follows the study
-  EXPECT_EQ(page_.numbers(slice).head["filtered"], 3);
-  while (page_.numbers(slice).head["missing"] > 0) {
-    // Columns are looked at some times a second.
-  }
-  EXPECT_EQ(page_.numbers(slice).head["solved"], 9);
-}
-
-TEST_F(PageAnswersTest, BinsCountWhatMeetsACondition) {
-  submit_grid();
-  solve(24);
-  const Numbers bins = page_.numbers("/api/studies/1/bins?x=mu&nx=2&where=mu%20%3C%200.3");
-  EXPECT_EQ(bins.head["points"], 12);
-  EXPECT_EQ(bins.head["filtered"], 12);
-  EXPECT_EQ(bins.head["x"]["most"], 0.2F);  // of those that are counted
-  EXPECT_EQ(bins.read<std::uint32_t>(0, 2), (std::vector<std::uint32_t>{6, 6}));
-  const Numbers none = page_.numbers("/api/studies/1/bins?x=mu&nx=2&where=0");
-  EXPECT_EQ(none.head["points"], 0);
-  EXPECT_EQ(none.head["filtered"], 24);
-}
-
-TEST_F(PageAnswersTest, AConditionIsJudgedAsTheQueryLanguageDoes) {
-  submit_grid();
-  solve(24);
-  const std::vector<std::pair<std::string, std::string>> all{
-      {"muu%20%3E%201", "did you mean `mu`?"},
-      {"mu%20%3E", "\\\"mu >\\\" is not allowed: something must follow its end"},
-      {"1)%20OR%20(1", "is not allowed"},
-      {"1;%20DROP%20TABLE%20studies", "is not allowed"},
-      {"1%20--", "is not allowed"},
-      {"E%20=%201", "E"},
-      {"load_extension('x')", "load_extension"}};
-  for (const std::string picture : {"slice?z=mode&x=mu&y=H&at=e@1", "bins?x=mu"}) {
-    for (const auto& [condition, sentence] : all) {
-      const std::string answer = page_.get("/api/studies/1/" + picture + "&where=" + condition);
-      EXPECT_EQ(status_of_answer(answer), 400) << picture << condition;
-      EXPECT_THAT(answer, HasSubstr(sentence)) << picture;
-      EXPECT_THAT(answer, testing::Not(HasSubstr("e = 0"))) << "not what was added to it";
-    }
-    EXPECT_EQ(status_of_answer(page_.get("/api/studies/9/" + picture + "&where=1")), 404);
-  }
-  // What is wrong beside it is told before anything is looked for.
-  EXPECT_EQ(status_of_answer(page_.get("/api/studies/1/slice?z=muu&x=mu&where=1")), 400);
-  EXPECT_EQ(status_of_answer(page_.get("/api/studies/1/bins?x=mode&where=1")), 400);
 }
 
 TEST_F(PageAnswersTest, AColumnThatWasReadFollowsTheStudy) {
