@@ -37,6 +37,22 @@ TEST_F(PageFiltersTest, ASliceMarksWhatDoesNotMeetACondition) {
   EXPECT_EQ(page_.numbers(slice + "mode&where=NULL").head["filtered"], 12);
 }
 
+TEST_F(PageFiltersTest, SlicesOfAllHeldValuesAreJudgedAlike) {
+  submit_grid();
+  solve(24);
+  for (const std::string view : {"x=mu&y=H&at=e@0", "x=mu&at=H@1,e@1", "x=e&at=H@2,mu@3",
+                                 "x=mu&y=e&at=H@0", "x=mu&y=H&x0=1&x1=2&y0=2", "x=H&y=e&at=mu@2"}) {
+    const std::string slice = "/api/studies/1/slice?z=mode&" + view;
+    const auto cells = page_.numbers(slice).head["solved"].get<int>();
+    const json all = page_.numbers(slice + "&where=fn_peak_N%20%3E%200").head;
+    EXPECT_EQ(all["solved"], cells) << view;
+    const json none = page_.numbers(slice + "&where=fn_peak_N%20%3C%200").head;
+    EXPECT_EQ(none["filtered"], cells) << view;
+    const json some = page_.numbers(slice + "&where=point%20%25%202%20%3D%201").head;
+    EXPECT_EQ(some["solved"].get<int>() + some["filtered"].get<int>(), cells) << view;
+  }
+}
+
 TEST_F(PageFiltersTest, WhatWasNotSolvedIsNotLeftOutByACondition) {
   submit_grid();
   solve(4);
