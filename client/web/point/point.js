@@ -1,6 +1,6 @@
 // @ts-check
 // A point: its numbers, its contact over time, and the finger moving.
-import { copied, h, save } from "/parts/dom.js";
+import { copied, h, named, picker, save } from "/parts/dom.js";
 import { count, quoted, shown, with_unit } from "/parts/format.js";
 import { line_plot } from "/parts/lines.js";
 import { json } from "/server.js";
@@ -34,6 +34,7 @@ export async function point_view(root, place, study, point) {
     standing ? h("p", { class: row?.error ? "bad" : "weak" }, standing) : "", pictures,
     ...(row ? [point_numbers(row, whole.columns)] : []),
     h("section", {}, h("h2", {}, "Take it with you"),
+      ...pictures_to_take(study, point, told.name),
       h("p", {}, "Its time histories:"), copied("the command of the trace", `oblique trace ${quoted(told.name)} ${point} --out trace.csv`),
       h("p", {}, "Its row:"), copied("the command of the row", `oblique query ${quoted(told.name)} --where 'point = ${point}'`)));
   /** @type {{close: () => void}[]} */
@@ -50,6 +51,22 @@ export async function point_view(root, place, study, point) {
     stop.abort();
     parts.forEach((part) => part.close());
   } };
+}
+
+const kPanels = ["forces", "loop", "deformation", "velocities", "energies", "shape"];
+
+/** Its pictures as oblique plot draws them, and the command. @param {number} study @param {number} point @param {string} name */
+function pictures_to_take(study, point, name) {
+  const files = h("div", { class: "row files" });
+  const command = h("div", {});
+  const choose = (/** @type {string} */ panel) => {
+    const link = (/** @type {string} */ format) => h("a", { class: "button", download: `${name}-${point}.${format}`,
+      href: `/api/studies/${study}/points/${point}/picture?${new URLSearchParams({ ...(panel ? { panel } : {}), format })}` }, format.toUpperCase());
+    files.replaceChildren(...["svg", "png", "csv"].map(link));
+    command.replaceChildren(copied("the command of the picture", `oblique plot ${quoted(name)} --point ${point}${panel ? ` --panel ${panel}` : ""} --out picture.svg`));
+  };
+  choose("");
+  return [h("div", { class: "row" }, named("pictures, as oblique plot draws them", picker([["", "all"], ...kPanels.map((one) => [one, one])], "", choose)), files), command];
 }
 
 /** @param {import("./trace.js").Trace} trace @param {string} name */

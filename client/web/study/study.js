@@ -2,7 +2,7 @@
 // A study: what its address says, the picture, and what belongs to it.
 import { h } from "/parts/dom.js";
 import { json } from "/server.js";
-import { ask } from "./asked/question.js";
+import { ask, steps_to } from "./asked/question.js";
 import { fill_in, varying } from "./axes.js";
 import { choice_of } from "./choice.js";
 import { condition_fields } from "./conditions.js";
@@ -178,11 +178,14 @@ export class StudyView {
     const kind = this.is("pic");
     try {
       const begun = performance.now();
-      const picture = await ask(this, signal);
-      if (signal.aborted || this.solving.is_on) return;
-      this.loaded_ms = performance.now();
-      this.show(picture, kind);
-      this.root.dataset.pictureMs = String(Math.round(performance.now() - begun));
+      for (const cells of steps_to(this)) {
+        if (this.wants_more) break;  // the finer one would not be seen
+        const picture = await ask(this, cells, signal);
+        if (signal.aborted || this.solving.is_on) return;
+        this.loaded_ms = performance.now();
+        this.show(picture, kind);
+        this.root.dataset.pictureMs = String(Math.round(performance.now() - begun));
+      }
       if (this.said.className.includes("bad")) this.say("");
     } catch (error) {
       if (!signal.aborted) this.complain(error);

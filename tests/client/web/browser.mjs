@@ -22,8 +22,8 @@ export class Server {
     if (made.status !== 0) throw new Error(made.stderr);
   }
 
-  async start() {
-    this.process = spawn(this.oblique, ["view", this.database, "--port", "0"], { stdio: ["ignore", "pipe", "pipe"] });
+  async start(...flags) {
+    this.process = spawn(this.oblique, ["view", this.database, "--port", "0", ...flags], { stdio: ["ignore", "pipe", "pipe"] });
     this.said = "";
     this.process.stderr.on("data", (text) => { this.said += text; });
     this.address = await new Promise((take, fail) => {

@@ -101,3 +101,20 @@ test("rows are turned a page at a time and sorted, and nothing is truncated unsa
   assert.equal(csv.trim().split("\r\n").length, 253);
   await page.close();
 });
+
+test("all modules that a study's map needs are asked for at once, and no others", async () => {
+  const page = await study();
+  const [preloaded, needed] = await page.evaluate(async () => {
+    const path = (address) => new URL(address, location.href).pathname;
+    const links = [...document.querySelectorAll("link[rel=modulepreload]")].map((one) => path(one.href)).concat(path("/main.js"));
+    const found = new Set(["/main.js"]);
+    for (const module of found) {  // grows meanwhile
+      const text = await (await fetch(module)).text();
+      for (const [, wanted] of text.matchAll(/^import .* from "([^"]+)";$/gm)) found.add(new URL(wanted, `${location.origin}${module}`).pathname);
+      if (module === "/main.js") found.add("/study/study.js");
+    }
+    return [links.sort(), [...found].sort()];
+  });
+  assert.deepEqual(preloaded, needed);
+  await page.close();
+});

@@ -38,6 +38,23 @@ test("the SVG that a view gives is what its command draws", async () => {
   }
 });
 
+test("the SVG that a point gives is what its command draws", async () => {
+  const page = await browser.open("#/study/1/point/100");
+  await page.waitForSelector(".files");
+  await page.evaluate(() => {
+    const pick = document.querySelector(".files").parentElement.querySelector("select");
+    pick.value = "forces";
+    pick.dispatchEvent(new Event("change"));
+  });
+  const taken = await file(page, "SVG");
+  assert.equal(taken.status, 200, taken.text);
+  const command = await page.$$eval("code", (all) => all.map((one) => one.textContent).find((text) => text.startsWith("oblique plot")));
+  const out = join(server.folder, "point.svg");
+  made_by(command, out);
+  assert.equal(taken.text, readFileSync(out, "utf8"));
+  await page.close();
+});
+
 test("pictures are also taken as PNG and CSV, and tables as CSV, which is what the command of the rows gives", async () => {
   const page = await study("#/study/1?at=e@2&where=mu%20%3C%201&order=mu%20DESC");
   const csv = await file(page, "CSV");

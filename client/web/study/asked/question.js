@@ -6,6 +6,9 @@ import { dots, kMostDots } from "./dots.js";
 import { bins, slice } from "./picture.js";
 
 const kMostCells = 512; // a side of a picture
+/** Of a study that the server does not hold in memory each cell is looked up: some of them come first. */
+const kFirstCells = 96;
+const kLarge = 4_000_000; // points
 const kMostBins = 96;
 const kMostLines = 8;
 
@@ -16,14 +19,17 @@ export const is_slice = (/** @type {string} */ kind) => kind === "map" || kind =
 const ends_of = (/** @type {View} */ view) =>
   Object.fromEntries(["x0", "x1", "y0", "y1"].filter((name) => view.is(name)).map((name) => [name, view.is(name)]));
 
-/** @param {View} view @returns {Record<string, string | number>} */
-function slice_fields(view) {
+/** How many cells a side are asked for, one picture after the other. @param {View} view */
+export const steps_to = (view) => (is_slice(view.is("pic")) && view.study.points > kLarge ? [kFirstCells, kMostCells] : [kMostCells]);
+
+/** @param {View} view @param {number} cells a side, at most @returns {Record<string, string | number>} */
+function slice_fields(view, cells) {
   const kind = view.is("pic");
   const keys = own_axes(view.block).map((a) => a.key);
   const at = [...view.places()].filter(([key]) => keys.includes(key) && key !== view.is("x") && key !== view.is("y"))
     .map(([key, n]) => `${key}@${n}`).join(",");
   return { z: view.is("z"), x: view.is("x"), ...(view.is("y") ? { y: view.is("y") } : {}), ...(at ? { at } : {}), block: view.is("block"),
-    nx: kMostCells, ny: kind === "lines" ? kMostLines : kMostCells, ...ends_of(view) };
+    nx: cells, ny: kind === "lines" ? kMostLines : cells, ...ends_of(view) };
 }
 
 /** @param {View} view @returns {Record<string, string | number>} */
@@ -57,11 +63,11 @@ async function scatter(view, signal) {
 
 const filter_of = (/** @type {View} */ view) => (view.is("where") ? { where: view.is("where") } : {});
 
-/** The picture of a view. @param {View} view @param {AbortSignal} signal */
-export function ask(view, signal) {
+/** The picture of a view. @param {View} view @param {number} cells a side of a map, at most @param {AbortSignal} signal */
+export function ask(view, cells, signal) {
   const kind = view.is("pic");
   if (kind === "gathered") return scatter(view, signal);
-  return is_slice(kind) ? slice(view.study.id, { ...slice_fields(view), ...filter_of(view) }, signal, view.unit_of)
+  return is_slice(kind) ? slice(view.study.id, { ...slice_fields(view, cells), ...filter_of(view) }, signal, view.unit_of)
     : bins(view.study.id, { ...bins_fields(view), ...filter_of(view) }, signal, view.unit_of);
 }
 
@@ -86,7 +92,7 @@ export async function ask_marks(view, picture, condition, signal) {
     const told = await bins(view.study.id, { ...bins_fields(view), ...ends, where }, signal, view.unit_of);
     return { cells: Uint8Array.from(told.head.counts, (n) => (n > 0 ? 1 : 0)), counts: told.head.counts, points: null };
   }
-  const told = await slice(view.study.id, { ...slice_fields(view), where }, signal, view.unit_of);
+  const told = await slice(view.study.id, { ...slice_fields(view, Math.max(picture.x.values.length, picture.y.values.length)), where }, signal, view.unit_of);
   const cells = Uint8Array.from({ length: size }, (_, cell) => (["missing", "left_out", "filtered"].includes(told.why_empty(cell)) ? 0 : 1));
   return { cells, counts: null, points: null };
 }
