@@ -1,6 +1,6 @@
 // @ts-check
 // Studies and workers, live.
-import { h } from "/parts/dom.js";
+import { h, save } from "/parts/dom.js";
 import { count, time_left } from "/parts/format.js";
 import { change, json } from "/server.js";
 
@@ -80,6 +80,13 @@ export function progress_of(study) {
     "aria-label": `${study.name}: settled points` }), percent);
 }
 
+/** @param {any[]} studies */
+function studies_csv(studies) {
+  const columns = ["id", "name", "state", "points", "solved", "failed", "points_per_s", "priority", "created_at", "submitted_by"];
+  const cell = (/** @type {any} */ value) => (/[",\r\n]/.test(String(value)) ? `"${String(value).replaceAll('"', '""')}"` : String(value ?? ""));
+  return [columns, ...studies.map((study) => columns.map((name) => study[name]))].map((line) => line.map(cell).join(",")).join("\r\n") + "\r\n";
+}
+
 /**
  * @param {HTMLElement} root @param {import("/main.js").Place} place
  * @returns {import("/main.js").View}
@@ -97,9 +104,10 @@ export function overview(root, place) {
   const no_workers = h("p", { class: "weak" }, "No worker is here: start oblique-worker.");
   const unlisted = h("p", { class: "weak" });
   const filter = h("input", { type: "search", oninput: () => draw(), "aria-label": "Studies whose name has" , placeholder: "name has …" });
+  const file = h("button", { type: "button", onclick: () => save("studies.csv", "text/csv", studies_csv([...known.values()].filter((s) => !is_look(s)))) }, "CSV");
   const more = h("button", { type: "button", hidden: true, onclick: () => read(next_after) }, "More studies");
   root.append(numbers, said,
-    h("section", {}, h("div", { class: "head" }, h("h2", {}, "Studies"), filter, place.may_change && h("a", { class: "button", href: "#/new" }, "Start a study")), studies.element, no_studies, more),
+    h("section", {}, h("div", { class: "head" }, h("h2", {}, "Studies"), filter, place.may_change && h("a", { class: "button", href: "#/new" }, "Start a study"), file), studies.element, no_studies, more),
     h("section", {}, h("h2", {}, "Workers"), workers.element, no_workers, unlisted));
 
   /** @type {Map<number, any>} */

@@ -6,6 +6,8 @@ import { change } from "/server.js";
 
 /** The most that a double counts without gaps. */
 const kMostCounted = 2 ** 53;
+const kBytesPerPoint = 450; // measured: a row with its packed arrays
+const kJudgeAfter_ms = 250;
 
 /**
  * An axis as a flag has it: 0.4 or 0.4,0.6,0.8 or FROM:TO:COUNT or FROM:TO:COUNT:log.
@@ -69,27 +71,50 @@ export function start_view(root, place) {
   root.append(h("h2", {}, "Start a study"), form, commands);
 
   const values = () => /** @type {any} */ (Object.fromEntries(Object.entries(fields).map(([name, field]) => [name, field.value])));
+  let later = 0;
+  let turn = 0;
+  const object_to = (/** @type {any} */ error) => {
+    size.textContent = String(error.message);
+    size.className = "bad";
+    submit.disabled = true;
+  };
+  /** How much it is. @param {number} points @param {boolean} is_counted */
+  function tell_size(points, is_counted) {
+    const now = place.now();
+    const seconds = now && now.threads > 0 && now.thread_s_per_point > 0 ? (points * now.thread_s_per_point) / now.threads : null;
+    const bytes = points * kBytesPerPoint;
+    size.textContent = `${count(points)} ${points === 1 ? "point" : "points"}${is_counted ? "" : " at most"}`
+      + (seconds !== null ? `, about ${time_left(seconds)} with the ${now.threads} threads that are here` : "")
+      + (bytes > 1e6 ? `, about ${bytes > 1e9 ? `${(bytes / 1e9).toFixed(1)} GB` : `${Math.round(bytes / 1e6)} MB`} in the database` : "") + ".";
+    size.className = "";
+    submit.disabled = false;
+  }
   function tell() {
     said.textContent = "";
+    clearTimeout(later);
+    const mine = ++turn;
     try {
-      const told = submission_of({ ...values(), name: fields.name.value || "name" });
-      if (told.points > kMostCounted) throw new Error("that is more points than a study may have");
-      const now = place.now();
-      const seconds = now && now.threads > 0 && now.thread_s_per_point > 0 ? (told.points * now.thread_s_per_point) / now.threads : null;
-      const bytes = told.points * 400; // measured: a row with its packed arrays
-      size.textContent = `${count(told.points)} points${fields.where.value.trim() ? " at most" : ""}`
-        + (seconds !== null ? `, about ${time_left(seconds)} with the ${now.threads} threads that are here` : "")
-        + (bytes > 1e6 ? `, about ${bytes > 1e9 ? `${(bytes / 1e9).toFixed(1)} GB` : `${Math.round(bytes / 1e6)} MB`} in the database` : "") + ".";
-      size.className = "";
-      submit.disabled = false;
       const v = values();
+      const told = submission_of({ ...v, name: v.name || "name" });
+      if (told.points > kMostCounted) throw new Error("that is more points than a study may have");
+      tell_size(told.points, v.where.trim() === "");
+      const others = v.others.split(/\n/).filter((/** @type {string} */ line) => line.trim() !== "").flatMap((/** @type {string} */ line) => {
+        const [key, text_] = line.split("=", 2);
+        return [`--${key.trim().replaceAll("_", "-")}`, text_.trim()];
+      });
       commands.replaceChildren(h("p", {}, "The same on a command line:"), copied("the command of the study", ["oblique", "submit", "--name", v.name || "NAME",
-        "--H", v.H, "--mu", v.mu, "--e", v.e].map(quoted).join(" ")));
-      commands.hidden = v.others.trim() !== "" || v.where.trim() !== "";
+        ...others, "--H", v.H, "--mu", v.mu, "--e", v.e, ...(v.where.trim() ? ["--where", v.where.trim()] : [])].map(quoted).join(" ")));
+      // What the grammar of recipes and filters says of it.
+      later = setTimeout(async () => {
+        try {
+          const judged = await change("/api/check", { recipe: told.body.recipe });
+          if (mine === turn) tell_size(judged.points, judged.is_counted);
+        } catch (error) {
+          if (mine === turn) object_to(error);
+        }
+      }, kJudgeAfter_ms);
     } catch (error) {
-      size.textContent = String(/** @type {Error} */ (error).message);
-      size.className = "bad";
-      submit.disabled = true;
+      object_to(error);
     }
   }
   async function start() {
@@ -104,5 +129,5 @@ export function start_view(root, place) {
   }
   tell();
   fields.name.focus();
-  return {};
+  return { close: () => clearTimeout(later) };
 }

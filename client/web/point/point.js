@@ -36,7 +36,8 @@ export async function point_view(root, place, study, point) {
     h("section", {}, h("h2", {}, "Take it with you"),
       ...pictures_to_take(study, point, told.name),
       h("p", {}, "Its time histories:"), copied("the command of the trace", `oblique trace ${quoted(told.name)} ${point} --out trace.csv`),
-      h("p", {}, "Its row:"), copied("the command of the row", `oblique query ${quoted(told.name)} --where 'point = ${point}'`)));
+      h("p", {}, "Its row:"), copied("the command of the row", `oblique query ${quoted(told.name)} --where 'point = ${point}'`),
+      h("a", { class: "button", download: `${told.name}-${point}-row.csv`, href: `/api/studies/${study}/rows?${new URLSearchParams({ where: `point = ${point}`, format: "csv" })}` }, "Row as CSV")));
   /** @type {{close: () => void}[]} */
   const parts = [];
   trace_of(study, point, stop.signal, (text) => { said.textContent = text; }).then((trace) => {

@@ -35,19 +35,28 @@ test("the overview follows a study that is started on the page, live, and studie
   await page.close();
 });
 
-test("a form that is wrong says what is allowed, and a server that refuses is heard", async () => {
+test("a form that is wrong says what is allowed, filters are counted, and a server that refuses is heard", async () => {
   const page = await browser.open("#/new");
   await page.waitForSelector("form");
   const fields = await page.$$("form input");
-  await fields[2].click({ clickCount: 3 });
-  await fields[2].type("0.1:2");
-  assert.match(await text_of(page, "form [role=status]"), /FROM:TO:COUNT/);
-  await fields[2].click({ clickCount: 3 });
-  await fields[2].type("-1");
-  await page.type("form input", "wrong");
+  const write = async (field, text) => {
+    await field.click({ clickCount: 3 });
+    await field.type(text);
+  };
+  const told = () => text_of(page, "form [role=status]");
+  await write(fields[2], "0.1:2");
+  assert.match(await told(), /FROM:TO:COUNT/);
+  await write(fields[2], "-1");  // only the server knows what a recipe may have
+  await until(page, () => document.querySelector("form [role=status].bad")?.textContent.includes("mu"));
+  assert.equal(await page.$eval("form button", (one) => one.disabled), true);
+  await write(fields[2], "1:2:11");
+  await write(fields[4], "mu > 1.75");
+  await until(page, () => document.querySelector("form [role=status]").textContent.startsWith("3 points,") || document.querySelector("form [role=status]").textContent === "3 points.");
+  assert.match(await page.$eval(".copied code", (one) => one.textContent), /--mu 1:2:11 --e 1 --where 'mu > 1.75'$/);
+  await write(fields[0], "friction");  // there is one, of other points
   await page.click("form button");
-  await until(page, () => document.querySelector("form [role=alert]").textContent.includes("mu"));
-  browser.objections = browser.objections.filter((one) => !one.includes("status of 4"));  // that answer is wanted here
+  await until(page, () => document.querySelector("form [role=alert]").textContent.includes("friction"));
+  browser.objections = browser.objections.filter((one) => !one.includes("status of 4"));  // these answers are wanted here
   await page.close();
 });
 
