@@ -135,6 +135,9 @@ std::vector<GridPlace> places_at(const std::vector<AxisLayout>& axes, std::strin
 
 std::vector<GridPlace> grid_places(const protocol::PointTable& table, const FieldReader& fields) {
   const std::string at = fields.text("at").value_or("");
+  if (at.empty()) {
+    return {};
+  }
   const auto has_all = [&](const std::vector<AxisLayout>& axes) {
     for (const std::string_view one : protocol::split(at, ',')) {
       if (find(axes, one.substr(0, one.find_first_of(":@"))) == nullptr) {

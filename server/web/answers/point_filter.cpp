@@ -62,10 +62,12 @@ std::string narrowing(const protocol::PointTable& table, const GridSlice& slice)
 /// what lies between them.
 bool is_worth_it(const LookedAtStudy& study, const FilterQuestion& question) {
   constexpr std::uint64_t kMuch = 8;
+  constexpr int kManyBlocks = 1000;  // too many to look through
   const auto points_read = [&](const std::string& condition) {
     return points_in(spans_of(study.table->recipe(), boxes_of(condition)));
   };
   return study.points > ColumnStore::kMostPoints ||
+         study.table->recipe().blocks_size() > kManyBlocks ||
          points_read(question.narrowed) <= points_read(question.condition) / kMuch;
 }
 

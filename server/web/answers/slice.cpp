@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstring>
 #include <map>
 #include <numeric>
 #include <stdexcept>
@@ -24,9 +23,9 @@ constexpr std::uint64_t kNear = 4;
 
 template <typename Number>
 void append(const std::vector<Number>& numbers, std::string& bytes) {
-  const std::size_t at = bytes.size();
-  bytes.resize(at + numbers.size() * sizeof(Number));
-  std::memcpy(bytes.data() + at, numbers.data(), numbers.size() * sizeof(Number));
+  if (!numbers.empty()) {
+    bytes.append(reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(Number));
+  }
 }
 
 /// Values of points, read by key. Neighbours are read together.

@@ -24,7 +24,7 @@ namespace {
 using protocol::Descriptor;
 
 constexpr int kLookEvery_ms = 50;
-constexpr int kNiceness = 10;
+constexpr int kNiceness = 5;
 constexpr std::size_t kMostSaid = 4096;
 
 void check(int error, const std::string& what) {

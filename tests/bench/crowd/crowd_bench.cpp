@@ -17,9 +17,9 @@
 
 #include "proto/keys/key_file.h"
 #include "tests/bench/crowd/crowd.h"
+#include "tests/bench/crowd/scraper.h"
 #include "tests/bench/crowd/status_probe.h"
 #include "tests/bench/process_usage.h"
-#include "tests/bench/scraper.h"
 #include "tests/support/database.h"
 #include "tests/support/programs.h"
 

@@ -102,6 +102,17 @@ TEST(PageAccess, HostilePagesGetAndChangeNothing) {
       {origin + "Origin: http://evil.example\r\n", 403, 403},
   };
   for (const Hostile& one : all) {
+    for (const std::string path :
+         {"/", "/api/events", "/api/studies/1/slice?z=mode&x=mu&where=1",
+          "/api/studies/1/bins?x=mu", "/api/studies/1/rows?where=1", "/api/studies/1/picture",
+          "/api/studies/1/points/0/picture", "/api/studies/1/points/0/trace"}) {
+      // Without an answer to its end, which a stream has not.
+      RawHttp browser(page.url());
+      browser.send("GET " + path + " HTTP/1.1\r\nHost: " + page.host() + "\r\n" +
+                   page.cookie_header() + one.headers + "\r\n");
+      const int status = status_of_answer(browser.read_until("\r\n"));
+      EXPECT_EQ(status == 403, one.get == 403) << path << ' ' << status << one.headers;
+    }
     EXPECT_EQ(status_of_answer(page.ask("GET", "/api/studies", page.cookie_header() + one.headers)),
               one.get)
         << one.headers;

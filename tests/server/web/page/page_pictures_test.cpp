@@ -198,7 +198,7 @@ TEST_F(PagePicturesTest, OnesSurroundingsAreNotHanded) {
   start(script("echo \"[$OBLIQUE_SERVER]\"; ls /proc/self/fd | wc -l; cat; nice; ulimit -c"));
   ::unsetenv("OBLIQUE_SERVER");
   // Its three, and that of the folder that `ls` looks into.
-  EXPECT_EQ(arguments_of(""), "[]\n4\n10\n0\n");
+  EXPECT_EQ(arguments_of(""), "[]\n4\n5\n0\n");
 }
 
 TEST_F(PagePicturesTest, ItEndsWithItsBrowserAndWithTheServer) {

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """How long the page waits for a server's answers, seen by a browser that asks one thing at a time.
 
-  page_latency.py PAGE slices STUDY [Z]    a study of a grid over mu, H and e: opening it, the first slice
+  latency.py PAGE slices STUDY [Z]    a study of a grid over mu, H and e: opening it, the first slice
                                            of a column, the next ones, 200 moves of a slider, conditions
-  page_latency.py PAGE tabs COUNT SECONDS  holds so many event streams open, and tells what came
+  latency.py PAGE tabs COUNT SECONDS  holds so many event streams open, and tells what came
 
 PAGE is the address that the server prints, with its token. Times in ms.
 """
