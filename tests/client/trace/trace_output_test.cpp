@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include "client/trace/traced_fall.h"
 #include "tests/support/python.h"
 #include "worker/solver/model/errors.h"
 
@@ -29,6 +30,25 @@ std::vector<solver::TraceRow> made_up_rows(std::size_t count, const solver::Trac
     rows.push_back(trace_row(shape, numbers, solver::kTraceStates.at(i % 4)));
   }
   return rows;
+}
+
+TEST(TracedFall, IsTakenOffTheFrontAndLeavesTheContact) {
+  const auto taken = [](std::size_t falling, std::size_t touching) {
+    std::vector<solver::TraceRow> rows(falling + touching);
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      rows[i].t_s = static_cast<double>(i);
+      rows[i].state = i < falling ? solver::kFalling : "sC";
+    }
+    const auto fall = take_fall(rows);
+    EXPECT_EQ(fall.size(), falling);
+    EXPECT_EQ(rows.size(), touching);
+    EXPECT_TRUE(fall.empty() || fall.back().t_s == static_cast<double>(falling) - 1.0);
+    EXPECT_TRUE(rows.empty() || rows.front().t_s == static_cast<double>(falling));
+  };
+  taken(3, 2);
+  taken(0, 2);
+  taken(3, 0);
+  taken(0, 0);
 }
 
 class TraceArchives : public testing::Test {
