@@ -55,8 +55,8 @@ export class Browser {
     await first.close();
   }
 
-  /** A tab at a view. */
-  async open(view, { width = 1280, scheme = "light", motion = "no-preference" } = {}) {
+  /** A tab at a view; `early` runs in it before all scripts of the page. */
+  async open(view, { width = 1280, scheme = "light", motion = "no-preference", early = () => {} } = {}) {
     const page = await this.browser.newPage();
     await this.look(page, { width, scheme, motion });
     page.on("console", (line) => {
@@ -83,6 +83,7 @@ export class Browser {
         }
       };
     });
+    await page.evaluateOnNewDocument(early);
     await page.goto(`${this.server.origin}/${view}`);
     return page;
   }
@@ -96,7 +97,7 @@ export class Browser {
   /** What axe-core finds wrong with what a tab shows. */
   async faults(page) {
     if (!await page.evaluate(() => "axe" in window)) await page.evaluate(axe_source);
-    return page.evaluate(async () => (await window.axe.run(document)).violations.map((one) =>
+    return page.evaluate(async () => (await window.axe.run(document, { resultTypes: ["violations"] })).violations.map((one) =>
       `${one.id}: ${one.nodes.slice(0, 3).map((node) => node.html.slice(0, 120)).join(" | ")}`));
   }
 
