@@ -130,26 +130,12 @@ std::vector<Outline> boundaries_of(const KindGrid& grid) {
   return lines;
 }
 
-Roomiest roomiest_of(const KindGrid& grid, int kind) {
-  // Side of the largest square of the kind that ends in each cell, from those beside and above.
-  std::vector<std::size_t> above(grid.columns + 1, 0);
-  Roomiest best;
-  for (std::size_t y = 0; y < grid.rows; ++y) {
-    std::vector<std::size_t> sides(grid.columns + 1, 0);
-    for (std::size_t x = 0; x < grid.columns; ++x) {
-      if (grid.at(x, y) != kind) {
-        continue;
-      }
-      const std::size_t side = 1 + std::min({sides[x], above[x], above[x + 1]});
-      sides[x + 1] = side;
-      if (side > best.side) {
-        const double half = static_cast<double>(side) / 2.0;
-        best = {static_cast<double>(x + 1) - half, static_cast<double>(y + 1) - half, side};
-      }
-    }
-    above = std::move(sides);
+std::size_t corners_of(const std::vector<Outline>& outlines) {
+  std::size_t corners = 0;
+  for (const Outline& outline : outlines) {
+    corners += outline.corners.size();
   }
-  return best;
+  return corners;
 }
 
 }  // namespace oblique::client::plot

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstddef>
-#include <functional>
 #include <vector>
 
 namespace oblique::client::plot {
@@ -36,13 +35,7 @@ std::vector<Outline> outlines_of(const KindGrid& grid, int kind);
 /// border, nor along cells of a kind below 0.
 std::vector<Outline> boundaries_of(const KindGrid& grid);
 
-/// A cell of that kind with as much of its kind around it as there is: the side of the largest
-/// square of the kind, and its middle in cells. Nothing there: a side of 0.
-struct Roomiest {
-  double x = 0.0;
-  double y = 0.0;
-  std::size_t side = 0;
-};
-Roomiest roomiest_of(const KindGrid& grid, int kind);
+/// Corners of all of them.
+std::size_t corners_of(const std::vector<Outline>& outlines);
 
 }  // namespace oblique::client::plot

@@ -15,9 +15,10 @@ namespace {
 
 constexpr std::array<std::string_view, 2> kPaletteNames{"viridis", "cividis"};
 
-// Light enough for hatching and letters in black; after the schemes "light" of P. Tol and "Set 2".
+// Light enough for hatching and letters in black; after the scheme "light" of P. Tol, and a brown
+// for its grey, which is that of the others.
 constexpr std::array<std::uint32_t, 8> kFillColours{0x77aadd, 0xeedd88, 0xee8866, 0x99ddff,
-                                                    0xbbcc33, 0xffaabb, 0x44bb99, 0xcccccc};
+                                                    0xbbcc33, 0xffaabb, 0x44bb99, 0xb59a80};
 
 constexpr std::array<Stroke, kStrokes> kStrokeTable{{
     {colour_of(0x0067a5), colour_of(0x56b4e9), "", Mark::kDisc},
@@ -62,6 +63,16 @@ Fill fill(std::size_t kind) {
   const std::size_t round = number / kFillColours.size();
   const std::size_t hatch = (number + round * 4) % kHatches;
   return {colour_of(kFillColours[number % kFillColours.size()]), static_cast<Hatch>(hatch)};
+}
+
+Colour plain_fill(std::size_t kind) {
+  const Colour colour = fill(kind).colour;
+  const auto darker = [](std::uint8_t channel) {
+    return static_cast<std::uint8_t>(channel * 3 / 5);
+  };
+  return kind % kFills < kFillColours.size()
+             ? colour
+             : Colour{darker(colour.red), darker(colour.green), darker(colour.blue)};
 }
 
 Stroke stroke(std::size_t number) {

@@ -23,6 +23,9 @@ Colour shade(Palette palette, std::size_t number);
 /// The shade of a share from 0 to 1; others take that of the nearer end.
 std::size_t shade_number(double share);
 
+/// The shades up to this share of a palette can be told from white paper, as lines and points must.
+inline constexpr double kDarkShare = 0.68;
+
 /// A hatching, drawn over a colour, in the ink of text.
 enum class Hatch { kNone, kRising, kFalling, kCrossed, kDots, kLevel, kUpright, kGrid };
 inline constexpr std::size_t kHatches = 8;
@@ -36,6 +39,8 @@ struct Fill {
 /// The fills of kinds, from the one that is met most. So many differ; more begin again.
 inline constexpr std::size_t kFills = 16;
 Fill fill(std::size_t kind);
+/// The colours of the same kinds where there is no hatching: none for two of them.
+Colour plain_fill(std::size_t kind);
 /// Of what belongs to no kind of its own.
 inline constexpr Fill kFillOfOthers{colour_of(0xdddddd), Hatch::kDots};
 

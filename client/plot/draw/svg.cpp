@@ -1,8 +1,11 @@
 #include "client/plot/draw/svg.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <utility>
+
+#include <spdlog/fmt/fmt.h>
 
 #include "proto/text.h"
 
@@ -36,7 +39,55 @@ void append_hundredths(std::string& out, std::int64_t hundredths) {
   }
 }
 
+/// Stands for the beginning of the picture's ids until they are known. `visible` lets no text have
+/// it.
+constexpr char kOwn = '\x01';
+
+constexpr std::string_view kPngMark = "base64,";
+
+/// Where the next PNG begins in a picture, and where it ends.
+std::pair<std::size_t, std::size_t> next_png(std::string_view text, std::size_t from) {
+  const std::size_t begin = text.find(kPngMark, from);
+  return begin == std::string_view::npos ? std::pair{text.size(), text.size()}
+                                         : std::pair{begin, text.find('"', begin)};
+}
+
+/// The rules of CSS, each of them of what is below the element with that id.
+std::string below(std::string_view css, std::string_view id) {
+  std::string out;
+  while (!css.empty()) {
+    const std::size_t open = css.find('{');
+    if (css.front() == '@' && open != std::string_view::npos) {
+      out += css.substr(0, open + 1);  // of rules inside
+      css.remove_prefix(open + 1);
+      continue;
+    }
+    if (css.front() == '}' || open == std::string_view::npos) {
+      out += css.front();
+      css.remove_prefix(1);
+      continue;
+    }
+    for (const char letter : css.substr(0, open)) {
+      const bool begins =
+          out.empty() || out.back() == '}' || out.back() == '{' || out.back() == ',';
+      out += begins ? fmt::format("#{} {}", id, letter) : std::string(1, letter);
+    }
+    const std::size_t close = css.find('}', open);
+    out += css.substr(open, close - open + 1);
+    css.remove_prefix(close + 1);
+  }
+  return out;
+}
+
 }  // namespace
+
+std::string text_of(const OwnId& id) {
+  return fmt::format("{}-{}", kOwn, id.name);
+}
+
+std::string text_of(const OwnLink& link) {
+  return fmt::format("url(#{}-{})", kOwn, link.name);
+}
 
 std::string svg_number(double value) {
   std::string text;
@@ -101,6 +152,7 @@ void PathData::line_to(double x, double y) {
 SvgWriter::SvgWriter(double width, double height, std::string_view title,
                      std::string_view description) {
   begin("svg", {{"xmlns", "http://www.w3.org/2000/svg"},
+                {"id", OwnId{"picture"}},
                 {"width", width},
                 {"height", height},
                 {"viewBox", "0 0 " + svg_number(width) + ' ' + svg_number(height)},
@@ -181,9 +233,30 @@ void SvgWriter::text_upwards(double x, double y, std::string_view style, std::st
   }
 }
 
+void SvgWriter::style(std::string_view css) {
+  text_ += "<style>" + below(css, text_of(OwnId{"picture"})) + "</style>\n";
+}
+
 std::string SvgWriter::finished() && {
   close("svg");
-  return std::move(text_);
+  auto png = next_png(text_, 0);
+  for (std::size_t i = 0; i < text_.size(); ++i) {
+    if (i == png.first) {
+      i = png.second;
+      png = next_png(text_, i);
+    }
+    hash_ = (hash_ ^ static_cast<unsigned char>(text_[i])) * kFactor;
+  }
+  const std::string own = fmt::format("p{:08x}", static_cast<std::uint32_t>(hash_ >> 32U));
+  std::string whole;
+  whole.reserve(text_.size() + text_.size() / 8);
+  for (std::size_t from = 0; from < text_.size();) {
+    const std::size_t mark = std::min(text_.find(kOwn, from), text_.size());
+    whole.append(text_, from, mark - from);
+    whole += mark < text_.size() ? own : std::string();
+    from = mark + 1;
+  }
+  return whole;
 }
 
 }  // namespace oblique::client::plot

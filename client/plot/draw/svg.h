@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <initializer_list>
 #include <string>
 #include <string_view>
@@ -13,6 +14,19 @@ std::string svg_number(double value);
 
 /// A text between tags or in quotes. Characters that XML has no place for become visible ones.
 std::string svg_text(std::string_view text);
+
+/// An id of the picture. Several pictures may stand in one page of HTML, where ids and styles hold
+/// for all of it: SvgWriter begins each id with what tells the picture from others.
+struct OwnId {
+  std::string_view name;
+};
+/// A reference to it: "url(#...)".
+struct OwnLink {
+  std::string_view name;
+};
+/// Both as they stand in a text that SvgWriter is given verbatim.
+std::string text_of(const OwnId& id);
+std::string text_of(const OwnLink& link);
 
 /// The data of a path, from place to place.
 class PathData {
@@ -41,6 +55,9 @@ struct Attribute {
       : Attribute(name_given, std::string_view(value)) {}
   Attribute(std::string_view name_given, const char* value)
       : Attribute(name_given, std::string_view(value)) {}
+  Attribute(std::string_view name_given, const OwnId& id) : name(name_given), text(text_of(id)) {}
+  Attribute(std::string_view name_given, const OwnLink& link)
+      : name(name_given), text(text_of(link)) {}
   std::string_view name;
   std::string text;
 };
@@ -57,8 +74,13 @@ class SvgWriter {
   void text_element(std::string_view name, Attributes attributes, std::string_view text);
   void open(std::string_view name, Attributes attributes = {});
   void close(std::string_view name);
-  /// As it is, as styles are.
+  /// As it is, as definitions are.
   void verbatim(std::string_view text) { text_ += text; }
+  /// Rules of CSS, which hold in this picture alone.
+  void style(std::string_view css);
+  /// What is in the picture as bytes that may differ from machine to machine, as a PNG, and tells
+  /// it from others.
+  void tell_apart(std::uint64_t hash) { hash_ ^= hash * kFactor; }
 
   void line(double x1, double y1, double x2, double y2, std::string_view style);
   void rectangle(double x, double y, double width, double height, std::string_view style);
@@ -69,13 +91,16 @@ class SvgWriter {
   /// Upwards, its middle at y.
   void text_upwards(double x, double y, std::string_view style, std::string_view text);
 
-  /// The whole picture.
+  /// The whole picture, with its ids.
   std::string finished() &&;
 
  private:
+  static constexpr std::uint64_t kFactor = 0x100000001b3U;  // of FNV-1a
+
   void begin(std::string_view name, Attributes attributes);
 
   std::string text_;
+  std::uint64_t hash_ = 0xcbf29ce484222325U;
 };
 
 }  // namespace oblique::client::plot

@@ -20,7 +20,7 @@ std::string colours_for(const Inks& inks, bool is_dark) {
       hexadecimal(inks.paper), hexadecimal(inks.ink), hexadecimal(inks.muted),
       hexadecimal(inks.faint), hexadecimal(inks.alarm),
       hexadecimal(is_dark ? stroke(0).on_dark : stroke(0).on_light),
-      is_dark ? "#dfe3e8" : hexadecimal(inks.paper));
+      is_dark ? "#eceff3" : hexadecimal(inks.paper));
   for (std::size_t i = 0; i < kStrokes; ++i) {
     const auto colour = hexadecimal(is_dark ? stroke(i).on_dark : stroke(i).on_light);
     css += fmt::format(".s{0},.m{0}{{stroke:{1}}}.f{0}{{fill:{1};stroke:{1}}}", i, colour);
@@ -43,7 +43,7 @@ std::string pattern(std::string_view id, double side, std::string_view style,
   return fmt::format(
       "<pattern id=\"{}\" width=\"{}\" height=\"{}\" patternUnits=\"userSpaceOnUse\"><path "
       "class=\"{}\" d=\"{}\"/></pattern>\n",
-      id, length, length, style, path);
+      text_of(OwnId{id}), length, length, style, path);
 }
 
 }  // namespace
@@ -66,8 +66,8 @@ std::string style_sheet() {
       css += fmt::format(".s{}{{stroke-dasharray:{}}}", i, stroke(i).dashes);
     }
   }
-  return fmt::format("<style>{}{}@media screen and (prefers-color-scheme:dark){{{}}}</style>\n",
-                     css, colours_for(kLightInks, false), colours_for(kDarkInks, true));
+  return fmt::format("{}{}@media screen and (prefers-color-scheme:dark){{{}}}", css,
+                     colours_for(kLightInks, false), colours_for(kDarkInks, true));
 }
 
 std::string pattern_definitions(std::span<const Hatch> hatches) {
@@ -90,8 +90,8 @@ std::string pattern_definitions(std::span<const Hatch> hatches) {
   for (const Hatch hatch : hatches) {
     const auto number = static_cast<std::size_t>(hatch);
     if (hatch != Hatch::kNone) {
-      all += pattern(fmt::format("h{}", number), kLines[number].side,
-                     hatch == Hatch::kDots ? "dot" : "hatch", kLines[number].path);
+      all += pattern(hatch_id(hatch), kLines[number].side, hatch == Hatch::kDots ? "dot" : "hatch",
+                     kLines[number].path);
     }
   }
   all += pattern("missing", 8, "miss", "M-2 2L2-2M-1 9L9-1M6 10L10 6");
@@ -99,8 +99,8 @@ std::string pattern_definitions(std::span<const Hatch> hatches) {
   return all + "</defs>\n";
 }
 
-std::string hatch_link(Hatch hatch) {
-  return hatch == Hatch::kNone ? "none" : fmt::format("url(#h{})", static_cast<int>(hatch));
+std::string hatch_id(Hatch hatch) {
+  return fmt::format("h{}", static_cast<int>(hatch));
 }
 
 }  // namespace oblique::client::plot

@@ -28,17 +28,17 @@ inline constexpr Inks kDarkInks{colour_of(0x14171c), colour_of(0xe8eaed), colour
 /// Shades of spans of an axis, as of phases and of stick.
 inline constexpr std::size_t kSpanKinds = 4;
 
-/// The styles of all classes that pictures use, light, and dark on screens of those who want that.
+/// The rules of all classes that pictures use, light, and dark on screens of those who want that.
 /// Classes: paper, title, text, small, muted, faint, frame, tick, grid, letter, plate (of colours
 /// on light and dark alike), boundary, missing, failed, s0 to s7 and m0 to m7 for lines and marks,
 /// p0 to p3 for spans, bar.
 std::string style_sheet();
 
-/// Patterns for hatchings: their id is "h1" for Hatch 1 and so on, and "missing" and "failed".
-/// Only those that are named.
+/// Patterns for hatchings: their id is that of `hatch_id`, and "missing" and "failed". Only those
+/// that are named.
 std::string pattern_definitions(std::span<const Hatch> hatches);
 
-/// "url(#h1)"; of Hatch::kNone "none".
-std::string hatch_link(Hatch hatch);
+/// "h1" for Hatch 1 and so on.
+std::string hatch_id(Hatch hatch);
 
 }  // namespace oblique::client::plot

@@ -11,6 +11,20 @@ double middle_of(double a, double b, bool is_logarithmic) {
 
 }  // namespace
 
+Colour shade_of(const Colours& colours, double share) {
+  return shade(colours.palette, shade_number(share * (colours.has_plate ? kDarkShare : 1.0)));
+}
+
+KindGrid kind_grid_of(const Cells& cells) {
+  KindGrid grid{cells.columns(), cells.rows(), std::vector<int>(cells.values.size(), -1)};
+  for (std::size_t i = 0; i < grid.kinds.size(); ++i) {
+    if (cells.states[i] == CellState::kSolved) {
+      grid.kinds[i] = static_cast<int>(cells.values[i]);
+    }
+  }
+  return grid;
+}
+
 Gaps gaps_of(const Cells& cells) {
   Gaps gaps;
   for (const CellState state : cells.states) {

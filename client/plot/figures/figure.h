@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "client/plot/draw/outline.h"
 #include "client/plot/draw/palette.h"
 #include "client/plot/draw/scale.h"
 
@@ -86,6 +87,8 @@ struct KindCells {
   Cells cells = {};
   std::vector<Kind> kinds = {};
   std::vector<std::string> names = {};  ///< of the cells before kinds were gathered, for tables
+  /// Areas of fewer cells are colours alone, without hatching and outlines; 0: all are.
+  std::size_t least_outlined = 1;
 };
 
 /// Bars that stand on 0, between edges; or, with names, lie one below the other.
@@ -125,6 +128,9 @@ struct Colours {
   Palette palette = Palette::kViridis;
   bool has_below = false;  ///< there are values below the range, drawn as its lower end
   bool has_above = false;
+  /// Lines, points and scattered cells lie on a light plate, in dark pictures too, and do without
+  /// the palette's pale end, which is lost there.
+  bool has_plate = false;
 };
 
 /// Cells of a map that have no value to draw, by reason.
@@ -144,8 +150,14 @@ struct Figure {
   std::vector<std::string> notes = {};  ///< sentences below the picture
 };
 
+/// The colour of a share from 0 to 1 of what colours span; others take that of the nearer end.
+Colour shade_of(const Colours& colours, double share);
+
 /// Counts the gaps of cells.
 Gaps gaps_of(const Cells& cells);
+
+/// The kinds of solved cells; -1: of others.
+KindGrid kind_grid_of(const Cells& cells);
 
 /// Middles of the cells between edges, on a scale of that kind.
 std::vector<double> middles_of(const std::vector<double>& edges, bool is_logarithmic);

@@ -185,10 +185,10 @@ class Arranger {
     }
   }
 
-  /// Gives panels at least half of the height that was asked for, and what can be read.
+  /// Gives panels at least three quarters of the height that was asked for, and what can be read.
   void grow_if_low() {
     constexpr double kLowestPanel = 120.0;
-    const double least = std::max({200.0, 0.5 * layout_.size.height,
+    const double least = std::max({200.0, 0.75 * layout_.size.height,
                                    kLowestPanel * static_cast<double>(figure_.panels.size())});
     const double lacking = least - room_.height;
     if (lacking > 0.0) {

@@ -40,6 +40,7 @@ void add_kinds(std::vector<LegendEntry>& entries, const KindCells& kinds) {
     const auto share = percentage(kind.cells, whole);
     entries.push_back({.sign = kind.is_rest ? Sign::kRest : Sign::kKind,
                        .number = i,
+                       .is_hatched = kinds.least_outlined > 0,
                        .name = fmt::format("{} ({})", kind.name, share)});
   }
 }
@@ -60,20 +61,23 @@ double height_of(const LegendLayout::Place& place) {
 void draw_area_sign(SvgWriter& svg, const LegendEntry& entry, double x, double y) {
   const double width = kSignWidth - 6.0;
   constexpr double kHeight = 12.0;
-  const auto rectangle = [&](const std::string& filling) {
+  const auto rectangle = [&](const auto& filling) {
     svg.element(
         "rect",
         {{"x", x}, {"y", y - 6.0}, {"width", width}, {"height", kHeight}, {"fill", filling}});
   };
   if (entry.sign == Sign::kKind || entry.sign == Sign::kRest) {
     const Fill filling = entry.sign == Sign::kRest ? kFillOfOthers : fill(entry.number);
-    rectangle(hexadecimal(filling.colour));
-    rectangle(hatch_link(filling.hatch));
+    rectangle(hexadecimal(
+        entry.is_hatched || entry.sign == Sign::kRest ? filling.colour : plain_fill(entry.number)));
+    if (entry.is_hatched && filling.hatch != Hatch::kNone) {
+      rectangle(OwnLink{hatch_id(filling.hatch)});
+    }
   } else {
-    rectangle(entry.sign == Sign::kFailed ? "url(#failed)" : "url(#missing)");
+    rectangle(OwnLink{entry.sign == Sign::kFailed ? "failed" : "missing"});
   }
   svg.rectangle(x, y - 6.0, width, kHeight, "frame");
-  if (entry.sign == Sign::kKind) {
+  if (entry.sign == Sign::kKind && entry.is_hatched) {
     svg.text(x + width / 2.0, y + 4.0, "letter small", "middle", letter_of(entry.number));
   }
 }

@@ -16,6 +16,7 @@ struct LegendEntry {
   std::size_t number = 0;  ///< of the stroke, shading or kind
   bool has_line = true;    ///< of a curve
   bool has_marks = false;
+  bool is_hatched = true;  ///< of a kind
   std::string name;
 };
 

@@ -48,6 +48,7 @@ Figure line_chart(const Quantity& x, const Quantity& y, const std::optional<Quan
     ColourChoice colours = choice.colours;
     colours.range.reset();
     figure.colours = colours_for(*by, bys, colours);
+    figure.colours->has_plate = true;
   }
   Panel panel;
   // Marks at the ends are whole.

@@ -8,6 +8,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/output/human_units.h"
+#include "client/plot/draw/areas.h"
 
 namespace oblique::client::plot {
 namespace {
@@ -50,7 +51,7 @@ std::vector<Kind> gathered(const std::map<std::string, std::uint64_t>& cells,
       --kept;
     }
   }
-  if (kept == kinds.size()) {
+  if (kept + 1 >= kinds.size()) {  // one alone has its own name
     return kinds;
   }
   Kind rest{.name = {}, .is_rest = true};
@@ -58,10 +59,53 @@ std::vector<Kind> gathered(const std::map<std::string, std::uint64_t>& cells,
     rest.cells += kinds[i].cells;
     rest.gathered.push_back(kinds[i].name);
   }
-  rest.name = fmt::format("other: {} {}", rest.gathered.size(), plural);
+  rest.name = fmt::format("{} other {}", shown_count(rest.gathered.size()), plural);
   kinds.resize(kept);
   kinds.push_back(std::move(rest));
   return kinds;
+}
+
+/// Gives each solved cell the number of its kind.
+void number_cells(KindCells& map) {
+  std::map<std::string, std::size_t> numbers;
+  for (std::size_t k = 0; k < map.kinds.size(); ++k) {
+    if (!map.kinds[k].is_rest) {
+      numbers.emplace(map.kinds[k].name, k);
+    }
+  }
+  for (std::size_t i = 0; i < map.names.size(); ++i) {
+    if (map.cells.states[i] == CellState::kSolved) {
+      const auto found = numbers.find(map.names[i]);
+      map.cells.values[i] =
+          static_cast<double>(found == numbers.end() ? map.kinds.size() - 1 : found->second);
+    }
+  }
+  map.least_outlined = least_outlined(kind_grid_of(map.cells));
+}
+
+void say_kinds(Figure& figure, const KindCells& map, std::size_t kinds, const std::string& plural) {
+  if (map.kinds.empty()) {
+    figure.notes.emplace_back("Nothing to draw: no cell has a value.");
+    return;
+  }
+  if (map.name == "mode" || map.name == "major_mode") {
+    figure.notes.emplace_back(
+        "S stick, s slip; C compression, R restitution: in the order of time.");
+  }
+  if (map.kinds.back().is_rest) {
+    figure.notes.push_back(
+        fmt::format("Of {} {} those with the most cells are named; the others are in --format csv.",
+                    shown_count(kinds), plural));
+  }
+  if (map.least_outlined == 0) {
+    figure.notes.push_back(fmt::format(
+        "Too many cells differ from those beside them to be outlined: {} are colours alone.",
+        plural));
+  } else if (map.least_outlined > 1) {
+    figure.notes.push_back(
+        fmt::format("Areas of fewer than {} cells are colours alone, without hatching and outline.",
+                    map.least_outlined));
+  }
 }
 
 }  // namespace
@@ -96,6 +140,8 @@ Figure heat_map(const MapAxes& axes, const Quantity& value, Cells cells,
     }
   }
   figure.colours = colours_for(value, drawn, choice);
+  figure.colours->has_plate = std::find(cells.states.begin(), cells.states.end(),
+                                        CellState::kNoPoint) != cells.states.end();
   Panel panel = panel_of(axes, cells);
   panel.cells = std::move(cells);
   figure.panels.push_back(std::move(panel));
@@ -119,31 +165,14 @@ Figure kind_map(const MapAxes& axes, const std::string& name, Cells cells,
     }
   }
   KindCells map{.name = name};
-  map.kinds = gathered(counts, plural);
-  std::map<std::string, std::size_t> numbers;
-  for (std::size_t k = 0; k < map.kinds.size(); ++k) {
-    numbers.emplace(map.kinds[k].name, k);
-    for (const auto& each : map.kinds[k].gathered) {
-      numbers.emplace(each, k);
-    }
-  }
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    if (cells.states[i] == CellState::kSolved) {
-      cells.values[i] = static_cast<double>(numbers.at(names[i]));
-    }
-  }
-  Figure figure;
-  figure.gaps = gaps_of(cells);
-  Panel panel = panel_of(axes, cells);
   map.cells = std::move(cells);
   map.names = std::move(names);
-  if (map.kinds.empty()) {
-    figure.notes.emplace_back("Nothing to draw: no cell has a value.");
-  } else if (map.kinds.back().is_rest) {
-    figure.notes.push_back(
-        fmt::format("Of {} {} those with the most cells are named; the others are in --format csv.",
-                    counts.size(), plural));
-  }
+  map.kinds = gathered(counts, plural);
+  number_cells(map);
+  Figure figure;
+  figure.gaps = gaps_of(map.cells);
+  Panel panel = panel_of(axes, map.cells);
+  say_kinds(figure, map, counts.size(), plural);
   panel.kinds = std::move(map);
   figure.panels.push_back(std::move(panel));
   say_no_value(figure);

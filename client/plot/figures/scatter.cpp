@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <unordered_set>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
@@ -11,8 +12,20 @@
 namespace oblique::client::plot {
 namespace {
 
-constexpr std::size_t kColumns = 160;
-constexpr std::size_t kRows = 110;
+constexpr std::size_t kMostColumns = 160;
+constexpr std::size_t kMostRows = 110;
+
+/// So many cells that those of values in equal steps, as of a grid's axis, are next to each other:
+/// between narrower ones there were stripes.
+std::size_t cells_for(const std::vector<double>& values, std::size_t most) {
+  std::unordered_set<double> different;
+  for (const double value : values) {
+    if (std::isfinite(value) && different.insert(value).second && different.size() > 2 * most) {
+      return most;
+    }
+  }
+  return std::clamp<std::size_t>(different.size() * 9 / 10, 2, most);
+}
 
 /// The number of the cell that a share lies in; outside: the number of cells.
 std::size_t cell_of(double share, std::size_t cells) {
@@ -32,16 +45,18 @@ std::vector<double> equal_edges(const Scale& scale, std::size_t cells) {
 
 /// Gathers points in cells of equal size: how many, or the mean of their shades.
 Cells gathered_in_cells(const Dots& dots, const Scale& x, const Scale& y) {
-  Cells cells{equal_edges(x, kColumns), equal_edges(y, kRows), {}, {}};
-  std::vector<double> sums(kColumns * kRows, 0.0);
-  std::vector<std::uint64_t> counts(kColumns * kRows, 0);
+  const std::size_t columns = cells_for(dots.x, kMostColumns);
+  const std::size_t rows = cells_for(dots.y, kMostRows);
+  Cells cells{equal_edges(x, columns), equal_edges(y, rows), {}, {}};
+  std::vector<double> sums(columns * rows, 0.0);
+  std::vector<std::uint64_t> counts(columns * rows, 0);
   for (std::size_t i = 0; i < dots.x.size(); ++i) {
-    const std::size_t column = cell_of(x.share_of(dots.x[i]), kColumns);
-    const std::size_t row = cell_of(y.share_of(dots.y[i]), kRows);
+    const std::size_t column = cell_of(x.share_of(dots.x[i]), columns);
+    const std::size_t row = cell_of(y.share_of(dots.y[i]), rows);
     const double shade = dots.shades.empty() ? 1.0 : dots.shades[i];
-    if (column < kColumns && row < kRows && std::isfinite(shade)) {
-      sums[row * kColumns + column] += shade;
-      ++counts[row * kColumns + column];
+    if (column < columns && row < rows && std::isfinite(shade)) {
+      sums[row * columns + column] += shade;
+      ++counts[row * columns + column];
     }
   }
   for (std::size_t i = 0; i < sums.size(); ++i) {
@@ -89,6 +104,7 @@ Figure scatter(const Quantity& x, const Quantity& y, const std::optional<Quantit
   if (dots.x.size() <= kMostDots) {
     if (colour) {
       figure.colours = colours_for(*colour, dots.shades, choice.colours);
+      figure.colours->has_plate = true;
     }
     panel.dots = dots;
     figure.panels.push_back(std::move(panel));
@@ -108,9 +124,11 @@ Figure scatter(const Quantity& x, const Quantity& y, const std::optional<Quantit
     colours.range.reset();
   }
   figure.colours = colours_for(quantity, panel.cells->values, colours);
-  figure.notes.push_back(fmt::format(
-      "{} points, gathered in {} x {} cells; colours are {}.", shown_count(dots.x.size()), kColumns,
-      kRows, colour ? "means of their points" : "the number of their points"));
+  figure.colours->has_plate = true;
+  figure.notes.push_back(
+      fmt::format("{} points, gathered in {} x {} cells; colours are {}.",
+                  shown_count(dots.x.size()), panel.cells->columns(), panel.cells->rows(),
+                  colour ? "means of their points" : "the number of their points"));
   figure.panels.push_back(std::move(panel));
   return figure;
 }

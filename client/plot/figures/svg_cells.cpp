@@ -1,3 +1,5 @@
+#include "client/plot/figures/svg_cells.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -6,12 +8,9 @@
 #include "client/plot/draw/outline.h"
 #include "client/plot/draw/png.h"
 #include "client/plot/draw/theme.h"
-#include "client/plot/figures/svg_marks.h"
 
 namespace oblique::client::plot {
 namespace {
-
-constexpr std::uint8_t kClear = 255;
 
 /// Which cell each of `pixels` equal parts of an axis shows.
 std::vector<std::size_t> cells_of_pixels(const std::vector<double>& edges, const Scale& scale,
@@ -44,22 +43,73 @@ std::size_t pixels_for(const std::vector<double>& edges, const Scale& scale) {
   return n >= kAtLeast ? n : n * ((kAtLeast + n - 1) / n);
 }
 
-/// Draws cells, each with the colour whose number it has, over the whole frame.
+/// FNV-1a.
+std::uint64_t hash_of(const std::vector<std::uint8_t>& bytes) {
+  std::uint64_t hash = 0xcbf29ce484222325U;
+  for (const std::uint8_t byte : bytes) {
+    hash = (hash ^ byte) * 0x100000001b3U;
+  }
+  return hash;
+}
+
+double x_of(const Places& places, const Cells& cells, std::size_t corner) {
+  return places.x(cells.x_edges[corner]);
+}
+double y_of(const Places& places, const Cells& cells, std::size_t corner) {
+  return places.y(cells.y_edges[corner]);
+}
+
+/// Gaps with more corners would take up too many bytes as paths.
+std::size_t most_corners(const Cells& cells) {
+  constexpr std::size_t kEach = 6;
+  return kEach * (cells.columns() + cells.rows());
+}
+
+/// Fills the cells of a state through a mask, whose size is bounded by the number of cells.
+void fill_masked(SvgWriter& svg, const Cells& cells, CellState state, std::string_view filling,
+                 const Places& places) {
+  std::vector<std::uint8_t> numbers;
+  numbers.reserve(cells.states.size());
+  for (const CellState each : cells.states) {
+    numbers.push_back(each == state ? 0 : kClear);
+  }
+  const Box& frame = places.frame();
+  const std::string mask = fmt::format("only-{}", filling);
+  svg.open("mask", {{"id", OwnId{mask}},
+                    {"maskUnits", "userSpaceOnUse"},
+                    {"x", frame.x},
+                    {"y", frame.y},
+                    {"width", frame.width},
+                    {"height", frame.height}});
+  draw_image(svg, cells, numbers, {colour_of(0xffffff)}, places);
+  svg.close("mask");
+  svg.element("rect", {{"x", frame.x},
+                       {"y", frame.y},
+                       {"width", frame.width},
+                       {"height", frame.height},
+                       {"fill", OwnLink{filling}},
+                       {"mask", OwnLink{mask}}});
+}
+
+}  // namespace
+
 void draw_image(SvgWriter& svg, const Cells& cells, const std::vector<std::uint8_t>& numbers,
                 std::vector<Colour> colours, const Places& places) {
   const std::size_t width = pixels_for(cells.x_edges, places.x_scale());
   const std::size_t height = pixels_for(cells.y_edges, places.y_scale());
   const auto columns = cells_of_pixels(cells.x_edges, places.x_scale(), width);
   const auto rows = cells_of_pixels(cells.y_edges, places.y_scale(), height);
-  IndexedImage image{width, height, std::move(colours), kClear, {}};
-  image.colours.resize(kClear + 1U);
+  const auto clear = static_cast<std::uint8_t>(colours.size());
+  IndexedImage image{width, height, std::move(colours), clear, {}};
+  image.colours.resize(clear + std::size_t{1});
   image.pixels.reserve(width * height);
   for (std::size_t y = 0; y < height; ++y) {
     const std::size_t row = rows[height - 1 - y] * cells.columns();
     for (std::size_t x = 0; x < width; ++x) {
-      image.pixels.push_back(numbers[row + columns[x]]);
+      image.pixels.push_back(std::min(numbers[row + columns[x]], clear));
     }
   }
+  svg.tell_apart(hash_of(image.pixels));
   const Box& frame = places.frame();
   svg.element("image", {{"class", "cells"},
                         {"x", frame.x},
@@ -68,13 +118,6 @@ void draw_image(SvgWriter& svg, const Cells& cells, const std::vector<std::uint8
                         {"height", frame.height},
                         {"preserveAspectRatio", "none"},
                         {"href", "data:image/png;base64," + base64(png_of(image))}});
-}
-
-double x_of(const Places& places, const Cells& cells, std::size_t corner) {
-  return places.x(cells.x_edges[corner]);
-}
-double y_of(const Places& places, const Cells& cells, std::size_t corner) {
-  return places.y(cells.y_edges[corner]);
 }
 
 std::string path_of(const std::vector<Outline>& outlines, const Cells& cells, const Places& places,
@@ -99,65 +142,31 @@ std::string path_of(const std::vector<Outline>& outlines, const Cells& cells, co
   return path.text();
 }
 
-/// Edges of areas that are few enough to be seen. Of a map like noise they would hide the colours,
-/// and take megabytes.
-constexpr std::size_t kMostCorners = 60'000;
-
-std::size_t corners_of(const std::vector<Outline>& outlines) {
-  std::size_t corners = 0;
-  for (const Outline& outline : outlines) {
-    corners += outline.corners.size();
-  }
-  return corners;
-}
-
-void fill_path(SvgWriter& svg, const std::string& data, const std::string& filling) {
+void fill_path(SvgWriter& svg, const std::string& data, std::string_view filling) {
   if (!data.empty()) {
-    svg.element("path", {{"fill", filling}, {"fill-rule", "evenodd"}, {"d", data}});
+    svg.element("path", {{"fill", OwnLink{filling}}, {"fill-rule", "evenodd"}, {"d", data}});
   }
 }
 
-/// Hatches cells without result, and those that failed.
 void draw_gaps(SvgWriter& svg, const Cells& cells, const Places& places) {
   KindGrid grid{cells.columns(), cells.rows(), {}};
   for (const CellState state : cells.states) {
     grid.kinds.push_back(static_cast<int>(state));
   }
-  for (const auto& [state, filling] : {std::pair{CellState::kNoResult, "url(#missing)"},
-                                       std::pair{CellState::kFailed, "url(#failed)"}}) {
-    fill_path(svg, path_of(outlines_of(grid, static_cast<int>(state)), cells, places, true),
-              filling);
+  for (const auto& [state, filling] :
+       {std::pair{CellState::kNoResult, "missing"}, std::pair{CellState::kFailed, "failed"}}) {
+    const auto outlines = outlines_of(grid, static_cast<int>(state));
+    if (corners_of(outlines) > most_corners(cells)) {
+      fill_masked(svg, cells, state, filling, places);
+    } else {
+      fill_path(svg, path_of(outlines, cells, places, true), filling);
+    }
   }
 }
-
-/// Writes its letter into the area of a kind where there is room.
-void draw_letter(SvgWriter& svg, const KindGrid& grid, std::size_t kind, const Cells& cells,
-                 const Places& places) {
-  const Roomiest room = roomiest_of(grid, static_cast<int>(kind));
-  if (room.side == 0) {
-    return;
-  }
-  const auto corner = [&](double at, const auto& edges) {
-    const auto whole = static_cast<std::size_t>(at);
-    return at > static_cast<double>(whole) ? 0.5 * (edges(whole) + edges(whole + 1)) : edges(whole);
-  };
-  const auto x_edge = [&](std::size_t i) { return x_of(places, cells, i); };
-  const auto y_edge = [&](std::size_t i) { return y_of(places, cells, i); };
-  const double half = static_cast<double>(room.side) / 2.0;
-  const double width = corner(room.x + half, x_edge) - corner(room.x - half, x_edge);
-  const double height = corner(room.y - half, y_edge) - corner(room.y + half, y_edge);
-  constexpr double kRoomForLetter = 13.0;
-  if (width >= kRoomForLetter && height >= kRoomForLetter) {
-    svg.text(corner(room.x, x_edge), corner(room.y, y_edge) + 4.5, "letter", "middle",
-             letter_of(kind));
-  }
-}
-
-}  // namespace
 
 Colour colour_at(const Colours& colours, double value) {
   const Scale scale(colours.axis.range.from, colours.axis.range.to, colours.axis.is_logarithmic);
-  return shade(colours.palette, shade_number(scale.share_of(value)));
+  return shade_of(colours, scale.share_of(value));
 }
 
 void draw_cells(SvgWriter& svg, const Cells& cells, const Colours& colours, const Places& places) {
@@ -166,7 +175,7 @@ void draw_cells(SvgWriter& svg, const Cells& cells, const Colours& colours, cons
   constexpr std::size_t kLast = kClear - 1;
   std::vector<Colour> shades;
   for (std::size_t i = 0; i <= kLast; ++i) {
-    shades.push_back(shade(colours.palette, (i * (kShades - 1) + kLast / 2) / kLast));
+    shades.push_back(shade_of(colours, static_cast<double>(i) / kLast));
   }
   std::vector<std::uint8_t> numbers(cells.values.size(), kClear);
   for (std::size_t i = 0; i < numbers.size(); ++i) {
@@ -176,42 +185,8 @@ void draw_cells(SvgWriter& svg, const Cells& cells, const Colours& colours, cons
           std::floor(std::clamp(share, 0.0, 1.0) * static_cast<double>(kLast) + 0.5));
     }
   }
-  draw_gaps(svg, cells, places);
   draw_image(svg, cells, numbers, std::move(shades), places);
-}
-
-void draw_kinds(SvgWriter& svg, const KindCells& map, const Places& places) {
-  const Cells& cells = map.cells;
-  std::vector<Colour> colours;
-  for (std::size_t i = 0; i < map.kinds.size(); ++i) {
-    colours.push_back(map.kinds[i].is_rest ? kFillOfOthers.colour : fill(i).colour);
-  }
-  KindGrid grid{cells.columns(), cells.rows(), std::vector<int>(cells.values.size(), -1)};
-  std::vector<std::uint8_t> numbers(cells.values.size(), kClear);
-  for (std::size_t i = 0; i < numbers.size(); ++i) {
-    if (cells.states[i] == CellState::kSolved) {
-      numbers[i] = static_cast<std::uint8_t>(cells.values[i]);
-      grid.kinds[i] = numbers[i];
-    }
-  }
   draw_gaps(svg, cells, places);
-  draw_image(svg, cells, numbers, std::move(colours), places);
-  if (const auto boundaries = boundaries_of(grid); corners_of(boundaries) <= kMostCorners) {
-    // Outlines turn where boundaries do: they are as few.
-    for (std::size_t i = 0; i < map.kinds.size(); ++i) {
-      const Hatch hatch = map.kinds[i].is_rest ? kFillOfOthers.hatch : fill(i).hatch;
-      if (hatch != Hatch::kNone) {
-        fill_path(svg, path_of(outlines_of(grid, static_cast<int>(i)), cells, places, true),
-                  hatch_link(hatch));
-      }
-    }
-    svg.path(path_of(boundaries, cells, places, false), "boundary");
-  }
-  for (std::size_t i = 0; i < map.kinds.size(); ++i) {
-    if (!map.kinds[i].is_rest) {
-      draw_letter(svg, grid, i, cells, places);
-    }
-  }
 }
 
 }  // namespace oblique::client::plot

@@ -14,6 +14,10 @@
 namespace oblique::client::plot {
 namespace {
 
+std::string id_of_frame(std::size_t number) {
+  return fmt::format("frame{}", number);
+}
+
 void draw_x_axis(SvgWriter& svg, const FigureAxis& axis, const PanelLayout& place) {
   const Box& frame = place.frame;
   for (const Tick& tick : place.x_ticks.ticks) {
@@ -75,7 +79,7 @@ void draw_contents(SvgWriter& svg, const Figure& figure, const Panel& panel,
                    const PanelLayout& place) {
   const Places places(panel, place.frame);
   // Colours from dark to light want the same ground on light and dark screens.
-  const bool has_plate = figure.colours && !panel.cells && (panel.dots || !panel.curves.empty());
+  const bool has_plate = figure.colours && figure.colours->has_plate;
   if (has_plate) {
     const Box& frame = place.frame;
     svg.rectangle(frame.x, frame.y, frame.width, frame.height, "plate");
@@ -117,7 +121,8 @@ void draw_panel(SvgWriter& svg, const Figure& figure, std::size_t number, const 
   const Panel& panel = figure.panels[number];
   const PanelLayout& place = layout.panels[number];
   const Box& frame = place.frame;
-  svg.open("g", {{"clip-path", fmt::format("url(#frame{})", first_frame + number)}});
+  const std::string frame_id = id_of_frame(first_frame + number);
+  svg.open("g", {{"clip-path", OwnLink{frame_id}}});
   draw_contents(svg, figure, panel, place);
   svg.close("g");
   svg.rectangle(frame.x, frame.y, frame.width, frame.height, "frame");
@@ -142,24 +147,25 @@ void draw_beyond(SvgWriter& svg, const Box& bar, double y, double tip, const Col
 void draw_colour_bar(SvgWriter& svg, const Colours& colours, const Layout& layout) {
   const Box& bar = layout.colour_bar;
   constexpr std::size_t kStops = 32;
-  svg.open("linearGradient", {{"id", "ramp"}, {"x1", 0.0}, {"y1", 1.0}, {"x2", 0.0}, {"y2", 0.0}});
+  svg.open("linearGradient",
+           {{"id", OwnId{"ramp"}}, {"x1", 0.0}, {"y1", 1.0}, {"x2", 0.0}, {"y2", 0.0}});
   for (std::size_t i = 0; i <= kStops; ++i) {
     const double share = static_cast<double>(i) / kStops;
     svg.element("stop", {{"offset", svg_number(100.0 * share) + "%"},
-                         {"stop-color", hexadecimal(shade(colours.palette, shade_number(share)))}});
+                         {"stop-color", hexadecimal(shade_of(colours, share))}});
   }
   svg.close("linearGradient");
   svg.element("rect", {{"x", bar.x},
                        {"y", bar.y},
                        {"width", bar.width},
                        {"height", bar.height},
-                       {"fill", "url(#ramp)"}});
+                       {"fill", OwnLink{"ramp"}}});
   svg.rectangle(bar.x, bar.y, bar.width, bar.height, "frame");
   if (colours.has_above) {
-    draw_beyond(svg, bar, bar.y - 1.0, bar.y - 10.0, shade(colours.palette, kShades - 1));
+    draw_beyond(svg, bar, bar.y - 1.0, bar.y - 10.0, shade_of(colours, 1.0));
   }
   if (colours.has_below) {
-    draw_beyond(svg, bar, bar.bottom() + 1.0, bar.bottom() + 10.0, shade(colours.palette, 0));
+    draw_beyond(svg, bar, bar.bottom() + 1.0, bar.bottom() + 10.0, shade_of(colours, 0.0));
   }
   for (const Tick& tick : layout.colour_ticks.ticks) {
     const double y = bar.bottom() - tick.share * bar.height;
@@ -190,7 +196,8 @@ std::vector<Hatch> hatches_of(const Figure& figure) {
 void define_frames(SvgWriter& svg, const Layout& layout, std::size_t first_frame) {
   for (std::size_t i = 0; i < layout.panels.size(); ++i) {
     const Box& frame = layout.panels[i].frame;
-    svg.open("clipPath", {{"id", fmt::format("frame{}", first_frame + i)}});
+    const std::string frame_id = id_of_frame(first_frame + i);
+    svg.open("clipPath", {{"id", OwnId{frame_id}}});
     svg.rectangle(frame.x, frame.y, frame.width, frame.height, "clip");
     svg.close("clipPath");
   }
@@ -235,7 +242,7 @@ void draw_figure(SvgWriter& svg, const Figure& figure, const Layout& layout,
 std::string svg_of(const Figure& figure, const Size& size) {
   const Layout layout = layout_of(figure, size);
   SvgWriter svg(layout.size.width, layout.size.height, figure.title, description_of(figure));
-  svg.verbatim(style_sheet());
+  svg.style(style_sheet());
   svg.verbatim(pattern_definitions(hatches_of(figure)));
   define_frames(svg, layout, 0);
   svg.rectangle(0.0, 0.0, layout.size.width, layout.size.height, "paper");

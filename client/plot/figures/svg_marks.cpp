@@ -143,6 +143,7 @@ void draw_bars(SvgWriter& svg, const Bars& bars, const Places& places) {
 
 void draw_dots(SvgWriter& svg, const Dots& dots, const Figure& figure, const Places& places) {
   // Dots of one colour are one path; 64 colours are as many as eyes tell apart.
+  constexpr std::size_t kShadesOfDots = 4;
   std::map<std::size_t, std::string> paths;
   for (std::size_t i = 0; i < dots.x.size(); ++i) {
     const double x = places.x(dots.x[i]);
@@ -158,20 +159,24 @@ void draw_dots(SvgWriter& svg, const Dots& dots, const Figure& figure, const Pla
       if (std::isnan(share)) {
         continue;
       }
-      number = shade_number(share) / 4 * 4;
+      number = shade_number(share) / kShadesOfDots;
     }
     paths[number] += fmt::format("M{} {}h0", svg_number(x), svg_number(y));
   }
   const double width = dots.x.size() <= 300 ? 6.0 : dots.x.size() <= 1500 ? 4.5 : 3.0;
   for (const auto& [number, data] : paths) {
     const bool has_shades = figure.colours && !dots.shades.empty();
-    svg.element("path", {{"class", has_shades ? "dots" : "dots m0"},
-                         {"fill", "none"},
-                         {"stroke-linecap", "round"},
-                         {"stroke-width", width},
-                         {"stroke", has_shades ? hexadecimal(shade(figure.colours->palette, number))
-                                               : std::string("currentColor")},
-                         {"d", data}});
+    svg.element(
+        "path",
+        {{"class", has_shades ? "dots" : "dots m0"},
+         {"fill", "none"},
+         {"stroke-linecap", "round"},
+         {"stroke-width", width},
+         {"stroke", has_shades ? hexadecimal(shade_of(
+                                     *figure.colours,
+                                     static_cast<double>(number * kShadesOfDots) / (kShades - 1)))
+                               : std::string("currentColor")},
+         {"d", data}});
   }
 }
 

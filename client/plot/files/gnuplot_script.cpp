@@ -39,8 +39,7 @@ void write_palette(std::string& out, const Colours& colours) {
   constexpr std::size_t kStops = 16;
   for (std::size_t i = 0; i <= kStops; ++i) {
     const double share = static_cast<double>(i) / kStops;
-    out += fmt::format("{}{} '{}'", i == 0 ? "" : ", ", i,
-                       hexadecimal(shade(colours.palette, shade_number(share))));
+    out += fmt::format("{}{} '{}'", i == 0 ? "" : ", ", i, hexadecimal(shade_of(colours, share)));
   }
   out += ")\n";
   write_axis(out, 'c',
@@ -79,7 +78,7 @@ void write_cells(std::string& out, const Panel& panel, const Figure& figure, std
                        std::max<std::size_t>(2, panel.kinds->kinds.size()) - 1);
     out += "set palette defined (";
     for (std::size_t i = 0; i < panel.kinds->kinds.size(); ++i) {
-      const Colour colour = panel.kinds->kinds[i].is_rest ? kFillOfOthers.colour : fill(i).colour;
+      const Colour colour = panel.kinds->kinds[i].is_rest ? kFillOfOthers.colour : plain_fill(i);
       out += fmt::format("{}{} '{}'", i == 0 ? "" : ", ", i, hexadecimal(colour));
       // A palette of one colour wants two stops.
       if (panel.kinds->kinds.size() == 1) {
@@ -93,7 +92,7 @@ void write_cells(std::string& out, const Panel& panel, const Figure& figure, std
       "notitle",
       block);
   for (std::size_t i = 0; panel.kinds && i < panel.kinds->kinds.size(); ++i) {
-    const Colour colour = panel.kinds->kinds[i].is_rest ? kFillOfOthers.colour : fill(i).colour;
+    const Colour colour = panel.kinds->kinds[i].is_rest ? kFillOfOthers.colour : plain_fill(i);
     out += fmt::format(", \\\n  NaN with boxes fill solid linecolor rgb '{}' title {} noenhanced",
                        hexadecimal(colour), gnuplot_text(panel.kinds->kinds[i].name));
   }
@@ -162,7 +161,8 @@ void write_points(std::string& out, const Panel& panel, const Figure& figure, st
     add(x, y, {}, 0.0,
         fmt::format("using 1:2 with points pointtype 12 title {} noenhanced", gnuplot_text(name)));
   }
-  out += plots.empty() ? "plot NaN notitle\n" : "set key outside right\n" + plots + '\n';
+  const std::string key = figure.panels.size() > 1 ? "set key below\n" : "set key outside right\n";
+  out += plots.empty() ? "plot NaN notitle\n" : key + plots + '\n';
 }
 
 }  // namespace
@@ -173,8 +173,10 @@ std::string gnuplot_of(const Figure& figure, const Size& size) {
       "background rgb 'white'\nset output 'picture.svg'\n",
       number(size.width), number(size.height));
   if (figure.panels.size() > 1) {
-    out += fmt::format("set multiplot layout {},1 title {} noenhanced\n", figure.panels.size(),
-                       gnuplot_text(figure.title));
+    const std::size_t columns = figure.panels.size() > 3 ? 2 : 1;
+    out += fmt::format("set multiplot layout {},{} title {} noenhanced\n",
+                       (figure.panels.size() + columns - 1) / columns, columns,
+                       gnuplot_text(figure.title + ", " + figure.subtitle));
   } else {
     out += fmt::format("set title {} noenhanced\n",
                        gnuplot_text(figure.title + ", " + figure.subtitle));
@@ -184,6 +186,12 @@ std::string gnuplot_of(const Figure& figure, const Size& size) {
   }
   for (std::size_t i = 0; i < figure.panels.size(); ++i) {
     const Panel& panel = figure.panels[i];
+    if (i > 0) {
+      out += "unset logscale xy\nset size noratio\n";
+    }
+    if (figure.panels.size() > 1) {
+      out += fmt::format("set title {} noenhanced\n", gnuplot_text(panel.title));
+    }
     write_axis(out, 'x', panel.x);
     write_axis(out, 'y', panel.y);
     if (panel.has_equal_aspect) {

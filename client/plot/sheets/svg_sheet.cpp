@@ -14,12 +14,18 @@ namespace oblique::client::plot {
 namespace {
 
 /// Compression is darker than restitution, in grey too; stick is hatched over both.
-constexpr std::string_view kSpanStyles =
-    "<style>.p0{fill:#cfe1f3}.p1{fill:#fcf3e6}.p2{fill:url(#stick)}.stick{stroke:#57606a;"
-    "stroke-width:1;stroke-opacity:.55}@media screen and (prefers-color-scheme:dark){"
-    ".p0{fill:#1f364e}.p1{fill:#2a2219}.p2{fill:url(#stick)}.stick{stroke:#a9b2bc}}</style>\n"
-    "<defs><pattern id=\"stick\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\">"
-    "<path class=\"stick\" d=\"M-1 7L7-1M-1 1L1-1M5 7L7 5\"/></pattern></defs>\n";
+void add_span_styles(SvgWriter& svg) {
+  const auto link = text_of(OwnLink{"stick"});
+  svg.style(fmt::format(
+      ".p0{{fill:#cfe1f3}}.p1{{fill:#fcf3e6}}.p2{{fill:{0}}}.stick{{stroke:#57606a;stroke-width:1;"
+      "stroke-opacity:.55}}@media screen and (prefers-color-scheme:dark){{.p0{{fill:#1f364e}}"
+      ".p1{{fill:#2a2219}}.p2{{fill:{0}}}.stick{{stroke:#a9b2bc}}}}",
+      link));
+  svg.verbatim(fmt::format(
+      "<defs><pattern id=\"{}\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\"><path "
+      "class=\"stick\" d=\"M-1 7L7-1M-1 1L1-1M5 7L7 5\"/></pattern></defs>\n",
+      text_of(OwnId{"stick"})));
+}
 
 /// A figure with the place of its upper left corner.
 struct PlacedPart {
@@ -116,8 +122,8 @@ std::string svg_of(const Sheet& sheet, const Size& size) {
       placed_parts(sheet, width, std::max(size.height - y - texts.below(), kSmallestSide), y);
   const double bottom = y + texts.below();
   SvgWriter svg(width, bottom, sheet.title, described(sheet));
-  svg.verbatim(style_sheet());
-  svg.verbatim(kSpanStyles);
+  svg.style(style_sheet());
+  add_span_styles(svg);
   std::size_t frame = 0;
   for (const auto& part : parts) {
     define_frames(svg, part.layout, frame);

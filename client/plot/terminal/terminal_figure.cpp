@@ -163,7 +163,7 @@ std::string legend_line(const LegendEntry& entry, const TerminalLook& look) {
                          stroke_on_terminal(entry.number), entry.name, look);
     case Sign::kKind:
       return signed_line(look.is_plain ? letter_of(entry.number) + ' ' : block,
-                         fill(entry.number).colour, entry.name, look);
+                         plain_fill(entry.number), entry.name, look);
     case Sign::kRest:
       return signed_line(look.is_plain ? ". " : block, kFillOfOthers.colour, entry.name, look);
     case Sign::kNoResult:
@@ -195,7 +195,7 @@ std::string colour_line(const Colours& colours, const TerminalLook& look) {
   for (std::size_t i = 0; i < steps; ++i) {
     const double share = (static_cast<double>(i) + 0.5) / static_cast<double>(steps);
     line.put(column++, 0, look.is_plain ? std::string(1, shade_sign(share)) : "\u2588",
-             shade(colours.palette, shade_number(share)));
+             shade_of(colours, share));
   }
   write((colours.has_above ? " <= " : " ") + number(scale.to()) + "  " +
         (look.is_plain ? plain(colours.axis.label) : colours.axis.label));

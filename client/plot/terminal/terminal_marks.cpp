@@ -55,9 +55,9 @@ class MapLook {
     }
     if (panel_.kinds) {
       const auto kind = static_cast<std::size_t>(cells_.values[cell]);
-      return panel_.kinds->kinds[kind].is_rest ? kFillOfOthers.colour : fill(kind).colour;
+      return panel_.kinds->kinds[kind].is_rest ? kFillOfOthers.colour : plain_fill(kind);
     }
-    return shade(figure_.colours->palette, shade_number(share(cell)));
+    return shade_of(*figure_.colours, share(cell));
   }
 
   std::string sign(std::size_t cell) const {
@@ -180,7 +180,7 @@ void draw_lines(DotCanvas& dots, const Figure& figure, const Panel& panel) {
   const Scale y = scale_for(panel.y);
   const auto colour_of_shade = [&figure](double value) {
     const auto& colours = *figure.colours;
-    return shade(colours.palette, shade_number(scale_for(colours.axis).share_of(value)));
+    return shade_of(colours, scale_for(colours.axis).share_of(value));
   };
   for (std::size_t i = 0; panel.dots && i < panel.dots->x.size(); ++i) {
     const bool is_shaded = figure.colours && !panel.dots->shades.empty();

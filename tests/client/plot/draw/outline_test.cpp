@@ -1,12 +1,14 @@
 // Outlines of areas, and lines between them.
 #include <algorithm>
 #include <cstdlib>
+#include <random>
 #include <string>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "client/plot/draw/areas.h"
 #include "client/plot/draw/outline.h"
 
 namespace oblique::client::plot {
@@ -68,12 +70,42 @@ TEST(Boundaries, LieBetweenKindsOnceAndNotAlongWhatIsUnknown) {
   EXPECT_TRUE(boundaries_of(grid_of({"aaa", "aaa"})).empty());
 }
 
-TEST(RoomiestCell, IsInTheMiddleOfTheLargestSquareOfItsKind) {
-  const auto room = roomiest_of(grid_of({"abbbb", "abbba", "abbba", "aaaaa"}), 1);
-  EXPECT_EQ(room.side, 3U);
-  EXPECT_EQ(room.x, 2.5);
-  EXPECT_EQ(room.y, 1.5);
-  EXPECT_EQ(roomiest_of(grid_of({"aa"}), 3).side, 0U);
+TEST(Areas, AreOfOneKindAndShareEdges) {
+  const auto found = areas_of(grid_of({"aab", "bba", " ba"}));
+  ASSERT_EQ(found.areas.size(), 4U);
+  EXPECT_EQ(found.areas[0].cells, 2U);
+  EXPECT_EQ(found.areas[1].cells, 1U) << "the b that meets others at a corner";
+  EXPECT_EQ(found.areas[2].cells, 3U);
+  EXPECT_EQ(found.of_cells[6], Areas::kNone);
+  EXPECT_EQ(found.of_cells[7], 2U);
+}
+
+TEST(Areas, HaveTheirLargestSquareAndItsMiddle) {
+  const auto found = areas_of(grid_of({"abbbb", "abbba", "abbba", "aaaaa"}));
+  ASSERT_EQ(found.areas.size(), 2U);
+  EXPECT_EQ(found.areas[1].side, 3U);
+  EXPECT_EQ(found.areas[1].x, 2.5);
+  EXPECT_EQ(found.areas[1].y, 1.5);
+}
+
+TEST(Areas, GoOnOverSpecksInsideThemAndEndAtThoseBetween) {
+  const auto left = without_specks(grid_of({"aacaabb", "aaaacbb", "caaabbb"}), 2);
+  EXPECT_EQ(left.kinds, grid_of({"aaaaabb", "aaaa bb", "aaaabbb"}).kinds);
+}
+
+TEST(Areas, AreAllOutlinedWhereTheyAreFewAndNoneInNoise) {
+  EXPECT_EQ(least_outlined(grid_of({"aab", "abb", "bbb"})), 1U);
+  EXPECT_EQ(least_outlined({}), 1U);
+  KindGrid noise{200, 200, {}};
+  std::mt19937 random(7);
+  for (int i = 0; i < 40'000; ++i) {
+    noise.kinds.push_back(static_cast<int>(random() % 5));
+  }
+  EXPECT_EQ(least_outlined(noise), 0U);
+  for (int i = 0; i < 40'000; ++i) {
+    noise.kinds[static_cast<std::size_t>(i)] = i % 200 < 100 ? 1 : random() % 20 == 0 ? 2 : 3;
+  }
+  EXPECT_GT(least_outlined(noise), 1U) << "specks in one of two areas";
 }
 
 }  // namespace

@@ -112,6 +112,15 @@ TEST(Fills, DifferInHatchingOrToAllEyesInColour) {
   }
 }
 
+TEST(Fills, WithoutHatchingHaveAColourEach) {
+  constexpr std::size_t kKindsOfAMap = 12;
+  for (std::size_t i = 0; i < kKindsOfAMap; ++i) {
+    for (std::size_t k = 0; k < i; ++k) {
+      EXPECT_GT(difference(plain_fill(i), plain_fill(k), kAllCones), 10.0) << i << " and " << k;
+    }
+  }
+}
+
 TEST(Strokes, DifferInDashesAndAreReadOnPaperAndOnDarkScreens) {
   std::set<std::string> dashes;
   for (std::size_t i = 0; i < kStrokes; ++i) {
@@ -120,6 +129,15 @@ TEST(Strokes, DifferInDashesAndAreReadOnPaperAndOnDarkScreens) {
     EXPECT_GE(contrast(stroke(i).on_dark, kDarkInks.paper), 3.0) << i;
   }
   EXPECT_EQ(dashes.size(), kStrokes);
+}
+
+TEST(Shades, OfLinesAndPointsAreToldFromTheirPlate) {
+  for (const Palette palette : {Palette::kViridis, Palette::kCividis}) {
+    for (int i = 0; i <= 20; ++i) {
+      const Colour colour = shade(palette, shade_number(kDarkShare * i / 20.0));
+      EXPECT_GE(contrast(colour, kLightInks.paper), 2.4) << i;
+    }
+  }
 }
 
 TEST(Texts, HaveTheContrastThatReadersNeed) {

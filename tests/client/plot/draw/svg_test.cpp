@@ -1,6 +1,7 @@
 // What SVG is written of: numbers, texts, paths, widths.
 #include <clocale>
 #include <cmath>
+#include <cstdint>
 #include <string>
 
 #include <gmock/gmock.h>
@@ -38,6 +39,37 @@ TEST(SvgTexts, AreNoMarkupAndSteerNothing) {
   EXPECT_EQ(svg_text("<script>a & \"b\"</script>"),
             "&lt;script&gt;a &amp; &quot;b&quot;&lt;/script&gt;");
   EXPECT_EQ(svg_text("a\x1b[31m\nb"), "a\\x1b[31m\\nb");
+}
+
+/// A picture with one rectangle, which has an id, a link and a rule of its own.
+std::string picture_of(double width, std::uint64_t bytes = 0) {
+  SvgWriter svg(10.0, 10.0, "t", "d");
+  svg.style("a,.b{c:d}@media screen{.b{e:f}}");
+  svg.tell_apart(bytes);
+  svg.element("rect", {{"id", OwnId{"it"}}, {"fill", OwnLink{"it"}}, {"width", width}});
+  return std::move(svg).finished();
+}
+
+std::string own_of(const std::string& svg) {
+  const auto from = svg.find("id=\"") + 4;
+  return svg.substr(from, svg.find('-', from) - from);
+}
+
+TEST(Ids, AreAPicturesOwnSoThatSeveralMayStandInOnePage) {
+  const auto svg = picture_of(1.0);
+  const auto own = own_of(svg);
+  EXPECT_THAT(own, testing::MatchesRegex("p[0-9a-f]{8}"));
+  EXPECT_THAT(svg, testing::HasSubstr("<rect id=\"" + own + "-it\" fill=\"url(#" + own + "-it)\""));
+  EXPECT_EQ(own, own_of(picture_of(1.0)));
+  EXPECT_NE(own, own_of(picture_of(2.0)));
+  EXPECT_NE(own, own_of(picture_of(1.0, 7))) << "of other bytes";
+}
+
+TEST(Styles, HoldInTheirPictureAlone) {
+  const auto svg = picture_of(1.0);
+  const auto root = '#' + own_of(svg) + "-picture ";
+  EXPECT_THAT(svg, testing::HasSubstr("<style>" + root + "a," + root + ".b{c:d}@media screen{" +
+                                      root + ".b{e:f}}</style>"));
 }
 
 TEST(Paths, SayOneNumberWhereALineIsLevelOrUpright) {
