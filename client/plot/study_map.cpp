@@ -29,9 +29,13 @@ void blank_unmet(Cells& cells) {
 
 void say_gathered(Figure& figure, const GatheredCells& gathered) {
   if (gathered.most_in_a_cell > 1) {
-    figure.notes.push_back(fmt::format("Cells hold up to {} points and show {}.",
-                                       shown_count(gathered.most_in_a_cell),
-                                       gathered.has_names ? "the first" : "their mean"));
+    figure.notes.push_back(fmt::format(
+        "Cells hold up to {} points and show {}{}.", shown_count(gathered.most_in_a_cell),
+        gathered.has_names ? "what most of these have" : "their mean",
+        gathered.mixed_cells == 0 ? ""
+        : gathered.mixed_cells == 1
+            ? "; 1 cell has others too"
+            : fmt::format("; {} cells have others too", shown_count(gathered.mixed_cells))));
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <compare>
 #include <limits>
 #include <map>
 
@@ -37,13 +38,8 @@ class CellGatherer {
       return;
     }
     if (rows.value.has_texts()) {
-      if (gathered_.names.empty()) {
-        gathered_.names.resize(counts_.size());
-      }
-      if (counts_[cell] == 0) {
-        // A column of texts may have numbers among them.
-        gathered_.names[cell] = rows.value.text(row);
-      }
+      // A column of texts may have numbers among them.
+      words_.push_back({cell, rows.value.word_of_row[row]});
     } else {
       gathered_.cells.values[cell] += rows.value.numbers[row];
     }
@@ -58,11 +54,45 @@ class CellGatherer {
       gathered_.most_in_a_cell = std::max(gathered_.most_in_a_cell, counts_[i]);
     }
     gathered_.has_names = rows.value.has_texts();
+    if (gathered_.has_names) {
+      name_cells(rows.value);
+    }
     return std::move(gathered_);
   }
 
  private:
+  struct WordOfCell {
+    std::size_t cell;
+    std::uint32_t word;
+
+    auto operator<=>(const WordOfCell&) const = default;
+  };
+
+  /// The text that each cell has most often; of those that are equally many the first in the
+  /// answer.
+  void name_cells(const AnswerColumn& column) {
+    gathered_.names.resize(counts_.size());
+    std::sort(words_.begin(), words_.end());
+    for (auto at = words_.begin(); at != words_.end();) {
+      const auto cell_ends = std::upper_bound(at, words_.end(), WordOfCell{at->cell, UINT32_MAX});
+      gathered_.mixed_cells += at->word == (cell_ends - 1)->word ? 0U : 1U;
+      const std::size_t cell = at->cell;
+      std::ptrdiff_t most = 0;
+      while (at != cell_ends) {
+        const auto word_ends = std::upper_bound(at, cell_ends, *at);
+        if (word_ends - at > most) {
+          most = word_ends - at;
+          gathered_.names[cell] =
+              at->word == AnswerColumn::kNoWord ? std::string() : column.words[at->word];
+        }
+        at = word_ends;
+      }
+    }
+    words_.clear();
+  }
+
   GatheredCells gathered_;
+  std::vector<WordOfCell> words_;
   std::vector<std::uint64_t> counts_;
 };
 

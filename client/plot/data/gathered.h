@@ -26,12 +26,13 @@ struct GatheredCells {
   bool has_names = false;
   std::uint64_t points = 0;          ///< rows that are in a cell
   std::uint64_t most_in_a_cell = 0;  ///< of them, of those with a value
+  std::uint64_t mixed_cells = 0;     ///< cells whose points have different texts
 };
 
 /// The values of an axis of cells: those of the study, and others that rows have.
 std::vector<double> axis_values(std::vector<double> of_study, const AnswerColumn& column);
 
-/// A cell a pair of values; several rows in a cell give their mean, of texts the first.
+/// A cell a pair of values; several rows in a cell give their mean, of texts that which most have.
 GatheredCells gathered_on(const MapRows& rows, const std::vector<double>& x_values,
                           const std::vector<double>& y_values, bool is_x_logarithmic,
                           bool is_y_logarithmic);

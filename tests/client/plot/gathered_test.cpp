@@ -1,4 +1,5 @@
 // Rows of answers gathered in cells and lines.
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <string>
@@ -24,9 +25,13 @@ AnswerColumn texts(const std::vector<std::string>& values) {
   AnswerColumn column{.name = "t", .unit = {}};
   for (const auto& value : values) {
     column.numbers.push_back(std::nan(""));
-    column.word_of_row.push_back(value.empty() ? AnswerColumn::kNoWord
-                                               : static_cast<std::uint32_t>(column.words.size()));
-    column.words.push_back(value);
+    const auto found = std::find(column.words.begin(), column.words.end(), value);
+    column.word_of_row.push_back(
+        value.empty() ? AnswerColumn::kNoWord
+                      : static_cast<std::uint32_t>(found - column.words.begin()));
+    if (!value.empty() && found == column.words.end()) {
+      column.words.push_back(value);
+    }
   }
   return column;
 }
@@ -115,7 +120,19 @@ TEST(Cells, OfTextsHaveNames) {
   const auto gathered = gathered_on({x, y, value, status}, {1, 2}, {1}, false, false);
   EXPECT_TRUE(gathered.has_names);
   EXPECT_EQ(gathered.names[0], "SC sR");
+  EXPECT_EQ(gathered.mixed_cells, 0U);
   EXPECT_EQ(gathered.cells.states[1], CellState::kNoValue);
+}
+
+TEST(Cells, WithSeveralTextsHaveThatOfMostOfTheirPointsAndAreCounted) {
+  const auto x = numbers({1, 1, 1, 1, 2, 2, 3});
+  const auto y = numbers({1, 1, 1, 1, 1, 1, 1});
+  const auto value = texts({"rare", "SC", "", "SC", "SC", "rare", "SC"});
+  const auto status = texts(std::vector<std::string>(7, "solved"));
+  const auto gathered = gathered_on({x, y, value, status}, {1, 2, 3}, {1}, false, false);
+  EXPECT_THAT(gathered.names, ElementsAre("SC", "rare", "SC")) << "of equally many the first met";
+  EXPECT_EQ(gathered.mixed_cells, 2U);
+  EXPECT_EQ(gathered.most_in_a_cell, 3U);
 }
 
 TEST(Bins, HoldAllScatteredPointsThoseAtTheEndsIncluded) {
