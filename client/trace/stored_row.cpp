@@ -192,4 +192,18 @@ std::vector<std::string> differences(const StoredRow& stored, const PointAtHand&
   return columns;
 }
 
+std::string differences_in_words(const StoredRow& stored, const PointAtHand& point,
+                                 const solver::CaseResult& result) {
+  std::string names;
+  for (const auto& column : differences(stored, point, result)) {
+    names += (names.empty() ? "" : ", ") + column;
+  }
+  const std::string stored_version = stored.text("solver_version");
+  const std::string& version = result.solver.version;
+  return names.empty() ? names
+         : stored_version == version
+             ? fmt::format("{}: both by solver {}", names, version)
+             : fmt::format("{}: stored by solver {}, now by {}", names, stored_version, version);
+}
+
 }  // namespace oblique::client

@@ -39,4 +39,8 @@ std::optional<StoredRow> stored_row(Source& source, const std::string& study, st
 std::vector<std::string> differences(const StoredRow& stored, const PointAtHand& point,
                                      const solver::CaseResult& result);
 
+/// The same for people: "fn_peak_N, mode: stored by solver 0.1, now by 0.2"; empty: there are none.
+std::string differences_in_words(const StoredRow& stored, const PointAtHand& point,
+                                 const solver::CaseResult& result);
+
 }  // namespace oblique::client

@@ -50,11 +50,12 @@ void add_falls(PointHistory& history, const solver::Finger& finger) {
   }
 }
 
-void solve_history(PointHistory& history) {
+void solve_history(PointHistory& history, bool with_errors) {
   const solver::Finger finger(history.model);
   const solver::Tracing tracing{
       [&history](const solver::TraceRow& row) { history.rows.push_back(row); }, true};
-  history.result = solve_here(finger, {history.H_m, history.mu, history.e_star}, tracing, false);
+  history.result =
+      solve_here(finger, {history.H_m, history.mu, history.e_star, with_errors}, tracing, false);
   add_falls(history, finger);
 }
 
@@ -71,8 +72,14 @@ PointHistory history_of(const PointAtHand& point) {
       fmt::format("point {} of {} has no answer: {}", *flags.point, flags.study, reason));
 }
 
-PointHistory history_by_worker(const PointPictureFlags& flags, const SourceFlags& source,
-                               Connection& connection) {
+/// A point of a study with its histories.
+struct SolvedAgain {
+  PointAtHand point;
+  PointHistory history;
+};
+
+SolvedAgain solved_by_worker(const PointPictureFlags& flags, const SourceFlags& source,
+                             Connection& connection) {
   WorkLine line(std::cerr);
   const auto waiting = line.begin(fmt::format("a worker of {} solves point {} of {}",
                                               connection.url(), *flags.point, flags.study));
@@ -89,7 +96,23 @@ PointHistory history_by_worker(const PointPictureFlags& flags, const SourceFlags
   PointHistory history = history_of(solved.point);
   history.rows = std::move(rows);
   history.result = solved.result;
-  return history;
+  if (flags.panel.empty() || plot::point_panel_named(flags.panel) == plot::PointPanel::kShape) {
+    history.remarks.emplace_back(
+        "A worker gives the shapes from touch on; with --here those of the fall are drawn too.");
+  }
+  return {solved.point, std::move(history)};
+}
+
+SolvedAgain solved_here(const PointPictureFlags& flags, const PointAtHand& point) {
+  PointHistory history = history_of(point);
+  try {
+    solve_history(history, point.errors);
+  } catch (const solver::SolveError& error) {
+    throw_unsolved(flags, error.what());
+  } catch (const solver::InputError& error) {  // the study was taken with it: no wrong usage here
+    throw_unsolved(flags, error.what());
+  }
+  return {point, std::move(history)};
 }
 
 void refuse_failed_point(const PointPictureFlags& flags, const std::optional<StoredRow>& stored) {
@@ -97,6 +120,25 @@ void refuse_failed_point(const PointPictureFlags& flags, const std::optional<Sto
     throw std::runtime_error(fmt::format(
         "point {} of {} failed and has no time histories: {}. `oblique retry {}` solves it again",
         *flags.point, flags.study, stored->text("error"), flags.study));
+  }
+}
+
+/// Says, in the picture too, where what is drawn is other than what the study has.
+void compare(SolvedAgain& solved, const std::optional<StoredRow>& stored) {
+  if (!stored) {
+    return;
+  }
+  if (!solved.history.result) {
+    tell_line(
+        "The worker's outputs are others than this program knows: not held against the stored "
+        "row.");
+    return;
+  }
+  const auto others = differences_in_words(*stored, solved.point, *solved.history.result);
+  if (!others.empty()) {
+    solved.history.remarks.push_back(
+        fmt::format("Solved again, it is other than stored in {}.", others));
+    tell_line(solved.history.remarks.back());
   }
 }
 
@@ -113,21 +155,16 @@ PointHistory history_of_study(const PointPictureFlags& flags, const SourceFlags&
   if (!is_file) {
     connection.emplace(connection_settings(source_flags));
   }
-  refuse_failed_point(flags, stored_row(*source, flags.study, number));
-  if (!is_file && !flags.here) {
-    return history_by_worker(flags, source_flags, *connection);
-  }
-  PointHistory history =
-      history_of(is_file ? point_in(database, study_named(*source, flags.study), number)
-                         : point_at(*connection, flags.study, number));
-  try {
-    solve_history(history);
-  } catch (const solver::SolveError& error) {
-    throw_unsolved(flags, error.what());
-  } catch (const solver::InputError& error) {  // the study was taken with it: no wrong usage here
-    throw_unsolved(flags, error.what());
-  }
-  return history;
+  const auto stored = stored_row(*source, flags.study, number);
+  refuse_failed_point(flags, stored);
+  auto solved =
+      !is_file && !flags.here
+          ? solved_by_worker(flags, source_flags, *connection)
+          : solved_here(flags, is_file
+                                   ? point_in(database, study_named(*source, flags.study), number)
+                                   : point_at(*connection, flags.study, number));
+  compare(solved, stored);
+  return std::move(solved.history);
 }
 
 PointHistory history_of_values(const PointPictureFlags& flags) {
@@ -143,7 +180,7 @@ PointHistory history_of_values(const PointPictureFlags& flags) {
                        .H_m = point.H_m,
                        .mu = point.mu,
                        .e_star = point.e_star};
-  solve_history(history);
+  solve_history(history, false);
   tell_mesh(std::cerr, table.recipe());
   return history;
 }

@@ -122,21 +122,9 @@ void tell_comparison(const std::optional<StoredRow>& stored, const Solved& solve
     tell_line(again + ". Its outputs are others than this program knows: not compared.");
     return;
   }
-  const auto others = differences(*stored, solved.point, *solved.result);
-  const std::string stored_version = stored->text("solver_version");
-  const std::string& version = solved.result->solver.version;
-  if (others.empty()) {
-    tell_line(again + ", same as stored.");
-    return;
-  }
-  std::string names;
-  for (const auto& column : others) {
-    names += (names.empty() ? "" : ", ") + column;
-  }
-  tell_line(fmt::format("{}, other than stored in {}: {}.", again, names,
-                        stored_version == version ? fmt::format("both by solver {}", version)
-                                                  : fmt::format("stored by solver {}, now by {}",
-                                                                stored_version, version)));
+  const auto others = differences_in_words(*stored, solved.point, *solved.result);
+  tell_line(others.empty() ? again + ", same as stored."
+                           : fmt::format("{}, other than stored in {}.", again, others));
 }
 
 /// A failed point is not solved again: where solving kills, it may kill again.

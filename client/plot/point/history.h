@@ -27,6 +27,7 @@ struct PointHistory {
   std::vector<solver::TraceRow> rows = {};
   std::optional<solver::CaseResult> result = {};  ///< none: it has outputs unknown here
   std::vector<FallShape> falls = {};              ///< some of the fall, where they are known
+  std::vector<std::string> remarks = {};          ///< sentences that the picture has below it
 };
 
 inline constexpr double kMicro = 1e6;

@@ -191,6 +191,7 @@ Sheet sheet_of(const PointHistory& history, std::optional<PointPanel> panel) {
   if (shows(PointPanel::kLoop) && history.e_star == 1.0) {
     sheet.notes.push_back("With e* = 1 restitution goes back as compression came.");
   }
+  sheet.notes.insert(sheet.notes.end(), history.remarks.begin(), history.remarks.end());
   return sheet;
 }
 

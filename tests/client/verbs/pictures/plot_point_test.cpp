@@ -47,6 +47,36 @@ TEST_F(PlotPoint, DrawsAPointOfAStudySolvedAgainOrForTheFirstTime) {
   }
 }
 
+TEST_F(PlotPoint, SaysWhereThePointSolvedAgainIsOtherThanStored) {
+  const auto other = plot({"a", "--point", "0"});
+  EXPECT_THAT(other.err, HasSubstr("Solved again, it is other than stored in "));
+  EXPECT_THAT(other.err, HasSubstr("fn_peak_N"));
+  EXPECT_THAT(other.out, HasSubstr("it is other than stored in")) << "in the picture too";
+  const auto not_stored = plot({"a", "--point", "11"});
+  EXPECT_THAT(not_stored.err, Not(HasSubstr("stored")));
+
+  test::run_oblique(folder_, {"run", "--H", "1", "--mu", "0.4", "--e", "1", "--name", "own"});
+  const auto same = plot({"own", "--point", "0"});
+  EXPECT_EQ(same.exit_code, 0) << same.err;
+  EXPECT_THAT(same.err + same.out, Not(HasSubstr("stored")));
+}
+
+TEST_F(PlotPoint, OfAServerHasTheShapesThatAWorkerSends) {
+  const test::Server server(folder_, "oblique.db");
+  const test::Worker worker(folder_, server.worker_url(), {"--threads", "1", "--name", "ann"});
+  const auto ask = [&](const std::string& more) {
+    return plot({"a", "--point", "11", "--panel", "shape", "--server", server.client_url(), more});
+  };
+  test::wait_until("the worker is there", [&] { return ask("--on-worker").exit_code == 0; });
+  const auto there = ask("--on-worker");
+  EXPECT_THAT(there.out, HasSubstr("at touch"));
+  EXPECT_THAT(there.out, HasSubstr("at separation"));
+  EXPECT_THAT(there.out, HasSubstr("with --here those of the fall"));
+  const auto here = ask("--here");
+  EXPECT_THAT(here.out, HasSubstr("drop "));
+  EXPECT_THAT(here.out, Not(HasSubstr("--here")));
+}
+
 TEST_F(PlotPoint, DrawsAPointOfNoStudy) {
   const auto outcome =
       plot({"--H", "1", "--mu", "1.2", "--e", "1", "--panel", "forces", "--tip-mass", "0.001"});
