@@ -4,7 +4,7 @@ import uPlot from "/vendor/uPlot.esm.js";
 import { h } from "/parts/dom.js";
 import { ink } from "/parts/colours.js";
 import { heading, shown } from "/parts/format.js";
-import { tick_text } from "/parts/scale.js";
+import { scale, ticks, tick_text } from "/parts/scale.js";
 
 const kDashes = [[], [7, 3], [2, 3], [9, 3, 2, 3], [14, 4], [4, 2], [1, 4], [12, 3, 3, 3]];
 const kFills = ["bar", "line1"];
@@ -68,7 +68,12 @@ export function line_plot(of) {
   const options = (/** @type {number} */ width) => {
     const axis = { stroke: ink("text"), grid: { stroke: ink("grid"), width: 1 }, ticks: { stroke: ink("weak"), width: 1 },
       font: "12px system-ui, sans-serif", labelFont: "13px system-ui, sans-serif",
-      values: (/** @type {any} */ _, /** @type {number[]} */ splits) => splits.map((v) => (v === null ? "" : tick_text(v))) };
+      // Ticks as those of maps: uPlot's own of logarithmic axes want ends that are powers of ten.
+      splits: (/** @type {any} */ u, /** @type {number} */ i, /** @type {number} */ least, /** @type {number} */ most) => (i === 0
+        ? ticks(scale(least, most, of.x.is_log ?? false), Math.max(u.bbox.width / (window.devicePixelRatio || 1) / 80, 2))
+        : ticks(scale(least, most, of.y.is_log ?? false), Math.max((of.height ?? 240) / 50, 2))),
+      filter: (/** @type {any} */ _, /** @type {number[]} */ splits) => splits,
+      values: (/** @type {any} */ _, /** @type {number[]} */ splits) => splits.map(tick_text) };
     return { width, height: of.height ?? 240, legend: { show: false }, ms: 1,
       cursor: { points: { size: 7 }, drag: { x: true, y: false, setScale: !of.brushed } },
       scales: { x: { time: false, distr: of.x.is_log ? 3 : 1, range }, y: { distr: of.y.is_log ? 3 : 1 } },

@@ -52,7 +52,7 @@ export function drawing_of(view) {
         const look = look_of(picture);
         view.map.show(picture, look, view.marking.marks);
         if (picture.z.is_category) legend.append(categories(picture));
-        else if (!picture.dots || picture.dots.z) legend.append(colour_bar(picture, look));
+        else if (picture.least !== null) legend.append(colour_bar(picture, look));
         legend.append(gaps(picture));
       } else {
         draw_lines(picture);

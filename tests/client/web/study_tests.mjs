@@ -75,6 +75,18 @@ test("maps are zoomed by dragging and by keys, and lines, gathered points and hi
   await page.close();
 });
 
+test("logarithmic axes of lines and bars are drawn, whatever their ends are", async () => {
+  for (const view of ["#/study/1?pic=histogram&x=mu&xlog=1", "#/study/1?pic=lines&y=e&xlog=1&ylog=1", "#/study/4?pic=histogram&x=mu&xlog=1"]) {
+    const page = await browser.open(view);
+    const inked = () => {
+      const canvas = document.querySelector(".uplot canvas");
+      return canvas && new Set(new Uint32Array(canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data.buffer)).size > 5;
+    };
+    await until(page, inked);
+    await page.close();
+  }
+});
+
 test("what lies between the cells of a map is solved while one looks, and is kept as a study", async () => {
   const page = await study();
   await page.click(".finer");
