@@ -14,6 +14,19 @@ export function scale(from, to, is_log) {
   return { from, to, is_log, place: (v) => (inner(v) - a) / width, value: (p) => outer(a + p * width) };
 }
 
+/** The least and the most; null: there is none. Columns may be longer than a call has arguments. @param {ArrayLike<number | null>} values @returns {[number | null, number | null]} */
+export function ends_of(values) {
+  let least = /** @type {number | null} */ (null);
+  let most = /** @type {number | null} */ (null);
+  for (let i = 0; i < values.length; ++i) {
+    const value = values[i];
+    if (value === null || Number.isNaN(value)) continue;
+    least = least === null ? value : Math.min(least, value);
+    most = most === null ? value : Math.max(most, value);
+  }
+  return [least, most];
+}
+
 /** The nearest of 1, 2, 5 times a power of ten. @param {number} rough */
 function nice(rough) {
   const power = 10 ** Math.floor(Math.log10(rough));
@@ -25,7 +38,9 @@ function nice(rough) {
 export function ticks(of, wanted) {
   const least = Math.min(of.from, of.to);
   const most = Math.max(of.from, of.to);
-  if (!(most > least)) return [least];
+  const wide = most - least;
+  // Steps of a range of a few ulps would not move on.
+  if (!(wide < Infinity && wide > 1e-12 * Math.max(Math.abs(least), Math.abs(most)))) return [least];
   if (of.is_log && most / least >= 8) {
     const decades = Math.log10(most / least);
     const each = decades > wanted ? [1] : decades > wanted / 3 ? [1, 3] : [1, 2, 5];
@@ -39,7 +54,7 @@ export function ticks(of, wanted) {
     }
     return found;
   }
-  const step = nice((most - least) / Math.max(wanted, 1));
+  const step = nice(wide / Math.max(wanted, 1));
   const found = [];
   for (let i = Math.ceil(least / step - 1e-9); i * step <= most + step * 1e-9; ++i) {
     found.push(Number((i * step).toPrecision(12)));

@@ -3,6 +3,7 @@
 import { h, named, picker } from "/parts/dom.js";
 import { ink } from "/parts/colours.js";
 import { shown } from "/parts/format.js";
+import { ends_of } from "/parts/scale.js";
 import { arrow, begin, draw_ground, draw_length, kHeight, length_text } from "./strokes.js";
 
 const kEnlargements = ["1", "10", "30", "100"];
@@ -38,7 +39,15 @@ export function finger(trace) {
   const ft = trace.column("ft_N");
   const rest = trace.nodes(0);
   const ground = -trace.head.H;
-  const largest = Math.max(1e-9, ...fn, ...Array.from(ft, Math.abs));
+  /** From where to where some columns reach. @param {...ArrayLike<number>} columns */
+  const span = (...columns) => {
+    const ends = columns.flatMap((column) => ends_of(column).map((end) => end ?? 0));
+    return [Math.min(...ends), Math.max(...ends)];
+  };
+  const largest = Math.max(1e-9, ...span(fn, ft).map(Math.abs));
+  // All places of tip and P during the contact.
+  const [x0, x1] = span(x, xP);
+  const [y0, y1] = span(y, [ground]);
   const fall = trace.fall.rows > 0 ? { x: trace.fall.column("x_m"), y: trace.fall.column("y_m"), v: trace.fall.column("vn_m_s") } : { x: [], y: [], v: [] };
   const box = reach_of(trace, ground);
 
@@ -94,9 +103,6 @@ export function finger(trace) {
       c.fillText(`falls: the tip is ${length_text(Math.max(fall.y[falling] - ground, 0))} above the ground`, 10, 10);
       return;
     }
-    // All places of tip and P during the contact fit in.
-    const [x0, x1] = [Math.min(...x, ...xP), Math.max(...x, ...xP)];
-    const [y0, y1] = [Math.min(...y, ground), Math.max(...y, ground)];
     const metres_per_px = Math.max((x1 - x0) / (width * 0.55), (y1 - y0) / (kHeight * 0.4), 1e-9);
     const px = (/** @type {number} */ v) => width / 2 + (v - (x0 + x1) / 2) / metres_per_px;
     const level = kHeight * 0.6;

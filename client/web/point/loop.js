@@ -3,7 +3,7 @@
 import { h } from "/parts/dom.js";
 import { ink } from "/parts/colours.js";
 import { heading } from "/parts/format.js";
-import { scale, ticks, tick_text } from "/parts/scale.js";
+import { ends_of, scale, ticks, tick_text } from "/parts/scale.js";
 
 const kMargin = { left: 66, right: 12, top: 8, bottom: 44 };
 const kHeight = 260;
@@ -19,8 +19,9 @@ export function loop_plot(title, x, y, colour) {
   const place = h("div", { class: "plot loop" }, canvas);
   let at = 0;
   const ends = (/** @type {Float64Array} */ values) => {
-    let least = Math.min(0, ...values);
-    let most = Math.max(0, ...values);
+    const [low, high] = ends_of(values);
+    const least = Math.min(0, low ?? 0);
+    let most = Math.max(0, high ?? 0);
     if (least === most) most = least + 1;
     const room = (most - least) * 0.04;
     return scale(least - room, most + room, false);

@@ -43,27 +43,29 @@ export function usual_axes(block) {
   return [x, others.includes("H") ? "H" : others[0] ?? ""];
 }
 
+const kOfGrids = ["map", "lines"];
+const kPictures = [...kOfGrids, "gathered", "histogram"];
+
 /** Fills in what an address leaves open, and mends what does not fit the study. @param {URLSearchParams} fields @param {any} study */
 export function fill_in(fields, study) {
   const is = (/** @type {string} */ name) => fields.get(name) ?? "";
   const numbers = study.columns.filter((/** @type {any} */ c) => c.picture === "numbers");
   const usual = usual_block(study.blocks);
+  if (!kPictures.includes(is("pic")) || (kOfGrids.includes(is("pic")) && usual < 0)) fields.delete("pic");
   if (!is("pic")) fields.set("pic", usual >= 0 ? (varying(study.blocks[usual]).length > 1 ? "map" : "lines") : "gathered");
-  if (is("pic") === "map" || is("pic") === "lines") {
-    const wanted = Number(is("block") || usual);
-    const block = study.blocks[wanted];
-    if (block && varying(block).length > 0) {
-      fields.set("block", String(wanted));
-      const keys = varying(block).map((a) => a.key);
-      const [x, y] = usual_axes(block);
-      if (!keys.includes(is("x"))) fields.set("x", x);
-      if (is("y") && !keys.includes(is("y"))) fields.delete("y");
-      if (is("y") === is("x")) fields.delete("y");
-      if (!is("y") && is("pic") === "map") {
-        const other = [y, ...keys].find((key) => key && key !== is("x"));
-        if (other) fields.set("y", other);
-        else fields.set("pic", "lines");
-      }
+  if (kOfGrids.includes(is("pic"))) {
+    const asked = study.blocks[Number(is("block") || usual)];
+    const block = asked && varying(asked).length > 0 ? asked : study.blocks[usual];
+    fields.set("block", String(study.blocks.indexOf(block)));
+    const keys = varying(block).map((a) => a.key);
+    const [x, y] = usual_axes(block);
+    if (!keys.includes(is("x"))) fields.set("x", x);
+    if (is("y") && !keys.includes(is("y"))) fields.delete("y");
+    if (is("y") === is("x")) fields.delete("y");
+    if (!is("y") && is("pic") === "map") {
+      const other = [y, ...keys].find((key) => key && key !== is("x"));
+      if (other) fields.set("y", other);
+      else fields.set("pic", "lines");
     }
   } else {
     const has = (/** @type {string} */ name) => numbers.some((/** @type {any} */ c) => c.name === name);

@@ -23,8 +23,9 @@ export function drawing_of(view) {
   }
   /** @param {import("./asked/picture.js").Picture} picture @returns {import("./drawn/map.js").Look} */
   function look_of(picture) {
-    let from = view.is("from") === "" ? picture.least ?? 0 : Number(view.is("from"));
-    let to = view.is("to") === "" ? picture.most ?? 1 : Number(view.is("to"));
+    const told = (/** @type {string} */ name, /** @type {number} */ usual) => (view.is(name) !== "" && Number.isFinite(Number(view.is(name))) ? Number(view.is(name)) : usual);
+    let from = told("from", picture.least ?? 0);
+    let to = told("to", picture.most ?? 1);
     if (to < from) [from, to] = [to, from];
     return { colours: palette(view.is("pal") || "viridis"), from, to, z_log: view.is("zlog") !== "" && from > 0,
       x_log: view.is("xlog") !== "", y_log: view.is("ylog") !== "" };

@@ -1,7 +1,8 @@
 // @ts-check
 // Single points over two columns, where they are few.
+import { ends_of } from "/parts/scale.js";
 import { joined, within } from "../conditions.js";
-import { ends_of, rows, steps } from "./picture.js";
+import { rows, steps } from "./picture.js";
 
 /** More points than that are gathered in bins. */
 export const kMostDots = 20_000;

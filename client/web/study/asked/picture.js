@@ -1,5 +1,6 @@
 // @ts-check
 // Pictures as the server gives them, in one form for the map, the lines and the bars.
+import { ends_of } from "/parts/scale.js";
 import { json, numbers } from "/server.js";
 
 /**
@@ -89,19 +90,6 @@ export function steps(name, unit, least, most, bins, is_log) {
   const at = (/** @type {number} */ i) => outer(from + (width * i) / bins);
   const edges = Array.from({ length: bins + 1 }, (_, i) => (i === 0 ? least : i === bins ? most : at(i)));
   return { name, unit, values: Float64Array.from({ length: bins }, (_, i) => at(i + 0.5)), edges, is_whole: true };
-}
-
-/** @param {ArrayLike<number | null>} values @returns {[number | null, number | null]} */
-export function ends_of(values) {
-  let least = /** @type {number | null} */ (null);
-  let most = /** @type {number | null} */ (null);
-  for (let i = 0; i < values.length; ++i) {
-    const value = values[i];
-    if (value === null || Number.isNaN(value)) continue;
-    least = least === null ? value : Math.min(least, value);
-    most = most === null ? value : Math.max(most, value);
-  }
-  return [least, most];
 }
 
 /**

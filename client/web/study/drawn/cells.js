@@ -82,7 +82,7 @@ export function draw_dots(context, area, picture, look, x, y, marked) {
   const n = dots.points.length;
   const radius = n < 400 ? 4 : n < 4000 ? 2.6 : 1.6;
   const of_z = scale(look.from, look.to, look.z_log);
-  const plain = ink("bar");
+  const [plain, weak, text] = ["bar", "weak", "text"].map(ink);
   const place = (/** @type {number} */ i) => [area.x + x.scale.place(dots.x[i]) * area.w, area.y + (1 - y.scale.place(dots.y[i])) * area.h];
   context.save();
   context.beginPath();
@@ -90,7 +90,7 @@ export function draw_dots(context, area, picture, look, x, y, marked) {
   context.clip();
   const colour = (/** @type {number} */ i) => {
     const value = dots.z?.[i];
-    return !dots.z ? plain : value === null || value === undefined ? ink("weak") : css_colour(look.colours, colour_of(of_z, value));
+    return !dots.z ? plain : value === null || value === undefined ? weak : css_colour(look.colours, colour_of(of_z, value));
   };
   // What is marked lies above the others, which step back.
   for (const is_marked of marked ? [false, true] : [false]) {
@@ -103,7 +103,7 @@ export function draw_dots(context, area, picture, look, x, y, marked) {
       context.arc(px, py, is_marked ? radius + 1 : radius, 0, 2 * Math.PI);
       context.fill();
       if (!is_marked) continue;
-      context.strokeStyle = ink("text");
+      context.strokeStyle = text;
       context.lineWidth = 1.2;
       context.stroke();
     }

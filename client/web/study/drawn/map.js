@@ -157,11 +157,12 @@ export class MapCanvas {
 
   /** @param {[number, number] | null} cell */
   hover(cell) {
-    if (String(cell) !== String(this.hovered)) {
+    const is_other = String(cell) !== String(this.hovered);
+    if (is_other) {
       this.hovered = cell;
       this.on.hover(cell);
     }
-    this.draw_top();
+    if (is_other || this.drag) this.draw_top();
   }
 
   /** @param {number} left @param {number} top @returns {[number, number] | null} */
