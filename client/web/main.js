@@ -7,7 +7,8 @@ import { overview } from "/overview.js";
 /**
  * @typedef {object} Place what an address says
  * @property {URLSearchParams} fields
- * @property {(fields: URLSearchParams) => void} keep writes them into the address
+ * @property {(fields: URLSearchParams) => void} keep writes them into the address, soon
+ * @property {(address: string) => void} go to another view, so that this one can be come back to
  * @property {boolean} may_change
  * @property {() => any} now the last overview, or null
  * @property {(links: (string | Node)[]) => void} trail what stands beside the name
@@ -28,6 +29,29 @@ let may_change = false;
 /** How views were left. @type {Map<string, string>} */
 const left = new Map();
 
+/** Browsers refuse addresses that change more than some hundred times in ten seconds. */
+const kWriteAgain_ms = 150;
+/** The address that this view is to have; empty: it has it. */
+let wanted = "";
+let later = 0;
+const path_of = (/** @type {string} */ address) => address.replace(/^#/, "").split("?", 1)[0];
+
+function write() {
+  if (wanted === "" || path_of(wanted) !== path_of(location.hash)) return;
+  try {
+    history.replaceState(null, "", wanted);
+    wanted = "";
+  } catch { /* too often for this browser: a little later */ }
+}
+function write_soon() {
+  if (later) return;
+  write();
+  later = setTimeout(() => {
+    later = 0;
+    if (wanted !== "") write_soon();
+  }, kWriteAgain_ms);
+}
+
 function links(/** @type {(string | Node)[]} */ parts) {
   trail.replaceChildren(...parts.flatMap((part) => [h("span", { "aria-hidden": "true" }, "/"), part]));
   const last = parts.at(-1);
@@ -38,14 +62,22 @@ async function show() {
   const mine = ++turn;
   shown.close?.();
   shown = {};
+  wanted = "";
   const [path, query] = location.hash.replace(/^#/, "").split("?", 2);
   const root = h("div", {});
   /** @type {Place} */
-  const place = { fields: new URLSearchParams(query ?? ""), may_change, now: () => now, trail: links,
+  const place = { fields: new URLSearchParams(query ?? ""), may_change, now: () => now,
+    // Answers may come when another view is shown.
+    trail: (parts) => { if (mine === turn) links(parts); },
     last: (of) => left.get(of) ?? `#${of}`,
     keep: (fields) => {
-      history.replaceState(null, "", `#${path}?${fields}`);
-      left.set(path, location.hash);
+      if (mine !== turn) return;
+      left.set(path, wanted = `#${path}?${fields}`);
+      write_soon();
+    },
+    go: (address) => {
+      write();
+      location.hash = address;
     } };
   left.set(path, location.hash);
   links([]);
@@ -82,8 +114,13 @@ try {
       shown.take?.(told);
     }, (text) => { pace.textContent = text; });
     addEventListener("hashchange", show);
-    // Drawings have the colours of when they were drawn.
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", show);
+    // Links, and what copies the address, find it written.
+    document.addEventListener("click", write, { capture: true });
+    // Drawings have the colours of when they were drawn; forms are left as people filled them.
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+      write();
+      if (location.hash.startsWith("#/study/")) show();
+    });
     await show();
   } else {
     view.replaceChildren(h("p", {}, here.how_to_enter));

@@ -48,7 +48,7 @@ export function choice_of(view) {
     /** @param {[number, number]} cell */
     open(cell) {
       const point = (map.chosen_point !== null && String(cell) === String(map.chosen) ? map.chosen_point : view.picture?.point(...cell)) ?? null;
-      if (point !== null) location.hash = `#/study/${view.shown_study}/point/${point}`;
+      if (point !== null) view.place.go(`#/study/${view.shown_study}/point/${point}`);
     },
     /** Marks a point of the study where the picture has it. @param {number} point */
     choose_point(point) {
