@@ -103,7 +103,7 @@ export function condition_fields(view) {
     of.said.textContent = sentence;
   };
   /** Shows what the address says. @param {boolean} [is_again] results came in between */
-  const tell = (is_again = false) => { last_told = tell_both(is_again); };
+  const tell = (is_again = false) => (last_told = tell_both(is_again));
   async function tell_both(/** @type {boolean} */ is_again) {
     for (const [name, one] of /** @type {["where" | "mark", typeof where][]} */ ([["where", where], ["mark", mark]])) {
       if (document.activeElement !== one.input || !is_again) one.input.value = view.is(name);

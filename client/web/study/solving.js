@@ -9,8 +9,6 @@ export function solving_panel(view) {
   /** @type {AbortController | null} */
   let stop = null;
   let id = 0;
-  /** A point of the study, whose model is taken. */
-  let near = -1;
 
   function end() {
     stop?.abort();
@@ -41,7 +39,6 @@ export function solving_panel(view) {
   async function solve(part) {
     const { picture } = view;
     if (!picture) return;
-    if (near < 0) near = picture.head.first_point;
     view.stop_asking();
     end();
     const mine = stop = new AbortController();
@@ -54,7 +51,7 @@ export function solving_panel(view) {
     view.choice.none();
     offer();
     try {
-      const wanted = { study: view.study.id, block: view.block, near, z: view.is("z"), ranges, held, where: view.is("where") };
+      const wanted = { study: view.study.id, block: view.block, z: view.is("z"), ranges, held, where: view.is("where") };
       for await (const step of finer(wanted, mine.signal, view.unit_of)) {
         if (mine.signal.aborted) return;
         id = step.id;

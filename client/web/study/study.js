@@ -44,7 +44,14 @@ export class StudyView {
     this.asked = null;
     /** @type {Picture | null} */
     this.picture = null;
+    this.wants_more = false;
+    /** When the last refresh came to its end. */
     this.loaded_ms = 0;
+    /** The timer of the next refresh; 0: none. */
+    this.later = 0;
+    this.is_refreshing = false;
+    this.has_moved = false;
+    this.is_closed = false;
     fill_in(this.fields, this.study);
   }
 
@@ -116,13 +123,13 @@ export class StudyView {
   }
 
   close() {
+    this.is_closed = true;
     this.solving.end();
     this.stop_asking();
     this.table.close();
     this.conditions.close();
     this.map.close();
     this.drawing.end();
-    clearTimeout(this.later);
   }
 
   /** @param {any} now */
@@ -130,14 +137,20 @@ export class StudyView {
     this.standing.take(now);
   }
 
-  /** Points were solved since. */
+  /** Points were solved since. Where answers take longer than points one refresh ends before the next begins, or none would end. */
   #look_again() {
-    if (this.solving.is_on) return;
-    clearTimeout(this.later);
-    this.later = setTimeout(() => {
-      this.load();
-      this.conditions.tell(true);
-      this.table.again();
+    if (this.is_closed || this.solving.is_on) return;
+    this.has_moved = true;
+    if (this.later || this.is_refreshing) return;
+    this.later = setTimeout(async () => {
+      this.later = 0;
+      this.has_moved = false;
+      this.is_refreshing = true;
+      await Promise.allSettled([this.load(), this.conditions.tell(true), this.table.again()]);
+      await this.marked;
+      this.is_refreshing = false;
+      this.loaded_ms = performance.now();
+      if (this.has_moved) this.#look_again();
     }, Math.max(kLookAgain_ms - (performance.now() - this.loaded_ms), 0));
   }
 
@@ -162,6 +175,9 @@ export class StudyView {
   }
 
   stop_asking() {
+    clearTimeout(this.later);
+    this.later = 0;
+    this.has_moved = this.wants_more = false;
     this.asked?.abort();
     this.marking.stop();
   }
@@ -207,7 +223,7 @@ export class StudyView {
     this.drawing.draw();
     this.choice.again();
     this.solving.offer();
-    this.marking.load();
+    this.marked = this.marking.load();
     show_takeaways(this);
   }
 

@@ -33,7 +33,10 @@ export function row_table(of) {
   let asked = null;
   /** How many meet the filter; null: not known. @type {number | null} */
   let total = null;
+  /** The filter that it is of. */
   let counted = "\0";
+  /** Other points have results since. */
+  let is_old = false;
   let chosen = -1;
   /** @type {number[]} */
   let points_here = [];
@@ -57,11 +60,11 @@ export function row_table(of) {
 
   async function count_rows(/** @type {AbortSignal} */ signal) {
     const where = condition();
-    if (counted === where) return;
-    total = null;
+    if (counted === where && !is_old) return;
     const answer = await rows(of.study, { where, select: "count(*)", limit: 1 }, signal);
     total = Number(answer.rows[0]?.[0] ?? 0);
     counted = where;
+    is_old = false;
   }
 
   function head(/** @type {any} */ answer) {
@@ -79,6 +82,10 @@ export function row_table(of) {
     const mine = asked = new AbortController();
     const columns = of.columns();
     const where = condition();
+    if (counted !== where) {
+      total = null;
+      counted = "\0"; // counting may be given up
+    }
     only.hidden = of.marked() === "";
     file.href = rows_path(of.study, { where, order: of.order() || "point", select: columns.join(","), limit: kMostInFile, format: "csv" });
     try {
@@ -95,7 +102,7 @@ export function row_table(of) {
       })));
       points_here = some.map((/** @type {any[]} */ row) => row[0]);
       mark();
-      mark_rows(mine.signal).catch(() => {});
+      const marked = mark_rows(mine.signal).catch(() => {});
       back.disabled = page === 0;
       next.disabled = !has_more || first + 2 * kPage > kDeepest;
       const range = some.length > 0 ? `${count(first + 1)} to ${count(first + some.length)}` : "None";
@@ -109,6 +116,7 @@ export function row_table(of) {
       say();
       await count_rows(mine.signal);
       say();
+      await marked;
     } catch (error) {
       if (mine.signal.aborted) return;
       table.replaceChildren(table.caption ?? "");
@@ -134,9 +142,9 @@ export function row_table(of) {
 
   return { element, load, begin, condition,
     /** Other points have results now. */
-    again() {
-      counted = "\0";
-      if (!element.contains(document.activeElement)) load();
+    async again() {
+      is_old = true;
+      if (!element.contains(document.activeElement)) await load();
     },
     /** Marks the row of a point. @param {number} point */
     choose(point) {

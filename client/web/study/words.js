@@ -1,6 +1,6 @@
 // @ts-check
 // Pictures in words and numbers.
-import { count, shown } from "/parts/format.js";
+import { count, csv_line, shown } from "/parts/format.js";
 import { kMostDots } from "./asked/dots.js";
 
 /** @typedef {import("./asked/picture.js").Picture} Picture */
@@ -45,12 +45,12 @@ export function sentence(picture, [column, row]) {
 export function cells_csv(picture) {
   if (picture.dots) return dots_csv(picture, picture.dots);
   const nx = picture.x.values.length;
-  const lines = [[picture.x.name, ...(picture.y.name ? [picture.y.name] : []), picture.z.name, "point"].join(",")];
+  const lines = [csv_line([picture.x.name, ...(picture.y.name ? [picture.y.name] : []), picture.z.name, "point"])];
   for (let cell = 0; cell < picture.values.length; ++cell) {
     const column = cell % nx;
     const row = Math.floor(cell / nx);
     const value = picture.why_empty(cell) ? "" : picture.z.is_category ? picture.dictionary[picture.values[cell]].text : picture.values[cell];
-    lines.push([picture.x.values[column], ...(picture.y.name ? [picture.y.values[row]] : []), value, picture.point(column, row) ?? ""].join(","));
+    lines.push(csv_line([picture.x.values[column], ...(picture.y.name ? [picture.y.values[row]] : []), value, picture.point(column, row) ?? ""]));
   }
   return lines.join("\r\n") + "\r\n";
 }

@@ -1,9 +1,8 @@
 // Conditions of the query language: what is shown, and what is marked.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { browser, drag, kMany, kMap, kScattered, study, text_of, until, write } from "./here.mjs";
+import { browser, drag, kMany, kMap, kScattered, kWhere, study, text_of, until, write } from "./here.mjs";
 
-const kWhere = ".conditions > div:first-child input";
 const kMark = ".marks input";
 const field = (page, name) => page.evaluate((wanted) => new URLSearchParams(location.hash.split("?")[1]).get(wanted), name);
 const rows = (page, query) => page.evaluate(async (asked) => (await (await fetch(`/api/studies/${asked.id}/rows?${new URLSearchParams(asked.of)}`)).json()).rows, query);
@@ -111,4 +110,10 @@ test("few points are drawn one by one, and chosen by pointing at them; many are 
   await write(many, kWhere, "mu < 0.5");
   await until(many, () => document.querySelector(".facts").textContent.includes("each drawn"));
   await many.close();
+  // Of a part that is zoomed into only its own points are asked for.
+  const part = await study(`#/study/${kScattered}?pic=gathered&x=mu&y=H&x0=0.5&x1=1&mark=e+%3E+0.5`);
+  await until(part, () => document.querySelector("[data-marks]"));
+  assert.equal(await part.evaluate(() => performance.getEntriesByType("resource").map((one) => new URL(one.name).searchParams)
+    .find((asked) => asked.get("select") === "point").get("where")), "e > 0.5 AND mu >= 0.5 AND mu <= 1");
+  await part.close();
 });

@@ -7,6 +7,7 @@ export { text_of, until } from "./browser.mjs";
 export const server = new Server(join(process.env.OBLIQUE_BIN, "oblique"));
 export const browser = new Browser();
 export const kMap = ".map canvas[tabindex]";
+export const kWhere = ".conditions > div:first-child input";
 
 /** Studies by their numbers: a grid, scattered points, more of these than are drawn one by one, a single point. */
 export const kGrid = 1;

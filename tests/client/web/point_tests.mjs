@@ -64,6 +64,16 @@ test("a point shows its numbers and where they come from, and its plots are read
   await page.close();
 });
 
+test("loops of more instants than a call has arguments are drawn", async () => {
+  const page = await point({ motion: "reduce" });
+  assert.equal(await page.evaluate(async () => {
+    const { loop_plot } = await import("/point/loop.js");
+    const long = { name: "x", unit: "m", values: Float64Array.from({ length: 300_000 }, (_, i) => i) };
+    return loop_plot("long", long, long, 0).element.tagName;
+  }), "FIGURE");
+  await page.close();
+});
+
 test("who wants little motion sees the finger move only when asked", async () => {
   const page = await point({ motion: "reduce" });
   const released = await time(page);

@@ -1,7 +1,7 @@
 // A study: its map, its other pictures, its rows.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { browser, kMap, server, study, text_of, until } from "./here.mjs";
+import { browser, kMap, kWhere, server, study, text_of, until, write } from "./here.mjs";
 
 test("a map shows its cells; pointing at one tells its value, a click chooses it, two open its point", async () => {
   const page = await study();
@@ -89,7 +89,15 @@ test("logarithmic axes of lines and bars are drawn, whatever their ends are", as
 
 test("what lies between the cells of a map is solved while one looks, and is kept as a study", async () => {
   const page = await study();
-  await page.click(".finer");
+  // Whatever is asked for when it begins does not end it.
+  await page.evaluate(() => {
+    const slider = document.querySelector(".sliders input");
+    for (const value of ["1", "2", "1"]) {
+      slider.value = value;
+      slider.dispatchEvent(new Event("input"));
+    }
+    document.querySelector(".finer").click();
+  });
   await until(page, () => document.querySelector(".facts").textContent.match(/(\d+) × \1 cells, [1-9]/));
   await until(page, () => document.querySelector(".facts").textContent.includes("129 × 129"));
   await page.type('[aria-label^="Name under which"]', "kept");
@@ -128,5 +136,112 @@ test("all modules that a study's map needs are asked for at once, and no others"
     return [links.sort(), [...found].sort()];
   });
   assert.deepEqual(preloaded, needed);
+  await page.close();
+});
+
+test("addresses that do not fit a study, or have numbers that are none, show what is usual there", async () => {
+  for (const [view, picture] of [["1?pic=map&block=99", "map"], ["1?pic=nothing", "map"], ["2?pic=map", "gathered"],
+    ["1?pic=map&zlog=1&from=1&to=Infinity", "map"]]) {
+    const page = await study(`#/study/${view}`);
+    assert.equal(await page.$eval(".controls select", (one) => one.value), picture, view);
+    assert.equal(await text_of(page, "p.said:not([id])"), "", view);
+    await page.close();
+  }
+});
+
+test("a slider writes the address a few times, however fast it is dragged, and its last place at last", async () => {
+  const page = await study();
+  const written = await page.evaluate(async () => {
+    const real = history.replaceState.bind(history);
+    let times = 0;
+    history.replaceState = (...given) => {
+      ++times;
+      real(...given);
+    };
+    const slider = document.querySelector(".sliders input");
+    for (let i = 0; i <= 300; ++i) {
+      slider.value = String(i % 3);
+      slider.dispatchEvent(new Event("input"));
+    }
+    slider.value = "2";
+    slider.dispatchEvent(new Event("input"));
+    document.querySelector("h2.name").click();  // any click finds it written
+    return [times, location.hash];
+  });
+  assert.ok(written[0] <= 3, `${written[0]} times`);
+  assert.match(written[1], /at=e%402/);
+  await page.close();
+});
+
+test("a view that was left changes neither the address nor the name of the next", async () => {
+  const page = await browser.open("#/");
+  await page.waitForSelector("table");
+  await page.evaluate(async () => {
+    const real = window.fetch;
+    window.fetch = async (path, how) => {
+      const answer = await real(path, how);
+      if (path === "/api/studies/1") await new Promise((go_on) => setTimeout(go_on, 300));
+      return answer;
+    };
+    location.hash = "#/study/1";
+    await new Promise((go_on) => setTimeout(go_on, 100));
+    location.hash = "#/new";
+    await new Promise((go_on) => setTimeout(go_on, 600));
+  });
+  assert.deepEqual(await page.evaluate(() => [location.hash, document.title]), ["#/new", "new study – oblique"]);
+  await page.close();
+});
+
+test("how many rows there are is told again after a condition was given up while it was counted", async () => {
+  const page = await study();
+  await until(page, () => document.querySelector(".rows p[role=status]").textContent === "1 to 25 of 252 rows.");
+  await page.evaluate(() => {
+    const real = window.fetch;
+    window.fetch = async (path, how) => {
+      if (String(path).includes("count")) await new Promise((go_on) => setTimeout(go_on, 500));
+      return real(path, how);
+    };
+  });
+  await write(page, kWhere, "mu > 1");
+  await until(page, () => document.querySelector(".rows p[role=status]").textContent === "1 to 25.");
+  await write(page, kWhere, "");
+  await until(page, () => document.querySelector(".rows p[role=status]").textContent === "1 to 25 of 252 rows.");
+  await page.close();
+});
+
+test("what is solved between the cells of a block has that block's model", async () => {
+  const page = await browser.open("#/");
+  const id = await page.evaluate(async () => {
+    const axes = [{ key: "H", values: [0.5, 1] }, { key: "mu", values: [0.5, 1] }, { key: "e", values: [1] }];
+    const body = { name: "blocks", recipe: { blocks: [{ axes: [{ key: "k", values: [1e7] }, ...axes] }, { axes: [{ key: "k", values: [3e7] }, ...axes] }] } };
+    const made = await fetch("/api/studies", { method: "POST", body: JSON.stringify(body), headers: { "Content-Type": "application/json" } });
+    return (await made.json()).id;
+  });
+  await until(page, async (study) => (await (await fetch(`/api/studies/${study}/rows?select=point&limit=9`)).json()).rows.length === 8, id);
+  await page.close();
+  const map = await study(`#/study/${id}?pic=map&block=0`);
+  const solved_by = async () => {
+    const asked = map.waitForRequest((one) => one.url().endsWith("/api/look"));
+    await map.click(".finer");
+    const { model, blocks } = JSON.parse((await asked).postData()).recipe;
+    return blocks[0].axes.find((one) => one.key === "k")?.values?.[0] ?? model.k;
+  };
+  assert.equal(await solved_by(), 1e7);
+  await map.evaluate(() => [...document.querySelectorAll("button")].find((one) => one.textContent === "Back to the study").click());
+  await map.waitForSelector(".finer");
+  await map.evaluate(() => { location.hash = location.hash.replace("block=0", "block=1"); });
+  await map.waitForSelector(".finer");
+  assert.equal(await solved_by(), 3e7);
+  await map.close();
+});
+
+test("ranges of a few ulps and without an end have one tick, texts in CSV are quoted", async () => {
+  const page = await browser.open("#/");
+  const told = await page.evaluate(async () => {
+    const { scale, ticks } = await import("/parts/scale.js");
+    const { csv_line } = await import("/parts/format.js");
+    return [ticks(scale(0.4517539514526256, 0.4517539514526_2565, false), 5), ticks(scale(1, Infinity, true), 5), csv_line([1, "a, \"b\""])];
+  });
+  assert.deepEqual(told, [[0.4517539514526256], [1], '1,"a, ""b"""']);
   await page.close();
 });

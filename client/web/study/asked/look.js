@@ -2,7 +2,7 @@
 // What a study lacks is solved while somebody looks: coarse first, then finer. The server makes a short-lived
 // study of it, that comes before all others and goes when nobody asks for it any more.
 import { change, json } from "/server.js";
-import { slice } from "./picture.js";
+import { rows, slice } from "./picture.js";
 
 /** Each has the values of the one before among its own. */
 const kSides = [33, 65, 129];
@@ -14,13 +14,16 @@ const kModelKeys = { E_Pa: "E_Pa", A: "A_m2", I: "I_m4", rho: "rho_kg_m3", g: "g
   tip_mass: "tip_mass_kg", dt: "dt_s", dt_fall: "dt_fall_s", spectral_radius: "spectral_radius", tolerance: "tolerance" };
 const kIntegrators = ["explicit", "generalized-alpha"];
 
-/** The model of a study, as one of its solved points has it. @param {number} study @param {number} near */
-async function model_of(study, near) {
-  let { row } = await json(`/api/studies/${study}/points/${near}`);
+/**
+ * The model of a block, as one of its solved points has it: others may have axes of the model that it has not.
+ * @param {number} study @param {import("../axes.js").Block} block @param {AbortSignal} signal
+ */
+async function model_of(study, { first_point, points }, signal) {
+  let { row } = await json(`/api/studies/${study}/points/${first_point}`, signal);
   if (!row) {
-    const some = await json(`/api/studies/${study}/rows?select=point&limit=1`);
-    if (some.rows.length === 0) throw new Error("the study has no result yet that tells its model");
-    ({ row } = await json(`/api/studies/${study}/points/${some.rows[0][0]}`));
+    const some = await rows(study, { select: "point", where: `point >= ${first_point} AND point < ${first_point + points}`, limit: 1 }, signal);
+    if (some.rows.length === 0) throw new Error("there is no result yet that tells the model");
+    ({ row } = await json(`/api/studies/${study}/points/${some.rows[0][0]}`, signal));
   }
   const model = Object.fromEntries(Object.entries(kModelKeys).map(([column, key]) => [key, row[column]]));
   return { ...model, lengths_m: row.lengths_m, integrator: Math.max(kIntegrators.indexOf(row.integrator), 0) };
@@ -30,7 +33,6 @@ async function model_of(study, near) {
  * @typedef {object} Wanted
  * @property {number} study
  * @property {import("../axes.js").Block} block
- * @property {number} near a point of the study there
  * @property {string} z
  * @property {Record<string, {from: number, to: number, is_log: boolean}>} ranges of the two axes
  * @property {Record<string, number>} held values of the others
@@ -55,7 +57,8 @@ const rest = (/** @type {number} */ ms) => new Promise((go_on) => setTimeout(go_
  * @returns {AsyncGenerator<{id: number, side: number, is_whole: boolean, picture: import("./picture.js").Picture}>}
  */
 export async function* finer(wanted, signal, unit_of) {
-  const model = await model_of(wanted.study, wanted.near);
+  const model = await model_of(wanted.study, wanted.block, signal);
+  if (signal.aborted) return;
   const [x, y] = Object.keys(wanted.ranges);
   let id = 0;
   for (const side of kSides) {

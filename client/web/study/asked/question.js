@@ -1,9 +1,9 @@
 // @ts-check
 // What the server is asked for a picture, as the address says it.
 import { own_axes } from "../axes.js";
-import { joined } from "../conditions.js";
+import { joined, within } from "../conditions.js";
 import { dots, kMostDots } from "./dots.js";
-import { bins, slice } from "./picture.js";
+import { bins, rows, slice } from "./picture.js";
 
 const kMostCells = 512; // a side of a picture
 /** Of a study that the server does not hold in memory each cell is looked up: some of them come first. */
@@ -81,8 +81,10 @@ export async function ask_marks(view, picture, condition, signal) {
   const where = joined(view.is("where"), condition);
   const size = picture.values.length;
   if (picture.dots) {
-    const { rows } = await import("./picture.js");
-    const answer = await rows(view.study.id, { select: "point", where, limit: 100_000 }, signal);
+    // As few as the picture's own: those of the part that is zoomed into.
+    const { x0, x1, y0, y1 } = ends_of(view);
+    const there = joined(where, within(view.is("x"), x0, x1), within(view.is("y"), y0, y1));
+    const answer = await rows(view.study.id, { select: "point", where: there, limit: kMostDots + 1 }, signal);
     const points = new Set(answer.rows.map((/** @type {number[]} */ row) => row[0]));
     return { cells: new Uint8Array(size), counts: null, points };
   }
