@@ -66,7 +66,8 @@ function live_table(caption, heads) {
         body.replaceChildren(...rows);
         if (focused && body.contains(focused)) focused.focus();
       }
-      for (const id of kept.keys()) if (!lines.some((line) => line.id === id)) kept.delete(id);
+      const there = new Set(lines.map((line) => line.id));
+      for (const id of kept.keys()) if (!there.has(id)) kept.delete(id);
     },
   };
 }

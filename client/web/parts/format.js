@@ -42,3 +42,6 @@ export function time_left(seconds) {
 export function quoted(text) {
   return /^[A-Za-z0-9_.,:=/@%+-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`;
 }
+
+/** A line of a CSV file, without its end. @param {any[]} values */
+export const csv_line = (values) => values.map((value) => (/[",\r\n]/.test(String(value)) ? `"${String(value).replaceAll('"', '""')}"` : value)).join(",");
