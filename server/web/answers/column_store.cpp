@@ -83,6 +83,26 @@ std::vector<PointRun> difference(const std::vector<PointRun>& of,
   return left;
 }
 
+std::optional<std::vector<PointRun>> settled_between(sqlite3* database, std::uint64_t study,
+                                                     std::uint64_t first, std::uint64_t last) {
+  constexpr std::size_t kMostRuns = 20'000;
+  Statement rows(database,
+                 "SELECT first_point, points FROM settled_points WHERE study_id = ?1 AND "
+                 "first_point <= ?3 AND first_point >= coalesce((SELECT max(first_point) FROM "
+                 "settled_points WHERE study_id = ?1 AND first_point <= ?2), 0) "
+                 "ORDER BY first_point LIMIT ?4");
+  rows.bind(1, study);
+  rows.bind(2, first);
+  rows.bind(3, last);
+  rows.bind(4, static_cast<std::uint64_t>(kMostRuns));
+  std::vector<PointRun> runs;
+  while (rows.step()) {
+    const auto begin = static_cast<std::uint64_t>(rows.integer(0));
+    runs.push_back({begin, begin + static_cast<std::uint64_t>(rows.integer(1))});
+  }
+  return runs.size() < kMostRuns ? std::optional(std::move(runs)) : std::nullopt;
+}
+
 StoredColumn::StoredColumn(std::uint64_t study, ColumnSource source, std::uint64_t points)
     : study_(study), source_(std::move(source)), points_(points) {}
 

@@ -7,6 +7,7 @@
 #include <list>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -60,6 +61,11 @@ class StoredColumn {
 /// Runs of points that are in `of` and not in `without`; both rising and apart.
 std::vector<PointRun> difference(const std::vector<PointRun>& of,
                                  const std::vector<PointRun>& without);
+
+/// Runs of settled points, rising, that have points from `first` to `last`, both in. Nothing: there
+/// are so many that finding them helps nobody.
+std::optional<std::vector<PointRun>> settled_between(sqlite3* database, std::uint64_t study,
+                                                     std::uint64_t first, std::uint64_t last);
 
 /// Columns that were looked at last, as far as a bound on memory goes. One that is wanted is read
 /// when nobody waits; meanwhile pictures read their rows by key.

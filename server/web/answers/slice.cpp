@@ -39,6 +39,9 @@ std::vector<float> read_by_key(const AnswerDesk& desk, std::uint64_t study,
     std::sort(order.begin(), order.end(), is_before);
   }
   std::vector<float> values(points.size(), no_result());
+  const auto settled =
+      settled_between(desk.database, study, points[order.front()], points[order.back()]);
+  std::size_t run = 0;
   ColumnReader reader(desk.database, study, source);
   for (std::size_t begin = 0; begin < order.size();) {
     std::size_t end = begin + 1;
@@ -46,6 +49,13 @@ std::vector<float> read_by_key(const AnswerDesk& desk, std::uint64_t study,
       ++end;
     }
     std::size_t next = begin;
+    while (settled && run < settled->size() && (*settled)[run].end <= points[order[begin]]) {
+      ++run;
+    }
+    if (settled && (run == settled->size() || points[order[end - 1]] < (*settled)[run].begin)) {
+      begin = end;  // no row is there, and none is looked for
+      continue;
+    }
     reader.read(points[order[begin]], points[order[end - 1]],
                 [&](std::uint64_t point, float value) {
                   while (next < end && points[order[next]] < point) {

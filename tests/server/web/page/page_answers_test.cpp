@@ -1,6 +1,8 @@
 // What the page asks a whole server with a pretended worker.
+#include <cmath>
 #include <map>
 #include <memory>
+#include <set>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -162,6 +164,36 @@ TEST_F(PageAnswersTest, AStudyOfABillionPointsIsLookedAtLikeASmallOne) {
   EXPECT_EQ(slice.head["nx"], 1000);
   EXPECT_EQ(slice.head["missing"], 1'000'000);
   EXPECT_EQ(status_of_answer(page_.get("/api/studies/1/bins?x=fn_peak_N")), 400);
+}
+
+TEST_F(PageAnswersTest, SolvedPointsAreFoundAmongManyThatAreNot) {
+  submit("wide", protocol::recipe_of(
+                     {{protocol::range("H", 0.1, 1.0, 40), protocol::range("mu", 0.0, 2.0, 40),
+                       protocol::range("e", 0.5, 1.0, 40)}}));
+  solve(200);
+  std::set<std::uint64_t> solved;  // whole batches
+  const json stored = page_.json("/api/studies/1/rows?select=point&limit=64000");
+  for (const json& row : stored["rows"]) {
+    solved.insert(row[0].get<std::uint64_t>());
+  }
+  EXPECT_GE(solved.size(), 200U);
+  EXPECT_LT(solved.size(), 60'000U);
+  for (const std::string view : {"x=e&y=mu&at=H@0", "x=mu&y=e&at=H@0", "x=e&y=mu&at=H@1",
+                                 "x=mu&y=H&at=e@7", "x=e&at=mu@4,H@0", "x=e&at=mu@5,H@0"}) {
+    const Numbers slice = page_.numbers("/api/studies/1/slice?z=fn_peak_N&" + view);
+    const auto nx = slice.head["nx"].get<std::size_t>();
+    const auto ny = slice.head["ny"].get<std::size_t>();
+    const bool is_line = slice.head["y"].is_null();
+    const auto values = slice.read<float>(8 * (nx + (is_line ? 0 : ny)), nx * ny);
+    const auto first = slice.head["first_point"].get<std::uint64_t>();
+    const auto x = slice.head["x"]["stride"].get<std::uint64_t>();
+    const auto y = is_line ? 0 : slice.head["y"]["stride"].get<std::uint64_t>();
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const std::uint64_t point = first + i % nx * x + i / nx * y;
+      EXPECT_EQ(std::isfinite(values[i]), solved.contains(point)) << view << ' ' << point;
+      EXPECT_TRUE(!solved.contains(point) || values[i] == force_of(point)) << view << ' ' << point;
+    }
+  }
 }
 
 TEST_F(PageAnswersTest, ModesAreCodesWithADictionary) {
