@@ -24,11 +24,15 @@ export function picture_fields(view) {
   const is = (/** @type {string} */ name) => view.is(name);
   const kind = is("pic") === "gathered" ? "scatter" : is("pic");
   const [on_grid, has_map] = [kind === "map" || kind === "lines", view.has_map];
-  const at = on_grid ? (view.picture?.head.at ?? []).filter((/** @type {any} */ one) => one.of > 1) : [];
+  const held = on_grid ? view.picture?.head.at ?? [] : [];
+  const at = held.filter((/** @type {any} */ one) => one.of > 1);
+  // Of several blocks each may hold a key at another value, and --at takes one of the first that has it.
+  const has_blocks = view.study.blocks.length > 1;
+  const of_block = has_blocks ? held.map((/** @type {any} */ one) => `${column_of(one.key)} = ${one.value}`) : [];
   const has_range = has_map && is("from") !== "" && is("to") !== "";
   return { kind, z: kind === "histogram" ? "" : is("z"), x: is("x"), y: has_map ? is("y") : "", by: kind === "lines" ? is("y") : "",
-    at: at.map((/** @type {any} */ one) => `${one.key}:${one.value}`).join(","),
-    where: joined(is("where"), ...zoomed(view)),
+    at: has_blocks ? "" : at.map((/** @type {any} */ one) => `${one.key}:${one.value}`).join(","),
+    where: joined(is("where"), ...of_block, ...zoomed(view)),
     xlog: is("xlog"), ylog: kind === "histogram" ? "" : is("ylog"), zlog: has_map ? is("zlog") : "",
     from: has_range ? is("from") : "", to: has_range ? is("to") : "", palette: has_map ? is("pal") : "" };
 }
