@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -46,15 +47,25 @@ std::vector<PlacedPart> placed_parts(const Sheet& sheet, double width, double he
   std::vector<PlacedPart> placed;
   for (std::size_t first = 0; first < sheet.parts.size(); first += columns) {
     const std::size_t end = std::min(first + columns, sheet.parts.size());
+    std::vector<Layout> layouts;
     Size size = room;
     for (std::size_t i = first; i < end; ++i) {
-      size.height = std::max(size.height, layout_of(sheet.parts[i], room).size.height);
+      layouts.push_back(layout_of(sheet.parts[i], room));
+      size.height = std::max(size.height, layouts.back().size.height);
     }
+    double highest = size.height;
     for (std::size_t i = first; i < end; ++i) {
-      placed.push_back({&sheet.parts[i], layout_of(sheet.parts[i], size),
-                        room.width * static_cast<double>(i - first), y});
+      Layout& layout = layouts[i - first];
+      // A part that has the height by itself would grow again, as it grows with what it is asked
+      // for.
+      if (layout.size.height < size.height) {
+        layout = layout_of(sheet.parts[i], size);
+      }
+      highest = std::max(highest, layout.size.height);
+      placed.push_back(
+          {&sheet.parts[i], std::move(layout), room.width * static_cast<double>(i - first), y});
     }
-    y += size.height;
+    y += highest;
   }
   return placed;
 }

@@ -202,6 +202,28 @@ std::string colour_line(const Colours& colours, const TerminalLook& look) {
   return line.text(look.is_plain ? Shading::kNone : look.shading);
 }
 
+/// The text in lines that are at most so long, broken at spaces.
+std::string broken_at(const std::string& text, std::size_t columns) {
+  std::string lines;
+  std::size_t length = 0;
+  for (const auto word : protocol::split(text, ' ')) {
+    // Bytes that go on with a character take no room of their own.
+    const auto letters = static_cast<std::size_t>(std::count_if(
+        word.begin(), word.end(), [](char byte) { return (byte & '\xc0') != '\x80'; }));
+    const bool is_first = length == 0;
+    if (!is_first && length + 1 + letters > columns) {
+      lines += '\n';
+      length = 0;
+    } else if (!is_first) {
+      lines += ' ';
+      ++length;
+    }
+    lines += word;
+    length += letters;
+  }
+  return lines + '\n';
+}
+
 }  // namespace
 
 TerminalLook look_of_standard_output() {
@@ -226,13 +248,16 @@ std::string text_of(const Figure& figure, const TerminalLook& look) {
     after += legend_line(entry, look);
   }
   const auto note = [&look](const std::string& text) {
-    return protocol::visible(look.is_plain ? plain(text) : text) + '\n';
+    return broken_at(protocol::visible(look.is_plain ? plain(text) : text), look.columns);
   };
   for (const auto& text : figure.notes) {
     after += note(text);
   }
   std::string text = note(figure.title) + note(figure.subtitle);
-  const auto taken = static_cast<std::size_t>(std::count(after.begin(), after.end(), '\n')) + 3;
+  const auto lines_in = [](const std::string& lines) {
+    return static_cast<std::size_t>(std::count(lines.begin(), lines.end(), '\n'));
+  };
+  const std::size_t taken = lines_in(text) + lines_in(after) + 1;  // and what follows below
   const std::size_t panels = std::max<std::size_t>(1, figure.panels.size());
   for (const Panel& panel : figure.panels) {
     const std::size_t room = look.lines > taken ? (look.lines - taken) / panels : 0;

@@ -93,5 +93,20 @@ TEST(Terminal, DrawsTheRangeOfColours) {
   EXPECT_THAT(text, HasSubstr("0 .:-=+*oO#@ 2.3e+07  duration of contact [us]"));
 }
 
+TEST(Terminal, BreaksLongSentencesAndLeavesALineForWhatFollows) {
+  Figure figure = test::striped_kinds(40);
+  figure.notes.emplace_back(
+      "A sentence that is longer than forty letters, said in three lines, then.");
+  const TerminalLook look{44, 45, true};
+  const auto text = text_of(figure, look);
+  std::istringstream lines(text);
+  std::size_t count = 0;
+  for (std::string line; std::getline(lines, line); ++count) {
+    EXPECT_LE(line.size(), look.columns) << line;
+  }
+  EXPECT_LT(count, look.lines);
+  EXPECT_THAT(text, HasSubstr("letters, said in"));
+}
+
 }  // namespace
 }  // namespace oblique::client::plot

@@ -1,5 +1,7 @@
 // Several figures in one picture.
 #include <algorithm>
+#include <iterator>
+#include <map>
 #include <regex>
 #include <set>
 #include <string>
@@ -58,6 +60,27 @@ TEST(Sheet, AsATableHasAllPanels) {
     EXPECT_THAT(csv, HasSubstr(heading));
   }
   EXPECT_THAT(csv, HasSubstr("normal force F_n,0.0001,1000\n"));
+}
+
+TEST(Sheet, PartsThatAreHigherThanAskedForEndWhereTheNextBegins) {
+  for (const double width : {320.0, 480.0, 800.0}) {
+    const auto svg = svg_of(sheet_of(test::small_history(), {}), {width, 360.0});
+    const std::string mark = "<g transform=\"translate(";
+    std::map<double, double> lowest_texts;  // of the rows of parts, by where these begin
+    for (auto at = svg.find(mark); at != std::string::npos;) {
+      const auto next = svg.find(mark, at + 1);
+      const std::string part = svg.substr(at, next == std::string::npos ? next : next - at);
+      const double y = std::stod(all_of(part, "translate\\([0-9.]* ([0-9.]*)\\)").front());
+      const std::string drawn = part.substr(0, part.find("\n</g>\n</svg>"));
+      for (const auto& text : all_of(drawn, "<text [^>]* y=\"([0-9.]*)\"")) {
+        lowest_texts[y] = std::max(lowest_texts[y], y + std::stod(text));
+      }
+      at = next;
+    }
+    for (auto row = lowest_texts.begin(); std::next(row) != lowest_texts.end(); ++row) {
+      EXPECT_LE(row->second, std::next(row)->first) << width;
+    }
+  }
 }
 
 }  // namespace
