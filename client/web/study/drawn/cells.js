@@ -33,10 +33,11 @@ function codes(picture, look) {
 
 /**
  * @param {Picture} picture @param {Look} look @param {Cells} x @param {Cells} y @param {Uint8Array | null} marked cells
- * @param {number} width @param {number} height in pixels of the canvas @returns {ImageData}
+ * @param {number} width @param {number} height in pixels of the canvas @param {ImageData | null} last an image that is not needed any more
+ * @returns {ImageData}
  */
-export function cell_image(picture, look, x, y, marked, width, height) {
-  const image = new ImageData(width, height);
+export function cell_image(picture, look, x, y, marked, width, height, last) {
+  const image = last && last.width === width && last.height === height ? last : new ImageData(width, height);
   const pixels = new Uint32Array(image.data.buffer);
   const columns = cell_of_pixels(x, width);
   const lines = cell_of_pixels(y, height).reverse();

@@ -30,6 +30,8 @@ export class MapCanvas {
     this.picture = null;
     /** @type {Look | null} */
     this.look = null;
+    /** The cells as they are drawn. @type {ImageData | null} */
+    this.image = null;
     /** @type {import("../asked/question.js").Marks | null} */
     this.marks = null;
     /** @type {[number, number] | null} */
@@ -77,18 +79,21 @@ export class MapCanvas {
     if (!picture || !look || width < 40) return;
     const height = Math.round(Math.min(Math.max(width * 0.62, 240), 560));
     const ratio = this.ratio = window.devicePixelRatio || 1;
+    const size_px = [Math.round(width * ratio), Math.round(height * ratio)];
     for (const canvas of [this.base, this.top]) {
-      canvas.width = Math.round(width * ratio);
-      canvas.height = Math.round(height * ratio);
+      if (canvas.width === size_px[0] && canvas.height === size_px[1]) continue;  // a new size is a new canvas, which costs
+      [canvas.width, canvas.height] = size_px;
       canvas.style.height = `${height}px`;
     }
     const area = this.area = { x: kMargin.left, y: kMargin.top, w: width - kMargin.left - kMargin.right, h: height - kMargin.top - kMargin.bottom };
     this.x = cells_of(picture.x, look.x_log);
     this.y = cells_of(picture.y, look.y_log);
     const context = this.base.getContext("2d");
+    context.clearRect(0, 0, this.base.width, this.base.height);
     if (!picture.dots) {
       const size = [area.w, area.h].map((side) => Math.max(Math.round(side * ratio), 1));
-      context.putImageData(cell_image(picture, look, this.x, this.y, marks?.cells ?? null, size[0], size[1]), Math.round(area.x * ratio), Math.round(area.y * ratio));
+      this.image = cell_image(picture, look, this.x, this.y, marks?.cells ?? null, size[0], size[1], this.image);
+      context.putImageData(this.image, Math.round(area.x * ratio), Math.round(area.y * ratio));
     }
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     draw_axes(context, area, picture, this.x, this.y);
