@@ -47,11 +47,10 @@ PlotRequest completed(PlotRequest request, const StudyShape& shape) {
   const auto axes = by_preference(shape);
   if (!request.colour.empty() && axes.size() >= 2) {
     request.scatter = fmt::format("{},{}", axes[0]->key, axes[1]->key);
-  } else if (!request.by.empty()) {
-    request.lines = kUsualOutput;
-  } else if (!request.y.empty() || (shape.is_grid && axes.size() >= 2 + request.at.size())) {
+  } else if (request.by.empty() &&
+             (!request.y.empty() || (shape.is_grid && axes.size() >= 2 + request.at.size()))) {
     request.map = kUsualOutput;
-  } else if (shape.is_grid && !axes.empty()) {
+  } else if (!request.by.empty() || (shape.is_grid && !axes.empty())) {
     request.lines = kUsualOutput;
   } else if (axes.size() >= 2) {
     request.scatter = fmt::format("{},{}", axes[0]->key, axes[1]->key);

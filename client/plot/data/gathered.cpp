@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <compare>
 #include <limits>
 #include <map>
+#include <tuple>
 
 namespace oblique::client::plot {
 namespace {
@@ -65,7 +65,9 @@ class CellGatherer {
     std::size_t cell;
     std::uint32_t word;
 
-    auto operator<=>(const WordOfCell&) const = default;
+    bool operator<(const WordOfCell& other) const {
+      return std::tie(cell, word) < std::tie(other.cell, other.word);
+    }
   };
 
   /// The text that each cell has most often; of those that are equally many the first in the

@@ -1,11 +1,11 @@
 #pragma once
 
-#include <compare>
 #include <cstddef>
 #include <cstdint>
 #include <list>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "proto/oblique.pb.h"
@@ -21,7 +21,11 @@ struct TraceKey {
   bool shape = false;  ///< with the positions of the nodes
   bool fall = false;   ///< with rows of the fall
 
-  auto operator<=>(const TraceKey&) const = default;
+  bool operator==(const TraceKey&) const = default;
+  bool operator<(const TraceKey& other) const {
+    return std::tie(study, point, shape, fall) <
+           std::tie(other.study, other.point, other.shape, other.fall);
+  }
 };
 
 /// A trace as it comes in from a worker. What comes is taken for hostile.
