@@ -1,7 +1,7 @@
 // @ts-check
 // Studies and workers, live.
 import { h, save } from "/parts/dom.js";
-import { count, time_left } from "/parts/format.js";
+import { count, csv_line, time_left } from "/parts/format.js";
 import { change, json } from "/server.js";
 
 const kStudiesAtOnce = 200;
@@ -84,8 +84,7 @@ export function progress_of(study) {
 /** @param {any[]} studies */
 function studies_csv(studies) {
   const columns = ["id", "name", "state", "points", "solved", "failed", "points_per_s", "priority", "created_at", "submitted_by"];
-  const cell = (/** @type {any} */ value) => (/[",\r\n]/.test(String(value)) ? `"${String(value).replaceAll('"', '""')}"` : String(value ?? ""));
-  return [columns, ...studies.map((study) => columns.map((name) => study[name]))].map((line) => line.map(cell).join(",")).join("\r\n") + "\r\n";
+  return [columns, ...studies.map((study) => columns.map((name) => study[name]))].map(csv_line).join("\r\n") + "\r\n";
 }
 
 /**
