@@ -110,6 +110,8 @@ Talk PointFilters::talk(std::uint64_t study, std::string condition, std::string 
         std::exchange(coming->is_asked_as_written, true)) {
       return failure(error);
     }
+    coming->chunks = 0;  // what came of the first question is no part of this answer
+    coming->points = std::make_shared<PointSet>();
     return points_that_meet(coming->study, condition);
   };
   return {status_of_number(study), go_on, too_slow(), failed};

@@ -70,7 +70,9 @@ Talk Looks::begin(const HttpQuestion& question) {
                                 {"points", said.points()},
                                 {"settled", said.settled()}});
           },
-          too_slow()};
+          too_slow(),
+          {},
+          true};
 }
 
 std::optional<Talk> Looks::keep(std::uint64_t study, const HttpQuestion& question) {
@@ -92,19 +94,31 @@ std::optional<Talk> Looks::keep(std::uint64_t study, const HttpQuestion& questio
   kept.set_priority(0);
   look->second.seen = Clock::now();
   return Talk{request,
-              [this, study, kept](const ClientReply& reply) -> Talk::Next {
+              [this, study, kept](const ClientReply& reply) mutable -> Talk::Next {
                 if (reply.has_submit()) {
                   return json_answer({{"id", study}, {"name", kept.name()}});
                 }
                 looks_.erase(study);
-                ClientRequest terms;
-                *terms.mutable_submit() = kept;
-                return terms;
+                ClientRequest next;
+                if (reply.has_describe()) {
+                  *kept.mutable_recipe() = reply.describe().recipe();
+                } else if (!kept.has_recipe()) {  // an earlier server made it
+                  next.mutable_describe()->set_study(kept.name());
+                  return next;
+                }
+                *next.mutable_submit() = kept;
+                return next;
               },
-              too_slow()};
+              too_slow(),
+              {},
+              true};
 }
 
 void Looks::add(std::uint64_t study, const protocol::SubmitRequest& request) {
+  // One that had the name before was deleted or renamed by somebody else.
+  std::erase_if(looks_, [&](const auto& look) {
+    return look.first != study && look.second.request.name() == request.name();
+  });
   looks_.insert_or_assign(study, Look{request, Clock::now()});
   while (std::count_if(looks_.begin(), looks_.end(), [](const auto& look) {
            return !look.second.going;
@@ -113,7 +127,7 @@ void Looks::add(std::uint64_t study, const protocol::SubmitRequest& request) {
       return !one.second.going && (other.second.going || one.second.seen < other.second.seen);
     };
     const auto oldest = std::min_element(looks_.begin(), looks_.end(), is_older);
-    drop(oldest->first, oldest->second);
+    drop(oldest->second);
   }
 }
 
@@ -123,10 +137,10 @@ void Looks::seen(std::uint64_t study) {
   }
 }
 
-void Looks::drop(std::uint64_t study, Look& look) {
+void Looks::drop(Look& look) {
   ClientRequest request;
+  // By its name alone: under another one somebody keeps it.
   request.mutable_change()->set_study(look.request.name());
-  request.mutable_change()->set_study_id(study);
   request.mutable_change()->set_change(protocol::STUDY_CHANGE_DELETE);
   look.going = ++last_number_;
   service_.ask(*look.going, std::move(request));
@@ -160,7 +174,7 @@ std::optional<std::chrono::milliseconds> Looks::tick() {
   find_leavings();
   const auto now = Clock::now();
   for (auto look = looks_.begin(); look != looks_.end();) {
-    auto& [study, state] = *look;
+    Look& state = look->second;
     const auto reply = state.going ? service_.reply(*state.going) : std::nullopt;
     if (reply) {
       service_.forget(*std::exchange(state.going, std::nullopt));
@@ -175,7 +189,7 @@ std::optional<std::chrono::milliseconds> Looks::tick() {
     if (reply) {
       state.seen = now;  // it is tried again
     } else if (!state.going && now - state.seen >= kept_) {
-      drop(study, state);
+      drop(state);
     }
     ++look;
   }

@@ -45,7 +45,7 @@ class Looks {
 
   void add(std::uint64_t study, const protocol::SubmitRequest& request);
   void find_leavings();
-  void drop(std::uint64_t study, Look& look);
+  void drop(Look& look);
 
   ServiceLine& service_;
   std::chrono::milliseconds kept_;

@@ -1,6 +1,8 @@
 #include "server/web/page/page.h"
 
+#include <algorithm>
 #include <charconv>
+#include <exception>
 #include <stdexcept>
 #include <string_view>
 #include <utility>
@@ -164,12 +166,33 @@ std::optional<HttpAnswer> Page::answer(const HttpQuestion& question) {
 }
 
 void Page::gone(std::uint64_t number) {
-  const auto known = under_way_.extract(number);
-  if (!known.empty() && known.mapped().talk) {
+  auto known = under_way_.extract(number);
+  if (!known.empty() && known.mapped().talk && known.mapped().talk->must_end) {
+    left_.emplace(number, std::move(*known.mapped().talk));
+  } else if (!known.empty() && known.mapped().talk) {
     at_.service.forget(number);
   } else if (!known.empty()) {
     known.mapped().pool->forget(number);
   }
+}
+
+std::optional<std::chrono::milliseconds> Page::tick() {
+  hear_those_left();
+  const auto looks = looks_.tick();
+  constexpr std::chrono::milliseconds kSoon{100};
+  return left_.empty() ? looks : std::min(looks.value_or(kSoon), kSoon);
+}
+
+/// What comes of them nobody sees.
+void Page::hear_those_left() {
+  std::erase_if(left_, [this](const auto& left) {
+    try {
+      return hear(left.first, left.second).has_value();
+    } catch (const std::exception&) {
+      at_.service.forget(left.first);
+      return true;
+    }
+  });
 }
 
 std::optional<HttpAnswer> Page::begin(const HttpQuestion& question) {
@@ -288,23 +311,31 @@ std::optional<HttpAnswer> Page::go_on(const HttpQuestion& question, UnderWay& un
 }
 
 std::optional<HttpAnswer> Page::go_on_talking(const HttpQuestion& question, UnderWay& under_way) {
-  const Talk& talk = *under_way.talk;
-  while (const auto reply = at_.service.reply(question.number)) {
+  auto next = hear(question.number, *under_way.talk);
+  if (!next) {
+    return std::nullopt;
+  }
+  if (auto* answer = std::get_if<HttpAnswer>(&*next)) {
+    return std::move(*answer);
+  }
+  under_way = {{}, &at_.answers};
+  const bool is_taken =
+      at_.answers.submit(question.number, std::get<AnswerPool::Job>(std::move(*next)));
+  return is_taken ? std::nullopt : std::optional(error_answer(kTryLater, kTooManyPictures));
+}
+
+/// How a talk ends: with an answer, or a job that makes one. Nothing: a reply is awaited.
+std::optional<Talk::Next> Page::hear(std::uint64_t number, const Talk& talk) {
+  while (const auto reply = at_.service.reply(number)) {
     Talk::Next next = !reply->has_error() ? talk.go_on(*reply)
                       : talk.failed       ? talk.failed(reply->error())
                                           : failure(reply->error());
-    if (auto* request = std::get_if<protocol::ClientRequest>(&next)) {
-      at_.service.ask(question.number, std::move(*request));
-      continue;
+    auto* const request = std::get_if<protocol::ClientRequest>(&next);
+    if (request == nullptr) {
+      at_.service.forget(number);
+      return next;
     }
-    at_.service.forget(question.number);
-    if (auto* answer = std::get_if<HttpAnswer>(&next)) {
-      return std::move(*answer);
-    }
-    under_way = {{}, &at_.answers};
-    const bool is_taken =
-        at_.answers.submit(question.number, std::get<AnswerPool::Job>(std::move(next)));
-    return is_taken ? std::nullopt : std::optional(error_answer(kTryLater, kTooManyPictures));
+    at_.service.ask(number, std::move(*request));
   }
   return std::nullopt;
 }

@@ -54,7 +54,7 @@ class Page {
   std::optional<HttpAnswer> answer(const HttpQuestion& question);
   void gone(std::uint64_t number);
   /// Looks after what nobody asks for. Gives the time after which it wants to be called again.
-  std::optional<std::chrono::milliseconds> tick() { return looks_.tick(); }
+  std::optional<std::chrono::milliseconds> tick();
 
  private:
   /// A path below /api/studies/, taken apart.
@@ -85,6 +85,8 @@ class Page {
   std::optional<HttpAnswer> begin(const HttpQuestion& question, FilteredPicture picture);
   std::optional<HttpAnswer> go_on(const HttpQuestion& question, UnderWay& under_way);
   std::optional<HttpAnswer> go_on_talking(const HttpQuestion& question, UnderWay& under_way);
+  std::optional<Talk::Next> hear(std::uint64_t number, const Talk& talk);
+  void hear_those_left();
 
   bool shows_without_token_;
   std::string version_;
@@ -94,6 +96,7 @@ class Page {
   PictureSettings pictures_;
   PointFilters filters_;
   std::map<std::uint64_t, UnderWay> under_way_;  // by number of the request
+  std::map<std::uint64_t, Talk> left_;           // that must end, and have no browser any more
 };
 
 }  // namespace oblique::server

@@ -22,6 +22,8 @@ struct Talk {
   HttpAnswer meanwhile;
   /// What follows from an error, where that is not its sentence.
   std::function<Next(const protocol::ErrorReply&)> failed = {};
+  /// It is heard to its end though the browser goes: half of it would leave a study behind.
+  bool must_end = false;
 };
 
 /// That it takes too long.

@@ -1,11 +1,15 @@
 // Pictures of the points that meet a condition, of a whole server with a pretended worker.
 #include <bit>
+#include <cstdint>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "proto/wire/chunk_writer.h"
+#include "server/web/page/filter_talk.h"
 #include "tests/server/web/page/page_study.h"
 
 namespace oblique::server {
@@ -103,6 +107,36 @@ TEST_F(PageFiltersTest, AConditionIsJudgedAsTheQueryLanguageDoes) {
   // What is wrong beside it is told before anything is looked for.
   EXPECT_EQ(status_of_answer(page_.get("/api/studies/1/slice?z=muu&x=mu&where=1")), 400);
   EXPECT_EQ(status_of_answer(page_.get("/api/studies/1/bins?x=mode&where=1")), 400);
+}
+
+ClientReply chunk_of(const std::vector<std::int64_t>& points, bool ends) {
+  protocol::ChunkWriter rows({"point"});
+  for (const std::int64_t point : points) {
+    rows.integer(point);
+    rows.end_row();
+  }
+  ClientReply reply;
+  *reply.mutable_query() = rows.take();
+  reply.mutable_query()->set_ends(ends);
+  return reply;
+}
+
+TEST(PointFilters, WhatCameBeforeAQuestionFailedIsNoPartOfTheNextAnswer) {
+  PointFilters filters;
+  HttpQuestion question{};
+  question.number = 3;
+  const Talk talk = filters.begin(1, question, false).then();
+  ClientReply study;
+  study.mutable_status()->add_studies()->set_name("grid");
+  EXPECT_TRUE(std::holds_alternative<ClientRequest>(talk.go_on(study)));
+  EXPECT_TRUE(std::holds_alternative<ClientRequest>(talk.go_on(chunk_of({1, 2}, false))));
+  protocol::ErrorReply error;
+  error.set_wrong_request(true);
+  EXPECT_TRUE(std::holds_alternative<ClientRequest>(talk.failed(error)));
+  const auto more = talk.go_on(chunk_of({0, 1}, false));
+  ASSERT_TRUE(std::holds_alternative<ClientRequest>(more));
+  EXPECT_EQ(std::get<ClientRequest>(more).more_rows().taken(), 1U);
+  EXPECT_TRUE(std::holds_alternative<AnswerPool::Job>(talk.go_on(chunk_of({2}, true))));
 }
 
 }  // namespace

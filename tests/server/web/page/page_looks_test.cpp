@@ -1,11 +1,15 @@
 // Studies that are made because somebody looks, and go when nobody does.
 #include <chrono>
+#include <optional>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "server/web/page/looks.h"
+#include "server/web/page/page.h"
 #include "tests/server/web/page/page_server.h"
 
 namespace oblique::server {
@@ -90,6 +94,21 @@ TEST_F(PageShortLooksTest, ItGoesWhenNobodyLooks) {
   EXPECT_EQ(status_of_answer(page_.get("/api/studies/" + gone["id"].dump())), 404);
 }
 
+TEST_F(PageShortLooksTest, WhatSomebodyGaveANameStays) {
+  const json named = look(look_at(5));
+  PretendedClient client(page_.server().client_endpoint());
+  ClientRequest request;
+  request.mutable_change()->set_study(named["name"]);
+  request.mutable_change()->set_change(protocol::STUDY_CHANGE_RENAME);
+  request.mutable_change()->set_new_name("kept");
+  ASSERT_TRUE(client.ask(request).has_change());
+  look(look_at(6));  // goes after it
+  while (names().size() > 1) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  EXPECT_EQ(names(), std::vector<std::string>{"kept"});
+}
+
 TEST_F(PageLooksTest, ItIsKeptUnderANameAndGoesBehindOthers) {
   const json made = look(look_at(5));
   const std::string path = "/api/look/" + made["id"].dump() + "/keep";
@@ -136,6 +155,115 @@ TEST(PageLooks, AnEarlierServersAreFound) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }
   EXPECT_EQ(client.status("look-at-this").points(), 5U);
+}
+
+TEST(PageLooks, AnEarlierServersAreKeptAsTheyAre) {
+  const test::TemporaryFolder folder;
+  constexpr const char* kName = "look-0123456789abcdef";
+  {
+    const RunningServer before(folder.file("a.db"));
+    PretendedClient client(before.client_endpoint());
+    ClientRequest request;
+    request.mutable_submit()->set_name(kName);
+    request.mutable_submit()->set_priority(1000);
+    *request.mutable_submit()->mutable_recipe() = table_of(5)->recipe();
+    client.ask(request);
+  }
+  const PageServer page(page_settings(), folder.file("a.db"));
+  std::string answer;
+  while (status_of_answer(answer = page.post("/api/look/1/keep", R"({"name":"kept"})")) == 404) {
+    // It is searched for when the server has begun.
+  }
+  EXPECT_EQ(status_of_answer(answer), 200) << answer;
+  PretendedClient client(page.server().client_endpoint());
+  EXPECT_EQ(client.status("kept").priority(), 0);
+  EXPECT_EQ(client.status("kept").points(), 5U);
+}
+
+/// The page and a browser that comes and goes, with what the service says played by the test.
+class PageAloneTest : public testing::Test {
+ protected:
+  explicit PageAloneTest(std::chrono::milliseconds looks_kept = std::chrono::milliseconds(0)) {
+    PageSettings settings;
+    settings.token = kTestToken;
+    settings.looks_kept = looks_kept;
+    page_.emplace(settings, Page::Neighbours{line_, pool_, pool_, live_});
+  }
+  void post(std::uint64_t number, const std::string& path, const std::string& body) {
+    HttpQuestion question{};
+    question.number = number;
+    question.method = "POST";
+    question.path = path;
+    question.host = "localhost:1";
+    const std::string cookie = page_->key().cookie_for(question.host);
+    question.cookies = {cookie.substr(0, cookie.find(';'))};
+    question.body = body;
+    EXPECT_FALSE(page_->answer(question));
+  }
+  /// What the page has asked since the last time, under that number.
+  std::vector<ClientRequest> asked(std::uint64_t number) {
+    std::vector<ClientRequest> all;
+    for (auto frames = line_.take(); !frames.empty(); frames = line_.take()) {
+      for (const std::string& frame : frames) {
+        ClientRequest request;
+        EXPECT_TRUE(protocol::decode(frame, request));
+        if (number == 0 || request.request_id() == number) {
+          all.push_back(request);
+        }
+      }
+    }
+    return all;
+  }
+  void say(std::uint64_t number, ClientReply reply) {
+    reply.set_request_id(number);
+    line_.put(protocol::encode(reply));
+  }
+  void is_submitted(std::uint64_t number) {
+    ClientReply reply;
+    reply.mutable_submit()->set_study_id(7);
+    say(number, reply);
+  }
+
+  ServiceLine line_;
+  AnswerPool pool_{"", [] {}};
+  LiveText live_{[] { return std::nullopt; }, 0};
+  std::optional<Page> page_;
+};
+
+TEST_F(PageAloneTest, ALookGoesThoughItsBrowserWentBeforeItWasThere) {
+  post(1, "/api/look", look_at(5));
+  page_->gone(1);
+  EXPECT_TRUE(page_->tick());
+  is_submitted(1);
+  EXPECT_TRUE(page_->tick());
+  const auto requests = asked(0);
+  const auto& last = requests.back().change();
+  EXPECT_EQ(last.change(), protocol::STUDY_CHANGE_DELETE);
+  EXPECT_EQ(last.study(), requests.front().submit().name());
+}
+
+class PageAloneForLongTest : public PageAloneTest {
+ protected:
+  PageAloneForLongTest() : PageAloneTest(std::chrono::hours(1)) {}
+};
+
+TEST_F(PageAloneForLongTest, WhatIsKeptIsKeptThoughTheBrowserGoesMeanwhile) {
+  post(1, "/api/look", look_at(5));
+  page_->gone(1);
+  is_submitted(1);
+  page_->tick();
+  post(2, "/api/look/7/keep", R"({"name":"kept"})");
+  EXPECT_EQ(asked(2).back().change().new_name(), "kept");
+  page_->gone(2);
+  ClientReply renamed;
+  renamed.mutable_change();
+  say(2, renamed);
+  page_->tick();
+  const auto next = asked(2);
+  ASSERT_EQ(next.size(), 1U);
+  EXPECT_EQ(next[0].submit().name(), "kept");
+  EXPECT_EQ(next[0].submit().priority(), 0);
+  EXPECT_EQ(next[0].submit().recipe().blocks_size(), 1);
 }
 
 }  // namespace

@@ -43,8 +43,9 @@ struct Numbers {
 /// A whole server, and a browser that it has let in.
 class PageServer {
  public:
-  explicit PageServer(const WebSettings& web = page_settings())
-      : server_(folder_.file("a.db"), {}, {}, {}, {}, web) {
+  explicit PageServer(const WebSettings& web = page_settings(), const std::string& database = {})
+      : database_(database.empty() ? folder_.file("a.db") : database),
+        server_(database_, {}, {}, {}, {}, web) {
     const std::string answer = ask("GET", std::string("/?token=") + kTestToken, "");
     const std::string name = "Set-Cookie: ";
     const std::size_t at = answer.find(name);
@@ -54,7 +55,7 @@ class PageServer {
   }
 
   const RunningServer& server() const { return server_; }
-  std::string database() const { return folder_.file("a.db"); }
+  std::string database() const { return database_; }
   std::string url() const { return server_.http_url(); }
   std::string host() const { return url().substr(std::string("http://").size()); }
   std::string cookie_header() const { return "Cookie: " + cookie_ + "\r\n"; }
@@ -89,6 +90,7 @@ class PageServer {
 
  private:
   test::TemporaryFolder folder_;
+  std::string database_;
   RunningServer server_;
   std::string cookie_;
 };
