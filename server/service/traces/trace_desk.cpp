@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <set>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
@@ -36,21 +37,15 @@ void TraceDesk::ask(const Client& client, const protocol::TraceRequest& request,
   }
   // Who has a key has one share, however many connections that is.
   const std::string asker = client.holder == nullptr ? client.identity : "key " + client.key();
-  const auto of_asker = std::count_if(waiting_.begin(), waiting_.end(), [&](const auto& entry) {
-    return entry.second.asker == asker;
-  });
-  const bool is_full = static_cast<std::size_t>(of_asker) >= limits_.most_of_one ||
-                       waiting_.size() >= limits_.most_waiting;
-  if (stopping_ || is_full) {
+  const TraceKey key{study.id, request.point(), request.shape(), request.fall()};
+  if (stopping_ || is_full(asker, key)) {
     clients_.reply_error(client, stopping_ ? kStoppingTraces : kTooManyTraces);
     return;
   }
   const std::uint64_t ticket = ++last_ticket_;
   constexpr auto kLongest = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
   const TraceQuestion question{
-      ticket,
-      {study.id, request.point(), request.shape(), request.fall()},
-      request.first_row(),
+      ticket, key, request.first_row(),
       static_cast<std::int64_t>(std::min(request.time_limit_ms(), kLongest))};
   waiting_.emplace(ticket, Waiting{client, asker, question, study.solver_version,
                                    request.only_point(), now.steady_ms + word_every_ms_});
@@ -71,6 +66,21 @@ void TraceDesk::ask(const Client& client, const protocol::TraceRequest& request,
     }
     found(ticket, point, now);
   }
+}
+
+/// Whether one who asks for that trace has his share already. Who asks anew for what he waits for,
+/// as a page does whose browser was answered meanwhile, takes no other's place at a worker.
+bool TraceDesk::is_full(const std::string& asker, const TraceKey& key) const {
+  std::size_t requests = 0;
+  std::set<TraceKey> keys{key};
+  for (const auto& [ticket, waiting] : waiting_) {
+    if (waiting.asker == asker) {
+      ++requests;
+      keys.insert(waiting.question.key);
+    }
+  }
+  return keys.size() > limits_.most_of_one || requests >= limits_.most_requests_of_one ||
+         waiting_.size() >= limits_.most_waiting;
 }
 
 void TraceDesk::point_read(std::uint64_t ticket, const TracedPoint& point, Instant now) {

@@ -64,6 +64,7 @@ class TraceDesk {
   };
 
   void found(std::uint64_t ticket, const TracedPoint& point, Instant now);
+  bool is_full(const std::string& asker, const TraceKey& key) const;
   void answer_what_is_done();
   bool tell(const Waiting& waiting);
 

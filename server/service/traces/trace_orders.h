@@ -18,7 +18,8 @@ namespace oblique::server {
 
 struct TraceLimits {
   std::size_t most_waiting = 64;                    ///< requests without an answer
-  std::size_t most_of_one = 4;                      ///< of these, of one who asks
+  std::size_t most_requests_of_one = 32;            ///< of these, of one who asks
+  std::size_t most_of_one = 4;                      ///< traces that these are for
   std::size_t most_at_work = 8;                     ///< traces that are with workers
   std::size_t most_bytes = std::size_t{8} << 20U;   ///< of one trace
   std::size_t kept_bytes = std::size_t{32} << 20U;  ///< of those that are kept

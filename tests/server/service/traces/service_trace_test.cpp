@@ -303,6 +303,20 @@ TEST_F(ServiceTraceTest, OneWhoAsksForManyAtOnceHasAShareAndOthersTheRest) {
   EXPECT_EQ(orders().size(), 1U) << "a worker has one at a time";
 }
 
+TEST_F(ServiceTraceTest, WhoAsksAnewForTheTraceThatHeWaitsForTakesNoMoreOfHisShare) {
+  hello();
+  for (std::uint64_t i = 0; i < 100; ++i) {
+    ask(i, 3);
+  }
+  EXPECT_EQ(outbox_.replies.size(), 100U - 32U) << "others may wait, too";
+  for (std::uint64_t i = 0; i < 8; ++i) {
+    ask(i, 3 + i % 4, "another");
+  }
+  EXPECT_EQ(outbox_.replies.size(), 100U - 32U);
+  ask(9, 9, "another");
+  EXPECT_THAT(refusal(), HasSubstr("too many traces")) << "a fifth trace";
+}
+
 TEST_F(ServiceTraceTest, WhoHasAKeyHasOneShareHoweverManyConnectionsThatIs) {
   hello();
   const auto reader =
