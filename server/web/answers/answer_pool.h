@@ -25,6 +25,9 @@ struct AnswerDesk {
   StudyBook& studies;
   ColumnStore& columns;
   std::function<bool()> is_over;  ///< nobody waits any more, or the time is up
+
+  /// For what goes through many points: throws StorageError when it is over, at every 65,536th.
+  void end_in_time(std::uint64_t point) const;
 };
 
 /// Answers that are made of the database, on a few threads of their own with a connection each: a

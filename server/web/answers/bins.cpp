@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -22,31 +23,49 @@ constexpr std::uint64_t kUsualBins = 64;
 /// Columns are looked at in parts, so that no second copy of them is held.
 constexpr std::size_t kPart = 65'536;
 
-/// The bins along one column.
+/// The bins along one column, both ends in.
 struct BinSide {
   ColumnStore::Shared column;  ///< null: there is one bin
   std::uint64_t bins = 1;
   bool is_logarithmic = false;
   double least = 0.0;
   double most = 0.0;
+  // The ends as values are kept: the end that was typed is the float32 next to it.
+  float first = 0.0F;
+  float last = 0.0F;
+  double from = 0.0;   ///< place of `first`
+  double width = 0.0;  ///< up to that of `last`
 
-  double place_of(double value) const { return is_logarithmic ? std::log(value) : value; }
-  bool takes(double value) const {
-    return !column || (value >= least && value <= most && (!is_logarithmic || value > 0.0));
+  void place_ends() {
+    first = as_kept(least);
+    last = as_kept(most);
+    from = place_of(first);
+    width = place_of(last) - from;
   }
-  /// Both ends are in.
-  std::uint64_t bin_of(double value) const {
-    const double from = place_of(least);
-    const double width = place_of(most) - from;
+  bool takes(float value) const { return !column || (value >= first && value <= last); }
+  /// Of a value that it takes.
+  std::uint64_t bin_of(float value) const {
     const double share = column && width > 0.0 ? (place_of(value) - from) / width : 0.0;
     return std::min(static_cast<std::uint64_t>(share * static_cast<double>(bins)), bins - 1);
+  }
+
+ private:
+  using Kept = std::numeric_limits<float>;
+  float as_kept(double end) const {
+    const auto kept = static_cast<float>(
+        std::clamp(end, static_cast<double>(Kept::lowest()), static_cast<double>(Kept::max())));
+    return is_logarithmic ? std::max(kept, Kept::denorm_min()) : kept;
+  }
+  double place_of(float value) const {
+    const auto number = static_cast<double>(value);
+    return is_logarithmic ? std::log(number) : number;
   }
 };
 
 ColumnStore::Shared whole_column(const AnswerDesk& desk, const LookedAtStudy& study,
                                  const ColumnSource& source) {
   ColumnStore::check_size(study.points);
-  return desk.columns.read(desk.database, study.id, source, study.points);
+  return desk.columns.read(desk.database, study.id, source, study.points, desk.is_over);
 }
 
 /// Which points are counted: those that meet a condition, or all.
@@ -61,10 +80,12 @@ class Chosen {
 };
 
 /// The least and the largest value that can be shown; nothing: there is none.
-std::optional<std::pair<double, double>> range_of(const BinSide& side, const PointSet* chosen) {
+std::optional<std::pair<double, double>> range_of(const AnswerDesk& desk, const BinSide& side,
+                                                  const PointSet* chosen) {
   Chosen is_chosen(chosen);
   std::optional<std::pair<double, double>> range;
   for (std::uint64_t first = 0; first < side.column->points(); first += kPart) {
+    desk.end_in_time(first);
     const std::vector<float> part = side.column->part(first, kPart);
     for (std::size_t i = 0; i < part.size(); ++i) {
       const auto value = static_cast<double>(part[i]);
@@ -84,13 +105,17 @@ BinSide side_of(const AnswerDesk& desk, const LookedAtStudy& study, const FieldR
   side.column = whole_column(desk, study, picture_column(fields, name, false));
   side.bins = fields.pixels("n" + name, kUsualBins);
   side.is_logarithmic = fields.text(name + "log").value_or("") == "1";
-  const auto range = range_of(side, chosen);
-  side.least = fields.number(name + "0").value_or(range ? range->first : 0.0);
-  side.most = fields.number(name + "1").value_or(range ? range->second : 0.0);
-  if (side.least > side.most || (side.is_logarithmic && range && side.least <= 0.0)) {
+  const auto range = range_of(desk, side, chosen);
+  const auto typed_least = fields.number(name + "0");
+  const auto typed_most = fields.number(name + "1");
+  side.least = typed_least.value_or(range ? range->first : typed_most.value_or(0.0));
+  side.most = typed_most.value_or(range ? range->second : side.least);
+  const bool has_ends = range || typed_least || typed_most;
+  if (side.least > side.most || (side.is_logarithmic && has_ends && side.least <= 0.0)) {
     throw std::invalid_argument(
         fmt::format("{0}0 must be at most {0}1, and above 0 where the scale is logarithmic", name));
   }
+  side.place_ends();
   return side;
 }
 
@@ -104,19 +129,20 @@ struct Bins {
   std::uint64_t filtered = 0;
 };
 
-Bins bins_of(const BinSide& x, const BinSide& y, const ColumnStore::Shared& z,
-             const PointSet* chosen) {
+Bins bins_of(const AnswerDesk& desk, const BinSide& x, const BinSide& y,
+             const ColumnStore::Shared& z, const PointSet* chosen) {
   Chosen is_chosen(chosen);
   const std::size_t size = x.bins * y.bins;
   Bins bins{std::vector<std::uint32_t>(size), std::vector<double>(z ? size : 0),
             std::vector<std::uint32_t>(z ? size : 0)};
   for (std::uint64_t first = 0; first < x.column->points(); first += kPart) {
+    desk.end_in_time(first);
     const std::vector<float> x_part = x.column->part(first, kPart);
     const std::vector<float> y_part = y.column ? y.column->part(first, kPart) : x_part;
     const std::vector<float> z_part = z ? z->part(first, kPart) : std::vector<float>();
     for (std::size_t i = 0; i < x_part.size(); ++i) {
-      const auto x_value = static_cast<double>(x_part[i]);
-      const auto y_value = static_cast<double>(y_part[i]);
+      const float x_value = x_part[i];
+      const float y_value = y_part[i];
       if (!std::isfinite(x_value) || !std::isfinite(y_value)) {
         continue;
       }
@@ -154,7 +180,7 @@ HttpAnswer bins_answer(const AnswerDesk& desk, std::uint64_t id, const Fields& a
   const BinSide y = fields.text("y") ? side_of(desk, study, fields, "y", chosen) : BinSide();
   const ColumnStore::Shared z =
       fields.text("z") ? whole_column(desk, study, picture_column(fields, "z", false)) : nullptr;
-  const Bins bins = bins_of(x, y, z, chosen);
+  const Bins bins = bins_of(desk, x, y, z, chosen);
   std::string numbers(bins.counts.size() * sizeof(bins.counts[0]), '\0');
   std::memcpy(numbers.data(), bins.counts.data(), numbers.size());
   for (std::size_t i = 0; i < bins.sums.size(); ++i) {

@@ -17,7 +17,7 @@ using Clock = std::chrono::steady_clock;
 /// A filter over many points is counted for so long.
 constexpr std::chrono::seconds kLongestSurvey{5};
 
-HttpAnswer check_answer(const std::string& body) {
+HttpAnswer check_answer(const AnswerDesk& desk, const std::string& body) {
   protocol::SubmitRequest asked;
   const auto read = google::protobuf::util::JsonStringToMessage(body, &asked);
   if (!read.ok()) {
@@ -26,8 +26,8 @@ HttpAnswer check_answer(const std::string& body) {
   try {
     protocol::PointTable table(std::move(*asked.mutable_recipe()));
     const auto until = Clock::now() + kLongestSurvey;
-    const bool is_counted =
-        !table.needs_survey() || table.survey([until] { return Clock::now() < until; });
+    const bool is_counted = !table.needs_survey() ||
+                            table.survey([&] { return Clock::now() < until && !desk.is_over(); });
     return json_answer({{"points", table.points()},
                         {"numbers", table.size()},
                         {"models", table.models()},
@@ -40,7 +40,7 @@ HttpAnswer check_answer(const std::string& body) {
 }  // namespace
 
 AnswerPool::Job check_job(const std::string& body) {
-  return [body](const AnswerDesk& /*desk*/) { return check_answer(body); };
+  return [body](const AnswerDesk& desk) { return check_answer(desk, body); };
 }
 
 }  // namespace oblique::server

@@ -106,13 +106,22 @@ std::optional<std::vector<PointRun>> settled_between(sqlite3* database, std::uin
 StoredColumn::StoredColumn(std::uint64_t study, ColumnSource source, std::uint64_t points)
     : study_(study), source_(std::move(source)), points_(points) {}
 
-bool StoredColumn::bring_up_to_date(sqlite3* database, bool may_take_long) {
+bool StoredColumn::bring_up_to_date(sqlite3* database) {
+  const std::unique_lock held(mutex_, std::try_to_lock);
+  return held.owns_lock() && follow(database, false);
+}
+
+void StoredColumn::read(sqlite3* database, const std::function<bool()>& is_over) {
   std::unique_lock held(mutex_, std::defer_lock);
-  if (may_take_long) {
-    held.lock();
-  } else if (!held.try_lock()) {
-    return false;  // it is being read
+  while (!held.try_lock_for(kLookOften)) {
+    if (is_over()) {
+      throw StorageError("a column is being read: ask again later");
+    }
   }
+  follow(database, true);
+}
+
+bool StoredColumn::follow(sqlite3* database, bool may_take_long) {
   const auto now = Clock::now();
   if (!values_.empty() && now - looked_ < (points_ <= kSmall ? kLookOften : kLookEvery)) {
     return true;
@@ -127,7 +136,7 @@ bool StoredColumn::bring_up_to_date(sqlite3* database, bool may_take_long) {
       execute(database, "COMMIT");
       return false;
     }
-    if (values_.empty()) {
+    if (values_.empty() || settled_.empty()) {  // nothing is known of them
       values_.assign(points_, no_result());
     }
     for (const PointRun& run : difference(settled_, settled)) {
@@ -141,7 +150,7 @@ bool StoredColumn::bring_up_to_date(sqlite3* database, bool may_take_long) {
       come.push_back({point, point + 1});
     }
     settled_.clear();  // should reading end early, all of it is read anew
-    read(database, come);
+    read_runs(database, come);
     settled_ = std::move(settled);
     failed_ = std::move(failed);
     looked_ = now;
@@ -153,7 +162,7 @@ bool StoredColumn::bring_up_to_date(sqlite3* database, bool may_take_long) {
   return true;
 }
 
-void StoredColumn::read(sqlite3* database, const std::vector<PointRun>& runs) {
+void StoredColumn::read_runs(sqlite3* database, const std::vector<PointRun>& runs) {
   ColumnReader reader(database, study_, source_);
   for (const PointRun& run : runs) {
     reader.read(run.begin, run.end - 1,
@@ -212,24 +221,35 @@ ColumnStore::Shared ColumnStore::find(sqlite3* database, std::uint64_t study,
     const std::lock_guard lock(mutex_);
     column = known(study, source, points);
   }
-  if (column && column->bring_up_to_date(database, false)) {
+  if (column && column->bring_up_to_date(database)) {
     return column;
   }
-  const std::lock_guard lock(mutex_);
+  want(column ? column : std::make_shared<StoredColumn>(study, source, points));
+  return nullptr;
+}
+
+ColumnStore::Shared ColumnStore::wanted(std::uint64_t study, const ColumnSource& source,
+                                        std::uint64_t points) const {
   const auto is_it = [&](const Shared& wished) {
     return wished && wished->study() == study && wished->points() == points &&
            wished->source().name == source.name;
   };
-  const bool is_wished = is_it(under_way_) || std::any_of(wished_.begin(), wished_.end(), is_it);
+  const auto found = std::find_if(wished_.begin(), wished_.end(), is_it);
+  return is_it(under_way_) ? under_way_ : found != wished_.end() ? *found : nullptr;
+}
+
+void ColumnStore::want(const Shared& column) {
   constexpr std::size_t kMostWishes = 8;
-  if (!is_wished && wished_.size() < kMostWishes) {
-    wished_.push_back(column ? column : std::make_shared<StoredColumn>(study, source, points));
+  const std::lock_guard lock(mutex_);
+  if (wished_.size() < kMostWishes &&
+      !wanted(column->study(), column->source(), column->points())) {
+    wished_.push_back(column);
   }
-  return nullptr;
 }
 
 ColumnStore::Shared ColumnStore::read(sqlite3* database, std::uint64_t study,
-                                      const ColumnSource& source, std::uint64_t points) {
+                                      const ColumnSource& source, std::uint64_t points,
+                                      const std::function<bool()>& is_over) {
   if (points > kMostPoints) {
     return nullptr;
   }
@@ -237,11 +257,17 @@ ColumnStore::Shared ColumnStore::read(sqlite3* database, std::uint64_t study,
   {
     const std::lock_guard lock(mutex_);
     column = known(study, source, points);
+    column = column ? column : wanted(study, source, points);
   }
   if (!column) {
     column = std::make_shared<StoredColumn>(study, source, points);
   }
-  column->bring_up_to_date(database, true);
+  try {
+    column->read(database, is_over);
+  } catch (const StorageError&) {
+    want(column);
+    throw;
+  }
   keep(column);
   return column;
 }
@@ -259,7 +285,7 @@ bool ColumnStore::has_wishes() const {
   return !wished_.empty();
 }
 
-void ColumnStore::fill_one(sqlite3* database) {
+void ColumnStore::fill_one(sqlite3* database, const std::function<bool()>& is_over) {
   Shared column;
   {
     const std::lock_guard lock(mutex_);
@@ -271,7 +297,7 @@ void ColumnStore::fill_one(sqlite3* database) {
     under_way_ = column;
   }
   try {
-    column->bring_up_to_date(database, true);
+    column->read(database, is_over);
     keep(column);
   } catch (const StorageError&) {
     // It took too long, or the server ends: pictures go on reading by key.

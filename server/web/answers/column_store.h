@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <list>
 #include <memory>
 #include <mutex>
@@ -36,9 +37,11 @@ class StoredColumn {
   std::size_t bytes() const { return points_ * sizeof(float); }
 
   /// Makes it what the database holds now, by which points have come and gone since the last time,
-  /// not oftener than twice a second. False: it has too much to do to be waited for, unless it may
-  /// `take_long`.
-  bool bring_up_to_date(sqlite3* database, bool may_take_long);
+  /// not oftener than twice a second. False: it has too much to do to be waited for.
+  bool bring_up_to_date(sqlite3* database);
+  /// The same, however long it takes. Throws StorageError when `is_over` while another reads it;
+  /// while it is read here, SQLite looks at that.
+  void read(sqlite3* database, const std::function<bool()>& is_over);
   /// What it has of these points, in their order.
   void gather(std::span<const std::uint64_t> points, std::vector<float>& into);
   /// The values of so many points from `first` on, as far as there are any.
@@ -46,12 +49,13 @@ class StoredColumn {
 
  private:
   using Clock = std::chrono::steady_clock;
-  void read(sqlite3* database, const std::vector<PointRun>& runs);
+  bool follow(sqlite3* database, bool may_take_long);
+  void read_runs(sqlite3* database, const std::vector<PointRun>& runs);
 
   const std::uint64_t study_;
   const ColumnSource source_;
   const std::uint64_t points_;
-  std::mutex mutex_;
+  std::timed_mutex mutex_;
   std::vector<float> values_;          // guarded by mutex_
   std::vector<PointRun> settled_;      // guarded by mutex_: what was read
   std::vector<std::uint64_t> failed_;  // guarded by mutex_: of these, the first so many that failed
@@ -77,13 +81,14 @@ class ColumnStore {
   /// is too large.
   Shared find(sqlite3* database, std::uint64_t study, const ColumnSource& source,
               std::uint64_t points);
-  /// The same at once, however long it takes; null: the study is too large.
+  /// The same at once, however long it takes; null: the study is too large. What is interrupted,
+  /// which throws StorageError, is wanted, so that who asks again later has it.
   Shared read(sqlite3* database, std::uint64_t study, const ColumnSource& source,
-              std::uint64_t points);
+              std::uint64_t points, const std::function<bool()>& is_over);
 
   bool has_wishes() const;
   /// Reads a column that is wanted.
-  void fill_one(sqlite3* database);
+  void fill_one(sqlite3* database, const std::function<bool()>& is_over);
 
   /// Studies with more points are never read whole.
   static constexpr std::uint64_t kMostPoints = 32'000'000;
@@ -91,9 +96,12 @@ class ColumnStore {
   static void check_size(std::uint64_t points);
 
  private:
-  static constexpr std::size_t kMostBytes = std::size_t{256} << 20U;
+  /// A picture is of three columns at most.
+  static constexpr std::size_t kMostBytes = 3 * kMostPoints * sizeof(float);
 
   Shared known(std::uint64_t study, const ColumnSource& source, std::uint64_t points);
+  Shared wanted(std::uint64_t study, const ColumnSource& source, std::uint64_t points) const;
+  void want(const Shared& column);
   void keep(const Shared& column);
 
   mutable std::mutex mutex_;

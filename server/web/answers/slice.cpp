@@ -82,12 +82,14 @@ struct Tally {
 };
 
 /// Marks what a filter of the study leaves out, and results that are not `chosen`, and counts.
-Tally tally(const LookedAtStudy& study, const std::vector<std::uint64_t>& points,
-            std::vector<float>& values, const PointSet* chosen) {
+Tally tally(const AnswerDesk& desk, const LookedAtStudy& study,
+            const std::vector<std::uint64_t>& points, std::vector<float>& values,
+            const PointSet* chosen) {
   Tally tally;
   std::size_t near = 0;
   const bool has_filter = study.table->has_filter();
   for (std::size_t i = 0; i < values.size(); ++i) {
+    desk.end_in_time(i);
     float& value = values[i];
     if (is_same_mark(value, no_result()) && has_filter && !study.table->is_left_in(points[i])) {
       value = left_out();
@@ -179,14 +181,15 @@ HttpAnswer slice_answer(const AnswerDesk& desk, std::uint64_t id, const Fields& 
   std::vector<float> values;
   // Looking up a row takes as long as reading sixteen that follow each other.
   const bool is_most_of_it = study.points / 16 <= points.size();
-  const auto column = is_most_of_it ? desk.columns.read(desk.database, id, source, study.points)
-                                    : desk.columns.find(desk.database, id, source, study.points);
+  const auto column = is_most_of_it
+                          ? desk.columns.read(desk.database, id, source, study.points, desk.is_over)
+                          : desk.columns.find(desk.database, id, source, study.points);
   if (column) {
     column->gather(points, values);
   } else {
     values = read_by_key(desk, id, source, points);
   }
-  const Tally counts = tally(study, points, values, chosen);
+  const Tally counts = tally(desk, study, points, values, chosen);
   ordered_json at = ordered_json::array();
   for (const GridPlace& place : slice.at) {
     at.push_back(

@@ -2,10 +2,19 @@
 
 #include "server/web/answers/point_set.h"
 
+#include <atomic>
+#include <chrono>
+#include <cstdint>
 #include <random>
 #include <set>
+#include <string>
+#include <thread>
+#include <vector>
 
 #include <gtest/gtest.h>
+#include <spdlog/fmt/fmt.h>
+
+#include "server/database/sqlite.h"
 
 namespace oblique::server {
 namespace {
@@ -89,6 +98,103 @@ TEST(ColumnSource, ListsAndWordsAboutRowsAreNoPictures) {
   for (const std::string name : {"", "peaks", "worker_name", "fn_peak", "E", "lengths_m", "p.mu"}) {
     EXPECT_FALSE(column_source(name)) << name;
   }
+}
+
+/// A database with one study, as far as columns are read of it, in memory.
+class ColumnStoreTest : public testing::Test {
+ protected:
+  ColumnStoreTest() {
+    sqlite3* database = nullptr;
+    sqlite3_open(":memory:", &database);
+    database_.reset(database);
+    run("CREATE TABLE packed_results (study_id, point, error, mu, PRIMARY KEY (study_id, point)) "
+        "WITHOUT ROWID");
+    run("CREATE INDEX failed_points ON packed_results (study_id, point) WHERE error IS NOT NULL");
+    run("CREATE TABLE settled_points (study_id, first_point, points)");
+  }
+  void run(const std::string& sql) { execute(database_.get(), sql.c_str()); }
+  void settle(std::uint64_t begin, std::uint64_t end) {
+    run("DELETE FROM settled_points");
+    run(fmt::format("DELETE FROM packed_results WHERE point < {} OR point >= {}", begin, end));
+    run(fmt::format("INSERT INTO settled_points VALUES (1, {}, {})", begin, end - begin));
+    run(
+        fmt::format("WITH RECURSIVE p(i) AS (SELECT {} UNION ALL SELECT i + 1 FROM p WHERE i + 1 < "
+                    "{}) INSERT OR REPLACE INTO packed_results SELECT 1, i, NULL, i FROM p",
+                    begin, end));
+    std::this_thread::sleep_for(std::chrono::milliseconds(60));  // columns follow so often
+  }
+  ColumnStore::Shared read() {
+    return store_.read(database_.get(), 1, *column_source("mu"), kPoints, [] { return false; });
+  }
+  /// Ends while rows are read: the only statement that is long.
+  void read_in_vain() {
+    constexpr int kSteps = 300;
+    sqlite3_progress_handler(
+        database_.get(), kSteps, [](void* /*nothing*/) { return 1; }, nullptr);
+    EXPECT_THROW(read(), StorageError);
+    sqlite3_progress_handler(database_.get(), 0, nullptr, nullptr);
+  }
+
+  static constexpr std::uint64_t kPoints = 500;
+  DatabaseHandle database_;
+  ColumnStore store_;
+};
+
+TEST_F(ColumnStoreTest, AColumnThatTookTooLongIsReadWhenNobodyWaits) {
+  settle(0, kPoints);
+  read_in_vain();
+  ASSERT_TRUE(store_.has_wishes());
+  read_in_vain();  // it is one wish
+  store_.fill_one(database_.get(), [] { return false; });
+  EXPECT_FALSE(store_.has_wishes());
+  const auto column = store_.find(database_.get(), 1, *column_source("mu"), kPoints);
+  ASSERT_TRUE(column);
+  EXPECT_EQ(column->part(499, 1), std::vector<float>{499.0F});
+}
+
+TEST_F(ColumnStoreTest, WhatVanishedWhileReadingFailedIsNotShown) {
+  settle(0, 100);
+  const auto column = read();
+  EXPECT_EQ(column->part(50, 1), std::vector<float>{50.0F});
+  settle(0, kPoints);
+  read_in_vain();
+  settle(60, kPoints);
+  EXPECT_EQ(read(), column);
+  EXPECT_TRUE(is_same_mark(column->part(50, 1).at(0), no_result()));
+  EXPECT_EQ(column->part(60, 1), std::vector<float>{60.0F});
+}
+
+TEST_F(ColumnStoreTest, WhoWaitsForAColumnThatAnotherReadsGoesInTime) {
+  settle(0, kPoints);
+  read();
+  std::atomic<bool> is_read = false;
+  std::atomic<bool> may_end = false;
+  std::thread another([&] {
+    settle(0, kPoints);
+    struct Both {
+      std::atomic<bool>& is_read;
+      std::atomic<bool>& may_end;
+    } both{is_read, may_end};
+    sqlite3_progress_handler(
+        database_.get(), 1,
+        [](void* given) {
+          const Both& flags = *static_cast<Both*>(given);
+          flags.is_read = true;
+          while (!flags.may_end) {
+            std::this_thread::yield();
+          }
+          return 0;
+        },
+        &both);
+    read();
+  });
+  while (!is_read) {
+    std::this_thread::yield();
+  }
+  EXPECT_THROW(store_.read(nullptr, 1, *column_source("mu"), kPoints, [] { return true; }),
+               StorageError);
+  may_end = true;
+  another.join();
 }
 
 }  // namespace

@@ -230,6 +230,30 @@ TEST_F(PageAnswersTest, BinsCountEveryPointOnce) {
   EXPECT_EQ(status_of_answer(page_.get("/api/studies/1/bins?x=mu&xlog=1&x0=0")), 400);
 }
 
+TEST_F(PageAnswersTest, BothEndsThatPeopleTypeAreInTheBins) {
+  submit_grid();
+  solve(24);
+  for (const std::string log : {"", "&xlog=1"}) {
+    const std::string bins = "/api/studies/1/bins?x=mu&nx=2" + log;
+    const Numbers typed = page_.numbers(bins + "&x0=0.2&x1=0.6");  // none of them is a float32
+    EXPECT_EQ(typed.head["points"], 18) << log;
+    EXPECT_EQ(typed.head["x"]["least"], 0.2);
+    EXPECT_EQ(typed.head["x"]["most"], 0.6);
+  }
+  const std::string far = "/api/studies/1/bins?x=mu&x1=1e300";
+  EXPECT_EQ(page_.numbers(far + "&x0=-1e300").head["points"], 24);
+  EXPECT_EQ(page_.numbers(far + "&x0=1e-300&xlog=1").head["points"], 18);
+}
+
+TEST_F(PageAnswersTest, BinsOfNothingHaveTheEndsThatWereTyped) {
+  submit_grid();
+  const std::string bins = "/api/studies/1/bins?x=fn_peak_N";
+  EXPECT_EQ(page_.numbers(bins + "&x0=2").head["x"]["most"], 2);
+  EXPECT_EQ(page_.numbers(bins + "&x1=-2").head["x"]["least"], -2);
+  EXPECT_EQ(status_of_answer(page_.get(bins + "&xlog=1")), 200);
+  EXPECT_EQ(status_of_answer(page_.get(bins + "&xlog=1&x0=-1&x1=1")), 400);
+}
+
 TEST_F(PageAnswersTest, AColumnThatWasReadFollowsTheStudy) {
   submit_grid();
   const auto count = [&] {
