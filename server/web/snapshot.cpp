@@ -117,6 +117,7 @@ Snapshot take_snapshot(const SnapshotSources& sources, std::int64_t now_ms, bool
   const Scheduler& scheduler = service.scheduler();
   Snapshot snapshot;
   snapshot.made_ms = now_ms;
+  snapshot.is_for_page = for_page;
   snapshot.points_solved = service.stored_points().solved;
   snapshot.points_failed = service.stored_points().failed;
   snapshot.points_per_s = service.points_per_s(now_ms);

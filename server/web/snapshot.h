@@ -68,8 +68,9 @@ struct Snapshot {
   /// Of the highest priority, the oldest first.
   std::vector<StudyNumbers> listed;
   std::uint64_t unlisted = 0;
-  /// The same studies, and the first workers, with all that is known of them; of a snapshot for the
-  /// page only.
+  bool is_for_page = false;
+  /// Of a snapshot for the page: the same studies, and the first workers, with all that is known of
+  /// them.
   std::vector<StudyView> shown_studies;
   std::vector<WorkerView> shown_workers;
   std::map<std::string, OpenNumbers> open_by_key;  ///< by its name

@@ -106,7 +106,7 @@ class Web::Parts {
   std::optional<std::string> look() {
     const NoticeBoard::Shared latest = board_.latest();
     board_.want_for_page();
-    if (!latest || latest == told_ || latest->shown_studies.size() != latest->listed.size()) {
+    if (!latest || latest == told_ || !latest->is_for_page) {
       return std::nullopt;
     }
     told_ = latest;

@@ -4,6 +4,7 @@
 #include <array>
 #include <charconv>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <system_error>
@@ -73,10 +74,15 @@ Asked asked_on(MHD_Connection* connection, const char* method, const char* path)
   return asked;
 }
 
-MHD_Response* buffered(const HttpAnswer& answer) {
-  // The library only reads what it copies.
-  return MHD_create_response_from_buffer(answer.body.size(), const_cast<char*>(answer.body.data()),
-                                         MHD_RESPMEM_MUST_COPY);
+MHD_Response* buffered(std::string body) {
+  auto owned = std::make_unique<std::string>(std::move(body));
+  MHD_Response* const response = MHD_create_response_from_buffer_with_free_callback_cls(
+      owned->size(), owned->data(), [](void* text) { delete static_cast<std::string*>(text); },
+      owned.get());
+  if (response != nullptr) {
+    static_cast<void>(owned.release());  // the library's from now on
+  }
+  return response;
 }
 
 void add_headers(MHD_Response* response, const HttpAnswer& answer) {

@@ -22,8 +22,8 @@ struct Asked {
 /// What the library has of a request whose head has come.
 Asked asked_on(MHD_Connection* connection, const char* method, const char* path);
 
-/// A response with a copy of the body; null: there is no memory.
-MHD_Response* buffered(const HttpAnswer& answer);
+/// A response with that body; null: there is no memory.
+MHD_Response* buffered(std::string body);
 /// Adds the headers of all answers, and those of this one.
 void add_headers(MHD_Response* response, const HttpAnswer& answer);
 

@@ -321,22 +321,23 @@ class HttpServer::Parts {
     if (is_stopping_) {
       return MHD_NO;
     }
-    if (const auto answer = answer_(question)) {
-      return send(peer, *answer);
+    if (auto answer = answer_(question)) {
+      return send(peer, std::move(*answer));
     }
     peer->second.waits = true;
     MHD_suspend_connection(peer->first);
     return MHD_YES;
   }
 
-  MHD_Result send(Peers::iterator peer, const HttpAnswer& answer) {
+  MHD_Result send(Peers::iterator peer, HttpAnswer answer) {
     const auto streams = static_cast<std::size_t>(std::count_if(
         peers_.begin(), peers_.end(), [](const auto& other) { return other.second.stream; }));
     if (answer.stream && streams >= limits_.streams) {
       return send(peer, {MHD_HTTP_SERVICE_UNAVAILABLE, kPlainText,
                          "too many pages are open already: close some\n"});
     }
-    MHD_Response* const response = answer.stream ? streaming(peer->first) : buffered(answer);
+    MHD_Response* const response =
+        answer.stream ? streaming(peer->first) : buffered(std::move(answer.body));
     if (response == nullptr) {
       return MHD_NO;
     }

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 
 namespace oblique::server {
 namespace {
@@ -33,7 +34,7 @@ HttpAnswer numbers_answer(const nlohmann::ordered_json& head, const std::string&
   }
   body += text;
   body += numbers;
-  return {200, "application/octet-stream", body};
+  return {200, "application/octet-stream", std::move(body)};
 }
 
 }  // namespace oblique::server

@@ -190,9 +190,8 @@ ChildEnd run_child(const std::string& program, std::vector<std::string> argument
       end.kind = ChildEnd::Kind::kTooLong;
       return end;
     }
-    if (!read_some(errors.out, end.said, kMostSaid)) {
-      errors.out = Descriptor();  // its first words are enough
-    }
+    // Its first words are enough; the others are read all the same, for nobody could write them.
+    static_cast<void>(read_some(errors.out, end.said, kMostSaid));
   }
   const int status = *child.status();
   end.kind = WIFEXITED(status) ? ChildEnd::Kind::kEnded : ChildEnd::Kind::kKilled;

@@ -14,6 +14,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/web/pictures/child.h"
 #include "tests/server/web/page/page_server.h"
 #include "tests/support/points.h"
 #include "tests/support/recipes.h"
@@ -259,6 +260,15 @@ TEST_F(PagePicturesTest, APictureHasTheBytesOfObliquePlot) {
   const std::string wrong = get("?kind=map&z=muu");
   EXPECT_EQ(status_of_answer(wrong), 400);
   EXPECT_THAT(wrong, HasSubstr("muu"));
+}
+
+TEST(RunChild, HearsTheBeginningOfWhatIsSaidAndLetsItGoOn) {
+  const ChildEnd end =
+      run_child("/bin/sh", {"sh", "-c", "head -c 1000000 /dev/zero >&2 && echo drawn"}, {},
+                [] { return false; });
+  EXPECT_EQ(end.kind, ChildEnd::Kind::kEnded);
+  EXPECT_EQ(end.output, "drawn\n");
+  EXPECT_EQ(end.said.size(), 4096U);
 }
 
 }  // namespace
