@@ -26,9 +26,9 @@ AnswerColumn texts(const std::vector<std::string>& values) {
   for (const auto& value : values) {
     column.numbers.push_back(std::nan(""));
     const auto found = std::find(column.words.begin(), column.words.end(), value);
-    column.word_of_row.push_back(
-        value.empty() ? AnswerColumn::kNoWord
-                      : static_cast<std::uint32_t>(found - column.words.begin()));
+    column.word_of_row.push_back(value.empty()
+                                     ? AnswerColumn::kNoWord
+                                     : static_cast<std::uint32_t>(found - column.words.begin()));
     if (!value.empty() && found == column.words.end()) {
       column.words.push_back(value);
     }
