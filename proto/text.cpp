@@ -82,13 +82,14 @@ bool is_control(char32_t code) {
     char32_t first;
     char32_t last;
   };
-  constexpr std::array<Range, 6> kControls{{
+  constexpr std::array<Range, 7> kControls{{
       {0x00, 0x1f},      // C0
       {0x7f, 0x9f},      // DEL, C1
       {0x061c, 0x061c},  // Arabic letter mark
       {0x200e, 0x200f},  // left-to-right and right-to-left marks
       {0x2028, 0x202e},  // line and paragraph separators; embeddings and overrides
       {0x2066, 0x2069},  // isolates
+      {0xfffe, 0xffff},  // no characters, and not allowed in XML
   }};
   return std::any_of(kControls.begin(), kControls.end(), [code](const Range& range) {
     return code >= range.first && code <= range.last;

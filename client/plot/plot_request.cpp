@@ -63,8 +63,27 @@ PlotRequest completed(PlotRequest request, const StudyShape& shape) {
   return request;
 }
 
+namespace {
+
+/// Logarithms of what --range gives, of colours or of the axis of numbers, must be there.
+void check_range(const PlotRequest& request) {
+  const bool has_colours = !request.map.empty() || !request.scatter.empty();
+  const auto [flag, is_logarithmic] =
+      has_colours              ? std::pair{"--log-colour", request.is_colour_logarithmic}
+      : !request.lines.empty() ? std::pair{"--log-y", request.is_y_logarithmic}
+                               : std::pair{"--log-x", request.is_x_logarithmic};
+  const auto range = range_given(request.range);
+  if (range && is_logarithmic && range->from <= 0.0) {
+    throw solver::InputError(fmt::format("--range {} is not allowed with {}: FROM must be above 0",
+                                         request.range, flag));
+  }
+}
+
+}  // namespace
+
 Figure figure_of(Source& source, const StudyShape& shape, const PlotRequest& request,
                  const Tell& tell) {
+  check_range(request);
   Drawing drawing(source, shape, request, tell);
   return !request.map.empty()       ? drawing.map()
          : !request.lines.empty()   ? drawing.lines()

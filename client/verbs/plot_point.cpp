@@ -1,5 +1,6 @@
 #include "client/verbs/plot_point.h"
 
+#include <algorithm>
 #include <iostream>
 #include <stdexcept>
 #include <string>
@@ -14,6 +15,7 @@
 #include "client/service/watching.h"
 #include "client/trace/stored_row.h"
 #include "client/trace/trace_of_worker.h"
+#include "client/trace/traced_fall.h"
 #include "client/verbs/solve_here.h"
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
@@ -27,36 +29,34 @@ namespace {
 
 using plot::PointHistory;
 
-/// Where the finger is when its tip has dropped a quarter, a half and three quarters of H: where it
-/// would touch, had the ground been there.
-void add_falls(PointHistory& history, const solver::Finger& finger) {
+/// Where the finger is when its tip has dropped a quarter, a half and three quarters of H, between
+/// the two rows of the fall around each. Nothing where a worker gave none.
+void take_falls(PointHistory& history) {
+  const auto fall = take_fall(history.rows);
   for (const double share : {0.25, 0.5, 0.75}) {
-    const double drop_m = share * history.H_m;
-    std::vector<double> nodes_m;
-    try {
-      static_cast<void>(finger.solve(drop_m, history.mu, history.e_star,
-                                     {[&nodes_m](const solver::TraceRow& row) {
-                                        if (nodes_m.empty()) {
-                                          nodes_m = row.nodes_m;
-                                        }
-                                      },
-                                      true}));
-    } catch (const solver::SolveError&) {
-      // Its contact has no answer; where it began is known.
+    const double y_m = -share * history.H_m;
+    const auto below = std::find_if(fall.begin(), fall.end(),
+                                    [y_m](const solver::TraceRow& row) { return row.y_m <= y_m; });
+    if (below == fall.begin() || below == fall.end()) {
+      continue;
     }
-    if (!nodes_m.empty()) {
-      history.falls.push_back({drop_m, std::move(nodes_m)});
+    const auto& above = *(below - 1);
+    const double part = (above.y_m - y_m) / (above.y_m - below->y_m);
+    std::vector<double> nodes_m = above.nodes_m;
+    for (std::size_t i = 0; i < nodes_m.size() && i < below->nodes_m.size(); ++i) {
+      nodes_m[i] += part * (below->nodes_m[i] - nodes_m[i]);
     }
+    history.falls.push_back({share * history.H_m, std::move(nodes_m)});
   }
 }
 
 void solve_history(PointHistory& history, bool with_errors) {
   const solver::Finger finger(history.model);
   const solver::Tracing tracing{
-      [&history](const solver::TraceRow& row) { history.rows.push_back(row); }, true};
+      [&history](const solver::TraceRow& row) { history.rows.push_back(row); }, true, true};
   history.result =
       solve_here(finger, {history.H_m, history.mu, history.e_star, with_errors}, tracing, false);
-  add_falls(history, finger);
+  take_falls(history);
 }
 
 PointHistory history_of(const PointAtHand& point) {
@@ -87,6 +87,7 @@ SolvedAgain solved_by_worker(const PointPictureFlags& flags, const SourceFlags& 
   const auto solved = trace_by_worker(
       connection, flags.study, static_cast<std::uint64_t>(*flags.point),
       {.with_shape = true,
+       .with_fall = true,
        .time_limit_ms = source.timeout_s ? connection_settings(source).timeout_ms : 0},
       [](const solver::TraceShape&) {},
       [&rows](const solver::TraceRow& row) { rows.push_back(row); });
@@ -96,9 +97,11 @@ SolvedAgain solved_by_worker(const PointPictureFlags& flags, const SourceFlags& 
   PointHistory history = history_of(solved.point);
   history.rows = std::move(rows);
   history.result = solved.result;
-  if (flags.panel.empty() || plot::point_panel_named(flags.panel) == plot::PointPanel::kShape) {
+  take_falls(history);
+  if (history.falls.empty() &&
+      (flags.panel.empty() || plot::point_panel_named(flags.panel) == plot::PointPanel::kShape)) {
     history.remarks.emplace_back(
-        "A worker gives the shapes from touch on; with --here those of the fall are drawn too.");
+        "This worker gives the shapes from touch on; with --here those of the fall are drawn too.");
   }
   return {solved.point, std::move(history)};
 }

@@ -111,6 +111,44 @@ void check_references(sqlite3* database, const std::string& which, Diagnosis& fo
   }
 }
 
+std::vector<std::string> faults_of_tables(sqlite3* database) {
+  std::vector<std::string> faults;
+  for (const std::string& table : missing_tables(database)) {
+    faults.push_back(fmt::format(
+        "the table {} is missing, and no server starts on this file: `oblique backup --salvage` "
+        "makes one that has it, of all that can be read",
+        table));
+  }
+  return faults;
+}
+
+void add_texts(std::vector<std::string>& to, sqlite3* database, const std::string& sql) {
+  for (auto& text : texts(database, sql)) {
+    to.push_back(std::move(text));
+  }
+}
+
+/// Rows that refer to what is not there.
+void check_references_of_rows(sqlite3* database, const std::string& table, Diagnosis& found) {
+  // Rows of a study that is being deleted refer to none.
+  const bool deletes = !deleted_studies(database).empty();
+  check_references(database, deletes ? "parent <> 'studies'" : "1", found);
+  if (deletes) {
+    add_texts(found.faults, database,
+              fmt::format("SELECT DISTINCT 'table {0}: refers to study number ' || study_id ||"
+                          " ', which is not there' FROM {0} WHERE study_id NOT IN"
+                          " (SELECT study_id FROM studies UNION SELECT study_id FROM deletions)"
+                          " LIMIT 20",
+                          table));
+    add_texts(
+        found.remarks, database,
+        fmt::format("SELECT count(*) || ' results of deleted studies are left; the next server"
+                    " deletes them' FROM {} WHERE study_id IN (SELECT study_id FROM deletions)"
+                    " HAVING count(*) > 0",
+                    table));
+  }
+}
+
 }  // namespace
 
 std::vector<std::string> faults_of_pages(sqlite3* database) {
@@ -136,44 +174,19 @@ Diagnosis diagnose(const std::string& path) {
   add_row_checksum(database);
   const int schema = schema_of(database);
   if (schema >= kFirstPacked) {
-    for (const std::string& table : missing_tables(database)) {
-      found.faults.push_back(fmt::format(
-          "the table {} is missing, and no server starts on this file: `oblique backup --salvage` "
-          "makes one that has it, of all that can be read",
-          table));
-    }
+    found.faults = faults_of_tables(database);
     if (!found.faults.empty()) {
       return found;  // what would be asked next needs them
     }
   }
   const std::string table(results_table(schema));
-  const auto add = [&](std::vector<std::string>& to, const std::string& sql) {
-    for (auto& text : texts(database, sql)) {
-      to.push_back(std::move(text));
-    }
-  };
-  // Rows of a study that is being deleted refer to none.
-  const bool deletes = !deleted_studies(database).empty();
-  check_references(database, deletes ? "parent <> 'studies'" : "1", found);
-  if (deletes) {
-    add(found.faults,
-        fmt::format("SELECT DISTINCT 'table {0}: refers to study number ' || study_id ||"
-                    " ', which is not there' FROM {0} WHERE study_id NOT IN"
-                    " (SELECT study_id FROM studies UNION SELECT study_id FROM deletions)"
-                    " LIMIT 20",
-                    table));
-    add(found.remarks,
-        fmt::format("SELECT count(*) || ' results of deleted studies are left; the next server"
-                    " deletes them' FROM {} WHERE study_id IN (SELECT study_id FROM deletions)"
-                    " HAVING count(*) > 0",
-                    table));
-  }
-  add(found.faults,
-      "SELECT 'study ' || name || ' is called done with ' || results || ' of ' || points ||"
-      " ' results' FROM " +
-          counted_studies(schema) +
-          " WHERE state = 'done' AND results <> points"
-          " LIMIT 20");
+  check_references_of_rows(database, table, found);
+  add_texts(found.faults, database,
+            "SELECT 'study ' || name || ' is called done with ' || results || ' of ' || points ||"
+            " ' results' FROM " +
+                counted_studies(schema) +
+                " WHERE state = 'done' AND results <> points"
+                " LIMIT 20");
   if (schema >= kFirstPacked) {
     compare_settled_points(database, found);
     if (const auto faults = faults_of_views(database); !faults.empty()) {
@@ -184,14 +197,15 @@ Diagnosis diagnose(const std::string& path) {
   for (auto& fault : faults_of_rows(database, schema, kMostOfAKind)) {
     found.faults.push_back(std::move(fault));
   }
-  add(found.remarks,
-      "SELECT 'study ' || name || ' is ' || state || ': ' || results || ' of ' || points ||"
-      " ' points have a result' FROM " +
-          counted_studies(schema) +
-          " WHERE results < points"
-          " ORDER BY study_id");
+  add_texts(found.remarks, database,
+            "SELECT 'study ' || name || ' is ' || state || ': ' || results || ' of ' || points ||"
+            " ' points have a result' FROM " +
+                counted_studies(schema) +
+                " WHERE results < points"
+                " ORDER BY study_id");
   if (schema >= kFirstWithChecksums) {
-    add(found.remarks,
+    add_texts(
+        found.remarks, database,
         fmt::format(
             "SELECT count(*) || ' of ' || (SELECT count(*) FROM {0}) || ' results have no checksum,"
             " for they are of an earlier schema: a flipped bit in them may go unseen'"

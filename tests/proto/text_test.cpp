@@ -19,6 +19,7 @@ TEST(VisibleText, WritesOutWhatSteersATerminal) {
 
 TEST(VisibleText, WritesOutWhatTurnsTheDirectionOrEndsALine) {
   EXPECT_EQ(visible("a\u202eb\u2066c\u2069"), "a\\u202eb\\u2066c\\u2069");
+  EXPECT_EQ(visible("a\ufffe\uffff"), "a\\ufffe\\uffff");
   EXPECT_EQ(visible("\u200e\u200f\u061c\u2028\u2029"), "\\u200e\\u200f\\u061c\\u2028\\u2029");
 }
 

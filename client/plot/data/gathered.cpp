@@ -208,11 +208,9 @@ GatheredLines gathered_lines(const AnswerColumn& x, const AnswerColumn& y, const
   for (auto& [value, points] : lines) {
     const double first = points.begin()->first;
     const double last = points.rbegin()->first;
-    for (const double at : x_values) {
-      if (at > first && at < last) {
-        points.try_emplace(at);
-      }
-    }
+    const auto begin = std::upper_bound(x_values.begin(), x_values.end(), first);
+    const auto end = std::lower_bound(begin, x_values.end(), last);
+    std::for_each(begin, end, [&points = points](double at) { points.try_emplace(at); });
     Series line{.by = value, .x = {}, .y = {}};
     for (const auto& [at, sum] : points) {
       line.x.push_back(at);

@@ -43,13 +43,14 @@ void append_hundredths(std::string& out, std::int64_t hundredths) {
 /// it.
 constexpr char kOwn = '\x01';
 
-constexpr std::string_view kPngMark = "base64,";
+/// Texts have no quote, so that this is an attribute.
+constexpr std::string_view kPngMark = "\"data:image/png;base64,";
 
 /// Where the next PNG begins in a picture, and where it ends.
 std::pair<std::size_t, std::size_t> next_png(std::string_view text, std::size_t from) {
   const std::size_t begin = text.find(kPngMark, from);
   return begin == std::string_view::npos ? std::pair{text.size(), text.size()}
-                                         : std::pair{begin, text.find('"', begin)};
+                                         : std::pair{begin, text.find('"', begin + 1)};
 }
 
 /// The rules of CSS, each of them of what is below the element with that id.

@@ -57,6 +57,10 @@ Panel shape_panel(const PointHistory& history) {
                           .y = {-history.H_m, -history.H_m},
                           .stroke = 6});
   panel.y = axis_around("y [m]", "y_m", 1.0, panel.curves, false);
+  // So that a shallow drop, drawn to scale, is more than a strip.
+  const double least_m = 0.3 * (panel.x.range.to - panel.x.range.from);
+  const double lacking_m = std::max(0.0, least_m - (panel.y.range.to - panel.y.range.from));
+  panel.y.range = {panel.y.range.from - 0.5 * lacking_m, panel.y.range.to + 0.5 * lacking_m};
   return panel;
 }
 

@@ -65,6 +65,15 @@ TEST(Ids, AreAPicturesOwnSoThatSeveralMayStandInOnePage) {
   EXPECT_NE(own, own_of(picture_of(1.0, 7))) << "of other bytes";
 }
 
+TEST(Ids, FollowFromTextsThatLookLikePicturesToo) {
+  const auto picture_with = [](const std::string& text) {
+    SvgWriter svg(10.0, 10.0, "t", "d");
+    svg.text(1.0, 1.0, "a", "start", "data:image/png;base64," + text);
+    return std::move(svg).finished();
+  };
+  EXPECT_NE(own_of(picture_with("one")), own_of(picture_with("two")));
+}
+
 TEST(Styles, HoldInTheirPictureAlone) {
   const auto svg = picture_of(1.0);
   const auto root = '#' + own_of(svg) + "-picture ";
