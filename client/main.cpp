@@ -1,4 +1,4 @@
-#include "client/command_line.h"
+#include "client/verbs/command_line.h"
 #include "proto/frames.h"
 
 int main(int argc, char** argv) {

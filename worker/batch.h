@@ -2,11 +2,19 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
+#include "proto/oblique.pb.h"
 #include "proto/recipe/point_table.h"
 
 namespace oblique::worker {
+
+/// Points that follow each other, the end out.
+struct BatchPart {
+  std::uint64_t begin;
+  std::uint64_t end;
+};
 
 /// A batch with all that solving it needs.
 struct Batch {
@@ -16,24 +24,19 @@ struct Batch {
   std::uint64_t first_point;
   std::uint64_t count;
   std::shared_ptr<const protocol::PointTable> points;
+  std::vector<BatchPart> parts{};  ///< rising and apart, what is to be solved of it; empty: all
+
+  /// The first point of [at, end) that is to be solved, or `end`.
+  std::uint64_t first_to_solve(std::uint64_t at, std::uint64_t end) const;
 };
+
+/// The parts that a message tells, of a batch that begins with `first_point`; nothing when they are
+/// not `count` points together, or no parts at all.
+std::optional<std::vector<BatchPart>> parts_of(const protocol::Batch& message);
 
 /// How many points of a batch are to be solved. Where there is a filter so many numbers are looked
 /// at, which is more than a server puts into a batch.
-inline std::uint64_t points_to_solve(const protocol::PointTable& table, std::uint64_t first_point,
-                                     std::uint64_t count) {
-  constexpr std::uint64_t kMostLooks = 100'000;
-  if (!table.has_filter() || count > kMostLooks) {
-    return count;
-  }
-  std::uint64_t points = 0;
-  const std::uint64_t end = first_point + count;
-  for (std::uint64_t at = table.first_left_in(first_point, end); at < end;
-       at = table.first_left_in(at + 1, end)) {
-    ++points;
-  }
-  return points;
-}
+std::uint64_t points_to_solve(const Batch& batch);
 
 /// Points of one batch that were solved since the last report of it.
 struct Progress {

@@ -4,6 +4,8 @@
 #include <iterator>
 #include <utility>
 
+#include "worker/solver/library/point_runs.h"
+
 namespace oblique::worker {
 
 BatchSolver::BatchSolver(SolvePoints solve, std::function<void()> batch_ended, std::size_t threads)
@@ -135,7 +137,7 @@ void BatchSolver::work(const std::stop_token& stop) {
 
 std::optional<std::uint64_t> BatchSolver::next_point(Task& task, const std::stop_token& stop) {
   do {
-    task.next = task.batch->batch.points->first_left_in(task.next, task.end);
+    task.next = task.batch->batch.first_to_solve(task.next, task.end);
     if (task.next < task.end) {
       if (task.batch->dropped) {  // points may be slow: the rest of the task is not waited for
         return std::nullopt;
@@ -159,9 +161,7 @@ bool BatchSolver::take_more(Task& task, const std::stop_token& stop) {
   if (open.dropped || stop.stop_requested() || left == 0) {
     return false;
   }
-  // Ever smaller tasks towards the end, so that the threads finish together.
-  const std::uint64_t count =
-      std::clamp<std::uint64_t>(left / (4 * thread_count_), 1, kLargestTask);
+  const std::uint64_t count = solver::points_of_task(left, thread_count_);
   task.next = open.batch.first_point + open.given;
   task.end = task.next + count;
   open.given += count;

@@ -63,8 +63,6 @@ class BatchSolver {
 
  private:
   using Clock = std::chrono::steady_clock;
-  /// Most points of a task; about ten milliseconds of quick ones.
-  static constexpr std::uint64_t kLargestTask = 32;
   /// A result waits no longer in its thread.
   static constexpr std::chrono::milliseconds kLongestWait{20};
 

@@ -271,7 +271,8 @@ void Conversation::on(const protocol::Batch& batch) {
     return;
   }
   const auto study = studies_.find(batch.study_id());
-  const bool is_sound = study != studies_.end() && batch.count() > 0 &&
+  auto parts = parts_of(batch);
+  const bool is_sound = parts && study != studies_.end() && batch.count() > 0 &&
                         batch.first_point() < study->second->size() &&
                         batch.count() <= study->second->size() - batch.first_point();
   if (!is_sound) {
@@ -279,13 +280,13 @@ void Conversation::on(const protocol::Batch& batch) {
     return;
   }
   backoff_ms_ = 0;
-  const std::uint64_t number = next_batch_++;
-  const std::uint64_t points = points_to_solve(*study->second, batch.first_point(), batch.count());
-  held_[number] = {batch.study_id(), batch.lease_id(), batch.attempt(), points};
+  const Batch taken{next_batch_++, batch.study_id(), batch.first_point(),
+                    batch.count(), study->second,    std::move(*parts)};
+  const std::uint64_t points = points_to_solve(taken);
+  held_[taken.number] = {batch.study_id(), batch.lease_id(), batch.attempt(), points};
   leaving_.note_work(now_ms_);
   leaving_.note_batch({batch.study_id(), points});
-  effects_.emplace_back(
-      Solve{{number, batch.study_id(), batch.first_point(), batch.count(), study->second}});
+  effects_.emplace_back(Solve{taken});
   give_back_what_takes_too_long();
 }
 

@@ -17,11 +17,13 @@
 #include <CLI/CLI.hpp>
 
 #include "proto/frames.h"
+#include "proto/program/completion/complete.h"
 #include "proto/program/configuration/configuration.h"
 #include "proto/program/configuration/log_flags.h"
 #include "proto/program/exit_code.h"
 #include "proto/program/log.h"
 #include "proto/program/notify.h"
+#include "proto/program/origin/origin.h"
 #include "proto/program/parent.h"
 #include "proto/program/stop_signals.h"
 #include "proto/program/until.h"
@@ -144,11 +146,15 @@ int run_worker(SessionSettings settings, const StopWithParent& parent) {
 
 void add_options(CLI::App& app, Configuration& configuration, StopWithParent& parent,
                  SessionSettings& settings, Ending& ending, std::string& keys) {
-  app.set_version_flag("--version", "oblique-worker " + oblique::solver::solver_version());
+  app.set_version_flag("--version", "oblique-worker " + oblique::protocol::version_and_commit());
   app.add_option("--server", settings.server, "Where the server awaits workers")
+      ->type_name("URL")
       ->capture_default_str();
-  app.add_option("--keys", keys, "Key file for a server that has keys")->envname("OBLIQUE_KEYS");
+  app.add_option("--keys", keys, "Key file for a server that has keys")
+      ->type_name("FILE")
+      ->envname("OBLIQUE_KEYS");
   app.add_option("--name", settings.name, "Name that people see; the default is HOST:PROCESS")
+      ->type_name("NAME")
       ->check(objection_to_name);
   app.add_option("--threads", settings.threads,
                  "Points solved at a time, each thread on a core; the default is all cores here")
@@ -186,6 +192,7 @@ int run_program(int argc, char** argv, LogSettings& log) {
   Ending ending;
   add_options(app, configuration, parent, settings, ending, keys);
   add_log_flags(app, configuration, log);
+  oblique::protocol::answer_shell(app, argc, argv);
   if (const auto exit_code = configuration.parse(argc, argv)) {
     return *exit_code;
   }

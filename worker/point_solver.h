@@ -1,8 +1,6 @@
 #pragma once
 
 #include <cstddef>
-#include <span>
-#include <vector>
 
 #include "worker/batch.h"
 #include "worker/batch_solver.h"
@@ -34,11 +32,6 @@ class PointSolver {
   protocol::PointResult trace(const protocol::TraceOrder& order, const solver::Tracing::Sink& sink);
 
  private:
-  class BatchPoints;
-
-  /// One for each model; those that are missing are solved side by side.
-  std::vector<solver::FallOutcome> falls_of(std::span<const solver::ModelParameters> models);
-
   solver::FallCache falls_;
 };
 

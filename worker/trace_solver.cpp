@@ -38,6 +38,9 @@ void TraceSolver::take(protocol::TraceOrder order) {
   }
   job_.emplace(Job{std::move(order), {}});
   job_->part.set_trace_id(job_->order.trace_id());
+  if (job_->order.shape()) {
+    job_->thinning.emplace(job_->order.most_bytes());
+  }
   changed_.notify_all();
 }
 
@@ -70,20 +73,34 @@ void TraceSolver::work(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   while (changed_.wait(lock, stop, [this] { return job_.has_value(); })) {
     lock.unlock();
-    end(solve_(job_->order, [this](const solver::TraceRow& row) { add_row(row); }));
+    auto result = solve_(job_->order, [this](const solver::TraceRow& row) { add_row(row); });
+    if (job_->thinning) {
+      for (const TraceThinning::Shared& row : job_->thinning->rows()) {
+        add_numbers(row->numbers, row->state);
+      }
+    }
+    end(std::move(result));
     lock.lock();
   }
 }
 
 void TraceSolver::add_row(const solver::TraceRow& row) {
+  if (job_->thinning) {
+    job_->thinning->add(row);
+    return;
+  }
   if (job_->bytes > job_->order.most_bytes()) {
     return;  // it fails in the end
   }
   std::vector<double> numbers;
   solver::append_numbers(row, numbers);
+  add_numbers(numbers, solver::code_of_state(row.state));
+}
+
+void TraceSolver::add_numbers(const std::vector<double>& numbers, std::uint8_t state) {
   auto& rows = *job_->part.mutable_rows();
   rows.mutable_values()->Add(numbers.begin(), numbers.end());
-  rows.mutable_states()->push_back(static_cast<char>(solver::code_of_state(row.state)));
+  rows.mutable_states()->push_back(static_cast<char>(state));
   const std::size_t row_bytes = numbers.size() * sizeof(double) + 1;
   job_->bytes += row_bytes;
   const std::size_t rows_here = rows.states().size();

@@ -11,6 +11,7 @@
 
 #include "proto/oblique.pb.h"
 #include "worker/solver/model/trace.h"
+#include "worker/trace_thinning.h"
 
 namespace oblique::worker {
 
@@ -54,12 +55,15 @@ class TraceSolver {
     protocol::TraceOrder order;
     protocol::TracePart part;  ///< that grows
     std::uint64_t bytes = 0;   ///< of all rows so far
+    std::optional<TraceThinning> thinning =
+        {};  ///< of one with the shape, which is to be looked at
     bool is_cancelled = false;
     bool is_dropped = false;
   };
 
   void work(const std::stop_token& stop);
   void add_row(const solver::TraceRow& row);
+  void add_numbers(const std::vector<double>& numbers, std::uint8_t state);
   void hand_on(protocol::TracePart part);
   void end(protocol::PointResult result);
 
@@ -67,7 +71,8 @@ class TraceSolver {
   const std::function<void()> has_part_;
   mutable std::mutex mutex_;
   std::condition_variable_any changed_;
-  std::optional<Job> job_;  ///< `part` and `bytes` are the thread's own, the rest is guarded
+  std::optional<Job>
+      job_;  ///< `part`, `bytes` and `thinning` are the thread's own, the rest is guarded
   std::vector<protocol::TracePart> parts_;
   std::jthread thread_;  // last: it uses all the others
 };

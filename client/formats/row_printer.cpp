@@ -23,6 +23,10 @@ constexpr std::array<std::string_view, 6> kFormatNames{"table", "csv", "json",
 
 }  // namespace
 
+std::span<const std::string_view> format_names() {
+  return kFormatNames;
+}
+
 Format format_named(std::string_view name) {
   const auto found = std::find(kFormatNames.begin(), kFormatNames.end(), name);
   if (found == kFormatNames.end()) {

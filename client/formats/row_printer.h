@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -17,6 +18,8 @@ enum class Format { kTable, kCsv, kJson, kJsonLines, kNpz, kMarkdown };
 /// The format of that name: `table`, `csv`, `json`, `jsonl`, `npz` or `markdown`. Throws
 /// solver::InputError for other names.
 Format format_named(std::string_view name);
+/// Names of all.
+std::span<const std::string_view> format_names();
 
 /// The format that --format names or, where that is empty, the end of the file's name: .csv, .json,
 /// .jsonl, .npz or .md; a table for standard output (`file` empty), and for what is written in

@@ -7,6 +7,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/output/human_units.h"
+#include "client/plot/block_choice.h"
 #include "client/plot/figures/quantity.h"
 #include "proto/suggestion.h"
 #include "server/asking/columns.h"
@@ -154,8 +155,13 @@ bool names_axis(const std::string& condition, const StudyAxis& axis) {
 Condition condition_of(const PlotRequest& request, const StudyShape& shape,
                        const std::vector<ChosenAxis>& drawn, bool fixes_others) {
   Condition condition;
+  if (shape.is_one_block) {
+    condition.sql = fmt::format("point >= {} AND point < {}", shape.block.first_point,
+                                shape.block.first_point + shape.block.points);
+    condition.shown.push_back(block_in_words(shape));
+  }
   if (!request.where.empty()) {
-    condition.sql = '(' + request.where + ')';
+    condition.sql += fmt::format("{}({})", condition.sql.empty() ? "" : " AND ", request.where);
     condition.shown.push_back(request.where);
   }
   std::vector<const StudyAxis*> fixed;

@@ -79,8 +79,26 @@ void Drawing::entitle(Figure& figure, const std::string& what, std::uint64_t poi
     figure.subtitle += shown + ", ";
   }
   figure.subtitle += points == 1 ? "1 point" : shown_count(points) + " points";
+  say_block(figure);
   for (const auto& sentence : condition_.said) {
     tell_(sentence);
+  }
+}
+
+void Drawing::say_block(Figure& figure) const {
+  if (!shape_.is_one_block) {
+    return;
+  }
+  const std::size_t number = shape_.block.number + 1;
+  const std::uint64_t others = shape_.points - shape_.block.points;
+  figure.notes.push_back(fmt::format("Block {} of {}; not drawn: {} of {}.", number, shape_.blocks,
+                                     others == 1 ? "1 point" : shown_count(others) + " points",
+                                     shape_.blocks == 2 ? "the other" : "the others"));
+  if (request_.block.empty()) {
+    tell_(
+        fmt::format("The study has {} blocks; block {} is drawn. --block N draws another, and "
+                    "--block all draws all of them.",
+                    shape_.blocks, number));
   }
 }
 

@@ -47,6 +47,8 @@ class Drawing {
   static Quantity quantity(const ChosenAxis& axis, const AnswerColumn& column);
   static bool is_logarithmic_by_study(const ChosenAxis& axis);
   ColourChoice colours() const;
+  /// Says which block is drawn, and how much is not.
+  void say_block(Figure& figure) const;
   /// Title and subtitle; says what was chosen.
   void entitle(Figure& figure, const std::string& what, std::uint64_t points) const;
   static void refuse_log_of_nothing(const std::string& flag, bool is_asked,

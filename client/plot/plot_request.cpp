@@ -34,6 +34,13 @@ void check(const PlotRequest& request) {
     throw solver::InputError(fmt::format(
         "--scatter {} is not allowed: it must be two columns, as mu,fn_peak_N", request.scatter));
   }
+  const bool is_number =
+      request.block.find_first_not_of("0123456789") == std::string::npos && request.block != "0";
+  if (!is_number && request.block != "all") {
+    throw solver::InputError(
+        fmt::format("--block {} is not allowed: it must be the number of a block, from 1, or `all`",
+                    request.block));
+  }
   (void)palette_named(request.palette);
   (void)range_given(request.range);
 }

@@ -24,6 +24,7 @@ struct PlotRequest {
   std::string colour{};
   std::string where{};
   std::vector<std::string> at{};  ///< "KEY=VALUE"
+  std::string block{};            ///< its number from 1, or "all"; empty: chosen
   bool is_x_logarithmic = false;
   bool is_y_logarithmic = false;
   bool is_colour_logarithmic = false;

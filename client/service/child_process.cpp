@@ -37,6 +37,20 @@ Descriptor nameless_file() {
   return file;
 }
 
+// A nameless file that holds `text` and is read from its beginning.
+Descriptor file_of(std::string_view text) {
+  Descriptor file = nameless_file();
+  while (!text.empty()) {
+    const auto written = write(file.number(), text.data(), text.size());
+    if (written < 0 && errno != EINTR) {
+      throw ProcessError(fmt::format("cannot write what a program is to read: {}", reason(errno)));
+    }
+    text.remove_prefix(static_cast<std::size_t>(std::max<ssize_t>(0, written)));
+  }
+  lseek(file.number(), 0, SEEK_SET);
+  return file;
+}
+
 // Our environment without the variables whose names begin with `hidden`, unless that is empty.
 std::vector<char*> environment_without(const std::string& hidden) {
   std::vector<char*> variables;
@@ -49,12 +63,16 @@ std::vector<char*> environment_without(const std::string& hidden) {
   return variables;
 }
 
-// What a child starts with: the descriptors it gets, no blocked signals, its own process group.
+// What a child starts with: the descriptors it gets, no blocked signals, its process group.
 class SpawnPlan {
  public:
-  SpawnPlan(const ChildSettings& settings, int errors, int output) {
+  SpawnPlan(const ChildSettings& settings, int input, int errors, int output) {
     posix_spawn_file_actions_init(&actions_);
-    posix_spawn_file_actions_addopen(&actions_, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+    if (input >= 0) {
+      posix_spawn_file_actions_adddup2(&actions_, input, STDIN_FILENO);
+    } else {
+      posix_spawn_file_actions_addopen(&actions_, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+    }
     if (errors >= 0) {
       posix_spawn_file_actions_adddup2(&actions_, errors, STDERR_FILENO);
     }
@@ -69,7 +87,8 @@ class SpawnPlan {
     sigemptyset(&none);
     posix_spawnattr_setsigmask(&attributes_, &none);
     posix_spawnattr_setpgroup(&attributes_, 0);
-    posix_spawnattr_setflags(&attributes_, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETPGROUP);
+    const int group = settings.stays_in_our_group ? 0 : POSIX_SPAWN_SETPGROUP;
+    posix_spawnattr_setflags(&attributes_, static_cast<short>(POSIX_SPAWN_SETSIGMASK | group));
   }
   ~SpawnPlan() {
     posix_spawn_file_actions_destroy(&actions_);
@@ -104,7 +123,8 @@ ChildProcess::ChildProcess(const ChildSettings& settings) {
   if (settings.keep_output) {
     output_ = nameless_file();
   }
-  const SpawnPlan plan(settings, errors_.number(), output_.number());
+  const Descriptor input = settings.input ? file_of(*settings.input) : Descriptor();
+  const SpawnPlan plan(settings, input.number(), errors_.number(), output_.number());
   std::vector<std::string> texts{settings.program.string()};
   texts.insert(texts.end(), settings.arguments.begin(), settings.arguments.end());
   std::vector<char*> arguments;

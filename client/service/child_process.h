@@ -42,10 +42,13 @@ struct ChildSettings {
   int handed_over = -1;                ///< descriptor that becomes the child's kHandedOver
   bool keep_output = false;            ///< its standard output is kept apart; else with the errors
   std::string hidden_variables{};      ///< it does not see variables that begin so; empty: sees all
+  std::optional<std::string> input{};  ///< what it reads on standard input; none: nothing
+  bool stays_in_our_group = false;     ///< whoever ends our process group ends it too
 };
 
-/// One process of our own. It runs in a process group of its own, so that a Ctrl-C on the terminal
-/// reaches us alone and we end it in order. Killed and reaped when this is destroyed.
+/// One process of our own. It runs in a process group of its own unless told otherwise, so that a
+/// Ctrl-C on the terminal reaches us alone and we end it in order. Killed and reaped when this is
+/// destroyed.
 class ChildProcess {
  public:
   /// Number of the descriptor that the child is handed.

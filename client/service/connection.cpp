@@ -95,7 +95,9 @@ void Connection::send_or_connect_again(Outstanding& outstanding) {
 }
 
 void Connection::wait_a_slice(bool to_send) {
-  constexpr std::chrono::milliseconds kSlice{50};
+  constexpr std::chrono::milliseconds kLongest{50};
+  constexpr std::int64_t kSlices = 5;  // of a short patience
+  const auto slice = std::min(std::chrono::milliseconds(settings_.timeout_ms / kSlices), kLongest);
   if (keep_waiting_ && !keep_waiting_()) {
     throw Interrupted("stopped while waiting for the server");
   }
@@ -104,7 +106,7 @@ void Connection::wait_a_slice(bool to_send) {
   std::array<zmq::pollitem_t, 2> items{{{monitor_.handle(), 0, ZMQ_POLLIN, 0},
                                         {socket_.handle(), 0, static_cast<short>(events), 0}}};
   try {
-    zmq::poll(items, kSlice);
+    zmq::poll(items, slice);
   } catch (const zmq::error_t& error) {
     if (error.num() != EINTR) {
       throw;
@@ -241,6 +243,12 @@ protocol::SubmitReply Connection::submit(const Study& study, const StudyTerms& t
   }
   request.mutable_submit()->set_fresh(terms.fresh);
   return call(std::move(request)).submit();
+}
+
+protocol::StatusReply Connection::greeting() {
+  protocol::ClientRequest request;
+  request.mutable_status()->set_limit(1);
+  return call(std::move(request)).status();
 }
 
 protocol::StatusReply Connection::status(const std::string& study, const Tell& tell) {

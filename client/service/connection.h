@@ -78,6 +78,8 @@ class Connection {
 
   const std::string& url() const { return settings_.server_url; }
 
+  /// What the server says of itself, with one study at most.
+  protocol::StatusReply greeting();
   protocol::SubmitReply submit(const Study& study, const StudyTerms& terms = {});
   /// The study of that name, or all of them when it is empty, however many pages they fill.
   protocol::StatusReply status(const std::string& study, const Tell& tell = {});

@@ -8,6 +8,7 @@
 
 #include "client/study/flag_axis.h"
 #include "client/study/study.h"
+#include "proto/program/choices.h"
 #include "proto/recipe/axes.h"
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/checks.h"
@@ -118,12 +119,14 @@ void add_point_flags(CLI::App& verb, PointFlags& flags, FlagValues values) {
   const std::string type = values == FlagValues::kOne ? "VALUE" : "VALUES";
   const auto add = [&](const ParameterKey& key, const std::string& group) {
     const std::string name(key.name);
-    return verb
-        .add_option_function<std::string>(
-            flag_of_key(key.name),
-            [&flags, name](const std::string& text) { flags.axes[name] = text; }, described(key))
-        ->type_name(key.name == "integrator" ? "NAME" : type)
-        ->group(group);
+    const bool is_integrator = key.name == "integrator";
+    auto* option = verb.add_option_function<std::string>(
+                           flag_of_key(key.name),
+                           [&flags, name](const std::string& text) { flags.axes[name] = text; },
+                           described(key))
+                       ->type_name(is_integrator ? "NAME" : type)
+                       ->group(group);
+    return is_integrator ? protocol::note_choices(option, solver::integrator_names()) : option;
   };
   for (const auto& key : solver::point_keys()) {
     add(key, "Points");
@@ -132,12 +135,14 @@ void add_point_flags(CLI::App& verb, PointFlags& flags, FlagValues values) {
     add_block_flags(verb, flags);
   }
   const std::string group = "Model (defaults: the preset `" + flags.preset + "`)";
-  verb.add_option("--preset", flags.preset,
-                  "model to start from: " + protocol::joined(solver::preset_names()) +
-                      "; single flags override it")
-      ->type_name("NAME")
-      ->group(group)
-      ->capture_default_str();
+  auto* preset =
+      verb.add_option("--preset", flags.preset,
+                      "model to start from: " + protocol::joined(solver::preset_names()) +
+                          "; single flags override it")
+          ->type_name("NAME")
+          ->group(group)
+          ->capture_default_str();
+  protocol::note_choices(preset, solver::preset_names());
   verb.add_option(
           "--lengths", flags.lengths,
           "length of each link, from the pin outwards [m]; > 0; --length1, --length2, ... set that "

@@ -1,5 +1,6 @@
 #include "client/trace/trace_of_worker.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "proto/result_message.h"
@@ -72,7 +73,7 @@ SolvedByWorker trace_by_worker(Connection& connection, const std::string& study,
   request.set_fall(wishes.with_fall);
   request.set_time_limit_ms(static_cast<std::uint64_t>(wishes.time_limit_ms));
   protocol::TraceReply reply = connection.trace(request);
-  const SolvedByWorker solved = solved_by_worker(study, point, reply);
+  SolvedByWorker solved = solved_by_worker(study, point, reply);
   if (!solved.error.empty()) {
     return solved;
   }
@@ -81,16 +82,26 @@ SolvedByWorker trace_by_worker(Connection& connection, const std::string& study,
       static_cast<std::size_t>(solved.point.model.elements_per_link), wishes.with_shape);
   begin(shape);
   const std::uint64_t total = reply.total_rows();
-  std::uint64_t rows = give_rows(reply.rows(), shape, connection, row);
+  std::uint64_t instants = 0;  // of the contact
+  const auto counted = [&](const solver::TraceRow& each) {
+    instants += each.state == solver::kFalling ? 0U : 1U;
+    row(each);
+  };
+  std::uint64_t rows = give_rows(reply.rows(), shape, connection, counted);
   while (rows < total) {
     request.set_first_row(rows);
     reply = connection.trace(request);
-    const std::size_t more = give_rows(reply.rows(), shape, connection, row);
+    const std::size_t more = give_rows(reply.rows(), shape, connection, counted);
     if (more == 0 || reply.total_rows() != total ||
         reply.solver_version() != solved.solver_version) {
       refuse_rows(connection);
     }
     rows += more;
+  }
+  if (solved.result && wishes.with_shape) {  // each step has an instant, and the touch
+    const auto all =
+        static_cast<std::uint64_t>(std::max<std::int64_t>(solved.result->solver.steps, 0)) + 1;
+    solved.instants_left_out = all - std::min(all, instants);
   }
   return solved;
 }

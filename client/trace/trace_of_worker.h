@@ -21,6 +21,7 @@ struct SolvedByWorker {
   std::string worker;                        ///< its name
   std::string solver_version;
   std::string instruction_set;
+  std::uint64_t instants_left_out = 0;  ///< of the contact, where a trace with shapes was too long
 };
 
 /// What is wanted of a trace.

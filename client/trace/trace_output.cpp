@@ -31,6 +31,10 @@ std::optional<TraceFormat> format_called(std::string_view name) {
 
 }  // namespace
 
+std::span<const std::string_view> trace_format_names() {
+  return kFormats;
+}
+
 TraceFormat trace_format(const std::string& flag, const std::string& file) {
   const std::string ending = std::filesystem::path(file).extension().string();
   const auto of_file = format_called(std::string_view(ending).substr(ending.empty() ? 0 : 1));

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -20,6 +21,8 @@ enum class TraceFormat { kCsv, kJson, kNpz };
 /// The format that a flag names or, where it is empty, the end of the file's name; CSV unless told.
 /// Throws solver::InputError for other names, and for a file whose name ends as another format.
 TraceFormat trace_format(const std::string& flag, const std::string& file);
+/// Names of all.
+std::span<const std::string_view> trace_format_names();
 
 /// Where a trace goes: a file, which appears whole at the end only, or, where that is empty,
 /// standard output.

@@ -20,6 +20,7 @@
 #include "client/service/source_flags.h"
 #include "client/service/watching.h"
 #include "client/verbs/verbs.h"
+#include "proto/program/choices.h"
 #include "proto/program/stop_signals.h"
 #include "proto/program/usage.h"
 #include "proto/suggestion.h"
@@ -40,6 +41,8 @@ Before, for the workers of the jobs:
 
 Submits jobs with workers (deploy/slurm) while points are open, as many as settle them within the
 target, and has those leave that idle. Ctrl-C leaves the jobs running; started again it finds them.)";
+
+constexpr std::array<std::string_view, 1> kEngines{"slurm"};
 
 struct AutoscaleFlags {
   std::string engine;
@@ -243,14 +246,14 @@ void add_autoscale(CLI::App& app, Command& command) {
   auto* verb = app.add_subcommand(
       "autoscale", "Submit jobs with workers to a cluster while there is work, and retire them");
   verb->footer(kAutoscaleExamples);
-  verb->add_option("ENGINE", flags->engine, "what runs the jobs: slurm")
-      ->required()
-      ->check([](const std::string& engine) {
-        constexpr std::array<std::string_view, 1> kEngines{"slurm"};
-        return engine == kEngines[0] ? std::string()
-                                     : fmt::format("there is no `{}`{}: jobs are run by {}", engine,
-                                                   protocol::did_you_mean(engine, kEngines),
-                                                   protocol::joined(kEngines));
+  auto* engine = verb->add_option("ENGINE", flags->engine, "what runs the jobs: slurm")->required();
+  protocol::note_choices(engine, kEngines);
+  engine
+      ->check([](const std::string& name) {
+        return name == kEngines[0] ? std::string()
+                                   : fmt::format("there is no `{}`{}: jobs are run by {}", name,
+                                                 protocol::did_you_mean(name, kEngines),
+                                                 protocol::joined(kEngines));
       })
       ->type_name("");
   add_scaling_flags(*verb, *flags);

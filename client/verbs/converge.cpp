@@ -19,6 +19,7 @@
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
 #include "proto/program/usage.h"
+#include "proto/recipe/blocks.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {
@@ -153,15 +154,39 @@ int converge(const ConvergeFlags& flags, const protocol::PointTable& table, Work
   return kDone;
 }
 
-int mesh_study(const ConvergeFlags& flags, const protocol::PointTable& table, WorkLine& line) {
+/// Of a study that refines one model.
+solver::ModelParameters only_model(const protocol::PointTable& table, const char* study) {
   if (table.models() != 1) {
     throw solver::InputError(
-        fmt::format("the flags make {} models, and a mesh study takes one", table.models()));
+        fmt::format("the flags make {} models, and {} takes one: give each key of the model one "
+                    "value",
+                    table.models(), study));
   }
+  return first_model(table);
+}
+
+/// Points that would be of no effect are refused.
+void refuse_points(const PointFlags& flags) {
+  std::string given = !flags.sample.empty() ? "--sample" : !flags.where.empty() ? "--where" : "";
+  for (const auto key : protocol::kPointKeyOrder) {
+    if (flags.axes.contains(std::string(key))) {
+      given = fmt::format("--{}", key);
+    }
+  }
+  if (!given.empty() || flags.zip) {
+    throw solver::InputError(
+        fmt::format("{} is not allowed with --step-study, which has its own points over all drops, "
+                    "frictions and restitutions: give keys of the model alone",
+                    given.empty() ? "--zip" : given));
+  }
+}
+
+int mesh_study(const ConvergeFlags& flags, const protocol::PointTable& table, WorkLine& line) {
+  const auto model = only_model(table, "a mesh study");
   const auto points = points_of(table);
   const int coarsest = flags.coarsest == 0 ? kStudyCoarsest : flags.coarsest;
   const int finest = flags.finest == 0 ? std::max(kStudyFinest, 4 * coarsest) : flags.finest;
-  const auto meshes = mesh_levels(first_model(table), coarsest, finest);
+  const auto meshes = mesh_levels(model, coarsest, finest);
   tell_levels("mesh", meshes);
   const auto levels = solved(meshes, points, line);
   std::vector<Refinement> refinements;
@@ -199,6 +224,9 @@ int step_study_around(const solver::ModelParameters& model, Format format, WorkL
 }
 
 int converge_of_flags(ConvergeFlags flags) {
+  if (flags.step_study) {
+    refuse_points(flags.points);
+  }
   if (flags.mesh_study || flags.step_study) {
     flags.points.axes.try_emplace("H", "0.4,0.7,1");
     flags.points.axes.try_emplace("mu", "0.1,0.4,0.8,1.2,1.6");
@@ -207,7 +235,8 @@ int converge_of_flags(ConvergeFlags flags) {
   const auto table = points_of_flags(flags.points, tip_reach());
   WorkLine line;
   if (flags.step_study) {
-    return step_study_around(first_model(table), flags.json ? Format::kJson : Format::kTable, line);
+    return step_study_around(only_model(table, "a step study"),
+                             flags.json ? Format::kJson : Format::kTable, line);
   }
   return flags.mesh_study ? mesh_study(flags, table, line) : converge(flags, table, line);
 }

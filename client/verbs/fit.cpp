@@ -11,6 +11,7 @@
 #include "client/output/work_line.h"
 #include "client/paper/parameter_fit.h"
 #include "client/verbs/verbs.h"
+#include "proto/program/choices.h"
 #include "proto/suggestion.h"
 #include "worker/solver/model/number.h"
 #include "worker/solver/model/parameters.h"
@@ -137,10 +138,11 @@ void add_fit(CLI::App& app, Command& command) {
   auto* verb = app.add_subcommand(
       "fit", "Recover the parameters that the paper does not print from the numbers it does");
   verb->footer(kFitExamples);
-  verb->add_option("--from", flags->from,
-                   "preset to start from: " + protocol::joined(solver::preset_names()))
-      ->type_name("NAME")
-      ->capture_default_str();
+  auto* from = verb->add_option("--from", flags->from,
+                                "preset to start from: " + protocol::joined(solver::preset_names()))
+                   ->type_name("NAME")
+                   ->capture_default_str();
+  protocol::note_choices(from, solver::preset_names());
   verb->add_option("--elements-per-link", flags->elements_per_link, "mesh on which to fit")
       ->type_name("N")
       ->capture_default_str();

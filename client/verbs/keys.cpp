@@ -1,9 +1,11 @@
+#include <array>
 #include <filesystem>
 #include <iostream>
 #include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -12,6 +14,7 @@
 #include "client/verbs/verbs.h"
 #include "proto/keys/key_file.h"
 #include "proto/keys/key_folder.h"
+#include "proto/program/choices.h"
 #include "proto/text.h"
 #include "worker/solver/model/errors.h"
 
@@ -25,6 +28,9 @@ constexpr const char* kKeysExamples = R"(Examples:
   oblique keys revoke alice --dir keys
 
 A running server heeds a change within a second; the connections of a revoked key are ended.)";
+
+/// That may be listed: all but the server's.
+constexpr std::array<std::string_view, 3> kRoles{"client", "worker", "reader"};
 
 struct KeysFlags {
   std::string folder;  // empty: not given
@@ -175,9 +181,10 @@ void add_keys(CLI::App& app, Command& command) {
   added->add_option("NAME", flags->name, "of the key, for people; also of its file, NAME.key")
       ->required()
       ->type_name("");
-  added->add_option("--role", flags->role, "client, worker or reader")
-      ->required()
-      ->type_name("ROLE");
+  auto* role = added->add_option("--role", flags->role, "client, worker or reader")
+                   ->required()
+                   ->type_name("ROLE");
+  protocol::note_choices(role, kRoles);
   added
       ->add_option("--public", flags->public_key,
                    "public key that was made elsewhere; default: a new pair, written to NAME.key")

@@ -126,7 +126,7 @@ void add_columns(CLI::App& app, Command& command) {
   auto flags = std::make_shared<ColumnsFlags>();
   auto* verb = app.add_subcommand("columns", "Name, unit and meaning of every input and output");
   verb->footer(kListColumnsExamples);
-  verb->add_option("NAME", flags->pattern, "a column, or a pattern of * and ?; all when left out")
+  verb->add_option("COLUMN", flags->pattern, "a column, or a pattern of * and ?; all when left out")
       ->type_name("");
   verb->add_flag("--trace", flags->trace, "those of a trace, as `oblique trace` writes it");
   add_format_flag(*verb, flags->format);

@@ -17,6 +17,7 @@
 #include "client/verbs/printed_rows.h"
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
+#include "proto/program/choices.h"
 #include "proto/suggestion.h"
 #include "server/asking/sql/sql_expression.h"
 #include "worker/solver/model/errors.h"
@@ -118,6 +119,7 @@ void add_paper(CLI::App& app, Command& command) {
   auto* preset = verb->add_option("--preset", flags->preset,
                                   "model: " + protocol::joined(solver::preset_names()));
   preset->type_name("NAME")->capture_default_str();
+  protocol::note_choices(preset, solver::preset_names());
   auto* database = verb->add_option("--db", flags->database,
                                     "compare results of this database instead of solving now");
   database->type_name("FILE")->excludes(preset);

@@ -7,6 +7,7 @@
 #include "client/formats/pager.h"
 #include "client/formats/sink.h"
 #include "client/plot/terminal/terminal_figure.h"
+#include "proto/program/choices.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::client {
@@ -19,9 +20,11 @@ void add_picture_flags(CLI::App& verb, PictureFlags& flags) {
       ->default_str("760x520");
   verb.add_option("--out", flags.out, "file to write, which appears when it is whole")
       ->type_name("FILE");
-  verb.add_option("--format", flags.format,
-                  "svg, png, csv or gnuplot; as the file's name ends when left out, else svg")
-      ->type_name("FORMAT");
+  auto* format =
+      verb.add_option("--format", flags.format,
+                      "svg, png, csv or gnuplot; as the file's name ends when left out, else svg")
+          ->type_name("FORMAT");
+  protocol::note_choices(format, plot::picture_format_names());
   verb.add_flag("--show", flags.show, "draw on the terminal");
 }
 

@@ -2,12 +2,15 @@
 #include <string>
 #include <vector>
 
+#include "client/plot/block_choice.h"
+#include "client/plot/draw/palette.h"
 #include "client/plot/plot_request.h"
 #include "client/service/source_flags.h"
 #include "client/service/watching.h"
 #include "client/verbs/picture_flags.h"
 #include "client/verbs/plot_point.h"
 #include "client/verbs/verbs.h"
+#include "proto/program/choices.h"
 #include "server/care/study_care.h"
 
 namespace oblique::client {
@@ -25,8 +28,9 @@ constexpr const char* kPlotExamples = R"(Examples:
   oblique plot --H 1 --mu 1.2 --e 1 --out impact.svg    of a point of no study
 
 OUTPUT and COL are columns of `oblique query`, or SQL expressions over them, as ft_peak_N/fn_peak_N;
-KEY is an axis of the study. Of an axis that is left open the first value is drawn, and said. Maps of
-texts, as of modes, name those that are met most. Cells without a result are hatched, failed ones
+KEY is an axis of the study. Of an axis that is left open the first value is drawn, and said; of
+several blocks a map and lines show one, and say so. Maps of texts, as of modes, name those that are
+met most. Cells without a result are hatched, failed ones
 crossed. Where points lie scattered, or are too many to draw each, cells gather them, and the picture
 says so. PNG needs rsvg-convert. Without --out the picture is drawn on a terminal, and as SVG into a
 pipe. --range and --at are in SI units. A point is solved again for its time histories, here when the
@@ -50,7 +54,7 @@ protocol::Recipe recipe_for(const PlotFlags& flags, Source& source) {
 int plot_study(const PlotFlags& flags) {
   const auto size = picture_size(flags.picture, {});
   const auto source = open_source(flags.source);
-  const auto shape = plot::shape_of(recipe_for(flags, *source));
+  const auto shape = plot::shape_for(recipe_for(flags, *source), flags.request);
   const auto figure =
       plot::figure_of(*source, shape, plot::completed(flags.request, shape), tell_line);
   put_out(flags.picture, figure,
@@ -119,19 +123,24 @@ void add_plot(CLI::App& app, Command& command) {
   add_text(*verb, "--where", request.where, "condition that points must meet", "EXPR");
   verb->add_option("--at", request.at, "value of another axis; may be given for several")
       ->type_name("KEY=VALUE");
+  add_text(*verb, "--block", request.block,
+           "which block of the study; default: that with the most points of those that fit",
+           "N|all");
   verb->add_flag("--log-x", request.is_x_logarithmic, "a logarithmic horizontal axis");
   verb->add_flag("--log-y", request.is_y_logarithmic, "a logarithmic vertical axis");
   verb->add_flag("--log-colour", request.is_colour_logarithmic, "colours by logarithms");
   add_text(*verb, "--range", request.range,
            "values that colours span, or the vertical axis of --lines, or the bins of --histogram",
            "FROM:TO");
-  add_text(*verb, "--palette", request.palette, "colours of maps: viridis or cividis", "NAME")
-      ->capture_default_str();
+  auto* palette =
+      add_text(*verb, "--palette", request.palette, "colours of maps: viridis or cividis", "NAME")
+          ->capture_default_str();
+  protocol::note_choices(palette, plot::palette_names());
   add_picture_flags(*verb, flags->picture);
   add_point_picture_flags(*verb, flags->point);
   for (const char* of_study :
        {"--map", "--lines", "--scatter", "--histogram", "--x", "--y", "--by", "--colour", "--where",
-        "--at", "--range", "--log-x", "--log-y", "--log-colour"}) {
+        "--at", "--block", "--range", "--log-x", "--log-y", "--log-colour"}) {
     verb->get_option("--point")->excludes(verb->get_option(of_study));
   }
   add_source_flags(*verb, flags->source);

@@ -9,6 +9,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/output/human_units.h"
 #include "client/output/mesh_note.h"
 #include "client/output/work_line.h"
 #include "client/plot/point/panels.h"
@@ -19,6 +20,7 @@
 #include "client/verbs/solve_here.h"
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
+#include "proto/program/choices.h"
 #include "proto/program/usage.h"
 #include "proto/recipe/point_table.h"
 #include "worker/solver/model/errors.h"
@@ -97,6 +99,10 @@ SolvedAgain solved_by_worker(const PointPictureFlags& flags, const SourceFlags& 
   PointHistory history = history_of(solved.point);
   history.rows = std::move(rows);
   history.result = solved.result;
+  if (solved.instants_left_out > 0) {
+    history.remarks.push_back(fmt::format("{} instants are left out; with --here all are drawn.",
+                                          shown_count(solved.instants_left_out)));
+  }
   take_falls(history);
   if (history.falls.empty() &&
       (flags.panel.empty() || plot::point_panel_named(flags.panel) == plot::PointPanel::kShape)) {
@@ -197,11 +203,12 @@ void add_point_picture_flags(CLI::App& verb, PointPictureFlags& flags) {
       ->check(protocol::whole_number_from(0))
       ->type_name("N")
       ->group(group);
-  verb.add_option("--panel", flags.panel,
-                  "of a point one panel alone: forces, loop, deformation, velocities, energies or "
-                  "shape")
-      ->type_name("NAME")
-      ->group(group);
+  auto* panel = verb.add_option("--panel", flags.panel,
+                                "of a point one panel alone: forces, loop, deformation, "
+                                "velocities, energies or shape")
+                    ->type_name("NAME")
+                    ->group(group);
+  protocol::note_choices(panel, plot::kPointPanels);
   auto* here = verb.add_flag("--here", flags.here, "solve the point in this process");
   here->group(group);
   verb.add_flag("--on-worker", flags.on_worker, "have a worker of the server solve the point")

@@ -11,6 +11,7 @@
 #include "client/output/columns.h"
 #include "client/output/human_units.h"
 #include "client/output/terminal.h"
+#include "proto/program/choices.h"
 #include "proto/program/exit_code.h"
 #include "proto/text.h"
 #include "proto/wire/chunk_rows.h"
@@ -20,16 +21,18 @@
 namespace oblique::client {
 
 void add_format_flag(CLI::App& verb, std::string& format) {
-  verb.add_option("--format", format, "table, csv, json, jsonl, npz or markdown")
-      ->type_name("FORMAT")
-      ->capture_default_str();
+  auto* option = verb.add_option("--format", format, "table, csv, json, jsonl, npz or markdown")
+                     ->type_name("FORMAT")
+                     ->capture_default_str();
+  protocol::note_choices(option, format_names());
 }
 
 void add_output_flags(CLI::App& verb, OutputFlags& flags) {
-  verb.add_option("--format", flags.format,
-                  "table, csv, json, jsonl, npz or markdown; as the file's name ends when left "
-                  "out, else table")
-      ->type_name("FORMAT");
+  auto* format = verb.add_option("--format", flags.format,
+                                 "table, csv, json, jsonl, npz or markdown; as the file's name "
+                                 "ends when left out, else table")
+                     ->type_name("FORMAT");
+  protocol::note_choices(format, format_names());
   verb.add_option("--out", flags.file, "file to write, which appears when it is whole")
       ->type_name("FILE");
   verb.add_flag("--no-pager", flags.no_pager,

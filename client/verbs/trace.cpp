@@ -7,6 +7,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/output/human_units.h"
 #include "client/output/work_line.h"
 #include "client/service/source_flags.h"
 #include "client/service/watching.h"
@@ -15,6 +16,7 @@
 #include "client/trace/trace_output.h"
 #include "client/verbs/solve_here.h"
 #include "client/verbs/verbs.h"
+#include "proto/program/choices.h"
 #include "proto/program/usage.h"
 #include "worker/solver/model/number.h"
 
@@ -107,6 +109,13 @@ Solved solve_by_worker(const TraceFlags& flags, Connection& connection, TraceOut
         "The trace has no rows of the fall: the server or its worker is older than these. --here "
         "solves the point in this process.");
   }
+  if (solved.instants_left_out > 0) {
+    tell_line(fmt::format(
+        "With the shapes the trace is too long to pass through a server: {} instants of the "
+        "contact are left out, "
+        "evenly, but for extremes of the forces and changes of state. --here has all of them.",
+        shown_count(solved.instants_left_out)));
+  }
   return {solved.point, solved.result,
           fmt::format("by worker {} ({})", solved.worker, solved.instruction_set)};
 }
@@ -180,9 +189,11 @@ void add_trace(CLI::App& app, Command& command) {
       ->type_name("");
   verb->add_option("--out", flags->out, "file that is written; standard output when left out")
       ->type_name("FILE");
-  verb->add_option("--format", flags->format,
-                   "csv, json or npz; as the file's name ends when left out, else csv")
-      ->type_name("FORMAT");
+  auto* format = verb->add_option("--format", flags->format,
+                                  "csv, json or npz; as the file's name ends when left out, "
+                                  "else csv")
+                     ->type_name("FORMAT");
+  protocol::note_choices(format, trace_format_names());
   verb->add_flag("--shape", flags->shape, "add the positions of the chain's nodes");
   verb->add_flag(
       "--fall", flags->fall,

@@ -47,5 +47,6 @@ void add_autoscale(CLI::App& app, Command& command);
 void add_keygen(CLI::App& app, Command& command);
 void add_keys(CLI::App& app, Command& command);
 void add_view(CLI::App& app, Command& command);
+void add_doctor(CLI::App& app, Command& command);
 
 }  // namespace oblique::client

@@ -1,19 +1,20 @@
 // @ts-check
 // Which view an address means. Views are functions: they fill an element and give what ends them.
 import { h } from "/parts/dom.js";
-import { session, follow } from "/server.js";
+import { session, follow, in_words, Silence } from "/server.js";
 import { overview } from "/overview.js";
 
 /**
  * @typedef {object} Place what an address says
  * @property {URLSearchParams} fields
- * @property {(fields: URLSearchParams) => void} keep writes them into the address, soon
+ * @property {(fields: URLSearchParams, is_step?: boolean) => void} keep writes them into the address, soon; a step is one that people go back over
  * @property {(address: string) => void} go to another view, so that this one can be come back to
  * @property {boolean} may_change
  * @property {() => any} now the last overview, or null
  * @property {(links: (string | Node)[]) => void} trail what stands beside the name
  * @property {(path: string) => string} last how that view was left
- * @typedef {{close?: () => void, take?: (now: any) => void}} View
+ * @typedef {{close?: () => void, take?: (now: any) => void, go_to?: (fields: URLSearchParams) => void, focus?: () => void, again?: () => void}} View
+ *   `go_to` another address of the same path; `focus` for who came back; `again` after the server did not answer
  */
 
 const view = /** @type {HTMLElement} */ (document.getElementById("view"));
@@ -25,12 +26,16 @@ let shown = {};
 /** @type {any} */
 let now = null;
 let turn = 0;
+/** Of the view that is shown. */
+let here = "";
 let may_change = false;
 /** How views were left. @type {Map<string, string>} */
 const left = new Map();
 
 /** Browsers refuse addresses that change more than some hundred times in ten seconds. */
 const kWriteAgain_ms = 150;
+/** After the server did not answer. */
+const kAskAgain_ms = 3000;
 /** The address that this view is to have; empty: it has it. */
 let wanted = "";
 let later = 0;
@@ -52,6 +57,15 @@ function write_soon() {
   }, kWriteAgain_ms);
 }
 
+/** The address that is left stays behind. @param {string} address */
+function step_to(address) {
+  write();
+  if (address === location.hash) return;
+  try {
+    history.pushState(null, "", address);
+  } catch { /* too often for this browser: it is written as others are */ }
+}
+
 function links(/** @type {(string | Node)[]} */ parts) {
   trail.replaceChildren(...parts.flatMap((part) => [h("span", { "aria-hidden": "true" }, "/"), part]));
   const last = parts.at(-1);
@@ -59,19 +73,28 @@ function links(/** @type {(string | Node)[]} */ parts) {
 }
 
 async function show() {
+  const [path, query] = location.hash.replace(/^#/, "").split("?", 2);
+  if (path === here && shown.go_to) {
+    wanted = "";
+    left.set(path, location.hash);
+    shown.go_to(new URLSearchParams(query ?? ""));
+    return;
+  }
+  const is_first = turn === 0;
+  here = path;
   const mine = ++turn;
   shown.close?.();
   shown = {};
   wanted = "";
-  const [path, query] = location.hash.replace(/^#/, "").split("?", 2);
   const root = h("div", {});
   /** @type {Place} */
   const place = { fields: new URLSearchParams(query ?? ""), may_change, now: () => now,
     // Answers may come when another view is shown.
     trail: (parts) => { if (mine === turn) links(parts); },
     last: (of) => left.get(of) ?? `#${of}`,
-    keep: (fields) => {
+    keep: (fields, is_step = false) => {
       if (mine !== turn) return;
+      if (is_step) step_to(`#${path}?${fields}`);
       left.set(path, wanted = `#${path}?${fields}`);
       write_soon();
     },
@@ -96,23 +119,36 @@ async function show() {
       return;
     }
     shown = made;
+    if (!is_first && [document.body, view, null].includes(/** @type {any} */ (document.activeElement))) {
+      view.focus({ preventScroll: true });
+      made.focus?.();
+    }
     if (now) shown.take?.(now);
   } catch (error) {
-    if (mine === turn) root.replaceChildren(h("p", { role: "alert", class: "bad" }, String(/** @type {Error} */ (error).message ?? error)),
+    const said = in_words(error);
+    if (mine === turn && said instanceof Silence) setTimeout(() => { if (mine === turn) show(); }, kAskAgain_ms);
+    if (mine === turn) root.replaceChildren(h("p", { role: "alert", class: "bad" }, String(said.message ?? said)),
       h("p", {}, h("a", { href: "#/" }, "All studies")));
   }
 }
 
 try {
-  const here = await session();
-  may_change = here.may_change;
-  if (here.may_look) {
-    follow((told) => {
+  const told = await session();
+  may_change = told.may_change;
+  if (told.may_look) {
+    const take = (/** @type {any} */ told) => {
       now = told;
       pace.textContent = told.database_fault || `${Math.round(told.points_per_s)} points/s`;
       pace.className = told.database_fault ? "bad" : "";
       shown.take?.(told);
-    }, (text) => { pace.textContent = text; });
+    };
+    follow(take, (text) => {
+      pace.textContent = text;
+      pace.className = "bad";
+    }, () => {
+      if (now) take(now);
+      shown.again?.();
+    });
     addEventListener("hashchange", show);
     // Links, and what copies the address, find it written.
     document.addEventListener("click", write, { capture: true });
@@ -123,7 +159,7 @@ try {
     });
     await show();
   } else {
-    view.replaceChildren(h("p", {}, here.how_to_enter));
+    view.replaceChildren(h("p", {}, told.how_to_enter));
   }
 } catch (error) {
   view.replaceChildren(h("p", { role: "alert", class: "bad" }, String(error)));

@@ -10,6 +10,26 @@ export class Refusal extends Error {
   }
 }
 
+/** No answer: nobody listens, or no longer. */
+export class Silence extends Error {
+  constructor() {
+    super("The server does not answer.");
+  }
+}
+
+/** What people are told of an error. @param {any} error */
+export const in_words = (error) => (/dynamically imported module|importing a module script/i.test(error?.message) ? new Silence() : error);
+
+/** @param {string} path @param {RequestInit} how */
+async function asked(path, how) {
+  try {
+    return await fetch(path, how);
+  } catch (error) {
+    if (how.signal?.aborted) throw error;
+    throw new Silence();
+  }
+}
+
 /** @param {Response} answer */
 async function refusal(answer) {
   let sentence = `${answer.status} ${answer.statusText}`;
@@ -21,14 +41,14 @@ async function refusal(answer) {
 
 /** @param {string} path @param {AbortSignal} [signal] @returns {Promise<any>} */
 export async function json(path, signal) {
-  const answer = await fetch(path, { signal });
+  const answer = await asked(path, { signal });
   if (!answer.ok) throw await refusal(answer);
   return answer.json();
 }
 
 /** Asks for a change. @param {string} path @param {object} [body] @returns {Promise<any>} */
 export async function change(path, body) {
-  const answer = await fetch(path, {
+  const answer = await asked(path, {
     method: "POST", body: JSON.stringify(body ?? {}), headers: { "Content-Type": "application/json" } });
   if (!answer.ok) throw await refusal(answer);
   return answer.json();
@@ -37,11 +57,15 @@ export async function change(path, body) {
 /**
  * Numbers behind a head: the head, the bytes, and where the numbers begin in them.
  * @param {string} path @param {AbortSignal} [signal]
+ * @param {(told: any) => void} [meanwhile] is told what is said when they are not there yet
  * @returns {Promise<{head: any, bytes: ArrayBuffer, begin: number} | null>} null: not yet, ask again
  */
-export async function numbers(path, signal) {
-  const answer = await fetch(path, { signal });
-  if (answer.status === 202) return null;
+export async function numbers(path, signal, meanwhile) {
+  const answer = await asked(path, { signal });
+  if (answer.status === 202) {
+    meanwhile?.(await answer.json());
+    return null;
+  }
   if (!answer.ok) throw await refusal(answer);
   const bytes = await answer.arrayBuffer();
   const length = new DataView(bytes).getUint32(0, true);
@@ -55,12 +79,13 @@ const kTryAgain_ms = 3000;
 
 /**
  * Follows the overview while the page is seen.
- * @param {(now: any) => void} take @param {(text: string) => void} say
+ * @param {(now: any) => void} take @param {(text: string) => void} say @param {() => void} back it answers again
  */
-export function follow(take, say) {
+export function follow(take, say, back) {
   /** @type {EventSource | null} */
   let source = null;
   let later = 0;
+  let is_silent = false;
   const end = () => {
     clearTimeout(later);
     source?.close();
@@ -72,10 +97,16 @@ export function follow(take, say) {
     } else if (!source) {
       source = new EventSource("/api/events");
       source.addEventListener("overview", (event) => take(JSON.parse(event.data)));
+      source.addEventListener("open", () => {
+        if (is_silent) back();
+        is_silent = false;
+      });
       source.addEventListener("error", () => {
+        is_silent = true;
         say("The server does not answer; trying again.");
         if (source?.readyState !== EventSource.CLOSED) return;
         end();  // it was refused, and browsers do not ask again then
+        session().then((told) => { if (!told.may_look) say(`The server was started anew: ${told.how_to_enter}.`); }, () => {});
         later = setTimeout(look, kTryAgain_ms);
       });
     }

@@ -78,6 +78,24 @@ OpenedForReading open_for_reading(const std::string& path) {
   return opened;
 }
 
+DatabaseHandle open_without_traces(const std::string& path) {
+  check_path(path);
+  if (!std::filesystem::exists(path)) {
+    throw StorageError("there is no database " + path);
+  }
+  const auto has_bytes = [&path](const char* ending) {
+    std::error_code none;
+    return std::filesystem::file_size(path + ending, none) > 0 && !none;
+  };
+  if (has_bytes("-wal") && has_bytes("-shm")) {
+    DatabaseHandle database = open_database(path, SQLITE_OPEN_READONLY);
+    if (!lacks_files(look_at(database.get()))) {
+      return database;
+    }
+  }
+  return open_alone(path);
+}
+
 OpenedForReading open_stored(const std::string& path) {
   OpenedForReading opened = open_for_reading(path);
   if (identify(opened.database.get(), path) == DatabaseKind::kEmpty) {

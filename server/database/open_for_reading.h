@@ -19,8 +19,13 @@ struct OpenedForReading {
 /// is no such file or it cannot be opened.
 OpenedForReading open_for_reading(const std::string& path);
 
-/// The same for a database that is ours and has had a study stored in it; throws StorageError,
-/// saying what it is instead, for any other.
+/// The same, and surely nothing is made or changed beside it, and nobody is waited for: where a log
+/// lies beside it without its index, its rows are read into memory, and where none does, the
+/// database is read without regard to who may begin to write to it.
+DatabaseHandle open_without_traces(const std::string& path);
+
+/// As `open_for_reading` for a database that is ours and has had a study stored in it; throws
+/// StorageError, saying what it is instead, for any other.
 OpenedForReading open_stored(const std::string& path);
 
 }  // namespace oblique::server

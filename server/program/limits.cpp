@@ -38,14 +38,21 @@ CLI::Validator whole_number(std::int64_t least, std::int64_t largest) {
 
 constexpr const char* kGroup = "Limits";
 
-/// Says where the bounds are shown instead of listing them all.
+/// Says where the bounds are shown instead of listing them all; --help-all lists them.
 class BriefHelp : public CLI::Formatter {
  public:
+  std::string make_help(const CLI::App* app, std::string name,
+                        CLI::AppFormatMode mode) const override {
+    CLI::Formatter whole;
+    whole.column_width(get_column_width());
+    return mode == CLI::AppFormatMode::All ? whole.make_help(app, name, mode)
+                                           : CLI::Formatter::make_help(app, name, mode);
+  }
   std::string make_group(std::string group, bool is_positional,
                          std::vector<const CLI::Option*> options) const override {
-    return group == kGroup
-               ? "\nLimits:\n  --limits-KEY, one for each bound that --print-config shows\n"
-               : CLI::Formatter::make_group(group, is_positional, options);
+    return group == kGroup ? "\nLimits:\n  --limits-KEY, one for each bound that --print-config "
+                             "and --help-all show\n"
+                           : CLI::Formatter::make_group(group, is_positional, options);
   }
 };
 
@@ -71,7 +78,10 @@ class Adder {
 
 void add_limits(CLI::App& app, NetworkLimits& network, ServiceSettings& service,
                 TurnSettings& queries) {
-  app.formatter(std::make_shared<BriefHelp>());
+  const auto help = std::make_shared<BriefHelp>();
+  help->column_width(app.get_formatter()->get_column_width());
+  app.formatter(help);
+  app.set_help_all_flag("--help-all", "Print the same with every bound, and exit");
   Adder add(app);
   // Connections.
   add("connections", network.connections, 2, kMost, "Connections at all ports");

@@ -21,11 +21,13 @@
 #include <nlohmann/json.hpp>
 
 #include "proto/frames.h"
+#include "proto/program/completion/complete.h"
 #include "proto/program/configuration/configuration.h"
 #include "proto/program/configuration/log_flags.h"
 #include "proto/program/exit_code.h"
 #include "proto/program/log.h"
 #include "proto/program/notify.h"
+#include "proto/program/origin/origin.h"
 #include "proto/program/parent.h"
 #include "proto/program/stop_signals.h"
 #include "proto/program/usage.h"
@@ -151,16 +153,19 @@ int run(LoopSettings settings, int ready_fd, const StopWithParent& parent) {
 void add_options(CLI::App& app, Configuration& configuration, StopWithParent& parent,
                  Options& options) {
   LoopSettings& loop = options.loop;
-  app.set_version_flag("--version", "oblique-server " + oblique::solver::solver_version());
+  app.set_version_flag("--version", "oblique-server " + oblique::protocol::version_and_commit());
   app.option_defaults()->always_capture_default();
-  app.add_option("--db", loop.database, "Database file; made when it is not there");
+  app.add_option("--db", loop.database, "Database file; made when it is not there")
+      ->type_name("FILE");
   app.add_flag("--allow-network-disk", loop.allow_network_disk,
                "Take a database on a network file system, where a second machine could damage it");
   app.add_option("--listen", loop.doors.listen,
-                 "Address to listen on, * for all; beyond loopback only with --keys or --insecure");
+                 "Address to listen on, * for all; beyond loopback only with --keys or --insecure")
+      ->type_name("ADDRESS");
   app.add_option("--keys", loop.doors.keys,
                  "Key file of the server, as `oblique keygen` makes it; the list of keys to let "
                  "in, authorized_keys.toml, lies beside it")
+      ->type_name("FILE")
       ->envname("OBLIQUE_KEYS");
   app.add_flag("--insecure", loop.doors.insecure, "Let in whoever reaches the ports, unencrypted");
   constexpr double kLargestPort = 65535;
@@ -210,6 +215,7 @@ std::optional<int> finish_options(const CLI::App& app, const Configuration& conf
   constexpr double kMillisecondsASecond = 1000.0;
   loop.drain = std::chrono::milliseconds(std::llround(options.drain_s * kMillisecondsASecond));
   loop.service.solver_version = oblique::solver::solver_version();
+  loop.service.clients.version = oblique::protocol::version_and_commit();
   return std::nullopt;
 }
 
@@ -233,6 +239,7 @@ int main(int argc, char** argv) {
                                     {"limits", "log"}});
   try {
     add_options(app, configuration, parent, options);
+    oblique::protocol::answer_shell(app, argc, argv);
     if (const auto exit_code = configuration.parse(argc, argv)) {
       return *exit_code;
     }

@@ -11,12 +11,13 @@
 
 #include <fcntl.h>
 #include <poll.h>
-#include <spawn.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include "proto/frames.h"
+#include "proto/system/descriptor.h"
+#include "proto/system/spawn_plan.h"
 #include "server/queries/reader_program.h"
 
 namespace oblique::server {
@@ -32,63 +33,21 @@ void check(int error, const std::string& what) {
   }
 }
 
-/// What a reader starts with: its channel, no other descriptor but standard error, no signal
-/// blocked or ignored, a process group of its own, so that a Ctrl-C on the terminal is the server's
-/// alone.
-class SpawnPlan {
- public:
-  explicit SpawnPlan(int channel) {
-    posix_spawn_file_actions_init(&actions_);
-    posix_spawn_file_actions_adddup2(&actions_, channel, kReaderChannel);
-    posix_spawn_file_actions_addopen(&actions_, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-    posix_spawn_file_actions_adddup2(&actions_, STDERR_FILENO, STDOUT_FILENO);
-    posix_spawn_file_actions_addclosefrom_np(&actions_, kReaderChannel + 1);
-    posix_spawnattr_init(&attributes_);
-    sigset_t signals;
-    sigemptyset(&signals);
-    posix_spawnattr_setsigmask(&attributes_, &signals);
-    sigfillset(&signals);
-    posix_spawnattr_setsigdefault(&attributes_, &signals);
-    posix_spawnattr_setpgroup(&attributes_, 0);
-    posix_spawnattr_setflags(
-        &attributes_, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
-  }
-  ~SpawnPlan() {
-    posix_spawn_file_actions_destroy(&actions_);
-    posix_spawnattr_destroy(&attributes_);
-  }
-  SpawnPlan(const SpawnPlan&) = delete;
-  SpawnPlan& operator=(const SpawnPlan&) = delete;
-
-  const posix_spawn_file_actions_t* actions() const { return &actions_; }
-  const posix_spawnattr_t* attributes() const { return &attributes_; }
-
- private:
-  posix_spawn_file_actions_t actions_{};
-  posix_spawnattr_t attributes_{};
-};
-
 }  // namespace
 
 ReaderProcess::ReaderProcess(const std::string& program, const std::string& path) {
   std::array<int, 2> ends{};
   check(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) == 0 ? 0 : errno,
         "socketpair");
-  channel_ = ends[0];
-  int error = fcntl(channel_, F_SETFL, O_NONBLOCK) == 0 ? 0 : errno;
-  if (error == 0) {
-    const SpawnPlan plan(ends[1]);
-    // Its name is for those who list processes.
-    std::array<std::string, 3> words{"oblique-reader", kReadMode, path};
-    std::array<char*, 4> arguments{words[0].data(), words[1].data(), words[2].data(), nullptr};
-    error = posix_spawn(&pid_, program.c_str(), plan.actions(), plan.attributes(), arguments.data(),
-                        environ);
-  }
-  ::close(ends[1]);
-  if (error != 0) {
-    ::close(channel_);
-    check(error, program);
-  }
+  protocol::Descriptor ours(ends[0]);
+  const protocol::Descriptor theirs(ends[1]);
+  check(fcntl(ours.number(), F_SETFL, O_NONBLOCK) == 0 ? 0 : errno, "fcntl");
+  protocol::SpawnPlan plan;
+  plan.give(theirs.number(), kReaderChannel);
+  plan.give(STDERR_FILENO, STDOUT_FILENO);
+  plan.close_from(kReaderChannel + 1);
+  pid_ = plan.start(program, {"oblique-reader", kReadMode, path}, environ);
+  channel_ = ours.release();
 }
 
 ReaderProcess::~ReaderProcess() {

@@ -301,8 +301,11 @@ LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Batch
   pace.last_end = batch.end();
   pace.held_points += batch.points;
   requeue(study);
-  effects_.emplace_back(
-      SendBatch{id, study, batch.first_point, batch.count, batch.attempts + 1, lease});
+  SendBatch send{id, study, batch.first_point, batch.count, batch.attempts + 1, lease};
+  if (batch.points < batch.count) {
+    send.parts = served.points.leased_set().within(batch.first_point, batch.end());
+  }
+  effects_.emplace_back(std::move(send));
   return lease;
 }
 

@@ -214,6 +214,7 @@ struct SendBatch {
   std::uint64_t count;
   std::uint32_t attempt;
   LeaseId lease;
+  std::vector<Interval> parts{};  ///< of these, the points that are to be solved; empty: all
 };
 /// Make these results of the message durable, then say ResultsStored. Sent for every Results
 /// message, even with nothing to keep: the acknowledgement follows all commits before it.

@@ -228,6 +228,8 @@ void ClientsDesk::status(const Client& client, const protocol::StatusRequest& re
   fields.set_draining(draining_);
   fields.set_workers(static_cast<std::uint32_t>(at_.sources.scheduler.workers()));
   fields.set_access(settings_.access);
+  fields.set_version(settings_.version);
+  fields.set_utc_ms(now.utc_ms);
   if (!request.study().empty() || request.study_id() != 0) {
     const StudyStates& states = at_.sources.states;
     auto known = states.find_durable(request.study());

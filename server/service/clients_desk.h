@@ -30,6 +30,7 @@ struct ClientsDeskSettings {
   std::size_t most_long_bytes = std::size_t{64} * 1024 * 1024;
   std::size_t largest_page = 1000;  ///< studies or workers in one reply
   std::string access = "loopback";  ///< as StatusReply.access
+  std::string version{};            ///< as StatusReply.version
 };
 
 /// Speaks with clients: takes their requests, shows them how things stand, in pages where that is

@@ -30,6 +30,14 @@ void WorkersDesk::send(const SendBatch& batch) {
   fields.set_count(batch.count);
   fields.set_attempt(batch.attempt);
   fields.set_lease_id(batch.lease);
+  std::uint64_t reached = batch.first_point;
+  for (const Interval& part : batch.parts) {
+    if (part.begin > reached) {
+      fields.add_parts(part.begin - reached);
+    }
+    fields.add_parts(part.end - part.begin);
+    reached = part.end;
+  }
   send(batch.worker, message, batch.lease);
 }
 

@@ -5,6 +5,9 @@
 #include <string>
 #include <utility>
 
+#include <spdlog/fmt/fmt.h>
+
+#include "proto/text.h"
 #include "server/store/store.h"
 
 namespace oblique::server {
@@ -115,6 +118,13 @@ std::vector<StoredStudy> Store::studies() {
     StoredStudy study{};
     study.study_id = number(list, 0);
     study.name = list.text(1);
+    if (!protocol::is_utf8(study.name)) {  // no message may carry it
+      left_out_.push_back(fmt::format(
+          "study {} is left as it is, for its name \"{}\" is no UTF-8: with no server at work, "
+          "sqlite3 gives it another (UPDATE studies SET name = 'NAME' WHERE study_id = {})",
+          study.study_id, protocol::visible(study.name), study.study_id));
+      continue;
+    }
     study.table = StudyTable(list.text(2), number(list, 8));
     study.state = state_named(list.text(3));
     study.created_at = list.text(4);

@@ -15,10 +15,12 @@ void HttpOptions::add_to(CLI::App& app) {
   address_option_ =
       app.add_option("--http", address_,
                      "Address and port of the page, metrics and health over HTTP; port 0: "
-                     "the system picks one; off: none");
+                     "the system picks one; off: none")
+          ->type_name("ADDRESS:PORT");
   app.add_option("--http-name", names_,
                  "Host name by which HTTP is asked, beside numeric addresses and localhost; may be "
-                 "given again");
+                 "given again")
+      ->type_name("HOST");
   app.add_flag("--http-read-without-token", shows_to_all_,
                "Show the page to whoever reaches the address; changing something takes the token");
   app.add_option(

@@ -22,7 +22,7 @@
 #include <zmq.hpp>
 
 #include "proto/frames.h"
-#include "tests/bench/instant_worker.h"
+#include "tests/bench/known/instant_worker.h"
 #include "tests/bench/process_usage.h"
 #include "tests/support/database.h"
 #include "tests/support/programs.h"

@@ -1,7 +1,9 @@
-"""What deploy/README.md and the READMEs below it tell people to type, against programs, units and files.
+"""What deploy/README.md and the READMEs below it tell people to type, against programs, units and files; and the
+terminal that README.md shows, against what stands there now.
 
   readme_test.py TREE FOLDER-OF-THE-PROGRAMS
 """
+import os
 import pathlib
 import re
 import shlex
@@ -67,6 +69,15 @@ class Readmes(unittest.TestCase):
                     seen += 1
         self.assertGreater(seen, 10)
 
+    def test_the_changelog_begins_with_the_version_that_is_built_and_cited(self):
+        version = re.search(r"project\(oblique VERSION ([\d.]+)", (TREE / "CMakeLists.txt").read_text())[1]
+        changes = re.findall(r"(?m)^## \[([\d.]+)\] - (\d{4}-\d\d-\d\d)$", (TREE / "deploy/CHANGELOG.md").read_text())
+        self.assertEqual(changes[0][0], version)
+        self.assertEqual([date for _, date in changes], sorted((date for _, date in changes), reverse=True))
+        citation = (TREE / "CITATION.cff").read_text()
+        self.assertIn(f"\nversion: {version}\n", citation)
+        self.assertIn(f'\ndate-released: "{changes[0][1]}"\n', citation)
+
     def test_settings_that_are_named_exist(self):
         printed = settings()
         named = re.findall(r"^\| 760\d \(`(\w+)`\)", MAIN, re.M) + ["drain", "insecure"]
@@ -83,11 +94,11 @@ class Readmes(unittest.TestCase):
     def test_units_packages_and_parts_are_there(self):
         for unit in re.findall(r"systemctl enable --now ([\w-]+)", MAIN):
             self.assertTrue((TREE / f"deploy/systemd/{unit}.service.in").exists(), unit)
-        cmake = (TREE / "deploy/packages/packages.cmake").read_text()
+        cmake = (TREE / "deploy/packages/CMakeLists.txt").read_text()
         for package in re.findall(r"\./([\w-]+)_\*\.deb", MAIN):
-            self.assertRegex(cmake, rf"_PACKAGE_NAME {package}\)")
+            self.assertRegex(cmake, rf"set\(package_of_\w+ {package}\)")
         for part in re.search(r"`--component (\w+)`, `(\w+)` or `(\w+)`", MAIN).groups():
-            self.assertIn(part, re.search(r"CPACK_COMPONENTS_ALL ([\w ]+)", cmake)[1].split())
+            self.assertIn(part, re.search(r"set\(parts ([\w ]+)\)", cmake)[1].split())
 
     def test_the_labs_commands_make_the_installed_configuration_one_that_listens_and_connects(self):
         edits = re.findall(r"sudo (sed -i .*) /etc/oblique/(\w+)\.toml$", MAIN, re.M)
@@ -104,6 +115,23 @@ class Readmes(unittest.TestCase):
                                          text=True, capture_output=True, check=True).stdout
             for key, value in expected[part].items():
                 self.assertRegex(printed, rf'(?m)^{key} = "{re.escape(value)}"')
+
+    def test_the_recorded_first_minute_is_what_one_sees(self):
+        recording = re.search(r"^<!-- recorded .* -->\n\n```\n(.*?)^```$", (TREE / "README.md").read_text(), re.M | re.S)[1]
+        # Each of them after a line with the time of the one before.
+        commands = [c for c in re.split(r"^(?=\$ )", recording, flags=re.M) if c.startswith("$ oblique ")]
+        self.assertEqual(len(commands), 2)
+
+        def without_times(text):
+            return re.sub(r"[\d,.]+(?= (points/s|s$))", "N", text.strip(), flags=re.M)
+
+        with tempfile.TemporaryDirectory() as folder:
+            for recorded in commands:
+                line = recorded.splitlines()[0].removeprefix("$ ")
+                seen = subprocess.run([(TREE / ".ci/recorded").resolve(), line], cwd=folder, text=True, check=True, capture_output=True,
+                                      env={**os.environ, "PATH": f"{PROGRAMS.resolve()}:{os.environ['PATH']}",
+                                           "LC_ALL": "C"}).stdout
+                self.assertEqual(without_times(seen), without_times(recorded))
 
 
 if __name__ == "__main__":

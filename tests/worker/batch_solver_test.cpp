@@ -123,6 +123,23 @@ TEST_F(BatchSolverTest, PointsThatAFilterLeavesOutArePassedOver) {
   EXPECT_EQ(solved, (std::set<std::uint64_t>{100, 110, 120, 130, 140, 150, 160, 170, 180, 190}));
 }
 
+TEST_F(BatchSolverTest, OnlyTheWantedPartsOfABatchAreSolvedAndOfTheseWhatAFilterLeavesIn) {
+  gate_.open(1000);
+  Batch scattered = filtered_batch(100, 300, "floor(mu / 10) == mu / 10");
+  scattered.parts = {{100, 101}, {105, 131}, {339, 400}};
+  EXPECT_EQ(points_to_solve(scattered), 10U);
+  solver_.add(scattered);
+  wait_batches_ended(1);
+  const auto progress = solver_.collect();
+  ASSERT_EQ(progress.size(), 1U);
+  EXPECT_TRUE(progress[0].batch_done);
+  std::set<std::uint64_t> solved;
+  for (const auto& result : progress[0].results) {
+    solved.insert(result.point());
+  }
+  EXPECT_EQ(solved, (std::set<std::uint64_t>{100, 110, 120, 130, 340, 350, 360, 370, 380, 390}));
+}
+
 TEST_F(BatchSolverTest, ABatchOfWhichNothingIsLeftInEndsWithoutAResult) {
   solver_.add(filtered_batch(0, 500, "mu > 900"));
   wait_batches_ended(1);

@@ -213,6 +213,39 @@ TEST_F(ConversationTest, ABatchBeyondItsStudyBeginsTheConversationAnew) {
   }
 }
 
+TEST_F(ConversationTest, OnlyThePartsOfABatchThatAreWantedAreSolved) {
+  join();
+  auto message = batch_message(7, 31, 20, 10);
+  for (const std::uint64_t points : {1U, 3U, 2U, 1U, 3U}) {
+    message.mutable_batch()->add_parts(points);
+  }
+  receive(message);
+  const auto solve = effects_of<Solve>();
+  ASSERT_EQ(solve.size(), 1U);
+  ASSERT_EQ(solve[0].batch.parts.size(), 3U);
+  EXPECT_EQ(solve[0].batch.parts[1].begin, 24U);
+  EXPECT_EQ(solve[0].batch.parts[1].end, 26U);
+  EXPECT_EQ(solve[0].batch.parts[2].end, 30U);
+  EXPECT_EQ(points_to_solve(solve[0].batch), 6U);
+}
+
+TEST_F(ConversationTest, ABatchWhosePartsAreNotItsPointsBeginsTheConversationAnew) {
+  const auto max = std::numeric_limits<std::uint64_t>::max();
+  for (const std::vector<std::uint64_t>& parts : std::vector<std::vector<std::uint64_t>>{
+           {9}, {11}, {4, 6}, {0, 10}, {10, 0, 1}, {3, 3, 5}, {1, max, 10}}) {
+    use(ConversationSettings{});
+    join();
+    receive(heartbeat_reply_message());
+    auto message = batch_message(7, 31, 20, 10);
+    for (const std::uint64_t points : parts) {
+      message.mutable_batch()->add_parts(points);
+    }
+    receive(message);
+    EXPECT_FALSE(has<Solve>());
+    EXPECT_TRUE(has<Connect>());
+  }
+}
+
 TEST_F(ConversationTest, AStudyThatCannotBeReadEndsTheWorkerRatherThanFailingItsPoints) {
   start();
   receive(welcome_message());

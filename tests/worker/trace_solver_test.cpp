@@ -1,5 +1,6 @@
 #include "worker/trace_solver.h"
 
+#include <algorithm>
 #include <future>
 #include <memory>
 #include <utility>
@@ -106,6 +107,82 @@ TEST(TraceSolverTest, ATraceThatHasMoreThanItMayFailsAndNamesTheBound) {
   solver.take(order(7, 1000));
   const auto parts = parts_of(solver);
   EXPECT_NE(parts.back().result().error().find("1000 bytes"), std::string::npos);
+}
+
+/// A fall, and a contact whose force has a narrow peak.
+TraceSolver::Solve solving_shapes(int rows, std::size_t nodes) {
+  return [rows, nodes](const protocol::TraceOrder&, const solver::Tracing::Sink& sink) {
+    solver::TraceRow row = row_at(0);
+    row.nodes_m.resize(2 * nodes);
+    for (int i = 0; i < solver::kFallRows; ++i) {
+      row.t_s = i + 1 - solver::kFallRows;
+      row.state = solver::kFalling;
+      sink(row);
+    }
+    for (int i = 0; i < rows; ++i) {
+      row.t_s = i;
+      row.fn_N = i == rows / 3 ? 100.0 : i % 5;
+      row.state = i < rows / 2 ? "SC" : "sR";
+      sink(row);
+    }
+    protocol::PointResult result;
+    result.add_reals(5.0);
+    return result;
+  };
+}
+
+struct ThinRows {
+  std::vector<double> t_s;
+  std::vector<double> fn_N;
+  std::string states;
+};
+
+ThinRows shapes_within(std::size_t most_bytes, int rows, std::size_t nodes) {
+  TraceSolver solver(solving_shapes(rows, nodes), [] {});
+  auto wanted = order(7, most_bytes);
+  wanted.set_shape(true);
+  wanted.set_fall(true);
+  solver.take(wanted);
+  const std::size_t numbers = solver::trace_numbers({1, nodes});
+  ThinRows found;
+  for (const auto& part : parts_of(solver)) {
+    EXPECT_EQ(part.result().error(), "");
+    found.states += part.rows().states();
+    for (int i = 0; i < part.rows().values_size(); i += static_cast<int>(numbers)) {
+      found.t_s.push_back(part.rows().values(i));
+      found.fn_N.push_back(part.rows().values(i + 1));
+    }
+  }
+  EXPECT_LE(found.states.size() * (numbers * sizeof(double) + 1), most_bytes);
+  return found;
+}
+
+TEST(TraceSolverTest, ShapesThatAreTooManyAreThinnedAndKeepWhatMatters) {
+  constexpr std::size_t kMost = std::size_t{8} << 20U;
+  for (const auto& [rows, nodes] :
+       {std::pair{50'000, std::size_t{145}}, {20'000, std::size_t{4097}}}) {
+    const ThinRows thin = shapes_within(kMost, rows, nodes);
+    EXPECT_TRUE(std::is_sorted(thin.t_s.begin(), thin.t_s.end()));
+    EXPECT_EQ(thin.t_s.front(), 1 - solver::kFallRows) << "release";
+    EXPECT_EQ(thin.t_s.back(), rows - 1);
+    EXPECT_EQ(std::ranges::count(thin.fn_N, 100.0), 1) << "the peak";
+    const auto has = [&thin](double t_s) { return std::ranges::count(thin.t_s, t_s) > 0; };
+    EXPECT_TRUE(has(rows / 2 - 1) && has(rows / 2)) << "where the state changes";
+    EXPECT_TRUE(has(0.0)) << "touch";
+    const auto fall = static_cast<std::size_t>(std::ranges::count(thin.states, '\4'));
+    EXPECT_GE(fall, nodes > 1000 ? 20U : 121U);
+    EXPECT_GE(thin.t_s.size() - fall, nodes > 1000 ? 40U : 1500U);
+    double longest = 0.0;
+    for (std::size_t i = fall + 1; i < thin.t_s.size(); ++i) {
+      longest = std::max(longest, thin.t_s[i] - thin.t_s[i - 1]);
+    }
+    EXPECT_LE(longest, nodes > 1000 ? 2048 : 128) << "they lie evenly";
+  }
+}
+
+TEST(TraceSolverTest, ShapesThatAreFewAreAllThere) {
+  const ThinRows all = shapes_within(std::size_t{8} << 20U, 3000, 13);
+  EXPECT_EQ(all.t_s.size(), 3000U + solver::kFallRows);
 }
 
 TEST(TraceSolverTest, WhileOneIsSolvedAnotherIsNotTaken) {

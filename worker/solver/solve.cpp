@@ -4,9 +4,9 @@
 #include <string>
 #include <utility>
 
-#include "worker/solver/finger_parts.h"
 #include "worker/solver/lanes/lane_stepper.h"
 #include "worker/solver/motion/trace_of_chain.h"
+#include "worker/solver/solve_points.h"
 
 namespace oblique::solver {
 

@@ -1,3 +1,5 @@
+#include "worker/solver/solve_points.h"
+
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -5,7 +7,7 @@
 #include <utility>
 
 #include "worker/solver/chain/lane_chains.h"
-#include "worker/solver/finger_parts.h"
+
 #include "worker/solver/lanes/lane_batch.h"
 #include "worker/solver/solve.h"
 

@@ -1,14 +1,12 @@
 #include "client/plot/data/study_axes.h"
 
 #include <algorithm>
-#include <optional>
 
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/axes.h"
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/keys.h"
-#include "worker/solver/model/errors.h"
 
 namespace oblique::client::plot {
 namespace {
@@ -16,15 +14,14 @@ namespace {
 using protocol::Axis;
 using protocol::Block;
 
-std::string column_of(const std::string& key) {
-  if (const auto link = protocol::link_of_key(protocol::key_number(key))) {
-    return fmt::format("json_extract(lengths_m, '$[{}]')", *link);
-  }
-  return key == "E" ? "E_Pa" : key;  // SQL does not tell E from e
-}
-
 bool are_listed(const Axis& axis) {
   return protocol::has_own_values(axis) && protocol::axis_size(axis) <= kMostListed;
+}
+
+/// Each once, rising.
+void sort_out(std::vector<double>& values) {
+  std::sort(values.begin(), values.end());
+  values.erase(std::unique(values.begin(), values.end()), values.end());
 }
 
 std::vector<double> values_of(const Axis& axis) {
@@ -35,32 +32,25 @@ std::vector<double> values_of(const Axis& axis) {
       values.push_back(range.at(i));
     }
   }
-  std::sort(values.begin(), values.end());
-  values.erase(std::unique(values.begin(), values.end()), values.end());
+  sort_out(values);
   return values;
 }
 
-void unite_values(std::vector<double>& all, const std::vector<double>& more) {
-  const auto middle = static_cast<std::ptrdiff_t>(all.size());
-  all.insert(all.end(), more.begin(), more.end());
-  std::inplace_merge(all.begin(), all.begin() + middle, all.end());
-  all.erase(std::unique(all.begin(), all.end()), all.end());
-}
-
-const Block& largest_block(const protocol::Recipe& recipe) {
-  if (recipe.blocks().empty()) {
-    throw solver::InputError("the study has no points");
-  }
-  const Block* largest = nullptr;
-  std::uint64_t points = 0;
+/// Adds values that other blocks give to the same keys.
+void unite_blocks(const protocol::Recipe& recipe, const Block& own, StudyShape& shape) {
   for (const Block& block : recipe.blocks()) {
-    const auto of_block = protocol::points_of_block(block);
-    if (largest == nullptr || of_block > points) {
-      largest = &block;
-      points = of_block;
+    for (const Axis& axis : block.axes()) {
+      for (StudyAxis& of_study : shape.axes) {
+        if (&block != &own && of_study.key == axis.key() && are_listed(axis)) {
+          const auto more = values_of(axis);
+          of_study.all_values.insert(of_study.all_values.end(), more.begin(), more.end());
+        }
+      }
     }
   }
-  return *largest;
+  for (StudyAxis& axis : shape.axes) {
+    sort_out(axis.all_values);
+  }
 }
 
 }  // namespace
@@ -82,13 +72,40 @@ std::vector<const StudyAxis*> StudyShape::varying() const {
   return found;
 }
 
-StudyShape shape_of(const protocol::Recipe& recipe) {
-  const Block& largest = largest_block(recipe);
+std::string column_of_key(const std::string& key) {
+  if (const auto link = protocol::link_of_key(protocol::key_number(key))) {
+    return fmt::format("json_extract(lengths_m, '$[{}]')", *link);
+  }
+  return key == "E" ? "E_Pa" : key;  // SQL does not tell E from e
+}
+
+std::optional<BlockOfStudy> largest_block(const protocol::Recipe& recipe,
+                                          const std::function<bool(const Block&)>& is_meant) {
+  std::optional<BlockOfStudy> largest;
+  BlockOfStudy each;
+  for (const Block& block : recipe.blocks()) {
+    each.points = protocol::points_of_block(block);
+    if ((!largest || each.points > largest->points) && is_meant(block)) {
+      largest = each;
+    }
+    each.first_point += each.points;
+    ++each.number;
+  }
+  return largest;
+}
+
+StudyShape shape_of(const protocol::Recipe& recipe, const BlockOfStudy& block, bool is_alone) {
+  const Block& own = recipe.blocks(static_cast<int>(block.number));
   StudyShape shape;
-  shape.is_grid = protocol::block_kind(largest) == protocol::BlockKind::kProduct;
-  shape.points = protocol::points_of_block(largest);
-  for (const Axis& axis : largest.axes()) {
-    StudyAxis of_study{.key = axis.key(), .column = column_of(axis.key())};
+  shape.is_grid = protocol::block_kind(own) == protocol::BlockKind::kProduct;
+  shape.block = block;
+  shape.blocks = static_cast<std::size_t>(recipe.blocks_size());
+  shape.is_one_block = is_alone && shape.blocks > 1;
+  for (const Block& each : recipe.blocks()) {
+    shape.points += protocol::points_of_block(each);
+  }
+  for (const Axis& axis : own.axes()) {
+    StudyAxis of_study{.key = axis.key(), .column = column_of_key(axis.key())};
     of_study.is_listed = are_listed(axis);
     of_study.is_logarithmic = axis.count() > 0 && axis.spacing() == protocol::SPACING_LOGARITHMIC;
     if (of_study.is_listed) {
@@ -97,14 +114,8 @@ StudyShape shape_of(const protocol::Recipe& recipe) {
     }
     shape.axes.push_back(std::move(of_study));
   }
-  for (const Block& block : recipe.blocks()) {
-    for (const Axis& axis : block.axes()) {
-      for (StudyAxis& of_study : shape.axes) {
-        if (&block != &largest && of_study.key == axis.key() && are_listed(axis)) {
-          unite_values(of_study.all_values, values_of(axis));
-        }
-      }
-    }
+  if (!shape.is_one_block) {
+    unite_blocks(recipe, own, shape);
   }
   return shape;
 }

@@ -33,6 +33,10 @@ constexpr std::array<Stroke, kStrokes> kStrokeTable{{
 
 }  // namespace
 
+std::span<const std::string_view> palette_names() {
+  return kPaletteNames;
+}
+
 Palette palette_named(std::string_view name) {
   for (std::size_t i = 0; i < kPaletteNames.size(); ++i) {
     if (name == kPaletteNames[i]) {

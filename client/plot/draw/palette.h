@@ -15,6 +15,8 @@ enum class Palette { kViridis, kCividis };
 
 /// Throws solver::InputError for a name that is neither `viridis` nor `cividis`.
 Palette palette_named(std::string_view name);
+/// Names of all.
+std::span<const std::string_view> palette_names();
 
 /// Number of colours of a palette.
 inline constexpr std::size_t kShades = 256;

@@ -74,17 +74,51 @@ std::string label_of(double value) {
   return solver::readable_number(value, 6);
 }
 
+/// Which first digits have labels, from most to fewest.
+using Digits = std::array<bool, 10>;
+constexpr std::array<Digits, 5> kDigits{{
+    {false, true, true, true, true, true, true, true, true, true},
+    {false, true, true, true, true, true, true, false, true},
+    {false, true, true, true, false, true},
+    {false, true, true, false, false, true},
+    {false, true},
+}};
+
+int labels_of(const Digits& digits, const Scale& scale) {
+  const int first = static_cast<int>(std::floor(log10_of(scale.from())));
+  const int last = static_cast<int>(std::ceil(log10_of(scale.to())));
+  int labels = 0;
+  for (int decade = first; decade <= last; ++decade) {
+    for (int digit = 1; digit <= 9; ++digit) {
+      const double share = scale.share_of(digit * power_of_ten(decade));
+      const bool is_there = share > -1e-9 && share < 1.0 + 1e-9;
+      labels += digits[static_cast<std::size_t>(digit)] && is_there ? 1 : 0;
+    }
+  }
+  return labels;
+}
+
+/// By how many labels there may be: where decades are few as many as there is room for, and two.
+Digits labelled_digits(const Scale& scale, double decades, int wanted) {
+  std::size_t chosen = decades * 8 <= wanted ? 1 : decades * 3 <= wanted ? 3 : 4;
+  if (decades < 1.0) {
+    chosen = 0;
+    while (chosen + 1 < kDigits.size() && labels_of(kDigits[chosen], scale) > std::max(wanted, 2)) {
+      ++chosen;
+    }
+  }
+  while (chosen > 0 && decades < 2.0 && labels_of(kDigits[chosen], scale) < 2) {
+    --chosen;
+  }
+  return kDigits[chosen];
+}
+
 Ticks logarithmic_ticks(const Scale& scale, int wanted) {
   const double decades = log10_of(scale.to()) - log10_of(scale.from());
   const int first = static_cast<int>(std::floor(log10_of(scale.from())));
   const int last = static_cast<int>(std::ceil(log10_of(scale.to())));
   const int every = std::max(1, static_cast<int>(std::ceil(decades / std::max(wanted, 1))));
-  const std::array<bool, 10> labelled =
-      decades * 3 <= wanted
-          ? (decades * 8 <= wanted
-                 ? std::array<bool, 10>{false, true, true, true, true, true, true, false, true}
-                 : std::array<bool, 10>{false, true, true, false, false, true})
-          : std::array<bool, 10>{false, true};
+  const Digits labelled = labelled_digits(scale, decades, wanted);
   Ticks ticks;
   for (int decade = first; decade <= last; ++decade) {
     for (int digit = 1; digit <= 9; ++digit) {
@@ -100,6 +134,11 @@ Ticks logarithmic_ticks(const Scale& scale, int wanted) {
     }
   }
   return ticks;
+}
+
+std::ptrdiff_t labels_in(const Ticks& ticks) {
+  return std::count_if(ticks.ticks.begin(), ticks.ticks.end(),
+                       [](const Tick& tick) { return !tick.label.empty(); });
 }
 
 }  // namespace
@@ -188,15 +227,18 @@ std::string Ticks::factor() const {
 }
 
 Ticks ticks_of(const Scale& scale, int wanted) {
+  Ticks linear = linear_ticks(scale, wanted);
   if (scale.is_logarithmic()) {
+    constexpr std::ptrdiff_t kEnough = 3;
     Ticks ticks = logarithmic_ticks(scale, wanted);
-    const auto labelled = std::count_if(ticks.ticks.begin(), ticks.ticks.end(),
-                                        [](const Tick& tick) { return !tick.label.empty(); });
-    if (labelled >= 2) {
+    // In a small part of a decade there are few round values of one digit.
+    const bool is_small_part = scale.to() < 10.0 * scale.from();
+    const auto labels = labels_in(ticks);
+    if (labels >= kEnough || (labels == 2 && (!is_small_part || labels_in(linear) <= labels))) {
       return ticks;
     }
   }
-  return linear_ticks(scale, wanted);
+  return linear;
 }
 
 }  // namespace oblique::client::plot

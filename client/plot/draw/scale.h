@@ -66,7 +66,7 @@ struct Ticks {
 
 /// About `wanted` round values, 1, 2 or 5 times a power of ten apart, within the range. Of a
 /// logarithmic scale powers of ten, with 2 and 5, or 2 to 9, where those are few, and small marks
-/// between; where it spans less than a decade and those are not enough, as of a linear one.
+/// between; where it spans less than a decade and these are fewer than three, as of a linear one.
 Ticks ticks_of(const Scale& scale, int wanted);
 
 }  // namespace oblique::client::plot

@@ -5,10 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <stdexcept>
 #include <string_view>
 #include <thread>
@@ -41,37 +38,16 @@ constexpr std::array<NamedFormat, 5> kFormats{{
     {"gnuplot", ".gp", PictureFormat::kGnuplot},
 }};
 
-/// A folder that is gone with what is in it.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "oblique-plot-XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) {
-      throw std::runtime_error("no temporary folder can be made for rsvg-convert");
-    }
-    path_ = name;
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  const std::filesystem::path& path() const { return path_; }
+constexpr std::size_t kMostPngBytes = std::size_t{256} << 20U;
 
- private:
-  std::filesystem::path path_;
-};
-
+/// Nothing of it stays behind when we are killed: no process, no file.
 std::string png_made_of(const std::string& svg) {
-  const TemporaryFolder folder;
-  const auto from = folder.path() / "picture.svg";
-  const auto to = folder.path() / "picture.png";
-  std::ofstream(from, std::ios::binary) << svg;
   try {
-    ChildProcess converter(
-        {.program = "rsvg-convert",
-         .arguments = {"--format", "png", "--zoom", "2", "--output", to.string(), from.string()}});
+    ChildProcess converter({.program = "rsvg-convert",
+                            .arguments = {"--format", "png", "--zoom", "2"},
+                            .keep_output = true,
+                            .input = svg,
+                            .stays_in_our_group = true});
     while (converter.is_running()) {
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
     }
@@ -79,17 +55,25 @@ std::string png_made_of(const std::string& svg) {
       throw std::runtime_error(
           fmt::format("rsvg-convert {}: {}", converter.ending(), converter.last_words()));
     }
+    return converter.output(kMostPngBytes);
   } catch (const ProgramNotFound&) {
     throw std::runtime_error(
         "PNG is made by rsvg-convert, which is not here: install it (Debian: librsvg2-bin), or "
-        "take "
-        "--format svg");
+        "take --format svg");
   }
-  std::ifstream file(to, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
 }
 
 }  // namespace
+
+std::vector<std::string_view> picture_format_names() {
+  std::vector<std::string_view> names;
+  for (const auto& format : kFormats) {
+    if (std::find(names.begin(), names.end(), format.name) == names.end()) {
+      names.push_back(format.name);
+    }
+  }
+  return names;
+}
 
 PictureFormat picture_format(const std::string& name, const std::string& file) {
   constexpr std::string_view kAllowed = "svg, png, csv or gnuplot";

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "client/plot/figures/figure.h"
 #include "client/plot/figures/layout.h"
@@ -13,6 +15,9 @@ enum class PictureFormat { kSvg, kPng, kCsv, kGnuplot };
 /// The format of that name, or without one that of a file's ending, else SVG. Throws
 /// solver::InputError for another name, and for a file that ends otherwise without a format.
 PictureFormat picture_format(const std::string& name, const std::string& file);
+
+/// Names of all.
+std::vector<std::string_view> picture_format_names();
 
 /// The figure in that format. PNG is made by rsvg-convert, two pixels each way for one of SVG;
 /// throws std::runtime_error where that program is missing or fails.

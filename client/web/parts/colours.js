@@ -14,7 +14,7 @@ const packed = ([r, g, b]) => ((255 << 24) | (b << 16) | (g << 8) | r) >>> 0;
 
 /** 256 colours from the least to the most. @param {string} name @returns {Uint32Array} */
 export function palette(name) {
-  const stops = (kStops[/** @type {keyof typeof kStops} */ (name)] ?? kStops.viridis).split(" ").map(rgb);
+  const stops = kStops[/** @type {keyof typeof kStops} */ (Object.hasOwn(kStops, name) ? name : "viridis")].split(" ").map(rgb);
   return Uint32Array.from({ length: 256 }, (_, i) => {
     const at = (i / 255) * (stops.length - 1);
     const k = Math.min(Math.floor(at), stops.length - 2);
@@ -28,27 +28,34 @@ export function css_colour(colours, i) {
   return `rgb(${c & 255} ${(c >> 8) & 255} ${(c >> 16) & 255})`;
 }
 
-const kFills = "77aadd eedd88 ee8866 44bb99 ffaabb 99ddff bbcc33".split(" ").map(rgb);
-const kOther = rgb("b8b8b8");
+/** How kinds look, that with most cells first: colour and hatching as oblique plot has them; a test compares. */
+const kKinds = /** @type {[string, number][]} */ ([["77aadd", 0], ["eedd88", 1], ["ee8866", 2], ["99ddff", 3], ["bbcc33", 4], ["ffaabb", 5], ["44bb99", 6], ["b59a80", 7],
+  ["77aadd", 4], ["eedd88", 5], ["ee8866", 6], ["99ddff", 7], ["bbcc33", 0], ["ffaabb", 1], ["44bb99", 2], ["b59a80", 3]]);
+const kOthers = /** @type {[string, number]} */ (["dddddd", 4]);
+const kMostKinds = 12;
+/** The code of what has no look of its own. */
+export const kOther = kKinds.length;
 
-/** How many categories have a look of their own; the others look the same. */
-export const kLooks = 2 * kFills.length;
+/** How many of these have a look of their own: of many kinds those with next to no cells have none. @param {{cells: number}[]} kinds that with most cells first */
+export function own_looks(kinds) {
+  let kept = kinds.length;
+  if (kept > kMostKinds) {
+    const whole = kinds.reduce((sum, one) => sum + one.cells, 0);
+    kept = kMostKinds;
+    while (kept > 1 && kinds[kept - 1].cells * 400 < whole) --kept;
+  }
+  return kept + 1 >= kinds.length ? kinds.length : kept;
+}
 
-/** Whether a pixel lies on a category's hatching, which tells neighbours apart without colour. */
-const kHatchings = [
-  () => false,
-  (/** @type {number} */ x, /** @type {number} */ y) => (x + y) % 9 < 2,
-  (/** @type {number} */ x, /** @type {number} */ y) => (x - y + 9000000) % 9 < 2,
-  (/** @type {number} */ x, /** @type {number} */ y) => x % 7 < 2 && y % 7 < 2,
-  (/** @type {number} */ _, /** @type {number} */ y) => y % 8 < 2,
-  (/** @type {number} */ x) => x % 8 < 2,
-];
+/** Whether a pixel lies on a hatching: none, rising, falling, crossed, dots, level, upright, grid. @type {((x: number, y: number) => boolean)[]} */
+const kHatchings = [() => false, (x, y) => (x + y) % 7 < 2, (x, y) => (x - y + 7000000) % 7 < 2,
+  (x, y) => (x + y) % 9 < 2 || (x - y + 9000000) % 9 < 2, (x, y) => x % 7 < 2 && y % 7 < 2, (_, y) => y % 6 < 1, (x) => x % 6 < 1, (x, y) => x % 8 < 1 || y % 8 < 1];
+const kLooks = [...kKinds, kOthers].map(([hex, hatch]) => ({ plain: packed(rgb(hex)), inked: packed(rgb(hex).map((c) => Math.round(c * 0.62 + 6))), is_inked: kHatchings[hatch] }));
 
-/** The colour of a pixel of a category. @param {number} code @param {number} x @param {number} y */
+/** The colour of a pixel of a kind. @param {number} code @param {number} x @param {number} y */
 export function category_pixel(code, x, y) {
-  const colour = code < kLooks ? kFills[code % kFills.length] : kOther;
-  const is_hatched = code < kLooks && kHatchings[(code + (code >= kFills.length ? 3 : 0)) % kHatchings.length](x, y);
-  return packed(is_hatched ? colour.map((c) => Math.round(c * 0.68)) : colour);
+  const { plain, inked, is_inked } = kLooks[Math.min(code, kOther)];
+  return is_inked(x, y) ? inked : plain;
 }
 
 /** What stands for a pixel without a value. @param {"missing" | "failed" | "left_out" | "none" | "filtered"} why @param {number} x @param {number} y @param {boolean} is_dark */

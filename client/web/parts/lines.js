@@ -1,10 +1,12 @@
 // @ts-check
 // Lines over an axis, by uPlot: with keys to move the cursor, a spoken value, and spans shaded behind.
-import uPlot from "/vendor/uPlot.esm.js";
 import { h } from "/parts/dom.js";
 import { ink } from "/parts/colours.js";
 import { heading, shown } from "/parts/format.js";
 import { scale, ticks, tick_text } from "/parts/scale.js";
+
+// A script of its own, which modules come after (index.html): it is minified as no module.
+const uPlot = /** @type {any} */ (globalThis).uPlot;
 
 const kDashes = [[], [7, 3], [2, 3], [9, 3, 2, 3], [14, 4], [4, 2], [1, 4], [12, 3, 3, 3]];
 const kFills = ["bar", "line1"];
@@ -13,14 +15,17 @@ const kInks = ["line0", "line1", "line2", "line3", "line4", "line5", "line6", "l
 /**
  * @typedef {{label: string, values: ArrayLike<number | null>, colour?: number}} Series
  * @typedef {{from: number, to: number, ink: string, is_band?: boolean}} Span a band is a bar at the foot
+ * @typedef {{x: number[], y: number[] | null}} Part where it ends; y null: all
  * @typedef {object} Lines
  * @property {string} title
  * @property {{name: string, unit: string, values: ArrayLike<number>, is_log?: boolean, ends?: number[], edges?: number[]}} x
- * @property {{name: string, unit: string, is_log?: boolean}} y
+ * @property {{name: string, unit: string, is_log?: boolean, ends?: number[]}} y
  * @property {Series[]} series
  * @property {Span[]} [spans]
  * @property {boolean} [as_bars]
- * @property {(from: number, to: number) => void} [brushed] a span was dragged over, or chosen by Shift and arrows; without it dragging zooms
+ * @property {(part: Part | null) => void} [brushed] a part is marked, by dragging or by Shift and arrows; null: nothing is
+ * @property {(part: Part | null) => void} [zoomed] a part is zoomed into; null: all is shown. Without it the plot zooms by itself
+ * @property {boolean} [drag_marks] dragging marks, and with Shift it zooms; else the other way round
  * @property {number} [height]
  * @property {(i: number) => void} [moved] the cursor is over value `i`
  */
@@ -51,12 +56,16 @@ export function line_plot(of) {
   let at = -1;
   /** Where a span of keys began; -1: nowhere. */
   let anchor = -1;
+  /** Whether a drag zooms. */
+  let zooms = true;
   let quiet = false;
+  /** Which values of each series are marked. @type {ArrayLike<number | boolean>[] | null} */
+  let marked = null;
 
   const read = (/** @type {number} */ i) => {
     const x = of.x.values[i];
-    said.textContent = x === undefined ? "" : `${of.x.name} ${shown(x)} ${of.x.unit}: ` + of.series.map((one) =>
-      `${of.series.length > 1 ? `${one.label} ` : ""}${shown(one.values[i])} ${of.y.unit}`).join(", ");
+    said.textContent = x === undefined ? "" : `${of.x.name} ${shown(x)} ${of.x.unit}: ` + of.series.map((one, k) =>
+      `${of.series.length > 1 ? `${one.label} ` : ""}${shown(one.values[i])} ${of.y.unit}${marked?.[k][i] ? " (marked)" : ""}`).join(", ");
   };
   /** What is shown unless somebody zooms: uPlot would round logarithmic ends to powers of ten. @param {any} _ @param {number} least @param {number} most */
   const range = (_, least, most) => {
@@ -75,8 +84,8 @@ export function line_plot(of) {
       filter: (/** @type {any} */ _, /** @type {number[]} */ splits) => splits,
       values: (/** @type {any} */ _, /** @type {number[]} */ splits) => splits.map(tick_text) };
     return { width, height: of.height ?? 240, legend: { show: false }, ms: 1,
-      cursor: { points: { size: 7 }, drag: { x: true, y: false, setScale: !of.brushed } },
-      scales: { x: { time: false, distr: of.x.is_log ? 3 : 1, range }, y: { distr: of.y.is_log ? 3 : 1 } },
+      cursor: { points: { size: 7 }, drag: { x: true, y: of.brushed !== undefined && !of.as_bars, uni: 24, setScale: true }, ...(of.zoomed ? { bind: { dblclick: () => () => of.zoomed?.(null) } } : {}) },
+      scales: { x: { time: false, distr: of.x.is_log ? 3 : 1, range }, y: { distr: of.y.is_log ? 3 : 1, ...(of.y.ends ? { range: of.y.ends } : {}) } },
       axes: [{ ...axis, label: heading(of.x.name, of.x.unit), labelSize: 22, size: 34 },
         { ...axis, label: heading(of.y.name, of.y.unit), labelSize: 22, size: 62 }],
       series: [{}, ...of.series.map((one, i) => ({ label: one.label, stroke: ink(kInks[(one.colour ?? i) % 8]), width: 1.6,
@@ -84,11 +93,13 @@ export function line_plot(of) {
         ...(of.as_bars ? { paths: uPlot.paths.bars({ size: [1, Infinity] }), fill: ink(kFills[i]), dash: [], stroke: ink("weak"), width: 0.5 } : {}) }))],
       hooks: {
         setSelect: [(/** @type {any} */ u) => {
-          const { left, width: wide } = u.select;
-          if (!of.brushed || wide < 3) return;
+          const { left, width: wide, top, height: high } = u.select;
+          if (!of.brushed || u.cursor.drag.setScale || wide < 3) return;
           u.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
-          of.brushed(u.posToVal(left, "x"), u.posToVal(left + wide, "x"));
+          const told = zooms ? of.zoomed : of.brushed;
+          told?.({ x: [u.posToVal(left, "x"), u.posToVal(left + wide, "x")], y: high < u.over.clientHeight - 1 ? [u.posToVal(top + high, "y"), u.posToVal(top, "y")] : null });
         }],
+        draw: [(/** @type {any} */ u) => marked?.forEach((one, k) => draw_marked(u, k, one))],
         drawClear: [(/** @type {any} */ u) => {
           for (const span of of.spans ?? []) {
             const from = Math.max(u.valToPos(span.from, "x", true), u.bbox.left);
@@ -109,13 +120,59 @@ export function line_plot(of) {
         }],
       } };
   };
+  /** What is marked of a line is thicker, with a disc where it is one value alone or these are few. @param {any} u @param {number} k @param {ArrayLike<number | boolean>} is */
+  const draw_marked = (u, k, is) => {
+    const ratio = window.devicePixelRatio || 1;
+    const { values, colour = k } = of.series[k];
+    const has = (/** @type {number} */ i) => Boolean(is[i]) && typeof values[i] === "number";
+    const place = (/** @type {number} */ i) => [u.valToPos(of.x.values[i], "x", true), u.valToPos(values[i], "y", true)];
+    u.ctx.save();
+    u.ctx.beginPath();
+    u.ctx.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height);
+    u.ctx.clip();
+    u.ctx.strokeStyle = u.ctx.fillStyle = ink(kInks[colour % 8]);
+    u.ctx.lineWidth = 3.2 * ratio;
+    u.ctx.beginPath();
+    const discs = [];
+    for (let i = 0; i < values.length; ++i) {
+      if (!has(i)) continue;
+      if (has(i - 1)) u.ctx.lineTo(...place(i));
+      else u.ctx.moveTo(...place(i));
+      if (values.length < 60 || (!has(i - 1) && !has(i + 1))) discs.push(place(i));
+    }
+    u.ctx.stroke();
+    u.ctx.strokeStyle = ink("text");
+    u.ctx.lineWidth = 1.2 * ratio;
+    for (const [x, y] of discs) {
+      u.ctx.beginPath();
+      u.ctx.arc(x, y, 4 * ratio, 0, 2 * Math.PI);
+      u.ctx.fill();
+      u.ctx.stroke();
+    }
+    u.ctx.restore();
+  };
+  const step_back = () => {
+    for (const one of plot?.series.slice(1) ?? []) one.alpha = marked ? 0.4 : 1;
+  };
   const move = (/** @type {number} */ i) => {
     if (!plot || of.x.values[i] === undefined) return;
     const y = of.series[0]?.values[i];
     plot.setCursor({ left: plot.valToPos(of.x.values[i], "x"), top: typeof y === "number" ? plot.valToPos(y, "y") : -1 });
   };
+  place.addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => {
+    if (!plot || !of.brushed) return;
+    zooms = Boolean(of.drag_marks) === event.shiftKey;
+    plot.cursor.drag.setScale = zooms && !of.zoomed;
+  }, true);
   place.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
+    if (event.key === "Escape") of.brushed?.(null);
     const last = of.x.values.length - 1;
+    if (of.zoomed && !event.ctrlKey && ["0", "-", "+", "="].includes(event.key)) {
+      const [from, until] = [Math.max(at - Math.ceil(last / 4), 0), Math.min(Math.max(at, 0) + Math.ceil(last / 4), last)];
+      of.zoomed(event.key === "0" || event.key === "-" ? null : { x: [of.x.edges?.[from] ?? of.x.values[from], of.x.edges?.[until + 1] ?? of.x.values[until]], y: null });
+      event.preventDefault();
+      return;
+    }
     const step = Math.max(Math.round(last / 200), 1);
     const to = /** @type {Record<string, number>} */ ({ ArrowLeft: Math.max(at - step, 0), ArrowRight: Math.min(at + step, last), Home: 0, End: last })[event.key];
     if (to === undefined) return;
@@ -123,13 +180,14 @@ export function line_plot(of) {
     anchor = event.shiftKey ? (anchor < 0 ? Math.max(at, 0) : anchor) : -1;
     move(to);
     const [from, until] = [Math.min(anchor, to), Math.max(anchor, to)];
-    if (anchor >= 0) of.brushed?.(of.x.edges?.[from] ?? of.x.values[from], of.x.edges?.[until + 1] ?? of.x.values[until]);
+    if (anchor >= 0) of.brushed?.({ x: [of.x.edges?.[from] ?? of.x.values[from], of.x.edges?.[until + 1] ?? of.x.values[until]], y: null });
   });
   const watch = new ResizeObserver(() => {
     const width = place.clientWidth;
     if (width < 60) return;
     if (plot) plot.setSize({ width, height: of.height ?? 240 });
     else plot = new uPlot(options(width), [of.x.values, ...of.series.map((one) => one.values)], place);
+    step_back();
   });
   watch.observe(place);
   return { element,
@@ -139,6 +197,12 @@ export function line_plot(of) {
       quiet = true;
       move(i);
       quiet = false;
+    },
+    /** @param {ArrayLike<number | boolean>[] | null} which values of each series; null: none */
+    mark(which) {
+      marked = which;
+      step_back();
+      plot?.redraw(false);
     },
     close() {
       watch.disconnect();

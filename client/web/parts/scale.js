@@ -56,7 +56,9 @@ export function ticks(of, wanted) {
   }
   const step = nice(wide / Math.max(wanted, 1));
   const found = [];
-  for (let i = Math.ceil(least / step - 1e-9); i * step <= most + step * 1e-9; ++i) {
+  // Counted, for sums with the largest numbers are infinite.
+  const last = Math.floor(most / step + 1e-9);
+  for (let i = Math.ceil(least / step - 1e-9); i <= last; ++i) {
     found.push(Number((i * step).toPrecision(12)));
   }
   return found;

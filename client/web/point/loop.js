@@ -4,6 +4,7 @@ import { h } from "/parts/dom.js";
 import { ink } from "/parts/colours.js";
 import { heading } from "/parts/format.js";
 import { ends_of, scale, ticks, tick_text } from "/parts/scale.js";
+import { begin } from "./strokes.js";
 
 const kMargin = { left: 66, right: 12, top: 8, bottom: 44 };
 const kHeight = 260;
@@ -29,19 +30,13 @@ export function loop_plot(title, x, y, colour) {
   const of_x = ends(x.values);
   const of_y = ends(y.values);
   const draw = () => {
-    const width = place.clientWidth;
-    if (width < 60) return;
-    const ratio = window.devicePixelRatio || 1;
-    canvas.width = width * ratio;
-    canvas.height = kHeight * ratio;
-    canvas.style.height = `${kHeight}px`;
-    const c = canvas.getContext("2d");
-    c.scale(ratio, ratio);
+    const drawing = begin(canvas, place, kHeight);
+    if (!drawing) return;
+    const { c, width } = drawing;
     const w = width - kMargin.left - kMargin.right;
     const high = kHeight - kMargin.top - kMargin.bottom;
     const px = (/** @type {number} */ v) => kMargin.left + of_x.place(v) * w;
     const py = (/** @type {number} */ v) => kMargin.top + (1 - of_y.place(v)) * high;
-    c.font = "12px system-ui, sans-serif";
     c.fillStyle = ink("text");
     c.strokeStyle = ink("grid");
     c.textAlign = "center";
@@ -74,7 +69,6 @@ export function loop_plot(title, x, y, colour) {
     c.restore();
     c.strokeStyle = ink(`line${colour}`);
     c.lineWidth = 1.6;
-    c.lineJoin = "round";
     c.beginPath();
     x.values.forEach((v, i) => c.lineTo(px(v), py(y.values[i])));
     c.stroke();

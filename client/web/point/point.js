@@ -4,47 +4,105 @@ import { copied, h, named, picker, save } from "/parts/dom.js";
 import { count, quoted, shown, with_unit } from "/parts/format.js";
 import { line_plot } from "/parts/lines.js";
 import { json } from "/server.js";
+import { wanted_of } from "/study/asked/between.js";
+import { held_open } from "/study/asked/look.js";
 import { finger } from "./finger.js";
 import { loop_plot } from "./loop.js";
 import { point_numbers } from "./numbers.js";
 import { player } from "./player.js";
 import { trace_of } from "./trace.js";
 
+const kAskAgain_ms = 300;
+
+/**
+ * A point as the server tells it. One that lies between those of the study is solved first, which takes a moment.
+ * @param {number} study @param {number} point @param {boolean} is_between @param {AbortSignal} signal
+ */
+async function told_of(study, point, is_between, signal) {
+  for (;;) {
+    const told = await json(`/api/studies/${study}/points/${point}`, signal);
+    if (!is_between || told.row || told.fault || told.left_out) return told;
+    await new Promise((go_on) => setTimeout(go_on, kAskAgain_ms));
+    signal.throwIfAborted();
+  }
+}
+
+/** The command that solves a point of no study that stays. @param {any} whole @param {any} wanted @param {any} row */
+function solve_command(whole, wanted, row) {
+  const lengths = (/** @type {string} */ key) => /^(links|lengths?\d*)$/.test(key);
+  const changed = whole.model.filter((/** @type {any} */ one) => !one.usual && one.value !== null).map((/** @type {any} */ one) => one.key);
+  const keys = new Set([...wanted.block.axes.map((/** @type {any} */ axis) => axis.key), ...changed].map((key) => (lengths(key) ? "lengths" : key)));
+  for (const key of ["H", "mu", "e"]) keys.delete(key);
+  const value = (/** @type {string} */ key) => (key === "lengths" ? row.lengths_m.join(",") : row[key === "E" ? "E_Pa" : key]);
+  return ["oblique solve", ...["H", "mu", "e", ...keys].map((key) => `--${key.replaceAll("_", "-")} ${quoted(String(value(key)))}`), "--trace trace.csv"].join(" ");
+}
+
 /**
  * @param {HTMLElement} root @param {import("/main.js").Place} place @param {number} study @param {number} point
  * @returns {Promise<import("/main.js").View>}
  */
 export async function point_view(root, place, study, point) {
-  const [told, whole] = await Promise.all([json(`/api/studies/${study}/points/${point}`), json(`/api/studies/${study}`)]);
-  place.trail([h("a", { href: place.last(`/study/${study}`) }, told.name), `point ${count(point)}`]);
   const stop = new AbortController();
+  const { signal } = stop;
+  const whole = await json(`/api/studies/${study}`);
   const said = h("p", { role: "status", class: "said" }, "A worker solves this point again.");
+  /** Of points that lie between those of the study. */
+  const is_between = place.fields.has("between");
+  const side = Number(place.fields.get("side"));
+  const of_view = new URLSearchParams(place.fields);
+  of_view.delete("side");
+  const back = is_between ? `#/study/${study}?${of_view}` : place.last(`/study/${study}`);
+  const trail = (/** @type {string} */ what) => place.trail([h("a", { href: back }, whole.name), what]);
+  /** The study that has the point. */
+  let id = study;
+  /** @type {any} */
+  let wanted = null;
+  if (is_between) {
+    trail(`between its points, ${count(point)}`);
+    root.append(said);
+    wanted = await wanted_of(whole, place.fields, signal);
+    id = await held_open(wanted, side, signal, (other) => {
+      id = other;
+      take.replaceWith(take = things_to_take());
+    });
+  } else {
+    trail(`point ${count(point)}`);
+  }
+  const told = await told_of(id, point, is_between, signal).catch((error) => {
+    stop.abort();
+    throw error;
+  });
+  root.replaceChildren();
   const pictures = h("section", { "aria-label": "The contact over time" }, said);
+  const name = is_between ? `${whole.name}-between` : told.name;
+  const other = (/** @type {number} */ number) => `#/study/${study}/point/${number}${is_between ? `?${place.fields}` : ""}`;
   const neighbours = h("div", { class: "row" },
-    point > 0 && h("a", { class: "button", href: `#/study/${study}/point/${point - 1}` }, "Previous point"),
-    point + 1 < whole.numbers && h("a", { class: "button", href: `#/study/${study}/point/${point + 1}` }, "Next point"));
+    point > 0 && h("a", { class: "button", href: other(point - 1) }, "Previous point"),
+    point + 1 < (is_between ? side * side : whole.numbers) && h("a", { class: "button", href: other(point + 1) }, "Next point"));
   const row = told.row;
   const facts = [["H", `${shown(told.H)} m`], ["mu", shown(told.mu)], ["e", shown(told.e)],
     ...(row && row.status === "solved" ? [["F_n peak", with_unit(row.fn_peak_N, "N")], ["F_t peak", with_unit(row.ft_peak_N, "N")],
       ["contact", `${shown(row.duration_s * 1e6, 4)} µs`], ["stick", `${shown(row.stick_total_s * 1e6, 4)} µs`], ["mode", row.mode]] : [])];
   const standing = told.fault || (told.left_out ? "The study's filter leaves this point out." : "")
     || (!row ? "This point is not solved yet." : row.error ? `It failed: ${row.error}` : "");
-  root.append(h("h2", { class: "name" }, `${told.name}, point ${count(point)}`), neighbours,
+  const row_file = () => h("a", { class: "button", download: `${name}-${point}-row.csv`, href: `/api/studies/${id}/rows?${new URLSearchParams({ where: `point = ${point}`, format: "csv" })}` }, "Row as CSV");
+  const things_to_take = () => h("section", {}, h("h2", {}, "Take it with you"),
+    ...pictures_to_take(id, point, name, !is_between),
+    ...(is_between ? [h("p", {}, "The address of this page finds this point again or solves it anew, as does:"), ...(row ? [copied("the command of the point", solve_command(whole, wanted, row))] : [])]
+      : [h("p", {}, "Its time histories:"), copied("the command of the trace", `oblique trace ${quoted(name)} ${point} --out trace.csv`),
+        h("p", {}, "Its row:"), copied("the command of the row", `oblique query ${quoted(name)} --where 'point = ${point}'`)]), row_file());
+  let take = things_to_take();
+  root.append(h("h2", { class: "name" }, is_between ? `${whole.name}, between its points: ${count(point)} of ${side} × ${side}` : `${told.name}, point ${count(point)}`), neighbours,
     h("dl", { class: "figures" }, ...facts.map(([name, value]) => h("div", {}, h("dt", {}, name), h("dd", {}, value)))),
     standing ? h("p", { class: row?.error ? "bad" : "weak" }, standing) : "", pictures,
-    ...(row ? [point_numbers(row, whole.columns)] : []),
-    h("section", {}, h("h2", {}, "Take it with you"),
-      ...pictures_to_take(study, point, told.name),
-      h("p", {}, "Its time histories:"), copied("the command of the trace", `oblique trace ${quoted(told.name)} ${point} --out trace.csv`),
-      h("p", {}, "Its row:"), copied("the command of the row", `oblique query ${quoted(told.name)} --where 'point = ${point}'`),
-      h("a", { class: "button", download: `${told.name}-${point}-row.csv`, href: `/api/studies/${study}/rows?${new URLSearchParams({ where: `point = ${point}`, format: "csv" })}` }, "Row as CSV")));
+    ...(row ? [point_numbers(row, whole.columns)] : []), take);
   /** @type {{close: () => void}[]} */
   const parts = [];
-  trace_of(study, point, stop.signal, (text) => { said.textContent = text; }).then((trace) => {
-    if (stop.signal.aborted) return;
-    parts.push(...show_trace(pictures, trace, `point-${study}-${point}.csv`));
+  trace_of(id, point, signal, (text) => { said.textContent = text; }).then((trace) => {
+    if (signal.aborted) return;
+    parts.push(...show_trace(pictures, trace, `${is_between ? name : `point-${study}`}-${point}.csv`));
   }).catch((error) => {
-    if (stop.signal.aborted) return;
+    if (signal.aborted) return;
     said.className = "said bad";
     said.textContent = `No time histories: ${error.message}`;
   });
@@ -56,15 +114,15 @@ export async function point_view(root, place, study, point) {
 
 const kPanels = ["forces", "loop", "deformation", "velocities", "energies", "shape"];
 
-/** Its pictures as oblique plot draws them, and the command. @param {number} study @param {number} point @param {string} name */
-function pictures_to_take(study, point, name) {
+/** Its pictures as oblique plot draws them, and the command. @param {number} study @param {number} point @param {string} name @param {boolean} has_command */
+function pictures_to_take(study, point, name, has_command) {
   const files = h("div", { class: "row files" });
   const command = h("div", {});
   const choose = (/** @type {string} */ panel) => {
     const link = (/** @type {string} */ format) => h("a", { class: "button", download: `${name}-${point}.${format}`,
       href: `/api/studies/${study}/points/${point}/picture?${new URLSearchParams({ ...(panel ? { panel } : {}), format })}` }, format.toUpperCase());
     files.replaceChildren(...["svg", "png", "csv"].map(link));
-    command.replaceChildren(copied("the command of the picture", `oblique plot ${quoted(name)} --point ${point}${panel ? ` --panel ${panel}` : ""} --out picture.svg`));
+    if (has_command) command.replaceChildren(copied("the command of the picture", `oblique plot ${quoted(name)} --point ${point}${panel ? ` --panel ${panel}` : ""} --out picture.svg`));
   };
   choose("");
   return [h("div", { class: "row" }, named("pictures, as oblique plot draws them", picker([["", "all"], ...kPanels.map((one) => [one, one])], "", choose)), files), command];
@@ -120,7 +178,7 @@ function show_trace(place, trace, file) {
   place.replaceChildren(h("h2", {}, trace.fall.rows > 0 ? "The fall and the contact" : "The contact"), body.element, watch.element, key,
     h("div", { class: "two" }, ...plots.map((plot) => plot.element), ...loops.map((loop) => loop.element)),
     h("p", {}, h("button", { type: "button", onclick: () => save_trace(trace, file) }, "Time histories as CSV"), " ",
-      h("span", { class: "weak" }, `${count(trace.rows)} instants, solved again by ${trace.head.worker}, solver ${trace.head.solver_version}, ${trace.head.instruction_set}.`)));
+      h("span", { class: "weak" }, `${count(trace.rows)}${trace.rows < trace.head.instants ? ` of ${count(trace.head.instants)}` : ""} instants${trace.rows < trace.head.instants ? ", evenly chosen, and the extremes of the forces" : ""}, solved again by ${trace.head.worker}, solver ${trace.head.solver_version}, ${trace.head.instruction_set}.`)));
   watch.begin();
   return [...all, body, watch];
 }

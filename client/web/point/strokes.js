@@ -1,5 +1,5 @@
 // @ts-check
-// What drawings of the finger are made of: ground, lengths, arrows.
+// What drawings of a point are made of: an empty canvas, ground, lengths, arrows.
 import { ink } from "/parts/colours.js";
 import { shown } from "/parts/format.js";
 
@@ -17,14 +17,14 @@ export function length_text(metres) {
   return metres >= 1e-3 ? `${shown(metres * 1e3, 3)} mm` : `${shown(metres * 1e6, 3)} µm`;
 }
 
-/** @param {any} canvas @param {HTMLElement} place */
-export const begin = (canvas, place) => {
+/** An empty drawing; null where there is no room. @param {any} canvas @param {HTMLElement} place */
+export const begin = (canvas, place, height = kHeight) => {
   const width = place.clientWidth;
   if (width < 60) return null;
   const ratio = window.devicePixelRatio || 1;
   canvas.width = width * ratio;
-  canvas.height = kHeight * ratio;
-  canvas.style.height = `${kHeight}px`;
+  canvas.height = height * ratio;
+  canvas.style.height = `${height}px`;
   const c = canvas.getContext("2d");
   c.scale(ratio, ratio);
   c.font = "12px system-ui, sans-serif";

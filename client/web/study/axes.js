@@ -43,6 +43,23 @@ export function usual_axes(block) {
   return [x, others.includes("H") ? "H" : others[0] ?? ""];
 }
 
+/**
+ * Between which values points are solved while one looks, as the address says it: "mu:0.1:2,H:0.3:1.1:log".
+ * @typedef {Record<string, {from: number, to: number, is_log: boolean}>} Ranges of the two axes of a map
+ */
+
+/** @param {Ranges} ranges */
+export const between_text = (ranges) => Object.entries(ranges).map(([key, { from, to, is_log }]) => `${key}:${from}:${to}${is_log ? ":log" : ""}`).join(",");
+
+/** @param {string} text @returns {Ranges | null} null: it is no such text */
+export function ranges_of(text) {
+  const all = text.split(",").map((one) => one.split(":"));
+  const is_one = (/** @type {string[]} */ [key, from, to, log]) => key && from && to && Number.isFinite(Number(from)) && Number(from) <= Number(to)
+    && Number.isFinite(Number(to)) && (log === undefined || (log === "log" && Number(from) > 0));
+  if (all.length !== 2 || !all.every(is_one) || all[0][0] === all[1][0]) return null;
+  return Object.fromEntries(all.map(([key, from, to, log]) => [key, { from: Number(from), to: Number(to), is_log: log === "log" }]));
+}
+
 const kOfGrids = ["map", "lines"];
 const kPictures = [...kOfGrids, "gathered", "histogram"];
 
@@ -72,6 +89,8 @@ export function fill_in(fields, study) {
     if (!has(is("x"))) fields.set("x", is("pic") === "histogram" ? "fn_peak_N" : "mu");
     if (is("pic") === "gathered" && !has(is("y"))) fields.set("y", "H");
   }
+  const ranges = is("pic") === "map" ? ranges_of(is("between")) : null;
+  if (!ranges || !ranges[is("x")] || !ranges[is("y")]) fields.delete("between");
   const is_there = study.columns.some((/** @type {any} */ c) => c.name === is("z") && c.picture !== "none");
   if (!is_there && !(is("pic") === "gathered" && fields.has("z"))) fields.set("z", "fn_peak_N");
   if (is("pic") !== "map" && study.columns.find((/** @type {any} */ c) => c.name === is("z"))?.picture === "categories") fields.set("z", "fn_peak_N");

@@ -10,13 +10,13 @@ export function choice_of(view) {
   const spoken = h("p", { class: "reading", "aria-live": "polite" });
   const line = h("p", { class: "choice" });
   const { map } = view;
-  const link = (/** @type {number} */ study, /** @type {number} */ point, /** @type {string} */ text) => line.replaceChildren(
-    h("a", { class: "button", href: `#/study/${study}/point/${point}` }, `Open point ${count(point)}`), h("span", { class: "weak" }, text));
+  const link = (/** @type {string} */ address, /** @type {number} */ point, /** @type {string} */ text) => line.replaceChildren(
+    h("a", { class: "button", href: address }, `Open point ${count(point)}`), h("span", { class: "weak" }, text));
 
   /** The cell of a point, where the picture shows it. @param {number} point @returns {[number, number] | null} */
   function cell_of(point) {
     const { picture } = view;
-    if (!picture) return null;
+    if (!picture || view.solving.is_on) return null;
     const i = picture.dots?.points.indexOf(point) ?? -1;
     if (picture.dots && i >= 0) return [step_of(picture.x, picture.dots.x[i], view.is("xlog") !== ""), step_of(picture.y, picture.dots.y[i], view.is("ylog") !== "")];
     if (!picture.head.x?.stride) return null;
@@ -40,7 +40,7 @@ export function choice_of(view) {
       const point = which ?? view.picture?.point(...cell) ?? null;
       line.replaceChildren();
       if (point === null) return;
-      link(view.shown_study, point, " or press Enter, or click twice");
+      link(view.address_of(point), point, " or press Enter, or click twice");
       if (view.solving.is_on) return;
       view.table.choose(point);
       view.set({ cell: String(point) });
@@ -48,7 +48,7 @@ export function choice_of(view) {
     /** @param {[number, number]} cell */
     open(cell) {
       const point = (map.chosen_point !== null && String(cell) === String(map.chosen) ? map.chosen_point : view.picture?.point(...cell)) ?? null;
-      if (point !== null) view.place.go(`#/study/${view.shown_study}/point/${point}`);
+      if (point !== null) view.place.go(view.address_of(point));
     },
     /** Marks a point of the study where the picture has it. @param {number} point */
     choose_point(point) {
@@ -58,7 +58,7 @@ export function choice_of(view) {
       if (cell) {
         this.choose(cell, point);
       } else {
-        link(view.study.id, point, view.has_map ? " (it lies outside this picture)" : "");
+        link(`#/study/${view.study.id}/point/${point}`, point, view.has_map ? " (it lies outside this picture)" : "");
         view.set({ cell: String(point) });
       }
     },

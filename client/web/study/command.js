@@ -11,7 +11,7 @@ import { column_of, joined, within } from "./conditions.js";
 /** The part that is zoomed into, as conditions. @param {View} view */
 function zoomed(view) {
   const { picture } = view;
-  if (!picture) return [];
+  if (!picture || view.solving.is_on) return [];
   return [picture.x, picture.y].map((side, i) => {
     if (view.is(i === 0 ? "x0" : "y0") === "") return "";
     const ends = side.edges ? [side.edges[0], side.edges[side.edges.length - 1]] : [Math.min(...side.values), Math.max(...side.values)];
@@ -19,38 +19,64 @@ function zoomed(view) {
   });
 }
 
+const number_of = (/** @type {View} */ view, /** @type {string} */ name) => (view.is(name) !== "" && Number.isFinite(Number(view.is(name))) ? Number(view.is(name)) : null);
+
+/** Whether the address says what colours span, or the vertical axis of lines. @param {View} view */
+export const has_span = (view) => number_of(view, "from") !== null || number_of(view, "to") !== null;
+
+/** What they span: an end that the address does not say is that of the picture. @param {View} view @param {import("./asked/picture.js").Picture} picture @returns {number[]} */
+export function span_of(view, picture) {
+  const [from, to] = [number_of(view, "from"), number_of(view, "to")];
+  // Values are of single precision.
+  const [least, most] = [picture.least ?? 0, picture.most ?? 1].map((one) => (from === to ? one : Number(one.toPrecision(7))));
+  const width = most - least || Math.abs(from ?? to ?? 0) * 0.05 || 1;
+  const first = from ?? (to === null || least < to ? least : to - width);
+  const last = to ?? (from === null || most > from ? most : from + width);
+  return first <= last ? [first, last] : [last, first];
+}
+
 /** @param {View} view @returns {Fields} */
 export function picture_fields(view) {
   const is = (/** @type {string} */ name) => view.is(name);
   const kind = is("pic") === "gathered" ? "scatter" : is("pic");
   const [on_grid, has_map] = [kind === "map" || kind === "lines", view.has_map];
-  const held = on_grid ? view.picture?.head.at ?? [] : [];
-  const at = held.filter((/** @type {any} */ one) => one.of > 1);
-  // Of several blocks each may hold a key at another value, and --at takes one of the first that has it.
-  const has_blocks = view.study.blocks.length > 1;
-  const of_block = has_blocks ? held.map((/** @type {any} */ one) => `${column_of(one.key)} = ${one.value}`) : [];
-  const has_range = has_map && is("from") !== "" && is("to") !== "";
+  const at = (on_grid ? view.picture?.head.at ?? [] : []).filter((/** @type {any} */ one) => one.of > 1);
+  const [from, to] = kind === "histogram" ? [is("x0"), is("x1")] : is("z") && has_span(view) && view.picture ? span_of(view, view.picture).map(String) : ["", ""];
   return { kind, z: kind === "histogram" ? "" : is("z"), x: is("x"), y: has_map ? is("y") : "", by: kind === "lines" ? is("y") : "",
-    at: has_blocks ? "" : at.map((/** @type {any} */ one) => `${one.key}:${one.value}`).join(","),
-    where: joined(is("where"), ...of_block, ...zoomed(view)),
+    block: on_grid && view.study.blocks.length > 1 && !view.solving.is_on ? view.is("block") : "", at: at.map((/** @type {any} */ one) => `${one.key}:${one.value}`).join(","),
+    where: joined(is("where"), ...(kind === "histogram" ? [] : zoomed(view))),
     xlog: is("xlog"), ylog: kind === "histogram" ? "" : is("ylog"), zlog: has_map ? is("zlog") : "",
-    from: has_range ? is("from") : "", to: has_range ? is("to") : "", palette: has_map ? is("pal") : "" };
+    from, to, palette: has_map ? is("pal") : "" };
 }
 
 /** The same as flags of oblique plot. @param {Fields} of @returns {[string, string][]} */
 function flags(of) {
   const found = /** @type {[string, string][]} */ (of.kind === "scatter" ? [["scatter", `${of.x},${of.y}`], ["colour", of.z]]
     : of.kind === "histogram" ? [["histogram", of.x]] : [[of.kind, of.z], ["x", of.x], ["y", of.y], ["by", of.by]]);
-  for (const one of of.at.split(",")) found.push(["at", one.replace(":", "=")]);
+  // Its number from 1 to people.
+  found.push(["block", of.block && String(Number(of.block) + 1)], ...of.at.split(",").map((one) => /** @type {[string, string]} */ (["at", one.replace(":", "=")])));
   found.push(["where", of.where], ["range", of.from && `${of.from}:${of.to}`], ["palette", of.palette]);
   return found.filter(([, value]) => value !== "");
 }
 
-/** @param {View} view */
-export function plot_command(view) {
+/** What is solved while somebody looks, as the command that solves it as a study of that name. @param {View} view @param {string} name */
+export function run_command(view, name) {
+  const { axes, where } = view.solving.block;
+  const has = (/** @type {string[]} */ ...keys) => axes.some((/** @type {any} */ axis) => keys.includes(axis.key));
+  // Lengths are said together, unless axes act on all links.
+  const left_out = has("links", "length") ? ["lengths"] : ["links", "length"];
+  const model = view.study.model.filter((/** @type {any} */ one) => !one.usual && one.value !== null && !has(one.key) && !left_out.includes(one.key));
+  const said = (/** @type {any} */ axis) => axis.expression ?? axis.values?.join(",") ?? [axis.from, axis.to, axis.count, ...(axis.spacing ? ["log"] : [])].join(":");
+  const flag = (/** @type {string} */ key, /** @type {any} */ value) => `--${key.replaceAll("_", "-")} ${quoted(String(value))}`;
+  return ["oblique run", flag("name", name), ...axes.map((/** @type {any} */ axis) => flag(axis.key, said(axis))),
+    ...model.map((/** @type {any} */ one) => flag(one.key, one.value)), ...(where ? [flag("where", where)] : [])].join(" ");
+}
+
+/** @param {View} view @param {string} [name] of the study */
+export function plot_command(view, name = view.study.name) {
   const of = picture_fields(view);
   const ticks = [["xlog", "--log-x"], ["ylog", "--log-y"], ["zlog", "--log-colour"]].filter(([name]) => of[name]).map(([, flag]) => flag);
-  return ["oblique plot", quoted(view.study.name), ...flags(of).map(([flag, value]) => `--${flag} ${quoted(value)}`), ...ticks, "--out picture.svg"].join(" ");
+  return ["oblique plot", quoted(name), ...flags(of).map(([flag, value]) => `--${flag} ${quoted(value)}`), ...ticks, "--out picture.svg"].join(" ");
 }
 
 /** @param {View} view */

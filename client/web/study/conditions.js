@@ -2,6 +2,7 @@
 // Conditions of the query language: which points are looked at, and which are marked. Both stand in the address.
 import { h, named } from "/parts/dom.js";
 import { count } from "/parts/format.js";
+import { Silence } from "/server.js";
 import { rows } from "./asked/picture.js";
 
 /** All of them. @param {...string} conditions those that are empty say nothing */
@@ -93,7 +94,8 @@ export function condition_fields(view) {
       const answer = await rows(view.study.id, { where: condition, select: "count(*)", limit: 1 }, signal);
       of.said.textContent = tell(Number(answer.rows[0]?.[0] ?? 0));
     } catch (error) {
-      if (!signal.aborted) wrong(of, String(/** @type {Error} */ (error).message));
+      if (/** @type {any} */ (error).status === 503) of.said.textContent = "Counting the points that meet it takes too long.";
+      else if (!signal.aborted) wrong(of, String(/** @type {Error} */ (error).message));
     }
   }
   let last_told = Promise.resolve();

@@ -12,7 +12,8 @@ import { show_takeaways } from "./take.js";
 export function show_controls(view) {
   const kind = view.is("pic");
   const again = (/** @type {Record<string, string>} */ changes) => {
-    view.set({ ...changes, x0: "", x1: "", y0: "", y1: "", cell: "" });
+    // Another output is one of the same part.
+    view.set({ ...changes, ...("z" in changes ? {} : { x0: "", x1: "", y0: "", y1: "", cell: "" }) }, true);
     fill_in(view.fields, view.study);
     view.place.keep(view.fields);
     view.choice.none();
@@ -51,15 +52,13 @@ export function show_controls(view) {
   };
   parts.push(h("div", { class: "ticks" }, tick(`log ${view.is("x")}`, view.is("xlog") !== "", (is) => redraw({ xlog: is ? "1" : "" })),
     kind === "histogram" ? null : tick(kind === "lines" ? "log output" : `log ${view.is("y")}`, view.is("ylog") !== "", (is) => redraw({ ylog: is ? "1" : "" }))));
-  if (kind !== "lines") {
-    const drags = picker([["zoom", "zooms in"], ["mark", "marks points"]], view.is("drag") === "mark" ? "mark" : "zoom", (drag) => {
-      view.set({ drag: drag === "mark" ? "mark" : "" });
-      view.map.let_drag(drag === "mark" ? "mark" : "zoom");
-      view.drawing.draw();
-    });
-    drags.title = "with Shift a map takes the other one";
-    parts.push(named("dragging", drags));
-  }
+  const drags = picker([["zoom", "zooms in"], ["mark", "marks points"]], view.is("drag") === "mark" ? "mark" : "zoom", (drag) => {
+    view.set({ drag: drag === "mark" ? "mark" : "" });
+    view.map.let_drag(drag === "mark" ? "mark" : "zoom");
+    view.drawing.draw();
+  });
+  drags.title = "with Shift it is the other one";
+  parts.push(named("dragging", drags));
   // Who chose by keys goes on where they were.
   const focused = [...view.controls.querySelectorAll("select, input")].indexOf(/** @type {any} */ (document.activeElement));
   view.controls.replaceChildren(...parts);

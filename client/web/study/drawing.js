@@ -2,6 +2,7 @@
 // What is drawn of a picture: a map or points on a canvas, lines, bars; with what colours mean and how much is shown.
 import { h } from "/parts/dom.js";
 import { palette } from "/parts/colours.js";
+import { has_span, span_of } from "./command.js";
 import { part_of } from "./conditions.js";
 import { categories, colour_bar, gaps } from "./drawn/legend.js";
 import { facts } from "./words.js";
@@ -23,10 +24,7 @@ export function drawing_of(view) {
   }
   /** @param {import("./asked/picture.js").Picture} picture @returns {import("./drawn/map.js").Look} */
   function look_of(picture) {
-    const told = (/** @type {string} */ name, /** @type {number} */ usual) => (view.is(name) !== "" && Number.isFinite(Number(view.is(name))) ? Number(view.is(name)) : usual);
-    let from = told("from", picture.least ?? 0);
-    let to = told("to", picture.most ?? 1);
-    if (to < from) [from, to] = [to, from];
+    const [from, to] = span_of(view, picture);
     return { colours: palette(view.is("pal") || "viridis"), from, to, z_log: view.is("zlog") !== "" && from > 0,
       x_log: view.is("xlog") !== "", y_log: view.is("ylog") !== "" };
   }
@@ -37,9 +35,10 @@ export function drawing_of(view) {
     const { drawn_lines } = await import("./drawn/drawn_lines.js");
     if (mine !== turn) return;
     lines?.close();
-    const brushes = as_bars && view.is("drag") === "mark";
     lines = drawn_lines(picture, { as_bars, x_log: view.is("xlog") !== "", y_log: view.is("ylog") !== "", counts: view.marking.marks?.counts,
-      ...(brushes ? { brushed: (from, to) => view.marking.mark(part_of(picture.x, [], [from, to])) } : {}) });
+      y_ends: !as_bars && has_span(view) ? span_of(view, picture) : undefined, zoomed: (part) => view.zoom_lines(part),
+      drag_marks: view.is("drag") === "mark", brushed: (part) => (as_bars ? view.marking.mark(part ? part_of(picture.x, [], part.x) : "") : view.marking.mark_lines(part)) });
+    if (!as_bars) lines.mark(view.marking.marks);
     lines_place.replaceChildren(lines.element);
   }
   return { lines_place, legend, told, end,
@@ -56,14 +55,19 @@ export function drawing_of(view) {
         else if (picture.least !== null) legend.append(colour_bar(picture, look));
         legend.append(gaps(picture));
       } else {
-        draw_lines(picture);
+        draw_lines(picture).catch((error) => view.complain(error));
       }
-      told.textContent = facts(picture, view.is("pic")).join(" ");
-      if (view.is("x0") || view.is("y0")) told.append(" ", h("button", { type: "button", onclick: () => view.zoom(null) }, "Show all"));
+      told.textContent = facts(picture, view.is("pic"), view.study).join(" ");
+      if (view.has_map && !picture.z.is_category && picture.least !== null && picture.most !== null) {
+        const [from, to] = span_of(view, picture);
+        if (picture.most < from || picture.least > to) told.append(` All values lie ${picture.most < from ? "below" : "above"} what colours span.`);
+      }
+      if (view.is("x0") || view.is("y0") || (view.is("pic") === "lines" && has_span(view))) told.append(" A part is shown. ", h("button", { type: "button", onclick: () => view.zoom(null) }, "Show all"));
     },
     /** Only what is marked is another. */
     mark() {
       if (view.has_map) view.map.mark(view.marking.marks);
       else if (view.is("pic") === "histogram" && view.picture) draw_lines(view.picture);
+      else lines?.mark(view.marking.marks);
     } };
 }

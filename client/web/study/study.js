@@ -1,11 +1,12 @@
 // @ts-check
 // A study: what its address says, the picture, and what belongs to it.
 import { h } from "/parts/dom.js";
-import { json } from "/server.js";
+import { in_words, json, Silence } from "/server.js";
+import { waiting } from "./asked/picture.js";
 import { ask, steps_to } from "./asked/question.js";
 import { fill_in, varying } from "./axes.js";
 import { choice_of } from "./choice.js";
-import { condition_fields } from "./conditions.js";
+import { condition_fields, rounded } from "./conditions.js";
 import { show_controls } from "./controls.js";
 import { drawing_of } from "./drawing.js";
 import { MapCanvas } from "./drawn/map.js";
@@ -16,6 +17,8 @@ import { row_table } from "./table.js";
 import { show_takeaways } from "./take.js";
 
 const kLookAgain_ms = 1500;
+/** After the server did not answer. */
+const kAskAgain_ms = 3000;
 
 /** @typedef {import("./asked/picture.js").Picture} Picture */
 
@@ -45,6 +48,14 @@ export class StudyView {
     /** @type {Picture | null} */
     this.picture = null;
     this.wants_more = false;
+    /** For a condition that takes long. */
+    this.is_waiting = false;
+    /** Something that was asked for did not come. */
+    this.is_stale = false;
+    /** Who came back goes on at the map. */
+    this.wants_focus = false;
+    /** Columns of which a whole picture was there: the server keeps them. @type {Set<string>} */
+    this.read_columns = new Set();
     /** When the last refresh came to its end. */
     this.loaded_ms = 0;
     /** The timer of the next refresh; 0: none. */
@@ -58,13 +69,13 @@ export class StudyView {
   is(/** @type {string} */ name) {
     return this.fields.get(name) ?? "";
   }
-  /** @param {Record<string, string>} changes */
-  set(changes) {
+  /** @param {Record<string, string>} changes @param {boolean} [is_step] that people go back over */
+  set(changes, is_step = false) {
     for (const [name, value] of Object.entries(changes)) {
       if (value === "") this.fields.delete(name);
       else this.fields.set(name, value);
     }
-    this.place.keep(this.fields);
+    this.place.keep(this.fields, is_step);
   }
   get block() {
     return this.study.blocks[Number(this.is("block"))];
@@ -72,9 +83,14 @@ export class StudyView {
   get has_map() {
     return this.is("pic") === "map" || this.is("pic") === "gathered";
   }
-  /** The study that has the points of the picture. */
-  get shown_study() {
-    return this.solving.study || this.study.id;
+  /** Where a point of the picture is looked at: one that lies between those of the study has the view with it. @param {number} point */
+  address_of(point) {
+    const own = `#/study/${this.study.id}/point/${point}`;
+    if (!this.solving.is_on) return own;
+    const fields = new URLSearchParams(this.fields);
+    fields.delete("cell");
+    fields.set("side", String(this.solving.side));
+    return `${own}?${fields}`;
   }
   /** Numbers of the values at which the other axes are held. @returns {Map<string, number>} */
   places() {
@@ -106,6 +122,10 @@ export class StudyView {
     this.solving = solving_panel(this);
     this.table = row_table({ study: this.study.id, points: this.study.points, columns: () => this.row_columns(),
       where: () => this.is("where"), marked: () => this.is("mark"),
+      all: () => this.is("all") !== "", keep_all: (all) => {
+        this.set({ all: all ? "1" : "" });
+        show_takeaways(this);
+      },
       order: () => this.is("order"), keep_order: (order) => { this.set({ order }); show_takeaways(this); },
       wrong: (error) => this.complain(error), chosen: (point) => this.choice.choose_point(point) });
     this.choice.speak(null);
@@ -122,6 +142,19 @@ export class StudyView {
     return this;
   }
 
+  /** Another view of the same study, as by the browser's Back. @param {URLSearchParams} fields */
+  go_to(fields) {
+    this.fields = fields;
+    fill_in(this.fields, this.study);
+    this.say("");
+    this.map.let_drag(this.is("drag") === "mark" ? "mark" : "zoom");
+    this.choice.none();
+    show_controls(this);
+    this.load();
+    this.table.load();
+    this.conditions.tell();
+  }
+
   close() {
     this.is_closed = true;
     this.solving.end();
@@ -130,6 +163,20 @@ export class StudyView {
     this.conditions.close();
     this.map.close();
     this.drawing.end();
+  }
+
+  /** The server did not answer, and does again. */
+  again() {
+    if (!this.is_stale || this.is_closed) return;
+    this.is_stale = false;
+    this.say("");
+    this.load();
+    this.table.load();
+    this.conditions.tell(true);
+  }
+
+  focus() {
+    this.wants_focus = true;
   }
 
   /** @param {any} now */
@@ -161,6 +208,12 @@ export class StudyView {
   }
   /** What a condition is refused for stands beside its field, and is not said again. @param {any} error */
   async complain(error) {
+    if (in_words(error) instanceof Silence) {
+      if (!this.is_stale) setTimeout(() => this.again(), kAskAgain_ms);
+      this.is_stale = true;
+      this.say("The server does not answer: what is shown is what came last.", true);
+      return;
+    }
     if (error.status === 400 && await this.conditions.is_wrong()) return;
     this.say(String(error.message), true);
   }
@@ -184,12 +237,21 @@ export class StudyView {
 
   /** Asks for the picture; what is asked for meanwhile comes after it, and only the last of that. */
   async load() {
+    if (this.is("between")) {
+      this.solving.go_on();
+      return;
+    }
     this.solving.end();
     if (this.asked) {
       this.wants_more = true;
+      if (this.is_waiting) this.asked.abort();  // that may take long
       return;
     }
     this.asked = new AbortController();
+    waiting.heard = (share) => {
+      this.is_waiting = true;
+      this.say(`The condition is asked of all points: ${Math.floor(100 * share)} %.`);
+    };
     const { signal } = this.asked;
     const kind = this.is("pic");
     try {
@@ -197,21 +259,30 @@ export class StudyView {
       for (const cells of steps_to(this)) {
         if (this.wants_more) break;  // the finer one would not be seen
         const picture = await ask(this, cells, signal);
-        if (signal.aborted || this.solving.is_on) return;
+        if (signal.aborted) break;
+        if (this.solving.is_on) return;
         this.loaded_ms = performance.now();
         this.show(picture, kind);
         this.root.dataset.pictureMs = String(Math.round(performance.now() - begun));
       }
+      if (!this.wants_more && !signal.aborted) this.read_columns.add(this.is("z"));
       if (this.said.className.includes("bad")) this.say("");
     } catch (error) {
       if (!signal.aborted) this.complain(error);
     } finally {
       this.asked = null;
+      this.waited();
     }
     if (this.wants_more) {
       this.wants_more = false;
       this.load();
     }
+  }
+
+  /** Nothing takes long any more. */
+  waited() {
+    if (this.is_waiting && !this.said.className.includes("bad")) this.say("");
+    this.is_waiting = false;
   }
 
   /** @param {Picture} picture @param {string} kind what it was asked for as */
@@ -222,6 +293,8 @@ export class StudyView {
     this.map.element.hidden = this.choice.spoken.hidden = this.choice.line.hidden = !this.has_map;
     this.drawing.draw();
     this.choice.again();
+    if (this.wants_focus && this.has_map) this.map.top.focus({ preventScroll: true });
+    this.wants_focus = false;
     this.solving.offer();
     this.marked = this.marking.load();
     show_takeaways(this);
@@ -236,15 +309,37 @@ export class StudyView {
       return;
     }
     if (!part) {
-      this.set({ x0: "", x1: "", y0: "", y1: "" });
+      this.set({ x0: "", x1: "", y0: "", y1: "", between: "", ...(this.is("pic") === "lines" ? { from: "", to: "" } : {}) }, true);
     } else {
       const ends = (/** @type {import("./asked/picture.js").Side} */ side, /** @type {number[]} */ cells, /** @type {number[]} */ values) => (side.edges
         ? values : cells.map((i) => side.numbers?.[i] ?? 0)).sort((a, b) => a - b).map(String);
       const [x0, x1] = ends(picture.x, [part.from[0], part.to[0]], part.x);
       const [y0, y1] = ends(picture.y, [part.from[1], part.to[1]], part.y);
-      this.set({ x0, x1, y0, y1 });
+      this.set({ x0, x1, y0, y1 }, true);
     }
     this.map.choose(null);
+    this.load();
+  }
+
+  /** @param {import("/parts/lines.js").Part | null} part of lines or of a histogram */
+  zoom_lines(part) {
+    const { picture } = this;
+    if (!picture) return;
+    if (!part) {
+      this.zoom(null);
+      return;
+    }
+    const { values, numbers, edges } = picture.x;
+    if (edges) {
+      const [from, to] = part.x.map((one) => rounded(one, edges[edges.length - 1] - edges[0]));
+      if (to > from) this.set({ x0: String(from), x1: String(to) }, true);
+    } else {
+      const inside = [...values.keys()].filter((i) => values[i] >= part.x[0] && values[i] <= part.x[1]).map((i) => numbers?.[i] ?? 0);
+      if (inside.length < 2) return;  // one value is no line
+      const wide = part.y ? part.y[1] - part.y[0] : 0;
+      this.set({ x0: String(Math.min(...inside)), x1: String(Math.max(...inside)),
+        ...(part.y ? { from: String(rounded(part.y[0], wide)), to: String(rounded(part.y[1], wide)) } : {}) }, true);
+    }
     this.load();
   }
 }

@@ -2,6 +2,7 @@
 // Rows of a study, a page at a time.
 import { h, tick } from "/parts/dom.js";
 import { count, heading, shown } from "/parts/format.js";
+import { Silence } from "/server.js";
 import { rows, rows_path } from "./asked/picture.js";
 import { joined } from "./conditions.js";
 
@@ -11,7 +12,7 @@ const kDeepest = 10_000;
 const kMostInFile = 100_000;
 
 /**
- * @param {{study: number, points: number, columns: () => string[], where: () => string, marked: () => string, wrong: (error: any) => void,
+ * @param {{study: number, points: number, columns: () => string[], where: () => string, marked: () => string, all: () => boolean, keep_all: (all: boolean) => void, wrong: (error: any) => void,
  *   chosen: (point: number) => void, order: () => string, keep_order: (order: string) => void}} of
  */
 export function row_table(of) {
@@ -20,11 +21,11 @@ export function row_table(of) {
   const back = h("button", { type: "button", onclick: () => turn(-1) }, "Previous");
   const next = h("button", { type: "button", onclick: () => turn(1) }, "Next");
   const file = h("a", { class: "button", download: "rows.csv" }, "Table as CSV");
-  let shows_marked_only = true;
   const only = h("div", { class: "only" }, tick("marked points only", true, (is) => {
-    shows_marked_only = is;
+    of.keep_all(!is);
     begin();
   }));
+  const only_box = /** @type {HTMLInputElement} */ (only.querySelector("input"));
   const element = h("section", { class: "rows" }, h("h2", {}, "Points"), only,
     h("div", { class: "scroll", tabIndex: 0, role: "region", "aria-label": "Points" }, table),
     h("div", { class: "row" }, back, next, file), said);
@@ -46,7 +47,7 @@ export function row_table(of) {
     load();
   }
   /** Which points are shown. */
-  const condition = () => joined(of.where(), shows_marked_only ? of.marked() : "");
+  const condition = () => joined(of.where(), of.all() ? "" : of.marked());
   function turn(/** @type {number} */ by) {
     page = Math.max(page + by, 0);
     load();
@@ -87,6 +88,7 @@ export function row_table(of) {
       counted = "\0"; // counting may be given up
     }
     only.hidden = of.marked() === "";
+    only_box.checked = !of.all();
     file.href = rows_path(of.study, { where, order: of.order() || "point", select: columns.join(","), limit: kMostInFile, format: "csv" });
     try {
       const first = page * kPage;
@@ -119,8 +121,10 @@ export function row_table(of) {
       await marked;
     } catch (error) {
       if (mine.signal.aborted) return;
-      table.replaceChildren(table.caption ?? "");
-      said.textContent = "";
+      if (!(error instanceof Silence)) {
+        table.replaceChildren(table.caption ?? "");
+        said.textContent = "";
+      }
       of.wrong(error);
     }
   }
@@ -129,7 +133,7 @@ export function row_table(of) {
   async function mark_rows(signal) {
     const condition_ = of.marked();
     if (condition_ === "" || points_here.length === 0) return;
-    const all = shows_marked_only ? points_here : (await rows(of.study, { select: "point", where: joined(`point IN (${points_here.join(",")})`, condition_), limit: kPage }, signal))
+    const all = !of.all() ? points_here : (await rows(of.study, { select: "point", where: joined(`point IN (${points_here.join(",")})`, condition_), limit: kPage }, signal))
       .rows.map((/** @type {number[]} */ row) => row[0]);
     for (const row of table.querySelectorAll("tr[data-point]")) row.classList.toggle("marked", all.includes(Number(/** @type {HTMLElement} */ (row).dataset.point)));
   }

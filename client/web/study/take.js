@@ -1,7 +1,7 @@
 // @ts-check
 // What people take with them: the picture as files, the view as a link, and the commands that make both.
 import { copied, h, save } from "/parts/dom.js";
-import { picture_fields, plot_command, query_command } from "./command.js";
+import { picture_fields, plot_command, query_command, run_command } from "./command.js";
 import { cells_csv } from "./words.js";
 
 /** @param {import("./study.js").StudyView} view */
@@ -9,7 +9,11 @@ export function show_takeaways(view) {
   const { picture } = view;
   if (!picture) return;
   if (view.solving.is_on) {
-    view.commands.replaceChildren(h("p", { class: "weak" }, "What is solved while one looks goes when nobody looks: keep it as a study to take it with you."), numbers(picture));
+    const name = `${view.study.name}-part`;
+    const what = view.solving.is_kept ? "These points are kept as a study."
+      : "What is solved while one looks goes when nobody looks. The address of this view finds it again or solves it anew; or keep it as a study.";
+    view.commands.replaceChildren(h("p", { class: "weak" }, what), numbers(picture),
+      ...(view.solving.block ? [copied("the command that solves it", run_command(view, name)), copied("the command of the picture", plot_command(view, name))] : []));
     return;
   }
   const file = (/** @type {string} */ format) => h("a", { class: "button", download: `${view.study.name}.${format}`, href: picture_path(view, format) }, format.toUpperCase());

@@ -7,21 +7,24 @@ import { kMostDots } from "./asked/dots.js";
 
 const many = (/** @type {number} */ n, /** @type {string} */ what) => `${count(n)} ${what}${n === 1 ? "" : "s"}`;
 
-/** What is shown, of how much. @param {Picture} picture @param {string} kind */
-export function facts(picture, kind) {
+/** What is shown, of how much. @param {Picture} picture @param {string} kind @param {any} study */
+export function facts(picture, kind, study) {
   const parts = [];
+  const blocks = study.blocks.length + study.blocks_left_out;
   if (picture.head.nx !== undefined) {
     const whole = (/** @type {any} */ side, /** @type {any} */ told) => told && !side.is_whole;
     parts.push(`${count(picture.head.nx)}${picture.y.name ? ` × ${count(picture.head.ny)}` : ""} cells, ${count(picture.head.solved)} solved${picture.head.filtered > 0 ? " that meet the condition" : ""}.`);
     for (const [side, told] of [[picture.x, picture.head.x], [picture.y, picture.head.y]]) {
       if (whole(side, told)) parts.push(`Of ${count(told.last - told.first + 1)} values of ${side.name}, ${count(side.values.length)} are shown, evenly chosen${kind === "lines" ? "" : ": zoom in for the others"}.`);
     }
-    for (const one of picture.head.at.filter((/** @type {any} */ a) => a.of > 1)) parts.push(`${one.key} = ${shown(one.value)}.`);
+    if (blocks > 1 && picture.head.study === study.id) parts.push(`Block ${picture.head.block + 1} of ${count(blocks)}; not shown: ${many(study.numbers - study.blocks[picture.head.block].points, "point")} of the others.`);
+    for (const one of picture.held ?? picture.head.at.filter((/** @type {any} */ a) => a.of > 1)) parts.push(`${one.key} = ${shown(one.value)}.`);
   } else if (picture.dots) {
     parts.push(`${many(picture.head.points, "point")}, each drawn.`);
     if (picture.head.without > 0) parts.push(`${many(picture.head.without, "other")} without values that can be shown.`);
   } else {
     parts.push(`${many(picture.head.points, "point")} in ${many(picture.values.length, "bin")}${picture.head.outside > 0 ? `, ${count(picture.head.outside)} outside` : ""}.`);
+    if (picture.head.sample) parts.push(`Of ${many(picture.head.sample.of, "result")} ${count(picture.head.sample.results)} are counted, evenly chosen.`);
     if (picture.head.filtered > 0) parts.push(`${many(picture.head.filtered, "other")} where the condition is not met.`);
     if (picture.y.name) parts.push(`Up to ${count(kMostDots)} points are drawn one by one, more are gathered.`);
   }

@@ -139,8 +139,9 @@ std::optional<int> Configuration::parse(int argc, const char* const* argv) {
 
 void Configuration::collect_settings() {
   for (CLI::Option* option : app_.get_options()) {
-    const bool is_about_program =
-        option == app_.get_help_ptr() || option->get_name() == "--version";
+    const bool is_about_program = option == app_.get_help_ptr() ||
+                                  option == app_.get_help_all_ptr() ||
+                                  option->get_name() == "--version";
     if (is_about_program || command_line_only_.contains(option)) {
       continue;
     }

@@ -27,14 +27,14 @@ struct StudyTerms {
   bool operator==(const StudyTerms&) const = default;
 };
 
-/// Points that are handed out together, under one lease: a run of numbers, of one model or several.
-/// What a filter leaves out of it, the worker knows by itself.
+/// Points that are handed out together, under one lease: a run of numbers, of one model or several,
+/// without those that a filter leaves out and some that were settled before.
 struct Batch {
   std::uint64_t first_point;
   std::uint64_t count;
   std::uint32_t attempts;        ///< how often these points had been leased before
   LossHistory losses;            ///< of the leases before
-  std::uint64_t points = count;  ///< of these numbers, those that no filter leaves out
+  std::uint64_t points = count;  ///< of these numbers, those that are handed out
 
   std::uint64_t end() const { return first_point + count; }
 };
@@ -147,6 +147,8 @@ class StudyPoints {
   std::optional<Interval> next_fresh(std::optional<std::uint64_t> follows) const;
   std::optional<Interval> next_left_in(std::optional<std::uint64_t> follows, std::uint64_t& looks);
   std::uint64_t lease_fresh(const Interval& free, const Portion& wanted, std::uint64_t& looks);
+  std::optional<Interval> fresh_near(std::uint64_t end, std::uint64_t run_end, std::uint64_t enough,
+                                     std::uint64_t taken, std::uint64_t& looks);
   void leave_out(const Interval& range);
   void forget_excess();
   bool erase_from(Returned& intervals, std::uint64_t point);

@@ -25,6 +25,8 @@ constexpr std::chrono::seconds kLongestFill{60};
 constexpr int kStepsBetweenLooks = 10'000;
 /// Rows that a slice reads lie apart: pages of the tree are worth keeping.
 constexpr const char* kPageCache = "PRAGMA cache_size = -65536";
+/// The number of no request: a column is filled.
+constexpr std::uint64_t kFilling = UINT64_MAX;
 
 }  // namespace
 
@@ -39,9 +41,8 @@ struct AnswerPool::Desk {
   }
 };
 
-void AnswerDesk::end_in_time(std::uint64_t point) const {
-  constexpr std::uint64_t kPointsBetweenLooks = 65'536;
-  if (point % kPointsBetweenLooks == 0 && is_over()) {
+void AnswerDesk::end_in_time(std::uint64_t point, std::uint64_t points_between_looks) const {
+  if (point % points_between_looks == 0 && is_over()) {
     throw StorageError("that takes too long: ask for less");
   }
 }
@@ -72,13 +73,13 @@ void AnswerPool::stop() {
   threads_.clear();
 }
 
-bool AnswerPool::submit(std::uint64_t number, Job job) {
+bool AnswerPool::submit(std::uint64_t number, Job job, Lane lane) {
   {
     const std::lock_guard lock(mutex_);
     if (is_stopping_ || waiting_.size() >= kMostWaiting) {
       return false;
     }
-    waiting_.push_back({number, std::move(job), std::make_shared<std::atomic<bool>>(false)});
+    waiting_.push_back({number, std::move(job), std::make_shared<std::atomic<bool>>(false), lane});
   }
   woken_.notify_one();
   return true;
@@ -99,40 +100,50 @@ void AnswerPool::forget(std::uint64_t number) {
   }
 }
 
+std::optional<AnswerPool::Order> AnswerPool::next() {
+  const auto found = std::find_if(waiting_.begin(), waiting_.end(), [this](const Order& order) {
+    return order.lane == Lane::kAny || !is_slow_lane_taken_;
+  });
+  if (found != waiting_.end()) {
+    Order order = std::move(*found);
+    waiting_.erase(found);
+    return order;
+  }
+  if (is_slow_lane_taken_ || !columns_.has_wishes()) {
+    return std::nullopt;
+  }
+  return Order{kFilling,
+               [](const AnswerDesk& at) {
+                 at.columns.fill_one(at.database, at.is_over);
+                 return HttpAnswer{};
+               },
+               std::make_shared<std::atomic<bool>>(false), Lane::kSlow};
+}
+
 void AnswerPool::run() {
   Desk desk;
   std::unique_lock lock(mutex_);
   while (!is_stopping_) {
-    // One of the threads may fill a column when nobody waits; the others stay free.
-    const bool may_fill = waiting_.empty() && !is_filling_ && columns_.has_wishes();
-    if (waiting_.empty() && !may_fill) {
+    const auto order = next();
+    if (!order) {
       woken_.wait(lock);
       continue;
     }
-    constexpr std::uint64_t kFilling = UINT64_MAX;
-    Order order{kFilling,
-                [](const AnswerDesk& at) {
-                  at.columns.fill_one(at.database, at.is_over);
-                  return HttpAnswer{};
-                },
-                std::make_shared<std::atomic<bool>>(false)};
-    if (!may_fill) {
-      order = std::move(waiting_.front());
-      waiting_.pop_front();
-    }
-    is_filling_ = is_filling_ || may_fill;
-    at_work_[order.number] = order.is_unwanted;
+    const bool is_filling = order->number == kFilling;
+    const bool is_slow = order->lane == Lane::kSlow;
+    is_slow_lane_taken_ = is_slow_lane_taken_ || is_slow;
+    at_work_[order->number] = order->is_unwanted;
     lock.unlock();
-    desk.until = Clock::now() + (may_fill ? kLongestFill : kLongestJob);
-    HttpAnswer answer = answer_to(order, desk);
+    desk.until = Clock::now() + (is_filling ? kLongestFill : kLongestJob);
+    HttpAnswer answer = answer_to(*order, desk);
     lock.lock();
-    at_work_.erase(order.number);
-    is_filling_ = is_filling_ && !may_fill;
-    if (columns_.has_wishes()) {
+    at_work_.erase(order->number);
+    is_slow_lane_taken_ = is_slow_lane_taken_ && !is_slow;
+    if (columns_.has_wishes() || !waiting_.empty()) {
       woken_.notify_one();
     }
-    if (!may_fill && !*order.is_unwanted) {
-      answers_.insert_or_assign(order.number, std::move(answer));
+    if (!is_filling && !*order->is_unwanted) {
+      answers_.insert_or_assign(order->number, std::move(answer));
       done_();
     }
   }

@@ -26,8 +26,8 @@ struct AnswerDesk {
   ColumnStore& columns;
   std::function<bool()> is_over;  ///< nobody waits any more, or the time is up
 
-  /// For what goes through many points: throws StorageError when it is over, at every 65,536th.
-  void end_in_time(std::uint64_t point) const;
+  /// For what goes through many points: throws StorageError when it is over, at every so manyth.
+  void end_in_time(std::uint64_t point, std::uint64_t points_between_looks = 65'536) const;
 };
 
 /// Answers that are made of the database, on a few threads of their own with a connection each: a
@@ -50,8 +50,12 @@ class AnswerPool {
   /// Ends all jobs; `done` is not called any more, and nothing is taken.
   void stop();
 
+  /// What is done one at a time, so that others are always answered: counting what filters leave
+  /// in, whatever those ask who come without the token, and filling columns that nobody waits for.
+  enum class Lane { kAny, kSlow };
+
   /// False when too many wait already, and after `stop`.
-  bool submit(std::uint64_t number, Job job);
+  bool submit(std::uint64_t number, Job job, Lane lane = Lane::kAny);
   /// The answer, once; nothing: it is not made yet.
   std::optional<HttpAnswer> take(std::uint64_t number);
   /// Nobody waits for it any more.
@@ -62,8 +66,12 @@ class AnswerPool {
     std::uint64_t number;
     Job job;
     std::shared_ptr<std::atomic<bool>> is_unwanted;
+    Lane lane = Lane::kAny;
   };
   struct Desk;
+
+  /// The next that may begin; it waits no more. Nothing: none may. With mutex_ locked.
+  std::optional<Order> next();
 
   void run();
   HttpAnswer answer_to(const Order& order, Desk& desk);
@@ -77,7 +85,7 @@ class AnswerPool {
   std::deque<Order> waiting_;                                            // guarded by mutex_
   std::map<std::uint64_t, std::shared_ptr<std::atomic<bool>>> at_work_;  // guarded by mutex_
   std::map<std::uint64_t, HttpAnswer> answers_;                          // guarded by mutex_
-  bool is_filling_ = false;                                              // guarded by mutex_
+  bool is_slow_lane_taken_ = false;                                      // guarded by mutex_
   bool is_stopping_ = false;                                             // guarded by mutex_
   std::vector<std::thread> threads_;  // last: they use all the others
 };

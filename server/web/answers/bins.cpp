@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -10,6 +11,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "server/web/answers/fields.h"
+#include "server/web/answers/result_sample.h"
 #include "server/web/answers/study_answers.h"
 #include "server/web/http/json_answer.h"
 
@@ -23,9 +25,41 @@ constexpr std::uint64_t kUsualBins = 64;
 /// Columns are looked at in parts, so that no second copy of them is held.
 constexpr std::size_t kPart = 65'536;
 
+/// Values of a study's column, as it is held or as a sample of it has them.
+class BinColumn {
+ public:
+  BinColumn() = default;
+  BinColumn(ColumnSource source, ColumnStore::Shared stored)
+      : source_(std::move(source)), stored_(std::move(stored)) {}
+  BinColumn(ColumnSource source, std::shared_ptr<const ResultSample> sample, std::size_t number)
+      : source_(std::move(source)), sample_(std::move(sample)), number_(number) {}
+
+  explicit operator bool() const { return stored_ || sample_; }
+  const ColumnSource& source() const { return source_; }
+  std::uint64_t size() const { return stored_ ? stored_->points() : sample_->points.size(); }
+  std::uint64_t point(std::uint64_t place) const {
+    return stored_ ? place : sample_->points[place];
+  }
+  std::vector<float> part(std::uint64_t first, std::size_t count) const {
+    if (stored_) {
+      return stored_->part(first, count);
+    }
+    const auto& all = sample_->columns[number_];
+    const std::size_t end = std::min<std::size_t>(first + count, all.size());
+    return {all.begin() + static_cast<std::ptrdiff_t>(first),
+            all.begin() + static_cast<std::ptrdiff_t>(end)};
+  }
+
+ private:
+  ColumnSource source_;
+  ColumnStore::Shared stored_;
+  std::shared_ptr<const ResultSample> sample_;
+  std::size_t number_ = 0;
+};
+
 /// The bins along one column, both ends in.
 struct BinSide {
-  ColumnStore::Shared column;  ///< null: there is one bin
+  BinColumn column;  ///< none: there is one bin
   std::uint64_t bins = 1;
   bool is_logarithmic = false;
   double least = 0.0;
@@ -62,10 +96,27 @@ struct BinSide {
   }
 };
 
-ColumnStore::Shared whole_column(const AnswerDesk& desk, const LookedAtStudy& study,
-                                 const ColumnSource& source) {
-  ColumnStore::check_size(study.points);
-  return desk.columns.read(desk.database, study.id, source, study.points, desk.is_over);
+/// Columns that are asked for, and what there is of their study.
+struct BinColumns {
+  std::vector<BinColumn> columns;
+  std::shared_ptr<const ResultSample> sample;  ///< null: all is held
+};
+
+BinColumns read_columns(const AnswerDesk& desk, const LookedAtStudy& study,
+                        const std::vector<ColumnSource>& sources) {
+  BinColumns read;
+  if (study.points > ColumnStore::kMostPoints) {
+    read.sample = std::make_shared<ResultSample>(sample_results(desk, study.id, sources));
+  }
+  for (const ColumnSource& source : sources) {
+    if (read.sample) {
+      read.columns.emplace_back(source, read.sample, read.columns.size());
+    } else {
+      read.columns.emplace_back(
+          source, desk.columns.read(desk.database, study.id, source, study.points, desk.is_over));
+    }
+  }
+  return read;
 }
 
 /// Which points are counted: those that meet a condition, or all.
@@ -84,13 +135,13 @@ std::optional<std::pair<double, double>> range_of(const AnswerDesk& desk, const 
                                                   const PointSet* chosen) {
   Chosen is_chosen(chosen);
   std::optional<std::pair<double, double>> range;
-  for (std::uint64_t first = 0; first < side.column->points(); first += kPart) {
+  for (std::uint64_t first = 0; first < side.column.size(); first += kPart) {
     desk.end_in_time(first);
-    const std::vector<float> part = side.column->part(first, kPart);
+    const std::vector<float> part = side.column.part(first, kPart);
     for (std::size_t i = 0; i < part.size(); ++i) {
       const auto value = static_cast<double>(part[i]);
       if (std::isfinite(value) && (!side.is_logarithmic || value > 0.0) &&
-          is_chosen.has(first + i)) {
+          is_chosen.has(side.column.point(first + i))) {
         range = range ? std::pair(std::min(range->first, value), std::max(range->second, value))
                       : std::pair(value, value);
       }
@@ -99,10 +150,10 @@ std::optional<std::pair<double, double>> range_of(const AnswerDesk& desk, const 
   return range;
 }
 
-BinSide side_of(const AnswerDesk& desk, const LookedAtStudy& study, const FieldReader& fields,
+BinSide side_of(const AnswerDesk& desk, BinColumn column, const FieldReader& fields,
                 const std::string& name, const PointSet* chosen) {
   BinSide side;
-  side.column = whole_column(desk, study, picture_column(fields, name, false));
+  side.column = std::move(column);
   side.bins = fields.pixels("n" + name, kUsualBins);
   side.is_logarithmic = fields.text(name + "log").value_or("") == "1";
   const auto range = range_of(desk, side, chosen);
@@ -129,24 +180,24 @@ struct Bins {
   std::uint64_t filtered = 0;
 };
 
-Bins bins_of(const AnswerDesk& desk, const BinSide& x, const BinSide& y,
-             const ColumnStore::Shared& z, const PointSet* chosen) {
+Bins bins_of(const AnswerDesk& desk, const BinSide& x, const BinSide& y, const BinColumn& z,
+             const PointSet* chosen) {
   Chosen is_chosen(chosen);
   const std::size_t size = x.bins * y.bins;
   Bins bins{std::vector<std::uint32_t>(size), std::vector<double>(z ? size : 0),
             std::vector<std::uint32_t>(z ? size : 0)};
-  for (std::uint64_t first = 0; first < x.column->points(); first += kPart) {
+  for (std::uint64_t first = 0; first < x.column.size(); first += kPart) {
     desk.end_in_time(first);
-    const std::vector<float> x_part = x.column->part(first, kPart);
-    const std::vector<float> y_part = y.column ? y.column->part(first, kPart) : x_part;
-    const std::vector<float> z_part = z ? z->part(first, kPart) : std::vector<float>();
+    const std::vector<float> x_part = x.column.part(first, kPart);
+    const std::vector<float> y_part = y.column ? y.column.part(first, kPart) : x_part;
+    const std::vector<float> z_part = z ? z.part(first, kPart) : std::vector<float>();
     for (std::size_t i = 0; i < x_part.size(); ++i) {
       const float x_value = x_part[i];
       const float y_value = y_part[i];
       if (!std::isfinite(x_value) || !std::isfinite(y_value)) {
         continue;
       }
-      if (!is_chosen.has(first + i)) {
+      if (!is_chosen.has(x.column.point(first + i))) {
         ++bins.filtered;
         continue;
       }
@@ -167,7 +218,7 @@ Bins bins_of(const AnswerDesk& desk, const BinSide& x, const BinSide& y,
 }
 
 ordered_json side_json(const BinSide& side) {
-  const ColumnSource& source = side.column->source();
+  const ColumnSource& source = side.column.source();
   return {{"column", source.name}, {"unit", source.unit}, {"least", side.least},
           {"most", side.most},     {"bins", side.bins},   {"log", side.is_logarithmic}};
 }
@@ -176,10 +227,18 @@ HttpAnswer bins_answer(const AnswerDesk& desk, std::uint64_t id, const Fields& a
                        const PointSet* chosen) {
   const LookedAtStudy study = desk.studies.study(desk.database, id);
   const FieldReader fields(asked);
-  const BinSide x = side_of(desk, study, fields, "x", chosen);
-  const BinSide y = fields.text("y") ? side_of(desk, study, fields, "y", chosen) : BinSide();
-  const ColumnStore::Shared z =
-      fields.text("z") ? whole_column(desk, study, picture_column(fields, "z", false)) : nullptr;
+  const bool has_y = fields.text("y").has_value();
+  std::vector<ColumnSource> sources{picture_column(fields, "x", false)};
+  if (has_y) {
+    sources.push_back(picture_column(fields, "y", false));
+  }
+  if (fields.text("z")) {
+    sources.push_back(picture_column(fields, "z", false));
+  }
+  auto [columns, sample] = read_columns(desk, study, sources);
+  const BinColumn z = fields.text("z") ? columns.back() : BinColumn();
+  const BinSide x = side_of(desk, columns[0], fields, "x", chosen);
+  const BinSide y = has_y ? side_of(desk, columns[1], fields, "y", chosen) : BinSide();
   const Bins bins = bins_of(desk, x, y, z, chosen);
   std::string numbers(bins.counts.size() * sizeof(bins.counts[0]), '\0');
   std::memcpy(numbers.data(), bins.counts.data(), numbers.size());
@@ -189,15 +248,19 @@ HttpAnswer bins_answer(const AnswerDesk& desk, std::uint64_t id, const Fields& a
                            : no_result();
     numbers.append(reinterpret_cast<const char*>(&mean), sizeof mean);
   }
-  return numbers_answer({{"study", id},
-                         {"x", side_json(x)},
-                         {"y", y.column ? side_json(y) : ordered_json(nullptr)},
-                         {"z", z ? ordered_json(z->source().name) : ordered_json(nullptr)},
-                         {"points", bins.inside},
-                         {"outside", bins.outside},
-                         {"filtered", bins.filtered},
-                         {"most", *std::max_element(bins.counts.begin(), bins.counts.end())}},
-                        numbers);
+  return numbers_answer(
+      {{"study", id},
+       {"x", side_json(x)},
+       {"y", y.column ? side_json(y) : ordered_json(nullptr)},
+       {"z", z ? ordered_json(z.source().name) : ordered_json(nullptr)},
+       {"points", bins.inside},
+       {"outside", bins.outside},
+       {"filtered", bins.filtered},
+       {"sample", sample && sample->points.size() < sample->of
+                      ? ordered_json{{"results", sample->points.size()}, {"of", sample->of}}
+                      : ordered_json(nullptr)},
+       {"most", *std::max_element(bins.counts.begin(), bins.counts.end())}},
+      numbers);
 }
 
 }  // namespace

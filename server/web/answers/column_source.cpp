@@ -24,6 +24,14 @@ bool has(const Names& names, std::string_view name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
+/// The value, or of a point that failed its error, a text, where no value is. Outputs of such a
+/// point are NULL: its error is looked at only then, for every look costs at 10^6 rows.
+std::string value_or_error(const ColumnSource& source) {
+  return source.is_of_failed
+             ? fmt::format("CASE WHEN p.error IS NULL THEN {} ELSE p.error END", source.sql)
+             : fmt::format("coalesce({}, p.error)", source.sql);
+}
+
 }  // namespace
 
 std::optional<ColumnSource> column_source(std::string_view name) {
@@ -39,9 +47,11 @@ std::optional<ColumnSource> column_source(std::string_view name) {
   } else if (has(kPlainNumbers, name) || has(kTexts, name)) {
     source.sql = fmt::format("p.{}", name);
     source.is_category = has(kTexts, name);
+    source.is_of_failed = !source.is_category;
   } else if (has(kOfModels, name) || name == "E_Pa") {
     source.sql = fmt::format("m.{}", name == "E_Pa" ? "E" : name);
     source.is_of_model = true;
+    source.is_of_failed = true;
   } else {
     return std::nullopt;
   }
@@ -73,9 +83,9 @@ ColumnReader::ColumnReader(sqlite3* database, std::uint64_t study, const ColumnS
       per_unit_(source.per_unit),
       statement_(
           database,
-          fmt::format("SELECT p.point, p.error IS NOT NULL, {} FROM packed_results AS p{} "
+          fmt::format("SELECT p.point, {} FROM packed_results AS p{} "
                       "WHERE p.study_id = ?1 AND p.point BETWEEN ?2 AND ?3",
-                      source.sql,
+                      value_or_error(source),
                       source.is_of_model ? " JOIN models AS m ON m.model_id = p.model_id" : "")) {}
 
 void ColumnReader::begin(std::uint64_t first, std::uint64_t last) {
@@ -86,10 +96,14 @@ void ColumnReader::begin(std::uint64_t first, std::uint64_t last) {
 }
 
 float ColumnReader::value() const {
-  if (statement_.integer(1) != 0) {
-    return failed_point();
+  switch (statement_.type(1)) {
+    case SQLITE_NULL:
+      return no_value();
+    case SQLITE_TEXT:
+      return failed_point();
+    default:
+      return static_cast<float>(statement_.real(1) / per_unit_);
   }
-  return statement_.is_null(2) ? no_value() : static_cast<float>(statement_.real(2) / per_unit_);
 }
 
 }  // namespace oblique::server

@@ -13,10 +13,11 @@ namespace oblique::server {
 struct ColumnSource {
   std::string name;
   std::string unit;
-  std::string sql;           ///< over packed_results AS p and models AS m
-  double per_unit = 1.0;     ///< so many of what stands there are one `unit`
-  bool is_of_model = false;  ///< `m` is needed
-  bool is_category = false;  ///< what stands there is the number of a text
+  std::string sql;            ///< over packed_results AS p and models AS m
+  double per_unit = 1.0;      ///< so many of what stands there are one `unit`
+  bool is_of_model = false;   ///< `m` is needed
+  bool is_of_failed = false;  ///< points that failed have it too
+  bool is_category = false;   ///< what stands there is the number of a text
 };
 
 /// Nothing: the column is none of numbers or of categories.

@@ -273,14 +273,6 @@ ColumnStore::Shared ColumnStore::read(sqlite3* database, std::uint64_t study,
   return column;
 }
 
-void ColumnStore::check_size(std::uint64_t points) {
-  if (points > kMostPoints) {
-    throw std::invalid_argument(
-        fmt::format("the study has {} points, and bins are made of at most {}: ask for rows",
-                    points, kMostPoints));
-  }
-}
-
 bool ColumnStore::has_wishes() const {
   const std::lock_guard lock(mutex_);
   return !wished_.empty();

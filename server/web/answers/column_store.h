@@ -92,8 +92,6 @@ class ColumnStore {
 
   /// Studies with more points are never read whole.
   static constexpr std::uint64_t kMostPoints = 32'000'000;
-  /// Throws std::invalid_argument, for people, for a study of more points.
-  static void check_size(std::uint64_t points);
 
  private:
   /// A picture is of three columns at most.

@@ -147,10 +147,13 @@ std::vector<GridPlace> grid_places(const protocol::PointTable& table, const Fiel
     return true;
   };
   std::vector<AxisLayout> axes;
+  const auto meant = fields.whole("block");
+  std::uint64_t number = 0;
   for (const protocol::Block& block : table.recipe().blocks()) {
-    if (is_grid(block) && !has_all(axes)) {
+    if (is_grid(block) && (meant ? number == *meant : !has_all(axes))) {
       axes = protocol::layout_of(block);
     }
+    ++number;
   }
   return places_at(axes, at);
 }

@@ -88,8 +88,10 @@ Tally tally(const AnswerDesk& desk, const LookedAtStudy& study,
   Tally tally;
   std::size_t near = 0;
   const bool has_filter = study.table->has_filter();
+  constexpr std::uint64_t kFiltersBetweenLooks = 64;  // one may take as long as its author likes
+  constexpr std::uint64_t kPointsBetweenLooks = 65'536;
   for (std::size_t i = 0; i < values.size(); ++i) {
-    desk.end_in_time(i);
+    desk.end_in_time(i, has_filter ? kFiltersBetweenLooks : kPointsBetweenLooks);
     float& value = values[i];
     if (is_same_mark(value, no_result()) && has_filter && !study.table->is_left_in(points[i])) {
       value = left_out();
@@ -116,7 +118,8 @@ Tally tally(const AnswerDesk& desk, const LookedAtStudy& study,
 
 constexpr std::uint16_t kFirstMark = 0xfffb;
 
-/// Codes of texts, the most frequent first, and these texts.
+/// Codes of texts, the most frequent first, and these texts. Of those that are equally frequent the
+/// first by the alphabet, as pictures of oblique plot have them.
 std::vector<std::uint16_t> coded(const AnswerDesk& desk, const std::vector<float>& values,
                                  ordered_json& dictionary) {
   std::map<std::int64_t, std::uint64_t> counts;
@@ -125,19 +128,28 @@ std::vector<std::uint16_t> coded(const AnswerDesk& desk, const std::vector<float
       ++counts[static_cast<std::int64_t>(value)];
     }
   }
-  std::vector<std::pair<std::int64_t, std::uint64_t>> ranked(counts.begin(), counts.end());
-  std::stable_sort(ranked.begin(), ranked.end(),
-                   [](const auto& a, const auto& b) { return a.second > b.second; });
-  std::map<std::int64_t, std::uint16_t> codes;
+  struct Text {
+    std::int64_t id;
+    std::uint64_t count;
+    std::string text;
+  };
+  std::vector<Text> ranked;
   Statement text(desk.database, "SELECT text FROM texts WHERE text_id = ?1");
-  for (const auto& [id, count] : ranked) {
+  for (const auto& [id, count] : counts) {
+    text.bind(1, id);
+    ranked.push_back({id, count, text.step() ? text.text(0) : ""});
+    text.reset();
+  }
+  std::sort(ranked.begin(), ranked.end(), [](const Text& a, const Text& b) {
+    return a.count != b.count ? a.count > b.count : a.text < b.text;
+  });
+  std::map<std::int64_t, std::uint16_t> codes;
+  for (Text& each : ranked) {
     if (codes.size() == kFirstMark) {
       break;
     }
-    text.bind(1, id);
-    dictionary.push_back({{"text", text.step() ? text.text(0) : ""}, {"cells", count}});
-    text.reset();
-    codes.emplace(id, static_cast<std::uint16_t>(codes.size()));
+    dictionary.push_back({{"text", std::move(each.text)}, {"cells", each.count}});
+    codes.emplace(each.id, static_cast<std::uint16_t>(codes.size()));
   }
   std::vector<std::uint16_t> coded(values.size());
   std::transform(values.begin(), values.end(), coded.begin(), [&](float value) -> std::uint16_t {

@@ -104,6 +104,7 @@ ordered_json model_json(const protocol::Recipe& recipe) {
   const solver::ModelParameters model = recipe.has_model()
                                             ? protocol::unjudged_from_message(recipe.model())
                                             : solver::ModelParameters();
+  const solver::ModelParameters usual;
   ordered_json keys = ordered_json::array();
   for (const solver::ParameterKey& key : solver::model_keys()) {
     const bool is_word = key.name == "integrator";
@@ -112,12 +113,15 @@ ordered_json model_json(const protocol::Recipe& recipe) {
     keys.push_back({{"key", key.name},
                     {"unit", key.unit},
                     {"meaning", key.meaning},
-                    {"value", std::move(value)}});
+                    {"value", std::move(value)},
+                    {"usual", is_word ? model.integrator == usual.integrator
+                                      : key.get(model) == key.get(usual)}});
   }
   keys.push_back({{"key", "lengths"},
                   {"unit", "m"},
                   {"meaning", "of each link, from the pin outwards"},
-                  {"value", model.lengths_m}});
+                  {"value", model.lengths_m},
+                  {"usual", model.lengths_m == usual.lengths_m}});
   return keys;
 }
 
@@ -142,6 +146,19 @@ HttpAnswer study_answer(const AnswerDesk& desk, std::uint64_t id) {
                       {"columns", columns_json()}});
 }
 
+/// The list that a text is; discarded where it is none, or nested deeper than ours are: whoever
+/// wrote the file decides how deep, and to copy or write such a value takes as much of the stack.
+ordered_json list_of(const std::string& text) {
+  constexpr int kDeepest = 3;
+  bool is_too_deep = false;
+  const auto is_kept = [&is_too_deep](int depth, auto, const ordered_json&) {
+    is_too_deep = is_too_deep || depth > kDeepest;
+    return !is_too_deep;
+  };
+  auto list = ordered_json::parse(text, is_kept, false);
+  return is_too_deep ? ordered_json(ordered_json::value_t::discarded) : list;
+}
+
 ordered_json value_of(const Statement& row, int column) {
   switch (row.type(column)) {
     case SQLITE_INTEGER:
@@ -154,8 +171,8 @@ ordered_json value_of(const Statement& row, int column) {
       break;
   }
   std::string text = row.text(column);
-  if (text.starts_with('[')) {  // a list
-    auto list = ordered_json::parse(text, nullptr, false);
+  if (text.starts_with('[')) {
+    auto list = list_of(text);
     return list.is_discarded() ? ordered_json(std::move(text)) : list;
   }
   return text;

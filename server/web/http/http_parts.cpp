@@ -52,8 +52,14 @@ MHD_Result take_header(void* into, MHD_ValueKind /*kind*/, const char* key, cons
   return MHD_YES;
 }
 
-MHD_Result take_field(void* into, MHD_ValueKind /*kind*/, const char* key, const char* value) {
-  static_cast<HttpQuestion*>(into)->fields.try_emplace(key, value == nullptr ? "" : value);
+MHD_Result take_field(void* into, MHD_ValueKind /*kind*/, const char* key, std::size_t key_bytes,
+                      const char* value, std::size_t value_bytes) {
+  auto& [head, question] = *static_cast<Asked*>(into);
+  const std::string name(key, key_bytes);
+  const std::string text = value == nullptr ? std::string() : std::string(value, value_bytes);
+  head.has_zero_bytes = head.has_zero_bytes || name.find('\0') != std::string::npos ||
+                        text.find('\0') != std::string::npos;
+  question.fields.try_emplace(name, text);
   return MHD_YES;
 }
 
@@ -70,7 +76,7 @@ Asked asked_on(MHD_Connection* connection, const char* method, const char* path)
   asked.question.method = method;
   asked.question.path = path;
   MHD_get_connection_values(connection, MHD_HEADER_KIND, take_header, &asked);
-  MHD_get_connection_values(connection, MHD_GET_ARGUMENT_KIND, take_field, &asked.question);
+  MHD_get_connection_values_n(connection, MHD_GET_ARGUMENT_KIND, take_field, &asked);
   return asked;
 }
 

@@ -113,6 +113,9 @@ std::optional<HttpRefusal> objection_to(const RequestHead& head, const OwnNames&
   if (auto refusal = objection_to_hosts(head, own)) {
     return refusal;
   }
+  if (head.has_zero_bytes) {
+    return HttpRefusal{kBadRequest, "fields of a request have no zero bytes"};
+  }
   const bool is_of_ours =
       std::all_of(head.origins.begin(), head.origins.end(),
                   [&](const std::string& origin) { return is_own_origin(origin, head); }) &&

@@ -12,10 +12,11 @@ namespace oblique::server {
 struct RequestHead {
   std::string method;
   bool has_body = false;
-  std::vector<std::string> hosts;                ///< every Host header
-  std::vector<std::string> origins;              ///< every Origin header
-  std::vector<std::string> fetch_sites;          ///< every Sec-Fetch-Site header
-  bool takes_changes = false;                    ///< something can be changed at its path, by POST
+  std::vector<std::string> hosts;        ///< every Host header
+  std::vector<std::string> origins;      ///< every Origin header
+  std::vector<std::string> fetch_sites;  ///< every Sec-Fetch-Site header
+  bool has_zero_bytes = false;           ///< in a field: what follows one is easily overlooked
+  bool takes_changes = false;            ///< something can be changed at its path, by POST
   std::optional<std::uint64_t> body_bytes = {};  ///< as Content-Length says
 };
 

@@ -18,6 +18,11 @@ using protocol::ClientReply;
 using protocol::ClientRequest;
 
 constexpr unsigned kWrong = 400;
+constexpr unsigned kAskAgain = 202;
+
+/// What took longer to find than this is used for as long as it took.
+constexpr std::chrono::seconds kLong{2};
+constexpr std::chrono::seconds kLongestUse{60};
 
 /// Runs of all sets that are kept: 64 MiB.
 constexpr std::size_t kMostKeptRuns = PointSet::kMostRuns;
@@ -32,7 +37,7 @@ ClientRequest points_that_meet(const std::string& study, const std::string& cond
 }
 
 /// False: they are too many, or come in another order than asked for.
-bool take_points(const protocol::QueryReply& chunk, PointSet& points) {
+bool take_points(const protocol::QueryReply& chunk, PointSet& points, std::uint64_t& last) {
   if (!protocol::is_sound(chunk) || (chunk.chunk_rows() > 0 && chunk.columns_size() != 1)) {
     return false;
   }
@@ -41,6 +46,7 @@ bool take_points(const protocol::QueryReply& chunk, PointSet& points) {
         !points.add(static_cast<std::uint64_t>(rows.cell(0).integer))) {
       return false;
     }
+    last = static_cast<std::uint64_t>(rows.cell(0).integer);
   }
   return true;
 }
@@ -50,10 +56,24 @@ bool take_points(const protocol::QueryReply& chunk, PointSet& points) {
 /// Points as they come, chunk by chunk.
 struct PointFilters::Coming {
   Asked asked;
+  Clock::time_point begun = Clock::now();
+  Clock::time_point wanted = begun;  ///< by somebody, the last time
   std::string study = {};
+  std::uint64_t study_points = 0;
+  std::uint64_t last_point = 0;
   std::uint64_t chunks = 0;
   bool is_asked_as_written = false;
   std::shared_ptr<PointSet> points = std::make_shared<PointSet>();
+
+  /// Points come in their order, so that the last one tells how far it is.
+  HttpAnswer so_far() const {
+    const auto share = study_points == 0
+                           ? 0.0
+                           : static_cast<double>(last_point) / static_cast<double>(study_points);
+    return json_answer({{"state", "the condition is asked of all points: ask again"},
+                        {"share", std::min(share, 1.0)}},
+                       kAskAgain);
+  }
 };
 
 FilteredPicture PointFilters::begin(std::uint64_t study, const HttpQuestion& question,
@@ -82,20 +102,29 @@ Talk PointFilters::talk(std::uint64_t study, std::string condition, std::string 
       coming->study = now.name();
       coming->asked.solved = now.solved();
       coming->asked.failed = now.failed();
+      coming->study_points = now.points();
       if (Shared known = find(coming->asked)) {
         return picture(std::move(known));
       }
+      if (auto fault = fault_of(coming->asked)) {
+        return *std::move(fault);
+      }
+      if (const auto other = under_way(coming->asked)) {
+        other->wanted = Clock::now();
+        return other->so_far();
+      }
+      comings_.push_back(coming);
       return points_that_meet(now.name(), coming->asked.condition);
     }
     ++coming->chunks;
-    if (!take_points(reply.query(), *coming->points)) {
+    if (!take_points(reply.query(), *coming->points, coming->last_point)) {
       return error_answer(kWrong,
                           fmt::format("the points that meet the condition are too many and lie too "
                                       "far apart: {} of them in turns are the most",
                                       PointSet::kMostRuns));
     }
     if (reply.query().ends()) {
-      keep(coming->asked, coming->points);
+      keep(*coming);
       return picture(coming->points);
     }
     ClientRequest more;
@@ -104,22 +133,52 @@ Talk PointFilters::talk(std::uint64_t study, std::string condition, std::string 
     return more;
   };
   // What is wrong is told of what people wrote, and not of what was added to it.
-  const auto failed =
-      [coming, condition = std::move(condition)](const protocol::ErrorReply& error) -> Talk::Next {
+  const auto failed = [this, coming, condition = std::move(condition)](
+                          const protocol::ErrorReply& error) -> Talk::Next {
     if (!error.wrong_request() || coming->study.empty() ||
         std::exchange(coming->is_asked_as_written, true)) {
+      const auto now = Clock::now();
+      if (now - coming->begun > kLong) {  // who was told to ask again hears it
+        faults_.push_back({coming->asked, failure(error), now + kWaitedFor});
+      }
       return failure(error);
     }
     coming->chunks = 0;  // what came of the first question is no part of this answer
     coming->points = std::make_shared<PointSet>();
     return points_that_meet(coming->study, condition);
   };
-  return {status_of_number(study), go_on, too_slow(), failed};
+  Talk::Background background{[coming] { return coming->so_far(); },
+                              [coming] { return Clock::now() - coming->wanted > kWaitedFor; }};
+  return {status_of_number(study), go_on, too_slow(), failed, false, std::move(background)};
+}
+
+std::optional<HttpAnswer> PointFilters::fault_of(const Asked& asked) {
+  std::erase_if(faults_, [now = Clock::now()](const Fault& fault) { return fault.until < now; });
+  const auto found = std::find_if(faults_.begin(), faults_.end(), [&](const Fault& fault) {
+    return fault.asked.study == asked.study && fault.asked.condition == asked.condition;
+  });
+  return found == faults_.end() ? std::nullopt : std::optional(found->answer);
+}
+
+/// The same condition that is asked already.
+std::shared_ptr<PointFilters::Coming> PointFilters::under_way(const Asked& asked) {
+  std::erase_if(comings_, [](const std::weak_ptr<Coming>& each) { return each.expired(); });
+  for (const std::weak_ptr<Coming>& each : comings_) {
+    const auto coming = each.lock();
+    if (coming && coming->asked.study == asked.study &&
+        coming->asked.condition == asked.condition) {
+      return coming;
+    }
+  }
+  return nullptr;
 }
 
 PointFilters::Shared PointFilters::find(const Asked& asked) {
-  const auto found = std::find_if(kept_.begin(), kept_.end(),
-                                  [&](const Kept& kept) { return kept.asked == asked; });
+  const auto found =
+      std::find_if(kept_.begin(), kept_.end(), [&, now = Clock::now()](const Kept& kept) {
+        return kept.asked == asked || (now < kept.until && kept.asked.study == asked.study &&
+                                       kept.asked.condition == asked.condition);
+      });
   if (found == kept_.end()) {
     return nullptr;
   }
@@ -127,12 +186,15 @@ PointFilters::Shared PointFilters::find(const Asked& asked) {
   return kept_.front().points;
 }
 
-void PointFilters::keep(const Asked& asked, Shared points) {
+void PointFilters::keep(const Coming& coming) {
   constexpr std::size_t kMostKept = 64;
+  const Asked& asked = coming.asked;
+  const auto now = Clock::now();
+  const auto took = std::min<Clock::duration>(now - coming.begun, kLongestUse);
   std::erase_if(kept_, [&](const Kept& kept) {
     return kept.asked.study == asked.study && kept.asked.condition == asked.condition;
   });
-  kept_.push_front({asked, std::move(points)});
+  kept_.push_front({asked, coming.points, took > kLong ? now + took : now});
   std::size_t runs = 0;
   std::size_t sets = 0;
   std::erase_if(kept_, [&](const Kept& kept) {

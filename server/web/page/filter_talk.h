@@ -1,11 +1,14 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <list>
 #include <memory>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "server/web/answers/answer_pool.h"
 #include "server/web/answers/point_set.h"
@@ -27,7 +30,11 @@ class PointFilters {
  public:
   FilteredPicture begin(std::uint64_t study, const HttpQuestion& question, bool is_slice);
 
+  /// What nobody has asked for so long ends.
+  static constexpr std::chrono::seconds kWaitedFor{10};
+
  private:
+  using Clock = std::chrono::steady_clock;
   using Shared = std::shared_ptr<const PointSet>;
   /// Of which state of a study.
   struct Asked {
@@ -41,15 +48,27 @@ class PointFilters {
   struct Kept {
     Asked asked;
     Shared points;
+    Clock::time_point until;  ///< also when the study has other results: it took so long
   };
   struct Coming;
 
   Talk talk(std::uint64_t study, std::string condition, std::string narrowed, std::uint64_t request,
             std::function<AnswerPool::Job(Shared)> picture);
   Shared find(const Asked& asked);
-  void keep(const Asked& asked, Shared points);
+  std::shared_ptr<Coming> under_way(const Asked& asked);
+  void keep(const Coming& coming);
 
-  std::list<Kept> kept_;  // that looked at last comes first
+  /// Why a condition that takes long has no answer.
+  struct Fault {
+    Asked asked;
+    HttpAnswer answer;
+    Clock::time_point until;
+  };
+  std::optional<HttpAnswer> fault_of(const Asked& asked);
+
+  std::vector<Fault> faults_;
+  std::list<Kept> kept_;                        // that looked at last comes first
+  std::vector<std::weak_ptr<Coming>> comings_;  // those whose talks have ended are gone
 };
 
 }  // namespace oblique::server

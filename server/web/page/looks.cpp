@@ -12,6 +12,8 @@
 #include "proto/recipe/written/study_terms.h"
 #include "server/web/http/json_answer.h"
 #include "worker/solver/model/errors.h"
+#include "worker/solver/model/number.h"
+#include "worker/solver/model/parameters.h"
 
 namespace oblique::server {
 namespace {
@@ -19,6 +21,8 @@ namespace {
 using protocol::ClientReply;
 using protocol::ClientRequest;
 
+constexpr unsigned kItHasGone = 404;
+constexpr unsigned kKeptAlready = 409;
 constexpr std::string_view kLookName = "look-";
 constexpr std::size_t kDigits = 16;
 constexpr auto kFirstOfAll = static_cast<std::int32_t>(protocol::kHighestPriority);
@@ -36,9 +40,63 @@ bool is_leaving(const protocol::StudyStatus& study) {
          study.priority() == kFirstOfAll && study.submitted_by().empty();
 }
 
-std::uint64_t points_of_look(const protocol::Recipe& recipe) {
+std::string kept_as(const std::string& name) {
+  return fmt::format("that is kept as \"{}\" already", name);
+}
+
+/// What is said to who keeps a study once more.
+Talk kept_already(std::uint64_t study, const std::string& name) {
+  return {status_of_number(study),
+          [study, name](const ClientReply& reply) -> Talk::Next {
+            if (reply.status().studies_size() != 1) {
+              return no_such_study();
+            }
+            const std::string& now = reply.status().studies(0).name();
+            return now == name ? json_answer({{"id", study}, {"name", name}})
+                               : error_answer(kKeptAlready, kept_as(now));
+          },
+          too_slow()};
+}
+
+/// A point under way is not interrupted, and what is looked at comes before all else: models whose
+/// points may take minutes are for studies.
+void judge_cost(const solver::ModelParameters& model) {
+  constexpr std::size_t kMostElements = 256;
+  constexpr double kLeastTolerance = 1e-8;
+  constexpr double kShortestStep_s = 1e-9;
+  constexpr double kShortestStepOfFall_s = 1e-7;
+  const auto elements = model.lengths_m.size() * static_cast<std::size_t>(model.elements_per_link);
+  if (elements > kMostElements) {
+    throw std::invalid_argument(
+        fmt::format("that has {} elements (links times elements_per_link), and {} at most are "
+                    "solved while one looks: submit it as a study",
+                    elements, kMostElements));
+  }
+  const auto is_below = [](double step_s, double least_s) {
+    return step_s > 0.0 && step_s < least_s;
+  };
+  if (model.tolerance < kLeastTolerance || is_below(model.dt_s, kShortestStep_s) ||
+      is_below(model.dt_fall_s, kShortestStepOfFall_s)) {
+    throw std::invalid_argument(fmt::format(
+        "what is solved while one looks has a tolerance of {}, a dt of {} s and a dt_fall of {} s "
+        "at least: submit it as a study",
+        solver::exact_number(kLeastTolerance), solver::exact_number(kShortestStep_s),
+        solver::exact_number(kShortestStepOfFall_s)));
+  }
+}
+
+/// Throws std::invalid_argument for what is no study, and for one that is too much to look at.
+void judge(const protocol::Recipe& recipe) {
   try {
-    return protocol::PointTable(recipe).size();
+    const protocol::PointTable table(recipe);
+    if (table.size() > Looks::kMostPoints) {
+      throw std::invalid_argument(fmt::format(
+          "that has {} points; {} are looked at together at most: ask for fewer, or submit it",
+          table.size(), Looks::kMostPoints));
+    }
+    for (std::uint64_t model = 0; model < table.models(); ++model) {
+      judge_cost(table.model(model));
+    }
   } catch (const solver::InputError& error) {
     throw std::invalid_argument(error.what());
   }
@@ -52,11 +110,7 @@ Talk Looks::begin(const HttpQuestion& question) {
   if (!read.ok()) {
     throw std::invalid_argument("the body is no study: " + std::string(read.message()));
   }
-  if (const std::uint64_t points = points_of_look(asked.recipe()); points > kMostPoints) {
-    throw std::invalid_argument(fmt::format(
-        "that has {} points; {} are looked at together at most: ask for fewer, or submit it",
-        points, kMostPoints));
-  }
+  judge(asked.recipe());
   asked.set_name(name_of(asked.recipe()));
   asked.set_priority(kFirstOfAll);
   ClientRequest request;
@@ -75,30 +129,39 @@ Talk Looks::begin(const HttpQuestion& question) {
           true};
 }
 
-std::optional<Talk> Looks::keep(std::uint64_t study, const HttpQuestion& question) {
-  const auto look = looks_.find(study);
-  if (look == looks_.end() || look->second.going) {
-    return std::nullopt;
-  }
+std::variant<HttpAnswer, Talk> Looks::keep(std::uint64_t study, const HttpQuestion& question) {
   const auto body = nlohmann::json::parse(question.body, nullptr, false);
   if (!body.is_object() || !body.contains("name") || !body["name"].is_string()) {
     throw std::invalid_argument("the body must be {\"name\": NAME}");
   }
+  const std::string name = body["name"];
+  if (std::ranges::find(kept_studies_, study) != kept_studies_.end()) {
+    return kept_already(study, name);
+  }
+  const auto look = looks_.find(study);
+  if (look == looks_.end() || look->second.going) {
+    return error_answer(kItHasGone, "there is nothing here");
+  }
+  // Of two names the second would find the study under the first one, and make another.
+  if (!look->second.kept_as.empty() && look->second.kept_as != name) {
+    return error_answer(kKeptAlready, kept_as(look->second.kept_as));
+  }
+  look->second.kept_as = name;
+  look->second.seen = Clock::now();
   protocol::SubmitRequest kept = look->second.request;
   ClientRequest request;
   request.mutable_change()->set_study(kept.name());
   request.mutable_change()->set_study_id(study);
   request.mutable_change()->set_change(protocol::STUDY_CHANGE_RENAME);
-  request.mutable_change()->set_new_name(body["name"]);
-  kept.set_name(body["name"]);
+  request.mutable_change()->set_new_name(name);
+  kept.set_name(name);
   kept.set_priority(0);
-  look->second.seen = Clock::now();
   return Talk{request,
               [this, study, kept](const ClientReply& reply) mutable -> Talk::Next {
                 if (reply.has_submit()) {
                   return json_answer({{"id", study}, {"name", kept.name()}});
                 }
-                looks_.erase(study);
+                is_kept(study);
                 ClientRequest next;
                 if (reply.has_describe()) {
                   *kept.mutable_recipe() = reply.describe().recipe();
@@ -110,8 +173,23 @@ std::optional<Talk> Looks::keep(std::uint64_t study, const HttpQuestion& questio
                 return next;
               },
               too_slow(),
-              {},
+              [this, study](const protocol::ErrorReply& error) -> Talk::Next {
+                if (const auto refused = looks_.find(study); refused != looks_.end()) {
+                  refused->second.kept_as.clear();  // another name may do
+                }
+                return failure(error);
+              },
               true};
+}
+
+void Looks::is_kept(std::uint64_t study) {
+  constexpr std::size_t kMostRemembered = 64;
+  if (looks_.erase(study) > 0) {
+    kept_studies_.push_back(study);
+    if (kept_studies_.size() > kMostRemembered) {
+      kept_studies_.pop_front();
+    }
+  }
 }
 
 void Looks::add(std::uint64_t study, const protocol::SubmitRequest& request) {

@@ -29,6 +29,10 @@ constexpr std::string_view kCheck = "/api/check";
 
 /// Browsers wait so long for one answer; what takes longer is asked for again.
 constexpr std::chrono::milliseconds kPatience{8000};
+/// The same of what goes on meanwhile, and tells how far it is.
+constexpr std::chrono::milliseconds kPatienceWithNews{2000};
+/// Most of that at a time.
+constexpr std::ptrdiff_t kMostInBackground = 4;
 
 constexpr const char* kHowToEnter =
     "this server shows its page to who has its token: open the address that it printed when it "
@@ -152,8 +156,15 @@ std::optional<HttpAnswer> Page::answer(const HttpQuestion& question) {
       return error_answer(kWrongQuestion, error.what());
     }
   }
+  if (const auto place = place_of(question.path)) {
+    looks_.seen(place->study);  // who waits for it looks at it
+  }
   auto answer = go_on(question, known->second);
-  if (!answer && question.waited > kPatience) {
+  if (!answer && question.waited > kPatienceWithNews && may_go_on(known->second)) {
+    Talk talk = std::move(*known->second.talk);
+    answer = talk.background->so_far();
+    left_.emplace(question.number, std::move(talk));
+  } else if (!answer && question.waited > kPatience) {
     answer = known->second.talk
                  ? known->second.talk->meanwhile
                  : error_answer(kTryLater, "the server takes too long: ask again later");
@@ -163,6 +174,13 @@ std::optional<HttpAnswer> Page::answer(const HttpQuestion& question) {
     under_way_.erase(question.number);
   }
   return answer;
+}
+
+bool Page::may_go_on(const UnderWay& under_way) const {
+  return under_way.talk && under_way.talk->background &&
+         std::count_if(left_.begin(), left_.end(), [](const auto& left) {
+           return left.second.background.has_value();
+         }) < kMostInBackground;
 }
 
 void Page::gone(std::uint64_t number) {
@@ -187,6 +205,11 @@ std::optional<std::chrono::milliseconds> Page::tick() {
 void Page::hear_those_left() {
   std::erase_if(left_, [this](const auto& left) {
     try {
+      const auto& background = left.second.background;
+      if (background && background->is_forgotten()) {
+        at_.service.forget(left.first);
+        return true;
+      }
       return hear(left.first, left.second).has_value();
     } catch (const std::exception&) {
       at_.service.forget(left.first);
@@ -260,14 +283,16 @@ std::optional<HttpAnswer> Page::begin_change(const HttpQuestion& question) {
     return begin(question, submit_talk(question));
   }
   if (question.path == kCheck) {
-    return begin(question, at_.answers, check_job(question.body));
+    return begin(question, at_.answers, check_job(question.body), AnswerPool::Lane::kSlow);
   }
   if (question.path == kLook) {
     return begin(question, looks_.begin(question));
   }
   if (const auto study = kept_by(question.path)) {
     auto keeping = looks_.keep(*study, question);
-    return keeping ? begin(question, std::move(*keeping)) : nothing_there();
+    auto* const talk = std::get_if<Talk>(&keeping);
+    return talk != nullptr ? begin(question, std::move(*talk))
+                           : std::optional(std::get<HttpAnswer>(std::move(keeping)));
   }
   const auto place = place_of(question.path);
   auto talk = place ? change_talk(place->study, place->part) : std::nullopt;
@@ -281,8 +306,11 @@ std::optional<HttpAnswer> Page::begin(const HttpQuestion& question, Talk talk) {
 }
 
 std::optional<HttpAnswer> Page::begin(const HttpQuestion& question, AnswerPool& pool,
-                                      AnswerPool::Job job) {
-  if (!pool.submit(question.number, std::move(job))) {
+                                      AnswerPool::Job job, AnswerPool::Lane lane) {
+  if (!is_trusted(question)) {
+    lane = AnswerPool::Lane::kSlow;
+  }
+  if (!pool.submit(question.number, std::move(job), lane)) {
     return error_answer(kTryLater, kTooManyPictures);
   }
   under_way_.emplace(question.number, UnderWay{{}, &pool});

@@ -75,7 +75,8 @@ class Page {
   std::optional<HttpAnswer> begin_change(const HttpQuestion& question);
   std::optional<HttpAnswer> begin(const HttpQuestion& question, Talk talk);
   std::optional<HttpAnswer> begin(const HttpQuestion& question, AnswerPool& pool,
-                                  AnswerPool::Job job);
+                                  AnswerPool::Job job,
+                                  AnswerPool::Lane lane = AnswerPool::Lane::kAny);
   /// What a request waits for: a reply to a talk or, without one, a job of a pool.
   struct UnderWay {
     std::optional<Talk> talk = {};
@@ -83,6 +84,8 @@ class Page {
     std::function<Talk()> then = {};  ///< what follows a job that is but the first step
   };
   std::optional<HttpAnswer> begin(const HttpQuestion& question, FilteredPicture picture);
+  /// Whether it goes on when its browser is told to ask again.
+  bool may_go_on(const UnderWay& under_way) const;
   std::optional<HttpAnswer> go_on(const HttpQuestion& question, UnderWay& under_way);
   std::optional<HttpAnswer> go_on_talking(const HttpQuestion& question, UnderWay& under_way);
   std::optional<Talk::Next> hear(std::uint64_t number, const Talk& talk);
@@ -96,7 +99,7 @@ class Page {
   PictureSettings pictures_;
   PointFilters filters_;
   std::map<std::uint64_t, UnderWay> under_way_;  // by number of the request
-  std::map<std::uint64_t, Talk> left_;           // that must end, and have no browser any more
+  std::map<std::uint64_t, Talk> left_;           // that go on without a browser
 };
 
 }  // namespace oblique::server

@@ -152,7 +152,11 @@ Talk submit_talk(const HttpQuestion& question) {
                                 {"appended", said.appended()},
                                 {"taken", said.taken().points()}});
           },
-          too_slow()};
+          error_answer(kUnavailable,
+                       "its points take long to judge; it begins by itself when that is done: look "
+                       "for it among the studies"),
+          {},
+          true};
 }
 
 }  // namespace oblique::server

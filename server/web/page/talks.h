@@ -24,6 +24,12 @@ struct Talk {
   std::function<Next(const protocol::ErrorReply&)> failed = {};
   /// It is heard to its end though the browser goes: half of it would leave a study behind.
   bool must_end = false;
+  /// What takes longer than a browser waits, and is asked for again while it goes on.
+  struct Background {
+    std::function<HttpAnswer()> so_far;  ///< what a browser is told meanwhile
+    std::function<bool()> is_forgotten;  ///< nobody has asked again
+  };
+  std::optional<Background> background = {};
 };
 
 /// That it takes too long.

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "proto/recipe/model_message.h"
+#include "proto/result_message.h"
 #include "server/web/http/json_answer.h"
 #include "server/web/page/talks.h"
 #include "worker/solver/model/trace_columns.h"
@@ -76,6 +77,7 @@ HttpAnswer whole(const ComingTrace& trace) {
                          {"elements_per_link", model.elements_per_link},
                          {"lengths_m", model.lengths_m},
                          {"rows", trace.states.size()},
+                         {"instants", protocol::from_message(trace.head.result()).solver.steps + 1},
                          {"fall_rows", std::ranges::count(trace.states, solver::kFallingCode)},
                          {"row_numbers", solver::trace_numbers(shape)},
                          {"columns", columns_of(shape)},

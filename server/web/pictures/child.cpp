@@ -8,15 +8,17 @@
 #include <optional>
 #include <string_view>
 #include <system_error>
+#include <utility>
+#include <vector>
 
 #include <fcntl.h>
 #include <poll.h>
-#include <spawn.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include "proto/system/descriptor.h"
+#include "proto/system/spawn_plan.h"
 
 namespace oblique::server {
 namespace {
@@ -45,56 +47,17 @@ struct Pipe {
   Descriptor in;
 };
 
-/// What a child starts with.
-class ChildPlan {
- public:
-  ChildPlan(int output, int errors) {
-    posix_spawn_file_actions_init(&actions_);
-    posix_spawn_file_actions_addopen(&actions_, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-    posix_spawn_file_actions_adddup2(&actions_, output, STDOUT_FILENO);
-    posix_spawn_file_actions_adddup2(&actions_, errors, STDERR_FILENO);
-    posix_spawn_file_actions_addclosefrom_np(&actions_, STDERR_FILENO + 1);
-    posix_spawnattr_init(&attributes_);
-    sigset_t signals;
-    sigemptyset(&signals);
-    posix_spawnattr_setsigmask(&attributes_, &signals);
-    sigfillset(&signals);
-    posix_spawnattr_setsigdefault(&attributes_, &signals);
-    posix_spawnattr_setpgroup(&attributes_, 0);
-    posix_spawnattr_setflags(
-        &attributes_, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
-  }
-  ~ChildPlan() {
-    posix_spawn_file_actions_destroy(&actions_);
-    posix_spawnattr_destroy(&attributes_);
-  }
-  ChildPlan(const ChildPlan&) = delete;
-  ChildPlan& operator=(const ChildPlan&) = delete;
-
-  pid_t start(const std::string& program, std::vector<std::string>& arguments) {
-    std::vector<char*> words;
-    for (std::string& argument : arguments) {
-      words.push_back(argument.data());
+/// Our environment without our own settings, which are not the child's.
+std::vector<char*> environment_of_child() {
+  std::vector<char*> variables;
+  for (char** variable = environ; *variable != nullptr; ++variable) {
+    if (!std::string_view(*variable).starts_with("OBLIQUE_")) {
+      variables.push_back(*variable);
     }
-    words.push_back(nullptr);
-    std::vector<char*> variables;
-    for (char** variable = environ; *variable != nullptr; ++variable) {
-      if (!std::string_view(*variable).starts_with("OBLIQUE_")) {
-        variables.push_back(*variable);
-      }
-    }
-    variables.push_back(nullptr);
-    pid_t pid = -1;
-    check(
-        posix_spawn(&pid, program.c_str(), &actions_, &attributes_, words.data(), variables.data()),
-        program);
-    return pid;
   }
-
- private:
-  posix_spawn_file_actions_t actions_{};
-  posix_spawnattr_t attributes_{};
-};
+  variables.push_back(nullptr);
+  return variables;
+}
 
 /// A child and its group, killed at the latest when this goes.
 class Child {
@@ -172,8 +135,11 @@ ChildEnd run_child(const std::string& program, std::vector<std::string> argument
                    const ChildLimits& limits, const std::function<bool()>& is_over) {
   Pipe output;
   Pipe errors;
-  ChildPlan plan(output.in.number(), errors.in.number());
-  Child child(plan.start(program, arguments), limits);
+  protocol::SpawnPlan plan;
+  plan.give(output.in.number(), STDOUT_FILENO);
+  plan.give(errors.in.number(), STDERR_FILENO);
+  plan.close_from(STDERR_FILENO + 1);
+  Child child(plan.start(program, std::move(arguments), environment_of_child().data()), limits);
   output.in = Descriptor();
   errors.in = Descriptor();
   ChildEnd end;

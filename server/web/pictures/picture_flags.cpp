@@ -144,6 +144,9 @@ std::vector<std::string> study_picture_flags(const LookedAtStudy& study,
   for (const GridPlace& place : grid_places(*study.table, fields)) {
     flags.push_back(fmt::format("--at={}={}", place.key, solver::exact_number(place.value)));
   }
+  if (const auto block = fields.whole("block")) {
+    flags.push_back(fmt::format("--block={}", *block + 1));
+  }
   if (const auto where = sql_field(fields, "where", SqlPart::kCondition)) {
     flags.push_back("--where=" + *where);
   }

@@ -17,7 +17,7 @@
 
 #include "server/database/sqlite.h"
 #include "server/store/store.h"
-#include "tests/bench/instant_worker.h"
+#include "tests/bench/known/instant_worker.h"
 #include "tests/bench/process_usage.h"
 #include "tests/support/database.h"
 #include "tests/support/programs.h"

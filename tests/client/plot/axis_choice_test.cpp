@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "client/plot/axis_choice.h"
+#include "client/plot/block_choice.h"
 #include "client/plot/data/study_axes.h"
 #include "client/plot/plot_request.h"
 #include "client/study/study_file.h"
@@ -18,8 +19,9 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-StudyShape shape_of_study(const std::string& blocks) {
-  return shape_of(parse_study("name = \"s\"\n" + blocks, "s.toml", [](const auto&...) {}).recipe);
+StudyShape shape_of_study(const std::string& blocks, const PlotRequest& request = {}) {
+  const auto study = parse_study("name = \"s\"\n" + blocks, "s.toml", [](const auto&...) {});
+  return shape_for(study.recipe, request);
 }
 
 const StudyShape& grid() {
@@ -37,18 +39,76 @@ std::string error_of(const PlotRequest& request, const StudyShape& shape) {
   return "none";
 }
 
+constexpr const char* kThreeBlocks =
+    "[[block]]\nH = [0.96, 1, 1.04]\nmu = 0.4\ne = 1\n"
+    "[[block]]\nH = 1\nmu = { from = 0.1, to = 2, count = 20 }\ne = [0.5, 1]\n"
+    "[[block]]\nH = [0.9, 1, 1.1]\nmu = [0.2, 0.3]\ne = 0.8\n";
+
 TEST(StudyShape, HasTheAxesOfTheBlockWithTheMostPoints) {
-  const auto shape = shape_of_study(
-      "[[block]]\nH = [0.96, 1, 1.04]\nmu = 0.4\ne = 1\n"
-      "[[block]]\nH = 1\nmu = { from = 0.1, to = 2, count = 20 }\ne = [0.5, 1]\n");
+  const auto shape = shape_of_study(kThreeBlocks);
   EXPECT_TRUE(shape.is_grid);
-  EXPECT_EQ(shape.points, 40U);
+  EXPECT_EQ(shape.block.points, 40U);
+  EXPECT_EQ(shape.points, 49U);
   EXPECT_THAT(shape.find("H")->values, ElementsAre(1.0));
-  EXPECT_THAT(shape.find("H")->all_values, ElementsAre(0.96, 1.0, 1.04));
   const auto axes = by_preference(shape);
   ASSERT_EQ(axes.size(), 2U);
   EXPECT_EQ(axes[0]->key, "mu");
   EXPECT_EQ(axes[1]->key, "e");
+}
+
+TEST(Blocks, AreChosenByTheAxesAndValuesThatAreAskedFor) {
+  const auto number_for = [](const PlotRequest& request) {
+    const auto shape = shape_of_study(kThreeBlocks, request);
+    return shape.is_one_block ? shape.block.number + 1 : 0;
+  };
+  EXPECT_EQ(number_for({}), 2U);
+  EXPECT_EQ(number_for({.map = "slide_m", .x = "mu", .y = "H"}), 3U);
+  EXPECT_EQ(number_for({.lines = "slide_m", .x = "H"}), 3U);
+  EXPECT_EQ(number_for({.lines = "slide_m", .x = "H", .at = {"mu=0.4"}}), 1U);
+  EXPECT_EQ(number_for({.lines = "slide_m", .at = {"e=0.8"}}), 3U);
+  EXPECT_EQ(number_for({.block = "1"}), 1U);
+  EXPECT_EQ(number_for({.map = "slide_m", .x = "H", .y = "e"}), 0U) << "none has both";
+}
+
+TEST(Blocks, AreAllDrawnWhereNoneIsMeant) {
+  EXPECT_FALSE(shape_of_study(kThreeBlocks, {.histogram = "mu"}).is_one_block);
+  EXPECT_FALSE(shape_of_study(kThreeBlocks, {.scatter = "mu,H"}).is_one_block);
+  EXPECT_TRUE(shape_of_study(kThreeBlocks, {.scatter = "mu,H", .block = "3"}).is_one_block);
+  const auto all = shape_of_study(kThreeBlocks, {.block = "all"});
+  EXPECT_FALSE(all.is_one_block);
+  EXPECT_THAT(all.find("H")->all_values, ElementsAre(0.9, 0.96, 1.0, 1.04, 1.1));
+  const auto points =
+      shape_of_study("[[block]]\nH = 1\nmu = 1\ne = 1\n[[block]]\nH = 1\nmu = 2\ne = 1\n");
+  EXPECT_FALSE(points.is_one_block) << "single points are no picture each";
+}
+
+TEST(Blocks, ThatThereAreNotAreRefused) {
+  for (const std::string block : {"0", "4", "-1", "1.5", "first", ""}) {
+    try {
+      (void)shape_of_study(kThreeBlocks, {.block = block + (block.empty() ? " " : "")});
+      FAIL() << block;
+    } catch (const solver::InputError& error) {
+      EXPECT_THAT(error.what(), HasSubstr("a number from 1 to 3 or `all`"));
+    }
+  }
+}
+
+TEST(Blocks, OfAHundredThousandAreUnitedAtOnce) {
+  protocol::Recipe recipe;
+  const auto study = parse_study("name = \"s\"\n[[block]]\nH = 1\nmu = [1, 2]\ne = 1\n", "s.toml",
+                                 [](const auto&...) {});
+  for (int i = 0; i < 100'000; ++i) {
+    auto& block = *recipe.add_blocks() = study.recipe.blocks(0);
+    block.mutable_axes(1)->set_values(1, 2.0 + i);
+  }
+  EXPECT_EQ(shape_for(recipe, {.block = "all"}).find("mu")->all_values.size(), 100'001U);
+}
+
+TEST(Condition, IsOfThePointsOfTheBlockThatIsDrawn) {
+  const auto shape = shape_of_study(kThreeBlocks, {.where = "e < 1"});
+  const auto condition = condition_of({.where = "e < 1"}, shape, {}, false);
+  EXPECT_EQ(condition.sql, "point >= 3 AND point < 43 AND (e < 1)");
+  EXPECT_THAT(condition.shown, testing::Contains("block 2 of 3"));
 }
 
 TEST(StudyShape, KnowsModelKeysByTheirColumns) {

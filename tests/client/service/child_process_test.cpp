@@ -77,6 +77,18 @@ TEST(ChildProcess, WritesToTheDescriptorItIsHanded) {
   EXPECT_EQ(std::string(bytes.data(), static_cast<std::size_t>(got)), "hello\n");
 }
 
+TEST(ChildProcess, ReadsWhatItIsGivenAndIsEndedWithOurGroupWhereItStaysInIt) {
+  auto settings = shell("cat");
+  const std::string long_text(1'000'000, 'x');
+  settings.input = long_text + "end";
+  settings.keep_output = true;
+  settings.stays_in_our_group = true;
+  ChildProcess child(settings);
+  EXPECT_EQ(getpgid(child.pid()), getpgrp());
+  wait_for_end(child);
+  EXPECT_EQ(child.output(2'000'000), long_text + "end");
+}
+
 TEST(ChildProcess, ThatIsNotThereIsAnErrorWithItsName) {
   try {
     const ChildProcess child({.program = "/nowhere/program", .arguments = {}});

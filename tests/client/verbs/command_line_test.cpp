@@ -95,6 +95,8 @@ TEST(CommandLine, AnswersWrongUsageWithExitCodeTwoAndASentence) {
       {{"converge", "--H", "1", "--mu", "0.4", "--e", "1", "--finest", "24"}, "--finest 24"},
       {{"converge", "--H", "1", "--mu", "0.4", "--e", "1", "--halvings", "1"}, "--halvings 1"},
       {{"converge", "--within", "1"}, "--mesh-study"},
+      {{"converge", "--step-study", "--elements-per-link", "4,8"}, "2 models, and a step study"},
+      {{"converge", "--step-study", "--mu", "0.4"}, "--mu is not allowed with --step-study"},
       {{"solve", "--H", "1", "--mu", "0.4", "--e", "1", "--tolerance", "0.1"}, "tolerance = 0.1"},
       {{"fit", "--from", "papre"}, "papre"},
       {{"fit", "--elements-per-link", "0"}, "elements_per_link = 0"},

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <CLI/CLI.hpp>
 
-#include "client/command_line.h"
+#include "client/verbs/command_line.h"
 #include "client/verbs/verbs.h"
 #include "worker/solver/model/parameters.h"
 

@@ -91,6 +91,37 @@ test("points are marked by keys, and Escape marks none", async () => {
   await page.close();
 });
 
+test("lines show what is marked elsewhere, and a rectangle over them marks what is seen in it", async () => {
+  const page = await study(`#/study/1?pic=lines&x=mu&y=H&at=e@2&mark=${encodeURIComponent("fn_peak_N > 4000")}`);
+  await until(page, () => document.querySelector("main > div").dataset.marks === "fn_peak_N > 4000" && document.querySelector(".uplot canvas"));
+  await page.focus(".plot[role=application]");
+  await page.keyboard.press("Home");
+  const said = await until(page, () => document.querySelector(".lines .reading").textContent);
+  for (const [, value, is_marked] of said.matchAll(/ ([\d.]+) N( \(marked\))?/g)) assert.equal(is_marked !== undefined, Number(value) > 4000, said);
+  const box = await (await page.$(".u-over")).boundingBox();
+  const sweep = async ([x0, y0], [x1, y1]) => {
+    await page.mouse.move(box.x + x0 * box.width, box.y + y0 * box.height);
+    await page.mouse.down();
+    await page.mouse.move(box.x + x1 * box.width, box.y + y1 * box.height, { steps: 3 });
+    await page.mouse.up();
+  };
+  await page.keyboard.down("Shift");
+  await sweep([0.3, 0.05], [0.7, 0.5]);
+  await page.keyboard.up("Shift");
+  const condition = await until(page, () => (document.querySelector(".marks input").value.startsWith("mu") ? document.querySelector(".marks input").value : ""));
+  assert.match(condition, /^mu >= [\d.]+ AND mu <= [\d.]+ AND fn_peak_N >= [\d.]+ AND fn_peak_N <= [\d.]+ AND e = 1$/);
+  await page.focus(".plot[role=application]");
+  await page.keyboard.press("Escape");
+  await until(page, () => document.querySelector(".marks input").value === "");
+  // Without Shift it zooms, unless people choose otherwise.
+  const old = await page.$(".u-over");
+  await page.evaluate(() => { const drags = [...document.querySelectorAll(".controls select")].at(-1); drags.value = "mark"; drags.dispatchEvent(new Event("change")); });
+  await until(page, (one) => !one.isConnected && document.querySelector(".u-over"), old);
+  await sweep([0.01, 0.2], [0.99, 0.21]);
+  assert.match(await until(page, () => document.querySelector(".marks input").value), /^(mu .* AND )?e = 1$/);
+  await page.close();
+});
+
 test("few points are drawn one by one, and chosen by pointing at them; many are gathered, and it is said", async () => {
   const page = await study(`#/study/${kScattered}?pic=gathered&x=mu&y=fn_peak_N&z=H`);
   assert.match(await text_of(page, ".facts"), /^300 points, each drawn/);

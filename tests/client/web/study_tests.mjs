@@ -100,11 +100,90 @@ test("what lies between the cells of a map is solved while one looks, and is kep
   });
   await until(page, () => document.querySelector(".facts").textContent.match(/(\d+) × \1 cells, [1-9]/));
   await until(page, () => document.querySelector(".facts").textContent.includes("129 × 129"));
-  await page.type('[aria-label^="Name under which"]', "kept");
-  await page.evaluate(() => [...document.querySelectorAll("button")].find((one) => one.textContent === "Keep it as a study").click());
-  await until(page, () => document.querySelector("p.said a")?.textContent === "kept");
+  const keep = async (name) => {
+    await page.type('[aria-label^="Name under which"]', name);
+    await page.keyboard.press("Enter");
+    return until(page, () => document.querySelector(".solving + p").textContent);
+  };
+  assert.equal(await text_of(page, ".keep"), "Keep these 129 × 129 cells as a study");
+  assert.match(await keep("friction"), /friction/);  // it is refused where the name is given
+  await page.$eval('[aria-label^="Name under which"]', (one) => { one.value = ""; });
+  await keep("kept");
+  browser.objections = browser.objections.filter((one) => !one.includes("status of 409"));
+  await until(page, () => document.querySelector(".solving + p").textContent.startsWith("Kept as kept, 16"));
+  assert.equal(await page.$eval(".keep", (one) => one.hidden), true);
   await page.evaluate(() => [...document.querySelectorAll("button")].find((one) => one.textContent === "Back to the study").click());
   await until(page, () => document.querySelector(".facts").textContent.includes("12 × 7"));
+  await page.close();
+});
+
+const facts = (page, text) => until(page, (wanted) => document.querySelector(".facts")?.textContent.includes(wanted), text);
+
+test("what is solved between points is in the address: other outputs and sliders, an open point, Back, a link and a study that went meanwhile find it again", async () => {
+  const page = await study();
+  await page.evaluate(() => document.querySelector(".finer").click());
+  await facts(page, "65 × 65");
+  const looks = [];
+  page.on("request", (one) => { if (one.url().endsWith("/api/look")) looks.push(JSON.parse(one.postData()).recipe.blocks[0].axes.find((axis) => axis.key === "mu").count); });
+  await page.evaluate(() => {
+    const pick = [...document.querySelectorAll(".controls label")].find((one) => one.textContent.startsWith("output")).querySelector("select");
+    pick.value = "duration_s";
+    pick.dispatchEvent(new Event("change"));
+  });
+  await until(page, () => document.querySelector(".map canvas[tabindex]").getAttribute("aria-label").startsWith("duration_s"));
+  assert.equal(looks[0] >= 65, true, String(looks));  // the same points, nothing coarser
+  await page.$eval(".sliders input", (slider) => {
+    slider.value = "1";
+    slider.dispatchEvent(new Event("input"));
+  });
+  await facts(page, "e = 0.8");
+  await page.focus(kMap);
+  await page.keyboard.press("ArrowRight");
+  await page.keyboard.press("ArrowRight");
+  await page.keyboard.press("Enter");
+  await until(page, () => document.querySelector("h2.name")?.textContent.startsWith("friction, between its points: 1 of"));
+  const command = await page.$$eval("code", (all) => all.map((one) => one.textContent));
+  assert.equal(command.length, 1);
+  assert.match(command[0], /^oblique solve --H 0.5 --mu 0.1\d+ --e 0.8 .*--trace trace.csv$/);
+  await page.evaluate(() => [...document.querySelectorAll("a.button")].find((one) => one.textContent === "Next point").click());
+  await until(page, () => document.querySelector("h2.name")?.textContent .startsWith("friction, between its points: 2 of"));
+  const link = await page.evaluate(() => location.hash);
+  await page.goBack();
+  await page.goBack();
+  await facts(page, "e = 0.8");
+  await page.waitForFunction(() => document.activeElement.matches(".map canvas[tabindex]"));
+  assert.match(await text_of(page, ".facts"), /(\d+) × \1 cells/);
+  await page.evaluate(() => history.back());  // the output
+  await until(page, () => document.querySelector(".map canvas[tabindex]").getAttribute("aria-label").startsWith("fn_peak_N"));
+  await page.evaluate(() => history.back());  // what lies between
+  await facts(page, "12 × 7");
+  await page.close();
+  // What nobody looked at for a while has gone.
+  const other = await browser.open("#/");
+  await other.evaluate(async () => {
+    for (let i = 3; i < 8; ++i) {
+      const recipe = { blocks: [{ axes: [{ key: "H", values: [1] }, { key: "mu", values: [i] }, { key: "e", values: [1] }] }] };
+      await fetch("/api/look", { method: "POST", body: JSON.stringify({ recipe }), headers: { "Content-Type": "application/json" } });
+    }
+  });
+  await other.evaluate((address) => { location.hash = address; }, link);
+  await until(other, () => document.querySelector("h2.name")?.textContent .startsWith("friction, between its points: 2 of"));
+  await other.waitForSelector(".uplot");
+  await other.close();
+});
+
+test("Back undoes a zoom and another output, and leaves the focus where it was", async () => {
+  const page = await study();
+  await page.focus(kMap);
+  await page.keyboard.press("+");
+  await until(page, () => !document.querySelector(".facts").textContent.includes("12 × 7"));
+  await page.keyboard.press("0");
+  await facts(page, "12 × 7");
+  await page.goBack();
+  await until(page, () => !document.querySelector(".facts").textContent.includes("12 × 7"));
+  await page.goBack();
+  await facts(page, "12 × 7");
+  assert.ok(await page.evaluate((map) => document.activeElement.matches(map), kMap));
   await page.close();
 });
 
@@ -220,6 +299,8 @@ test("what is solved between the cells of a block has that block's model", async
   await until(page, async (study) => (await (await fetch(`/api/studies/${study}/rows?select=point&limit=9`)).json()).rows.length === 8, id);
   await page.close();
   const map = await study(`#/study/${id}?pic=map&block=0`);
+  assert.match(await text_of(map, ".facts"), /Block 1 of 2; not shown: 4 points of the others\./);
+  assert.match(await text_of(map, ".commands code"), /^oblique plot blocks --map fn_peak_N --x mu --y H --block 1 /);
   const solved_by = async () => {
     const asked = map.waitForRequest((one) => one.url().endsWith("/api/look"));
     await map.click(".finer");
@@ -228,7 +309,7 @@ test("what is solved between the cells of a block has that block's model", async
   };
   assert.equal(await solved_by(), 1e7);
   await map.evaluate(() => [...document.querySelectorAll("button")].find((one) => one.textContent === "Back to the study").click());
-  await map.waitForSelector(".finer");
+  await map.waitForSelector(".finer:not([hidden])");
   await map.evaluate(() => {
     const pick = [...document.querySelectorAll(".controls label")].find((one) => one.textContent.startsWith("block")).querySelector("select");
     pick.value = "1";
@@ -240,13 +321,87 @@ test("what is solved between the cells of a block has that block's model", async
   await map.close();
 });
 
-test("ranges of a few ulps and without an end have one tick, texts in CSV are quoted", async () => {
+test("ranges of a few ulps and without an end have one tick, the widest some, texts in CSV are quoted", async () => {
   const page = await browser.open("#/");
   const told = await page.evaluate(async () => {
     const { scale, ticks } = await import("/parts/scale.js");
     const { csv_line } = await import("/parts/format.js");
-    return [ticks(scale(0.4517539514526256, 0.4517539514526_2565, false), 5), ticks(scale(1, Infinity, true), 5), csv_line([1, "a, \"b\""])];
+    return [ticks(scale(0.4517539514526256, 0.4517539514526_2565, false), 5), ticks(scale(1, Infinity, true), 5), csv_line([1, "a, \"b\""]),
+      ticks(scale(0, Number.MAX_VALUE, false), 2)];
   });
-  assert.deepEqual(told, [[0.4517539514526256], [1], '1,"a, ""b"""']);
+  assert.deepEqual(told, [[0.4517539514526256], [1], '1,"a, ""b"""', [0, 1e308]]);
+  await page.close();
+});
+
+test("a part of lines or of a histogram that is zoomed into is in the address, in the command and in words, and all is shown again", async () => {
+  for (const [view, said] of [["#/study/1?pic=lines&x=mu&y=H&z=fn_peak_N", /--where 'mu >= [\d.]+ AND mu <= [\d.]+'.* --range [\d.]+:[\d.]+/], ["#/study/1?pic=histogram&x=fn_peak_N", /--range [\d.]+:[\d.]+/]]) {
+    const page = await study(view);
+    const box = await (await page.waitForSelector(".u-over")).boundingBox();
+    const whole = await text_of(page, ".facts");
+    await page.mouse.move(box.x + 0.3 * box.width, box.y + 0.2 * box.height);
+    await page.mouse.down();
+    await page.mouse.move(box.x + 0.8 * box.width, box.y + 0.8 * box.height, { steps: 3 });
+    await page.mouse.up();
+    await facts(page, "A part is shown.");
+    assert.match(await text_of(page, ".commands code"), said);
+    const address = await page.evaluate(() => location.hash);
+    assert.match(address, /x0=[\d.]+&x1=[\d.]+/);
+    if (view.includes("lines")) {
+      await page.$eval(".sliders input", (slider) => {
+        slider.value = "1";
+        slider.dispatchEvent(new Event("input"));
+      });
+      await facts(page, "e = 0.8");
+      await facts(page, "A part is shown.");
+    }
+    await page.evaluate(() => [...document.querySelectorAll("button")].find((one) => one.textContent === "Show all").click());
+    await until(page, (all) => document.querySelector(".facts").textContent.startsWith(all.split(" ").slice(0, 4).join(" ")), whole);
+    assert.ok(!(await text_of(page, ".facts")).includes("A part"));
+    await page.close();
+  }
+});
+
+test("colours span what is said at one end and what is there at the other, also in the command", async () => {
+  const page = await study("#/study/1?from=300");
+  assert.match(await text_of(page, ".commands code"), /--range 300:\d+/);
+  await page.close();
+  const dark = await study("#/study/1?from=90000");
+  assert.match(await text_of(dark, ".facts"), /All values lie below what colours span/);
+  assert.match(await text_of(dark, ".commands code"), /--range 90000:9\d{4}/);
+  await write(dark, "input[inputmode=decimal]", "abc");
+  await until(dark, () => document.querySelector(".picture .bad")?.textContent === '"abc" is no number.');
+  await dark.close();
+});
+
+test("the command of the rows and the address say whether only marked points are shown", async () => {
+  const page = await study("#/study/1?mark=mu%20%3E%201");
+  const rows = () => page.$$eval(".commands code", (all) => all.map((one) => one.textContent).find((one) => one.startsWith("oblique query")));
+  assert.match(await rows(), /--where 'mu > 1'/);
+  await page.click(".only input");
+  await until(page, () => /all=1/.test(location.hash) && document.querySelector(".rows p[role=status]").textContent === "1 to 25 of 252 rows.");
+  assert.ok(!(await rows()).includes("--where"));
+  await page.waitForSelector("tr.marked");
+  const other = await study(await page.evaluate(() => location.hash));
+  assert.equal(await other.$eval(".only input", (one) => one.checked), false);
+  await other.close();
+  await page.close();
+});
+
+test("a server that does not answer is told of in words, and what it was asked meanwhile is asked again", async () => {
+  const page = await study();
+  await page.setOfflineMode(true);
+  await page.$eval(".sliders input", (slider) => {
+    slider.value = "2";
+    slider.dispatchEvent(new Event("input"));
+  });
+  await until(page, () => document.querySelector("p.said").textContent === "The server does not answer: what is shown is what came last.");
+  await page.evaluate(() => { location.hash = "#/study/1/point/3"; });
+  await until(page, () => document.querySelector("main [role=alert]")?.textContent === "The server does not answer.");
+  await page.evaluate(() => history.back());
+  await until(page, () => location.hash.startsWith("#/study/1?"));
+  await page.setOfflineMode(false);
+  await facts(page, "e = 1");
+  await until(page, () => document.querySelector("p.said").textContent === "");
+  browser.objections = browser.objections.filter((one) => !/ERR_INTERNET_DISCONNECTED/.test(one));
   await page.close();
 });

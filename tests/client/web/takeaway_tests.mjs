@@ -14,10 +14,10 @@ const file = (page, text) => page.evaluate(async (wanted) => {
 }, text);
 
 /** Runs a command that the page shows, as a shell would, on the database of the page. */
-function made_by(command, out) {
+function made_by(command, out, database = server.database) {
   const [, ...words] = ["oblique", ...command.replace(/^oblique /, "").replace("--out picture.svg", `--out ${out}`)
     .match(/'(?:[^']|'\\'')*'|\S+/g).map((word) => word.replace(/^'|'$/g, "").replaceAll("'\\''", "'"))];
-  const made = spawnSync(server.oblique, [...words, "--db", server.database], { encoding: "utf8" });
+  const made = spawnSync(server.oblique, [...words, "--db", database], { encoding: "utf8" });
   assert.equal(made.status, 0, made.stderr);
   return made.stdout;
 }
@@ -36,6 +36,36 @@ test("the SVG that a view gives is what its command draws", async () => {
     assert.equal(taken.text, readFileSync(out, "utf8"), view);
     await page.close();
   }
+});
+
+test("what is solved while one looks has commands that solve and draw the same points", async () => {
+  const page = await study("#/study/1?at=e@2&x0=2&x1=8&xlog=1");
+  await page.evaluate(() => document.querySelector(".finer").click());
+  const commands = await until(page, () => { const all = [...document.querySelectorAll(".commands code")].map((one) => one.textContent); return all[0]?.startsWith("oblique run") && all; });
+  const side = Number(/--mu [\d.]+:[\d.]+:(\d+):log /.exec(commands[0])?.[1]);
+  assert.ok(side >= 33, commands[0]);
+  await page.close();
+  const [database, out] = [join(server.folder, "part.db"), join(server.folder, "part.csv")];
+  made_by(commands[0], "", database);
+  made_by(commands[1].replace("picture.svg", out), out, database);
+  const rows = readFileSync(out, "utf8").trim().split("\n").slice(1).filter((line) => !line.endsWith(","));
+  assert.equal(rows.length, side ** 2, rows[0]);
+});
+
+test("a mode has the same place, and so the same look, in the page and in its SVG", async () => {
+  const page = await study("#/study/1?z=mode&at=e@1");
+  const names = await until(page, () => { const all = [...document.querySelectorAll(".categories > ul li span:first-of-type")]; return all.length > 0 && all.map((one) => one.textContent); });
+  assert.ok(names.length > 3, String(names));
+  const { text } = await file(page, "SVG");
+  // A name that is too long for a line begins there.
+  const legend = [...text.matchAll(/<text[^>]*>((?:[sS][CR] ?)+)(?: ?\(|<)/g)].map((found) => found[1].trim());
+  let last = -1;
+  for (const name of names) {
+    const at = legend.findIndex((one, i) => i > last && (name === one || name.startsWith(`${one} `)));
+    assert.ok(at > last, `${name} in ${legend}`);
+    last = at;
+  }
+  await page.close();
 });
 
 test("the SVG that a point gives is what its command draws", async () => {

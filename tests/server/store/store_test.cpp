@@ -128,6 +128,19 @@ TEST_F(StoreTest, TheStateOfAStudyIsKept) {
   EXPECT_EQ(Store(path_).studies().at(0).state, StudyState::kCancelled);
 }
 
+TEST_F(StoreTest, AStudyWhoseNameIsNoUtf8IsLeftAsItIsAndSaid) {
+  {
+    Store store(path_);
+    commit(store, {study_of(3), study_of(3, 2, "b")});
+  }
+  execute(open_database(path_, SQLITE_OPEN_READWRITE).get(),
+          "UPDATE studies SET name = CAST(x'61ff' AS TEXT) WHERE study_id = 1");
+  Store store(path_);
+  ASSERT_EQ(store.studies().size(), 1U);
+  EXPECT_EQ(store.studies().at(0).name, "b");
+  EXPECT_THAT(store.left_out().front(), HasSubstr("study 1 is left as it is"));
+}
+
 TEST_F(StoreTest, WhoSubmittedAStudyIsKeptByTheNameOfTheKey) {
   auto with_key = study_of(10);
   with_key.submitted_by = "alice";

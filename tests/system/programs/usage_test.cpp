@@ -121,14 +121,17 @@ TEST(UsageTest, NumbersOfServerAndWorkerRefuseWhatTheyCannotBe) {
   }
 }
 
-TEST(UsageTest, EveryProgramSaysItsVersion) {
+TEST(UsageTest, EveryProgramSaysItsVersionAndTheCommitThatItWasBuiltFrom) {
   const TemporaryFolder folder;
+  const auto version = [](const std::string& name) {
+    return std::regex(name + R"( \d+\.\d+\.\d+ \(commit (unknown|[0-9a-f]{12}( with changes)?, )"
+                             R"(\d{4}-\d\d-\d\d)\)\n)");
+  };
   for (const std::string& program : {client_program(), server_program(), worker_program()}) {
     Process process(folder, program, {"--version"});
     EXPECT_EQ(process.wait(), 0) << program;
     const std::string name = std::filesystem::path(program).filename().string();
-    EXPECT_TRUE(std::regex_match(process.out(), std::regex(name + R"( \d+\.\d+\.\d+\n)")))
-        << process.out();
+    EXPECT_TRUE(std::regex_match(process.out(), version(name))) << process.out();
     EXPECT_EQ(process.err(), "") << program;
   }
 }

@@ -1,5 +1,7 @@
 #include "tests/system/storms/pretended_worker.h"
 
+#include <sstream>
+
 #include "proto/frames.h"
 #include "proto/result_message.h"
 #include "tests/support/programs.h"
@@ -59,8 +61,11 @@ std::string worker_solver_version() {
   const TemporaryFolder folder;
   Process process(folder, worker_program(), {"--version"});
   process.wait();
-  const std::string output = process.out();
-  return output.substr(0, output.find('\n'));
+  std::istringstream words(process.out());  // "oblique-worker 0.2.0 (commit ...)"
+  std::string program;
+  std::string version;
+  words >> program >> version;
+  return version;
 }
 
 }  // namespace oblique::test

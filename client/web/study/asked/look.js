@@ -1,7 +1,7 @@
 // @ts-check
 // What a study lacks is solved while somebody looks: coarse first, then finer. The server makes a short-lived
 // study of it, that comes before all others and goes when nobody asks for it any more.
-import { change, json } from "/server.js";
+import { Refusal, change, json } from "/server.js";
 import { rows, slice } from "./picture.js";
 
 /** Each has the values of the one before among its own. */
@@ -22,7 +22,7 @@ async function model_of(study, { first_point, points }, signal) {
   let { row } = await json(`/api/studies/${study}/points/${first_point}`, signal);
   if (!row) {
     const some = await rows(study, { select: "point", where: `point >= ${first_point} AND point < ${first_point + points}`, limit: 1 }, signal);
-    if (some.rows.length === 0) throw new Error("there is no result yet that tells the model");
+    if (some.rows.length === 0) throw new Refusal(409, "there is no result yet that tells the model");
     ({ row } = await json(`/api/studies/${study}/points/${some.rows[0][0]}`, signal));
   }
   const model = Object.fromEntries(Object.entries(kModelKeys).map(([column, key]) => [key, row[column]]));
@@ -49,33 +49,85 @@ function recipe_of(wanted, model, side) {
   return { model, blocks: [{ axes, ...(wanted.block.where ? { where: wanted.block.where } : {}) }] };
 }
 
-const rest = (/** @type {number} */ ms) => new Promise((go_on) => setTimeout(go_on, ms));
+/** So long, or until the page is seen again. @param {number} ms */
+const rest = (ms) => new Promise((go_on) => {
+  const end = () => {
+    clearTimeout(timer);
+    document.removeEventListener("visibilitychange", end);
+    go_on(undefined);
+  };
+  const timer = setTimeout(end, ms);
+  document.addEventListener("visibilitychange", end);
+});
+
+/** Whether somebody asked for a study that went, as nobody had looked at it for a while. @param {any} error */
+const has_gone = (error) => error.status === 404;
+
+/**
+ * Keeps a study alive while the page is seen; where it went meanwhile it is begun anew, under another number.
+ * @param {number} id @param {() => Promise<number>} begin @param {AbortSignal} signal @returns {AsyncGenerator<number>} the other numbers
+ */
+async function* still_here(id, begin, signal) {
+  for (;;) {
+    await rest(kStillHere_ms);
+    if (signal.aborted) return;
+    if (document.hidden) continue;
+    try {
+      await json(`/api/studies/${id}`, signal);
+    } catch (error) {
+      if (signal.aborted) return;
+      if (!has_gone(error)) continue;  // a server that does not answer is asked again
+      id = await begin();
+      yield id;
+    }
+  }
+}
 
 /**
  * Pictures as they become better; afterwards it keeps the study alive until `signal`.
- * @param {Wanted} wanted @param {AbortSignal} signal @param {(key: string) => string} unit_of
- * @returns {AsyncGenerator<{id: number, side: number, is_whole: boolean, picture: import("./picture.js").Picture}>}
+ * @param {Wanted} wanted @param {number} first_side the coarsest that is shown @param {AbortSignal} signal @param {(key: string) => string} unit_of
+ * @returns {AsyncGenerator<{id: number, side: number, is_whole: boolean, picture: import("./picture.js").Picture, block: any}>}
  */
-export async function* finer(wanted, signal, unit_of) {
+export async function* finer(wanted, first_side, signal, unit_of) {
   const model = await model_of(wanted.study, wanted.block, signal);
-  if (signal.aborted) return;
   const [x, y] = Object.keys(wanted.ranges);
-  let id = 0;
-  for (const side of kSides) {
-    ({ id } = await change("/api/look", { recipe: recipe_of(wanted, model, side) }));
+  for (const side of kSides.filter((one) => one >= first_side)) {
+    if (signal.aborted) return;
+    const recipe = recipe_of(wanted, model, side);
+    const begin = async () => (await change("/api/look", { recipe })).id;
+    let id = await begin();
     for (let is_whole = false; !is_whole && !signal.aborted;) {
-      const picture = await slice(id, { z: wanted.z, x, y, nx: side, ny: side, ...(wanted.where ? { where: wanted.where } : {}) }, signal, unit_of);
-      is_whole = picture.head.missing === 0;
-      // Half of a finer picture is worse than all of the coarser one.
-      if (is_whole || side === kSides[0]) yield { id, side, is_whole, picture };
+      try {
+        const picture = await slice(id, { z: wanted.z, x, y, nx: side, ny: side, ...(wanted.where ? { where: wanted.where } : {}) }, signal, unit_of);
+        is_whole = picture.head.missing === 0;
+        // Half of a finer picture is worse than all of the coarser one.
+        if (is_whole || side === kSides[0]) yield { id, side, is_whole, picture, block: recipe.blocks[0] };
+        if (is_whole && side === kSides[kSides.length - 1]) {
+          for await (const other of still_here(id, begin, signal)) yield { id: other, side, is_whole, picture, block: recipe.blocks[0] };
+        }
+      } catch (error) {
+        if (signal.aborted || !has_gone(error)) throw error;
+        id = await begin();
+      }
       if (!is_whole) await rest(kAskAgain_ms);
     }
-    if (signal.aborted) return;
   }
-  while (!signal.aborted) {
-    await rest(kStillHere_ms);
-    if (!document.hidden && !signal.aborted) await json(`/api/studies/${id}`, signal);
-  }
+}
+
+/**
+ * A study of what lies between, as long as `signal` lasts.
+ * @param {Wanted} wanted @param {number} side @param {AbortSignal} signal @param {(id: number) => void} moved it has another number now
+ * @returns {Promise<number>} its number
+ */
+export async function held_open(wanted, side, signal, moved) {
+  const recipe = recipe_of(wanted, await model_of(wanted.study, wanted.block, signal), side);
+  const begin = async () => (await change("/api/look", { recipe })).id;
+  const id = await begin();
+  const watch = async () => {
+    for await (const other of still_here(id, begin, signal)) moved(other);
+  };
+  watch().catch(() => {});  // what is asked for next says why
+  return id;
 }
 
 /** @param {number} id @param {string} name */

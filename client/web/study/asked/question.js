@@ -6,9 +6,9 @@ import { dots, kMostDots } from "./dots.js";
 import { bins, rows, slice } from "./picture.js";
 
 const kMostCells = 512; // a side of a picture
-/** Of a study that the server does not hold in memory each cell is looked up: some of them come first. */
+/** Where the server looks each cell up, or reads a whole column for so many, some of them come first. */
 const kFirstCells = 96;
-const kLarge = 4_000_000; // points
+const kLarge = 4_000_000; // points: a column of these takes seconds
 const kMostBins = 96;
 const kMostLines = 8;
 
@@ -19,8 +19,18 @@ export const is_slice = (/** @type {string} */ kind) => kind === "map" || kind =
 const ends_of = (/** @type {View} */ view) =>
   Object.fromEntries(["x0", "x1", "y0", "y1"].filter((name) => view.is(name)).map((name) => [name, view.is(name)]));
 
+/** Whether the picture has so many cells that a part of them is there far sooner. @param {View} view */
+function has_many_cells(view) {
+  const cells = own_axes(view.block).filter((a) => a.key === view.is("x") || a.key === view.is("y")).reduce((all, a) => all * Math.min(a.values, kMostCells), 1);
+  return cells > 4 * kFirstCells ** 2;
+}
+
 /** How many cells a side are asked for, one picture after the other. @param {View} view */
-export const steps_to = (view) => (is_slice(view.is("pic")) && view.study.points > kLarge ? [kFirstCells, kMostCells] : [kMostCells]);
+export function steps_to(view) {
+  if (!is_slice(view.is("pic"))) return [kMostCells];
+  const is_first = view.is("pic") === "map" && !view.read_columns.has(view.is("z")) && view.is("where") === "" && has_many_cells(view);
+  return is_first || view.study.points > kLarge ? [kFirstCells, kMostCells] : [kMostCells];
+}
 
 /** @param {View} view @param {number} cells a side, at most @returns {Record<string, string | number>} */
 function slice_fields(view, cells) {

@@ -1,6 +1,6 @@
 // @ts-check
 // The cells of a picture and its single points, in pixels.
-import { category_pixel, css_colour, empty_pixel, ink, is_dark } from "/parts/colours.js";
+import { category_pixel, css_colour, empty_pixel, ink, is_dark, kOther, own_looks } from "/parts/colours.js";
 import { scale } from "/parts/scale.js";
 import { kEmpty } from "../asked/picture.js";
 import { cell_of_pixels } from "./frame.js";
@@ -24,10 +24,11 @@ function colour_of(of_z, value) {
 /** A colour, a category or -1 - the number of a reason for each cell: looked up once a cell, not once a pixel. @param {Picture} picture @param {Look} look */
 function codes(picture, look) {
   const of_z = scale(look.from, look.to, look.z_log);
+  const looks = own_looks(picture.dictionary);
   return Int32Array.from(picture.values, (value, i) => {
     const why = picture.why_empty(i);
     if (why) return -1 - kEmpty.indexOf(why);
-    return picture.z.is_category ? value : colour_of(of_z, value);
+    return picture.z.is_category ? (value < looks ? value : kOther) : colour_of(of_z, value);
   });
 }
 

@@ -1,7 +1,7 @@
 // @ts-check
 // What colours mean: a bar with its range, or a list of categories.
 import { h, named, tick, picker } from "/parts/dom.js";
-import { category_pixel, css_colour, empty_pixel, ink, is_dark, kLooks } from "/parts/colours.js";
+import { category_pixel, css_colour, empty_pixel, ink, is_dark, kOther, own_looks } from "/parts/colours.js";
 import { count, heading, shown } from "/parts/format.js";
 import { scale, ticks, tick_text } from "/parts/scale.js";
 
@@ -65,12 +65,13 @@ export function categories(picture) {
   const line = (/** @type {{text: string, cells: number}} */ one, /** @type {number} */ code) => h("li", {},
     swatch((x, y) => category_pixel(code, x, y)), h("span", {}, one.text),
     h("span", { class: "weak" }, ` ${(100 * one.cells / cells).toFixed(one.cells / cells < 0.01 ? 2 : 1)} %`));
-  const first = picture.dictionary.slice(0, kLooks);
-  const rest = picture.dictionary.slice(kLooks);
+  const looks = own_looks(picture.dictionary);
+  const first = picture.dictionary.slice(0, looks);
+  const rest = picture.dictionary.slice(looks);
   const others = rest.reduce((sum, one) => sum + one.cells, 0);
   return h("div", { class: "categories" }, h("p", { class: "of" }, `${picture.z.name}: ${count(picture.dictionary.length)} here`),
     h("ul", {}, ...first.map(line)),
-    rest.length > 0 && h("details", {}, h("summary", {}, swatch((x, y) => category_pixel(kLooks, x, y)),
+    rest.length > 0 && h("details", {}, h("summary", {}, swatch((x, y) => category_pixel(kOther, x, y)),
       `${count(rest.length)} others, ${count(others)} cells`),
     h("ul", {}, ...rest.map((one) => h("li", {}, one.text, h("span", { class: "weak" }, ` ${count(one.cells)} cells`))))));
 }
@@ -90,17 +91,19 @@ export function gaps(picture) {
  * @param {(changed: {from?: string, to?: string, zlog?: string, pal?: string}) => void} take
  */
 export function colour_controls(now, take) {
+  const said = h("span", { role: "status", class: "bad" });
   const number = (/** @type {"from" | "to"} */ name) => {
     const field = h("input", { type: "text", inputMode: "decimal", value: now[name], placeholder: "fits", size: 8,
       onchange: () => {
         const is_number = field.value.trim() === "" || Number.isFinite(Number(field.value));
         field.setAttribute("aria-invalid", String(!is_number));
+        said.textContent = is_number ? "" : `"${field.value.trim()}" is no number.`;
         if (is_number) take({ [name]: field.value.trim() });
       } });
     return named(name === "from" ? "colours from" : "to", field);
   };
   return h("div", { class: "row" }, number("from"), number("to"),
-    h("button", { type: "button", onclick: () => take({ from: "", to: "" }) }, "Fit"),
+    h("button", { type: "button", onclick: () => take({ from: "", to: "" }) }, "Fit"), said,
     named("palette", picker([["viridis", "viridis"], ["cividis", "cividis"]], now.palette, (pal) => take({ pal }))),
     tick("log colours", now.is_log, (is) => take({ zlog: is ? "1" : "" })));
 }

@@ -1,6 +1,8 @@
 // Colours: told apart by all, read on paper and on dark screens.
 #include <array>
 #include <cmath>
+#include <fstream>
+#include <iterator>
 #include <set>
 #include <string>
 #include <vector>
@@ -10,6 +12,7 @@
 
 #include "client/plot/draw/palette.h"
 #include "client/plot/draw/theme.h"
+#include "client/plot/figures/maps.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::client::plot {
@@ -119,6 +122,24 @@ TEST(Fills, WithoutHatchingHaveAColourEach) {
       EXPECT_GT(difference(plain_fill(i), plain_fill(k), kAllCones), 10.0) << i << " and " << k;
     }
   }
+}
+
+TEST(Fills, AreThoseOfThePage) {
+  std::ifstream file(OBLIQUE_SOURCE_DIR "/client/web/parts/colours.js");
+  const std::string page{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  const auto as_there = [](const Fill& look) {
+    return "[\"" + hexadecimal(look.colour).substr(1) + "\", " +
+           std::to_string(static_cast<int>(look.hatch)) + "]";
+  };
+  std::size_t at = page.find("const kKinds");
+  for (std::size_t i = 0; i < kFills; ++i) {
+    const std::size_t found = page.find("[\"", at);
+    ASSERT_NE(found, std::string::npos);
+    EXPECT_EQ(page.substr(found, as_there(fill(i)).size()), as_there(fill(i))) << i;
+    at = found + 1;
+  }
+  EXPECT_THAT(page, testing::HasSubstr("(" + as_there(kFillOfOthers) + ")"));
+  EXPECT_THAT(page, testing::HasSubstr("kMostKinds = " + std::to_string(kMostKinds) + ";"));
 }
 
 TEST(Strokes, DifferInDashesAndAreReadOnPaperAndOnDarkScreens) {

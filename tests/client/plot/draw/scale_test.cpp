@@ -55,6 +55,28 @@ TEST(Ticks, OfALogarithmicScaleArePowersOfTenWithOthersWhereThoseAreFew) {
   EXPECT_GE(labels(ticks_of(Scale(0.31, 0.37, true), 5)).size(), 3U);
 }
 
+TEST(Ticks, OfLessThanADecadeAreAsManyAsThereIsRoomFor) {
+  EXPECT_THAT(labels(ticks_of(Scale(1.0, 2.0, true), 5)),
+              ElementsAre("1.0", "1.2", "1.4", "1.6", "1.8", "2.0"));
+  EXPECT_THAT(labels(ticks_of(Scale(0.3, 1.2, true), 5)), ElementsAre("0.3", "0.5", "1"));
+  EXPECT_THAT(labels(ticks_of(Scale(0.3, 1.2, true), 8)),
+              ElementsAre("0.3", "0.4", "0.5", "0.6", "0.7", "0.8", "0.9", "1"));
+  EXPECT_THAT(labels(ticks_of(Scale(2.0, 9.0, true), 4)), ElementsAre("2", "3", "5"));
+  EXPECT_THAT(labels(ticks_of(Scale(1.0, 1.01, true), 3)), ElementsAre("1.000", "1.005", "1.010"));
+}
+
+TEST(Ticks, OfALogarithmicScaleAreTwoAtLeastAndNotMoreThanAreSeenApart) {
+  for (const double from : {1e-12, 0.02, 0.3, 1.0, 7.0, 95.0, 2e6}) {
+    for (const double ratio : {1.001, 1.01, 1.3, 2.0, 4.0, 9.0, 11.0, 70.0, 1e4, 1e12, 1e40}) {
+      for (const int wanted : {2, 3, 5, 10}) {
+        const auto all = labels(ticks_of(Scale(from, from * ratio, true), wanted));
+        EXPECT_GE(all.size(), 2U) << from << ' ' << ratio << ' ' << wanted;
+        EXPECT_LE(all.size(), static_cast<std::size_t>(2 * wanted + 1)) << from << ' ' << ratio;
+      }
+    }
+  }
+}
+
 TEST(Ticks, AreAtLeastTwoOnWhateverScale) {
   for (const double from : {-1e300, -1.0, 0.0, 1e-300, 0.1, 1.0, 123456.789, 1e15}) {
     for (const double length : {1e-5, 1.0, 7.3, 1e6, 1e200}) {

@@ -1,6 +1,7 @@
 #include "server/web/answers/column_store.h"
 
 #include "server/web/answers/point_set.h"
+#include "server/web/answers/result_sample.h"
 
 #include <atomic>
 #include <chrono>
@@ -29,6 +30,34 @@ std::vector<PointRun> runs_of(const std::set<std::uint64_t>& points) {
     }
   }
   return runs;
+}
+
+TEST(SampledRuns, LieEvenlyAmongAllAndAreNoMoreThanAskedFor) {
+  std::vector<PointRun> all;
+  for (std::uint64_t i = 0; i < 5000; ++i) {
+    all.push_back({i * 100'000, i * 100'000 + 1 + (i % 7) * 9'000});
+  }
+  constexpr std::uint64_t kMost = 1U << 20U;
+  const auto taken = sampled_runs(all, kMost);
+  EXPECT_TRUE(difference(taken, all).empty()) << "points that there are not";
+  std::uint64_t points = 0;
+  std::uint64_t lower_half = 0;
+  std::uint64_t end = 0;
+  for (const PointRun& run : taken) {
+    EXPECT_GE(run.begin, end);
+    end = run.end;
+    points += run.end - run.begin;
+    lower_half += run.begin < 250'000'000 ? run.end - run.begin : 0;
+  }
+  EXPECT_EQ(points, kMost);
+  EXPECT_NEAR(static_cast<double>(lower_half) / static_cast<double>(points), 0.5, 0.01);
+}
+
+TEST(SampledRuns, OfFewPointsAreAllOfThem) {
+  const std::vector<PointRun> few{{3, 5}, {70, 71}};
+  EXPECT_EQ(sampled_runs(few, 3), few);
+  EXPECT_TRUE(sampled_runs({}, 3).empty());
+  EXPECT_EQ(sampled_runs({{0, 10}}, 4).size(), 1U);
 }
 
 TEST(Difference, IsThatOfTheSetsOfPoints) {

@@ -1,8 +1,13 @@
 // What the page asks a whole server with a pretended worker.
+#include <atomic>
+#include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
+#include <thread>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -163,7 +168,7 @@ TEST_F(PageAnswersTest, AStudyOfABillionPointsIsLookedAtLikeASmallOne) {
       page_.numbers("/api/studies/1/slice?z=mode&x=mu&y=H&nx=1024&ny=1024&at=e:1");
   EXPECT_EQ(slice.head["nx"], 1000);
   EXPECT_EQ(slice.head["missing"], 1'000'000);
-  EXPECT_EQ(status_of_answer(page_.get("/api/studies/1/bins?x=fn_peak_N")), 400);
+  EXPECT_EQ(page_.numbers("/api/studies/1/bins?x=fn_peak_N").head["points"], 0);
 }
 
 TEST_F(PageAnswersTest, SolvedPointsAreFoundAmongManyThatAreNot) {
@@ -254,6 +259,19 @@ TEST_F(PageAnswersTest, BinsOfNothingHaveTheEndsThatWereTyped) {
   EXPECT_EQ(status_of_answer(page_.get(bins + "&xlog=1&x0=-1&x1=1")), 400);
 }
 
+TEST_F(PageAnswersTest, BinsOfAStudyThatIsTooLargeToBeHeldHaveWhatWasSolved) {
+  submit("large", protocol::recipe_of(
+                      {{protocol::range("H", 0.8, 1.0, 10'000),
+                        protocol::range("mu", 0.0, 2.0, 100'000), protocol::listed("e", {1.0})}}));
+  solve(3);
+  const Numbers bins = page_.numbers("/api/studies/1/bins?x=fn_peak_N&y=mu&z=H&nx=2&ny=2");
+  EXPECT_GE(bins.head["points"], 3);
+  EXPECT_EQ(bins.head["sample"], nullptr) << "all are counted";
+  EXPECT_EQ(bins.head["x"]["least"], force_of(0));
+  const Numbers some = page_.numbers("/api/studies/1/bins?x=mu&where=point%20%3C%202");
+  EXPECT_EQ(some.head["points"], 2);
+}
+
 TEST_F(PageAnswersTest, AColumnThatWasReadFollowsTheStudy) {
   submit_grid();
   const auto count = [&] {
@@ -300,6 +318,48 @@ TEST_F(PageAnswersTest, APointHasItsInputsAndWhereItsRowComesFrom) {
   const std::string trace = page_.get("/api/studies/1/points/3/trace");
   EXPECT_EQ(status_of_answer(trace), 409);
   EXPECT_THAT(trace, HasSubstr("no worker is connected"));
+}
+
+TEST_F(PageAnswersTest, WhatIsSlowIsDoneOneAtATimeAndHoldsUpNothingElse) {
+  std::atomic<int> slow = 0;
+  std::atomic<bool> may_end = false;
+  AnswerPool pool(page_.database(), [] {});
+  const auto take = [&pool](std::uint64_t number) {
+    std::optional<HttpAnswer> answer;
+    while (!(answer = pool.take(number))) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    return *answer;
+  };
+  const auto slowly = [&](const AnswerDesk&) {
+    EXPECT_EQ(++slow, 1);
+    while (!may_end) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    --slow;
+    return HttpAnswer{};
+  };
+  for (const std::uint64_t number : {1U, 2U, 3U}) {
+    ASSERT_TRUE(pool.submit(number, slowly, AnswerPool::Lane::kSlow));
+  }
+  ASSERT_TRUE(pool.submit(4, [](const AnswerDesk&) { return HttpAnswer{204, {}, {}}; }));
+  EXPECT_EQ(take(4).status, 204U);
+  may_end = true;
+  for (const std::uint64_t number : {1U, 2U, 3U}) {
+    take(number);
+  }
+}
+
+TEST_F(PageAnswersTest, ATextThatIsNestedWithoutEndIsAText) {
+  submit_grid();
+  solve(24);
+  const std::string deep = std::string(100'000, '[') + std::string(100'000, ']');
+  const std::string change =
+      "UPDATE packed_results SET checksum = NULL, error = '" + deep + "' WHERE point = 3";
+  const auto database = open_database(page_.database(), SQLITE_OPEN_READWRITE);
+  sqlite3_busy_timeout(database.get(), 10'000);
+  execute(database.get(), change.c_str());
+  EXPECT_EQ(page_.json("/api/studies/1/points/3")["row"]["error"], deep);
 }
 
 TEST_F(PageAnswersTest, AStudyIsStartedAndChangedFromThePage) {

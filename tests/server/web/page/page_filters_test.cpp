@@ -139,5 +139,30 @@ TEST(PointFilters, WhatCameBeforeAQuestionFailedIsNoPartOfTheNextAnswer) {
   EXPECT_TRUE(std::holds_alternative<AnswerPool::Job>(talk.go_on(chunk_of({2}, true))));
 }
 
+TEST(PointFilters, WhoAsksWhileTheSameIsAskedHearsHowFarItIs) {
+  PointFilters filters;
+  HttpQuestion question{};
+  question.number = 3;
+  question.fields = {{"where", "fn_peak_N > 2"}};
+  ClientReply study;
+  study.mutable_status()->add_studies()->set_name("grid");
+  study.mutable_status()->mutable_studies(0)->set_points(200);
+  std::optional<Talk> first = filters.begin(1, question, false).then();
+  first->go_on(study);
+  first->go_on(chunk_of({1, 50}, false));
+  const Talk second = filters.begin(1, question, false).then();
+  const auto told = second.go_on(study);
+  ASSERT_TRUE(std::holds_alternative<HttpAnswer>(told));
+  EXPECT_EQ(std::get<HttpAnswer>(told).status, 202U);
+  EXPECT_EQ(nlohmann::json::parse(std::get<HttpAnswer>(told).body)["share"], 0.25);
+  EXPECT_FALSE(first->background->is_forgotten());
+  // It is kept for the next one, and one that was given up is asked anew.
+  EXPECT_TRUE(std::holds_alternative<AnswerPool::Job>(first->go_on(chunk_of({60}, true))));
+  EXPECT_TRUE(std::holds_alternative<AnswerPool::Job>(second.go_on(study)));
+  study.mutable_status()->mutable_studies(0)->set_solved(7);
+  first.reset();
+  EXPECT_TRUE(std::holds_alternative<ClientRequest>(second.go_on(study)));
+}
+
 }  // namespace
 }  // namespace oblique::server

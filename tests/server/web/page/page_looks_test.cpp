@@ -117,7 +117,24 @@ TEST_F(PageLooksTest, ItIsKeptUnderANameAndGoesBehindOthers) {
   const json study = page_.json("/api/studies")["studies"][0];
   EXPECT_EQ(study["name"], "kept");
   EXPECT_EQ(study["priority"], 0);
-  EXPECT_EQ(status_of_answer(page_.post(path, R"({"name":"again"})")), 404);
+  EXPECT_EQ(json::parse(body_of(page_.post(path, R"({"name":"kept"})")))["id"], made["id"]);
+  const std::string other = page_.post(path, R"({"name":"again"})");
+  EXPECT_EQ(status_of_answer(other), 409);
+  EXPECT_THAT(other, HasSubstr(R"(kept as \"kept\" already)"));
+  EXPECT_EQ(names(), std::vector<std::string>{"kept"});
+}
+
+TEST_F(PageLooksTest, ANameThatIsTakenLeavesItToBeKeptUnderAnother) {
+  const json one = look(look_at(5));
+  const json two = look(look_at(6));
+  const auto keep = [this](const json& which, const std::string& name) {
+    return status_of_answer(
+        page_.post("/api/look/" + which["id"].dump() + "/keep", json{{"name", name}}.dump()));
+  };
+  EXPECT_EQ(keep(one, "kept"), 200);
+  EXPECT_EQ(keep(two, "kept"), 409);
+  EXPECT_EQ(keep(two, "another"), 200);
+  EXPECT_EQ(names(), (std::vector<std::string>{"kept", "another"}));
 }
 
 TEST_F(PageLooksTest, WhatIsTooLargeOrNoRecipeIsRefused) {
@@ -129,6 +146,23 @@ TEST_F(PageLooksTest, WhatIsTooLargeOrNoRecipeIsRefused) {
   }
   EXPECT_EQ(status_of_answer(page_.post("/api/look", look_at(5, -1.0))), 400);
   EXPECT_EQ(status_of_answer(page_.get("/api/look")), 404);
+}
+
+TEST_F(PageLooksTest, ModelsWhosePointsTakeMinutesAreForStudies) {
+  const auto look = [this](const std::string& axis) {
+    return page_.post("/api/look",
+                      R"({"recipe":{"blocks":[{"axes":[)" + axis +
+                          R"({"key":"H","values":[1]},)"
+                          R"({"key":"mu","values":[1]},{"key":"e","values":[1]}]}]}})");
+  };
+  for (const std::string key :
+       {R"("elements_per_link","values":[4,86])", R"("dt","values":[1e-10])",
+        R"("tolerance","values":[1e-9])", R"("dt_fall","values":[1e-9])"}) {
+    const std::string refused = look(R"({"key":)" + key + "},");
+    EXPECT_EQ(status_of_answer(refused), 400) << key;
+    EXPECT_THAT(refused, HasSubstr("submit it as a study")) << key;
+  }
+  EXPECT_EQ(status_of_answer(look(R"({"key":"elements_per_link","values":[4,85]},)")), 200);
 }
 
 TEST(PageLooks, AnEarlierServersAreFound) {
@@ -189,7 +223,7 @@ class PageAloneTest : public testing::Test {
     settings.looks_kept = looks_kept;
     page_.emplace(settings, Page::Neighbours{line_, pool_, pool_, live_});
   }
-  void post(std::uint64_t number, const std::string& path, const std::string& body) {
+  HttpQuestion posted(std::uint64_t number, const std::string& path, const std::string& body) {
     HttpQuestion question{};
     question.number = number;
     question.method = "POST";
@@ -198,7 +232,10 @@ class PageAloneTest : public testing::Test {
     const std::string cookie = page_->key().cookie_for(question.host);
     question.cookies = {cookie.substr(0, cookie.find(';'))};
     question.body = body;
-    EXPECT_FALSE(page_->answer(question));
+    return question;
+  }
+  void post(std::uint64_t number, const std::string& path, const std::string& body) {
+    EXPECT_FALSE(page_->answer(posted(number, path, body)));
   }
   /// What the page has asked since the last time, under that number.
   std::vector<ClientRequest> asked(std::uint64_t number) {
@@ -264,6 +301,20 @@ TEST_F(PageAloneForLongTest, WhatIsKeptIsKeptThoughTheBrowserGoesMeanwhile) {
   EXPECT_EQ(next[0].submit().name(), "kept");
   EXPECT_EQ(next[0].submit().priority(), 0);
   EXPECT_EQ(next[0].submit().recipe().blocks_size(), 1);
+}
+
+TEST_F(PageAloneForLongTest, TwoThatKeepItAtOnceMakeNoSecondStudy) {
+  post(1, "/api/look", look_at(5));
+  is_submitted(1);
+  page_->gone(1);
+  page_->tick();
+  post(2, "/api/look/7/keep", R"({"name":"kept"})");
+  const HttpQuestion other = posted(3, "/api/look/7/keep", R"({"name":"other"})");
+  const auto refused = page_->answer(other);
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->status, 409U);
+  post(4, "/api/look/7/keep", R"({"name":"kept"})");
+  EXPECT_TRUE(asked(3).empty());
 }
 
 }  // namespace

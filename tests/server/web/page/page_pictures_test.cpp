@@ -96,7 +96,6 @@ TEST_F(PagePicturesTest, NothingFromOutsideBecomesAnotherFlag) {
   EXPECT_EQ(arguments_of("?kind=map&z=fn_peak_N&db=/etc/passwd&--db=/etc/passwd&out=/tmp/x&"
                          "server=tcp://evil&program=/bin/sh"),
             plain);
-  EXPECT_EQ(arguments_of("?kind=map&z=fn_peak_N%00--db=x"), plain);  // a text ends there
   for (const std::string query : {"?kind=map&z=--db=/etc/passwd",
                                   "?kind=map&z=fn_peak_N%0A--db=/etc/passwd",
                                   "?kind=map&z=fn_peak_N%1b[31m",

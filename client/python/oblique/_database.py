@@ -1,0 +1,155 @@
+"""Results that studies have left, asked as ``oblique query`` and ``oblique sql`` ask."""
+
+from __future__ import annotations
+
+import os
+import re
+import warnings
+from typing import TYPE_CHECKING, Any, Iterator, Optional, Sequence, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._named import Plain
+
+if TYPE_CHECKING:
+    import pandas
+
+
+class Study(Plain):
+    """A study of a database and where it stands."""
+
+    study_id: int
+    name: str
+    state: str
+    points: int
+    solved: int
+    failed: int
+    created_at: str
+    solver_version: str
+
+
+class Answer:
+    """Columns by name, as ``answer["fn_peak_N"]`` or ``answer.fn_peak_N``: NumPy arrays, whole
+    numbers as int64, others as float64 with NaN for NULL, texts as objects with None. ``units`` has
+    their units (SI) as far as they are known, ``len()`` counts rows."""
+
+    units: dict[str, str]
+
+    def __init__(self, columns: list[tuple[str, str, Any]]) -> None:
+        self._columns: dict[str, npt.NDArray[Any]] = {}
+        self.units = {}
+        for name, unit, values in columns:
+            unique, number = name, 2
+            while unique in self._columns:
+                unique, number = f"{name}_{number}", number + 1
+            if isinstance(values, list):
+                texts = np.empty(len(values), dtype=object)
+                texts[:] = values
+                values = texts
+            self._columns[unique] = values
+            self.units[unique] = unit
+
+    def keys(self) -> list[str]:
+        """Names of the columns, in order."""
+        return list(self._columns)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._columns)
+
+    def __getitem__(self, name: str) -> npt.NDArray[Any]:
+        try:
+            return self._columns[name]
+        except KeyError:
+            raise KeyError(f"no column {name!r}: there are {', '.join(self._columns)}") from None
+
+    def __getattr__(self, name: str) -> npt.NDArray[Any]:
+        if name.startswith("_") or name not in self._columns:
+            raise AttributeError(f"no column {name!r}")
+        return self._columns[name]
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self._columns]
+
+    def __len__(self) -> int:
+        return len(next(iter(self._columns.values()))) if self._columns else 0
+
+    def __repr__(self) -> str:
+        return f"<{len(self)} rows: {', '.join(self._columns)}>"
+
+    def _asdict(self) -> dict[str, npt.NDArray[Any]]:
+        return dict(self._columns)
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """The same as a DataFrame; pandas is needed for this alone."""
+        import pandas
+
+        return pandas.DataFrame(self._columns)
+
+
+class Database:
+    """A database of results, opened for reading only: it may be asked while a server or a run
+    writes it. Raises FileNotFoundError where there is none, and DatabaseError where there is
+    something else. What is unusual in how it is read is a warning.
+
+        db = oblique.Database("oblique.db")
+        friction = db.query("friction", where="e = 1", select="mu, fn_peak_N")
+        friction.to_pandas().plot(x="mu", y="fn_peak_N")
+    """
+
+    def __init__(self, file: Union[str, "os.PathLike[str]"] = "oblique.db") -> None:
+        self.file = os.fspath(file)
+        self._database = _core.Database(self.file)
+        if remark := self._database.remark():
+            warnings.warn(remark, stacklevel=2)
+
+    def __repr__(self) -> str:
+        return f"oblique.Database({self.file!r})"
+
+    def query(
+        self,
+        study: str,
+        where: str = "",
+        select: Union[str, Sequence[str]] = "",
+        group: Union[str, Sequence[str]] = "",
+        order: Union[str, Sequence[str]] = "",
+        limit: Optional[int] = None,
+    ) -> Answer:
+        """Results of a study: the answer of ``oblique query STUDY --where ...`` in full.
+
+        Texts are SQL over the columns that ``oblique columns`` lists, in SI units; ``select`` left
+        out has those that people look at most, "*" has all. Raises ValueError for a wrong name,
+        with those that may have been meant.
+        """
+        if limit is not None and limit < 0:
+            raise ValueError(f"limit = {limit} is not allowed: limit must be >= 0")
+        with _PythonNames():
+            columns = self._database.query(
+                study, where, _joined(select), _joined(group), _joined(order), limit
+            )
+        return Answer(columns)
+
+    def sql(self, statement: str) -> Answer:
+        """The answer to one statement of SQL that only reads, as of ``oblique sql``."""
+        return Answer(self._database.sql(statement))
+
+    def studies(self) -> list[Study]:
+        """All studies, in the order in which they came."""
+        return [Study(study) for study in self._database.studies()]
+
+
+def _joined(names: Union[str, Sequence[str]]) -> str:
+    return names if isinstance(names, str) else ", ".join(names)
+
+
+class _PythonNames:
+    """Flags that an error speaks of as the arguments that they are here."""
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: object, error: Optional[BaseException], trace: object) -> None:
+        if isinstance(error, ValueError):
+            text = re.sub(r"--(where|select|group|order|limit)\b", r"\1", str(error))
+            raise ValueError(text) from None

@@ -1,0 +1,327 @@
+"""What solving gives: one result, many, and time histories."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Optional
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._named import Named, Plain
+
+if TYPE_CHECKING:
+    import pandas
+
+Floats = npt.NDArray[np.float64]
+Texts = npt.NDArray[np.object_]
+
+
+class Energy(Plain):
+    """Energy balance of a contact [J]; what is lost is positive."""
+
+    kinetic_in_J: float
+    friction_J: float
+    restitution_J: float
+    kinetic_change_J: float
+    strain_change_J: float
+    gravity_change_J: float
+    exchanged_J: float
+    closure: float
+
+
+class Errors(Plain):
+    """Estimated errors, as fractions of the output's scale; None unless asked for."""
+
+    mode_same: Optional[int]
+    fn_peak: Optional[float]
+    ft_peak: Optional[float]
+    duration: Optional[float]
+    stick_total: Optional[float]
+    slide: Optional[float]
+    impulse_n: Optional[float]
+    impulse_t: Optional[float]
+    v_out: Optional[float]
+
+
+class Solver(Plain):
+    """How a result was got. Two are equal whatever time they took."""
+
+    integrator: str
+    dt_s: float
+    steps: int
+    wall_s: float
+    version: str
+
+    def __eq__(self, other: object) -> bool:
+        return type(other) is Solver and {**self.__dict__, "wall_s": 0} == {
+            **other.__dict__,
+            "wall_s": 0,
+        }
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+class Result(Plain):
+    """One impact, with the fields of ``oblique solve --json`` (``oblique columns`` tells them all).
+
+    SI units; times count from touch. Fields are attributes, ``_asdict()`` gives all of them.
+    """
+
+    H: float
+    mu: float
+    e: float
+    fall_time_s: float
+    impact_x_m: float
+    vt_in_m_s: float
+    vn_in_m_s: float
+    duration_s: float
+    fn_peak_N: float
+    ft_peak_N: float
+    fn_peaks_N: list[float]
+    ft_peaks_N: list[float]
+    major_peaks_N: list[float]
+    impulse_n_Ns: float
+    impulse_t_Ns: float
+    slide_m: float
+    vt_out_m_s: float
+    vn_out_m_s: float
+    mode: str
+    major_mode: str
+    margin: Optional[float]
+    margin_event: Optional[str]
+    stick_total_s: float
+    stick_intervals_s: list[list[float]]
+    phases: list[dict[str, Any]]
+    reaction_peaks: list[dict[str, float]]
+    energy: Energy
+    errors: Errors
+    solver: Solver
+
+    def __init__(self, values: dict[str, Any]) -> None:
+        super().__init__({**values, **{name: _GROUPS[name](values[name]) for name in _GROUPS}})
+
+
+_GROUPS: dict[str, type[Named]] = {"energy": Energy, "errors": Errors, "solver": Solver}
+
+
+class ManyGroup(Named):
+    """One of the groups ``energy``, ``errors`` and ``solver`` of many results: arrays by the names
+    of :class:`Energy`, :class:`Errors` and :class:`Solver`."""
+
+    def __getattr__(self, name: str) -> Any:
+        raise AttributeError(f"there is no `{name}` here: there are {', '.join(self)}")
+
+
+class ManyResults(Named):
+    """Many impacts: the fields of :class:`Result`, each an array of the shape of the input.
+
+    Where a point has no result its numbers are NaN, its texts None, its lists empty, and ``error``
+    says why; ``failed`` marks such points. Lists are arrays of arrays (``fn_peaks_N``,
+    ``stick_intervals_s``), with named members where they have several (``phases["t0_s"]``);
+    :meth:`ragged` gives one without making an object for each point.
+
+    >>> import oblique
+    >>> sweep = oblique.solve_many(H=1, mu=[0.2, 0.4, -1], e=1)
+    >>> sweep.fn_peak_N.round(1)
+    array([5421. , 5057.6,    nan])
+    >>> sweep.error[2]
+    'mu = -1 is not allowed: mu must be >= 0'
+    """
+
+    H: Floats
+    mu: Floats
+    e: Floats
+    fall_time_s: Floats
+    impact_x_m: Floats
+    vt_in_m_s: Floats
+    vn_in_m_s: Floats
+    duration_s: Floats
+    fn_peak_N: Floats
+    ft_peak_N: Floats
+    fn_peaks_N: npt.NDArray[np.object_]
+    ft_peaks_N: npt.NDArray[np.object_]
+    major_peaks_N: npt.NDArray[np.object_]
+    impulse_n_Ns: Floats
+    impulse_t_Ns: Floats
+    slide_m: Floats
+    vt_out_m_s: Floats
+    vn_out_m_s: Floats
+    mode: Texts
+    major_mode: Texts
+    margin: Floats
+    margin_event: Texts
+    stick_total_s: Floats
+    stick_intervals_s: npt.NDArray[np.object_]
+    phases: npt.NDArray[np.object_]
+    reaction_peaks: npt.NDArray[np.object_]
+    energy: ManyGroup
+    errors: ManyGroup
+    solver: ManyGroup
+    error: Texts
+    failed: npt.NDArray[np.bool_]
+
+    def __init__(self, values: dict[str, Any], shape: tuple[int, ...]) -> None:
+        lists = values.pop("lists")
+
+        def shaped(column: Any) -> Any:
+            if isinstance(column, list):
+                texts = np.empty(len(column), dtype=object)
+                texts[:] = column
+                column = texts
+            return column.reshape(shape)
+
+        named: dict[str, Any] = {key: shaped(values[key]) for key in ("H", "mu", "e")}
+        for name, group, _, _, _, list_name, _, _ in _core.fields():
+            if list_name:
+                named[name] = None  # its place; made when it is asked for
+            elif group:
+                named.setdefault(group, {})[name] = shaped(values[group][name])
+            else:
+                named[name] = shaped(values[name])
+        for group in _GROUPS:
+            named[group] = ManyGroup(named[group])
+        named["error"] = shaped(values["error"])
+        named["failed"] = np.asarray(named["error"] != None)  # noqa: E711  element by element
+        named["_lists"] = lists
+        named["_shape"] = shape
+        super().__init__(named)
+
+    def __getattribute__(self, name: str) -> Any:
+        value = super().__getattribute__(name)
+        if value is None and not name.startswith("_"):
+            value = self._list(name)
+            self.__dict__[name] = value
+        return value
+
+    def __getattr__(self, name: str) -> Any:
+        raise AttributeError(f"there is no `{name}` here: there are {', '.join(self.__dict__)}")
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of every field."""
+        shape: tuple[int, ...] = self.__dict__["_shape"]
+        return shape
+
+    def __len__(self) -> int:
+        return self.shape[0] if self.shape else 1
+
+    def _asdict(self) -> dict[str, Any]:
+        for name in [name for name, value in self.__dict__.items() if value is None]:
+            getattr(self, name)
+        return super()._asdict()
+
+    def __repr__(self) -> str:
+        failed = int(self.failed.sum())
+        return (
+            f"<{self.failed.size} results of shape {self.shape}"
+            + (f", {failed} failed" if failed else "")
+            + ": "
+            + ", ".join(name for name in self.__dict__ if not name.startswith("_"))
+            + ">"
+        )
+
+    def ragged(self, name: str) -> tuple[npt.NDArray[Any], npt.NDArray[np.int64]]:
+        """A list of all points as one array: those of point i (of the flattened input) are
+        ``values[offsets[i]:offsets[i + 1]]``.
+
+        >>> import oblique
+        >>> values, offsets = oblique.solve_many(H=1, mu=[0.4, 1.2], e=1).ragged("fn_peaks_N")
+        >>> offsets.tolist(), len(values)
+        ([0, 3, 5], 5)
+        """
+        for field, _, _, _, _, list_name, member, where in _core.fields():
+            if field == name and list_name:
+                return self._ragged(list_name, member, where)
+        lists = ", ".join(field[0] for field in _core.fields() if field[5])
+        raise ValueError(f"{name!r} is no list: lists are {lists}")
+
+    def _ragged(
+        self, list_name: str, member: str, where: str
+    ) -> tuple[npt.NDArray[Any], npt.NDArray[np.int64]]:
+        packed = self.__dict__["_lists"][list_name]
+        offsets: npt.NDArray[np.int64] = packed["offsets"]
+        if not member:
+            return _elements(list_name, packed), offsets
+        values: npt.NDArray[Any] = packed[member]
+        if not where:
+            return values, offsets
+        counted = packed[where] != 0
+        before = np.concatenate([[0], np.cumsum(counted)])
+        return values[counted], before[offsets]
+
+    def _list(self, name: str) -> npt.NDArray[np.object_]:
+        values, offsets = self.ragged(name)
+        lists = np.empty(len(offsets) - 1, dtype=object)
+        for i in range(len(lists)):
+            lists[i] = values[offsets[i] : offsets[i + 1]]
+        return lists.reshape(self.shape)
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """A row a point: H, mu, e and all outputs that are one value, under the names that they
+        have in a database, and ``error``."""
+        import pandas
+
+        columns = {"H": self.H, "mu": self.mu, "e": self.e}
+        for name, group, column, _, _, list_name, _, _ in _core.fields():
+            if not list_name:
+                columns[column] = getattr(getattr(self, group) if group else self, name)
+        columns["error"] = self.error
+        return pandas.DataFrame({name: values.ravel() for name, values in columns.items()})
+
+
+def _elements(list_name: str, packed: dict[str, Any]) -> npt.NDArray[Any]:
+    """Elements with named members, or pairs where they have no names."""
+    members = [name for name in packed if name not in ("offsets", "texts")]
+    if list_name == "stick_intervals":
+        return np.stack([packed[name] for name in members], axis=-1)
+    size = len(packed["offsets"]) and len(packed[members[0]])
+    texts = np.array(packed["texts"] or [""])
+    elements = np.empty(
+        size, dtype=[(name, texts.dtype if name == "kind" else np.float64) for name in members]
+    )
+    for name in members:
+        elements[name] = texts[packed[name].astype(int)] if name == "kind" else packed[name]
+    return elements
+
+
+class Trace(Named):
+    """Time histories of one contact: an array a column (``t_s``, ``fn_N``, ``x_m``, ...; forces on
+    joints ``R0x_N`` ..., and where the shape was asked for ``node0x_m`` ...), and the ``result``.
+
+    ``state`` is SC, SR, sC or sR from each instant on, and "falling" before touch.
+    """
+
+    t_s: Floats
+    fn_N: Floats
+    ft_N: Floats
+    uy_m: Floats
+    ux_m: Floats
+    xP_m: Floats
+    vP_m_s: Floats
+    x_m: Floats
+    y_m: Floats
+    vt_m_s: Floats
+    vn_m_s: Floats
+    state: npt.NDArray[np.str_]
+    kinetic_J: Floats
+    strain_J: Floats
+    gravity_J: Floats
+    momentum_x_Ns: Floats
+    momentum_y_Ns: Floats
+    result: Result
+
+    def __getattr__(self, name: str) -> Any:
+        raise AttributeError(f"there is no `{name}` here: there are {', '.join(self.__dict__)}")
+
+    def __len__(self) -> int:
+        return len(self.t_s)
+
+    def __repr__(self) -> str:
+        return f"<Trace of {len(self)} instants: {', '.join(self.__dict__)}>"
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """A row an instant."""
+        import pandas
+
+        return pandas.DataFrame({k: v for k, v in self.__dict__.items() if k != "result"})

@@ -1,0 +1,191 @@
+"""Points solved here."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Callable, Optional, Sequence, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._results import ManyResults, Result, Trace
+
+Number = Union[float, int, "np.floating[Any]", "np.integer[Any]"]
+#: One value, or an expression of other keys, as "A^2 / (4 * pi)".
+Value = Union[Number, str]
+
+_falls = _core.Falls()  # of all calls: a model's fall is solved once
+
+
+def solve(
+    H: Value,
+    mu: Value,
+    e: Value,
+    *,
+    preset: str = "paper",
+    lengths: Optional[Sequence[Number]] = None,
+    errors: bool = False,
+    **model: Value,
+) -> Result:
+    """One impact: what ``oblique solve --json`` gives, with the same bits.
+
+    H [m] is the drop of the tip, mu the coefficient of friction, e Stronge's coefficient of
+    restitution. The model is a preset ("paper", "printed" or "converged") with single keys
+    overridden, as on the command line: ``E``, ``A``, ``I``, ``rho``, ``g``, ``k``, ``eta2``,
+    ``tip_mass``, ``links``, ``length``, ``length1``, ``elements_per_link``, ``integrator``, ``dt``,
+    ``dt_fall``, ``tolerance``, ...; ``lengths`` has one length a link. A value may be an expression
+    of other keys. ``errors`` asks for estimated errors too.
+
+    The first point of a model takes some 0.1 s, for its fall; others take 1 ms or less. Many points
+    are ten times as fast in one call of :func:`solve_many`.
+
+    Raises ValueError, naming key, value and range, for what is not allowed, and SolveError for a
+    point that has no answer.
+
+    >>> import oblique
+    >>> impact = oblique.solve(H=1, mu=1.2, e=0.8)
+    >>> impact.major_mode, round(impact.duration_s * 1e6)
+    ('SC SR sR sC sR', 330)
+    >>> oblique.solve(H=1, mu=0.4, e=1, tip_mas=0.1)
+    Traceback (most recent call last):
+      ...
+    ValueError: unknown key `tip_mas` (did you mean `tip_mass`?): ...
+    """
+    keys = _one_value_each("solve", {"H": H, "mu": mu, "e": e, **model}, preset, lengths)
+    return Result(_core.solve(_falls, keys, errors))
+
+
+def trace(
+    H: Value,
+    mu: Value,
+    e: Value,
+    *,
+    preset: str = "paper",
+    lengths: Optional[Sequence[Number]] = None,
+    fall: bool = False,
+    shape: bool = False,
+    **model: Value,
+) -> Trace:
+    """The time histories of one impact, from touch to separation; see :func:`solve`.
+
+    ``fall`` adds the fall before touch, at negative times; ``shape`` the positions of the nodes.
+
+    >>> import oblique
+    >>> contact = oblique.trace(H=1, mu=0.4, e=1)
+    >>> round(float(contact.fn_N.max()), 1), contact.state[0]
+    (5057.6, 'sC')
+    """
+    keys = _one_value_each("trace", {"H": H, "mu": mu, "e": e, **model}, preset, lengths)
+    result, columns = _core.trace(_falls, keys, fall, shape)
+    columns["state"] = np.array(_core.trace_states())[columns["state"]]
+    return Trace({**columns, "result": Result(result)})
+
+
+def solve_many(
+    H: Union[npt.ArrayLike, str],
+    mu: Union[npt.ArrayLike, str],
+    e: Union[npt.ArrayLike, str],
+    *,
+    preset: str = "paper",
+    lengths: Optional[Sequence[Number]] = None,
+    errors: bool = False,
+    threads: Optional[int] = None,
+    progress: Optional[Callable[[int, int], object]] = None,
+    **model: Union[npt.ArrayLike, str],
+) -> ManyResults:
+    """Many impacts, on all cores (or ``threads``) and in all lanes of their vector registers.
+
+    All keys may be arrays, lists or single values, which are broadcast against each other, and
+    expressions; the results have their common shape. They are the bits that :func:`solve` gives.
+    A point of an array that has no answer fails alone: see :class:`ManyResults`.
+
+    ``progress(done, all)`` is called every 50 ms or so; what it raises ends the work, as Ctrl-C
+    does. Other threads of Python run meanwhile.
+
+    >>> import numpy as np, oblique
+    >>> mu, e = np.meshgrid(np.linspace(0.1, 2, 20), [0.6, 0.8, 1.0])
+    >>> sweep = oblique.solve_many(H=1, mu=mu, e=e)
+    >>> sweep.fn_peak_N.shape, sweep.mode[2, 3]
+    ((3, 20), 'sC sR sC sR sC sR')
+    >>> stiff = oblique.solve_many(H=1, mu=0.4, e=1, k=[1e7, 2e7, 4e7])
+    >>> stiff.fn_peak_N.round(0)
+    array([3585., 4549., 5720.])
+    """
+    given: dict[str, Any] = {}
+    arrays: dict[str, npt.NDArray[Any]] = {}
+    for name, value in {"H": H, "mu": mu, "e": e, **model}.items():
+        if isinstance(value, str):
+            given[name] = value
+        else:
+            arrays[name] = _numbers(name, value)
+    try:
+        shape = np.broadcast_shapes(*(array.shape for array in arrays.values()))
+    except ValueError:
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items() if array.ndim)
+        raise ValueError(f"these shapes do not fit each other: {shapes}") from None
+    for name, array in arrays.items():
+        if array.ndim == 0:
+            given[name] = float(array)
+        else:
+            given[name] = np.ascontiguousarray(np.broadcast_to(array, shape).ravel())
+    points = math.prod(shape)
+    if threads is not None and (not isinstance(threads, int) or threads < 1):
+        raise ValueError(f"threads = {threads} is not allowed: threads must be a whole number >= 1")
+    _add_model(given, preset, lengths)
+    many = _core.solve_many(_falls, given, points, threads or 0, errors, progress)
+    return ManyResults(many, shape)
+
+
+def _one_value_each(
+    name: str, keys: dict[str, Any], preset: str, lengths: Optional[Sequence[Number]]
+) -> dict[str, Any]:
+    given: dict[str, Any] = {}
+    for key, value in keys.items():
+        if isinstance(value, str):
+            given[key] = value
+            continue
+        array = _numbers(key, value)
+        if array.ndim:
+            raise ValueError(
+                f"{key} has {array.size} values: {name} takes one; oblique.solve_many takes arrays"
+            )
+        given[key] = float(array)
+    _add_model(given, preset, lengths)
+    return given
+
+
+def _add_model(
+    given: dict[str, Any], preset: str, lengths: Optional[Sequence[Number]]
+) -> None:
+    if not isinstance(preset, str):
+        raise ValueError(f"preset = {preset!r} is not allowed: preset must be a name, as \"paper\"")
+    given["preset"] = preset
+    if lengths is not None:
+        values = _numbers("lengths", lengths)
+        if values.ndim != 1 or not values.size:
+            raise ValueError("lengths must be the length of each link, as [0.4, 0.4, 0.3]")
+        given["lengths"] = values.tolist()
+
+
+def _numbers(name: str, value: Any) -> npt.NDArray[np.float64]:
+    array = np.asarray(value)
+    if value is None or array.dtype.kind == "O" and None in array.ravel().tolist():
+        raise ValueError(f"{name} = None is not allowed: {name} must be a number or numbers")
+    if name == "integrator" and array.dtype.kind == "U":
+        names = _core.integrator_names()
+        unknown = [text for text in array.ravel().tolist() if text not in names]
+        if unknown:
+            raise ValueError(
+                f"integrator = {unknown[0]!r} is not allowed: integrator must be "
+                + ", ".join(names)
+            )
+        array = np.vectorize(names.index, otypes=[float])(array)
+    if array.dtype.kind == "O":
+        try:
+            array = array.astype(np.float64)
+        except (TypeError, ValueError, OverflowError):
+            pass
+    if array.dtype.kind not in "iuf":
+        raise ValueError(f"{name} = {value!r} is not allowed: {name} must be a number or numbers")
+    return array.astype(np.float64)

@@ -1,0 +1,215 @@
+#include "client/python/solving.h"
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <pybind11/stl.h>
+
+#include "client/python/conversions.h"
+#include "client/python/given_keys.h"
+#include "client/python/interruptible.h"
+#include "client/python/result_arrays.h"
+#include "worker/solver/library/solver.h"
+#include "worker/solver/model/result_fields.h"
+#include "worker/solver/model/trace_columns.h"
+
+namespace oblique::python {
+namespace {
+
+namespace py = pybind11;
+
+/// Thrown by the sink of a trace that nobody waits for any more.
+class Stopped {};
+
+/// The only point that was given. Throws InputError for what is wrong with its model.
+struct OnePoint {
+  ModelParameters model;
+  Point point;
+};
+OnePoint one_point(const GivenKeys& keys) {
+  GivenPoints given = points_of(keys);
+  if (!given.faults.front().empty()) {
+    throw InputError(given.faults.front());
+  }
+  return {std::move(given.models.front()), given.points.front()};
+}
+
+py::dict with_point(const Point& point, const py::dict& outputs) {
+  py::dict all;
+  all["H"] = point.H_m;
+  all["mu"] = point.mu;
+  all["e"] = point.e;
+  for (const auto& [name, value] : outputs) {
+    all[name] = value;
+  }
+  return all;
+}
+
+py::dict solve(const Falls& falls, const py::dict& keys, bool errors) {
+  const OnePoint one = one_point(keys_of(keys, 1));
+  const auto result = interruptibly<CaseResult>([one, falls, errors](const std::atomic<bool>&) {
+    const Finger finger(one.model, falls);
+    const Point& point = one.point;
+    CaseResult solved = finger.solve(point.H_m, point.mu, point.e);
+    if (errors) {
+      solved.errors = finger.estimated_errors(solved);
+    }
+    return solved;
+  });
+  return with_point(one.point, dict_of(result));
+}
+
+/// Instants of a trace, number behind number.
+struct Instants {
+  CaseResult result;
+  std::vector<double> numbers;
+  std::vector<std::uint8_t> states;
+};
+
+py::tuple trace(const Falls& falls, const py::dict& keys, bool fall, bool shape) {
+  const OnePoint one = one_point(keys_of(keys, 1));
+  auto instants = interruptibly<Instants>([one, falls, fall, shape](const std::atomic<bool>& stop) {
+    Instants rows;
+    Tracing tracing;
+    tracing.with_fall = fall;
+    tracing.with_shape = shape;
+    tracing.sink = [&](const TraceRow& row) {
+      if (stop) {
+        throw Stopped();
+      }
+      solver::append_numbers(row, rows.numbers);
+      rows.states.push_back(solver::code_of_state(row.state));
+    };
+    const Point& point = one.point;
+    rows.result = Finger(one.model, falls).trace(point.H_m, point.mu, point.e, tracing);
+    return rows;
+  });
+  const auto headings = solver::trace_headings(solver::trace_shape(
+      one.model.lengths_m.size(), static_cast<std::size_t>(one.model.elements_per_link), shape));
+  const std::size_t width = headings.size() - 1;  // the state is no number
+  const std::size_t rows = instants.states.size();
+  py::dict columns;
+  std::size_t place = 0;
+  for (const std::string& heading : headings) {
+    if (heading == "state") {
+      columns["state"] = array_of(std::move(instants.states));
+      continue;
+    }
+    std::vector<double> column(rows);
+    for (std::size_t i = 0; i < rows; ++i) {
+      column[i] = instants.numbers[i * width + place];
+    }
+    columns[py::str(heading)] = array_of(std::move(column));
+    ++place;
+  }
+  return py::make_tuple(with_point(one.point, dict_of(instants.result)), columns);
+}
+
+/// Lets signals and `progress` (None: nobody) end it.
+ManyOptions options_of(const Falls& falls, std::size_t points, std::size_t threads, bool errors,
+                       const py::object& progress) {
+  ManyOptions options;
+  options.threads = threads;
+  options.errors = errors;
+  options.falls = falls;
+  options.goes_on = [points, &progress](std::size_t outcomes) {
+    const py::gil_scoped_acquire here;
+    if (PyErr_CheckSignals() != 0) {
+      throw py::error_already_set();
+    }
+    if (!progress.is_none()) {
+      progress(outcomes, points);
+    }
+    return true;
+  };
+  return options;
+}
+
+py::dict solve_many(const Falls& falls, const py::dict& keys, std::size_t count,
+                    std::size_t threads, bool errors, const py::object& progress) {
+  const GivenKeys given_keys = keys_of(keys, count);
+  const auto options = options_of(falls, count, threads, errors, progress);
+  ResultArrays arrays(count);
+  GivenPoints given;
+  {
+    const py::gil_scoped_release others_run;
+    given = points_of(given_keys);
+    std::vector<Point> points;
+    std::vector<std::size_t> places;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (const std::string& fault = given.faults[given.points[i].model]; !fault.empty()) {
+        arrays.set_error(i, fault);
+      } else {
+        points.push_back(given.points[i]);
+        places.push_back(i);
+      }
+    }
+    oblique::solve_many(
+        given.models, points,
+        [&](Outcome&& outcome) {
+          const std::size_t place = places[outcome.point];
+          if (outcome.result) {
+            arrays.set(place, *outcome.result);
+          } else {
+            arrays.set_error(place, outcome.error);
+          }
+        },
+        options);
+  }
+  if (!progress.is_none()) {
+    progress(count, count);
+  }
+  py::dict all = dict_of(std::move(arrays));
+  std::vector<double> H_m;
+  std::vector<double> mu;
+  std::vector<double> e;
+  for (const Point& point : given.points) {
+    H_m.push_back(point.H_m);
+    mu.push_back(point.mu);
+    e.push_back(point.e);
+  }
+  all["H"] = array_of(std::move(H_m));
+  all["mu"] = array_of(std::move(mu));
+  all["e"] = array_of(std::move(e));
+  return all;
+}
+
+/// (name, group, column, unit, meaning, list, member, where) of each output.
+py::list fields() {
+  py::list all;
+  for (const auto& field : solver::result_fields()) {
+    const auto* part = std::get_if<solver::ListPart>(&field.value);
+    all.append(py::make_tuple(std::string(field.name), std::string(field.group),
+                              std::string(field.column), std::string(field.unit),
+                              std::string(field.meaning),
+                              part == nullptr ? "" : std::string(part->list->column),
+                              part == nullptr ? "" : std::string(part->member),
+                              part == nullptr ? "" : std::string(part->where)));
+  }
+  return all;
+}
+
+}  // namespace
+
+void add_solving(py::module_& module) {
+  py::class_<Falls>(module, "Falls").def(py::init<>());
+  module.def("solve", &solve, py::arg("falls"), py::arg("keys"), py::arg("errors"));
+  module.def("trace", &trace, py::arg("falls"), py::arg("keys"), py::arg("fall"), py::arg("shape"));
+  module.def("solve_many", &solve_many, py::arg("falls"), py::arg("keys"), py::arg("points"),
+             py::arg("threads"), py::arg("errors"), py::arg("progress"));
+  module.def("version", &version);
+  module.def("instruction_set", &instruction_set);
+  module.def("fields", &fields);
+  module.def("trace_states", [] {
+    return std::vector<std::string>(solver::kTraceStates.begin(), solver::kTraceStates.end());
+  });
+  module.def("integrator_names", [] {
+    const auto names = solver::integrator_names();
+    return std::vector<std::string>(names.begin(), names.end());
+  });
+}
+
+}  // namespace oblique::python

@@ -1,0 +1,188 @@
+#include "client/verbs/completion/values.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "client/service/source_flags.h"
+#include "client/verbs/completion/stored_names.h"
+#include "server/asking/columns.h"
+#include "worker/solver/model/parameters.h"
+
+namespace oblique::client {
+namespace {
+
+using protocol::Offers;
+using protocol::Typed;
+
+/// What people write in a place, by the word that help has for it.
+enum class Meaning {
+  kStudy,
+  kColumns,
+  kColumn,
+  kCondition,
+  kKey,
+  kKeyIs,
+  kDatabase,
+  kStudyFile,
+  kKeyFile
+};
+
+struct Word {
+  std::string_view option;  ///< the name of a place or flag, or the type of its values
+  Meaning meaning;
+};
+constexpr auto kWords = std::to_array<Word>({
+    {"STUDY", Meaning::kStudy},
+    {"OLD", Meaning::kStudy},
+    {"--study", Meaning::kStudy},
+    {"STUDY.toml", Meaning::kStudyFile},
+    {"file", Meaning::kDatabase},
+    {"FILES", Meaning::kDatabase},
+    {"--db", Meaning::kDatabase},
+    {"--keys", Meaning::kKeyFile},
+    {"STATEMENT", Meaning::kColumns},
+    {"EXPR", Meaning::kColumns},
+    {"COLUMNS", Meaning::kColumns},
+    {"X,Y", Meaning::kColumns},
+    {"OUTPUT", Meaning::kColumns},
+    {"COL", Meaning::kColumn},
+    {"CONDITION", Meaning::kCondition},
+    {"COLUMN", Meaning::kColumn},
+    {"KEY=VALUE", Meaning::kKeyIs},
+    {"--x", Meaning::kKey},
+    {"--y", Meaning::kKey},
+    {"--by", Meaning::kKey},
+});
+
+std::string given(const Typed& typed, const char* flag) {
+  const auto* option = typed.verb->get_option_no_throw(flag);
+  const auto found = option == nullptr ? typed.given.end() : typed.given.find(option);
+  return found == typed.given.end() || found->second.empty() ? std::string() : found->second.back();
+}
+
+bool has(const Typed& typed, const char* flag) {
+  return typed.verb->get_option_no_throw(flag) != nullptr;
+}
+
+Offers studies(const Typed& typed) {
+  SourceFlags flags{
+      .database = given(typed, "--db"), .server = given(typed, "--server"), .timeout_s = {}};
+  flags.keys = given(typed, "--keys");
+  std::string database = flags.database;
+  if (database.empty() && has(typed, "--db")) {
+    database = has(typed, "--server") ? database_meant(flags) : DatabaseSettings().file;
+  }
+  Offers offers;
+  for (const auto& name : database.empty() ? names_at_server(flags, typed.value)
+                                           : names_in_database(database, typed.value)) {
+    offer_value(offers, typed, name);
+  }
+  return offers;
+}
+
+/// Of names, at the end of what is typed.
+std::size_t begin_of_name(std::string_view text) {
+  const auto is_of_name = [](unsigned char c) {
+    return std::isalnum(c) != 0 || c == '_' || c == '.' || c == '[' || c == ']';
+  };
+  std::size_t begin = text.size();
+  while (begin > 0 && is_of_name(static_cast<unsigned char>(text[begin - 1]))) {
+    --begin;
+  }
+  return begin;
+}
+
+bool is_in_text(std::string_view expression) {
+  return std::count(expression.begin(), expression.end(), '\'') % 2 == 1;
+}
+
+/// Offers `name` in the place of the one that is typed last in an expression.
+void offer_name(Offers& offers, const Typed& typed, const std::string& name,
+                const std::string& meaning, const std::string& end = {}) {
+  const auto begin = begin_of_name(typed.value);
+  if (std::string_view(name).starts_with(std::string_view(typed.value).substr(begin))) {
+    offers.offers.push_back(
+        {typed.word.substr(0, typed.word.size() - typed.value.size() + begin) + name + end, name,
+         meaning});
+  }
+}
+
+Offers columns(const Typed& typed) {
+  Offers offers{.offers = {}, .goes_on = true};
+  if (is_in_text(typed.value)) {
+    return offers;
+  }
+  for (const auto& column : server::columns_and_functions()) {
+    const bool is_function = column.kind == "function";
+    const std::string name =
+        is_function ? column.name.substr(0, column.name.find('(') + 1) : column.name;
+    offer_name(
+        offers, typed, name,
+        column.unit.empty() ? column.meaning : fmt::format("{} [{}]", column.meaning, column.unit));
+  }
+  return offers;
+}
+
+/// Keys of points and models, as axes and conditions name them.
+Offers keys(const Typed& typed, const std::string& end, bool goes_on) {
+  Offers offers{.offers = {}, .goes_on = goes_on};
+  for (const auto all : {solver::point_keys(), solver::model_keys()}) {
+    for (const auto& key : all) {
+      offer_name(offers, typed, std::string(key.name), std::string(key.meaning), end);
+    }
+  }
+  return offers;
+}
+
+Offers files(const char* ending) {
+  return {.offers = {}, .files = protocol::FileNames{.ending = ending}};
+}
+
+std::optional<Meaning> meaning_of(const CLI::Option& option) {
+  const auto has_name = [&option](const Word& word) {
+    return option.check_name(std::string(word.option)) || option.get_type_name() == word.option;
+  };
+  const auto found = std::find_if(kWords.begin(), kWords.end(), has_name);
+  return found == kWords.end() ? std::nullopt : std::optional(found->meaning);
+}
+
+}  // namespace
+
+std::optional<Offers> values_of_verbs(const Typed& typed) {
+  const auto meaning = meaning_of(*typed.option);
+  if (!meaning) {
+    return std::nullopt;
+  }
+  switch (*meaning) {
+    case Meaning::kStudy:
+      return studies(typed);
+    case Meaning::kColumns:
+      return columns(typed);
+    case Meaning::kColumn: {
+      Offers offers = columns(typed);
+      offers.goes_on = false;
+      return offers;
+    }
+    case Meaning::kCondition:
+      return keys(typed, "", true);
+    case Meaning::kKey:
+      return keys(typed, "", false);
+    case Meaning::kKeyIs:
+      return keys(typed, "=", true);
+    case Meaning::kDatabase:
+      return files("db");
+    case Meaning::kStudyFile:
+      return files("toml");
+    case Meaning::kKeyFile:
+      return files("key");
+  }
+  return std::nullopt;
+}
+
+}  // namespace oblique::client

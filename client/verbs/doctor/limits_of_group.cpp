@@ -1,0 +1,102 @@
+#include "client/verbs/doctor/limits_of_group.h"
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+
+namespace oblique::client::doctor {
+namespace {
+
+std::string text_of(const std::string& file) {
+  std::ifstream stream(file);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+template <class Number>
+void tighten(std::optional<Number>& limit, Number other) {
+  limit = limit ? std::min(*limit, other) : other;
+}
+
+/// Of cpu.max: "200000 100000" are two cores, "max 100000" is no limit.
+void take_cores(LimitsOfGroup& limits, const std::string& quota_and_period) {
+  std::istringstream words(quota_and_period);
+  double quota_us = 0;
+  double period_us = 0;
+  if (words >> quota_us >> period_us && quota_us > 0 && period_us > 0) {
+    tighten(limits.cores, quota_us / period_us);
+  }
+}
+
+void take_memory(LimitsOfGroup& limits, const std::string& text) {
+  // The first version writes "no limit" as the largest number of whole pages.
+  constexpr std::uint64_t kNoLimit = std::uint64_t{1} << 60U;
+  std::istringstream words(text);
+  std::uint64_t bytes = 0;
+  if (words >> bytes && bytes < kNoLimit) {
+    tighten(limits.memory_bytes, bytes);
+  }
+}
+
+/// The group's path in the line of `controller` ("" for version 2): "0::/user.slice".
+std::optional<std::string> path_of(const std::string& own, const std::string& controller) {
+  std::istringstream lines(own);
+  for (std::string line; std::getline(lines, line);) {
+    const auto first = line.find(':');
+    const auto second = line.find(':', first + 1);
+    if (second == std::string::npos) {
+      continue;
+    }
+    std::istringstream names(line.substr(first + 1, second - first - 1));
+    std::string name;
+    bool is_meant = controller.empty() && second == first + 1;
+    while (std::getline(names, name, ',')) {
+      is_meant = is_meant || name == controller;
+    }
+    if (is_meant) {
+      return line.substr(second + 1);
+    }
+  }
+  return std::nullopt;
+}
+
+/// Calls `look` with the folder of the group and of each one above it. In a container the path may
+/// be that of the machine, which is not there: the top is looked at in any case.
+template <class Look>
+void climb(const std::string& root, std::string path, const Look& look) {
+  while (path.size() > 1) {
+    look(root + path);
+    path.resize(std::max<std::size_t>(path.rfind('/'), 0));
+  }
+  look(root);
+}
+
+}  // namespace
+
+LimitsOfGroup limits_of_group(const std::string& root, const std::string& own) {
+  LimitsOfGroup limits;
+  if (const auto path = path_of(own, "")) {
+    climb(root, *path, [&](const std::string& folder) {
+      take_cores(limits, text_of(folder + "/cpu.max"));
+      take_memory(limits, text_of(folder + "/memory.max"));
+    });
+  }
+  if (const auto path = path_of(own, "cpu")) {
+    climb(root + "/cpu", *path, [&](const std::string& folder) {
+      take_cores(limits,
+                 text_of(folder + "/cpu.cfs_quota_us") + text_of(folder + "/cpu.cfs_period_us"));
+    });
+  }
+  if (const auto path = path_of(own, "memory")) {
+    climb(root + "/memory", *path, [&](const std::string& folder) {
+      take_memory(limits, text_of(folder + "/memory.limit_in_bytes"));
+    });
+  }
+  return limits;
+}
+
+LimitsOfGroup limits_of_group() {
+  return limits_of_group("/sys/fs/cgroup", text_of("/proc/self/cgroup"));
+}
+
+}  // namespace oblique::client::doctor

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace oblique::client::doctor {
+
+/// What a container or a service may take of its machine, by its control group (cgroup).
+struct LimitsOfGroup {
+  std::optional<double> cores = {};
+  std::optional<std::uint64_t> memory_bytes = {};
+};
+
+/// The tightest limits from this process's group upwards. `root` and `own` are for tests: where
+/// groups are mounted, and the text of /proc/self/cgroup.
+LimitsOfGroup limits_of_group(const std::string& root, const std::string& own);
+LimitsOfGroup limits_of_group();
+
+}  // namespace oblique::client::doctor

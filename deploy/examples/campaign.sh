@@ -1,0 +1,42 @@
+#!/bin/sh
+# A campaign on a Slurm cluster, from its login node: a server here, workers in jobs that come while there is
+# work and leave when there is none. Stopped with Ctrl-C and started again, it goes on where it was.
+#   sh campaign.sh STUDY.toml [MOST-JOBS]
+# HOST is the name by which the nodes reach this machine; the database must not lie on a network disk.
+set -eu
+file=${1:?"sh campaign.sh STUDY.toml [MOST-JOBS]"} most=${2:-4}
+host=${HOST:-$(hostname)}
+client_port=${OBLIQUE_SERVER_CLIENT_PORT:-7600} worker_port=${OBLIQUE_SERVER_WORKER_PORT:-7601}
+
+# Keys, once: nobody else on the cluster may read or write the results.
+[ -d keys ] || oblique keygen keys
+
+# The server ends with this script, after the jobs.
+oblique-server --listen '*' --keys keys/server.key --db campaign.db 2> server.log &
+server=$!
+export OBLIQUE_SERVER="tcp://$host:$client_port" OBLIQUE_KEYS="$PWD/keys/client.key"
+export OBLIQUE_WORKER_SERVER="tcp://$host:$worker_port" OBLIQUE_WORKER_KEYS="$PWD/keys/worker.key"
+scaling=
+end() {
+  code=$?
+  [ "$code" = 0 ] || tail -n 3 server.log >&2
+  [ -z "$scaling" ] || kill "$scaling" 2> /dev/null || true
+  oblique autoscale slurm --retire --quiet || true
+  kill "$server" 2> /dev/null || true
+  wait
+}
+trap end EXIT
+trap 'exit 130' INT
+trap 'exit 143' TERM
+
+# A command that finds no server yet asks again, for 10 s.
+study=$(basename "$file" .toml)
+oblique submit "$file" --name "$study"
+
+# More of sbatch's arguments, as a partition or an account: --sbatch-args "--partition=short --account=lab7"
+oblique autoscale slurm --max "$most" ${SBATCH_ARGS:+--sbatch-args "$SBATCH_ARGS"} 2> autoscale.log &
+scaling=$!
+
+oblique watch "$study"
+oblique query "$study" --format csv > "$study.csv"
+echo "$(tail -n +2 "$study.csv" | wc -l) results in $study.csv"

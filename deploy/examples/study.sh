@@ -1,0 +1,25 @@
+#!/bin/sh
+# A study from a script: submitted, waited for, asked. It needs a server and a worker, as from
+#   oblique-server & oblique-worker &
+# and OBLIQUE_SERVER (with keys OBLIQUE_KEYS too) where these are elsewhere.
+#   sh study.sh NAME
+set -eu
+study=${1:?"sh study.sh NAME"}
+export OBLIQUE_SERVER="${OBLIQUE_SERVER:-tcp://127.0.0.1:7600}"
+
+# Said twice, it is the same study, which goes on where it was; with more points it grows.
+oblique submit --name "$study" --H 1 --mu 0.2:1.6:8 --e 0.8,1 --quiet
+
+# Until the last point is there. 0: all are solved. 1: some are not. 130: Ctrl-C, and the study goes on.
+code=0
+oblique watch "$study" --quiet || code=$?
+if [ "$code" = 1 ]; then
+  echo "These points of $study have no result:" >&2
+  oblique query "$study" --where "status <> 'solved'" --select point,mu,e,error >&2
+fi
+[ "$code" = 0 ] || exit "$code"
+
+# Data is on standard output and all else on standard error: into a file, or into a variable.
+oblique query "$study" --where "e = 1" --select mu,fn_peak_N,ft_peak_N --format csv > "$study.csv"
+largest=$(oblique query "$study" --select "max(fn_peak_N)" --format csv | tail -n 1)
+echo "largest normal force of $study: $largest N"

@@ -1,0 +1,22 @@
+# The solver for other programs, in two parts as Debian has them: `library` is what they run with,
+# `development` what they are built with. find_package(oblique) gives oblique::solver wherever it is put.
+# Optional: who has built the programs alone installs these.
+install(TARGETS oblique_shared EXPORT oblique-targets
+        LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library OPTIONAL NAMELINK_COMPONENT development)
+set(solver_folder ${PROJECT_SOURCE_DIR}/worker/solver/library)
+get_target_property(solver_files oblique_shared BINARY_DIR)
+install(DIRECTORY ${solver_files}/include/oblique DESTINATION include COMPONENT development)
+set(config_folder ${CMAKE_INSTALL_LIBDIR}/cmake/oblique)
+install(EXPORT oblique-targets NAMESPACE oblique:: DESTINATION ${config_folder} COMPONENT development)
+install(FILES ${solver_folder}/oblique-config.cmake ${solver_files}/oblique-config-version.cmake
+        DESTINATION ${config_folder} COMPONENT development)
+
+set(pkgconfig_folder ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+cmake_path(RELATIVE_PATH CMAKE_SOURCE_DIR BASE_DIRECTORY ${CMAKE_SOURCE_DIR}/${pkgconfig_folder}
+           OUTPUT_VARIABLE OBLIQUE_PREFIX_FROM_PC)
+configure_file(${solver_folder}/oblique.pc.in oblique.pc @ONLY)
+install(FILES ${CMAKE_CURRENT_BINARY_DIR}/oblique.pc DESTINATION ${pkgconfig_folder} COMPONENT development)
+
+# An example: a whole program.
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/tests/deploy/consumer
+        DESTINATION ${CMAKE_INSTALL_DATAROOTDIR}/doc/liboblique-dev/examples COMPONENT development)

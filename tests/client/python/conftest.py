@@ -1,0 +1,31 @@
+"""What tests of the module share: the programs of the same build, and a study that one of them solved."""
+
+import json
+import os
+import subprocess
+
+import pytest
+
+PROGRAMS = os.environ["OBLIQUE_PROGRAMS"]
+
+
+def run_oblique(*arguments):
+    return subprocess.run(
+        [os.path.join(PROGRAMS, "oblique"), *arguments], check=True, capture_output=True, text=True
+    ).stdout
+
+
+def solved_by_program(*arguments):
+    """What `oblique solve --json` says, but for the time that it took."""
+    return without_time(json.loads(run_oblique("solve", "--json", *arguments)))
+
+
+def without_time(result):
+    return {**result, "solver": {**result["solver"], "wall_s": None}}
+
+
+@pytest.fixture(scope="session")
+def database(tmp_path_factory):
+    file = str(tmp_path_factory.mktemp("study") / "sweep.db")
+    run_oblique("run", "--H", "0.6,1", "--mu", "0:2:9", "--e", "0.5,1", "--name", "sweep", "--db", file)
+    return file

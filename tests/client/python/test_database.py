@@ -1,0 +1,162 @@
+"""Databases: the answers of `oblique query` and `oblique sql`."""
+
+import csv
+import io
+import os
+import pathlib
+import sqlite3
+import subprocess
+import sys
+import threading
+
+import numpy as np
+import pytest
+
+import oblique
+from conftest import run_oblique
+
+
+def rows_of_program(*arguments):
+    return list(csv.DictReader(io.StringIO(run_oblique(*arguments, "--format", "csv"))))
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {},
+        {"where": "mu > 0.5 AND e = 1", "select": "mu, fn_peak_N, mode", "order": "fn_peak_N DESC"},
+        {"group": "major_mode", "select": "major_mode, count(*), max(fn_peak_N)"},
+        {"select": "*", "limit": 3},
+        {"select": "peaks[0].fn_N, stick_total_s", "where": "H = 1"},
+        {"where": "mu > 100"},
+    ],
+)
+def test_answers_are_those_of_the_program(database, keys):
+    flags = [text for key, value in keys.items() for text in ("--" + key, str(value))]
+    rows = rows_of_program("query", "sweep", "--db", database, *flags)
+    answer = oblique.Database(database).query("sweep", **keys)
+    assert len(answer) == len(rows)
+    for name in answer:
+        for value, row in zip(answer[name].tolist(), rows):
+            text = row[name]
+            if text == "":
+                assert value is None or value == "" or np.isnan(value)
+            else:
+                assert text == value if isinstance(value, str) else float(text) == value
+
+
+def test_columns_are_arrays_of_what_they_hold_with_their_units(database):
+    answer = oblique.Database(pathlib.Path(database)).query(
+        "sweep", select=["point", "mu", "fn_peak_N", "mode", "error", "ft_peak_error"]
+    )
+    assert [answer[name].dtype.kind for name in answer] == ["i", "f", "f", "O", "O", "f"]
+    assert answer.units["fn_peak_N"] == "N" and answer.units["mode"] == ""
+    assert answer.error[0] is None and np.isnan(answer.ft_peak_error).all()
+    assert answer.fn_peak_N is answer["fn_peak_N"]
+    assert list(answer.to_pandas().columns) == answer.keys()
+    assert repr(answer) == "<36 rows: point, mu, fn_peak_N, mode, error, ft_peak_error>"
+    with pytest.raises(KeyError, match="no column 'fn'"):
+        answer["fn"]
+
+
+def test_results_are_what_solving_here_gives_as_far_as_a_database_keeps_it(database):
+    answer = oblique.Database(database).query("sweep", select="H, mu, e, fn_peak_N, slide_m, mode")
+    here = oblique.solve_many(answer.H, answer.mu, answer.e)
+    assert np.allclose(here.fn_peak_N, answer.fn_peak_N, rtol=1e-8, atol=0)
+    assert np.allclose(here.slide_m, answer.slide_m, rtol=1e-8, atol=1e-10)
+    assert np.array_equal(here.mode, answer["mode"])
+
+
+def test_sql_is_answered_and_cannot_change_anything(database):
+    asked = oblique.Database(database)
+    assert asked.sql("SELECT count(*) AS n, max(mu) AS m FROM runs").m.tolist() == [2.0]
+    for statement in ("DELETE FROM results", "SELECT 1; SELECT 2", "SELEC 1", "ATTACH 'x' AS y"):
+        with pytest.raises(ValueError):
+            asked.sql(statement)
+
+
+def test_a_database_is_read_wherever_one_goes(database, tmp_path, monkeypatch):
+    (tmp_path / "copy.db").write_bytes(pathlib.Path(database).read_bytes())
+    monkeypatch.chdir(tmp_path)
+    asked = oblique.Database("copy.db")
+    monkeypatch.chdir("/")
+    assert len(asked.query("sweep", limit=2)) == 2
+    child = os.fork()
+    if child == 0:
+        os._exit(0 if len(asked.query("sweep", limit=2)) == 2 else 1)
+    assert os.waitpid(child, 0)[1] == 0
+
+
+def test_two_columns_of_one_name_are_both_there(database):
+    assert oblique.Database(database).sql("SELECT 1 AS a, 2 AS a").keys() == ["a", "a_2"]
+
+
+def test_studies_say_where_they_stand(database):
+    (study,) = oblique.Database(database).studies()
+    assert (study.name, study.state, study.points, study.solved) == ("sweep", "done", 36, 36)
+
+
+@pytest.mark.parametrize(
+    "study, keys, sentence",
+    [
+        ("swep", {}, 'did you mean'),
+        ("sweep", {"select": "fn_pk"}, "no such column: fn_pk (did you mean `fn_peak_N`"),
+        ("sweep", {"where": "mu >"}, 'where "mu >" is not allowed'),
+        ("sweep", {"limit": -1}, "limit = -1 is not allowed"),
+    ],
+)
+def test_wrong_names_are_value_errors_that_say_what_may_have_been_meant(database, study, keys, sentence):
+    with pytest.raises(ValueError) as error:
+        oblique.Database(database).query(study, **keys)
+    assert sentence in str(error.value)
+
+
+def test_what_is_no_database_is_told_by_what_it_is(tmp_path):
+    with pytest.raises(FileNotFoundError, match="nothing.db"):
+        oblique.Database(tmp_path / "nothing.db")
+    assert not list(tmp_path.iterdir())
+    (tmp_path / "text.db").write_text("hello, this is no database at all, only text" * 100)
+    for wrong in ("text.db", "."):
+        with pytest.raises(oblique.DatabaseError):
+            oblique.Database(tmp_path / wrong)
+
+
+def test_rows_that_are_written_meanwhile_are_seen_by_the_next_question(database, tmp_path):
+    file = str(tmp_path / "copy.db")
+    with sqlite3.connect(database) as one, sqlite3.connect(file) as other:
+        one.backup(other)
+    asked = oblique.Database(file)
+    assert len(asked.query("sweep")) == 36
+    run_oblique("run", "--H", "1", "--mu", "0.3", "--e", "0.7", "--name", "more", "--db", file)
+    assert [study.name for study in asked.studies()] == ["sweep", "more"]
+    assert len(asked.query("more")) == 1
+
+
+def test_one_database_may_be_asked_by_several_threads(database):
+    asked = oblique.Database(database)
+    counts = []
+    threads = [
+        threading.Thread(target=lambda: counts.append(len(asked.query("sweep")))) for _ in range(8)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert counts == [36] * 8
+
+
+def test_ctrl_c_ends_a_long_question_and_the_database_answers_the_next(database):
+    script = (
+        "import oblique, os, signal, sys, threading\n"
+        "asked = oblique.Database(sys.argv[1])\n"
+        "threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT)).start()\n"
+        "try:\n"
+        "    asked.sql('WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n)"
+        " SELECT count(*) FROM n')\n"
+        "except KeyboardInterrupt:\n"
+        "    print(len(asked.query('sweep')))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, database], capture_output=True, text=True, timeout=30
+    )
+    assert done.stdout == "36\n", done.stderr

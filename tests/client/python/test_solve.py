@@ -1,0 +1,195 @@
+"""One point, and its time histories."""
+
+import csv
+import doctest
+import importlib
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import oblique
+from conftest import run_oblique, solved_by_program, without_time
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {},
+        {"mu": 1.2, "e": 0.8, "errors": True},
+        {"preset": "printed", "elements_per_link": 2, "tip_mass": 0.01},
+        {"integrator": "generalized-alpha", "elements_per_link": 1},
+        {"lengths": [0.4, 0.5, 0.3]},
+        {"length2": 0.5, "I": "A^2 / (4 * pi)"},
+    ],
+)
+def test_a_point_has_all_fields_and_the_bits_of_solve_json(keys):
+    keys = {"H": 1, "mu": 0.4, "e": 1, **keys}
+    flags = []
+    for key, value in keys.items():
+        flags.append("--" + key.replace("_", "-"))
+        if key == "lengths":
+            value = ",".join(map(str, value))
+        if value is not True:
+            flags.append(str(value))
+    assert without_time(oblique.solve(**keys)._asdict()) == solved_by_program(*flags)
+
+
+def test_results_show_what_they_are():
+    impact = oblique.solve(1, 0.4, 1)
+    assert repr(impact).startswith("Result(H=1.0, mu=0.4, e=1.0, fall_time_s=0.43")
+    assert list(impact)[:4] == ["H", "mu", "e", "fall_time_s"]
+    assert impact.energy.closure < 1e-6
+    assert impact.phases[0]["kind"] == "compression"
+    assert impact == oblique.solve(1, 0.4, 1) and impact != oblique.solve(1, 0.5, 1)
+    assert pickle.loads(pickle.dumps(impact)) == impact
+
+
+@pytest.mark.parametrize(
+    "keys, sentence",
+    [
+        ({"mu": -0.4}, "mu = -0.4 is not allowed: mu must be >= 0"),
+        ({"e": 0}, "e = 0 is not allowed: e must be in [0.001, 1]"),
+        ({"H": 5}, "H = 5 m is not allowed: the tip drops at most the length of the chain, 1.2 m"),
+        ({"tip_mas": 1}, "unknown key `tip_mas` (did you mean `tip_mass`?)"),
+        ({"E": -1}, "E = -1 Pa is not allowed: E must be > 0"),
+        ({"preset": "papr"}, 'preset = "papr" is not allowed: preset must be paper, printed, converged'),
+        ({"integrator": "euler"}, 'integrator = "euler" is not allowed'),
+        ({"mu": None}, "mu = None is not allowed: mu must be a number"),
+        ({"mu": [0.1, 0.2]}, "mu has 2 values: solve takes one; oblique.solve_many takes arrays"),
+        ({"I": "A^2 / (4 * p)"}, 'I = "A^2 / (4 * p)": unknown key `p`'),
+        ({"k": "2 * k"}, 'k = "2 * k" follows from itself'),
+        ({"length4": 0.4}, "length4 is the length of a link that there is not: there are 3"),
+        ({"mu": 10**400}, "is not allowed: mu must be a number"),
+        ({"mu": True}, "mu = True is not allowed: mu must be a number"),
+        ({"preset": None}, "preset = None is not allowed"),
+        ({"lengths": []}, "lengths must be the length of each link"),
+        ({"dt": 1}, "dt = 1 s is not allowed: the explicit integrator is stable up to"),
+    ],
+)
+def test_a_wrong_value_is_a_value_error_that_names_key_value_and_range(keys, sentence):
+    with pytest.raises(ValueError) as error:
+        oblique.solve(**{"H": 1, "mu": 0.4, "e": 1, **keys})
+    assert sentence in str(error.value)
+
+
+def test_a_point_without_an_answer_is_an_error_of_its_own():
+    with pytest.raises(oblique.SolveError, match="too short"):
+        oblique.solve(1, 0.4, 1, dt=1e-25)
+
+
+def test_a_trace_has_the_columns_and_numbers_of_the_program(tmp_path):
+    file = tmp_path / "trace.csv"
+    run_oblique("solve", "--H", "1", "--mu", "0.4", "--e", "1", "--trace", str(file), "--trace-shape")
+    with open(file, newline="") as lines:
+        rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    trace = oblique.trace(1, 0.4, 1, shape=True)
+    columns = {name: values for name, values in trace._asdict().items() if name != "result"}
+    assert list(columns) == list(rows[0])
+    assert len(trace) == len(rows)
+    for name, values in columns.items():
+        assert [str(v) if name == "state" else float(v) for v in values] == [
+            row[name] if name == "state" else float(row[name]) for row in rows
+        ]
+    assert trace.fn_N.max() == pytest.approx(trace.result.fn_peak_N, rel=1e-3)
+
+
+def test_a_trace_may_begin_with_the_fall():
+    trace = oblique.trace(1, 0.4, 1, fall=True)
+    assert trace.state[0] == "falling" and trace.t_s[0] < -0.4
+    assert list(trace.to_pandas().columns)[:2] == ["t_s", "fn_N"]
+    with pytest.raises(AttributeError, match="node0x_m"):
+        trace.node0x_m
+
+
+def test_the_version_is_that_of_the_program():
+    assert oblique.__version__ in run_oblique("--version")
+
+
+LONG = "import oblique; print(flush=True); oblique.solve(1, 0.4, 1, integrator='generalized-alpha', dt_fall=1e-7)"
+LONG_SWEEP = (
+    "import oblique, numpy; print(flush=True); "
+    "oblique.solve_many(1, numpy.linspace(0, 2, 10**6), 1)"
+)
+
+
+@pytest.mark.parametrize("script", [LONG, LONG_SWEEP])
+def test_ctrl_c_ends_work_at_once_with_keyboard_interrupt(script):
+    with subprocess.Popen(
+        [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        process.stdout.readline()
+        time.sleep(0.3)
+        assert process.poll() is None
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=20)
+    assert said.rstrip().endswith("KeyboardInterrupt")
+    assert process.returncode in (-signal.SIGINT, 130)
+
+
+def test_other_threads_run_while_one_solves():
+    counted = 0
+    solving = threading.Thread(target=lambda: oblique.solve(1, 0.4, 1, E=71e9, elements_per_link=8))
+    solving.start()
+    while solving.is_alive():
+        counted += 1
+        time.sleep(0.001)
+    assert counted > 10
+
+
+def test_threads_get_the_same_bits_as_one():
+    expected = [oblique.solve(1, 0.1 * i, 1).fn_peak_N for i in range(8)]
+    got = [0.0] * 8
+
+    def solve(i):
+        got[i] = oblique.solve(1, 0.1 * i, 1).fn_peak_N
+
+    threads = [threading.Thread(target=solve, args=(i,)) for i in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert got == expected
+
+
+def test_a_child_after_fork_solves_and_asks(database):
+    asked = oblique.Database(database)
+    expected = oblique.solve(1, 0.4, 1).fn_peak_N
+    child = os.fork()
+    if child == 0:
+        same = oblique.solve(1, 0.4, 1).fn_peak_N == expected
+        os._exit(0 if same and len(asked.query("sweep")) == 36 else 1)
+    assert os.waitpid(child, 0)[1] == 0
+    assert len(asked.query("sweep")) == 36
+
+
+@pytest.mark.parametrize("name", ["oblique", "oblique._solving", "oblique._results", "oblique._database"])
+def test_examples_in_doc_strings_hold(name):
+    module = importlib.import_module(name)
+    assert doctest.testmod(module, optionflags=doctest.ELLIPSIS).failed == 0
+
+
+def test_the_session_in_the_readme_is_what_one_sees():
+    with open(os.environ["OBLIQUE_README"]) as file:
+        text = file.read().replace("```", "")
+    session = doctest.DocTestParser().get_doctest(text, {}, "README.md", "README.md", 0)
+    assert doctest.DocTestRunner().run(session) == (0, 5)
+
+
+def test_types_name_the_fields_that_there_are():
+    fields = {"": ["H", "mu", "e"], "energy": [], "errors": [], "solver": []}
+    for name, group, *_ in oblique._core.fields():
+        fields[group].append(name)
+    groups = ["energy", "errors", "solver"]
+    assert list(oblique.Result.__annotations__) == fields[""] + groups
+    assert list(oblique.ManyResults.__annotations__) == fields[""] + groups + ["error", "failed"]
+    for kind in (oblique.Energy, oblique.Errors, oblique.Solver):
+        assert list(kind.__annotations__) == fields[kind.__name__.lower()]
+    trace = oblique.trace(1, 0.4, 1)._asdict()
+    assert [name for name in trace if not name.startswith("R")] == list(oblique.Trace.__annotations__)

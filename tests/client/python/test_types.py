@@ -1,0 +1,33 @@
+"""Type hints, as mypy reads them; skipped where mypy is not."""
+
+import os
+import pathlib
+import subprocess
+import sys
+
+import pytest
+
+import oblique
+
+USE = """
+import numpy as np
+import oblique
+
+impact = oblique.solve(H=1, mu=0.4, e=1, k=2.7e7)
+force: float = impact.fn_peak_N
+loss: float = impact.energy.friction_J
+sweep = oblique.solve_many(1.0, np.linspace(0.1, 2, 4), [1.0], E=[70e9], threads=2)
+largest: np.float64 = np.max(sweep.fn_peak_N)
+answer = oblique.Database("oblique.db").query("sweep", where="mu > 1", limit=10)
+rows: int = len(answer)
+"""
+
+
+def test_a_program_that_uses_the_module_is_typed_strictly(tmp_path):
+    mypy = pytest.importorskip("mypy.api")
+    (tmp_path / "use.py").write_text(USE)
+    os.environ["MYPYPATH"] = str(pathlib.Path(oblique.__file__).parent.parent)
+    said, errors, code = mypy.run(
+        ["--strict", "--cache-dir", str(tmp_path), str(tmp_path / "use.py")]
+    )
+    assert code == 0, said + errors

@@ -1,0 +1,254 @@
+"""Debian's packages, as cpack makes them of what is built: what they hold and ask for, and what dpkg does with
+them in a root of its own, which it does not change into.
+
+  packages_test.py CPACK BUILD-FOLDER
+"""
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+CPACK, BUILD = sys.argv.pop(1), pathlib.Path(sys.argv.pop(1))
+SERVICES = ("oblique-server", "oblique-worker")
+
+
+def run(*words, **more):
+    """What the command prints; it must end well."""
+    done = subprocess.run([str(word) for word in words], capture_output=True, text=True, check=False, **more)
+    if done.returncode != 0:
+        raise AssertionError(f"{words}: {done.stdout}{done.stderr}")
+    return done.stdout + done.stderr
+
+
+def pack(folder):
+    """Packages by name. Uncompressed, which is soon done."""
+    run(CPACK, "--config", BUILD / "CPackConfig.cmake", "-G", "DEB", "-B", folder,
+        "-D", "CPACK_DEBIAN_COMPRESSION_TYPE=none", env={**os.environ, "SOURCE_DATE_EPOCH": "1800000000"})
+    return {file.name.split("_")[0]: file for file in sorted(folder.glob("*.deb"))}
+
+
+def older(package, folder):
+    """The same package as an earlier version, with another configuration as installed."""
+    tree = folder / package
+    run("dpkg-deb", "--raw-extract", PACKAGES[package], tree)
+    for name in ("control", "prerm"):
+        file = tree / "DEBIAN" / name
+        file.write_text(file.read_text().replace(VERSION, "0.0.1"))
+    settings = tree / "etc/oblique" / f"{package.removeprefix('oblique-')}.toml"
+    settings.write_text("# as version 0.0.1 had it\n")
+    run("dpkg-deb", "-Znone", "--root-owner-group", "--build", tree, folder / f"{package}.deb")
+    return folder / f"{package}.deb"
+
+
+def setUpModule():
+    tools = ("dpkg-deb", "dpkg-shlibdeps", "deb-systemd-helper", "systemd-sysusers", "file")
+    if missing := [tool for tool in tools if not shutil.which(tool)]:
+        raise unittest.SkipTest(f"there is no {missing[0]} here")
+    global FOLDER, PACKAGES, VERSION
+    FOLDER = tempfile.TemporaryDirectory()
+    PACKAGES = pack(pathlib.Path(FOLDER.name))
+    VERSION = field("oblique", "Version")
+    unittest.addModuleCleanup(FOLDER.cleanup)
+
+
+def field(package, name):
+    return run("dpkg-deb", "--field", PACKAGES[package], name).strip()
+
+
+def files(package):
+    lines = run("dpkg-deb", "--contents", PACKAGES[package]).splitlines()
+    return [line.split(maxsplit=5)[5].split(" -> ")[0].removeprefix(".") for line in lines if not line.endswith("/")]
+
+
+def script(package, name):
+    return run("dpkg-deb", "--info", PACKAGES[package], name)
+
+
+class Packages(unittest.TestCase):
+    def test_programs_ask_for_what_they_are_linked_with_and_nothing_that_their_users_do_not_need(self):
+        for package, library in ("oblique", "libsqlite3-0"), ("oblique-server", "libmicrohttpd12"), ("oblique-worker", "libzmq5"):
+            self.assertIn(library, field(package, "Depends"))
+            self.assertNotRegex(field(package, "Depends"), r"python|chromium|node|oblique")
+            self.assertEqual(field(package, "Multi-Arch"), "foreign")
+            self.assertEqual(field(package, "Section"), "science")
+        # What is not there cannot be asked too much.
+        self.assertNotRegex(field("oblique-worker", "Depends"), "sqlite|microhttpd|systemd")
+        self.assertIn("systemd-sysusers", field("oblique-server", "Depends"))
+
+    def test_the_library_stands_beside_others_and_its_development_files_ask_for_its_very_version(self):
+        library, = (package for package in PACKAGES if re.fullmatch(r"liboblique\d[\d.]*", package))
+        self.assertEqual(field("liboblique-dev", "Depends"), f"{library} (= {VERSION})")
+        self.assertRegex(field(library, "Depends"), r"^libc6 [^,]*, libgcc-s1 [^,]*, libstdc\+\+6 [^,]*$")
+        soname = library.removeprefix("liboblique")
+        triplet = run("dpkg-architecture", "-qDEB_HOST_MULTIARCH").strip()
+        self.assertIn(f"/usr/lib/{triplet}/liboblique.so.{VERSION}", files(library))
+        self.assertEqual(script(library, "shlibs"), f"liboblique {soname} {library} (>= {VERSION})\n")
+        for package in library, "liboblique-dev":
+            self.assertEqual(field(package, "Multi-Arch"), "same")
+            # One architecture's differ from another's only where the architecture is in the path.
+            self.assertEqual([f for f in files(package) if re.match(r"/usr/lib/(?!%s/)" % triplet, f)], [])
+
+    def test_what_others_build_with_finds_the_library_where_debian_has_it(self):
+        root, project = (pathlib.Path(FOLDER.name) / name for name in ("installed", "project"))
+        for package in PACKAGES:
+            if package.startswith("liboblique"):
+                run("dpkg-deb", "--extract", PACKAGES[package], root)
+        project.mkdir()
+        (project / "CMakeLists.txt").write_text("""
+            cmake_minimum_required(VERSION 3.16)
+            project(mine LANGUAGES NONE)
+            find_package(oblique 0.2 REQUIRED)
+            get_property(configurations TARGET oblique::solver PROPERTY IMPORTED_CONFIGURATIONS)
+            get_property(library TARGET oblique::solver PROPERTY IMPORTED_LOCATION_${configurations})
+            get_property(include TARGET oblique::solver PROPERTY INTERFACE_INCLUDE_DIRECTORIES)
+            file(WRITE ${CMAKE_BINARY_DIR}/found "${library} ${include}")""")
+        folder, = root.glob("usr/lib/*/cmake/oblique")
+        run("cmake", "-S", project, "-B", project / "build", f"-Doblique_DIR={folder}")
+        library, include = (pathlib.Path(path) for path in (project / "build/found").read_text().split())
+        self.assertTrue(library.is_file(), library)
+        self.assertTrue((include / "oblique/solver.h").is_file(), include)
+        flags = run("pkg-config", "--cflags", "--libs", folder.parent.parent / "pkgconfig/oblique.pc").split()
+        places = [pathlib.Path(flag[2:]) for flag in flags if flag[:2] in ("-I", "-L")]
+        self.assertTrue((places[0] / "oblique/solver.h").exists() and (places[1] / "liboblique.so").exists(), flags)
+
+    def test_the_python_module_asks_for_its_interpreter_and_numpy_and_for_none_of_our_programs(self):
+        if "python3-oblique" not in PACKAGES:
+            self.skipTest("the Python module is not built here")
+        self.assertRegex(field("python3-oblique", "Depends"), r"^python3 \(>= 3\.\d+\), python3 \(<< 3\.\d+\), python3-numpy, libc6")
+        self.assertNotRegex(field("python3-oblique", "Depends"), "oblique|pandas")
+        self.assertIn("/usr/lib/python3/dist-packages/oblique/__init__.py", files("python3-oblique"))
+        self.assertEqual([f for f in files("python3-oblique") if f.endswith(".pyc")], [])
+
+    def test_the_command_line_brings_the_services_of_its_own_version(self):
+        self.assertEqual(field("oblique", "Recommends"), ", ".join(f"{s} (= {VERSION})" for s in SERVICES))
+
+    def test_descriptions_fit_a_terminal_and_begin_with_what_the_package_is(self):
+        for package in PACKAGES:
+            synopsis, *text = field(package, "Description").splitlines()
+            self.assertLessEqual(len(synopsis), 70, synopsis)
+            self.assertGreater(len(text), 3)
+            self.assertTrue(all(len(line) <= 80 for line in text), text)
+
+    def test_scripts_are_for_any_shell_and_filled_in(self):
+        scripts = [(service, name) for service in SERVICES for name in ("postinst", "prerm", "postrm")]
+        if "python3-oblique" in PACKAGES:
+            scripts += [("python3-oblique", "postinst"), ("python3-oblique", "prerm")]
+        for package, name in scripts:
+            text = script(package, name)
+            subprocess.run(["sh", "-n"], input=text, text=True, check=True)
+            self.assertNotRegex(text, r"@[A-Za-z_]+@")
+
+    def test_lintian_has_no_errors_and_warns_of_nothing(self):
+        if not shutil.which("lintian"):
+            self.skipTest("there is no lintian here")
+        # Built as sanitizers or assertions want it, programs are not what is shipped.
+        if "CMAKE_BUILD_TYPE:STRING=Release" in (BUILD / "CMakeCache.txt").read_text():
+            run("lintian", "--allow-root", "--fail-on", "error,warning", "--suppress-tags",
+                "uses-no-compression-for-data-tarball", *PACKAGES.values())
+
+    def test_what_is_packed_again_has_the_same_bytes(self):
+        again = pack(pathlib.Path(FOLDER.name) / "elsewhere")
+        self.assertEqual(again.keys(), PACKAGES.keys())
+        for package, file in again.items():
+            self.assertEqual(file.read_bytes(), PACKAGES[package].read_bytes(), package)
+
+
+class AtWork(unittest.TestCase):
+    """dpkg installs, upgrades and removes in a root that has nothing else. Scripts see it as DPKG_ROOT."""
+
+    def setUp(self):
+        if os.geteuid() != 0:
+            self.skipTest("needs root, as dpkg does")
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+        self.root = self.folder / "root"
+        for name in "var/lib/dpkg/info", "var/lib/dpkg/updates", "etc":
+            (self.root / name).mkdir(parents=True)
+        (self.root / "var/lib/dpkg/status").touch()
+
+    def dpkg(self, *words):
+        return run("dpkg", f"--root={self.root}", "--force-script-chrootless,depends,confold", *words,
+                   env={**os.environ, "LC_ALL": "C.UTF-8"})
+
+    def install(self, *packages):
+        return self.dpkg("--install", *(PACKAGES.get(package, package) for package in packages))
+
+    def enable(self, unit, link):
+        """As systemctl enable does."""
+        wants = self.root / "etc/systemd/system/multi-user.target.wants"
+        wants.mkdir(parents=True, exist_ok=True)
+        (wants / link).symlink_to(f"/usr/lib/systemd/system/{unit}")
+        return wants / link
+
+    def test_an_installation_starts_and_enables_nothing_and_says_how_to(self):
+        said = self.install(*SERVICES)
+        for service in SERVICES:
+            self.assertIn(f"{service} is installed and not started.", said)
+            self.assertIn(f"  systemctl enable --now {service}\n", said)
+        self.assertEqual(list(self.root.glob("etc/systemd/**/*.service")), [])
+        state = self.root / "var/lib/oblique"
+        self.assertEqual(state.stat().st_mode & 0o777, 0o750)
+        account = re.search(r"^oblique:x:(\d+):(\d+):.*:/var/lib/oblique:", (self.root / "etc/passwd").read_text(), re.M)
+        self.assertEqual((str(state.stat().st_uid), str(state.stat().st_gid)), account.groups())
+
+    def test_an_upgrade_keeps_settings_that_somebody_edited_and_renews_others(self):
+        self.install(*(older(service, self.folder) for service in SERVICES))
+        mine = self.root / "etc/oblique/server.toml"
+        mine.write_text("# mine\n")
+        said = self.install(*SERVICES)
+        self.assertEqual(mine.read_text(), "# mine\n")
+        self.assertNotIn("0.0.1", (self.root / "etc/oblique/worker.toml").read_text())
+        self.assertNotIn("not started", said)
+
+    def test_what_databases_and_keys_hold_outlives_upgrade_removal_and_purge_which_says_where_they_are(self):
+        self.install(older("oblique-server", self.folder), older("oblique-worker", self.folder))
+        kept = [self.root / name for name in ("var/lib/oblique/oblique.db", "var/lib/oblique/keys", "etc/oblique/worker.key")]
+        for file in kept:
+            file.write_text(file.name)
+        self.install(*SERVICES)
+        self.dpkg("--remove", *SERVICES)
+        self.assertTrue((self.root / "etc/oblique/server.toml").exists())
+        self.assertFalse((self.root / "usr/bin/oblique-server").exists())
+        said = self.dpkg("--purge", *SERVICES)
+        self.assertIn("/var/lib/oblique is kept", said)
+        self.assertIn("/etc/oblique/worker.key is kept", said)
+        self.assertFalse((self.root / "etc/oblique/server.toml").exists())
+        self.install(*SERVICES)
+        self.assertEqual([file.read_text() for file in kept], [file.name for file in kept])
+        self.assertTrue((self.root / "etc/oblique/server.toml").exists())
+
+    def test_who_goes_back_is_told_what_that_means(self):
+        self.install(*SERVICES)
+        said = self.install(*(older(service, self.folder) for service in SERVICES))
+        self.assertIn(f"oblique-server goes back from {VERSION} to 0.0.1.", said)
+        self.assertIn("from a copy of before", said)
+        self.assertNotIn("goes back", self.install(*SERVICES))
+
+    def test_what_was_enabled_is_so_after_removal_and_return_and_no_longer_after_purge(self):
+        self.install(*SERVICES)
+        links = [self.enable("oblique-server.service", "oblique-server.service"),
+                 self.enable("oblique-worker.service", "oblique-worker.service"),
+                 self.enable("oblique-worker@.service", "oblique-worker@lab.service")]
+        other = self.enable("other.service", "other.service")
+        self.install(*SERVICES)
+        self.dpkg("--remove", *SERVICES)
+        self.install(*SERVICES)
+        self.assertTrue(all(link.is_symlink() for link in links))
+        self.dpkg("--purge", *SERVICES)
+        self.assertEqual([link for link in links if link.is_symlink()], [])
+        self.assertTrue(other.is_symlink())
+
+    def test_a_state_folder_that_is_a_link_to_another_disk_stays_one(self):
+        state = self.root / "var/lib/oblique"
+        state.symlink_to("/nowhere/that/is/mounted")
+        self.install("oblique-server")
+        self.assertTrue(state.is_symlink())
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,140 @@
+"""Recipes of deploy/examples, as somebody runs them who has installed oblique: copied elsewhere, with the programs
+in PATH.
+
+  recipes_test.py TREE FOLDER-OF-THE-PROGRAMS FOLDER-OF-THE-PYTHON-MODULE RECIPE
+
+Ends with 77, and says why, where what the recipe needs is not here.
+"""
+import csv
+import os
+import pathlib
+import shutil
+import socket
+import sqlite3
+import subprocess
+import sys
+import tempfile
+import unittest
+
+TREE, PROGRAMS, MODULE = map(pathlib.Path, sys.argv[1:4])
+PYTHON = "/usr/bin/python3"
+
+
+def free_ports(count):
+    """Ports that nobody has."""
+    sockets = [socket.create_server(("127.0.0.1", 0)) for _ in range(count)]
+    ports = [s.getsockname()[1] for s in sockets]
+    for s in sockets:
+        s.close()
+    return ports
+
+
+def missing(modules):
+    """The first of these that Python cannot import; none: all are here."""
+    for module in modules:
+        if subprocess.run([PYTHON, "-c", f"import {module}"], capture_output=True, check=False,
+                          env=os.environ | {"PYTHONPATH": str(MODULE)}).returncode != 0:
+            return module
+    return None
+
+
+class Recipe(unittest.TestCase):
+    NEEDS = ()  # modules of Python
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+        for file in (TREE / "deploy/examples").iterdir():
+            shutil.copy(file, self.folder)
+        self.environment = {k: v for k, v in os.environ.items() if not k.startswith("OBLIQUE_")}
+        # As where packages are installed, and pictures need no folder of fonts at home.
+        self.environment |= {"PATH": f"{PROGRAMS}:/usr/bin:/bin", "PYTHONPATH": str(MODULE),
+                             "MPLCONFIGDIR": str(self.folder / "fonts")}
+
+    def run_in_folder(self, *words, code=0, **more):
+        done = subprocess.run(words, cwd=self.folder, env=self.environment | more, text=True, capture_output=True,
+                              timeout=100, check=False)
+        self.assertEqual(done.returncode, code, f"{words}: {done.stdout}{done.stderr}")
+        return done.stdout
+
+    def start(self, *words, **more):
+        log = open(self.folder / (words[0] + ".log"), "w")
+        self.addCleanup(log.close)
+        process = subprocess.Popen(words, cwd=self.folder, env=self.environment | more, stdout=log, stderr=log)
+
+        def end():
+            process.terminate()
+            process.wait()
+        self.addCleanup(end)
+        return process
+
+    def rows_of(self, file):
+        with open(self.folder / file, newline="") as table:
+            return list(csv.DictReader(table))
+
+
+class StudyFromAScript(Recipe):
+    def test_it_submits_waits_and_asks_and_its_exit_code_says_what_became_of_the_study(self):
+        clients, workers = free_ports(2)
+        url = f"tcp://127.0.0.1:{clients}"
+        self.start("oblique-server", "--client-port", str(clients), "--worker-port", str(workers), "--http", "off")
+        self.start("oblique-worker", "--server", f"tcp://127.0.0.1:{workers}")
+        said = self.run_in_folder("sh", "study.sh", "friction", OBLIQUE_SERVER=url)
+        self.assertRegex(said, r"^friction: 16 points, 0 done\nlargest normal force of friction: \d{4}\.\d+ N\n$")
+        rows = self.rows_of("friction.csv")
+        self.assertEqual([round(float(r["mu"]), 9) for r in rows], [0.2, 0.4, 0.6, 0.8, 1, 1.2, 1.4, 1.6])
+        self.assertEqual(max(float(r["fn_peak_N"]) for r in rows), float(said.split()[-2]))
+        # Again: nothing is solved twice, and the answer is the same.
+        self.assertEqual(self.run_in_folder("sh", "study.sh", "friction", OBLIQUE_SERVER=url),
+                         said.replace(" 0 done", " 16 done; the server had it already"))
+        # Cancelled, it is not done: 1.
+        self.run_in_folder("oblique", "submit", "--name", "long", "--H", "1", "--mu", "0.1:2:1000", "--e",
+                           "0.5:1:1000", OBLIQUE_SERVER=url)
+        self.run_in_folder("oblique", "cancel", "long", OBLIQUE_SERVER=url)
+        self.run_in_folder("oblique", "watch", "long", "--quiet", code=1, OBLIQUE_SERVER=url)
+        # Wrong usage: 2.
+        self.run_in_folder("sh", "study.sh", "", code=2, OBLIQUE_SERVER=url)
+
+
+class PictureOfARunningStudy(Recipe):
+    NEEDS = "matplotlib", "pandas"
+
+    def test_it_is_drawn_while_the_study_runs_and_once_more_when_it_is_done(self):
+        self.start("oblique", "run", "--name", "first", "--H", "1", "--mu", "0.1:2:400", "--e", "0.8,1", "--quiet")
+        while not self.is_begun():
+            pass
+        said = self.run_in_folder(PYTHON, "running.py", "oblique.db", "first")
+        self.assertRegex(said, r"800 of 800 points, done\n$")
+        self.run_in_folder(PYTHON, "running.py", "oblique.db", "frist", code=1)
+        self.assertEqual((self.folder / "first.png").read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
+
+    def is_begun(self):
+        try:
+            with sqlite3.connect(f"file:{self.folder}/oblique.db?mode=ro", uri=True) as database:
+                return database.execute("SELECT count(*) FROM studies").fetchone()[0] == 1
+        except sqlite3.OperationalError:
+            return False
+
+
+class FiguresOfThePaper(Recipe):
+    NEEDS = "matplotlib", "numpy", "oblique"
+
+    def test_they_are_drawn_and_the_largest_forces_are_the_published_ones(self):
+        said = self.run_in_folder(PYTHON, "paper_figures.py")
+        lines = said.splitlines()
+        self.assertEqual(len(lines), 11)
+        for line in lines[1:-1]:
+            *_, fn_kN, published_fn_kN, ft_kN, published_ft_kN = map(float, line.split())
+            # Half of a last digit of what is printed, and the 0.56 % of client/paper.
+            self.assertAlmostEqual(fn_kN, published_fn_kN, delta=0.005 + 0.006 * published_fn_kN)
+            self.assertAlmostEqual(ft_kN, published_ft_kN, delta=0.005 + 0.006 * published_ft_kN)
+        for number in 4, 5, 6, 7:
+            self.assertGreater((self.folder / f"figure{number}.png").stat().st_size, 20_000)
+
+
+if __name__ == "__main__":
+    if lacking := missing(globals()[sys.argv[4]].NEEDS):
+        print(f"SKIPPED: {PYTHON} cannot import {lacking} here; deploy/test installs or builds it")
+        sys.exit(77)
+    unittest.main(argv=[sys.argv[0], sys.argv[4]])

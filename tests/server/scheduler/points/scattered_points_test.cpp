@@ -1,0 +1,161 @@
+// Points between settled ones, as where a finer grid has taken over a coarser one: how batches are
+// cut from them.
+#include <algorithm>
+#include <memory>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "server/scheduler/points/study_points.h"
+#include "tests/server/scheduler/scheduler_bench.h"
+#include "tests/support/recipes.h"
+
+namespace oblique::server {
+namespace {
+
+constexpr std::uint64_t kManyLooks = 1'000'000;
+
+/// All of `numbers` points but every `step`-th, the first included.
+IntervalSet every(std::uint64_t step, std::uint64_t numbers) {
+  IntervalSet points;
+  for (std::uint64_t point = 0; point < numbers; point += step) {
+    points.insert(point);
+  }
+  return points;
+}
+
+StudyPoints points_of(std::uint64_t numbers, IntervalSet settled) {
+  return {StudyTable(table_of(numbers)), std::move(settled), LossLimits{}};
+}
+
+Batch taken(StudyPoints& points, const Portion& wanted) {
+  std::uint64_t looks = kManyLooks;
+  const auto batch = points.take(wanted, looks);
+  points.check_invariants();
+  return batch.value();
+}
+
+/// What a worker that passes over what is not wanted solves of a batch.
+std::vector<PointOutcome> wanted_of(const SendBatch& batch) {
+  std::vector<PointOutcome> outcomes;
+  const Interval whole{batch.first_point, batch.first_point + batch.count};
+  for (const Interval& part : batch.parts.empty() ? std::vector{whole} : batch.parts) {
+    for (std::uint64_t point = part.begin; point < part.end; ++point) {
+      outcomes.push_back({point, false});
+    }
+  }
+  return outcomes;
+}
+
+TEST(ScatteredPointsTest, ABatchGoesOnBehindSettledPointsUntilItHasWhatIsWanted) {
+  StudyPoints points = points_of(100, every(2, 100));
+  const Batch batch = taken(points, {8});
+  EXPECT_EQ(batch.first_point, 1U);
+  EXPECT_EQ(batch.end(), 16U);
+  EXPECT_EQ(batch.points, 8U);
+  EXPECT_EQ(points.leased(), 8U);
+  EXPECT_EQ(taken(points, {8}).first_point, 17U);
+}
+
+TEST(ScatteredPointsTest, ABatchEndsBeforePointsThatAnotherHoldsAndBeforeAWideGap) {
+  StudyPoints points = points_of(1000, [] {
+    IntervalSet settled(0, 3);
+    settled.insert(5, 8);
+    return settled;
+  }());
+  EXPECT_EQ(taken(points, {2}).end(), 5U);
+  points.reopen(IntervalSet(0, 8));
+  EXPECT_EQ(taken(points, {8}).end(), 3U) << "3 and 4 are still out";
+
+  StudyPoints sparse = points_of(1000, [] {
+    IntervalSet settled(3, 500);
+    settled.insert(505, 520);
+    return settled;
+  }());
+  EXPECT_EQ(taken(sparse, {8}).end(), 3U);
+  const Batch next = taken(sparse, {8});
+  EXPECT_EQ(next.first_point, 500U);
+  EXPECT_EQ(next.end(), 523U);
+  EXPECT_EQ(next.points, 8U);
+}
+
+TEST(ScatteredPointsTest, ABatchGoesOnIntoAnotherModelOnlyWhereThatHasRoomInIt) {
+  const auto table = std::make_shared<const protocol::PointTable>(
+      protocol::recipe_of({{protocol::listed("k", {2e7, 3e7}), protocol::listed("H", {1.0}),
+                            protocol::range("mu", 0.0, 1.0, 10), protocol::listed("e", {1.0})}}));
+  StudyPoints points(StudyTable(table), every(2, 20), LossLimits{});
+  EXPECT_EQ(taken(points, {8}).end(), 10U) << "the other's fall is another worker's";
+  StudyPoints both(StudyTable(table), every(2, 20), LossLimits{});
+  EXPECT_EQ(taken(both, {18}).end(), 20U);
+}
+
+TEST(ScatteredPointsTest, WhatAFilterLeavesOutLiesBetweenToo) {
+  protocol::PointTable table(protocol::recipe_of_blocks(
+      {protocol::filtered({protocol::listed("H", {1.0}), protocol::range("mu", 0.0, 99.0, 100),
+                           protocol::listed("e", {1.0})},
+                          "floor(mu / 3) == mu / 3")}));
+  table.survey([] { return true; });
+  StudyPoints points(StudyTable(std::make_shared<const protocol::PointTable>(std::move(table))),
+                     every(6, 100), LossLimits{});
+  const Batch batch = taken(points, {6});
+  EXPECT_EQ(batch.first_point, 3U);
+  EXPECT_EQ(batch.points, 5U) << "3, 9, 15, 21 and 27: where half of the rest is found, that is it";
+  EXPECT_EQ(batch.end(), 28U);
+}
+
+TEST(ScatteredPointsTest, TheWorkerIsToldWhatIsWantedOfTheBatchAndNothingIsHandedOutTwice) {
+  SchedulerSettings settings = trusting();
+  settings.first_batch_points = 16;
+  SchedulerBench bench(settings);
+  bench.feed(StudyAdded{1, table_of(1000), every(2, 1000)});
+  auto batches = bench.join(1, 2);
+  std::vector<std::uint64_t> solved;
+  while (!batches.empty()) {
+    const SendBatch batch = batches.front();
+    batches.erase(batches.begin());
+    const auto outcomes = wanted_of(batch);
+    for (const PointOutcome& outcome : outcomes) {
+      solved.push_back(outcome.point);
+    }
+    bench.feed({ResultsReceived{1, 1, batch.lease, ++bench.sequence, true, 1e-3, outcomes}});
+    bench.feed(ResultsStored{1, 1, bench.sequence, outcomes});
+    for (const auto& more : only<SendBatch>(bench.feed(CreditGiven{1, 1}))) {
+      batches.push_back(more);
+    }
+  }
+  ASSERT_EQ(solved.size(), 500U);
+  for (std::size_t i = 0; i < solved.size(); ++i) {
+    EXPECT_EQ(solved[i], 2 * i + 1);
+  }
+}
+
+TEST(ScatteredPointsTest, WhatIsLeftOfALostBatchComesBackAndNothingBetween) {
+  SchedulerSettings settings = trusting();
+  settings.first_batch_points = 16;
+  SchedulerBench bench(settings);
+  bench.feed(StudyAdded{1, table_of(1000), every(2, 1000)});
+  const SendBatch batch = bench.join(1, 1).at(0);
+  auto outcomes = wanted_of(batch);
+  ASSERT_EQ(outcomes.size(), 16U);
+  outcomes.resize(5);
+  bench.feed(ResultsReceived{1, 1, batch.lease, ++bench.sequence, false, 1e-3, outcomes});
+  bench.feed(WorkerLeft{1});
+  EXPECT_EQ(bench.scheduler.study(1).leased, 0U);
+  std::uint64_t handed_out = 0;
+  for (const SendBatch& again : bench.join(2, 1000)) {
+    handed_out += again.parts.empty() ? again.count : size_of(again.parts);
+  }
+  EXPECT_EQ(handed_out, 495U);
+}
+
+TEST(ScatteredPointsTest, ResultsOfWhatWasNotWantedAreNotTaken) {
+  SchedulerBench bench(trusting());
+  bench.feed(StudyAdded{1, table_of(100), every(2, 100)});
+  const SendBatch batch = bench.join(1, 1).at(0);
+  const auto stores = only<StoreResults>(bench.solve(batch));
+  ASSERT_EQ(stores.size(), 1U);
+  EXPECT_EQ(stores[0].accepted.size(), size_of(batch.parts)) << "an older worker solves all";
+}
+
+}  // namespace
+}  // namespace oblique::server

@@ -1,0 +1,244 @@
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <exception>
+#include <memory>
+#include <mutex>
+#include <numeric>
+#include <system_error>
+#include <thread>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "worker/solver/library/falls_kept.h"
+#include "worker/solver/library/point_runs.h"
+#include "worker/solver/library/solver.h"
+
+namespace oblique {
+namespace {
+
+using namespace std::chrono_literals;
+constexpr auto kBetweenQuestions = 50ms;
+/// Threads that take longer to end, as in the middle of a long fall, are left to end by themselves.
+constexpr auto kLongestFarewell = 150ms;
+
+/// Points to solve and who solves them. Held by each thread, so that one that is left behind has
+/// all that it needs.
+class Work {
+ public:
+  Work(std::span<const ModelParameters> models, std::span<const Point> points,
+       const std::function<void(Outcome&&)>& take, const ManyOptions& options, std::size_t threads)
+      : models_(models.begin(), models.end()),
+        points_(points.begin(), points.end()),
+        order_(points.size()),
+        take_(&take),
+        errors_(options.errors),
+        falls_(options.falls),
+        threads_(threads) {
+    for (const Point& point : points_) {
+      if (point.model >= models_.size()) {
+        throw InputError("a point has model " + std::to_string(point.model) + " of " +
+                         std::to_string(models_.size()) + ": they count from 0");
+      }
+    }
+    // Neighbours share a model, a fall, the state at touch, and all until the first turn.
+    std::iota(order_.begin(), order_.end(), std::size_t{0});
+    const auto key = [this](std::size_t i) {
+      const Point& point = points_[i];
+      return std::tuple(point.model, point.H_m, point.mu, point.e, i);
+    };
+    std::sort(order_.begin(), order_.end(),
+              [&](std::size_t a, std::size_t b) { return key(a) < key(b); });
+  }
+
+  void solve() {
+    Source source(*this);
+    try {
+      solver::solve_points_of_models(
+          source, falls_.cache()->falls, errors_, [this](solver::PointOutcome&& outcome) {
+            hand_on({order_[outcome.number], std::move(outcome.result), std::move(outcome.error)});
+          });
+    } catch (...) {
+      fail(std::current_exception());
+    }
+    const std::lock_guard lock(mutex_);
+    --threads_;
+    changed_.notify_all();
+  }
+
+  /// Waits for all; whether all was handed on.
+  bool wait(const std::function<bool(std::size_t)>& goes_on) {
+    std::unique_lock lock(mutex_);
+    while (!changed_.wait_for(lock, kBetweenQuestions, [this] { return threads_ == 0; })) {
+      const std::size_t outcomes = outcomes_;
+      lock.unlock();
+      if (goes_on && !goes_on(outcomes)) {
+        return false;
+      }
+      lock.lock();
+    }
+    if (failure_) {
+      std::rethrow_exception(failure_);
+    }
+    return true;
+  }
+
+  /// Behind this nothing is handed on. Whether all threads are about to end.
+  bool end() {
+    stopped_ = true;
+    std::unique_lock lock(mutex_);
+    take_ = nullptr;
+    return changed_.wait_for(lock, kLongestFarewell, [this] { return threads_ == 0; });
+  }
+
+  /// Counts threads that could not be started.
+  void miss(std::size_t threads) {
+    const std::lock_guard lock(mutex_);
+    threads_ -= threads;
+  }
+
+ private:
+  /// The points of one thread: tasks of neighbours.
+  class Source : public solver::PointSource {
+   public:
+    explicit Source(Work& work) : work_(work) {}
+
+    std::optional<std::uint64_t> next() override {
+      if (work_.stopped_ || (next_ == end_ && !work_.take_task(next_, end_))) {
+        return std::nullopt;
+      }
+      return next_++;
+    }
+    solver::ModelPoint point(std::uint64_t number) override {
+      const Point& point = work_.at(number);
+      return {point.model, point.H_m, point.mu, point.e};
+    }
+    ModelParameters model(std::uint64_t number) override { return work_.models_[number]; }
+    std::vector<ModelParameters> models_ahead(std::uint64_t number) override {
+      std::vector<ModelParameters> models;
+      for (int run = 0; run < solver::kRunsAhead && models.size() < solver::kFallsAhead; ++run) {
+        const std::size_t model = work_.at(number).model;
+        solver::add_ahead(models, work_.models_[model]);
+        const auto rest = work_.order_.begin() + static_cast<std::ptrdiff_t>(number);
+        const auto behind = std::upper_bound(
+            rest, work_.order_.end(), model,
+            [this](std::size_t m, std::size_t i) { return m < work_.points_[i].model; });
+        if (behind == work_.order_.end()) {
+          break;
+        }
+        number = static_cast<std::uint64_t>(behind - work_.order_.begin());
+      }
+      return models;
+    }
+
+   private:
+    Work& work_;
+    std::uint64_t next_ = 0;
+    std::uint64_t end_ = 0;
+  };
+
+  /// By its place in the order.
+  const Point& at(std::uint64_t number) const { return points_[order_[number]]; }
+
+  bool take_task(std::uint64_t& begin, std::uint64_t& end) {
+    const std::lock_guard lock(mutex_);
+    const std::uint64_t left = order_.size() - given_;
+    if (left == 0) {
+      return false;
+    }
+    begin = given_;
+    given_ += solver::points_of_task(left, std::max<std::size_t>(threads_, 1));
+    end = given_;
+    return true;
+  }
+
+  void hand_on(Outcome&& outcome) {
+    const std::lock_guard lock(mutex_);
+    if (take_ == nullptr || failure_) {
+      return;
+    }
+    try {
+      (*take_)(std::move(outcome));
+      ++outcomes_;
+    } catch (...) {
+      failure_ = std::current_exception();
+      stopped_ = true;
+    }
+  }
+
+  void fail(std::exception_ptr failure) {
+    const std::lock_guard lock(mutex_);
+    if (!failure_) {
+      failure_ = std::move(failure);
+    }
+    stopped_ = true;
+  }
+
+  const std::vector<ModelParameters> models_;
+  const std::vector<Point> points_;
+  std::vector<std::size_t> order_;  ///< places of points, neighbours together
+  std::atomic<bool> stopped_ = false;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  const std::function<void(Outcome&&)>* take_;  ///< null: nobody wants outcomes any more
+  const bool errors_;
+  Falls falls_;
+  std::size_t threads_;      ///< at work
+  std::uint64_t given_ = 0;  ///< of the order
+  std::size_t outcomes_ = 0;
+  std::exception_ptr failure_;
+};
+
+/// The threads at some work. However that ends, nothing is handed on when this is gone.
+class Threads {
+ public:
+  explicit Threads(Work& work) : work_(work) {}
+  ~Threads() {
+    const bool all_end = work_.end();
+    for (std::thread& thread : threads_) {
+      all_end ? thread.join() : thread.detach();
+    }
+  }
+  Threads(const Threads&) = delete;
+  Threads& operator=(const Threads&) = delete;
+
+  /// Throws std::system_error when not one can be started; fewer do it all.
+  void start(std::size_t count, const std::shared_ptr<Work>& work) {
+    threads_.reserve(count);
+    try {
+      while (threads_.size() < count) {
+        threads_.emplace_back([work] { work->solve(); });
+      }
+    } catch (const std::system_error&) {
+      work_.miss(count - threads_.size());
+      if (threads_.empty()) {
+        throw;
+      }
+    }
+  }
+
+ private:
+  Work& work_;
+  std::vector<std::thread> threads_;
+};
+
+std::size_t threads_for(const ManyOptions& options, std::size_t points) {
+  const std::size_t cores = std::max(1U, std::thread::hardware_concurrency());
+  return std::min(std::max<std::size_t>(points, 1), options.threads == 0 ? cores : options.threads);
+}
+
+}  // namespace
+
+bool solve_many(std::span<const ModelParameters> models, std::span<const Point> points,
+                const std::function<void(Outcome&&)>& take, const ManyOptions& options) {
+  const std::size_t threads = threads_for(options, points.size());
+  const auto work = std::make_shared<Work>(models, points, take, options, threads);
+  Threads running(*work);
+  running.start(threads, work);
+  return work->wait(options.goes_on);
+}
+
+}  // namespace oblique
