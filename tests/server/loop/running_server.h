@@ -142,7 +142,8 @@ class PretendedWorker : public Peer<WorkerMessage, ServerToWorker> {
     message.mutable_credit()->set_batches(batches);
     send(message);
   }
-  void solve(const protocol::Batch& batch) {
+  /// Sends a result for each point that is wanted of the batch, and says how many these are.
+  std::uint64_t solve(const protocol::Batch& batch) {
     WorkerMessage message;
     auto& results = *message.mutable_results();
     results.set_study_id(batch.study_id());
@@ -151,10 +152,21 @@ class PretendedWorker : public Peer<WorkerMessage, ServerToWorker> {
     results.set_sequence(++sequence_);
     results.set_batch_done(true);
     results.set_busy_s(1e-3);
-    for (std::uint64_t i = 0; i < batch.count(); ++i) {
-      *results.add_results() = solved_point(batch.first_point() + i);
+    std::uint64_t point = batch.first_point();
+    bool is_wanted = true;
+    std::vector<std::uint64_t> parts(batch.parts().begin(), batch.parts().end());
+    if (parts.empty()) {
+      parts = {batch.count()};
+    }
+    for (const std::uint64_t points : parts) {
+      for (std::uint64_t i = 0; is_wanted && i < points; ++i) {
+        *results.add_results() = solved_point(point + i);
+      }
+      point += points;
+      is_wanted = !is_wanted;
     }
     send(message);
+    return static_cast<std::uint64_t>(results.results_size());
   }
   /// Takes batches, one at a time, until `points` are solved and stored.
   void work(std::uint64_t points) {
@@ -163,8 +175,8 @@ class PretendedWorker : public Peer<WorkerMessage, ServerToWorker> {
     while (waiting > 0) {
       const auto message = receive();
       if (message.has_batch()) {
-        in_hand_[sequence_ + 1] = message.batch().count();
-        solve(message.batch());
+        const std::uint64_t solved = solve(message.batch());
+        in_hand_[sequence_] = solved;
       } else if (message.has_results_stored()) {
         waiting -= std::min(waiting, in_hand_.at(message.results_stored().sequence()));
         credit(1);
