@@ -1,17 +1,29 @@
 #include "worker/solver/fall_cache.h"
 
 #include <algorithm>
-#include <exception>
 #include <iterator>
+#include <string>
 #include <utility>
 
 #include "worker/solver/lanes/lane_stepper.h"
+#include "worker/solver/model/errors.h"
 
 namespace oblique::solver {
 namespace {
 
 std::size_t bytes_of(const std::optional<FallOutcome>& outcome) {
   return outcome && outcome->fallen ? outcome->fallen->fall().bytes() : 0;
+}
+
+/// Why this is no model; empty: it is one. One with a NaN, which equals nothing, would never be
+/// found among those that are kept.
+std::string fault_of(const ModelParameters& falling) {
+  try {
+    validate(falling);
+    return {};
+  } catch (const InputError& error) {
+    return error.what();
+  }
 }
 
 }  // namespace
@@ -22,6 +34,9 @@ FallCache::FallCache(const Bounds& bounds)
 
 FallOutcome FallCache::fall(const ModelParameters& model, std::span<const ModelParameters> ahead) {
   const ModelParameters falling = fall_model(model);
+  if (std::string fault = fault_of(falling); !fault.empty()) {
+    return {nullptr, std::move(fault)};
+  }
   std::unique_lock lock(mutex_);
   while (true) {
     const auto found = find(falling);
@@ -75,7 +90,8 @@ std::vector<FallCache::Entries::iterator> FallCache::claim(const ModelParameters
     if (claimed.size() >= most || !has_room_ahead()) {
       break;
     }
-    if (ModelParameters next = fall_model(model); !in_lanes || fall_side_by_side(falling, next)) {
+    const ModelParameters next = fall_model(model);
+    if ((!in_lanes || fall_side_by_side(falling, next)) && fault_of(next).empty()) {
       claim_if_missing(next);
     }
   }
@@ -84,17 +100,24 @@ std::vector<FallCache::Entries::iterator> FallCache::claim(const ModelParameters
 
 void FallCache::solve(const std::vector<Entries::iterator>& claimed,
                       std::unique_lock<std::mutex>& lock) {
-  std::vector<ModelParameters> models;
-  models.reserve(claimed.size());
-  for (const auto& entry : claimed) {
-    models.push_back(entry->model);
-  }
-  lock.unlock();
   std::vector<FallOutcome> outcomes;
   try {
+    std::vector<ModelParameters> models;
+    models.reserve(claimed.size());
+    for (const auto& entry : claimed) {
+      models.push_back(entry->model);
+    }
+    lock.unlock();
     outcomes = solve_(models);
-  } catch (const std::exception& error) {  // no memory: others wait for these entries
-    outcomes.assign(models.size(), {nullptr, error.what()});
+  } catch (...) {  // no memory just then: others wait for these entries, and may have more luck
+    if (!lock.owns_lock()) {
+      lock.lock();
+    }
+    for (const auto& entry : claimed) {
+      entries_.erase(entry);
+    }
+    solved_.notify_all();
+    throw;
   }
   lock.lock();
   for (std::size_t i = claimed.size(); i-- > 0;) {  // the one wanted first is to stay longest

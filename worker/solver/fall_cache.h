@@ -16,8 +16,9 @@
 namespace oblique::solver {
 
 /// Keeps the falls that were used last, so that one fall serves all points of all models that share
-/// it. A fall that fails fails once: its error is kept as a fall is. May be used from several
-/// threads; the falls are solved on the threads that ask for them.
+/// it. A fall that fails fails once: its error is kept as a fall is. What `Solve` throws, as where
+/// memory is short, is not kept: it comes out of `fall`, and who asks next has it solved anew. May
+/// be used from several threads; the falls are solved on the threads that ask for them.
 class FallCache {
  public:
   struct Bounds {
@@ -35,7 +36,8 @@ class FallCache {
   /// The fall of `model`; fall_model() need not have gone through. What is not kept is solved, and
   /// beside it, as far as lanes go, those of `ahead`, the first first, that nobody has solved or is
   /// solving; when another thread solves that of `model`, those of `ahead` are solved while it
-  /// does. Does not wait for falls of `ahead` that others solve.
+  /// does. Does not wait for falls of `ahead` that others solve. A model outside its domain fails
+  /// with what is wrong with it.
   FallOutcome fall(const ModelParameters& model, std::span<const ModelParameters> ahead = {});
 
   /// The fall of `model` when it is kept; solves and waits for nothing.

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <exception>
 #include <map>
+#include <new>
 #include <tuple>
 #include <utility>
 
@@ -46,6 +47,8 @@ FallSolution solve_alone(const SharedChain& chain) {
                  &chain->fall_progress())
                 .path(),
             {}};
+  } catch (const std::bad_alloc&) {  // says nothing of this fall
+    throw;
   } catch (const std::exception& error) {
     return {nullptr, error.what()};
   }
@@ -123,6 +126,8 @@ std::vector<FallOutcome> solve_falls(std::span<const ModelParameters> models) {
     try {
       chains.push_back(std::make_shared<const PreparedChain>(models[i]));
       places.push_back(i);
+    } catch (const std::bad_alloc&) {
+      throw;
     } catch (const std::exception& error) {
       outcomes[i].error = error.what();
     }

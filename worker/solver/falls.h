@@ -74,7 +74,7 @@ bool fall_side_by_side(const ModelParameters& a, const ModelParameters& b);
 std::vector<FallOutcome> solve_falls(std::span<const std::shared_ptr<const PreparedChain>> chains);
 
 /// The same for the falls of some models, which fall_model() need not have gone through. A model
-/// outside its domain fails as a fall does.
+/// outside its domain fails as a fall does. Throws std::bad_alloc where there is no memory.
 std::vector<FallOutcome> solve_falls(std::span<const ModelParameters> models);
 
 }  // namespace oblique::solver

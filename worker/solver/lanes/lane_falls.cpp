@@ -1,6 +1,7 @@
 #include "worker/solver/lanes/lane_falls.h"
 
 #include <exception>
+#include <new>
 #include <optional>
 #include <utility>
 
@@ -54,6 +55,8 @@ class FallLanes {
         lanes_[lane] =
             Lane{number, std::make_shared<SteppedPath>(fall.motion, fall.dt_s,
                                                        longest_fall_s(*fall.chain), fall.progress)};
+      } catch (const std::bad_alloc&) {  // says nothing of this fall
+        throw;
       } catch (const std::exception& error) {
         solutions_[number].error = error.what();
         continue;
@@ -80,6 +83,8 @@ class FallLanes {
         solution.path = slot.path;
         slot.is_over = true;
       }
+    } catch (const std::bad_alloc&) {
+      throw;
     } catch (const std::exception& error) {
       solution.error = error.what();
       slot.is_over = true;

@@ -110,7 +110,11 @@ void add_ahead(std::vector<ModelParameters>& models, const ModelParameters& mode
 std::vector<FallOutcome> falls_of(FallCache& falls, std::span<const ModelParameters> models) {
   std::vector<FallOutcome> outcomes;
   for (std::size_t i = 0; i < models.size(); ++i) {
-    outcomes.push_back(falls.fall(models[i], models.subspan(i + 1)));
+    try {
+      outcomes.push_back(falls.fall(models[i], models.subspan(i + 1)));
+    } catch (const std::exception& error) {
+      outcomes.push_back({nullptr, error.what()});
+    }
   }
   return outcomes;
 }

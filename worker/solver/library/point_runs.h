@@ -50,7 +50,8 @@ void add_ahead(std::vector<ModelParameters>& models, const ModelParameters& mode
 void solve_points_of_models(PointSource& source, FallCache& falls, bool with_errors,
                             const std::function<void(PointOutcome&&)>& sink);
 
-/// One fall for each model; those that are missing are solved side by side.
+/// One fall for each model; those that are missing are solved side by side. One for which there is
+/// no memory just then fails.
 std::vector<FallOutcome> falls_of(FallCache& falls, std::span<const ModelParameters> models);
 
 /// What a cache of falls for so many threads may take: falls of a model of usual size that a thread

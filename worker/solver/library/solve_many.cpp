@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <compare>
 #include <condition_variable>
 #include <cstdint>
 #include <exception>
@@ -9,7 +10,6 @@
 #include <numeric>
 #include <system_error>
 #include <thread>
-#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -24,6 +24,20 @@ using namespace std::chrono_literals;
 constexpr auto kBetweenQuestions = 50ms;
 /// Threads that take longer to end, as in the middle of a long fall, are left to end by themselves.
 constexpr auto kLongestFarewell = 150ms;
+
+/// Whether the point `a`, given as number `i`, is solved before `b`, number `j`. NaN has a place
+/// too.
+bool is_before(const Point& a, std::size_t i, const Point& b, std::size_t j) {
+  if (a.model != b.model) {
+    return a.model < b.model;
+  }
+  for (double Point::*const value : {&Point::H_m, &Point::mu, &Point::e}) {
+    if (const auto order = std::strong_order(a.*value, b.*value); order != 0) {
+      return order < 0;
+    }
+  }
+  return i < j;
+}
 
 /// Points to solve and who solves them. Held by each thread, so that one that is left behind has
 /// all that it needs.
@@ -46,12 +60,9 @@ class Work {
     }
     // Neighbours share a model, a fall, the state at touch, and all until the first turn.
     std::iota(order_.begin(), order_.end(), std::size_t{0});
-    const auto key = [this](std::size_t i) {
-      const Point& point = points_[i];
-      return std::tuple(point.model, point.H_m, point.mu, point.e, i);
-    };
-    std::sort(order_.begin(), order_.end(),
-              [&](std::size_t a, std::size_t b) { return key(a) < key(b); });
+    std::sort(order_.begin(), order_.end(), [this](std::size_t a, std::size_t b) {
+      return is_before(points_[a], a, points_[b], b);
+    });
   }
 
   void solve() {
@@ -69,10 +80,11 @@ class Work {
     changed_.notify_all();
   }
 
-  /// Waits for all; whether all was handed on.
+  /// Waits for all, or for the first failure; whether all was handed on.
   bool wait(const std::function<bool(std::size_t)>& goes_on) {
     std::unique_lock lock(mutex_);
-    while (!changed_.wait_for(lock, kBetweenQuestions, [this] { return threads_ == 0; })) {
+    const auto is_over = [this] { return threads_ == 0 || failure_; };
+    while (!changed_.wait_for(lock, kBetweenQuestions, is_over)) {
       const std::size_t outcomes = outcomes_;
       lock.unlock();
       if (goes_on && !goes_on(outcomes)) {
@@ -88,9 +100,9 @@ class Work {
 
   /// Behind this nothing is handed on. Whether all threads are about to end.
   bool end() {
-    stopped_ = true;
     std::unique_lock lock(mutex_);
     take_ = nullptr;
+    stopped_ = true;
     return changed_.wait_for(lock, kLongestFarewell, [this] { return threads_ == 0; });
   }
 
@@ -113,6 +125,9 @@ class Work {
       return next_++;
     }
     solver::ModelPoint point(std::uint64_t number) override {
+      if (work_.stopped_) {  // one that was kept for a fall of its own
+        throw SolveError("nobody waits for it any more");
+      }
       const Point& point = work_.at(number);
       return {point.model, point.H_m, point.mu, point.e};
     }
@@ -164,17 +179,21 @@ class Work {
       (*take_)(std::move(outcome));
       ++outcomes_;
     } catch (...) {
-      failure_ = std::current_exception();
-      stopped_ = true;
+      set_failure(std::current_exception());
     }
   }
 
   void fail(std::exception_ptr failure) {
     const std::lock_guard lock(mutex_);
     if (!failure_) {
-      failure_ = std::move(failure);
+      set_failure(std::move(failure));
     }
+  }
+
+  void set_failure(std::exception_ptr failure) {
+    failure_ = std::move(failure);
     stopped_ = true;
+    changed_.notify_all();
   }
 
   const std::vector<ModelParameters> models_;

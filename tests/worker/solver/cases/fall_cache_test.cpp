@@ -5,7 +5,9 @@
 #include <atomic>
 #include <cstddef>
 #include <latch>
+#include <limits>
 #include <mutex>
+#include <new>
 #include <string>
 #include <thread>
 #include <vector>
@@ -81,12 +83,31 @@ TEST(FallCacheTest, AFallThatFailsFailsOnceForAllModelsThatShareIt) {
   EXPECT_EQ(falls.solved.size(), 1U);
 }
 
-TEST(FallCacheTest, AModelOutsideItsDomainIsAnErrorOnce) {
+TEST(FallCacheTest, AModelOutsideItsDomainFailsWithoutAFallBeingSolved) {
   CountedFalls falls;
-  for (int again = 0; again < 3; ++again) {
+  const ModelParameters nothing = model_with_E(std::numeric_limits<double>::quiet_NaN());
+  for (int again = 0; again < 2; ++again) {
     EXPECT_NE(falls.cache.fall(model_with_E(-1.0)).error.find("E = -1"), std::string::npos);
+    EXPECT_NE(falls.cache.fall(nothing).error.find("E = nan"), std::string::npos);
   }
-  EXPECT_EQ(falls.solved.size(), 1U);
+  EXPECT_TRUE(falls.solved.empty());
+  const std::vector<ModelParameters> ahead{nothing, model_with_E(-1.0), model_with_E(6e10)};
+  falls.cache.fall(coarse_model(), ahead);
+  ASSERT_EQ(falls.solved.size(), 1U);
+  ASSERT_EQ(falls.solved[0].size(), 2U);
+  EXPECT_EQ(falls.solved[0][1], ahead.back());
+}
+
+TEST(FallCacheTest, WhatSolvingThrowsComesOutAndTheNextWhoAsksHasItSolvedAnew) {
+  bool is_memory_short = true;
+  FallCache cache({}, [&](std::span<const ModelParameters> models) {
+    return is_memory_short ? throw std::bad_alloc() : solve_falls(models);
+  });
+  const auto models = models_with_E(2);
+  EXPECT_THROW(cache.fall(models[0], models), std::bad_alloc);
+  is_memory_short = false;
+  EXPECT_TRUE(cache.fall(models[0]).fallen);
+  EXPECT_TRUE(cache.fall(models[1]).fallen);
 }
 
 TEST(FallCacheTest, MissingFallsAreSolvedBesideTheOneAskedForUntilTheLanesAreFull) {

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <optional>
@@ -10,6 +11,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "worker/solver/library/falls_kept.h"
 #include "worker/solver/library/solver.h"
 #include "worker/solver/solve.h"
 
@@ -101,22 +103,82 @@ TEST(LibraryTest, APointOfAModelThatIsNotGivenIsRefused) {
   EXPECT_THROW(outcomes_of({coarse_model()}, {{1.0, 0.4, 1.0, 1}}), InputError);
 }
 
-TEST(LibraryTest, WhoeverAsksToEndIsAnsweredWhileAFallIsStillSolvedAndGetsNothingMore) {
+TEST(LibraryTest, APointOfAModelWithANaNFailsAloneWithWhatIsNoNumber) {
+  std::vector<ModelParameters> models{coarse_model()};
+  std::vector<Point> points{{1.0, 0.4, 1.0}};
+  std::vector<std::string> names;
+  for (const auto& key : model_keys()) {
+    if (key.name == "links" || key.name == "elements_per_link" || key.name == "integrator") {
+      continue;  // whole numbers
+    }
+    ModelParameters model = coarse_model();
+    key.set(model, std::numeric_limits<double>::quiet_NaN());
+    names.emplace_back(key.name);
+    points.push_back({1.0, 0.4, 1.0, models.size()});
+    models.push_back(model);
+  }
+  ASSERT_GT(names.size(), 10U);
+  for (const bool errors : {false, true}) {
+    const auto outcomes = outcomes_of(models, points, {.threads = 2, .errors = errors});
+    EXPECT_TRUE(outcomes[0]->result);
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      EXPECT_THAT(outcomes[i + 1]->error, HasSubstr("must be finite")) << names[i];
+    }
+  }
+}
+
+TEST(LibraryTest, PointsAreInOrderThoughSomeHaveNaNs) {
+  std::vector<Point> points;
+  for (int i = 0; i < 100; ++i) {
+    points.push_back({i % 3 == 0 ? std::numeric_limits<double>::quiet_NaN() : 200.0 - i, 0.4, 1.0});
+  }
+  std::vector<double> handed_on_m;
+  solve_many(std::vector{coarse_model()}, points,
+             [&](Outcome&& outcome) { handed_on_m.push_back(points.at(outcome.point).H_m); },
+             {.threads = 1});
+  EXPECT_EQ(handed_on_m.size(), points.size());
+  std::erase_if(handed_on_m, [](double H_m) { return std::isnan(H_m); });
+  EXPECT_TRUE(std::is_sorted(handed_on_m.begin(), handed_on_m.end()));
+}
+
+/// Its fall takes hours: a test that waits for it is ended by its time limit and by nothing else.
+ModelParameters model_that_falls_for_hours() {
   ModelParameters model;
-  model.integrator = Integrator::kGeneralizedAlpha;  // a fall of many seconds
-  model.dt_fall_s = 1e-6;
+  model.integrator = Integrator::kGeneralizedAlpha;
+  model.dt_fall_s = 1e-9;
+  return model;
+}
+
+TEST(LibraryTest, WhoeverAsksToEndIsAnsweredWhileAFallIsStillSolvedAndGetsNothingMore) {
   std::atomic<std::size_t> taken = 0;
   ManyOptions options;
   options.goes_on = [](std::size_t) { return false; };
   EXPECT_FALSE(solve_many(
-      std::vector{model}, std::vector<Point>{{1.0, 0.4, 1.0}}, [&](Outcome&&) { ++taken; },
-      options));
+      std::vector{model_that_falls_for_hours()}, std::vector<Point>{{1.0, 0.4, 1.0}},
+      [&](Outcome&&) { ++taken; }, options));
   EXPECT_EQ(taken, 0U);
 }
 
-TEST(LibraryTest, WhatTheTakerThrowsComesOut) {
+TEST(LibraryTest, WhatTheTakerThrowsComesOutWhileAFallIsStillSolved) {
   const auto take = [](Outcome&&) { throw std::runtime_error("the disk is full"); };
   EXPECT_THROW(solve_many(std::vector{coarse_model()}, sweep(1), take), std::runtime_error);
+  const std::vector models{coarse_model(), model_that_falls_for_hours()};
+  EXPECT_THROW(solve_many(models, std::vector<Point>{{1.0, 0.4, 1.0, 0}, {1.0, 0.4, 1.0, 1}}, take,
+                          {.threads = 2}),
+               std::runtime_error);
+}
+
+TEST(LibraryTest, NoFallIsBegunBehindTheEndOfTheWork) {
+  ModelParameters finer = coarse_model();
+  finer.elements_per_link = 2;
+  const Falls falls;
+  const auto take = [](Outcome&&) { throw std::runtime_error("the disk is full"); };
+  EXPECT_THROW(solve_many(std::vector{coarse_model(), finer},
+                          std::vector<Point>{{1.0, 0.4, 1.0, 0}, {1.0, 0.4, 1.0, 1}}, take,
+                          {.threads = 1, .falls = falls}),
+               std::runtime_error);
+  EXPECT_TRUE(falls.cache()->falls.kept_fall(coarse_model()));
+  EXPECT_FALSE(falls.cache()->falls.kept_fall(finer));
 }
 
 TEST(LibraryTest, FingersOverTheSameFallsSolveThemOnce) {
