@@ -178,6 +178,7 @@ void ClientsDesk::answer(const Client& client, const ReadRequest& read, Instant 
       break;
     case Kind::kEndQuery:
       queries_.end(client.identity, request.end_query().request_id());
+      at_.traces.end(client.identity, request.end_query().request_id());
       break;
     case Kind::KIND_NOT_SET:
       at_.bad_frames.count("a client");

@@ -133,8 +133,18 @@ void TraceDesk::answer_what_is_done() {
 }
 
 void TraceDesk::client_left(std::string_view identity) {
+  end_those([&](const Client& client) { return client.identity == identity; });
+}
+
+void TraceDesk::end(std::string_view identity, std::uint64_t request_id) {
+  end_those([&](const Client& client) {
+    return client.request_id == request_id && client.identity == identity;
+  });
+}
+
+void TraceDesk::end_those(const std::function<bool(const Client&)>& wait_no_more) {
   std::erase_if(waiting_, [&](const auto& entry) {
-    if (entry.second.client.identity != identity) {
+    if (!wait_no_more(entry.second.client)) {
       return false;
     }
     orders_.leave(entry.first);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <string>
 #include <string_view>
@@ -36,6 +37,8 @@ class TraceDesk {
   /// that request.
   void ask(const Client& client, const protocol::TraceRequest& request, const StudyToLookAt& study,
            Instant now);
+  /// That client waits no more for the answer to that request, if it was one for a trace.
+  void end(std::string_view identity, std::uint64_t request_id);
   /// A point of a long recipe was found, under the ticket of its ReadJob.
   void point_read(std::uint64_t ticket, const TracedPoint& point, Instant now);
   void client_left(std::string_view identity);
@@ -66,6 +69,7 @@ class TraceDesk {
   void found(std::uint64_t ticket, const TracedPoint& point, Instant now);
   bool is_full(const std::string& asker, const TraceKey& key) const;
   void answer_what_is_done();
+  void end_those(const std::function<bool(const Client&)>& wait_no_more);
   bool tell(const Waiting& waiting);
 
   ToClients& clients_;

@@ -28,8 +28,8 @@ std::string TraceOrders::objection_to(const TraceQuestion& question) const {
     return kDeadly;
   }
   if (solvers_.empty()) {
-    return "no worker is connected to solve it: start an `oblique-worker`, or give --here to solve "
-           "it in the client";
+    return "no worker is connected to solve it: start an `oblique-worker`, or solve it without one "
+           "by `oblique trace --here`";
   }
   return {};
 }
@@ -287,9 +287,9 @@ void TraceOrders::tick(std::int64_t now_ms) {
         late.push_back(waiter.ticket);
         effects_.emplace_back(RefuseTrace{
             waiter.ticket, job.worker ? "the trace took too long: the worker that solves it is not "
-                                        "done. Give it more time with --timeout SECONDS"
+                                        "done. `oblique trace --timeout SECONDS` gives it more time"
                                       : "no worker was free to solve the trace in the time it had: "
-                                        "give it more with --timeout SECONDS"});
+                                        "`oblique trace --timeout SECONDS` gives it more"});
       }
     }
   }

@@ -168,7 +168,11 @@ std::optional<HttpAnswer> Page::answer(const HttpQuestion& question) {
     answer = known->second.talk
                  ? known->second.talk->meanwhile
                  : error_answer(kTryLater, "the server takes too long: ask again later");
-    gone(question.number);
+    if (known->second.talk && !known->second.talk->must_end) {
+      at_.service.leave(question.number);
+    } else {
+      gone(question.number);
+    }
   }
   if (answer) {
     under_way_.erase(question.number);

@@ -10,6 +10,8 @@ namespace {
 
 /// So that the loop looks at others in between.
 constexpr std::size_t kMostOfATurn = 8;
+/// Of older ones the time is over at the service.
+constexpr std::size_t kMostLeftTraces = 256;
 
 }  // namespace
 
@@ -17,7 +19,11 @@ void ServiceLine::ask(std::uint64_t number, protocol::ClientRequest request) {
   request.set_request_id(number);
   Awaited& awaited = awaited_[number];
   awaited.is_query = awaited.is_query || request.has_query();
+  awaited.trace = request.has_trace() ? request.trace().SerializeAsString() : std::string();
   send(request);
+  if (request.has_trace()) {
+    end_those_before(awaited.trace);  // after the new one waits, or the work would be lost
+  }
 }
 
 std::optional<protocol::ClientReply> ServiceLine::reply(std::uint64_t number) {
@@ -34,6 +40,7 @@ std::optional<protocol::ClientReply> ServiceLine::reply(std::uint64_t number) {
     if (is_reply && awaited != awaited_.end()) {
       const bool is_part = reply.has_query() && !reply.query().ends();
       awaited->second.is_query = awaited->second.is_query && is_part;
+      awaited->second.trace.clear();
       awaited->second.replies.push_back(std::move(reply));
     }
   }
@@ -48,11 +55,37 @@ std::optional<protocol::ClientReply> ServiceLine::reply(std::uint64_t number) {
 
 void ServiceLine::forget(std::uint64_t number) {
   const auto awaited = awaited_.extract(number);
-  if (!awaited.empty() && awaited.mapped().is_query) {
-    protocol::ClientRequest request;
-    request.mutable_end_query()->set_request_id(number);
-    send(request);
+  if (!awaited.empty() && (awaited.mapped().is_query || !awaited.mapped().trace.empty())) {
+    end(number);
   }
+}
+
+void ServiceLine::leave(std::uint64_t number) {
+  const auto awaited = awaited_.find(number);
+  if (awaited == awaited_.end() || awaited->second.trace.empty()) {
+    forget(number);
+    return;
+  }
+  left_traces_.emplace_back(std::move(awaited->second.trace), number);
+  awaited_.erase(awaited);
+  if (left_traces_.size() > kMostLeftTraces) {
+    left_traces_.pop_front();
+  }
+}
+
+void ServiceLine::end_those_before(const std::string& trace) {
+  std::erase_if(left_traces_, [&](const auto& left) {
+    if (left.first == trace) {
+      end(left.second);
+    }
+    return left.first == trace;
+  });
+}
+
+void ServiceLine::end(std::uint64_t number) {
+  protocol::ClientRequest request;
+  request.mutable_end_query()->set_request_id(number);
+  send(request);
 }
 
 void ServiceLine::send(const protocol::ClientRequest& request) {

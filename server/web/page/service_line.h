@@ -6,6 +6,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "proto/oblique.pb.h"
@@ -27,6 +28,9 @@ class ServiceLine {
   std::optional<protocol::ClientReply> reply(std::uint64_t number);
   /// Nothing more is awaited under that number: what is still asked for ends where it can.
   void forget(std::uint64_t number);
+  /// The same, but a trace goes on: a browser asks for it again. The first that does takes the
+  /// place of those before; where none does the service ends it when its time is over.
+  void leave(std::uint64_t number);
 
   // ---- Of the loop.
   /// Readable when there is something to take.
@@ -42,12 +46,17 @@ class ServiceLine {
   std::vector<std::string> frames_;   // guarded by mutex_
 
   struct Awaited {
-    bool is_query = false;  // that has not ended
+    bool is_query = false;   // that has not ended
+    std::string trace = {};  // the request for one that has not come; empty: none
     std::deque<protocol::ClientReply> replies = {};
   };
   void send(const protocol::ClientRequest& request);
+  void end(std::uint64_t number);
+  void end_those_before(const std::string& trace);
 
-  std::map<std::uint64_t, Awaited> awaited_;  // of the HTTP server's thread
+  // Of the HTTP server's thread.
+  std::map<std::uint64_t, Awaited> awaited_;
+  std::deque<std::pair<std::string, std::uint64_t>> left_traces_;  // requests and their numbers
 };
 
 }  // namespace oblique::server

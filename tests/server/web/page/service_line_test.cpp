@@ -1,0 +1,76 @@
+// What the page says to the service when a browser waits no more.
+#include "server/web/page/service_line.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "proto/frames.h"
+
+namespace oblique::server {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+class ServiceLineTest : public testing::Test {
+ protected:
+  static protocol::ClientRequest trace_of(std::uint64_t point) {
+    protocol::ClientRequest request;
+    request.mutable_trace()->set_study("a");
+    request.mutable_trace()->set_point(point);
+    return request;
+  }
+  /// Numbers of the requests that the service is told to end, in order; others are passed over.
+  std::vector<std::uint64_t> ended() {
+    std::vector<std::uint64_t> numbers;
+    for (const std::string& frame : line_.take()) {
+      protocol::ClientRequest request;
+      EXPECT_TRUE(protocol::decode(frame, request));
+      if (request.has_end_query()) {
+        numbers.push_back(request.end_query().request_id());
+      }
+    }
+    return numbers;
+  }
+
+  ServiceLine line_;
+};
+
+TEST_F(ServiceLineTest, ATraceWhoseBrowserWentEnds) {
+  line_.ask(1, trace_of(7));
+  line_.forget(1);
+  EXPECT_THAT(ended(), ElementsAre(1));
+}
+
+TEST_F(ServiceLineTest, ATraceThatCameNeedsNoEnd) {
+  line_.ask(1, trace_of(7));
+  protocol::ClientReply reply;
+  reply.set_request_id(1);
+  reply.mutable_trace()->set_total_rows(3);
+  line_.put(protocol::encode(reply));
+  ASSERT_TRUE(line_.reply(1));
+  line_.forget(1);
+  EXPECT_THAT(ended(), IsEmpty());
+}
+
+TEST_F(ServiceLineTest, ATraceGoesOnUntilItIsAskedForAgainAndEndsWithTheLastWhoAsks) {
+  line_.ask(1, trace_of(7));
+  line_.leave(1);
+  line_.ask(2, trace_of(8));
+  EXPECT_THAT(ended(), IsEmpty());
+  line_.ask(3, trace_of(7));
+  EXPECT_THAT(ended(), ElementsAre(1));
+  line_.forget(3);
+  EXPECT_THAT(ended(), ElementsAre(3));
+}
+
+TEST_F(ServiceLineTest, AQueryThatIsLeftEnds) {
+  protocol::ClientRequest request;
+  request.mutable_query()->set_sql("SELECT 1");
+  line_.ask(1, request);
+  line_.leave(1);
+  EXPECT_THAT(ended(), ElementsAre(1));
+}
+
+}  // namespace
+}  // namespace oblique::server
