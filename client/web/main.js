@@ -10,6 +10,7 @@ import { overview } from "/overview.js";
  * @property {(fields: URLSearchParams, is_step?: boolean) => void} keep writes them into the address, soon; a step is one that people go back over
  * @property {(address: string) => void} go to another view, so that this one can be come back to
  * @property {boolean} may_change
+ * @property {AbortSignal} signal this view is left, or did not come about
  * @property {() => any} now the last overview, or null
  * @property {(links: (string | Node)[]) => void} trail what stands beside the name
  * @property {(path: string) => string} last how that view was left
@@ -26,6 +27,8 @@ let shown = {};
 /** @type {any} */
 let now = null;
 let turn = 0;
+/** Ends what the view that is shown, or comes, still asks for. */
+let leaving = new AbortController();
 /** Of the view that is shown. */
 let here = "";
 let may_change = false;
@@ -83,12 +86,15 @@ async function show() {
   const is_first = turn === 0;
   here = path;
   const mine = ++turn;
+  leaving.abort();
+  leaving = new AbortController();
+  const { signal } = leaving;
   shown.close?.();
   shown = {};
   wanted = "";
   const root = h("div", {});
   /** @type {Place} */
-  const place = { fields: new URLSearchParams(query ?? ""), may_change, now: () => now,
+  const place = { fields: new URLSearchParams(query ?? ""), may_change, signal, now: () => now,
     // Answers may come when another view is shown.
     trail: (parts) => { if (mine === turn) links(parts); },
     last: (of) => left.get(of) ?? `#${of}`,
@@ -125,9 +131,11 @@ async function show() {
     }
     if (now) shown.take?.(now);
   } catch (error) {
+    if (mine !== turn) return;
+    leaving.abort();
     const said = in_words(error);
-    if (mine === turn && said instanceof Silence) setTimeout(() => { if (mine === turn) show(); }, kAskAgain_ms);
-    if (mine === turn) root.replaceChildren(h("p", { role: "alert", class: "bad" }, String(said.message ?? said)),
+    if (said instanceof Silence) setTimeout(() => { if (mine === turn) show(); }, kAskAgain_ms);
+    root.replaceChildren(h("p", { role: "alert", class: "bad" }, String(said.message ?? said)),
       h("p", {}, h("a", { href: "#/" }, "All studies")));
   }
 }

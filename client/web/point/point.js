@@ -13,18 +13,56 @@ import { player } from "./player.js";
 import { trace_of } from "./trace.js";
 
 const kAskAgain_ms = 300;
+/** So often in a row a study that lies between is not there before that is said. */
+const kGoneAtMost = 40;
+
+/**
+ * Asks the study that has the point; one that lies between those of the study is in a study that may go, and then is
+ * begun anew under another number, which takes a moment.
+ * @param {() => number} id @param {boolean} is_between @param {AbortSignal} signal
+ */
+function asker_of(id, is_between, signal) {
+  return async (/** @type {(study: number) => Promise<any>} */ ask) => {
+    for (let left = is_between ? kGoneAtMost : 0; ; --left) {
+      try {
+        return await ask(id());
+      } catch (error) {
+        if (signal.aborted || left === 0 || /** @type {any} */ (error).status !== 404) throw error;
+      }
+      await pause(signal);
+    }
+  };
+}
+
+/** @param {AbortSignal} signal */
+async function pause(signal) {
+  await new Promise((go_on) => setTimeout(go_on, kAskAgain_ms));
+  signal.throwIfAborted();
+}
 
 /**
  * A point as the server tells it. One that lies between those of the study is solved first, which takes a moment.
- * @param {number} study @param {number} point @param {boolean} is_between @param {AbortSignal} signal
+ * @param {ReturnType<typeof asker_of>} of_study @param {number} point @param {boolean} is_between @param {AbortSignal} signal
  */
-async function told_of(study, point, is_between, signal) {
+async function told_of(of_study, point, is_between, signal) {
   for (;;) {
-    const told = await json(`/api/studies/${study}/points/${point}`, signal);
+    const told = await of_study((study) => json(`/api/studies/${study}/points/${point}`, signal));
     if (!is_between || told.row || told.fault || told.left_out) return told;
-    await new Promise((go_on) => setTimeout(go_on, kAskAgain_ms));
-    signal.throwIfAborted();
+    await pause(signal);
   }
+}
+
+/** What is known of a point without its time histories. @param {any} told @param {any[]} columns */
+function known_of(told, columns) {
+  const { row } = told;
+  const facts = [["H", `${shown(told.H)} m`], ["mu", shown(told.mu)], ["e", shown(told.e)],
+    ...(row && row.status === "solved" ? [["F_n peak", with_unit(row.fn_peak_N, "N")], ["F_t peak", with_unit(row.ft_peak_N, "N")],
+      ["contact", `${shown(row.duration_s * 1e6, 4)} µs`], ["stick", `${shown(row.stick_total_s * 1e6, 4)} µs`], ["mode", row.mode]] : [])];
+  const standing = told.fault || (told.left_out ? "The study's filter leaves this point out." : "")
+    || (!row ? "This point is not solved yet." : row.error ? `It failed: ${row.error}` : "");
+  return { facts: [h("dl", { class: "figures" }, ...facts.map(([name, value]) => h("div", {}, h("dt", {}, name), h("dd", {}, value)))),
+    standing ? h("p", { class: row?.error ? "bad" : "weak" }, standing) : ""],
+  numbers: row ? [point_numbers(row, columns)] : [] };
 }
 
 /** The command that solves a point of no study that stays. @param {any} whole @param {any} wanted @param {any} row */
@@ -42,9 +80,8 @@ function solve_command(whole, wanted, row) {
  * @returns {Promise<import("/main.js").View>}
  */
 export async function point_view(root, place, study, point) {
-  const stop = new AbortController();
-  const { signal } = stop;
-  const whole = await json(`/api/studies/${study}`);
+  const { signal } = place;
+  const whole = await json(`/api/studies/${study}`, signal);
   const said = h("p", { role: "status", class: "said" }, "A worker solves this point again.");
   /** Of points that lie between those of the study. */
   const is_between = place.fields.has("between");
@@ -57,59 +94,79 @@ export async function point_view(root, place, study, point) {
   let id = study;
   /** @type {any} */
   let wanted = null;
+  /** @type {any} */
+  let told = null;
+  const take = h("section", {});
   if (is_between) {
     trail(`between its points, ${count(point)}`);
     root.append(said);
     wanted = await wanted_of(whole, place.fields, signal);
     id = await held_open(wanted, side, signal, (other) => {
       id = other;
-      take.replaceWith(take = things_to_take());
+      show_take();
     });
   } else {
     trail(`point ${count(point)}`);
   }
-  const told = await told_of(id, point, is_between, signal).catch((error) => {
-    stop.abort();
-    throw error;
-  });
-  root.replaceChildren();
+  const of_study = asker_of(() => id, is_between, signal);
+  const name = () => (is_between ? `${whole.name}-between` : told.name);
+  function show_take() {
+    if (told) take.replaceChildren(...things_to_take(id, point, name(), told.row, whole, wanted));
+  }
+  const [facts, numbers] = [h("div", {}), h("div", {})];
+  function show_known() {
+    const known = known_of(told, whole.columns);
+    facts.replaceChildren(...known.facts);
+    numbers.replaceChildren(...known.numbers);
+  }
+  told = await told_of(of_study, point, is_between, signal);
   const pictures = h("section", { "aria-label": "The contact over time" }, said);
-  const name = is_between ? `${whole.name}-between` : told.name;
   const other = (/** @type {number} */ number) => `#/study/${study}/point/${number}${is_between ? `?${place.fields}` : ""}`;
   const neighbours = h("div", { class: "row" },
     point > 0 && h("a", { class: "button", href: other(point - 1) }, "Previous point"),
     point + 1 < (is_between ? side * side : whole.numbers) && h("a", { class: "button", href: other(point + 1) }, "Next point"));
-  const row = told.row;
-  const facts = [["H", `${shown(told.H)} m`], ["mu", shown(told.mu)], ["e", shown(told.e)],
-    ...(row && row.status === "solved" ? [["F_n peak", with_unit(row.fn_peak_N, "N")], ["F_t peak", with_unit(row.ft_peak_N, "N")],
-      ["contact", `${shown(row.duration_s * 1e6, 4)} µs`], ["stick", `${shown(row.stick_total_s * 1e6, 4)} µs`], ["mode", row.mode]] : [])];
-  const standing = told.fault || (told.left_out ? "The study's filter leaves this point out." : "")
-    || (!row ? "This point is not solved yet." : row.error ? `It failed: ${row.error}` : "");
-  const row_file = () => h("a", { class: "button", download: `${name}-${point}-row.csv`, href: `/api/studies/${id}/rows?${new URLSearchParams({ where: `point = ${point}`, format: "csv" })}` }, "Row as CSV");
-  const things_to_take = () => h("section", {}, h("h2", {}, "Take it with you"),
-    ...pictures_to_take(id, point, name, !is_between),
-    ...(is_between ? [h("p", {}, "The address of this page finds this point again or solves it anew, as does:"), ...(row ? [copied("the command of the point", solve_command(whole, wanted, row))] : [])]
-      : [h("p", {}, "Its time histories:"), copied("the command of the trace", `oblique trace ${quoted(name)} ${point} --out trace.csv`),
-        h("p", {}, "Its row:"), copied("the command of the row", `oblique query ${quoted(name)} --where 'point = ${point}'`)]), row_file());
-  let take = things_to_take();
-  root.append(h("h2", { class: "name" }, is_between ? `${whole.name}, between its points: ${count(point)} of ${side} × ${side}` : `${told.name}, point ${count(point)}`), neighbours,
-    h("dl", { class: "figures" }, ...facts.map(([name, value]) => h("div", {}, h("dt", {}, name), h("dd", {}, value)))),
-    standing ? h("p", { class: row?.error ? "bad" : "weak" }, standing) : "", pictures,
-    ...(row ? [point_numbers(row, whole.columns)] : []), take);
+  show_known();
+  show_take();
+  root.replaceChildren(h("h2", { class: "name" }, is_between ? `${whole.name}, between its points: ${count(point)} of ${side} × ${side}` : `${told.name}, point ${count(point)}`),
+    neighbours, facts, pictures, numbers, take);
   /** @type {{close: () => void}[]} */
   const parts = [];
-  trace_of(id, point, signal, (text) => { said.textContent = text; }).then((trace) => {
+  trace_of(of_study, point, signal, (text, is_bad) => {
+    said.textContent = text;
+    said.className = is_bad ? "said bad" : "said";
+  }).then((trace) => {
     if (signal.aborted) return;
-    parts.push(...show_trace(pictures, trace, `${is_between ? name : `point-${study}`}-${point}.csv`));
+    parts.push(...show_trace(pictures, trace, `${is_between ? name() : `point-${study}`}-${point}.csv`));
   }).catch((error) => {
     if (signal.aborted) return;
     said.className = "said bad";
     said.textContent = `No time histories: ${error.message}`;
   });
-  return { close() {
-    stop.abort();
-    parts.forEach((part) => part.close());
-  } };
+  return { take: look_again(study, () => told, async () => {
+    told = await told_of(of_study, point, is_between, signal);
+    if (told.row) show_known();
+  }), close: () => parts.forEach((part) => part.close()) };
+}
+
+/**
+ * Hears how far the study is, and looks whether the point was solved since.
+ * @param {number} study @param {() => any} told @param {() => Promise<void>} ask
+ */
+function look_again(study, told, ask) {
+  /** How many points had been settled when it was asked last. @type {number | null} */
+  let settled = null;
+  let is_asking = false;
+  return async (/** @type {any} */ now) => {
+    const one = now.studies.find((/** @type {any} */ each) => each.id === study);
+    const stands = one ? one.solved + one.failed : -1;  // those that ended are not told of
+    if (told().row || is_asking || stands === settled) return;
+    is_asking = true;
+    try {
+      await ask();
+      settled = stands;
+    } catch { /* it is asked again when the next overview comes */ }
+    is_asking = false;
+  };
 }
 
 const kPanels = ["forces", "loop", "deformation", "velocities", "energies", "shape"];
@@ -126,6 +183,18 @@ function pictures_to_take(study, point, name, has_command) {
   };
   choose("");
   return [h("div", { class: "row" }, named("pictures, as oblique plot draws them", picker([["", "all"], ...kPanels.map((one) => [one, one])], "", choose)), files), command];
+}
+
+/**
+ * @param {number} id of the study that has it @param {number} point @param {string} name @param {any} row null: it is not solved
+ * @param {any} whole the study @param {any} wanted what lies between its points; null: it is one of them
+ */
+function things_to_take(id, point, name, row, whole, wanted) {
+  const commands = wanted ? [h("p", {}, "The address of this page finds this point again or solves it anew, as does:"), ...(row ? [copied("the command of the point", solve_command(whole, wanted, row))] : [])]
+    : [h("p", {}, "Its time histories:"), copied("the command of the trace", `oblique trace ${quoted(name)} ${point} --out trace.csv`),
+      h("p", {}, "Its row:"), copied("the command of the row", `oblique query ${quoted(name)} --where 'point = ${point}'`)];
+  return [h("h2", {}, "Take it with you"), ...pictures_to_take(id, point, name, wanted === null), ...commands,
+    h("a", { class: "button", download: `${name}-${point}-row.csv`, href: `/api/studies/${id}/rows?${new URLSearchParams({ where: `point = ${point}`, format: "csv" })}` }, "Row as CSV")];
 }
 
 /** @param {import("./trace.js").Trace} trace @param {string} name */

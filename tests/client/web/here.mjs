@@ -1,4 +1,5 @@
 // The server and the browser of all tests, and tabs at its views.
+import assert from "node:assert/strict";
 import { join } from "node:path";
 import { Browser, Server, until } from "./browser.mjs";
 
@@ -35,6 +36,30 @@ export async function study(view = "#/study/1", how = {}) {
   await until(page, () => /solved|points?[ ,]/.test(document.querySelector(".facts")?.textContent ?? ""));
   await until(page, () => document.querySelectorAll(".rows tbody tr").length > 0);
   return page;
+}
+
+/** What is said below the picture has that. */
+export const facts = (page, text) => until(page, (wanted) => document.querySelector(".facts")?.textContent.includes(wanted), text);
+
+/** A study of axes from, to and with so many values, and what is done with it at once. @returns its number */
+export async function submit(name, axes, changes = []) {
+  const page = await browser.open("#/");
+  const id = await page.evaluate(async (given) => {
+    const recipe = { blocks: [{ axes: Object.entries(given.axes).map(([key, [from, to, count]]) => ({ key, from, to, count })) }] };
+    const made = await fetch("/api/studies", { method: "POST", body: JSON.stringify({ name: given.name, recipe }), headers: { "Content-Type": "application/json" } });
+    return (await made.json()).id;
+  }, { name, axes });
+  await page.close();
+  for (const what of changes) await change(id, what);
+  return id;
+}
+
+/** Pauses, resumes, cancels or retries a study. */
+export async function change(id, what) {
+  const page = await browser.open("#/");
+  assert.equal(await page.evaluate(async (path) => (await fetch(path, { method: "POST", body: "{}", headers: { "Content-Type": "application/json" } })).status,
+    `/api/studies/${id}/${what}`), 200);
+  await page.close();
 }
 
 /** A tab whose point has been solved again. */

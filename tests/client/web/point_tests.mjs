@@ -1,7 +1,7 @@
 // A point: its fall, its contact, the finger moving.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { point, text_of, until } from "./here.mjs";
+import { browser, change, point, submit, text_of, until } from "./here.mjs";
 
 /** Drags the time to a share of all that is watched. */
 const scrub = (page, share) => page.$eval(".scrub input", (slider, to) => {
@@ -82,4 +82,74 @@ test("who wants little motion sees the finger move only when asked", async () =>
   await page.click(".play");
   await until(page, (then) => document.querySelector(".player output").textContent !== then, released);
   await page.close();
+});
+
+const kBetween = "#/study/1/point/1?pic=map&z=fn_peak_N&x=mu&y=H&block=0&at=e%401&between=mu%3A0.1%3A2%2CH%3A0.5%3A1.1&side=33";
+
+test("a point that lies between and is left before it is solved is asked for no more, and its study is let go", async () => {
+  const page = await browser.open(kBetween, { early: () => {
+    const real = window.fetch;
+    window.waits_for = [];
+    window.fetch = async (path, how) => {
+      if (!/\/points\/1$/.test(path)) return real(path, how);
+      window.waits_for.push(how.signal);
+      const told = await (await real(path, how)).json();
+      return new Response(JSON.stringify({ ...told, row: null }));
+    };
+  } });
+  await until(page, () => window.waits_for.length > 1);
+  await page.evaluate(() => { location.hash = "#/"; });
+  await page.waitForSelector("table");
+  assert.deepEqual(await page.evaluate(() => window.waits_for.map((one) => one.aborted).filter((is) => !is)), []);
+  await page.close();
+});
+
+test("a point whose study between goes while it is waited for is shown from the one that comes after it", async () => {
+  const page = await browser.open(kBetween, { early: () => {
+    const real = window.fetch;
+    const begun = [];
+    window.begun = begun;
+    window.fetch = async (path, how) => {
+      if (begun.length === 1 && path.startsWith(`/api/studies/${begun[0]}`)) return new Response(JSON.stringify({ error: "it went" }), { status: 404 });
+      const answer = await real(path, how);
+      if (path === "/api/look") begun.push((await answer.clone().json()).id);
+      return answer;
+    };
+  } });
+  await until(page, () => document.querySelectorAll(".uplot").length === 4);
+  assert.ok(await page.evaluate(() => window.begun.length > 1));
+  await page.close();
+});
+
+test("a trace that was refused is asked for again, and people are told why it does not come", async () => {
+  const page = await browser.open("#/study/1/point/7", { motion: "reduce", early: () => {
+    const real = window.fetch;
+    let refused = 0;
+    window.told = [];
+    window.fetch = async (path, how) => {
+      if (/\/trace\?/.test(path)) window.told.push(document.querySelector("[aria-label='The contact over time'] .said").textContent);
+      if (/\/trace\?/.test(path) && ++refused <= 2) return new Response(JSON.stringify({ error: "too many wait" }), { status: refused === 1 ? 409 : 503 });
+      return real(path, how);
+    };
+  } });
+  await until(page, () => document.querySelectorAll(".uplot").length === 4);
+  assert.deepEqual(await page.evaluate(() => window.told.slice(1, 3)), Array(2).fill("No time histories yet: too many wait. They are asked for again."));
+  await page.close();
+});
+
+test("a point that is solved while somebody looks at it says so", async () => {
+  const id = await submit("solved later", { H: [0.2, 1.1, 200], mu: [0.1, 2, 200], e: [0.5, 1, 50] });
+  const page = await browser.open(`#/study/${id}/point/0`, { motion: "reduce", early: () => {
+    const real = window.fetch;
+    window.fetch = async (path, how) => {
+      const answer = await real(path, how);
+      return /\/points\/0$/.test(path) && !window.is_solved ? new Response(JSON.stringify({ ...await answer.json(), row: null })) : answer;
+    };
+  } });
+  await until(page, () => document.querySelector("main").textContent.includes("This point is not solved yet."));
+  await page.evaluate(() => { window.is_solved = true; });
+  await until(page, () => document.querySelector(".figures")?.textContent.includes("F_n peak"));
+  assert.ok(!(await text_of(page, "main")).includes("not solved yet"));
+  await page.close();
+  await change(id, "cancel");
 });
