@@ -60,6 +60,20 @@ export function copied(name, text) {
   return h("div", { class: "copied" }, h("code", { tabIndex: 0 }, text), copy, said);
 }
 
+const kTakesFocus = "a[href], button, input, select, summary, [tabindex]";
+
+/**
+ * Changes what is in an element: who is at one of its controls goes on at the one that stands there then.
+ * @param {HTMLElement} element @param {() => void} change
+ */
+export function keep_focus(element, change) {
+  const place = [...element.querySelectorAll(kTakesFocus)].indexOf(/** @type {Element} */ (document.activeElement));
+  change();
+  if (place < 0 || element.contains(document.activeElement)) return;
+  const there = /** @type {NodeListOf<HTMLElement>} */ (element.querySelectorAll(kTakesFocus));
+  there[Math.min(place, there.length - 1)]?.focus({ preventScroll: true });
+}
+
 /** Saves a text as a file of this machine. @param {string} name @param {string} type @param {string} text */
 export function save(name, type, text) {
   const address = URL.createObjectURL(new Blob([text], { type: `${type};charset=utf-8` }));

@@ -9,6 +9,8 @@ import { scale, ticks, tick_text } from "/parts/scale.js";
 const uPlot = /** @type {any} */ (globalThis).uPlot;
 
 const kDashes = [[], [7, 3], [2, 3], [9, 3, 2, 3], [14, 4], [4, 2], [1, 4], [12, 3, 3, 3]];
+/** Each of fewer values is drawn as a point too. */
+const kFewValues = 60;
 const kFills = ["bar", "line1"];
 const kInks = ["line0", "line1", "line2", "line3", "line4", "line5", "line6", "line7"];
 
@@ -42,6 +44,10 @@ function sample(look) {
   context.stroke();
   return canvas;
 }
+
+/** What of lines is not their numbers, nor follows from these later. @param {Lines} of */
+const look_of = (of) => JSON.stringify([of.title, of.x.name, of.x.unit, of.x.is_log, of.y, of.as_bars, of.spans, of.height, of.x.values.length < kFewValues,
+  of.series.map((one) => [one.label, one.colour])]);
 
 /** @param {Lines} of */
 export function line_plot(of) {
@@ -89,7 +95,7 @@ export function line_plot(of) {
       axes: [{ ...axis, label: heading(of.x.name, of.x.unit), labelSize: 22, size: 34 },
         { ...axis, label: heading(of.y.name, of.y.unit), labelSize: 22, size: 62 }],
       series: [{}, ...of.series.map((one, i) => ({ label: one.label, stroke: ink(kInks[(one.colour ?? i) % 8]), width: 1.6,
-        dash: kDashes[(one.colour ?? i) % 8], spanGaps: false, points: { show: of.x.values.length < 60 && !of.as_bars, size: 4 },
+        dash: kDashes[(one.colour ?? i) % 8], spanGaps: false, points: { show: of.x.values.length < kFewValues && !of.as_bars, size: 4 },
         ...(of.as_bars ? { paths: uPlot.paths.bars({ size: [1, Infinity] }), fill: ink(kFills[i]), dash: [], stroke: ink("weak"), width: 0.5 } : {}) }))],
       hooks: {
         setSelect: [(/** @type {any} */ u) => {
@@ -138,7 +144,7 @@ export function line_plot(of) {
       if (!has(i)) continue;
       if (has(i - 1)) u.ctx.lineTo(...place(i));
       else u.ctx.moveTo(...place(i));
-      if (values.length < 60 || (!has(i - 1) && !has(i + 1))) discs.push(place(i));
+      if (values.length < kFewValues || (!has(i - 1) && !has(i + 1))) discs.push(place(i));
     }
     u.ctx.stroke();
     u.ctx.strokeStyle = ink("text");
@@ -191,6 +197,26 @@ export function line_plot(of) {
   });
   watch.observe(place);
   return { element,
+    /** Shows other numbers in the same plot. @param {Lines} other @returns {boolean} false: it must be made anew */
+    update(other) {
+      if (!plot || look_of(other) !== look_of(of)) return false;
+      if (other.x.values.length !== of.x.values.length) at = anchor = -1;
+      of = other;
+      marked = null;
+      step_back();
+      plot.setData([of.x.values, ...of.series.map((one) => one.values)]);
+      if (said.textContent !== "") read(at);
+      return true;
+    },
+    /** Where somebody is by keys. */
+    get hands() {
+      return { has_focus: element.contains(document.activeElement), at, anchor };
+    },
+    /** Goes on where somebody was in another plot of the same. @param {{has_focus: boolean, at: number, anchor: number}} hands */
+    go_on(hands) {
+      ({ at, anchor } = hands);
+      if (hands.has_focus) place.focus({ preventScroll: true });
+    },
     /** Puts the cursor at value `i` without telling. @param {number} i */
     point_at(i) {
       if (i === at) return;

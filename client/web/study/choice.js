@@ -5,11 +5,20 @@ import { count } from "/parts/format.js";
 import { step_of } from "./asked/dots.js";
 import { sentence } from "./words.js";
 
+/** The number of the value that lies nearest. @param {Float64Array} values @param {number} value */
+function nearest(values, value) {
+  let best = 0;
+  for (let i = 1; i < values.length; ++i) if (Math.abs(values[i] - value) < Math.abs(values[best] - value)) best = i;
+  return best;
+}
+
 /** @param {import("./study.js").StudyView} view */
 export function choice_of(view) {
   const spoken = h("p", { class: "reading", "aria-live": "polite" });
   const line = h("p", { class: "choice" });
   const { map } = view;
+  /** The values of the cell that is chosen: another picture may have it in another place, or not at all. @type {[number, number] | null} */
+  let place = null;
   const link = (/** @type {string} */ address, /** @type {number} */ point, /** @type {string} */ text) => line.replaceChildren(
     h("a", { class: "button", href: address }, `Open point ${count(point)}`), h("span", { class: "weak" }, text));
 
@@ -29,6 +38,14 @@ export function choice_of(view) {
     return null;
   }
 
+  /** Where this picture has what was chosen in another one. @param {import("./asked/picture.js").Picture} picture @param {[number, number]} values @returns {[number, number] | null} */
+  function cell_at(picture, values) {
+    // What is solved while somebody looks becomes finer, and bins are made anew: their cells lie near the others'.
+    const may_be_near = view.solving.is_on || picture.x.edges !== undefined;
+    const cell = [picture.x, picture.y].map((side, i) => (may_be_near ? nearest(side.values, values[i]) : side.values.indexOf(values[i])));
+    return cell.includes(-1) ? null : /** @type {[number, number]} */ (cell);
+  }
+
   return { spoken, line,
     /** @param {[number, number] | null} cell */
     speak(cell) {
@@ -37,6 +54,7 @@ export function choice_of(view) {
     /** @param {[number, number]} cell @param {number | null} [which] of several points of a cell */
     choose(cell, which = null) {
       this.speak(cell);
+      place = view.picture && !view.picture.dots ? [view.picture.x.values[cell[0]], view.picture.y.values[cell[1]]] : null;
       const point = which ?? view.picture?.point(...cell) ?? null;
       line.replaceChildren();
       if (point === null) return;
@@ -58,23 +76,33 @@ export function choice_of(view) {
       if (cell) {
         this.choose(cell, point);
       } else {
-        link(`#/study/${view.study.id}/point/${point}`, point, view.has_map ? " (it lies outside this picture)" : "");
+        place = null;
+        link(`#/study/${view.study.id}/point/${point}`, point, view.has_map ? " (this picture does not show it)" : "");
         view.set({ cell: String(point) });
       }
     },
     /** After another picture has come. */
     again() {
       const { picture } = view;
-      const { chosen } = map;
       if (!view.has_map || !picture) {
         line.replaceChildren();
-      } else if (chosen && !picture.dots && chosen[0] < picture.x.values.length && chosen[1] < picture.y.values.length) {
-        this.choose(chosen);
+        return;
+      }
+      const cell = place && !picture.dots ? cell_at(picture, place) : null;
+      if (cell) {
+        map.choose(cell);
+        this.choose(cell);
       } else if (view.is("cell") && !view.solving.is_on) {
+        const was = place;
         this.choose_point(Number(view.is("cell")));
+        place ??= was;  // a finer one may show it again
+      } else if (place) {
+        line.replaceChildren();
+        this.speak(null);
       }
     },
     none() {
+      place = null;
       map.choose(null);
       line.replaceChildren();
       this.speak(null);

@@ -1,6 +1,6 @@
 // @ts-check
 // What a picture is of: pickers, sliders, scales. A choice goes into the address, and from there into the picture.
-import { h, named, picker, tick } from "/parts/dom.js";
+import { h, keep_focus, named, picker, tick } from "/parts/dom.js";
 import { count, heading, shown } from "/parts/format.js";
 import { axis_value, fill_in, varying } from "./axes.js";
 import { colour_controls } from "./drawn/legend.js";
@@ -59,19 +59,17 @@ export function show_controls(view) {
   });
   drags.title = "with Shift it is the other one";
   parts.push(named("dragging", drags));
-  // Who chose by keys goes on where they were.
-  const focused = [...view.controls.querySelectorAll("select, input")].indexOf(/** @type {any} */ (document.activeElement));
-  view.controls.replaceChildren(...parts);
-  if (focused >= 0) /** @type {any} */ (view.controls.querySelectorAll("select, input")[focused])?.focus();
+  keep_focus(view.controls, () => view.controls.replaceChildren(...parts));
   show_sliders(view, on_grid);
   const has_bar = (kind === "map" || kind === "gathered") && view.columns.find((c) => c.name === view.is("z"))?.picture !== "categories";
-  view.colour_row.replaceChildren(...(has_bar ? [colour_controls({ from: view.is("from"), to: view.is("to"), is_log: view.is("zlog") !== "", palette: view.is("pal") || "viridis" },
+  const colours = has_bar ? [colour_controls({ from: view.is("from"), to: view.is("to"), is_log: view.is("zlog") !== "", palette: view.is("pal") || "viridis" },
     (changed) => {
       view.set(/** @type {any} */ (changed));
       if ("from" in changed && "to" in changed) show_controls(view);
       view.drawing.draw();
       show_takeaways(view);
-    })] : []));
+    })] : [];
+  keep_focus(view.colour_row, () => view.colour_row.replaceChildren(...colours));
 }
 
 /** At which values the other axes are held. @param {View} view @param {boolean} on_grid */

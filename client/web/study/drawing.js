@@ -1,6 +1,6 @@
 // @ts-check
 // What is drawn of a picture: a map or points on a canvas, lines, bars; with what colours mean and how much is shown.
-import { h } from "/parts/dom.js";
+import { h, keep_focus } from "/parts/dom.js";
 import { palette } from "/parts/colours.js";
 import { has_span, span_of } from "./command.js";
 import { part_of } from "./conditions.js";
@@ -11,7 +11,10 @@ import { facts } from "./words.js";
 export function drawing_of(view) {
   const lines_place = h("div", {});
   const legend = h("div", { class: "colours" });
-  const told = h("p", { class: "weak facts" });
+  const said = h("span", {});
+  /** What stands while a part is shown. */
+  const part = h("span", {}, " A part is shown. ", h("button", { type: "button", onclick: () => view.zoom(null) }, "Show all"));
+  const told = h("p", { class: "weak facts" }, said);
   /** @type {any} */
   let lines = null;
   let turn = 0;
@@ -34,35 +37,49 @@ export function drawing_of(view) {
     const as_bars = view.is("pic") === "histogram";
     const { drawn_lines } = await import("./drawn/drawn_lines.js");
     if (mine !== turn) return;
-    lines?.close();
-    lines = drawn_lines(picture, { as_bars, x_log: view.is("xlog") !== "", y_log: view.is("ylog") !== "", counts: view.marking.marks?.counts,
-      y_ends: !as_bars && has_span(view) ? span_of(view, picture) : undefined, zoomed: (part) => view.zoom_lines(part),
-      drag_marks: view.is("drag") === "mark", brushed: (part) => (as_bars ? view.marking.mark(part ? part_of(picture.x, [], part.x) : "") : view.marking.mark_lines(part)) });
+    const how = { as_bars, x_log: view.is("xlog") !== "", y_log: view.is("ylog") !== "", counts: view.marking.marks?.counts ?? (view.is("mark") ? [] : null),
+      y_ends: !as_bars && has_span(view) ? span_of(view, picture) : undefined, zoomed: (/** @type {import("/parts/lines.js").Part | null} */ part) => view.zoom_lines(part),
+      drag_marks: view.is("drag") === "mark", brushed: (/** @type {import("/parts/lines.js").Part | null} */ part) => (as_bars ? view.marking.mark(part ? part_of(picture.x, [], part.x) : "") : view.marking.mark_lines(part)) };
+    // The same plot stays under the hands that are at it.
+    if (!lines?.update(picture, how)) {
+      const hands = lines?.hands;
+      lines?.close();
+      lines = drawn_lines(picture, how);
+      lines_place.replaceChildren(lines.element);
+      if (hands) lines.go_on(hands);
+    }
     if (!as_bars) lines.mark(view.marking.marks);
-    lines_place.replaceChildren(lines.element);
+  }
+  /** @param {import("./asked/picture.js").Picture} picture @param {import("./drawn/map.js").Look} look */
+  function show_legend(picture, look) {
+    const means = picture.z.is_category ? categories(picture) : picture.least !== null ? colour_bar(picture, look) : "";
+    const is_open = legend.querySelector("details")?.open ?? false;
+    keep_focus(legend, () => legend.replaceChildren(means, gaps(picture)));
+    const others = legend.querySelector("details");
+    if (others) others.open = is_open;
   }
   return { lines_place, legend, told, end,
     /** By the colours and scales that the address says. */
     draw() {
       const { picture } = view;
       if (!picture) return;
-      legend.replaceChildren();
       if (view.has_map) {
         end();
         const look = look_of(picture);
         view.map.show(picture, look, view.marking.marks);
-        if (picture.z.is_category) legend.append(categories(picture));
-        else if (picture.least !== null) legend.append(colour_bar(picture, look));
-        legend.append(gaps(picture));
+        show_legend(picture, look);
       } else {
+        legend.replaceChildren();
         draw_lines(picture).catch((error) => view.complain(error));
       }
-      told.textContent = facts(picture, view.is("pic"), view.study).join(" ");
+      said.textContent = facts(picture, view.is("pic"), view.study).join(" ");
       if (view.has_map && !picture.z.is_category && picture.least !== null && picture.most !== null) {
         const [from, to] = span_of(view, picture);
-        if (picture.most < from || picture.least > to) told.append(` All values lie ${picture.most < from ? "below" : "above"} what colours span.`);
+        if (picture.most < from || picture.least > to) said.append(` All values lie ${picture.most < from ? "below" : "above"} what colours span.`);
       }
-      if (view.is("x0") || view.is("y0") || (view.is("pic") === "lines" && has_span(view))) told.append(" A part is shown. ", h("button", { type: "button", onclick: () => view.zoom(null) }, "Show all"));
+      const is_part = view.is("x0") || view.is("y0") || (view.is("pic") === "lines" && has_span(view));
+      if (!is_part) part.remove();
+      else if (!part.isConnected) told.append(part);
     },
     /** Only what is marked is another. */
     mark() {

@@ -7,18 +7,31 @@ import { progress_of, study_buttons } from "/overview.js";
 
 /** @param {import("./study.js").StudyView} view @param {(settled: string) => void} moved other points are settled than before */
 export function standing_row(view, moved) {
-  const element = h("div", { class: "row standing" });
+  const how_far = h("div", { class: "row standing" });
+  // They stay what they are while the study goes on, under the finger that presses one and with the focus.
+  const buttons = h("div", {});
+  const element = h("div", { class: "row standing" }, how_far, buttons);
   let stood = "";
+  let offered = "";
   let settled = "";
+  /** @param {any} told */
+  function offer(told) {
+    const what = JSON.stringify([told.state, told.failed > 0]);
+    if (what === offered || !view.place.may_change) return;
+    offered = what;
+    const had_focus = buttons.contains(document.activeElement);
+    buttons.replaceChildren(study_buttons(told, (text, is_bad = false) => view.say(text, is_bad)));
+    if (had_focus) buttons.querySelector("button")?.focus();
+  }
   /** @param {any} told */
   const show = (told) => {
     const text = JSON.stringify([told.state, told.solved, told.failed, told.waits_for]);
     if (text === stood) return;
     stood = text;
-    element.replaceChildren(told.state, progress_of(told), `${count(told.points)} ${told.points === 1 ? "point" : "points"}`,
+    how_far.replaceChildren(told.state, progress_of(told), `${count(told.points)} ${told.points === 1 ? "point" : "points"}`,
       told.failed > 0 ? h("span", { class: "bad" }, `${count(told.failed)} failed`) : "",
-      told.state === "running" && told.waits_for ? h("span", { class: "weak" }, `waits for ${told.waits_for}`) : "",
-      view.place.may_change ? study_buttons(told, (text_, is_bad = false) => view.say(text_, is_bad)) : "");
+      told.state === "running" && told.waits_for ? h("span", { class: "weak" }, `waits for ${told.waits_for}`) : "");
+    offer(told);
     const now = `${told.solved + told.failed}`;
     if (now === settled) return;
     if (settled !== "") moved(now);

@@ -3,7 +3,7 @@
 import { h } from "/parts/dom.js";
 import { in_words, json, Silence } from "/server.js";
 import { waiting } from "./asked/picture.js";
-import { ask, steps_to } from "./asked/question.js";
+import { ask, is_fine, steps_to } from "./asked/question.js";
 import { fill_in, varying } from "./axes.js";
 import { choice_of } from "./choice.js";
 import { condition_fields, rounded } from "./conditions.js";
@@ -56,6 +56,8 @@ export class StudyView {
     this.wants_focus = false;
     /** Columns of which a whole picture was there: the server keeps them. @type {Set<string>} */
     this.read_columns = new Set();
+    /** How long the last picture took that is as fine as any. */
+    this.fine_ms = Infinity;
     /** When the last refresh came to its end. */
     this.loaded_ms = 0;
     /** The timer of the next refresh; 0: none. */
@@ -258,8 +260,10 @@ export class StudyView {
       const begun = performance.now();
       for (const cells of steps_to(this)) {
         if (this.wants_more) break;  // the finer one would not be seen
+        const asked_at = performance.now();
         const picture = await ask(this, cells, signal);
         if (signal.aborted) break;
+        if (is_fine(cells)) this.fine_ms = performance.now() - asked_at;
         if (this.solving.is_on) return;
         this.loaded_ms = performance.now();
         this.show(picture, kind);

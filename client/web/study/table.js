@@ -1,6 +1,6 @@
 // @ts-check
 // Rows of a study, a page at a time.
-import { h, tick } from "/parts/dom.js";
+import { h, keep_focus, tick } from "/parts/dom.js";
 import { count, heading, shown } from "/parts/format.js";
 import { Silence } from "/server.js";
 import { rows, rows_path } from "./asked/picture.js";
@@ -42,6 +42,10 @@ export function row_table(of) {
   /** @type {number[]} */
   let points_here = [];
 
+  function focus_on(/** @type {HTMLButtonElement} */ button) {
+    button.disabled = false;
+    button.focus({ preventScroll: true });
+  }
   function begin() {
     page = 0;
     load();
@@ -95,18 +99,23 @@ export function row_table(of) {
       const answer = await rows(of.study, { where, order: of.order() || "point", select: columns.join(","), limit: first + kPage + 1 }, mine.signal);
       const some = answer.rows.slice(first, first + kPage);
       const has_more = answer.rows.length > first + kPage;
-      table.replaceChildren(table.caption ?? "", head(answer), h("tbody", {}, ...some.map((/** @type {any[]} */ row) => {
+      const body = h("tbody", {}, ...some.map((/** @type {any[]} */ row) => {
         const made = h("tr", { "data-point": row[0], "aria-selected": undefined, onclick: () => of.chosen(row[0]) },
           ...row.map((value, i) => h("td", { class: typeof value === "number" ? "number" : "" },
             i === 0 ? h("a", { href: `#/study/${of.study}/point/${value}` }, count(value))
               : typeof value === "number" ? shown(value) : value ?? "–")));
         return made;
-      })));
+      }));
+      keep_focus(table, () => table.replaceChildren(table.caption ?? "", head(answer), body));
       points_here = some.map((/** @type {any[]} */ row) => row[0]);
       mark();
       const marked = mark_rows(mine.signal).catch(() => {});
+      const at_end = !has_more || first + 2 * kPage > kDeepest;
+      // What is pressed and leads nowhere leaves the focus to the other one.
+      if (document.activeElement === back && page === 0) focus_on(next);
+      if (document.activeElement === next && at_end) focus_on(back);
       back.disabled = page === 0;
-      next.disabled = !has_more || first + 2 * kPage > kDeepest;
+      next.disabled = at_end;
       const range = some.length > 0 ? `${count(first + 1)} to ${count(first + some.length)}` : "None";
       const tail = has_more && first + 2 * kPage > kDeepest ? " Further rows are in the CSV or asked for by a narrower filter." : "";
       said.className = "weak";

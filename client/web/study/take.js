@@ -1,25 +1,38 @@
 // @ts-check
 // What people take with them: the picture as files, the view as a link, and the commands that make both.
-import { copied, h, save } from "/parts/dom.js";
+import { copied, h, keep_focus, save } from "/parts/dom.js";
 import { picture_fields, plot_command, query_command, run_command } from "./command.js";
 import { cells_csv } from "./words.js";
 
+/** What was made for an element, before somebody copied of it. @type {WeakMap<HTMLElement, string>} */
+const made_for = new WeakMap();
+
+/**
+ * Buttons stay under the finger that presses one while a study runs, and what they said, as long as they mean the same.
+ * @param {HTMLElement} element @param {...HTMLElement} parts
+ */
+function show_parts(element, ...parts) {
+  const made = parts.map((part) => part.outerHTML).join("");
+  if (made_for.get(element) === made) return;
+  made_for.set(element, made);
+  keep_focus(element, () => element.replaceChildren(...parts));
+}
+
 /** @param {import("./study.js").StudyView} view */
 export function show_takeaways(view) {
-  const { picture } = view;
-  if (!picture) return;
+  if (!view.picture) return;
   if (view.solving.is_on) {
     const name = `${view.study.name}-part`;
     const what = view.solving.is_kept ? "These points are kept as a study."
       : "What is solved while one looks goes when nobody looks. The address of this view finds it again or solves it anew; or keep it as a study.";
-    view.commands.replaceChildren(h("p", { class: "weak" }, what), numbers(picture),
+    show_parts(view.commands, h("p", { class: "weak" }, what), numbers(view),
       ...(view.solving.block ? [copied("the command that solves it", run_command(view, name)), copied("the command of the picture", plot_command(view, name))] : []));
     return;
   }
   const file = (/** @type {string} */ format) => h("a", { class: "button", download: `${view.study.name}.${format}`, href: picture_path(view, format) }, format.toUpperCase());
   const said = h("span", { role: "status", class: "weak" });
-  view.commands.replaceChildren(
-    h("p", {}, "The picture, as oblique plot draws it:"), h("div", { class: "row files" }, file("svg"), file("png"), file("csv"), numbers(picture)),
+  show_parts(view.commands,
+    h("p", {}, "The picture, as oblique plot draws it:"), h("div", { class: "row files" }, file("svg"), file("png"), file("csv"), numbers(view)),
     copied("the command of the picture", plot_command(view)),
     h("p", {}, "The rows of the table:"), copied("the command of the rows", query_command(view)),
     h("p", { class: "weak" }, "Add --db FILE or --server ADDRESS where the database is not oblique.db. The address of this view is a link to it."),
@@ -33,8 +46,8 @@ export function show_takeaways(view) {
     } }, "Copy the link"), said));
 }
 
-/** @param {import("./asked/picture.js").Picture} picture */
-const numbers = (picture) => h("button", { type: "button", onclick: () => save("picture.csv", "text/csv", cells_csv(picture)) }, "Numbers on screen as CSV");
+/** @param {import("./study.js").StudyView} view */
+const numbers = (view) => h("button", { type: "button", onclick: () => { if (view.picture) save("picture.csv", "text/csv", cells_csv(view.picture)); } }, "Numbers on screen as CSV");
 
 /** @param {import("./study.js").StudyView} view @param {string} format */
 function picture_path(view, format) {

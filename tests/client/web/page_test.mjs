@@ -9,7 +9,9 @@ after(end);
 
 await import("./overview_tests.mjs");
 await import("./study_tests.mjs");
-await import("./condition_tests.mjs");
+await import("./study/condition_tests.mjs");
+await import("./study/choice_tests.mjs");
+await import("./study/running_tests.mjs");
 await import("./takeaway_tests.mjs");
 await import("./point_tests.mjs");
 await import("./looks_tests.mjs");

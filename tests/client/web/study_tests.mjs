@@ -1,7 +1,7 @@
 // A study: its map, its other pictures, its rows.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { browser, kMap, kWhere, server, study, text_of, until, write } from "./here.mjs";
+import { browser, facts, kMap, kWhere, server, study, text_of, until, write } from "./here.mjs";
 
 test("a map shows its cells; pointing at one tells its value, a click chooses it, two open its point", async () => {
   const page = await study();
@@ -116,8 +116,6 @@ test("what lies between the cells of a map is solved while one looks, and is kep
   await until(page, () => document.querySelector(".facts").textContent.includes("12 × 7"));
   await page.close();
 });
-
-const facts = (page, text) => until(page, (wanted) => document.querySelector(".facts")?.textContent.includes(wanted), text);
 
 test("what is solved between points is in the address: other outputs and sliders, an open point, Back, a link and a study that went meanwhile find it again", async () => {
   const page = await study();

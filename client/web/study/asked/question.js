@@ -9,6 +9,8 @@ const kMostCells = 512; // a side of a picture
 /** Where the server looks each cell up, or reads a whole column for so many, some of them come first. */
 const kFirstCells = 96;
 const kLarge = 4_000_000; // points: a column of these takes seconds
+/** Who waits so long for a picture sees a coarse one before. */
+const kSlow_ms = 300;
 const kMostBins = 96;
 const kMostLines = 8;
 
@@ -29,7 +31,9 @@ function has_many_cells(view) {
 export function steps_to(view) {
   if (!is_slice(view.is("pic"))) return [kMostCells];
   const is_first = view.is("pic") === "map" && !view.read_columns.has(view.is("z")) && view.is("where") === "" && has_many_cells(view);
-  return is_first || view.study.points > kLarge ? [kFirstCells, kMostCells] : [kMostCells];
+  // What is shown is not made coarser by the same with a few points more.
+  const is_slow = view.study.points > kLarge && view.fine_ms > kSlow_ms && !view.is_refreshing;
+  return is_first || is_slow ? [kFirstCells, kMostCells] : [kMostCells];
 }
 
 /** @param {View} view @param {number} cells a side, at most @returns {Record<string, string | number>} */
@@ -72,6 +76,9 @@ async function scatter(view, signal) {
 }
 
 const filter_of = (/** @type {View} */ view) => (view.is("where") ? { where: view.is("where") } : {});
+
+/** Whether a picture of so many cells is the best one. @param {number} cells */
+export const is_fine = (cells) => cells === kMostCells;
 
 /** The picture of a view. @param {View} view @param {number} cells a side of a map, at most @param {AbortSignal} signal */
 export function ask(view, cells, signal) {

@@ -81,8 +81,6 @@ const kSteps = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowD
 
 /** @param {import("./map.js").MapCanvas} map */
 function listen_to_keys(map) {
-  /** Where a marked rectangle began. @type {[number, number] | null} */
-  let anchor = null;
   const move = (/** @type {any} */ side, /** @type {number} */ i, /** @type {number} */ by) =>
     side.order[Math.min(Math.max(side.order.indexOf(i) + by, 0), side.order.length - 1)];
   const about = (/** @type {any} */ side, /** @type {number} */ i) => {
@@ -96,14 +94,14 @@ function listen_to_keys(map) {
     const place = map.chosen ?? /** @type {[number, number]} */ ([map.x.order[0], map.y.order[0]]);
     if (step) {
       const cell = /** @type {[number, number]} */ (map.chosen ? [move(map.x, place[0], step[0]), move(map.y, place[1], step[1])] : place);
-      anchor = event.shiftKey ? anchor ?? place : null;
+      map.anchor = event.shiftKey ? map.anchor ?? place : null;
       map.choose(cell);
       map.on.choose(cell, null);
-      if (anchor) map.on.mark(of_cells(map, anchor, cell));
+      if (map.anchor) map.on.mark(of_cells(map, map.anchor, cell));
     } else if (event.key === "Enter" && map.chosen) {
       map.on.open(map.chosen);
     } else if (event.key === "Escape") {
-      anchor = null;
+      map.anchor = null;
       map.on.mark(null);
     } else if (event.key === "+" || event.key === "=") {
       const [x0, x1] = about(map.x, place[0]);

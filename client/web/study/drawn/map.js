@@ -16,6 +16,12 @@ import { cell_at, cells_of, draw_axes, kMargin, reach } from "./frame.js";
  * @property {(part: import("./brush.js").Rectangle | null) => void} mark null: nothing
  */
 
+/** Whether cells of the same numbers are the same. @param {import("../asked/picture.js").Picture} a @param {import("../asked/picture.js").Picture} b */
+export function have_same_cells(a, b) {
+  return [[a.x, b.x], [a.y, b.y]].every(([one, other]) => one.name === other.name && one.values.length === other.values.length
+    && one.values.every((value, i) => value === other.values[i]));
+}
+
 export class MapCanvas {
   /** @param {Told} on */
   constructor(on) {
@@ -40,6 +46,8 @@ export class MapCanvas {
     this.chosen_point = null;
     /** @type {[number, number] | null} */
     this.hovered = null;
+    /** Where a rectangle began that keys mark. @type {[number, number] | null} */
+    this.anchor = null;
     /** @type {{x: number, y: number, to_x: number, to_y: number} | null} */
     this.drag = null;
     this.watch = new ResizeObserver(() => this.draw());
@@ -59,6 +67,7 @@ export class MapCanvas {
 
   /** @param {import("../asked/picture.js").Picture} picture @param {Look} look @param {import("../asked/question.js").Marks | null} marks */
   show(picture, look, marks) {
+    if (!this.picture || !have_same_cells(picture, this.picture)) this.chosen = this.hovered = this.anchor = null;
     this.picture = picture;
     this.look = look;
     this.marks = marks;

@@ -1,7 +1,7 @@
 // Conditions of the query language: what is shown, and what is marked.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { browser, drag, kMany, kMap, kScattered, kWhere, study, text_of, until, write } from "./here.mjs";
+import { browser, drag, kMany, kMap, kScattered, kWhere, study, text_of, until, write } from "../here.mjs";
 
 const kMark = ".marks input";
 const field = (page, name) => page.evaluate((wanted) => new URLSearchParams(location.hash.split("?")[1]).get(wanted), name);
@@ -84,10 +84,20 @@ test("points are marked by keys, and Escape marks none", async () => {
   await until(page, () => document.querySelector(".uplot canvas"));
   await page.focus(".plot[role=application]");
   await page.keyboard.press("Home");
-  await page.keyboard.down("Shift");
-  for (let i = 0; i < 3; ++i) await page.keyboard.press("ArrowRight");
-  await page.keyboard.up("Shift");
-  await until(page, () => /^mu >= [\d.]+ AND mu <= [\d.]+$/.test(document.querySelector(".marks input").value));
+  const spans = [];
+  for (let i = 0; i < 3; ++i) {
+    await page.keyboard.down("Shift");
+    await page.keyboard.press("ArrowRight");
+    await page.keyboard.up("Shift");
+    const condition = await until(page, (before) => {
+      const { value } = document.querySelector(".marks input");
+      return value !== before && document.querySelector("[data-marks]")?.dataset.marks === value && value;
+    }, spans.at(-1)?.condition ?? "");
+    const [, from, to] = condition.match(/^mu >= ([\d.]+) AND mu <= ([\d.]+)$/);
+    spans.push({ condition, from: Number(from), to: Number(to) });
+  }
+  assert.ok(spans.every((one, i) => i === 0 || (one.from === spans[0].from && one.to > spans[i - 1].to)), JSON.stringify(spans));
+  assert.ok(await page.evaluate(() => document.activeElement.matches(".plot[role=application]")));
   await page.close();
 });
 
@@ -114,9 +124,8 @@ test("lines show what is marked elsewhere, and a rectangle over them marks what 
   await page.keyboard.press("Escape");
   await until(page, () => document.querySelector(".marks input").value === "");
   // Without Shift it zooms, unless people choose otherwise.
-  const old = await page.$(".u-over");
   await page.evaluate(() => { const drags = [...document.querySelectorAll(".controls select")].at(-1); drags.value = "mark"; drags.dispatchEvent(new Event("change")); });
-  await until(page, (one) => !one.isConnected && document.querySelector(".u-over"), old);
+  await until(page, () => location.hash.includes("drag=mark"));
   await sweep([0.01, 0.2], [0.99, 0.21]);
   assert.match(await until(page, () => document.querySelector(".marks input").value), /^(mu .* AND )?e = 1$/);
   await page.close();
