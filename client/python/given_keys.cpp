@@ -133,6 +133,11 @@ ModelParameters base_model(const GivenKeys& given) {
     model.set(kIntegrator, static_cast<double>(solver::integrator_named(name->second)));
   }
   if (!given.lengths_m.empty()) {
+    for (const char* const name : {"links", "length"}) {  // as numbers they are refused below
+      if (given.texts.contains(name) || given.arrays.contains(name)) {
+        throw InputError(std::string(protocol::WrittenModel::kLengthsStandAlone));
+      }
+    }
     model.set_lengths(given.lengths_m);
   }
   return model.model();

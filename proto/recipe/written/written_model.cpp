@@ -44,9 +44,7 @@ void WrittenModel::set(std::string_view key, double value) {
 
 void WrittenModel::check_lengths_alone() const {
   if (lengths_m_ && (values_.contains("links") || values_.contains("length"))) {
-    throw solver::InputError(
-        "lengths stands beside links or length: give either lengths, one a link, or links and "
-        "length");
+    throw solver::InputError(std::string(kLengthsStandAlone));
   }
 }
 

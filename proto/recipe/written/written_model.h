@@ -18,6 +18,9 @@ class WrittenModel {
   /// The keys that stand in a model beside those of `solver::model_keys()`.
   static constexpr std::string_view kPreset = "preset";
   static constexpr std::string_view kLengths = "lengths";
+  /// What is said to those who write `lengths` and what it stands for too.
+  static constexpr std::string_view kLengthsStandAlone =
+      "lengths stands beside links or length: give either lengths, one a link, or links and length";
 
   void set_preset(std::string_view name);
   /// One length in m a link. Not beside the keys links and length.
