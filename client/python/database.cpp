@@ -31,8 +31,7 @@ namespace {
 namespace py = pybind11;
 using protocol::CellKind;
 
-/// A database file that several threads may ask, one after another. What was opened before a fork
-/// is left alone behind it: SQLite's files may not be carried over.
+/// A database file that several threads of one process may ask, one after another.
 class SharedReader {
  public:
   explicit SharedReader(const std::string& file) : file_(std::filesystem::absolute(file).string()) {
@@ -43,14 +42,14 @@ class SharedReader {
     open();
   }
 
-  /// Lets `ask` have the reader.
+  /// As an absolute path.
+  const std::string& file() const { return file_; }
+  bool is_of_this_process() const { return process_ == getpid(); }
+
+  /// Lets `ask` have the reader, unless `stop` was set before its turn.
   template <class Ask>
   auto with_reader(const std::atomic<bool>& stop, const Ask& ask) {
     const std::lock_guard lock(mutex_);
-    if (process_ != getpid()) {
-      static_cast<void>(reader_.release());
-      open();
-    }
     if (is_interrupted_) {  // for good
       open();
     }
@@ -61,6 +60,9 @@ class SharedReader {
       }
       ~Asking() { shared.set_asking(nullptr); }
     } asking(*this, stop);
+    if (stop) {
+      throw Stopped();
+    }
     return ask(*reader_);
   }
 
@@ -84,14 +86,13 @@ class SharedReader {
 
   void open() {
     reader_ = std::make_unique<server::Reader>(file_);
-    process_ = getpid();
     is_interrupted_ = false;
   }
 
   const std::string file_;
   std::mutex mutex_;
   std::unique_ptr<server::Reader> reader_;
-  pid_t process_ = 0;
+  const pid_t process_ = getpid();
   bool is_interrupted_ = false;
   std::mutex asking_mutex_;
   const std::atomic<bool>* asking_ = nullptr;  ///< who has the reader
@@ -161,7 +162,7 @@ class Database {
  public:
   explicit Database(const std::string& file) : shared_(std::make_shared<SharedReader>(file)) {}
 
-  std::string remark() const { return shared_->remark(); }
+  std::string remark() { return shared()->remark(); }
 
   py::list query(const std::string& study, const std::string& where, const std::string& select,
                  const std::string& group, const std::string& order,
@@ -192,7 +193,7 @@ class Database {
   /// A dict for each study.
   py::list studies() {
     using Studies = std::vector<protocol::StudyStatus>;
-    const auto found = interruptibly<Studies>([shared = shared_](const std::atomic<bool>& stop) {
+    const auto found = interruptibly<Studies>([shared = shared()](const std::atomic<bool>& stop) {
       return shared->with_reader(stop,
                                  [](server::Reader& reader) { return reader.study_status(); });
     });
@@ -213,13 +214,23 @@ class Database {
   }
 
  private:
+  /// The reader of this process. That of the parent is left alone behind a fork: SQLite's files may
+  /// not be carried over, and threads that are not here may have locked it.
+  const std::shared_ptr<SharedReader>& shared() {
+    if (!shared_->is_of_this_process()) {
+      auto own = std::make_shared<SharedReader>(shared_->file());
+      static_cast<void>(new std::shared_ptr(std::exchange(shared_, std::move(own))));
+    }
+    return shared_;
+  }
+
   /// (name, unit, values) of each column.
   py::list ask(const protocol::QueryRequest& request) {
     auto answer = interruptibly<QueryColumns>(
-        [shared = shared_, request](const std::atomic<bool>& stop) {
+        [shared = shared(), request](const std::atomic<bool>& stop) {
           return answer_to(*shared, request, stop);
         },
-        [shared = shared_](const std::atomic<bool>& stop) { shared->interrupt(stop); });
+        [shared = shared()](const std::atomic<bool>& stop) { shared->interrupt(stop); });
     py::list all;
     for (AnswerColumn& column : answer.columns()) {
       all.append(py::make_tuple(column.name, column.unit, values_of(std::move(column))));

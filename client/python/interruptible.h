@@ -13,6 +13,8 @@
 
 #include <pybind11/pybind11.h>
 
+#include "client/python/interpreter_lock.h"
+
 namespace oblique::python {
 
 /// How often a call looks whether somebody pressed Ctrl-C.
@@ -20,13 +22,22 @@ inline constexpr std::chrono::milliseconds kBetweenLooks{50};
 /// Work that takes longer to end is left to end by itself.
 inline constexpr std::chrono::milliseconds kLongestWait{150};
 
-/// Runs `work` on a thread of its own, without the interpreter's lock, and gives what it gives.
-/// Where a signal's handler throws meanwhile, as that of Ctrl-C does, `stop` is set, and soon after
-/// that is thrown, even while `work` still runs: it must own all that it uses. `when_stopped` is
-/// called behind that, from here, where there is one.
+/// Thrown by work that nobody waits for any more.
+class Stopped {};
+
+/// Runs `work` without the interpreter's lock, and gives what it gives. For the main thread, which
+/// signals reach, it runs on a thread of its own: where a signal's handler throws meanwhile, as
+/// that of Ctrl-C does, `stop` is set, and soon after that is thrown, even while `work` still runs:
+/// it must own all that it uses. `when_stopped` is called behind that, from here, where there is
+/// one.
 template <class Result>
 Result interruptibly(std::function<Result(const std::atomic<bool>& stop)> work,
                      const std::function<void(const std::atomic<bool>& stop)>& when_stopped = {}) {
+  if (!is_main_thread()) {
+    const WithoutLock others_run;
+    const std::atomic<bool> nobody_stops_it = false;
+    return work(nobody_stops_it);
+  }
   struct State {
     std::function<Result(const std::atomic<bool>&)> work;
     std::atomic<bool> stop = false;
@@ -40,7 +51,7 @@ Result interruptibly(std::function<Result(const std::atomic<bool>& stop)> work,
   state->work = std::move(work);
   bool is_interrupted = false;
   {
-    const pybind11::gil_scoped_release others_run;
+    WithoutLock others_run;
     std::thread thread([state] {
       std::optional<Result> result;
       std::exception_ptr failure;
@@ -59,10 +70,7 @@ Result interruptibly(std::function<Result(const std::atomic<bool>& stop)> work,
     const auto has_ended = [&state] { return state->has_ended; };
     while (!state->ended.wait_for(lock, kBetweenLooks, has_ended) && !is_interrupted) {
       lock.unlock();
-      {
-        const pybind11::gil_scoped_acquire here;
-        is_interrupted = PyErr_CheckSignals() != 0;
-      }
+      is_interrupted = others_run.with_lock([] { return PyErr_CheckSignals() != 0; });
       lock.lock();
       if (is_interrupted) {
         state->stop = true;

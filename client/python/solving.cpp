@@ -1,17 +1,25 @@
 #include "client/python/solving.h"
 
+#include <malloc.h>
+
+#include <algorithm>
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <memory>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
-#include <pybind11/stl.h>
-
 #include "client/python/conversions.h"
 #include "client/python/given_keys.h"
+#include "client/python/interpreter_lock.h"
 #include "client/python/interruptible.h"
 #include "client/python/result_arrays.h"
+#include "proto/program/origin/origin.h"
+#include "worker/solver/library/falls_kept.h"
+#include "worker/solver/library/point_runs.h"
 #include "worker/solver/library/solver.h"
 #include "worker/solver/model/result_fields.h"
 #include "worker/solver/model/trace_columns.h"
@@ -20,9 +28,6 @@ namespace oblique::python {
 namespace {
 
 namespace py = pybind11;
-
-/// Thrown by the sink of a trace that nobody waits for any more.
-class Stopped {};
 
 /// The only point that was given. Throws InputError for what is wrong with its model.
 struct OnePoint {
@@ -109,33 +114,32 @@ py::tuple trace(const Falls& falls, const py::dict& keys, bool fall, bool shape)
 }
 
 /// Lets signals and `progress` (None: nobody) end it.
-ManyOptions options_of(const Falls& falls, std::size_t points, std::size_t threads, bool errors,
-                       const py::object& progress) {
-  ManyOptions options;
-  options.threads = threads;
-  options.errors = errors;
-  options.falls = falls;
-  options.goes_on = [points, &progress](std::size_t outcomes) {
-    const py::gil_scoped_acquire here;
-    if (PyErr_CheckSignals() != 0) {
-      throw py::error_already_set();
-    }
-    if (!progress.is_none()) {
-      progress(outcomes, points);
-    }
-    return true;
+std::function<bool(std::size_t)> goes_on(WithoutLock& others_run, std::size_t points,
+                                         bool has_signals, const py::object& progress) {
+  if (!has_signals && progress.is_none()) {
+    return {};
+  }
+  return [=, &others_run, &progress](std::size_t outcomes) {
+    return others_run.with_lock([&] {
+      if (has_signals && PyErr_CheckSignals() != 0) {
+        throw py::error_already_set();
+      }
+      if (!progress.is_none()) {
+        progress(outcomes, points);
+      }
+      return true;
+    });
   };
-  return options;
 }
 
 py::dict solve_many(const Falls& falls, const py::dict& keys, std::size_t count,
                     std::size_t threads, bool errors, const py::object& progress) {
   const GivenKeys given_keys = keys_of(keys, count);
-  const auto options = options_of(falls, count, threads, errors, progress);
+  const bool has_signals = is_main_thread();
   ResultArrays arrays(count);
   GivenPoints given;
   {
-    const py::gil_scoped_release others_run;
+    WithoutLock others_run;
     given = points_of(given_keys);
     std::vector<Point> points;
     std::vector<std::size_t> places;
@@ -147,17 +151,19 @@ py::dict solve_many(const Falls& falls, const py::dict& keys, std::size_t count,
         places.push_back(i);
       }
     }
-    oblique::solve_many(
-        given.models, points,
-        [&](Outcome&& outcome) {
-          const std::size_t place = places[outcome.point];
-          if (outcome.result) {
-            arrays.set(place, *outcome.result);
-          } else {
-            arrays.set_error(place, outcome.error);
-          }
-        },
-        options);
+    oblique::solve_many(given.models, points,
+                        [&](Outcome&& outcome) {
+                          const std::size_t place = places[outcome.point];
+                          if (outcome.result) {
+                            arrays.set(place, *outcome.result);
+                          } else {
+                            arrays.set_error(place, outcome.error);
+                          }
+                        },
+                        {.threads = threads,
+                         .errors = errors,
+                         .goes_on = goes_on(others_run, count, has_signals, progress),
+                         .falls = falls});
   }
   if (!progress.is_none()) {
     progress(count, count);
@@ -195,12 +201,24 @@ py::list fields() {
 }  // namespace
 
 void add_solving(py::module_& module) {
-  py::class_<Falls>(module, "Falls").def(py::init<>());
+  py::class_<Falls>(module, "Falls")
+      .def(py::init([] {
+        return Falls(solver::bytes_of_falls(std::max(1U, std::thread::hardware_concurrency())));
+      }))
+      .def("is_at_rest", [](const Falls& falls) { return falls.cache()->falls.is_at_rest(); });
   module.def("solve", &solve, py::arg("falls"), py::arg("keys"), py::arg("errors"));
   module.def("trace", &trace, py::arg("falls"), py::arg("keys"), py::arg("fall"), py::arg("shape"));
   module.def("solve_many", &solve_many, py::arg("falls"), py::arg("keys"), py::arg("points"),
              py::arg("threads"), py::arg("errors"), py::arg("progress"));
+  // What threads have freed is kept for them otherwise.
+  module.def("give_memory_back", [] { malloc_trim(0); });
   module.def("version", &version);
+  module.def("origin", [] {
+    const auto origin = protocol::origin();
+    return std::map<std::string, std::string>{{"version", protocol::version_and_commit()},
+                                              {"compiler", origin.compiler},
+                                              {"build_type", origin.build_type}};
+  });
   module.def("instruction_set", &instruction_set);
   module.def("fields", &fields);
   module.def("trace_states", [] {

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Callable, Optional, Sequence, Union
+import operator
+import os
+from typing import Any, Callable, Optional, Sequence, SupportsIndex, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +18,29 @@ Number = Union[float, int, "np.floating[Any]", "np.integer[Any]"]
 Value = Union[Number, str]
 
 _falls = _core.Falls()  # of all calls: a model's fall is solved once
+_left_behind: list[_core.Falls] = []
+#: Threads that one call may have.
+MOST_THREADS = 1024
+
+
+def forget_falls() -> None:
+    """Gives back the memory of the falls that are kept for later calls: 256 MB at most, or 96 MB a
+    core where that is more. Calls of other threads go on; what comes next solves its falls anew,
+    to the same bits."""
+    global _falls
+    _falls = _core.Falls()
+    _core.give_memory_back()
+
+
+def _leave_threads_behind() -> None:
+    """In the child of a fork, where threads of the parent will never end what they are at."""
+    global _falls
+    if not _falls.is_at_rest():
+        _left_behind.append(_falls)  # whose end would wait for them
+        _falls = _core.Falls()
+
+
+os.register_at_fork(after_in_child=_leave_threads_behind)
 
 
 def solve(
@@ -37,8 +62,9 @@ def solve(
     ``dt_fall``, ``tolerance``, ...; ``lengths`` has one length a link. A value may be an expression
     of other keys. ``errors`` asks for estimated errors too.
 
-    The first point of a model takes some 0.1 s, for its fall; others take 1 ms or less. Many points
-    are ten times as fast in one call of :func:`solve_many`.
+    The first point of a model takes some 0.1 s, for its fall, which is kept for others (see
+    :func:`forget_falls`); these take 1 ms or less. Many points are ten times as fast in one call of
+    :func:`solve_many`.
 
     Raises ValueError, naming key, value and range, for what is not allowed, and SolveError for a
     point that has no answer.
@@ -90,7 +116,7 @@ def solve_many(
     preset: str = "paper",
     lengths: Optional[Sequence[Number]] = None,
     errors: bool = False,
-    threads: Optional[int] = None,
+    threads: Optional[SupportsIndex] = None,
     progress: Optional[Callable[[int, int], object]] = None,
     **model: Union[npt.ArrayLike, str],
 ) -> ManyResults:
@@ -98,7 +124,8 @@ def solve_many(
 
     All keys may be arrays, lists or single values, which are broadcast against each other, and
     expressions; the results have their common shape. They are the bits that :func:`solve` gives.
-    A point of an array that has no answer fails alone: see :class:`ManyResults`.
+    A point of an array that has no answer fails alone, as one does whose value is NaN or masked:
+    see :class:`ManyResults`.
 
     ``progress(done, all)`` is called every 50 ms or so; what it raises ends the work, as Ctrl-C
     does. Other threads of Python run meanwhile.
@@ -130,11 +157,23 @@ def solve_many(
         else:
             given[name] = np.ascontiguousarray(np.broadcast_to(array, shape).ravel())
     points = math.prod(shape)
-    if threads is not None and (not isinstance(threads, int) or threads < 1):
-        raise ValueError(f"threads = {threads} is not allowed: threads must be a whole number >= 1")
+    count = 0 if threads is None else _whole_threads(threads)
     _add_model(given, preset, lengths)
-    many = _core.solve_many(_falls, given, points, threads or 0, errors, progress)
+    many = _core.solve_many(_falls, given, points, count, errors, progress)
     return ManyResults(many, shape)
+
+
+def _whole_threads(threads: SupportsIndex) -> int:
+    try:
+        count = 0 if isinstance(threads, (bool, np.bool_)) else operator.index(threads)
+    except TypeError:
+        count = 0
+    if not 1 <= count <= MOST_THREADS:
+        raise ValueError(
+            f"threads = {threads} is not allowed: "
+            f"threads must be a whole number from 1 to {MOST_THREADS}"
+        )
+    return count
 
 
 def _one_value_each(
@@ -168,8 +207,17 @@ def _add_model(
         given["lengths"] = values.tolist()
 
 
+def _without_masks(value: Any) -> Any:
+    """NaN where a value is masked."""
+    if isinstance(value, (list, tuple)) and any(isinstance(v, np.ma.MaskedArray) for v in value):
+        value = np.ma.stack(np.broadcast_arrays(*value, subok=True))
+    if isinstance(value, np.ma.MaskedArray) and value.dtype.kind in "iuf":
+        return value.astype(np.float64).filled(np.nan)
+    return value
+
+
 def _numbers(name: str, value: Any) -> npt.NDArray[np.float64]:
-    array = np.asarray(value)
+    array = np.asarray(_without_masks(value))
     if value is None or array.dtype.kind == "O" and None in array.ravel().tolist():
         raise ValueError(f"{name} = None is not allowed: {name} must be a number or numbers")
     if name == "integrator" and array.dtype.kind == "U":

@@ -3,6 +3,7 @@
 import json
 import os
 import subprocess
+import sys
 
 import pytest
 
@@ -22,6 +23,26 @@ def solved_by_program(*arguments):
 
 def without_time(result):
     return {**result, "solver": {**result["solver"], "wall_s": None}}
+
+
+#: How scripts of their own begin that work without end, which is to be ended: where it is not, the
+#: time limit of all tests says so, and the alarm takes the script away behind that.
+BEGINNING = """
+import os, signal, sys, threading
+signal.alarm(1000)
+def threads():
+    return len(os.listdir("/proc/self/task"))
+def wait_for_threads(more_than):
+    while threads() <= more_than:
+        os.sched_yield()
+"""
+
+
+def ended_script(script, *arguments):
+    """What became of a script behind BEGINNING. One that does not end is the time limit's to judge."""
+    return subprocess.run(
+        [sys.executable, "-c", BEGINNING + script, *arguments], capture_output=True, text=True
+    )
 
 
 @pytest.fixture(scope="session")

@@ -77,8 +77,15 @@ def test_points_that_fail_are_nan_with_their_reason_and_leave_the_others_alone()
         ({"tipmass": [1, 2]}, "did you mean `tip_mass`?"),
         ({"threads": 0}, "threads = 0 is not allowed"),
         ({"threads": 1.5}, "threads = 1.5 is not allowed"),
+        ({"threads": True}, "threads = True is not allowed: threads must be a whole number from 1 to"),
+        ({"threads": np.bool_(True)}, "threads = True is not allowed"),
+        ({"threads": 10**20}, "threads = 100000000000000000000 is not allowed"),
         ({"mu": np.array([1j])}, "is not allowed: mu must be a number or numbers"),
         ({"lengths": [[0.4, 0.4]]}, "lengths must be the length of each link"),
+        ({"lengths": [0.4, 0.5], "links": 2}, "lengths stands beside links or length"),
+        ({"lengths": [0.4, 0.5], "links": [2]}, "lengths stands beside links or length"),
+        ({"lengths": [0.4, 0.5], "length": [0.5, 0.6]}, "lengths stands beside links or length"),
+        ({"lengths": [0.4, 0.5], "length": "H / 2"}, "lengths stands beside links or length"),
         ({"integrator": ["euler"]}, "integrator = 'euler' is not allowed"),
     ],
 )
@@ -88,9 +95,20 @@ def test_what_is_wrong_with_all_points_is_a_value_error(keys, sentence):
     assert sentence in str(error.value)
 
 
+def test_values_that_are_masked_fail_alone_whatever_lies_below_the_mask():
+    mu = np.ma.array([0.2, 0.4, 0.6], mask=[False, True, False])
+    many = oblique.solve_many(1, mu, 1)
+    assert many.failed.tolist() == [False, True, False]
+    assert "mu = nan is not allowed" in many.error[1]
+    whole = np.ma.array([1, 1, 0], mask=[False, True, False])
+    assert oblique.solve_many(1, whole, 1).failed.tolist() == [False, True, False]
+    assert oblique.solve_many(1, [mu, whole], 1).failed.tolist() == [[False, True, False]] * 2
+    assert oblique.solve_many(1, 0.4, 1, k=np.ma.array([1e7, 2e7], mask=[True, False])).failed[0]
+
+
 def test_the_number_of_threads_changes_no_bit():
     mu = np.linspace(0, 2, 50)[::-1]
-    one = oblique.solve_many(0.8, mu, 0.9, threads=1)
+    one = oblique.solve_many(0.8, mu, 0.9, threads=np.int64(1))
     three = oblique.solve_many(0.8, mu, 0.9, threads=3)
     assert np.array_equal(one.fn_peak_N, three.fn_peak_N)
     assert np.array_equal(one.mode, three.mode)

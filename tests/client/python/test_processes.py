@@ -1,0 +1,162 @@
+"""What ends, forks and outlasts work: Ctrl-C, the end of Python, children, and what stays in memory.
+
+Work here would go on for hours. A test that waits for it is ended by the time limit of all tests, and by nothing else.
+"""
+
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+import oblique
+from conftest import BEGINNING, ended_script
+
+SOLVE = "oblique.solve(1, 0.4, 1, integrator='generalized-alpha', dt_fall=1e-9)"
+SOLVE_MANY = "oblique.solve_many(1, numpy.linspace(0, 2, 10**6), 1, elements_per_link=32)"
+LONG_FALLS = "oblique.solve_many(1, 0.4, 1, integrator=['generalized-alpha'], dt_fall=[1e-9, 2e-9])"
+WITH_PROGRESS = SOLVE_MANY[:-1] + ", progress=lambda done, of: None)"
+TRACE = SOLVE.replace("solve", "trace")
+ENDLESS = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT count(*) FROM n"
+QUERY = f"oblique.Database(sys.argv[1]).sql('{ENDLESS}')"
+
+
+@pytest.mark.parametrize("work", [SOLVE, SOLVE_MANY, LONG_FALLS, TRACE, QUERY])
+def test_ctrl_c_ends_work_with_keyboard_interrupt(work, database):
+    script = f"import oblique, numpy\nprint(threads(), flush=True)\n{work}"
+    with subprocess.Popen(
+        [sys.executable, "-c", BEGINNING + script, database],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    ) as process:
+        before = int(process.stdout.readline())
+        while len(os.listdir(f"/proc/{process.pid}/task")) <= before:
+            os.sched_yield()
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate()
+    assert said.rstrip().endswith("KeyboardInterrupt")
+    assert process.returncode in (-signal.SIGINT, 130)
+
+
+#: What is destroyed when Python ends, which takes as long as that is told to take.
+ENDS_LATE = """
+import time
+class EndsLate:
+    def __del__(self, tasks=os.listdir, sleep=time.sleep, write=os.write):
+        while len(tasks("/proc/self/task")) > self.most_threads: pass
+        sleep(0.3)
+        write(1, b"done")
+sys.ends_late = EndsLate()  # no module that a thread still uses may hold it
+sys.ends_late.most_threads = 1000
+"""
+
+
+@pytest.mark.parametrize("work", [SOLVE, SOLVE_MANY, WITH_PROGRESS, TRACE, QUERY])
+def test_python_ends_well_while_a_daemon_thread_is_in_a_call(work, database):
+    ended = ended_script(
+        ENDS_LATE + "import oblique, numpy\n"
+        "begins = threading.Event()\n"
+        "class Work:\n"
+        "    def __enter__(self): begins.set()\n"
+        "    def __exit__(self, *_): print('it ended')\n"
+        "def run():\n"
+        f"    with Work(): {work}\n"
+        "threading.Thread(target=run, daemon=True).start()\n"
+        "begins.wait()\n"
+        "sys.setswitchinterval(1e-6)\n"
+        "for _ in range(10**6): pass\n",  # until it has left the lock to others
+        database,
+    )
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "done", "")
+
+
+def test_python_ends_well_when_the_call_of_a_daemon_thread_ends_behind_it():
+    ended = ended_script(
+        ENDS_LATE + "import oblique\n"
+        "before = threads()\n"
+        "sys.ends_late.most_threads = before + 1\n"  # those of the work have ended
+        "def work(): oblique.solve_many(1, [i / 1000 for i in range(1000)], 1, threads=1)\n"
+        "threading.Thread(target=work, daemon=True).start()\n"
+        "wait_for_threads(before + 1)\n"
+    )
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "done", "")
+
+
+def test_a_child_after_fork_solves_and_asks(database):
+    asked = oblique.Database(database)
+    expected = oblique.solve(1, 0.4, 1).fn_peak_N
+    child = os.fork()
+    if child == 0:
+        same = oblique.solve(1, 0.4, 1).fn_peak_N == expected
+        os._exit(0 if same and len(asked.query("sweep")) == 36 else 1)
+    assert os.waitpid(child, 0)[1] == 0
+    assert len(asked.query("sweep")) == 36
+
+
+def test_a_child_after_fork_has_the_falls_of_its_parent_where_no_thread_is_at_any():
+    oblique.solve(1, 0.4, 1)
+    kept = oblique._solving._falls
+    child = os.fork()
+    if child == 0:
+        os._exit(0 if oblique._solving._falls is kept else 1)
+    assert os.waitpid(child, 0)[1] == 0
+
+
+def test_a_child_of_a_fork_behind_a_ctrl_c_solves_the_fall_that_its_parent_was_at():
+    ended = ended_script(
+        "import oblique\n"
+        "def interrupt(*_): raise KeyboardInterrupt\n"
+        "signal.signal(signal.SIGVTALRM, interrupt)\n"
+        # It takes a second or some, in which the signal finds it at work.
+        "def solve(): return oblique.solve(1, 0.4, 1, integrator='generalized-alpha', dt_fall=2e-6).mode\n"
+        "try:\n"
+        "    signal.setitimer(signal.ITIMER_VIRTUAL, 0.05)\n"
+        "    solve()\n"
+        "    print('it ended before')\n"
+        "except KeyboardInterrupt:\n"
+        "    pass\n"
+        "child = os.fork()\n"
+        "mode = solve()\n"
+        "if child == 0: os._exit(0 if mode else 1)\n"
+        "print(os.waitpid(child, 0)[1])\n"
+    )
+    assert (ended.stdout, ended.stderr) == ("0\n", "")
+
+
+def test_a_question_that_ctrl_c_ended_before_its_turn_is_not_asked(database):
+    ended = ended_script(
+        "import oblique\n"
+        "asked = oblique.Database(sys.argv[1])\n"
+        "def ask(rows): return asked.sql('WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL"
+        " SELECT i + 1 FROM n LIMIT %s) SELECT count(*) AS n FROM n' % rows)\n"
+        "before = threads()\n"
+        "first = threading.Thread(target=ask, args=(10**7,))\n"
+        "first.start()\n"
+        "def interrupt():\n"
+        "    wait_for_threads(before + 2)\n"  # both threads, and that of the question which waits
+        "    os.kill(os.getpid(), signal.SIGINT)\n"
+        "threading.Thread(target=interrupt, daemon=True).start()\n"
+        "try:\n"
+        "    ask(-1)\n"
+        "except KeyboardInterrupt:\n"
+        "    print(ask(5).n[0])\n",
+        database,
+    )
+    assert (ended.stdout, ended.stderr) == ("5\n", "")
+
+
+def test_the_memory_of_falls_is_given_back_when_asked():
+    ended = ended_script(
+        "import oblique, numpy\n"
+        "def mebibytes():\n"
+        "    return int(open('/proc/self/statm').read().split()[1]) * os.sysconf('SC_PAGE_SIZE') >> 20\n"
+        "begun = mebibytes()\n"
+        "E = numpy.linspace(60e9, 80e9, 80)\n"
+        "oblique.solve_many(1, 0.4, 1, E=E)\n"
+        "kept = mebibytes() - begun\n"
+        "oblique.forget_falls()\n"
+        "print(kept, mebibytes() - begun)\n"
+        "oblique.solve(1, 0.4, 1)\n"
+    )
+    kept, left = map(int, ended.stdout.split())
+    assert left < kept / 2, ended.stdout + ended.stderr
