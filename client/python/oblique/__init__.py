@@ -31,6 +31,12 @@ from ._database import Answer, Database, Study
 from ._solving import forget_falls, solve, solve_many, trace
 from ._results import Energy, Errors, ManyResults, Result, Solver, Trace
 
+for _error, _meaning in (
+    (SolveError, "A point that has no answer; the message says why."),
+    (DatabaseError, "A file that is no database of results, or one that cannot be read."),
+):
+    _error.__module__, _error.__doc__ = __name__, _meaning
+
 __version__: str = _core.version()
 
 __all__ = [

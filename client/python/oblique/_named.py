@@ -6,7 +6,7 @@ from typing import Any, Iterator
 
 
 class Named:
-    """Named values, as attributes and by ``_asdict()``."""
+    """Named values, as attributes, as ``result["fn_peak_N"]`` and by ``_asdict()``."""
 
     def __init__(self, values: dict[str, Any]) -> None:
         self.__dict__.update(values)
@@ -18,6 +18,16 @@ class Named:
             for name, value in self.__dict__.items()
             if not name.startswith("_")
         }
+
+    def __getitem__(self, name: str) -> Any:
+        if not isinstance(name, str):
+            raise TypeError(
+                f"a {type(self).__name__} has fields, not places: take one by its name, "
+                "as [\"fn_peak_N\"], and then its elements"
+            )
+        if name.startswith("_") or name not in self.__dict__:
+            raise KeyError(f"no field {name!r}: there are {', '.join(self)}")
+        return getattr(self, name)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._asdict())

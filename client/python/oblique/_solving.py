@@ -208,12 +208,20 @@ def _add_model(
 
 
 def _without_masks(value: Any) -> Any:
-    """NaN where a value is masked."""
+    """NaN where a value is masked, or is the NA of pandas."""
     if isinstance(value, (list, tuple)) and any(isinstance(v, np.ma.MaskedArray) for v in value):
         value = np.ma.stack(np.broadcast_arrays(*value, subok=True))
+    kind = getattr(value, "dtype", None)
+    if hasattr(kind, "na_value") and getattr(kind, "kind", "") in tuple("iuf"):  # of pandas
+        return value.to_numpy(dtype=np.float64, na_value=np.nan)
     if isinstance(value, np.ma.MaskedArray) and value.dtype.kind in "iuf":
-        return value.astype(np.float64).filled(np.nan)
+        return np.ma.filled(value.astype(np.float64), np.nan)  # type: ignore[no-untyped-call]
     return value
+
+
+def _shown(value: Any) -> str:
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 100 else text[:97] + "..."
 
 
 def _numbers(name: str, value: Any) -> npt.NDArray[np.float64]:
@@ -235,5 +243,5 @@ def _numbers(name: str, value: Any) -> npt.NDArray[np.float64]:
         except (TypeError, ValueError, OverflowError):
             pass
     if array.dtype.kind not in "iuf":
-        raise ValueError(f"{name} = {value!r} is not allowed: {name} must be a number or numbers")
+        raise ValueError(f"{name} = {_shown(value)} is not allowed: {name} must be a number or numbers")
     return array.astype(np.float64)

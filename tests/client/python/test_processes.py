@@ -3,6 +3,7 @@
 Work here would go on for hours. A test that waits for it is ended by the time limit of all tests, and by nothing else.
 """
 
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -100,6 +101,17 @@ def test_a_child_after_fork_has_the_falls_of_its_parent_where_no_thread_is_at_an
     if child == 0:
         os._exit(0 if oblique._solving._falls is kept else 1)
     assert os.waitpid(child, 0)[1] == 0
+
+
+@pytest.mark.parametrize("way", ["fork", "spawn"])
+def test_processes_of_a_pool_solve_and_send_results_back(way):
+    here = oblique.solve_many(1, [0.4, 1.2], 1)
+    with multiprocessing.get_context(way).Pool(2) as pool:
+        ones = pool.starmap(oblique.solve, [(1, 0.4, 1), (1, 1.2, 1)])
+        many = pool.apply(oblique.solve_many, (1, [0.4, 1.2], 1))
+        with pytest.raises(oblique.SolveError):
+            pool.apply(oblique.solve, (1, 0.4, 1), {"dt": 1e-25})
+    assert [one.fn_peak_N for one in ones] == here.fn_peak_N.tolist() == many.fn_peak_N.tolist()
 
 
 def test_a_child_of_a_fork_behind_a_ctrl_c_solves_the_fall_that_its_parent_was_at():

@@ -82,8 +82,10 @@ def test_a_wrong_value_is_a_value_error_that_names_key_value_and_range(keys, sen
 
 
 def test_a_point_without_an_answer_is_an_error_of_its_own():
-    with pytest.raises(oblique.SolveError, match="too short"):
+    with pytest.raises(oblique.SolveError, match="too short") as error:
         oblique.solve(1, 0.4, 1, dt=1e-25)
+    assert error.type.__module__ == "oblique" and error.type.__doc__
+    assert isinstance(pickle.loads(pickle.dumps(error.value)), oblique.SolveError)
 
 
 def test_a_trace_has_the_columns_and_numbers_of_the_program(tmp_path):

@@ -81,6 +81,7 @@ def test_points_that_fail_are_nan_with_their_reason_and_leave_the_others_alone()
         ({"threads": np.bool_(True)}, "threads = True is not allowed"),
         ({"threads": 10**20}, "threads = 100000000000000000000 is not allowed"),
         ({"mu": np.array([1j])}, "is not allowed: mu must be a number or numbers"),
+        ({"mu": ["a"] * 1000}, "'a', '... is not allowed: mu must be a number or numbers"),
         ({"lengths": [[0.4, 0.4]]}, "lengths must be the length of each link"),
         ({"lengths": [0.4, 0.5], "links": 2}, "lengths stands beside links or length"),
         ({"lengths": [0.4, 0.5], "links": [2]}, "lengths stands beside links or length"),
@@ -104,6 +105,14 @@ def test_values_that_are_masked_fail_alone_whatever_lies_below_the_mask():
     assert oblique.solve_many(1, whole, 1).failed.tolist() == [False, True, False]
     assert oblique.solve_many(1, [mu, whole], 1).failed.tolist() == [[False, True, False]] * 2
     assert oblique.solve_many(1, 0.4, 1, k=np.ma.array([1e7, 2e7], mask=[True, False])).failed[0]
+
+
+def test_what_pandas_has_no_value_for_fails_alone():
+    pandas = pytest.importorskip("pandas")
+    for values in (pandas.array([0.4, None], dtype="Float64"), pandas.Series([1, None], dtype="Int64")):
+        assert oblique.solve_many(1, values, 1).failed.tolist() == [False, True]
+    rows = pandas.DataFrame({"H": [1, 0.9], "mu": [0.2, 0.4], "e": [1, 0.9]}, index=[5, 6])
+    assert oblique.solve_many(**rows).shape == (2,)
 
 
 def test_the_number_of_threads_changes_no_bit():
@@ -133,6 +142,18 @@ def test_progress_may_solve_and_ask_itself():
         1, np.linspace(0, 1, 500), 1, progress=lambda *_: inner.append(oblique.solve(1, 0.4, 1).mu)
     )
     assert set(inner) == {0.4}
+
+
+def test_fields_are_taken_by_name_as_columns_of_an_answer_are():
+    many = oblique.solve_many(1, [0.4, 1.2], 1)
+    assert many["fn_peak_N"] is many.fn_peak_N and many["energy"]["closure"] is many.energy.closure
+    assert many["fn_peaks_N"] is many.fn_peaks_N
+    assert oblique.solve(1, 0.4, 1)["fn_peak_N"] == many["fn_peak_N"][0]
+    assert oblique.trace(1, 0.4, 1)["state"][0] == "sC"
+    with pytest.raises(KeyError, match="no field 'fn': there are H, mu"):
+        many["fn"]
+    with pytest.raises(TypeError, match="has fields, not places"):
+        many[0]
 
 
 def test_results_can_be_pickled_and_copied():
