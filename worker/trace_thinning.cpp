@@ -39,9 +39,11 @@ std::size_t TraceThinning::most_rows() const {
 
 void TraceThinning::add(const solver::TraceRow& row) {
   const bool falls = row.state == solver::kFalling;
-  auto made =
-      std::make_shared<Row>(falls ? rows_of_fall_++ : rows_of_contact_++, std::vector<double>(),
-                            row.fn_N, std::abs(row.ft_N), solver::code_of_state(row.state));
+  auto made = std::make_shared<Row>(Row{.number = falls ? rows_of_fall_++ : rows_of_contact_++,
+                                        .numbers = {},
+                                        .fn_N = row.fn_N,
+                                        .ft_N = std::abs(row.ft_N),
+                                        .state = solver::code_of_state(row.state)});
   solver::append_numbers(row, made->numbers);
   row_bytes_ = bytes_of(made->numbers.size());
   if (falls) {

@@ -32,8 +32,8 @@ bool is_before(const Point& a, std::size_t i, const Point& b, std::size_t j) {
     return a.model < b.model;
   }
   for (double Point::*const value : {&Point::H_m, &Point::mu, &Point::e}) {
-    if (const auto order = std::strong_order(a.*value, b.*value); order != 0) {
-      return order < 0;
+    if (const auto order = std::strong_order(a.*value, b.*value); std::is_neq(order)) {
+      return std::is_lt(order);
     }
   }
   return i < j;
