@@ -2,7 +2,7 @@
 // What a picture is of: pickers, sliders, scales. A choice goes into the address, and from there into the picture.
 import { h, keep_focus, named, picker, tick } from "/parts/dom.js";
 import { count, heading, shown } from "/parts/format.js";
-import { axis_value, fill_in, varying } from "./axes.js";
+import { axis_value, fill_in, unvaried, varying } from "./axes.js";
 import { colour_controls } from "./drawn/legend.js";
 import { show_takeaways } from "./take.js";
 
@@ -14,21 +14,25 @@ export function show_controls(view) {
   const again = (/** @type {Record<string, string>} */ changes) => {
     // Another output is one of the same part.
     view.set({ ...changes, ...("z" in changes ? {} : { x0: "", x1: "", y0: "", y1: "", cell: "" }) }, true);
-    fill_in(view.fields, view.study);
+    fill_in(view.fields, view.study, view.place.may_change);
     view.place.keep(view.fields);
     view.choice.none();
     show_controls(view);
     view.load();
     view.table.load();
   };
-  const kinds = [...(view.grids.some((/** @type {any} */ g) => varying(g.b).length > 1) ? [["map", "map"]] : []),
+  const others = view.place.may_change ? unvaried(view.study, view.block) : [];
+  const is_other = (/** @type {string} */ key) => others.some((one) => one.key === key);
+  const may_map = view.grids.some((/** @type {any} */ g) => varying(g.b).length > 1)
+    || (view.place.may_change && view.study.blocks.some((/** @type {any} */ b) => b.kind === "grid"));
+  const kinds = [...(may_map ? [["map", "map"]] : []),
     ...(view.grids.length > 0 ? [["lines", "lines"]] : []), ["gathered", "scatter"], ["histogram", "histogram"]];
   const on_grid = kind === "map" || kind === "lines";
   const axes = on_grid ? varying(view.block).map((a) => [a.key, heading(a.key, a.unit)])
     : view.numbers.map((c) => [c.name, heading(c.name, c.unit)]);
   const outputs = view.columns.filter((c) => c.picture === "numbers" || (kind === "map" && c.picture === "categories"))
     .map((c) => [c.name, heading(c.name, c.unit)]);
-  const parts = [named("picture", picker(kinds, kind, (pic) => again({ pic, y: "", from: "", to: "" })))];
+  const parts = [named("picture", picker(kinds, kind, (pic) => again({ pic, ...(is_other(view.is("x")) ? { x: "" } : {}), y: "", from: "", to: "" })))];
   if (kind !== "histogram") {
     parts.push(named(kind === "gathered" ? "colour" : "output", picker(kind === "gathered" ? [["", "none"], ...outputs] : outputs, view.is("z"), (z) => {
       if (z === "") view.fields.set("z", "");
@@ -39,10 +43,12 @@ export function show_controls(view) {
     parts.push(named("block", picker(view.grids.map((/** @type {any} */ g) => [String(g.i), `${g.i + 1}: ${varying(g.b).map((a) => `${a.values} ${a.key}`).join(" × ")}`]),
       view.is("block"), (block) => again({ block, at: "" }))));
   }
-  parts.push(named(kind === "histogram" ? "of" : "across", picker(axes, view.is("x"), (x) => again({ x, ...(x === view.is("y") ? { y: on_grid ? view.is("x") : "" } : {}) }))));
-  if (kind !== "histogram" && axes.length > 1) {
-    parts.push(named(kind === "lines" ? "a line for each" : "upwards", picker(kind === "lines" ? [["", "none"], ...axes.filter(([k]) => k !== view.is("x"))] : axes,
-      view.is("y"), (y) => again({ y, ...(y === view.is("x") ? { x: view.is("y") } : {}) }))));
+  const asked = kind === "map" ? others.map((one) => [one.key, heading(one.key, one.unit)]) : [];
+  const axis_picker = (/** @type {string[][]} */ own, /** @type {string} */ name, /** @type {(key: string) => void} */ take) => with_others(own, asked, picker([...own, ...asked], view.is(name), take));
+  parts.push(named(kind === "histogram" ? "of" : "across", axis_picker(axes, "x", (x) => again({ x, ...(x === view.is("y") ? { y: on_grid ? view.is("x") : "" } : {}) }))));
+  if (kind !== "histogram" && axes.length + asked.length > 1) {
+    parts.push(named(kind === "lines" ? "a line for each" : "upwards", axis_picker(kind === "lines" ? [["", "none"], ...axes.filter(([k]) => k !== view.is("x"))] : axes, "y",
+      (y) => again({ y, ...(y === view.is("x") ? { x: view.is("y") } : {}) }))));
   }
   const redraw = (/** @type {Record<string, string>} */ changes) => {
     view.set(changes);
@@ -70,6 +76,14 @@ export function show_controls(view) {
       show_takeaways(view);
     })] : [];
   keep_focus(view.colour_row, () => view.colour_row.replaceChildren(...colours));
+}
+
+/** Below the axes that a study has those that it lacks. @param {string[][]} own @param {string[][]} others @param {HTMLSelectElement} made of both */
+function with_others(own, others, made) {
+  const { value } = made;
+  if (others.length > 0) made.append(h("optgroup", { label: "not in this study: solved here" }, ...[...made.options].slice(own.length)));
+  made.value = value;
+  return made;
 }
 
 /** At which values the other axes are held. @param {View} view @param {boolean} on_grid */

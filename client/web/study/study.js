@@ -11,7 +11,7 @@ import { show_controls } from "./controls.js";
 import { drawing_of } from "./drawing.js";
 import { MapCanvas } from "./drawn/map.js";
 import { marking_of } from "./marking.js";
-import { solving_panel } from "./solving.js";
+import { solving_panel } from "./solving/panel.js";
 import { standing_row } from "./standing.js";
 import { row_table } from "./table.js";
 import { show_takeaways } from "./take.js";
@@ -65,7 +65,7 @@ export class StudyView {
     this.is_refreshing = false;
     this.has_moved = false;
     this.is_closed = false;
-    fill_in(this.fields, this.study);
+    fill_in(this.fields, this.study, place.may_change);
   }
 
   is(/** @type {string} */ name) {
@@ -100,7 +100,7 @@ export class StudyView {
     return new Map(held.map(([key, number]) => [key, Number(number)]));
   }
   unit_of = (/** @type {string} */ key) => this.columns.find((c) => c.name === key)?.unit
-    ?? this.study.blocks.flatMap((/** @type {any} */ b) => b.axes).find((/** @type {any} */ a) => a.key === key)?.unit ?? "";
+    ?? [...this.study.blocks.flatMap((/** @type {any} */ b) => b.axes), ...this.study.model].find((/** @type {any} */ a) => a.key === key)?.unit ?? "";
 
   begin() {
     this.said = h("p", { role: "status", class: "said" });
@@ -147,7 +147,7 @@ export class StudyView {
   /** Another view of the same study, as by the browser's Back. @param {URLSearchParams} fields */
   go_to(fields) {
     this.fields = fields;
-    fill_in(this.fields, this.study);
+    fill_in(this.fields, this.study, this.place.may_change);
     this.say("");
     this.map.let_drag(this.is("drag") === "mark" ? "mark" : "zoom");
     this.choice.none();
@@ -155,6 +155,17 @@ export class StudyView {
     this.load();
     this.table.load();
     this.conditions.tell();
+  }
+
+  /** The study itself, over axes that it has. @param {boolean} is_step that people go back over */
+  show_own(is_step) {
+    const own = varying(this.block).map((axis) => axis.key);
+    const is_own = own.includes(this.is("x")) && own.includes(this.is("y"));
+    this.set({ between: "", cell: "", ...(is_own ? {} : { x: "", y: "", x0: "", x1: "", y0: "", y1: "", pic: own.length > 1 ? "map" : "" }) }, is_step);
+    fill_in(this.fields, this.study, this.place.may_change);
+    this.set({});
+    this.choice.none();
+    show_controls(this);
   }
 
   close() {
@@ -314,6 +325,8 @@ export class StudyView {
     }
     if (!part) {
       this.set({ x0: "", x1: "", y0: "", y1: "", between: "", ...(this.is("pic") === "lines" ? { from: "", to: "" } : {}) }, true);
+      fill_in(this.fields, this.study, this.place.may_change);  // axes that the study lacks have ends to begin with
+      this.set({});
     } else {
       const ends = (/** @type {import("./asked/picture.js").Side} */ side, /** @type {number[]} */ cells, /** @type {number[]} */ values) => (side.edges
         ? values : cells.map((i) => side.numbers?.[i] ?? 0)).sort((a, b) => a - b).map(String);

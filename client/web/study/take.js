@@ -25,14 +25,13 @@ export function show_takeaways(view) {
     const name = `${view.study.name}-part`;
     const what = view.solving.is_kept ? "These points are kept as a study."
       : "What is solved while one looks goes when nobody looks. The address of this view finds it again or solves it anew; or keep it as a study.";
-    show_parts(view.commands, h("p", { class: "weak" }, what), numbers(view),
+    show_parts(view.commands, h("p", { class: "weak" }, what), files(view, name, view.solving.id),
       ...(view.solving.block ? [copied("the command that solves it", run_command(view, name)), copied("the command of the picture", plot_command(view, name))] : []));
     return;
   }
-  const file = (/** @type {string} */ format) => h("a", { class: "button", download: `${view.study.name}.${format}`, href: picture_path(view, format) }, format.toUpperCase());
   const said = h("span", { role: "status", class: "weak" });
   show_parts(view.commands,
-    h("p", {}, "The picture, as oblique plot draws it:"), h("div", { class: "row files" }, file("svg"), file("png"), file("csv"), numbers(view)),
+    h("p", {}, "The picture, as oblique plot draws it:"), files(view, view.study.name, view.study.id),
     copied("the command of the picture", plot_command(view)),
     h("p", {}, "The rows of the table:"), copied("the command of the rows", query_command(view)),
     h("p", { class: "weak" }, "Add --db FILE or --server ADDRESS where the database is not oblique.db. The address of this view is a link to it."),
@@ -49,8 +48,14 @@ export function show_takeaways(view) {
 /** @param {import("./study.js").StudyView} view */
 const numbers = (view) => h("button", { type: "button", onclick: () => { if (view.picture) save("picture.csv", "text/csv", cells_csv(view.picture)); } }, "Numbers on screen as CSV");
 
-/** @param {import("./study.js").StudyView} view @param {string} format */
-function picture_path(view, format) {
+/** The picture as files. @param {import("./study.js").StudyView} view @param {string} name @param {number} id of the study that has its points; 0: it is not made yet */
+function files(view, name, id) {
+  const file = (/** @type {string} */ format) => h("a", { class: "button", download: `${name}.${format}`, href: picture_path(view, id, format) }, format.toUpperCase());
+  return h("div", { class: "row files" }, ...(id ? [file("svg"), file("png"), file("csv")] : []), numbers(view));
+}
+
+/** @param {import("./study.js").StudyView} view @param {number} id @param {string} format */
+function picture_path(view, id, format) {
   const fields = Object.entries({ ...picture_fields(view), format }).filter(([, value]) => value !== "");
-  return `/api/studies/${view.study.id}/picture?${new URLSearchParams(fields)}`;
+  return `/api/studies/${id}/picture?${new URLSearchParams(fields)}`;
 }

@@ -12,6 +12,7 @@ await import("./study_tests.mjs");
 await import("./study/condition_tests.mjs");
 await import("./study/choice_tests.mjs");
 await import("./study/running_tests.mjs");
+await import("./study/solving_tests.mjs");
 await import("./takeaway_tests.mjs");
 await import("./point_tests.mjs");
 await import("./looks_tests.mjs");

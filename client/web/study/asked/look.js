@@ -2,51 +2,42 @@
 // What a study lacks is solved while somebody looks: coarse first, then finer. The server makes a short-lived
 // study of it, that comes before all others and goes when nobody asks for it any more.
 import { Refusal, change, json } from "/server.js";
-import { rows, slice } from "./picture.js";
+import { slice } from "./picture.js";
 
 /** Each has the values of the one before among its own. */
 const kSides = [33, 65, 129];
 const kAskAgain_ms = 120;
 const kStillHere_ms = 2500;
 
-/** Of a row, as the recipe's model has them. */
-const kModelKeys = { E_Pa: "E_Pa", A: "A_m2", I: "I_m4", rho: "rho_kg_m3", g: "g_m_s2", elements_per_link: "elements_per_link", k: "k_N_m", eta2: "eta2",
-  tip_mass: "tip_mass_kg", dt: "dt_s", dt_fall: "dt_fall_s", spectral_radius: "spectral_radius", tolerance: "tolerance" };
+/** Keys of the model as a recipe has them. */
+const kModelKeys = { E: "E_Pa", A: "A_m2", I: "I_m4", rho: "rho_kg_m3", g: "g_m_s2", elements_per_link: "elements_per_link", k: "k_N_m", eta2: "eta2",
+  tip_mass: "tip_mass_kg", dt: "dt_s", dt_fall: "dt_fall_s", spectral_radius: "spectral_radius", tolerance: "tolerance", lengths: "lengths_m" };
 const kIntegrators = ["explicit", "generalized-alpha"];
 
-/**
- * The model of a block, as one of its solved points has it: others may have axes of the model that it has not.
- * @param {number} study @param {import("../axes.js").Block} block @param {AbortSignal} signal
- */
-async function model_of(study, { first_point, points }, signal) {
-  let { row } = await json(`/api/studies/${study}/points/${first_point}`, signal);
-  if (!row) {
-    const some = await rows(study, { select: "point", where: `point >= ${first_point} AND point < ${first_point + points}`, limit: 1 }, signal);
-    if (some.rows.length === 0) throw new Refusal(409, "there is no result yet that tells the model");
-    ({ row } = await json(`/api/studies/${study}/points/${some.rows[0][0]}`, signal));
-  }
-  const model = Object.fromEntries(Object.entries(kModelKeys).map(([column, key]) => [key, row[column]]));
-  return { ...model, lengths_m: row.lengths_m, integrator: Math.max(kIntegrators.indexOf(row.integrator), 0) };
+/** What holds where no axis says otherwise. @param {{key: string, value: any}[]} model as the study tells it */
+function model_of(model) {
+  const value = (/** @type {string} */ key) => model.find((one) => one.key === key)?.value;
+  return { ...Object.fromEntries(Object.entries(kModelKeys).map(([key, name]) => [name, value(key)])), integrator: Math.max(kIntegrators.indexOf(value("integrator")), 0) };
 }
 
 /**
  * @typedef {object} Wanted
- * @property {number} study
- * @property {import("../axes.js").Block} block
+ * @property {{key: string, value: any}[]} model of the study, where no axis says otherwise
+ * @property {import("../axes.js").Block} block with the axes that are asked for besides its own
  * @property {string} z
  * @property {Record<string, {from: number, to: number, is_log: boolean}>} ranges of the two axes
  * @property {Record<string, number>} held values of the others
  * @property {string} where which cells are shown; empty: all
  */
 
-/** @param {Wanted} wanted @param {any} model @param {number} side */
-function recipe_of(wanted, model, side) {
+/** @param {Wanted} wanted @param {number} side */
+function recipe_of(wanted, side) {
   const axes = wanted.block.axes.map((axis) => {
     const range = wanted.ranges[axis.key];
     if (range) return { key: axis.key, from: range.from, to: range.to, count: side, ...(range.is_log ? { spacing: "SPACING_LOGARITHMIC" } : {}) };
     return axis.expression ? { key: axis.key, expression: axis.expression } : { key: axis.key, values: [wanted.held[axis.key]] };
   });
-  return { model, blocks: [{ axes, ...(wanted.block.where ? { where: wanted.block.where } : {}) }] };
+  return { model: model_of(wanted.model), blocks: [{ axes, ...(wanted.block.where ? { where: wanted.block.where } : {}) }] };
 }
 
 /** So long, or until the page is seen again. @param {number} ms */
@@ -89,11 +80,10 @@ async function* still_here(id, begin, signal) {
  * @returns {AsyncGenerator<{id: number, side: number, is_whole: boolean, picture: import("./picture.js").Picture, block: any}>}
  */
 export async function* finer(wanted, first_side, signal, unit_of) {
-  const model = await model_of(wanted.study, wanted.block, signal);
   const [x, y] = Object.keys(wanted.ranges);
   for (const side of kSides.filter((one) => one >= first_side)) {
     if (signal.aborted) return;
-    const recipe = recipe_of(wanted, model, side);
+    const recipe = recipe_of(wanted, side);
     const begin = async () => (await change("/api/look", { recipe })).id;
     let id = await begin();
     for (let is_whole = false; !is_whole && !signal.aborted;) {
@@ -120,7 +110,7 @@ export async function* finer(wanted, first_side, signal, unit_of) {
  * @returns {Promise<number>} its number
  */
 export async function held_open(wanted, side, signal, moved) {
-  const recipe = recipe_of(wanted, await model_of(wanted.study, wanted.block, signal), side);
+  const recipe = recipe_of(wanted, side);
   const begin = async () => (await change("/api/look", { recipe })).id;
   const id = await begin();
   const watch = async () => {
