@@ -32,8 +32,8 @@ import os, signal, sys, threading
 signal.alarm(1000)
 def threads():
     return len(os.listdir("/proc/self/task"))
-def wait_for_threads(more_than):
-    while threads() <= more_than:
+def wait_for_threads(more_than, of):
+    while threads() <= more_than and of.is_alive():
         os.sched_yield()
 """
 

@@ -77,8 +77,9 @@ def test_python_ends_well_when_the_call_of_a_daemon_thread_ends_behind_it():
         "before = threads()\n"
         "sys.ends_late.most_threads = before + 1\n"  # those of the work have ended
         "def work(): oblique.solve_many(1, [i / 1000 for i in range(1000)], 1, threads=1)\n"
-        "threading.Thread(target=work, daemon=True).start()\n"
-        "wait_for_threads(before + 1)\n"
+        "thread = threading.Thread(target=work, daemon=True)\n"
+        "thread.start()\n"
+        "wait_for_threads(before + 1, thread)\n"
     )
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, "done", "")
 
@@ -145,10 +146,10 @@ def test_a_question_that_ctrl_c_ended_before_its_turn_is_not_asked(database):
         "first = threading.Thread(target=ask, args=(10**7,))\n"
         "first.start()\n"
         "def interrupt():\n"
-        "    wait_for_threads(before + 2)\n"  # both threads, and that of the question which waits
+        "    wait_for_threads(before + 2, first)\n"  # both threads, and that of the question which waits
         "    os.kill(os.getpid(), signal.SIGINT)\n"
-        "threading.Thread(target=interrupt, daemon=True).start()\n"
         "try:\n"
+        "    threading.Thread(target=interrupt, daemon=True).start()\n"
         "    ask(-1)\n"
         "except KeyboardInterrupt:\n"
         "    print(ask(5).n[0])\n",
