@@ -112,7 +112,8 @@ class BriefHelp : public CLI::Formatter {
 
 }  // namespace
 
-void add_point_flags(CLI::App& verb, PointFlags& flags, FlagValues values) {
+void add_point_flags(CLI::App& verb, PointFlags& flags, FlagValues values,
+                     bool with_single_lengths) {
   const auto help = std::make_shared<BriefHelp>();
   help->column_width(verb.get_formatter()->get_column_width());
   verb.formatter(help);
@@ -152,7 +153,7 @@ void add_point_flags(CLI::App& verb, PointFlags& flags, FlagValues values) {
   for (const auto& key : solver::model_keys()) {
     add(key, group)->default_str(default_of(key));
   }
-  for (std::size_t link = 1; link <= protocol::kMostLinks; ++link) {
+  for (std::size_t link = 1; with_single_lengths && link <= protocol::kMostLinks; ++link) {
     add(protocol::axis_key(fmt::format("length{}", link)), std::string(kSingleLengths));
   }
 }

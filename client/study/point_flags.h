@@ -26,9 +26,10 @@ struct PointFlags {
 /// Whether flags may give one value only (`solve`) or lists and ranges as well.
 enum class FlagValues { kOne, kMany };
 
-/// Adds --H, --mu, --e, --preset, --lengths and a flag for every model key. `flags` must live as
-/// long as `verb`.
-void add_point_flags(CLI::App& verb, PointFlags& flags, FlagValues values);
+/// Adds --H, --mu, --e, --preset, --lengths and a flag for every model key, and those of single
+/// lengths (--length1 ...) if wanted. `flags` must live as long as `verb`.
+void add_point_flags(CLI::App& verb, PointFlags& flags, FlagValues values,
+                     bool with_single_lengths);
 
 /// The recipe of all flags together, judged as study files are, also by `check_reach`. Model keys
 /// with one value shape the model; with several they are axes. Throws InputError. What only its

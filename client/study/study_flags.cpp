@@ -18,7 +18,7 @@ std::string name_of_recipe(const protocol::Recipe& recipe) {
                      protocol::hexadecimal(protocol::recipe_digest(recipe)).substr(0, kDigits));
 }
 
-void add_study_flags(CLI::App& verb, StudyFlags& flags) {
+void add_study_flags(CLI::App& verb, StudyFlags& flags, bool with_single_lengths) {
   verb.add_option(
           "STUDY.toml", flags.file,
           "study file; or say the points by the flags below, whose VALUES are 0.4, 0.4,0.6, "
@@ -32,7 +32,7 @@ void add_study_flags(CLI::App& verb, StudyFlags& flags) {
                 "estimate errors: solve each point also on half the mesh and at twice the step, at "
                 "a quarter more cost")
       ->group("Points");
-  add_point_flags(verb, flags.points, FlagValues::kMany);
+  add_point_flags(verb, flags.points, FlagValues::kMany, with_single_lengths);
 }
 
 Study study_of_flags(const StudyFlags& flags, const ReachCheck& check_reach) {

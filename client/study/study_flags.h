@@ -21,7 +21,7 @@ struct StudyFlags {
 
 /// Adds the STUDY.toml argument, --name, --errors and the point flags. `flags` must live as long as
 /// `verb`.
-void add_study_flags(CLI::App& verb, StudyFlags& flags);
+void add_study_flags(CLI::App& verb, StudyFlags& flags, bool with_single_lengths);
 
 /// Throws InputError when both a file and flags say what the points are, or none, and for what
 /// either says wrong, `check_reach` included. What only its points tell is left to `judge_points`.

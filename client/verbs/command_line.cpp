@@ -10,6 +10,7 @@
 #include <iostream>
 #include <sstream>
 #include <string>
+#include <string_view>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -177,6 +178,13 @@ int execute(CLI::App& app, const Command& command, const SpeechFlags& flags) {
   return code;
 }
 
+/// Also where it is written wrong, for then the flag that may be meant is named.
+bool may_name_single_lengths(int argc, const char* const* argv) {
+  return std::any_of(argv, argv + argc, [](const char* word) {
+    return std::string_view(word).find("len") != std::string_view::npos;
+  });
+}
+
 }  // namespace
 
 int run_command_line(int argc, const char* const* argv) {
@@ -187,6 +195,7 @@ int run_command_line(int argc, const char* const* argv) {
   app.require_subcommand(1);
   app.get_formatter()->column_width(kHelpColumn);
   Command command;
+  command.names_single_lengths = may_name_single_lengths(argc, argv);
   add_verbs(app, command);
   SpeechFlags speech;
   add_speech_flags(app, speech);

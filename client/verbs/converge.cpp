@@ -274,7 +274,7 @@ void add_converge(CLI::App& app, Command& command) {
       ->check(protocol::number_between(1e-9, 100.0))
       ->needs(study)
       ->capture_default_str();
-  add_point_flags(*verb, flags->points, FlagValues::kMany);
+  add_point_flags(*verb, flags->points, FlagValues::kMany, command.names_single_lengths);
   verb->callback([flags, &command] { command = [flags] { return converge_of_flags(*flags); }; });
 }
 

@@ -66,24 +66,6 @@ bool is_there(const std::string& path) {
   return std::filesystem::exists(std::filesystem::symlink_status(path));
 }
 
-/// The folder that was named, else this one or the `keys` in it, whichever has a list.
-std::string folder_of(const KeysFlags& flags) {
-  const auto has_keys = [](const std::string& folder) {
-    return is_there(protocol::authorized_keys_in(folder)) ||
-           is_there(protocol::key_file_in(folder, "server"));
-  };
-  std::string folder = flags.folder;
-  if (folder.empty()) {
-    folder = !has_keys(".") && has_keys("keys") ? "keys" : ".";
-  }
-  if (!has_keys(folder)) {
-    throw solver::InputError(
-        fmt::format("there is no {}: name the folder of the server's keys with --dir DIR",
-                    protocol::authorized_keys_in(folder)));
-  }
-  return folder;
-}
-
 std::optional<protocol::KeyFile> key_in(const std::string& path) {
   try {
     return protocol::read_key_file(path);
@@ -116,7 +98,7 @@ void check_not_revoked(const std::string& folder, const std::string& name) {
 int add(const KeysFlags& flags) {
   const auto role = role_of(flags.role);
   const auto public_key = public_key_of(flags.public_key);
-  const std::string folder = folder_of(flags);
+  const std::string folder = protocol::key_folder_meant(flags.folder);
   if (!public_key) {
     check_not_revoked(folder, flags.name);
   }
@@ -133,7 +115,8 @@ int list(const KeysFlags& flags) {
   for (const char* column : {"name", "role", "public", "added_at"}) {
     table.add_columns(column);
   }
-  const auto keys = protocol::read_authorized_keys(protocol::authorized_keys_in(folder_of(flags)));
+  const auto keys = protocol::read_authorized_keys(
+      protocol::authorized_keys_in(protocol::key_folder_meant(flags.folder)));
   for (const auto& key : keys.all()) {
     auto& row = *table.add_rows();
     add_value(row, key.name);
@@ -146,7 +129,7 @@ int list(const KeysFlags& flags) {
 }
 
 int revoke(const KeysFlags& flags) {
-  const std::string folder = folder_of(flags);
+  const std::string folder = protocol::key_folder_meant(flags.folder);
   const std::string path = protocol::authorized_keys_in(folder);
   if (!std::filesystem::exists(path)) {
     throw solver::InputError(fmt::format("there is no {}: say where it is with --dir", path));

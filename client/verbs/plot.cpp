@@ -137,7 +137,7 @@ void add_plot(CLI::App& app, Command& command) {
           ->capture_default_str();
   protocol::note_choices(palette, plot::palette_names());
   add_picture_flags(*verb, flags->picture);
-  add_point_picture_flags(*verb, flags->point);
+  add_point_picture_flags(*verb, flags->point, command.names_single_lengths);
   for (const char* of_study :
        {"--map", "--lines", "--scatter", "--histogram", "--x", "--y", "--by", "--colour", "--where",
         "--at", "--block", "--range", "--log-x", "--log-y", "--log-colour"}) {

@@ -196,7 +196,7 @@ PointHistory history_of_values(const PointPictureFlags& flags) {
 
 }  // namespace
 
-void add_point_picture_flags(CLI::App& verb, PointPictureFlags& flags) {
+void add_point_picture_flags(CLI::App& verb, PointPictureFlags& flags, bool with_single_lengths) {
   const std::string group = "One point";
   verb.add_option("--point", flags.point,
                   "draw the time histories of that point of the study, solved again")
@@ -214,7 +214,7 @@ void add_point_picture_flags(CLI::App& verb, PointPictureFlags& flags) {
   verb.add_flag("--on-worker", flags.on_worker, "have a worker of the server solve the point")
       ->excludes(here)
       ->group(group);
-  add_point_flags(verb, flags.values, FlagValues::kOne);
+  add_point_flags(verb, flags.values, FlagValues::kOne, with_single_lengths);
 }
 
 bool is_point_meant(const PointPictureFlags& flags) {

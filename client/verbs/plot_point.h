@@ -24,7 +24,7 @@ struct PointPictureFlags {
 
 /// Adds --point, --panel, --here, --on-worker and the flags of a point's values and model. `flags`
 /// must live as long as `verb`.
-void add_point_picture_flags(CLI::App& verb, PointPictureFlags& flags);
+void add_point_picture_flags(CLI::App& verb, PointPictureFlags& flags, bool with_single_lengths);
 
 /// Whether the flags mean a point. Throws solver::InputError where they contradict each other.
 bool is_point_meant(const PointPictureFlags& flags);

@@ -71,7 +71,7 @@ void add_run(CLI::App& app, Command& command) {
       ->check(protocol::whole_number_from(0))
       ->type_name("N")
       ->capture_default_str();
-  add_study_flags(*verb, flags->study);
+  add_study_flags(*verb, flags->study, command.names_single_lengths);
   verb->callback([flags, &command] { command = [flags] { return run(*flags); }; });
 }
 

@@ -121,7 +121,7 @@ void add_solve(CLI::App& app, Command& command) {
       ->needs(trace);
   verb->add_flag("--errors", flags->errors,
                  "estimate errors: solve the point also on half the mesh and at twice the step");
-  add_point_flags(*verb, flags->points, FlagValues::kOne);
+  add_point_flags(*verb, flags->points, FlagValues::kOne, command.names_single_lengths);
   verb->callback([flags, &command] { command = [flags] { return solve(*flags); }; });
 }
 

@@ -296,7 +296,7 @@ void add_study(CLI::App& app, Command& command) {
   check->footer(kCheckExamples);
   check->add_flag("--json", flags->json, "print one JSON object");
   check->add_flag("--no-rate", flags->no_rate, "solve no points, and estimate no time");
-  add_study_flags(*check, flags->study);
+  add_study_flags(*check, flags->study, command.names_single_lengths);
   check->callback([flags, &command] { command = [flags] { return check_study(*flags); }; });
 }
 

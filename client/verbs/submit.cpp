@@ -158,7 +158,7 @@ void add_submit(CLI::App& app, Command& command) {
                  "solved a point");
   verb->add_flag("--fresh", flags->terms.fresh,
                  "solve every point, also those that another study of the database has solved");
-  add_study_flags(*verb, flags->study);
+  add_study_flags(*verb, flags->study, command.names_single_lengths);
   verb->callback([flags, &command] { command = [flags] { return submit(*flags); }; });
 }
 

@@ -9,7 +9,13 @@
 namespace oblique::client {
 
 /// What a verb does once all is parsed; gives the exit code.
-using Command = std::function<int()>;
+struct Command : std::function<int()> {
+  using function::operator=;
+
+  /// Whether the line may name the length of a single link. That is some hundred flags in all, and
+  /// half of the time in which the program begins.
+  bool names_single_lengths = true;
+};
 
 using protocol::kDone;
 using protocol::kFailed;

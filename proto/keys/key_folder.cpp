@@ -59,6 +59,25 @@ std::string authorized_keys_in(const std::string& folder) {
   return authorized_keys_beside(key_file_in(folder, "server"));
 }
 
+std::string key_folder_meant(const std::string& named) {
+  const auto is_there = [](const std::string& path) {
+    return std::filesystem::exists(std::filesystem::symlink_status(path));
+  };
+  const auto has_keys = [&is_there](const std::string& folder) {
+    return is_there(authorized_keys_in(folder)) || is_there(key_file_in(folder, "server"));
+  };
+  std::string folder = named;
+  if (folder.empty()) {
+    folder = !has_keys(".") && has_keys("keys") ? "keys" : ".";
+  }
+  if (!has_keys(folder)) {
+    throw solver::InputError(
+        fmt::format("there is no {}: name the folder of the server's keys with --dir DIR",
+                    authorized_keys_in(folder)));
+  }
+  return folder;
+}
+
 CurveKey make_key_folder(const std::string& folder) {
   MadeFiles made;
   make_folder(folder, made);

@@ -14,6 +14,10 @@ namespace oblique::protocol {
 std::string key_file_in(const std::string& folder, const std::string& name);
 std::string authorized_keys_in(const std::string& folder);
 
+/// `named` or, where that is empty, this folder or the `keys` in it, whichever has a server's key
+/// or list. Throws solver::InputError where it has neither.
+std::string key_folder_meant(const std::string& named);
+
 /// Makes server.key, client.key, worker.key, reader.key and the list with the last three, and the
 /// folder, mode 0700, where there is none. Gives the server's public key. Throws std::runtime_error
 /// when one of them is there already or cannot be made; then what was made is removed.

@@ -158,6 +158,15 @@ class Answers(Folder):
         self.assertEqual(offers(self.folder, "plot", "--format", ""), ["svg", "png", "csv", "gnuplot"])
         self.assertEqual(offers(self.folder, "keys", "add", "--role", ""), ["client", "worker", "reader"])
         self.assertEqual(offers(self.folder, "autoscale", ""), ["slurm"])
+        self.assertEqual(offers(self.folder, "run", "--sample", ""), ["random:", "lhs:", "sobol:"])
+
+    def test_keys_that_are_listed_where_one_is_revoked(self):
+        subprocess.run([PROGRAMS / "oblique", "keygen", "server keys"], cwd=self.folder, check=True, capture_output=True)
+        self.addCleanup(shutil.rmtree, self.folder / "server keys")
+        self.assertEqual(sorted(offers(self.folder, "keys", "revoke", "--dir", "server keys", "")), ["client", "reader", "worker"])
+        self.assertEqual(offers(self.folder, "keys", "revoke", "--dir=server keys", "re"), ["reader"])
+        self.assertEqual(offers(self.folder, "keys", "revoke", ""), [])
+        self.assertEqual(offers(self.folder, "keys", "add", "--dir", "server keys", ""), [])
 
     def test_columns_in_lists_and_conditions(self):
         self.assertEqual(offers(self.folder, "query", "x", "--select", "mu,fn_peak_"), ["mu,fn_peak_N", "mu,fn_peak_error"])

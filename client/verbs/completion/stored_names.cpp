@@ -1,7 +1,9 @@
 #include "client/verbs/completion/stored_names.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
+#include <ctime>
 #include <exception>
 #include <memory>
 
@@ -18,9 +20,13 @@ using Clock = std::chrono::steady_clock;
 
 /// As many as anybody reads.
 constexpr int kMostNames = 500;
-/// With a server, and with a database, which answers in less unless it is meant to take long.
-constexpr std::chrono::milliseconds kPatience{12};
+/// Of a database, which answers in less unless it is meant to take long.
 constexpr std::chrono::milliseconds kLongestRead{50};
+
+/// Since this process began, or less: it has not waited for anything so far.
+std::chrono::milliseconds spent_so_far() {
+  return std::chrono::milliseconds(std::clock() * 1000 / CLOCKS_PER_SEC);
+}
 
 std::string text_of_sql(const std::string& text) {
   std::string literal = "'";
@@ -46,6 +52,12 @@ int has_taken_too_long(void* end) {
 
 }  // namespace
 
+std::chrono::milliseconds patience_left(std::chrono::milliseconds spent) {
+  constexpr std::chrono::milliseconds kUntilItEnds{18};  // the rest: to tell it, and to end
+  constexpr std::chrono::milliseconds kLeast{4};
+  return std::max(kUntilItEnds - spent, kLeast);
+}
+
 std::vector<std::string> names_in_database(const std::string& file, const std::string& begin) {
   std::vector<std::string> names;
   try {
@@ -69,11 +81,13 @@ std::vector<std::string> names_at_server(const SourceFlags& flags, const std::st
   std::vector<std::string> names;
   try {
     auto settings = connection_settings(flags);
-    settings.timeout_ms = kPatience.count();
+    const auto patience = patience_left(spent_so_far());
+    settings.timeout_ms = patience.count();
+    settings.waits_for_server = false;
     Clock::time_point end;
     // Not closed: a name that is looked up somewhere would be waited for. The program ends next.
     auto* connection = new Connection(settings, [&end] { return Clock::now() < end; });
-    end = Clock::now() + kPatience;  // the server's own
+    end = Clock::now() + patience;  // the server's own
     const auto answer = connection->query(statement(begin));
     for (const auto& row : answer.rows()) {
       if (row.values(0).has_text()) {

@@ -11,6 +11,8 @@
 
 #include "client/service/source_flags.h"
 #include "client/verbs/completion/stored_names.h"
+#include "proto/keys/key_folder.h"
+#include "proto/recipe/written/written_sample.h"
 #include "server/asking/columns.h"
 #include "worker/solver/model/parameters.h"
 
@@ -30,7 +32,9 @@ enum class Meaning {
   kKeyIs,
   kDatabase,
   kStudyFile,
-  kKeyFile
+  kKeyFile,
+  kListedKey,
+  kSample
 };
 
 struct Word {
@@ -58,6 +62,7 @@ constexpr auto kWords = std::to_array<Word>({
     {"--x", Meaning::kKey},
     {"--y", Meaning::kKey},
     {"--by", Meaning::kKey},
+    {"SAMPLE", Meaning::kSample},
 });
 
 std::string given(const Typed& typed, const char* flag) {
@@ -140,11 +145,32 @@ Offers keys(const Typed& typed, const std::string& end, bool goes_on) {
   return offers;
 }
 
+Offers listed_keys(const Typed& typed) {
+  Offers offers;
+  const auto folder = protocol::key_folder_meant(given(typed, "--dir"));
+  const auto keys = protocol::read_authorized_keys(protocol::authorized_keys_in(folder));
+  for (const auto& key : keys.all()) {
+    offer_value(offers, typed, key.name, std::string(protocol::name_of(key.role)));
+  }
+  return offers;
+}
+
+Offers sample_kinds(const Typed& typed) {
+  Offers offers{.offers = {}, .goes_on = true};
+  for (const auto kind : protocol::sample_names()) {
+    offer_value(offers, typed, std::string(kind) + ':');
+  }
+  return offers;
+}
+
 Offers files(const char* ending) {
   return {.offers = {}, .files = protocol::FileNames{.ending = ending}};
 }
 
-std::optional<Meaning> meaning_of(const CLI::Option& option) {
+std::optional<Meaning> meaning_of(const CLI::App& verb, const CLI::Option& option) {
+  if (verb.get_name() == "revoke" && option.get_positional()) {  // a NAME, as also new ones are
+    return Meaning::kListedKey;
+  }
   const auto has_name = [&option](const Word& word) {
     return option.check_name(std::string(word.option)) || option.get_type_name() == word.option;
   };
@@ -155,7 +181,7 @@ std::optional<Meaning> meaning_of(const CLI::Option& option) {
 }  // namespace
 
 std::optional<Offers> values_of_verbs(const Typed& typed) {
-  const auto meaning = meaning_of(*typed.option);
+  const auto meaning = meaning_of(*typed.verb, *typed.option);
   if (!meaning) {
     return std::nullopt;
   }
@@ -181,6 +207,10 @@ std::optional<Offers> values_of_verbs(const Typed& typed) {
       return files("toml");
     case Meaning::kKeyFile:
       return files("key");
+    case Meaning::kListedKey:
+      return listed_keys(typed);
+    case Meaning::kSample:
+      return sample_kinds(typed);
   }
   return std::nullopt;
 }

@@ -9,15 +9,15 @@
 #include "proto/text.h"
 
 namespace oblique::protocol {
-namespace {
 
-using solver::InputError;
-
-/// By their numbers.
 const std::vector<std::string_view>& sample_names() {
   static const std::vector<std::string_view> names{"random", "lhs", "sobol"};
   return names;
 }
+
+namespace {
+
+using solver::InputError;
 
 /// The number of a name. `what` begins the sentence about any other.
 std::size_t number_of_name(std::string_view name, const std::vector<std::string_view>& names,

@@ -41,5 +41,7 @@ std::string_view name_of(DistributionKind kind);
 std::string_view name_of(SampleKind kind);
 DistributionKind distribution_named(std::string_view name);
 const std::vector<std::string_view>& distribution_names();
+/// By their numbers.
+const std::vector<std::string_view>& sample_names();
 
 }  // namespace oblique::protocol

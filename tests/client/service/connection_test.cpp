@@ -157,6 +157,26 @@ TEST(Connection, AsksAServerThatAnswersOnce) {
   }
 }
 
+TEST(Connection, ThatDoesNotWaitForAServerEndsWhenTheConnectionIsRefused) {
+  const test::ReservedPort port;
+  Connection connection(
+      {.server_url = port.url(), .timeout_ms = kLong_ms, .waits_for_server = false});
+  try {
+    connection.status("");
+    FAIL() << "nobody is there";
+  } catch (const ConnectionError& error) {
+    EXPECT_EQ(error.what(), "nobody takes connections at " + port.url());
+  }
+}
+
+TEST(Connection, ThatDoesNotWaitForAServerAsksOneThatIsThere) {
+  const ScriptedServer server(
+      [&](const protocol::ClientRequest& request) { return workers_reply(request, 2); });
+  Connection connection(
+      {.server_url = server.url(), .timeout_ms = kLong_ms, .waits_for_server = false});
+  EXPECT_EQ(connection.status("").workers(), 2U);
+}
+
 TEST(Connection, PassesOverASecondAnswerToAnEarlierQuestion) {
   const ScriptedServer server([](const protocol::ClientRequest& request) {
     auto replies = workers_reply(request, static_cast<std::uint32_t>(request.request_id()));
