@@ -16,11 +16,10 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::size_t kThreads = 2;
-constexpr std::size_t kMostWaiting = 64;
-constexpr std::chrono::seconds kLongestJob{7};
-/// A column of a large study takes longer, once.
-constexpr std::chrono::seconds kLongestFill{60};
+/// One for each lane.
+constexpr std::size_t kThreads = 3;
+/// In each lane.
+constexpr std::ptrdiff_t kMostWaiting = 64;
 /// SQLite looks at the clock after so many of its steps.
 constexpr int kStepsBetweenLooks = 10'000;
 /// Rows that a slice reads lie apart: pages of the tree are worth keeping.
@@ -47,8 +46,9 @@ void AnswerDesk::end_in_time(std::uint64_t point, std::uint64_t points_between_l
   }
 }
 
-AnswerPool::AnswerPool(std::string database, std::function<void()> done)
-    : database_(std::move(database)), done_(std::move(done)) {
+AnswerPool::AnswerPool(std::string database, std::function<void()> done,
+                       std::chrono::milliseconds longest)
+    : database_(std::move(database)), done_(std::move(done)), longest_(longest) {
   for (std::size_t i = 0; i < kThreads; ++i) {
     threads_.emplace_back([this] { run(); });
   }
@@ -76,8 +76,13 @@ void AnswerPool::stop() {
 bool AnswerPool::submit(std::uint64_t number, Job job, Lane lane) {
   {
     const std::lock_guard lock(mutex_);
-    if (is_stopping_ || waiting_.size() >= kMostWaiting) {
+    const auto waiting = std::ranges::count(waiting_, lane, &Order::lane);
+    if (is_stopping_ || waiting >= kMostWaiting) {
       return false;
+    }
+    if (const auto filling = at_work_.find(kFilling);
+        lane == Lane::kSlow && filling != at_work_.end()) {
+      *filling->second = true;  // it is read on afterwards
     }
     waiting_.push_back({number, std::move(job), std::make_shared<std::atomic<bool>>(false), lane});
   }
@@ -100,16 +105,19 @@ void AnswerPool::forget(std::uint64_t number) {
   }
 }
 
+bool AnswerPool::is_taken(Lane lane) const {
+  return lane != Lane::kAny && taken_.contains(lane);
+}
+
 std::optional<AnswerPool::Order> AnswerPool::next() {
-  const auto found = std::find_if(waiting_.begin(), waiting_.end(), [this](const Order& order) {
-    return order.lane == Lane::kAny || !is_slow_lane_taken_;
-  });
+  const auto found = std::find_if(waiting_.begin(), waiting_.end(),
+                                  [this](const Order& order) { return !is_taken(order.lane); });
   if (found != waiting_.end()) {
     Order order = std::move(*found);
     waiting_.erase(found);
     return order;
   }
-  if (is_slow_lane_taken_ || !columns_.has_wishes()) {
+  if (is_taken(Lane::kSlow) || !columns_.has_wishes()) {
     return std::nullopt;
   }
   return Order{kFilling,
@@ -130,15 +138,14 @@ void AnswerPool::run() {
       continue;
     }
     const bool is_filling = order->number == kFilling;
-    const bool is_slow = order->lane == Lane::kSlow;
-    is_slow_lane_taken_ = is_slow_lane_taken_ || is_slow;
+    taken_.insert(order->lane);
     at_work_[order->number] = order->is_unwanted;
     lock.unlock();
-    desk.until = Clock::now() + (is_filling ? kLongestFill : kLongestJob);
+    desk.until = Clock::now() + longest_;
     HttpAnswer answer = answer_to(*order, desk);
     lock.lock();
     at_work_.erase(order->number);
-    is_slow_lane_taken_ = is_slow_lane_taken_ && !is_slow;
+    taken_.erase(order->lane);
     if (columns_.has_wishes() || !waiting_.empty()) {
       woken_.notify_one();
     }
@@ -162,8 +169,8 @@ HttpAnswer AnswerPool::answer_to(const Order& order, Desk& desk) {
       add_list_functions(desk.database.get());
       sqlite3_progress_handler(desk.database.get(), kStepsBetweenLooks, &Desk::is_over, &desk);
     }
-    return order.job(
-        {desk.database.get(), studies_, columns_, [&desk] { return Desk::is_over(&desk) != 0; }});
+    return order.job({desk.database.get(), studies_, columns_, samples_,
+                      [&desk] { return Desk::is_over(&desk) != 0; }});
   } catch (const std::invalid_argument& error) {
     return error_answer(kBadQuestion, error.what());
   } catch (const NothingThere& error) {

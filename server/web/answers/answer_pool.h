@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
@@ -9,11 +10,13 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "server/web/answers/column_store.h"
+#include "server/web/answers/result_sample.h"
 #include "server/web/answers/study_book.h"
 #include "server/web/http/http_message.h"
 
@@ -24,6 +27,7 @@ struct AnswerDesk {
   sqlite3* database;
   StudyBook& studies;
   ColumnStore& columns;
+  SampleBook& samples;
   std::function<bool()> is_over;  ///< nobody waits any more, or the time is up
 
   /// For what goes through many points: throws StorageError when it is over, at every so manyth.
@@ -41,7 +45,9 @@ class AnswerPool {
 
   /// `done` is called on a thread of the pool when an answer can be taken. The database is opened
   /// by the first job.
-  AnswerPool(std::string database, std::function<void()> done);
+  /// A job ends after `longest` at the latest; of filling, what it has is kept.
+  AnswerPool(std::string database, std::function<void()> done,
+             std::chrono::milliseconds longest = std::chrono::seconds(7));
   /// Stops.
   ~AnswerPool();
   AnswerPool(const AnswerPool&) = delete;
@@ -50,11 +56,12 @@ class AnswerPool {
   /// Ends all jobs; `done` is not called any more, and nothing is taken.
   void stop();
 
-  /// What is done one at a time, so that others are always answered: counting what filters leave
-  /// in, whatever those ask who come without the token, and filling columns that nobody waits for.
-  enum class Lane { kAny, kSlow };
+  /// What is done one at a time of each of the latter two, so that others are always answered:
+  /// counting what filters leave in, for which filling columns that nobody waits for makes way; and
+  /// whatever those ask who come without the token.
+  enum class Lane { kAny, kSlow, kStrangers };
 
-  /// False when too many wait already, and after `stop`.
+  /// False when too many of that lane wait already, and after `stop`.
   bool submit(std::uint64_t number, Job job, Lane lane = Lane::kAny);
   /// The answer, once; nothing: it is not made yet.
   std::optional<HttpAnswer> take(std::uint64_t number);
@@ -70,6 +77,7 @@ class AnswerPool {
   };
   struct Desk;
 
+  bool is_taken(Lane lane) const;  ///< with mutex_ locked
   /// The next that may begin; it waits no more. Nothing: none may. With mutex_ locked.
   std::optional<Order> next();
 
@@ -78,14 +86,16 @@ class AnswerPool {
 
   const std::string database_;
   const std::function<void()> done_;
+  const std::chrono::milliseconds longest_;
   StudyBook studies_;
   ColumnStore columns_;
+  SampleBook samples_;
   std::mutex mutex_;
   std::condition_variable woken_;
   std::deque<Order> waiting_;                                            // guarded by mutex_
   std::map<std::uint64_t, std::shared_ptr<std::atomic<bool>>> at_work_;  // guarded by mutex_
   std::map<std::uint64_t, HttpAnswer> answers_;                          // guarded by mutex_
-  bool is_slow_lane_taken_ = false;                                      // guarded by mutex_
+  std::set<Lane> taken_;                                                 // guarded by mutex_
   bool is_stopping_ = false;                                             // guarded by mutex_
   std::vector<std::thread> threads_;  // last: they use all the others
 };

@@ -106,7 +106,7 @@ BinColumns read_columns(const AnswerDesk& desk, const LookedAtStudy& study,
                         const std::vector<ColumnSource>& sources) {
   BinColumns read;
   if (study.points > ColumnStore::kMostPoints) {
-    read.sample = std::make_shared<ResultSample>(sample_results(desk, study.id, sources));
+    read.sample = desk.samples.sample(desk, study.id, sources);
   }
   for (const ColumnSource& source : sources) {
     if (read.sample) {

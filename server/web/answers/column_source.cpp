@@ -84,7 +84,7 @@ ColumnReader::ColumnReader(sqlite3* database, std::uint64_t study, const ColumnS
       statement_(
           database,
           fmt::format("SELECT p.point, {} FROM packed_results AS p{} "
-                      "WHERE p.study_id = ?1 AND p.point BETWEEN ?2 AND ?3",
+                      "WHERE p.study_id = ?1 AND p.point BETWEEN ?2 AND ?3 ORDER BY p.point",
                       value_or_error(source),
                       source.is_of_model ? " JOIN models AS m ON m.model_id = p.model_id" : "")) {}
 

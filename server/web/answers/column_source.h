@@ -37,7 +37,8 @@ class ColumnReader {
  public:
   ColumnReader(sqlite3* database, std::uint64_t study, const ColumnSource& source);
 
-  /// Gives `take` each point from `first` to `last`, both in, that has a row, and its value.
+  /// Gives `take` each point from `first` to `last`, both in, that has a row, and its value,
+  /// in the order of points.
   template <typename Take>
   void read(std::uint64_t first, std::uint64_t last, const Take& take) {
     begin(first, last);

@@ -37,19 +37,32 @@ std::vector<PointRun> settled_runs(sqlite3* database, std::uint64_t study, std::
   return runs;
 }
 
-std::vector<std::uint64_t> failed_points(sqlite3* database, std::uint64_t study) {
+std::vector<std::uint64_t> failed_points(sqlite3* database, std::uint64_t study,
+                                         std::uint64_t end) {
   Statement rows(
       database,
       "SELECT point FROM packed_results INDEXED BY failed_points WHERE study_id = ?1 AND "
-      "error IS NOT NULL "
-      "ORDER BY point LIMIT ?2");
+      "error IS NOT NULL AND point < ?2 ORDER BY point LIMIT ?3");
   rows.bind(1, study);
-  rows.bind(2, kMostFailed);
+  rows.bind(2, end);
+  rows.bind(3, kMostFailed);
   std::vector<std::uint64_t> points;
   while (rows.step()) {
     points.push_back(static_cast<std::uint64_t>(rows.integer(0)));
   }
   return points;
+}
+
+/// Points that are in one of them and not in both, a run each; both rising.
+std::vector<PointRun> runs_of_either(const std::vector<std::uint64_t>& one,
+                                     const std::vector<std::uint64_t>& other) {
+  std::vector<std::uint64_t> points;
+  std::ranges::set_symmetric_difference(one, other, std::back_inserter(points));
+  std::vector<PointRun> runs;
+  for (const std::uint64_t point : points) {
+    runs.push_back({point, point + 1});
+  }
+  return runs;
 }
 
 std::uint64_t points_in(const std::vector<PointRun>& runs) {
@@ -81,6 +94,21 @@ std::vector<PointRun> difference(const std::vector<PointRun>& of,
     }
   }
   return left;
+}
+
+std::vector<PointRun> united(const std::vector<PointRun>& one, const std::vector<PointRun>& other) {
+  std::vector<PointRun> all;
+  all.reserve(one.size() + other.size());
+  std::ranges::merge(one, other, std::back_inserter(all), {}, &PointRun::begin, &PointRun::begin);
+  std::vector<PointRun> joined;
+  for (const PointRun& run : all) {
+    if (!joined.empty() && run.begin <= joined.back().end) {
+      joined.back().end = std::max(joined.back().end, run.end);
+    } else {
+      joined.push_back(run);
+    }
+  }
+  return joined;
 }
 
 std::optional<std::vector<PointRun>> settled_between(sqlite3* database, std::uint64_t study,
@@ -131,29 +159,17 @@ bool StoredColumn::follow(sqlite3* database, bool may_take_long) {
   execute(database, "BEGIN");
   try {
     std::vector<PointRun> settled = settled_runs(database, study_, points_);
-    std::vector<std::uint64_t> failed = failed_points(database, study_);
-    std::vector<PointRun> come = difference(settled, settled_);
+    std::vector<std::uint64_t> failed = failed_points(database, study_, points_);
+    const std::vector<PointRun> gone =
+        united(difference(settled_, settled), runs_of_either(failed_, failed));
+    std::vector<PointRun> come = difference(settled, difference(settled_, gone));
     if (!may_take_long && points_in(come) > kMostAtOnce) {
       execute(database, "COMMIT");
       return false;
     }
-    if (values_.empty() || settled_.empty()) {  // nothing is known of them
-      values_.assign(points_, no_result());
-    }
-    for (const PointRun& run : difference(settled_, settled)) {
-      std::fill(values_.begin() + static_cast<std::ptrdiff_t>(run.begin),
-                values_.begin() + static_cast<std::ptrdiff_t>(run.end), no_result());
-    }
-    std::vector<std::uint64_t> changed;
-    std::set_symmetric_difference(failed_.begin(), failed_.end(), failed.begin(), failed.end(),
-                                  std::back_inserter(changed));
-    for (const std::uint64_t point : changed) {
-      come.push_back({point, point + 1});
-    }
-    settled_.clear();  // should reading end early, all of it is read anew
-    read_runs(database, come);
-    settled_ = std::move(settled);
+    forget_runs(gone);
     failed_ = std::move(failed);
+    read_runs(database, come);
     looked_ = now;
     execute(database, "COMMIT");
   } catch (...) {
@@ -163,12 +179,38 @@ bool StoredColumn::follow(sqlite3* database, bool may_take_long) {
   return true;
 }
 
-void StoredColumn::read_runs(sqlite3* database, const std::vector<PointRun>& runs) {
-  ColumnReader reader(database, study_, source_);
+void StoredColumn::forget_runs(const std::vector<PointRun>& runs) {
+  looked_ = {};
+  values_.resize(points_, no_result());
   for (const PointRun& run : runs) {
-    reader.read(run.begin, run.end - 1,
-                [this](std::uint64_t point, float value) { values_.at(point) = value; });
+    std::fill(values_.begin() + static_cast<std::ptrdiff_t>(run.begin),
+              values_.begin() + static_cast<std::ptrdiff_t>(run.end), no_result());
   }
+  settled_ = difference(settled_, runs);
+}
+
+void StoredColumn::read_runs(sqlite3* database, const std::vector<PointRun>& runs) {
+  std::vector<PointRun> read;
+  const auto record = [&] {
+    settled_ = united(settled_, read);
+    points_read_ = points_in(settled_);
+  };
+  try {
+    ColumnReader reader(database, study_, source_);
+    for (const PointRun& run : runs) {
+      read.push_back({run.begin, run.begin});
+      reader.read(run.begin, run.end - 1, [&](std::uint64_t point, float value) {
+        values_.at(point) = value;
+        read.back().end = point + 1;
+      });
+      read.back().end = run.end;
+    }
+  } catch (...) {
+    std::erase_if(read, [](const PointRun& run) { return run.begin == run.end; });
+    record();
+    throw;
+  }
+  record();
 }
 
 void StoredColumn::gather(std::span<const std::uint64_t> points, std::vector<float>& into) {
@@ -199,17 +241,20 @@ ColumnStore::Shared ColumnStore::known(std::uint64_t study, const ColumnSource& 
   return kept_.front();
 }
 
-void ColumnStore::keep(const Shared& column) {
+/// The column, which is among those that are kept from now on: its memory counts.
+ColumnStore::Shared ColumnStore::known_or_new(const Wish& wish) {
   const std::lock_guard lock(mutex_);
-  if (known(column->study(), column->source(), column->points())) {
-    return;
+  if (Shared column = known(wish.study, wish.source, wish.points)) {
+    return column;
   }
-  kept_.push_front(column);
+  kept_.push_front(std::make_shared<StoredColumn>(wish.study, wish.source, wish.points));
+  const Shared made = kept_.front();
   std::size_t bytes = 0;
   for (auto kept = kept_.begin(); kept != kept_.end();) {
     bytes += (*kept)->bytes();
     kept = bytes > kMostBytes ? kept_.erase(kept) : std::next(kept);
   }
+  return made;
 }
 
 ColumnStore::Shared ColumnStore::find(sqlite3* database, std::uint64_t study,
@@ -225,26 +270,19 @@ ColumnStore::Shared ColumnStore::find(sqlite3* database, std::uint64_t study,
   if (column && column->bring_up_to_date(database)) {
     return column;
   }
-  want(column ? column : std::make_shared<StoredColumn>(study, source, points));
+  want({study, source, points});
   return nullptr;
 }
 
-ColumnStore::Shared ColumnStore::wanted(std::uint64_t study, const ColumnSource& source,
-                                        std::uint64_t points) const {
-  const auto is_it = [&](const Shared& wished) {
-    return wished && wished->study() == study && wished->points() == points &&
-           wished->source().name == source.name;
-  };
-  const auto found = std::find_if(wished_.begin(), wished_.end(), is_it);
-  return is_it(under_way_) ? under_way_ : found != wished_.end() ? *found : nullptr;
-}
-
-void ColumnStore::want(const Shared& column) {
+void ColumnStore::want(const Wish& wish) {
   constexpr std::size_t kMostWishes = 8;
   const std::lock_guard lock(mutex_);
-  if (wished_.size() < kMostWishes &&
-      !wanted(column->study(), column->source(), column->points())) {
-    wished_.push_back(column);
+  const bool is_wanted = std::ranges::any_of(wished_, [&](const Wish& known) {
+    return known.study == wish.study && known.points == wish.points &&
+           known.source.name == wish.source.name;
+  });
+  if (wished_.size() < kMostWishes && !is_wanted) {
+    wished_.push_back(wish);
   }
 }
 
@@ -254,22 +292,14 @@ ColumnStore::Shared ColumnStore::read(sqlite3* database, std::uint64_t study,
   if (points > kMostPoints) {
     return nullptr;
   }
-  Shared column;
-  {
-    const std::lock_guard lock(mutex_);
-    column = known(study, source, points);
-    column = column ? column : wanted(study, source, points);
-  }
-  if (!column) {
-    column = std::make_shared<StoredColumn>(study, source, points);
-  }
+  const Wish wish{study, source, points};
+  Shared column = known_or_new(wish);
   try {
     column->read(database, is_over);
   } catch (const StorageError&) {
-    want(column);
+    want(wish);
     throw;
   }
-  keep(column);
   return column;
 }
 
@@ -279,24 +309,24 @@ bool ColumnStore::has_wishes() const {
 }
 
 void ColumnStore::fill_one(sqlite3* database, const std::function<bool()>& is_over) {
-  Shared column;
+  std::optional<Wish> wish;
   {
     const std::lock_guard lock(mutex_);
     if (wished_.empty()) {
       return;
     }
-    column = std::move(wished_.front());
+    wish = std::move(wished_.front());
     wished_.pop_front();
-    under_way_ = column;
   }
+  const Shared column = known_or_new(*wish);
+  const std::uint64_t before = column->points_read();
   try {
     column->read(database, is_over);
-    keep(column);
   } catch (const StorageError&) {
-    // It took too long, or the server ends: pictures go on reading by key.
+    if (column->points_read() > before) {
+      want(*wish);
+    }  // else pictures go on reading by key
   }
-  const std::lock_guard lock(mutex_);
-  under_way_.reset();
 }
 
 }  // namespace oblique::server

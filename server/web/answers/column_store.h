@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -39,8 +40,10 @@ class StoredColumn {
   /// Makes it what the database holds now, by which points have come and gone since the last time,
   /// not oftener than twice a second. False: it has too much to do to be waited for.
   bool bring_up_to_date(sqlite3* database);
+  /// How many points were read when reading ended the last time.
+  std::uint64_t points_read() const { return points_read_; }
   /// The same, however long it takes. Throws StorageError when `is_over` while another reads it;
-  /// while it is read here, SQLite looks at that.
+  /// while it is read here, SQLite looks at that. What was read until then is not read again.
   void read(sqlite3* database, const std::function<bool()>& is_over);
   /// What it has of these points, in their order.
   void gather(std::span<const std::uint64_t> points, std::vector<float>& into);
@@ -51,20 +54,25 @@ class StoredColumn {
   using Clock = std::chrono::steady_clock;
   bool follow(sqlite3* database, bool may_take_long);
   void read_runs(sqlite3* database, const std::vector<PointRun>& runs);
+  void forget_runs(const std::vector<PointRun>& runs);
 
   const std::uint64_t study_;
   const ColumnSource source_;
   const std::uint64_t points_;
+  std::atomic<std::uint64_t> points_read_ = 0;
   std::timed_mutex mutex_;
   std::vector<float> values_;          // guarded by mutex_
-  std::vector<PointRun> settled_;      // guarded by mutex_: what was read
+  std::vector<PointRun> settled_;      // guarded by mutex_: what was read; the rest is no_result()
   std::vector<std::uint64_t> failed_;  // guarded by mutex_: of these, the first so many that failed
-  Clock::time_point looked_{};         // guarded by mutex_
+  Clock::time_point looked_{};         // guarded by mutex_: when it was whole
 };
 
 /// Runs of points that are in `of` and not in `without`; both rising and apart.
 std::vector<PointRun> difference(const std::vector<PointRun>& of,
                                  const std::vector<PointRun>& without);
+
+/// Runs of points that are in one of them, or in both; all rising and apart.
+std::vector<PointRun> united(const std::vector<PointRun>& one, const std::vector<PointRun>& other);
 
 /// Runs of settled points, rising, that have points from `first` to `last`, both in. Nothing: there
 /// are so many that finding them helps nobody.
@@ -82,12 +90,13 @@ class ColumnStore {
   Shared find(sqlite3* database, std::uint64_t study, const ColumnSource& source,
               std::uint64_t points);
   /// The same at once, however long it takes; null: the study is too large. What is interrupted,
-  /// which throws StorageError, is wanted, so that who asks again later has it.
+  /// which throws StorageError, is wanted and read on, so that who asks again later has it.
   Shared read(sqlite3* database, std::uint64_t study, const ColumnSource& source,
               std::uint64_t points, const std::function<bool()>& is_over);
 
   bool has_wishes() const;
-  /// Reads a column that is wanted.
+  /// Reads a column that is wanted. What is interrupted is wanted still, as long as each time
+  /// brings it further.
   void fill_one(sqlite3* database, const std::function<bool()>& is_over);
 
   /// Studies with more points are never read whole.
@@ -97,15 +106,21 @@ class ColumnStore {
   /// A picture is of three columns at most.
   static constexpr std::size_t kMostBytes = 3 * kMostPoints * sizeof(float);
 
+  /// Whose column is kept as far as there is room, so that a wish itself holds nothing.
+  struct Wish {
+    std::uint64_t study;
+    ColumnSource source;
+    std::uint64_t points;
+  };
+
   Shared known(std::uint64_t study, const ColumnSource& source, std::uint64_t points);
-  Shared wanted(std::uint64_t study, const ColumnSource& source, std::uint64_t points) const;
-  void want(const Shared& column);
-  void keep(const Shared& column);
+  Shared known_or_new(const Wish& wish);
+  void want(const Wish& wish);
 
   mutable std::mutex mutex_;
-  std::list<Shared> kept_;     // guarded by mutex_; the one looked at last comes first
-  std::deque<Shared> wished_;  // guarded by mutex_
-  Shared under_way_;           // guarded by mutex_
+  // Guarded by mutex_; the one looked at last comes first. Those too that are being read.
+  std::list<Shared> kept_;
+  std::deque<Wish> wished_;  // guarded by mutex_
 };
 
 }  // namespace oblique::server

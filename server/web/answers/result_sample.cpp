@@ -1,12 +1,14 @@
 #include "server/web/answers/result_sample.h"
 
 #include <algorithm>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
 #include <spdlog/fmt/fmt.h>
 
 #include "server/database/sqlite.h"
+#include "server/web/answers/answer_pool.h"
 
 namespace oblique::server {
 namespace {
@@ -59,6 +61,44 @@ Statement rows_of(sqlite3* database, std::span<const ColumnSource> sources) {
                       columns, has_models ? " JOIN models AS m ON m.model_id = p.model_id" : "")};
 }
 
+/// Points that failed: so many, or that many and more.
+std::uint64_t failed_of(sqlite3* database, std::uint64_t study) {
+  Statement count(database,
+                  "SELECT count(*) FROM (SELECT 1 FROM packed_results INDEXED BY failed_points "
+                  "WHERE study_id = ?1 AND error IS NOT NULL LIMIT 10000)");
+  count.bind(1, study);
+  count.step();
+  return static_cast<std::uint64_t>(count.integer(0));
+}
+
+ResultSample sample_results(const AnswerDesk& desk, std::uint64_t study,
+                            std::span<const ColumnSource> sources,
+                            const std::vector<PointRun>& settled) {
+  ResultSample sample;
+  sample.of = points_of(settled);
+  sample.columns.resize(sources.size());
+  Statement rows = rows_of(desk.database, sources);
+  for (const PointRun& run : sampled_runs(settled, ResultSample::kMost)) {
+    rows.reset();
+    rows.bind(1, study);
+    rows.bind(2, run.begin);
+    rows.bind(3, run.end - 1);
+    while (rows.step()) {
+      desk.end_in_time(sample.points.size());
+      sample.points.push_back(static_cast<std::uint64_t>(rows.integer(0)));
+      const bool has_failed = rows.integer(1) != 0;
+      for (std::size_t i = 0; i < sources.size(); ++i) {
+        const int column = static_cast<int>(i) + 2;
+        sample.columns[i].push_back(
+            has_failed             ? failed_point()
+            : rows.is_null(column) ? no_value()
+                                   : static_cast<float>(rows.real(column) / sources[i].per_unit));
+      }
+    }
+  }
+  return sample;
+}
+
 }  // namespace
 
 std::vector<PointRun> sampled_runs(const std::vector<PointRun>& runs, std::uint64_t most) {
@@ -90,32 +130,41 @@ std::vector<PointRun> sampled_runs(const std::vector<PointRun>& runs, std::uint6
   return taken;
 }
 
-ResultSample sample_results(const AnswerDesk& desk, std::uint64_t study,
-                            std::span<const ColumnSource> sources) {
-  const std::vector<PointRun> settled = settled_runs_of(desk.database, study);
-  ResultSample sample;
-  sample.of = points_of(settled);
-  sample.columns.resize(sources.size());
-  Statement rows = rows_of(desk.database, sources);
-  for (const PointRun& run : sampled_runs(settled, ResultSample::kMost)) {
-    rows.reset();
-    rows.bind(1, study);
-    rows.bind(2, run.begin);
-    rows.bind(3, run.end - 1);
-    while (rows.step()) {
-      desk.end_in_time(sample.points.size());
-      sample.points.push_back(static_cast<std::uint64_t>(rows.integer(0)));
-      const bool has_failed = rows.integer(1) != 0;
-      for (std::size_t i = 0; i < sources.size(); ++i) {
-        const int column = static_cast<int>(i) + 2;
-        sample.columns[i].push_back(
-            has_failed             ? failed_point()
-            : rows.is_null(column) ? no_value()
-                                   : static_cast<float>(rows.real(column) / sources[i].per_unit));
-      }
-    }
+SampleBook::Shared SampleBook::sample(const AnswerDesk& desk, std::uint64_t study,
+                                      std::span<const ColumnSource> sources) {
+  constexpr std::size_t kMostKept = 4;
+  constexpr int kTimes = 9;
+  constexpr Clock::duration kLongestUse = std::chrono::minutes(1);
+  const auto begun = Clock::now();
+  Kept now{study, {}, 0, {}, nullptr};
+  for (const ColumnSource& source : sources) {
+    now.columns.push_back(source.name);
   }
-  return sample;
+  const auto is_it = [&now](const Kept& kept) {
+    return kept.study == now.study && kept.columns == now.columns;
+  };
+  std::optional<Kept> last;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto found = std::find_if(kept_.begin(), kept_.end(), is_it);
+    last = found == kept_.end() ? std::nullopt : std::optional(*found);
+  }
+  if (last && begun < last->until) {
+    return last->sample;
+  }
+  const std::vector<PointRun> settled = settled_runs_of(desk.database, study);
+  now.failed = failed_of(desk.database, study);
+  const bool is_same = last && last->sample->of == points_of(settled) && last->failed == now.failed;
+  now.sample =
+      is_same ? last->sample
+              : std::make_shared<const ResultSample>(sample_results(desk, study, sources, settled));
+  const auto read = Clock::now();
+  now.until = read + std::min<Clock::duration>(kTimes * (read - begun), kLongestUse);
+  const std::lock_guard lock(mutex_);
+  kept_.remove_if(is_it);
+  kept_.push_front(now);
+  kept_.resize(std::min(kept_.size(), kMostKept));
+  return now.sample;
 }
 
 }  // namespace oblique::server

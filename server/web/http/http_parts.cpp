@@ -35,6 +35,10 @@ MHD_Result take_header(void* into, MHD_ValueKind /*kind*/, const char* key, cons
     head.origins.push_back(text);
   } else if (is("Sec-Fetch-Site")) {
     head.fetch_sites.push_back(text);
+  } else if (is("Sec-Fetch-Mode")) {
+    head.fetch_modes.push_back(text);
+  } else if (is("Sec-Fetch-Dest")) {
+    head.fetch_targets.push_back(text);
   } else if (is(MHD_HTTP_HEADER_TRANSFER_ENCODING)) {
     head.has_body = true;
   } else if (is(MHD_HTTP_HEADER_CONTENT_LENGTH)) {
@@ -77,6 +81,8 @@ Asked asked_on(MHD_Connection* connection, const char* method, const char* path)
   asked.question.path = path;
   MHD_get_connection_values(connection, MHD_HEADER_KIND, take_header, &asked);
   MHD_get_connection_values_n(connection, MHD_GET_ARGUMENT_KIND, take_field, &asked);
+  // The frame of the page alone: with a token it would let a browser in.
+  asked.head.may_be_linked_to = asked.question.path == "/" && asked.question.fields.empty();
   return asked;
 }
 

@@ -59,6 +59,19 @@ bool is_own_origin(const std::string& origin, const RequestHead& head) {
   return head.hosts.size() == 1 && origin == std::string(kScheme) + head.hosts.front();
 }
 
+/// The only one of these headers says this.
+bool is(const std::vector<std::string>& headers, std::string_view word) {
+  return headers.size() == 1 && headers.front() == word;
+}
+
+/// A link on a page of another site that opens a tab or takes one over, which is no page within
+/// that site's.
+bool is_followed_link(const RequestHead& head) {
+  return head.may_be_linked_to && head.method == "GET" && head.origins.empty() &&
+         (is(head.fetch_sites, "cross-site") || is(head.fetch_sites, "same-site")) &&
+         is(head.fetch_modes, "navigate") && is(head.fetch_targets, "document");
+}
+
 std::optional<HttpRefusal> objection_to_change(const RequestHead& head) {
   if (head.origins.size() != 1 || std::any_of(head.fetch_sites.begin(), head.fetch_sites.end(),
                                               [](const auto& s) { return s != "same-origin"; })) {
@@ -121,7 +134,7 @@ std::optional<HttpRefusal> objection_to(const RequestHead& head, const OwnNames&
                   [&](const std::string& origin) { return is_own_origin(origin, head); }) &&
       std::all_of(head.fetch_sites.begin(), head.fetch_sites.end(),
                   [](const std::string& site) { return site == "same-origin" || site == "none"; });
-  if (!is_of_ours) {
+  if (!is_of_ours && !is_followed_link(head)) {
     return HttpRefusal{kForbidden, "pages of other sites get nothing from this server"};
   }
   if (head.method == "POST" && head.takes_changes) {

@@ -18,6 +18,9 @@ struct RequestHead {
   bool has_zero_bytes = false;           ///< in a field: what follows one is easily overlooked
   bool takes_changes = false;            ///< something can be changed at its path, by POST
   std::optional<std::uint64_t> body_bytes = {};  ///< as Content-Length says
+  bool may_be_linked_to = false;                 ///< what is there holds nothing and changes nothing
+  std::vector<std::string> fetch_modes = {};     ///< every Sec-Fetch-Mode header
+  std::vector<std::string> fetch_targets = {};   ///< every Sec-Fetch-Dest header
 };
 
 /// By what a server may be called in a request. A page of a stranger, opened in a browser on this
@@ -40,7 +43,8 @@ inline constexpr std::uint64_t kMostBodyBytes = std::uint64_t{256} * 1024;
 
 /// Why the request gets no answer; nothing: it gets one. What changes something must come from a
 /// page of this server, which says so by `Origin`; who else asks, as a program, has the port of the
-/// clients.
+/// clients. Of what comes from pages of other sites only a link that somebody follows is answered,
+/// where the head `may_be_linked_to`.
 std::optional<HttpRefusal> objection_to(const RequestHead& head, const OwnNames& own);
 
 /// The host of a Host header, in lower case and without port and brackets: "127.0.0.1" of

@@ -40,6 +40,11 @@ constexpr const char* kHowToEnter =
 
 constexpr const char* kTooManyPictures = "too many pictures are asked for at once: ask again later";
 
+constexpr const char* kSolvesHere =
+    "the picture of a point is solved for on the server's machine, which only who has the token "
+    "may "
+    "ask for: draw it with `oblique plot --server`";
+
 HttpAnswer nothing_there() {
   return error_answer(kNothingThere, "there is nothing here");
 }
@@ -265,6 +270,9 @@ std::optional<HttpAnswer> Page::begin_study(const HttpQuestion& question, const 
       FieldReader(question.fields).text("where")) {
     return begin(question, filters_.begin(place.study, question, is_slice));
   }
+  if (place.point && place.part == "/picture" && !is_trusted(question)) {
+    return error_answer(kUnauthorized, kSolvesHere);
+  }
   if (place.part == (place.point ? "/picture" : "picture")) {
     return begin(question, at_.drawings,
                  picture_job(pictures_, place.study, place.point, question.fields));
@@ -309,12 +317,16 @@ std::optional<HttpAnswer> Page::begin(const HttpQuestion& question, Talk talk) {
   return std::nullopt;
 }
 
+/// Who comes without the token keeps nobody waiting who has it.
+bool Page::submit(const HttpQuestion& question, AnswerPool& pool, AnswerPool::Job job,
+                  AnswerPool::Lane lane) const {
+  return pool.submit(question.number, std::move(job),
+                     is_trusted(question) ? lane : AnswerPool::Lane::kStrangers);
+}
+
 std::optional<HttpAnswer> Page::begin(const HttpQuestion& question, AnswerPool& pool,
                                       AnswerPool::Job job, AnswerPool::Lane lane) {
-  if (!is_trusted(question)) {
-    lane = AnswerPool::Lane::kSlow;
-  }
-  if (!pool.submit(question.number, std::move(job), lane)) {
+  if (!submit(question, pool, std::move(job), lane)) {
     return error_answer(kTryLater, kTooManyPictures);
   }
   under_way_.emplace(question.number, UnderWay{{}, &pool});
@@ -351,8 +363,8 @@ std::optional<HttpAnswer> Page::go_on_talking(const HttpQuestion& question, Unde
     return std::move(*answer);
   }
   under_way = {{}, &at_.answers};
-  const bool is_taken =
-      at_.answers.submit(question.number, std::get<AnswerPool::Job>(std::move(*next)));
+  const bool is_taken = submit(question, at_.answers, std::get<AnswerPool::Job>(std::move(*next)),
+                               AnswerPool::Lane::kAny);
   return is_taken ? std::nullopt : std::optional(error_answer(kTryLater, kTooManyPictures));
 }
 

@@ -77,6 +77,8 @@ class Page {
   std::optional<HttpAnswer> begin(const HttpQuestion& question, AnswerPool& pool,
                                   AnswerPool::Job job,
                                   AnswerPool::Lane lane = AnswerPool::Lane::kAny);
+  bool submit(const HttpQuestion& question, AnswerPool& pool, AnswerPool::Job job,
+              AnswerPool::Lane lane) const;
   /// What a request waits for: a reply to a talk or, without one, a job of a pool.
   struct UnderWay {
     std::optional<Talk> talk = {};

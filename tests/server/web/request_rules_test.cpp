@@ -86,6 +86,40 @@ TEST(RequestRules, PagesOfOthersGetNothing) {
   }
 }
 
+TEST(RequestRules, OfOtherSitesOnlyALinkThatIsFollowedIsAnswered) {
+  RequestHead link = request_for("localhost:7602");
+  link.fetch_sites = {"cross-site"};
+  link.fetch_modes = {"navigate"};
+  link.fetch_targets = {"document"};
+  EXPECT_EQ(status_of(link), 403U) << "nothing may be linked to but what says so";
+  link.may_be_linked_to = true;
+  EXPECT_EQ(status_of(link), 200U);
+  const auto with = [&link](auto change) {
+    RequestHead changed = link;
+    change(changed);
+    return status_of(changed);
+  };
+  EXPECT_EQ(with([](RequestHead& head) { head.fetch_sites = {"same-site"}; }), 200U);
+  EXPECT_EQ(with([](RequestHead& head) { head.hosts = {"evil.example"}; }), 403U);
+  EXPECT_EQ(with([](RequestHead& head) { head.method = "HEAD"; }), 403U);
+  EXPECT_EQ(with([](RequestHead& head) { head.method = "POST"; }), 403U);
+  EXPECT_EQ(with([](RequestHead& head) { head.origins = {"http://evil.example"}; }), 403U);
+  EXPECT_EQ(with([](RequestHead& head) { head.origins = {"null"}; }), 403U);
+  EXPECT_EQ(with([](RequestHead& head) { head.has_body = true; }), 413U);
+  using Words = std::vector<std::string>;
+  for (const Words& sites : {Words{""}, Words{"cross-site", "cross-site"}, Words{"Cross-Site"}}) {
+    EXPECT_EQ(with([&](RequestHead& head) { head.fetch_sites = sites; }), 403U);
+  }
+  for (const Words& modes : {Words{}, Words{"no-cors"}, Words{"cors"}, Words{"nested-navigate"},
+                             Words{"navigate", "navigate"}}) {
+    EXPECT_EQ(with([&](RequestHead& head) { head.fetch_modes = modes; }), 403U);
+  }
+  for (const Words& targets : {Words{}, Words{"iframe"}, Words{"embed"}, Words{"object"},
+                               Words{"script"}, Words{"empty"}, Words{"document", "document"}}) {
+    EXPECT_EQ(with([&](RequestHead& head) { head.fetch_targets = targets; }), 403U);
+  }
+}
+
 TEST(RequestRules, OnlyReadingIsAnswered) {
   EXPECT_EQ(status_of({"HEAD", false, {"localhost"}, {}, {}}), 200U);
   for (const std::string method : {"POST", "PUT", "DELETE", "OPTIONS", "TRACE", "get", "BREW"}) {

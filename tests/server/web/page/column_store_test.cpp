@@ -129,6 +129,25 @@ TEST(ColumnSource, ListsAndWordsAboutRowsAreNoPictures) {
   }
 }
 
+TEST(United, IsThatOfTheSetsOfPoints) {
+  std::mt19937 random(7);  // the same sets in every run
+  for (int round = 0; round < 2000; ++round) {
+    std::set<std::uint64_t> one;
+    std::set<std::uint64_t> other;
+    for (std::uint64_t point = 0; point < 14; ++point) {
+      if (random() % 3 == 0) {
+        one.insert(point);
+      }
+      if (random() % 3 == 0) {
+        other.insert(point);
+      }
+    }
+    const auto both = united(runs_of(one), runs_of(other));
+    one.insert(other.begin(), other.end());
+    EXPECT_EQ(both, runs_of(one));
+  }
+}
+
 /// A database with one study, as far as columns are read of it, in memory.
 class ColumnStoreTest : public testing::Test {
  protected:
@@ -191,6 +210,35 @@ TEST_F(ColumnStoreTest, WhatVanishedWhileReadingFailedIsNotShown) {
   EXPECT_EQ(read(), column);
   EXPECT_TRUE(is_same_mark(column->part(50, 1).at(0), no_result()));
   EXPECT_EQ(column->part(60, 1), std::vector<float>{60.0F});
+}
+
+TEST_F(ColumnStoreTest, AColumnThatIsInterruptedAgainAndAgainIsReadOn) {
+  settle(0, kPoints);
+  read_in_vain();
+  int times = 0;
+  for (; times < 100 && store_.has_wishes(); ++times) {
+    int looks = 0;
+    constexpr int kSteps = 100;
+    sqlite3_progress_handler(
+        database_.get(), kSteps,
+        [](void* count) { return ++*static_cast<int*>(count) > 5 ? 1 : 0; }, &looks);
+    store_.fill_one(database_.get(), [] { return false; });
+    sqlite3_progress_handler(database_.get(), 0, nullptr, nullptr);
+  }
+  EXPECT_GT(times, 1);
+  EXPECT_LT(times, 100);
+  const auto column = store_.find(database_.get(), 1, *column_source("mu"), kPoints);
+  ASSERT_TRUE(column);
+  for (std::uint64_t point = 0; point < kPoints; ++point) {
+    EXPECT_EQ(column->part(point, 1), std::vector<float>{static_cast<float>(point)});
+  }
+}
+
+TEST_F(ColumnStoreTest, PointsThatFailedBeyondThoseOfTheColumnAreNoneOfIt) {
+  settle(0, kPoints);
+  run("UPDATE packed_results SET error = 'no' WHERE point IN (7, 600)");
+  run("INSERT INTO packed_results VALUES (1, 600, 'no', NULL)");
+  EXPECT_TRUE(is_same_mark(read()->part(7, 1).at(0), failed_point()));
 }
 
 TEST_F(ColumnStoreTest, WhoWaitsForAColumnThatAnotherReadsGoesInTime) {

@@ -76,6 +76,9 @@ TEST(PageAccess, AnOperatorMayLetAllLookAndNoneChange) {
   EXPECT_EQ(status_of_answer(page.ask("POST", "/api/studies/1/pause",
                                       "Origin: " + page.url() + "\r\nContent-Length: 0\r\n")),
             401);
+  // A picture of a point would be solved for here; that of a study would not.
+  EXPECT_EQ(status_of_answer(page.ask("GET", "/api/studies/1/points/0/picture", "")), 401);
+  EXPECT_EQ(status_of_answer(page.ask("GET", "/api/studies/1/picture", "")), 404);
 }
 
 TEST(PageAccess, HostilePagesGetAndChangeNothing) {
@@ -130,6 +133,31 @@ TEST(PageAccess, HostilePagesGetAndChangeNothing) {
               403)
         << host;
   }
+}
+
+TEST(PageAccess, ALinkOfAnotherSiteOpensThePageAndNothingElse) {
+  const PageServer page;
+  const std::string link =
+      "Sec-Fetch-Site: cross-site\r\nSec-Fetch-Mode: navigate\r\nSec-Fetch-Dest: document\r\n";
+  const std::string frame = page.ask("GET", "/", link);
+  EXPECT_EQ(status_of_answer(frame), 200);
+  EXPECT_EQ(body_of(frame), body_of(page.ask("GET", "/", "")));
+  const std::string with_token = page.ask("GET", std::string("/?token=") + kTestToken, link);
+  EXPECT_EQ(status_of_answer(with_token), 403);
+  EXPECT_THAT(with_token, Not(HasSubstr("Set-Cookie")));
+  for (const std::string path :
+       {"/?", "/?x=1", "/main.js", "/page.css", "/metrics", "/healthz", "/api/session",
+        "/api/studies", "/api/studies/1/rows", "/api/studies/1/picture", "//", "/index.html"}) {
+    const bool is_frame = path == "/?";
+    EXPECT_EQ(status_of_answer(page.ask("GET", path, page.cookie_header() + link)),
+              is_frame ? 200 : 403)
+        << path;
+  }
+  EXPECT_EQ(status_of_answer(page.ask("POST", "/api/studies/7/pause",
+                                      page.cookie_header() + "Origin: http://evil.example\r\n" +
+                                          link + "Content-Length: 2\r\n",
+                                      "{}")),
+            403);
 }
 
 TEST(PageAccess, OnlyChangesHaveAnotherMethod) {
