@@ -42,7 +42,8 @@ const kAskAgain_ms = 3000;
 /** The address that this view is to have; empty: it has it. */
 let wanted = "";
 let later = 0;
-const path_of = (/** @type {string} */ address) => address.replace(/^#/, "").split("?", 1)[0];
+const path_of = (/** @type {string} */ address) => address.replace(/^#/, "").split("?", 1)[0] || "/";
+const address_of = (/** @type {string} */ path, /** @type {URLSearchParams} */ fields) => `#${path}${String(fields) && `?${fields}`}`;
 
 function write() {
   if (wanted === "" || path_of(wanted) !== path_of(location.hash)) return;
@@ -76,7 +77,8 @@ function links(/** @type {(string | Node)[]} */ parts) {
 }
 
 async function show() {
-  const [path, query] = location.hash.replace(/^#/, "").split("?", 2);
+  const path = path_of(location.hash);
+  const query = location.hash.split("?", 2)[1];
   if (path === here && shown.go_to) {
     wanted = "";
     left.set(path, location.hash);
@@ -100,8 +102,8 @@ async function show() {
     last: (of) => left.get(of) ?? `#${of}`,
     keep: (fields, is_step = false) => {
       if (mine !== turn) return;
-      if (is_step) step_to(`#${path}?${fields}`);
-      left.set(path, wanted = `#${path}?${fields}`);
+      if (is_step) step_to(address_of(path, fields));
+      left.set(path, wanted = address_of(path, fields));
       write_soon();
     },
     go: (address) => {

@@ -1,10 +1,12 @@
 // @ts-check
 // Studies and workers, live.
-import { h, save } from "/parts/dom.js";
+import { all_of, StudyList } from "/listed.js";
+import { copied, h, save } from "/parts/dom.js";
 import { count, csv_line, time_left } from "/parts/format.js";
-import { change, json } from "/server.js";
+import { change } from "/server.js";
 
-const kStudiesAtOnce = 200;
+/** After no answer, and of studies that events do not tell of. */
+const kAskAgain_ms = 3000;
 
 /** What somebody looks at and nobody keeps: see server/web/page. */
 const is_look = (/** @type {any} */ study) => /^look-[0-9a-f]{16}$/.test(study.name);
@@ -81,10 +83,54 @@ export function progress_of(study) {
     "aria-label": `${study.name}: settled points` }), percent);
 }
 
-/** @param {any[]} studies */
-function studies_csv(studies) {
-  const columns = ["id", "name", "state", "points", "solved", "failed", "points_per_s", "priority", "created_at", "submitted_by"];
-  return [columns, ...studies.map((study) => columns.map((name) => study[name]))].map(csv_line).join("\r\n") + "\r\n";
+/** @param {any[]} lines @param {string[]} columns */
+const csv_of = (lines, columns) => [columns, ...lines.map((line) => columns.map((name) => line[name]))].map(csv_line).join("\r\n") + "\r\n";
+const kStudyColumns = ["id", "name", "state", "points", "solved", "failed", "points_per_s", "priority", "created_at", "submitted_by"];
+const kWorkerColumns = ["id", "name", "host", "state", "threads", "points_per_s", "leased_points", "solved_points", "silent_s", "losses", "solver_version", "instruction_set"];
+
+/** Running ones first, then the latest. @param {any[]} studies @param {string} name what names have in them */
+function in_order(studies, name) {
+  const rank = (/** @type {any} */ s) => (s.state === "running" ? 0 : s.state === "paused" ? 1 : 2);
+  return studies.filter((s) => !is_look(s) && s.name.toLowerCase().includes(name.toLowerCase())).sort((a, b) => rank(a) - rank(b) || b.id - a.id);
+}
+
+/** The server as a whole. @param {any} now */
+function figures(now) {
+  const all = [["points/s", count(now.points_per_s)], ["points open", count(now.points_open)],
+    ["at workers", count(now.points_leased)], ["workers", count(now.workers_there)], ["threads", count(now.threads)],
+    ...Object.entries(now.studies_by_state).map(([state, n]) => [`studies ${state}`, count(Number(n))])];
+  return all.map(([name, value]) => h("div", {}, h("dt", {}, name), h("dd", {}, value)));
+}
+
+/** @param {(text: string, is_bad?: boolean) => void} say */
+function workers_section(say) {
+  const table = live_table("Workers", ["worker", "state", "#threads", "#points/s", "#solved", "#losses", "solver"]);
+  const none = h("p", { class: "weak" }, "No worker is here: start oblique-worker.");
+  const unlisted = h("p", { class: "weak" });
+  const file = csv_button("workers", kWorkerColumns, (all) => all, say);
+  return { element: h("section", {}, h("div", { class: "head" }, h("h2", {}, "Workers"), file), table.element, none, unlisted),
+    /** @param {any} now the overview, or null */
+    draw(now) {
+      const there = now?.workers ?? [];
+      table.element.hidden = there.length === 0;
+      none.hidden = there.length > 0 || !now;
+      table.show(there, (w) => [w.name, w.silent_s > 0 ? `${w.state}, silent for ${w.silent_s} s` : w.state, String(w.threads),
+        count(w.points_per_s), count(w.solved_points), String(w.losses),
+        h("span", { class: "weak" }, `${w.solver_version}, ${w.instruction_set}`)]);
+      const hidden = (now?.workers_there ?? 0) - there.length;
+      unlisted.textContent = hidden > 0 ? `${count(hidden)} more workers are not shown; the CSV has all.` : "";
+    } };
+}
+
+/** Saves all that the server lists, also what is not shown. @param {"studies" | "workers"} what @param {string[]} columns @param {(all: any[]) => any[]} chosen @param {(text: string, is_bad?: boolean) => void} say */
+function csv_button(what, columns, chosen, say) {
+  return h("button", { type: "button", "aria-label": `${what} as CSV`, onclick: async () => {
+    try {
+      save(`${what}.csv`, "text/csv", csv_of(chosen(await all_of(what)), columns));
+    } catch (error) {
+      say(String(/** @type {Error} */ (error).message), true);
+    }
+  } }, "CSV");
 }
 
 /**
@@ -97,76 +143,85 @@ export function overview(root, place) {
     said.textContent = text;
     said.className = is_bad ? "said bad" : "said";
   };
+  let now = place.now();
+  let states = "";
+  let later = 0;
+  let is_closed = false;
+  /** Why studies did not come. */
+  let fault = "";
+  const list = new StudyList(() => {
+    if (fault && said.textContent === fault) say("");
+    fault = "";
+    draw();
+    read_later();
+  }, (error) => {
+    say(fault = String(error.message), true);
+    read_later();
+  });
   const numbers = h("dl", { class: "figures" });
   const studies = live_table("Studies", ["study", "state", "progress", "#points", "#failed", "#points/s", "#left", "waits for", ...(place.may_change ? ["change"] : [])]);
-  const workers = live_table("Workers", ["worker", "state", "#threads", "#points/s", "#solved", "#losses", "solver"]);
   const no_studies = h("p", { class: "weak" }, "There is no study yet.");
-  const no_workers = h("p", { class: "weak" }, "No worker is here: start oblique-worker.");
   const unlisted = h("p", { class: "weak" });
-  const filter = h("input", { type: "search", oninput: () => draw(), "aria-label": "Studies whose name has" , placeholder: "name has …" });
-  const file = h("button", { type: "button", onclick: () => save("studies.csv", "text/csv", studies_csv([...known.values()].filter((s) => !is_look(s)))) }, "CSV");
-  const more = h("button", { type: "button", hidden: true, onclick: () => read(next_after) }, "More studies");
+  const filter = h("input", { type: "search", value: place.fields.get("name") ?? "", "aria-label": "Studies whose name has", placeholder: "name has …", oninput: () => {
+    place.keep(new URLSearchParams(filter.value ? { name: filter.value } : {}));
+    draw();
+  } });
+  const file = csv_button("studies", kStudyColumns, (all) => in_order(all, filter.value), say);
+  const more = h("button", { type: "button", hidden: true, onclick: () => list.more() }, "More studies");
+  const workers = workers_section(say);
   root.append(numbers, said,
-    h("section", {}, h("div", { class: "head" }, h("h2", {}, "Studies"), filter, place.may_change && h("a", { class: "button", href: "#/new" }, "Start a study"), file), studies.element, no_studies, more),
-    h("section", {}, h("h2", {}, "Workers"), workers.element, no_workers, unlisted));
+    h("section", {}, h("div", { class: "head" }, h("h2", {}, "Studies"), filter, place.may_change && h("a", { class: "button", href: "#/new" }, "Start a study"), file),
+      studies.element, no_studies, unlisted, more),
+    workers.element,
+    h("section", {}, h("h2", {}, "The same on a command line"), copied("the command of the studies", "oblique studies"), copied("the command of the workers", "oblique workers"),
+      h("p", { class: "weak" }, "Add --server ADDRESS where the server is elsewhere, and --format csv for a file.")));
 
-  /** @type {Map<number, any>} */
-  const known = new Map();
-  let next_after = 0;
-  let states = "";
-  let now = place.now();
-
-  async function read(after = 0) {
-    try {
-      const page = await json(`/api/studies?limit=${kStudiesAtOnce}&after=${after}`);
-      if (after === 0) known.clear();
-      for (const study of page.studies) known.set(study.id, study);
-      next_after = page.next_after;
-      more.hidden = next_after === 0;
-      draw();
-    } catch (error) {
-      say(String(/** @type {Error} */ (error).message), true);
-    }
+  /** What events do not tell of is asked for, and what did not come is asked for again. */
+  function read_later() {
+    if (is_closed || later || !(fault || now?.unlisted > 0)) return;
+    later = setTimeout(() => {
+      later = 0;
+      if (document.hidden) read_later();
+      else list.read();
+    }, kAskAgain_ms);
   }
-
   function draw() {
-    const wanted = filter.value.toLowerCase();
-    const rank = (/** @type {any} */ s) => (s.state === "running" ? 0 : s.state === "paused" ? 1 : 2);
-    const lines = [...known.values()].filter((s) => !is_look(s) && s.name.toLowerCase().includes(wanted))
-      .sort((a, b) => rank(a) - rank(b) || b.id - a.id);
+    const lines = in_order([...list.known.values()], filter.value);
     studies.element.hidden = lines.length === 0;
-    no_studies.hidden = lines.length > 0;
-    no_studies.textContent = known.size > 0 ? "No study is called so." : "There is no study yet.";
+    no_studies.hidden = lines.length > 0 || !list.was_read;
+    const read = [...list.known.values()].filter((s) => !is_look(s)).length;
+    no_studies.textContent = read === 0 ? "There is no study yet." : list.has_more ? `Of the ${count(read)} studies that were read none is called so.` : "No study is called so.";
     studies.show(lines, (s) => [h("a", { href: `#/study/${s.id}` }, s.name), s.state, progress_of(s), count(s.points),
       s.failed > 0 ? h("span", { class: "bad" }, count(s.failed)) : "0", s.points_per_s > 0 ? count(s.points_per_s) : "",
       s.state === "running" ? time_left(s.left_s) : "", h("span", { class: "weak" }, s.state === "running" ? s.waits_for : ""),
       ...(place.may_change ? [study_buttons(s, say)] : [])]);
-    const there = now?.workers ?? [];
-    workers.element.hidden = there.length === 0;
-    no_workers.hidden = there.length > 0 || !now;
-    workers.show(there, (w) => [w.name, w.silent_s > 0 ? `${w.state}, silent for ${w.silent_s} s` : w.state, String(w.threads),
-      count(w.points_per_s), count(w.solved_points), String(w.losses),
-      h("span", { class: "weak" }, `${w.solver_version}, ${w.instruction_set}`)]);
-    const hidden = (now?.workers_there ?? 0) - there.length;
-    unlisted.textContent = hidden > 0 ? `${count(hidden)} more workers are not shown.` : "";
-    if (now) {
-      const figures = [["points/s", count(now.points_per_s)], ["points open", count(now.points_open)],
-        ["at workers", count(now.points_leased)], ["workers", count(now.workers_there)], ["threads", count(now.threads)],
-        ...Object.entries(now.studies_by_state).map(([state, n]) => [`studies ${state}`, count(Number(n))])];
-      numbers.replaceChildren(...figures.map(([name, value]) => h("div", {}, h("dt", {}, name), h("dd", {}, value))));
-    }
+    more.hidden = !list.has_more;
+    unlisted.textContent = now?.unlisted > 0
+      ? `${count(now.unlisted)} more ${now.unlisted === 1 ? "study runs or is" : "studies run or are"} paused than are followed live; numbers of those come every ${kAskAgain_ms / 1000} s.` : "";
+    workers.draw(now);
+    if (now) numbers.replaceChildren(...figures(now));
   }
 
-  read();
+  list.read();
   return {
     take(told) {
       now = told;
       if (told.is_stopping) say("The server is stopping.");
-      for (const study of told.studies) known.set(study.id, study);
+      list.take(told.studies);
       const seen = JSON.stringify(told.studies_by_state);
-      if (seen !== states) read();
+      if (seen !== states) list.read();
       states = seen;
+      read_later();
       draw();
+    },
+    go_to(fields) {
+      filter.value = fields.get("name") ?? "";
+      draw();
+    },
+    again: () => list.read(),
+    close() {
+      is_closed = true;
+      clearTimeout(later);
     },
   };
 }

@@ -46,10 +46,17 @@ export async function json(path, signal) {
   return answer.json();
 }
 
-/** Asks for a change. @param {string} path @param {object} [body] @returns {Promise<any>} */
-export async function change(path, body) {
+/** A file; `is_cut`: the server sends the first 16 MiB of it. @param {string} path @returns {Promise<{file: Blob, is_cut: boolean}>} */
+export async function file_at(path) {
+  const answer = await asked(path, {});
+  if (!answer.ok) throw await refusal(answer);
+  return { file: await answer.blob(), is_cut: answer.headers.get("X-Oblique-Truncated") === "1" };
+}
+
+/** Asks for a change. @param {string} path @param {object} [body] @param {AbortSignal} [signal] @returns {Promise<any>} */
+export async function change(path, body, signal) {
   const answer = await asked(path, {
-    method: "POST", body: JSON.stringify(body ?? {}), headers: { "Content-Type": "application/json" } });
+    method: "POST", signal, body: JSON.stringify(body ?? {}), headers: { "Content-Type": "application/json" } });
   if (!answer.ok) throw await refusal(answer);
   return answer.json();
 }

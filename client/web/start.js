@@ -1,6 +1,6 @@
 // @ts-check
 // A study that is started here: values as on the command line, how much it is, and what the server says of it.
-import { h, named, picker, copied } from "/parts/dom.js";
+import { copied, h, named, picker, tick } from "/parts/dom.js";
 import { count, quoted, time_left } from "/parts/format.js";
 import { change } from "/server.js";
 
@@ -9,41 +9,132 @@ const kMostCounted = 2 ** 53;
 const kBytesPerPoint = 450; // measured: a row with its packed arrays
 const kJudgeAfter_ms = 250;
 
+const kDistributions = /** @type {Record<string, string>} */ ({ uniform: "DISTRIBUTION_UNIFORM", "log-uniform": "DISTRIBUTION_LOG_UNIFORM", normal: "DISTRIBUTION_NORMAL" });
+const kSamples = /** @type {Record<string, string>} */ ({ random: "SAMPLE_RANDOM", lhs: "SAMPLE_LATIN_HYPERCUBE", sobol: "SAMPLE_SOBOL" });
+
+/** @param {string} key @param {string} part */
+function number_of(key, part) {
+  const value = Number(part);
+  if (part.trim() === "" || !Number.isFinite(value)) throw new Error(`${key}: "${part.trim()}" is no number`);
+  return value;
+}
+
+/** A whole number from `least`. @param {string} key @param {string} what @param {string} part @param {number} least */
+function whole_of(key, what, part, least) {
+  const value = number_of(key, part);
+  if (!Number.isInteger(value) || value < least) throw new Error(`${key}: the ${what} must be a whole number from ${least}`);
+  return value;
+}
+
 /**
- * An axis as a flag has it: 0.4 or 0.4,0.6,0.8 or FROM:TO:COUNT or FROM:TO:COUNT:log.
- * @param {string} key @param {string} text @returns {{axis: any, values: number}}
+ * An axis as a flag has it: 0.4 or 0.4,0.6,0.8 or FROM:TO:COUNT or FROM:TO:COUNT:log; of a sample one value, FROM:TO or a distribution.
+ * @param {string} key @param {string} text @param {boolean} [is_drawn] in a sample @returns {{axis: any, values: number}}
  */
-export function axis_of(key, text) {
-  const number = (/** @type {string} */ part) => {
-    const value = Number(part);
-    if (part.trim() === "" || !Number.isFinite(value)) throw new Error(`${key}: "${part.trim()}" is no number`);
-    return value;
-  };
+export function axis_of(key, text, is_drawn = false) {
+  const drawn = is_drawn ? drawn_axis(key, text.trim()) : null;
+  if (drawn) return { axis: { key, distribution: drawn }, values: 1 };
   if (!text.includes(":")) {
-    const values = text.split(",").map(number);
+    const values = text.split(",").map((part) => number_of(key, part));
     return { axis: { key, values }, values: values.length };
   }
   const parts = text.split(":");
   const is_log = parts.length === 4 && parts[3].trim() === "log";
-  if (parts.length !== 3 && !is_log) throw new Error(`${key}: a range is FROM:TO:COUNT or FROM:TO:COUNT:log`);
-  const [from, to, values] = parts.slice(0, 3).map(number);
-  if (!Number.isInteger(values) || values < 1) throw new Error(`${key}: the count must be a whole number from 1`);
+  if (parts.length !== 3 && !is_log) throw new Error(`${key}: a range is FROM:TO:COUNT or FROM:TO:COUNT:log${is_drawn ? "; of a sample FROM:TO" : ""}`);
+  const [from, to] = parts.slice(0, 2).map((part) => number_of(key, part));
+  const values = whole_of(key, "count", parts[2], 1);
   return { axis: { key, from, to, count: values, ...(is_log ? { spacing: "SPACING_LOGARITHMIC" } : {}) }, values };
 }
 
-/** @param {{name: string, H: string, mu: string, e: string, others: string, where: string, priority: string}} form */
-export function submission_of(form) {
-  // Model keys come first, then H, mu, e.
-  const others = form.others.split(/\n/).map((line) => line.trim()).filter((line) => line !== "").map((line) => {
+/** What an axis of a sample is drawn from; null: it is written otherwise. @param {string} key @param {string} text */
+function drawn_axis(key, text) {
+  const [, name, inside] = /^([a-z-]+)\((.*)\)$/.exec(text) ?? [];
+  const ends = (/** @type {(string | undefined)[]} */ parts) => Object.fromEntries(["from", "to"].flatMap((end, i) => (parts[i]?.trim() ? [[end, number_of(key, /** @type {string} */ (parts[i]))]] : [])));
+  if (name === undefined) {
+    const parts = text.split(":");
+    return parts.length === 2 ? { kind: kDistributions.uniform, from: number_of(key, parts[0]), to: number_of(key, parts[1]) } : null;
+  }
+  const parts = inside.split(",");
+  if (!Object.hasOwn(kDistributions, name)) throw new Error(`${key}: there is no distribution ${name}; there are ${Object.keys(kDistributions).join(", ")}`);
+  const kind = kDistributions[name];
+  if (name !== "normal" && parts.length === 2) return { kind, from: number_of(key, parts[0]), to: number_of(key, parts[1]) };
+  if (name === "normal" && (parts.length === 2 || parts.length === 4)) return { kind, mean: number_of(key, parts[0]), sd: number_of(key, parts[1]), ...ends(parts.slice(2)) };
+  throw new Error(`${key}: write ${name === "normal" ? "normal(MEAN,SD) or normal(MEAN,SD,FROM,TO)" : `${name}(FROM,TO)`}`);
+}
+
+/** As --sample has it; undefined: nothing is drawn. @param {string} text */
+function sample_of(text) {
+  if (text === "") return undefined;
+  const [kind, count_, seed = "1", ...others] = text.split(":");
+  if (!Object.hasOwn(kSamples, kind) || count_ === undefined || others.length > 0) throw new Error("sample: write KIND:COUNT:SEED, as sobol:1000:1; kinds are random, lhs and sobol");
+  return { kind: kSamples[kind], count: whole_of("sample", "count", count_, 1), seed: whole_of("sample", "seed", seed, 0) };
+}
+
+/**
+ * What somebody has filled in.
+ * @typedef {{name: string, H: string, mu: string, e: string, others: string, where: string, priority: string, preset: string, integrator: string, sample: string, errors: boolean}} Form
+ */
+
+/** Keys of the model that the form has no field for, and their values. @param {Form} form */
+function others_of(form) {
+  return form.others.split(/\n/).map((line) => line.trim()).filter((line) => line !== "").map((line) => {
     const [key, text] = line.split("=", 2);
     if (!text) throw new Error(`"${line}": other keys are written as KEY=VALUES, one a line`);
-    return axis_of(key.trim(), text.trim());
+    return [key.trim(), text.trim()];
   });
-  const axes = [...others, axis_of("H", form.H), axis_of("mu", form.mu), axis_of("e", form.e)];
-  const points = axes.reduce((product, axis) => product * axis.values, 1);
+}
+
+/** @param {Form} form */
+export function submission_of(form) {
+  const sample = sample_of(form.sample.trim());
+  const axis = (/** @type {string} */ key, /** @type {string} */ text) => axis_of(key, text, sample !== undefined);
+  // Single values are part of the model, as those of flags are; model keys come first, by name, then H, mu, e.
+  const others = others_of(form).map(([key, text]) => ({ key, ...axis(key, text) }));
+  const is_single = (/** @type {any} */ one) => one.axis.values?.length === 1 && !/^length\d/.test(one.key);
+  const model = { preset: form.preset, integrator: form.integrator, ...Object.fromEntries(others.filter(is_single).map((one) => [one.key, one.axis.values[0]])) };
+  const varied = others.filter((one) => !is_single(one)).sort((a, b) => (a.key < b.key ? -1 : 1));
+  const axes = [...varied, axis("H", form.H), axis("mu", form.mu), axis("e", form.e)];
+  const points = sample ? sample.count : axes.reduce((product, one) => product * one.values, 1);
   if (form.name.trim() === "") throw new Error("name: a study has one");
-  return { points, body: { name: form.name.trim(), priority: Number(form.priority) || 0,
-    recipe: { blocks: [{ axes: axes.map((one) => one.axis), ...(form.where.trim() ? { where: form.where.trim() } : {}) }] } } };
+  const where = form.where.trim();
+  return { points, body: { name: form.name.trim(), priority: Number(form.priority) || 0, model,
+    recipe: { errors: form.errors, blocks: [{ axes: axes.map((one) => one.axis), ...(sample ? { sample } : {}), ...(where ? { where } : {}) }] } } };
+}
+
+/** The study as a command. @param {Form} form */
+function command_of(form) {
+  const flag = (/** @type {string} */ name, /** @type {string} */ value, /** @type {string} */ usual = "") => (value.trim() === usual ? [] : [`--${name}`, value.trim()]);
+  return ["oblique", "submit", "--name", form.name.trim() || "NAME", ...flag("preset", form.preset, kUsual.preset), ...flag("integrator", form.integrator, kUsual.integrator),
+    ...others_of(form).flatMap(([key, text]) => flag(key.replaceAll("_", "-"), text)), ...flag("H", form.H), ...flag("mu", form.mu), ...flag("e", form.e),
+    ...flag("sample", form.sample), ...flag("where", form.where), ...(form.errors ? ["--errors"] : []), ...flag("priority", form.priority, kUsual.priority)].map(quoted).join(" ");
+}
+
+/** What a form says unless somebody chooses. */
+const kUsual = { preset: "paper", integrator: "explicit", priority: "0" };
+
+/** Its fields. @param {() => void} changed */
+function fields_of(changed) {
+  const text = (/** @type {string} */ value, /** @type {string} */ hint) => h("input", { type: "text", value, placeholder: hint, spellcheck: false, autocomplete: "off", oninput: changed });
+  const fields = { name: text("", "friction"), H: text("1", "0.3:1.1:33"), mu: text("0.1:2:40", "0.1:2:40"), e: text("1", "0.6,0.8,1"),
+    preset: picker([["paper", "paper: as published, not converged"], ["printed", "printed: as the paper prints it"], ["converged", "converged: to predict"]], kUsual.preset, changed),
+    integrator: picker([["explicit", "explicit"], ["generalized-alpha", "generalized-alpha: the reference, slow"]], kUsual.integrator, changed),
+    others: h("textarea", { rows: 2, placeholder: "k=1e7:3e7:5", spellcheck: false, oninput: changed }), sample: text("", "sobol:1000:1"), where: text("", "mu > 0.5 * e"),
+    priority: picker([["0", "usual"], ["10", "before others"], ["-10", "after others"]], kUsual.priority, changed) };
+  const errors = tick("estimate errors, at a quarter more cost", false, changed);
+  return { first: fields.name,
+    elements: [named("name", fields.name), named("H, drop height [m]", fields.H), named("mu, friction", fields.mu), named("e, restitution", fields.e),
+      named("model to start from", fields.preset), named("integrator", fields.integrator), named("other keys of the model, one a line", fields.others),
+      named("points drawn, not multiplied: KIND:COUNT:SEED", fields.sample), named("only points where", fields.where), errors, named("priority", fields.priority)],
+    /** @returns {Form} */
+    values: () => /** @type {any} */ ({ ...Object.fromEntries(Object.entries(fields).map(([name, field]) => [name, field.value])), errors: errors.querySelector("input").checked }) };
+}
+
+/** How much a study is. @param {number} points @param {boolean} is_counted @param {any} now the overview, or null */
+function size_of(points, is_counted, now) {
+  const seconds = now && now.threads > 0 && now.thread_s_per_point > 0 ? (points * now.thread_s_per_point) / now.threads : null;
+  const bytes = points * kBytesPerPoint;
+  return `${count(points)} ${points === 1 ? "point" : "points"}${is_counted ? "" : " at most"}`
+    + (seconds !== null ? `, about ${time_left(seconds)} with the ${now.threads} threads that are here, if a point takes as long as the last ones did` : "")
+    + (bytes > 1e6 ? `, about ${bytes > 1e9 ? `${(bytes / 1e9).toFixed(1)} GB` : `${Math.round(bytes / 1e6)} MB`} in the database` : "") + ".";
 }
 
 /** @param {HTMLElement} root @param {import("/main.js").Place} place @returns {import("/main.js").View} */
@@ -53,10 +144,7 @@ export function start_view(root, place) {
     root.append(h("p", {}, "Studies are started with the address that the server printed, or that oblique view prints."));
     return {};
   }
-  const text = (/** @type {string} */ value, /** @type {string} */ hint) => h("input", { type: "text", value, placeholder: hint, spellcheck: false, autocomplete: "off", oninput: () => tell() });
-  const fields = { name: text("", "friction"), H: text("1", "0.3:1.1:33"), mu: text("0.1:2:40", "0.1:2:40"), e: text("1", "0.6,0.8,1"),
-    others: h("textarea", { rows: 2, placeholder: "k=1e7:3e7:5", spellcheck: false, oninput: () => tell() }), where: text("", "mu > 0.5 * e"),
-    priority: picker([["0", "usual"], ["10", "before others"], ["-10", "after others"]], "0", () => tell()) };
+  const { first, elements, values } = fields_of(() => tell());
   const size = h("p", { role: "status" });
   const said = h("p", { role: "alert", class: "bad" });
   const commands = h("div", {});
@@ -64,70 +152,68 @@ export function start_view(root, place) {
   const form = h("form", { class: "start", onsubmit: (/** @type {Event} */ event) => {
     event.preventDefault();
     start();
-  } },
-  named("name", fields.name), named("H, drop height [m]", fields.H), named("mu, friction", fields.mu), named("e, restitution", fields.e),
-  named("other keys of the model, one a line", fields.others), named("only points where", fields.where), named("priority", fields.priority),
-  h("p", { class: "weak" }, "Values: 0.4, or 0.4,0.6,0.8, or FROM:TO:COUNT, or FROM:TO:COUNT:log."), size, said, submit);
+  } }, ...elements, h("p", { class: "weak" }, "Values: 0.4, or 0.4,0.6,0.8, or FROM:TO:COUNT, or FROM:TO:COUNT:log. Of points that are drawn: 0.4, or FROM:TO, or normal(MEAN,SD)."), size, said, submit);
   root.append(h("h2", {}, "Start a study"), form, commands);
 
-  const values = () => /** @type {any} */ (Object.fromEntries(Object.entries(fields).map(([name, field]) => [name, field.value])));
   let later = 0;
-  let turn = 0;
-  const object_to = (/** @type {any} */ error) => {
-    size.textContent = String(error.message);
-    size.className = "bad";
-    submit.disabled = true;
-  };
-  /** How much it is. @param {number} points @param {boolean} is_counted */
-  function tell_size(points, is_counted) {
-    const now = place.now();
-    const seconds = now && now.threads > 0 && now.thread_s_per_point > 0 ? (points * now.thread_s_per_point) / now.threads : null;
-    const bytes = points * kBytesPerPoint;
-    size.textContent = `${count(points)} ${points === 1 ? "point" : "points"}${is_counted ? "" : " at most"}`
-      + (seconds !== null ? `, about ${time_left(seconds)} with the ${now.threads} threads that are here` : "")
-      + (bytes > 1e6 ? `, about ${bytes > 1e9 ? `${(bytes / 1e9).toFixed(1)} GB` : `${Math.round(bytes / 1e6)} MB`} in the database` : "") + ".";
-    size.className = "";
-    submit.disabled = false;
+  /** What is asked of the last values. */
+  let asked = new AbortController();
+  let is_wrong = false;
+  let is_starting = false;
+  let is_closed = false;
+  /** @param {string} text @param {boolean} [wrong] they are no study */
+  function show_size(text, wrong = false) {
+    size.textContent = text;
+    size.className = wrong ? "bad" : "";
+    is_wrong = wrong;
+    submit.disabled = is_wrong || is_starting;
+  }
+  /** What the grammar of recipes and filters says of it. @param {any} told */
+  async function judge(told) {
+    const { signal } = asked;
+    try {
+      const judged = await change("/api/check", { recipe: told.body.recipe, model: told.body.model }, signal);
+      show_size(size_of(judged.points, judged.is_counted, place.now()));
+    } catch (error) {
+      if (signal.aborted) return;
+      const { status, message } = /** @type {any} */ (error);
+      if (status === 400) show_size(message, true);
+      else show_size(`${size.textContent} It could not be judged before it starts: ${message}`);
+    }
   }
   function tell() {
     said.textContent = "";
     clearTimeout(later);
-    const mine = ++turn;
+    asked.abort();
+    asked = new AbortController();
     try {
-      const v = values();
-      const told = submission_of({ ...v, name: v.name || "name" });
+      const filled = values();
+      const told = submission_of({ ...filled, name: filled.name || "name" });
       if (told.points > kMostCounted) throw new Error("that is more points than a study may have");
-      tell_size(told.points, v.where.trim() === "");
-      const others = v.others.split(/\n/).filter((/** @type {string} */ line) => line.trim() !== "").flatMap((/** @type {string} */ line) => {
-        const [key, text_] = line.split("=", 2);
-        return [`--${key.trim().replaceAll("_", "-")}`, text_.trim()];
-      });
-      commands.replaceChildren(h("p", {}, "The same on a command line:"), copied("the command of the study", ["oblique", "submit", "--name", v.name || "NAME",
-        ...others, "--H", v.H, "--mu", v.mu, "--e", v.e, ...(v.where.trim() ? ["--where", v.where.trim()] : [])].map(quoted).join(" ")));
-      // What the grammar of recipes and filters says of it.
-      later = setTimeout(async () => {
-        try {
-          const judged = await change("/api/check", { recipe: told.body.recipe });
-          if (mine === turn) tell_size(judged.points, judged.is_counted);
-        } catch (error) {
-          if (mine === turn) object_to(error);
-        }
-      }, kJudgeAfter_ms);
+      show_size(size_of(told.points, filled.where.trim() === "", place.now()));
+      commands.replaceChildren(h("p", {}, "The same on a command line:"), copied("the command of the study", command_of(filled)));
+      later = setTimeout(() => judge(told), kJudgeAfter_ms);
     } catch (error) {
-      object_to(error);
+      show_size(String(/** @type {Error} */ (error).message), true);
     }
   }
   async function start() {
+    if (is_starting || is_wrong) return;
+    is_starting = submit.disabled = true;
     try {
-      submit.disabled = true;
       const made = await change("/api/studies", submission_of(values()).body);
-      location.hash = `#/study/${made.id}`;
+      if (!is_closed) location.hash = `#/study/${made.id}`;
     } catch (error) {
       said.textContent = String(/** @type {Error} */ (error).message);
-      submit.disabled = false;
     }
+    is_starting = false;
+    submit.disabled = is_wrong;
   }
   tell();
-  fields.name.focus();
-  return { close: () => clearTimeout(later) };
+  first.focus();
+  return { close() {
+    is_closed = true;
+    clearTimeout(later);
+    asked.abort();
+  } };
 }

@@ -75,8 +75,11 @@ export function keep_focus(element, change) {
 }
 
 /** Saves a text as a file of this machine. @param {string} name @param {string} type @param {string} text */
-export function save(name, type, text) {
-  const address = URL.createObjectURL(new Blob([text], { type: `${type};charset=utf-8` }));
+export const save = (name, type, text) => save_file(name, new Blob([text], { type: `${type};charset=utf-8` }));
+
+/** @param {string} name @param {Blob} file */
+export function save_file(name, file) {
+  const address = URL.createObjectURL(file);
   const link = h("a", { href: address, download: name });
   document.body.append(link);
   link.click();

@@ -5,6 +5,9 @@ import { count } from "/parts/format.js";
 import { json } from "/server.js";
 import { progress_of, study_buttons } from "/overview.js";
 
+/** Of a study that events do not tell of. */
+const kAskAgain_ms = 3000;
+
 /** @param {import("./study.js").StudyView} view @param {(settled: string) => void} moved other points are settled than before */
 export function standing_row(view, moved) {
   const how_far = h("div", { class: "row standing" });
@@ -14,6 +17,12 @@ export function standing_row(view, moved) {
   let stood = "";
   let offered = "";
   let settled = "";
+  let state = "";
+  /** By the last event, which has not all where many studies run or are paused. */
+  let is_listed = false;
+  let states = "";
+  let later = 0;
+  let is_closed = false;
   /** @param {any} told */
   function offer(told) {
     const what = JSON.stringify([told.state, told.failed > 0]);
@@ -28,6 +37,8 @@ export function standing_row(view, moved) {
     const text = JSON.stringify([told.state, told.solved, told.failed, told.waits_for]);
     if (text === stood) return;
     stood = text;
+    state = told.state;
+    wait();
     how_far.replaceChildren(told.state, progress_of(told), `${count(told.points)} ${told.points === 1 ? "point" : "points"}`,
       told.failed > 0 ? h("span", { class: "bad" }, `${count(told.failed)} failed`) : "",
       told.state === "running" && told.waits_for ? h("span", { class: "weak" }, `waits for ${told.waits_for}`) : "");
@@ -40,14 +51,29 @@ export function standing_row(view, moved) {
   const ask = () => json(`/api/studies?limit=1&after=${view.study.id - 1}`).then((page) => {
     if (page.studies[0]?.id === view.study.id) show(page.studies[0]);
   }, () => {});
+  /** Asks again, if nobody else tells. */
+  function wait() {
+    if (is_closed || later || is_listed || ["done", "cancelled"].includes(state)) return;
+    later = setTimeout(async () => {
+      if (!document.hidden) await ask();
+      later = 0;
+      wait();
+    }, kAskAgain_ms);
+  }
   ask();
-  let was_listed = false;
   return { element,
     /** @param {any} now the overview */
     take(now) {
       const told = now.studies.find((/** @type {any} */ one) => one.id === view.study.id);
+      const by_state = JSON.stringify(now.studies_by_state);
       if (told) show(told);
-      else if (was_listed) ask(); // it ended
-      was_listed = !!told;
+      else if (is_listed || by_state !== states) ask(); // it ended, or began
+      is_listed = !!told;
+      states = by_state;
+      wait();
+    },
+    close() {
+      is_closed = true;
+      clearTimeout(later);
     } };
 }

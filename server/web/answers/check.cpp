@@ -1,13 +1,18 @@
 #include <chrono>
 #include <stdexcept>
+#include <string>
 #include <utility>
 
 #include <google/protobuf/util/json_util.h>
 
 #include "proto/oblique.pb.h"
+#include "proto/recipe/model_message.h"
+#include "proto/recipe/point_table.h"
+#include "proto/recipe/written/written_model.h"
 #include "server/web/answers/study_answers.h"
 #include "server/web/http/json_answer.h"
 #include "worker/solver/model/errors.h"
+#include "worker/solver/model/parameters.h"
 
 namespace oblique::server {
 namespace {
@@ -17,12 +22,25 @@ using Clock = std::chrono::steady_clock;
 /// A filter over many points is counted for so long.
 constexpr std::chrono::seconds kLongestSurvey{5};
 
-HttpAnswer check_answer(const AnswerDesk& desk, const std::string& body) {
-  protocol::SubmitRequest asked;
-  const auto read = google::protobuf::util::JsonStringToMessage(body, &asked);
-  if (!read.ok()) {
-    throw std::invalid_argument("the body is no study: " + std::string(read.message()));
+/// A preset's and an integrator's names, and numbers of single keys.
+protocol::ModelParameters model_of(const nlohmann::json& written) {
+  protocol::WrittenModel model;
+  for (const auto& [key, value] : written.items()) {
+    if (key == protocol::WrittenModel::kPreset && value.is_string()) {
+      model.set_preset(value.get<std::string>());
+    } else if (key == "integrator" && value.is_string()) {
+      model.set(key, static_cast<double>(solver::integrator_named(value.get<std::string>())));
+    } else if (value.is_number()) {
+      model.set(key, value.get<double>());
+    } else {
+      throw solver::InputError("model: " + key + " must be a number; preset and integrator a name");
+    }
   }
+  return protocol::to_message(model.model());
+}
+
+HttpAnswer check_answer(const AnswerDesk& desk, const std::string& body) {
+  protocol::SubmitRequest asked = study_of_body(body);
   try {
     protocol::PointTable table(std::move(*asked.mutable_recipe()));
     const auto until = Clock::now() + kLongestSurvey;
@@ -38,6 +56,44 @@ HttpAnswer check_answer(const AnswerDesk& desk, const std::string& body) {
 }
 
 }  // namespace
+
+protocol::SubmitRequest study_of_body(const std::string& body) {
+  // Protobuf refuses what is deeper than that, too.
+  constexpr int kDeepest = 50;
+  bool is_deep = false;
+  auto whole = nlohmann::json::parse(
+      body,
+      [&](int depth, nlohmann::json::parse_event_t, nlohmann::json&) {
+        is_deep = is_deep || depth > kDeepest;
+        return !is_deep;
+      },
+      false);
+  if (is_deep) {
+    throw std::invalid_argument("the body is no study: it is nested too deeply");
+  }
+  const bool has_model = whole.is_object() && whole.contains("model");
+  const auto written = has_model ? whole["model"] : nlohmann::json();
+  if (has_model) {
+    whole.erase("model");
+  }
+  protocol::SubmitRequest asked;
+  const auto read =
+      google::protobuf::util::JsonStringToMessage(has_model ? whole.dump() : body, &asked);
+  if (!read.ok()) {
+    throw std::invalid_argument("the body is no study: " + std::string(read.message()));
+  }
+  if (has_model && (!written.is_object() || asked.recipe().has_model())) {
+    throw std::invalid_argument("the body is no study: its model is said once, as an object");
+  }
+  try {
+    if (has_model) {
+      *asked.mutable_recipe()->mutable_model() = model_of(written);
+    }
+  } catch (const solver::InputError& error) {
+    throw std::invalid_argument(error.what());
+  }
+  return asked;
+}
 
 AnswerPool::Job check_job(const std::string& body) {
   return [body](const AnswerDesk& desk) { return check_answer(desk, body); };

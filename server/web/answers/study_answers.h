@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 
+#include "proto/oblique.pb.h"
 #include "server/web/answers/answer_pool.h"
 #include "server/web/answers/point_set.h"
 
@@ -25,6 +26,10 @@ AnswerPool::Job slice_job(std::uint64_t study, const Fields& fields,
 /// unless it is null.
 AnswerPool::Job bins_job(std::uint64_t study, const Fields& fields,
                          std::shared_ptr<const PointSet> chosen = {});
+
+/// A study as the body of a submission has it: SubmitRequest in Protobuf's JSON, and beside it
+/// `model` as people write one. Throws std::invalid_argument with a sentence for what is none.
+protocol::SubmitRequest study_of_body(const std::string& body);
 
 /// Whether a recipe, as the body of a submission has it, is one, and what it would come to.
 AnswerPool::Job check_job(const std::string& body);

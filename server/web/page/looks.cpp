@@ -4,12 +4,12 @@
 #include <stdexcept>
 #include <utility>
 
-#include <google/protobuf/util/json_util.h>
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/point_table.h"
 #include "proto/recipe/sha256.h"
 #include "proto/recipe/written/study_terms.h"
+#include "server/web/answers/study_answers.h"
 #include "server/web/http/json_answer.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
@@ -105,11 +105,7 @@ void judge(const protocol::Recipe& recipe) {
 }  // namespace
 
 Talk Looks::begin(const HttpQuestion& question) {
-  protocol::SubmitRequest asked;
-  const auto read = google::protobuf::util::JsonStringToMessage(question.body, &asked);
-  if (!read.ok()) {
-    throw std::invalid_argument("the body is no study: " + std::string(read.message()));
-  }
+  protocol::SubmitRequest asked = study_of_body(question.body);
   judge(asked.recipe());
   asked.set_name(name_of(asked.recipe()));
   asked.set_priority(kFirstOfAll);

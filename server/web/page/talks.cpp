@@ -7,10 +7,10 @@
 #include <string>
 #include <utility>
 
-#include <google/protobuf/util/json_util.h>
 #include <spdlog/fmt/fmt.h>
 
 #include "server/web/answers/fields.h"
+#include "server/web/answers/study_answers.h"
 #include "server/web/http/json_answer.h"
 #include "server/web/page/status_json.h"
 
@@ -137,11 +137,7 @@ std::optional<Talk> change_talk(std::uint64_t study, const std::string& change) 
 
 Talk submit_talk(const HttpQuestion& question) {
   ClientRequest request;
-  const auto read =
-      google::protobuf::util::JsonStringToMessage(question.body, request.mutable_submit());
-  if (!read.ok()) {
-    throw std::invalid_argument("the body is no study: " + std::string(read.message()));
-  }
+  *request.mutable_submit() = study_of_body(question.body);
   return {request,
           [](const ClientReply& reply) -> Talk::Next {
             const protocol::SubmitReply& said = reply.submit();

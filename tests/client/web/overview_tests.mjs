@@ -1,7 +1,9 @@
 // Studies and workers, forms, and what is not there.
 import assert from "node:assert/strict";
+import { spawnSync } from "node:child_process";
+import { join } from "node:path";
 import { test } from "node:test";
-import { browser, text_of, until } from "./here.mjs";
+import { browser, server, text_of, until } from "./here.mjs";
 
 test("the overview follows a study that is started on the page, live, and studies are paused, resumed and cancelled", async () => {
   const page = await browser.open("#/new");
@@ -50,13 +52,186 @@ test("a form that is wrong says what is allowed, filters are counted, and a serv
   await until(page, () => document.querySelector("form [role=status].bad")?.textContent.includes("mu"));
   assert.equal(await page.$eval("form button", (one) => one.disabled), true);
   await write(fields[2], "1:2:11");
-  await write(fields[4], "mu > 1.75");
+  await write(fields[5], "mu > 1.75");
   await until(page, () => document.querySelector("form [role=status]").textContent.startsWith("3 points,") || document.querySelector("form [role=status]").textContent === "3 points.");
   assert.match(await page.$eval(".copied code", (one) => one.textContent), /--mu 1:2:11 --e 1 --where 'mu > 1.75'$/);
   await write(fields[0], "friction");  // there is one, of other points
   await page.click("form button");
   await until(page, () => document.querySelector("form [role=alert]").textContent.includes("friction"));
   browser.objections = browser.objections.filter((one) => !one.includes("status of 4"));  // these answers are wanted here
+  await page.close();
+});
+
+/** A form's field by its place among those with text. */
+const fill = async (page, i, text) => {
+  const fields = await page.$$("form input[type=text]");
+  await fields[i].click({ clickCount: 3 });
+  await fields[i].type(text);
+};
+
+test("values that got no judgement may be started all the same, and what is asked of older values is given up", async () => {
+  const page = await browser.open("#/new", { early: () => {
+    const real = window.fetch;
+    window.given_up = 0;
+    window.how = "silent";
+    window.fetch = (path, given) => {
+      if (!["/api/check", "/api/studies"].includes(path)) return real(path, given);
+      if (window.how === "busy") return Promise.resolve(new Response('{"error":"ask again later"}', { status: 503 }));
+      return new Promise((_, fail) => {
+        ++window.hanging;
+        given.signal?.addEventListener("abort", () => {
+          ++window.given_up;
+          fail(given.signal.reason);
+        });
+      });
+    };
+    window.hanging = 0;
+  } });
+  await page.waitForSelector("form");
+  await until(page, () => window.hanging === 1);
+  await fill(page, 0, "judged");
+  await until(page, () => window.given_up >= 1);
+  await page.evaluate(() => { window.how = "busy"; });
+  await fill(page, 2, "0.5");
+  await until(page, () => /could not be judged.*ask again later/.test(document.querySelector("form [role=status]").textContent));
+  const is_off = () => page.$eval("form button", (one) => one.disabled);
+  assert.equal(await is_off(), false);
+  // While the start is under way no other is begun, whatever is written meanwhile.
+  await page.evaluate(() => { window.how = "silent"; window.hanging = 0; });
+  await page.click("form button");
+  await until(page, () => window.hanging === 1);
+  await fill(page, 2, "0.75");
+  await until(page, () => document.querySelector(".copied code").textContent.includes("--mu 0.75"));
+  assert.equal(await is_off(), true);
+  await page.close();
+});
+
+test("the command of a form makes the study that the form starts: model, sample, errors, priority", async () => {
+  const page = await browser.open("#/new");
+  await page.waitForSelector("form");
+  await fill(page, 0, "drawn");
+  await fill(page, 1, "0.5:1");
+  await fill(page, 2, "normal(0.5,0.1,0.2,)");
+  await page.type("form textarea", "tolerance=1e-3\nk=2e7");
+  await fill(page, 4, "sobol:16:3");
+  await fill(page, 5, "mu < 0.6");
+  await page.click("form input[type=checkbox]");
+  for (const [i, choice] of [[0, "printed"], [2, "10"]]) await (await page.$$("form select"))[i].select(choice);
+  assert.match(await text_of(page, "form [role=status]"), /^16 points at most/);
+  const command = await text_of(page, ".copied code");
+  assert.match(command, /--preset printed --tolerance 1e-3 --k 2e7 .*--errors --priority 10$/);
+  await page.click("form button");
+  const id = await until(page, () => /^#\/study\/(\d+)/.exec(location.hash)?.[1]);
+  await until(page, () => document.querySelector(".standing").textContent.startsWith("done"));
+  const told = await page.evaluate(async (study) => (await (await fetch(`/api/studies/${study}`)).json()), id);
+  assert.equal(told.errors, true);
+  await page.close();
+  const other = join(server.folder, "form.db");
+  const flags = command.match(/'[^']*'|\S+/g).map((word) => word.replaceAll("'", "")).slice(2).filter((_, i, all) => all[i] !== "--priority" && all[i - 1] !== "--priority");
+  const made = spawnSync(server.oblique, ["run", ...flags, "--db", other, "--workers", "1"], { encoding: "utf8" });
+  assert.equal(made.status, 0, made.stderr);
+  const points = (database) => spawnSync(server.oblique, ["query", "drawn", "--select", "point,H,mu,e,k,eta2,fn_peak_N", "--format", "csv", "--db", database], { encoding: "utf8" }).stdout;
+  assert.match(points(other), /\n\d+,0\.\d+,0\.\d+,1,2e\+07,1.21/);
+  assert.equal(points(server.database), points(other));
+});
+
+/** A server with many studies, whose events are what a test tells. */
+const many_studies = () => {
+  const real = window.fetch;
+  window.all = Array.from({ length: 450 }, (_, i) => ({ id: i + 1, name: `study-${i + 1}`, state: "done", points: 10, solved: 10, failed: 0, points_per_s: 0, left_s: null,
+    waits_for: "", priority: 0, created_at: "", submitted_by: "" }));
+  window.fetch = (path, given) => {
+    const url = new URL(path, location.href);
+    if (url.pathname !== "/api/studies" || given?.method === "POST") return real(path, given);
+    if (window.refuses) return Promise.resolve(new Response('{"error":"ask again later"}', { status: 503 }));
+    const [after, limit] = ["after", "limit"].map((name) => Number(url.searchParams.get(name)));
+    const studies = window.all.filter((one) => one.id > after).slice(0, limit);
+    const last = studies.at(-1)?.id ?? 0;
+    return Promise.resolve(new Response(JSON.stringify({ studies, next_after: window.all.some((one) => one.id > last) ? last : 0 })));
+  };
+  window.EventSource = class extends EventTarget {
+    constructor() {
+      super();
+      window.tell = (now) => this.dispatchEvent(new MessageEvent("overview", { data: JSON.stringify({ studies: [], unlisted: 0, studies_by_state: { done: 450 }, workers: [],
+        workers_there: 0, threads: 0, points_open: 0, points_leased: 0, points_per_s: 0, ...now }) }));
+      setTimeout(() => window.tell({}));
+    }
+    close() {}
+  };
+};
+const row_of = (page, name) => until(page, (wanted) => [...document.querySelectorAll("tbody th")].find((one) => one.textContent === wanted)?.parentElement.textContent, name);
+
+test("of many studies the overview says what was read, keeps what was asked for, and has all of them in its CSV", async () => {
+  const page = await browser.open("#/?name=study-430", { early: many_studies });
+  const says = (what) => until(page, (text) => document.querySelector("main").textContent.includes(text), what);
+  const press = (name) => page.evaluate((wanted) => [...document.querySelectorAll("main button")].find((one) => one.textContent === wanted).click(), name);
+  await says("Of the 200 studies that were read none is called so.");
+  await press("More studies");
+  await says("Of the 400 studies that were read none is called so.");
+  await press("More studies");
+  await row_of(page, "study-430");
+  // Other states are read as far as was read before, and what was refused is asked for again.
+  await page.evaluate(() => { window.refuses = true; window.all[429].state = "cancelled"; window.tell({ studies_by_state: { done: 449, cancelled: 1 } }); });
+  await says("ask again later");
+  await page.evaluate(() => { window.refuses = false; });
+  await until(page, () => document.querySelector(".said").textContent === "" && document.querySelector("tbody tr")?.textContent.includes("cancelled"));
+  // The name is part of the address.
+  await page.evaluate(() => {
+    const field = document.querySelector("main input[type=search]");
+    field.value = "study-44";
+    field.dispatchEvent(new Event("input"));
+  });
+  await until(page, () => location.hash === "#/?name=study-44" && document.querySelectorAll("tbody tr").length === 11);
+  await page.evaluate(() => { location.hash = "#/"; });
+  await row_of(page, "study-1");
+  await page.goBack();
+  await until(page, () => document.querySelector("main input[type=search]").value === "study-44");
+  await page.evaluate(() => {
+    const make = URL.createObjectURL;
+    URL.createObjectURL = (blob) => {
+      blob.text().then((text) => { window.saved = text; });
+      return make.call(URL, blob);
+    };
+    document.querySelector('[aria-label="studies as CSV"]').click();
+  });
+  assert.equal((await until(page, () => window.saved)).trim().split("\r\n").length, 12);
+  await page.evaluate(() => { window.saved = ""; document.querySelector('[aria-label="workers as CSV"]').click(); });
+  assert.match(await until(page, () => window.saved), /^id,name,host,state,threads,.*\r\n\d+,/);
+  await page.close();
+});
+
+test("studies that events leave out are asked for: in the overview, which says how many these are, and in their own view", async () => {
+  for (const view of ["#/", "#/study/1"]) {
+    const page = await browser.open(view, { early: many_studies });
+    await until(page, () => document.querySelector("progress"));
+    const settled = () => page.$eval('progress[aria-label^="study-1:"]', (one) => one.value);
+    await page.evaluate(() => {
+      Object.assign(window.all[0], { state: "running", points: 1000 });
+      window.tell({ unlisted: 13, studies_by_state: { done: 449, running: 1 } });
+    });
+    if (view === "#/") await until(page, () => document.querySelector("main").textContent.includes("13 more studies run or are paused"));
+    for (const solved of [300, 600]) {
+      await page.evaluate((n) => { window.all[0].solved = n; }, solved);
+      await until(page, (n) => document.querySelector('progress[aria-label^="study-1:"]').value === n, solved);
+    }
+    assert.equal(await settled(), 600);
+    await page.close();
+  }
+});
+
+test("what stays in the overview after it ended is kept though it lies beyond what was read", async () => {
+  const page = await browser.open("#/", { early: many_studies });
+  await row_of(page, "study-200");
+  await page.evaluate(() => {
+    window.all[448].state = "running";
+    window.tell({ studies: [window.all[448]], studies_by_state: { done: 449, running: 1 } });
+  });
+  await row_of(page, "study-449");
+  await page.evaluate(() => {
+    window.all[448].state = "done";
+    window.tell({});
+  });
+  await until(page, () => [...document.querySelectorAll("tbody tr")].some((row) => row.cells[0].textContent === "study-449" && row.cells[1].textContent === "done"));
   await page.close();
 });
 

@@ -319,6 +319,37 @@ TEST_F(PageAnswersTest, AStudyIsStartedAndChangedFromThePage) {
   }
 }
 
+TEST_F(PageAnswersTest, TheModelOfAStudyIsSaidByPresetIntegratorAndKeys) {
+  const auto body = [](const std::string& model) {
+    return R"({"name":"made","model":)" + model +
+           R"(,"recipe":{"errors":true,"blocks":[{"axes":[{"key":"H","values":[1]},)"
+           R"({"key":"mu","values":[1]},{"key":"e","values":[1]}]}]}})";
+  };
+  const std::vector<std::string> wrong_ones{R"({"preset":"best"})",
+                                            R"({"integrator":"verlet"})",
+                                            R"({"kk":1})",
+                                            R"({"k":-1})",
+                                            R"({"k":"1"})",
+                                            "7",
+                                            std::string(100'000, '[')};
+  for (const std::string& wrong : wrong_ones) {
+    EXPECT_EQ(status_of_answer(page_.post("/api/check", body(wrong))), 400) << wrong;
+    EXPECT_EQ(status_of_answer(page_.post("/api/studies", body(wrong))), 400) << wrong;
+  }
+  EXPECT_THAT(page_.post("/api/check", body(R"({"preset":"best"})")), HasSubstr("converged"));
+  page_.post("/api/studies",
+             body(R"({"preset":"converged","integrator":"generalized-alpha","k":2.5e7})"));
+  const json study = page_.json("/api/studies/1");
+  EXPECT_EQ(study["errors"], true);
+  std::map<std::string, json> model;
+  for (const auto& one : study["model"]) {
+    model[one["key"]] = one["value"];
+  }
+  EXPECT_EQ(model["elements_per_link"], 48);
+  EXPECT_EQ(model["integrator"], "generalized-alpha");
+  EXPECT_EQ(model["k"], 2.5e7);
+}
+
 TEST_F(PageAnswersTest, AStudyIsJudgedBeforeItIsSubmitted) {
   const auto check = [&](const std::string& mu, const std::string& where) {
     return page_.post("/api/check",
