@@ -25,7 +25,7 @@ const kInks = ["line0", "line1", "line2", "line3", "line4", "line5", "line6", "l
  * @property {Series[]} series
  * @property {Span[]} [spans]
  * @property {boolean} [as_bars]
- * @property {(part: Part | null) => void} [brushed] a part is marked, by dragging or by Shift and arrows; null: nothing is
+ * @property {(part: Part | null, is_further?: boolean) => void} [brushed] a part is marked, by dragging or by Shift and arrows, which go on with the part that they marked last; null: nothing is
  * @property {(part: Part | null) => void} [zoomed] a part is zoomed into; null: all is shown. Without it the plot zooms by itself
  * @property {boolean} [drag_marks] dragging marks, and with Shift it zooms; else the other way round
  * @property {number} [height]
@@ -183,10 +183,11 @@ export function line_plot(of) {
     const to = /** @type {Record<string, number>} */ ({ ArrowLeft: Math.max(at - step, 0), ArrowRight: Math.min(at + step, last), Home: 0, End: last })[event.key];
     if (to === undefined) return;
     event.preventDefault();
+    const is_further = anchor >= 0;
     anchor = event.shiftKey ? (anchor < 0 ? Math.max(at, 0) : anchor) : -1;
     move(to);
     const [from, until] = [Math.min(anchor, to), Math.max(anchor, to)];
-    if (anchor >= 0) of.brushed?.({ x: [of.x.edges?.[from] ?? of.x.values[from], of.x.edges?.[until + 1] ?? of.x.values[until]], y: null });
+    if (anchor >= 0) of.brushed?.({ x: [of.x.edges?.[from] ?? of.x.values[from], of.x.edges?.[until + 1] ?? of.x.values[until]], y: null }, is_further);
   });
   const watch = new ResizeObserver(() => {
     const width = place.clientWidth;

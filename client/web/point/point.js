@@ -1,6 +1,7 @@
 // @ts-check
 // A point: its numbers, its contact over time, and the finger moving.
 import { copied, h, named, picker, save } from "/parts/dom.js";
+import { file_link, file_sayer } from "/parts/file_link.js";
 import { count, quoted, shown, with_unit } from "/parts/format.js";
 import { line_plot } from "/parts/lines.js";
 import { json } from "/server.js";
@@ -174,11 +175,13 @@ const kPanels = ["forces", "loop", "deformation", "velocities", "energies", "sha
 /** Its pictures as oblique plot draws them, and the command. @param {number} study @param {number} point @param {string} name @param {boolean} has_command */
 function pictures_to_take(study, point, name, has_command) {
   const files = h("div", { class: "row files" });
+  const { said, say } = file_sayer();
   const command = h("div", {});
   const choose = (/** @type {string} */ panel) => {
-    const link = (/** @type {string} */ format) => h("a", { class: "button", download: `${name}-${point}.${format}`,
-      href: `/api/studies/${study}/points/${point}/picture?${new URLSearchParams({ ...(panel ? { panel } : {}), format })}` }, format.toUpperCase());
-    files.replaceChildren(...["svg", "png", "csv"].map(link));
+    const link = (/** @type {string} */ format) => file_link(format.toUpperCase(), `${name}-${point}.${format}`,
+      `/api/studies/${study}/points/${point}/picture?${new URLSearchParams({ ...(panel ? { panel } : {}), format })}`, say);
+    say("");
+    files.replaceChildren(...["svg", "png", "csv"].map(link), said);
     if (has_command) command.replaceChildren(copied("the command of the picture", `oblique plot ${quoted(name)} --point ${point}${panel ? ` --panel ${panel}` : ""} --out picture.svg`));
   };
   choose("");

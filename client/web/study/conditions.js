@@ -32,10 +32,10 @@ export function short_between(a, b) {
   return (least + most) / 2;
 }
 
-/** A value as a part of what is shown is cut off: 500 steps are fine enough. @param {number} value @param {number} width */
+/** A value as a part of what is shown is cut off: 500 steps are fine enough, of itself where logarithmic scales are finer at their foot. @param {number} value @param {number} width */
 export function rounded(value, width) {
   if (!(width > 0)) return value;
-  const step = 10 ** Math.floor(Math.log10(width / 500));
+  const step = 10 ** Math.floor(Math.log10(Math.min(width, Math.abs(value) * 2 || width) / 500));
   return Number((Math.round(value / step) * step).toPrecision(12));
 }
 
@@ -48,9 +48,7 @@ export function part_of(side, cells, values) {
   const column = column_of(side.name);
   if (side.edges) {
     const width = side.edges[side.edges.length - 1] - side.edges[0];
-    const [from, to] = [Math.min(...values), Math.max(...values)];
-    // Logarithmic axes are finer at their foot.
-    return within(column, rounded(from, Math.min(width, Math.abs(from) * 2 || width)), rounded(to, Math.min(width, Math.abs(to) * 2 || width)));
+    return within(column, rounded(Math.min(...values), width), rounded(Math.max(...values), width));
   }
   const sorted = Array.from(side.values).sort((a, b) => a - b);
   if (sorted.length < 2) return "";
@@ -71,13 +69,13 @@ export function condition_fields(view) {
     const said = h("p", { role: "status", class: "weak said", id: `said-${name}` });
     const input = h("input", { type: "search", value: view.is(name), placeholder: hint, spellcheck: false, autocomplete: "off", "aria-describedby": said.id,
       onchange: () => take(), onkeydown: (/** @type {KeyboardEvent} */ event) => { if (event.key === "Enter") take(); } });
-    const take = () => { if (input.value.trim() !== view.is(name)) view.marking.change(name, input.value.trim()); };
+    const take = () => { if (input.value.trim() !== view.is(name)) view.marking.change({ [name]: input.value.trim() }); };
     return { said, input, label: named(title, input), counted: "\0" };
   };
   const where = field("where", "only points where (as with --where)", "mu > 0.5 AND fn_peak_N > 20");
   const mark = field("mark", "marked points", "drag over the picture, or write a condition");
   const keep = h("button", { type: "button", onclick: () => view.marking.keep() }, "Keep only these");
-  const clear = h("button", { type: "button", onclick: () => view.marking.change("mark", "") }, "Mark none");
+  const clear = h("button", { type: "button", onclick: () => view.marking.change({ mark: "" }) }, "Mark none");
   const marks = h("div", { class: "marks" }, h("div", { class: "row" }, mark.label, keep, clear), mark.said);
   /** @type {AbortController | null} */
   let asked = null;

@@ -39,7 +39,8 @@ export function drawing_of(view) {
     if (mine !== turn) return;
     const how = { as_bars, x_log: view.is("xlog") !== "", y_log: view.is("ylog") !== "", counts: view.marking.marks?.counts ?? (view.is("mark") ? [] : null),
       y_ends: !as_bars && has_span(view) ? span_of(view, picture) : undefined, zoomed: (/** @type {import("/parts/lines.js").Part | null} */ part) => view.zoom_lines(part),
-      drag_marks: view.is("drag") === "mark", brushed: (/** @type {import("/parts/lines.js").Part | null} */ part) => (as_bars ? view.marking.mark(part ? part_of(picture.x, [], part.x) : "") : view.marking.mark_lines(part)) };
+      drag_marks: view.is("drag") === "mark", brushed: (/** @type {import("/parts/lines.js").Part | null} */ part, is_further = false) => (as_bars ? view.marking.mark(part ? part_of(picture.x, [], part.x) : "", is_further)
+        : view.marking.mark_lines(part, is_further)) };
     // The same plot stays under the hands that are at it.
     if (!lines?.update(picture, how)) {
       const hands = lines?.hands;
@@ -72,7 +73,7 @@ export function drawing_of(view) {
         legend.replaceChildren();
         draw_lines(picture).catch((error) => view.complain(error));
       }
-      said.textContent = facts(picture, view.is("pic"), view.study).join(" ");
+      said.textContent = facts(picture, view.is("pic"), view.study, view.unit_of).join(" ");
       if (view.has_map && !picture.z.is_category && picture.least !== null && picture.most !== null) {
         const [from, to] = span_of(view, picture);
         if (picture.most < from || picture.least > to) said.append(` All values lie ${picture.most < from ? "below" : "above"} what colours span.`);

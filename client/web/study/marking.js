@@ -11,17 +11,17 @@ export function marking_of(view) {
   /** @type {import("./asked/question.js").Marks | null} */
   let marks = null;
 
-  /** @param {"where" | "mark"} name @param {string} condition */
-  function change(name, condition) {
-    view.set({ [name]: condition });
+  /** A step that people go back over. @param {Record<string, string>} conditions where and mark @param {boolean} [is_further] the rectangle of the last step grows */
+  function change(conditions, is_further = false) {
+    view.set(conditions, !is_further);
     view.say("");
     view.conditions.tell();
     view.table.begin();
-    if (name === "mark") {
+    if ("where" in conditions) {
+      view.load();
+    } else {
       load();
       show_takeaways(view);
-    } else {
-      view.load();
     }
   }
   /** Finds which cells and points of the picture are marked. */
@@ -43,16 +43,16 @@ export function marking_of(view) {
       if (!view.asked) view.waited();
     }
   }
-  /** @param {string} condition */
-  function mark(condition) {
-    if (condition !== view.is("mark")) change("mark", condition);
+  /** @param {string} condition @param {boolean} [is_further] */
+  function mark(condition, is_further = false) {
+    if (condition !== view.is("mark")) change({ mark: condition }, is_further);
   }
-  /** A picture shows some of the other axes' values: what is marked is what is seen. @param {import("./asked/picture.js").Picture} picture @param {...string} parts */
-  function mark_seen(picture, ...parts) {
+  /** A picture shows some of the other axes' values: what is marked is what is seen. @param {import("./asked/picture.js").Picture} picture @param {boolean} is_further @param {...string} parts */
+  function mark_seen(picture, is_further, ...parts) {
     const held = (picture.head.at ?? []).filter((/** @type {any} */ one) => one.of > 1).map((/** @type {any} */ one) => `${column_of(one.key)} = ${one.value}`);
     const { first_point, points } = view.study.blocks[picture.head.block] ?? {};
     const of_block = points && view.study.blocks.length > 1 ? [`point >= ${first_point}`, `point < ${first_point + points}`] : [];
-    mark(joined(...parts, ...held, ...of_block) || `${column_of(picture.x.name)} IS NOT NULL`);
+    mark(joined(...parts, ...held, ...of_block) || `${column_of(picture.x.name)} IS NOT NULL`, is_further);
   }
   return { change, load, mark,
     get marks() {
@@ -63,17 +63,17 @@ export function marking_of(view) {
       asked?.abort();
       marks = null;
     },
-    /** @param {import("./drawn/brush.js").Rectangle | null} part of the map */
-    mark_part(part) {
+    /** @param {import("./drawn/brush.js").Rectangle | null} part of the map @param {boolean} [is_further] keys go on with it */
+    mark_part(part, is_further = false) {
       const { picture } = view;
       if (!part || !picture) {
         mark("");
         return;
       }
-      mark_seen(picture, part_of(picture.x, [part.from[0], part.to[0]], part.x), part_of(picture.y, [part.from[1], part.to[1]], part.y));
+      mark_seen(picture, is_further, part_of(picture.x, [part.from[0], part.to[0]], part.x), part_of(picture.y, [part.from[1], part.to[1]], part.y));
     },
-    /** @param {import("/parts/lines.js").Part | null} part of lines: a span of the axis, and of the output where it does not go from below to above */
-    mark_lines(part) {
+    /** @param {import("/parts/lines.js").Part | null} part of lines: a span of the axis, and of the output where it does not go from below to above @param {boolean} [is_further] keys go on with it */
+    mark_lines(part, is_further = false) {
       const { picture } = view;
       if (!picture) return;
       const { values } = picture.x;
@@ -84,15 +84,13 @@ export function marking_of(view) {
       }
       const { y, z } = picture;
       const wide = (picture.most ?? 1) - (picture.least ?? 0);
-      mark_seen(picture, part_of(picture.x, [inside[0], inside[inside.length - 1]], []),
+      mark_seen(picture, is_further, part_of(picture.x, [inside[0], inside[inside.length - 1]], []),
         y.is_whole ? "" : `${column_of(y.name)} IN (${Array.from(y.values).join(", ")})`,
         part.y ? within(z.name, rounded(part.y[0], wide), rounded(part.y[1], wide)) : "");
     },
     /** What is marked becomes the condition. */
     keep() {
-      const where = joined(view.is("where"), view.is("mark"));
-      view.set({ mark: "" });
-      change("where", where);
+      change({ where: joined(view.is("where"), view.is("mark")), mark: "" });
     },
     stop: () => asked?.abort() };
 }

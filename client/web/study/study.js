@@ -115,7 +115,7 @@ export class StudyView {
       choose: (cell, point) => this.choice.choose(cell, point),
       open: (cell) => this.choice.open(cell),
       zoom: (part) => this.zoom(part),
-      mark: (part) => this.marking.mark_part(part),
+      mark: (part, is_further) => this.marking.mark_part(part, is_further),
     });
     this.map.let_drag(this.is("drag") === "mark" ? "mark" : "zoom");
     this.drawing = drawing_of(this);
@@ -128,6 +128,8 @@ export class StudyView {
         this.set({ all: all ? "1" : "" });
         show_takeaways(this);
       },
+      // People count pages from 1.
+      page: () => Math.max(Math.floor(Number(this.is("page"))) || 1, 1) - 1, keep_page: (page) => this.set({ page: page > 0 ? String(page + 1) : "" }),
       order: () => this.is("order"), keep_order: (order) => { this.set({ order }); show_takeaways(this); },
       wrong: (error) => this.complain(error), chosen: (point) => this.choice.choose_point(point) });
     this.choice.speak(null);
@@ -170,6 +172,7 @@ export class StudyView {
 
   close() {
     this.is_closed = true;
+    this.standing.close();
     this.solving.end();
     this.stop_asking();
     this.table.close();

@@ -1,6 +1,7 @@
 // @ts-check
 // Rows of a study, a page at a time.
 import { h, keep_focus, tick } from "/parts/dom.js";
+import { file_link, file_sayer } from "/parts/file_link.js";
 import { count, heading, shown } from "/parts/format.js";
 import { Silence } from "/server.js";
 import { rows, rows_path } from "./asked/picture.js";
@@ -13,14 +14,15 @@ const kMostInFile = 100_000;
 
 /**
  * @param {{study: number, points: number, columns: () => string[], where: () => string, marked: () => string, all: () => boolean, keep_all: (all: boolean) => void, wrong: (error: any) => void,
- *   chosen: (point: number) => void, order: () => string, keep_order: (order: string) => void}} of
+ *   chosen: (point: number) => void, order: () => string, keep_order: (order: string) => void, page: () => number, keep_page: (page: number) => void}} of pages count from 0
  */
 export function row_table(of) {
   const said = h("p", { role: "status", class: "weak" });
   const table = h("table", {}, h("caption", { class: "unseen" }, "Points of the study"));
   const back = h("button", { type: "button", onclick: () => turn(-1) }, "Previous");
   const next = h("button", { type: "button", onclick: () => turn(1) }, "Next");
-  const file = h("a", { class: "button", download: "rows.csv" }, "Table as CSV");
+  const { said: said_of_file, say: say_of_file } = file_sayer();
+  const file = file_link("Table as CSV", "rows.csv", "", say_of_file);
   const only = h("div", { class: "only" }, tick("marked points only", true, (is) => {
     of.keep_all(!is);
     begin();
@@ -28,8 +30,7 @@ export function row_table(of) {
   const only_box = /** @type {HTMLInputElement} */ (only.querySelector("input"));
   const element = h("section", { class: "rows" }, h("h2", {}, "Points"), only,
     h("div", { class: "scroll", tabIndex: 0, role: "region", "aria-label": "Points" }, table),
-    h("div", { class: "row" }, back, next, file), said);
-  let page = 0;
+    h("div", { class: "row" }, back, next, file, said_of_file), said);
   /** @type {AbortController | null} */
   let asked = null;
   /** How many meet the filter; null: not known. @type {number | null} */
@@ -47,13 +48,13 @@ export function row_table(of) {
     button.focus({ preventScroll: true });
   }
   function begin() {
-    page = 0;
+    if (of.page() > 0) of.keep_page(0);
     load();
   }
   /** Which points are shown. */
   const condition = () => joined(of.where(), of.all() ? "" : of.marked());
   function turn(/** @type {number} */ by) {
-    page = Math.max(page + by, 0);
+    of.keep_page(Math.max(of.page() + by, 0));
     load();
   }
   /** Sorts by a column, then the other way round, then by number again. @param {string} column */
@@ -86,6 +87,7 @@ export function row_table(of) {
     asked?.abort();
     const mine = asked = new AbortController();
     const columns = of.columns();
+    const page = Math.min(of.page(), kDeepest / kPage - 1);
     const where = condition();
     if (counted !== where) {
       total = null;

@@ -1,6 +1,7 @@
 // @ts-check
 // What people take with them: the picture as files, the view as a link, and the commands that make both.
 import { copied, h, keep_focus, save } from "/parts/dom.js";
+import { file_link, file_sayer } from "/parts/file_link.js";
 import { picture_fields, plot_command, query_command, run_command } from "./command.js";
 import { cells_csv } from "./words.js";
 
@@ -50,8 +51,9 @@ const numbers = (view) => h("button", { type: "button", onclick: () => { if (vie
 
 /** The picture as files. @param {import("./study.js").StudyView} view @param {string} name @param {number} id of the study that has its points; 0: it is not made yet */
 function files(view, name, id) {
-  const file = (/** @type {string} */ format) => h("a", { class: "button", download: `${name}.${format}`, href: picture_path(view, id, format) }, format.toUpperCase());
-  return h("div", { class: "row files" }, ...(id ? [file("svg"), file("png"), file("csv")] : []), numbers(view));
+  const { said, say } = file_sayer();
+  const file = (/** @type {string} */ format) => file_link(format.toUpperCase(), `${name}.${format}`, picture_path(view, id, format), say);
+  return h("div", { class: "row files" }, ...(id ? [file("svg"), file("png"), file("csv")] : []), numbers(view), said);
 }
 
 /** @param {import("./study.js").StudyView} view @param {number} id @param {string} format */

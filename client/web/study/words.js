@@ -1,14 +1,14 @@
 // @ts-check
 // Pictures in words and numbers.
-import { count, csv_line, shown } from "/parts/format.js";
+import { count, csv_line, shown, with_unit } from "/parts/format.js";
 import { kMostDots } from "./asked/dots.js";
 
 /** @typedef {import("./asked/picture.js").Picture} Picture */
 
 const many = (/** @type {number} */ n, /** @type {string} */ what) => `${count(n)} ${what}${n === 1 ? "" : "s"}`;
 
-/** What is shown, of how much. @param {Picture} picture @param {string} kind @param {any} study */
-export function facts(picture, kind, study) {
+/** What is shown, of how much. @param {Picture} picture @param {string} kind @param {any} study @param {(key: string) => string} unit_of */
+export function facts(picture, kind, study, unit_of) {
   const parts = [];
   const blocks = study.blocks.length + study.blocks_left_out;
   if (picture.head.nx !== undefined) {
@@ -18,7 +18,7 @@ export function facts(picture, kind, study) {
       if (whole(side, told)) parts.push(`Of ${count(told.last - told.first + 1)} values of ${side.name}, ${count(side.values.length)} are shown, evenly chosen${kind === "lines" ? "" : ": zoom in for the others"}.`);
     }
     if (blocks > 1 && picture.head.study === study.id) parts.push(`Block ${picture.head.block + 1} of ${count(blocks)}; not shown: ${many(study.numbers - study.blocks[picture.head.block].points, "point")} of the others.`);
-    for (const one of picture.held ?? picture.head.at.filter((/** @type {any} */ a) => a.of > 1)) parts.push(`${one.key} = ${shown(one.value)}.`);
+    for (const one of picture.held ?? picture.head.at.filter((/** @type {any} */ a) => a.of > 1)) parts.push(`${one.key} = ${with_unit(one.value, unit_of(one.key))}.`);
   } else if (picture.dots) {
     parts.push(`${many(picture.head.points, "point")}, each drawn.`);
     if (picture.head.without > 0) parts.push(`${many(picture.head.without, "other")} without values that can be shown.`);

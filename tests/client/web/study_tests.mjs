@@ -1,7 +1,7 @@
 // A study: its map, its other pictures, its rows.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { browser, facts, kMap, kWhere, server, study, text_of, until, write } from "./here.mjs";
+import { browser, facts, kMap, kScattered, kWhere, server, study, text_of, until, write } from "./here.mjs";
 
 test("a map shows its cells; pointing at one tells its value, a click chooses it, two open its point", async () => {
   const page = await study();
@@ -185,6 +185,32 @@ test("Back undoes a zoom and another output, and leaves the focus where it was",
   await page.close();
 });
 
+test("the lower decades of logarithmic scales can be zoomed into", async () => {
+  for (const view of [`#/study/${kScattered}?pic=histogram&x=closure&xlog=1`, "#/study/1?pic=lines&x=mu&y=&z=closure&ylog=1&at=e@2,H@3"]) {
+    const page = await study(view);
+    await page.waitForSelector(".u-over");
+    const box = await (await page.$(".u-over")).boundingBox();
+    await page.mouse.move(box.x + 0.02 * box.width, box.y + 0.98 * box.height);
+    await page.mouse.down();
+    await page.mouse.move(box.x + 0.9 * box.width, box.y + 0.4 * box.height, { steps: 3 });
+    await page.mouse.up();
+    const end = await until(page, (name) => new URLSearchParams(location.hash.split("?")[1]).get(name), view.includes("histogram") ? "x0" : "from");
+    assert.ok(Number(end) > 0, `${view}: ${end}`);
+    await until(page, () => document.querySelector(".facts").textContent.includes("A part is shown"));
+    assert.equal(await text_of(page, "p.said:not([id])"), "");
+    await page.close();
+  }
+});
+
+test("percentages of modes are of the cells that have one, and axes are held at values with units", async () => {
+  const page = await study(`#/study/1?z=mode&x=mu&y=e&at=H@3&where=${encodeURIComponent("mu > 0.5")}`);
+  await until(page, () => document.querySelector(".gaps").textContent.includes("condition is not met"));
+  const shares = await page.$$eval(".categories > ul .weak", (all) => all.map((one) => Number.parseFloat(one.textContent)));
+  assert.ok(Math.abs(shares.reduce((sum, one) => sum + one, 0) - 100) < 0.5, String(shares));
+  assert.match(await text_of(page, ".facts"), / H = 0\.8 m\./);
+  await page.close();
+});
+
 test("rows are turned a page at a time and sorted, and nothing is truncated unsaid", async () => {
   const page = await study();
   const said = () => text_of(page, ".rows p[role=status]");
@@ -194,6 +220,17 @@ test("rows are turned a page at a time and sorted, and nothing is truncated unsa
   await page.evaluate(() => [...document.querySelectorAll(".rows button.plain")].find((one) => one.textContent === "mu").click());
   await until(page, () => document.querySelector(".rows th[aria-sort=ascending]")?.textContent.startsWith("mu"));
   assert.equal(await said(), "1 to 25 of 252 rows.");
+  // The page of the table is part of the address, and other rows begin at the first.
+  await page.evaluate(() => [...document.querySelectorAll(".rows button")].find((one) => one.textContent === "Next").click());
+  await until(page, () => new URLSearchParams(location.hash.split("?")[1]).get("page") === "2");
+  const other = await study(await page.evaluate(() => location.hash));
+  assert.equal(await text_of(other, ".rows tbody"), await text_of(page, ".rows tbody"));
+  assert.equal(await text_of(other, ".rows p[role=status]"), "26 to 50 of 252 rows.");
+  await write(other, kWhere, "mu > 1");
+  await until(other, () => /^1 to 25 of/.test(document.querySelector(".rows p[role=status]").textContent) && !location.hash.includes("page="));
+  await other.goBack();
+  await until(other, () => document.querySelector(".rows p[role=status]").textContent === "26 to 50 of 252 rows.");
+  await other.close();
   const csv = await page.evaluate(async () => (await fetch(document.querySelector(".rows a[download]").href)).text());
   assert.equal(csv.trim().split("\r\n").length, 253);
   await page.close();

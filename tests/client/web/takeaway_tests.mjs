@@ -104,6 +104,30 @@ test("pictures are also taken as PNG and CSV, and tables as CSV, which is what t
   await page.close();
 });
 
+test("who takes a file gets it, or the sentence of the server that has none", async () => {
+  const page = await study("#/study/1?at=e@2", { early: () => {
+    const real = window.fetch;
+    window.fetch = (path, given) => (String(path).includes("format=png")
+      ? Promise.resolve(new Response('{"error":"PNG is made by rsvg-convert, which is not here"}', { status: 422 })) : real(path, given));
+    const make = URL.createObjectURL;
+    URL.createObjectURL = (blob) => {
+      blob.text().then((text) => { window.saved = text; });
+      return make.call(URL, blob);
+    };
+  } });
+  await page.waitForSelector(".files");
+  const press = (name) => page.evaluate((wanted) => [...document.querySelectorAll("a[download]")].find((one) => one.textContent === wanted).click(), name);
+  await press("PNG");
+  await until(page, () => document.querySelector(".files .bad")?.textContent.includes("rsvg-convert"));
+  await press("SVG");
+  assert.match(await until(page, () => window.saved), /^<\?xml|^<svg/);
+  await until(page, () => document.querySelector(".files [role=status]").textContent === "");
+  await page.evaluate(() => { window.saved = ""; });
+  await press("Table as CSV");
+  assert.match(await until(page, () => window.saved), /^point,H,mu,e/);
+  await page.close();
+});
+
 test("the numbers on screen are saved as a file", async () => {
   const page = await study("#/study/1?at=e@2");
   await page.waitForSelector(".files");

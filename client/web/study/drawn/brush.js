@@ -94,10 +94,11 @@ function listen_to_keys(map) {
     const place = map.chosen ?? /** @type {[number, number]} */ ([map.x.order[0], map.y.order[0]]);
     if (step) {
       const cell = /** @type {[number, number]} */ (map.chosen ? [move(map.x, place[0], step[0]), move(map.y, place[1], step[1])] : place);
+      const is_further = map.anchor !== null;
       map.anchor = event.shiftKey ? map.anchor ?? place : null;
       map.choose(cell);
       map.on.choose(cell, null);
-      if (map.anchor) map.on.mark(of_cells(map, map.anchor, cell));
+      if (map.anchor) map.on.mark(of_cells(map, map.anchor, cell), is_further);
     } else if (event.key === "Enter" && map.chosen) {
       map.on.open(map.chosen);
     } else if (event.key === "Escape") {

@@ -4,7 +4,7 @@ import { shown } from "/parts/format.js";
 import { line_plot } from "/parts/lines.js";
 
 /**
- * @typedef {{as_bars: boolean, x_log: boolean, y_log: boolean, drag_marks: boolean, y_ends?: number[], zoomed: (part: import("/parts/lines.js").Part | null) => void, counts?: ArrayLike<number> | null, brushed: ((part: import("/parts/lines.js").Part | null) => void)}} How
+ * @typedef {{as_bars: boolean, x_log: boolean, y_log: boolean, drag_marks: boolean, y_ends?: number[], zoomed: (part: import("/parts/lines.js").Part | null) => void, counts?: ArrayLike<number> | null, brushed: ((part: import("/parts/lines.js").Part | null, is_further?: boolean) => void)}} How
  *   with how many of each bar are marked, and what to do with a part that somebody marks
  */
 

@@ -61,7 +61,7 @@ function swatch(pixel) {
 
 /** @param {import("../asked/picture.js").Picture} picture */
 export function categories(picture) {
-  const cells = picture.values.length;
+  const cells = picture.dictionary.reduce((sum, one) => sum + one.cells, 0);  // that have a kind, as in the files of oblique plot
   const line = (/** @type {{text: string, cells: number}} */ one, /** @type {number} */ code) => h("li", {},
     swatch((x, y) => category_pixel(code, x, y)), h("span", {}, one.text),
     h("span", { class: "weak" }, ` ${(100 * one.cells / cells).toFixed(one.cells / cells < 0.01 ? 2 : 1)} %`));

@@ -13,7 +13,7 @@ import { cell_at, cells_of, draw_axes, kMargin, reach } from "./frame.js";
  * @property {(cell: [number, number], point: number | null) => void} choose the point where it is known
  * @property {(cell: [number, number]) => void} open
  * @property {(part: import("./brush.js").Rectangle | null) => void} zoom null: all
- * @property {(part: import("./brush.js").Rectangle | null) => void} mark null: nothing
+ * @property {(part: import("./brush.js").Rectangle | null, is_further?: boolean) => void} mark null: nothing; keys go on with the rectangle that they marked last
  */
 
 /** Whether cells of the same numbers are the same. @param {import("../asked/picture.js").Picture} a @param {import("../asked/picture.js").Picture} b */

@@ -26,6 +26,29 @@ test("cells of a map that do not meet a condition are greyed and counted, and th
   await page.close();
 });
 
+test("Back undoes a condition, what is marked, and what was kept of it", async () => {
+  const page = await study("#/study/1?at=e@2");
+  const stands = (where, mark) => until(page, (wanted) => JSON.stringify([...document.querySelectorAll(".conditions input")].map((one) => one.value)) === wanted, JSON.stringify([where, mark]));
+  await write(page, kWhere, "mu > 1");
+  await until(page, () => document.querySelector(".gaps").textContent.includes("42 cells"));
+  await page.focus(kMap);
+  await page.keyboard.down("Shift");
+  for (let i = 0; i < 3; ++i) await page.keyboard.press("ArrowRight");
+  await page.keyboard.up("Shift");
+  const marked = await until(page, () => document.querySelector(".marks input").value);
+  await page.evaluate(() => [...document.querySelectorAll(".marks button")].find((one) => one.textContent === "Keep only these").click());
+  await stands(`mu > 1 AND ${marked}`, "");
+  await page.goBack();
+  await stands("mu > 1", marked);
+  await until(page, () => document.querySelector("[data-marks]")?.dataset.marks);
+  await page.goBack();  // the keys of one rectangle are one step
+  await stands("mu > 1", "");
+  await page.goBack();
+  await stands("", "");
+  await until(page, () => document.querySelector(".gaps").textContent === "");
+  await page.close();
+});
+
 test("what the language objects to stands beside its field", async () => {
   const page = await study();
   await write(page, kWhere, "muu > 1");
