@@ -1,9 +1,12 @@
 # Writes a C++ source with the files of the page, gzipped: cmake -DOUT=FILE -DFOLDER=DIR -DNAMES=a,b -P embed.cmake
+# Lines of our scripts that are comments and nothing else are empty there: a browser needs none of them, and lines
+# keep their numbers.
 string(REPLACE "," ";" NAMES "${NAMES}")
 set(entries "")
 set(arrays "")
 set(number 0)
 find_program(GZIP gzip REQUIRED)
+find_program(SED sed REQUIRED)
 set(type_html "text/html; charset=utf-8")
 set(type_css "text/css; charset=utf-8")
 set(type_js "text/javascript; charset=utf-8")
@@ -11,7 +14,12 @@ set(type_svg "image/svg+xml")
 foreach(name IN LISTS NAMES)
   get_filename_component(extension ${name} LAST_EXT)
   string(SUBSTRING ${extension} 1 -1 extension)
-  execute_process(COMMAND ${GZIP} -9 -n -c ${FOLDER}/${name} OUTPUT_FILE ${OUT}.gz COMMAND_ERROR_IS_FATAL ANY)
+  set(comments "")
+  if(extension STREQUAL "js" AND NOT name MATCHES "^vendor/")
+    set(comments [[s,^ *//.*,,; s,^ */\*\* .*\*/$,,; \,^ */\*\*$,,\,^ *\*/$, s,.*,,]])
+  endif()
+  execute_process(COMMAND ${SED} -e "${comments}" ${FOLDER}/${name} COMMAND ${GZIP} -9 -n -c
+                  OUTPUT_FILE ${OUT}.gz COMMAND_ERROR_IS_FATAL ANY)
   file(READ ${OUT}.gz bytes HEX)
   file(REMOVE ${OUT}.gz)
   string(REGEX REPLACE "([0-9a-f][0-9a-f])" "0x\\1," bytes "${bytes}")
