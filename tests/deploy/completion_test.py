@@ -17,6 +17,8 @@ import tempfile
 import time
 import unittest
 
+import counting
+
 TREE = pathlib.Path(sys.argv.pop(1))
 PROGRAMS = pathlib.Path(sys.argv.pop(1))
 SCRIPTS = TREE / "proto/program/completion"
@@ -324,4 +326,4 @@ class Shells(Folder):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    counting.main()

@@ -14,6 +14,8 @@ import sys
 import tempfile
 import unittest
 
+import counting
+
 TREE = pathlib.Path(sys.argv.pop(1)).resolve()
 PROGRAMS = pathlib.Path(sys.argv.pop(1)).resolve()
 
@@ -182,4 +184,4 @@ class Pages(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    counting.main()

@@ -8,6 +8,8 @@ import subprocess
 import sys
 import unittest
 
+import counting
+
 try:
     import yaml
 except ImportError:
@@ -155,4 +157,4 @@ class Manifests(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    counting.main()

@@ -13,6 +13,8 @@ import sys
 import tempfile
 import unittest
 
+import counting
+
 TREE = pathlib.Path(sys.argv.pop(1))
 ORIGIN = "proto/program/origin"
 HASH = "0123456789abcdef0123456789abcdef01234567"
@@ -124,4 +126,4 @@ class DebiansChangelog(InAFolder):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    counting.main()

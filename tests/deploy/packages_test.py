@@ -13,6 +13,8 @@ import sys
 import tempfile
 import unittest
 
+import counting
+
 CPACK, BUILD = sys.argv.pop(1), pathlib.Path(sys.argv.pop(1))
 CONSUMER = pathlib.Path(__file__).parent / "consumer"
 SERVICES = ("oblique-server", "oblique-worker")
@@ -141,13 +143,33 @@ class Packages(unittest.TestCase):
             subprocess.run(["sh", "-n"], input=text, text=True, check=True)
             self.assertNotRegex(text, r"@[A-Za-z_]+@")
 
+    def test_what_a_removal_stopped_is_started_again_where_it_does_not_come_instances_too(self):
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            (folder / "run/systemd/system").mkdir(parents=True)
+            (folder / "run/systemd/units").mkdir()
+            for unit in "oblique-worker.service", "oblique-worker@lab.service", "other.service":
+                (folder / "run/systemd/units" / f"invocation:{unit}").symlink_to("0123456789abcdef")
+            tools = {"systemctl": "", "deb-systemd-helper": "exit 1", "deb-systemd-invoke": f'echo "$@" >> {folder}/asked'}
+            for tool, text in tools.items():
+                (folder / tool).write_text(f"#!/bin/sh\n{text}\n")
+                (folder / tool).chmod(0o755)
+            for name, word in ("prerm", "remove"), ("postinst", "abort-remove"):
+                text = script("oblique-worker", name).replace("/run/", f"{folder}/run/")
+                subprocess.run(["sh", "-s", word], input=text, text=True, check=True, env={"PATH": f"{folder}:/usr/bin:/bin"})
+            self.assertEqual((folder / "asked").read_text().splitlines(),
+                             ["stop oblique-worker.service oblique-worker@*.service",
+                              "start oblique-worker.service oblique-worker@lab.service"])
+            self.assertFalse((folder / "run/oblique-worker.stopped").exists())
+
     def test_lintian_has_no_errors_and_warns_of_nothing(self):
         if not shutil.which("lintian"):
             self.skipTest("there is no lintian here")
         # Built as sanitizers or assertions want it, programs are not what is shipped.
-        if "CMAKE_BUILD_TYPE:STRING=Release" in (BUILD / "CMakeCache.txt").read_text():
-            run("lintian", "--allow-root", "--fail-on", "error,warning", "--suppress-tags",
-                "uses-no-compression-for-data-tarball", *PACKAGES.values())
+        if "CMAKE_BUILD_TYPE:STRING=Release" not in (BUILD / "CMakeCache.txt").read_text():
+            self.skipTest("what is built is not what is shipped")
+        run("lintian", "--allow-root", "--fail-on", "error,warning", "--suppress-tags",
+            "uses-no-compression-for-data-tarball", *PACKAGES.values())
 
     def test_what_is_packed_again_has_the_same_bytes(self):
         again = pack(pathlib.Path(FOLDER.name) / "elsewhere")
@@ -242,6 +264,18 @@ class AtWork(unittest.TestCase):
         self.assertEqual([link for link in links if link.is_symlink()], [])
         self.assertTrue(other.is_symlink())
 
+    def test_a_purge_leaves_links_to_a_unit_that_somebody_wrote(self):
+        self.install("oblique-worker")
+        ours = self.enable("oblique-worker@.service", "oblique-worker@lab.service")
+        own = self.root / "etc/systemd/system/oblique-worker@night.service"
+        own.write_text("[Service]\nExecStart=/bin/true\n")
+        links = [ours.parent / name for name in ("oblique-worker@night.service", "oblique-worker@by-name.service")]
+        links[0].symlink_to("/etc/systemd/system/oblique-worker@night.service")
+        links[1].symlink_to("../oblique-worker@night.service")
+        self.dpkg("--purge", "oblique-worker")
+        self.assertFalse(ours.is_symlink())
+        self.assertTrue(all(link.is_symlink() for link in links))
+
     def test_a_state_folder_that_is_a_link_to_another_disk_stays_one(self):
         state = self.root / "var/lib/oblique"
         state.symlink_to("/nowhere/that/is/mounted")
@@ -250,4 +284,4 @@ class AtWork(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    counting.main()

@@ -262,7 +262,7 @@ class ManyResults(Named):
         have in a database, and ``error``."""
         import pandas
 
-        columns = {"H": self.H, "mu": self.mu, "e": self.e}
+        columns: dict[str, npt.NDArray[Any]] = {"H": self.H, "mu": self.mu, "e": self.e}
         for name, group, column, _, _, list_name, _, _ in _core.fields():
             if not list_name:
                 columns[column] = getattr(getattr(self, group) if group else self, name)
