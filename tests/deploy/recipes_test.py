@@ -10,14 +10,17 @@ import os
 import pathlib
 import shutil
 import socket
-import sqlite3
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
+
+import counting
 
 TREE, PROGRAMS, MODULE = map(pathlib.Path, sys.argv[1:4])
 PYTHON = "/usr/bin/python3"
+LONGEST_S = 60  # on a machine that has much else to do
 
 
 def free_ports(count):
@@ -59,7 +62,7 @@ class Recipe(unittest.TestCase):
         return done.stdout
 
     def start(self, *words, **more):
-        log = open(self.folder / (words[0] + ".log"), "w")
+        log = open(self.folder / (pathlib.Path(words[0]).name + ".log"), "w")
         self.addCleanup(log.close)
         process = subprocess.Popen(words, cwd=self.folder, env=self.environment | more, stdout=log, stderr=log)
 
@@ -68,6 +71,9 @@ class Recipe(unittest.TestCase):
             process.wait()
         self.addCleanup(end)
         return process
+
+    def log_of(self, process):
+        return self.folder / (pathlib.Path(process.args[0]).name + ".log")
 
     def rows_of(self, file):
         with open(self.folder / file, newline="") as table:
@@ -101,20 +107,27 @@ class PictureOfARunningStudy(Recipe):
     NEEDS = "matplotlib", "pandas"
 
     def test_it_is_drawn_while_the_study_runs_and_once_more_when_it_is_done(self):
-        self.start("oblique", "run", "--name", "first", "--H", "1", "--mu", "0.1:2:400", "--e", "0.8,1", "--quiet")
-        while not self.is_begun():
-            pass
-        said = self.run_in_folder(PYTHON, "running.py", "oblique.db", "first")
-        self.assertRegex(said, r"800 of 800 points, done\n$")
-        self.run_in_folder(PYTHON, "running.py", "oblique.db", "frist", code=1)
+        clients, workers = free_ports(2)
+        url = f"tcp://127.0.0.1:{clients}"
+        self.start("oblique-server", "--client-port", str(clients), "--worker-port", str(workers), "--http", "off")
+        self.run_in_folder("oblique", "submit", "--name", "first", "--H", "1", "--mu", "0.1:2:40", "--e", "0.8,1",
+                           OBLIQUE_SERVER=url)
+        # Nobody solves it before a picture was drawn.
+        drawing = self.start(PYTHON, "-u", "running.py", "oblique.db", "first")
+        self.wait_for(drawing, "0 of 80 points, running\n")
+        self.start("oblique-worker", "--server", f"tcp://127.0.0.1:{workers}")
+        self.wait_for(drawing, "80 of 80 points, done\n")
+        self.assertEqual(drawing.wait(LONGEST_S), 0)
         self.assertEqual((self.folder / "first.png").read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
+        self.run_in_folder(PYTHON, "running.py", "oblique.db", "frist", code=1)
 
-    def is_begun(self):
-        try:
-            with sqlite3.connect(f"file:{self.folder}/oblique.db?mode=ro", uri=True) as database:
-                return database.execute("SELECT count(*) FROM studies").fetchone()[0] == 1
-        except sqlite3.OperationalError:
-            return False
+    def wait_for(self, process, text):
+        """Until the process has printed it."""
+        end = time.monotonic() + LONGEST_S
+        while text not in (printed := self.log_of(process).read_text()):
+            self.assertIn(process.poll(), (None, 0), printed)
+            self.assertLess(time.monotonic(), end, printed)
+            time.sleep(0.05)
 
 
 class FiguresOfThePaper(Recipe):
@@ -137,4 +150,4 @@ if __name__ == "__main__":
     if lacking := missing(globals()[sys.argv[4]].NEEDS):
         print(f"SKIPPED: {PYTHON} cannot import {lacking} here; deploy/test installs or builds it")
         sys.exit(77)
-    unittest.main(argv=[sys.argv[0], sys.argv[4]])
+    counting.main(argv=[sys.argv[0], sys.argv[4]])
