@@ -4,14 +4,17 @@
   latency.py PAGE slices STUDY [Z]    a study of a grid over mu, H and e: opening it, the first slice
                                            of a column, the next ones, 200 moves of a slider, conditions
   latency.py PAGE tabs COUNT SECONDS  holds so many event streams open, and tells what came
-  latency.py PAGE share COUNT SECONDS PAIRS PID
+  latency.py PAGE share COUNT SECONDS PAIRS PID [LOOKING STUDY]
                                            so many tabs open for so long, then closed for as long, and
                                            so on, while workers solve: what they cost the server, the
-                                           process PID of this machine, and what is stored a second
+                                           process PID of this machine with its children, and what is
+                                           stored a second. LOOKING of the tabs show STUDY, a grid over
+                                           mu and H that runs: a slice and rows each 1.5 s
 
 PAGE is the address that the server prints, with its token. Times in ms.
 """
 
+import concurrent.futures
 import http.client
 import json
 import os
@@ -30,13 +33,13 @@ class Page:
         answer, _ = self.ask("/?" + url.query)
         self.cookie = answer.getheader("Set-Cookie", "").split(";")[0]
 
-    def connection(self, path):
+    def connection(self, path, **headers):
         connection = http.client.HTTPConnection(self.host, self.port, timeout=30)
-        connection.request("GET", path, headers={"Cookie": getattr(self, "cookie", "")})
+        connection.request("GET", path, headers={"Cookie": getattr(self, "cookie", ""), **headers})
         return connection
 
-    def ask(self, path):
-        connection = self.connection(path)
+    def ask(self, path, **headers):
+        connection = self.connection(path, **headers)
         answer = connection.getresponse()
         body = answer.read()
         connection.close()
@@ -78,8 +81,22 @@ def slices(page, study, z):
              [page.timed(f"{at}/bins?x={z}&nx={65 + i}&where={asked}")[0] for i in range(5)], size)
 
 
-def watch(page, count, seconds):
-    """Holds tabs open; the bytes that came."""
+LOOK_AGAIN_S = 1.5  # study.js
+
+
+def look(page, study, until):
+    """Asks until then what a tab asks that shows a study which runs: the next time begins behind the answers."""
+    slice_of = f"/api/studies/{study}/slice?z=fn_peak_N&x=mu&y=H&nx=256&ny=256"
+    while time.monotonic() < until:
+        page.ask(slice_of)
+        page.ask(f"/api/studies/{study}/rows?order=point&limit=26")
+        time.sleep(max(0.0, min(LOOK_AGAIN_S, until - time.monotonic())))
+
+
+def watch(page, count, seconds, looking=0, study=0):
+    """Holds tabs open, so many of which show a study that runs; the bytes of events that came."""
+    threads = concurrent.futures.ThreadPoolExecutor(max(looking, 1))
+    lookers = [threads.submit(look, page, study, time.monotonic() + seconds) for _ in range(looking)]
     connections = [page.connection("/api/events") for _ in range(count)]
     sockets = [connection.sock for connection in connections]
     came, until = 0, time.monotonic() + seconds
@@ -88,6 +105,8 @@ def watch(page, count, seconds):
             came += len(ready.recv(1 << 20))
     for connection in connections:
         connection.close()
+    for looker in lookers:
+        looker.result()
     return came
 
 
@@ -96,10 +115,17 @@ def tabs(page, count, seconds):
 
 
 def processor_s(process):
-    """Processor time of a process, by thread."""
-    times = {}
+    """Processor time of a process, by thread, and of its children, which read rows and draw."""
+    times, children = {}, 0.0
     for thread in pathlib.Path(f"/proc/{process}/task").iterdir():
         times[thread.name] = int((thread / "schedstat").read_text().split()[0]) * 1e-9
+        for child in (thread / "children").read_text().split():
+            try:
+                children += sum(processor_s(child).values())
+            except OSError:
+                pass  # it ended, and is among those that were waited for
+    ended = pathlib.Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()[13:15]
+    times["children"] = children + sum(map(int, ended)) / os.sysconf("SC_CLK_TCK")
     return times
 
 
@@ -110,38 +136,44 @@ def solved(page):
     return 0.0
 
 
-def share(page, count, seconds, pairs, process):
+def alternated(page, count, seconds, pairs, process, looking=0, study=0):
+    """(points stored a second, processor time of the server [s/s] by thread) of each turn, with tabs (True) and without, in pairs."""
     found = {True: [], False: []}
-    first = None
     for turn in range(2 * pairs):
         is_open = turn % 4 in (0, 3)  # open, closed, closed, open: what drifts meets both alike
         began, points, spent = time.monotonic(), solved(page), processor_s(process)
-        first = first or spent
-        watch(page, count if is_open else 0, seconds)
+        watch(page, count if is_open else 0, seconds, looking if is_open else 0, study)
         took, stored = time.monotonic() - began, solved(page) - points
         after = processor_s(process)
-        cost = {thread: (after[thread] - spent.get(thread, 0.0)) / took for thread in after}
-        found[is_open].append((stored / took, sum(cost.values()), cost))
-    name = {thread: pathlib.Path(f"/proc/{process}/task/{thread}/comm").read_text().strip() for thread in first}
+        found[is_open].append((stored / took, {thread: (after[thread] - spent.get(thread, 0.0)) / took for thread in after}))
+    return found
+
+
+def changes_of(found):
+    """Mean and standard error of what the tabs take: processor time of the server, at the same points stored, and the rate; in % of all there is."""
+    pairs = list(zip(found[True], found[False]))
     cores = len(os.sched_getaffinity(0))
-    rates = {is_open: [rate for rate, _, _ in those] for is_open, those in found.items()}
-    costs = {is_open: [cost for _, cost, _ in those] for is_open, those in found.items()}
-    print(f"{cores} cores, {pairs} pairs of {seconds} s: {count} tabs and none, mean and its standard error")
-    for what, values, scale in (("points stored a second", rates, 1.0), ("processor time of the server [ms a second]", costs, 1e3)):
-        with_tabs, without = ([scale * value for value in values[is_open]] for is_open in (True, False))
-        changes = [one - other for one, other in zip(with_tabs, without)]
-        print(f"{what:45} {statistics.mean(with_tabs):9.1f} {statistics.mean(without):9.1f}   difference "
-              f"{statistics.mean(changes):8.1f} ± {error_of(changes):.1f}")
-    changes = [one - other for one, other in zip(costs[True], costs[False])]
-    print(f"that is {100 * statistics.mean(changes) / cores:.2f} ± {100 * error_of(changes) / cores:.2f} % of all processor time; the rate "
-          f"{100 * (statistics.mean(rates[True]) / statistics.mean(rates[False]) - 1):.1f} ± "
-          f"{100 * error_of([one / other for one, other in zip(rates[True], rates[False])]):.1f} %")
-    by_point = {is_open: sum(costs[is_open]) / max(sum(rates[is_open]), 1.0) for is_open in costs}
-    print(f"processor time of the server a point [us]: {1e6 * by_point[True]:.2f} with, {1e6 * by_point[False]:.2f} without")
-    for thread in sorted(first, key=int):
-        means = {is_open: statistics.mean(cost.get(thread, 0.0) for _, _, cost in those) for is_open, those in found.items()}
+    spent = [100 * (sum(one[1].values()) - sum(other[1].values()) * one[0] / other[0]) / cores for one, other in pairs]
+    rates = [100 * (one[0] / other[0] - 1) for one, other in pairs]
+    return [(statistics.mean(values), error_of(values)) for values in (spent, rates)]
+
+
+def share(page, count, seconds, pairs, process, looking=0, study=0):
+    found = alternated(page, count, seconds, pairs, process, looking, study)
+    print(f"{len(os.sched_getaffinity(0))} cores, {pairs} pairs of {seconds} s: {count} tabs, {looking} of them at a study, and none; means")
+    rates = {is_open: statistics.mean(rate for rate, _ in those) for is_open, those in found.items()}
+    costs = {is_open: statistics.mean(sum(cost.values()) for _, cost in those) for is_open, those in found.items()}
+    print(f"points stored a second                        {rates[True]:9.1f} {rates[False]:9.1f}")
+    print(f"processor time of the server [ms a second]    {1e3 * costs[True]:9.1f} {1e3 * costs[False]:9.1f}")
+    print(f"processor time of the server a point [us]     {1e6 * costs[True] / max(rates[True], 1.0):9.2f} {1e6 * costs[False] / max(rates[False], 1.0):9.2f}")
+    (spent, spent_error), (rate, rate_error) = changes_of(found)
+    print(f"at the same rate the tabs take {spent:.2f} ± {spent_error:.2f} % of all processor time; the rate {rate:.1f} ± {rate_error:.1f} %")
+    for thread in sorted({thread for _, cost in found[True] for thread in cost}):
+        means = {is_open: statistics.mean(cost.get(thread, 0.0) for _, cost in those) for is_open, those in found.items()}
+        comm = pathlib.Path(f"/proc/{process}/task/{thread}/comm")
         if means[True] + means[False] > 1e-4:
-            print(f"  thread {thread} {name[thread]:16} {1e3 * means[True]:8.2f} {1e3 * means[False]:8.2f} ms a second")
+            name = comm.read_text().strip() if comm.exists() else ""
+            print(f"  {thread:9} {name:16} {1e3 * means[True]:8.2f} {1e3 * means[False]:8.2f} ms a second")
 
 
 def error_of(values):
@@ -153,7 +185,7 @@ if __name__ == "__main__":
         sys.exit(__doc__)
     if sys.argv[2] == "tabs":
         tabs(Page(sys.argv[1]), int(sys.argv[3]), float(sys.argv[4]))
-    elif sys.argv[2] == "share" and len(sys.argv) == 7:
-        share(Page(sys.argv[1]), int(sys.argv[3]), float(sys.argv[4]), int(sys.argv[5]), int(sys.argv[6]))
+    elif sys.argv[2] == "share" and len(sys.argv) in (7, 9):
+        share(Page(sys.argv[1]), int(sys.argv[3]), float(sys.argv[4]), *map(int, sys.argv[5:]))
     else:
         slices(Page(sys.argv[1]), sys.argv[3], sys.argv[4] if len(sys.argv) > 4 else "fn_peak_N")

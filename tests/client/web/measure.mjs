@@ -1,22 +1,27 @@
-// How long people wait: run BINARIES MODULES measure.mjs FILE.db, of which the largest grid is looked at. A copy is
-// worked on. All is seen from the browser: from the click to what is painted.
-import { constants, copyFileSync } from "node:fs";
+// How long people wait: run BINARIES MODULES measure.mjs FILE.db|PAGE [PART...]. Of a database a copy is worked on; PAGE is the
+// address of a server, with its token. The largest grid of which a tenth is solved is looked at. PARTs are opening, modes, scatter, slider,
+// solving and large; all when none is named. OBLIQUE_FIGURES=FILE gets the times as JSON as well. All is seen from the
+// browser: from the click to what is painted.
+import { constants, copyFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { Browser, Server, until } from "./browser.mjs";
 
-const kOpened = 9;
+const kOpened = 20;
 const kSlides = 60;
 const kSolved = 5;
 
-const [file] = process.argv.slice(2);
-if (!file) {
-  console.error("measure.mjs: name a database, as one of a study of 10^6 points on a grid of three axes");
+const [given, ...parts] = process.argv.slice(2);
+if (!given) {
+  console.error("measure.mjs: name a database, as one of a study of 10^6 points on a grid of three axes, or the address of a page");
   process.exit(2);
 }
-const server = new Server(join(process.env.OBLIQUE_BIN, "oblique"));
+const is_page = given.startsWith("http://");
+const server = is_page ? { address: given, origin: new URL(given).origin } : new Server(join(process.env.OBLIQUE_BIN, "oblique"));
 const browser = new Browser();
+const figures = {};
 const at = (sorted, share) => sorted[Math.min(Math.ceil(share * sorted.length) - 1, sorted.length - 1)];
-function say(what, times, wanted) {
+function say(part, what, times, wanted) {
+  figures[part] = times;
   const sorted = [...times].sort((a, b) => a - b);
   console.log(`${what.padEnd(44)} median ${at(sorted, 0.5).toFixed(0).padStart(5)} ms, 95 % ${at(sorted, 0.95).toFixed(0).padStart(5)} ms, `
     + `first ${times[0].toFixed(0).padStart(5)} ms, of ${times.length}; wanted ${wanted} ms`);
@@ -36,14 +41,14 @@ async function opened(view) {
   return { page, painted };
 }
 
-async function opening(what, view) {
+async function opening(part, what, view) {
   const { page, painted } = await opened(view);
   const times = [painted];
   while (times.length < kOpened) {
     await page.reload();
     times.push(await until(page, () => (window.painted_ms > 0 ? window.painted_ms : 0)));
   }
-  say(what, times, 500);
+  say(part, what, times, 500);
   await page.close();
 }
 
@@ -70,7 +75,7 @@ async function sliding(view) {
     }
     return found;
   }, kSlides);
-  say("slider to repaint", times, 100);
+  say("slider", "slider to repaint", times, 100);
   const slices = await page.evaluate(async () => {
     const asked = performance.getEntriesByType("resource").map((one) => one.name).filter((name) => name.includes("/slice?")).at(-1);
     const found = [];
@@ -81,12 +86,21 @@ async function sliding(view) {
     }
     return found;
   });
-  say("a slice of 256 × 256 at most", slices, 60);
+  say("slice", "a slice of 256 × 256 at most", slices, 60);
   await page.close();
 }
 
+/** What closed tabs looked at would be solved for six seconds more, and the next click wait for it. */
+async function end_looks(page) {
+  await page.evaluate(async () => {
+    const { studies } = await (await fetch("/api/studies?limit=1000")).json();
+    const looks = studies.filter((one) => one.name.startsWith("look-") && one.state === "running");
+    await Promise.all(looks.map((one) => fetch(`/api/studies/${one.id}/cancel`, { method: "POST", body: "{}" })));
+  });
+}
+
 /** From the click to whole pictures of 33² and 65² points that the study lacks. */
-async function solving(study) {
+async function solving(overview, study) {
   const found = { 33: [], 65: [] };
   for (let i = 0; i < kSolved; ++i) {
     const { page } = await opened(`#/study/${study.id}?solve=off&x0=${i + 1}&x1=${i + 12}&y0=${2 * i + 1}&y1=${2 * i + 20}`);
@@ -107,9 +121,10 @@ async function solving(study) {
     }));
     for (const side of [33, 65]) found[side].push(times[side]);
     await page.close();
+    await end_looks(overview);
   }
-  say("solved while one looks, 33 × 33", found[33], 300);
-  say("solved while one looks, 65 × 65", found[65], 1000);
+  say("33", "solved while one looks, 33 × 33", found[33], 300);
+  say("65", "solved while one looks, 65 × 65", found[65], 1000);
 }
 
 /** A study of 10^9 points, of which some are solved. */
@@ -124,22 +139,32 @@ async function begin_large(page) {
   });
 }
 
-try {
-  copyFileSync(file, server.database, constants.COPYFILE_FICLONE);
-  await server.start();
-  await browser.start(server);
+async function measure() {
   const page = await browser.open("#/");
   const studies = await page.evaluate(async () => (await (await fetch("/api/studies?limit=1000")).json()).studies);
-  const study = studies.sort((a, b) => b.points - a.points)[0];
+  const study = studies.filter((one) => one.solved * 10 >= one.points).sort((a, b) => b.points - a.points)[0];
   console.log(`${study.name}: ${study.points} points, ${study.solved} solved`);
-  await opening("from opening the study to its first picture", `#/study/${study.id}`);
-  await opening("the same of modes", `#/study/${study.id}?pic=map&z=mode`);
-  await opening("the same of a scatter", `#/study/${study.id}?pic=gathered&x=mu&y=fn_peak_N`);
-  await sliding(`#/study/${study.id}`);
-  await solving(study);
-  const large = await begin_large(page);
-  await opening("the same of 10^9 points, some solved", `#/study/${large}`);
+  const view = `#/study/${study.id}`;
+  const all = {
+    opening: () => opening("opening", "from opening the study to its first picture", view),
+    modes: () => opening("modes", "the same of modes", `${view}?pic=map&z=mode`),
+    scatter: () => opening("scatter", "the same of a scatter", `${view}?pic=gathered&x=mu&y=fn_peak_N`),
+    slider: () => sliding(view),
+    solving: () => solving(page, study),
+    large: async () => opening("large", "the same of 10^9 points, some solved", `#/study/${await begin_large(page)}`),
+  };
+  for (const part of parts.length > 0 ? parts : Object.keys(all)) await all[part]();
+}
+
+try {
+  if (!is_page) {
+    copyFileSync(given, server.database, constants.COPYFILE_FICLONE);
+    await server.start();
+  }
+  await browser.start(server);
+  await measure();
+  if (process.env.OBLIQUE_FIGURES) writeFileSync(process.env.OBLIQUE_FIGURES, JSON.stringify(figures));
 } finally {
   await browser.stop();
-  await server.stop();
+  if (!is_page) await server.stop();
 }
