@@ -12,9 +12,11 @@ export function drawing_of(view) {
   const lines_place = h("div", {});
   const legend = h("div", { class: "colours" });
   const said = h("span", {});
+  /** What is solved meanwhile. */
+  const coming = h("span", {});
   /** What stands while a part is shown. */
   const part = h("span", {}, " A part is shown. ", h("button", { type: "button", onclick: () => view.zoom(null) }, "Show all"));
-  const told = h("p", { class: "weak facts" }, said);
+  const told = h("p", { class: "weak facts" }, said, coming);
   /** @type {any} */
   let lines = null;
   let turn = 0;
@@ -81,6 +83,10 @@ export function drawing_of(view) {
       const is_part = view.is("x0") || view.is("y0") || (view.is("pic") === "lines" && has_span(view));
       if (!is_part) part.remove();
       else if (!part.isConnected) told.append(part);
+    },
+    /** Cells finer than these are on their way. @param {number} side cells a side; 0: none @param {number} share of them that is solved */
+    tell_coming(side, share) {
+      coming.textContent = side > 0 ? ` ${side} × ${side} are being solved: ${Math.floor(100 * share)} %.` : "";
     },
     /** Only what is marked is another. */
     mark() {

@@ -55,32 +55,43 @@ const rest = (ms) => new Promise((go_on) => {
 const has_gone = (error) => error.status === 404;
 
 /**
- * Keeps a study alive while the page is seen; where it went meanwhile it is begun anew, under another number.
- * @param {number} id @param {() => Promise<number>} begin @param {AbortSignal} signal @returns {AsyncGenerator<number>} the other numbers
+ * Keeps a study alive while the page is seen; one that went meanwhile is begun anew.
+ * @param {number} id @param {() => Promise<number>} begin @param {AbortSignal} signal @returns {Promise<number>} its number, which then is another one
  */
+async function asked_for(id, begin, signal) {
+  if (document.hidden) return id;
+  try {
+    await json(`/api/studies/${id}`, signal);
+  } catch (error) {
+    if (!signal.aborted && has_gone(error)) return begin();  // a server that does not answer is asked again
+  }
+  return id;
+}
+
+/** @param {number} id @param {() => Promise<number>} begin @param {AbortSignal} signal @returns {AsyncGenerator<number>} other numbers that the study has */
 async function* still_here(id, begin, signal) {
   for (;;) {
     await rest(kStillHere_ms);
     if (signal.aborted) return;
-    if (document.hidden) continue;
-    try {
-      await json(`/api/studies/${id}`, signal);
-    } catch (error) {
-      if (signal.aborted) return;
-      if (!has_gone(error)) continue;  // a server that does not answer is asked again
-      id = await begin();
-      yield id;
-    }
+    const other = await asked_for(id, begin, signal);
+    if (other !== id) yield id = other;
   }
 }
 
+/** How much of a picture is solved, of 1. @param {import("./picture.js").Picture} picture */
+const share_of = ({ head, values }) => 1 - head.missing / Math.max(values.length - head.left_out, 1);
+
 /**
- * Pictures as they become better; afterwards it keeps the study alive until `signal`.
+ * Pictures as they become better; what was given last is kept alive until `signal`.
  * @param {Wanted} wanted @param {number} first_side the coarsest that is shown @param {AbortSignal} signal @param {(key: string) => string} unit_of
+ * @param {(side: number, share: number) => void} coming is told how much is solved of one that is finer than what was given
  * @returns {AsyncGenerator<{id: number, side: number, is_whole: boolean, picture: import("./picture.js").Picture, block: any}>}
  */
-export async function* finer(wanted, first_side, signal, unit_of) {
+export async function* finer(wanted, first_side, signal, unit_of, coming) {
   const [x, y] = Object.keys(wanted.ranges);
+  /** @type {any} */
+  let given = null;
+  let asked_at = 0;
   for (const side of kSides.filter((one) => one >= first_side)) {
     if (signal.aborted) return;
     const recipe = recipe_of(wanted, side);
@@ -91,13 +102,24 @@ export async function* finer(wanted, first_side, signal, unit_of) {
         const picture = await slice(id, { z: wanted.z, x, y, nx: side, ny: side, ...(wanted.where ? { where: wanted.where } : {}) }, signal, unit_of);
         is_whole = picture.head.missing === 0;
         // Half of a finer picture is worse than all of the coarser one.
-        if (is_whole || side === kSides[0]) yield { id, side, is_whole, picture, block: recipe.blocks[0] };
+        if (is_whole || side === kSides[0]) {
+          given = { begin, told: { id, side, is_whole, picture, block: recipe.blocks[0] } };
+          asked_at = performance.now();
+          yield given.told;
+        } else if (given) {
+          coming(side, share_of(picture));
+        }
         if (is_whole && side === kSides[kSides.length - 1]) {
-          for await (const other of still_here(id, begin, signal)) yield { id: other, side, is_whole, picture, block: recipe.blocks[0] };
+          for await (const other of still_here(id, begin, signal)) yield { ...given.told, id: other };
         }
       } catch (error) {
         if (signal.aborted || !has_gone(error)) throw error;
         id = await begin();
+      }
+      if (given && given.told.side < side && performance.now() - asked_at >= kStillHere_ms) {
+        asked_at = performance.now();
+        const other = await asked_for(given.told.id, given.begin, signal);
+        if (other !== given.told.id) yield given.told = { ...given.told, id: other };
       }
       if (!is_whole) await rest(kAskAgain_ms);
     }

@@ -54,6 +54,7 @@ class SolvingPanel {
     this.id = this.side = 0;
     this.shown = "";
     this.unasked.stop();
+    this.view.drawing.tell_coming(0, 0);
   }
 
   offer() {
@@ -93,6 +94,7 @@ class SolvingPanel {
     view.stop_asking();
     this.unasked.stop();
     this.stop?.abort();
+    view.drawing.tell_coming(0, 0);
     this.stop = new AbortController();
     const { signal } = this.stop;
     this.offer();
@@ -108,8 +110,9 @@ class SolvingPanel {
         this.side = this.id = 0;
         this.offer();
       }
-      for await (const { id, side, block, is_whole, picture } of finer(wanted, this.side, signal, view.unit_of)) {
+      for await (const { id, side, block, is_whole, picture } of finer(wanted, this.side, signal, view.unit_of, (finer_side, share) => view.drawing.tell_coming(finer_side, share))) {
         if (signal.aborted) return;
+        view.drawing.tell_coming(0, 0);
         Object.assign(this, { id, side, block, solved: { x: view.is("x"), y: view.is("y"), between: view.is("between") } });
         picture.held = varying(view.block).filter((axis) => axis.key in wanted.held).map((axis) => ({ key: axis.key, value: wanted.held[axis.key] }));
         view.root.dataset.side = String(is_whole ? side : 0);
