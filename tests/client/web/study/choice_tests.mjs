@@ -51,7 +51,7 @@ test("the cell that is chosen stays where it is while what lies between is solve
   const spoken = await place(page);
   assert.match(spoken, /^mu 2, H 0\.55\d+ m$/);
   await page.evaluate(() => window.let_go());
-  await facts(page, "129 × 129");
+  await facts(page, "129 × 129 cells");
   assert.equal(await place(page), spoken);
   await page.evaluate(() => [...document.querySelectorAll("button")].find((one) => one.textContent === "Back to the study").click());
   await facts(page, "12 × 7");

@@ -82,7 +82,7 @@ test("who sorts by keys stays at the column, who fits colours at the button, and
 test("the list of the rarer modes stays open when the picture is drawn anew", async () => {
   const page = await study("#/study/1?z=mode&at=e@0");
   await page.evaluate(() => document.querySelector(".finer").click());
-  await facts(page, "129 × 129");
+  await facts(page, "129 × 129 cells");
   await page.click(".categories summary");
   const list = await page.$(".categories details");
   await page.evaluate(() => document.querySelector(".controls .ticks input").click());
