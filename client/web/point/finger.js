@@ -4,7 +4,7 @@ import { h, named, picker } from "/parts/dom.js";
 import { ink } from "/parts/colours.js";
 import { shown } from "/parts/format.js";
 import { ends_of } from "/parts/scale.js";
-import { arrow, begin, draw_ground, draw_length, kHeight, length_text } from "./strokes.js";
+import { arrow, begin, draw_ground, draw_length, kHeight, label, length_text } from "./strokes.js";
 
 const kEnlargements = ["1", "10", "30", "100"];
 /** What the finger reaches from release to touch. @param {import("./trace.js").Trace} trace @param {number} ground */
@@ -85,9 +85,9 @@ export function finger(trace) {
     }
     c.textAlign = "left";
     c.textBaseline = "bottom";
-    c.fillText("O", px(0) + 8, py(0) - 6);
+    label(c, "O", px(0) + 8, py(0) - 6);
     c.textBaseline = "top";
-    c.fillText(falling >= 0 ? `falls, ${shown(-fall.v[falling], 3)} m/s downwards` : `touches, motion enlarged ${enlargement} times`, 10, 10);
+    label(c, falling >= 0 ? `falls, ${shown(-fall.v[falling], 3)} m/s downwards` : `touches, motion enlarged ${enlargement} times`, 10, 10);
     draw_length(c, width, metres_per_px);
   }
 
@@ -100,7 +100,7 @@ export function finger(trace) {
       c.fillStyle = ink("text");
       c.textAlign = "left";
       c.textBaseline = "top";
-      c.fillText(`falls: the tip is ${length_text(Math.max(fall.y[falling] - ground, 0))} above the ground`, 10, 10);
+      label(c, `falls: the tip is ${length_text(Math.max(fall.y[falling] - ground, 0))} above the ground`, 10, 10);
       return;
     }
     const metres_per_px = Math.max((x1 - x0) / (width * 0.55), (y1 - y0) / (kHeight * 0.4), 1e-9);
@@ -135,21 +135,20 @@ export function finger(trace) {
     c.beginPath();
     c.arc(px(xP[at]), level, 4, 0, 2 * Math.PI);
     c.fill();
-    c.textAlign = "center";
-    c.textBaseline = "top";
-    c.fillText("P", px(xP[at]), level + 20);
     const per_N = (kHeight * 0.3) / largest;
     arrow(c, [px(x[at]), py(y[at])], [0, -fn[at] * per_N], ink("line0"));
     arrow(c, [px(x[at]), py(y[at])], [ft[at] * per_N, 0], ink("line1"));
-    c.textAlign = "left";
-    c.textBaseline = "top";
     c.fillStyle = ink("text");
+    c.textAlign = "center";
+    c.textBaseline = "top";
+    label(c, "P", px(xP[at]), level + 20);
+    c.textAlign = "left";
     const what = { S: "stick", s: "slip", C: "compression", R: "restitution" };
-    c.fillText([...trace.state(at)].map((one) => what[/** @type {keyof typeof what} */ (one)]).join(", "), 10, 10);
+    label(c, [...trace.state(at)].map((one) => what[/** @type {keyof typeof what} */ (one)]).join(", "), 10, 10);
     c.fillStyle = ink("line0");
-    c.fillText(`Fn ${shown(fn[at], 4)} N`, 10, 28);
+    label(c, `Fn ${shown(fn[at], 4)} N`, 10, 28);
     c.fillStyle = ink("line1");
-    c.fillText(`Ft ${shown(ft[at], 4)} N`, 10, 46);
+    label(c, `Ft ${shown(ft[at], 4)} N`, 10, 46);
     draw_length(c, width, metres_per_px);
   }
 

@@ -49,6 +49,16 @@ export const draw_ground = (c, width, level) => {
   c.stroke();
 };
 
+/** A text that is read where lines run below it: they end around it. @param {any} c @param {string} text @param {number} x @param {number} y */
+export const label = (c, text, x, y) => {
+  c.save();
+  c.strokeStyle = ink("page");
+  c.lineWidth = 5;
+  c.strokeText(text, x, y);
+  c.restore();
+  c.fillText(text, x, y);
+};
+
 /** @param {any} c @param {number} width @param {number} metres_per_px */
 export const draw_length = (c, width, metres_per_px) => {
   const metres = round_length(width * 0.3 * metres_per_px);
@@ -61,7 +71,7 @@ export const draw_length = (c, width, metres_per_px) => {
   c.stroke();
   c.textAlign = "right";
   c.textBaseline = "top";
-  c.fillText(length_text(metres), width - 12, 19);
+  label(c, length_text(metres), width - 12, 19);
 };
 
 /** @param {any} c @param {number[]} from @param {number[]} by pixels @param {string} colour */

@@ -52,6 +52,38 @@ test("the time is scrubbed from release through the contact, and the finger and 
   await page.close();
 });
 
+test("what is written beside the finger has the page's colour around it, and nothing is drawn over it", async () => {
+  const page = await point({ motion: "reduce", early: () => {
+    const { prototype } = CanvasRenderingContext2D;
+    const note = (name, told) => {
+      const real = prototype[name];
+      prototype[name] = function noted(...given) {
+        (this.canvas.drawn ??= []).push(told(this, given));
+        return real.apply(this, given);
+      };
+    };
+    note("scale", () => "begun");
+    note("stroke", () => "line");
+    note("fill", () => "shape");
+    note("strokeText", (c, [text]) => `${c.strokeStyle} around ${text}`);
+    note("fillText", (_, [text]) => `text ${text}`);
+  } });
+  await page.click(".touch");
+  const [ground, drawn] = await page.evaluate(() => {
+    const [, near] = document.querySelectorAll(".two canvas");
+    const c = document.createElement("canvas").getContext("2d");
+    c.strokeStyle = getComputedStyle(document.body).backgroundColor;
+    return [c.strokeStyle, near.drawn.slice(near.drawn.lastIndexOf("begun") + 1)];
+  });
+  const texts = drawn.filter((one) => one.startsWith("text ")).map((one) => one.slice(5));
+  assert.equal(texts[0], "P");
+  assert.ok(texts.length === 5, String(texts));
+  for (const text of texts) assert.equal(drawn[drawn.indexOf(`text ${text}`) - 1], `${ground} around ${text}`);
+  // After them comes the bar of the length alone, which is short and in a corner.
+  assert.deepEqual(drawn.slice(drawn.indexOf("text P")).filter((one) => ["line", "shape"].includes(one)), ["line"]);
+  await page.close();
+});
+
 test("a point shows its numbers and where they come from, and its plots are read by keys", async () => {
   const page = await point({ motion: "reduce" });
   const names = await page.$$eval("table.values th[scope=row]", (all) => all.map((one) => one.textContent));
