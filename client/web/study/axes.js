@@ -130,7 +130,7 @@ export function fill_in(fields, study, may_solve) {
     fill_in_axes(fields, study, may_solve && is("pic") === "map");
   } else {
     const has = (/** @type {string} */ name) => numbers.some((/** @type {any} */ c) => c.name === name);
-    if (!has(is("x"))) fields.set("x", is("pic") === "histogram" ? "fn_peak_N" : "mu");
+    if (!has(is("x"))) fields.set("x", is("pic") === "gathered" ? "mu" : has(is("z")) ? is("z") : "fn_peak_N");
     if (is("pic") === "gathered" && !has(is("y"))) fields.set("y", "H");
   }
   const ranges = is("pic") === "map" ? ranges_of(is("between")) : null;

@@ -32,7 +32,7 @@ export function show_controls(view) {
     : view.numbers.map((c) => [c.name, heading(c.name, c.unit)]);
   const outputs = view.columns.filter((c) => c.picture === "numbers" || (kind === "map" && c.picture === "categories"))
     .map((c) => [c.name, heading(c.name, c.unit)]);
-  const parts = [named("picture", picker(kinds, kind, (pic) => again({ pic, ...(is_other(view.is("x")) ? { x: "" } : {}), y: "", from: "", to: "" })))];
+  const parts = [named("picture", picker(kinds, kind, (pic) => again({ pic, ...(is_other(view.is("x")) || (on_grid && pic === "histogram") ? { x: "" } : {}), y: "", from: "", to: "" })))];
   if (kind !== "histogram") {
     parts.push(named(kind === "gathered" ? "colour" : "output", picker(kind === "gathered" ? [["", "none"], ...outputs] : outputs, view.is("z"), (z) => {
       if (z === "") view.fields.set("z", "");

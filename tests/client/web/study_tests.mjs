@@ -55,6 +55,15 @@ test("every view is a link, and tells the command that makes it", async () => {
   await page.close();
 });
 
+test("the histogram that comes after a map is one of the map's output", async () => {
+  const page = await study("#/study/1?pic=map&z=duration_s&x=mu&y=H");
+  await page.select(".controls select", "histogram");
+  await until(page, () => new URLSearchParams(location.hash.split("?")[1]).get("x") === "duration_s");
+  await page.evaluate(() => { location.hash = "#/study/1?pic=histogram&z=mass_ratio_that_is_not_there"; });
+  await until(page, () => [...document.querySelectorAll(".controls select")].some((one) => one.value === "fn_peak_N"));
+  await page.close();
+});
+
 test("maps are zoomed by dragging and by keys, and lines, gathered points and histograms are drawn", async () => {
   const page = await study();
   const box = await (await page.$(kMap)).boundingBox();
@@ -99,7 +108,7 @@ test("what lies between the cells of a map is solved while one looks, and is kep
     document.querySelector(".finer").click();
   });
   await until(page, () => document.querySelector(".facts").textContent.match(/(\d+) × \1 cells, [1-9]/));
-  await until(page, () => document.querySelector(".facts").textContent.includes("129 × 129"));
+  await until(page, () => document.querySelector(".facts").textContent.includes("129 × 129 cells"));
   const keep = async (name) => {
     await page.type('[aria-label^="Name under which"]', name);
     await page.keyboard.press("Enter");
@@ -120,7 +129,7 @@ test("what lies between the cells of a map is solved while one looks, and is kep
 test("what is solved between points is in the address: other outputs and sliders, an open point, Back, a link and a study that went meanwhile find it again", async () => {
   const page = await study();
   await page.evaluate(() => document.querySelector(".finer").click());
-  await facts(page, "65 × 65");
+  await facts(page, "65 × 65 cells");
   const looks = [];
   page.on("request", (one) => { if (one.url().endsWith("/api/look")) looks.push(JSON.parse(one.postData()).recipe.blocks[0].axes.find((axis) => axis.key === "mu").count); });
   await page.evaluate(() => {
