@@ -23,8 +23,9 @@ function show_parts(element, ...parts) {
 export function show_takeaways(view) {
   if (!view.picture) return;
   if (view.solving.is_on) {
-    const name = `${view.study.name}-part`;
-    const what = view.solving.is_kept ? "These points are kept as a study."
+    const { kept_as } = view.solving;
+    const name = kept_as || `${view.study.name}-part`;
+    const what = kept_as ? "These points are kept as a study."
       : "What is solved while one looks goes when nobody looks. The address of this view finds it again or solves it anew; or keep it as a study.";
     show_parts(view.commands, h("p", { class: "weak" }, what), files(view, name, view.solving.id),
       ...(view.solving.block ? [copied("the command that solves it", run_command(view, name)), copied("the command of the picture", plot_command(view, name))] : []));

@@ -23,7 +23,7 @@ function ends_of(view, side, cells, edges) {
   let values = cells ? cells.map((i) => all[i]) : [...all];
   if (cells && cells[0] === cells[1] && all.length > 1) {
     const [least, most] = [Math.min(...all), Math.max(...all)];
-    values = edges.map((one) => Math.min(Math.max(rounded(one, Math.abs(edges[1] - edges[0])), least), most));
+    values = edges.map((one) => Math.min(Math.max(one, least), most));
   }
   if (Math.min(...values) === Math.max(...values)) values = around(view, side);
   return [Math.min(...values), Math.max(...values)];
@@ -33,11 +33,16 @@ function ends_of(view, side, cells, edges) {
 export function between_of(view, part) {
   const picture = /** @type {import("../asked/picture.js").Picture} */ (view.picture);
   const range = (/** @type {Side} */ side, /** @type {0 | 1} */ i, /** @type {string} */ log) => {
-    const [from, to] = ends_of(view, side, part && [part.from[i], part.to[i]], part ? [part.x, part.y][i] : []);
+    const ends = ends_of(view, side, part && [part.from[i], part.to[i]], part ? [part.x, part.y][i] : []);
+    // Of values that a computation gave, what a pixel of the map can tell.
+    const [from, to] = ends.map((one) => rounded(one, ends[1] - ends[0]));
     return { from, to, is_log: view.is(log) !== "" && from > 0 };
   };
   return between_text({ [picture.x.name]: range(picture.x, 0, "xlog"), [picture.y.name]: range(picture.y, 1, "ylog") });
 }
+
+/** All digits of a number are seen: without its last ones it reads as a smaller one. @param {string} text */
+const room_of = (text) => Math.max(8, text.length + 1);
 
 /** Fields for the ends of both axes. @param {View} view @param {(between: string) => void} take */
 export function ends_fields(view, take) {
@@ -74,8 +79,9 @@ export function ends_fields(view, take) {
       shown = between;
       tell("");
       const focused = /** @type {HTMLElement} */ (document.activeElement)?.dataset ?? {};
-      const field = (/** @type {string} */ key, /** @type {"from" | "to"} */ end) => h("input", { type: "text", inputMode: "decimal", size: 8, value: String(ranges[key][end]),
-        "aria-label": `${key} ${end}`, "data-key": key, "data-end": end, onchange: read });
+      const field = (/** @type {string} */ key, /** @type {"from" | "to"} */ end) => h("input", { type: "text", inputMode: "decimal", size: room_of(String(ranges[key][end])), value: String(ranges[key][end]),
+        "aria-label": `${key} ${end}`, "data-key": key, "data-end": end, onchange: read,
+        oninput: (/** @type {any} */ event) => { event.target.size = room_of(event.target.value); } });
       // In the order of the pickers above.
       rows.replaceChildren(...[view.is("x"), view.is("y")].filter((key) => ranges[key]).map((key) => h("span", { class: "from-to" }, h("span", { class: "weak" }, `${key} from`),
         field(key, "from"), h("span", { class: "weak" }, "to"), field(key, "to"), h("span", { class: "weak" }, view.unit_of(key).replace(/^1$/, "")))));

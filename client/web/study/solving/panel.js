@@ -43,9 +43,9 @@ class SolvingPanel {
   get is_on() {
     return this.stop !== null;
   }
-  /** Whether what is shown was kept. */
-  get is_kept() {
-    return this.keeping.is_kept;
+  /** The name under which what is shown was kept; empty: it was not. */
+  get kept_as() {
+    return this.keeping.kept_as;
   }
 
   end() {

@@ -30,6 +30,27 @@ const press = (page, text) => page.evaluate((wanted) => [...document.querySelect
 /** A browser reports answers that are meant to be refusals. */
 const gone = (status) => { browser.objections = browser.objections.filter((one) => !one.includes(`status of ${status}`)); };
 
+/** Of a map of 129 a side cells are missing, whatever was solved. */
+function never_finest() {
+  const real = window.fetch;
+  window.asked = [];
+  window.fetch = async (path, how) => {
+    window.asked.push(String(path));
+    const answer = await real(path, how);
+    if (!/\/slice\?.*nx=129/.test(path) || answer.status !== 200) return answer;
+    const bytes = new Uint8Array(await answer.arrayBuffer());
+    const begin = 4 + new DataView(bytes.buffer).getUint32(0, true);
+    const head = JSON.parse(new TextDecoder().decode(bytes.subarray(4, begin)));
+    const told = JSON.stringify({ ...head, missing: (129 * 129 - 1) / 4 });
+    const size = Math.ceil((told.length + 4) / 8) * 8 - 4;  // numbers lie at multiples of their size
+    const changed = new Uint8Array(4 + size + bytes.length - begin);
+    new DataView(changed.buffer).setUint32(0, size, true);
+    changed.set(new TextEncoder().encode(told.padEnd(size)), 4);
+    changed.set(bytes.subarray(begin), 4 + size);
+    return new Response(changed);
+  };
+}
+
 test("an axis that a study lacks is solved at once around its value, and its ends are said in fields, in the address and in the command", async () => {
   const page = await study("#/study/1?at=e@1");
   const recipes = asked_of(page);
@@ -76,11 +97,15 @@ test("ends that are no range, or that the server refuses, are told of beside the
 });
 
 test("what is solved over an axis that a study lacks is kept as a study, its points are opened, and the study is come back to", async () => {
-  const page = await study("#/study/1?x=tip_mass&y=e&at=mu@5");
-  await solved(page);
+  const page = await study("#/study/1?x=tip_mass&y=e&at=mu@5", { early: never_finest });
+  await facts(page, "65 × 65 cells");
+  const named = () => page.evaluate(() => [...document.querySelectorAll(".commands a[download], .commands code")].map((one) => one.download ?? one.textContent));
+  assert.ok((await named()).every((one) => one.includes("friction-part")), String(await named()));
   await page.type('[aria-label^="Name under which"]', "with a mass");
   await page.keyboard.press("Enter");
   await until(page, () => /^Kept as with a mass, [\d\s]+ points/.test(document.querySelector(".solving + p").textContent));
+  await until(page, () => document.querySelector(".commands p").textContent === "These points are kept as a study.");
+  assert.ok((await named()).every((one) => one.startsWith("with a mass.") || one.includes("'with a mass'")), String(await named()));
   await page.focus(kMap);
   await page.keyboard.press("ArrowRight");
   await page.keyboard.press("Enter");
@@ -93,27 +118,6 @@ test("what is solved over an axis that a study lacks is kept as a study, its poi
   assert.doesNotMatch(await page.evaluate(() => location.hash), /between|tip_mass/);
   await page.close();
 });
-
-/** Of a map of 129 a side cells are missing, whatever was solved. */
-function never_finest() {
-  const real = window.fetch;
-  window.asked = [];
-  window.fetch = async (path, how) => {
-    window.asked.push(String(path));
-    const answer = await real(path, how);
-    if (!/\/slice\?.*nx=129/.test(path) || answer.status !== 200) return answer;
-    const bytes = new Uint8Array(await answer.arrayBuffer());
-    const begin = 4 + new DataView(bytes.buffer).getUint32(0, true);
-    const head = JSON.parse(new TextDecoder().decode(bytes.subarray(4, begin)));
-    const told = JSON.stringify({ ...head, missing: (129 * 129 - 1) / 4 });
-    const size = Math.ceil((told.length + 4) / 8) * 8 - 4;  // numbers lie at multiples of their size
-    const changed = new Uint8Array(4 + size + bytes.length - begin);
-    new DataView(changed.buffer).setUint32(0, size, true);
-    changed.set(new TextEncoder().encode(told.padEnd(size)), 4);
-    changed.set(bytes.subarray(begin), 4 + size);
-    return new Response(changed);
-  };
-}
 
 test("while finer cells are solved the page says how far they are, and what is on the screen is asked for, so that it stays", async () => {
   const page = await study("#/study/1?x=mu&y=H&at=e@1&between=mu:0.1:2,H:0.5:1.1", { early: never_finest });
@@ -159,7 +163,24 @@ test("one column or one cell of a map is solved half-way to its neighbours", asy
   await facts(page, "33 × 33");
   const [step, first] = [1.9 / 11, 0.1 + 3 * 1.9 / 11];
   const [mu, H] = ["mu", "H"].map((key) => axis_of(recipes[0], key));
-  for (const [one, other] of [[mu.from, first - step / 2], [mu.to, first + step / 2], [H.from, 0.5], [H.to, 0.55]]) assert.ok(Math.abs(one - other) < 1e-9, `${one} ${other}`);
+  // To what a pixel tells.
+  for (const [one, other] of [[mu.from, first - step / 2], [mu.to, first + step / 2], [H.from, 0.5], [H.to, 0.55]]) assert.ok(Math.abs(one - other) < step / 500, `${one} ${other}`);
+  await page.close();
+});
+
+test("ends of what is solved have the digits that a pixel can tell, and their fields show all of them", async () => {
+  // Its steps of H and mu are no round numbers, and the values are sums of them.
+  const page = await study("#/study/1?solve=off&x0=3&x1=8&y0=1&y1=4");
+  await facts(page, "6 × 4");
+  await page.click(".finer");
+  await until(page, () => decodeURIComponent(location.hash).includes("between=mu:0.618:1.482,H:0.6:0.9"));
+  await pick(page, "across", "E");
+  const field = '[aria-label="E to"]';
+  await page.waitForSelector(field);
+  const is_seen = () => page.$eval(field, (one) => one.value.length > 10 && one.scrollWidth <= one.clientWidth);
+  assert.ok(await is_seen());
+  await write(page, field, "123456789123");
+  assert.ok(await is_seen());
   await page.close();
 });
 
