@@ -92,10 +92,19 @@ Quantity quantity_of_axis(const StudyAxis& axis) {
   return quantity_of(axis.key == "E" ? axis.column : axis.key, server::unit_of_column(axis.column));
 }
 
+void add_term(std::string& sql, const std::string& term) {
+  sql += (sql.empty() ? "" : " AND ") + term;
+}
+
+void fix(Condition& condition, const StudyAxis& axis, double value) {
+  const std::string term = fmt::format("{} = {}", axis.column, solver::exact_number(value));
+  add_term(condition.sql, term);
+  add_term(condition.sql_without_where, term);
+}
+
 void add_condition(Condition& condition, const StudyAxis& axis, double value) {
   if (axis.varies()) {
-    condition.sql += fmt::format("{}{} = {}", condition.sql.empty() ? "" : " AND ", axis.column,
-                                 solver::exact_number(value));
+    fix(condition, axis, value);
   }
   condition.shown.push_back(shown_value(quantity_of_axis(axis), value));
 }
@@ -158,10 +167,11 @@ Condition condition_of(const PlotRequest& request, const StudyShape& shape,
   if (shape.is_one_block) {
     condition.sql = fmt::format("point >= {} AND point < {}", shape.block.first_point,
                                 shape.block.first_point + shape.block.points);
+    condition.sql_without_where = condition.sql;
     condition.shown.push_back(block_in_words(shape));
   }
   if (!request.where.empty()) {
-    condition.sql += fmt::format("{}({})", condition.sql.empty() ? "" : " AND ", request.where);
+    add_term(condition.sql, fmt::format("({})", request.where));
     condition.shown.push_back(request.where);
   }
   std::vector<const StudyAxis*> fixed;
@@ -188,8 +198,7 @@ Condition condition_of(const PlotRequest& request, const StudyShape& shape,
     const double value = axis.values.front();
     // Of all points: said only where another choice would show others.
     if (axis.all_values.size() > 1) {
-      condition.sql += fmt::format("{}{} = {}", condition.sql.empty() ? "" : " AND ", axis.column,
-                                   solver::exact_number(value));
+      fix(condition, axis, value);
       condition.said.push_back(
           fmt::format("{} has {}; {} = {} is drawn, and --at {}=VALUE draws another.", axis.key,
                       values_in_words(axis), axis.key, readable_number(value), axis.key));

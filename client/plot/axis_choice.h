@@ -25,6 +25,7 @@ std::vector<const StudyAxis*> by_preference(const StudyShape& shape);
 /// What holds for all points of a picture.
 struct Condition {
   std::string sql;                 ///< empty: all points
+  std::string sql_without_where;   ///< the same, also of points that --where leaves out
   std::vector<std::string> shown;  ///< "e = 0.9", for the subtitle
   std::vector<std::string> said;   ///< sentences about what was chosen
 };

@@ -6,7 +6,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/output/human_units.h"
-#include "client/service/result_query.h"
 #include "proto/text.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
@@ -47,10 +46,14 @@ std::vector<AnswerColumn> Drawing::ask(const std::vector<std::string>& columns) 
   for (const auto& column : columns) {
     query.select += (query.select.empty() ? "" : ", ") + column;
   }
+  return answer_to(query, columns.size());
+}
+
+std::vector<AnswerColumn> Drawing::answer_to(const ResultQuery& query, std::size_t columns) {
   check(query);
   const auto stream = source_.rows(request_for(query));
   auto answer = read_columns(*stream);
-  if (answer.size() != columns.size()) {
+  if (answer.size() != columns) {
     throw solver::InputError(fmt::format("a picture takes one column a flag, and `{}` are {}",
                                          query.select, answer.size()));
   }

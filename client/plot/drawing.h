@@ -11,6 +11,7 @@
 #include "client/plot/figures/maps.h"
 #include "client/plot/figures/quantity.h"
 #include "client/plot/plot_request.h"
+#include "client/service/result_query.h"
 #include "client/service/source.h"
 
 namespace oblique::client::plot {
@@ -36,6 +37,9 @@ class Drawing {
  private:
   /// The rows of the columns, where the condition holds.
   std::vector<AnswerColumn> ask(const std::vector<std::string>& columns);
+  /// Sets apart the cells without a row that have one of a point that --where leaves out.
+  void tell_filtered(Cells& cells, const ChosenAxis& x, const ChosenAxis& y);
+  std::vector<AnswerColumn> answer_to(const ResultQuery& query, std::size_t columns);
   /// The axis that a flag names, else the first that is neither taken nor held by --at. Throws
   /// solver::InputError with the remedy where there is none.
   ChosenAxis chosen_or(const std::string& flag, const std::string& text,

@@ -92,10 +92,14 @@ Figure figure_of(Source& source, const StudyShape& shape, const PlotRequest& req
                  const Tell& tell) {
   check_range(request);
   Drawing drawing(source, shape, request, tell);
-  return !request.map.empty()       ? drawing.map()
-         : !request.lines.empty()   ? drawing.lines()
-         : !request.scatter.empty() ? drawing.scattered()
-                                    : drawing.counts();
+  Figure figure = !request.map.empty()       ? drawing.map()
+                  : !request.lines.empty()   ? drawing.lines()
+                  : !request.scatter.empty() ? drawing.scattered()
+                                             : drawing.counts();
+  if (figure.is_empty) {
+    tell("No point of the picture has a value: nothing is drawn in it.");
+  }
+  return figure;
 }
 
 }  // namespace oblique::client::plot

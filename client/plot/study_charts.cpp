@@ -8,9 +8,24 @@
 #include "client/plot/data/gathered.h"
 #include "client/plot/drawing.h"
 #include "client/plot/figures/charts.h"
+#include "server/asking/columns.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::client::plot {
+
+namespace {
+
+/// Of whole lists hardly two are alike; their elements can be counted.
+void refuse_list(const std::string& column) {
+  const auto lists = server::lists_of_queries();
+  if (std::any_of(lists.begin(), lists.end(),
+                  [&](const server::ListColumn& list) { return list.name == column; })) {
+    throw solver::InputError(
+        fmt::format("--histogram {0}: its values are lists; take an element, as {0}[0]", column));
+  }
+}
+
+}  // namespace
 
 std::optional<ChosenAxis> Drawing::lines_by(const ChosenAxis& x) const {
   if (!request_.by.empty()) {
@@ -85,6 +100,12 @@ Figure Drawing::scattered() {
     columns.push_back(chosen_axis("--colour", request_.colour, shape_).column);
   }
   auto answer = ask(columns);
+  if (answer.size() > 2 && answer[2].has_texts()) {
+    throw solver::InputError(
+        fmt::format("--colour {}: its values are texts, and --scatter colours by numbers; take "
+                    "--map {}, or --where for the points of one of them",
+                    request_.colour, request_.colour));
+  }
   for (const auto& column : answer) {
     if (column.has_texts()) {
       throw solver::InputError(fmt::format(
@@ -113,6 +134,7 @@ Figure Drawing::scattered() {
 }
 
 Figure Drawing::counts() {
+  refuse_list(request_.histogram);
   const ChosenAxis column = chosen_axis("--histogram", request_.histogram, shape_);
   condition_ = condition_of(request_, shape_, {column}, false);
   const auto answer = ask({column.column});

@@ -63,6 +63,20 @@ std::vector<double> cell_values(const ChosenAxis& axis, const AnswerColumn& colu
 
 }  // namespace
 
+void Drawing::tell_filtered(Cells& cells, const ChosenAxis& x, const ChosenAxis& y) {
+  const auto is_empty = [](CellState state) { return state == CellState::kNoResult; };
+  if (request_.where.empty() || std::none_of(cells.states.begin(), cells.states.end(), is_empty)) {
+    return;
+  }
+  // One row a cell, however many points it has.
+  ResultQuery query;
+  query.study = request_.study;
+  query.where = condition_.sql_without_where;
+  query.select = query.group = fmt::format("{}, {}", x.column, y.column);
+  const auto answer = answer_to(query, 2);
+  mark_filtered(cells, answer[0], answer[1]);
+}
+
 Figure Drawing::map() {
   const std::string remedy =
       "has fewer than two axes: take --lines, --scatter or --histogram, or name --x and --y";
@@ -90,6 +104,7 @@ Figure Drawing::map() {
     refuse_log_of_axis("--log-x", axes.is_x_logarithmic, x_values);
     refuse_log_of_axis("--log-y", axes.is_y_logarithmic, y_values);
     gathered = gathered_on(rows, x_values, y_values, axes.is_x_logarithmic, axes.is_y_logarithmic);
+    tell_filtered(gathered.cells, x, y);
   } else {
     refuse_log_of_nothing("--log-x", axes.is_x_logarithmic, answer[0]);
     refuse_log_of_nothing("--log-y", axes.is_y_logarithmic, answer[1]);
@@ -102,9 +117,6 @@ Figure Drawing::map() {
                                                 std::move(gathered.names), plural)
                                      : heat_map(axes, quantity_of(answer[2].name, answer[2].unit),
                                                 std::move(gathered.cells), colours());
-  if (!request_.where.empty()) {
-    figure.gaps.no_result_name = "no result, or left out by --where";
-  }
   say_gathered(figure, gathered);
   entitle(figure, answer[2].name, gathered.points);
   return figure;

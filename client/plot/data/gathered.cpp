@@ -174,6 +174,17 @@ GatheredCells gathered_on(const MapRows& rows, const std::vector<double>& x_valu
   return gathered;
 }
 
+void mark_filtered(Cells& cells, const AnswerColumn& x, const AnswerColumn& y) {
+  const auto columns = places_among(cells.x_values, x);
+  const auto rows = places_among(cells.y_values, y);
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    if (columns[i] != kNowhere && rows[i] != kNowhere) {
+      auto& state = cells.states[rows[i] * cells.columns() + columns[i]];
+      state = state == CellState::kNoResult ? CellState::kFiltered : state;
+    }
+  }
+}
+
 GatheredCells gathered_in_bins(const MapRows& rows, std::size_t x_cells, std::size_t y_cells,
                                bool is_x_logarithmic, bool is_y_logarithmic) {
   const auto scale_for = [](const AnswerColumn& column, bool is_logarithmic) {

@@ -37,6 +37,10 @@ GatheredCells gathered_on(const MapRows& rows, const std::vector<double>& x_valu
                           const std::vector<double>& y_values, bool is_x_logarithmic,
                           bool is_y_logarithmic);
 
+/// Cells without a row in which `x` and `y` have one: the condition leaves that out. The cells
+/// stand for values.
+void mark_filtered(Cells& cells, const AnswerColumn& x, const AnswerColumn& y);
+
 /// Cells of equal size over all rows, so many along each axis, for what lies scattered.
 GatheredCells gathered_in_bins(const MapRows& rows, std::size_t x_cells, std::size_t y_cells,
                                bool is_x_logarithmic, bool is_y_logarithmic);

@@ -70,7 +70,7 @@ std::string style_sheet() {
                      colours_for(kLightInks, false), colours_for(kDarkInks, true));
 }
 
-std::string pattern_definitions(std::span<const Hatch> hatches) {
+std::string pattern_definitions(std::span<const Hatch> hatches, bool is_filtered) {
   // Side of the tile, and lines in it; lines that cross its corners are drawn beyond both.
   struct Lines {
     double side;
@@ -96,6 +96,9 @@ std::string pattern_definitions(std::span<const Hatch> hatches) {
   }
   all += pattern("missing", 8, "miss", "M-2 2L2-2M-1 9L9-1M6 10L10 6");
   all += pattern("failed", 6, "fail", "M-1-1L7 7M-1 7L7-1");
+  if (is_filtered) {
+    all += pattern("filtered", 8, "miss", "M1 2H4M5 6H8");
+  }
   return all + "</defs>\n";
 }
 

@@ -35,8 +35,8 @@ inline constexpr std::size_t kSpanKinds = 4;
 std::string style_sheet();
 
 /// Patterns for hatchings: their id is that of `hatch_id`, and "missing" and "failed". Only those
-/// that are named.
-std::string pattern_definitions(std::span<const Hatch> hatches);
+/// that are named; "filtered" only where it `is_filtered`.
+std::string pattern_definitions(std::span<const Hatch> hatches, bool is_filtered);
 
 /// "h1" for Hatch 1 and so on.
 std::string hatch_id(Hatch hatch);

@@ -15,6 +15,15 @@ Colour shade_of(const Colours& colours, double share) {
   return shade(colours.palette, shade_number(share * (colours.has_plate ? kDarkShare : 1.0)));
 }
 
+void say_empty(Figure& figure, const std::string& why) {
+  figure.is_empty = true;
+  figure.notes.push_back("Nothing to draw: " + why + ".");
+}
+
+bool has_colour_scale(const Figure& figure) {
+  return figure.colours && !figure.is_empty;
+}
+
 KindGrid kind_grid_of(const Cells& cells) {
   KindGrid grid{cells.columns(), cells.rows(), std::vector<int>(cells.values.size(), -1)};
   for (std::size_t i = 0; i < grid.kinds.size(); ++i) {
@@ -29,6 +38,7 @@ Gaps gaps_of(const Cells& cells) {
   Gaps gaps;
   for (const CellState state : cells.states) {
     gaps.no_result += state == CellState::kNoResult ? 1U : 0U;
+    gaps.filtered += state == CellState::kFiltered ? 1U : 0U;
     gaps.failed += state == CellState::kFailed ? 1U : 0U;
     gaps.no_value += state == CellState::kNoValue ? 1U : 0U;
   }

@@ -54,7 +54,8 @@ struct KnownPoint {
 /// What is known of a cell of a map.
 enum class CellState : std::uint8_t {
   kSolved,
-  kNoResult,  ///< not solved yet, or left out by a condition
+  kNoResult,  ///< not solved yet
+  kFiltered,  ///< has a result, which the condition leaves out
   kFailed,
   kNoValue,  ///< solved, but without that output, or with one that has no place
   kNoPoint,  ///< the study has no point there
@@ -135,10 +136,10 @@ struct Colours {
 
 /// Cells of a map that have no value to draw, by reason.
 struct Gaps {
-  std::uint64_t no_result = 0;  ///< not solved yet, or left out by a condition
+  std::uint64_t no_result = 0;  ///< not solved yet
+  std::uint64_t filtered = 0;   ///< with a result, which the condition leaves out
   std::uint64_t failed = 0;
   std::uint64_t no_value = 0;  ///< solved, but without that output, or with one that has no place
-  std::string no_result_name{"no result"};  ///< for the legend
 };
 
 struct Figure {
@@ -147,11 +148,18 @@ struct Figure {
   std::vector<Panel> panels = {};  ///< one below the other
   std::optional<Colours> colours = {};
   Gaps gaps = {};
+  bool is_empty = false;                ///< there is no value to draw: one of the notes says so
   std::vector<std::string> notes = {};  ///< sentences below the picture
 };
 
 /// The colour of a share from 0 to 1 of what colours span; others take that of the nearer end.
 Colour shade_of(const Colours& colours, double share);
+
+/// Notes that there is nothing to draw; `why` is a part of a sentence.
+void say_empty(Figure& figure, const std::string& why);
+
+/// Whether the picture says which colour stands for which value.
+bool has_colour_scale(const Figure& figure);
 
 /// Counts the gaps of cells.
 Gaps gaps_of(const Cells& cells);

@@ -92,7 +92,7 @@ void say_left_out(Figure& figure, std::size_t all, std::size_t kept) {
                                        shown_count(all - kept), shown_count(all)));
   }
   if (kept == 0) {
-    figure.notes.emplace_back("Nothing to draw: no point has a value.");
+    say_empty(figure, "no point has a value");
   }
 }
 
@@ -162,7 +162,7 @@ Figure name_counts(const Quantity& quantity, const std::vector<std::string>& nam
              false};
   panel.x.is_whole = true;
   if (bars.names.empty()) {
-    figure.notes.emplace_back("Nothing to draw: no point has a value.");
+    say_empty(figure, "no point has a value");
   } else {
     panel.bars = std::move(bars);
   }

@@ -170,7 +170,7 @@ class Arranger {
     const LegendLayout beside =
         laid_out_beside(layout_.entries, std::min(0.36 * room_.width, 290.0));
     // A colour bar has the place beside.
-    const bool is_beside = !figure_.colours && layout_.size.width >= kFewestSideBySide &&
+    const bool is_beside = !has_colour_scale(figure_) && layout_.size.width >= kFewestSideBySide &&
                            beside.height <= room_.height;
     layout_.legend = is_beside ? beside : laid_out_below(layout_.entries, room_.width);
     if (is_beside) {
@@ -199,7 +199,7 @@ class Arranger {
   }
 
   void place_colour_bar() {
-    if (!figure_.colours) {
+    if (!has_colour_scale(figure_)) {
       room_.width -= 12.0;  // for half of the last label below
       return;
     }

@@ -74,7 +74,9 @@ void draw_area_sign(SvgWriter& svg, const LegendEntry& entry, double x, double y
       rectangle(OwnLink{hatch_id(filling.hatch)});
     }
   } else {
-    rectangle(OwnLink{entry.sign == Sign::kFailed ? "failed" : "missing"});
+    rectangle(OwnLink{entry.sign == Sign::kFailed     ? "failed"
+                      : entry.sign == Sign::kFiltered ? "filtered"
+                                                      : "missing"});
   }
   svg.rectangle(x, y - 6.0, width, kHeight, "frame");
   if (entry.sign == Sign::kKind && entry.is_hatched) {
@@ -137,8 +139,12 @@ std::vector<LegendEntry> legend_of(const Figure& figure) {
   }
   if (figure.gaps.no_result > 0) {
     entries.push_back({.sign = Sign::kNoResult,
-                       .name = fmt::format("{} ({})", figure.gaps.no_result_name,
-                                           shown_count(figure.gaps.no_result))});
+                       .name = fmt::format("no result ({})", shown_count(figure.gaps.no_result))});
+  }
+  if (figure.gaps.filtered > 0) {
+    entries.push_back(
+        {.sign = Sign::kFiltered,
+         .name = fmt::format("left out by --where ({})", shown_count(figure.gaps.filtered))});
   }
   if (figure.gaps.failed > 0) {
     entries.push_back({.sign = Sign::kFailed,

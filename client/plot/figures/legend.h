@@ -11,7 +11,7 @@ namespace oblique::client::plot {
 
 /// A sign and what it means.
 struct LegendEntry {
-  enum class Sign { kCurve, kSpan, kKnown, kKind, kRest, kNoResult, kFailed };
+  enum class Sign { kCurve, kSpan, kKnown, kKind, kRest, kNoResult, kFiltered, kFailed };
   Sign sign;
   std::size_t number = 0;  ///< of the stroke, shading or kind
   bool has_line = true;    ///< of a curve

@@ -62,7 +62,7 @@ Figure line_chart(const Quantity& x, const Quantity& y, const std::optional<Quan
                    : widened(range_of(ys, choice.is_y_logarithmic), 0.05, choice.is_y_logarithmic),
       choice.is_y_logarithmic);
   if (xs.empty() || std::all_of(ys.begin(), ys.end(), [](double v) { return std::isnan(v); })) {
-    figure.notes.emplace_back("Nothing to draw: no point has a value.");
+    say_empty(figure, "no point has a value");
   }
   std::size_t number = 0;
   for (Series& each : series) {

@@ -85,7 +85,7 @@ void number_cells(KindCells& map) {
 
 void say_kinds(Figure& figure, const KindCells& map, std::size_t kinds, const std::string& plural) {
   if (map.kinds.empty()) {
-    figure.notes.emplace_back("Nothing to draw: no cell has a value.");
+    say_empty(figure, "no cell has a value");
     return;
   }
   if (map.name == "mode" || map.name == "major_mode") {
@@ -150,7 +150,7 @@ Figure heat_map(const MapAxes& axes, const Quantity& value, Cells cells,
         fmt::format("All cells have one value: {}.", shown_value(value, all.from)));
   }
   if (drawn.empty()) {
-    figure.notes.emplace_back("Nothing to draw: no cell has a value.");
+    say_empty(figure, "no cell has a value");
   }
   say_no_value(figure);
   return figure;

@@ -85,7 +85,7 @@ void say_what_is_missing(Figure& figure, const Dots& dots, const ChartChoice& ch
                                        shown_count(missing), shown_count(dots.x.size())));
   }
   if (missing == dots.x.size()) {
-    figure.notes.emplace_back("Nothing to draw: no point has both values.");
+    say_empty(figure, "no point has both values");
   }
 }
 

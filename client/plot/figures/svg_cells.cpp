@@ -154,7 +154,8 @@ void draw_gaps(SvgWriter& svg, const Cells& cells, const Places& places) {
     grid.kinds.push_back(static_cast<int>(state));
   }
   for (const auto& [state, filling] :
-       {std::pair{CellState::kNoResult, "missing"}, std::pair{CellState::kFailed, "failed"}}) {
+       {std::pair{CellState::kNoResult, "missing"}, std::pair{CellState::kFiltered, "filtered"},
+        std::pair{CellState::kFailed, "failed"}}) {
     const auto outlines = outlines_of(grid, static_cast<int>(state));
     if (corners_of(outlines) > most_corners(cells)) {
       fill_masked(svg, cells, state, filling, places);

@@ -228,7 +228,7 @@ void draw_figure(SvgWriter& svg, const Figure& figure, const Layout& layout,
   for (std::size_t i = 0; i < figure.panels.size(); ++i) {
     draw_panel(svg, figure, i, layout, first_frame);
   }
-  if (figure.colours) {
+  if (has_colour_scale(figure)) {
     draw_colour_bar(svg, *figure.colours, layout);
   }
   draw_legend(svg, layout.entries, layout.legend, layout.legend_x, layout.legend_y);
@@ -243,7 +243,7 @@ std::string svg_of(const Figure& figure, const Size& size) {
   const Layout layout = layout_of(figure, size);
   SvgWriter svg(layout.size.width, layout.size.height, figure.title, description_of(figure));
   svg.style(style_sheet());
-  svg.verbatim(pattern_definitions(hatches_of(figure)));
+  svg.verbatim(pattern_definitions(hatches_of(figure), figure.gaps.filtered > 0));
   define_frames(svg, layout, 0);
   svg.rectangle(0.0, 0.0, layout.size.width, layout.size.height, "paper");
   draw_figure(svg, figure, layout, 0);

@@ -48,6 +48,8 @@ std::string_view name_of(CellState state) {
       return "solved";
     case CellState::kNoResult:
       return "no result";
+    case CellState::kFiltered:
+      return "filtered";
     case CellState::kFailed:
       return "failed";
     case CellState::kNoValue:

@@ -181,8 +181,10 @@ std::string gnuplot_of(const Figure& figure, const Size& size) {
     out += fmt::format("set title {} noenhanced\n",
                        gnuplot_text(figure.title + ", " + figure.subtitle));
   }
-  if (figure.colours) {
+  if (has_colour_scale(figure)) {
     write_palette(out, *figure.colours);
+  } else if (figure.colours) {
+    out += "unset colorbox\n";
   }
   for (std::size_t i = 0; i < figure.panels.size(); ++i) {
     const Panel& panel = figure.panels[i];

@@ -168,6 +168,8 @@ std::string legend_line(const LegendEntry& entry, const TerminalLook& look) {
       return signed_line(look.is_plain ? ". " : block, kFillOfOthers.colour, entry.name, look);
     case Sign::kNoResult:
       return signed_line(look.is_plain ? "? " : block, colour_of(0x6e6e6e), entry.name, look);
+    case Sign::kFiltered:
+      return signed_line(look.is_plain ? "- " : block, kFilteredInk, entry.name, look);
     case Sign::kFailed:
       return signed_line(look.is_plain ? "! " : block, colour_of(0xff0000), entry.name, look);
     case Sign::kKnown:
@@ -241,7 +243,7 @@ TerminalLook look_of_standard_output() {
 
 std::string text_of(const Figure& figure, const TerminalLook& look) {
   std::string after;
-  if (figure.colours) {
+  if (has_colour_scale(figure)) {
     after += colour_line(*figure.colours, look);
   }
   for (const LegendEntry& entry : legend_of(figure)) {

@@ -45,6 +45,8 @@ class MapLook {
     switch (cells_.states[cell]) {
       case CellState::kNoResult:
         return colour_of(0x6e6e6e);
+      case CellState::kFiltered:
+        return kFilteredInk;
       case CellState::kFailed:
         return colour_of(0xff0000);
       case CellState::kNoValue:
@@ -64,6 +66,8 @@ class MapLook {
     switch (cells_.states[cell]) {
       case CellState::kNoResult:
         return "?";
+      case CellState::kFiltered:
+        return "-";
       case CellState::kFailed:
         return "!";
       case CellState::kNoValue:

@@ -18,6 +18,9 @@ struct TextFrame {
 void draw_panel_text(TextCanvas& canvas, const Figure& figure, const Panel& panel,
                      const TextFrame& frame, const TerminalLook& look);
 
+/// Of cells that --where leaves out.
+inline constexpr Colour kFilteredInk = colour_of(0x4a5a78);
+
 /// The sign of a shade in ASCII, of ten from light to heavy, for a share from 0 to 1.
 char shade_sign(double share);
 /// The sign of a line in ASCII.

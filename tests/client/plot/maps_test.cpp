@@ -60,6 +60,26 @@ TEST(HeatMap, ShowsWhatIsMissingAndWhatFailedAsSuchAndNotAsAValue) {
   EXPECT_EQ(pixels.colours[last_row + 2 * cell + cell / 2] & 0xffU, 0xffU);
 }
 
+TEST(HeatMap, HasASignOfItsOwnForWhatTheConditionLeavesOut) {
+  Cells cells = test::counted_cells(6, 4);
+  cells.states[3] = CellState::kNoResult;
+  cells.states[4] = CellState::kFiltered;
+  const auto svg = svg_of(heat_map(test::usual_axes(), quantity_of("fn_peak_N", "N"), cells));
+  EXPECT_THAT(svg, HasSubstr("no result (1)"));
+  EXPECT_THAT(svg, HasSubstr("left out by --where (1)"));
+  EXPECT_THAT(svg, ContainsRegex("fill=\"url\\(#p[0-9a-f]+-filtered\\)\""));
+}
+
+TEST(HeatMap, OfNoValueHasNoScaleOfColours) {
+  Cells cells = test::counted_cells(6, 4);
+  const auto map = [&] {
+    return svg_of(heat_map(test::usual_axes(), quantity_of("fn_peak_N", "N"), cells));
+  };
+  EXPECT_THAT(map(), HasSubstr("linearGradient"));
+  cells.states.assign(cells.states.size(), CellState::kFiltered);
+  EXPECT_THAT(map(), Not(HasSubstr("linearGradient")));
+}
+
 TEST(HeatMap, OfNothingAndOfOneValueSaysSo) {
   EXPECT_THAT(svg_of(heat_map(test::usual_axes(), quantity_of("fn_peak_N", "N"), {})),
               HasSubstr("Nothing to draw"));

@@ -3,6 +3,8 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <memory>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -125,6 +127,59 @@ TEST_F(Plot, DrawsNothingOfNothingAndSaysSo) {
   EXPECT_THAT(outcome.out, HasSubstr("0 points"));
 }
 
+TEST_F(Plot, OfAMapTellsWhatIsNotSolvedFromWhatTheConditionLeavesOut) {
+  {
+    server::Store store((folder_.path() / "oblique.db").string());
+    const auto table = std::make_shared<const protocol::PointTable>(
+        protocol::recipe_of({{protocol::range("H", 0.5, 1.0, 2), protocol::range("mu", 0.0, 1.0, 3),
+                              protocol::listed("e", {1.0})}}));
+    const std::vector<server::Change> changes{
+        server::AddStudy{2, "grid", table, "2024-01-01T00:00:00.000Z"},
+        server::AddResults{
+            2,
+            table,
+            0,
+            "",
+            "",
+            1,
+            "now",
+            {server::solved_point(0), server::solved_point(1), server::solved_point(2)}}};
+    store.commit(changes);
+  }
+  const std::vector<std::string> asked{
+      "grid", "--map", "fn_peak_N", "--where", "fn_peak_N < 20000", "--format"};
+  const auto as = [&](const std::string& format) {
+    auto arguments = asked;
+    arguments.push_back(format);
+    return plot(arguments).out;
+  };
+  const auto lines_with = [](const std::string& text, const std::string& part) {
+    std::istringstream in(text);
+    std::string line;
+    std::size_t count = 0;
+    while (std::getline(in, line)) {
+      count += line.ends_with(part) ? 1U : 0U;
+    }
+    return count;
+  };
+  const auto csv = as("csv");
+  EXPECT_EQ(lines_with(csv, ",solved"), 2U) << csv;
+  EXPECT_EQ(lines_with(csv, ",filtered"), 1U) << csv;
+  EXPECT_EQ(lines_with(csv, ",no result"), 3U) << csv;
+  const auto svg = as("svg");
+  EXPECT_THAT(svg, HasSubstr("no result (3)"));
+  EXPECT_THAT(svg, HasSubstr("left out by --where (1)"));
+}
+
+TEST_F(Plot, OfNoValueSaysSoOnStandardErrorAndHasNoColours) {
+  const auto outcome =
+      plot({"a", "--scatter", "mu,fn_peak_N", "--colour", "duration_s", "--where", "mu > 5"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("No point of the picture has a value"));
+  EXPECT_THAT(outcome.out, Not(HasSubstr("linearGradient")));
+  EXPECT_THAT(plot({"a", "--histogram", "fn_peak_N"}).err, Not(HasSubstr("No point")));
+}
+
 TEST_F(Plot, OfAWrongFlagNamesItAndWhatIsAllowed) {
   struct Wrong {
     std::vector<std::string> arguments;
@@ -139,6 +194,9 @@ TEST_F(Plot, OfAWrongFlagNamesItAndWhatIsAllowed) {
                           {{"a", "--map", "mode", "--lines", "mu"}, "excludes"},
                           {{"a", "--scatter", "mu"}, "two columns"},
                           {{"a", "--scatter", "mu,major_mode"}, "texts"},
+                          {{"a", "--scatter", "mu,fn_peak_N", "--colour", "major_mode"},
+                           "--colour major_mode: its values are texts"},
+                          {{"a", "--histogram", "fn_peaks_N"}, "fn_peaks_N[0]"},
                           {{"a", "--at", "q=1"}, "no axis q"},
                           {{"a", "--palette", "jet"}, "viridis, cividis"},
                           {{"a", "--range", "1"}, "FROM:TO"},
