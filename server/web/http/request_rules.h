@@ -18,9 +18,9 @@ struct RequestHead {
   bool has_zero_bytes = false;           ///< in a field: what follows one is easily overlooked
   bool takes_changes = false;            ///< something can be changed at its path, by POST
   std::optional<std::uint64_t> body_bytes = {};  ///< as Content-Length says
-  bool may_be_linked_to = false;                 ///< what is there holds nothing and changes nothing
-  std::vector<std::string> fetch_modes = {};     ///< every Sec-Fetch-Mode header
-  std::vector<std::string> fetch_targets = {};   ///< every Sec-Fetch-Dest header
+  bool may_be_linked_to = false;                ///< what is there holds nothing and changes nothing
+  std::vector<std::string> fetch_modes = {};    ///< every Sec-Fetch-Mode header
+  std::vector<std::string> fetch_targets = {};  ///< every Sec-Fetch-Dest header
 };
 
 /// By what a server may be called in a request. A page of a stranger, opened in a browser on this
