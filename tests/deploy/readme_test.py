@@ -76,7 +76,7 @@ class Readmes(unittest.TestCase):
         changes = re.findall(r"(?m)^## \[([\d.]+)\] - (\d{4}-\d\d-\d\d)$", (TREE / "deploy/CHANGELOG.md").read_text())
         self.assertEqual(changes[0][0], version)
         self.assertEqual([date for _, date in changes], sorted((date for _, date in changes), reverse=True))
-        citation = (TREE / "CITATION.cff").read_text()
+        citation = (TREE / "deploy/packages/CITATION.cff").read_text()
         self.assertIn(f"\nversion: {version}\n", citation)
         self.assertIn(f'\ndate-released: "{changes[0][1]}"\n', citation)
 

@@ -35,6 +35,19 @@ Batch filtered_batch(std::uint64_t first, std::uint64_t count, const std::string
   return {1, 7, first, count, points};
 }
 
+/// What was solved of the one batch of which there is progress, and which has ended.
+std::set<std::uint64_t> points_of_one_batch(const std::vector<Progress>& progress) {
+  EXPECT_EQ(progress.size(), 1U);
+  std::set<std::uint64_t> solved;
+  for (const Progress& batch : progress) {
+    EXPECT_TRUE(batch.batch_done);
+    for (const auto& result : batch.results) {
+      solved.insert(result.point());
+    }
+  }
+  return solved;
+}
+
 /// Lets the test decide when each point ends.
 class Gate {
  public:
@@ -113,14 +126,8 @@ TEST_F(BatchSolverTest, PointsThatAFilterLeavesOutArePassedOver) {
   gate_.open(1000);
   solver_.add(filtered_batch(100, 300, "floor(mu / 10) == mu / 10 && mu < 200"));
   wait_batches_ended(1);
-  const auto progress = solver_.collect();
-  ASSERT_EQ(progress.size(), 1U);
-  EXPECT_TRUE(progress[0].batch_done);
-  std::set<std::uint64_t> solved;
-  for (const auto& result : progress[0].results) {
-    solved.insert(result.point());
-  }
-  EXPECT_EQ(solved, (std::set<std::uint64_t>{100, 110, 120, 130, 140, 150, 160, 170, 180, 190}));
+  EXPECT_EQ(points_of_one_batch(solver_.collect()),
+            (std::set<std::uint64_t>{100, 110, 120, 130, 140, 150, 160, 170, 180, 190}));
 }
 
 TEST_F(BatchSolverTest, OnlyTheWantedPartsOfABatchAreSolvedAndOfTheseWhatAFilterLeavesIn) {
@@ -130,14 +137,8 @@ TEST_F(BatchSolverTest, OnlyTheWantedPartsOfABatchAreSolvedAndOfTheseWhatAFilter
   EXPECT_EQ(points_to_solve(scattered), 10U);
   solver_.add(scattered);
   wait_batches_ended(1);
-  const auto progress = solver_.collect();
-  ASSERT_EQ(progress.size(), 1U);
-  EXPECT_TRUE(progress[0].batch_done);
-  std::set<std::uint64_t> solved;
-  for (const auto& result : progress[0].results) {
-    solved.insert(result.point());
-  }
-  EXPECT_EQ(solved, (std::set<std::uint64_t>{100, 110, 120, 130, 340, 350, 360, 370, 380, 390}));
+  EXPECT_EQ(points_of_one_batch(solver_.collect()),
+            (std::set<std::uint64_t>{100, 110, 120, 130, 340, 350, 360, 370, 380, 390}));
 }
 
 TEST_F(BatchSolverTest, ABatchOfWhichNothingIsLeftInEndsWithoutAResult) {

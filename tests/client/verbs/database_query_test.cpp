@@ -11,6 +11,7 @@
 #include "server/store/store.h"
 #include "tests/support/points.h"
 #include "tests/support/programs.h"
+#include "tests/support/stored_study.h"
 
 namespace oblique::client {
 namespace {
@@ -25,19 +26,7 @@ class DatabaseQuery : public testing::Test {
  protected:
   DatabaseQuery() {
     server::Store store((folder_.path() / "oblique.db").string());
-    const auto table = server::table_of(4);
-    const std::vector<server::Change> changes{
-        server::AddStudy{1, "a", table, "2024-01-01T00:00:00.000Z"},
-        server::AddResults{1,
-                           table,
-                           0,
-                           "",
-                           "",
-                           1,
-                           "now",
-                           {server::solved_point(0), server::solved_point(1),
-                            server::solved_point(2), server::solved_point(3)}}};
-    store.commit(changes);
+    test::add_study(store, "a", 4, 4);
   }
   test::Outcome ask(const std::vector<std::string>& arguments) {
     return test::run_oblique(folder_, arguments);

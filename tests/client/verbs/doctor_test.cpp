@@ -18,6 +18,7 @@
 #include "tests/support/points.h"
 #include "tests/support/programs.h"
 #include "tests/support/reserved_port.h"
+#include "tests/support/stored_study.h"
 
 namespace oblique::client {
 namespace {
@@ -104,21 +105,10 @@ TEST_F(Doctor, GivesEveryPartAsJson) {
 }
 
 TEST_F(Doctor, ReadsADatabaseWhoseServerWasKilledAndMakesNoFileBesideIt) {
-  const auto table = server::table_of(4);
   std::filesystem::create_directory(folder_.path() / "data");
   {
     server::Store store(folder_.file("data/alive.db"));
-    const std::vector<server::Change> changes{
-        server::AddStudy{1, "friction", table, "2024-01-01T00:00:00.000Z"},
-        server::AddResults{1,
-                           table,
-                           0,
-                           "",
-                           "",
-                           1,
-                           "2024-01-01T00:00:00.000Z",
-                           {server::solved_point(0), server::solved_point(1)}}};
-    store.commit(changes);
+    test::add_study(store, "friction", 4, 2);
     // As a killed server leaves them.
     std::filesystem::copy(folder_.file("data/alive.db"), folder_.file("data/dead.db"));
     std::filesystem::copy(folder_.file("data/alive.db-wal"), folder_.file("data/dead.db-wal"));

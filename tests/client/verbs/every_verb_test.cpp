@@ -12,6 +12,7 @@
 #include "server/store/store.h"
 #include "tests/support/points.h"
 #include "tests/support/programs.h"
+#include "tests/support/stored_study.h"
 
 namespace oblique::client {
 namespace {
@@ -181,18 +182,7 @@ class EveryVerbThatReads : public testing::Test {
  protected:
   EveryVerbThatReads() {
     server::Store store((folder_.path() / "oblique.db").string());
-    const auto table = server::table_of(4);
-    const std::vector<server::Change> changes{
-        server::AddStudy{1, "friction", table, "2024-01-01T00:00:00.000Z"},
-        server::AddResults{1,
-                           table,
-                           0,
-                           "",
-                           "",
-                           1,
-                           "2024-01-01T00:00:00.000Z",
-                           {server::solved_point(0), server::solved_point(1)}}};
-    store.commit(changes);
+    test::add_study(store, "friction", 4, 2);
   }
   /// Those whose first argument is a study of a database.
   static std::vector<Verb> verbs_of_studies() {

@@ -14,6 +14,7 @@
 #include "server/store/store.h"
 #include "tests/support/points.h"
 #include "tests/support/programs.h"
+#include "tests/support/stored_study.h"
 
 namespace oblique::client {
 namespace {
@@ -26,19 +27,7 @@ class Plot : public testing::Test {
  protected:
   Plot() {
     server::Store store((folder_.path() / "oblique.db").string());
-    const auto table = server::table_of(12);
-    const std::vector<server::Change> changes{
-        server::AddStudy{1, "a", table, "2024-01-01T00:00:00.000Z"},
-        server::AddResults{1,
-                           table,
-                           0,
-                           "",
-                           "",
-                           1,
-                           "now",
-                           {server::solved_point(0), server::solved_point(1),
-                            server::solved_point(2), server::solved_point(3)}}};
-    store.commit(changes);
+    test::add_study(store, "a", 12, 4);
   }
   test::Outcome plot(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), "plot");
