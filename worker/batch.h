@@ -25,6 +25,7 @@ struct Batch {
   std::uint64_t count;
   std::shared_ptr<const protocol::PointTable> points;
   std::vector<BatchPart> parts{};  ///< rising and apart, what is to be solved of it; empty: all
+  std::int32_t priority = 0;       ///< those of a higher one are solved first
 
   /// The first point of [at, end) that is to be solved, or `end`.
   std::uint64_t first_to_solve(std::uint64_t at, std::uint64_t end) const;

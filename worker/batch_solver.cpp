@@ -99,17 +99,22 @@ Progress& BatchSolver::progress_of(const Batch& batch) {
       .first->second;
 }
 
-BatchSolver::OpenBatches::iterator BatchSolver::batch_with_free_points() {
-  return std::find_if(open_.begin(), open_.end(), [](const OpenBatch& batch) {
-    return !batch.dropped && batch.given < batch.batch.count;
-  });
+/// That of the highest priority among those with points that no thread took, the first of several.
+BatchSolver::OpenBatches::iterator BatchSolver::next_batch() {
+  auto next = open_.end();
+  for (auto batch = open_.begin(); batch != open_.end(); ++batch) {
+    const bool has_points = !batch->dropped && batch->given < batch->batch.count;
+    if (has_points && (next == open_.end() || batch->batch.priority > next->batch.priority)) {
+      next = batch;
+    }
+  }
+  return next;
 }
 
 void BatchSolver::work(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
-  while (changed_.wait(lock, stop,
-                       [this] { return !paused_ && batch_with_free_points() != open_.end(); })) {
-    Task task{batch_with_free_points(), 0, 0, {}, Clock::now()};
+  while (changed_.wait(lock, stop, [this] { return !paused_ && next_batch() != open_.end(); })) {
+    Task task{next_batch(), 0, 0, {}, Clock::now()};
     ++task.batch->solvers;
     const Batch batch = task.batch->batch;
     lock.unlock();
@@ -148,7 +153,8 @@ std::optional<std::uint64_t> BatchSolver::next_point(Task& task, const std::stop
   return std::nullopt;
 }
 
-/// Takes the next part of the batch, in which a filter may leave nothing. False when none is left.
+/// Takes the next part of the batch, in which a filter may leave nothing. False when none is left,
+/// or another batch comes first.
 bool BatchSolver::take_more(Task& task, const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   hand_on(task);
@@ -158,7 +164,7 @@ bool BatchSolver::take_more(Task& task, const std::stop_token& stop) {
     task.busy_since = Clock::now();
   }
   const std::uint64_t left = open.batch.count - open.given;
-  if (open.dropped || stop.stop_requested() || left == 0) {
+  if (open.dropped || stop.stop_requested() || left == 0 || next_batch() != task.batch) {
     return false;
   }
   const std::uint64_t count = solver::points_of_task(left, thread_count_);

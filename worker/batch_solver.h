@@ -18,9 +18,11 @@
 
 namespace oblique::worker {
 
-/// Solves batches in the order in which they were added, on threads of its own, so that solving
-/// never holds up heartbeats. Points that a filter leaves out are passed over. The threads take
-/// each batch apart into tasks, each one point or a few, and meet in a lock once a task.
+/// Solves batches, those of the highest priority first, of these in the order in which they were
+/// added, on threads of its own, so that solving never holds up heartbeats. Points that a filter
+/// leaves out are passed over. The threads take each batch apart into tasks, each one point or a
+/// few, and meet in a lock once a task: then they leave it for one of a higher priority, and come
+/// back to it.
 class BatchSolver {
  public:
   /// Gives the next point to solve; nothing when there is none.
@@ -85,7 +87,7 @@ class BatchSolver {
   };
 
   void work(const std::stop_token& stop);
-  OpenBatches::iterator batch_with_free_points();
+  OpenBatches::iterator next_batch();
   std::optional<std::uint64_t> next_point(Task& task, const std::stop_token& stop);
   bool take_more(Task& task, const std::stop_token& stop);
   void take(Task& task, protocol::PointResult&& result);

@@ -280,8 +280,8 @@ void Conversation::on(const protocol::Batch& batch) {
     return;
   }
   backoff_ms_ = 0;
-  const Batch taken{next_batch_++, batch.study_id(), batch.first_point(),
-                    batch.count(), study->second,    std::move(*parts)};
+  const Batch taken{next_batch_++, batch.study_id(),  batch.first_point(), batch.count(),
+                    study->second, std::move(*parts), batch.priority()};
   const std::uint64_t points = points_to_solve(taken);
   held_[taken.number] = {batch.study_id(), batch.lease_id(), batch.attempt(), points};
   leaving_.note_work(now_ms_);

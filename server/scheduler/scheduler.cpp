@@ -179,7 +179,7 @@ void Scheduler::on(const StudyRemoved& event) {
   queue_.put(event.study, {});
   searching_.erase(event.study);
   studies_.erase(event.study);
-  ready_workers_.wake_all();  // suspect points of it may have kept some from others
+  wake_all();  // suspect points of it may have kept some from others
 }
 
 /// Where a study begins that opens now: level with the one served least, so that it neither waits
@@ -203,10 +203,12 @@ void Scheduler::requeue(StudyId id) {
   const StudyQueue::Place before = known == nullptr ? StudyQueue::Place{} : *known;
   const StudyQueue::Place place = place_of(studies_.at(id));
   queue_.put(id, place);
-  // Of free points there may be more now, and for whom they are; suspect ones stop some workers.
-  if ((place.has_free && (!before.has_free || place.solver_version != before.solver_version)) ||
+  // Of free points there may be more now, for whom they are and before what; suspect ones stop some
+  // workers.
+  if ((place.has_free && (!before.has_free || place.solver_version != before.solver_version ||
+                          place.priority > before.priority)) ||
       place.has_suspect != before.has_suspect) {
-    ready_workers_.wake_all();
+    wake_all();
   }
 }
 

@@ -26,6 +26,46 @@ void Scheduler::dispatch() {
     ready_workers_.remove(id);
     queue(id, worker);
   }
+  serve_ahead();
+}
+
+/// A study that comes before all that a worker holds does not wait until some of that has ended:
+/// the worker gets a batch of it at once, besides what it asked for, and the next when that one has
+/// ended.
+void Scheduler::serve_ahead() {
+  const auto is_urgent = [this] {
+    const auto highest = queue_.highest_priority();
+    return highest && !priorities_.empty() && *highest > priorities_.begin()->first;
+  };
+  while (full_workers_.has_awake() && is_urgent()) {
+    const WorkerId id = full_workers_.first_awake();
+    Worker& worker = workers_.at(id);
+    ++looks_;
+    const StudyId study = next_free_study(worker);
+    worker.ahead = may_get_ahead(worker, study) ? serve_free(id, worker, study) : 0;
+    if (worker.ahead != 0) {
+      full_workers_.remove(id);
+    } else {
+      full_workers_.rest(id);
+    }
+  }
+}
+
+bool Scheduler::may_get_ahead(const Worker& worker, StudyId study) const {
+  const bool is_sound = !worker.is_busy && !worker.draining && worker.probe == 0 &&
+                        is_proven(worker) && !is_set_aside(worker) &&
+                        next_suspect_study(worker) == 0;
+  return is_sound && study != 0 && !worker.leases.empty() &&
+         std::ranges::all_of(worker.leases, [&](LeaseId id) {
+           const Lease& lease = leases_.at(id);
+           return !lease.alone && lease.priority < studies_.at(study).terms.priority;
+         });
+}
+
+/// Something has changed for all workers.
+void Scheduler::wake_all() {
+  ready_workers_.wake_all();
+  full_workers_.wake_all();
 }
 
 /// While a study looks for its next point that is left in, others get the workers.
@@ -88,22 +128,28 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
   if (study == 0) {
     return seeks_stragglers_ && serve_straggler(id, worker);
   }
+  serve_free(id, worker, study);
+  return true;
+}
+
+/// Free points of the study. @returns the lease; 0: it looks for them
+LeaseId Scheduler::serve_free(WorkerId id, Worker& worker, StudyId study) {
   const Portion wanted = portion_for(worker, study, true);
   StudyPoints& points = studies_.at(study).points;
   // With few looks left a batch would be small: it is cut in the next event.
   const bool is_short = points.has_filter() && !points.has(Standing::kSound) &&
                         looks_left_ < settings_.most_looks / 2;
   if (const auto batch = is_short ? std::nullopt : points.take(wanted, looks_left_)) {
-    grant(id, worker, study, *batch, false);
+    const LeaseId lease = grant(id, worker, study, *batch, false);
     // What ended before says nothing of how much the worker can do.
     auto& fit_for = worker.paces.at(study).last_batch_points;
     fit_for = std::max(fit_for, wanted.points);
-  } else {
-    set_searching(study, points.has_free());
-    finish_if_complete(study);
-    requeue(study);
+    return lease;
   }
-  return true;
+  set_searching(study, points.has_free());
+  finish_if_complete(study);
+  requeue(study);
+  return 0;
 }
 
 bool Scheduler::serve_suspect(WorkerId id, Worker& worker) {
@@ -224,17 +270,19 @@ Portion Scheduler::portion_for(const Worker& worker, StudyId id, bool fills_lane
   const auto known = worker.paces.find(id);
   const Pace pace = known == worker.paces.end() ? Pace{} : known->second;
   std::uint64_t points = settings_.first_batch_points * worker.threads;
+  std::uint64_t fewest = 1;
   if (pace.s_per_point() > 0.0) {
     const double by_pace = target_s() * worker.threads / pace.s_per_point();
     const auto largest = static_cast<double>(
         std::min(settings_.largest_batch_points * worker.threads,
                  settings_.growth * std::max<std::uint64_t>(pace.last_batch_points, 1)));
     points = static_cast<std::uint64_t>(std::min(by_pace, largest));
+    fewest = static_cast<std::uint64_t>(by_pace * settings_.shortest_batch_s / target_s());
   }
   const std::uint64_t shares = settings_.tail_batches_per_thread * threads_;
   const std::uint64_t fair =
       studies_.at(id).points.free() / std::max<std::uint64_t>(shares, 1) * worker.threads;
-  Portion wanted{std::max<std::uint64_t>(std::min(points, fair), 1)};
+  Portion wanted{std::max<std::uint64_t>(std::min(points, std::max(fair, fewest)), 1)};
   if (pace.last_end != 0) {
     wanted.follows = pace.last_end;
   }
@@ -293,20 +341,31 @@ LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Batch
     served.solver_version = worker.solver_version;
   }
   const LeaseId lease = next_lease_++;
-  leases_.emplace(lease, Lease{id, study, batch, alone, now_ms_});
+  leases_.emplace(lease, Lease{id, study, batch, alone, now_ms_, 0, served.terms.priority});
+  note_priority(served.terms.priority, true);
   served.leases.insert(lease, batch);
   worker.leases.insert(lease);
-  --worker.credit;
+  worker.credit -= std::min(worker.credit, 1U);
   pace.last_batch_points = batch.points;
   pace.last_end = batch.end();
   pace.held_points += batch.points;
   requeue(study);
   SendBatch send{id, study, batch.first_point, batch.count, batch.attempts + 1, lease};
+  send.priority = served.terms.priority;
   if (batch.points < batch.count) {
     send.parts = served.points.leased_set().within(batch.first_point, batch.end());
   }
   effects_.emplace_back(std::move(send));
   return lease;
+}
+
+/// A lease of that priority begins or ends.
+void Scheduler::note_priority(std::int32_t priority, bool is_leased) {
+  std::size_t& leases = priorities_[priority];
+  leases = is_leased ? leases + 1 : leases - 1;
+  if (leases == 0) {
+    priorities_.erase(priority);
+  }
 }
 
 }  // namespace oblique::server

@@ -35,6 +35,8 @@ struct SchedulerSettings {
   /// While free points last, at least so many more batches are left for each thread: the tail of a
   /// study goes out in ever smaller batches and all workers finish together.
   std::uint64_t tail_batches_per_thread = 3;
+  double shortest_batch_s =
+      0.01;  ///< of those too: shorter ones cost more on their way than they help
   /// With nothing else to hand out, a batch that takes this long, and `straggler_factor` times as
   /// long as it should, is given to a second worker too; the first answer to a point wins. Batches
   /// that have cost a worker are not.
@@ -215,6 +217,7 @@ struct SendBatch {
   std::uint32_t attempt;
   LeaseId lease;
   std::vector<Interval> parts{};  ///< of these, the points that are to be solved; empty: all
+  std::int32_t priority = 0;      ///< of the study
 };
 /// Make these results of the message durable, then say ResultsStored. Sent for every Results
 /// message, even with nothing to keep: the acknowledgement follows all commits before it.

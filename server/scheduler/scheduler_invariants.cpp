@@ -72,12 +72,22 @@ void Scheduler::check_invariants() const {
     ++versions[worker.solver_version];
     require(ready_workers_.contains(id) == (worker.credit > 0),
             "a worker with credit is not in the line, or one without is");
+    require(!full_workers_.contains(id) || (worker.credit == 0 && worker.ahead == 0),
+            "a worker stands where those stand that have all they asked for, and has not");
+    require(worker.ahead == 0 || worker.leases.contains(worker.ahead),
+            "what a worker got ahead is not one of its leases");
   }
   check_losses();
   require(ready_workers_.size() <= workers_.size(), "a worker that is gone stands in the line");
   require(draining == draining_ && versions == versions_, "workers are miscounted");
   require(threads == threads_, "the number of threads is wrong");
   require(leases == leases_.size(), "a worker holds a lease that does not exist");
+  require(full_workers_.size() <= workers_.size(), "a worker that is gone stands in a line");
+  std::map<std::int32_t, std::size_t> priorities;
+  for (const auto& [id, lease] : leases_) {
+    ++priorities[lease.priority];
+  }
+  require(priorities == priorities_, "priorities of leases are miscounted");
 }
 
 void Scheduler::check_losses() const {

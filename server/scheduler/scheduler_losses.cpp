@@ -129,7 +129,7 @@ void Scheduler::note_end(const Worker& worker, WorkerEnd how) {
 /// Who has proven itself, is set aside or is there at all may be another now.
 void Scheduler::standing_of_processes_changed() {
   longest_proven_since_ms_.clear();
-  ready_workers_.wake_all();
+  wake_all();
 }
 
 /// What the message says of the worker's process.

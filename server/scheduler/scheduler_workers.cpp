@@ -49,6 +49,7 @@ Scheduler::Worker* Scheduler::heard_from(WorkerId worker) {
   }
   found->second.last_heard_ms = now_ms_;
   ready_workers_.wake(worker);
+  full_workers_.wake(worker);
   return &found->second;
 }
 
@@ -60,9 +61,13 @@ void Scheduler::on(const CreditGiven& event) {
   }
 }
 
-void Scheduler::queue(WorkerId id, Worker& worker) {
+/// To the line in which it is to stand.
+void Scheduler::queue(WorkerId id, const Worker& worker) {
   if (worker.credit > 0) {
+    full_workers_.remove(id);
     ready_workers_.add(id);
+  } else if (worker.ahead == 0) {
+    full_workers_.add(id);
   }
 }
 
@@ -158,6 +163,7 @@ void Scheduler::remove_worker(WorkerId id, WorkerEnd how) {
     end_lease(lease, loss);
   }
   ready_workers_.remove(id);
+  full_workers_.remove(id);
   set_draining(found->second, false);
   threads_ -= found->second.threads;
   if (const auto version = versions_.find(found->second.solver_version); --version->second == 0) {

@@ -1,5 +1,7 @@
 #include "server/scheduler/study_queue.h"
 
+#include <algorithm>
+
 namespace oblique::server {
 
 void StudyQueue::put(StudyId study, const Place& place) {
@@ -44,6 +46,15 @@ StudyQueue::StudyId StudyQueue::next_free(const std::string& solver_version) con
     }
   }
   return best == nullptr ? 0 : std::get<StudyId>(*best);
+}
+
+std::optional<std::int64_t> StudyQueue::highest_priority() const {
+  std::optional<std::int64_t> highest;
+  for (const auto& [version, ranks] : free_) {
+    const std::int64_t priority = -std::get<0>(*ranks.begin());
+    highest = std::max(highest.value_or(priority), priority);
+  }
+  return highest;
 }
 
 std::optional<double> StudyQueue::least_served(StudyId but) const {

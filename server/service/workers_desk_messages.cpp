@@ -30,6 +30,7 @@ void WorkersDesk::send(const SendBatch& batch) {
   fields.set_count(batch.count);
   fields.set_attempt(batch.attempt);
   fields.set_lease_id(batch.lease);
+  fields.set_priority(batch.priority);
   std::uint64_t reached = batch.first_point;
   for (const Interval& part : batch.parts) {
     if (part.begin > reached) {

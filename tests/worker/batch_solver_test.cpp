@@ -16,6 +16,7 @@
 
 #include "proto/result_message.h"
 #include "tests/support/points.h"
+#include "worker/solver/library/point_runs.h"
 
 namespace oblique::worker {
 namespace {
@@ -120,6 +121,25 @@ TEST_F(BatchSolverTest, BatchesAreSolvedPointByPointInTheOrderTheyWereAdded) {
   EXPECT_TRUE(progress[0].batch_done);
   EXPECT_EQ(progress[1].results.size(), 2U);
   EXPECT_TRUE(solver_.collect().empty());
+}
+
+TEST_F(BatchSolverTest, ABatchOfAHigherPriorityComesBeforeWhatIsLeftOfOneThatWasBegun) {
+  solver_.add(batch(1, 0, 1000));
+  gate_.wait_begun(1);
+  Batch urgent = batch(2, 0, 3, 8);
+  urgent.priority = 1;
+  solver_.add(urgent);
+  const int of_a_task = static_cast<int>(solver::points_of_task(1000, 1));
+  gate_.open(of_a_task + 3);
+  wait_batches_ended(1);
+  const auto progress = solver_.collect();
+  ASSERT_EQ(progress.size(), 2U);
+  EXPECT_FALSE(progress[0].batch_done);
+  EXPECT_EQ(progress[1].batch, 2U);
+  EXPECT_TRUE(progress[1].batch_done);
+  gate_.open(1000);
+  wait_batches_ended(2);
+  EXPECT_EQ(progress[0].results.size() + points_of_one_batch(solver_.collect()).size(), 1000U);
 }
 
 TEST_F(BatchSolverTest, PointsThatAFilterLeavesOutArePassedOver) {

@@ -22,9 +22,12 @@ TEST_F(ConversationTest, AWelcomedWorkerAsksForTwoBatches) {
 
 TEST_F(ConversationTest, ABatchIsSolvedWithTheRecipeOfItsStudy) {
   join();
-  receive(batch_message(7, 31, 90, 10));
+  auto message = batch_message(7, 31, 90, 10);
+  message.mutable_batch()->set_priority(-3);
+  receive(message);
   const auto solves = effects_of<Solve>();
   ASSERT_EQ(solves.size(), 1U);
+  EXPECT_EQ(solves[0].batch.priority, -3);
   EXPECT_EQ(solves[0].batch.study_id, 7U);
   EXPECT_EQ(solves[0].batch.first_point, 90U);
   EXPECT_EQ(solves[0].batch.count, 10U);

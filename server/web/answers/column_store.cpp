@@ -13,9 +13,14 @@ namespace oblique::server {
 namespace {
 
 constexpr std::chrono::milliseconds kLookEvery{500};
-/// Of small studies, that may be solved while one looks.
-constexpr std::chrono::milliseconds kLookOften{50};
+/// A small study may be solved while one looks: as often as takes a tenth of a processor, within
+/// these.
 constexpr std::uint64_t kSmall = 65'536;
+constexpr int kPausesOfReading = 9;
+constexpr std::chrono::milliseconds kLookOftenest{5};
+constexpr std::chrono::milliseconds kLookOften{50};
+/// Who waits for another to read it asks so often whether its time is over.
+constexpr std::chrono::milliseconds kAskEvery{50};
 /// Reading so many rows is not waited for.
 constexpr std::uint64_t kMostAtOnce = 50'000;
 /// Points that failed are looked up again, for they may be solved later: the first so many.
@@ -142,7 +147,7 @@ bool StoredColumn::bring_up_to_date(sqlite3* database) {
 void StoredColumn::read(sqlite3* database, const std::function<bool()>& is_over) {
   std::unique_lock held(mutex_, std::defer_lock);
   // Until an instant of the system's clock: the thread sanitizer knows of no others.
-  while (!held.try_lock_until(std::chrono::system_clock::now() + kLookOften)) {
+  while (!held.try_lock_until(std::chrono::system_clock::now() + kAskEvery)) {
     if (is_over()) {
       throw StorageError("a column is being read: ask again later");
     }
@@ -152,7 +157,7 @@ void StoredColumn::read(sqlite3* database, const std::function<bool()>& is_over)
 
 bool StoredColumn::follow(sqlite3* database, bool may_take_long) {
   const auto now = Clock::now();
-  if (!values_.empty() && now - looked_ < (points_ <= kSmall ? kLookOften : kLookEvery)) {
+  if (!values_.empty() && now < look_again_) {
     return true;
   }
   // One state of the database for both questions and all rows.
@@ -170,8 +175,12 @@ bool StoredColumn::follow(sqlite3* database, bool may_take_long) {
     forget_runs(gone);
     failed_ = std::move(failed);
     read_runs(database, come);
-    looked_ = now;
     execute(database, "COMMIT");
+    const auto read_at = Clock::now();
+    look_again_ = points_ > kSmall
+                      ? now + kLookEvery
+                      : read_at + std::clamp<Clock::duration>(kPausesOfReading * (read_at - now),
+                                                              kLookOftenest, kLookOften);
   } catch (...) {
     sqlite3_exec(database, "ROLLBACK", nullptr, nullptr, nullptr);
     throw;
@@ -180,7 +189,7 @@ bool StoredColumn::follow(sqlite3* database, bool may_take_long) {
 }
 
 void StoredColumn::forget_runs(const std::vector<PointRun>& runs) {
-  looked_ = {};
+  look_again_ = {};
   values_.resize(points_, no_result());
   for (const PointRun& run : runs) {
     std::fill(values_.begin() + static_cast<std::ptrdiff_t>(run.begin),

@@ -38,7 +38,8 @@ class StoredColumn {
   std::size_t bytes() const { return points_ * sizeof(float); }
 
   /// Makes it what the database holds now, by which points have come and gone since the last time,
-  /// not oftener than twice a second. False: it has too much to do to be waited for.
+  /// not oftener than twice a second, of a small study 20 times, or as often as takes a tenth of a
+  /// processor. False: it has too much to do to be waited for.
   bool bring_up_to_date(sqlite3* database);
   /// How many points were read when reading ended the last time.
   std::uint64_t points_read() const { return points_read_; }
@@ -64,7 +65,7 @@ class StoredColumn {
   std::vector<float> values_;          // guarded by mutex_
   std::vector<PointRun> settled_;      // guarded by mutex_: what was read; the rest is no_result()
   std::vector<std::uint64_t> failed_;  // guarded by mutex_: of these, the first so many that failed
-  Clock::time_point looked_{};         // guarded by mutex_: when it was whole
+  Clock::time_point look_again_{};     // guarded by mutex_: it was whole, and holds until then
 };
 
 /// Runs of points that are in `of` and not in `without`; both rising and apart.

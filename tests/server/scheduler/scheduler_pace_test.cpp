@@ -71,6 +71,21 @@ TEST(SchedulerPace, SlowPointsOfOneModelFillTheLanesOfAWorker) {
   EXPECT_LT(third.count, 4U) << "but not when they take minutes";
 }
 
+TEST(SchedulerPace, TheLastBatchesOfAStudyAreNotShorterThanTheirWayIsWorth) {
+  SchedulerSettings settings = trusting();
+  settings.shortest_batch_s = 0.01;
+  SchedulerBench bench(settings);
+  bench.feed(StudyAdded{1, table_of(1000), {}});
+  SendBatch batch = bench.join(1, 1).at(0);
+  std::vector<std::uint64_t> counts;
+  for (std::uint64_t left = 1000 - batch.count; left > 0; left -= batch.count) {
+    batch = bench.next_after(batch, 1e-4);
+    counts.push_back(batch.count);
+  }
+  EXPECT_GE(counts.at(counts.size() - 2), 100U) << "0.01 s at 0.1 ms a point";
+  EXPECT_LT(counts.size(), 12U);
+}
+
 TEST(SchedulerPace, ABatchGrowsToSoManyTimesTheLastOneAtMost) {
   SchedulerSettings settings = by_pace_alone();
   settings.growth = 4;

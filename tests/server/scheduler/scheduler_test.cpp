@@ -107,7 +107,9 @@ TEST(SchedulerTest, BatchesGrowToTheWorkThatWasAimedAt) {
 }
 
 TEST(SchedulerTest, TheTailGoesOutInEverSmallerBatches) {
-  SchedulerBench bench;
+  SchedulerSettings settings;
+  settings.shortest_batch_s = 0.0;
+  SchedulerBench bench(settings);
   bench.feed(StudyAdded{1, table_of(2000), {}});
   std::deque<SendBatch> held;
   for (const WorkerId worker : {1U, 2U, 3U, 4U}) {

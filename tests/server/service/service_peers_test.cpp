@@ -69,6 +69,9 @@ TEST_F(ServiceTest, AnotherShareIsAcknowledgedOnceItIsDurableAndWhatIsNotGivenSt
   request(status);
   EXPECT_EQ(last_reply().status().studies(0).priority(), 7);
   EXPECT_EQ(last_reply().status().studies(0).weight(), 3.0);
+  hello();
+  credit(1);
+  EXPECT_EQ(last_message().batch().priority(), 7);
   again.mutable_submit()->set_priority(8);
   request(again);
   write_all("the disk is full");

@@ -6,7 +6,12 @@ import { slice } from "./picture.js";
 
 /** Each has the values of the one before among its own. */
 const kSides = [33, 65, 129];
+/** A quick picture is there in some tenths of a second, and one that is not need not be asked for so often. */
+const kAskSoon_ms = 25;
 const kAskAgain_ms = 120;
+const kQuick_ms = 1000;
+/** Drawing parts of what comes whole in moments would hold it up. */
+const kMoments_ms = 300;
 const kStillHere_ms = 2500;
 
 /** Keys of the model as a recipe has them. */
@@ -97,16 +102,18 @@ export async function* finer(wanted, first_side, signal, unit_of, coming) {
     const recipe = recipe_of(wanted, side);
     const begin = async () => (await change("/api/look", { recipe })).id;
     let id = await begin();
+    const begun_at = performance.now();
     for (let is_whole = false; !is_whole && !signal.aborted;) {
       try {
         const picture = await slice(id, { z: wanted.z, x, y, nx: side, ny: side, ...(wanted.where ? { where: wanted.where } : {}) }, signal, unit_of);
         is_whole = picture.head.missing === 0;
+        const is_slow = performance.now() - begun_at > kMoments_ms;
         // Half of a finer picture is worse than all of the coarser one.
-        if (is_whole || side === kSides[0]) {
+        if (is_whole || (is_slow && side === kSides[0])) {
           given = { begin, told: { id, side, is_whole, picture, block: recipe.blocks[0] } };
           asked_at = performance.now();
           yield given.told;
-        } else if (given) {
+        } else if (is_slow) {
           coming(side, share_of(picture));
         }
         if (is_whole && side === kSides[kSides.length - 1]) {
@@ -121,7 +128,7 @@ export async function* finer(wanted, first_side, signal, unit_of, coming) {
         const other = await asked_for(given.told.id, given.begin, signal);
         if (other !== given.told.id) yield given.told = { ...given.told, id: other };
       }
-      if (!is_whole) await rest(kAskAgain_ms);
+      if (!is_whole) await rest(performance.now() - begun_at < kQuick_ms ? kAskSoon_ms : kAskAgain_ms);
     }
   }
 }
