@@ -82,6 +82,7 @@ def slices(page, study, z):
 
 
 LOOK_AGAIN_S = 1.5  # study.js
+LONGEST_SNAPSHOT_S = 2.0
 
 
 def look(page, study, until):
@@ -136,15 +137,24 @@ def solved(page):
     return 0.0
 
 
+def solved_now(page):
+    """(time [s], points that were solved until then): the number is of the server's last snapshot, half a second old at
+    most while tabs are open, and so is waited for until it is another."""
+    until, before = time.monotonic() + LONGEST_SNAPSHOT_S, solved(page)
+    while (points := solved(page)) == before and time.monotonic() < until:
+        time.sleep(0.005)
+    return time.monotonic(), points
+
+
 def alternated(page, count, seconds, pairs, process, looking=0, study=0):
     """(points stored a second, processor time of the server [s/s] by thread) of each turn, with tabs (True) and without, in pairs."""
     found = {True: [], False: []}
     for turn in range(2 * pairs):
         is_open = turn % 4 in (0, 3)  # open, closed, closed, open: what drifts meets both alike
-        began, points, spent = time.monotonic(), solved(page), processor_s(process)
+        (began, points), spent = solved_now(page), processor_s(process)
         watch(page, count if is_open else 0, seconds, looking if is_open else 0, study)
-        took, stored = time.monotonic() - began, solved(page) - points
-        after = processor_s(process)
+        (ended, stored), after = solved_now(page), processor_s(process)
+        took, stored = ended - began, stored - points
         found[is_open].append((stored / took, {thread: (after[thread] - spent.get(thread, 0.0)) / took for thread in after}))
     return found
 
