@@ -23,11 +23,15 @@ export function with_unit(value, unit) {
   return unit && unit !== "1" ? `${shown(value)} ${unit}` : shown(value);
 }
 
+/** Inputs whose names outputs would have without their units: dt is the step that is asked for, dt_s the one that was taken. */
+const kTaken = ["dt"];
+
 /** What an axis or a column is called: its name and unit. @param {string} name @param {string} unit */
 export function heading(name, unit) {
   if (!unit || unit === "1") return name;
   const suffix = `_${unit.replace("/", "_").replaceAll(" ", "")}`;
-  return `${name.endsWith(suffix) ? name.slice(0, -suffix.length) : name} [${unit}]`;
+  const short = name.endsWith(suffix) ? name.slice(0, -suffix.length) : name;
+  return `${kTaken.includes(short) ? name : short} [${unit}]`;
 }
 
 /** A time that is left. @param {number | null} seconds */

@@ -64,6 +64,16 @@ test("the histogram that comes after a map is one of the map's output", async ()
   await page.close();
 });
 
+test("pickers tell all that can be picked apart", async () => {
+  for (const kind of ["map", "gathered"]) {
+    const page = await study(`#/study/1?pic=${kind}`);
+    for (const names of await page.$$eval(".controls select", (all) => all.map((one) => [...one.options].map((option) => option.text)))) {
+      assert.deepEqual(names.filter((name, i) => names.indexOf(name) !== i), []);
+    }
+    await page.close();
+  }
+});
+
 test("maps are zoomed by dragging and by keys, and lines, gathered points and histograms are drawn", async () => {
   const page = await study();
   const box = await (await page.$(kMap)).boundingBox();
