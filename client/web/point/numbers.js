@@ -14,12 +14,15 @@ function text_of(value) {
   return String(value);
 }
 
+/** Browsers break lines behind hyphens, also in numbers with an exponent and in instants. @param {string} text */
+const in_one_piece = (text) => text.split(/(\S*\d(?:e-|T)\d\S*)/).map((part, i) => (i % 2 === 1 ? h("span", { class: "whole" }, part) : part));
+
 /** @param {string} caption @param {[string, string, string, string][]} lines */
 function table(caption, lines) {
   return h("div", { class: "scroll", tabIndex: 0, role: "region", "aria-label": caption }, h("table", { class: "values" },
     h("caption", {}, caption), h("thead", {}, h("tr", {}, ...["name", "value", "unit", "meaning"].map((head) => h("th", { scope: "col" }, head)))),
     h("tbody", {}, ...lines.map(([name, value, unit, meaning]) => h("tr", {}, h("th", { scope: "row" }, name),
-      h("td", { class: "value" }, value), h("td", {}, unit), h("td", { class: "weak meaning" }, meaning))))));
+      h("td", { class: "value" }, ...in_one_piece(value)), h("td", {}, unit), h("td", { class: "weak meaning" }, meaning))))));
 }
 
 /** @param {any} row @param {any[]} columns */

@@ -96,6 +96,26 @@ test("a point shows its numbers and where they come from, and its plots are read
   await page.close();
 });
 
+test("in a window of 400 pixels the numbers of a point are in one piece each, and so are the words beside them", async () => {
+  const page = await point({ width: 400, motion: "reduce" });
+  const broken = await page.$$eval("table.values", (tables) => tables.flatMap((table) => {
+    const found = [];
+    for (const texts = document.createTreeWalker(table, NodeFilter.SHOW_TEXT); texts.nextNode();) {
+      for (const word of texts.currentNode.data.matchAll(/\S+/g)) {
+        const range = document.createRange();
+        range.setStart(texts.currentNode, word.index);
+        range.setEnd(texts.currentNode, word.index + word[0].length);
+        // Words of two may be broken at their hyphen.
+        if (!/[a-z]-[a-z]/.test(word[0]) && new Set([...range.getClientRects()].map((one) => one.top)).size > 1) found.push(word[0]);
+      }
+    }
+    return found;
+  }));
+  assert.deepEqual(broken, []);
+  assert.ok(await page.$$eval(".scroll:has(table.values)", (all) => all.every((one) => one.scrollWidth <= one.clientWidth)));
+  await page.close();
+});
+
 test("loops of more instants than a call has arguments are drawn", async () => {
   const page = await point({ motion: "reduce" });
   assert.equal(await page.evaluate(async () => {
