@@ -283,3 +283,15 @@ test("ticks, numbers and values on flags are what people expect", async () => {
   assert.ok(Math.abs(told.last - 10) < 1e-12);
   await page.close();
 });
+
+test("a form's pickers show all of what is chosen where there is room", async () => {
+  const page = await browser.open("#/new");
+  await page.waitForSelector("form select");
+  const cut = await page.$$eval("form select", (pickers) => pickers.filter((picker) => {
+    const shown = picker.clientWidth;
+    picker.style.maxWidth = "none";
+    return picker.clientWidth > shown;
+  }).map((picker) => picker.selectedOptions[0].text));
+  assert.deepEqual(cut, []);
+  await page.close();
+});
