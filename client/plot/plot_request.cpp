@@ -1,6 +1,8 @@
 #include "client/plot/plot_request.h"
 
+#include <algorithm>
 #include <utility>
+#include <vector>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -45,6 +47,31 @@ void check(const PlotRequest& request) {
   (void)range_given(request.range);
 }
 
+namespace {
+
+/// Over which of the two axes that are left open lines say more than a map: the other one has few
+/// values, and cells as tall as their distance would reach to values that it cannot have.
+const StudyAxis* axis_of_few_lines(const PlotRequest& request,
+                                   const std::vector<const StudyAxis*>& axes) {
+  std::vector<const StudyAxis*> open;
+  for (const StudyAxis* axis : axes) {
+    const bool is_held = std::any_of(
+        request.at.begin(), request.at.end(),
+        [axis](const std::string& at) { return at.substr(0, at.find('=')) == axis->key; });
+    if (!is_held) {
+      open.push_back(axis);
+    }
+  }
+  constexpr std::size_t kFew = 3;
+  if (open.size() != 2 || !open[0]->is_listed || !open[1]->is_listed ||
+      std::min(open[0]->values.size(), open[1]->values.size()) > kFew) {
+    return nullptr;
+  }
+  return open[0]->values.size() < open[1]->values.size() ? open[1] : open[0];
+}
+
+}  // namespace
+
 PlotRequest completed(PlotRequest request, const StudyShape& shape) {
   const bool is_told = !request.map.empty() || !request.lines.empty() || !request.scatter.empty() ||
                        !request.histogram.empty();
@@ -54,6 +81,10 @@ PlotRequest completed(PlotRequest request, const StudyShape& shape) {
   const auto axes = by_preference(shape);
   if (!request.colour.empty() && axes.size() >= 2) {
     request.scatter = fmt::format("{},{}", axes[0]->key, axes[1]->key);
+  } else if (const StudyAxis* over = axis_of_few_lines(request, axes);
+             over != nullptr && shape.is_grid && request.y.empty() && request.by.empty()) {
+    request.lines = kUsualOutput;
+    request.x = request.x.empty() ? over->key : request.x;
   } else if (request.by.empty() &&
              (!request.y.empty() || (shape.is_grid && axes.size() >= 2 + request.at.size()))) {
     request.map = kUsualOutput;

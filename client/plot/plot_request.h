@@ -36,7 +36,7 @@ struct PlotRequest {
 void check(const PlotRequest& request);
 
 /// The same with what suits the study where nothing is asked for: a map of the largest normal force
-/// over two axes, lines over one, points where they lie scattered.
+/// over two axes, lines over one or where another has few values, points where they lie scattered.
 PlotRequest completed(PlotRequest request, const StudyShape& shape);
 
 /// Draws it from the rows of `source`. `tell` gets sentences about what was chosen. Throws

@@ -78,8 +78,9 @@ void Drawing::tell_filtered(Cells& cells, const ChosenAxis& x, const ChosenAxis&
 }
 
 Figure Drawing::map() {
-  const std::string remedy =
-      "has fewer than two axes: take --lines, --scatter or --histogram, or name --x and --y";
+  const std::string remedy = fmt::format(
+      "has fewer than two axes{}: take --lines, --scatter or --histogram, or name --x and --y",
+      request_.at.empty() ? "" : " that --at leaves open");
   // The one that is named is not chosen for the other.
   const std::vector<ChosenAxis> named_y =
       request_.y.empty() ? std::vector<ChosenAxis>()

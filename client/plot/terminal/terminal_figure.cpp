@@ -66,7 +66,9 @@ class PanelText {
   std::string drawn() {
     const bool lists_names = panel_.bars && !panel_.bars->names.empty();
     const std::size_t lines = canvas_.lines() - 4;  // labels above and below, the axis, its numbers
-    const Ticks y_ticks = ticks_of(scaled(panel_.y), std::max(2, static_cast<int>(lines / 4)));
+    constexpr int kFewestTicks = 3;                 // of two hardly more than 0 is left
+    const Ticks y_ticks =
+        ticks_of(scaled(panel_.y), std::max(kFewestTicks, static_cast<int>(lines / 4)));
     std::size_t widest = 0;
     for (const Tick& tick : y_ticks.ticks) {
       widest = std::max(widest, tick.label.size());
@@ -81,7 +83,15 @@ class PanelText {
     draw_left(lists_names ? Ticks() : y_ticks);
     for (std::size_t i = 0; lists_names && i < panel_.bars->names.size(); ++i) {
       auto name = shown(protocol::visible(panel_.bars->names[i]));
-      name = name.size() > widest ? name.substr(0, widest) : name;
+      const auto letters = characters_of(name);
+      if (letters.size() > widest) {
+        const std::string more = look_.is_plain ? ".." : "\u2026";
+        name.clear();
+        for (std::size_t letter = 0; letter + characters_of(more).size() < widest; ++letter) {
+          name += letters[letter];
+        }
+        name += more;
+      }
       canvas_.write_before(frame_.left - 1, frame_.top + i, name);
     }
     draw_below();
@@ -143,41 +153,80 @@ class PanelText {
 };
 
 /// A sign in its colour, and what it means.
-std::string signed_line(const std::string& sign, const std::optional<Colour>& ink,
-                        const std::string& meaning, const TerminalLook& look) {
-  TextCanvas line(look.columns, 1);
-  std::size_t column = 0;
-  for (const auto& character : characters_of(sign)) {
-    line.put(column++, 0, character, ink);
-  }
-  line.write(column + 1, 0, look.is_plain ? plain(meaning) : meaning);
-  return line.text(look.is_plain ? Shading::kNone : look.shading);
-}
+struct SignedName {
+  std::string sign;
+  std::optional<Colour> ink;
+  std::string name;
 
-std::string legend_line(const LegendEntry& entry, const TerminalLook& look) {
+  std::size_t columns() const {
+    return characters_of(sign).size() + 1 + characters_of(name).size();
+  }
+};
+
+SignedName signed_name(const LegendEntry& entry, const TerminalLook& look) {
   using Sign = LegendEntry::Sign;
   const std::string block = "\u2588\u2588";
+  const std::string name = look.is_plain ? plain(entry.name) : entry.name;
   switch (entry.sign) {
     case Sign::kCurve:
-      return signed_line(look.is_plain ? std::string(2, stroke_sign(entry.number)) : "\u2501\u2501",
-                         stroke_on_terminal(entry.number), entry.name, look);
+      return {look.is_plain ? std::string(2, stroke_sign(entry.number)) : "\u2501\u2501",
+              stroke_on_terminal(entry.number), name};
     case Sign::kKind:
-      return signed_line(look.is_plain ? letter_of(entry.number) + ' ' : block,
-                         plain_fill(entry.number), entry.name, look);
+      return {look.is_plain ? letter_of(entry.number) + ' ' : block, plain_fill(entry.number),
+              name};
     case Sign::kRest:
-      return signed_line(look.is_plain ? ". " : block, kFillOfOthers.colour, entry.name, look);
+      return {look.is_plain ? ". " : block, kFillOfOthers.colour, name};
     case Sign::kNoResult:
-      return signed_line(look.is_plain ? "? " : block, colour_of(0x6e6e6e), entry.name, look);
+      return {look.is_plain ? "? " : block, colour_of(0x6e6e6e), name};
     case Sign::kFiltered:
-      return signed_line(look.is_plain ? "- " : block, kFilteredInk, entry.name, look);
+      return {look.is_plain ? "- " : block, kFilteredInk, name};
     case Sign::kFailed:
-      return signed_line(look.is_plain ? "! " : block, colour_of(0xff0000), entry.name, look);
+      return {look.is_plain ? "! " : block, colour_of(0xff0000), name};
     case Sign::kKnown:
-      return signed_line("P ", stroke_on_terminal(7), entry.name, look);
+      return {"P ", stroke_on_terminal(7), name};
     case Sign::kSpan:
       return {};
   }
   return {};
+}
+
+/// One entry a line, or as many as fit into one.
+std::string legend_lines(const std::vector<LegendEntry>& entries, bool is_packed,
+                         const TerminalLook& look) {
+  constexpr std::size_t kBetween = 3;
+  std::string text;
+  TextCanvas line(look.columns, 1);
+  std::size_t column = 0;
+  const auto end_line = [&] {
+    text += line.text(look.is_plain ? Shading::kNone : look.shading);
+    line = TextCanvas(look.columns, 1);
+    column = 0;
+  };
+  for (const LegendEntry& entry : entries) {
+    if (entry.sign == LegendEntry::Sign::kSpan) {  // spans are not drawn in characters
+      continue;
+    }
+    const SignedName next = signed_name(entry, look);
+    if (column > 0 && (!is_packed || column + next.columns() > look.columns)) {
+      end_line();
+    }
+    for (const auto& character : characters_of(next.sign)) {
+      line.put(column++, 0, character, next.ink);
+    }
+    line.write(column + 1, 0, next.name);
+    column += 1 + characters_of(next.name).size() + kBetween;
+  }
+  if (column > 0) {
+    end_line();
+  }
+  return text;
+}
+
+/// What the panel's lines mean, below it where there are several panels.
+std::string legend_of_panel(const Panel& panel, const TerminalLook& look) {
+  Figure alone;
+  alone.panels = {panel};
+  return legend_lines(legend_of(alone), true, look);
 }
 
 /// The shades from the lowest value to the highest.
@@ -246,8 +295,10 @@ std::string text_of(const Figure& figure, const TerminalLook& look) {
   if (has_colour_scale(figure)) {
     after += colour_line(*figure.colours, look);
   }
-  for (const LegendEntry& entry : legend_of(figure)) {
-    after += legend_line(entry, look);
+  // Panels have colours in common, which mean something else in each.
+  const bool is_legend_by_panel = figure.panels.size() > 1;
+  if (!is_legend_by_panel) {
+    after += legend_lines(legend_of(figure), false, look);
   }
   const auto note = [&look](const std::string& text) {
     return broken_at(protocol::visible(look.is_plain ? plain(text) : text), look.columns);
@@ -268,6 +319,7 @@ std::string text_of(const Figure& figure, const TerminalLook& look) {
       lines = panel.bars->names.size() + 4;
     }
     text += PanelText(figure, panel, look, lines).drawn();
+    text += is_legend_by_panel ? legend_of_panel(panel, look) : "";
   }
   return text + after;
 }

@@ -189,9 +189,24 @@ TEST(Axes, ThatThereAreNotAreNamedWithTheNearest) {
   EXPECT_EQ(chosen_axis("--x", "slide_m / 2", grid()).column, "slide_m / 2");
 }
 
+TEST(UsualPicture, HasALineAValueWhereAnAxisHasFew) {
+  const auto few = completed(
+      {},
+      shape_of_study("[[block]]\nH = 1\nmu = { from = 0.2, to = 2, count = 10 }\ne = [0.8, 1]\n"));
+  EXPECT_EQ(few.lines, "fn_peak_N");
+  EXPECT_EQ(few.x, "mu");
+  const auto few_across = completed(
+      {},
+      shape_of_study("[[block]]\nH = { from = 0.2, to = 1, count = 9 }\nmu = [0.4, 0.8]\ne = 1\n"));
+  EXPECT_EQ(few_across.lines, "fn_peak_N");
+  EXPECT_EQ(few_across.x, "H");
+}
+
 TEST(UsualPicture, SuitsTheStudy) {
   EXPECT_EQ(completed({}, grid()).map, "fn_peak_N");
   EXPECT_EQ(completed({.at = {"e=1", "H=1"}}, grid()).lines, "fn_peak_N");
+  EXPECT_EQ(completed({.at = {"e=1"}}, grid()).lines, "fn_peak_N");
+  EXPECT_EQ(completed({.y = "H"}, grid()).map, "fn_peak_N");
   EXPECT_EQ(completed({}, shape_of_study("[[block]]\nH = [0.5, 1]\nmu = 1\ne = 1\n")).lines,
             "fn_peak_N");
   EXPECT_EQ(completed({}, shape_of_study("[[block]]\nH = 0.5\nmu = 1\ne = 1\n")).histogram,

@@ -93,6 +93,34 @@ TEST(Terminal, DrawsTheRangeOfColours) {
   EXPECT_THAT(text, HasSubstr("0 .:-=+*oO#@ 2.3e+07  duration of contact [us]"));
 }
 
+TEST(Terminal, SaysBelowEachPanelWhatItsLinesMean) {
+  const auto text = text_of(test::panels(), kPlain);
+  EXPECT_LT(text.find(" F_n "), text.find("energy [J]"));
+  EXPECT_LT(text.find(" F_t"), text.find('\n', text.find(" F_n "))) << "they share a line";
+  EXPECT_LT(text.find(" closure\n"), text.find("y [m]"));
+  EXPECT_LT(text.find("x [m]"), text.find(" finger\n"));
+}
+
+TEST(Terminal, HasNumbersBesideZeroAtTheAxesOfFlatPanels) {
+  const auto text = text_of(test::panels(), kPlain);
+  const auto force =
+      text.substr(text.find("force [N]"), text.find(" F_n ") - text.find("force [N]"));
+  EXPECT_THAT(force, testing::ContainsRegex("[1-5]000\\+"));
+}
+
+TEST(Terminal, ShowsWhereALongNameIsCut) {
+  Figure figure;
+  Panel panel;
+  panel.bars = Bars{.heights = {2.0, 1.0}, .names = {"SC SR sR sC sR SR sR sC SC SR sR", "sC sR"}};
+  panel.x.range = {0.0, 2.0};
+  figure.panels = {panel};
+  EXPECT_THAT(text_of(figure, {60, 24, true, Shading::kNone}),
+              HasSubstr("SC SR sR sC sR SR sR sC SC S..|"));
+  EXPECT_THAT(text_of(figure, {60, 24, false, Shading::kTrue}),
+              HasSubstr("SC SR sR sC sR SR sR sC SC SR\u2026"));
+  EXPECT_THAT(text_of(figure, {80, 24, true, Shading::kNone}), HasSubstr("SC SR sR|"));
+}
+
 TEST(Terminal, BreaksLongSentencesAndLeavesALineForWhatFollows) {
   Figure figure = test::striped_kinds(40);
   figure.notes.emplace_back(
