@@ -231,6 +231,15 @@ Study parse_study(std::string_view text, const std::string& file, const ReachChe
 }
 
 Study read_study_file(const std::filesystem::path& path, const ReachCheck& check_reach) {
+  std::error_code unknown;
+  if (!std::filesystem::exists(path, unknown) && !unknown) {
+    auto with_ending = path;
+    with_ending += ".toml";
+    throw InputError(fmt::format("there is no study file {}{}", path.string(),
+                                 std::filesystem::exists(with_ending, unknown)
+                                     ? fmt::format(" (did you mean `{}`?)", with_ending.string())
+                                     : ""));
+  }
   std::ifstream stream(path, std::ios::binary);
   if (!stream || std::filesystem::is_directory(path)) {
     throw InputError("cannot read the study file " + path.string() +

@@ -115,8 +115,21 @@ TEST(StudyFile, ThatIsNotThereIsAnErrorWithItsName) {
     read_study_file("/nowhere/study.toml", pretended_reach());
     FAIL();
   } catch (const solver::InputError& error) {
-    EXPECT_NE(std::string(error.what()).find("/nowhere/study.toml"), std::string::npos);
+    EXPECT_STREQ(error.what(), "there is no study file /nowhere/study.toml");
   }
+}
+
+TEST(StudyFile, WhoseEndingIsLeftOutIsSuggested) {
+  const auto name = std::filesystem::path(testing::TempDir()) / "left-out";
+  const auto file = name.string() + ".toml";
+  { const std::ofstream empty(file); }
+  try {
+    read_study_file(name, pretended_reach());
+    FAIL();
+  } catch (const solver::InputError& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("did you mean `" + file + "`?"));
+  }
+  std::filesystem::remove(file);
 }
 
 TEST(StudyFile, ThatIsEmptyHasNoBlock) {
