@@ -3,7 +3,7 @@
 import { h } from "/parts/dom.js";
 import { ink } from "/parts/colours.js";
 import { heading } from "/parts/format.js";
-import { scale, ticks, tick_text } from "/parts/scale.js";
+import { ends_of, scale, ticks, tick_text } from "/parts/scale.js";
 
 // A script of its own, which modules come after (index.html): it is minified as no module.
 export const uPlot = /** @type {any} */ (globalThis).uPlot;
@@ -15,16 +15,49 @@ const kFills = ["bar", "line1"];
 const kInks = ["line0", "line1", "line2", "line3", "line4", "line5", "line6", "line7"];
 
 const kHeight = 240;
+/** Of the height of a plot: lines that nowhere lie farther apart are one to the eye. */
+const kSame = 0.004;
+/** Pixels that each of the lines that are one to the eye is seen, by turns. */
+const kTurn = 8;
 
 /** @typedef {import("./lines.js").Lines} Lines */
 
-/** A line as it is drawn. @param {number} look */
-function sample(look) {
+/**
+ * Which lines lie on each other, and so are drawn by turns.
+ * @typedef {{nth: number, of: number, on: number}} Turn so many of them are below it, of how many, and which is the first of these; of a line alone 0, 1 and itself
+ * @param {Lines} lines @returns {Turn[]}
+ */
+export function turns_of({ series, y, as_bars }) {
+  const [least, most] = y.ends ?? ends_of(series.flatMap((one) => ends_of(one.values)));
+  const { place } = scale(least ?? 0, most ?? 0, y.is_log ?? false);
+  const lies_on = (/** @type {ArrayLike<number | null>} */ a, /** @type {ArrayLike<number | null>} */ b) => {
+    let are_there = false;
+    for (let i = 0; i < a.length; ++i) {
+      const [one, other] = [a[i], b[i]];
+      if (one === null || other === null ? one !== other : Math.abs(place(one) - place(other)) > kSame) return false;
+      are_there ||= one !== null;
+    }
+    return are_there;
+  };
+  const turns = /** @type {Turn[]} */ ([]);
+  series.forEach(({ values }, i) => {
+    const below = as_bars ? -1 : turns.findIndex((one, k) => one.on === k && lies_on(values, series[k].values));
+    turns.push({ nth: below < 0 ? 0 : turns.filter((one) => one.on === below).length, of: 1, on: below < 0 ? i : below });
+  });
+  for (const turn of turns) turn.of = turns.filter((one) => one.on === turn.on).length;
+  return turns;
+}
+
+/** The first of several that lie on each other is whole, the next leaves the last turns of each round to those below. @param {number} look @param {Turn} turn */
+const dash_of = (look, { nth, of }) => (of === 1 ? kDashes[look] : nth === 0 ? [] : [kTurn * (of - nth), kTurn * nth]);
+
+/** A line as it is drawn. @param {number} look @param {Turn} turn */
+function sample(look, turn) {
   const canvas = h("canvas", { width: 34, height: 10, class: "sample", "aria-hidden": "true" });
   const context = canvas.getContext("2d");
   context.strokeStyle = ink(kInks[look]);
   context.lineWidth = 2.4;
-  context.setLineDash(kDashes[look]);
+  context.setLineDash(dash_of(look, turn));
   context.moveTo(0, 5);
   context.lineTo(34, 5);
   context.stroke();
@@ -32,12 +65,17 @@ function sample(look) {
 }
 
 /** Which line is which, where there are several. @param {Lines} of */
-export const legend_of = (of) => h("ul", { class: "legend" }, ...(of.series.length > 1 ? of.series : []).map((one, i) => h("li", {},
-  of.as_bars ? h("span", { class: `shade ink-${kFills[i]}` }) : sample((one.colour ?? i) % 8), one.label)));
+export function legend_of(of) {
+  const turns = turns_of(of);
+  const several = of.series.length > 1 ? of.series : [];
+  return h("ul", { class: "legend" }, ...several.map((one, i) => h("li", {},
+    of.as_bars ? h("span", { class: `shade ink-${kFills[i]}` }) : sample((one.colour ?? i) % 8, turns[i]),
+    turns[i].nth > 0 ? `${one.label} (lies on ${of.series[turns[i].on].label})` : one.label)));
+}
 
 /** What of lines is not their numbers, nor follows from these later. @param {Lines} of */
 export const look_of = (of) => JSON.stringify([of.title, of.x.name, of.x.unit, of.x.is_log, of.y, of.as_bars, of.spans, of.height, of.x.values.length < kFewValues,
-  of.series.map((one) => [one.label, one.colour])]);
+  of.series.map((one) => [one.label, one.colour]), turns_of(of)]);
 
 /** What is shown unless somebody zooms: uPlot would round logarithmic ends to powers of ten. @param {Lines["x"]} x @param {number} least @param {number} most */
 function shown_ends({ values, ends }, least, most) {
@@ -62,10 +100,11 @@ function axes_of(of, height) {
 
 /** Lines or bars. @param {Lines} of */
 function series_of(of) {
+  const turns = turns_of(of);
   return of.series.map((one, i) => {
     const look = (one.colour ?? i) % 8;
-    const line = { label: one.label, stroke: ink(kInks[look]), width: 1.6, dash: kDashes[look], spanGaps: false,
-      points: { show: of.x.values.length < kFewValues && !of.as_bars, size: 4 } };
+    const line = { label: one.label, stroke: ink(kInks[look]), width: 1.6, dash: dash_of(look, turns[i]), spanGaps: false,
+      points: { show: of.x.values.length < kFewValues && !of.as_bars && turns[i].nth === 0, size: 4 } };
     return of.as_bars ? { ...line, paths: uPlot.paths.bars({ size: [1, Infinity] }), fill: ink(kFills[i]), dash: [], stroke: ink("weak"), width: 0.5 } : line;
   });
 }
