@@ -9,63 +9,95 @@ const kLasts = [["3", "3 s"], ["8", "8 s"], ["20", "20 s"], ["60", "60 s"]];
 const kFallLasts = 2;
 const kScrubSteps = 1000;
 
+/** @typedef {{row: number, is_falling: boolean}} Instant a row of the fall or of the contact */
+
+/** @param {number} by */
+const slower = (by) => (by < 1.05 ? "as fast as it is" : `${by < 10 ? shown(by, 2) : count(by)} times slower than it is`);
+
+/** Which instant is watched when: places in it are seconds since release as they are watched, the fall first. */
+class Film {
+  /** Seconds that the contact takes to watch. */
+  contact_lasts = 8;
+
+  /** @param {Float64Array} times of the contact @param {Float64Array} fall_times before it, negative; none: it begins at touch */
+  constructor(times, fall_times) {
+    this.times = times;
+    this.fall_times = fall_times;
+    this.contact_s = times[times.length - 1] || 1e-9;
+    this.fall_s = fall_times.length > 1 ? -fall_times[0] : 0;
+    this.fall_lasts = this.fall_s > 0 ? kFallLasts : 0;
+  }
+  get lasts() {
+    return this.fall_lasts + this.contact_lasts;
+  }
+  /** Time since touch [s]. @param {number} place */
+  time_at(place) {
+    return place < this.fall_lasts ? -this.fall_s * (1 - place / this.fall_lasts) : ((place - this.fall_lasts) / this.contact_lasts) * this.contact_s;
+  }
+  /** @param {number} t since touch [s] */
+  place_of(t) {
+    return t < 0 ? this.fall_lasts * (1 + t / this.fall_s) : this.fall_lasts + (t / this.contact_s) * this.contact_lasts;
+  }
+  /** @param {number} place @returns {Instant} */
+  instant_at(place) {
+    const is_falling = place < this.fall_lasts;
+    return { row: row_at(is_falling ? this.fall_times : this.times, this.time_at(place)), is_falling };
+  }
+  /** The time as it is read and as it is spoken, and how fast it goes. @param {number} place */
+  words_at(place) {
+    const t = this.time_at(place);
+    const ms = (t * 1e3).toFixed(0);
+    const us = `${(t * 1e6).toFixed(1)} µs`;
+    return place < this.fall_lasts
+      ? { time: `${ms.replace("-", "\u2212")} ms`, spoken: `${(-t * 1e3).toFixed(0)} ms before touch`, speed: `falls, ${slower(this.fall_lasts / this.fall_s)}` }
+      : { time: us, spoken: `${us} after touch`, speed: slower(this.contact_lasts / this.contact_s) };
+  }
+}
+
 /**
- * @typedef {{row: number, is_falling: boolean}} Instant a row of the fall or of the contact
  * @param {Float64Array} times of the contact @param {Float64Array} fall_times before it, negative; none: it begins at touch
  * @param {(at: Instant) => void} moved
  */
 export function player(times, fall_times, moved) {
-  const end = times[times.length - 1] || 1e-9;
-  const fall = fall_times.length > 1 ? -fall_times[0] : 0;
-  const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
-  /** Seconds since release as they are watched, the fall first. */
-  let watched = 0;
-  let lasts = 8;
+  const film = new Film(times, fall_times);
+  let place = 0;
   let frame = 0;
   let before = 0;
-  const fall_lasts = fall > 0 ? kFallLasts : 0;
   const play = h("button", { type: "button", class: "play", onclick: () => (frame ? pause() : go_on()) }, "Play");
-  const touch = h("button", { type: "button", class: "touch", onclick: () => {
-    pause();
-    set(fall_lasts);
-  } }, "To the touch");
-  const scrub = h("input", { type: "range", min: 0, max: kScrubSteps, step: 1, value: 0, "aria-label": "Time, from release through the contact", oninput: () => {
-    pause();
-    set(((fall_lasts + lasts) * Number(scrub.value)) / kScrubSteps);
-  } });
+  const touch = h("button", { type: "button", class: "touch", onclick: () => jump(film.fall_lasts) }, "To the touch");
+  const scrub = h("input", { type: "range", min: 0, max: kScrubSteps, step: 1, value: 0, "aria-label": "Time, from release through the contact",
+    oninput: () => jump((film.lasts * Number(scrub.value)) / kScrubSteps) });
   const out = h("output", {});
   const speed = h("span", { class: "weak speed" });
-  const element = h("div", { class: "row player" }, play, fall > 0 && touch, h("span", { class: "scrub" }, scrub, out),
-    named("contact lasts", picker(kLasts, String(lasts), (text) => {
-      const time = time_of();
-      lasts = Number(text);
-      show_time(time);
-    })), speed);
-
-  /** Time since touch [s]. */
-  const time_of = () => (watched < fall_lasts ? -fall * (1 - watched / fall_lasts) : ((watched - fall_lasts) / lasts) * end);
-  const show_time = (/** @type {number} */ t) => set(t < 0 ? fall_lasts * (1 + t / fall) : fall_lasts + (t / end) * lasts);
-  const slower = (/** @type {number} */ by) => (by < 1.05 ? "as fast as it is" : `${by < 10 ? shown(by, 2) : count(by)} times slower than it is`);
+  const pace = picker(kLasts, String(film.contact_lasts), (text) => {
+    const t = film.time_at(place);
+    film.contact_lasts = Number(text);
+    set(film.place_of(t));
+  });
+  const element = h("div", { class: "row player" }, play, film.fall_s > 0 && touch, h("span", { class: "scrub" }, scrub, out), named("contact lasts", pace), speed);
 
   function set(/** @type {number} */ to) {
-    watched = Math.min(Math.max(to, 0), fall_lasts + lasts);
-    const t = time_of();
-    const is_falling = watched < fall_lasts;
-    scrub.value = String(Math.round((kScrubSteps * watched) / (fall_lasts + lasts)));
-    out.textContent = is_falling ? `${(t * 1e3).toFixed(0).replace("-", "\u2212")} ms` : `${(t * 1e6).toFixed(1)} µs`;
-    scrub.setAttribute("aria-valuetext", is_falling ? `${(-t * 1e3).toFixed(0)} ms before touch` : `${out.textContent} after touch`);
-    speed.textContent = is_falling ? `falls, ${slower(fall_lasts / fall)}` : slower(lasts / end);
-    moved({ row: row_at(is_falling ? fall_times : times, t), is_falling });
+    place = Math.min(Math.max(to, 0), film.lasts);
+    const words = film.words_at(place);
+    scrub.value = String(Math.round((kScrubSteps * place) / film.lasts));
+    out.textContent = words.time;
+    scrub.setAttribute("aria-valuetext", words.spoken);
+    speed.textContent = words.speed;
+    moved(film.instant_at(place));
+  }
+  function jump(/** @type {number} */ to) {
+    pause();
+    set(to);
   }
   function step(/** @type {number} */ now) {
     const passed = Math.min((now - before) / 1000, 0.1);
     before = now;
-    set(watched + passed);
-    if (watched >= fall_lasts + lasts) pause();
+    set(place + passed);
+    if (place >= film.lasts) pause();
     else if (frame) frame = requestAnimationFrame(step);
   }
   function go_on() {
-    if (watched >= fall_lasts + lasts) watched = 0;
+    if (place >= film.lasts) place = 0;
     before = performance.now();
     play.textContent = "Pause";
     frame = requestAnimationFrame(step);
@@ -81,13 +113,10 @@ export function player(times, fall_times, moved) {
     begin() {
       set(0);
       // Who wants little motion starts it by hand.
-      if (!calm) go_on();
+      if (!matchMedia("(prefers-reduced-motion: reduce)").matches) go_on();
     },
     /** Somebody points at an instant of the contact elsewhere. @param {number} row */
-    show(row) {
-      pause();
-      show_time(times[row]);
-    },
+    show: (row) => jump(film.place_of(times[row])),
     close() {
       pause();
       document.removeEventListener("visibilitychange", hide);
