@@ -11,6 +11,9 @@ const kAskAgain_ms = 3000;
 /** What somebody looks at and nobody keeps: see server/web/page. */
 const is_look = (/** @type {any} */ study) => /^look-[0-9a-f]{16}$/.test(study.name);
 
+/** The condition that points meet which failed. */
+export const kFailed = "error IS NOT NULL";
+
 /** What may be asked of a study in a state. @type {Record<string, string[]>} */
 const kChanges = { running: ["pause", "cancel"], paused: ["resume", "cancel"], cancelled: ["resume"], done: [] };
 
@@ -192,7 +195,7 @@ export function overview(root, place) {
     const read = [...list.known.values()].filter((s) => !is_look(s)).length;
     no_studies.textContent = read === 0 ? "There is no study yet." : list.has_more ? `Of the ${count(read)} studies that were read none is called so.` : "No study is called so.";
     studies.show(lines, (s) => [h("a", { href: `#/study/${s.id}` }, s.name), s.state, progress_of(s), count(s.points),
-      s.failed > 0 ? h("span", { class: "bad" }, count(s.failed)) : "0", s.points_per_s > 0 ? count(s.points_per_s) : "",
+      s.failed > 0 ? h("a", { class: "bad", href: `#/study/${s.id}?where=${encodeURIComponent(kFailed)}`, title: "which, and why" }, count(s.failed)) : "0", s.points_per_s > 0 ? count(s.points_per_s) : "",
       s.state === "running" ? time_left(s.left_s) : "", h("span", { class: "weak" }, s.state === "running" ? s.waits_for : ""),
       ...(place.may_change ? [study_buttons(s, say)] : [])]);
     more.hidden = !list.has_more;

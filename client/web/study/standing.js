@@ -3,17 +3,48 @@
 import { h } from "/parts/dom.js";
 import { count } from "/parts/format.js";
 import { json } from "/server.js";
-import { progress_of, study_buttons } from "/overview.js";
+import { kFailed, progress_of, study_buttons } from "/overview.js";
 
 /** Of a study that events do not tell of. */
 const kAskAgain_ms = 3000;
+
+/** Why points failed, by the first of them, and the way to all of them. @param {import("./study.js").StudyView} view */
+function failure_line(view) {
+  const { id } = view.study;
+  const why = h("span", { class: "bad" });
+  const all = h("a", { href: `#/study/${id}?where=${encodeURIComponent(kFailed)}`, onclick: (/** @type {MouseEvent} */ event) => {
+    if (event.ctrlKey || event.metaKey || event.shiftKey) return;  // a view of its own
+    event.preventDefault();
+    view.marking.change({ where: kFailed, mark: "" });
+    view.table.element.scrollIntoView();
+  } });
+  const element = h("p", { class: "failure", hidden: true }, why, " ", all);
+  /** What the study was like when it was asked why. */
+  let asked = "";
+  let failed = 0;
+  return { element,
+    /** @param {any} told the study, as events tell of it */
+    async show(told) {
+      element.hidden = told.failed === 0;
+      all.textContent = told.failed === 1 ? "Show it in the table" : `Show all ${count(told.failed)} that failed`;
+      const stands = `${told.state} ${told.failed < failed}`;  // those that are tried again may fail in another way
+      failed = told.failed;
+      if (failed === 0) asked = "";
+      if (failed === 0 || stands === asked) return;
+      asked = stands;
+      const first = await json(`/api/studies/${id}`).then((study) => study.first_failure, () => null);
+      if (first && stands === asked) why.textContent = `Point ${count(first.point)} failed: ${first.error}${/[.?!]$/.test(first.error) ? "" : "."}`;
+      else if (stands === asked) asked = ""; // with the next that is told
+    } };
+}
 
 /** @param {import("./study.js").StudyView} view @param {(settled: string) => void} moved other points are settled than before */
 export function standing_row(view, moved) {
   const how_far = h("div", { class: "row standing" });
   // They stay what they are while the study goes on, under the finger that presses one and with the focus.
   const buttons = h("div", {});
-  const element = h("div", { class: "row standing" }, how_far, buttons);
+  const failure = failure_line(view);
+  const element = h("div", {}, h("div", { class: "row standing" }, how_far, buttons), failure.element);
   let stood = "";
   let offered = "";
   let settled = "";
@@ -42,6 +73,7 @@ export function standing_row(view, moved) {
     how_far.replaceChildren(told.state, progress_of(told), `${count(told.points)} ${told.points === 1 ? "point" : "points"}`,
       told.failed > 0 ? h("span", { class: "bad" }, `${count(told.failed)} failed`) : "",
       told.state === "running" && told.waits_for ? h("span", { class: "weak" }, `waits for ${told.waits_for}`) : "");
+    failure.show(told);
     offer(told);
     const now = `${told.solved + told.failed}`;
     if (now === settled) return;

@@ -236,6 +236,7 @@ export class StudyView {
 
   row_columns() {
     const keys = new Set(["point", "H", "mu", "e"]);
+    if (/\b(error|status)\b/.test(`${this.is("where")} ${this.is("mark")}`)) keys.add("error");
     for (const key of [this.is("x"), this.is("y"), this.is("z")]) {
       if (this.columns.some((c) => c.name === key)) keys.add(key);
     }

@@ -125,6 +125,16 @@ ordered_json model_json(const protocol::Recipe& recipe) {
   return keys;
 }
 
+/// The first point that failed, and why; null when none has.
+ordered_json first_failure(sqlite3* database, std::uint64_t study) {
+  Statement row(database,
+                "SELECT point, error FROM packed_results INDEXED BY failed_points "
+                "WHERE study_id = ?1 AND error IS NOT NULL ORDER BY point LIMIT 1");
+  row.bind(1, study);
+  return row.step() ? ordered_json{{"point", row.integer(0)}, {"error", row.text(1)}}
+                    : ordered_json();
+}
+
 HttpAnswer study_answer(const AnswerDesk& desk, std::uint64_t id) {
   const LookedAtStudy study = desk.studies.study(desk.database, id);
   const protocol::Recipe& recipe = study.table->recipe();
@@ -140,6 +150,7 @@ HttpAnswer study_answer(const AnswerDesk& desk, std::uint64_t id) {
                       {"numbers", study.table->size()},
                       {"models", study.table->models()},
                       {"errors", recipe.errors()},
+                      {"first_failure", first_failure(desk.database, study.id)},
                       {"model", model_json(recipe)},
                       {"blocks", std::move(blocks)},
                       {"blocks_left_out", std::max(recipe.blocks_size() - kMostBlocks, 0)},

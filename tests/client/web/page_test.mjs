@@ -11,6 +11,7 @@ await import("./overview_tests.mjs");
 await import("./study_tests.mjs");
 await import("./study/condition_tests.mjs");
 await import("./study/choice_tests.mjs");
+await import("./study/failure_tests.mjs");
 await import("./study/running_tests.mjs");
 await import("./study/solving_tests.mjs");
 await import("./takeaway_tests.mjs");

@@ -350,24 +350,6 @@ TEST_F(PageAnswersTest, TheModelOfAStudyIsSaidByPresetIntegratorAndKeys) {
   EXPECT_EQ(model["k"], 2.5e7);
 }
 
-TEST_F(PageAnswersTest, AStudyIsJudgedBeforeItIsSubmitted) {
-  const auto check = [&](const std::string& mu, const std::string& where) {
-    return page_.post("/api/check",
-                      R"({"recipe":{"blocks":[{"axes":[{"key":"H","values":[1]},{"key":"mu",)" +
-                          mu + R"(},{"key":"e","values":[1]}],"where":")" + where + "\"}]}}");
-  };
-  const json all = json::parse(body_of(check(R"("from":0,"to":1,"count":11)", "")));
-  EXPECT_EQ(all["points"], 11);
-  EXPECT_EQ(all["models"], 1);
-  const json some = json::parse(body_of(check(R"("from":0,"to":1,"count":11)", "mu > 0.45")));
-  EXPECT_EQ(some["points"], 6);
-  EXPECT_EQ(some["numbers"], 11);
-  const std::string wrong = check(R"("values":[-1])", "");
-  EXPECT_EQ(status_of_answer(wrong), 400);
-  EXPECT_THAT(wrong, HasSubstr("mu"));
-  EXPECT_EQ(page_.json("/api/studies")["studies"].size(), 0U);
-}
-
 TEST_F(PageAnswersTest, ManyWhoGoBeforeTheirAnswerHarmNobody) {
   submit_grid();
   solve(24);

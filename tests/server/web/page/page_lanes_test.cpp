@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "proto/wire/chunk_rows.h"
+#include "proto/wire/chunk_writer.h"
 #include "server/web/answers/answer_pool.h"
 #include "server/web/page/page.h"
 #include "tests/server/web/page/page_study.h"
