@@ -36,8 +36,6 @@ ReachChecker::ReachChecker(LargestDrop largest_drop_m)
     : largest_drop_m_(std::move(largest_drop_m)) {}
 
 void ReachChecker::operator()(const protocol::PointTable& block) {
-  // No finger falls through less than this part of its length, so lower drops need no look.
-  constexpr double kSurelyReached = 0.9;
   if (block.models() > kMostFalls) {
     return;
   }
@@ -47,7 +45,7 @@ void ReachChecker::operator()(const protocol::PointTable& block) {
     at = segment.first_point + segment.count;
     const auto model = block.model(segment.model);
     const double length_m = std::accumulate(model.lengths_m.begin(), model.lengths_m.end(), 0.0);
-    if (H_m <= kSurelyReached * length_m) {
+    if (H_m <= protocol::kSurelyReached * length_m) {
       continue;
     }
     Fall* fall = fall_of(model);

@@ -1,12 +1,13 @@
 // @ts-check
 // A study that is started here: values as on the command line, how much it is, and what the server says of it.
 import { copied, h, named, picker, tick } from "/parts/dom.js";
-import { count, quoted, time_left } from "/parts/format.js";
+import { count, quoted, shown, time_left, with_unit } from "/parts/format.js";
 import { change } from "/server.js";
 
 /** The most that a double counts without gaps. */
 const kMostCounted = 2 ** 53;
 const kBytesPerPoint = 450; // measured: a row with its packed arrays
+const kErrorsCost = 1.25; // with estimated errors: worker/solver/README.md
 const kJudgeAfter_ms = 250;
 
 const kDistributions = /** @type {Record<string, string>} */ ({ uniform: "DISTRIBUTION_UNIFORM", "log-uniform": "DISTRIBUTION_LOG_UNIFORM", normal: "DISTRIBUTION_NORMAL" });
@@ -128,13 +129,87 @@ function fields_of(changed) {
     values: () => /** @type {any} */ ({ ...Object.fromEntries(Object.entries(fields).map(([name, field]) => [name, field.value])), errors: errors.querySelector("input").checked }) };
 }
 
-/** How much a study is. @param {number} points @param {boolean} is_counted @param {any} now the overview, or null */
-function size_of(points, is_counted, now) {
-  const seconds = now && now.threads > 0 && now.thread_s_per_point > 0 ? (points * now.thread_s_per_point) / now.threads : null;
+/**
+ * What is known of a study before it starts: what the server answers to `/api/check`, or only how many points it has at most.
+ * @typedef {{points: number, is_counted: boolean, models?: number, relative_cost?: number | null, surely_reached_m?: number | null}} Judged
+ */
+
+/** In which the time of the last points tells little of these. @param {Judged} judged */
+function differences(judged) {
+  const { relative_cost: cost, models = 1 } = judged;
+  const said = [];
+  if (cost === null) said.push("How long points take with this integrator or this dt is not known before; it may be far longer.");
+  else if (cost && (cost < 0.5 || cost > 2)) said.push(`By its mesh and tolerance a point of this study takes roughly ${to_one_digit(cost)} times as long as one of the preset paper.`);
+  if (models > 1) said.push(`Falls come on top, up to one for each of the ${count(models)} models.`);
+  return said;
+}
+
+/** Nobody knows more of it. @param {number} value */
+const to_one_digit = (value) => (value < 1 ? shown(value, 1) : count(Number(value.toPrecision(1))));
+
+/** How much a study is. @param {Form} form @param {Judged} judged @param {any} now the overview, or null */
+function size_of(form, judged, now) {
+  const { points, is_counted, surely_reached_m: reached_m } = judged;
   const bytes = points * kBytesPerPoint;
-  return `${count(points)} ${points === 1 ? "point" : "points"}${is_counted ? "" : " at most"}`
-    + (seconds !== null ? `, about ${time_left(seconds)} with the ${now.threads} threads that are here, if a point takes as long as the last ones did` : "")
-    + (bytes > 1e6 ? `, about ${bytes > 1e9 ? `${(bytes / 1e9).toFixed(1)} GB` : `${Math.round(bytes / 1e6)} MB`} in the database` : "") + ".";
+  const said = [`${count(points)} ${points === 1 ? "point" : "points"}${is_counted ? "" : " at most"}`];
+  const has_pace = now?.threads > 0 && now.thread_s_per_point > 0;
+  if (has_pace) {
+    const seconds = points * now.thread_s_per_point * (form.errors ? kErrorsCost : 1) / now.threads;
+    said.push(`about ${time_left(seconds)} with the ${now.threads} threads that are here, if a point takes as long as the last ones did${form.errors ? " and its errors a quarter more" : ""}`);
+  }
+  if (bytes > 1e6) said.push(`about ${bytes > 1e9 ? `${(bytes / 1e9).toFixed(1)} GB` : `${Math.round(bytes / 1e6)} MB`} in the database`);
+  return [`${said.join(", ")}.`, ...(has_pace ? differences(judged) : []),
+    ...(reached_m ? [`Whether the tip comes down further than ${with_unit(reached_m, "m")} only its fall tells: points with an H that it never reaches will fail.`] : [])].join(" ");
+}
+
+/**
+ * Tells how much the last values are, at once as far as the page knows and then by the server.
+ * @param {import("/main.js").Place} place @param {(text: string, is_wrong?: boolean) => void} show
+ */
+function judging_of(place, show) {
+  let later = 0;
+  /** What is asked of the last values. */
+  let asked = new AbortController();
+  /** What the grammar of recipes and filters says of it. @param {Form} form @param {any} body @param {string} before what is said already */
+  async function judge(form, body, before) {
+    const { signal } = asked;
+    try {
+      const judged = await change("/api/check", { recipe: body.recipe, model: body.model }, signal);
+      show(size_of(form, judged, place.now()));
+    } catch (error) {
+      if (signal.aborted) return;
+      const { status, message } = /** @type {any} */ (error);
+      if (status === 400) show(message, true);
+      else show(`${before} It could not be judged before it starts: ${message}`);
+    }
+  }
+  function end() {
+    clearTimeout(later);
+    asked.abort();
+  }
+  return { end,
+    /** Of other values than before. Throws what is wrong with them as they are written. @param {Form} form */
+    begin(form) {
+      end();
+      asked = new AbortController();
+      const { points, body } = submission_of({ ...form, name: form.name || "name" });
+      if (points > kMostCounted) throw new Error("that is more points than a study may have");
+      const before = size_of(form, { points, is_counted: form.where.trim() === "" }, place.now());
+      show(before);
+      later = setTimeout(() => judge(form, body, before), kJudgeAfter_ms);
+    } };
+}
+
+/** @param {HTMLElement[]} elements its fields @param {() => void} start */
+function form_of(elements, start) {
+  const size = h("p", { role: "status" });
+  const said = h("p", { role: "alert", class: "bad" });
+  const submit = h("button", { type: "submit" }, "Start");
+  const element = h("form", { class: "start", onsubmit: (/** @type {Event} */ event) => {
+    event.preventDefault();
+    start();
+  } }, ...elements, h("p", { class: "weak" }, "Values: 0.4, or 0.4,0.6,0.8, or FROM:TO:COUNT, or FROM:TO:COUNT:log. Of points that are drawn: 0.4, or FROM:TO, or normal(MEAN,SD)."), size, said, submit);
+  return { element, size, said, submit };
 }
 
 /** @param {HTMLElement} root @param {import("/main.js").Place} place @returns {import("/main.js").View} */
@@ -145,75 +220,46 @@ export function start_view(root, place) {
     return {};
   }
   const { first, elements, values } = fields_of(() => tell());
-  const size = h("p", { role: "status" });
-  const said = h("p", { role: "alert", class: "bad" });
+  const form = form_of(elements, () => start());
   const commands = h("div", {});
-  const submit = h("button", { type: "submit" }, "Start");
-  const form = h("form", { class: "start", onsubmit: (/** @type {Event} */ event) => {
-    event.preventDefault();
-    start();
-  } }, ...elements, h("p", { class: "weak" }, "Values: 0.4, or 0.4,0.6,0.8, or FROM:TO:COUNT, or FROM:TO:COUNT:log. Of points that are drawn: 0.4, or FROM:TO, or normal(MEAN,SD)."), size, said, submit);
-  root.append(h("h2", {}, "Start a study"), form, commands);
-
-  let later = 0;
-  /** What is asked of the last values. */
-  let asked = new AbortController();
+  root.append(h("h2", {}, "Start a study"), form.element, commands);
   let is_wrong = false;
   let is_starting = false;
   let is_closed = false;
+  const judging = judging_of(place, show);
   /** @param {string} text @param {boolean} [wrong] they are no study */
-  function show_size(text, wrong = false) {
-    size.textContent = text;
-    size.className = wrong ? "bad" : "";
+  function show(text, wrong = false) {
+    form.size.textContent = text;
+    form.size.className = wrong ? "bad" : "";
     is_wrong = wrong;
-    submit.disabled = is_wrong || is_starting;
-  }
-  /** What the grammar of recipes and filters says of it. @param {any} told */
-  async function judge(told) {
-    const { signal } = asked;
-    try {
-      const judged = await change("/api/check", { recipe: told.body.recipe, model: told.body.model }, signal);
-      show_size(size_of(judged.points, judged.is_counted, place.now()));
-    } catch (error) {
-      if (signal.aborted) return;
-      const { status, message } = /** @type {any} */ (error);
-      if (status === 400) show_size(message, true);
-      else show_size(`${size.textContent} It could not be judged before it starts: ${message}`);
-    }
+    form.submit.disabled = is_wrong || is_starting;
   }
   function tell() {
-    said.textContent = "";
-    clearTimeout(later);
-    asked.abort();
-    asked = new AbortController();
+    form.said.textContent = "";
+    const filled = values();
     try {
-      const filled = values();
-      const told = submission_of({ ...filled, name: filled.name || "name" });
-      if (told.points > kMostCounted) throw new Error("that is more points than a study may have");
-      show_size(size_of(told.points, filled.where.trim() === "", place.now()));
+      judging.begin(filled);
       commands.replaceChildren(h("p", {}, "The same on a command line:"), copied("the command of the study", command_of(filled)));
-      later = setTimeout(() => judge(told), kJudgeAfter_ms);
     } catch (error) {
-      show_size(String(/** @type {Error} */ (error).message), true);
+      show(String(/** @type {Error} */ (error).message), true);
     }
   }
   async function start() {
     if (is_starting || is_wrong) return;
-    is_starting = submit.disabled = true;
+    is_starting = form.submit.disabled = true;
     try {
       const made = await change("/api/studies", submission_of(values()).body);
       if (!is_closed) location.hash = `#/study/${made.id}`;
     } catch (error) {
-      said.textContent = String(/** @type {Error} */ (error).message);
+      form.said.textContent = String(/** @type {Error} */ (error).message);
     }
     is_starting = false;
-    submit.disabled = is_wrong;
+    form.submit.disabled = is_wrong;
   }
   tell();
   first.focus();
   return { close() {
     is_closed = true;
-    clearTimeout(later);
-    asked.abort();
+    judging.end();
   } };
 }

@@ -1,6 +1,7 @@
 #include "proto/recipe/blocks.h"
 
 #include <algorithm>
+#include <numeric>
 #include <string>
 #include <utility>
 
@@ -88,6 +89,26 @@ bool is_drawn(const Axis& axis) {
 bool is_plain_product(const Block& block) {
   return block_kind(block) == BlockKind::kProduct && block.where().empty() &&
          std::all_of(block.axes().begin(), block.axes().end(), has_own_values);
+}
+
+solver::ModelParameters shortest_model(solver::ModelParameters model, const Block& block) {
+  for (const bool are_single : {false, true}) {  // `links` and `length` first
+    for (const Axis* axis : model_axes(block)) {
+      const std::size_t number = key_number(axis->key());
+      if (axis->expression().empty() && link_of_key(number).has_value() == are_single) {
+        key_numbered(number).set(model, smallest_value(*axis));
+      }
+    }
+  }
+  return model;
+}
+
+std::optional<double> surely_reached_m(const solver::ModelParameters& model, const Block& block) {
+  const auto shortest = shortest_model(model, block).lengths_m;
+  const double reached_m = kSurelyReached * std::accumulate(shortest.begin(), shortest.end(), 0.0);
+  const Axis& H = *point_axes(block)[0];
+  const bool is_below = H.expression().empty() && largest_value(H) <= reached_m;
+  return is_below ? std::nullopt : std::optional(reached_m);
 }
 
 Block block_of(std::vector<Axis> axes) {

@@ -3,11 +3,13 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
 
 #include "proto/oblique.pb.h"
+#include "worker/solver/model/parameters.h"
 
 namespace oblique::protocol {
 
@@ -59,6 +61,18 @@ std::vector<AxisLayout> layout_of(const Block& block);
 /// Whether the block is a product of lists and ranges, without expressions and without a filter, so
 /// that conditions on its axes are sets of points by `layout_of` alone.
 bool is_plain_product(const Block& block);
+
+/// The model of the shortest finger that lists, ranges and distributions of the block make of
+/// `model`: length grows with every key that sets it.
+solver::ModelParameters shortest_model(solver::ModelParameters model, const Block& block);
+
+/// No finger turns back before its tip has dropped by this part of its length. From there up to the
+/// length, which is what the rules of a block allow, only the fall tells.
+inline constexpr double kSurelyReached = 0.9;
+
+/// That drop in m of the shortest finger of a block that was judged, where the block has H above it
+/// or may have (H follows by an expression); nothing where the tip surely reaches every H.
+std::optional<double> surely_reached_m(const solver::ModelParameters& model, const Block& block);
 
 /// A block of the axes, in the order that recipes need: model keys as listings have them, then H,
 /// mu and e. Judges nothing. Keys must be known.

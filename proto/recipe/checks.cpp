@@ -255,29 +255,15 @@ void check_order(const Block& block, const KeySet& seen) {
   }
 }
 
-/// The model of the shortest finger that lists, ranges and distributions of the block make: length
-/// grows with every key that sets it.
-solver::ModelParameters shortest(solver::ModelParameters model, const Block& block) {
-  for (const bool are_single : {false, true}) {  // `links` and `length` first
-    for (const Axis* axis : model_axes(block)) {
-      const std::size_t number = key_number(axis->key());
-      if (axis->expression().empty() && link_of_key(number).has_value() == are_single) {
-        key_numbered(number).set(model, smallest_value(*axis));
-      }
-    }
-  }
-  return model;
-}
-
 /// Every single length is that of a link.
-void check_single_lengths(const solver::ModelParameters& shortest_model, const Block& block) {
+void check_single_lengths(const solver::ModelParameters& shortest, const Block& block) {
   for (const Axis* axis : model_axes(block)) {
     const auto link = link_of_key(key_number(axis->key()));
-    if (link && *link >= shortest_model.lengths_m.size()) {
+    if (link && *link >= shortest.lengths_m.size()) {
       throw InputError(
           fmt::format("{} is not allowed: it is the length of link {}, and the model "
                       "has {} of them",
-                      axis->key(), *link + 1, shortest_model.lengths_m.size()));
+                      axis->key(), *link + 1, shortest.lengths_m.size()));
     }
   }
 }
@@ -331,7 +317,7 @@ void check_reach(const solver::ModelParameters& model, const Block& block) {
   const auto largest = [&](std::size_t i) {
     return axes[i]->expression().empty() ? largest_value(*axes[i]) : 1.0;
   };
-  solver::validate_point(shortest(model, block), largest(0), largest(1), largest(2));
+  solver::validate_point(shortest_model(model, block), largest(0), largest(1), largest(2));
 }
 
 }  // namespace
@@ -374,7 +360,7 @@ void check_block(const solver::ModelParameters& model, const Block& block) {
   } else if (block.zip()) {
     check_zip(block);
   }
-  check_single_lengths(shortest(model, block), block);
+  check_single_lengths(shortest_model(model, block), block);
   if (!is_judged_by_points(model, block)) {
     check_reach(model, block);
   } else {

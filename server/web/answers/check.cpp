@@ -1,4 +1,7 @@
+#include <algorithm>
 #include <chrono>
+#include <cstdint>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -6,6 +9,7 @@
 #include <google/protobuf/util/json_util.h>
 
 #include "proto/oblique.pb.h"
+#include "proto/recipe/blocks.h"
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
 #include "proto/recipe/written/written_model.h"
@@ -13,10 +17,12 @@
 #include "server/web/http/json_answer.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/parameters.h"
+#include "worker/solver/model/relative_cost.h"
 
 namespace oblique::server {
 namespace {
 
+using nlohmann::ordered_json;
 using Clock = std::chrono::steady_clock;
 
 /// A filter over many points is counted for so long.
@@ -39,6 +45,41 @@ protocol::ModelParameters model_of(const nlohmann::json& written) {
   return protocol::to_message(model.model());
 }
 
+/// The least drop in m beyond which only a fall tells whether the tip comes to an H of the study;
+/// nothing where it comes to all of them.
+std::optional<double> surely_reached_m(const protocol::Recipe& recipe) {
+  const auto model =
+      recipe.has_model() ? protocol::from_message(recipe.model()) : solver::ModelParameters();
+  std::optional<double> least_m;
+  for (const auto& block : recipe.blocks()) {
+    const auto drop_m = protocol::surely_reached_m(model, block);
+    if (drop_m && (!least_m || *drop_m < *least_m)) {
+      least_m = drop_m;
+    }
+  }
+  return least_m;
+}
+
+/// `relative_cost` of the study's points, by some of its models; nothing where it is not known.
+std::optional<double> relative_cost(const protocol::PointTable& table) {
+  constexpr std::uint64_t kLookedAt = 64;
+  const std::uint64_t looks = std::min(table.models(), kLookedAt);
+  double sum = 0.0;
+  for (std::uint64_t i = 0; i < looks; ++i) {
+    const std::uint64_t model = looks == 1 ? 0 : i * ((table.models() - 1) / (looks - 1));
+    const auto cost = solver::relative_cost(table.model(model));
+    if (!cost) {
+      return std::nullopt;
+    }
+    sum += *cost;
+  }
+  return sum / static_cast<double>(looks);
+}
+
+ordered_json json_of(const std::optional<double>& number) {
+  return number ? ordered_json(*number) : ordered_json();
+}
+
 HttpAnswer check_answer(const AnswerDesk& desk, const std::string& body) {
   protocol::SubmitRequest asked = study_of_body(body);
   try {
@@ -49,7 +90,9 @@ HttpAnswer check_answer(const AnswerDesk& desk, const std::string& body) {
     return json_answer({{"points", table.points()},
                         {"numbers", table.size()},
                         {"models", table.models()},
-                        {"is_counted", is_counted}});
+                        {"is_counted", is_counted},
+                        {"surely_reached_m", json_of(surely_reached_m(table.recipe()))},
+                        {"relative_cost", json_of(relative_cost(table))}});
   } catch (const solver::InputError& error) {
     throw std::invalid_argument(error.what());
   }

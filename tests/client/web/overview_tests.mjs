@@ -106,6 +106,54 @@ test("values that got no judgement may be started all the same, and what is aske
   await page.close();
 });
 
+test("a form says where only a fall tells whether the tip comes to H, and refuses a drop beyond the finger's length", async () => {
+  const page = await browser.open("#/new");
+  await page.waitForSelector("form");
+  const says = (text) => until(page, (wanted) => document.querySelector("form [role=status]").textContent.includes(wanted), text);
+  await fill(page, 1, "0.5:1.19:4");
+  await says("Whether the tip comes down further than 1.08 m only its fall tells");
+  await fill(page, 1, "0.5:1.25:4");
+  await says("H = 1.25 m is not allowed: the tip drops at most the length of the chain, 1.2 m");
+  assert.equal(await page.$eval("form button", (one) => one.disabled), true);
+  await fill(page, 1, "0.5:1:4");
+  await until(page, () => /^160 points[,.]/.test(document.querySelector("form [role=status]").textContent));
+  assert.doesNotMatch(await text_of(page, "form [role=status]"), /fall tells/);
+  browser.objections = browser.objections.filter((one) => !one.includes("status of 4"));  // this answer is wanted here
+  await page.close();
+});
+
+test("a form's time is that of the last points, with more for errors, and says in what these points differ", async () => {
+  const page = await browser.open("#/new", { early: () => {
+    window.EventSource = class extends EventTarget {
+      constructor() {
+        super();
+        setTimeout(() => this.dispatchEvent(new MessageEvent("overview", { data: JSON.stringify({ studies: [], unlisted: 0, studies_by_state: {}, workers: [], workers_there: 1,
+          threads: 2, thread_s_per_point: 1, points_open: 0, points_leased: 0, points_per_s: 0 }) })));
+      }
+      close() {}
+    };
+  } });
+  await page.waitForSelector("form");
+  await until(page, () => document.querySelector("#pace").textContent !== "");
+  const told = () => text_of(page, "form [role=status]");
+  await fill(page, 2, "0.1:2:80");
+  assert.match(await told(), /about 40 s with the 2 threads that are here, if a point takes as long as the last ones did\.$/);
+  await page.click("form input[type=checkbox]");
+  assert.match(await told(), /about 50 s with .* and its errors a quarter more\.$/);
+  const says = (text) => until(page, (wanted) => document.querySelector("form [role=status]").textContent.includes(wanted), text);
+  const selects = await page.$$("form select");
+  await selects[0].select("converged");
+  await says("a point of this study takes roughly 60 times as long as one of the preset paper.");
+  await selects[1].select("generalized-alpha");
+  await says("How long points take with this integrator or this dt is not known before");
+  await selects[0].select("paper");
+  await selects[1].select("explicit");
+  await page.type("form textarea", "rho=2600:2700:3");
+  await says("Falls come on top, up to one for each of the 3 models.");
+  assert.doesNotMatch(await told(), /times as long/);
+  await page.close();
+});
+
 test("the command of a form makes the study that the form starts: model, sample, errors, priority", async () => {
   const page = await browser.open("#/new");
   await page.waitForSelector("form");

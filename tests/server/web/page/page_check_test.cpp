@@ -33,6 +33,48 @@ TEST_F(PageCheckTest, AStudyIsJudgedBeforeItIsSubmitted) {
   EXPECT_EQ(page_.json("/api/studies")["studies"].size(), 0U);
 }
 
+/// A study of one finger and these H, as the body of a check.
+std::string body_with(const std::string& H, const std::string& others = "") {
+  return R"({"recipe":{"blocks":[{"axes":[)" + others + R"({"key":"H",)" + H +
+         R"(},{"key":"mu","values":[1]},{"key":"e","values":[1]}]}]}})";
+}
+
+TEST_F(PageCheckTest, ADropBeyondTheLengthOfTheFingerIsRefusedWithKeyValueAndRange) {
+  for (const std::string H : {R"("values":[1.0,1.25])", R"("from":0.1,"to":1.25,"count":9)"}) {
+    const std::string refused = page_.post("/api/check", body_with(H));
+    EXPECT_EQ(status_of_answer(refused), 400) << H;
+    EXPECT_THAT(refused, HasSubstr("H = 1.25 m is not allowed: the tip drops at most the length of "
+                                   "the chain, 1.2 m"));
+  }
+}
+
+TEST_F(PageCheckTest, WhatOnlyAFallTellsOfADropIsSaid) {
+  const auto reached_m = [&](const std::string& body) {
+    return json::parse(body_of(page_.post("/api/check", body)))["surely_reached_m"];
+  };
+  EXPECT_EQ(reached_m(body_with(R"("from":0.1,"to":1.08,"count":9)")), json());
+  EXPECT_DOUBLE_EQ(reached_m(body_with(R"("from":0.1,"to":1.19,"count":9)")), 1.08);
+  const std::string links = R"({"key":"links","values":[2,3]},)";
+  EXPECT_DOUBLE_EQ(reached_m(body_with(R"("values":[0.75])", links)), 0.72)
+      << "of the shortest finger";
+  EXPECT_DOUBLE_EQ(reached_m(body_with(R"("expression":"0.5 + 0.1 * e")")), 1.08);
+}
+
+TEST_F(PageCheckTest, HowLongAPointTakesIsSaidInPointsOfThePresetPaper) {
+  const auto cost = [&](const std::string& axes, const std::string& model) {
+    std::string body = body_with(R"("values":[1])", axes);
+    body.back() = ',';
+    return json::parse(
+        body_of(page_.post("/api/check", body + R"("model":)" + model + "}")))["relative_cost"];
+  };
+  EXPECT_DOUBLE_EQ(cost("", "{}"), 1.0);
+  const double converged = cost("", R"({"preset":"converged"})");
+  EXPECT_GT(converged, 20.0);
+  const std::string meshes = R"({"key":"elements_per_link","values":[4,48]},)";
+  EXPECT_DOUBLE_EQ(cost(meshes, "{}"), (1.0 + converged) / 2.0);
+  EXPECT_EQ(cost("", R"({"integrator":"generalized-alpha"})"), json());
+}
+
 TEST_F(PageCheckTest, TheFirstPointThatFailedIsToldWithItsReason) {
   submit_grid();
   solve(24);
