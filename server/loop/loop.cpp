@@ -137,7 +137,7 @@ class Loop::Parts final : public Outbox {
     return forward_to_client(identity, protocol::encode(reply));
   }
   bool forward_to_client(const std::string& identity, const std::string& frame) override {
-    if (identity == Web::kPageClient) {
+    if (Web::is_client(identity)) {
       return web_->put_reply(frame);
     }
     if (is_ending_) {
@@ -191,8 +191,8 @@ class Loop::Parts final : public Outbox {
   }
 
   void take_reports() {
-    for (const auto& frame : web_ ? web_->take_requests() : std::vector<std::string>()) {
-      service_->client_frame(Web::kPageClient, frame, now());
+    for (const auto& request : web_ ? web_->take_requests() : std::vector<ServiceLine::Request>()) {
+      service_->client_frame(request.client, request.frame, now());
     }
     for (const auto& report : written_.take()) {
       service_->written(std::get<WriteReport>(report), now());

@@ -59,7 +59,7 @@ class Web::Parts {
   std::string page_url() const { return url() + "/?token=" + page_.key().token(); }
 
   int descriptor() const { return line_.descriptor(); }
-  std::vector<std::string> take_requests() { return line_.take(); }
+  std::vector<ServiceLine::Request> take_requests() { return line_.take(); }
   void put_reply(const std::string& frame) {
     line_.put(frame);
     http_.wake();
@@ -159,7 +159,11 @@ int Web::descriptor() const {
   return parts_->descriptor();
 }
 
-std::vector<std::string> Web::take_requests() {
+bool Web::is_client(const std::string& identity) {
+  return identity == ServiceLine::kIdentity || identity == ServiceLine::kStrangers;
+}
+
+std::vector<ServiceLine::Request> Web::take_requests() {
   return parts_->take_requests();
 }
 

@@ -42,12 +42,11 @@ class Web {
   /// The same with the token that lets a browser in.
   std::string page_url() const;
 
-  /// As what the page is a client of the service; of the loop.
-  static constexpr const char* kPageClient = ServiceLine::kIdentity;
+  /// Whether the page is that client of the service; of the loop, as what follows.
+  static bool is_client(const std::string& identity);
   /// Readable when the page has requests.
   int descriptor() const;
-  /// Their frames.
-  std::vector<std::string> take_requests();
+  std::vector<ServiceLine::Request> take_requests();
   /// The frame of a reply to the page; true.
   bool put_reply(const std::string& frame);
 

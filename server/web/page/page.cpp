@@ -7,6 +7,7 @@
 #include <string_view>
 #include <utility>
 
+#include "proto/text.h"
 #include "server/web/answers/fields.h"
 #include "server/web/answers/study_answers.h"
 #include "server/web/http/json_answer.h"
@@ -31,7 +32,7 @@ constexpr std::string_view kCheck = "/api/check";
 constexpr std::chrono::milliseconds kPatience{8000};
 /// The same of what goes on meanwhile, and tells how far it is.
 constexpr std::chrono::milliseconds kPatienceWithNews{2000};
-/// Most of that at a time.
+/// Most of that at a time, of strangers and of the others.
 constexpr std::ptrdiff_t kMostInBackground = 4;
 
 constexpr const char* kHowToEnter =
@@ -42,11 +43,17 @@ constexpr const char* kTooManyPictures = "too many pictures are asked for at onc
 
 constexpr const char* kSolvesHere =
     "the picture of a point is solved for on the server's machine, which only who has the token "
-    "may "
-    "ask for: draw it with `oblique plot --server`";
+    "may ask for: draw it with `oblique plot --server`";
 
 HttpAnswer nothing_there() {
   return error_answer(kNothingThere, "there is nothing here");
+}
+
+/// Messages to the service have nothing else.
+bool is_text(const Fields& fields) {
+  return std::all_of(fields.begin(), fields.end(), [](const auto& field) {
+    return protocol::is_utf8(field.first) && protocol::is_utf8(field.second);
+  });
 }
 
 /// Takes a number from the front; nothing: there is none.
@@ -165,7 +172,7 @@ std::optional<HttpAnswer> Page::answer(const HttpQuestion& question) {
     looks_.seen(place->study);  // who waits for it looks at it
   }
   auto answer = go_on(question, known->second);
-  if (!answer && question.waited > kPatienceWithNews && may_go_on(known->second)) {
+  if (!answer && question.waited > kPatienceWithNews && may_go_on(question.number, known->second)) {
     Talk talk = std::move(*known->second.talk);
     answer = talk.background->so_far();
     left_.emplace(question.number, std::move(talk));
@@ -185,10 +192,11 @@ std::optional<HttpAnswer> Page::answer(const HttpQuestion& question) {
   return answer;
 }
 
-bool Page::may_go_on(const UnderWay& under_way) const {
+bool Page::may_go_on(std::uint64_t number, const UnderWay& under_way) const {
   return under_way.talk && under_way.talk->background &&
-         std::count_if(left_.begin(), left_.end(), [](const auto& left) {
-           return left.second.background.has_value();
+         std::count_if(left_.begin(), left_.end(), [&](const auto& left) {
+           return left.second.background.has_value() &&
+                  at_.service.is_strangers(left.first) == at_.service.is_strangers(number);
          }) < kMostInBackground;
 }
 
@@ -241,11 +249,16 @@ std::optional<HttpAnswer> Page::begin(const HttpQuestion& question) {
   if (!shows_without_token_ && !is_trusted(question)) {
     return error_answer(kUnauthorized, kHowToEnter);
   }
+  if (!is_text(question.fields)) {
+    return error_answer(kWrongQuestion, "fields of a request are UTF-8");
+  }
   if (question.method == "POST") {
     return begin_change(question);
   }
   if (path == "/api/events") {
-    return HttpAnswer{200, "text/event-stream", {}, {}, at_.overview.open(question.seen_event)};
+    auto tab = at_.overview.open(question.seen_event, !is_trusted(question));
+    return tab ? HttpAnswer{200, "text/event-stream", {}, {}, std::move(tab)}
+               : error_answer(kTryLater, "too many pages are open already: close some");
   }
   if (path == kStudies) {
     return begin(question, studies_talk(question));
@@ -312,7 +325,7 @@ std::optional<HttpAnswer> Page::begin_change(const HttpQuestion& question) {
 }
 
 std::optional<HttpAnswer> Page::begin(const HttpQuestion& question, Talk talk) {
-  at_.service.ask(question.number, talk.first);
+  at_.service.ask(question.number, talk.first, !is_trusted(question));
   under_way_.emplace(question.number, UnderWay{std::move(talk)});
   return std::nullopt;
 }
@@ -350,7 +363,7 @@ std::optional<HttpAnswer> Page::go_on(const HttpQuestion& question, UnderWay& un
     return answer;
   }
   under_way.talk = under_way.then();
-  at_.service.ask(question.number, under_way.talk->first);
+  at_.service.ask(question.number, under_way.talk->first, !is_trusted(question));
   return std::nullopt;
 }
 

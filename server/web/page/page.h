@@ -87,7 +87,7 @@ class Page {
   };
   std::optional<HttpAnswer> begin(const HttpQuestion& question, FilteredPicture picture);
   /// Whether it goes on when its browser is told to ask again.
-  bool may_go_on(const UnderWay& under_way) const;
+  bool may_go_on(std::uint64_t number, const UnderWay& under_way) const;
   std::optional<HttpAnswer> go_on(const HttpQuestion& question, UnderWay& under_way);
   std::optional<HttpAnswer> go_on_talking(const HttpQuestion& question, UnderWay& under_way);
   std::optional<Talk::Next> hear(std::uint64_t number, const Talk& talk);

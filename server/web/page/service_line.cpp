@@ -15,15 +15,20 @@ constexpr std::size_t kMostLeftTraces = 256;
 
 }  // namespace
 
-void ServiceLine::ask(std::uint64_t number, protocol::ClientRequest request) {
+void ServiceLine::ask(std::uint64_t number, protocol::ClientRequest request, bool is_strangers) {
   request.set_request_id(number);
-  Awaited& awaited = awaited_[number];
+  Awaited& awaited = awaited_.try_emplace(number, Awaited{is_strangers}).first->second;
   awaited.is_query = awaited.is_query || request.has_query();
   awaited.trace = request.has_trace() ? request.trace().SerializeAsString() : std::string();
-  send(request);
+  send(request, awaited.is_strangers);
   if (request.has_trace()) {
     end_those_before(awaited.trace);  // after the new one waits, or the work would be lost
   }
+}
+
+bool ServiceLine::is_strangers(std::uint64_t number) const {
+  const auto awaited = awaited_.find(number);
+  return awaited != awaited_.end() && awaited->second.is_strangers;
 }
 
 std::optional<protocol::ClientReply> ServiceLine::reply(std::uint64_t number) {
@@ -56,7 +61,7 @@ std::optional<protocol::ClientReply> ServiceLine::reply(std::uint64_t number) {
 void ServiceLine::forget(std::uint64_t number) {
   const auto awaited = awaited_.extract(number);
   if (!awaited.empty() && (awaited.mapped().is_query || !awaited.mapped().trace.empty())) {
-    end(number);
+    end(number, awaited.mapped().is_strangers);
   }
 }
 
@@ -66,7 +71,7 @@ void ServiceLine::leave(std::uint64_t number) {
     forget(number);
     return;
   }
-  left_traces_.emplace_back(std::move(awaited->second.trace), number);
+  left_traces_.push_back({std::move(awaited->second.trace), number, awaited->second.is_strangers});
   awaited_.erase(awaited);
   if (left_traces_.size() > kMostLeftTraces) {
     left_traces_.pop_front();
@@ -75,34 +80,34 @@ void ServiceLine::leave(std::uint64_t number) {
 
 void ServiceLine::end_those_before(const std::string& trace) {
   std::erase_if(left_traces_, [&](const auto& left) {
-    if (left.first == trace) {
-      end(left.second);
+    if (left.request == trace) {
+      end(left.number, left.is_strangers);
     }
-    return left.first == trace;
+    return left.request == trace;
   });
 }
 
-void ServiceLine::end(std::uint64_t number) {
+void ServiceLine::end(std::uint64_t number, bool is_strangers) {
   protocol::ClientRequest request;
   request.mutable_end_query()->set_request_id(number);
-  send(request);
+  send(request, is_strangers);
 }
 
-void ServiceLine::send(const protocol::ClientRequest& request) {
+void ServiceLine::send(const protocol::ClientRequest& request, bool is_strangers) {
   protocol::ClientRequest versioned = request;
   versioned.set_protocol_version(protocol::kProtocolVersion);
   std::string frame = protocol::encode(versioned);
   {
     const std::lock_guard lock(mutex_);
-    requests_.push_back(std::move(frame));
+    requests_.push_back({is_strangers ? kStrangers : kIdentity, std::move(frame)});
   }
   woken_.wake();
 }
 
-std::vector<std::string> ServiceLine::take() {
+std::vector<ServiceLine::Request> ServiceLine::take() {
   woken_.clear();
   const std::lock_guard lock(mutex_);
-  std::vector<std::string> some;
+  std::vector<Request> some;
   while (!requests_.empty() && some.size() < kMostOfATurn) {
     some.push_back(std::move(requests_.front()));
     requests_.pop_front();

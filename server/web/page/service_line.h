@@ -6,7 +6,6 @@
 #include <mutex>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "proto/oblique.pb.h"
@@ -16,14 +15,25 @@ namespace oblique::server {
 
 /// The page as a client of the service: requests go from the HTTP server's thread to the loop, and
 /// replies back. To the service all tabs are one client, whose shares of traces, queries and long
-/// requests they have together.
+/// requests they have together; those of strangers, who come without the token, are another one, so
+/// that they take nothing of these shares.
 class ServiceLine {
  public:
-  /// By which the service knows this client; no connection is called so.
+  /// By which the service knows these clients; no connection is called so.
   static constexpr const char* kIdentity = "the page";
+  static constexpr const char* kStrangers = "the page without its token";
+
+  /// A frame of ClientRequest, and whose it is.
+  struct Request {
+    const char* client;
+    std::string frame;
+  };
 
   // ---- Of the HTTP server's thread.
-  void ask(std::uint64_t number, protocol::ClientRequest request);
+  /// Whose it is, the first request under a number says for all that follow.
+  void ask(std::uint64_t number, protocol::ClientRequest request, bool is_strangers = false);
+  /// Whether a stranger's request is under way under that number.
+  bool is_strangers(std::uint64_t number) const;
   /// The next reply under that number; nothing: there is none yet.
   std::optional<protocol::ClientReply> reply(std::uint64_t number);
   /// Nothing more is awaited under that number: what is still asked for ends where it can.
@@ -35,28 +45,34 @@ class ServiceLine {
   // ---- Of the loop.
   /// Readable when there is something to take.
   int descriptor() const { return woken_.descriptor(); }
-  /// Frames of ClientRequest, a few at a time.
-  std::vector<std::string> take();
+  /// A few at a time.
+  std::vector<Request> take();
   void put(std::string frame);
 
  private:
   protocol::WakeUp woken_;
   std::mutex mutex_;
-  std::deque<std::string> requests_;  // guarded by mutex_
-  std::vector<std::string> frames_;   // guarded by mutex_
+  std::deque<Request> requests_;     // guarded by mutex_
+  std::vector<std::string> frames_;  // guarded by mutex_
 
   struct Awaited {
+    bool is_strangers = false;
     bool is_query = false;   // that has not ended
     std::string trace = {};  // the request for one that has not come; empty: none
     std::deque<protocol::ClientReply> replies = {};
   };
-  void send(const protocol::ClientRequest& request);
-  void end(std::uint64_t number);
+  void send(const protocol::ClientRequest& request, bool is_strangers);
+  void end(std::uint64_t number, bool is_strangers);
   void end_those_before(const std::string& trace);
 
   // Of the HTTP server's thread.
+  struct LeftTrace {
+    std::string request;
+    std::uint64_t number;
+    bool is_strangers;
+  };
   std::map<std::uint64_t, Awaited> awaited_;
-  std::deque<std::pair<std::string, std::uint64_t>> left_traces_;  // requests and their numbers
+  std::deque<LeftTrace> left_traces_;
 };
 
 }  // namespace oblique::server

@@ -73,12 +73,24 @@ TEST(PageAccess, AnOperatorMayLetAllLookAndNoneChange) {
   EXPECT_EQ(session["may_look"], true);
   EXPECT_EQ(session["may_change"], false);
   EXPECT_EQ(status_of_answer(page.ask("GET", "/api/studies", "")), 200);
+  EXPECT_EQ(status_of_answer(page.get("/api/studies")), 200);
   EXPECT_EQ(status_of_answer(page.ask("POST", "/api/studies/1/pause",
                                       "Origin: " + page.url() + "\r\nContent-Length: 0\r\n")),
             401);
   // A picture of a point would be solved for here; that of a study would not.
   EXPECT_EQ(status_of_answer(page.ask("GET", "/api/studies/1/points/0/picture", "")), 401);
   EXPECT_EQ(status_of_answer(page.ask("GET", "/api/studies/1/picture", "")), 404);
+}
+
+TEST(PageAccess, FieldsAreText) {
+  const PageServer page;
+  for (const std::string path :
+       {"/api/studies?limit=%ff", "/api/studies?%c3%28=1", "/api/studies/1/rows?where=%ff",
+        "/api/studies/1/slice?x=%ed%a0%80"}) {
+    const std::string answer = page.get(path);
+    EXPECT_EQ(status_of_answer(answer), 400) << path;
+    EXPECT_THAT(answer, HasSubstr("UTF-8")) << path;
+  }
 }
 
 TEST(PageAccess, HostilePagesGetAndChangeNothing) {

@@ -48,6 +48,26 @@ class PageLanesTest : public PageStudyTest {
     return [](const AnswerDesk&) { return HttpAnswer{204, {}, {}}; };
   }
 
+  static PageSettings open_to_all() {
+    PageSettings settings;
+    settings.shows_without_token = true;
+    return settings;
+  }
+  /// Without the token.
+  static HttpQuestion asked(std::uint64_t number, const std::string& path) {
+    HttpQuestion question{};
+    question.number = number;
+    question.method = "GET";
+    question.path = path;
+    question.host = "localhost:1";
+    return question;
+  }
+  static HttpQuestion with_token(HttpQuestion question, const Page& page) {
+    const std::string cookie = page.key().cookie_for(question.host);
+    question.cookies = {cookie.substr(0, cookie.find(';'))};
+    return question;
+  }
+
   std::atomic<int> begun_ = 0;
   std::atomic<bool> may_end_ = false;
   AnswerPool pool_{page_.database(), [] {}, std::chrono::hours(1)};
@@ -111,13 +131,8 @@ TEST_F(PageLanesTest, TheSecondStepOfAStrangerIsInTheLaneOfTheFirst) {
   solve(24);
   ServiceLine line;
   LiveText live([] { return std::nullopt; }, 0);
-  PageSettings settings;
-  settings.shows_without_token = true;
-  Page page(settings, {line, pool_, pool_, live});
-  HttpQuestion question{};
-  question.number = 7;
-  question.method = "GET";
-  question.path = "/api/studies/1/bins";
+  Page page(open_to_all(), {line, pool_, pool_, live});
+  HttpQuestion question = asked(7, "/api/studies/1/bins");
   question.fields = {{"x", "mu"}, {"where", "1"}};
   const auto answered = [&](ClientReply reply) {
     while (line.take().empty()) {
@@ -148,6 +163,77 @@ TEST_F(PageLanesTest, TheSecondStepOfAStrangerIsInTheLaneOfTheFirst) {
     pause();
   }
   EXPECT_EQ(answer->status, 200U);
+}
+
+TEST_F(PageLanesTest, WhatStrangersAskOfTheServiceIsOfAClientOfTheirOwn) {
+  ServiceLine line;
+  LiveText live([] { return std::nullopt; }, 0);
+  Page page(open_to_all(), {line, pool_, pool_, live});
+  const std::string trace = "/api/studies/1/points/0/trace";
+  const auto clients = [&] {
+    std::vector<std::string> names;
+    for (const auto& [client, frame] : line.take()) {
+      names.emplace_back(client);
+    }
+    return names;
+  };
+  const std::vector<std::string> stranger{ServiceLine::kStrangers};
+  const std::vector<std::string> known{ServiceLine::kIdentity};
+  ClientReply study;
+  study.mutable_status()->add_studies()->set_name("grid");
+  std::uint64_t number = 0;
+  for (const bool has_token : {false, true}) {
+    const HttpQuestion question =
+        has_token ? with_token(asked(++number, trace), page) : asked(++number, trace);
+    EXPECT_FALSE(page.answer(question));
+    EXPECT_EQ(clients(), has_token ? known : stranger);
+    study.set_request_id(number);
+    line.put(protocol::encode(study));
+    EXPECT_FALSE(page.answer(question));
+    EXPECT_EQ(clients(), has_token ? known : stranger) << "what follows";
+    page.gone(number);
+    EXPECT_EQ(clients(), has_token ? known : stranger) << "its end";
+  }
+}
+
+TEST_F(PageLanesTest, ConditionsOfStrangersThatTakeLongLeaveRoomForTheOthers) {
+  submit_grid();
+  ServiceLine line;
+  LiveText live([] { return std::nullopt; }, 0);
+  Page page(open_to_all(), {line, pool_, pool_, live});
+  const auto after_long = [&](HttpQuestion question) {
+    question.fields = {{"x", "mu"}, {"where", "1"}};
+    while (line.take().empty()) {
+      EXPECT_FALSE(page.answer(question));
+      pause();
+    }
+    question.waited = std::chrono::seconds(3);
+    const auto answer = page.answer(question);
+    return answer ? answer->status : 0;
+  };
+  const std::string bins = "/api/studies/1/bins";
+  std::uint64_t number = 0;
+  while (after_long(asked(++number, bins)) == 202) {
+    ASSERT_LT(number, 100U);
+  }
+  EXPECT_EQ(after_long(with_token(asked(++number, bins), page)), 202U);
+}
+
+TEST_F(PageLanesTest, TabsOfStrangersLeaveRoomForTheOthers) {
+  ServiceLine line;
+  LiveText live([] { return std::nullopt; }, 0);
+  Page page(open_to_all(), {line, pool_, pool_, live});
+  std::vector<HttpAnswer> tabs;
+  const auto open = [&] { return *page.answer(asked(tabs.size(), "/api/events")); };
+  for (HttpAnswer tab = open(); tab.status == 200; tab = open()) {
+    tabs.push_back(std::move(tab));
+    ASSERT_LT(tabs.size(), HttpLimits().streams);
+  }
+  EXPECT_EQ(tabs.size(), HttpLimits().streams / 2);
+  EXPECT_EQ(open().status, 503U);
+  EXPECT_EQ(page.answer(with_token(asked(100, "/api/events"), page))->status, 200U);
+  tabs.pop_back();
+  EXPECT_EQ(open().status, 200U);
 }
 
 TEST_F(PageLanesTest, ASampleOfTheSameResultsIsReadOnce) {

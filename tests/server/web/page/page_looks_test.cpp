@@ -241,7 +241,7 @@ class PageAloneTest : public testing::Test {
   std::vector<ClientRequest> asked(std::uint64_t number) {
     std::vector<ClientRequest> all;
     for (auto frames = line_.take(); !frames.empty(); frames = line_.take()) {
-      for (const std::string& frame : frames) {
+      for (const auto& [client, frame] : frames) {
         ClientRequest request;
         EXPECT_TRUE(protocol::decode(frame, request));
         if (number == 0 || request.request_id() == number) {

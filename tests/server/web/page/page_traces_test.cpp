@@ -56,7 +56,7 @@ class PageTracesAloneTest : public testing::Test {
   }
   std::vector<std::uint64_t> ended() {
     std::vector<std::uint64_t> numbers;
-    for (const std::string& frame : line_.take()) {
+    for (const auto& [client, frame] : line_.take()) {
       ClientRequest request;
       EXPECT_TRUE(protocol::decode(frame, request));
       if (request.has_end_query()) {
