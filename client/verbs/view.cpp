@@ -1,9 +1,14 @@
+#include <unistd.h>
+
+#include <cerrno>
 #include <chrono>
 #include <filesystem>
 #include <iostream>
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <string_view>
+#include <system_error>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -24,7 +29,9 @@ constexpr const char* kViewExamples = R"(Examples:
   oblique view big.db --port 8000
 
 Open the address that it prints in a browser on this machine; Ctrl-C ends it. Over ssh, forward the
-port: ssh -L 8000:127.0.0.1:8000 HOST. Studies that are not done go on meanwhile, as with a server.)";
+port: ssh -L 8000:127.0.0.1:8000 HOST. Studies that are not done go on meanwhile, as with a server.
+Others are started on the page: what changes the file, as `oblique run`, is refused until it ends.
+Links to views hold as long as the port is the same: give one that is kept.)";
 
 struct ViewFlags {
   RunSettings settings{.service = {.database = {}}, .terms = {}};
@@ -42,12 +49,24 @@ void wait_for_the_end(EmbeddedService& service, protocol::StopSignals& stop) {
   }
 }
 
+/// Whether the server ended because that port is taken; it says so in terms of its own flag.
+bool is_taken(int port, const ProcessError& error) {
+  const auto taken = std::generic_category().message(EADDRINUSE);
+  return port != 0 && std::string_view(error.what()).find(taken) != std::string_view::npos;
+}
+
 int view(ViewFlags flags) {
   check_settings(flags.settings);
   ServiceSettings& how = flags.settings.service;
   if (!std::filesystem::exists(how.database)) {
     throw std::runtime_error(fmt::format("there is no file {}: `oblique run` makes a database",
                                          protocol::visible(how.database.string())));
+  }
+  if (::access(how.database.c_str(), W_OK) != 0) {
+    throw std::runtime_error(
+        fmt::format("{0} may not be written to, and the page's server has to: show a copy, which "
+                    "`oblique backup copy.db --db {0}` makes",
+                    protocol::visible(how.database.string())));
   }
   how.http = fmt::format("127.0.0.1:{}", flags.port);
   // Before any thread is started; see StopSignals.
@@ -66,6 +85,14 @@ int view(ViewFlags flags) {
     service.stop();
   } catch (const Interrupted&) {
     return stop.exit_code();
+  } catch (const ProcessError& error) {
+    if (is_taken(flags.port, error)) {
+      throw std::runtime_error(fmt::format(
+          "port {} is taken by another program: name another with --port, or none, and the system "
+          "picks one",
+          flags.port));
+    }
+    throw;
   }
   return kDone;
 }
@@ -78,9 +105,9 @@ void add_view(CLI::App& app, Command& command) {
       "view",
       "Show a database as a page in a browser: a server and a worker for as long as it is open");
   verb->footer(kViewExamples);
-  verb->add_option("file", flags->settings.service.database, "database")
+  verb->add_option("FILE.db", flags->settings.service.database, "database")
       ->required()
-      ->type_name("FILE");
+      ->type_name("");
   constexpr double kLargestPort = 65535;
   verb->add_option("--port", flags->port, "port of the page; 0: the system picks one")
       ->check(protocol::number_between(0, kLargestPort))

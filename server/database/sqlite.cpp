@@ -1,5 +1,6 @@
 #include "server/database/sqlite.h"
 
+#include <cerrno>
 #include <filesystem>
 #include <system_error>
 
@@ -19,6 +20,11 @@ DatabaseHandle open_database(const std::string& path, int flags) {
   const int code = sqlite3_open_v2(path.c_str(), &raw,
                                    flags | SQLITE_OPEN_EXRESCODE | SQLITE_OPEN_NOMUTEX, nullptr);
   DatabaseHandle database(raw);
+  if (code != SQLITE_OK && raw != nullptr && sqlite3_system_errno(raw) == EACCES) {
+    throw StorageError("cannot open the database " + path +
+                       ": permission denied; a database is its owner's alone until `chmod` lets "
+                       "others read it");
+  }
   if (code != SQLITE_OK) {
     throw StorageError("cannot open the database " + path + ": " +
                        (raw != nullptr ? sqlite3_errmsg(raw) : sqlite3_errstr(code)));

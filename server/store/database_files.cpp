@@ -57,8 +57,9 @@ DatabaseFiles::DatabaseFiles(const std::string& path)
   }
   if (!is_locked(file_)) {
     ::close(file_);
-    throw StorageError("another server or `oblique run` already uses the database " + path +
-                       ": wait for it, or name another database");
+    throw StorageError(
+        "another server, `oblique run` or `oblique view` already uses the database " + path +
+        ": wait for it, or name another database");
   }
 }
 

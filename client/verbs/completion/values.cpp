@@ -46,7 +46,7 @@ constexpr auto kWords = std::to_array<Word>({
     {"OLD", Meaning::kStudy},
     {"--study", Meaning::kStudy},
     {"STUDY.toml", Meaning::kStudyFile},
-    {"file", Meaning::kDatabase},
+    {"FILE.db", Meaning::kDatabase},
     {"FILES", Meaning::kDatabase},
     {"--db", Meaning::kDatabase},
     {"--keys", Meaning::kKeyFile},

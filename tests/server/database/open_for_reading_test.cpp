@@ -122,5 +122,12 @@ TEST_F(ReadOnlyFolderTest, NothingIsLeftBesideADatabaseThatCanBeReadOnly) {
   EXPECT_EQ(std::distance(fs::begin(files), fs::end(files)), 2);
 }
 
+TEST_F(ReadOnlyFolderTest, ADatabaseThatMayNotBeReadIsSaidToBeItsOwnersAlone) {
+  const std::string file = file_in("alone");
+  ::chmod(file.c_str(), ::geteuid() == 0 ? 0600 : 0);
+  EXPECT_EXIT(as_stranger([&] { return rows_of(file) == 2; }), testing::ExitedWithCode(3),
+              "permission denied; a database is its owner's alone");
+}
+
 }  // namespace
 }  // namespace oblique::server

@@ -1,5 +1,9 @@
 // `oblique view`: a database, its page and a worker, from a program that a browser could ask.
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <csignal>
+#include <fstream>
 #include <string>
 
 #include <gmock/gmock.h>
@@ -69,6 +73,36 @@ TEST(View, AFileThatIsNotThereIsNotMade) {
   const Outcome outcome = run_oblique(folder, {"view", "nothing.db"});
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_THAT(outcome.err, HasSubstr("there is no file nothing.db"));
+}
+
+TEST(View, APortThatIsTakenIsToldByTheFlagOfTheVerb) {
+  const TemporaryFolder folder;
+  for (const std::string name : {"first", "second"}) {
+    const Outcome made =
+        run_oblique(folder, {"run", "--H", "0.5", "--mu", "0.4", "--e", "1", "--db", name + ".db"});
+    ASSERT_EQ(made.exit_code, 0) << made.err;
+  }
+  Process view(folder, client_program(), {"view", "first.db"});
+  const std::string url = printed_url(view);
+  const std::size_t port = url.rfind(':') + 1;
+  const Outcome second = run_oblique(
+      folder, {"view", "second.db", "--port", url.substr(port, url.find('/', port) - port)});
+  EXPECT_EQ(second.exit_code, 1);
+  EXPECT_THAT(second.err, HasSubstr("is taken by another program: name another with --port"));
+  EXPECT_THAT(second.err, testing::Not(HasSubstr("--http")));
+}
+
+TEST(View, AFileThatMayNotBeWrittenToIsToBeCopied) {
+  if (::geteuid() == 0) {
+    GTEST_SKIP() << "root may write to every file";
+  }
+  const TemporaryFolder folder;
+  const std::string file = folder.file("given.db");
+  { const std::ofstream empty(file); }
+  ASSERT_EQ(::chmod(file.c_str(), 0444), 0);
+  const Outcome outcome = run_oblique(folder, {"view", "given.db"});
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("oblique backup copy.db --db given.db"));
 }
 
 }  // namespace
