@@ -302,6 +302,20 @@ class Shells(Folder):
     def test_names_survive_bash(self):
         self.check_names(self.session(bash))
 
+    def test_bash_runs_no_command_in_a_name_that_begins_as_what_was_typed(self):
+        name = "$(touch ran)x"
+        shutil.copy(self.folder / "oblique.db", self.folder / "dollar.db")
+        with sqlite3.connect(self.folder / "dollar.db") as database:
+            database.execute("UPDATE studies SET name = ? WHERE study_id = 1", (name,))
+        database.close()
+        self.addCleanup((self.folder / "dollar.db").unlink)
+        shell = self.session(bash)
+        for typed in ("$", '"$', r"\$", r'"\$', "'$"):
+            with self.subTest(typed=typed):
+                line = shell.completed("oblique query --db dollar.db " + typed)
+                self.assertEqual(shell.words(line), ["query", "--db", "dollar.db", name], line)
+                self.assertFalse((self.folder / "ran").exists(), line)
+
     def test_names_survive_zsh(self):
         self.check_names(self.session(zsh))
 

@@ -59,6 +59,8 @@ class BashAnswer {
       : type_(std::move(type)), line_(std::move(line)), replaced_(std::move(replaced)) {
     if (line_.escapes && !replaced_.empty()) {
       replaced_.pop_back();
+    } else if (ends_in_dollar()) {
+      replaced_.insert(replaced_.size() - 1, 1, '\\');  // what follows would be expanded with it
     }
   }
 
@@ -93,6 +95,17 @@ class BashAnswer {
   }
 
  private:
+  /// In one that bash would expand: between double quotes no backslash makes a parenthesis behind
+  /// it plain, and a name may be a command in these.
+  bool ends_in_dollar() const {
+    const std::size_t dollar = replaced_.empty() ? 0 : replaced_.size() - 1;
+    std::size_t escapes = dollar;
+    while (escapes > 0 && replaced_[escapes - 1] == '\\') {
+      --escapes;
+    }
+    return replaced_.ends_with('$') && line_.quote != '\'' && (dollar - escapes) % 2 == 0;
+  }
+
   /// A whole word, in the place of what is replaced.
   std::string written_on(const std::string& value) const {
     return replaced_ + written_for_bash(rest_of(value), line_.quote);
