@@ -136,6 +136,59 @@ function csv_button(what, columns, chosen, say) {
   } }, "CSV");
 }
 
+/** A row of the table of studies. @param {any} study @param {any[]} changes what may be done with it */
+function cells_of(study, changes) {
+  const is_running = study.state === "running";
+  return [h("a", { href: `#/study/${study.id}` }, study.name), study.state, progress_of(study), count(study.points),
+    study.failed > 0 ? h("a", { class: "bad", href: `#/study/${study.id}?where=${encodeURIComponent(kFailed)}`, title: "which, and why" }, count(study.failed)) : "0",
+    study.points_per_s > 0 ? count(study.points_per_s) : "",
+    is_running ? time_left(study.left_s) : "", h("span", { class: "weak" }, is_running ? study.waits_for : ""), ...changes];
+}
+
+/** Why no study is shown. @param {number} read how many studies were @param {boolean} has_more */
+const none_text = (read, has_more) => (read === 0 ? "There is no study yet." : has_more ? `Of the ${count(read)} studies that were read none is called so.` : "No study is called so.");
+
+/** @param {number} unlisted studies of which events do not tell */
+const unlisted_text = (unlisted) => (unlisted > 0
+  ? `${count(unlisted)} more ${unlisted === 1 ? "study runs or is" : "studies run or are"} paused than are followed live; numbers of those come every ${kAskAgain_ms / 1000} s.` : "");
+
+/** The commands that say the same. */
+const commands_section = () => h("section", {}, h("h2", {}, "The same on a command line"), copied("the command of the studies", "oblique studies"), copied("the command of the workers", "oblique workers"),
+  h("p", { class: "weak" }, "Add --server ADDRESS where the server is elsewhere, and --format csv for a file."));
+
+/**
+ * @param {import("/main.js").Place} place @param {StudyList} list @param {(text: string, is_bad?: boolean) => void} say
+ * @param {() => void} filtered another part of their names is wanted
+ */
+function studies_section(place, list, say, filtered) {
+  const table = live_table("Studies", ["study", "state", "progress", "#points", "#failed", "#points/s", "#left", "waits for", ...(place.may_change ? ["change"] : [])]);
+  const none = h("p", { class: "weak" }, none_text(0, false));
+  const unlisted = h("p", { class: "weak" });
+  const filter = h("input", { type: "search", value: place.fields.get("name") ?? "", "aria-label": "Studies whose name has", placeholder: "name has …", oninput: () => {
+    place.keep(new URLSearchParams(filter.value ? { name: filter.value } : {}));
+    filtered();
+  } });
+  const file = csv_button("studies", kStudyColumns, (all) => in_order(all, filter.value), say);
+  const more = h("button", { type: "button", hidden: true, onclick: () => list.more() }, "More studies");
+  const start = place.may_change && h("a", { class: "button", href: "#/new" }, "Start a study");
+  return { element: h("section", {}, h("div", { class: "head" }, h("h2", {}, "Studies"), filter, start, file), table.element, none, unlisted, more),
+    /** @param {any} now the overview, or null */
+    draw(now) {
+      const known = [...list.known.values()];
+      const lines = in_order(known, filter.value);
+      table.element.hidden = lines.length === 0;
+      none.hidden = lines.length > 0 || !list.was_read;
+      none.textContent = none_text(known.filter((one) => !is_look(one)).length, list.has_more);
+      table.show(lines, (one) => cells_of(one, place.may_change ? [study_buttons(one, say)] : []));
+      more.hidden = !list.has_more;
+      unlisted.textContent = unlisted_text(now?.unlisted ?? 0);
+    },
+    /** @param {URLSearchParams} fields */
+    go_to(fields) {
+      filter.value = fields.get("name") ?? "";
+    } };
+}
+
 /**
  * @param {HTMLElement} root @param {import("/main.js").Place} place
  * @returns {import("/main.js").View}
@@ -162,22 +215,9 @@ export function overview(root, place) {
     read_later();
   });
   const numbers = h("dl", { class: "figures" });
-  const studies = live_table("Studies", ["study", "state", "progress", "#points", "#failed", "#points/s", "#left", "waits for", ...(place.may_change ? ["change"] : [])]);
-  const no_studies = h("p", { class: "weak" }, "There is no study yet.");
-  const unlisted = h("p", { class: "weak" });
-  const filter = h("input", { type: "search", value: place.fields.get("name") ?? "", "aria-label": "Studies whose name has", placeholder: "name has …", oninput: () => {
-    place.keep(new URLSearchParams(filter.value ? { name: filter.value } : {}));
-    draw();
-  } });
-  const file = csv_button("studies", kStudyColumns, (all) => in_order(all, filter.value), say);
-  const more = h("button", { type: "button", hidden: true, onclick: () => list.more() }, "More studies");
+  const studies = studies_section(place, list, say, draw);
   const workers = workers_section(say);
-  root.append(numbers, said,
-    h("section", {}, h("div", { class: "head" }, h("h2", {}, "Studies"), filter, place.may_change && h("a", { class: "button", href: "#/new" }, "Start a study"), file),
-      studies.element, no_studies, unlisted, more),
-    workers.element,
-    h("section", {}, h("h2", {}, "The same on a command line"), copied("the command of the studies", "oblique studies"), copied("the command of the workers", "oblique workers"),
-      h("p", { class: "weak" }, "Add --server ADDRESS where the server is elsewhere, and --format csv for a file.")));
+  root.append(numbers, said, studies.element, workers.element, commands_section());
 
   /** What events do not tell of is asked for, and what did not come is asked for again. */
   function read_later() {
@@ -189,18 +229,7 @@ export function overview(root, place) {
     }, kAskAgain_ms);
   }
   function draw() {
-    const lines = in_order([...list.known.values()], filter.value);
-    studies.element.hidden = lines.length === 0;
-    no_studies.hidden = lines.length > 0 || !list.was_read;
-    const read = [...list.known.values()].filter((s) => !is_look(s)).length;
-    no_studies.textContent = read === 0 ? "There is no study yet." : list.has_more ? `Of the ${count(read)} studies that were read none is called so.` : "No study is called so.";
-    studies.show(lines, (s) => [h("a", { href: `#/study/${s.id}` }, s.name), s.state, progress_of(s), count(s.points),
-      s.failed > 0 ? h("a", { class: "bad", href: `#/study/${s.id}?where=${encodeURIComponent(kFailed)}`, title: "which, and why" }, count(s.failed)) : "0", s.points_per_s > 0 ? count(s.points_per_s) : "",
-      s.state === "running" ? time_left(s.left_s) : "", h("span", { class: "weak" }, s.state === "running" ? s.waits_for : ""),
-      ...(place.may_change ? [study_buttons(s, say)] : [])]);
-    more.hidden = !list.has_more;
-    unlisted.textContent = now?.unlisted > 0
-      ? `${count(now.unlisted)} more ${now.unlisted === 1 ? "study runs or is" : "studies run or are"} paused than are followed live; numbers of those come every ${kAskAgain_ms / 1000} s.` : "";
+    studies.draw(now);
     workers.draw(now);
     if (now) numbers.replaceChildren(...figures(now));
   }
@@ -218,7 +247,7 @@ export function overview(root, place) {
       draw();
     },
     go_to(fields) {
-      filter.value = fields.get("name") ?? "";
+      studies.go_to(fields);
       draw();
     },
     again: () => list.read(),

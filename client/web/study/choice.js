@@ -12,39 +12,42 @@ function nearest(values, value) {
   return best;
 }
 
-/** @param {import("./study.js").StudyView} view */
+/** @typedef {import("./study.js").StudyView} View */
+
+/** The cell of a point, where the picture shows it. @param {View} view @param {number} point @returns {[number, number] | null} */
+function cell_of(view, point) {
+  const { picture } = view;
+  if (!picture || view.solving.is_on) return null;
+  const i = picture.dots?.points.indexOf(point) ?? -1;
+  if (picture.dots && i >= 0) return [step_of(picture.x, picture.dots.x[i], view.is("xlog") !== ""), step_of(picture.y, picture.dots.y[i], view.is("ylog") !== "")];
+  if (!picture.head.x?.stride) return null;
+  const numbers = picture.x.numbers ?? [];
+  for (let row = 0; row < picture.y.values.length; ++row) {
+    const column = (point - /** @type {number} */ (picture.point(0, row))) / picture.head.x.stride;
+    const found = numbers.indexOf(column + (numbers[0] ?? 0));
+    if (Number.isInteger(column) && found >= 0) return [found, row];
+  }
+  return null;
+}
+
+/** Where this picture has what was chosen in another one. @param {View} view @param {import("./asked/picture.js").Picture} picture @param {[number, number]} values @returns {[number, number] | null} */
+function cell_at(view, picture, values) {
+  // What is solved while somebody looks becomes finer, and bins are made anew: their cells lie near the others'.
+  const may_be_near = view.solving.is_on || picture.x.edges !== undefined;
+  const cell = [picture.x, picture.y].map((side, i) => (may_be_near ? nearest(side.values, values[i]) : side.values.indexOf(values[i])));
+  return cell.includes(-1) ? null : /** @type {[number, number]} */ (cell);
+}
+
+/** @param {string} address @param {number} point @param {string} text what is said beside it */
+const link_of = (address, point, text) => [h("a", { class: "button", href: address }, `Open point ${count(point)}`), h("span", { class: "weak" }, text)];
+
+/** @param {View} view */
 export function choice_of(view) {
   const spoken = h("p", { class: "reading", "aria-live": "polite" });
   const line = h("p", { class: "choice" });
   const { map } = view;
   /** The values of the cell that is chosen: another picture may have it in another place, or not at all. @type {[number, number] | null} */
   let place = null;
-  const link = (/** @type {string} */ address, /** @type {number} */ point, /** @type {string} */ text) => line.replaceChildren(
-    h("a", { class: "button", href: address }, `Open point ${count(point)}`), h("span", { class: "weak" }, text));
-
-  /** The cell of a point, where the picture shows it. @param {number} point @returns {[number, number] | null} */
-  function cell_of(point) {
-    const { picture } = view;
-    if (!picture || view.solving.is_on) return null;
-    const i = picture.dots?.points.indexOf(point) ?? -1;
-    if (picture.dots && i >= 0) return [step_of(picture.x, picture.dots.x[i], view.is("xlog") !== ""), step_of(picture.y, picture.dots.y[i], view.is("ylog") !== "")];
-    if (!picture.head.x?.stride) return null;
-    const numbers = picture.x.numbers ?? [];
-    for (let row = 0; row < picture.y.values.length; ++row) {
-      const column = (point - /** @type {number} */ (picture.point(0, row))) / picture.head.x.stride;
-      const found = numbers.indexOf(column + (numbers[0] ?? 0));
-      if (Number.isInteger(column) && found >= 0) return [found, row];
-    }
-    return null;
-  }
-
-  /** Where this picture has what was chosen in another one. @param {import("./asked/picture.js").Picture} picture @param {[number, number]} values @returns {[number, number] | null} */
-  function cell_at(picture, values) {
-    // What is solved while somebody looks becomes finer, and bins are made anew: their cells lie near the others'.
-    const may_be_near = view.solving.is_on || picture.x.edges !== undefined;
-    const cell = [picture.x, picture.y].map((side, i) => (may_be_near ? nearest(side.values, values[i]) : side.values.indexOf(values[i])));
-    return cell.includes(-1) ? null : /** @type {[number, number]} */ (cell);
-  }
 
   return { spoken, line,
     /** @param {[number, number] | null} cell */
@@ -58,7 +61,7 @@ export function choice_of(view) {
       const point = which ?? view.picture?.point(...cell) ?? null;
       line.replaceChildren();
       if (point === null) return;
-      link(view.address_of(point), point, " or press Enter, or click twice");
+      line.replaceChildren(...link_of(view.address_of(point), point, " or press Enter, or click twice"));
       if (view.solving.is_on) return;
       view.table.choose(point);
       view.set({ cell: String(point) });
@@ -71,13 +74,13 @@ export function choice_of(view) {
     /** Marks a point of the study where the picture has it. @param {number} point */
     choose_point(point) {
       view.table.choose(point);
-      const cell = cell_of(point);
+      const cell = cell_of(view, point);
       map.choose(cell, view.picture?.dots ? point : null);
       if (cell) {
         this.choose(cell, point);
       } else {
         place = null;
-        link(`#/study/${view.study.id}/point/${point}`, point, view.has_map ? " (this picture does not show it)" : "");
+        line.replaceChildren(...link_of(`#/study/${view.study.id}/point/${point}`, point, view.has_map ? " (this picture does not show it)" : ""));
         view.set({ cell: String(point) });
       }
     },
@@ -88,7 +91,7 @@ export function choice_of(view) {
         line.replaceChildren();
         return;
       }
-      const cell = place && !picture.dots ? cell_at(picture, place) : null;
+      const cell = place && !picture.dots ? cell_at(view, picture, place) : null;
       if (cell) {
         map.choose(cell);
         this.choose(cell);

@@ -13,158 +13,187 @@ const kDeepest = 10_000;
 const kMostInFile = 100_000;
 
 /**
- * @param {{study: number, points: number, columns: () => string[], where: () => string, marked: () => string, all: () => boolean, keep_all: (all: boolean) => void, wrong: (error: any) => void,
- *   chosen: (point: number) => void, order: () => string, keep_order: (order: string) => void, page: () => number, keep_page: (page: number) => void}} of pages count from 0
+ * @typedef {{study: number, points: number, columns: () => string[], where: () => string, marked: () => string, all: () => boolean, keep_all: (all: boolean) => void, wrong: (error: any) => void,
+ *   chosen: (point: number) => void, order: () => string, keep_order: (order: string) => void, page: () => number, keep_page: (page: number) => void}} Of pages count from 0
  */
-export function row_table(of) {
-  const said = h("p", { role: "status", class: "weak" });
-  const table = h("table", {}, h("caption", { class: "unseen" }, "Points of the study"));
-  const back = h("button", { type: "button", onclick: () => turn(-1) }, "Previous");
-  const next = h("button", { type: "button", onclick: () => turn(1) }, "Next");
-  const { said: said_of_file, say: say_of_file } = file_sayer();
-  const file = file_link("Table as CSV", "rows.csv", "", say_of_file);
-  const only = h("div", { class: "only" }, tick("marked points only", true, (is) => {
-    of.keep_all(!is);
-    begin();
-  }));
-  const only_box = /** @type {HTMLInputElement} */ (only.querySelector("input"));
-  const element = h("section", { class: "rows" }, h("h2", {}, "Points"), only,
-    h("div", { class: "scroll", tabIndex: 0, role: "region", "aria-label": "Points" }, table),
-    h("div", { class: "row" }, back, next, file, said_of_file), said);
-  /** @type {AbortController | null} */
-  let asked = null;
-  /** How many meet the filter; null: not known. @type {number | null} */
-  let total = null;
-  /** The filter that it is of. */
-  let counted = "\0";
-  /** Other points have results since. */
-  let is_old = false;
-  let chosen = -1;
-  /** @type {number[]} */
-  let points_here = [];
 
-  function focus_on(/** @type {HTMLButtonElement} */ button) {
-    button.disabled = false;
-    button.focus({ preventScroll: true });
+/** @param {Of} of */
+export const row_table = (of) => new RowTable(of);
+
+/** Names of columns, which sort. @param {any} answer @param {string} order @param {(column: string) => void} sort */
+function head_of(answer, order, sort) {
+  return h("thead", {}, h("tr", {}, ...answer.columns.map((/** @type {string} */ name, /** @type {number} */ i) => {
+    const sign = order === name ? " ▲" : order === `${name} DESC` ? " ▼" : "";
+    return h("th", { scope: "col", class: answer.rows.some((/** @type {any} */ row) => typeof row[i] === "number") ? "number" : "",
+      "aria-sort": order === name ? "ascending" : order === `${name} DESC` ? "descending" : "none" },
+    h("button", { type: "button", class: "plain", onclick: () => sort(name) }, heading(name, answer.units[i]) + sign));
+  })));
+}
+
+/** Rows that begin with their point. @param {Of} of @param {any[][]} rows */
+function body_of({ study, chosen }, rows) {
+  const text = (/** @type {any} */ value) => (typeof value === "number" ? shown(value) : value ?? "–");
+  return h("tbody", {}, ...rows.map((row) => h("tr", { "data-point": row[0], onclick: () => chosen(row[0]) },
+    ...row.map((value, i) => h("td", { class: typeof value === "number" ? "number" : "" },
+      i === 0 ? h("a", { href: `#/study/${study}/point/${value}` }, count(value)) : text(value))))));
+}
+
+/** Which rows are shown, of how many. @param {number} first @param {number} some @param {boolean} are_out_of_reach the rows behind them @param {number | null} total null: not known */
+function range_text(first, some, are_out_of_reach, total) {
+  const range = some > 0 ? `${count(first + 1)} to ${count(first + some)}` : "None";
+  const tail = are_out_of_reach ? " Further rows are in the CSV or asked for by a narrower filter." : "";
+  if (total === null) return `${range}.${tail}`;
+  const cut = total > kMostInFile ? ` The CSV has the first ${count(kMostInFile)}; oblique query gives all.` : "";
+  return `${range} of ${count(total)} rows.${tail}${cut}`;
+}
+
+/** @param {HTMLButtonElement} button */
+function focus_on(button) {
+  button.disabled = false;
+  button.focus({ preventScroll: true });
+}
+
+class RowTable {
+  /** @type {AbortController | null} */
+  #asked = null;
+  /** How many meet the filter; null: not known. @type {number | null} */
+  #total = null;
+  /** The filter that it is of. */
+  #counted = "\0";
+  /** Other points have results since. */
+  #is_old = false;
+  #chosen = -1;
+  /** @type {number[]} */
+  #points_here = [];
+
+  /** @param {Of} of */
+  constructor(of) {
+    this.of = of;
+    this.said = h("p", { role: "status", class: "weak" });
+    this.table = h("table", {}, h("caption", { class: "unseen" }, "Points of the study"));
+    this.back = h("button", { type: "button", onclick: () => this.#turn(-1) }, "Previous");
+    this.next = h("button", { type: "button", onclick: () => this.#turn(1) }, "Next");
+    const { said, say } = file_sayer();
+    this.file = file_link("Table as CSV", "rows.csv", "", say);
+    this.only = h("div", { class: "only" }, tick("marked points only", true, (is) => {
+      of.keep_all(!is);
+      this.begin();
+    }));
+    this.element = h("section", { class: "rows" }, h("h2", {}, "Points"), this.only,
+      h("div", { class: "scroll", tabIndex: 0, role: "region", "aria-label": "Points" }, this.table),
+      h("div", { class: "row" }, this.back, this.next, this.file, said), this.said);
   }
-  function begin() {
-    if (of.page() > 0) of.keep_page(0);
-    load();
-  }
+
   /** Which points are shown. */
-  const condition = () => joined(of.where(), of.all() ? "" : of.marked());
-  function turn(/** @type {number} */ by) {
-    of.keep_page(Math.max(of.page() + by, 0));
-    load();
+  condition() {
+    return joined(this.of.where(), this.of.all() ? "" : this.of.marked());
+  }
+  /** From the first page. */
+  begin() {
+    if (this.of.page() > 0) this.of.keep_page(0);
+    this.load();
+  }
+  /** Other points have results now. */
+  async again() {
+    this.#is_old = true;
+    if (!this.element.contains(document.activeElement)) await this.load();
+  }
+  /** Marks the row of a point. @param {number} point */
+  choose(point) {
+    this.#chosen = point;
+    this.#show_chosen();
+  }
+  close() {
+    this.#asked?.abort();
+  }
+
+  async load() {
+    this.#asked?.abort();
+    const { signal } = this.#asked = new AbortController();
+    const first = Math.min(this.of.page(), kDeepest / kPage - 1) * kPage;
+    const asked = { where: this.condition(), order: this.of.order() || "point", select: this.of.columns().join(",") };
+    if (this.#counted !== asked.where) this.#forget_total();
+    this.only.hidden = this.of.marked() === "";
+    this.only.querySelector("input").checked = !this.of.all();
+    this.file.href = rows_path(this.of.study, { ...asked, limit: kMostInFile, format: "csv" });
+    try {
+      await this.#show(await rows(this.of.study, { ...asked, limit: first + kPage + 1 }, signal), first, signal);
+    } catch (error) {
+      if (signal.aborted) return;
+      if (!(error instanceof Silence)) {
+        this.table.replaceChildren(this.table.caption ?? "");
+        this.said.textContent = "";
+      }
+      this.of.wrong(error);
+    }
+  }
+
+  /** What was answered; how many rows there are and which of these are marked comes later. @param {any} answer @param {number} first row of the page @param {AbortSignal} signal */
+  async #show(answer, first, signal) {
+    const some = answer.rows.slice(first, first + kPage);
+    const has_more = answer.rows.length > first + kPage;
+    const is_deepest = first + 2 * kPage > kDeepest;
+    const head = head_of(answer, this.of.order(), (column) => this.#sort(column));
+    const body = body_of(this.of, some);
+    keep_focus(this.table, () => this.table.replaceChildren(this.table.caption ?? "", head, body));
+    this.#points_here = some.map((/** @type {any[]} */ row) => row[0]);
+    this.#show_chosen();
+    const marked = this.#show_marked(signal).catch(() => {});
+    this.#let_turn(first === 0, !has_more || is_deepest);
+    const say = () => {
+      this.said.textContent = range_text(first, some.length, has_more && is_deepest, this.#total);
+    };
+    say();
+    await this.#count(signal);
+    say();
+    await marked;
+  }
+  /** What is pressed and leads nowhere leaves the focus to the other one. @param {boolean} at_begin @param {boolean} at_end */
+  #let_turn(at_begin, at_end) {
+    if (document.activeElement === this.back && at_begin) focus_on(this.next);
+    if (document.activeElement === this.next && at_end) focus_on(this.back);
+    this.back.disabled = at_begin;
+    this.next.disabled = at_end;
+  }
+  #turn(/** @type {number} */ by) {
+    this.of.keep_page(Math.max(this.of.page() + by, 0));
+    this.load();
   }
   /** Sorts by a column, then the other way round, then by number again. @param {string} column */
-  function sort(column) {
-    const now = of.order();
-    of.keep_order(now === column ? `${column} DESC` : now === `${column} DESC` ? "" : column);
-    begin();
+  #sort(column) {
+    const order = this.of.order();
+    this.of.keep_order(order === column ? `${column} DESC` : order === `${column} DESC` ? "" : column);
+    this.begin();
   }
 
-  async function count_rows(/** @type {AbortSignal} */ signal) {
-    const where = condition();
-    if (counted === where && !is_old) return;
-    const answer = await rows(of.study, { where, select: "count(*)", limit: 1 }, signal);
-    total = Number(answer.rows[0]?.[0] ?? 0);
-    counted = where;
-    is_old = false;
+  /** Counting may be given up. */
+  #forget_total() {
+    this.#total = null;
+    this.#counted = "\0";
+  }
+  async #count(/** @type {AbortSignal} */ signal) {
+    const where = this.condition();
+    if (this.#counted === where && !this.#is_old) return;
+    const answer = await rows(this.of.study, { where, select: "count(*)", limit: 1 }, signal);
+    this.#total = Number(answer.rows[0]?.[0] ?? 0);
+    this.#counted = where;
+    this.#is_old = false;
   }
 
-  function head(/** @type {any} */ answer) {
-    const now = of.order();
-    return h("thead", {}, h("tr", {}, ...answer.columns.map((/** @type {string} */ name, /** @type {number} */ i) => {
-      const sign = now === name ? " ▲" : now === `${name} DESC` ? " ▼" : "";
-      return h("th", { scope: "col", class: answer.rows.some((/** @type {any} */ r) => typeof r[i] === "number") ? "number" : "",
-        "aria-sort": now === name ? "ascending" : now === `${name} DESC` ? "descending" : "none" },
-      h("button", { type: "button", class: "plain", onclick: () => sort(name) }, heading(name, answer.units[i]) + sign));
-    })));
+  /** @param {string} look @param {(point: number) => boolean} is */
+  #look(look, is) {
+    for (const row of this.table.querySelectorAll("tr[data-point]")) row.classList.toggle(look, is(Number(row.dataset.point)));
   }
-
-  async function load() {
-    asked?.abort();
-    const mine = asked = new AbortController();
-    const columns = of.columns();
-    const page = Math.min(of.page(), kDeepest / kPage - 1);
-    const where = condition();
-    if (counted !== where) {
-      total = null;
-      counted = "\0"; // counting may be given up
-    }
-    only.hidden = of.marked() === "";
-    only_box.checked = !of.all();
-    file.href = rows_path(of.study, { where, order: of.order() || "point", select: columns.join(","), limit: kMostInFile, format: "csv" });
-    try {
-      const first = page * kPage;
-      const answer = await rows(of.study, { where, order: of.order() || "point", select: columns.join(","), limit: first + kPage + 1 }, mine.signal);
-      const some = answer.rows.slice(first, first + kPage);
-      const has_more = answer.rows.length > first + kPage;
-      const body = h("tbody", {}, ...some.map((/** @type {any[]} */ row) => {
-        const made = h("tr", { "data-point": row[0], "aria-selected": undefined, onclick: () => of.chosen(row[0]) },
-          ...row.map((value, i) => h("td", { class: typeof value === "number" ? "number" : "" },
-            i === 0 ? h("a", { href: `#/study/${of.study}/point/${value}` }, count(value))
-              : typeof value === "number" ? shown(value) : value ?? "–")));
-        return made;
-      }));
-      keep_focus(table, () => table.replaceChildren(table.caption ?? "", head(answer), body));
-      points_here = some.map((/** @type {any[]} */ row) => row[0]);
-      mark();
-      const marked = mark_rows(mine.signal).catch(() => {});
-      const at_end = !has_more || first + 2 * kPage > kDeepest;
-      // What is pressed and leads nowhere leaves the focus to the other one.
-      if (document.activeElement === back && page === 0) focus_on(next);
-      if (document.activeElement === next && at_end) focus_on(back);
-      back.disabled = page === 0;
-      next.disabled = at_end;
-      const range = some.length > 0 ? `${count(first + 1)} to ${count(first + some.length)}` : "None";
-      const tail = has_more && first + 2 * kPage > kDeepest ? " Further rows are in the CSV or asked for by a narrower filter." : "";
-      said.className = "weak";
-      const say = () => {
-        const of_all = total === null ? "" : ` of ${count(total)} rows`;
-        const cut = total !== null && total > kMostInFile ? ` The CSV has the first ${count(kMostInFile)}; oblique query gives all.` : "";
-        said.textContent = `${range}${of_all}.${tail}${cut}`;
-      };
-      say();
-      await count_rows(mine.signal);
-      say();
-      await marked;
-    } catch (error) {
-      if (mine.signal.aborted) return;
-      if (!(error instanceof Silence)) {
-        table.replaceChildren(table.caption ?? "");
-        said.textContent = "";
-      }
-      of.wrong(error);
-    }
+  #show_chosen() {
+    this.#look("chosen", (point) => point === this.#chosen);
   }
-
   /** Which of the rows that are shown are marked. @param {AbortSignal} signal */
-  async function mark_rows(signal) {
-    const condition_ = of.marked();
-    if (condition_ === "" || points_here.length === 0) return;
-    const all = !of.all() ? points_here : (await rows(of.study, { select: "point", where: joined(`point IN (${points_here.join(",")})`, condition_), limit: kPage }, signal))
-      .rows.map((/** @type {number[]} */ row) => row[0]);
-    for (const row of table.querySelectorAll("tr[data-point]")) row.classList.toggle("marked", all.includes(Number(/** @type {HTMLElement} */ (row).dataset.point)));
+  async #show_marked(signal) {
+    const marked = this.of.marked();
+    if (marked === "" || this.#points_here.length === 0) return;
+    const all = !this.of.all() ? this.#points_here
+      : (await rows(this.of.study, { select: "point", where: joined(`point IN (${this.#points_here.join(",")})`, marked), limit: kPage }, signal))
+        .rows.map((/** @type {number[]} */ row) => row[0]);
+    this.#look("marked", (point) => all.includes(point));
   }
-
-  function mark() {
-    for (const row of table.querySelectorAll("tr[data-point]")) {
-      row.classList.toggle("chosen", Number(/** @type {HTMLElement} */ (row).dataset.point) === chosen);
-    }
-  }
-
-  return { element, load, begin, condition,
-    /** Other points have results now. */
-    async again() {
-      is_old = true;
-      if (!element.contains(document.activeElement)) await load();
-    },
-    /** Marks the row of a point. @param {number} point */
-    choose(point) {
-      chosen = point;
-      mark();
-    },
-    close: () => asked?.abort() };
 }
