@@ -16,11 +16,11 @@ function hold_finer_ones() {
   };
 }
 const place = async (page) => (await text_of(page, ".reading")).split(":")[0];
-/** A view that has just been opened may take the focus once more. */
+/** Chooses the last cell of the fourth row. A view that has just been opened may take the focus once more, amidst the keys. */
 const choose_by_keys = async (page) => {
-  for (let tries = 0; tries < 5 && !(await page.$(".choice a")); ++tries) {
+  for (let tries = 0; tries < 5 && !(await place(page)).startsWith("mu 2,"); ++tries) {
     await page.focus(kMap);
-    for (const key of ["Home", "End", "ArrowUp", "ArrowUp", "ArrowUp"]) await page.keyboard.press(key);
+    for (const key of [...Array(3 * tries).fill("ArrowDown"), "Home", "End", "ArrowUp", "ArrowUp", "ArrowUp"]) await page.keyboard.press(key);
   }
 };
 
