@@ -15,6 +15,31 @@ function span(...columns) {
   return [Math.min(...ends), Math.max(...ends)];
 }
 
+/** @param {any} c @param {number} width @param {number} metres above the ground */
+function draw_falling(c, width, metres) {
+  draw_ground(c, width, kLevel);
+  c.fillStyle = ink("text");
+  c.textAlign = "left";
+  c.textBaseline = "top";
+  label(c, `falls: the tip is ${length_text(Math.max(metres, 0))} above the ground`, 10, 10);
+}
+
+/** P on the ground, and the springs between it and the tip. @param {any} c @param {number[]} tip in pixels @param {number} px_of_P */
+function draw_particle(c, [x, y], px_of_P) {
+  c.strokeStyle = ink("text");
+  c.setLineDash([2, 3]);
+  c.lineWidth = 1.2;
+  c.beginPath();
+  c.moveTo(x, y);
+  c.lineTo(px_of_P, kLevel);
+  c.stroke();
+  c.setLineDash([]);
+  c.fillStyle = ink("text");
+  c.beginPath();
+  c.arc(px_of_P, kLevel, 4, 0, 2 * Math.PI);
+  c.fill();
+}
+
 /** @param {import("./trace.js").Trace} trace @param {import("./finger.js").Fall} fall */
 export function near_of(trace, fall) {
   const canvas = h("canvas", { role: "img", "aria-label": "The tip and the ground, enlarged" });
@@ -26,14 +51,6 @@ export function near_of(trace, fall) {
   const [x0, x1] = span(x, xP);
   const [y0, y1] = span(y, [ground]);
 
-  /** @param {any} c @param {number} width @param {number} row of the fall */
-  function draw_falling(c, width, row) {
-    draw_ground(c, width, kLevel);
-    c.fillStyle = ink("text");
-    c.textAlign = "left";
-    c.textBaseline = "top";
-    label(c, `falls: the tip is ${length_text(Math.max(fall.y[row] - ground, 0))} above the ground`, 10, 10);
-  }
   /** Where the tip was, and the last element's direction, not its length. @param {any} c @param {number} at @param {number} length @param {(x: number) => number} px @param {(y: number) => number} py */
   function draw_tip(c, at, length, px, py) {
     c.strokeStyle = ink("weak");
@@ -50,21 +67,6 @@ export function near_of(trace, fall) {
     c.moveTo(px(x[at]) + (nx / n) * length, py(y[at]) - (ny / n) * length);
     c.lineTo(px(x[at]), py(y[at]));
     c.stroke();
-  }
-  /** P on the ground, and the springs between it and the tip. @param {any} c @param {number} at @param {(x: number) => number} px @param {(y: number) => number} py */
-  function draw_particle(c, at, px, py) {
-    c.strokeStyle = ink("text");
-    c.setLineDash([2, 3]);
-    c.lineWidth = 1.2;
-    c.beginPath();
-    c.moveTo(px(x[at]), py(y[at]));
-    c.lineTo(px(xP[at]), kLevel);
-    c.stroke();
-    c.setLineDash([]);
-    c.fillStyle = ink("text");
-    c.beginPath();
-    c.arc(px(xP[at]), kLevel, 4, 0, 2 * Math.PI);
-    c.fill();
   }
   /** @param {any} c @param {number} at @param {number[]} tip in pixels */
   function draw_forces(c, at, tip) {
@@ -92,7 +94,7 @@ export function near_of(trace, fall) {
       if (!made) return;
       const { c, width } = made;
       if (is_falling) {
-        draw_falling(c, width, row);
+        draw_falling(c, width, fall.y[row] - ground);
         return;
       }
       const metres_per_px = Math.max((x1 - x0) / (width * 0.55), (y1 - y0) / (kHeight * 0.4), 1e-9);
@@ -100,8 +102,9 @@ export function near_of(trace, fall) {
       const py = (/** @type {number} */ v) => kLevel - (v - ground) / metres_per_px;
       draw_ground(c, width, kLevel);
       draw_tip(c, row, width, px, py);
-      draw_particle(c, row, px, py);
-      draw_forces(c, row, [px(x[row]), py(y[row])]);
+      const tip = [px(x[row]), py(y[row])];
+      draw_particle(c, tip, px(xP[row]));
+      draw_forces(c, row, tip);
       write(c, row, px(xP[row]));
       draw_length(c, width, metres_per_px);
     } };
