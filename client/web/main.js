@@ -10,6 +10,7 @@ import { overview } from "/overview.js";
  * @property {(fields: URLSearchParams, is_step?: boolean) => void} keep writes them into the address, soon; a step is one that people go back over
  * @property {(address: string) => void} go to another view, so that this one can be come back to
  * @property {boolean} may_change
+ * @property {string} file that commands are to read; empty: they ask the server
  * @property {AbortSignal} signal this view is left, or did not come about
  * @property {() => any} now the last overview, or null
  * @property {(links: (string | Node)[]) => void} trail what stands beside the name
@@ -32,6 +33,7 @@ let leaving = new AbortController();
 /** Of the view that is shown. */
 let here = "";
 let may_change = false;
+let file = "";
 /** How views were left. @type {Map<string, string>} */
 const left = new Map();
 
@@ -96,7 +98,7 @@ async function show() {
   wanted = "";
   const root = h("div", {});
   /** @type {Place} */
-  const place = { fields: new URLSearchParams(query ?? ""), may_change, signal, now: () => now,
+  const place = { fields: new URLSearchParams(query ?? ""), may_change, file, signal, now: () => now,
     // Answers may come when another view is shown.
     trail: (parts) => { if (mine === turn) links(parts); },
     last: (of) => left.get(of) ?? `#${of}`,
@@ -144,7 +146,7 @@ async function show() {
 
 try {
   const told = await session();
-  may_change = told.may_change;
+  ({ may_change, file } = told);
   if (told.may_look) {
     const take = (/** @type {any} */ told) => {
       now = told;

@@ -2,7 +2,7 @@
 // Studies and workers, live.
 import { all_of, StudyList } from "/listed.js";
 import { copied, h, save } from "/parts/dom.js";
-import { count, csv_line, time_left } from "/parts/format.js";
+import { count, csv_line, of_file, time_left } from "/parts/format.js";
 import { change } from "/server.js";
 
 /** After no answer, and of studies that events do not tell of. */
@@ -152,9 +152,10 @@ const none_text = (read, has_more) => (read === 0 ? "There is no study yet." : h
 const unlisted_text = (unlisted) => (unlisted > 0
   ? `${count(unlisted)} more ${unlisted === 1 ? "study runs or is" : "studies run or are"} paused than are followed live; numbers of those come every ${kAskAgain_ms / 1000} s.` : "");
 
-/** The commands that say the same. */
-const commands_section = () => h("section", {}, h("h2", {}, "The same on a command line"), copied("the command of the studies", "oblique studies"), copied("the command of the workers", "oblique workers"),
-  h("p", { class: "weak" }, "Add --server ADDRESS where the server is elsewhere, and --format csv for a file."));
+/** The commands that say the same. @param {string} file that they are to read; empty: they ask the server */
+const commands_section = (file) => h("section", {}, h("h2", {}, "The same on a command line"), copied("the command of the studies", `oblique studies${of_file(file)}`),
+  ...(file ? [] : [copied("the command of the workers", "oblique workers")]),
+  h("p", { class: "weak" }, file ? "Add --format csv for a table in a file." : "Add --server ADDRESS where the server is elsewhere, and --format csv for a file."));
 
 /**
  * @param {import("/main.js").Place} place @param {StudyList} list @param {(text: string, is_bad?: boolean) => void} say
@@ -217,7 +218,7 @@ export function overview(root, place) {
   const numbers = h("dl", { class: "figures" });
   const studies = studies_section(place, list, say, draw);
   const workers = workers_section(say);
-  root.append(numbers, said, studies.element, workers.element, commands_section());
+  root.append(numbers, said, studies.element, workers.element, commands_section(place.file));
 
   /** What events do not tell of is asked for, and what did not come is asked for again. */
   function read_later() {

@@ -79,7 +79,7 @@ export async function numbers(path, signal, meanwhile) {
   return { head: JSON.parse(new TextDecoder().decode(new Uint8Array(bytes, 4, length))), bytes, begin: 4 + length };
 }
 
-/** @returns {Promise<{version: string, may_look: boolean, may_change: boolean, how_to_enter: string}>} */
+/** @returns {Promise<{version: string, may_look: boolean, may_change: boolean, file: string, how_to_enter: string}>} */
 export const session = () => json("/api/session");
 
 const kTryAgain_ms = 3000;

@@ -1,7 +1,7 @@
 // @ts-check
 // A study that is started here: values as on the command line, how much it is, and what the server says of it.
 import { copied, h, named, picker, tick } from "/parts/dom.js";
-import { count, quoted, shown, time_left, with_unit } from "/parts/format.js";
+import { count, of_file, quoted, shown, time_left, with_unit } from "/parts/format.js";
 import { change } from "/server.js";
 
 /** The most that a double counts without gaps. */
@@ -101,12 +101,12 @@ export function submission_of(form) {
     recipe: { errors: form.errors, blocks: [{ axes: axes.map((one) => one.axis), ...(sample ? { sample } : {}), ...(where ? { where } : {}) }] } } };
 }
 
-/** The study as a command. @param {Form} form */
-function command_of(form) {
+/** The study as a command. @param {Form} form @param {string} file in which it is solved; empty: by the server */
+function command_of(form, file) {
   const flag = (/** @type {string} */ name, /** @type {string} */ value, /** @type {string} */ usual = "") => (value.trim() === usual ? [] : [`--${name}`, value.trim()]);
-  return ["oblique", "submit", "--name", form.name.trim() || "NAME", ...flag("preset", form.preset, kUsual.preset), ...flag("integrator", form.integrator, kUsual.integrator),
+  return ["oblique", file ? "run" : "submit", "--name", form.name.trim() || "NAME", ...flag("preset", form.preset, kUsual.preset), ...flag("integrator", form.integrator, kUsual.integrator),
     ...others_of(form).flatMap(([key, text]) => flag(key.replaceAll("_", "-"), text)), ...flag("H", form.H), ...flag("mu", form.mu), ...flag("e", form.e),
-    ...flag("sample", form.sample), ...flag("where", form.where), ...(form.errors ? ["--errors"] : []), ...flag("priority", form.priority, kUsual.priority)].map(quoted).join(" ");
+    ...flag("sample", form.sample), ...flag("where", form.where), ...(form.errors ? ["--errors"] : []), ...(file ? [] : flag("priority", form.priority, kUsual.priority))].map(quoted).join(" ") + of_file(file);
 }
 
 /** What a form says unless somebody chooses. */
@@ -239,7 +239,7 @@ export function start_view(root, place) {
     const filled = values();
     try {
       judging.begin(filled);
-      commands.replaceChildren(h("p", {}, "The same on a command line:"), copied("the command of the study", command_of(filled)));
+      commands.replaceChildren(h("p", {}, `The same on a command line${place.file && ", once oblique view has ended"}:`), copied("the command of the study", command_of(filled, place.file)));
     } catch (error) {
       show(String(/** @type {Error} */ (error).message), true);
     }

@@ -34,8 +34,12 @@ const CLI::Option* StopWithParent::add_to(CLI::App& app) {
   return option_;
 }
 
+bool StopWithParent::is_wanted() const {
+  return option_ != nullptr && option_->count() > 0;
+}
+
 bool StopWithParent::begin() const {
-  if (option_ == nullptr || option_->count() == 0) {
+  if (!is_wanted()) {
     return true;
   }
   if (prctl(PR_SET_PDEATHSIG, SIGTERM) != 0) {

@@ -16,6 +16,9 @@ class StopWithParent {
   /// Adds the option and gives it back. This must live as long as `app`.
   const CLI::Option* add_to(CLI::App& app);
 
+  /// After the command line is parsed: whether the option was given.
+  bool is_wanted() const;
+
   /// After the command line is parsed and signals are watched: asks the system for the signal, if
   /// the option was given. False when the parent has ended already, which one that gave its own
   /// process id learns whenever it was. Throws std::system_error when the system refuses.

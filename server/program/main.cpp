@@ -246,6 +246,9 @@ int main(int argc, char** argv) {
     if (const auto exit_code = finish_options(app, configuration, options)) {
       return *exit_code;
     }
+    if (options.loop.web) {
+      options.loop.web->page.is_of_file = parent.is_wanted();
+    }
     oblique::protocol::set_up_log(kProgram, options.log);
     return run(options.loop, options.ready_fd, parent);
   } catch (const std::exception& error) {

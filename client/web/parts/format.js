@@ -47,5 +47,8 @@ export function quoted(text) {
   return /^[A-Za-z0-9_.,:=/@%+-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`;
 }
 
+/** What tells a command the file that it is to read; empty: it asks the server. @param {string} file */
+export const of_file = (file) => (file ? ` --db ${quoted(file)}` : "");
+
 /** A line of a CSV file, without its end. @param {any[]} values */
 export const csv_line = (values) => values.map((value) => (/[",\r\n]/.test(String(value)) ? `"${String(value).replaceAll('"', '""')}"` : value)).join(",");

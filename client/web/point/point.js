@@ -2,7 +2,7 @@
 // A point: its numbers, its contact over time, and the finger moving.
 import { copied, h, named, picker, save } from "/parts/dom.js";
 import { file_link, file_sayer } from "/parts/file_link.js";
-import { count, quoted, shown, with_unit } from "/parts/format.js";
+import { count, of_file, quoted, shown, with_unit } from "/parts/format.js";
 import { line_plot } from "/parts/lines.js";
 import { json } from "/server.js";
 import { wanted_of } from "/study/asked/between.js";
@@ -112,7 +112,7 @@ export async function point_view(root, place, study, point) {
   const of_study = asker_of(() => id, is_between, signal);
   const name = () => (is_between ? `${whole.name}-between` : told.name);
   function show_take() {
-    if (told) take.replaceChildren(...things_to_take(id, point, name(), told.row, whole, wanted));
+    if (told) take.replaceChildren(...things_to_take(id, point, name(), told.row, whole, wanted, of_file(place.file)));
   }
   const [facts, numbers] = [h("div", {}), h("div", {})];
   function show_known() {
@@ -172,8 +172,8 @@ function look_again(study, told, ask) {
 
 const kPanels = ["forces", "loop", "deformation", "velocities", "energies", "shape"];
 
-/** Its pictures as oblique plot draws them, and the command. @param {number} study @param {number} point @param {string} name @param {boolean} has_command */
-function pictures_to_take(study, point, name, has_command) {
+/** Its pictures as oblique plot draws them, and the command. @param {number} study @param {number} point @param {string} name @param {string | null} from of which file the command reads it; null: there is none */
+function pictures_to_take(study, point, name, from) {
   const files = h("div", { class: "row files" });
   const { said, say } = file_sayer();
   const command = h("div", {});
@@ -182,7 +182,7 @@ function pictures_to_take(study, point, name, has_command) {
       `/api/studies/${study}/points/${point}/picture?${new URLSearchParams({ ...(panel ? { panel } : {}), format })}`, say);
     say("");
     files.replaceChildren(...["svg", "png", "csv"].map(link), said);
-    if (has_command) command.replaceChildren(copied("the command of the picture", `oblique plot ${quoted(name)} --point ${point}${panel ? ` --panel ${panel}` : ""} --out picture.svg`));
+    if (from !== null) command.replaceChildren(copied("the command of the picture", `oblique plot ${quoted(name)} --point ${point}${panel ? ` --panel ${panel}` : ""} --out picture.svg${from}`));
   };
   choose("");
   return [h("div", { class: "row" }, named("pictures, as oblique plot draws them", picker([["", "all"], ...kPanels.map((one) => [one, one])], "", choose)), files), command];
@@ -190,13 +190,13 @@ function pictures_to_take(study, point, name, has_command) {
 
 /**
  * @param {number} id of the study that has it @param {number} point @param {string} name @param {any} row null: it is not solved
- * @param {any} whole the study @param {any} wanted what lies between its points; null: it is one of them
+ * @param {any} whole the study @param {any} wanted what lies between its points; null: it is one of them @param {string} from of which file commands read it
  */
-function things_to_take(id, point, name, row, whole, wanted) {
+function things_to_take(id, point, name, row, whole, wanted, from) {
   const commands = wanted ? [h("p", {}, "The address of this page finds this point again or solves it anew, as does:"), ...(row ? [copied("the command of the point", solve_command(whole, wanted, row))] : [])]
-    : [h("p", {}, "Its time histories:"), copied("the command of the trace", `oblique trace ${quoted(name)} ${point} --out trace.csv`),
-      h("p", {}, "Its row:"), copied("the command of the row", `oblique query ${quoted(name)} --where 'point = ${point}'`)];
-  return [h("h2", {}, "Take it with you"), ...pictures_to_take(id, point, name, wanted === null), ...commands,
+    : [h("p", {}, "Its time histories:"), copied("the command of the trace", `oblique trace ${quoted(name)} ${point} --out trace.csv${from}`),
+      h("p", {}, "Its row:"), copied("the command of the row", `oblique query ${quoted(name)} --where 'point = ${point}'${from}`)];
+  return [h("h2", {}, "Take it with you"), ...pictures_to_take(id, point, name, wanted ? null : from), ...commands,
     h("a", { class: "button", download: `${name}-${point}-row.csv`, href: `/api/studies/${id}/rows?${new URLSearchParams({ where: `point = ${point}`, format: "csv" })}` }, "Row as CSV")];
 }
 

@@ -112,6 +112,28 @@ export function asked_ranges(study, block, keys, before) {
   return ranges.every((one) => one !== undefined) ? Object.fromEntries(keys.map((key, i) => [key, ranges[i]])) : null;
 }
 
+/**
+ * The axis of whose values each is a line where lines say more than a map: cells as tall as the distance of few values
+ * would reach to what an axis cannot have. As `oblique plot` has it. @param {Block} block
+ */
+function lines_of_few(block) {
+  const axes = varying(block);
+  if (block.kind !== "grid" || axes.length !== 2) return "";
+  const few = axes[0].values < axes[1].values ? axes[0] : axes[1];
+  return few.values <= kFewLines ? few.key : "";
+}
+
+/** What a study is shown as unless somebody chooses. @param {URLSearchParams} fields @param {Block | undefined} block */
+function choose_picture(fields, block) {
+  const few = block && !["x", "y", "z"].some((name) => fields.get(name)) ? lines_of_few(block) : "";
+  if (few) {
+    fields.set("x", varying(/** @type {Block} */ (block)).map((axis) => axis.key).find((key) => key !== few) ?? "");
+    fields.set("y", few);
+  }
+  fields.set("pic", !block ? "gathered" : few || varying(block).length < 2 ? "lines" : "map");
+}
+
+const kFewLines = 3;
 const kOfGrids = ["map", "lines"];
 const kPictures = [...kOfGrids, "gathered", "histogram"];
 
@@ -125,7 +147,7 @@ export function fill_in(fields, study, may_solve) {
   const usual = usual_block(study.blocks);
   const has_grid = may_solve && study.blocks.some((/** @type {Block} */ one) => one.kind === "grid");
   if (!kPictures.includes(is("pic")) || (kOfGrids.includes(is("pic")) && usual < 0 && !(has_grid && is("pic") === "map"))) fields.delete("pic");
-  if (!is("pic")) fields.set("pic", usual >= 0 ? (varying(study.blocks[usual]).length > 1 ? "map" : "lines") : "gathered");
+  if (!is("pic")) choose_picture(fields, study.blocks[usual]);
   if (kOfGrids.includes(is("pic"))) {
     fill_in_axes(fields, study, may_solve && is("pic") === "map");
   } else {

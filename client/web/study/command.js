@@ -1,6 +1,6 @@
 // @ts-check
 // A view as the server's picture of it, and as the commands that make it.
-import { quoted } from "/parts/format.js";
+import { of_file, quoted } from "/parts/format.js";
 import { column_of, joined, within } from "./conditions.js";
 
 /**
@@ -69,19 +69,19 @@ export function run_command(view, name) {
   const said = (/** @type {any} */ axis) => axis.expression ?? axis.values?.join(",") ?? [axis.from, axis.to, axis.count, ...(axis.spacing ? ["log"] : [])].join(":");
   const flag = (/** @type {string} */ key, /** @type {any} */ value) => `--${key.replaceAll("_", "-")} ${quoted(String(value))}`;
   return ["oblique run", flag("name", name), ...axes.map((/** @type {any} */ axis) => flag(axis.key, said(axis))),
-    ...model.map((/** @type {any} */ one) => flag(one.key, one.value)), ...(where ? [flag("where", where)] : [])].join(" ");
+    ...model.map((/** @type {any} */ one) => flag(one.key, one.value)), ...(where ? [flag("where", where)] : [])].join(" ") + of_file(view.place.file);
 }
 
 /** @param {View} view @param {string} [name] of the study */
 export function plot_command(view, name = view.study.name) {
   const of = picture_fields(view);
   const ticks = [["xlog", "--log-x"], ["ylog", "--log-y"], ["zlog", "--log-colour"]].filter(([name]) => of[name]).map(([, flag]) => flag);
-  return ["oblique plot", quoted(name), ...flags(of).map(([flag, value]) => `--${flag} ${quoted(value)}`), ...ticks, "--out picture.svg"].join(" ");
+  return ["oblique plot", quoted(name), ...flags(of).map(([flag, value]) => `--${flag} ${quoted(value)}`), ...ticks, "--out picture.svg"].join(" ") + of_file(view.place.file);
 }
 
 /** @param {View} view */
 export function query_command(view) {
   const where = view.table.condition();
   return ["oblique query", quoted(view.study.name), "--select", view.row_columns().join(","), ...(where ? ["--where", quoted(where)] : []),
-    ...(view.is("order") ? ["--order", quoted(view.is("order"))] : [])].join(" ");
+    ...(view.is("order") ? ["--order", quoted(view.is("order"))] : [])].join(" ") + of_file(view.place.file);
 }

@@ -26,7 +26,7 @@ export function show_takeaways(view) {
     const { kept_as } = view.solving;
     const name = kept_as || `${view.study.name}-part`;
     const what = kept_as ? "These points are kept as a study."
-      : "What is solved while one looks goes when nobody looks. The address of this view finds it again or solves it anew; or keep it as a study.";
+      : `What is solved while one looks goes when nobody looks. The address of this view finds it again or solves it anew; or keep it as a study.${view.place.file && " The first command is for when oblique view has ended."}`;
     show_parts(view.commands, h("p", { class: "weak" }, what), files(view, name, view.solving.id),
       ...(view.solving.block ? [copied("the command that solves it", run_command(view, name)), copied("the command of the picture", plot_command(view, name))] : []));
     return;
@@ -36,7 +36,8 @@ export function show_takeaways(view) {
     h("p", {}, "The picture, as oblique plot draws it:"), files(view, view.study.name, view.study.id),
     copied("the command of the picture", plot_command(view)),
     h("p", {}, "The rows of the table:"), copied("the command of the rows", query_command(view)),
-    h("p", { class: "weak" }, "Add --db FILE or --server ADDRESS where the database is not oblique.db. The address of this view is a link to it."),
+    h("p", { class: "weak" }, view.place.file ? "The address of this view is a link to it, as long as oblique view goes on."
+      : "Add --db FILE or --server ADDRESS where the database is not oblique.db. The address of this view is a link to it."),
     h("div", { class: "row" }, h("button", { type: "button", onclick: async () => {
       try {
         await navigator.clipboard.writeText(location.href);

@@ -1,5 +1,6 @@
 #include "server/web/answers/fields.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <stdexcept>
@@ -22,6 +23,12 @@ std::optional<Number> read_as(const std::string& text) {
 }
 
 }  // namespace
+
+bool is_text(const std::map<std::string, std::string>& fields) {
+  return std::all_of(fields.begin(), fields.end(), [](const auto& field) {
+    return protocol::is_utf8(field.first) && protocol::is_utf8(field.second);
+  });
+}
 
 std::optional<std::string> FieldReader::text(const std::string& name) const {
   const auto field = fields_.find(name);

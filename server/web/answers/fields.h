@@ -9,6 +9,9 @@
 
 namespace oblique::server {
 
+/// Whether all of them are UTF-8: messages to the service have nothing else.
+bool is_text(const std::map<std::string, std::string>& fields);
+
 /// What follows the question mark of a request, read field by field. Each throws
 /// std::invalid_argument, naming the field and what is allowed.
 class FieldReader {

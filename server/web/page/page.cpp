@@ -7,7 +7,6 @@
 #include <string_view>
 #include <utility>
 
-#include "proto/text.h"
 #include "server/web/answers/fields.h"
 #include "server/web/answers/study_answers.h"
 #include "server/web/http/json_answer.h"
@@ -49,13 +48,6 @@ HttpAnswer nothing_there() {
   return error_answer(kNothingThere, "there is nothing here");
 }
 
-/// Messages to the service have nothing else.
-bool is_text(const Fields& fields) {
-  return std::all_of(fields.begin(), fields.end(), [](const auto& field) {
-    return protocol::is_utf8(field.first) && protocol::is_utf8(field.second);
-  });
-}
-
 /// Takes a number from the front; nothing: there is none.
 std::optional<std::uint64_t> take_number(std::string_view& text) {
   std::uint64_t number = 0;
@@ -71,6 +63,7 @@ std::optional<std::uint64_t> take_number(std::string_view& text) {
 
 Page::Page(const PageSettings& settings, const Neighbours& neighbours)
     : shows_without_token_(settings.shows_without_token),
+      file_(settings.is_of_file ? settings.pictures.database : ""),
       version_(settings.version),
       key_(settings.token.empty() ? PageKey() : PageKey(settings.token)),
       at_(neighbours),
@@ -156,6 +149,7 @@ HttpAnswer Page::session(const HttpQuestion& question) const {
   return json_answer({{"version", version_},
                       {"may_look", trusted || shows_without_token_},
                       {"may_change", trusted},
+                      {"file", trusted ? file_ : ""},
                       {"how_to_enter", trusted ? "" : kHowToEnter}});
 }
 

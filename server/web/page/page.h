@@ -23,6 +23,8 @@ struct PageSettings {
   std::string token;
   /// Who comes without it may look, and change nothing.
   bool shows_without_token = false;
+  /// The server is of one who shows a file, and ends with that: commands read the file.
+  bool is_of_file = false;
   /// A study that was made to be looked at goes when nobody has for so long.
   std::chrono::milliseconds looks_kept{6000};
   PictureSettings pictures = {};
@@ -94,6 +96,7 @@ class Page {
   void hear_those_left();
 
   bool shows_without_token_;
+  std::string file_;  // empty: commands ask the server
   std::string version_;
   PageKey key_;
   Neighbours at_;

@@ -54,7 +54,7 @@ test("a form that is wrong says what is allowed, filters are counted, and a serv
   await write(fields[2], "1:2:11");
   await write(fields[5], "mu > 1.75");
   await until(page, () => document.querySelector("form [role=status]").textContent.startsWith("3 points,") || document.querySelector("form [role=status]").textContent === "3 points.");
-  assert.match(await page.$eval(".copied code", (one) => one.textContent), /--mu 1:2:11 --e 1 --where 'mu > 1.75'$/);
+  assert.match(await page.$eval(".copied code", (one) => one.textContent), /--mu 1:2:11 --e 1 --where 'mu > 1.75' --db \S+$/);
   await write(fields[0], "friction");  // there is one, of other points
   await page.click("form button");
   await until(page, () => document.querySelector("form [role=alert]").textContent.includes("friction"));
@@ -167,7 +167,7 @@ test("the command of a form makes the study that the form starts: model, sample,
   for (const [i, choice] of [[0, "printed"], [2, "10"]]) await (await page.$$("form select"))[i].select(choice);
   assert.match(await text_of(page, "form [role=status]"), /^16 points at most/);
   const command = await text_of(page, ".copied code");
-  assert.match(command, /--preset printed --tolerance 1e-3 --k 2e7 .*--errors --priority 10$/);
+  assert.match(command, /--preset printed --tolerance 1e-3 --k 2e7 .*--errors --db \S+$/, "the file's, once the page is closed: alone it needs no priority");
   await page.click("form button");
   const id = await until(page, () => /^#\/study\/(\d+)/.exec(location.hash)?.[1]);
   await until(page, () => document.querySelector(".standing").textContent.startsWith("done"));
@@ -175,8 +175,8 @@ test("the command of a form makes the study that the form starts: model, sample,
   assert.equal(told.errors, true);
   await page.close();
   const other = join(server.folder, "form.db");
-  const flags = command.match(/'[^']*'|\S+/g).map((word) => word.replaceAll("'", "")).slice(2).filter((_, i, all) => all[i] !== "--priority" && all[i - 1] !== "--priority");
-  const made = spawnSync(server.oblique, ["run", ...flags, "--db", other, "--workers", "1"], { encoding: "utf8" });
+  const flags = command.match(/'[^']*'|\S+/g).map((word) => word.replaceAll("'", "")).slice(1, -1);
+  const made = spawnSync(server.oblique, [...flags, other, "--workers", "1"], { encoding: "utf8" });
   assert.equal(made.status, 0, made.stderr);
   const points = (database) => spawnSync(server.oblique, ["query", "drawn", "--select", "point,H,mu,e,k,eta2,fn_peak_N", "--format", "csv", "--db", database], { encoding: "utf8" }).stdout;
   assert.match(points(other), /\n\d+,0\.\d+,0\.\d+,1,2e\+07,1.21/);

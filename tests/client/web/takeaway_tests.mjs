@@ -13,11 +13,14 @@ const file = (page, text) => page.evaluate(async (wanted) => {
   return { name: link.download, status: answer.status, text: await answer.text() };
 }, text);
 
-/** Runs a command that the page shows, as a shell would, on the database of the page. */
+/** Runs a command that the page shows, as a shell would: it names the database that the page is of, instead of which another may be taken. */
 function made_by(command, out, database = server.database) {
   const [, ...words] = ["oblique", ...command.replace(/^oblique /, "").replace("--out picture.svg", `--out ${out}`)
     .match(/'(?:[^']|'\\'')*'|\S+/g).map((word) => word.replace(/^'|'$/g, "").replaceAll("'\\''", "'"))];
-  const made = spawnSync(server.oblique, [...words, "--db", database], { encoding: "utf8" });
+  const at = words.indexOf("--db") + 1;
+  assert.ok(at > 0 && words[at] === server.database, command);
+  words[at] = database;
+  const made = spawnSync(server.oblique, words, { encoding: "utf8" });
   assert.equal(made.status, 0, made.stderr);
   return made.stdout;
 }

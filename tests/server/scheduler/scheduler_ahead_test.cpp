@@ -16,23 +16,21 @@ StudyTerms terms_of(std::int32_t priority) {
   return terms;
 }
 
-/// A worker that has solved something holds two batches of a long study of priority 3, all it asked for.
+/// A worker that has solved something holds two batches of a long study of priority 3, all it asked
+/// for.
 class SchedulerAheadTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    bench_.feed(StudyAdded{.study = kSweep,
-                           .table = table_of(1'000'000),
-                           .settled = {},
-                           .terms = terms_of(3)});
+    bench_.feed(StudyAdded{
+        .study = kSweep, .table = table_of(1'000'000), .settled = {}, .terms = terms_of(3)});
     const SendBatch first = bench_.join(1, 1).at(0);
-    sweep_ = {bench_.next_after(first, 1e-3), only<SendBatch>(bench_.feed(CreditGiven{1, 1})).at(0)};
+    sweep_ = {bench_.next_after(first, 1e-3),
+              only<SendBatch>(bench_.feed(CreditGiven{1, 1})).at(0)};
   }
 
   std::vector<SendBatch> add_urgent(std::int32_t priority, std::uint64_t points = 1000) {
-    return only<SendBatch>(bench_.feed(StudyAdded{.study = kUrgent,
-                                                  .table = table_of(points),
-                                                  .settled = {},
-                                                  .terms = terms_of(priority)}));
+    return only<SendBatch>(bench_.feed(StudyAdded{
+        .study = kUrgent, .table = table_of(points), .settled = {}, .terms = terms_of(priority)}));
   }
 
   SchedulerBench bench_;

@@ -73,3 +73,11 @@ test("of a large study a coarse picture comes first when it is opened or its pic
   assert.deepEqual(steps, [[96, 512], [512], [96, 512], [512]]);
   await page.close();
 });
+
+test("a study with few values along one of its two axes is lines unless somebody chooses, as a map would reach to what cannot be", async () => {
+  const id = await submit("few", { H: [1, 1, 1], mu: [0.1, 2, 7], e: [0.6, 1, 3] });
+  const page = await study(`#/study/${id}`);
+  await until(page, () => document.querySelector(".commands code"));
+  assert.match(await text_of(page, ".commands code"), /^oblique plot few --lines fn_peak_N --x mu --by e /);
+  await page.close();
+});

@@ -26,6 +26,15 @@ TEST(PageAccess, ATokenBecomesACookieAndGoesFromTheAddress) {
   EXPECT_EQ(page.json("/api/session")["may_change"], true);
 }
 
+TEST(PageAccess, OnlyAServerThatShowsAFileTellsCommandsToReadItAndOnlyThoseWhoAreIn) {
+  EXPECT_EQ(PageServer().json("/api/session")["file"], "");
+  WebSettings web = page_settings();
+  web.page.is_of_file = true;
+  const PageServer page(web);
+  EXPECT_EQ(page.json("/api/session")["file"], page.database());
+  EXPECT_EQ(nlohmann::json::parse(body_of(page.ask("GET", "/api/session", "")))["file"], "");
+}
+
 TEST(PageAccess, AWrongTokenIsRefused) {
   const PageServer page;
   for (const std::string token :
