@@ -227,6 +227,7 @@ class Scheduler {
   void standing_of_processes_changed();
   bool probe(WorkerId id, Worker& worker);
   void check_losses() const;
+  void check_lines() const;
 
   void dispatch();
   bool serve(WorkerId id, Worker& worker);

@@ -70,6 +70,16 @@ void Scheduler::check_invariants() const {
     leases += worker.leases.size();
     draining += worker.draining ? 1U : 0U;
     ++versions[worker.solver_version];
+  }
+  check_losses();
+  check_lines();
+  require(draining == draining_ && versions == versions_, "workers are miscounted");
+  require(threads == threads_, "the number of threads is wrong");
+  require(leases == leases_.size(), "a worker holds a lease that does not exist");
+}
+
+void Scheduler::check_lines() const {
+  for (const auto& [id, worker] : workers_) {
     require(ready_workers_.contains(id) == (worker.credit > 0),
             "a worker with credit is not in the line, or one without is");
     require(!full_workers_.contains(id) || (worker.credit == 0 && worker.ahead == 0),
@@ -77,11 +87,7 @@ void Scheduler::check_invariants() const {
     require(worker.ahead == 0 || worker.leases.contains(worker.ahead),
             "what a worker got ahead is not one of its leases");
   }
-  check_losses();
   require(ready_workers_.size() <= workers_.size(), "a worker that is gone stands in the line");
-  require(draining == draining_ && versions == versions_, "workers are miscounted");
-  require(threads == threads_, "the number of threads is wrong");
-  require(leases == leases_.size(), "a worker holds a lease that does not exist");
   require(full_workers_.size() <= workers_.size(), "a worker that is gone stands in a line");
   std::map<std::int32_t, std::size_t> priorities;
   for (const auto& [id, lease] : leases_) {
