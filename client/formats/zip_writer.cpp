@@ -12,7 +12,7 @@ constexpr std::uint32_t kEnd = 0x06054b50;
 constexpr std::uint16_t kZip64Field = 0x0001;
 constexpr std::uint16_t kVersion = 45;          // zip64
 constexpr std::uint16_t kMadeBy = 0x0300 | 45;  // Unix, so that the modes below count
-constexpr std::uint32_t kMode = 0100644U << 16U;
+constexpr std::uint32_t kUnixMode = 0100644U << 16U;
 constexpr std::uint16_t kNamesAreUtf8 = 0x0800;
 constexpr std::uint16_t kFirstDay =
     (1U << 5U) | 1U;                         // 1980-01-01: archives of equal rows are equal
@@ -83,7 +83,7 @@ void ZipWriter::end() {
     put16(entry, 0);  // comment
     put16(entry, 0);  // disk
     put16(entry, 0);  // kind of contents
-    put32(entry, kMode);
+    put32(entry, kUnixMode);
     put32(entry, kIn64);
     entry += member.name;
     put16(entry, kZip64Field);

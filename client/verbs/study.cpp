@@ -33,7 +33,7 @@ constexpr const char* kStudyExamples = R"help(Examples:
   oblique study check sweep.toml --json
   oblique study check --sample sobol:100000:1 --H 0.3:1.1 --mu "normal(0.4,0.05,0,)" --e 0.9)help";
 
-constexpr const char* kCheckExamples = R"(Examples:
+constexpr const char* kStudyCheckExamples = R"(Examples:
   oblique study check deploy/studies/paper.toml
   oblique study check sweep.toml --json
   oblique study check --H 1 --mu 0.01:2:40:log --e 0.6,0.8,1 --where "mu > 0.5 * e"
@@ -293,7 +293,7 @@ void add_study(CLI::App& app, Command& command) {
   auto flags = std::make_shared<CheckFlags>();
   auto* check = verb->add_subcommand(
       "check", "Say how many points a study has, which, and what they will cost; or what is wrong");
-  check->footer(kCheckExamples);
+  check->footer(kStudyCheckExamples);
   check->add_flag("--json", flags->json, "print one JSON object");
   check->add_flag("--no-rate", flags->no_rate, "solve no points, and estimate no time");
   add_study_flags(*check, flags->study, command.names_single_lengths);

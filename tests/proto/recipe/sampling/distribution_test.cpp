@@ -12,8 +12,6 @@
 namespace oblique::sampling {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
 /// Mean of `of` over the values in the middles of `n` equal parts: the integral over the
 /// distribution, nearly.
 double mean_of(const Distribution& distribution, const std::function<double(double)>& of) {
@@ -62,8 +60,8 @@ TEST(NormalTest, PartsBelowAreThoseOfTheErrorFunction) {
   for (double z = -8.0; z < 8.0; z += 0.01) {
     EXPECT_NEAR(normal_part_below(z) / (0.5 * std::erfc(-z / std::sqrt(2.0))), 1.0, 1e-14) << z;
   }
-  EXPECT_EQ(normal_part_below(-kInfinity), 0.0);
-  EXPECT_EQ(normal_part_below(kInfinity), 1.0);
+  EXPECT_EQ(normal_part_below(-std::numeric_limits<double>::infinity()), 0.0);
+  EXPECT_EQ(normal_part_below(std::numeric_limits<double>::infinity()), 1.0);
 }
 
 TEST(DistributionTest, UniformValuesHaveTheirMomentsAndTheirEndsAsLimits) {
@@ -83,7 +81,8 @@ TEST(DistributionTest, LogUniformValuesHaveAUniformLogarithm) {
 }
 
 TEST(DistributionTest, NormalValuesHaveTheirMomentsAndQuantiles) {
-  const auto normal = Distribution::normal(0.4, 0.05, -kInfinity, kInfinity);
+  const auto normal = Distribution::normal(0.4, 0.05, -std::numeric_limits<double>::infinity(),
+                                           std::numeric_limits<double>::infinity());
   EXPECT_NEAR(mean(normal), 0.4, 1e-12);
   EXPECT_NEAR(variance(normal), 0.05 * 0.05, 1e-6);
   EXPECT_EQ(normal.value_at(0.5), 0.4);
@@ -98,8 +97,12 @@ TEST(DistributionTest, ATruncatedNormalHasTheMomentsOfTheory) {
     return std::isinf(z) ? 0.0 : std::exp(-z * z / 2.0) / std::sqrt(2.0 * std::acos(-1.0));
   };
   const auto edge = [&](double z) { return std::isinf(z) ? 0.0 : z * phi(z); };
-  for (const auto& [a, b] : std::vector<std::pair<double, double>>{
-           {-1.0, 1.0}, {-0.5, kInfinity}, {-kInfinity, -2.0}, {3.0, kInfinity}, {5.0, 6.0}}) {
+  for (const auto& [a, b] :
+       std::vector<std::pair<double, double>>{{-1.0, 1.0},
+                                              {-0.5, std::numeric_limits<double>::infinity()},
+                                              {-std::numeric_limits<double>::infinity(), -2.0},
+                                              {3.0, std::numeric_limits<double>::infinity()},
+                                              {5.0, 6.0}}) {
     const auto cut = Distribution::normal(10.0, 2.0, 10.0 + 2.0 * a, 10.0 + 2.0 * b);
     const double part = a > 0.0 ? normal_part_below(-a) - normal_part_below(-b)
                                 : normal_part_below(b) - normal_part_below(a);
@@ -131,14 +134,18 @@ TEST(DistributionTest, ValuesRiseWithTheFractionAndStayBetweenTheEnds) {
 TEST(DistributionTest, WhatIsLeftTooFarFromTheMeanIsSaid) {
   EXPECT_GT(Distribution::normal(0.0, 1.0, 36.0, 37.0).part_left(), Distribution::kLeastPart);
   EXPECT_LT(Distribution::normal(0.0, 1.0, 38.0, 39.0).part_left(), Distribution::kLeastPart);
-  EXPECT_EQ(Distribution::normal(0.0, 1.0, 1e10, kInfinity).part_left(), 0.0);
+  EXPECT_EQ(
+      Distribution::normal(0.0, 1.0, 1e10, std::numeric_limits<double>::infinity()).part_left(),
+      0.0);
 }
 
 // A study's points are these for ever, on every machine.
 TEST(DistributionTest, ValuesAreThoseOfTheFirstVersion) {
   EXPECT_EQ(Distribution::uniform(0.3, 1.1).value_at(0.123), 0.39839999999999998);
   EXPECT_EQ(Distribution::log_uniform(0.01, 2.0).value_at(0.123), 0.019187866556359772);
-  EXPECT_EQ(Distribution::normal(0.4, 0.05, 0.0, kInfinity).value_at(0.123), 0.34199400585012418);
+  EXPECT_EQ(
+      Distribution::normal(0.4, 0.05, 0.0, std::numeric_limits<double>::infinity()).value_at(0.123),
+      0.34199400585012418);
   EXPECT_EQ(Distribution::normal(0.4, 0.05, 0.5, 0.6).value_at(0.987), 0.57040805991834731);
 }
 
