@@ -40,8 +40,8 @@ class MadeFiles {
 };
 
 void make_folder(const std::string& folder, MadeFiles& made) {
-  constexpr mode_t kOwnersAlone = 0700;
-  if (::mkdir(folder.c_str(), kOwnersAlone) == 0) {
+  constexpr mode_t kFolderMode = 0700;
+  if (::mkdir(folder.c_str(), kFolderMode) == 0) {
     made.add(folder);
   } else if (errno != EEXIST) {
     throw std::runtime_error(

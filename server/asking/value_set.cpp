@@ -25,8 +25,8 @@ bool meets(const ValueRange& a, const ValueRange& b) {
 }  // namespace
 
 ValueSet ValueSet::all() {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  return ValueSet({-kInfinity, kInfinity});
+  return ValueSet(
+      {-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()});
 }
 
 ValueSet::ValueSet(ValueRange range) {

@@ -15,11 +15,11 @@ double linear(std::uint8_t channel) {
 }  // namespace
 
 std::string hexadecimal(const Colour& colour) {
-  constexpr std::string_view kDigits = "0123456789abcdef";
+  constexpr std::string_view kHexDigits = "0123456789abcdef";
   std::string text = "#";
   for (const std::uint8_t channel : {colour.red, colour.green, colour.blue}) {
-    text += kDigits[channel >> 4U];
-    text += kDigits[channel & 0xfU];
+    text += kHexDigits[channel >> 4U];
+    text += kHexDigits[channel & 0xfU];
   }
   return text;
 }

@@ -132,7 +132,7 @@ std::vector<PointRun> sampled_runs(const std::vector<PointRun>& runs, std::uint6
 
 SampleBook::Shared SampleBook::sample(const AnswerDesk& desk, std::uint64_t study,
                                       std::span<const ColumnSource> sources) {
-  constexpr std::size_t kMostKept = 4;
+  constexpr std::size_t kMostSamples = 4;
   constexpr int kTimes = 9;
   constexpr Clock::duration kLongestUse = std::chrono::minutes(1);
   const auto begun = Clock::now();
@@ -163,7 +163,7 @@ SampleBook::Shared SampleBook::sample(const AnswerDesk& desk, std::uint64_t stud
   const std::lock_guard lock(mutex_);
   kept_.remove_if(is_it);
   kept_.push_front(now);
-  kept_.resize(std::min(kept_.size(), kMostKept));
+  kept_.resize(std::min(kept_.size(), kMostSamples));
   return now.sample;
 }
 

@@ -21,11 +21,11 @@ class RunTest : public ::testing::Test {
     words.insert(words.end(), points.begin(), points.end());
     return words;
   }
-  static constexpr double kCount = kManyPoints;
+  static constexpr double kPoints = kManyPoints;
 
   /// The server and the workers of a run, once all are there and at work.
   std::vector<pid_t> started_by(const Process& run) {
-    wait_until("rows in the database", [&] { return database_.rows() >= kCount / 400; });
+    wait_until("rows in the database", [&] { return database_.rows() >= kPoints / 400; });
     const auto children = children_of(run.pid());
     EXPECT_EQ(children.size(), 3U);
     return children;
@@ -51,12 +51,12 @@ TEST_F(RunTest, CtrlCLeavesNothingRunningAndTheSameCommandContinues) {
     EXPECT_FALSE(is_running(child));
   }
   const double rows = database_.rows();
-  ASSERT_LT(rows, kCount) << "stopped too late to be a test";
+  ASSERT_LT(rows, kPoints) << "stopped too late to be a test";
   const auto kept = database_.texts("SELECT point || ' ' || solved_at FROM results ORDER BY point");
 
   const Outcome again = run_oblique(folder_, arguments());
   EXPECT_EQ(again.exit_code, 0) << again.err;
-  EXPECT_EQ(database_.rows(), kCount);
+  EXPECT_EQ(database_.rows(), kPoints);
   const auto now = database_.texts("SELECT point || ' ' || solved_at FROM results ORDER BY point");
   EXPECT_TRUE(std::includes(now.begin(), now.end(), kept.begin(), kept.end(),
                             [](const std::string& a, const std::string& b) {
@@ -72,10 +72,10 @@ TEST_F(RunTest, ARunThatIsKilledLeavesNoProcessAndTheSameCommandContinues) {
   run.send(SIGKILL);
   EXPECT_EQ(run.wait(), -SIGKILL);
   expect_gone(children);
-  ASSERT_LT(database_.rows(), kCount) << "killed too late to be a test";
+  ASSERT_LT(database_.rows(), kPoints) << "killed too late to be a test";
   const Outcome again = run_oblique(folder_, arguments());
   EXPECT_EQ(again.exit_code, 0) << again.err;
-  EXPECT_EQ(database_.number("SELECT count(*) FROM results WHERE status = 'solved'"), kCount);
+  EXPECT_EQ(database_.number("SELECT count(*) FROM results WHERE status = 'solved'"), kPoints);
 }
 
 TEST(WorkerOfARunTest, EndsWhenTheRunWasKilledBeforeTheWorkerBegan) {
@@ -95,7 +95,7 @@ TEST_F(RunTest, ARunGoesOnWhenOneOfItsWorkersIsKilled) {
   const pid_t worker = *std::max_element(children.begin(), children.end());  // started last
   kill(worker, SIGKILL);
   EXPECT_EQ(run.wait(), 0) << run.err();
-  EXPECT_EQ(database_.number("SELECT count(*) FROM results WHERE status = 'solved'"), kCount);
+  EXPECT_EQ(database_.number("SELECT count(*) FROM results WHERE status = 'solved'"), kPoints);
 }
 
 TEST_F(RunTest, ASecondRunOnADatabaseInUseIsRefusedAndTheFirstGoesOn) {
@@ -105,7 +105,7 @@ TEST_F(RunTest, ASecondRunOnADatabaseInUseIsRefusedAndTheFirstGoesOn) {
   EXPECT_EQ(second.wait(), 1);
   EXPECT_NE(second.err().find("already uses the database"), std::string::npos) << second.err();
   EXPECT_EQ(first.wait(), 0) << first.err();
-  EXPECT_EQ(database_.number("SELECT count(*) FROM results WHERE status = 'solved'"), kCount);
+  EXPECT_EQ(database_.number("SELECT count(*) FROM results WHERE status = 'solved'"), kPoints);
 }
 
 }  // namespace
