@@ -56,7 +56,7 @@ Connection::Connection(ConnectionSettings settings, KeepWaiting keep_waiting)
     : settings_(std::move(settings)),
       keep_waiting_(std::move(keep_waiting)),
       socket_(protocol::made_dealer(context_, dealer_settings(settings_))),
-      monitor_(context_, socket_, !settings_.waits_for_server) {
+      monitor_(context_, socket_) {
   protocol::connect(socket_, dealer_settings(settings_));
 }
 
@@ -154,9 +154,6 @@ protocol::ClientReply Connection::answer_to(const protocol::ClientRequest& reque
     wait_a_slice(is_unsent(outstanding));
     if (const auto rejection = monitor_.rejection()) {
       throw ConnectionError(protocol::sentence_of(*rejection, dealer_settings(settings_)));
-    }
-    if (!settings_.waits_for_server && monitor_.attempts().failed > 0) {
-      throw ConnectionError(fmt::format("nobody takes connections at {}", settings_.server_url));
     }
     if (auto reply = received(request.request_id())) {
       if (std::exchange(said_silent, false)) {

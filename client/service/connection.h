@@ -25,8 +25,6 @@ struct ConnectionSettings {
   /// again after twice as long.
   std::int64_t resend_after_ms = 3'000;
   std::optional<protocol::KeyFile> key = {};  ///< ours; none: plain text
-  /// Whether it may come later: if not, a connection that is refused is an error at once.
-  bool waits_for_server = true;
 };
 
 /// The server answered that it cannot or will not; the message is its own.

@@ -9,9 +9,6 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/service/source_flags.h"
-#include "client/verbs/completion/stored_names.h"
-#include "proto/keys/key_folder.h"
 #include "proto/recipe/written/written_sample.h"
 #include "server/asking/columns.h"
 #include "worker/solver/model/parameters.h"
@@ -24,7 +21,6 @@ using protocol::Typed;
 
 /// What people write in a place, by the word that help has for it.
 enum class Meaning {
-  kStudy,
   kColumns,
   kColumn,
   kCondition,
@@ -33,7 +29,6 @@ enum class Meaning {
   kDatabase,
   kStudyFile,
   kKeyFile,
-  kListedKey,
   kSample
 };
 
@@ -42,9 +37,6 @@ struct Word {
   Meaning meaning;
 };
 constexpr auto kWords = std::to_array<Word>({
-    {"STUDY", Meaning::kStudy},
-    {"OLD", Meaning::kStudy},
-    {"--study", Meaning::kStudy},
     {"STUDY.toml", Meaning::kStudyFile},
     {"FILE.db", Meaning::kDatabase},
     {"FILES", Meaning::kDatabase},
@@ -64,32 +56,6 @@ constexpr auto kWords = std::to_array<Word>({
     {"--by", Meaning::kKey},
     {"SAMPLE", Meaning::kSample},
 });
-
-std::string given(const Typed& typed, const char* flag) {
-  const auto* option = typed.verb->get_option_no_throw(flag);
-  const auto found = option == nullptr ? typed.given.end() : typed.given.find(option);
-  return found == typed.given.end() || found->second.empty() ? std::string() : found->second.back();
-}
-
-bool has(const Typed& typed, const char* flag) {
-  return typed.verb->get_option_no_throw(flag) != nullptr;
-}
-
-Offers studies(const Typed& typed) {
-  SourceFlags flags{
-      .database = given(typed, "--db"), .server = given(typed, "--server"), .timeout_s = {}};
-  flags.keys = given(typed, "--keys");
-  std::string database = flags.database;
-  if (database.empty() && has(typed, "--db")) {
-    database = has(typed, "--server") ? database_meant(flags) : DatabaseSettings().file;
-  }
-  Offers offers;
-  for (const auto& name : database.empty() ? names_at_server(flags, typed.value)
-                                           : names_in_database(database, typed.value)) {
-    offer_value(offers, typed, name);
-  }
-  return offers;
-}
 
 /// Of names, at the end of what is typed.
 std::size_t begin_of_name(std::string_view text) {
@@ -145,16 +111,6 @@ Offers keys(const Typed& typed, const std::string& end, bool goes_on) {
   return offers;
 }
 
-Offers listed_keys(const Typed& typed) {
-  Offers offers;
-  const auto folder = protocol::key_folder_meant(given(typed, "--dir"));
-  const auto keys = protocol::read_authorized_keys(protocol::authorized_keys_in(folder));
-  for (const auto& key : keys.all()) {
-    offer_value(offers, typed, key.name, std::string(protocol::name_of(key.role)));
-  }
-  return offers;
-}
-
 Offers sample_kinds(const Typed& typed) {
   Offers offers{.offers = {}, .goes_on = true};
   for (const auto kind : protocol::sample_names()) {
@@ -167,10 +123,7 @@ Offers files(const char* ending) {
   return {.offers = {}, .files = protocol::FileNames{.ending = ending}};
 }
 
-std::optional<Meaning> meaning_of(const CLI::App& verb, const CLI::Option& option) {
-  if (verb.get_name() == "revoke" && option.get_positional()) {  // a NAME, as also new ones are
-    return Meaning::kListedKey;
-  }
+std::optional<Meaning> meaning_of(const CLI::Option& option) {
   const auto has_name = [&option](const Word& word) {
     return option.check_name(std::string(word.option)) || option.get_type_name() == word.option;
   };
@@ -181,13 +134,11 @@ std::optional<Meaning> meaning_of(const CLI::App& verb, const CLI::Option& optio
 }  // namespace
 
 std::optional<Offers> values_of_verbs(const Typed& typed) {
-  const auto meaning = meaning_of(*typed.verb, *typed.option);
+  const auto meaning = meaning_of(*typed.option);
   if (!meaning) {
     return std::nullopt;
   }
   switch (*meaning) {
-    case Meaning::kStudy:
-      return studies(typed);
     case Meaning::kColumns:
       return columns(typed);
     case Meaning::kColumn: {
@@ -207,8 +158,6 @@ std::optional<Offers> values_of_verbs(const Typed& typed) {
       return files("toml");
     case Meaning::kKeyFile:
       return files("key");
-    case Meaning::kListedKey:
-      return listed_keys(typed);
     case Meaning::kSample:
       return sample_kinds(typed);
   }

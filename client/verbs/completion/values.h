@@ -6,8 +6,8 @@
 
 namespace oblique::client {
 
-/// What a value of a verb may be beyond what its option tells: studies of the database or server
-/// that is named beside it, columns, keys of models, files by what is in them.
+/// What a value of a verb may be beyond what its option tells: columns, keys of models, files by
+/// what is in them.
 std::optional<protocol::Offers> values_of_verbs(const protocol::Typed& typed);
 
 }  // namespace oblique::client

@@ -9,10 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include <sys/time.h>
 #include <unistd.h>
-
-#include <csignal>
 
 #include "proto/program/completion/bash_line.h"
 #include "proto/program/exit_code.h"
@@ -22,16 +19,6 @@ namespace oblique::protocol {
 namespace {
 
 constexpr std::string_view kHiddenVerb = "__complete";
-
-/// Whatever is waited for, a disk or a network, the shell has its prompt back after so long.
-void end_in_time() {
-  constexpr suseconds_t kLongest_us = 500'000;
-  struct sigaction action {};
-  action.sa_handler = [](int) { ::_exit(kDone); };
-  ::sigaction(SIGALRM, &action, nullptr);
-  const itimerval longest{{0, 0}, {0, kLongest_us}};
-  ::setitimer(ITIMER_REAL, &longest, nullptr);
-}
 
 /// What the script is to do beside offering what follows.
 std::string order_of(const Offers& offers) {
@@ -59,8 +46,6 @@ class BashAnswer {
       : type_(std::move(type)), line_(std::move(line)), replaced_(std::move(replaced)) {
     if (line_.escapes && !replaced_.empty()) {
       replaced_.pop_back();
-    } else if (ends_in_dollar()) {
-      replaced_.insert(replaced_.size() - 1, 1, '\\');  // what follows would be expanded with it
     }
   }
 
@@ -95,17 +80,6 @@ class BashAnswer {
   }
 
  private:
-  /// In one that bash would expand: between double quotes no backslash makes a parenthesis behind
-  /// it plain, and a name may be a command in these.
-  bool ends_in_dollar() const {
-    const std::size_t dollar = replaced_.empty() ? 0 : replaced_.size() - 1;
-    std::size_t escapes = dollar;
-    while (escapes > 0 && replaced_[escapes - 1] == '\\') {
-      --escapes;
-    }
-    return replaced_.ends_with('$') && line_.quote != '\'' && (dollar - escapes) % 2 == 0;
-  }
-
   /// A whole word, in the place of what is replaced.
   std::string written_on(const std::string& value) const {
     return replaced_ + written_for_bash(rest_of(value), line_.quote);
@@ -197,14 +171,13 @@ void answer_shell(CLI::App& app, int argc, const char* const* argv, const Values
   if (argc < 2 || argv[1] != kHiddenVerb) {
     return;
   }
-  end_in_time();
   try {
     const std::string answer = answer_to(app, {argv + 2, argv + argc}, values);
     std::cout.write(answer.data(), static_cast<std::streamsize>(answer.size())).flush();
   } catch (const std::exception&) {
     // There is nothing to offer.
   }
-  ::_exit(kDone);  // nothing is waited for any more
+  ::_exit(kDone);
 }
 
 }  // namespace oblique::protocol

@@ -26,7 +26,6 @@ struct FileNames {
 
 /// All that the word may become.
 struct Offers {
-  /// Of too many the first in order, and the last, so that what these have in common all have.
   std::vector<Offer> offers;
   bool goes_on = false;  ///< what is taken may be written on: no space follows
   std::optional<FileNames> files = {};

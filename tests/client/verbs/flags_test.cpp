@@ -1,6 +1,5 @@
-// Every flag of every verb, given values that no flag may have; and how long completion waits.
+// Every flag of every verb, given values that no flag may have.
 #include <algorithm>
-#include <chrono>
 #include <string>
 #include <vector>
 
@@ -8,7 +7,6 @@
 #include <CLI/CLI.hpp>
 
 #include "client/verbs/command_line.h"
-#include "client/verbs/completion/stored_names.h"
 #include "client/verbs/verbs.h"
 #include "worker/solver/model/parameters.h"
 
@@ -154,14 +152,6 @@ TEST(Flags, ShowWhatIsWrongWithoutSteeringTheTerminal) {
       EXPECT_EQ(ending.errors.find(raw), std::string::npos) << ending.errors;
     }
   }
-}
-
-// Shells are in tests/deploy.
-TEST(Completion, GivesAServerWhatTheBeginningHasLeftOfTwentyMillisecondsAndAlwaysALittle) {
-  using std::chrono::milliseconds;
-  EXPECT_LE(milliseconds(6) + patience_left(milliseconds(6)), milliseconds(20));
-  EXPECT_LT(patience_left(milliseconds(10)), patience_left(milliseconds(6)));
-  EXPECT_GT(patience_left(milliseconds(1000)), milliseconds(0));
 }
 
 }  // namespace
