@@ -4,8 +4,11 @@
 
 namespace oblique::server {
 
-/// Whether a server, which `oblique run` is too, has the database at `path` locked for its work. It
-/// is not kept from anything by being asked after. False for a file that cannot be opened.
+/// Locks an open database file for a server until the file is closed. False: another server has it.
+bool lock_for_server(int file);
+
+/// Whether a server has the database at `path` open; false for a file that cannot be opened. Takes
+/// no lock.
 bool is_in_use(const std::string& path);
 
 }  // namespace oblique::server

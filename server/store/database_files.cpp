@@ -2,16 +2,15 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <chrono>
 #include <cstring>
 #include <filesystem>
-#include <thread>
 #include <vector>
 
 #include <fcntl.h>
-#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
+
+#include "server/database/database_in_use.h"
 
 namespace oblique::server {
 namespace {
@@ -33,20 +32,6 @@ int open_or_make(const std::string& path, bool& made) {
   return file;
 }
 
-/// Takes the lock. Who only looks whether somebody is at work holds the file for an instant; see
-/// is_in_use.
-bool is_locked(int file) {
-  constexpr int kTries = 20;
-  constexpr std::chrono::milliseconds kBetweenTries{5};
-  for (int i = 1; ::flock(file, LOCK_EX | LOCK_NB) != 0; ++i) {
-    if (i == kTries) {
-      return false;
-    }
-    std::this_thread::sleep_for(kBetweenTries);
-  }
-  return true;
-}
-
 }  // namespace
 
 DatabaseFiles::DatabaseFiles(const std::string& path)
@@ -55,7 +40,7 @@ DatabaseFiles::DatabaseFiles(const std::string& path)
     throw StorageError("cannot open the database " + path +
                        " for writing: " + std::strerror(errno));
   }
-  if (!is_locked(file_)) {
+  if (!lock_for_server(file_)) {
     ::close(file_);
     throw StorageError(
         "another server, `oblique run` or `oblique view` already uses the database " + path +

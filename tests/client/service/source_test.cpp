@@ -1,10 +1,6 @@
 #include "client/service/source_flags.h"
 
-#include <fcntl.h>
-#include <sys/file.h>
-#include <unistd.h>
-
-#include <chrono>
+#include <atomic>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
@@ -16,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "proto/recipe/point_table.h"
+#include "server/database/database_in_use.h"
 #include "server/store/store.h"
 #include "tests/client/service/scripted_server.h"
 #include "tests/support/temporary_folder.h"
@@ -116,15 +113,17 @@ TEST_F(SourceTest, SaysNothingOfTheKindWhileAServerHasTheFile) {
 
 TEST_F(SourceTest, KeepsNoServerFromItsFileByLookingAtIt) {
   make_database("oblique.db", "default");
-  // As somebody who looks does, at the instant when the server begins.
-  const int looking = open("oblique.db", O_RDONLY | O_CLOEXEC);
-  ASSERT_EQ(flock(looking, LOCK_SH | LOCK_NB), 0);
-  std::thread done([looking] {
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    close(looking);
+  std::atomic<bool> goes_on{true};
+  std::thread looking([&goes_on] {
+    while (goes_on) {
+      (void)server::is_in_use("oblique.db");
+    }
   });
-  EXPECT_NO_THROW(server::Store("oblique.db"));
-  done.join();
+  for (int i = 0; i < 20; ++i) {
+    EXPECT_NO_THROW(server::Store("oblique.db"));
+  }
+  goes_on = false;
+  looking.join();
 }
 
 TEST_F(SourceTest, CallsAWrongStatementWrongUsageWhereverItIsAsked) {
