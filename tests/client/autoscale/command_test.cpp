@@ -12,7 +12,7 @@ namespace oblique::client {
 namespace {
 
 CommandSettings command_line(const std::string& script) {
-  return {.program = "sh", .arguments = {"-c", script}};
+  return {.program = "sh", .arguments = {"-c", script}, .timeout_s = 600.0};
 }
 
 std::string error_of_running(const CommandSettings& command) {

@@ -9,7 +9,6 @@ import pickle
 import subprocess
 import sys
 import threading
-import time
 
 import numpy as np
 import pytest
@@ -120,21 +119,11 @@ def test_what_a_report_of_a_defect_should_tell_is_what_the_doctor_tells():
     said = subprocess.run([sys.executable, "-m", "oblique"], capture_output=True, text=True, check=True)
     assert said.stdout == oblique.about() + "\n"
     lines = dict(line.split(maxsplit=1) for line in said.stdout.splitlines())
-    doctor = json.loads(run_oblique("doctor", "--json", "--no-timing", "--timeout", "60"))
+    doctor = json.loads(run_oblique("doctor", "--json", "--no-timing", "--timeout", "600"))
     assert "oblique " + lines["oblique"] == run_oblique("--version").strip()
     assert lines["built"] == "{compiler}, {type}".format(**doctor["programs"]["built"])
     assert lines["instructions"] == oblique._core.instruction_set()
     assert lines["NumPy"] == np.__version__
-
-
-def test_other_threads_run_while_one_solves():
-    counted = 0
-    solving = threading.Thread(target=lambda: oblique.solve(1, 0.4, 1, E=71e9, elements_per_link=8))
-    solving.start()
-    while solving.is_alive():
-        counted += 1
-        time.sleep(0.001)
-    assert counted > 10
 
 
 def test_threads_get_the_same_bits_as_one():

@@ -1,9 +1,9 @@
 // Questions to a database file, by the program itself.
-#include <chrono>
 #include <csignal>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <thread>
+#include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -49,7 +49,10 @@ TEST_F(DatabaseQuery, AStatementHasItsTimeWhateverItDoes) {
 
 TEST_F(DatabaseQuery, ASignalEndsAStatementThatNeverLooksAtTheClock) {
   test::Process program(folder_, test::client_program(), {"sql", kDeaf});
-  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  const auto threads = "/proc/" + std::to_string(program.pid()) + "/task";
+  test::wait_until("the thread that watches the time of the statement", [&] {
+    return std::distance(std::filesystem::directory_iterator(threads), {}) > 1;
+  });
   kill(program.pid(), SIGINT);
   EXPECT_THAT(program.outcome().exit_code, testing::AnyOf(-SIGINT, 130));
 }

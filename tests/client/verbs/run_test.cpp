@@ -17,7 +17,7 @@
 namespace oblique::client {
 namespace {
 
-// Long enough that a signal meets it at work, short enough to be finished afterwards.
+// So long that a signal meets it at work.
 void write_study(const test::TemporaryFolder& folder, int points) {
   std::ofstream(folder.path() / "study.toml")
       << "name = 'many'\n[[block]]\nH = 1\nmu = { from = 0.1, to = 2, count = " << points
@@ -153,7 +153,7 @@ TEST(Run, OfAnotherStudyUnderATakenNameIsRefused) {
 
 TEST(Run, NoticesThatTheServerDied) {
   const test::TemporaryFolder folder;
-  write_study(folder, 100000);
+  write_study(folder, 10'000'000);
   test::Process program(folder, test::client_program(), run_arguments());
   wait_until_at_work(folder, program);
   const auto processes = test::children_of(program.pid());
@@ -167,7 +167,7 @@ TEST(Run, NoticesThatTheServerDied) {
 
 /// What a run of a long study says to which its user gives that order from another shell.
 test::Outcome ordered_run(const test::TemporaryFolder& folder, const std::string& order) {
-  write_study(folder, 100000);
+  write_study(folder, 10'000'000);
   auto arguments = run_arguments();
   arguments.push_back("--verbose");
   test::Process program(folder, test::client_program(), arguments);
@@ -214,7 +214,7 @@ TEST(Run, OfAStudyThatSomebodyPausesSaysHowToGoOnAndEndsWithOne) {
 
 TEST(Watch, OfAFileOnWhichNobodyWorksSaysSo) {
   const test::TemporaryFolder folder;
-  write_study(folder, 100000);
+  write_study(folder, 10'000'000);
   {
     test::Process program(folder, test::client_program(), run_arguments());
     wait_until_at_work(folder, program);
@@ -234,7 +234,7 @@ TEST(Watch, OfAFileOnWhichNobodyWorksSaysSo) {
 
 TEST(Run, GoesOnWithTheWorkersThatAreLeftAndStopsWhenNoneIs) {
   const test::TemporaryFolder folder;
-  write_study(folder, 100000);
+  write_study(folder, 10'000'000);
   test::Process program(folder, test::client_program(), run_arguments());
   wait_until_at_work(folder, program);
   const auto processes = test::children_of(program.pid());
