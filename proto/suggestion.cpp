@@ -6,6 +6,8 @@
 #include <numeric>
 #include <vector>
 
+#include "proto/text.h"
+
 namespace oblique::protocol {
 namespace {
 
@@ -35,6 +37,10 @@ std::string_view nearest(std::string_view word, std::span<const std::string_view
   std::string_view best;
   std::size_t best_distance = std::max<std::size_t>(1, word.size() / 2) + 1;
   for (const auto candidate : candidates) {
+    // The distance is at least the difference of the lengths.
+    if (word.size() >= candidate.size() + best_distance) {
+      continue;
+    }
     const std::size_t candidate_distance = distance(word, candidate);
     // A candidate that shares no letter with the word is no suggestion.
     if (candidate_distance < best_distance &&
@@ -49,6 +55,10 @@ std::string_view nearest(std::string_view word, std::span<const std::string_view
 std::string did_you_mean(std::string_view word, std::span<const std::string_view> candidates) {
   const auto best = nearest(word, candidates);
   return best.empty() ? std::string() : " (did you mean `" + std::string(best) + "`?)";
+}
+
+std::string unknown_key(std::string_view name, std::span<const std::string_view> known) {
+  return "unknown key `" + excerpt(name) + "`" + did_you_mean(name, known);
 }
 
 std::string joined(std::span<const std::string_view> names) {

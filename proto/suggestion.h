@@ -13,6 +13,9 @@ std::string_view nearest(std::string_view word, std::span<const std::string_view
 /// " (did you mean `x`?)" with the nearest candidate, or nothing.
 std::string did_you_mean(std::string_view word, std::span<const std::string_view> candidates);
 
+/// "unknown key `muu` (did you mean `mu`?)", for the beginning of a sentence.
+std::string unknown_key(std::string_view name, std::span<const std::string_view> known);
+
 /// Names for a sentence: "a, b, c".
 std::string joined(std::span<const std::string_view> names);
 

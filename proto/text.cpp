@@ -82,14 +82,20 @@ bool is_control(char32_t code) {
     char32_t first;
     char32_t last;
   };
-  constexpr std::array<Range, 7> kControls{{
-      {0x00, 0x1f},      // C0
-      {0x7f, 0x9f},      // DEL, C1
-      {0x061c, 0x061c},  // Arabic letter mark
-      {0x200e, 0x200f},  // left-to-right and right-to-left marks
-      {0x2028, 0x202e},  // line and paragraph separators; embeddings and overrides
-      {0x2066, 0x2069},  // isolates
-      {0xfffe, 0xffff},  // no characters, and not allowed in XML
+  constexpr std::array<Range, 13> kControls{{
+      {0x00, 0x1f},        // C0
+      {0x7f, 0x9f},        // DEL, C1
+      {0xad, 0xad},        // soft hyphen
+      {0x034f, 0x034f},    // combining grapheme joiner
+      {0x061c, 0x061c},    // Arabic letter mark
+      {0x180b, 0x180f},    // Mongolian variation selectors and vowel separator
+      {0x200b, 0x200f},    // zero-width space and joiners; left-to-right and right-to-left marks
+      {0x2028, 0x202e},    // line and paragraph separators; embeddings and overrides
+      {0x2060, 0x206f},    // word joiner, invisible operators, isolates
+      {0xfe00, 0xfe0f},    // variation selectors
+      {0xfeff, 0xfeff},    // zero-width no-break space
+      {0xfffe, 0xffff},    // no characters, and not allowed in XML
+      {0xe0000, 0xe0fff},  // tags, variation selectors
   }};
   return std::any_of(kControls.begin(), kControls.end(), [code](const Range& range) {
     return code >= range.first && code <= range.last;
@@ -123,6 +129,13 @@ std::string shortened(const std::string& text, std::size_t bytes) {
     --bytes;
   }
   return text.substr(0, bytes);
+}
+
+std::string excerpt(std::string_view text, std::size_t bytes) {
+  constexpr std::size_t kLongestCharacter = 4;
+  const std::string all = visible(text.substr(0, bytes + kLongestCharacter));
+  const std::string part = shortened(all, bytes);
+  return part.size() < all.size() ? part + "..." : part;
 }
 
 std::vector<std::string_view> split(std::string_view text, char separator) {

@@ -6,11 +6,12 @@
 
 namespace oblique::protocol {
 
-/// `text` with everything written out that would steer a terminal or forge a line of a log: control
-/// characters (C0, DEL and C1), the marks that turn the direction of writing, Unicode's line and
-/// paragraph separators, and bytes that are not UTF-8. ESC becomes \x1b, U+202E \u202e, a line
-/// break \n. All other text stays as it is. For whatever people read that comes from outside:
-/// names, values of a database, keys of files, messages of other processes.
+/// `text` with everything written out that would steer a terminal, forge a line of a log or not be
+/// seen: control characters (C0, DEL and C1), the marks that turn the direction of writing,
+/// zero-width characters, Unicode's line and paragraph separators, and bytes that are not UTF-8.
+/// ESC becomes \x1b, U+202E \u202e, a line break \n. All other text stays as it is. For whatever
+/// people read that comes from outside: names, values of a database, keys of files, messages of
+/// other processes.
 std::string visible(std::string_view text);
 
 /// The same, but line breaks stay: for messages of several lines.
@@ -25,6 +26,12 @@ bool is_utf8(std::string_view text);
 /// The beginning of a UTF-8 text, at most `bytes` long, without half a character at its end.
 std::string shortened(const std::string& text, std::size_t bytes);
 
+/// At most `bytes` of `text` as `visible` writes it, for an error; "..." stands for the rest.
+std::string excerpt(std::string_view text, std::size_t bytes = 80);
+
+/// For `excerpt`: a message of toml++ ends with a key.
+inline constexpr std::size_t kLongestParseError = 150;
+
 /// The parts of `text` between separators: one more than there are separators, empty ones too.
 std::vector<std::string_view> split(std::string_view text, char separator);
 
@@ -36,7 +43,7 @@ struct Character {
 };
 Character first_character(std::string_view text);
 
-/// Whether a terminal would act on the character rather than show it.
+/// Whether a terminal would act on the character or show nothing.
 bool is_control(char32_t code);
 
 }  // namespace oblique::protocol

@@ -70,7 +70,7 @@ void append_json_text(std::string& out, std::string_view text) {
       out += static_cast<char>(next.code);
     } else if (next.code == '\n') {
       out += "\\n";
-    } else if (protocol::is_control(next.code)) {
+    } else if (next.code <= 0xffff && protocol::is_control(next.code)) {
       append_escape(out, next.code);
     } else {
       out += text.substr(0, next.bytes);

@@ -10,6 +10,7 @@
 #include "client/plot/block_choice.h"
 #include "client/plot/figures/quantity.h"
 #include "proto/suggestion.h"
+#include "proto/text.h"
 #include "server/asking/columns.h"
 #include "server/asking/sql/sql_tokens.h"
 #include "worker/solver/model/errors.h"
@@ -57,16 +58,16 @@ struct At {
 At judged_at(const std::string& text, const StudyShape& shape) {
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos || equals == 0) {
-    throw solver::InputError(
-        fmt::format("--at {} is not allowed: it must be KEY=VALUE, as e=1", text));
+    throw solver::InputError(fmt::format("--at {} is not allowed: it must be KEY=VALUE, as e=1",
+                                         protocol::excerpt(text)));
   }
   const std::string key = text.substr(0, equals);
   const StudyAxis* axis = shape.find(key);
   if (axis == nullptr) {
     const auto keys = keys_of(shape);
-    throw solver::InputError(fmt::format("--at {}: the study has no axis {}{}; it has {}", text,
-                                         key, protocol::did_you_mean(key, keys),
-                                         protocol::joined(keys)));
+    throw solver::InputError(fmt::format(
+        "--at {}: the study has no axis {}{}; it has {}", protocol::excerpt(text),
+        protocol::excerpt(key), protocol::did_you_mean(key, keys), protocol::joined(keys)));
   }
   const auto value = solver::number_of(text.substr(equals + 1));
   if (!value || !std::isfinite(*value)) {
@@ -132,9 +133,10 @@ ChosenAxis chosen_axis(const std::string& flag, const std::string& text, const S
       is_column = is_column || column.name == text;
     }
     if (!is_column) {
-      throw solver::InputError(fmt::format(
-          "{} {}: there is no such axis or column{}; the axes of this study are {}", flag, text,
-          protocol::did_you_mean(text, names), protocol::joined(keys_of(shape))));
+      throw solver::InputError(
+          fmt::format("{} {}: there is no such axis or column{}; the axes of this study are {}",
+                      flag, protocol::excerpt(text), protocol::did_you_mean(text, names),
+                      protocol::joined(keys_of(shape))));
     }
   }
   return {text, text, nullptr};

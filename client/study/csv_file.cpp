@@ -1,13 +1,13 @@
 #include "client/study/csv_file.h"
 
 #include <algorithm>
-#include <fstream>
 #include <iterator>
 #include <optional>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/small_file.h"
 #include "proto/suggestion.h"
 #include "proto/text.h"
 #include "worker/solver/model/number.h"
@@ -116,10 +116,9 @@ double number_of_field(std::string_view field, const solver::ParameterKey& key) 
   }
   const auto value = solver::number_of(field.starts_with('+') ? field.substr(1) : field);
   if (!value) {
-    throw InputError(
-        field.empty() ? "the field is empty: a number must stand there"
-                      : fmt::format("\"{}\" is not a number", protocol::visible(protocol::shortened(
-                                                                  std::string(field), 40))));
+    throw InputError(field.empty()
+                         ? "the field is empty: a number must stand there"
+                         : fmt::format("\"{}\" is not a number", protocol::excerpt(field)));
   }
   solver::check_value(key, *value);
   return *value;
@@ -128,22 +127,7 @@ double number_of_field(std::string_view field, const solver::ParameterKey& key) 
 }  // namespace
 
 CsvFile CsvFile::read(const std::filesystem::path& path) {
-  const std::string name = path.string();
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) {
-    throw InputError(
-        fmt::format("cannot read the CSV file {}: it must be a file that is there", name));
-  }
-  if (const auto bytes = std::filesystem::file_size(path, error); error || bytes > kMostBytes) {
-    throw InputError(
-        fmt::format("cannot read the CSV file {}: it has more than {} bytes", name, kMostBytes));
-  }
-  std::ifstream stream(path, std::ios::binary);
-  const std::string text(std::istreambuf_iterator<char>(stream), {});
-  if (!stream) {
-    throw InputError(fmt::format("cannot read the CSV file {}", name));
-  }
-  return parse(text, name);
+  return parse(protocol::read_small_file(path.string(), "the CSV file", kMostBytes), path.string());
 }
 
 CsvFile CsvFile::parse(std::string_view text, std::string name) {
@@ -188,7 +172,7 @@ void CsvFile::check_columns(std::size_t line) const {
     }
     if (std::find(columns_.begin(), name, *name) != name) {
       throw InputError(
-          fmt::format("{}two columns are called `{}`", place(line), protocol::visible(*name)));
+          fmt::format("{}two columns are called `{}`", place(line), protocol::excerpt(*name)));
     }
   }
 }
@@ -207,11 +191,11 @@ std::size_t CsvFile::column_number(std::string_view column) const {
   if (found == columns_.end()) {
     std::vector<std::string> names;
     for (const auto& name : columns_) {
-      names.push_back(protocol::visible(protocol::shortened(name, 40)));
+      names.push_back(protocol::excerpt(name, 40));
     }
     const std::vector<std::string_view> known(names.begin(), names.end());
     throw InputError(fmt::format("{} has no column `{}`{}: its columns are {}", name_,
-                                 protocol::visible(column), protocol::did_you_mean(column, known),
+                                 protocol::excerpt(column), protocol::did_you_mean(column, known),
                                  protocol::joined(known)));
   }
   return static_cast<std::size_t>(found - columns_.begin());
@@ -227,7 +211,7 @@ std::vector<double> CsvFile::values(std::string_view column,
       values.push_back(number_of_field(fields_[row * columns_.size() + number], key));
     } catch (const InputError& error) {
       throw InputError(fmt::format("{}column `{}`: {}", place(lines_[row]),
-                                   protocol::visible(column), error.what()));
+                                   protocol::excerpt(column), error.what()));
     }
   }
   return values;

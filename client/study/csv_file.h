@@ -24,7 +24,7 @@ class CsvFile {
   /// The same of a text; `name` is what errors call it.
   static CsvFile parse(std::string_view text, std::string name);
 
-  static constexpr std::size_t kMostBytes = std::size_t{256} << 20;
+  static constexpr std::size_t kMostBytes = std::size_t{64} << 20;
   static constexpr std::size_t kMostColumns = 4096;
 
   const std::string& name() const { return name_; }

@@ -198,9 +198,7 @@ std::string flag_of_key(std::string_view key) {
 }
 
 std::string shown_flag(std::string_view flag, std::string_view text) {
-  constexpr std::size_t kLongest = 80;
-  const std::string shown = protocol::shortened(std::string(text), kLongest);
-  return fmt::format("{} {}{}", flag, shown, shown.size() < text.size() ? "..." : "");
+  return fmt::format("{} {}", flag, protocol::excerpt(text));
 }
 
 std::string without_text(std::string_view key, std::string_view text, const std::string& sentence) {

@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
 #include <functional>
-#include <iterator>
 #include <map>
 #include <string_view>
 #include <utility>
@@ -24,7 +22,9 @@
 #include "proto/recipe/point_table.h"
 #include "proto/recipe/written/study_name.h"
 #include "proto/recipe/written/written_model.h"
+#include "proto/small_file.h"
 #include "proto/suggestion.h"
+#include "proto/text.h"
 
 namespace oblique::client {
 namespace {
@@ -65,10 +65,9 @@ class StudyReader {
 void StudyReader::check_top_keys(const toml::table& top) const {
   for (const auto& [key, value] : top) {
     if (std::find(kTopKeys.begin(), kTopKeys.end(), key.str()) == kTopKeys.end()) {
-      place_.fail(key,
-                  fmt::format("unknown key `{}`{}: a study file has name, errors, [model] and one "
-                              "or more [[block]]; H, mu and e stand in a block",
-                              key.str(), protocol::did_you_mean(key.str(), kTopKeys)));
+      place_.fail(key, fmt::format("{}: a study file has name, errors, [model] and one or more "
+                                   "[[block]]; H, mu and e stand in a block",
+                                   protocol::unknown_key(key.str(), kTopKeys)));
     }
   }
 }
@@ -226,7 +225,8 @@ Study parse_study(std::string_view text, const std::string& file, const ReachChe
   } catch (const toml::parse_error& error) {
     const auto& begin = error.source().begin;
     throw InputError(
-        fmt::format("{}:{}:{}: {}", file, begin.line, begin.column, error.description()));
+        fmt::format("{}:{}:{}: {}", file, begin.line, begin.column,
+                    protocol::excerpt(error.description(), protocol::kLongestParseError)));
   }
 }
 
@@ -240,13 +240,10 @@ Study read_study_file(const std::filesystem::path& path, const ReachCheck& check
                                      ? fmt::format(" (did you mean `{}`?)", with_ending.string())
                                      : ""));
   }
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream || std::filesystem::is_directory(path)) {
-    throw InputError("cannot read the study file " + path.string() +
-                     ": it must be a readable TOML file");
-  }
-  const std::string text(std::istreambuf_iterator<char>(stream), {});
-  return parse_study(text, path.string(), check_reach);
+  // A recipe has at most 4 MiB. A number takes 8 bytes in it and up to 25 in a file.
+  constexpr std::size_t kMostBytes = std::size_t{16} << 20U;
+  return parse_study(protocol::read_small_file(path.string(), "the study file", kMostBytes),
+                     path.string(), check_reach);
 }
 
 }  // namespace oblique::client

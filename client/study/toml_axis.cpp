@@ -50,8 +50,8 @@ class AxisTable {
   void check_parts(std::span<const std::string_view> known, std::string_view forms) const {
     for (const auto& [part, value] : table_) {
       if (std::find(known.begin(), known.end(), part.str()) == known.end()) {
-        place_.fail(part, fmt::format("{}: unknown key `{}`{}: {}", key_.name, part.str(),
-                                      protocol::did_you_mean(part.str(), known), forms));
+        place_.fail(part, fmt::format("{}: {}: {}", key_.name,
+                                      protocol::unknown_key(part.str(), known), forms));
       }
     }
   }

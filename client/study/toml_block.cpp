@@ -72,8 +72,8 @@ class BlockReader {
       return true;
     }
     if (!protocol::nearest(key, kBlockKeys).empty() && !protocol::is_axis_key(key)) {
-      place_.fail(written, fmt::format("unknown key `{}`{}: beside its axes a block has {}", key,
-                                       protocol::did_you_mean(key, kBlockKeys),
+      place_.fail(written, fmt::format("{}: beside its axes a block has {}",
+                                       protocol::unknown_key(key, kBlockKeys),
                                        protocol::joined(kBlockKeys)));
     }
     return false;
@@ -84,10 +84,8 @@ class BlockReader {
         place_.table("sample", node, "{ kind = \"sobol\", count = 1000, seed = 1 }");
     for (const auto& [part, value] : sample) {
       if (std::find(kSampleParts.begin(), kSampleParts.end(), part.str()) == kSampleParts.end()) {
-        place_.fail(part,
-                    fmt::format("sample: unknown key `{}`{}: a sample is {{ kind, count, "
-                                "seed }}",
-                                part.str(), protocol::did_you_mean(part.str(), kSampleParts)));
+        place_.fail(part, fmt::format("sample: {}: a sample is {{ kind, count, seed }}",
+                                      protocol::unknown_key(part.str(), kSampleParts)));
       }
     }
     if (!sample.contains("kind") || !sample.contains("count")) {

@@ -3,13 +3,15 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/study/toml_text.h"
+#include "proto/text.h"
 
 namespace oblique::client {
 namespace {
 
 std::string not_as_expected(std::string_view key, const toml::node& node,
                             std::string_view expected) {
-  return fmt::format("{} = {} is {}: it must be {}", key, shown(node), kind_of(node), expected);
+  return fmt::format("{} = {} is {}: it must be {}", protocol::excerpt(key), shown(node),
+                     kind_of(node), expected);
 }
 
 }  // namespace

@@ -4,9 +4,7 @@
 #include <cstddef>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
-#include <iterator>
 #include <memory>
 #include <optional>
 #include <string>
@@ -23,6 +21,7 @@
 #include "proto/program/choices.h"
 #include "proto/program/stop_signals.h"
 #include "proto/program/usage.h"
+#include "proto/small_file.h"
 #include "proto/suggestion.h"
 #include "proto/text.h"
 #include "worker/solver/model/errors.h"
@@ -82,8 +81,8 @@ void check_variables(const AutoscaleFlags& flags, const std::string& script) {
     // --sbatch-args "--export=ALL,OBLIQUE_WORKER_SERVER=..." will do too.
     return is_set(variable) || flags.sbatch_arguments.find(variable) != std::string::npos;
   };
-  std::ifstream file(script);
-  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  constexpr std::size_t kMostBytes = std::size_t{1} << 20U;
+  const std::string text = protocol::read_small_file(script, "the script", kMostBytes);
   if (text.find(fmt::format("${{{}:?", kServer)) != std::string::npos && !is_given(kServer)) {
     throw solver::InputError(
         fmt::format("{} is not set, and {} needs it: export {}=tcp://HOST:7601, where the server "
@@ -115,9 +114,6 @@ SlurmSettings slurm_settings(const AutoscaleFlags& flags, const std::string& ser
     throw solver::InputError(
         "--script FILE is needed: no script is installed beside this program. It is "
         "deploy/slurm/oblique-workers.sbatch in the source tree");
-  }
-  if (submits && !std::filesystem::exists(settings.script)) {
-    throw solver::InputError(fmt::format("--script {}: there is no such file", settings.script));
   }
   if (submits) {
     check_variables(flags, settings.script);

@@ -33,15 +33,11 @@ constexpr std::array<std::string_view, 1> kTopFields{"key"};
                   what, mode & 07777U, path));
 }
 
-/// Whoever may write the list, or put another one in its place, may admit himself. A server that
-/// opens a pipe waits for somebody to write to it.
+/// Whoever may write the list, or put another one in its place, may admit himself.
 void check_file(const std::string& path) {
   struct stat file {};
   if (::stat(path.c_str(), &file) != 0) {
     return;  // reading it tells why
-  }
-  if (!S_ISREG(file.st_mode)) {
-    throw solver::InputError(fmt::format("the list of keys {} is no regular file", path));
   }
   if ((file.st_mode & S_IWOTH) != 0) {
     refuse_writers("the list of keys " + path, file.st_mode, path);
@@ -120,7 +116,7 @@ AuthorizedKey AuthorizedKeys::remove(std::string_view name) {
       }
       return all;
     }();
-    throw solver::InputError(fmt::format("there is no key called {}{}; there {}", visible(name),
+    throw solver::InputError(fmt::format("there is no key called {}{}; there {}", excerpt(name),
                                          did_you_mean(name, names),
                                          names.empty() ? "is none" : "are: " + joined(names)));
   }

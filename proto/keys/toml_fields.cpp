@@ -1,38 +1,24 @@
 #include "proto/keys/toml_fields.h"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
-#include <fstream>
-#include <iterator>
 
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/keys/key_file.h"
+#include "proto/small_file.h"
 #include "proto/suggestion.h"
+#include "proto/text.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::protocol {
 
 TomlFile::TomlFile(const std::string& path, std::string_view what) {
-  std::ifstream file(path, std::ios::binary);
-  std::string text(kMostBytes + 1, '\0');
-  if (file) {
-    file.read(text.data(), static_cast<std::streamsize>(text.size()));
-    text.resize(static_cast<std::size_t>(file.gcount()));
-  }
-  if (!file.is_open() || file.bad()) {
-    throw solver::InputError(fmt::format("{} {} cannot be read: {}", what, path,
-                                         std::strerror(errno == 0 ? EIO : errno)));
-  }
-  if (text.size() > kMostBytes) {
-    throw solver::InputError(fmt::format("{} {} has more than {} bytes", what, path, kMostBytes));
-  }
+  const std::string text = read_small_file(path, what, kMostBytes);
   try {
     top_ = toml::parse(text, path);
   } catch (const toml::parse_error& error) {
-    throw solver::InputError(
-        fmt::format("{}:{}: {}", path, error.source().begin.line, error.description()));
+    throw solver::InputError(fmt::format("{}:{}: {}", path, error.source().begin.line,
+                                         excerpt(error.description(), kLongestParseError)));
   }
 }
 
@@ -85,8 +71,8 @@ void TomlFields::refuse_unknown(std::span<const std::string_view> known,
                                 std::string_view what) const {
   for (const auto& [field, value] : table_) {
     if (std::find(known.begin(), known.end(), field.str()) == known.end()) {
-      fail(field.str(), fmt::format("unknown key `{}`{}: {} has {}", field.str(),
-                                    did_you_mean(field.str(), known), what, joined(known)));
+      fail(field.str(),
+           fmt::format("{}: {} has {}", unknown_key(field.str(), known), what, joined(known)));
     }
   }
 }

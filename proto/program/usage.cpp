@@ -94,7 +94,7 @@ std::string objection_of(const CLI::App& app, const CLI::App& verb, const CLI::P
   if (const auto unexpected = app.remaining(true); !unexpected.empty()) {
     const std::string& first = unexpected.front();
     const bool is_verb = has_verbs(verb) && !first.starts_with("-");
-    return std::string(is_verb ? "unknown verb" : "unexpected") + " `" + first + "`" +
+    return std::string(is_verb ? "unknown verb" : "unexpected") + " `" + excerpt(first) + "`" +
            did_you_mean(first.substr(0, first.find('=')), candidates);
   }
   const std::string message = error.what();

@@ -44,9 +44,7 @@ auto named(const std::string& what, Make make) {
 }  // namespace
 
 std::string expression_in_words(std::string_view key, const std::string& text) {
-  constexpr std::size_t kLongest = 80;
-  const std::string shown = shortened(visible(text), kLongest);
-  return fmt::format("{} = \"{}{}\"", key, shown, shown.size() < text.size() ? "..." : "");
+  return fmt::format("{} = \"{}\"", key, excerpt(text));
 }
 
 sampling::Distribution distribution_of(const Axis& axis) {

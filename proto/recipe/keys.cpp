@@ -12,7 +12,6 @@
 namespace oblique::protocol {
 namespace {
 
-constexpr std::size_t kLongestQuoted = 64;
 constexpr std::string_view kSingleLength = "length";
 
 /// "length1", "length2", ... where it stays.
@@ -71,13 +70,6 @@ std::size_t first_point_key() {
 }
 
 }  // namespace
-
-std::string unknown_key(std::string_view name, std::span<const std::string_view> known) {
-  if (name.size() > kLongestQuoted) {
-    return fmt::format("unknown key of {} characters", name.size());
-  }
-  return fmt::format("unknown key `{}`{}", name, did_you_mean(name, known));
-}
 
 std::size_t key_number(std::string_view name) {
   const auto model_keys = solver::model_keys();

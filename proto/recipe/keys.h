@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <optional>
-#include <span>
 #include <string>
 #include <string_view>
 
@@ -34,9 +33,5 @@ bool is_point_key(std::size_t number);
 /// The link, from 0, whose length the key of that number is; nothing for all other keys. Single
 /// lengths act on what `links` and `length` have made.
 std::optional<std::size_t> link_of_key(std::size_t number);
-
-/// A key from outside that is none, for the beginning of a sentence, with the nearest of `known`:
-/// "unknown key `muu` (did you mean `mu`?)". Long ones only by their length.
-std::string unknown_key(std::string_view name, std::span<const std::string_view> known);
 
 }  // namespace oblique::protocol

@@ -1,8 +1,10 @@
 #include "server/database/sqlite.h"
 
 #include <cerrno>
-#include <filesystem>
-#include <system_error>
+
+#include <sys/stat.h>
+
+#include "proto/system/file_kind.h"
 
 namespace oblique::server {
 namespace {
@@ -213,13 +215,10 @@ DatabaseKind identify(sqlite3* database, const std::string& path) {
 }
 
 void check_path(const std::string& path) {
-  std::error_code ignored;
-  const auto status = std::filesystem::status(path, ignored);
-  if (std::filesystem::is_directory(status)) {
-    throw StorageError(path + " is a directory: name a file in it");
-  }
-  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
-    throw StorageError(path + " is not a regular file");
+  struct stat about {};
+  if (::stat(path.c_str(), &about) == 0 && !S_ISREG(about.st_mode)) {
+    throw StorageError(path + " is " + protocol::kind_of_file(about.st_mode) +
+                       ": a database is a regular file");
   }
 }
 

@@ -106,8 +106,7 @@ enum class DatabaseKind { kEmpty, kOurs, kOlder };
 /// messages.
 DatabaseKind identify(sqlite3* database, const std::string& path);
 
-/// Throws StorageError naming what `path` is when no database could be there: a directory, or some
-/// other thing that is no regular file. A path where nothing is passes.
+/// Throws StorageError when `path` is there and is not a regular file.
 void check_path(const std::string& path);
 
 }  // namespace oblique::server

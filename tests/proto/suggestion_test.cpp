@@ -1,6 +1,7 @@
 #include "proto/suggestion.h"
 
 #include <array>
+#include <string>
 #include <string_view>
 
 #include <gtest/gtest.h>
@@ -25,6 +26,12 @@ TEST(Suggestion, SuggestsNothingForAWordUnlikeAll) {
 TEST(Suggestion, SaysSoInASentence) {
   EXPECT_EQ(did_you_mean("muu", kNames), " (did you mean `mu`?)");
   EXPECT_EQ(joined(kNames), "mu, e, H, tip_mass, elements_per_link");
+}
+
+TEST(UnknownKey, RepeatsAtMostEightyCharactersOfIt) {
+  EXPECT_EQ(unknown_key("muu", kNames), "unknown key `muu` (did you mean `mu`?)");
+  EXPECT_EQ(unknown_key(std::string(10'000'000, 'k'), kNames),
+            "unknown key `" + std::string(80, 'k') + "...`");
 }
 
 }  // namespace

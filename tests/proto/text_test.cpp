@@ -23,12 +23,25 @@ TEST(VisibleText, WritesOutWhatTurnsTheDirectionOrEndsALine) {
   EXPECT_EQ(visible("\u200e\u200f\u061c\u2028\u2029"), "\\u200e\\u200f\\u061c\\u2028\\u2029");
 }
 
+TEST(VisibleText, WritesOutWhatHasNoWidth) {
+  EXPECT_EQ(visible("\u00ad\u200b\u200c\u200d\u2060\ufeff"),
+            "\\u00ad\\u200b\\u200c\\u200d\\u2060\\ufeff");
+  EXPECT_EQ(visible("\ufe0f\U000e0041"), "\\ufe0f\\ue0041");
+}
+
 TEST(VisibleText, LeavesAllOtherTextAlone) {
   for (const char* text : {"", "plain", "μ > 0.5, Größe, 参数, 🙂",
-                           "\u00a0\u2027\u202f\u2065\u206a", "back\\slash \\x1b", "\U0010ffff"}) {
+                           "\u00a0\u2027\u202f\u2070", "back\\slash \\x1b", "\U0010ffff"}) {
     EXPECT_EQ(visible(text), text);
     EXPECT_TRUE(is_visible(text)) << text;
   }
+}
+
+TEST(Excerpt, HasAtMostSoManyBytesOfWhatIsShown) {
+  EXPECT_EQ(excerpt("four", 4), "four");
+  EXPECT_EQ(excerpt("fivex", 4), "five...");
+  EXPECT_EQ(excerpt("a\x1b[2J", 4), "a\\x1...");
+  EXPECT_EQ(excerpt("\u03bc\u03bc", 3), "\u03bc...") << "no half of a character";
 }
 
 TEST(VisibleText, WritesOutBytesThatAreNotUtf8) {

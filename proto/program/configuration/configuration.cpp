@@ -12,6 +12,7 @@
 #include "proto/program/configuration/printed_configuration.h"
 #include "proto/program/usage.h"
 #include "proto/suggestion.h"
+#include "proto/text.h"
 
 namespace oblique::protocol {
 namespace {
@@ -247,7 +248,7 @@ void Configuration::check_keys(const std::vector<WrittenValue>& written) const {
                                  ? fmt::format("{}: {} is given on the command line only, as {}",
                                                value.place, value.key, flag)
                                  : fmt::format("{}: there is no setting {}{}", value.place,
-                                               value.key, did_you_mean(value.key, keys)));
+                                               excerpt(value.key), did_you_mean(value.key, keys)));
   }
 }
 

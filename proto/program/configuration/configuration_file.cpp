@@ -1,10 +1,6 @@
 #include "proto/program/configuration/configuration_file.h"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
-#include <fstream>
-#include <iterator>
 #include <optional>
 #include <sstream>
 #include <string_view>
@@ -14,26 +10,13 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/small_file.h"
+#include "proto/text.h"
+#include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::protocol {
 namespace {
-
-std::string bytes_of(const std::string& file) {
-  std::string bytes;
-  std::ifstream stream(file, std::ios::binary);
-  std::string reason = stream.is_open() ? "" : std::strerror(errno);
-  try {
-    bytes.assign(std::istreambuf_iterator<char>(stream), {});
-  } catch (const std::ios_base::failure&) {
-    reason = std::strerror(errno);  // as of a folder
-  }
-  if (!reason.empty()) {
-    throw ConfigurationError(
-        fmt::format("the configuration file {} cannot be read: {}", file, reason));
-  }
-  return bytes;
-}
 
 struct Scalar {
   std::string text;
@@ -63,13 +46,16 @@ class FileReader {
   explicit FileReader(const std::string& file) : file_(file) {}
 
   std::vector<WrittenValue> values() {
-    const std::string bytes = bytes_of(file_);
+    constexpr std::size_t kMostBytes = std::size_t{1} << 20U;
     try {
+      const std::string bytes = read_small_file(file_, "the configuration file", kMostBytes);
       const toml::table top = toml::parse(std::string_view(bytes), std::string_view(file_));
       take(top, "");
     } catch (const toml::parse_error& error) {
-      throw ConfigurationError(
-          fmt::format("{}:{}: {}", file_, error.source().begin.line, error.description()));
+      throw ConfigurationError(fmt::format("{}:{}: {}", file_, error.source().begin.line,
+                                           excerpt(error.description(), kLongestParseError)));
+    } catch (const solver::InputError& error) {
+      throw ConfigurationError(error.what());
     }
     // Tables are kept by name; people read errors from the top.
     std::stable_sort(taken_.begin(), taken_.end(),
@@ -122,7 +108,7 @@ class FileReader {
     if (!is_sound) {
       throw ConfigurationError(fmt::format(
           "{}: {} must be a text, a number, true or false, or a list of one kind of these",
-          value.place, value.key));
+          value.place, excerpt(value.key)));
     }
   }
 

@@ -11,8 +11,9 @@ std::string objection_to_study_name(const std::string& name) {
   }
   return "name = \"" + visible(name.substr(0, kMostBytes)) +
          "\" is not allowed: a study's name has 1 to " + std::to_string(kMostBytes) +
-         " bytes of UTF-8, no control characters or marks of writing direction, and does not "
-         "begin with '-'";
+         " bytes of UTF-8, no control characters, marks of writing direction or zero-width "
+         "characters, "
+         "and does not begin with '-'";
 }
 
 }  // namespace oblique::protocol

@@ -25,8 +25,7 @@ std::size_t number_of_name(std::string_view name, const std::vector<std::string_
   const auto found = std::find(names.begin(), names.end(), name);
   if (found == names.end()) {
     throw InputError(fmt::format("{} \"{}\" is not known{}: it must be one of {}", what,
-                                 visible(shortened(std::string(name), 40)),
-                                 did_you_mean(name, names), joined(names)));
+                                 excerpt(name), did_you_mean(name, names), joined(names)));
   }
   return static_cast<std::size_t>(found - names.begin());
 }

@@ -13,6 +13,7 @@
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
 #include "proto/recipe/written/written_model.h"
+#include "proto/text.h"
 #include "server/web/answers/study_answers.h"
 #include "server/web/http/json_answer.h"
 #include "worker/solver/model/errors.h"
@@ -123,7 +124,8 @@ protocol::SubmitRequest study_of_body(const std::string& body) {
   const auto read =
       google::protobuf::util::JsonStringToMessage(has_model ? whole.dump() : body, &asked);
   if (!read.ok()) {
-    throw std::invalid_argument("the body is no study: " + std::string(read.message()));
+    throw std::invalid_argument("the body is no study: " +
+                                protocol::excerpt({read.message().data(), read.message().size()}));
   }
   if (has_model && (!written.is_object() || asked.recipe().has_model())) {
     throw std::invalid_argument("the body is no study: its model is said once, as an object");

@@ -75,7 +75,7 @@ ColumnSource picture_column(const FieldReader& fields, const std::string& name,
   if (!source || (source->is_category && !may_be_category)) {
     throw std::invalid_argument(fmt::format("{} must be a column of numbers{}; \"{}\" is none",
                                             name, may_be_category ? " or categories" : "",
-                                            protocol::visible(column)));
+                                            protocol::excerpt(column)));
   }
   return *std::move(source);
 }

@@ -53,7 +53,7 @@ std::size_t chosen_block(const protocol::PointTable& table, const FieldReader& f
   }
   throw std::invalid_argument(
       fmt::format("no block of the study has {}{} as axes that multiply: ask for bins",
-                  protocol::visible(x), y.empty() ? "" : " and " + protocol::visible(y)));
+                  protocol::excerpt(x), y.empty() ? "" : " and " + protocol::excerpt(y)));
 }
 
 /// The values that are shown: all, or evenly chosen ones, both ends in.
@@ -109,7 +109,7 @@ GridPlace place_of(const std::vector<AxisLayout>& axes, std::string_view text) {
     throw std::invalid_argument(
         fmt::format("at must be KEY:VALUE or KEY@NUMBER of axes of the block, with commas between; "
                     "{} is none",
-                    protocol::visible(text)));
+                    protocol::excerpt(text)));
   }
   const std::uint64_t number =
       text[mark] == '@' ? *reader.whole("at") : nearest(*axis->axis, *reader.number("at"));

@@ -40,14 +40,14 @@ std::optional<HttpRefusal> objection_to_hosts(const RequestHead& head, const Own
   for (const std::string& header : head.hosts) {
     const auto host = host_without_port(header);
     if (!host) {
-      return HttpRefusal{kBadRequest, fmt::format("\"{}\" is no Host", protocol::visible(header))};
+      return HttpRefusal{kBadRequest, fmt::format("\"{}\" is no Host", protocol::excerpt(header))};
     }
     if (!is_own(*host, own)) {
       return HttpRefusal{
           kForbidden,
           fmt::format("this server is not called {}: ask for its address, or start it with "
                       "--http-name {}",
-                      protocol::visible(*host), protocol::visible(*host))};
+                      protocol::excerpt(*host), protocol::excerpt(*host))};
     }
   }
   return std::nullopt;

@@ -1,7 +1,6 @@
 #include "server/web/page/token_file.h"
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cstddef>
 #include <cstring>
@@ -13,6 +12,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/small_file.h"
 #include "proto/system/descriptor.h"
 #include "proto/text.h"
 #include "server/web/page/page_key.h"
@@ -42,18 +42,14 @@ std::string new_token(const std::string& path) {
 }  // namespace
 
 std::string token_of_file(const std::string& path) {
-  const protocol::Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-  if (!file.is_open()) {
-    return errno == ENOENT ? new_token(path)
-                           : (throw_wrong(path, std::strerror(errno)), std::string());
-  }
   struct stat about {};
-  if (::fstat(file.number(), &about) != 0 || (about.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
+  if (::stat(path.c_str(), &about) != 0 && errno == ENOENT) {
+    return new_token(path);
+  }
+  if ((about.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
     throw_wrong(path, "others may read it: chmod 600 keeps it to its owner");
   }
-  std::array<char, kLongest + 2> bytes{};
-  const ssize_t count = ::read(file.number(), bytes.data(), bytes.size());
-  std::string token(bytes.data(), count < 0 ? 0 : static_cast<std::size_t>(count));
+  std::string token = protocol::read_small_file(path, "the token file", kLongest + 1);
   if (token.ends_with('\n')) {
     token.pop_back();
   }

@@ -203,7 +203,7 @@ TEST_F(StudyBesideAFile, NamesThePlaceInBothFiles) {
   expect("[[block]]\ncsv = 'measured.csv'\ncolumns = { H = 'drop' }\nH = 1\nmu = 1\ne = 1\n",
          {"study.toml:3:17: ", "H is given twice"});
   expect("[[block]]\ncsv = 'nowhere.csv'\nmu = 1\ne = 1\n",
-         {"study.toml:2:7: cannot read the CSV file", "nowhere.csv"});
+         {"study.toml:2:7: the CSV file", "nowhere.csv cannot be read"});
   std::ofstream(folder_ / "measured.csv") << "mu\n0.5\n-1\n";
   expect(block_with("mu = { csv = 'measured.csv' }"),
          {"study.toml:3:6: ", "measured.csv:3: column `mu`: mu = -1 is not allowed"});

@@ -1,3 +1,4 @@
+#include <sys/stat.h>
 #include <sys/wait.h>
 
 #include <algorithm>
@@ -249,6 +250,59 @@ TEST(CommandLine, SaysThatNobodyAnswersAndWhatToDo) {
   EXPECT_EQ(outcome.out, "");
   EXPECT_NE(outcome.err.find("no answer from tcp://127.0.0.1:1 within 0.05 s"), std::string::npos)
       << outcome.err;
+}
+
+TEST(CommandLine, RefusesFilesThatAreNotRegularAndSaysWhatTheyAre) {
+  const test::TemporaryFolder folder;
+  ASSERT_EQ(mkfifo(folder.file("pipe").c_str(), 0600), 0);
+  std::ofstream(folder.path() / "pipe.toml") << "[[block]]\ncsv = 'pipe'\n";
+  const struct {
+    std::vector<std::string> arguments;
+    std::string says;
+  } wrong[] = {
+      {{"study", "check", "/dev/zero"}, "the study file /dev/zero cannot be read: it is a device"},
+      {{"study", "check", "pipe"}, "the study file pipe cannot be read: it is a pipe"},
+      {{"study", "check", "pipe.toml"}, "the CSV file pipe cannot be read: it is a pipe"},
+      {{"study", "check", "--H", "@pipe", "--mu", "1", "--e", "1"}, "the CSV file ./pipe cannot"},
+      {{"status", "--keys", "pipe"}, "the key file pipe cannot be read: it is a pipe"},
+      {{"status", "--db", "pipe"}, "pipe is a pipe: a database is a regular file"},
+      {{"run", "--db", "pipe", "--H", "1", "--mu", "1", "--e", "1"}, "pipe is a pipe"},
+      {{"merge", "pipe"}, "pipe is a pipe"},
+      {{"backup", "saved.db", "--db", "pipe", "--salvage"}, "pipe is a pipe"},
+      {{"autoscale", "slurm", "--max", "1", "--script", "pipe"}, "the script pipe cannot be read"},
+  };
+  for (const auto& [arguments, says] : wrong) {
+    const auto outcome = test::run_oblique(folder, arguments);
+    EXPECT_NE(outcome.exit_code, 0) << testing::PrintToString(arguments);
+    EXPECT_NE(outcome.err.find(says), std::string::npos) << outcome.err;
+  }
+  const auto doctor =
+      test::run_oblique(folder, {"doctor", "--no-timing", "--timeout", "600", "--db", "./pipe"});
+  EXPECT_NE(doctor.out.find("/pipe is a pipe"), std::string::npos) << doctor.out;
+}
+
+TEST(CommandLine, RepeatsAtMostEightyCharactersOfAWrongKey) {
+  const test::TemporaryFolder folder;
+  const std::string key(100'000, 'k');
+  const auto expect_short = [&](const std::vector<std::string>& arguments) {
+    const auto outcome = test::run_oblique(folder, arguments);
+    EXPECT_EQ(outcome.exit_code, 2) << outcome.err.substr(0, 1000);
+    EXPECT_NE(outcome.err.find(key.substr(0, 40)), std::string::npos) << outcome.err;
+    EXPECT_EQ(outcome.err.find(key.substr(0, 81)), std::string::npos)
+        << outcome.err.substr(0, 1000);
+  };
+  expect_short({"solve", "--" + key});
+  expect_short({key});
+  for (const std::string& text :
+       {key + " = 1\n", "[model]\n" + key + " = 1\n", "[[block]]\n" + key + " = 1\n",
+        "[[block]]\nH = { " + key + " = 1 }\n", "[[block]]\nsample = { " + key + " = 1 }\n",
+        "[[block]]\nmu = '" + key + "'\nH = 1\ne = 1\n", key + " = 1\n" + key + " = 2\n"}) {
+    std::ofstream(folder.path() / "a.toml") << text;
+    expect_short({"study", "check", "a.toml"});
+  }
+  ASSERT_EQ(test::run_oblique(folder, {"keygen", "keys"}).exit_code, 0);
+  std::ofstream(folder.path() / "keys/client.key", std::ios::app) << key << " = 1\n";
+  expect_short({"status", "--keys", "keys/client.key"});
 }
 
 TEST(CommandLine, SaysThatADatabaseIsNotThere) {

@@ -237,6 +237,7 @@ TEST_F(ConfigurationTest, AValueOutOfRangeIsToldAlsoWhereItIsOverridden) {
 TEST_F(ConfigurationTest, AFileThatIsNamedMustBeThere) {
   expect_refused({"--config", folder_.file("missing.toml")}, "missing.toml");
   expect_refused({"--config", folder_.path().string()}, "cannot be read");
+  expect_refused({"--config", "/dev/zero"}, "/dev/zero cannot be read: it is a device");
   set("TEST_PROGRAM_CONFIG", folder_.file("gone.toml"));
   expect_refused({}, "gone.toml");
 }

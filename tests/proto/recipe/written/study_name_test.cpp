@@ -31,5 +31,14 @@ TEST(StudyName, IsRefusedAndShownEscapedWhenItWouldSteerATerminal) {
   }
 }
 
+TEST(StudyName, IsRefusedAndShownEscapedWhenItHasACharacterWithoutWidth) {
+  for (const auto& name :
+       {"a\u200bb"s, "a\u200c"s, "a\u200db"s, "\u2060a"s, "\ufeff"s, "a\u00adb"s}) {
+    const auto objection = objection_to_study_name(name);
+    EXPECT_NE(objection.find("zero-width"), std::string::npos) << objection;
+    EXPECT_EQ(objection.find(name), std::string::npos) << objection;
+  }
+}
+
 }  // namespace
 }  // namespace oblique::protocol
