@@ -72,6 +72,10 @@ void QueryPool::stop() {
   }
 }
 
+std::int64_t QueryPool::time_ms() const {
+  return settings_.clock_ms ? settings_.clock_ms() : steady_ms();
+}
+
 void QueryPool::run() {
   while (true) {
     {
@@ -101,15 +105,16 @@ void QueryPool::turn() {
   take_wishes();
   for (Slot& slot : slots_) {
     if (slot.process != nullptr) {
-      look_after(slot, steady_ms());
+      look_after(slot, time_ms());
     }
   }
-  make_room(steady_ms());
-  begin_queries(steady_ms());
-  free_from_idle_clients(steady_ms());
+  make_room(time_ms());
+  begin_queries(time_ms());
+  free_from_idle_clients(time_ms());
+  begin_queries(time_ms());  // with the readers that were freed just now
   std::erase_if(slots_, [](const Slot& slot) { return slot.process == nullptr; });
   std::erase_if(dying_, [](const auto& process) { return process->is_gone(); });
-  wait(steady_ms());
+  wait(time_ms());
 }
 
 void QueryPool::wait(std::int64_t now_ms) {

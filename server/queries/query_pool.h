@@ -41,6 +41,7 @@ struct QueryPoolSettings {
   /// for its reader, or the write-ahead log has grown so long; unless it can be gone on with later.
   std::int64_t patience_ms = 10'000;
   std::uint64_t long_log_bytes = kLongLogBytes;
+  std::function<std::int64_t()> clock_ms = {};  ///< of a test; empty: the steady clock
 };
 
 /// So many chunks of an answer are given ahead of what its client has taken.
@@ -84,6 +85,7 @@ class QueryPool {
 
   void run();
   void turn();
+  std::int64_t time_ms() const;
   void wait(std::int64_t now_ms);
   void take_wishes();
   void drop(std::uint64_t ticket);

@@ -16,10 +16,11 @@
 #include <stdexcept>
 #include <thread>
 
+#include "tests/support/hang_limit.h"
+
 namespace oblique::test {
 namespace {
 
-constexpr std::chrono::seconds kNeverThatLong{240};
 constexpr std::chrono::milliseconds kBetweenLooks{2};
 
 std::string contents(const std::string& path) {
@@ -93,7 +94,7 @@ std::vector<pid_t> all_processes() {
 }  // namespace
 
 void wait_until(const std::string& what, const std::function<bool()>& condition) {
-  const auto give_up = std::chrono::steady_clock::now() + kNeverThatLong;
+  const auto give_up = std::chrono::steady_clock::now() + kHangLimit;
   while (!condition()) {
     if (std::chrono::steady_clock::now() > give_up) {
       throw std::runtime_error("waited in vain: " + what);

@@ -17,6 +17,7 @@
 #include "proto/frames.h"
 #include "server/queries/reader_program.h"
 #include "server/store/store.h"
+#include "tests/support/hang_limit.h"
 #include "tests/support/process.h"
 #include "tests/support/temporary_folder.h"
 
@@ -46,7 +47,7 @@ class QueryPoolTest : public testing::Test {
     }
     return *pool_;
   }
-  std::uint64_t ask(const std::string& sql, std::uint64_t time_limit_ms = 0,
+  std::uint64_t ask(const std::string& sql, std::uint64_t time_limit_ms = kLongestTimeLimit_ms,
                     const std::string& client = "") {
     QueryJob job{++last_ticket_, client.empty() ? std::to_string(last_ticket_) : client, {}};
     job.request.set_sql(sql);
@@ -60,7 +61,7 @@ class QueryPoolTest : public testing::Test {
   }
   protocol::ClientReply wait_for(std::uint64_t ticket, Kind kind = Kind::kAnswered) {
     std::unique_lock lock(mutex_);
-    const bool came = arrived_.wait_for(lock, std::chrono::seconds(100), [&] {
+    const bool came = arrived_.wait_for(lock, test::kHangLimit, [&] {
       return replies_.contains({ticket, kind});
     });
     if (!came) {
@@ -68,11 +69,14 @@ class QueryPoolTest : public testing::Test {
     }
     return replies_.at({ticket, kind});
   }
-  std::string error_of(const std::string& sql, std::uint64_t time_limit_ms = 0) {
+  std::string error_of(const std::string& sql, std::uint64_t time_limit_ms = kLongestTimeLimit_ms) {
     return wait_for(ask(sql, time_limit_ms)).error().message();
   }
-  std::int64_t number_of(const std::string& sql) {
-    return wait_for(ask(sql)).query().rows(0).values(0).integer();
+  std::int64_t number_of(const std::string& sql) { return number_in(wait_for(ask(sql))); }
+  /// Of the first row; −1, and a failure, when the reply is an error.
+  static std::int64_t number_in(const protocol::ClientReply& reply) {
+    EXPECT_EQ(reply.query().rows_size(), 1) << reply.error().message();
+    return reply.query().rows_size() == 1 ? reply.query().rows(0).values(0).integer() : -1;
   }
 
   test::TemporaryFolder folder_;
@@ -113,6 +117,7 @@ TEST_F(QueryPoolTest, AReaderWhoseServerWasKilledWhileItStartedBeginsNoQuery) {
 
 TEST_F(QueryPoolTest, AQueryIsAnsweredByAnotherProcess) {
   const auto reply = wait_for(ask("SELECT 5 AS five, 'x'"));
+  ASSERT_EQ(reply.query().rows_size(), 1) << reply.error().message();
   EXPECT_EQ(reply.query().columns(0), "five");
   EXPECT_EQ(reply.query().rows(0).values(0).integer(), 5);
   EXPECT_EQ(reply.query().rows(0).values(1).text(), "x");
@@ -164,12 +169,12 @@ TEST_F(QueryPoolTest, OthersAreAnsweredWhileMoreDeafQueriesRunThanThereAreReader
 
 TEST_F(QueryPoolTest, ACancelledQueryGivesItsReaderBack) {
   turns_.most_running_each = 1;
-  const auto running = ask(kDeaf, 0, "one client");
+  const auto running = ask(kDeaf, kLongestTimeLimit_ms, "one client");
   wait_for(running, Kind::kBegun);
-  const auto next = ask("SELECT 2", 0, "one client");
+  const auto next = ask("SELECT 2", kLongestTimeLimit_ms, "one client");
   EXPECT_FALSE(has(next, Kind::kBegun));
   pool().cancel(running);
-  EXPECT_EQ(wait_for(next).query().rows(0).values(0).integer(), 2);
+  EXPECT_EQ(number_in(wait_for(next)), 2);
   EXPECT_FALSE(has(running, Kind::kAnswered));
 }
 

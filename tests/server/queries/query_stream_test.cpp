@@ -1,12 +1,12 @@
 // Answers in chunks from real reader processes, taken by clients that want more or do not.
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <map>
 #include <mutex>
 #include <optional>
 #include <stdexcept>
-#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,6 +15,7 @@
 #include "proto/wire/chunk_rows.h"
 #include "server/queries/query_pool.h"
 #include "server/store/store.h"
+#include "tests/support/hang_limit.h"
 #include "tests/support/points.h"
 #include "tests/support/temporary_folder.h"
 
@@ -34,6 +35,7 @@ constexpr const char* kSlow =
 class QueryStreamTest : public testing::Test {
  protected:
   QueryStreamTest() {
+    settings_.patience_ms = kLongestTimeLimit_ms;
     Store store(path_);
     const auto table = table_of(60);
     AddResults results{1, table, 0, "", "", 1, "now", {}};
@@ -51,6 +53,7 @@ class QueryStreamTest : public testing::Test {
     question.set_study("a");
     question.add_select("point, '" + std::string(150'000, 'x') + "'");
     job.request.set_in_chunks(true);
+    job.request.set_time_limit_ms(kLongestTimeLimit_ms);
     EXPECT_TRUE(pool().submit(std::move(job)));
     return last_ticket_;
   }
@@ -66,6 +69,7 @@ class QueryStreamTest : public testing::Test {
     QueryJob job{++last_ticket_, client.empty() ? std::to_string(last_ticket_) : client, {}};
     job.request.set_sql(sql);
     job.request.set_in_chunks(true);
+    job.request.set_time_limit_ms(kLongestTimeLimit_ms);
     EXPECT_TRUE(pool().submit(std::move(job)));
     return last_ticket_;
   }
@@ -81,8 +85,7 @@ class QueryStreamTest : public testing::Test {
   template <typename Condition>
   Answer wait_until(std::uint64_t ticket, const Condition& condition) {
     std::unique_lock lock(mutex_);
-    if (!changed_.wait_for(lock, std::chrono::seconds(100),
-                           [&] { return condition(answers_[ticket]); })) {
+    if (!changed_.wait_for(lock, test::kHangLimit, [&] { return condition(answers_[ticket]); })) {
       throw std::runtime_error("the pool gives nothing");
     }
     return answers_[ticket];
@@ -105,6 +108,12 @@ class QueryStreamTest : public testing::Test {
       pool().more(ticket, taken);
     }
   }
+
+  /// From now on the pool's time stands still, but for `jump_ms`.
+  void stop_clock() {
+    settings_.clock_ms = [this] { return clock_ms_.load(); };
+  }
+  void jump_ms(std::int64_t time_ms) { clock_ms_ += time_ms; }
 
   QueryPoolSettings settings_;
 
@@ -133,6 +142,7 @@ class QueryStreamTest : public testing::Test {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::map<std::uint64_t, Answer> answers_;
+  std::atomic<std::int64_t> clock_ms_ = 0;
   std::uint64_t last_ticket_ = 0;
   std::optional<QueryPool> pool_;  // last: it reports to the others
 };
@@ -223,6 +233,7 @@ TEST_F(QueryStreamTest, WhoTakesNothingForLongLosesTheAnswerWhenOthersWait) {
 }
 
 TEST_F(QueryStreamTest, TimeInWhichAnAnswerWaitsForAReaderIsNotItsClients) {
+  stop_clock();
   settings_.patience_ms = 1500;
   settings_.turns.most_running_each = 1;
   settings_.turns.quick_ms = 60'000;
@@ -231,7 +242,7 @@ TEST_F(QueryStreamTest, TimeInWhichAnAnswerWaitsForAReaderIsNotItsClients) {
   }
   const auto fourth = ask(kLong, "a");
   const auto behind_it = ask("SELECT 1", "a");
-  std::this_thread::sleep_for(std::chrono::milliseconds(settings_.patience_ms + 200));
+  jump_ms(settings_.patience_ms + 200);
   pool().cancel(1);
   wait_for_chunks(fourth, kChunksAhead);
   const Answer answer = take_all(fourth);
@@ -241,15 +252,11 @@ TEST_F(QueryStreamTest, TimeInWhichAnAnswerWaitsForAReaderIsNotItsClients) {
 }
 
 TEST_F(QueryStreamTest, TimeInWhichNothingIsTakenDoesNotCount) {
-  QueryJob job{50, "a", {}};
-  job.request.set_sql(kLong);
-  job.request.set_in_chunks(true);
-  job.request.set_time_limit_ms(600);
-  pool().submit(std::move(job));
-  wait_for_chunks(50, kChunksAhead);
-  // The grace over, the server itself would have ended it.
-  std::this_thread::sleep_for(std::chrono::milliseconds(1500));
-  EXPECT_EQ(take_all(50).rows, 60'000U);
+  stop_clock();
+  const auto ticket = ask(kLong);
+  wait_for_chunks(ticket, kChunksAhead);
+  jump_ms(2 * kLongestTimeLimit_ms);
+  EXPECT_EQ(take_all(ticket).rows, 60'000U);
 }
 
 TEST_F(QueryStreamTest, ALongLogEndsWhatKeepsItFromBeingEmptied) {

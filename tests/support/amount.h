@@ -1,0 +1,13 @@
+#pragma once
+
+#include <cstdlib>
+
+namespace oblique::test {
+
+/// How often something is repeated: `all` times where the environment variable OBLIQUE_TEST_ALL is
+/// set, as by `deploy/test --all`, else `quick` times.
+inline int amount(int quick, int all) {
+  return std::getenv("OBLIQUE_TEST_ALL") != nullptr ? all : quick;
+}
+
+}  // namespace oblique::test
