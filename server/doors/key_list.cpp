@@ -22,7 +22,10 @@ void append(std::string& names, const std::string& name) {
 }  // namespace
 
 KeyList::KeyList(std::string path)
-    : path_(std::move(path)), seen_(stamp()), was_fresh_(is_fresh()), holders_(read()) {}
+    : path_(std::move(path)),
+      seen_(stamp()),
+      was_fresh_(is_fresh(Clock::now())),
+      holders_(read()) {}
 
 std::optional<KeyList::Stamp> KeyList::stamp() const {
   struct stat file {};
@@ -35,15 +38,13 @@ std::optional<KeyList::Stamp> KeyList::stamp() const {
 
 /// Of the file as it was seen. Systems count time in steps, some of a second: a change so soon
 /// after another one may leave the same stamp.
-bool KeyList::is_fresh() const {
-  constexpr std::int64_t kStep_ns = 2'000'000'000;
+bool KeyList::is_fresh(Clock::time_point now) const {
+  constexpr std::chrono::seconds kStep{2};
   if (!seen_) {
     return false;
   }
-  timespec now{};
-  clock_gettime(CLOCK_REALTIME, &now);
-  const std::int64_t age_ns = nanoseconds_of(now) - std::get<4>(*seen_);
-  return age_ns > -kStep_ns && age_ns < kStep_ns;
+  const auto age = now.time_since_epoch() - std::chrono::nanoseconds(std::get<4>(*seen_));
+  return age > -kStep && age < kStep;
 }
 
 KeyList::Holders KeyList::read() const {
@@ -56,13 +57,13 @@ KeyList::Holders KeyList::read() const {
   return holders;
 }
 
-std::optional<KeyList::News> KeyList::look() {
-  const auto now = stamp();
-  if (now == seen_ && !was_fresh_) {
+std::optional<KeyList::News> KeyList::look(Clock::time_point now) {
+  const auto found = stamp();
+  if (found == seen_ && !was_fresh_) {
     return std::nullopt;
   }
-  seen_ = now;
-  was_fresh_ = is_fresh();
+  seen_ = found;
+  was_fresh_ = is_fresh(now);
   try {
     Holders holders = read();
     if (holders.empty() && !holders_.empty() && was_fresh_) {

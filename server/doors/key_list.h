@@ -2,6 +2,7 @@
 
 #include <sys/stat.h>
 
+#include <chrono>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -21,6 +22,7 @@ class KeyList {
  public:
   /// Throws solver::InputError when the list cannot be read.
   explicit KeyList(std::string path);
+  using Clock = std::chrono::system_clock;
 
   /// What a look at the file has brought.
   struct News {
@@ -29,7 +31,7 @@ class KeyList {
     std::string text;  ///< for the log
   };
   /// Looks whether the file is another one than before. Each fault is told once.
-  std::optional<News> look();
+  std::optional<News> look(Clock::time_point now = Clock::now());
 
   std::size_t size() const { return holders_.size(); }
   const std::string& path() const { return path_; }
@@ -43,7 +45,7 @@ class KeyList {
   using Holders = std::map<protocol::CurveKey, std::shared_ptr<const KeyHolder>>;
 
   std::optional<Stamp> stamp() const;
-  bool is_fresh() const;
+  bool is_fresh(Clock::time_point now) const;
   Holders read() const;
   std::string take(Holders holders);
 

@@ -88,13 +88,13 @@ class HttpServer::Parts {
          {wake_up_.descriptor(), POLLIN, 0},
          {listener_.descriptor(), POLLIN, 0}}};
     while (!is_stopping_) {
-      const auto now = Clock::now();
+      const auto now = rules_.now();
       const bool accepts = now >= accept_again_;
       ::poll(items.data(), accepts ? items.size() : items.size() - 1,
              static_cast<int>(wait_from(now).count()));
       wake_up_.clear();
       turn_again_ = rules_.turn();
-      end_overdue(Clock::now());
+      end_overdue(rules_.now());
       end_gone();
       accept_all();
       ask_again();
@@ -124,7 +124,7 @@ class HttpServer::Parts {
       Listener::Accepted accepted = listener_.accept();
       if (!accepted.socket.is_open()) {
         const bool lacks_room = errno == EMFILE || errno == ENFILE || errno == ENOBUFS;
-        accept_again_ = lacks_room ? Clock::now() + kAcceptPause : accept_again_;
+        accept_again_ = lacks_room ? rules_.now() + kAcceptPause : accept_again_;
         return;
       }
       const int descriptor = accepted.socket.release();
@@ -221,7 +221,7 @@ class HttpServer::Parts {
     for (auto& [connection, peer] : peers_) {
       if (peer.waits && (is_stopping_ || !peer.stream || peer.stream->has_news())) {
         peer.waits = false;
-        peer.since = peer.stream ? Clock::now() : peer.since;
+        peer.since = peer.stream ? rules_.now() : peer.since;
         MHD_resume_connection(connection);
       }
     }
@@ -236,7 +236,7 @@ class HttpServer::Parts {
       return MHD_CONTENT_READER_END_OF_STREAM;
     }
     Peer& peer = found->second;
-    peer.since = Clock::now();
+    peer.since = parts->rules_.now();
     if (peer.unsent.empty()) {
       peer.unsent = peer.stream->next();
       peer.waits = peer.unsent.empty();
@@ -263,7 +263,7 @@ class HttpServer::Parts {
     }
     const int descriptor =
         MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD)->connect_fd;
-    parts.peers_[connection] = {descriptor, parts.accepted_host_, Clock::now(), {}};
+    parts.peers_[connection] = {descriptor, parts.accepted_host_, parts.rules_.now(), {}};
   }
 
   static MHD_Result asked(void* self, MHD_Connection* connection, const char* url,
@@ -311,7 +311,7 @@ class HttpServer::Parts {
   }
 
   MHD_Result answer(Peers::iterator peer) {
-    const auto now = Clock::now();
+    const auto now = rules_.now();
     if (!peer->second.asked) {
       peer->second.asked = now;
     }

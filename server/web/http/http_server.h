@@ -53,6 +53,8 @@ class HttpServer {
     /// Called whenever the thread turns; gives the time after which it is to turn again.
     std::function<std::optional<std::chrono::milliseconds>()> turn =
         []() -> std::optional<std::chrono::milliseconds> { return std::nullopt; };
+    /// The time of connections; tests set their own.
+    std::function<std::chrono::steady_clock::time_point()> now = std::chrono::steady_clock::now;
   };
 
   /// Listens from now on. Throws std::runtime_error, naming the address, when it cannot.

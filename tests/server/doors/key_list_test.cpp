@@ -7,9 +7,9 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <thread>
 
 #include "server/doors/doors.h"
+#include "tests/support/hang_limit.h"
 #include "tests/support/temporary_folder.h"
 #include "worker/solver/model/errors.h"
 
@@ -109,10 +109,12 @@ TEST_F(KeyListTest, AListThatIsEmptiedCountsWhenItStaysSo) {
   const auto list = std::make_shared<KeyList>(path_);
   const PortKeeper workers(list, PortKeeper::Port::kWorkers);
   std::ofstream(path_, std::ios::trunc).close();  // as by an editor that goes on to write
-  EXPECT_FALSE(list->look());
+  struct stat file {};
+  ASSERT_EQ(::stat(path_.c_str(), &file), 0);
+  const KeyList::Clock::time_point written{std::chrono::seconds(file.st_ctim.tv_sec)};
+  EXPECT_FALSE(list->look(written));
   EXPECT_EQ(name_in(workers.judge(key)), "w");
-  std::this_thread::sleep_for(std::chrono::milliseconds(2100));
-  EXPECT_TRUE(list->look());
+  EXPECT_TRUE(list->look(written + test::kHangLimit));
   EXPECT_EQ(cause_of(workers.judge(key)), RefusalCause::kRevokedKey);
 }
 

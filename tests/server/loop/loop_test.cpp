@@ -182,7 +182,7 @@ TEST_F(LoopTest, TheQueriesOfAClientEndWithItsConnectionBeforeItIsToHearOfThem) 
     ClientRequest request;
     request.set_protocol_version(protocol::kProtocolVersion);
     request.mutable_query()->set_sql(kDeaf);
-    request.mutable_query()->set_time_limit_ms(600'000);
+    request.mutable_query()->set_time_limit_ms(kLongestTimeLimit_ms);
     client.send(request);
     EXPECT_TRUE(client.submit("a", 10).has_submit());  // so that the query has arrived
   }

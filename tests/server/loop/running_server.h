@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <chrono>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -18,6 +19,8 @@
 #include "proto/frames.h"
 #include "proto/result_message.h"
 #include "server/loop/loop.h"
+#include "server/reading/query_limits.h"
+#include "tests/support/hang_limit.h"
 #include "tests/support/points.h"
 
 namespace oblique::server {
@@ -73,7 +76,8 @@ class RunningServer {
     return settings;
   }
 
-  static constexpr std::int64_t kLongestSilence_ms = 120'000;
+  static constexpr std::int64_t kLongestSilence_ms =
+      std::chrono::milliseconds(test::kHangLimit).count();
 
   int stop_fd_ = eventfd(0, 0);
   Loop loop_;
@@ -87,7 +91,7 @@ class Peer {
  public:
   explicit Peer(const std::string& endpoint) : socket_(context_, zmq::socket_type::dealer) {
     socket_.set(zmq::sockopt::linger, 0);
-    socket_.set(zmq::sockopt::rcvtimeo, kLongest_ms);  // so that a broken server fails the test
+    socket_.set(zmq::sockopt::rcvtimeo, kLongest_ms);
     disconnections_.init(socket_, "inproc://disconnections", ZMQ_EVENT_DISCONNECTED);
     socket_.connect(endpoint);
   }
@@ -116,7 +120,7 @@ class Peer {
   }
 
  private:
-  static constexpr int kLongest_ms = 60'000;
+  static constexpr int kLongest_ms = std::chrono::milliseconds(test::kHangLimit).count();
 
   zmq::context_t context_;
   zmq::socket_t socket_;
@@ -210,6 +214,7 @@ class PretendedClient : public Peer<ClientRequest, ClientReply> {
   ClientReply query(const std::string& sql) {
     ClientRequest request;
     request.mutable_query()->set_sql(sql);
+    request.mutable_query()->set_time_limit_ms(kLongestTimeLimit_ms);
     return ask(request);
   }
   /// Asks for what takes minutes, and waits until it is said that the query runs.
@@ -218,9 +223,10 @@ class PretendedClient : public Peer<ClientRequest, ClientReply> {
     request.set_protocol_version(protocol::kProtocolVersion);
     request.set_request_id(++id_);
     request.mutable_query()->set_sql(sql);
-    request.mutable_query()->set_time_limit_ms(600'000);
+    request.mutable_query()->set_time_limit_ms(kLongestTimeLimit_ms);
     send(request);
-    for (int words = 0; words < 60; ++words) {
+    constexpr int kMostWords = 600;  // one a second
+    for (int words = 0; words < kMostWords; ++words) {
       const auto word = receive();
       ASSERT_EQ(word.still_working().request_id(), id_);
       if (word.still_working().runs()) {

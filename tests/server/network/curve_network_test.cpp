@@ -194,8 +194,7 @@ TEST_F(CurveNetworkTest, WhoseKeyIsRevokedIsEndedAtOnceWithAllThatItSent) {
   const Incoming from_one = next();
   const Incoming from_other = next();
   revoked->send("too late");
-  usleep(20'000);
-  network_.collect(now_ms_);
+  turn_until([&] { return network_.held_in_bytes() > 0; });
   doorkeeper_->revoke(worker_.public_key);
   network_.admission_changed();
   EXPECT_EQ(network_.connections(), 1U);

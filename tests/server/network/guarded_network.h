@@ -3,12 +3,11 @@
 #include <memory>
 #include <string>
 
-#include <unistd.h>
-
 #include <gtest/gtest.h>
 
 #include "server/network/network.h"
 #include "tests/server/network/list_doorkeeper.h"
+#include "tests/server/network/turning.h"
 
 namespace oblique::server {
 
@@ -24,15 +23,7 @@ class GuardedNetworkTest : public testing::Test {
   /// Turns until `done`; a network that never gets there fails the test.
   template <typename Done>
   void turn_until(const Done& done) {
-    bool is_done = done();
-    for (int i = 0; i < 20'000 && !is_done; ++i) {
-      network_.collect(now_ms_);
-      if (!network_.has_more()) {
-        usleep(1000);
-      }
-      is_done = done();
-    }
-    ASSERT_TRUE(is_done);
+    ASSERT_TRUE(server::turn_until(network_, now_ms_, done));
   }
   Incoming next() {
     std::optional<Incoming> incoming;

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/server/network/raw_peer.h"
+#include "tests/server/network/turning.h"
 
 namespace oblique::server {
 namespace {
@@ -30,13 +31,7 @@ class NetworkTest : public testing::Test {
   /// Turns until `done`; a network that never gets there fails the test.
   template <typename Done>
   void turn_until(const Done& done) {
-    bool is_done = done();
-    for (int i = 0; i < 20'000 && !is_done; ++i) {
-      network_.collect(now_ms_);
-      usleep(1000);
-      is_done = done();
-    }
-    ASSERT_TRUE(is_done);
+    ASSERT_TRUE(server::turn_until(network_, now_ms_, done));
   }
   Incoming next(Network::Port port = 0) {
     std::optional<Incoming> incoming;
@@ -56,10 +51,14 @@ TEST_F(NetworkTest, PeersTakeTurnsHoweverMuchOneSends) {
     flood->send(zmtp_frame("flood"));
   }
   EXPECT_EQ(next().message.body, "flood");
-  const auto modest = peer();
-  modest->send(zmtp_frame("first") + zmtp_frame("second"));
-  turn_until([&] { return network_.connections() == 2; });
-  usleep(10'000);
+  RawPeer modest(network_.endpoint(0));
+  // In one packet, so that all of it has come when the server answers with its own READY.
+  modest.send(zmtp_greeting() + zmtp_ready("DEALER") + zmtp_frame("first") + zmtp_frame("second"));
+  std::size_t heard = 0;
+  turn_until([&] {
+    heard += modest.receive_what_is_there().size();
+    return heard > zmtp_greeting().size();
+  });
   std::vector<std::string> bodies;
   while (bodies.size() < 200 && (bodies.empty() || bodies.back() != "second")) {
     bodies.push_back(next().message.body);
@@ -98,15 +97,20 @@ TEST(ManyPeers, ThatDeliverMoreThanIsTakenAreReadNoFurtherAndLoseNothing) {
     peers.back()->send(zmtp_frame(std::string(kMessage, 'x')));
   }
   const auto anyone = [](const std::string&) { return true; };
-  int taken = 0;
   std::size_t most = 0;
-  for (int turn = 0; taken < kPeers && turn < 100'000; ++turn) {
-    network.collect(turn);
-    most = std::max(most, network.held_in_bytes());
-    const bool is_late = turn > 1000;  // nothing is taken before
-    taken += is_late && network.next(port, anyone) ? 1 : 0;
+  const auto see = [&] { return most = std::max(most, network.held_in_bytes()); };
+  // Nothing is taken before so much is held.
+  EXPECT_TRUE(turn_until(network, 0, [&] { return see() >= kPause; }));
+  for (int turn = 0; turn < 100; ++turn) {
+    network.collect(0);
+    see();
   }
-  EXPECT_EQ(taken, kPeers);
+  int taken = 0;
+  EXPECT_TRUE(turn_until(network, 0, [&] {
+    see();
+    taken += network.next(port, anyone) ? 1 : 0;
+    return taken == kPeers;
+  }));
   EXPECT_TRUE(network.take_departures().empty());
   EXPECT_LT(most, kPause + 4 * kMessage);
   EXPECT_GT(sent, 2 * kPause);
@@ -229,11 +233,11 @@ TEST_F(TightNetworkTest, TogetherPeersHoldNoMoreThanAllMayAndTheLargestGoes) {
   modest->send(zmtp_frame(std::string(1000, 'm')));
   const auto greedy = peer();
   greedy->send(zmtp_header(16'000'000) + std::string(100'000, 'g'));
-  for (int i = 0; i < 2000 && network_.take_departures().empty(); ++i) {
+  turn_until([&] {
     greedy->send_what_fits(std::string(100'000, 'g'));
-    network_.collect(now_ms_);
     EXPECT_LE(network_.held_in_bytes(), kLimits.held_in_bytes);
-  }
+    return !network_.take_departures().empty();
+  });
   EXPECT_EQ(network_.connections(), 1U);
   EXPECT_EQ(next().message.body, std::string(1000, 'm'));
 }
@@ -253,10 +257,8 @@ TEST_F(TightNetworkTest, TheQuietestConnectionMakesRoomAndAStormFindsNone) {
   EXPECT_EQ(network_.send(identity, "late"), Delivery::kGone);
   // All of them have just spoken.
   RawPeer refused(network_.endpoint(0));
-  for (int i = 0; i < 50; ++i) {
-    network_.collect(now_ms_);
-    usleep(1000);
-  }
+  constexpr auto kBound = static_cast<std::size_t>(RefusalCause::kBound);
+  turn_until([&] { return network_.refusals().at(kBound).count == 1; });
   EXPECT_EQ(network_.connections(), 3U);
   EXPECT_EQ(refused.receive(), "");
 }

@@ -123,13 +123,13 @@ TEST_F(RefusedPeersTest, WhoIsInIsServedBetweenTheHandshakesOfAFlood) {
   const std::string first = modest->curve.sealed("first");
   modest->tcp.send(first + modest->curve.sealed("second"));
   std::vector<std::string> bodies;
-  for (int turn = 0; turn < 20'000 && bodies.size() < 2; ++turn) {
-    network_.collect(now_ms_);
+  turn_until([&] {
     while (const auto incoming = network_.next(guarded_, anybody)) {
       bodies.push_back(incoming->message.body);
       EXPECT_TRUE(network_.has_more());  // most of the flood still waits
     }
-  }
+    return bodies.size() >= 2;
+  });
   EXPECT_THAT(bodies, testing::ElementsAre("first", "second"));
   std::size_t welcomed = 0;
   for (const auto& peer : flood) {
@@ -295,11 +295,11 @@ TEST_F(TightRefusedPeersTest, TheConnectionsOfAKeyTogetherHoldNoMoreThanItsShare
   modest->tcp.send(modest->curve.sealed(std::string(1000, 'm')));
   const auto greedy = admitted();
   greedy->tcp.send(zmtp_header(16'000'000));
-  for (int i = 0; i < 2000 && network_.connections() == 2; ++i) {
+  turn_until([&] {
     greedy->tcp.send_what_fits(std::string(100'000, 'g'));
-    network_.collect(now_ms_);
     EXPECT_LE(network_.held_in_bytes(), kLimits.held_in_bytes_of_key);
-  }
+    return network_.connections() < 2;
+  });
   EXPECT_THAT(network_.take_departures().at(0).reason,
               HasSubstr("the key \"anna\" together hold too much"));
   EXPECT_EQ(next().message.body, std::string(1000, 'm'));

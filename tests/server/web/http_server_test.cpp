@@ -33,8 +33,9 @@ class EndlessStream final : public HttpStream {
   bool has_more_;
 };
 
-/// Repeats the path that it is asked for; to /wait there is no answer before `is_open`, that to
-/// /long has more bytes than fit on their way, and those to /loud and /quiet never end.
+/// With a clock that moves a nanosecond at each look. Repeats the path that it is asked for; to
+/// /wait there is no answer before `is_open`, that to /long has more bytes than fit on their way,
+/// and those to /loud and /quiet never end.
 class EchoServer {
  public:
   explicit EchoServer(const HttpLimits& limits = {})
@@ -43,8 +44,8 @@ class EchoServer {
             [this](const HttpServer::Question& question) -> std::optional<HttpAnswer> {
               slow_ = question.counts->ended_as_slow;
               crowded_ = question.counts->ended_for_others;
+              asked_ += question.path == "/wait" || question.path == "/long" ? 1 : 0;
               if (question.path == "/wait" && !is_open_) {
-                ++asked_;
                 return std::nullopt;
               }
               if (question.path == "/loud" || question.path == "/quiet") {
@@ -66,6 +67,10 @@ class EchoServer {
     is_open_ = true;
     server_.wake();
   }
+  void jump(milliseconds time) {
+    now_ = now_.load() + time;
+    server_.wake();
+  }
   std::uint64_t asked() const { return asked_; }
   std::uint64_t slow() const { return slow_; }
   std::uint64_t crowded() const { return crowded_; }
@@ -75,6 +80,7 @@ class EchoServer {
   HttpServer::Rules rules() {
     HttpServer::Rules rules;
     rules.gone = [this](std::uint64_t) { ++gone_; };
+    rules.now = [this] { return now_.load() + std::chrono::nanoseconds(++looks_); };
     return rules;
   }
 
@@ -83,6 +89,8 @@ class EchoServer {
   std::atomic<std::uint64_t> slow_ = 0;
   std::atomic<std::uint64_t> crowded_ = 0;
   std::atomic<std::uint64_t> gone_ = 0;
+  std::atomic<std::int64_t> looks_ = 0;
+  std::atomic<std::chrono::steady_clock::time_point> now_{std::chrono::steady_clock::now()};
   HttpServer server_;  // last: its thread uses the others
 };
 
@@ -221,14 +229,16 @@ TEST(HttpServer, AnAddressTakesNoRoomFromAnother) {
 }
 
 TEST(HttpServer, WhoTakesTooLongIsEnded) {
-  HttpLimits limits;
-  limits.longest = milliseconds(50);
-  EchoServer server(limits);
+  EchoServer server;
   RawHttp silent(server.url());
   RawHttp halting(server.url());
   halting.send("GET / HTTP/1.1\r\n");
   RawHttp reading_nothing(server.url());
   reading_nothing.send("GET /long HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  while (server.asked() < 1) {
+    get(server.url(), "/");
+  }
+  server.jump(HttpLimits().longest);
   EXPECT_THAT(silent.read_to_the_end(), testing::StartsWith("HTTP/1.1 408 "));
   EXPECT_THAT(halting.read_to_the_end(), testing::StartsWith("HTTP/1.1 408 "));
   while (server.slow() < 3) {
@@ -238,9 +248,7 @@ TEST(HttpServer, WhoTakesTooLongIsEnded) {
 }
 
 TEST(HttpServer, AStreamThatIsNotTakenIsEndedAndAQuietOneIsNot) {
-  HttpLimits limits;
-  limits.longest = milliseconds(50);
-  EchoServer server(limits);
+  EchoServer server;
   const std::string rest = " HTTP/1.1\r\nHost: localhost\r\n\r\n";
   RawHttp quiet(server.url());
   quiet.send("GET /quiet" + rest);
@@ -253,7 +261,8 @@ TEST(HttpServer, AStreamThatIsNotTakenIsEndedAndAQuietOneIsNot) {
   std::string some(std::size_t{1} << 20U, '\0');
   while (server.slow() < 1) {
     ASSERT_GT(::recv(taking.number(), some.data(), some.size(), 0), 0) << "it takes what comes";
-    get(server.url(), "/");
+    get(server.url(), "/");  // after which the server has sent more
+    server.jump(HttpLimits().longest / 10);
   }
   EXPECT_FALSE(quiet.has_news()) << "it takes all that there is";
   while (::recv(taking_nothing.number(), some.data(), some.size(), 0) > 0) {

@@ -12,6 +12,7 @@
 #include <sys/socket.h>
 
 #include "proto/system/descriptor.h"
+#include "tests/support/hang_limit.h"
 
 namespace oblique::server {
 
@@ -83,7 +84,7 @@ class RawHttp {
   int number() const { return socket_.number(); }
 
  private:
-  static constexpr int kLongest_ms = 20'000;  // so that a broken server fails the test
+  static constexpr int kLongest_ms = std::chrono::milliseconds(test::kHangLimit).count();
 
   static sockaddr_in address_of(const std::string& text, std::uint16_t port) {
     sockaddr_in address{};

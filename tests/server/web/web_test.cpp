@@ -18,6 +18,8 @@ namespace {
 WebSettings anywhere() {
   WebSettings settings;
   settings.address = {"127.0.0.1", "*"};
+  settings.limits.longest = test::kHangLimit;
+  settings.patience = test::kHangLimit;
   return settings;
 }
 

@@ -9,6 +9,7 @@
 
 #include "proto/result_message.h"
 #include "server/store/store.h"
+#include "tests/support/hang_limit.h"
 #include "tests/support/points.h"
 #include "tests/support/temporary_folder.h"
 
@@ -57,7 +58,7 @@ class KnownFinderTest : public testing::Test {
   }
   KnownReport next_report() {
     std::unique_lock lock(mutex_);
-    EXPECT_TRUE(wake_.wait_for(lock, std::chrono::seconds(30), [&] { return !reports_.empty(); }));
+    EXPECT_TRUE(wake_.wait_for(lock, test::kHangLimit, [&] { return !reports_.empty(); }));
     KnownReport report = std::move(reports_.front());
     reports_.pop_front();
     return report;

@@ -4,7 +4,6 @@
 #include "server/web/answers/result_sample.h"
 
 #include <atomic>
-#include <chrono>
 #include <cstdint>
 #include <random>
 #include <set>
@@ -16,6 +15,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "server/database/sqlite.h"
+#include "tests/support/process.h"
 
 namespace oblique::server {
 namespace {
@@ -169,17 +169,24 @@ class ColumnStoreTest : public testing::Test {
         fmt::format("WITH RECURSIVE p(i) AS (SELECT {} UNION ALL SELECT i + 1 FROM p WHERE i + 1 < "
                     "{}) INSERT OR REPLACE INTO packed_results SELECT 1, i, NULL, i FROM p",
                     begin, end));
-    std::this_thread::sleep_for(std::chrono::milliseconds(60));  // columns follow so often
   }
   ColumnStore::Shared read() {
     return store_.read(database_.get(), 1, *column_source("mu"), kPoints, [] { return false; });
   }
-  /// Ends while rows are read: the only statement that is long.
+  /// Ends while rows are read: the only statement that is long. A column that was read just now is
+  /// not read again at once.
   void read_in_vain() {
     constexpr int kSteps = 300;
     sqlite3_progress_handler(
         database_.get(), kSteps, [](void* /*nothing*/) { return 1; }, nullptr);
-    EXPECT_THROW(read(), StorageError);
+    test::wait_until("the column is read", [this] {
+      try {
+        read();
+        return false;
+      } catch (const StorageError&) {
+        return true;
+      }
+    });
     sqlite3_progress_handler(database_.get(), 0, nullptr, nullptr);
   }
 
@@ -207,8 +214,10 @@ TEST_F(ColumnStoreTest, WhatVanishedWhileReadingFailedIsNotShown) {
   settle(0, kPoints);
   read_in_vain();
   settle(60, kPoints);
-  EXPECT_EQ(read(), column);
-  EXPECT_TRUE(is_same_mark(column->part(50, 1).at(0), no_result()));
+  test::wait_until("a point has vanished", [&] {
+    EXPECT_EQ(read(), column);
+    return is_same_mark(column->part(50, 1).at(0), no_result());
+  });
   EXPECT_EQ(column->part(60, 1), std::vector<float>{60.0F});
 }
 
@@ -263,7 +272,9 @@ TEST_F(ColumnStoreTest, WhoWaitsForAColumnThatAnotherReadsGoesInTime) {
           return 0;
         },
         &both);
-    read();
+    while (!is_read) {
+      read();
+    }
   });
   while (!is_read) {
     std::this_thread::yield();
