@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/amount.h"
+
 namespace oblique::simulation {
 namespace {
 
@@ -22,28 +24,32 @@ SimulationOutcome simulate_seeds(std::uint64_t first, std::uint64_t count,
   return all;
 }
 
-/// 2000 seeds in parts, which CTest runs beside each other; in every second part a sync that fails
+std::uint64_t seeds(int quick, int all) {
+  return static_cast<std::uint64_t>(test::amount(quick, all));
+}
+
+/// Seeds in parts, which CTest runs beside each other; in every second part a sync that fails
 /// forgets what it should have kept, as on Linux.
 class SimulationTest : public testing::TestWithParam<std::uint64_t> {};
 
 TEST_P(SimulationTest, EveryPointEndsWithOneRightRowWhateverBreaks) {
-  constexpr std::uint64_t kSeeds = 250;
+  const std::uint64_t count = seeds(40, 250);
   SimulationSettings settings;
   settings.forgetful_syncs = GetParam() % 2 == 1;
-  const auto all = simulate_seeds(GetParam() * kSeeds + 1, kSeeds, settings);
-  EXPECT_GT(all.server_kills, kSeeds / 2);
-  EXPECT_GT(all.power_losses, kSeeds / 2);
-  EXPECT_GT(all.deaths_in_writes, kSeeds / 4);
-  EXPECT_GT(all.server_stops, kSeeds / 4);
-  EXPECT_GT(all.undone_commits, kSeeds / 4);
-  EXPECT_GT(all.failed_commits, kSeeds);
-  EXPECT_GT(all.worker_faults, kSeeds);
-  EXPECT_GT(all.partitions, kSeeds / 4);
-  EXPECT_GT(all.clock_jumps, kSeeds / 4);
-  EXPECT_GT(all.growths, kSeeds / 4);
-  EXPECT_GT(all.renamings, kSeeds / 4);
-  EXPECT_GT(all.deletions, kSeeds / 4);
-  EXPECT_GT(all.cleared_rows, kSeeds);
+  const auto all = simulate_seeds(GetParam() * count + 1, count, settings);
+  EXPECT_GT(all.server_kills, count / 2);
+  EXPECT_GT(all.power_losses, count / 2);
+  EXPECT_GT(all.deaths_in_writes, count / 4);
+  EXPECT_GT(all.server_stops, count / 4);
+  EXPECT_GT(all.undone_commits, count / 4);
+  EXPECT_GT(all.failed_commits, count);
+  EXPECT_GT(all.worker_faults, count);
+  EXPECT_GT(all.partitions, count / 4);
+  EXPECT_GT(all.clock_jumps, count / 4);
+  EXPECT_GT(all.growths, count / 4);
+  EXPECT_GT(all.renamings, count / 4);
+  EXPECT_GT(all.deletions, count / 4);
+  EXPECT_GT(all.cleared_rows, count);
   EXPECT_EQ(all.failed_points, 0U);
 }
 
@@ -52,17 +58,19 @@ INSTANTIATE_TEST_SUITE_P(Part, SimulationTest, testing::Range<std::uint64_t>(0, 
 TEST(KillersTest, OnlyThePointsThatKillTheirWorkersFail) {
   SimulationSettings settings;
   settings.killers = true;
-  const auto all = simulate_seeds(1, 100, settings);
-  EXPECT_GT(all.failed_points, 50U);
+  const std::uint64_t count = seeds(20, 100);
+  const auto all = simulate_seeds(1, count, settings);
+  EXPECT_GT(all.failed_points, count / 2);
 }
 
 TEST(StormsTest, NoPointFailsForWorkersThatAreLostBesideASoundOne) {
   SimulationSettings settings;
   settings.storms = true;
-  const auto all = simulate_seeds(1, 200, settings);
-  EXPECT_GT(all.worker_faults, 1000U);
-  EXPECT_GT(all.cuts, 500U);
-  EXPECT_GT(all.vanished_peers, 100U);
+  const std::uint64_t count = seeds(20, 200);
+  const auto all = simulate_seeds(1, count, settings);
+  EXPECT_GT(all.worker_faults, 5 * count);
+  EXPECT_GT(all.cuts, 5 * count / 2);
+  EXPECT_GT(all.vanished_peers, count / 2);
   EXPECT_EQ(all.failed_points, 0U);
 }
 

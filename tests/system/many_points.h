@@ -8,7 +8,7 @@ namespace oblique::test {
 #if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
 constexpr int kSide = 30;  ///< sanitized programs are some twenty times slower
 #else
-constexpr int kSide = 200;
+constexpr int kSide = 140;
 #endif
 
 /// A study that takes seconds, so that there is time to break something in its middle.

@@ -38,7 +38,7 @@ class QueryAttackTest : public testing::Test {
   QueryAttackTest() { std::filesystem::create_directory(folder_.file("temporary")); }
 
   std::vector<std::string> asking(const std::string& sql) const {
-    return {"sql", sql, "--server", server_.client_url(), "--timeout", "200", "--format", "csv"};
+    return {"sql", sql, "--server", server_.client_url(), "--timeout", "600", "--format", "csv"};
   }
   void attack(const std::string& sql) {
     attackers_.emplace_back(folder_, client_program(), asking(sql));

@@ -10,13 +10,14 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/amount.h"
 #include "tests/support/database.h"
 #include "tests/support/programs.h"
 
 namespace oblique::test {
 namespace {
 
-constexpr int kRounds = 12;
+const int kRounds = amount(4, 12);
 constexpr int kPointsABlock = 200;
 
 class GrowthKillTest : public ::testing::Test {
@@ -35,7 +36,7 @@ class GrowthKillTest : public ::testing::Test {
   }
 
   std::unique_ptr<Process> client(std::vector<std::string> arguments) const {
-    arguments.insert(arguments.end(), {"--server", server_->client_url(), "--timeout", "30"});
+    arguments.insert(arguments.end(), {"--server", server_->client_url(), "--timeout", "600"});
     return std::make_unique<Process>(folder_, client_program(), arguments);
   }
   std::unique_ptr<Process> submit(const std::string& file) const {

@@ -26,7 +26,8 @@ class KillTest : public ::testing::Test {
   }
 
   void start_worker() {
-    workers_.push_back(std::make_unique<Worker>(folder_, server_->worker_url()));
+    workers_.push_back(std::make_unique<Worker>(folder_, server_->worker_url(),
+                                                std::vector<std::string>{"--threads", "1"}));
   }
 
   void wait_for_rows(double rows) {

@@ -145,7 +145,7 @@ class ApartCycle {
     // What a killed server was asked is asked again of the next one: the client does not give up.
     Process client(
         folder_, client_program(),
-        {"submit", study_.file(), "--server", server_->client_url(), "--watch", "--timeout", "30"},
+        {"submit", study_.file(), "--server", server_->client_url(), "--watch", "--timeout", "600"},
         first ? blow_.environment("oblique") : blow_.bystander());
     while (!client.exit_code()) {
       look_after();

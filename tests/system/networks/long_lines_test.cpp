@@ -38,7 +38,7 @@ class LongLines : public ::testing::Test {
     // On a machine that does much else a long line takes longer than the ten seconds that are
     // usual.
     arguments.insert(arguments.end(), {"--server", to_clients_port_->url(), "--keys", client_key_,
-                                       "--timeout", "60"});
+                                       "--timeout", "600"});
     client_.emplace(folder_, client_program(), arguments);
     wait_for_rows(database_, 1);
   }
