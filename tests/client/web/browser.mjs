@@ -1,5 +1,5 @@
-// A server with a small database, and a browser that writes down all it objects to.
-import { spawn, spawnSync } from "node:child_process";
+// A server of a database, and a browser that writes down all it objects to.
+import { spawn } from "node:child_process";
 import { mkdtempSync, rmSync } from "node:fs";
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
@@ -9,17 +9,15 @@ const need = createRequire(join(process.env.OBLIQUE_NODE_MODULES, "x"));
 const puppeteer = need("puppeteer-core");
 const axe_source = need("axe-core").source;
 
-/** Makes studies, shows them as `oblique view` does, until `stop`. */
+/** Ends a wait only where something hangs. */
+const kHangs_ms = 300_000;
+
+/** Shows a database as `oblique view` does, until `stop`. */
 export class Server {
   constructor(oblique) {
     this.oblique = oblique;
     this.folder = mkdtempSync(join(tmpdir(), "oblique-page-"));
     this.database = join(this.folder, "page.db");
-  }
-
-  run(...flags) {
-    const made = spawnSync(this.oblique, ["run", ...flags, "--db", this.database, "--workers", "1"], { encoding: "utf8" });
-    if (made.status !== 0) throw new Error(made.stderr);
   }
 
   async start(...flags) {
@@ -48,16 +46,22 @@ export class Browser {
   async start(server) {
     this.server = server;
     this.objections = [];
-    this.browser = await puppeteer.launch({ executablePath: process.env.OBLIQUE_CHROMIUM,
+    this.browser = await puppeteer.launch({ executablePath: process.env.OBLIQUE_CHROMIUM, timeout: kHangs_ms, protocolTimeout: kHangs_ms,
       args: ["--disable-gpu", "--disable-dev-shm-usage", ...(process.getuid() === 0 ? ["--no-sandbox"] : [])] });
-    const first = await this.browser.newPage();
+    const first = await this.#tab();
     await first.goto(server.address);  // the token becomes a cookie
     await first.close();
   }
 
-  /** A tab at a view; `early` runs in it before all scripts of the page. */
-  async open(view, { width = 1280, scheme = "light", motion = "no-preference", early = () => {} } = {}) {
+  async #tab() {
     const page = await this.browser.newPage();
+    page.setDefaultTimeout(kHangs_ms);
+    return page;
+  }
+
+  /** A tab at a view; `early` runs in it before all scripts of the page; where it is hurried no timer of the page takes long. */
+  async open(view, { width = 1280, scheme = "light", motion = "no-preference", is_hurried = false, early = () => {} } = {}) {
+    const page = await this.#tab();
     await this.look(page, { width, scheme, motion });
     page.on("console", (line) => {
       if (["error", "warn"].includes(line.type())) this.objections.push(`${view}: console: ${line.text()}`);
@@ -83,6 +87,12 @@ export class Browser {
         }
       };
     });
+    if (is_hurried) {
+      await page.evaluateOnNewDocument(() => {
+        const real = window.setTimeout;
+        window.setTimeout = (call, ms, ...given) => real(call, Math.min(ms ?? 0, 50), ...given);
+      });
+    }
     await page.evaluateOnNewDocument(early);
     await page.goto(`${this.server.origin}/${view}`);
     return page;
@@ -106,10 +116,14 @@ export class Browser {
   }
 }
 
-/** Waits until `look` in the tab gives something, and gives that. */
+/** Waits until `look` in the tab gives something, and gives that. It may fail as long as what it looks at is not there. */
 export async function until(page, look, ...given) {
-  const found = await page.waitForFunction(look, { timeout: 20_000, polling: 50 }, ...given);
-  return found.jsonValue();
+  let fault;
+  for (const end = Date.now() + kHangs_ms; Date.now() < end; await new Promise((go_on) => setTimeout(go_on, 50))) {
+    const found = await page.evaluate(look, ...given).catch((error) => { fault = error; });
+    if (found) return found;
+  }
+  throw new Error(`it did not come to: ${look}`, { cause: fault });
 }
 
 export const text_of = (page, selector) => page.$eval(selector, (one) => one.textContent);

@@ -1,6 +1,10 @@
-// The server and the browser of all tests, and tabs at its views.
+// The server and the browser of the tests of a file, and tabs at its views.
+// OBLIQUE_BIN: the folder of programs; OBLIQUE_NODE_MODULES; OBLIQUE_CHROMIUM; OBLIQUE_PAGE_DB: the database of which each file
+// has a copy.
 import assert from "node:assert/strict";
+import { copyFileSync } from "node:fs";
 import { join } from "node:path";
+import { after, before } from "node:test";
 import { Browser, Server, until } from "./browser.mjs";
 
 export { text_of, until } from "./browser.mjs";
@@ -16,19 +20,17 @@ export const kScattered = 2;
 export const kMany = 3;
 export const kOne = 4;
 
-export async function begin() {
-  server.run("--name", "friction", "--H", "0.5:1.1:7", "--mu", "0.1:2:12", "--e", "0.6,0.8,1");
-  server.run("--name", "scattered", "--sample", "sobol:300:7", "--H", "0.3:1.1", "--mu", "0.05:2", "--e", "0.4:1");
-  server.run("--name", "many", "--sample", "sobol:20100:3", "--H", "0.3:1.1", "--mu", "0.05:2", "--e", "0.4:1", "--elements-per-link", "1", "--tolerance", "0.01");
-  server.run("--name", "one", "--H", "1", "--mu", "1", "--e", "1");
+before(async () => {
+  copyFileSync(process.env.OBLIQUE_PAGE_DB, server.database);
   await server.start();
   await browser.start(server);
-}
+});
 
-export async function end() {
+after(async () => {
   await browser.stop();
   await server.stop();
-}
+  assert.deepEqual(browser.objections, [], "an error, a report of the content policy or a request to another host");
+});
 
 /** A tab that shows the picture of a study. */
 export async function study(view = "#/study/1", how = {}) {

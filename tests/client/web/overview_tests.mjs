@@ -74,21 +74,21 @@ test("values that got no judgement may be started all the same, and what is aske
     const real = window.fetch;
     window.given_up = 0;
     window.how = "silent";
+    window.hanging = { "/api/check": 0, "/api/studies": 0 };
     window.fetch = (path, given) => {
-      if (!["/api/check", "/api/studies"].includes(path)) return real(path, given);
+      if (!(path in window.hanging)) return real(path, given);
       if (window.how === "busy") return Promise.resolve(new Response('{"error":"ask again later"}', { status: 503 }));
       return new Promise((_, fail) => {
-        ++window.hanging;
+        ++window.hanging[path];
         given.signal?.addEventListener("abort", () => {
           ++window.given_up;
           fail(given.signal.reason);
         });
       });
     };
-    window.hanging = 0;
   } });
   await page.waitForSelector("form");
-  await until(page, () => window.hanging === 1);
+  await until(page, () => window.hanging["/api/check"] > 0);
   await fill(page, 0, "judged");
   await until(page, () => window.given_up >= 1);
   await page.evaluate(() => { window.how = "busy"; });
@@ -97,9 +97,9 @@ test("values that got no judgement may be started all the same, and what is aske
   const is_off = () => page.$eval("form button", (one) => one.disabled);
   assert.equal(await is_off(), false);
   // While the start is under way no other is begun, whatever is written meanwhile.
-  await page.evaluate(() => { window.how = "silent"; window.hanging = 0; });
+  await page.evaluate(() => { window.how = "silent"; });
   await page.click("form button");
-  await until(page, () => window.hanging === 1);
+  await until(page, () => window.hanging["/api/studies"] === 1);
   await fill(page, 2, "0.75");
   await until(page, () => document.querySelector(".copied code").textContent.includes("--mu 0.75"));
   assert.equal(await is_off(), true);
@@ -210,7 +210,7 @@ const many_studies = () => {
 const row_of = (page, name) => until(page, (wanted) => [...document.querySelectorAll("tbody th")].find((one) => one.textContent === wanted)?.parentElement.textContent, name);
 
 test("of many studies the overview says what was read, keeps what was asked for, and has all of them in its CSV", async () => {
-  const page = await browser.open("#/?name=study-430", { early: many_studies });
+  const page = await browser.open("#/?name=study-430", { is_hurried: true, early: many_studies });
   const says = (what) => until(page, (text) => document.querySelector("main").textContent.includes(text), what);
   const press = (name) => page.evaluate((wanted) => [...document.querySelectorAll("main button")].find((one) => one.textContent === wanted).click(), name);
   await says("Of the 200 studies that were read none is called so.");
@@ -250,7 +250,7 @@ test("of many studies the overview says what was read, keeps what was asked for,
 
 test("studies that events leave out are asked for: in the overview, which says how many these are, and in their own view", async () => {
   for (const view of ["#/", "#/study/1"]) {
-    const page = await browser.open(view, { early: many_studies });
+    const page = await browser.open(view, { is_hurried: true, early: many_studies });
     await until(page, () => document.querySelector("progress"));
     const settled = () => page.$eval('progress[aria-label^="study-1:"]', (one) => one.value);
     await page.evaluate(() => {

@@ -75,7 +75,7 @@ test("pickers tell all that can be picked apart", async () => {
 });
 
 test("maps are zoomed by dragging and by keys, and lines, gathered points and histograms are drawn", async () => {
-  const page = await study();
+  const page = await study("#/study/1?solve=off");
   const box = await (await page.$(kMap)).boundingBox();
   await page.mouse.move(box.x + 100, box.y + 40);
   await page.mouse.down();
@@ -124,102 +124,20 @@ test("lines that lie on each other are seen by turns, and the legend says which 
 });
 
 test("logarithmic axes of lines and bars are drawn, whatever their ends are", async () => {
-  for (const view of ["#/study/1?pic=histogram&x=mu&xlog=1", "#/study/1?pic=lines&y=e&xlog=1&ylog=1", "#/study/4?pic=histogram&x=mu&xlog=1"]) {
-    const page = await browser.open(view);
+  const page = await browser.open("#/");
+  for (const view of ["#/study/1?pic=histogram&x=mu&xlog=1", "#/study/4?pic=histogram&x=mu&xlog=1", "#/study/1?pic=lines&y=e&xlog=1&ylog=1"]) {
+    await page.evaluate((address) => { location.hash = address; }, view);  // another study is another view
     const inked = () => {
       const canvas = document.querySelector(".uplot canvas");
       return canvas && new Set(new Uint32Array(canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data.buffer)).size > 5;
     };
     await until(page, inked);
-    await page.close();
   }
-});
-
-test("what lies between the cells of a map is solved while one looks, and is kept as a study", async () => {
-  const page = await study();
-  // Whatever is asked for when it begins does not end it.
-  await page.evaluate(() => {
-    const slider = document.querySelector(".sliders input");
-    for (const value of ["1", "2", "1"]) {
-      slider.value = value;
-      slider.dispatchEvent(new Event("input"));
-    }
-    document.querySelector(".finer").click();
-  });
-  await until(page, () => document.querySelector(".facts").textContent.match(/(\d+) × \1 cells, [1-9]/));
-  await until(page, () => document.querySelector(".facts").textContent.includes("129 × 129 cells"));
-  const keep = async (name) => {
-    await page.type('[aria-label^="Name under which"]', name);
-    await page.keyboard.press("Enter");
-    return until(page, () => document.querySelector(".solving + p").textContent);
-  };
-  assert.equal(await text_of(page, ".keep"), "Keep these 129 × 129 cells as a study");
-  assert.match(await keep("friction"), /friction/);  // it is refused where the name is given
-  await page.$eval('[aria-label^="Name under which"]', (one) => { one.value = ""; });
-  await keep("kept");
-  browser.objections = browser.objections.filter((one) => !one.includes("status of 409"));
-  await until(page, () => document.querySelector(".solving + p").textContent.startsWith("Kept as kept, 16"));
-  assert.equal(await page.$eval(".keep", (one) => one.hidden), true);
-  await page.evaluate(() => [...document.querySelectorAll("button")].find((one) => one.textContent === "Back to the study").click());
-  await until(page, () => document.querySelector(".facts").textContent.includes("12 × 7"));
   await page.close();
-});
-
-test("what is solved between points is in the address: other outputs and sliders, an open point, Back, a link and a study that went meanwhile find it again", async () => {
-  const page = await study();
-  await page.evaluate(() => document.querySelector(".finer").click());
-  await facts(page, "65 × 65 cells");
-  const looks = [];
-  page.on("request", (one) => { if (one.url().endsWith("/api/look")) looks.push(JSON.parse(one.postData()).recipe.blocks[0].axes.find((axis) => axis.key === "mu").count); });
-  await page.evaluate(() => {
-    const pick = [...document.querySelectorAll(".controls label")].find((one) => one.textContent.startsWith("output")).querySelector("select");
-    pick.value = "duration_s";
-    pick.dispatchEvent(new Event("change"));
-  });
-  await until(page, () => document.querySelector(".map canvas[tabindex]").getAttribute("aria-label").startsWith("duration_s"));
-  assert.equal(looks[0] >= 65, true, String(looks));  // the same points, nothing coarser
-  await page.$eval(".sliders input", (slider) => {
-    slider.value = "1";
-    slider.dispatchEvent(new Event("input"));
-  });
-  await facts(page, "e = 0.8");
-  await page.focus(kMap);
-  await page.keyboard.press("ArrowRight");
-  await page.keyboard.press("ArrowRight");
-  await page.keyboard.press("Enter");
-  await until(page, () => document.querySelector("h2.name")?.textContent.startsWith("friction, between its points: 1 of"));
-  const command = await page.$$eval("code", (all) => all.map((one) => one.textContent));
-  assert.equal(command.length, 1);
-  assert.match(command[0], /^oblique solve --H 0.5 --mu 0.1\d+ --e 0.8 .*--trace trace.csv$/);
-  await page.evaluate(() => [...document.querySelectorAll("a.button")].find((one) => one.textContent === "Next point").click());
-  await until(page, () => document.querySelector("h2.name")?.textContent .startsWith("friction, between its points: 2 of"));
-  const link = await page.evaluate(() => location.hash);
-  await page.goBack();
-  await page.goBack();
-  await facts(page, "e = 0.8");
-  await page.waitForFunction(() => document.activeElement.matches(".map canvas[tabindex]"));
-  assert.match(await text_of(page, ".facts"), /(\d+) × \1 cells/);
-  await page.evaluate(() => history.back());  // the output
-  await until(page, () => document.querySelector(".map canvas[tabindex]").getAttribute("aria-label").startsWith("fn_peak_N"));
-  await page.evaluate(() => history.back());  // what lies between
-  await facts(page, "12 × 7");
-  await page.close();
-  // What nobody looked at for a while has gone.
-  const other = await browser.open("#/");
-  await other.evaluate(async () => {
-    for (let i = 3; i < 8; ++i) {
-      const recipe = { blocks: [{ axes: [{ key: "H", values: [1] }, { key: "mu", values: [i] }, { key: "e", values: [1] }] }] };
-      await fetch("/api/look", { method: "POST", body: JSON.stringify({ recipe }), headers: { "Content-Type": "application/json" } });
-    }
-  });
-  await other.evaluate((address) => { location.hash = address; }, link);
-  await until(other, () => document.querySelector("h2.name")?.textContent .startsWith("friction, between its points: 2 of"));
-  await other.waitForSelector(".uplot");
-  await other.close();
 });
 
 test("Back undoes a zoom and another output, and leaves the focus where it was", async () => {
-  const page = await study();
+  const page = await study("#/study/1?solve=off");
   await page.focus(kMap);
   await page.keyboard.press("+");
   await until(page, () => !document.querySelector(".facts").textContent.includes("12 × 7"));
@@ -230,6 +148,27 @@ test("Back undoes a zoom and another output, and leaves the focus where it was",
   await page.goBack();
   await facts(page, "12 × 7");
   assert.ok(await page.evaluate((map) => document.activeElement.matches(map), kMap));
+  await page.close();
+});
+
+test("Back finds the address that was left, whatever the view was about to write into it", async () => {
+  const page = await study("#/study/1?solve=off", { early: () => {
+    const real = window.setTimeout;
+    window.setTimeout = (call, ms, ...given) => {
+      if (ms !== 150) return real(call, ms, ...given);
+      window.write_again = call;  // when the test says so
+      return 1;
+    };
+  } });
+  await page.focus(kMap);
+  await page.keyboard.press("+");
+  await until(page, () => !document.querySelector(".facts").textContent.includes("12 × 7"));
+  await page.keyboard.press("ArrowRight");
+  await page.evaluate(() => {
+    addEventListener("popstate", window.write_again);
+    history.back();
+  });
+  await facts(page, "12 × 7");
   await page.close();
 });
 
@@ -302,13 +241,14 @@ test("all modules that a study's map needs are asked for at once, and no others"
 });
 
 test("addresses that do not fit a study, or have numbers that are none, show what is usual there", async () => {
-  for (const [view, picture] of [["1?pic=map&block=99", "map"], ["1?pic=nothing", "map"], ["2?pic=map", "gathered"],
-    ["1?pic=map&zlog=1&from=1&to=Infinity", "map"]]) {
-    const page = await study(`#/study/${view}`);
-    assert.equal(await page.$eval(".controls select", (one) => one.value), picture, view);
+  const page = await browser.open("#/");
+  for (const [view, picture] of [["1?pic=map&block=99", "map"], ["2?pic=map", "gathered"], ["1?pic=nothing", "map"],
+    ["2", "gathered"], ["1?pic=map&zlog=1&from=1&to=Infinity", "map"]]) {
+    await page.evaluate((address) => { location.hash = `#/study/${address}`; }, view);  // another study is another view
+    await until(page, (kind) => document.querySelector(".controls select")?.value === kind && document.querySelector(".facts").textContent, picture);
     assert.equal(await text_of(page, "p.said:not([id])"), "", view);
-    await page.close();
   }
+  await page.close();
 });
 
 test("a slider writes the address a few times, however fast it is dragged, and its last place at last", async () => {
@@ -336,19 +276,26 @@ test("a slider writes the address a few times, however fast it is dragged, and i
 });
 
 test("a view that was left changes neither the address nor the name of the next", async () => {
-  const page = await browser.open("#/");
-  await page.waitForSelector("table");
-  await page.evaluate(async () => {
+  const page = await browser.open("#/", { early: () => {
     const real = window.fetch;
+    const released = new Promise((go_on) => { window.let_go = go_on; });
     window.fetch = async (path, how) => {
       const answer = await real(path, how);
-      if (path === "/api/studies/1") await new Promise((go_on) => setTimeout(go_on, 300));
+      if (path !== "/api/studies/1") return answer;
+      window.is_held = true;
+      await released;
       return answer;
     };
-    location.hash = "#/study/1";
-    await new Promise((go_on) => setTimeout(go_on, 100));
-    location.hash = "#/new";
-    await new Promise((go_on) => setTimeout(go_on, 600));
+  } });
+  await page.waitForSelector("table");
+  await page.evaluate(() => { location.hash = "#/study/1"; });
+  await until(page, () => window.is_held);
+  await page.evaluate(() => { location.hash = "#/new"; });
+  await page.waitForSelector("form");
+  // The view that was left gets its answer before this one comes.
+  await page.evaluate(async () => {
+    window.let_go();
+    await (await fetch("/api/studies/1")).json();
   });
   assert.deepEqual(await page.evaluate(() => [location.hash, document.title]), ["#/new", "new study – oblique"]);
   await page.close();
@@ -359,19 +306,27 @@ test("how many rows there are is told again after a condition was given up while
   await until(page, () => document.querySelector(".rows p[role=status]").textContent === "1 to 25 of 252 rows.");
   await page.evaluate(() => {
     const real = window.fetch;
+    const released = new Promise((go_on) => { window.let_go = go_on; });
+    window.counts = 0;
     window.fetch = async (path, how) => {
-      if (String(path).includes("count")) await new Promise((go_on) => setTimeout(go_on, 500));
+      if (/select=count/.test(path)) {
+        ++window.counts;
+        await released;
+      }
       return real(path, how);
     };
   });
   await write(page, kWhere, "mu > 1");
   await until(page, () => document.querySelector(".rows p[role=status]").textContent === "1 to 25.");
+  const counts = await page.evaluate(() => window.counts);
   await write(page, kWhere, "");
+  await until(page, (before) => window.counts > before, counts);
+  await page.evaluate(() => window.let_go());
   await until(page, () => document.querySelector(".rows p[role=status]").textContent === "1 to 25 of 252 rows.");
   await page.close();
 });
 
-test("what is solved between the cells of a block has that block's model", async () => {
+test("a map shows one block of a study, says so, and another one is chosen", async () => {
   const page = await browser.open("#/");
   const id = await page.evaluate(async () => {
     const axes = [{ key: "H", values: [0.5, 1] }, { key: "mu", values: [0.5, 1] }, { key: "e", values: [1] }];
@@ -384,23 +339,13 @@ test("what is solved between the cells of a block has that block's model", async
   const map = await study(`#/study/${id}?pic=map&block=0`);
   assert.match(await text_of(map, ".facts"), /Block 1 of 2; not shown: 4 points of the others\./);
   assert.match(await text_of(map, ".commands code"), /^oblique plot blocks --map fn_peak_N --x mu --y H --block 1 /);
-  const solved_by = async () => {
-    const asked = map.waitForRequest((one) => one.url().endsWith("/api/look"));
-    await map.click(".finer");
-    const { model, blocks } = JSON.parse((await asked).postData()).recipe;
-    return blocks[0].axes.find((one) => one.key === "k")?.values?.[0] ?? model.k_N_m;
-  };
-  assert.equal(await solved_by(), 1e7);
-  await map.evaluate(() => [...document.querySelectorAll("button")].find((one) => one.textContent === "Back to the study").click());
-  await map.waitForSelector(".finer:not([hidden])");
   await map.evaluate(() => {
     const pick = [...document.querySelectorAll(".controls label")].find((one) => one.textContent.startsWith("block")).querySelector("select");
     pick.value = "1";
     pick.dispatchEvent(new Event("change"));
   });
-  const of_block = await map.evaluate(async (study) => (await (await fetch(`/api/studies/${study}/points/4`)).json()).row.k, id);
-  assert.notEqual(of_block, 1e7);
-  assert.equal(await solved_by(), of_block);
+  await facts(map, "Block 2 of 2");
+  assert.match(await text_of(map, ".commands code"), /^oblique plot blocks --map fn_peak_N --x mu --y H --block 2 /);
   await map.close();
 });
 
@@ -471,7 +416,7 @@ test("the command of the rows and the address say whether only marked points are
 });
 
 test("a server that does not answer is told of in words, and what it was asked meanwhile is asked again", async () => {
-  const page = await study();
+  const page = await study("#/study/1", { is_hurried: true });
   await page.setOfflineMode(true);
   await page.$eval(".sliders input", (slider) => {
     slider.value = "2";

@@ -1,7 +1,7 @@
 // The cell that is chosen, while pictures become finer and coarser.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { browser, facts, kMap, study, submit, text_of, until } from "../here.mjs";
+import { browser, facts, kMap, study, submit, text_of, until } from "./here.mjs";
 
 /** Run in a tab before its scripts: pictures of more cells a side come when `let_go` is called. */
 function hold_finer_ones() {
@@ -11,7 +11,7 @@ function hold_finer_ones() {
   window.fetch = async (path, how) => {
     const cells = /\/slice\?/.test(path) ? Number(new URL(path, location.href).searchParams.get("nx")) : 0;
     if (cells) window.sides.push(cells);
-    if ([65, 129].includes(cells) || (cells === 512 && window.sides.includes(96))) await released;
+    if (cells === 512) await released;
     return real(path, how);
   };
 }
@@ -26,7 +26,7 @@ const choose_by_keys = async (page) => {
 
 test("a large map is asked for with few cells first, and the cell that is chosen in it is the same point in the finer one", async () => {
   const id = await submit("large", { H: [0.5, 1.1, 200], mu: [0.1, 2, 200], e: [0.8, 0.8, 1] }, ["pause"]);
-  const page = await browser.open(`#/study/${id}?pic=map&x=mu&y=H`, { early: hold_finer_ones });
+  const page = await browser.open(`#/study/${id}?pic=map&x=mu&y=H&solve=off`, { early: hold_finer_ones });
   await facts(page, "96 × 96");
   await choose_by_keys(page);
   const [spoken, choice] = [await place(page), await text_of(page, ".choice a")];
@@ -40,25 +40,6 @@ test("a large map is asked for with few cells first, and the cell that is chosen
   // Keys go on from there.
   await page.keyboard.press("ArrowLeft");
   assert.match(await place(page), /^mu 1\.99\d*, H 0\.5\d+ m$/);
-  await page.close();
-});
-
-test("the cell that is chosen stays where it is while what lies between is solved finer, and goes with it", async () => {
-  const page = await study("#/study/1?z=mode&at=e@1", { early: hold_finer_ones });
-  await page.evaluate(() => document.querySelector(".finer").click());
-  await facts(page, "33 × 33 cells, 1");
-  await choose_by_keys(page);
-  const spoken = await place(page);
-  assert.match(spoken, /^mu 2, H 0\.55\d+ m$/);
-  await page.evaluate(() => window.let_go());
-  await facts(page, "129 × 129 cells");
-  assert.equal(await place(page), spoken);
-  await page.evaluate(() => [...document.querySelectorAll("button")].find((one) => one.textContent === "Back to the study").click());
-  await facts(page, "12 × 7");
-  assert.equal(await text_of(page, ".choice"), "");
-  await page.hover(kMap);
-  await page.mouse.move(2, 2);
-  await until(page, () => document.querySelector(".reading").textContent.startsWith("Point at a cell"));
   await page.close();
 });
 

@@ -1,12 +1,12 @@
 // Hands and focus stay where they are while a study runs and its pictures and tables are made anew.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { change, facts, study, submit, text_of, until } from "../here.mjs";
+import { change, study, submit, text_of, until } from "./here.mjs";
 
 /** A tab at a study that goes on for minutes, until it is cancelled. */
 async function running(name) {
   const id = await submit(name, { H: [0.2, 1.1, 200], mu: [0.1, 2, 200], e: [0.5, 1, 50] });
-  return { id, page: await study(`#/study/${id}?pic=histogram&x=mu`) };
+  return { id, page: await study(`#/study/${id}?pic=histogram&x=mu`, { is_hurried: true }) };
 }
 
 /** Until more of its points are known than when it was asked. */
@@ -80,9 +80,7 @@ test("who sorts by keys stays at the column, who fits colours at the button, and
 });
 
 test("the list of the rarer modes stays open when the picture is drawn anew", async () => {
-  const page = await study("#/study/1?z=mode&at=e@0");
-  await page.evaluate(() => document.querySelector(".finer").click());
-  await facts(page, "129 × 129 cells");
+  const page = await study("#/study/1?z=mode&at=e@2");
   await page.click(".categories summary");
   const list = await page.$(".categories details");
   await page.evaluate(() => document.querySelector(".controls .ticks input").click());

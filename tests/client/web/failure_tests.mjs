@@ -1,7 +1,7 @@
 // Points that failed: why, and which they are.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { browser, study, submit, text_of, until } from "../here.mjs";
+import { browser, study, submit, text_of, until } from "./here.mjs";
 
 test("a study some of whose points failed says why, how many, and shows them in its table; the overview leads there", async () => {
   const id = await submit("too far", { H: [1.15, 1.19, 3], mu: [0.5, 1, 2], e: [0.9, 1, 2] });  // the tip turns back at 1.179 m
