@@ -161,7 +161,8 @@ try {
       if (now) take(now);
       shown.again?.();
     });
-    addEventListener("hashchange", show);
+    // At once: what the view that is left still writes would otherwise replace the address that people come back to.
+    addEventListener("popstate", show);
     // Links, and what copies the address, find it written.
     document.addEventListener("click", write, { capture: true });
     // Drawings have the colours of when they were drawn; forms are left as people filled them.

@@ -169,7 +169,8 @@ class LinePlot {
     event.preventDefault();
     const is_further = this.#anchor >= 0;
     this.#anchor = event.shiftKey ? (is_further ? this.#anchor : Math.max(this.#at, 0)) : -1;
-    this.#move(to);
+    if (this.#plot) this.#move(to);
+    else this.#at = to;  // it is made anew, and goes on from there
     if (this.#anchor >= 0) this.of.brushed?.(this.#part(Math.min(this.#anchor, to), Math.max(this.#anchor, to)), is_further);
   }
   /** In to half of what is there, around the cursor, or out to all. @param {string} key */
