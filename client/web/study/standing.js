@@ -77,7 +77,7 @@ export function standing_row(view, moved) {
     offer(told);
     const now = `${told.solved + told.failed}`;
     if (now === settled) return;
-    if (settled !== "") moved(now);
+    if (settled !== "" || view.study.state === "running") moved(now);  // points may have come while the view was opened
     settled = now;
   };
   const ask = () => json(`/api/studies?limit=1&after=${view.study.id - 1}`).then((page) => {

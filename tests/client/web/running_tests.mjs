@@ -1,7 +1,7 @@
 // Hands and focus stay where they are while a study runs and its pictures and tables are made anew.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { change, study, submit, text_of, until } from "./here.mjs";
+import { browser, change, study, submit, text_of, until } from "./here.mjs";
 
 /** A tab at a study that goes on for minutes, until it is cancelled. */
 async function running(name) {
@@ -56,6 +56,21 @@ test("a plot of a running study is the same one after a refresh, with its focus 
   assert.ok(await copy.evaluate((one) => one === document.activeElement));
   await page.close();
   await change(id, "cancel");
+});
+
+test("points that were solved while a study was opened are shown", async () => {
+  const page = await browser.open("#/study/1", { early: () => {
+    const real = window.fetch;
+    let tables = 0;
+    window.fetch = async (path, how) => {
+      const answer = await real(path, how);
+      if (path === "/api/studies/1") return new Response(JSON.stringify({ ...await answer.json(), state: "running" }));
+      if (/\/rows\?.*select=point/.test(path) && ++tables === 1) return new Response(JSON.stringify({ ...await answer.json(), rows: [] }));
+      return answer;
+    };
+  } });
+  await until(page, () => document.querySelectorAll(".rows tbody tr").length > 0);
+  await page.close();
 });
 
 test("who sorts by keys stays at the column, who fits colours at the button, and who turns to the last page at the other button", async () => {
