@@ -241,6 +241,22 @@ PointCounts Scheduler::points(StudyId id) const {
   return {study.points.size(), study.points.settled(), study.failed, study.points.leased()};
 }
 
+QuietWorkers Scheduler::quiet_workers(StudyId id, std::int64_t now_ms) const {
+  std::set<WorkerId> holders;
+  std::int64_t last_stored_ms = 0;
+  for (const LeaseId lease : studies_.at(id).leases.all()) {
+    const WorkerId worker = leases_.at(lease).worker;
+    holders.insert(worker);
+    last_stored_ms = std::max(last_stored_ms, workers_.at(worker).stored_ms);
+  }
+  return {holders.size(), std::max<std::int64_t>(0, now_ms - last_stored_ms)};
+}
+
+bool Scheduler::sets_all_aside() const {
+  return std::ranges::all_of(workers_,
+                             [this](const auto& entry) { return is_set_aside(entry.second); });
+}
+
 std::array<Crew, kCrewStates> Scheduler::crews(std::int64_t now_ms,
                                                std::int64_t silent_after_ms) const {
   std::array<Crew, kCrewStates> crews{};

@@ -41,6 +41,12 @@ struct PointCounts {
   std::uint64_t open() const { return points - settled; }
 };
 
+/// Workers that hold points of a study, all of which have stored nothing for a time.
+struct QuietWorkers {
+  std::size_t workers;
+  std::int64_t quiet_ms;  ///< of the one that stored something last
+};
+
 /// What a worker does; of several the first that is true.
 enum class CrewState {
   kSilent,    ///< nothing came of it lately
@@ -93,6 +99,10 @@ class Scheduler {
   StudyCounts study(StudyId study) const;
   /// The same.
   PointCounts points(StudyId study) const;
+  /// Those that hold points of the study. Throws std::out_of_range for an unknown study.
+  QuietWorkers quiet_workers(StudyId study, std::int64_t now_ms) const;
+  /// No worker gets points before it has solved a probe; true without workers.
+  bool sets_all_aside() const;
   /// All workers, by CrewState. Those count as silent of which nothing came for so long.
   std::array<Crew, kCrewStates> crews(std::int64_t now_ms, std::int64_t silent_after_ms) const;
   /// Batches that are at workers.
@@ -169,6 +179,8 @@ class Scheduler {
     LeaseId ahead = 0;                        ///< that it has not asked for; 0: none
     std::optional<std::int64_t> probed_ms{};  ///< when it got its last probe
     std::int64_t last_heard_ms;
+    std::int64_t stored_ms = 0;      ///< when it last stored a point, or began to hold batches
+    std::size_t solved_batches = 0;  ///< since it joined or stalled
     std::uint64_t solved_points = 0;
     std::set<LeaseId> leases;
     std::map<StudyId, std::uint64_t> defined;  ///< with so many points, as it was told
@@ -211,6 +223,8 @@ class Scheduler {
   void release_if_answered(LeaseId lease);
   void remove_worker(WorkerId worker, WorkerEnd how);
   void learn_pace(Worker& worker, const ResultsReceived& event);
+  void end_stalled();
+  std::int64_t longest_stall_ms(const Worker& worker, std::map<StudyId, double>& paces) const;
   void finish_if_complete(StudyId id);
   StudyQueue::Place place_of(const Study& study) const;
   /// To be called after every change of a study or its points.

@@ -121,7 +121,7 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
     set_draining(worker, true);
     return false;
   }
-  if (!is_proven(worker) && worker.leases.size() >= settings_.newcomer_batches) {
+  if (worker.leases.size() >= settings_.newcomer_batches + worker.solved_batches) {
     return false;
   }
   const StudyId study = next_free_study(worker);
@@ -340,6 +340,7 @@ LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Batch
   if (served.solver_version.empty()) {
     served.solver_version = worker.solver_version;
   }
+  worker.stored_ms = worker.leases.empty() ? now_ms_ : worker.stored_ms;
   const LeaseId lease = next_lease_++;
   leases_.emplace(lease, Lease{id, study, batch, alone, now_ms_, 0, served.terms.priority});
   note_priority(served.terms.priority, true);

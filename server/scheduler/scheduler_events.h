@@ -56,8 +56,14 @@ struct SchedulerSettings {
   /// The same goes for every newcomer, when so many of them vanished with points in this time.
   std::size_t vanished_newcomers = 3;
   std::int64_t newcomers_watched_ms = 60'000;
-  std::int64_t probe_interval_ms = 1000;     ///< between two probes of one worker
-  std::size_t newcomer_batches = 2;          ///< are with a worker that has solved nothing yet
+  std::int64_t probe_interval_ms = 1000;  ///< between two probes of one worker
+  /// A worker holds at most so many batches more than it has solved since it joined or stalled.
+  std::size_t newcomer_batches = 2;
+  /// A worker stalls, and its batches go to others, when it stores nothing for so many times what
+  /// one of them takes at the fastest known pace of its study, within these limits.
+  double stall_factor = 10.0;
+  std::int64_t shortest_stall_ms = 60'000;
+  std::int64_t longest_stall_ms = 3'600'000;
   std::size_t most_absent_processes = 1024;  ///< are remembered, of newcomers and of others each
   std::uint32_t max_credit = 1024;           ///< batches a worker may ask for at a time
   /// So many points are looked at in one event, whether a filter leaves them in: about a
@@ -250,7 +256,8 @@ struct WithdrawStudy {
   WorkerId worker;
   StudyId study;
 };
-/// Every point of that batch has a result from elsewhere: what is left of it need not be solved.
+/// What is left of that batch need not be solved: every point has a result from elsewhere, or
+/// others get what has none.
 struct ReleaseBatch {
   WorkerId worker;
   LeaseId lease;

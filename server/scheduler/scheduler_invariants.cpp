@@ -102,8 +102,11 @@ void Scheduler::check_losses() const {
     const WorkerProcess& process = processes_.at(worker.process);
     require(process.workers.contains(id), "a worker is not known as one of its process");
     require(worker.probe == 0 || worker.leases.empty(), "a probe is not alone");
-    require(worker.leases.size() <= settings_.newcomer_batches || process.proven_since_ms,
-            "a newcomer has too many batches");
+    require(worker.leases.size() <=
+                settings_.newcomer_batches + worker.solved_batches + (worker.ahead == 0 ? 0U : 1U),
+            "a worker has more batches than it has earned");
+    require(worker.solved_batches == 0 || process.proven_since_ms,
+            "a worker that is not proven has solved batches");
   }
   require(processes_.workers() == workers_.size(), "a process has workers that are not there");
   for (const auto& [id, lease] : leases_) {

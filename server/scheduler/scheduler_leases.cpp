@@ -100,6 +100,9 @@ void Scheduler::on(const ResultsReceived& event) {
     if (!store.accepted.empty() && study->second.solver_version.empty()) {
       study->second.solver_version = worker->solver_version;
     }
+    if (!store.accepted.empty()) {
+      worker->stored_ms = now_ms_;
+    }
     requeue(event.study);
     learn_pace(*worker, event);
   }
@@ -112,6 +115,8 @@ void Scheduler::on(const ResultsReceived& event) {
   }
   const LeaseId twin = lease->second.twin;
   if (event.batch_done) {
+    const bool is_solved = is_proven(*worker) && !has_open_points(lease->second);
+    worker->solved_batches += is_solved ? 1U : 0U;
     batch_s_.observe(1e-3 * static_cast<double>(now_ms_ - lease->second.granted_ms));
     // Points of a finished batch that got no answer count as lost, or a worker that never answers
     // them would take them for ever.

@@ -165,6 +165,61 @@ void Scheduler::note_answers(Worker& worker, const ResultsReceived& event, bool 
   }
 }
 
+/// Gives the batches of workers that store nothing to others. Whether such a worker is slow or
+/// never solves anything cannot be told: nothing counts as lost, what it sends later is stored, and
+/// it gets points again once it has solved something.
+void Scheduler::end_stalled() {
+  std::map<StudyId, double> paces;
+  bool any_stalled = false;
+  for (auto& [id, worker] : workers_) {
+    const std::int64_t quiet_ms = now_ms_ - worker.stored_ms;
+    if (worker.leases.empty() || quiet_ms <= settings_.shortest_stall_ms ||
+        quiet_ms <= longest_stall_ms(worker, paces)) {
+      continue;
+    }
+    any_stalled = true;
+    worker.solved_batches = 0;
+    set_draining(worker, false);
+    WorkerProcess& process = processes_.at(worker.process);
+    process.lost_in_a_row = std::max(process.lost_in_a_row, settings_.set_aside_after);
+    process.losses += worker.leases.size();
+    for (const LeaseId lease : std::set<LeaseId>(worker.leases)) {
+      effects_.emplace_back(ReleaseBatch{id, lease});
+      end_lease(lease, std::nullopt);
+    }
+  }
+  if (any_stalled) {
+    standing_of_processes_changed();
+  }
+}
+
+/// How long the worker may store nothing. `paces` are the fastest of the studies looked at, in
+/// seconds of a thread a point; 0: unknown.
+std::int64_t Scheduler::longest_stall_ms(const Worker& worker,
+                                         std::map<StudyId, double>& paces) const {
+  double longest_s = 0.0;
+  for (const LeaseId id : worker.leases) {
+    const Lease& lease = leases_.at(id);
+    const auto [fastest, is_new] = paces.try_emplace(lease.study, 0.0);
+    for (auto other = is_new ? workers_.begin() : workers_.end(); other != workers_.end();
+         ++other) {
+      const auto pace = other->second.paces.find(lease.study);
+      const double s_per_point =
+          pace == other->second.paces.end() ? 0.0 : pace->second.s_per_point();
+      if (s_per_point > 0.0 && (fastest->second == 0.0 || s_per_point < fastest->second)) {
+        fastest->second = s_per_point;
+      }
+    }
+    // A thread solves its lanes side by side, and one point alone takes as long.
+    const double points = std::max(static_cast<double>(lease.batch.points) / worker.threads,
+                                   static_cast<double>(settings_.lanes));
+    longest_s = std::max(longest_s, fastest->second * points);
+  }
+  return static_cast<std::int64_t>(std::clamp(1e3 * settings_.stall_factor * longest_s,
+                                              static_cast<double>(settings_.shortest_stall_ms),
+                                              static_cast<double>(settings_.longest_stall_ms)));
+}
+
 bool Scheduler::is_proven(const Worker& worker) const {
   return processes_.at(worker.process).proven_since_ms.has_value();
 }

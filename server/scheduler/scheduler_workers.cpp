@@ -135,6 +135,10 @@ void Scheduler::on(const Tick&) {
   for (auto& [id, worker] : workers_) {
     if (gap_ms > kLongestTick_ms) {
       worker.last_heard_ms = std::min(now_ms_, worker.last_heard_ms + gap_ms - kLongestTick_ms);
+      worker.stored_ms = std::min(now_ms_, worker.stored_ms + gap_ms - kLongestTick_ms);
+    }
+    if (held_) {  // results may wait to be taken
+      worker.stored_ms = now_ms_;
     }
     if (now_ms_ - worker.last_heard_ms > settings_.lost_after_ms) {
       lost.push_back(id);
@@ -145,6 +149,7 @@ void Scheduler::on(const Tick&) {
     remove_worker(id, WorkerEnd::kLost);
     effects_.emplace_back(DropWorker{id, "silent for " + std::to_string(silent_ms) + " ms"});
   }
+  end_stalled();
 }
 
 void Scheduler::remove_worker(WorkerId id, WorkerEnd how) {
