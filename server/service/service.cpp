@@ -79,6 +79,7 @@ void Service::client_frame(const std::string& identity, std::string_view frame, 
 void Service::tick(Instant now) {
   workers_.tick([&](WorkerId id) { return scheduler_.silent_ms(id, now.steady_ms); }, now);
   feed(Tick{}, now);
+  ledger_.tick(now.steady_ms);
   clients_.tick(now);
   send_traces();
   changes_.release_replies(now);

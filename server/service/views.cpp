@@ -5,8 +5,9 @@
 namespace oblique::server {
 namespace {
 
-std::string what_it_waits_for(const StudySources& sources, const StudyCounts& counts,
-                              const protocol::TakenOver& taken) {
+std::string what_it_waits_for(StudyId id, const StudySources& sources, const StudyCounts& counts,
+                              const protocol::TakenOver& taken, Instant now) {
+  constexpr std::int64_t kQuietAfter_ms = 20'000;
   const WriteLedger& ledger = sources.ledger;
   if (ledger.is_gone()) {
     return ledger.fault();
@@ -14,11 +15,15 @@ std::string what_it_waits_for(const StudySources& sources, const StudyCounts& co
   if (!ledger.fault().empty()) {
     return "the database, which takes no results: " + ledger.fault();
   }
+  if (ledger.is_slow()) {
+    return fmt::format("the database, which stored nothing for over {} s",
+                       WriteLedger::kSlowAfter_s);
+  }
   if (taken.under_way()) {
     return fmt::format("known points to be taken over from other studies, {} so far",
                        taken.points());
   }
-  if (sources.scheduler.workers() == 0) {
+  if (counts.leased == 0 && sources.scheduler.sets_all_aside()) {
     return "a worker";
   }
   if (counts.lacks_worker) {
@@ -26,6 +31,12 @@ std::string what_it_waits_for(const StudySources& sources, const StudyCounts& co
         "a worker with solver version {}, that of its results, or to be submitted again with "
         "--mix-versions",
         counts.solver_version);
+  }
+  const QuietWorkers quiet = sources.scheduler.quiet_workers(id, now.steady_ms);
+  if (counts.leased > 0 && quiet.quiet_ms >= kQuietAfter_ms) {
+    return fmt::format("results of {} point{} from {} worker{}, which stored nothing for over {} s",
+                       counts.leased, counts.leased == 1 ? "" : "s", quiet.workers,
+                       quiet.workers == 1 ? "" : "s", kQuietAfter_ms / 1000);
   }
   return {};
 }
@@ -56,7 +67,8 @@ StudyView view_of(StudyId id, const StudySources& sources, Instant now) {
   }
   if (state == StudyState::kRunning) {
     view.points_per_s = sources.rates.points_per_s(id, view.settled(), now.steady_ms);
-    view.waits_for = is_complete ? std::string() : what_it_waits_for(sources, counts, view.taken);
+    view.waits_for =
+        is_complete ? std::string() : what_it_waits_for(id, sources, counts, view.taken, now);
   }
   return view;
 }

@@ -70,6 +70,15 @@ std::optional<Meaning> WriteLedger::settle(std::uint64_t ticket) {
   return meaning;
 }
 
+void WriteLedger::tick(std::int64_t now_ms) {
+  constexpr std::int64_t kMillisecondsASecond = 1000;
+  const std::uint64_t oldest = open_.empty() ? 0 : open_.begin()->first;
+  if (std::exchange(oldest_, oldest) != oldest || oldest == 0) {
+    oldest_since_ms_ = now_ms;
+  }
+  is_slow_ = now_ms - oldest_since_ms_ >= kSlowAfter_s * kMillisecondsASecond;
+}
+
 std::vector<Meaning> WriteLedger::abandon(const std::string& error) {
   fault_ = error;
   is_gone_ = true;

@@ -110,6 +110,12 @@ class WriteLedger {
   void note_fault(const std::string& error) { fault_ = error; }
   void note_recovery() { fault_.clear(); }
 
+  /// To be called several times a second.
+  void tick(std::int64_t now_ms);
+  /// Nothing became durable for `kSlowAfter_s`, and the database does not say why.
+  bool is_slow() const { return is_slow_; }
+  static constexpr std::int64_t kSlowAfter_s = 5;
+
   /// Why the database takes no results; empty: it does.
   const std::string& fault() const { return fault_; }
   /// The database is not where it was; nothing can be stored any more.
@@ -149,6 +155,9 @@ class WriteLedger {
   bool is_behind_ = false;
   std::string fault_;
   bool is_gone_ = false;
+  std::uint64_t oldest_ = 0;  // ticket at the last tick; 0: none
+  std::int64_t oldest_since_ms_ = 0;
+  bool is_slow_ = false;
 };
 
 }  // namespace oblique::server

@@ -19,6 +19,49 @@ TEST_F(ServiceTest, AStudyIsAcknowledgedOnlyOnceItIsStored) {
   EXPECT_TRUE(reply.submit().created());
 }
 
+TEST_F(ServiceTest, WhileTheDatabaseStoresNothingForSecondsClientsAreToldSo) {
+  request(submit_request("a"));
+  write_all();
+  const std::size_t replies = outbox_.replies.size();
+  request(submit_request("b"));
+  service_->tick(now_);
+  now_.steady_ms += 4999;
+  service_->tick(now_);
+  request(submit_request("b"));
+  EXPECT_EQ(outbox_.replies.size(), replies) << "it may be stored in a moment";
+  now_.steady_ms += 1;
+  service_->tick(now_);
+  request(submit_request("b"));
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("stored nothing for over 5 s"));
+  EXPECT_THAT(status_of("a").waits_for(), HasSubstr("stored nothing for over 5 s"));
+  write_all();
+  service_->tick(now_);
+  EXPECT_EQ(status_of("a").waits_for(), "a worker");
+}
+
+TEST_F(ServiceTest, TheStatusOfAStudySaysThatItsWorkersStoreNothing) {
+  request(submit_request("a", 1));
+  write_all();
+  hello();
+  credit(1);
+  WorkerMessage heartbeat;
+  heartbeat.mutable_heartbeat()->add_lease_ids(last_message().batch().lease_id());
+  const auto pass = [&](int seconds) {
+    for (int second = 0; second < seconds; ++second) {
+      now_.steady_ms += 1000;
+      worker_says(heartbeat);
+      service_->tick(now_);
+    }
+  };
+  pass(19);
+  EXPECT_EQ(status_of("a").waits_for(), "");
+  pass(1);
+  EXPECT_EQ(status_of("a").waits_for(),
+            "results of 1 point from 1 worker, which stored nothing for over 20 s");
+  pass(60);
+  EXPECT_EQ(status_of("a").waits_for(), "a worker") << "one that is not set aside";
+}
+
 TEST_F(ServiceTest, AStudyThatCouldNotBeStoredIsRefusedAndItsNameIsFree) {
   request(submit_request("a"));
   write_all("the disk is full");
