@@ -167,6 +167,10 @@ class Storage {
   /// Moves the write-ahead log into the database and empties it, so that the one file holds all.
   /// False when a reader keeps it from doing so: to be tried again. Throws StorageError.
   virtual bool merge_log() { return true; }
+
+  /// Ends the statement under way, and every later one that takes long, with a StorageError. From
+  /// any thread.
+  virtual void interrupt() {}
 };
 
 }  // namespace oblique::server

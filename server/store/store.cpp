@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <optional>
 
+#include <spdlog/fmt/fmt.h>
+
 #include "proto/result_message.h"
 #include "server/database/row_checksum.h"
 #include "server/store/migration.h"
@@ -16,6 +18,8 @@ namespace {
 
 constexpr int kBusyTimeout_ms = 2000;
 constexpr std::size_t kMostCachedModels = 65536;
+/// Of SQLite's virtual machine, whether the statement is interrupted: some 10 us.
+constexpr int kStepsBetweenLooks = 1000;
 
 /// While it lives the connection waits for no other one.
 class Impatience {
@@ -137,11 +141,18 @@ Store::Store(const std::string& path, const Notice& notice) {
   files_ = std::make_unique<DatabaseFiles>(path);
   database_ = open_database(path, SQLITE_OPEN_READWRITE);
   sqlite3_busy_timeout(database_.get(), kBusyTimeout_ms);
+  sqlite3_progress_handler(
+      database_.get(), kStepsBetweenLooks,
+      [](void* interrupted) {
+        return static_cast<std::atomic<bool>*>(interrupted)->load() ? 1 : 0;
+      },
+      &interrupted_);
   add_row_checksum(database_.get());
   // Zeros over what is deleted would go through the log, page by page.
   execute(database_.get(), "PRAGMA secure_delete = OFF");
   log_ = std::make_unique<WriteAheadLog>(database_.get());
   const DatabaseKind kind = identify(database_.get(), path);
+  refuse_other_triggers(database_.get(), path);
   if (kind == DatabaseKind::kEmpty) {
     // What is deleted is given back in small steps. To be said before anything is written.
     execute(database_.get(), "PRAGMA auto_vacuum = INCREMENTAL");
@@ -159,6 +170,11 @@ Store::Store(const std::string& path, const Notice& notice) {
   }
   if (kind != DatabaseKind::kOurs || restore_views(database_.get(), notice)) {
     log_->merge();  // a new file is a whole database from the start
+  }
+  // A view in the place of one could be read without end.
+  if (const auto missing = missing_tables(database_.get()); !missing.empty()) {
+    throw StorageError(fmt::format("{} lacks the table {}: `oblique check --db {}` tells more",
+                                   path, fmt::join(missing, " and "), path));
   }
   if (!gives_space_back(database_.get())) {
     make_it_give_space_back(database_.get(), notice);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -55,6 +56,7 @@ class Store final : public Storage {
   void commit(std::span<const Change> changes) override;
   void check() override { files_->check(); }
   bool merge_log() override;
+  void interrupt() override { interrupted_ = true; }
   ClearedAway clear_away(std::size_t most) override;
   /// Rows that `clear_away` has deleted.
   std::uint64_t cleared_rows() const { return clearing_->rows(); }
@@ -110,7 +112,8 @@ class Store final : public Storage {
   std::uint64_t highest(const std::string& sql);
   PointsOfStudies settled_points();
 
-  std::unique_ptr<DatabaseFiles> files_;  // outlives the connection
+  std::unique_ptr<DatabaseFiles> files_;   // outlives the connection
+  std::atomic<bool> interrupted_ = false;  // the same
   DatabaseHandle database_;
   std::unique_ptr<WriteAheadLog> log_;
   std::unique_ptr<Clearing> clearing_;

@@ -82,8 +82,17 @@ std::uint64_t study_of(const Change& change) {
 
 }  // namespace
 
-Writer::Writer(Storage& storage, Report report)
-    : commits_(storage), report_(std::move(report)), thread_([this] { run(); }) {}
+Writer::Writer(Storage& storage, Report report, std::chrono::milliseconds longest_last_step)
+    : storage_(storage),
+      longest_last_step_(longest_last_step),
+      commits_(storage),
+      report_(std::move(report)),
+      thread_([this] {
+        run();
+        const std::lock_guard lock(mutex_);
+        has_ended_ = true;
+        ended_.notify_all();
+      }) {}
 
 Writer::~Writer() {
   finish();
@@ -103,9 +112,15 @@ void Writer::clear_leavings() {
 
 std::size_t Writer::finish() {
   {
-    const std::lock_guard lock(mutex_);
+    std::unique_lock lock(mutex_);
     finishing_ = true;
     wake_.notify_one();
+    for (std::uint64_t seen = steps_;
+         !ended_.wait_for(lock, longest_last_step_, [this] { return has_ended_; });) {
+      if (std::exchange(seen, steps_) == steps_) {
+        storage_.interrupt();
+      }
+    }
   }
   if (thread_.joinable()) {
     thread_.join();
@@ -128,6 +143,7 @@ void Writer::run() {
       std::move(queue_.begin(), queue_.end(), std::back_inserter(jobs));
       queue_.clear();
       last_round = finishing_;
+      ++steps_;
       if (std::exchange(has_leavings_, false)) {
         commits_.look_for_leavings();
       }

@@ -104,9 +104,10 @@ class Writer {
  public:
   using Report = std::function<void(std::vector<WriteReport>)>;
 
-  /// `report` is called on the writer's thread, after each commit. `storage`
-  /// must outlive the writer.
-  Writer(Storage& storage, Report report);
+  /// `report` is called on the writer's thread, after each commit. `storage` must outlive the
+  /// writer. At the end a step that takes longer than `longest_last_step` is interrupted.
+  Writer(Storage& storage, Report report,
+         std::chrono::milliseconds longest_last_step = std::chrono::seconds(5));
   /// Stops without waiting for jobs that keep failing.
   ~Writer();
   Writer(const Writer&) = delete;
@@ -118,8 +119,8 @@ class Writer {
   /// thread uses the storage.
   void clear_leavings();
 
-  /// Writes what waits, merges the log and ends the thread. Returns how many jobs could not be made
-  /// durable.
+  /// Writes what waits, merges the log and ends the thread, also when a statement would never end.
+  /// Returns how many jobs could not be made durable.
   std::size_t finish();
 
   /// From any thread.
@@ -132,13 +133,18 @@ class Writer {
   void clear_some(std::vector<WriteReport>& reports);
   void merge_before_the_end();
 
+  Storage& storage_;
+  const std::chrono::milliseconds longest_last_step_;
   GroupCommit commits_;  // of the thread
   Report report_;
   mutable std::mutex mutex_;
   std::condition_variable wake_;
-  std::deque<WriteJob> queue_;      // guarded by mutex_
-  bool finishing_ = false;          // guarded by mutex_
-  bool has_leavings_ = false;       // guarded by mutex_
+  std::deque<WriteJob> queue_;  // guarded by mutex_
+  bool finishing_ = false;      // guarded by mutex_
+  bool has_leavings_ = false;   // guarded by mutex_
+  std::uint64_t steps_ = 0;     // that the thread began; guarded by mutex_
+  bool has_ended_ = false;      // the thread; guarded by mutex_
+  std::condition_variable ended_;
   CommitCounts counts_;             // guarded by mutex_
   std::size_t left_over_ = 0;       // written by the thread, read after it ended
   std::size_t rows_to_clear_ = 64;  // of the thread: so many take about as long as they may

@@ -36,12 +36,6 @@ OldAdditions::OldAdditions(sqlite3* database) : database_(database) {
     }
   }
   find_indices();
-  Statement triggers(database_,
-                     "SELECT name, sql FROM sqlite_schema WHERE type = 'trigger'"
-                     " AND tbl_name = 'results' COLLATE NOCASE ORDER BY name");
-  while (triggers.step()) {
-    triggers_.push_back({triggers.text(0), triggers.text(1)});
-  }
   find_references();
 }
 
@@ -60,8 +54,8 @@ std::vector<std::string> OldAdditions::names() const {
   if (!columns_.empty()) {
     names = {"added_columns", "added_columns_by_point"};
   }
-  if (!triggers_.empty() || std::any_of(indices_.begin(), indices_.end(),
-                                        [](const Index& index) { return index.columns.empty(); })) {
+  if (std::any_of(indices_.begin(), indices_.end(),
+                  [](const Index& index) { return index.columns.empty(); })) {
     names.emplace_back("added_before_8");
   }
   return names;
@@ -101,13 +95,6 @@ std::vector<std::string> OldAdditions::keep(const std::string& table) {
   std::vector<std::string> said;
   keep_columns(table, said);
   keep_indices(said);
-  for (const Trigger& trigger : triggers_) {
-    note("trigger", trigger.name, trigger.sql);
-    said.push_back(
-        fmt::format("the trigger {} on results does not work any more, for results is a view now; "
-                    "its SQL stands in the table added_before_8",
-                    trigger.name));
-  }
   for (const std::string& name : referring_) {
     said.push_back(
         fmt::format("the table {} has a foreign key to results, which is a view now: its rows are "

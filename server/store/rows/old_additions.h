@@ -32,10 +32,6 @@ class OldAdditions {
     std::string sql;
     std::string columns;  // of `packed_results`, as in the statement that makes it
   };
-  struct Trigger {
-    std::string name;
-    std::string sql;
-  };
 
   void find_indices();
   void find_references();
@@ -47,7 +43,6 @@ class OldAdditions {
   sqlite3* database_;
   std::vector<std::string> columns_;
   std::vector<Index> indices_;
-  std::vector<Trigger> triggers_;
   std::vector<std::string> referring_;  // tables whose foreign keys name `results`
 };
 

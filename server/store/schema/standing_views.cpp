@@ -7,6 +7,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/text.h"
 #include "server/store/schema/schema.h"
 
 namespace oblique::server {
@@ -92,18 +93,26 @@ std::string name_taken(const Standing& one) {
       one.type, one.name);
 }
 
-/// Triggers of the views, but for ours, which go when a view does.
-std::vector<Standing> added_triggers(sqlite3* database, const std::vector<Standing>& views) {
-  std::vector<Standing> added = standing_in(database, kStandingSql);
-  std::erase_if(added, [&](const Standing& one) {
-    const auto has_name = [&](const Standing& other) {
-      return other.type == one.type && other.name == one.name;
-    };
-    return one.type != "trigger" || std::any_of(ours().begin(), ours().end(), has_name) ||
-           std::none_of(views.begin(), views.end(),
-                        [&](const Standing& view) { return view.name == one.table; });
-  });
-  return added;
+std::int64_t schema_version(sqlite3* database) {
+  Statement version(database, "PRAGMA user_version");
+  return version.step() ? version.integer(0) : 0;
+}
+
+/// Names of the triggers that this schema does not have; earlier ones had none.
+std::vector<std::string> other_triggers(sqlite3* database) {
+  constexpr std::size_t kLongestName = 80;
+  const bool has_ours = schema_version(database) == kSchemaVersion;
+  std::vector<std::string> names;
+  for (const Standing& one : standing_in(database, kStandingSql)) {
+    const bool is_ours =
+        has_ours && std::ranges::any_of(ours(), [&](const Standing& other) {
+          return other.type == one.type && other.name == one.name && other.table == one.table;
+        });
+    if (one.type == "trigger" && !is_ours) {
+      names.push_back(protocol::visible(protocol::shortened(one.name, kLongestName)));
+    }
+  }
+  return names;
 }
 
 /// How somebody gives another name to what has one that we want.
@@ -199,22 +208,38 @@ std::vector<std::string> faults_of_views(sqlite3* database) {
         faults.push_back(name_taken(one));
     }
   }
+  for (const std::string& name : other_triggers(database)) {
+    faults.push_back(fmt::format(
+        "the trigger {} is not ours: no server works on this file until it is dropped", name));
+  }
   return faults;
 }
 
 std::vector<std::string> missing_views(sqlite3* database) {
   std::vector<std::string> names;
-  Statement schema(database, "PRAGMA user_version");
-  if (!schema.step() || schema.integer(0) != kSchemaVersion) {
+  if (schema_version(database) != kSchemaVersion) {
     return names;
   }
-  schema.reset();
   for (const Standing& one : that_are(database, State::kMissing)) {
     if (one.type == "view") {
       names.push_back(one.name);
     }
   }
   return names;
+}
+
+void refuse_other_triggers(sqlite3* database, const std::string& path) {
+  constexpr std::size_t kMostNames = 10;
+  std::vector<std::string> names = other_triggers(database);
+  if (names.empty()) {
+    return;
+  }
+  const std::size_t more = names.size() - std::min(names.size(), kMostNames);
+  names.resize(names.size() - more);
+  throw StorageError(fmt::format(
+      "{} has triggers that are not ours, and would run with each change of its rows: {}{}. Drop "
+      "them, as with DROP TRIGGER in the program sqlite3",
+      path, fmt::join(names, ", "), more > 0 ? fmt::format(" and {} more", more) : ""));
 }
 
 bool restore_views(sqlite3* database, const std::function<void(const std::string&)>& notice) {
@@ -232,7 +257,6 @@ bool restore_views(sqlite3* database, const std::function<void(const std::string
     return false;
   }
   Transaction transaction(database);
-  const std::vector<Standing> added = added_triggers(database, other);
   for (const Standing& one : other) {
     execute(database, fmt::format("DROP {} IF EXISTS {}", one.type, one.name));
   }
@@ -241,14 +265,6 @@ bool restore_views(sqlite3* database, const std::function<void(const std::string
     if (one.type == "trigger" && one.table == "packed_results") {
       // Nobody has noted meanwhile what other programs deleted.
       execute(database, "UPDATE studies SET counted = 0");
-    }
-  }
-  for (const Standing& trigger : added) {
-    try {
-      execute(database, trigger.sql);
-    } catch (const StorageError& error) {
-      tell(fmt::format("the trigger {} on {} cannot be kept: {}", trigger.name, trigger.table,
-                       error.what()));
     }
   }
   transaction.commit();

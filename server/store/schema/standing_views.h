@@ -7,7 +7,7 @@
 #include "server/database/sqlite.h"
 
 // Views, triggers and indices that every database of this schema has. Other programs may have
-// dropped or replaced some; what people made under other names is theirs. Tables, which cannot be
+// dropped or replaced some; what people made under other names is theirs, but for triggers. Tables, which cannot be
 // made again with what they held, are only named.
 namespace oblique::server {
 
@@ -28,9 +28,12 @@ std::vector<std::string> faults_of_views(sqlite3* database);
 /// The names of those of our views that are missing; none where the schema is another one.
 std::vector<std::string> missing_views(sqlite3* database);
 
+/// Throws StorageError naming the triggers that this schema does not have: they would run with each
+/// change of the writer, and may never end. `path` is for the message.
+void refuse_other_triggers(sqlite3* database, const std::string& path);
+
 /// Makes those again, in one transaction, and says so. What has the name of one and is none is
-/// named and left as it is; triggers that people put on a view of ours are kept. Says whether
-/// anything was done. Throws StorageError.
+/// named and left as it is. Says whether anything was done. Throws StorageError.
 bool restore_views(sqlite3* database, const std::function<void(const std::string&)>& notice);
 
 /// Makes our views for this connection alone, before those of the file. Throws StorageError.

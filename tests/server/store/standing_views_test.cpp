@@ -96,21 +96,45 @@ TEST_F(StandingViewsTest, WhicheverIsDroppedIsNamedByACheckAndMadeAgainByAStart)
   EXPECT_THAT(texts("SELECT count(*) FROM runs"), ElementsAre("3"));
 }
 
-TEST_F(StandingViewsTest, OneThatSomebodyReplacedIsOursAgainWithTheTriggersThatPeoplePutOnIt) {
-  run("CREATE TABLE seen (point);"
-      "CREATE TRIGGER mine INSTEAD OF INSERT ON results BEGIN INSERT INTO seen VALUES (1); END;"
-      "CREATE VIEW large AS SELECT * FROM runs WHERE fn_peak_N > 1e3;");
+TEST_F(StandingViewsTest, OneThatSomebodyReplacedIsOursAgain) {
+  run("CREATE VIEW large AS SELECT * FROM runs WHERE fn_peak_N > 1e3;");
   EXPECT_THAT(start(), IsEmpty()) << "what has other names is theirs";
-  run("DROP VIEW results; CREATE VIEW results AS SELECT study_id, point FROM packed_results;"
-      "CREATE TRIGGER mine INSTEAD OF INSERT ON results BEGIN INSERT INTO seen VALUES (1); END;");
+  run("DROP VIEW results; CREATE VIEW results AS SELECT study_id, point FROM packed_results;");
   EXPECT_THAT(find_faults(path_), Contains(HasSubstr("the view results is not ours")));
   EXPECT_THAT(start(),
               Contains(AllOf(HasSubstr("not as this version"), HasSubstr("view results"))));
-  EXPECT_THAT(texts("SELECT name FROM sqlite_schema WHERE name IN ('mine', 'large') ORDER BY 1"),
-              ElementsAre("large", "mine"));
   EXPECT_THAT(texts("SELECT count(*) FROM large"), ElementsAre("3"));
   run("DELETE FROM results WHERE point = 1");
   EXPECT_THAT(texts("SELECT count(*) FROM runs"), ElementsAre("2"));
+}
+
+TEST_F(StandingViewsTest, AFileWithATriggerThatIsNotOursIsRefusedWithItsName) {
+  run("CREATE TRIGGER endless AFTER INSERT ON studies BEGIN"
+      " SELECT count(*) FROM (WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n)"
+      " SELECT i FROM n); END;");
+  EXPECT_THAT([this] { start(); },
+              testing::ThrowsMessage<StorageError>(
+                  AllOf(HasSubstr("triggers that are not ours"), HasSubstr("endless"),
+                        testing::Not(HasSubstr("rows_are_gone")))));
+  EXPECT_THAT(find_faults(path_), Contains(HasSubstr("the trigger endless is not ours")));
+  run("DROP TRIGGER endless");
+  EXPECT_THAT(start(), IsEmpty());
+}
+
+TEST_F(StandingViewsTest, AFileWithAViewInThePlaceOfATableIsRefused) {
+  run("DROP TABLE about; CREATE VIEW about AS WITH RECURSIVE n(i) AS"
+      " (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT i AS database_id FROM n WHERE i < 0;");
+  EXPECT_THAT([this] { start(); },
+              testing::ThrowsMessage<StorageError>(HasSubstr("lacks the table about")));
+}
+
+TEST_F(StandingViewsTest, AnOlderFileWithATriggerIsRefusedBeforeItIsMigrated) {
+  const std::string old = folder_.file("old.db");
+  std::filesystem::copy_file(OBLIQUE_OLD_SCHEMAS "/made_by_schema_7.sqlite", old);
+  execute(open_database(old, SQLITE_OPEN_READWRITE).get(),
+          "CREATE TRIGGER rows_are_gone AFTER UPDATE ON studies BEGIN SELECT 1; END;");
+  EXPECT_THAT([&] { const Store store(old); },
+              testing::ThrowsMessage<StorageError>(HasSubstr("rows_are_gone")));
 }
 
 TEST_F(StandingViewsTest, ATableThatHasTheNameOfOneStaysAndIsNamed) {

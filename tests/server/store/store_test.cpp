@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -73,6 +74,20 @@ TEST_F(StoreTest, WhatWasCommittedIsThereAfterReopening) {
   EXPECT_EQ(store.last_study_id(), 1U);
   EXPECT_EQ(store.last_worker_id(), 1U);
   EXPECT_EQ(store.database_id(), identity);
+}
+
+TEST_F(StoreTest, AStatementThatNeverEndsCanBeInterrupted) {
+  Store store(path_);
+  execute(open_database(path_, SQLITE_OPEN_READWRITE).get(),
+          "CREATE TRIGGER endless AFTER INSERT ON studies BEGIN"
+          " SELECT count(*) FROM (WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n)"
+          " SELECT i FROM n); END;");
+  std::thread writer([&] {
+    EXPECT_THAT([&] { commit(store, {study_of(1)}); },
+                testing::ThrowsMessage<StorageError>(HasSubstr("interrupted")));
+  });
+  store.interrupt();
+  writer.join();
 }
 
 TEST_F(StoreTest, AnEmptyDatabaseHasNoStudies) {

@@ -1,6 +1,8 @@
 #include "server/store/writer.h"
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <map>
 #include <mutex>
@@ -191,6 +193,28 @@ TEST_F(WriterTest, ResultsWaitWhileThereIsNoMemoryAndAreWrittenWhenThereIs) {
   EXPECT_EQ(reports_.count(Kind::kRecovered), 1);
   EXPECT_EQ(reports_.count(Kind::kFault), 1);
   EXPECT_EQ(storage_.committed(), (std::vector<std::uint64_t>{1, 2}));
+}
+
+TEST(WriterEndTest, AStatementThatNeverEndsIsInterruptedAtTheEnd) {
+  class Endless final : public Storage {
+   public:
+    void commit(std::span<const Change> /*changes*/) override {
+      is_interrupted_.wait(false);
+      throw StorageError("interrupted");
+    }
+    void interrupt() override {
+      is_interrupted_ = true;
+      is_interrupted_.notify_all();
+    }
+
+   private:
+    std::atomic<bool> is_interrupted_ = false;
+  };
+  Endless storage;
+  Writer writer(
+      storage, [](const auto&) {}, std::chrono::milliseconds(1));
+  writer.submit({1, AddWorker{1, "", 1, "", "", ""}, false});
+  EXPECT_EQ(writer.finish(), 1U) << "it is not durable";
 }
 
 TEST(GroupCommitTest, AChangeThatWaitsIsNotOvertakenByALaterOneOfItsStudy) {
