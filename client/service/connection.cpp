@@ -179,6 +179,10 @@ protocol::ClientReply Connection::answer_to(const protocol::ClientRequest& reque
         seconds_of(timeout), settings_.server_url,
         *outstanding.runs ? "works on it" : "is busy with the queries of others"));
   }
+  if (!settings_.if_silent.empty()) {
+    throw ConnectionError(fmt::format("no answer from {} within {}: {}", settings_.server_url,
+                                      seconds_of(timeout), settings_.if_silent));
+  }
   throw ConnectionError(fmt::format(
       "no answer from {} within {}: {}, or say where it is with --server URL or "
       "OBLIQUE_SERVER",

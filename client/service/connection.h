@@ -25,6 +25,8 @@ struct ConnectionSettings {
   /// again after twice as long.
   std::int64_t resend_after_ms = 3'000;
   std::optional<protocol::KeyFile> key = {};  ///< ours; none: plain text
+  /// What to say of a server that does not answer; empty: that there may be none.
+  std::string if_silent = {};
 };
 
 /// The server answered that it cannot or will not; the message is its own.

@@ -10,6 +10,7 @@
 #include <csignal>
 #include <iterator>
 #include <thread>
+#include <utility>
 
 #include <spdlog/fmt/fmt.h>
 #include <nlohmann/json.hpp>
@@ -66,7 +67,8 @@ void end_all(const std::vector<ChildProcess*>& children) {
 /// The lines that a server writes while it starts.
 class ReadyLines {
  public:
-  ReadyLines(const Descriptor& ready, ChildProcess& server) : ready_(ready), server_(server) {}
+  ReadyLines(const Descriptor& ready, ChildProcess& server, std::filesystem::path database)
+      : ready_(ready), server_(server), database_(std::move(database)) {}
 
   /// The next one; empty when the server closes the pipe without one. Throws ProcessError when none
   /// comes in time, and Interrupted when `stop` is requested.
@@ -78,7 +80,9 @@ class ReadyLines {
         throw Interrupted("stopped before the server was ready");
       }
       if (!has_told_ && Clock::now() > deadline) {
-        throw ProcessError(with_last_words("the server was not ready in time", server_));
+        throw ProcessError(with_last_words(
+            fmt::format("no answer within {} s: {}", kReadyWithin.count(), why_silent(database_)),
+            server_));
       }
       pollfd waited{ready_.number(), POLLIN, 0};
       constexpr int kSlice_ms = 50;
@@ -105,6 +109,7 @@ class ReadyLines {
 
   const Descriptor& ready_;
   ChildProcess& server_;
+  std::filesystem::path database_;
   std::string held_;
   bool has_told_ = false;
 };
@@ -115,6 +120,13 @@ unsigned threads_each(int workers) {
 }
 
 }  // namespace
+
+std::string why_silent(const std::filesystem::path& database) {
+  return fmt::format(
+      "the server that was started here runs, and waits for its database {0}, which is slow or "
+      "damaged. `oblique check --db {0}` examines it",
+      database.string());
+}
 
 EmbeddedService::EmbeddedService(const ServiceSettings& settings, protocol::StopSignals& stop) {
   const auto worker_program = sibling_program("oblique-worker");
@@ -140,7 +152,7 @@ EmbeddedService::~EmbeddedService() {
 
 void EmbeddedService::wait_until_ready(const Descriptor& ready, const ServiceSettings& settings,
                                        protocol::StopSignals& stop) {
-  ReadyLines lines(ready, *server_);
+  ReadyLines lines(ready, *server_, settings.database);
   auto urls = nlohmann::json::parse(lines.next(stop), nullptr, false);
   while (urls.is_object() && urls.contains("notice") && urls["notice"].is_string()) {
     settings.on_long_start(urls["notice"]);

@@ -24,6 +24,9 @@ struct ServiceSettings {
   std::function<void(const std::string&)> on_long_start = [](const std::string&) {};
 };
 
+/// Why a server that was started on the database may not answer, as a sentence part.
+std::string why_silent(const std::filesystem::path& database);
+
 /// Starts `oblique-server` on loopback, at ports that the system picks, and workers that ask it
 /// for work; ends them all when destroyed. The same programs and messages as on many machines.
 class EmbeddedService {

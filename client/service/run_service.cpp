@@ -69,6 +69,7 @@ RunEnd submit_and_wait(const Study& study, const RunSettings& settings, Embedded
   ConnectionSettings where;
   where.server_url = service.client_url();
   where.key = service.client_key();
+  where.if_silent = why_silent(settings.service.database);
   Connection connection(where, look_after);
   const auto submitted = connection.submit(study, settings.terms);
   if (!submitted.created()) {

@@ -39,6 +39,21 @@ TEST(Connection, SaysWhereItLookedAndWhatToDoWhenNobodyAnswers) {
   }
 }
 
+TEST(Connection, SaysOfASilentServerThatItStartedWhatThatWaitsFor) {
+  const ScriptedServer server(
+      [](const protocol::ClientRequest&) { return std::vector<std::string>(); });
+  ConnectionSettings settings = at(server.url(), 100);
+  settings.if_silent = "its database is slow";
+  Connection connection(settings);
+  try {
+    connection.submit({.name = "sweep", .recipe = {}});
+    FAIL();
+  } catch (const ConnectionError& error) {
+    EXPECT_EQ(error.what(),
+              "no answer from " + server.url() + " within 0.1 s: its database is slow");
+  }
+}
+
 TEST(Connection, RefusesAnAddressThatIsNone) {
   EXPECT_THROW(Connection(at("localhost", 100)), solver::InputError);
 }
