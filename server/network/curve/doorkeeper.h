@@ -47,8 +47,8 @@ using Verdict = std::variant<std::shared_ptr<const KeyHolder>, Refusal>;
 class Doorkeeper {
  public:
   virtual ~Doorkeeper() = default;
-  /// Whose key that is, or why it is not admitted. Asked often, and before the peer has proved that
-  /// it holds the key; so it must be quick, and its reason may say nothing that is secret.
+  /// Whose key that is, or why it is not admitted. Only called for a key that the peer has proved
+  /// to hold. Called often, so it must be quick.
   virtual Verdict judge(const protocol::CurveKey& public_key) const = 0;
 };
 

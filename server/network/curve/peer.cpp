@@ -34,12 +34,13 @@ CurvePeer::Outcome CurvePeer::take_initiate(std::string_view initiate) {
   if (!claim) {
     return Refusal{RefusalCause::kFaulty, "its INITIATE does not belong to its HELLO"};
   }
+  // Before the key is judged: a forged INITIATE must not reveal which keys are listed.
+  if (!handshake_->is_proved(guard_.server_public)) {
+    return Refusal{RefusalCause::kFaulty, "it does not hold the key that it shows"};
+  }
   Verdict verdict = guard_.doorkeeper->judge(claim->client_key);
   if (auto* const refusal = std::get_if<Refusal>(&verdict)) {
     return std::move(*refusal);
-  }
-  if (!handshake_->is_proved(guard_.server_public)) {
-    return Refusal{RefusalCause::kFaulty, "it does not hold the key that it shows"};
   }
   key_ = claim->client_key;
   holder_ = std::get<std::shared_ptr<const KeyHolder>>(std::move(verdict));

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/network/key_shares.h"
 #include "tests/server/network/curve_zmtp.h"
 
 namespace oblique::server {
@@ -95,6 +96,21 @@ TEST_F(CurveZmtpTest, ItIsNotEnoughToKnowAnAuthorizedKey) {
   refused_with([](CurveClient& c) { c.vouching_secret = protocol::made_key_pair().secret_key; });
   refused_with([](CurveClient& c) { c.vouched_brief = protocol::made_key_pair().public_key; });
   refused_with([](CurveClient& c) { c.vouched_server = protocol::made_key_pair().public_key; });
+}
+
+TEST_F(CurveZmtpTest, AForgedInitiateDoesNotRevealWhetherItsKeyIsListedOrHasRoom) {
+  const KeyShares shares;
+  const PortGuard full(server_, std::make_shared<BoundedDoorkeeper>(doorkeeper_, shares, 0));
+  const auto answer_to_forged = [&](const PortGuard& guard, const protocol::KeyPair& shown) {
+    Zmtp zmtp(&guard);
+    CurveClient thief(shown, server_.public_key);
+    thief.vouching_secret = protocol::made_key_pair().secret_key;
+    be_welcomed(zmtp, thief);
+    return refusal_of(zmtp, initiate_frame(thief.initiate())) + zmtp.fault();
+  };
+  const std::string listed = answer_to_forged(guard_, own_);
+  EXPECT_EQ(answer_to_forged(guard_, protocol::made_key_pair()), listed) << "not listed";
+  EXPECT_EQ(answer_to_forged(full, own_), listed) << "has no room";
 }
 
 TEST_F(CurveZmtpTest, KeysWithWhichEverySecretIsKnownAreRefused) {
