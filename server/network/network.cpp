@@ -113,7 +113,9 @@ void Network::accept_all(Port port, std::int64_t now_ms) {
   // No more than can be let in: a crowd waits in the system, where nobody is turned away.
   const bool has_keys = ports_[port].guard != nullptr;
   const std::size_t most = has_keys ? kStepsATurn / kStepsOfHandshake : kMostAtATime;
-  for (std::size_t i = 0; i < most && handshakes_.size() < kMostWaitingSteps; ++i) {
+  std::size_t taken = 0;
+  for (std::size_t i = 0;
+       i < kMostAtATime && taken < most && handshakes_.size() < kMostWaitingSteps; ++i) {
     if (must_newcomers_wait(now_ms)) {
       let_newcomers_wait(port);
       return;
@@ -125,7 +127,11 @@ void Network::accept_all(Port port, std::int64_t now_ms) {
       }
       return;
     }
-    if (handshakes_under_way_ >= limits_.handshakes) {
+    if (has_keys && !has_room_for(accepted.address, now_ms)) {
+      continue;
+    }
+    ++taken;
+    if (strangers_.size() >= limits_.handshakes) {
       end_oldest_handshake();
     }
     if (peers_.size() < limits_.connections || make_room(port, now_ms)) {
@@ -142,8 +148,8 @@ void Network::accept(Port port, Listener::Accepted accepted, std::int64_t now_ms
   peer->port = port;
   peer->since_ms = peer->last_heard_ms = now_ms;
   Peer& stored = *peers_.emplace(number, std::move(peer)).first->second;
-  strangers_.push_back(number);
-  ++handshakes_under_way_;
+  strangers_.insert(number);
+  strangers_of_[stored.address.source()].insert(number);
   watch(number, stored, EPOLL_CTL_ADD);
   stored.connection.greet();
   settle(number, stored);
@@ -203,7 +209,7 @@ void Network::serve(Number number, std::uint32_t events, std::int64_t now_ms) {
       return;
     }
     if (peer.is_stranger && connection.said().is_open()) {
-      let_in(peer);
+      let_in(number, peer);
     }
   }
   settle(number, peer);
@@ -230,15 +236,14 @@ void Network::shake_hands() {
       continue;
     }
     if (peer.connection.said().is_open()) {
-      let_in(peer);
+      let_in(number, peer);
     }
     settle(number, peer);
   }
 }
 
-void Network::let_in(Peer& peer) {
-  peer.is_stranger = false;
-  --handshakes_under_way_;
+void Network::let_in(Number number, Peer& peer) {
+  handshake_is_over(number, peer);
   peer.holder = peer.connection.said().holder();
   if (peer.holder) {
     peer.share = &shares_.join(peer.connection.said().key(), peer.holder);

@@ -6,8 +6,10 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <unordered_map>
@@ -37,6 +39,8 @@ struct NetworkLimits {
   std::int64_t active_ms = 5000;
   /// Under way at a time. The oldest of more is ended once it has had a tenth of `handshake_ms`.
   std::size_t handshakes = 1024;
+  /// Of these, with one source address at a port with keys. No option of the server.
+  std::size_t handshakes_of_source = 512;
   /// What the connections of one key may have together. One key can be all workers'.
   std::size_t connections_of_key = 3072;  ///< at most 7/8 of all
   std::size_t held_in_bytes_of_key = std::size_t{256} << 20U;
@@ -161,7 +165,8 @@ class Network {
   bool make_room(Port port, std::int64_t now_ms);
   void serve(Number number, std::uint32_t events, std::int64_t now_ms);
   void shake_hands();
-  void let_in(Peer& peer);
+  void let_in(Number number, Peer& peer);
+  void handshake_is_over(Number number, Peer& peer);
   void end_who_has_left(Number number, const Peer& peer);
   void read_to_the_end(Number number, Peer& peer);
   void depart(Number number, Peer& peer, const std::string& reason,
@@ -176,7 +181,9 @@ class Network {
     return !port.line.empty() && port.held_in_bytes >= limits_.held_in_to_pause_bytes;
   }
   void read_paused_again();
-  bool must_newcomers_wait(std::int64_t now_ms);
+  bool must_newcomers_wait(std::int64_t now_ms) const;
+  bool has_had(Number stranger, std::int64_t part, std::int64_t now_ms) const;
+  bool has_room_for(const PeerAddress& address, std::int64_t now_ms);
   void let_newcomers_wait(Port port);
   void accept_again(std::int64_t now_ms);
   void end_the_largest();
@@ -193,8 +200,8 @@ class Network {
   Peers peers_;
   Number last_number_;
   std::deque<Number> handshakes_;  // whose next step waits, in turn
-  std::deque<Number> strangers_;   // in the order in which they came; some are none any more
-  std::size_t handshakes_under_way_ = 0;
+  std::set<Number> strangers_;     // whose handshakes are under way, the oldest first
+  std::map<PeerAddress::Source, std::set<Number>> strangers_of_;
   bool has_unopened_ = false;
   bool a_key_has_too_much_ = false;
   std::size_t held_in_bytes_ = 0;

@@ -50,8 +50,19 @@ void Network::end(Number number, const std::string& reason, std::optional<Refusa
   if (peer.share != nullptr) {
     shares_.leave(peer.connection.said().key());
   }
-  handshakes_under_way_ -= peer.is_stranger ? 1 : 0;
+  handshake_is_over(number, peer);
   peers_.erase(found);
+}
+
+void Network::handshake_is_over(Number number, Peer& peer) {
+  if (std::exchange(peer.is_stranger, false)) {
+    strangers_.erase(number);
+    const auto of_source = strangers_of_.find(peer.address.source());
+    of_source->second.erase(number);
+    if (of_source->second.empty()) {
+      strangers_of_.erase(of_source);
+    }
+  }
 }
 
 void Network::end_faulty(Number number, const Peer& peer) {
@@ -131,31 +142,19 @@ void Network::end_the_largest_of_keys() {
 
 /// False when none is under way.
 bool Network::end_oldest_handshake() {
-  while (!strangers_.empty()) {
-    const Number oldest = strangers_.front();
-    strangers_.pop_front();
-    const auto found = peers_.find(oldest);
-    if (found != peers_.end() && found->second->is_stranger) {
-      end(oldest, "there is no room for more, and its handshake is the oldest that is not done",
-          RefusalCause::kBound);
-      return true;
-    }
+  if (strangers_.empty()) {
+    return false;
   }
-  return false;
+  end(*strangers_.begin(),
+      "there is no room for more, and its handshake is the oldest that is not done",
+      RefusalCause::kBound);
+  return true;
 }
 
 void Network::end_unfinished_handshakes(std::int64_t now_ms) {
-  while (!strangers_.empty()) {
-    const Number oldest = strangers_.front();
-    const auto found = peers_.find(oldest);
-    const bool is_one = found != peers_.end() && found->second->is_stranger;
-    if (is_one && now_ms - found->second->since_ms <= limits_.handshake_ms) {
-      return;
-    }
-    strangers_.pop_front();
-    if (is_one) {
-      end(oldest, "it does not finish its handshake", RefusalCause::kTooSlow);
-    }
+  while (!strangers_.empty() &&
+         now_ms - peers_.at(*strangers_.begin())->since_ms > limits_.handshake_ms) {
+    end(*strangers_.begin(), "it does not finish its handshake", RefusalCause::kTooSlow);
   }
 }
 

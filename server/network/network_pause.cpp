@@ -2,11 +2,21 @@
 #include <sys/epoll.h>
 
 #include <algorithm>
+#include <cstddef>
+#include <iterator>
 #include <utility>
 
 #include "server/network/network.h"
 
 namespace oblique::server {
+namespace {
+
+/// Of the time for a handshake, after which the oldest makes room. Half of this is too short for
+/// thousands of one busy process. Those who never finish keep others waiting.
+constexpr std::int64_t kPartOfTime = 10;
+constexpr const char* kTooManyOfSource = "its address has too many handshakes under way";
+
+}  // namespace
 
 bool Network::has_more() const {
   return has_unopened_ || !handshakes_.empty() ||
@@ -34,22 +44,40 @@ void Network::read_paused_again() {
   }
 }
 
+bool Network::has_had(Number stranger, std::int64_t part, std::int64_t now_ms) const {
+  return now_ms - peers_.at(stranger)->since_ms >= limits_.handshake_ms / part;
+}
+
 /// As many handshakes are under way as may be, and the oldest has not had its time. Who is ended
 /// comes again at once: of a crowd that is slow nobody would ever get in.
-bool Network::must_newcomers_wait(std::int64_t now_ms) {
-  // Half of this is too short for thousands of one busy process. Those who never finish keep others
-  // waiting.
-  constexpr std::int64_t kPartOfTime = 10;
-  if (handshakes_under_way_ < limits_.handshakes) {
+bool Network::must_newcomers_wait(std::int64_t now_ms) const {
+  return strangers_.size() >= limits_.handshakes &&
+         !has_had(*strangers_.begin(), kPartOfTime, now_ms);
+}
+
+/// Whether one more handshake of that source may begin; a connection that waited in the system
+/// would keep those of other sources waiting. Of too many the oldest is ended once it has had its
+/// time, else one of the newest: most finish even when all are slow, and a fast one soon gets in
+/// beside many that never finish.
+bool Network::has_room_for(const PeerAddress& address, std::int64_t now_ms) {
+  constexpr std::size_t kPartForNewest = 8;
+  constexpr std::int64_t kPartOfTimeOfNewest = 100;
+  const auto found = strangers_of_.find(address.source());
+  if (found == strangers_of_.end() || found->second.size() < limits_.handshakes_of_source) {
+    return true;
+  }
+  const std::set<Number>& strangers = found->second;
+  const auto newest = static_cast<std::ptrdiff_t>(strangers.size() / kPartForNewest);
+  const Number one_of_newest = *std::prev(strangers.end(), newest + 1);
+  if (has_had(*strangers.begin(), kPartOfTime, now_ms)) {
+    end(*strangers.begin(), kTooManyOfSource, RefusalCause::kBound);
+  } else if (has_had(one_of_newest, kPartOfTimeOfNewest, now_ms)) {
+    end(one_of_newest, kTooManyOfSource, RefusalCause::kBound);
+  } else {
+    count_refusal(RefusalCause::kBound, address.text(), kTooManyOfSource);
     return false;
   }
-  for (; !strangers_.empty(); strangers_.pop_front()) {
-    const auto oldest = peers_.find(strangers_.front());
-    if (oldest != peers_.end() && oldest->second->is_stranger) {
-      return now_ms - oldest->second->since_ms < limits_.handshake_ms / kPartOfTime;
-    }
-  }
-  return false;
+  return true;
 }
 
 void Network::let_newcomers_wait(Port port) {

@@ -1,5 +1,6 @@
 #include "server/network/peer_address.h"
 
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <memory>
@@ -49,6 +50,21 @@ std::string PeerAddress::text() const {
   return IN6_IS_ADDR_V4MAPPED(&address_.sin6_addr) && digits.starts_with(kMapped)
              ? fmt::format("{}:{}", digits.substr(kMapped.size()), port.data())
              : fmt::format("[{}]:{}", digits, port.data());
+}
+
+PeerAddress::Source PeerAddress::source() const {
+  constexpr std::size_t kV4At = 12;
+  Source source{};
+  const std::uint8_t* const v6 = address_.sin6_addr.s6_addr;
+  if (!is_v6()) {
+    const auto* const v4 = reinterpret_cast<const sockaddr_in*>(&address_);
+    std::memcpy(source.data() + kV4At, &v4->sin_addr, sizeof v4->sin_addr);
+  } else if (IN6_IS_ADDR_V4MAPPED(&address_.sin6_addr)) {
+    std::copy_n(v6 + kV4At, source.size() - kV4At, source.begin() + kV4At);
+  } else {
+    std::copy_n(v6, source.size() / 2, source.begin());
+  }
+  return source;
 }
 
 }  // namespace oblique::server

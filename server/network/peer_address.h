@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 
@@ -17,6 +18,9 @@ class PeerAddress {
 
   /// As 10.0.0.3:4711 or [::1]:4711; for IPv4 that came by an IPv6 socket as for IPv4.
   std::string text() const;
+  /// The IPv4 address, or the first 64 bits of an IPv6 address: one host can have all of the rest.
+  using Source = std::array<std::uint8_t, 16>;
+  Source source() const;
   bool is_v6() const { return address_.sin6_family == AF_INET6; }
 
   // As the system takes them and gives them back.

@@ -87,5 +87,16 @@ TEST(ListenerTest, APortThatIsTakenIsNamed) {
   }
 }
 
+TEST(PeerAddressTest, OfOneSourceAreAllPortsOfAnIpv4AddressAndAllAddressesOfAnIpv6Network) {
+  const auto source_of = [](const std::string& address, std::uint16_t port = 1) {
+    return PeerAddress(address, port).source();
+  };
+  EXPECT_EQ(source_of("10.0.0.3"), source_of("10.0.0.3", 2));
+  EXPECT_EQ(source_of("10.0.0.3"), source_of("::ffff:10.0.0.3"));
+  EXPECT_NE(source_of("10.0.0.3"), source_of("10.0.0.4"));
+  EXPECT_EQ(source_of("2001:db8::1"), source_of("2001:db8::ffff:1:2:3"));
+  EXPECT_NE(source_of("2001:db8::1"), source_of("2001:db8:0:1::1"));
+}
+
 }  // namespace
 }  // namespace oblique::server

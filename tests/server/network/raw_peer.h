@@ -64,10 +64,16 @@ inline std::string zmtp_ping(std::string_view context) {
 /// A TCP connection to a server that does what it is told to and nothing else.
 class RawPeer {
  public:
-  /// To an endpoint as tcp://127.0.0.1:7601. A connection that the server ends makes `send` throw.
-  explicit RawPeer(const std::string& endpoint) : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
+  /// To an endpoint as tcp://127.0.0.1:7601, from an IPv4 address of this machine. A connection
+  /// that the server ends makes `send` throw.
+  explicit RawPeer(const std::string& endpoint, const char* source = "127.0.0.1")
+      : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
     sockaddr_in address{};
     address.sin_family = AF_INET;
+    address.sin_addr.s_addr = inet_addr(source);
+    if (bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+      throw std::runtime_error("cannot bind");
+    }
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     address.sin_port =
         htons(static_cast<std::uint16_t>(std::stoi(endpoint.substr(endpoint.rfind(':') + 1))));

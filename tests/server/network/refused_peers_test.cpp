@@ -23,13 +23,16 @@ class RefusedPeersTest : public GuardedNetworkTest {
 
   /// A TCP connection and the client's end of CURVE on it.
   struct KeyedPeer {
-    KeyedPeer(const std::string& endpoint, CurveClient keys) : tcp(endpoint), curve(keys) {}
+    KeyedPeer(const std::string& endpoint, CurveClient keys, const char* source)
+        : tcp(endpoint, source), curve(keys) {}
     void say_hello() { tcp.send(curve_greeting() + zmtp_command("HELLO", curve.hello())); }
     RawPeer tcp;
     CurveClient curve;
   };
-  std::unique_ptr<KeyedPeer> peer(const protocol::KeyPair& own, const protocol::CurveKey& server) {
-    return std::make_unique<KeyedPeer>(network_.endpoint(guarded_), CurveClient(own, server));
+  std::unique_ptr<KeyedPeer> peer(const protocol::KeyPair& own, const protocol::CurveKey& server,
+                                  const char* source = kHere) {
+    return std::make_unique<KeyedPeer>(network_.endpoint(guarded_), CurveClient(own, server),
+                                       source);
   }
   /// What the server has said to it, turning until there are so many bytes.
   std::string heard_by(KeyedPeer& peer, std::size_t bytes) {
@@ -42,8 +45,8 @@ class RefusedPeersTest : public GuardedNetworkTest {
     const std::string heard = heard_by(peer, kWelcomedBytes);
     ASSERT_TRUE(peer.curve.take_welcome(std::string_view(heard).substr(kGreetingBytes + 10)));
   }
-  std::unique_ptr<KeyedPeer> admitted() {
-    auto admitted = peer(worker_, server_.public_key);
+  std::unique_ptr<KeyedPeer> admitted(const char* source = kHere) {
+    auto admitted = peer(worker_, server_.public_key, source);
     admitted->say_hello();
     be_welcomed(*admitted);
     admitted->tcp.send(command_of("INITIATE", admitted->curve.initiate()));
@@ -56,6 +59,8 @@ class RefusedPeersTest : public GuardedNetworkTest {
         [](std::uint64_t sum, const RefusalCount& refusal) { return sum + refusal.count; });
   }
 
+  static constexpr const char* kHere = "127.0.0.1";
+  static constexpr const char* kElsewhere = "127.0.0.2";
   static constexpr std::size_t kWelcomedBytes = kGreetingBytes + 170;
 };
 
@@ -196,6 +201,43 @@ TEST_F(CrowdedNetworkTest, ThoseWhoSayNothingMakeRoomAfterAPartOfTheirTime) {
   now_ms_ += NetworkLimits().handshake_ms / 10;
   turn_until([&] { return refused(RefusalCause::kBound) == kMost; });
   EXPECT_EQ(network_.connections(), kMost);
+}
+
+class CrowdOfOneAddressTest : public RefusedPeersTest {
+ protected:
+  CrowdOfOneAddressTest()
+      : RefusedPeersTest({.handshakes = 2 * kMost, .handshakes_of_source = kMost}) {
+    for (std::size_t i = 0; i < kCrowd; ++i) {
+      crowd_.push_back(peer(protocol::made_key_pair(), server_.public_key, kElsewhere));
+    }
+    turn_until([&] { return refused(RefusalCause::kBound) == kCrowd - kMost; });
+  }
+
+  static constexpr std::size_t kMost = 16;
+  static constexpr std::size_t kCrowd = 100;
+  std::vector<std::unique_ptr<KeyedPeer>> crowd_;
+};
+
+TEST_F(CrowdOfOneAddressTest, NewcomersOfOtherAddressesAreLetInAtOnce) {
+  EXPECT_EQ(network_.connections(), kMost);
+  const auto newcomer = admitted();
+  newcomer->tcp.send(newcomer->curve.sealed("in"));
+  EXPECT_EQ(next().message.body, "in");
+}
+
+TEST_F(CrowdOfOneAddressTest, OneOfTheNewestMakesRoomSoonForANewcomerOfThatAddress) {
+  now_ms_ += NetworkLimits().handshake_ms / 100;
+  const auto newcomer = admitted(kElsewhere);
+  EXPECT_EQ(network_.connections(), kMost);
+  crowd_.front()->say_hello();
+  be_welcomed(*crowd_.front());  // the oldest keeps its place
+}
+
+TEST_F(CrowdOfOneAddressTest, TheOldestMakesRoomOnceItHasHadItsTime) {
+  now_ms_ += NetworkLimits().handshake_ms / 10;
+  const auto newcomer = admitted(kElsewhere);
+  EXPECT_EQ(crowd_.front()->tcp.receive(), greeting_of("CURVE"));
+  EXPECT_EQ(crowd_.front()->tcp.receive(), "");
 }
 
 TEST_F(RefusedPeersTest, WhoConnectsAndLeavesWithoutAWordIsNoRefusedPeer) {
