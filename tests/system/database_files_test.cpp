@@ -71,11 +71,6 @@ TEST_F(DatabaseFilesTest, AServerWhoseDatabaseIsDeletedSaysSoAndEndsWithOne) {
   submit_to(server);
   wait_until("rows in the database", [&] { return database_.rows() > 0; });
   fs::remove(file_);
-  // While it still answers, it says why.
-  wait_until("a client is told", [&] {
-    const Outcome asked = run_oblique(folder_, {"cancel", "some", "--server", server.client_url()});
-    return asked.exit_code == 1 && contains(asked.err, "was deleted");
-  });
   EXPECT_EQ(server.process().wait(), 1);
   EXPECT_TRUE(contains(server.process().err(), file_ + " was deleted")) << server.process().err();
   EXPECT_TRUE(is_running(worker.pid())) << "it keeps what is not stored";
