@@ -60,6 +60,18 @@ TEST_F(PageCheckTest, WhatOnlyAFallTellsOfADropIsSaid) {
   EXPECT_DOUBLE_EQ(reached_m(body_with(R"("expression":"0.5 + 0.1 * e")")), 1.08);
 }
 
+TEST_F(PageCheckTest, AtMostEightyCharactersOfAWrongKeyAreRepeated) {
+  const std::string key(10'000, 'k');
+  for (const std::string& body :
+       {"{\"" + key + "\":1}", "{\"recipe\":{},\"model\":{\"" + key + "\":1}}",
+        body_with(R"("values":[1])", R"({"key":")" + key + R"(","values":[1]},)")}) {
+    const std::string refused = page_.post("/api/check", body);
+    EXPECT_EQ(status_of_answer(refused), 400);
+    EXPECT_THAT(refused, HasSubstr(key.substr(0, 20)));
+    EXPECT_EQ(refused.find(key.substr(0, 81)), std::string::npos) << refused;
+  }
+}
+
 TEST_F(PageCheckTest, HowLongAPointTakesIsSaidInPointsOfThePresetPaper) {
   const auto cost = [&](const std::string& axes, const std::string& model) {
     std::string body = body_with(R"("values":[1])", axes);
