@@ -9,6 +9,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <sodium.h>
+
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/keys/toml_fields.h"
@@ -39,11 +41,29 @@ void check_mode(const std::string& path) {
   }
 }
 
+/// Takes the secret key out of a key file's text and leaves zeros there: a parser leaves copies of
+/// its text in memory. Nothing unless a line begins with `secret = "KEY"`.
+std::optional<SecretKey> take_secret(std::string& text) {
+  const std::size_t line = text.starts_with("secret") ? 0 : text.find("\nsecret");
+  const std::size_t quote = text.find_first_of("\"'", line);
+  if (line == std::string::npos || quote == std::string::npos) {
+    return std::nullopt;
+  }
+  std::optional<SecretKey> key =
+      secret_key_of_z85(std::string_view(text).substr(quote + 1, kKeyCharacters));
+  if (key) {
+    text.replace(quote + 1, kKeyCharacters, kKeyCharacters, '0');
+  }
+  return key;
+}
+
 }  // namespace
 
 KeyFile read_key_file(const std::string& path) {
   check_mode(path);
-  const TomlFile file(path, "the key file");
+  std::optional<SecretKey> secret;
+  const TomlFile file(path, "the key file",
+                      [&secret](std::string& text) { secret = take_secret(text); });
   const TomlFields fields(path, file.top());
   KeyFile key;
   key.path = path;
@@ -53,7 +73,11 @@ KeyFile read_key_file(const std::string& path) {
                                   : std::span<const std::string_view>(kPeersFields),
                         is_server ? "the server's key file" : "a key file");
   key.name = fields.key_name("name");
-  key.pair = {fields.key("public"), fields.key("secret")};
+  key.pair.public_key = fields.key("public");
+  if (fields.key("secret") != CurveKey{} || !secret) {
+    fields.fail("secret", "`secret` must begin its line, as secret = \"KEY\"");
+  }
+  key.pair.secret_key = *secret;
   if (public_half_of(key.pair.secret_key) != key.pair.public_key) {
     fields.fail("secret", "`secret` is not the other half of `public`");
   }
@@ -64,14 +88,28 @@ KeyFile read_key_file(const std::string& path) {
 }
 
 void write_key_file(const std::string& path, const KeyFile& key) {
+  constexpr std::size_t kLongestRest = 256;
   std::string text = fmt::format(
       "# A key of oblique: whoever can read this file can pass for its owner.\n"
-      "role = \"{}\"\nname = \"{}\"\npublic = \"{}\"\nsecret = \"{}\"\n",
-      name_of(key.role), key.name, z85(key.pair.public_key), z85(key.pair.secret_key));
+      "role = \"{}\"\nname = \"{}\"\npublic = \"{}\"\n",
+      name_of(key.role), key.name, z85(key.pair.public_key));
+  std::string secret = z85(key.pair.secret_key.bytes());
+  text.reserve(text.size() + kLongestRest);  // growing would leave the secret key behind
+  ((text += "secret = \"") += secret) += "\"\n";
   if (key.server) {
     text += fmt::format("server = \"{}\"  # public key\n", z85(*key.server));
   }
-  write_new_file(path, text);
+  const auto wipe = [&] {
+    sodium_memzero(secret.data(), secret.size());
+    sodium_memzero(text.data(), text.size());
+  };
+  try {
+    write_new_file(path, text);
+  } catch (const std::runtime_error&) {
+    wipe();
+    throw;
+  }
+  wipe();
 }
 
 std::string objection_to_key_name(std::string_view name) {

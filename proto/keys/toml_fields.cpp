@@ -12,8 +12,12 @@
 
 namespace oblique::protocol {
 
-TomlFile::TomlFile(const std::string& path, std::string_view what) {
-  const std::string text = read_small_file(path, what, kMostBytes);
+TomlFile::TomlFile(const std::string& path, std::string_view what,
+                   const std::function<void(std::string&)>& prepare) {
+  std::string text = read_small_file(path, what, kMostBytes);
+  if (prepare) {
+    prepare(text);
+  }
   try {
     top_ = toml::parse(text, path);
   } catch (const toml::parse_error& error) {

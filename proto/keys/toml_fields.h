@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -19,7 +20,9 @@ class TomlFile {
   static constexpr std::size_t kMostBytes = std::size_t{1} << 20U;
 
   /// Throws solver::InputError when it cannot be read or is no TOML; `what` says what it should be.
-  TomlFile(const std::string& path, std::string_view what);
+  /// `prepare` may change the text before it is parsed.
+  TomlFile(const std::string& path, std::string_view what,
+           const std::function<void(std::string&)>& prepare = {});
 
   const toml::table& top() const { return top_; }
 

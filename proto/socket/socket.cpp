@@ -33,7 +33,8 @@ void set_keys(zmq::socket_t& socket, const KeyFile& key) {
   }
   socket.set(zmq::sockopt::curve_serverkey, z85(*key.server));
   socket.set(zmq::sockopt::curve_publickey, z85(key.pair.public_key));
-  socket.set(zmq::sockopt::curve_secretkey, z85(key.pair.secret_key));
+  socket.set(zmq::sockopt::curve_secretkey,
+             zmq::const_buffer(key.pair.secret_key.data(), key.pair.secret_key.bytes().size()));
 }
 
 }  // namespace

@@ -168,7 +168,8 @@ zmq::socket_t connected(zmq::context_t& context, const TurnedNetwork& server, bo
   socket.set(zmq::sockopt::linger, 0);
   if (has_keys) {
     socket.set(zmq::sockopt::curve_publickey, zmq::buffer(server.own().public_key));
-    socket.set(zmq::sockopt::curve_secretkey, zmq::buffer(server.own().secret_key));
+    socket.set(zmq::sockopt::curve_secretkey,
+               zmq::const_buffer(server.own().secret_key.data(), kKeyBytes));
     socket.set(zmq::sockopt::curve_serverkey, zmq::buffer(server.server_key()));
   }
   socket.connect(server.endpoint(has_keys ? 0 : 1));

@@ -1,7 +1,6 @@
 #include "server/network/curve/doorkeeper.h"
 
 #include <array>
-#include <stdexcept>
 #include <utility>
 
 namespace oblique::server {
@@ -17,10 +16,6 @@ std::string_view name_of(RefusalCause cause) {
 PortGuard::PortGuard(const protocol::KeyPair& server, std::shared_ptr<const Doorkeeper> keeper)
     : server_secret(server.secret_key),
       server_public(server.public_key),
-      doorkeeper(std::move(keeper)) {
-  if (sodium_init() < 0) {
-    throw std::runtime_error("no keys can be used: the system gives no random numbers");
-  }
-}
+      doorkeeper(std::move(keeper)) {}
 
 }  // namespace oblique::server

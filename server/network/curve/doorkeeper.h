@@ -8,7 +8,6 @@
 
 #include "proto/keys/curve_key.h"
 #include "proto/keys/role.h"
-#include "server/network/curve/secret.h"
 
 namespace oblique::server {
 
@@ -54,10 +53,9 @@ class Doorkeeper {
 
 /// What guards a port: the server's keys, and who knows whose are admitted.
 struct PortGuard {
-  /// Throws std::runtime_error when the system gives no random numbers.
   PortGuard(const protocol::KeyPair& server, std::shared_ptr<const Doorkeeper> keeper);
 
-  Secret server_secret;
+  protocol::SecretKey server_secret;
   protocol::CurveKey server_public;
   std::shared_ptr<const Doorkeeper> doorkeeper;
 };

@@ -49,7 +49,7 @@ bool CurveHandshake::is_sound_hello(std::string_view hello) {
          sodium_is_zero(raw(hello.substr(kPaddingAt)), kPeersKeyAt - kPaddingAt) == 1;
 }
 
-std::optional<std::string> CurveHandshake::welcome(const Secret& server_key,
+std::optional<std::string> CurveHandshake::welcome(const protocol::SecretKey& server_key,
                                                    std::string_view hello) {
   const std::string_view peers_key = hello.substr(kPeersKeyAt, kKeyBytes);
   Secret shared;

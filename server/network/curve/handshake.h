@@ -26,7 +26,7 @@ class CurveHandshake {
   /// `hello` and `initiate` are commands less their names. WELCOME's body less its name; nothing
   /// when HELLO cannot be opened with that key: it was made for another server's, or is forged.
   /// Costs two multiplications on the curve.
-  std::optional<std::string> welcome(const Secret& server_key, std::string_view hello);
+  std::optional<std::string> welcome(const protocol::SecretKey& server_key, std::string_view hello);
   /// What INITIATE claims; nothing when it does not belong to this handshake. Costs one
   /// multiplication.
   std::optional<Claim> claim(std::string_view initiate);

@@ -12,11 +12,11 @@ namespace oblique::server {
 
 inline constexpr std::size_t kKeyBytes = std::tuple_size_v<protocol::CurveKey>;
 
-/// A key that nobody may read: wiped where it lay when it is no longer needed.
+/// A key of one connection, wiped when it is no longer needed. It is not locked in memory:
+/// thousands of them would exceed what the system permits.
 class Secret {
  public:
   Secret() = default;
-  explicit Secret(const protocol::CurveKey& key) : bytes_(key) {}
   Secret(const Secret&) = default;
   Secret& operator=(const Secret&) = default;
   ~Secret() { wipe(); }

@@ -1,13 +1,18 @@
 #include "proto/keys/key_file.h"
 
+#include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <fstream>
 #include <functional>
 #include <stdexcept>
 
+#include <sodium.h>
 #include <zmq.hpp>
 
+#include "tests/support/dumped_memory.h"
 #include "tests/support/temporary_folder.h"
 #include "worker/solver/model/errors.h"
 
@@ -47,8 +52,8 @@ class KeyFileTest : public ::testing::Test {
   }
   std::string text_of(const KeyFile& key) const {
     return "role = \"worker\"\nname = \"w\"\npublic = \"" + z85(key.pair.public_key) +
-           "\"\nsecret = \"" + z85(key.pair.secret_key) + "\"\nserver = \"" + z85(*key.server) +
-           "\"\n";
+           "\"\nsecret = \"" + z85(key.pair.secret_key.bytes()) + "\"\nserver = \"" +
+           z85(*key.server) + "\"\n";
   }
   std::string error_of(const std::string& text) const {
     const std::string path = written(text);
@@ -60,9 +65,9 @@ class KeyFileTest : public ::testing::Test {
 TEST(CurveKeyTest, AreWrittenAsLibzmqWritesThem) {
   const KeyPair pair = made_key_pair();
   char text[kKeyCharacters + 1];
-  ASSERT_NE(zmq_z85_encode(text, pair.secret_key.data(), pair.secret_key.size()), nullptr);
-  EXPECT_EQ(z85(pair.secret_key), text);
-  EXPECT_EQ(key_of_z85(text), pair.secret_key);
+  ASSERT_NE(zmq_z85_encode(text, pair.secret_key.data(), pair.public_key.size()), nullptr);
+  EXPECT_EQ(z85(pair.secret_key.bytes()), text);
+  EXPECT_EQ(secret_key_of_z85(text), pair.secret_key);
   char public_half[kKeyCharacters + 1];
   ASSERT_EQ(zmq_curve_public(public_half, text), 0);
   EXPECT_EQ(z85(pair.public_key), public_half);
@@ -151,7 +156,68 @@ TEST_F(KeyFileTest, WithHalvesOfTwoPairsIsRefusedWithoutShowingASecret) {
   key.pair.secret_key = made_key_pair().secret_key;
   EXPECT_THAT(error_of(text_of(key)),
               AllOf(HasSubstr("some.key:4: "), HasSubstr("not the other half"),
-                    Not(HasSubstr(z85(key.pair.secret_key)))));
+                    Not(HasSubstr(z85(key.pair.secret_key.bytes())))));
+}
+
+TEST_F(KeyFileTest, WithASecretThatDoesNotBeginItsLineIsRefused) {
+  std::string text = text_of(worker_key());
+  text.insert(text.find("secret"), " ");
+  EXPECT_THAT(error_of(text), AllOf(HasSubstr("some.key:4: "), HasSubstr("must begin its line")));
+}
+
+/// A key file that another process has written, so that nothing of it is in this one's memory.
+std::string file_of_another_process(const std::string& path) {
+  const pid_t writer = fork();
+  if (writer == 0) {
+    write_key_file(path, worker_key());
+    _exit(0);
+  }
+  int status = -1;
+  waitpid(writer, &status, 0);
+  EXPECT_EQ(status, 0);
+  return path;
+}
+
+class SecretKeyTest : public KeyFileTest {
+ protected:
+  void SetUp() override {
+    if (!test::kAllMemoryMayBeRead) {
+      GTEST_SKIP() << "a sanitizer objects to reading all memory";
+    }
+  }
+  static void expect_no_copy_in_a_core_dump(const SecretKey& key) {
+    const test::MappedRange* range = nullptr;
+    const auto ranges = test::mapped_ranges();
+    for (const auto& each : ranges) {
+      range = each.contains(key.data()) ? &each : range;
+    }
+    ASSERT_NE(range, nullptr);
+    EXPECT_TRUE(range->has("dd")) << range->flags;
+    rlimit lockable{};
+    getrlimit(RLIMIT_MEMLOCK, &lockable);
+    constexpr rlim_t kEnough = 64 * 1024;
+    EXPECT_EQ(range->has("lo"), lockable.rlim_cur >= kEnough) << range->flags;
+    EXPECT_FALSE(
+        test::is_in_a_core_dump({reinterpret_cast<const char*>(key.data()), key.bytes().size()}));
+  }
+};
+
+TEST_F(SecretKeyTest, ThatIsReadIsLockedInMemoryAndNotInACoreDump) {
+  const KeyFile key = read_key_file(file_of_another_process(folder_.file("worker.key")));
+  expect_no_copy_in_a_core_dump(key.pair.secret_key);
+  // Nor as text, of which freed memory keeps the end. What is searched for is not dumped either.
+  constexpr std::size_t kEnd = 24;
+  SecretKey end;
+  std::string text = z85(key.pair.secret_key.bytes());
+  std::copy_n(text.end() - kEnd, kEnd, end.bytes().begin());
+  sodium_memzero(text.data(), text.size());
+  EXPECT_FALSE(test::is_in_a_core_dump({reinterpret_cast<const char*>(end.data()), kEnd}));
+}
+
+TEST_F(SecretKeyTest, ThatIsMadeAndWrittenIsLockedInMemoryAndNotInACoreDump) {
+  const KeyFile key = worker_key();
+  write_key_file(folder_.file("worker.key"), key);
+  expect_no_copy_in_a_core_dump(key.pair.secret_key);
 }
 
 }  // namespace

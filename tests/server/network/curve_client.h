@@ -42,7 +42,7 @@ struct CurveClient {
   // What the vouch says and by which key, unless a test says otherwise.
   std::optional<protocol::CurveKey> vouched_brief = {};
   std::optional<protocol::CurveKey> vouched_server = {};
-  std::optional<protocol::CurveKey> vouching_secret = {};
+  std::optional<protocol::SecretKey> vouching_secret = {};
 
   std::string next_number() {
     const auto number = big_endian_of(nonce++);
@@ -50,7 +50,7 @@ struct CurveClient {
   }
 
   static std::string box(std::string_view text, const CurveNonce& nonce_bytes,
-                         const protocol::CurveKey& to, const protocol::CurveKey& from) {
+                         const protocol::CurveKey& to, const protocol::SecretKey& from) {
     std::string sealed(kMacBytes + text.size(), '\0');
     if (crypto_box_easy(raw(sealed.data()), raw(text), text.size(), nonce_bytes.data(), to.data(),
                         from.data()) != 0) {
@@ -60,7 +60,7 @@ struct CurveClient {
   }
   static std::optional<std::string> opened(std::string_view sealed, const CurveNonce& nonce_bytes,
                                            const protocol::CurveKey& from,
-                                           const protocol::CurveKey& to) {
+                                           const protocol::SecretKey& to) {
     std::string text(sealed.size() - kMacBytes, '\0');
     if (crypto_box_open_easy(raw(text.data()), raw(sealed), sealed.size(), nonce_bytes.data(),
                              from.data(), to.data()) != 0) {

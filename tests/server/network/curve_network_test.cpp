@@ -32,7 +32,7 @@ class Dealer {
   }
   void use_keys(const protocol::KeyPair& own, const protocol::CurveKey& server) {
     socket_.set(zmq::sockopt::curve_publickey, zmq::buffer(own.public_key));
-    socket_.set(zmq::sockopt::curve_secretkey, zmq::buffer(own.secret_key));
+    socket_.set(zmq::sockopt::curve_secretkey, zmq::const_buffer(own.secret_key.data(), kKeyBytes));
     socket_.set(zmq::sockopt::curve_serverkey, zmq::buffer(server));
   }
   zmq::socket_t& socket() { return socket_; }
