@@ -1,0 +1,57 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdlib>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "server/network/zmtp.h"
+#include "tests/server/network/curve_client.h"
+#include "tests/server/network/list_doorkeeper.h"
+
+namespace oblique::server {
+
+/// A port with keys, and one who is admitted there.
+struct Guarded {
+  protocol::KeyPair server = protocol::made_key_pair();
+  protocol::KeyPair own = protocol::made_key_pair();
+  std::shared_ptr<ListDoorkeeper> doorkeeper = std::make_shared<ListDoorkeeper>();
+  PortGuard guard{server, doorkeeper};
+  Guarded() { doorkeeper->admit(own.public_key, "fuzz"); }
+};
+
+inline std::string say(Zmtp& zmtp, std::string_view bytes) {
+  constexpr std::size_t kMuch = std::size_t{1} << 20U;
+  zmtp.receive(bytes);
+  while (zmtp.has_message() || zmtp.waiting_work() != Zmtp::Work::kNone) {
+    zmtp.do_work();
+    if (zmtp.has_message()) {
+      static_cast<void>(zmtp.take_message());
+    }
+  }
+  if (zmtp.held_bytes() > kMuch) {
+    std::abort();  // no more can be held than has come
+  }
+  return zmtp.take_answers();
+}
+
+/// The next piece of the input; its first byte is its length.
+inline std::string_view next_piece(std::string_view& input) {
+  const std::size_t length =
+      std::min<std::size_t>(static_cast<unsigned char>(input.front()), input.size() - 1);
+  const std::string_view piece = input.substr(1, length);
+  input.remove_prefix(1 + length);
+  return piece;
+}
+
+inline void be_welcomed(Zmtp& zmtp, CurveClient& client) {
+  static_cast<void>(zmtp.take_answers());
+  const std::string welcome = say(zmtp, curve_greeting() + zmtp_command("HELLO", client.hello()));
+  if (!client.take_welcome(std::string_view(welcome).substr(10))) {
+    std::abort();
+  }
+}
+
+}  // namespace oblique::server
