@@ -8,8 +8,8 @@ Ends with 77, and says why, where what the recipe needs is not here.
 import csv
 import os
 import pathlib
+import re
 import shutil
-import socket
 import subprocess
 import sys
 import tempfile
@@ -20,16 +20,7 @@ import counting
 
 TREE, PROGRAMS, MODULE = map(pathlib.Path, sys.argv[1:4])
 PYTHON = "/usr/bin/python3"
-LONGEST_S = 600  # ends a hang
-
-
-def free_ports(count):
-    """Ports that nobody has."""
-    sockets = [socket.create_server(("127.0.0.1", 0)) for _ in range(count)]
-    ports = [s.getsockname()[1] for s in sockets]
-    for s in sockets:
-        s.close()
-    return ports
+HANGS_S = 300  # ends what hangs
 
 
 def missing(modules):
@@ -57,7 +48,7 @@ class Recipe(unittest.TestCase):
 
     def run_in_folder(self, *words, code=0, **more):
         done = subprocess.run(words, cwd=self.folder, env=self.environment | more, text=True, capture_output=True,
-                              timeout=LONGEST_S, check=False)
+                              timeout=HANGS_S, check=False)
         self.assertEqual(done.returncode, code, f"{words}: {done.stdout}{done.stderr}")
         return done.stdout
 
@@ -75,6 +66,20 @@ class Recipe(unittest.TestCase):
     def log_of(self, process):
         return self.folder / (pathlib.Path(process.args[0]).name + ".log")
 
+    def start_server(self):
+        """Starts a server and returns its addresses for clients and for workers."""
+        server = self.start("oblique-server", "--client-port", "0", "--worker-port", "0", "--http", "off")
+        return self.wait_for(server, r"clients at (\S+), workers at (\S+),").groups()
+
+    def wait_for(self, process, pattern):
+        """Waits until the process has printed it, and returns the match."""
+        end = time.monotonic() + HANGS_S
+        while not (found := re.search(pattern, printed := self.log_of(process).read_text())):
+            self.assertIn(process.poll(), (None, 0), printed)
+            self.assertLess(time.monotonic(), end, printed)
+            time.sleep(0.05)
+        return found
+
     def rows_of(self, file):
         with open(self.folder / file, newline="") as table:
             return list(csv.DictReader(table))
@@ -82,10 +87,8 @@ class Recipe(unittest.TestCase):
 
 class StudyFromAScript(Recipe):
     def test_it_submits_waits_and_asks_and_its_exit_code_says_what_became_of_the_study(self):
-        clients, workers = free_ports(2)
-        url = f"tcp://127.0.0.1:{clients}"
-        self.start("oblique-server", "--client-port", str(clients), "--worker-port", str(workers), "--http", "off")
-        self.start("oblique-worker", "--server", f"tcp://127.0.0.1:{workers}")
+        url, workers = self.start_server()
+        self.start("oblique-worker", "--server", workers)
         said = self.run_in_folder("sh", "study.sh", "friction", OBLIQUE_SERVER=url)
         self.assertRegex(said, r"^friction: 16 points, 0 done\nlargest normal force of friction: \d{4}\.\d+ N\n$")
         rows = self.rows_of("friction.csv")
@@ -107,27 +110,17 @@ class PictureOfARunningStudy(Recipe):
     NEEDS = "matplotlib", "pandas"
 
     def test_it_is_drawn_while_the_study_runs_and_once_more_when_it_is_done(self):
-        clients, workers = free_ports(2)
-        url = f"tcp://127.0.0.1:{clients}"
-        self.start("oblique-server", "--client-port", str(clients), "--worker-port", str(workers), "--http", "off")
+        url, workers = self.start_server()
         self.run_in_folder("oblique", "submit", "--name", "first", "--H", "1", "--mu", "0.1:2:40", "--e", "0.8,1",
                            OBLIQUE_SERVER=url)
         # Nobody solves it before a picture was drawn.
         drawing = self.start(PYTHON, "-u", "running.py", "oblique.db", "first")
         self.wait_for(drawing, "0 of 80 points, running\n")
-        self.start("oblique-worker", "--server", f"tcp://127.0.0.1:{workers}")
+        self.start("oblique-worker", "--server", workers)
         self.wait_for(drawing, "80 of 80 points, done\n")
-        self.assertEqual(drawing.wait(LONGEST_S), 0)
+        self.assertEqual(drawing.wait(HANGS_S), 0)
         self.assertEqual((self.folder / "first.png").read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
         self.run_in_folder(PYTHON, "running.py", "oblique.db", "frist", code=1)
-
-    def wait_for(self, process, text):
-        """Until the process has printed it."""
-        end = time.monotonic() + LONGEST_S
-        while text not in (printed := self.log_of(process).read_text()):
-            self.assertIn(process.poll(), (None, 0), printed)
-            self.assertLess(time.monotonic(), end, printed)
-            time.sleep(0.05)
 
 
 class FiguresOfThePaper(Recipe):

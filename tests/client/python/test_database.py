@@ -5,15 +5,13 @@ import io
 import os
 import pathlib
 import sqlite3
-import subprocess
-import sys
 import threading
 
 import numpy as np
 import pytest
 
 import oblique
-from conftest import run_oblique
+from conftest import ended_script, run_oblique
 
 
 def rows_of_program(*arguments):
@@ -146,22 +144,19 @@ def test_one_database_may_be_asked_by_several_threads(database):
 
 
 def test_ctrl_c_ends_a_long_question_and_the_database_answers_the_next(database):
-    script = (
-        "import oblique, os, signal, sys, threading\n"
+    ended = ended_script(
+        "import oblique\n"
         "asked = oblique.Database(sys.argv[1])\n"
-        "def tasks(): return len(os.listdir('/proc/self/task'))\n"
-        "before = tasks()\n"
+        "before = threads()\n"
         "def interrupt():\n"
-        "    while tasks() < before + 2: os.sched_yield()\n"  # this thread and that of the question
+        "    wait_for_threads(before + 1, threading.main_thread())\n"  # its own, and that of the question
         "    os.kill(os.getpid(), signal.SIGINT)\n"
-        "threading.Thread(target=interrupt).start()\n"
         "try:\n"
+        "    threading.Thread(target=interrupt, daemon=True).start()\n"
         "    asked.sql('WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n)"
         " SELECT count(*) FROM n')\n"
         "except KeyboardInterrupt:\n"
-        "    print(len(asked.query('sweep')))\n"
+        "    print(len(asked.query('sweep')))\n",
+        database,
     )
-    done = subprocess.run(
-        [sys.executable, "-c", script, database], capture_output=True, text=True
-    )
-    assert done.stdout == "36\n", done.stderr
+    assert ended.stdout == "36\n", ended.stderr
