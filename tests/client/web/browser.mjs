@@ -59,12 +59,15 @@ export class Browser {
     return page;
   }
 
-  /** A tab at a view; `early` runs in it before all scripts of the page; where it is hurried no timer of the page takes long. */
-  async open(view, { width = 1280, scheme = "light", motion = "no-preference", is_hurried = false, early = () => {} } = {}) {
+  /**
+   * A tab at a view; `early` runs in it before all scripts of the page; where it is hurried no timer of the page takes long;
+   * `expected` are lines of the console that are no objections.
+   */
+  async open(view, { width = 1280, scheme = "light", motion = "no-preference", is_hurried = false, expected = /^$/, early = () => {} } = {}) {
     const page = await this.#tab();
     await this.look(page, { width, scheme, motion });
     page.on("console", (line) => {
-      if (["error", "warn"].includes(line.type())) this.objections.push(`${view}: console: ${line.text()}`);
+      if (["error", "warn"].includes(line.type()) && !expected.test(line.text())) this.objections.push(`${view}: console: ${line.text()}`);
     });
     page.on("pageerror", (error) => this.objections.push(`${view}: ${error.message}`));
     page.on("request", (request) => {

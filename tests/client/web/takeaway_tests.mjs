@@ -4,7 +4,7 @@ import { spawnSync } from "node:child_process";
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
 import { test } from "node:test";
-import { browser, kOne, kScattered, server, study, text_of, until } from "./here.mjs";
+import { browser, kOne, kScattered, server, study, until } from "./here.mjs";
 
 /** Run in a tab before its scripts: files that the page saves are kept as text. */
 function keep_saved() {
