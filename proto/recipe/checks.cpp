@@ -20,6 +20,7 @@
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/expressions/expression_text.h"
 #include "proto/recipe/keys.h"
+#include "proto/wire/frame_scan.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::protocol {
@@ -27,6 +28,9 @@ namespace {
 
 using solver::exact_number;
 using solver::InputError;
+
+/// Most bytes of a recipe: with room for what goes around it on its way to a worker.
+constexpr std::size_t kLongestRecipe = kMaxFrameBytes - 1024;
 
 /// Which keys a block has, by `key_number`.
 using KeySet = std::bitset<128>;
@@ -369,15 +373,18 @@ void check_block(const solver::ModelParameters& model, const Block& block) {
 }
 
 void check_size(const Recipe& recipe) {
-  // Room for what goes around a recipe on its way to a worker.
-  constexpr std::size_t kLongest = kMaxFrameBytes - 1024;
-  if (const std::size_t bytes = recipe.ByteSizeLong(); bytes > kLongest) {
+  if (const std::size_t bytes = recipe.ByteSizeLong(); bytes > kLongestRecipe) {
     throw InputError(
         fmt::format("the recipe has {} bytes, more than the {} that a worker can be sent: write "
                     "long lists of values as ranges, or long columns of a CSV file as several "
                     "studies; a value that is listed takes 8 bytes",
-                    bytes, kLongest));
+                    bytes, kLongestRecipe));
   }
+}
+
+bool parse_recipe(std::string_view bytes, Recipe& recipe) {
+  return bytes.size() <= kLongestRecipe && is_of_a_recipes_shape(bytes) &&
+         recipe.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
 }
 
 }  // namespace oblique::protocol

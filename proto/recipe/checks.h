@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <string_view>
 
 #include "proto/oblique.pb.h"
 #include "proto/recipe/blocks.h"
@@ -39,5 +40,9 @@ inline constexpr std::size_t kMostExpressions = 1000;
 
 /// Throws InputError for a recipe that is too long to be sent to a worker in one frame.
 void check_size(const Recipe& recipe);
+
+/// Parses the recipe that a database file has, within the limits of one from the network: parsed, a
+/// foreign one could take a hundred times its bytes. False when it is damaged or beyond them.
+bool parse_recipe(std::string_view bytes, Recipe& recipe);
 
 }  // namespace oblique::protocol

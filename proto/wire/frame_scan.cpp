@@ -78,7 +78,7 @@ bool is_of_a_workers_size(std::string_view frame) {
   return results <= kMostResultsAMessage && lease_ids <= kMostLeasesAHeartbeat;
 }
 
-bool is_of_a_requests_shape(std::string_view frame) {
+bool is_of_a_recipes_shape(std::string_view recipe) {
   // Key and count, of a range from 0 to 0: the least that an axis takes.
   constexpr std::size_t kLeastAxisBytes = 5;
   constexpr std::size_t kLeastAxes = 3;
@@ -94,18 +94,23 @@ bool is_of_a_requests_shape(std::string_view frame) {
     });
     is_padded = is_padded || !is_message || axes < kLeastAxes;
   };
-  const auto look_at_recipe = [&](std::string_view recipe) {
-    return for_each_field(recipe, [&](int field, std::string_view part) {
-      if (field == Recipe::kBlocksFieldNumber) {
-        look_at_axes(part);
-      }
-      return !is_padded;
-    });
-  };
+  const bool is_message = for_each_field(recipe, [&](int field, std::string_view part) {
+    if (field == Recipe::kBlocksFieldNumber) {
+      look_at_axes(part);
+    }
+    return !is_padded;
+  });
+  return is_message && !is_padded;
+}
+
+bool is_of_a_requests_shape(std::string_view frame) {
+  bool is_padded = false;
   const bool is_message = for_each_field(frame, [&](int kind, std::string_view part) {
     const bool is_submission = kind == ClientRequest::kSubmitFieldNumber;
     if (is_submission && !for_each_field(part, [&](int field, std::string_view recipe) {
-          return field != SubmitRequest::kRecipeFieldNumber || look_at_recipe(recipe);
+          is_padded = is_padded || (field == SubmitRequest::kRecipeFieldNumber &&
+                                    !is_of_a_recipes_shape(recipe));
+          return !is_padded;
         })) {
       is_padded = true;
     }

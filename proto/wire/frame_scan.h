@@ -26,6 +26,9 @@ bool is_of_a_workers_size(std::string_view frame);
 /// read.
 bool is_of_a_requests_shape(std::string_view frame);
 
+/// The same of a serialised recipe.
+bool is_of_a_recipes_shape(std::string_view recipe);
+
 /// The number of a client's request, from the beginning of its frame; 0 when it is not there.
 std::uint64_t request_id_of(std::string_view frame);
 

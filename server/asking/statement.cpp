@@ -7,6 +7,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/recipe/checks.h"
 #include "server/asking/columns.h"
 #include "server/asking/conditions.h"
 #include "server/asking/grouping.h"
@@ -188,7 +189,8 @@ AskedStudy asked_study(sqlite3* database, const std::string& name) {
                    {},
                    has_sound_lists ? Lists::kSound : Lists::kMaybeDamaged};
   // Points of a recipe that does not tell where they are are all looked at.
-  if (!found.recipe.ParseFromString(study.text(2)) || !tells_points(found.recipe, found.points)) {
+  if (!protocol::parse_recipe(study.bytes(2), found.recipe) ||
+      !tells_points(found.recipe, found.points)) {
     found.recipe.Clear();
   }
   return found;

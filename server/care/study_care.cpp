@@ -6,6 +6,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/recipe/checks.h"
 #include "proto/recipe/written/study_name.h"
 #include "server/database/open_for_reading.h"
 #include "server/database/sqlite.h"
@@ -96,7 +97,7 @@ protocol::Recipe stored_recipe(const std::string& path, std::uint64_t study_id) 
     throw StudyRefused(gone_from(path));
   }
   protocol::Recipe recipe;
-  if (!recipe.ParseFromString(find.text(0))) {
+  if (!protocol::parse_recipe(find.bytes(0), recipe)) {
     throw StorageError(fmt::format(
         "the recipe of the study cannot be read: `oblique check --db {}` tells more", path));
   }

@@ -4,14 +4,15 @@
 #include <utility>
 
 #include "proto/recipe/canonical.h"
+#include "proto/recipe/checks.h"
 
 namespace oblique::server {
 namespace {
 
 protocol::Recipe parsed(const std::string& bytes) {
   protocol::Recipe recipe;
-  if (!recipe.ParseFromString(bytes)) {
-    throw std::runtime_error("its bytes are damaged");
+  if (!protocol::parse_recipe(bytes, recipe)) {
+    throw std::runtime_error("its bytes are damaged, or more than a recipe may have");
   }
   return recipe;
 }

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "proto/oblique.pb.h"
+#include "proto/recipe/checks.h"
 #include "server/database/sqlite.h"
 #include "server/web/answers/answer_pool.h"
 
@@ -33,7 +34,7 @@ LookedAtStudy StudyBook::study(sqlite3* database, std::uint64_t id) {
   }
   if (!study.table) {
     protocol::Recipe recipe;
-    if (!recipe.ParseFromString(row.text(3))) {
+    if (!protocol::parse_recipe(row.bytes(3), recipe)) {
       throw StorageError("the recipe of the study cannot be read");
     }
     study.table = std::make_shared<const protocol::PointTable>(std::move(recipe));

@@ -99,6 +99,13 @@ TEST(FrameScanTest, ARecipePaddedWithEmptyBlocksOrAxesIsNotRead) {
   EXPECT_FALSE(is_of_a_requests_shape(std::string("\x1a\x7f", 2))) << "cut off";
 }
 
+TEST(FrameScanTest, TheRecipeOfAFileIsJudgedAsThatOfARequest) {
+  Recipe recipe = submission().submit().recipe();
+  EXPECT_TRUE(is_of_a_recipes_shape(recipe.SerializeAsString()));
+  recipe.add_blocks();
+  EXPECT_FALSE(is_of_a_recipes_shape(recipe.SerializeAsString()));
+}
+
 TEST(FrameScanTest, TheNumberOfARequestIsReadFromItsBeginning) {
   const std::string frame = encode(submission());
   EXPECT_EQ(request_id_of(frame), 77U);
