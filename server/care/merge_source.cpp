@@ -53,7 +53,7 @@ class PackedSource final : public MergeSource {
             fmt::format("SELECT {}, checksum IS NOT NULL, (SELECT w.solver_version FROM workers AS"
                         " w WHERE w.worker_id = packed_results.worker), {} FROM packed_results"
                         " ORDER BY study_id, point",
-                        result_soundness_sql(schema_of(source)) + " AND " + lists_are_json_sql(),
+                        result_soundness_sql(schema_of(source)) + " AND " + lists_are_sound_sql(),
                         fmt::join(packed_columns(), ", "))) {
     rows_ = number(source, "SELECT sum(points) FROM studies");
   }

@@ -7,6 +7,8 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "server/store/rows/row_columns.h"
+
 namespace oblique::server {
 
 MergedOrigins::MergedOrigins(sqlite3* source, sqlite3* target, const StudyPlaces& places)
@@ -15,9 +17,8 @@ MergedOrigins::MergedOrigins(sqlite3* source, sqlite3* target, const StudyPlaces
       find_(target,
             "SELECT origin_id FROM origins WHERE name = ?"
             " AND origin_id NOT IN (SELECT study_id FROM studies) LIMIT 1"),
-      reserve_(target,
-               "UPDATE about SET last_study_id = 1 + max(last_study_id,"
-               " coalesce((SELECT max(study_id) FROM studies), 0)) RETURNING last_study_id"),
+      reserve_(target, "UPDATE about SET last_study_id = 1 + " + last_study_id_sql() +
+                           " RETURNING last_study_id"),
       insert_(target, "INSERT OR IGNORE INTO origins (origin_id, name) VALUES (?, ?)") {}
 
 std::string MergedOrigins::in_target(const std::string& taken_from) {

@@ -128,9 +128,7 @@ class Placing {
         grow_(target,
               "UPDATE studies SET recipe = ?2, points = ?3,"
               " checksum = row_checksum(study_id, name, ?2, ?3, created_at) WHERE study_id = ?1") {
-    Statement last(target,
-                   "SELECT max(last_study_id, coalesce((SELECT max(study_id) FROM studies), 0))"
-                   " FROM about");
+    Statement last(target, "SELECT " + last_study_id_sql());
     last_id_ = last.step() ? number_in(last, 0) : 0;
   }
 

@@ -4,28 +4,24 @@
 #include <cmath>
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <stdexcept>
 #include <string_view>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/recipe/checks.h"
 #include "proto/recipe/point_table.h"
+#include "proto/result_message.h"
 #include "server/care/table_columns.h"
 #include "server/store/rows/list_faults.h"
 #include "server/store/rows/model_rows.h"
+#include "server/store/rows/recipe_check.h"
 #include "server/store/rows/row_columns.h"
 #include "server/store/rows/stored_units.h"
 
 namespace oblique::server {
 namespace {
-
-std::string shown(double value) {
-  std::string text(32, '\0');
-  text.resize(static_cast<std::size_t>(std::snprintf(text.data(), text.size(), "%.17g", value)));
-  return text;
-}
 
 /// Collects what is found of one kind.
 class Found {
@@ -127,13 +123,11 @@ void check_models(sqlite3* database, int schema, Found& found) {
 class StudyCheck {
  public:
   StudyCheck(sqlite3* database, int schema)
-      : schema_(schema),
-        definition_(database, "SELECT definition FROM models WHERE model_id = ?"),
-        rows_(database, rows_sql(schema)) {}
+      : database_(database), schema_(schema), rows_(database, rows_sql(schema)) {}
 
   void run(std::int64_t study_id, const std::string& name, const protocol::PointTable& table,
            Found& found) {
-    segment_.reset();
+    RecipeCheck recipe(database_, schema_, table);
     rows_.reset();
     rows_.bind(1, study_id);
     std::uint64_t of_no_point = 0;
@@ -143,7 +137,7 @@ class StudyCheck {
         ++of_no_point;
         continue;
       }
-      std::string fault = fault_of_place(table, number);
+      std::string fault = recipe.fault_of(rows_);
       if (fault.empty() && rows_.integer(5) != 0) {
         fault = fault_of_arrays(rows_, kFirstArray);
       }
@@ -161,65 +155,26 @@ class StudyCheck {
  private:
   static constexpr int kFirstArray = 6;
 
-  /// Lists are held against the rest in rows without a checksum. Of those that no JSON are, which
-  /// is reported with all of their kind, nothing is asked: views cannot unfold them.
+  /// Lists are compared with the other columns in rows without a checksum. Lists that views cannot
+  /// unfold are not read here: `faults_of_rows` reports them.
   static std::string rows_sql(int schema) {
     std::string when = schema >= kFirstWithChecksums ? "checksum IS NULL" : "1";
     std::string from = "results";
     if (schema >= kFirstPacked) {
       from = fmt::format(
-          "results JOIN (SELECT study_id, point, {} AS is_json FROM packed_results)"
+          "results JOIN (SELECT study_id, point, {} AS has_sound_lists FROM packed_results)"
           " USING (study_id, point)",
-          lists_are_json_sql());
-      when += " AND is_json";
+          lists_are_sound_sql());
+      when += " AND has_sound_lists";
     }
     return fmt::format(
-        "SELECT point, model_id, H, mu, e, status = 'solved' AND {0}, {1} FROM {2}"
+        "SELECT {3}, status = 'solved' AND {0}, {1} FROM {2}"
         " WHERE study_id = ? ORDER BY point",
-        when, array_columns_sql(schema, when), from);
+        when, array_columns_sql(schema, when), from, RecipeCheck::kColumns);
   }
 
-  /// Whether H, mu, e and model are the recipe's.
-  std::string fault_of_place(const protocol::PointTable& table, std::uint64_t number) {
-    if (!table.is_left_in(number)) {
-      return "the study's filter leaves it out, and it has a row";
-    }
-    const protocol::Point point = table.point(number);
-    const std::pair<const char*, double> expected[]{
-        {"H", point.H_m}, {"mu", point.mu}, {"e", point.e_star}};
-    int column = 2;
-    for (const auto& [key, value] : expected) {
-      if (rows_.real(column) != value) {
-        return std::string(key) + " is " + shown(rows_.real(column)) + ", and " + shown(value) +
-               " in the recipe";
-      }
-      ++column;
-    }
-    if (!segment_ || segment_->model != point.model) {
-      segment_ = {point.model, definition_of(table.model(point.model), schema_), -1};
-    }
-    if (const std::int64_t model_id = rows_.integer(1); model_id != segment_->good_id) {
-      definition_.reset();
-      definition_.bind(1, model_id);
-      const bool agrees = definition_.step() && definition_.text(0) == segment_->definition;
-      definition_.reset();
-      if (!agrees) {
-        return "its model is not that of the recipe";
-      }
-      segment_->good_id = model_id;
-    }
-    return {};
-  }
-
-  /// The model of the points at hand.
-  struct Model {
-    std::uint64_t model;
-    std::string definition;
-    std::int64_t good_id;  ///< row that has it; -1: none was seen
-  };
+  sqlite3* database_;
   int schema_;
-  std::optional<Model> segment_;
-  Statement definition_;
   Statement rows_;
 };
 
@@ -230,8 +185,8 @@ void check_studies(sqlite3* database, int schema, Found& found) {
     const std::string name = studies.text(1);
     protocol::Recipe recipe;
     try {
-      if (!recipe.ParseFromString(studies.text(2))) {
-        throw std::runtime_error("its bytes are damaged");
+      if (!protocol::parse_recipe(studies.bytes(2), recipe)) {
+        throw std::runtime_error("its bytes are damaged, or more than a recipe may have");
       }
       const protocol::PointTable table(std::move(recipe));
       if (table.points() != static_cast<std::uint64_t>(studies.integer(3))) {
@@ -263,9 +218,10 @@ std::vector<std::string> faults_of_rows(sqlite3* database, int schema, std::size
   if (schema >= kFirstPacked) {
     kind().add_all(
         database,
-        "SELECT 'study ' || study_id || ', point ' || point || ': one of its lists cannot"
-        " be read' FROM packed_results WHERE NOT " +
-            lists_are_json_sql());
+        fmt::format("SELECT 'study ' || study_id || ', point ' || point || ': one of its lists"
+                    " cannot be read, or has more than {} elements' FROM packed_results"
+                    " WHERE NOT {}",
+                    protocol::kMostListElements, lists_are_sound_sql()));
     kind().add_all(database,
                    "SELECT 'text ' || text_id || ' is not the one that was stored' FROM texts"
                    " WHERE checksum <> " +
@@ -276,10 +232,11 @@ std::vector<std::string> faults_of_rows(sqlite3* database, int schema, std::size
                        worker_checksum_sql());
   }
   if (schema >= kFirstWithChecksums) {
-    kind().add_all(database,
-                   "SELECT 'study ' || study_id || ', ' || name || ': its name, recipe or size is"
-                   " not the one that was stored' FROM studies WHERE checksum <> " +
-                       study_checksum_sql());
+    kind().add_all(
+        database,
+        "SELECT 'study ' || study_id || ', ' || name || ': its number, name, recipe or size"
+        " is not the one that was stored' FROM studies WHERE checksum <> " +
+            study_checksum_sql());
     kind().add_all(database,
                    "SELECT 'study ' || study_id || ', point ' || point || ': its row is not the one"
                    " that was stored' FROM " +

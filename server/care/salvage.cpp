@@ -187,7 +187,7 @@ class PackedCopy final : public RowsCopy {
         study_(study),
         read_(from, fmt::format("SELECT point, {} AND {}, checksum IS NOT NULL, {} FROM"
                                 " packed_results WHERE study_id = ?1 AND point > ?2 ORDER BY point",
-                                result_soundness_sql(kSchemaVersion), lists_are_json_sql(),
+                                result_soundness_sql(kSchemaVersion), lists_are_sound_sql(),
                                 fmt::join(packed_columns(), ", "))),
         insert_(to) {}
 

@@ -69,13 +69,14 @@ class Store final : public Storage {
 
   /// All studies in the order of their numbers, with what is settled. Rows of those that are in
   /// doubt (SettledRuns) are counted again. Throws StorageError, also for a recipe that cannot be
-  /// read.
+  /// read, a number below 1, and a study whose rows are not those of its recipe.
   std::vector<StoredStudy> studies();
   /// A sentence about each study that `studies` left out, because an earlier version took what this
   /// one does not.
   const std::vector<std::string>& left_out() const { return left_out_; }
 
-  /// Highest number given to a study or worker so far; 0 when there is none.
+  /// Highest number given to a study or worker so far, in any table; 0 when there is none. Throws
+  /// StorageError when no study can have a higher one.
   std::uint64_t last_study_id();
   std::uint64_t last_worker_id();
 

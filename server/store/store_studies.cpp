@@ -1,13 +1,17 @@
 // Reading back what studies there are and how far they are, and the numbers that were given.
+#include <limits>
 #include <map>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/text.h"
+#include "server/store/rows/recipe_check.h"
+#include "server/store/rows/row_columns.h"
 #include "server/store/store.h"
 
 namespace oblique::server {
@@ -55,7 +59,7 @@ Progress progress_of_all(sqlite3* database) {
   return progress;
 }
 
-/// Makes sure that points can be handed out; afterwards, those of a study that rests need no table.
+/// Makes sure that points can be handed out, and makes the study's table.
 /// Gives why this version takes no such study, or an empty text. Throws StorageError for a recipe
 /// that cannot be read.
 std::string objection_to(const StoredStudy& study) {
@@ -67,10 +71,44 @@ std::string objection_to(const StoredStudy& study) {
     throw StorageError("the recipe of study " + study.name + " cannot be read: " + reason.what() +
                        ". `oblique check` tells more");
   }
-  if (study.state == StudyState::kCancelled || study.state == StudyState::kPaused) {
-    study.table.release();
-  }
   return {};
+}
+
+/// Throws StorageError for a study whose rows are those of another one, as when its number was
+/// changed by hand. Compares the first row, the last, and some between with the recipe.
+void check_rows(sqlite3* database, const StoredStudy& study) {
+  constexpr std::uint64_t kCompared = 64;
+  const std::uint64_t step = study.settled.size() / kCompared + 1;
+  std::vector<std::uint64_t> points;
+  std::uint64_t passed = 0;  // points before the run
+  study.settled.for_each([&](const Interval& run) {
+    const std::uint64_t size = run.end - run.begin;
+    for (std::uint64_t i = (step - passed % step) % step; i < size; i += step) {
+      points.push_back(run.begin + i);
+    }
+    passed += size;
+    if (passed == study.settled.size()) {
+      points.push_back(run.end - 1);
+    }
+  });
+  RecipeCheck recipe(database, kSchemaVersion, *study.table.get());
+  Statement row(database, fmt::format("SELECT {} FROM packed_results"
+                                      " WHERE study_id = ? AND point = ?",
+                                      RecipeCheck::kColumns));
+  for (const std::uint64_t point : points) {
+    row.bind(1, study.study_id);
+    row.bind(2, point);
+    const std::string fault = row.step() ? recipe.fault_of(row) : "its row is gone";
+    row.reset();
+    if (!fault.empty()) {
+      throw StorageError(fmt::format(
+          "the results of study \"{0}\" are not those of its recipe, as after a change of study "
+          "numbers by hand (point {1}: {2}). `oblique check --db FILE` names all of them. With no "
+          "server at work, set the numbers that the studies had with sqlite3, or delete the study "
+          "with these results: `oblique delete \"{0}\" --db FILE`",
+          study.name, point, fault));
+    }
+  }
 }
 
 }  // namespace
@@ -125,6 +163,14 @@ std::vector<StoredStudy> Store::studies() {
           study.study_id, protocol::visible(study.name), study.study_id));
       continue;
     }
+    if (list.integer(0) < 1) {
+      throw StorageError(fmt::format(
+          "study \"{0}\" has the number {1}, and study numbers begin with 1. With no server at "
+          "work, set the number that it had (sqlite3 FILE \"UPDATE studies SET study_id = NUMBER "
+          "WHERE study_id = {1}\"), or delete it: `oblique delete \"{0}\" --db FILE`. `oblique "
+          "check` tells more",
+          study.name, list.integer(0)));
+    }
     study.table = StudyTable(list.text(2), number(list, 8));
     study.state = state_named(list.text(3));
     study.created_at = list.text(4);
@@ -141,11 +187,17 @@ std::vector<StoredStudy> Store::studies() {
     study.solver_version = version.step() ? version.text(0) : "";
     version.reset();
     const bool is_open = study.settled.size() < study.table.size();
-    if (const std::string objection = is_open ? objection_to(study) : ""; !objection.empty()) {
+    const std::string objection = objection_to(study);
+    if (objection.empty()) {
+      check_rows(database_.get(), study);
+    } else if (is_open) {
       left_out_.push_back(
           "the study \"" + study.name +
           "\" is left as it is, for this version takes no such study: " + objection);
       continue;
+    }
+    if (!is_open || study.state != StudyState::kRunning) {
+      study.table.release();  // nobody computes with it for now
     }
     study.failures = std::move(progress.failures[study.study_id]);
     study.attempts = std::move(progress.attempts[study.study_id]);
@@ -160,9 +212,12 @@ std::uint64_t Store::highest(const std::string& sql) {
 }
 
 std::uint64_t Store::last_study_id() {
-  return highest(
-      "SELECT max(last_study_id, coalesce((SELECT max(study_id) FROM studies), 0))"
-      " FROM about");
+  const std::uint64_t last = highest("SELECT " + last_study_id_sql());
+  if (last == std::numeric_limits<std::int64_t>::max()) {
+    throw StorageError("no number is left for another study: a table has rows of study number " +
+                       std::to_string(last) + ". `oblique check` tells more");
+  }
+  return last;
 }
 
 std::uint64_t Store::last_worker_id() {

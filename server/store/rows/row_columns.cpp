@@ -5,6 +5,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/result_message.h"
 #include "server/store/rows/stored_units.h"
 #include "worker/solver/model/result_fields.h"
 
@@ -140,12 +141,25 @@ std::vector<std::string> certain_columns(int schema) {
   return names;
 }
 
-std::string lists_are_json_sql() {
+std::string lists_are_sound_sql() {
   std::string condition = "(1";
   for (const solver::ResultList* list : solver::result_lists()) {
-    condition += fmt::format(" AND ({0} IS NULL OR json_valid({0}))", list->column);
+    const int per_element = list->column == "peaks" ? 3 : list->column == "phases" ? 1 : 2;
+    condition += fmt::format(
+        " AND CASE WHEN {0} IS NULL THEN 1 WHEN json_valid({0}) THEN json_array_length({0}) <= {1}"
+        " ELSE 0 END",
+        list->column, per_element * protocol::kMostListElements);
   }
   return condition + ")";
+}
+
+std::string last_study_id_sql() {
+  std::string numbers = "SELECT 0 AS number UNION ALL SELECT last_study_id FROM about";
+  for (const std::string_view table :
+       {"studies", "packed_results", "settled_points", "retries", "deletions", "taken_points"}) {
+    numbers += fmt::format(" UNION ALL SELECT max(study_id) FROM {}", table);
+  }
+  return "(SELECT max(number) FROM (" + numbers + " UNION ALL SELECT max(origin_id) FROM origins))";
 }
 
 std::string_view shown_name(std::string_view packed_column) {

@@ -46,9 +46,14 @@ std::vector<std::string> output_columns(int schema);
 /// Those that every solved row has.
 std::vector<std::string> certain_columns(int schema);
 
-/// An expression over `packed_results` that is true when every list is JSON, or NULL: one that is
-/// not would fail each query of the views that unfold it.
-std::string lists_are_json_sql();
+/// An expression over `packed_results` that is true when every list is NULL, or JSON of at most as
+/// many numbers as a worker may send. Others would fail queries of the views that unfold them, or
+/// make them quadratic.
+std::string lists_are_sound_sql();
+
+/// An expression for the highest number that any table has given to a study; 0: none. Rows of a
+/// study whose row in `studies` was deleted by hand count too.
+std::string last_study_id_sql();
 
 /// What views call a column of `packed_results`.
 std::string_view shown_name(std::string_view packed_column);

@@ -71,5 +71,13 @@ TEST_F(MergeTest, RowsThatWereTakenOverNameTheirOriginInTheWholeAndAreCounted) {
   EXPECT_GE(all.last_study_id(), std::stoull(text("all", "SELECT max(origin_id) FROM origins")));
 }
 
+TEST_F(MergeTest, AStudyIsNotGivenTheNumberOfRowsWhoseStudyWasDeletedByHand) {
+  store("one", {{.study = "b", .table = table_of(3), .end = 2}});
+  store("all", {{.study = "a", .end = 10}});
+  execute(open_database(file("all"), SQLITE_OPEN_READWRITE).get(), "DELETE FROM studies");
+  merge("one");
+  EXPECT_EQ(text("all", "SELECT count(*) FROM runs WHERE study = 'b'"), "2");
+}
+
 }  // namespace
 }  // namespace oblique::server

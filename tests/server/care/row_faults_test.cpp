@@ -114,6 +114,21 @@ TEST_F(RowFaultsTest, AFailedPointWithOutputsIsNamed) {
   EXPECT_THAT(find_faults(path_), Contains(HasSubstr("point 2: it is failed, and has outputs")));
 }
 
+TEST_F(RowFaultsTest, AListThatIsLongerThanAnyResultHasItIsNamedAndNotUnfolded) {
+  const auto peaks_of = [this](int elements) {
+    run("UPDATE packed_results SET peaks = (WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1"
+        " FROM n WHERE i < " +
+        std::to_string(3 * elements) + ") SELECT json_group_array(i) FROM n) WHERE point < 2");
+  };
+  peaks_of(200'000);
+  EXPECT_THAT(find_faults(path_),
+              testing::UnorderedElementsAre(HasSubstr("point 0: one of its lists cannot be read, or"
+                                                      " has more than 4096 elements"),
+                                            HasSubstr("point 1: one of its lists")));
+  peaks_of(protocol::kMostListElements);
+  EXPECT_THAT(find_faults(path_), testing::Not(Contains(HasSubstr("one of its lists"))));
+}
+
 TEST_F(RowFaultsTest, AModelThatIsNotThatOfItsDefinitionOrOfTheRecipeIsNamed) {
   run("UPDATE models SET E = E + 1");
   EXPECT_THAT(find_faults(path_), Contains(HasSubstr("model 1: E is not")));

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "proto/frames.h"
 #include "server/care/diagnosis.h"
 #include "server/care/merge.h"
 #include "tests/server/care/care_fixture.h"
@@ -100,6 +101,23 @@ TEST_F(StudyCareTest, AMissingDatabaseIsNotMade) {
 TEST_F(StudyCareTest, TheRecipeIsThatWhichWasStoredAlsoWhileAServerWorks) {
   EXPECT_EQ(stored_recipe(path_, 1).SerializeAsString(), table_->recipe().SerializeAsString());
   EXPECT_THROW(stored_recipe(path_, 2), StudyRefused);
+}
+
+TEST_F(StudyCareTest, ARecipeThatIsLongerThanAServerTakesIsNotParsed) {
+  store_.reset();
+  const std::string block = table_->recipe().SerializeAsString();  // a longer recipe goes on so
+  std::string bytes;
+  while (bytes.size() <= protocol::kMaxFrameBytes) {
+    bytes += block;
+  }
+  {
+    const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);
+    Statement update(database.get(), "UPDATE studies SET recipe = ?");
+    update.bind_blob(1, bytes);
+    update.run();
+  }
+  EXPECT_THROW(stored_recipe(path_, 1), StorageError);
+  EXPECT_THAT(find_faults(path_), testing::Contains(HasSubstr("more than a recipe may have")));
 }
 
 TEST_F(StudyCareTest, RowsThatADeletionHasLeftAreNoFaultsAndAreNotMerged) {

@@ -66,10 +66,17 @@ class ClearingTest : public testing::Test {
   std::optional<Store> store_{path_};
 };
 
+/// Three points, and so many further ones.
+std::shared_ptr<const protocol::PointTable> grown_table(std::uint64_t further) {
+  protocol::Recipe all = table_of(3)->recipe();
+  all.MergeFrom(table_of(further)->recipe());
+  return std::make_shared<const protocol::PointTable>(all);
+}
+
 TEST_F(ClearingTest, AStudyThatGrowsHasItsRowsAndFurtherPointsAndRuns) {
   commit(solved_study(1, table_of(3), 1));
   commit({SetStudyState{1, StudyState::kDone, "then"}});
-  commit({GrowStudy{1, table_of(5), {2, 0.5, true}, "now"}});
+  commit({GrowStudy{1, grown_table(2), {2, 0.5, true}, "now"}});
   reopen();
   const auto study = store_->studies().at(0);
   EXPECT_EQ(study.table.size(), 5U);
@@ -80,14 +87,8 @@ TEST_F(ClearingTest, AStudyThatGrowsHasItsRowsAndFurtherPointsAndRuns) {
 }
 
 TEST_F(ClearingTest, TheChecksumsOfStudiesThatGrewOrWereRenamedAreRight) {
-  const StudyTable table = table_of(3);
-  const auto recipe = [](std::uint64_t further) {
-    protocol::Recipe all = table_of(3)->recipe();
-    all.MergeFrom(table_of(further)->recipe());
-    return std::make_shared<const protocol::PointTable>(all);
-  };
-  commit(solved_study(1, table, 1));
-  commit({GrowStudy{1, recipe(4), {}, "now"}, RenameStudy{1, "another name"}});
+  commit(solved_study(1, table_of(3), 1));
+  commit({GrowStudy{1, grown_table(4), {}, "now"}, RenameStudy{1, "another name"}});
   reopen();
   EXPECT_EQ(store_->studies().at(0).name, "another name");
   EXPECT_THAT(find_faults(path_), IsEmpty());

@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "proto/recipe/model_message.h"
 #include "proto/result_message.h"
 #include "server/reading/reader.h"
 #include "tests/support/points.h"
@@ -326,6 +327,99 @@ TEST_F(StoreTest, ARecipeThatCannotBeReadIsAnErrorThatNamesTheStudy) {
     EXPECT_THAT(error.what(),
                 testing::AllOf(HasSubstr("recipe of study a"), HasSubstr("`oblique check`")));
   }
+}
+
+/// Two studies, both done; the second has other points.
+class NumbersByHandTest : public StoreTest {
+ protected:
+  NumbersByHandTest() {
+    Store store(path_);
+    const auto first = study_of(2, 1, "first");
+    const auto second = study_of(5, 2, "second");
+    commit(store, {first, second, results_of(first, {solved_point(0), solved_point(1)}),
+                   results_of(second, {solved_point(0), solved_point(1), solved_point(2),
+                                       solved_point(3), solved_point(4)})});
+  }
+  void run(const std::string& sql) {
+    execute(open_database(path_, SQLITE_OPEN_READWRITE).get(), sql);
+  }
+  std::string message_of_start() {
+    try {
+      Store store(path_);
+      (void)store.last_study_id();
+      (void)store.studies();
+    } catch (const StorageError& error) {
+      return error.what();
+    }
+    return "it started";
+  }
+};
+
+TEST_F(NumbersByHandTest, ANumberThatAnyTableNamesIsNotGivenToAnotherStudy) {
+  run("DELETE FROM studies WHERE study_id = 2");
+  EXPECT_EQ(Store(path_).last_study_id(), 2U) << "its results are there";
+  run("DELETE FROM packed_results WHERE study_id = 2");
+  EXPECT_EQ(Store(path_).last_study_id(), 2U) << "settled_points names it";
+  run("DELETE FROM settled_points WHERE study_id = 2");
+  EXPECT_EQ(Store(path_).last_study_id(), 1U);
+  run("INSERT INTO retries VALUES (3, 0, 1, 1, 'now')");
+  EXPECT_EQ(Store(path_).last_study_id(), 3U);
+  run("INSERT INTO origins VALUES (4, 'gone (deleted)')");
+  EXPECT_EQ(Store(path_).last_study_id(), 4U);
+  run("INSERT INTO taken_points VALUES (5, 4, 1)");
+  EXPECT_EQ(Store(path_).last_study_id(), 5U);
+  run("UPDATE about SET last_study_id = 6");
+  EXPECT_EQ(Store(path_).last_study_id(), 6U);
+}
+
+TEST_F(NumbersByHandTest, AStudyWithTheResultsOfAnotherIsRefusedByNameAndWithTheWayOut) {
+  EXPECT_EQ(message_of_start(), "it started");
+  run("DELETE FROM studies WHERE study_id = 1; UPDATE studies SET study_id = 1");
+  EXPECT_THAT(message_of_start(),
+              testing::AllOf(HasSubstr("study \"second\""), HasSubstr("`oblique check")))
+      << "the rows of the first one, which was deleted";
+}
+
+TEST_F(NumbersByHandTest, AStudyWithTheResultsOfALongerOneIsRefused) {
+  {
+    Store store(path_);
+    commit(store, {study_of(1, 3, "third")});  // its point is the first one of the second study
+  }
+  run("DELETE FROM studies WHERE study_id = 2; UPDATE studies SET study_id = 2 WHERE study_id = 3");
+  EXPECT_THAT(message_of_start(), HasSubstr("point 1: the study has no such point"));
+}
+
+TEST_F(NumbersByHandTest, AStudyWithTheResultsOfAnotherModelIsRefused) {
+  solver::ModelParameters other;
+  other.E_Pa *= 2.0;
+  protocol::Recipe recipe = table_of(5)->recipe();
+  *recipe.mutable_model() = protocol::to_message(other);
+  {
+    Store store(path_);
+    commit(store, {AddStudy{3, "third", std::make_shared<const protocol::PointTable>(recipe),
+                            "2024-01-01T00:00:00.000Z"}});
+  }
+  run("DELETE FROM studies WHERE study_id = 2; UPDATE studies SET study_id = 2 WHERE study_id = 3");
+  EXPECT_THAT(message_of_start(), testing::AllOf(HasSubstr("study \"third\""), HasSubstr("model")));
+}
+
+TEST_F(NumbersByHandTest, AStudyWhoseRowsMovedToAnotherNumberIsRefused) {
+  run("UPDATE packed_results SET study_id = 7 WHERE study_id = 2");
+  EXPECT_THAT(message_of_start(), HasSubstr("its row is gone"));
+}
+
+TEST_F(NumbersByHandTest, ANumberBelow1IsRefusedByTheNameOfItsStudy) {
+  for (const char* number : {"0", "-1"}) {
+    run(std::string("UPDATE studies SET study_id = ") + number + " WHERE name = 'second'");
+    EXPECT_THAT(message_of_start(),
+                testing::AllOf(HasSubstr(std::string("study \"second\" has the number ") + number),
+                               HasSubstr("`oblique check`")));
+  }
+}
+
+TEST_F(NumbersByHandTest, TheHighestNumberThatThereIsLeavesNoneForAnotherStudy) {
+  run("UPDATE studies SET study_id = 9223372036854775807 WHERE name = 'second'");
+  EXPECT_THAT(message_of_start(), HasSubstr("no number is left"));
 }
 
 }  // namespace
