@@ -139,8 +139,8 @@ std::string ClientsDesk::objection_to(const ReadRequest& read) {
   }
   if ((request.has_submit() || request.has_change()) && ledger.is_slow()) {
     return fmt::format(
-        "the database stored nothing for over {} s: its disk is slow, or the file is damaged "
-        "(`oblique check` examines it). Ask again later",
+        "the change was not stored: the database stored nothing for over {} s. Its disk is slow or "
+        "the file is damaged (`oblique check` examines it). Ask again later",
         WriteLedger::kSlowAfter_s);
   }
   return ledger.is_gone() && !request.has_status() && !request.has_workers() ? ledger.fault()

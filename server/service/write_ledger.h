@@ -113,7 +113,7 @@ class WriteLedger {
   /// To be called several times a second.
   void tick(std::int64_t now_ms);
   /// Nothing became durable for `kSlowAfter_s`, and the database does not say why.
-  bool is_slow() const { return is_slow_; }
+  bool is_slow() const { return is_slow_ && fault_.empty(); }
   static constexpr std::int64_t kSlowAfter_s = 5;
 
   /// Why the database takes no results; empty: it does.
