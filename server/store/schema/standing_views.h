@@ -7,8 +7,8 @@
 #include "server/database/sqlite.h"
 
 // Views, triggers and indices that every database of this schema has. Other programs may have
-// dropped or replaced some; what people made under other names is theirs, but for triggers. Tables, which cannot be
-// made again with what they held, are only named.
+// dropped or replaced some; what people made under other names is theirs, but for triggers. Tables,
+// which cannot be made again with what they held, are only named.
 namespace oblique::server {
 
 /// The names of the tables of this schema.
