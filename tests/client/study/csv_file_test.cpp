@@ -1,6 +1,5 @@
 #include "client/study/csv_file.h"
 
-#include <filesystem>
 #include <fstream>
 #include <string>
 #include <vector>
@@ -9,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "proto/recipe/keys.h"
+#include "tests/support/temporary_folder.h"
 
 namespace oblique::client {
 namespace {
@@ -101,15 +101,14 @@ TEST(CsvFile, WantsNamesAboveItsColumns) {
 }
 
 TEST(CsvFiles, AreFoundBesideTheStudyAndMustBeFiles) {
-  const std::filesystem::path folder = testing::TempDir();
-  { std::ofstream(folder / "beside.csv") << "drop\n0.4\n"; }
-  CsvFiles files(folder);
+  const test::TemporaryFolder folder;
+  { std::ofstream(folder.file("beside.csv")) << "drop\n0.4\n"; }
+  CsvFiles files(folder.path());
   EXPECT_EQ(files.at("beside.csv").rows(), 1U);
-  EXPECT_EQ(files.at((folder / "beside.csv").string()).rows(), 1U) << "also by the whole path";
+  EXPECT_EQ(files.at(folder.file("beside.csv")).rows(), 1U) << "also by the whole path";
   for (const std::string path : {"nowhere.csv", ".", "/dev/zero"}) {
     EXPECT_THROW(files.at(path), solver::InputError) << path;
   }
-  std::filesystem::remove(folder / "beside.csv");
 }
 
 }  // namespace

@@ -1,6 +1,5 @@
 #include "client/study/point_flags.h"
 
-#include <filesystem>
 #include <fstream>
 #include <map>
 #include <string>
@@ -14,6 +13,7 @@
 #include "proto/recipe/point_table.h"
 #include "tests/client/study/flags_of.h"
 #include "tests/client/study/pretended_fall.h"
+#include "tests/support/temporary_folder.h"
 
 namespace oblique::client {
 namespace {
@@ -57,7 +57,8 @@ TEST(PointFlags, TakeLogarithmicRangesAndSteps) {
 }
 
 TEST(PointFlags, TakeColumnsOfFiles) {
-  const std::string path = testing::TempDir() + "flags.csv";
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("flags.csv");
   std::ofstream(path) << "mu,drop\n0.4,0.5\n0.6,0.5\n";
   EXPECT_EQ(values(axis_of("mu", "@" + path)), (std::vector{0.4, 0.6}));
   const auto side_by_side = protocol::BlockKind::kZip;
@@ -65,7 +66,6 @@ TEST(PointFlags, TakeColumnsOfFiles) {
   const auto message = error_of(flags_of({{"H", "@" + path + ":dorp"}}));
   EXPECT_TRUE(message.starts_with("--H @")) << message;
   EXPECT_NE(message.find("did you mean `drop`"), std::string::npos) << message;
-  std::filesystem::remove(path);
 }
 
 TEST(PointFlags, TakeDistributionsInSamplesAndExpressions) {

@@ -1,6 +1,5 @@
 #include "client/study/study_file.h"
 
-#include <filesystem>
 #include <fstream>
 #include <string>
 #include <vector>
@@ -11,6 +10,7 @@
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
 #include "tests/client/study/study_text.h"
+#include "tests/support/temporary_folder.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {
@@ -120,7 +120,8 @@ TEST(StudyFile, ThatIsNotThereIsAnErrorWithItsName) {
 }
 
 TEST(StudyFile, WhoseEndingIsLeftOutIsSuggested) {
-  const auto name = std::filesystem::path(testing::TempDir()) / "left-out";
+  const test::TemporaryFolder folder;
+  const auto name = folder.path() / "left-out";
   const auto file = name.string() + ".toml";
   { const std::ofstream empty(file); }
   try {
@@ -129,11 +130,11 @@ TEST(StudyFile, WhoseEndingIsLeftOutIsSuggested) {
   } catch (const solver::InputError& error) {
     EXPECT_THAT(error.what(), testing::HasSubstr("did you mean `" + file + "`?"));
   }
-  std::filesystem::remove(file);
 }
 
 TEST(StudyFile, ThatIsEmptyHasNoBlock) {
-  const auto file = std::filesystem::path(testing::TempDir()) / "empty-study.toml";
+  const test::TemporaryFolder folder;
+  const auto file = folder.path() / "empty-study.toml";
   { const std::ofstream empty(file); }
   EXPECT_THROW(
       {
@@ -145,19 +146,16 @@ TEST(StudyFile, ThatIsEmptyHasNoBlock) {
         }
       },
       solver::InputError);
-  std::filesystem::remove(file);
 }
 
 /// A folder with a CSV file, for studies beside it.
 class StudyBesideAFile : public testing::Test {
  protected:
   StudyBesideAFile() {
-    std::filesystem::create_directories(folder_);
-    std::ofstream(folder_ / "measured.csv") << "drop,friction,H\n0.5,0.4,0.7\n0.5,0.6,0.8\n";
+    std::ofstream(folder_.file("measured.csv")) << "drop,friction,H\n0.5,0.4,0.7\n0.5,0.6,0.8\n";
   }
-  ~StudyBesideAFile() override { std::filesystem::remove_all(folder_); }
   protocol::PointTable table(const std::string& text) const {
-    return protocol::PointTable(parsed(text, (folder_ / "study.toml").string()).recipe);
+    return protocol::PointTable(parsed(text, folder_.file("study.toml")).recipe);
   }
   std::string error(const std::string& text) const {
     try {
@@ -168,8 +166,7 @@ class StudyBesideAFile : public testing::Test {
     return "accepted";
   }
 
-  const std::filesystem::path folder_ =
-      std::filesystem::path(testing::TempDir()) / "study-beside-a-file";
+  const test::TemporaryFolder folder_;
 };
 
 TEST_F(StudyBesideAFile, TakesAColumnAsAnAxis) {
@@ -204,7 +201,7 @@ TEST_F(StudyBesideAFile, NamesThePlaceInBothFiles) {
          {"study.toml:3:17: ", "H is given twice"});
   expect("[[block]]\ncsv = 'nowhere.csv'\nmu = 1\ne = 1\n",
          {"study.toml:2:7: the CSV file", "nowhere.csv cannot be read"});
-  std::ofstream(folder_ / "measured.csv") << "mu\n0.5\n-1\n";
+  std::ofstream(folder_.file("measured.csv")) << "mu\n0.5\n-1\n";
   expect(block_with("mu = { csv = 'measured.csv' }"),
          {"study.toml:3:6: ", "measured.csv:3: column `mu`: mu = -1 is not allowed"});
 }
