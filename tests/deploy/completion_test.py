@@ -84,7 +84,7 @@ def bash(folder):
     return Shell(["bash", "--norc", "--noprofile", "-i"], folder, [
         "bind 'set enable-bracketed-paste off'; bind 'set bell-style none'; bind 'set page-completions off'",
         "show() { printf 'LINE<%s>ENIL' \"$READLINE_LINE\"; }; bind -x '\"\\C-g\": show'",
-        f". {SCRIPTS}/oblique.bash"])
+        f". '{SCRIPTS}/oblique.bash'"])
 
 
 def zsh(folder):
@@ -92,7 +92,7 @@ def zsh(folder):
         "unsetopt zle_bracketed_paste prompt_sp beep 2> /dev/null; unset zle_bracketed_paste; PROMPT='> '; stty cols 200 rows 60",
         "autoload -Uz compinit && compinit -u -D",
         "show() { print -rn -- \"LINE<$BUFFER>ENIL\" }; zle -N show; bindkey '^G' show; bindkey '^U' kill-whole-line",
-        f". {SCRIPTS}/_oblique"])
+        f". '{SCRIPTS}/_oblique'"])
 
 
 class Folder(unittest.TestCase):

@@ -66,7 +66,7 @@ INSTANTIATE_TEST_SUITE_P(
     All, Examples,
     testing::Values(Example{"Shell",
                             {"/usr/bin/sqlite3", "-readonly", "grid.db",
-                             ".read " + kExamples + "/forces.sql"},
+                             ".read '" + kExamples + "/forces.sql'"},
                             "test -x /usr/bin/sqlite3"},
                     Example{"Python",
                             {"/usr/bin/python3", kExamples + "/forces.py", "grid.db"},
