@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -220,6 +221,9 @@ void SlurmCluster::wait_for_state(const std::string& job, const std::string& sta
 
 void SlurmCluster::begin_now(const std::string& job) const {
   wait_for_state(job, "PENDING");
+  // A node refuses what was started in the second in which it revoked the job, or earlier.
+  const std::time_t revoked = std::time(nullptr);
+  wait_until("the next second", [&] { return std::time(nullptr) > revoked; });
   run("scontrol", {"update", "JobId=" + job, "StartTime=now"});
 }
 
