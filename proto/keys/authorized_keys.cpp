@@ -33,7 +33,7 @@ constexpr std::array<std::string_view, 1> kTopFields{"key"};
                   what, mode & 07777U, path));
 }
 
-/// Whoever may write the list, or put another one in its place, may admit himself.
+/// Anyone who can write or replace this file can add a key of his own.
 void check_file(const std::string& path) {
   struct stat file {};
   if (::stat(path.c_str(), &file) != 0) {
