@@ -28,16 +28,12 @@ std::string field_around(int number, std::string_view encoded) {
 
 }  // namespace
 
-std::string objection_to_version(std::uint32_t version, std::uint32_t oldest,
-                                 const std::string& who) {
-  if (version >= oldest && version <= kProtocolVersion) {
-    return {};
-  }
-  const std::string spoken = oldest == kProtocolVersion
-                                 ? fmt::format("version {}", kProtocolVersion)
-                                 : fmt::format("versions {} to {}", oldest, kProtocolVersion);
-  return fmt::format("the server speaks protocol {}, the {} {}: install the same release on both",
-                     spoken, who, version);
+std::string objection_to_version(std::uint32_t version, const std::string& who) {
+  return version == kProtocolVersion ? std::string()
+                                     : fmt::format(
+                                           "the server has protocol version {}, the {} {}: install "
+                                           "the same release on both",
+                                           kProtocolVersion, who, version);
 }
 
 std::string encode(const google::protobuf::MessageLite& message) {

@@ -10,20 +10,14 @@
 
 namespace oblique::protocol {
 
-/// Version spoken here, and the oldest ones that the server still speaks to clients and to workers.
-/// Peers of any other one are refused with the numbers in the reason. protocol.md says what each
-/// version brought.
-inline constexpr std::uint32_t kProtocolVersion = 5;
-inline constexpr std::uint32_t kOldestClientsVersion = 3;
-inline constexpr std::uint32_t kOldestWorkersVersion = 5;
+/// Peers of any other version are refused with both numbers in the reason.
+inline constexpr std::uint32_t kProtocolVersion = 6;
 
 /// Largest frame that either side takes; a longer one is a foreign or broken peer.
 inline constexpr std::size_t kMaxFrameBytes = std::size_t{16} * 1024 * 1024;
 
-/// Why the server, which speaks the versions from `oldest` to the present one with `who` ("worker",
-/// "client"), does not speak with one of that version, or an empty text.
-std::string objection_to_version(std::uint32_t version, std::uint32_t oldest,
-                                 const std::string& who);
+/// Why the server refuses a `who` ("worker", "client") of that version, or an empty text.
+std::string objection_to_version(std::uint32_t version, const std::string& who);
 
 /// Serialises a message into one frame.
 std::string encode(const google::protobuf::MessageLite& message);

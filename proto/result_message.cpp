@@ -320,8 +320,7 @@ std::string sent_outputs() {
 }
 
 std::string objection_to_worker(const WorkerHello& hello) {
-  std::string objection =
-      objection_to_version(hello.protocol_version(), kOldestWorkersVersion, "worker");
+  std::string objection = objection_to_version(hello.protocol_version(), "worker");
   if (objection.empty() && hello.outputs() != sent_outputs()) {
     return "its results have other outputs than those that are stored here: install the same "
            "release on both";

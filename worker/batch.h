@@ -10,33 +10,55 @@
 
 namespace oblique::worker {
 
-/// Points that follow each other, the end out.
-struct BatchPart {
-  std::uint64_t begin;
-  std::uint64_t end;
-};
+/// A batch with all that solving it needs. Its points are reached by their positions in the order
+/// in which they are to be solved, from 0 to size().
+class Batch {
+ public:
+  /// Points that follow each other, without the end.
+  struct Range {
+    std::uint64_t begin;
+    std::uint64_t end;
+  };
+  /// `number` counts this worker's batches: lease numbers may come again, these do not. Batches of
+  /// a higher priority are solved first.
+  Batch(std::uint64_t number, std::uint64_t study_id, const std::vector<Range>& ranges,
+        std::shared_ptr<const protocol::PointTable> points, std::int32_t priority = 0);
 
-/// A batch with all that solving it needs.
-struct Batch {
-  std::uint64_t
-      number;  ///< counts this worker's batches; lease numbers may come again, these do not
-  std::uint64_t study_id;
-  std::uint64_t first_point;
-  std::uint64_t count;
-  std::shared_ptr<const protocol::PointTable> points;
-  std::vector<BatchPart> parts{};  ///< rising and apart, what is to be solved of it; empty: all
-  std::int32_t priority = 0;       ///< those of a higher one are solved first
+  std::uint64_t number() const { return number_; }
+  std::uint64_t study_id() const { return study_id_; }
+  std::int32_t priority() const { return priority_; }
+  const protocol::PointTable& points() const { return *points_; }
 
-  /// The first point of [at, end) that is to be solved, or `end`.
+  std::uint64_t size() const { return size_; }
+  std::uint64_t point_at(std::uint64_t position) const;
+  /// The first position of [at, end) whose point a filter leaves in, or `end`.
   std::uint64_t first_to_solve(std::uint64_t at, std::uint64_t end) const;
+  /// The position behind the points from `position` on that follow each other and share a model.
+  std::uint64_t end_of_model(std::uint64_t position) const;
+
+ private:
+  struct Run {
+    std::uint64_t position;
+    std::uint64_t point;
+  };
+  std::size_t run_of(std::uint64_t position) const;
+  std::uint64_t end_of_run(std::size_t run) const;
+
+  std::uint64_t number_;
+  std::uint64_t study_id_;
+  std::vector<Run> runs_;  ///< by position; up to the position of the next one
+  std::uint64_t size_ = 0;
+  std::shared_ptr<const protocol::PointTable> points_;
+  std::int32_t priority_;
 };
 
-/// The parts that a message tells, of a batch that begins with `first_point`; nothing when they are
-/// not `count` points together, or no parts at all.
-std::optional<std::vector<BatchPart>> parts_of(const protocol::Batch& message);
+/// The ranges of a message; nothing unless each has points, all of a study of `study_points`, and
+/// together not more.
+std::optional<std::vector<Batch::Range>> ranges_of(const protocol::Batch& message,
+                                                   std::uint64_t study_points);
 
-/// How many points of a batch are to be solved. Where there is a filter so many numbers are looked
-/// at, which is more than a server puts into a batch.
+/// How many points of a batch are to be solved. With a filter each point is looked at, which is
+/// cheap in a batch of usual size.
 std::uint64_t points_to_solve(const Batch& batch);
 
 /// Points of one batch that were solved since the last report of it.

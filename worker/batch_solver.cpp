@@ -27,7 +27,7 @@ BatchSolver::~BatchSolver() {
 
 void BatchSolver::add(Batch batch) {
   const std::lock_guard lock(mutex_);
-  open_.emplace_back().batch = std::move(batch);
+  open_.emplace_back(std::move(batch));
   changed_.notify_all();
 }
 
@@ -36,7 +36,7 @@ void BatchSolver::drop_study(std::uint64_t study_id) {
   std::erase_if(progress_, [&](const auto& entry) { return entry.second.study_id == study_id; });
   for (auto batch = open_.begin(); batch != open_.end();) {
     const auto dropped = batch++;
-    if (dropped->batch.study_id == study_id) {
+    if (dropped->batch.study_id() == study_id) {
       dropped->unwanted = true;
       drop(dropped);
     }
@@ -47,7 +47,7 @@ void BatchSolver::drop_study(std::uint64_t study_id) {
 void BatchSolver::drop_batch(std::uint64_t number) {
   const std::lock_guard lock(mutex_);
   const auto found = std::find_if(open_.begin(), open_.end(), [&](const OpenBatch& batch) {
-    return batch.batch.number == number;
+    return batch.batch.number() == number;
   });
   if (found != open_.end()) {
     drop(found);
@@ -95,7 +95,8 @@ std::vector<Progress> BatchSolver::collect() {
 }
 
 Progress& BatchSolver::progress_of(const Batch& batch) {
-  return progress_.try_emplace(batch.number, Progress{batch.number, batch.study_id, {}, 0.0, false})
+  return progress_
+      .try_emplace(batch.number(), Progress{batch.number(), batch.study_id(), {}, 0.0, false})
       .first->second;
 }
 
@@ -103,8 +104,8 @@ Progress& BatchSolver::progress_of(const Batch& batch) {
 BatchSolver::OpenBatches::iterator BatchSolver::next_batch() {
   auto next = open_.end();
   for (auto batch = open_.begin(); batch != open_.end(); ++batch) {
-    const bool has_points = !batch->dropped && batch->given < batch->batch.count;
-    if (has_points && (next == open_.end() || batch->batch.priority > next->batch.priority)) {
+    const bool has_points = !batch->dropped && batch->given < batch->batch.size();
+    if (has_points && (next == open_.end() || batch->batch.priority() > next->batch.priority())) {
       next = batch;
     }
   }
@@ -116,7 +117,7 @@ void BatchSolver::work(const std::stop_token& stop) {
   while (changed_.wait(lock, stop, [this] { return !paused_ && next_batch() != open_.end(); })) {
     Task task{next_batch(), 0, 0, {}, Clock::now()};
     ++task.batch->solvers;
-    const Batch batch = task.batch->batch;
+    const Batch& batch = task.batch->batch;  // stays while a thread is at work on it
     lock.unlock();
     solve_(
         batch, [&] { return next_point(task, stop); },
@@ -127,12 +128,14 @@ void BatchSolver::work(const std::stop_token& stop) {
     if (--done.solvers > 0) {
       continue;
     }
-    const bool ended = !done.dropped && done.given == batch.count;
+    const bool ended = !done.dropped && done.given == batch.size();
+    if (ended) {
+      progress_of(batch).batch_done = true;
+    }
     if (done.dropped || ended) {
       open_.erase(task.batch);
     }
     if (ended) {
-      progress_of(batch).batch_done = true;
       lock.unlock();
       batch_ended_();
       lock.lock();
@@ -163,12 +166,12 @@ bool BatchSolver::take_more(Task& task, const std::stop_token& stop) {
     changed_.wait(lock, stop, [&] { return !paused_ || open.dropped; });
     task.busy_since = Clock::now();
   }
-  const std::uint64_t left = open.batch.count - open.given;
+  const std::uint64_t left = open.batch.size() - open.given;
   if (open.dropped || stop.stop_requested() || left == 0 || next_batch() != task.batch) {
     return false;
   }
   const std::uint64_t count = solver::points_of_task(left, thread_count_);
-  task.next = open.batch.first_point + open.given;
+  task.next = open.given;
   task.end = task.next + count;
   open.given += count;
   return true;

@@ -25,7 +25,7 @@ namespace oblique::worker {
 /// back to it.
 class BatchSolver {
  public:
-  /// Gives the next point to solve; nothing when there is none.
+  /// Gives the position in the batch of the next point to solve; nothing when there is none.
   using NextPoint = std::function<std::optional<std::uint64_t>()>;
   using TakeResult = std::function<void(protocol::PointResult&&)>;
   /// Solves the points of a batch that the second gives, some of them at a time, and hands each
@@ -69,8 +69,10 @@ class BatchSolver {
   static constexpr std::chrono::milliseconds kLongestWait{20};
 
   struct OpenBatch {
-    Batch batch;
-    std::uint64_t given = 0;  ///< points that a thread took
+    explicit OpenBatch(Batch&& opened) : batch(std::move(opened)) {}
+
+    const Batch batch;
+    std::uint64_t given = 0;  ///< positions that a thread took
     std::size_t solvers = 0;  ///< threads at work on it
     /// No further point is begun; set under the lock, read before each point without it.
     std::atomic<bool> dropped = false;
@@ -80,8 +82,8 @@ class BatchSolver {
   /// The part of a batch that one thread solves at a time, and then the next.
   struct Task {
     OpenBatches::iterator batch;
-    std::uint64_t next = 0;                      ///< point
-    std::uint64_t end = 0;                       ///< past the last point
+    std::uint64_t next = 0;                      ///< position
+    std::uint64_t end = 0;                       ///< past the last position
     std::vector<protocol::PointResult> results;  ///< not handed on yet
     Clock::time_point busy_since;                ///< work before this is handed on
   };

@@ -271,19 +271,16 @@ void Conversation::on(const protocol::Batch& batch) {
     return;
   }
   const auto study = studies_.find(batch.study_id());
-  auto parts = parts_of(batch);
-  const bool is_sound = parts && study != studies_.end() && batch.count() > 0 &&
-                        batch.first_point() < study->second->size() &&
-                        batch.count() <= study->second->size() - batch.first_point();
-  if (!is_sound) {
+  const auto ranges =
+      study == studies_.end() ? std::nullopt : ranges_of(batch, study->second->size());
+  if (!ranges) {
     connect_after_backoff("a batch of points that no known study has");
     return;
   }
   backoff_ms_ = 0;
-  const Batch taken{next_batch_++, batch.study_id(),  batch.first_point(), batch.count(),
-                    study->second, std::move(*parts), batch.priority()};
+  const Batch taken(next_batch_++, batch.study_id(), *ranges, study->second, batch.priority());
   const std::uint64_t points = points_to_solve(taken);
-  held_[taken.number] = {batch.study_id(), batch.lease_id(), batch.attempt(), points};
+  held_[taken.number()] = {batch.study_id(), batch.lease_id(), batch.attempt(), points};
   leaving_.note_work(now_ms_);
   leaving_.note_batch({batch.study_id(), points});
   effects_.emplace_back(Solve{taken});

@@ -28,8 +28,10 @@
 #include "proto/program/stop_signals.h"
 #include "proto/program/until.h"
 #include "proto/program/usage.h"
+#include "proto/system/limits_of_group.h"
 #include "worker/point_solver.h"
 #include "worker/session.h"
+#include "worker/solver/model/fall_model.h"
 #include "worker/solver/solve.h"
 
 namespace {
@@ -106,7 +108,8 @@ std::string objection_to_end(const std::string& until, std::int64_t farewell_ms)
                            until, farewell_ms / kSecond_ms);
 }
 
-int run_worker(SessionSettings settings, const StopWithParent& parent) {
+int run_worker(SessionSettings settings, std::uint64_t fall_memory_bytes,
+               const StopWithParent& parent) {
   oblique::protocol::Notifier notifier;
   oblique::protocol::StopSignals stop;  // before any thread starts
   oblique::protocol::survive_failed_writes();
@@ -114,7 +117,11 @@ int run_worker(SessionSettings settings, const StopWithParent& parent) {
     spdlog::warn("the parent process was gone before this one began");
     return oblique::protocol::kDone;
   }
-  oblique::worker::PointSolver points(settings.threads);
+  if (fall_memory_bytes == 0) {
+    fall_memory_bytes =
+        oblique::protocol::available_memory_bytes() / oblique::solver::kFallsPartOfMemory;
+  }
+  oblique::worker::PointSolver points(fall_memory_bytes);
   const oblique::worker::Session* running = nullptr;
   settings.on_turn = [&] {
     notifier.status(running->status());
@@ -145,7 +152,8 @@ int run_worker(SessionSettings settings, const StopWithParent& parent) {
 }
 
 void add_options(CLI::App& app, Configuration& configuration, StopWithParent& parent,
-                 SessionSettings& settings, Ending& ending, std::string& keys) {
+                 SessionSettings& settings, std::uint64_t& fall_memory_bytes, Ending& ending,
+                 std::string& keys) {
   app.set_version_flag("--version", "oblique-worker " + oblique::protocol::version_and_commit());
   app.add_option("--server", settings.server, "Where the server awaits workers")
       ->type_name("URL")
@@ -160,6 +168,12 @@ void add_options(CLI::App& app, Configuration& configuration, StopWithParent& pa
                  "Points solved at a time, each thread on a core; the default is all cores here")
       ->capture_default_str()
       ->check(CLI::Range(std::size_t{1}, kMostThreads));
+  app.add_option(
+         "--fall-memory", fall_memory_bytes,
+         "Memory for solved falls, as 2GB: points that share a fall need not solve it again; "
+         "the default is an eighth of the free memory, or of the container's limit")
+      ->type_name("SIZE")
+      ->transform(CLI::AsSizeValue(false));
   app.add_option("--until", ending.until,
                  "Be gone by then: a time, as 2026-11-22T05:00:00Z (without a zone it is local), "
                  "or a duration from now, as 90m")
@@ -190,7 +204,8 @@ int run_program(int argc, char** argv, LogSettings& log) {
       {"OBLIQUE_WORKER_", oblique::protocol::default_configuration_file("worker.toml"), {"log"}});
   StopWithParent parent;
   Ending ending;
-  add_options(app, configuration, parent, settings, ending, keys);
+  std::uint64_t fall_memory_bytes = 0;
+  add_options(app, configuration, parent, settings, fall_memory_bytes, ending, keys);
   add_log_flags(app, configuration, log);
   oblique::protocol::answer_shell(app, argc, argv);
   if (const auto exit_code = configuration.parse(argc, argv)) {
@@ -215,7 +230,7 @@ int run_program(int argc, char** argv, LogSettings& log) {
     if (!keys.empty()) {
       settings.key = oblique::protocol::read_key_file(keys);
     }
-    return run_worker(settings, parent);
+    return run_worker(settings, fall_memory_bytes, parent);
   } catch (const oblique::solver::InputError& error) {
     return oblique::protocol::tell_wrong_usage(app.get_name(), error.what());
   }

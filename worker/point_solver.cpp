@@ -27,34 +27,33 @@ class BatchPoints : public solver::PointSource {
   BatchPoints(const Batch& batch, const BatchSolver::NextPoint& next)
       : batch_(batch), next_(next) {}
 
-  std::optional<std::uint64_t> next() override { return next_(); }
+  std::optional<std::uint64_t> next() override {
+    const auto position = next_();
+    position_ = position.value_or(position_);
+    return position ? std::optional(batch_.point_at(*position)) : std::nullopt;
+  }
 
   solver::ModelPoint point(std::uint64_t number) override {
-    if (const std::string fault = batch_.points->fault(number); !fault.empty()) {
+    if (const std::string fault = batch_.points().fault(number); !fault.empty()) {
       throw solver::InputError(fault);
     }
-    const protocol::Point point = batch_.points->point(number);
+    const protocol::Point point = batch_.points().point(number);
     return {point.model, point.H_m, point.mu, point.e_star};
   }
 
   solver::ModelParameters model(std::uint64_t number) override {
-    return batch_.points->model(number);
+    return batch_.points().model(number);
   }
 
-  std::vector<solver::ModelParameters> models_ahead(std::uint64_t point) override {
+  std::vector<solver::ModelParameters> models_ahead() override {
     std::vector<solver::ModelParameters> models;
-    const std::uint64_t end = batch_.first_point + batch_.count;
-    for (int run = 0; run < solver::kRunsAhead && models.size() < solver::kFallsAhead; ++run) {
-      const protocol::Segment segment = batch_.points->segment_at(point);
-      solver::add_ahead(models, batch_.points->model(segment.model));
-      const std::uint64_t segment_end = segment.first_point + segment.count;
-      if (segment_end >= end) {
-        break;
-      }
-      point = batch_.first_to_solve(segment_end, end);
-      if (point == end) {
-        break;
-      }
+    std::uint64_t at = position_;
+    for (int run = 0;
+         run < solver::kRunsAhead && models.size() < solver::kFallsAhead && at < batch_.size();
+         ++run) {
+      const protocol::Segment segment = batch_.points().segment_at(batch_.point_at(at));
+      solver::add_ahead(models, batch_.points().model(segment.model));
+      at = batch_.first_to_solve(batch_.end_of_model(at), batch_.size());
     }
     return models;
   }
@@ -62,18 +61,16 @@ class BatchPoints : public solver::PointSource {
  private:
   const Batch& batch_;
   const BatchSolver::NextPoint& next_;
+  std::uint64_t position_ = 0;  ///< of the point given last
 };
 
 }  // namespace
-
-PointSolver::PointSolver(std::size_t threads)
-    : falls_({.bytes = solver::bytes_of_falls(threads)}) {}
 
 void PointSolver::solve(const Batch& batch, const BatchSolver::NextPoint& next,
                         const BatchSolver::TakeResult& take) {
   BatchPoints points(batch, next);
   solver::solve_points_of_models(
-      points, falls_, batch.points->wants_errors(),
+      points, falls_, batch.points().wants_errors(),
       [&take](solver::PointOutcome&& outcome) { take(message_of(outcome)); });
 }
 

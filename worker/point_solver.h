@@ -12,8 +12,8 @@ namespace oblique::worker {
 /// Solves points of batches. May be used from several threads.
 class PointSolver {
  public:
-  /// Keeps falls for so many threads.
-  explicit PointSolver(std::size_t threads);
+  /// Keeps falls in at most so much memory.
+  explicit PointSolver(std::size_t fall_bytes) : falls_({.bytes = fall_bytes}) {}
   explicit PointSolver(const solver::FallCache::Bounds& bounds,
                        const solver::FallCache::Solve& solve)
       : falls_(bounds, solve) {}

@@ -18,9 +18,11 @@
 #include "client/python/interruptible.h"
 #include "client/python/result_arrays.h"
 #include "proto/program/origin/origin.h"
+#include "proto/system/limits_of_group.h"
 #include "worker/solver/library/falls_kept.h"
 #include "worker/solver/library/point_runs.h"
 #include "worker/solver/library/solver.h"
+#include "worker/solver/model/fall_model.h"
 #include "worker/solver/model/result_fields.h"
 #include "worker/solver/model/trace_columns.h"
 
@@ -202,9 +204,8 @@ py::list fields() {
 
 void add_solving(py::module_& module) {
   py::class_<Falls>(module, "Falls")
-      .def(py::init([] {
-        return Falls(solver::bytes_of_falls(std::max(1U, std::thread::hardware_concurrency())));
-      }))
+      .def(py::init(
+          [] { return Falls(protocol::available_memory_bytes() / solver::kFallsPartOfMemory); }))
       .def("is_at_rest", [](const Falls& falls) { return falls.cache()->falls.is_at_rest(); });
   module.def("solve", &solve, py::arg("falls"), py::arg("keys"), py::arg("errors"));
   module.def("trace", &trace, py::arg("falls"), py::arg("keys"), py::arg("fall"), py::arg("shape"));

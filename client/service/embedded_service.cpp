@@ -16,6 +16,8 @@
 #include <nlohmann/json.hpp>
 
 #include "client/service/connection.h"
+#include "proto/system/limits_of_group.h"
+#include "worker/solver/model/fall_model.h"
 
 namespace oblique::client {
 namespace {
@@ -114,6 +116,12 @@ class ReadyLines {
   bool has_told_ = false;
 };
 
+/// Memory for falls of each worker, so that all together take an eighth of what is free.
+std::uint64_t fall_memory_each(int workers) {
+  return protocol::available_memory_bytes() /
+         (solver::kFallsPartOfMemory * static_cast<std::uint64_t>(workers));
+}
+
 /// Threads of each worker, so that all together use the cores of this machine.
 unsigned threads_each(int workers) {
   return std::max(1U, std::thread::hardware_concurrency() / static_cast<unsigned>(workers));
@@ -141,7 +149,10 @@ EmbeddedService::EmbeddedService(const ServiceSettings& settings, protocol::Stop
                       .arguments = {"--no-config", "--server", worker_url_, "--keys",
                                     keys_.file_of(protocol::Role::kWorker), "--stop-with-parent",
                                     std::to_string(getpid()), "--threads",
-                                    std::to_string(threads_each(settings.workers))},
+                                    std::to_string(threads_each(settings.workers)), "--fall-memory",
+                                    std::to_string(settings.fall_memory_bytes != 0
+                                                       ? settings.fall_memory_bytes
+                                                       : fall_memory_each(settings.workers))},
                       .show_errors = settings.verbose}));
   }
 }

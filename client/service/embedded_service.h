@@ -16,10 +16,11 @@ namespace oblique::client {
 /// A server and workers on this machine, for as long as this object lives.
 struct ServiceSettings {
   std::filesystem::path database;
-  int workers = 1;                  ///< processes, which share the cores
-  bool allow_network_disk = false;  ///< the database may lie on a network file system
-  std::string http = "off";         ///< where its page is: ADDRESS:PORT
-  bool verbose = false;             ///< what server and workers say goes to our standard error
+  int workers = 1;                      ///< processes, which share the cores
+  bool allow_network_disk = false;      ///< the database may lie on a network file system
+  std::string http = "off";             ///< where its page is: ADDRESS:PORT
+  std::uint64_t fall_memory_bytes = 0;  ///< of all workers; 0: an eighth of what is free
+  bool verbose = false;                 ///< what server and workers say goes to our standard error
   /// Told what the server is at while its start takes long.
   std::function<void(const std::string&)> on_long_start = [](const std::string&) {};
 };

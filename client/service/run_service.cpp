@@ -123,6 +123,12 @@ void add_worker_flags(CLI::App& verb, RunSettings& settings) {
                   "worker processes, which share the cores of this machine")
       ->type_name("N")
       ->capture_default_str();
+  verb.add_option(
+          "--fall-memory", settings.service.fall_memory_bytes,
+          "memory of all workers for solved falls, as 2GB; the default is an eighth of what "
+          "is free")
+      ->type_name("SIZE")
+      ->transform(CLI::AsSizeValue(false));
   verb.add_flag("--verbose", settings.service.verbose, "show what server and workers say");
 }
 

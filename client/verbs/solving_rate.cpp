@@ -38,7 +38,7 @@ worker::Batch batch_number(std::uint64_t number,
   const std::uint64_t batches = batches_of(*points);
   const auto batch = static_cast<std::uint64_t>(part * static_cast<double>(batches));
   const std::uint64_t first = std::min(batch, batches - 1) * kTogether;
-  return {number, 0, first, std::min(kTogether, points->size() - first), points};
+  return {number, 0, {{first, std::min(first + kTogether, points->size())}}, points};
 }
 
 /// Falls that are solved already, by model.
@@ -58,7 +58,7 @@ class Sample {
   void solve_one(Clock::time_point end) {
     const auto start = Clock::now();
     const std::uint64_t first = points_->first_left_in(0, points_->size());
-    solve({0, 0, first, 1, points_}, end);
+    solve({0, 0, {{first, first + 1}}, points_}, end);
     rate_.points_s = seconds_since(start) - rate_.falls_s;
   }
 
@@ -110,14 +110,13 @@ class Sample {
 
   void solve(const worker::Batch& batch, Clock::time_point end) {
     constexpr std::uint64_t kFewest = 4;
-    std::uint64_t next = batch.first_point;
+    std::uint64_t next = 0;
     std::uint64_t given = 0;
     solver_.solve(
         batch,
         [&]() -> std::optional<std::uint64_t> {
-          const std::uint64_t past = batch.first_point + batch.count;
-          next = points_->first_left_in(std::min(next, past), past);
-          if (next >= past || (given >= kFewest && Clock::now() >= end)) {
+          next = batch.first_to_solve(next, batch.size());
+          if (next >= batch.size() || (given >= kFewest && Clock::now() >= end)) {
             return std::nullopt;
           }
           ++given;

@@ -18,11 +18,11 @@ class LeaseIndex {
   using LeaseId = std::uint64_t;
 
   void insert(LeaseId lease, const Batch& batch) {
-    by_point_.emplace(batch.first_point, lease);
+    by_point_.emplace(batch.first_place, lease);
     longest_ = std::max(longest_, batch.count);
   }
   void erase(LeaseId lease, const Batch& batch) {
-    by_point_.erase({batch.first_point, lease});
+    by_point_.erase({batch.first_place, lease});
     longest_ = by_point_.empty() ? 0 : longest_;
   }
 
@@ -41,7 +41,7 @@ class LeaseIndex {
 
   /// Those that may have points of the batch: all that do, and some others near it.
   std::vector<LeaseId> near(const Batch& batch) const {
-    const std::uint64_t from = batch.first_point - std::min(batch.first_point, longest_);
+    const std::uint64_t from = batch.first_place - std::min(batch.first_place, longest_);
     std::vector<LeaseId> leases;
     for (auto at = by_point_.lower_bound({from, 0});
          at != by_point_.end() && at->first < batch.end(); ++at) {

@@ -69,7 +69,7 @@ void Scheduler::on(const StudyCancelled& event) {
   }
   found->second.cancelled = true;
   end_all_leases(event.study);
-  found->second.points.rest();
+  found->second.points.rest(false);
   requeue(event.study);
   withdraw(event.study);
 }
@@ -218,7 +218,7 @@ void Scheduler::finish_if_complete(StudyId id) {
     study.finished = true;
     study.cancelled = false;
     study.paused = false;
-    study.points.rest();
+    study.points.rest(!study.leases.empty());
     effects_.emplace_back(StudyFinished{id});
   }
 }
@@ -291,7 +291,7 @@ WorkerCounts Scheduler::worker(WorkerId id, std::int64_t now_ms) const {
   for (const LeaseId lease_id : worker.leases) {
     const Lease& lease = leases_.at(lease_id);
     const IntervalSet& leased = studies_.at(lease.study).points.leased_set();
-    for (const Interval& interval : leased.within(lease.batch.first_point, lease.batch.end())) {
+    for (const Interval& interval : leased.within(lease.batch.first_place, lease.batch.end())) {
       counts.leased_points += interval.end - interval.begin;
     }
   }

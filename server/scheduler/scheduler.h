@@ -117,10 +117,6 @@ class Scheduler {
   std::uint64_t solved_points(WorkerId worker) const { return workers_.at(worker).solved_points; }
   /// Since its last message. Throws std::out_of_range for an unknown worker.
   std::int64_t silent_ms(WorkerId worker, std::int64_t now_ms) const;
-  /// Which points of the study have a row. Throws std::out_of_range for an unknown study.
-  const IntervalSet& settled(StudyId study) const {
-    return studies_.at(study).points.settled_set();
-  }
 
   /// Throws std::logic_error when the state contradicts itself: a point in two places or in none, a
   /// lease without worker or study, a leased point without lease, two leases of one point where no
@@ -163,7 +159,7 @@ class Scheduler {
     double busy_s = 0.0;  ///< of a thread, for so many points: the last messages, weighted
     double points = 0.0;
     std::uint64_t last_batch_points = 0;  ///< that it was fit for
-    std::uint64_t last_end = 0;           ///< of its last batch; 0: it had none
+    std::uint64_t last_end = 0;           ///< place; 0: it had no batch
     std::uint64_t held_points = 0;        ///< of its leases
 
     double s_per_point() const { return points > 0.0 ? busy_s / points : 0.0; }  ///< 0: unknown

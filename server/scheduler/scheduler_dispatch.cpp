@@ -182,7 +182,7 @@ bool Scheduler::serve_straggler(WorkerId id, Worker& worker) {
   Lease& straggler = longest->second;
   Study& study = studies_.at(straggler.study);
   const auto left =
-      study.points.leased_set().within(straggler.batch.first_point, straggler.batch.end());
+      study.points.leased_set().within(straggler.batch.first_place, straggler.batch.end());
   study.overlaps = true;
   const Batch rest{left.front().begin, left.back().end - left.front().begin,
                    straggler.batch.attempts + 1, straggler.batch.losses, size_of(left)};
@@ -197,7 +197,7 @@ bool Scheduler::is_straggling(const Lease& lease, const Worker& helper) const {
   const std::int64_t age_ms = now_ms_ - lease.granted_ms;
   if (lease.twin != 0 || lease.alone || !lease.batch.losses.empty() ||
       age_ms < settings_.straggler_after_ms || !study.is_open() || !admits(study, helper) ||
-      study.points.leased_set().within(lease.batch.first_point, lease.batch.end()).empty()) {
+      study.points.leased_set().within(lease.batch.first_place, lease.batch.end()).empty()) {
     return false;
   }
   const Worker& holder = workers_.at(lease.worker);
@@ -287,6 +287,7 @@ Portion Scheduler::portion_for(const Worker& worker, StudyId id, bool fills_lane
     wanted.follows = pace.last_end;
   }
   if (fills_lanes) {
+    wanted.falls = studies_.at(id).leases.empty() ? settings_.lanes * worker.threads : 0;
     fill_lanes(wanted, studies_.at(id).points, worker.threads, pace);
   }
   return wanted;
@@ -296,7 +297,7 @@ Portion Scheduler::portion_for(const Worker& worker, StudyId id, bool fills_lane
 void Scheduler::fill_lanes(Portion& wanted, const StudyPoints& points, std::uint32_t threads,
                            const Pace& pace) const {
   const auto lanes = static_cast<double>(settings_.lanes);
-  const bool has_models = points.models() > 1;
+  const bool has_models = points.has_models();
   if (!has_models && pace.s_per_point() * lanes <= target_s()) {
     return;  // of quick points of one model a batch has enough
   }
@@ -320,15 +321,14 @@ void Scheduler::fill_lanes(Portion& wanted, const StudyPoints& points, std::uint
     wanted.most_points =
         in_time < static_cast<double>(most) ? static_cast<std::uint64_t>(in_time) : most;
   }
-  wanted.models = has_models ? settings_.lanes * threads : 1;
+  wanted.groups = has_models && !points.order().is_arranged() ? settings_.lanes * threads : 1;
 }
 
 LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Batch& batch,
                          bool alone) {
   // A study may have grown since the worker was told of it.
-  std::uint64_t& told_points = worker.defined[study];
-  if (told_points < batch.end()) {
-    told_points = studies_.at(study).points.numbers();
+  const std::uint64_t numbers = studies_.at(study).points.numbers();
+  if (std::exchange(worker.defined[study], numbers) != numbers) {
     effects_.emplace_back(DefineStudy{id, study});
   }
   Study& served = studies_.at(study);
@@ -351,10 +351,10 @@ LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Batch
   pace.last_end = batch.end();
   pace.held_points += batch.points;
   requeue(study);
-  SendBatch send{id, study, batch.first_point, batch.count, batch.attempts + 1, lease};
-  send.priority = served.terms.priority;
-  if (batch.points < batch.count) {
-    send.parts = served.points.leased_set().within(batch.first_point, batch.end());
+  SendBatch send{id, study, {}, batch.attempts + 1, lease, served.terms.priority};
+  for (const Interval& places : served.points.leased_set().within(batch.first_place, batch.end())) {
+    const auto points = served.points.order().points(places);
+    send.points.insert(send.points.end(), points.begin(), points.end());
   }
   effects_.emplace_back(std::move(send));
   return lease;

@@ -218,12 +218,13 @@ struct DefineStudy {
 struct SendBatch {
   WorkerId worker;
   StudyId study;
-  std::uint64_t first_point;
-  std::uint64_t count;
+  std::vector<Interval> points;  ///< in the order in which they are to be solved
   std::uint32_t attempt;
   LeaseId lease;
-  std::vector<Interval> parts{};  ///< of these, the points that are to be solved; empty: all
-  std::int32_t priority = 0;      ///< of the study
+  std::int32_t priority = 0;  ///< of the study
+
+  std::uint64_t first_point() const { return points.front().begin; }
+  std::uint64_t count() const { return size_of(points); }
 };
 /// Make these results of the message durable, then say ResultsStored. Sent for every Results
 /// message, even with nothing to keep: the acknowledgement follows all commits before it.

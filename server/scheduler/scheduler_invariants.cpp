@@ -27,17 +27,21 @@ void Scheduler::check_invariants() const {
     require(!lease.alone || worker->second.leases.size() == 1, "a suspect lease is not alone");
     require(lease.batch.points > 0 && lease.batch.points <= lease.batch.count && id < next_lease_,
             "a lease is malformed");
+    // Between the points of a batch, and of one that is answered, there may be settled ones.
     IntervalSet& covered = under_lease[lease.study];
-    require(studies_.at(lease.study).overlaps ||
-                covered.within(lease.batch.first_point, lease.batch.end()).empty(),
-            "two leases hold one point");
+    for (const Interval& held : studies_.at(lease.study)
+                                    .points.leased_set()
+                                    .within(lease.batch.first_place, lease.batch.end())) {
+      require(studies_.at(lease.study).overlaps || covered.within(held.begin, held.end).empty(),
+              "two leases hold one point");
+      covered.insert(held.begin, held.end);
+    }
     require(lease.twin == 0 || (leases_.contains(lease.twin) && leases_.at(lease.twin).twin == id &&
                                 leases_.at(lease.twin).worker != lease.worker),
             "a batch's second lease is not one");
     require(admits(studies_.at(lease.study), worker->second),
             "a worker of another solver version holds a lease");
     ++leases_of[lease.study];
-    covered.insert(lease.batch.first_point, lease.batch.end());
   }
   for (const auto& [id, study] : studies_) {
     study.points.check_invariants();

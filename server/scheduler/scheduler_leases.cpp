@@ -53,7 +53,7 @@ void Scheduler::end_lease(LeaseId id, const std::optional<Loss>& loss) {
 /// Points that are leased by this lease, which has ended, and by no other.
 std::vector<Interval> Scheduler::held_by(const Lease& lease) const {
   const Study& study = studies_.at(lease.study);
-  const auto leased = study.points.leased_set().within(lease.batch.first_point, lease.batch.end());
+  const auto leased = study.points.leased_set().within(lease.batch.first_place, lease.batch.end());
   if (!study.overlaps || leased.empty()) {
     return leased;
   }
@@ -63,14 +63,14 @@ std::vector<Interval> Scheduler::held_by(const Lease& lease) const {
   }
   for (const LeaseId id : study.leases.near(lease.batch)) {
     const Batch& other = leases_.at(id).batch;
-    held.erase(other.first_point, other.end());
+    held.erase(other.first_place, other.end());
   }
-  return held.within(lease.batch.first_point, lease.batch.end());
+  return held.within(lease.batch.first_place, lease.batch.end());
 }
 
 bool Scheduler::has_open_points(const Lease& lease) const {
   const IntervalSet& leased = studies_.at(lease.study).points.leased_set();
-  return !leased.within(lease.batch.first_point, lease.batch.end()).empty();
+  return !leased.within(lease.batch.first_place, lease.batch.end()).empty();
 }
 
 /// A batch whose points were all answered by others is nobody's work any more.

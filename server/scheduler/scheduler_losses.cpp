@@ -38,7 +38,7 @@ std::vector<std::vector<Interval>> split(const std::vector<Interval>& intervals,
 /// The lease ended without an answer to some of its points. It alone held `held` of them.
 void Scheduler::note_loss(const Lease& lease, const std::vector<Interval>& held, Loss loss) {
   StudyPoints& points = studies_.at(lease.study).points;
-  if (points.leased_set().within(lease.batch.first_point, lease.batch.end()).empty()) {
+  if (points.leased_set().within(lease.batch.first_place, lease.batch.end()).empty()) {
     return;
   }
   if (loss.process != kNobody) {
@@ -70,7 +70,8 @@ void Scheduler::note_loss(const Lease& lease, const std::vector<Interval>& held,
     }
   }
   if (standing == Standing::kCondemned) {
-    condemned_.push_back({now_ms_ + settings_.return_within_ms, lease.study, held.front().begin});
+    condemned_.push_back({now_ms_ + settings_.return_within_ms, lease.study,
+                          points.order().point(held.front().begin)});
   }
 }
 
@@ -141,11 +142,14 @@ void Scheduler::note_answers(Worker& worker, const ResultsReceived& event, bool 
   const bool is_probe = event.lease != 0 && event.lease == worker.probe;
   const bool is_its_lease = lease != leases_.end() && worker.leases.contains(event.lease) &&
                             lease->second.study == event.study;
+  const auto is_of_lease = [&](std::uint64_t point) {
+    const std::uint64_t place = studies_.at(event.study).points.order().place(point);
+    const Batch& batch = lease->second.batch;
+    return place >= batch.first_place && place < batch.end();
+  };
   const bool solved =
       std::any_of(event.outcomes.begin(), event.outcomes.end(), [&](const PointOutcome& outcome) {
-        return !outcome.failed &&
-               (is_probe || (is_its_lease && outcome.point >= lease->second.batch.first_point &&
-                             outcome.point < lease->second.batch.end()));
+        return !outcome.failed && (is_probe || (is_its_lease && is_of_lease(outcome.point)));
       });
   if (is_probe) {
     worker.probe = 0;

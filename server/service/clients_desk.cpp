@@ -129,8 +129,7 @@ std::string ClientsDesk::objection_to(const ReadRequest& read) {
     at_.bad_frames.count("a client");
     return "this is the port for clients; workers connect to the other one";
   }
-  if (std::string reason = protocol::objection_to_version(
-          request.protocol_version(), protocol::kOldestClientsVersion, "client");
+  if (std::string reason = protocol::objection_to_version(request.protocol_version(), "client");
       !reason.empty()) {
     return reason;
   }

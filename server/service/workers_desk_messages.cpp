@@ -26,18 +26,14 @@ void WorkersDesk::send(const SendBatch& batch) {
   protocol::ServerToWorker message;
   auto& fields = *message.mutable_batch();
   fields.set_study_id(batch.study);
-  fields.set_first_point(batch.first_point);
-  fields.set_count(batch.count);
   fields.set_attempt(batch.attempt);
   fields.set_lease_id(batch.lease);
   fields.set_priority(batch.priority);
-  std::uint64_t reached = batch.first_point;
-  for (const Interval& part : batch.parts) {
-    if (part.begin > reached) {
-      fields.add_parts(part.begin - reached);
-    }
-    fields.add_parts(part.end - part.begin);
-    reached = part.end;
+  std::uint64_t reached = 0;
+  for (const Interval& range : batch.points) {
+    fields.add_ranges(static_cast<std::int64_t>(range.begin - reached));
+    fields.add_ranges(static_cast<std::int64_t>(range.end - range.begin));
+    reached = range.end;
   }
   send(batch.worker, message, batch.lease);
 }
@@ -47,7 +43,7 @@ void WorkersDesk::send(const SendProbe& probe) {
   definition.mutable_study()->set_study_id(kProbeStudy);
   *definition.mutable_study()->mutable_recipe() = probe_recipe();
   send(probe.worker, definition);
-  send(SendBatch{probe.worker, kProbeStudy, 0, 1, 1, probe.lease});
+  send(SendBatch{probe.worker, kProbeStudy, {{0, 1}}, 1, probe.lease});
 }
 
 void WorkersDesk::send(const AcknowledgeResults& stored) {

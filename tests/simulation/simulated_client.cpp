@@ -15,6 +15,7 @@ using server::StudyState;
 namespace {
 
 /// `points` points, in models of `points_a_model` and, if some are left, one more. H has the mark.
+/// Models have three falls in turn: points that share one lie apart.
 protocol::Recipe recipe_of_models(std::uint64_t points, std::uint64_t points_a_model, double H) {
   using protocol::listed;
   using protocol::range;
@@ -25,8 +26,10 @@ protocol::Recipe recipe_of_models(std::uint64_t points, std::uint64_t points_a_m
   const std::uint64_t rest = points % points_a_model;
   protocol::Recipe recipe;
   if (models > 0) {
-    recipe = protocol::recipe_of({{axis("k", 1e7, 2e7, models), listed("H", {H}),
-                                   axis("mu", 0.5, 1.0, points_a_model), listed("e", {1.0})}});
+    recipe = protocol::recipe_of(
+        {{axis("k", 1e7, 2e7, models),
+          protocol::following("E", "6e10 + 1e9 * (floor(k / 3e5) - 3 * floor(floor(k / 3e5) / 3))"),
+          listed("H", {H}), axis("mu", 0.5, 1.0, points_a_model), listed("e", {1.0})}});
   }
   if (rest > 0) {
     recipe.MergeFrom(

@@ -120,9 +120,9 @@ void SimulatedWorker::apply(worker::Effects effects) {
     } else if (auto* solve = std::get_if<worker::Solve>(&effect)) {
       batches_.push_back({std::move(solve->batch), 0});
     } else if (const auto* drop = std::get_if<worker::DropStudy>(&effect)) {
-      std::erase_if(batches_, [&](const Work& w) { return w.batch.study_id == drop->study_id; });
+      std::erase_if(batches_, [&](const Work& w) { return w.batch.study_id() == drop->study_id; });
     } else if (const auto* batch = std::get_if<worker::DropBatch>(&effect)) {
-      std::erase_if(batches_, [&](const Work& w) { return w.batch.number == batch->number; });
+      std::erase_if(batches_, [&](const Work& w) { return w.batch.number() == batch->number; });
     } else if (std::holds_alternative<worker::DropAll>(effect)) {
       batches_.clear();
     } else if (std::holds_alternative<worker::Finish>(effect)) {
@@ -171,19 +171,19 @@ void SimulatedWorker::plan_solving() {
   });
 }
 
-/// The next point of the batch that its study's filter leaves in, or its end.
-std::uint64_t SimulatedWorker::next_point(const Work& work) {
-  return work.batch.points->first_left_in(work.batch.first_point + work.solved,
-                                          work.batch.first_point + work.batch.count);
+/// The position of the next point that the study's filter leaves in, or the end of the batch.
+std::uint64_t SimulatedWorker::next_position(const Work& work) {
+  return work.batch.first_to_solve(work.solved, work.batch.size());
 }
 
 std::pair<std::uint64_t, std::uint64_t> SimulatedWorker::next_model() const {
   const Work& work = batches_.front();
-  const std::uint64_t point = next_point(work);
-  if (point == work.batch.first_point + work.batch.count) {
+  const std::uint64_t position = next_position(work);
+  if (position == work.batch.size()) {
     return fallen_model_;
   }
-  return {work.batch.study_id, work.batch.points->point(point).model};
+  const std::uint64_t point = work.batch.point_at(position);
+  return {work.batch.study_id(), work.batch.points().point(point).model};
 }
 
 void SimulatedWorker::solve_some() {
@@ -191,12 +191,12 @@ void SimulatedWorker::solve_some() {
     return;
   }
   Work& work = batches_.front();
-  const std::uint64_t end = work.batch.first_point + work.batch.count;
-  const std::uint64_t point = next_point(work);
+  const std::uint64_t position = next_position(work);
   worker::Progress progress{
-      work.batch.number, work.batch.study_id, {}, 1e-3 * static_cast<double>(busy_ms_), false};
-  if (point < end) {
-    const std::uint64_t mark = mark_of(work.batch.points->point(point).H_m);
+      work.batch.number(), work.batch.study_id(), {}, 1e-3 * static_cast<double>(busy_ms_), false};
+  if (position < work.batch.size()) {
+    const std::uint64_t point = work.batch.point_at(position);
+    const std::uint64_t mark = mark_of(work.batch.points().point(point).H_m);
     const auto killers = killers_.find(mark);
     if (killers != killers_.end() && killers->second.contains(point)) {
       ++deaths_;
@@ -204,10 +204,10 @@ void SimulatedWorker::solve_some() {
       return;
     }
     fallen_model_ = next_model();
-    work.solved = point + 1 - work.batch.first_point;
+    work.solved = position + 1;
     progress.results.push_back(answer_to(mark, point));
   }
-  progress.batch_done = next_point(work) == end;
+  progress.batch_done = next_position(work) == work.batch.size();
   if (progress.batch_done) {
     batches_.pop_front();
   }

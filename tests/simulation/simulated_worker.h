@@ -51,7 +51,7 @@ class SimulatedWorker {
  private:
   struct Work {
     worker::Batch batch;
-    std::uint64_t solved;
+    std::uint64_t solved;  ///< positions
   };
   void start();
   /// Runs `what` of this process life now, or when it is no longer frozen.
@@ -60,7 +60,7 @@ class SimulatedWorker {
   void plan_time();
   void plan_solving();
   void solve_some();
-  static std::uint64_t next_point(const Work& work);
+  static std::uint64_t next_position(const Work& work);
   std::pair<std::uint64_t, std::uint64_t> next_model() const;
 
   World& world_;

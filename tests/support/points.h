@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "proto/recipe/point_table.h"
 #include "proto/result_message.h"
@@ -14,6 +15,19 @@ inline std::shared_ptr<const protocol::PointTable> table_of(std::uint64_t points
   return std::make_shared<const protocol::PointTable>(protocol::recipe_of(
       {{protocol::listed("H", {1.0}), protocol::range("mu", 0.0, points == 1 ? 0.0 : 1.0, points),
         protocol::listed("e", {1.0})}}));
+}
+
+/// The points of a batch as a worker gets it, in the order in which they are to be solved.
+inline std::vector<std::uint64_t> points_of(const protocol::Batch& batch) {
+  std::vector<std::uint64_t> points;
+  std::uint64_t reached = 0;
+  for (int i = 0; i + 1 < batch.ranges_size(); i += 2) {
+    reached += static_cast<std::uint64_t>(batch.ranges(i));
+    for (std::int64_t count = batch.ranges(i + 1); count > 0; --count) {
+      points.push_back(reached++);
+    }
+  }
+  return points;
 }
 
 /// A solved point with made-up outputs that do not repeat and that no short decimal equals.

@@ -22,17 +22,17 @@ namespace {
 
 /// Of a study in which nothing is left out.
 Batch batch(std::uint64_t number, std::uint64_t first, std::uint64_t count,
-            std::uint64_t study_id = 7) {
-  return {number, study_id, first, count, server::table_of(1'000'000'000)};
+            std::uint64_t study_id = 7, std::int32_t priority = 0) {
+  return {number, study_id, {{first, first + count}}, server::table_of(1'000'000'000), priority};
 }
 
 /// Of a study of a thousand points with mu from 0 to 999.
-Batch filtered_batch(std::uint64_t first, std::uint64_t count, const std::string& where) {
+Batch filtered_batch(const std::vector<Batch::Range>& ranges, const std::string& where) {
   const auto points = std::make_shared<const protocol::PointTable>(protocol::recipe_of_blocks(
       {protocol::filtered({protocol::listed("H", {1.0}), protocol::range("mu", 0.0, 999.0, 1000),
                            protocol::listed("e", {1.0})},
                           where)}));
-  return {1, 7, first, count, points};
+  return {1, 7, ranges, points};
 }
 
 /// What was solved of the one batch of which there is progress, and which has ended.
@@ -94,10 +94,10 @@ class BatchSolverTest : public ::testing::Test {
   std::mutex mutex_;
   std::condition_variable changed_;
   int batches_ended_ = 0;
-  BatchSolver solver_{[this](const Batch&, const auto& next, const auto& take) {
+  BatchSolver solver_{[this](const Batch& of, const auto& next, const auto& take) {
                         while (const auto point = next()) {
                           gate_.pass();
-                          take(protocol::failed_point(*point, "for the test"));
+                          take(protocol::failed_point(of.point_at(*point), "for the test"));
                         }
                       },
                       [this] {
@@ -125,9 +125,7 @@ TEST_F(BatchSolverTest, BatchesAreSolvedPointByPointInTheOrderTheyWereAdded) {
 TEST_F(BatchSolverTest, ABatchOfAHigherPriorityComesBeforeWhatIsLeftOfOneThatWasBegun) {
   solver_.add(batch(1, 0, 1000));
   gate_.wait_begun(1);
-  Batch urgent = batch(2, 0, 3, 8);
-  urgent.priority = 1;
-  solver_.add(urgent);
+  solver_.add(batch(2, 0, 3, 8, 1));
   const int of_a_task = static_cast<int>(solver::points_of_task(1000, 1));
   gate_.open(of_a_task + 3);
   wait_batches_ended(1);
@@ -143,16 +141,16 @@ TEST_F(BatchSolverTest, ABatchOfAHigherPriorityComesBeforeWhatIsLeftOfOneThatWas
 
 TEST_F(BatchSolverTest, PointsThatAFilterLeavesOutArePassedOver) {
   gate_.open(1000);
-  solver_.add(filtered_batch(100, 300, "floor(mu / 10) == mu / 10 && mu < 200"));
+  solver_.add(filtered_batch({{100, 400}}, "floor(mu / 10) == mu / 10 && mu < 200"));
   wait_batches_ended(1);
   EXPECT_EQ(points_of_one_batch(solver_.collect()),
             (std::set<std::uint64_t>{100, 110, 120, 130, 140, 150, 160, 170, 180, 190}));
 }
 
-TEST_F(BatchSolverTest, OnlyTheWantedPartsOfABatchAreSolvedAndOfTheseWhatAFilterLeavesIn) {
+TEST_F(BatchSolverTest, OfTheRangesOfABatchThatIsSolvedWhichAFilterLeavesIn) {
   gate_.open(1000);
-  Batch scattered = filtered_batch(100, 300, "floor(mu / 10) == mu / 10");
-  scattered.parts = {{100, 101}, {105, 131}, {339, 400}};
+  const Batch scattered =
+      filtered_batch({{339, 400}, {100, 101}, {105, 131}}, "floor(mu / 10) == mu / 10");
   EXPECT_EQ(points_to_solve(scattered), 10U);
   solver_.add(scattered);
   wait_batches_ended(1);
@@ -160,8 +158,19 @@ TEST_F(BatchSolverTest, OnlyTheWantedPartsOfABatchAreSolvedAndOfTheseWhatAFilter
             (std::set<std::uint64_t>{100, 110, 120, 130, 340, 350, 360, 370, 380, 390}));
 }
 
+TEST_F(BatchSolverTest, RangesAreSolvedInTheOrderInWhichTheyAreGiven) {
+  gate_.open(1000);
+  solver_.add({1, 7, {{30, 32}, {7, 8}, {10, 12}}, server::table_of(100)});
+  wait_batches_ended(1);
+  std::vector<std::uint64_t> solved;
+  for (const auto& result : solver_.collect().at(0).results) {
+    solved.push_back(result.point());
+  }
+  EXPECT_EQ(solved, (std::vector<std::uint64_t>{30, 31, 7, 10, 11}));
+}
+
 TEST_F(BatchSolverTest, ABatchOfWhichNothingIsLeftInEndsWithoutAResult) {
-  solver_.add(filtered_batch(0, 500, "mu > 900"));
+  solver_.add(filtered_batch({{0, 500}}, "mu > 900"));
   wait_batches_ended(1);
   const auto progress = solver_.collect();
   ASSERT_EQ(progress.size(), 1U);
@@ -255,10 +264,10 @@ TEST_F(BatchSolverTest, APausedSolverThatIsEndedBeginsNoPoint) {
   std::atomic<int> begun{0};
   {
     BatchSolver paused(
-        [&begun](const Batch&, const auto& next, const auto& take) {
+        [&begun](const Batch& of, const auto& next, const auto& take) {
           while (const auto point = next()) {
             ++begun;
-            take(protocol::failed_point(*point, "for the test"));
+            take(protocol::failed_point(of.point_at(*point), "for the test"));
           }
         },
         [] {});
@@ -270,10 +279,10 @@ TEST_F(BatchSolverTest, APausedSolverThatIsEndedBeginsNoPoint) {
 
 TEST_F(BatchSolverTest, SeveralThreadsShareABatch) {
   BatchSolver shared(
-      [this](const Batch&, const auto& next, const auto& take) {
+      [this](const Batch& of, const auto& next, const auto& take) {
         while (const auto point = next()) {
           gate_.pass();
-          take(protocol::failed_point(*point, "for the test"));
+          take(protocol::failed_point(of.point_at(*point), "for the test"));
         }
       },
       [] {}, 3);
@@ -298,17 +307,17 @@ TEST_F(BatchSolverTest, AThreadThatIsFreePassesOverADroppedBatchThatAnotherStill
   std::atomic<bool> next_is_solved{false};
   BatchSolver shared(
       [&](const Batch& at_hand, const auto& next, const auto& take) {
-        if (at_hand.number == 1 && ++taken_up > 2) {
+        if (at_hand.number() == 1 && ++taken_up > 2) {
           ADD_FAILURE() << "a dropped batch is taken up";
           std::abort();  // and would be without end
         }
         while (const auto point = next()) {
-          if (at_hand.number == 1) {
+          if (at_hand.number() == 1) {
             dropped_batch.pass();
           }
-          take(protocol::failed_point(*point, "for the test"));
+          take(protocol::failed_point(at_hand.point_at(*point), "for the test"));
         }
-        if (at_hand.number == 2) {
+        if (at_hand.number() == 2) {
           next_is_solved = true;
           next_is_solved.notify_all();
         }
@@ -329,9 +338,9 @@ TEST(BatchSolver, EveryPointOfManyBatchesIsSolvedOnceHoweverManyThreads) {
   std::condition_variable changed;
   std::uint64_t ended = 0;
   BatchSolver solver(
-      [](const Batch&, const auto& next, const auto& take) {
+      [](const Batch& of, const auto& next, const auto& take) {
         while (const auto point = next()) {
-          take(protocol::failed_point(*point, "for the test"));
+          take(protocol::failed_point(of.point_at(*point), "for the test"));
         }
       },
       [&] {

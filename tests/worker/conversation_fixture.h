@@ -57,8 +57,8 @@ inline protocol::ServerToWorker batch_message(std::uint64_t study_id, std::uint6
   protocol::Batch& batch = *message.mutable_batch();
   batch.set_study_id(study_id);
   batch.set_lease_id(lease_id);
-  batch.set_first_point(first_point);
-  batch.set_count(count);
+  batch.add_ranges(static_cast<std::int64_t>(first_point));
+  batch.add_ranges(static_cast<std::int64_t>(count));
   batch.set_attempt(1);
   return message;
 }

@@ -27,11 +27,11 @@ TEST_F(ConversationTest, ABatchIsSolvedWithTheRecipeOfItsStudy) {
   receive(message);
   const auto solves = effects_of<Solve>();
   ASSERT_EQ(solves.size(), 1U);
-  EXPECT_EQ(solves[0].batch.priority, -3);
-  EXPECT_EQ(solves[0].batch.study_id, 7U);
-  EXPECT_EQ(solves[0].batch.first_point, 90U);
-  EXPECT_EQ(solves[0].batch.count, 10U);
-  EXPECT_EQ(solves[0].batch.points->size(), 100U);
+  EXPECT_EQ(solves[0].batch.priority(), -3);
+  EXPECT_EQ(solves[0].batch.study_id(), 7U);
+  EXPECT_EQ(solves[0].batch.point_at(0), 90U);
+  EXPECT_EQ(solves[0].batch.size(), 10U);
+  EXPECT_EQ(solves[0].batch.points().size(), 100U);
 }
 
 TEST_F(ConversationTest, CreditIsGivenAgainForEachBatchSolvedAndNeverForMoreThanTwo) {
@@ -216,32 +216,33 @@ TEST_F(ConversationTest, ABatchBeyondItsStudyBeginsTheConversationAnew) {
   }
 }
 
-TEST_F(ConversationTest, OnlyThePartsOfABatchThatAreWantedAreSolved) {
+TEST_F(ConversationTest, ABatchMayBeSeveralRangesInAnyOrder) {
   join();
   auto message = batch_message(7, 31, 20, 10);
-  for (const std::uint64_t points : {1U, 3U, 2U, 1U, 3U}) {
-    message.mutable_batch()->add_parts(points);
+  for (const std::int64_t number : {-25, 2, 90, 3}) {  // 5 and 6, 97 to 99
+    message.mutable_batch()->add_ranges(number);
   }
   receive(message);
   const auto solve = effects_of<Solve>();
   ASSERT_EQ(solve.size(), 1U);
-  ASSERT_EQ(solve[0].batch.parts.size(), 3U);
-  EXPECT_EQ(solve[0].batch.parts[1].begin, 24U);
-  EXPECT_EQ(solve[0].batch.parts[1].end, 26U);
-  EXPECT_EQ(solve[0].batch.parts[2].end, 30U);
-  EXPECT_EQ(points_to_solve(solve[0].batch), 6U);
+  const Batch& batch = solve[0].batch;
+  EXPECT_EQ(batch.size(), 15U);
+  EXPECT_EQ(batch.point_at(9), 29U);
+  EXPECT_EQ(batch.point_at(10), 5U);
+  EXPECT_EQ(batch.point_at(12), 97U);
+  EXPECT_EQ(batch.point_at(14), 99U);
 }
 
-TEST_F(ConversationTest, ABatchWhosePartsAreNotItsPointsBeginsTheConversationAnew) {
-  const auto max = std::numeric_limits<std::uint64_t>::max();
-  for (const std::vector<std::uint64_t>& parts : std::vector<std::vector<std::uint64_t>>{
-           {9}, {11}, {4, 6}, {0, 10}, {10, 0, 1}, {3, 3, 5}, {1, max, 10}}) {
+TEST_F(ConversationTest, ABatchWhoseRangesAreNoneOfItsStudyBeginsTheConversationAnew) {
+  const auto max = std::numeric_limits<std::int64_t>::max();
+  for (const std::vector<std::int64_t>& ranges : std::vector<std::vector<std::int64_t>>{
+           {0}, {-31, 2}, {0, 0}, {0, -1}, {60, 11}, {max, 2}, {-30, 90, 0, 10}, {0, 5, 0}}) {
     use(ConversationSettings{});
     join();
     receive(heartbeat_reply_message());
     auto message = batch_message(7, 31, 20, 10);
-    for (const std::uint64_t points : parts) {
-      message.mutable_batch()->add_parts(points);
+    for (const std::int64_t number : ranges) {
+      message.mutable_batch()->add_ranges(number);
     }
     receive(message);
     EXPECT_FALSE(has<Solve>());

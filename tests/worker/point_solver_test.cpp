@@ -23,19 +23,21 @@
 namespace oblique::worker {
 namespace {
 
+constexpr std::size_t kFallBytes = std::size_t{1} << 30U;
+
 Batch batch_of(const protocol::Recipe& recipe) {
   const auto points = std::make_shared<const protocol::PointTable>(recipe);
-  return {1, 7, 0, points->size(), points};
+  return {1, 7, {{0, points->size()}}, points};
 }
 
 /// Solves all points of a batch on so many threads; the results in the order of the points.
 std::vector<protocol::PointResult> solved(const Batch& batch, PointSolver& solver,
                                           std::size_t threads = 1) {
-  std::vector<protocol::PointResult> results(batch.count);
+  std::vector<protocol::PointResult> results(batch.size());
   std::atomic<std::uint64_t> given = 0;
   const auto next = [&]() -> std::optional<std::uint64_t> {
     const std::uint64_t index = given++;
-    return index < batch.count ? std::optional(batch.first_point + index) : std::nullopt;
+    return index < batch.size() ? std::optional(index) : std::nullopt;
   };
   const auto take = [&](protocol::PointResult&& result) {
     const std::uint64_t point = result.point();
@@ -51,7 +53,7 @@ std::vector<protocol::PointResult> solved(const Batch& batch, PointSolver& solve
 }
 
 std::vector<protocol::PointResult> solved(const Batch& batch) {
-  PointSolver solver(1);
+  PointSolver solver(kFallBytes);
   return solved(batch, solver);
 }
 
@@ -104,8 +106,8 @@ TEST(PointSolverTest, EveryPointGivesWhatTheFingerGivesForItAlone) {
   const Batch batch = batch_of(recipe_with_points(12));
   const auto results = solved(batch);
   const solver::Finger finger({});
-  for (std::uint64_t i = 0; i < batch.count; ++i) {
-    const protocol::Point point = batch.points->point(i);
+  for (std::uint64_t i = 0; i < batch.size(); ++i) {
+    const protocol::Point point = batch.points().point(i);
     const solver::CaseResult expected = finger.solve(point.H_m, point.mu, point.e_star);
     EXPECT_EQ(results[i].error(), "");
     EXPECT_EQ(results[i].point(), i);
@@ -149,7 +151,7 @@ TEST(PointSolverTest, AModelThatMakesNoFingerFailsEachPointWithTheReason) {
 
 TEST(PointSolverTest, PointsOfManyModelsGiveWhatTheirFingersGiveForThemAlone) {
   const Batch batch = batch_of(recipe_with_models(3, {6e10, 7e10, 8e10}, {2e7, 3e7}));
-  ASSERT_EQ(batch.count, 18U);
+  ASSERT_EQ(batch.size(), 18U);
   CountedFalls falls;
   PointSolver one({}, falls.solve);
   PointSolver several({}, falls.solve);
@@ -157,10 +159,10 @@ TEST(PointSolverTest, PointsOfManyModelsGiveWhatTheirFingersGiveForThemAlone) {
   EXPECT_EQ(falls.count(), 3U) << "k does not enter the fall";
   const auto by_threads = solved(batch, several, 3);
   EXPECT_EQ(falls.count(), 6U) << "threads do not solve each other's falls again";
-  for (std::uint64_t i = 0; i < batch.count; ++i) {
-    const protocol::Point point = batch.points->point(i);
+  for (std::uint64_t i = 0; i < batch.size(); ++i) {
+    const protocol::Point point = batch.points().point(i);
     const solver::CaseResult expected =
-        solver::Finger(batch.points->model(point.model)).solve(point.H_m, point.mu, point.e_star);
+        solver::Finger(batch.points().model(point.model)).solve(point.H_m, point.mu, point.e_star);
     for (const auto* result : {&results[i], &by_threads[i]}) {
       EXPECT_EQ(result->error(), "");
       const auto outputs = protocol::from_message(*result);
@@ -195,7 +197,7 @@ TEST(PointSolverTest, AFallThatFailsIsSolvedOnceAndFailsThePointsOfItsModelsAlon
     const auto results = solved(batch, solver);
     for (const auto& result : results) {
       const bool fails =
-          batch.points->model(batch.points->point(result.point()).model).dt_fall_s == 0.025;
+          batch.points().model(batch.points().point(result.point()).model).dt_fall_s == 0.025;
       EXPECT_EQ(result.error().empty(), !fails) << result.error();
     }
   }
@@ -229,13 +231,13 @@ std::string bits_of(const protocol::PointResult& result) {
 
 /// The order for a point of a recipe.
 protocol::TraceOrder order_of(const Batch& batch, std::uint64_t number) {
-  const protocol::Point point = batch.points->point(number);
+  const protocol::Point point = batch.points().point(number);
   protocol::TraceOrder order;
-  *order.mutable_model() = protocol::to_message(batch.points->model(point.model));
+  *order.mutable_model() = protocol::to_message(batch.points().model(point.model));
   order.set_h_m(point.H_m);
   order.set_mu(point.mu);
   order.set_e_star(point.e_star);
-  order.set_errors(batch.points->wants_errors());
+  order.set_errors(batch.points().wants_errors());
   return order;
 }
 
@@ -254,9 +256,9 @@ void expect_traces_to_repeat(solver::Integrator integrator, std::size_t points, 
   add_model_axis(recipe, "k", {2e7, 3e7});
   recipe.set_errors(errors);
   const Batch batch = batch_of(recipe);
-  PointSolver solver(1);
+  PointSolver solver(kFallBytes);
   const auto results = solved(batch, solver);
-  for (const std::uint64_t number : {std::uint64_t{0}, batch.count - 1}) {
+  for (const std::uint64_t number : {std::uint64_t{0}, batch.size() - 1}) {
     std::size_t rows = 0;
     protocol::TraceOrder order = order_of(batch, number);
     order.set_shape(shape);
@@ -288,7 +290,7 @@ TEST(PointSolverTest, ATraceBeginsWithTheFallWhereThatIsOrdered) {
   model.elements_per_link = 1;
   protocol::Recipe recipe = recipe_with_points(2);
   *recipe.mutable_model() = protocol::to_message(model);
-  PointSolver solver(1);
+  PointSolver solver(kFallBytes);
   protocol::TraceOrder order = order_of(batch_of(recipe), 0);
   for (const bool fall : {false, true}) {
     order.set_fall(fall);
@@ -302,7 +304,7 @@ TEST(PointSolverTest, ATraceBeginsWithTheFallWhereThatIsOrdered) {
 }
 
 TEST(PointSolverTest, ATraceWithoutAnswerFailsWithTheReasonOfItsPoint) {
-  PointSolver solver(1);
+  PointSolver solver(kFallBytes);
   const Batch batch = batch_of(recipe_with_points(2));
   protocol::TraceOrder order = order_of(batch, 0);
   order.set_h_m(1.19);  // beyond the largest drop

@@ -20,7 +20,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/output/human_units.h"
-#include "client/verbs/doctor/limits_of_group.h"
+#include "proto/system/limits_of_group.h"
 #include "proto/text.h"
 #include "worker/solver/solve.h"
 
@@ -89,7 +89,7 @@ void add_processor(Findings& found) {
 void add_cores(Findings& found) {
   const long online = sysconf(_SC_NPROCESSORS_ONLN);
   const unsigned allowed = std::thread::hardware_concurrency();
-  const auto group = limits_of_group();
+  const auto group = protocol::limits_of_group();
   std::array<double, 3> load{};
   const bool has_load = getloadavg(load.data(), 3) == 3;
   std::string text = fmt::format("{} of the machine's {}", allowed, online);
@@ -120,7 +120,7 @@ void add_cores(Findings& found) {
 void add_memory(Findings& found) {
   const std::uint64_t total = memory_bytes("MemTotal");
   const std::uint64_t available = memory_bytes("MemAvailable");
-  const auto group = limits_of_group();
+  const auto group = protocol::limits_of_group();
   rlimit address_space{};
   getrlimit(RLIMIT_AS, &address_space);
   std::string text =

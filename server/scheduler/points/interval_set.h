@@ -52,6 +52,9 @@ class IntervalSet {
   /// The lowest interval. The set must not be empty.
   Interval front() const { return {ends_.begin()->first, ends_.begin()->second}; }
 
+  /// The highest one. The set must not be empty.
+  Interval back() const { return {ends_.rbegin()->first, ends_.rbegin()->second}; }
+
   /// The lowest part of an interval that lies at `point` or above; nothing when there is none.
   std::optional<Interval> first_from(std::uint64_t point) const;
 

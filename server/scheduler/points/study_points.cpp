@@ -25,6 +25,57 @@ StudyPoints::StudyPoints(StudyTable table, IntervalSet settled, const LossLimits
       [this](const Interval& interval) { fresh_.erase(interval.begin, interval.end); });
 }
 
+void StudyPoints::arrange(std::uint64_t falls_a_group) {
+  if (was_arranged_ || falls_a_group == 0) {
+    return;
+  }
+  was_arranged_ = true;
+  falls_a_group_ = falls_a_group;
+  order_.arrange(*table_.get(), 0, fresh_, falls_a_group);
+  if (order_.is_arranged()) {
+    move_all([this](const IntervalSet& points) { return order_.places(points); });
+    begun_until_ = 0;
+  }
+}
+
+void StudyPoints::rest(bool has_leases) {
+  table_.release();
+  if (order_.is_arranged() && is_complete() && !has_leases) {
+    move_all([this](const IntervalSet& places) {
+      IntervalSet points;
+      places.for_each([&](const Interval& interval) {
+        for (const Interval& part : order_.points(interval)) {
+          points.insert(part.begin, part.end);
+        }
+      });
+      return points;
+    });
+    order_ = {};
+    was_arranged_ = false;
+    begun_until_ = 0;
+  }
+}
+
+/// Replaces what is in each place by what `map` makes of it.
+template <typename Map>
+void StudyPoints::move_all(const Map& map) {
+  for (IntervalSet* set : {&fresh_, &leased_, &committing_, &settled_}) {
+    *set = map(*set);
+  }
+  for (Returned& intervals : returned_) {
+    Returned moved;
+    for (const auto& [first, history] : intervals) {
+      map(IntervalSet(first, history.end)).for_each([&](const Interval& interval) {
+        History part = history;
+        part.end = interval.end;
+        part.part_end = interval.end;
+        moved.emplace(interval.begin, part);
+      });
+    }
+    intervals = std::move(moved);
+  }
+}
+
 void StudyPoints::give_back(std::span<const Interval> parts, std::uint32_t attempts,
                             const LossHistory& losses, std::int64_t now_ms) {
   Returned& intervals = returned(losses.standing(limits_));
@@ -54,11 +105,12 @@ void StudyPoints::take_back_losses(ProcessNumber process) {
   }
 }
 
-bool StudyPoints::receive(std::uint64_t point) {
+bool StudyPoints::receive(std::uint64_t number) {
+  const std::uint64_t point = order_.place(number);
   if (leased_.contains(point)) {
     leased_.erase(point);
   } else if (fresh_.contains(point)) {
-    if (!table_->is_left_in(point)) {
+    if (!table_->is_left_in(number)) {
       return false;
     }
     fresh_.erase(point);
@@ -88,7 +140,8 @@ bool StudyPoints::erase_from(Returned& intervals, std::uint64_t point) {
   return true;
 }
 
-bool StudyPoints::settle(std::uint64_t point) {
+bool StudyPoints::settle(std::uint64_t number) {
+  const std::uint64_t point = order_.place(number);
   if (!committing_.contains(point)) {
     return false;
   }
@@ -100,6 +153,11 @@ bool StudyPoints::settle(std::uint64_t point) {
 void StudyPoints::grow(StudyTable table) {
   fresh_.insert(table_.numbers(), table.numbers());
   points_ += table.size() - std::min(table.size(), table_.size());
+  was_arranged_ = order_.is_arranged();
+  if (was_arranged_) {
+    const std::uint64_t first = table_.numbers();
+    order_.arrange(*table.get(), first, IntervalSet(first, table.numbers()), falls_a_group_);
+  }
   table_ = std::move(table);
 }
 
@@ -111,7 +169,7 @@ std::uint64_t StudyPoints::settle_unsolved(const IntervalSet& points) {
       settled += interval.end - interval.begin;
     }
   };
-  points.for_each([&](const Interval& range) {
+  order_.places(points).for_each([&](const Interval& range) {
     for (IntervalSet* place : {&fresh_, &leased_}) {
       settle_all(place->within(range.begin, range.end));
       place->erase(range.begin, range.end);
@@ -152,7 +210,7 @@ std::vector<Interval> StudyPoints::extract_from(Returned& intervals, const Inter
 
 std::uint64_t StudyPoints::reopen(const IntervalSet& points) {
   std::uint64_t reopened = 0;
-  points.for_each([&](const Interval& asked) {
+  order_.places(points).for_each([&](const Interval& asked) {
     for (const Interval& interval : settled_.within(asked.begin, asked.end)) {
       settled_.erase(interval.begin, interval.end);
       fresh_.insert(interval.begin, interval.end);
@@ -166,23 +224,25 @@ void StudyPoints::count_attempts(const PointAttempts& attempts) {
   // Workers may say any number; what is added to it must not overflow.
   constexpr std::uint32_t kMostAttempts = 1'000'000'000;
   attempts.for_each([this](const Interval& counted, std::uint32_t times) {
-    for (const Interval& interval : fresh_.within(counted.begin, counted.end)) {
-      fresh_.erase(interval.begin, interval.end);
-      returned(Standing::kSound)
-          .emplace(interval.begin, History{interval.end,
-                                           times < kMostAttempts ? times : kMostAttempts,
-                                           {},
-                                           0,
-                                           interval.end});
-      returned_points_ += interval.end - interval.begin;
-    }
+    order_.places(IntervalSet(counted.begin, counted.end)).for_each([&](const Interval& places) {
+      for (const Interval& interval : fresh_.within(places.begin, places.end)) {
+        fresh_.erase(interval.begin, interval.end);
+        returned(Standing::kSound)
+            .emplace(interval.begin, History{interval.end,
+                                             times < kMostAttempts ? times : kMostAttempts,
+                                             {},
+                                             0,
+                                             interval.end});
+        returned_points_ += interval.end - interval.begin;
+      }
+    });
   });
 }
 
 std::vector<std::uint64_t> StudyPoints::condemned() const {
   std::vector<std::uint64_t> points;
   for (const auto& [first, history] : returned(Standing::kCondemned)) {
-    points.push_back(first);
+    points.push_back(order_.point(first));
   }
   return points;
 }

@@ -12,6 +12,7 @@
 #include "server/scheduler/points/interval_set.h"
 #include "server/scheduler/points/loss_history.h"
 #include "server/scheduler/points/point_attempts.h"
+#include "server/scheduler/points/point_order.h"
 #include "server/scheduler/points/study_table.h"
 
 namespace oblique::server {
@@ -27,22 +28,23 @@ struct StudyTerms {
   bool operator==(const StudyTerms&) const = default;
 };
 
-/// Points that are handed out together, under one lease: a run of numbers, of one model or several,
-/// without those that a filter leaves out and some that were settled before.
+/// Points that are handed out together, under one lease: a run of places (PointOrder), without
+/// points that a filter leaves out and some that were settled before.
 struct Batch {
-  std::uint64_t first_point;
+  std::uint64_t first_place;
   std::uint64_t count;
   std::uint32_t attempts;        ///< how often these points had been leased before
   LossHistory losses;            ///< of the leases before
-  std::uint64_t points = count;  ///< of these numbers, those that are handed out
+  std::uint64_t points = count;  ///< the number of these places whose points are handed out
 
-  std::uint64_t end() const { return first_point + count; }
+  std::uint64_t end() const { return first_place + count; }
 };
 
 /// Where the points of one study stand. Every point is in exactly one place: fresh (never leased by
 /// this run of the server), returned with one of the four standings that its losses give it,
 /// leased, committing (its result is on the way to the disk) or settled. The cost grows with the
-/// number of intervals, not of points.
+/// number of intervals, not of points. Intervals, here and in Batch, are of places: the first lease
+/// brings the points into an order in which those that share a fall follow each other.
 ///
 /// A point that a filter leaves out is fresh until somebody comes across it, and then among the
 /// settled ones, though it counts as none: so the sets stay whole intervals, and nothing that is
@@ -58,16 +60,19 @@ class StudyPoints {
   std::uint64_t size() const { return points_; }
   /// How many point numbers.
   std::uint64_t numbers() const { return table_.numbers(); }
-  /// How many models they have; the table is made when there is none.
-  std::uint64_t models() const { return table_->models(); }
-  /// Nothing is handed out for a while: the table is forgotten until something is.
-  void rest() { table_.release(); }
+  /// Whether they have several models; the table is made when there is none.
+  bool has_models() const { return table_->models() > 1; }
+  /// Nothing is handed out for a while: the table is forgotten until something is, and the order
+  /// of a complete study of which there are no leases.
+  void rest(bool has_leases);
+  /// Points and places, as they are now.
+  const PointOrder& order() const { return order_; }
 
   /// Takes points out of the returned sound ones or, when there are none, the fresh ones: those
-  /// that are left of the model that `wanted` follows, then models of which nothing was taken yet,
-  /// then what is left of any. Nothing when there are none, or when `looks` came to 0 before one
-  /// was found: it says how many points may be looked at, whether they are left in, and is counted
-  /// down.
+  /// that are left of the group that `wanted` follows, then groups of which nothing was taken yet,
+  /// then the second half of what is left of the last. Nothing when there are none, or when `looks`
+  /// came to 0 before one was found: it says how many points may be looked at, whether they are
+  /// left in, and is counted down.
   std::optional<Batch> take(const Portion& wanted, std::uint64_t& looks);
   /// The same out of the returned ones of that standing. These cost no look but between them.
   std::optional<Batch> take(Standing standing, const Portion& wanted, std::uint64_t& looks);
@@ -76,8 +81,8 @@ class StudyPoints {
   /// The condemned point if it came back at `until_ms` or before, else nothing.
   std::optional<Batch> take_condemned(std::uint64_t point, std::int64_t until_ms);
 
-  /// The points of `parts`, in order, that are still leased are returned at `now_ms`, with the
-  /// history given. Those between the parts stay where they are.
+  /// The points at the places `parts`, in order, that are still leased are returned at `now_ms`,
+  /// with the history given. Those between the parts stay where they are.
   void give_back(std::span<const Interval> parts, std::uint32_t attempts, const LossHistory& losses,
                  std::int64_t now_ms);
 
@@ -118,13 +123,12 @@ class StudyPoints {
   /// Some point has a result, durable or on its way.
   bool has_results() const { return settled() > 0 || !committing_.empty(); }
 
-  std::vector<std::uint64_t> condemned() const;  ///< points
+  std::vector<std::uint64_t> condemned() const;
 
   std::uint64_t free() const;  ///< fresh and returned points
   std::uint64_t settled() const { return settled_.size() - left_out_; }
   std::uint64_t leased() const { return leased_.size(); }
-  /// With those that were found to be left out.
-  const IntervalSet& settled_set() const { return settled_; }
+  /// Places.
   const IntervalSet& leased_set() const { return leased_; }
 
   /// Throws std::logic_error unless every point is in exactly one place.
@@ -144,6 +148,9 @@ class StudyPoints {
   const Returned& returned(Standing standing) const {
     return returned_.at(static_cast<std::size_t>(standing));
   }
+  void arrange(std::uint64_t falls_a_group);
+  template <typename Map>
+  void move_all(const Map& map);
   std::optional<Interval> next_fresh(std::optional<std::uint64_t> follows) const;
   std::optional<Interval> next_left_in(std::optional<std::uint64_t> follows, std::uint64_t& looks);
   std::uint64_t lease_fresh(const Interval& free, const Portion& wanted, std::uint64_t& looks);
@@ -155,10 +162,13 @@ class StudyPoints {
   std::vector<Interval> extract_from(Returned& intervals, const Interval& range);
 
   StudyTable table_;
+  PointOrder order_;
   std::uint64_t points_;
   LossLimits limits_;
   IntervalSet fresh_;
-  std::uint64_t begun_until_ = 0;     // of all models before, points were taken
+  std::uint64_t begun_until_ = 0;  // of all groups before, points were taken
+  bool was_arranged_ = false;      // or stays as it is numbered
+  std::uint64_t falls_a_group_ = 1;
   std::array<Returned, 4> returned_;  // by standing
   IntervalSet leased_;
   IntervalSet committing_;

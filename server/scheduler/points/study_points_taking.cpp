@@ -8,6 +8,7 @@
 namespace oblique::server {
 
 std::optional<Batch> StudyPoints::take(const Portion& wanted, std::uint64_t& looks) {
+  arrange(wanted.falls);
   if (has(Standing::kSound)) {
     return take(Standing::kSound, wanted, looks);
   }
@@ -19,20 +20,20 @@ std::optional<Batch> StudyPoints::take(const Portion& wanted, std::uint64_t& loo
   std::uint64_t end = lease_fresh(*free, wanted, looks);
   const auto taken = [&] { return leased_.size() - leased_before; };
   const std::uint64_t enough =
-      std::max(wanted.points, std::min(wanted.models > 1 ? wanted.models : 0, wanted.most_points));
+      std::max(wanted.points, std::min(wanted.groups > 1 ? wanted.groups : 0, wanted.most_points));
   std::uint64_t run_end = free->end;
   while (const auto next = fresh_near(end, run_end, enough, taken(), looks)) {
     end = lease_fresh(*next, {enough - taken()}, looks);
     run_end = next->end;
   }
-  begun_until_ = std::max(begun_until_, end_of_model(*table_.get(), end));
+  begun_until_ = std::max(begun_until_, order_.group_at(*table_.get(), end - 1).end);
   return Batch{free->begin, end - free->begin, 0, {}, taken()};
 }
 
 /// The next fresh points, from one that is left in, for a batch that ends at `end`, has `taken`
 /// points and wants `enough`: those behind a few settled ones, as where a finer grid has taken over
 /// a coarser one. Not what is left of the run up to `run_end`, where the batch was cut, and not
-/// those of a model of which there is no room for all.
+/// those of a group of which there is no room for all points.
 std::optional<Interval> StudyPoints::fresh_near(std::uint64_t end, std::uint64_t run_end,
                                                 std::uint64_t enough, std::uint64_t taken,
                                                 std::uint64_t& looks) {
@@ -43,16 +44,16 @@ std::optional<Interval> StudyPoints::fresh_near(std::uint64_t end, std::uint64_t
     }
     // Others may have the points between, or get them.
     const auto between = settled_.within(end, next->begin);
-    const protocol::Segment model = table_->segment_at(next->begin);
+    const Interval group = order_.group_at(*table_.get(), next->begin);
     if (between.size() != 1 || !(between.front() == Interval{end, next->begin}) ||
-        (model.first_point >= end && model.count > enough - taken)) {
+        (group.begin >= end && group.end - group.begin > enough - taken)) {
       return std::nullopt;
     }
     if (!table_->has_filter()) {
       return next;
     }
     const std::uint64_t last = next->begin + std::min(looks, next->end - next->begin);
-    const std::uint64_t found = table_->first_left_in(next->begin, last);
+    const std::uint64_t found = order_.first_left_in(*table_.get(), next->begin, last);
     leave_out({next->begin, found});
     looks -= found - next->begin;
     if (found < last || looks == 0) {
@@ -70,14 +71,14 @@ bool StudyPoints::search(std::uint64_t& looks) {
 std::uint64_t StudyPoints::lease_fresh(const Interval& free, const Portion& wanted,
                                        std::uint64_t& looks) {
   const protocol::PointTable& table = *table_.get();
-  const std::uint64_t cut = end_of_batch(table, free, wanted);
+  const std::uint64_t cut = end_of_batch(table, order_, free, wanted);
   if (!table.has_filter()) {
     fresh_.erase(free.begin, cut);
     leased_.insert(free.begin, cut);
     return cut;
   }
   // As many points as the cut has numbers. Where it has half of them that is enough, for it may end
-  // with a model.
+  // with a group.
   const std::uint64_t enough = cut - free.begin;
   const std::uint64_t last = free.begin + std::min(looks, free.end - free.begin);
   std::uint64_t taken = 0;
@@ -85,7 +86,7 @@ std::uint64_t StudyPoints::lease_fresh(const Interval& free, const Portion& want
   std::uint64_t at = free.begin;
   while (at < last && taken < enough && !(at == cut && 2 * taken >= enough)) {
     const std::uint64_t next = std::min(at < cut ? cut : free.end, last);
-    const std::uint64_t found = table.first_left_in(at, next);
+    const std::uint64_t found = order_.first_left_in(table, at, next);
     leave_out({at, found});
     at = found;
     if (found < next) {
@@ -112,7 +113,7 @@ std::optional<Interval> StudyPoints::next_left_in(std::optional<std::uint64_t> f
       return free;
     }
     const std::uint64_t last = free->begin + std::min(looks, free->end - free->begin);
-    const std::uint64_t found = table_->first_left_in(free->begin, last);
+    const std::uint64_t found = order_.first_left_in(*table_.get(), free->begin, last);
     leave_out({free->begin, found});
     looks -= found - free->begin;
     if (found < last) {
@@ -145,12 +146,19 @@ std::optional<Interval> StudyPoints::next_fresh(std::optional<std::uint64_t> fol
   }
   if (follows) {
     const auto rest = fresh_.first_from(*follows);
-    if (rest && rest->begin < end_of_model(*table_.get(), *follows)) {
+    if (rest && rest->begin < order_.group_at(*table_.get(), *follows - 1).end) {
       return rest;
     }
   }
-  const auto begun_by_nobody = fresh_.first_from(begun_until_);
-  return begun_by_nobody ? *begun_by_nobody : fresh_.front();
+  if (const auto begun_by_nobody = fresh_.first_from(begun_until_)) {
+    return begun_by_nobody;
+  }
+  if (!order_.is_arranged()) {
+    return fresh_.front();
+  }
+  // The worker that began the group goes on with its first falls, this one takes its last.
+  const Interval last = fresh_.back();
+  return Interval{last.begin + (last.end - last.begin) / 2, last.end};
 }
 
 std::optional<Batch> StudyPoints::take(Standing standing, const Portion& wanted,
@@ -160,7 +168,7 @@ std::optional<Batch> StudyPoints::take(Standing standing, const Portion& wanted,
     return std::nullopt;
   }
   const auto [first, history] = *intervals.begin();
-  std::uint64_t end = end_of_batch(*table_.get(), {first, history.end}, wanted);
+  std::uint64_t end = end_of_batch(*table_.get(), order_, {first, history.end}, wanted);
   intervals.erase(intervals.begin());
   if (end < history.end) {
     intervals.emplace(end, history);
@@ -175,7 +183,7 @@ std::optional<Batch> StudyPoints::take(Standing standing, const Portion& wanted,
     if (next->second.part_end != history.part_end || next->second.attempts != history.attempts ||
         !(next->second.losses == history.losses) || gap > looks ||
         next->second.end - next->first > wanted.points - points ||
-        table_->first_left_in(end, next->first) != next->first) {
+        order_.first_left_in(*table_.get(), end, next->first) != next->first) {
       break;
     }
     looks -= gap;
@@ -190,15 +198,16 @@ std::optional<Batch> StudyPoints::take(Standing standing, const Portion& wanted,
 
 std::optional<Batch> StudyPoints::take_condemned(std::uint64_t point, std::int64_t until_ms) {
   Returned& condemned = returned(Standing::kCondemned);
-  const auto found = condemned.find(point);
+  const auto found = condemned.find(order_.place(point));
   if (found == condemned.end() || found->second.returned_ms > until_ms) {
     return std::nullopt;
   }
   const History history = found->second;
   condemned.erase(found);
-  leased_.insert(point);
+  const std::uint64_t place = order_.place(point);
+  leased_.insert(place);
   --returned_points_;
-  return Batch{point, 1, history.attempts, history.losses, 1};
+  return Batch{place, 1, history.attempts, history.losses, 1};
 }
 
 }  // namespace oblique::server

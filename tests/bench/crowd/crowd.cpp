@@ -165,7 +165,7 @@ class Crowd::Parts {
       return false;
     }
     Job& job = member.jobs.front();
-    const std::uint64_t left = job.batch.count - job.done;
+    const std::uint64_t left = job.batch.size() - job.done;
     // The others get their turn.
     std::uint64_t solved = std::min<std::uint64_t>(left, kResultsATurn);
     const double elapsed_s = now_s() - member.solving_since_s;
@@ -176,10 +176,10 @@ class Crowd::Parts {
         return false;
       }
     }
-    worker::Progress progress{job.batch.number, job.batch.study_id, {}, 0.0, solved == left};
+    worker::Progress progress{job.batch.number(), job.batch.study_id(), {}, 0.0, solved == left};
     progress.results.assign(solved, result_);
     for (std::uint64_t i = 0; i < solved; ++i) {
-      progress.results[i].set_point(job.batch.first_point + job.done + i);
+      progress.results[i].set_point(job.batch.point_at(job.done + i));
     }
     const double points = static_cast<double>(solved);
     progress.busy_s = settings_.point_s > 0.0 ? points * settings_.point_s : points * 1e-6;
@@ -237,10 +237,10 @@ class Crowd::Parts {
           member.jobs.push_back({std::move(effect.batch)});
         },
         [&](const worker::DropStudy& effect) {
-          drop([&](const worker::Batch& batch) { return batch.study_id == effect.study_id; });
+          drop([&](const worker::Batch& batch) { return batch.study_id() == effect.study_id; });
         },
         [&](const worker::DropBatch& effect) {
-          drop([&](const worker::Batch& batch) { return batch.number == effect.number; });
+          drop([&](const worker::Batch& batch) { return batch.number() == effect.number; });
         },
         [&](const worker::DropAll&) { member.jobs.clear(); },
         [](const worker::SolveTrace&) {},

@@ -13,7 +13,6 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "client/verbs/doctor/limits_of_group.h"
 #include "client/verbs/doctor/report.h"
 #include "server/store/store.h"
 #include "tests/support/points.h"
@@ -197,17 +196,17 @@ TEST(LimitsOfAGroup, AreTheTightestFromTheProcessUpwardsInBothVersions) {
     std::ofstream(folder.file(name)) << text;
   };
   const std::string root = folder.path().string();
-  EXPECT_FALSE(doctor::limits_of_group(root, "0::/\n").cores);
+  EXPECT_FALSE(protocol::limits_of_group(root, "0::/\n").cores);
   write("a/cpu.max", "150000 100000\n");
   write("a/b/cpu.max", "max 100000\n");
   write("a/b/memory.max", "500000000\n");
-  const auto second = doctor::limits_of_group(root, "0::/a/b\n");
+  const auto second = protocol::limits_of_group(root, "0::/a/b\n");
   EXPECT_EQ(second.cores, 1.5);
   EXPECT_EQ(second.memory_bytes, 500'000'000U);
   write("cpu/job/cpu.cfs_quota_us", "200000\n");
   write("cpu/job/cpu.cfs_period_us", "100000\n");
   write("memory/memory.limit_in_bytes", "9223372036854771712\n");
-  const auto first = doctor::limits_of_group(root, "4:memory:/job\n2:cpu,cpuacct:/job\n");
+  const auto first = protocol::limits_of_group(root, "4:memory:/job\n2:cpu,cpuacct:/job\n");
   EXPECT_EQ(first.cores, 2.0);
   EXPECT_FALSE(first.memory_bytes);
 }

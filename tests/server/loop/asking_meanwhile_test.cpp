@@ -44,8 +44,8 @@ class PacedWorker {
 
   void answer_was_read() { ++answers_; }
   bool is_done() const { return done_; }
-  /// First point and count of each batch that was sent, stored or not.
-  std::vector<std::pair<std::uint64_t, std::uint64_t>> batches() const {
+  /// The points of each batch that was sent, stored or not; they follow each other.
+  std::vector<std::vector<std::uint64_t>> batches() const {
     const std::lock_guard lock(mutex_);
     return batches_;
   }
@@ -62,12 +62,12 @@ class PacedWorker {
         if (message.has_batch()) {
           batch = message.batch();
           const std::lock_guard lock(mutex_);
-          batches_.emplace_back(batch.first_point(), batch.count());
+          batches_.push_back(points_of(batch));
           worker_.solve(batch);
         }
         is_stored = message.has_results_stored();
       }
-      stored += batch.count();
+      stored += points_of(batch).size();
       while (answers_ < number) {
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
       }
@@ -76,7 +76,7 @@ class PacedWorker {
 
   PretendedWorker worker_;
   mutable std::mutex mutex_;
-  std::vector<std::pair<std::uint64_t, std::uint64_t>> batches_;
+  std::vector<std::vector<std::uint64_t>> batches_;
   std::atomic<std::uint64_t> answers_{0};
   std::atomic<bool> done_{false};
   std::thread thread_;
@@ -163,11 +163,12 @@ TEST_F(AskingMeanwhile, EachAnswerIsOfOneMomentAndNoneIsBehindTheLast) {
     // Sorted before the first row is given, so of one transaction.
     const auto points = points_of(rows("point", "point DESC"));
     ASSERT_TRUE(std::adjacent_find(points.begin(), points.end()) == points.end());
-    for (const auto& [first, count] : worker.batches()) {
-      const auto from = std::lower_bound(points.begin(), points.end(), first);
-      const auto to = std::lower_bound(points.begin(), points.end(), first + count);
-      const auto here = static_cast<std::uint64_t>(to - from);
-      ASSERT_TRUE(here == 0 || here == count) << here << " of the " << count << " from " << first;
+    for (const auto& batch : worker.batches()) {
+      const auto from = std::lower_bound(points.begin(), points.end(), batch.front());
+      const auto to = std::upper_bound(points.begin(), points.end(), batch.back());
+      const auto here = static_cast<std::size_t>(to - from);
+      ASSERT_TRUE(here == 0 || here == batch.size())
+          << here << " of the " << batch.size() << " from " << batch.front();
     }
     goes_on(points.size(), "a list");
     const auto sums = rows("count(*), count(DISTINCT point), count(status), max(point)", "");

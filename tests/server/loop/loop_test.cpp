@@ -86,7 +86,7 @@ TEST_F(LoopTest, AStoppingServerTellsItsWorkersAndCommitsWhatItReceived) {
     stored = stored || message.has_results_stored();
   }
   server.reset();
-  EXPECT_EQ(Reader(path_).study_status("a").at(0).solved(), batch.count());
+  EXPECT_EQ(Reader(path_).study_status("a").at(0).solved(), points_of(batch).size());
 }
 
 TEST_F(LoopTest, HostileFramesHarmNobody) {

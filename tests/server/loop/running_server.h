@@ -156,18 +156,8 @@ class PretendedWorker : public Peer<WorkerMessage, ServerToWorker> {
     results.set_sequence(++sequence_);
     results.set_batch_done(true);
     results.set_busy_s(1e-3);
-    std::uint64_t point = batch.first_point();
-    bool is_wanted = true;
-    std::vector<std::uint64_t> parts(batch.parts().begin(), batch.parts().end());
-    if (parts.empty()) {
-      parts = {batch.count()};
-    }
-    for (const std::uint64_t points : parts) {
-      for (std::uint64_t i = 0; is_wanted && i < points; ++i) {
-        *results.add_results() = solved_point(point + i);
-      }
-      point += points;
-      is_wanted = !is_wanted;
+    for (const std::uint64_t point : points_of(batch)) {
+      *results.add_results() = solved_point(point);
     }
     send(message);
     return static_cast<std::uint64_t>(results.results_size());

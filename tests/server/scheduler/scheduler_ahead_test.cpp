@@ -63,7 +63,7 @@ TEST_F(SchedulerAheadTest, WhatTheWorkerAsksForMeanwhileIsOfItToo) {
 
 TEST_F(SchedulerAheadTest, WhenItIsDoneTheWorkerGetsNoMoreThanItAsksFor) {
   SendBatch batch = add_urgent(4, 2).at(0);
-  ASSERT_EQ(batch.count, 1U);
+  ASSERT_EQ(batch.count(), 1U);
   batch = only<SendBatch>(bench_.solve_and_store(batch)).at(0);
   EXPECT_TRUE(only<SendBatch>(bench_.solve_and_store(batch)).empty());
   EXPECT_TRUE(only<SendBatch>(bench_.solve_and_store(sweep_[0])).empty());
@@ -100,7 +100,7 @@ TEST_F(SchedulerAheadTest, ABatchThatCameAheadIsLostAndReturnedAsAnyOther) {
   const SendBatch ahead = add_urgent(4).at(0);
   const auto again = only<SendBatch>(bench_.feed(BatchesReturned{1, {ahead.lease}}));
   ASSERT_EQ(again.size(), 1U);
-  EXPECT_EQ(again[0].first_point, ahead.first_point);
+  EXPECT_EQ(again[0].first_point(), ahead.first_point());
   bench_.feed(WorkerLeft{1});
   EXPECT_EQ(bench_.scheduler.study(kUrgent).leased, 0U);
 }

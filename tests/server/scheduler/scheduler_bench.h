@@ -63,11 +63,19 @@ class SchedulerBench {
 
   /// The whole batch solved in `busy_s` and the results received.
   std::vector<Effect> solve(const SendBatch& batch, double busy_s = 1e-3) {
-    ResultsReceived event{batch.worker, batch.study, batch.lease, ++sequence, true, busy_s, {}};
-    for (std::uint64_t i = 0; i < batch.count; ++i) {
-      event.outcomes.push_back({batch.first_point + i, false});
+    return feed(ResultsReceived{batch.worker, batch.study, batch.lease, ++sequence, true, busy_s,
+                                outcomes_of(batch)});
+  }
+
+  /// Each point of the batch solved, in the order of the batch.
+  static std::vector<PointOutcome> outcomes_of(const SendBatch& batch) {
+    std::vector<PointOutcome> outcomes;
+    for (const Interval& range : batch.points) {
+      for (std::uint64_t point = range.begin; point < range.end; ++point) {
+        outcomes.push_back({point, false});
+      }
     }
-    return feed(event);
+    return outcomes;
   }
 
   /// `solve`, and the results are made durable. Returns the effects of both.
@@ -76,7 +84,7 @@ class SchedulerBench {
     for (const StoreResults& store : only<StoreResults>(effects)) {
       ResultsStored stored{store.worker, store.study, store.sequence, {}};
       for (const std::size_t index : store.accepted) {
-        stored.outcomes.push_back({batch.first_point + index, false});
+        stored.outcomes.push_back(outcomes_of(batch)[index]);
       }
       append(effects, feed(stored));
     }
@@ -85,7 +93,7 @@ class SchedulerBench {
 
   /// What the worker gets once it has solved the batch at so many seconds a point.
   SendBatch next_after(const SendBatch& batch, double s_per_point) {
-    solve_and_store(batch, s_per_point * static_cast<double>(batch.count));
+    solve_and_store(batch, s_per_point * static_cast<double>(batch.count()));
     return only<SendBatch>(feed(CreditGiven{batch.worker, 1})).at(0);
   }
 

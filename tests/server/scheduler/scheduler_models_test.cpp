@@ -28,7 +28,7 @@ std::shared_ptr<const PointTable> table_of_models(std::uint64_t models, std::uin
 /// In studies of models of many points: the model that a batch begins with.
 constexpr std::uint64_t kMany = 100'000;
 std::uint64_t model_of(const SendBatch& batch) {
-  return batch.first_point / kMany;
+  return batch.first_point() / kMany;
 }
 
 TEST(SchedulerModels, TheFirstBatchHasAModelForEachLaneOfAWorkersThreads) {
@@ -36,8 +36,8 @@ TEST(SchedulerModels, TheFirstBatchHasAModelForEachLaneOfAWorkersThreads) {
   bench.feed(StudyAdded{1, table_of_models(10'000, 1), {}});
   const auto batches = bench.join(1, 2, 3);
   ASSERT_EQ(batches.size(), 2U);
-  EXPECT_EQ(batches[0].count, 24U);
-  EXPECT_EQ(batches[1].first_point, 24U);
+  EXPECT_EQ(batches[0].count(), 24U);
+  EXPECT_EQ(batches[1].first_point(), 24U);
 }
 
 TEST(SchedulerModels, BatchesOfAPointAModelFillLanesAlsoWhereAFallTakesLongerThanABatchShould) {
@@ -46,12 +46,12 @@ TEST(SchedulerModels, BatchesOfAPointAModelFillLanesAlsoWhereAFallTakesLongerTha
   SendBatch batch = bench.join(1, 1).at(0);
   for (int i = 0; i < 5; ++i) {
     batch = bench.next_after(batch, 0.5);
-    EXPECT_EQ(batch.count, 8U);
+    EXPECT_EQ(batch.count(), 8U);
   }
   for (int i = 0; i < 5; ++i) {
     batch = bench.next_after(batch, 30.0);
   }
-  EXPECT_EQ(batch.count, 1U) << "a lost worker would cost minutes";
+  EXPECT_EQ(batch.count(), 1U) << "a lost worker would cost minutes";
 }
 
 TEST(SchedulerModels, QuickModelsGoOutByPaceAsPointsOfOneDo) {
@@ -60,7 +60,8 @@ TEST(SchedulerModels, QuickModelsGoOutByPaceAsPointsOfOneDo) {
   settings.tail_batches_per_thread = 0;
   SchedulerBench bench(settings);
   bench.feed(StudyAdded{1, table_of_models(10'000, 1), {}});
-  EXPECT_EQ(bench.next_after(bench.join(1, 1).at(0), 1e-3).count, 100U) << "0.1 s at 1 ms a point";
+  EXPECT_EQ(bench.next_after(bench.join(1, 1).at(0), 1e-3).count(), 100U)
+      << "0.1 s at 1 ms a point";
 }
 
 TEST(SchedulerModels, InTheEndEveryWorkerHasItsPart) {
@@ -71,8 +72,8 @@ TEST(SchedulerModels, InTheEndEveryWorkerHasItsPart) {
   bench.feed(CreditGiven{2, 2});
   const auto batches = only<SendBatch>(bench.feed(StudyAdded{1, table_of_models(14, 1), {}}));
   ASSERT_EQ(batches.size(), 2U);
-  EXPECT_EQ(batches[0].count, 7U);
-  EXPECT_EQ(batches[1].count, 7U);
+  EXPECT_EQ(batches[0].count(), 7U);
+  EXPECT_EQ(batches[1].count(), 7U);
   EXPECT_NE(batches[0].worker, batches[1].worker);
 }
 
@@ -83,7 +84,7 @@ TEST(SchedulerModels, ABatchEndsWithAModelWhereItCan) {
   std::uint64_t whole = 0;
   for (int i = 0; i < 12; ++i) {
     batch = bench.next_after(batch, 1e-3);
-    whole += (batch.first_point + batch.count) % 9 == 0 ? 1U : 0U;
+    whole += (batch.first_point() + batch.count()) % 9 == 0 ? 1U : 0U;
   }
   EXPECT_GE(whole, 10U) << "at first too little is known of its pace";
 }
@@ -95,11 +96,11 @@ TEST(SchedulerModels, ModelsOfManyPointsFillLanesForAsLongAsABatchMayTakeForIt) 
   for (int i = 0; i < 20; ++i) {
     batch = bench.next_after(batch, 1e-4);
   }
-  EXPECT_EQ(batch.count, 8000U) << "0.8 s, and eight falls side by side";
+  EXPECT_EQ(batch.count(), 8000U) << "0.8 s, and eight falls side by side";
   for (int i = 0; i < 20; ++i) {
     batch = bench.next_after(batch, 5e-4);
   }
-  EXPECT_EQ(batch.count, 2000U) << "1 s";
+  EXPECT_EQ(batch.count(), 2000U) << "1 s";
 }
 
 TEST(SchedulerModels, WorkersTakeModelsOfTheirOwnWhileThereAreAny) {
@@ -133,12 +134,12 @@ TEST(SchedulerModels, WhatALostWorkerHeldOfSeveralModelsGoesOutAgainAsItWas) {
   SchedulerBench bench(trusting());
   bench.feed(StudyAdded{1, table_of_models(8, 1), {}});
   const SendBatch lost = bench.join(1, 1).at(0);
-  ASSERT_EQ(lost.count, 8U);
+  ASSERT_EQ(lost.count(), 8U);
   bench.join(2, 1);
   const auto again = only<SendBatch>(bench.feed(WorkerUnreachable{1}));
   ASSERT_EQ(again.size(), 1U);
-  EXPECT_EQ(again[0].first_point, lost.first_point);
-  EXPECT_EQ(again[0].count, lost.count);
+  EXPECT_EQ(again[0].first_point(), lost.first_point());
+  EXPECT_EQ(again[0].count(), lost.count());
   EXPECT_EQ(again[0].attempt, 2U);
 }
 
@@ -150,8 +151,8 @@ TEST(SchedulerModels, ABatchOfSeveralModelsThatStragglesGoesToASecondWorkerToo) 
   bench.join(2, 1);
   const auto twins = only<SendBatch>(bench.pass(1500, {1, 2}));
   ASSERT_EQ(twins.size(), 1U);
-  EXPECT_EQ(twins[0].first_point, 1U);
-  EXPECT_EQ(twins[0].count, 7U);
+  EXPECT_EQ(twins[0].first_point(), 1U);
+  EXPECT_EQ(twins[0].count(), 7U);
 }
 
 TEST(SchedulerModels, APointOfManyModelsThatKillsIsFoundAndNoOtherFails) {
@@ -183,13 +184,13 @@ TEST(SchedulerModels, APointOfManyModelsThatKillsIsFoundAndNoOtherFails) {
     }
     const SendBatch batch = held.front();
     held.pop_front();
-    if (batch.study == 1 && batch.first_point <= kKiller &&
-        kKiller < batch.first_point + batch.count) {
+    if (batch.study == 1 && batch.first_point() <= kKiller &&
+        kKiller < batch.first_point() + batch.count()) {
       take(bench.feed(WorkerUnreachable{batch.worker}));
       std::erase_if(held, [&](const SendBatch& other) { return other.worker == batch.worker; });
       join();
     } else {
-      take(bench.solve_and_store(batch, 1e-3 * static_cast<double>(batch.count)));
+      take(bench.solve_and_store(batch, 1e-3 * static_cast<double>(batch.count())));
       take(bench.feed(CreditGiven{batch.worker, 1}));
     }
   }
@@ -209,7 +210,7 @@ TEST(SchedulerModels, ALongBatchCountsForAsManyAsItTakesInTheShareOfAStudy) {
   for (int i = 0; i < 500; ++i) {
     const SendBatch batch = held.front();
     held.pop_front();
-    const double s = (batch.study == 1 ? 0.1 : 1e-4) * static_cast<double>(batch.count);
+    const double s = (batch.study == 1 ? 0.1 : 1e-4) * static_cast<double>(batch.count());
     busy_s[batch.study] += s;
     bench.solve_and_store(batch, s);
     held.push_back(only<SendBatch>(bench.feed(CreditGiven{1, 1})).at(0));

@@ -19,7 +19,7 @@ TEST(SchedulerPace, ABatchTakesTheTimeAimedAt) {
   SchedulerBench bench(by_pace_alone());
   bench.feed(StudyAdded{1, table_of(1'000'000), {}});
   const SendBatch next = bench.next_after(bench.join(1, 1).at(0), 1e-3);
-  EXPECT_EQ(next.count, 100U) << "0.1 s at 1 ms a point";
+  EXPECT_EQ(next.count(), 100U) << "0.1 s at 1 ms a point";
 }
 
 TEST(SchedulerPace, WithMoreWorkersThanTheServerServesAtThatPaceBatchesTakeLonger) {
@@ -31,7 +31,7 @@ TEST(SchedulerPace, WithMoreWorkersThanTheServerServesAtThatPaceBatchesTakeLonge
   for (WorkerId worker = 2; worker <= 8; ++worker) {
     bench.join(worker, 0);
   }
-  EXPECT_EQ(bench.next_after(first, 1e-3).count, 400U) << "8 workers, each a batch in 0.4 s";
+  EXPECT_EQ(bench.next_after(first, 1e-3).count(), 400U) << "8 workers, each a batch in 0.4 s";
 }
 
 TEST(SchedulerPace, OneSlowBatchCountsHalfAgainstOneOfItsSizeThatIsKnown) {
@@ -40,7 +40,7 @@ TEST(SchedulerPace, OneSlowBatchCountsHalfAgainstOneOfItsSizeThatIsKnown) {
   SchedulerBench bench(settings);
   bench.feed(StudyAdded{1, table_of(1'000'000), {}});
   const SendBatch second = bench.next_after(bench.join(1, 1).at(0), 1e-3);
-  EXPECT_EQ(bench.next_after(second, 3e-3).count, 50U) << "0.1 s at 2 ms a point";
+  EXPECT_EQ(bench.next_after(second, 3e-3).count(), 50U) << "0.1 s at 2 ms a point";
 }
 
 TEST(SchedulerPace, AMessageCountsByItsPointsSoThatAFallBeforeTheFirstOnesSaysLittleOfOthers) {
@@ -59,16 +59,16 @@ TEST(SchedulerPace, AMessageCountsByItsPointsSoThatAFallBeforeTheFirstOnesSaysLi
   part(0, 10, 0.2, false);
   part(10, 1000, 0.099, true);
   const SendBatch next = only<SendBatch>(bench.feed(CreditGiven{1, 1})).at(0);
-  EXPECT_NEAR(static_cast<double>(next.count), 0.1 / (0.299 / 1000), 5.0);
+  EXPECT_NEAR(static_cast<double>(next.count()), 0.1 / (0.299 / 1000), 5.0);
 }
 
 TEST(SchedulerPace, SlowPointsOfOneModelFillTheLanesOfAWorker) {
   SchedulerBench bench(by_pace_alone());
   bench.feed(StudyAdded{1, table_of(1'000'000), {}});
   const SendBatch second = bench.next_after(bench.join(1, 1).at(0), 0.5);
-  EXPECT_EQ(second.count, 8U) << "0.5 s a point, and eight at a time take little longer than one";
+  EXPECT_EQ(second.count(), 8U) << "0.5 s a point, and eight at a time take little longer than one";
   const SendBatch third = bench.next_after(second, 5.0);
-  EXPECT_LT(third.count, 4U) << "but not when they take minutes";
+  EXPECT_LT(third.count(), 4U) << "but not when they take minutes";
 }
 
 TEST(SchedulerPace, TheLastBatchesOfAStudyAreNotShorterThanTheirWayIsWorth) {
@@ -78,9 +78,9 @@ TEST(SchedulerPace, TheLastBatchesOfAStudyAreNotShorterThanTheirWayIsWorth) {
   bench.feed(StudyAdded{1, table_of(1000), {}});
   SendBatch batch = bench.join(1, 1).at(0);
   std::vector<std::uint64_t> counts;
-  for (std::uint64_t left = 1000 - batch.count; left > 0; left -= batch.count) {
+  for (std::uint64_t left = 1000 - batch.count(); left > 0; left -= batch.count()) {
     batch = bench.next_after(batch, 1e-4);
-    counts.push_back(batch.count);
+    counts.push_back(batch.count());
   }
   EXPECT_GE(counts.at(counts.size() - 2), 100U) << "0.01 s at 0.1 ms a point";
   EXPECT_LT(counts.size(), 12U);
@@ -92,7 +92,7 @@ TEST(SchedulerPace, ABatchGrowsToSoManyTimesTheLastOneAtMost) {
   SchedulerBench bench(settings);
   bench.feed(StudyAdded{1, table_of(1'000'000), {}});
   const SendBatch first = bench.join(1, 1).at(0);
-  EXPECT_EQ(bench.next_after(first, 1e-6).count, 4 * first.count);
+  EXPECT_EQ(bench.next_after(first, 1e-6).count(), 4 * first.count());
 }
 
 }  // namespace

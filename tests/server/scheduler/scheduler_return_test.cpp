@@ -12,19 +12,19 @@ TEST(SchedulerReturnTest, ABatchThatIsGivenBackIsFreeAtOnceAndNoLoss) {
   SchedulerBench bench(trusting());
   bench.feed(StudyAdded{1, table_of(100), {}});
   const SendBatch batch = only<SendBatch>(bench.join_as("a", 1, 1)).at(0);
-  ASSERT_GT(batch.count, 1U);
+  ASSERT_GT(batch.count(), 1U);
   bench.join_as("b", 2, 1000);  // takes all others and waits for more
   // One point is solved, the rest goes back.
-  bench.feed(ResultsReceived{1, 1, batch.lease, 1, false, 1e-3, {{batch.first_point, false}}});
+  bench.feed(ResultsReceived{1, 1, batch.lease, 1, false, 1e-3, {{batch.first_point(), false}}});
   const auto again = only<SendBatch>(bench.feed(BatchesReturned{1, {batch.lease}}));
-  std::uint64_t next = batch.first_point + 1;
+  std::uint64_t next = batch.first_point() + 1;
   for (const SendBatch& part : again) {
     EXPECT_EQ(part.worker, 2U);
-    EXPECT_EQ(part.first_point, next);
+    EXPECT_EQ(part.first_point(), next);
     EXPECT_EQ(part.attempt, batch.attempt + 1);
-    next += part.count;
+    next += part.count();
   }
-  EXPECT_EQ(next, batch.first_point + batch.count);
+  EXPECT_EQ(next, batch.first_point() + batch.count());
   EXPECT_EQ(bench.scheduler.worker(1, bench.now_ms).losses, 0U);
   EXPECT_EQ(bench.scheduler.worker(1, bench.now_ms).leased_points, 0U);
 }
@@ -47,7 +47,7 @@ TEST(SchedulerReturnTest, LeasesOfOthersAndUnknownOnesStay) {
   const SendBatch other = bench.join(2, 1).at(0);
   bench.feed(BatchesReturned{2, {batch.lease, 0, UINT64_MAX, other.lease, other.lease}});
   bench.feed(BatchesReturned{99, {batch.lease}});
-  EXPECT_EQ(bench.scheduler.worker(1, bench.now_ms).leased_points, batch.count);
+  EXPECT_EQ(bench.scheduler.worker(1, bench.now_ms).leased_points, batch.count());
   EXPECT_EQ(bench.scheduler.worker(2, bench.now_ms).leased_points, 0U);
 }
 

@@ -72,7 +72,7 @@ TEST(SchedulerShare, ForgottenFailuresAreFreeAgainAndOthersStaySettled) {
   failures.insert(7);
   const auto batches = only<SendBatch>(bench.feed(FailuresForgotten{1, failures}));
   ASSERT_EQ(batches.size(), 1U);
-  EXPECT_EQ(batches[0].first_point, 2U);
+  EXPECT_EQ(batches[0].first_point(), 2U);
   EXPECT_EQ(bench.scheduler.study(1).failed, 0U);
   EXPECT_EQ(bench.scheduler.study(1).solved, 7U);
 }

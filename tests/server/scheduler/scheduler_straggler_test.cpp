@@ -15,7 +15,7 @@ class StragglerTest : public testing::Test {
   StragglerTest() : bench_(settings()) {
     bench_.feed(StudyAdded{1, table_of(4), {}});
     first_ = bench_.join(1, 1).at(0);
-    EXPECT_EQ(first_.count, 4U);
+    EXPECT_EQ(first_.count(), 4U);
     EXPECT_TRUE(bench_.join(2, 1).empty());
   }
 
@@ -61,8 +61,8 @@ TEST_F(StragglerTest, ABatchThatTakesTooLongIsGivenToASecondWorkerToo) {
   EXPECT_TRUE(only<SendBatch>(bench_.pass(750, {1, 2})).empty()) << "too early";
   const SendBatch batch = second();
   EXPECT_EQ(batch.worker, 2U);
-  EXPECT_EQ(batch.first_point, 0U);
-  EXPECT_EQ(batch.count, 4U);
+  EXPECT_EQ(batch.first_point(), 0U);
+  EXPECT_EQ(batch.count(), 4U);
   EXPECT_EQ(batch.attempt, 2U);
   EXPECT_EQ(bench_.scheduler.study(1).leased, 4U) << "points count once";
 }
@@ -70,8 +70,8 @@ TEST_F(StragglerTest, ABatchThatTakesTooLongIsGivenToASecondWorkerToo) {
 TEST_F(StragglerTest, OnlyWhatIsLeftOfTheBatchGoesToTheSecondWorker) {
   answer(first_, {0, 1}, false);
   const SendBatch batch = second();
-  EXPECT_EQ(batch.first_point, 2U);
-  EXPECT_EQ(batch.count, 2U);
+  EXPECT_EQ(batch.first_point(), 2U);
+  EXPECT_EQ(batch.count(), 2U);
 }
 
 TEST_F(StragglerTest, TheFirstAnswerWinsAndTheOtherWorkerIsReleased) {
@@ -102,7 +102,7 @@ TEST_F(StragglerTest, PointsStayLeasedWhileOneOfTheTwoWorkersHasThem) {
   EXPECT_EQ(bench_.scheduler.study(1).leased, 4U);
   bench_.feed(WorkerLeft{2});
   EXPECT_EQ(bench_.scheduler.study(1).leased, 0U);
-  EXPECT_EQ(bench_.join(3, 1).at(0).count, 4U);
+  EXPECT_EQ(bench_.join(3, 1).at(0).count(), 4U);
   EXPECT_EQ(batch.worker, 2U);
 }
 
@@ -143,7 +143,7 @@ TEST_F(StragglerTest, ABatchThatWaitsBehindAnotherOfItsWorkerIsTakenOver) {
   bench.feed(CreditGiven{2, 1});
   const auto taken = only<SendBatch>(bench.pass(500, {1, 2}));
   ASSERT_EQ(taken.size(), 1U);
-  EXPECT_EQ(taken[0].first_point, waits.first_point);
+  EXPECT_EQ(taken[0].first_point(), waits.first_point());
 }
 
 TEST_F(StragglerTest, ABatchThatKillsWorkersIsFoundAlthoughTwoOfThemHadIt) {
@@ -154,7 +154,7 @@ TEST_F(StragglerTest, ABatchThatKillsWorkersIsFoundAlthoughTwoOfThemHadIt) {
   const auto probe = only<SendProbe>(bench_.feed(WorkerUnreachable{2}));
   // Two workers were lost: the points are suspect now, and go to a worker that has proven itself.
   ASSERT_EQ(probe.size(), 1U);
-  EXPECT_EQ(only<SendBatch>(bench_.solve_probe(probe[0])).at(0).count, 1U) << "split";
+  EXPECT_EQ(only<SendBatch>(bench_.solve_probe(probe[0])).at(0).count(), 1U) << "split";
 }
 
 TEST_F(StragglerTest, AFailureForgottenUnderARunningLeaseIsNotGivenBackWhileItsNewLeaseLasts) {

@@ -98,7 +98,7 @@ TEST(SchedulerTest, ACancelGivesBackThePointsOfLeasesThatOverlap) {
   const SendBatch first = bench.join(1, 1).at(0);
   bench.join(2, 1);
   ASSERT_EQ(only<SendBatch>(bench.pass(1500, {1, 2})).size(), 1U) << "it straggles";
-  ASSERT_EQ(bench.scheduler.worker(2, bench.now_ms).leased_points, first.count);
+  ASSERT_EQ(bench.scheduler.worker(2, bench.now_ms).leased_points, first.count());
   EXPECT_EQ(only<WithdrawStudy>(bench.feed(StudyCancelled{1})).size(), 2U);
   EXPECT_EQ(bench.scheduler.study(1).leased, 0U);
   bench.feed(CreditGiven{1, 1});

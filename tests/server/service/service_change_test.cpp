@@ -100,7 +100,7 @@ TEST_F(ServiceTest, TheAttemptGoesOnCountingAfterARetryAlsoWhenTheServerStartedA
   std::map<std::uint64_t, std::uint32_t> attempts;
   for (const auto& message : outbox_.worker_messages) {
     if (message.has_batch()) {
-      attempts[message.batch().first_point()] = message.batch().attempt();
+      attempts[points_of(message.batch()).front()] = message.batch().attempt();
     }
   }
   EXPECT_EQ(attempts, (std::map<std::uint64_t, std::uint32_t>{{0, 1}, {1, 5}}));

@@ -146,7 +146,7 @@ class ServiceTest : public testing::Test {
     results.set_attempt(batch.attempt());
     results.set_sequence(++sequence_);
     results.set_batch_done(true);
-    for (std::uint64_t i = batch.first_point(); i < batch.first_point() + batch.count(); ++i) {
+    for (const std::uint64_t i : points_of(batch)) {
       *results.add_results() =
           i < first_failed ? solved_point(i) : protocol::failed_point(i, "for the test");
     }

@@ -86,7 +86,7 @@ TEST_F(ServiceGrowthTest, AStudyThatIsDoneRunsAgainAndItsWorkersAreToldOfTheFurt
   EXPECT_EQ(
       outbox_.worker_messages.at(outbox_.worker_messages.size() - 2).study().recipe().blocks_size(),
       2);
-  EXPECT_EQ(last_message().batch().first_point(), 3U);
+  EXPECT_EQ(points_of(last_message().batch()).front(), 3U);
   solve_everything();
   EXPECT_EQ(status_of("a").state(), "done");
 }

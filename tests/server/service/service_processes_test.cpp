@@ -100,7 +100,7 @@ TEST_F(ProcessesTest, AProbeIsAStudyOfOnePointThatAnyWorkerReadsAndItsResultIsAc
   ASSERT_TRUE(last_message().has_batch());
   const auto batch = last_message().batch();
   EXPECT_EQ(batch.study_id(), 0U);
-  EXPECT_EQ(batch.count(), 1U);
+  EXPECT_EQ(points_of(batch).size(), 1U);
   const auto& definition = outbox_.worker_messages.at(outbox_.worker_messages.size() - 2);
   ASSERT_TRUE(definition.has_study());
   EXPECT_EQ(definition.study().study_id(), 0U);
@@ -144,7 +144,7 @@ TEST_F(ProcessesTest, ABatchMayBeOfSeveralModels) {
   write_all();
   hello();
   credit(1);
-  EXPECT_EQ(last_message().batch().count(), 8U);
+  EXPECT_EQ(points_of(last_message().batch()).size(), 8U);
 }
 
 }  // namespace

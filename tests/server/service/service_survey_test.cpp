@@ -84,7 +84,7 @@ TEST_F(ServiceSurveyTest, TheWorkerGetsTheRecipeAndOnlyWhatIsLeftInIsWantedOfIt)
   write_all();
   hello();
   credit(1);
-  EXPECT_EQ(last_message().batch().first_point(), 8U);
+  EXPECT_EQ(points_of(last_message().batch()).front(), 8U);
   for (int point = 0; point < 3; ++point) {
     answer_batch(100);
     credit(1);

@@ -9,9 +9,10 @@ namespace oblique::solver {
 namespace {
 
 constexpr std::size_t kMostStages = GaussCollocation::kMostStages;
-/// Numbers that a fall keeps at most, of states and of intervals each: 16 MB. All steps of the
-/// default model fit.
-constexpr std::size_t kMostNumbers = (std::size_t{16} << 20) / sizeof(double);
+/// Numbers that a fall keeps at most: 16 MB of states and 4 MB of intervals. With fewer states a
+/// state at a drop costs more than it should beside a contact; more leave room for fewer falls.
+constexpr std::size_t kMostOfStates = (std::size_t{16} << 20) / sizeof(double);
+constexpr std::size_t kMostOfIntervals = (std::size_t{4} << 20) / sizeof(double);
 
 /// What the accelerations of the stages do up to the fraction c of a step: v + h sum by_v a and
 /// q + c h v + h^2 sum by_q a.
@@ -121,7 +122,7 @@ void CollocationPath::keep(const CollocationLanes& lanes, std::size_t lane) {
   }
   const std::size_t state = 3 * size();
   lanes.copy_state(lane, states_.emplace_back(state).data());
-  if (states_.size() * state <= kMostNumbers) {
+  if (states_.size() * state <= kMostOfStates) {
     return;
   }
   for (std::size_t i = 1; 2 * i < states_.size(); ++i) {
@@ -144,7 +145,7 @@ std::shared_ptr<const CollocationPath::Interval> CollocationPath::interval(
   }
   auto solved = solve_again(number);
   const std::lock_guard lock(mutex_);
-  if (!intervals_[number] && numbers_ + solved->size() <= kMostNumbers) {
+  if (!intervals_[number] && numbers_ + solved->size() <= kMostOfIntervals) {
     intervals_[number] = solved;
     numbers_ += solved->size();
   }

@@ -12,8 +12,6 @@
 namespace oblique::solver {
 namespace {
 
-constexpr std::size_t kBytesAThread = std::size_t{96} << 20U;
-constexpr std::size_t kFewestBytes = std::size_t{256} << 20U;
 constexpr std::uint64_t kLargestTask = 32;
 
 using OutcomeSink = std::function<void(PointOutcome&&)>;
@@ -34,7 +32,7 @@ class PointRuns {
       }
       const std::uint64_t number = *std::exchange(held_, std::nullopt);
       first_ = point_of(number, [&](const ModelParameters& model) {
-        return std::optional(falls_.fall(model, source_.models_ahead(number)));
+        return std::optional(falls_.fall(model, source_.models_ahead()));
       });
     }
     return true;
@@ -140,10 +138,6 @@ void solve_points_of_models(PointSource& source, FallCache& falls, bool with_err
       solve_points(next_of_run, take);
     }
   }
-}
-
-std::size_t bytes_of_falls(std::size_t threads) {
-  return std::max(kFewestBytes, threads * kBytesAThread);
 }
 
 std::uint64_t points_of_task(std::uint64_t left, std::size_t threads) {

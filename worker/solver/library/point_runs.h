@@ -31,14 +31,14 @@ class PointSource {
   /// That point. What it throws is the reason why the point has no answer.
   virtual ModelPoint point(std::uint64_t number) = 0;
   virtual ModelParameters model(std::uint64_t number) = 0;
-  /// Models of this point and of those behind it, in order, those of one fall that follow each
-  /// other once: their falls are solved beside its own.
-  virtual std::vector<ModelParameters> models_ahead(std::uint64_t number) = 0;
+  /// Models of the point that `next` gave last and of those behind it, in order, those of one fall
+  /// that follow each other once: their falls are solved beside its own.
+  virtual std::vector<ModelParameters> models_ahead() = 0;
 };
 
 /// Runs of points of one model that `models_ahead` should look at, and models that it should give,
 /// at most.
-inline constexpr int kRunsAhead = 512;
+inline constexpr int kRunsAhead = 4096;
 inline constexpr std::size_t kFallsAhead = 64;
 
 /// Adds a model to those ahead unless it shares the fall of the last one.
@@ -53,10 +53,6 @@ void solve_points_of_models(PointSource& source, FallCache& falls, bool with_err
 /// One fall for each model; those that are missing are solved side by side. One for which there is
 /// no memory just then fails.
 std::vector<FallOutcome> falls_of(FallCache& falls, std::span<const ModelParameters> models);
-
-/// What a cache of falls for so many threads may take: falls of a model of usual size that a thread
-/// has in hand, and as many ahead [bytes].
-std::size_t bytes_of_falls(std::size_t threads);
 
 /// How many of the points that are left a thread should take at a time: as many as meet in a lock
 /// seldom, about ten milliseconds of quick ones, and ever fewer towards the end, so that the

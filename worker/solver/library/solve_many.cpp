@@ -16,6 +16,7 @@
 #include "worker/solver/library/falls_kept.h"
 #include "worker/solver/library/point_runs.h"
 #include "worker/solver/library/solver.h"
+#include "worker/solver/model/fall_model.h"
 
 namespace oblique {
 namespace {
@@ -45,18 +46,19 @@ class Work {
  public:
   Work(std::span<const ModelParameters> models, std::span<const Point> points,
        const std::function<void(Outcome&&)>& take, const ManyOptions& options, std::size_t threads)
-      : models_(models.begin(), models.end()),
-        points_(points.begin(), points.end()),
+      : points_(points.begin(), points.end()),
         order_(points.size()),
         take_(&take),
         errors_(options.errors),
         falls_(options.falls),
         threads_(threads) {
-    for (const Point& point : points_) {
+    const std::vector<std::size_t> places = take_models(models);
+    for (Point& point : points_) {
       if (point.model >= models_.size()) {
         throw InputError("a point has model " + std::to_string(point.model) + " of " +
                          std::to_string(models_.size()) + ": they count from 0");
       }
+      point.model = places[point.model];
     }
     // Neighbours share a model, a fall, the state at touch, and all until the first turn.
     std::iota(order_.begin(), order_.end(), std::size_t{0});
@@ -132,8 +134,9 @@ class Work {
       return {point.model, point.H_m, point.mu, point.e};
     }
     ModelParameters model(std::uint64_t number) override { return work_.models_[number]; }
-    std::vector<ModelParameters> models_ahead(std::uint64_t number) override {
+    std::vector<ModelParameters> models_ahead() override {
       std::vector<ModelParameters> models;
+      std::uint64_t number = next_ - 1;  // given last
       for (int run = 0; run < solver::kRunsAhead && models.size() < solver::kFallsAhead; ++run) {
         const std::size_t model = work_.at(number).model;
         solver::add_ahead(models, work_.models_[model]);
@@ -154,6 +157,21 @@ class Work {
     std::uint64_t next_ = 0;
     std::uint64_t end_ = 0;
   };
+
+  /// Sets models_ so that models of one fall follow each other. Returns where each one is.
+  std::vector<std::size_t> take_models(std::span<const ModelParameters> models) {
+    std::vector<std::pair<std::uint64_t, std::size_t>> by_fall;
+    for (std::size_t i = 0; i < models.size(); ++i) {
+      by_fall.emplace_back(solver::fall_hash(models[i]), i);
+    }
+    std::sort(by_fall.begin(), by_fall.end());
+    std::vector<std::size_t> places(models.size());
+    for (const auto& [fall, number] : by_fall) {
+      places[number] = models_.size();
+      models_.push_back(models[number]);
+    }
+    return places;
+  }
 
   /// By its place in the order.
   const Point& at(std::uint64_t number) const { return points_[order_[number]]; }
@@ -196,8 +214,8 @@ class Work {
     changed_.notify_all();
   }
 
-  const std::vector<ModelParameters> models_;
-  const std::vector<Point> points_;
+  std::vector<ModelParameters> models_;
+  std::vector<Point> points_;
   std::vector<std::size_t> order_;  ///< places of points, neighbours together
   std::atomic<bool> stopped_ = false;
   std::mutex mutex_;

@@ -1,6 +1,8 @@
 #include "worker/solver/model/fall_model.h"
 
 #include <algorithm>
+#include <bit>
+#include <cstdint>
 
 namespace oblique::solver {
 
@@ -16,6 +18,24 @@ ModelParameters fall_model(const ModelParameters& model) {
     falling.spectral_radius = defaults.spectral_radius;
   }
   return falling;
+}
+
+std::uint64_t fall_hash(const ModelParameters& model) {
+  const ModelParameters falling = fall_model(model);
+  std::uint64_t hash = 0;
+  const auto mix = [&hash](double value) {  // as splitmix64
+    hash = (hash ^ std::bit_cast<std::uint64_t>(value)) + 0x9e3779b97f4a7c15U;
+    hash = (hash ^ (hash >> 30U)) * 0xbf58476d1ce4e5b9U;
+    hash = (hash ^ (hash >> 27U)) * 0x94d049bb133111ebU;
+    hash ^= hash >> 31U;
+  };
+  for (const double length_m : falling.lengths_m) {
+    mix(length_m);
+  }
+  for (const ParameterKey& key : model_keys()) {
+    mix(key.get(falling));
+  }
+  return hash;
 }
 
 }  // namespace oblique::solver

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::solver {
@@ -8,5 +10,11 @@ namespace oblique::solver {
 /// than the default, and spectral_radius where no method reads it) at its default. Models share a
 /// fall exactly when this gives the same.
 ModelParameters fall_model(const ModelParameters& model);
+
+/// Solved falls may take one part in so many of the memory that a process can have.
+inline constexpr std::uint64_t kFallsPartOfMemory = 8;
+
+/// The same number for models that share a fall; different ones share it by rare accident.
+std::uint64_t fall_hash(const ModelParameters& model);
 
 }  // namespace oblique::solver

@@ -170,8 +170,8 @@ TEST(SchedulerLosses, ABatchWhosePointsWereAllAnsweredBeforeItEndedIsNone) {
   bench.feed(StudyAdded{1, table_of(1'000'000), {}});
   const SendBatch batch = bench.join(1, 1).at(0);
   ResultsReceived answers{1, 1, batch.lease, 1, false, 1e-3, {}};
-  for (std::uint64_t i = 0; i < batch.count; ++i) {
-    answers.outcomes.push_back({batch.first_point + i, false});
+  for (std::uint64_t i = 0; i < batch.count(); ++i) {
+    answers.outcomes.push_back({batch.first_point() + i, false});
   }
   bench.feed(answers);
   bench.feed(ResultsReceived{1, 1, batch.lease, 2, true, 0.0, {}});
@@ -194,7 +194,7 @@ TEST(SchedulerLosses, ANewConnectionOfAProcessEndsItsOldOneAtOnce) {
   ASSERT_EQ(only<DropWorker>(effects).size(), 1U);
   EXPECT_EQ(only<DropWorker>(effects)[0].worker, 1U);
   ASSERT_EQ(only<SendBatch>(effects).size(), 1U);
-  EXPECT_EQ(only<SendBatch>(effects)[0].first_point, lost.first_point);
+  EXPECT_EQ(only<SendBatch>(effects)[0].first_point(), lost.first_point());
 }
 
 TEST(SchedulerLosses, ANewcomerThatConnectsAnewHasNotVanished) {

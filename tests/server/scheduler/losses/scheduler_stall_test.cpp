@@ -50,7 +50,7 @@ class StallTest : public testing::Test {
   StallTest() : bench_(settings()) {
     bench_.feed(StudyAdded{1, table_of(4), {}});
     batch_ = bench_.join(1, 1).at(0);
-    EXPECT_EQ(batch_.count, 4U);
+    EXPECT_EQ(batch_.count(), 4U);
   }
 
   static SchedulerSettings settings() {
@@ -81,7 +81,7 @@ TEST_F(StallTest, ItsPointsAreNotSuspectHoweverManyWorkersStallWithThem) {
     bench_.feed(WorkerLeft{worker - 1});
     const auto batches = bench_.join(worker, 1);
     ASSERT_EQ(batches.size(), 1U);
-    EXPECT_EQ(batches[0].count, 4U) << "they go out together";
+    EXPECT_EQ(batches[0].count(), 4U) << "they go out together";
     EXPECT_EQ(batches[0].attempt, worker);
   }
 }
@@ -137,10 +137,10 @@ TEST(SchedulerStall, SlowPointsGetAMultipleOfTheTimeThatTheFastestWorkerNeeds) {
   const SendBatch quick = bench.join(1, 1).at(0);
   const SendBatch slow = bench.join(2, 1).at(0);
   bench.pass(10'000, {1, 2});
-  bench.solve_and_store(quick, 10.0 * static_cast<double>(quick.count));
+  bench.solve_and_store(quick, 10.0 * static_cast<double>(quick.count()));
   // Ten times what eight points side by side take.
   bench.pass(780'000, {1, 2});
-  EXPECT_EQ(bench.scheduler.worker(2, bench.now_ms).leased_points, slow.count);
+  EXPECT_EQ(bench.scheduler.worker(2, bench.now_ms).leased_points, slow.count());
   bench.pass(20'000, {1, 2});
   EXPECT_EQ(bench.scheduler.worker(2, bench.now_ms).leased_points, 0U);
 }

@@ -46,8 +46,8 @@ class Supervised {
     } else {
       const SendBatch batch = held_.front();
       held_.pop_front();
-      const auto killer = killers_.lower_bound(batch.first_point);
-      if (killer != killers_.end() && *killer < batch.first_point + batch.count) {
+      const auto killer = killers_.lower_bound(batch.first_point());
+      if (killer != killers_.end() && *killer < batch.first_point() + batch.count()) {
         ++deaths;
         take(bench_.feed(WorkerUnreachable{worker_}));
         return false;
@@ -236,7 +236,7 @@ TEST(SchedulerTest, SuspectPointsGoToAProvenWorkerThatHoldsNothingElse) {
   const auto suspect = only<SendBatch>(bench.solve(fresh[1]));
   ASSERT_EQ(suspect.size(), 1U);
   EXPECT_EQ(suspect[0].attempt, 3U);
-  EXPECT_EQ(suspect[0].first_point, 0U);
+  EXPECT_EQ(suspect[0].first_point(), 0U);
 }
 
 TEST(SchedulerTest, ThePartsOfASplitChunkStaySuspect) {
@@ -246,14 +246,14 @@ TEST(SchedulerTest, ThePartsOfASplitChunkStaySuspect) {
   SchedulerBench bench(settings);
   bench.feed(StudyAdded{1, table_of(33), IntervalSet(32, 33)});
   for (const WorkerId worker : {1U, 2U}) {
-    EXPECT_EQ(bench.join(worker, 2).at(0).count, 32U);
+    EXPECT_EQ(bench.join(worker, 2).at(0).count(), 32U);
     bench.feed(WorkerUnreachable{worker});
   }
   for (const WorkerId worker : {3U, 4U}) {
     const auto probe = only<SendProbe>(bench.join_as("", worker, 2)).at(0);
     const auto part = only<SendBatch>(bench.solve_probe(probe));
     ASSERT_EQ(part.size(), 1U) << "alone, although it asked for two";
-    EXPECT_EQ(part[0].count, worker == 3 ? 4U : 1U);
+    EXPECT_EQ(part[0].count(), worker == 3 ? 4U : 1U);
     bench.feed(WorkerUnreachable{worker});
   }
 }
@@ -278,7 +278,7 @@ TEST(SchedulerTest, ABusyWorkerIsEmptiedForSuspectPoints) {
     const auto given = bench.feed(CreditGiven{3, 1});
     for (const auto& effects : {solved, given}) {
       for (const auto& next : only<SendBatch>(effects)) {
-        suspect_was_leased = suspect_was_leased || next.first_point == second.first_point;
+        suspect_was_leased = suspect_was_leased || next.first_point() == second.first_point();
         held.push_back(next);
       }
     }

@@ -23,7 +23,7 @@ PointTable mixed_table() {
 }
 
 std::uint64_t cut(const Interval& free, const Portion& wanted) {
-  return end_of_batch(mixed_table(), free, wanted);
+  return end_of_batch(mixed_table(), PointOrder{}, free, wanted);
 }
 
 TEST(BatchCut, ABatchEndsWithTheModelThatEndsNearest) {
@@ -38,10 +38,10 @@ TEST(BatchCut, AModelOfMorePointsThanABatchMayHaveIsShared) {
 }
 
 TEST(BatchCut, ABatchHasSoManyModelsAsItHasRoomFor) {
-  EXPECT_EQ(cut({50, 90}, {.points = 3, .models = 8, .most_points = 100}), 58U);
-  EXPECT_EQ(cut({50, 90}, {.points = 3, .models = 8, .most_points = 5}), 55U);
-  EXPECT_EQ(cut({0, 90}, {.points = 3, .models = 2, .most_points = 20}), 20U);
-  EXPECT_EQ(cut({0, 90}, {.points = 3, .models = 2, .most_points = 19}), 10U);
+  EXPECT_EQ(cut({50, 90}, {.points = 3, .groups = 8, .most_points = 100}), 58U);
+  EXPECT_EQ(cut({50, 90}, {.points = 3, .groups = 8, .most_points = 5}), 55U);
+  EXPECT_EQ(cut({0, 90}, {.points = 3, .groups = 2, .most_points = 20}), 20U);
+  EXPECT_EQ(cut({0, 90}, {.points = 3, .groups = 2, .most_points = 19}), 10U);
 }
 
 TEST(BatchCut, NoBatchLeavesTheFreePoints) {

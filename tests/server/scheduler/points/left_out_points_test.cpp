@@ -48,8 +48,8 @@ SchedulerSettings short_sighted() {
 std::vector<Effect> solve_left_in(SchedulerBench& bench, const protocol::PointTable& table,
                                   const SendBatch& batch, std::set<std::uint64_t>& solved) {
   ResultsReceived event{batch.worker, batch.study, batch.lease, ++bench.sequence, true, 1e-3, {}};
-  const std::uint64_t end = batch.first_point + batch.count;
-  for (std::uint64_t point = table.first_left_in(batch.first_point, end); point < end;
+  const std::uint64_t end = batch.first_point() + batch.count();
+  for (std::uint64_t point = table.first_left_in(batch.first_point(), end); point < end;
        point = table.first_left_in(point + 1, end)) {
     event.outcomes.push_back({point, false});
     EXPECT_TRUE(solved.insert(point).second) << point << " was handed out twice";
@@ -71,7 +71,7 @@ TEST(LeftOutPointsTest, ABatchIsARunOfNumbersAndCountsThoseThatAreLeftIn) {
   std::uint64_t looks = kEnoughLooks;
   const auto batch = points.take({3}, looks);
   ASSERT_TRUE(batch.has_value());
-  EXPECT_EQ(batch->first_point, 0U);
+  EXPECT_EQ(batch->first_place, 0U);
   EXPECT_EQ(batch->count, 3U);
   EXPECT_EQ(batch->points, 2U);
   EXPECT_EQ(points.leased(), 2U);
@@ -101,7 +101,7 @@ TEST(LeftOutPointsTest, ASearchEndsWithItsLooksAndGoesOnWhereItEnded) {
   while (true) {
     std::uint64_t looks = 100;
     if (const auto batch = points.take({50}, looks)) {
-      EXPECT_EQ(batch->first_point, 700U);
+      EXPECT_EQ(batch->first_place, 700U);
       EXPECT_EQ(batch->points, 1U);
       break;
     }
@@ -135,11 +135,11 @@ TEST(LeftOutPointsTest, WhatComesBackTogetherGoesOutTogether) {
   points.check_invariants();
   const auto first = points.take({20}, looks);
   ASSERT_TRUE(first.has_value());
-  EXPECT_EQ(first->first_point, 0U);
+  EXPECT_EQ(first->first_place, 0U);
   EXPECT_EQ(first->points, 2U) << "the answered one is not solved again";
   const auto rest = points.take({20}, looks);
   ASSERT_TRUE(rest.has_value());
-  EXPECT_EQ(rest->first_point, 6U);
+  EXPECT_EQ(rest->first_place, 6U);
   EXPECT_EQ(rest->points, 7U);
   points.check_invariants();
 }
@@ -156,7 +156,7 @@ TEST(LeftOutPointsTest, AfterARestartTheRowsAndTheCountTellWhatIsOpen) {
   std::set<std::uint64_t> out;
   std::uint64_t looks = kEnoughLooks;
   while (const auto batch = points.take({4}, looks)) {
-    for (const Interval& run : points.leased_set().within(batch->first_point, batch->end())) {
+    for (const Interval& run : points.leased_set().within(batch->first_place, batch->end())) {
       for (std::uint64_t point = run.begin; point < run.end; ++point) {
         out.insert(point);
       }
@@ -179,7 +179,7 @@ TEST(LeftOutPointsTest, AStudyThatIsCompleteAtARestartIsSoWithoutALook) {
   EXPECT_EQ(points.reopen(IntervalSet(2, 3)), 1U);  // it had failed, and is tried again
   EXPECT_TRUE(points.has_free());
   std::uint64_t looks = kEnoughLooks;
-  EXPECT_EQ(points.take({4}, looks)->first_point, 2U);
+  EXPECT_EQ(points.take({4}, looks)->first_place, 2U);
   points.check_invariants();
 }
 
@@ -189,7 +189,7 @@ TEST(LeftOutPointsTest, ACountThatIsTooLargeKeepsNobodyWaiting) {
   StudyPoints points = points_of(std::make_shared<const protocol::PointTable>(recipe));
   std::uint64_t looks = kEnoughLooks;
   while (const auto batch = points.take({4}, looks)) {
-    for (const Interval& run : points.leased_set().within(batch->first_point, batch->end())) {
+    for (const Interval& run : points.leased_set().within(batch->first_place, batch->end())) {
       for (std::uint64_t point = run.begin; point < run.end; ++point) {
         points.receive(point);
         points.settle(point);
@@ -260,7 +260,7 @@ TEST(LeftOutPointsTest, ASearchIsWantedOnlyWhileWorkersWait) {
     batches = only<SendBatch>(bench.feed(SearchGoesOn{}));
   }
   ASSERT_EQ(batches.size(), 1U);
-  EXPECT_EQ(batches[0].first_point, 99U);
+  EXPECT_EQ(batches[0].first_point(), 99U);
   EXPECT_FALSE(bench.scheduler.is_searching());
 }
 
@@ -332,7 +332,7 @@ TEST(LeftOutPointsTest, APointThatKillsAmongOthersIsFoundByFewWorkers) {
       continue;
     }
     const SendBatch batch = batches[0];
-    if (batch.first_point <= kKiller && kKiller < batch.first_point + batch.count) {
+    if (batch.first_point() <= kKiller && kKiller < batch.first_point() + batch.count()) {
       ++deaths;
       effects = bench.pass(15'000);  // it is silent, and then lost
       if (only<StoreFailure>(effects).empty()) {

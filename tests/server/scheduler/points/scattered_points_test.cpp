@@ -35,26 +35,14 @@ Batch taken(StudyPoints& points, const Portion& wanted) {
   return batch.value();
 }
 
-/// What a worker that passes over what is not wanted solves of a batch.
-std::vector<PointOutcome> wanted_of(const SendBatch& batch) {
-  std::vector<PointOutcome> outcomes;
-  const Interval whole{batch.first_point, batch.first_point + batch.count};
-  for (const Interval& part : batch.parts.empty() ? std::vector{whole} : batch.parts) {
-    for (std::uint64_t point = part.begin; point < part.end; ++point) {
-      outcomes.push_back({point, false});
-    }
-  }
-  return outcomes;
-}
-
 TEST(ScatteredPointsTest, ABatchGoesOnBehindSettledPointsUntilItHasWhatIsWanted) {
   StudyPoints points = points_of(100, every(2, 100));
   const Batch batch = taken(points, {8});
-  EXPECT_EQ(batch.first_point, 1U);
+  EXPECT_EQ(batch.first_place, 1U);
   EXPECT_EQ(batch.end(), 16U);
   EXPECT_EQ(batch.points, 8U);
   EXPECT_EQ(points.leased(), 8U);
-  EXPECT_EQ(taken(points, {8}).first_point, 17U);
+  EXPECT_EQ(taken(points, {8}).first_place, 17U);
 }
 
 TEST(ScatteredPointsTest, ABatchEndsBeforePointsThatAnotherHoldsAndBeforeAWideGap) {
@@ -74,14 +62,14 @@ TEST(ScatteredPointsTest, ABatchEndsBeforePointsThatAnotherHoldsAndBeforeAWideGa
   }());
   EXPECT_EQ(taken(sparse, {8}).end(), 3U);
   const Batch next = taken(sparse, {8});
-  EXPECT_EQ(next.first_point, 500U);
+  EXPECT_EQ(next.first_place, 500U);
   EXPECT_EQ(next.end(), 523U);
   EXPECT_EQ(next.points, 8U);
 }
 
 TEST(ScatteredPointsTest, ABatchGoesOnIntoAnotherModelOnlyWhereThatHasRoomInIt) {
   const auto table = std::make_shared<const protocol::PointTable>(
-      protocol::recipe_of({{protocol::listed("k", {2e7, 3e7}), protocol::listed("H", {1.0}),
+      protocol::recipe_of({{protocol::listed("E", {6e10, 7e10}), protocol::listed("H", {1.0}),
                             protocol::range("mu", 0.0, 1.0, 10), protocol::listed("e", {1.0})}}));
   StudyPoints points(StudyTable(table), every(2, 20), LossLimits{});
   EXPECT_EQ(taken(points, {8}).end(), 10U) << "the other's fall is another worker's";
@@ -98,7 +86,7 @@ TEST(ScatteredPointsTest, WhatAFilterLeavesOutLiesBetweenToo) {
   StudyPoints points(StudyTable(std::make_shared<const protocol::PointTable>(std::move(table))),
                      every(6, 100), LossLimits{});
   const Batch batch = taken(points, {6});
-  EXPECT_EQ(batch.first_point, 3U);
+  EXPECT_EQ(batch.first_place, 3U);
   EXPECT_EQ(batch.points, 5U) << "3, 9, 15, 21 and 27: where half of the rest is found, that is it";
   EXPECT_EQ(batch.end(), 28U);
 }
@@ -113,7 +101,7 @@ TEST(ScatteredPointsTest, TheWorkerIsToldWhatIsWantedOfTheBatchAndNothingIsHande
   while (!batches.empty()) {
     const SendBatch batch = batches.front();
     batches.erase(batches.begin());
-    const auto outcomes = wanted_of(batch);
+    const auto outcomes = SchedulerBench::outcomes_of(batch);
     for (const PointOutcome& outcome : outcomes) {
       solved.push_back(outcome.point);
     }
@@ -135,7 +123,7 @@ TEST(ScatteredPointsTest, WhatIsLeftOfALostBatchComesBackAndNothingBetween) {
   SchedulerBench bench(settings);
   bench.feed(StudyAdded{1, table_of(1000), every(2, 1000)});
   const SendBatch batch = bench.join(1, 1).at(0);
-  auto outcomes = wanted_of(batch);
+  auto outcomes = SchedulerBench::outcomes_of(batch);
   ASSERT_EQ(outcomes.size(), 16U);
   outcomes.resize(5);
   bench.feed(ResultsReceived{1, 1, batch.lease, ++bench.sequence, false, 1e-3, outcomes});
@@ -143,18 +131,21 @@ TEST(ScatteredPointsTest, WhatIsLeftOfALostBatchComesBackAndNothingBetween) {
   EXPECT_EQ(bench.scheduler.study(1).leased, 0U);
   std::uint64_t handed_out = 0;
   for (const SendBatch& again : bench.join(2, 1000)) {
-    handed_out += again.parts.empty() ? again.count : size_of(again.parts);
+    handed_out += again.count();
   }
   EXPECT_EQ(handed_out, 495U);
 }
 
-TEST(ScatteredPointsTest, ResultsOfWhatWasNotWantedAreNotTaken) {
+TEST(ScatteredPointsTest, ResultsOfSettledPointsBetweenThoseOfABatchAreNotTaken) {
   SchedulerBench bench(trusting());
   bench.feed(StudyAdded{1, table_of(100), every(2, 100)});
-  const SendBatch batch = bench.join(1, 1).at(0);
+  SendBatch batch = bench.join(1, 1).at(0);
+  const std::uint64_t wanted = batch.count();
+  ASSERT_GT(batch.points.size(), 1U);
+  batch.points = {{batch.points.front().begin, batch.points.back().end}};
   const auto stores = only<StoreResults>(bench.solve(batch));
   ASSERT_EQ(stores.size(), 1U);
-  EXPECT_EQ(stores[0].accepted.size(), size_of(batch.parts)) << "an older worker solves all";
+  EXPECT_EQ(stores[0].accepted.size(), wanted);
 }
 
 }  // namespace

@@ -35,7 +35,7 @@ TEST(SchedulerTaken, WhatIsTakenIsNotHandedOutAndBelongsToItsVersion) {
   bench.feed(WorkerJoined{2, 1, "2.0"});
   const auto batches = only<SendBatch>(bench.feed(CreditGiven{2, 4}));
   ASSERT_THAT(batches, Not(IsEmpty()));
-  EXPECT_LE(batches.back().first_point + batches.back().count, 2U);
+  EXPECT_LE(batches.back().first_point() + batches.back().count(), 2U);
 }
 
 TEST(SchedulerTaken, AStudyOfWhichAllIsTakenIsFinished) {
@@ -55,12 +55,12 @@ TEST(SchedulerTaken, PointsThatAreOutAreTakenAllTheSameAndTheirBatchIsWithdrawn)
   const auto batches = only<SendBatch>(bench.feed(CreditGiven{1, 2}));
   ASSERT_THAT(batches, SizeIs(2));
   const auto& second = batches[1];
-  const IntervalSet taken(second.first_point, second.first_point + second.count + 5);
+  const IntervalSet taken(second.first_point(), second.first_point() + second.count() + 5);
   const auto released = only<ReleaseBatch>(bench.feed(PointsTaken{1, taken, "2.0"}));
   ASSERT_THAT(released, SizeIs(1));
   EXPECT_EQ(released[0].lease, second.lease);
   bench.feed(WorkerLeft{1});
-  EXPECT_EQ(bench.scheduler.study(1).solved, second.count + 5);
+  EXPECT_EQ(bench.scheduler.study(1).solved, second.count() + 5);
 }
 
 TEST(SchedulerTaken, AHeldStudyCanBePausedCancelledAndGoOn) {

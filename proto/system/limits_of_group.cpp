@@ -1,11 +1,13 @@
-#include "client/verbs/doctor/limits_of_group.h"
+#include "proto/system/limits_of_group.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <sstream>
+#include <string_view>
 
-namespace oblique::client::doctor {
+namespace oblique::protocol {
 namespace {
 
 std::string text_of(const std::string& file) {
@@ -99,4 +101,19 @@ LimitsOfGroup limits_of_group() {
   return limits_of_group("/sys/fs/cgroup", text_of("/proc/self/cgroup"));
 }
 
-}  // namespace oblique::client::doctor
+std::uint64_t available_memory_bytes() {
+  constexpr std::uint64_t kKibibyte = 1024;
+  constexpr std::uint64_t kUnknown = std::uint64_t{2} << 30U;
+  constexpr std::string_view kName = "MemAvailable:";
+  std::uint64_t bytes = 0;
+  std::ifstream lines("/proc/meminfo");
+  for (std::string line; bytes == 0 && std::getline(lines, line);) {
+    if (line.starts_with(kName)) {
+      bytes = kKibibyte * std::strtoull(line.c_str() + kName.size(), nullptr, 10);
+    }
+  }
+  bytes = bytes == 0 ? kUnknown : bytes;
+  return std::min(bytes, limits_of_group().memory_bytes.value_or(bytes));
+}
+
+}  // namespace oblique::protocol

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-namespace oblique::client::doctor {
+namespace oblique::protocol {
 
 /// What a container or a service may take of its machine, by its control group (cgroup).
 struct LimitsOfGroup {
@@ -17,4 +17,8 @@ struct LimitsOfGroup {
 LimitsOfGroup limits_of_group(const std::string& root, const std::string& own);
 LimitsOfGroup limits_of_group();
 
-}  // namespace oblique::client::doctor
+/// Memory that this process can still take: what the machine has free, or its group's limit if
+/// that is less [bytes].
+std::uint64_t available_memory_bytes();
+
+}  // namespace oblique::protocol

@@ -1,0 +1,241 @@
+#include "server/scheduler/points/point_order.h"
+
+#include <algorithm>
+#include <iterator>
+#include <numeric>
+#include <unordered_map>
+#include <utility>
+
+#include "proto/recipe/keys.h"
+#include "worker/solver/model/fall_model.h"
+
+namespace oblique::server {
+namespace {
+
+/// Points of one fall that follow each other.
+struct Piece {
+  Interval points;
+  std::uint64_t fall;  ///< number of its fall
+};
+
+/// The points from a number on, as pieces, and the first open point of each fall.
+struct Falls {
+  static constexpr std::uint64_t kNone = ~std::uint64_t{0};
+
+  Falls(const protocol::PointTable& table, std::uint64_t first, const IntervalSet& open) {
+    std::unordered_map<std::uint64_t, std::uint64_t> numbers;
+    for (std::uint64_t at = first; at < table.size();) {
+      const protocol::Segment segment = table.segment_at(at);
+      const Interval points{at, segment.first_point + segment.count};
+      const std::uint64_t hash = solver::fall_hash(table.model(segment.model));
+      const std::uint64_t fall = numbers.try_emplace(hash, numbers.size()).first->second;
+      if (pieces.empty() || pieces.back().fall != fall) {
+        pieces.push_back({points, fall});
+      }
+      pieces.back().points.end = points.end;
+      heads.resize(numbers.size(), kNone);
+      const auto found = open.first_from(points.begin);
+      if (heads[fall] == kNone && found && found->begin < points.end) {
+        heads[fall] = found->begin;
+      }
+      at = points.end;
+    }
+  }
+
+  /// Numbers the falls anew, those with open points first, and sorts the pieces by fall. Returns
+  /// how many have open points.
+  std::uint64_t sort() {
+    std::vector<std::uint64_t> order(heads.size());
+    std::iota(order.begin(), order.end(), std::uint64_t{0});
+    const auto middle = std::stable_partition(
+        order.begin(), order.end(), [this](std::uint64_t fall) { return heads[fall] != kNone; });
+    std::vector<std::uint64_t> new_heads(heads.size());
+    std::vector<std::uint64_t> numbers(heads.size());
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      numbers[order[i]] = i;
+      new_heads[i] = heads[order[i]];
+    }
+    heads = std::move(new_heads);
+    for (Piece& piece : pieces) {
+      piece.fall = numbers[piece.fall];
+    }
+    std::stable_sort(pieces.begin(), pieces.end(),
+                     [](const Piece& a, const Piece& b) { return a.fall < b.fall; });
+    return static_cast<std::uint64_t>(middle - order.begin());
+  }
+
+  std::vector<Piece> pieces;
+  std::vector<std::uint64_t> heads;  ///< by fall; kNone: it has no open point
+};
+
+/// Whether points of the block may share a fall and lie apart: not if each has its own.
+bool may_share_falls(const protocol::Block& block) {
+  return std::none_of(block.axes().begin(), block.axes().end(), [](const protocol::Axis& axis) {
+    const auto& key = protocol::axis_key(axis.key());
+    if (key.set == nullptr || !axis.has_distribution()) {
+      return false;
+    }
+    solver::ModelParameters one;
+    solver::ModelParameters other;
+    key.set(one, 1.0);
+    key.set(other, 2.0);
+    return solver::fall_hash(one) != solver::fall_hash(other);
+  });
+}
+
+}  // namespace
+
+void PointOrder::arrange(const protocol::PointTable& table, std::uint64_t first,
+                         const IntervalSet& open, std::uint64_t falls_a_group) {
+  const auto& blocks = table.recipe().blocks();
+  if (first != end_ || table.models() > kMostModels ||
+      std::none_of(blocks.begin(), blocks.end(), may_share_falls)) {
+    return;
+  }
+  Falls falls(table, first, open);
+  if (falls.pieces.size() == falls.heads.size()) {
+    return;  // no fall lies apart
+  }
+  const std::uint64_t open_falls = std::max<std::uint64_t>(falls.sort(), 1);
+  const std::uint64_t groups = (open_falls + falls_a_group - 1) / falls_a_group;
+  const auto group_of = [&](std::uint64_t fall) {  // of nearly one size; the last has the rest
+    return std::min(fall * groups / open_falls, groups - 1);
+  };
+  end_ = first;
+  for (auto begin = falls.pieces.begin(); begin != falls.pieces.end();) {
+    const std::uint64_t group = group_of(begin->fall);
+    const auto end = std::find_if(begin, falls.pieces.end(), [&](const Piece& piece) {
+      return group_of(piece.fall) != group;
+    });
+    groups_.push_back(end_);
+    for (std::uint64_t fall = begin->fall; fall <= std::prev(end)->fall; ++fall) {
+      if (const std::uint64_t head = falls.heads[fall]; head != Falls::kNone) {
+        append({head, head + 1});
+      }
+    }
+    for (auto piece = begin; piece != end; ++piece) {
+      const std::uint64_t head = falls.heads[piece->fall];
+      const bool has_head = head >= piece->points.begin && head < piece->points.end;
+      append({piece->points.begin, has_head ? head : piece->points.end});
+      append({has_head ? head + 1 : piece->points.end, piece->points.end});
+    }
+    begin = end;
+  }
+  by_point_.resize(runs_.size());
+  std::iota(by_point_.begin(), by_point_.end(), 0U);
+  std::sort(by_point_.begin(), by_point_.end(),
+            [this](std::uint32_t a, std::uint32_t b) { return runs_[a].point < runs_[b].point; });
+}
+
+/// Gives these points the places behind the last one.
+void PointOrder::append(const Interval& points) {
+  if (points.begin == points.end) {
+    return;
+  }
+  if (runs_.empty() || runs_.back().point + (end_ - runs_.back().place) != points.begin) {
+    runs_.push_back({end_, points.begin});
+  }
+  end_ += points.end - points.begin;
+}
+
+std::uint64_t PointOrder::end_of_run(std::size_t run) const {
+  return run + 1 < runs_.size() ? runs_[run + 1].place : end_;
+}
+
+std::size_t PointOrder::run_of_place(std::uint64_t place) const {
+  const auto after =
+      std::upper_bound(runs_.begin(), runs_.end(), place,
+                       [](std::uint64_t at, const Run& run) { return at < run.place; });
+  return static_cast<std::size_t>(std::distance(runs_.begin(), after)) - 1;
+}
+
+std::uint64_t PointOrder::place(std::uint64_t point) const {
+  if (point >= end_) {
+    return point;
+  }
+  const auto after = std::upper_bound(
+      by_point_.begin(), by_point_.end(), point,
+      [this](std::uint64_t at, std::uint32_t run) { return at < runs_[run].point; });
+  const Run& run = runs_[*std::prev(after)];
+  return run.place + (point - run.point);
+}
+
+std::uint64_t PointOrder::point(std::uint64_t place) const {
+  if (place >= end_) {
+    return place;
+  }
+  const Run& run = runs_[run_of_place(place)];
+  return run.point + (place - run.place);
+}
+
+std::vector<Interval> PointOrder::points(const Interval& places) const {
+  std::vector<Interval> points;
+  std::uint64_t at = places.begin;
+  for (std::size_t run = at < end_ ? run_of_place(at) : runs_.size(); at < places.end; ++run) {
+    const std::uint64_t end = at < end_ ? std::min(end_of_run(run), places.end) : places.end;
+    const std::uint64_t first = point(at);
+    if (points.empty() || points.back().end != first) {
+      points.push_back({first, first});
+    }
+    points.back().end += end - at;
+    at = end;
+  }
+  return points;
+}
+
+IntervalSet PointOrder::places(const IntervalSet& points) const {
+  if (!is_arranged()) {
+    return points;
+  }
+  std::vector<Interval> parts;
+  points.for_each([&](const Interval& interval) {
+    for (std::uint64_t at = interval.begin; at < interval.end;) {
+      const std::uint64_t first = place(at);
+      const std::uint64_t room =
+          at < end_ ? end_of_run(run_of_place(first)) - first : interval.end - at;
+      const std::uint64_t count = std::min(room, interval.end - at);
+      parts.push_back({first, first + count});
+      at += count;
+    }
+  });
+  // In order they are merged as they come.
+  std::sort(parts.begin(), parts.end(),
+            [](const Interval& a, const Interval& b) { return a.begin < b.begin; });
+  IntervalSet places;
+  Interval joined{0, 0};
+  for (const Interval& part : parts) {
+    if (part.begin != joined.end) {
+      places.insert(joined.begin, joined.end);
+      joined.begin = part.begin;
+    }
+    joined.end = part.end;
+  }
+  places.insert(joined.begin, joined.end);
+  return places;
+}
+
+Interval PointOrder::group_at(const protocol::PointTable& table, std::uint64_t place) const {
+  if (place < end_) {
+    const auto after = std::upper_bound(groups_.begin(), groups_.end(), place);
+    return {*std::prev(after), after == groups_.end() ? end_ : *after};
+  }
+  const protocol::Segment segment = table.segment_at(place);
+  return {std::max(segment.first_point, end_), segment.first_point + segment.count};
+}
+
+std::uint64_t PointOrder::first_left_in(const protocol::PointTable& table, std::uint64_t begin,
+                                        std::uint64_t end) const {
+  for (std::uint64_t at = begin; at < end;) {
+    const std::uint64_t run_end = at < end_ ? std::min(end_of_run(run_of_place(at)), end) : end;
+    const std::uint64_t first = point(at);
+    const std::uint64_t past = first + (run_end - at);
+    const std::uint64_t found = table.first_left_in(first, past);
+    if (found < past) {
+      return at + (found - first);
+    }
+    at = run_end;
+  }
+  return end;
+}
+
+}  // namespace oblique::server
