@@ -43,6 +43,9 @@ ChildSettings server_settings(const ServiceSettings& settings, const KeysForARun
                     std::to_string(getpid()), "--keys", keys.file_of(protocol::Role::kServer)},
       .show_errors = settings.verbose,
       .handed_over = ready};
+  if (!settings.only_study.empty()) {
+    child.arguments.push_back("--only-study=" + settings.only_study);
+  }
   if (settings.allow_network_disk) {
     child.arguments.emplace_back("--allow-network-disk");
   }

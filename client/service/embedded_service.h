@@ -20,6 +20,7 @@ struct ServiceSettings {
   bool allow_network_disk = false;      ///< the database may lie on a network file system
   std::string http = "off";             ///< where its page is: ADDRESS:PORT
   std::uint64_t fall_memory_bytes = 0;  ///< of all workers; 0: an eighth of what is free
+  std::string only_study{};             ///< the others of the database wait; empty: all are solved
   bool verbose = false;                 ///< what server and workers say goes to our standard error
   /// Told what the server is at while its start takes long.
   std::function<void(const std::string&)> on_long_start = [](const std::string&) {};

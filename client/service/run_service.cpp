@@ -4,6 +4,7 @@
 #include <iostream>
 #include <string>
 #include <system_error>
+#include <vector>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -57,6 +58,32 @@ std::string objection_to_waiting(const protocol::StudyStatus& status) {
       shown_count(status.points() - status.solved() - status.failed()));
 }
 
+/// Names the other studies of the database that are not finished. They wait during this run.
+void tell_of_other_studies(Connection& connection, const Study& study,
+                           const std::filesystem::path& database) {
+  constexpr std::size_t kMostNamed = 3;
+  std::vector<std::string> others;
+  const auto all = connection.status({});
+  for (const auto& other : all.studies()) {
+    if (other.name() != study.name && other.state() == "running") {
+      others.push_back(fmt::format("{} ({} points open)", other.name(),
+                                   shown_count(other.points() - other.solved() - other.failed())));
+    }
+  }
+  if (others.empty()) {
+    return;
+  }
+  std::string more;
+  if (others.size() > kMostNamed) {
+    more = fmt::format(" and {} more", shown_count(others.size() - kMostNamed));
+    others.resize(kMostNamed);
+  }
+  tell_line(fmt::format(
+      "Also unfinished in {0}: {1}{2}. To go on with one, repeat the `oblique run` that "
+      "began it; `oblique view {0}` goes on with all.",
+      database.string(), fmt::join(others, ", "), more));
+}
+
 RunEnd submit_and_wait(const Study& study, const RunSettings& settings, EmbeddedService& service,
                        protocol::StopSignals& stop) {
   const auto look_after = [&] {
@@ -79,6 +106,7 @@ RunEnd submit_and_wait(const Study& study, const RunSettings& settings, Embedded
   if (const std::string taken = taken_over(submitted.taken()); !taken.empty()) {
     std::cerr << fmt::format("\"{}\": {}\n", study.name, taken);
   }
+  tell_of_other_studies(connection, study, settings.service.database);
   const auto ask = [&](const Tell& tell) {
     look_after();
     const auto reply = connection.status(study.name, tell);
@@ -137,6 +165,7 @@ std::optional<RunEnd> run_study(const Study& study, const RunSettings& settings,
   check_settings(settings);
   try {
     ServiceSettings how = settings.service;
+    how.only_study = study.name;
     if (!how.verbose) {  // else its log says it
       how.on_long_start = [&how](const std::string& sentence) {
         tell_line(fmt::format("{}: {}.", how.database.string(), sentence));

@@ -23,7 +23,8 @@ constexpr const char* kRunExamples = R"(Examples:
   oblique run --H 1 --mu 0.1:2.0:40 --e 0.6,0.8,1 --name friction
   oblique run sweep.toml --db sweep.db --workers 4
 
-Ctrl-C stops it and loses nothing: the same command again goes on where it stopped.
+Ctrl-C stops it and loses nothing: the same command again goes on where it stopped. Other studies of
+the database that are not finished wait meanwhile.
 The exit code is 1 when a point failed, too.)";
 
 struct RunFlags {

@@ -180,12 +180,17 @@ void add_options(CLI::App& app, Configuration& configuration, StopWithParent& pa
                                "for each step of a start that takes long; -1: none")
                     ->check(objection_to_descriptor);
   options.http.add_to(app);
+  auto* only = app.add_option("--only-study", loop.service.only_study,
+                              "Hand out points of this study alone; others of the database wait. "
+                              "Empty: of all studies")
+                   ->type_name("NAME");
   constexpr double kLongestDrain_s = 1e6;
   app.add_option("--drain", options.drain_s,
                  "When told to stop, wait so long for results under way; 0: end at once")
       ->type_name("SECONDS")
       ->check(oblique::protocol::number_between(0.0, kLongestDrain_s));
   configuration.keep_to_command_line(ready);
+  configuration.keep_to_command_line(only);
   configuration.keep_to_command_line(parent.add_to(app));
   add_log_flags(app, configuration, options.log);
   add_limits(app, loop.network, loop.service, loop.queries.turns);

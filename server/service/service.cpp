@@ -41,10 +41,13 @@ Service::Service(const ServiceSettings& settings, Outbox& outbox, std::vector<St
       note_source(study.study_id);
     }
     known_.restore(study.study_id, study.taken);
-    const bool seeks = study.takes_over && outbox.finder().can_seek();
+    const std::string& name = states_.record(study.study_id).name;
+    const bool waits = !settings.only_study.empty() && name != settings.only_study;
+    const bool seeks = study.takes_over && outbox.finder().can_seek() && !waits;
     feed(StudyAdded{study.study_id, study.table, std::move(study.settled), study.failures.size(),
-                    study.state == StudyState::kCancelled, study.state == StudyState::kPaused,
-                    study.terms, study.solver_version, std::move(study.attempts), seeks},
+                    study.state == StudyState::kCancelled,
+                    study.state == StudyState::kPaused || waits, study.terms, study.solver_version,
+                    std::move(study.attempts), seeks},
          now);
     if (seeks) {  // it was not at its end when the server ended
       seek_known(study.study_id);

@@ -32,6 +32,8 @@ struct ServiceSettings {
   std::string database_id;
   std::uint64_t last_study_id = 0;
   std::uint64_t last_worker_id = 0;
+  /// Points of this study alone are handed out; others of the database wait. Empty: of all.
+  std::string only_study{};
 };
 
 /// Points that were stored since the service began.

@@ -232,6 +232,26 @@ TEST(Watch, OfAFileOnWhichNobodyWorksSaysSo) {
   EXPECT_EQ(watch.outcome().exit_code, 128 + SIGINT);
 }
 
+TEST(Run, SolvesItsStudyAloneAndNamesTheOthersThatAreUnfinished) {
+  const test::TemporaryFolder folder;
+  write_study(folder, 10'000'000);
+  {
+    test::Process program(folder, test::client_program(), run_arguments());
+    wait_until_at_work(folder, program);
+    kill(program.pid(), SIGINT);
+    EXPECT_EQ(program.outcome().exit_code, 128 + SIGINT);
+  }
+  const auto before = solved(folder);
+  const auto other = test::run_oblique(
+      folder, {"run", "--H", "1", "--mu", "0.1:2:200", "--e", "0.9", "--name", "other"});
+  EXPECT_EQ(other.exit_code, 0) << other.err;
+  EXPECT_EQ(solved(folder), before);
+  EXPECT_NE(other.err.find("Also unfinished in oblique.db: many (9,9"), std::string::npos)
+      << other.err;
+  EXPECT_NE(test::run_oblique(folder, {"status", "many"}).out.find("running"), std::string::npos)
+      << "nothing is paused in the database";
+}
+
 TEST(Run, GoesOnWithTheWorkersThatAreLeftAndStopsWhenNoneIs) {
   const test::TemporaryFolder folder;
   write_study(folder, 10'000'000);
