@@ -105,6 +105,9 @@ class Connection {
   protocol::QueryReply query(const std::string& sql, std::uint64_t max_rows = 0,
                              const Tell& tell = {});
 
+  /// The chunks of the answer to a question, all of them. For answers that fit into memory.
+  std::vector<protocol::QueryReply> chunks(protocol::QueryRequest request, const Tell& tell = {});
+
   /// Asks for an answer in chunks. It is given by `next_rows` and ended by `end_rows`, or by any
   /// other request.
   void ask_for_rows(protocol::QueryRequest request);
@@ -124,6 +127,7 @@ class Connection {
     std::uint64_t chunks = 0;      ///< that were given
     std::uint64_t rows = 0;
     std::vector<std::string> columns = {};
+    Tell tell = {};  ///< of the first chunk
   };
 
   /// A request that is not answered yet.

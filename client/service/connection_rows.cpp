@@ -23,6 +23,17 @@ void Connection::ask_for_rows(protocol::QueryRequest request) {
   rows_ = std::move(rows);
 }
 
+std::vector<protocol::QueryReply> Connection::chunks(protocol::QueryRequest request,
+                                                     const Tell& tell) {
+  ask_for_rows(std::move(request));
+  rows_->tell = tell;
+  std::vector<protocol::QueryReply> all;
+  while (rows_) {
+    all.push_back(next_rows());
+  }
+  return all;
+}
+
 protocol::QueryReply Connection::next_rows() {
   protocol::QueryReply chunk;
   if (rows_->chunks > 0) {
@@ -30,7 +41,7 @@ protocol::QueryReply Connection::next_rows() {
   } else {
     // A call ends what is under way.
     Rows rows = *std::exchange(rows_, std::nullopt);
-    chunk = std::move(*call_numbered(rows.request, {}).mutable_query());
+    chunk = std::move(*call_numbered(rows.request, rows.tell).mutable_query());
     rows.connection = monitor_.connections();
     rows_ = std::move(rows);
   }

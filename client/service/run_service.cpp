@@ -127,7 +127,7 @@ RunEnd submit_and_wait(const Study& study, const RunSettings& settings, Embedded
     const std::uint64_t servers_limit = 0;
     return connection.query(sql, servers_limit, tell_line);
   };
-  end.rows = query(statement_of_first_results(study, settings.rows));
+  end.rows = connection.chunks(first_results(study.name, settings.rows), tell_line);
   end.exit_code = tell_end(end.status, query);
   return end;
 }

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -31,8 +32,8 @@ void check_settings(const RunSettings& settings);
 /// How a study ended.
 struct RunEnd {
   protocol::StudyStatus status;
-  protocol::QueryReply rows;  ///< the first results, a few columns
-  int exit_code;              ///< kDone when every point is solved
+  std::vector<protocol::QueryReply> rows;  ///< chunks of the first results
+  int exit_code;                           ///< kDone when every point is solved
 };
 
 /// Starts server and workers here, submits the study, shows its progress and waits for its end;

@@ -103,16 +103,21 @@ std::string shell_word(const std::string& text) {
   return quoted + "'";
 }
 
-void print_first(const protocol::QueryReply& rows, std::uint64_t points) {
-  if (rows.rows().empty()) {
+void print_first(const std::vector<protocol::QueryReply>& chunks, std::uint64_t points) {
+  std::uint64_t rows = 0;
+  for (const auto& chunk : chunks) {
+    rows += chunk.chunk_rows();
+  }
+  if (rows == 0) {
     return;
   }
-  RowOutput out({.may_page = false, .shown = shown_columns(rows)});
-  out.print(protocol::as_chunk(rows));
+  RowOutput out({.may_page = false, .shown = shown_columns(chunks.front())});
+  for (const auto& chunk : chunks) {
+    out.print(chunk);
+  }
   out.finish();
-  if (static_cast<std::uint64_t>(rows.rows_size()) < points) {
-    std::cerr << fmt::format("The first {} of {} points are shown.\n",
-                             shown_count(static_cast<std::uint64_t>(rows.rows_size())),
+  if (rows < points) {
+    std::cerr << fmt::format("The first {} of {} points are shown.\n", shown_count(rows),
                              shown_count(points));
   }
 }

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -38,8 +39,8 @@ int print_lines(RowStream& stream);
 /// `text` as one word of a shell.
 std::string shell_word(const std::string& text);
 
-/// Prints the first rows of a study as a table, in the units that people read. When there are more
-/// `points`, says so on standard error.
-void print_first(const protocol::QueryReply& rows, std::uint64_t points);
+/// Prints the first rows of a study, given in chunks, as a table in the units that people read.
+/// When there are more `points`, says so on standard error.
+void print_first(const std::vector<protocol::QueryReply>& chunks, std::uint64_t points);
 
 }  // namespace oblique::client

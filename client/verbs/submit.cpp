@@ -93,7 +93,7 @@ int watch(const Study& study, std::uint64_t study_id, std::int64_t rows,
     return connection.query(sql, servers_limit, tell_line);
   };
   if (rows > 0) {
-    print_first(query(statement_of_first_results(study, rows)), status.points());
+    print_first(connection.chunks(first_results(study.name, rows), tell_line), status.points());
     std::cerr << "More: " << for_more << '\n';
   }
   return tell_end(status, query);

@@ -79,8 +79,8 @@ void add_inputs(std::vector<Column>& columns) {
   for (const auto& key : solver::model_keys()) {
     const auto* output = solver::find_result_column(key.name);
     auto column = input(key, output == nullptr ? std::string() : place_in_json(*output));
-    if (key.name == "E") {
-      column.name = "E_Pa";  // SQL does not tell E from e
+    column.name = column_of_key(key.name);
+    if (column.name != key.name) {
       column.meaning += " (E on flags and in study files)";
     }
     columns.push_back(std::move(column));
@@ -111,6 +111,10 @@ void add_packed_lists(std::vector<Column>& columns) {
 }
 
 }  // namespace
+
+std::string column_of_key(std::string_view key) {
+  return key == "E" ? "E_Pa" : std::string(key);
+}
 
 const std::vector<Column>& all_columns() {
   static const std::vector<Column> all = [] {

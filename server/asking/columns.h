@@ -21,6 +21,9 @@ struct Column {
 /// All of them, in the order of listings: inputs, outputs, what else a row tells.
 const std::vector<Column>& all_columns();
 
+/// The column of an input that users call `key`. SQL does not tell E from e: that one is E_Pa.
+std::string column_of_key(std::string_view key);
+
 /// The same, and what else questions may be made of: elements of lists, and functions.
 std::vector<Column> columns_and_functions();
 

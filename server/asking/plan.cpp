@@ -135,6 +135,21 @@ void check_syntax(sqlite3* database, const protocol::StudyQuery& question, Lists
         "SELECT 1 ORDER BY " + in_sqlite(database, question.order(), lists));
 }
 
+/// Gives a question that selects nothing its columns.
+void select_usual(protocol::StudyQuery& question, const protocol::Recipe& recipe) {
+  if (!question.select().empty()) {
+    return;
+  }
+  if (!question.group().empty()) {
+    question.add_select(question.group());
+    question.add_select("count(*)");
+    return;
+  }
+  for (const std::string& column : usual_columns(recipe)) {
+    question.add_select(column);
+  }
+}
+
 /// A statement that gives the lines of a text.
 std::string statement_of_lines(const std::string& text) {
   std::string values;
@@ -149,12 +164,13 @@ std::string statement_of_lines(const std::string& text) {
 
 }  // namespace
 
-Plan plan(sqlite3* database, const protocol::StudyQuery& question) {
+Plan plan(sqlite3* database, protocol::StudyQuery question) {
   check(question);
   const auto known =
       columns_of_statement(database, fmt::format("SELECT * FROM {} LIMIT 0", rows_of_queries()));
-  check_columns(question, known);
   const AskedStudy study = asked_study(database, question.study());
+  select_usual(question, study.recipe);
+  check_columns(question, known);
   const RowsAsked rows = rows_asked(question, study);
   const std::string written = selected_by(question);
   Plan plan;

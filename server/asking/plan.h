@@ -32,6 +32,6 @@ struct Plan {
 /// asks to `explain` gets a statement that gives the lines of the explanation. Throws
 /// solver::InputError for a question that is wrong, naming the flag or the column and what is
 /// allowed; StorageError for what cannot be read.
-Plan plan(sqlite3* database, const protocol::StudyQuery& question);
+Plan plan(sqlite3* database, protocol::StudyQuery question);
 
 }  // namespace oblique::server

@@ -7,6 +7,7 @@
 
 #include "proto/recipe/axes.h"
 #include "proto/recipe/blocks.h"
+#include "server/asking/columns.h"
 
 namespace oblique::server {
 namespace {
@@ -143,7 +144,7 @@ Spans numbers_in(const protocol::Axis& axis, const ValueSet& values) {
 
 /// What `box` wants of an axis; nullptr: nothing that the axis alone decides.
 const ValueSet* wanted(const protocol::Block& block, const protocol::Axis& axis, const Box& box) {
-  const auto found = box.find(axis.key() == "E" ? "E_Pa" : axis.key());
+  const auto found = box.find(column_of_key(axis.key()));
   // The column `length` is that of every link, and single lengths are axes too.
   const bool is_of_many = axis.key() == "length" &&
                           std::any_of(block.axes().begin(), block.axes().end(), [](const auto& a) {

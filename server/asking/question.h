@@ -7,11 +7,11 @@
 
 namespace oblique::server {
 
-/// What is asked for where a question selects nothing.
-inline constexpr const char* kUsualColumns =
-    "point,H,mu,e,status,fn_peak_N,ft_peak_N,duration_s,slide_m,stick_total_s,major_mode";
+/// The columns of a question that selects none: the point, the axes that vary in the study, and the
+/// main outputs. Without a block in the recipe H, mu and e stand for the axes.
+std::vector<std::string> usual_columns(const protocol::Recipe& recipe);
 
-/// The columns that `question` asks for, as one text.
+/// The columns that `question` selects, as one text.
 std::string selected_by(const protocol::StudyQuery& question);
 
 /// Throws solver::InputError, naming the flag, for texts that are no part of a statement; see

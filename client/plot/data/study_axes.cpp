@@ -7,6 +7,7 @@
 #include "proto/recipe/axes.h"
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/keys.h"
+#include "server/asking/columns.h"
 
 namespace oblique::client::plot {
 namespace {
@@ -76,7 +77,7 @@ std::string column_of_key(const std::string& key) {
   if (const auto link = protocol::link_of_key(protocol::key_number(key))) {
     return fmt::format("json_extract(lengths_m, '$[{}]')", *link);
   }
-  return key == "E" ? "E_Pa" : key;  // SQL does not tell E from e
+  return server::column_of_key(key);
 }
 
 std::optional<BlockOfStudy> largest_block(const protocol::Recipe& recipe,

@@ -235,13 +235,15 @@ export class StudyView {
   }
 
   row_columns() {
-    const keys = new Set(["point", "H", "mu", "e"]);
+    /** @type {string[]} */
+    const usual = this.study.usual_columns;
+    const outputs = usual.indexOf("status");
+    const keys = new Set(usual.slice(0, outputs));
     if (/\b(error|status)\b/.test(`${this.is("where")} ${this.is("mark")}`)) keys.add("error");
     for (const key of [this.is("x"), this.is("y"), this.is("z")]) {
       if (this.columns.some((c) => c.name === key)) keys.add(key);
     }
-    keys.add("mode");
-    return [...keys];
+    return [...new Set([...keys, ...usual.slice(outputs)])];
   }
 
   stop_asking() {

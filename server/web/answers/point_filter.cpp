@@ -8,6 +8,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/axes.h"
+#include "server/asking/columns.h"
 #include "server/asking/conditions.h"
 #include "server/asking/point_spans.h"
 #include "server/asking/sql/sql_expression.h"
@@ -23,7 +24,7 @@ using solver::exact_number;
 
 /// As questions call an axis; empty: they have no column that is it.
 std::string column_of_axis(const std::string& key) {
-  const std::string column = key == "E" ? "E_Pa" : key;
+  const std::string column = column_of_key(key);
   const bool is_of_point = key == "H" || key == "mu" || key == "e";
   const auto source = column_source(column);
   return is_of_point || (source && source->is_of_model) ? column : std::string();

@@ -12,6 +12,7 @@
 #include "proto/recipe/keys.h"
 #include "proto/recipe/model_message.h"
 #include "server/asking/columns.h"
+#include "server/asking/question.h"
 #include "server/web/http/json_answer.h"
 #include "worker/solver/model/parameters.h"
 
@@ -154,7 +155,8 @@ HttpAnswer study_answer(const AnswerDesk& desk, std::uint64_t id) {
                       {"model", model_json(recipe)},
                       {"blocks", std::move(blocks)},
                       {"blocks_left_out", std::max(recipe.blocks_size() - kMostBlocks, 0)},
-                      {"columns", columns_json()}});
+                      {"columns", columns_json()},
+                      {"usual_columns", usual_columns(recipe)}});
 }
 
 /// The list that a text is; discarded where it is none, or nested deeper than ours are: whoever

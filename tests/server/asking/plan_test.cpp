@@ -1,18 +1,24 @@
 #include "server/asking/plan.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "proto/result_message.h"
 #include "server/asking/lists/list_functions.h"
+#include "server/asking/question.h"
+#include "server/asking/statement.h"
 #include "server/database/open_for_reading.h"
 #include "server/reading/reader.h"
 #include "server/store/store.h"
 #include "tests/support/points.h"
+#include "tests/support/recipes.h"
 #include "tests/support/temporary_folder.h"
 #include "worker/solver/model/errors.h"
 
@@ -90,13 +96,48 @@ TEST_F(PlanTest, AStudyIsAnsweredInTheOrderOfItsPoints) {
   EXPECT_THAT(answer(question("mu", "status = 'solved' AND mu > 0")), ElementsAre(0.25, 0.5));
 }
 
-TEST_F(PlanTest, WithoutColumnsTheUsualOnesAreAnswered) {
+TEST_F(PlanTest, WithoutColumnsTheAxesThatVaryAndTheMainOutputsAreAnswered) {
   protocol::StudyQuery all;
   all.set_study("a");
-  const auto columns = plan_of(all).columns;
-  ASSERT_FALSE(columns.empty());
-  EXPECT_EQ(columns.front().name, "point");
-  EXPECT_EQ(columns.back().name, "major_mode");
+  std::vector<std::string> names;
+  for (const PlannedColumn& column : plan_of(all).columns) {
+    names.push_back(column.name);
+  }
+  EXPECT_THAT(names, ElementsAre("point", "mu", "status", "fn_peak_N", "ft_peak_N", "duration_s",
+                                 "slide_m", "stick_total_s", "major_mode"));
+  EXPECT_EQ(names, usual_columns(asked_study(open_for_reading(path_).database.get(), "a").recipe));
+}
+
+/// The axes among the usual columns.
+std::vector<std::string> usual_axes(const protocol::Recipe& recipe) {
+  auto columns = usual_columns(recipe);
+  columns.erase(std::find(columns.begin(), columns.end(), "status"), columns.end());
+  columns.erase(columns.begin());  // point
+  return columns;
+}
+
+TEST(UsualColumns, HaveEveryKeyWithSeveralValuesInTheStudyAndNoOther) {
+  using protocol::listed;
+  using protocol::recipe_of;
+  const auto H = listed("H", {1});
+  const auto mu = listed("mu", {0.4});
+  const auto e = listed("e", {1});
+  EXPECT_THAT(usual_axes(recipe_of({{H, mu, e}})), IsEmpty());
+  EXPECT_THAT(usual_axes(recipe_of({{listed("E", {7e10, 8e10}), listed("k", {1e7}), H,
+                                     protocol::range("mu", 0, 1, 3), e}})),
+              ElementsAre("mu", "E_Pa"));
+  EXPECT_THAT(usual_axes(recipe_of({{H, mu, e}, {listed("H", {0.9}), mu, e}})), ElementsAre("H"))
+      << "from block to block";
+  EXPECT_THAT(usual_axes(recipe_of({{H, mu, e}, {listed("k", {1e7}), H, mu, e}})), ElementsAre("k"))
+      << "in one of the blocks";
+  EXPECT_THAT(usual_axes(recipe_of(
+                  {{protocol::following("I", "A^2"), listed("length2", {0.3, 0.4}), H, mu, e}})),
+              ElementsAre("I", "lengths_m"));
+  EXPECT_THAT(usual_axes(protocol::recipe_of_blocks({protocol::sampled(
+                  {protocol::uniform("rho", 2000, 3000), H, mu, protocol::uniform("e", 0.5, 1)},
+                  protocol::SAMPLE_LATIN_HYPERCUBE, 10)})),
+              ElementsAre("e", "rho"));
+  EXPECT_THAT(usual_axes({}), ElementsAre("H", "mu", "e")) << "of a recipe that cannot be read";
 }
 
 TEST_F(PlanTest, AConditionCannotReachOtherStudies) {
