@@ -31,7 +31,7 @@ void say_gathered(Figure& figure, const GatheredCells& gathered) {
   if (gathered.most_in_a_cell > 1) {
     figure.notes.push_back(fmt::format(
         "Cells hold up to {} points and show {}{}.", shown_count(gathered.most_in_a_cell),
-        gathered.has_names ? "what most of these have" : "their mean",
+        gathered.has_names ? "what most of these have, percentages count points" : "their mean",
         gathered.mixed_cells == 0 ? ""
         : gathered.mixed_cells == 1
             ? "; 1 cell has others too"
@@ -114,10 +114,11 @@ Figure Drawing::map() {
     blank_unmet(gathered.cells);
   }
   const std::string plural = request_.map.find("mode") != std::string::npos ? "modes" : "kinds";
-  Figure figure = gathered.has_names ? kind_map(axes, answer[2].name, std::move(gathered.cells),
-                                                std::move(gathered.names), plural)
-                                     : heat_map(axes, quantity_of(answer[2].name, answer[2].unit),
-                                                std::move(gathered.cells), colours());
+  Figure figure = gathered.has_names
+                      ? kind_map(axes, answer[2].name, std::move(gathered.cells),
+                                 std::move(gathered.names), gathered.points_of_name, plural)
+                      : heat_map(axes, quantity_of(answer[2].name, answer[2].unit),
+                                 std::move(gathered.cells), colours());
   say_gathered(figure, gathered);
   entitle(figure, answer[2].name, gathered.points);
   return figure;

@@ -115,8 +115,8 @@ bool is_list(std::string_view column) {
 
 void check_numbers(std::string_view flag, std::string_view text,
                    const std::vector<std::string>& names_given) {
-  constexpr std::array<std::string_view, 7> kOfNumbers{"avg",        "sum",    "total",   "median",
-                                                       "percentile", "stddev", "variance"};
+  constexpr std::array<std::string_view, 8> kOfNumbers{"avg",        "sum",    "total",    "median",
+                                                       "percentile", "stddev", "variance", "corr"};
   constexpr std::array<std::string_view, 2> kOfValues{"min", "max"};
   const auto tokens = sql_tokens(text);
   const GroupTokens all(tokens);

@@ -55,6 +55,7 @@ class CellGatherer {
     }
     gathered_.has_names = rows.value.has_texts();
     if (gathered_.has_names) {
+      count_names(rows.value);
       name_cells(rows.value);
     }
     return std::move(gathered_);
@@ -84,13 +85,26 @@ class CellGatherer {
         const auto word_ends = std::upper_bound(at, cell_ends, *at);
         if (word_ends - at > most) {
           most = word_ends - at;
-          gathered_.names[cell] =
-              at->word == AnswerColumn::kNoWord ? std::string() : column.words[at->word];
+          gathered_.names[cell] = name_of_word(column, at->word);
         }
         at = word_ends;
       }
     }
     words_.clear();
+  }
+
+  void count_names(const AnswerColumn& column) {
+    std::map<std::uint32_t, std::uint64_t> points_of_word;
+    for (const WordOfCell& each : words_) {
+      ++points_of_word[each.word];
+    }
+    for (const auto& [word, points] : points_of_word) {
+      gathered_.points_of_name[name_of_word(column, word)] += points;
+    }
+  }
+
+  static std::string name_of_word(const AnswerColumn& column, std::uint32_t word) {
+    return word == AnswerColumn::kNoWord ? std::string() : column.words[word];
   }
 
   GatheredCells gathered_;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -24,9 +25,10 @@ struct GatheredCells {
   Cells cells;
   std::vector<std::string> names = {};  ///< of the cells, where the values are texts
   bool has_names = false;
-  std::uint64_t points = 0;          ///< rows that are in a cell
-  std::uint64_t most_in_a_cell = 0;  ///< of them, of those with a value
-  std::uint64_t mixed_cells = 0;     ///< cells whose points have different texts
+  std::map<std::string, std::uint64_t> points_of_name = {};  ///< in all cells
+  std::uint64_t points = 0;                                  ///< rows that are in a cell
+  std::uint64_t most_in_a_cell = 0;                          ///< of them, of those with a value
+  std::uint64_t mixed_cells = 0;  ///< cells whose points have different texts
 };
 
 /// The values of an axis of cells: those of the study, and others that rows have.

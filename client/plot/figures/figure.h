@@ -77,7 +77,7 @@ struct Cells {
 /// A kind of cells in a map of kinds, as a mode.
 struct Kind {
   std::string name{};
-  std::uint64_t cells = 0;
+  std::uint64_t points = 0;
   bool is_rest = false;                    ///< stands for all that have no kind of their own
   std::vector<std::string> gathered = {};  ///< of the rest: the names
 };

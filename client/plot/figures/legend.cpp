@@ -33,11 +33,11 @@ std::string percentage(std::uint64_t part, std::uint64_t whole) {
 void add_kinds(std::vector<LegendEntry>& entries, const KindCells& kinds) {
   std::uint64_t whole = 0;
   for (const Kind& kind : kinds.kinds) {
-    whole += kind.cells;
+    whole += kind.points;
   }
   for (std::size_t i = 0; i < kinds.kinds.size(); ++i) {
     const Kind& kind = kinds.kinds[i];
-    const auto share = percentage(kind.cells, whole);
+    const auto share = percentage(kind.points, whole);
     entries.push_back({.sign = kind.is_rest ? Sign::kRest : Sign::kKind,
                        .number = i,
                        .is_hatched = kinds.least_outlined > 0,

@@ -31,23 +31,23 @@ void say_no_value(Figure& figure) {
   }
 }
 
-/// The kinds by the number of their cells, largest first, those with next to none gathered in the
+/// The kinds by the number of their points, largest first, those with next to none gathered in the
 /// last one.
-std::vector<Kind> gathered(const std::map<std::string, std::uint64_t>& cells,
+std::vector<Kind> gathered(const std::map<std::string, std::uint64_t>& points,
                            const std::string& plural) {
   std::vector<Kind> kinds;
   std::uint64_t whole = 0;
-  for (const auto& [name, count] : cells) {
-    kinds.push_back({.name = name, .cells = count});
+  for (const auto& [name, count] : points) {
+    kinds.push_back({.name = name, .points = count});
     whole += count;
   }
   std::stable_sort(kinds.begin(), kinds.end(),
-                   [](const Kind& a, const Kind& b) { return a.cells > b.cells; });
+                   [](const Kind& a, const Kind& b) { return a.points > b.points; });
   std::size_t kept = kinds.size();
   if (kept > kMostKinds) {
     // A kind that has less than a quarter of a per cent is nowhere to be seen.
     kept = kMostKinds;
-    while (kept > 1 && kinds[kept - 1].cells * 400 < whole) {
+    while (kept > 1 && kinds[kept - 1].points * 400 < whole) {
       --kept;
     }
   }
@@ -56,7 +56,7 @@ std::vector<Kind> gathered(const std::map<std::string, std::uint64_t>& cells,
   }
   Kind rest{.name = {}, .is_rest = true};
   for (std::size_t i = kept; i < kinds.size(); ++i) {
-    rest.cells += kinds[i].cells;
+    rest.points += kinds[i].points;
     rest.gathered.push_back(kinds[i].name);
   }
   rest.name = fmt::format("{} other {}", shown_count(rest.gathered.size()), plural);
@@ -93,9 +93,9 @@ void say_kinds(Figure& figure, const KindCells& map, std::size_t kinds, const st
         "S stick, s slip; C compression, R restitution: in the order of time.");
   }
   if (map.kinds.back().is_rest) {
-    figure.notes.push_back(
-        fmt::format("Of {} {} those with the most cells are named; the others are in --format csv.",
-                    shown_count(kinds), plural));
+    figure.notes.push_back(fmt::format(
+        "Of {} {} those with the most points are named; the others are in --format csv.",
+        shown_count(kinds), plural));
   }
   if (map.least_outlined == 0) {
     figure.notes.push_back(fmt::format(
@@ -157,22 +157,17 @@ Figure heat_map(const MapAxes& axes, const Quantity& value, Cells cells,
 }
 
 Figure kind_map(const MapAxes& axes, const std::string& name, Cells cells,
-                std::vector<std::string> names, const std::string& plural) {
-  std::map<std::string, std::uint64_t> counts;
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    if (cells.states[i] == CellState::kSolved) {
-      ++counts[names[i]];
-    }
-  }
+                std::vector<std::string> names, const std::map<std::string, std::uint64_t>& points,
+                const std::string& plural) {
   KindCells map{.name = name};
   map.cells = std::move(cells);
   map.names = std::move(names);
-  map.kinds = gathered(counts, plural);
+  map.kinds = gathered(points, plural);
   number_cells(map);
   Figure figure;
   figure.gaps = gaps_of(map.cells);
   Panel panel = panel_of(axes, map.cells);
-  say_kinds(figure, map, counts.size(), plural);
+  say_kinds(figure, map, points.size(), plural);
   panel.kinds = std::move(map);
   figure.panels.push_back(std::move(panel));
   say_no_value(figure);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -32,11 +33,13 @@ Figure heat_map(const MapAxes& axes, const Quantity& value, Cells cells,
 Colours colours_for(const Quantity& quantity, const std::vector<double>& values,
                     const ColourChoice& choice);
 
-/// Most kinds that a map tells apart. Others, and those that have next to no cells, are gathered.
+/// Most kinds that a map tells apart. Others, and those that have next to no points, are gathered.
 inline constexpr std::size_t kMostKinds = 12;
 
-/// A map of kinds, as of modes: `names` has the kind of each solved cell.
+/// A map of kinds, as of modes: `names` has the kind of each solved cell, `points` how many points
+/// are of each kind, by which kinds are ordered and get their share.
 Figure kind_map(const MapAxes& axes, const std::string& name, Cells cells,
-                std::vector<std::string> names, const std::string& plural = "kinds");
+                std::vector<std::string> names, const std::map<std::string, std::uint64_t>& points,
+                const std::string& plural = "kinds");
 
 }  // namespace oblique::client::plot

@@ -30,6 +30,16 @@ struct Moments {
   double squares;
 };
 
+/// Means, sums of squared differences from them and the sum of their products, likewise.
+struct Products {
+  std::uint64_t count;
+  double mean_x;
+  double mean_y;
+  double squares_x;
+  double squares_y;
+  double products;
+};
+
 /// Fails the statement by the fault of whoever wrote it.
 void refuse(sqlite3_context* context, const char* why) {
   sqlite3_result_error(context, why, -1);
@@ -45,7 +55,7 @@ bool is_number(sqlite3_context* context, sqlite3_value* value) {
     case SQLITE_NULL:
       return false;
     default:
-      refuse(context, "median, percentile, variance and stddev take numbers");
+      refuse(context, "median, percentile, variance, stddev and corr take numbers");
       return false;
   }
 }
@@ -141,11 +151,43 @@ void moments_final(sqlite3_context* context) {
   }
 }
 
-constexpr std::array<DescribedFunction, 8> kFunctions{{
+void corr_step(sqlite3_context* context, int, sqlite3_value** arguments) {
+  auto* const sums = static_cast<Products*>(sqlite3_aggregate_context(context, sizeof(Products)));
+  if (sums == nullptr) {
+    sqlite3_result_error_nomem(context);
+    return;
+  }
+  if (!is_number(context, arguments[0]) || !is_number(context, arguments[1])) {
+    return;
+  }
+  ++sums->count;
+  const auto count = static_cast<double>(sums->count);
+  const double step_x = sqlite3_value_double(arguments[0]) - sums->mean_x;
+  const double step_y = sqlite3_value_double(arguments[1]) - sums->mean_y;
+  sums->mean_x += step_x / count;
+  sums->mean_y += step_y / count;
+  const double part = 1.0 - 1.0 / count;
+  sums->squares_x += step_x * step_x * part;
+  sums->squares_y += step_y * step_y * part;
+  sums->products += step_x * step_y * part;
+}
+
+/// NULL for fewer than two rows, or where one of the two does not vary.
+void corr_final(sqlite3_context* context) {
+  const auto* const sums = static_cast<const Products*>(sqlite3_aggregate_context(context, 0));
+  if (sums != nullptr && sums->squares_x > 0.0 && sums->squares_y > 0.0) {
+    const double corr = sums->products / (std::sqrt(sums->squares_x) * std::sqrt(sums->squares_y));
+    sqlite3_result_double(context, std::clamp(corr, -1.0, 1.0));
+  }
+}
+
+constexpr std::array<DescribedFunction, 9> kFunctions{{
     {"median(x)", "the middle value; half way between the two middle ones of an even number"},
     {"percentile(x, p)", "the value that p percent lie below, between neighbours in proportion"},
     {"stddev(x)", "standard deviation of a sample (n - 1)"},
     {"variance(x)", "its square"},
+    {"corr(x, y)",
+     "Pearson's correlation of two columns, from -1 to 1; rows with a NULL are left out"},
     {"count_mode('SC SR')",
      "points whose major_mode is that; of others count(*) FILTER (WHERE e = 1)"},
     {"avg(x), min(x), max(x), sum(x)", "of the points, or of each group of --group"},
@@ -167,6 +209,7 @@ void add_functions(sqlite3* database) {
   add("percentile", 2, &percentile_step, &numbers_final);
   add("variance", 1, &moments_step, &moments_final<false>);
   add("stddev", 1, &moments_step, &moments_final<true>);
+  add("corr", 2, &corr_step, &corr_final);
 }
 
 std::span<const DescribedFunction> described_functions() {

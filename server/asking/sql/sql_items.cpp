@@ -99,10 +99,10 @@ std::string name_of(const SqlToken& token) {
 }
 
 bool is_aggregate(std::string_view name, std::size_t arguments) {
-  constexpr std::array<std::string_view, 13> kGather{
-      "count",     "sum",        "total",  "avg",      "group_concat", "json_group_array",
-      "median",    "percentile", "stddev", "variance", "count_mode",   "json_group_object",
-      "string_agg"};
+  constexpr std::array<std::string_view, 14> kGather{
+      "count",      "sum",        "total",  "avg",      "group_concat", "json_group_array",
+      "median",     "percentile", "stddev", "variance", "count_mode",   "json_group_object",
+      "string_agg", "corr"};
   const auto is_it = [&](std::string_view known) { return same_but_case(known, name); };
   return std::any_of(kGather.begin(), kGather.end(), is_it) ||
          (arguments == 1 && (is_it("min") || is_it("max")));

@@ -2,6 +2,8 @@
 
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -51,6 +53,15 @@ inline Figure gappy_map() {
   return titled(heat_map(usual_axes(), quantity_of("duration_s", "s"), std::move(cells)));
 }
 
+/// A map of modes with a point a cell.
+inline Figure modes_of(Cells cells, std::vector<std::string> names) {
+  std::map<std::string, std::uint64_t> points;
+  for (const std::string& name : names) {
+    ++points[name];
+  }
+  return kind_map(usual_axes(), "major_mode", std::move(cells), std::move(names), points, "modes");
+}
+
 /// A map of so many kinds in stripes, the first widest.
 inline Figure striped_kinds(std::size_t kinds) {
   Cells cells = counted_cells(60, 40);
@@ -63,7 +74,7 @@ inline Figure striped_kinds(std::size_t kinds) {
     }
     names.push_back(name + " " + std::to_string(kind));
   }
-  return titled(kind_map(usual_axes(), "major_mode", std::move(cells), std::move(names), "modes"));
+  return titled(modes_of(std::move(cells), std::move(names)));
 }
 
 inline Figure lines_of_count(std::size_t lines, std::size_t points = 12) {

@@ -135,6 +135,17 @@ TEST(Cells, WithSeveralTextsHaveThatOfMostOfTheirPointsAndAreCounted) {
   EXPECT_EQ(gathered.most_in_a_cell, 3U);
 }
 
+TEST(Cells, OfTextsCountThePointsOfEachTextAlsoWhereOthersHaveTheCell) {
+  const auto x = numbers({1, 1, 1, 2});
+  const auto y = numbers({1, 1, 1, 1});
+  const auto value = texts({"SC", "SC", "rare", "SC"});
+  const auto status = texts(std::vector<std::string>(4, "solved"));
+  const auto gathered = gathered_on({x, y, value, status}, {1, 2}, {1}, false, false);
+  EXPECT_THAT(gathered.names, ElementsAre("SC", "SC"));
+  EXPECT_EQ(gathered.points_of_name,
+            (std::map<std::string, std::uint64_t>{{"SC", 3}, {"rare", 1}}));
+}
+
 TEST(Bins, HoldAllScatteredPointsThoseAtTheEndsIncluded) {
   std::vector<double> xs;
   std::vector<double> ys;

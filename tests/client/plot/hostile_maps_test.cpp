@@ -57,10 +57,6 @@ Figure heat_of(Cells cells) {
   return heat_map(test::usual_axes(), quantity_of("fn_peak_N", "N"), std::move(cells));
 }
 
-Figure kinds_of(Cells cells, std::vector<std::string> names) {
-  return kind_map(test::usual_axes(), "mode", std::move(cells), std::move(names), "modes");
-}
-
 TEST(HostileMap, OfNoiseStaysSmall) {
   EXPECT_LT(svg_of(heat_of(noisy_cells())).size(), kMostBytes);
 }
@@ -91,7 +87,8 @@ TEST(HostileMap, OfCellsInEveryStateAtRandomStaysSmall) {
 TEST(HostileMap, OfKindsAtRandomStaysSmall) {
   for (const std::uint32_t kinds : {2U, 5U, 13U, 1000U}) {
     EXPECT_LT(
-        svg_of(kinds_of(test::counted_cells(kSide, kSide), names_of(noise(kCells, kinds)))).size(),
+        svg_of(test::modes_of(test::counted_cells(kSide, kSide), names_of(noise(kCells, kinds))))
+            .size(),
         kMostBytes)
         << kinds;
   }
@@ -102,14 +99,14 @@ TEST(HostileMap, OfEveryOtherCellAnotherKindStaysSmall) {
   for (std::size_t i = 0; i < kCells; ++i) {
     chequered.push_back((i % kSide + i / kSide) % 2 == 0 ? 0 : static_cast<std::uint32_t>(i));
   }
-  EXPECT_LT(svg_of(kinds_of(test::counted_cells(kSide, kSide), names_of(chequered))).size(),
+  EXPECT_LT(svg_of(test::modes_of(test::counted_cells(kSide, kSide), names_of(chequered))).size(),
             kMostBytes);
 }
 
 TEST(HostileMap, OfKindsWithGapsAtRandomStaysSmall) {
   Cells cells = test::counted_cells(kSide, kSide);
   scatter_states(cells, {CellState::kSolved, CellState::kNoResult, CellState::kFailed});
-  EXPECT_LT(svg_of(kinds_of(cells, names_of(noise(kCells, 13)))).size(), kMostBytes);
+  EXPECT_LT(svg_of(test::modes_of(cells, names_of(noise(kCells, 13)))).size(), kMostBytes);
 }
 
 }  // namespace

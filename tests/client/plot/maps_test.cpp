@@ -114,21 +114,31 @@ TEST(HeatMap, Of256By256CellsTakesLessThan200Kilobytes) {
             200'000U);
 }
 
-TEST(KindMap, NamesThoseWithTheMostCellsAndGathersTheOthers) {
+TEST(KindMap, NamesThoseWithTheMostPointsAndGathersTheOthers) {
   const Figure figure = test::striped_kinds(40);
   const auto& kinds = figure.panels[0].kinds->kinds;
   ASSERT_EQ(kinds.size(), kMostKinds + 1);
   EXPECT_TRUE(kinds.back().is_rest);
   EXPECT_THAT(kinds.back().name, HasSubstr("modes"));
-  std::uint64_t cells = 0;
+  std::uint64_t points = 0;
   for (const Kind& kind : kinds) {
-    cells += kind.cells;
+    points += kind.points;
   }
-  EXPECT_EQ(cells, 2400U);
+  EXPECT_EQ(points, 2400U);
   EXPECT_EQ(kinds.size() - 1 + kinds.back().gathered.size(), 41U);
   for (std::size_t i = 1; i + 1 < kinds.size(); ++i) {
-    EXPECT_GE(kinds[i - 1].cells, kinds[i].cells);
+    EXPECT_GE(kinds[i - 1].points, kinds[i].points);
   }
+}
+
+TEST(KindMap, SharesAreThoseOfPointsAndNotOfCells) {
+  const auto figure = kind_map(test::usual_axes(), "major_mode", test::counted_cells(2, 1),
+                               {"SC", "sC"}, {{"SC", 1}, {"sC", 9}, {"in no cell", 10}}, "modes");
+  const auto& kinds = figure.panels[0].kinds->kinds;
+  ASSERT_EQ(kinds.size(), 3U);
+  EXPECT_EQ(kinds[0].name, "in no cell");
+  EXPECT_EQ(kinds[1].name, "sC");
+  EXPECT_THAT(svg_of(figure), AllOf(HasSubstr("SC (5.0 %)"), HasSubstr("sC (45 %)")));
 }
 
 TEST(KindMap, OfFewKindsNamesAll) {
@@ -150,12 +160,12 @@ TEST(KindMap, LikeNoiseIsColoursAlone) {
   for (std::size_t i = 0; i < 90'000; ++i) {
     names.push_back(std::to_string((i % 300 * 7 + i / 300 * 11) % 5));
   }
-  EXPECT_LT(svg_of(kind_map(test::usual_axes(), "mode", cells, names)).size(), 200'000U);
+  EXPECT_LT(svg_of(test::modes_of(cells, names)).size(), 200'000U);
 }
 
 TEST(KindMap, ShowsNamesOfOthersAsTextAlone) {
   Cells cells = test::counted_cells(1, 1);
-  const auto svg = svg_of(kind_map(test::usual_axes(), "mode", cells, {"<b>\x1b[2J"}));
+  const auto svg = svg_of(test::modes_of(cells, {"<b>\x1b[2J"}));
   EXPECT_THAT(svg, Not(HasSubstr("<b>")));
   EXPECT_THAT(svg, Not(HasSubstr("\x1b")));
   EXPECT_THAT(svg, HasSubstr("&lt;b&gt;\\x1b[2J"));

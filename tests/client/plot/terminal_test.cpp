@@ -82,8 +82,7 @@ TEST(ColouredTerminal, IsLeftAsItWas) {
 }
 
 TEST(Terminal, IsNotSteeredByNamesOfOthers) {
-  const auto text = text_of(
-      kind_map(test::usual_axes(), "mode", test::counted_cells(1, 1), {"a\x1b[2J"}), kColoured);
+  const auto text = text_of(test::modes_of(test::counted_cells(1, 1), {"a\x1b[2J"}), kColoured);
   EXPECT_THAT(text, Not(HasSubstr("\x1b[2J")));
   EXPECT_THAT(text, HasSubstr("\\x1b[2J"));
 }

@@ -88,6 +88,18 @@ TEST_F(Answers, FunctionsGatherTheNumbersOfRows) {
   EXPECT_DOUBLE_EQ(number("median(nullif(point, 9))"), 4.0);
 }
 
+TEST_F(Answers, CorrIsPearsonsCorrelationOfTheRowsThatHaveBoth) {
+  EXPECT_DOUBLE_EQ(number("corr(point, 3 - 2 * point)"), -1.0);
+  // Of 0, 1, 2 with 0, 1, 4: covariance 2, variances 1 and 13/3.
+  EXPECT_NEAR(number("corr(point, point * point)", "point < 3"), 2.0 / std::sqrt(13.0 / 3.0),
+              1e-15);
+  EXPECT_NEAR(number("corr(nullif(point, 9), nullif(point * point, 64))", "point NOT IN (3, 4)"),
+              number("corr(point, point * point)", "point NOT IN (3, 4, 8, 9)"), 1e-15);
+  EXPECT_DOUBLE_EQ(number("corr(1e9 + point, point)"), 1.0) << "without cancellation";
+  EXPECT_DOUBLE_EQ(number("corr(point, 7) IS NULL"), 1.0) << "one of them does not vary";
+  EXPECT_DOUBLE_EQ(number("corr(point, mu) IS NULL", "point = 3"), 1.0);
+}
+
 TEST_F(Answers, FunctionsRefuseWhatIsNoNumber) {
   const auto failure = [&](const std::string& expression) -> std::string {
     try {
@@ -99,6 +111,7 @@ TEST_F(Answers, FunctionsRefuseWhatIsNoNumber) {
   };
   EXPECT_THAT(failure("median('x')"), HasSubstr("take numbers"));
   EXPECT_THAT(failure("stddev(x'00')"), HasSubstr("take numbers"));
+  EXPECT_THAT(failure("corr(mu, 'x')"), HasSubstr("take numbers"));
   EXPECT_THAT(failure("percentile(mu, 101)"), HasSubstr("from 0 to 100"));
   EXPECT_THAT(failure("percentile(mu, 'x')"), HasSubstr("from 0 to 100"));
   EXPECT_THAT(failure("percentile(mu, point)"), HasSubstr("one percentage"));
@@ -232,7 +245,7 @@ TEST_F(Answers, ANameInDoubleQuotesIsNeverAText) {
 TEST_F(Answers, WhatTakesNumbersIsRefusedTextsAndLists) {
   const auto said = [&](const std::string& select) { return objection(question(select)); };
   for (const char* wrong : {"avg(mode)", "sum(DISTINCT mode)", "total(status)", "median(mode)",
-                            "SUM(\"mode\")", "round(avg(mode), 1)"}) {
+                            "SUM(\"mode\")", "round(avg(mode), 1)", "corr(mode, mu)"}) {
     EXPECT_THAT(said(wrong),
                 AllOf(HasSubstr("--select"), HasSubstr("takes numbers"), HasSubstr("is a text")))
         << wrong;
