@@ -259,10 +259,16 @@ void TablePrinter::end() {
     print_first_rows();
   }
   std::vector<std::string> left_out;
+  bool has_mode = false;
   for (const Column& column : columns_) {
     if (column.is_left_out) {
       left_out.push_back(column.heading);
+    } else {
+      has_mode = has_mode || column.heading == "mode" || column.heading == "major_mode";
     }
+  }
+  if (has_mode) {
+    sink_.append(fmt::format("({})\n", kModeLetters));
   }
   if (!left_out.empty()) {
     const std::string beginning =

@@ -7,9 +7,13 @@
 
 namespace oblique::client {
 
+/// What the letters of modes mean.
+inline constexpr const char* kModeLetters = "S stick, s slip; C compression, R restitution";
+
 /// See made_printer. Widths are those of the first rows; a later value that is wider shifts the
 /// rest of its line. Where lines would be too long, texts are shortened, then columns left out from
-/// the right, which a line below the table says.
+/// the right, which a line below the table says. Another one says what the letters of a
+/// mode mean.
 class TablePrinter : public RowPrinter {
  public:
   TablePrinter(Sink& sink, PrinterSettings settings)

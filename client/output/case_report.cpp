@@ -9,6 +9,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/formats/table_printer.h"
 #include "client/output/printer.h"
 #include "worker/solver/model/number.h"
 #include "worker/solver/model/result_fields.h"
@@ -69,7 +70,7 @@ ordered_json json_of(const CaseResult& result, const solver::Member<T>& member) 
 
 void print_margin(std::ostream& out, const CaseResult& result) {
   if (result.margin && result.margin_event) {
-    out << fmt::format("margin      {} to another order of events, nearest: {}{}\n",
+    out << fmt::format("margin      {} (0 fragile, 1 safe), closest event: {}{}\n",
                        readable_number(*result.margin, 2), *result.margin_event,
                        *result.margin < kDoubtfulMargin ? "; the mode is not to be trusted" : "");
   }
@@ -159,7 +160,7 @@ void print_summary(std::ostream& out, const CaseResult& result) {
   if (result.mode != result.major_mode) {
     out << fmt::format("  (with ripples: {})", result.mode);
   }
-  out << '\n';
+  out << fmt::format("\n            ({})\n", kModeLetters);
   print_margin(out, result);
   out << '\n';
   print_peaks(out, result);
@@ -176,7 +177,7 @@ void print_summary(std::ostream& out, const CaseResult& result) {
       << fmt::format("energy      {} J in; friction takes {} J, restitution {} J\n",
                      fixed_number(energy.kinetic_in_J, 4), fixed_number(energy.friction_J, 6),
                      fixed_number(energy.restitution_J, 6))
-      << fmt::format("            does not add up by {} of what was exchanged\n",
+      << fmt::format("            balance error {} of the energy exchanged\n",
                      readable_number(energy.closure, 2))
       << fmt::format("solver      {} {}, {} steps of {} us, {} ms\n", report.integrator,
                      report.version, report.steps, readable_number(report.dt_s * kMicro, 3),

@@ -7,6 +7,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/formats/table_printer.h"
 #include "client/output/human_units.h"
 #include "client/plot/draw/areas.h"
 
@@ -89,8 +90,7 @@ void say_kinds(Figure& figure, const KindCells& map, std::size_t kinds, const st
     return;
   }
   if (map.name == "mode" || map.name == "major_mode") {
-    figure.notes.emplace_back(
-        "S stick, s slip; C compression, R restitution: in the order of time.");
+    figure.notes.push_back(fmt::format("{}: in the order of time.", kModeLetters));
   }
   if (map.kinds.back().is_rest) {
     figure.notes.push_back(fmt::format(

@@ -46,14 +46,21 @@ TEST(JsonLines, HaveAnObjectALine) {
 
 TEST(Table, AlignsNumbersAtThePoint) {
   EXPECT_EQ(printed(Format::kTable,
-                    {chunk_of({"fn_N", "mode"},
+                    {chunk_of({"fn_N", "kind"},
                               {{5057.63, "SC"}, {812.345, "sC"}, {-2.0, "SR"}, {nullptr, "-"}})}),
-            "    fn_N  mode\n"
+            "    fn_N  kind\n"
             "--------  ----\n"
             "5057.63   SC\n"
             " 812.345  sC\n"
             "  -2      SR\n"
             "       -  -\n");
+}
+
+TEST(Table, WithModesSaysWhatTheirLettersMean) {
+  for (const char* column : {"mode", "major_mode"}) {
+    EXPECT_TRUE(printed(Format::kTable, {chunk_of({column}, {{"SC"}})})
+                    .ends_with("\n(S stick, s slip; C compression, R restitution)\n"));
+  }
 }
 
 TEST(Table, KeepsTheWidthsOfItsFirstRows) {

@@ -101,9 +101,9 @@ TEST(Summary, SaysHowNearAnotherModeIsAndWhenThatIsTooNear) {
   };
   EXPECT_EQ(text_with(std::nullopt).find("margin"), std::string::npos);
   result.margin_event = "turn";
-  EXPECT_NE(text_with(0.0361).find("margin      0.036 to another order of events, nearest: turn\n"),
+  EXPECT_NE(text_with(0.0361).find("margin      0.036 (0 fragile, 1 safe), closest event: turn\n"),
             std::string::npos);
-  EXPECT_NE(text_with(3e-7).find("nearest: turn; the mode is not to be trusted\n"),
+  EXPECT_NE(text_with(3e-7).find("closest event: turn; the mode is not to be trusted\n"),
             std::string::npos);
 }
 

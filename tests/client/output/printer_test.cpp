@@ -146,7 +146,7 @@ TEST(Json, GivesEachColumnAKeyOfItsOwn) {
 
 TEST(Table, AlignsNumbersAtThePointAndTextsToTheLeft) {
   protocol::QueryReply rows;
-  rows.add_columns("mode");
+  rows.add_columns("kind");
   rows.add_columns("fn_peak_N");
   for (const auto& [mode, force] : {std::pair{"SC SR", 5057.62999}, std::pair{"sC", 12.5}}) {
     auto& row = *rows.add_rows();
@@ -154,7 +154,7 @@ TEST(Table, AlignsNumbersAtThePointAndTextsToTheLeft) {
     add_value(row, force);
   }
   EXPECT_EQ(printed(rows, Format::kTable),
-            "mode   fn_peak_N\n"
+            "kind   fn_peak_N\n"
             "-----  ---------\n"
             "SC SR    5057.63\n"
             "sC         12.5\n");
