@@ -76,6 +76,12 @@ void add_source_flags(CLI::App& verb, SourceFlags& flags) {
   database->excludes("--keys");
 }
 
+void add_database_argument(CLI::App& verb, std::filesystem::path& file) {
+  verb.add_option("--db,FILE", file, "the database; --db may be left out")
+      ->type_name("FILE")
+      ->capture_default_str();
+}
+
 ConnectionSettings connection_settings(const SourceFlags& flags) {
   ConnectionSettings settings;
   settings.timeout_ms = timeout_of(flags, settings.timeout_ms);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -23,6 +24,9 @@ struct SourceFlags {
 void add_server_flags(CLI::App& verb, SourceFlags& flags);
 /// Adds --db, --server, --keys and --timeout. `flags` must live as long as `verb`.
 void add_source_flags(CLI::App& verb, SourceFlags& flags);
+
+/// Adds the database file that a verb works on, as --db FILE or as a word of its own.
+void add_database_argument(CLI::App& verb, std::filesystem::path& file);
 
 /// The server that the flags name, else OBLIQUE_SERVER, else the default; and the key of the file
 /// that they name, else OBLIQUE_KEYS, else none. Throws solver::InputError for a timeout that is

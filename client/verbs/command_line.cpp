@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <chrono>
 #include <csignal>
@@ -11,6 +12,7 @@
 #include <sstream>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -108,6 +110,15 @@ int wrong_usage(const CLI::App& verb, const std::string& message) {
   return protocol::tell_wrong_usage(words_of(verb), message);
 }
 
+/// What has another name here, where that is not the nearest one.
+std::string other_name_of(const std::string& verb) {
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 3> kOtherNames{
+      {{"server", "oblique-server"}, {"worker", "oblique-worker"}, {"list", "oblique studies"}}};
+  const auto* const found = std::find_if(kOtherNames.begin(), kOtherNames.end(),
+                                         [&](const auto& pair) { return pair.first == verb; });
+  return found == kOtherNames.end() ? std::string() : std::string(found->second);
+}
+
 int parse(CLI::App& app, int argc, const char* const* argv) {
   try {
     app.parse(argc, argv);
@@ -121,6 +132,13 @@ int parse(CLI::App& app, int argc, const char* const* argv) {
       return exit_code;
     }
     auto& verb = parsed_verb(app);
+    const auto unexpected = app.remaining(true);
+    if (&verb == &app && !unexpected.empty()) {
+      if (const auto other = other_name_of(unexpected.front()); !other.empty()) {
+        return wrong_usage(
+            app, fmt::format("unknown verb `{}` (did you mean `{}`?)", unexpected.front(), other));
+      }
+    }
     return wrong_usage(verb, protocol::objection_of(app, verb, error));
   }
 }

@@ -18,12 +18,11 @@ void add_picture_flags(CLI::App& verb, PictureFlags& flags) {
           "width and height in pixels, of PNG twice as many; higher where a legend needs it")
       ->type_name("WxH")
       ->default_str("760x520");
-  verb.add_option("--out", flags.out, "file to write, which appears when it is whole")
-      ->type_name("FILE");
-  auto* format =
-      verb.add_option("--format", flags.format,
-                      "svg, png, csv or gnuplot; as the file's name ends when left out, else svg")
-          ->type_name("FORMAT");
+  verb.add_option("--out", flags.out, "output file, written atomically")->type_name("FILE");
+  auto* format = verb.add_option("--format", flags.format,
+                                 "svg, png, csv or gnuplot; default: as the name of --out ends. "
+                                 "Without --out it goes to standard output")
+                     ->type_name("FORMAT");
   protocol::note_choices(format, plot::picture_format_names());
   verb.add_flag("--show", flags.show, "draw on the terminal");
 }
@@ -34,10 +33,16 @@ PictureChoice picture_choice(const PictureFlags& flags) {
     throw solver::InputError(
         "--show draws on standard output: give the file for --format as --out FILE");
   }
-  const bool is_for_terminal =
-      flags.out.empty() && flags.format.empty() && terminal_size().lines > 0;
-  const bool is_shown = flags.show || is_for_terminal;
+  const bool is_shown = flags.show || (flags.out.empty() && flags.format.empty());
   return {format, is_shown, !is_shown || !flags.out.empty()};
+}
+
+void refuse_pipe(const PictureFlags& flags) {
+  if (flags.out.empty() && flags.format.empty() && !flags.show && terminal_size().lines == 0) {
+    throw solver::InputError(
+        "standard output is no terminal: name a file for the picture with --out FILE.svg (or .png, "
+        ".csv), or draw it in characters with --show");
+  }
 }
 
 plot::Size picture_size(const PictureFlags& flags, const plot::Size& own) {

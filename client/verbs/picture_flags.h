@@ -28,6 +28,10 @@ struct PictureChoice {
   bool is_written;  ///< to a file or to standard output
 };
 PictureChoice picture_choice(const PictureFlags& flags);
+
+/// Throws solver::InputError where the flags leave open where a picture goes, and standard output
+/// is no terminal.
+void refuse_pipe(const PictureFlags& flags);
 /// The size asked for, else `own`.
 plot::Size picture_size(const PictureFlags& flags, const plot::Size& own);
 

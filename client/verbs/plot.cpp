@@ -29,12 +29,12 @@ constexpr const char* kPlotExamples = R"(Examples:
 
 OUTPUT and COL are columns of `oblique query`, or SQL expressions over them, as ft_peak_N/fn_peak_N;
 KEY is an axis of the study. Of an axis that is left open the first value is drawn, and said; of
-several blocks a map and lines show one, and say so. Maps of texts, as of modes, name those that are
-met most. Cells without a result are hatched, failed ones
-crossed. Where points lie scattered, or are too many to draw each, cells gather them, and the picture
-says so. PNG needs rsvg-convert. Without --out the picture is drawn on a terminal, and as SVG into a
-pipe. --range and --at are in SI units. A point is solved again for its time histories, here when the
-database is a file or the point is of no study, and by a worker of the server otherwise.)";
+several blocks a map and lines show one, and say so. Maps of texts, as of modes, name those that most
+points have. Cells without a result are hatched, failed ones crossed. Where points lie scattered, or
+are too many to draw each, cells gather them, and the picture says so. PNG needs rsvg-convert. Without
+--out the picture is drawn on the terminal. --range and --at are in SI units. A point is solved again
+for its time histories, here when the database is a file or the point is of no study, and by a worker
+of the server otherwise.)";
 
 struct PlotFlags {
   plot::PlotRequest request;
@@ -66,6 +66,7 @@ int plot_what_is_meant(PlotFlags& flags) {
   static_cast<void>(picture_choice(flags.picture));
   static_cast<void>(picture_size(flags.picture, {}));
   plot::check(flags.request);
+  refuse_pipe(flags.picture);
   flags.point.study = flags.request.study;
   return is_point_meant(flags.point) ? plot_point(flags.point, flags.picture, flags.source)
                                      : plot_study(flags);

@@ -15,6 +15,7 @@
 #include "client/service/connection.h"
 #include "client/service/embedded_service.h"
 #include "client/service/run_service.h"
+#include "client/service/source_flags.h"
 #include "client/service/watching.h"
 #include "client/verbs/verbs.h"
 #include "proto/program/stop_signals.h"
@@ -25,7 +26,8 @@ namespace oblique::client {
 namespace {
 
 constexpr const char* kViewExamples = R"(Examples:
-  oblique view oblique.db
+  oblique view
+  oblique view friction.db
   oblique view big.db --port 8000
 
 Open the address that it prints in a browser on this machine; Ctrl-C ends it. Over ssh, forward the
@@ -34,7 +36,7 @@ Others are started on the page: what changes the file, as `oblique run`, is refu
 Links to views hold as long as the port is the same: give one that is kept.)";
 
 struct ViewFlags {
-  RunSettings settings{.service = {.database = {}}, .terms = {}};
+  RunSettings settings;
   int port = 0;
 };
 
@@ -105,9 +107,7 @@ void add_view(CLI::App& app, Command& command) {
       "view",
       "Show a database as a page in a browser: a server and a worker for as long as it is open");
   verb->footer(kViewExamples);
-  verb->add_option("FILE.db", flags->settings.service.database, "database")
-      ->required()
-      ->type_name("");
+  add_database_argument(*verb, flags->settings.service.database);
   constexpr double kLargestPort = 65535;
   verb->add_option("--port", flags->port, "port of the page; 0: the system picks one")
       ->check(protocol::number_between(0, kLargestPort))

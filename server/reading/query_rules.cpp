@@ -16,6 +16,8 @@
 namespace oblique::server {
 namespace {
 
+constexpr const char* kOnlyReads = "this only reads";
+
 /// Pragmas that only tell something, when they have no argument or name a table.
 bool is_harmless_pragma(std::string_view name, const char* argument) {
   constexpr std::array<std::string_view, 6> kAboutTables{
@@ -119,11 +121,13 @@ StatementHandle prepare_query(sqlite3* database, const std::string& sql) {
   StatementHandle statement(raw, &sqlite3_finalize);
   const int primary = static_cast<int>(static_cast<unsigned>(code) & 0xffU);
   if (primary == SQLITE_AUTH) {
-    throw StatementError(std::string("only statements that read are allowed: ") +
-                         sqlite3_errmsg(database));
+    throw StatementError(fmt::format("{}: {}", kOnlyReads, sqlite3_errmsg(database)));
   }
   if (primary == SQLITE_ERROR) {
     const std::string reason = sqlite3_errmsg(database);
+    if (reason.starts_with("cannot modify ")) {  // a view
+      throw StatementError(fmt::format("{}: {}", kOnlyReads, reason));
+    }
     throw StatementError(
         fmt::format("the statement is wrong: {}{}", reason, what_quotes_mean(reason, sql)));
   }
@@ -137,7 +141,7 @@ StatementHandle prepare_query(sqlite3* database, const std::string& sql) {
     throw StatementError("one statement at a time: something follows the first");
   }
   if (sqlite3_stmt_readonly(raw) == 0) {
-    throw StatementError("only statements that read are allowed");
+    throw StatementError(kOnlyReads);
   }
   if (sqlite3_bind_parameter_count(raw) > 0) {
     // Only the named ones have a name; nothing would ever be bound to any.

@@ -41,6 +41,9 @@ TEST(CommandLine, AnswersWrongUsageWithExitCodeTwoAndASentence) {
   } wrong[] = {
       {{}, "no verb given"},
       {{"solv"}, "unknown verb `solv` (did you mean `solve`?)"},
+      {{"server", "--db", "a.db"}, "unknown verb `server` (did you mean `oblique-server`?)"},
+      {{"worker"}, "(did you mean `oblique-worker`?)"},
+      {{"list"}, "(did you mean `oblique studies`?)"},
       {{"--verbos"}, "unexpected `--verbos`"},
       {{"solve", "--H", "1", "--mu", "0.4"}, "--e is missing"},
       {{"solve", "--H", "1", "--mu", "-0.4", "--e", "1"}, "mu = -0.4"},

@@ -17,6 +17,7 @@ namespace oblique::client {
 namespace {
 
 using testing::HasSubstr;
+using testing::Not;
 
 /// Compares for hours without a look at the clock.
 constexpr const char* kDeaf = "SELECT instr(zeroblob(60000000), zeroblob(29999999) || x'01')";
@@ -77,6 +78,39 @@ TEST_F(DatabaseQuery, ANameInTheWrongCaseIsRefusedWithTheRightOne) {
   EXPECT_EQ(ask({"query", "a", "--select", "max(mu) AS MU", "--order", "MU"}).exit_code, 0);
   EXPECT_EQ(ask({"query", "a", "--select", "Mu"}).exit_code, 2);
   EXPECT_EQ(ask({"query", "a", "--order", "POINT DESC"}).exit_code, 2);
+}
+
+TEST_F(DatabaseQuery, AModeThatNoPointHasIsSaid) {
+  const auto unknown = ask({"query", "a", "--where", "mu < 2 AND major_mode = 'SC SR SR'"});
+  EXPECT_EQ(unknown.exit_code, 0) << unknown.err;
+  EXPECT_THAT(unknown.err, testing::AllOf(HasSubstr("no point of a has major_mode = 'SC SR SR'"),
+                                          HasSubstr("'SC SR sR sC sR'")));
+  const auto known = ask({"sql", "SELECT mode FROM runs LIMIT 1", "--format", "csv"}).out;
+  const auto mode = known.substr(5, known.find('\n', 5) - 5);
+  EXPECT_EQ(ask({"query", "a", "--where", "mode == '" + mode + "'", "--format", "csv"}).err, "");
+}
+
+TEST_F(DatabaseQuery, ATableWithModesSaysWhatTheirLettersMean) {
+  const std::string letters = "\n(S stick, s slip; C compression, R restitution)\n";
+  EXPECT_THAT(ask({"query", "a"}).out, testing::EndsWith(letters));
+  EXPECT_THAT(ask({"sql", "SELECT mode FROM runs"}).out, testing::EndsWith(letters));
+  EXPECT_THAT(ask({"query", "a", "--select", "mu"}).out, Not(HasSubstr("S stick")));
+  EXPECT_THAT(ask({"query", "a", "--format", "csv"}).out, Not(HasSubstr("S stick")));
+}
+
+TEST_F(DatabaseQuery, SqlSaysThatItOnlyReads) {
+  for (const char* change :
+       {"DELETE FROM runs", "UPDATE studies SET name = 'b'", "DROP TABLE models"}) {
+    const auto outcome = ask({"sql", change});
+    EXPECT_EQ(outcome.exit_code, 2) << change;
+    EXPECT_THAT(outcome.err, HasSubstr("this only reads")) << change;
+  }
+}
+
+TEST_F(DatabaseQuery, CheckTakesItsFileWithTheFlagAndWithoutIt) {
+  EXPECT_THAT(ask({"check", "oblique.db"}).err, HasSubstr("oblique.db is sound"));
+  EXPECT_EQ(ask({"check", "oblique.db"}).err, ask({"check", "--db", "oblique.db"}).err);
+  EXPECT_THAT(ask({"check", "other.db"}).err, HasSubstr("other.db"));
 }
 
 TEST_F(DatabaseQuery, AConditionCannotCutOffOrderAndLimit) {

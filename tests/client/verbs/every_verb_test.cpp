@@ -211,6 +211,9 @@ TEST_F(EveryVerbThatReads, SuggestsTheNearestStudyAndFailsWithOneWhereAStudyIsNo
     if (verb.help.find("--yes ") != std::string::npos) {
       words.emplace_back("--yes");  // nobody can be asked here
     }
+    if (verb.help.find("--show ") != std::string::npos) {
+      words.emplace_back("--show");  // a picture goes into no pipe
+    }
     const auto outcome = test::run_oblique(folder_, words);
     EXPECT_EQ(outcome.exit_code, 1) << PrintToString(words) << outcome.err;
     EXPECT_THAT(outcome.err, HasSubstr("(did you mean `friction`?)")) << PrintToString(words);

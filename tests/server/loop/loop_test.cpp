@@ -202,7 +202,7 @@ TEST_F(LoopTest, TheServerStopsWhateverQueriesDo) {
 TEST_F(LoopTest, AQueryThatWritesIsRefused) {
   RunningServer server(path_);
   PretendedClient client(server.client_endpoint());
-  EXPECT_THAT(client.query("DELETE FROM studies").error().message(), HasSubstr("only statements"));
+  EXPECT_THAT(client.query("DELETE FROM studies").error().message(), HasSubstr("this only reads"));
 }
 
 TEST_F(LoopTest, TheSecondServerOfADatabaseIsRefused) {

@@ -70,9 +70,12 @@ TEST(View, ShowsADatabaseAndItsPointsUntilItIsStopped) {
 
 TEST(View, AFileThatIsNotThereIsNotMade) {
   const TemporaryFolder folder;
-  const Outcome outcome = run_oblique(folder, {"view", "nothing.db"});
-  EXPECT_EQ(outcome.exit_code, 1);
-  EXPECT_THAT(outcome.err, HasSubstr("there is no file nothing.db"));
+  for (const std::vector<std::string>& words :
+       {std::vector<std::string>{"view", "nothing.db"}, {"view", "--db", "nothing.db"}}) {
+    const Outcome outcome = run_oblique(folder, words);
+    EXPECT_EQ(outcome.exit_code, 1);
+    EXPECT_THAT(outcome.err, HasSubstr("there is no file nothing.db"));
+  }
 }
 
 TEST(View, APortThatIsTakenIsToldByTheFlagOfTheVerb) {

@@ -1,4 +1,5 @@
 // `oblique plot` of one point, and `oblique paper --figures`, as people call them.
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -31,6 +32,12 @@ class PlotPoint : public testing::Test {
   }
   test::Outcome plot(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), "plot");
+    const auto says_where = [](const std::string& word) {
+      return word == "--out" || word == "--format" || word == "--show" || word == "--help";
+    };
+    if (std::none_of(arguments.begin(), arguments.end(), says_where)) {
+      arguments.insert(arguments.end(), {"--format", "svg"});
+    }
     return test::run_oblique(folder_, arguments);
   }
 

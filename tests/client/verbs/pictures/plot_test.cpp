@@ -1,4 +1,5 @@
 // `oblique plot` as people call it.
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -31,6 +32,12 @@ class Plot : public testing::Test {
   }
   test::Outcome plot(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), "plot");
+    const auto says_where = [](const std::string& word) {
+      return word == "--out" || word == "--format" || word == "--show" || word == "--help";
+    };
+    if (std::none_of(arguments.begin(), arguments.end(), says_where)) {
+      arguments.insert(arguments.end(), {"--format", "svg"});
+    }
     return test::run_oblique(folder_, arguments);
   }
   std::string file(const std::string& name) const {
@@ -47,6 +54,13 @@ TEST_F(Plot, DrawsAStudyWithoutBeingToldWhat) {
   EXPECT_TRUE(outcome.out.starts_with("<svg ")) << outcome.out.substr(0, 100);
   EXPECT_TRUE(outcome.out.ends_with("</svg>\n"));
   EXPECT_THAT(outcome.out, HasSubstr("a: fn_peak_N"));
+}
+
+TEST_F(Plot, IntoAPipeAsksForAFile) {
+  const auto outcome = test::run_oblique(folder_, {"plot", "a"});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_EQ(outcome.out, "");
+  EXPECT_THAT(outcome.err, HasSubstr("--out FILE.svg"));
 }
 
 TEST_F(Plot, DrawsTheSameBytesTwice) {

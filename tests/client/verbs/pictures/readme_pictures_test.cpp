@@ -80,7 +80,8 @@ TEST(ReadmePictures, TheMapOfModesIsThatOfItsStudy) {
 }
 
 TEST(ReadmePictures, TheImpactIsThatOfItsPoint) {
-  const auto drawn = test::run_oblique({"plot", "--H", "1", "--mu", "1.2", "--e", "0.8"});
+  const auto drawn =
+      test::run_oblique({"plot", "--H", "1", "--mu", "1.2", "--e", "0.8", "--format", "svg"});
   ASSERT_EQ(drawn.exit_code, 0) << drawn.err;
   EXPECT_EQ(first_difference(kept_picture("impact.svg"), drawn.out), "");
 }

@@ -250,7 +250,8 @@ TEST_F(PagePicturesTest, APictureHasTheBytesOfObliquePlot) {
   ChildLimits limits;
   limits.memory_bytes = 0;  // sanitizers reserve much
   start("", limits);
-  const std::string plot = "'" + own.string() + "' plot grid --db " + page_->database();
+  const std::string plot =
+      "'" + own.string() + "' plot grid --format svg --db " + page_->database();
   const std::string map = output_of(plot + " --map fn_peak_N --x mu --y H --at e=0.5 2>/dev/null");
   EXPECT_THAT(map, HasSubstr("<svg"));
   EXPECT_EQ(body_of(get("?kind=map&z=fn_peak_N&x=mu&y=H&at=e@1")), map);
