@@ -26,6 +26,15 @@ test("a map shows its cells; pointing at one tells its value, a click chooses it
   await page.close();
 });
 
+test("the table has the axes that vary in the study, what the picture shows, and the main outputs", async () => {
+  const heads = async (/** @type {any} */ page) => page.$$eval(".rows thead th", (all) => all.map((one) => one.textContent.split(" ")[0]));
+  const outputs = ["status", "fn_peak", "ft_peak", "duration", "slide", "stick_total", "major_mode"];
+  const page = await study("#/study/1?pic=map&z=vn_out_m_s&x=mu&y=H&at=e@2");
+  await until(page, () => document.querySelector(".rows tbody tr"));
+  assert.deepEqual(await heads(page), ["point", "H", "mu", "e", "vn_out", ...outputs]);
+  await page.close();
+});
+
 test("a map is moved over by keys, and its values are spoken", async () => {
   const page = await study();
   await page.focus(kMap);
