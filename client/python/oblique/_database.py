@@ -119,8 +119,8 @@ class Database:
         """Results of a study: the answer of ``oblique query STUDY --where ...`` in full.
 
         Texts are SQL over the columns that ``oblique columns`` lists, in SI units; ``select`` left
-        out has those that people look at most, "*" has all. Raises ValueError for a wrong name,
-        with those that may have been meant.
+        out has the axes that vary in the study and the main outputs, "*" has all. Raises ValueError
+        for a wrong name, with those that may have been meant.
         """
         if limit is not None and limit < 0:
             raise ValueError(f"limit = {limit} is not allowed: limit must be >= 0")

@@ -76,7 +76,7 @@ class ReadmeCommands : public StudyOnLan {
 
 TEST_F(ReadmeCommands, AreFiveFromTheFirstKeyToTheFirstResultFromAnotherMachine) {
   const std::string text = readme();
-  std::ofstream(elsewhere_.file("first.toml")) << block_after(text, "## A first study", "toml");
+  std::ofstream(elsewhere_.file("first.toml")) << block_after(text, "## A study", "toml");
   const auto commands = commands_of(block_after(text, "## More than one machine", ""));
   ASSERT_EQ(commands.size(), 5U);
   std::vector<std::unique_ptr<Process>> stay;

@@ -1,4 +1,4 @@
-// The pictures of README.md are what the programs draw. deploy/pictures/make draws them anew.
+// The pictures of READMEs are what the programs draw. deploy/pictures/make draws them anew.
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -95,9 +95,12 @@ TEST(ReadmePictures, TheForcesAreThePapersFigure) {
 }
 
 TEST(ReadmePictures, AreShownThere) {
-  const auto readme = text_of_file(std::filesystem::path(OBLIQUE_SOURCE_DIR) / "README.md");
-  for (const char* name : {"modes.svg", "impact.svg", "forces.svg"}) {
-    EXPECT_NE(readme.find("(deploy/pictures/" + std::string(name) + ")"), std::string::npos);
+  const std::filesystem::path tree(OBLIQUE_SOURCE_DIR);
+  EXPECT_NE(text_of_file(tree / "README.md").find("(deploy/pictures/modes.svg)"),
+            std::string::npos);
+  const auto readme = text_of_file(tree / "deploy/pictures/README.md");
+  for (const std::string name : {"modes.svg", "impact.svg", "forces.svg"}) {
+    EXPECT_NE(readme.find("](" + name + ")"), std::string::npos);
     EXPECT_FALSE(kept_picture(name).empty());
   }
 }
