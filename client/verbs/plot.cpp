@@ -28,13 +28,13 @@ constexpr const char* kPlotExamples = R"(Examples:
   oblique plot --H 1 --mu 1.2 --e 1 --out impact.svg    of a point of no study
 
 OUTPUT and COL are columns of `oblique query`, or SQL expressions over them, as ft_peak_N/fn_peak_N;
-KEY is an axis of the study. Of an axis that is left open the first value is drawn, and said; of
-several blocks a map and lines show one, and say so. Maps of texts, as of modes, name those that most
-points have. Cells without a result are hatched, failed ones crossed. Where points lie scattered, or
-are too many to draw each, cells gather them, and the picture says so. PNG needs rsvg-convert. Without
---out the picture is drawn on the terminal. --range and --at are in SI units. A point is solved again
-for its time histories, here when the database is a file or the point is of no study, and by a worker
-of the server otherwise.)";
+KEY is an axis of the study. Axes without --at are held at their first value, and a message says
+which. Of several blocks a map and lines show one, and say so. Maps of texts, as of modes, name those
+that most points have. Cells without a result are hatched, failed ones crossed. Where points lie
+scattered, or are too many to draw each, cells gather them, and the picture says so. PNG needs
+rsvg-convert. Without --out the picture is drawn on the terminal. --range and --at are in SI units.
+A point is solved again for its time histories, here when the database is a file or the point is of
+no study, and by a worker of the server otherwise.)";
 
 struct PlotFlags {
   plot::PlotRequest request;

@@ -29,12 +29,11 @@ void add_format_flag(CLI::App& verb, std::string& format) {
 
 void add_output_flags(CLI::App& verb, OutputFlags& flags) {
   auto* format = verb.add_option("--format", flags.format,
-                                 "table, csv, json, jsonl, npz or markdown; as the file's name "
-                                 "ends when left out, else table")
+                                 "table, csv, json, jsonl, npz or markdown; default: as the "
+                                 "name of --out ends, else table")
                      ->type_name("FORMAT");
   protocol::note_choices(format, format_names());
-  verb.add_option("--out", flags.file, "file to write, which appears when it is whole")
-      ->type_name("FILE");
+  verb.add_option("--out", flags.file, "output file, written atomically")->type_name("FILE");
   verb.add_flag("--no-pager", flags.no_pager,
                 "print long tables on a terminal without $OBLIQUE_PAGER, $PAGER or less");
 }
