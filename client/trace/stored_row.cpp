@@ -9,7 +9,6 @@
 #include <stdlib.h>
 
 #include <spdlog/fmt/fmt.h>
-#include <nlohmann/json.hpp>
 
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
@@ -85,63 +84,6 @@ StoredRow row_once_stored(const PointAtHand& point, const solver::CaseResult& re
   return StoredRow(server::Reader(file).query("SELECT * FROM runs", server::kNoLimits));
 }
 
-nlohmann::json json_of_cells(std::span<const solver::Cell> cells) {
-  auto array = nlohmann::json::array();
-  for (const auto& cell : cells) {
-    std::visit(
-        [&](const auto& value) {
-          using Type = std::decay_t<decltype(value)>;
-          if constexpr (std::is_same_v<Type, bool>) {
-            array.push_back(value ? 1 : 0);
-          } else {
-            array.push_back(value);
-          }
-        },
-        cell);
-  }
-  return array;
-}
-
-/// Whether a packed list is that of the result, with every digit.
-bool is_list_of(const Value& packed, const solver::ResultList& list,
-                const solver::CaseResult& result) {
-  auto all = nlohmann::json::array();
-  list.each(result,
-            [&](std::span<const solver::Cell> cells) { all.push_back(json_of_cells(cells)); });
-  return nlohmann::json::parse(packed.text(), nullptr, false) == all;
-}
-
-template <class T>
-bool is_value_of(const Value& stored, const T* value) {
-  if (value == nullptr) {
-    return stored.kind_case() == Value::KIND_NOT_SET;
-  }
-  if constexpr (std::is_same_v<T, double>) {
-    return stored.has_real() && stored.real() == *value;
-  } else if constexpr (std::is_same_v<T, std::string>) {
-    return stored.text() == *value;
-  } else {
-    return stored.integer() == *value;
-  }
-}
-
-/// Whether a stored value is that of the result with every digit, as earlier schemas have it.
-bool is_exact(const Value& stored, const solver::ResultField& field,
-              const solver::CaseResult& result) {
-  if (const auto* list = std::get_if<solver::ListPart>(&field.value)) {
-    return is_list_of(stored, *list->list, result);
-  }
-  return std::visit(
-      [&](const auto& member) {
-        if constexpr (std::is_same_v<std::decay_t<decltype(member)>, solver::ListPart>) {
-          return false;
-        } else {
-          return is_value_of(stored, member.of(result));
-        }
-      },
-      field.value);
-}
-
 bool is_same(const Value& a, const Value& b) {
   return a.SerializeAsString() == b.SerializeAsString();
 }
@@ -171,22 +113,22 @@ std::vector<std::string> differences(const StoredRow& stored, const PointAtHand&
                                      const solver::CaseResult& result) {
   const StoredRow again = row_once_stored(point, result);
   std::vector<std::string> columns;
-  const auto compare = [&](std::string_view name, const auto& has_all_digits) {
+  const auto compare = [&](std::string_view name) {
     const std::string column(name);
     const auto before = stored.value(column);
     const auto now = again.value(column);
-    if (before && now && !is_same(*before, *now) && !has_all_digits(*before)) {
+    if (before && now && !is_same(*before, *now)) {
       columns.push_back(column);
     }
   };
   for (const auto& field : solver::result_fields()) {
     if (field.sent_with == solver::SentWith::kResult && field.name != "wall_s") {
-      compare(field.column, [&](const Value& value) { return is_exact(value, field, result); });
+      compare(field.column);
     }
   }
   for (const auto* list : solver::result_lists()) {
     if (solver::find_result_column(list->column) == nullptr) {
-      compare(list->column, [&](const Value& value) { return is_list_of(value, *list, result); });
+      compare(list->column);
     }
   }
   return columns;

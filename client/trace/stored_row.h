@@ -34,8 +34,8 @@ std::optional<StoredRow> stored_row(Source& source, const std::string& study, st
 /// The outputs, by column, in which the stored row is another one than `result`, the same point
 /// solved again. A database keeps the digits that outputs are accurate to: the result is stored, in
 /// a database of its own that is gone afterwards, and what comes out of both is compared bit by
-/// bit; a database of an earlier schema may have all digits. Left out is what differs from run to
-/// run: the time that it took. Throws server::StorageError when nothing can be stored here.
+/// bit. Left out is what differs from run to run: the time that it took. Throws
+/// server::StorageError when nothing can be stored here.
 std::vector<std::string> differences(const StoredRow& stored, const PointAtHand& point,
                                      const solver::CaseResult& result);
 

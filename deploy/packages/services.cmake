@@ -3,7 +3,7 @@ set(UNITS_OF_server oblique-server.service)
 set(FIRST_OF_server "For a start now and with the machine:")
 set(WAY_BACK_OF_server
 "A database
-  of a newer schema it leaves as it is, and says so: then go on from a copy of before.")
+  of another schema it leaves as it is, and says so: then go on from a copy of before.")
 set(KEPT_OF_server /var/lib/oblique)
 set(WHAT_IS_KEPT_OF_server "databases and keys")
 file(READ ${CMAKE_CURRENT_SOURCE_DIR}/debian/prepare_server PREPARATION_OF_server)

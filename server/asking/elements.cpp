@@ -202,7 +202,9 @@ ElementReference counted_mode(ElementTokens tokens) {
   return {4, fmt::format("count(*) FILTER (WHERE major_mode = {})", tokens[2].text), {}};
 }
 
-ElementReference sound_element_at(ElementTokens tokens) {
+}  // namespace
+
+ElementReference element_at(ElementTokens tokens) {
   if (tokens.size() < 2 || tokens[0].kind != SqlToken::Kind::kName) {
     return {};
   }
@@ -226,32 +228,12 @@ ElementReference sound_element_at(ElementTokens tokens) {
   return chosen(tokens);
 }
 
-/// The list that an element is written with: "phases" of "phases" and "longest_phase".
-std::string_view list_of(std::string_view written) {
-  const auto rest = written.substr(std::min(written.size(), written.find('_') + 1));
-  const auto single = std::find_if(kSingles.begin(), kSingles.end(),
-                                   [&](const Single& known) { return known.name == rest; });
-  return single == kSingles.end() ? written : single->list;
-}
-
-}  // namespace
-
-ElementReference element_at(ElementTokens tokens, Lists lists) {
-  auto reference = sound_element_at(tokens);
-  // Counts of modes are of no list.
-  if (reference.tokens > 0 && lists == Lists::kMaybeDamaged && !is_word(tokens[0], "count_mode")) {
-    reference.sql =
-        fmt::format("CASE WHEN json_valid({}) THEN {} END", list_of(tokens[0].text), reference.sql);
-  }
-  return reference;
-}
-
-std::string in_sqlite(sqlite3* database, std::string_view text, Lists lists) {
+std::string in_sqlite(sqlite3* database, std::string_view text) {
   const auto tokens = sql_tokens(text);
   std::string sql;
   std::size_t copied = 0;
   for (std::size_t i = 0; i < tokens.size(); ++i) {
-    const auto reference = element_at(ElementTokens(tokens).subspan(i), lists);
+    const auto reference = element_at(ElementTokens(tokens).subspan(i));
     if (reference.tokens == 0) {
       continue;
     }
@@ -265,11 +247,11 @@ std::string in_sqlite(sqlite3* database, std::string_view text, Lists lists) {
   return with_exact_numbers(database, sql);
 }
 
-std::string columns_in_sqlite(sqlite3* database, std::string_view text, Lists lists) {
+std::string columns_in_sqlite(sqlite3* database, std::string_view text) {
   const auto tokens = sql_tokens(text);
   std::string columns;
   for (const SqlItem& item : sql_items(tokens)) {
-    const std::string sql = in_sqlite(database, item.text, lists);
+    const std::string sql = in_sqlite(database, item.text);
     columns += columns.empty() ? "" : ", ";
     if (sql == item.text) {
       columns += item.whole;

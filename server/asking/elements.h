@@ -20,20 +20,16 @@ struct ElementReference {
   std::string unit;
 };
 
-/// What is known of the texts of lists: before schema 8 they are stored as they are given, and one
-/// that is damaged must not spoil a question.
-enum class Lists { kSound, kMaybeDamaged };
-
 /// What stands at the beginning of `tokens`. Throws solver::InputError for an element of a list
 /// that has no such member, or a number that is none.
-ElementReference element_at(std::span<const SqlToken> tokens, Lists lists = Lists::kSound);
+ElementReference element_at(std::span<const SqlToken> tokens);
 
 /// `text` with elements, counts of modes as count_mode('SC SR'), and numbers as SQLite understands
 /// them; see with_exact_numbers. Throws as element_at does.
-std::string in_sqlite(sqlite3* database, std::string_view text, Lists lists);
+std::string in_sqlite(sqlite3* database, std::string_view text);
 
 /// The same for columns: those that were changed keep what was written as their name.
-std::string columns_in_sqlite(sqlite3* database, std::string_view text, Lists lists);
+std::string columns_in_sqlite(sqlite3* database, std::string_view text);
 
 /// Every element of a list by itself, as peaks[0].fn_N and longest_phase.t1_s, for comparing.
 std::vector<std::string> all_elements();

@@ -108,7 +108,7 @@ std::string explanation_of(sqlite3* database, const protocol::StudyQuery& questi
 
 /// Throws solver::InputError, naming the flag, for a text that alone is no SQL: what SQLite says of
 /// the whole statement speaks of what stands around it.
-void check_syntax(sqlite3* database, const protocol::StudyQuery& question, Lists lists) {
+void check_syntax(sqlite3* database, const protocol::StudyQuery& question) {
   const auto check = [&](const char* flag, const std::string& text, const std::string& sql) {
     if (text.empty()) {
       return;
@@ -126,13 +126,10 @@ void check_syntax(sqlite3* database, const protocol::StudyQuery& question, Lists
     }
   };
   const std::string selected = selected_by(question);
-  check("--select", selected, "SELECT " + columns_in_sqlite(database, selected, lists));
-  check("--where", question.where(),
-        "SELECT 1 WHERE " + in_sqlite(database, question.where(), lists));
-  check("--group", question.group(),
-        "SELECT 1 GROUP BY " + in_sqlite(database, question.group(), lists));
-  check("--order", question.order(),
-        "SELECT 1 ORDER BY " + in_sqlite(database, question.order(), lists));
+  check("--select", selected, "SELECT " + columns_in_sqlite(database, selected));
+  check("--where", question.where(), "SELECT 1 WHERE " + in_sqlite(database, question.where()));
+  check("--group", question.group(), "SELECT 1 GROUP BY " + in_sqlite(database, question.group()));
+  check("--order", question.order(), "SELECT 1 ORDER BY " + in_sqlite(database, question.order()));
 }
 
 /// Gives a question that selects nothing its columns.
@@ -175,7 +172,7 @@ Plan plan(sqlite3* database, protocol::StudyQuery question) {
   const std::string written = selected_by(question);
   Plan plan;
   plan.goes_on_by_point = is_in_point_order(question) && gives_points(written);
-  std::string selected = columns_in_sqlite(database, written, study.lists);
+  std::string selected = columns_in_sqlite(database, written);
   selected += plan.goes_on_by_point ? ", point" : "";
   plan.statement = statement_of(database, question, selected, study, rows);
   try {
@@ -185,8 +182,8 @@ Plan plan(sqlite3* database, protocol::StudyQuery question) {
     }
     plan.columns = planned_columns(std::move(names), written);
   } catch (const solver::InputError& error) {
-    check_syntax(database, question, study.lists);
-    throw solver::InputError(with_suggestions(database, error.what(), known) +
+    check_syntax(database, question);
+    throw solver::InputError(with_suggestions(error.what(), known) +
                              what_quotes_mean(error.what(), plan.statement));
   }
   if (question.explain()) {

@@ -10,6 +10,7 @@
 #include "proto/recipe/checks.h"
 #include "server/asking/columns.h"
 #include "server/asking/conditions.h"
+#include "server/asking/elements.h"
 #include "server/asking/grouping.h"
 #include "server/asking/lists/quick_views.h"
 #include "server/asking/question.h"
@@ -181,13 +182,7 @@ AskedStudy asked_study(sqlite3* database, const std::string& name) {
   if (!study.step()) {
     throw solver::InputError(fmt::format("there is no study called \"{}\"", name));
   }
-  constexpr std::int64_t kFirstWithSoundLists = 8;
-  Statement schema(database, "PRAGMA user_version");
-  const bool has_sound_lists = schema.step() && schema.integer(0) >= kFirstWithSoundLists;
-  AskedStudy found{study.integer(0),
-                   static_cast<std::uint64_t>(study.integer(1)),
-                   {},
-                   has_sound_lists ? Lists::kSound : Lists::kMaybeDamaged};
+  AskedStudy found{study.integer(0), static_cast<std::uint64_t>(study.integer(1)), {}};
   // Points of a recipe that does not tell where they are are all looked at.
   if (!protocol::parse_recipe(study.bytes(2), found.recipe) ||
       !tells_points(found.recipe, found.points)) {
@@ -267,12 +262,11 @@ RowsAsked rows_asked(const protocol::StudyQuery& question, const AskedStudy& stu
 std::string statement_of(sqlite3* database, const protocol::StudyQuery& question,
                          const std::string& selected, const AskedStudy& study,
                          const RowsAsked& rows) {
-  const std::string where =
-      question.where().empty()
-          ? ""
-          : fmt::format(" WHERE ({})", in_sqlite(database, question.where(), study.lists));
-  const std::string group = in_sqlite(database, question.group(), study.lists);
-  std::string order = in_sqlite(database, question.order(), study.lists);
+  const std::string where = question.where().empty()
+                                ? ""
+                                : fmt::format(" WHERE ({})", in_sqlite(database, question.where()));
+  const std::string group = in_sqlite(database, question.group());
+  std::string order = in_sqlite(database, question.order());
   if (order.empty()) {
     order = group.empty() ? "point" : group;
   }

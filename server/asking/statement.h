@@ -7,7 +7,6 @@
 #include <sqlite3.h>
 
 #include "proto/oblique.pb.h"
-#include "server/asking/elements.h"
 #include "server/asking/point_spans.h"
 
 namespace oblique::server {
@@ -17,7 +16,6 @@ struct AskedStudy {
   std::int64_t study_id;
   std::uint64_t points;     ///< without those that filters leave out
   protocol::Recipe recipe;  ///< empty: it cannot be read, or is not that of so many points
-  Lists lists;
 };
 
 /// Throws solver::InputError for a name that no study has.

@@ -11,7 +11,6 @@
 #include "server/asking/elements.h"
 #include "server/asking/sql/sql_functions.h"
 #include "server/asking/sql/sql_tokens.h"
-#include "server/database/sqlite.h"
 
 namespace oblique::server {
 namespace {
@@ -141,8 +140,7 @@ std::string what_quotes_mean(const std::string& message, std::string_view sql) {
                      is_element ? ", and an element of a list stands in none" : "");
 }
 
-std::string with_suggestions(sqlite3* database, const std::string& message,
-                             const std::vector<std::string>& columns) {
+std::string with_suggestions(const std::string& message, const std::vector<std::string>& columns) {
   constexpr std::string_view kListed = "; `oblique columns` lists all";
   if (const std::string wrong = behind(message, "no such function: "); !wrong.empty()) {
     if (same_but_case(wrong, "regexp") || same_but_case(wrong, "match")) {
@@ -155,18 +153,6 @@ std::string with_suggestions(sqlite3* database, const std::string& message,
   const std::string wrong = missing_column(message);
   if (wrong.empty()) {
     return message;
-  }
-  Statement schema(database, "PRAGMA user_version");
-  const std::int64_t version = schema.step() ? schema.integer(0) : kSchemaVersion;
-  const auto& all = all_columns();
-  const bool is_newer = std::any_of(all.begin(), all.end(),
-                                    [&](const Column& column) { return column.name == wrong; });
-  if (is_newer && version < kSchemaVersion) {
-    return fmt::format(
-        "{} in this database, which an earlier version wrote (its schema is {}, ours {}): the "
-        "start "
-        "of a server on it brings it up to date, as does one on a copy that `oblique backup` makes",
-        message, version, kSchemaVersion);
   }
   return fmt::format("{}{}{}", message, suggestion(wrong, in_place_of_column(wrong, columns)),
                      kListed);

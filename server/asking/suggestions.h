@@ -5,8 +5,6 @@
 #include <string_view>
 #include <vector>
 
-#include <sqlite3.h>
-
 namespace oblique::server {
 
 /// " (did you mean `a`, `b` or `c`?)" with those of `candidates` that `word` may be short for or
@@ -18,9 +16,8 @@ std::string did_you_mean_some(std::string_view word, std::span<const std::string
 /// double quotes, where a text may have been meant; else nothing.
 std::string what_quotes_mean(const std::string& message, std::string_view sql);
 
-/// What SQLite has against a question on `database`, with the columns, elements of lists or
-/// functions that may have been meant. `columns` are those that questions have there.
-std::string with_suggestions(sqlite3* database, const std::string& message,
-                             const std::vector<std::string>& columns);
+/// What SQLite has against a question, with the columns, elements of lists or functions that may
+/// have been meant. `columns` are those that questions have.
+std::string with_suggestions(const std::string& message, const std::vector<std::string>& columns);
 
 }  // namespace oblique::server

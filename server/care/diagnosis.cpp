@@ -13,7 +13,6 @@
 #include "server/database/open_for_reading.h"
 #include "server/database/row_checksum.h"
 #include "server/database/sqlite.h"
-#include "server/store/rows/row_columns.h"
 #include "server/store/rows/settled_runs.h"
 #include "server/store/schema/standing_views.h"
 
@@ -48,12 +47,9 @@ std::uint64_t first_difference(const IntervalSet& a, const IntervalSet& b) {
 }
 
 /// Every study beside the number of its results, for FROM.
-std::string counted_studies(int schema) {
-  return fmt::format(
-      "(SELECT *, (SELECT count(*) FROM {} AS r WHERE r.study_id = s.study_id) AS results"
-      " FROM studies AS s)",
-      results_table(schema));
-}
+constexpr const char* kCountedStudies =
+    "(SELECT *, (SELECT count(*) FROM packed_results AS r WHERE r.study_id = s.study_id)"
+    " AS results FROM studies AS s)";
 
 /// What the runs of settled points say that the rows do not. One instant of both, whatever a server
 /// writes meanwhile.
@@ -102,8 +98,7 @@ void check_references(sqlite3* database, const std::string& which, Diagnosis& fo
         found.faults.push_back(rows.text(0));
       }
     } catch (const StorageError& error) {
-      const bool is_ours =
-          table == "results" || std::count(our_tables().begin(), our_tables().end(), table) > 0;
+      const bool is_ours = std::count(our_tables().begin(), our_tables().end(), table) > 0;
       (is_ours ? found.faults : found.remarks)
           .push_back(fmt::format("the foreign keys of the table {} cannot be checked: {}", table,
                                  error.what()));
@@ -129,23 +124,19 @@ void add_texts(std::vector<std::string>& to, sqlite3* database, const std::strin
 }
 
 /// Rows that refer to what is not there.
-void check_references_of_rows(sqlite3* database, const std::string& table, Diagnosis& found) {
+void check_references_of_rows(sqlite3* database, Diagnosis& found) {
   // Rows of a study that is being deleted refer to none.
   const bool deletes = !deleted_studies(database).empty();
   check_references(database, deletes ? "parent <> 'studies'" : "1", found);
   if (deletes) {
     add_texts(found.faults, database,
-              fmt::format("SELECT DISTINCT 'table {0}: refers to study number ' || study_id ||"
-                          " ', which is not there' FROM {0} WHERE study_id NOT IN"
-                          " (SELECT study_id FROM studies UNION SELECT study_id FROM deletions)"
-                          " LIMIT 20",
-                          table));
-    add_texts(
-        found.remarks, database,
-        fmt::format("SELECT count(*) || ' results of deleted studies are left; the next server"
-                    " deletes them' FROM {} WHERE study_id IN (SELECT study_id FROM deletions)"
-                    " HAVING count(*) > 0",
-                    table));
+              "SELECT DISTINCT 'table packed_results: refers to study number ' || study_id ||"
+              " ', which is not there' FROM packed_results WHERE study_id NOT IN"
+              " (SELECT study_id FROM studies UNION SELECT study_id FROM deletions) LIMIT 20");
+    add_texts(found.remarks, database,
+              "SELECT count(*) || ' results of deleted studies are left; the next server deletes"
+              " them' FROM packed_results WHERE study_id IN (SELECT study_id FROM deletions)"
+              " HAVING count(*) > 0");
   }
 }
 
@@ -172,46 +163,33 @@ Diagnosis diagnose(const std::string& path) {
     return found;  // what damaged pages say of anything else means nothing
   }
   add_row_checksum(database);
-  const int schema = schema_of(database);
-  if (schema >= kFirstPacked) {
-    found.faults = faults_of_tables(database);
-    if (!found.faults.empty()) {
-      return found;  // what would be asked next needs them
-    }
+  found.faults = faults_of_tables(database);
+  if (!found.faults.empty()) {
+    return found;  // what would be asked next needs them
   }
-  const std::string table(results_table(schema));
-  check_references_of_rows(database, table, found);
+  check_references_of_rows(database, found);
   add_texts(found.faults, database,
-            "SELECT 'study ' || name || ' is called done with ' || results || ' of ' || points ||"
-            " ' results' FROM " +
-                counted_studies(schema) +
-                " WHERE state = 'done' AND results <> points"
-                " LIMIT 20");
-  if (schema >= kFirstPacked) {
-    compare_settled_points(database, found);
-    if (const auto faults = faults_of_views(database); !faults.empty()) {
-      found.faults.insert(found.faults.end(), faults.begin(), faults.end());
-      shadow_views(database);  // the rows are looked at all the same
-    }
+            fmt::format("SELECT 'study ' || name || ' is called done with ' || results || ' of ' ||"
+                        " points || ' results' FROM {} WHERE state = 'done' AND results <> points"
+                        " LIMIT 20",
+                        kCountedStudies));
+  compare_settled_points(database, found);
+  if (const auto faults = faults_of_views(database); !faults.empty()) {
+    found.faults.insert(found.faults.end(), faults.begin(), faults.end());
+    shadow_views(database);  // the rows are looked at all the same
   }
-  for (auto& fault : faults_of_rows(database, schema, kMostOfAKind)) {
+  for (auto& fault : faults_of_rows(database, kMostOfAKind)) {
     found.faults.push_back(std::move(fault));
   }
   add_texts(found.remarks, database,
-            "SELECT 'study ' || name || ' is ' || state || ': ' || results || ' of ' || points ||"
-            " ' points have a result' FROM " +
-                counted_studies(schema) +
-                " WHERE results < points"
-                " ORDER BY study_id");
-  if (schema >= kFirstWithChecksums) {
-    add_texts(
-        found.remarks, database,
-        fmt::format(
-            "SELECT count(*) || ' of ' || (SELECT count(*) FROM {0}) || ' results have no checksum,"
-            " for they are of an earlier schema: a flipped bit in them may go unseen'"
-            " FROM {0} WHERE checksum IS NULL HAVING count(*) > 0",
-            table));
-  }
+            fmt::format("SELECT 'study ' || name || ' is ' || state || ': ' || results || ' of ' ||"
+                        " points || ' points have a result' FROM {} WHERE results < points"
+                        " ORDER BY study_id",
+                        kCountedStudies));
+  add_texts(found.remarks, database,
+            "SELECT count(*) || ' of ' || (SELECT count(*) FROM packed_results) || ' results have"
+            " no checksum: a flipped bit in them may go unseen'"
+            " FROM packed_results WHERE checksum IS NULL HAVING count(*) > 0");
   return found;
 }
 

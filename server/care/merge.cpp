@@ -5,12 +5,10 @@
 #include "proto/frames.h"
 #include "server/care/merged_rows.h"
 #include "server/care/merged_studies.h"
-#include "server/care/table_columns.h"
 #include "server/database/open_for_reading.h"
 #include "server/database/row_checksum.h"
 #include "server/database/sqlite.h"
-#include "server/store/rows/model_rows.h"
-#include "server/store/rows/row_columns.h"
+#include "server/store/schema/standing_views.h"
 #include "server/store/store.h"
 
 namespace oblique::server {
@@ -20,11 +18,8 @@ namespace {
 /// came in one message.
 void bound_what_is_read(sqlite3* source) {
   sqlite3_limit(source, SQLITE_LIMIT_LENGTH, static_cast<int>(2 * protocol::kMaxFrameBytes));
-  const std::string tables = fmt::format(
-      "COLLATE NOCASE IN ('about', 'studies', 'models', 'workers', 'texts', '{}', 'retries', "
-      "'origins',"
-      " 'deletions')",
-      results_table(schema_of(source)));
+  const std::string tables =
+      fmt::format("COLLATE NOCASE IN ('{}')", fmt::join(our_tables(), "', '"));
   Statement list(source,
                  fmt::format("SELECT t.name FROM pragma_table_list AS t WHERE t.name {}"
                              " AND (t.type <> 'table' OR NOT t.strict OR EXISTS"
@@ -61,7 +56,6 @@ Merged Merger::merge(const std::string& source, const MergeSettings& settings,
   sqlite3* const from = opened.database.get();
   sqlite3* const to = parts_->database.get();
   add_row_checksum(from);
-  add_model_definition(from);
   Merged merged;
   if (!opened.remark.empty()) {
     merged.remarks.push_back(opened.remark);

@@ -54,10 +54,10 @@ class Merger {
   /// Called now and then with how many of the rows were looked at.
   using Progress = std::function<void(std::uint64_t looked_at, std::uint64_t rows)>;
 
-  /// Merges the database at `source`, of this or an earlier schema, as it is at one instant, in one
-  /// transaction: all of it, or, when this throws or the process ends, nothing. What was merged
-  /// before is passed over. Throws StorageError for what cannot be read or written, for a row that
-  /// is not as it was written too, and MergeRefused. `source` must not be the target.
+  /// Merges the database at `source` as it is at one instant, in one transaction: all of it, or,
+  /// when this throws or the process ends, nothing. What was merged before is passed over. Throws
+  /// StorageError for what cannot be read or written, for a row that is not as it was written too,
+  /// and MergeRefused. `source` must not be the target.
   Merged merge(const std::string& source, const MergeSettings& settings, const Progress& progress);
 
   /// Moves all into the one file of the target. False when a reader keeps it from doing so.

@@ -1,31 +1,32 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
-#include <memory>
 #include <string>
 
+#include "server/care/merged_origins.h"
+#include "server/care/merged_references.h"
 #include "server/care/merged_studies.h"
 #include "server/database/sqlite.h"
 #include "server/store/rows/packed_row.h"
+#include "server/store/rows/row_columns.h"
+#include "server/store/rows/text_numbers.h"
 
 namespace oblique::server {
 
-/// The results of a database of this or an earlier schema, one after the other as packed rows.
+/// The results of a database, one after the other.
 class MergeSource {
  public:
-  /// Both connections must have `row_checksum`, and the source `model_definition`. All must outlive
-  /// it.
-  static std::unique_ptr<MergeSource> of(sqlite3* source, sqlite3* target,
-                                         const StudyPlaces& places);
-  virtual ~MergeSource() = default;
+  /// Both connections must have `row_checksum`. All must outlive it.
+  MergeSource(sqlite3* source, sqlite3* target, const StudyPlaces& places);
 
   /// Goes to the next row; false when there is none. Throws StorageError.
-  virtual bool next() = 0;
+  bool next();
   /// Numbers of texts of the present row become those of the target, where they are brought, so
   /// that outputs can be compared. Throws StorageError for one that is not there.
-  virtual void take_texts() = 0;
+  void take_texts();
   /// The same with its model, its worker and the study that it was taken from.
-  virtual void take_references() = 0;
+  void take_references();
 
   PackedRow& row() { return row_; }
   /// Whether the row is as it was stored, as far as that can be told.
@@ -36,7 +37,18 @@ class MergeSource {
   /// About how many there are.
   std::uint64_t rows() const { return rows_; }
 
- protected:
+ private:
+  const int model_id_ = packed_column("model_id");
+  const int worker_ = packed_column("worker");
+  const int taken_from_ = packed_column("taken_from");
+  const std::array<int, 3> text_columns_{packed_column("mode"), packed_column("major_mode"),
+                                         packed_column("margin_event")};
+  MergedModels models_;
+  MergedWorkers workers_;
+  MergedOrigins origins_;
+  TextNumbers target_texts_;
+  MergedTexts texts_;
+  Statement read_;
   PackedRow row_;
   bool is_sound_ = false;
   bool has_checksum_ = false;

@@ -1,12 +1,13 @@
 #include "server/care/merged_references.h"
 
-#include <algorithm>
 #include <cstddef>
+#include <string_view>
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/recipe/canonical.h"
 #include "server/care/row_faults.h"
-#include "server/care/table_columns.h"
+#include "server/store/rows/model_rows.h"
 #include "server/store/rows/row_columns.h"
 
 namespace oblique::server {
@@ -15,25 +16,6 @@ namespace {
 [[noreturn]] void missing(const char* what, std::int64_t number) {
   throw StorageError(fmt::format(
       "a result names {} {}, which is not there: `oblique check` tells more", what, number));
-}
-
-/// The columns of a model but its number, the definition first. What an earlier schema of `source`
-/// lacks has its default in `target`.
-std::vector<std::string> columns_of_models(sqlite3* source, sqlite3* target) {
-  std::vector<std::string> columns{"definition"};
-  const auto there = columns_of(source, "models");
-  for (const std::string& name : columns_of(target, "models")) {
-    const bool is_there = std::find(there.begin(), there.end(), name) != there.end();
-    if (is_there && name != "model_id" && name != "definition") {
-      columns.push_back(name);
-    }
-  }
-  return columns;
-}
-
-std::int64_t highest(sqlite3* target, const std::string& sql) {
-  Statement statement(target, sql);
-  return statement.step() ? statement.integer(0) : 0;
 }
 
 void remember(std::unordered_map<std::int64_t, std::int64_t>& known, std::int64_t in_source,
@@ -48,9 +30,6 @@ void remember(std::unordered_map<std::int64_t, std::int64_t>& known, std::int64_
 /// Throws StorageError when the row of a worker is not as it was stored: of all its results nobody
 /// would know by which solver they are.
 void check_workers(sqlite3* source) {
-  if (schema_of(source) < kFirstPacked) {
-    return;  // without checksums
-  }
   Statement damaged(source,
                     "SELECT worker_id FROM workers WHERE checksum IS NOT NULL AND checksum <> " +
                         worker_checksum_sql() + " LIMIT 1");
@@ -65,34 +44,19 @@ void check_workers(sqlite3* source) {
 /// Throws StorageError when the columns of a model are not those of its definition: the whole would
 /// be damaged as well.
 void refuse_damaged_models(sqlite3* source) {
-  const auto faults = faults_of_models(source, schema_of(source), 1);
+  const auto faults = faults_of_models(source, 1);
   if (!faults.empty()) {
     throw StorageError(faults.front() + ": `oblique check` tells more");
   }
 }
 
-std::string marks(std::size_t count) {
-  std::string text = "?";
-  for (std::size_t i = 1; i < count; ++i) {
-    text += ", ?";
-  }
-  return text;
-}
-
 }  // namespace
 
 MergedModels::MergedModels(sqlite3* source, sqlite3* target)
-    : MergedModels(source, target, columns_of_models(source, target)) {}
-
-MergedModels::MergedModels(sqlite3* source, sqlite3* target,
-                           const std::vector<std::string>& columns)
-    : read_(source, fmt::format("SELECT {} FROM models WHERE model_id = ?",
-                                present_values_sql(schema_of(source), "models",
-                                                   fmt::format("{}", fmt::join(columns, ", "))))),
+    : target_(target),
+      read_(source, "SELECT definition FROM models WHERE model_id = ?"),
       find_(target, "SELECT model_id FROM models WHERE definition = ?"),
-      insert_(target, fmt::format("INSERT INTO models (model_id, {}) VALUES ({})",
-                                  fmt::join(columns, ", "), marks(columns.size() + 1))),
-      last_(highest(target, "SELECT max(model_id) FROM models")) {
+      insert_(target, insert_model_sql()) {
   refuse_damaged_models(source);
 }
 
@@ -104,18 +68,16 @@ std::int64_t MergedModels::in_target(std::int64_t in_source) {
   if (!read_.step()) {
     missing("model", in_source);
   }
-  find_.bind_column(1, read_, 0);
+  const std::string definition = read_.text(0);
+  read_.reset();
+  find_.bind(1, std::string_view(definition));
   std::int64_t number = find_.step() ? find_.integer(0) : 0;
   find_.reset();
   if (number == 0) {
-    number = ++last_;
-    insert_.bind(1, number);
-    for (int column = 0; column < read_.columns(); ++column) {
-      insert_.bind_column(column + 2, read_, column);
-    }
+    bind_model(insert_, protocol::model_of_canonical(definition), definition);
     insert_.run();
+    number = sqlite3_last_insert_rowid(target_);
   }
-  read_.reset();
   remember(known_, in_source, number);
   return number;
 }

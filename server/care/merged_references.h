@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <string>
 #include <unordered_map>
-#include <vector>
 
 #include "server/database/sqlite.h"
 #include "server/store/rows/text_numbers.h"
@@ -14,7 +13,6 @@ namespace oblique::server {
 /// Models. Two of one definition are one.
 class MergedModels {
  public:
-  /// The source must have `model_definition`.
   MergedModels(sqlite3* source, sqlite3* target);
 
   /// The number in the target of the model that has this one in the source; it is brought there
@@ -22,12 +20,10 @@ class MergedModels {
   std::int64_t in_target(std::int64_t in_source);
 
  private:
-  MergedModels(sqlite3* source, sqlite3* target, const std::vector<std::string>& columns);
-
+  sqlite3* target_;
   Statement read_;
   Statement find_;
   Statement insert_;
-  std::int64_t last_ = 0;
   std::unordered_map<std::int64_t, std::int64_t> known_;  // some of them
 };
 
@@ -52,7 +48,7 @@ class MergedWorkers {
   std::unordered_map<std::int64_t, std::int64_t> known_;
 };
 
-/// The table `texts`, which sources before schema `kFirstPacked` lack.
+/// The table `texts`.
 class MergedTexts {
  public:
   MergedTexts(sqlite3* source, TextNumbers& target);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <memory>
 #include <set>
 #include <string>
 #include <string_view>
@@ -50,14 +49,12 @@ std::vector<Output> compared_outputs() {
   return outputs;
 }
 
-/// Those that are others in both rows; what one lacks, as one of an older schema may, says nothing.
+/// Those that are others in both rows.
 std::vector<std::string> differing_outputs(const std::vector<Output>& outputs, const PackedRow& a,
                                            const PackedRow& b) {
   std::vector<std::string> differing;
   for (const Output& output : outputs) {
-    const PackedValue& here = a.at(output.column);
-    const PackedValue& there = b.at(output.column);
-    if (!is_null(here) && !is_null(there) && here != there) {
+    if (a.at(output.column) != b.at(output.column)) {
       differing.emplace_back(output.shown);
     }
   }
@@ -70,7 +67,7 @@ class RowMerge {
       : places_(places),
         merged_(merged),
         deleted_(deleted_studies(source)),
-        source_(MergeSource::of(source, target, places)),
+        source_(source, target, places),
         insert_(target),
         remove_(target, "DELETE FROM packed_results WHERE study_id = ? AND point = ?"),
         known_(target, fmt::format("SELECT {}, (SELECT w.solver_version FROM workers AS w"
@@ -79,9 +76,9 @@ class RowMerge {
                                    fmt::join(packed_columns(), ", "))) {}
 
   void run(const Merger::Progress& progress) {
-    const std::uint64_t rows = source_->rows();
+    const std::uint64_t rows = source_.rows();
     std::uint64_t looked_at = 0;
-    while (source_->next()) {
+    while (source_.next()) {
       take_row();
       if (++looked_at % kRowsBetweenReports == 0) {
         progress(looked_at, std::max(rows, looked_at));
@@ -96,13 +93,13 @@ class RowMerge {
   }
 
   void take_row() {
-    PackedRow& row = source_->row();
+    PackedRow& row = source_.row();
     const std::uint64_t point = whole(row, columns_.point);
     const auto found = places_.find(whole(row, columns_.study_id));
     if (found == places_.end() && deleted_.contains(whole(row, columns_.study_id))) {
       return;  // the server there has not come to it yet
     }
-    if (!source_->is_sound() || found == places_.end() || point >= found->second.points_in_source) {
+    if (!source_.is_sound() || found == places_.end() || point >= found->second.points_in_source) {
       throw StorageError(
           fmt::format("the result of point {} of study number {} is not as it was stored: `oblique "
                       "check` tells "
@@ -111,11 +108,11 @@ class RowMerge {
     }
     StudyPlace& place = found->second;
     row.at(columns_.study_id).whole = static_cast<std::int64_t>(place.id);
-    source_->take_texts();
+    source_.take_texts();
     if (place.is_new || is_wanted(place, point)) {
       check_version(place);
-      source_->take_references();
-      insert_.run(row, source_->has_checksum());
+      source_.take_references();
+      insert_.run(row, source_.has_checksum());
       ++place.rows_changed;
       ++merged_.results_added;
     }
@@ -130,7 +127,7 @@ class RowMerge {
       return true;
     }
     there_.read(known_, 0);
-    const bool is_solved = is_null(source_->row().at(columns_.error));
+    const bool is_solved = is_null(source_.row().at(columns_.error));
     const bool was_solved = is_null(there_.at(columns_.error));
     if (is_solved && was_solved) {
       compare(place, point);
@@ -149,8 +146,8 @@ class RowMerge {
 
   /// Both solved it.
   void compare(const StudyPlace& place, std::uint64_t point) {
-    std::vector<std::string> differing = differing_outputs(outputs_, source_->row(), there_);
-    if (known_.text(known_.columns() - 1) != source_->solver_version()) {
+    std::vector<std::string> differing = differing_outputs(outputs_, source_.row(), there_);
+    if (known_.text(known_.columns() - 1) != source_.solver_version()) {
       differing.insert(differing.begin(), "solver_version");
     }
     if (!differing.empty() && ++merged_.results_differing <= kMostRemarks) {
@@ -161,7 +158,7 @@ class RowMerge {
 
   /// Results of a study come from one solver, unless it was said that they need not.
   void check_version(const StudyPlace& place) const {
-    const std::string& version = source_->solver_version();
+    const std::string& version = source_.solver_version();
     if (place.mixes_versions || place.solver_version.empty() || version.empty() ||
         version == place.solver_version) {
       return;
@@ -177,7 +174,7 @@ class RowMerge {
   StudyPlaces& places_;
   Merged& merged_;
   const std::set<std::uint64_t> deleted_;
-  std::unique_ptr<MergeSource> source_;
+  MergeSource source_;
   RowInsert insert_;
   Statement remove_;
   Statement known_;

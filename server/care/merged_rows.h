@@ -10,8 +10,8 @@ namespace oblique::server {
 
 /// Brings the rows of `results` of `source`, with the models and workers that they name, into
 /// `target`, where studies are at `places`. A transaction must be open in the target; both
-/// connections must have `row_checksum`, and the source `model_definition`. Throws MergeRefused and
-/// StorageError. Memory does not grow with the number of rows.
+/// connections must have `row_checksum`. Throws MergeRefused and StorageError. Memory does not grow
+/// with the number of rows.
 void merge_rows(sqlite3* source, sqlite3* target, StudyPlaces& places, Merged& merged,
                 const Merger::Progress& progress);
 

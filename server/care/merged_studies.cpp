@@ -12,7 +12,6 @@
 #include "proto/recipe/written/study_name.h"
 #include "proto/recipe/written/study_terms.h"
 #include "server/care/merged_origins.h"
-#include "server/care/table_columns.h"
 #include "server/scheduler/points/study_table.h"
 #include "server/store/rows/row_columns.h"
 #include "server/store/rows/settled_runs.h"
@@ -40,19 +39,9 @@ std::uint64_t number_in(const Statement& row, int column) {
   return static_cast<std::uint64_t>(row.integer(column));
 }
 
-/// Columns of studies, of which earlier schemas lack some.
-std::string study_columns_sql(sqlite3* source) {
-  const auto there = columns_of(source, "studies");
-  const auto column_or = [&](const std::string& column, const std::string& otherwise) {
-    return std::find(there.begin(), there.end(), column) == there.end() ? otherwise : column;
-  };
-  const std::string sound = column_or("checksum", "NULL") == "NULL"
-                                ? "1"
-                                : "checksum IS NULL OR checksum = " + study_checksum_sql();
-  return fmt::format(
-      "study_id, name, recipe, points, {}, {}, state, created_at, changed_at, {}, {}",
-      column_or("mixes_versions", "0"), sound, column_or("priority", "0"),
-      column_or("weight", "1.0"));
+std::string study_columns_sql() {
+  return "study_id, name, recipe, points, mixes_versions, checksum IS NULL OR checksum = " +
+         study_checksum_sql() + ", state, created_at, changed_at, priority, weight";
 }
 
 StudyRow study_in(const Statement& row) {
@@ -99,7 +88,7 @@ std::uint64_t numbers_of(const StudyTable& table) {
 }
 
 std::optional<StudyRow> study_named(sqlite3* target, const std::string& name) {
-  Statement find(target, "SELECT " + study_columns_sql(target) + " FROM studies WHERE name = ?");
+  Statement find(target, "SELECT " + study_columns_sql() + " FROM studies WHERE name = ?");
   find.bind(1, std::string_view(name));
   return find.step() ? std::optional(study_in(find)) : std::nullopt;
 }
@@ -118,7 +107,7 @@ class Placing {
   Placing(sqlite3* source, sqlite3* target, const MergeSettings& settings)
       : target_(target),
         settings_(settings),
-        list_(source, "SELECT " + study_columns_sql(source) + " FROM studies ORDER BY study_id"),
+        list_(source, "SELECT " + study_columns_sql() + " FROM studies ORDER BY study_id"),
         insert_(target,
                 "INSERT INTO studies (study_id, name, recipe, points, state, created_at,"
                 " changed_at, priority, weight, mixes_versions, checksum)"
@@ -307,11 +296,9 @@ StudyPlaces place_studies(sqlite3* source, sqlite3* target, const MergeSettings&
 }
 
 void settle_studies(sqlite3* source, sqlite3* target, const StudyPlaces& places) {
-  if (!columns_of(source, "retries").empty()) {
-    Retries retries(source, target);
-    for (const auto& [from, place] : places) {
-      retries.bring(from, place.id);
-    }
+  Retries retries(source, target);
+  for (const auto& [from, place] : places) {
+    retries.bring(from, place.id);
   }
   SettledRuns settled(target);
   Statement count(target, "SELECT sum(points) FROM settled_points WHERE study_id = ?");

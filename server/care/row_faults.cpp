@@ -1,21 +1,18 @@
 #include "server/care/row_faults.h"
 
-#include <algorithm>
-#include <cmath>
 #include <cstdint>
-#include <memory>
+#include <span>
 #include <stdexcept>
 #include <string_view>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/recipe/canonical.h"
 #include "proto/recipe/checks.h"
 #include "proto/recipe/point_table.h"
 #include "proto/result_message.h"
-#include "server/care/table_columns.h"
 #include "server/store/rows/list_faults.h"
-#include "server/store/rows/model_rows.h"
 #include "server/store/rows/recipe_check.h"
 #include "server/store/rows/row_columns.h"
 #include "server/store/rows/stored_units.h"
@@ -50,63 +47,48 @@ class Found {
 };
 
 /// Outputs that a row has or lacks without reason.
-std::string misplaced_outputs_sql(int schema) {
-  const auto number_missing = [](const std::vector<std::string>& columns) {
+std::string misplaced_outputs_sql() {
+  const auto number_missing = [](std::span<const std::string_view> columns) {
     return fmt::format("(({} IS NULL))", fmt::join(columns, " IS NULL) + ("));
   };
-  const auto all = output_columns(schema);
-  const std::string status =
-      schema < kFirstPacked ? "status" : "CASE WHEN error IS NULL THEN 'solved' ELSE 'failed' END";
   return fmt::format(
-      "SELECT 'study ' || study_id || ', point ' || point || ': it is ' || status ||"
-      " CASE WHEN (status = 'solved') <> (error IS NULL) THEN ', and its error says otherwise'"
-      " WHEN status = 'solved' THEN ', and outputs are missing' ELSE ', and has outputs' END"
-      " FROM (SELECT *, {} AS status FROM {}) WHERE (status = 'solved') <> (error IS NULL) OR"
-      " CASE status WHEN 'solved' THEN {} > 0 ELSE {} < {} END",
-      status, results_table(schema), number_missing(certain_columns(schema)), number_missing(all),
-      all.size());
+      "SELECT 'study ' || study_id || ', point ' || point || CASE WHEN error IS NULL"
+      " THEN ': it is solved, and outputs are missing' ELSE ': it is failed, and has outputs' END"
+      " FROM packed_results WHERE CASE WHEN error IS NULL THEN {} > 0 ELSE {} < {} END",
+      number_missing(certain_outputs()), number_missing(packed_outputs()), packed_outputs().size());
 }
 
 /// Numbers that were too large for the unit in which they are stored, or set so by hand.
-std::string infinite_outputs_sql(int schema) {
-  const auto columns = output_columns(schema);
+std::string infinite_outputs_sql() {
   std::string what;
   for (const StoredUnit& unit : stored_units()) {
-    const std::string_view name = schema >= kFirstPacked ? unit.stored : unit.column;
-    if (std::find(columns.begin(), columns.end(), name) != columns.end()) {
-      what += fmt::format(" WHEN abs({}) >= 9e999 THEN '{}'", name, unit.column);
-    }
+    what += fmt::format(" WHEN abs({}) >= 9e999 THEN '{}'", unit.stored, unit.column);
   }
   return fmt::format(
       "SELECT 'study ' || study_id || ', point ' || point || ': its ' || what ||"
-      " ' is not a finite number' FROM (SELECT study_id, point, CASE{} END AS what FROM {})"
-      " WHERE what IS NOT NULL",
-      what, results_table(schema));
+      " ' is not a finite number' FROM (SELECT study_id, point, CASE{} END AS what"
+      " FROM packed_results) WHERE what IS NOT NULL",
+      what);
 }
 
 /// Holds each row of a model against its definition.
-void check_models(sqlite3* database, int schema, Found& found) {
-  const auto there = columns_of(database, "models");
+void check_models(sqlite3* database, Found& found) {
   std::string columns = "model_id, definition";
-  std::vector<solver::ParameterKey> keys;  // that this schema has
   for (const auto& key : solver::model_keys()) {
-    if (std::find(there.begin(), there.end(), key.name) != there.end()) {
-      keys.push_back(key);
-      columns += ", " + std::string(key.name);
-    }
+    columns += ", " + std::string(key.name);
   }
   Statement rows(database, "SELECT " + columns + " FROM models");
   while (!found.is_full() && rows.step()) {
     const std::string name = "model " + std::to_string(rows.integer(0));
     solver::ModelParameters model;
     try {
-      model = model_of_definition(rows.text(1), schema);
+      model = protocol::model_of_canonical(rows.text(1));
     } catch (const std::runtime_error& error) {
       found.add(name + ": its definition cannot be read: " + error.what());
       continue;
     }
     int column = 2;
-    for (const auto& key : keys) {
+    for (const auto& key : solver::model_keys()) {
       const bool agrees = key.name == "integrator"
                               ? rows.text(column) == solver::integrator_name(model.integrator)
                               : rows.is_null(column) || rows.real(column) == key.get(model);
@@ -122,12 +104,11 @@ void check_models(sqlite3* database, int schema, Found& found) {
 /// Holds the rows of one study against its recipe, in the order of the points.
 class StudyCheck {
  public:
-  StudyCheck(sqlite3* database, int schema)
-      : database_(database), schema_(schema), rows_(database, rows_sql(schema)) {}
+  explicit StudyCheck(sqlite3* database) : database_(database), rows_(database, rows_sql()) {}
 
   void run(std::int64_t study_id, const std::string& name, const protocol::PointTable& table,
            Found& found) {
-    RecipeCheck recipe(database_, schema_, table);
+    RecipeCheck recipe(database_, table);
     rows_.reset();
     rows_.bind(1, study_id);
     std::uint64_t of_no_point = 0;
@@ -157,29 +138,21 @@ class StudyCheck {
 
   /// Lists are compared with the other columns in rows without a checksum. Lists that views cannot
   /// unfold are not read here: `faults_of_rows` reports them.
-  static std::string rows_sql(int schema) {
-    std::string when = schema >= kFirstWithChecksums ? "checksum IS NULL" : "1";
-    std::string from = "results";
-    if (schema >= kFirstPacked) {
-      from = fmt::format(
-          "results JOIN (SELECT study_id, point, {} AS has_sound_lists FROM packed_results)"
-          " USING (study_id, point)",
-          lists_are_sound_sql());
-      when += " AND has_sound_lists";
-    }
+  static std::string rows_sql() {
+    constexpr const char* kWhen = "checksum IS NULL AND has_sound_lists";
     return fmt::format(
-        "SELECT {3}, status = 'solved' AND {0}, {1} FROM {2}"
-        " WHERE study_id = ? ORDER BY point",
-        when, array_columns_sql(schema, when), from, RecipeCheck::kColumns);
+        "SELECT {}, status = 'solved' AND {}, {} FROM results JOIN"
+        " (SELECT study_id, point, {} AS has_sound_lists FROM packed_results)"
+        " USING (study_id, point) WHERE study_id = ? ORDER BY point",
+        RecipeCheck::kColumns, kWhen, array_columns_sql(kWhen), lists_are_sound_sql());
   }
 
   sqlite3* database_;
-  int schema_;
   Statement rows_;
 };
 
-void check_studies(sqlite3* database, int schema, Found& found) {
-  StudyCheck check(database, schema);
+void check_studies(sqlite3* database, Found& found) {
+  StudyCheck check(database);
   Statement studies(database, "SELECT study_id, name, recipe, points FROM studies");
   while (!found.is_full() && studies.step()) {
     const std::string name = studies.text(1);
@@ -205,50 +178,44 @@ void check_studies(sqlite3* database, int schema, Found& found) {
 
 }  // namespace
 
-std::vector<std::string> faults_of_models(sqlite3* database, int schema, std::size_t at_most) {
+std::vector<std::string> faults_of_models(sqlite3* database, std::size_t at_most) {
   std::vector<std::string> faults;
   Found found(faults, at_most);
-  check_models(database, schema, found);
+  check_models(database, found);
   return faults;
 }
 
-std::vector<std::string> faults_of_rows(sqlite3* database, int schema, std::size_t at_most) {
+std::vector<std::string> faults_of_rows(sqlite3* database, std::size_t at_most) {
   std::vector<std::string> faults;
   const auto kind = [&] { return Found(faults, at_most); };
-  if (schema >= kFirstPacked) {
-    kind().add_all(
-        database,
-        fmt::format("SELECT 'study ' || study_id || ', point ' || point || ': one of its lists"
-                    " cannot be read, or has more than {} elements' FROM packed_results"
-                    " WHERE NOT {}",
-                    protocol::kMostListElements, lists_are_sound_sql()));
-    kind().add_all(database,
-                   "SELECT 'text ' || text_id || ' is not the one that was stored' FROM texts"
-                   " WHERE checksum <> " +
-                       text_checksum_sql());
-    kind().add_all(database,
-                   "SELECT 'worker ' || worker_id || ' is not the one that was stored' FROM workers"
-                   " WHERE checksum <> " +
-                       worker_checksum_sql());
-  }
-  if (schema >= kFirstWithChecksums) {
-    kind().add_all(
-        database,
-        "SELECT 'study ' || study_id || ', ' || name || ': its number, name, recipe or size"
-        " is not the one that was stored' FROM studies WHERE checksum <> " +
-            study_checksum_sql());
-    kind().add_all(database,
-                   "SELECT 'study ' || study_id || ', point ' || point || ': its row is not the one"
-                   " that was stored' FROM " +
-                       std::string(results_table(schema)) + " WHERE checksum <> " +
-                       result_checksum_sql(schema));
-  }
-  kind().add_all(database, misplaced_outputs_sql(schema));
-  kind().add_all(database, infinite_outputs_sql(schema));
+  kind().add_all(
+      database,
+      fmt::format("SELECT 'study ' || study_id || ', point ' || point || ': one of its lists"
+                  " cannot be read, or has more than {} elements' FROM packed_results"
+                  " WHERE NOT {}",
+                  protocol::kMostListElements, lists_are_sound_sql()));
+  kind().add_all(database,
+                 "SELECT 'text ' || text_id || ' is not the one that was stored' FROM texts"
+                 " WHERE checksum <> " +
+                     text_checksum_sql());
+  kind().add_all(database,
+                 "SELECT 'worker ' || worker_id || ' is not the one that was stored' FROM workers"
+                 " WHERE checksum <> " +
+                     worker_checksum_sql());
+  kind().add_all(database,
+                 "SELECT 'study ' || study_id || ', ' || name || ': its number, name, recipe or"
+                 " size is not the one that was stored' FROM studies WHERE checksum <> " +
+                     study_checksum_sql());
+  kind().add_all(database,
+                 "SELECT 'study ' || study_id || ', point ' || point || ': its row is not the one"
+                 " that was stored' FROM packed_results WHERE checksum <> " +
+                     result_checksum_sql());
+  kind().add_all(database, misplaced_outputs_sql());
+  kind().add_all(database, infinite_outputs_sql());
   auto models = kind();
-  check_models(database, schema, models);
+  check_models(database, models);
   auto studies = kind();
-  check_studies(database, schema, studies);
+  check_studies(database, studies);
   return faults;
 }
 

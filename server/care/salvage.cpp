@@ -13,9 +13,6 @@
 #include "server/database/open_for_reading.h"
 #include "server/database/row_checksum.h"
 #include "server/database/sqlite.h"
-#include "server/store/rows/model_rows.h"
-#include "server/store/rows/old_rows.h"
-#include "server/store/rows/old_workers.h"
 #include "server/store/rows/packed_row.h"
 #include "server/store/rows/row_columns.h"
 #include "server/store/rows/settled_runs.h"
@@ -128,21 +125,20 @@ class RowsCopy {
   std::uint64_t unreadable_ = 0;
 };
 
-/// All of a table whose columns mean the same in every schema.
+/// All of a table, but of packed_results.
 class TableCopy final : public RowsCopy {
  public:
   TableCopy(sqlite3* from, sqlite3* to, const std::string& table)
       : RowsCopy(to),
         columns_(common_columns(from, to, table)),
-        read_(from, "SELECT rowid, " + soundness_sql(from, table) + ", " +
-                        present_values_sql(schema_of(from), table, columns_) + " FROM " + table +
+        read_(from, "SELECT rowid, " + soundness_sql(table) + ", " + columns_ + " FROM " + table +
                         " WHERE rowid > ? ORDER BY rowid"),
         insert_(to, "INSERT INTO " + table + " (" + columns_ + ") VALUES (" + marks() + ")") {}
 
  private:
   /// Words that others took the place of would say wrong things of many rows.
-  static std::string soundness_sql(sqlite3* from, const std::string& table) {
-    if (schema_of(from) < kFirstPacked || (table != "texts" && table != "workers")) {
+  static std::string soundness_sql(const std::string& table) {
+    if (table != "texts" && table != "workers") {
       return "1";
     }
     return "(checksum IS NULL OR checksum = " +
@@ -179,7 +175,7 @@ class TableCopy final : public RowsCopy {
   Statement insert_;
 };
 
-/// The results of one study of this schema.
+/// The results of one study.
 class PackedCopy final : public RowsCopy {
  public:
   PackedCopy(sqlite3* from, sqlite3* to, std::int64_t study)
@@ -187,7 +183,7 @@ class PackedCopy final : public RowsCopy {
         study_(study),
         read_(from, fmt::format("SELECT point, {} AND {}, checksum IS NOT NULL, {} FROM"
                                 " packed_results WHERE study_id = ?1 AND point > ?2 ORDER BY point",
-                                result_soundness_sql(kSchemaVersion), lists_are_sound_sql(),
+                                result_soundness_sql(), lists_are_sound_sql(),
                                 fmt::join(packed_columns(), ", "))),
         insert_(to) {}
 
@@ -210,46 +206,6 @@ class PackedCopy final : public RowsCopy {
   PackedRow packed_;
 };
 
-/// The results of an earlier schema.
-class OldCopy final : public RowsCopy {
- public:
-  OldCopy(sqlite3* from, sqlite3* to)
-      : RowsCopy(to),
-        old_(from, schema_of(from)),
-        texts_(to),
-        workers_(to),
-        read_(from,
-              fmt::format("SELECT rowid, {}, {}, {} FROM results WHERE rowid > ? ORDER BY rowid",
-                          result_soundness_sql(schema_of(from)),
-                          schema_of(from) >= kFirstWithChecksums ? "checksum IS NOT NULL" : "0",
-                          OldRows::columns_sql(schema_of(from)))),
-        insert_(to) {}
-
- private:
-  static constexpr int kFirst = 3;
-
-  Statement& read_behind(std::int64_t last) override {
-    read_.reset();
-    read_.bind(1, last);
-    return read_;
-  }
-  bool copy(Statement& row) override {
-    if (row.integer(1) == 0 || !old_.pack(row, kFirst, texts_, packed_)) {
-      return false;
-    }
-    OldRows::name_worker(row, kFirst, workers_, packed_);
-    return insert_.run(packed_, row.integer(2) != 0);
-  }
-  void give_up() override { insert_.give_up(); }
-
-  OldRows old_;
-  TextNumbers texts_;
-  OldWorkers workers_;
-  Statement read_;
-  RowInsert insert_;
-  PackedRow packed_;
-};
-
 std::vector<std::int64_t> studies_in(sqlite3* database) {
   Statement list(database, "SELECT study_id FROM studies");
   std::vector<std::int64_t> studies;
@@ -261,18 +217,10 @@ std::vector<std::int64_t> studies_in(sqlite3* database) {
 
 /// Copies the results of all studies that were saved. Those of others tell nothing.
 void copy_results(sqlite3* from, sqlite3* to, Salvaged& saved) {
-  const auto run = [&](RowsCopy& copy) {
-    copy.run(-1);  // points are counted from 0
-    saved.unreadable_places += copy.unreadable_places();
-  };
-  if (schema_of(from) < kFirstPacked) {
-    OldCopy copy(from, to);
-    run(copy);
-    return;
-  }
   for (const std::int64_t study : studies_in(to)) {
     PackedCopy copy(from, to, study);
-    run(copy);
+    copy.run(-1);  // points are counted from 0
+    saved.unreadable_places += copy.unreadable_places();
   }
 }
 
@@ -280,7 +228,7 @@ void copy_results(sqlite3* from, sqlite3* to, Salvaged& saved) {
 void copy_tables(sqlite3* from, sqlite3* to, Salvaged& saved) {
   for (const std::string table : {"studies", "models", "workers", "texts", "retries", "origins"}) {
     if (columns_of(from, table).empty()) {
-      continue;  // an earlier schema has none
+      continue;  // it was lost
     }
     TableCopy copy(from, to, table);
     copy.run(0);  // SQLite counts rows from 1
@@ -347,7 +295,6 @@ Salvaged salvage(const std::string& from, const std::string& to) {
   execute(source.get(), "PRAGMA writable_schema = ON");
   check_tables(source.get(), from);
   add_row_checksum(source.get());
-  add_model_definition(source.get());
   DraftFile draft(to + ".part");
   Salvaged saved;
   { const Store with_schema(draft.path()); }

@@ -14,9 +14,9 @@ struct Salvaged {
 
 /// Makes a sound database `to` of the rows of `from` that can still be read; behind an unreadable
 /// place at most as many readable ones are passed over as were lost. Nothing else is lost: points
-/// whose rows are gone count as pending, and a server that goes on solves them again. `from` may be
-/// of an older schema and is not changed; no server may be at work on it. Throws StorageError when
-/// `to` exists or `from` cannot be opened at all, std::runtime_error when `to` cannot be written.
+/// whose rows are gone count as pending, and a server that goes on solves them again. `from` is not
+/// changed; no server may be at work on it. Throws StorageError when `to` exists or `from` cannot
+/// be opened at all, std::runtime_error when `to` cannot be written.
 Salvaged salvage(const std::string& from, const std::string& to);
 
 }  // namespace oblique::server

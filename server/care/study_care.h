@@ -10,7 +10,7 @@
 #include "server/store/changes.h"
 
 // What people do with a study of a database on which no server works. All but `stored_recipe` lock
-// it as a server does, bring an older schema to the present one, and throw StorageError.
+// it as a server does. All throw StorageError.
 namespace oblique::server {
 
 /// There is no such study, or a name is not to be had. The message says why.
@@ -43,8 +43,8 @@ struct Patience {
 bool clear_all_away(Storage& storage, const std::function<void()>& part_is_done,
                     const Patience& patience = {});
 
-/// The recipe of a study, of this or an earlier schema; only reads, also while a server works on
-/// the database. Throws StorageError, and StudyRefused when there is no study of that number.
+/// The recipe of a study; only reads, also while a server works on the database. Throws
+/// StudyRefused when there is no study of that number.
 protocol::Recipe stored_recipe(const std::string& path, std::uint64_t study_id);
 
 }  // namespace oblique::server

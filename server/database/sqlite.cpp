@@ -205,13 +205,15 @@ DatabaseKind identify(sqlite3* database, const std::string& path) {
     throw StorageError(path + " is a database of another program (application id " +
                        std::to_string(application_id) + ", " + tables + "): choose another file");
   }
-  if (version < 1 || version > kSchemaVersion) {
-    throw StorageError(path + " has schema version " + std::to_string(version) +
-                       ", and this program knows versions 1 to " + std::to_string(kSchemaVersion) +
-                       (version > kSchemaVersion ? ": use the newer program that wrote it"
-                                                 : ": the file is damaged"));
+  if (version != kSchemaVersion) {
+    throw StorageError(path + " has schema " + std::to_string(version) +
+                       ", and this version of oblique has schema " +
+                       std::to_string(kSchemaVersion) + ": use the " +
+                       (version < kSchemaVersion ? "older" : "newer") +
+                       " version that wrote the file, read it with sqlite3, or solve its studies "
+                       "again into a new file");
   }
-  return version == kSchemaVersion ? DatabaseKind::kOurs : DatabaseKind::kOlder;
+  return DatabaseKind::kOurs;
 }
 
 void check_path(const std::string& path) {

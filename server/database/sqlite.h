@@ -99,11 +99,10 @@ class Transaction {
 inline constexpr std::int32_t kApplicationId = 0x6f626c71;  // "oblq"
 inline constexpr std::int32_t kSchemaVersion = 8;
 
-enum class DatabaseKind { kEmpty, kOurs, kOlder };
+enum class DatabaseKind { kEmpty, kOurs };
 
-/// Says whether an open database is empty, ours, or ours with an older schema. Throws StorageError
-/// naming what was found when it is a foreign file or has a newer schema. `path` is for the
-/// messages.
+/// Says whether an open database is empty or ours. Throws StorageError naming what was found when
+/// it is a foreign file or has another schema. `path` is for the messages.
 DatabaseKind identify(sqlite3* database, const std::string& path);
 
 /// Throws StorageError when `path` is there and is not a regular file.

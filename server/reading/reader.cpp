@@ -1,7 +1,6 @@
 #include "server/reading/reader.h"
 
 #include <algorithm>
-#include <optional>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -46,10 +45,6 @@ Fit copy_row(sqlite3* database, sqlite3_stmt* statement, std::uint64_t most_byte
 constexpr const char* kVersionOfRows =
     "SELECT w.solver_version FROM packed_results AS r CROSS JOIN workers AS w"
     " ON w.worker_id = r.worker WHERE r.study_id = s.study_id ORDER BY r.point LIMIT 1";
-constexpr const char* kVersionOfOlderRows =
-    "SELECT r.solver_version FROM results AS r WHERE r.study_id = s.study_id"
-    " ORDER BY r.point LIMIT 1";
-
 /// For what a study took over from others.
 constexpr const char* kOrigins =
     "SELECT o.name, t.points FROM taken_points AS t JOIN origins AS o USING (origin_id)"
@@ -164,38 +159,21 @@ std::string Reader::nearest_study(const std::string& name) {
 }
 
 std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name) {
-  Statement schema(database_.get(), "PRAGMA user_version");
-  constexpr int kFirstWithShares = 2;
-  constexpr int kFirstThatMixes = 3;
-  constexpr int kFirstWithSubmitters = 6;
-  const std::int64_t version = schema.step() ? schema.integer(0) : 0;
-  constexpr int kFirstPacked = 8;
   // Counts come from indices and the table for them where they can: rows are not touched.
-  const std::string counts =
-      version >= kFirstPacked
-          ? " CASE s.counted WHEN 1 THEN (SELECT coalesce(sum(c.points), 0) FROM settled_points AS "
-            "c"
-            " WHERE c.study_id = s.study_id) ELSE"
-            " (SELECT count(*) FROM packed_results AS r WHERE r.study_id = s.study_id) END,"
-            " (SELECT count(*) FROM packed_results AS r INDEXED BY failed_points"
-            " WHERE r.study_id = s.study_id AND r.error IS NOT NULL)"
-          : " (SELECT count(*) FROM results AS r WHERE r.study_id = s.study_id),"
-            " (SELECT count(*) FROM results AS r WHERE r.study_id = s.study_id"
-            " AND r.status = 'failed')";
   Statement list(
       database_.get(),
-      "SELECT s.study_id, s.name, s.state, s.points, s.created_at," + counts +
-          std::string(version >= kFirstWithShares ? ", s.priority, s.weight" : ", 0, 1.0") +
-          (version >= kFirstWithSubmitters ? ", coalesce(s.submitted_by, '')" : ", ''") +
-          (version >= kFirstThatMixes ? ", s.mixes_versions" : ", 0") + ", coalesce((" +
-          (version >= kFirstPacked ? kVersionOfRows : kVersionOfOlderRows) +
-          "), '')"
-          " FROM studies AS s WHERE ?1 = '' OR s.name = ?1 ORDER BY s.study_id");
+      std::string("SELECT s.study_id, s.name, s.state, s.points, s.created_at,"
+                  " CASE s.counted WHEN 1 THEN (SELECT coalesce(sum(c.points), 0) FROM"
+                  " settled_points AS c WHERE c.study_id = s.study_id) ELSE"
+                  " (SELECT count(*) FROM packed_results AS r WHERE r.study_id = s.study_id) END,"
+                  " (SELECT count(*) FROM packed_results AS r INDEXED BY failed_points"
+                  " WHERE r.study_id = s.study_id AND r.error IS NOT NULL),"
+                  " s.priority, s.weight, coalesce(s.submitted_by, ''), s.mixes_versions,"
+                  " coalesce((") +
+          kVersionOfRows +
+          "), '') FROM studies AS s WHERE ?1 = '' OR s.name = ?1 ORDER BY s.study_id");
   list.bind(1, name);
-  std::optional<Statement> origins;
-  if (version >= kFirstPacked) {
-    origins.emplace(database_.get(), kOrigins);
-  }
+  Statement origins(database_.get(), kOrigins);
   std::vector<protocol::StudyStatus> found;
   while (list.step()) {
     protocol::StudyStatus status;
@@ -213,9 +191,7 @@ std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name)
     status.set_submitted_by(list.text(9));
     status.set_mixes_versions(list.integer(10) != 0);
     status.set_solver_version(list.text(11));
-    if (origins) {
-      add_taken(*origins, status);
-    }
+    add_taken(origins, status);
     found.push_back(std::move(status));
   }
   if (found.empty() && !name.empty()) {

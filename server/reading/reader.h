@@ -18,7 +18,7 @@ namespace oblique::server {
 /// `interrupt`.
 class Reader {
  public:
-  /// Throws StorageError naming what was found: nothing, a directory, a foreign file, a newer
+  /// Throws StorageError naming what was found: nothing, a directory, a foreign file, another
   /// schema, an unreadable file.
   explicit Reader(const std::string& path);
 

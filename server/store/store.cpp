@@ -5,9 +5,9 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/recipe/canonical.h"
 #include "proto/result_message.h"
 #include "server/database/row_checksum.h"
-#include "server/store/migration.h"
 #include "server/store/rows/model_rows.h"
 #include "server/store/rows/packed_row.h"
 #include "server/store/rows/row_columns.h"
@@ -165,20 +165,14 @@ Store::Store(const std::string& path, const Notice& notice) {
   log_->make_sure();
   if (kind == DatabaseKind::kEmpty) {
     create_schema(database_.get());
-  } else if (kind == DatabaseKind::kOlder) {
-    migrate(database_.get(), notice);
   }
-  if (kind != DatabaseKind::kOurs || restore_views(database_.get(), notice)) {
+  if (kind == DatabaseKind::kEmpty || restore_views(database_.get(), notice)) {
     log_->merge();  // a new file is a whole database from the start
   }
   // A view in the place of one could be read without end.
   if (const auto missing = missing_tables(database_.get()); !missing.empty()) {
     throw StorageError(fmt::format("{} lacks the table {}: `oblique check --db {}` tells more",
                                    path, fmt::join(missing, " and "), path));
-  }
-  if (!gives_space_back(database_.get())) {
-    make_it_give_space_back(database_.get(), notice);
-    log_->merge();
   }
   statements_ = std::make_unique<Statements>(database_.get());
   clearing_ = std::make_unique<Clearing>(database_.get());
@@ -390,7 +384,7 @@ Store::StoredModel Store::stored_model(const AddResults& change, std::uint64_t m
     return known->second;
   }
   const solver::ModelParameters parameters = change.table->model(model);
-  const std::string definition = definition_of(parameters, kSchemaVersion);
+  const std::string definition = protocol::canonical_model(parameters);
   bind_model(statements_->add_model, parameters, definition);
   statements_->add_model.run();
   const bool is_new = sqlite3_changes(database_.get()) > 0;

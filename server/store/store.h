@@ -47,9 +47,9 @@ class Store final : public Storage {
   /// Told in a sentence what takes long, and what came of it.
   using Notice = std::function<void(const std::string&)>;
 
-  /// Opens the database at `path`, or makes it; one of an older schema is brought to the present
-  /// one. Throws StorageError naming what was found: a directory, a foreign file, a newer schema, a
-  /// damaged or unwritable file, one that is open elsewhere.
+  /// Opens the database at `path`, or makes it. Throws StorageError naming what was found: a
+  /// directory, a foreign file, another schema, a damaged or unwritable file, one that is open
+  /// elsewhere.
   explicit Store(const std::string& path, const Notice& notice = {});
   ~Store() override;
 

@@ -91,7 +91,7 @@ void check_rows(sqlite3* database, const StoredStudy& study) {
       points.push_back(run.end - 1);
     }
   });
-  RecipeCheck recipe(database, kSchemaVersion, *study.table.get());
+  RecipeCheck recipe(database, *study.table.get());
   Statement row(database, fmt::format("SELECT {} FROM packed_results"
                                       " WHERE study_id = ? AND point = ?",
                                       RecipeCheck::kColumns));

@@ -69,15 +69,7 @@ void add_contents(Findings& found, const std::string& file) {
     found.add("contents", "nothing was ever stored in it");
     return;
   }
-  const auto schema = number(database, "PRAGMA user_version").value_or(0);
-  found.add("schema", "schema",
-            fmt::format("{} (this program's is {})", schema, server::kSchemaVersion), schema);
-  if (schema < server::kSchemaVersion) {
-    found.odd.push_back(fmt::format(
-        "{} has the older schema {}: the next server that starts on it brings it to {}. Copy it "
-        "before, with `oblique backup`, if programs of an older version still use it.",
-        file, schema, server::kSchemaVersion));
-  }
+  found.add("schema", "schema", std::to_string(server::kSchemaVersion), server::kSchemaVersion);
   const auto studies = number(database, "SELECT count(*) FROM studies");
   const auto points = number(database, "SELECT sum(points) FROM settled_points");
   found.add("studies", "studies",

@@ -122,11 +122,6 @@ bool has_unjoined_results(sqlite3* database) {
 }
 
 void add_quick_views(sqlite3* database) {
-  Statement schema(database, "PRAGMA user_version");
-  if (!schema.step() || schema.integer(0) != kSchemaVersion) {
-    return;
-  }
-  schema.reset();
   try {
     const std::string results = quick_results(view_in_file(database, "results"));
     const std::string runs = quick_runs(view_in_file(database, "runs"));

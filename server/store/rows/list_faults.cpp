@@ -137,12 +137,10 @@ std::string disagreement(const Statement& row, int first, const Lists& lists) {
 
 }  // namespace
 
-std::string array_columns_sql(int schema, const std::string& when) {
+std::string array_columns_sql(const std::string& when) {
   std::string columns(fmt::to_string(fmt::join(kOutputs, ", ")));
   for (const ResultList* list : solver::result_lists()) {
-    columns += list->since_schema <= schema
-                   ? fmt::format(", CASE WHEN {} THEN {} END", when, list->column)
-                   : ", NULL";
+    columns += fmt::format(", CASE WHEN {} THEN {} END", when, list->column);
   }
   return columns;
 }
@@ -151,11 +149,12 @@ std::string fault_of_arrays(const Statement& row, int first) {
   Lists lists;
   int column = first + static_cast<int>(kOutputs.size());
   for (const ResultList* list : solver::result_lists()) {
-    const bool may_lack = list->since_schema > 1 && row.is_null(column);
-    const auto rows = may_lack ? Rows() : elements_of(*list, row.text(column));
     const bool is_phases = list->column == "phases";
+    const bool is_reactions = list->column == "reaction_peaks";
+    const auto rows =
+        is_reactions && row.is_null(column) ? Rows() : elements_of(*list, row.text(column));
     // Reactions stand in the order of the joints.
-    const bool in_time = is_phases || list->column == "reaction_peaks" || !rows || ascends(*rows);
+    const bool in_time = is_phases || is_reactions || !rows || ascends(*rows);
     if (!rows || !in_time || (is_phases && !turns_of(*rows))) {
       return fmt::format("its {} cannot be read{}", list->column,
                          is_phases ? ", or have gaps" : "");

@@ -3,64 +3,10 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <new>
-#include <stdexcept>
 
 #include <nlohmann/json.hpp>
 
-#include "proto/oblique.pb.h"
-#include "proto/recipe/canonical.h"
-#include "proto/recipe/model_message.h"
-
 namespace oblique::server {
-namespace {
-
-std::string unreadable(std::string_view bytes) {
-  constexpr std::string_view kDigits = "0123456789abcdef";
-  std::string text = "unreadable ";
-  for (const char letter : bytes) {
-    const auto byte = static_cast<unsigned char>(letter);
-    text += {kDigits[byte >> 4U], kDigits[byte & 0xfU]};
-  }
-  return text;
-}
-
-std::string present_definition(std::string_view bytes) {
-  try {
-    return protocol::canonical_model(model_of_definition(bytes, kFirstWithCanonicalModels - 1));
-  } catch (const std::runtime_error&) {
-    return unreadable(bytes);
-  }
-}
-
-void model_definition(sqlite3_context* context, int /*count*/, sqlite3_value** values) {
-  const auto* bytes = static_cast<const char*>(sqlite3_value_blob(values[0]));
-  const auto size = static_cast<std::size_t>(sqlite3_value_bytes(values[0]));
-  try {
-    const std::string text = present_definition({size == 0 ? "" : bytes, size});
-    sqlite3_result_text64(context, text.data(), text.size(), SQLITE_TRANSIENT, SQLITE_UTF8);
-  } catch (const std::bad_alloc&) {
-    sqlite3_result_error_nomem(context);
-  }
-}
-
-}  // namespace
-
-std::string definition_of(const solver::ModelParameters& model, int schema) {
-  return schema >= kFirstWithCanonicalModels ? protocol::canonical_model(model)
-                                             : protocol::to_message(model).SerializeAsString();
-}
-
-solver::ModelParameters model_of_definition(std::string_view definition, int schema) {
-  if (schema >= kFirstWithCanonicalModels) {
-    return protocol::model_of_canonical(definition);
-  }
-  protocol::ModelParameters message;
-  if (!message.ParseFromArray(definition.data(), static_cast<int>(definition.size()))) {
-    throw std::runtime_error("its bytes are damaged");
-  }
-  return protocol::unjudged_from_message(message);
-}
 
 std::string insert_model_sql() {
   // The keys are the columns, but for those handled first.
@@ -93,16 +39,6 @@ void bind_model(Statement& insert, const solver::ModelParameters& model,
       insert.bind(index, value);
     }
     ++index;
-  }
-}
-
-void add_model_definition(sqlite3* database) {
-  constexpr int kArguments = 1;
-  const int code = sqlite3_create_function_v2(database, "model_definition", kArguments,
-                                              SQLITE_UTF8 | SQLITE_DETERMINISTIC, nullptr,
-                                              model_definition, nullptr, nullptr, nullptr);
-  if (code != SQLITE_OK) {
-    throw StorageError(std::string("models cannot be defined: ") + sqlite3_errmsg(database));
   }
 }
 

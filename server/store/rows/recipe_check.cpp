@@ -4,7 +4,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "server/store/rows/model_rows.h"
+#include "proto/recipe/canonical.h"
 
 namespace oblique::server {
 
@@ -26,7 +26,7 @@ std::string RecipeCheck::fault_of(const Statement& row) {
     ++column;
   }
   if (!model_ || model_->number != point.model) {
-    model_ = {point.model, definition_of(table_.model(point.model), schema_), -1};
+    model_ = {point.model, protocol::canonical_model(table_.model(point.model)), -1};
   }
   if (const std::int64_t model_id = row.integer(1); model_id != model_->good_id) {
     definition_.bind(1, model_id);

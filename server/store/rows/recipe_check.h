@@ -15,11 +15,9 @@ class RecipeCheck {
   /// The columns that `fault_of` reads, as a list for SQL. They come first.
   static constexpr const char* kColumns = "point, model_id, H, mu, e";
 
-  /// A database of that schema. Both must outlive this.
-  RecipeCheck(sqlite3* database, int schema, const protocol::PointTable& table)
-      : schema_(schema),
-        table_(table),
-        definition_(database, "SELECT definition FROM models WHERE model_id = ?") {}
+  /// Both must outlive this.
+  RecipeCheck(sqlite3* database, const protocol::PointTable& table)
+      : table_(table), definition_(database, "SELECT definition FROM models WHERE model_id = ?") {}
 
   /// What in the present row is not as the recipe has it: the point, H, mu, e or the model. Empty:
   /// nothing.
@@ -32,7 +30,6 @@ class RecipeCheck {
     std::string definition;
     std::int64_t good_id;  ///< row of `models` that has it; -1: none was seen
   };
-  int schema_;
   const protocol::PointTable& table_;
   std::optional<Model> model_;
   Statement definition_;

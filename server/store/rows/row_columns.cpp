@@ -13,49 +13,35 @@ namespace oblique::server {
 namespace {
 
 /// Columns before and after the outputs.
-constexpr std::array<std::string_view, 8> kHeadColumns{"study_id", "point", "model_id", "H",
-                                                       "mu",       "e",     "status",   "error"};
-constexpr std::array<std::string_view, 5> kTailColumns{"worker", "solver_version",
-                                                       "instruction_set", "attempt", "solved_at"};
 constexpr std::array<std::string_view, 7> kPackedHead{"study_id", "point", "model_id", "H",
                                                       "mu",       "e",     "error"};
 constexpr std::array<std::string_view, 4> kPackedTail{"worker", "attempt", "solved_at",
                                                       "taken_from"};
 
-/// Calls `take` with the column of each output that schemas from `first` to `last` brought.
-template <class Take>
-void for_each_output(int first, int last, const Take& take) {
-  const auto take_one = [&](const auto& output) {
-    if (output.since_schema >= first && output.since_schema <= last) {
-      take(output.column);
-    }
-  };
-  const auto take_field = [&](const solver::ResultField& field, const auto&) { take_one(field); };
-  solver::for_each_sent<double>(take_field);
-  solver::for_each_sent<std::int64_t>(take_field);
-  solver::for_each_sent<std::string>(take_field);
-  for (const solver::ResultList* list : solver::result_lists()) {
-    take_one(*list);
-  }
-}
-
 struct PackedColumns {
   std::vector<std::string_view> all;
   std::vector<std::string_view> outputs;
+  std::vector<std::string_view> certain_outputs;
 };
 
 PackedColumns make_packed_columns() {
   PackedColumns columns;
-  for (const StoredUnit& unit : stored_units()) {
-    columns.outputs.push_back(unit.stored);
-  }
-  const auto add = [&](const solver::ResultField& field, const auto&) {
-    columns.outputs.push_back(field.column);
+  const auto add = [&](std::string_view column, bool may_be_absent) {
+    columns.outputs.push_back(column);
+    if (!may_be_absent) {
+      columns.certain_outputs.push_back(column);
+    }
   };
-  solver::for_each_sent<std::int64_t>(add);
-  solver::for_each_sent<std::string>(add);
+  const StoredUnit* unit = stored_units().data();  // they are in the order of the fields
+  solver::for_each_sent<double>(
+      [&](const auto&, const auto& member) { add((unit++)->stored, member.may_be_absent); });
+  const auto add_field = [&](const solver::ResultField& field, const auto& member) {
+    add(field.column, member.may_be_absent);
+  };
+  solver::for_each_sent<std::int64_t>(add_field);
+  solver::for_each_sent<std::string>(add_field);
   for (const solver::ResultList* list : solver::result_lists()) {
-    columns.outputs.push_back(list->column);
+    add(list->column, list->column != "peaks" && list->column != "stick_intervals");
   }
   columns.all.assign(kPackedHead.begin(), kPackedHead.end());
   columns.all.insert(columns.all.end(), columns.outputs.begin(), columns.outputs.end());
@@ -78,26 +64,17 @@ std::span<const std::string_view> packed_outputs() {
   return all_packed_columns().outputs;
 }
 
+std::span<const std::string_view> certain_outputs() {
+  return all_packed_columns().certain_outputs;
+}
+
 int packed_column(std::string_view name) {
   const auto names = packed_columns();
   return static_cast<int>(std::find(names.begin(), names.end(), name) - names.begin());
 }
 
-std::vector<std::string_view> result_columns(int schema) {
-  std::vector<std::string_view> names(kHeadColumns.begin(), kHeadColumns.end());
-  const auto add = [&](std::string_view column) { names.push_back(column); };
-  for_each_output(1, std::min(schema, kFirstWithChecksums), add);
-  names.insert(names.end(), kTailColumns.begin(), kTailColumns.end());
-  for (int brought = kFirstWithChecksums + 1; brought <= schema; ++brought) {
-    for_each_output(brought, brought, add);
-  }
-  return names;
-}
-
-std::string result_checksum_sql(int schema) {
-  return schema >= kFirstPacked
-             ? fmt::format("row_checksum({})", fmt::join(packed_columns(), ", "))
-             : fmt::format("row_checksum({})", fmt::join(result_columns(schema), ", "));
+std::string result_checksum_sql() {
+  return fmt::format("row_checksum({})", fmt::join(packed_columns(), ", "));
 }
 
 std::string study_checksum_sql() {
@@ -110,35 +87,6 @@ std::string text_checksum_sql() {
 
 std::string worker_checksum_sql() {
   return "row_checksum(worker_id, name, threads, solver_version, instruction_set, joined_at)";
-}
-
-std::vector<std::string> output_columns(int schema) {
-  if (schema >= kFirstPacked) {
-    return {packed_outputs().begin(), packed_outputs().end()};
-  }
-  std::vector<std::string> names;
-  for_each_output(1, schema, [&](std::string_view column) { names.emplace_back(column); });
-  return names;
-}
-
-std::vector<std::string> certain_columns(int schema) {
-  if (schema < kFirstPacked) {
-    return output_columns(1);
-  }
-  std::vector<std::string> names{"peaks", "stick_intervals"};
-  const auto add = [&](const solver::ResultField& field, const auto& member) {
-    if (field.since_schema == 1 && !member.may_be_absent) {
-      const auto units = stored_units();
-      const auto unit = std::find_if(units.begin(), units.end(), [&](const StoredUnit& one) {
-        return one.column == field.column;
-      });
-      names.emplace_back(unit == units.end() ? field.column : unit->stored);
-    }
-  };
-  solver::for_each_sent<double>(add);
-  solver::for_each_sent<std::int64_t>(add);
-  solver::for_each_sent<std::string>(add);
-  return names;
 }
 
 std::string lists_are_sound_sql() {

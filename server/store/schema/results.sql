@@ -65,10 +65,10 @@ CREATE TABLE packed_results (
   reaction_peaks   TEXT,         -- [t, force, ...]
   worker           INTEGER REFERENCES workers (worker_id),  -- NULL: the server failed the point
   attempt          INTEGER NOT NULL, -- number of the lease under which it was solved
-  solved_at        ANY,          -- milliseconds since 1970; a text: what stood there in an older schema
+  solved_at        ANY,          -- milliseconds since 1970; any other text as it came
   taken_from       TEXT,         -- origin_id/POINT whose result this is; NULL: it was solved for this point
   -- CRC-32 of the other columns (server/database/row_checksum.h), which `oblique check` compares with
-  -- them. NULL: the row is of an earlier schema. Whoever changes a row sets it to NULL.
+  -- them. Whoever changes a row sets it to NULL.
   checksum         INTEGER,
   PRIMARY KEY (study_id, point)
 ) STRICT, WITHOUT ROWID;

@@ -51,8 +51,7 @@ CREATE TABLE models (
   -- All of them as one text, by which models are told apart: 'oblique-model-1 lengths=0.4,0.4,0.4 E=7e+10
   -- A=0.0005309 ...'. proto/recipe/README.md gives it byte by byte.
   definition  TEXT NOT NULL UNIQUE,
-  -- Relative error that chosen steps leave. Models of earlier schemas have the default.
-  tolerance   REAL NOT NULL DEFAULT 1e-5
+  tolerance   REAL NOT NULL      -- relative error that chosen steps leave
 ) STRICT;
 
 -- One row for each session of a worker in which it delivered a result.

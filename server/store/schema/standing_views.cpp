@@ -1,8 +1,8 @@
 #include "server/store/schema/standing_views.h"
 
 #include <algorithm>
-#include <array>
 #include <iterator>
+#include <random>
 #include <string_view>
 
 #include <spdlog/fmt/fmt.h>
@@ -93,21 +93,14 @@ std::string name_taken(const Standing& one) {
       one.type, one.name);
 }
 
-std::int64_t schema_version(sqlite3* database) {
-  Statement version(database, "PRAGMA user_version");
-  return version.step() ? version.integer(0) : 0;
-}
-
-/// Names of the triggers that this schema does not have; earlier ones had none.
+/// Names of the triggers that this schema does not have.
 std::vector<std::string> other_triggers(sqlite3* database) {
   constexpr std::size_t kLongestName = 80;
-  const bool has_ours = schema_version(database) == kSchemaVersion;
   std::vector<std::string> names;
   for (const Standing& one : standing_in(database, kStandingSql)) {
-    const bool is_ours =
-        has_ours && std::ranges::any_of(ours(), [&](const Standing& other) {
-          return other.type == one.type && other.name == one.name && other.table == one.table;
-        });
+    const bool is_ours = std::ranges::any_of(ours(), [&](const Standing& other) {
+      return other.type == one.type && other.name == one.name && other.table == one.table;
+    });
     if (one.type == "trigger" && !is_ours) {
       names.push_back(protocol::visible(protocol::shortened(one.name, kLongestName)));
     }
@@ -115,18 +108,30 @@ std::vector<std::string> other_triggers(sqlite3* database) {
   return names;
 }
 
-/// How somebody gives another name to what has one that we want.
-std::string way_out(const std::string& type, const std::string& name) {
-  std::string quoted;
-  for (const char letter : name) {
-    quoted += letter == '"' ? "\"\"" : std::string(1, letter);
+std::string random_id() {
+  std::random_device source;
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  std::string id;
+  for (int i = 0; i < 32; ++i) {
+    id += kDigits[source() % kDigits.size()];
   }
-  return type == "table"
-             ? fmt::format("ALTER TABLE \"{0}\" RENAME TO \"my_{0}\"", quoted)
-             : fmt::format("DROP {} \"{}\", and make it again under another name", type, quoted);
+  return id;
 }
 
 }  // namespace
+
+void create_schema(sqlite3* database) {
+  Transaction transaction(database);
+  for (const char* part : {kSchemaSql, kResultsSql, kViewsSql}) {
+    execute(database, part);
+  }
+  execute(database, "PRAGMA application_id = " + std::to_string(kApplicationId));
+  execute(database, "PRAGMA user_version = " + std::to_string(kSchemaVersion));
+  Statement about(database, "INSERT INTO about (database_id) VALUES (?)");
+  about.bind(1, random_id());
+  about.run();
+  transaction.commit();
+}
 
 const std::vector<std::string>& our_tables() {
   static const std::vector<std::string> names = [] {
@@ -153,38 +158,6 @@ std::vector<std::string> missing_tables(sqlite3* database) {
     find.reset();
   }
   return missing;
-}
-
-std::string names_in_the_way(sqlite3* database, const std::vector<std::string>& more) {
-  // Tables of the schema before this one; its views and indices make room for ours.
-  constexpr std::array<std::string_view, 6> kBefore{"about",   "studies", "models",
-                                                    "workers", "retries", "results"};
-  std::vector<Standing> wanted = ours();
-  for (const auto& names : {our_tables(), more}) {
-    for (const std::string& name : names) {
-      wanted.push_back({"table", name, name, {}});
-    }
-  }
-  Statement find(database,
-                 "SELECT type, name FROM sqlite_schema WHERE name = ?1 COLLATE NOCASE"
-                 " AND (type = 'trigger') = (?2 = 'trigger') AND NOT"
-                 " (type = 'trigger' AND tbl_name = 'results' COLLATE NOCASE)");  // goes with it
-  std::string said;
-  for (const Standing& one : wanted) {
-    if (std::find(kBefore.begin(), kBefore.end(), one.name) != kBefore.end()) {
-      continue;
-    }
-    find.bind(1, one.name);
-    find.bind(2, one.type);
-    const bool makes_room = one.type == "view" || one.type == "index";
-    if (find.step() && !(makes_room && find.text(0) == one.type)) {
-      said += fmt::format("{}the {} {} has a name that is needed for something else: {}",
-                          said.empty() ? "" : "; ", find.text(0), find.text(1),
-                          way_out(find.text(0), find.text(1)));
-    }
-    find.reset();
-  }
-  return said;
 }
 
 std::vector<std::string> faults_of_views(sqlite3* database) {
@@ -217,9 +190,6 @@ std::vector<std::string> faults_of_views(sqlite3* database) {
 
 std::vector<std::string> missing_views(sqlite3* database) {
   std::vector<std::string> names;
-  if (schema_version(database) != kSchemaVersion) {
-    return names;
-  }
   for (const Standing& one : that_are(database, State::kMissing)) {
     if (one.type == "view") {
       names.push_back(one.name);

@@ -11,21 +11,20 @@
 // which cannot be made again with what they held, are only named.
 namespace oblique::server {
 
+/// Makes the tables and views in an empty database, which gets an identity. Throws StorageError.
+void create_schema(sqlite3* database);
+
 /// The names of the tables of this schema.
 const std::vector<std::string>& our_tables();
 
 /// Those of them that a database of this schema lacks. Throws StorageError.
 std::vector<std::string> missing_tables(sqlite3* database);
 
-/// What has a name that this schema wants in a database of the one before it, or one of `more`
-/// names, and what to do about it, in one sentence; empty where nothing has. Throws StorageError.
-std::string names_in_the_way(sqlite3* database, const std::vector<std::string>& more);
-
 /// A sentence for each one that is missing or other than ours, and each whose name something else
-/// has. The database has the present schema. Throws StorageError.
+/// has. Throws StorageError.
 std::vector<std::string> faults_of_views(sqlite3* database);
 
-/// The names of those of our views that are missing; none where the schema is another one.
+/// The names of those of our views that are missing.
 std::vector<std::string> missing_views(sqlite3* database);
 
 /// Throws StorageError naming the triggers that this schema does not have: they would run with each

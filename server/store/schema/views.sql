@@ -1,10 +1,4 @@
--- The views of the database, made anew after each migration. Those that users add stay.
-DROP VIEW IF EXISTS runs;
-DROP VIEW IF EXISTS reaction_peaks;
-DROP VIEW IF EXISTS stick_intervals;
-DROP VIEW IF EXISTS phases;
-DROP VIEW IF EXISTS peaks;
-DROP VIEW IF EXISTS results;
+-- The views of the database. Those that users add stay.
 
 -- One row for each settled point, in SI units. Dividing by a power of ten gives the double that is
 -- nearest to the decimal number. Lists are JSON arrays with an array for each element; one that is damaged

@@ -62,19 +62,5 @@ TEST_F(BegunByAnotherSolver, IsNotWaitedForAndTheWaysOutAreNamed) {
               AllOf(HasSubstr("100 %"), HasSubstr("mixed\n")));
 }
 
-TEST(RunOnAnOlderDatabase, SaysWhatIsDoneToItAndThatItIsOnce) {
-  const test::TemporaryFolder folder;
-  std::filesystem::copy_file(OBLIQUE_SOURCE_DIR "/tests/server/store/old/made_by_schema_7.sqlite",
-                             folder.path() / "oblique.db");
-  std::ofstream(folder.path() / "begun.toml") << kBegun;
-  const auto first = test::run_oblique(folder, {"run", "begun.toml"});
-  EXPECT_EQ(first.exit_code, 0) << first.err;
-  EXPECT_THAT(first.err, HasSubstr("oblique.db: the database is brought from schema 7 to 8, once"));
-  EXPECT_THAT(first.err, HasSubstr(" results are brought over."));
-  const auto second = test::run_oblique(folder, {"run", "begun.toml"});
-  EXPECT_EQ(second.exit_code, 0) << second.err;
-  EXPECT_EQ(second.err.find("schema"), std::string::npos) << second.err;
-}
-
 }  // namespace
 }  // namespace oblique::client

@@ -79,14 +79,5 @@ TEST(PackedRow, HasNullForWhatAResultLacksAndNoCheckMissesIt) {
   }
 }
 
-TEST(PackedRow, OutputsOfEachEarlierSchemaCountBehindThoseOfTheSchemasBefore) {
-  for (int schema = kFirstWithChecksums; schema + 1 < kFirstPacked; ++schema) {
-    const auto before = result_columns(schema);
-    auto after = result_columns(schema + 1);
-    after.resize(before.size());
-    EXPECT_EQ(after, before) << schema;
-  }
-}
-
 }  // namespace
 }  // namespace oblique::server

@@ -72,13 +72,6 @@ TEST_F(StandingViewsTest, NothingIsSaidOrChangedWhereAllAreThere) {
   EXPECT_EQ(texts("PRAGMA schema_version"), before);
 }
 
-TEST_F(StandingViewsTest, AFileThatIsBroughtToThisSchemaHasThemAll) {
-  const std::string old = folder_.file("old.db");
-  std::filesystem::copy_file(OBLIQUE_OLD_SCHEMAS "/made_by_schema_7.sqlite", old);
-  { const Store store(old); }
-  EXPECT_THAT(faults_of_views(open_database(old, SQLITE_OPEN_READONLY).get()), IsEmpty());
-}
-
 TEST_F(StandingViewsTest, WhicheverIsDroppedIsNamedByACheckAndMadeAgainByAStart) {
   const auto before = texts(standing_sql_);
   ASSERT_EQ(before.size(), 10U);
@@ -126,15 +119,6 @@ TEST_F(StandingViewsTest, AFileWithAViewInThePlaceOfATableIsRefused) {
       " (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT i AS database_id FROM n WHERE i < 0;");
   EXPECT_THAT([this] { start(); },
               testing::ThrowsMessage<StorageError>(HasSubstr("lacks the table about")));
-}
-
-TEST_F(StandingViewsTest, AnOlderFileWithATriggerIsRefusedBeforeItIsMigrated) {
-  const std::string old = folder_.file("old.db");
-  std::filesystem::copy_file(OBLIQUE_OLD_SCHEMAS "/made_by_schema_7.sqlite", old);
-  execute(open_database(old, SQLITE_OPEN_READWRITE).get(),
-          "CREATE TRIGGER rows_are_gone AFTER UPDATE ON studies BEGIN SELECT 1; END;");
-  EXPECT_THAT([&] { const Store store(old); },
-              testing::ThrowsMessage<StorageError>(HasSubstr("rows_are_gone")));
 }
 
 TEST_F(StandingViewsTest, ATableThatHasTheNameOfOneStaysAndIsNamed) {

@@ -277,15 +277,6 @@ TEST_F(StoreTest, ADatabaseOfAnotherProgramIsRefusedByName) {
   EXPECT_THAT(message_of_opening(path_), HasSubstr("recipes"));
 }
 
-TEST_F(StoreTest, ANewerSchemaIsRefusedWithBothVersions) {
-  { const Store store(path_); }
-  const std::string newer = std::to_string(kSchemaVersion + 1);
-  execute(open_database(path_, SQLITE_OPEN_READWRITE).get(), "PRAGMA user_version = " + newer);
-  EXPECT_THAT(message_of_opening(path_), HasSubstr("schema version " + newer));
-  EXPECT_THAT(message_of_opening(path_),
-              HasSubstr("knows versions 1 to " + std::to_string(kSchemaVersion)));
-}
-
 TEST_F(StoreTest, AStudyThatThisVersionDoesNotTakeIsLeftOutAndNamedAndTheOthersAreThere) {
   {
     Store store(path_);

@@ -39,7 +39,6 @@ struct ResultList {
   bool has_names = true;  ///< elements of `solve --json` and `query` are objects, else arrays
   /// Gives `take` the elements in order.
   void (*each)(const CaseResult& result, const TakeElement& take) = nullptr;
-  int since_schema = 1;  ///< first version of the database's schema that has it
 };
 
 /// A list of outputs made of a ResultList: the list itself, or one member of its elements.
@@ -68,7 +67,6 @@ struct ResultField {
   std::string_view shown_unit = unit;  ///< in which tables for people show it
   double shown_per_unit = 1.0;         ///< so many shown units are one `unit`
   SentWith sent_with = SentWith::kResult;
-  int since_schema = 1;  ///< first version of the database's schema that has it
 };
 
 /// All outputs in the order in which `solve --json` has them. Of each type those that are

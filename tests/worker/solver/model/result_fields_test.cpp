@@ -63,18 +63,6 @@ TEST(ResultFields, OfListsNameMembersThatTheirElementsHave) {
   }
 }
 
-TEST(ResultFields, ThatResultsMayLackCameLaterThanTheFirstSchemaWhoseRowsHaveEveryOutput) {
-  for (const auto& field : result_fields()) {
-    std::visit(
-        [&](const auto& value) {
-          if constexpr (requires { value.may_be_absent; }) {
-            EXPECT_TRUE(!value.may_be_absent || field.since_schema > 1) << field.column;
-          }
-        },
-        field.value);
-  }
-}
-
 TEST(ResultFields, ANumberThatIsNotFiniteIsFoundWhereverItIs) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_TRUE(is_finite(with_lists()));
