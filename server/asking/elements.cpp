@@ -291,7 +291,10 @@ std::vector<WrittenForm> element_forms() {
   for (const auto* list : solver::result_lists()) {
     const std::string_view member = list->members.back() == "major" ? "fn_N" : list->members.back();
     forms.push_back({fmt::format("{}[0].{}", list->column, member), unit_of_member(member),
-                     fmt::format("{} of the first element; -1 is the last. Members: {}", member,
+                     fmt::format("{} of the first element; -1 is the last{}. Members: {}", member,
+                                 list->column == "peaks" ? ", and ripples count: major_peak_1_N "
+                                                           "is the first peak that is none"
+                                                         : "",
                                  fmt::join(list->members, ", "))});
     forms.push_back({fmt::format("{}.count", list->column), "", "number of elements"});
   }

@@ -81,6 +81,12 @@ class Result(Plain):
     fn_peaks_N: list[float]
     ft_peaks_N: list[float]
     major_peaks_N: list[float]
+    major_peak_1_N: float
+    major_peak_2_N: Optional[float]
+    major_peak_3_N: Optional[float]
+    major_peak_1_t_s: float
+    major_peak_2_t_s: Optional[float]
+    major_peak_3_t_s: Optional[float]
     impulse_n_Ns: float
     impulse_t_Ns: float
     slide_m: float
@@ -142,6 +148,12 @@ class ManyResults(Named):
     fn_peaks_N: npt.NDArray[np.object_]
     ft_peaks_N: npt.NDArray[np.object_]
     major_peaks_N: npt.NDArray[np.object_]
+    major_peak_1_N: Floats
+    major_peak_2_N: Floats
+    major_peak_3_N: Floats
+    major_peak_1_t_s: Floats
+    major_peak_2_t_s: Floats
+    major_peak_3_t_s: Floats
     impulse_n_Ns: Floats
     impulse_t_Ns: Floats
     slide_m: Floats

@@ -154,15 +154,15 @@ void PackedRow::pack_outputs(const solver::CaseResult& result, double accuracy,
       store(value, *number);
     }
   };
-  solver::for_each_sent<double>([&](const auto&, const auto& member) {
+  solver::for_each_stored<double>([&](const auto&, const auto& member) {
     put(member.of(result),
         [&](PackedValue& value, double number) { set(value, *unit, number, digits); });
     ++unit;
   });
-  solver::for_each_sent<std::int64_t>([&](const auto&, const auto& member) {
+  solver::for_each_stored<std::int64_t>([&](const auto&, const auto& member) {
     put(member.of(result), [](PackedValue& value, std::int64_t number) { set(value, number); });
   });
-  solver::for_each_sent<std::string>([&](const auto&, const auto& member) {
+  solver::for_each_stored<std::string>([&](const auto&, const auto& member) {
     put(member.of(result),
         [&](PackedValue& value, const std::string& text) { set(value, texts.number_of(text)); });
   });

@@ -33,13 +33,13 @@ PackedColumns make_packed_columns() {
     }
   };
   const StoredUnit* unit = stored_units().data();  // they are in the order of the fields
-  solver::for_each_sent<double>(
+  solver::for_each_stored<double>(
       [&](const auto&, const auto& member) { add((unit++)->stored, member.may_be_absent); });
   const auto add_field = [&](const solver::ResultField& field, const auto& member) {
     add(field.column, member.may_be_absent);
   };
-  solver::for_each_sent<std::int64_t>(add_field);
-  solver::for_each_sent<std::string>(add_field);
+  solver::for_each_stored<std::int64_t>(add_field);
+  solver::for_each_stored<std::string>(add_field);
   for (const solver::ResultList* list : solver::result_lists()) {
     add(list->column, list->column != "peaks" && list->column != "stick_intervals");
   }

@@ -26,6 +26,12 @@ CREATE TABLE packed_results (
   duration         ANY,          -- 1e-12 s
   fn_peak          ANY,          -- 1e-5 N
   ft_peak          ANY,          -- 1e-5 N
+  major_peak_1     ANY,          -- 1e-5 N
+  major_peak_2     ANY,          -- 1e-5 N
+  major_peak_3     ANY,          -- 1e-5 N
+  major_peak_1_t   ANY,          -- 1e-12 s
+  major_peak_2_t   ANY,          -- 1e-12 s
+  major_peak_3_t   ANY,          -- 1e-12 s
   impulse_n        ANY,          -- 1e-9 N s
   impulse_t        ANY,          -- 1e-9 N s
   slide            ANY,          -- 1e-11 m

@@ -46,9 +46,9 @@ std::map<std::string, std::string> expected_outputs() {
       columns.emplace(field.column, type);
     };
   };
-  solver::for_each_sent<double>(add("REAL"));
-  solver::for_each_sent<std::int64_t>(add("INTEGER"));
-  solver::for_each_sent<std::string>(add("TEXT"));
+  solver::for_each_stored<double>(add("REAL"));
+  solver::for_each_stored<std::int64_t>(add("INTEGER"));
+  solver::for_each_stored<std::string>(add("TEXT"));
   for (const ResultList* list : solver::result_lists()) {
     columns.emplace(list->column, "TEXT");
   }

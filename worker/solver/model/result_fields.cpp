@@ -39,6 +39,19 @@ constexpr auto at = [] {
       Kind::kMayBeAbsent};
 }();
 
+/// That member of the n-th peak, from 1, of those that are left when ripples are merged.
+template <int n, double Peak::*member>
+constexpr Member<double> of_major_peak{[](const CaseResult& result) -> const double* {
+                                         int number = 0;
+                                         for (const Peak& peak : result.peaks) {
+                                           if (peak.major && ++number == n) {
+                                             return &(peak.*member);
+                                           }
+                                         }
+                                         return nullptr;
+                                       },
+                                       nullptr, true};
+
 template <class... Values>
 std::array<Cell, sizeof...(Values)> element(Values... values) {
   return {Cell(values)...};
@@ -55,8 +68,9 @@ constexpr ResultList kPeaks{
     .column = "peaks",
     .unit = "s, N",
     .meaning =
-        "every peak of the normal force: t_s counted from touch, fn_N, ft_N the largest "
-        "tangential magnitude around it, and whether it is major (1) or a ripple (0)",
+        "every peak of the normal force, ripples too: t_s counted from touch, fn_N, ft_N the "
+        "largest tangential magnitude around it, and whether it is major (1) or a ripple (0); "
+        "peaks[1] may be a ripple, major_peak_2_N is the second one that counts",
     .members = kPeakMembers,
     .each = [](const CaseResult& result, const TakeElement& take) {
       for (const Peak& peak : result.peaks) {
@@ -104,12 +118,11 @@ constexpr ResultList kReactionPeaks{
         "largest force on the outer link at the pin O, then at each joint: t_s, its instant "
         "counted from touch, and force_N, its magnitude",
     .members = kReactionMembers,
-    .each =
-        [](const CaseResult& result, const TakeElement& take) {
-          for (const ReactionPeak& peak : result.reaction_peaks) {
-            take(element(peak.t_s, peak.force_N));
-          }
-        }};
+    .each = [](const CaseResult& result, const TakeElement& take) {
+      for (const ReactionPeak& peak : result.reaction_peaks) {
+        take(element(peak.t_s, peak.force_N));
+      }
+    }};
 
 constexpr std::array kLists{&kPeaks, &kFtPeaks, &kPhases, &kStickIntervals, &kReactionPeaks};
 
@@ -119,6 +132,26 @@ constexpr std::string_view kSolver = "solver";
 constexpr auto kEnergyOf = &CaseResult::energy;
 constexpr auto kErrorsOf = &CaseResult::errors;
 constexpr auto kSolverOf = &CaseResult::solver;
+
+template <int n>
+constexpr ResultField major_peak_force(std::string_view name, std::string_view meaning) {
+  return {.name = name,
+          .unit = "N",
+          .meaning = meaning,
+          .value = of_major_peak<n, &Peak::fn_N>,
+          .sent_with = SentWith::kPeaks};
+}
+
+template <int n>
+constexpr ResultField major_peak_instant(std::string_view name, std::string_view meaning) {
+  return {.name = name,
+          .unit = "s",
+          .meaning = meaning,
+          .value = of_major_peak<n, &Peak::t_s>,
+          .shown_unit = "us",
+          .shown_per_unit = 1e6,
+          .sent_with = SentWith::kPeaks};
+}
 
 constexpr std::array kFields{
     ResultField{.name = "fall_time_s",
@@ -156,7 +189,8 @@ constexpr std::array kFields{
                 .value = at<&CaseResult::ft_peak_N>},
     ResultField{.name = "fn_peaks_N",
                 .unit = "N",
-                .meaning = "every peak of the normal force, ripples included, in order of time",
+                .meaning = "every peak of the normal force, ripples included, in order of time; "
+                           "the second one that is no ripple is major_peak_2_N",
                 .value = ListPart{&kPeaks, "fn_N"}},
     ResultField{.name = "ft_peaks_N",
                 .unit = "N",
@@ -166,6 +200,14 @@ constexpr std::array kFields{
                 .unit = "N",
                 .meaning = "the peaks of the normal force left when ripples are merged",
                 .value = ListPart{&kPeaks, "fn_N", "major"}},
+    major_peak_force<1>("major_peak_1_N", "first peak of the normal force, ripples merged"),
+    major_peak_force<2>("major_peak_2_N",
+                        "second peak of the normal force, ripples merged; NULL: there is none"),
+    major_peak_force<3>("major_peak_3_N",
+                        "third peak of the normal force, ripples merged; NULL: there is none"),
+    major_peak_instant<1>("major_peak_1_t_s", "when major_peak_1_N is reached, from touch"),
+    major_peak_instant<2>("major_peak_2_t_s", "when major_peak_2_N is reached, from touch"),
+    major_peak_instant<3>("major_peak_3_t_s", "when major_peak_3_N is reached, from touch"),
     ResultField{.name = "impulse_n_Ns",
                 .unit = "N s",
                 .meaning = "impulse of the normal force, upwards",

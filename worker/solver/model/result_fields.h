@@ -20,7 +20,8 @@ template <class T>
 struct Member {
   using Value = T;
   const T* (*of)(const CaseResult& result);  ///< nullptr: the result lacks it
-  T& (*in)(CaseResult& result);              ///< a result that lacks it has it from then on
+  /// A result that lacks it has it from then on. nullptr: it follows from a list.
+  T& (*in)(CaseResult& result);
   bool may_be_absent = false;
 };
 
@@ -51,6 +52,7 @@ struct ListPart {
 /// What brings a value from a worker to the database.
 enum class SentWith {
   kResult,  ///< each result's message
+  kPeaks,   ///< it follows from the result's list of peaks
   kModel,   ///< it is a parameter of the study's model
   kWorker,  ///< the worker tells it once for all its results
 };
@@ -82,15 +84,26 @@ const ResultField* find_result_column(std::string_view column);
 /// The list with that column, or nullptr.
 const ResultList* find_result_list(std::string_view column);
 
-/// Calls `take` with each field of type T that is sent with a result, and its member.
+/// Calls `take` with each field of type T that a row of a result has, and its member.
 template <class T, class Take>
-void for_each_sent(const Take& take) {
+void for_each_stored(const Take& take) {
   for (const ResultField& field : result_fields()) {
     const auto* member = std::get_if<Member<T>>(&field.value);
-    if (member != nullptr && field.sent_with == SentWith::kResult) {
+    if (member != nullptr &&
+        (field.sent_with == SentWith::kResult || field.sent_with == SentWith::kPeaks)) {
       take(field, *member);
     }
   }
+}
+
+/// The same with each that is sent with a result.
+template <class T, class Take>
+void for_each_sent(const Take& take) {
+  for_each_stored<T>([&](const ResultField& field, const Member<T>& member) {
+    if (field.sent_with == SentWith::kResult) {
+      take(field, member);
+    }
+  });
 }
 
 /// Whether every number of a result is finite.
