@@ -1,16 +1,15 @@
 #include "client/output/mesh_note.h"
 
 #include <algorithm>
+#include <string_view>
+
+#include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/model_message.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::client {
 namespace {
-
-/// Elements a link from which on all but exit velocities and reactions are within 0.5 % of their
-/// limits (worker/solver/README.md, Which mesh).
-constexpr int kForcesConverge = 16;
 
 /// Elements a link on the coarsest mesh of the study.
 int coarsest(const protocol::Recipe& recipe) {
@@ -38,23 +37,21 @@ int coarsest(const protocol::Recipe& recipe) {
 }  // namespace
 
 void tell_mesh(std::ostream& out, const protocol::Recipe& recipe) {
-  const int published = solver::preset("paper").elements_per_link;
-  const int converged = solver::preset("converged").elements_per_link;
+  const solver::MeshAccuracy& coarse = solver::mesh_accuracies()[0];
+  const solver::MeshAccuracy& enough = solver::mesh_accuracies()[1];
   const int elements = coarsest(recipe);
-  if (elements == 0 || elements >= converged) {
+  if (elements == 0 || elements >= enough.elements_per_link) {
     return;
   }
-  if (elements >= kForcesConverge) {
-    out << "Note: on " << elements
-        << " elements a link forces, times and impulses are converged, exit velocities and "
-           "reactions less so; --preset converged has "
-        << converged << " (README.md, Limits).\n";
-    return;
-  }
-  out << "Note: the mesh, " << elements << " elements a link"
-      << (elements == published ? " as published" : "")
-      << ", is not converged; to predict, take --preset converged, in a study file preset = "
-         "\"converged\" (README.md, Limits).\n";
+  const std::string_view bound = elements == coarse.elements_per_link  ? ""
+                                 : elements < coarse.elements_per_link ? "more than "
+                                                                       : "up to ";
+  out << fmt::format(
+      "Note: on {} elements a link forces are off by {}{} %, durations by {}{} %, and {}{:.0f} in "
+      "10 points get another sequence of states than on {}; to predict: preset = \"{}\"\n",
+      elements, bound, coarse.forces_off, bound, coarse.duration_off, bound,
+      (100.0 - coarse.same_mode) / 10.0, solver::preset("converged").elements_per_link,
+      solver::preset_names().front());
 }
 
 }  // namespace oblique::client

@@ -13,8 +13,7 @@ namespace oblique::client {
 
 std::vector<std::uint64_t> unjudged_blocks(const protocol::Recipe& recipe) {
   const protocol::PointTable table(recipe);
-  const solver::ModelParameters model =
-      recipe.has_model() ? protocol::from_message(recipe.model()) : solver::ModelParameters{};
+  const auto model = protocol::from_message(recipe.model());
   std::vector<std::uint64_t> found;
   for (int i = 0; i < recipe.blocks_size(); ++i) {
     const auto number = static_cast<std::size_t>(i);

@@ -12,7 +12,7 @@ namespace oblique::python {
 /// What a caller said of some points: keys of models and of points, as on flags.
 struct GivenKeys {
   std::size_t points = 1;
-  std::string preset{"paper"};
+  std::string preset{solver::preset_names().front()};
   std::vector<double> lengths_m;                      ///< empty: by `links` and `length`
   std::map<std::string, double> numbers;              ///< one value for all points
   std::map<std::string, std::string> texts;           ///< expressions, and the integrator's name

@@ -9,6 +9,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/output/human_units.h"
+#include "client/output/mesh_note.h"
 #include "client/service/connection.h"
 #include "client/service/result_query.h"
 #include "client/service/watching.h"
@@ -99,7 +100,9 @@ RunEnd submit_and_wait(const Study& study, const RunSettings& settings, Embedded
   where.if_silent = why_silent(settings.service.database);
   Connection connection(where, look_after);
   const auto submitted = connection.submit(study, settings.terms);
-  if (!submitted.created()) {
+  if (submitted.created()) {
+    tell_mesh(std::cerr, study.recipe);
+  } else {
     std::cerr << fmt::format("Going on with \"{}\": {} of {} points are done.\n", study.name,
                              shown_count(submitted.settled()), shown_count(submitted.points()));
   }

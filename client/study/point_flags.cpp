@@ -1,5 +1,6 @@
 #include "client/study/point_flags.h"
 
+#include <algorithm>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -18,6 +19,7 @@
 #include "proto/suggestion.h"
 #include "proto/text.h"
 #include "worker/solver/model/number.h"
+#include "worker/solver/model/relative_cost.h"
 
 namespace oblique::client {
 namespace {
@@ -76,6 +78,44 @@ std::string default_of(const ParameterKey& key) {
     return std::string(solver::integrator_name(defaults.integrator));
   }
   return solver::exact_number(key.get(defaults));
+}
+
+/// What presets and other meshes differ in, for help.
+std::string table_of_presets() {
+  std::vector<std::pair<std::string_view, solver::ModelParameters>> rows;
+  for (const std::string_view name : solver::preset_names()) {
+    rows.emplace_back(name, solver::preset(name));
+  }
+  const auto meshes = solver::mesh_accuracies();
+  for (const solver::MeshAccuracy& mesh : meshes) {
+    const auto is_on_it = [&](const auto& row) {
+      return row.second.elements_per_link == mesh.elements_per_link;
+    };
+    if (std::none_of(rows.begin(), rows.end(), is_on_it)) {
+      rows.emplace_back("-", solver::ModelParameters()).second.elements_per_link =
+          mesh.elements_per_link;
+    }
+  }
+  std::string table =
+      "Presets, against 48 elements a link over 400 random points:\n"
+      "  preset     elements  forces off  duration off  same mode  time of a contact\n";
+  for (const auto& [name, model] : rows) {
+    const auto mesh = std::find_if(meshes.begin(), meshes.end(),
+                                   [elements = model.elements_per_link](const auto& each) {
+                                     return each.elements_per_link == elements;
+                                   });
+    const auto percent = [&](double solver::MeshAccuracy::*value) {
+      return mesh == meshes.end() ? "-" : fmt::format("{} %", solver::exact_number((*mesh).*value));
+    };
+    table += fmt::format("  {:<9}  {:>8}  {:>10}  {:>12}  {:>9}  {:>17}\n", name,
+                         model.elements_per_link, percent(&solver::MeshAccuracy::forces_off),
+                         percent(&solver::MeshAccuracy::duration_off),
+                         percent(&solver::MeshAccuracy::same_mode),
+                         solver::readable_number(*solver::relative_cost(model), 1));
+  }
+  return table +
+         "standard is to predict; paper has the published mesh and a round section, printed the\n"
+         "section as printed; converged is the reference.";
 }
 
 /// How the axes of the flags are put together.
@@ -153,6 +193,7 @@ void add_point_flags(CLI::App& verb, PointFlags& flags, FlagValues values,
   for (const auto& key : solver::model_keys()) {
     add(key, group)->default_str(default_of(key));
   }
+  verb.footer(fmt::format("{}\n\n{}", verb.get_footer(), table_of_presets()));
   for (std::size_t link = 1; with_single_lengths && link <= protocol::kMostLinks; ++link) {
     add(protocol::axis_key(fmt::format("length{}", link)), std::string(kSingleLengths));
   }

@@ -15,7 +15,7 @@ namespace oblique::client {
 
 /// What the flags of points and models said, as plain text until they are read together.
 struct PointFlags {
-  std::string preset{"paper"};
+  std::string preset{solver::preset_names().front()};
   std::string lengths;                      ///< "0.4,0.4,0.3"; empty: by links and length
   std::map<std::string, std::string> axes;  ///< text of each given flag, by key
   bool zip = false;
@@ -27,7 +27,8 @@ struct PointFlags {
 enum class FlagValues { kOne, kMany };
 
 /// Adds --H, --mu, --e, --preset, --lengths and a flag for every model key, and those of single
-/// lengths (--length1 ...) if wanted. `flags` must live as long as `verb`.
+/// lengths (--length1 ...) if wanted, and a table of presets to the footer of help. `flags` must
+/// live as long as `verb`.
 void add_point_flags(CLI::App& verb, PointFlags& flags, FlagValues values,
                      bool with_single_lengths);
 

@@ -146,8 +146,8 @@ std::vector<std::string> overrides(const solver::ModelParameters& model,
   return lines;
 }
 
-/// [model] with the preset that leaves the fewest keys to say; nothing for the preset that a study
-/// has without one.
+/// [model] with the preset that leaves the fewest keys to say. Also where that is the default,
+/// which another version may not have.
 std::string model_text(const solver::ModelParameters& model) {
   std::string_view best;
   std::vector<std::string> fewest;
@@ -157,9 +157,6 @@ std::string model_text(const solver::ModelParameters& model) {
       best = name;
       fewest = std::move(lines);
     }
-  }
-  if (fewest.empty() && model == solver::ModelParameters()) {
-    return "";
   }
   std::string text = fmt::format("\n[model]\npreset = {}\n", toml_string(best));
   for (const auto& line : fewest) {
@@ -175,9 +172,7 @@ std::string study_toml(const std::string& name, const protocol::Recipe& recipe) 
   if (recipe.errors()) {
     text += "errors = true\n";
   }
-  if (recipe.has_model()) {
-    text += model_text(protocol::from_message(recipe.model()));
-  }
+  text += model_text(protocol::from_message(recipe.model()));
   for (const auto& block : recipe.blocks()) {
     text += block_text(block);
   }

@@ -30,7 +30,7 @@ constexpr const char* kConvergeExamples = R"(Examples:
   oblique converge --H 1 --mu 0.6 --e 0.8 --finest 16 --json
   oblique converge --H 1 --mu 0.4 --e 1 --integrator generalized-alpha
   oblique converge --mesh-study                     the study that the preset `converged` rests on
-  oblique converge --step-study                     the study that chosen steps rest on
+  oblique converge --step-study --preset paper      the study that chosen steps rest on
 
 A finest mesh of 32 takes some seconds. The work of a contact grows with the cube of the mesh for the
 explicit integrator, that of a fall with the mesh.)";

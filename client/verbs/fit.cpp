@@ -32,7 +32,7 @@ Three falls an iteration, those of A and I side by side: some seconds in all.)";
 
 struct FitFlags {
   std::string from{"printed"};
-  int elements_per_link = solver::ModelParameters().elements_per_link;
+  int elements_per_link = solver::preset("paper").elements_per_link;
   bool json = false;
 };
 

@@ -10,7 +10,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/output/human_units.h"
-#include "client/output/mesh_note.h"
 #include "client/output/work_line.h"
 #include "client/plot/point/panels.h"
 #include "client/service/watching.h"
@@ -190,7 +189,6 @@ PointHistory history_of_values(const PointPictureFlags& flags) {
                        .mu = point.mu,
                        .e_star = point.e_star};
   solve_history(history, false);
-  tell_mesh(std::cerr, table.recipe());
   return history;
 }
 

@@ -118,7 +118,9 @@ int submit(const SubmitFlags& flags) {
   try {
     const auto reply = connection.submit(study, flags.terms);
     tell_submitted(study, reply, flags.terms);
-    tell_mesh(std::cerr, study.recipe);
+    if (reply.created()) {
+      tell_mesh(std::cerr, study.recipe);
+    }
     tell_unjudged(std::cerr, study.recipe);
     submitted = true;
     return flags.watch || flags.rows ? watch(study, reply.study_id(), flags.rows.value_or(0),

@@ -110,13 +110,13 @@ function command_of(form, file) {
 }
 
 /** What a form says unless somebody chooses. */
-const kUsual = { preset: "paper", integrator: "explicit", priority: "0" };
+const kUsual = { preset: "standard", integrator: "explicit", priority: "0" };
 
 /** Its fields. @param {() => void} changed */
 function fields_of(changed) {
   const text = (/** @type {string} */ value, /** @type {string} */ hint) => h("input", { type: "text", value, placeholder: hint, spellcheck: false, autocomplete: "off", oninput: changed });
   const fields = { name: text("", "friction"), H: text("1", "0.3:1.1:33"), mu: text("0.1:2:40", "0.1:2:40"), e: text("1", "0.6,0.8,1"),
-    preset: picker([["paper", "paper: as published, not converged"], ["printed", "printed: as the paper prints it"], ["converged", "converged: to predict"]], kUsual.preset, changed),
+    preset: picker([["standard", "standard: to predict"], ["paper", "paper: as published, forces 3 % off"], ["printed", "printed: as the paper prints it"], ["converged", "converged: the reference, slow"]], kUsual.preset, changed),
     integrator: picker([["explicit", "explicit"], ["generalized-alpha", "generalized-alpha: the reference, slow"]], kUsual.integrator, changed),
     others: h("textarea", { rows: 2, placeholder: "k=1e7:3e7:5", spellcheck: false, oninput: changed }), sample: text("", "sobol:1000:1"), where: text("", "mu > 0.5 * e"),
     priority: picker([["0", "usual"], ["10", "before others"], ["-10", "after others"]], kUsual.priority, changed) };
@@ -139,7 +139,7 @@ function differences(judged) {
   const { relative_cost: cost, models = 1 } = judged;
   const said = [];
   if (cost === null) said.push("How long points take with this integrator or this dt is not known before; it may be far longer.");
-  else if (cost && (cost < 0.5 || cost > 2)) said.push(`By its mesh and tolerance a point of this study takes roughly ${to_one_digit(cost)} times as long as one of the preset paper.`);
+  else if (cost && (cost < 0.5 || cost > 2)) said.push(`By its mesh and tolerance a point of this study takes roughly ${to_one_digit(cost)} times as long as one of the preset standard.`);
   if (models > 1) said.push(`Falls come on top, up to one for each of the ${count(models)} models.`);
   return said;
 }

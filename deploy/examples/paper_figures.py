@@ -38,7 +38,7 @@ STICK_MS = {(1.0, 1.2, 1.0): 0.070, (1.0, 1.4, 1.0): 0.083, (1.0, 1.6, 1.0): 0.0
 
 # %% Solve: time histories, a tenth of a second for the fall and then a millisecond each
 points = sorted({point for group in GROUPS.values() for point in group})
-contacts = {point: oblique.trace(*point) for point in points}
+contacts = {point: oblique.trace(*point, preset="paper") for point in points}
 
 
 # %% Four panels a figure, one a group
@@ -90,7 +90,7 @@ figure(7, "trajectory of the fingertip", "x [mm]", "y + H [mm]",
 
 # %% The table: largest forces, all points side by side
 H, mu, e = np.array(list(PUBLISHED)).T
-ours = oblique.solve_many(H=H, mu=mu, e=e)
+ours = oblique.solve_many(H=H, mu=mu, e=e, preset="paper")
 print("   H   mu   e*   F_n [kN] published  F_t [kN] published")
 differences = []
 for i, (point, (normal, tangential)) in enumerate(PUBLISHED.items()):

@@ -280,9 +280,8 @@ solver::ModelParameters model_of_canonical(std::string_view text) {
 
 void write_canonical(const Recipe& recipe, const std::function<void(std::string_view)>& take) {
   Pieces out(take);
-  const auto model =
-      recipe.has_model() ? unjudged_from_message(recipe.model()) : solver::ModelParameters();
-  out << kRecipeHead << "model" << model_fields(model, solver::model_keys()) << "\n";
+  out << kRecipeHead << "model"
+      << model_fields(unjudged_from_message(recipe.model()), solver::model_keys()) << "\n";
   if (recipe.errors()) {
     out << kErrorsLine;
   }

@@ -99,9 +99,11 @@ class PointTable::Compiled {
 };
 
 PointTable::PointTable(Recipe recipe) : recipe_(std::make_unique<Recipe>(std::move(recipe))) {
-  if (recipe_->has_model()) {
-    base_model_ = from_message(recipe_->model());
+  if (!recipe_->has_model()) {
+    throw solver::InputError(
+        "the recipe has no model: send all its parameters, for defaults change between versions");
   }
+  base_model_ = from_message(recipe_->model());
   if (recipe_->blocks().empty()) {
     throw solver::InputError("the study has no block: it needs at least one with H, mu and e");
   }

@@ -41,9 +41,9 @@ struct BlockPlace {
 /// is const.
 class PointTable {
  public:
-  /// Blocks without model axes share one model number. An absent model is the preset `paper`.
-  /// Throws solver::InputError naming key, value and what is allowed: what checks.h says of blocks,
-  /// a model outside its domain, no block, too many points, too many expressions. What can be
+  /// Blocks without model axes share one model number. Throws solver::InputError naming key, value
+  /// and what is allowed: what checks.h says of blocks, no model or one outside its domain, no
+  /// block, too many points, too many expressions. What can be
   /// judged only point by point is judged by `survey`.
   explicit PointTable(Recipe recipe);
   ~PointTable();

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "proto/frames.h"
+#include "proto/recipe/model_message.h"
 #include "server/service/workers_desk.h"
 
 namespace oblique::server {
@@ -11,6 +12,7 @@ namespace {
 /// A recipe of the point that every sound worker solves in a moment.
 protocol::Recipe probe_recipe() {
   protocol::Recipe recipe;
+  *recipe.mutable_model() = protocol::to_message(solver::preset("paper"));
   protocol::Block& block = *recipe.add_blocks();
   for (const auto& [key, value] : {std::pair{"H", 1.0}, {"mu", 0.4}, {"e", 1.0}}) {
     protocol::Axis& axis = *block.add_axes();

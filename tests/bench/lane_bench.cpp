@@ -38,7 +38,7 @@ void lane_step(benchmark::State& bench, const LaneKernel& kernel, int elements_p
                bool own_chains) {
   std::vector<Chain> chains;
   for (std::size_t lane = 0; lane < kernel.lanes; ++lane) {
-    solver::ModelParameters model;
+    solver::ModelParameters model = solver::preset("paper");
     model.elements_per_link = elements_per_link;
     model.E_Pa *= own_chains ? 1.0 + 0.01 * static_cast<double>(lane) : 1.0;
     chains.emplace_back(model);

@@ -22,6 +22,7 @@
 #include <zmq.hpp>
 
 #include "proto/frames.h"
+#include "proto/recipe/model_message.h"
 #include "tests/bench/known/instant_worker.h"
 #include "tests/bench/process_usage.h"
 #include "tests/support/database.h"
@@ -41,15 +42,19 @@ std::vector<std::string> study_of(std::uint64_t points) {
   std::ostringstream text;
   text << ':' << std::max<std::uint64_t>(side, 2);
   const std::string count = text.str();
-  return {"--H", "0.1:1.15" + count, "--mu",   "0.05:0.95" + count,
-          "--e", "0.2:1.0" + count,  "--name", "bench"};
+  return {
+      "--preset",        "paper",  "--H",  "0.1:1.15" + count, "--mu", "0.05:0.95" + count, "--e",
+      "0.2:1.0" + count, "--name", "bench"};
 }
 
 /// As many points, each of a model of its own.
 std::vector<std::string> models_of(std::uint64_t points) {
-  return {
-      "--k",  "1e7:9e7:" + std::to_string(points), "--H", "1", "--mu", "0.4", "--e", "1", "--name",
-      "bench"};
+  return {"--k",      "1e7:9e7:" + std::to_string(points),
+          "--preset", "paper",
+          "--H",      "1",
+          "--mu",     "0.4",
+          "--e",      "1",
+          "--name",   "bench"};
 }
 
 double megabytes(const std::string& file) {
@@ -232,6 +237,8 @@ void submit_studies(const std::string& client_url, std::uint64_t studies) {
   socket.connect(client_url);
   protocol::ClientRequest request;
   request.set_protocol_version(protocol::kProtocolVersion);
+  *request.mutable_submit()->mutable_recipe()->mutable_model() =
+      protocol::to_message(solver::preset("paper"));
   auto& block = *request.mutable_submit()->mutable_recipe()->add_blocks();
   for (const auto& [key, value] : {std::pair{"H", 1.0}, {"mu", 0.4}, {"e", 1.0}}) {
     auto& axis = *block.add_axes();

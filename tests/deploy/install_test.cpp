@@ -108,7 +108,8 @@ TEST(InstallTest, AStudyRunsFromWhereverTheProgramsAreInstalled) {
   std::filesystem::create_directory(folder.path() / "bin");
   std::filesystem::create_symlink(prefix + "/bin/oblique", folder.path() / "bin/oblique");
   Process run(folder, folder.file("bin/oblique"),
-              {"run", "--H", "1", "--mu", "0.4", "--e", "1", "--db", folder.file("a.db")});
+              {"run", "--preset", "paper", "--H", "1", "--mu", "0.4", "--e", "1", "--db",
+               folder.file("a.db")});
   EXPECT_EQ(run.wait(), 0) << run.err();
   EXPECT_THAT(run.out(), HasSubstr("solved"));
 }
@@ -117,7 +118,7 @@ TEST(InstallTest, AClientWithoutServerSaysWhatIsMissing) {
   const TemporaryFolder folder;
   const std::string prefix = folder.file("client");
   ASSERT_EQ(install(folder, prefix, "client").exit_code, 0);
-  const std::vector<std::string> point{"--H", "1", "--mu", "0.4", "--e", "1"};
+  const std::vector<std::string> point{"--preset", "paper", "--H", "1", "--mu", "0.4", "--e", "1"};
   std::vector<std::string> arguments{"solve"};
   arguments.insert(arguments.end(), point.begin(), point.end());
   Process solve(folder, prefix + "/bin/oblique", arguments);
@@ -212,7 +213,8 @@ TEST(PackagesTest, TheArchiveRunsWhereItIsUnpackedWithLibrariesOfItsOwn) {
     EXPECT_EQ(linked.exit_code, 0);
   }
   Process run(folder, folder.file("bin/oblique"),
-              {"run", "--H", "1", "--mu", "0.4", "--e", "1", "--db", folder.file("a.db")});
+              {"run", "--preset", "paper", "--H", "1", "--mu", "0.4", "--e", "1", "--db",
+               folder.file("a.db")});
   EXPECT_EQ(run.wait(), 0) << run.err();
   EXPECT_THAT(text_of(folder.file("lib/systemd/system/oblique-server.service")),
               HasSubstr("\nExecStart=/opt/oblique/bin/oblique-server "));

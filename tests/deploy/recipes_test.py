@@ -98,7 +98,7 @@ class StudyFromAScript(Recipe):
         self.assertEqual(self.run_in_folder("sh", "study.sh", "friction", OBLIQUE_SERVER=url),
                          said.replace(" 0 done", " 16 done; the server had it already"))
         # Cancelled, it is not done: 1.
-        self.run_in_folder("oblique", "submit", "--name", "long", "--H", "1", "--mu", "0.1:2:1000", "--e",
+        self.run_in_folder("oblique", "submit", "--name", "long", "--preset", "paper", "--H", "1", "--mu", "0.1:2:1000", "--e",
                            "0.5:1:1000", OBLIQUE_SERVER=url)
         self.run_in_folder("oblique", "cancel", "long", OBLIQUE_SERVER=url)
         self.run_in_folder("oblique", "watch", "long", "--quiet", code=1, OBLIQUE_SERVER=url)
@@ -111,7 +111,7 @@ class PictureOfARunningStudy(Recipe):
 
     def test_it_is_drawn_while_the_study_runs_and_once_more_when_it_is_done(self):
         url, workers = self.start_server()
-        self.run_in_folder("oblique", "submit", "--name", "first", "--H", "1", "--mu", "0.1:2:40", "--e", "0.8,1",
+        self.run_in_folder("oblique", "submit", "--name", "first", "--preset", "paper", "--H", "1", "--mu", "0.1:2:40", "--e", "0.8,1",
                            OBLIQUE_SERVER=url)
         # Nobody solves it before a picture was drawn.
         drawing = self.start(PYTHON, "-u", "running.py", "oblique.db", "first")

@@ -2,11 +2,11 @@
 
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "proto/frames.h"
 #include "proto/recipe/point_table.h"
 #include "tests/simulation/simulated_worker.h"
-#include "tests/support/recipes.h"
 
 namespace oblique::simulation {
 
@@ -24,18 +24,17 @@ protocol::Recipe recipe_of_models(std::uint64_t points, std::uint64_t points_a_m
   };
   const std::uint64_t models = points / points_a_model;
   const std::uint64_t rest = points % points_a_model;
-  protocol::Recipe recipe;
+  std::vector<std::vector<protocol::Axis>> blocks;
   if (models > 0) {
-    recipe = protocol::recipe_of(
-        {{axis("k", 1e7, 2e7, models),
-          protocol::following("E", "6e10 + 1e9 * (floor(k / 3e5) - 3 * floor(floor(k / 3e5) / 3))"),
-          listed("H", {H}), axis("mu", 0.5, 1.0, points_a_model), listed("e", {1.0})}});
+    blocks.push_back(
+        {axis("k", 1e7, 2e7, models),
+         protocol::following("E", "6e10 + 1e9 * (floor(k / 3e5) - 3 * floor(floor(k / 3e5) / 3))"),
+         listed("H", {H}), axis("mu", 0.5, 1.0, points_a_model), listed("e", {1.0})});
   }
   if (rest > 0) {
-    recipe.MergeFrom(
-        protocol::recipe_of({{listed("H", {H}), axis("mu", 0.0, 0.4, rest), listed("e", {1.0})}}));
+    blocks.push_back({listed("H", {H}), axis("mu", 0.0, 0.4, rest), listed("e", {1.0})});
   }
-  return recipe;
+  return protocol::recipe_of(blocks);
 }
 
 /// The same with a filter in every block that leaves out points here and there; nothing if one
@@ -74,11 +73,11 @@ std::uint64_t SimulatedClient::set_recipe(std::uint64_t points) {
     const char* filter = world_.chance(0.3) ? "sin(1234.5 * mu + k) > 0.9"  // a few are left in
                                             : "sin(1234.5 * mu + k) > -0.3";
     if (const auto table = filtered_here_and_there(recipe, filter)) {
-      recipe_.MergeFrom(table->recipe());
+      recipe_.mutable_blocks()->MergeFrom(table->recipe().blocks());
       return table->points();
     }
   }
-  recipe_.MergeFrom(recipe);
+  recipe_.mutable_blocks()->MergeFrom(recipe.blocks());
   return points;
 }
 

@@ -9,6 +9,7 @@
 #include "server/store/changes.h"
 #include "tests/simulation/network.h"
 #include "tests/simulation/world.h"
+#include "tests/support/recipes.h"
 
 namespace oblique::simulation {
 
@@ -64,7 +65,7 @@ class SimulatedClient {
   std::uint64_t study_id_ = 0;  // as it was acknowledged
   std::string new_name_;
   std::uint64_t appended_ = 0;  // by the request
-  protocol::Recipe recipe_;
+  protocol::Recipe recipe_ = protocol::recipe_of({});
   Network::LinkId link_ = 0;
   std::uint64_t request_ = 0;
   bool acknowledged_ = false;

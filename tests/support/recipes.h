@@ -5,13 +5,14 @@
 #include <vector>
 
 #include "proto/oblique.pb.h"
+#include "proto/recipe/model_message.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::protocol {
 
 /// A model in which no parameter has its default.
 inline solver::ModelParameters unusual_model() {
-  solver::ModelParameters model;
+  solver::ModelParameters model = solver::preset("paper");
   model.lengths_m = {0.5, 0.25};
   model.E_Pa = 1e9;
   model.A_m2 = 2e-4;
@@ -99,18 +100,19 @@ inline Block sampled(const std::vector<Axis>& axes, SampleKind kind, std::uint64
   return block;
 }
 
-/// A recipe of the given blocks, without a model.
+/// A recipe of the given blocks and the preset `paper`.
 inline Recipe recipe_of_blocks(const std::vector<Block>& blocks) {
   Recipe recipe;
+  *recipe.mutable_model() = to_message(solver::preset("paper"));
   for (const Block& block : blocks) {
     *recipe.add_blocks() = block;
   }
   return recipe;
 }
 
-/// A recipe of the given blocks, each a list of axes, without a model.
+/// A recipe of the given blocks, each a list of axes, and the preset `paper`.
 inline Recipe recipe_of(const std::vector<std::vector<Axis>>& blocks) {
-  Recipe recipe;
+  Recipe recipe = recipe_of_blocks({});
   for (const auto& axes : blocks) {
     Block& block = *recipe.add_blocks();
     for (const Axis& axis : axes) {

@@ -78,9 +78,10 @@ TEST_F(DatabaseFilesTest, AServerWhoseDatabaseIsDeletedSaysSoAndEndsWithOne) {
 
 TEST_F(DatabaseFilesTest, ARunWhoseDatabaseIsReplacedFailsAndSaysSo) {
   const std::string other = folder_.file("other.db");
-  ASSERT_EQ(
-      run_oblique(folder_, {"run", "--H", "1", "--mu", "0.4", "--e", "1", "--db", other}).exit_code,
-      0);
+  ASSERT_EQ(run_oblique(folder_, {"run", "--preset", "paper", "--H", "1", "--mu", "0.4", "--e", "1",
+                                  "--db", other})
+                .exit_code,
+            0);
   Process run(folder_, client_program(), run_arguments());
   wait_until("rows in the database", [&] { return database_.rows() > 0; });
   fs::rename(other, file_);
@@ -90,9 +91,10 @@ TEST_F(DatabaseFilesTest, ARunWhoseDatabaseIsReplacedFailsAndSaysSo) {
 }
 
 TEST_F(DatabaseFilesTest, TheFileAloneHasAllRowsAfterARunAlsoWhenAnotherProgramHasItOpen) {
-  ASSERT_EQ(
-      run_oblique(folder_, {"run", "--H", "1", "--mu", "0.4", "--e", "1", "--db", file_}).exit_code,
-      0);
+  ASSERT_EQ(run_oblique(folder_, {"run", "--preset", "paper", "--H", "1", "--mu", "0.4", "--e", "1",
+                                  "--db", file_})
+                .exit_code,
+            0);
   OtherReader reader(file_);
   ASSERT_TRUE(reader.read_one());
   reader.finish_query();

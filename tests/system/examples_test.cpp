@@ -45,8 +45,9 @@ TEST_P(Examples, ReadTheNumbersThatTheClientPrints) {
     GTEST_SKIP() << "this fails here: " << GetParam().needs;
   }
   const TemporaryFolder folder;
-  const Outcome ran = run_oblique(folder, {"run", "--name", "grid", "--H", "0.5,1", "--mu",
-                                           "0.2,0.9", "--e", "0.5,1", "--db", "grid.db"});
+  const Outcome ran =
+      run_oblique(folder, {"run", "--name", "grid", "--preset", "paper", "--H", "0.5,1", "--mu",
+                           "0.2,0.9", "--e", "0.5,1", "--db", "grid.db"});
   ASSERT_EQ(ran.exit_code, 0) << ran.err;
   const Outcome queried =
       run_oblique(folder, {"query", "grid", "--db", "grid.db", "--where", "e = 1", "--select",

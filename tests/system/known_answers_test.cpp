@@ -206,9 +206,9 @@ TEST(KnownAnswersTest, APointWithoutAnswerIsARowWithTheReasonAndTheOthersAreSolv
   const TemporaryFolder folder;
   const Database database(folder.file("steps.db"));
   // 20 µs is beyond the stability limit.
-  const Outcome ran =
-      run_oblique(folder, {"run", "--H", "1", "--mu", "0.4", "--e", "1", "--dt", "4e-6,2e-5",
-                           "--name", "steps", "--db", folder.file("steps.db")});
+  const Outcome ran = run_oblique(
+      folder, {"run", "--preset", "paper", "--H", "1", "--mu", "0.4", "--e", "1", "--dt",
+               "4e-6,2e-5", "--name", "steps", "--db", folder.file("steps.db")});
   EXPECT_EQ(ran.exit_code, 1) << ran.err;
   EXPECT_EQ(database.texts("SELECT status FROM results ORDER BY point"),
             (std::vector<std::string>{"solved", "failed"}));

@@ -15,7 +15,8 @@ constexpr int kSide = 140;
 constexpr double kManyPoints = kSide * kSide;
 inline std::vector<std::string> many_points(const std::string& name) {
   const std::string count = std::to_string(kSide);
-  return {"--H", "1", "--mu", "0.1:2.0:" + count, "--e", "0.5:1.0:" + count, "--name", name};
+  return {"--preset",         "paper",  "--H", "1", "--mu", "0.1:2.0:" + count, "--e",
+          "0.5:1.0:" + count, "--name", name};
 }
 
 }  // namespace oblique::test

@@ -108,7 +108,7 @@ const std::string kSlowExit = "the same; some exits are slow";
 const std::string kHundredfold = "100 times that at 0.1 us: order 2";
 
 TEST(Agreement, BothIntegratorsGiveTheSameSixtyContactsAtATenthOfAMicrosecond) {
-  const BothWays both(solver::ModelParameters{});
+  const BothWays both(solver::preset("paper"));
   Differences at_step;
   Differences without_leading_error;
   for (const Point& point : grid()) {
@@ -134,7 +134,7 @@ TEST(Agreement, BothIntegratorsGiveTheSameSixtyContactsAtATenthOfAMicrosecond) {
 }
 
 TEST(Agreement, BothIntegratorsGiveTheSameSixtyContactsAtAMicrosecond) {
-  const BothWays both(solver::ModelParameters{});
+  const BothWays both(solver::preset("paper"));
   Differences differences;
   std::string apart;
   int cases_apart = 0;
@@ -167,7 +167,7 @@ TEST(Agreement, BothIntegratorsGiveTheSameSixtyContactsAtAMicrosecond) {
 }
 
 TEST(Agreement, BothIntegratorsGiveTheSameSixtyCasesFromReleaseToSeparation) {
-  solver::ModelParameters model;
+  solver::ModelParameters model = solver::preset("paper");
   model.dt_fall_s = 5e-6;
   model.dt_s = 1e-7;
   const BothWays reference(model);

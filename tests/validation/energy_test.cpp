@@ -28,7 +28,7 @@ double closure(const CaseResult& result) {
 }
 
 TEST(Energy, BalancesOverThePublishedContactsUnderBothIntegrators) {
-  const BothWays both(solver::ModelParameters{});
+  const BothWays both(solver::preset("paper"));
   double by_explicit = 0.0;
   double by_generalized_alpha = 0.0;
   for (const Point& point : kPublishedPoints) {
@@ -53,7 +53,7 @@ double fall_drift(const Motion& motion, const solver::Fall& fall) {
 }
 
 TEST(Energy, IsKeptInTheFallUnderBothIntegrators) {
-  const solver::ModelParameters model;
+  const solver::ModelParameters model = solver::preset("paper");
   const solver::Chain chain(model);
   const auto generalized_alpha = std::make_shared<solver::GeneralizedAlphaMotion>(model);
   const solver::Fall one(chain, 2.5e-6);

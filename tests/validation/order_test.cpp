@@ -151,7 +151,7 @@ class SmallestOrders {
 /// Links so soft that the fall itself bends them far: of the paper's links the vibration in the
 /// fall is so small that a halved step finds rounding.
 solver::ModelParameters soft_chain() {
-  solver::ModelParameters model;
+  solver::ModelParameters model = solver::preset("paper");
   model.E_Pa *= 1e-4;
   return model;
 }
@@ -182,7 +182,7 @@ TEST(Order, OfGeneralizedAlphaIsTwoInTheFall) {
 }
 
 TEST(Order, OfTheExplicitWayIsFourInContactWithEvents) {
-  const BothWays both(solver::ModelParameters{});
+  const BothWays both(solver::preset("paper"));
   SmallestOrders orders;
   for (const Point& point : kPublishedPoints) {
     const auto at = [&](double dt_s) {
@@ -196,7 +196,7 @@ TEST(Order, OfTheExplicitWayIsFourInContactWithEvents) {
 }
 
 TEST(Order, OfGeneralizedAlphaIsTwoInContactWithEvents) {
-  const BothWays both(solver::ModelParameters{});
+  const BothWays both(solver::preset("paper"));
   SmallestOrders orders;
   for (const Point& point : kPublishedPoints) {
     const auto at = [&](double dt_s) {

@@ -167,7 +167,7 @@ struct StiffLinks {
     return state;
   }
 
-  solver::ModelParameters model;
+  solver::ModelParameters model = solver::preset("paper");
   Eigen::Matrix2d J;
 };
 

@@ -10,6 +10,7 @@
 
 #include <gtest/gtest.h>
 
+#include "proto/recipe/model_message.h"
 #include "proto/result_message.h"
 #include "worker/conversation.h"
 
@@ -18,6 +19,7 @@ namespace oblique::worker {
 /// A recipe of `points` points of one model.
 inline protocol::Recipe recipe_with_points(std::uint64_t points) {
   protocol::Recipe recipe;
+  *recipe.mutable_model() = protocol::to_message(solver::preset("paper"));
   protocol::Block& block = *recipe.add_blocks();
   const auto add = [&](const std::string& key, double value) {
     protocol::Axis& axis = *block.add_axes();

@@ -75,7 +75,7 @@ void add_model_axis(protocol::Recipe& recipe, const char* key, const std::vector
 protocol::Recipe recipe_with_models(std::uint64_t points, const std::vector<double>& E_Pa,
                                     const std::vector<double>& k_N_m) {
   protocol::Recipe recipe = recipe_with_points(points);
-  solver::ModelParameters model;
+  solver::ModelParameters model = solver::preset("paper");
   model.elements_per_link = 1;
   *recipe.mutable_model() = protocol::to_message(model);
   add_model_axis(recipe, "E", E_Pa);
@@ -105,7 +105,7 @@ struct CountedFalls {
 TEST(PointSolverTest, EveryPointGivesWhatTheFingerGivesForItAlone) {
   const Batch batch = batch_of(recipe_with_points(12));
   const auto results = solved(batch);
-  const solver::Finger finger({});
+  const solver::Finger finger(solver::preset("paper"));
   for (std::uint64_t i = 0; i < batch.size(); ++i) {
     const protocol::Point point = batch.points().point(i);
     const solver::CaseResult expected = finger.solve(point.H_m, point.mu, point.e_star);
@@ -139,7 +139,7 @@ TEST(PointSolverTest, APointWithAValueThatIsNotAllowedFailsWithTheValues) {
 TEST(PointSolverTest, AModelThatMakesNoFingerFailsEachPointWithTheReason) {
   // The recipe takes any positive number, the solver only one that leaves it a step.
   protocol::Recipe recipe = recipe_with_points(3);
-  solver::ModelParameters model;
+  solver::ModelParameters model = solver::preset("paper");
   model.dt_s = 1.0;
   *recipe.mutable_model() = protocol::to_message(model);
   const auto results = solved(batch_of(recipe));
@@ -185,7 +185,7 @@ TEST(PointSolverTest, FallsThatLaterPointsMissAreSolvedBesideTheFirst) {
 
 TEST(PointSolverTest, AFallThatFailsIsSolvedOnceAndFailsThePointsOfItsModelsAlone) {
   protocol::Recipe recipe = recipe_with_models(4, {7e10}, {2e7, 3e7});
-  solver::ModelParameters model;
+  solver::ModelParameters model = solver::preset("paper");
   model.elements_per_link = 1;
   model.integrator = solver::Integrator::kGeneralizedAlpha;
   *recipe.mutable_model() = protocol::to_message(model);
@@ -245,7 +245,7 @@ protocol::TraceOrder order_of(const Batch& batch, std::uint64_t number) {
 /// point; each trace must have the bits of the batch's result.
 void expect_traces_to_repeat(solver::Integrator integrator, std::size_t points, bool errors,
                              bool shape) {
-  solver::ModelParameters model;
+  solver::ModelParameters model = solver::preset("paper");
   model.integrator = integrator;
   model.elements_per_link = 2;
   if (integrator == solver::Integrator::kGeneralizedAlpha) {
@@ -286,7 +286,7 @@ TEST(PointSolverTest, ATraceByGeneralizedAlphaHasTheBitsOfItsBatchToo) {
 }
 
 TEST(PointSolverTest, ATraceBeginsWithTheFallWhereThatIsOrdered) {
-  solver::ModelParameters model;
+  solver::ModelParameters model = solver::preset("paper");
   model.elements_per_link = 1;
   protocol::Recipe recipe = recipe_with_points(2);
   *recipe.mutable_model() = protocol::to_message(model);

@@ -48,7 +48,7 @@ def solve(
     mu: Value,
     e: Value,
     *,
-    preset: str = "paper",
+    preset: str = "standard",
     lengths: Optional[Sequence[Number]] = None,
     errors: bool = False,
     **model: Value,
@@ -56,7 +56,7 @@ def solve(
     """One impact: what ``oblique solve --json`` gives, with the same bits.
 
     H [m] is the drop of the tip, mu the coefficient of friction, e Stronge's coefficient of
-    restitution. The model is a preset ("paper", "printed" or "converged") with single keys
+    restitution. The model is a preset ("standard", "paper", "printed" or "converged") with single keys
     overridden, as on the command line: ``E``, ``A``, ``I``, ``rho``, ``g``, ``k``, ``eta2``,
     ``tip_mass``, ``links``, ``length``, ``length1``, ``elements_per_link``, ``integrator``, ``dt``,
     ``dt_fall``, ``tolerance``, ...; ``lengths`` has one length a link. A value may be an expression
@@ -87,7 +87,7 @@ def trace(
     mu: Value,
     e: Value,
     *,
-    preset: str = "paper",
+    preset: str = "standard",
     lengths: Optional[Sequence[Number]] = None,
     fall: bool = False,
     shape: bool = False,
@@ -113,7 +113,7 @@ def solve_many(
     mu: Union[npt.ArrayLike, str],
     e: Union[npt.ArrayLike, str],
     *,
-    preset: str = "paper",
+    preset: str = "standard",
     lengths: Optional[Sequence[Number]] = None,
     errors: bool = False,
     threads: Optional[SupportsIndex] = None,

@@ -89,7 +89,7 @@ Findings examine_solver() {
   Findings found{"solver", "solver"};
   const double start_s = cpu_time_s();
   const auto start = Clock::now();
-  const solver::Finger finger{solver::ModelParameters{}};
+  const solver::Finger finger(solver::preset("paper"));
   (void)finger.solve(1.0, 0.4, 1.0);
   const double first_s = cpu_time_s() - start_s;
   const auto alone = one_by_one(finger, Budget(0.05, std::chrono::milliseconds(150)));

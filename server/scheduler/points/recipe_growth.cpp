@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cstddef>
+#include <cstdint>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -10,6 +11,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/canonical.h"
+#include "proto/recipe/model_message.h"
 #include "proto/text.h"
 
 namespace oblique::server {
@@ -71,6 +73,7 @@ std::vector<std::string> lines_of(const protocol::Recipe& recipe) {
 /// The line of one block.
 std::string line_of(const protocol::Block& block) {
   protocol::Recipe recipe;
+  *recipe.mutable_model() = protocol::to_message(solver::ModelParameters());  // any
   *recipe.add_blocks() = block;
   std::vector<std::string> lines = lines_of(recipe);
   constexpr std::size_t kBehindBlock = 2;  // nothing stands behind the last line feed
@@ -80,9 +83,7 @@ std::string line_of(const protocol::Block& block) {
 /// The line of its model.
 std::string model_line_of(const protocol::Recipe& recipe) {
   protocol::Recipe model;
-  if (recipe.has_model()) {
-    *model.mutable_model() = recipe.model();
-  }
+  *model.mutable_model() = recipe.model();
   return lines_of(model).at(1);
 }
 
@@ -193,6 +194,13 @@ void compare_heads(const protocol::Recipe& stored, const protocol::Recipe& given
   if (const std::string other = model_line_of(given); model != other) {
     difference.compare("model", model, other);
     differs = true;
+    protocol::Recipe on_paper = given;
+    on_paper.mutable_model()->set_elements_per_link(
+        static_cast<std::uint32_t>(solver::preset("paper").elements_per_link));
+    if (model_line_of(on_paper) == model) {
+      difference.add(
+          "preset = \"paper\" below [model], or --preset paper, goes on with the stored one");
+    }
   }
   if (stored.errors() != given.errors()) {
     const auto told = [](bool errors) { return errors ? "true" : "false"; };

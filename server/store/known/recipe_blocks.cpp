@@ -86,8 +86,7 @@ bool is_product(const protocol::Block& block) {
 }
 
 solver::ModelParameters base_model_of(const protocol::PointTable& table) {
-  return table.recipe().has_model() ? protocol::from_message(table.recipe().model())
-                                    : solver::ModelParameters();
+  return protocol::from_message(table.recipe().model());
 }
 
 ProductInverse::ProductInverse(const PlacedBlock& block)

@@ -227,9 +227,7 @@ bool is_same_sample(const PlacedBlock& target, const PlacedBlock& source) {
   }
   const auto text = [](const PlacedBlock& placed) {
     protocol::Recipe recipe;
-    if (placed.table->recipe().has_model()) {
-      *recipe.mutable_model() = placed.table->recipe().model();
-    }
+    *recipe.mutable_model() = placed.table->recipe().model();
     protocol::Block& block = *recipe.add_blocks() = *placed.block;
     block.clear_where();
     if (block.sample().kind() != protocol::SAMPLE_LATIN_HYPERCUBE) {

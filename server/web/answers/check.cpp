@@ -49,8 +49,7 @@ protocol::ModelParameters model_of(const nlohmann::json& written) {
 /// The least drop in m beyond which only a fall tells whether the tip comes to an H of the study;
 /// nothing where it comes to all of them.
 std::optional<double> surely_reached_m(const protocol::Recipe& recipe) {
-  const auto model =
-      recipe.has_model() ? protocol::from_message(recipe.model()) : solver::ModelParameters();
+  const auto model = protocol::from_message(recipe.model());
   std::optional<double> least_m;
   for (const auto& block : recipe.blocks()) {
     const auto drop_m = protocol::surely_reached_m(model, block);

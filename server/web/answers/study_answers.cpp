@@ -102,9 +102,7 @@ ordered_json columns_json() {
 
 /// The model that blocks without model axes have, key by key.
 ordered_json model_json(const protocol::Recipe& recipe) {
-  const solver::ModelParameters model = recipe.has_model()
-                                            ? protocol::unjudged_from_message(recipe.model())
-                                            : solver::ModelParameters();
+  const auto model = protocol::unjudged_from_message(recipe.model());
   const solver::ModelParameters usual;
   ordered_json keys = ordered_json::array();
   for (const solver::ParameterKey& key : solver::model_keys()) {

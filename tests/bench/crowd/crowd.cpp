@@ -60,7 +60,7 @@ protocol::WorkerHello hello_of(std::size_t number) {
 }
 
 protocol::PointResult solved_result() {
-  return protocol::to_message(0, solver::Finger(solver::ModelParameters{}).solve(1.0, 0.4, 0.8));
+  return protocol::to_message(0, solver::Finger(solver::preset("paper")).solve(1.0, 0.4, 0.8));
 }
 
 }  // namespace

@@ -88,9 +88,10 @@ struct Place {
 
 /// A study that no crowd comes to the end of.
 void submit(const Place& place, const test::Server& server) {
-  std::vector<std::string> words{
-      "submit",         "--server", server.client_url(), "--H",    "0.1:1.15:1000", "--mu",
-      "0.05:0.95:1000", "--e",      "0.2:1.0:1000",      "--name", "crowd"};
+  std::vector<std::string> words{"submit",         "--server", server.client_url(), "--preset",
+                                 "paper",          "--H",      "0.1:1.15:1000",     "--mu",
+                                 "0.05:0.95:1000", "--e",      "0.2:1.0:1000",      "--name",
+                                 "crowd"};
   if (!place.environment.empty()) {
     words.insert(words.end(), {"--keys", place.keys + "/client.key"});
   }

@@ -44,7 +44,7 @@ class InstantWorker {
 
  private:
   const protocol::PointResult result_ =
-      protocol::to_message(0, solver::Finger(solver::ModelParameters{}).solve(1.0, 0.4, 0.8));
+      protocol::to_message(0, solver::Finger(solver::preset("paper")).solve(1.0, 0.4, 0.8));
   int stop_;
   std::thread thread_;
 };

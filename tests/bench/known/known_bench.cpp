@@ -94,8 +94,8 @@ std::vector<std::string> study_of(std::uint64_t points, const std::string& name)
   const auto side =
       static_cast<std::uint64_t>(std::llround(std::cbrt(static_cast<double>(points))));
   const std::string count = fmt::format(":{}", std::max<std::uint64_t>(side, 2));
-  return {"--H", "0.1:1.15" + count, "--mu",   "0.05:0.95" + count,
-          "--e", "0.2:1" + count,    "--name", name};
+  return {"--preset",          "paper", "--H",           "0.1:1.15" + count, "--mu",
+          "0.05:0.95" + count, "--e",   "0.2:1" + count, "--name",           name};
 }
 
 void bench_taken(std::uint64_t points) {

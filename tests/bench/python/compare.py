@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""What the Python module costs beside C++: 20,000 points over H, mu and e, solved by turns by
+"""What the Python module costs beside C++: 20,000 points over H, mu and e of the preset paper, solved by turns by
 oblique.solve_many and by the same in C++, each in a process of its own. Prints each pair, and the
 medians of the ratios.
     PYTHONPATH=build/release/python tests/bench/python/compare.py build/release/bin/oblique-many-points 5
@@ -16,7 +16,7 @@ H = np.linspace(0.3, 1.1, 20)[:, None, None]
 mu = np.linspace(0, 2, 50)[None, :, None]
 e = np.linspace(0.5, 1, 20)
 before, begun = resource.getrusage(resource.RUSAGE_SELF).ru_utime, time.perf_counter()
-sweep = oblique.solve_many(H, mu, e)
+sweep = oblique.solve_many(H, mu, e, preset="paper")
 wall = time.perf_counter() - begun
 user = resource.getrusage(resource.RUSAGE_SELF).ru_utime - before
 print(wall, user, sweep.fn_peak_N.sum())

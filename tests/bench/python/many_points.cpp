@@ -39,7 +39,7 @@ int main() {
       }
     }
   }
-  const std::vector<oblique::ModelParameters> models(1);
+  const std::vector<oblique::ModelParameters> models{oblique::preset("paper")};
   std::vector<std::optional<oblique::CaseResult>> results(points.size());
   const double user_before_s = user_s();
   const auto begun = std::chrono::steady_clock::now();

@@ -115,7 +115,7 @@ TEST(Convergence, IsDeniedWhereTheModeChangesOnTheFinestLevels) {
 }
 
 TEST(MeshLevels, DoubleTheMeshAndChooseStepsForEach) {
-  solver::ModelParameters model;
+  solver::ModelParameters model = solver::preset("paper");
   model.dt_s = 1e-6;
   model.dt_fall_s = 1e-6;
   const auto levels = mesh_levels(model, 2, 8);
@@ -130,7 +130,7 @@ TEST(MeshLevels, DoubleTheMeshAndChooseStepsForEach) {
 }
 
 TEST(MeshLevels, KeepTheStepsOfGeneralizedAlpha) {
-  solver::ModelParameters model;
+  solver::ModelParameters model = solver::preset("paper");
   model.integrator = solver::Integrator::kGeneralizedAlpha;
   model.dt_s = 1e-6;
   for (const auto& level : mesh_levels(model, 2, 8)) {
@@ -146,7 +146,7 @@ TEST(StepLevels, HalveBothStepsFromTheShortestTheModelTakes) {
   EXPECT_DOUBLE_EQ(levels[1].model.dt_s, levels[0].model.dt_s / 2.0);
   // Restitution at e* = 0.2 steps shorter than compression.
   EXPECT_LT(levels[0].model.dt_s, step_levels({}, 1.0, 2)[0].model.dt_s);
-  solver::ModelParameters model;
+  solver::ModelParameters model = solver::preset("paper");
   model.dt_fall_s = 2e-6;
   EXPECT_EQ(step_levels(model, 1.0, 2)[2].model.dt_fall_s, 0.5e-6);
   model.integrator = solver::Integrator::kGeneralizedAlpha;
@@ -157,7 +157,7 @@ TEST(StepLevels, HalveBothStepsFromTheShortestTheModelTakes) {
 }
 
 TEST(StepLevels, ShareTheFallThatChoosesItsStepsByTheTolerance) {
-  solver::ModelParameters model;
+  solver::ModelParameters model = solver::preset("paper");
   model.tolerance = 1e-4;
   const auto levels = step_levels(model, 1.0, 2);
   for (const auto& level : levels) {
@@ -209,7 +209,7 @@ double grazing_mu(const solver::Finger& a, const solver::Finger& b) {
 }
 
 TEST(Convergence, NamesTheGrazingTurnThatComesAndGoesWithTheStep) {
-  solver::ModelParameters model;
+  solver::ModelParameters model = solver::preset("paper");
   model.elements_per_link = 2;
   model.dt_fall_s = 5e-6;
   model.dt_s = 4e-6;
@@ -227,7 +227,7 @@ TEST(Convergence, NamesTheGrazingTurnThatComesAndGoesWithTheStep) {
 }
 
 TEST(Convergence, OfTheExplicitStepIsOfOrderFourOnARealImpact) {
-  solver::ModelParameters model;
+  solver::ModelParameters model = solver::preset("paper");
   model.elements_per_link = 2;
   std::ostringstream shown;
   WorkLine line(shown);

@@ -11,7 +11,7 @@ namespace {
 
 /// A short chain, for the test's time.
 StepStudyCase small_case() {
-  solver::ModelParameters model;
+  solver::ModelParameters model = solver::preset("paper");
   model.lengths_m = {0.2};
   return {"small", model, 12, 0.4, 1.0, {0.5, 1.0, 2.0}};
 }

@@ -168,7 +168,7 @@ TEST(WorkLineDeathTest, ASignalEndsTheProgramAndLeavesACleanLine) {
 }
 
 TEST(WorkLine, NamesAFallByTheDropOfTheTip) {
-  EXPECT_EQ(fall_so_far(solver::ModelParameters(), 0.46312), "fall 0.463 of 1.2 m");
+  EXPECT_EQ(fall_so_far(solver::preset("paper"), 0.46312), "fall 0.463 of 1.2 m");
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 
 #include <gtest/gtest.h>
 
+#include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
 #include "server/database/database_in_use.h"
 #include "server/store/store.h"
@@ -34,6 +35,7 @@ class SourceTest : public ::testing::Test {
 
   static void make_database(const std::string& file, const std::string& study) {
     protocol::Recipe recipe;
+    *recipe.mutable_model() = protocol::to_message(solver::preset("paper"));
     for (const auto& [key, value] : {std::pair{"H", 1.0}, {"mu", 0.4}, {"e", 1.0}}) {
       if (recipe.blocks().empty()) {
         recipe.add_blocks();

@@ -33,9 +33,7 @@ class DrawnRecipe {
   protocol::Recipe recipe() {
     protocol::Recipe recipe;
     recipe.set_errors(chance(0.2));
-    if (chance(0.8)) {
-      *recipe.mutable_model() = protocol::to_message(model());
-    }
+    *recipe.mutable_model() = protocol::to_message(model());
     for (std::uint64_t i = 0; i <= below(3); ++i) {
       *recipe.add_blocks() = block();
     }
@@ -52,7 +50,7 @@ class DrawnRecipe {
   }
 
   solver::ModelParameters model() {
-    auto model = solver::preset(solver::preset_names()[below(3)]);
+    auto model = solver::preset(solver::preset_names()[below(4)]);
     if (chance(0.3)) {
       model.lengths_m.assign(3 + below(2), real(0.3, 0.5));
     } else if (chance(0.4)) {
@@ -165,7 +163,8 @@ std::string written(const std::string& text, const std::string& name = "x") {
 
 TEST(StudyToml, IsAsAPersonWouldWriteIt) {
   EXPECT_EQ(written("[[block]]\nH=1\nmu={from=0.1,to=2,step=0.1}\ne=[0.5,1]\n", "friction"),
-            "name = \"friction\"\n\n[[block]]\nH = 1\nmu = { from = 0.1, to = 2, count = 20 }\n"
+            "name = \"friction\"\n\n[model]\npreset = \"standard\"\n\n[[block]]\nH = 1\nmu = { "
+            "from = 0.1, to = 2, count = 20 }\n"
             "e = [0.5, 1]\n");
   EXPECT_EQ(written("errors=true\n[model]\npreset='printed'\nk=1e7\n[[block]]\nsample={kind='lhs',"
                     "count=9}\nH={from=0.5,to=1}\nmu=1\ne=1\nI='A^2'\nwhere='mu>e'\n"),

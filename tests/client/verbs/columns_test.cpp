@@ -46,7 +46,8 @@ class TwoWays : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     const test::TemporaryFolder folder;
-    const std::vector<std::string> point{"--H", "1", "--mu", "1.2", "--e", "0.9"};
+    const std::vector<std::string> point{"--preset", "paper", "--H", "1",
+                                         "--mu",     "1.2",   "--e", "0.9"};
     const auto with_point = [&](std::vector<std::string> words) {
       words.insert(words.end(), point.begin(), point.end());
       return test::run_oblique(folder, words);
@@ -94,7 +95,7 @@ server::StoredDigits digits_of(const nlohmann::ordered_json& solved) {
   result.energy.kinetic_in_J = solved["energy"]["kinetic_in_J"];
   result.energy.exchanged_J = solved["energy"]["exchanged_J"];
   result.solver.dt_s = solved["solver"]["dt_s"];
-  return {result, server::accuracy_of(solver::ModelParameters())};
+  return {result, server::accuracy_of(solver::preset("paper"))};
 }
 
 void expect_same(const nlohmann::ordered_json& stored, const nlohmann::ordered_json& member,

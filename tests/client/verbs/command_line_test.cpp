@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
@@ -17,6 +18,9 @@
 
 namespace oblique::client {
 namespace {
+
+using testing::HasSubstr;
+using testing::Not;
 
 // Every verb that the program itself lists: one that is added is checked with the others.
 std::vector<std::string> verbs_of(const std::string& help) {
@@ -50,10 +54,10 @@ TEST(CommandLine, AnswersWrongUsageWithExitCodeTwoAndASentence) {
       {{"solve", "--H", "1", "--mu", "abc", "--e", "1"}, "\"abc\" is not a number"},
       {{"solve", "--H", "1", "--mu", "0.4", "--e", "1.1"}, "e = 1.1"},
       {{"solve", "--H", "1.3", "--mu", "0.4", "--e", "1"}, "1.2 m"},
-      {{"solve", "--H", "1.19", "--mu", "0.4", "--e", "1"}, "1.179156"},
-      {{"run", "--H", "1.19", "--mu", "0.4", "--e", "1"}, "1.179156"},
-      {{"submit", "--H", "1.19", "--mu", "0.4", "--e", "1"}, "1.179156"},
-      {{"converge", "--H", "1.19", "--mu", "0.4", "--e", "1"}, "1.179156"},
+      {{"solve", "--preset", "paper", "--H", "1.19", "--mu", "0.4", "--e", "1"}, "1.179156"},
+      {{"run", "--preset", "paper", "--H", "1.19", "--mu", "0.4", "--e", "1"}, "1.179156"},
+      {{"submit", "--preset", "paper", "--H", "1.19", "--mu", "0.4", "--e", "1"}, "1.179156"},
+      {{"converge", "--preset", "paper", "--H", "1.19", "--mu", "0.4", "--e", "1"}, "1.179156"},
       {{"solve", "--H", "1", "--mu", "0.4", "--e", "1", "--k", "0-mu"},
        "--k 0-mu: point 0: k = -0.4 N/m is not allowed"},
       {{"solve", "--H", "1", "--mu", "log(0-H)", "--e", "1"}, "mu = nan is not allowed"},
@@ -153,8 +157,8 @@ TEST(CommandLine, ShowsEveryVerbWithExamplesOnStandardOutput) {
 }
 
 TEST(CommandLine, SolvesOnePointAsOneJsonObject) {
-  const auto outcome =
-      test::run_oblique({"solve", "--H", "1", "--mu", "0.4", "--e", "1", "--json"});
+  const auto outcome = test::run_oblique(
+      {"solve", "--preset", "paper", "--H", "1", "--mu", "0.4", "--e", "1", "--json"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   const auto json = nlohmann::json::parse(outcome.out);
   EXPECT_EQ(json["H"], 1.0);
@@ -165,8 +169,9 @@ TEST(CommandLine, SolvesOnePointAsOneJsonObject) {
 
 TEST(CommandLine, ConvergesWithTheModelOfThePointThatItsFilterLeavesIn) {
   const auto converged = [](const std::vector<std::string>& more) {
-    std::vector<std::string> words{"converge", "--H",        "0.9", "--mu",     "0.4", "--e",
-                                   "1",        "--coarsest", "1",   "--finest", "4",   "--json"};
+    std::vector<std::string> words{"converge", "--preset", "paper", "--H",   "0.9",
+                                   "--mu",     "0.4",      "--e",   "1",     "--coarsest",
+                                   "1",        "--finest", "4",     "--json"};
     words.insert(words.end(), more.begin(), more.end());
     const auto outcome = test::run_oblique(words);
     EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
@@ -175,21 +180,62 @@ TEST(CommandLine, ConvergesWithTheModelOfThePointThatItsFilterLeavesIn) {
   EXPECT_EQ(converged({"--k", "1e7,2e7", "--where", "k > 1.5e7"}), converged({"--k", "2e7"}));
 }
 
-TEST(CommandLine, SaysOnceAndBesideTheDataThatThePublishedMeshIsNotConverged) {
-  const auto outcome =
-      test::run_oblique({"solve", "--H", "1", "--mu", "0.4", "--e", "1", "--json"});
-  EXPECT_TRUE(nlohmann::json::accept(outcome.out)) << outcome.out;
-  EXPECT_NE(outcome.err.find("--preset converged"), std::string::npos) << outcome.err;
-  const auto run = test::run_oblique({"run", "--H", "0.6", "--mu", "0.2:0.4:3", "--e", "1"});
-  const auto first = run.err.find("--preset converged");
-  EXPECT_NE(first, std::string::npos) << run.err;
-  EXPECT_EQ(run.err.find("--preset converged", first + 1), std::string::npos) << run.err;
+TEST(CommandLine, SaysOfACoarseMeshWhatItCostsBesideTheDataAndOfAStudyOnce) {
+  const test::TemporaryFolder folder;
+  const auto err_of = [&](std::vector<std::string> words) {
+    words.insert(words.end(), {"--H", "0.6", "--mu", "0.4", "--e", "1"});
+    return test::run_oblique(folder, words).err;
+  };
+  const std::string note = "Note: on 4 elements a link forces are off by 3 %";
+  EXPECT_THAT(err_of({"solve", "--preset", "paper", "--json"}), HasSubstr(note));
+  EXPECT_THAT(err_of({"study", "check", "--preset", "paper", "--no-rate"}), HasSubstr(note));
+  EXPECT_THAT(err_of({"run", "--preset", "paper"}), HasSubstr(note));
+  EXPECT_THAT(err_of({"run", "--preset", "paper"}), Not(HasSubstr(note))) << "it is there already";
+  EXPECT_THAT(err_of({"plot", "--preset", "paper"}), Not(HasSubstr(note)));
+  EXPECT_THAT(err_of({"solve"}), Not(HasSubstr("Note")));
+}
+
+TEST(CommandLine, AStudyOfThePaperWithoutItsPresetSaysHowToGoOn) {
+  const test::TemporaryFolder folder;
+  const auto run = [&](const std::string& model) {
+    std::ofstream(folder.path() / "old.toml") << model << "[[block]]\nH = 0.6\nmu = 0.4\ne = 1\n";
+    return test::run_oblique(folder, {"run", "old.toml"});
+  };
+  ASSERT_EQ(run("[model]\npreset = 'paper'\n").exit_code, 0);
+  const auto refused = run("");
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_THAT(refused.err, HasSubstr("model, elements_per_link: stored 4, given 16"));
+  EXPECT_THAT(refused.err, HasSubstr("preset = \"paper\" below [model]"));
+}
+
+TEST(CommandLine, PeaksThatAreNoRipplesAreColumnsAndAbsentWhereThereAreFewer) {
+  const test::TemporaryFolder folder;
+  const std::vector<std::string> point{"--preset", "paper",   "--H", "1",
+                                       "--mu",     "1.2,0.6", "--e", "1"};
+  std::vector<std::string> words{"run", "--name", "a"};
+  words.insert(words.end(), point.begin(), point.end());
+  ASSERT_EQ(test::run_oblique(folder, words).exit_code, 0);
+  const auto rows = [&](const std::string& format) {
+    return test::run_oblique(folder, {"query", "a", "--format", format, "--select",
+                                      "mu,major_peak_2_N,major_peak_3_N,major_peak_3_t_s"})
+        .out;
+  };
+  const auto json = nlohmann::json::parse(rows("json"));
+  EXPECT_NEAR(json[0]["major_peak_2_N"].get<double>(), 1573.71, 0.02);
+  EXPECT_TRUE(json[0]["major_peak_3_N"].is_null());
+  EXPECT_NEAR(json[1]["major_peak_2_N"].get<double>(), 1587.48, 0.02) << "no ripple of 784.43 N";
+  EXPECT_NEAR(json[1]["major_peak_3_N"].get<double>(), 2395.13, 0.02);
+  EXPECT_THAT(rows("csv"), HasSubstr(",,\n"));
+  EXPECT_EQ(test::run_oblique(folder, {"query", "a", "--where", "major_peak_3_N IS NULL",
+                                       "--select", "point", "--format", "csv"})
+                .out,
+            "point\n0\n");
 }
 
 TEST(CommandLine, WritesATraceFromTouchToSeparation) {
   const test::TemporaryFolder folder;
-  const auto outcome = test::run_oblique(
-      folder, {"solve", "--H", "1", "--mu", "1.2", "--e", "1", "--trace", "trace.csv"});
+  const auto outcome = test::run_oblique(folder, {"solve", "--preset", "paper", "--H", "1", "--mu",
+                                                  "1.2", "--e", "1", "--trace", "trace.csv"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_NE(outcome.out.find("contact"), std::string::npos);
   std::ifstream trace(folder.path() / "trace.csv");

@@ -20,8 +20,9 @@ namespace {
 // So long that a signal meets it at work.
 void write_study(const test::TemporaryFolder& folder, int points) {
   std::ofstream(folder.path() / "study.toml")
-      << "name = 'many'\n[[block]]\nH = 1\nmu = { from = 0.1, to = 2, count = " << points
-      << " }\ne = 0.9\n";
+      << "name = 'many'\n[model]\npreset = 'paper'\n[[block]]\nH = 1\nmu = { from = 0.1, to = 2, "
+         "count = "
+      << points << " }\ne = 0.9\n";
 }
 
 // Waits for something that must come; the test's own time limit is what ends a wait in vain.
@@ -90,7 +91,8 @@ TEST(Run, SolvesAStudyAndItsResultsAreThereForEveryVerbThatReads) {
 
 TEST(Run, WithErrorsGivesThemToEveryPointAndWithoutToNone) {
   const test::TemporaryFolder folder;
-  std::vector<std::string> arguments{"run", "--H", "0.9,1", "--mu", "0.4", "--e", "1"};
+  std::vector<std::string> arguments{"run",  "--preset", "paper", "--H", "0.9,1",
+                                     "--mu", "0.4",      "--e",   "1"};
   for (const char* one : {"--elements-per-link", "2", "--name", "without"}) {
     arguments.emplace_back(one);
   }
@@ -114,7 +116,8 @@ TEST(Run, WithErrorsGivesThemToEveryPointAndWithoutToNone) {
 
 TEST(Run, OfAStudyThatIsDoneShowsItsResultsAgain) {
   const test::TemporaryFolder folder;
-  const std::vector<std::string> arguments{"run", "--H", "1", "--mu", "0.4", "--e", "1"};
+  const std::vector<std::string> arguments{"run",  "--preset", "paper", "--H", "1",
+                                           "--mu", "0.4",      "--e",   "1"};
   const auto first = test::run_oblique(folder, arguments);
   const auto second = test::run_oblique(folder, arguments);
   EXPECT_EQ(second.exit_code, 0) << second.err;
@@ -124,10 +127,10 @@ TEST(Run, OfAStudyThatIsDoneShowsItsResultsAgain) {
 
 TEST(Queries, ThatAreWrongSayWhatIsWrong) {
   const test::TemporaryFolder folder;
-  ASSERT_EQ(
-      test::run_oblique(folder, {"run", "--H", "1", "--mu", "0.4", "--e", "1", "--name", "one"})
-          .exit_code,
-      0);
+  ASSERT_EQ(test::run_oblique(folder, {"run", "--preset", "paper", "--H", "1", "--mu", "0.4", "--e",
+                                       "1", "--name", "one"})
+                .exit_code,
+            0);
   const auto column = test::run_oblique(folder, {"query", "one", "--where", "fn_peak > 1"});
   EXPECT_EQ(column.exit_code, 2);
   EXPECT_NE(column.err.find("did you mean `fn_peak_N`"), std::string::npos) << column.err;
@@ -141,12 +144,12 @@ TEST(Queries, ThatAreWrongSayWhatIsWrong) {
 
 TEST(Run, OfAnotherStudyUnderATakenNameIsRefused) {
   const test::TemporaryFolder folder;
-  ASSERT_EQ(
-      test::run_oblique(folder, {"run", "--H", "1", "--mu", "0.4", "--e", "1", "--name", "one"})
-          .exit_code,
-      0);
-  const auto other =
-      test::run_oblique(folder, {"run", "--H", "1", "--mu", "0.5", "--e", "1", "--name", "one"});
+  ASSERT_EQ(test::run_oblique(folder, {"run", "--preset", "paper", "--H", "1", "--mu", "0.4", "--e",
+                                       "1", "--name", "one"})
+                .exit_code,
+            0);
+  const auto other = test::run_oblique(
+      folder, {"run", "--preset", "paper", "--H", "1", "--mu", "0.5", "--e", "1", "--name", "one"});
   EXPECT_EQ(other.exit_code, 1);
   EXPECT_NE(other.err.find("one"), std::string::npos) << other.err;
 }
@@ -271,7 +274,8 @@ TEST(Run, GoesOnWithTheWorkersThatAreLeftAndStopsWhenNoneIs) {
 TEST(Run, SaysWhatTheServerSaidWhenItDoesNotStart) {
   const test::TemporaryFolder folder;
   std::ofstream(folder.path() / "oblique.db") << "this is no database, but some text in a file\n";
-  const auto outcome = test::run_oblique(folder, {"run", "--H", "1", "--mu", "0.4", "--e", "1"});
+  const auto outcome = test::run_oblique(
+      folder, {"run", "--preset", "paper", "--H", "1", "--mu", "0.4", "--e", "1"});
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_NE(outcome.err.find("the server did not start"), std::string::npos) << outcome.err;
   EXPECT_NE(outcome.err.find("oblique.db"), std::string::npos) << outcome.err;

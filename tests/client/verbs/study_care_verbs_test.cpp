@@ -18,7 +18,7 @@ using testing::Not;
 
 /// A study file with so many points, of which the first ones are always the same.
 std::string study_text(int blocks) {
-  std::string text = "name = \"friction\"\n";
+  std::string text = "name = \"friction\"\n[model]\npreset = \"paper\"\n";
   for (int block = 0; block < blocks; ++block) {
     text += "[[block]]\nH = 1.0\ne = 1.0\nmu = [0." + std::to_string(2 * block + 1) + ", 0." +
             std::to_string(2 * block + 2) + "]\n";

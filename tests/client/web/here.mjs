@@ -48,7 +48,7 @@ export async function submit(name, axes, changes = []) {
   const page = await browser.open("#/");
   const id = await page.evaluate(async (given) => {
     const recipe = { blocks: [{ axes: Object.entries(given.axes).map(([key, [from, to, count]]) => ({ key, from, to, count })) }] };
-    const made = await fetch("/api/studies", { method: "POST", body: JSON.stringify({ name: given.name, recipe }), headers: { "Content-Type": "application/json" } });
+    const made = await fetch("/api/studies", { method: "POST", body: JSON.stringify({ name: given.name, model: { preset: "paper" }, recipe }), headers: { "Content-Type": "application/json" } });
     return (await made.json()).id;
   }, { name, axes });
   await page.close();

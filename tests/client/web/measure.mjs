@@ -131,7 +131,7 @@ async function solving(overview, study) {
 async function begin_large(page) {
   return page.evaluate(async () => {
     const axis = (key, from, to) => ({ key, from, to, count: 1000 });
-    const body = { name: `measured-${Date.now()}`, recipe: { blocks: [{ axes: [axis("H", 0.2, 1.1), axis("mu", 0.1, 2), axis("e", 0.5, 1)] }] } };
+    const body = { name: `measured-${Date.now()}`, model: { preset: "paper" }, recipe: { blocks: [{ axes: [axis("H", 0.2, 1.1), axis("mu", 0.1, 2), axis("e", 0.5, 1)] }] } };
     const { id } = await (await fetch("/api/studies", { method: "POST", body: JSON.stringify(body) })).json();
     await new Promise((go_on) => setTimeout(go_on, 3000));
     await fetch(`/api/studies/${id}/pause`, { method: "POST", body: "{}" });

@@ -143,10 +143,10 @@ test("a form's time is that of the last points, with more for errors, and says i
   const says = (text) => until(page, (wanted) => document.querySelector("form [role=status]").textContent.includes(wanted), text);
   const selects = await page.$$("form select");
   await selects[0].select("converged");
-  await says("a point of this study takes roughly 60 times as long as one of the preset paper.");
+  await says("a point of this study takes roughly 6 times as long as one of the preset standard.");
   await selects[1].select("generalized-alpha");
   await says("How long points take with this integrator or this dt is not known before");
-  await selects[0].select("paper");
+  await selects[0].select("standard");
   await selects[1].select("explicit");
   await page.type("form textarea", "rho=2600:2700:3");
   await says("Falls come on top, up to one for each of the 3 models.");

@@ -339,7 +339,7 @@ test("a map shows one block of a study, says so, and another one is chosen", asy
   const page = await browser.open("#/");
   const id = await page.evaluate(async () => {
     const axes = [{ key: "H", values: [0.5, 1] }, { key: "mu", values: [0.5, 1] }, { key: "e", values: [1] }];
-    const body = { name: "blocks", recipe: { blocks: [{ axes: [{ key: "k", values: [1e7] }, ...axes] }, { axes }] } };
+    const body = { name: "blocks", model: { preset: "paper" }, recipe: { blocks: [{ axes: [{ key: "k", values: [1e7] }, ...axes] }, { axes }] } };
     const made = await fetch("/api/studies", { method: "POST", body: JSON.stringify(body), headers: { "Content-Type": "application/json" } });
     return (await made.json()).id;
   });

@@ -290,7 +290,7 @@ TEST(BlockKindsTest, ValuesThatAreNotAllowedFailTheirPointWhereNobodyCouldLook) 
   EXPECT_TRUE(table.survey([] { return true; })) << "nobody looks at so many points";
   EXPECT_EQ(table.fault(0), "");
   EXPECT_THAT(table.fault(200'000'000), HasSubstr("k = -1 N/m is not allowed"));
-  EXPECT_EQ(table.model(200'000'000).k_N_m, solver::ModelParameters().k_N_m);
+  EXPECT_EQ(table.model(200'000'000).k_N_m, solver::preset("paper").k_N_m);
 }
 
 TEST(BlockKindsTest, SeveralThreadsMayUseOneTable) {
@@ -327,7 +327,7 @@ TEST(BlockKindsTest, SingleLengthsActOnWhatLinksAndLengthHaveMade) {
 TEST(BlockKindsTest, AnExpressionSeesTheLengthThatLinksMake) {
   Recipe recipe = recipe_of({{listed("links", {2, 3}), following("tip_mass", "length2"),
                               listed("H", {0.2}), listed("mu", {0.4}), listed("e", {1.0})}});
-  solver::ModelParameters base;
+  solver::ModelParameters base = solver::preset("paper");
   base.lengths_m = {0.4, 0.3};
   *recipe.mutable_model() = to_message(base);
   const PointTable table(recipe);

@@ -49,7 +49,7 @@ TEST(RecipeRules, AGoodStudyIsTaken) {
 }
 
 TEST(RecipeRules, AStudyWithoutBlocksIsRefused) {
-  EXPECT_THAT(refusal(Recipe()), HasSubstr("no block"));
+  EXPECT_THAT(refusal(recipe_of({})), HasSubstr("no block"));
 }
 
 TEST(RecipeRules, AnUnknownKeyIsNamedAndTheKnownOnesListed) {
@@ -196,7 +196,7 @@ TEST(RecipeRules, TheBlockIsNamedWhenThereAreSeveral) {
 
 TEST(RecipeRules, AModelOutsideItsDomainIsRefused) {
   Recipe recipe = recipe_of({{listed("H", {1.0}), listed("mu", {0.4}), listed("e", {1.0})}});
-  solver::ModelParameters model;
+  solver::ModelParameters model = solver::preset("paper");
   model.E_Pa = -1.0;
   *recipe.mutable_model() = to_message(model);
   EXPECT_THAT(refusal(recipe), HasSubstr("E = -1"));

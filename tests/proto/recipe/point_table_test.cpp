@@ -3,6 +3,7 @@
 #include <stdexcept>
 #include <tuple>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "proto/recipe/axes.h"
@@ -25,7 +26,7 @@ Recipe varied_recipe() {
 }
 
 struct ExpectedPoint {
-  solver::ModelParameters model;
+  solver::ModelParameters model = solver::preset("paper");
   double H_m;
   double mu;
   double e_star;
@@ -118,7 +119,7 @@ TEST(PointTableTest, BlocksWithoutModelAxesShareOneModel) {
   const PointTable table(varied_recipe());
   EXPECT_EQ(table.models(), 1U + 6U + 3U);
   EXPECT_EQ(table.point(0).model, table.segment_at(36 + 60).model);
-  EXPECT_EQ(table.model(0), solver::ModelParameters{});
+  EXPECT_EQ(table.model(0), solver::preset("paper"));
 }
 
 TEST(PointTableTest, TheModelOfTheRecipeIsTheBaseOfEveryModelAxis) {
@@ -129,6 +130,13 @@ TEST(PointTableTest, TheModelOfTheRecipeIsTheBaseOfEveryModelAxis) {
   solver::ModelParameters expected = solver::preset("printed");
   expected.k_N_m = 2e7;
   EXPECT_EQ(table.model(table.point(1).model), expected);
+}
+
+TEST(PointTableTest, ARecipeWithoutAModelIsRefused) {
+  Recipe recipe = varied_recipe();
+  recipe.clear_model();
+  EXPECT_THAT([&] { PointTable{recipe}; }, testing::ThrowsMessage<solver::InputError>(
+                                               testing::HasSubstr("the recipe has no model")));
 }
 
 TEST(PointTableTest, AStudyOfATrillionPointsIsReadAtAnyPoint) {

@@ -285,7 +285,7 @@ TEST_F(MergeTest, OnlyADatabaseOfOursIsMerged) {
 /// Ten points, and as many behind them.
 Table grown_table() {
   protocol::Recipe recipe = table_of(10)->recipe();
-  recipe.MergeFrom(table_of(10)->recipe());
+  *recipe.add_blocks() = table_of(10)->recipe().blocks(0);
   return std::make_shared<const protocol::PointTable>(recipe);
 }
 

@@ -133,7 +133,7 @@ TEST_F(RowFaultsTest, AModelThatIsNotThatOfItsDefinitionOrOfTheRecipeIsNamed) {
   run("UPDATE models SET E = E + 1");
   EXPECT_THAT(find_faults(path_), Contains(HasSubstr("model 1: E is not")));
   run("UPDATE models SET E = E - 1");
-  solver::ModelParameters other;
+  solver::ModelParameters other = solver::preset("paper");
   other.E_Pa += 1.0;
   {
     const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);

@@ -128,6 +128,7 @@ TEST_F(LoopTest, ALongRecipeIsStoredAndHandedOutWhileOthersAreAnswered) {
   large.set_protocol_version(protocol::kProtocolVersion);
   large.mutable_submit()->set_name("large");
   large.mutable_submit()->set_priority(1);
+  *large.mutable_submit()->mutable_recipe() = protocol::recipe_of({});
   constexpr int kBlocks = 50'000;
   for (int i = 0; i < kBlocks; ++i) {
     auto& block = *large.mutable_submit()->mutable_recipe()->add_blocks();

@@ -13,7 +13,7 @@ using testing::HasSubstr;
 /// `points` points, and behind them a block of `further`.
 protocol::Recipe grown_recipe(std::uint64_t points, std::uint64_t further) {
   protocol::Recipe recipe = table_of(points)->recipe();
-  recipe.MergeFrom(table_of(further)->recipe());
+  *recipe.add_blocks() = table_of(further)->recipe().blocks(0);
   return recipe;
 }
 

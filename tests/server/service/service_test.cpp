@@ -1,7 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "proto/recipe/model_message.h"
+#include "proto/recipe/axes.h"
 #include "tests/server/service/service_fixture.h"
 
 namespace oblique::server {
@@ -84,12 +84,17 @@ TEST_F(ServiceTest, TheSamePointsWrittenInAnotherWayAreTheSameStudy) {
   request(submit_request("a"));
   write_all();
   ClientRequest written = submit_request("a");
-  auto& model = *written.mutable_submit()->mutable_recipe()->mutable_model();
-  model = protocol::to_message(solver::preset("paper"));
+  auto& recipe = *written.mutable_submit()->mutable_recipe();
+  auto& mu = *recipe.mutable_blocks(0)->mutable_axes(1);
+  const protocol::Axis range = mu;
+  mu = protocol::listed("mu", {});
+  for (std::uint64_t i = 0; i < range.count(); ++i) {
+    mu.add_values(protocol::axis_value(range, i));
+  }
   request(written);
   EXPECT_FALSE(last_reply().submit().created());
   EXPECT_EQ(last_reply().submit().study_id(), 1U);
-  model.set_k_n_m(1e7);
+  recipe.mutable_model()->set_k_n_m(1e7);
   request(written);
   EXPECT_THAT(last_reply().error().message(), HasSubstr("model, k: stored 2.7e+07, given 1e+07"));
 }
@@ -112,6 +117,10 @@ TEST_F(ServiceTest, BadStudiesAreRefusedWithTheReason) {
   bad.mutable_submit()->mutable_recipe()->mutable_blocks(0)->mutable_axes(2)->set_values(0, 1.5);
   request(bad);
   EXPECT_THAT(last_reply().error().message(), HasSubstr("e = 1.5"));
+  bad = submit_request("a");
+  bad.mutable_submit()->mutable_recipe()->clear_model();
+  request(bad);
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("the recipe has no model"));
   EXPECT_TRUE(outbox_.jobs.empty());
 }
 

@@ -69,7 +69,7 @@ class ClearingTest : public testing::Test {
 /// Three points, and so many further ones.
 std::shared_ptr<const protocol::PointTable> grown_table(std::uint64_t further) {
   protocol::Recipe all = table_of(3)->recipe();
-  all.MergeFrom(table_of(further)->recipe());
+  *all.add_blocks() = table_of(further)->recipe().blocks(0);
   return std::make_shared<const protocol::PointTable>(all);
 }
 

@@ -198,7 +198,7 @@ TEST_F(StoreTest, OneModelOfTwoStudiesIsOneRowAndEachKeyIsAColumn) {
   const auto reply = ask(path_, "SELECT " + columns + " FROM models");
   ASSERT_EQ(reply.rows_size(), 1);
   EXPECT_EQ(reply.rows(0).values(0).text(), "[0.4,0.4,0.4]");
-  const solver::ModelParameters paper;
+  const solver::ModelParameters paper = solver::preset("paper");
   int column = 1;
   for (const auto& key : solver::model_keys()) {
     const auto& value = reply.rows(0).values(column++);
@@ -381,7 +381,7 @@ TEST_F(NumbersByHandTest, AStudyWithTheResultsOfALongerOneIsRefused) {
 }
 
 TEST_F(NumbersByHandTest, AStudyWithTheResultsOfAnotherModelIsRefused) {
-  solver::ModelParameters other;
+  solver::ModelParameters other = solver::preset("paper");
   other.E_Pa *= 2.0;
   protocol::Recipe recipe = table_of(5)->recipe();
   *recipe.mutable_model() = protocol::to_message(other);

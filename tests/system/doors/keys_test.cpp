@@ -62,8 +62,8 @@ class KeysTest : public ::testing::Test {
   std::unique_ptr<Server> server_;
 };
 
-const std::vector<std::string> kFewPoints{"submit", "--name", "few", "--H",       "1",
-                                          "--mu",   "0.4",    "--e", "0.9,0.95,1"};
+const std::vector<std::string> kFewPoints{"submit", "--name", "few", "--preset", "paper",     "--H",
+                                          "1",      "--mu",   "0.4", "--e",      "0.9,0.95,1"};
 
 TEST_F(KeysTest, WithTheKeysOfTheirRolesAStudyIsSubmittedSolvedAndRead) {
   const auto worker = worker_with(key("worker"));

@@ -15,6 +15,7 @@ namespace {
 std::string large_study(const TemporaryFolder& folder, int blocks) {
   const std::string file = folder.file("large.toml");
   std::ofstream out(file);
+  out << "[model]\npreset = 'paper'\n";
   for (int i = 0; i < blocks; ++i) {
     out << "[[block]]\nH = { from = " << 0.1 + 1e-6 * i << ", to = 1.0, count = 1024 }\n"
         << "mu = { from = 0.1, to = 1.0, count = 1024 }\ne = 1\n";

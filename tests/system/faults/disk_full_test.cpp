@@ -30,8 +30,8 @@ TEST(DiskFullTest, AStudyWaitsForRoomOnTheDiskSaysSoAndLosesNothing) {
   constexpr rlim_t kRoom = 600'000;
   limit_files(server.process().pid(), kRoom);
   const Outcome submitted =
-      run_oblique(folder, {"submit", "--H", "1", "--mu", "0.1:2.0:50", "--e", "0.5:1.0:40",
-                           "--name", "full", "--server", server.client_url()});
+      run_oblique(folder, {"submit", "--preset", "paper", "--H", "1", "--mu", "0.1:2.0:50", "--e",
+                           "0.5:1.0:40", "--name", "full", "--server", server.client_url()});
   ASSERT_EQ(submitted.exit_code, 0) << submitted.err;
   Worker worker(folder, server.worker_url());
   wait_until("the study waits for the disk", [&] {
@@ -41,8 +41,8 @@ TEST(DiskFullTest, AStudyWaitsForRoomOnTheDiskSaysSoAndLosesNothing) {
   EXPECT_GT(rows, 0);
   EXPECT_LT(rows, 2000);
   const Outcome refused =
-      run_oblique(folder, {"submit", "--H", "1", "--mu", "0.4", "--e", "1", "--name", "another",
-                           "--server", server.client_url()});
+      run_oblique(folder, {"submit", "--preset", "paper", "--H", "1", "--mu", "0.4", "--e", "1",
+                           "--name", "another", "--server", server.client_url()});
   // So little may still have fitted.
   EXPECT_TRUE(refused.exit_code == 0 || refused.err.find("was not stored") != std::string::npos)
       << refused.err;

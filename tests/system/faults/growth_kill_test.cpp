@@ -26,7 +26,7 @@ class GrowthKillTest : public ::testing::Test {
   std::string study_file(const std::string& name, double k, int blocks) const {
     const std::string path = folder_.file(name + ".toml");
     std::ofstream file(path);
-    file << "name = \"" << name << "\"\n[model]\nk = " << k << "\n";
+    file << "name = \"" << name << "\"\n[model]\npreset = \"paper\"\nk = " << k << "\n";
     for (int block = 0; block < blocks; ++block) {
       file << "[[block]]\nH = " << 0.8 + 0.01 * block
            << "\nmu = { from = 0.1, to = 2.0, count = 20 }\n"

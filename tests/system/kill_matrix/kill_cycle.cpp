@@ -28,6 +28,8 @@ constexpr int kPointsFailed = 1;  ///< exit code: the study is at its end, with 
 // long enough for heartbeats and for a score of commits. Of the second a filter leaves half out.
 // The last two have no answer.
 constexpr const char* kStudy = R"(name = "matrix"
+[model]
+preset = "paper"
 [[block]]
 dt = 1e-6
 H = 1.0

@@ -24,8 +24,8 @@ class PlainText : public StudyOnLan {
     workers_.push_back(worker_on(*worker_hosts_[0]));  // it says its name, worker1
     using Words = std::vector<std::string>;
     for (const Words& asked :
-         {Words{"submit", "--watch", "--name", "conspicuous", "--H", "1", "--mu", "1.2", "--e",
-                "1"},
+         {Words{"submit", "--watch", "--name", "conspicuous", "--preset", "paper", "--H", "1",
+                "--mu", "1.2", "--e", "1"},
           Words{"query", "conspicuous", "--select", "fn_peak_N,mode", "--where", "e > 0.95"},
           Words{"sql", "SELECT count(*) FROM runs"}, Words{"workers"}}) {
       const Outcome ran = client(asked)->outcome();

@@ -11,7 +11,7 @@ namespace oblique::test {
 
 std::vector<std::string> submit_and_watch() {
   const std::string count = std::to_string(kPointsOfAnAxis);
-  return {"submit", "--watch", "--name",           "many", "--H",
+  return {"submit", "--watch", "--name",           "many", "--preset",        "paper", "--H",
           "1",      "--mu",    "0.1:2.0:" + count, "--e",  "0.5:1.0:" + count};
 }
 

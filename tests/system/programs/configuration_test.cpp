@@ -106,7 +106,8 @@ TEST(ConfigurationOfProgramsTest, AnUnknownKeyEndsBothWithTwoAndTheNearestName) 
 TEST(ConfigurationOfProgramsTest, APrivateServiceDoesNotTakeWhatIsMeantForTheMachinesOwn) {
   const TemporaryFolder folder;
   Process run(folder, client_program(),
-              {"run", "--H", "1", "--mu", "0.4", "--e", "1", "--db", folder.file("a.db")},
+              {"run", "--preset", "paper", "--H", "1", "--mu", "0.4", "--e", "1", "--db",
+               folder.file("a.db")},
               {{"OBLIQUE_SERVER_DB", folder.file("not_this.db")},
                {"OBLIQUE_SERVER_LISTEN", "192.0.2.1"},
                {"OBLIQUE_WORKER_THREADS", "none"},

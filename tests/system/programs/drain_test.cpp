@@ -64,8 +64,8 @@ class DrainTest : public testing::Test {
   /// Points whose fall takes a minute and more.
   void submit() {
     const Outcome outcome = run_oblique(
-        folder_, {"submit", "--server", server_.client_url(), "--H", "1", "--mu", "0.1:2:40", "--e",
-                  "1", "--elements-per-link", "64", "--name", "study"});
+        folder_, {"submit", "--server", server_.client_url(), "--preset", "paper", "--H", "1",
+                  "--mu", "0.1:2:40", "--e", "1", "--elements-per-link", "64", "--name", "study"});
     ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   }
   Outcome status() {
@@ -92,8 +92,8 @@ TEST_F(DrainTest, WaitsForWhatIsUnderWayAndSaysSoToClientsAndToTheManager) {
   wait_until("it drains", [&] { return manager_.heard("STATUS=draining"); });
   EXPECT_TRUE(manager_.heard("STOPPING=1"));
   const Outcome refused =
-      run_oblique(folder_, {"submit", "--server", server_.client_url(), "--H", "1", "--mu", "0.5",
-                            "--e", "1", "--name", "another"});
+      run_oblique(folder_, {"submit", "--server", server_.client_url(), "--preset", "paper", "--H",
+                            "1", "--mu", "0.5", "--e", "1", "--name", "another"});
   EXPECT_EQ(refused.exit_code, 1);
   EXPECT_NE(refused.err.find("draining"), std::string::npos) << refused.err;
   EXPECT_NE(status().out.find("draining"), std::string::npos);

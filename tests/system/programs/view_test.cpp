@@ -49,8 +49,9 @@ class Browser {
 
 TEST(View, ShowsADatabaseAndItsPointsUntilItIsStopped) {
   const TemporaryFolder folder;
-  const Outcome made = run_oblique(folder, {"run", "--H", "0.5", "--mu", "0.1:1:4", "--e", "1",
-                                            "--name", "small", "--db", "small.db"});
+  const Outcome made =
+      run_oblique(folder, {"run", "--preset", "paper", "--H", "0.5", "--mu", "0.1:1:4", "--e", "1",
+                           "--name", "small", "--db", "small.db"});
   ASSERT_EQ(made.exit_code, 0) << made.err;
   Process view(folder, client_program(), {"view", "small.db"});
   const Browser browser(printed_url(view));
@@ -81,8 +82,8 @@ TEST(View, AFileThatIsNotThereIsNotMade) {
 TEST(View, APortThatIsTakenIsToldByTheFlagOfTheVerb) {
   const TemporaryFolder folder;
   for (const std::string name : {"first", "second"}) {
-    const Outcome made =
-        run_oblique(folder, {"run", "--H", "0.5", "--mu", "0.4", "--e", "1", "--db", name + ".db"});
+    const Outcome made = run_oblique(folder, {"run", "--preset", "paper", "--H", "0.5", "--mu",
+                                              "0.4", "--e", "1", "--db", name + ".db"});
     ASSERT_EQ(made.exit_code, 0) << made.err;
   }
   Process view(folder, client_program(), {"view", "first.db"});

@@ -16,7 +16,7 @@ double limit_s(const Chain& chain, double tip_stiffness_N_m) {
 }
 
 TEST(StepChoice, LimitsAreThoseOfTheStiffestSpringOfEachPhase) {
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   const Chain chain(model);
   const auto limits = [&](double eta2, double e_star) {
     model.eta2 = eta2;
@@ -32,7 +32,7 @@ TEST(StepChoice, LimitsAreThoseOfTheStiffestSpringOfEachPhase) {
 }
 
 TEST(StepChoice, TheStepChosenMakesTheErrorModelTheTolerance) {
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   for (const double tolerance : {1e-5, 1e-7}) {
     model.tolerance = tolerance;
     const Chain chain(model);
@@ -46,7 +46,7 @@ TEST(StepChoice, TheStepChosenMakesTheErrorModelTheTolerance) {
 }
 
 TEST(StepChoice, StepsShrinkWithFastRestitutionInBothPhases) {
-  const ModelParameters model;
+  const ModelParameters model = preset("paper");
   const Chain chain(model);
   const StepChoice steps(chain, model);
   const double usual_s = steps.contact(1.0).compression_s;
@@ -72,7 +72,7 @@ TEST(StepChoice, ChosenStepsStayBelowTheLimitWhateverTheModel) {
   for (const int elements : {1, 4, 64}) {
     for (const double k : {1.0, 2.7e7, 1e12}) {
       for (const double tolerance : {1e-9, 1e-5, 1e-2}) {
-        ModelParameters model;
+        ModelParameters model = preset("paper");
         model.elements_per_link = elements;
         model.k_N_m = k;
         model.tolerance = tolerance;
@@ -80,7 +80,7 @@ TEST(StepChoice, ChosenStepsStayBelowTheLimitWhateverTheModel) {
       }
     }
   }
-  ModelParameters heavy;
+  ModelParameters heavy = preset("paper");
   heavy.tip_mass_kg = 100.0;
   expect_below(heavy);
   const Chain chain(heavy);
@@ -92,7 +92,7 @@ TEST(StepChoice, ChosenStepsStayBelowTheLimitWhateverTheModel) {
 
 TEST(StepChoice, AFallIsAsExactAsTheContactButNotLessExactThanByDefault) {
   for (const auto integrator : {Integrator::kExplicit, Integrator::kGeneralizedAlpha}) {
-    ModelParameters model;
+    ModelParameters model = preset("paper");
     model.integrator = integrator;
     const Chain chain(model);
     const double usual_s = StepChoice(chain, model).fall_s();
@@ -107,7 +107,7 @@ TEST(StepChoice, AFallIsAsExactAsTheContactButNotLessExactThanByDefault) {
 }
 
 TEST(StepChoice, GeneralizedAlphaFollowsTheToleranceByItsOrder) {
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   model.integrator = Integrator::kGeneralizedAlpha;
   const Chain chain(model);
   const double usual_s = StepChoice(chain, model).contact(1.0).compression_s;
@@ -116,7 +116,7 @@ TEST(StepChoice, GeneralizedAlphaFollowsTheToleranceByItsOrder) {
 }
 
 TEST(StepChoice, StepAskedForIsTakenUpToTheLimitAndRefusedAbove) {
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   const Chain chain(model);
   const double limit = StepChoice(chain, model).contact_limits(0.5).restitution_s;
   model.dt_s = 0.999 * limit;
@@ -124,7 +124,7 @@ TEST(StepChoice, StepAskedForIsTakenUpToTheLimitAndRefusedAbove) {
   EXPECT_EQ(StepChoice(chain, model).contact(0.5).restitution_s, model.dt_s);
   model.dt_s = 1.001 * limit;
   EXPECT_THROW(StepChoice(chain, model).contact(0.5), InputError);
-  model = {};
+  model = preset("paper");
   model.dt_fall_s = 1.001 * limit_s(chain, 0.0);
   EXPECT_THROW(StepChoice(chain, model), InputError);
   model.dt_fall_s = 0.999 * limit_s(chain, 0.0);
@@ -132,7 +132,7 @@ TEST(StepChoice, StepAskedForIsTakenUpToTheLimitAndRefusedAbove) {
 }
 
 TEST(StepChoice, RestitutionTooSmallForDoublePrecisionIsAnErrorNotAWrongNumber) {
-  const ModelParameters model;
+  const ModelParameters model = preset("paper");
   const Chain chain(model);
   const StepChoice steps(chain, model);
   EXPECT_NO_THROW(steps.contact(0.001));

@@ -22,7 +22,7 @@
 /// corrected in them stands in worker/solver/README.md of the sources.
 ///
 ///     #include <oblique/solver.h>
-///     const oblique::Finger finger;                        // the preset `paper`
+///     const oblique::Finger finger;                        // the preset `standard`
 ///     const auto impact = finger.solve(1.0, 0.4, 1.0);     // H = 1 m, mu = 0.4, e = 1
 ///     std::cout << impact.fn_peak_N << " N, " << impact.mode << '\n';
 ///
@@ -39,7 +39,7 @@ using solver::CaseResult;       ///< what solving a point gave
 using solver::ErrorEstimate;    ///< estimated errors of outputs
 using solver::InputError;       ///< a value outside its range: message names key, value, range
 using solver::Integrator;       ///< how the equations of motion are stepped
-using solver::ModelParameters;  ///< the finger, ground and method; the default is `paper`
+using solver::ModelParameters;  ///< the finger, ground and method; the default is `standard`
 using solver::SolveError;       ///< a point that has no answer: message says why
 using solver::TraceRow;         ///< one instant of a contact
 using solver::Tracing;          ///< what is wanted of the instants, and where they go

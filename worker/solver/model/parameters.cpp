@@ -26,7 +26,10 @@ constexpr int kMaxLinks = 64;
 constexpr int kMaxElementsPerLink = 256;
 
 constexpr std::array<std::string_view, 2> kIntegratorNames{"explicit", "generalized-alpha"};
-constexpr std::array<std::string_view, 3> kPresetNames{"paper", "printed", "converged"};
+constexpr std::array<std::string_view, 4> kPresetNames{"standard", "paper", "printed", "converged"};
+constexpr std::array<MeshAccuracy, 3> kMeshAccuracies{
+    {{4, 3.0, 12.0, 59.0}, {8, 0.15, 1.0, 90.0}, {16, 0.02, 0.07, 98.0}}};
+constexpr int kPublishedElements = 4;
 
 using Model = ModelParameters;
 
@@ -175,14 +178,17 @@ std::span<const std::string_view> integrator_names() {
 
 ModelParameters preset(std::string_view name) {
   ModelParameters model;
-  if (name == "printed") {
+  if (name == "paper") {
+    model.elements_per_link = kPublishedElements;
+  } else if (name == "printed") {
+    model.elements_per_link = kPublishedElements;
     model.A_m2 = 5e-4;
     model.I_m4 = 2e-8;
     model.k_N_m = 2.5e7;
     model.eta2 = 1.21;
   } else if (name == "converged") {
     model.elements_per_link = 48;
-  } else if (name != "paper") {
+  } else if (name != kPresetNames[0]) {
     throw InputError("preset = \"" + std::string(name) + "\" is not allowed: preset must be " +
                      joined(kPresetNames));
   }
@@ -191,6 +197,10 @@ ModelParameters preset(std::string_view name) {
 
 std::span<const std::string_view> preset_names() {
   return kPresetNames;
+}
+
+std::span<const MeshAccuracy> mesh_accuracies() {
+  return kMeshAccuracies;
 }
 
 }  // namespace oblique::solver

@@ -16,7 +16,7 @@ enum class Integrator {
 };
 
 /// Every parameter of the finger and its solution but H, mu and e*. Defaults are the preset
-/// `paper`. Plain values; `validate` says whether they make a model.
+/// `standard`. Plain values; `validate` says whether they make a model.
 struct ModelParameters {
   std::vector<double> lengths_m{0.4, 0.4, 0.4};  ///< one a link, from the pin O outwards
   double E_Pa = 70e9;                            ///< Young's modulus
@@ -24,7 +24,7 @@ struct ModelParameters {
   double I_m4 = 2.243e-8;                        ///< second moment of area
   double rho_kg_m3 = 2700.0;                     ///< density
   double g_m_s2 = 9.81;                          ///< gravity, downwards
-  int elements_per_link = 4;
+  int elements_per_link = 16;
   double k_N_m = 2.7e7;      ///< normal contact stiffness in compression
   double eta2 = 1.2463;      ///< ratio of normal to tangential contact stiffness
   double tip_mass_kg = 0.0;  ///< point mass carried by the tip node
@@ -80,8 +80,21 @@ Integrator integrator_named(std::string_view name);
 /// Names of all integrators, in the order of their numbers.
 std::span<const std::string_view> integrator_names();
 
-/// The model of a preset: `paper`, `printed` or `converged`. Throws InputError for other names.
+/// The model of a preset: `standard`, `paper`, `printed` or `converged`. Throws InputError for
+/// other names.
 ModelParameters preset(std::string_view name);
+/// The default is the first.
 std::span<const std::string_view> preset_names();
+
+/// How far results on a mesh are from those on 48 elements a link [%]: the means over 400 random
+/// points.
+struct MeshAccuracy {
+  int elements_per_link;
+  double forces_off;
+  double duration_off;
+  double same_mode;  ///< points with the same major mode
+};
+/// From coarse to fine.
+std::span<const MeshAccuracy> mesh_accuracies();
 
 }  // namespace oblique::solver

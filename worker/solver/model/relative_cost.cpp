@@ -27,8 +27,8 @@ std::optional<double> relative_cost(const ModelParameters& model) {
   if (model.integrator != Integrator::kExplicit || model.dt_s != 0.0) {
     return std::nullopt;
   }
-  const ModelParameters paper;
-  return work_of_step(model) * steps(model) / (work_of_step(paper) * steps(paper));
+  const ModelParameters standard;
+  return work_of_step(model) * steps(model) / (work_of_step(standard) * steps(standard));
 }
 
 }  // namespace oblique::solver

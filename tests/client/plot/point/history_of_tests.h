@@ -9,8 +9,11 @@ namespace oblique::client::plot::test {
 /// A made-up contact of 200 us at rising and falling force: it sticks for a quarter of the time, is
 /// compressed for a half, and e* = 0.5 makes restitution four times as stiff.
 inline PointHistory small_history() {
-  PointHistory history{
-      .name = "Point 3 of a study", .model = {}, .H_m = 1.0, .mu = 1.2, .e_star = 0.5};
+  PointHistory history{.name = "Point 3 of a study",
+                       .model = solver::preset("paper"),
+                       .H_m = 1.0,
+                       .mu = 1.2,
+                       .e_star = 0.5};
   constexpr int kSteps = 20;
   for (int i = 0; i <= kSteps; ++i) {
     const double share = static_cast<double>(i) / kSteps;

@@ -55,7 +55,8 @@ TEST_F(PlotPoint, DrawsAPointOfAStudySolvedAgainOrForTheFirstTime) {
 }
 
 TEST_F(PlotPoint, DrawsTheFingerAsItFalls) {
-  const auto shape = plot({"--H", "0.4", "--mu", "0.4", "--e", "1", "--panel", "shape"});
+  const auto shape =
+      plot({"--preset", "paper", "--H", "0.4", "--mu", "0.4", "--e", "1", "--panel", "shape"});
   EXPECT_EQ(shape.exit_code, 0) << shape.err;
   for (const char* drop : {"0.1 m", "0.2 m", "0.3 m"}) {
     EXPECT_THAT(shape.out, HasSubstr(drop));
@@ -76,7 +77,8 @@ TEST_F(PlotPoint, SaysWhereThePointSolvedAgainIsOtherThanStored) {
   const auto not_stored = plot({"a", "--point", "11"});
   EXPECT_THAT(not_stored.err, Not(HasSubstr("stored")));
 
-  test::run_oblique(folder_, {"run", "--H", "1", "--mu", "0.4", "--e", "1", "--name", "own"});
+  test::run_oblique(folder_, {"run", "--preset", "paper", "--H", "1", "--mu", "0.4", "--e", "1",
+                              "--name", "own"});
   const auto same = plot({"own", "--point", "0"});
   EXPECT_EQ(same.exit_code, 0) << same.err;
   EXPECT_THAT(same.err + same.out, Not(HasSubstr("stored")));
@@ -99,8 +101,8 @@ TEST_F(PlotPoint, OfAServerHasTheShapesThatAWorkerSends) {
 }
 
 TEST_F(PlotPoint, DrawsAPointOfNoStudy) {
-  const auto outcome =
-      plot({"--H", "1", "--mu", "1.2", "--e", "1", "--panel", "forces", "--tip-mass", "0.001"});
+  const auto outcome = plot({"--preset", "paper", "--H", "1", "--mu", "1.2", "--e", "1", "--panel",
+                             "forces", "--tip-mass", "0.001"});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("Contact forces"));
   EXPECT_THAT(outcome.out, Not(HasSubstr("Shape of the finger")));

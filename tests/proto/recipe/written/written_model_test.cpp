@@ -24,8 +24,8 @@ std::string refusal(const std::function<void(WrittenModel&)>& write) {
   return "";
 }
 
-TEST(WrittenModel, IsThePaperUntilSomethingIsSaid) {
-  EXPECT_EQ(WrittenModel().model(), solver::preset("paper"));
+TEST(WrittenModel, IsTheStandardUntilSomethingIsSaid) {
+  EXPECT_EQ(WrittenModel().model(), solver::preset("standard"));
 }
 
 TEST(WrittenModel, IsTheSameInWhateverOrderItIsSaid) {

@@ -34,8 +34,7 @@ const protocol::Axis kTwoMus = listed("mu", {0.7, 0.9});
 TEST(RecipeGrowth, FurtherBlocksMakeItLongerHoweverTheFirstOnesAreWritten) {
   EXPECT_EQ(growth_of(blocks_of({kFiveMus}), blocks_of({kFiveMus, kTwoMus})).kind,
             Growth::Kind::kLonger);
-  auto rewritten = blocks_of({listed("mu", {0.1, 0.2, 0.3, 0.4, 0.5}), kTwoMus});
-  *rewritten.mutable_model() = protocol::to_message(solver::preset("paper"));
+  const auto rewritten = blocks_of({listed("mu", {0.1, 0.2, 0.3, 0.4, 0.5}), kTwoMus});
   EXPECT_EQ(growth_of(blocks_of({kFiveMus}), rewritten).kind, Growth::Kind::kLonger);
   EXPECT_EQ(growth_of(blocks_of({kFiveMus}), blocks_of({kFiveMus})).kind, Growth::Kind::kSame);
 }
@@ -75,6 +74,18 @@ TEST(RecipeGrowth, KeysOfTheModelAndTheChoiceOfErrorsAreNamed) {
   EXPECT_THAT(growth.difference, HasSubstr("model, tolerance: stored none, given 1e-07\n"));
   EXPECT_THAT(growth.difference, HasSubstr("errors: stored false, given true"));
   EXPECT_THAT(growth.difference, Not(HasSubstr("block")));
+}
+
+TEST(RecipeGrowth, AStudyOnTheMeshOfThePaperSaysHowToGoOnWithItWhereOnlyTheMeshDiffers) {
+  auto given = blocks_of({kFiveMus});
+  *given.mutable_model() = protocol::to_message(solver::preset("standard"));
+  const std::string way_on =
+      "preset = \"paper\" below [model], or --preset paper, goes on with the stored one";
+  EXPECT_EQ(growth_of(blocks_of({kFiveMus}), given).difference,
+            "model, elements_per_link: stored 4, given 16\n" + way_on);
+  EXPECT_THAT(growth_of(given, blocks_of({kFiveMus})).difference, Not(HasSubstr(way_on)));
+  given.mutable_model()->set_k_n_m(1e7);
+  EXPECT_THAT(growth_of(blocks_of({kFiveMus}), given).difference, Not(HasSubstr(way_on)));
 }
 
 TEST(RecipeGrowth, OfAxesInAnotherOrderTheOrderIsShown) {

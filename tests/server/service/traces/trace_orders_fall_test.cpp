@@ -24,7 +24,7 @@ class TracesWithFall : public testing::Test {
   /// there already.
   protocol::TraceOrder ask(std::uint64_t point, bool fall) {
     TracedPoint traced;
-    traced.model = protocol::to_message(solver::ModelParameters{});
+    traced.model = protocol::to_message(solver::preset("paper"));
     TraceQuestion question{++ticket_, {1, point, false, fall}};
     orders_.order(question, traced, "1.0", 0);
     return taken<SendOrder>().order;

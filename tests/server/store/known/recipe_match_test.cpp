@@ -113,7 +113,7 @@ TEST(RecipeMatch, ModelsAreComparedByWhatTheyAreWhereverTheyStand) {
     return recipe_of({axes});
   };
   auto of_base = with({});
-  solver::ModelParameters model;
+  solver::ModelParameters model = solver::preset("paper");
   model.k_N_m = 2e7;
   *of_base.mutable_model() = protocol::to_message(model);
   const auto of_axis = with({range("k", 1e7, 3e7, 3)});

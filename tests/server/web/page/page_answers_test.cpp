@@ -302,8 +302,9 @@ TEST_F(PageAnswersTest, ATextThatIsNestedWithoutEndIsAText) {
 
 TEST_F(PageAnswersTest, AStudyIsStartedAndChangedFromThePage) {
   const std::string made = page_.post(
-      "/api/studies", R"({"name":"made","recipe":{"blocks":[{"axes":[{"key":"H","values":[1]},)"
-                      R"({"key":"mu","from":0,"to":1,"count":5},{"key":"e","values":[1]}]}]}})");
+      "/api/studies",
+      R"({"name":"made","model":{},"recipe":{"blocks":[{"axes":[{"key":"H","values":[1]},)"
+      R"({"key":"mu","from":0,"to":1,"count":5},{"key":"e","values":[1]}]}]}})");
   EXPECT_EQ(json::parse(body_of(made))["points"], 5);
   const auto state = [&] { return page_.json("/api/studies")["studies"][0]["state"]; };
   EXPECT_EQ(status_of_answer(page_.post("/api/studies/1/pause")), 200);

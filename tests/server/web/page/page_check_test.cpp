@@ -18,7 +18,8 @@ using PageCheckTest = PageStudyTest;
 TEST_F(PageCheckTest, AStudyIsJudgedBeforeItIsSubmitted) {
   const auto check = [&](const std::string& mu, const std::string& where) {
     return page_.post("/api/check",
-                      R"({"recipe":{"blocks":[{"axes":[{"key":"H","values":[1]},{"key":"mu",)" +
+                      R"({"model":{},"recipe":{"blocks":[{"axes":[{"key":"H","values":[1]},)"
+                      R"({"key":"mu",)" +
                           mu + R"(},{"key":"e","values":[1]}],"where":")" + where + "\"}]}}");
   };
   const json all = json::parse(body_of(check(R"("from":0,"to":1,"count":11)", "")));
@@ -33,10 +34,21 @@ TEST_F(PageCheckTest, AStudyIsJudgedBeforeItIsSubmitted) {
   EXPECT_EQ(page_.json("/api/studies")["studies"].size(), 0U);
 }
 
-/// A study of one finger and these H, as the body of a check.
-std::string body_with(const std::string& H, const std::string& others = "") {
-  return R"({"recipe":{"blocks":[{"axes":[)" + others + R"({"key":"H",)" + H +
-         R"(},{"key":"mu","values":[1]},{"key":"e","values":[1]}]}]}})";
+/// A study of these H, as the body of a check.
+std::string body_with(const std::string& H, const std::string& others = "",
+                      const std::string& model = "{}") {
+  return R"({"model":)" + model + R"(,"recipe":{"blocks":[{"axes":[)" + others + R"({"key":"H",)" +
+         H + R"(},{"key":"mu","values":[1]},{"key":"e","values":[1]}]}]}})";
+}
+
+TEST_F(PageCheckTest, AStudyWithoutAModelIsRefused) {
+  std::string body = body_with(R"("values":[1])");
+  body.replace(1, body.find("\"recipe\"") - 1, R"("name":"a",)");
+  for (const char* path : {"/api/check", "/api/studies"}) {
+    const std::string refused = page_.post(path, body);
+    EXPECT_NE(status_of_answer(refused), 200) << path;
+    EXPECT_THAT(refused, HasSubstr("the recipe has no model")) << path;
+  }
 }
 
 TEST_F(PageCheckTest, ADropBeyondTheLengthOfTheFingerIsRefusedWithKeyValueAndRange) {
@@ -72,17 +84,15 @@ TEST_F(PageCheckTest, AtMostEightyCharactersOfAWrongKeyAreRepeated) {
   }
 }
 
-TEST_F(PageCheckTest, HowLongAPointTakesIsSaidInPointsOfThePresetPaper) {
+TEST_F(PageCheckTest, HowLongAPointTakesIsSaidInPointsOfTheDefault) {
   const auto cost = [&](const std::string& axes, const std::string& model) {
-    std::string body = body_with(R"("values":[1])", axes);
-    body.back() = ',';
-    return json::parse(
-        body_of(page_.post("/api/check", body + R"("model":)" + model + "}")))["relative_cost"];
+    const std::string body = body_with(R"("values":[1])", axes, model);
+    return json::parse(body_of(page_.post("/api/check", body)))["relative_cost"];
   };
   EXPECT_DOUBLE_EQ(cost("", "{}"), 1.0);
   const double converged = cost("", R"({"preset":"converged"})");
-  EXPECT_GT(converged, 20.0);
-  const std::string meshes = R"({"key":"elements_per_link","values":[4,48]},)";
+  EXPECT_GT(converged, 3.0);
+  const std::string meshes = R"({"key":"elements_per_link","values":[16,48]},)";
   EXPECT_DOUBLE_EQ(cost(meshes, "{}"), (1.0 + converged) / 2.0);
   EXPECT_EQ(cost("", R"({"integrator":"generalized-alpha"})"), json());
 }

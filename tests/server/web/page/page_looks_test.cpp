@@ -20,7 +20,8 @@ using testing::HasSubstr;
 using testing::StartsWith;
 
 std::string look_at(int count, double from = 0.0) {
-  return json{{"recipe",
+  return json{{"model", {{"preset", "paper"}}},
+              {"recipe",
                {{"blocks",
                  {{{"axes",
                     {{{"key", "H"}, {"values", {1}}},
@@ -149,7 +150,7 @@ TEST_F(PageLooksTest, WhatIsTooLargeOrNoRecipeIsRefused) {
 TEST_F(PageLooksTest, ModelsWhosePointsTakeMinutesAreForStudies) {
   const auto look = [this](const std::string& axis) {
     return page_.post("/api/look",
-                      R"({"recipe":{"blocks":[{"axes":[)" + axis +
+                      R"({"model":{},"recipe":{"blocks":[{"axes":[)" + axis +
                           R"({"key":"H","values":[1]},)"
                           R"({"key":"mu","values":[1]},{"key":"e","values":[1]}]}]}})");
   };

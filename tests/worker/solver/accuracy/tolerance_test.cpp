@@ -82,20 +82,20 @@ void expect_within(const Errors& errors, double tolerance) {
 }
 
 TEST(Tolerance, ChosenStepsKeepItOnThePublishedMesh) {
-  const Errors errors = Steps(ModelParameters()).left_by(1.0);
+  const Errors errors = Steps(preset("paper")).left_by(1.0);
   expect_within(errors, 1e-5);
   EXPECT_LE(errors.stick_s, 5e-9);
 }
 
 TEST(Tolerance, ChosenStepsKeepItOnAFineMesh) {
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   model.lengths_m = {0.4};
   model.elements_per_link = 16;
   expect_within(Steps(model).left_by(1.0), 1e-5);
 }
 
 TEST(Tolerance, ChosenStepsKeepItOnAHardSpringAndWithAHeavyTip) {
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   model.lengths_m = {0.4};
   model.k_N_m = 1e9;
   expect_within(Steps(model).left_by(1.0), 1e-5);
@@ -105,7 +105,7 @@ TEST(Tolerance, ChosenStepsKeepItOnAHardSpringAndWithAHeavyTip) {
 }
 
 TEST(Tolerance, ErrorsFallByTheFourthOrder) {
-  const Steps steps{ModelParameters()};
+  const Steps steps{preset("paper")};
   const Errors whole = steps.left_by(1.0);
   const Errors half = steps.left_by(0.5);
   EXPECT_LT(half.relative, whole.relative / 10.0);
@@ -113,7 +113,7 @@ TEST(Tolerance, ErrorsFallByTheFourthOrder) {
 }
 
 TEST(Tolerance, ATighterOneTakesStepsShorterByItsFourthRoot) {
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   model.lengths_m = {0.4};
   const double usual_s = Finger(model).solve(0.3, 0.4, 1.0).solver.dt_s;
   model.tolerance = 1e-9;

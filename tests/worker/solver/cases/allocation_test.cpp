@@ -64,7 +64,7 @@ struct Solved {
 
 /// Solves one point in lanes; the fall is solved before.
 Solved solve_with_step(double dt_s) {
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   model.dt_s = dt_s;
   const Finger finger(model);
   finger.largest_drop_m();
@@ -110,12 +110,12 @@ void expect_no_allocations(const Motion& motion, double h_s) {
 }
 
 TEST(Allocations, AnExplicitStepMakesNone) {
-  const Chain chain(ModelParameters{});
+  const Chain chain(preset("paper"));
   expect_no_allocations(ExplicitMotion(chain), 1e-6);
 }
 
 TEST(Allocations, AStepOfGeneralizedAlphaMakesNoneNorDoesRestarting) {
-  const GeneralizedAlphaMotion motion(ModelParameters{});
+  const GeneralizedAlphaMotion motion(preset("paper"));
   expect_no_allocations(motion, 1e-6);
   ChainState state = motion.at_rest();
   ChainState next;
@@ -137,7 +137,7 @@ TEST(Allocations, AStepOfGeneralizedAlphaMakesNoneNorDoesRestarting) {
 /// before.
 TEST(Allocations, AContactByGeneralizedAlphaMakesAsManyHoweverManyStepsItTakes) {
   const auto solve = [](double dt_s) {
-    ModelParameters model;
+    ModelParameters model = preset("paper");
     model.elements_per_link = 1;
     model.integrator = Integrator::kGeneralizedAlpha;
     model.dt_s = dt_s;
@@ -173,7 +173,7 @@ std::uint64_t allocations_of_a_failure(const Finger& finger) {
 }
 
 TEST(Allocations, AFallThatFailsIsSolvedOnceForAllPoints) {
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   model.integrator = Integrator::kGeneralizedAlpha;
   model.elements_per_link = 1;
   model.dt_fall_s = 0.025;  // some steps on, Newton's method does not converge

@@ -105,7 +105,7 @@ TEST(FallOfATrace, KeepsItsEnergy) {
 
 TEST(FallOfATrace, MomentumChangesByThePinsForceAndTheWeight) {
   for (const TraceWithFall& t : falls()) {
-    const ModelParameters model;
+    const ModelParameters model = preset("paper");
     const double weight_N = 1.2 * model.rho_kg_m3 * model.A_m2 * model.g_m_s2;
     double x_Ns = 0.0;
     double y_Ns = 0.0;

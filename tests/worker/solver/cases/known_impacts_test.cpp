@@ -78,7 +78,7 @@ TEST(KnownImpacts, DurationsAreKnown) {
 }
 
 TEST(KnownImpacts, ATightToleranceGivesEveryDigitOfThePhases) {
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   model.tolerance = 1e-7;
   const Finger exact{model};
   for_each_impact([&exact](const KnownImpact& known, const CaseResult&) {
@@ -116,7 +116,7 @@ TEST(KnownImpacts, EnergyBalanceClosesToAMillionthOfTheWorkExchanged) {
 }
 
 TEST(KnownImpacts, ExitVelocitiesAreThoseOfAFourTimesShorterStep) {
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   model.dt_s = results()[0].solver.dt_s / 4.0;
   const Finger fine{model};
   for_each_impact([&fine](const KnownImpact& known, const CaseResult& result) {

@@ -6,13 +6,13 @@ namespace oblique::solver {
 
 /// The preset `paper`. One for all tests of a process: its fall takes half a second.
 inline const Finger& paper_finger() {
-  static const Finger finger{ModelParameters{}};
+  static const Finger finger{preset("paper")};
   return finger;
 }
 
 /// The preset `paper` with few elements a link, whose fall takes little.
 inline ModelParameters coarse_model(int elements_per_link = 1) {
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   model.elements_per_link = elements_per_link;
   return model;
 }

@@ -188,7 +188,7 @@ TEST(SolveSweep, TangentialSpringSofterAndHarderThanTheNormalOne) {
 }
 
 TEST(SolveSweep, SlowManyPointsOfThePaper) {
-  sweep(ModelParameters{}, 3000, 11);
+  sweep(preset("paper"), 3000, 11);
 }
 
 }  // namespace

@@ -16,7 +16,7 @@ namespace oblique::solver {
 namespace {
 
 ModelParameters chain_of(std::size_t links, int elements_per_link) {
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   model.lengths_m.clear();
   for (std::size_t i = 0; i < links; ++i) {
     model.lengths_m.push_back(0.4 - 0.05 * static_cast<double>(i));
@@ -115,7 +115,7 @@ TEST(Chain, RigidTurnAboutThePinCostsNoEnergyAndNoForce) {
 
 TEST(Chain, JointsTurnFreely) {
   // The outer half of two equal links folds up: nothing is stored.
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   model.lengths_m = {0.4, 0.4};
   model.elements_per_link = 1;
   const Chain chain(model);
@@ -251,19 +251,19 @@ TEST(ChainFrequency, GivesTheKnownStabilityLimitsOfVerlet) {
 }
 
 TEST(Chain, ModelOutsideItsDomainIsRefused) {
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   model.E_Pa = -1.0;
   EXPECT_THROW(Chain{model}, InputError);
-  model = {};
+  model = preset("paper");
   model.lengths_m.clear();
   EXPECT_THROW(Chain{model}, InputError);
-  model = {};
+  model = preset("paper");
   model.rho_kg_m3 = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THROW(Chain{model}, InputError);
 }
 
 TEST(Chain, TheTipShowsItsOwnMassAndAPartOfTheLastElement) {
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   const double bare_kg = Chain(model).tip_inertia_kg();
   const double element_kg = model.rho_kg_m3 * model.A_m2 * model.lengths_m.back() / 4.0;
   EXPECT_NEAR(bare_kg, element_kg / 16.0, 0.02 * element_kg);

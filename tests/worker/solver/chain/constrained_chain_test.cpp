@@ -14,7 +14,7 @@ namespace oblique::solver {
 namespace {
 
 ModelParameters three_links() {
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   model.lengths_m = {0.4, 0.3, 0.35};
   model.elements_per_link = 2;
   model.tip_mass_kg = 0.05;

@@ -15,7 +15,7 @@ struct FourNumbers {
 };
 
 Chain chain_with(double E_Pa, int elements_per_link = 2) {
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   model.E_Pa = E_Pa;
   model.elements_per_link = elements_per_link;
   return Chain(model);
@@ -66,7 +66,7 @@ TEST(LaneChains, ChainsAreEqualWhenTheirConstantsAre) {
 }
 
 TEST(LaneChains, SlopesBetweenElementsHaveNeitherWeightNorMomentum) {
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   model.lengths_m = {0.1, 0.3, 0.7};
   model.elements_per_link = 3;
   const Chain chain(model);

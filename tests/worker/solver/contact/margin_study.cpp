@@ -94,7 +94,7 @@ class MarginStudy {
     }
     const double dt_s = finger_.solve(1.0, 0.4, 1.0).solver.dt_s;
     for (const double factor : {0.5, 2.0}) {
-      ModelParameters model;
+      ModelParameters model = preset("paper");
       model.dt_s = factor * dt_s;
       print_changes(factor < 1.0 ? "half the step" : "twice the step",
                     {solved(Finger(model), points_)});
@@ -124,7 +124,7 @@ class MarginStudy {
     });
   }
 
-  Finger finger_{ModelParameters{}};
+  Finger finger_{preset("paper")};
   std::vector<PointRequest> points_;
   Answers base_;
 };

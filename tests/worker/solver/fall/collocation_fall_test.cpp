@@ -22,7 +22,7 @@ using testing::HasSubstr;
 constexpr double kAccuracy = 1e-5;
 
 ModelParameters model_of(int elements_per_link) {
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   model.elements_per_link = elements_per_link;
   return model;
 }
@@ -48,13 +48,13 @@ struct Fallen {
     return chain.kinetic_energy_J(state.v) + chain.strain_energy_J(state.q) +
            chain.gravity_energy_J(state.q);
   }
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   Chain chain;
   Fall fall;
 };
 
 const Fallen& paper() {
-  static const Fallen fallen{ModelParameters{}};
+  static const Fallen fallen{preset("paper")};
   return fallen;
 }
 
@@ -159,8 +159,8 @@ TEST(CollocationFall, IsRightForSoftAndStiffAndLoadedAndSingleLinks) {
 
 TEST(CollocationFall, ErrorFollowsTheAccuracyAskedFor) {
   const Fall steps(paper().chain, 2e-6);
-  const Fallen tight(ModelParameters{}, kAccuracy / 100.0);
-  const Fallen loose(ModelParameters{}, kAccuracy * 10.0);
+  const Fallen tight(preset("paper"), kAccuracy / 100.0);
+  const Fallen loose(preset("paper"), kAccuracy * 10.0);
   EXPECT_LT(difference(tight, steps).velocity_m_s, 5e-6);
   EXPECT_GT(difference(loose, steps).velocity_m_s, 5e-6);
   EXPECT_LT(difference(loose, steps).velocity_m_s, 2e-3);

@@ -173,7 +173,7 @@ TEST(GaussCollocation, DiagonalisesTheSquareOfItsMatrix) {
 
 TEST(CollocationLanes, StepsOfHalfTheLengthErrAThousandTimesLess) {
   // A soft chain: the motion itself, and no vibration too fast for the steps.
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   model.elements_per_link = 1;
   model.E_Pa = 1e5;
   const Chain chain(model);

@@ -20,7 +20,7 @@ class LaneFallsTest : public testing::Test {
   /// More chains of one link than any kernel has lanes, each with another E and length.
   LaneFallsTest() {
     for (int i = 0; i < 11; ++i) {
-      ModelParameters model;
+      ModelParameters model = preset("paper");
       model.lengths_m = {0.4 + 0.05 * i};
       model.elements_per_link = 2;
       model.E_Pa *= 1.0 - 0.05 * i;

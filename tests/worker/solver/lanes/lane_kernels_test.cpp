@@ -35,7 +35,7 @@ std::vector<Case> cases() {
 }
 
 std::vector<CaseResult> solve_by(const LaneKernel& kernel) {
-  const ModelParameters model;
+  const ModelParameters model = preset("paper");
   const Chain chain(model);
   const StepChoice steps(chain, model);
   const Fall fall(chain, steps.fall_s());

@@ -19,7 +19,7 @@ struct Shape {
 /// Unlike in all that chains of one shape may differ in.
 Chain chain_number(std::size_t i, const Shape& shape) {
   const double more = static_cast<double>(i);
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   model.elements_per_link = shape.elements_per_link;
   model.lengths_m.assign(shape.links, 0.4);
   model.lengths_m.front() *= 1.0 + 0.03 * more;

@@ -21,7 +21,7 @@ namespace {
 using ::testing::HasSubstr;
 
 ModelParameters coarse_model() {
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   model.elements_per_link = 1;
   return model;
 }
@@ -143,7 +143,7 @@ TEST(LibraryTest, PointsAreInOrderThoughSomeHaveNaNs) {
 
 /// Its fall takes hours: a test that waits for it is ended by its time limit and by nothing else.
 ModelParameters model_that_falls_for_hours() {
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   model.integrator = Integrator::kGeneralizedAlpha;
   model.dt_fall_s = 1e-9;
   return model;
@@ -199,7 +199,7 @@ TEST(LibraryTest, ATraceHasTheResultOfItsPointAndWhatItsSinkThrowsEndsIt) {
 }
 
 TEST(LibraryTest, ErrorsAreThoseThatManyPointsHave) {
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   model.elements_per_link = 2;
   const Finger finger(model);
   const auto outcomes = outcomes_of({model}, {{1.0, 0.4, 0.9}}, {.errors = true});

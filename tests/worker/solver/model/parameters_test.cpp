@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstddef>
 #include <limits>
 #include <set>
 #include <string>
@@ -27,8 +29,31 @@ TEST(Parameters, EveryPresetIsInsideItsDomain) {
   for (const std::string_view name : preset_names()) {
     EXPECT_NO_THROW(validate(preset(name))) << name;
   }
-  EXPECT_EQ(preset("paper"), ModelParameters{}) << "the defaults";
   EXPECT_THROW(preset("papers"), InputError);
+}
+
+TEST(Parameters, TheDefaultIsThePaperOnAMeshThatPredicts) {
+  EXPECT_EQ(preset_names().front(), "standard");
+  EXPECT_EQ(preset("standard"), ModelParameters{});
+  ModelParameters paper = preset("paper");
+  EXPECT_EQ(paper.elements_per_link, 4);
+  paper.elements_per_link = 16;
+  EXPECT_EQ(paper, preset("standard"));
+}
+
+TEST(Parameters, TheAccuracyOfEveryPresetsMeshIsKnownAndRisesWithTheMesh) {
+  const auto meshes = mesh_accuracies();
+  for (const std::string_view name : {"standard", "paper", "printed"}) {
+    EXPECT_TRUE(std::any_of(meshes.begin(), meshes.end(), [&](const MeshAccuracy& mesh) {
+      return mesh.elements_per_link == preset(name).elements_per_link;
+    })) << name;
+  }
+  for (std::size_t i = 1; i < meshes.size(); ++i) {
+    EXPECT_LT(meshes[i - 1].elements_per_link, meshes[i].elements_per_link);
+    EXPECT_GT(meshes[i - 1].forces_off, meshes[i].forces_off);
+    EXPECT_GT(meshes[i - 1].duration_off, meshes[i].duration_off);
+    EXPECT_LT(meshes[i - 1].same_mode, meshes[i].same_mode);
+  }
 }
 
 TEST(Parameters, EveryKeyHasANameOfItsOwnAndReadsWhatItWrote) {

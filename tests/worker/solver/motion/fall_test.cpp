@@ -18,7 +18,7 @@ namespace {
 using testing::HasSubstr;
 
 ModelParameters coarse_model() {
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   model.elements_per_link = 1;
   return model;
 }
@@ -44,7 +44,7 @@ struct Known {
 
 TEST(Fall, TipHasTheKnownStateAtTheDropsOfThePaper) {
   // An independent explicit solution, converged to nine digits.
-  const FallOf paper(ModelParameters{}, 2.5e-6);
+  const FallOf paper(preset("paper"), 2.5e-6);
   for (const Known& known : {Known{0.96, 0.42263713, 0.6273702, -5.23465, -5.34110},
                              Known{1.00, 0.43018976, 0.5859693, -5.73783, -5.23380},
                              Known{1.04, 0.43798758, 0.5389964, -6.31882, -4.99916}}) {
@@ -205,7 +205,7 @@ TEST(Fall, StepBeyondTheStabilityLimitIsAnErrorNotANumber) {
 }
 
 TEST(Fall, OneLinkFallsAsAPhysicalPendulum) {
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   model.lengths_m = {1.0};
   model.elements_per_link = 2;
   const FallOf pendulum(model, 5e-6);

@@ -21,7 +21,7 @@ using testing::HasSubstr;
 constexpr AffineContactForce<double> kNoContact{};
 
 ModelParameters coarse_model() {
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   model.elements_per_link = 2;
   return model;
 }
@@ -59,7 +59,7 @@ struct MovingChain {
     return gaps.cwiseAbs().maxCoeff();
   }
 
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   Chain chain;
   GeneralizedAlphaMotion motion;
   ChainState state;
@@ -67,7 +67,7 @@ struct MovingChain {
 };
 
 TEST(GeneralizedAlpha, PinAndJointsHoldOverManySteps) {
-  MovingChain moving(ModelParameters{});
+  MovingChain moving(preset("paper"));
   const auto force = push_at(moving.chain.tip(moving.state));
   moving.motion.restart(force, moving.constrained);
   ChainState state = moving.constrained;
@@ -84,7 +84,7 @@ TEST(GeneralizedAlpha, PinAndJointsHoldOverManySteps) {
 TEST(GeneralizedAlpha, ReactionAtThePinHoldsTheHangingChain) {
   // Straight down and at rest: O carries the weight, each joint what hangs below it. The links
   // stretch a little from rest, so the reactions swing about that.
-  const ModelParameters model;
+  const ModelParameters model = preset("paper");
   const Chain chain(model);
   const GeneralizedAlphaMotion motion(model);
   ChainState state = chain.at_rest();
@@ -137,7 +137,7 @@ TEST(GeneralizedAlpha, SpectralRadiusSaysHowFastUnresolvedVibrationsGo) {
 }
 
 TEST(GeneralizedAlpha, SpectralRadiusOfOneIsRefusedWithTheReason) {
-  ModelParameters model;
+  ModelParameters model = preset("paper");
   model.spectral_radius = 1.0;
   try {
     const GeneralizedAlphaMotion motion(model);

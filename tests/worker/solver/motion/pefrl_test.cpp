@@ -40,7 +40,7 @@ double largest_swing(double h, int steps) {
 class PefrlOnAChain : public testing::Test {
  protected:
   PefrlOnAChain() {
-    ModelParameters model;
+    ModelParameters model = preset("paper");
     model.lengths_m = {0.4, 0.3};
     model.elements_per_link = 2;
     chain_ = std::make_unique<Chain>(model);

@@ -71,7 +71,7 @@ class Precision {
 
  private:
   static ModelParameters with(int elements_per_link) {
-    ModelParameters model;
+    ModelParameters model = preset("paper");
     model.elements_per_link = elements_per_link;
     return model;
   }
