@@ -43,7 +43,7 @@ all cores, for about a second (of a fine mesh on coarser ones); the size from wh
 model take in a database on average.)";
 
 /// What a result takes in a database, on average (server/store/README.md).
-constexpr std::uint64_t kBytesAResult = 450;
+constexpr std::uint64_t kBytesAResult = 650;
 /// What a model takes there.
 constexpr std::uint64_t kBytesAModel = 600;
 

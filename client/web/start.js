@@ -6,7 +6,7 @@ import { change } from "/server.js";
 
 /** The most that a double counts without gaps. */
 const kMostCounted = 2 ** 53;
-const kBytesPerPoint = 450; // measured: a row with its packed arrays
+const kBytesPerPoint = 650; // measured: a row with its packed arrays
 const kErrorsCost = 1.25; // with estimated errors: worker/solver/README.md
 const kJudgeAfter_ms = 250;
 

@@ -14,7 +14,7 @@ namespace {
 /// first 20 us after touch, over and over, without the search for events. The cost of a step must
 /// grow as the number of elements.
 void generalized_alpha_step_in_contact(benchmark::State& bench) {
-  ModelParameters model = preset("paper");
+  ModelParameters model = solver::preset("paper");
   model.elements_per_link = static_cast<int>(bench.range(0));
   const auto owned = std::make_shared<GeneralizedAlphaMotion>(model);
   const GeneralizedAlphaMotion& motion = *owned;

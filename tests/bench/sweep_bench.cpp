@@ -44,7 +44,7 @@ std::vector<PointRequest> sweep() {
 }
 
 ModelParameters with_elements(std::int64_t elements_per_link) {
-  ModelParameters model = preset("paper");
+  ModelParameters model = solver::preset("paper");
   model.elements_per_link = static_cast<int>(elements_per_link);
   return model;
 }
@@ -59,7 +59,7 @@ void count_cases(benchmark::State& bench, std::size_t cases_an_iteration) {
 void solve_scalar(const Chain& chain, const Fall& fall, const solver::StepChoice& steps,
                   const PointRequest& point) {
   const solver::ExplicitMotion motion(chain);
-  const ModelParameters model = preset("paper");
+  const ModelParameters model = solver::preset("paper");
   benchmark::DoNotOptimize(
       solver::solve_contact(motion, {model.k_N_m, model.eta2, point.mu, point.e_star},
                             steps.contact(point.e_star), fall.state_at(point.H_m), {}));
@@ -70,7 +70,7 @@ void naive(benchmark::State& bench) {
   const std::vector<PointRequest> points = sweep();
   std::size_t next = 0;
   for (auto _ : bench) {
-    const ModelParameters model = preset("paper");
+    const ModelParameters model = solver::preset("paper");
     const Chain chain(model);
     const solver::StepChoice steps(chain, model);
     const Fall fall(chain, steps.fall_s());
@@ -144,7 +144,7 @@ void solve_all(std::size_t count, const std::function<FingerPoint(std::size_t)>&
 
 /// Every case has k and eta2 of its own; one fall serves all, the same drop or one of 8 drops.
 void distinct_contacts(benchmark::State& bench) {
-  const ModelParameters model = preset("paper");
+  const ModelParameters model = solver::preset("paper");
   const auto fallen = solver::solve_falls({&model, 1}).front().fallen;
   const auto drops = static_cast<std::size_t>(bench.range(0));
   constexpr std::size_t kCases = 512;

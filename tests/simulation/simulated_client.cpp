@@ -91,7 +91,7 @@ void SimulatedClient::begin_anew() {
   acknowledged_ = false;
   study_id_ = 0;
   mark_ += kClients;
-  recipe_.Clear();
+  recipe_.clear_blocks();
   points_ = set_recipe(static_cast<std::uint64_t>(world_.between(1, 300)));
 }
 

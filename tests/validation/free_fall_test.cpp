@@ -79,7 +79,7 @@ FallErrors generalized_alpha_errors(const ModelParameters& model, double dt_s,
 }
 
 TEST(FreeFall, ExplicitWayReachesTheKnownStates) {
-  const FallErrors worst = explicit_errors(preset("paper"), 2.5e-6, kKnown);
+  const FallErrors worst = explicit_errors(solver::preset("paper"), 2.5e-6, kKnown);
   expect_at_most({"fall, explicit, 2.5 us: time at H = 0.96, 1, 1.04 [s]", kKnownFrom, worst.t_s,
                   1e-8, "digits of the reference"});
   expect_at_most({"fall, explicit, 2.5 us: x of the tip [m]", kKnownFrom, worst.x_m, 1e-7,
@@ -89,7 +89,7 @@ TEST(FreeFall, ExplicitWayReachesTheKnownStates) {
 }
 
 TEST(FreeFall, GeneralizedAlphaReachesTheKnownStates) {
-  const FallErrors worst = generalized_alpha_errors(preset("paper"), 5e-6, kKnown);
+  const FallErrors worst = generalized_alpha_errors(solver::preset("paper"), 5e-6, kKnown);
   expect_at_most({"fall, generalized-alpha, 5 us: time at H = 0.96, 1, 1.04 [s]", kKnownFrom,
                   worst.t_s, 1e-8 + 3e-9, "the reference's digits, and the vibration's 3e-9"});
   expect_at_most({"fall, generalized-alpha, 5 us: x of the tip [m]", kKnownFrom, worst.x_m, 1e-7,
@@ -100,13 +100,13 @@ TEST(FreeFall, GeneralizedAlphaReachesTheKnownStates) {
 }
 
 TEST(FreeFall, GeneralizedAlphaFindsTheImpactTimeWithStepsOfATenthOfAMillisecond) {
-  const FallErrors worst = generalized_alpha_errors(preset("paper"), 1e-4, kKnown);
+  const FallErrors worst = generalized_alpha_errors(solver::preset("paper"), 1e-4, kKnown);
   expect_at_most({"fall, generalized-alpha, 100 us: time at H = 0.96, 1, 1.04 [s]", kKnownFrom,
                   worst.t_s, 3e-7, "(w h)^2/12 t of links that turn at w = 25 rad/s in the end"});
 }
 
 TEST(FreeFall, StiffLinksFallAsRigidOnes) {
-  ModelParameters model = preset("paper");
+  ModelParameters model = solver::preset("paper");
   model.elements_per_link = 1;
   model.E_Pa *= 100.0;
   const FallErrors one = explicit_errors(model, 1.5e-6, kRigid);

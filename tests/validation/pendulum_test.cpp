@@ -23,7 +23,7 @@ using solver::Motion;
 constexpr solver::AffineContactForce<double> kNoContact{};
 
 ModelParameters pendulum() {
-  ModelParameters model = preset("paper");
+  ModelParameters model = solver::preset("paper");
   model.lengths_m = {0.4};
   return model;
 }

@@ -29,7 +29,7 @@ constexpr double kV0_m_s = 1e-3;
 constexpr double kSpring_N_m = 2.6e7;
 
 ModelParameters link(double length_m, int elements) {
-  ModelParameters model = preset("paper");
+  ModelParameters model = solver::preset("paper");
   model.lengths_m = {length_m};
   model.elements_per_link = elements;
   model.g_m_s2 = 1e-12;
@@ -135,7 +135,7 @@ struct Rod {
   }
   double window_s() const { return 0.8 * model.lengths_m.front() / exact().wave_speed_m_s(); }
 
-  ModelParameters model = preset("paper");
+  ModelParameters model = solver::preset("paper");
   Chain chain;
   solver::AffineContactForce<double> spring;
   double dt_s;

@@ -3,7 +3,7 @@
 >>> import oblique
 >>> impact = oblique.solve(H=1, mu=0.4, e=1)
 >>> round(impact.fn_peak_N, 1), impact.mode
-(5057.6, 'sC sR sC sR sC sR')
+(4909.4, 'sC sR sC sR sC sR')
 
 Units are SI and stand at the end of names: ``fn_peak_N``, ``duration_s``.
 

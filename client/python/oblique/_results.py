@@ -130,7 +130,7 @@ class ManyResults(Named):
     >>> import oblique
     >>> sweep = oblique.solve_many(H=1, mu=[0.2, 0.4, -1], e=1)
     >>> sweep.fn_peak_N.round(1)
-    array([5421. , 5057.6,    nan])
+    array([5273.6, 4909.4,    nan])
     >>> sweep.error[2]
     'mu = -1 is not allowed: mu must be >= 0'
     """
@@ -240,7 +240,7 @@ class ManyResults(Named):
         >>> import oblique
         >>> values, offsets = oblique.solve_many(H=1, mu=[0.4, 1.2], e=1).ragged("fn_peaks_N")
         >>> offsets.tolist(), len(values)
-        ([0, 3, 5], 5)
+        ([0, 3, 7], 7)
         """
         for field, _, _, _, _, list_name, member, where in _core.fields():
             if field == name and list_name:

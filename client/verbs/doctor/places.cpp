@@ -109,7 +109,7 @@ Findings examine_disk(const std::string& file) {
         folder.string()));
   } else if (free < kLittle) {
     found.odd.push_back(fmt::format(
-        "Little of the disk is free ({}): a million results take some 400 MB. Studies wait where "
+        "Little of the disk is free ({}): a million results take some 650 MB. Studies wait where "
         "a disk is full, and go on when there is room.",
         shown_bytes(free)));
   }

@@ -58,7 +58,7 @@ def test_results_show_what_they_are():
         ({"H": 5}, "H = 5 m is not allowed: the tip drops at most the length of the chain, 1.2 m"),
         ({"tip_mas": 1}, "unknown key `tip_mas` (did you mean `tip_mass`?)"),
         ({"E": -1}, "E = -1 Pa is not allowed: E must be > 0"),
-        ({"preset": "papr"}, 'preset = "papr" is not allowed: preset must be paper, printed, converged'),
+        ({"preset": "papr"}, 'preset = "papr" is not allowed: preset must be standard, paper, printed, converged'),
         ({"integrator": "euler"}, 'integrator = "euler" is not allowed'),
         ({"mu": None}, "mu = None is not allowed: mu must be a number"),
         ({"mu": [0.1, 0.2]}, "mu has 2 values: solve takes one; oblique.solve_many takes arrays"),

@@ -47,7 +47,7 @@ struct Settings {
 };
 
 ModelParameters model_of(const Settings& settings, int elements_per_link) {
-  ModelParameters model = preset("paper");
+  ModelParameters model = solver::preset("paper");
   model.elements_per_link = elements_per_link;
   model.k_N_m *= settings.k_times;
   model.I_m4 *= settings.I_times;
