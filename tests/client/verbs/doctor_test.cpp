@@ -14,6 +14,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/verbs/doctor/report.h"
+#include "proto/system/limits_of_group.h"
 #include "server/store/store.h"
 #include "tests/support/points.h"
 #include "tests/support/programs.h"

@@ -44,12 +44,13 @@ TEST_F(SnapshotTest, FollowsPointsOnTheirWay) {
   hello();
   EXPECT_EQ(workers(snapshot(), CrewState::kIdle), 1U);
   credit(1);
-  const std::uint64_t leased = last_message().batch().count();
+  const std::vector<std::uint64_t> points = points_of(last_message().batch());
+  const std::uint64_t leased = points.size();
   EXPECT_EQ(snapshot().points_leased, leased);
   EXPECT_EQ(snapshot().batches_leased, 1U);
   EXPECT_EQ(workers(snapshot(), CrewState::kWorking), 1U);
   now_.steady_ms += 700;
-  answer_batch(last_message().batch().first_point() + leased - 1);  // the last point failed
+  answer_batch(points.back());  // the last point failed
   const Snapshot after = snapshot();
   EXPECT_EQ(after.points_solved, leased - 1);
   EXPECT_EQ(after.points_failed, 1U);
