@@ -18,6 +18,7 @@
 #include "client/python/interruptible.h"
 #include "client/python/result_arrays.h"
 #include "proto/program/origin/origin.h"
+#include "proto/recipe/keys.h"
 #include "proto/system/limits_of_group.h"
 #include "worker/solver/library/falls_kept.h"
 #include "worker/solver/library/point_runs.h"
@@ -25,6 +26,7 @@
 #include "worker/solver/model/fall_model.h"
 #include "worker/solver/model/result_fields.h"
 #include "worker/solver/model/trace_columns.h"
+#include "worker/solver/model/usual_ranges.h"
 
 namespace oblique::python {
 namespace {
@@ -224,6 +226,9 @@ void add_solving(py::module_& module) {
   module.def("fields", &fields);
   module.def("trace_states", [] {
     return std::vector<std::string>(solver::kTraceStates.begin(), solver::kTraceStates.end());
+  });
+  module.def("note_on_value", [](const std::string& key, double value) {
+    return protocol::is_axis_key(key) ? solver::note_on_value(protocol::axis_key(key), value) : "";
   });
   module.def("integrator_names", [] {
     const auto names = solver::integrator_names();

@@ -19,7 +19,6 @@
 #include "proto/suggestion.h"
 #include "proto/text.h"
 #include "worker/solver/model/number.h"
-#include "worker/solver/model/relative_cost.h"
 
 namespace oblique::client {
 namespace {
@@ -98,7 +97,7 @@ std::string table_of_presets() {
   }
   std::string table =
       "Presets, against 48 elements a link over 400 random points:\n"
-      "  preset     elements  forces off  duration off  same mode  time of a contact\n";
+      "  preset     elements  forces off  duration off  same mode\n";
   for (const auto& [name, model] : rows) {
     const auto mesh = std::find_if(meshes.begin(), meshes.end(),
                                    [elements = model.elements_per_link](const auto& each) {
@@ -107,11 +106,10 @@ std::string table_of_presets() {
     const auto percent = [&](double solver::MeshAccuracy::*value) {
       return mesh == meshes.end() ? "-" : fmt::format("{} %", solver::exact_number((*mesh).*value));
     };
-    table += fmt::format("  {:<9}  {:>8}  {:>10}  {:>12}  {:>9}  {:>17}\n", name,
-                         model.elements_per_link, percent(&solver::MeshAccuracy::forces_off),
+    table += fmt::format("  {:<9}  {:>8}  {:>10}  {:>12}  {:>9}\n", name, model.elements_per_link,
+                         percent(&solver::MeshAccuracy::forces_off),
                          percent(&solver::MeshAccuracy::duration_off),
-                         percent(&solver::MeshAccuracy::same_mode),
-                         solver::readable_number(*solver::relative_cost(model), 1));
+                         percent(&solver::MeshAccuracy::same_mode));
   }
   return table +
          "standard is to predict; paper has the published mesh and a round section, printed the\n"

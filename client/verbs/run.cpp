@@ -4,6 +4,7 @@
 #include <string>
 
 #include "client/output/unjudged_note.h"
+#include "client/output/value_notes.h"
 #include "client/service/connection.h"
 #include "client/service/embedded_service.h"
 #include "client/service/run_service.h"
@@ -36,6 +37,7 @@ int run(const RunFlags& flags) {
   judge_points(study);
   check_settings(flags.settings);
   tell_unjudged(std::cerr, study.recipe);
+  tell_values(std::cerr, study.recipe);
   // Before any thread is started; see StopSignals.
   protocol::StopSignals stop;
   const auto end = run_study(study, flags.settings, stop);

@@ -7,6 +7,7 @@
 
 #include "client/output/case_report.h"
 #include "client/output/mesh_note.h"
+#include "client/output/value_notes.h"
 #include "client/study/flag_axis.h"
 #include "client/study/point_flags.h"
 #include "client/trace/trace_output.h"
@@ -76,6 +77,7 @@ int solve(const SolveFlags& flags) {
   check_one_value_each(flags.points);
   const auto table = points_of_flags(flags.points, tip_reach());
   check_one_point(table);
+  tell_values(std::cerr, table.recipe());
   const auto point = table.point(0);
   const solver::Finger finger(table.model(0));
   std::optional<TraceOutput> trace;

@@ -12,16 +12,17 @@
 #include "client/output/human_units.h"
 #include "client/output/mesh_note.h"
 #include "client/output/unjudged_note.h"
+#include "client/output/value_notes.h"
 #include "client/output/work_line.h"
-#include "client/study/fall_count.h"
 #include "client/study/study_flags.h"
-#include "client/verbs/solving_rate.h"
+#include "client/verbs/study_time.h"
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
 #include "proto/program/stop_signals.h"
 #include "proto/recipe/block_points.h"
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/model_message.h"
+#include "proto/recipe/study_size.h"
 #include "proto/recipe/written/written_sample.h"
 #include "worker/solver/model/number.h"
 
@@ -38,14 +39,10 @@ constexpr const char* kStudyCheckExamples = R"(Examples:
   oblique study check sweep.toml --json
   oblique study check --H 1 --mu 0.01:2:40:log --e 0.6,0.8,1 --where "mu > 0.5 * e"
 
-Nothing is submitted. The time is estimated from some points of the study that are solved here, on
-all cores, for about a second (of a fine mesh on coarser ones); the size from what a result and a
-model take in a database on average.)";
-
-/// What a result takes in a database, on average (server/store/README.md).
-constexpr std::uint64_t kBytesAResult = 650;
-/// What a model takes there.
-constexpr std::uint64_t kBytesAModel = 600;
+Nothing is submitted. The time is that of `oblique run` on this machine: (falls x time of a fall +
+points x time of a contact) / threads. Some falls and contacts of the study are timed for it, on all
+cores, which takes a few seconds on fine meshes. The size follows from what a result and a model
+take in a database on average.)";
 
 struct CheckFlags {
   StudyFlags study;
@@ -71,12 +68,10 @@ struct BlockReport {
 struct Report {
   std::string name;
   std::uint64_t numbers;  ///< of points, with those that are left out
-  std::uint64_t points;
-  std::uint64_t models;
-  FallCount falls;
+  protocol::StudySize size;
   std::vector<BlockReport> blocks;
   std::vector<std::uint64_t> unjudged;  ///< of the blocks, from 0
-  std::optional<SolvingRate> rate;
+  std::optional<StudyCost> cost;
 };
 
 /// The point that was gone to, by the axes, not by the model: of length and length1 both have a
@@ -127,30 +122,13 @@ BlockReport report_of_block(const protocol::PointTable& table, int number) {
           shown_first, shown_point(block, points, place.first_point + last)};
 }
 
-/// What the study takes in a database. Points that a filter leaves out bring no model.
-std::uint64_t bytes_of(const Report& report) {
-  return kBytesAResult * report.points + kBytesAModel * std::min(report.models, report.points);
-}
-
-Report report_of(const std::string& name,
-                 const std::shared_ptr<const protocol::PointTable>& table) {
-  Report report{name,
-                table->size(),
-                table->points(),
-                table->models(),
-                count_falls(*table),
-                {},
-                unjudged_blocks(table->recipe()),
+Report report_of(const std::string& name, const protocol::PointTable& table) {
+  Report report{name, table.size(), protocol::size_of(table), {}, unjudged_blocks(table.recipe()),
                 {}};
-  for (int i = 0; i < table->recipe().blocks_size(); ++i) {
-    report.blocks.push_back(report_of_block(*table, i));
+  for (int i = 0; i < table.recipe().blocks_size(); ++i) {
+    report.blocks.push_back(report_of_block(table, i));
   }
   return report;
-}
-
-/// Falls that are to be solved: an estimate of errors wants a second one, on half the mesh.
-std::uint64_t falls_to_solve(const Report& report, bool wants_errors) {
-  return std::min(report.falls.falls, report.points) * (wants_errors ? 2 : 1);
 }
 
 std::string shown(const ShownPoint& point) {
@@ -169,15 +147,17 @@ std::string counted(std::uint64_t count, std::string_view one, std::string_view 
   return fmt::format("{} {}", shown_count(count), count == 1 ? one : many);
 }
 
-void print(const Report& report, bool wants_errors) {
-  std::cout << "study   " << report.name << (wants_errors ? ", with estimated errors" : "") << '\n';
-  std::cout << "points  " << shown_count(report.points);
-  if (report.points != report.numbers) {
+void print(const Report& report, const protocol::Recipe& recipe) {
+  const protocol::StudySize& size = report.size;
+  std::cout << "study   " << report.name << (recipe.errors() ? ", with estimated errors" : "")
+            << '\n';
+  std::cout << "points  " << shown_count(size.points);
+  if (size.points != report.numbers) {
     std::cout << " of " << shown_count(report.numbers) << ", left in by where";
   }
-  std::cout << "\nmodels  " << shown_count(report.models) << ", with "
-            << (report.falls.is_estimate ? "about " : "")
-            << counted(report.falls.falls, "fall", "different falls") << '\n';
+  std::cout << "\nmodels  " << shown_count(size.models) << ", with "
+            << (size.falls_estimated ? "about " : "")
+            << counted(size.falls, "fall", "different falls") << '\n';
   for (std::size_t i = 0; i < report.blocks.size(); ++i) {
     const auto& block = report.blocks[i];
     const std::uint64_t last = block.place.first_point + block.place.points - 1;
@@ -189,19 +169,14 @@ void print(const Report& report, bool wants_errors) {
     std::cout << fmt::format("  first {}: {}\n", block.first.number, shown(block.first));
     std::cout << fmt::format("  last {}: {}\n", block.last.number, shown(block.last));
   }
-  if (report.rate) {
-    const auto& rate = *report.rate;
+  if (report.cost) {
     std::cout << fmt::format(
-        "time    about {} on {} here, as busy as it is now ({} and {} were solved{})\n",
-        shown_duration(rate.time_s(report.points, falls_to_solve(report, wants_errors))),
-        counted(rate.threads, "thread", "threads"), counted(rate.points, "point", "points"),
-        counted(rate.falls, "fall", "falls"),
-        rate.elements_per_link == 0
-            ? ""
-            : fmt::format(" on {} elements a link and fewer, and the cost extrapolated",
-                          rate.elements_per_link));
+        "time    {}\n        ({} and {} timed, as busy as this machine is now)\n",
+        time_in_words(*report.cost, size, recipe),
+        counted(report.cost->timed_falls, "fall", "falls"),
+        counted(report.cost->timed_points, "contact", "contacts"));
   }
-  std::cout << fmt::format("size    about {} in a database\n", shown_bytes(bytes_of(report)));
+  std::cout << fmt::format("size    about {} in a database\n", shown_bytes(size.bytes));
 }
 
 nlohmann::ordered_json json_of(const ShownPoint& point) {
@@ -219,11 +194,11 @@ nlohmann::ordered_json json_of(const ShownPoint& point) {
 nlohmann::ordered_json json_of(const Report& report, bool wants_errors) {
   nlohmann::ordered_json json{{"study", report.name},
                               {"errors", wants_errors},
-                              {"points", report.points},
+                              {"points", report.size.points},
                               {"numbers", report.numbers},
-                              {"models", report.models},
-                              {"falls", report.falls.falls},
-                              {"falls_estimated", report.falls.is_estimate}};
+                              {"models", report.size.models},
+                              {"falls", report.size.falls},
+                              {"falls_estimated", report.size.falls_estimated}};
   for (const auto& block : report.blocks) {
     json["blocks"].push_back({{"first_point", block.place.first_point},
                               {"numbers", block.place.points},
@@ -234,17 +209,13 @@ nlohmann::ordered_json json_of(const Report& report, bool wants_errors) {
                               {"last", json_of(block.last)}});
   }
   json["blocks_not_judged"] = report.unjudged;
-  if (report.rate) {
-    const auto& rate = *report.rate;
-    json["time_s"] = rate.time_s(report.points, falls_to_solve(report, wants_errors));
-    json["threads"] = rate.threads;
-    json["solved_points"] = rate.points;
-    json["solved_falls"] = rate.falls;
-    if (rate.elements_per_link != 0) {
-      json["extrapolated_from_elements_per_link"] = rate.elements_per_link;
-    }
+  if (report.cost) {
+    json["time_s"] = time_s(*report.cost, report.size);
+    json["threads"] = report.cost->threads;
+    json["solved_points"] = report.cost->timed_points;
+    json["solved_falls"] = report.cost->timed_falls;
   }
-  json["bytes"] = bytes_of(report);
+  json["bytes"] = report.size.bytes;
   return json;
 }
 
@@ -263,23 +234,23 @@ std::optional<int> survey(const Study& study, protocol::PointTable& table) {
 
 int check_study(const CheckFlags& flags) {
   const auto study = study_of_flags(flags.study, tip_reach());
-  const auto table = std::make_shared<protocol::PointTable>(study.recipe);
-  if (const auto stopped = survey(study, *table)) {
+  protocol::PointTable table(study.recipe);
+  if (const auto stopped = survey(study, table)) {
     return *stopped;
   }
   Report report = report_of(study.name, table);
   if (!flags.no_rate) {
     WorkLine line;
-    const auto solving = line.begin("solving some points for an estimate of time");
-    report.rate = measured_rate(table, 1.0);
+    const auto timing = line.begin("timing some falls and contacts of the study");
+    report.cost = measured_cost(table, report.size);
   }
-  const bool wants_errors = table->wants_errors();
   if (flags.json) {
-    std::cout << json_of(report, wants_errors).dump(2) << '\n';
+    std::cout << json_of(report, table.wants_errors()).dump(2) << '\n';
   } else {
-    print(report, wants_errors);
-    tell_mesh(std::cerr, table->recipe());
-    tell_unjudged(std::cerr, table->recipe());
+    print(report, table.recipe());
+    tell_mesh(std::cerr, table.recipe());
+    tell_unjudged(std::cerr, table.recipe());
+    tell_values(std::cerr, table.recipe());
   }
   return kDone;
 }
@@ -295,7 +266,7 @@ void add_study(CLI::App& app, Command& command) {
       "check", "Say how many points a study has, which, and what they will cost; or what is wrong");
   check->footer(kStudyCheckExamples);
   check->add_flag("--json", flags->json, "print one JSON object");
-  check->add_flag("--no-rate", flags->no_rate, "solve no points, and estimate no time");
+  check->add_flag("--no-rate", flags->no_rate, "solve no points, and predict no time");
   add_study_flags(*check, flags->study, command.names_single_lengths);
   check->callback([flags, &command] { command = [flags] { return check_study(*flags); }; });
 }

@@ -9,6 +9,7 @@
 #include "client/output/human_units.h"
 #include "client/output/mesh_note.h"
 #include "client/output/unjudged_note.h"
+#include "client/output/value_notes.h"
 #include "client/service/connection.h"
 #include "client/service/result_query.h"
 #include "client/service/source_flags.h"
@@ -122,6 +123,7 @@ int submit(const SubmitFlags& flags) {
       tell_mesh(std::cerr, study.recipe);
     }
     tell_unjudged(std::cerr, study.recipe);
+    tell_values(std::cerr, study.recipe);
     submitted = true;
     return flags.watch || flags.rows ? watch(study, reply.study_id(), flags.rows.value_or(0),
                                              query_for_more(study, server), connection, stop)

@@ -1,13 +1,11 @@
 // @ts-check
-// A study that is started here: values as on the command line, how much it is, and what the server says of it.
+// A study that is started here: values as on the command line, how much it is by the server's count.
 import { copied, h, named, picker, tick } from "/parts/dom.js";
-import { count, of_file, quoted, shown, time_left, with_unit } from "/parts/format.js";
+import { count, of_file, quoted, with_unit } from "/parts/format.js";
 import { change } from "/server.js";
 
 /** The most that a double counts without gaps. */
 const kMostCounted = 2 ** 53;
-const kBytesPerPoint = 650; // measured: a row with its packed arrays
-const kErrorsCost = 1.25; // with estimated errors: worker/solver/README.md
 const kJudgeAfter_ms = 250;
 
 const kDistributions = /** @type {Record<string, string>} */ ({ uniform: "DISTRIBUTION_UNIFORM", "log-uniform": "DISTRIBUTION_LOG_UNIFORM", normal: "DISTRIBUTION_NORMAL" });
@@ -101,13 +99,16 @@ export function submission_of(form) {
     recipe: { errors: form.errors, blocks: [{ axes: axes.map((one) => one.axis), ...(sample ? { sample } : {}), ...(where ? { where } : {}) }] } } };
 }
 
-/** The study as a command. @param {Form} form @param {string} file in which it is solved; empty: by the server */
-function command_of(form, file) {
+/** The flags of the study on a command line. @param {Form} form @param {boolean} [with_priority] */
+function flags_of(form, with_priority = false) {
   const flag = (/** @type {string} */ name, /** @type {string} */ value, /** @type {string} */ usual = "") => (value.trim() === usual ? [] : [`--${name}`, value.trim()]);
-  return ["oblique", file ? "run" : "submit", "--name", form.name.trim() || "NAME", ...flag("preset", form.preset, kUsual.preset), ...flag("integrator", form.integrator, kUsual.integrator),
+  return ["--name", form.name.trim() || "NAME", ...flag("preset", form.preset, kUsual.preset), ...flag("integrator", form.integrator, kUsual.integrator),
     ...others_of(form).flatMap(([key, text]) => flag(key.replaceAll("_", "-"), text)), ...flag("H", form.H), ...flag("mu", form.mu), ...flag("e", form.e),
-    ...flag("sample", form.sample), ...flag("where", form.where), ...(form.errors ? ["--errors"] : []), ...(file ? [] : flag("priority", form.priority, kUsual.priority))].map(quoted).join(" ") + of_file(file);
+    ...flag("sample", form.sample), ...flag("where", form.where), ...(form.errors ? ["--errors"] : []), ...(with_priority ? flag("priority", form.priority, kUsual.priority) : [])].map(quoted).join(" ");
 }
+
+/** The command that makes the same study. @param {Form} form @param {string} file in which it is solved; empty: by the server */
+const command_of = (form, file) => `oblique ${file ? "run" : "submit"} ${flags_of(form, !file)}${of_file(file)}`;
 
 /** What a form says unless somebody chooses. */
 const kUsual = { preset: "standard", integrator: "explicit", priority: "0" };
@@ -131,34 +132,21 @@ function fields_of(changed) {
 
 /**
  * What is known of a study before it starts: what the server answers to `/api/check`, or only how many points it has at most.
- * @typedef {{points: number, is_counted: boolean, models?: number, relative_cost?: number | null, surely_reached_m?: number | null}} Judged
+ * @typedef {{points: number, is_counted: boolean, models?: number, falls?: number, falls_estimated?: boolean, bytes?: number, surely_reached_m?: number | null}} Judged
  */
 
-/** In which the time of the last points tells little of these. @param {Judged} judged */
-function differences(judged) {
-  const { relative_cost: cost, models = 1 } = judged;
-  const said = [];
-  if (cost === null) said.push("How long points take with this integrator or this dt is not known before; it may be far longer.");
-  else if (cost && (cost < 0.5 || cost > 2)) said.push(`By its mesh and tolerance a point of this study takes roughly ${to_one_digit(cost)} times as long as one of the preset standard.`);
-  if (models > 1) said.push(`Falls come on top, up to one for each of the ${count(models)} models.`);
-  return said;
+/** @param {number} bytes */
+function shown_bytes(bytes) {
+  const [size, unit] = bytes < 1e6 ? [bytes / 1e3, "kB"] : bytes < 1e9 ? [bytes / 1e6, "MB"] : [bytes / 1e9, "GB"];
+  return `${size < 10 ? size.toFixed(1) : count(Math.round(size))} ${unit}`;
 }
 
-/** Nobody knows more of it. @param {number} value */
-const to_one_digit = (value) => (value < 1 ? shown(value, 1) : count(Number(value.toPrecision(1))));
-
-/** How much a study is. @param {Form} form @param {Judged} judged @param {any} now the overview, or null */
-function size_of(form, judged, now) {
-  const { points, is_counted, surely_reached_m: reached_m } = judged;
-  const bytes = points * kBytesPerPoint;
-  const said = [`${count(points)} ${points === 1 ? "point" : "points"}${is_counted ? "" : " at most"}`];
-  const has_pace = now?.threads > 0 && now.thread_s_per_point > 0;
-  if (has_pace) {
-    const seconds = points * now.thread_s_per_point * (form.errors ? kErrorsCost : 1) / now.threads;
-    said.push(`about ${time_left(seconds)} with the ${now.threads} threads that are here, if a point takes as long as the last ones did${form.errors ? " and its errors a quarter more" : ""}`);
-  }
-  if (bytes > 1e6) said.push(`about ${bytes > 1e9 ? `${(bytes / 1e9).toFixed(1)} GB` : `${Math.round(bytes / 1e6)} MB`} in the database`);
-  return [`${said.join(", ")}.`, ...(has_pace ? differences(judged) : []),
+/** How much a study is, in the numbers of `oblique study check`. @param {Judged} judged */
+function size_of({ points, is_counted, models = 0, falls = 0, falls_estimated, bytes = 0, surely_reached_m: reached_m }) {
+  const many = (/** @type {number} */ number, /** @type {string} */ one, /** @type {string} */ more = `${one}s`) => `${count(number)} ${number === 1 ? one : more}`;
+  const said = [many(points, "point") + (is_counted ? "" : " at most")];
+  if (models > 0) said.push(`${many(models, "model")} with ${falls_estimated ? "about " : ""}${many(falls, "fall", "different falls")}`, `about ${shown_bytes(bytes)} in the database`);
+  return [`${said.join(", ")}.`,
     ...(reached_m ? [`Whether the tip comes down further than ${with_unit(reached_m, "m")} only its fall tells: points with an H that it never reaches will fail.`] : [])].join(" ");
 }
 
@@ -175,7 +163,7 @@ function judging_of(place, show) {
     const { signal } = asked;
     try {
       const judged = await change("/api/check", { recipe: body.recipe, model: body.model }, signal);
-      show(size_of(form, judged, place.now()));
+      show(size_of(judged));
     } catch (error) {
       if (signal.aborted) return;
       const { status, message } = /** @type {any} */ (error);
@@ -194,7 +182,7 @@ function judging_of(place, show) {
       asked = new AbortController();
       const { points, body } = submission_of({ ...form, name: form.name || "name" });
       if (points > kMostCounted) throw new Error("that is more points than a study may have");
-      const before = size_of(form, { points, is_counted: form.where.trim() === "" }, place.now());
+      const before = size_of({ points, is_counted: form.where.trim() === "" });
       show(before);
       later = setTimeout(() => judge(form, body, before), kJudgeAfter_ms);
     } };
@@ -239,7 +227,8 @@ export function start_view(root, place) {
     const filled = values();
     try {
       judging.begin(filled);
-      commands.replaceChildren(h("p", {}, `The same on a command line${place.file && ", once oblique view has ended"}:`), copied("the command of the study", command_of(filled, place.file)));
+      commands.replaceChildren(h("p", {}, `The same on a command line${place.file && ", once oblique view has ended"}:`), copied("the command of the study", command_of(filled, place.file)),
+        h("p", {}, "How long it takes, measured where this command runs:"), copied("the command that measures the time", `oblique study check ${flags_of(filled)}`));
     } catch (error) {
       show(String(/** @type {Error} */ (error).message), true);
     }

@@ -9,6 +9,7 @@
 
 #include "worker/solver/fall/collocation_fall.h"
 #include "worker/solver/lanes/lane_falls.h"
+#include "worker/solver/model/usual_ranges.h"
 #include "worker/solver/motion/generalized_alpha.h"
 #include "worker/solver/step_choice.h"
 
@@ -108,10 +109,11 @@ std::vector<FallOutcome> solve_falls(std::span<const SharedChain> chains) {
     std::vector<FallSolution> solutions = solve(std::get<WayToFall>(kind), group);
     for (std::size_t i = 0; i < alike.size(); ++i) {
       FallOutcome& outcome = outcomes[alike[i]];
-      outcome.error = std::move(solutions[i].error);
       if (solutions[i].path) {
         outcome.fallen =
             std::make_shared<const FallenChain>(group[i], Fall(std::move(solutions[i].path)));
+      } else {
+        outcome.error = with_likely_cause(std::move(solutions[i].error), group[i]->model());
       }
     }
   }

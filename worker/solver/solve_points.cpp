@@ -9,6 +9,7 @@
 #include "worker/solver/chain/lane_chains.h"
 
 #include "worker/solver/lanes/lane_batch.h"
+#include "worker/solver/model/usual_ranges.h"
 #include "worker/solver/solve.h"
 
 namespace oblique::solver {
@@ -84,12 +85,15 @@ class Crowd {
 
   void solve_by_motion(const FingerPoint& point) {
     PointOutcome outcome{point.point.number, std::nullopt, {}};
+    bool touches = false;
     try {
       const auto& [number, H_m, mu, e_star] = point.point;
       point.finger.parts()->check(H_m, mu, e_star);
+      touches = true;
       outcome.result = point.finger.parts()->solve_by_motion(point.point, tracing_);
     } catch (const std::exception& error) {
-      outcome.error = error.what();
+      outcome.error =
+          touches ? with_likely_cause(error.what(), point.finger.model()) : error.what();
     }
     sink_(std::move(outcome));
   }
@@ -160,6 +164,8 @@ class Crowd {
       contact.result->H_m = point.point.H_m;
       contact.result->fall_time_s = fall_time_s;
       point.finger.parts()->sign(contact.result->solver);
+    } else {
+      contact.error = with_likely_cause(std::move(contact.error), point.finger.model());
     }
     sink_({point.point.number, std::move(contact.result), std::move(contact.error)});
   }

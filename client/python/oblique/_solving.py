@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import operator
 import os
+import warnings
 from typing import Any, Callable, Optional, Sequence, SupportsIndex, Union
 
 import numpy as np
@@ -67,7 +68,7 @@ def solve(
     :func:`solve_many`.
 
     Raises ValueError, naming key, value and range, for what is not allowed, and SolveError for a
-    point that has no answer.
+    point that has no answer. Warns of a value that is likely to be in another unit.
 
     >>> import oblique
     >>> impact = oblique.solve(H=1, mu=1.2, e=0.8)
@@ -79,6 +80,7 @@ def solve(
     ValueError: unknown key `tip_mas` (did you mean `tip_mass`?): ...
     """
     keys = _one_value_each("solve", {"H": H, "mu": mu, "e": e, **model}, preset, lengths)
+    _warn_of_units(keys)
     return Result(_core.solve(_falls, keys, errors))
 
 
@@ -103,6 +105,7 @@ def trace(
     (4909.4, 'sC')
     """
     keys = _one_value_each("trace", {"H": H, "mu": mu, "e": e, **model}, preset, lengths)
+    _warn_of_units(keys)
     result, columns = _core.trace(_falls, keys, fall, shape)
     columns["state"] = np.array(_core.trace_states())[columns["state"]]
     return Trace({**columns, "result": Result(result)})
@@ -159,6 +162,7 @@ def solve_many(
     points = math.prod(shape)
     count = 0 if threads is None else _whole_threads(threads)
     _add_model(given, preset, lengths)
+    _warn_of_units(given)
     many = _core.solve_many(_falls, given, points, count, errors, progress)
     return ManyResults(many, shape)
 
@@ -192,6 +196,18 @@ def _one_value_each(
         given[key] = float(array)
     _add_model(given, preset, lengths)
     return given
+
+
+def _warn_of_units(given: dict[str, Any]) -> None:
+    """A warning for each key with a value that is likely to be in another unit."""
+    for key, values in given.items():
+        numbers = np.atleast_1d([] if isinstance(values, str) else values)
+        numbers = numbers[np.isfinite(numbers)]
+        ends = [numbers.min(), numbers.max()] if numbers.size else []
+        name = "length" if key == "lengths" else key
+        notes = [_core.note_on_value(name, end) for end in ends]
+        if any(notes):
+            warnings.warn(next(filter(None, notes)), stacklevel=3)
 
 
 def _add_model(

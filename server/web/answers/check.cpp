@@ -12,13 +12,13 @@
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
+#include "proto/recipe/study_size.h"
 #include "proto/recipe/written/written_model.h"
 #include "proto/text.h"
 #include "server/web/answers/study_answers.h"
 #include "server/web/http/json_answer.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/parameters.h"
-#include "worker/solver/model/relative_cost.h"
 
 namespace oblique::server {
 namespace {
@@ -60,22 +60,6 @@ std::optional<double> surely_reached_m(const protocol::Recipe& recipe) {
   return least_m;
 }
 
-/// `relative_cost` of the study's points, by some of its models; nothing where it is not known.
-std::optional<double> relative_cost(const protocol::PointTable& table) {
-  constexpr std::uint64_t kLookedAt = 64;
-  const std::uint64_t looks = std::min(table.models(), kLookedAt);
-  double sum = 0.0;
-  for (std::uint64_t i = 0; i < looks; ++i) {
-    const std::uint64_t model = looks == 1 ? 0 : i * ((table.models() - 1) / (looks - 1));
-    const auto cost = solver::relative_cost(table.model(model));
-    if (!cost) {
-      return std::nullopt;
-    }
-    sum += *cost;
-  }
-  return sum / static_cast<double>(looks);
-}
-
 ordered_json json_of(const std::optional<double>& number) {
   return number ? ordered_json(*number) : ordered_json();
 }
@@ -87,12 +71,15 @@ HttpAnswer check_answer(const AnswerDesk& desk, const std::string& body) {
     const auto until = Clock::now() + kLongestSurvey;
     const bool is_counted = !table.needs_survey() ||
                             table.survey([&] { return Clock::now() < until && !desk.is_over(); });
-    return json_answer({{"points", table.points()},
+    const protocol::StudySize size = protocol::size_of(table);
+    return json_answer({{"points", size.points},
                         {"numbers", table.size()},
-                        {"models", table.models()},
+                        {"models", size.models},
+                        {"falls", size.falls},
+                        {"falls_estimated", size.falls_estimated},
+                        {"bytes", size.bytes},
                         {"is_counted", is_counted},
-                        {"surely_reached_m", json_of(surely_reached_m(table.recipe()))},
-                        {"relative_cost", json_of(relative_cost(table))}});
+                        {"surely_reached_m", json_of(surely_reached_m(table.recipe()))}});
   } catch (const solver::InputError& error) {
     throw std::invalid_argument(error.what());
   }

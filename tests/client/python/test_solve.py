@@ -40,6 +40,18 @@ def test_a_point_has_all_fields_and_the_bits_of_solve_json(keys):
     assert without_time(oblique.solve(**keys)._asdict()) == solved_by_program(*flags)
 
 
+def test_a_value_that_is_likely_in_another_unit_is_warned_of_once_for_each_key():
+    with pytest.warns(UserWarning) as warned:
+        oblique.solve_many(1, 0.4, 1, rho=[2.7, 2700], tip_mass=20)
+    assert [str(one.message) for one in warned] == [
+        "rho = 2.7 kg/m^3 is lighter than cork; 2700?",
+        "tip_mass = 20 kg is outside the usual 1e-6 to 10 kg; 0.02?",
+    ]
+    assert {one.filename for one in warned} == {__file__}
+    with pytest.warns(UserWarning, match="length = 400 m is outside the usual 0.001 to 100 m; 0.4"):
+        oblique.solve(1, 0.4, 1, lengths=[0.4, 400], elements_per_link=1)
+
+
 def test_results_show_what_they_are():
     impact = oblique.solve(1, 0.4, 1)
     assert repr(impact).startswith("Result(H=1.0, mu=0.4, e=1.0, fall_time_s=0.43")

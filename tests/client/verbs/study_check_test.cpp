@@ -69,7 +69,7 @@ TEST(StudyCheck, CountsModelsAndTheFallsThatTheyShare) {
 }
 
 // A study in which each point has its model takes 600 bytes more for each.
-TEST(StudyCheck, KnowsFallsAndSizeOfMoreModelsThanItLooksAt) {
+TEST(StudyCheck, KnowsFallsAndSizeOfManyModels) {
   const auto check = [](std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), {"study", "check", "--json", "--no-rate"});
     arguments.insert(arguments.end(), {"--H", "0.9", "--mu", "0.4", "--e", "1"});
@@ -84,7 +84,7 @@ TEST(StudyCheck, KnowsFallsAndSizeOfMoreModelsThanItLooksAt) {
   EXPECT_EQ(stiff["bytes"], 40000 * (650 + 600));
   const auto thick = check({"--sample", "sobol:40000:1", "--k", "1e7:1e8", "--A", "4e-4:6e-4"});
   EXPECT_EQ(thick["falls"], 40000) << "every area falls in its own way";
-  EXPECT_EQ(thick["falls_estimated"], true);
+  EXPECT_EQ(thick["falls_estimated"], false);
   const auto some =
       check({"--sample", "random:40000:1", "--k", "1e7:1e8", "--A", "4e-4,5e-4,6e-4"});
   EXPECT_EQ(some["falls"], 3);
@@ -92,6 +92,9 @@ TEST(StudyCheck, KnowsFallsAndSizeOfMoreModelsThanItLooksAt) {
       check({"--k", "1e7:1e8:30000", "--A", "4e-4:6e-4:5", "--tolerance", "1e-5,1e-4"});
   EXPECT_EQ(product["falls"], 5);
   EXPECT_EQ(product["falls_estimated"], false);
+  const auto many = check({"--sample", "sobol:400000:1", "--A", "4e-4:6e-4"});
+  EXPECT_EQ(many["falls"], 400000) << "no more than points";
+  EXPECT_EQ(many["falls_estimated"], true);
 }
 
 TEST(StudyCheck, ShowsTheValuesOfTheAxesAlsoWhereOneOverridesAnother) {
@@ -106,14 +109,29 @@ TEST(StudyCheck, ShowsTheValuesOfTheAxesAlsoWhereOneOverridesAnother) {
   EXPECT_EQ(block["last"]["H"], 0.9);
 }
 
-TEST(StudyCheck, OfAFineMeshTriesCoarserOnesAndSaysThatTheCostIsExtrapolated) {
-  const auto outcome = test::run_oblique(
-      {"study", "check", "--json", "--preset", "converged", "--H", "1", "--mu", "0.4", "--e", "1"});
-  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-  const auto json = nlohmann::json::parse(outcome.out);
-  EXPECT_EQ(json["extrapolated_from_elements_per_link"], 16);
-  EXPECT_EQ(json["solved_falls"], 1) << "and by one thread";
-  EXPECT_GT(json["time_s"], 0.0);
+TEST(StudyCheck, TimesFallsOfTheStudysOwnMeshAndForErrorsOfHalfOfIt) {
+  const auto timed = [](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"study", "check", "--json",     "--preset", "paper",
+                                       "--H",   "1",     "--mu",       "0.4",      "--e",
+                                       "1",     "--E",   "6e10:8e10:3"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const auto outcome = test::run_oblique(arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return nlohmann::json::parse(outcome.out);
+  };
+  const auto plain = timed({});
+  EXPECT_EQ(plain["solved_falls"], 3);
+  EXPECT_GT(plain["time_s"], 0.0);
+  EXPECT_EQ(timed({"--errors"})["solved_falls"], 6);
+}
+
+TEST(StudyCheck, NotesUnitsAndListsThatAreNotWhatWasMeant) {
+  const auto outcome =
+      test::run_oblique({"study", "check", "--no-rate", "--sample", "lhs:10:1", "--E", "70", "--H",
+                         "0.9", "--mu", "0.1:1:5", "--e", "1"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("Note: E = 70 Pa is softer than rubber; 7e10?\n"));
+  EXPECT_THAT(outcome.err, HasSubstr("Note: mu: 5 values; 0.1:1 draws between them.\n"));
 }
 
 TEST(StudyCheck, OfAThousandMillionPointsCostsNoMoreThanOfAFew) {

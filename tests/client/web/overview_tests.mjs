@@ -123,34 +123,17 @@ test("a form says where only a fall tells whether the tip comes to H, and refuse
   await page.close();
 });
 
-test("a form's time is that of the last points, with more for errors, and says in what these points differ", async () => {
-  const page = await form({ early: () => {
-    window.EventSource = class extends EventTarget {
-      constructor() {
-        super();
-        setTimeout(() => this.dispatchEvent(new MessageEvent("overview", { data: JSON.stringify({ studies: [], unlisted: 0, studies_by_state: {}, workers: [], workers_there: 1,
-          threads: 2, thread_s_per_point: 1, points_open: 0, points_leased: 0, points_per_s: 0 }) })));
-      }
-      close() {}
-    };
-  } });
-  await until(page, () => document.querySelector("#pace").textContent !== "");
-  const told = () => text_of(page, "form [role=status]");
-  await fill(page, 2, "0.1:2:80");
-  assert.match(await told(), /about 40 s with the 2 threads that are here, if a point takes as long as the last ones did\.$/);
+test("a form says points, models, falls and size, and has the command that measures the time", async () => {
+  const page = await form();
+  const says = (text) => until(page, (wanted) => document.querySelector("form [role=status]").textContent === wanted, text);
+  await says("40 points, 1 model with 1 fall, about 19 kB in the database.");
+  await page.type("form textarea", "rho=2600:2700:3\nk=1e7:3e7:5");
+  await says("600 points, 15 models with 3 different falls, about 279 kB in the database.");
+  await fill(page, 5, "mu < 0.2");
   await page.click("form input[type=checkbox]");
-  assert.match(await told(), /about 50 s with .* and its errors a quarter more\.$/);
-  const says = (text) => until(page, (wanted) => document.querySelector("form [role=status]").textContent.includes(wanted), text);
-  const selects = await page.$$("form select");
-  await selects[0].select("converged");
-  await says("a point of this study takes roughly 6 times as long as one of the preset standard.");
-  await selects[1].select("generalized-alpha");
-  await says("How long points take with this integrator or this dt is not known before");
-  await selects[0].select("standard");
-  await selects[1].select("explicit");
-  await page.type("form textarea", "rho=2600:2700:3");
-  await says("Falls come on top, up to one for each of the 3 models.");
-  assert.doesNotMatch(await told(), /times as long/);
+  const commands = await page.$$eval(".copied code", (all) => all.map((one) => one.textContent));
+  const flags = "--name NAME --rho 2600:2700:3 --k 1e7:3e7:5 --H 1 --mu 0.1:2:40 --e 1 --where 'mu < 0.2' --errors";
+  assert.deepEqual(commands.map((one) => one.replace(/ --db \S+$/, "")), [`oblique run ${flags}`, `oblique study check ${flags}`]);
   await page.close();
 });
 

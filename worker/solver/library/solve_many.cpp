@@ -10,6 +10,7 @@
 #include <numeric>
 #include <system_error>
 #include <thread>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -158,11 +159,14 @@ class Work {
     std::uint64_t end_ = 0;
   };
 
-  /// Sets models_ so that models of one fall follow each other. Returns where each one is.
+  /// Sets models_ so that models of one fall follow each other, falls in the order of their first
+  /// models. Returns where each one is.
   std::vector<std::size_t> take_models(std::span<const ModelParameters> models) {
-    std::vector<std::pair<std::uint64_t, std::size_t>> by_fall;
+    std::unordered_map<std::uint64_t, std::size_t> falls;  // numbers by hash
+    std::vector<std::pair<std::size_t, std::size_t>> by_fall;
     for (std::size_t i = 0; i < models.size(); ++i) {
-      by_fall.emplace_back(solver::fall_hash(models[i]), i);
+      const auto fall = falls.try_emplace(solver::fall_hash(models[i]), falls.size()).first;
+      by_fall.emplace_back(fall->second, i);
     }
     std::sort(by_fall.begin(), by_fall.end());
     std::vector<std::size_t> places(models.size());

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cstdint>
 
 namespace oblique::solver {
 
@@ -21,20 +20,18 @@ ModelParameters fall_model(const ModelParameters& model) {
 }
 
 std::uint64_t fall_hash(const ModelParameters& model) {
+  constexpr std::uint64_t kOdd = 0x9e3779b97f4a7c15;  // 2^64 over the golden ratio
   const ModelParameters falling = fall_model(model);
   std::uint64_t hash = 0;
-  const auto mix = [&hash](double value) {  // as splitmix64
-    hash = (hash ^ std::bit_cast<std::uint64_t>(value)) + 0x9e3779b97f4a7c15U;
-    hash = (hash ^ (hash >> 30U)) * 0xbf58476d1ce4e5b9U;
-    hash = (hash ^ (hash >> 27U)) * 0x94d049bb133111ebU;
-    hash ^= hash >> 31U;
+  const auto add = [&hash](double value) {
+    hash = (hash ^ std::bit_cast<std::uint64_t>(value)) * kOdd;
+    hash ^= hash >> 32;
   };
-  for (const double length_m : falling.lengths_m) {
-    mix(length_m);
+  std::for_each(falling.lengths_m.begin(), falling.lengths_m.end(), add);
+  for (const auto& key : model_keys()) {
+    add(key.get(falling));
   }
-  for (const ParameterKey& key : model_keys()) {
-    mix(key.get(falling));
-  }
+  add(falling.step_factor);
   return hash;
 }
 

@@ -25,6 +25,9 @@ TEST_F(PageCheckTest, AStudyIsJudgedBeforeItIsSubmitted) {
   const json all = json::parse(body_of(check(R"("from":0,"to":1,"count":11)", "")));
   EXPECT_EQ(all["points"], 11);
   EXPECT_EQ(all["models"], 1);
+  EXPECT_EQ(all["falls"], 1);
+  EXPECT_EQ(all["falls_estimated"], false);
+  EXPECT_EQ(all["bytes"], 11 * 650 + 600) << "as of oblique study check";
   const json some = json::parse(body_of(check(R"("from":0,"to":1,"count":11)", "mu > 0.45")));
   EXPECT_EQ(some["points"], 6);
   EXPECT_EQ(some["numbers"], 11);
@@ -82,19 +85,6 @@ TEST_F(PageCheckTest, AtMostEightyCharactersOfAWrongKeyAreRepeated) {
     EXPECT_THAT(refused, HasSubstr(key.substr(0, 20)));
     EXPECT_EQ(refused.find(key.substr(0, 81)), std::string::npos) << refused;
   }
-}
-
-TEST_F(PageCheckTest, HowLongAPointTakesIsSaidInPointsOfTheDefault) {
-  const auto cost = [&](const std::string& axes, const std::string& model) {
-    const std::string body = body_with(R"("values":[1])", axes, model);
-    return json::parse(body_of(page_.post("/api/check", body)))["relative_cost"];
-  };
-  EXPECT_DOUBLE_EQ(cost("", "{}"), 1.0);
-  const double converged = cost("", R"({"preset":"converged"})");
-  EXPECT_GT(converged, 3.0);
-  const std::string meshes = R"({"key":"elements_per_link","values":[16,48]},)";
-  EXPECT_DOUBLE_EQ(cost(meshes, "{}"), (1.0 + converged) / 2.0);
-  EXPECT_EQ(cost("", R"({"integrator":"generalized-alpha"})"), json());
 }
 
 TEST_F(PageCheckTest, TheFirstPointThatFailedIsToldWithItsReason) {

@@ -105,6 +105,27 @@ TEST(SolveErrors, ContactThatOutlastsTheStatedTimeIsGivenUp) {
               HasSubstr("did not end within 0.02 s"));
 }
 
+TEST(SolveErrors, AFallOrContactWithoutAnEndNamesTheUnusualValueThatIsLikelyToBlame) {
+  const auto error = [](const std::function<void(ModelParameters&)>& change) {
+    ModelParameters model = coarse_model();
+    change(model);
+    const Finger finger{model};
+    return message_of<SolveError>([&] { finger.solve(0.5, 0.4, 1.0); });
+  };
+  const char* const soft = "; likely cause: E = 70 Pa is outside the usual 1e8 to 1e12 Pa";
+  EXPECT_THAT(error([](ModelParameters& m) { m.E_Pa = 70; }),
+              AllOf(HasSubstr("fall"), testing::EndsWith(soft)));
+  const char* const loose =
+      "did not end within 0.02 s; likely cause: k = 27 N/m is outside the "
+      "usual 10000 to 1e10 N/m";
+  EXPECT_THAT(error([](ModelParameters& m) { m.k_N_m = 27; }), testing::EndsWith(loose));
+  EXPECT_THAT(error([](ModelParameters& m) {
+                m.k_N_m = 27;
+                m.integrator = Integrator::kGeneralizedAlpha;
+              }),
+              testing::EndsWith(loose));
+}
+
 TEST(SolveErrors, MagnitudesBeyondNumbersAreAnErrorInBoundedTime) {
   EXPECT_THAT(model_error([](ModelParameters& m) { m.I_m4 = 1e300; }), HasSubstr("magnitude"));
   EXPECT_THAT(model_error([](ModelParameters& m) { m.rho_kg_m3 = 1e-300; }),

@@ -1,0 +1,60 @@
+#include "client/output/value_notes.h"
+
+#include <sstream>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "client/study/study_file.h"
+
+namespace oblique::client {
+namespace {
+
+std::string notes_of(const std::string& model, const std::string& axes) {
+  std::ostringstream out;
+  const auto any_reach = [](const protocol::PointTable&) {};
+  const std::string text = "[model]\n" + model + "\n[[block]]\n" + axes;
+  tell_values(out, parse_study(text, "a.toml", any_reach).recipe);
+  return out.str();
+}
+
+const std::string kSample = "sample = { kind = 'lhs', count = 100 }\n";
+
+TEST(ValueNotes, NamesOnceEachKeyThatIsLikelyToBeInAnotherUnit) {
+  EXPECT_EQ(notes_of("E = 7e4\nrho = 2.7\nlengths = [0.4, 400, 300]",
+                     "H = 100\nmu = 0.4\ne = 1\nk = [27, 2.7e7, 3e11]\n"),
+            "Note: E = 70000 Pa is softer than rubber; 7e10?\n"
+            "Note: H = 100 m is outside the usual 0.0001 to 10 m; 0.1?\n"
+            "Note: k = 27 N/m is outside the usual 10000 to 1e10 N/m; 2.7e7?\n"
+            "Note: length = 400 m is outside the usual 0.001 to 100 m; 0.4?\n"
+            "Note: rho = 2.7 kg/m^3 is lighter than cork; 2700?\n");
+}
+
+TEST(ValueNotes, LooksAtTheEndsOfRangesAndAtWhatIsDrawn) {
+  EXPECT_EQ(notes_of("", "H = 0.9\nmu = 0.4\ne = 1\nE = { from = 60, to = 80, count = 3 }\n"),
+            "Note: E = 60 Pa is softer than rubber; 6e10?\n");
+  EXPECT_EQ(
+      notes_of("", kSample + "H = 0.9\nmu = { from = 0, to = 1 }\ne = 1\n"
+                             "rho = { distribution = 'normal', mean = 2.7, sd = 0.1, from = 1 }\n"),
+      "Note: rho = 2.7 kg/m^3 is lighter than cork; 2700?\n");
+}
+
+TEST(ValueNotes, SaysThatARangeOfASampleIsAListOfValues) {
+  EXPECT_EQ(notes_of("", kSample + "H = 0.9\nmu = { from = 0.1, to = 1, count = 5 }\ne = 1\n"
+                                   "elements_per_link = { from = 4, to = 8, count = 5 }\n"),
+            "Note: mu: 5 values; 0.1:1 draws between them.\n")
+      << "numbers of elements are drawn from a list alone";
+  EXPECT_EQ(notes_of("", "H = 0.9\nmu = { from = 0.1, to = 1, count = 5 }\ne = 1\n"), "");
+}
+
+TEST(ValueNotes, SaysNothingOfUsualValues) {
+  for (const char* preset : {"paper", "printed", "converged"}) {
+    EXPECT_EQ(notes_of(std::string("preset = '") + preset + "'",
+                       kSample + "H = { from = 0.3, to = 1.1 }\nmu = [0, 2]\ne = 1\n"
+                                 "tip_mass = [0, 0.02]\nI = \"A^2 / (4 * pi)\"\n"),
+              "");
+  }
+}
+
+}  // namespace
+}  // namespace oblique::client
