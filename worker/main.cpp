@@ -173,7 +173,7 @@ void add_options(CLI::App& app, Configuration& configuration, StopWithParent& pa
          "Memory for solved falls, as 2GB: points that share a fall need not solve it again; "
          "the default is an eighth of the free memory, or of the container's limit")
       ->type_name("SIZE")
-      ->transform(CLI::AsSizeValue(false));
+      ->transform(CLI::AsSizeValue(false).description(""));
   app.add_option("--until", ending.until,
                  "Be gone by then: a time, as 2026-11-22T05:00:00Z (without a zone it is local), "
                  "or a duration from now, as 90m")

@@ -159,7 +159,7 @@ void add_worker_flags(CLI::App& verb, RunSettings& settings) {
           "memory of all workers for solved falls, as 2GB; the default is an eighth of what "
           "is free")
       ->type_name("SIZE")
-      ->transform(CLI::AsSizeValue(false));
+      ->transform(CLI::AsSizeValue(false).description(""));
   verb.add_flag("--verbose", settings.service.verbose, "show what server and workers say");
 }
 

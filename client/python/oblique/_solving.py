@@ -63,8 +63,8 @@ def solve(
     ``dt_fall``, ``tolerance``, ...; ``lengths`` has one length a link. A value may be an expression
     of other keys. ``errors`` asks for estimated errors too.
 
-    The first point of a model takes some 0.1 s, for its fall, which is kept for others (see
-    :func:`forget_falls`); these take 1 ms or less. Many points are ten times as fast in one call of
+    The first point of a model takes half a second or so, for its fall, which is kept for others (see
+    :func:`forget_falls`); these take some 10 ms. Many points are ten times as fast in one call of
     :func:`solve_many`.
 
     Raises ValueError, naming key, value and range, for what is not allowed, and SolveError for a

@@ -11,6 +11,7 @@
 #include "client/convergence/convergence_report.h"
 #include "client/convergence/levels.h"
 #include "worker/solver/model/fall_model.h"
+#include "worker/solver/model/result_fields.h"
 #include "worker/solver/solve.h"
 
 namespace oblique::client {
@@ -54,6 +55,8 @@ TEST(Outputs, HaveOneMajorPeakEachAndNoRipples) {
   std::vector<std::string> names;
   for (const auto& output : outputs_of(result)) {
     names.push_back(output.name);
+    EXPECT_TRUE(!output.name.starts_with("major_peak") || solver::find_result_column(output.name))
+        << "what results call it";
   }
   EXPECT_EQ(names, (std::vector<std::string>{"fn_peak_N", "major_peak_1_N", "major_peak_2_N",
                                              "ft_peak_N", "duration_s", "stick_total_s", "slide_m",

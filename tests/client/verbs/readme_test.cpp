@@ -31,8 +31,7 @@ TEST(Readme, ShowsTheBeginningOfTheReportOfOneImpact) {
   const std::string command = "$ oblique solve --H 1 --mu 1.2 --e 1\n";
   const auto from = readme.find(command) + command.size();
   const auto shown_report = readme.substr(from, readme.find("...\n", from) - from);
-  const auto printed = test::run_oblique(
-      {"solve", "--H", "1", "--mu", "1.2", "--e", "1", "--elements-per-link", "16"});
+  const auto printed = test::run_oblique({"solve", "--H", "1", "--mu", "1.2", "--e", "1"});
   ASSERT_EQ(printed.exit_code, 0) << printed.err;
   EXPECT_EQ(printed.out.substr(0, shown_report.size()), shown_report);
 }

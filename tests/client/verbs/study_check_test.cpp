@@ -132,6 +132,13 @@ TEST(StudyCheck, NotesUnitsAndListsThatAreNotWhatWasMeant) {
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_THAT(outcome.err, HasSubstr("Note: E = 70 Pa is softer than rubber; 7e10?\n"));
   EXPECT_THAT(outcome.err, HasSubstr("Note: mu: 5 values; 0.1:1 draws between them.\n"));
+  const test::TemporaryFolder folder;
+  for (const std::string verb : {"solve", "run"}) {
+    const auto solved = test::run_oblique(
+        folder, {verb, "--preset", "paper", "--rho", "2.7", "--H", "0.9", "--mu", "1", "--e", "1"});
+    EXPECT_EQ(solved.exit_code, 0) << solved.err;
+    EXPECT_THAT(solved.err, HasSubstr("Note: rho = 2.7 kg/m^3 is lighter than cork; 2700?\n"));
+  }
 }
 
 TEST(StudyCheck, OfAThousandMillionPointsCostsNoMoreThanOfAFew) {

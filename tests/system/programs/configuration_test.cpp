@@ -80,7 +80,7 @@ TEST(ConfigurationOfProgramsTest, HelpEndsWithTheVariableAndTheKeyThatAnOptionMa
   const TemporaryFolder folder;
   for (const auto& [program, words] : std::vector<std::pair<std::string, std::string>>{
            {server_program(), "(--worker-port: OBLIQUE_SERVER_WORKER_PORT)"},
-           {worker_program(), "(--idle-exit: OBLIQUE_WORKER_IDLE_EXIT)"}}) {
+           {worker_program(), "(--fall-memory: OBLIQUE_WORKER_FALL_MEMORY)"}}) {
     Process process(folder, program, {"--help"});
     EXPECT_EQ(process.wait(), 0);
     const auto said = process.out().find(words);

@@ -122,6 +122,7 @@ TEST(ColumnSource, MarksDifferFromEachOtherAndAreNoNumbers) {
 
 TEST(ColumnSource, ListsAndWordsAboutRowsAreNoPictures) {
   EXPECT_TRUE(column_source("fn_peak_N"));
+  EXPECT_TRUE(column_source("major_peak_2_t_s"));
   EXPECT_TRUE(column_source("E_Pa")->is_of_model);
   EXPECT_TRUE(column_source("major_mode")->is_category);
   for (const std::string name : {"", "peaks", "worker_name", "fn_peak", "E", "lengths_m", "p.mu"}) {
