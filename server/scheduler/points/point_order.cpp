@@ -98,8 +98,8 @@ void PointOrder::arrange(const protocol::PointTable& table, std::uint64_t first,
   }
   const std::uint64_t open_falls = std::max<std::uint64_t>(falls.sort(), 1);
   const std::uint64_t groups = (open_falls + falls_a_group - 1) / falls_a_group;
-  const auto group_of = [&](std::uint64_t fall) {  // of nearly one size; the last has the rest
-    return std::min(fall * groups / open_falls, groups - 1);
+  const auto group_of = [&](std::uint64_t fall) {  // the last one has what is settled, too
+    return std::min(fall / falls_a_group, groups - 1);
   };
   end_ = first;
   for (auto begin = falls.pieces.begin(); begin != falls.pieces.end();) {

@@ -21,8 +21,8 @@ class PointOrder {
   static constexpr std::uint64_t kMostModels = 1'000'000;
 
   /// Brings the points from `first` on, which is 0 or where the arranged ones end, into order if
-  /// falls lie apart. `open` are points that may be handed out: a group has about `falls_a_group`
-  /// falls that have some.
+  /// falls lie apart. `open` are points that may be handed out: a group has `falls_a_group` falls
+  /// that have some, the last one fewer.
   void arrange(const protocol::PointTable& table, std::uint64_t first, const IntervalSet& open,
                std::uint64_t falls_a_group);
   bool is_arranged() const { return end_ > 0; }
