@@ -64,8 +64,9 @@ void StudyPoints::move_all(const Map& map) {
   }
   for (Returned& intervals : returned_) {
     Returned moved;
-    for (const auto& [first, history] : intervals) {
-      map(IntervalSet(first, history.end)).for_each([&](const Interval& interval) {
+    for (const auto& entry : intervals) {
+      const History& history = entry.second;
+      map(IntervalSet(entry.first, history.end)).for_each([&](const Interval& interval) {
         History part = history;
         part.end = interval.end;
         part.part_end = interval.end;
