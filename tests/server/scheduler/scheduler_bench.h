@@ -81,10 +81,11 @@ class SchedulerBench {
   /// `solve`, and the results are made durable. Returns the effects of both.
   std::vector<Effect> solve_and_store(const SendBatch& batch, double busy_s = 1e-3) {
     auto effects = solve(batch, busy_s);
+    const std::vector<PointOutcome> outcomes = outcomes_of(batch);
     for (const StoreResults& store : only<StoreResults>(effects)) {
       ResultsStored stored{store.worker, store.study, store.sequence, {}};
       for (const std::size_t index : store.accepted) {
-        stored.outcomes.push_back(outcomes_of(batch)[index]);
+        stored.outcomes.push_back(outcomes[index]);
       }
       append(effects, feed(stored));
     }
