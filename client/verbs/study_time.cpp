@@ -73,14 +73,10 @@ struct FallAxes {
 
 FallAxes fall_axes(const protocol::Recipe& recipe) {
   FallAxes found;
+  const ModelParameters model = protocol::from_message(recipe.model());
   for (const auto& block : recipe.blocks()) {
     for (const auto* axis : protocol::model_axes(block)) {
-      const auto fall_with = [&](double value) {
-        auto model = protocol::from_message(recipe.model());
-        protocol::axis_key(axis->key()).set(model, value);
-        return solver::fall_hash(model);
-      };
-      if (fall_with(1.0) == fall_with(2.0)) {
+      if (!solver::changes_fall(protocol::axis_key(axis->key()), model)) {
         continue;
       }
       if (axis->has_distribution()) {

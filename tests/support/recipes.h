@@ -110,6 +110,15 @@ inline Recipe recipe_of_blocks(const std::vector<Block>& blocks) {
   return recipe;
 }
 
+/// A sample whose points have `falls` falls, in which E takes so many values and k any.
+inline Recipe sample_with_falls(std::uint64_t points, std::uint64_t falls,
+                                SampleKind kind = SAMPLE_RANDOM) {
+  return recipe_of_blocks(
+      {sampled({range("E", 6e10, 7e10, falls), uniform("k", 1e7, 3e7), listed("H", {1.0}),
+                uniform("mu", 0.0, 1.0), listed("e", {1.0})},
+               kind, points)});
+}
+
 /// A recipe of the given blocks, each a list of axes, and the preset `paper`.
 inline Recipe recipe_of(const std::vector<std::vector<Axis>>& blocks) {
   Recipe recipe = recipe_of_blocks({});

@@ -162,8 +162,10 @@ TEST_F(BatchSolverTest, RangesAreSolvedInTheOrderInWhichTheyAreGiven) {
   gate_.open(1000);
   solver_.add({1, 7, {{30, 32}, {7, 8}, {10, 12}}, server::table_of(100)});
   wait_batches_ended(1);
+  const auto progress = solver_.collect();
+  ASSERT_EQ(progress.size(), 1U);
   std::vector<std::uint64_t> solved;
-  for (const auto& result : solver_.collect().at(0).results) {
+  for (const auto& result : progress[0].results) {
     solved.push_back(result.point());
   }
   EXPECT_EQ(solved, (std::vector<std::uint64_t>{30, 31, 7, 10, 11}));

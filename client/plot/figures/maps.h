@@ -36,8 +36,8 @@ Colours colours_for(const Quantity& quantity, const std::vector<double>& values,
 /// Most kinds that a map tells apart. Others, and those that have next to no points, are gathered.
 inline constexpr std::size_t kMostKinds = 12;
 
-/// A map of kinds, as of modes: `names` has the kind of each solved cell, `points` how many points
-/// are of each kind, by which kinds are ordered and get their share.
+/// A map of kinds, as of modes. `names` is the kind of each solved cell, `points` the number of
+/// points of each kind: the legend lists the kinds with most points first, with their percentages.
 Figure kind_map(const MapAxes& axes, const std::string& name, Cells cells,
                 std::vector<std::string> names, const std::map<std::string, std::uint64_t>& points,
                 const std::string& plural = "kinds");

@@ -6,6 +6,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "proto/recipe/blocks.h"
 #include "proto/recipe/keys.h"
 #include "worker/solver/model/fall_model.h"
 
@@ -70,16 +71,10 @@ struct Falls {
 
 /// Whether points of the block may share a fall and lie apart: not if each has its own.
 bool may_share_falls(const protocol::Block& block) {
-  return std::none_of(block.axes().begin(), block.axes().end(), [](const protocol::Axis& axis) {
-    const auto& key = protocol::axis_key(axis.key());
-    if (key.set == nullptr || !axis.has_distribution()) {
-      return false;
-    }
-    solver::ModelParameters one;
-    solver::ModelParameters other;
-    key.set(one, 1.0);
-    key.set(other, 2.0);
-    return solver::fall_hash(one) != solver::fall_hash(other);
+  const auto axes = protocol::model_axes(block);
+  return std::none_of(axes.begin(), axes.end(), [](const protocol::Axis* axis) {
+    return axis->has_distribution() &&
+           solver::changes_fall(protocol::axis_key(axis->key()), solver::ModelParameters());
   });
 }
 

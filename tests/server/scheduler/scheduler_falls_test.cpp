@@ -15,17 +15,11 @@
 namespace oblique::server {
 namespace {
 
-using protocol::listed;
 using protocol::PointTable;
-using protocol::range;
-using protocol::uniform;
 
-/// A sample in which E has `falls` values.
 std::shared_ptr<const PointTable> sample(std::uint64_t points, std::uint64_t falls) {
-  return std::make_shared<const PointTable>(protocol::recipe_of_blocks(
-      {protocol::sampled({range("E", 6e10, 7e10, falls), uniform("k", 1e7, 3e7), listed("H", {1.0}),
-                          uniform("mu", 0.0, 1.0), listed("e", {1.0})},
-                         protocol::SAMPLE_LATIN_HYPERCUBE, points)}));
+  return std::make_shared<const PointTable>(
+      protocol::sample_with_falls(points, falls, protocol::SAMPLE_LATIN_HYPERCUBE));
 }
 
 /// What workers were given, in whole.

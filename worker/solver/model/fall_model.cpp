@@ -19,6 +19,14 @@ ModelParameters fall_model(const ModelParameters& model) {
   return falling;
 }
 
+bool changes_fall(const ParameterKey& key, const ModelParameters& model) {
+  ModelParameters one = model;
+  ModelParameters other = model;
+  key.set(one, 1.0);  // no key takes these two values for one
+  key.set(other, 2.0);
+  return !(fall_model(one) == fall_model(other));
+}
+
 std::uint64_t fall_hash(const ModelParameters& model) {
   constexpr std::uint64_t kOdd = 0x9e3779b97f4a7c15;  // 2^64 over the golden ratio
   const ModelParameters falling = fall_model(model);

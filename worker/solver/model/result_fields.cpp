@@ -68,9 +68,9 @@ constexpr ResultList kPeaks{
     .column = "peaks",
     .unit = "s, N",
     .meaning =
-        "every peak of the normal force, ripples too: t_s counted from touch, fn_N, ft_N the "
-        "largest tangential magnitude around it, and whether it is major (1) or a ripple (0); "
-        "peaks[1] may be a ripple, major_peak_2_N is the second one that counts",
+        "peaks of the normal force, ripples included: t_s from touch, fn_N, ft_N the largest "
+        "tangential magnitude around the peak, major 1 or, for a ripple, 0; peaks[1] may be a "
+        "ripple, the second major peak is major_peak_2_N",
     .members = kPeakMembers,
     .each = [](const CaseResult& result, const TakeElement& take) {
       for (const Peak& peak : result.peaks) {

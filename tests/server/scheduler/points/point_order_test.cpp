@@ -17,15 +17,7 @@ namespace {
 using protocol::listed;
 using protocol::PointTable;
 using protocol::range;
-using protocol::uniform;
-
-/// A sample in which E has `values` values and k any.
-protocol::Recipe sampled_recipe(std::uint64_t points, std::uint64_t values) {
-  return protocol::recipe_of_blocks(
-      {protocol::sampled({range("E", 6e10, 7e10, values), uniform("k", 1e7, 3e7),
-                          listed("H", {1.0}), uniform("mu", 0.0, 1.0), listed("e", {1.0})},
-                         protocol::SAMPLE_RANDOM, points)});
-}
+using protocol::sample_with_falls;
 
 std::uint64_t fall_of(const PointTable& table, std::uint64_t point) {
   return solver::fall_hash(table.model(table.point(point).model));
@@ -55,7 +47,7 @@ void expect_each_point_once(const PointTable& table, const PointOrder& order) {
 }
 
 TEST(PointOrderTest, PointsThatShareAFallFollowEachOther) {
-  const PointTable table(sampled_recipe(500, 7));
+  const PointTable table(sample_with_falls(500, 7));
   PointOrder order;
   order.arrange(table, 0, IntervalSet(0, 500), 1);
   expect_each_point_once(table, order);
@@ -68,7 +60,7 @@ TEST(PointOrderTest, PointsThatShareAFallFollowEachOther) {
 }
 
 TEST(PointOrderTest, AGroupBeginsWithAnOpenPointOfEachOfItsFalls) {
-  const PointTable table(sampled_recipe(500, 21));
+  const PointTable table(sample_with_falls(500, 21));
   IntervalSet open(0, 500);
   open.erase(0, 100);
   PointOrder order;
@@ -102,7 +94,7 @@ TEST(PointOrderTest, AGridStaysInTheOrderOfItsNumbers) {
 }
 
 TEST(PointOrderTest, SetsOfPointsBecomeSetsOfPlacesAndBack) {
-  const PointTable table(sampled_recipe(300, 5));
+  const PointTable table(sample_with_falls(300, 5));
   PointOrder order;
   order.arrange(table, 0, IntervalSet(0, 300), 2);
   IntervalSet points;
@@ -121,7 +113,7 @@ TEST(PointOrderTest, SetsOfPointsBecomeSetsOfPlacesAndBack) {
 }
 
 TEST(PointOrderTest, PointsThatAStudyGrowsByComeBehindAllOthers) {
-  protocol::Recipe recipe = sampled_recipe(100, 3);
+  protocol::Recipe recipe = sample_with_falls(100, 3);
   PointOrder order;
   order.arrange(PointTable(recipe), 0, IntervalSet(0, 100), 1);
   *recipe.add_blocks() =
@@ -141,7 +133,7 @@ TEST(PointOrderTest, PointsThatAStudyGrowsByComeBehindAllOthers) {
 }
 
 TEST(PointOrderTest, AStudyOfTooManyModelsStaysInTheOrderOfItsNumbers) {
-  const PointTable table(sampled_recipe(PointOrder::kMostModels + 1, 3));
+  const PointTable table(sample_with_falls(PointOrder::kMostModels + 1, 3));
   PointOrder order;
   order.arrange(table, 0, IntervalSet(0, 1), 8);
   EXPECT_FALSE(order.is_arranged());
@@ -150,7 +142,7 @@ TEST(PointOrderTest, AStudyOfTooManyModelsStaysInTheOrderOfItsNumbers) {
 }
 
 TEST(PointOrderTest, APlaceIsPassedOverIfAFilterLeavesItsPointOut) {
-  protocol::Recipe recipe = sampled_recipe(200, 4);
+  protocol::Recipe recipe = sample_with_falls(200, 4);
   recipe.mutable_blocks(0)->set_where("mu > 0.5");
   const PointTable table(recipe);
   PointOrder order;
