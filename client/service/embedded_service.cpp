@@ -119,10 +119,14 @@ class ReadyLines {
   bool has_told_ = false;
 };
 
-/// Memory for falls of each worker, so that all together take an eighth of what is free.
-std::uint64_t fall_memory_each(int workers) {
-  return protocol::available_memory_bytes() /
-         (solver::kFallsPartOfMemory * static_cast<std::uint64_t>(workers));
+/// Memory for the falls of each worker: an equal share of the setting or, by default, of an eighth
+/// of what is free.
+std::uint64_t fall_memory_each(const ServiceSettings& settings) {
+  const std::uint64_t all_bytes =
+      settings.fall_memory_bytes != 0
+          ? settings.fall_memory_bytes
+          : protocol::available_memory_bytes() / solver::kFallsPartOfMemory;
+  return std::max<std::uint64_t>(all_bytes / static_cast<std::uint64_t>(settings.workers), 1);
 }
 
 /// Threads of each worker, so that all together use the cores of this machine.
@@ -153,9 +157,7 @@ EmbeddedService::EmbeddedService(const ServiceSettings& settings, protocol::Stop
                                     keys_.file_of(protocol::Role::kWorker), "--stop-with-parent",
                                     std::to_string(getpid()), "--threads",
                                     std::to_string(threads_each(settings.workers)), "--fall-memory",
-                                    std::to_string(settings.fall_memory_bytes != 0
-                                                       ? settings.fall_memory_bytes
-                                                       : fall_memory_each(settings.workers))},
+                                    std::to_string(fall_memory_each(settings))},
                       .show_errors = settings.verbose}));
   }
 }

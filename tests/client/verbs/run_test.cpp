@@ -271,6 +271,25 @@ TEST(Run, GoesOnWithTheWorkersThatAreLeftAndStopsWhenNoneIs) {
   expect_gone(processes);
 }
 
+TEST(Run, SharesTheMemoryForFallsAmongItsWorkers) {
+  const test::TemporaryFolder folder;
+  write_study(folder, 10'000'000);
+  auto arguments = run_arguments();
+  arguments.insert(arguments.end(), {"--fall-memory", "100000000"});
+  test::Process program(folder, test::client_program(), arguments);
+  wait_until_at_work(folder, program);
+  const pid_t worker = test::children_of(program.pid()).at(1);
+  std::ifstream words("/proc/" + std::to_string(worker) + "/cmdline");
+  for (std::string word; word != "--fall-memory";) {
+    ASSERT_TRUE(std::getline(words, word, '\0'));
+  }
+  std::string bytes;
+  std::getline(words, bytes, '\0');
+  EXPECT_EQ(bytes, "50000000");
+  kill(program.pid(), SIGINT);
+  program.outcome();
+}
+
 TEST(Run, SaysWhatTheServerSaidWhenItDoesNotStart) {
   const test::TemporaryFolder folder;
   std::ofstream(folder.path() / "oblique.db") << "this is no database, but some text in a file\n";
