@@ -12,9 +12,9 @@
 #include "proto/recipe/written/study_name.h"
 #include "proto/recipe/written/study_terms.h"
 #include "server/care/merged_origins.h"
-#include "server/scheduler/points/study_table.h"
 #include "server/store/rows/row_columns.h"
 #include "server/store/rows/settled_runs.h"
+#include "server/study/study_table.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::server {

@@ -9,9 +9,9 @@
 
 #include "proto/oblique.pb.h"
 #include "proto/recipe/point_table.h"
-#include "server/scheduler/points/interval_set.h"
-#include "server/scheduler/points/study_points.h"
-#include "server/scheduler/points/study_table.h"
+#include "server/study/interval_set.h"
+#include "server/study/study_table.h"
+#include "server/study/study_terms.h"
 
 namespace oblique::server {
 

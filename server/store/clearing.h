@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "server/database/sqlite.h"
-#include "server/scheduler/points/interval_set.h"
+#include "server/study/interval_set.h"
 
 namespace oblique::server {
 

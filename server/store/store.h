@@ -10,14 +10,14 @@
 #include <vector>
 
 #include "server/database/sqlite.h"
-#include "server/scheduler/points/interval_set.h"
-#include "server/scheduler/points/point_attempts.h"
 #include "server/store/changes.h"
 #include "server/store/clearing.h"
 #include "server/store/database_files.h"
 #include "server/store/result_copy.h"
 #include "server/store/rows/settled_runs.h"
 #include "server/store/write_ahead_log.h"
+#include "server/study/interval_set.h"
+#include "server/study/point_attempts.h"
 
 namespace oblique::server {
 

@@ -4,8 +4,8 @@
 #include <optional>
 
 #include "proto/recipe/point_table.h"
-#include "server/scheduler/points/interval_set.h"
 #include "server/scheduler/points/point_order.h"
+#include "server/study/interval_set.h"
 
 namespace oblique::server {
 

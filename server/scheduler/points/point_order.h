@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "proto/recipe/point_table.h"
-#include "server/scheduler/points/interval_set.h"
+#include "server/study/interval_set.h"
 
 namespace oblique::server {
 

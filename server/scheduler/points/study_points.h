@@ -9,24 +9,14 @@
 #include <vector>
 
 #include "server/scheduler/points/batch_cut.h"
-#include "server/scheduler/points/interval_set.h"
 #include "server/scheduler/points/loss_history.h"
-#include "server/scheduler/points/point_attempts.h"
 #include "server/scheduler/points/point_order.h"
-#include "server/scheduler/points/study_table.h"
+#include "server/study/interval_set.h"
+#include "server/study/point_attempts.h"
+#include "server/study/study_table.h"
+#include "server/study/study_terms.h"
 
 namespace oblique::server {
-
-/// On which terms a study gets workers: those of the highest priority come first, and among them
-/// each gets batches in proportion to its weight.
-struct StudyTerms {
-  std::int32_t priority = 0;
-  double weight = 1.0;
-  /// Workers of any solver version take part, not only of the one that the study began with.
-  bool mixes_versions = false;
-
-  bool operator==(const StudyTerms&) const = default;
-};
 
 /// Points that are handed out together, under one lease: a run of places (PointOrder), without
 /// points that a filter leaves out and some that were settled before.

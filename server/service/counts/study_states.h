@@ -9,12 +9,12 @@
 #include <string>
 #include <string_view>
 
-#include "server/scheduler/points/interval_set.h"
-#include "server/scheduler/points/point_attempts.h"
-#include "server/scheduler/points/study_table.h"
 #include "server/scheduler/worker_processes.h"
 #include "server/store/changes.h"
 #include "server/store/store.h"
+#include "server/study/interval_set.h"
+#include "server/study/point_attempts.h"
+#include "server/study/study_table.h"
 
 namespace oblique::server {
 

@@ -15,7 +15,7 @@
 #include <thread>
 
 #include "proto/oblique.pb.h"
-#include "server/scheduler/points/study_table.h"
+#include "server/study/study_table.h"
 
 namespace oblique::server {
 

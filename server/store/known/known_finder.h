@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "server/database/sqlite.h"
-#include "server/scheduler/points/study_table.h"
 #include "server/store/known/known_points.h"
+#include "server/study/study_table.h"
 
 namespace oblique::server {
 

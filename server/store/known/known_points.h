@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "server/database/sqlite.h"
-#include "server/scheduler/points/study_table.h"
 #include "server/store/known/recipe_blocks.h"
 #include "server/store/known/recipe_match.h"
+#include "server/study/study_table.h"
 
 namespace oblique::server {
 

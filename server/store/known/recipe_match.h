@@ -4,9 +4,9 @@
 #include <functional>
 
 #include "proto/recipe/point_table.h"
-#include "server/scheduler/points/interval_set.h"
 #include "server/store/changes.h"
 #include "server/store/known/work.h"
+#include "server/study/interval_set.h"
 
 namespace oblique::server {
 

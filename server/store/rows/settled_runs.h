@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "server/database/sqlite.h"
-#include "server/scheduler/points/interval_set.h"
+#include "server/study/interval_set.h"
 
 namespace oblique::server {
 

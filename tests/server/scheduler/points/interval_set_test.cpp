@@ -1,4 +1,4 @@
-#include "server/scheduler/points/interval_set.h"
+#include "server/study/interval_set.h"
 
 #include <random>
 #include <set>

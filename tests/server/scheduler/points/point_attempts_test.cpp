@@ -1,4 +1,4 @@
-#include "server/scheduler/points/point_attempts.h"
+#include "server/study/point_attempts.h"
 
 #include <map>
 #include <random>

@@ -1,4 +1,4 @@
-#include "server/scheduler/points/recipe_growth.h"
+#include "server/study/recipe_growth.h"
 
 #include <vector>
 

@@ -7,7 +7,7 @@
 
 #include "proto/recipe/point_table.h"
 #include "proto/recipe/sha256.h"
-#include "server/scheduler/points/recipe_growth.h"
+#include "server/study/recipe_growth.h"
 
 namespace oblique::server {
 

@@ -1,4 +1,4 @@
-#include "server/scheduler/points/study_table.h"
+#include "server/study/study_table.h"
 
 #include <stdexcept>
 #include <utility>

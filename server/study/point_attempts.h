@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <map>
 
-#include "server/scheduler/points/interval_set.h"
+#include "server/study/interval_set.h"
 
 namespace oblique::server {
 
