@@ -10,13 +10,13 @@
 #include <string>
 #include <vector>
 
-#include "server/scheduler/histogram.h"
 #include "server/scheduler/lease_index.h"
 #include "server/scheduler/points/study_points.h"
 #include "server/scheduler/ready_line.h"
 #include "server/scheduler/scheduler_events.h"
 #include "server/scheduler/study_queue.h"
 #include "server/scheduler/worker_processes.h"
+#include "server/study/histogram.h"
 
 namespace oblique::server {
 

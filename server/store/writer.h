@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "server/database/sqlite.h"
-#include "server/scheduler/histogram.h"
 #include "server/store/changes.h"
+#include "server/study/histogram.h"
 
 namespace oblique::server {
 

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "server/scheduler/histogram.h"
+#include "server/study/histogram.h"
 
 namespace oblique::server {
 
