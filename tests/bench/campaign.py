@@ -1,10 +1,10 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 """Times samples whose points share falls, and prints ratios.
 
-  PYTHONPATH=build/release/python python3 tests/bench/campaign.py build/release/bin/oblique [quick]
+  PYTHONPATH=build/release/python tests/bench/campaign.py build/release/bin/oblique [quick]
 
 First: points/s of a Latin hypercube of 1,000 points on 16 elements a link with E drawn from 21 values, over those with
-12 values. Then: the time of a sample of 20,000 points with 500 falls over (falls x time of a fall + points x time of a
+12 values, beside the same ratio of (falls x time of a fall + points x time of a contact). Then: the time of a sample of 20,000 points with 500 falls over (falls x time of a fall + points x time of a
 contact), on one worker process and on four. Both times are measured in the same run, by oblique.solve_many: many falls
 with one point each, and one fall with many points. `quick` takes a tenth of the points and falls.
 """
@@ -48,11 +48,12 @@ def solve_s(points, falls):
 def main():
     program = pathlib.Path(sys.argv[1]).resolve()
     part = 10 if "quick" in sys.argv[2:] else 1
-    few, many = (run_s(program, 1000, falls, 1) for falls in (12, 21))
-    print(f"1,000 points with 12 falls: {1000 / few:.0f} points/s; with 21: {1000 / many:.0f} points/s; "
-          f"ratio {few / many:.2f}", flush=True)
     fall_s = (solve_s(160, 160) - solve_s(160, 1)) / 160
     contact_s = (solve_s(2000, 1) - solve_s(200, 1)) / 1800
+    few, many = (run_s(program, 1000, falls, 1) for falls in (12, 21))
+    sums = (12 * fall_s + 1000 * contact_s) / (21 * fall_s + 1000 * contact_s)
+    print(f"1,000 points with 12 falls: {1000 / few:.0f} points/s; with 21: {1000 / many:.0f} points/s; "
+          f"ratio {few / many:.2f}, of the sums {sums:.2f}", flush=True)
     points, falls = 20_000 // part, 500 // part
     expected_s = falls * fall_s + points * contact_s
     print(f"a fall {1e3 * fall_s:.1f} ms, a contact {1e3 * contact_s:.2f} ms, on all cores; {points} points with "
