@@ -2,10 +2,15 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <string>
+#include <system_error>
 
+#include <spdlog/fmt/fmt.h>
+
+#include "server/asking/sql/sql_tokens.h"
 #include "server/database/sqlite.h"
 
 namespace oblique::server {
@@ -181,19 +186,39 @@ void corr_final(sqlite3_context* context) {
   }
 }
 
-constexpr std::array<DescribedFunction, 9> kFunctions{{
-    {"median(x)", "the middle value; half way between the two middle ones of an even number"},
-    {"percentile(x, p)", "the value that p percent lie below, between neighbours in proportion"},
-    {"stddev(x)", "standard deviation of a sample (n - 1)"},
-    {"variance(x)", "its square"},
-    {"corr(x, y)",
-     "Pearson's correlation of two columns, from -1 to 1; rows with a NULL are left out"},
-    {"count_mode('SC SR')",
-     "points whose major_mode is that; of others count(*) FILTER (WHERE e = 1)"},
-    {"avg(x), min(x), max(x), sum(x)", "of the points, or of each group of --group"},
-    {"count(*)", "number of points"},
-    {"round(x, n), abs(x)", "of one value"},
+constexpr std::array<SqlFunction, 18> kFunctions{{
+    {"median", "median(x)",
+     "the middle value; half way between the two middle ones of an even number", true, true},
+    {"percentile", "percentile(x, p)",
+     "the value that p percent lie below, between neighbours in proportion", true, true},
+    {"stddev", "stddev(x)", "standard deviation of a sample (n - 1)", true, true},
+    {"variance", "variance(x)", "its square", true},
+    {"corr", "corr(x, y)",
+     "Pearson's correlation of two columns, from -1 to 1; rows with a NULL are left out", true},
+    {"count_mode", "count_mode('SC SR')",
+     "points whose major_mode is that; of others count(*) FILTER (WHERE e = 1)", true},
+    {"avg", "avg(x)", "mean of the points, or of each group of --group", true, true},
+    {"min", "min(x)", "least of them", true, true},
+    {"max", "max(x)", "largest of them", true, true},
+    {"sum", "sum(x)", "their sum", true, true},
+    {"count", "count(*)", "number of points", true},
+    {"round", "round(x, n)", "one value to n decimals", false, true},
+    {"abs", "abs(x)", "of one value", false, true},
+    {"total", "", "", true, true},
+    {"group_concat", "", "", true},
+    {"string_agg", "", "", true},
+    {"json_group_array", "", "", true},
+    {"json_group_object", "", "", true},
 }};
+
+void nearest_double(sqlite3_context* context, int, sqlite3_value** arguments) {
+  const auto* const text = reinterpret_cast<const char*>(sqlite3_value_text(arguments[0]));
+  if (const auto number = decimal_number(text == nullptr ? "" : text)) {
+    sqlite3_result_double(context, *number);
+  } else {
+    refuse(context, "nearest_double takes a number as text");
+  }
+}
 
 }  // namespace
 
@@ -202,7 +227,7 @@ void add_functions(sqlite3* database) {
   const auto add = [&](const char* name, int arguments, auto step, auto last) {
     if (sqlite3_create_function_v2(database, name, arguments, kFlags, nullptr, nullptr, step, last,
                                    nullptr) != SQLITE_OK) {
-      throw StorageError(std::string("no function ") + name + ": " + sqlite3_errmsg(database));
+      throw StorageError(fmt::format("no function {}: {}", name, sqlite3_errmsg(database)));
     }
   };
   add("median", 1, &median_step, &numbers_final);
@@ -210,10 +235,30 @@ void add_functions(sqlite3* database) {
   add("variance", 1, &moments_step, &moments_final<false>);
   add("stddev", 1, &moments_step, &moments_final<true>);
   add("corr", 2, &corr_step, &corr_final);
+  if (sqlite3_create_function_v2(database, kNumberFunction.data(), 1, kFlags, nullptr,
+                                 &nearest_double, nullptr, nullptr, nullptr) != SQLITE_OK) {
+    throw StorageError(
+        fmt::format("no function {}: {}", kNumberFunction, sqlite3_errmsg(database)));
+  }
 }
 
-std::span<const DescribedFunction> described_functions() {
+std::optional<double> decimal_number(std::string_view text) {
+  double number = 0.0;
+  const char* const end = text.data() + text.size();
+  const auto [read, error] = std::from_chars(text.data(), end, number);
+  const bool is_decimal = text.find_first_not_of("0123456789.eE+-") == std::string_view::npos;
+  return is_decimal && error == std::errc() && read == end ? std::optional(number) : std::nullopt;
+}
+
+std::span<const SqlFunction> sql_functions() {
   return kFunctions;
+}
+
+const SqlFunction* find_sql_function(std::string_view name) {
+  const auto* found = std::find_if(kFunctions.begin(), kFunctions.end(), [&](const auto& known) {
+    return same_but_case(known.name, name);
+  });
+  return found == kFunctions.end() ? nullptr : found;
 }
 
 }  // namespace oblique::server
