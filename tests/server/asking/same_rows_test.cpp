@@ -198,7 +198,7 @@ bool has_filter(const Recipe& recipe) {
 class SameRows : public testing::Test {
  protected:
   static constexpr std::uint64_t kStudies = 10;
-  static constexpr int kConditions = 100;
+  static constexpr int kConditions = 60;
 };
 
 TEST_F(SameRows, APlanGivesTheRowsThatSqliteGivesWithoutIt) {
