@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -186,38 +185,6 @@ TEST_F(PlanTest, AnAnswerGoesOnAfterAPointWhateverIsKnownOfTheRecipe) {
   rest.set_where("mu >= 0 OR 1");
   rest.set_after_point(4);
   EXPECT_THAT(answer(rest), IsEmpty());
-}
-
-TEST_F(PlanTest, AFilteredStudyIsPlannedByItsRecipe) {
-  protocol::PointTable table(protocol::recipe_of_blocks(
-      {protocol::filtered({protocol::range("H", 0.1, 1.0, 10), protocol::range("mu", 0.1, 1.0, 10),
-                           protocol::listed("e", {1.0})},
-                          "mu > 0.95 || H > 0.95")}));
-  table.survey([] { return true; });
-  const auto filtered = std::make_shared<const protocol::PointTable>(std::move(table));
-  {
-    Store store(path_);
-    AddResults results{3, filtered, 0, "", "", 1, "now", {}};
-    for (std::uint64_t point = 0; point < filtered->size(); ++point) {
-      if (filtered->is_left_in(point)) {
-        results.results.push_back(solved_point(point));
-      }
-    }
-    store.commit(std::vector<Change>{AddStudy{3, "filtered", filtered, "2024-01-03T00:00:00.000Z"},
-                                     results});
-  }
-  auto asked = question("point", "H = 0.5");
-  asked.set_study("filtered");
-  EXPECT_THAT(answer(asked), ElementsAre(49));
-  asked.set_where("H > 0.85");
-  asked.set_after_point(89);
-  EXPECT_THAT(answer(asked), ElementsAre(90, 91, 92, 93, 94, 95, 96, 97, 98, 99));
-  asked.clear_where();
-  asked.set_after_point(69);
-  EXPECT_THAT(answer(asked), ElementsAre(79, 89, 90, 91, 92, 93, 94, 95, 96, 97, 98, 99));
-  asked.clear_after_point();
-  asked.set_where("H >= 0.85");
-  EXPECT_THAT(plan_of(asked).statement, HasSubstr("BETWEEN 70 AND 99"));
 }
 
 TEST_F(PlanTest, WhatGathersOrSortsDoesNotGoOn) {
