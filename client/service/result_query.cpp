@@ -47,7 +47,6 @@ protocol::QueryRequest request_for(const ResultQuery& query) {
   question.set_where(query.where);
   question.set_group(query.group);
   question.set_order(query.order);
-  question.set_explain(query.explain);
   if (query.limit) {
     question.set_limit(static_cast<std::uint64_t>(*query.limit));
   }

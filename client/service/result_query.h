@@ -16,7 +16,6 @@ struct ResultQuery {
   std::string group;   ///< columns of which each row has other values; empty: none
   std::string order;   ///< empty: by point, of a group by its columns
   std::optional<std::int64_t> limit;  ///< none: all rows
-  bool explain = false;               ///< the plan of the answer, and not the answer
 };
 
 /// Throws solver::InputError, naming the flag, for a limit below 0 and for texts that are no part

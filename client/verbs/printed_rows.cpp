@@ -77,18 +77,6 @@ int print_stream(RowStream& stream, const OutputFlags& flags, bool in_shown_unit
   return protocol::kDone;
 }
 
-int print_lines(RowStream& stream) {
-  for (bool ends = false; !ends;) {
-    const protocol::QueryReply chunk = stream.next();
-    protocol::ChunkRows rows(chunk);
-    while (rows.next()) {
-      std::cout << protocol::visible(std::string(rows.cell(0).text)) << '\n';
-    }
-    ends = chunk.ends();
-  }
-  return protocol::kDone;
-}
-
 std::string shell_word(const std::string& text) {
   constexpr std::string_view kPlain =
       "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-./:";

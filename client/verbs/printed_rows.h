@@ -33,9 +33,6 @@ Format format_of(const OutputFlags& flags);
 int print_stream(RowStream& stream, const OutputFlags& flags, bool in_shown_units,
                  const std::string& way_to_all = "csv and json have all");
 
-/// Prints an answer of one column of texts, a line each. Gives the exit code.
-int print_lines(RowStream& stream);
-
 /// `text` as one word of a shell.
 std::string shell_word(const std::string& text);
 

@@ -27,8 +27,7 @@ constexpr const char* kQueryExamples = R"(Examples:
   oblique query friction --select "*" --limit 1 --format json
   oblique query friction --group major_mode --select "major_mode, count(*), median(mu) AS mid_mu"
   oblique query friction --select "corr(mu, fn_peak_N) AS of_mu, corr(e, fn_peak_N) AS of_e"
-  oblique query friction --select "mu, peaks[0].fn_N, longest_phase.duration_s" --where "e = 1"
-  oblique query friction --where "H = 1 AND e = 1" --explain
+  oblique query friction --select "mu, peaks[0].fn_N, phases.count" --where "e = 1"
 
 `oblique columns` lists columns, elements of lists (from 0) and functions, in the case in which they
 are written: e is the restitution coefficient, E_Pa Young's modulus. LIKE tells capitals apart, as
@@ -75,14 +74,11 @@ void note_unknown_modes(Source& source, const ResultQuery& asked) {
 }
 
 int query(const QueryFlags& flags) {
-  const Format format = format_of(flags.output);
+  (void)format_of(flags.output);
   check(flags.query);
   const auto source = open_source(flags.source);
   try {
     const auto answer = source->rows(request_for(flags.query));
-    if (flags.query.explain && format == Format::kTable && flags.output.file.empty()) {
-      return print_lines(*answer);
-    }
     print_stream(*answer, flags.output, true, "--select names columns, csv and json have all");
     note_unknown_modes(*source, flags.query);
     return kDone;
@@ -114,8 +110,6 @@ void add_query(CLI::App& app, Command& command) {
   verb->add_option("--limit", flags->query.limit, "most rows shown; all when left out")
       ->check(protocol::whole_number_from(0))
       ->type_name("N");
-  verb->add_flag("--explain", flags->query.explain,
-                 "show how the question is answered: which points, how many rows, SQLite's plan");
   add_output_flags(*verb, flags->output);
   add_source_flags(*verb, flags->source);
   verb->callback([flags, &command] { command = [flags] { return query(*flags); }; });

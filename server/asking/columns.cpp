@@ -135,9 +135,11 @@ std::vector<Column> columns_and_functions() {
   for (const WrittenForm& element : element_forms()) {
     columns.push_back({element.form, element.unit, "element", "", element.meaning});
   }
-  for (const DescribedFunction& function : described_functions()) {
-    columns.push_back(
-        {std::string(function.form), "", "function", "", std::string(function.meaning)});
+  for (const SqlFunction& function : sql_functions()) {
+    if (!function.form.empty()) {
+      columns.push_back(
+          {std::string(function.form), "", "function", "", std::string(function.meaning)});
+    }
   }
   return columns;
 }

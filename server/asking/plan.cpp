@@ -1,6 +1,7 @@
 #include "server/asking/plan.h"
 
 #include <algorithm>
+#include <span>
 #include <string_view>
 #include <utility>
 
@@ -11,15 +12,37 @@
 #include "server/asking/grouping.h"
 #include "server/asking/question.h"
 #include "server/asking/sql/sql_expression.h"
+#include "server/asking/sql/sql_functions.h"
 #include "server/asking/sql/sql_items.h"
 #include "server/asking/statement.h"
 #include "server/asking/suggestions.h"
-#include "server/asking/units.h"
 #include "server/database/sqlite.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::server {
 namespace {
+
+/// The unit of a column, an element, or a function of one that keeps the unit; empty: a pure
+/// number, a text, or another expression.
+std::string unit_of(std::span<const SqlToken> tokens) {
+  if (tokens.size() == 1 && tokens[0].is_name()) {
+    return unit_of_column(name_of(tokens[0]));
+  }
+  if (const auto element = element_at(tokens); element.tokens > 0) {
+    const bool is_all = element.tokens == tokens.size();
+    return is_all && element.unit.find(',') == std::string::npos ? element.unit : "";
+  }
+  const bool is_call = tokens.size() > 3 && tokens[0].kind == SqlToken::Kind::kName &&
+                       tokens[1].is_sign('(') && closing_bracket(tokens, 1) == tokens.size() - 1;
+  const SqlFunction* const function = is_call ? find_sql_function(tokens[0].text) : nullptr;
+  if (function == nullptr || !function->keeps_unit) {
+    return {};
+  }
+  const auto arguments = tokens.subspan(2, tokens.size() - 3);
+  const auto comma = std::find_if(arguments.begin(), arguments.end(),
+                                  [](const SqlToken& token) { return token.is_sign(','); });
+  return unit_of({arguments.begin(), comma});
+}
 
 /// Names and units. `text` is what was selected, as it was written.
 std::vector<PlannedColumn> planned_columns(std::vector<std::string> names,
@@ -29,81 +52,10 @@ std::vector<PlannedColumn> planned_columns(std::vector<std::string> names,
   std::vector<PlannedColumn> columns;
   for (std::size_t i = 0; i < names.size(); ++i) {
     const std::string unit =
-        items.size() == names.size() ? unit_of(items[i]) : unit_of_column(names[i]);
+        items.size() == names.size() ? unit_of(items[i].tokens) : unit_of_column(names[i]);
     columns.push_back({std::move(names[i]), unit});
   }
   return columns;
-}
-
-std::string shown(const std::vector<PointSpan>& spans) {
-  constexpr std::size_t kShown = 4;
-  std::string text;
-  for (std::size_t i = 0; i < std::min(kShown, spans.size()); ++i) {
-    text += fmt::format("{}{}", i == 0 ? "" : ", ", spans[i].first);
-    text += spans[i].last > spans[i].first ? fmt::format("-{}", spans[i].last) : "";
-  }
-  return text + (spans.size() > kShown ? fmt::format(", ... {}", spans.back().last) : "");
-}
-
-std::string how_rows_are_found(const AskedStudy& study, const RowsAsked& rows) {
-  if (!rows.by_spans) {
-    return fmt::format("points     all {}: the condition says nothing of the recipe\n",
-                       study.points);
-  }
-  if (rows.spans.empty()) {
-    return fmt::format("points     none of {} can meet the condition\n", study.points);
-  }
-  const std::uint64_t all = points_of(study.recipe);
-  return fmt::format("points     {} of {} by the recipe{}, in {} range{}: {}\n",
-                     points_in(rows.spans), all, all == study.points ? "" : " before its filter",
-                     rows.spans.size(), rows.spans.size() == 1 ? "" : "s", shown(rows.spans));
-}
-
-std::string how_rows_are_ordered(const protocol::StudyQuery& question, const RowsAsked& rows) {
-  if (!question.group().empty()) {
-    return fmt::format("groups     by {}\n", question.group());
-  }
-  if (is_in_point_order(question)) {
-    return fmt::format("order      that of points, as {} are read\n",
-                       rows.spans.size() > 1 ? "the ranges" : "rows");
-  }
-  return fmt::format("order      {}{}\n", question.order(),
-                     rows.come_in_order ? ", as the ranges are read" : ", sorted in memory");
-}
-
-/// SQLite's own plan, a line a step.
-std::string plan_of_sqlite(sqlite3* database, const std::string& statement) {
-  Statement steps(database, "EXPLAIN QUERY PLAN " + statement);
-  std::string text;
-  while (steps.step()) {
-    text += fmt::format("SQLite     {}\n", steps.text(3));
-  }
-  return text;
-}
-
-/// A statement as people are shown it: long lists of ranges are cut.
-std::string shown_statement(const std::string& statement) {
-  constexpr std::size_t kMost = 60;
-  constexpr std::string_view kBegin = "json_each('{";
-  const auto begin = statement.find(kBegin);
-  const auto end = begin == std::string::npos ? begin : statement.find("}')", begin);
-  if (end == std::string::npos || end - begin <= kMost) {
-    return statement;
-  }
-  const auto cut = statement.find(',', begin + kMost / 2);
-  return statement.substr(0, std::min(cut, end)) + ",..." + statement.substr(end);
-}
-
-std::string explanation_of(sqlite3* database, const protocol::StudyQuery& question,
-                           const AskedStudy& study, const RowsAsked& rows,
-                           const std::string& statement) {
-  const std::uint64_t most =
-      rows.by_spans ? std::min(points_in(rows.spans), study.points) : study.points;
-  return how_rows_are_found(study, rows) +
-         fmt::format("reads      at most {} rows, by their key (study_id, point)\n", most) +
-         how_rows_are_ordered(question, rows) +
-         fmt::format("statement  {}\n", shown_statement(statement)) +
-         plan_of_sqlite(database, statement);
 }
 
 /// Throws solver::InputError, naming the flag, for a text that alone is no SQL: what SQLite says of
@@ -126,10 +78,10 @@ void check_syntax(sqlite3* database, const protocol::StudyQuery& question) {
     }
   };
   const std::string selected = selected_by(question);
-  check("--select", selected, "SELECT " + columns_in_sqlite(database, selected));
-  check("--where", question.where(), "SELECT 1 WHERE " + in_sqlite(database, question.where()));
-  check("--group", question.group(), "SELECT 1 GROUP BY " + in_sqlite(database, question.group()));
-  check("--order", question.order(), "SELECT 1 ORDER BY " + in_sqlite(database, question.order()));
+  check("--select", selected, "SELECT " + with_elements(selected));
+  check("--where", question.where(), "SELECT 1 WHERE " + with_elements(question.where()));
+  check("--group", question.group(), "SELECT 1 GROUP BY " + with_elements(question.group()));
+  check("--order", question.order(), "SELECT 1 ORDER BY " + with_elements(question.order()));
 }
 
 /// Gives a question that selects nothing its columns.
@@ -147,18 +99,6 @@ void select_usual(protocol::StudyQuery& question, const protocol::Recipe& recipe
   }
 }
 
-/// A statement that gives the lines of a text.
-std::string statement_of_lines(const std::string& text) {
-  std::string values;
-  for (std::size_t begin = 0; begin < text.size();) {
-    const std::size_t end = std::min(text.find('\n', begin), text.size());
-    values += fmt::format("{}({})", values.empty() ? "" : ", ",
-                          sql_text(text.substr(begin, end - begin)));
-    begin = end + 1;
-  }
-  return fmt::format("SELECT column1 AS plan FROM (VALUES {})", values);
-}
-
 }  // namespace
 
 Plan plan(sqlite3* database, protocol::StudyQuery question) {
@@ -168,13 +108,12 @@ Plan plan(sqlite3* database, protocol::StudyQuery question) {
   const AskedStudy study = asked_study(database, question.study());
   select_usual(question, study.recipe);
   check_columns(question, known);
-  const RowsAsked rows = rows_asked(question, study);
   const std::string written = selected_by(question);
   Plan plan;
   plan.goes_on_by_point = is_in_point_order(question) && gives_points(written);
-  std::string selected = columns_in_sqlite(database, written);
+  std::string selected = columns_in_sqlite(written);
   selected += plan.goes_on_by_point ? ", point" : "";
-  plan.statement = statement_of(database, question, selected, study, rows);
+  plan.statement = statement_of(database, question, selected, study);
   try {
     auto names = columns_of_statement(database, plan.statement);
     if (plan.goes_on_by_point) {
@@ -185,12 +124,6 @@ Plan plan(sqlite3* database, protocol::StudyQuery question) {
     check_syntax(database, question);
     throw solver::InputError(with_suggestions(error.what(), known) +
                              what_quotes_mean(error.what(), plan.statement));
-  }
-  if (question.explain()) {
-    plan.explanation = explanation_of(database, question, study, rows, plan.statement);
-    plan.statement = statement_of_lines(plan.explanation);
-    plan.columns = {{"plan", ""}};
-    plan.goes_on_by_point = false;
   }
   return plan;
 }

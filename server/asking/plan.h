@@ -25,12 +25,10 @@ struct Plan {
   /// the last: the point. Whoever has read up to point N may go on later with the question whose
   /// `after_point` is N and whose `limit`, if any, is so much less.
   bool goes_on_by_point = false;
-  std::string explanation;  ///< for people: lines, each ended by a line feed
 };
 
-/// Plans the answer to `question` from `database`, in which a study was stored. A question that
-/// asks to `explain` gets a statement that gives the lines of the explanation. Throws
-/// solver::InputError for a question that is wrong, naming the flag or the column and what is
+/// Plans the answer to `question` from `database`, which has kNumberFunction and the functions of
+/// lists. Throws solver::InputError for a wrong question, naming the flag or the column and what is
 /// allowed; StorageError for what cannot be read.
 Plan plan(sqlite3* database, protocol::StudyQuery question);
 

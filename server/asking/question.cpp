@@ -108,16 +108,8 @@ void check_columns(const protocol::StudyQuery& question, const std::vector<std::
   check_case_of_columns(kWhere, question.where(), columns, names_given);
   check_case_of_columns(kGroup, question.group(), columns, names_given);
   check_case_of_columns(kOrder, question.order(), columns, names_given);
-  check_numbers(kSelect, selected, {});
-  check_numbers(kOrder, question.order(), names_given);
-  if (question.group().empty()) {
-    check_gathered_into_one(kSelect, selected, columns);
-  } else {
-    check_gathered(kSelect, selected, question.group(), columns, {});
-    if (!question.order().empty()) {
-      check_gathered(kOrder, question.order(), question.group(), columns, names_given);
-    }
-  }
+  check_grouped(kSelect, selected, question, columns, {});
+  check_grouped(kOrder, question.order(), question, columns, names_given);
 }
 
 }  // namespace oblique::server

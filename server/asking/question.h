@@ -19,8 +19,8 @@ std::string selected_by(const protocol::StudyQuery& question);
 void check(const protocol::StudyQuery& question);
 
 /// Throws solver::InputError for names that differ from one of `columns` only in case, and for
-/// columns that have many values in a group, or in the one row that a function makes of all. The
-/// question was checked.
+/// columns of a row of a group that are neither keys nor aggregated; see check_grouped. The
+/// question passed `check`.
 void check_columns(const protocol::StudyQuery& question, const std::vector<std::string>& columns);
 
 }  // namespace oblique::server

@@ -2,18 +2,16 @@
 
 #include <algorithm>
 #include <memory>
-#include <optional>
 #include <string_view>
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/recipe/blocks.h"
 #include "proto/recipe/checks.h"
 #include "server/asking/columns.h"
-#include "server/asking/conditions.h"
 #include "server/asking/elements.h"
-#include "server/asking/grouping.h"
 #include "server/asking/lists/quick_views.h"
-#include "server/asking/question.h"
+#include "server/asking/point_ranges.h"
 #include "server/asking/sql/sql_expression.h"
 #include "server/asking/sql/sql_items.h"
 #include "server/database/sqlite.h"
@@ -23,83 +21,46 @@
 namespace oblique::server {
 namespace {
 
-/// Finding the first row of a span costs about so many rows that follow each other.
-constexpr std::uint64_t kRowsASpan = 3;
-
-/// The columns that rows are to be sorted by; none where it is by something else.
-std::optional<std::vector<SortKey>> sort_keys(const protocol::StudyQuery& question) {
-  std::vector<SortKey> keys;
-  const auto tokens = sql_tokens(question.order());
-  if (tokens.empty()) {
-    return keys;
+/// The points whose rows can answer a question, in rising order.
+std::vector<PointRange> points_asked(const protocol::StudyQuery& question,
+                                     const AskedStudy& study) {
+  std::vector<PointRange> ranges = study.recipe.blocks().empty()
+                                       ? std::vector<PointRange>{{0, INT64_MAX}}
+                                       : point_ranges(study.recipe, question.where());
+  if (question.has_after_point()) {
+    std::erase_if(ranges, [&](PointRange& range) {
+      const bool is_behind = range.last > question.after_point();
+      range.first = std::max(range.first, is_behind ? question.after_point() + 1 : 0);
+      return !is_behind;
+    });
   }
-  for (const SqlItem& item : sql_items(tokens)) {
-    const bool falls = same_but_case(item.name, "desc");
-    const bool is_column = item.tokens.size() == 1 &&
-                           item.tokens[0].kind == SqlToken::Kind::kName &&
-                           (item.name.empty() || falls || same_but_case(item.name, "asc"));
-    if (!is_column) {
-      return std::nullopt;
-    }
-    keys.push_back({std::string(item.tokens[0].text), falls});
-  }
-  return keys;
+  return ranges;
 }
 
-bool is_by_point(const std::vector<SortKey>& keys, bool falls) {
-  return keys.size() == 1 && keys[0].column == "point" && keys[0].falls == falls;
-}
-
-/// Spans in the order of axes, where rows are to be sorted so and spans can be; else none.
-std::vector<PointSpan> sorted_spans(const protocol::StudyQuery& question, const AskedStudy& study,
-                                    const Boxes& boxes) {
-  auto keys = sort_keys(question);
-  if (!keys || keys->empty() || !question.group().empty() || !gives_points(selected_by(question))) {
+/// The ranges as a table to join with; empty for a single one.
+std::string join_of(const std::vector<PointRange>& ranges) {
+  if (ranges.size() < 2) {
     return {};
   }
-  // Rows of one value of each axis come by their number anyway.
-  if (keys->back().column == "point" && !keys->back().falls) {
-    keys->pop_back();
-  }
-  const auto names = names_given_in(selected_by(question));
-  const auto is_no_axis = [&](const SortKey& key) {
-    return key.column == "point" ||
-           std::find(names.begin(), names.end(), key.column) != names.end();
-  };
-  if (keys->empty() || std::any_of(keys->begin(), keys->end(), is_no_axis)) {
-    return {};
-  }
-  return sorted_spans_of(study.recipe, boxes, *keys).value_or(std::vector<PointSpan>());
-}
-
-std::string join_of(const std::vector<PointSpan>& spans) {
-  // A list of JSON is read faster than VALUES is compiled.
+  // SQLite reads a JSON list faster than it compiles VALUES.
   std::string list;
-  for (const PointSpan& span : spans) {
-    list += fmt::format("{}\"{}\":{}", list.empty() ? "" : ",", span.first, span.last);
+  for (const PointRange& range : ranges) {
+    list += fmt::format("{}\"{}\":{}", list.empty() ? "" : ",", range.first, range.last);
   }
   return fmt::format("json_each('{{{}}}') AS span CROSS JOIN ", list);
 }
 
-/// Which points of the study, as conditions behind the study's own.
-std::string points_in_sql(const protocol::StudyQuery& question, const RowsAsked& rows) {
-  if (!rows.by_spans) {
-    return question.has_after_point()
-               ? fmt::format(" AND runs.point > {}",
-                             std::min<std::uint64_t>(question.after_point(), INT64_MAX))
-               : "";
+std::string condition_of(const std::vector<PointRange>& ranges) {
+  if (ranges.empty()) {
+    return "0";
   }
-  if (rows.spans.empty()) {
-    return " AND 0";
+  if (ranges.size() == 1) {
+    return fmt::format("runs.point BETWEEN {} AND {}", ranges[0].first, ranges[0].last);
   }
-  if (rows.spans.size() == 1) {
-    return fmt::format(" AND runs.point BETWEEN {} AND {}", rows.spans[0].first,
-                       rows.spans[0].last);
-  }
-  return " AND runs.point BETWEEN CAST(span.key AS INTEGER) AND span.value";
+  return "runs.point BETWEEN CAST(span.key AS INTEGER) AND span.value";
 }
 
-/// What a question names, of whatever kind.
+/// The names in a question: of columns, functions and others.
 struct Named {
   std::vector<std::string> names;
   bool all_columns = false;
@@ -126,8 +87,8 @@ Named named_in(const std::vector<std::string>& texts) {
   return named;
 }
 
-/// Whether the results alone have every column that is named, and none that the view `runs` has
-/// not: then models and workers need not be looked up for each row.
+/// Whether `results` has every named column. Then models and workers need not be looked up for each
+/// row. A name that `results` has and `runs` lacks is left to `runs`, where it is an error.
 bool needs_results_alone(sqlite3* database, const Named& named) {
   const auto runs = columns_of_statement(database, "SELECT * FROM runs LIMIT 0");
   const auto results = columns_of_statement(database, "SELECT * FROM results LIMIT 0");
@@ -165,12 +126,24 @@ std::string columns_of_rows(const protocol::StudyQuery& question, const Named& n
   return columns;
 }
 
-/// Whether a recipe is that of so many points.
-bool tells_points(const protocol::Recipe& recipe, std::uint64_t points) {
+/// The points that a study with this recipe counts: those that filters leave out are subtracted
+/// where they were counted.
+std::uint64_t points_left_in(const protocol::Recipe& recipe) {
+  std::uint64_t points = points_of(recipe);
+  for (const protocol::Block& block : recipe.blocks()) {
+    if (points > 0 && !block.where().empty() && block.has_points_left_in()) {
+      const std::uint64_t all = protocol::points_of_block(block);
+      points -= all - std::min(all, block.points_left_in());
+    }
+  }
+  return points;
+}
+
+bool has_points(const protocol::Recipe& recipe, std::int64_t points) {
   try {
-    return points > 0 && points_left_in(recipe) == points;
+    return points > 0 && points_left_in(recipe) == static_cast<std::uint64_t>(points);
   } catch (const solver::InputError&) {
-    return false;  // more than any study may have
+    return false;  // more than a study may have
   }
 }
 
@@ -182,18 +155,20 @@ AskedStudy asked_study(sqlite3* database, const std::string& name) {
   if (!study.step()) {
     throw solver::InputError(fmt::format("there is no study called \"{}\"", name));
   }
-  AskedStudy found{study.integer(0), static_cast<std::uint64_t>(study.integer(1)), {}};
-  // Points of a recipe that does not tell where they are are all looked at.
+  AskedStudy found{study.integer(0), {}};
   if (!protocol::parse_recipe(study.bytes(2), found.recipe) ||
-      !tells_points(found.recipe, found.points)) {
+      !has_points(found.recipe, study.integer(1))) {
     found.recipe.Clear();
   }
   return found;
 }
 
 bool is_in_point_order(const protocol::StudyQuery& question) {
-  const auto keys = sort_keys(question);
-  return question.group().empty() && keys && (keys->empty() || is_by_point(*keys, false));
+  const auto tokens = sql_tokens(question.order());
+  return question.group().empty() &&
+         (tokens.empty() ||
+          (tokens[0].text == "point" &&
+           (tokens.size() == 1 || (tokens.size() == 2 && is_word(tokens[1], "asc")))));
 }
 
 std::vector<std::string> columns_of_statement(sqlite3* database, const std::string& sql) {
@@ -219,67 +194,26 @@ std::vector<std::string> columns_of_statement(sqlite3* database, const std::stri
   return names;
 }
 
-RowsAsked rows_asked(const protocol::StudyQuery& question, const AskedStudy& study) {
-  RowsAsked rows;
-  Boxes boxes = boxes_of(question.where());
-  if (question.has_after_point()) {
-    for (Box& box : boxes) {
-      const ValueSet behind({static_cast<double>(question.after_point()) + 1, 1e18});
-      box.try_emplace("point", ValueSet::all()).first->second.intersect(behind);
-    }
-  }
-  constexpr std::size_t kMostBlocksAndBoxes = 200'000;
-  const auto blocks = static_cast<std::size_t>(study.recipe.blocks_size());
-  if (blocks == 0 || blocks * boxes.size() > kMostBlocksAndBoxes) {
-    return rows;  // nothing to look through, or too long
-  }
-  rows.spans = sorted_spans(question, study, boxes);
-  if (rows.spans.size() > 1) {
-    rows.by_spans = true;
-    rows.come_in_order = true;
-    return rows;
-  }
-  rows.spans.clear();
-  const auto is_free = [](const Box& box) { return box.empty(); };
-  if (std::any_of(boxes.begin(), boxes.end(), is_free)) {
-    return rows;
-  }
-  auto spans = spans_of(study.recipe, boxes);
-  const std::uint64_t points = points_in(spans);
-  const std::uint64_t all = points_of(study.recipe);
-  const bool is_few = points + kRowsASpan * spans.size() <= all - all / 10;
-  const auto keys = sort_keys(question);
-  const bool is_backwards = question.group().empty() && keys && is_by_point(*keys, true);
-  if (spans.size() > 1 && (!is_few || (is_backwards && points > all / 8))) {
-    spans = {{spans.front().first, spans.back().last}};
-  }
-  rows.by_spans = true;
-  rows.spans = std::move(spans);
-  rows.come_in_order = is_in_point_order(question) && rows.spans.size() > 1;
-  return rows;
-}
-
 std::string statement_of(sqlite3* database, const protocol::StudyQuery& question,
-                         const std::string& selected, const AskedStudy& study,
-                         const RowsAsked& rows) {
-  const std::string where = question.where().empty()
-                                ? ""
-                                : fmt::format(" WHERE ({})", in_sqlite(database, question.where()));
-  const std::string group = in_sqlite(database, question.group());
-  std::string order = in_sqlite(database, question.order());
-  if (order.empty()) {
-    order = group.empty() ? "point" : group;
-  }
+                         const std::string& selected, const AskedStudy& study) {
+  const std::string where =
+      question.where().empty() ? "" : fmt::format(" WHERE ({})", in_sqlite(question.where()));
+  const std::string group = in_sqlite(question.group());
+  const std::string order = !question.order().empty() ? in_sqlite(question.order())
+                            : group.empty()           ? "point"
+                                                      : group;
   const Named named = named_in({selected, where, group, order});
   const bool is_alone = needs_results_alone(database, named);
-  // The study is chosen inside, where no condition can widen it.
+  const auto ranges = points_asked(question, study);
+  // SQLite reads the ranges of a cross join one after another, and the rows of each by their key.
+  const bool is_sorted = ranges.size() > 1 && is_in_point_order(question);
+  // The study is chosen inside, where no condition can reach another one.
   return fmt::format(
-      "SELECT {} FROM (SELECT {} FROM {}{} AS runs WHERE runs.study_id = {}{}){}{}{}{}", selected,
-      columns_of_rows(question, named, is_alone), rows.spans.size() > 1 ? join_of(rows.spans) : "",
-      view_of(database, named, is_alone), study.study_id, points_in_sql(question, rows), where,
+      "SELECT {} FROM (SELECT {} FROM {}{} AS runs WHERE runs.study_id = {} AND {}){}{}{}{}",
+      selected, columns_of_rows(question, named, is_alone), join_of(ranges),
+      view_of(database, named, is_alone), study.study_id, condition_of(ranges), where,
       group.empty() ? "" : fmt::format(" GROUP BY {}", group),
-      // Spans are read one after another, and rows in them by their key.
-      rows.come_in_order ? "" : fmt::format(" ORDER BY {}", order),
+      is_sorted ? "" : fmt::format(" ORDER BY {}", order),
       question.has_limit()
           ? fmt::format(" LIMIT {}", std::min<std::uint64_t>(question.limit(), INT64_MAX))
           : "");

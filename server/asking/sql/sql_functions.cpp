@@ -2,10 +2,15 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <string>
+#include <system_error>
 
+#include <spdlog/fmt/fmt.h>
+
+#include "server/asking/sql/sql_tokens.h"
 #include "server/database/sqlite.h"
 
 namespace oblique::server {
@@ -23,15 +28,9 @@ struct Numbers {
   bool failed;
 };
 
-/// Mean and sum of squared differences from it, without cancellation (Welford 1962).
+/// Means, sums of squared differences from them and the sum of their products, without cancellation
+/// (Welford 1962).
 struct Moments {
-  std::uint64_t count;
-  double mean;
-  double squares;
-};
-
-/// Means, sums of squared differences from them and the sum of their products, likewise.
-struct Products {
   std::uint64_t count;
   double mean_x;
   double mean_y;
@@ -125,20 +124,28 @@ void numbers_final(sqlite3_context* context) {
   numbers->values = nullptr;
 }
 
-void moments_step(sqlite3_context* context, int, sqlite3_value** arguments) {
+/// Of the pair of the first and the last argument.
+void moments_step(sqlite3_context* context, int count_of_arguments, sqlite3_value** arguments) {
+  sqlite3_value* const x = arguments[0];
+  sqlite3_value* const y = arguments[count_of_arguments - 1];
   auto* const moments = static_cast<Moments*>(sqlite3_aggregate_context(context, sizeof(Moments)));
   if (moments == nullptr) {
     sqlite3_result_error_nomem(context);
     return;
   }
-  if (!is_number(context, arguments[0])) {
+  if (!is_number(context, x) || !is_number(context, y)) {
     return;
   }
-  const double value = sqlite3_value_double(arguments[0]);
   ++moments->count;
-  const double step = value - moments->mean;
-  moments->mean += step / static_cast<double>(moments->count);
-  moments->squares += step * (value - moments->mean);
+  const auto count = static_cast<double>(moments->count);
+  const double step_x = sqlite3_value_double(x) - moments->mean_x;
+  const double step_y = sqlite3_value_double(y) - moments->mean_y;
+  moments->mean_x += step_x / count;
+  moments->mean_y += step_y / count;
+  const double part = 1.0 - 1.0 / count;
+  moments->squares_x += step_x * step_x * part;
+  moments->squares_y += step_y * step_y * part;
+  moments->products += step_x * step_y * part;
 }
 
 /// Of a sample: divided by one less than there are; NULL for fewer than two.
@@ -146,54 +153,54 @@ template <bool is_root>
 void moments_final(sqlite3_context* context) {
   const auto* const moments = static_cast<const Moments*>(sqlite3_aggregate_context(context, 0));
   if (moments != nullptr && moments->count > 1) {
-    const double variance = moments->squares / static_cast<double>(moments->count - 1);
+    const double variance = moments->squares_x / static_cast<double>(moments->count - 1);
     sqlite3_result_double(context, is_root ? std::sqrt(variance) : variance);
   }
 }
 
-void corr_step(sqlite3_context* context, int, sqlite3_value** arguments) {
-  auto* const sums = static_cast<Products*>(sqlite3_aggregate_context(context, sizeof(Products)));
-  if (sums == nullptr) {
-    sqlite3_result_error_nomem(context);
-    return;
-  }
-  if (!is_number(context, arguments[0]) || !is_number(context, arguments[1])) {
-    return;
-  }
-  ++sums->count;
-  const auto count = static_cast<double>(sums->count);
-  const double step_x = sqlite3_value_double(arguments[0]) - sums->mean_x;
-  const double step_y = sqlite3_value_double(arguments[1]) - sums->mean_y;
-  sums->mean_x += step_x / count;
-  sums->mean_y += step_y / count;
-  const double part = 1.0 - 1.0 / count;
-  sums->squares_x += step_x * step_x * part;
-  sums->squares_y += step_y * step_y * part;
-  sums->products += step_x * step_y * part;
-}
-
 /// NULL for fewer than two rows, or where one of the two does not vary.
 void corr_final(sqlite3_context* context) {
-  const auto* const sums = static_cast<const Products*>(sqlite3_aggregate_context(context, 0));
-  if (sums != nullptr && sums->squares_x > 0.0 && sums->squares_y > 0.0) {
-    const double corr = sums->products / (std::sqrt(sums->squares_x) * std::sqrt(sums->squares_y));
+  const auto* const moments = static_cast<const Moments*>(sqlite3_aggregate_context(context, 0));
+  if (moments != nullptr && moments->squares_x > 0.0 && moments->squares_y > 0.0) {
+    const double corr =
+        moments->products / (std::sqrt(moments->squares_x) * std::sqrt(moments->squares_y));
     sqlite3_result_double(context, std::clamp(corr, -1.0, 1.0));
   }
 }
 
-constexpr std::array<DescribedFunction, 9> kFunctions{{
-    {"median(x)", "the middle value; half way between the two middle ones of an even number"},
-    {"percentile(x, p)", "the value that p percent lie below, between neighbours in proportion"},
-    {"stddev(x)", "standard deviation of a sample (n - 1)"},
-    {"variance(x)", "its square"},
-    {"corr(x, y)",
-     "Pearson's correlation of two columns, from -1 to 1; rows with a NULL are left out"},
-    {"count_mode('SC SR')",
-     "points whose major_mode is that; of others count(*) FILTER (WHERE e = 1)"},
-    {"avg(x), min(x), max(x), sum(x)", "of the points, or of each group of --group"},
-    {"count(*)", "number of points"},
-    {"round(x, n), abs(x)", "of one value"},
+constexpr std::array<SqlFunction, 18> kFunctions{{
+    {"median", "median(x)",
+     "the middle value; half way between the two middle ones of an even number", true, true},
+    {"percentile", "percentile(x, p)",
+     "the value that p percent lie below, between neighbours in proportion", true, true},
+    {"stddev", "stddev(x)", "standard deviation of a sample (n - 1)", true, true},
+    {"variance", "variance(x)", "its square", true},
+    {"corr", "corr(x, y)",
+     "Pearson's correlation of two columns, from -1 to 1; rows with a NULL are left out", true},
+    {"count_mode", "count_mode('SC SR')",
+     "points whose major_mode is that; of others count(*) FILTER (WHERE e = 1)", true},
+    {"avg", "avg(x)", "mean of the points, or of each group of --group", true, true},
+    {"min", "min(x)", "least of them", true, true},
+    {"max", "max(x)", "largest of them", true, true},
+    {"sum", "sum(x)", "their sum", true, true},
+    {"count", "count(*)", "number of points", true},
+    {"round", "round(x, n)", "one value to n decimals", false, true},
+    {"abs", "abs(x)", "of one value", false, true},
+    {"total", "", "", true, true},
+    {"group_concat", "", "", true},
+    {"string_agg", "", "", true},
+    {"json_group_array", "", "", true},
+    {"json_group_object", "", "", true},
 }};
+
+void nearest_double(sqlite3_context* context, int, sqlite3_value** arguments) {
+  const auto* const text = reinterpret_cast<const char*>(sqlite3_value_text(arguments[0]));
+  if (const auto number = decimal_number(text == nullptr ? "" : text)) {
+    sqlite3_result_double(context, *number);
+  } else {
+    refuse(context, "nearest_double takes a number as text");
+  }
+}
 
 }  // namespace
 
@@ -202,18 +209,38 @@ void add_functions(sqlite3* database) {
   const auto add = [&](const char* name, int arguments, auto step, auto last) {
     if (sqlite3_create_function_v2(database, name, arguments, kFlags, nullptr, nullptr, step, last,
                                    nullptr) != SQLITE_OK) {
-      throw StorageError(std::string("no function ") + name + ": " + sqlite3_errmsg(database));
+      throw StorageError(fmt::format("no function {}: {}", name, sqlite3_errmsg(database)));
     }
   };
   add("median", 1, &median_step, &numbers_final);
   add("percentile", 2, &percentile_step, &numbers_final);
   add("variance", 1, &moments_step, &moments_final<false>);
   add("stddev", 1, &moments_step, &moments_final<true>);
-  add("corr", 2, &corr_step, &corr_final);
+  add("corr", 2, &moments_step, &corr_final);
+  if (sqlite3_create_function_v2(database, kNumberFunction.data(), 1, kFlags, nullptr,
+                                 &nearest_double, nullptr, nullptr, nullptr) != SQLITE_OK) {
+    throw StorageError(
+        fmt::format("no function {}: {}", kNumberFunction, sqlite3_errmsg(database)));
+  }
 }
 
-std::span<const DescribedFunction> described_functions() {
+std::optional<double> decimal_number(std::string_view text) {
+  double number = 0.0;
+  const char* const end = text.data() + text.size();
+  const auto [read, error] = std::from_chars(text.data(), end, number);
+  const bool is_decimal = text.find_first_not_of("0123456789.eE+-") == std::string_view::npos;
+  return is_decimal && error == std::errc() && read == end ? std::optional(number) : std::nullopt;
+}
+
+std::span<const SqlFunction> sql_functions() {
   return kFunctions;
+}
+
+const SqlFunction* find_sql_function(std::string_view name) {
+  const auto* found = std::find_if(kFunctions.begin(), kFunctions.end(), [&](const auto& known) {
+    return same_but_case(known.name, name);
+  });
+  return found == kFunctions.end() ? nullptr : found;
 }
 
 }  // namespace oblique::server

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string_view>
 
@@ -7,22 +8,32 @@
 
 namespace oblique::server {
 
-/// What a statement fails with that gives one of these functions what it does not take.
+/// The error code of a statement that passes one of these functions a wrong argument.
 inline constexpr int kWrongArgument = SQLITE_MISMATCH;
 
 /// Gives statements on `database` the functions median(x), percentile(x, p), variance(x), stddev(x)
-/// and corr(x, y), which gather the numbers of rows; what is NULL does not count, and what is no
-/// number is an error. The first two keep 8 bytes a row in memory that SQLite counts. Throws
-/// StorageError.
+/// and corr(x, y), which aggregate the numbers of rows; NULLs do not count, and other values than
+/// numbers are an error. The first two keep 8 bytes a row in memory that SQLite counts. And
+/// kNumberFunction. Throws StorageError.
 void add_functions(sqlite3* database);
 
-/// What listings say of a function.
-struct DescribedFunction {
-  std::string_view form;
-  std::string_view meaning;
-};
+/// A function of one text that gives the double nearest to the number in it.
+inline constexpr std::string_view kNumberFunction = "nearest_double";
 
-/// These, and those of SQLite that people ask for most.
-std::span<const DescribedFunction> described_functions();
+/// The double nearest to what `text` writes in decimals, as .5 or 1e-3; none for other texts.
+std::optional<double> decimal_number(std::string_view text);
+
+/// A function that questions may use, ours or SQLite's.
+struct SqlFunction {
+  std::string_view name;
+  std::string_view form;     ///< for listings; empty: it is not listed
+  std::string_view meaning;  ///< one line
+  bool aggregates = false;   ///< with one argument, where the name is min or max
+  bool keeps_unit = false;   ///< its value has the unit of its first argument
+};
+std::span<const SqlFunction> sql_functions();
+
+/// The function of that name, in whatever case; nullptr: none of these.
+const SqlFunction* find_sql_function(std::string_view name);
 
 }  // namespace oblique::server

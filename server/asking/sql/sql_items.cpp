@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 
+#include "server/asking/sql/sql_functions.h"
+
 namespace oblique::server {
 namespace {
 
@@ -98,29 +100,26 @@ std::string name_of(const SqlToken& token) {
   return name;
 }
 
-bool is_aggregate(std::string_view name, std::size_t arguments) {
-  constexpr std::array<std::string_view, 14> kGather{
-      "count",      "sum",        "total",  "avg",      "group_concat", "json_group_array",
-      "median",     "percentile", "stddev", "variance", "count_mode",   "json_group_object",
-      "string_agg", "corr"};
-  const auto is_it = [&](std::string_view known) { return same_but_case(known, name); };
-  return std::any_of(kGather.begin(), kGather.end(), is_it) ||
-         (arguments == 1 && (is_it("min") || is_it("max")));
-}
-
-std::size_t arguments_in(std::span<const SqlToken> tokens, std::size_t open, std::size_t close) {
-  if (close <= open + 1) {
-    return 0;
+bool calls_aggregate(std::span<const SqlToken> tokens, std::size_t i) {
+  const bool is_call = i + 1 < tokens.size() && tokens[i].kind == SqlToken::Kind::kName &&
+                       tokens[i + 1].is_sign('(');
+  const SqlFunction* const function = is_call ? find_sql_function(tokens[i].text) : nullptr;
+  if (function == nullptr || !function->aggregates) {
+    return false;
   }
-  std::size_t arguments = 1;
-  for (std::size_t i = open + 1; i < close; ++i) {
-    if (tokens[i].is_sign('(')) {
-      i = closing_bracket(tokens, i);
-    } else if (tokens[i].is_sign(',')) {
-      ++arguments;
+  if (function->name != "min" && function->name != "max") {
+    return true;
+  }
+  // With several arguments they compare these, not rows.
+  const std::size_t close = closing_bracket(tokens, i + 1);
+  for (std::size_t j = i + 2; j < close; ++j) {
+    if (tokens[j].is_sign('(')) {
+      j = closing_bracket(tokens, j);
+    } else if (tokens[j].is_sign(',')) {
+      return false;
     }
   }
-  return arguments;
+  return true;
 }
 
 }  // namespace oblique::server

@@ -29,10 +29,7 @@ std::size_t closing_bracket(std::span<const SqlToken> tokens, std::size_t open);
 /// The name that a token writes, without its quotes.
 std::string name_of(const SqlToken& token);
 
-/// Whether `name`, in lower case, is a function that gathers rows when it has so many arguments.
-bool is_aggregate(std::string_view name, std::size_t arguments);
-
-/// Number of arguments of the function whose brackets are these; `count(*)` has one.
-std::size_t arguments_in(std::span<const SqlToken> tokens, std::size_t open, std::size_t close);
+/// Whether a function that aggregates rows is called at token `i`.
+bool calls_aggregate(std::span<const SqlToken> tokens, std::size_t i);
 
 }  // namespace oblique::server

@@ -9,8 +9,7 @@
 
 #include "proto/recipe/axes.h"
 #include "server/asking/columns.h"
-#include "server/asking/conditions.h"
-#include "server/asking/point_spans.h"
+#include "server/asking/point_ranges.h"
 #include "server/asking/sql/sql_expression.h"
 #include "server/web/answers/fields.h"
 #include "server/web/answers/grid.h"
@@ -65,7 +64,7 @@ bool is_worth_it(const LookedAtStudy& study, const FilterQuestion& question) {
   constexpr std::uint64_t kMuch = 8;
   constexpr int kManyBlocks = 1000;  // too many to look through
   const auto points_read = [&](const std::string& condition) {
-    return points_in(spans_of(study.table->recipe(), boxes_of(condition)));
+    return points_in(point_ranges(study.table->recipe(), condition));
   };
   return study.points > ColumnStore::kMostPoints ||
          study.table->recipe().blocks_size() > kManyBlocks ||

@@ -98,7 +98,7 @@ def test_studies_say_where_they_stand(database):
     "study, keys, sentence",
     [
         ("swep", {}, 'did you mean'),
-        ("sweep", {"select": "fn_pk"}, "no such column: fn_pk (did you mean `fn_peak_N`"),
+        ("sweep", {"select": "fn_peak"}, "no such column: fn_peak (did you mean `fn_peak_N`"),
         ("sweep", {"where": "mu >"}, 'where "mu >" is not allowed'),
         ("sweep", {"limit": -1}, "limit = -1 is not allowed"),
     ],

@@ -41,11 +41,9 @@ TEST(ResultQuery, AGroupHasItsOwnColumnsAndOrderWhereNoneAreGiven) {
                         q.group = "e";
                         q.select = "e, avg(mu)";
                         q.order = "avg(mu)";
-                        q.explain = true;
                       })).question();
   EXPECT_EQ(chosen.select(0), "e, avg(mu)");
   EXPECT_EQ(chosen.order(), "avg(mu)");
-  EXPECT_TRUE(chosen.explain());
 }
 
 TEST(ResultQuery, EachFlagIsCheckedAndNamed) {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,6 +12,7 @@
 #include "proto/result_message.h"
 #include "server/asking/lists/list_functions.h"
 #include "server/asking/question.h"
+#include "server/asking/sql/sql_functions.h"
 #include "server/asking/statement.h"
 #include "server/database/open_for_reading.h"
 #include "server/reading/reader.h"
@@ -63,6 +63,7 @@ class PlanTest : public testing::Test {
 
   Plan plan_of(const protocol::StudyQuery& question) const {
     const auto database = open_for_reading(path_).database;
+    add_functions(database.get());
     add_list_functions(database.get());
     return plan(database.get(), question);
   }
@@ -184,42 +185,6 @@ TEST_F(PlanTest, AnAnswerGoesOnAfterAPointWhateverIsKnownOfTheRecipe) {
   rest.set_where("mu >= 0 OR 1");
   rest.set_after_point(4);
   EXPECT_THAT(answer(rest), IsEmpty());
-}
-
-TEST_F(PlanTest, AFilteredStudyIsPlannedByItsRecipe) {
-  protocol::PointTable table(protocol::recipe_of_blocks(
-      {protocol::filtered({protocol::range("H", 0.1, 1.0, 10), protocol::range("mu", 0.1, 1.0, 10),
-                           protocol::listed("e", {1.0})},
-                          "mu > 0.95 || H > 0.95")}));
-  table.survey([] { return true; });
-  const auto filtered = std::make_shared<const protocol::PointTable>(std::move(table));
-  {
-    Store store(path_);
-    AddResults results{3, filtered, 0, "", "", 1, "now", {}};
-    for (std::uint64_t point = 0; point < filtered->size(); ++point) {
-      if (filtered->is_left_in(point)) {
-        results.results.push_back(solved_point(point));
-      }
-    }
-    store.commit(std::vector<Change>{AddStudy{3, "filtered", filtered, "2024-01-03T00:00:00.000Z"},
-                                     results});
-  }
-  auto asked = question("point", "H = 0.5");
-  asked.set_study("filtered");
-  EXPECT_THAT(answer(asked), ElementsAre(49));
-  asked.set_where("H > 0.85");
-  asked.set_after_point(89);
-  EXPECT_THAT(answer(asked), ElementsAre(90, 91, 92, 93, 94, 95, 96, 97, 98, 99));
-  asked.clear_where();
-  asked.set_after_point(69);
-  EXPECT_THAT(answer(asked), ElementsAre(79, 89, 90, 91, 92, 93, 94, 95, 96, 97, 98, 99));
-  asked.clear_after_point();
-  asked.set_where("H >= 0.85");
-  EXPECT_THAT(plan_of(asked).statement, HasSubstr("BETWEEN 80 AND 99"));
-  asked.set_explain(true);
-  EXPECT_THAT(plan_of(asked).explanation,
-              AllOf(HasSubstr("20 of 100 by the recipe before its filter, in 1 range: 80-99"),
-                    HasSubstr("at most 19 rows")));
 }
 
 TEST_F(PlanTest, WhatGathersOrSortsDoesNotGoOn) {
