@@ -45,7 +45,10 @@ constexpr const char* kLong =
 /// A pool with a clock that only the tests advance.
 class QueryPoolTest : public testing::Test {
  protected:
-  QueryPoolTest() { Store store(path_); }
+  QueryPoolTest() {
+    Store store(path_);
+    settings_.reader_program = OBLIQUE_SERVER_PROGRAM;
+  }
 
   QueryPool& pool() {
     if (!pool_) {
@@ -122,7 +125,7 @@ class QueryPoolTest : public testing::Test {
 
   test::TemporaryFolder folder_;
   std::string path_ = folder_.file("studies.db");
-  QueryPoolSettings settings_{.reader_program = OBLIQUE_SERVER_PROGRAM};
+  QueryPoolSettings settings_;
 
  private:
   void take(const QueryReport& report) {
