@@ -168,7 +168,6 @@ class Database {
                  const std::string& group, const std::string& order,
                  std::optional<std::uint64_t> limit) {
     protocol::QueryRequest request;
-    request.set_in_chunks(true);
     protocol::StudyQuery& question = *request.mutable_question();
     question.set_study(study);
     question.set_where(where);
@@ -185,7 +184,6 @@ class Database {
 
   py::list sql(const std::string& statement) {
     protocol::QueryRequest request;
-    request.set_in_chunks(true);
     request.set_sql(statement);
     return ask(request);
   }

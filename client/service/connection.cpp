@@ -327,18 +327,4 @@ protocol::Recipe Connection::describe(const std::string& study) {
   return call(std::move(request)).describe().recipe();
 }
 
-protocol::QueryReply Connection::query(const std::string& sql, std::uint64_t max_rows,
-                                       const Tell& tell) {
-  protocol::ClientRequest request;
-  request.mutable_query()->set_sql(sql);
-  request.mutable_query()->set_max_rows(max_rows);
-  request.mutable_query()->set_time_limit_ms(static_cast<std::uint64_t>(settings_.timeout_ms));
-  protocol::ClientReply reply = call(std::move(request), tell);
-  if (reply.query().truncated()) {
-    throw ServerError(fmt::format("{} gave only the first {} rows of an answer",
-                                  settings_.server_url, reply.query().rows_size()));
-  }
-  return std::move(*reply.mutable_query());
-}
-
 }  // namespace oblique::client

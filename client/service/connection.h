@@ -99,11 +99,9 @@ class Connection {
   /// Deletes it with its results.
   protocol::ChangeReply remove(const protocol::StudyStatus& study);
   protocol::Recipe describe(const std::string& study);
-  /// Runs one statement that only reads, for no longer than an answer is waited for; `max_rows` 0
-  /// leaves that limit to the server. For answers that fit into one reply; a longer one is a
-  /// ServerError.
-  protocol::QueryReply query(const std::string& sql, std::uint64_t max_rows = 0,
-                             const Tell& tell = {});
+  /// The whole answer to one statement that only reads, as `rows` of one reply. For answers that
+  /// fit into memory.
+  protocol::QueryReply query(const std::string& sql, const Tell& tell = {});
 
   /// The chunks of the answer to a question, all of them. For answers that fit into memory.
   std::vector<protocol::QueryReply> chunks(protocol::QueryRequest request, const Tell& tell = {});

@@ -10,6 +10,7 @@
 #include "client/service/connection.h"
 #include "proto/frames.h"
 #include "proto/wire/chunk_rows.h"
+#include "proto/wire/chunk_writer.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {
@@ -18,7 +19,6 @@ void Connection::ask_for_rows(protocol::QueryRequest request) {
   end_rows();
   Rows rows;
   *rows.request.mutable_query() = std::move(request);
-  rows.request.mutable_query()->set_in_chunks(true);
   rows.request.mutable_query()->set_time_limit_ms(static_cast<std::uint64_t>(settings_.timeout_ms));
   rows_ = std::move(rows);
 }
@@ -32,6 +32,16 @@ std::vector<protocol::QueryReply> Connection::chunks(protocol::QueryRequest requ
     all.push_back(next_rows());
   }
   return all;
+}
+
+protocol::QueryReply Connection::query(const std::string& sql, const Tell& tell) {
+  protocol::QueryRequest request;
+  request.set_sql(sql);
+  protocol::QueryReply whole;
+  for (const protocol::QueryReply& chunk : chunks(std::move(request), tell)) {
+    protocol::append_rows(chunk, whole);
+  }
+  return whole;
 }
 
 protocol::QueryReply Connection::next_rows() {

@@ -126,10 +126,7 @@ RunEnd submit_and_wait(const Study& study, const RunSettings& settings, Embedded
   if (stop.requested()) {
     throw Interrupted("stopped");
   }
-  const auto query = [&](const std::string& sql) {
-    const std::uint64_t servers_limit = 0;
-    return connection.query(sql, servers_limit, tell_line);
-  };
+  const auto query = [&](const std::string& sql) { return connection.query(sql, tell_line); };
   end.rows = connection.chunks(first_results(study.name, settings.rows), tell_line);
   end.exit_code = tell_end(end.status, query);
   return end;

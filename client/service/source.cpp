@@ -28,7 +28,7 @@ class DatabaseSource : public Source {
   }
 
   std::unique_ptr<RowStream> rows(protocol::QueryRequest request) override {
-    return std::make_unique<DatabaseRows>(file_, reader_, std::move(request), limits_);
+    return std::make_unique<DatabaseRows>(reader_, request, limits_);
   }
   std::vector<protocol::StudyStatus> status(const std::string& study, const Tell&) override {
     try {
@@ -63,7 +63,7 @@ class DatabaseSource : public Source {
   std::string file_;
   server::Reader reader_;
   // Nobody else is kept waiting.
-  server::QueryLimits limits_{UINT64_MAX, UINT64_MAX, 0, std::int64_t{64} << 20U, 0};
+  server::QueryLimits limits_{UINT64_MAX, 0, std::int64_t{64} << 20U};
 };
 
 class ServerRows : public RowStream {
@@ -116,9 +116,7 @@ protocol::QueryReply Source::query(const std::string& sql) {
   protocol::QueryReply whole;
   for (bool ends = false; !ends;) {
     const protocol::QueryReply chunk = stream->next();
-    protocol::QueryReply part = protocol::as_rows(chunk);
-    whole.mutable_columns()->Swap(part.mutable_columns());
-    whole.mutable_rows()->MergeFrom(part.rows());
+    protocol::append_rows(chunk, whole);
     ends = chunk.ends();
   }
   return whole;

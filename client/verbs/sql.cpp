@@ -19,8 +19,7 @@ One statement that only reads, in SQLite's SQL with median(x), percentile(x, p),
 variance(x) and corr(x, y) beside its functions. What `oblique query` alone knows is written otherwise here:
   peaks[0].fn_N           peaks ->> '$[0][1]', or the views peaks, phases, stick_intervals and
                           reaction_peaks
-  count_mode('SC SR')     count(*) FILTER (WHERE major_mode = 'SC SR')
-  mode LIKE 'SC%'         mode GLOB 'SC*': SQLite's LIKE takes s for S)";
+  count_mode('SC SR')     count(*) FILTER (WHERE major_mode = 'SC SR'))";
 
 struct SqlFlags {
   std::string statement;

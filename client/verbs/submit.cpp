@@ -89,10 +89,7 @@ int watch(const Study& study, std::uint64_t study_id, std::int64_t rows,
   if (stop.requested()) {
     throw Interrupted("no longer watching");
   }
-  const std::uint64_t servers_limit = 0;
-  const auto query = [&](const std::string& sql) {
-    return connection.query(sql, servers_limit, tell_line);
-  };
+  const auto query = [&](const std::string& sql) { return connection.query(sql, tell_line); };
   if (rows > 0) {
     print_first(connection.chunks(first_results(study.name, rows), tell_line), status.points());
     std::cerr << "More: " << for_more << '\n';

@@ -117,8 +117,7 @@ QueryReply as_chunk(const QueryReply& whole) {
   return chunk;
 }
 
-QueryReply as_rows(const QueryReply& chunk) {
-  QueryReply whole;
+void append_rows(const QueryReply& chunk, QueryReply& whole) {
   *whole.mutable_columns() = chunk.columns();
   ChunkRows rows(chunk);
   while (rows.next()) {
@@ -141,6 +140,11 @@ QueryReply as_rows(const QueryReply& chunk) {
       }
     }
   }
+}
+
+QueryReply as_rows(const QueryReply& chunk) {
+  QueryReply whole;
+  append_rows(chunk, whole);
   return whole;
 }
 

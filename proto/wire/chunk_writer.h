@@ -47,7 +47,11 @@ class ChunkWriter {
 /// The same rows as a chunk, which is the last one, of an answer that came whole.
 QueryReply as_chunk(const QueryReply& whole);
 
-/// The same rows, each a message; for answers that go whole. `chunk` is sound (chunk_rows.h).
+/// Appends the rows of a chunk, each as a message, and sets the columns. `chunk` is sound
+/// (chunk_rows.h).
+void append_rows(const QueryReply& chunk, QueryReply& whole);
+
+/// The same for a single chunk.
 QueryReply as_rows(const QueryReply& chunk);
 
 }  // namespace oblique::protocol

@@ -77,7 +77,7 @@ class Adder {
 }  // namespace
 
 void add_limits(CLI::App& app, NetworkLimits& network, ServiceSettings& service,
-                TurnSettings& queries) {
+                QueueSettings& queries) {
   const auto help = std::make_shared<BriefHelp>();
   help->column_width(app.get_formatter()->get_column_width());
   app.formatter(help);
@@ -123,7 +123,7 @@ void add_limits(CLI::App& app, NetworkLimits& network, ServiceSettings& service,
       "Long requests of one client that wait");
   add("long-request-bytes", clients.most_long_bytes, kOneMessage, kMostBytes,
       "Long requests that wait");
-  add("running-queries", queries.readers, 2, 256, "Queries that run side by side");
+  add("running-queries", queries.readers, 1, 256, "Queries that run side by side");
   add("running-queries-of-client", queries.most_running_each, 1, 256,
       "Queries of one client that run side by side");
   add("waiting-queries", queries.most_waiting, 1, kMost, "Queries that wait");

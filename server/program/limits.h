@@ -3,7 +3,7 @@
 #include <CLI/CLI.hpp>
 
 #include "server/network/network.h"
-#include "server/queries/query_turns.h"
+#include "server/queries/query_queue.h"
 #include "server/service/service.h"
 
 namespace oblique::server {
@@ -11,6 +11,6 @@ namespace oblique::server {
 /// Adds an option --limits-KEY for each bound that people may set, which --help does not show. All
 /// of the structures must outlive `app`; what they hold is the default.
 void add_limits(CLI::App& app, NetworkLimits& network, ServiceSettings& service,
-                TurnSettings& queries);
+                QueueSettings& queries);
 
 }  // namespace oblique::server

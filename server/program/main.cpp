@@ -193,7 +193,7 @@ void add_options(CLI::App& app, Configuration& configuration, StopWithParent& pa
   configuration.keep_to_command_line(only);
   configuration.keep_to_command_line(parent.add_to(app));
   add_log_flags(app, configuration, options.log);
-  add_limits(app, loop.network, loop.service, loop.queries.turns);
+  add_limits(app, loop.network, loop.service, loop.queries.queue);
 }
 
 /// The exit code when there is nothing to run, or it is told what is wrong with the options.

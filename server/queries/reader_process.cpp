@@ -23,7 +23,7 @@
 namespace oblique::server {
 namespace {
 
-/// A killed process is gone at once, unless the system itself hangs on its disk.
+/// A killed process ends at once, except while the system waits for a disk.
 constexpr std::chrono::milliseconds kLongestEnd{500};
 constexpr std::size_t kReadBytes = 64 * 1024;
 
@@ -51,41 +51,52 @@ ReaderProcess::ReaderProcess(const std::string& program, const std::string& path
 }
 
 ReaderProcess::~ReaderProcess() {
-  kill();
-  const auto give_up = std::chrono::steady_clock::now() + kLongestEnd;
-  while (!is_gone() && std::chrono::steady_clock::now() < give_up) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  }
+  end();
   ::close(channel_);
 }
 
 void ReaderProcess::ask(const std::string& request) {
-  const auto length = static_cast<FrameLength>(request.size());
-  out_.assign(reinterpret_cast<const char*>(&length), sizeof length);
+  const FrameHead head{static_cast<std::uint32_t>(request.size()), 1};
+  out_.assign(reinterpret_cast<const char*>(&head), sizeof head);
   out_ += request;
-  sent_ = 0;
-  in_.clear();
-  state_ = State::kWorking;
+  is_asked_ = true;
+  is_broken_ = !send_some();
 }
 
 short ReaderProcess::events() const {
-  const bool sends = state_ == State::kWorking && sent_ < out_.size();
-  return static_cast<short>(sends ? POLLIN | POLLOUT : POLLIN);
+  return static_cast<short>(out_.empty() ? POLLIN : POLLIN | POLLOUT);
 }
 
-ReaderProcess::State ReaderProcess::advance() {
-  if (state_ != State::kAnswered && state_ != State::kEnded && (!send_some() || !receive_some())) {
-    state_ = State::kEnded;
+std::optional<ReaderProcess::Frame> ReaderProcess::read() {
+  is_broken_ = is_broken_ || !send_some();
+  while (!is_broken_) {
+    FrameHead head{};
+    if (in_.size() >= sizeof head) {
+      std::memcpy(&head, in_.data(), sizeof head);
+      if (!is_asked_ || head.length > protocol::kMaxFrameBytes) {
+        is_broken_ = true;
+        return std::nullopt;
+      }
+      if (in_.size() >= sizeof head + head.length) {
+        Frame frame{in_.substr(sizeof head, head.length), head.is_last != 0};
+        in_.erase(0, sizeof head + head.length);
+        is_asked_ = !frame.is_last;
+        return frame;
+      }
+    }
+    if (!receive_some()) {
+      return std::nullopt;
+    }
   }
-  return state_;
+  return std::nullopt;
 }
 
-/// False when the process is gone.
+/// False when the process has gone.
 bool ReaderProcess::send_some() {
-  while (sent_ < out_.size()) {
-    const ssize_t sent = ::send(channel_, out_.data() + sent_, out_.size() - sent_, MSG_NOSIGNAL);
+  while (!out_.empty()) {
+    const ssize_t sent = ::send(channel_, out_.data(), out_.size(), MSG_NOSIGNAL);
     if (sent >= 0) {
-      sent_ += static_cast<std::size_t>(sent);
+      out_.erase(0, static_cast<std::size_t>(sent));
     } else if (errno != EINTR) {
       return errno == EAGAIN;
     }
@@ -93,80 +104,47 @@ bool ReaderProcess::send_some() {
   return true;
 }
 
-/// False when the process is gone, or says what no reader says.
+/// False when nothing has come.
 bool ReaderProcess::receive_some() {
   std::array<char, kReadBytes> bytes;
-  while (look_for_frame()) {
-    if (state_ == State::kAnswered) {
+  while (true) {
+    const ssize_t got = ::recv(channel_, bytes.data(), bytes.size(), 0);
+    if (got > 0) {
+      in_.append(bytes.data(), static_cast<std::size_t>(got));
       return true;
     }
-    const ssize_t got = ::recv(channel_, bytes.data(), bytes.size(), 0);
-    if (got < 0 && errno == EINTR) {
-      continue;
+    if (got == 0 || errno != EINTR) {
+      is_broken_ = got == 0 || errno != EAGAIN;
+      return false;
     }
-    if (got <= 0) {
-      return got < 0 && errno == EAGAIN;
-    }
-    in_.append(bytes.data(), static_cast<std::size_t>(got));
   }
-  return false;
-}
-
-/// Answered when `in_` begins with a whole frame. False when no reader says what it begins with.
-bool ReaderProcess::look_for_frame() {
-  if (in_.size() < sizeof(AnswerHead)) {
-    return in_.empty() || state_ == State::kWorking;
-  }
-  const std::size_t length = head().length;
-  if (state_ != State::kWorking || length > protocol::kMaxFrameBytes) {
-    return false;
-  }
-  if (in_.size() >= sizeof(AnswerHead) + length) {
-    state_ = State::kAnswered;
-  }
-  return true;
-}
-
-AnswerHead ReaderProcess::head() const {
-  AnswerHead head{};
-  std::memcpy(&head, in_.data(), sizeof head);
-  return head;
-}
-
-ReaderAnswer ReaderProcess::take_answer() {
-  ReaderAnswer answer{head(), {}};
-  answer.reply = in_.substr(sizeof answer.head, answer.head.length);
-  in_.erase(0, sizeof answer.head + answer.head.length);
-  if (answer.head.ends == 0) {
-    state_ = State::kWorking;
-  } else {
-    out_ = {};
-    sent_ = 0;
-    state_ = State::kIdle;
-  }
-  return answer;
 }
 
 void ReaderProcess::kill() {
-  // Waited for here and nowhere else, so the number cannot have passed to another process.
+  // Only this class waits for the process, so its id cannot have been reused.
   if (!is_gone()) {
     ::kill(pid_, SIGKILL);
   }
 }
 
-bool ReaderProcess::is_gone() {
-  if (!gone_) {
-    gone_ = waitpid(pid_, &status_, WNOHANG) == pid_;
+std::string ReaderProcess::end() {
+  kill();
+  const auto give_up = std::chrono::steady_clock::now() + kLongestEnd;
+  while (!is_gone() && std::chrono::steady_clock::now() < give_up) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
-  return gone_;
-}
-
-std::string ReaderProcess::ending() const {
   if (WIFSIGNALED(status_)) {
     const int signal = WTERMSIG(status_);
     return "was killed by signal " + std::to_string(signal) + " (" + strsignal(signal) + ")";
   }
   return "ended with exit code " + std::to_string(WEXITSTATUS(status_));
+}
+
+bool ReaderProcess::is_gone() {
+  if (!is_gone_) {
+    is_gone_ = waitpid(pid_, &status_, WNOHANG) == pid_;
+  }
+  return is_gone_;
 }
 
 }  // namespace oblique::server

@@ -1,23 +1,16 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 
 #include <sys/types.h>
 
-#include "server/queries/reader_program.h"
-
 namespace oblique::server {
 
-/// One frame of an answer; see AnswerHead.
-struct ReaderAnswer {
-  AnswerHead head;
-  std::string reply;
-};
-
-/// One process that reads a database for this one, one query at a time; see reader_program.h. It is
-/// killed when this is destroyed, when its owner says so, or when the thread that made this ends.
-/// Nothing here waits for it, but for the destructor, a short time.
+/// A child process that answers one query at a time; see reader_program.h. It is killed when this
+/// is destroyed and when the thread that created this ends. Only `end` and the destructor wait for
+/// it, and only for a short time.
 class ReaderProcess {
  public:
   /// Starts `program` for the database at `path`. Throws std::system_error.
@@ -26,42 +19,40 @@ class ReaderProcess {
   ReaderProcess(const ReaderProcess&) = delete;
   ReaderProcess& operator=(const ReaderProcess&) = delete;
 
-  /// Gives it a query, the bytes of a QueryRequest. Not before the last one was answered.
+  /// Sends a query, an encoded QueryRequest. The previous answer must have been read to its end.
   void ask(const std::string& request);
 
-  enum class State { kIdle, kWorking, kAnswered, kEnded };
-  /// Moves bytes both ways as far as they go without waiting, until a frame of the answer has come.
-  /// Throws std::bad_alloc.
-  State advance();
-  State state() const { return state_; }
-  /// What stands before that frame.
-  AnswerHead head() const;
-  /// That frame, once. Until it is taken the process is read no further, and so soon stands still.
-  ReaderAnswer take_answer();
+  struct Frame {
+    std::string reply;  ///< an encoded ClientReply without request_id
+    bool is_last;
+  };
+  /// Sends and receives what is possible without waiting. Returns the next frame of the answer once
+  /// it is complete. The process blocks while its frames are not read.
+  std::optional<Frame> read();
+  /// The process has closed its end, or sent bytes that are no answer. Set by `read`.
+  bool is_broken() const { return is_broken_; }
 
-  /// To be polled for `events()` before the next `advance`; -1 when it has nothing more to say.
-  int descriptor() const { return state_ == State::kEnded ? -1 : channel_; }
+  /// To be polled for `events()` before the next `read`.
+  int descriptor() const { return channel_; }
   short events() const;
 
   void kill();
-  /// Whether the process has ended; after `kill` it soon has.
-  bool is_gone();
-  /// How it ended, as "was killed by signal 9 (Killed)"; only once it is gone.
-  std::string ending() const;
+  /// Kills it if needed and waits for its end. Returns how it ended, as "ended with exit code 3".
+  std::string end();
 
  private:
   bool send_some();
   bool receive_some();
-  bool look_for_frame();
+  bool is_gone();
 
   int channel_ = -1;
   pid_t pid_ = -1;
-  bool gone_ = false;
-  int status_ = 0;  ///< as waitpid tells it, once gone
-  State state_ = State::kIdle;
-  std::string out_;
-  std::size_t sent_ = 0;  ///< of out_
-  std::string in_;        ///< what has come of the answer and was not taken
+  bool is_gone_ = false;
+  int status_ = 0;  ///< as waitpid returns it, once gone
+  bool is_broken_ = false;
+  bool is_asked_ = false;  ///< a query was sent whose answer has not ended
+  std::string out_;        ///< bytes to send
+  std::string in_;         ///< received bytes of the frames that were not returned
 };
 
 }  // namespace oblique::server

@@ -1,15 +1,11 @@
 #include "server/queries/reader_program.h"
 
-#include <array>
 #include <cerrno>
-#include <cstring>
 #include <exception>
 #include <fstream>
-#include <functional>
 #include <iostream>
 #include <new>
 #include <optional>
-#include <stdexcept>
 #include <system_error>
 
 #include <malloc.h>
@@ -22,7 +18,6 @@
 
 #include "proto/frames.h"
 #include "proto/text.h"
-#include "server/reading/query_values.h"
 #include "server/reading/reader.h"
 #include "worker/solver/model/errors.h"
 
@@ -36,7 +31,8 @@ constexpr rlim_t kLargestFile = 64U << 20U;
 /// Behind the server and the workers, and the first to go when the machine runs out of memory.
 constexpr int kNiceness = 5;
 constexpr const char* kFirstToGo = "1000";
-/// Processor time over a query's limit: a backstop, for the server ends it before.
+/// Processor time beyond the limit of a query. Matters only where the server that would kill this
+/// process is gone.
 constexpr rlim_t kSpareCpu_s = 10;
 constexpr std::size_t kLongestError = 4000;
 
@@ -79,7 +75,7 @@ void confine() {
   std::ofstream("/proc/self/oom_score_adj") << kFirstToGo;
 }
 
-/// SIGXCPU ends the process when this query takes so much more than it may.
+/// Lets SIGXCPU end the process when one chunk takes far longer than the query may.
 void limit_cpu(std::int64_t time_limit_ms) {
   rusage used{};
   check(getrusage(RUSAGE_SELF, &used) == 0, "getrusage");
@@ -104,26 +100,14 @@ bool receive_all(void* to, std::size_t size) {
   return true;
 }
 
-/// Waits until the server takes more; calls `stalls` when that is not before long.
-void wait_for_server(const std::function<void()>& stalls) {
-  constexpr int kSoon_ms = 100;
-  pollfd channel{kReaderChannel, POLLOUT, 0};
-  if (::poll(&channel, 1, kSoon_ms) == 0) {
-    stalls();
-    (void)::poll(&channel, 1, -1);
-  }
-}
-
-/// False when the server has gone.
-bool send_all(const void* from, std::size_t size, const std::function<void()>& stalls) {
+/// Blocks while the server takes nothing. False when the server has gone.
+bool send_all(const void* from, std::size_t size) {
   const auto* at = static_cast<const char*>(from);
   while (size > 0) {
-    const ssize_t sent = ::send(kReaderChannel, at, size, MSG_NOSIGNAL | MSG_DONTWAIT);
+    const ssize_t sent = ::send(kReaderChannel, at, size, MSG_NOSIGNAL);
     if (sent >= 0) {
       at += sent;
       size -= static_cast<std::size_t>(sent);
-    } else if (errno == EAGAIN) {
-      wait_for_server(stalls);
     } else if (errno != EINTR) {
       return false;
     }
@@ -131,12 +115,18 @@ bool send_all(const void* from, std::size_t size, const std::function<void()>& s
   return true;
 }
 
+bool send_frame(const std::string& reply, bool is_last) {
+  const FrameHead head{static_cast<std::uint32_t>(reply.size()), is_last ? 1U : 0U};
+  return send_all(&head, sizeof head) && send_all(reply.data(), reply.size());
+}
+
+/// Empty when the server has gone.
 std::optional<protocol::QueryRequest> next_request() {
-  FrameLength length = 0;
-  if (!receive_all(&length, sizeof length) || length > protocol::kMaxFrameBytes) {
+  FrameHead head{};
+  if (!receive_all(&head, sizeof head) || head.length > protocol::kMaxFrameBytes) {
     return std::nullopt;
   }
-  std::string frame(length, '\0');
+  std::string frame(head.length, '\0');
   protocol::QueryRequest request;
   if (!receive_all(frame.data(), frame.size()) || !protocol::decode(frame, request)) {
     return std::nullopt;
@@ -144,69 +134,39 @@ std::optional<protocol::QueryRequest> next_request() {
   return request;
 }
 
-/// False when the server has gone.
-bool send_answer(
-    AnswerHead head, const std::string& reply, const std::function<void()>& stalls = [] {}) {
-  head.length = static_cast<std::uint32_t>(reply.size());
-  return send_all(&head, sizeof head, stalls) && send_all(reply.data(), reply.size(), stalls);
-}
-
-constexpr AnswerHead kLast{
-    .length = 0, .ends = 1, .can_go_on = 0, .reserved = 0, .last_point = 0, .rows = 0, .chunks = 0};
-
-/// Gives chunk by chunk what the server takes; waits for it in between, in which the processor's
-/// time and the query's stand still. False when the server has gone.
-bool send_chunks(Reader& reader, const protocol::QueryRequest& request, const QueryLimits& limits) {
-  Answer answer = reader.answer(request, limits);
-  while (true) {
-    limit_cpu(limits.time_limit_ms);
-    const protocol::QueryReply chunk = answer.next();
-    const protocol::GivenRows& given = answer.given();
-    const AnswerHead head{.length = 0,
-                          .ends = static_cast<std::uint8_t>(chunk.ends() ? 1 : 0),
-                          .can_go_on = static_cast<std::uint8_t>(answer.can_go_on() ? 1 : 0),
-                          .reserved = 0,
-                          .last_point = given.last_point(),
-                          .rows = given.rows(),
-                          .chunks = given.chunks()};
-    const auto rest = [&answer] {
-      if (answer.can_go_on()) {
-        answer.rest();
-      }
-    };
-    if (!send_answer(head, protocol::reply_around(protocol::encode(chunk)), rest)) {
-      return false;
-    }
-    if (chunk.ends()) {
-      return true;
-    }
-  }
-}
-
-/// False when the server has gone.
-bool answer(std::optional<Reader>& reader, const std::string& path,
-            const protocol::QueryRequest& request) {
-  const QueryLimits limits = limits_of(request);
-  std::string reply;
+/// Sends the answer chunk by chunk. False when the server has gone.
+bool send_answer(std::optional<Reader>& reader, const std::string& path,
+                 const protocol::QueryRequest& request) {
+  const std::int64_t time_limit_ms = time_limit_of(request);
+  std::string error;
   try {
-    limit_cpu(limits.time_limit_ms);
+    limit_cpu(time_limit_ms);
     if (!reader) {
       reader.emplace(path);
     }
-    if (request.in_chunks() || request.has_question()) {
-      return send_chunks(*reader, request, limits);
+    // Without a time limit: the server kills this process at the deadline.
+    QueryLimits limits;
+    limits.time_limit_ms = 0;
+    Answer answer = reader->answer(request, limits);
+    for (bool ends = false; !ends;) {
+      limit_cpu(time_limit_ms);
+      const protocol::QueryReply chunk = answer.next();
+      ends = chunk.ends();
+      if (!send_frame(protocol::reply_around(protocol::encode(chunk)), ends)) {
+        return false;
+      }
     }
-    reply = protocol::reply_around(reader->encoded_query(request.sql(), limits));
+    return true;
   } catch (const std::bad_alloc&) {
-    reply = encoded_error("the answer needs more memory than a query may have");
-  } catch (const StatementError& error) {
-    reply = encoded_error(error.what(), true);
-  } catch (const solver::InputError& error) {
-    reply = encoded_error(error.what(), true);
-  } catch (const std::exception& error) {
-    reply = encoded_error(error.what());
+    error = encoded_error("the answer needs more memory than a query may have");
+  } catch (const StatementError& wrong) {
+    error = encoded_error(wrong.what(), true);
+  } catch (const solver::InputError& wrong) {
+    error = encoded_error(wrong.what(), true);
+  } catch (const std::exception& failure) {
+    error = encoded_error(failure.what());
   }
-  return send_answer(kLast, reply);
+  return send_frame(error, true);
 }
 
 }  // namespace
@@ -230,7 +190,7 @@ int run_reader_program(const std::string& path) {
     }
     std::optional<Reader> reader;
     while (const auto request = next_request()) {
-      if (!answer(reader, path, *request)) {
+      if (!send_answer(reader, path, *request)) {
         return 1;
       }
       malloc_trim(0);  // what one query had is not kept for the next

@@ -1,65 +1,55 @@
 #pragma once
 
 #include <atomic>
-#include <chrono>
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <sqlite3.h>
 
 #include "proto/oblique.pb.h"
 #include "proto/wire/chunk_writer.h"
-#include "server/reading/query_limits.h"
 #include "server/reading/query_rules.h"
 
 namespace oblique::server {
 
-/// An answer under way: rows of one statement, given in chunks. Between two chunks of one that
-/// comes in the order of its points no transaction is open, and it goes on from the last point with
-/// what the database holds then. Any other holds its transaction until it ends, which keeps the
-/// write-ahead log of the database from being emptied.
+/// Size at which a chunk of an answer is returned. A chunk is also returned with the first row that
+/// comes kLongestChunk_ms after the chunk was begun, so that a reader of the first rows need not
+/// wait for many.
+inline constexpr std::uint64_t kChunkBytes = std::uint64_t{256} << 10U;
+inline constexpr std::int64_t kLongestChunk_ms = 250;
+
+/// The rows of one statement, returned in chunks. Holds a read transaction until it ends or is
+/// destroyed, during which the database cannot truncate its write-ahead log.
 class Answer {
  public:
-  /// See Reader::answer, which makes them.
-  Answer(sqlite3* database, protocol::QueryRequest request, const QueryLimits& limits,
+  /// See Reader::answer.
+  Answer(sqlite3* database, const protocol::QueryRequest& request, const QueryLimits& limits,
          const std::atomic<bool>& interrupted);
 
-  /// The next rows, some kChunkBytes of them, under the number of the chunk; `ends` is set in the
-  /// last chunk, which may have no row. Throws QueryError when the statement fails, when it runs
-  /// for longer than the time limit since the last chunk, and when one row has more than
-  /// `max_bytes`. Not to be called after the end or a failure.
+  /// The next chunk, with its number from 1 on; `ends` is set in the last one, which may have no
+  /// row. A blob is returned as the text x'0F..', as is a text that is not UTF-8. Throws QueryError
+  /// when the statement fails, when this call takes longer than the time limit, and when a row is
+  /// longer than `max_row_bytes`. Not to be called after the end or a failure.
   protocol::QueryReply next();
 
-  /// Ends its transaction until the next chunk is asked for; that is an error then unless
-  /// `can_go_on`. From any thread, while no other call is under way.
-  void rest();
-
-  /// Whether it can be ended after any chunk and asked for again with `given`.
-  bool can_go_on() const { return by_point_; }
-  /// What was given until now.
-  const protocol::GivenRows& given() const { return request_.after(); }
-
  private:
-  void begin();
-  /// The statement that answers what is left of the question.
-  std::string planned();
-  /// Steps to a row; false behind the last.
   bool step();
   void copy_row();
 
   sqlite3* database_;
-  protocol::QueryRequest request_;  // its `after` is what was given
   QueryLimits limits_;
   const std::atomic<bool>& interrupted_;
-  bool by_point_ = false;
-  std::chrono::steady_clock::time_point begun_;            // the transaction
-  StatementHandle statement_{nullptr, &sqlite3_finalize};  // null: to begin
-  std::optional<protocol::ChunkWriter> rows_;              // once the columns are known
-  int columns_ = 0;                                        // that are shown
-  std::vector<std::string> units_;                         // of these, or none
-  std::int64_t running_ms_ = 0;                            // in all
+  StatementHandle statement_{nullptr, &sqlite3_finalize};
+  int columns_ = 0;                            // those that are returned
+  std::vector<std::string> units_;             // of these, or none
+  std::optional<protocol::ChunkWriter> rows_;  // set by the constructor
+  std::uint64_t chunks_ = 0;
 };
+
+/// As SQL writes a blob: x'0F..'.
+std::string hexadecimal(std::string_view bytes);
 
 }  // namespace oblique::server

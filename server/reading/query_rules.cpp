@@ -61,23 +61,30 @@ bool is_blank(std::string_view text) {
   return text.find_first_not_of(" \t\r\n;") == std::string_view::npos;
 }
 
-bool like_tells_capitals_apart(sqlite3* database) {
-  const StatementHandle statement = prepare_query(database, "SELECT 'a' LIKE 'A'");
-  const int code = sqlite3_step(statement.get());
-  if (code != SQLITE_ROW) {
-    throw failure(database, code);
-  }
-  return sqlite3_column_int(statement.get(), 0) == 0;
-}
-
 std::string mebibytes(std::int64_t bytes) {
   return std::to_string(bytes >> 20U) + " MiB";
 }
 
 }  // namespace
 
+std::int64_t time_limit_of(const protocol::QueryRequest& request) {
+  if (request.time_limit_ms() == 0) {
+    return QueryLimits().time_limit_ms;
+  }
+  return static_cast<std::int64_t>(std::min<std::uint64_t>(
+      request.time_limit_ms(), static_cast<std::uint64_t>(kLongestTimeLimit_ms)));
+}
+
+std::string took_too_long(std::int64_t time_limit_ms) {
+  return fmt::format(
+      "the query took too long (more than {} s): narrow it, as with WHERE or LIMIT, or give it "
+      "more "
+      "time with --timeout",
+      static_cast<double>(time_limit_ms) / 1000.0);
+}
+
 void restrict_to_reading(sqlite3* database) {
-  execute(database, "PRAGMA temp_store = MEMORY");
+  execute(database, "PRAGMA temp_store = MEMORY; PRAGMA case_sensitive_like = ON");
   constexpr std::array<std::pair<int, int>, 9> kLimits{{{SQLITE_LIMIT_SQL_LENGTH, kLongestSql},
                                                         {SQLITE_LIMIT_COLUMN, 1000},
                                                         {SQLITE_LIMIT_EXPR_DEPTH, 1000},
@@ -151,25 +158,6 @@ StatementHandle prepare_query(sqlite3* database, const std::string& sql) {
                          ", which has no value: write the value itself, a text in single quotes");
   }
   return statement;
-}
-
-void let_like_tell_capitals_apart(sqlite3* database, bool does) {
-  if (like_tells_capitals_apart(database) == does) {
-    return;
-  }
-  // Nobody else may set anything.
-  sqlite3_set_authorizer(database, nullptr, nullptr);
-  const int code = sqlite3_exec(
-      database, does ? "PRAGMA case_sensitive_like = ON" : "PRAGMA case_sensitive_like = OFF",
-      nullptr, nullptr, nullptr);
-  sqlite3_set_authorizer(database, &authorize, nullptr);
-  if (code != SQLITE_OK) {
-    throw failure(database, code);
-  }
-  // SQLite says nothing where it could not.
-  if (like_tells_capitals_apart(database) != does) {
-    throw QueryError("another statement is still running");
-  }
 }
 
 void throw_failure(sqlite3* database, int code) {

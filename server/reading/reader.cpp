@@ -1,46 +1,16 @@
 #include "server/reading/reader.h"
 
-#include <algorithm>
 #include <string_view>
 #include <utility>
 #include <vector>
 
 #include "proto/suggestion.h"
-#include "proto/text.h"
 #include "server/database/open_for_reading.h"
-#include "server/reading/query_values.h"
-#include "server/reading/running_time.h"
 
 namespace oblique::server {
 namespace {
 
 constexpr int kBusyTimeout_ms = 2000;
-/// What a message takes in the one around it beside its own bytes, at most.
-constexpr std::uint64_t kFieldBytes = 8;
-
-enum class Fit { kYes, kNot };
-
-/// Copies the row at which `statement` stands into `row`; says whether it has at most `most_bytes`
-/// in a reply. Throws QueryError when memory ran out.
-Fit copy_row(sqlite3* database, sqlite3_stmt* statement, std::uint64_t most_bytes,
-             protocol::Row& row) {
-  row.Clear();
-  std::uint64_t left = most_bytes;
-  for (int i = 0; i < sqlite3_column_count(statement); ++i) {
-    protocol::Value& value = *row.add_values();
-    const Copied copied = copy_value(statement, i, left, value);
-    if (copied == Copied::kNoMemory) {
-      throw failure(database, SQLITE_NOMEM);
-    }
-    const std::uint64_t bytes = value.ByteSizeLong() + kFieldBytes;
-    if (copied == Copied::kTooLarge || bytes > left) {
-      return Fit::kNot;
-    }
-    left -= bytes;
-  }
-  return Fit::kYes;
-}
-
 /// The solver of a study's results, which are all of one unless it mixes them.
 constexpr const char* kVersionOfRows =
     "SELECT w.solver_version FROM packed_results AS r CROSS JOIN workers AS w"
@@ -80,67 +50,16 @@ Reader::Reader(const std::string& path) {
 }
 
 protocol::QueryReply Reader::query(const std::string& sql, const QueryLimits& limits) {
-  google::protobuf::RepeatedPtrField<protocol::Row> rows;
-  protocol::QueryReply reply =
-      run(sql, limits, [&rows](protocol::Row& row) { *rows.Add() = std::move(row); });
-  *reply.mutable_rows() = std::move(rows);
-  return reply;
-}
-
-std::string Reader::encoded_query(const std::string& sql, const QueryLimits& limits) {
-  // Encoded messages one after another are, decoded, one message with all their fields.
-  std::string bytes;
-  protocol::QueryReply part;
-  protocol::Row& slot = *part.add_rows();
-  const protocol::QueryReply rest = run(sql, limits, [&](protocol::Row& row) {
-    slot.Swap(&row);
-    part.AppendToString(&bytes);
-  });
-  rest.AppendToString(&bytes);
-  return bytes;
-}
-
-protocol::QueryReply Reader::run(const std::string& sql, const QueryLimits& limits,
-                                 const TakeRow& take) {
-  sqlite3* const database = database_.get();
-  sqlite3_limit(database, SQLITE_LIMIT_LENGTH, static_cast<int>(limits.max_value_bytes));
-  const RunningTime watch(database, interrupted_, limits.time_limit_ms);
-  let_like_tell_capitals_apart(database, false);
-  const StatementHandle statement = prepare_query(database, sql);
-  protocol::QueryReply reply;
-  for (int i = 0; i < sqlite3_column_count(statement.get()); ++i) {
-    const char* name = sqlite3_column_name(statement.get(), i);
-    if (name == nullptr) {
-      throw failure(database, SQLITE_NOMEM);
-    }
-    reply.add_columns(protocol::is_utf8(name) ? std::string(name) : hexadecimal(name));
+  protocol::QueryRequest request;
+  request.set_sql(sql);
+  Answer rows = answer(request, limits);
+  protocol::QueryReply whole;
+  for (bool ends = false; !ends;) {
+    const protocol::QueryReply chunk = rows.next();
+    protocol::append_rows(chunk, whole);
+    ends = chunk.ends();
   }
-  std::uint64_t bytes = reply.ByteSizeLong() + kFieldBytes;
-  protocol::Row row;
-  int code = SQLITE_DONE;
-  for (std::uint64_t rows = 0; (code = sqlite3_step(statement.get())) == SQLITE_ROW; ++rows) {
-    const std::uint64_t left = limits.max_bytes - std::min(limits.max_bytes, bytes);
-    const bool is_full = rows >= limits.max_rows;
-    if (is_full || copy_row(database, statement.get(), left, row) == Fit::kNot) {
-      if (rows == 0 && !is_full) {
-        throw QueryError("one row alone has more than the " + std::to_string(limits.max_bytes) +
-                         " bytes of a reply, blobs counted twice: select less of it, as with "
-                         "substr() or length()");
-      }
-      reply.set_truncated(true);
-      return reply;
-    }
-    bytes += row.ByteSizeLong() + kFieldBytes;
-    take(row);
-  }
-  if (code == SQLITE_INTERRUPT) {
-    throw QueryError(interrupted_ ? "the query was interrupted"
-                                  : took_too_long(limits.time_limit_ms));
-  }
-  if (code != SQLITE_DONE) {
-    throw_failure(database, code);
-  }
-  return reply;
+  return whole;
 }
 
 Answer Reader::answer(const protocol::QueryRequest& request, const QueryLimits& limits) {

@@ -23,9 +23,7 @@ void WaitingQueries::ask(const Client& client, const protocol::QueryRequest& req
   const std::uint64_t ticket = ++last_ticket_;
   // Who has a key has one share, however many connections that is.
   const std::string asker = client.holder == nullptr ? client.identity : "key " + client.key();
-  QueryJob job{ticket, asker, request};
-  job.request.clear_after();  // the server keeps it itself
-  if (!readers_.query(std::move(job))) {
+  if (!readers_.query({ticket, asker, request})) {
     clients_.reply_error(client, "too many queries wait already: ask again later");
     return;
   }
@@ -71,8 +69,8 @@ void WaitingQueries::report(QueryReport report) {
     return;
   }
   using Kind = QueryReport::Kind;
-  if (report.kind == Kind::kBegun || report.kind == Kind::kPutBack) {
-    found->second.runs = report.kind == Kind::kBegun;
+  if (report.kind == Kind::kBegun) {
+    found->second.runs = true;
     return;
   }
   if (report.kind == Kind::kRows) {

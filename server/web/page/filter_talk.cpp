@@ -29,7 +29,6 @@ constexpr std::size_t kMostKeptRuns = PointSet::kMostRuns;
 
 ClientRequest points_that_meet(const std::string& study, const std::string& condition) {
   ClientRequest request;
-  request.mutable_query()->set_in_chunks(true);
   request.mutable_query()->mutable_question()->set_study(study);
   request.mutable_query()->mutable_question()->set_where(condition);
   request.mutable_query()->mutable_question()->add_select("point");

@@ -137,7 +137,6 @@ Talk rows_talk(std::uint64_t study, const HttpQuestion& question) {
       study,
       [coming](const std::string& name) {
         protocol::ClientRequest request;
-        request.mutable_query()->set_in_chunks(true);
         *request.mutable_query()->mutable_question() = coming->question;
         request.mutable_query()->mutable_question()->set_study(name);
         return request;

@@ -92,7 +92,6 @@ class AskingMeanwhile : public testing::Test {
     request.set_protocol_version(protocol::kProtocolVersion);
     request.set_request_id(++id_);
     auto& query = *request.mutable_query();
-    query.set_in_chunks(true);
     query.set_time_limit_ms(kLongestTimeLimit_ms);
     auto& question = *query.mutable_question();
     question.set_study("a");

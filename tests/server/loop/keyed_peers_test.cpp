@@ -29,7 +29,7 @@ class KeyedPeersTest : public testing::Test {
           keys.add(
               {"berta", protocol::Role::kWorker, worker_keys_.public_key, protocol::utc_now()});
         });
-    server_ = std::make_unique<RunningServer>(folder_.file("studies.db"), TurnSettings{},
+    server_ = std::make_unique<RunningServer>(folder_.file("studies.db"), QueueSettings{},
                                               NetworkLimits{}, ClientsDeskSettings{},
                                               DoorSettings{"127.0.0.1", key_file_, false});
   }

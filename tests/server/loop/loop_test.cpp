@@ -161,10 +161,9 @@ TEST_F(LoopTest, ALongQueryHoldsUpNothingElse) {
 }
 
 TEST_F(LoopTest, TheQueriesOfClientsThatWentAreGivenUp) {
-  TurnSettings turns;
-  turns.readers = 2;
-  turns.quick_ms = 1'000'000;  // so that nothing is put back for others
-  RunningServer server(path_, turns);
+  QueueSettings queue;
+  queue.readers = 2;
+  RunningServer server(path_, queue);
   for (int i = 0; i < 2; ++i) {
     PretendedClient(server.client_endpoint()).start_query(kDeaf);
   }
@@ -172,12 +171,11 @@ TEST_F(LoopTest, TheQueriesOfClientsThatWentAreGivenUp) {
 }
 
 TEST_F(LoopTest, TheQueriesOfAClientEndWithItsConnectionBeforeItIsToHearOfThem) {
-  TurnSettings turns;
-  turns.readers = 2;
-  turns.quick_ms = 1'000'000;
+  QueueSettings queue;
+  queue.readers = 2;
   ClientsDeskSettings clients;
   clients.still_working_every_ms = 1'000'000;
-  RunningServer server(path_, turns, {}, clients);
+  RunningServer server(path_, queue, {}, clients);
   for (int i = 0; i < 2; ++i) {
     PretendedClient client(server.client_endpoint());
     ClientRequest request;

@@ -18,8 +18,9 @@
 
 #include "proto/frames.h"
 #include "proto/result_message.h"
+#include "proto/wire/chunk_writer.h"
 #include "server/loop/loop.h"
-#include "server/reading/query_limits.h"
+#include "server/reading/query_rules.h"
 #include "tests/support/hang_limit.h"
 #include "tests/support/points.h"
 
@@ -33,10 +34,10 @@ using protocol::WorkerMessage;
 /// A server on ports that the system picked, stopped when it goes out of scope.
 class RunningServer {
  public:
-  explicit RunningServer(const std::string& database, TurnSettings turns = {},
+  explicit RunningServer(const std::string& database, QueueSettings queue = {},
                          NetworkLimits network = {}, ClientsDeskSettings clients = {},
                          const DoorSettings& doors = {}, const std::optional<WebSettings>& web = {})
-      : loop_(settings(database, turns, network, clients, doors, web)) {
+      : loop_(settings(database, queue, network, clients, doors, web)) {
     thread_ = std::thread([this] { end_ = loop_.run(stop_fd_); });
   }
   ~RunningServer() { stop(); }
@@ -57,7 +58,7 @@ class RunningServer {
   std::string http_url() const { return loop_.http_url(); }
 
  private:
-  static LoopSettings settings(const std::string& database, TurnSettings turns,
+  static LoopSettings settings(const std::string& database, QueueSettings queue,
                                NetworkLimits network, const ClientsDeskSettings& clients,
                                const DoorSettings& doors, const std::optional<WebSettings>& web) {
     LoopSettings settings;
@@ -65,7 +66,7 @@ class RunningServer {
     settings.doors = doors;
     settings.service.clients = clients;
     settings.network = network;
-    settings.queries.turns = turns;
+    settings.queries.queue = queue;
     settings.database = database;
     settings.worker_port = "*";
     settings.client_port = "*";
@@ -201,11 +202,16 @@ class PretendedClient : public Peer<ClientRequest, ClientReply> {
     *request.mutable_submit()->mutable_recipe() = table_of(points)->recipe();
     return ask(request);
   }
+  /// With the rows of the first chunk.
   ClientReply query(const std::string& sql) {
     ClientRequest request;
     request.mutable_query()->set_sql(sql);
     request.mutable_query()->set_time_limit_ms(kLongestTimeLimit_ms);
-    return ask(request);
+    ClientReply reply = ask(request);
+    if (reply.has_query()) {
+      *reply.mutable_query() = protocol::as_rows(reply.query());
+    }
+    return reply;
   }
   /// Asks for what takes minutes, and waits until it is said that the query runs.
   void start_query(const std::string& sql) {

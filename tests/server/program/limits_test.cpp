@@ -16,7 +16,7 @@ class LimitsTest : public testing::Test {
 
   NetworkLimits network_;
   ServiceSettings service_;
-  TurnSettings queries_;
+  QueueSettings queries_;
   CLI::App app_;
 };
 
