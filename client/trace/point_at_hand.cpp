@@ -6,7 +6,7 @@
 
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
-#include "server/care/study_care.h"
+#include "server/maintenance/study_changes_offline.h"
 
 namespace oblique::client {
 

@@ -9,8 +9,8 @@
 #include "client/output/human_units.h"
 #include "client/service/source.h"
 #include "client/verbs/verbs.h"
-#include "server/care/backup.h"
-#include "server/care/salvage.h"
+#include "server/maintenance/backup.h"
+#include "server/maintenance/salvage.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::client {

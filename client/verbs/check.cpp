@@ -9,7 +9,7 @@
 #include "client/service/source_flags.h"
 #include "client/verbs/verbs.h"
 #include "proto/text.h"
-#include "server/care/diagnosis.h"
+#include "server/maintenance/check.h"
 
 namespace oblique::client {
 namespace {

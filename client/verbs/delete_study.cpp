@@ -13,7 +13,7 @@
 #include "client/service/watching.h"
 #include "client/verbs/verbs.h"
 #include "proto/text.h"
-#include "server/care/study_care.h"
+#include "server/maintenance/study_changes_offline.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::client {

@@ -6,7 +6,7 @@
 #include "client/service/watching.h"
 #include "client/study/study_toml.h"
 #include "client/verbs/verbs.h"
-#include "server/care/study_care.h"
+#include "server/maintenance/study_changes_offline.h"
 
 namespace oblique::client {
 namespace {

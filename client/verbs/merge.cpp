@@ -15,10 +15,10 @@
 #include "client/service/source.h"
 #include "client/verbs/verbs.h"
 #include "proto/text.h"
-#include "server/care/merge.h"
 #include "server/database/database_in_use.h"
 #include "server/database/shared_disk.h"
 #include "server/database/sqlite.h"
+#include "server/maintenance/merge.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::client {

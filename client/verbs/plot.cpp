@@ -11,7 +11,7 @@
 #include "client/verbs/plot_point.h"
 #include "client/verbs/verbs.h"
 #include "proto/program/choices.h"
-#include "server/care/study_care.h"
+#include "server/maintenance/study_changes_offline.h"
 
 namespace oblique::client {
 namespace {

@@ -9,7 +9,7 @@
 #include "client/verbs/verbs.h"
 #include "proto/recipe/written/study_name.h"
 #include "proto/text.h"
-#include "server/care/study_care.h"
+#include "server/maintenance/study_changes_offline.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::client {

@@ -248,13 +248,4 @@ bool restore_views(sqlite3* database, const std::function<void(const std::string
   return true;
 }
 
-void shadow_views(sqlite3* database) {
-  constexpr std::string_view kCreate = "CREATE VIEW ";
-  for (const Standing& one : ours()) {
-    if (one.type == "view" && one.sql.starts_with(kCreate)) {
-      execute(database, "CREATE TEMP VIEW " + one.sql.substr(kCreate.size()));
-    }
-  }
-}
-
 }  // namespace oblique::server

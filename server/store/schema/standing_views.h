@@ -35,7 +35,4 @@ void refuse_other_triggers(sqlite3* database, const std::string& path);
 /// named and left as it is. Says whether anything was done. Throws StorageError.
 bool restore_views(sqlite3* database, const std::function<void(const std::string&)>& notice);
 
-/// Makes our views for this connection alone, before those of the file. Throws StorageError.
-void shadow_views(sqlite3* database);
-
 }  // namespace oblique::server

@@ -12,9 +12,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/care/backup.h"
-#include "server/care/diagnosis.h"
-#include "server/care/salvage.h"
+#include "server/maintenance/backup.h"
+#include "server/maintenance/check.h"
+#include "server/maintenance/salvage.h"
 #include "server/reading/reader.h"
 #include "server/store/store.h"
 #include "tests/support/points.h"

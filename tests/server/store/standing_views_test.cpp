@@ -9,7 +9,7 @@
 
 #include "proto/recipe/point_table.h"
 #include "server/asking/plan.h"
-#include "server/care/diagnosis.h"
+#include "server/maintenance/check.h"
 #include "server/store/store.h"
 #include "tests/support/points.h"
 #include "tests/support/temporary_folder.h"

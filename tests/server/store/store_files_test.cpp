@@ -10,8 +10,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/care/backup.h"
-#include "server/care/diagnosis.h"
+#include "server/maintenance/backup.h"
+#include "server/maintenance/check.h"
 #include "server/reading/reader.h"
 #include "server/store/store.h"
 #include "tests/support/points.h"

@@ -1,11 +1,10 @@
-#include "server/care/backup.h"
+#include "server/maintenance/backup.h"
 
 #include <filesystem>
 
-#include "server/care/diagnosis.h"
-#include "server/database/draft_file.h"
 #include "server/database/open_for_reading.h"
 #include "server/database/sqlite.h"
+#include "server/maintenance/check.h"
 
 namespace oblique::server {
 namespace {
@@ -15,7 +14,7 @@ void copy_pages(sqlite3* from, sqlite3* to, const std::string& path) {
   if (backup == nullptr) {
     throw StorageError("cannot write the copy " + path + ": " + sqlite3_errmsg(to));
   }
-  // All pages in one step: one instant of the source, whatever is written to it meanwhile.
+  // All pages in one step: one instant of the source, even while a server writes to it.
   sqlite3_backup_step(backup, -1);
   if (sqlite3_backup_finish(backup) != SQLITE_OK) {
     throw StorageError("cannot write the copy " + path + ": " + sqlite3_errmsg(to));
@@ -24,22 +23,25 @@ void copy_pages(sqlite3* from, sqlite3* to, const std::string& path) {
 
 }  // namespace
 
+std::string copy_into(const DraftFile& draft, const std::string& from, const std::string& to) {
+  const OpenedForReading source = open_stored(from);
+  const DatabaseHandle copy =
+      open_database(draft.path(), SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
+  copy_pages(source.database.get(), copy.get(), to);
+  // One file, without a log beside it.
+  execute(copy.get(), "PRAGMA journal_mode = DELETE");
+  if (const auto faults = faults_of_pages(copy.get()); !faults.empty()) {
+    throw StorageError(from + " is damaged, and so would be the copy: " + faults.front());
+  }
+  return source.remark;
+}
+
 void back_up(const std::string& from, const std::string& to) {
   if (std::filesystem::exists(to)) {
     throw StorageError(to + " exists already: name a file that does not");
   }
-  const OpenedForReading source = open_stored(from);
   DraftFile draft(to + ".part");
-  {
-    const DatabaseHandle copy =
-        open_database(draft.path(), SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
-    copy_pages(source.database.get(), copy.get(), to);
-    // One file, without a log beside it.
-    execute(copy.get(), "PRAGMA journal_mode = DELETE");
-    if (const auto faults = faults_of_pages(copy.get()); !faults.empty()) {
-      throw StorageError(from + " is damaged, and so would be the copy: " + faults.front());
-    }
-  }
+  copy_into(draft, from, to);
   draft.keep_as(to);
 }
 

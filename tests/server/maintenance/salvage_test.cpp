@@ -1,4 +1,4 @@
-#include "server/care/salvage.h"
+#include "server/maintenance/salvage.h"
 
 #include <algorithm>
 #include <array>
@@ -11,10 +11,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/care/diagnosis.h"
+#include "server/maintenance/check.h"
 #include "server/reading/reader.h"
 #include "server/store/store.h"
-#include "tests/server/care/care_fixture.h"
+#include "tests/server/maintenance/maintenance_fixture.h"
 
 namespace oblique::server {
 namespace {
@@ -23,7 +23,7 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::SizeIs;
 
-class SalvageTest : public CareTest {
+class SalvageTest : public MaintenanceTest {
  protected:
   /// Study, point and, by its checksum, all else of each row, in the order of the texts.
   static std::vector<std::string> rows_of(const std::string& file) {

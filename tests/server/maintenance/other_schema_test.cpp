@@ -9,18 +9,18 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/care/backup.h"
-#include "server/care/diagnosis.h"
-#include "server/care/merge.h"
-#include "server/care/salvage.h"
-#include "server/care/study_care.h"
+#include "server/maintenance/backup.h"
+#include "server/maintenance/check.h"
+#include "server/maintenance/merge.h"
+#include "server/maintenance/salvage.h"
+#include "server/maintenance/study_changes_offline.h"
 #include "server/reading/reader.h"
-#include "tests/server/care/care_fixture.h"
+#include "tests/server/maintenance/maintenance_fixture.h"
 
 namespace oblique::server {
 namespace {
 
-class OtherSchema : public CareTest,
+class OtherSchema : public MaintenanceTest,
                     public testing::WithParamInterface<std::pair<int, std::string>> {
  protected:
   OtherSchema() {

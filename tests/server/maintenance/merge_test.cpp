@@ -1,11 +1,13 @@
-#include "server/care/merge.h"
+#include "server/maintenance/merge.h"
 
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <csignal>
+#include <cstdint>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <memory>
@@ -15,10 +17,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/care/diagnosis.h"
 #include "server/database/sqlite.h"
+#include "server/maintenance/check.h"
 #include "server/store/store.h"
-#include "tests/server/care/merge_fixture.h"
+#include "tests/support/points.h"
+#include "tests/support/temporary_folder.h"
 
 namespace oblique::server {
 namespace {
@@ -26,6 +29,93 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
+
+using Table = std::shared_ptr<const protocol::PointTable>;
+
+/// Results of one study in one database.
+struct Part {
+  std::string study = "a";
+  Table table = table_of(10);
+  std::uint64_t first = 0;
+  std::uint64_t end = 0;
+  std::string solver_version = "0.1";
+  std::string worker = "host";
+  std::vector<std::uint64_t> failed{};
+  StudyTerms terms{};
+  double closure = 0.0;  ///< added to that of each result
+};
+
+/// Databases that are made, and merged into the one called `all`.
+class MergeTest : public testing::Test {
+ protected:
+  std::string file(const std::string& name) const { return folder_.file(name + ".db"); }
+
+  /// A database with these studies and results; some may be there already.
+  void store(const std::string& name, const std::vector<Part>& parts) const {
+    Store store(file(name));
+    for (const Part& part : parts) {
+      commit(store, part);
+    }
+  }
+
+  static void commit(Store& store, const Part& part) {
+    const auto studies = store.studies();
+    const auto known = std::find_if(studies.begin(), studies.end(),
+                                    [&](const auto& study) { return study.name == part.study; });
+    const bool is_new = known == studies.end();
+    const std::uint64_t study = is_new ? store.last_study_id() + 1 : known->study_id;
+    const std::uint64_t worker = store.last_worker_id() + 1;
+    std::vector<Change> changes;
+    if (is_new) {
+      changes.emplace_back(
+          AddStudy{study, part.study, part.table, "2024-01-01T00:00:00.000Z", part.terms});
+    }
+    changes.emplace_back(AddWorker{worker, part.worker, 1, part.solver_version, "avx2", "then"});
+    AddResults results{study, part.table, worker, part.solver_version, "avx2", 1, "now", {}};
+    for (std::uint64_t point = part.first; point < part.end; ++point) {
+      const bool failed =
+          std::find(part.failed.begin(), part.failed.end(), point) != part.failed.end();
+      protocol::PointResult result =
+          failed ? protocol::failed_point(point, "why") : solved_point(point);
+      if (!failed && part.closure != 0.0) {
+        solver::CaseResult other = protocol::from_message(result);
+        other.energy.closure += part.closure;
+        result = protocol::to_message(point, other);
+      }
+      results.results.push_back(std::move(result));
+    }
+    changes.emplace_back(std::move(results));
+    store.commit(changes);
+  }
+
+  Merged merge(const std::string& source, const MergeSettings& settings = {}) const {
+    return Merger(file("all")).merge(file(source), settings, [](auto, auto) {});
+  }
+
+  std::string refusal(const std::string& source, const MergeSettings& settings = {}) const {
+    try {
+      merge(source, settings);
+    } catch (const MergeRefused& error) {
+      return error.what();
+    }
+    return "it was merged";
+  }
+
+  std::vector<std::string> texts(const std::string& name, const std::string& sql) const {
+    const DatabaseHandle database = open_database(file(name), SQLITE_OPEN_READWRITE);
+    Statement statement(database.get(), sql);
+    std::vector<std::string> found;
+    while (statement.step()) {
+      found.push_back(statement.text(0));
+    }
+    return found;
+  }
+  std::string text(const std::string& name, const std::string& sql) const {
+    return texts(name, sql).at(0);
+  }
+
+  test::TemporaryFolder folder_;
+};
 
 TEST_F(MergeTest, StudiesOfSeveralDatabasesStandInOneWithAllTheirRows) {
   store("one", {{.study = "a", .end = 10}, {.study = "b", .end = 3, .worker = "other host"}});
@@ -273,6 +363,7 @@ TEST_F(MergeTest, KilledInTheMiddleItLeavesWhatWasThereAndIsDoneByTheNextTry) {
   EXPECT_THAT(find_faults(file("all")), IsEmpty());
   EXPECT_EQ(Store(file("all")).studies().size(), 1U);
   EXPECT_EQ(merge("one").results_added, 20'000U);
+  EXPECT_FALSE(std::filesystem::exists(file("all") + ".merging")) << "nor a copy of the source";
 }
 
 TEST_F(MergeTest, OnlyADatabaseOfOursIsMerged) {
@@ -325,6 +416,70 @@ TEST_F(MergeTest, NumbersOfDeletedStudiesAreNotGivenAgain) {
   store("other", {{.study = "c"}});
   merge("other");
   EXPECT_EQ(text("all", "SELECT study_id FROM studies WHERE name = 'c'"), "3");
+}
+
+/// The points from 0.5 on of ten from 0 to 1: numbers 5 to 9.
+Table filtered_table() {
+  protocol::Recipe recipe = table_of(10)->recipe();
+  recipe.mutable_blocks(0)->set_where("mu > 0.5");
+  protocol::PointTable table(recipe);
+  table.survey([] { return true; });
+  return std::make_shared<const protocol::PointTable>(std::move(table));
+}
+
+TEST_F(MergeTest, AStudyIsDoneWhenAllIsThereThatItsFilterLeavesIn) {
+  store("one", {{.table = filtered_table(), .first = 5, .end = 8}});
+  store("two", {{.table = filtered_table(), .first = 8, .end = 10}});
+  const auto state = [&] {
+    return text("all", "SELECT state || ' ' || counted || ' ' || points FROM studies");
+  };
+  merge("one");
+  EXPECT_EQ(state(), "running 1 5");
+  merge("two");
+  EXPECT_EQ(state(), "done 1 5");
+  EXPECT_THAT(texts("all", "SELECT first_point || '+' || points FROM settled_points"),
+              ElementsAre("5+5"));
+  EXPECT_THAT(find_faults(file("all")), IsEmpty());
+}
+
+TEST_F(MergeTest, RowsThatWereTakenOverNameTheirOriginInTheWholeAndAreCounted) {
+  store("one", {{.study = "a", .end = 10}, {.study = "gone", .end = 10}, {.study = "b"}});
+  {
+    Store store(file("one"));
+    const auto taken = std::make_shared<TakenResults>();
+    store.commit(std::vector<Change>{TakeResults{3, 1, {{0, 0, 4}}, "0.1", taken},
+                                     TakeResults{3, 2, {{4, 4, 6}}, "0.1", taken},
+                                     RenameStudy{1, "first"}, DeleteStudy{2}});
+    while (store.clear_away(100) != ClearedAway::kAll) {
+    }
+  }
+  store("all", {{.study = "first", .table = table_of(3), .end = 3}, {.study = "x"}});
+  const std::string origins =
+      "SELECT group_concat(taken_from) FROM (SELECT * FROM runs WHERE study = 'b' ORDER BY point)";
+  const std::string counts =
+      "SELECT o.name || ' ' || t.points FROM taken_points AS t JOIN origins AS o USING (origin_id)"
+      " JOIN studies AS s USING (study_id) WHERE s.name = 'b' ORDER BY o.name";
+  for (int i = 0; i < 2; ++i) {
+    merge("one", {.rename_prefix = "other "});
+    EXPECT_EQ(
+        text("all", origins),
+        "other first/0,other first/1,other first/2,other first/3,gone (deleted)/4,"
+        "gone (deleted)/5,gone (deleted)/6,gone (deleted)/7,gone (deleted)/8,gone (deleted)/9");
+    EXPECT_THAT(texts("all", counts), ElementsAre("gone (deleted) 6", "other first 4"));
+    EXPECT_THAT(find_faults(file("all")), IsEmpty());
+  }
+  EXPECT_EQ(text("all", "SELECT count(*) FROM origins"), "2");
+  // No study will have the number by which the whole knows what is gone.
+  Store all(file("all"));
+  EXPECT_GE(all.last_study_id(), std::stoull(text("all", "SELECT max(origin_id) FROM origins")));
+}
+
+TEST_F(MergeTest, AStudyIsNotGivenTheNumberOfRowsWhoseStudyWasDeletedByHand) {
+  store("one", {{.study = "b", .table = table_of(3), .end = 2}});
+  store("all", {{.study = "a", .end = 10}});
+  execute(open_database(file("all"), SQLITE_OPEN_READWRITE).get(), "DELETE FROM studies");
+  merge("one");
+  EXPECT_EQ(text("all", "SELECT count(*) FROM runs WHERE study = 'b'"), "2");
 }
 
 }  // namespace

@@ -15,9 +15,9 @@
 namespace oblique::server {
 
 /// A database with one study of ten points, five of them solved.
-class CareTest : public testing::Test {
+class MaintenanceTest : public testing::Test {
  protected:
-  CareTest() { add_results(*store_, 0, 5, true); }
+  MaintenanceTest() { add_results(*store_, 0, 5, true); }
 
   void add_results(Store& store, std::uint64_t first, std::uint64_t end, bool with_study) {
     std::vector<Change> changes;

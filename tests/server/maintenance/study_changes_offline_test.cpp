@@ -1,4 +1,4 @@
-#include "server/care/study_care.h"
+#include "server/maintenance/study_changes_offline.h"
 
 #include <filesystem>
 
@@ -6,9 +6,9 @@
 #include <gtest/gtest.h>
 
 #include "proto/frames.h"
-#include "server/care/diagnosis.h"
-#include "server/care/merge.h"
-#include "tests/server/care/care_fixture.h"
+#include "server/maintenance/check.h"
+#include "server/maintenance/merge.h"
+#include "tests/server/maintenance/maintenance_fixture.h"
 
 namespace oblique::server {
 namespace {
@@ -16,7 +16,7 @@ namespace {
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-class StudyCareTest : public CareTest {
+class OfflineStudyTest : public MaintenanceTest {
  protected:
   std::string refusal_of_renaming(std::uint64_t study, const std::string& name) {
     try {
@@ -28,7 +28,7 @@ class StudyCareTest : public CareTest {
   }
 };
 
-TEST_F(StudyCareTest, AStudyGetsAnotherNameUnlessThatIsTakenOrNone) {
+TEST_F(OfflineStudyTest, AStudyGetsAnotherNameUnlessThatIsTakenOrNone) {
   store_->commit(std::vector<Change>{AddStudy{2, "b", table_, "2024-01-01T00:00:00.000Z"}});
   store_.reset();
   rename_study(path_, 1, "friction");
@@ -39,13 +39,13 @@ TEST_F(StudyCareTest, AStudyGetsAnotherNameUnlessThatIsTakenOrNone) {
   EXPECT_THAT(find_faults(path_), IsEmpty());
 }
 
-TEST_F(StudyCareTest, ADatabaseAtWorkIsNotChanged) {
+TEST_F(OfflineStudyTest, ADatabaseAtWorkIsNotChanged) {
   EXPECT_THROW(rename_study(path_, 1, "b"), StorageError);
   EXPECT_THROW(delete_study(path_, 1, [](auto) {}), StorageError);
   EXPECT_EQ(store_->studies().at(0).name, "a");
 }
 
-TEST_F(StudyCareTest, ADeletedStudyLeavesNothingBehind) {
+TEST_F(OfflineStudyTest, ADeletedStudyLeavesNothingBehind) {
   add_results(*store_, 5, 10, false);
   store_.reset();
   std::uint64_t rows = 0;
@@ -93,17 +93,17 @@ TEST(ClearAllAway, WaitsForThoseWhoReadAsLongAsItGoesOnAndNotForEver) {
   EXPECT_EQ(parts, 100);
 }
 
-TEST_F(StudyCareTest, AMissingDatabaseIsNotMade) {
+TEST_F(OfflineStudyTest, AMissingDatabaseIsNotMade) {
   EXPECT_THROW(rename_study(copy_, 1, "b"), StorageError);
   EXPECT_FALSE(std::filesystem::exists(copy_));
 }
 
-TEST_F(StudyCareTest, TheRecipeIsThatWhichWasStoredAlsoWhileAServerWorks) {
+TEST_F(OfflineStudyTest, TheRecipeIsThatWhichWasStoredAlsoWhileAServerWorks) {
   EXPECT_EQ(stored_recipe(path_, 1).SerializeAsString(), table_->recipe().SerializeAsString());
   EXPECT_THROW(stored_recipe(path_, 2), StudyRefused);
 }
 
-TEST_F(StudyCareTest, ARecipeThatIsLongerThanAServerTakesIsNotParsed) {
+TEST_F(OfflineStudyTest, ARecipeThatIsLongerThanAServerTakesIsNotParsed) {
   store_.reset();
   const std::string block = table_->recipe().SerializeAsString();  // a longer recipe goes on so
   std::string bytes;
@@ -120,7 +120,7 @@ TEST_F(StudyCareTest, ARecipeThatIsLongerThanAServerTakesIsNotParsed) {
   EXPECT_THAT(find_faults(path_), testing::Contains(HasSubstr("more than a recipe may have")));
 }
 
-TEST_F(StudyCareTest, RowsThatADeletionHasLeftAreNoFaultsAndAreNotMerged) {
+TEST_F(OfflineStudyTest, RowsThatADeletionHasLeftAreNoFaultsAndAreNotMerged) {
   store_->commit(
       std::vector<Change>{AddStudy{2, "b", table_, "2024-01-01T00:00:00.000Z"}, DeleteStudy{1}});
   store_.reset();

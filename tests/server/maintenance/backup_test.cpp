@@ -1,4 +1,4 @@
-#include "server/care/backup.h"
+#include "server/maintenance/backup.h"
 
 #include <filesystem>
 #include <fstream>
@@ -8,12 +8,12 @@
 #include <gtest/gtest.h>
 
 #include "server/store/store.h"
-#include "tests/server/care/care_fixture.h"
+#include "tests/server/maintenance/maintenance_fixture.h"
 
 namespace oblique::server {
 namespace {
 
-TEST_F(CareTest, ACopyMadeWhileTheDatabaseIsOpenHasAllThatWasCommitted) {
+TEST_F(MaintenanceTest, ACopyMadeWhileTheDatabaseIsOpenHasAllThatWasCommitted) {
   back_up(path_, copy_);
   add_results(*store_, 5, 10, false);
   Store copy(copy_);
@@ -23,14 +23,14 @@ TEST_F(CareTest, ACopyMadeWhileTheDatabaseIsOpenHasAllThatWasCommitted) {
   EXPECT_EQ(copy.database_id(), store_->database_id());
 }
 
-TEST_F(CareTest, ACopyNeverReplacesAFile) {
+TEST_F(MaintenanceTest, ACopyNeverReplacesAFile) {
   std::ofstream(copy_) << "mine";
   EXPECT_THROW(back_up(path_, copy_), StorageError);
   std::ifstream file(copy_);
   EXPECT_EQ(std::string(std::istreambuf_iterator<char>(file), {}), "mine");
 }
 
-TEST_F(CareTest, OnlyADatabaseOfOursIsCopied) {
+TEST_F(MaintenanceTest, OnlyADatabaseOfOursIsCopied) {
   const std::string other = folder_.file("notes.txt");
   std::ofstream(other) << "not a database, and long enough to be sure of it";
   EXPECT_THROW(back_up(other, copy_), StorageError);

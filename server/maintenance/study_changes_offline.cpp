@@ -1,4 +1,4 @@
-#include "server/care/study_care.h"
+#include "server/maintenance/study_changes_offline.h"
 
 #include <optional>
 #include <string_view>

@@ -1,0 +1,269 @@
+#include "server/maintenance/check.h"
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "proto/recipe/canonical.h"
+#include "proto/result_message.h"
+#include "server/maintenance/backup.h"
+#include "server/store/store.h"
+#include "tests/server/maintenance/maintenance_fixture.h"
+
+namespace oblique::server {
+namespace {
+
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+TEST_F(MaintenanceTest, ASoundDatabaseHasNoFaults) {
+  EXPECT_THAT(find_faults(path_), IsEmpty());
+}
+
+TEST_F(MaintenanceTest, ADamagedPageIsFoundAndNotCopied) {
+  store_.reset();  // all is in the one file now
+  {
+    std::fstream file(path_, std::ios::in | std::ios::out | std::ios::binary);
+    const auto size = std::filesystem::file_size(path_);
+    const std::string rubbish(4096, '\x5a');
+    // Every page but the first, which tells what the file is.
+    for (std::uintmax_t at = 4096; at < size; at += 4096) {
+      file.seekp(static_cast<std::streamoff>(at));
+      file << rubbish;
+    }
+  }
+  bool found = false;
+  try {
+    found = !find_faults(path_).empty();
+  } catch (const StorageError&) {
+    found = true;
+  }
+  EXPECT_TRUE(found);
+  EXPECT_THROW(back_up(path_, copy_), StorageError);
+  EXPECT_FALSE(std::filesystem::exists(copy_));
+}
+
+TEST_F(MaintenanceTest, EveryColumnOfAResultIsUnderItsChecksum) {
+  store_.reset();
+  std::vector<std::string> columns;
+  {
+    const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READONLY);
+    Statement names(
+        database.get(),
+        "SELECT name FROM pragma_table_info('packed_results') WHERE name <> 'checksum'");
+    while (names.step()) {
+      columns.push_back(names.text(0));
+    }
+  }
+  EXPECT_GT(columns.size(), 40U);
+  for (const std::string& column : columns) {
+    const std::string copy = folder_.file(column + ".db");
+    std::filesystem::copy_file(path_, copy);
+    {
+      const DatabaseHandle database = open_database(copy, SQLITE_OPEN_READWRITE);
+      execute(database.get(), "PRAGMA ignore_check_constraints = ON");
+      execute(database.get(), "UPDATE packed_results SET " + column + " = CASE typeof(" + column +
+                                  ") WHEN 'text' THEN " + column + " || ' ' WHEN 'null' THEN 1" +
+                                  " ELSE " + column + " + 1 END WHERE point = 4");
+    }
+    EXPECT_THAT(find_faults(copy), testing::Contains(HasSubstr("not the one that was stored")))
+        << column;
+  }
+}
+
+TEST_F(MaintenanceTest, AStudyThatWasChangedIsFound) {
+  store_.reset();
+  execute(open_database(path_, SQLITE_OPEN_READWRITE).get(), "UPDATE studies SET name = 'b'");
+  EXPECT_THAT(find_faults(path_), testing::Contains(HasSubstr("study 1, b")));
+}
+
+TEST_F(MaintenanceTest, ADamagedDatabaseIsRefusedWithTheWayOut) {
+  store_.reset();
+  const auto page_of = [&](const std::string& name) {
+    const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READONLY);
+    Statement root(database.get(), "SELECT rootpage FROM sqlite_schema WHERE name = ?");
+    root.bind(1, std::string_view(name));
+    root.step();
+    return root.integer(0);
+  };
+  const std::int64_t page = page_of("studies");
+  {
+    std::fstream file(path_, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp((page - 1) * 4096);
+    file << std::string(4096, '\x5a');
+  }
+  try {
+    Store store(path_);
+    (void)store.studies();
+    FAIL() << "a damaged database was opened";
+  } catch (const StorageError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("--salvage"));
+  }
+}
+
+TEST_F(MaintenanceTest, ARowOfAPointThatTheStudyDoesNotHaveIsNamed) {
+  store_.reset();
+  const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);
+  execute(database.get(), "UPDATE packed_results SET point = 77 WHERE point = 4");
+  EXPECT_THAT(find_faults(path_), testing::Contains(HasSubstr("study a")));
+}
+
+TEST_F(MaintenanceTest, StartsOfServersAreCountedSoThatNoLeaseNumberComesTwice) {
+  EXPECT_EQ(store_->count_start(), 1U);
+  store_.reset();
+  EXPECT_EQ(Store(path_).count_start(), 2U);
+}
+
+TEST_F(MaintenanceTest, AStudyThatIsNotFinishedIsNamedThoughTheDatabaseIsSound) {
+  const auto found = diagnose(path_);
+  EXPECT_THAT(found.faults, IsEmpty());
+  EXPECT_THAT(found.remarks, ElementsAre("study a is running: 5 of 10 points have a result"));
+  add_results(*store_, 5, 10, false);
+  EXPECT_THAT(diagnose(path_).remarks, IsEmpty());
+}
+
+TEST_F(MaintenanceTest, EveryTableThatIsMissingIsNamed) {
+  store_.reset();
+  std::vector<std::string> tables;
+  {
+    const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READONLY);
+    Statement names(database.get(), "SELECT name FROM sqlite_schema WHERE type = 'table'");
+    while (names.step()) {
+      tables.push_back(names.text(0));
+    }
+  }
+  EXPECT_THAT(tables, Contains("taken_points"));
+  for (const std::string& table : tables) {
+    const std::string copy = folder_.file("without_" + table + ".db");
+    std::filesystem::copy_file(path_, copy);
+    execute(open_database(copy, SQLITE_OPEN_READWRITE).get(), "DROP TABLE " + table);
+    EXPECT_THAT(find_faults(copy), Contains(HasSubstr("the table " + table + " is missing")));
+  }
+}
+
+TEST_F(MaintenanceTest, AForeignKeyOfAnotherTableThatCannotBeCheckedIsNamedAndTheRestIsChecked) {
+  store_.reset();
+  execute(open_database(path_, SQLITE_OPEN_READWRITE).get(),
+          "CREATE TABLE notes (study_id, point,"
+          " FOREIGN KEY (study_id, point) REFERENCES results (study_id, point));"
+          "INSERT INTO notes VALUES (1, 2);");
+  const auto found = diagnose(path_);
+  EXPECT_THAT(found.faults, IsEmpty());
+  EXPECT_THAT(found.remarks, Contains(HasSubstr("the foreign keys of the table notes")));
+  execute(open_database(path_, SQLITE_OPEN_READWRITE).get(),
+          "UPDATE packed_results SET worker = 99, checksum = NULL WHERE point = 2");
+  EXPECT_THAT(find_faults(path_),
+              Contains(HasSubstr("table packed_results: refers to a row of workers")));
+}
+
+TEST_F(MaintenanceTest, RowsWithoutChecksumsAreCounted) {
+  execute(open_database(path_, SQLITE_OPEN_READWRITE).get(),
+          "UPDATE results SET checksum = NULL WHERE point < 2");
+  EXPECT_THAT(diagnose(path_).remarks, Contains(HasSubstr("2 of 5 results have no checksum")));
+}
+
+/// Three points, the last of them failed; their rows have no checksums.
+class RowFaultsTest : public testing::Test {
+ protected:
+  RowFaultsTest() {
+    Store store(path_);
+    store.commit(std::vector<Change>{
+        AddStudy{1, "a", table_, "now", {}},
+        AddResults{1,
+                   table_,
+                   0,
+                   "0.1",
+                   "avx2",
+                   1,
+                   "now",
+                   {solved_point(0), solved_point(1), protocol::failed_point(2, "why")}}});
+    run("UPDATE results SET checksum = NULL");
+    run("UPDATE studies SET checksum = NULL");
+  }
+  void run(const std::string& sql) {
+    execute(open_database(path_, SQLITE_OPEN_READWRITE).get(), sql);
+  }
+
+  test::TemporaryFolder folder_;
+  std::string path_ = folder_.file("studies.db");
+  std::shared_ptr<const protocol::PointTable> table_ = table_of(5);
+};
+
+TEST_F(RowFaultsTest, RowsThatAgreeWithThemselvesAndTheRecipeHaveNone) {
+  EXPECT_THAT(find_faults(path_), IsEmpty());
+}
+
+TEST_F(RowFaultsTest, ARowWithoutAChecksumThatDisagreesWithTheRecipeOrIsNoResultIsNamed) {
+  const std::vector<std::pair<std::string, std::string>> damages{
+      {"H = 1.0000000000000002", "H is 1.0000000000000002"},
+      {"mu = mu + 0.125", "mu is"},
+      {"e = 0.5", "e is"},
+      {"peaks = replace(peaks, ']', '')", "one of its lists cannot be read"},
+      {"phases = '[inf]'", "one of its lists cannot be read"},
+      {"impulse_n = NULL", "outputs are missing"},
+      {"error = 'none'", "it is failed, and has outputs"}};
+  for (const auto& [change, said] : damages) {
+    const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);
+    execute(database.get(),
+            "CREATE TEMP TABLE before AS SELECT * FROM packed_results WHERE point = 1");
+    execute(database.get(), "UPDATE packed_results SET " + change + " WHERE point = 1");
+    EXPECT_THAT(find_faults(path_), Contains(testing::AllOf(HasSubstr("point 1"), HasSubstr(said))))
+        << change;
+    execute(database.get(), "DELETE FROM packed_results WHERE point = 1");
+    execute(database.get(), "INSERT INTO packed_results SELECT * FROM before");
+    EXPECT_THAT(find_faults(path_), IsEmpty()) << "after " << change;
+  }
+}
+
+TEST_F(RowFaultsTest, AFailedPointWithOutputsIsNamed) {
+  run("UPDATE packed_results SET fn_peak = 1 WHERE point = 2");
+  EXPECT_THAT(find_faults(path_), Contains(HasSubstr("point 2: it is failed, and has outputs")));
+}
+
+TEST_F(RowFaultsTest, AListThatIsLongerThanAnyResultHasItIsNamedAndNotUnfolded) {
+  const auto peaks_of = [this](int elements) {
+    run("UPDATE packed_results SET peaks = (WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1"
+        " FROM n WHERE i < " +
+        std::to_string(3 * elements) + ") SELECT json_group_array(i) FROM n) WHERE point < 2");
+  };
+  peaks_of(200'000);
+  EXPECT_THAT(find_faults(path_),
+              testing::UnorderedElementsAre(HasSubstr("point 0: one of its lists cannot be read, or"
+                                                      " has more than 4096 elements"),
+                                            HasSubstr("point 1: one of its lists")));
+  peaks_of(protocol::kMostListElements);
+  EXPECT_THAT(find_faults(path_), testing::Not(Contains(HasSubstr("one of its lists"))));
+}
+
+TEST_F(RowFaultsTest, AModelThatIsNotThatOfItsDefinitionOrOfTheRecipeIsNamed) {
+  run("UPDATE models SET E = E + 1");
+  EXPECT_THAT(find_faults(path_), Contains(HasSubstr("model 1: E is not")));
+  run("UPDATE models SET E = E - 1, lengths_m = '[1.0]'");
+  EXPECT_THAT(find_faults(path_), Contains(HasSubstr("model 1: lengths_m is not")));
+  solver::ModelParameters other = solver::preset("paper");
+  other.E_Pa += 1.0;
+  {
+    const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);
+    Statement update(database.get(), "UPDATE models SET E = E + 1, definition = ?");
+    update.bind(1, std::string_view(protocol::canonical_model(other)));
+    update.run();
+  }
+  EXPECT_THAT(find_faults(path_), Contains(HasSubstr("point 0: its model is not")));
+}
+
+TEST_F(RowFaultsTest, ARecipeThatCannotBeReadOrHasOtherPointsIsNamed) {
+  run("UPDATE studies SET points = 6");
+  EXPECT_THAT(find_faults(path_), Contains(HasSubstr("it has 6 points, and 5 by its recipe")));
+  run("UPDATE studies SET points = 5, recipe = x'ff'");
+  EXPECT_THAT(find_faults(path_), Contains(HasSubstr("its recipe cannot be read")));
+}
+
+}  // namespace
+}  // namespace oblique::server
