@@ -14,7 +14,7 @@
 #include "server/database/row_checksum.h"
 #include "server/database/sqlite.h"
 #include "server/store/rows/settled_runs.h"
-#include "server/store/schema/standing_views.h"
+#include "server/store/schema/schema_setup.h"
 
 namespace oblique::server {
 namespace {
@@ -174,10 +174,15 @@ Diagnosis diagnose(const std::string& path) {
                         " LIMIT 20",
                         kCountedStudies));
   compare_settled_points(database, found);
-  if (const auto faults = faults_of_views(database); !faults.empty()) {
-    found.faults.insert(found.faults.end(), faults.begin(), faults.end());
-    shadow_views(database);  // the rows are looked at all the same
+  for (const std::string& view : missing_views(database)) {
+    found.faults.push_back(
+        fmt::format("the view {} is missing: the next server on this file creates it", view));
   }
+  for (const std::string& trigger : other_triggers(database)) {
+    found.faults.push_back(fmt::format(
+        "the trigger {} is not ours: no server works on this file until it is dropped", trigger));
+  }
+  create_temporary_views(database);  // those of the file may be missing or not be ours
   for (auto& fault : faults_of_rows(database, kMostOfAKind)) {
     found.faults.push_back(std::move(fault));
   }

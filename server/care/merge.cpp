@@ -8,7 +8,7 @@
 #include "server/database/open_for_reading.h"
 #include "server/database/row_checksum.h"
 #include "server/database/sqlite.h"
-#include "server/store/schema/standing_views.h"
+#include "server/store/schema/schema_setup.h"
 #include "server/store/store.h"
 
 namespace oblique::server {

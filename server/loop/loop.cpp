@@ -50,11 +50,7 @@ class Loop::Parts final : public Outbox {
       : drain_(settings.drain),
         on_turn_(settings.on_turn),
         doors_(settings.doors),
-        store_(path_on_own_disk(settings.database, settings.allow_network_disk),
-               [tell = settings.on_long_start](const std::string& sentence) {
-                 spdlog::info("{}", sentence);
-                 tell(sentence);
-               }),
+        store_(path_on_own_disk(settings.database, settings.allow_network_disk)),
         writer_(store_, [this](std::vector<WriteReport> r) { written_.put(std::move(r)); }),
         queries_(settings.database, settings.queries,
                  [this](QueryReport r) { queried_.put(std::array{std::move(r)}); }),

@@ -11,7 +11,7 @@
 #include "server/store/rows/model_rows.h"
 #include "server/store/rows/packed_row.h"
 #include "server/store/rows/row_columns.h"
-#include "server/store/schema/standing_views.h"
+#include "server/store/schema/schema_setup.h"
 
 namespace oblique::server {
 namespace {
@@ -136,7 +136,7 @@ struct Store::Statements {
   PackedRow row;
 };
 
-Store::Store(const std::string& path, const Notice& notice) {
+Store::Store(const std::string& path) {
   check_path(path);
   files_ = std::make_unique<DatabaseFiles>(path);
   database_ = open_database(path, SQLITE_OPEN_READWRITE);
@@ -152,7 +152,15 @@ Store::Store(const std::string& path, const Notice& notice) {
   execute(database_.get(), "PRAGMA secure_delete = OFF");
   log_ = std::make_unique<WriteAheadLog>(database_.get());
   const DatabaseKind kind = identify(database_.get(), path);
-  refuse_other_triggers(database_.get(), path);
+  if (auto triggers = other_triggers(database_.get()); !triggers.empty()) {
+    constexpr std::size_t kMostNames = 10;
+    const std::size_t count = triggers.size();
+    triggers.resize(std::min(count, kMostNames));
+    throw StorageError(fmt::format(
+        "{} has {} triggers that are not ours, and would run with each change of its rows: {}{}. "
+        "Drop them, as with DROP TRIGGER in the program sqlite3",
+        path, count, fmt::join(triggers, ", "), count > kMostNames ? " and more" : ""));
+  }
   if (kind == DatabaseKind::kEmpty) {
     // What is deleted is given back in small steps. To be said before anything is written.
     execute(database_.get(), "PRAGMA auto_vacuum = INCREMENTAL");
@@ -164,15 +172,23 @@ Store::Store(const std::string& path, const Notice& notice) {
   execute(database_.get(), "PRAGMA synchronous = FULL");
   log_->make_sure();
   if (kind == DatabaseKind::kEmpty) {
-    create_schema(database_.get());
-  }
-  if (kind == DatabaseKind::kEmpty || restore_views(database_.get(), notice)) {
-    log_->merge();  // a new file is a whole database from the start
+    create_tables(database_.get());
   }
   // A view in the place of one could be read without end.
   if (const auto missing = missing_tables(database_.get()); !missing.empty()) {
     throw StorageError(fmt::format("{} lacks the table {}: `oblique check --db {}` tells more",
                                    path, fmt::join(missing, " and "), path));
+  }
+  try {
+    create_views(database_.get());
+  } catch (const StorageError& error) {
+    throw StorageError(
+        fmt::format("the views of {} cannot be created: {}. If a table has the name of a view, "
+                    "rename the table",
+                    path, error.what()));
+  }
+  if (kind == DatabaseKind::kEmpty) {
+    log_->merge();  // a new file is a whole database from the start
   }
   statements_ = std::make_unique<Statements>(database_.get());
   clearing_ = std::make_unique<Clearing>(database_.get());

@@ -2,7 +2,6 @@
 
 #include <atomic>
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -44,13 +43,10 @@ struct StoredStudy {
 /// again), studies with a full sync.
 class Store final : public Storage {
  public:
-  /// Told in a sentence what takes long, and what came of it.
-  using Notice = std::function<void(const std::string&)>;
-
   /// Opens the database at `path`, or makes it. Throws StorageError naming what was found: a
   /// directory, a foreign file, another schema, a damaged or unwritable file, one that is open
   /// elsewhere.
-  explicit Store(const std::string& path, const Notice& notice = {});
+  explicit Store(const std::string& path);
   ~Store() override;
 
   void commit(std::span<const Change> changes) override;
