@@ -81,7 +81,7 @@ class Loop::Parts final : public Outbox {
   }
 
   LoopEnd run(int stop_fd, const std::function<void()>& take_stop) {
-    writer_.clear_leavings();  // from here on it alone uses the store
+    writer_.resume_deletions();  // from here on it alone uses the store
     auto next_tick = Clock::now();
     std::array<pollfd, 6> items{{{network_.descriptor(), POLLIN, 0},
                                  {web_ ? web_->descriptor() : -1, POLLIN, 0},

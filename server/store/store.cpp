@@ -114,6 +114,7 @@ struct Store::Statements {
                    "INSERT INTO workers (worker_id, name, threads, solver_version,"
                    " instruction_set, joined_at, checksum) VALUES (?1, ?2, ?3, ?4, ?5, ?6,"
                    " row_checksum(?1, ?2, ?3, ?4, ?5, ?6))"),
+        find_study(database, "SELECT 1 FROM studies WHERE study_id = ?"),
         find_model(database, "SELECT model_id FROM models WHERE definition = ?"),
         add_model(database, insert_model_sql()),
         texts(database),
@@ -129,6 +130,7 @@ struct Store::Statements {
   Statement rename;
   Statement rename_origin;
   Statement add_worker;
+  Statement find_study;
   Statement find_model;
   Statement add_model;
   TextNumbers texts;
@@ -161,10 +163,6 @@ Store::Store(const std::string& path) {
         "Drop them, as with DROP TRIGGER in the program sqlite3",
         path, count, fmt::join(triggers, ", "), count > kMostNames ? " and more" : ""));
   }
-  if (kind == DatabaseKind::kEmpty) {
-    // What is deleted is given back in small steps. To be said before anything is written.
-    execute(database_.get(), "PRAGMA auto_vacuum = INCREMENTAL");
-  }
   if (Statement journal(database_.get(), "PRAGMA journal_mode = WAL");
       !journal.step() || journal.text(0) != "wal") {
     throw StorageError("the file system of " + path + " cannot hold a write-ahead log");
@@ -190,10 +188,15 @@ Store::Store(const std::string& path) {
   if (kind == DatabaseKind::kEmpty) {
     log_->merge();  // a new file is a whole database from the start
   }
+  deletion_ = std::make_unique<StudyDeletion>(database_.get());
+  {
+    Transaction transaction(database_.get());
+    deletion_->remove_orphans();
+    transaction.commit();
+  }
   statements_ = std::make_unique<Statements>(database_.get());
-  clearing_ = std::make_unique<Clearing>(database_.get());
   settled_ = std::make_unique<SettledRuns>(database_.get());
-  copy_ = std::make_unique<ResultCopy>(database_.get(), *settled_, *clearing_);
+  copy_ = std::make_unique<ResultCopy>(database_.get(), *settled_);
   files_->expect(database_.get(), database_id());
 }
 
@@ -229,9 +232,7 @@ void Store::commit(std::span<const Change> changes) {
     transaction.commit();
     files_->check();  // or it was committed to a file that nobody will find
     log_->shorten();
-    clearing_->kept();
   } catch (...) {
-    clearing_->undo();
     models_.clear();
     statements_->texts.forget();
     settled_->forget();
@@ -248,7 +249,7 @@ bool Store::merge_log() {
 }
 
 ClearedAway Store::clear_away(std::size_t most) {
-  if (clearing_->is_idle()) {
+  if (!deletion_->has_rows()) {
     return ClearedAway::kAll;
   }
   try {
@@ -259,22 +260,15 @@ ClearedAway Store::clear_away(std::size_t most) {
       return ClearedAway::kMustWait;
     }
     set_sync(false);  // what losing power undoes is deleted again
-    if (clearing_->gives_back()) {
-      clearing_->step(most);
-    } else {
-      Transaction transaction(database_.get());
-      if (clearing_->step(most)) {
-        models_.clear();
-      }
-      transaction.commit();
-    }
+    Transaction transaction(database_.get());
+    deletion_->delete_rows(most);
+    transaction.commit();
     files_->check();
   } catch (...) {
-    clearing_->failed();
     log_->suspect();
     throw;
   }
-  return clearing_->is_idle() ? ClearedAway::kAll : ClearedAway::kPart;
+  return ClearedAway::kPart;
 }
 
 void Store::add(const AddStudy& change) {
@@ -302,7 +296,7 @@ void Store::add(const SetStudyTerms& change) {
 }
 
 void Store::add(const ForgetFailures& change) {
-  if (clearing_->is_deleted(change.study_id)) {
+  if (!has_study(change.study_id)) {
     return;
   }
   settled_->flush();
@@ -349,7 +343,7 @@ void Store::add(const RenameStudy& change) {
 }
 
 void Store::add(const DeleteStudy& change) {
-  clearing_->remove(change.study_id);
+  deletion_->remove(change.study_id);
 }
 
 void Store::add(const SetStudyState& change) {
@@ -372,14 +366,13 @@ void Store::add(const AddWorker& change) {
 }
 
 void Store::add(const AddResults& change) {
-  if (clearing_->is_deleted(change.study_id)) {
+  if (!has_study(change.study_id)) {
     return;
   }
   PackedRow& row = statements_->row;
   for (const protocol::PointResult& result : change.results) {
     const protocol::Point point = change.table->point(result.point());
     const StoredModel model = stored_model(change, point.model);
-    clearing_->note_use(model.id, change.worker_id);
     const RowContext context{change.study_id, model.id,         model.accuracy, point,
                              result.point(),  change.worker_id, change.attempt, change.solved_at};
     if (result.error().empty()) {
@@ -392,6 +385,15 @@ void Store::add(const AddResults& change) {
       settled_->add(change.study_id, result.point());
     }
   }
+}
+
+/// False for a deleted study: results of it are late ones.
+bool Store::has_study(std::uint64_t study_id) {
+  Statement& find = statements_->find_study;
+  find.bind(1, study_id);
+  const bool found = find.step();
+  find.reset();
+  return found;
 }
 
 Store::StoredModel Store::stored_model(const AddResults& change, std::uint64_t model) {
