@@ -197,7 +197,6 @@ Store::Store(const std::string& path) {
   statements_ = std::make_unique<Statements>(database_.get());
   settled_ = std::make_unique<SettledRuns>(database_.get());
   copy_ = std::make_unique<ResultCopy>(database_.get(), *settled_);
-  files_->expect(database_.get(), database_id());
 }
 
 Store::~Store() {
@@ -205,7 +204,13 @@ Store::~Store() {
     files_->check();
     log_->before_closing();
   } catch (const StorageGone&) {
-    leave_files();
+    // What was acknowledged goes into our own file, wherever that is: the next program at the path
+    // must not find our log beside another database.
+    try {
+      log_->merge();
+    } catch (const StorageError&) {
+      // Nothing more can be done for it.
+    }
   }
 }
 
@@ -221,7 +226,6 @@ void Store::commit(std::span<const Change> changes) {
     return std::visit([](const auto& kind) { return is_lasting(kind); }, change);
   });
   try {
-    files_->check();
     log_->make_sure();
     set_sync(any_is_lasting);
     Transaction transaction(database_.get());
@@ -253,7 +257,6 @@ ClearedAway Store::clear_away(std::size_t most) {
     return ClearedAway::kAll;
   }
   try {
-    files_->check();
     log_->make_sure();
     log_->shorten();
     if (log_->is_held_long()) {

@@ -86,7 +86,6 @@ class Store final : public Storage {
  private:
   struct Statements;
 
-  void leave_files();
   void add(const AddStudy& change);
   void add(const SetStudyState& change);
   void add(const SetStudyTerms& change);
