@@ -69,22 +69,22 @@ void end_all(const std::vector<ChildProcess*>& children) {
   }
 }
 
-/// The lines that a server writes while it starts.
-class ReadyLines {
+/// The line that a server writes when it is ready.
+class ReadyLine {
  public:
-  ReadyLines(const Descriptor& ready, ChildProcess& server, std::filesystem::path database)
+  ReadyLine(const Descriptor& ready, ChildProcess& server, std::filesystem::path database)
       : ready_(ready), server_(server), database_(std::move(database)) {}
 
-  /// The next one; empty when the server closes the pipe without one. Throws ProcessError when none
+  /// The line; empty when the server closes the pipe without one. Throws ProcessError when none
   /// comes in time, and Interrupted when `stop` is requested.
-  std::string next(protocol::StopSignals& stop) {
+  std::string read(protocol::StopSignals& stop) {
     const auto deadline = Clock::now() + kReadyWithin;
     std::size_t end = 0;
     while ((end = held_.find('\n')) == std::string::npos) {
       if (stop.requested()) {
         throw Interrupted("stopped before the server was ready");
       }
-      if (!has_told_ && Clock::now() > deadline) {
+      if (Clock::now() > deadline) {
         throw ProcessError(with_last_words(
             fmt::format("no answer within {} s: {}", kReadyWithin.count(), why_silent(database_)),
             server_));
@@ -95,17 +95,13 @@ class ReadyLines {
         return {};
       }
     }
-    // Who says what it is at may take as long as that takes.
-    has_told_ = true;
-    const std::string line = held_.substr(0, end);
-    held_.erase(0, end + 1);
-    return line;
+    return held_.substr(0, end);
   }
 
  private:
   bool read_more() {
     std::array<char, 512> bytes{};
-    const auto got = read(ready_.number(), bytes.data(), bytes.size());
+    const auto got = ::read(ready_.number(), bytes.data(), bytes.size());
     if (got > 0) {
       held_.append(bytes.data(), static_cast<std::size_t>(got));
     }
@@ -116,7 +112,6 @@ class ReadyLines {
   ChildProcess& server_;
   std::filesystem::path database_;
   std::string held_;
-  bool has_told_ = false;
 };
 
 /// Memory for the falls of each worker: an equal share of the setting or, by default, of an eighth
@@ -168,12 +163,8 @@ EmbeddedService::~EmbeddedService() {
 
 void EmbeddedService::wait_until_ready(const Descriptor& ready, const ServiceSettings& settings,
                                        protocol::StopSignals& stop) {
-  ReadyLines lines(ready, *server_, settings.database);
-  auto urls = nlohmann::json::parse(lines.next(stop), nullptr, false);
-  while (urls.is_object() && urls.contains("notice") && urls["notice"].is_string()) {
-    settings.on_long_start(urls["notice"]);
-    urls = nlohmann::json::parse(lines.next(stop), nullptr, false);
-  }
+  ReadyLine line(ready, *server_, settings.database);
+  const auto urls = nlohmann::json::parse(line.read(stop), nullptr, false);
   if (urls.is_object() && urls.contains("client") && urls.contains("worker") &&
       urls["client"].is_string() && urls["worker"].is_string()) {
     client_url_ = urls["client"];

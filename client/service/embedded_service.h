@@ -1,7 +1,6 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <set>
 #include <string>
@@ -22,8 +21,6 @@ struct ServiceSettings {
   std::uint64_t fall_memory_bytes = 0;  ///< of all workers; 0: an eighth of what is free
   std::string only_study{};             ///< the others of the database wait; empty: all are solved
   bool verbose = false;                 ///< what server and workers say goes to our standard error
-  /// Told what the server is at while its start takes long.
-  std::function<void(const std::string&)> on_long_start = [](const std::string&) {};
 };
 
 /// Why a server that was started on the database may not answer, as a sentence part.

@@ -166,11 +166,6 @@ std::optional<RunEnd> run_study(const Study& study, const RunSettings& settings,
   try {
     ServiceSettings how = settings.service;
     how.only_study = study.name;
-    if (!how.verbose) {  // else its log says it
-      how.on_long_start = [&how](const std::string& sentence) {
-        tell_line(fmt::format("{}: {}.", how.database.string(), sentence));
-      };
-    }
     EmbeddedService service(how, stop);
     auto end = submit_and_wait(study, settings, service, stop);
     service.stop();

@@ -26,8 +26,8 @@ constexpr const char* kDeleteExamples = R"(Examples:
 
 The study and all its results are gone for good: `oblique backup` makes a copy first. On a terminal
 it asks; elsewhere it wants --yes. Workers drop what they have of a study that runs, its name is free
-at once, and the file gets smaller while a server deletes the rows, a few at a time. A database file
-is changed directly, when no server works on it.)";
+at once, and a server deletes the rows meanwhile. The file keeps its size: later results use the room.
+A database file is changed directly, when no server works on it.)";
 
 struct DeleteFlags {
   std::string study;
@@ -46,7 +46,7 @@ bool is_confirmed(const protocol::StudyStatus& study, const std::string& place) 
   return answer == "y" || answer == "Y" || answer == "yes";
 }
 
-/// In a database file; says so when the file could not be made smaller.
+/// In a database file. Prints a note when rows are left to the next server.
 void delete_from(const std::string& database, const protocol::StudyStatus& study) {
   Progress progress(std::cerr, true);
   const bool draws = isatty(STDERR_FILENO) != 0;
@@ -66,8 +66,7 @@ void delete_from(const std::string& database, const protocol::StudyStatus& study
   progress.finish();
   if (!is_merged) {
     std::cerr << fmt::format(
-        "Another program reads {}: the file gets smaller when the next server has worked on it.\n",
-        database);
+        "Another program reads {}: the next server deletes what is left of the study.\n", database);
   }
 }
 

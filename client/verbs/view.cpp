@@ -73,11 +73,6 @@ int view(ViewFlags flags) {
   how.http = fmt::format("127.0.0.1:{}", flags.port);
   // Before any thread is started; see StopSignals.
   protocol::StopSignals stop;
-  if (!how.verbose) {
-    how.on_long_start = [&how](const std::string& sentence) {
-      tell_line(fmt::format("{}: {}.", how.database.string(), sentence));
-    };
-  }
   try {
     EmbeddedService service(how, stop);
     // Whoever reads it may change studies, so it is for who started this alone.

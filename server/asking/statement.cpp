@@ -15,7 +15,7 @@
 #include "server/asking/sql/sql_expression.h"
 #include "server/asking/sql/sql_items.h"
 #include "server/database/sqlite.h"
-#include "server/store/schema/standing_views.h"
+#include "server/store/schema/schema_setup.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::server {

@@ -36,9 +36,13 @@ DatabaseHandle open_database(const std::string& path, int flags) {
 
 void execute(sqlite3* database, const std::string& sql) {
   char* message = nullptr;
-  if (sqlite3_exec(database, sql.c_str(), nullptr, nullptr, &message) != SQLITE_OK) {
-    const std::string reason = message != nullptr ? message : sqlite3_errmsg(database);
+  const int code = sqlite3_exec(database, sql.c_str(), nullptr, nullptr, &message);
+  if (code != SQLITE_OK) {
+    std::string reason = message != nullptr ? message : sqlite3_errmsg(database);
     sqlite3_free(message);
+    if ((static_cast<unsigned>(code) & 0xffU) == SQLITE_CORRUPT) {
+      reason += kWayOut;
+    }
     throw StorageError("the database refused a statement: " + reason);
   }
 }

@@ -50,11 +50,7 @@ class Loop::Parts final : public Outbox {
       : drain_(settings.drain),
         on_turn_(settings.on_turn),
         doors_(settings.doors),
-        store_(path_on_own_disk(settings.database, settings.allow_network_disk),
-               [tell = settings.on_long_start](const std::string& sentence) {
-                 spdlog::info("{}", sentence);
-                 tell(sentence);
-               }),
+        store_(path_on_own_disk(settings.database, settings.allow_network_disk)),
         writer_(store_, [this](std::vector<WriteReport> r) { written_.put(std::move(r)); }),
         queries_(settings.database, settings.queries,
                  [this](QueryReport r) { queried_.put(std::array{std::move(r)}); }),
@@ -85,7 +81,7 @@ class Loop::Parts final : public Outbox {
   }
 
   LoopEnd run(int stop_fd, const std::function<void()>& take_stop) {
-    writer_.clear_leavings();  // from here on it alone uses the store
+    writer_.resume_deletions();  // from here on it alone uses the store
     auto next_tick = Clock::now();
     std::array<pollfd, 6> items{{{network_.descriptor(), POLLIN, 0},
                                  {web_ ? web_->descriptor() : -1, POLLIN, 0},

@@ -35,8 +35,6 @@ struct LoopSettings {
   std::chrono::milliseconds drain{0};
   /// Called on the loop's thread several times a second, and once as the loop ends.
   std::function<void(const LoopTurn&)> on_turn = [](const LoopTurn&) {};
-  /// Called with a sentence on what takes long while the database is opened, beside the log.
-  std::function<void(const std::string&)> on_long_start = [](const std::string&) {};
   ServiceSettings service;  ///< solver_version must be set; the rest from the database
 };
 

@@ -20,7 +20,7 @@
 #include "server/store/rows/recipe_check.h"
 #include "server/store/rows/row_columns.h"
 #include "server/store/rows/settled_runs.h"
-#include "server/store/schema/standing_views.h"
+#include "server/store/schema/schema_setup.h"
 
 namespace oblique::server {
 namespace {
@@ -276,7 +276,14 @@ Diagnosis diagnose(const std::string& path) {
   add_row_checksum(database);
   execute(database, "BEGIN");  // one instant of rows and counts while a server writes
   check_other_tables(database, found);
-  append(found.faults, faults_of_views(database));
+  for (const std::string& view : missing_views(database)) {
+    found.faults.push_back(
+        fmt::format("the view {} is missing: the next server on this file creates it", view));
+  }
+  for (const std::string& trigger : other_triggers(database)) {
+    found.faults.push_back(fmt::format(
+        "the trigger {} is not ours: no server works on this file until it is dropped", trigger));
+  }
   append(found.faults, faults_of_rows(database, kMostOfAKind));
   append(found.faults, faults_of_recipes(database));
   append(found.remarks, database,

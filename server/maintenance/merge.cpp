@@ -15,7 +15,7 @@
 #include "server/maintenance/merged_studies.h"
 #include "server/maintenance/study_counts.h"
 #include "server/store/rows/row_columns.h"
-#include "server/store/schema/standing_views.h"
+#include "server/store/schema/schema_setup.h"
 #include "server/store/store.h"
 
 namespace oblique::server {

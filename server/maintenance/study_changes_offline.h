@@ -26,7 +26,7 @@ void rename_study(const std::string& path, std::uint64_t study_id, const std::st
 /// Called now and then with how many rows are deleted.
 using RowsDeleted = std::function<void(std::uint64_t rows)>;
 
-/// Deletes a study with all its results, and gives the space back. When the process ends on the way
+/// Deletes a study with all its results. When the process ends on the way
 /// the study is gone, and the next server deletes what is left of it. False when that is left to it
 /// or the write-ahead log could not be merged, because another program goes on reading the
 /// database. Throws StudyRefused when there is no study of that number.

@@ -128,11 +128,6 @@ int run(LoopSettings settings, int ready_fd, const StopWithParent& parent) {
   settings.on_turn = [&notifier, drain = settings.drain](const LoopTurn& turn) {
     tell_turn(notifier, turn, drain);
   };
-  if (ready_fd >= 0) {
-    settings.on_long_start = [ready_fd](const std::string& sentence) {
-      tell_line(ready_fd, {{"notice", sentence}});
-    };
-  }
   Loop loop(settings);
   spdlog::info("database {}, clients at {}, workers at {}, metrics at {}", settings.database,
                loop.client_endpoint(), loop.worker_endpoint(),

@@ -32,9 +32,8 @@ void set_whole(PackedValue& value, std::uint64_t whole) {
 
 }  // namespace
 
-ResultCopy::ResultCopy(sqlite3* database, SettledRuns& settled, Clearing& clearing)
+ResultCopy::ResultCopy(sqlite3* database, SettledRuns& settled)
     : settled_(settled),
-      clearing_(clearing),
       name_(database, "SELECT name FROM studies WHERE study_id = ?"),
       read_(database, read_sql()),
       name_origin_(database, "INSERT OR IGNORE INTO origins (origin_id, name) VALUES (?, ?)"),
@@ -116,8 +115,6 @@ void ResultCopy::end(const EndTaking& change) {
 void ResultCopy::copy(const TakeResults& change, const SharedRun& run) {
   static const int kStudy = packed_column("study_id");
   static const int kPoint = packed_column("point");
-  static const int kModel = packed_column("model_id");
-  static const int kWorker = packed_column("worker");
   static const int kTakenFrom = packed_column("taken_from");
   read_.reset();
   read_.bind(1, change.source_id);
@@ -139,7 +136,6 @@ void ResultCopy::copy(const TakeResults& change, const SharedRun& run) {
     if (insert_.run(row_)) {
       change.taken->points.insert(point);
       settled_.add(change.study_id, point);
-      clearing_.note_use(row_.at(kModel).whole, static_cast<std::uint64_t>(row_.at(kWorker).whole));
     }
   }
   read_.reset();

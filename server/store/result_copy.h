@@ -6,7 +6,6 @@
 
 #include "server/database/sqlite.h"
 #include "server/store/changes.h"
-#include "server/store/clearing.h"
 #include "server/store/rows/packed_row.h"
 #include "server/store/rows/settled_runs.h"
 
@@ -19,7 +18,7 @@ namespace oblique::server {
 class ResultCopy {
  public:
   /// All must outlive this.
-  ResultCopy(sqlite3* database, SettledRuns& settled, Clearing& clearing);
+  ResultCopy(sqlite3* database, SettledRuns& settled);
 
   /// Throws StorageError.
   void run(const TakeResults& change);
@@ -43,7 +42,6 @@ class ResultCopy {
   };
 
   SettledRuns& settled_;
-  Clearing& clearing_;
   Statement name_;
   Statement read_;
   Statement name_origin_;

@@ -11,7 +11,7 @@
 #include "server/store/rows/model_rows.h"
 #include "server/store/rows/packed_row.h"
 #include "server/store/rows/row_columns.h"
-#include "server/store/schema/standing_views.h"
+#include "server/store/schema/schema_setup.h"
 
 namespace oblique::server {
 namespace {
@@ -114,6 +114,7 @@ struct Store::Statements {
                    "INSERT INTO workers (worker_id, name, threads, solver_version,"
                    " instruction_set, joined_at, checksum) VALUES (?1, ?2, ?3, ?4, ?5, ?6,"
                    " row_checksum(?1, ?2, ?3, ?4, ?5, ?6))"),
+        find_study(database, "SELECT 1 FROM studies WHERE study_id = ?"),
         find_model(database, "SELECT model_id FROM models WHERE definition = ?"),
         add_model(database, insert_model_sql()),
         texts(database),
@@ -129,6 +130,7 @@ struct Store::Statements {
   Statement rename;
   Statement rename_origin;
   Statement add_worker;
+  Statement find_study;
   Statement find_model;
   Statement add_model;
   TextNumbers texts;
@@ -136,7 +138,7 @@ struct Store::Statements {
   PackedRow row;
 };
 
-Store::Store(const std::string& path, const Notice& notice) {
+Store::Store(const std::string& path) {
   check_path(path);
   files_ = std::make_unique<DatabaseFiles>(path);
   database_ = open_database(path, SQLITE_OPEN_READWRITE);
@@ -152,10 +154,14 @@ Store::Store(const std::string& path, const Notice& notice) {
   execute(database_.get(), "PRAGMA secure_delete = OFF");
   log_ = std::make_unique<WriteAheadLog>(database_.get());
   const DatabaseKind kind = identify(database_.get(), path);
-  refuse_other_triggers(database_.get(), path);
-  if (kind == DatabaseKind::kEmpty) {
-    // What is deleted is given back in small steps. To be said before anything is written.
-    execute(database_.get(), "PRAGMA auto_vacuum = INCREMENTAL");
+  if (auto triggers = other_triggers(database_.get()); !triggers.empty()) {
+    constexpr std::size_t kMostNames = 10;
+    const std::size_t count = triggers.size();
+    triggers.resize(std::min(count, kMostNames));
+    throw StorageError(fmt::format(
+        "{} has {} triggers that are not ours, and would run with each change of its rows: {}{}. "
+        "Drop them, as with DROP TRIGGER in the program sqlite3",
+        path, count, fmt::join(triggers, ", "), count > kMostNames ? " and more" : ""));
   }
   if (Statement journal(database_.get(), "PRAGMA journal_mode = WAL");
       !journal.step() || journal.text(0) != "wal") {
@@ -164,21 +170,33 @@ Store::Store(const std::string& path, const Notice& notice) {
   execute(database_.get(), "PRAGMA synchronous = FULL");
   log_->make_sure();
   if (kind == DatabaseKind::kEmpty) {
-    create_schema(database_.get());
-  }
-  if (kind == DatabaseKind::kEmpty || restore_views(database_.get(), notice)) {
-    log_->merge();  // a new file is a whole database from the start
+    create_tables(database_.get());
   }
   // A view in the place of one could be read without end.
   if (const auto missing = missing_tables(database_.get()); !missing.empty()) {
     throw StorageError(fmt::format("{} lacks the table {}: `oblique check --db {}` tells more",
                                    path, fmt::join(missing, " and "), path));
   }
+  try {
+    create_views(database_.get());
+  } catch (const StorageError& error) {
+    throw StorageError(
+        fmt::format("the views of {} cannot be created: {}. If a table has the name of a view, "
+                    "rename the table",
+                    path, error.what()));
+  }
+  if (kind == DatabaseKind::kEmpty) {
+    log_->merge();  // a new file is a whole database from the start
+  }
+  deletion_ = std::make_unique<StudyDeletion>(database_.get());
+  {
+    Transaction transaction(database_.get());
+    deletion_->remove_orphans();
+    transaction.commit();
+  }
   statements_ = std::make_unique<Statements>(database_.get());
-  clearing_ = std::make_unique<Clearing>(database_.get());
   settled_ = std::make_unique<SettledRuns>(database_.get());
-  copy_ = std::make_unique<ResultCopy>(database_.get(), *settled_, *clearing_);
-  files_->expect(database_.get(), database_id());
+  copy_ = std::make_unique<ResultCopy>(database_.get(), *settled_);
 }
 
 Store::~Store() {
@@ -186,7 +204,13 @@ Store::~Store() {
     files_->check();
     log_->before_closing();
   } catch (const StorageGone&) {
-    leave_files();
+    // What was acknowledged goes into our own file, wherever that is: the next program at the path
+    // must not find our log beside another database.
+    try {
+      log_->merge();
+    } catch (const StorageError&) {
+      // Nothing more can be done for it.
+    }
   }
 }
 
@@ -202,7 +226,6 @@ void Store::commit(std::span<const Change> changes) {
     return std::visit([](const auto& kind) { return is_lasting(kind); }, change);
   });
   try {
-    files_->check();
     log_->make_sure();
     set_sync(any_is_lasting);
     Transaction transaction(database_.get());
@@ -213,9 +236,7 @@ void Store::commit(std::span<const Change> changes) {
     transaction.commit();
     files_->check();  // or it was committed to a file that nobody will find
     log_->shorten();
-    clearing_->kept();
   } catch (...) {
-    clearing_->undo();
     models_.clear();
     statements_->texts.forget();
     settled_->forget();
@@ -232,33 +253,25 @@ bool Store::merge_log() {
 }
 
 ClearedAway Store::clear_away(std::size_t most) {
-  if (clearing_->is_idle()) {
+  if (!deletion_->has_rows()) {
     return ClearedAway::kAll;
   }
   try {
-    files_->check();
     log_->make_sure();
     log_->shorten();
     if (log_->is_held_long()) {
       return ClearedAway::kMustWait;
     }
     set_sync(false);  // what losing power undoes is deleted again
-    if (clearing_->gives_back()) {
-      clearing_->step(most);
-    } else {
-      Transaction transaction(database_.get());
-      if (clearing_->step(most)) {
-        models_.clear();
-      }
-      transaction.commit();
-    }
+    Transaction transaction(database_.get());
+    deletion_->delete_rows(most);
+    transaction.commit();
     files_->check();
   } catch (...) {
-    clearing_->failed();
     log_->suspect();
     throw;
   }
-  return clearing_->is_idle() ? ClearedAway::kAll : ClearedAway::kPart;
+  return ClearedAway::kPart;
 }
 
 void Store::add(const AddStudy& change) {
@@ -286,7 +299,7 @@ void Store::add(const SetStudyTerms& change) {
 }
 
 void Store::add(const ForgetFailures& change) {
-  if (clearing_->is_deleted(change.study_id)) {
+  if (!has_study(change.study_id)) {
     return;
   }
   settled_->flush();
@@ -333,7 +346,7 @@ void Store::add(const RenameStudy& change) {
 }
 
 void Store::add(const DeleteStudy& change) {
-  clearing_->remove(change.study_id);
+  deletion_->remove(change.study_id);
 }
 
 void Store::add(const SetStudyState& change) {
@@ -356,14 +369,13 @@ void Store::add(const AddWorker& change) {
 }
 
 void Store::add(const AddResults& change) {
-  if (clearing_->is_deleted(change.study_id)) {
+  if (!has_study(change.study_id)) {
     return;
   }
   PackedRow& row = statements_->row;
   for (const protocol::PointResult& result : change.results) {
     const protocol::Point point = change.table->point(result.point());
     const StoredModel model = stored_model(change, point.model);
-    clearing_->note_use(model.id, change.worker_id);
     const RowContext context{change.study_id, model.id,         model.accuracy, point,
                              result.point(),  change.worker_id, change.attempt, change.solved_at};
     if (result.error().empty()) {
@@ -376,6 +388,15 @@ void Store::add(const AddResults& change) {
       settled_->add(change.study_id, result.point());
     }
   }
+}
+
+/// False for a deleted study: results of it are late ones.
+bool Store::has_study(std::uint64_t study_id) {
+  Statement& find = statements_->find_study;
+  find.bind(1, study_id);
+  const bool found = find.step();
+  find.reset();
+  return found;
 }
 
 Store::StoredModel Store::stored_model(const AddResults& change, std::uint64_t model) {

@@ -2,7 +2,6 @@
 
 #include <atomic>
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -11,10 +10,10 @@
 
 #include "server/database/sqlite.h"
 #include "server/store/changes.h"
-#include "server/store/clearing.h"
 #include "server/store/database_files.h"
 #include "server/store/result_copy.h"
 #include "server/store/rows/settled_runs.h"
+#include "server/store/study_deletion.h"
 #include "server/store/write_ahead_log.h"
 #include "server/study/interval_set.h"
 #include "server/study/point_attempts.h"
@@ -44,13 +43,10 @@ struct StoredStudy {
 /// again), studies with a full sync.
 class Store final : public Storage {
  public:
-  /// Told in a sentence what takes long, and what came of it.
-  using Notice = std::function<void(const std::string&)>;
-
   /// Opens the database at `path`, or makes it. Throws StorageError naming what was found: a
   /// directory, a foreign file, another schema, a damaged or unwritable file, one that is open
   /// elsewhere.
-  explicit Store(const std::string& path, const Notice& notice = {});
+  explicit Store(const std::string& path);
   ~Store() override;
 
   void commit(std::span<const Change> changes) override;
@@ -59,7 +55,7 @@ class Store final : public Storage {
   void interrupt() override { interrupted_ = true; }
   ClearedAway clear_away(std::size_t most) override;
   /// Rows that `clear_away` has deleted.
-  std::uint64_t cleared_rows() const { return clearing_->rows(); }
+  std::uint64_t cleared_rows() const { return deletion_->rows(); }
 
   /// There was no file; it was made.
   bool is_new() const { return files_->were_made(); }
@@ -90,7 +86,6 @@ class Store final : public Storage {
  private:
   struct Statements;
 
-  void leave_files();
   void add(const AddStudy& change);
   void add(const SetStudyState& change);
   void add(const SetStudyTerms& change);
@@ -107,6 +102,7 @@ class Store final : public Storage {
     std::int64_t id;
     double accuracy;
   };
+  bool has_study(std::uint64_t study_id);
   StoredModel stored_model(const AddResults& change, std::uint64_t model);
   std::int64_t known_model(std::string_view definition);
   void set_sync(bool full);
@@ -117,11 +113,11 @@ class Store final : public Storage {
   std::atomic<bool> interrupted_ = false;  // the same
   DatabaseHandle database_;
   std::unique_ptr<WriteAheadLog> log_;
-  std::unique_ptr<Clearing> clearing_;
+  std::unique_ptr<StudyDeletion> deletion_;
   std::unique_ptr<Statements> statements_;
   std::unique_ptr<SettledRuns> settled_;
   std::unique_ptr<ResultCopy> copy_;
-  // By study and model number; emptied when it grows or a transaction fails.
+  // By study and model number; emptied when it is large or a transaction fails.
   std::map<std::pair<std::uint64_t, std::uint64_t>, StoredModel> models_;
   bool full_sync_ = true;
   std::vector<std::string> left_out_;

@@ -241,18 +241,4 @@ std::string Store::database_id() {
   return statement.text(0);
 }
 
-/// Whoever comes after must not find our log beside another database, where SQLite would take it
-/// for that one's. What was acknowledged goes into our own file, wherever that may be now.
-void Store::leave_files() {
-  try {
-    if (files_->were_overwritten()) {
-      log_->discard();
-    } else {
-      log_->merge();
-    }
-  } catch (const StorageError&) {
-    // Nothing more can be done for it.
-  }
-}
-
 }  // namespace oblique::server

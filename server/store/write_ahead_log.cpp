@@ -91,12 +91,6 @@ bool WriteAheadLog::merge() {
   return true;
 }
 
-void WriteAheadLog::discard() {
-  if (sqlite3_file* file = file_of(database_); file != nullptr) {
-    file->pMethods->xTruncate(file, 0);
-  }
-}
-
 void WriteAheadLog::before_closing() {
   try {
     make_sure();

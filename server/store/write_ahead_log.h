@@ -30,8 +30,6 @@ class WriteAheadLog {
   /// Moves all of it into the database and empties it. False when a reader still needs it. Throws
   /// StorageError.
   bool merge();
-  /// Empties it: what it is to be merged into is not there any more.
-  void discard();
   /// A log of so many pages is long.
   void shorten_at(int pages) { long_pages_ = pages; }
   /// To be called before the database is closed, which would build on the log.

@@ -22,12 +22,9 @@ constexpr std::chrono::milliseconds kRetryPause{500};
 /// While nothing is to be written the database is looked after so often.
 constexpr std::chrono::milliseconds kTendPause{1000};
 
-/// What deleted studies left is cleared away in steps that take about so long, between which
-/// whatever waits is written; after a step that failed or must wait, none is tried for so long.
-constexpr std::chrono::milliseconds kShortStep{1};
-constexpr std::chrono::milliseconds kLongStep{3};
-constexpr std::size_t kFewestRows = 16;
-constexpr std::size_t kMostRows = 512;  // some ms, whatever kind of step comes next
+/// Rows of deleted studies go so many at a time, some 10 ms, between which whatever waits is
+/// written. After a step that failed or must wait, none is tried for a pause.
+constexpr std::size_t kRowsAtOnce = 1000;
 constexpr std::chrono::milliseconds kClearPause{1000};
 
 /// So often a log that readers hold is tried before that is said.
@@ -104,9 +101,9 @@ void Writer::submit(WriteJob job) {
   wake_.notify_one();
 }
 
-void Writer::clear_leavings() {
+void Writer::resume_deletions() {
   const std::lock_guard lock(mutex_);
-  has_leavings_ = true;
+  resumes_ = true;
   wake_.notify_one();
 }
 
@@ -138,22 +135,22 @@ void Writer::run() {
         wake_.wait_for(lock, kRetryPause, [this] { return finishing_; });
       } else if (jobs.empty() && !may_clear()) {
         wake_.wait_for(lock, kTendPause,
-                       [this] { return finishing_ || has_leavings_ || !queue_.empty(); });
+                       [this] { return finishing_ || resumes_ || !queue_.empty(); });
       }
       std::move(queue_.begin(), queue_.end(), std::back_inserter(jobs));
       queue_.clear();
       last_round = finishing_;
       ++steps_;
-      if (std::exchange(has_leavings_, false)) {
-        commits_.look_for_leavings();
+      if (std::exchange(resumes_, false)) {
+        commits_.resume_deletions();
       }
     }
     const bool was_faulty = commits_.is_faulty();
     auto reports = !jobs.empty() ? write(jobs)
                    : may_clear() ? std::vector<WriteReport>()
                                  : commits_.tend();
-    if (may_clear() && !last_round) {
-      clear_some(reports);
+    if (may_clear() && !last_round && !commits_.clear(kRowsAtOnce, reports)) {
+      clears_from_ = std::chrono::steady_clock::now() + kClearPause;
     }
     if (!reports.empty()) {
       report_(std::move(reports));
@@ -181,20 +178,6 @@ std::vector<WriteReport> Writer::write(std::deque<WriteJob>& jobs) {
 bool Writer::may_clear() const {
   return commits_.has_to_clear() && !commits_.is_faulty() &&
          std::chrono::steady_clock::now() >= clears_from_;
-}
-
-void Writer::clear_some(std::vector<WriteReport>& reports) {
-  const auto began = std::chrono::steady_clock::now();
-  if (!commits_.clear(rows_to_clear_, reports)) {
-    clears_from_ = std::chrono::steady_clock::now() + kClearPause;
-    return;
-  }
-  const auto taken = std::chrono::steady_clock::now() - began;
-  if (taken > kLongStep) {
-    rows_to_clear_ = std::max(rows_to_clear_ / 2, kFewestRows);
-  } else if (taken < kShortStep) {
-    rows_to_clear_ = std::min(rows_to_clear_ * 2, kMostRows);
-  }
 }
 
 CommitCounts Writer::commits() const {
@@ -250,13 +233,7 @@ std::vector<WriteReport> GroupCommit::tend() {
 bool GroupCommit::clear(std::size_t most, std::vector<WriteReport>& reports) {
   try {
     const ClearedAway cleared = storage_.clear_away(most);
-    if (cleared == ClearedAway::kAll) {
-      to_be_merged_ = to_be_merged_ || std::exchange(any_is_cleared_, false);  // the file shrinks
-      tries_ = 0;
-      clears_ = false;
-    } else {
-      any_is_cleared_ = true;
-    }
+    clears_ = cleared != ClearedAway::kAll;
     return cleared != ClearedAway::kMustWait;
   } catch (const StorageGone& error) {
     note_gone(error, reports);

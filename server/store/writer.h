@@ -65,11 +65,11 @@ class GroupCommit {
   /// The database is not where it was; nothing is written any more.
   bool is_gone() const { return gone_; }
 
-  /// Something of deleted studies may be left by an earlier process.
-  void look_for_leavings() { clears_ = true; }
-  /// Whether something of deleted studies may be left to be cleared away.
+  /// An earlier process may have left rows of deleted studies.
+  void resume_deletions() { clears_ = true; }
+  /// Whether rows of deleted studies may be left.
   bool has_to_clear() const { return clears_ && !gone_; }
-  /// Clears away a part of it: at most about so many rows. False when that must wait a while.
+  /// Deletes at most so many of them. False when that must wait a while.
   bool clear(std::size_t most, std::vector<WriteReport>& reports);
 
   /// To be called now and then while nothing waits: looks whether the database is still there, and
@@ -92,8 +92,7 @@ class GroupCommit {
   std::uint64_t rows_ = 0;
   bool faulty_ = false;
   bool gone_ = false;
-  bool clears_ = false;  // something of deleted studies may be left
-  bool any_is_cleared_ = false;
+  bool clears_ = false;        // rows of deleted studies may be left
   bool to_be_merged_ = false;  // a study is done
   int tries_ = 0;              // to merge since then
   std::string why_unmerged_;
@@ -115,9 +114,9 @@ class Writer {
 
   void submit(WriteJob job);
 
-  /// Clears away what an earlier process left of deleted studies. To be called once nobody but this
-  /// thread uses the storage.
-  void clear_leavings();
+  /// Continues deletions that an earlier process left. To be called once only this thread uses the
+  /// storage.
+  void resume_deletions();
 
   /// Writes what waits, merges the log and ends the thread, also when a statement would never end.
   /// Returns how many jobs could not be made durable.
@@ -130,7 +129,6 @@ class Writer {
   void run();
   std::vector<WriteReport> write(std::deque<WriteJob>& jobs);
   bool may_clear() const;
-  void clear_some(std::vector<WriteReport>& reports);
   void merge_before_the_end();
 
   Storage& storage_;
@@ -141,13 +139,12 @@ class Writer {
   std::condition_variable wake_;
   std::deque<WriteJob> queue_;  // guarded by mutex_
   bool finishing_ = false;      // guarded by mutex_
-  bool has_leavings_ = false;   // guarded by mutex_
+  bool resumes_ = false;        // guarded by mutex_
   std::uint64_t steps_ = 0;     // that the thread began; guarded by mutex_
   bool has_ended_ = false;      // the thread; guarded by mutex_
   std::condition_variable ended_;
-  CommitCounts counts_;             // guarded by mutex_
-  std::size_t left_over_ = 0;       // written by the thread, read after it ended
-  std::size_t rows_to_clear_ = 64;  // of the thread: so many take about as long as they may
+  CommitCounts counts_;        // guarded by mutex_
+  std::size_t left_over_ = 0;  // written by the thread, read after it ended
   std::chrono::steady_clock::time_point clears_from_{};  // of the thread
   std::thread thread_;                                   // last: it uses all the others
 };

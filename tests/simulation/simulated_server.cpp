@@ -33,7 +33,7 @@ void SimulatedServer::start() {
   settings.last_study_id = found.last_study_id;
   settings.last_worker_id = found.last_worker_id;
   commits_.emplace(disk_);
-  commits_->look_for_leavings();
+  commits_->resume_deletions();
   service_.emplace(settings, *this, std::move(found.studies), now());
   clear_some();
   tick();

@@ -80,10 +80,7 @@ void Server::start(const TemporaryFolder& folder, std::vector<std::string> argum
   }
   process_.emplace(folder, server_program(), arguments, with_drain, ready[1]);
   close(ready[1]);
-  auto urls = nlohmann::json::parse(read_line(ready[0]), nullptr, false);
-  while (urls.is_object() && urls.contains("notice")) {
-    urls = nlohmann::json::parse(read_line(ready[0]), nullptr, false);
-  }
+  const auto urls = nlohmann::json::parse(read_line(ready[0]), nullptr, false);
   close(ready[0]);
   if (!urls.is_object()) {
     throw std::runtime_error("the server did not start: " + process_->err());

@@ -79,8 +79,6 @@ CREATE TABLE packed_results (
   PRIMARY KEY (study_id, point)
 ) STRICT, WITHOUT ROWID;
 
-CREATE INDEX failed_points ON packed_results (study_id, point) WHERE error IS NOT NULL;
-
 -- Points that have a row, as runs of neighbours, so that a server that starts need not look at the rows.
 -- Right for studies that are `counted`; it is changed together with the rows.
 CREATE TABLE settled_points (
@@ -103,11 +101,3 @@ CREATE TABLE taken_points (
   points      INTEGER NOT NULL,  -- how many
   PRIMARY KEY (study_id, origin_id)
 ) STRICT, WITHOUT ROWID;
-
--- Rows that go, by whatever hand: the next start of a server counts again. A program that takes them
--- out of `settled_points` too sets `counted` to what it was.
-CREATE TRIGGER rows_are_gone AFTER DELETE ON packed_results
-WHEN (SELECT counted FROM studies WHERE study_id = OLD.study_id)
-BEGIN
-  UPDATE studies SET counted = 0 WHERE study_id = OLD.study_id;
-END;

@@ -65,7 +65,7 @@ CREATE TABLE workers (
   checksum        INTEGER        -- CRC-32 of the other columns
 ) STRICT;
 
--- Studies that are deleted, of which rows may be left: these go a few at a time, while a server works.
+-- Studies that are deleted. A server deletes their rows while it works, and the next one what no row refers to then.
 CREATE TABLE deletions (
   study_id    INTEGER PRIMARY KEY   -- its number
 ) STRICT;

@@ -51,6 +51,7 @@ TEST_F(OfflineStudyTest, ADeletedStudyLeavesNothingBehind) {
   std::uint64_t rows = 0;
   EXPECT_TRUE(delete_study(path_, 1, [&](std::uint64_t deleted) { rows = deleted; }));
   EXPECT_EQ(rows, 10U);
+  { const Store next(path_); }  // a start deletes what no row refers to
   const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READONLY);
   for (const char* table : {"studies", "models", "workers", "packed_results", "settled_points",
                             "deletions", "retries"}) {

@@ -41,9 +41,8 @@ class FailingStorage final : public Storage {
   }
 
   /// As many steps as `leave` said.
-  ClearedAway clear_away(std::size_t most) override {
+  ClearedAway clear_away(std::size_t /*most*/) override {
     const std::lock_guard lock(mutex_);
-    most_in_a_step_ = std::max(most_in_a_step_, most);
     if (full_) {
       throw StorageError("the disk is full");
     }
@@ -52,10 +51,6 @@ class FailingStorage final : public Storage {
     }
     --left_;
     return ClearedAway::kPart;
-  }
-  std::size_t most_in_a_step() {
-    const std::lock_guard lock(mutex_);
-    return most_in_a_step_;
   }
   void leave(int steps) {
     const std::lock_guard lock(mutex_);
@@ -91,7 +86,6 @@ class FailingStorage final : public Storage {
   bool out_of_memory_ = false;
   int attempts_ = 0;
   int left_ = 0;
-  std::size_t most_in_a_step_ = 0;
   std::vector<std::uint64_t> committed_;
 };
 
@@ -362,24 +356,12 @@ TEST_F(WriterTest, WhatDeletedStudiesLeftIsClearedAwayBetweenWritesAndWithoutAny
   EXPECT_EQ(writer_.finish(), 0U);
 }
 
-TEST_F(WriterTest, StepsOfClearingAwayThatWereQuickDoNotMakeTheNextOneLong) {
-  storage_.leave(500);  // which take no time
-  writer_.clear_leavings();
-  while (storage_.left() > 0) {
-    std::this_thread::yield();
-  }
-  EXPECT_EQ(writer_.finish(), 0U);
-  EXPECT_GT(storage_.most_in_a_step(), 16U);
-  EXPECT_LE(storage_.most_in_a_step(), 512U)
-      << "rows: a step of another kind takes longer for each";
-}
-
 TEST_F(WriterTest, WhatAnEarlierProcessLeftIsClearedAwayWhenItIsTold) {
   storage_.leave(3);
   writer_.submit(kept(1));
   ASSERT_EQ(reports_.wait_for_ticket(1), Kind::kStored);
   EXPECT_EQ(storage_.left(), 3) << "others may still use the storage";
-  writer_.clear_leavings();
+  writer_.resume_deletions();
   while (storage_.left() > 0) {
     std::this_thread::yield();
   }
@@ -389,7 +371,7 @@ TEST(GroupCommitTest, AStepThatFailsIsTakenAgainAndDisturbsNothing) {
   FailingStorage storage;
   GroupCommit commits(storage);
   EXPECT_FALSE(commits.has_to_clear()) << "not before it is told";
-  commits.look_for_leavings();
+  commits.resume_deletions();
   storage.leave(2);
   std::vector<WriteReport> reports;
   EXPECT_TRUE(commits.clear(10, reports));

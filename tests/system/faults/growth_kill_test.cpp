@@ -90,7 +90,9 @@ TEST_F(GrowthKillTest, WhatWasAcknowledgedIsThereAndWhatWasDeletedStaysAwayWhene
   EXPECT_EQ(names(), (std::vector<std::string>{"grows", "stays"}));
   wait_until("all is solved and cleared away", [&] {
     return number("SELECT count(*) FROM studies WHERE state = 'done'") == 2 &&
-           number("SELECT count(*) FROM deletions") == 0;
+           number(
+               "SELECT count(*) FROM packed_results WHERE study_id IN"
+               " (SELECT study_id FROM deletions)") == 0;
   });
   EXPECT_EQ(number("SELECT count(*) FROM packed_results"), kPointsABlock * (kRounds + 2));
   EXPECT_EQ(number("SELECT count(DISTINCT point) FROM runs WHERE study = 'grows'"),

@@ -1,6 +1,4 @@
 // Studies that grow, get another name or are deleted, as the database has it.
-#include <filesystem>
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -23,7 +21,7 @@ std::shared_ptr<const protocol::PointTable> table_with_k(double k, std::uint64_t
         protocol::range("mu", 0.0, 1.0, points), protocol::listed("e", {1.0})}}));
 }
 
-class ClearingTest : public testing::Test {
+class StudyDeletionTest : public testing::Test {
  protected:
   void commit(std::vector<Change> changes) { store_->commit(changes); }
   void reopen() {
@@ -73,7 +71,7 @@ std::shared_ptr<const protocol::PointTable> grown_table(std::uint64_t further) {
   return std::make_shared<const protocol::PointTable>(all);
 }
 
-TEST_F(ClearingTest, AStudyThatGrowsHasItsRowsAndFurtherPointsAndRuns) {
+TEST_F(StudyDeletionTest, AStudyThatGrowsHasItsRowsAndFurtherPointsAndRuns) {
   commit(solved_study(1, table_of(3), 1));
   commit({SetStudyState{1, StudyState::kDone, "then"}});
   commit({GrowStudy{1, grown_table(2), {2, 0.5, true}, "now"}});
@@ -86,7 +84,7 @@ TEST_F(ClearingTest, AStudyThatGrowsHasItsRowsAndFurtherPointsAndRuns) {
   EXPECT_EQ(study.created_at, "2024-01-01T00:00:00.000Z");
 }
 
-TEST_F(ClearingTest, TheChecksumsOfStudiesThatGrewOrWereRenamedAreRight) {
+TEST_F(StudyDeletionTest, TheChecksumsOfStudiesThatGrewOrWereRenamedAreRight) {
   commit(solved_study(1, table_of(3), 1));
   commit({GrowStudy{1, grown_table(4), {}, "now"}, RenameStudy{1, "another name"}});
   reopen();
@@ -94,7 +92,7 @@ TEST_F(ClearingTest, TheChecksumsOfStudiesThatGrewOrWereRenamedAreRight) {
   EXPECT_THAT(find_faults(path_), IsEmpty());
 }
 
-TEST_F(ClearingTest, ADeletedStudyIsGoneAtOnceAndItsRowsGoAFewAtATime) {
+TEST_F(StudyDeletionTest, ADeletedStudyIsGoneAtOnceAndItsRowsGoAFewAtATime) {
   commit(solved_study(1, table_of(100), 1));
   commit(solved_study(2, table_of(50), 2));
   commit({DeleteStudy{1}});
@@ -111,8 +109,8 @@ TEST_F(ClearingTest, ADeletedStudyIsGoneAtOnceAndItsRowsGoAFewAtATime) {
   EXPECT_EQ(store_->clear_away(10), ClearedAway::kAll);
 }
 
-TEST_F(ClearingTest, WhereverItIsKilledTheNextProcessEndsIt) {
-  for (int steps = 0; steps < 15; ++steps) {
+TEST_F(StudyDeletionTest, AfterAKillTheNextProcessContinues) {
+  for (int steps = 0; steps < 8; ++steps) {
     const std::uint64_t id = static_cast<std::uint64_t>(2 * steps + 1);
     commit(solved_study(id, table_of(20), id));
     commit(solved_study(id + 1, table_with_k(1e7 + steps, 20), id + 1));
@@ -123,8 +121,8 @@ TEST_F(ClearingTest, WhereverItIsKilledTheNextProcessEndsIt) {
     reopen();
     EXPECT_THAT(find_faults(path_), IsEmpty()) << "after step " << steps;
     clear_all(4);
-    EXPECT_EQ(rows_of(id + 1), 0);
     EXPECT_EQ(number("SELECT count(*) FROM packed_results"), 20 * (steps + 1));
+    reopen();
     EXPECT_EQ(number("SELECT count(*) FROM models"), 1);
     EXPECT_EQ(number("SELECT count(*) FROM workers"), steps + 1);
     EXPECT_EQ(number("SELECT count(*) FROM deletions"), 0);
@@ -133,7 +131,7 @@ TEST_F(ClearingTest, WhereverItIsKilledTheNextProcessEndsIt) {
   EXPECT_THAT(find_faults(path_), IsEmpty());
 }
 
-TEST_F(ClearingTest, ItsNumberIsNeverGivenAgainAndItsNameIsFreeAtOnce) {
+TEST_F(StudyDeletionTest, ItsNumberIsNeverGivenAgainAndItsNameIsFreeAtOnce) {
   commit(solved_study(1, table_of(5), 1));
   commit({DeleteStudy{1}, AddStudy{2, "study 1", table_of(4), "now"}});
   EXPECT_EQ(store_->studies().at(0).table.size(), 4U);
@@ -143,7 +141,7 @@ TEST_F(ClearingTest, ItsNumberIsNeverGivenAgainAndItsNameIsFreeAtOnce) {
   EXPECT_EQ(store_->last_study_id(), 2U);
 }
 
-TEST_F(ClearingTest, LateResultsOfADeletedStudyAreDropped) {
+TEST_F(StudyDeletionTest, LateResultsOfADeletedStudyAreDropped) {
   commit(solved_study(1, table_of(5), 1));
   commit({DeleteStudy{1}, results_of(1, table_of(5), 1)});
   clear_all(100);
@@ -154,7 +152,7 @@ TEST_F(ClearingTest, LateResultsOfADeletedStudyAreDropped) {
   EXPECT_THAT(store_->studies(), IsEmpty());
 }
 
-TEST_F(ClearingTest, ADeletionThatIsRolledBackDeletesNothing) {
+TEST_F(StudyDeletionTest, ADeletionThatIsRolledBackDeletesNothing) {
   commit(solved_study(1, table_of(5), 1));
   EXPECT_THROW(commit({DeleteStudy{1}, AddStudy{2, "b", table_of(1), "now"},
                        AddStudy{3, "b", table_of(1), "now"}}),
@@ -169,109 +167,45 @@ TEST_F(ClearingTest, ADeletionThatIsRolledBackDeletesNothing) {
   EXPECT_EQ(rows_of(1), 6) << "it is not taken for deleted";
 }
 
-TEST_F(ClearingTest, ModelsThatOthersHaveStayAndSoDoThoseThatComeIntoUseMeanwhile) {
+TEST_F(StudyDeletionTest, ModelsWorkersAndTextsWithoutRowsGoAtTheNextStartOnceAllRowsAreGone) {
   commit(solved_study(1, table_with_k(1e7, 20), 1));
   commit(solved_study(2, table_with_k(2e7, 20), 2));
   commit(solved_study(3, table_with_k(2e7, 20), 3));
   commit({DeleteStudy{1}, DeleteStudy{2}});
-  while (rows_of(1) + rows_of(2) > 0) {
-    (void)store_->clear_away(7);
-  }
-  // Of the study with the lowest number, whose rows have been looked at by then.
-  (void)store_->clear_away(1);
-  (void)store_->clear_away(1);
-  commit(solved_study(4, table_with_k(1e7, 3), 4));
-  clear_all(1);
-  EXPECT_EQ(number("SELECT count(*) FROM models"), 2);
-  EXPECT_EQ(number("SELECT count(*) FROM results JOIN models USING (model_id)"), 23);
-  commit({DeleteStudy{4}});
-  clear_all(100);
+  reopen();
+  EXPECT_EQ(number("SELECT count(*) FROM models"), 2) << "rows are left";
+  clear_all(7);
+  EXPECT_EQ(number("SELECT count(*) FROM models"), 2) << "they may come into use again";
+  EXPECT_EQ(number("SELECT count(*) FROM workers"), 3);
+  reopen();
   EXPECT_EQ(number("SELECT count(*) FROM models"), 1);
-  commit(solved_study(5, table_with_k(1e7, 3), 5));
+  EXPECT_EQ(number("SELECT count(*) FROM workers"), 1);
+  EXPECT_EQ(number("SELECT count(*) FROM results JOIN models USING (model_id)"), 20);
+  const std::int64_t texts = number("SELECT count(*) FROM texts");
+  EXPECT_GT(texts, 0);
+  commit(solved_study(4, table_with_k(1e7, 3), 4));
   EXPECT_EQ(number("SELECT count(*) FROM results JOIN models USING (model_id) WHERE k = 1e7"), 3)
       << "a model that was deleted comes again";
-}
-
-TEST_F(ClearingTest, WorkersThatMayStillStoreResultsStayUntilTheNextStart) {
-  commit(solved_study(1, table_of(5), 1));
-  commit({DeleteStudy{1}});
+  EXPECT_EQ(number("SELECT count(*) FROM texts"), texts);
+  commit({DeleteStudy{3}, DeleteStudy{4}});
   clear_all(100);
-  EXPECT_EQ(number("SELECT count(*) FROM workers"), 1);
-  commit({AddStudy{2, "b", table_of(1), "now"}, results_of(2, table_of(1), 1)});
   reopen();
-  clear_all(100);
-  EXPECT_EQ(number("SELECT count(*) FROM workers"), 1);
-  commit({DeleteStudy{2}});
-  clear_all(100);
-  EXPECT_EQ(number("SELECT count(*) FROM workers"), 0);
-  EXPECT_EQ(number("SELECT count(*) FROM deletions"), 0);
+  EXPECT_EQ(number("SELECT (SELECT count(*) FROM texts) + (SELECT count(*) FROM models)"), 0);
+  commit(solved_study(5, table_with_k(1e7, 3), 5));
+  EXPECT_EQ(number("SELECT count(*) FROM runs WHERE mode IS NOT NULL"), 3);
 }
 
-TEST_F(ClearingTest, ManyModelsThatOthersLieBetweenGoInRounds) {
-  constexpr std::uint64_t kStudies = 40;
-  for (std::uint64_t id = 1; id <= kStudies; ++id) {
-    commit(solved_study(id, table_with_k(1e7 + static_cast<double>(id), 2), id));
-  }
-  store_.reset();
-  const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);
-  for (const bool is_restarted : {false, true}) {  // then all models are in doubt
-    Clearing clearing(database.get(), 3);
-    const std::uint64_t first = is_restarted ? 1 : 2;
-    for (std::uint64_t id = first; id <= kStudies; id += is_restarted ? 4 : 2) {
-      clearing.remove(id);
-    }
-    clearing.kept();
-    std::optional<Clearing> restarted;
-    if (is_restarted) {
-      restarted.emplace(database.get(), 3);
-    }
-    Clearing& clears = is_restarted ? *restarted : clearing;
-    while (!clears.is_idle()) {
-      (void)clears.step(5);
-    }
-    const std::int64_t left = is_restarted ? 10 : 20;
-    EXPECT_EQ(number("SELECT count(*) FROM packed_results"), 2 * left);
-    EXPECT_EQ(number("SELECT count(*) FROM models"), left);
-    EXPECT_EQ(number("SELECT count(*) FROM workers"), left);
-    EXPECT_EQ(number("SELECT count(*) FROM results JOIN models USING (model_id)"), 2 * left);
-    EXPECT_EQ(number("SELECT count(*) FROM deletions"), 0);
-  }
-}
-
-TEST(DoubtfulNumbers, AreSoManyRunsAtMostAndTheHigherOnesAreLeftForLater) {
-  DoubtfulNumbers numbers(4);
-  for (std::uint64_t i = 0; i < 1000; ++i) {
-    numbers.insert(2 * i, 2 * i + 1);
-    EXPECT_LE(numbers.runs().intervals(), 4U);
-  }
-  EXPECT_TRUE(numbers.has_more());
-  EXPECT_EQ(numbers.runs().first_from(0)->begin, 0U);
-  const std::uint64_t judged = numbers.end();
-  EXPECT_EQ(numbers.next_round(), judged);
-  EXPECT_FALSE(numbers.has_more());
-  numbers.insert(judged, 2000);
-  for (std::uint64_t i = judged + 1; i < 2000; i += 2) {
-    numbers.erase(i);
-    EXPECT_LE(numbers.runs().intervals(), 4U);
-    EXPECT_FALSE(numbers.runs().contains(i));
-  }
-  EXPECT_GT(numbers.end(), judged);
-}
-
-TEST_F(ClearingTest, TheFileGetsSmaller) {
-  commit(solved_study(1, table_of(5000), 1));
-  commit(solved_study(2, table_of(10), 2));
-  ASSERT_TRUE(store_->merge_log());
-  const auto before = std::filesystem::file_size(path_);
+TEST_F(StudyDeletionTest, AModelOfADeletedStudyMayBeUsedBeforeTheNextStart) {
+  commit(solved_study(1, table_with_k(1e7, 5), 1));
   commit({DeleteStudy{1}});
-  clear_all(500);
-  ASSERT_TRUE(store_->merge_log());
-  EXPECT_LT(std::filesystem::file_size(path_), before / 4);
-  EXPECT_EQ(std::filesystem::file_size(path_ + "-wal"), 0U);
-  EXPECT_THAT(find_faults(path_), IsEmpty());
+  clear_all(100);
+  commit({AddStudy{2, "b", table_with_k(1e7, 5), "now"}, results_of(2, table_with_k(1e7, 5), 1)});
+  reopen();
+  EXPECT_EQ(number("SELECT count(*) FROM runs"), 5);
+  EXPECT_EQ(number("SELECT count(*) FROM workers"), 1);
 }
 
-TEST_F(ClearingTest, WhileAReaderKeepsTheLogLongItWaits) {
+TEST_F(StudyDeletionTest, WhileAReaderKeepsTheLogLongItWaits) {
   commit(solved_study(1, table_of(2000), 1));
   commit(solved_study(2, table_of(2000), 2));
   store_->checkpoint_at(1);
