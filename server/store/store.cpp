@@ -55,7 +55,7 @@ bool is_lasting(const GrowStudy& /*change*/) {
 bool is_lasting(const RenameStudy& /*change*/) {
   return true;
 }
-bool is_lasting(const TakeResults& /*change*/) {
+bool is_lasting(const ReuseResults& /*change*/) {
   return false;
 }
 bool is_lasting(const EndTaking& /*change*/) {
@@ -177,7 +177,7 @@ Store::Store(const std::string& path, const Notice& notice) {
   statements_ = std::make_unique<Statements>(database_.get());
   clearing_ = std::make_unique<Clearing>(database_.get());
   settled_ = std::make_unique<SettledRuns>(database_.get());
-  copy_ = std::make_unique<ResultCopy>(database_.get(), *settled_, *clearing_);
+  reuse_ = std::make_unique<ResultReuse>(database_.get(), *settled_, *clearing_);
   files_->expect(database_.get(), database_id());
 }
 

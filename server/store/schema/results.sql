@@ -81,6 +81,9 @@ CREATE TABLE packed_results (
 
 CREATE INDEX failed_points ON packed_results (study_id, point) WHERE error IS NOT NULL;
 
+-- By which the result of a point is found that another study needs, too.
+CREATE INDEX solved_points ON packed_results (model_id, H, mu, e) WHERE error IS NULL;
+
 -- Points that have a row, as runs of neighbours, so that a server that starts need not look at the rows.
 -- Right for studies that are `counted`; it is changed together with the rows.
 CREATE TABLE settled_points (
