@@ -54,7 +54,7 @@ ResultReuse::ResultReuse(sqlite3* database, SettledRuns& settled, Clearing& clea
       settled_(settled),
       clearing_(clearing),
       settled_run_(database,
-                   "SELECT first_point + points FROM settled_points AS p JOIN studies AS s"
+                   "SELECT p.first_point + p.points FROM settled_points AS p JOIN studies AS s"
                    " USING (study_id) WHERE p.study_id = ?1 AND first_point <= ?2 AND s.counted"
                    " ORDER BY first_point DESC LIMIT 1"),
       model_(database, "SELECT model_id FROM models WHERE definition = ?"),
