@@ -74,11 +74,11 @@ TEST_F(StandingViewsTest, NothingIsSaidOrChangedWhereAllAreThere) {
 
 TEST_F(StandingViewsTest, WhicheverIsDroppedIsNamedByACheckAndMadeAgainByAStart) {
   const auto before = texts(standing_sql_);
-  ASSERT_EQ(before.size(), 10U);
+  ASSERT_EQ(before.size(), 11U);
   for (const std::string dropped :
        {"view runs", "view results", "view peaks", "view phases", "view stick_intervals",
         "view reaction_peaks", "trigger delete_results", "trigger update_results",
-        "trigger rows_are_gone", "index failed_points"}) {
+        "trigger rows_are_gone", "index failed_points", "index solved_points"}) {
     run("DROP " + dropped);
     EXPECT_THAT(find_faults(path_), Contains(HasSubstr("the " + dropped + " is missing")))
         << dropped;
