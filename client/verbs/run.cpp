@@ -65,8 +65,9 @@ void add_run(CLI::App& app, Command& command) {
   verb->add_flag(
       "--allow-network-disk", flags->settings.service.allow_network_disk,
       "take a database on a network file system, where a second machine could damage it");
-  verb->add_flag("--fresh", flags->settings.terms.fresh,
-                 "solve every point, also those that another study of the database has solved");
+  verb->add_flag(
+      "--no-reuse", flags->settings.terms.fresh,
+      "solve every point, also those of which another study of the database has the result");
   add_worker_flags(*verb, flags->settings);
   verb->add_option("--rows", flags->settings.rows, "most rows of the table shown at the end")
       ->check(protocol::whole_number_from(0))

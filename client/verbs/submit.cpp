@@ -157,8 +157,9 @@ void add_submit(CLI::App& app, Command& command) {
   verb->add_flag("--mix-versions", flags->terms.mixes_versions,
                  "workers of any solver version take part; the column solver_version says which "
                  "solved a point");
-  verb->add_flag("--fresh", flags->terms.fresh,
-                 "solve every point, also those that another study of the database has solved");
+  verb->add_flag(
+      "--no-reuse", flags->terms.fresh,
+      "solve every point, also those of which another study of the database has the result");
   add_study_flags(*verb, flags->study, command.names_single_lengths);
   verb->callback([flags, &command] { command = [flags] { return submit(*flags); }; });
 }

@@ -55,8 +55,6 @@ class Loop::Parts final : public Outbox {
         queries_(settings.database, settings.queries,
                  [this](QueryReport r) { queried_.put(std::array{std::move(r)}); }),
         reader_([this](ReadReport r) { done_aside_.put(std::array{std::move(r)}); }),
-        finder_({settings.database, settings.service.solver_version},
-                [this](KnownReport r) { done_aside_.put(std::array{std::move(r)}); }),
         network_(settings.network),
         workers_(network_.listen(doors_.address(), settings.worker_port,
                                  doors_.guard(PortKeeper::Port::kWorkers))),
@@ -147,7 +145,6 @@ class Loop::Parts final : public Outbox {
   void cancel_query(std::uint64_t ticket) override { queries_.cancel(ticket); }
   void read(ReadJob job) override { reader_.submit(std::move(job)); }
   void cancel_read(std::uint64_t ticket) override { reader_.cancel(ticket); }
-  KnownSeeker& finder() override { return finder_; }
   PeerCounts peer_counts() const override {
     PeerCounts counts;
     for (const auto& [key, share] : network_.key_shares().all()) {
@@ -196,12 +193,8 @@ class Loop::Parts final : public Outbox {
     for (auto& report : queried_.take()) {
       service_->queried(std::get<QueryReport>(std::move(report)));
     }
-    for (auto& report : done_aside_.take()) {
-      if (auto* known = std::get_if<KnownReport>(&report)) {
-        service_->known(std::move(*known));
-      } else {
-        service_->request_read(std::get<ReadReport>(std::move(report)), now());
-      }
+    for (const auto& report : done_aside_.take()) {
+      service_->request_read(std::get<ReadReport>(report), now());
     }
   }
 
@@ -359,7 +352,6 @@ class Loop::Parts final : public Outbox {
   Writer writer_;
   QueryPool queries_;
   RequestReader reader_;
-  KnownFinder finder_;
   Network network_;
   Network::Port workers_;
   Network::Port clients_;

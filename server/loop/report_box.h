@@ -8,7 +8,6 @@
 #include "proto/system/wake_up.h"
 #include "server/queries/query_pool.h"
 #include "server/service/outbox/request_reader.h"
-#include "server/store/known/known_finder.h"
 #include "server/store/writer.h"
 
 namespace oblique::server {
@@ -16,7 +15,7 @@ namespace oblique::server {
 /// Reports of the other threads, kept for the loop, which a descriptor wakes.
 class ReportBox {
  public:
-  using Item = std::variant<WriteReport, QueryReport, ReadReport, KnownReport>;
+  using Item = std::variant<WriteReport, QueryReport, ReadReport>;
 
   /// From any thread.
   template <typename Reports>

@@ -21,8 +21,7 @@ Service::Service(const ServiceSettings& settings, Outbox& outbox, std::vector<St
                outbox, outbox, bad_frames_, ledger_),
       open_(settings.bounds),
       changes_(settings.last_study_id, states_, ledger_,
-               {scheduler_, states_, ledger_, rates_, known_}, known_, open_, outbox,
-               outbox.finder(), outbox),
+               {scheduler_, states_, ledger_, rates_, known_}, known_, open_, outbox, outbox),
       traces_(settings.traces, settings.solver_version, outbox, outbox,
               settings.clients.still_working_every_ms),
       clients_(settings.clients, {outbox,
@@ -38,19 +37,19 @@ Service::Service(const ServiceSettings& settings, Outbox& outbox, std::vector<St
   for (StoredStudy& study : studies) {
     states_.restore(study, now.steady_ms);
     if (!study.settled.empty()) {
-      note_source(study.study_id);
+      known_.note_source(study.study_id);
     }
     known_.restore(study.study_id, study.taken);
     const std::string& name = states_.record(study.study_id).name;
     const bool waits = !settings.only_study.empty() && name != settings.only_study;
-    const bool seeks = study.takes_over && outbox.finder().can_seek() && !waits;
+    const bool seeks = study.takes_over && !waits;
     feed(StudyAdded{study.study_id, study.table, std::move(study.settled), study.failures.size(),
                     study.state == StudyState::kCancelled,
                     study.state == StudyState::kPaused || waits, study.terms, study.solver_version,
                     std::move(study.attempts), seeks},
          now);
     if (seeks) {  // it was not at its end when the server ended
-      seek_known(study.study_id);
+      begin_reuse(study.study_id, now);
     }
     changes_.recount(study.study_id);
   }
@@ -322,7 +321,7 @@ void Service::stored(const ResultsWrite& write, Instant now) {
   }
   feed(write.event, now);
   if (!write.event.outcomes.empty()) {
-    note_source(id);
+    known_.note_source(id);
     open_.set_points(id, scheduler_.study(id).points - settled_of(id));
   }
 }
@@ -330,14 +329,13 @@ void Service::stored(const ResultsWrite& write, Instant now) {
 void Service::stored(const StateWrite& write, Instant now) {
   feed(changes_.stored(write, now), now);
   if (write.state == StudyState::kCancelled) {
-    outbox_.finder().stop_seeking(write.study);
+    known_.stop(write.study);
   }
   changes_.answer(write, now);
 }
 
 void Service::stored(const TermsWrite& write, Instant now) {
   feed(changes_.stored(write, now), now);
-  outbox_.finder().set_priority(write.study, write.terms.priority);
   changes_.answer(write, now);
 }
 

@@ -64,8 +64,6 @@ class Service {
     clients_.request_read(report, now);
     send_traces();
   }
-  /// Points were found that another study has solved, or no more are.
-  void known(KnownReport report);
   /// The connection of that client is gone.
   void client_left(std::string_view identity) {
     clients_.client_left(identity);
@@ -136,8 +134,8 @@ class Service {
   void perform(const DropWorker& effect, Turn turn);
   void perform(const StudyFinished& effect, Turn turn);
 
-  void note_source(StudyId id);
-  void seek_known(StudyId id);
+  void begin_reuse(StudyId id, Instant now);
+  void reuse_part(StudyId id, std::uint64_t first_point);
 
   void lose_storage(const std::string& error, Instant now);
   void stored(const ResultsWrite& write, Instant now);
@@ -148,7 +146,7 @@ class Service {
   void stored(const GrowthWrite& write, Instant now);
   void stored(const NameWrite& write, Instant now);
   void stored(const RemovalWrite& write, Instant now);
-  void stored(const TakingWrite& write, Instant now);
+  void stored(const ReuseWrite& write, Instant now);
   void stored(const EndTakingWrite& write, Instant now);
   void stored(const QuietWrite& write, Instant now);
   void refused(const ResultsWrite& write, const std::string& error, Instant now);
@@ -159,7 +157,7 @@ class Service {
   void refused(const GrowthWrite& write, const std::string& error, Instant now);
   void refused(const NameWrite& write, const std::string& error, Instant now);
   void refused(const RemovalWrite& write, const std::string& error, Instant now);
-  void refused(const TakingWrite& write, const std::string& error, Instant now);
+  void refused(const ReuseWrite& write, const std::string& error, Instant now);
   void refused(const EndTakingWrite& write, const std::string& error, Instant now);
   void refused(const QuietWrite& write, const std::string& error, Instant now);
 

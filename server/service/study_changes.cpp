@@ -121,7 +121,7 @@ void StudyChanges::grow(const Client& client, StudyId id, const ReadRequest& rea
     return;
   }
   const StudyView view = view_of(id, sources_, now);
-  const bool takes_over = !read.request.submit().fresh() && finder_.can_seek() &&
+  const bool takes_over = !read.request.submit().fresh() &&
                           known_.should_seek(id, view.solver_version, terms.mixes_versions);
   const GrowthWrite write{id, read.table, terms, study.table.size(), view.state, takes_over};
   Turn& turn = turns_[id];
@@ -190,8 +190,8 @@ void StudyChanges::add(const Client& client, const ReadRequest& read, const Stud
   states_.add(id, {name, read.table, created_at, terms, {}, {}, now.steady_ms, client.key()});
   recount(id);
   submitters_[id].push_back(client);
-  const bool takes_over = !read.request.submit().fresh() && finder_.can_seek() &&
-                          known_.should_seek(id, {}, terms.mixes_versions);
+  const bool takes_over =
+      !read.request.submit().fresh() && known_.should_seek(id, {}, terms.mixes_versions);
   ledger_.write(AddStudy{id, name, read.table, created_at, terms, client.key(), takes_over},
                 StudyWrite{id, takes_over});
 }

@@ -23,7 +23,7 @@ class StudyChanges {
   /// `last_study_id` is the last one of the database. All of these must outlive this.
   StudyChanges(std::uint64_t last_study_id, StudyStates& states, WriteLedger& ledger,
                StudySources sources, TakeOvers& known, OpenStudies& open, ToClients& clients,
-               KnownSeeker& finder, ToLog& log)
+               ToLog& log)
       : last_study_id_(last_study_id),
         states_(states),
         ledger_(ledger),
@@ -31,7 +31,6 @@ class StudyChanges {
         known_(known),
         open_(open),
         clients_(clients),
-        finder_(finder),
         log_(log) {}
 
   /// A study whose recipe was read and judged: a new one, or one that is there and goes on.
@@ -121,7 +120,6 @@ class StudyChanges {
   TakeOvers& known_;
   OpenStudies& open_;
   ToClients& clients_;
-  KnownSeeker& finder_;
   ToLog& log_;
   std::map<StudyId, std::vector<Client>> submitters_;  // wait for the study to be durable
   std::map<StudyId, Turn> turns_;

@@ -65,8 +65,6 @@ Event StudyChanges::stored(const RemovalWrite& write, Instant now) {
   note(write.study, "is deleted");
   open_.close(write.study);
   states_.remove(write.study);
-  finder_.stop_seeking(write.study);
-  finder_.drop_source(write.study);
   known_.rename_origin(reply.change().study().name(),
                        fmt::format("{} (deleted)", reply.change().study().name()));
   known_.forget(write.study);

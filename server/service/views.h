@@ -8,9 +8,9 @@
 #include "server/scheduler/scheduler.h"
 #include "server/service/counts/settled_rates.h"
 #include "server/service/counts/study_states.h"
+#include "server/service/take_overs.h"
 #include "server/service/workers_desk.h"
 #include "server/service/write_ledger.h"
-#include "server/store/known/take_overs.h"
 
 // Studies and workers as others see them: plain values, from which replies are made, and whatever
 // else shows how things stand.

@@ -33,7 +33,7 @@ bool is_change_of(const NameWrite&) {
 bool is_change_of(const RemovalWrite&) {
   return true;
 }
-bool is_change_of(const TakingWrite&) {
+bool is_change_of(const ReuseWrite&) {
   return false;
 }
 bool is_change_of(const EndTakingWrite&) {

@@ -24,7 +24,7 @@ struct ResultsWrite {
 };
 struct StudyWrite {
   StudyId study;
-  bool takes_over = false;  ///< points that other studies have solved are to be sought
+  bool takes_over = false;  ///< results of other studies are to be looked up
 };
 struct StateWrite {
   StudyId study;
@@ -60,21 +60,20 @@ struct RemovalWrite {
   StudyId study;
   Client client;
 };
-/// Rows that were copied from another study.
-struct TakingWrite {
+/// Rows that were copied from other studies.
+struct ReuseWrite {
   StudyId study;
-  std::shared_ptr<TakenResults> taken;
+  std::shared_ptr<const ReusedResults> outcome;
 };
 struct EndTakingWrite {
   StudyId study;
-  bool is_cut_short;
 };
 /// Nothing follows.
 struct QuietWrite {};
 
 using Meaning =
     std::variant<ResultsWrite, StudyWrite, StateWrite, TermsWrite, FailuresWrite, GrowthWrite,
-                 NameWrite, RemovalWrite, TakingWrite, EndTakingWrite, QuietWrite>;
+                 NameWrite, RemovalWrite, ReuseWrite, EndTakingWrite, QuietWrite>;
 
 struct LedgerLimits {
   /// Results messages of one worker that wait for the disk. A sound worker stops long before.

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <variant>
@@ -42,7 +44,7 @@ struct AddStudy {
   std::string created_at;
   StudyTerms terms{};
   std::string submitted_by = {};  ///< name of the key; empty: without keys
-  bool takes_over = false;        ///< points that other studies have solved are sought
+  bool takes_over = false;        ///< results of other studies are looked up
 };
 
 struct SetStudyTerms {
@@ -94,33 +96,26 @@ struct GrowStudy {
   bool takes_over = false;  ///< as in AddStudy
 };
 
-/// Points of one study that are points of another, neighbours in both: `count` from `point` on are
-/// those from `source_point` on.
-struct SharedRun {
-  std::uint64_t point;
-  std::uint64_t source_point;
-  std::uint64_t count;
-
-  bool operator==(const SharedRun&) const = default;
+/// What became of a ReuseResults. Read it when the change is durable.
+struct ReusedResults {
+  IntervalSet points;                              ///< that got a row
+  std::map<std::string, std::uint64_t> origins{};  ///< how many, by the name of their source
+  std::uint64_t probes = 0;                        ///< lookups that were made
+  std::optional<std::uint64_t> next_point = {};    ///< where the next part begins; none: at the end
 };
 
-/// What became of a TakeResults. Read it when the change is durable.
-struct TakenResults {
-  IntervalSet points;  ///< that got a row
-  std::string origin;  ///< what the source is called; empty: it is deleted
-};
-
-/// Copies of the solved points of another study that are of that solver version. A point that has a
-/// row already keeps it.
-struct TakeResults {
+/// Looks up one part of the study's open points, from `first_point` on, among the solved points of
+/// other studies, and copies the rows that it finds: those of that solver version, of studies that
+/// ask for estimated errors as this one does or does not.
+struct ReuseResults {
   std::uint64_t study_id;
-  std::uint64_t source_id;
-  std::vector<SharedRun> runs;
+  std::shared_ptr<const protocol::PointTable> table;
+  std::uint64_t first_point;
   std::string solver_version;
-  std::shared_ptr<TakenResults> taken;  ///< is filled in
+  std::shared_ptr<ReusedResults> outcome;  ///< is filled in
 };
 
-/// No more points are sought for it in other studies.
+/// No more results of other studies are looked up for it.
 struct EndTaking {
   std::uint64_t study_id;
 };
@@ -138,7 +133,7 @@ struct DeleteStudy {
 
 using Change =
     std::variant<AddStudy, SetStudyState, SetStudyTerms, ForgetFailures, GrowStudy, RenameStudy,
-                 DeleteStudy, TakeResults, EndTaking, AddWorker, AddResults>;
+                 DeleteStudy, ReuseResults, EndTaking, AddWorker, AddResults>;
 
 /// How much of what deleted studies left is gone.
 enum class ClearedAway {

@@ -55,7 +55,7 @@ bool is_lasting(const GrowStudy& /*change*/) {
 bool is_lasting(const RenameStudy& /*change*/) {
   return true;
 }
-bool is_lasting(const TakeResults& /*change*/) {
+bool is_lasting(const ReuseResults& /*change*/) {
   return false;
 }
 bool is_lasting(const EndTaking& /*change*/) {
@@ -196,7 +196,7 @@ Store::Store(const std::string& path) {
   }
   statements_ = std::make_unique<Statements>(database_.get());
   settled_ = std::make_unique<SettledRuns>(database_.get());
-  copy_ = std::make_unique<ResultCopy>(database_.get(), *settled_);
+  reuse_ = std::make_unique<ResultReuse>(database_.get(), *settled_);
 }
 
 Store::~Store() {

@@ -11,7 +11,7 @@
 #include "server/database/sqlite.h"
 #include "server/store/changes.h"
 #include "server/store/database_files.h"
-#include "server/store/result_copy.h"
+#include "server/store/result_reuse.h"
 #include "server/store/rows/settled_runs.h"
 #include "server/store/study_deletion.h"
 #include "server/store/write_ahead_log.h"
@@ -93,8 +93,8 @@ class Store final : public Storage {
   void add(const GrowStudy& change);
   void add(const RenameStudy& change);
   void add(const DeleteStudy& change);
-  void add(const TakeResults& change) { copy_->run(change); }
-  void add(const EndTaking& change) { copy_->end(change); }
+  void add(const ReuseResults& change) { reuse_->run(change); }
+  void add(const EndTaking& change) { reuse_->end(change); }
   void add(const AddWorker& change);
   void add(const AddResults& change);
   /// Row of `models`, and the accuracy of its results.
@@ -116,7 +116,7 @@ class Store final : public Storage {
   std::unique_ptr<StudyDeletion> deletion_;
   std::unique_ptr<Statements> statements_;
   std::unique_ptr<SettledRuns> settled_;
-  std::unique_ptr<ResultCopy> copy_;
+  std::unique_ptr<ResultReuse> reuse_;
   // By study and model number; emptied when it is large or a transaction fails.
   std::map<std::pair<std::uint64_t, std::uint64_t>, StoredModel> models_;
   bool full_sync_ = true;

@@ -58,7 +58,7 @@ std::uint64_t study_of(const GrowStudy& change) {
 std::uint64_t study_of(const RenameStudy& change) {
   return change.study_id;
 }
-std::uint64_t study_of(const TakeResults& change) {
+std::uint64_t study_of(const ReuseResults& change) {
   return change.study_id;
 }
 std::uint64_t study_of(const EndTaking& change) {

@@ -23,7 +23,7 @@
 
 #include "proto/frames.h"
 #include "proto/recipe/model_message.h"
-#include "tests/bench/known/instant_worker.h"
+#include "tests/bench/instant_worker.h"
 #include "tests/bench/process_usage.h"
 #include "tests/support/database.h"
 #include "tests/support/programs.h"

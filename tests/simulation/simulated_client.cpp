@@ -132,6 +132,8 @@ void SimulatedClient::ask() {
   } else {
     expect(protocol::STUDY_CHANGE_RESUME);
     request.mutable_submit()->set_name(name_);
+    // The model of the store holds what workers solved, not copies.
+    request.mutable_submit()->set_fresh(true);
     if (world_.chance(0.3)) {
       // Submitting again with another share changes it, durably before it is acknowledged.
       request.mutable_submit()->set_priority(static_cast<std::int32_t>(world_.between(-2, 2)));

@@ -12,7 +12,6 @@
 #include "server/network/delivery.h"
 #include "server/queries/query_queue.h"
 #include "server/service/outbox/request_reader.h"
-#include "server/store/known/known_finder.h"
 #include "server/store/writer.h"
 
 // What the service asks of the world around it, by whom it asks it. Nothing here may block or call
@@ -78,17 +77,6 @@ struct PeerCounts {
   std::vector<std::pair<std::string, std::uint64_t>> refusals{};  ///< causes with how many peers
 };
 
-class ToFinder {
- public:
-  virtual ~ToFinder() = default;
-  /// Where points that other studies have solved are sought: `Service::known` is called with what
-  /// is found.
-  virtual KnownSeeker& finder() { return nowhere_; }
-
- private:
-  KnownSeeker nowhere_;
-};
-
 class ToNetwork {
  public:
   virtual ~ToNetwork() = default;
@@ -130,7 +118,6 @@ class Outbox : public ToWorkers,
                public ToClients,
                public ToWriter,
                public ToReaders,
-               public ToFinder,
                public ToNetwork,
                public ToLog {};
 

@@ -1,6 +1,9 @@
--- The index and the triggers of the database, created at each start of a server, after the views.
+-- The indices and the triggers of the database, created at each start of a server, after the views.
 
 CREATE INDEX IF NOT EXISTS failed_points ON packed_results (study_id, point) WHERE error IS NOT NULL;
+
+-- Finds the result of a point that another study needs too.
+CREATE INDEX IF NOT EXISTS solved_points ON packed_results (model_id, H, mu, e) WHERE error IS NULL;
 
 -- Rows that go, by whatever hand: the next start of a server counts again. A program that takes them
 -- out of `settled_points` too sets `counted` to what it was.

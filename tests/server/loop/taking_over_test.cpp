@@ -35,11 +35,11 @@ class TakingOverTest : public testing::Test {
     server_.reset();
   }
   protocol::SubmitReply submit(const std::string& name, const protocol::Recipe& recipe,
-                               bool fresh = false) {
+                               bool no_reuse = false) {
     ClientRequest request;
     request.mutable_submit()->set_name(name);
     *request.mutable_submit()->mutable_recipe() = recipe;
-    request.mutable_submit()->set_fresh(fresh);
+    request.mutable_submit()->set_fresh(no_reuse);
     const ClientReply reply = client_->ask(request);
     EXPECT_TRUE(reply.has_submit()) << reply.error().message();
     return reply.submit();

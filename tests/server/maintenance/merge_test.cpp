@@ -443,12 +443,12 @@ TEST_F(MergeTest, AStudyIsDoneWhenAllIsThereThatItsFilterLeavesIn) {
 }
 
 TEST_F(MergeTest, RowsThatWereTakenOverNameTheirOriginInTheWholeAndAreCounted) {
-  store("one", {{.study = "a", .end = 10}, {.study = "gone", .end = 10}, {.study = "b"}});
+  store("one",
+        {{.study = "a", .end = 4}, {.study = "gone", .first = 4, .end = 10}, {.study = "b"}});
   {
     Store store(file("one"));
-    const auto taken = std::make_shared<TakenResults>();
-    store.commit(std::vector<Change>{TakeResults{3, 1, {{0, 0, 4}}, "0.1", taken},
-                                     TakeResults{3, 2, {{4, 4, 6}}, "0.1", taken},
+    const auto outcome = std::make_shared<ReusedResults>();
+    store.commit(std::vector<Change>{ReuseResults{3, table_of(10), 0, "0.1", outcome},
                                      RenameStudy{1, "first"}, DeleteStudy{2}});
     while (store.clear_away(100) != ClearedAway::kAll) {
     }

@@ -218,9 +218,9 @@ TEST_F(SalvageTest, StudiesWithFiltersAreDoneAndRowsThatWereTakenOverAreCountedA
   protocol::PointTable counted(recipe);
   counted.survey([] { return true; });
   const auto filtered = std::make_shared<const protocol::PointTable>(std::move(counted));
-  const auto taken = std::make_shared<TakenResults>();
+  const auto outcome = std::make_shared<ReusedResults>();
   store_->commit(std::vector<Change>{
-      AddStudy{2, "b", filtered, "now"}, TakeResults{2, 1, {{0, 0, 4}}, "0.1", taken},
+      AddStudy{2, "b", filtered, "now"}, ReuseResults{2, filtered, 0, "0.1", outcome},
       SetStudyState{2, StudyState::kDone, "now"}, RenameStudy{1, "first"}});
   store_.reset();
   execute(open_database(path_, SQLITE_OPEN_READWRITE).get(), "DELETE FROM taken_points");
@@ -234,11 +234,15 @@ TEST_F(SalvageTest, StudiesWithFiltersAreDoneAndRowsThatWereTakenOverAreCountedA
 }
 
 TEST_F(SalvageTest, TheNumberOfAStudyThatIsGoneIsNotGivenAgainWhereRowsNameIt) {
-  const auto taken = std::make_shared<TakenResults>();
-  store_->commit(std::vector<Change>{AddStudy{2, "b", table_, "now"},
-                                     AddStudy{3, "source", table_, "now"},
-                                     TakeResults{3, 1, {{0, 0, 4}}, "0.1", taken},
-                                     TakeResults{2, 3, {{0, 0, 4}}, "0.1", taken}, DeleteStudy{3}});
+  const auto other = std::make_shared<const protocol::PointTable>(
+      protocol::recipe_of({{protocol::listed("H", {0.5}), protocol::listed("mu", {0.0, 0.5}),
+                            protocol::listed("e", {1.0})}}));
+  const auto outcome = std::make_shared<ReusedResults>();
+  store_->commit(std::vector<Change>{
+      AddStudy{2, "b", other, "now"}, AddStudy{3, "source", other, "now"},
+      AddResults{3, other, 1, "0.1", "avx2", 1, "now", {solved_point(0), solved_point(1)}},
+      ReuseResults{2, other, 0, "0.1", outcome}, DeleteStudy{3}});
+  ASSERT_EQ(outcome->points, IntervalSet(0, 2));
   while (store_->clear_away(100) != ClearedAway::kAll) {
   }
   store_.reset();

@@ -74,7 +74,7 @@ TEST_F(ReaderTest, StatementsThatWriteOrReachOutsideAreRefused) {
        {"DELETE FROM results", "INSERT INTO about VALUES ('x')", "UPDATE studies SET name = 'z'",
         "DROP TABLE results", "CREATE TABLE t (x)", "CREATE TEMP TABLE t (x)",
         "ATTACH DATABASE '/tmp/elsewhere.db' AS other", "DETACH DATABASE main",
-        "PRAGMA user_version = 9", "PRAGMA journal_mode = DELETE", "PRAGMA writable_schema = 1",
+        "PRAGMA user_version = 10", "PRAGMA journal_mode = DELETE", "PRAGMA writable_schema = 1",
         "VACUUM INTO '/tmp/copy.db'", "BEGIN", "SAVEPOINT s", "ANALYZE", "REINDEX",
         "SELECT load_extension('/tmp/x.so')"}) {
     EXPECT_NE(refusal_of(sql), "it ran") << sql;

@@ -21,29 +21,6 @@ using protocol::ClientRequest;
 using protocol::ServerToWorker;
 using protocol::WorkerMessage;
 
-/// Keeps what is asked of a finder, and finds nothing.
-struct FakeFinder final : KnownSeeker {
-  bool can_seek() const override { return can; }
-  void note_source(std::uint64_t study_id, const StudyTable&) override {
-    sources.push_back(study_id);
-  }
-  void drop_source(std::uint64_t study_id) override { dropped.push_back(study_id); }
-  void seek(KnownQuestion question) override { questions.push_back(std::move(question)); }
-  void go_on() override { ++done; }
-  void set_priority(std::uint64_t study_id, std::int32_t priority) override {
-    priorities.emplace_back(study_id, priority);
-  }
-  void stop_seeking(std::uint64_t study_id) override { stopped.push_back(study_id); }
-
-  bool can = false;
-  std::vector<std::uint64_t> sources;
-  std::vector<std::uint64_t> dropped;
-  std::vector<KnownQuestion> questions;
-  std::vector<std::uint64_t> stopped;
-  std::vector<std::pair<std::uint64_t, std::int32_t>> priorities;
-  int done = 0;
-};
-
 /// Keeps what the service sends, and writes only when told to.
 class FakeOutbox final : public Outbox {
  public:
@@ -83,13 +60,11 @@ class FakeOutbox final : public Outbox {
   }
   void cancel_query(std::uint64_t ticket) override { cancelled_queries.push_back(ticket); }
   void read(ReadJob job) override { reads.push_back(std::move(job)); }
-  KnownSeeker& finder() override { return seeker; }
   void note(Severity, const std::string& text) override {
     ++notes;
     log.push_back(text);
   }
 
-  FakeFinder seeker;
   std::string unreachable;
   std::string busy;
   std::string unheard;
@@ -118,12 +93,14 @@ class ServiceTest : public testing::Test {
     service_->client_frame("client", protocol::encode(message), now_, holder);
     service_->scheduler().check_invariants();
   }
+  /// Results of other studies are not reused.
   ClientRequest submit_request(const std::string& name, std::uint64_t points = 10) {
     ClientRequest message;
     message.set_protocol_version(protocol::kProtocolVersion);
     message.set_request_id(42);
     message.mutable_submit()->set_name(name);
     *message.mutable_submit()->mutable_recipe() = table_of(points)->recipe();
+    message.mutable_submit()->set_fresh(true);
     return message;
   }
   ClientRequest change_request(const std::string& name, protocol::StudyChange change) {

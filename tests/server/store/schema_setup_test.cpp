@@ -63,11 +63,11 @@ class SchemaSetupTest : public testing::Test {
 
 TEST_F(SchemaSetupTest, EachStartCreatesWhatWasDropped) {
   const auto before = texts(schema_sql_);
-  ASSERT_EQ(before.size(), 10U);
+  ASSERT_EQ(before.size(), 11U);
   for (const std::string dropped :
        {"view runs", "view results", "view peaks", "view phases", "view stick_intervals",
         "view reaction_peaks", "trigger delete_results", "trigger update_results",
-        "trigger rows_are_gone", "index failed_points"}) {
+        "trigger rows_are_gone", "index failed_points", "index solved_points"}) {
     run("DROP " + dropped);
     if (dropped.starts_with("view")) {
       EXPECT_THAT(find_faults(path_), Contains(HasSubstr("the " + dropped + " is missing")));

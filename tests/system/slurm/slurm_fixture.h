@@ -82,7 +82,7 @@ class SlurmTest : public ::testing::Test {
     const auto submitted = run_oblique(
         folder_, {"submit", "--server", server_->client_url(), "--keys", key_of("client"),
                   "--preset", "paper", "--H", "1", "--mu", "0.1:2.0:" + side, "--e",
-                  "0.5:1.0:" + side, "--fresh", "--name", "study" + std::to_string(++studies_)});
+                  "0.5:1.0:" + side, "--no-reuse", "--name", "study" + std::to_string(++studies_)});
     ASSERT_EQ(submitted.exit_code, 0) << submitted.err;
   }
 

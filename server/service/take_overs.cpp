@@ -1,4 +1,4 @@
-#include "server/store/known/take_overs.h"
+#include "server/service/take_overs.h"
 
 #include <algorithm>
 #include <iterator>
@@ -21,12 +21,6 @@ bool TakeOvers::should_seek(std::uint64_t study_id, std::string_view version,
 
 void TakeOvers::restore(std::uint64_t study_id, const std::map<std::string, std::uint64_t>& from) {
   for (const auto& [origin, points] : from) {
-    add(study_id, origin, points);
-  }
-}
-
-void TakeOvers::add(std::uint64_t study_id, const std::string& origin, std::uint64_t points) {
-  if (points > 0) {
     Taken& taken = taken_[study_id];
     taken.from[origin] += points;
     taken.points += points;
@@ -41,18 +35,60 @@ void TakeOvers::rename_origin(const std::string& before, const std::string& name
   }
 }
 
-bool TakeOvers::end(std::uint64_t study_id, bool is_cut_short) {
-  const auto known = taken_.find(study_id);
-  if (known == taken_.end() || known->second.under_way == 0) {
+bool TakeOvers::begin(std::uint64_t study_id, std::int64_t now_ms) {
+  std::optional<Lookup>& lookup = taken_[study_id].lookup;
+  if (lookup) {
+    lookup->begins_again = true;
     return false;
   }
-  Taken& taken = known->second;
-  taken.cut_short = taken.cut_short || is_cut_short;
-  const bool is_last = --taken.under_way == 0;
-  if (is_last && taken.points == 0 && !taken.cut_short) {
-    taken_.erase(known);
+  lookup = Lookup{now_ms};
+  return true;
+}
+
+std::optional<std::uint64_t> TakeOvers::add_part(std::uint64_t study_id, const ReusedResults& part,
+                                                 std::int64_t now_ms) {
+  restore(study_id, part.origins);
+  Taken& taken = taken_.at(study_id);
+  Lookup& lookup = *taken.lookup;
+  if (part.points.empty()) {
+    lookup.probes_in_vain += part.probes;
+  } else {
+    lookup.probes_in_vain = 0;
+    lookup.last_result_ms = now_ms;
   }
-  return is_last;
+  if (lookup.is_stopped) {
+    return std::nullopt;
+  }
+  if (part.next_point) {
+    if (lookup.probes_in_vain < kMostProbesInVain &&
+        now_ms - lookup.last_result_ms < kLongestInVain_ms) {
+      return part.next_point;
+    }
+    taken.cut_short = true;
+  }
+  if (lookup.begins_again) {
+    lookup = Lookup{now_ms};
+    return 0;
+  }
+  return std::nullopt;
+}
+
+void TakeOvers::stop(std::uint64_t study_id) {
+  if (is_under_way(study_id)) {
+    taken_.at(study_id).lookup->is_stopped = true;
+  }
+}
+
+bool TakeOvers::end(std::uint64_t study_id, std::int64_t now_ms) {
+  Taken& taken = taken_.at(study_id);
+  const bool begins_again = taken.lookup->begins_again && !taken.lookup->is_stopped;
+  taken.lookup.reset();
+  if (begins_again) {
+    taken.lookup = Lookup{now_ms};
+  } else if (taken.points == 0 && !taken.cut_short) {
+    taken_.erase(study_id);
+  }
+  return begins_again;
 }
 
 void TakeOvers::forget(std::uint64_t study_id) {
@@ -62,7 +98,7 @@ void TakeOvers::forget(std::uint64_t study_id) {
 
 bool TakeOvers::is_under_way(std::uint64_t study_id) const {
   const auto known = taken_.find(study_id);
-  return known != taken_.end() && known->second.under_way > 0;
+  return known != taken_.end() && known->second.lookup.has_value();
 }
 
 protocol::TakenOver TakeOvers::message_of(std::uint64_t study_id) const {
@@ -72,7 +108,7 @@ protocol::TakenOver TakeOvers::message_of(std::uint64_t study_id) const {
     return message;
   }
   message.set_points(known->second.points);
-  message.set_under_way(known->second.under_way > 0);
+  message.set_under_way(known->second.lookup.has_value());
   message.set_cut_short(known->second.cut_short);
   std::vector<std::pair<std::string, std::uint64_t>> from(known->second.from.begin(),
                                                           known->second.from.end());

@@ -1,0 +1,233 @@
+// Results that other studies have, as the service reuses them.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/server/service/service_fixture.h"
+
+namespace oblique::server {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+class ServiceReuseTest : public ServiceTest {
+ protected:
+  static constexpr std::uint64_t kSource = 1;
+  static constexpr std::uint64_t kStudy = 2;
+
+  /// Study 1, "a", is solved in part.
+  void solve_some() {
+    request(submit_request("a"));
+    write_all();
+    hello();
+    credit(1);
+    answer_batch(1000);
+  }
+  ClientRequest reusing(const std::string& name, std::uint64_t points = 10) {
+    ClientRequest message = submit_request(name, points);
+    message.mutable_submit()->set_fresh(false);
+    return message;
+  }
+  /// Study 2, "b", is durable and its first part waits for the writer.
+  void submit_study() {
+    solve_some();
+    request(reusing("b"));
+    write_all();
+  }
+  /// The first points of the parts that wait for the writer.
+  std::vector<std::uint64_t> parts() const {
+    std::vector<std::uint64_t> firsts;
+    for (const WriteJob& job : outbox_.jobs) {
+      if (const auto* part = std::get_if<ReuseResults>(&job.change)) {
+        firsts.push_back(part->first_point);
+      }
+    }
+    return firsts;
+  }
+  /// The study of the end that waits for the writer; 0: none does.
+  std::uint64_t ended() const {
+    for (const WriteJob& job : outbox_.jobs) {
+      if (const auto* end = std::get_if<EndTaking>(&job.change)) {
+        return end->study_id;
+      }
+    }
+    return 0;
+  }
+  /// Writes what waits; this came of the part that is among it.
+  void write_part(const ReusedResults& outcome) {
+    for (WriteJob& job : outbox_.jobs) {
+      if (const auto* part = std::get_if<ReuseResults>(&job.change)) {
+        *part->outcome = outcome;
+      }
+    }
+    write_all();
+  }
+  static ReusedResults copies_of_a(const IntervalSet& points,
+                                   std::optional<std::uint64_t> next = {}) {
+    return {points, {{"a", points.size()}}, points.size(), next};
+  }
+};
+
+TEST_F(ServiceReuseTest, WithoutAnyResultNothingIsLookedUp) {
+  request(reusing("a"));
+  write_all();
+  EXPECT_THAT(outbox_.jobs, IsEmpty());
+  EXPECT_TRUE(last_reply().has_submit());
+}
+
+TEST_F(ServiceReuseTest, NothingIsLookedUpForARequestWithoutReuse) {
+  solve_some();
+  request(submit_request("b"));
+  write_all();
+  EXPECT_THAT(outbox_.jobs, IsEmpty());
+  EXPECT_EQ(last_reply().submit().study_id(), kStudy);
+}
+
+TEST_F(ServiceReuseTest, UntilTheLookupEndsNothingIsHandedOutAndTheReplyWaits) {
+  solve_some();
+  request(reusing("b"));
+  const std::size_t replies = outbox_.replies.size();
+  write_all();
+  EXPECT_THAT(parts(), ElementsAre(0));
+  EXPECT_EQ(outbox_.replies.size(), replies);
+  EXPECT_THAT(status_of("b").waits_for(), HasSubstr("known points to be taken over"));
+  write_part(copies_of_a(IntervalSet(0, 4), 6));
+  EXPECT_THAT(parts(), ElementsAre(6));
+  EXPECT_EQ(status_of("b").solved(), 4U);
+  EXPECT_THAT(status_of("b").waits_for(), HasSubstr("4 so far"));
+  write_part({});
+  EXPECT_EQ(ended(), kStudy);
+  write_all();
+  const auto reply = last_reply().submit();
+  EXPECT_EQ(reply.settled(), 4U);
+  EXPECT_EQ(reply.taken().points(), 4U);
+  EXPECT_EQ(reply.taken().from(0).study(), "a");
+  EXPECT_FALSE(status_of("b").taken().under_way());
+  EXPECT_EQ(status_of("b").waits_for(), "");
+  EXPECT_THAT(outbox_.jobs, IsEmpty());
+}
+
+TEST_F(ServiceReuseTest, TheReplyWaitsAtMostSomeSeconds) {
+  submit_study();
+  now_.steady_ms += 2000;
+  service_->tick(now_);
+  const auto reply = last_reply().submit();
+  EXPECT_EQ(reply.study_id(), kStudy);
+  EXPECT_TRUE(reply.taken().under_way());
+}
+
+TEST_F(ServiceReuseTest, ALookupThatFindsNothingForAMillionProbesIsCutShort) {
+  submit_study();
+  const std::uint64_t half = TakeOvers::kMostProbesInVain / 2;
+  write_part({{}, {}, half, 1});
+  write_part(copies_of_a(IntervalSet(0, 1), 2));  // and the count begins again
+  write_part({{}, {}, half, 3});
+  EXPECT_THAT(parts(), ElementsAre(3));
+  write_part({{}, {}, half, 4});
+  EXPECT_EQ(ended(), kStudy);
+  write_all();
+  EXPECT_TRUE(last_reply().submit().taken().cut_short());
+}
+
+TEST_F(ServiceReuseTest, ALookupThatFindsNothingForLongIsCutShort) {
+  submit_study();
+  now_.steady_ms += TakeOvers::kLongestInVain_ms - 1;
+  write_part(copies_of_a(IntervalSet(0, 1), 1));  // and the time begins again
+  now_.steady_ms += TakeOvers::kLongestInVain_ms - 1;
+  write_part({{}, {}, 1, 2});
+  EXPECT_THAT(parts(), ElementsAre(2));
+  now_.steady_ms += 1;
+  write_part({{}, {}, 1, 3});
+  EXPECT_EQ(ended(), kStudy);
+}
+
+TEST_F(ServiceReuseTest, AStudyThatGrowsIsLookedUpAgain) {
+  solve_some();
+  request(reusing("b", 7));
+  write_all();
+  write_part({});
+  write_all();
+  auto longer = reusing("b", 7);
+  *longer.mutable_submit()->mutable_recipe()->add_blocks() = table_of(10)->recipe().blocks(0);
+  request(longer);
+  write_all();
+  EXPECT_THAT(parts(), ElementsAre(0));
+  write_part({});
+  write_all();
+  EXPECT_EQ(last_reply().submit().appended(), 10U);
+}
+
+TEST_F(ServiceReuseTest, AStudyThatGrowsDuringItsLookupIsLookedUpAgainAtTheEnd) {
+  solve_some();
+  request(reusing("b", 7));
+  write_all();
+  auto longer = reusing("b", 7);
+  *longer.mutable_submit()->mutable_recipe()->add_blocks() = table_of(10)->recipe().blocks(0);
+  const WriteJob part = outbox_.jobs.at(0);
+  outbox_.jobs.clear();
+  request(longer);
+  write_all();
+  EXPECT_THAT(parts(), IsEmpty()) << "one lookup of a study at a time";
+  outbox_.jobs.push_back(part);
+  write_part({});
+  EXPECT_THAT(parts(), ElementsAre(0));
+  EXPECT_TRUE(status_of("b").taken().under_way());
+  write_part({});
+  write_all();
+  EXPECT_FALSE(status_of("b").taken().under_way());
+}
+
+TEST_F(ServiceReuseTest, ThePartUnderWayOfACancelledStudyIsTheLast) {
+  submit_study();
+  const WriteJob part = outbox_.jobs.at(0);
+  outbox_.jobs.clear();
+  request(cancel_request("b"));
+  write_all();
+  outbox_.jobs.push_back(part);
+  write_part(copies_of_a(IntervalSet(0, 4), 4));
+  EXPECT_EQ(ended(), kStudy);
+  write_all();
+  EXPECT_FALSE(status_of("b").taken().under_way());
+}
+
+TEST_F(ServiceReuseTest, OfADeletedStudyNothingMoreIsLookedUp) {
+  submit_study();
+  const WriteJob part = outbox_.jobs.at(0);
+  outbox_.jobs.clear();
+  request(change_request("b", protocol::STUDY_CHANGE_DELETE));
+  write_all();
+  outbox_.jobs.push_back(part);
+  write_part({{}, {}, 1, 4});
+  EXPECT_THAT(outbox_.jobs, IsEmpty());
+}
+
+TEST_F(ServiceReuseTest, AServerThatStopsLeavesTheRestToTheNextOne) {
+  submit_study();
+  service_->drain(now_);
+  write_part(copies_of_a(IntervalSet(0, 4), 4));
+  EXPECT_THAT(outbox_.jobs, IsEmpty());
+}
+
+TEST_F(ServiceReuseTest, AServerThatStartsGoesOnWithALookupThatHasNotEnded) {
+  ServiceSettings settings;
+  settings.solver_version = "1.0";
+  StoredStudy source{kSource, "a", table_of(10), StudyState::kRunning, "then", {}, {}, {}, {}};
+  source.settled = IntervalSet(0, 5);
+  StoredStudy pending{kStudy, "b", table_of(10), StudyState::kRunning, "then", {}, {}, {}, {}};
+  pending.takes_over = true;
+  pending.taken = {{"a", 3}};
+  pending.settled = IntervalSet(0, 3);
+  service_.reset();
+  service_.emplace(settings, outbox_, std::vector<StoredStudy>{source, pending}, now_);
+  EXPECT_THAT(parts(), ElementsAre(0));
+  EXPECT_EQ(status_of("b").taken().points(), 3U);
+  EXPECT_TRUE(status_of("b").taken().under_way());
+  write_part(copies_of_a(IntervalSet(3, 5)));
+  EXPECT_EQ(ended(), kStudy);
+  EXPECT_EQ(status_of("b").taken().points(), 5U);
+}
+
+}  // namespace
+}  // namespace oblique::server
