@@ -131,7 +131,6 @@ std::int64_t ResultReuse::stored_model(const protocol::PointTable& table, std::u
 void ResultReuse::reuse(const ReuseResults& change, std::uint64_t point, std::int64_t model_id) {
   static const int kStudy = packed_column("study_id");
   static const int kPoint = packed_column("point");
-  static const int kWorker = packed_column("worker");
   static const int kTakenFrom = packed_column("taken_from");
   ReusedResults& outcome = *change.outcome;
   ++outcome.probes;
