@@ -11,7 +11,6 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <sstream>
 #include <stdexcept>
 #include <thread>
@@ -23,9 +22,11 @@ namespace {
 
 constexpr std::chrono::milliseconds kBetweenLooks{2};
 
+/// Empty also if the process of a file in /proc is gone, where a read fails.
 std::string contents(const std::string& path) {
-  std::ifstream file(path);
-  return {std::istreambuf_iterator<char>(file), {}};
+  std::ostringstream text;
+  text << std::ifstream(path).rdbuf();
+  return text.str();
 }
 
 /// State and parent of a process, from /proc; nothing when it is gone.
