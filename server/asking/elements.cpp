@@ -154,8 +154,13 @@ std::string in_sqlite(std::string_view text) {
   const std::string sql = with_elements(text);
   std::string exact;
   std::size_t copied = 0;
-  for (const SqlToken& token : sql_tokens(sql)) {
-    if (token.kind == SqlToken::Kind::kLiteral &&
+  const auto tokens = sql_tokens(sql);
+  for (std::size_t i = 0; i < tokens.size(); ++i) {
+    const SqlToken& token = tokens[i];
+    // SQLite takes only a literal before these words.
+    const bool is_frame_offset = i + 1 < tokens.size() && (is_word(tokens[i + 1], "preceding") ||
+                                                           is_word(tokens[i + 1], "following"));
+    if (!is_frame_offset && token.kind == SqlToken::Kind::kLiteral &&
         token.text.find_first_of(".eE") != std::string_view::npos && decimal_number(token.text)) {
       copy_before(sql, token.text, copied, exact);
       exact += fmt::format("{}('{}')", kNumberFunction, token.text);

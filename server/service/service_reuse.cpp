@@ -107,8 +107,19 @@ void Service::stored(const EndTakingWrite& write, Instant now) {
   changes_.release_replies(now);
 }
 
-/// The writer keeps these until it can write them.
-void Service::refused(const ReuseWrite& /*write*/, const std::string& /*error*/, Instant /*now*/) {}
+/// What the lookup has not found is solved.
+void Service::refused(const ReuseWrite& write, const std::string& error, Instant /*now*/) {
+  if (ledger_.is_gone() || !states_.contains(write.study)) {
+    return;
+  }
+  outbox_.note(Severity::kWarning,
+               fmt::format("study {}: results of other studies cannot be reused: {}",
+                           states_.record(write.study).name, error));
+  known_.cut_short(write.study);
+  ledger_.write(EndTaking{write.study}, EndTakingWrite{write.study});
+}
+
+/// The writer keeps it until it can write it.
 void Service::refused(const EndTakingWrite& /*write*/, const std::string& /*error*/,
                       Instant /*now*/) {}
 

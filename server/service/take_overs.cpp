@@ -39,6 +39,7 @@ bool TakeOvers::begin(std::uint64_t study_id, std::int64_t now_ms) {
   std::optional<Lookup>& lookup = taken_[study_id].lookup;
   if (lookup) {
     lookup->begins_again = true;
+    lookup->is_stopped = false;
     return false;
   }
   lookup = Lookup{now_ms};
@@ -71,6 +72,12 @@ std::optional<std::uint64_t> TakeOvers::add_part(std::uint64_t study_id, const R
     return 0;
   }
   return std::nullopt;
+}
+
+void TakeOvers::cut_short(std::uint64_t study_id) {
+  Taken& taken = taken_.at(study_id);
+  taken.cut_short = true;
+  taken.lookup->begins_again = false;
 }
 
 void TakeOvers::stop(std::uint64_t study_id) {

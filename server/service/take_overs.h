@@ -51,6 +51,8 @@ class TakeOvers {
   /// A part is durable. Returns where the next one begins; nothing: the lookup is over.
   std::optional<std::uint64_t> add_part(std::uint64_t study_id, const ReusedResults& part,
                                         std::int64_t now_ms);
+  /// The lookup ends although other results may be known.
+  void cut_short(std::uint64_t study_id);
   /// The part under way is the last one.
   void stop(std::uint64_t study_id);
   /// The end of the lookup is durable. True when it begins again.

@@ -51,7 +51,8 @@ bool is_change(const Meaning& meaning) {
 
 void WriteLedger::write(Change change, Meaning meaning) {
   const std::uint64_t ticket = ++last_ticket_;
-  const bool answer_failure = is_change(meaning);
+  // A study can do without reuse, so that a lookup that fails delays nothing else.
+  const bool answer_failure = is_change(meaning) || std::holds_alternative<ReuseWrite>(meaning);
   count(meaning);
   open_.emplace(ticket, std::move(meaning));
   weigh();

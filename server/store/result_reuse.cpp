@@ -12,6 +12,13 @@
 namespace oblique::server {
 namespace {
 
+/// Resets a statement at the end of a scope, also when an exception leaves it: a statement that
+/// stays open would keep the connection at an old state of the database.
+struct ResetAtEnd {
+  Statement& statement;
+  ~ResetAtEnd() { statement.reset(); }
+};
+
 /// Point numbers of one change, and lookups: some 50 ms of the writer when all have a row.
 constexpr std::uint64_t kPart = 4096;
 
@@ -135,7 +142,7 @@ void ResultReuse::reuse(const ReuseResults& change, std::uint64_t point, std::in
   ReusedResults& outcome = *change.outcome;
   ++outcome.probes;
   const protocol::Point inputs = change.table->point(point);
-  rows_.reset();
+  const ResetAtEnd reset{rows_};
   rows_.bind(1, model_id);
   rows_.bind(2, inputs.H_m);
   rows_.bind(3, inputs.mu);
@@ -162,7 +169,6 @@ void ResultReuse::reuse(const ReuseResults& change, std::uint64_t point, std::in
     }
     break;
   }
-  rows_.reset();
 }
 
 /// Null for a study that was deleted.

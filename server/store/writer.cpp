@@ -276,7 +276,12 @@ void GroupCommit::note_gone(const StorageGone& error, std::vector<WriteReport>& 
 }
 
 bool GroupCommit::write_group(std::deque<WriteJob>& jobs, std::vector<WriteReport>& reports) {
-  const std::size_t size = std::min(jobs.size(), kLargestGroup);
+  std::size_t size = 0;
+  // A lookup takes as long as thousands of results, so it is the last of its group.
+  for (bool has_lookup = false; size < std::min(jobs.size(), kLargestGroup) && !has_lookup;
+       ++size) {
+    has_lookup = std::holds_alternative<ReuseResults>(jobs[size].change);
+  }
   std::vector<Change> changes;
   changes.reserve(size);
   for (std::size_t i = 0; i < size; ++i) {

@@ -131,6 +131,15 @@ TEST_F(ServiceReuseTest, ALookupThatFindsNothingForAMillionProbesIsCutShort) {
   EXPECT_TRUE(last_reply().submit().taken().cut_short());
 }
 
+TEST_F(ServiceReuseTest, ALookupThatFailsIsCutShortAndTheStudyGoesOn) {
+  submit_study();
+  write_all("a page is damaged");
+  EXPECT_EQ(ended(), kStudy);
+  write_all();
+  EXPECT_TRUE(last_reply().submit().taken().cut_short());
+  EXPECT_EQ(status_of("b").waits_for(), "");
+}
+
 TEST_F(ServiceReuseTest, ALookupThatFindsNothingForLongIsCutShort) {
   submit_study();
   now_.steady_ms += TakeOvers::kLongestInVain_ms - 1;
