@@ -10,9 +10,9 @@ namespace oblique::server {
 /// Creates the tables in an empty database, which gets a random identity. Throws StorageError.
 void create_tables(sqlite3* database);
 
-/// Creates the views, the indices and the triggers of this schema, also where another program dropped
-/// or replaced them. Objects with other names stay. Throws StorageError, as where a table has the
-/// name of a view.
+/// Creates the views, the indices and the triggers of this schema, also where another program
+/// dropped or replaced them. Objects with other names stay. Throws StorageError, as where a table
+/// has the name of a view.
 void create_views(sqlite3* database);
 
 /// Creates the views for this connection alone, where they hide those of the file. Throws
