@@ -242,6 +242,56 @@ TEST(GroupCommitTest, AChangeThatWaitsIsNotOvertakenByALaterOneOfItsStudy) {
   EXPECT_EQ(jobs.front().ticket, 1U);
 }
 
+/// Notes how many changes each commit has; refuses lookups of results if `is_damaged`.
+class LookupStorage final : public Storage {
+ public:
+  void commit(std::span<const Change> changes) override {
+    for (const Change& change : changes) {
+      if (is_damaged && std::holds_alternative<ReuseResults>(change)) {
+        throw StorageError("a page is damaged");
+      }
+    }
+    sizes.push_back(changes.size());
+  }
+  bool is_damaged = false;
+  std::vector<std::size_t> sizes;
+};
+
+std::deque<WriteJob> lookups_beside_other_changes() {
+  std::deque<WriteJob> jobs;
+  jobs.push_back({1, AddWorker{1, "", 1, "", "", ""}, false});
+  jobs.push_back({2, ReuseResults{1, nullptr, 0, "", nullptr}, true});
+  jobs.push_back({3, ReuseResults{2, nullptr, 0, "", nullptr}, true});
+  jobs.push_back({4, AddWorker{2, "", 1, "", "", ""}, false});
+  return jobs;
+}
+
+TEST(GroupCommitTest, ALookupOfResultsIsTheLastChangeOfItsTransaction) {
+  LookupStorage storage;
+  GroupCommit commits(storage);
+  auto jobs = lookups_beside_other_changes();
+  while (!jobs.empty()) {
+    commits.write(jobs);
+  }
+  EXPECT_EQ(storage.sizes, (std::vector<std::size_t>{2, 1, 1}));
+}
+
+TEST(GroupCommitTest, ALookupOfResultsThatFailsKeepsNothingElseFromBeingStored) {
+  LookupStorage storage;
+  storage.is_damaged = true;
+  GroupCommit commits(storage);
+  auto jobs = lookups_beside_other_changes();
+  std::map<std::uint64_t, Kind> became;
+  for (const auto& report : commits.write(jobs)) {
+    became[report.ticket] = report.kind;
+  }
+  EXPECT_EQ(became,
+            (std::map<std::uint64_t, Kind>{
+                {1, Kind::kStored}, {2, Kind::kRefused}, {3, Kind::kRefused}, {4, Kind::kStored}}));
+  EXPECT_TRUE(jobs.empty());
+  EXPECT_FALSE(commits.is_faulty());
+}
+
 /// Takes changes until its files are gone; merges its log at the so-many-th try.
 class VanishingStorage final : public Storage {
  public:
