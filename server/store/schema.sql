@@ -6,7 +6,8 @@
 CREATE TABLE about (
   database_id   TEXT NOT NULL,              -- random, set when the file is created
   starts        INTEGER NOT NULL DEFAULT 0, -- how often a server has opened the file
-  last_study_id INTEGER NOT NULL DEFAULT 0  -- highest number of a deleted study; numbers are never reused
+  last_study_id INTEGER NOT NULL DEFAULT 0, -- highest number of a deleted study; numbers are never reused
+  has_orphans   INTEGER NOT NULL DEFAULT 0  -- 1: deleted studies may have left models and workers without rows
 ) STRICT;
 
 CREATE TABLE studies (
@@ -144,7 +145,7 @@ CREATE TABLE reused_points (
   PRIMARY KEY (study_id, source)
 ) STRICT, WITHOUT ROWID;
 
--- Deleted studies that may still have rows; the server deletes these in small parts.
+-- Deleted studies that may still have rows. The server deletes the rows in small parts, and then the number here.
 CREATE TABLE deletions (
   study_id    INTEGER PRIMARY KEY -- its number
 ) STRICT;

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -96,9 +97,13 @@ class Store final : public Storage {
   void add(const EndTaking& change) { reuse_->end(change); }
   void add(const AddWorker& change);
   void add(const AddResults& change);
+  void prepare_schema(const std::string& path);
+  /// Notes a failed sync.
+  void guard_syncs(const std::function<void()>& work);
+  /// Runs `work` in a transaction, rolled back when it throws.
+  void in_transaction(bool full_sync, const std::function<void()>& work);
   bool has_study(std::uint64_t study_id);
   std::int64_t stored_model(const AddResults& change, std::uint64_t model);
-  void set_sync(bool full);
   std::uint64_t highest(const std::string& sql);
   PointsOfStudies completed_points();
 
@@ -113,6 +118,7 @@ class Store final : public Storage {
   // Rows of `models` by study and model number; emptied when it is large or a transaction fails.
   std::map<std::pair<std::uint64_t, std::uint64_t>, std::int64_t> models_;
   bool full_sync_ = true;
+  bool sync_failed_ = false;
   std::vector<std::string> left_out_;
 };
 

@@ -50,12 +50,13 @@ TEST_P(OtherSchema, IsRefusedByWhateverOpensItWithBothNumbersAndTheRemedy) {
       {"describe", [&] { stored_recipe(path_, 1); }},
       {"rename", [&] { rename_study(path_, 1, "b"); }}};
   for (const auto& [name, open] : openers) {
-    EXPECT_THAT(open, testing::ThrowsMessage<StorageError>(
-                          path_ + " has schema " + std::to_string(schema) +
-                          ", and this version of oblique has schema " +
-                          std::to_string(kSchemaVersion) + ": use the " + written_by +
-                          " version that wrote the file, read it with sqlite3, or solve its "
-                          "studies again into a new file"))
+    EXPECT_THAT(open,
+                testing::ThrowsMessage<StorageError>(
+                    path_ + " has schema " + std::to_string(schema) +
+                    ", and this version of oblique has schema " + std::to_string(kSchemaVersion) +
+                    ": export its results with the " + written_by +
+                    " version that wrote it (oblique query STUDY --db FILE --format csv), "
+                    "or solve its studies again into a new file"))
         << name;
   }
   EXPECT_EQ(contents(), before);
