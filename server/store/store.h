@@ -92,7 +92,7 @@ class Store final : public Storage {
   void add(const ForgetFailures& change);
   void add(const GrowStudy& change);
   void add(const RenameStudy& change);
-  void add(const DeleteStudy& change);
+  void add(const DeleteStudy& change) { deletion_->remove(change.study_id); }
   void add(const ReuseResults& change) { reuse_->run(change); }
   void add(const EndTaking& change) { reuse_->end(change); }
   void add(const AddWorker& change);
