@@ -1,4 +1,4 @@
-// Reading back what studies there are and how far they are, and the numbers that were given.
+// Reading the studies and their progress from the database at a start.
 #include <algorithm>
 #include <limits>
 #include <map>
@@ -59,9 +59,8 @@ void read_failures(sqlite3* database, std::vector<StoredStudy>& studies) {
       true);
 }
 
-/// Makes sure that points can be handed out, and makes the study's table.
-/// Gives why this version takes no such study, or an empty text. Throws StorageError for a recipe
-/// that cannot be read.
+/// Reads the study's recipe. Returns why this version does not accept the study, or an empty text.
+/// Throws StorageError for a recipe that cannot be read.
 std::string objection_to(const StoredStudy& study) {
   try {
     (void)study.table.get();
@@ -201,7 +200,7 @@ std::vector<StoredStudy> Store::studies() {
       continue;
     }
     if (!is_open || study.state != StudyState::kRunning) {
-      study.table.release();  // nobody computes with it for now
+      study.table.release();  // not needed until the study runs again
     }
     found.push_back(std::move(study));
   }
