@@ -46,7 +46,7 @@ std::uint64_t study_of(const AddStudy& change) {
 std::uint64_t study_of(const SetStudyState& change) {
   return change.study_id;
 }
-std::uint64_t study_of(const SetStudyTerms& change) {
+std::uint64_t study_of(const SetPriority& change) {
   return change.study_id;
 }
 std::uint64_t study_of(const ForgetFailures& change) {

@@ -20,8 +20,6 @@ CREATE TABLE studies (
   created_at  TEXT NOT NULL,     -- UTC, ISO 8601
   changed_at  TEXT NOT NULL,     -- when `state` was last set
   priority    INTEGER NOT NULL DEFAULT 0,   -- studies of a higher one come first
-  weight      REAL NOT NULL DEFAULT 1.0,    -- share of the workers among studies of one priority
-  mixes_versions INTEGER NOT NULL DEFAULT 0, -- 1: results of several solver versions are allowed
   checksum    INTEGER,           -- CRC-32 of study_id, name, recipe, points and created_at
   submitted_by TEXT,             -- name of the key with which it was first submitted; NULL: without keys
   counted     INTEGER NOT NULL DEFAULT 0,   -- 1: `settled_points` says which points have a row
