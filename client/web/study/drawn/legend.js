@@ -87,8 +87,8 @@ export function gaps(picture) {
 
 /**
  * The range that colours span, and how.
- * @param {{from: string, to: string, is_log: boolean, palette: string}} now
- * @param {(changed: {from?: string, to?: string, zlog?: string, pal?: string}) => void} take
+ * @param {{from: string, to: string, is_log: boolean}} now
+ * @param {(changed: {from?: string, to?: string, zlog?: string}) => void} take
  */
 export function colour_controls(now, take) {
   const said = h("span", { role: "status", class: "bad" });
@@ -104,6 +104,5 @@ export function colour_controls(now, take) {
   };
   return h("div", { class: "row" }, number("from"), number("to"),
     h("button", { type: "button", onclick: () => take({ from: "", to: "" }) }, "Fit"), said,
-    named("palette", picker([["viridis", "viridis"], ["cividis", "cividis"]], now.palette, (pal) => take({ pal }))),
     tick("log colours", now.is_log, (is) => take({ zlog: is ? "1" : "" })));
 }
