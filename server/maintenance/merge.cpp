@@ -289,7 +289,8 @@ class RowMerge {
     bound(other_version_, place).bind(5, std::string_view(place.solver_version));
     if (other_version_.step()) {
       throw MergeRefused(fmt::format(
-          "its results of study {} come from solver version {}, those that are there from {}",
+          "its results of study {} come from solver version {}, those that are there from {}: "
+          "`oblique rename` gives one of the studies another name",
           place.name, other_version_.text(0), place.solver_version));
     }
     other_version_.reset();

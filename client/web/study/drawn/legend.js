@@ -1,6 +1,6 @@
 // @ts-check
 // What colours mean: a bar with its range, or a list of categories.
-import { h, named, tick, picker } from "/parts/dom.js";
+import { h, named, tick } from "/parts/dom.js";
 import { category_pixel, css_colour, empty_pixel, ink, is_dark, kOther, own_looks } from "/parts/colours.js";
 import { count, heading, shown } from "/parts/format.js";
 import { scale, ticks, tick_text } from "/parts/scale.js";
