@@ -146,8 +146,6 @@ void add_merge(CLI::App& app, Command& command) {
   verb->add_option("--rename-prefix", flags->settings.rename_prefix,
                    "goes before the names of studies whose names other recipes have")
       ->type_name("PREFIX");
-  verb->add_flag("--mix-versions", flags->settings.mixes_versions,
-                 "unite studies whose results come from different solver versions");
   verb->add_flag("--allow-network-disk", flags->allow_network_disk,
                  "take a --db on a network file system, where a second machine could damage it");
   verb->callback([flags, &command] { command = [flags] { return merge(*flags); }; });

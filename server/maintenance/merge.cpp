@@ -258,7 +258,7 @@ class RowMerge {
 
   void merge_part(const StudyPlace& place, std::uint64_t rows) {
     note_differing(place);
-    if (!place.mixes_versions && !place.solver_version.empty()) {
+    if (!place.solver_version.empty()) {
       refuse_other_version(place);
     }
     merged_.failures_replaced += changed_by(bound(remove_failed_, place));
@@ -284,13 +284,13 @@ class RowMerge {
     differing_.reset();
   }
 
-  /// Results of a study come from one solver version unless it mixes versions.
+  /// Results of a study come from one solver version.
   void refuse_other_version(const StudyPlace& place) {
     bound(other_version_, place).bind(5, std::string_view(place.solver_version));
     if (other_version_.step()) {
       throw MergeRefused(fmt::format(
           "its results of study {} come from solver version {}, those that are there from {}: "
-          "--mix-versions unites them all the same",
+          "`oblique rename` gives one of the studies another name",
           place.name, other_version_.text(0), place.solver_version));
     }
     other_version_.reset();

@@ -13,8 +13,6 @@ struct MergeSettings {
   /// Goes before the name of a study whose name is taken by one with other points, another model or
   /// another choice of errors; empty: such a database is refused.
   std::string rename_prefix;
-  /// Results of several solver versions may be in one study.
-  bool mixes_versions = false;
 };
 
 /// What the merge of one database changed.

@@ -8,7 +8,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/written/study_name.h"
-#include "proto/recipe/written/study_terms.h"
+#include "proto/recipe/written/study_priority.h"
 #include "server/store/rows/row_columns.h"
 #include "server/study/study_table.h"
 #include "worker/solver/model/errors.h"
@@ -21,24 +21,20 @@ struct StudyRow {
   std::uint64_t id;
   std::string name;
   StudyTable table;
-  bool mixes_versions;
 };
 
 constexpr const char* kStudyColumns =
-    "study_id, name, recipe, points, mixes_versions, state, created_at, changed_at, priority,"
-    " weight";
-constexpr int kCreatedAt = 6;
-constexpr int kChangedAt = 7;
-constexpr int kPriority = 8;
-constexpr int kWeight = 9;
+    "study_id, name, recipe, points, state, created_at, changed_at, priority";
+constexpr int kCreatedAt = 5;
+constexpr int kChangedAt = 6;
+constexpr int kPriority = 7;
 
 std::uint64_t number_in(const Statement& row, int column) {
   return static_cast<std::uint64_t>(row.integer(column));
 }
 
 StudyRow study_in(const Statement& row) {
-  return {number_in(row, 0), row.text(1), StudyTable(row.text(2), number_in(row, 3)),
-          row.integer(4) != 0};
+  return {number_in(row, 0), row.text(1), StudyTable(row.text(2), number_in(row, 3))};
 }
 
 /// Why no server would have stored the study in that row, or an empty text. Such a study could keep
@@ -49,8 +45,7 @@ std::string objection_to(const StudyRow& study, const Statement& row) {
     return "its times are not valid";
   }
   for (const std::string& objection : {protocol::objection_to_study_name(study.name),
-                                       protocol::objection_to_priority(row.integer(kPriority)),
-                                       protocol::objection_to_weight(row.real(kWeight))}) {
+                                       protocol::objection_to_priority(row.integer(kPriority))}) {
     if (!objection.empty()) {
       return objection;
     }
@@ -156,11 +151,6 @@ class StudyMerge {
 
   StudyPlace unite(const StudyRow& study, const StudyRow& known, const Growth& growth) {
     ++merged_.studies_united;
-    const bool mixes = known.mixes_versions || study.mixes_versions || settings_.mixes_versions;
-    Statement mix(database_, "UPDATE main.studies SET mixes_versions = ?2 WHERE study_id = ?1");
-    mix.bind(1, known.id);
-    mix.bind(2, std::int64_t{mixes});
-    mix.run();
     if (growth.kind == Growth::Kind::kLonger) {
       ++merged_.studies_grown;
       Statement grow(
@@ -172,21 +162,17 @@ class StudyMerge {
       grow.bind(3, study.table.size());
       grow.run();
     }
-    return {study.id,
-            known.id,
-            known.name,
-            numbers_of(study.table),
-            solver_version_of(database_, known.id),
-            mixes};
+    return {study.id, known.id, known.name, numbers_of(study.table),
+            solver_version_of(database_, known.id)};
   }
 
   StudyPlace add(const StudyRow& study, const std::string& name) {
     ++merged_.studies_added;
     Statement insert(
         database_,
-        fmt::format("INSERT INTO main.studies (study_id, name, recipe, points, mixes_versions,"
-                    " state, created_at, changed_at, priority, weight) SELECT 1 + {}, ?1, recipe,"
-                    " points, mixes_versions, state, created_at, changed_at, priority, weight"
+        fmt::format("INSERT INTO main.studies (study_id, name, recipe, points,"
+                    " state, created_at, changed_at, priority) SELECT 1 + {}, ?1, recipe,"
+                    " points, state, created_at, changed_at, priority"
                     " FROM source.studies WHERE study_id = ?2",
                     last_study_id_sql()));
     insert.bind(1, std::string_view(name));
@@ -198,7 +184,7 @@ class StudyMerge {
                                study_checksum_sql()));
     seal.bind(1, id);
     seal.run();
-    return {study.id, id, name, numbers_of(study.table), {}, true};
+    return {study.id, id, name, numbers_of(study.table), {}};
   }
 
   /// Throws MergeRefused when there are conflicts, and names the first ten.

@@ -17,7 +17,6 @@ struct StudyPlace {
   std::uint64_t points_in_source;  ///< numbers of its points are lower
   /// Of the results in the target; empty: it has none, and rows of any version may come.
   std::string solver_version;
-  bool mixes_versions;
 };
 
 /// Inserts, renames and grows studies of main so that each of `source`, an attached database, has a

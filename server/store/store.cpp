@@ -46,14 +46,11 @@ struct Store::Statements {
   explicit Statements(sqlite3* database)
       : add_study(database,
                   "INSERT INTO studies (study_id, name, recipe, points, state, created_at,"
-                  " changed_at, priority, weight, mixes_versions, checksum, submitted_by, counted, "
-                  "reuses)"
-                  " VALUES (?1, ?2, ?3, ?4, 'running', ?5, ?5, ?6, ?7, ?8,"
-                  " row_checksum(?1, ?2, ?3, ?4, ?5), nullif(?9, ''), 1, ?10)"),
+                  " changed_at, priority, checksum, submitted_by, counted, reuses)"
+                  " VALUES (?1, ?2, ?3, ?4, 'running', ?5, ?5, ?6,"
+                  " row_checksum(?1, ?2, ?3, ?4, ?5), nullif(?7, ''), 1, ?8)"),
         set_state(database, "UPDATE studies SET state = ?2, changed_at = ?3 WHERE study_id = ?1"),
-        set_terms(database,
-                  "UPDATE studies SET priority = ?2, weight = ?3, mixes_versions = ?4"
-                  " WHERE study_id = ?1"),
+        set_priority(database, "UPDATE studies SET priority = ?2 WHERE study_id = ?1"),
         note_retries(database,
                      // Neighbours of one attempt have one difference between number and rank.
                      "INSERT INTO retries (study_id, first_point, points, attempt, retried_at)"
@@ -72,7 +69,7 @@ struct Store::Statements {
                " WHERE study_id = ?1 AND state = 'done'"),
         grow(database,
              "UPDATE studies SET recipe = ?2, points = ?3, state = 'running', changed_at = ?4,"
-             " priority = ?5, weight = ?6, mixes_versions = ?7, reuses = reuses OR ?8,"
+             " priority = ?5, reuses = reuses OR ?6,"
              " checksum = row_checksum(study_id, name, ?2, ?3, created_at) WHERE study_id = ?1"),
         rename(database,
                "UPDATE studies SET name = ?2,"
@@ -88,7 +85,7 @@ struct Store::Statements {
 
   Statement add_study;
   Statement set_state;
-  Statement set_terms;
+  Statement set_priority;
   Statement note_retries;
   Statement forget_failures;
   Statement reopen;
@@ -253,20 +250,16 @@ void Store::add(const AddStudy& change) {
   insert.bind_blob(3, change.table.recipe_bytes());
   insert.bind(4, change.table.size());
   insert.bind(5, change.created_at);
-  insert.bind(6, std::int64_t{change.terms.priority});
-  insert.bind(7, change.terms.weight);
-  insert.bind(8, std::int64_t{change.terms.mixes_versions});
-  insert.bind(9, change.submitted_by);
-  insert.bind(10, std::int64_t{change.takes_over});
+  insert.bind(6, std::int64_t{change.priority});
+  insert.bind(7, change.submitted_by);
+  insert.bind(8, std::int64_t{change.takes_over});
   insert.run();
 }
 
-void Store::add(const SetStudyTerms& change) {
-  Statement& update = statements_->set_terms;
+void Store::add(const SetPriority& change) {
+  Statement& update = statements_->set_priority;
   update.bind(1, change.study_id);
-  update.bind(2, std::int64_t{change.terms.priority});
-  update.bind(3, change.terms.weight);
-  update.bind(4, std::int64_t{change.terms.mixes_versions});
+  update.bind(2, std::int64_t{change.priority});
   update.run();
 }
 
@@ -309,10 +302,8 @@ void Store::add(const GrowStudy& change) {
   update.bind_blob(2, change.table.recipe_bytes());
   update.bind(3, change.table.size());
   update.bind(4, change.changed_at);
-  update.bind(5, std::int64_t{change.terms.priority});
-  update.bind(6, change.terms.weight);
-  update.bind(7, std::int64_t{change.terms.mixes_versions});
-  update.bind(8, std::int64_t{change.takes_over});
+  update.bind(5, std::int64_t{change.priority});
+  update.bind(6, std::int64_t{change.takes_over});
   update.run();
 }
 

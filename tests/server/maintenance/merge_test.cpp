@@ -41,7 +41,7 @@ struct Part {
   std::string solver_version = "0.1";
   std::string worker = "host";
   std::vector<std::uint64_t> failed{};
-  StudyTerms terms{};
+  std::int32_t priority = 0;
   double closure = 0.0;  ///< added to that of each result
 };
 
@@ -68,7 +68,7 @@ class MergeTest : public testing::Test {
     std::vector<Change> changes;
     if (is_new) {
       changes.emplace_back(
-          AddStudy{study, part.study, part.table, "2024-01-01T00:00:00.000Z", part.terms});
+          AddStudy{study, part.study, part.table, "2024-01-01T00:00:00.000Z", part.priority});
     }
     changes.emplace_back(AddWorker{worker, part.worker, 1, part.solver_version, "avx2", "then"});
     AddResults results{study, part.table, worker, part.solver_version, "avx2", 1, "now", {}};
@@ -257,20 +257,11 @@ TEST_F(MergeTest, TwoStudiesThatBecomeOneByANewNameAreUnited) {
   EXPECT_THAT(find_faults(file("all")), IsEmpty());
 }
 
-TEST_F(MergeTest, ResultsOfAnotherSolverVersionAreRefusedUnlessVersionsMayMix) {
+TEST_F(MergeTest, ResultsOfAnotherSolverVersionAreRefused) {
   store("all", {{.end = 4}});
   store("one", {{.study = "b", .end = 4}, {.first = 4, .end = 7, .solver_version = "0.2"}});
   EXPECT_THAT(refusal("one"), HasSubstr("solver version 0.2"));
   EXPECT_EQ(text("all", "SELECT count(*) FROM studies"), "1");
-  EXPECT_EQ(merge("one", {.rename_prefix = "", .mixes_versions = true}).results_added, 7U);
-  EXPECT_EQ(text("all", "SELECT mixes_versions FROM studies WHERE name = 'a'"), "1");
-}
-
-TEST_F(MergeTest, AStudyThatMixesVersionsElsewhereMixesThemHere) {
-  store("all", {{.end = 4}});
-  store("one", {{.first = 4, .end = 7, .solver_version = "0.2", .terms = {0, 1.0, true}}});
-  EXPECT_EQ(merge("one").results_added, 3U);
-  EXPECT_EQ(text("all", "SELECT mixes_versions FROM studies"), "1");
 }
 
 TEST_F(MergeTest, ARowThatIsNotAsItWasStoredRefusesTheWholeDatabase) {
@@ -287,12 +278,11 @@ TEST_F(MergeTest, ARowThatIsNotAsItWasStoredRefusesTheWholeDatabase) {
 
 TEST_F(MergeTest, AWorkerThatIsNotAsItWasStoredRefusesTheWholeDatabase) {
   for (const char* change : {"solver_version = '0.2'", "name = 'another'", "threads = 3"}) {
-    store(change, {{.end = 5}});
+    store(change, {{.study = change, .end = 5}});
     texts(change, std::string("UPDATE workers SET ") + change);
-    EXPECT_THROW(merge(change, {.rename_prefix = "", .mixes_versions = true}), StorageError)
-        << change;
+    EXPECT_THROW(merge(change), StorageError) << change;
     texts(change, "UPDATE workers SET checksum = NULL");
-    EXPECT_NO_THROW(merge(change, {.rename_prefix = "", .mixes_versions = true})) << change;
+    EXPECT_NO_THROW(merge(change)) << change;
   }
 }
 
@@ -305,10 +295,9 @@ TEST_F(MergeTest, AModelThatIsNotThatOfItsDefinitionRefusesTheWholeDatabase) {
 
 TEST_F(MergeTest, AStudyThatWouldKeepAServerFromStartingRefusesTheWholeDatabase) {
   int number = 0;
-  for (const char* change :
-       {"points = 1000000000000000000", "points = -1", "recipe = x'ffffffff'", "weight = 0.0",
-        "weight = 9e999", "priority = 9223372036854775807", "name = ''", "name = char(27)",
-        "name = hex(zeroblob(1000))", "created_at = hex(zeroblob(1000))"}) {
+  for (const char* change : {"points = 1000000000000000000", "points = -1", "recipe = x'ffffffff'",
+                             "priority = 9223372036854775807", "name = ''", "name = char(27)",
+                             "name = hex(zeroblob(1000))", "created_at = hex(zeroblob(1000))"}) {
     const std::string source = "source" + std::to_string(++number);
     store(source, {{.end = 3}});
     texts(source, std::string("UPDATE studies SET checksum = NULL, ") + change);
@@ -330,7 +319,7 @@ TEST_F(MergeTest, WhatIsComputedIsNotRead) {
 }
 
 TEST_F(MergeTest, WhatIsMergedIsNotChangedAndItsStateGoesAlong) {
-  store("one", {{.end = 5, .terms = {7, 2.5, false}}});
+  store("one", {{.end = 5, .priority = 7}});
   Store(file("one")).commit(std::vector<Change>{SetStudyState{1, StudyState::kPaused, "later"}});
   const auto bytes = [&] {
     std::ifstream stream(file("one"), std::ios::binary);
@@ -340,9 +329,9 @@ TEST_F(MergeTest, WhatIsMergedIsNotChangedAndItsStateGoesAlong) {
   merge("one");
   EXPECT_EQ(bytes(), before);
   EXPECT_EQ(text("all",
-                 "SELECT state || ' ' || priority || ' ' || weight || ' ' || created_at ||"
+                 "SELECT state || ' ' || priority || ' ' || created_at ||"
                  " ' ' || changed_at FROM studies"),
-            "paused 7 2.5 2024-01-01T00:00:00.000Z later");
+            "paused 7 2024-01-01T00:00:00.000Z later");
 }
 
 TEST_F(MergeTest, KilledInTheMiddleItLeavesWhatWasThereAndIsDoneByTheNextTry) {
