@@ -13,8 +13,6 @@ struct MergeSettings {
   /// Goes before the name of a study whose name is taken by one with other points, another model or
   /// another choice of errors; empty: such a database is refused.
   std::string rename_prefix;
-  /// Results of several solver versions may be in one study.
-  bool mixes_versions = false;
 };
 
 /// What the merge of one database changed.
@@ -30,7 +28,7 @@ struct Merged {
 };
 
 /// A database was not merged, and nothing of it was: its studies contradict those of the target.
-/// The message says what can be done.
+/// The message gives the remedy.
 class MergeRefused : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

@@ -10,8 +10,9 @@
 #include "server/database/open_for_reading.h"
 #include "server/database/row_checksum.h"
 #include "server/database/sqlite.h"
+#include "server/maintenance/check.h"
 #include "server/maintenance/study_counts.h"
-#include "server/store/rows/row_columns.h"
+#include "server/store/completed_ranges.h"
 #include "server/store/store.h"
 
 namespace oblique::server {
@@ -46,16 +47,12 @@ std::vector<std::string> columns_of(sqlite3* database, const std::string& table)
   return texts(database, "SELECT name FROM pragma_table_info('" + table + "')");
 }
 
-std::vector<std::string> studies_in(sqlite3* database) {
-  return texts(database, "SELECT study_id FROM studies");
-}
-
 /// Rows of one table that have ascending integer keys.
 struct KeyedRows {
   std::string table;
   std::string key = "rowid";
   std::string condition = "1";    ///< which rows are copied, in SQL
-  std::string is_sound = "1";     ///< false for a row that differs from what was stored
+  std::string is_sound = "1";     ///< false for a damaged row, in SQL
   std::int64_t before_first = 0;  ///< all keys are above
 };
 
@@ -161,23 +158,23 @@ std::uint64_t copy_rows(sqlite3* from, sqlite3* to, const KeyedRows& rows, Salva
 
 /// Copies the tables, each after those that it refers to.
 void copy_tables(sqlite3* from, sqlite3* to, Salvaged& saved) {
-  const auto unchanged = [](const std::string& checksum_sql) {
-    return "(checksum IS NULL OR checksum = " + checksum_sql + ")";
-  };
   saved.studies = copy_rows(from, to, {.table = "studies"}, saved);
-  copy_rows(from, to, {.table = "models"}, saved);
-  // Wrong words and workers would make many rows wrong.
-  copy_rows(from, to, {.table = "workers", .is_sound = unchanged(worker_checksum_sql())}, saved);
-  copy_rows(from, to, {.table = "texts", .is_sound = unchanged(text_checksum_sql())}, saved);
-  copy_rows(from, to, {.table = "retries"}, saved);
-  copy_rows(from, to, {.table = "origins"}, saved);
+  for (const std::string table : {"models", "workers", "retries"}) {
+    copy_rows(from, to, {.table = table}, saved);
+  }
   // Rows of a study that was lost mean nothing.
-  for (const std::string& study : studies_in(to)) {
+  for (const std::string& study : texts(to, "SELECT study_id FROM studies")) {
     copy_rows(from, to,
-              {.table = "packed_results",
+              {.table = "results",
                .key = "point",
                .condition = "study_id = " + study,
-               .is_sound = unchanged(result_checksum_sql()) + " AND " + lists_are_sound_sql(),
+               .is_sound = row_fault_sql() + " IS NULL",
+               .before_first = -1},
+              saved);
+    copy_rows(from, to,
+              {.table = "completed_ranges",
+               .key = "first_point",
+               .condition = "study_id = " + study,
                .before_first = -1},
               saved);
   }
@@ -185,34 +182,25 @@ void copy_tables(sqlite3* from, sqlite3* to, Salvaged& saved) {
 
 /// Removes or repairs references to rows that were lost, and counts rows again.
 void mend_references(sqlite3* database) {
-  // Rows of a study or model that is lost mean nothing, nor do those whose words are lost.
   execute(database,
-          "DELETE FROM packed_results WHERE study_id NOT IN (SELECT study_id FROM studies)"
-          " OR model_id NOT IN (SELECT model_id FROM models)"
-          " OR (mode IS NOT NULL AND mode NOT IN (SELECT text_id FROM texts))"
-          " OR (major_mode IS NOT NULL AND major_mode NOT IN (SELECT text_id FROM texts))"
-          " OR (margin_event IS NOT NULL AND margin_event NOT IN (SELECT text_id FROM texts));"
+          "DELETE FROM results WHERE model_id NOT IN (SELECT model_id FROM models);"
           "DELETE FROM retries WHERE study_id NOT IN (SELECT study_id FROM studies);"
           // The number of a lost worker stays, so that the row keeps its checksum. Databases mostly
           // have results of one solver version; otherwise that of a lost worker is unknown.
           "INSERT INTO workers"
           " (worker_id, name, threads, solver_version, instruction_set, joined_at)"
-          " SELECT DISTINCT worker, 'lost with a damaged file', 1,"
+          " SELECT DISTINCT worker_id, 'lost with a damaged file', 1,"
           " (SELECT CASE count(DISTINCT solver_version) WHEN 1 THEN min(solver_version)"
-          " ELSE 'unknown' END FROM workers), 'unknown', '' FROM packed_results"
-          " WHERE worker NOT IN (SELECT worker_id FROM workers)");
-  for (const std::string& study : studies_in(database)) {
-    count_rows_again(database, std::stoull(study));
+          " ELSE 'unknown' END FROM workers), 'unknown', '' FROM results"
+          " WHERE worker_id IS NOT NULL AND worker_id NOT IN (SELECT worker_id FROM workers);"
+          "UPDATE studies SET counted = 1;");
+  const auto noted = noted_points(database);
+  Statement studies(database, "SELECT study_id, recipe, points FROM studies");
+  while (studies.step()) {
+    const auto study_id = static_cast<std::uint64_t>(studies.integer(0));
+    const StudyTable table(studies.text(1), static_cast<std::uint64_t>(studies.integer(2)));
+    count_again(database, study_id, table, noted.at(study_id).value());
   }
-  // No later study may get a number by which rows name the study that they come from.
-  execute(database,
-          "DELETE FROM origins WHERE origin_id NOT IN (SELECT study_id FROM studies)"
-          " AND origin_id NOT IN (SELECT origin_id FROM taken_points);"
-          "UPDATE about SET last_study_id ="
-          " max(last_study_id, coalesce((SELECT max(origin_id) FROM origins), 0));"
-          "UPDATE studies SET state = 'running' WHERE state = 'done' AND points <>"
-          " (SELECT coalesce(sum(p.points), 0) FROM settled_points AS p"
-          " WHERE p.study_id = studies.study_id)");
 }
 
 }  // namespace
@@ -235,7 +223,7 @@ Salvaged salvage(const std::string& from, const std::string& to) {
     copy_tables(source.get(), target.get(), saved);
     mend_references(target.get());
     transaction.commit();
-    saved.results = std::stoull(texts(target.get(), "SELECT count(*) FROM packed_results").at(0));
+    saved.results = std::stoull(texts(target.get(), "SELECT count(*) FROM results").at(0));
     execute(target.get(), "PRAGMA journal_mode = DELETE");
   }
   draft.keep_as(to);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <fstream>
 #include <memory>
 #include <optional>
 #include <string>
@@ -13,6 +14,24 @@
 #include "tests/support/temporary_folder.h"
 
 namespace oblique::server {
+
+/// The first page of a table.
+inline std::int64_t page_of(const std::string& path, const std::string& table) {
+  const DatabaseHandle database = open_database(path, SQLITE_OPEN_READONLY);
+  Statement root(database.get(), "SELECT rootpage FROM sqlite_schema WHERE name = ?");
+  root.bind(1, std::string_view(table));
+  EXPECT_TRUE(root.step()) << table;
+  return root.integer(0);
+}
+
+constexpr std::int64_t kPageBytes = 8192;
+
+/// Makes a page unreadable.
+inline void overwrite_page(const std::string& path, std::int64_t page) {
+  std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp((page - 1) * kPageBytes);
+  file << std::string(kPageBytes, '\x5a');
+}
 
 /// A database with one study of ten points, five of them solved.
 class MaintenanceTest : public testing::Test {
