@@ -80,29 +80,6 @@ std::vector<std::string> faults_of_tables(sqlite3* database) {
   return faults;
 }
 
-/// Tables that other people made may have foreign keys that are violated or cannot be checked.
-void check_other_tables(sqlite3* database, Diagnosis& found) {
-  Statement tables(database, "SELECT name FROM sqlite_schema WHERE type = 'table'");
-  while (tables.step()) {
-    const std::string table = tables.text(0);
-    if (std::any_of(our_tables().begin(), our_tables().end(),
-                    [&](const TableDefinition& ours) { return ours.name == table; })) {
-      continue;
-    }
-    try {
-      Statement rows(database, "SELECT parent FROM pragma_foreign_key_check(?)");
-      rows.bind(1, std::string_view(table));
-      if (rows.step()) {
-        found.faults.push_back(fmt::format("table {}: refers to a row of {} that does not exist",
-                                           table, rows.text(0)));
-      }
-    } catch (const StorageError& error) {
-      found.remarks.push_back(fmt::format("the foreign keys of the table {} cannot be checked: {}",
-                                          table, error.what()));
-    }
-  }
-}
-
 /// The column that differs from the model's definition; empty: none.
 std::string differing_column(const Statement& row, const solver::ModelParameters& model) {
   if (row.text(2) != nlohmann::json(model.lengths_m).dump()) {
@@ -340,7 +317,6 @@ Diagnosis diagnose(const std::string& path) {
   }
   add_row_checksum(database);
   execute(database, "BEGIN");  // one instant of rows and counts while a server writes
-  check_other_tables(database, found);
   for (const std::string& view : missing_views(database)) {
     found.faults.push_back(
         fmt::format("the view {} is missing: the next server on this file creates it", view));

@@ -19,7 +19,6 @@
 #include "server/store/completed_ranges.h"
 #include "server/store/result_rows.h"
 #include "server/store/schema.h"
-#include "server/store/store.h"
 #include "server/study/study_table.h"
 
 namespace oblique::server {
@@ -68,61 +67,55 @@ class StudyMerge {
   StudyMerge(sqlite3* database, sqlite3* source, const std::string& rename_prefix, Merged& merged)
       : database_(database), source_(source), rename_prefix_(rename_prefix), merged_(merged) {}
 
-  /// Throws MergeRefused, naming the first ten studies without a place.
+  /// Throws MergeRefused for a study without a place.
   std::vector<StudyPlace> run() {
     std::vector<StudyPlace> places;
     Statement list(source_, fmt::format("SELECT {} FROM studies ORDER BY study_id", kStudyColumns));
     while (list.step()) {
       const StudyRow study = study_in(list);
-      if (auto target = place_of(study)) {
-        auto completed = noted_points_of(database_, target->id).value_or(IntervalSet());
-        const auto others = noted_points_of(source_, study.id).value_or(IntervalSet());
-        others.for_each([&](const Interval& range) { completed.insert(range.begin, range.end); });
-        places.push_back({study.id, std::move(*target), std::move(completed)});
+      StudyPlace place{study.id, place_of(study), {}};
+      for (const auto& noted :
+           {noted_points_of(database_, place.target.id), noted_points_of(source_, study.id)}) {
+        noted.value_or(IntervalSet()).for_each([&](const Interval& range) {
+          place.completed.insert(range.begin, range.end);
+        });
       }
+      places.push_back(std::move(place));
     }
-    refuse_conflicts();
     return places;
   }
 
  private:
-  /// Nothing, and one more conflict, when the study has no place.
-  std::optional<StudyRow> place_of(const StudyRow& study) {
-    std::string name = study.name;
-    auto known = study_named(name);
-    Growth growth = growth_of(known, study);
-    if (growth.kind == Growth::Kind::kOther && !rename_prefix_.empty()) {
-      name = rename_prefix_ + name;
-      known = study_named(name);
-      growth = growth_of(known, study);
+  /// The first free name or study of the same recipe: by its own name, and with the prefix.
+  StudyRow place_of(const StudyRow& study) {
+    std::string conflict;
+    for (const std::string& name : {study.name, rename_prefix_ + study.name}) {
+      Statement find(database_,
+                     fmt::format("SELECT {} FROM main.studies WHERE name = ?", kStudyColumns));
+      find.bind(1, std::string_view(name));
+      if (!find.step()) {
+        return add(study, name);
+      }
+      const StudyRow known = study_in(find);
+      const Growth growth = growth_of(known, study);
+      if (growth.kind != Growth::Kind::kOther) {
+        return unite(study, known, growth);
+      }
+      conflict = fmt::format("there is a study called \"{}\" with another recipe ({})", name,
+                             growth.difference);
     }
-    if (growth.kind == Growth::Kind::kOther) {
-      std::replace(growth.difference.begin(), growth.difference.end(), '\n', ';');
-      conflicts_.push_back(fmt::format("there is a study called \"{}\" with another recipe ({})",
-                                       name, growth.difference));
-      return std::nullopt;
-    }
-    if (std::string objection = protocol::objection_to_study_name(name); !objection.empty()) {
-      conflicts_.push_back(std::move(objection));
-      return std::nullopt;
-    }
-    return known ? unite(study, *known, growth) : add(study, name);
+    std::replace(conflict.begin(), conflict.end(), '\n', ';');
+    throw MergeRefused(conflict + (rename_prefix_.empty()
+                                       ? ". --rename-prefix PREFIX gives such studies other names"
+                                       : ". Another --rename-prefix gives other names"));
   }
 
-  std::optional<StudyRow> study_named(const std::string& name) const {
-    Statement find(database_,
-                   fmt::format("SELECT {} FROM main.studies WHERE name = ?", kStudyColumns));
-    find.bind(1, std::string_view(name));
-    return find.step() ? std::optional(study_in(find)) : std::nullopt;
-  }
-
-  /// How the recipe of `study` relates to that of the one with its name, if any.
-  static Growth growth_of(const std::optional<StudyRow>& known, const StudyRow& study) {
-    if (!known || known->table.is_of_the_recipe_of(study.table)) {
+  static Growth growth_of(const StudyRow& known, const StudyRow& study) {
+    if (known.table.is_of_the_recipe_of(study.table)) {
       return {Growth::Kind::kSame, {}};
     }
     try {
-      return known->table.growth_to(study.table);
+      return known.table.growth_to(study.table);
     } catch (const std::runtime_error& error) {
       return {Growth::Kind::kOther, error.what()};
     }
@@ -168,6 +161,9 @@ class StudyMerge {
   }
 
   StudyRow add(const StudyRow& study, const std::string& name) {
+    if (const std::string objection = protocol::objection_to_study_name(name); !objection.empty()) {
+      throw MergeRefused(objection);
+    }
     ++merged_.studies_added;
     Statement insert(
         database_,
@@ -183,27 +179,10 @@ class StudyMerge {
     return {static_cast<std::uint64_t>(sqlite3_last_insert_rowid(database_)), name, study.table};
   }
 
-  void refuse_conflicts() const {
-    if (conflicts_.empty()) {
-      return;
-    }
-    constexpr std::size_t kMostNamed = 10;
-    const auto named = static_cast<std::ptrdiff_t>(std::min(conflicts_.size(), kMostNamed));
-    std::string text =
-        fmt::format("{}", fmt::join(conflicts_.begin(), conflicts_.begin() + named, "; "));
-    if (conflicts_.size() > kMostNamed) {
-      text += fmt::format("; and {} more", conflicts_.size() - kMostNamed);
-    }
-    throw MergeRefused(text + (rename_prefix_.empty()
-                                   ? ". --rename-prefix PREFIX gives such studies other names"
-                                   : ". Another --rename-prefix gives other names"));
-  }
-
   sqlite3* database_;
   sqlite3* source_;
   const std::string& rename_prefix_;
   Merged& merged_;
-  std::vector<std::string> conflicts_;
 };
 
 /// Copies the models and workers that the target lacks, and makes the temporary tables `model_map`
@@ -376,36 +355,26 @@ void finish_studies(sqlite3* database, const std::vector<StudyPlace>& places) {
   }
 }
 
+/// A connection to the target, with the database at `copy` attached as `source`.
+DatabaseHandle connect(const std::string& target, const std::string& copy) {
+  DatabaseHandle database = open_database(target, SQLITE_OPEN_READWRITE);
+  add_row_checksum(database.get());
+  // The store makes the checkpoints; pages that do not fit into so many KiB go to the log.
+  execute(database.get(), "PRAGMA wal_autocheckpoint = 0");
+  execute(database.get(), "PRAGMA synchronous = FULL");
+  execute(database.get(), "PRAGMA cache_size = -65536");
+  sqlite3_db_config(database.get(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
+  Statement attach(database.get(), "ATTACH ? AS source");
+  attach.bind(1, std::string_view(copy));
+  attach.run();
+  return database;
+}
+
 }  // namespace
-
-struct Merger::Parts {
-  explicit Parts(const std::string& file) : target(file), path(file) {}
-
-  /// A connection to the target, with the database at `copy` attached as `source`.
-  DatabaseHandle connect(const std::string& copy) const {
-    DatabaseHandle database = open_database(path, SQLITE_OPEN_READWRITE);
-    add_row_checksum(database.get());
-    // The store makes the checkpoints; pages that do not fit into so many KiB go to the log.
-    execute(database.get(), "PRAGMA wal_autocheckpoint = 0");
-    execute(database.get(), "PRAGMA synchronous = FULL");
-    execute(database.get(), "PRAGMA cache_size = -65536");
-    sqlite3_db_config(database.get(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
-    Statement attach(database.get(), "ATTACH ? AS source");
-    attach.bind(1, std::string_view(copy));
-    attach.run();
-    return database;
-  }
-
-  Store target;  // has the schema and the lock
-  std::string path;
-};
-
-Merger::Merger(const std::string& target) : parts_(std::make_unique<Parts>(target)) {}
-Merger::~Merger() = default;
 
 Merged Merger::merge(const std::string& source, const MergeSettings& settings,
                      const Progress& progress) {
-  const DraftFile copy(parts_->path + ".merging");
+  const DraftFile copy(path_ + ".merging");
   const std::string remark = copy_into(copy, source, copy.path());
   Merged merged;
   if (!remark.empty()) {
@@ -413,14 +382,14 @@ Merged Merger::merge(const std::string& source, const MergeSettings& settings,
   }
   try {
     const DatabaseHandle opened = open_sound_source(copy.path());
-    const DatabaseHandle database = parts_->connect(copy.path());
+    const DatabaseHandle database = connect(path_, copy.path());
     Transaction transaction(database.get());
     const auto places =
         StudyMerge(database.get(), opened.get(), settings.rename_prefix, merged).run();
     copy_models_and_workers(database.get());
     RowMerge(database.get(), merged).run(places, progress);
     finish_studies(database.get(), places);
-    parts_->target.check();
+    target_.check();
     transaction.commit();
   } catch (const MergeRefused& error) {
     throw MergeRefused(fmt::format("{} was not merged: {}", source, error.what()));
@@ -429,12 +398,8 @@ Merged Merger::merge(const std::string& source, const MergeSettings& settings,
   } catch (const StorageError& error) {
     throw StorageError(fmt::format("{} was not merged: {}", source, error.what()));
   }
-  parts_->target.check();
+  target_.check();
   return merged;
-}
-
-bool Merger::finish() {
-  return parts_->target.merge_log();
 }
 
 }  // namespace oblique::server

@@ -43,10 +43,6 @@ std::vector<std::string> texts(sqlite3* database, const std::string& sql) {
   return found;
 }
 
-std::vector<std::string> columns_of(sqlite3* database, const std::string& table) {
-  return texts(database, "SELECT name FROM pragma_table_info('" + table + "')");
-}
-
 /// Rows of one table that have ascending integer keys.
 struct KeyedRows {
   std::string table;
@@ -56,104 +52,65 @@ struct KeyedRows {
   std::int64_t before_first = 0;  ///< all keys are above
 };
 
-/// Copies the rows of a table in the order of their keys, without what cannot be read.
-class RowsCopy {
- public:
-  RowsCopy(sqlite3* from, sqlite3* to, const KeyedRows& rows)
-      : to_(to),
-        columns_(columns_of(to, rows.table)),
-        last_(rows.before_first),
-        read_(from, fmt::format("SELECT {}, {}, {} FROM {} WHERE {} AND {} > ? ORDER BY {}",
-                                rows.key, rows.is_sound, fmt::join(columns_, ", "), rows.table,
-                                rows.condition, rows.key, rows.key)),
-        insert_(to, fmt::format("INSERT INTO {} ({}) VALUES (?{})", rows.table,
-                                fmt::join(columns_, ", "), marks())) {}
-
-  std::uint64_t copied() const { return copied_; }
-  std::uint64_t unreadable_places() const { return unreadable_; }
-
-  /// After an unreadable place the next readable row is sought in growing leaps, so that a long
-  /// place costs few attempts and a short one few readable rows.
-  void run() {
-    // No table has this many rows: behind such a leap is nothing.
-    constexpr std::int64_t kLongestLeap = std::int64_t{1} << 42U;
-    std::int64_t leap = 0;
-    std::int64_t end_of_leap = last_;
-    while (!copy_until_unreadable()) {
-      const bool is_new_place = leap == 0 || last_ != end_of_leap;
-      unreadable_ += is_new_place ? 1U : 0U;
-      leap = is_new_place ? 1 : 2 * leap;
-      if (leap > kLongestLeap) {
-        return;
-      }
-      last_ += leap;
-      end_of_leap = last_;
-    }
+/// Inserts the columns behind the first two of a row. False when the row violates the schema, which
+/// makes it damaged. Throws std::runtime_error when the copy cannot be written.
+bool insert_row(sqlite3* to, Statement& insert, const Statement& row) {
+  for (int column = 2; column < row.columns(); ++column) {
+    insert.bind_column(column - 1, row, column);
   }
-
- private:
-  std::string marks() const {
-    std::string marks;
-    for (std::size_t i = 1; i < columns_.size(); ++i) {
-      marks += ", ?";
+  try {
+    insert.run();
+    return true;
+  } catch (const StorageError&) {
+    const auto code = static_cast<unsigned>(sqlite3_errcode(to)) & 0xffU;
+    if (code != SQLITE_CONSTRAINT && code != SQLITE_MISMATCH) {
+      throw std::runtime_error("the copy cannot be written: is there room on its disk?");
     }
-    return marks;
+    insert.reset();
+    return false;
   }
+}
 
-  /// True at the end of the table.
-  bool copy_until_unreadable() {
-    read_.reset();
-    read_.bind(1, last_);
-    while (true) {
-      try {
-        if (!read_.step()) {
-          return true;
-        }
-      } catch (const StorageError&) {
-        return false;
-      }
-      last_ = read_.integer(0);
-      ++(read_.integer(1) != 0 && insert() ? copied_ : unreadable_);
-    }
-  }
-
-  /// False when the row violates the schema, which makes it damaged. Throws std::runtime_error when
-  /// the copy cannot be written.
-  bool insert() {
-    for (int column = 2; column < read_.columns(); ++column) {
-      insert_.bind_column(column - 1, read_, column);
-    }
-    try {
-      insert_.run();
-      return true;
-    } catch (const StorageError&) {
-      const auto code = static_cast<unsigned>(sqlite3_errcode(to_)) & 0xffU;
-      if (code != SQLITE_CONSTRAINT && code != SQLITE_MISMATCH) {
-        throw std::runtime_error("the copy cannot be written: is there room on its disk?");
-      }
-      insert_.reset();
-      return false;
-    }
-  }
-
-  sqlite3* to_;
-  std::vector<std::string> columns_;
-  std::int64_t last_;
-  Statement read_;
-  Statement insert_;
-  std::uint64_t copied_ = 0;
-  std::uint64_t unreadable_ = 0;
-};
-
-/// Returns how many rows were copied.
+/// Copies rows in the order of their keys, without those that cannot be read, and returns how many.
+/// After an unreadable place the next readable row is sought in growing leaps, so that a long place
+/// costs few attempts and a short one few readable rows.
 std::uint64_t copy_rows(sqlite3* from, sqlite3* to, const KeyedRows& rows, Salvaged& saved) {
-  if (columns_of(from, rows.table).empty()) {
+  // No table has this many rows: behind such a leap is nothing.
+  constexpr std::int64_t kLongestLeap = std::int64_t{1} << 42U;
+  const std::string columns_sql = "SELECT name FROM pragma_table_info('" + rows.table + "')";
+  if (texts(from, columns_sql).empty()) {
     return 0;  // the table is lost
   }
-  RowsCopy copy(from, to, rows);
-  copy.run();
-  saved.unreadable_places += copy.unreadable_places();
-  return copy.copied();
+  const std::vector<std::string> columns = texts(to, columns_sql);
+  Statement read(
+      from,
+      fmt::format("SELECT {0}, {1}, {2} FROM {3} WHERE {4} AND {0} > ? ORDER BY {0}", rows.key,
+                  rows.is_sound, fmt::join(columns, ", "), rows.table, rows.condition));
+  Statement insert(
+      to, fmt::format("INSERT INTO {} ({}) VALUES ({})", rows.table, fmt::join(columns, ", "),
+                      fmt::join(std::vector<std::string>(columns.size(), "?"), ", ")));
+  std::uint64_t copied = 0;
+  std::int64_t last = rows.before_first;
+  std::int64_t end_of_leap = last;
+  for (std::int64_t leap = 0; leap <= kLongestLeap;) {
+    try {
+      read.reset();
+      read.bind(1, last);
+      while (read.step()) {
+        last = read.integer(0);
+        const bool is_copied = read.integer(1) != 0 && insert_row(to, insert, read);
+        ++(is_copied ? copied : saved.unreadable_places);
+      }
+      break;
+    } catch (const StorageError&) {  // a damaged page
+      const bool is_new_place = leap == 0 || last != end_of_leap;
+      saved.unreadable_places += is_new_place ? 1U : 0U;
+      leap = is_new_place ? 1 : 2 * leap;
+      last += leap;
+      end_of_leap = last;
+    }
+  }
+  return copied;
 }
 
 /// Copies the tables, each after those that it refers to.

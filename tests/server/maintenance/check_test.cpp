@@ -124,18 +124,35 @@ TEST_F(MaintenanceTest, EveryTableThatIsMissingIsNamed) {
   }
 }
 
-TEST_F(MaintenanceTest, AForeignKeyOfAnotherTableThatCannotBeCheckedIsNamedAndTheRestIsChecked) {
+TEST_F(MaintenanceTest, ARowOfAWorkerOrStudyThatDoesNotExistIsNamed) {
+  store_.reset();
+  const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);
+  execute(database.get(), "UPDATE results SET worker_id = 99, checksum = NULL WHERE point = 2");
+  EXPECT_THAT(find_faults(path_), ElementsAre("study a, point 2: its worker does not exist"));
+  execute(database.get(), "INSERT INTO reused_points VALUES (7, 'b', 1)");
+  EXPECT_THAT(find_faults(path_),
+              Contains("table reused_points: refers to study number 7, which does not exist"));
+}
+
+TEST_F(MaintenanceTest, ATableThatIsNotAsServersMakeItIsNamed) {
   store_.reset();
   execute(open_database(path_, SQLITE_OPEN_READWRITE).get(),
-          "CREATE TABLE notes (study_id, point,"
-          " FOREIGN KEY (study_id, point) REFERENCES runs (study_id, point));"
-          "INSERT INTO notes VALUES (1, 2);");
-  const auto found = diagnose(path_);
-  EXPECT_THAT(found.faults, IsEmpty());
-  EXPECT_THAT(found.remarks, Contains(HasSubstr("the foreign keys of the table notes")));
-  execute(open_database(path_, SQLITE_OPEN_READWRITE).get(),
-          "UPDATE results SET worker_id = 99, checksum = NULL WHERE point = 2");
-  EXPECT_THAT(find_faults(path_), Contains("study a, point 2: its worker does not exist"));
+          "ALTER TABLE results ADD COLUMN note BLOB AS (zeroblob(1000000))");
+  EXPECT_THAT(find_faults(path_), ElementsAre(HasSubstr("results is not as servers make it")));
+}
+
+TEST_F(MaintenanceTest, CompletedPointsThatDifferFromTheRowsAreNamedWithTheRemedy) {
+  store_.reset();
+  const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);
+  for (const char* change :
+       {"UPDATE completed_ranges SET points = 6", "UPDATE completed_ranges SET points = 4",
+        "UPDATE completed_ranges SET first_point = 1"}) {
+    execute(database.get(), change);
+    EXPECT_THAT(find_faults(path_), Contains(HasSubstr("UPDATE studies SET counted = 0")))
+        << change;
+  }
+  execute(database.get(), "UPDATE studies SET counted = 0, state = 'done'");
+  EXPECT_THAT(find_faults(path_), ElementsAre("study a is done: 5 of 10 points have a result"));
 }
 
 TEST_F(MaintenanceTest, RowsWithoutChecksumsAreCounted) {
