@@ -155,7 +155,8 @@ class StudyMerge {
     other.bind(2, std::string_view(present.text(0)));
     if (other.step()) {
       throw MergeRefused(fmt::format(
-          "its results of study {} come from solver version {}, those that are there from {}",
+          "its results of study {} come from solver version {}, those that are there from {}: "
+          "`oblique rename` gives one of the studies another name",
           known.name, other.text(0), present.text(0)));
     }
   }

@@ -5,6 +5,8 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -14,6 +16,15 @@
 #include "tests/support/temporary_folder.h"
 
 namespace oblique::server {
+
+/// Ten points, mu from 0 to 1, of which a filter leaves out some.
+inline std::shared_ptr<const protocol::PointTable> filtered_table(const std::string& where) {
+  protocol::Recipe recipe = table_of(10)->recipe();
+  recipe.mutable_blocks(0)->set_where(where);
+  protocol::PointTable counted(recipe);
+  counted.survey([] { return true; });
+  return std::make_shared<const protocol::PointTable>(std::move(counted));
+}
 
 /// The first page of a table.
 inline std::int64_t page_of(const std::string& path, const std::string& table) {

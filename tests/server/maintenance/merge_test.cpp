@@ -20,8 +20,7 @@
 #include "server/database/sqlite.h"
 #include "server/maintenance/check.h"
 #include "server/store/store.h"
-#include "tests/support/points.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/server/maintenance/maintenance_fixture.h"
 
 namespace oblique::server {
 namespace {
@@ -41,7 +40,6 @@ struct Part {
   std::string solver_version = "0.1";
   std::string worker = "host";
   std::vector<std::uint64_t> failed{};
-  StudyTerms terms{};
   double closure = 0.0;  ///< added to that of each result
 };
 
@@ -67,8 +65,7 @@ class MergeTest : public testing::Test {
     const std::uint64_t worker = store.last_worker_id() + 1;
     std::vector<Change> changes;
     if (is_new) {
-      changes.emplace_back(
-          AddStudy{study, part.study, part.table, "2024-01-01T00:00:00.000Z", part.terms});
+      changes.emplace_back(AddStudy{study, part.study, part.table, "2024-01-01T00:00:00.000Z"});
     }
     changes.emplace_back(AddWorker{worker, part.worker, 1, part.solver_version, "avx2", "then"});
     AddResults results{study, part.table, worker, part.solver_version, "avx2", 1, "now", {}};
@@ -324,7 +321,8 @@ TEST_F(MergeTest, TablesThatAServerDoesNotMakeRefuseTheWholeDatabase) {
 }
 
 TEST_F(MergeTest, WhatIsMergedIsNotChangedAndItsStateGoesAlong) {
-  store("one", {{.end = 5, .terms = {.priority = 7}}});
+  store("one", {{.end = 5}});
+  texts("one", "UPDATE studies SET priority = 7");
   Store(file("one")).commit(std::vector<Change>{SetStudyState{1, StudyState::kPaused, "later"}});
   const auto bytes = [&] {
     std::ifstream stream(file("one"), std::ios::binary);
@@ -412,18 +410,9 @@ TEST_F(MergeTest, NumbersOfDeletedStudiesAreNotGivenAgain) {
   EXPECT_EQ(text("all", "SELECT study_id FROM studies WHERE name = 'c'"), "3");
 }
 
-/// The points from 0.5 on of ten from 0 to 1: numbers 5 to 9.
-Table filtered_table() {
-  protocol::Recipe recipe = table_of(10)->recipe();
-  recipe.mutable_blocks(0)->set_where("mu > 0.5");
-  protocol::PointTable table(recipe);
-  table.survey([] { return true; });
-  return std::make_shared<const protocol::PointTable>(std::move(table));
-}
-
 TEST_F(MergeTest, AStudyIsDoneWhenAllIsThereThatItsFilterLeavesIn) {
-  store("one", {{.table = filtered_table(), .first = 5, .end = 8}});
-  store("two", {{.table = filtered_table(), .first = 8, .end = 10}});
+  store("one", {{.table = filtered_table("mu > 0.5"), .first = 5, .end = 8}});
+  store("two", {{.table = filtered_table("mu > 0.5"), .first = 8, .end = 10}});
   const auto state = [&] {
     return text("all", "SELECT state || ' ' || counted || ' ' || points FROM studies");
   };
@@ -436,8 +425,8 @@ TEST_F(MergeTest, AStudyIsDoneWhenAllIsThereThatItsFilterLeavesIn) {
 }
 
 TEST_F(MergeTest, CompletedPointsThatAFilterLeavesOutAreUnited) {
-  store("one", {{.table = filtered_table(), .first = 5, .end = 8}});
-  store("two", {{.table = filtered_table(), .first = 7, .end = 9}});
+  store("one", {{.table = filtered_table("mu > 0.5"), .first = 5, .end = 8}});
+  store("two", {{.table = filtered_table("mu > 0.5"), .first = 7, .end = 9}});
   texts("one", "INSERT INTO completed_ranges VALUES (1, 0, 2)");
   texts("two", "INSERT INTO completed_ranges VALUES (1, 1, 4)");
   merge("one");
@@ -448,7 +437,7 @@ TEST_F(MergeTest, CompletedPointsThatAFilterLeavesOutAreUnited) {
 }
 
 TEST_F(MergeTest, APointThatNoFilterLeavesOutIsNotCompletedWithoutARow) {
-  store("one", {{.table = filtered_table(), .first = 5, .end = 7}});
+  store("one", {{.table = filtered_table("mu > 0.5"), .first = 5, .end = 7}});
   texts("one", "INSERT INTO completed_ranges VALUES (1, 8, 2)");
   merge("one");
   EXPECT_EQ(ranges("all"), "5+2");

@@ -200,12 +200,8 @@ TEST_F(SalvageTest, RowsThatAreOnlyInTheLogAreSavedTooAndTheLogStaysAsItIs) {
   EXPECT_EQ(std::filesystem::file_size(crashed + "-wal"), log);
 }
 
-TEST_F(SalvageTest, StudiesWithFiltersAreDoneAndRowsThatWereTakenOverAreCountedAgain) {
-  protocol::Recipe recipe = table_->recipe();
-  recipe.mutable_blocks(0)->set_where("mu < 0.4");  // points 0 to 3 of 10
-  protocol::PointTable counted(recipe);
-  counted.survey([] { return true; });
-  const auto filtered = std::make_shared<const protocol::PointTable>(std::move(counted));
+TEST_F(SalvageTest, StudiesWithFiltersAreDoneAndReusedResultsAreCountedAgain) {
+  const auto filtered = filtered_table("mu < 0.4");  // points 0 to 3
   const auto outcome = std::make_shared<ReusedResults>();
   store_->commit(std::vector<Change>{AddStudy{2, "b", filtered, "now"},
                                      ReuseResults{2, filtered, 0, "0.1", outcome},
@@ -219,6 +215,31 @@ TEST_F(SalvageTest, StudiesWithFiltersAreDoneAndRowsThatWereTakenOverAreCountedA
   EXPECT_EQ(study.state, StudyState::kDone);
   EXPECT_EQ(study.settled, IntervalSet(0, 4));
   EXPECT_EQ(study.taken, (std::map<std::string, std::uint64_t>{{"a", 4}}));
+}
+
+TEST_F(SalvageTest, PointsThatAFilterLeavesOutStayCompletedAndThoseOfLostRowsDoNot) {
+  const auto filtered = filtered_table("mu < 0.4");  // points 0 to 3
+  store_->commit(
+      std::vector<Change>{AddStudy{2, "b", filtered, "now"},
+                          AddResults{2,
+                                     filtered,
+                                     1,
+                                     "0.1",
+                                     "avx2",
+                                     1,
+                                     "now",
+                                     {solved_point(0), solved_point(1), solved_point(2)}}});
+  store_.reset();
+  execute(open_database(path_, SQLITE_OPEN_READWRITE).get(),
+          "INSERT INTO completed_ranges VALUES (2, 4, 3);"
+          "UPDATE results SET mu = 2 * mu WHERE study_id = 2 AND point = 1");
+  salvage(path_, copy_);
+  const DatabaseHandle saved = open_database(copy_, SQLITE_OPEN_READONLY);
+  Statement ranges(saved.get(),
+                   "SELECT group_concat(first_point || '+' || points) FROM completed_ranges"
+                   " WHERE study_id = 2");
+  ASSERT_TRUE(ranges.step());
+  EXPECT_EQ(ranges.text(0), "0+1,2+1,4+3");
 }
 
 }  // namespace
