@@ -89,9 +89,8 @@ void tell(const std::string& source, const std::string& target, const server::Me
     std::cerr << fmt::format("; {} were there already", shown_count(merged.results_known));
   }
   if (merged.results_differing > 0) {
-    std::cerr << fmt::format(
-        ", {} of these with other numbers or of another solver version: those of {} stay",
-        shown_count(merged.results_differing), target);
+    std::cerr << fmt::format(", {} of these with other numbers: those of {} stay",
+                             shown_count(merged.results_differing), target);
   }
   std::cerr << ".\n";
   for (const std::string& remark : merged.remarks) {

@@ -130,7 +130,7 @@ void tell_comparison(const std::optional<StoredRow>& stored, const Solved& solve
     tell_line(again + ". Its outputs are others than this program knows: not compared.");
     return;
   }
-  const auto others = differences_in_words(*stored, solved.point, *solved.result);
+  const auto others = differences_in_words(*stored, *solved.result);
   tell_line(others.empty() ? again + ", same as stored."
                            : fmt::format("{}, other than stored in {}.", again, others));
 }
