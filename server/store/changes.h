@@ -13,7 +13,6 @@
 #include "proto/recipe/point_table.h"
 #include "server/study/interval_set.h"
 #include "server/study/study_table.h"
-#include "server/study/study_terms.h"
 
 namespace oblique::server {
 
@@ -42,14 +41,14 @@ struct AddStudy {
   std::string name;
   StudyTable table;
   std::string created_at;
-  StudyTerms terms{};
+  std::int32_t priority = 0;
   std::string submitted_by = {};  ///< name of the key; empty: without keys
   bool takes_over = false;        ///< results of other studies are looked up
 };
 
-struct SetStudyTerms {
+struct SetPriority {
   std::uint64_t study_id;
-  StudyTerms terms{};
+  std::int32_t priority = 0;
 };
 
 /// Deletes the rows of these points that failed. A study that was done runs again.
@@ -86,11 +85,11 @@ struct AddResults {
   std::vector<protocol::PointResult> results;
 };
 
-/// Appends points to a study, which then runs on these terms.
+/// Appends points to a study, which then runs with this priority.
 struct GrowStudy {
   std::uint64_t study_id;
   StudyTable table;  ///< of all its points
-  StudyTerms terms;
+  std::int32_t priority = 0;
   std::string changed_at;
   bool takes_over = false;  ///< as in AddStudy
 };
@@ -131,7 +130,7 @@ struct DeleteStudy {
 };
 
 using Change =
-    std::variant<AddStudy, SetStudyState, SetStudyTerms, ForgetFailures, GrowStudy, RenameStudy,
+    std::variant<AddStudy, SetStudyState, SetPriority, ForgetFailures, GrowStudy, RenameStudy,
                  DeleteStudy, ReuseResults, EndTaking, AddWorker, AddResults>;
 
 /// Which rows of deleted studies a step deleted.

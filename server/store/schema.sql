@@ -19,8 +19,6 @@ CREATE TABLE studies (
   created_at   TEXT NOT NULL,        -- UTC, ISO 8601
   changed_at   TEXT NOT NULL,        -- when `state` was last set
   priority     INTEGER NOT NULL DEFAULT 0, -- studies of a higher priority come first
-  weight       REAL NOT NULL DEFAULT 1.0, -- share of the workers among studies of one priority
-  mixes_versions INTEGER NOT NULL DEFAULT 0, -- 1: results of several solver versions are allowed
   submitted_by TEXT,                 -- name of the key that first submitted it; NULL: without keys
   counted      INTEGER NOT NULL DEFAULT 1, -- 0: rows were deleted, `completed_ranges` must be made again
   reuses       INTEGER NOT NULL DEFAULT 0, -- 1: the lookup of results in other studies has not ended

@@ -186,20 +186,16 @@ ClearedAway Store::clear_away(std::size_t most) {
 void Store::add(const AddStudy& change) {
   execute_with(database_.get(),
                "INSERT INTO studies (study_id, name, recipe, points, state, created_at, changed_at,"
-               " priority, weight, mixes_versions, submitted_by, reuses, checksum)"
-               " VALUES (?1, ?2, ?3, ?4, 'running', ?5, ?5, ?6, ?7, ?8, nullif(?9, ''), ?10,"
+               " priority, submitted_by, reuses, checksum)"
+               " VALUES (?1, ?2, ?3, ?4, 'running', ?5, ?5, ?6, nullif(?7, ''), ?8,"
                " row_checksum(?1, ?2, ?3, ?4, ?5))",
                change.study_id, change.name, Blob{change.table.recipe_bytes()}, change.table.size(),
-               change.created_at, change.terms.priority, change.terms.weight,
-               change.terms.mixes_versions, change.submitted_by, change.takes_over);
+               change.created_at, change.priority, change.submitted_by, change.takes_over);
 }
 
-void Store::add(const SetStudyTerms& change) {
-  execute_with(database_.get(),
-               "UPDATE studies SET priority = ?2, weight = ?3, mixes_versions = ?4"
-               " WHERE study_id = ?1",
-               change.study_id, change.terms.priority, change.terms.weight,
-               change.terms.mixes_versions);
+void Store::add(const SetPriority& change) {
+  execute_with(database_.get(), "UPDATE studies SET priority = ?2 WHERE study_id = ?1",
+               change.study_id, change.priority);
 }
 
 void Store::add(const ForgetFailures& change) {
@@ -243,11 +239,10 @@ void Store::add(const ForgetFailures& change) {
 void Store::add(const GrowStudy& change) {
   execute_with(database_.get(),
                "UPDATE studies SET recipe = ?2, points = ?3, state = 'running', changed_at = ?4,"
-               " priority = ?5, weight = ?6, mixes_versions = ?7, reuses = reuses OR ?8,"
+               " priority = ?5, reuses = reuses OR ?6,"
                " checksum = row_checksum(study_id, name, ?2, ?3, created_at) WHERE study_id = ?1",
                change.study_id, Blob{change.table.recipe_bytes()}, change.table.size(),
-               change.changed_at, change.terms.priority, change.terms.weight,
-               change.terms.mixes_versions, change.takes_over);
+               change.changed_at, change.priority, change.takes_over);
 }
 
 void Store::add(const RenameStudy& change) {

@@ -27,7 +27,7 @@ struct StoredStudy {
   StudyTable table;
   StudyState state;
   std::string created_at;
-  StudyTerms terms{};
+  std::int32_t priority = 0;
   std::string solver_version;  ///< of its first result from a worker; empty: none
   IntervalSet settled;         ///< completed points
   IntervalSet failures;        ///< completed points that failed
@@ -84,7 +84,7 @@ class Store final : public Storage {
 
   void add(const AddStudy& change);
   void add(const SetStudyState& change);
-  void add(const SetStudyTerms& change);
+  void add(const SetPriority& change);
   void add(const ForgetFailures& change);
   void add(const GrowStudy& change);
   void add(const RenameStudy& change);

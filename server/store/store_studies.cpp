@@ -146,8 +146,8 @@ PointsOfStudies Store::completed_points() {
 std::vector<StoredStudy> Store::studies() {
   std::vector<StoredStudy> found;
   Statement list(database_.get(),
-                 "SELECT study_id, name, recipe, state, created_at, priority, weight,"
-                 " mixes_versions, points, coalesce(submitted_by, ''), reuses FROM studies "
+                 "SELECT study_id, name, recipe, state, created_at, priority,"
+                 " points, coalesce(submitted_by, ''), reuses FROM studies "
                  "ORDER BY study_id");
   Statement version(database_.get(),
                     "SELECT w.solver_version FROM results AS r"
@@ -174,12 +174,12 @@ std::vector<StoredStudy> Store::studies() {
           "check` tells more",
           study.name, list.integer(0)));
     }
-    study.table = StudyTable(list.text(2), number(list, 8));
+    study.table = StudyTable(list.text(2), number(list, 6));
     study.state = state_named(list.text(3));
     study.created_at = list.text(4);
-    study.terms = {static_cast<std::int32_t>(list.integer(5)), list.real(6), list.integer(7) != 0};
-    study.submitted_by = list.text(9);
-    study.takes_over = list.integer(10) != 0;
+    study.priority = static_cast<std::int32_t>(list.integer(5));
+    study.submitted_by = list.text(7);
+    study.takes_over = list.integer(8) != 0;
     taken.bind(1, study.study_id);
     while (taken.step()) {
       study.taken[taken.text(0)] = number(taken, 1);

@@ -14,7 +14,6 @@
 #include "server/maintenance/merge.h"
 #include "server/maintenance/salvage.h"
 #include "server/maintenance/study_changes_offline.h"
-#include "server/reading/reader.h"
 #include "tests/server/maintenance/maintenance_fixture.h"
 
 namespace oblique::server {
@@ -41,7 +40,6 @@ TEST_P(OtherSchema, IsRefusedByWhateverOpensItWithBothNumbersAndTheRemedy) {
   const auto before = contents();
   const std::vector<std::pair<std::string, std::function<void()>>> openers{
       {"server", [&] { const Store store(path_); }},
-      {"query", [&] { const Reader reader(path_); }},
       {"backup", [&] { back_up(path_, copy_); }},
       {"salvage", [&] { salvage(path_, copy_); }},
       {"check", [&] { diagnose(path_); }},

@@ -60,13 +60,13 @@ std::shared_ptr<const protocol::PointTable> grown_table(std::uint64_t further) {
 TEST_F(StudyDeletionTest, AStudyThatGrowsHasItsRowsAndFurtherPointsAndRuns) {
   commit(solved_study(1, table_of(3), 1));
   commit({SetStudyState{1, StudyState::kDone, "then"}});
-  commit({GrowStudy{1, grown_table(2), {2, 0.5, true}, "now"}});
+  commit({GrowStudy{1, grown_table(2), 2, "now"}});
   reopen();
   const auto study = store().studies().at(0);
   EXPECT_EQ(study.table.size(), 5U);
   EXPECT_EQ(study.state, StudyState::kRunning);
   EXPECT_EQ(study.settled, IntervalSet(0, 3));
-  EXPECT_EQ(study.terms, (StudyTerms{2, 0.5, true}));
+  EXPECT_EQ(study.priority, 2);
   EXPECT_EQ(study.created_at, "2024-01-01T00:00:00.000Z");
 }
 
