@@ -42,7 +42,7 @@ Service::Service(const ServiceSettings& settings, Outbox& outbox, std::vector<St
     known_.restore(study.study_id, study.taken);
     const std::string& name = states_.record(study.study_id).name;
     const bool waits = !settings.only_study.empty() && name != settings.only_study;
-    const bool seeks = study.takes_over && !waits;
+    const bool seeks = study.reuses && !waits;
     feed(StudyAdded{study.study_id, study.table, std::move(study.settled), study.failures.size(),
                     study.state == StudyState::kCancelled,
                     study.state == StudyState::kPaused || waits, study.priority,

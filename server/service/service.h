@@ -147,7 +147,7 @@ class Service {
   void stored(const NameWrite& write, Instant now);
   void stored(const RemovalWrite& write, Instant now);
   void stored(const ReuseWrite& write, Instant now);
-  void stored(const EndTakingWrite& write, Instant now);
+  void stored(const EndReuseWrite& write, Instant now);
   void stored(const QuietWrite& write, Instant now);
   void refused(const ResultsWrite& write, const std::string& error, Instant now);
   void refused(const StudyWrite& write, const std::string& error, Instant now);
@@ -158,7 +158,7 @@ class Service {
   void refused(const NameWrite& write, const std::string& error, Instant now);
   void refused(const RemovalWrite& write, const std::string& error, Instant now);
   void refused(const ReuseWrite& write, const std::string& error, Instant now);
-  void refused(const EndTakingWrite& write, const std::string& error, Instant now);
+  void refused(const EndReuseWrite& write, const std::string& error, Instant now);
   void refused(const QuietWrite& write, const std::string& error, Instant now);
 
   Outbox& outbox_;

@@ -41,24 +41,24 @@ void Service::reuse_part(StudyId id, std::uint64_t first_point) {
   } catch (const std::runtime_error& error) {  // only another version can read the recipe
     outbox_.note(Severity::kWarning,
                  fmt::format("study {}: {}", states_.record(id).name, error.what()));
-    ledger_.write(EndTaking{id}, EndTakingWrite{id});
+    ledger_.write(EndReuse{id}, EndReuseWrite{id});
   }
 }
 
 void Service::stored(const StudyWrite& write, Instant now) {
   feed(changes_.stored(write, now), now);
-  if (write.takes_over) {
+  if (write.reuses) {
     begin_reuse(write.study, now);
   }
   changes_.answer(write, now);
 }
 
 void Service::stored(const GrowthWrite& write, Instant now) {
-  if (write.takes_over) {
+  if (write.reuses) {
     feed(StudyHeld{write.study, true}, now);
   }
   feed(changes_.stored(write, now), now);
-  if (write.takes_over) {
+  if (write.reuses) {
     begin_reuse(write.study, now);
   }
   changes_.answer(write, now);
@@ -82,11 +82,11 @@ void Service::stored(const ReuseWrite& write, Instant now) {
   if (next) {
     reuse_part(id, *next);
   } else {
-    ledger_.write(EndTaking{id}, EndTakingWrite{id});
+    ledger_.write(EndReuse{id}, EndReuseWrite{id});
   }
 }
 
-void Service::stored(const EndTakingWrite& write, Instant now) {
+void Service::stored(const EndReuseWrite& write, Instant now) {
   const StudyId id = write.study;
   if (!states_.contains(id)) {
     return;
@@ -116,11 +116,11 @@ void Service::refused(const ReuseWrite& write, const std::string& error, Instant
                fmt::format("study {}: results of other studies cannot be reused: {}",
                            states_.record(write.study).name, error));
   known_.cut_short(write.study);
-  ledger_.write(EndTaking{write.study}, EndTakingWrite{write.study});
+  ledger_.write(EndReuse{write.study}, EndReuseWrite{write.study});
 }
 
 /// The writer keeps it until it can write it.
-void Service::refused(const EndTakingWrite& /*write*/, const std::string& /*error*/,
+void Service::refused(const EndReuseWrite& /*write*/, const std::string& /*error*/,
                       Instant /*now*/) {}
 
 }  // namespace oblique::server

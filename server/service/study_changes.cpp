@@ -102,15 +102,15 @@ void StudyChanges::grow(const Client& client, StudyId id, const ReadRequest& rea
     return;
   }
   const StudyView view = view_of(id, sources_, now);
-  const bool takes_over =
+  const bool reuses =
       !read.request.submit().no_reuse() && known_.should_seek(id, view.solver_version);
-  const GrowthWrite write{id, read.table, priority, study.table.size(), view.state, takes_over};
+  const GrowthWrite write{id, read.table, priority, study.table.size(), view.state, reuses};
   Turn& turn = turns_[id];
   turn.grown = read.table;
   turn.submitters.push_back(client);
   states_.change(id, StudyState::kRunning);
   recount(id);
-  ledger_.write(GrowStudy{id, read.table, priority, iso_8601(now), takes_over}, write);
+  ledger_.write(GrowStudy{id, read.table, priority, iso_8601(now), reuses}, write);
 }
 
 void StudyChanges::refuse_recipe(const Client& client, const std::string& name,
@@ -171,9 +171,9 @@ void StudyChanges::add(const Client& client, const ReadRequest& read, std::int32
   states_.add(id, {name, read.table, created_at, priority, {}, {}, now.steady_ms, client.key()});
   recount(id);
   submitters_[id].push_back(client);
-  const bool takes_over = !read.request.submit().no_reuse() && known_.should_seek(id, {});
-  ledger_.write(AddStudy{id, name, read.table, created_at, priority, client.key(), takes_over},
-                StudyWrite{id, takes_over});
+  const bool reuses = !read.request.submit().no_reuse() && known_.should_seek(id, {});
+  ledger_.write(AddStudy{id, name, read.table, created_at, priority, client.key(), reuses},
+                StudyWrite{id, reuses});
 }
 
 /// Whether the study may have so many further points open; else the client is told why not.

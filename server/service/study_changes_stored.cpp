@@ -14,7 +14,7 @@ Event StudyChanges::stored(const StudyWrite& write, Instant now) {
   const StudyRecord& study = states_.record(write.study);
   note(write.study, fmt::format("of {} points begins", study.table.size()));
   StudyAdded added{write.study, study.table, {}, 0, false, false, study.priority};
-  added.held = write.takes_over;
+  added.held = write.reuses;
   return added;
 }
 

@@ -36,7 +36,7 @@ bool is_change_of(const RemovalWrite&) {
 bool is_change_of(const ReuseWrite&) {
   return false;
 }
-bool is_change_of(const EndTakingWrite&) {
+bool is_change_of(const EndReuseWrite&) {
   return false;
 }
 bool is_change_of(const QuietWrite&) {

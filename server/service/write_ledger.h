@@ -24,7 +24,7 @@ struct ResultsWrite {
 };
 struct StudyWrite {
   StudyId study;
-  bool takes_over = false;  ///< results of other studies are to be looked up
+  bool reuses = false;  ///< results of other studies are to be looked up
 };
 struct StateWrite {
   StudyId study;
@@ -49,7 +49,7 @@ struct GrowthWrite {
   std::int32_t priority = 0;
   std::uint64_t points_before;
   StudyState state_before;
-  bool takes_over = false;  ///< as in StudyWrite
+  bool reuses = false;  ///< as in StudyWrite
 };
 struct NameWrite {
   StudyId study;
@@ -65,7 +65,7 @@ struct ReuseWrite {
   StudyId study;
   std::shared_ptr<const ReusedResults> outcome;
 };
-struct EndTakingWrite {
+struct EndReuseWrite {
   StudyId study;
 };
 /// Nothing follows.
@@ -73,7 +73,7 @@ struct QuietWrite {};
 
 using Meaning =
     std::variant<ResultsWrite, StudyWrite, StateWrite, PriorityWrite, FailuresWrite, GrowthWrite,
-                 NameWrite, RemovalWrite, ReuseWrite, EndTakingWrite, QuietWrite>;
+                 NameWrite, RemovalWrite, ReuseWrite, EndReuseWrite, QuietWrite>;
 
 struct LedgerLimits {
   /// Results messages of one worker that wait for the disk. A sound worker stops long before.

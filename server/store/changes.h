@@ -43,7 +43,7 @@ struct AddStudy {
   std::string created_at;
   std::int32_t priority = 0;
   std::string submitted_by = {};  ///< name of the key; empty: without keys
-  bool takes_over = false;        ///< results of other studies are looked up
+  bool reuses = false;            ///< results of other studies are looked up
 };
 
 struct SetPriority {
@@ -91,7 +91,7 @@ struct GrowStudy {
   StudyTable table;  ///< of all its points
   std::int32_t priority = 0;
   std::string changed_at;
-  bool takes_over = false;  ///< as in AddStudy
+  bool reuses = false;  ///< as in AddStudy
 };
 
 /// The outcome of a ReuseResults, valid once the change is durable.
@@ -114,7 +114,7 @@ struct ReuseResults {
 };
 
 /// Ends the lookup of results for a study.
-struct EndTaking {
+struct EndReuse {
   std::uint64_t study_id;
 };
 
@@ -131,7 +131,7 @@ struct DeleteStudy {
 
 using Change =
     std::variant<AddStudy, SetStudyState, SetPriority, ForgetFailures, GrowStudy, RenameStudy,
-                 DeleteStudy, ReuseResults, EndTaking, AddWorker, AddResults>;
+                 DeleteStudy, ReuseResults, EndReuse, AddWorker, AddResults>;
 
 /// Which rows of deleted studies a step deleted.
 enum class ClearedAway {

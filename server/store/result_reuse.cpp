@@ -99,7 +99,7 @@ void ResultReuse::run(const ReuseResults& change) {
   }
 }
 
-void ResultReuse::end(const EndTaking& change) {
+void ResultReuse::end(const EndReuse& change) {
   execute_with(database_, "UPDATE studies SET reuses = 0 WHERE study_id = ?", change.study_id);
 }
 

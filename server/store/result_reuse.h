@@ -26,7 +26,7 @@ class ResultReuse {
 
   /// Fills in `change.outcome`. Throws StorageError.
   void run(const ReuseResults& change);
-  void end(const EndTaking& change);
+  void end(const EndReuse& change);
 
  private:
   /// A study that rows are copied from.

@@ -22,7 +22,7 @@ constexpr int kStepsBetweenLooks = 1000;
 bool is_lasting(const Change& change) {
   return !std::holds_alternative<AddResults>(change) &&
          !std::holds_alternative<ReuseResults>(change) &&
-         !std::holds_alternative<EndTaking>(change) && !std::holds_alternative<AddWorker>(change);
+         !std::holds_alternative<EndReuse>(change) && !std::holds_alternative<AddWorker>(change);
 }
 
 }  // namespace
@@ -190,7 +190,7 @@ void Store::add(const AddStudy& change) {
                " VALUES (?1, ?2, ?3, ?4, 'running', ?5, ?5, ?6, nullif(?7, ''), ?8,"
                " row_checksum(?1, ?2, ?3, ?4, ?5))",
                change.study_id, change.name, Blob{change.table.recipe_bytes()}, change.table.size(),
-               change.created_at, change.priority, change.submitted_by, change.takes_over);
+               change.created_at, change.priority, change.submitted_by, change.reuses);
 }
 
 void Store::add(const SetPriority& change) {
@@ -242,7 +242,7 @@ void Store::add(const GrowStudy& change) {
                " priority = ?5, reuses = reuses OR ?6,"
                " checksum = row_checksum(study_id, name, ?2, ?3, created_at) WHERE study_id = ?1",
                change.study_id, Blob{change.table.recipe_bytes()}, change.table.size(),
-               change.changed_at, change.priority, change.takes_over);
+               change.changed_at, change.priority, change.reuses);
 }
 
 void Store::add(const RenameStudy& change) {

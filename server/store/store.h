@@ -33,7 +33,7 @@ struct StoredStudy {
   IntervalSet failures;        ///< completed points that failed
   PointAttempts attempts{};    ///< of failures, and of points whose failure was removed by `retry`
   std::string submitted_by{};  ///< name of the key; empty: without keys
-  bool takes_over = false;     ///< the lookup of results in other studies has not ended
+  bool reuses = false;         ///< the lookup of results in other studies has not ended
   std::map<std::string, std::uint64_t> taken{};  ///< number of reused results by their source
 };
 
@@ -90,7 +90,7 @@ class Store final : public Storage {
   void add(const RenameStudy& change);
   void add(const DeleteStudy& change) { deletion_->remove(change.study_id); }
   void add(const ReuseResults& change) { reuse_->run(change); }
-  void add(const EndTaking& change) { reuse_->end(change); }
+  void add(const EndReuse& change) { reuse_->end(change); }
   void add(const AddWorker& change);
   void add(const AddResults& change);
   void prepare_schema(const std::string& path);

@@ -179,7 +179,7 @@ std::vector<StoredStudy> Store::studies() {
     study.created_at = list.text(4);
     study.priority = static_cast<std::int32_t>(list.integer(5));
     study.submitted_by = list.text(7);
-    study.takes_over = list.integer(8) != 0;
+    study.reuses = list.integer(8) != 0;
     taken.bind(1, study.study_id);
     while (taken.step()) {
       study.taken[taken.text(0)] = number(taken, 1);

@@ -49,7 +49,7 @@ class ServiceReuseTest : public ServiceTest {
   /// The study of the end that waits for the writer; 0: none does.
   std::uint64_t ended() const {
     for (const WriteJob& job : outbox_.jobs) {
-      if (const auto* end = std::get_if<EndTaking>(&job.change)) {
+      if (const auto* end = std::get_if<EndReuse>(&job.change)) {
         return end->study_id;
       }
     }
@@ -225,7 +225,7 @@ TEST_F(ServiceReuseTest, AServerThatStartsGoesOnWithALookupThatHasNotEnded) {
   StoredStudy source{kSource, "a", table_of(10), StudyState::kRunning, "then", {}, {}, {}, {}};
   source.settled = IntervalSet(0, 5);
   StoredStudy pending{kStudy, "b", table_of(10), StudyState::kRunning, "then", {}, {}, {}, {}};
-  pending.takes_over = true;
+  pending.reuses = true;
   pending.taken = {{"a", 3}};
   pending.settled = IntervalSet(0, 3);
   service_.reset();

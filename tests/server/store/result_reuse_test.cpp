@@ -145,9 +145,9 @@ TEST_F(SamePointsTest, PointsThatAreCompletedWithoutARowGetNone) {
 
 TEST_F(SamePointsTest, ALookupThatEndedIsNotedInTheStudy) {
   commit({AddStudy{3, "c", points_, "then", {}, "", true}});
-  EXPECT_TRUE(store().studies().at(2).takes_over);
-  commit({EndTaking{3}});
-  EXPECT_FALSE(store().studies().at(2).takes_over);
+  EXPECT_TRUE(store().studies().at(2).reuses);
+  commit({EndReuse{3}});
+  EXPECT_FALSE(store().studies().at(2).reuses);
 }
 
 TEST_F(SamePointsTest, RowsOfADeletedStudyAreNotCopied) {
