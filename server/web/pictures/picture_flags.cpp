@@ -137,8 +137,7 @@ PictureFormat picture_format(const FieldReader& fields) {
   return {std::move(name), std::string(kTypes.at(static_cast<std::size_t>(place)))};
 }
 
-std::vector<std::string> study_picture_flags(const LookedAtStudy& study,
-                                             const FieldReader& fields) {
+std::vector<std::string> study_picture_flags(const ServedStudy& study, const FieldReader& fields) {
   std::vector<std::string> flags;
   add_kind(fields, flags);
   for (const GridPlace& place : grid_places(*study.table, fields)) {
