@@ -86,8 +86,7 @@ ServedStudy JobContext::study(std::uint64_t id) const {
     throw JobError(error_answer(404, "there is no such study"));
   }
   const protocol::StudyStatus& found = status.status().studies(0);
-  ServedStudy study{id, found.name(), found.state(), found.failed(),
-                    studies_.find(id, found.points())};
+  ServedStudy study{id, found.name(), found.state(), studies_.find(id, found.points())};
   if (!study.table) {
     request.mutable_describe()->set_study(study.name);
     protocol::Recipe recipe = Exchange(*this, request).next().describe().recipe();

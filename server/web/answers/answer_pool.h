@@ -29,7 +29,6 @@ struct ServedStudy {
   std::uint64_t id;
   std::string name;
   std::string state;
-  std::uint64_t failed;  ///< number of failed points
   std::shared_ptr<const protocol::PointTable> table;
 };
 
