@@ -50,9 +50,14 @@ std::string join_of(const std::vector<PointRange>& ranges) {
   return fmt::format("json_each('{{{}}}') AS span CROSS JOIN ", list);
 }
 
-std::string condition_of(const std::vector<PointRange>& ranges) {
+/// Without a range for all `points` of the study: SQLite would prefer it to a list of points that
+/// the question names.
+std::string condition_of(const std::vector<PointRange>& ranges, std::uint64_t points) {
   if (ranges.empty()) {
     return "0";
+  }
+  if (ranges.size() == 1 && ranges[0].first == 0 && ranges[0].last >= points - 1) {
+    return "1";
   }
   if (ranges.size() == 1) {
     return fmt::format("runs.point BETWEEN {} AND {}", ranges[0].first, ranges[0].last);
@@ -211,7 +216,8 @@ std::string statement_of(sqlite3* database, const protocol::StudyQuery& question
   return fmt::format(
       "SELECT {} FROM (SELECT {} FROM {}{} AS runs WHERE runs.study_id = {} AND {}){}{}{}{}",
       selected, columns_of_rows(question, named, is_alone), join_of(ranges),
-      view_of(database, named, is_alone), study.study_id, condition_of(ranges), where,
+      view_of(database, named, is_alone), study.study_id,
+      condition_of(ranges, study.recipe.blocks().empty() ? 1 : points_of(study.recipe)), where,
       group.empty() ? "" : fmt::format(" GROUP BY {}", group),
       is_sorted ? "" : fmt::format(" ORDER BY {}", order),
       question.has_limit()

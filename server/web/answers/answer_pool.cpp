@@ -16,7 +16,6 @@ using protocol::ClientRequest;
 /// The service runs two queries of the page at a time; the third thread answers what needs none.
 constexpr std::size_t kThreads = 3;
 constexpr std::size_t kMostWaiting = 64;
-constexpr std::size_t kMostCached = 8;
 /// How often a thread that waits for the service looks whether its job is over.
 constexpr std::chrono::milliseconds kLookEvery{50};
 
@@ -25,24 +24,6 @@ JobError too_long() {
 }
 
 }  // namespace
-
-StudyCache::Table StudyCache::find(std::uint64_t id, std::uint64_t points) {
-  const std::lock_guard lock(mutex_);
-  const auto found = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& entry) {
-    return entry.id == id && entry.points == points;
-  });
-  if (found == entries_.end()) {
-    return nullptr;
-  }
-  entries_.splice(entries_.begin(), entries_, found);
-  return entries_.front().table;
-}
-
-void StudyCache::add(std::uint64_t id, std::uint64_t points, Table table) {
-  const std::lock_guard lock(mutex_);
-  entries_.push_front({id, points, std::move(table)});
-  entries_.resize(std::min(entries_.size(), kMostCached));
-}
 
 /// One request to the service and its replies. Ends a query whose answer has not ended.
 class JobContext::Exchange {
@@ -86,14 +67,10 @@ ServedStudy JobContext::study(std::uint64_t id) const {
     throw JobError(error_answer(404, "there is no such study"));
   }
   const protocol::StudyStatus& found = status.status().studies(0);
-  ServedStudy study{id, found.name(), found.state(), studies_.find(id, found.points())};
-  if (!study.table) {
-    request.mutable_describe()->set_study(study.name);
-    protocol::Recipe recipe = Exchange(*this, request).next().describe().recipe();
-    study.table = std::make_shared<const protocol::PointTable>(std::move(recipe));
-    studies_.add(id, found.points(), study.table);
-  }
-  return study;
+  request.mutable_describe()->set_study(found.name());
+  const ClientReply described = Exchange(*this, request).next();
+  return {id, found.name(), found.state(),
+          std::make_shared<const protocol::PointTable>(described.describe().recipe())};
 }
 
 void JobContext::query(const protocol::StudyQuery& query, const OnRow& on_row) const {
@@ -112,6 +89,23 @@ void JobContext::query(const protocol::StudyQuery& query, const OnRow& on_row) c
       return;
     }
     exchange.request_more(chunks);
+  }
+}
+
+void JobContext::query(const protocol::StudyQuery& query, const std::string& condition,
+                       const OnRow& on_row) const {
+  try {
+    this->query(query, on_row);
+  } catch (const JobError& error) {
+    if (error.answer().status == 400 && !condition.empty()) {
+      protocol::StudyQuery as_written;
+      as_written.set_study(query.study());
+      as_written.add_select("point");
+      as_written.set_where(condition);
+      as_written.set_limit(1);
+      this->query(as_written, [](const auto&) {});
+    }
+    throw;
   }
 }
 
@@ -199,8 +193,8 @@ void AnswerPool::run() {
 HttpAnswer AnswerPool::answer_to(const QueuedJob& queued) {
   const auto until = Clock::now() + time_limit_;
   try {
-    return queued.job({service_, studies_,
-                       [&queued, until] { return *queued.is_cancelled || Clock::now() >= until; }});
+    return queued.job(
+        {service_, [&queued, until] { return *queued.is_cancelled || Clock::now() >= until; }});
   } catch (const JobError& error) {
     return error.answer();
   } catch (const std::invalid_argument& error) {

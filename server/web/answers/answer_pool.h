@@ -7,7 +7,6 @@
 #include <deque>
 #include <exception>
 #include <functional>
-#include <list>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -43,32 +42,13 @@ class JobError : public std::exception {
   HttpAnswer answer_;
 };
 
-/// The recipes of the studies that were used last. Thread-safe.
-class StudyCache {
- public:
-  using Table = std::shared_ptr<const protocol::PointTable>;
-
-  /// Null if there is none. A study that has grown has more `points`.
-  Table find(std::uint64_t id, std::uint64_t points);
-  void add(std::uint64_t id, std::uint64_t points, Table table);
-
- private:
-  struct Entry {
-    std::uint64_t id;
-    std::uint64_t points;
-    Table table;
-  };
-  std::mutex mutex_;
-  std::list<Entry> entries_;  // guarded by mutex_; the last used first
-};
-
 /// What a job works with: requests to the service, for which its thread waits. Each function throws
 /// JobError for an error of the service, and when the job is over.
 class JobContext {
  public:
   /// `is_over`: the client has gone, or the time is up.
-  JobContext(ServiceLine& service, StudyCache& studies, std::function<bool()> is_over)
-      : service_(service), studies_(studies), is_over_(std::move(is_over)) {}
+  JobContext(ServiceLine& service, std::function<bool()> is_over)
+      : service_(service), is_over_(std::move(is_over)) {}
 
   ServedStudy study(std::uint64_t id) const;
 
@@ -76,6 +56,10 @@ class JobContext {
   /// killed when the job is over.
   using OnRow = std::function<void(const protocol::ChunkRows&)>;
   void query(const protocol::StudyQuery& query, const OnRow& on_row) const;
+  /// The same for a query that `condition`, which a person wrote, is part of. If the condition is
+  /// wrong, the error shows it as it was written.
+  void query(const protocol::StudyQuery& query, const std::string& condition,
+             const OnRow& on_row) const;
 
   bool is_over() const { return is_over_(); }
   /// To be called now and then by what takes long.
@@ -85,7 +69,6 @@ class JobContext {
   class Exchange;
 
   ServiceLine& service_;
-  StudyCache& studies_;
   std::function<bool()> is_over_;
 };
 
@@ -127,7 +110,6 @@ class AnswerPool {
   ServiceLine& service_;
   const std::function<void()> done_;
   const std::chrono::milliseconds time_limit_;
-  StudyCache studies_;
   std::mutex mutex_;
   std::condition_variable woken_;
   std::deque<QueuedJob> waiting_;                                        // guarded by mutex_

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -22,10 +23,6 @@ constexpr std::uint64_t kUsualBins = 64;
 /// Values this close to an end, relative to it, are in the bins: people type 0.2 for 0.6 / 3.
 constexpr double kEndTolerance = 1e-12;
 
-double real_of(const protocol::Cell& cell) {
-  return cell.kind == protocol::CellKind::kInteger ? static_cast<double>(cell.integer) : cell.real;
-}
-
 /// A number in SQL.
 std::string sql_number(double value) {
   return fmt::format("({})", solver::exact_real(value));
@@ -42,6 +39,7 @@ struct BinSide {
   double least = 0.0;
   double most = 0.0;
 
+  bool has_typed_ends() const { return typed_least && typed_most; }
   /// Rows that have a place on this side.
   std::string has_place_sql() const {
     return fmt::format("{} {}", column.name, is_logarithmic ? "> 0" : "IS NOT NULL");
@@ -94,86 +92,82 @@ BinSide side_of(const FieldReader& fields, const std::string& name) {
           fields.number(name + "1")};
 }
 
-/// What lies where.
 struct Bins {
   std::vector<std::uint32_t> counts;
-  std::vector<float> means;      ///< of the third column
-  std::uint64_t inside = 0;      ///< rows in the bins
-  std::uint64_t with_place = 0;  ///< rows in and beside them
+  std::vector<float> means;  ///< of the third column
+  std::uint64_t outside = 0;
 };
 
-/// Two queries: the ranges of the columns, then the bins.
-class BinQuery {
- public:
-  BinQuery(const JobContext& context, const ServedStudy& study, std::string condition,
-           std::vector<BinSide>& sides)
-      : context_(context), study_(study), condition_(std::move(condition)), sides_(sides) {}
-
-  Bins run(const std::optional<PictureColumn>& z) {
-    const std::uint64_t with_place = find_ranges();
-    const std::size_t size = sides_[0].bins * (sides_.size() > 1 ? sides_[1].bins : 1);
-    Bins bins{std::vector<std::uint32_t>(size),
-              std::vector<float>(z ? size : 0, std::numeric_limits<float>::quiet_NaN()), 0,
-              with_place};
-    protocol::StudyQuery query = base_query();
-    query.add_select(sides_.size() > 1 ? fmt::format("{} + {} * {} AS bin", sides_[0].bin_sql(),
-                                                     sides_[0].bins, sides_[1].bin_sql())
-                                       : fmt::format("{} AS bin", sides_[0].bin_sql()));
-    query.add_select("count(*)");
-    if (z) {
-      query.add_select(fmt::format("avg({})", z->name));
-    }
-    query.set_group("bin");
-    for (const BinSide& side : sides_) {
-      query.set_where(query.where() + " AND " + side.is_inside_sql());
-    }
-    context_.query(query, [&](const protocol::ChunkRows& row) {
-      const auto bin = static_cast<std::size_t>(row.cell(0).integer);
-      bins.counts.at(bin) = static_cast<std::uint32_t>(row.cell(1).integer);
-      bins.inside += bins.counts[bin];
-      if (z && row.cell(2).kind != protocol::CellKind::kNull) {
-        bins.means[bin] = static_cast<float>(real_of(row.cell(2)));
-      }
-    });
-    return bins;
+/// Selects from the solved points that meet the condition and have a place on all sides.
+protocol::StudyQuery query_of(const ServedStudy& study, const std::string& condition,
+                              const std::vector<BinSide>& sides) {
+  protocol::StudyQuery query;
+  query.set_study(study.name);
+  std::string where =
+      condition.empty() ? "error IS NULL" : fmt::format("({}) AND error IS NULL", condition);
+  for (const BinSide& side : sides) {
+    where += " AND " + side.has_place_sql();
   }
+  query.set_where(where);
+  return query;
+}
 
- private:
-  protocol::StudyQuery base_query() const {
-    protocol::StudyQuery query;
-    query.set_study(study_.name);
-    query.set_where(condition_.empty() ? "error IS NULL"
-                                       : fmt::format("({}) AND error IS NULL", condition_));
-    for (const BinSide& side : sides_) {
-      query.set_where(query.where() + " AND " + side.has_place_sql());
-    }
-    return query;
+/// Sets the ends of the sides, by a query unless all were typed.
+void find_ends(const JobContext& context, const ServedStudy& study, const std::string& condition,
+               std::vector<BinSide>& sides) {
+  if (std::ranges::all_of(sides, &BinSide::has_typed_ends)) {
+    std::ranges::for_each(sides, [](BinSide& side) { side.set_ends(std::nullopt); });
+    return;
   }
-
-  /// Sets the ends of the sides. Returns how many rows have a place on all of them.
-  std::uint64_t find_ranges() {
-    protocol::StudyQuery query = base_query();
-    query.add_select("count(*)");
-    for (const BinSide& side : sides_) {
-      query.add_select(fmt::format("min({0}), max({0})", side.column.name));
-    }
-    std::uint64_t rows = 0;
-    query_with_condition(context_, query, condition_, [&](const protocol::ChunkRows& row) {
-      rows = static_cast<std::uint64_t>(row.cell(0).integer);
-      for (std::size_t i = 0; i < sides_.size(); ++i) {
-        sides_[i].set_ends(rows == 0 ? std::nullopt
-                                     : std::optional(std::pair(real_of(row.cell(1 + 2 * i)),
-                                                               real_of(row.cell(2 + 2 * i)))));
-      }
-    });
-    return rows;
+  protocol::StudyQuery query = query_of(study, condition, sides);
+  for (const BinSide& side : sides) {
+    query.add_select(fmt::format("min({0}), max({0})", side.column.name));
   }
+  context.query(query, condition, [&](const protocol::ChunkRows& row) {
+    for (std::size_t i = 0; i < sides.size(); ++i) {
+      const protocol::Cell& least = row.cell(2 * i);
+      sides[i].set_ends(
+          least.kind == protocol::CellKind::kNull
+              ? std::nullopt
+              : std::optional(std::pair(real_of(least), real_of(row.cell(2 * i + 1)))));
+    }
+  });
+}
 
-  const JobContext& context_;
-  const ServedStudy& study_;
-  const std::string condition_;
-  std::vector<BinSide>& sides_;
-};
+/// One row a bin; of what lies beyond the ends the bin is NULL.
+Bins count_bins(const JobContext& context, const ServedStudy& study, const std::string& condition,
+                const std::vector<BinSide>& sides, const std::optional<PictureColumn>& z) {
+  std::size_t size = 1;
+  std::string bin;
+  std::string is_inside;
+  for (const BinSide& side : sides) {
+    bin += fmt::format("{}{} * {}", bin.empty() ? "" : " + ", size, side.bin_sql());
+    is_inside += (is_inside.empty() ? "" : " AND ") + side.is_inside_sql();
+    size *= side.bins;
+  }
+  Bins bins{std::vector<std::uint32_t>(size),
+            std::vector<float>(z ? size : 0, std::numeric_limits<float>::quiet_NaN())};
+  protocol::StudyQuery query = query_of(study, condition, sides);
+  query.add_select(fmt::format("CASE WHEN {} THEN {} END AS bin", is_inside, bin));
+  query.add_select("count(*)");
+  if (z) {
+    query.add_select(fmt::format("avg({})", z->name));
+  }
+  query.set_group("bin");
+  context.query(query, condition, [&](const protocol::ChunkRows& row) {
+    const auto count = static_cast<std::uint64_t>(row.cell(1).integer);
+    if (row.cell(0).kind == protocol::CellKind::kNull) {
+      bins.outside = count;
+      return;
+    }
+    const auto place = static_cast<std::size_t>(row.cell(0).integer);
+    bins.counts.at(place) = static_cast<std::uint32_t>(count);
+    if (z && row.cell(2).kind != protocol::CellKind::kNull) {
+      bins.means[place] = static_cast<float>(real_of(row.cell(2)));
+    }
+  });
+  return bins;
+}
 
 HttpAnswer bins_answer(const JobContext& context, std::uint64_t id, const Fields& asked) {
   const FieldReader fields(asked);
@@ -187,19 +181,21 @@ HttpAnswer bins_answer(const JobContext& context, std::uint64_t id, const Fields
     z = picture_column(fields, "z", false);
   }
   const ServedStudy study = context.study(id);
-  const Bins bins = BinQuery(context, study, condition, sides).run(z);
+  find_ends(context, study, condition, sides);
+  const Bins bins = count_bins(context, study, condition, sides, z);
   std::string numbers(reinterpret_cast<const char*>(bins.counts.data()),
                       bins.counts.size() * sizeof bins.counts[0]);
   numbers.append(reinterpret_cast<const char*>(bins.means.data()),
                  bins.means.size() * sizeof(float));
-  return numbers_answer({{"study", id},
-                         {"x", sides[0].json()},
-                         {"y", sides.size() > 1 ? sides[1].json() : ordered_json(nullptr)},
-                         {"z", z ? ordered_json(z->name) : ordered_json(nullptr)},
-                         {"points", bins.inside},
-                         {"outside", bins.with_place - bins.inside},
-                         {"most", *std::max_element(bins.counts.begin(), bins.counts.end())}},
-                        numbers);
+  return numbers_answer(
+      {{"study", id},
+       {"x", sides[0].json()},
+       {"y", sides.size() > 1 ? sides[1].json() : ordered_json(nullptr)},
+       {"z", z ? ordered_json(z->name) : ordered_json(nullptr)},
+       {"points", std::accumulate(bins.counts.begin(), bins.counts.end(), std::uint64_t{0})},
+       {"outside", bins.outside},
+       {"most", *std::max_element(bins.counts.begin(), bins.counts.end())}},
+      numbers);
 }
 
 }  // namespace

@@ -11,7 +11,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/text.h"
-#include "proto/wire/cell.h"
 #include "server/asking/columns.h"
 #include "server/asking/sql/sql_expression.h"
 #include "worker/solver/model/errors.h"
@@ -83,6 +82,10 @@ std::string FieldReader::condition() const {
     throw std::invalid_argument(error.what());
   }
   return condition;
+}
+
+double real_of(const protocol::Cell& cell) {
+  return cell.kind == protocol::CellKind::kInteger ? static_cast<double>(cell.integer) : cell.real;
 }
 
 std::optional<PictureColumn> find_picture_column(std::string_view name) {

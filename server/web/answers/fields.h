@@ -6,6 +6,8 @@
 #include <string>
 #include <string_view>
 
+#include "proto/wire/cell.h"
+
 namespace oblique::server {
 
 /// The fields behind the question mark of a request, decoded.
@@ -32,6 +34,9 @@ class FieldReader {
  private:
   const Fields& fields_;
 };
+
+/// The value of a cell that is an integer or a real number.
+double real_of(const protocol::Cell& cell);
 
 /// A column that a picture can show.
 struct PictureColumn {

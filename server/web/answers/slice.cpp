@@ -1,7 +1,7 @@
 #include <algorithm>
-#include <cstring>
+#include <bit>
 #include <map>
-#include <numeric>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -24,16 +24,11 @@ enum class Mark : std::uint8_t { kNotSolved, kFailed, kLeftOut, kNoValue, kFilte
 constexpr std::uint32_t kNan = 0x7fc00000;
 constexpr std::uint16_t kLastCode = 0xffff;
 
-/// A cell of the picture.
-struct Cell {
-  Mark mark = Mark::kNotSolved;
-  float number = 0.0F;
-  std::size_t text = 0;  ///< index into SliceCells::texts
-};
-
+/// What the cells of a picture have, row by row.
 struct SliceCells {
-  std::vector<Cell> cells;  ///< row by row
-  std::vector<std::string> texts = {};
+  std::vector<Mark> marks;
+  std::vector<float> numbers;                              ///< of a column of numbers
+  std::map<std::string, std::vector<std::size_t>> places;  ///< of categories: cells by text
 };
 
 template <typename Number>
@@ -87,39 +82,29 @@ std::vector<std::pair<std::uint64_t, std::size_t>> points_of(const GridSlice& sl
 SliceCells read_cells(const JobContext& context, const ServedStudy& study, const GridSlice& slice,
                       const PictureColumn& column, const std::string& condition) {
   const auto points = points_of(slice);
-  SliceCells read{std::vector<Cell>(points.size())};
-  std::map<std::string, std::size_t, std::less<>> known;
+  SliceCells read{std::vector<Mark>(points.size()), std::vector<float>(points.size()), {}};
   auto place = points.begin();
   const auto take = [&](const protocol::ChunkRows& row) {
     const auto point = static_cast<std::uint64_t>(row.cell(0).integer);
-    while (place != points.end() && place->first < point) {
-      ++place;
-    }
+    place =
+        std::find_if(place, points.end(), [&](const auto& each) { return each.first >= point; });
     if (place == points.end() || place->first != point) {
       throw std::runtime_error("a reader process returned another point than it was asked for");
     }
-    Cell& cell = read.cells[place->second];
-    cell.mark = static_cast<Mark>(row.cell(2).integer);
-    const protocol::Cell& value = row.cell(1);
-    if (cell.mark == Mark::kHasValue && column.is_category) {
-      auto text = known.find(value.text);
-      if (text == known.end()) {
-        text = known.emplace(value.text, read.texts.size()).first;
-        read.texts.emplace_back(value.text);
-      }
-      cell.text = text->second;
-    } else if (cell.mark == Mark::kHasValue) {
-      cell.number = static_cast<float>(value.kind == protocol::CellKind::kInteger
-                                           ? static_cast<double>(value.integer)
-                                           : value.real);
+    const std::size_t cell = place->second;
+    read.marks[cell] = static_cast<Mark>(row.cell(2).integer);
+    if (read.marks[cell] == Mark::kHasValue && column.is_category) {
+      read.places[std::string(row.cell(1).text)].push_back(cell);
+    } else if (read.marks[cell] == Mark::kHasValue) {
+      read.numbers[cell] = static_cast<float>(real_of(row.cell(1)));
     }
   };
-  query_with_condition(context, slice_query(study, slice, column.name, condition), condition, take);
+  context.query(slice_query(study, slice, column.name, condition), condition, take);
   if (study.table->has_filter()) {
-    for (const auto& [point, number] : points) {
+    for (const auto& [point, cell] : points) {
       context.throw_if_over();  // a filter may take long
-      if (read.cells[number].mark == Mark::kNotSolved && !study.table->is_left_in(point)) {
-        read.cells[number].mark = Mark::kLeftOut;
+      if (read.marks[cell] == Mark::kNotSolved && !study.table->is_left_in(point)) {
+        read.marks[cell] = Mark::kLeftOut;
       }
     }
   }
@@ -138,51 +123,45 @@ ordered_json side_json(const GridSide& side) {
 
 /// Adds least and most to the head, and the cells to the numbers.
 void append_numbers(const SliceCells& read, ordered_json& head, std::string& numbers) {
-  head["least"] = nullptr;
-  head["most"] = nullptr;
-  for (const Cell& cell : read.cells) {
-    std::uint32_t bits = kNan + static_cast<std::uint32_t>(cell.mark);
-    if (cell.mark == Mark::kHasValue) {
-      std::memcpy(&bits, &cell.number, sizeof bits);
-      const auto value = static_cast<double>(cell.number);
-      head["least"] =
-          head["least"].is_null() ? value : std::min(head["least"].get<double>(), value);
-      head["most"] = head["most"].is_null() ? value : std::max(head["most"].get<double>(), value);
+  std::vector<std::uint32_t> bits;
+  std::optional<std::pair<float, float>> range;
+  for (std::size_t cell = 0; cell < read.marks.size(); ++cell) {
+    const float number = read.numbers[cell];
+    const bool has_value = read.marks[cell] == Mark::kHasValue;
+    bits.push_back(has_value ? std::bit_cast<std::uint32_t>(number)
+                             : kNan + static_cast<std::uint32_t>(read.marks[cell]));
+    if (has_value) {
+      range = std::pair(std::min(range ? range->first : number, number),
+                        std::max(range ? range->second : number, number));
     }
-    numbers.append(reinterpret_cast<const char*>(&bits), sizeof bits);
   }
+  head["least"] = range ? ordered_json(range->first) : nullptr;
+  head["most"] = range ? ordered_json(range->second) : nullptr;
+  append(bits, numbers);
 }
 
-/// Adds the dictionary to the head, the most frequent text first, of equally frequent ones the
-/// first in the alphabet, as `oblique plot` orders them; and the codes of the cells to the numbers.
+/// Adds the dictionary to the head, and the codes of the cells to the numbers. The most frequent
+/// text comes first, of equally frequent ones the first in the alphabet, as in `oblique plot`.
 void append_codes(const SliceCells& read, ordered_json& head, std::string& numbers) {
-  std::vector<std::uint64_t> counts(read.texts.size());
-  for (const Cell& cell : read.cells) {
-    if (cell.mark == Mark::kHasValue) {
-      ++counts[cell.text];
-    }
+  std::vector<std::uint16_t> codes;
+  for (const Mark mark : read.marks) {
+    codes.push_back(static_cast<std::uint16_t>(kLastCode - static_cast<int>(mark)));
   }
-  std::vector<std::size_t> ranked(counts.size());
-  std::iota(ranked.begin(), ranked.end(), std::size_t{0});
-  std::sort(ranked.begin(), ranked.end(), [&](std::size_t one, std::size_t other) {
-    return counts[one] != counts[other] ? counts[one] > counts[other]
-                                        : read.texts[one] < read.texts[other];
+  std::vector<std::pair<std::string, std::vector<std::size_t>>> ranked(read.places.begin(),
+                                                                       read.places.end());
+  std::stable_sort(ranked.begin(), ranked.end(), [](const auto& one, const auto& other) {
+    return one.second.size() > other.second.size();
   });
-  std::vector<std::uint16_t> code_of(counts.size());
   head["dictionary"] = ordered_json::array();
   for (std::size_t code = 0; code < ranked.size(); ++code) {
-    // 2^16 cells have fewer texts than that, but for a picture in which each has another one.
-    code_of[ranked[code]] = static_cast<std::uint16_t>(std::min<std::size_t>(code, kLastCode - 5));
-    head["dictionary"].push_back(
-        {{"text", read.texts[ranked[code]]}, {"cells", counts[ranked[code]]}});
+    const auto& [text, places] = ranked[code];
+    for (const std::size_t cell : places) {
+      // No picture has so many texts that a code would be a mark, but a file made by hand may.
+      codes[cell] = static_cast<std::uint16_t>(std::min<std::size_t>(code, kLastCode - 5));
+    }
+    head["dictionary"].push_back({{"text", text}, {"cells", places.size()}});
   }
-  for (const Cell& cell : read.cells) {
-    const std::uint16_t code =
-        cell.mark == Mark::kHasValue
-            ? code_of[cell.text]
-            : static_cast<std::uint16_t>(kLastCode - static_cast<int>(cell.mark));
-    numbers.append(reinterpret_cast<const char*>(&code), sizeof code);
-  }
+  append(codes, numbers);
 }
 
 HttpAnswer slice_answer(const JobContext& context, std::uint64_t id, const Fields& asked) {
@@ -192,7 +171,7 @@ HttpAnswer slice_answer(const JobContext& context, std::uint64_t id, const Field
   const ServedStudy study = context.study(id);
   const GridSlice slice = grid_slice(*study.table, fields);
   const SliceCells read = read_cells(context, study, slice, column, condition);
-  const auto count = [&](Mark mark) { return std::ranges::count(read.cells, mark, &Cell::mark); };
+  const auto count = [&](Mark mark) { return std::ranges::count(read.marks, mark); };
   ordered_json at = ordered_json::array();
   for (const GridPlace& place : slice.at) {
     at.push_back(
@@ -227,23 +206,6 @@ HttpAnswer slice_answer(const JobContext& context, std::uint64_t id, const Field
 }
 
 }  // namespace
-
-void query_with_condition(const JobContext& context, const protocol::StudyQuery& query,
-                          const std::string& condition, const JobContext::OnRow& on_row) {
-  try {
-    context.query(query, on_row);
-  } catch (const JobError& error) {
-    if (error.answer().status == 400 && !condition.empty()) {
-      protocol::StudyQuery as_written;
-      as_written.set_study(query.study());
-      as_written.add_select("point");
-      as_written.set_where(condition);
-      as_written.set_limit(1);
-      context.query(as_written, [](const auto&) {});
-    }
-    throw;
-  }
-}
 
 AnswerPool::Job slice_job(std::uint64_t study, const Fields& fields) {
   return

@@ -196,8 +196,8 @@ ordered_json value_of(const protocol::Cell& cell) {
 HttpAnswer point_answer(const JobContext& context, std::uint64_t id, std::uint64_t number) {
   const ServedStudy study = context.study(id);
   if (number >= study.table->size()) {
-    throw JobError(error_answer(
-        404, fmt::format("the study \"{}\" has no point {}", study.name, number)));
+    throw JobError(
+        error_answer(404, fmt::format("the study \"{}\" has no point {}", study.name, number)));
   }
   const protocol::Point point = study.table->point(number);
   ordered_json answer{{"study", study.id},

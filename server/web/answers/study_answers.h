@@ -19,11 +19,6 @@ AnswerPool::Job slice_job(std::uint64_t study, const Fields& fields);
 /// Number of points, and mean of a column, in bins along one or two columns.
 AnswerPool::Job bins_job(std::uint64_t study, const Fields& fields);
 
-/// Runs a query that `condition`, which a person wrote, is part of. If it is wrong, the error is
-/// that of the condition alone. Throws as JobContext::query does.
-void query_with_condition(const JobContext& context, const protocol::StudyQuery& query,
-                          const std::string& condition, const JobContext::OnRow& on_row);
-
 /// A study as the body of a submission has it: SubmitRequest in Protobuf's JSON, and beside it
 /// `model` as people write one. Throws std::invalid_argument with a sentence for what is none.
 protocol::SubmitRequest study_of_body(const std::string& body);

@@ -12,8 +12,6 @@
 
 #include "proto/frames.h"
 #include "proto/wire/chunk_writer.h"
-#include "tests/support/points.h"
-#include "tests/support/recipes.h"
 
 namespace oblique::server {
 namespace {
@@ -92,7 +90,8 @@ TEST_F(AnswerPoolTest, TheQueryOfAClientThatHasGoneEnds) {
 }
 
 TEST_F(AnswerPoolTest, AJobThatIsTooSlowEndsItsQueryAndSaysSo) {
-  AnswerPool hasty(line_, [] {}, std::chrono::milliseconds(0));
+  AnswerPool hasty(
+      line_, [] {}, std::chrono::milliseconds(0));
   ASSERT_TRUE(hasty.submit(7, [&](const JobContext& context) {
     EXPECT_TRUE(context.is_over());
     return query_job()(context);
@@ -113,36 +112,6 @@ TEST_F(AnswerPoolTest, AnErrorOfTheServiceIsTheAnswer) {
   wrong.mutable_error()->set_wrong_request(true);
   reply(requested(), wrong);
   EXPECT_EQ(answer(7).status, 400U);
-}
-
-TEST_F(AnswerPoolTest, ARecipeIsRequestedAgainOnlyWhenItsStudyHasGrown) {
-  const auto study_job = [](const JobContext& context) {
-    return HttpAnswer{200, {}, std::to_string(context.study(3).table->size())};
-  };
-  const auto reply_status = [&](std::uint64_t points) {
-    ClientReply status;
-    status.mutable_status()->add_studies()->set_name("a");
-    status.mutable_status()->mutable_studies(0)->set_points(points);
-    reply(requested(), status);
-  };
-  const auto reply_recipe = [&](std::uint64_t points) {
-    ClientReply described;
-    *described.mutable_describe()->mutable_recipe() = protocol::recipe_of(
-        {{protocol::listed("H", {1.0}), protocol::range("mu", 0.0, 1.0, points),
-          protocol::listed("e", {1.0})}});
-    reply(requested(), described);
-  };
-  ASSERT_TRUE(pool_.submit(1, study_job));
-  reply_status(4);
-  reply_recipe(4);
-  EXPECT_EQ(answer(1).body, "4");
-  ASSERT_TRUE(pool_.submit(2, study_job));
-  reply_status(4);
-  EXPECT_EQ(answer(2).body, "4");
-  ASSERT_TRUE(pool_.submit(3, study_job));
-  reply_status(5);
-  reply_recipe(5);
-  EXPECT_EQ(answer(3).body, "5");
 }
 
 }  // namespace

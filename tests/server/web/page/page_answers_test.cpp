@@ -159,8 +159,7 @@ TEST_F(PageAnswersTest, AStudyOfABillionPointsIsLookedAtLikeASmallOne) {
   submit("huge", protocol::recipe_of(
                      {{protocol::range("H", 0.1, 1.0, 1000), protocol::range("mu", 0.0, 2.0, 1000),
                        protocol::range("e", 0.5, 1.0, 1000)}}));
-  const Numbers slice =
-      page_.numbers("/api/studies/1/slice?z=mode&x=mu&y=H&nx=256&ny=256&at=e:1");
+  const Numbers slice = page_.numbers("/api/studies/1/slice?z=mode&x=mu&y=H&nx=256&ny=256&at=e:1");
   EXPECT_EQ(slice.head["nx"], 256);
   EXPECT_EQ(slice.head["missing"], 256 * 256);
   EXPECT_EQ(page_.numbers("/api/studies/1/bins?x=fn_peak_N").head["points"], 0);

@@ -33,7 +33,8 @@ TEST_F(PageBinsTest, BothEndsThatPeopleTypeAreInTheBins) {
   solve(24);
   for (const std::string log : {"", "&xlog=1"}) {
     const std::string bins = "/api/studies/1/bins?x=mu&nx=2" + log;
-    const Numbers typed = page_.numbers(bins + "&x0=0.2&x1=0.6");  // 0.6 / 3 is another double than 0.2
+    const Numbers typed =
+        page_.numbers(bins + "&x0=0.2&x1=0.6");  // 0.6 / 3 is another double than 0.2
     EXPECT_EQ(typed.head["points"], 18) << log;
     EXPECT_EQ(typed.head["x"]["least"], 0.2);
     EXPECT_EQ(typed.head["x"]["most"], 0.6);

@@ -1,12 +1,19 @@
 // Pictures of the points that meet a condition, of a whole server with a pretended worker.
 #include <bit>
+#include <chrono>
 #include <cstdint>
+#include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "proto/frames.h"
+#include "server/asking/plan.h"
+#include "server/reading/query_rules.h"
+#include "server/web/answers/study_answers.h"
 #include "tests/server/web/page/page_study.h"
 
 namespace oblique::server {
@@ -99,6 +106,49 @@ TEST_F(PageFiltersTest, AConditionIsJudgedAsTheQueryLanguageDoes) {
   // What is wrong beside it is told before anything is looked for.
   EXPECT_EQ(status_of_answer(page_.get("/api/studies/1/slice?z=muu&x=mu&where=1")), 400);
   EXPECT_EQ(status_of_answer(page_.get("/api/studies/1/bins?x=mode&where=1")), 400);
+}
+
+/// The query by which a slice of the study `grid` is read.
+protocol::StudyQuery slice_query(const Fields& fields, const protocol::Recipe& recipe) {
+  ServiceLine line;
+  AnswerPool pool(
+      line, [] {}, std::chrono::hours(1));
+  EXPECT_TRUE(pool.submit(1, slice_job(1, fields)));
+  while (true) {
+    for (const std::string& frame : line.take()) {
+      ClientRequest request;
+      EXPECT_TRUE(protocol::decode(frame, request));
+      if (request.has_query()) {
+        return request.query().question();
+      }
+      ClientReply reply;
+      reply.set_request_id(request.request_id());
+      if (request.has_status()) {
+        reply.mutable_status()->add_studies()->set_name("grid");
+      } else {
+        *reply.mutable_describe()->mutable_recipe() = recipe;
+      }
+      line.put(protocol::encode(reply));
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+}
+
+TEST_F(PageFiltersTest, TheRowsOfASliceAreLookedUpByKey) {
+  submit_grid();
+  const protocol::StudyQuery query =
+      slice_query({{"z", "fn_peak_N"}, {"x", "mu"}, {"y", "H"}, {"where", "slide_m > 1 OR e > 2"}},
+                  grid_recipe());
+  const auto database = open_database(page_.database(), SQLITE_OPEN_READWRITE);
+  restrict_to_reading(database.get());
+  const std::string statement = plan(database.get(), query).statement;
+  sqlite3_set_authorizer(database.get(), nullptr, nullptr);
+  Statement explained(database.get(), "EXPLAIN QUERY PLAN " + statement);
+  std::string steps;
+  while (explained.step()) {
+    steps += explained.text(3) + '\n';
+  }
+  EXPECT_THAT(steps, HasSubstr("(study_id=? AND point=?)")) << statement;
 }
 
 }  // namespace
