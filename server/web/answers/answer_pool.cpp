@@ -61,9 +61,10 @@ class JobContext::Exchange {
 
 ServedStudy JobContext::study(std::uint64_t id) const {
   ClientRequest request;
-  request.mutable_status()->set_study_id(id);
+  request.mutable_status()->set_after_study_id(id - 1);
+  request.mutable_status()->set_limit(1);
   const ClientReply status = Exchange(*this, request).next();
-  if (status.status().studies_size() != 1) {
+  if (status.status().studies_size() != 1 || status.status().studies(0).study_id() != id) {
     throw JobError(error_answer(404, "there is no such study"));
   }
   const protocol::StudyStatus& found = status.status().studies(0);

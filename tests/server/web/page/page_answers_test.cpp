@@ -96,6 +96,15 @@ TEST_F(PageAnswersTest, AStudyIsItsRecipeAndColumns) {
   }
 }
 
+TEST_F(PageAnswersTest, AStudyThatDoesNotExistIsNotFound) {
+  submit_grid();
+  for (const std::string path : {"0", "2", "2/slice?z=mode&x=mu", "2/bins?x=mu", "2/points/0"}) {
+    const std::string answer = page_.get("/api/studies/" + path);
+    EXPECT_EQ(status_of_answer(answer), 404) << path;
+  }
+  EXPECT_THAT(page_.get("/api/studies/2"), HasSubstr("there is no such study"));
+}
+
 TEST_F(PageAnswersTest, ASliceIsIndexArithmeticOnTheRecipe) {
   submit_grid();
   solve(24);

@@ -124,7 +124,9 @@ protocol::StudyQuery slice_query(const Fields& fields, const protocol::Recipe& r
       ClientReply reply;
       reply.set_request_id(request.request_id());
       if (request.has_status()) {
-        reply.mutable_status()->add_studies()->set_name("grid");
+        auto& study = *reply.mutable_status()->add_studies();
+        study.set_study_id(1);
+        study.set_name("grid");
       } else {
         *reply.mutable_describe()->mutable_recipe() = recipe;
       }
