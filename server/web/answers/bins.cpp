@@ -25,7 +25,8 @@ constexpr double kEndTolerance = 1e-12;
 
 /// A number in SQL.
 std::string sql_number(double value) {
-  return fmt::format("({})", solver::exact_real(value));
+  constexpr double kMost = std::numeric_limits<double>::max();
+  return fmt::format("({})", solver::exact_real(std::clamp(value, -kMost, kMost)));
 }
 
 /// The bins along one column.
@@ -45,10 +46,11 @@ struct BinSide {
     return fmt::format("{} {}", column.name, is_logarithmic ? "> 0" : "IS NOT NULL");
   }
   std::string is_inside_sql() const {
-    const double slack = kEndTolerance * std::max(std::abs(least), std::abs(most));
-    return fmt::format("{} BETWEEN {} AND {}", column.name,
-                       sql_number(is_logarithmic ? least * (1.0 - kEndTolerance) : least - slack),
-                       sql_number(most + slack));
+    const double slack_below =
+        kEndTolerance * (is_logarithmic ? least : std::max(std::abs(least), std::abs(most)));
+    const double slack_above = kEndTolerance * std::max(std::abs(least), std::abs(most));
+    return fmt::format("{} BETWEEN {} AND {}", column.name, sql_number(least - slack_below),
+                       sql_number(most + slack_above));
   }
   /// The number of a row's bin.
   std::string bin_sql() const {

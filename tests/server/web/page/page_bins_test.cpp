@@ -41,6 +41,7 @@ TEST_F(PageBinsTest, BothEndsThatPeopleTypeAreInTheBins) {
   }
   const std::string far = "/api/studies/1/bins?x=mu&x1=1e300";
   EXPECT_EQ(page_.numbers(far + "&x0=-1e300").head["points"], 24);
+  EXPECT_EQ(page_.numbers("/api/studies/1/bins?x=mu&x0=-1.7e308&x1=1.7e308").head["points"], 24);
   EXPECT_EQ(page_.numbers(far + "&x0=1e-300&xlog=1").head["points"], 18);
 }
 
