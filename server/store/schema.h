@@ -10,17 +10,17 @@ namespace oblique::server {
 /// Creates the tables in an empty database, which gets a random identity. Throws StorageError.
 void create_tables(sqlite3* database);
 
-/// Creates the views, the indices and the triggers of this schema, also where another program
+/// Creates the indices, the trigger and the views of this schema, also where another program
 /// dropped or replaced them. Objects with other names stay. Throws StorageError, as where a table
 /// has the name of a view.
 void create_views(sqlite3* database);
 
-/// Creates the views for this connection alone, where they hide those of the file. Throws
-/// StorageError.
-void create_temporary_views(sqlite3* database);
-
-/// The names of the tables of this schema.
-const std::vector<std::string>& our_tables();
+/// A table of this schema and the statement that creates it.
+struct TableDefinition {
+  std::string name;
+  std::string sql;  ///< as `sqlite_schema` has it
+};
+const std::vector<TableDefinition>& our_tables();
 
 /// Those tables and those views that a database of this schema lacks. Throws StorageError.
 std::vector<std::string> missing_tables(sqlite3* database);
@@ -29,5 +29,9 @@ std::vector<std::string> missing_views(sqlite3* database);
 /// Names of the triggers that this schema does not have: they would run with each change of the
 /// writer, and might never end. Throws StorageError.
 std::vector<std::string> other_triggers(sqlite3* database);
+
+/// An expression for the highest study number in any table; 0: none. Rows of a study whose row in
+/// `studies` was deleted by hand count too.
+std::string last_study_id_sql();
 
 }  // namespace oblique::server

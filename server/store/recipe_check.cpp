@@ -1,4 +1,4 @@
-#include "server/store/rows/recipe_check.h"
+#include "server/store/recipe_check.h"
 
 #include <utility>
 

@@ -1,19 +1,18 @@
-#include "server/store/schema/schema_setup.h"
+#include "server/store/schema.h"
 
 #include <random>
-#include <regex>
 
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/text.h"
-#include "server/store/schema/schema.h"
+#include "server/store/schema_sql.h"
 
 namespace oblique::server {
 namespace {
 
 const std::vector<std::string>& our_views() {
-  static const std::vector<std::string> kNames{
-      "results", "runs", "peaks", "phases", "stick_intervals", "reaction_peaks"};
+  static const std::vector<std::string> kNames{"runs", "peaks", "phases", "stick_intervals",
+                                               "reaction_peaks"};
   return kNames;
 }
 
@@ -56,7 +55,6 @@ std::string random_id() {
 void create_tables(sqlite3* database) {
   Transaction transaction(database);
   execute(database, kSchemaSql);
-  execute(database, kResultsSql);
   execute(database, fmt::format("PRAGMA application_id = {}", kApplicationId));
   execute(database, fmt::format("PRAGMA user_version = {}", kSchemaVersion));
   Statement about(database, "INSERT INTO about (database_id) VALUES (?)");
@@ -67,30 +65,30 @@ void create_tables(sqlite3* database) {
 
 void create_views(sqlite3* database) {
   Transaction transaction(database);
-  for (const std::string& view : our_views()) {
-    execute(database, "DROP VIEW IF EXISTS " + view);
-  }
   execute(database, kViewsSql);
-  execute(database, kTriggersSql);
   transaction.commit();
 }
 
-void create_temporary_views(sqlite3* database) {
-  execute(database, std::regex_replace(kViewsSql, std::regex("CREATE VIEW"), "CREATE TEMP VIEW"));
-}
-
-const std::vector<std::string>& our_tables() {
-  static const std::vector<std::string> kNames = [] {
+const std::vector<TableDefinition>& our_tables() {
+  static const std::vector<TableDefinition> kTables = [] {
     const DatabaseHandle database = open_database(":memory:", SQLITE_OPEN_READWRITE);
     execute(database.get(), kSchemaSql);
-    execute(database.get(), kResultsSql);
-    return names(database.get(), "SELECT name FROM sqlite_schema WHERE type = 'table'");
+    std::vector<TableDefinition> tables;
+    Statement list(database.get(), "SELECT name, sql FROM sqlite_schema WHERE type = 'table'");
+    while (list.step()) {
+      tables.push_back({list.text(0), list.text(1)});
+    }
+    return tables;
   }();
-  return kNames;
+  return kTables;
 }
 
 std::vector<std::string> missing_tables(sqlite3* database) {
-  return missing(database, "table", our_tables());
+  std::vector<std::string> names;
+  for (const TableDefinition& table : our_tables()) {
+    names.push_back(table.name);
+  }
+  return missing(database, "table", names);
 }
 
 std::vector<std::string> missing_views(sqlite3* database) {
@@ -101,13 +99,21 @@ std::vector<std::string> other_triggers(sqlite3* database) {
   constexpr std::size_t kLongestName = 80;
   std::vector<std::string> found =
       names(database,
-            "SELECT name FROM sqlite_schema WHERE type = 'trigger' AND (name, tbl_name) NOT IN"
-            " (VALUES ('rows_are_gone', 'packed_results'), ('delete_results', 'results'),"
-            " ('update_results', 'results')) ORDER BY rowid");
+            "SELECT name FROM sqlite_schema WHERE type = 'trigger' AND (name, tbl_name) <>"
+            " ('row_deleted', 'results') ORDER BY rowid");
   for (std::string& name : found) {
     name = protocol::visible(protocol::shortened(name, kLongestName));
   }
   return found;
+}
+
+std::string last_study_id_sql() {
+  std::string numbers = "SELECT last_study_id AS number FROM about";
+  for (const std::string_view table :
+       {"studies", "results", "completed_ranges", "retries", "deletions", "reused_points"}) {
+    numbers += fmt::format(" UNION ALL SELECT max(study_id) FROM {}", table);
+  }
+  return "(SELECT coalesce(max(number), 0) FROM (" + numbers + "))";
 }
 
 }  // namespace oblique::server
