@@ -1,4 +1,4 @@
-#include "server/asking/columns.h"
+#include "server/query/columns.h"
 
 #include <algorithm>
 #include <array>
@@ -8,8 +8,8 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "server/asking/elements.h"
-#include "server/asking/sql/sql_functions.h"
+#include "server/query/elements.h"
+#include "server/query/sql_functions.h"
 #include "worker/solver/model/parameters.h"
 #include "worker/solver/model/result_fields.h"
 
@@ -31,35 +31,30 @@ constexpr std::array<Described, 12> kRowColumns{{
     {"model_id", "number of the model in the database", CellKind::kInteger},
     {"status", "solved or failed"},
     {"error", "why it failed"},
-    {"worker", "number of the worker that solved it", CellKind::kInteger},
+    {"worker_id", "number of the worker that solved it", CellKind::kInteger},
     {"worker_name", "that worker's name"},
     {"instruction_set", "vector instructions that it used"},
     {"attempt", "number of the lease under which it was solved", CellKind::kInteger},
     {"solved_at", "when the result arrived (UTC)"},
-    {"taken_from",
-     "the point that has the same inputs and whose result this is, as STUDY/POINT; the name is the "
-     "study's present one, with (deleted) the last that it had"},
+    {"reused_from",
+     "STUDY/POINT, as named then, of which this result is a copy; NULL: solved for this point"},
 }};
 
-/// What the view `runs` has of a list of `solve --json`, as an expression for SQL. The numbers stay
-/// texts, so that no bit of them is lost; a damaged list is NULL and does not spoil the query.
+/// The list `part` as an expression over the columns of `runs`. Numbers keep their digits.
 std::string list_sql(const solver::ListPart& part) {
-  const std::string packed = fmt::format("runs.{}", part.list->column);
+  const std::string list = fmt::format("runs.{}", part.list->column);
   if (part.member.empty()) {
-    return packed;
+    return list;
   }
-  const auto number_of = [&](std::string_view member) {
+  const auto index_of = [&](std::string_view member) {
     const auto& members = part.list->members;
     return std::find(members.begin(), members.end(), member) - members.begin();
   };
-  const std::string where =
-      part.where.empty() ? "" : fmt::format(" WHERE item.value ->> {}", number_of(part.where));
   return fmt::format(
-      "coalesce(list_member({0}, {1}, {3}), CASE WHEN json_valid({0}) THEN '[' || "
-      "coalesce((SELECT group_concat(item.value -> {1}) FROM json_each({0}) AS item{2}), '') || "
-      "']' "
-      "END)",
-      packed, number_of(part.member), where, part.where.empty() ? -1 : number_of(part.where));
+      "CASE WHEN {0} IS NOT NULL THEN (SELECT json_group_array(item.value -> {1}) "
+      "FROM json_each({0}) AS item{2}) END",
+      list, index_of(part.member),
+      part.where.empty() ? "" : fmt::format(" WHERE item.value ->> {}", index_of(part.where)));
 }
 
 std::string place_in_json(const solver::ResultField& field) {
@@ -100,8 +95,8 @@ void add_outputs(std::vector<Column>& columns) {
   }
 }
 
-/// Lists as the database packs them, where `solve --json` says less.
-void add_packed_lists(std::vector<Column>& columns) {
+/// Lists of the database that `solve --json` has in another form.
+void add_stored_lists(std::vector<Column>& columns) {
   for (const auto* list : solver::result_lists()) {
     if (solver::find_result_column(list->column) == nullptr) {
       columns.push_back({std::string(list->column), std::string(list->unit), "output", "",
@@ -121,7 +116,7 @@ const std::vector<Column>& all_columns() {
     std::vector<Column> columns;
     add_inputs(columns);
     add_outputs(columns);
-    add_packed_lists(columns);
+    add_stored_lists(columns);
     for (const auto& [name, meaning, values] : kRowColumns) {
       columns.push_back({std::string(name), "", "row", "", std::string(meaning)});
     }
@@ -144,23 +139,18 @@ std::vector<Column> columns_and_functions() {
   return columns;
 }
 
-std::vector<ListColumn> lists_of_queries() {
-  std::vector<ListColumn> lists;
-  for (const auto& field : solver::result_fields()) {
-    const auto* part = std::get_if<solver::ListPart>(&field.value);
-    if (part != nullptr && field.column != part->list->column) {
-      lists.push_back({std::string(field.column), list_sql(*part)});
+const std::vector<ListColumn>& lists_of_queries() {
+  static const std::vector<ListColumn> all = [] {
+    std::vector<ListColumn> lists;
+    for (const auto& field : solver::result_fields()) {
+      const auto* part = std::get_if<solver::ListPart>(&field.value);
+      if (part != nullptr && field.column != part->list->column) {
+        lists.push_back({std::string(field.column), list_sql(*part)});
+      }
     }
-  }
-  return lists;
-}
-
-std::string rows_of_queries() {
-  std::string lists;
-  for (const ListColumn& list : lists_of_queries()) {
-    lists += fmt::format(", {} AS {}", list.sql, list.name);
-  }
-  return fmt::format("(SELECT *{} FROM runs)", lists);
+    return lists;
+  }();
+  return all;
 }
 
 protocol::CellKind kind_of_values(std::string_view name) {

@@ -17,19 +17,19 @@ struct PlannedColumn {
   bool operator==(const PlannedColumn&) const = default;
 };
 
-/// How a question is answered.
+/// How a query of a study is answered.
 struct Plan {
-  std::string statement;               ///< one that only reads
-  std::vector<PlannedColumn> columns;  ///< of the answer
-  /// Rows come in the order of their points, and `statement` gives one column more than `columns`,
-  /// the last: the point. Whoever has read up to point N may go on later with the question whose
-  /// `after_point` is N and whose `limit`, if any, is so much less.
-  bool goes_on_by_point = false;
+  std::string statement;  ///< a SELECT
+  std::vector<PlannedColumn> columns;
 };
 
-/// Plans the answer to `question` from `database`, which has kNumberFunction and the functions of
-/// lists. Throws solver::InputError for a wrong question, naming the flag or the column and what is
-/// allowed; StorageError for what cannot be read.
+/// Plans the answer to `question` from `database`, which has kNumberFunction. Throws
+/// solver::InputError for a wrong question, naming the flag or the column and what is allowed;
+/// StorageError where the database cannot be read.
 Plan plan(sqlite3* database, protocol::StudyQuery question);
+
+/// An addition to SQLite's message about `sql` if a name that does not exist stands in double
+/// quotes, where a text may have been meant; else empty.
+std::string quotes_hint(const std::string& message, std::string_view sql);
 
 }  // namespace oblique::server

@@ -1,4 +1,4 @@
-#include "server/asking/point_ranges.h"
+#include "server/query/point_ranges.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -11,9 +11,9 @@
 
 #include "proto/recipe/axes.h"
 #include "proto/recipe/blocks.h"
-#include "server/asking/columns.h"
-#include "server/asking/sql/sql_functions.h"
-#include "server/asking/sql/sql_items.h"
+#include "server/query/columns.h"
+#include "server/query/sql_functions.h"
+#include "server/query/sql_text.h"
 
 namespace oblique::server {
 namespace {
@@ -22,9 +22,9 @@ using Ranges = std::vector<PointRange>;
 using Tokens = std::span<const SqlToken>;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-/// With more ranges, the statement would be long and slow to start.
+/// More ranges become one: the statement would be long and slow to start.
 constexpr std::size_t kMostRanges = 20'000;
-/// To find the first row of a range costs about as much as to read this many rows.
+/// Finding the first row of a range costs about as much as reading this many rows.
 constexpr std::uint64_t kRowsARange = 3;
 /// Conditions in more brackets restrict nothing.
 constexpr int kDeepest = 50;
@@ -98,7 +98,7 @@ std::optional<std::pair<std::string, Interval>> between(Tokens tokens) {
   return {{std::string(tokens[0].text), {*low, *high}}};
 }
 
-/// Intersects `intervals` with what the conjunction in `tokens` restricts.
+/// Intersects `intervals` with those of the comparisons that `tokens` join with AND.
 void restrict_by(Tokens tokens, int depth, Intervals& intervals) {
   if (depth > kDeepest || tokens.empty()) {
     return;
@@ -138,7 +138,7 @@ void restrict_by(Tokens tokens, int depth, Intervals& intervals) {
   }
 }
 
-/// What `intervals` allow of an axis; nullptr: everything, or the axis alone does not decide it.
+/// The interval to which an axis is restricted; nullptr: none, or the axis alone does not decide.
 const Interval* interval_of(const protocol::Block& block, const protocol::Axis& axis,
                             const Intervals& intervals) {
   // The column `length` is that of every link, and single lengths are axes too.
@@ -154,8 +154,8 @@ const Interval* interval_of(const protocol::Block& block, const protocol::Axis& 
              : &found->second;
 }
 
-/// Numbers of the values of an axis from the first to the last in `interval`; for a range one more
-/// at each end. Without values: none.
+/// Numbers of the first and the last value of an axis in `interval`; of a range of values one more
+/// at each end. None if no value is in it.
 std::optional<PointRange> numbers_in(const protocol::Axis& axis, const Interval& interval) {
   if (axis.count() > 0) {
     if (interval.low > interval.high) {
@@ -175,6 +175,11 @@ std::optional<PointRange> numbers_in(const protocol::Axis& axis, const Interval&
   return found;
 }
 
+/// One range around all.
+Ranges hull(const Ranges& ranges) {
+  return {{ranges.front().first, ranges.back().last}};
+}
+
 /// Ranges of a block's points, numbered from 0. A product is built from its fastest axis outwards.
 Ranges ranges_in(const protocol::Block& block, const Intervals& intervals) {
   const std::uint64_t points = protocol::points_of_block(block);
@@ -184,7 +189,7 @@ Ranges ranges_in(const protocol::Block& block, const Intervals& intervals) {
   if (block.has_sample() || block.zip()) {
     return {{0, points - 1}};
   }
-  Ranges ranges{{0, 0}};
+  Ranges ranges{{0, 0}};  // of the axes from `a` on
   std::uint64_t stride = 1;
   for (int a = block.axes_size(); a-- > 0;) {
     const protocol::Axis& axis = block.axes(a);
@@ -195,19 +200,18 @@ Ranges ranges_in(const protocol::Block& block, const Intervals& intervals) {
     if (!numbers) {
       return {};
     }
-    const std::uint64_t count = numbers->last - numbers->first + 1;
-    const PointRange all{ranges.front().first, ranges.back().last};
+    const PointRange all = hull(ranges).front();
     const bool is_whole = ranges.size() == 1 && all == PointRange{0, stride - 1};
-    if (is_whole || count > kMostRanges / ranges.size()) {
+    if (is_whole || numbers->last - numbers->first >= kMostRanges / ranges.size()) {
       ranges = {{numbers->first * stride + all.first, numbers->last * stride + all.last}};
     } else {
-      Ranges wider;
+      Ranges copies;
       for (std::uint64_t i = numbers->first; i <= numbers->last; ++i) {
         for (const PointRange& range : ranges) {
-          wider.push_back({i * stride + range.first, i * stride + range.last});
+          copies.push_back({i * stride + range.first, i * stride + range.last});
         }
       }
-      ranges = std::move(wider);
+      ranges = std::move(copies);
     }
     stride *= size;
   }
@@ -243,23 +247,22 @@ std::vector<PointRange> point_ranges(const protocol::Recipe& recipe, std::string
         ranges.push_back({points + range.first, points + range.last});
       }
     }
+    if (ranges.size() > kMostRanges) {
+      ranges = hull(ranges);
+    }
     points += protocol::points_of_block(block);
   }
   if (const auto numbers = intervals.find("point"); numbers != intervals.end()) {
     ranges = clipped(ranges, numbers->second);
   }
-  const bool is_worth_it = ranges.size() <= kMostRanges &&
-                           points_in(ranges) + kRowsARange * ranges.size() <= points - points / 10;
-  if (ranges.size() > 1 && !is_worth_it) {
-    ranges = {{ranges.front().first, ranges.back().last}};
-  }
-  return ranges;
+  const bool are_worth_it = points_in(ranges) + kRowsARange * ranges.size() <= points - points / 10;
+  return ranges.size() > 1 && !are_worth_it ? hull(ranges) : ranges;
 }
 
 std::uint64_t points_of(const protocol::Recipe& recipe) {
   std::uint64_t points = 0;
   for (const protocol::Block& block : recipe.blocks()) {
-    // A recipe that was validated has no such axis, and its points cannot be counted.
+    // No valid recipe has an axis without values, and its points cannot be counted.
     if (std::any_of(block.axes().begin(), block.axes().end(),
                     [](const auto& axis) { return protocol::axis_size(axis) == 0; })) {
       return 0;

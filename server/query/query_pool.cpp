@@ -1,4 +1,4 @@
-#include "server/queries/query_pool.h"
+#include "server/query/query_pool.h"
 
 #include <algorithm>
 #include <utility>
@@ -6,8 +6,8 @@
 #include <poll.h>
 
 #include "proto/frames.h"
-#include "server/queries/reader_program.h"
-#include "server/reading/query_rules.h"
+#include "server/query/query_rules.h"
+#include "server/query/reader_program.h"
 
 namespace oblique::server {
 namespace {
@@ -16,7 +16,62 @@ namespace {
 constexpr std::chrono::milliseconds kRetryPause{20};
 constexpr std::int64_t kLongestWait_ms = 60'000;
 
+std::size_t bytes_of(const QueryJob& job) {
+  return job.request.ByteSizeLong();
+}
+
 }  // namespace
+
+bool QueryQueue::add(QueryJob job) {
+  std::size_t waiting = 0;
+  std::size_t bytes = bytes_of(job);
+  for (const Client& client : clients_) {
+    waiting += client.waiting.size();
+    for (const QueryJob& other : client.waiting) {
+      bytes += bytes_of(other);
+    }
+  }
+  if (waiting >= settings_.most_waiting || bytes > settings_.most_waiting_bytes) {
+    return false;
+  }
+  auto client = std::find_if(clients_.begin(), clients_.end(),
+                             [&](const Client& each) { return each.name == job.client; });
+  if (client == clients_.end()) {
+    client = clients_.insert(clients_.end(), Client{job.client});
+  } else if (client->waiting.size() >= settings_.most_waiting_each) {
+    return false;
+  }
+  client->waiting.push_back(std::move(job));
+  return true;
+}
+
+std::optional<QueryJob> QueryQueue::start_next() {
+  std::size_t running = 0;
+  for (const Client& client : clients_) {
+    running += client.running.size();
+  }
+  const auto next = std::find_if(clients_.begin(), clients_.end(), [this](const Client& client) {
+    return !client.waiting.empty() && client.running.size() < settings_.most_running_each;
+  });
+  if (running >= settings_.readers || next == clients_.end()) {
+    return std::nullopt;
+  }
+  QueryJob job = std::move(next->waiting.front());
+  next->waiting.pop_front();
+  next->running.insert(job.ticket);
+  clients_.splice(clients_.end(), clients_, next);
+  return job;
+}
+
+void QueryQueue::remove(std::uint64_t ticket) {
+  for (Client& client : clients_) {
+    client.running.erase(ticket);
+    std::erase_if(client.waiting, [&](const QueryJob& job) { return job.ticket == ticket; });
+  }
+  std::erase_if(clients_, [](const Client& client) {
+    return client.waiting.empty() && client.running.empty();
+  });
+}
 
 QueryPool::QueryPool(std::string database, QueryPoolSettings settings, Report report)
     : database_(std::move(database)),

@@ -1,4 +1,4 @@
-#include "server/reading/query_rules.h"
+#include "server/query/query_rules.h"
 
 #include <algorithm>
 #include <array>
@@ -7,11 +7,9 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "server/asking/lists/list_functions.h"
-#include "server/asking/lists/quick_views.h"
-#include "server/asking/sql/sql_functions.h"
-#include "server/asking/suggestions.h"
 #include "server/database/sqlite.h"
+#include "server/query/plan.h"
+#include "server/query/sql_functions.h"
 
 namespace oblique::server {
 namespace {
@@ -112,8 +110,6 @@ void restrict_to_reading(sqlite3* database) {
   // SQLite makes these tables of functions when they are first named, which would be refused then.
   execute(database, "SELECT 1 FROM json_each('[]'), json_tree('[]')");
   add_functions(database);
-  add_list_functions(database);
-  add_quick_views(database);
   sqlite3_set_authorizer(database, &authorize, nullptr);
 }
 
@@ -136,7 +132,7 @@ StatementHandle prepare_query(sqlite3* database, const std::string& sql) {
       throw StatementError(fmt::format("{}: {}", kOnlyReads, reason));
     }
     throw StatementError(
-        fmt::format("the statement is wrong: {}{}", reason, what_quotes_mean(reason, sql)));
+        fmt::format("the statement is wrong: {}{}", reason, quotes_hint(reason, sql)));
   }
   if (primary != SQLITE_OK) {
     throw failure(database, code);

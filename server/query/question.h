@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -7,7 +8,7 @@
 
 namespace oblique::server {
 
-/// The columns of a question that selects none: the point, the axes that vary in the study, and the
+/// The columns of a query that selects none: the point, the axes that vary in the study, and the
 /// main outputs. Without a block in the recipe H, mu and e stand for the axes.
 std::vector<std::string> usual_columns(const protocol::Recipe& recipe);
 
@@ -16,11 +17,11 @@ std::string selected_by(const protocol::StudyQuery& question);
 
 /// Throws solver::InputError, naming the flag, for texts that are no part of a statement; see
 /// check_sql_part.
-void check(const protocol::StudyQuery& question);
+void check_parts(const protocol::StudyQuery& question);
 
-/// Throws solver::InputError for names that differ from one of `columns` only in case, and for
-/// columns of a row of a group that are neither keys nor aggregated; see check_grouped. The
-/// question passed `check`.
-void check_columns(const protocol::StudyQuery& question, const std::vector<std::string>& columns);
+/// Throws solver::InputError for names that differ from one of `columns` only in case, and for a
+/// column in a grouped row (or in the one row of all points) that is neither a key of the group nor
+/// inside an aggregate: SQL would take its value from any point. `question` passed check_parts.
+void check_columns(const protocol::StudyQuery& question, std::span<const std::string> columns);
 
 }  // namespace oblique::server

@@ -1,4 +1,4 @@
-#include "server/queries/reader_process.h"
+#include "server/query/reader_process.h"
 
 #include <array>
 #include <cerrno>
@@ -18,7 +18,7 @@
 #include "proto/frames.h"
 #include "proto/system/descriptor.h"
 #include "proto/system/spawn_plan.h"
-#include "server/queries/reader_program.h"
+#include "server/query/reader_program.h"
 
 namespace oblique::server {
 namespace {

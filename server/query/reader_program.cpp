@@ -1,4 +1,4 @@
-#include "server/queries/reader_program.h"
+#include "server/query/reader_program.h"
 
 #include <cerrno>
 #include <exception>
@@ -18,7 +18,7 @@
 
 #include "proto/frames.h"
 #include "proto/text.h"
-#include "server/reading/reader.h"
+#include "server/query/reader.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::server {

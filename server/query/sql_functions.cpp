@@ -1,4 +1,4 @@
-#include "server/asking/sql/sql_functions.h"
+#include "server/query/sql_functions.h"
 
 #include <algorithm>
 #include <array>
@@ -10,8 +10,8 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "server/asking/sql/sql_tokens.h"
 #include "server/database/sqlite.h"
+#include "server/query/sql_text.h"
 
 namespace oblique::server {
 namespace {

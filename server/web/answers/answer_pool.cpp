@@ -7,7 +7,6 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "server/asking/lists/list_functions.h"
 #include "server/database/open_for_reading.h"
 #include "server/web/http/json_answer.h"
 
@@ -166,7 +165,6 @@ HttpAnswer AnswerPool::answer_to(const Order& order, Desk& desk) {
     if (!desk.database) {
       desk.database = open_stored(database_).database;
       execute(desk.database.get(), kPageCache);
-      add_list_functions(desk.database.get());
       sqlite3_progress_handler(desk.database.get(), kStepsBetweenLooks, &Desk::is_over, &desk);
     }
     return order.job({desk.database.get(), studies_, columns_, samples_,

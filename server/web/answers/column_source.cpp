@@ -6,7 +6,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "server/asking/columns.h"
+#include "server/query/columns.h"
 #include "server/store/rows/stored_units.h"
 
 namespace oblique::server {

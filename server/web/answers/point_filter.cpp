@@ -8,9 +8,9 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/axes.h"
-#include "server/asking/columns.h"
-#include "server/asking/point_ranges.h"
-#include "server/asking/sql/sql_expression.h"
+#include "server/query/columns.h"
+#include "server/query/point_ranges.h"
+#include "server/query/sql_text.h"
 #include "server/web/answers/fields.h"
 #include "server/web/answers/grid.h"
 #include "worker/solver/model/errors.h"

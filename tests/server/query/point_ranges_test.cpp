@@ -1,4 +1,4 @@
-#include "server/asking/point_ranges.h"
+#include "server/query/point_ranges.h"
 
 #include <string>
 #include <vector>

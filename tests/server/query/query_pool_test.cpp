@@ -1,5 +1,5 @@
 // Queries in real reader processes, including statements that no thread could be stopped at.
-#include "server/queries/query_pool.h"
+#include "server/query/query_pool.h"
 
 #include <sys/socket.h>
 #include <unistd.h>
@@ -14,14 +14,16 @@
 #include <mutex>
 #include <optional>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "proto/frames.h"
 #include "proto/wire/chunk_rows.h"
-#include "server/queries/reader_program.h"
-#include "server/reading/query_rules.h"
+#include "server/query/query_rules.h"
+#include "server/query/reader_program.h"
 #include "server/store/store.h"
 #include "tests/support/hang_limit.h"
 #include "tests/support/process.h"
@@ -34,7 +36,7 @@ using Kind = QueryReport::Kind;
 using testing::AnyOf;
 using testing::HasSubstr;
 
-/// Checks for an interrupt once, before it begins, and then compares for hours.
+/// Compares for hours without checking for an interrupt.
 constexpr const char* kDeaf = "SELECT instr(zeroblob(16000000), zeroblob(7999999) || x'01')";
 
 /// Megabytes: more than a client is sent ahead.
@@ -47,7 +49,7 @@ class QueryPoolTest : public testing::Test {
  protected:
   QueryPoolTest() {
     Store store(path_);
-    settings_.reader_program = OBLIQUE_SERVER_PROGRAM;
+    settings_.reader_program = OBLIQUE_TEST_READER;
   }
 
   QueryPool& pool() {
@@ -113,6 +115,13 @@ class QueryPoolTest : public testing::Test {
       pool().more(ticket, taken);
     }
   }
+  /// Makes a shell script the reader program.
+  std::string use_script(const std::string& commands) {
+    settings_.reader_program = folder_.file("reader");
+    std::ofstream(settings_.reader_program) << "#!/bin/sh\n" << commands << '\n';
+    std::filesystem::permissions(settings_.reader_program, std::filesystem::perms::owner_all);
+    return settings_.reader_program;
+  }
   std::string error_of(const std::string& sql) { return take_all(ask(sql)).error; }
   /// Of the only row.
   std::int64_t number_of(const std::string& sql) {
@@ -176,9 +185,11 @@ TEST_F(QueryPoolTest, AReaderWhoseServerWasKilledWhileItStartedBeginsNoQuery) {
 
 TEST_F(QueryPoolTest, AQueryIsAnsweredByAnotherProcess) {
   EXPECT_EQ(number_of("SELECT 5 AS five, 'x'"), 5);
+  EXPECT_EQ(number_of("SELECT 7 /*" + std::string(900'000, 'x') + "*/"), 7);
   EXPECT_THAT(error_of("SELECT nothing"), HasSubstr("nothing"));
-  EXPECT_THAT(error_of("SELECT count(*) FROM runs WHERE \"mux\" > 0.5"),
-              HasSubstr("no such column: mux"));
+  const Answer empty = take_all(ask("SELECT 1 WHERE 0"));
+  EXPECT_EQ(empty.chunks, 1U);
+  EXPECT_EQ(empty.rows, 0U);
 }
 
 TEST_F(QueryPoolTest, AQueryIsKilledAtItsDeadlineWhateverItDoes) {
@@ -248,23 +259,16 @@ TEST_F(QueryPoolTest, StoppingWaitsForNoQuery) {
 }
 
 TEST_F(QueryPoolTest, AReaderThatDiesIsReplaced) {
-  const std::string program = folder_.file("reader");
-  std::ofstream(program) << "#!/bin/sh\nexit 3\n";
-  std::filesystem::permissions(program, std::filesystem::perms::owner_all);
-  settings_.reader_program = program;
+  const std::string program = use_script("exit 3");
   EXPECT_THAT(error_of("SELECT 1"), HasSubstr("ended with exit code 3"));
   std::filesystem::remove(program);
   EXPECT_THAT(error_of("SELECT 1"), HasSubstr("no process can be started"));
-  std::filesystem::create_symlink(OBLIQUE_SERVER_PROGRAM, program);
+  std::filesystem::create_symlink(OBLIQUE_TEST_READER, program);
   EXPECT_EQ(number_of("SELECT 1"), 1);
 }
 
 TEST_F(QueryPoolTest, AnAnswerThatIsTooLongForAFrameEndsTheReader) {
-  const std::string program = folder_.file("reader");
-  std::ofstream(program)
-      << "#!/bin/sh\nprintf '\\377\\377\\377\\377\\0\\0\\0\\0' >&3\nexec sleep 1000\n";
-  std::filesystem::permissions(program, std::filesystem::perms::owner_all);
-  settings_.reader_program = program;
+  use_script("printf '\\377\\377\\377\\377\\0\\0\\0\\0' >&3\nexec sleep 1000");
   EXPECT_THAT(error_of("SELECT 1"), HasSubstr("was killed by signal 9"));
 }
 
@@ -275,10 +279,6 @@ TEST_F(QueryPoolTest, AReaderOpensADatabaseThatCouldNotBeReadAtFirst) {
   EXPECT_EQ(number_of("SELECT 1"), 1);
 }
 
-TEST_F(QueryPoolTest, ALongStatementReachesTheReader) {
-  EXPECT_EQ(number_of("SELECT 7 /*" + std::string(900'000, 'x') + "*/"), 7);
-}
-
 TEST_F(QueryPoolTest, ALongAnswerComesWholeInBoundedChunks) {
   const Answer answer = take_all(ask(kLong));
   EXPECT_EQ(answer.error, "");
@@ -287,12 +287,6 @@ TEST_F(QueryPoolTest, ALongAnswerComesWholeInBoundedChunks) {
   EXPECT_GT(answer.chunks, 10U);
   EXPECT_TRUE(answer.in_order);
   EXPECT_LT(answer.largest, (std::uint64_t{256} << 10U) + 4096);
-}
-
-TEST_F(QueryPoolTest, AnEmptyAnswerIsOneChunk) {
-  const Answer empty = take_all(ask("SELECT 1 WHERE 0"));
-  EXPECT_EQ(empty.chunks, 1U);
-  EXPECT_EQ(empty.rows, 0U);
 }
 
 TEST_F(QueryPoolTest, FirstRowsDoNotWaitForManyMore) {
@@ -352,7 +346,7 @@ TEST_F(QueryPoolTest, AnErrorInTheMiddleEndsTheAnswer) {
   EXPECT_GT(answer.chunks, 5U);
 }
 
-TEST_F(QueryPoolTest, CancelledAnswersGiveTheirReadersBack) {
+TEST_F(QueryPoolTest, CancelledAnswersReleaseTheirReaders) {
   settings_.queue.most_running_each = 1;
   for (int i = 0; i < 5; ++i) {
     const auto ticket = ask(kLong, "a");
@@ -360,6 +354,88 @@ TEST_F(QueryPoolTest, CancelledAnswersGiveTheirReadersBack) {
     pool().cancel(ticket);
   }
   EXPECT_EQ(take_all(ask("SELECT 1", "a")).rows, 1U);
+}
+
+class QueryQueueTest : public testing::Test {
+ protected:
+  bool add(const std::string& client, const std::string& sql = "SELECT 1") {
+    QueryJob job{++last_ticket_, client, {}};
+    job.request.set_sql(sql);
+    return queue_.add(std::move(job));
+  }
+  /// Starts all queries that may run now; returns them as "client:ticket".
+  std::vector<std::string> start() {
+    std::vector<std::string> started;
+    while (const auto job = queue_.start_next()) {
+      started.push_back(job->client + ":" + std::to_string(job->ticket));
+    }
+    return started;
+  }
+
+  using Names = std::vector<std::string>;
+
+  QueryQueue queue_{QueueSettings{}};
+  std::uint64_t last_ticket_ = 0;
+};
+
+TEST_F(QueryQueueTest, OneClientNeverHasAllReaders) {
+  for (int i = 0; i < 5; ++i) {
+    add("a");
+  }
+  EXPECT_EQ(start(), (Names{"a:1", "a:2"}));
+  add("b");
+  EXPECT_EQ(start(), Names{"b:6"});
+}
+
+TEST_F(QueryQueueTest, ClientsTakeTurnsAndEachIsServedInOrderOfArrival) {
+  for (int i = 0; i < 6; ++i) {
+    add("a");
+  }
+  for (const char* client : {"b", "b", "c", "c"}) {
+    add(client);
+  }
+  EXPECT_EQ(start(), (Names{"a:1", "b:7", "c:9", "a:2"}));
+  queue_.remove(1);
+  EXPECT_EQ(start(), Names{"b:8"});
+  queue_.remove(7);
+  EXPECT_EQ(start(), Names{"c:10"});
+  queue_.remove(9);
+  EXPECT_EQ(start(), Names{"a:3"});
+}
+
+TEST_F(QueryQueueTest, TheNumberOfWaitingQueriesIsBoundedForEachClientAndForAll) {
+  for (int i = 0; i < 16; ++i) {
+    EXPECT_TRUE(add("a"));
+  }
+  EXPECT_FALSE(add("a"));
+  for (int i = 0; i < 48; ++i) {
+    EXPECT_TRUE(add("client " + std::to_string(i)));
+  }
+  EXPECT_FALSE(add("one more"));
+  start();
+  EXPECT_TRUE(add("one more"));
+}
+
+TEST_F(QueryQueueTest, TheBytesOfWaitingStatementsAreBounded) {
+  const std::string half(QueueSettings{}.most_waiting_bytes / 2 - 100, ' ');
+  ASSERT_TRUE(add("a", half));
+  ASSERT_TRUE(add("b", half));
+  EXPECT_FALSE(add("c", std::string(1000, ' ')));
+  queue_.remove(2);
+  EXPECT_TRUE(add("c", half)) << "b's query no longer waits";
+  EXPECT_FALSE(add("d", half));
+  start();
+  EXPECT_TRUE(add("d", half)) << "running queries do not count";
+}
+
+TEST_F(QueryQueueTest, ARemovedQueryIsNeverStarted) {
+  add("a");
+  add("a");
+  add("b");
+  queue_.remove(1);
+  queue_.remove(3);
+  queue_.remove(99);
+  EXPECT_EQ(start(), Names{"a:2"});
 }
 
 }  // namespace

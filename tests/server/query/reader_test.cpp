@@ -1,39 +1,43 @@
-#include "server/reading/reader.h"
+#include "server/query/reader.h"
 
+#include <cstdint>
 #include <fstream>
+#include <memory>
 #include <thread>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "proto/result_message.h"
+#include "proto/wire/chunk_rows.h"
 #include "server/store/store.h"
 #include "tests/support/points.h"
 #include "tests/support/temporary_folder.h"
+#include "worker/solver/model/errors.h"
 
 namespace oblique::server {
 namespace {
 
+using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::Not;
+
+constexpr const char* kEndless =
+    "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT count(*) FROM n";
 
 class ReaderTest : public testing::Test {
  protected:
   ReaderTest() {
-    Store store(path_);
-    const auto table = table_of(4);
-    const std::vector<Change> changes{
-        AddStudy{1, "a", table, "2024-01-01T00:00:00.000Z"},
-        AddStudy{2, "b", table_of(2), "2024-01-02T00:00:00.000Z"},
-        AddResults{1,
-                   table,
-                   0,
-                   "",
-                   "",
-                   1,
-                   "now",
-                   {solved_point(0), solved_point(2), protocol::failed_point(3, "no")}}};
-    store.commit(changes);
+    const AddResults results{
+        1,     table_of(4),
+        0,     "",
+        "",    1,
+        "now", {solved_point(0), solved_point(2), protocol::failed_point(3, "no")}};
+    commit({AddStudy{1, "a", table_of(4), "2024-01-01T00:00:00.000Z"},
+            AddStudy{2, "b", table_of(2), "2024-01-02T00:00:00.000Z"}, results});
   }
+  void commit(const std::vector<Change>& changes) { Store(path_).commit(changes); }
 
   std::string refusal_of(const std::string& sql, const QueryLimits& limits = {}) {
     try {
@@ -43,30 +47,45 @@ class ReaderTest : public testing::Test {
     }
     return "it ran";
   }
+  /// The values of the first row.
+  protocol::Row row_of(const std::string& sql) { return Reader(path_).query(sql, {}).rows(0); }
 
   test::TemporaryFolder folder_;
   std::string path_ = folder_.file("studies.db");
 };
 
-TEST_F(ReaderTest, AReplyHasColumnsAndTypedValues) {
-  const auto reply =
-      Reader(path_).query("SELECT 1 AS i, 0.5 AS r, 'x' AS t, NULL AS n, x'0aff' AS b", {});
-  EXPECT_EQ(reply.columns_size(), 5);
+TEST_F(ReaderTest, ValuesHaveTheirTypes) {
+  const auto reply = Reader(path_).query(
+      "SELECT 1 AS i, 0.5 AS r, CAST(x'c3a9' AS TEXT) AS t, NULL AS n, x'0aff' AS b,"
+      " CAST(x'ff' AS TEXT), CAST(x'eda080' AS TEXT), 'SC' LIKE 'sC', 'SC' LIKE 'S%' ESCAPE '!'",
+      {});
   EXPECT_EQ(reply.columns(1), "r");
   const auto& row = reply.rows(0);
   EXPECT_EQ(row.values(0).integer(), 1);
   EXPECT_EQ(row.values(1).real(), 0.5);
-  EXPECT_EQ(row.values(2).text(), "x");
+  EXPECT_EQ(row.values(2).text(), "\xc3\xa9");
   EXPECT_EQ(row.values(3).kind_case(), protocol::Value::KIND_NOT_SET);
   EXPECT_EQ(row.values(4).text(), "x'0AFF'");
+  EXPECT_EQ(row.values(5).text(), "x'FF'") << "no UTF-8";
+  EXPECT_EQ(row.values(6).text(), "x'EDA080'") << "no UTF-8";
+  EXPECT_EQ(row.values(7).integer(), 0) << "LIKE is case-sensitive";
+  EXPECT_EQ(row.values(8).integer(), 1);
 }
 
-TEST_F(ReaderTest, ATextThatIsNotUtf8ComesAsHexadecimal) {
-  const auto reply = Reader(path_).query(
-      "SELECT CAST(x'ff' AS TEXT), CAST(x'eda080' AS TEXT), CAST(x'c3a9' AS TEXT)", {});
-  EXPECT_EQ(reply.rows(0).values(0).text(), "x'FF'");
-  EXPECT_EQ(reply.rows(0).values(1).text(), "x'EDA080'");
-  EXPECT_EQ(reply.rows(0).values(2).text(), "\xc3\xa9");
+TEST_F(ReaderTest, AQueryOfAStudyIsAnsweredWithUnits) {
+  Reader reader(path_);
+  const auto ask = [&](const std::string& study, const std::string& select) {
+    protocol::QueryRequest request;
+    request.mutable_question()->set_study(study);
+    request.mutable_question()->add_select(select);
+    return reader.answer(request, {}).next();
+  };
+  const auto chunk = ask("a", "H, status");
+  EXPECT_EQ(chunk.chunk_rows(), 3U);
+  EXPECT_THAT(chunk.units(), ElementsAre("m", ""));
+  EXPECT_THROW(ask("no such", "H"), solver::InputError);
+  EXPECT_THROW(ask("a", "percentile(mu, 100 + 20)"), StatementError);
+  EXPECT_THROW(reader.query("SELECT percentile(mu, 120) FROM runs", {}), StatementError);
 }
 
 TEST_F(ReaderTest, StatementsThatWriteOrReachOutsideAreRefused) {
@@ -82,28 +101,39 @@ TEST_F(ReaderTest, StatementsThatWriteOrReachOutsideAreRefused) {
   EXPECT_EQ(Reader(path_).query("SELECT * FROM results", {}).rows_size(), 3);
 }
 
-TEST_F(ReaderTest, FunctionsThatReachOutOfTheDatabaseAreRefused) {
-  for (const char* sql : {"SELECT fts3_tokenizer('simple')", "SELECT fts3_tokenizer('x', x'00')",
-                          "SELECT load_extension('x')", "SELECT sqlite_log(1, 'x')",
-                          "SELECT rtreecheck('results')"}) {
-    EXPECT_THAT(refusal_of(sql), HasSubstr("not authorized to use function")) << sql;
+TEST_F(ReaderTest, AWrongStatementIsRefusedWithTheReason) {
+  const struct {
+    const char* sql;
+    const char* reason;
+  } wrong[] = {
+      {"SELECT fts3_tokenizer('simple')", "not authorized to use function"},
+      {"SELECT fts3_tokenizer('x', x'00')", "not authorized to use function"},
+      {"SELECT load_extension('x')", "not authorized to use function"},
+      {"SELECT sqlite_log(1, 'x')", "not authorized to use function"},
+      {"SELECT rtreecheck('results')", "not authorized to use function"},
+      {"SELECT ?", "the parameter ?,"},
+      {"SELECT 1 WHERE 1 > :mu", "the parameter :mu,"},
+      {"SELECT $x", "the parameter $x,"},
+      {"SELECT 1; SELECT 2", "one statement"},
+      {"  ", "no statement"},
+      {"SELECT nothing FROM results", "nothing"},
+      {"SELECT count(*) FROM runs WHERE \"mux\" > 0.5", "in single quotes a text"},
+  };
+  for (const auto& [sql, reason] : wrong) {
+    EXPECT_THAT(refusal_of(sql), HasSubstr(reason)) << sql;
   }
-  EXPECT_EQ(refusal_of("SELECT json_extract('[1]', '$[0]'), abs(-1), randomblob(3), upper('x')"),
-            "it ran");
+  EXPECT_THAT(refusal_of("SELECT mux FROM runs"), Not(HasSubstr("quotes")));
 }
 
-TEST_F(ReaderTest, ANameInDoubleQuotesIsNeverAText) {
-  EXPECT_THAT(
-      refusal_of("SELECT count(*) FROM runs WHERE \"mux\" > 0.5"),
-      testing::AllOf(HasSubstr("no such column: mux"), HasSubstr("in single quotes a text")));
-  EXPECT_THAT(refusal_of("SELECT mux FROM runs"), testing::Not(HasSubstr("quotes")));
-  EXPECT_EQ(refusal_of("SELECT \"mu\" AS \"my mu\" FROM \"runs\" ORDER BY \"my mu\""), "it ran");
-}
-
-TEST_F(ReaderTest, AParameterIsRefusedForItHasNoValue) {
-  EXPECT_THAT(refusal_of("SELECT ?"), HasSubstr("the parameter ?,"));
-  EXPECT_THAT(refusal_of("SELECT 1 WHERE 1 > :mu"), HasSubstr("the parameter :mu,"));
-  EXPECT_THAT(refusal_of("SELECT $x"), HasSubstr("the parameter $x,"));
+TEST_F(ReaderTest, StatementsMayListTablesAndUseJson) {
+  for (const char* sql :
+       {"PRAGMA table_info(results)", "SELECT name FROM sqlite_schema", "SELECT 1 ; \n",
+        "SELECT json_extract('[1]', '$[0]'), abs(-1), randomblob(3), upper('x')",
+        "SELECT \"mu\" AS \"my mu\" FROM \"runs\" ORDER BY \"my mu\""}) {
+    EXPECT_EQ(refusal_of(sql), "it ran") << sql;
+  }
+  EXPECT_EQ(row_of("SELECT sum(value) FROM json_each('[1, 2, 3]')").values(0).integer(), 6);
+  EXPECT_EQ(row_of("SELECT sum(atom) FROM json_tree('[1, [2, 3]]')").values(0).integer(), 6);
 }
 
 TEST_F(ReaderTest, ARowOverTheLimitOfAReplyIsAnError) {
@@ -123,50 +153,21 @@ TEST_F(ReaderTest, AValueOverItsLimitIsAnErrorOnTheWayToo) {
   EXPECT_EQ(refusal_of("SELECT length(zeroblob(1000000))", limits), "it ran");
 }
 
-TEST_F(ReaderTest, OneStatementAtATime) {
-  EXPECT_THAT(refusal_of("SELECT 1; SELECT 2"), HasSubstr("one statement"));
-  EXPECT_THAT(refusal_of("  "), HasSubstr("no statement"));
-  EXPECT_EQ(refusal_of("SELECT 1 ; \n"), "it ran");
-}
-
-TEST_F(ReaderTest, AWrongStatementIsAnErrorThatSaysWhere) {
-  EXPECT_THAT(refusal_of("SELECT nothing FROM results"), HasSubstr("nothing"));
-}
-
-TEST_F(ReaderTest, TablesCanBeListed) {
-  EXPECT_EQ(refusal_of("PRAGMA table_info(results)"), "it ran");
-  EXPECT_EQ(refusal_of("SELECT name FROM sqlite_schema"), "it ran");
-}
-
 TEST_F(ReaderTest, AnEndlessQueryEndsAtItsTimeLimit) {
-  EXPECT_THAT(refusal_of("WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) "
-                         "SELECT count(*) FROM n",
-                         {1000, 50, 1'000'000}),
+  EXPECT_THAT(refusal_of(kEndless, {1000, 50, 1'000'000}),
               HasSubstr("took too long (more than 0.05 s)"));
 }
 
 TEST_F(ReaderTest, ARunningQueryCanBeInterrupted) {
   Reader reader(path_);
   std::thread other([&] { reader.interrupt(); });
-  EXPECT_THROW(reader.query("WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) "
-                            "SELECT count(*) FROM n",
-                            kNoLimits),
-               QueryError);
+  EXPECT_THROW(reader.query(kEndless, kNoLimits), QueryError);
   other.join();
 }
 
-TEST_F(ReaderTest, WhatTheServerCommitsIsSeenWhileItRuns) {
-  Store store(path_);
-  Reader reader(path_);
-  const std::string count = "SELECT count(*) FROM results";
-  EXPECT_EQ(reader.query(count, {}).rows(0).values(0).integer(), 3);
-  const std::vector<Change> changes{
-      AddResults{1, table_of(4), 0, "", "", 1, "now", {solved_point(1)}}};
-  store.commit(changes);
-  EXPECT_EQ(reader.query(count, {}).rows(0).values(0).integer(), 4);
-}
-
 TEST_F(ReaderTest, TheStatusOfStudiesIsDerivedFromTheRows) {
+  execute(open_database(path_, SQLITE_OPEN_READWRITE).get(),
+          "INSERT INTO reused_points VALUES (1, 'x', 1), (1, 'y', 2), (2, 'y', 5)");
   const auto all = Reader(path_).study_status();
   ASSERT_EQ(all.size(), 2U);
   EXPECT_EQ(all[0].name(), "a");
@@ -174,40 +175,13 @@ TEST_F(ReaderTest, TheStatusOfStudiesIsDerivedFromTheRows) {
   EXPECT_EQ(all[0].solved(), 2U);
   EXPECT_EQ(all[0].failed(), 1U);
   EXPECT_EQ(all[0].state(), "running");
-  EXPECT_EQ(Reader(path_).study_status("b").at(0).solved(), 0U);
-  EXPECT_THROW(Reader(path_).study_status("c"), QueryError);
-}
-
-TEST_F(ReaderTest, EachStudyHasThePointsThatItTookOver) {
-  execute(open_database(path_, SQLITE_OPEN_READWRITE).get(),
-          "INSERT INTO origins VALUES (7, 'x'), (8, 'y');"
-          "INSERT INTO taken_points VALUES (1, 7, 1), (1, 8, 2), (2, 8, 5)");
-  const auto all = Reader(path_).study_status();
-  ASSERT_EQ(all.size(), 2U);
   EXPECT_EQ(all[0].taken().points(), 3U);
   ASSERT_EQ(all[0].taken().from_size(), 2);
   EXPECT_EQ(all[0].taken().from(0).study(), "y");
-  EXPECT_EQ(all[1].taken().points(), 5U);
-  ASSERT_EQ(all[1].taken().from_size(), 1);
-  EXPECT_EQ(all[1].taken().from(0).study(), "y");
-}
-
-TEST_F(ReaderTest, AStudyWithAllItsRowsIsDone) {
-  {
-    Store store(path_);
-    const std::vector<Change> changes{
-        AddResults{1, table_of(4), 0, "", "", 1, "now", {solved_point(1)}}};
-    store.commit(changes);
-  }
+  EXPECT_EQ(Reader(path_).study_status("b").at(0).solved(), 0U);
+  EXPECT_THROW(Reader(path_).study_status("c"), QueryError);
+  commit({AddResults{1, table_of(4), 0, "", "", 1, "now", {solved_point(1)}}});
   EXPECT_EQ(Reader(path_).study_status("a").at(0).state(), "done");
-}
-
-TEST_F(ReaderTest, AStatementMayUnfoldListsItself) {
-  { const Store store(path_); }
-  for (const char* sql : {"SELECT sum(value) FROM json_each('[1, 2, 3]')",
-                          "SELECT sum(atom) FROM json_tree('[1, [2, 3]]')"}) {
-    EXPECT_EQ(Reader(path_).query(sql, kNoLimits).rows(0).values(0).integer(), 6) << sql;
-  }
 }
 
 TEST_F(ReaderTest, WhatIsNoDatabaseOfOursIsRefusedByItsKind) {
@@ -225,6 +199,99 @@ TEST_F(ReaderTest, WhatIsNoDatabaseOfOursIsRefusedByItsKind) {
   EXPECT_THAT(message_of(folder_.file("empty.db")), HasSubstr("is empty"));
   std::ofstream(folder_.file("text.db")) << std::string(5000, 'x');
   EXPECT_THAT(message_of(folder_.file("text.db")), HasSubstr("is not a database"));
+}
+
+/// Study "a" has points 0 to 9, of which 5 is not solved yet, and rows of a fourth of a chunk.
+class AnswerTest : public testing::Test {
+ protected:
+  AnswerTest() : store_(path_), table_(table_of(10)) {
+    std::vector<Change> changes{AddStudy{1, "a", table_, "2024-01-01T00:00:00.000Z"}};
+    for (std::uint64_t point = 0; point < 10; ++point) {
+      if (point != 5) {
+        changes.emplace_back(result_of(point));
+      }
+    }
+    store_.commit(changes);
+  }
+
+  AddResults result_of(std::uint64_t point) const {
+    return {1, table_, 0, "", "", 1, "now", {solved_point(point)}};
+  }
+  /// Only full chunks, however slow the machine is.
+  static QueryLimits full_chunks() {
+    QueryLimits limits;
+    limits.longest_chunk_ms = INT64_MAX;
+    return limits;
+  }
+  static protocol::QueryRequest wide_rows() {
+    protocol::QueryRequest request;
+    request.mutable_question()->set_study("a");
+    request.mutable_question()->add_select("point");
+    request.mutable_question()->add_select("'" + std::string(kChunkBytes / 4, 'x') + "' AS x");
+    return request;
+  }
+  /// Points of a chunk.
+  static std::vector<std::int64_t> points_of(const protocol::QueryReply& chunk) {
+    std::vector<std::int64_t> points;
+    protocol::ChunkRows rows(chunk);
+    while (rows.next()) {
+      points.push_back(rows.cell(0).integer);
+    }
+    return points;
+  }
+
+  test::TemporaryFolder folder_;
+  std::string path_ = folder_.file("studies.db");
+  Store store_;
+  std::shared_ptr<const protocol::PointTable> table_;
+};
+
+TEST_F(AnswerTest, ComesInNumberedChunksOfOneMoment) {
+  Reader reader(path_);
+  Answer answer = reader.answer(wide_rows(), full_chunks());
+  const auto first = answer.next();
+  EXPECT_THAT(points_of(first), ElementsAre(0, 1, 2, 3));
+  EXPECT_EQ(first.chunk(), 1U);
+  EXPECT_EQ(first.columns_size(), 2);
+  const std::vector<Change> more{result_of(5)};
+  store_.commit(more);
+  const auto second = answer.next();
+  EXPECT_THAT(points_of(second), ElementsAre(4, 6, 7, 8));
+  EXPECT_EQ(second.chunk(), 2U);
+  EXPECT_FALSE(second.ends());
+  const auto last = answer.next();
+  EXPECT_THAT(points_of(last), ElementsAre(9));
+  EXPECT_TRUE(last.ends());
+  EXPECT_EQ(reader.query("SELECT * FROM results", {}).rows_size(), 10);
+}
+
+TEST_F(AnswerTest, ALimitHoldsOverAllChunks) {
+  Reader reader(path_);
+  auto request = wide_rows();
+  request.mutable_question()->set_limit(6);
+  Answer answer = reader.answer(request, full_chunks());
+  EXPECT_THAT(points_of(answer.next()), ElementsAre(0, 1, 2, 3));
+  const auto last = answer.next();
+  EXPECT_THAT(points_of(last), ElementsAre(4, 6));
+  EXPECT_TRUE(last.ends());
+}
+
+TEST_F(AnswerTest, HoldsNoTransactionOnceItHasEnded) {
+  Reader reader(path_);
+  Answer answer = reader.answer(wide_rows(), full_chunks());
+  const DatabaseHandle other = open_database(path_, SQLITE_OPEN_READWRITE);
+  execute(other.get(), "SELECT * FROM studies");
+  const auto truncate_log = [&other] {
+    return sqlite3_wal_checkpoint_v2(other.get(), nullptr, SQLITE_CHECKPOINT_TRUNCATE, nullptr,
+                                     nullptr);
+  };
+  answer.next();
+  const std::vector<Change> more{result_of(5)};
+  store_.commit(more);
+  EXPECT_EQ(truncate_log(), SQLITE_BUSY);
+  while (!answer.next().ends()) {
+  }
+  EXPECT_EQ(truncate_log(), SQLITE_OK);
 }
 
 }  // namespace

@@ -11,7 +11,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/asking/columns.h"
+#include "server/query/columns.h"
 #include "server/database/sqlite.h"
 #include "server/store/store.h"
 #include "tests/support/temporary_folder.h"

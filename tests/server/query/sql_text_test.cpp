@@ -1,4 +1,4 @@
-#include "server/asking/sql/sql_expression.h"
+#include "server/query/sql_text.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ std::string objection(const std::string& text, SqlPart part = SqlPart::kConditio
   }
 }
 
-TEST(SqlExpression, WhatPeopleAskForIsAllowed) {
+TEST(SqlText, WhatPeopleAskForIsAllowed) {
   for (const char* text : {"mu > 0.5",
                            "mu > 0.5 AND (e = 1 OR e < .5)",
                            "mode = 'sC -- sR; /* ? */'",
@@ -59,7 +59,7 @@ TEST(SqlExpression, WhatPeopleAskForIsAllowed) {
   }
 }
 
-TEST(SqlExpression, ANameThatDiffersFromAColumnInCaseIsRefusedWithTheRightOne) {
+TEST(SqlText, ANameThatDiffersFromAColumnInCaseIsRefusedWithTheRightOne) {
   EXPECT_THAT(objection("E > 1e10"),
               AllOf(HasSubstr("--where \"E > 1e10\" is not allowed"),
                     HasSubstr("E is no column, and SQL would take it for e: write e, or E_Pa")));
@@ -73,20 +73,21 @@ TEST(SqlExpression, ANameThatDiffersFromAColumnInCaseIsRefusedWithTheRightOne) {
   EXPECT_THAT(objection("E DESC", SqlPart::kOrder), HasSubstr("write e"));
 }
 
-TEST(SqlExpression, AnErrorShowsTheBeginningOfALongText) {
+TEST(SqlText, AnErrorShowsTheBeginningOfALongText) {
   const std::string long_text = "mu > 1 AND (" + std::string(100'000, '1');
   EXPECT_LT(objection(long_text).size(), 1000U);
   EXPECT_THAT(objection(long_text), HasSubstr("--where \"mu > 1 AND (111"));
 }
 
-TEST(SqlExpression, NamesGivenToColumnsMayBeUsedInTheirOwnCase) {
-  EXPECT_THAT(names_given_in("max(mu) AS E, e as \"Two \"\"words\"\"\", k"),
+TEST(SqlText, AliasesMayBeUsedInTheirOwnCase) {
+  const std::vector<std::string> kAliases{"E"};
+  EXPECT_THAT(aliases_in("max(mu) AS E, e as \"Two \"\"words\"\"\", k"),
               ElementsAre("E", "Two \"words\""));
-  EXPECT_NO_THROW(check_case_of_columns("--order", "E DESC", kColumns, {"E"}));
-  EXPECT_THROW(check_case_of_columns("--order", "MU", kColumns, {"E"}), solver::InputError);
+  EXPECT_NO_THROW(check_case_of_columns("--order", "E DESC", kColumns, kAliases));
+  EXPECT_THROW(check_case_of_columns("--order", "MU", kColumns, kAliases), solver::InputError);
 }
 
-TEST(SqlExpression, NothingReachesBeyondItsPart) {
+TEST(SqlText, NothingReachesBeyondItsPart) {
   const struct {
     const char* text;
     const char* says;
