@@ -29,7 +29,8 @@ struct QueryLimits {
   std::int64_t time_limit_ms = 30'000;         ///< for each chunk of the answer; 0: no limit
   /// Of one text, blob or row inside the statement; at most SQLite's own limit of 10^9.
   std::int64_t max_value_bytes = std::int64_t{16} << 20U;
-  /// A chunk is returned with the first row that comes later, so that first rows wait for no others.
+  /// A chunk is returned with the first row that comes later, so that first rows wait for no
+  /// others.
   std::int64_t longest_chunk_ms = 250;
 };
 
