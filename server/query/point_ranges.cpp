@@ -47,55 +47,50 @@ std::optional<double> number_in(Tokens tokens) {
   return number && is_negative ? std::optional(-*number) : number;
 }
 
-/// A column compared with numbers, or none.
-std::optional<std::pair<std::string, Interval>> comparison(Tokens tokens) {
+/// A column and the interval to which a condition restricts it.
+using Restriction = std::optional<std::pair<std::string, Interval>>;
+
+Restriction restriction(Tokens column, std::optional<double> low, std::optional<double> high) {
+  const bool is_column = column.size() == 1 && column[0].kind == SqlToken::Kind::kName;
+  return is_column && low && high ? Restriction({std::string(column[0].text), {*low, *high}})
+                                  : std::nullopt;
+}
+
+/// `column < number`, `number < column` and so on; none for what is no such comparison.
+Restriction comparison(Tokens tokens) {
   const auto is_comparing = [](const SqlToken& token) {
     return token.is_sign('<') || token.is_sign('=') || token.is_sign('>');
   };
   const auto sign = std::ranges::find_if(tokens, is_comparing);
   const auto end = std::find_if_not(sign, tokens.end(), is_comparing);
   std::string text;
-  for (auto each = sign; each != end; ++each) {
-    text += each->text;
-  }
+  std::for_each(sign, end, [&](const SqlToken& token) { text += token.text; });
   Tokens column(tokens.begin(), sign);
-  Tokens value(end, tokens.end());
-  if (number_in(column)) {
-    std::swap(column, value);
-    for (char& c : text) {
-      c = c == '<' ? '>' : c == '>' ? '<' : c;
-    }
+  auto number = number_in({end, tokens.end()});
+  if (const auto first = number_in(column)) {
+    column = {end, tokens.end()};
+    number = first;
+    std::ranges::transform(text, text.begin(), [](char c) {
+      return c == '<' ? '>' : c == '>' ? '<' : c;
+    });
   }
-  const auto number = number_in(value);
-  if (!number || column.size() != 1 || column[0].kind != SqlToken::Kind::kName) {
-    return std::nullopt;
-  }
-  const std::string name(column[0].text);
   if (text == "=" || text == "==") {
-    return {{name, {*number, *number}}};
+    return restriction(column, number, number);
   }
   if (text == "<" || text == "<=") {
-    return {{name, {-kInfinity, *number}}};
+    return restriction(column, -kInfinity, number);
   }
-  if (text == ">" || text == ">=") {
-    return {{name, {*number, kInfinity}}};
-  }
-  return std::nullopt;
+  return text == ">" || text == ">=" ? restriction(column, number, kInfinity) : std::nullopt;
 }
 
-std::optional<std::pair<std::string, Interval>> between(Tokens tokens) {
-  const auto bounds = tokens.subspan(2);
+/// `column BETWEEN number AND number`
+Restriction between(Tokens tokens) {
+  const Tokens bounds = tokens.subspan(2);
   const auto middle =
       std::ranges::find_if(bounds, [](const SqlToken& token) { return is_word(token, "and"); });
-  if (middle == bounds.end()) {
-    return std::nullopt;
-  }
-  const auto low = number_in({bounds.begin(), middle});
-  const auto high = number_in({middle + 1, bounds.end()});
-  if (!low || !high || tokens[0].kind != SqlToken::Kind::kName) {
-    return std::nullopt;
-  }
-  return {{std::string(tokens[0].text), {*low, *high}}};
+  return middle == bounds.end() ? std::nullopt
+                                : restriction(tokens.first(1), number_in({bounds.begin(), middle}),
+                                              number_in({middle + 1, bounds.end()}));
 }
 
 /// Intersects `intervals` with those of the comparisons that `tokens` join with AND.

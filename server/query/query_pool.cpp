@@ -15,6 +15,8 @@ namespace {
 /// Pause before a turn is repeated that failed.
 constexpr std::chrono::milliseconds kRetryPause{20};
 constexpr std::int64_t kLongestWait_ms = 60'000;
+/// Number of chunks that marks a cancelled query.
+constexpr std::uint64_t kCancelled = UINT64_MAX;
 
 std::size_t bytes_of(const QueryJob& job) {
   return job.request.ByteSizeLong();
@@ -95,14 +97,13 @@ bool QueryPool::submit(QueryJob job) {
 
 void QueryPool::more(std::uint64_t ticket, std::uint64_t taken) {
   const std::lock_guard lock(mutex_);
-  taken_[ticket] = taken;
+  std::uint64_t& known = taken_[ticket];
+  known = std::max(known, taken);
   woken_.wake();
 }
 
 void QueryPool::cancel(std::uint64_t ticket) {
-  const std::lock_guard lock(mutex_);
-  cancelled_.insert(ticket);
-  woken_.wake();
+  more(ticket, kCancelled);
 }
 
 void QueryPool::stop() {
@@ -170,25 +171,23 @@ void QueryPool::wait() {
 }
 
 void QueryPool::take_requests() {
-  std::set<std::uint64_t> cancelled;
   std::map<std::uint64_t, std::uint64_t> taken;
   {
     const std::lock_guard lock(mutex_);
-    cancelled = std::exchange(cancelled_, {});
     taken = std::exchange(taken_, {});
   }
   for (const auto& [ticket, chunks] : taken) {
-    if (Slot* slot = slot_of(ticket); slot != nullptr && chunks > slot->taken) {
+    Slot* const slot = slot_of(ticket);
+    if (chunks == kCancelled) {
+      forget(ticket);
+      std::erase_if(slots_, [&](const Slot& each) { return each.ticket == ticket; });
+    } else if (slot != nullptr && chunks > slot->taken) {
       const bool waited = slot->waits_for_client();
       slot->taken = chunks;
       if (waited) {
         slot->deadline_ms = settings_.now_ms() + slot->time_limit_ms;
       }
     }
-  }
-  for (const std::uint64_t ticket : cancelled) {
-    forget(ticket);
-    std::erase_if(slots_, [&](const Slot& slot) { return slot.ticket == ticket; });
   }
 }
 

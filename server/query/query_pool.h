@@ -148,7 +148,6 @@ class QueryPool {
   const protocol::WakeUp woken_;
   std::mutex mutex_;
   QueryQueue queue_;                              // guarded by mutex_
-  std::set<std::uint64_t> cancelled_;             // guarded by mutex_; tickets
   std::map<std::uint64_t, std::uint64_t> taken_;  // guarded by mutex_; chunks, by ticket
   bool stopping_ = false;                         // guarded by mutex_
   std::vector<Slot> slots_;                       // of the thread
