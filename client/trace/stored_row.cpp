@@ -13,9 +13,9 @@
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
 #include "proto/result_message.h"
-#include "server/asking/sql/sql_expression.h"
 #include "server/database/sqlite.h"
-#include "server/reading/reader.h"
+#include "server/query/reader.h"
+#include "server/query/sql_text.h"
 #include "server/store/store.h"
 #include "worker/solver/model/result_fields.h"
 

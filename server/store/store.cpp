@@ -8,10 +8,8 @@
 #include "proto/recipe/canonical.h"
 #include "proto/result_message.h"
 #include "server/database/row_checksum.h"
-#include "server/store/rows/model_rows.h"
-#include "server/store/rows/packed_row.h"
-#include "server/store/rows/row_columns.h"
-#include "server/store/schema/schema_setup.h"
+#include "server/store/result_rows.h"
+#include "server/store/schema.h"
 
 namespace oblique::server {
 namespace {
@@ -78,7 +76,7 @@ struct Store::Statements {
       : add_study(database,
                   "INSERT INTO studies (study_id, name, recipe, points, state, created_at,"
                   " changed_at, priority, weight, mixes_versions, checksum, submitted_by, counted, "
-                  "takes_over)"
+                  "reuses)"
                   " VALUES (?1, ?2, ?3, ?4, 'running', ?5, ?5, ?6, ?7, ?8,"
                   " row_checksum(?1, ?2, ?3, ?4, ?5), nullif(?9, ''), 1, ?10)"),
         set_state(database, "UPDATE studies SET state = ?2, changed_at = ?3 WHERE study_id = ?1"),
@@ -91,33 +89,30 @@ struct Store::Statements {
                      " SELECT ?1, min(point), count(*), attempt, ?4 FROM"
                      " (SELECT point, attempt,"
                      " point - row_number() OVER (PARTITION BY attempt ORDER BY point) AS run"
-                     " FROM packed_results INDEXED BY failed_points WHERE study_id = ?1"
+                     " FROM results INDEXED BY failed_points WHERE study_id = ?1"
                      " AND point >= ?2 AND point < ?3 AND error IS NOT NULL)"
                      " GROUP BY attempt, run"),
         forget_failures(database,
-                        "DELETE FROM packed_results INDEXED BY failed_points WHERE study_id = ?1 "
+                        "DELETE FROM results INDEXED BY failed_points WHERE study_id = ?1 "
                         "AND point >= ?2"
-                        " AND point < ?3 AND error IS NOT NULL"),
+                        " AND point < ?3 AND error IS NOT NULL RETURNING point"),
         reopen(database,
                "UPDATE studies SET state = 'running', changed_at = ?2"
                " WHERE study_id = ?1 AND state = 'done'"),
         grow(database,
              "UPDATE studies SET recipe = ?2, points = ?3, state = 'running', changed_at = ?4,"
-             " priority = ?5, weight = ?6, mixes_versions = ?7, takes_over = takes_over OR ?8,"
+             " priority = ?5, weight = ?6, mixes_versions = ?7, reuses = reuses OR ?8,"
              " checksum = row_checksum(study_id, name, ?2, ?3, created_at) WHERE study_id = ?1"),
         rename(database,
                "UPDATE studies SET name = ?2,"
                " checksum = row_checksum(study_id, ?2, recipe, points, created_at)"
                " WHERE study_id = ?1"),
-        rename_origin(database, "UPDATE origins SET name = ?2 WHERE origin_id = ?1"),
         add_worker(database,
                    "INSERT INTO workers (worker_id, name, threads, solver_version,"
-                   " instruction_set, joined_at, checksum) VALUES (?1, ?2, ?3, ?4, ?5, ?6,"
-                   " row_checksum(?1, ?2, ?3, ?4, ?5, ?6))"),
+                   " instruction_set, joined_at) VALUES (?1, ?2, ?3, ?4, ?5, ?6)"),
         find_study(database, "SELECT 1 FROM studies WHERE study_id = ?"),
         find_model(database, "SELECT model_id FROM models WHERE definition = ?"),
         add_model(database, insert_model_sql()),
-        texts(database),
         add_result(database) {}
 
   Statement add_study;
@@ -128,14 +123,11 @@ struct Store::Statements {
   Statement reopen;
   Statement grow;
   Statement rename;
-  Statement rename_origin;
   Statement add_worker;
   Statement find_study;
   Statement find_model;
   Statement add_model;
-  TextNumbers texts;
-  RowInsert add_result;
-  PackedRow row;
+  ResultInsert add_result;
 };
 
 Store::Store(const std::string& path) {
@@ -152,6 +144,8 @@ Store::Store(const std::string& path) {
   add_row_checksum(database_.get());
   // Zeros over what is deleted would go through the log, page by page.
   execute(database_.get(), "PRAGMA secure_delete = OFF");
+  // Of a new file: four more rows fit on a page of this size than on two of half of it.
+  execute(database_.get(), "PRAGMA page_size = 8192");
   log_ = std::make_unique<WriteAheadLog>(database_.get());
   const DatabaseKind kind = identify(database_.get(), path);
   if (auto triggers = other_triggers(database_.get()); !triggers.empty()) {
@@ -195,8 +189,8 @@ Store::Store(const std::string& path) {
     transaction.commit();
   }
   statements_ = std::make_unique<Statements>(database_.get());
-  settled_ = std::make_unique<SettledRuns>(database_.get());
-  reuse_ = std::make_unique<ResultReuse>(database_.get(), *settled_);
+  ranges_ = std::make_unique<CompletedRanges>(database_.get());
+  reuse_ = std::make_unique<ResultReuse>(database_.get(), *ranges_);
 }
 
 Store::~Store() {
@@ -232,14 +226,13 @@ void Store::commit(std::span<const Change> changes) {
     for (const Change& change : changes) {
       std::visit([this](const auto& kind) { add(kind); }, change);
     }
-    settled_->flush();
+    ranges_->flush();
     transaction.commit();
     files_->check();  // or it was committed to a file that nobody will find
     log_->shorten();
   } catch (...) {
     models_.clear();
-    statements_->texts.forget();
-    settled_->forget();
+    ranges_->forget();
     log_->suspect();
     throw;
   }
@@ -302,8 +295,9 @@ void Store::add(const ForgetFailures& change) {
   if (!has_study(change.study_id)) {
     return;
   }
-  settled_->flush();
-  const bool was_doubtful = settled_->is_doubtful(change.study_id);
+  ranges_->flush();
+  const bool was_counted = ranges_->is_counted(change.study_id);
+  IntervalSet forgotten;
   change.points.for_each([&](const Interval& interval) {
     Statement& note = statements_->note_retries;
     note.bind(1, change.study_id);
@@ -315,9 +309,15 @@ void Store::add(const ForgetFailures& change) {
     forget.bind(1, change.study_id);
     forget.bind(2, interval.begin);
     forget.bind(3, interval.end);
-    forget.run();
-    settled_->look_again(change.study_id, interval, was_doubtful);
+    while (forget.step()) {
+      forgotten.insert(static_cast<std::uint64_t>(forget.integer(0)));
+    }
+    forget.reset();
   });
+  ranges_->remove(change.study_id, forgotten);
+  if (was_counted) {  // the trigger took these deletions for those of another program
+    ranges_->set_counted(change.study_id);
+  }
   Statement& reopen = statements_->reopen;
   reopen.bind(1, change.study_id);
   reopen.bind(2, change.changed_at);
@@ -338,11 +338,10 @@ void Store::add(const GrowStudy& change) {
 }
 
 void Store::add(const RenameStudy& change) {
-  for (Statement* update : {&statements_->rename, &statements_->rename_origin}) {
-    update->bind(1, change.study_id);
-    update->bind(2, change.name);
-    update->run();
-  }
+  Statement& update = statements_->rename;
+  update.bind(1, change.study_id);
+  update.bind(2, change.name);
+  update.run();
 }
 
 void Store::add(const DeleteStudy& change) {
@@ -372,20 +371,24 @@ void Store::add(const AddResults& change) {
   if (!has_study(change.study_id)) {
     return;
   }
-  PackedRow& row = statements_->row;
+  solver::CaseResult outputs;
   for (const protocol::PointResult& result : change.results) {
     const protocol::Point point = change.table->point(result.point());
-    const StoredModel model = stored_model(change, point.model);
-    const RowContext context{change.study_id, model.id,         model.accuracy, point,
-                             result.point(),  change.worker_id, change.attempt, change.solved_at};
-    if (result.error().empty()) {
-      const solver::CaseResult outputs = protocol::from_message(result);
-      row.pack(context, &outputs, {}, statements_->texts);
-    } else {
-      row.pack(context, nullptr, result.error(), statements_->texts);
+    const bool is_solved = result.error().empty();
+    if (is_solved) {
+      outputs = protocol::from_message(result);
     }
+    const ResultRow row{.study_id = change.study_id,
+                        .point = result.point(),
+                        .model_id = stored_model(change, point.model),
+                        .inputs = point,
+                        .result = is_solved ? &outputs : nullptr,
+                        .error = result.error(),
+                        .worker_id = change.worker_id,
+                        .attempt = change.attempt,
+                        .solved_at = change.solved_at};
     if (statements_->add_result.run(row)) {  // else the point has a row already
-      settled_->add(change.study_id, result.point());
+      ranges_->add(change.study_id, result.point());
     }
   }
 }
@@ -399,7 +402,8 @@ bool Store::has_study(std::uint64_t study_id) {
   return found;
 }
 
-Store::StoredModel Store::stored_model(const AddResults& change, std::uint64_t model) {
+/// The row of `models` that has that model of the study, inserted if there is none.
+std::int64_t Store::stored_model(const AddResults& change, std::uint64_t model) {
   const std::pair key{change.study_id, model};
   if (const auto known = models_.find(key); known != models_.end()) {
     return known->second;
@@ -408,22 +412,14 @@ Store::StoredModel Store::stored_model(const AddResults& change, std::uint64_t m
   const std::string definition = protocol::canonical_model(parameters);
   bind_model(statements_->add_model, parameters, definition);
   statements_->add_model.run();
-  const bool is_new = sqlite3_changes(database_.get()) > 0;
-  const std::int64_t id =
-      is_new ? sqlite3_last_insert_rowid(database_.get()) : known_model(definition);
-  const StoredModel stored{id, accuracy_of(parameters)};
-  if (models_.size() >= kMostCachedModels) {
-    models_.clear();
-  }
-  models_.emplace(key, stored);
-  return stored;
-}
-
-std::int64_t Store::known_model(std::string_view definition) {
   Statement& find = statements_->find_model;
   find.bind(1, definition);
   const std::int64_t id = find.step() ? find.integer(0) : 0;
   find.reset();
+  if (models_.size() >= kMostCachedModels) {
+    models_.clear();
+  }
+  models_.emplace(key, id);
   return id;
 }
 

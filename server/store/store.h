@@ -5,14 +5,13 @@
 #include <map>
 #include <memory>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "server/database/sqlite.h"
 #include "server/store/changes.h"
+#include "server/store/completed_ranges.h"
 #include "server/store/database_files.h"
 #include "server/store/result_reuse.h"
-#include "server/store/rows/settled_runs.h"
 #include "server/store/study_deletion.h"
 #include "server/store/write_ahead_log.h"
 #include "server/study/interval_set.h"
@@ -29,12 +28,12 @@ struct StoredStudy {
   std::string created_at;
   StudyTerms terms{};
   std::string solver_version;  ///< of its first result that a worker solved; empty: there is none
-  IntervalSet settled;         ///< points that have a row
+  IntervalSet settled;         ///< completed points
   IntervalSet failures;        ///< those whose row says failed
   PointAttempts attempts{};    ///< of these, and of those that failed and were forgotten
   std::string submitted_by{};  ///< name of the key; empty: without keys
-  bool takes_over = false;     ///< points that other studies have solved are still sought
-  std::map<std::string, std::uint64_t> taken{};  ///< points that it took over, by their origins
+  bool takes_over = false;     ///< results of other studies are still looked up
+  std::map<std::string, std::uint64_t> taken{};  ///< points that it reuses, by their source
 };
 
 /// The SQLite database (schema.sql), opened for writing. Only one Store may have a file open;
@@ -63,8 +62,8 @@ class Store final : public Storage {
   /// The log is moved into the database when it has so many pages; 1000 unless told.
   void checkpoint_at(int pages) { log_->shorten_at(pages); }
 
-  /// All studies in the order of their numbers, with what is settled. Rows of those that are in
-  /// doubt (SettledRuns) are counted again. Throws StorageError, also for a recipe that cannot be
+  /// All studies in the order of their numbers, with what is settled. Rows are counted again where
+  /// another program deleted some. Throws StorageError, also for a recipe that cannot be
   /// read, a number below 1, and a study whose rows are not those of its recipe.
   std::vector<StoredStudy> studies();
   /// A sentence about each study that `studies` left out, because an earlier version took what this
@@ -97,17 +96,11 @@ class Store final : public Storage {
   void add(const EndTaking& change) { reuse_->end(change); }
   void add(const AddWorker& change);
   void add(const AddResults& change);
-  /// Row of `models`, and the accuracy of its results.
-  struct StoredModel {
-    std::int64_t id;
-    double accuracy;
-  };
   bool has_study(std::uint64_t study_id);
-  StoredModel stored_model(const AddResults& change, std::uint64_t model);
-  std::int64_t known_model(std::string_view definition);
+  std::int64_t stored_model(const AddResults& change, std::uint64_t model);
   void set_sync(bool full);
   std::uint64_t highest(const std::string& sql);
-  PointsOfStudies settled_points();
+  PointsOfStudies completed_points();
 
   std::unique_ptr<DatabaseFiles> files_;   // outlives the connection
   std::atomic<bool> interrupted_ = false;  // the same
@@ -115,10 +108,10 @@ class Store final : public Storage {
   std::unique_ptr<WriteAheadLog> log_;
   std::unique_ptr<StudyDeletion> deletion_;
   std::unique_ptr<Statements> statements_;
-  std::unique_ptr<SettledRuns> settled_;
+  std::unique_ptr<CompletedRanges> ranges_;
   std::unique_ptr<ResultReuse> reuse_;
-  // By study and model number; emptied when it is large or a transaction fails.
-  std::map<std::pair<std::uint64_t, std::uint64_t>, StoredModel> models_;
+  // Rows of `models` by study and model number; emptied when it is large or a transaction fails.
+  std::map<std::pair<std::uint64_t, std::uint64_t>, std::int64_t> models_;
   bool full_sync_ = true;
   std::vector<std::string> left_out_;
 };

@@ -10,8 +10,8 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/text.h"
-#include "server/store/rows/recipe_check.h"
-#include "server/store/rows/row_columns.h"
+#include "server/store/recipe_check.h"
+#include "server/store/result_rows.h"
 #include "server/store/store.h"
 
 namespace oblique::server {
@@ -47,7 +47,7 @@ Progress progress_of_all(sqlite3* database) {
                                               static_cast<std::uint32_t>(retries.integer(3)));
   }
   Statement failed(database,
-                   "SELECT study_id, point, attempt FROM packed_results INDEXED BY failed_points"
+                   "SELECT study_id, point, attempt FROM results INDEXED BY failed_points"
                    " WHERE error IS NOT NULL"
                    " ORDER BY study_id, point");
   while (failed.step()) {
@@ -92,7 +92,7 @@ void check_rows(sqlite3* database, const StoredStudy& study) {
     }
   });
   RecipeCheck recipe(database, *study.table.get());
-  Statement row(database, fmt::format("SELECT {} FROM packed_results"
+  Statement row(database, fmt::format("SELECT {} FROM results"
                                       " WHERE study_id = ? AND point = ?",
                                       RecipeCheck::kColumns));
   for (const std::uint64_t point : points) {
@@ -113,8 +113,8 @@ void check_rows(sqlite3* database, const StoredStudy& study) {
 
 }  // namespace
 
-/// What is in doubt is counted in one transaction.
-PointsOfStudies Store::settled_points() {
+/// Counts rows again where that is needed, in one transaction.
+PointsOfStudies Store::completed_points() {
   auto found = noted_points(database_.get());
   std::optional<Transaction> counting;
   for (const auto& [study_id, points] : found) {
@@ -123,7 +123,7 @@ PointsOfStudies Store::settled_points() {
         log_->make_sure();
         counting.emplace(database_.get());
       }
-      settled_->count_again(study_id);
+      ranges_->count_again(study_id);
     }
   }
   if (counting) {
@@ -142,16 +142,14 @@ std::vector<StoredStudy> Store::studies() {
   Progress progress = progress_of_all(database_.get());
   Statement list(database_.get(),
                  "SELECT study_id, name, recipe, state, created_at, priority, weight,"
-                 " mixes_versions, points, coalesce(submitted_by, ''), takes_over FROM studies "
+                 " mixes_versions, points, coalesce(submitted_by, ''), reuses FROM studies "
                  "ORDER BY study_id");
   Statement version(database_.get(),
-                    "SELECT w.solver_version FROM packed_results AS r"
-                    " CROSS JOIN workers AS w ON w.worker_id = r.worker"
+                    "SELECT w.solver_version FROM results AS r"
+                    " CROSS JOIN workers AS w USING (worker_id)"
                     " WHERE r.study_id = ? ORDER BY r.point LIMIT 1");
-  Statement taken(database_.get(),
-                  "SELECT o.name, t.points FROM taken_points AS t"
-                  " JOIN origins AS o USING (origin_id) WHERE t.study_id = ?");
-  PointsOfStudies settled = settled_points();
+  Statement taken(database_.get(), "SELECT source, points FROM reused_points WHERE study_id = ?");
+  PointsOfStudies settled = completed_points();
   while (list.step()) {
     StoredStudy study{};
     study.study_id = number(list, 0);
@@ -179,7 +177,7 @@ std::vector<StoredStudy> Store::studies() {
     study.takes_over = list.integer(10) != 0;
     taken.bind(1, study.study_id);
     while (taken.step()) {
-      study.taken[taken.text(0)] += number(taken, 1);
+      study.taken[taken.text(0)] = number(taken, 1);
     }
     taken.reset();
     study.settled = std::move(settled[study.study_id]);

@@ -5,8 +5,8 @@ namespace {
 
 constexpr const char* kDeletedStudyWithRows =
     "SELECT study_id FROM deletions AS d"
-    " WHERE EXISTS (SELECT 1 FROM packed_results WHERE study_id = d.study_id)"
-    " OR EXISTS (SELECT 1 FROM settled_points WHERE study_id = d.study_id) LIMIT 1";
+    " WHERE EXISTS (SELECT 1 FROM results WHERE study_id = d.study_id)"
+    " OR EXISTS (SELECT 1 FROM completed_ranges WHERE study_id = d.study_id) LIMIT 1";
 
 }  // namespace
 
@@ -14,9 +14,7 @@ void StudyDeletion::remove(std::uint64_t study_id) {
   for (const char* sql :
        {"UPDATE about SET last_study_id = max(last_study_id, ?1)",
         "INSERT OR IGNORE INTO deletions (study_id) VALUES (?1)",
-        "DELETE FROM retries WHERE study_id = ?1", "DELETE FROM taken_points WHERE study_id = ?1",
-        "UPDATE origins SET name = name || ' (deleted)' WHERE origin_id = ?1"
-        " AND EXISTS (SELECT 1 FROM studies WHERE study_id = ?1)",
+        "DELETE FROM retries WHERE study_id = ?1", "DELETE FROM reused_points WHERE study_id = ?1",
         "DELETE FROM studies WHERE study_id = ?1"}) {
     Statement statement(database_, sql);
     statement.bind(1, study_id);
@@ -36,13 +34,14 @@ void StudyDeletion::delete_rows(std::size_t most) {
   const auto study = static_cast<std::uint64_t>(find.integer(0));
   find.reset();
   const std::size_t deleted = delete_some(
-      "DELETE FROM packed_results WHERE study_id = ?1 AND point IN"
-      " (SELECT point FROM packed_results WHERE study_id = ?1 ORDER BY point LIMIT ?2)",
+      "DELETE FROM results WHERE study_id = ?1 AND point IN"
+      " (SELECT point FROM results WHERE study_id = ?1 ORDER BY point LIMIT ?2)",
       study, most);
   rows_ += deleted;
   delete_some(
-      "DELETE FROM settled_points WHERE study_id = ?1 AND first_point IN"
-      " (SELECT first_point FROM settled_points WHERE study_id = ?1 ORDER BY first_point LIMIT ?2)",
+      "DELETE FROM completed_ranges WHERE study_id = ?1 AND first_point IN"
+      " (SELECT first_point FROM completed_ranges WHERE study_id = ?1 ORDER BY first_point LIMIT "
+      "?2)",
       study, most - deleted);
 }
 
@@ -60,16 +59,9 @@ void StudyDeletion::remove_orphans() {
     return;
   }
   execute(database_, R"sql(
-    CREATE TEMP TABLE used AS
-      SELECT DISTINCT model_id, worker, mode, major_mode, margin_event FROM packed_results;
+    CREATE TEMP TABLE used AS SELECT DISTINCT model_id, worker_id FROM results;
     DELETE FROM models WHERE model_id NOT IN (SELECT model_id FROM used);
-    DELETE FROM workers WHERE worker_id NOT IN (SELECT worker FROM used WHERE worker IS NOT NULL);
-    DELETE FROM texts WHERE text_id NOT IN (
-      SELECT mode FROM used WHERE mode IS NOT NULL UNION
-      SELECT major_mode FROM used WHERE major_mode IS NOT NULL UNION
-      SELECT margin_event FROM used WHERE margin_event IS NOT NULL);
-    DELETE FROM origins WHERE origin_id NOT IN (
-      SELECT study_id FROM studies UNION SELECT origin_id FROM taken_points);
+    DELETE FROM workers WHERE worker_id NOT IN (SELECT worker_id FROM used WHERE worker_id IS NOT NULL);
     DROP TABLE used;
     DELETE FROM deletions;
   )sql");

@@ -10,7 +10,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/text.h"
-#include "server/asking/sql/sql_expression.h"
+#include "server/query/sql_text.h"
 #include "server/web/answers/grid.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"

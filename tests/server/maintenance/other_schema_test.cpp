@@ -14,7 +14,7 @@
 #include "server/maintenance/merge.h"
 #include "server/maintenance/salvage.h"
 #include "server/maintenance/study_changes_offline.h"
-#include "server/reading/reader.h"
+#include "server/query/reader.h"
 #include "tests/server/maintenance/maintenance_fixture.h"
 
 namespace oblique::server {

@@ -12,7 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "server/maintenance/check.h"
-#include "server/reading/reader.h"
+#include "server/query/reader.h"
 #include "server/store/store.h"
 #include "tests/server/maintenance/maintenance_fixture.h"
 

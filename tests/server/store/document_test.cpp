@@ -11,8 +11,8 @@
 
 #include <gtest/gtest.h>
 
-#include "server/asking/columns.h"
 #include "server/database/sqlite.h"
+#include "server/query/columns.h"
 #include "server/store/store.h"
 #include "tests/support/temporary_folder.h"
 #include "worker/solver/model/result_fields.h"

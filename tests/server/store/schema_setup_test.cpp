@@ -7,8 +7,8 @@
 #include <gtest/gtest.h>
 
 #include "proto/recipe/point_table.h"
-#include "server/asking/plan.h"
 #include "server/maintenance/check.h"
+#include "server/query/plan.h"
 #include "server/store/store.h"
 #include "tests/support/points.h"
 #include "tests/support/temporary_folder.h"

@@ -9,7 +9,7 @@
 
 #include "proto/result_message.h"
 #include "server/maintenance/check.h"
-#include "server/reading/reader.h"
+#include "server/query/reader.h"
 #include "server/store/store.h"
 #include "tests/support/points.h"
 #include "tests/support/temporary_folder.h"

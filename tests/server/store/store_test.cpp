@@ -10,7 +10,7 @@
 
 #include "proto/recipe/model_message.h"
 #include "proto/result_message.h"
-#include "server/reading/reader.h"
+#include "server/query/reader.h"
 #include "tests/support/points.h"
 #include "tests/support/temporary_folder.h"
 

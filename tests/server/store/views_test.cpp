@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "proto/result_message.h"
-#include "server/reading/reader.h"
+#include "server/query/reader.h"
 #include "server/store/store.h"
 #include "tests/support/points.h"
 #include "tests/support/stored_numbers.h"

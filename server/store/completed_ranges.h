@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+
+#include "server/database/sqlite.h"
+#include "server/study/interval_set.h"
+
+namespace oblique::server {
+
+/// Points by the number of their study.
+using PointsOfStudies = std::map<std::uint64_t, IntervalSet>;
+
+/// Which of [begin, end) have a row, from the rows themselves. Throws StorageError.
+IntervalSet points_with_row(sqlite3* database, std::uint64_t study_id, const Interval& points);
+
+/// The completed points of all studies as `completed_ranges` has them. Studies whose rows must be
+/// counted again have none. Throws StorageError.
+std::map<std::uint64_t, std::optional<IntervalSet>> noted_points(sqlite3* database);
+
+/// The same of one study.
+std::optional<IntervalSet> noted_points_of(sqlite3* database, std::uint64_t study_id);
+
+/// Keeps the table `completed_ranges`: the completed points of each study as ranges, so that nobody
+/// has to read the rows to know. Whoever inserts or deletes rows says so here in the same
+/// transaction. When another program deletes rows, a trigger sets `studies.counted` to 0, and the
+/// rows are counted again.
+///
+/// Writing a range costs three statements, whatever its length, because neighbours are united.
+///
+/// The connection must outlive this. All members throw StorageError.
+class CompletedRanges {
+ public:
+  explicit CompletedRanges(sqlite3* database);
+  ~CompletedRanges();
+  CompletedRanges(const CompletedRanges&) = delete;
+  CompletedRanges& operator=(const CompletedRanges&) = delete;
+
+  /// Points are completed. Written by `flush`.
+  void add(std::uint64_t study_id, std::uint64_t point) { gathered_[study_id].insert(point); }
+  void add(std::uint64_t study_id, const Interval& points) {
+    gathered_[study_id].insert(points.begin, points.end);
+  }
+  /// Writes what was added.
+  void flush();
+  /// The transaction of what was added is rolled back.
+  void forget() { gathered_.clear(); }
+
+  /// These points are open again.
+  void remove(std::uint64_t study_id, const IntervalSet& points);
+  /// False after another program deleted rows of the study.
+  bool is_counted(std::uint64_t study_id);
+  void set_counted(std::uint64_t study_id);
+  /// Makes the ranges of a study from its rows.
+  void count_again(std::uint64_t study_id);
+
+ private:
+  struct Statements;
+
+  void write(std::uint64_t study_id, const Interval& range);
+
+  sqlite3* database_;
+  std::unique_ptr<Statements> statements_;
+  PointsOfStudies gathered_;
+};
+
+}  // namespace oblique::server
