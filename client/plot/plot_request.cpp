@@ -43,7 +43,6 @@ void check(const PlotRequest& request) {
         fmt::format("--block {} is not allowed: it must be the number of a block, from 1, or `all`",
                     request.block));
   }
-  (void)palette_named(request.palette);
   (void)range_given(request.range);
 }
 

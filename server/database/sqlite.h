@@ -18,12 +18,18 @@ class StorageError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The files of the database were deleted, renamed or replaced while it was open. Nothing that is
-/// written from then on is kept, and no later attempt will be.
+/// The file of the database was deleted, renamed or replaced while it was open, or a sync failed:
+/// nothing can be stored until the program starts again. After a failed sync Linux takes what it
+/// could not write for written, so that a second sync succeeds without having stored it.
 class StorageGone : public StorageError {
  public:
   using StorageError::StorageError;
 };
+
+/// Whether the extended result code is that of a failed fsync.
+bool is_failed_sync(int code);
+/// Throws StorageGone, which names the file of the connection.
+[[noreturn]] void throw_failed_sync(sqlite3* database);
 
 struct CloseDatabase {
   void operator()(sqlite3* database) const { sqlite3_close_v2(database); }

@@ -13,7 +13,7 @@ namespace oblique::server {
 namespace {
 
 constexpr int kBusyTimeout_ms = 2000;
-/// The solver of a study's results, which are all of one unless it mixes them.
+/// The solver of a study's results, which are all of one version.
 constexpr const char* kVersionOfRows =
     "SELECT w.solver_version FROM results AS r CROSS JOIN workers AS w"
     " ON w.worker_id = r.worker_id WHERE r.study_id = s.study_id ORDER BY r.point LIMIT 1";
@@ -245,7 +245,7 @@ std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name)
                   " (SELECT count(*) FROM results AS r WHERE r.study_id = s.study_id) END,"
                   " (SELECT count(*) FROM results AS r INDEXED BY failed_points"
                   " WHERE r.study_id = s.study_id AND r.error IS NOT NULL),"
-                  " s.priority, s.weight, coalesce(s.submitted_by, ''), s.mixes_versions,"
+                  " s.priority, coalesce(s.submitted_by, ''),"
                   " coalesce((") +
           kVersionOfRows +
           "), '') FROM studies AS s WHERE ?1 = '' OR s.name = ?1 ORDER BY s.study_id");
@@ -264,10 +264,8 @@ std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name)
     status.set_failed(static_cast<std::uint64_t>(list.integer(6)));
     status.set_solved(static_cast<std::uint64_t>(settled) - status.failed());
     status.set_priority(static_cast<std::int32_t>(list.integer(7)));
-    status.set_weight(list.real(8));
-    status.set_submitted_by(list.text(9));
-    status.set_mixes_versions(list.integer(10) != 0);
-    status.set_solver_version(list.text(11));
+    status.set_submitted_by(list.text(8));
+    status.set_solver_version(list.text(9));
     add_taken(origins, status);
     found.push_back(std::move(status));
   }

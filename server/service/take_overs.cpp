@@ -12,11 +12,10 @@ constexpr std::size_t kMostNamed = 20;
 
 }  // namespace
 
-bool TakeOvers::should_seek(std::uint64_t study_id, std::string_view version,
-                            bool mixes_versions) const {
+bool TakeOvers::should_seek(std::uint64_t study_id, std::string_view version) const {
   const bool is_only_source = sources_.size() == 1 && sources_.contains(study_id);
   return !solver_version_.empty() && !sources_.empty() && !is_only_source &&
-         (version.empty() || mixes_versions || version == solver_version_);
+         (version.empty() || version == solver_version_);
 }
 
 void TakeOvers::restore(std::uint64_t study_id, const std::map<std::string, std::uint64_t>& from) {

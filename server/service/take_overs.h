@@ -37,9 +37,9 @@ class TakeOvers {
 
   /// The study has results.
   void note_source(std::uint64_t study_id) { sources_.insert(study_id); }
-  /// Whether another study has results, and a study of that solver version, or of any, can have
-  /// them.
-  bool should_seek(std::uint64_t study_id, std::string_view version, bool mixes_versions) const;
+  /// Whether another study has results, and a study of that solver version, or of none
+  /// yet, can have them.
+  bool should_seek(std::uint64_t study_id, std::string_view version) const;
 
   /// From the database: points by the study that they came from.
   void restore(std::uint64_t study_id, const std::map<std::string, std::uint64_t>& from);

@@ -13,7 +13,6 @@
 #include "proto/recipe/point_table.h"
 #include "server/study/interval_set.h"
 #include "server/study/study_table.h"
-#include "server/study/study_terms.h"
 
 namespace oblique::server {
 
@@ -42,14 +41,14 @@ struct AddStudy {
   std::string name;
   StudyTable table;
   std::string created_at;
-  StudyTerms terms{};
+  std::int32_t priority = 0;
   std::string submitted_by = {};  ///< name of the key; empty: without keys
   bool takes_over = false;        ///< results of other studies are looked up
 };
 
-struct SetStudyTerms {
+struct SetPriority {
   std::uint64_t study_id;
-  StudyTerms terms{};
+  std::int32_t priority = 0;
 };
 
 /// Forgets that these points failed; a study that was done is running again. Rows of solved points
@@ -87,11 +86,11 @@ struct AddResults {
   std::vector<protocol::PointResult> results;
 };
 
-/// The study has further points, behind those that it had, and runs on these terms.
+/// The study has further points, behind those that it had, and runs with this priority.
 struct GrowStudy {
   std::uint64_t study_id;
   StudyTable table;  ///< of all its points
-  StudyTerms terms;
+  std::int32_t priority = 0;
   std::string changed_at;
   bool takes_over = false;  ///< as in AddStudy
 };
@@ -132,7 +131,7 @@ struct DeleteStudy {
 };
 
 using Change =
-    std::variant<AddStudy, SetStudyState, SetStudyTerms, ForgetFailures, GrowStudy, RenameStudy,
+    std::variant<AddStudy, SetStudyState, SetPriority, ForgetFailures, GrowStudy, RenameStudy,
                  DeleteStudy, ReuseResults, EndTaking, AddWorker, AddResults>;
 
 /// How much of what deleted studies left is gone.

@@ -77,6 +77,9 @@ struct CompletedRanges::Statements {
         take_out(database,
                  "DELETE FROM completed_ranges WHERE study_id = ? AND first_point BETWEEN ? AND ?"
                  " RETURNING first_point + points"),
+        between(database,
+                "SELECT first_point, points FROM completed_ranges WHERE study_id = ?"
+                " AND first_point BETWEEN ? AND ?"),
         put(database, "INSERT OR REPLACE INTO completed_ranges VALUES (?, ?, ?)"),
         is_counted(database, "SELECT 1 FROM studies WHERE study_id = ? AND counted"),
         set_counted(database, "UPDATE studies SET counted = 1 WHERE study_id = ?"),
@@ -109,6 +112,7 @@ struct CompletedRanges::Statements {
 
   Statement before;
   Statement take_out;
+  Statement between;
   Statement put;
   Statement is_counted;
   Statement set_counted;
@@ -139,6 +143,23 @@ void CompletedRanges::write(std::uint64_t study_id, const Interval& range) {
   put.bind(2, whole.begin);
   put.bind(3, whole.end - whole.begin);
   put.run();
+}
+
+IntervalSet CompletedRanges::overlapping(std::uint64_t study_id, const Interval& points) {
+  IntervalSet found;
+  if (const auto before = statements_->range_before(study_id, points.begin);
+      before && before->end > points.begin) {
+    found.insert(before->begin, before->end);
+  }
+  Statement& rows = statements_->between;
+  rows.bind(1, study_id);
+  rows.bind(2, points.begin);
+  rows.bind(3, points.end - 1);
+  while (rows.step()) {
+    found.insert(number(rows, 0), number(rows, 0) + number(rows, 1));
+  }
+  rows.reset();
+  return found;
 }
 
 void CompletedRanges::remove(std::uint64_t study_id, const IntervalSet& points) {

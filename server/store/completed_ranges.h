@@ -23,12 +23,12 @@ std::map<std::uint64_t, std::optional<IntervalSet>> noted_points(sqlite3* databa
 /// The same of one study.
 std::optional<IntervalSet> noted_points_of(sqlite3* database, std::uint64_t study_id);
 
-/// Keeps the table `completed_ranges`: the completed points of each study as ranges, so that nobody
-/// has to read the rows to know. Whoever inserts or deletes rows says so here in the same
-/// transaction. When another program deletes rows, a trigger sets `studies.counted` to 0, and the
-/// rows are counted again.
+/// Keeps the table `completed_ranges`: the completed points of each study as ranges, so that a
+/// start need not read all rows. To be called in each transaction that inserts or deletes rows.
+/// When another program deletes rows, a trigger sets `studies.counted` to 0, and the next start of
+/// a server makes the ranges from the rows.
 ///
-/// Writing a range costs three statements, whatever its length, because neighbours are united.
+/// Writing a range costs three statements, whatever its length. Adjacent ranges are merged.
 ///
 /// The connection must outlive this. All members throw StorageError.
 class CompletedRanges {
@@ -48,6 +48,8 @@ class CompletedRanges {
   /// The transaction of what was added is rolled back.
   void forget() { gathered_.clear(); }
 
+  /// The ranges of a study that overlap [first, end), as they are written.
+  IntervalSet overlapping(std::uint64_t study_id, const Interval& points);
   /// These points are open again.
   void remove(std::uint64_t study_id, const IntervalSet& points);
   /// False after another program deleted rows of the study.

@@ -60,11 +60,6 @@ std::string copy_sql() {
 ResultReuse::ResultReuse(sqlite3* database, CompletedRanges& ranges)
     : database_(database),
       ranges_(ranges),
-      completed_range_(database,
-                       "SELECT p.first_point + p.points FROM completed_ranges AS p"
-                       " JOIN studies AS s USING (study_id)"
-                       " WHERE p.study_id = ?1 AND first_point <= ?2 AND s.counted"
-                       " ORDER BY first_point DESC LIMIT 1"),
       model_(database, "SELECT model_id FROM models WHERE definition = ?"),
       find_(database, find_sql()),
       copy_(database, copy_sql()),
@@ -85,7 +80,7 @@ void ResultReuse::run(const ReuseResults& change) {
   const protocol::PointTable& table = *change.table;
   std::uint64_t point = first_open(change.study_id, change.first_point);
   const std::uint64_t last = std::min(point + kPart, table.size());
-  const IntervalSet completed = points_with_row(database_, change.study_id, {point, last});
+  const IntervalSet completed = ranges_.overlapping(change.study_id, {point, last});
   while (point < last && outcome.probes < kPart) {
     const protocol::Segment segment = table.segment_at(point);
     const std::uint64_t segment_end = segment.first_point + segment.count;
@@ -113,14 +108,13 @@ void ResultReuse::end(const EndTaking& change) {
   end_.run();
 }
 
-/// `point`, or the end of the range of completed points that it is in.
+/// `point`, or the end of the completed range that contains it.
 std::uint64_t ResultReuse::first_open(std::uint64_t study_id, std::uint64_t point) {
-  completed_range_.bind(1, study_id);
-  completed_range_.bind(2, point);
-  const std::uint64_t end =
-      completed_range_.step() ? static_cast<std::uint64_t>(completed_range_.integer(0)) : 0;
-  completed_range_.reset();
-  return std::max(point, end);
+  std::uint64_t first = point;
+  ranges_.overlapping(study_id, {point, point + 1}).for_each([&](const Interval& range) {
+    first = range.end;
+  });
+  return first;
 }
 
 /// Its row in `models`; 0: there is none.

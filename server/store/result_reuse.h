@@ -44,7 +44,6 @@ class ResultReuse {
 
   sqlite3* database_;
   CompletedRanges& ranges_;
-  Statement completed_range_;
   Statement model_;
   Statement find_;
   Statement copy_;

@@ -110,88 +110,103 @@ std::string study_checksum_sql() {
 
 ResultInsert::ResultInsert(sqlite3* database)
     : database_(database), insert_(database, [] {
-        std::vector<std::string> values;
-        for (std::size_t i = 1; i <= result_columns().size(); ++i) {
-          values.push_back(fmt::format("?{}", i));
+        std::string marks = "?";  // the checksum
+        for (std::size_t i = 0; i < result_columns().size(); ++i) {
+          marks += ", ?";
         }
-        // Only a point that is there already is passed over; any other conflict is an error.
+        // Only a point that has a row is passed over; any other conflict is an error.
         return fmt::format(
-            "INSERT INTO results ({0}, checksum) VALUES ({1}, row_checksum({1}))"
+            "INSERT INTO results ({}, checksum) VALUES ({})"
             " ON CONFLICT (study_id, point) DO NOTHING",
-            fmt::join(result_columns(), ", "), fmt::join(values, ", "));
+            fmt::join(result_columns(), ", "), marks);
       }()) {}
+
+void ResultInsert::put(std::string_view text) {
+  insert_.bind_lasting(next_++, text);
+  checksum_.add(text);
+}
+
+template <class Number>
+requires std::is_arithmetic_v<Number>
+void ResultInsert::put(Number value) {
+  insert_.bind(next_++, value);
+  checksum_.add(value);
+}
+
+void ResultInsert::put_null() {
+  ++next_;
+  checksum_.add_null();
+}
 
 bool ResultInsert::run(const ResultRow& row) {
   insert_.reset();
-  insert_.bind(1, row.study_id);
-  insert_.bind(2, row.point);
-  insert_.bind(3, row.model_id);
-  insert_.bind(4, row.inputs.H_m);
-  insert_.bind(5, row.inputs.mu);
-  insert_.bind(6, row.inputs.e_star);
+  checksum_.clear();
+  next_ = 1;
+  put(static_cast<std::int64_t>(row.study_id));
+  put(static_cast<std::int64_t>(row.point));
+  put(row.model_id);
+  put(row.inputs.H_m);
+  put(row.inputs.mu);
+  put(row.inputs.e_star);
   if (row.result != nullptr) {
-    bind_outputs(*row.result);
+    put_null();
+    put_fields<double>(*row.result);
+    put_fields<std::int64_t>(*row.result);
+    put_fields<std::string>(*row.result);
+    put_lists(*row.result);
   } else {
-    insert_.bind_lasting(7, row.error);
+    put(row.error);
+    std::ranges::for_each(output_columns(), [this](std::string_view) { put_null(); });
   }
-  const auto origin = static_cast<int>(kInputs.size() + output_columns().size());
-  if (row.worker_id != 0) {
-    insert_.bind(origin + 1, row.worker_id);
-  }
-  insert_.bind(origin + 2, std::int64_t{row.attempt});
-  insert_.bind_lasting(origin + 3, row.solved_at);
+  row.worker_id != 0 ? put(static_cast<std::int64_t>(row.worker_id)) : put_null();
+  put(std::int64_t{row.attempt});
+  put(row.solved_at);
+  put_null();  // reused_from
+  insert_.bind(next_, std::int64_t{checksum_.sum()});
   insert_.run();
   return sqlite3_changes(database_) > 0;
 }
 
-void ResultInsert::bind_outputs(const solver::CaseResult& result) {
-  next_ = static_cast<int>(kInputs.size()) + 1;
-  bind_fields<double>(result);
-  bind_fields<std::int64_t>(result);
-  bind_fields<std::string>(result);
-  bind_lists(result);
-}
-
 template <class T>
-void ResultInsert::bind_fields(const solver::CaseResult& result) {
+void ResultInsert::put_fields(const solver::CaseResult& result) {
   solver::for_each_stored<T>([&](const solver::ResultField&, const solver::Member<T>& member) {
-    if (const T* const value = member.of(result)) {
-      if constexpr (std::is_same_v<T, std::string>) {
-        insert_.bind_lasting(next_, *value);
-      } else {
-        insert_.bind(next_, *value);
-      }
-    }
-    ++next_;
+    const T* const value = member.of(result);
+    value != nullptr ? put(*value) : put_null();
   });
 }
 
-void ResultInsert::bind_lists(const solver::CaseResult& result) {
-  write_json(lists_[0], result.peaks, [](const solver::Peak& peak) {
+void ResultInsert::put_lists(const solver::CaseResult& result) {
+  auto& [peaks, ft_peaks, phases, stick_intervals, reaction_peaks] = lists_;
+  write_json(peaks, result.peaks, [](const solver::Peak& peak) {
     return std::array{peak.t_s, peak.fn_N, peak.ft_N, peak.major ? 1.0 : 0.0};
   });
-  write_json(lists_[1], result.ft_peaks, [](const solver::TangentialPeak& peak) {
-    return std::array{peak.t_s, peak.ft_N};
-  });
-  lists_[2] = "[";
-  for (const solver::Phase& phase : result.phases) {
-    lists_[2] += lists_[2].size() > 1 ? "," : "";
-    append(lists_[2], phase.t1_s);
+  put(peaks);
+  if (ft_peaks_equal_those_of_peaks(result)) {
+    put_null();
+  } else {
+    write_json(ft_peaks, result.ft_peaks, [](const solver::TangentialPeak& peak) {
+      return std::array{peak.t_s, peak.ft_N};
+    });
+    put(ft_peaks);
   }
-  lists_[2] += ']';
-  write_json(lists_[3], result.stick_intervals, [](const solver::StickInterval& interval) {
+  phases = "[";
+  for (const solver::Phase& phase : result.phases) {
+    phases += phases.size() > 1 ? "," : "";
+    append(phases, phase.t1_s);
+  }
+  phases += ']';
+  put(phases);
+  write_json(stick_intervals, result.stick_intervals, [](const solver::StickInterval& interval) {
     return std::array{interval.t0_s, interval.t1_s};
   });
-  write_json(lists_[4], result.reaction_peaks, [](const solver::ReactionPeak& peak) {
-    return std::array{peak.t_s, peak.force_N};
-  });
-  const std::array are_there{true, !ft_peaks_equal_those_of_peaks(result), true, true,
-                             !result.reaction_peaks.empty()};
-  for (std::size_t i = 0; i < lists_.size(); ++i) {
-    if (are_there[i]) {
-      insert_.bind_lasting(next_, lists_[i]);
-    }
-    ++next_;
+  put(stick_intervals);
+  if (result.reaction_peaks.empty()) {
+    put_null();
+  } else {
+    write_json(reaction_peaks, result.reaction_peaks, [](const solver::ReactionPeak& peak) {
+      return std::array{peak.t_s, peak.force_N};
+    });
+    put(reaction_peaks);
   }
 }
 

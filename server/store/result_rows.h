@@ -5,8 +5,10 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
 
 #include "proto/recipe/point_table.h"
+#include "server/database/row_checksum.h"
 #include "server/database/sqlite.h"
 #include "worker/solver/model/case_result.h"
 #include "worker/solver/model/parameters.h"
@@ -43,7 +45,7 @@ struct ResultRow {
 /// Inserts rows into `results`, with their checksums.
 class ResultInsert {
  public:
-  /// The connection must have the function `row_checksum`, and outlive this.
+  /// The connection must outlive this.
   explicit ResultInsert(sqlite3* database);
 
   /// Inserts the row unless its point has one; any other conflict is an error. Returns whether it
@@ -51,13 +53,18 @@ class ResultInsert {
   bool run(const ResultRow& row);
 
  private:
-  void bind_outputs(const solver::CaseResult& result);
-  void bind_lists(const solver::CaseResult& result);
+  void put(std::string_view text);
+  template <class Number>
+  requires std::is_arithmetic_v<Number>
+  void put(Number value);
+  void put_null();
   template <class T>
-  void bind_fields(const solver::CaseResult& result);
+  void put_fields(const solver::CaseResult& result);
+  void put_lists(const solver::CaseResult& result);
 
   sqlite3* database_;
   Statement insert_;
+  RowChecksum checksum_;
   int next_ = 0;                      // parameter to be bound
   std::array<std::string, 5> lists_;  // texts of the lists, which keep their memory
 };

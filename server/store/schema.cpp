@@ -1,5 +1,6 @@
 #include "server/store/schema.h"
 
+#include <algorithm>
 #include <random>
 
 #include <spdlog/fmt/fmt.h>
@@ -10,35 +11,57 @@
 namespace oblique::server {
 namespace {
 
-const std::vector<std::string>& our_views() {
-  static const std::vector<std::string> kNames{"runs", "peaks", "phases", "stick_intervals",
-                                               "reaction_peaks"};
-  return kNames;
-}
+/// An object of a database, as `sqlite_schema` has it.
+struct SchemaObject {
+  std::string type;
+  std::string name;
+  std::string table;  ///< that an index or trigger belongs to
+  std::string sql;
 
-std::vector<std::string> names(sqlite3* database, const std::string& sql) {
-  std::vector<std::string> found;
-  Statement statement(database, sql);
-  while (statement.step()) {
-    found.push_back(statement.text(0));
+  bool operator==(const SchemaObject&) const = default;
+};
+
+std::vector<SchemaObject> objects_of(sqlite3* database) {
+  std::vector<SchemaObject> objects;
+  Statement list(database,
+                 "SELECT type, name, tbl_name, sql FROM sqlite_schema"
+                 " WHERE sql IS NOT NULL ORDER BY rowid");
+  while (list.step()) {
+    objects.push_back({list.text(0), list.text(1), list.text(2), list.text(3)});
   }
-  return found;
+  return objects;
 }
 
-std::vector<std::string> missing(sqlite3* database, const std::string& type,
-                                 const std::vector<std::string>& expected) {
+const std::vector<SchemaObject>& our_objects() {
+  static const std::vector<SchemaObject> kObjects = [] {
+    const DatabaseHandle database = open_database(":memory:", SQLITE_OPEN_READWRITE);
+    execute(database.get(), kSchemaSql);
+    execute(database.get(), kViewsSql);
+    return objects_of(database.get());
+  }();
+  return kObjects;
+}
+
+std::vector<std::string> missing(sqlite3* database, const std::string& type) {
   std::vector<std::string> absent;
   Statement find(database,
                  "SELECT 1 FROM sqlite_schema WHERE type = ? AND name = ? COLLATE NOCASE");
-  for (const std::string& name : expected) {
+  for (const SchemaObject& object : our_objects()) {
+    if (object.type != type) {
+      continue;
+    }
     find.bind(1, type);
-    find.bind(2, name);
+    find.bind(2, object.name);
     if (!find.step()) {
-      absent.push_back(name);
+      absent.push_back(object.name);
     }
     find.reset();
   }
   return absent;
+}
+
+bool is_ours(const SchemaObject& object) {
+  return std::ranges::find(our_objects(), object) != our_objects().end();
 }
 
 std::string random_id() {
@@ -65,18 +88,24 @@ void create_tables(sqlite3* database) {
 
 void create_views(sqlite3* database) {
   Transaction transaction(database);
+  // Without our trigger, deleted rows were not noticed.
+  const auto objects = objects_of(database);
+  if (std::ranges::none_of(objects, [](const SchemaObject& object) {
+        return object.type == "trigger" && is_ours(object);
+      })) {
+    execute(database, "UPDATE studies SET counted = 0");
+  }
   execute(database, kViewsSql);
   transaction.commit();
 }
 
 const std::vector<TableDefinition>& our_tables() {
   static const std::vector<TableDefinition> kTables = [] {
-    const DatabaseHandle database = open_database(":memory:", SQLITE_OPEN_READWRITE);
-    execute(database.get(), kSchemaSql);
     std::vector<TableDefinition> tables;
-    Statement list(database.get(), "SELECT name, sql FROM sqlite_schema WHERE type = 'table'");
-    while (list.step()) {
-      tables.push_back({list.text(0), list.text(1)});
+    for (const SchemaObject& object : our_objects()) {
+      if (object.type == "table") {
+        tables.push_back({object.name, object.sql});
+      }
     }
     return tables;
   }();
@@ -84,25 +113,20 @@ const std::vector<TableDefinition>& our_tables() {
 }
 
 std::vector<std::string> missing_tables(sqlite3* database) {
-  std::vector<std::string> names;
-  for (const TableDefinition& table : our_tables()) {
-    names.push_back(table.name);
-  }
-  return missing(database, "table", names);
+  return missing(database, "table");
 }
 
 std::vector<std::string> missing_views(sqlite3* database) {
-  return missing(database, "view", our_views());
+  return missing(database, "view");
 }
 
 std::vector<std::string> other_triggers(sqlite3* database) {
   constexpr std::size_t kLongestName = 80;
-  std::vector<std::string> found =
-      names(database,
-            "SELECT name FROM sqlite_schema WHERE type = 'trigger' AND (name, tbl_name) <>"
-            " ('row_deleted', 'results') ORDER BY rowid");
-  for (std::string& name : found) {
-    name = protocol::visible(protocol::shortened(name, kLongestName));
+  std::vector<std::string> found;
+  for (const SchemaObject& object : objects_of(database)) {
+    if (object.type == "trigger" && !is_ours(object)) {
+      found.push_back(protocol::visible(protocol::shortened(object.name, kLongestName)));
+    }
   }
   return found;
 }

@@ -11,8 +11,9 @@ namespace oblique::server {
 void create_tables(sqlite3* database);
 
 /// Creates the indices, the trigger and the views of this schema, also where another program
-/// dropped or replaced them. Objects with other names stay. Throws StorageError, as where a table
-/// has the name of a view.
+/// dropped or replaced them. Objects with other names stay. If the trigger was not there, rows may
+/// have been deleted unnoticed, so all studies are marked to be counted again. Throws StorageError,
+/// as where a table has the name of a view.
 void create_views(sqlite3* database);
 
 /// A table of this schema and the statement that creates it.
@@ -26,8 +27,8 @@ const std::vector<TableDefinition>& our_tables();
 std::vector<std::string> missing_tables(sqlite3* database);
 std::vector<std::string> missing_views(sqlite3* database);
 
-/// Names of the triggers that this schema does not have: they would run with each change of the
-/// writer, and might never end. Throws StorageError.
+/// Names of the triggers that this schema does not have, or has with another text: they would run
+/// with each change of the writer, and might never end. Throws StorageError.
 std::vector<std::string> other_triggers(sqlite3* database);
 
 /// An expression for the highest study number in any table; 0: none. Rows of a study whose row in

@@ -6,20 +6,19 @@
 CREATE TABLE about (
   database_id   TEXT NOT NULL,              -- random, set when the file is created
   starts        INTEGER NOT NULL DEFAULT 0, -- how often a server has opened the file
-  last_study_id INTEGER NOT NULL DEFAULT 0  -- highest number of a deleted study; numbers are never reused
+  last_study_id INTEGER NOT NULL DEFAULT 0, -- highest number of a deleted study; numbers are never reused
+  has_orphans   INTEGER NOT NULL DEFAULT 0  -- 1: deleted studies may have left models and workers without rows
 ) STRICT;
 
 CREATE TABLE studies (
-  study_id     INTEGER PRIMARY KEY,  -- its number
-  name         TEXT NOT NULL UNIQUE, -- its name
+  study_id     INTEGER PRIMARY KEY,  -- number of the study
+  name         TEXT NOT NULL UNIQUE, -- name of the study
   recipe       BLOB NOT NULL,        -- oblique.protocol.Recipe, serialised: point i is a function of it
   points       INTEGER NOT NULL,     -- number of point numbers, filtered ones included
-  state        TEXT NOT NULL CHECK (state IN ('running', 'paused', 'cancelled', 'done')), -- its state
+  state        TEXT NOT NULL CHECK (state IN ('running', 'paused', 'cancelled', 'done')), -- running, paused, cancelled or done
   created_at   TEXT NOT NULL,        -- UTC, ISO 8601
   changed_at   TEXT NOT NULL,        -- when `state` was last set
   priority     INTEGER NOT NULL DEFAULT 0, -- studies of a higher priority come first
-  weight       REAL NOT NULL DEFAULT 1.0, -- share of the workers among studies of one priority
-  mixes_versions INTEGER NOT NULL DEFAULT 0, -- 1: results of several solver versions are allowed
   submitted_by TEXT,                 -- name of the key that first submitted it; NULL: without keys
   counted      INTEGER NOT NULL DEFAULT 1, -- 0: rows were deleted, `completed_ranges` must be made again
   reuses       INTEGER NOT NULL DEFAULT 0, -- 1: the lookup of results in other studies has not ended
@@ -29,7 +28,7 @@ CREATE TABLE studies (
 -- Every parameter except H, mu and e; one row for each distinct model that has results. The columns are the
 -- model keys of study files.
 CREATE TABLE models (
-  model_id    INTEGER PRIMARY KEY, -- its number
+  model_id    INTEGER PRIMARY KEY, -- number of the model
   links       INTEGER NOT NULL,    -- number of links
   length      REAL,                -- of every link, m; NULL where they differ
   lengths_m   TEXT NOT NULL,       -- lengths of the links in m as a JSON array, from the pin outwards
@@ -53,7 +52,7 @@ CREATE TABLE models (
 
 -- One row for each session in which a worker delivered a result.
 CREATE TABLE workers (
-  worker_id       INTEGER PRIMARY KEY, -- its number
+  worker_id       INTEGER PRIMARY KEY, -- number of the worker
   name            TEXT NOT NULL,       -- host and process, for people
   threads         INTEGER NOT NULL,    -- number of solver threads
   solver_version  TEXT NOT NULL,       -- of all its results
@@ -64,8 +63,8 @@ CREATE TABLE workers (
 -- One row for each solved or failed point. Outputs of a failed point are NULL and `error` says why. Lists are
 -- JSON arrays with 8 significant digits.
 CREATE TABLE results (
-  study_id         INTEGER NOT NULL REFERENCES studies (study_id), -- its study
-  point            INTEGER NOT NULL, -- its number in the study, from 0
+  study_id         INTEGER NOT NULL REFERENCES studies (study_id), -- number of the study
+  point            INTEGER NOT NULL, -- number of the point in its study, from 0
   model_id         INTEGER NOT NULL REFERENCES models (model_id),  -- every parameter except H, mu and e
   H                REAL NOT NULL, -- drop of the tip at touch, m
   mu               REAL NOT NULL, -- coefficient of friction
@@ -120,17 +119,17 @@ CREATE TABLE results (
   phases           TEXT,          -- [t1_s, ...]: end of each phase; compression first, then in turn
   stick_intervals  TEXT,          -- [[t0_s, t1_s], ...]
   reaction_peaks   TEXT,          -- [[t_s, force_N], ...]: pin first, then the joints
-  worker_id        INTEGER REFERENCES workers (worker_id),  -- NULL: the server failed the point
+  worker_id        INTEGER REFERENCES workers (worker_id), -- number of the worker; NULL: the server failed the point
   attempt          INTEGER NOT NULL, -- number of the lease under which it was solved
   solved_at        TEXT NOT NULL, -- UTC, ISO 8601
-  reused_from      TEXT,          -- STUDY/POINT, as named then, of which this is a copy; NULL: solved for this point
+  reused_from      TEXT,          -- STUDY/POINT, as named when it was copied, of which this is a copy; NULL: solved for this point
   checksum         INTEGER,       -- CRC-32 of the other columns; NULL after a change by hand
   PRIMARY KEY (study_id, point)
 ) STRICT, WITHOUT ROWID;
 
 -- Points that are completed, as ranges: those that have a row, and those that `where` leaves out.
 CREATE TABLE completed_ranges (
-  study_id    INTEGER NOT NULL REFERENCES studies (study_id), -- whose points
+  study_id    INTEGER NOT NULL REFERENCES studies (study_id), -- number of the study
   first_point INTEGER NOT NULL, -- first point of the range
   points      INTEGER NOT NULL, -- number of points
   PRIMARY KEY (study_id, first_point)
@@ -138,20 +137,20 @@ CREATE TABLE completed_ranges (
 
 -- How many results a study has copied from another.
 CREATE TABLE reused_points (
-  study_id    INTEGER NOT NULL REFERENCES studies (study_id), -- that has the copies
+  study_id    INTEGER NOT NULL REFERENCES studies (study_id), -- number of the study that has the copies
   source      TEXT NOT NULL,    -- name of the other study when they were copied
   points      INTEGER NOT NULL, -- number of copies
   PRIMARY KEY (study_id, source)
 ) STRICT, WITHOUT ROWID;
 
--- Deleted studies that may still have rows; the server deletes these in small parts.
+-- Deleted studies that may still have rows. The server deletes the rows in small parts, and then the number here.
 CREATE TABLE deletions (
-  study_id    INTEGER PRIMARY KEY -- its number
+  study_id    INTEGER PRIMARY KEY -- number of the study
 ) STRICT;
 
 -- Failed points whose rows were removed by `retry`, as ranges of one attempt. The last row of a point counts.
 CREATE TABLE retries (
-  study_id    INTEGER NOT NULL REFERENCES studies (study_id), -- whose points
+  study_id    INTEGER NOT NULL REFERENCES studies (study_id), -- number of the study
   first_point INTEGER NOT NULL, -- first point of the range
   points      INTEGER NOT NULL, -- number of points
   attempt     INTEGER NOT NULL, -- attempt that failed; the next has a higher number

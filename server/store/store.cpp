@@ -33,40 +33,11 @@ class Impatience {
   sqlite3* database_;
 };
 
-// Whether losing power must not undo a change: results are solved again, and what people asked for
-// would be gone.
-bool is_lasting(const AddStudy& /*change*/) {
-  return true;
-}
-bool is_lasting(const SetStudyState& /*change*/) {
-  return true;
-}
-bool is_lasting(const SetStudyTerms& /*change*/) {
-  return true;
-}
-bool is_lasting(const ForgetFailures& /*change*/) {
-  return true;
-}
-bool is_lasting(const GrowStudy& /*change*/) {
-  return true;
-}
-bool is_lasting(const RenameStudy& /*change*/) {
-  return true;
-}
-bool is_lasting(const ReuseResults& /*change*/) {
-  return false;
-}
-bool is_lasting(const EndTaking& /*change*/) {
-  return false;
-}
-bool is_lasting(const DeleteStudy& /*change*/) {
-  return true;
-}
-bool is_lasting(const AddWorker& /*change*/) {
-  return false;
-}
-bool is_lasting(const AddResults& /*change*/) {
-  return false;
+/// Whether a loss of power must not undo the change. Results can be solved again.
+bool is_lasting(const Change& change) {
+  return !std::holds_alternative<AddResults>(change) &&
+         !std::holds_alternative<ReuseResults>(change) &&
+         !std::holds_alternative<EndTaking>(change) && !std::holds_alternative<AddWorker>(change);
 }
 
 }  // namespace
@@ -75,14 +46,11 @@ struct Store::Statements {
   explicit Statements(sqlite3* database)
       : add_study(database,
                   "INSERT INTO studies (study_id, name, recipe, points, state, created_at,"
-                  " changed_at, priority, weight, mixes_versions, checksum, submitted_by, counted, "
-                  "reuses)"
-                  " VALUES (?1, ?2, ?3, ?4, 'running', ?5, ?5, ?6, ?7, ?8,"
-                  " row_checksum(?1, ?2, ?3, ?4, ?5), nullif(?9, ''), 1, ?10)"),
+                  " changed_at, priority, checksum, submitted_by, counted, reuses)"
+                  " VALUES (?1, ?2, ?3, ?4, 'running', ?5, ?5, ?6,"
+                  " row_checksum(?1, ?2, ?3, ?4, ?5), nullif(?7, ''), 1, ?8)"),
         set_state(database, "UPDATE studies SET state = ?2, changed_at = ?3 WHERE study_id = ?1"),
-        set_terms(database,
-                  "UPDATE studies SET priority = ?2, weight = ?3, mixes_versions = ?4"
-                  " WHERE study_id = ?1"),
+        set_priority(database, "UPDATE studies SET priority = ?2 WHERE study_id = ?1"),
         note_retries(database,
                      // Neighbours of one attempt have one difference between number and rank.
                      "INSERT INTO retries (study_id, first_point, points, attempt, retried_at)"
@@ -101,7 +69,7 @@ struct Store::Statements {
                " WHERE study_id = ?1 AND state = 'done'"),
         grow(database,
              "UPDATE studies SET recipe = ?2, points = ?3, state = 'running', changed_at = ?4,"
-             " priority = ?5, weight = ?6, mixes_versions = ?7, reuses = reuses OR ?8,"
+             " priority = ?5, reuses = reuses OR ?6,"
              " checksum = row_checksum(study_id, name, ?2, ?3, created_at) WHERE study_id = ?1"),
         rename(database,
                "UPDATE studies SET name = ?2,"
@@ -117,7 +85,7 @@ struct Store::Statements {
 
   Statement add_study;
   Statement set_state;
-  Statement set_terms;
+  Statement set_priority;
   Statement note_retries;
   Statement forget_failures;
   Statement reopen;
@@ -142,12 +110,49 @@ Store::Store(const std::string& path) {
       },
       &interrupted_);
   add_row_checksum(database_.get());
-  // Zeros over what is deleted would go through the log, page by page.
+  // Overwriting deleted rows with zeros would write many pages.
   execute(database_.get(), "PRAGMA secure_delete = OFF");
-  // Of a new file: four more rows fit on a page of this size than on two of half of it.
+  // Takes effect in a new file. Rows fill pages of this size better than smaller ones.
   execute(database_.get(), "PRAGMA page_size = 8192");
   log_ = std::make_unique<WriteAheadLog>(database_.get());
   const DatabaseKind kind = identify(database_.get(), path);
+  if (Statement journal(database_.get(), "PRAGMA journal_mode = WAL");
+      !journal.step() || journal.text(0) != "wal") {
+    throw StorageError("the file system of " + path + " cannot hold a write-ahead log");
+  }
+  execute(database_.get(), "PRAGMA synchronous = FULL");
+  log_->rewrite();
+  if (kind == DatabaseKind::kEmpty) {
+    create_tables(database_.get());
+  }
+  prepare_schema(path);
+  if (kind == DatabaseKind::kEmpty) {
+    log_->merge();  // a new file is a whole database from the start
+  }
+  deletion_ = std::make_unique<StudyDeletion>(database_.get());
+  in_transaction(true, [this] { deletion_->remove_orphans(); });
+  statements_ = std::make_unique<Statements>(database_.get());
+  ranges_ = std::make_unique<CompletedRanges>(database_.get());
+  reuse_ = std::make_unique<ResultReuse>(database_.get(), *ranges_);
+}
+
+/// Creates the views, and refuses a file whose tables or triggers are not those of this schema.
+void Store::prepare_schema(const std::string& path) {
+  // A view in the place of a table could be read without end.
+  if (const auto missing = missing_tables(database_.get()); !missing.empty()) {
+    throw StorageError(fmt::format("{} lacks the table {}: `oblique check --db {}` tells more",
+                                   path, fmt::join(missing, " and "), path));
+  }
+  try {
+    create_views(database_.get());
+  } catch (const StorageGone&) {
+    throw;
+  } catch (const StorageError& error) {
+    throw StorageError(
+        fmt::format("the views of {} cannot be created: {}. If a table has the name of a view, "
+                    "rename the table",
+                    path, error.what()));
+  }
   if (auto triggers = other_triggers(database_.get()); !triggers.empty()) {
     constexpr std::size_t kMostNames = 10;
     const std::size_t count = triggers.size();
@@ -157,113 +162,84 @@ Store::Store(const std::string& path) {
         "Drop them, as with DROP TRIGGER in the program sqlite3",
         path, count, fmt::join(triggers, ", "), count > kMostNames ? " and more" : ""));
   }
-  if (Statement journal(database_.get(), "PRAGMA journal_mode = WAL");
-      !journal.step() || journal.text(0) != "wal") {
-    throw StorageError("the file system of " + path + " cannot hold a write-ahead log");
-  }
-  execute(database_.get(), "PRAGMA synchronous = FULL");
-  log_->make_sure();
-  if (kind == DatabaseKind::kEmpty) {
-    create_tables(database_.get());
-  }
-  // A view in the place of one could be read without end.
-  if (const auto missing = missing_tables(database_.get()); !missing.empty()) {
-    throw StorageError(fmt::format("{} lacks the table {}: `oblique check --db {}` tells more",
-                                   path, fmt::join(missing, " and "), path));
-  }
-  try {
-    create_views(database_.get());
-  } catch (const StorageError& error) {
-    throw StorageError(
-        fmt::format("the views of {} cannot be created: {}. If a table has the name of a view, "
-                    "rename the table",
-                    path, error.what()));
-  }
-  if (kind == DatabaseKind::kEmpty) {
-    log_->merge();  // a new file is a whole database from the start
-  }
-  deletion_ = std::make_unique<StudyDeletion>(database_.get());
-  {
-    Transaction transaction(database_.get());
-    deletion_->remove_orphans();
-    transaction.commit();
-  }
-  statements_ = std::make_unique<Statements>(database_.get());
-  ranges_ = std::make_unique<CompletedRanges>(database_.get());
-  reuse_ = std::make_unique<ResultReuse>(database_.get(), *ranges_);
 }
 
 Store::~Store() {
   try {
     files_->check();
-    log_->before_closing();
+    if (!sync_failed_) {
+      log_->delete_on_close();
+    }
   } catch (const StorageGone&) {
-    // What was acknowledged goes into our own file, wherever that is: the next program at the path
-    // must not find our log beside another database.
+    // Another file has the name. Our log must not remain beside it, so it is merged into our own
+    // file, wherever that is.
     try {
       log_->merge();
     } catch (const StorageError&) {
-      // Nothing more can be done for it.
+      // The log stays.
     }
   }
 }
 
-void Store::set_sync(bool full) {
-  if (full != full_sync_) {
-    execute(database_.get(), full ? "PRAGMA synchronous = FULL" : "PRAGMA synchronous = NORMAL");
-    full_sync_ = full;
+void Store::guard_syncs(const std::function<void()>& work) {
+  try {
+    work();
+  } catch (const StorageGone&) {
+    sync_failed_ = true;
+    throw;
   }
+}
+
+void Store::in_transaction(bool full_sync, const std::function<void()>& work) {
+  guard_syncs([&] {
+    if (full_sync != full_sync_) {
+      execute(database_.get(),
+              full_sync ? "PRAGMA synchronous = FULL" : "PRAGMA synchronous = NORMAL");
+      full_sync_ = full_sync;
+    }
+    Transaction transaction(database_.get());
+    work();
+    transaction.commit();
+  });
 }
 
 void Store::commit(std::span<const Change> changes) {
-  const bool any_is_lasting = std::ranges::any_of(changes, [](const Change& change) {
-    return std::visit([](const auto& kind) { return is_lasting(kind); }, change);
-  });
   try {
-    log_->make_sure();
-    set_sync(any_is_lasting);
-    Transaction transaction(database_.get());
-    for (const Change& change : changes) {
-      std::visit([this](const auto& kind) { add(kind); }, change);
-    }
-    ranges_->flush();
-    transaction.commit();
-    files_->check();  // or it was committed to a file that nobody will find
-    log_->shorten();
+    in_transaction(std::ranges::any_of(changes, is_lasting), [&] {
+      for (const Change& change : changes) {
+        std::visit([this](const auto& kind) { add(kind); }, change);
+      }
+      ranges_->flush();
+    });
   } catch (...) {
     models_.clear();
     ranges_->forget();
-    log_->suspect();
     throw;
   }
+  files_->check();  // throws if it was committed to a file that has lost its name
+  guard_syncs([this] { log_->shorten(); });
 }
 
 bool Store::merge_log() {
   files_->check();
   // A reader may take long, and results would wait.
   const Impatience impatience(database_.get());
-  return log_->merge();
+  bool is_merged = false;
+  guard_syncs([&] { is_merged = log_->merge(); });
+  return is_merged;
 }
 
 ClearedAway Store::clear_away(std::size_t most) {
   if (!deletion_->has_rows()) {
     return ClearedAway::kAll;
   }
-  try {
-    log_->make_sure();
-    log_->shorten();
-    if (log_->is_held_long()) {
-      return ClearedAway::kMustWait;
-    }
-    set_sync(false);  // what losing power undoes is deleted again
-    Transaction transaction(database_.get());
-    deletion_->delete_rows(most);
-    transaction.commit();
-    files_->check();
-  } catch (...) {
-    log_->suspect();
-    throw;
+  guard_syncs([this] { log_->shorten(); });
+  if (log_->is_held_long()) {
+    return ClearedAway::kMustWait;
   }
+  // Rows that come back when power is lost are deleted again.
+  in_transaction(false, [&] { deletion_->delete_rows(most); });
+  files_->check();
   return ClearedAway::kPart;
 }
 
@@ -274,20 +250,16 @@ void Store::add(const AddStudy& change) {
   insert.bind_blob(3, change.table.recipe_bytes());
   insert.bind(4, change.table.size());
   insert.bind(5, change.created_at);
-  insert.bind(6, std::int64_t{change.terms.priority});
-  insert.bind(7, change.terms.weight);
-  insert.bind(8, std::int64_t{change.terms.mixes_versions});
-  insert.bind(9, change.submitted_by);
-  insert.bind(10, std::int64_t{change.takes_over});
+  insert.bind(6, std::int64_t{change.priority});
+  insert.bind(7, change.submitted_by);
+  insert.bind(8, std::int64_t{change.takes_over});
   insert.run();
 }
 
-void Store::add(const SetStudyTerms& change) {
-  Statement& update = statements_->set_terms;
+void Store::add(const SetPriority& change) {
+  Statement& update = statements_->set_priority;
   update.bind(1, change.study_id);
-  update.bind(2, std::int64_t{change.terms.priority});
-  update.bind(3, change.terms.weight);
-  update.bind(4, std::int64_t{change.terms.mixes_versions});
+  update.bind(2, std::int64_t{change.priority});
   update.run();
 }
 
@@ -330,10 +302,8 @@ void Store::add(const GrowStudy& change) {
   update.bind_blob(2, change.table.recipe_bytes());
   update.bind(3, change.table.size());
   update.bind(4, change.changed_at);
-  update.bind(5, std::int64_t{change.terms.priority});
-  update.bind(6, change.terms.weight);
-  update.bind(7, std::int64_t{change.terms.mixes_versions});
-  update.bind(8, std::int64_t{change.takes_over});
+  update.bind(5, std::int64_t{change.priority});
+  update.bind(6, std::int64_t{change.takes_over});
   update.run();
 }
 

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -26,7 +27,7 @@ struct StoredStudy {
   StudyTable table;
   StudyState state;
   std::string created_at;
-  StudyTerms terms{};
+  std::int32_t priority = 0;
   std::string solver_version;  ///< of its first result that a worker solved; empty: there is none
   IntervalSet settled;         ///< completed points
   IntervalSet failures;        ///< those whose row says failed
@@ -87,7 +88,7 @@ class Store final : public Storage {
 
   void add(const AddStudy& change);
   void add(const SetStudyState& change);
-  void add(const SetStudyTerms& change);
+  void add(const SetPriority& change);
   void add(const ForgetFailures& change);
   void add(const GrowStudy& change);
   void add(const RenameStudy& change);
@@ -96,9 +97,13 @@ class Store final : public Storage {
   void add(const EndTaking& change) { reuse_->end(change); }
   void add(const AddWorker& change);
   void add(const AddResults& change);
+  void prepare_schema(const std::string& path);
+  /// Notes a failed sync.
+  void guard_syncs(const std::function<void()>& work);
+  /// Runs `work` in a transaction, rolled back when it throws.
+  void in_transaction(bool full_sync, const std::function<void()>& work);
   bool has_study(std::uint64_t study_id);
   std::int64_t stored_model(const AddResults& change, std::uint64_t model);
-  void set_sync(bool full);
   std::uint64_t highest(const std::string& sql);
   PointsOfStudies completed_points();
 
@@ -113,6 +118,7 @@ class Store final : public Storage {
   // Rows of `models` by study and model number; emptied when it is large or a transaction fails.
   std::map<std::pair<std::uint64_t, std::uint64_t>, std::int64_t> models_;
   bool full_sync_ = true;
+  bool sync_failed_ = false;
   std::vector<std::string> left_out_;
 };
 

@@ -1,4 +1,5 @@
 // Reading back what studies there are and how far they are, and the numbers that were given.
+#include <algorithm>
 #include <limits>
 #include <map>
 #include <optional>
@@ -74,8 +75,14 @@ std::string objection_to(const StoredStudy& study) {
   return {};
 }
 
+bool has_condition(const StoredStudy& study) {
+  return std::ranges::any_of(study.table.get()->recipe().blocks(),
+                             [](const protocol::Block& block) { return !block.where().empty(); });
+}
+
 /// Throws StorageError for a study whose rows are those of another one, as when its number was
-/// changed by hand. Compares the first row, the last, and some between with the recipe.
+/// changed by hand. Compares the first row, the last, and some between with the recipe. A completed
+/// point may lack a row where a condition leaves out points.
 void check_rows(sqlite3* database, const StoredStudy& study) {
   constexpr std::uint64_t kCompared = 64;
   const std::uint64_t step = study.settled.size() / kCompared + 1;
@@ -98,7 +105,10 @@ void check_rows(sqlite3* database, const StoredStudy& study) {
   for (const std::uint64_t point : points) {
     row.bind(1, study.study_id);
     row.bind(2, point);
-    const std::string fault = row.step() ? recipe.fault_of(row) : "its row is gone";
+    const bool has_row = row.step();
+    const std::string fault = has_row                ? recipe.fault_of(row)
+                              : has_condition(study) ? ""
+                                                     : "its row is gone";
     row.reset();
     if (!fault.empty()) {
       throw StorageError(fmt::format(
@@ -115,34 +125,32 @@ void check_rows(sqlite3* database, const StoredStudy& study) {
 
 /// Counts rows again where that is needed, in one transaction.
 PointsOfStudies Store::completed_points() {
-  auto found = noted_points(database_.get());
-  std::optional<Transaction> counting;
-  for (const auto& [study_id, points] : found) {
-    if (!points) {
-      if (!counting) {
-        log_->make_sure();
-        counting.emplace(database_.get());
-      }
-      ranges_->count_again(study_id);
+  PointsOfStudies completed;
+  std::vector<std::uint64_t> uncounted;
+  for (auto& [study_id, points] : noted_points(database_.get())) {
+    if (points) {
+      completed.emplace(study_id, std::move(*points));
+    } else {
+      uncounted.push_back(study_id);
     }
   }
-  if (counting) {
-    counting->commit();
-    found = noted_points(database_.get());
+  if (!uncounted.empty()) {
+    in_transaction(true, [&] {
+      std::ranges::for_each(uncounted, [&](std::uint64_t id) { ranges_->count_again(id); });
+    });
   }
-  PointsOfStudies settled;
-  for (auto& [study_id, points] : found) {
-    settled.emplace(study_id, std::move(points).value_or(IntervalSet()));
+  for (const std::uint64_t id : uncounted) {
+    completed.emplace(id, noted_points_of(database_.get(), id).value_or(IntervalSet()));
   }
-  return settled;
+  return completed;
 }
 
 std::vector<StoredStudy> Store::studies() {
   std::vector<StoredStudy> found;
   Progress progress = progress_of_all(database_.get());
   Statement list(database_.get(),
-                 "SELECT study_id, name, recipe, state, created_at, priority, weight,"
-                 " mixes_versions, points, coalesce(submitted_by, ''), reuses FROM studies "
+                 "SELECT study_id, name, recipe, state, created_at, priority,"
+                 " points, coalesce(submitted_by, ''), reuses FROM studies "
                  "ORDER BY study_id");
   Statement version(database_.get(),
                     "SELECT w.solver_version FROM results AS r"
@@ -169,12 +177,12 @@ std::vector<StoredStudy> Store::studies() {
           "check` tells more",
           study.name, list.integer(0)));
     }
-    study.table = StudyTable(list.text(2), number(list, 8));
+    study.table = StudyTable(list.text(2), number(list, 6));
     study.state = state_named(list.text(3));
     study.created_at = list.text(4);
-    study.terms = {static_cast<std::int32_t>(list.integer(5)), list.real(6), list.integer(7) != 0};
-    study.submitted_by = list.text(9);
-    study.takes_over = list.integer(10) != 0;
+    study.priority = static_cast<std::int32_t>(list.integer(5));
+    study.submitted_by = list.text(7);
+    study.takes_over = list.integer(8) != 0;
     taken.bind(1, study.study_id);
     while (taken.step()) {
       study.taken[taken.text(0)] = number(taken, 1);
@@ -223,11 +231,8 @@ std::uint64_t Store::last_worker_id() {
 }
 
 std::uint64_t Store::count_start() {
-  log_->make_sure();
-  set_sync(true);
-  Transaction transaction(database_.get());
-  execute(database_.get(), "UPDATE about SET starts = starts + 1");
-  transaction.commit();
+  in_transaction(true,
+                 [this] { execute(database_.get(), "UPDATE about SET starts = starts + 1"); });
   return highest("SELECT starts FROM about");
 }
 

@@ -1,48 +1,47 @@
 #include "server/store/study_deletion.h"
 
 namespace oblique::server {
-namespace {
 
-constexpr const char* kDeletedStudyWithRows =
-    "SELECT study_id FROM deletions AS d"
-    " WHERE EXISTS (SELECT 1 FROM results WHERE study_id = d.study_id)"
-    " OR EXISTS (SELECT 1 FROM completed_ranges WHERE study_id = d.study_id) LIMIT 1";
-
-}  // namespace
+void StudyDeletion::run(const char* sql, std::uint64_t study_id) {
+  Statement statement(database_, sql);
+  statement.bind(1, study_id);
+  statement.run();
+}
 
 void StudyDeletion::remove(std::uint64_t study_id) {
   for (const char* sql :
-       {"UPDATE about SET last_study_id = max(last_study_id, ?1)",
+       {"UPDATE about SET last_study_id = max(last_study_id, ?1), has_orphans = 1",
         "INSERT OR IGNORE INTO deletions (study_id) VALUES (?1)",
         "DELETE FROM retries WHERE study_id = ?1", "DELETE FROM reused_points WHERE study_id = ?1",
         "DELETE FROM studies WHERE study_id = ?1"}) {
-    Statement statement(database_, sql);
-    statement.bind(1, study_id);
-    statement.run();
+    run(sql, study_id);
   }
 }
 
 bool StudyDeletion::has_rows() const {
-  return Statement(database_, kDeletedStudyWithRows).step();
+  return Statement(database_, "SELECT 1 FROM deletions").step();
 }
 
 void StudyDeletion::delete_rows(std::size_t most) {
-  Statement find(database_, kDeletedStudyWithRows);
-  if (!find.step()) {
+  Statement first(database_, "SELECT study_id FROM deletions LIMIT 1");
+  if (!first.step()) {
     return;
   }
-  const auto study = static_cast<std::uint64_t>(find.integer(0));
-  find.reset();
-  const std::size_t deleted = delete_some(
+  const auto study = static_cast<std::uint64_t>(first.integer(0));
+  first.reset();
+  const std::size_t results = delete_some(
       "DELETE FROM results WHERE study_id = ?1 AND point IN"
       " (SELECT point FROM results WHERE study_id = ?1 ORDER BY point LIMIT ?2)",
       study, most);
-  rows_ += deleted;
-  delete_some(
+  rows_ += results;
+  const std::size_t ranges = delete_some(
       "DELETE FROM completed_ranges WHERE study_id = ?1 AND first_point IN"
-      " (SELECT first_point FROM completed_ranges WHERE study_id = ?1 ORDER BY first_point LIMIT "
-      "?2)",
-      study, most - deleted);
+      " (SELECT first_point FROM completed_ranges WHERE study_id = ?1 ORDER BY first_point"
+      " LIMIT ?2)",
+      study, most - results);
+  if (results + ranges < most) {
+    run("DELETE FROM deletions WHERE study_id = ?1", study);
+  }
 }
 
 /// Returns how many rows the statement deleted.
@@ -55,7 +54,7 @@ std::size_t StudyDeletion::delete_some(const char* sql, std::uint64_t study_id, 
 }
 
 void StudyDeletion::remove_orphans() {
-  if (!Statement(database_, "SELECT 1 FROM deletions").step() || has_rows()) {
+  if (has_rows() || !Statement(database_, "SELECT 1 FROM about WHERE has_orphans").step()) {
     return;
   }
   execute(database_, R"sql(
@@ -63,7 +62,7 @@ void StudyDeletion::remove_orphans() {
     DELETE FROM models WHERE model_id NOT IN (SELECT model_id FROM used);
     DELETE FROM workers WHERE worker_id NOT IN (SELECT worker_id FROM used WHERE worker_id IS NOT NULL);
     DROP TABLE used;
-    DELETE FROM deletions;
+    UPDATE about SET has_orphans = 0;
   )sql");
 }
 

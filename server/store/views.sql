@@ -12,27 +12,29 @@ BEGIN
   UPDATE studies SET counted = 0 WHERE study_id = OLD.study_id;
 END;
 
+-- JSON writes a whole number without a point; the casts keep it from becoming an integer in SQL.
 DROP VIEW IF EXISTS peaks;
 CREATE VIEW peaks AS
-SELECT r.study_id, r.point, p.key AS seq, p.value ->> 0 AS t_s, p.value ->> 1 AS fn_N, p.value ->> 2 AS ft_N,
-       p.value ->> 3 AS major
+SELECT r.study_id, r.point, p.key AS seq, CAST(p.value ->> 0 AS REAL) AS t_s, CAST(p.value ->> 1 AS REAL) AS fn_N,
+       CAST(p.value ->> 2 AS REAL) AS ft_N, p.value ->> 3 AS major
 FROM results AS r, json_each(r.peaks) AS p;
 
 DROP VIEW IF EXISTS phases;
 CREATE VIEW phases AS
 SELECT r.study_id, r.point, p.key AS seq, CASE p.key % 2 WHEN 0 THEN 'compression' ELSE 'restitution' END AS kind,
-       CASE p.key WHEN 0 THEN 0.0 ELSE r.phases ->> (p.key - 1) END AS t0_s, p.value AS t1_s
+       CASE p.key WHEN 0 THEN 0.0 ELSE CAST(r.phases ->> (p.key - 1) AS REAL) END AS t0_s,
+       CAST(p.value AS REAL) AS t1_s
 FROM results AS r, json_each(r.phases) AS p;
 
 DROP VIEW IF EXISTS stick_intervals;
 CREATE VIEW stick_intervals AS
-SELECT r.study_id, r.point, s.key AS seq, s.value ->> 0 AS t0_s, s.value ->> 1 AS t1_s
+SELECT r.study_id, r.point, s.key AS seq, CAST(s.value ->> 0 AS REAL) AS t0_s, CAST(s.value ->> 1 AS REAL) AS t1_s
 FROM results AS r, json_each(r.stick_intervals) AS s;
 
 -- `seq` 0 is the pin O, 1 the first joint from there.
 DROP VIEW IF EXISTS reaction_peaks;
 CREATE VIEW reaction_peaks AS
-SELECT r.study_id, r.point, f.key AS seq, f.value ->> 0 AS t_s, f.value ->> 1 AS force_N
+SELECT r.study_id, r.point, f.key AS seq, CAST(f.value ->> 0 AS REAL) AS t_s, CAST(f.value ->> 1 AS REAL) AS force_N
 FROM results AS r, json_each(r.reaction_peaks) AS f;
 
 -- Study name, results, all lists, worker and model side by side. Young's modulus is E_Pa here, because column

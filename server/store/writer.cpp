@@ -39,42 +39,17 @@ bool ends_a_study(const Change& change) {
   return state != nullptr && state->state == StudyState::kDone;
 }
 
-// The study that a change is of; 0: of none.
-std::uint64_t study_of(const AddStudy& change) {
-  return change.study_id;
-}
-std::uint64_t study_of(const SetStudyState& change) {
-  return change.study_id;
-}
-std::uint64_t study_of(const SetStudyTerms& change) {
-  return change.study_id;
-}
-std::uint64_t study_of(const ForgetFailures& change) {
-  return change.study_id;
-}
-std::uint64_t study_of(const GrowStudy& change) {
-  return change.study_id;
-}
-std::uint64_t study_of(const RenameStudy& change) {
-  return change.study_id;
-}
-std::uint64_t study_of(const ReuseResults& change) {
-  return change.study_id;
-}
-std::uint64_t study_of(const EndTaking& change) {
-  return change.study_id;
-}
-std::uint64_t study_of(const DeleteStudy& change) {
-  return change.study_id;
-}
-std::uint64_t study_of(const AddWorker& /*change*/) {
-  return 0;
-}
-std::uint64_t study_of(const AddResults& change) {
-  return change.study_id;
-}
+/// The study that the change is of; 0: none.
 std::uint64_t study_of(const Change& change) {
-  return std::visit([](const auto& kind) { return study_of(kind); }, change);
+  return std::visit(
+      [](const auto& kind) -> std::uint64_t {
+        if constexpr (requires { kind.study_id; }) {
+          return kind.study_id;
+        } else {
+          return 0;
+        }
+      },
+      change);
 }
 
 }  // namespace

@@ -65,6 +65,7 @@ class Simulation {
     outcome_.server_kills = server_.crashes - server_.power_losses;
     outcome_.power_losses = server_.power_losses;
     outcome_.deaths_in_writes = server_.deaths_in_writes;
+    outcome_.failed_syncs = server_.failed_syncs;
     outcome_.undone_commits = disk_.model().undone_commits;
     outcome_.refused_kept = disk_.model().refused_kept;
     outcome_.failed_commits = disk_.model().failed_commits;

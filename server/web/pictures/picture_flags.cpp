@@ -106,10 +106,6 @@ void add_look(const FieldReader& fields, std::vector<std::string>& flags) {
     flags.push_back(
         fmt::format("--range={}:{}", solver::exact_number(*from), solver::exact_number(*to)));
   }
-  constexpr std::array<std::string_view, 2> kPalettes{"viridis", "cividis"};
-  if (const std::string palette = one_of(fields, "palette", "", kPalettes); !palette.empty()) {
-    flags.push_back("--palette=" + palette);
-  }
 }
 
 void add_form(const FieldReader& fields, std::vector<std::string>& flags) {

@@ -39,7 +39,7 @@ class TakingOverTest : public testing::Test {
     ClientRequest request;
     request.mutable_submit()->set_name(name);
     *request.mutable_submit()->mutable_recipe() = recipe;
-    request.mutable_submit()->set_fresh(no_reuse);
+    request.mutable_submit()->set_no_reuse(no_reuse);
     const ClientReply reply = client_->ask(request);
     EXPECT_TRUE(reply.has_submit()) << reply.error().message();
     return reply.submit();
