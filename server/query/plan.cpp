@@ -100,9 +100,14 @@ std::string join_of(const std::vector<PointRange>& ranges) {
   return fmt::format("json_each('{{{}}}') AS span CROSS JOIN ", list);
 }
 
-std::string condition_of(const std::vector<PointRange>& ranges) {
+/// A study without a recipe has no ranges of its own. A range of all points would only keep SQLite
+/// from looking up those that the condition names, as with IN.
+std::string condition_of(const std::vector<PointRange>& ranges, const protocol::Recipe& recipe) {
   if (ranges.empty()) {
-    return "0";
+    return recipe.blocks().empty() ? "1" : "0";
+  }
+  if (points_in(ranges) == points_of(recipe)) {
+    return "1";
   }
   if (ranges.size() == 1) {
     return fmt::format("runs.point BETWEEN {} AND {}", ranges[0].first, ranges[0].last);
@@ -162,7 +167,7 @@ std::string rows_of(sqlite3* database, const protocol::StudyQuery& question,
   add(kStoredFtPeaks, fmt::format(fmt::runtime(list_of), "ft_peaks"));
   return fmt::format("(SELECT {} FROM {}{} AS runs WHERE runs.study_id = {} AND {})", selected,
                      join_of(ranges), has_all ? "results" : "runs", study.study_id,
-                     condition_of(ranges));
+                     condition_of(ranges, study.recipe));
 }
 
 /// Whether rows are asked for in rising order of their points.
@@ -183,8 +188,7 @@ std::string statement_of(sqlite3* database, const protocol::StudyQuery& question
   const std::string order = !question.order().empty() ? in_sqlite(question.order())
                             : group.empty()           ? "point"
                                                       : group;
-  const auto ranges = study.recipe.blocks().empty() ? std::vector<PointRange>{{0, INT64_MAX}}
-                                                    : point_ranges(study.recipe, question.where());
+  const auto ranges = point_ranges(study.recipe, question.where());
   // The study is chosen in the subquery, where no condition can reach another one.
   std::string statement =
       fmt::format("SELECT {} FROM {}{}", selected,
