@@ -100,13 +100,13 @@ std::string join_of(const std::vector<PointRange>& ranges) {
   return fmt::format("json_each('{{{}}}') AS span CROSS JOIN ", list);
 }
 
-/// Without a range for all points of the study: SQLite would prefer it to a list of points that the
-/// query names.
+/// A study without a recipe has no ranges of its own. A range of all points would only keep SQLite
+/// from looking up those that the condition names, as with IN.
 std::string condition_of(const std::vector<PointRange>& ranges, const protocol::Recipe& recipe) {
   if (ranges.empty()) {
-    return "0";
+    return recipe.blocks().empty() ? "1" : "0";
   }
-  if (ranges.size() == 1 && (recipe.blocks().empty() || points_in(ranges) == points_of(recipe))) {
+  if (points_in(ranges) == points_of(recipe)) {
     return "1";
   }
   if (ranges.size() == 1) {
@@ -188,8 +188,7 @@ std::string statement_of(sqlite3* database, const protocol::StudyQuery& question
   const std::string order = !question.order().empty() ? in_sqlite(question.order())
                             : group.empty()           ? "point"
                                                       : group;
-  const auto ranges = study.recipe.blocks().empty() ? std::vector<PointRange>{{0, INT64_MAX}}
-                                                    : point_ranges(study.recipe, question.where());
+  const auto ranges = point_ranges(study.recipe, question.where());
   // The study is chosen in the subquery, where no condition can reach another one.
   std::string statement =
       fmt::format("SELECT {} FROM {}{}", selected,

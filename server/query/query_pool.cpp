@@ -12,7 +12,7 @@
 namespace oblique::server {
 namespace {
 
-/// Pause before a turn is repeated that failed.
+/// Pause before a failed turn is repeated.
 constexpr std::chrono::milliseconds kRetryPause{20};
 constexpr std::int64_t kLongestWait_ms = 60'000;
 /// Number of chunks that marks a cancelled query.
@@ -128,7 +128,7 @@ void QueryPool::run() {
     try {
       turn();
     } catch (const std::exception&) {
-      // Such as std::bad_alloc. What this turn did not do is done in the next one.
+      // Such as std::bad_alloc. The next turn does the rest.
       std::this_thread::sleep_for(kRetryPause);
     }
   }
@@ -279,7 +279,7 @@ void QueryPool::finish(Slot& slot, std::string reply) {
   report_({QueryReport::Kind::kAnswered, ticket, std::move(reply)});
 }
 
-/// Gives the query, if there is one, an error, and ends the process.
+/// Answers the query, if there is one, with an error, and ends the process.
 void QueryPool::fail(Slot& slot, const std::string& message) {
   if (slot.ticket != 0) {
     finish(slot, encoded_error(message));
@@ -287,7 +287,7 @@ void QueryPool::fail(Slot& slot, const std::string& message) {
   slot.process.reset();
 }
 
-/// Null when no process runs that query; for 0 one without a query.
+/// The slot whose process runs that query, for 0 an idle one; nullptr: none.
 QueryPool::Slot* QueryPool::slot_of(std::uint64_t ticket) {
   const auto found = std::find_if(slots_.begin(), slots_.end(),
                                   [&](const Slot& slot) { return slot.ticket == ticket; });

@@ -24,7 +24,7 @@ namespace oblique::server {
 /// A query of a client.
 struct QueryJob {
   std::uint64_t ticket;  ///< unique
-  std::string client;    ///< who shares a place in the round: a key, or a connection
+  std::string client;    ///< whose queries take turns with those of others: a key, or a connection
   protocol::QueryRequest request;
 };
 
@@ -36,7 +36,7 @@ struct QueueSettings {
   std::size_t most_waiting_bytes = 16U << 20U;  ///< of all statements that wait
 };
 
-/// Decides which query runs next: round-robin over clients, first come first served within one.
+/// Decides which query runs next: round-robin over clients, in order of arrival within one.
 /// Has no thread and no clock.
 class QueryQueue {
  public:
@@ -76,9 +76,9 @@ struct QueryPoolSettings {
   /// Program that reads, see reader_program.h; the default is the one that runs.
   std::string reader_program = "/proc/self/exe";
   QueueSettings queue;
-  /// A client that takes no chunk for so long, while kChunksAhead wait for it, loses its answer.
+  /// A client that takes none of kChunksAhead chunks for this time loses its answer.
   std::int64_t patience_ms = 10'000;
-  /// A whole answer may not take longer, waiting for its client included.
+  /// Longest time of a whole answer, waiting for its client included.
   std::int64_t longest_answer_ms = 1'800'000;
   std::function<std::int64_t()> now_ms = [] {
     using std::chrono::steady_clock;
@@ -93,7 +93,7 @@ inline constexpr std::uint64_t kChunksAhead = 4;
 
 /// Runs queries in reader processes, which are started when needed and kept for later queries. A
 /// process can be bounded in memory and stopped at any time, whatever its statement does. One
-/// thread looks after all processes.
+/// thread serves all processes.
 class QueryPool {
  public:
   using Report = std::function<void(QueryReport)>;

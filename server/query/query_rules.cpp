@@ -16,7 +16,7 @@ namespace {
 
 constexpr const char* kOnlyReads = "this only reads";
 
-/// Pragmas that only tell something, when they have no argument or name a table.
+/// Pragmas that only return values, if they have no argument or name a table.
 bool is_harmless_pragma(std::string_view name, const char* argument) {
   constexpr std::array<std::string_view, 6> kAboutTables{
       "table_info", "table_xinfo", "table_list", "index_list", "index_info", "foreign_key_list"};
@@ -28,8 +28,8 @@ bool is_harmless_pragma(std::string_view name, const char* argument) {
   return has(kAboutTables) || (argument == nullptr && has(kPlain));
 }
 
-/// Functions that reach out of the database, take or give addresses of this process, run SQL of
-/// their own, or belong to kinds of tables that ours has not.
+/// False for functions that reach out of the database, use addresses of this process, run SQL, or
+/// belong to kinds of tables that our databases do not have.
 bool is_harmless_function(std::string_view name) {
   constexpr std::array<std::string_view, 16> kOthers{
       "load_extension", "fts3_tokenizer", "fts5",       "fts5_source_id",
@@ -96,8 +96,7 @@ void restrict_to_reading(sqlite3* database) {
     sqlite3_limit(database, limit, most);
   }
   // The schema stays trusted: SQLite 3.40 takes json_extract, which our views use, for unsafe.
-  // Without DQS_DML a name in double quotes that no column has is an error, no text. Views are read
-  // so too, and none of any schema of ours has such a text; DQS_DDL is of what a file defines.
+  // Without DQS_DML an unknown name in double quotes is an error instead of a text.
   constexpr std::array<std::pair<int, int>, 5> kSwitches{
       {{SQLITE_DBCONFIG_DEFENSIVE, 1},
        {SQLITE_DBCONFIG_DQS_DML, 0},
@@ -107,7 +106,7 @@ void restrict_to_reading(sqlite3* database) {
   for (const auto& [name, value] : kSwitches) {
     sqlite3_db_config(database, name, value, nullptr);
   }
-  // SQLite makes these tables of functions when they are first named, which would be refused then.
+  // SQLite creates these virtual tables at their first use, which would be refused later.
   execute(database, "SELECT 1 FROM json_each('[]'), json_tree('[]')");
   add_functions(database);
   sqlite3_set_authorizer(database, &authorize, nullptr);
@@ -147,7 +146,7 @@ StatementHandle prepare_query(sqlite3* database, const std::string& sql) {
     throw StatementError(kOnlyReads);
   }
   if (sqlite3_bind_parameter_count(raw) > 0) {
-    // Only the named ones have a name; nothing would ever be bound to any.
+    // A parameter without a name is ?.
     const char* name = sqlite3_bind_parameter_name(raw, sqlite3_bind_parameter_count(raw));
     throw StatementError(std::string("the statement has the parameter ") +
                          (name == nullptr ? "?" : name) +

@@ -17,7 +17,7 @@ class QueryError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The statement itself is wrong: asking for it again gives the same.
+/// The statement itself is wrong: running it again gives the same error.
 class StatementError : public QueryError {
  public:
   using QueryError::QueryError;
@@ -52,23 +52,23 @@ inline constexpr std::int64_t kReaderHeapBytes = std::int64_t{256} << 20U;
 /// Longest statement [bytes].
 inline constexpr int kLongestSql = 1'000'000;
 
-/// Lets statements on `database` read and compute, nothing else, adds our functions, and bounds
-/// what one statement may consist of. LIKE becomes case-sensitive, since in modes S is stick and s
-/// slip. What does not fit into memory is not put into files.
+/// Lets statements on `database` read and compute, nothing else, adds our functions, and bounds the
+/// size of a statement. LIKE becomes case-sensitive, since in modes S is stick and s is slip.
+/// Sorting and grouping use no files.
 void restrict_to_reading(sqlite3* database);
 
 using StatementHandle = std::unique_ptr<sqlite3_stmt, int (*)(sqlite3_stmt*)>;
 
-/// One statement that only reads. Throws StatementError: none or more than one, one that
-/// writes, attaches or sets something, one with parameters, one that SQLite refuses; QueryError for
-/// one that needs too much.
+/// Prepares one statement that only reads. Throws StatementError for none or several statements,
+/// for one that writes, attaches or changes settings, has parameters, or that SQLite refuses;
+/// QueryError for one that needs too much memory.
 StatementHandle prepare_query(sqlite3* database, const std::string& sql);
 
-/// What a failed call on `database` means to the one who asked. `code` is what SQLite returned.
+/// The error for a client after a call on `database` returned `code`.
 QueryError failure(sqlite3* database, int code);
 
-/// Throws what a statement that failed while it ran means: StatementError where its functions were
-/// given what they do not take, else QueryError.
+/// Throws the error of a statement that failed while it ran: StatementError for a wrong argument of
+/// one of our functions, else QueryError.
 [[noreturn]] void throw_failure(sqlite3* database, int code);
 
 }  // namespace oblique::server

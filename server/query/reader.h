@@ -41,7 +41,7 @@ class Answer {
   QueryLimits limits_;
   const std::atomic<bool>& interrupted_;
   StatementHandle statement_{nullptr, &sqlite3_finalize};
-  std::vector<std::string> units_;             // of these, or none
+  std::vector<std::string> units_;             // of the columns, or none
   std::optional<protocol::ChunkWriter> rows_;  // set by the constructor
   std::uint64_t chunks_ = 0;
 };
@@ -54,22 +54,22 @@ class Reader {
   /// schema, an unreadable file.
   explicit Reader(const std::string& path);
 
-  /// What there is to say of how the database is read (see open_for_reading); mostly nothing.
+  /// How the database is read, if that is unusual (see open_for_reading); mostly empty.
   const std::string& remark() const { return remark_; }
 
-  /// The answer to `request`, to be taken in chunks. Throws QueryError: what `prepare_query` does,
-  /// and for a plan that takes longer than the time limit; solver::InputError for a wrong question.
+  /// Starts the answer to `request`. Throws QueryError as `prepare_query` does, and for a plan that
+  /// takes longer than the time limit; solver::InputError for a wrong question.
   /// The reader must outlive the answer and does nothing else meanwhile.
   Answer answer(const protocol::QueryRequest& request, const QueryLimits& limits);
 
   /// The whole answer to one statement, as `rows` of one reply. Throws what Answer throws.
   protocol::QueryReply query(const std::string& sql, const QueryLimits& limits);
 
-  /// Where the study called `name` stands, or all of them when `name` is empty. Nothing is leased
-  /// and the rate is 0, for that only a server knows. Throws QueryError for an unknown name.
+  /// Status of the study called `name`, or of all when `name` is empty. Leases and rate are 0,
+  /// because only a server has them. Throws QueryError for an unknown name.
   std::vector<protocol::StudyStatus> study_status(const std::string& name = {});
 
-  /// Ends the query that runs, and all later ones. From any thread.
+  /// Ends the running query and all later ones. May be called from any thread.
   void interrupt() { interrupted_ = true; }
 
  private:

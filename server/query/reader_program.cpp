@@ -24,11 +24,11 @@
 namespace oblique::server {
 namespace {
 
-/// Memory beside SQLite's: the answer and what holds it while it is made.
+/// Memory beside SQLite's, for the answer.
 constexpr rlim_t kOwnBytes = 512U << 20U;
-/// SQLite may make the database's index of the write-ahead log, and writes nothing else.
+/// SQLite may create the index of the write-ahead log (-shm), and writes nothing else.
 constexpr rlim_t kLargestFile = 64U << 20U;
-/// Behind the server and the workers, and the first to go when the machine runs out of memory.
+/// Lower priority than server and workers, and the first process to be killed without memory.
 constexpr int kNiceness = 5;
 constexpr const char* kFirstToGo = "1000";
 /// Processor time beyond the limit of a query. Matters only where the server that would kill this
@@ -70,7 +70,7 @@ void confine() {
   limit(RLIMIT_FSIZE, kLargestFile);
   limit(RLIMIT_CORE, 0);
   sqlite3_hard_heap_limit64(kReaderHeapBytes);
-  // The next two help the rest of the machine; where they are not allowed it goes without.
+  // Where the next two are not allowed, the reader runs without them.
   (void)setpriority(PRIO_PROCESS, 0, kNiceness);
   std::ofstream("/proc/self/oom_score_adj") << kFirstToGo;
 }
@@ -193,7 +193,7 @@ int run_reader_program(const std::string& path) {
       if (!send_answer(reader, path, *request)) {
         return 1;
       }
-      malloc_trim(0);  // what one query had is not kept for the next
+      malloc_trim(0);  // returns the memory of one query before the next
     }
     return 0;
   } catch (const std::exception& error) {

@@ -19,7 +19,7 @@ namespace {
 constexpr double kHalf = 50.0;
 constexpr double kWhole = 100.0;
 
-/// The numbers of a group. SQLite gives it zeroed, and takes it back when the group ends.
+/// The numbers of a group. SQLite allocates it with zeros and frees it when the group ends.
 struct Numbers {
   double* values;
   std::uint64_t count;
@@ -39,13 +39,13 @@ struct Moments {
   double products;
 };
 
-/// Fails the statement by the fault of whoever wrote it.
+/// Ends the statement with the error kWrongArgument.
 void refuse(sqlite3_context* context, const char* why) {
   sqlite3_result_error(context, why, -1);
   sqlite3_result_error_code(context, kWrongArgument);
 }
 
-/// Whether the value is a number. NULL counts as none; for others the statement fails.
+/// Whether the value is a number. NULL is not; other values end the statement.
 bool is_number(sqlite3_context* context, sqlite3_value* value) {
   switch (sqlite3_value_type(value)) {
     case SQLITE_INTEGER:
@@ -104,7 +104,7 @@ void percentile_step(sqlite3_context* context, int, sqlite3_value** arguments) {
   add_number(context, arguments[0], percent);
 }
 
-/// Between the two numbers nearest to the place, in proportion.
+/// The percentile, interpolated linearly between the two nearest numbers.
 void numbers_final(sqlite3_context* context) {
   auto* const numbers = static_cast<Numbers*>(sqlite3_aggregate_context(context, 0));
   if (numbers == nullptr) {
@@ -124,7 +124,7 @@ void numbers_final(sqlite3_context* context) {
   numbers->values = nullptr;
 }
 
-/// Of the pair of the first and the last argument.
+/// Adds the pair of the first and the last argument.
 void moments_step(sqlite3_context* context, int count_of_arguments, sqlite3_value** arguments) {
   sqlite3_value* const x = arguments[0];
   sqlite3_value* const y = arguments[count_of_arguments - 1];
@@ -148,7 +148,7 @@ void moments_step(sqlite3_context* context, int count_of_arguments, sqlite3_valu
   moments->products += step_x * step_y * part;
 }
 
-/// Of a sample: divided by one less than there are; NULL for fewer than two.
+/// Variance of a sample, divided by n - 1, or its root; NULL for fewer than two numbers.
 template <bool is_root>
 void moments_final(sqlite3_context* context) {
   const auto* const moments = static_cast<const Moments*>(sqlite3_aggregate_context(context, 0));

@@ -28,12 +28,12 @@ struct SqlFunction {
   std::string_view name;
   std::string_view form;     ///< for listings; empty: it is not listed
   std::string_view meaning;  ///< one line
-  bool aggregates = false;   ///< with one argument, where the name is min or max
+  bool aggregates = false;   ///< it makes one value of many rows; min and max with one argument
   bool keeps_unit = false;   ///< its value has the unit of its first argument
 };
 std::span<const SqlFunction> sql_functions();
 
-/// The function of that name, in whatever case; nullptr: none of these.
+/// The function of that name, in any case; nullptr: none.
 const SqlFunction* find_sql_function(std::string_view name);
 
 }  // namespace oblique::server

@@ -327,6 +327,13 @@ TEST_F(PlanTest, OnlyQueriesThatNameAModelOrWorkerReadTheirTables) {
   EXPECT_TRUE(reads_models("phases", ""));
 }
 
+TEST_F(PlanTest, PointsThatAConditionNamesAreLookedUp) {
+  const auto asked = question("fn_peak_N", "point IN (3, 1)");
+  Statement steps(database_.get(), "EXPLAIN QUERY PLAN " + plan(database_.get(), asked).statement);
+  ASSERT_TRUE(steps.step());
+  EXPECT_THAT(steps.text(3), HasSubstr("(study_id=? AND point=?)"));
+}
+
 TEST_F(PlanTest, UnitsFollowFromThoseOfColumns) {
   EXPECT_EQ(column("avg(fn_peak_N)").unit, "N");
   EXPECT_EQ(column("percentile(slide_m, 90)").unit, "m");
