@@ -52,7 +52,6 @@ Event StudyChanges::stored(const GrowthWrite& write, Instant /*now*/) {
 
 void StudyChanges::stored(const NameWrite& write) {
   note(write.study, fmt::format("is called {} from now on", write.name));
-  known_.rename_origin(states_.record(write.study).name, write.name);
   states_.rename(write.study, write.name);
 }
 
@@ -65,8 +64,6 @@ Event StudyChanges::stored(const RemovalWrite& write, Instant now) {
   note(write.study, "is deleted");
   open_.close(write.study);
   states_.remove(write.study);
-  known_.rename_origin(reply.change().study().name(),
-                       fmt::format("{} (deleted)", reply.change().study().name()));
   known_.forget(write.study);
   release_replies(now, write.study);
   return StudyRemoved{write.study};

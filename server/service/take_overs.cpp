@@ -26,14 +26,6 @@ void TakeOvers::restore(std::uint64_t study_id, const std::map<std::string, std:
   }
 }
 
-void TakeOvers::rename_origin(const std::string& before, const std::string& name) {
-  for (auto& [study_id, taken] : taken_) {
-    if (auto origin = taken.from.extract(before); !origin.empty()) {
-      taken.from[name] += origin.mapped();
-    }
-  }
-}
-
 bool TakeOvers::begin(std::uint64_t study_id, std::int64_t now_ms) {
   std::optional<Lookup>& lookup = taken_[study_id].lookup;
   if (lookup) {

@@ -18,9 +18,7 @@ IntervalSet points_with_row(sqlite3* database, std::uint64_t study_id, const Int
   Statement rows(database,
                  "SELECT point FROM results WHERE study_id = ? AND point >= ? AND point < ?"
                  " ORDER BY point");
-  rows.bind(1, study_id);
-  rows.bind(2, points.begin);
-  rows.bind(3, points.end);
+  rows.bind_all(study_id, points.begin, points.end);
   while (rows.step()) {
     const std::uint64_t point = number(rows, 0);
     if (point != run.end) {
@@ -35,93 +33,65 @@ IntervalSet points_with_row(sqlite3* database, std::uint64_t study_id, const Int
 
 std::map<std::uint64_t, std::optional<IntervalSet>> noted_points(sqlite3* database) {
   std::map<std::uint64_t, std::optional<IntervalSet>> found;
-  Statement studies(database, "SELECT study_id, counted FROM studies");
+  Statement studies(database, "SELECT study_id FROM studies");
   while (studies.step()) {
-    found[number(studies, 0)] =
-        studies.integer(1) != 0 ? std::optional(IntervalSet()) : std::nullopt;
-  }
-  Statement runs(database,
-                 "SELECT study_id, first_point, points FROM completed_ranges"
-                 " ORDER BY study_id, first_point");
-  while (runs.step()) {
-    const auto study = found.find(number(runs, 0));
-    if (study != found.end() && study->second) {
-      study->second->insert(number(runs, 1), number(runs, 1) + number(runs, 2));
-    }
+    found[number(studies, 0)] = noted_points_of(database, number(studies, 0));
   }
   return found;
 }
 
 std::optional<IntervalSet> noted_points_of(sqlite3* database, std::uint64_t study_id) {
   Statement study(database, "SELECT 1 FROM studies WHERE study_id = ? AND counted");
-  study.bind(1, study_id);
+  study.bind_all(study_id);
   if (!study.step()) {
     return std::nullopt;
   }
   IntervalSet found;
-  Statement runs(database,
-                 "SELECT first_point, points FROM completed_ranges WHERE study_id = ?"
-                 " ORDER BY first_point");
-  runs.bind(1, study_id);
-  while (runs.step()) {
-    found.insert(number(runs, 0), number(runs, 0) + number(runs, 1));
+  Statement ranges(database,
+                   "SELECT first_point, points FROM completed_ranges WHERE study_id = ?"
+                   " ORDER BY first_point");
+  ranges.bind_all(study_id);
+  while (ranges.step()) {
+    found.insert(number(ranges, 0), number(ranges, 0) + number(ranges, 1));
   }
   return found;
 }
 
-struct CompletedRanges::Statements {
-  explicit Statements(sqlite3* database)
-      : before(database,
-               "SELECT first_point, points FROM completed_ranges WHERE study_id = ?"
-               " AND first_point BETWEEN 0 AND ? ORDER BY first_point DESC LIMIT 1"),
-        take_out(database,
-                 "DELETE FROM completed_ranges WHERE study_id = ? AND first_point BETWEEN ? AND ?"
-                 " RETURNING first_point + points"),
-        between(database,
-                "SELECT first_point, points FROM completed_ranges WHERE study_id = ?"
-                " AND first_point BETWEEN ? AND ?"),
-        put(database, "INSERT OR REPLACE INTO completed_ranges VALUES (?, ?, ?)"),
-        is_counted(database, "SELECT 1 FROM studies WHERE study_id = ? AND counted"),
-        set_counted(database, "UPDATE studies SET counted = 1 WHERE study_id = ?"),
-        clear(database, "DELETE FROM completed_ranges WHERE study_id = ?") {}
-
-  /// The last range that begins at or before the point.
-  std::optional<Interval> range_before(std::uint64_t study_id, std::uint64_t point) {
-    std::optional<Interval> range;
-    before.bind(1, study_id);
-    before.bind(2, point);
-    if (before.step()) {
-      range = Interval{number(before, 0), number(before, 0) + number(before, 1)};
-    }
-    before.reset();
-    return range;
-  }
-
-  /// Takes out the ranges that begin in [first, last]. Returns the end of the last one, or 0.
-  std::uint64_t take_out_ranges(std::uint64_t study_id, std::uint64_t first, std::uint64_t last) {
-    std::uint64_t end = 0;
-    take_out.bind(1, study_id);
-    take_out.bind(2, first);
-    take_out.bind(3, last);
-    while (take_out.step()) {
-      end = std::max(end, number(take_out, 0));
-    }
-    take_out.reset();
-    return end;
-  }
-
-  Statement before;
-  Statement take_out;
-  Statement between;
-  Statement put;
-  Statement is_counted;
-  Statement set_counted;
-  Statement clear;
-};
-
 CompletedRanges::CompletedRanges(sqlite3* database)
-    : database_(database), statements_(std::make_unique<Statements>(database)) {}
-CompletedRanges::~CompletedRanges() = default;
+    : database_(database),
+      before_(database,
+              "SELECT first_point, points FROM completed_ranges WHERE study_id = ?"
+              " AND first_point BETWEEN 0 AND ? ORDER BY first_point DESC LIMIT 1"),
+      take_out_(database,
+                "DELETE FROM completed_ranges WHERE study_id = ? AND first_point BETWEEN ? AND ?"
+                " RETURNING first_point + points"),
+      between_(database,
+               "SELECT first_point, points FROM completed_ranges WHERE study_id = ?"
+               " AND first_point BETWEEN ? AND ?"),
+      put_(database, "INSERT OR REPLACE INTO completed_ranges VALUES (?, ?, ?)") {}
+
+/// The last range that begins at or before the point.
+std::optional<Interval> CompletedRanges::range_before(std::uint64_t study_id, std::uint64_t point) {
+  std::optional<Interval> range;
+  before_.bind_all(study_id, point);
+  if (before_.step()) {
+    range = Interval{number(before_, 0), number(before_, 0) + number(before_, 1)};
+  }
+  before_.reset();
+  return range;
+}
+
+/// Deletes the ranges that begin in [first, last]. Returns the end of the last one, or 0.
+std::uint64_t CompletedRanges::take_out(std::uint64_t study_id, std::uint64_t first,
+                                        std::uint64_t last) {
+  std::uint64_t end = 0;
+  take_out_.bind_all(study_id, first, last);
+  while (take_out_.step()) {
+    end = std::max(end, number(take_out_, 0));
+  }
+  take_out_.reset();
+  return end;
+}
 
 void CompletedRanges::flush() {
   for (const auto& [study_id, points] : gathered_) {
@@ -132,29 +102,23 @@ void CompletedRanges::flush() {
 
 void CompletedRanges::write(std::uint64_t study_id, const Interval& range) {
   Interval whole = range;
-  const auto before = statements_->range_before(study_id, range.begin);
+  const auto before = range_before(study_id, range.begin);
   if (before && before->end >= range.begin) {
     whole = {before->begin, std::max(range.end, before->end)};
   }
-  whole.end =
-      std::max(whole.end, statements_->take_out_ranges(study_id, whole.begin + 1, whole.end));
-  Statement& put = statements_->put;
-  put.bind(1, study_id);
-  put.bind(2, whole.begin);
-  put.bind(3, whole.end - whole.begin);
-  put.run();
+  whole.end = std::max(whole.end, take_out(study_id, whole.begin + 1, whole.end));
+  put_.bind_all(study_id, whole.begin, whole.end - whole.begin);
+  put_.run();
 }
 
 IntervalSet CompletedRanges::overlapping(std::uint64_t study_id, const Interval& points) {
   IntervalSet found;
-  if (const auto before = statements_->range_before(study_id, points.begin);
+  if (const auto before = range_before(study_id, points.begin);
       before && before->end > points.begin) {
     found.insert(before->begin, before->end);
   }
-  Statement& rows = statements_->between;
-  rows.bind(1, study_id);
-  rows.bind(2, points.begin);
-  rows.bind(3, points.end - 1);
+  Statement& rows = between_;
+  rows.bind_all(study_id, points.begin, points.end - 1);
   while (rows.step()) {
     found.insert(number(rows, 0), number(rows, 0) + number(rows, 1));
   }
@@ -164,11 +128,11 @@ IntervalSet CompletedRanges::overlapping(std::uint64_t study_id, const Interval&
 
 void CompletedRanges::remove(std::uint64_t study_id, const IntervalSet& points) {
   points.for_each([&](const Interval& gone) {
-    const auto before = statements_->range_before(study_id, gone.begin);
+    const auto before = range_before(study_id, gone.begin);
     const bool overlaps = before && before->end > gone.begin;
     const std::uint64_t begin = overlaps ? before->begin : gone.begin;
     std::uint64_t end = overlaps ? before->end : gone.begin;
-    end = std::max(end, statements_->take_out_ranges(study_id, begin, gone.end - 1));
+    end = std::max(end, take_out(study_id, begin, gone.end - 1));
     for (const Interval& rest : {Interval{begin, gone.begin}, Interval{gone.end, end}}) {
       if (rest.begin < rest.end) {
         write(study_id, rest);
@@ -178,23 +142,19 @@ void CompletedRanges::remove(std::uint64_t study_id, const IntervalSet& points) 
 }
 
 bool CompletedRanges::is_counted(std::uint64_t study_id) {
-  Statement& query = statements_->is_counted;
-  query.bind(1, study_id);
-  const bool found = query.step();
-  query.reset();
-  return found;
+  Statement query(database_, "SELECT 1 FROM studies WHERE study_id = ? AND counted");
+  query.bind_all(study_id);
+  return query.step();
 }
 
 void CompletedRanges::set_counted(std::uint64_t study_id) {
-  statements_->set_counted.bind(1, study_id);
-  statements_->set_counted.run();
+  execute_with(database_, "UPDATE studies SET counted = 1 WHERE study_id = ?", study_id);
 }
 
 void CompletedRanges::count_again(std::uint64_t study_id) {
   constexpr auto kLast = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
   const IntervalSet points = points_with_row(database_, study_id, {0, kLast});
-  statements_->clear.bind(1, study_id);
-  statements_->clear.run();
+  execute_with(database_, "DELETE FROM completed_ranges WHERE study_id = ?", study_id);
   points.for_each([&](const Interval& range) { write(study_id, range); });
   set_counted(study_id);
 }

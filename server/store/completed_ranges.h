@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <map>
-#include <memory>
 #include <optional>
 
 #include "server/database/sqlite.h"
@@ -34,9 +33,6 @@ std::optional<IntervalSet> noted_points_of(sqlite3* database, std::uint64_t stud
 class CompletedRanges {
  public:
   explicit CompletedRanges(sqlite3* database);
-  ~CompletedRanges();
-  CompletedRanges(const CompletedRanges&) = delete;
-  CompletedRanges& operator=(const CompletedRanges&) = delete;
 
   /// Points are completed. Written by `flush`.
   void add(std::uint64_t study_id, std::uint64_t point) { gathered_[study_id].insert(point); }
@@ -59,12 +55,15 @@ class CompletedRanges {
   void count_again(std::uint64_t study_id);
 
  private:
-  struct Statements;
-
+  std::optional<Interval> range_before(std::uint64_t study_id, std::uint64_t point);
+  std::uint64_t take_out(std::uint64_t study_id, std::uint64_t first, std::uint64_t last);
   void write(std::uint64_t study_id, const Interval& range);
 
   sqlite3* database_;
-  std::unique_ptr<Statements> statements_;
+  Statement before_;
+  Statement take_out_;
+  Statement between_;
+  Statement put_;
   PointsOfStudies gathered_;
 };
 

@@ -63,11 +63,7 @@ ResultReuse::ResultReuse(sqlite3* database, CompletedRanges& ranges)
       model_(database, "SELECT model_id FROM models WHERE definition = ?"),
       find_(database, find_sql()),
       copy_(database, copy_sql()),
-      source_(database, "SELECT name, recipe FROM studies WHERE study_id = ?"),
-      count_(database,
-             "INSERT INTO reused_points (study_id, source, points) VALUES (?1, ?2, ?3)"
-             " ON CONFLICT DO UPDATE SET points = points + excluded.points"),
-      end_(database, "UPDATE studies SET reuses = 0 WHERE study_id = ?") {}
+      source_(database, "SELECT name, recipe FROM studies WHERE study_id = ?") {}
 
 void ResultReuse::run(const ReuseResults& change) {
   ReusedResults& outcome = *change.outcome;
@@ -104,8 +100,7 @@ void ResultReuse::run(const ReuseResults& change) {
 }
 
 void ResultReuse::end(const EndTaking& change) {
-  end_.bind(1, change.study_id);
-  end_.run();
+  execute_with(database_, "UPDATE studies SET reuses = 0 WHERE study_id = ?", change.study_id);
 }
 
 /// `point`, or the end of the completed range that contains it.
@@ -135,12 +130,8 @@ void ResultReuse::reuse(const ReuseResults& change, std::uint64_t point, std::in
   ++outcome.probes;
   const protocol::Point inputs = change.table->point(point);
   const ResetAtEnd reset{find_};
-  find_.bind(1, model_id);
-  find_.bind(2, inputs.H_m);
-  find_.bind(3, inputs.mu);
-  find_.bind(4, inputs.e_star);
-  find_.bind(5, change.solver_version);
-  find_.bind(6, change.study_id);
+  find_.bind_all(model_id, inputs.H_m, inputs.mu, inputs.e_star, change.solver_version,
+                 change.study_id);
   for (; find_.step(); ++outcome.probes) {
     const auto source_id = static_cast<std::uint64_t>(find_.integer(0));
     Source* const source = source_of(source_id);
@@ -150,11 +141,7 @@ void ResultReuse::reuse(const ReuseResults& change, std::uint64_t point, std::in
     }
     const std::string reused_from = fmt::format("{}/{}", source->name, find_.integer(1));
     const ResetAtEnd reset_copy{copy_};
-    copy_.bind(1, change.study_id);
-    copy_.bind(2, point);
-    copy_.bind(3, reused_from);
-    copy_.bind(4, source_id);
-    copy_.bind(5, find_.integer(1));
+    copy_.bind_all(change.study_id, point, reused_from, source_id, find_.integer(1));
     copy_.run();
     if (sqlite3_changes(database_) > 0) {
       ++source->copied;
@@ -189,10 +176,10 @@ void ResultReuse::count_origins(const ReuseResults& change) {
       continue;
     }
     change.outcome->origins[source->name] = source->copied;
-    count_.bind(1, change.study_id);
-    count_.bind(2, source->name);
-    count_.bind(3, source->copied);
-    count_.run();
+    execute_with(database_,
+                 "INSERT INTO reused_points (study_id, source, points) VALUES (?1, ?2, ?3)"
+                 " ON CONFLICT DO UPDATE SET points = points + excluded.points",
+                 change.study_id, source->name, source->copied);
   }
 }
 

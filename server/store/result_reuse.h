@@ -48,8 +48,6 @@ class ResultReuse {
   Statement find_;
   Statement copy_;
   Statement source_;
-  Statement count_;
-  Statement end_;
   // Of the change under way: names may be others in the next one, and models be gone.
   std::map<std::uint64_t, std::optional<Source>> sources_;
   std::unordered_map<std::uint64_t, std::int64_t> models_;  // 0: it has no row

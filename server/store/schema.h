@@ -10,8 +10,8 @@ namespace oblique::server {
 /// Creates the tables in an empty database, which gets a random identity. Throws StorageError.
 void create_tables(sqlite3* database);
 
-/// Creates the indices, the trigger and the views of this schema, also where another program
-/// dropped or replaced them. Objects with other names stay. If the trigger was not there, rows may
+/// Creates the views and the trigger of this schema anew, and its indices where they were dropped.
+/// Objects with other names stay. If the trigger was not there, rows may
 /// have been deleted unnoticed, so all studies are marked to be counted again. Throws StorageError,
 /// as where a table has the name of a view.
 void create_views(sqlite3* database);

@@ -14,24 +14,9 @@
 namespace oblique::server {
 namespace {
 
-constexpr int kBusyTimeout_ms = 2000;
 constexpr std::size_t kMostCachedModels = 65536;
 /// Of SQLite's virtual machine, whether the statement is interrupted: some 10 us.
 constexpr int kStepsBetweenLooks = 1000;
-
-/// While it lives the connection waits for no other one.
-class Impatience {
- public:
-  explicit Impatience(sqlite3* database) : database_(database) {
-    sqlite3_busy_timeout(database_, 0);
-  }
-  ~Impatience() { sqlite3_busy_timeout(database_, kBusyTimeout_ms); }
-  Impatience(const Impatience&) = delete;
-  Impatience& operator=(const Impatience&) = delete;
-
- private:
-  sqlite3* database_;
-};
 
 /// Whether a loss of power must not undo the change. Results can be solved again.
 bool is_lasting(const Change& change) {
@@ -42,56 +27,14 @@ bool is_lasting(const Change& change) {
 
 }  // namespace
 
+/// Statements that each batch of results runs.
 struct Store::Statements {
   explicit Statements(sqlite3* database)
-      : add_study(database,
-                  "INSERT INTO studies (study_id, name, recipe, points, state, created_at,"
-                  " changed_at, priority, checksum, submitted_by, counted, reuses)"
-                  " VALUES (?1, ?2, ?3, ?4, 'running', ?5, ?5, ?6,"
-                  " row_checksum(?1, ?2, ?3, ?4, ?5), nullif(?7, ''), 1, ?8)"),
-        set_state(database, "UPDATE studies SET state = ?2, changed_at = ?3 WHERE study_id = ?1"),
-        set_priority(database, "UPDATE studies SET priority = ?2 WHERE study_id = ?1"),
-        note_retries(database,
-                     // Neighbours of one attempt have one difference between number and rank.
-                     "INSERT INTO retries (study_id, first_point, points, attempt, retried_at)"
-                     " SELECT ?1, min(point), count(*), attempt, ?4 FROM"
-                     " (SELECT point, attempt,"
-                     " point - row_number() OVER (PARTITION BY attempt ORDER BY point) AS run"
-                     " FROM results INDEXED BY failed_points WHERE study_id = ?1"
-                     " AND point >= ?2 AND point < ?3 AND error IS NOT NULL)"
-                     " GROUP BY attempt, run"),
-        forget_failures(database,
-                        "DELETE FROM results INDEXED BY failed_points WHERE study_id = ?1 "
-                        "AND point >= ?2"
-                        " AND point < ?3 AND error IS NOT NULL RETURNING point"),
-        reopen(database,
-               "UPDATE studies SET state = 'running', changed_at = ?2"
-               " WHERE study_id = ?1 AND state = 'done'"),
-        grow(database,
-             "UPDATE studies SET recipe = ?2, points = ?3, state = 'running', changed_at = ?4,"
-             " priority = ?5, reuses = reuses OR ?6,"
-             " checksum = row_checksum(study_id, name, ?2, ?3, created_at) WHERE study_id = ?1"),
-        rename(database,
-               "UPDATE studies SET name = ?2,"
-               " checksum = row_checksum(study_id, ?2, recipe, points, created_at)"
-               " WHERE study_id = ?1"),
-        add_worker(database,
-                   "INSERT INTO workers (worker_id, name, threads, solver_version,"
-                   " instruction_set, joined_at) VALUES (?1, ?2, ?3, ?4, ?5, ?6)"),
-        find_study(database, "SELECT 1 FROM studies WHERE study_id = ?"),
+      : find_study(database, "SELECT 1 FROM studies WHERE study_id = ?"),
         find_model(database, "SELECT model_id FROM models WHERE definition = ?"),
         add_model(database, insert_model_sql()),
         add_result(database) {}
 
-  Statement add_study;
-  Statement set_state;
-  Statement set_priority;
-  Statement note_retries;
-  Statement forget_failures;
-  Statement reopen;
-  Statement grow;
-  Statement rename;
-  Statement add_worker;
   Statement find_study;
   Statement find_model;
   Statement add_model;
@@ -102,7 +45,6 @@ Store::Store(const std::string& path) {
   check_path(path);
   files_ = std::make_unique<DatabaseFiles>(path);
   database_ = open_database(path, SQLITE_OPEN_READWRITE);
-  sqlite3_busy_timeout(database_.get(), kBusyTimeout_ms);
   sqlite3_progress_handler(
       database_.get(), kStepsBetweenLooks,
       [](void* interrupted) {
@@ -222,8 +164,6 @@ void Store::commit(std::span<const Change> changes) {
 
 bool Store::merge_log() {
   files_->check();
-  // A reader may take long, and results would wait.
-  const Impatience impatience(database_.get());
   bool is_merged = false;
   guard_syncs([&] { is_merged = log_->merge(); });
   return is_merged;
@@ -244,23 +184,18 @@ ClearedAway Store::clear_away(std::size_t most) {
 }
 
 void Store::add(const AddStudy& change) {
-  Statement& insert = statements_->add_study;
-  insert.bind(1, change.study_id);
-  insert.bind(2, change.name);
-  insert.bind_blob(3, change.table.recipe_bytes());
-  insert.bind(4, change.table.size());
-  insert.bind(5, change.created_at);
-  insert.bind(6, std::int64_t{change.priority});
-  insert.bind(7, change.submitted_by);
-  insert.bind(8, std::int64_t{change.takes_over});
-  insert.run();
+  execute_with(database_.get(),
+               "INSERT INTO studies (study_id, name, recipe, points, state, created_at, changed_at,"
+               " priority, submitted_by, reuses, checksum)"
+               " VALUES (?1, ?2, ?3, ?4, 'running', ?5, ?5, ?6, nullif(?7, ''), ?8,"
+               " row_checksum(?1, ?2, ?3, ?4, ?5))",
+               change.study_id, change.name, Blob{change.table.recipe_bytes()}, change.table.size(),
+               change.created_at, change.priority, change.submitted_by, change.takes_over);
 }
 
 void Store::add(const SetPriority& change) {
-  Statement& update = statements_->set_priority;
-  update.bind(1, change.study_id);
-  update.bind(2, std::int64_t{change.priority});
-  update.run();
+  execute_with(database_.get(), "UPDATE studies SET priority = ?2 WHERE study_id = ?1",
+               change.study_id, change.priority);
 }
 
 void Store::add(const ForgetFailures& change) {
@@ -269,18 +204,23 @@ void Store::add(const ForgetFailures& change) {
   }
   ranges_->flush();
   const bool was_counted = ranges_->is_counted(change.study_id);
+  // Failures of one attempt that follow each other have one difference between number and rank.
+  Statement note(database_.get(),
+                 "INSERT INTO retries (study_id, first_point, points, attempt, retried_at)"
+                 " SELECT ?1, min(point), count(*), attempt, ?4 FROM"
+                 " (SELECT point, attempt,"
+                 " point - row_number() OVER (PARTITION BY attempt ORDER BY point) AS run"
+                 " FROM results INDEXED BY failed_points WHERE study_id = ?1"
+                 " AND point >= ?2 AND point < ?3 AND error IS NOT NULL)"
+                 " GROUP BY attempt, run");
+  Statement forget(database_.get(),
+                   "DELETE FROM results INDEXED BY failed_points WHERE study_id = ?1"
+                   " AND point >= ?2 AND point < ?3 AND error IS NOT NULL RETURNING point");
   IntervalSet forgotten;
   change.points.for_each([&](const Interval& interval) {
-    Statement& note = statements_->note_retries;
-    note.bind(1, change.study_id);
-    note.bind(2, interval.begin);
-    note.bind(3, interval.end);
-    note.bind(4, change.changed_at);
+    note.bind_all(change.study_id, interval.begin, interval.end, change.changed_at);
     note.run();
-    Statement& forget = statements_->forget_failures;
-    forget.bind(1, change.study_id);
-    forget.bind(2, interval.begin);
-    forget.bind(3, interval.end);
+    forget.bind_all(change.study_id, interval.begin, interval.end);
     while (forget.step()) {
       forgotten.insert(static_cast<std::uint64_t>(forget.integer(0)));
     }
@@ -290,51 +230,41 @@ void Store::add(const ForgetFailures& change) {
   if (was_counted) {  // the trigger took these deletions for those of another program
     ranges_->set_counted(change.study_id);
   }
-  Statement& reopen = statements_->reopen;
-  reopen.bind(1, change.study_id);
-  reopen.bind(2, change.changed_at);
-  reopen.run();
+  execute_with(database_.get(),
+               "UPDATE studies SET state = 'running', changed_at = ?2"
+               " WHERE study_id = ?1 AND state = 'done'",
+               change.study_id, change.changed_at);
 }
 
 void Store::add(const GrowStudy& change) {
-  Statement& update = statements_->grow;
-  update.bind(1, change.study_id);
-  update.bind_blob(2, change.table.recipe_bytes());
-  update.bind(3, change.table.size());
-  update.bind(4, change.changed_at);
-  update.bind(5, std::int64_t{change.priority});
-  update.bind(6, std::int64_t{change.takes_over});
-  update.run();
+  execute_with(database_.get(),
+               "UPDATE studies SET recipe = ?2, points = ?3, state = 'running', changed_at = ?4,"
+               " priority = ?5, reuses = reuses OR ?6,"
+               " checksum = row_checksum(study_id, name, ?2, ?3, created_at) WHERE study_id = ?1",
+               change.study_id, Blob{change.table.recipe_bytes()}, change.table.size(),
+               change.changed_at, change.priority, change.takes_over);
 }
 
 void Store::add(const RenameStudy& change) {
-  Statement& update = statements_->rename;
-  update.bind(1, change.study_id);
-  update.bind(2, change.name);
-  update.run();
-}
-
-void Store::add(const DeleteStudy& change) {
-  deletion_->remove(change.study_id);
+  execute_with(database_.get(),
+               "UPDATE studies SET name = ?2,"
+               " checksum = row_checksum(study_id, ?2, recipe, points, created_at)"
+               " WHERE study_id = ?1",
+               change.study_id, change.name);
 }
 
 void Store::add(const SetStudyState& change) {
-  Statement& update = statements_->set_state;
-  update.bind(1, change.study_id);
-  update.bind(2, std::string_view(state_name(change.state)));
-  update.bind(3, change.changed_at);
-  update.run();
+  execute_with(database_.get(),
+               "UPDATE studies SET state = ?2, changed_at = ?3 WHERE study_id = ?1",
+               change.study_id, std::string_view(state_name(change.state)), change.changed_at);
 }
 
 void Store::add(const AddWorker& change) {
-  Statement& insert = statements_->add_worker;
-  insert.bind(1, change.worker_id);
-  insert.bind(2, change.name);
-  insert.bind(3, std::uint64_t{change.threads});
-  insert.bind(4, change.solver_version);
-  insert.bind(5, change.instruction_set);
-  insert.bind(6, change.joined_at);
-  insert.run();
+  execute_with(database_.get(),
+               "INSERT INTO workers (worker_id, name, threads, solver_version, instruction_set,"
+               " joined_at) VALUES (?, ?, ?, ?, ?, ?)",
+               change.worker_id, change.name, change.threads, change.solver_version,
+               change.instruction_set, change.joined_at);
 }
 
 void Store::add(const AddResults& change) {

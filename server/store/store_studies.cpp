@@ -1,4 +1,4 @@
-// Reading back what studies there are and how far they are, and the numbers that were given.
+// Reading the studies and their progress from the database at a start.
 #include <algorithm>
 #include <limits>
 #include <map>
@@ -27,42 +27,40 @@ StudyState state_named(const std::string& name) {
   return StudyState::kRunning;
 }
 
-/// What is known of failures, gathered by a pass over all of them.
-struct Progress {
-  std::map<std::uint64_t, IntervalSet> failures;
-  std::map<std::uint64_t, PointAttempts> attempts;
-};
-
 std::uint64_t number(Statement& statement, int column) {
   return static_cast<std::uint64_t>(statement.integer(column));
 }
 
-Progress progress_of_all(sqlite3* database) {
-  Progress progress;
-  // The failures that are there come last: they are later than all that were forgotten.
-  Statement retries(database,
-                    "SELECT study_id, first_point, points, attempt FROM retries ORDER BY rowid");
-  while (retries.step()) {
-    const std::uint64_t first = number(retries, 1);
-    progress.attempts[number(retries, 0)].set({first, first + number(retries, 2)},
-                                              static_cast<std::uint32_t>(retries.integer(3)));
+/// Reads the failures, and the attempts in which points failed, of all studies.
+void read_failures(sqlite3* database, std::vector<StoredStudy>& studies) {
+  std::map<std::uint64_t, StoredStudy*> by_number;
+  for (StoredStudy& study : studies) {
+    by_number[study.study_id] = &study;
   }
-  Statement failed(database,
-                   "SELECT study_id, point, attempt FROM results INDEXED BY failed_points"
-                   " WHERE error IS NOT NULL"
-                   " ORDER BY study_id, point");
-  while (failed.step()) {
-    const std::uint64_t point = number(failed, 1);
-    progress.failures[number(failed, 0)].insert(point);
-    progress.attempts[number(failed, 0)].set({point, point + 1},
-                                             static_cast<std::uint32_t>(failed.integer(2)));
-  }
-  return progress;
+  const auto read = [&](const char* sql, bool is_failed) {
+    Statement row(database, sql);
+    while (row.step()) {
+      const auto study = by_number.find(number(row, 0));
+      if (study == by_number.end()) {
+        continue;
+      }
+      const Interval points{number(row, 1), number(row, 1) + number(row, 2)};
+      study->second->attempts.set(points, static_cast<std::uint32_t>(row.integer(3)));
+      if (is_failed) {
+        study->second->failures.insert(points.begin, points.end);
+      }
+    }
+  };
+  // Rows of failures are later than the retries of their points.
+  read("SELECT study_id, first_point, points, attempt FROM retries ORDER BY rowid", false);
+  read(
+      "SELECT study_id, point, 1, attempt FROM results INDEXED BY failed_points"
+      " WHERE error IS NOT NULL ORDER BY study_id, point",
+      true);
 }
 
-/// Makes sure that points can be handed out, and makes the study's table.
-/// Gives why this version takes no such study, or an empty text. Throws StorageError for a recipe
-/// that cannot be read.
+/// Reads the study's recipe. Returns why this version does not accept the study, or an empty text.
+/// Throws StorageError for a recipe that cannot be read.
 std::string objection_to(const StoredStudy& study) {
   try {
     (void)study.table.get();
@@ -147,7 +145,6 @@ PointsOfStudies Store::completed_points() {
 
 std::vector<StoredStudy> Store::studies() {
   std::vector<StoredStudy> found;
-  Progress progress = progress_of_all(database_.get());
   Statement list(database_.get(),
                  "SELECT study_id, name, recipe, state, created_at, priority,"
                  " points, coalesce(submitted_by, ''), reuses FROM studies "
@@ -203,12 +200,11 @@ std::vector<StoredStudy> Store::studies() {
       continue;
     }
     if (!is_open || study.state != StudyState::kRunning) {
-      study.table.release();  // nobody computes with it for now
+      study.table.release();  // not needed until the study runs again
     }
-    study.failures = std::move(progress.failures[study.study_id]);
-    study.attempts = std::move(progress.attempts[study.study_id]);
     found.push_back(std::move(study));
   }
+  read_failures(database_.get(), found);
   return found;
 }
 

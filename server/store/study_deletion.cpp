@@ -2,19 +2,13 @@
 
 namespace oblique::server {
 
-void StudyDeletion::run(const char* sql, std::uint64_t study_id) {
-  Statement statement(database_, sql);
-  statement.bind(1, study_id);
-  statement.run();
-}
-
 void StudyDeletion::remove(std::uint64_t study_id) {
   for (const char* sql :
        {"UPDATE about SET last_study_id = max(last_study_id, ?1), has_orphans = 1",
         "INSERT OR IGNORE INTO deletions (study_id) VALUES (?1)",
         "DELETE FROM retries WHERE study_id = ?1", "DELETE FROM reused_points WHERE study_id = ?1",
         "DELETE FROM studies WHERE study_id = ?1"}) {
-    run(sql, study_id);
+    execute_with(database_, sql, study_id);
   }
 }
 
@@ -40,16 +34,13 @@ void StudyDeletion::delete_rows(std::size_t most) {
       " LIMIT ?2)",
       study, most - results);
   if (results + ranges < most) {
-    run("DELETE FROM deletions WHERE study_id = ?1", study);
+    execute_with(database_, "DELETE FROM deletions WHERE study_id = ?", study);
   }
 }
 
 /// Returns how many rows the statement deleted.
 std::size_t StudyDeletion::delete_some(const char* sql, std::uint64_t study_id, std::size_t most) {
-  Statement statement(database_, sql);
-  statement.bind(1, study_id);
-  statement.bind(2, std::uint64_t{most});
-  statement.run();
+  execute_with(database_, sql, study_id, most);
   return static_cast<std::size_t>(sqlite3_changes(database_));
 }
 

@@ -32,7 +32,6 @@ class StudyDeletion {
   std::uint64_t rows() const { return rows_; }  ///< deleted by this object
 
  private:
-  void run(const char* sql, std::uint64_t study_id);
   std::size_t delete_some(const char* sql, std::uint64_t study_id, std::size_t most);
 
   sqlite3* database_;

@@ -31,13 +31,10 @@ int write_again(sqlite3_file* file) {
   return code == SQLITE_OK ? file->pMethods->xSync(file, SQLITE_SYNC_NORMAL) : code;
 }
 
-bool is_busy(int code) {
-  return (static_cast<unsigned>(code) & 0xffU) == SQLITE_BUSY;
-}
-
 }  // namespace
 
 WriteAheadLog::WriteAheadLog(sqlite3* database) : database_(database) {
+  sqlite3_busy_timeout(database_, kBusyTimeout_ms);
   sqlite3_db_config(database_, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
   // This replaces the checkpoints of SQLite.
   sqlite3_wal_hook(
@@ -79,8 +76,11 @@ void WriteAheadLog::shorten() {
 }
 
 bool WriteAheadLog::merge() {
+  // A reader may take long, and results would wait.
+  sqlite3_busy_timeout(database_, 0);
   const int code = checkpoint(SQLITE_CHECKPOINT_TRUNCATE, nullptr, nullptr);
-  if (is_busy(code)) {
+  sqlite3_busy_timeout(database_, kBusyTimeout_ms);
+  if ((static_cast<unsigned>(code) & 0xffU) == SQLITE_BUSY) {
     return false;
   }
   if (code != SQLITE_OK) {
@@ -89,10 +89,6 @@ bool WriteAheadLog::merge() {
   }
   pages_ = 0;
   return true;
-}
-
-void WriteAheadLog::delete_on_close() {
-  sqlite3_db_config(database_, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 0, nullptr);
 }
 
 }  // namespace oblique::server

@@ -32,7 +32,9 @@ class WriteAheadLog {
   /// Length in pages from which on `shorten` copies the log.
   void shorten_at(int pages) { long_pages_ = pages; }
   /// Lets SQLite copy and delete the log when the database is closed. Not after a failed sync.
-  void delete_on_close();
+  void delete_on_close() {
+    sqlite3_db_config(database_, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 0, nullptr);
+  }
 
  private:
   int checkpoint(int mode, int* in_log, int* copied);
@@ -41,6 +43,7 @@ class WriteAheadLog {
   int pages_ = 0;
   int long_pages_ = 1000;
   static constexpr int kHeldLong = 16;
+  static constexpr int kBusyTimeout_ms = 2000;  // of other statements than `merge`
 };
 
 }  // namespace oblique::server
