@@ -106,7 +106,7 @@ std::string condition_of(const std::vector<PointRange>& ranges, const protocol::
   if (ranges.empty()) {
     return recipe.blocks().empty() ? "1" : "0";
   }
-  if (points_in(ranges) == points_of(recipe)) {
+  if (ranges.size() == 1 && points_in(ranges) == points_of(recipe)) {
     return "1";
   }
   if (ranges.size() == 1) {
