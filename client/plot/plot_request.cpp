@@ -8,7 +8,7 @@
 
 #include "client/plot/axis_choice.h"
 #include "client/plot/drawing.h"
-#include "server/asking/sql/sql_expression.h"
+#include "server/query/sql_text.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::client::plot {

@@ -14,7 +14,7 @@
 #include "client/service/watch_teller.h"
 #include "proto/program/exit_code.h"
 #include "proto/text.h"
-#include "server/asking/sql/sql_expression.h"
+#include "server/query/sql_text.h"
 
 namespace oblique::client {
 namespace {

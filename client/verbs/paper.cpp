@@ -19,7 +19,7 @@
 #include "client/verbs/verbs.h"
 #include "proto/program/choices.h"
 #include "proto/suggestion.h"
-#include "server/asking/sql/sql_expression.h"
+#include "server/query/sql_text.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/parameters.h"
 

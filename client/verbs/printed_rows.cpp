@@ -16,6 +16,7 @@
 #include "proto/text.h"
 #include "proto/wire/chunk_rows.h"
 #include "proto/wire/chunk_writer.h"
+#include "server/query/columns.h"
 
 namespace oblique::client {
 

@@ -64,15 +64,11 @@ export async function change(path, body, signal) {
 /**
  * Numbers behind a head: the head, the bytes, and where the numbers begin in them.
  * @param {string} path @param {AbortSignal} [signal]
- * @param {(told: any) => void} [meanwhile] is told what is said when they are not there yet
- * @returns {Promise<{head: any, bytes: ArrayBuffer, begin: number} | null>} null: not yet, ask again
+ * @returns {Promise<{head: any, bytes: ArrayBuffer, begin: number} | null>} null: not yet, ask again (traces alone)
  */
-export async function numbers(path, signal, meanwhile) {
+export async function numbers(path, signal) {
   const answer = await asked(path, { signal });
-  if (answer.status === 202) {
-    meanwhile?.(await answer.json());
-    return null;
-  }
+  if (answer.status === 202) return null;
   if (!answer.ok) throw await refusal(answer);
   const bytes = await answer.arrayBuffer();
   const length = new DataView(bytes).getUint32(0, true);

@@ -184,8 +184,8 @@ class Loop::Parts final : public Outbox {
   }
 
   void take_reports() {
-    for (const auto& request : web_ ? web_->take_requests() : std::vector<ServiceLine::Request>()) {
-      service_->client_frame(request.client, request.frame, now());
+    for (const auto& frame : web_ ? web_->take_requests() : std::vector<std::string>()) {
+      service_->client_frame(ServiceLine::kIdentity, frame, now());
     }
     for (const auto& report : written_.take()) {
       service_->written(std::get<WriteReport>(report), now());

@@ -59,7 +59,7 @@ class Web::Parts {
   std::string page_url() const { return url() + "/?token=" + page_.key().token(); }
 
   int descriptor() const { return line_.descriptor(); }
-  std::vector<ServiceLine::Request> take_requests() { return line_.take(); }
+  std::vector<std::string> take_requests() { return line_.take(); }
   void put_reply(const std::string& frame) {
     line_.put(frame);
     http_.wake();
@@ -138,8 +138,8 @@ class Web::Parts {
   std::string overview_;       // the same
   ServiceLine line_;
   LiveText live_{[this] { return look(); }, began_ms_};
-  AnswerPool answers_{settings_.database, [this] { http_.wake(); }};
-  AnswerPool drawings_{settings_.database, [this] { http_.wake(); }};
+  AnswerPool answers_{line_, [this] { http_.wake(); }};
+  AnswerPool drawings_{line_, [this] { http_.wake(); }};
   Page page_{settings_.page, {line_, answers_, drawings_, live_}};
   HttpServer http_;  // last: its thread uses all the others
 };
@@ -160,10 +160,10 @@ int Web::descriptor() const {
 }
 
 bool Web::is_client(const std::string& identity) {
-  return identity == ServiceLine::kIdentity || identity == ServiceLine::kStrangers;
+  return identity == ServiceLine::kIdentity;
 }
 
-std::vector<ServiceLine::Request> Web::take_requests() {
+std::vector<std::string> Web::take_requests() {
   return parts_->take_requests();
 }
 

@@ -46,7 +46,7 @@ class Web {
   static bool is_client(const std::string& identity);
   /// Readable when the page has requests.
   int descriptor() const;
-  std::vector<ServiceLine::Request> take_requests();
+  std::vector<std::string> take_requests();
   /// The frame of a reply to the page; true.
   bool put_reply(const std::string& frame);
 

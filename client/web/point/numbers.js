@@ -4,7 +4,7 @@ import { h } from "/parts/dom.js";
 import { shown } from "/parts/format.js";
 
 const kProvenance = ["status", "error", "solver_version", "integrator", "instruction_set", "elements_per_link", "tolerance", "dt_s", "steps",
-  "wall_s", "closure", "worker_name", "worker", "attempt", "solved_at", "taken_from", "model_id"];
+  "wall_s", "closure", "worker_name", "worker_id", "attempt", "solved_at", "reused_from", "model_id"];
 
 /** @param {any} value */
 function text_of(value) {

@@ -62,8 +62,6 @@ export function marking_of(view) {
       view.root.dataset.marks = condition;
     } catch (error) {
       if (!signal.aborted) view.complain(error);
-    } finally {
-      if (!view.asked) view.waited();
     }
   }
   /** @param {string} condition @param {boolean} [is_further] */

@@ -2,8 +2,7 @@
 // A study: what its address says, the picture, and what belongs to it.
 import { h } from "/parts/dom.js";
 import { in_words, json, Silence } from "/server.js";
-import { waiting } from "./asked/picture.js";
-import { ask, is_fine, steps_to } from "./asked/question.js";
+import { ask, steps_to } from "./asked/question.js";
 import { fill_in, varying } from "./axes.js";
 import { choice_of } from "./choice.js";
 import { condition_fields, rounded } from "./conditions.js";
@@ -48,16 +47,10 @@ export class StudyView {
     /** @type {Picture | null} */
     this.picture = null;
     this.wants_more = false;
-    /** For a condition that takes long. */
-    this.is_waiting = false;
     /** Something that was asked for did not come. */
     this.is_stale = false;
     /** Who came back goes on at the map. */
     this.wants_focus = false;
-    /** Columns of which a whole picture was there: the server keeps them. @type {Set<string>} */
-    this.read_columns = new Set();
-    /** How long the last picture took that is as fine as any. */
-    this.fine_ms = Infinity;
     /** When the last refresh came to its end. */
     this.loaded_ms = 0;
     /** The timer of the next refresh; 0: none. */
@@ -263,47 +256,32 @@ export class StudyView {
     this.solving.end();
     if (this.asked) {
       this.wants_more = true;
-      if (this.is_waiting) this.asked.abort();  // that may take long
       return;
     }
     this.asked = new AbortController();
-    waiting.heard = (share) => {
-      this.is_waiting = true;
-      this.say(`The condition is asked of all points: ${Math.floor(100 * share)} %.`);
-    };
     const { signal } = this.asked;
     const kind = this.is("pic");
     try {
       const begun = performance.now();
       for (const cells of steps_to(this)) {
         if (this.wants_more) break;  // the finer one would not be seen
-        const asked_at = performance.now();
         const picture = await ask(this, cells, signal);
         if (signal.aborted) break;
-        if (is_fine(cells)) this.fine_ms = performance.now() - asked_at;
         if (this.solving.is_on) return;
         this.loaded_ms = performance.now();
         this.show(picture, kind);
         this.root.dataset.pictureMs = String(Math.round(performance.now() - begun));
       }
-      if (!this.wants_more && !signal.aborted) this.read_columns.add(this.is("z"));
       if (this.said.className.includes("bad")) this.say("");
     } catch (error) {
       if (!signal.aborted) this.complain(error);
     } finally {
       this.asked = null;
-      this.waited();
     }
     if (this.wants_more) {
       this.wants_more = false;
       this.load();
     }
-  }
-
-  /** Nothing takes long any more. */
-  waited() {
-    if (this.is_waiting && !this.said.className.includes("bad")) this.say("");
-    this.is_waiting = false;
   }
 
   /** @param {Picture} picture @param {string} kind what it was asked for as */

@@ -24,8 +24,6 @@ export function facts(picture, kind, study, unit_of) {
     if (picture.head.without > 0) parts.push(`${many(picture.head.without, "other")} without values that can be shown.`);
   } else {
     parts.push(`${many(picture.head.points, "point")} in ${many(picture.values.length, "bin")}${picture.head.outside > 0 ? `, ${count(picture.head.outside)} outside` : ""}.`);
-    if (picture.head.sample) parts.push(`Of ${many(picture.head.sample.of, "result")} ${count(picture.head.sample.results)} are counted, evenly chosen.`);
-    if (picture.head.filtered > 0) parts.push(`${many(picture.head.filtered, "other")} where the condition is not met.`);
     if (picture.y.name) parts.push(`Up to ${count(kMostDots)} points are drawn one by one, more are gathered.`);
   }
   return parts;

@@ -1,54 +1,124 @@
 #include "server/web/answers/answer_pool.h"
 
 #include <algorithm>
-#include <chrono>
 #include <stdexcept>
 #include <utility>
 
-#include <spdlog/fmt/fmt.h>
-
-#include "server/asking/lists/list_functions.h"
-#include "server/database/open_for_reading.h"
 #include "server/web/http/json_answer.h"
 
 namespace oblique::server {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+using protocol::ClientReply;
+using protocol::ClientRequest;
 
-/// One for each lane.
+/// The service runs two queries of the page at a time; the third thread answers what needs none.
 constexpr std::size_t kThreads = 3;
-/// In each lane.
-constexpr std::ptrdiff_t kMostWaiting = 64;
-/// SQLite looks at the clock after so many of its steps.
-constexpr int kStepsBetweenLooks = 10'000;
-/// Rows that a slice reads lie apart: pages of the tree are worth keeping.
-constexpr const char* kPageCache = "PRAGMA cache_size = -65536";
-/// The number of no request: a column is filled.
-constexpr std::uint64_t kFilling = UINT64_MAX;
+constexpr std::size_t kMostWaiting = 64;
+/// How often a thread that waits for the service looks whether its job is over.
+constexpr std::chrono::milliseconds kLookEvery{50};
+
+JobError too_long() {
+  return JobError(error_answer(503, "that takes too long: ask for less, as by a condition"));
+}
 
 }  // namespace
 
-struct AnswerPool::Desk {
-  DatabaseHandle database;
-  Clock::time_point until;
-  const std::atomic<bool>* is_unwanted = nullptr;
-
-  static int is_over(void* self) {
-    const Desk& desk = *static_cast<Desk*>(self);
-    return *desk.is_unwanted || Clock::now() >= desk.until ? 1 : 0;
+/// One request to the service and its replies. Ends a query whose answer has not ended.
+class JobContext::Exchange {
+ public:
+  Exchange(const JobContext& context, const ClientRequest& request)
+      : context_(context), number_(context.service_.new_number()) {
+    context_.service_.ask(number_, request);
   }
+  ~Exchange() { context_.service_.forget(number_); }
+  Exchange(const Exchange&) = delete;
+  Exchange& operator=(const Exchange&) = delete;
+
+  void request_more(std::uint64_t chunks_taken) {
+    ClientRequest request;
+    request.mutable_more_rows()->set_request_id(number_);
+    request.mutable_more_rows()->set_taken(chunks_taken);
+    context_.service_.ask(number_, request);
+  }
+  ClientReply next() {
+    while (true) {
+      context_.throw_if_over();
+      if (auto reply = context_.service_.wait_for_reply(number_, kLookEvery)) {
+        if (reply->has_error()) {
+          throw JobError(failure(reply->error()));
+        }
+        return *std::move(reply);
+      }
+    }
+  }
+
+ private:
+  const JobContext& context_;
+  const std::uint64_t number_;
 };
 
-void AnswerDesk::end_in_time(std::uint64_t point, std::uint64_t points_between_looks) const {
-  if (point % points_between_looks == 0 && is_over()) {
-    throw StorageError("that takes too long: ask for less");
+ServedStudy JobContext::study(std::uint64_t id) const {
+  ClientRequest request;
+  request.mutable_status()->set_after_study_id(id - 1);
+  request.mutable_status()->set_limit(1);
+  const ClientReply status = Exchange(*this, request).next();
+  if (status.status().studies_size() != 1 || status.status().studies(0).study_id() != id) {
+    throw JobError(error_answer(404, "there is no such study"));
+  }
+  const protocol::StudyStatus& found = status.status().studies(0);
+  request.mutable_describe()->set_study(found.name());
+  const ClientReply described = Exchange(*this, request).next();
+  return {id, found.name(), found.state(),
+          std::make_shared<const protocol::PointTable>(described.describe().recipe())};
+}
+
+void JobContext::query(const protocol::StudyQuery& query, const OnRow& on_row) const {
+  ClientRequest request;
+  *request.mutable_query()->mutable_question() = query;
+  Exchange exchange(*this, request);
+  for (std::uint64_t chunks = 1;; ++chunks) {
+    const ClientReply reply = exchange.next();
+    if (!protocol::is_sound(reply.query())) {
+      throw std::runtime_error("a reader process of the server sent no valid answer");
+    }
+    for (protocol::ChunkRows rows(reply.query()); rows.next();) {
+      on_row(rows);
+    }
+    if (reply.query().ends()) {
+      return;
+    }
+    exchange.request_more(chunks);
   }
 }
 
-AnswerPool::AnswerPool(std::string database, std::function<void()> done,
-                       std::chrono::milliseconds longest)
-    : database_(std::move(database)), done_(std::move(done)), longest_(longest) {
+void JobContext::query(const protocol::StudyQuery& query, const std::string& condition,
+                       const OnRow& on_row) const {
+  try {
+    this->query(query, on_row);
+  } catch (const JobError& error) {
+    if (error.answer().status == 400 && !condition.empty()) {
+      protocol::StudyQuery as_written;
+      as_written.set_study(query.study());
+      as_written.add_select("point");
+      as_written.set_where(condition);
+      as_written.set_limit(1);
+      this->query(as_written, [](const auto&) {});
+    }
+    throw;
+  }
+}
+
+void JobContext::throw_if_over() const {
+  if (is_over()) {
+    throw too_long();
+  }
+}
+
+AnswerPool::AnswerPool(ServiceLine& service, std::function<void()> done,
+                       std::chrono::milliseconds time_limit)
+    : service_(service), done_(std::move(done)), time_limit_(time_limit) {
   for (std::size_t i = 0; i < kThreads; ++i) {
     threads_.emplace_back([this] { run(); });
   }
@@ -62,8 +132,8 @@ void AnswerPool::stop() {
   {
     const std::lock_guard lock(mutex_);
     is_stopping_ = true;
-    for (const auto& [number, is_unwanted] : at_work_) {
-      *is_unwanted = true;
+    for (const auto& [number, is_cancelled] : running_) {
+      *is_cancelled = true;
     }
   }
   woken_.notify_all();
@@ -73,18 +143,13 @@ void AnswerPool::stop() {
   threads_.clear();
 }
 
-bool AnswerPool::submit(std::uint64_t number, Job job, Lane lane) {
+bool AnswerPool::submit(std::uint64_t number, Job job) {
   {
     const std::lock_guard lock(mutex_);
-    const auto waiting = std::ranges::count(waiting_, lane, &Order::lane);
-    if (is_stopping_ || waiting >= kMostWaiting) {
+    if (is_stopping_ || waiting_.size() >= kMostWaiting) {
       return false;
     }
-    if (const auto filling = at_work_.find(kFilling);
-        lane == Lane::kSlow && filling != at_work_.end()) {
-      *filling->second = true;  // it is read on afterwards
-    }
-    waiting_.push_back({number, std::move(job), std::make_shared<std::atomic<bool>>(false), lane});
+    waiting_.push_back({number, std::move(job), std::make_shared<std::atomic<bool>>(false)});
   }
   woken_.notify_one();
   return true;
@@ -98,88 +163,45 @@ std::optional<HttpAnswer> AnswerPool::take(std::uint64_t number) {
 
 void AnswerPool::forget(std::uint64_t number) {
   const std::lock_guard lock(mutex_);
-  std::erase_if(waiting_, [number](const Order& order) { return order.number == number; });
+  std::erase_if(waiting_, [number](const QueuedJob& queued) { return queued.number == number; });
   answers_.erase(number);
-  if (const auto order = at_work_.find(number); order != at_work_.end()) {
-    *order->second = true;
+  if (const auto job = running_.find(number); job != running_.end()) {
+    *job->second = true;
   }
-}
-
-bool AnswerPool::is_taken(Lane lane) const {
-  return lane != Lane::kAny && taken_.contains(lane);
-}
-
-std::optional<AnswerPool::Order> AnswerPool::next() {
-  const auto found = std::find_if(waiting_.begin(), waiting_.end(),
-                                  [this](const Order& order) { return !is_taken(order.lane); });
-  if (found != waiting_.end()) {
-    Order order = std::move(*found);
-    waiting_.erase(found);
-    return order;
-  }
-  if (is_taken(Lane::kSlow) || !columns_.has_wishes()) {
-    return std::nullopt;
-  }
-  return Order{kFilling,
-               [](const AnswerDesk& at) {
-                 at.columns.fill_one(at.database, at.is_over);
-                 return HttpAnswer{};
-               },
-               std::make_shared<std::atomic<bool>>(false), Lane::kSlow};
 }
 
 void AnswerPool::run() {
-  Desk desk;
   std::unique_lock lock(mutex_);
-  while (!is_stopping_) {
-    const auto order = next();
-    if (!order) {
-      woken_.wait(lock);
-      continue;
+  while (true) {
+    woken_.wait(lock, [this] { return is_stopping_ || !waiting_.empty(); });
+    if (is_stopping_) {
+      return;
     }
-    const bool is_filling = order->number == kFilling;
-    taken_.insert(order->lane);
-    at_work_[order->number] = order->is_unwanted;
+    const QueuedJob queued = std::move(waiting_.front());
+    waiting_.pop_front();
+    running_[queued.number] = queued.is_cancelled;
     lock.unlock();
-    desk.until = Clock::now() + longest_;
-    HttpAnswer answer = answer_to(*order, desk);
+    HttpAnswer answer = answer_to(queued);
     lock.lock();
-    at_work_.erase(order->number);
-    taken_.erase(order->lane);
-    if (columns_.has_wishes() || !waiting_.empty()) {
-      woken_.notify_one();
-    }
-    if (!is_filling && !*order->is_unwanted) {
-      answers_.insert_or_assign(order->number, std::move(answer));
+    running_.erase(queued.number);
+    if (!*queued.is_cancelled) {
+      answers_.insert_or_assign(queued.number, std::move(answer));
       done_();
     }
   }
 }
 
-HttpAnswer AnswerPool::answer_to(const Order& order, Desk& desk) {
-  constexpr unsigned kBadQuestion = 400;
-  constexpr unsigned kNotThere = 404;
-  constexpr unsigned kFailed = 500;
-  constexpr unsigned kNotNow = 503;
-  desk.is_unwanted = order.is_unwanted.get();
+HttpAnswer AnswerPool::answer_to(const QueuedJob& queued) {
+  const auto until = Clock::now() + time_limit_;
   try {
-    if (!desk.database) {
-      desk.database = open_stored(database_).database;
-      execute(desk.database.get(), kPageCache);
-      add_list_functions(desk.database.get());
-      sqlite3_progress_handler(desk.database.get(), kStepsBetweenLooks, &Desk::is_over, &desk);
-    }
-    return order.job({desk.database.get(), studies_, columns_, samples_,
-                      [&desk] { return Desk::is_over(&desk) != 0; }});
+    return queued.job(
+        {service_, [&queued, until] { return *queued.is_cancelled || Clock::now() >= until; }});
+  } catch (const JobError& error) {
+    return error.answer();
   } catch (const std::invalid_argument& error) {
-    return error_answer(kBadQuestion, error.what());
-  } catch (const NothingThere& error) {
-    return error_answer(kNotThere, error.what());
-  } catch (const StorageError& error) {
-    const bool is_late = Clock::now() >= desk.until;
-    return error_answer(kNotNow, is_late ? "that takes too long: ask for less" : error.what());
+    return error_answer(400, error.what());
   } catch (const std::exception& error) {
-    return error_answer(kFailed, error.what());
+    return error_answer(500, error.what());
   }
 }
 

@@ -1,8 +1,7 @@
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
-#include <memory>
+#include <numeric>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -11,9 +10,9 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "server/web/answers/fields.h"
-#include "server/web/answers/result_sample.h"
 #include "server/web/answers/study_answers.h"
 #include "server/web/http/json_answer.h"
+#include "worker/solver/model/number.h"
 
 namespace oblique::server {
 namespace {
@@ -21,255 +20,190 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr std::uint64_t kUsualBins = 64;
+/// Values this close to an end, relative to it, are in the bins: people type 0.2 for 0.6 / 3.
+constexpr double kEndTolerance = 1e-12;
 
-/// Columns are looked at in parts, so that no second copy of them is held.
-constexpr std::size_t kPart = 65'536;
+/// A number in SQL.
+std::string sql_number(double value) {
+  constexpr double kMost = std::numeric_limits<double>::max();
+  return fmt::format("({})", solver::exact_real(std::clamp(value, -kMost, kMost)));
+}
 
-/// Values of a study's column, as it is held or as a sample of it has them.
-class BinColumn {
- public:
-  BinColumn() = default;
-  BinColumn(ColumnSource source, ColumnStore::Shared stored)
-      : source_(std::move(source)), stored_(std::move(stored)) {}
-  BinColumn(ColumnSource source, std::shared_ptr<const ResultSample> sample, std::size_t number)
-      : source_(std::move(source)), sample_(std::move(sample)), number_(number) {}
-
-  explicit operator bool() const { return stored_ || sample_; }
-  const ColumnSource& source() const { return source_; }
-  std::uint64_t size() const { return stored_ ? stored_->points() : sample_->points.size(); }
-  std::uint64_t point(std::uint64_t place) const {
-    return stored_ ? place : sample_->points[place];
-  }
-  std::vector<float> part(std::uint64_t first, std::size_t count) const {
-    if (stored_) {
-      return stored_->part(first, count);
-    }
-    const auto& all = sample_->columns[number_];
-    const std::size_t end = std::min<std::size_t>(first + count, all.size());
-    return {all.begin() + static_cast<std::ptrdiff_t>(first),
-            all.begin() + static_cast<std::ptrdiff_t>(end)};
-  }
-
- private:
-  ColumnSource source_;
-  ColumnStore::Shared stored_;
-  std::shared_ptr<const ResultSample> sample_;
-  std::size_t number_ = 0;
-};
-
-/// The bins along one column, both ends in.
+/// The bins along one column.
 struct BinSide {
-  BinColumn column;  ///< none: there is one bin
-  std::uint64_t bins = 1;
+  std::string name;  ///< x or y
+  PictureColumn column;
+  std::uint64_t bins = kUsualBins;
   bool is_logarithmic = false;
+  std::optional<double> typed_least = {};
+  std::optional<double> typed_most = {};
   double least = 0.0;
   double most = 0.0;
-  // The ends as values are kept: the end that was typed is the float32 next to it.
-  float first = 0.0F;
-  float last = 0.0F;
-  double from = 0.0;   ///< place of `first`
-  double width = 0.0;  ///< up to that of `last`
 
-  void place_ends() {
-    first = as_kept(least);
-    last = as_kept(most);
-    from = place_of(first);
-    width = place_of(last) - from;
+  bool has_typed_ends() const { return typed_least && typed_most; }
+  /// Rows that have a place on this side.
+  std::string has_place_sql() const {
+    return fmt::format("{} {}", column.name, is_logarithmic ? "> 0" : "IS NOT NULL");
   }
-  bool takes(float value) const { return !column || (value >= first && value <= last); }
-  /// Of a value that it takes.
-  std::uint64_t bin_of(float value) const {
-    const double share = column && width > 0.0 ? (place_of(value) - from) / width : 0.0;
-    return std::min(static_cast<std::uint64_t>(share * static_cast<double>(bins)), bins - 1);
+  std::string is_inside_sql() const {
+    const double slack_below =
+        kEndTolerance * (is_logarithmic ? least : std::max(std::abs(least), std::abs(most)));
+    const double slack_above = kEndTolerance * std::max(std::abs(least), std::abs(most));
+    return fmt::format("{} BETWEEN {} AND {}", column.name, sql_number(least - slack_below),
+                       sql_number(most + slack_above));
+  }
+  /// The number of a row's bin.
+  std::string bin_sql() const {
+    const double first = place_of(least);
+    const double width = place_of(most) - first;
+    if (!(width > 0.0)) {
+      return "0";
+    }
+    const std::string place = is_logarithmic ? fmt::format("ln({})", column.name) : column.name;
+    return fmt::format("max(min(CAST(({} - {}) * {} AS INTEGER), {}), 0)", place, sql_number(first),
+                       sql_number(static_cast<double>(bins) / width), bins - 1);
+  }
+  /// Takes the ends that were not typed from the range of the column; `range` is empty if no row
+  /// has a place. Throws std::invalid_argument for wrong ends.
+  void set_ends(std::optional<std::pair<double, double>> range) {
+    least = typed_least.value_or(range ? range->first : typed_most.value_or(0.0));
+    most = typed_most.value_or(range ? range->second : least);
+    const bool has_ends = range || typed_least || typed_most;
+    if (least > most || (is_logarithmic && has_ends && least <= 0.0)) {
+      throw std::invalid_argument(fmt::format(
+          "{0}0 must be at most {0}1, and above 0 where the scale is logarithmic", name));
+    }
+  }
+  ordered_json json() const {
+    return {{"column", column.name}, {"unit", column.unit}, {"least", least},
+            {"most", most},          {"bins", bins},        {"log", is_logarithmic}};
   }
 
  private:
-  using Kept = std::numeric_limits<float>;
-  float as_kept(double end) const {
-    const auto kept = static_cast<float>(
-        std::clamp(end, static_cast<double>(Kept::lowest()), static_cast<double>(Kept::max())));
-    return is_logarithmic ? std::max(kept, Kept::denorm_min()) : kept;
-  }
-  double place_of(float value) const {
-    const auto number = static_cast<double>(value);
-    return is_logarithmic ? std::log(number) : number;
+  double place_of(double value) const {
+    return is_logarithmic ? std::log(std::max(value, std::numeric_limits<double>::min())) : value;
   }
 };
 
-/// Columns that are asked for, and what there is of their study.
-struct BinColumns {
-  std::vector<BinColumn> columns;
-  std::shared_ptr<const ResultSample> sample;  ///< null: all is held
-};
-
-BinColumns read_columns(const AnswerDesk& desk, const LookedAtStudy& study,
-                        const std::vector<ColumnSource>& sources) {
-  BinColumns read;
-  if (study.points > ColumnStore::kMostPoints) {
-    read.sample = desk.samples.sample(desk, study.id, sources);
-  }
-  for (const ColumnSource& source : sources) {
-    if (read.sample) {
-      read.columns.emplace_back(source, read.sample, read.columns.size());
-    } else {
-      read.columns.emplace_back(
-          source, desk.columns.read(desk.database, study.id, source, study.points, desk.is_over));
-    }
-  }
-  return read;
+BinSide side_of(const FieldReader& fields, const std::string& name) {
+  return {name,
+          picture_column(fields, name, false),
+          fields.cells("n" + name, kUsualBins),
+          fields.text(name + "log").value_or("") == "1",
+          fields.number(name + "0"),
+          fields.number(name + "1")};
 }
 
-/// Which points are counted: those that meet a condition, or all.
-class Chosen {
- public:
-  explicit Chosen(const PointSet* points) : points_(points) {}
-  bool has(std::uint64_t point) { return points_ == nullptr || points_->has(point, near_); }
-
- private:
-  const PointSet* points_;
-  std::size_t near_ = 0;
-};
-
-/// The least and the largest value that can be shown; nothing: there is none.
-std::optional<std::pair<double, double>> range_of(const AnswerDesk& desk, const BinSide& side,
-                                                  const PointSet* chosen) {
-  Chosen is_chosen(chosen);
-  std::optional<std::pair<double, double>> range;
-  for (std::uint64_t first = 0; first < side.column.size(); first += kPart) {
-    desk.end_in_time(first);
-    const std::vector<float> part = side.column.part(first, kPart);
-    for (std::size_t i = 0; i < part.size(); ++i) {
-      const auto value = static_cast<double>(part[i]);
-      if (std::isfinite(value) && (!side.is_logarithmic || value > 0.0) &&
-          is_chosen.has(side.column.point(first + i))) {
-        range = range ? std::pair(std::min(range->first, value), std::max(range->second, value))
-                      : std::pair(value, value);
-      }
-    }
-  }
-  return range;
-}
-
-BinSide side_of(const AnswerDesk& desk, BinColumn column, const FieldReader& fields,
-                const std::string& name, const PointSet* chosen) {
-  BinSide side;
-  side.column = std::move(column);
-  side.bins = fields.pixels("n" + name, kUsualBins);
-  side.is_logarithmic = fields.text(name + "log").value_or("") == "1";
-  const auto range = range_of(desk, side, chosen);
-  const auto typed_least = fields.number(name + "0");
-  const auto typed_most = fields.number(name + "1");
-  side.least = typed_least.value_or(range ? range->first : typed_most.value_or(0.0));
-  side.most = typed_most.value_or(range ? range->second : side.least);
-  const bool has_ends = range || typed_least || typed_most;
-  if (side.least > side.most || (side.is_logarithmic && has_ends && side.least <= 0.0)) {
-    throw std::invalid_argument(
-        fmt::format("{0}0 must be at most {0}1, and above 0 where the scale is logarithmic", name));
-  }
-  side.place_ends();
-  return side;
-}
-
-/// What lies where.
 struct Bins {
   std::vector<std::uint32_t> counts;
-  std::vector<double> sums;           ///< of the third column; empty: none is wanted
-  std::vector<std::uint32_t> summed;  ///< points with such a value
-  std::uint64_t inside = 0;
+  std::vector<float> means;  ///< of the third column
   std::uint64_t outside = 0;
-  std::uint64_t filtered = 0;
 };
 
-Bins bins_of(const AnswerDesk& desk, const BinSide& x, const BinSide& y, const BinColumn& z,
-             const PointSet* chosen) {
-  Chosen is_chosen(chosen);
-  const std::size_t size = x.bins * y.bins;
-  Bins bins{std::vector<std::uint32_t>(size), std::vector<double>(z ? size : 0),
-            std::vector<std::uint32_t>(z ? size : 0)};
-  for (std::uint64_t first = 0; first < x.column.size(); first += kPart) {
-    desk.end_in_time(first);
-    const std::vector<float> x_part = x.column.part(first, kPart);
-    const std::vector<float> y_part = y.column ? y.column.part(first, kPart) : x_part;
-    const std::vector<float> z_part = z ? z.part(first, kPart) : std::vector<float>();
-    for (std::size_t i = 0; i < x_part.size(); ++i) {
-      const float x_value = x_part[i];
-      const float y_value = y_part[i];
-      if (!std::isfinite(x_value) || !std::isfinite(y_value)) {
-        continue;
-      }
-      if (!is_chosen.has(x.column.point(first + i))) {
-        ++bins.filtered;
-        continue;
-      }
-      if (!x.takes(x_value) || !y.takes(y_value)) {
-        ++bins.outside;
-        continue;
-      }
-      const std::uint64_t bin = y.bin_of(y_value) * x.bins + x.bin_of(x_value);
-      ++bins.counts[bin];
-      ++bins.inside;
-      if (z && std::isfinite(z_part[i])) {
-        bins.sums[bin] += static_cast<double>(z_part[i]);
-        ++bins.summed[bin];
-      }
-    }
+/// Selects from the solved points that meet the condition and have a place on all sides.
+protocol::StudyQuery query_of(const ServedStudy& study, const std::string& condition,
+                              const std::vector<BinSide>& sides) {
+  protocol::StudyQuery query;
+  query.set_study(study.name);
+  std::string where =
+      condition.empty() ? "error IS NULL" : fmt::format("({}) AND error IS NULL", condition);
+  for (const BinSide& side : sides) {
+    where += " AND " + side.has_place_sql();
   }
+  query.set_where(where);
+  return query;
+}
+
+/// Sets the ends of the sides, by a query unless all were typed.
+void find_ends(const JobContext& context, const ServedStudy& study, const std::string& condition,
+               std::vector<BinSide>& sides) {
+  if (std::ranges::all_of(sides, &BinSide::has_typed_ends)) {
+    std::ranges::for_each(sides, [](BinSide& side) { side.set_ends(std::nullopt); });
+    return;
+  }
+  protocol::StudyQuery query = query_of(study, condition, sides);
+  for (const BinSide& side : sides) {
+    query.add_select(fmt::format("min({0}), max({0})", side.column.name));
+  }
+  context.query(query, condition, [&](const protocol::ChunkRows& row) {
+    for (std::size_t i = 0; i < sides.size(); ++i) {
+      const protocol::Cell& least = row.cell(2 * i);
+      sides[i].set_ends(
+          least.kind == protocol::CellKind::kNull
+              ? std::nullopt
+              : std::optional(std::pair(real_of(least), real_of(row.cell(2 * i + 1)))));
+    }
+  });
+}
+
+/// One row a bin; of what lies beyond the ends the bin is NULL.
+Bins count_bins(const JobContext& context, const ServedStudy& study, const std::string& condition,
+                const std::vector<BinSide>& sides, const std::optional<PictureColumn>& z) {
+  std::size_t size = 1;
+  std::string bin;
+  std::string is_inside;
+  for (const BinSide& side : sides) {
+    bin += fmt::format("{}{} * {}", bin.empty() ? "" : " + ", size, side.bin_sql());
+    is_inside += (is_inside.empty() ? "" : " AND ") + side.is_inside_sql();
+    size *= side.bins;
+  }
+  Bins bins{std::vector<std::uint32_t>(size),
+            std::vector<float>(z ? size : 0, std::numeric_limits<float>::quiet_NaN())};
+  protocol::StudyQuery query = query_of(study, condition, sides);
+  query.add_select(fmt::format("CASE WHEN {} THEN {} END AS bin", is_inside, bin));
+  query.add_select("count(*)");
+  if (z) {
+    query.add_select(fmt::format("avg({})", z->name));
+  }
+  query.set_group("bin");
+  context.query(query, condition, [&](const protocol::ChunkRows& row) {
+    const auto count = static_cast<std::uint64_t>(row.cell(1).integer);
+    if (row.cell(0).kind == protocol::CellKind::kNull) {
+      bins.outside = count;
+      return;
+    }
+    const auto place = static_cast<std::size_t>(row.cell(0).integer);
+    bins.counts.at(place) = static_cast<std::uint32_t>(count);
+    if (z && row.cell(2).kind != protocol::CellKind::kNull) {
+      bins.means[place] = static_cast<float>(real_of(row.cell(2)));
+    }
+  });
   return bins;
 }
 
-ordered_json side_json(const BinSide& side) {
-  const ColumnSource& source = side.column.source();
-  return {{"column", source.name}, {"unit", source.unit}, {"least", side.least},
-          {"most", side.most},     {"bins", side.bins},   {"log", side.is_logarithmic}};
-}
-
-HttpAnswer bins_answer(const AnswerDesk& desk, std::uint64_t id, const Fields& asked,
-                       const PointSet* chosen) {
-  const LookedAtStudy study = desk.studies.study(desk.database, id);
+HttpAnswer bins_answer(const JobContext& context, std::uint64_t id, const Fields& asked) {
   const FieldReader fields(asked);
-  const bool has_y = fields.text("y").has_value();
-  std::vector<ColumnSource> sources{picture_column(fields, "x", false)};
-  if (has_y) {
-    sources.push_back(picture_column(fields, "y", false));
+  const std::string condition = fields.condition();
+  std::vector<BinSide> sides{side_of(fields, "x")};
+  if (fields.text("y")) {
+    sides.push_back(side_of(fields, "y"));
   }
+  std::optional<PictureColumn> z;
   if (fields.text("z")) {
-    sources.push_back(picture_column(fields, "z", false));
+    z = picture_column(fields, "z", false);
   }
-  auto [columns, sample] = read_columns(desk, study, sources);
-  const BinColumn z = fields.text("z") ? columns.back() : BinColumn();
-  const BinSide x = side_of(desk, columns[0], fields, "x", chosen);
-  const BinSide y = has_y ? side_of(desk, columns[1], fields, "y", chosen) : BinSide();
-  const Bins bins = bins_of(desk, x, y, z, chosen);
-  std::string numbers(bins.counts.size() * sizeof(bins.counts[0]), '\0');
-  std::memcpy(numbers.data(), bins.counts.data(), numbers.size());
-  for (std::size_t i = 0; i < bins.sums.size(); ++i) {
-    const float mean = bins.summed[i] > 0
-                           ? static_cast<float>(bins.sums[i] / static_cast<double>(bins.summed[i]))
-                           : no_result();
-    numbers.append(reinterpret_cast<const char*>(&mean), sizeof mean);
-  }
+  const ServedStudy study = context.study(id);
+  find_ends(context, study, condition, sides);
+  const Bins bins = count_bins(context, study, condition, sides, z);
+  std::string numbers(reinterpret_cast<const char*>(bins.counts.data()),
+                      bins.counts.size() * sizeof bins.counts[0]);
+  numbers.append(reinterpret_cast<const char*>(bins.means.data()),
+                 bins.means.size() * sizeof(float));
   return numbers_answer(
       {{"study", id},
-       {"x", side_json(x)},
-       {"y", y.column ? side_json(y) : ordered_json(nullptr)},
-       {"z", z ? ordered_json(z.source().name) : ordered_json(nullptr)},
-       {"points", bins.inside},
+       {"x", sides[0].json()},
+       {"y", sides.size() > 1 ? sides[1].json() : ordered_json(nullptr)},
+       {"z", z ? ordered_json(z->name) : ordered_json(nullptr)},
+       {"points", std::accumulate(bins.counts.begin(), bins.counts.end(), std::uint64_t{0})},
        {"outside", bins.outside},
-       {"filtered", bins.filtered},
-       {"sample", sample && sample->points.size() < sample->of
-                      ? ordered_json{{"results", sample->points.size()}, {"of", sample->of}}
-                      : ordered_json(nullptr)},
        {"most", *std::max_element(bins.counts.begin(), bins.counts.end())}},
       numbers);
 }
 
 }  // namespace
 
-AnswerPool::Job bins_job(std::uint64_t study, const Fields& fields,
-                         std::shared_ptr<const PointSet> chosen) {
-  return [study, fields, chosen = std::move(chosen)](const AnswerDesk& desk) {
-    return bins_answer(desk, study, fields, chosen.get());
-  };
+AnswerPool::Job bins_job(std::uint64_t study, const Fields& fields) {
+  return [study, fields](const JobContext& context) { return bins_answer(context, study, fields); };
 }
 
 }  // namespace oblique::server

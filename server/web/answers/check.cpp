@@ -64,13 +64,14 @@ ordered_json json_of(const std::optional<double>& number) {
   return number ? ordered_json(*number) : ordered_json();
 }
 
-HttpAnswer check_answer(const AnswerDesk& desk, const std::string& body) {
+HttpAnswer check_answer(const JobContext& context, const std::string& body) {
   protocol::SubmitRequest asked = study_of_body(body);
   try {
     protocol::PointTable table(std::move(*asked.mutable_recipe()));
     const auto until = Clock::now() + kLongestSurvey;
-    const bool is_counted = !table.needs_survey() ||
-                            table.survey([&] { return Clock::now() < until && !desk.is_over(); });
+    const bool is_counted = !table.needs_survey() || table.survey([&] {
+      return Clock::now() < until && !context.is_over();
+    });
     const protocol::StudySize size = protocol::size_of(table);
     return json_answer({{"points", size.points},
                         {"numbers", table.size()},
@@ -127,7 +128,7 @@ protocol::SubmitRequest study_of_body(const std::string& body) {
 }
 
 AnswerPool::Job check_job(const std::string& body) {
-  return [body](const AnswerDesk& desk) { return check_answer(desk, body); };
+  return [body](const JobContext& context) { return check_answer(context, body); };
 }
 
 }  // namespace oblique::server

@@ -1,6 +1,7 @@
 #include "server/web/answers/fields.h"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <stdexcept>
@@ -10,6 +11,9 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/text.h"
+#include "server/query/columns.h"
+#include "server/query/sql_text.h"
+#include "worker/solver/model/errors.h"
 
 namespace oblique::server {
 namespace {
@@ -24,7 +28,7 @@ std::optional<Number> read_as(const std::string& text) {
 
 }  // namespace
 
-bool is_text(const std::map<std::string, std::string>& fields) {
+bool is_text(const Fields& fields) {
   return std::all_of(fields.begin(), fields.end(), [](const auto& field) {
     return protocol::is_utf8(field.first) && protocol::is_utf8(field.second);
   });
@@ -60,24 +64,53 @@ std::optional<double> FieldReader::number(const std::string& name) const {
   return number;
 }
 
-std::uint64_t FieldReader::pixels(const std::string& name, std::uint64_t usual) const {
-  const std::uint64_t pixels = whole(name).value_or(usual);
-  if (pixels < 1 || pixels > kMostPixels) {
-    throw std::invalid_argument(fmt::format("{} must be from 1 to {}", name, kMostPixels));
+std::uint64_t FieldReader::cells(const std::string& name, std::uint64_t usual) const {
+  const std::uint64_t cells = whole(name).value_or(usual);
+  if (cells < 1 || cells > kMostCells) {
+    throw std::invalid_argument(fmt::format("{} must be from 1 to {}", name, kMostCells));
   }
-  return pixels;
+  return cells;
 }
 
-ColumnSource picture_column(const FieldReader& fields, const std::string& name,
-                            bool may_be_category) {
-  const std::string column = fields.text(name).value_or("");
-  auto source = column_source(column);
-  if (!source || (source->is_category && !may_be_category)) {
+std::string FieldReader::condition() const {
+  const std::string condition = text("where").value_or("");
+  try {
+    if (!condition.empty()) {
+      check_sql_part("--where", condition, SqlPart::kCondition);
+    }
+  } catch (const solver::InputError& error) {
+    throw std::invalid_argument(error.what());
+  }
+  return condition;
+}
+
+double real_of(const protocol::Cell& cell) {
+  return cell.kind == protocol::CellKind::kInteger ? static_cast<double>(cell.integer) : cell.real;
+}
+
+std::optional<PictureColumn> find_picture_column(std::string_view name) {
+  constexpr std::array<std::string_view, 3> kCategories{"mode", "major_mode", "margin_event"};
+  if (std::ranges::find(kCategories, name) != kCategories.end()) {
+    return PictureColumn{std::string(name), "", true};
+  }
+  const auto& columns = all_columns();
+  const auto column = std::ranges::find(columns, name, &Column::name);
+  const bool is_quantity = column != columns.end() && column->kind != "row" &&
+                           kind_of_values(name) != protocol::CellKind::kText;
+  return is_quantity ? std::optional(PictureColumn{column->name, column->unit, false})
+                     : std::nullopt;
+}
+
+PictureColumn picture_column(const FieldReader& fields, const std::string& name,
+                             bool may_be_category) {
+  const std::string text = fields.text(name).value_or("");
+  auto column = find_picture_column(text);
+  if (!column || (column->is_category && !may_be_category)) {
     throw std::invalid_argument(fmt::format("{} must be a column of numbers{}; \"{}\" is none",
                                             name, may_be_category ? " or categories" : "",
-                                            protocol::excerpt(column)));
+                                            protocol::excerpt(text)));
   }
-  return *std::move(source);
+  return *std::move(column);
 }
 
 }  // namespace oblique::server

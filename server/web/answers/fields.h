@@ -4,35 +4,53 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 
-#include "server/web/answers/column_source.h"
+#include "proto/wire/cell.h"
 
 namespace oblique::server {
 
-/// Whether all of them are UTF-8: messages to the service have nothing else.
-bool is_text(const std::map<std::string, std::string>& fields);
+/// The fields behind the question mark of a request, decoded.
+using Fields = std::map<std::string, std::string>;
 
-/// What follows the question mark of a request, read field by field. Each throws
-/// std::invalid_argument, naming the field and what is allowed.
+/// Whether all of them are UTF-8: messages to the service have nothing else.
+bool is_text(const Fields& fields);
+
+/// Reads fields. Each function throws std::invalid_argument, naming the field and what is allowed.
 class FieldReader {
  public:
-  explicit FieldReader(const std::map<std::string, std::string>& fields) : fields_(fields) {}
+  explicit FieldReader(const Fields& fields) : fields_(fields) {}
 
   std::optional<std::string> text(const std::string& name) const;
   std::optional<std::uint64_t> whole(const std::string& name) const;
   std::optional<double> number(const std::string& name) const;
-  /// From 1 to the most pixels of a side.
-  std::uint64_t pixels(const std::string& name, std::uint64_t usual) const;
+  /// Cells along one side of a picture, from 1 to kMostCells.
+  std::uint64_t cells(const std::string& name, std::uint64_t usual) const;
+  /// The condition `where`, a whole expression of SQL; empty if there is none.
+  std::string condition() const;
 
-  static constexpr std::uint64_t kMostPixels = 1024;
+  static constexpr std::uint64_t kMostCells = 256;
 
  private:
-  const std::map<std::string, std::string>& fields_;
+  const Fields& fields_;
 };
 
-/// The column that a field names. Throws std::invalid_argument unless it is one of numbers, or,
-/// where it may be, of categories.
-ColumnSource picture_column(const FieldReader& fields, const std::string& name,
-                            bool may_be_category);
+/// The value of a cell that is an integer or a real number.
+double real_of(const protocol::Cell& cell);
+
+/// A column that a picture can show.
+struct PictureColumn {
+  std::string name;
+  std::string unit;
+  bool is_category = false;  ///< a text with few values; else a number
+};
+
+/// Nothing if the column is neither a number nor a category.
+std::optional<PictureColumn> find_picture_column(std::string_view name);
+
+/// The column in a field. Throws std::invalid_argument unless it is a number or, where allowed, a
+/// category.
+PictureColumn picture_column(const FieldReader& fields, const std::string& name,
+                             bool may_be_category);
 
 }  // namespace oblique::server

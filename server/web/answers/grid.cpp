@@ -17,7 +17,7 @@ namespace {
 
 using protocol::AxisLayout;
 
-constexpr std::uint64_t kUsualPixels = 256;
+constexpr std::uint64_t kUsualCells = 256;
 
 /// Null: the block has no such axis with values of its own.
 const AxisLayout* find(const std::vector<AxisLayout>& axes, std::string_view key) {
@@ -67,7 +67,7 @@ GridSide side_of(const AxisLayout& layout, const FieldReader& fields, const std:
                     side.of, side.key));
   }
   const std::uint64_t there = side.last - side.first + 1;
-  const std::uint64_t shown = std::min(there, fields.pixels("n" + name, kUsualPixels));
+  const std::uint64_t shown = std::min(there, fields.cells("n" + name, kUsualCells));
   for (std::uint64_t i = 0; i < shown; ++i) {
     // Half is added so that the nearest line is taken.
     const std::uint64_t steps = shown > 1 ? shown - 1 : 1;
@@ -102,7 +102,7 @@ GridPlace place_of(const std::vector<AxisLayout>& axes, std::string_view text) {
   const std::size_t mark = text.find_first_of(":@");
   const std::string_view key = text.substr(0, mark);
   const AxisLayout* const axis = mark == std::string_view::npos ? nullptr : find(axes, key);
-  const std::map<std::string, std::string> entry{
+  const Fields entry{
       {"at", std::string(mark == std::string_view::npos ? "" : text.substr(mark + 1))}};
   const FieldReader reader(entry);
   if (axis == nullptr || !reader.text("at")) {

@@ -39,7 +39,7 @@ struct GridSlice {
   std::vector<GridPlace> at;
   std::uint64_t first_point;  ///< that of the first values of both sides
 
-  /// Of a pixel.
+  /// The point of a cell.
   std::uint64_t point(std::size_t column, std::size_t row) const {
     return first_point + x.numbers[column] * x.stride + (y.numbers[row] * y.stride);
   }

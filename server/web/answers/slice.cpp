@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <map>
-#include <numeric>
+#include <optional>
 #include <stdexcept>
 #include <utility>
+#include <vector>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -18,8 +18,18 @@ namespace {
 
 using nlohmann::ordered_json;
 
-/// Rows that lie so near to each other are read in one go.
-constexpr std::uint64_t kNear = 4;
+/// Why a cell has no value. As a number it is the NaN with the bits kNan + mark, as a category the
+/// code 0xffff - mark.
+enum class Mark : std::uint8_t { kNotSolved, kFailed, kLeftOut, kNoValue, kFiltered, kHasValue };
+constexpr std::uint32_t kNan = 0x7fc00000;
+constexpr std::uint16_t kLastCode = 0xffff;
+
+/// What the cells of a picture have, row by row.
+struct SliceCells {
+  std::vector<Mark> marks;
+  std::vector<float> numbers;                              ///< of a column of numbers
+  std::map<std::string, std::vector<std::size_t>> places;  ///< of categories: cells by text
+};
 
 template <typename Number>
 void append(const std::vector<Number>& numbers, std::string& bytes) {
@@ -28,142 +38,77 @@ void append(const std::vector<Number>& numbers, std::string& bytes) {
   }
 }
 
-/// Values of points, read by key. Neighbours are read together.
-std::vector<float> read_by_key(const AnswerDesk& desk, std::uint64_t study,
-                               const ColumnSource& source,
-                               const std::vector<std::uint64_t>& points) {
-  std::vector<std::size_t> order(points.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  const auto is_before = [&](std::size_t a, std::size_t b) { return points[a] < points[b]; };
-  if (!std::is_sorted(order.begin(), order.end(), is_before)) {
-    std::sort(order.begin(), order.end(), is_before);
+/// What is added to the number of a point for each cell along a side, as a JSON array.
+std::string offsets_json(const GridSide& side, std::uint64_t first) {
+  std::vector<std::uint64_t> offsets;
+  for (const std::uint64_t number : side.numbers) {
+    offsets.push_back(first + number * side.stride);
   }
-  std::vector<float> values(points.size(), no_result());
-  const auto settled =
-      settled_between(desk.database, study, points[order.front()], points[order.back()]);
-  std::size_t run = 0;
-  ColumnReader reader(desk.database, study, source);
-  for (std::size_t begin = 0; begin < order.size();) {
-    std::size_t end = begin + 1;
-    while (end < order.size() && points[order[end]] - points[order[end - 1]] <= kNear) {
-      ++end;
-    }
-    std::size_t next = begin;
-    while (settled && run < settled->size() && (*settled)[run].end <= points[order[begin]]) {
-      ++run;
-    }
-    if (settled && (run == settled->size() || points[order[end - 1]] < (*settled)[run].begin)) {
-      begin = end;  // no row is there, and none is looked for
-      continue;
-    }
-    reader.read(points[order[begin]], points[order[end - 1]],
-                [&](std::uint64_t point, float value) {
-                  while (next < end && points[order[next]] < point) {
-                    ++next;
-                  }
-                  if (next < end && points[order[next]] == point) {
-                    values[order[next]] = value;
-                  }
-                });
-    begin = end;
-  }
-  return values;
+  return fmt::format("[{}]", fmt::join(offsets, ","));
 }
 
-struct Tally {
-  std::uint64_t solved = 0;
-  std::uint64_t failed = 0;
-  std::uint64_t left_out = 0;
-  std::uint64_t missing = 0;
-  std::uint64_t filtered = 0;
-  double least = 0.0;
-  double most = 0.0;
-  bool has_value = false;
-};
-
-/// Marks what a filter of the study leaves out, and results that are not `chosen`, and counts.
-Tally tally(const AnswerDesk& desk, const LookedAtStudy& study,
-            const std::vector<std::uint64_t>& points, std::vector<float>& values,
-            const PointSet* chosen) {
-  Tally tally;
-  std::size_t near = 0;
-  const bool has_filter = study.table->has_filter();
-  constexpr std::uint64_t kFiltersBetweenLooks = 64;  // one may take as long as its author likes
-  constexpr std::uint64_t kPointsBetweenLooks = 65'536;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    desk.end_in_time(i, has_filter ? kFiltersBetweenLooks : kPointsBetweenLooks);
-    float& value = values[i];
-    if (is_same_mark(value, no_result()) && has_filter && !study.table->is_left_in(points[i])) {
-      value = left_out();
-      ++tally.left_out;
-    } else if (is_same_mark(value, no_result())) {
-      ++tally.missing;
-    } else if (chosen != nullptr && !chosen->has(points[i], near)) {
-      value = filtered_out();
-      ++tally.filtered;
-    } else if (is_same_mark(value, failed_point())) {
-      ++tally.failed;
-    } else {
-      ++tally.solved;
-    }
-    if (std::isfinite(value)) {
-      const auto number = static_cast<double>(value);
-      tally.least = tally.has_value ? std::min(tally.least, number) : number;
-      tally.most = tally.has_value ? std::max(tally.most, number) : number;
-      tally.has_value = true;
-    }
-  }
-  return tally;
+/// Selects point, value and mark of the cells that have a row. SQLite looks each point up by key.
+protocol::StudyQuery slice_query(const ServedStudy& study, const GridSlice& slice,
+                                 const std::string& column, const std::string& condition) {
+  protocol::StudyQuery query;
+  query.set_study(study.name);
+  query.add_select("point");
+  query.add_select(column);
+  query.add_select(
+      fmt::format("CASE {}WHEN error IS NOT NULL THEN {} WHEN {} IS NULL THEN {} ELSE {} END",
+                  condition.empty() ? ""
+                                    : fmt::format("WHEN ({}) IS NOT TRUE THEN {} ", condition,
+                                                  static_cast<int>(Mark::kFiltered)),
+                  static_cast<int>(Mark::kFailed), column, static_cast<int>(Mark::kNoValue),
+                  static_cast<int>(Mark::kHasValue)));
+  query.set_where(fmt::format(
+      "point IN (SELECT y.value + x.value FROM json_each('{}') AS y, json_each('{}') AS x)",
+      offsets_json(slice.y, slice.first_point), offsets_json(slice.x, 0)));
+  return query;
 }
 
-constexpr std::uint16_t kFirstMark = 0xfffb;
-
-/// Codes of texts, the most frequent first, and these texts. Of those that are equally frequent the
-/// first by the alphabet, as pictures of oblique plot have them.
-std::vector<std::uint16_t> coded(const AnswerDesk& desk, const std::vector<float>& values,
-                                 ordered_json& dictionary) {
-  std::map<std::int64_t, std::uint64_t> counts;
-  for (const float value : values) {
-    if (std::isfinite(value)) {
-      ++counts[static_cast<std::int64_t>(value)];
+/// The cells by rising point.
+std::vector<std::pair<std::uint64_t, std::size_t>> points_of(const GridSlice& slice) {
+  std::vector<std::pair<std::uint64_t, std::size_t>> points;
+  for (std::size_t row = 0; row < slice.y.numbers.size(); ++row) {
+    for (std::size_t column = 0; column < slice.x.numbers.size(); ++column) {
+      points.emplace_back(slice.point(column, row), points.size());
     }
   }
-  struct Text {
-    std::int64_t id;
-    std::uint64_t count;
-    std::string text;
+  std::sort(points.begin(), points.end());
+  return points;
+}
+
+SliceCells read_cells(const JobContext& context, const ServedStudy& study, const GridSlice& slice,
+                      const PictureColumn& column, const std::string& condition) {
+  const auto points = points_of(slice);
+  SliceCells read{std::vector<Mark>(points.size()), std::vector<float>(points.size()), {}};
+  auto place = points.begin();
+  const auto take = [&](const protocol::ChunkRows& row) {
+    const auto point = static_cast<std::uint64_t>(row.cell(0).integer);
+    place =
+        std::find_if(place, points.end(), [&](const auto& each) { return each.first >= point; });
+    if (place == points.end() || place->first != point) {
+      throw std::runtime_error("a reader process returned another point than it was asked for");
+    }
+    const std::size_t cell = place->second;
+    read.marks[cell] = static_cast<Mark>(row.cell(2).integer);
+    if (read.marks[cell] == Mark::kHasValue && column.is_category) {
+      read.places[std::string(row.cell(1).text)].push_back(cell);
+    } else if (read.marks[cell] == Mark::kHasValue) {
+      read.numbers[cell] = static_cast<float>(real_of(row.cell(1)));
+    }
   };
-  std::vector<Text> ranked;
-  Statement text(desk.database, "SELECT text FROM texts WHERE text_id = ?1");
-  for (const auto& [id, count] : counts) {
-    text.bind(1, id);
-    ranked.push_back({id, count, text.step() ? text.text(0) : ""});
-    text.reset();
-  }
-  std::sort(ranked.begin(), ranked.end(), [](const Text& a, const Text& b) {
-    return a.count != b.count ? a.count > b.count : a.text < b.text;
-  });
-  std::map<std::int64_t, std::uint16_t> codes;
-  for (Text& each : ranked) {
-    if (codes.size() == kFirstMark) {
-      break;
+  context.query(slice_query(study, slice, column.name, condition), condition, take);
+  if (study.table->has_filter()) {
+    for (const auto& [point, cell] : points) {
+      context.throw_if_over();  // a filter may take long
+      if (read.marks[cell] == Mark::kNotSolved && !study.table->is_left_in(point)) {
+        read.marks[cell] = Mark::kLeftOut;
+      }
     }
-    dictionary.push_back({{"text", std::move(each.text)}, {"cells", each.count}});
-    codes.emplace(each.id, static_cast<std::uint16_t>(codes.size()));
   }
-  std::vector<std::uint16_t> coded(values.size());
-  std::transform(values.begin(), values.end(), coded.begin(), [&](float value) -> std::uint16_t {
-    if (std::isfinite(value)) {
-      const auto code = codes.find(static_cast<std::int64_t>(value));
-      return code == codes.end() ? 0xfffc : code->second;
-    }
-    return is_same_mark(value, no_result())      ? 0xffff
-           : is_same_mark(value, failed_point()) ? 0xfffe
-           : is_same_mark(value, left_out())     ? 0xfffd
-           : is_same_mark(value, no_value())     ? 0xfffc
-                                                 : kFirstMark;
-  });
-  return coded;
+  return read;
 }
 
 ordered_json side_json(const GridSide& side) {
@@ -176,32 +121,57 @@ ordered_json side_json(const GridSide& side) {
       {"stride", side.stride}, {"all_lines", side.numbers.size() == side.last - side.first + 1}};
 }
 
-HttpAnswer slice_answer(const AnswerDesk& desk, std::uint64_t id, const Fields& asked,
-                        const PointSet* chosen) {
-  const LookedAtStudy study = desk.studies.study(desk.database, id);
-  const FieldReader fields(asked);
-  const ColumnSource source = picture_column(fields, "z", true);
-  const GridSlice slice = grid_slice(*study.table, fields);
-  const std::size_t nx = slice.x.numbers.size();
-  const std::size_t ny = slice.y.numbers.size();
-  std::vector<std::uint64_t> points(nx * ny);
-  for (std::size_t row = 0; row < ny; ++row) {
-    for (std::size_t column = 0; column < nx; ++column) {
-      points[row * nx + column] = slice.point(column, row);
+/// Adds least and most to the head, and the cells to the numbers.
+void append_numbers(const SliceCells& read, ordered_json& head, std::string& numbers) {
+  std::vector<std::uint32_t> bits;
+  std::optional<std::pair<float, float>> range;
+  for (std::size_t cell = 0; cell < read.marks.size(); ++cell) {
+    const float number = read.numbers[cell];
+    const bool has_value = read.marks[cell] == Mark::kHasValue;
+    bits.push_back(has_value ? std::bit_cast<std::uint32_t>(number)
+                             : kNan + static_cast<std::uint32_t>(read.marks[cell]));
+    if (has_value) {
+      range = std::pair(std::min(range ? range->first : number, number),
+                        std::max(range ? range->second : number, number));
     }
   }
-  std::vector<float> values;
-  // Looking up a row takes as long as reading sixteen that follow each other.
-  const bool is_most_of_it = study.points / 16 <= points.size();
-  const auto column = is_most_of_it
-                          ? desk.columns.read(desk.database, id, source, study.points, desk.is_over)
-                          : desk.columns.find(desk.database, id, source, study.points);
-  if (column) {
-    column->gather(points, values);
-  } else {
-    values = read_by_key(desk, id, source, points);
+  head["least"] = range ? ordered_json(range->first) : nullptr;
+  head["most"] = range ? ordered_json(range->second) : nullptr;
+  append(bits, numbers);
+}
+
+/// Adds the dictionary to the head, and the codes of the cells to the numbers. The most frequent
+/// text comes first, of equally frequent ones the first in the alphabet, as in `oblique plot`.
+void append_codes(const SliceCells& read, ordered_json& head, std::string& numbers) {
+  std::vector<std::uint16_t> codes;
+  for (const Mark mark : read.marks) {
+    codes.push_back(static_cast<std::uint16_t>(kLastCode - static_cast<int>(mark)));
   }
-  const Tally counts = tally(desk, study, points, values, chosen);
+  std::vector<std::pair<std::string, std::vector<std::size_t>>> ranked(read.places.begin(),
+                                                                       read.places.end());
+  std::stable_sort(ranked.begin(), ranked.end(), [](const auto& one, const auto& other) {
+    return one.second.size() > other.second.size();
+  });
+  head["dictionary"] = ordered_json::array();
+  for (std::size_t code = 0; code < ranked.size(); ++code) {
+    const auto& [text, places] = ranked[code];
+    for (const std::size_t cell : places) {
+      // No picture has so many texts that a code would be a mark, but a file made by hand may.
+      codes[cell] = static_cast<std::uint16_t>(std::min<std::size_t>(code, kLastCode - 5));
+    }
+    head["dictionary"].push_back({{"text", text}, {"cells", places.size()}});
+  }
+  append(codes, numbers);
+}
+
+HttpAnswer slice_answer(const JobContext& context, std::uint64_t id, const Fields& asked) {
+  const FieldReader fields(asked);
+  const std::string condition = fields.condition();
+  const PictureColumn column = picture_column(fields, "z", true);
+  const ServedStudy study = context.study(id);
+  const GridSlice slice = grid_slice(*study.table, fields);
+  const SliceCells read = read_cells(context, study, slice, column, condition);
+  const auto count = [&](Mark mark) { return std::ranges::count(read.marks, mark); };
   ordered_json at = ordered_json::array();
   for (const GridPlace& place : slice.at) {
     at.push_back(
@@ -210,42 +180,36 @@ HttpAnswer slice_answer(const AnswerDesk& desk, std::uint64_t id, const Fields& 
   ordered_json head{{"study", id},
                     {"block", slice.block},
                     {"z",
-                     {{"name", source.name},
-                      {"unit", source.unit},
-                      {"kind", source.is_category ? "categories" : "numbers"}}},
+                     {{"name", column.name},
+                      {"unit", column.unit},
+                      {"kind", column.is_category ? "categories" : "numbers"}}},
                     {"x", side_json(slice.x)},
                     {"y", side_json(slice.y)},
                     {"at", std::move(at)},
-                    {"nx", nx},
-                    {"ny", ny},
+                    {"nx", slice.x.numbers.size()},
+                    {"ny", slice.y.numbers.size()},
                     {"first_point", slice.first_point},
-                    {"solved", counts.solved},
-                    {"failed", counts.failed},
-                    {"left_out", counts.left_out},
-                    {"missing", counts.missing},
-                    {"filtered", counts.filtered}};
+                    {"solved", count(Mark::kHasValue) + count(Mark::kNoValue)},
+                    {"failed", count(Mark::kFailed)},
+                    {"left_out", count(Mark::kLeftOut)},
+                    {"missing", count(Mark::kNotSolved)},
+                    {"filtered", count(Mark::kFiltered)}};
   std::string numbers;
   append(slice.x.values, numbers);
   append(slice.y.values, numbers);
-  if (source.is_category) {
-    ordered_json dictionary = ordered_json::array();
-    append(coded(desk, values, dictionary), numbers);
-    head["dictionary"] = std::move(dictionary);
+  if (column.is_category) {
+    append_codes(read, head, numbers);
   } else {
-    head["least"] = counts.has_value ? ordered_json(counts.least) : nullptr;
-    head["most"] = counts.has_value ? ordered_json(counts.most) : nullptr;
-    append(values, numbers);
+    append_numbers(read, head, numbers);
   }
   return numbers_answer(head, numbers);
 }
 
 }  // namespace
 
-AnswerPool::Job slice_job(std::uint64_t study, const Fields& fields,
-                          std::shared_ptr<const PointSet> chosen) {
-  return [study, fields, chosen = std::move(chosen)](const AnswerDesk& desk) {
-    return slice_answer(desk, study, fields, chosen.get());
-  };
+AnswerPool::Job slice_job(std::uint64_t study, const Fields& fields) {
+  return
+      [study, fields](const JobContext& context) { return slice_answer(context, study, fields); };
 }
 
 }  // namespace oblique::server

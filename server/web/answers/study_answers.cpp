@@ -11,8 +11,8 @@
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/keys.h"
 #include "proto/recipe/model_message.h"
-#include "server/asking/columns.h"
-#include "server/asking/question.h"
+#include "server/query/columns.h"
+#include "server/query/question.h"
 #include "server/web/http/json_answer.h"
 #include "worker/solver/model/parameters.h"
 
@@ -88,14 +88,14 @@ ordered_json block_json(const protocol::Block& block, const protocol::BlockPlace
 ordered_json columns_json() {
   ordered_json columns = ordered_json::array();
   for (const Column& column : all_columns()) {
-    const auto source = column_source(column.name);
+    const auto picture = find_picture_column(column.name);
     columns.push_back({{"name", column.name},
                        {"unit", column.unit},
                        {"kind", column.kind},
                        {"meaning", column.meaning},
-                       {"picture", !source               ? "none"
-                                   : source->is_category ? "categories"
-                                                         : "numbers"}});
+                       {"picture", !picture               ? "none"
+                                   : picture->is_category ? "categories"
+                                                          : "numbers"}});
   }
   return columns;
 }
@@ -124,18 +124,22 @@ ordered_json model_json(const protocol::Recipe& recipe) {
   return keys;
 }
 
-/// The first point that failed, and why; null when none has.
-ordered_json first_failure(sqlite3* database, std::uint64_t study) {
-  Statement row(database,
-                "SELECT point, error FROM packed_results INDEXED BY failed_points "
-                "WHERE study_id = ?1 AND error IS NOT NULL ORDER BY point LIMIT 1");
-  row.bind(1, study);
-  return row.step() ? ordered_json{{"point", row.integer(0)}, {"error", row.text(1)}}
-                    : ordered_json();
+/// The first failed point and its error; null if none has failed.
+ordered_json first_failure(const JobContext& context, const ServedStudy& study) {
+  protocol::StudyQuery query;
+  query.set_study(study.name);
+  query.add_select("point, error");
+  query.set_where("error IS NOT NULL");  // of which the table has an index
+  query.set_limit(1);
+  ordered_json first;
+  context.query(query, [&](const protocol::ChunkRows& row) {
+    first = {{"point", row.cell(0).integer}, {"error", row.cell(1).text}};
+  });
+  return first;
 }
 
-HttpAnswer study_answer(const AnswerDesk& desk, std::uint64_t id) {
-  const LookedAtStudy study = desk.studies.study(desk.database, id);
+HttpAnswer study_answer(const JobContext& context, std::uint64_t id) {
+  const ServedStudy study = context.study(id);
   const protocol::Recipe& recipe = study.table->recipe();
   constexpr int kMostBlocks = 1000;
   ordered_json blocks = ordered_json::array();
@@ -149,7 +153,7 @@ HttpAnswer study_answer(const AnswerDesk& desk, std::uint64_t id) {
                       {"numbers", study.table->size()},
                       {"models", study.table->models()},
                       {"errors", recipe.errors()},
-                      {"first_failure", first_failure(desk.database, study.id)},
+                      {"first_failure", first_failure(context, study)},
                       {"model", model_json(recipe)},
                       {"blocks", std::move(blocks)},
                       {"blocks_left_out", std::max(recipe.blocks_size() - kMostBlocks, 0)},
@@ -170,18 +174,18 @@ ordered_json list_of(const std::string& text) {
   return is_too_deep ? ordered_json(ordered_json::value_t::discarded) : list;
 }
 
-ordered_json value_of(const Statement& row, int column) {
-  switch (row.type(column)) {
-    case SQLITE_INTEGER:
-      return row.integer(column);
-    case SQLITE_FLOAT:
-      return row.real(column);
-    case SQLITE_NULL:
+ordered_json value_of(const protocol::Cell& cell) {
+  switch (cell.kind) {
+    case protocol::CellKind::kInteger:
+      return cell.integer;
+    case protocol::CellKind::kReal:
+      return cell.real;
+    case protocol::CellKind::kNull:
       return nullptr;
-    default:
+    case protocol::CellKind::kText:
       break;
   }
-  std::string text = row.text(column);
+  std::string text(cell.text);
   if (text.starts_with('[')) {
     auto list = list_of(text);
     return list.is_discarded() ? ordered_json(std::move(text)) : list;
@@ -189,51 +193,45 @@ ordered_json value_of(const Statement& row, int column) {
   return text;
 }
 
-HttpAnswer point_answer(const AnswerDesk& desk, std::uint64_t id, std::uint64_t number) {
-  const LookedAtStudy study = desk.studies.study(desk.database, id);
+HttpAnswer point_answer(const JobContext& context, std::uint64_t id, std::uint64_t number) {
+  const ServedStudy study = context.study(id);
   if (number >= study.table->size()) {
-    throw NothingThere(fmt::format("the study \"{}\" has no point {}", study.name, number));
+    throw JobError(
+        error_answer(404, fmt::format("the study \"{}\" has no point {}", study.name, number)));
   }
   const protocol::Point point = study.table->point(number);
-  const std::size_t block = study.table->block_of_point(number);
   ordered_json answer{{"study", study.id},
                       {"name", study.name},
                       {"point", number},
-                      {"block", block},
+                      {"block", study.table->block_of_point(number)},
                       {"H", point.H_m},
                       {"mu", point.mu},
                       {"e", point.e_star},
                       {"left_out", !study.table->is_left_in(number)},
-                      {"fault", study.table->fault(number)}};
-  std::vector<std::string> names;
-  std::string list;
+                      {"fault", study.table->fault(number)},
+                      {"row", nullptr}};
+  protocol::StudyQuery query;
+  query.set_study(study.name);
+  query.set_where(fmt::format("point = {}", number));
   for (const Column& column : all_columns()) {
-    names.push_back(column.name);
-    list += (list.empty() ? "" : ", ") + column.name;
+    query.add_select(column.name);
   }
-  Statement row(desk.database, fmt::format("SELECT {} FROM {} WHERE study_id = ?1 AND point = ?2",
-                                           list, rows_of_queries()));
-  row.bind(1, study.id);
-  row.bind(2, number);
-  answer["row"] = nullptr;
-  if (row.step()) {
-    ordered_json values;
-    for (std::size_t i = 0; i < names.size(); ++i) {
-      values[names[i]] = value_of(row, static_cast<int>(i));
+  context.query(query, [&](const protocol::ChunkRows& row) {
+    for (int i = 0; i < query.select_size(); ++i) {
+      answer["row"][query.select(i)] = value_of(row.cell(static_cast<std::size_t>(i)));
     }
-    answer["row"] = std::move(values);
-  }
+  });
   return json_answer(answer);
 }
 
 }  // namespace
 
 AnswerPool::Job study_job(std::uint64_t study) {
-  return [study](const AnswerDesk& desk) { return study_answer(desk, study); };
+  return [study](const JobContext& context) { return study_answer(context, study); };
 }
 
 AnswerPool::Job point_job(std::uint64_t study, std::uint64_t point) {
-  return [study, point](const AnswerDesk& desk) { return point_answer(desk, study, point); };
+  return [study, point](const JobContext& context) { return point_answer(context, study, point); };
 }
 
 }  // namespace oblique::server

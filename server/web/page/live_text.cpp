@@ -42,16 +42,8 @@ class LiveText::Tab final : public HttpStream {
 
 LiveText::LiveText(Look look, std::int64_t begun) : look_(std::move(look)), begun_(begun) {}
 
-std::shared_ptr<HttpStream> LiveText::open(const std::string& seen, bool is_strangers) {
-  std::erase_if(strangers_, [](const auto& tab) { return tab.expired(); });
-  if (is_strangers && strangers_.size() >= kMostOfStrangers) {
-    return nullptr;
-  }
-  auto tab = std::make_shared<Tab>(*this, seen == id_of(begun_, number_) ? number_ : 0);
-  if (is_strangers) {
-    strangers_.push_back(tab);
-  }
-  return tab;
+std::shared_ptr<HttpStream> LiveText::open(const std::string& seen) {
+  return std::make_shared<Tab>(*this, seen == id_of(begun_, number_) ? number_ : 0);
 }
 
 void LiveText::look() {

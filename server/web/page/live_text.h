@@ -1,16 +1,13 @@
 #pragma once
 
 #include <chrono>
-#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "server/web/http/http_message.h"
-#include "server/web/http/http_server.h"
 
 namespace oblique::server {
 
@@ -27,11 +24,7 @@ class LiveText {
 
   /// Events called `overview`, the present one first unless it is the one that was `seen` (a
   /// Last-Event-ID), and a comment every 15 s while there is none.
-  /// Nothing: as many strangers, who come without the token, have one already as may.
-  std::shared_ptr<HttpStream> open(const std::string& seen, bool is_strangers);
-
-  /// Strangers' tabs: half of those that the HTTP server has, so that they leave room for others.
-  static constexpr std::size_t kMostOfStrangers = HttpLimits().streams / 2;
+  std::shared_ptr<HttpStream> open(const std::string& seen);
 
  private:
   class Tab;
@@ -43,7 +36,6 @@ class LiveText {
   Clock::time_point looked_{};
   std::uint64_t number_ = 0;  // of the text; 0: there was none yet
   std::string event_;
-  std::vector<std::weak_ptr<Tab>> strangers_;
 };
 
 }  // namespace oblique::server

@@ -8,7 +8,7 @@
 #include <string>
 #include <variant>
 
-#include "server/web/page/service_line.h"
+#include "server/web/answers/service_line.h"
 #include "server/web/page/talks.h"
 
 namespace oblique::server {

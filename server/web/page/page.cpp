@@ -29,10 +29,6 @@ constexpr std::string_view kCheck = "/api/check";
 
 /// Browsers wait so long for one answer; what takes longer is asked for again.
 constexpr std::chrono::milliseconds kPatience{8000};
-/// The same of what goes on meanwhile, and tells how far it is.
-constexpr std::chrono::milliseconds kPatienceWithNews{2000};
-/// Most of that at a time, of strangers and of the others.
-constexpr std::ptrdiff_t kMostInBackground = 4;
 
 constexpr const char* kHowToEnter =
     "this server shows its page to who has its token: open the address that it printed when it "
@@ -166,11 +162,7 @@ std::optional<HttpAnswer> Page::answer(const HttpQuestion& question) {
     looks_.seen(place->study);  // who waits for it looks at it
   }
   auto answer = go_on(question, known->second);
-  if (!answer && question.waited > kPatienceWithNews && may_go_on(question.number, known->second)) {
-    Talk talk = std::move(*known->second.talk);
-    answer = talk.background->so_far();
-    left_.emplace(question.number, std::move(talk));
-  } else if (!answer && question.waited > kPatience) {
+  if (!answer && question.waited > kPatience) {
     answer = known->second.talk
                  ? known->second.talk->meanwhile
                  : error_answer(kTryLater, "the server takes too long: ask again later");
@@ -184,14 +176,6 @@ std::optional<HttpAnswer> Page::answer(const HttpQuestion& question) {
     under_way_.erase(question.number);
   }
   return answer;
-}
-
-bool Page::may_go_on(std::uint64_t number, const UnderWay& under_way) const {
-  return under_way.talk && under_way.talk->background &&
-         std::count_if(left_.begin(), left_.end(), [&](const auto& left) {
-           return left.second.background.has_value() &&
-                  at_.service.is_strangers(left.first) == at_.service.is_strangers(number);
-         }) < kMostInBackground;
 }
 
 void Page::gone(std::uint64_t number) {
@@ -216,11 +200,6 @@ std::optional<std::chrono::milliseconds> Page::tick() {
 void Page::hear_those_left() {
   std::erase_if(left_, [this](const auto& left) {
     try {
-      const auto& background = left.second.background;
-      if (background && background->is_forgotten()) {
-        at_.service.forget(left.first);
-        return true;
-      }
       return hear(left.first, left.second).has_value();
     } catch (const std::exception&) {
       at_.service.forget(left.first);
@@ -250,9 +229,7 @@ std::optional<HttpAnswer> Page::begin(const HttpQuestion& question) {
     return begin_change(question);
   }
   if (path == "/api/events") {
-    auto tab = at_.overview.open(question.seen_event, !is_trusted(question));
-    return tab ? HttpAnswer{200, "text/event-stream", {}, {}, std::move(tab)}
-               : error_answer(kTryLater, "too many pages are open already: close some");
+    return HttpAnswer{200, "text/event-stream", {}, {}, at_.overview.open(question.seen_event)};
   }
   if (path == kStudies) {
     return begin(question, studies_talk(question));
@@ -272,11 +249,6 @@ std::optional<HttpAnswer> Page::begin_study(const HttpQuestion& question, const 
   if (!place.point && place.part == "rows") {
     return begin(question, rows_talk(place.study, question));
   }
-  const bool is_slice = place.part == "slice";
-  if (!place.point && (is_slice || place.part == "bins") &&
-      FieldReader(question.fields).text("where")) {
-    return begin(question, filters_.begin(place.study, question, is_slice));
-  }
   if (place.point && place.part == "/picture" && !is_trusted(question)) {
     return error_answer(kUnauthorized, kSolvesHere);
   }
@@ -289,7 +261,7 @@ std::optional<HttpAnswer> Page::begin_study(const HttpQuestion& question, const 
     job = point_job(place.study, *place.point);
   } else if (!place.point && place.part.empty()) {
     job = study_job(place.study);
-  } else if (!place.point && is_slice) {
+  } else if (!place.point && place.part == "slice") {
     job = slice_job(place.study, question.fields);
   } else if (!place.point && place.part == "bins") {
     job = bins_job(place.study, question.fields);
@@ -302,7 +274,7 @@ std::optional<HttpAnswer> Page::begin_change(const HttpQuestion& question) {
     return begin(question, submit_talk(question));
   }
   if (question.path == kCheck) {
-    return begin(question, at_.answers, check_job(question.body), AnswerPool::Lane::kSlow);
+    return begin(question, at_.answers, check_job(question.body));
   }
   if (question.path == kLook) {
     return begin(question, looks_.begin(question));
@@ -319,64 +291,27 @@ std::optional<HttpAnswer> Page::begin_change(const HttpQuestion& question) {
 }
 
 std::optional<HttpAnswer> Page::begin(const HttpQuestion& question, Talk talk) {
-  at_.service.ask(question.number, talk.first, !is_trusted(question));
+  at_.service.ask(question.number, talk.first);
   under_way_.emplace(question.number, UnderWay{std::move(talk)});
   return std::nullopt;
 }
 
-/// Who comes without the token keeps nobody waiting who has it.
-bool Page::submit(const HttpQuestion& question, AnswerPool& pool, AnswerPool::Job job,
-                  AnswerPool::Lane lane) const {
-  return pool.submit(question.number, std::move(job),
-                     is_trusted(question) ? lane : AnswerPool::Lane::kStrangers);
-}
-
 std::optional<HttpAnswer> Page::begin(const HttpQuestion& question, AnswerPool& pool,
-                                      AnswerPool::Job job, AnswerPool::Lane lane) {
-  if (!submit(question, pool, std::move(job), lane)) {
+                                      AnswerPool::Job job) {
+  if (!pool.submit(question.number, std::move(job))) {
     return error_answer(kTryLater, kTooManyPictures);
   }
   under_way_.emplace(question.number, UnderWay{{}, &pool});
   return std::nullopt;
 }
 
-std::optional<HttpAnswer> Page::begin(const HttpQuestion& question, FilteredPicture picture) {
-  auto answer = begin(question, at_.answers, std::move(picture.first));
-  if (!answer) {
-    under_way_.at(question.number).then = std::move(picture.then);
-  }
-  return answer;
+std::optional<HttpAnswer> Page::go_on(const HttpQuestion& question, const UnderWay& under_way) {
+  return under_way.talk ? hear(question.number, *under_way.talk)
+                        : under_way.pool->take(question.number);
 }
 
-std::optional<HttpAnswer> Page::go_on(const HttpQuestion& question, UnderWay& under_way) {
-  if (under_way.talk) {
-    return go_on_talking(question, under_way);
-  }
-  auto answer = under_way.pool->take(question.number);
-  if (!answer || answer->status != AnswerPool::kStep) {
-    return answer;
-  }
-  under_way.talk = under_way.then();
-  at_.service.ask(question.number, under_way.talk->first, !is_trusted(question));
-  return std::nullopt;
-}
-
-std::optional<HttpAnswer> Page::go_on_talking(const HttpQuestion& question, UnderWay& under_way) {
-  auto next = hear(question.number, *under_way.talk);
-  if (!next) {
-    return std::nullopt;
-  }
-  if (auto* answer = std::get_if<HttpAnswer>(&*next)) {
-    return std::move(*answer);
-  }
-  under_way = {{}, &at_.answers};
-  const bool is_taken = submit(question, at_.answers, std::get<AnswerPool::Job>(std::move(*next)),
-                               AnswerPool::Lane::kAny);
-  return is_taken ? std::nullopt : std::optional(error_answer(kTryLater, kTooManyPictures));
-}
-
-/// How a talk ends: with an answer, or a job that makes one. Nothing: a reply is awaited.
-std::optional<Talk::Next> Page::hear(std::uint64_t number, const Talk& talk) {
+/// The answer at the end of a talk; nothing while a reply is awaited.
+std::optional<HttpAnswer> Page::hear(std::uint64_t number, const Talk& talk) {
   while (const auto reply = at_.service.reply(number)) {
     Talk::Next next = !reply->has_error() ? talk.go_on(*reply)
                       : talk.failed       ? talk.failed(reply->error())
@@ -384,7 +319,7 @@ std::optional<Talk::Next> Page::hear(std::uint64_t number, const Talk& talk) {
     auto* const request = std::get_if<protocol::ClientRequest>(&next);
     if (request == nullptr) {
       at_.service.forget(number);
-      return next;
+      return std::get<HttpAnswer>(std::move(next));
     }
     at_.service.ask(number, std::move(*request));
   }

@@ -7,12 +7,11 @@
 #include <string>
 
 #include "server/web/answers/answer_pool.h"
+#include "server/web/answers/service_line.h"
 #include "server/web/http/http_message.h"
-#include "server/web/page/filter_talk.h"
 #include "server/web/page/live_text.h"
 #include "server/web/page/looks.h"
 #include "server/web/page/page_key.h"
-#include "server/web/page/service_line.h"
 #include "server/web/page/talks.h"
 #include "server/web/pictures/picture_job.h"
 
@@ -77,22 +76,14 @@ class Page {
   std::optional<HttpAnswer> begin_change(const HttpQuestion& question);
   std::optional<HttpAnswer> begin(const HttpQuestion& question, Talk talk);
   std::optional<HttpAnswer> begin(const HttpQuestion& question, AnswerPool& pool,
-                                  AnswerPool::Job job,
-                                  AnswerPool::Lane lane = AnswerPool::Lane::kAny);
-  bool submit(const HttpQuestion& question, AnswerPool& pool, AnswerPool::Job job,
-              AnswerPool::Lane lane) const;
+                                  AnswerPool::Job job);
   /// What a request waits for: a reply to a talk or, without one, a job of a pool.
   struct UnderWay {
     std::optional<Talk> talk = {};
     AnswerPool* pool = nullptr;
-    std::function<Talk()> then = {};  ///< what follows a job that is but the first step
   };
-  std::optional<HttpAnswer> begin(const HttpQuestion& question, FilteredPicture picture);
-  /// Whether it goes on when its browser is told to ask again.
-  bool may_go_on(std::uint64_t number, const UnderWay& under_way) const;
-  std::optional<HttpAnswer> go_on(const HttpQuestion& question, UnderWay& under_way);
-  std::optional<HttpAnswer> go_on_talking(const HttpQuestion& question, UnderWay& under_way);
-  std::optional<Talk::Next> hear(std::uint64_t number, const Talk& talk);
+  std::optional<HttpAnswer> go_on(const HttpQuestion& question, const UnderWay& under_way);
+  std::optional<HttpAnswer> hear(std::uint64_t number, const Talk& talk);
   void hear_those_left();
 
   bool shows_without_token_;
@@ -102,7 +93,6 @@ class Page {
   Neighbours at_;
   Looks looks_;
   PictureSettings pictures_;
-  PointFilters filters_;
   std::map<std::uint64_t, UnderWay> under_way_;  // by number of the request
   std::map<std::uint64_t, Talk> left_;           // that go on without a browser
 };

@@ -20,9 +20,7 @@ namespace {
 using protocol::ClientReply;
 using protocol::ClientRequest;
 
-constexpr unsigned kBadRequest = 400;
 constexpr unsigned kNotFound = 404;
-constexpr unsigned kConflict = 409;
 constexpr unsigned kUnavailable = 503;
 
 constexpr std::uint64_t kMostLines = 1000;
@@ -67,14 +65,6 @@ Talk talk_by_name(std::uint64_t study, std::function<ClientRequest(const std::st
                        : Talk::Next(no_such_study());
           },
           std::move(meanwhile)};
-}
-
-HttpAnswer failure(const protocol::ErrorReply& error) {
-  const bool is_unknown = error.message().starts_with("there is no study");
-  return error_answer(is_unknown              ? kNotFound
-                      : error.wrong_request() ? kBadRequest
-                                              : kConflict,
-                      error.message());
 }
 
 Talk studies_talk(const HttpQuestion& question) {

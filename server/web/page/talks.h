@@ -6,17 +6,16 @@
 #include <variant>
 
 #include "proto/oblique.pb.h"
-#include "server/web/answers/answer_pool.h"
+#include "server/web/answers/service_line.h"
 #include "server/web/http/http_message.h"
 
 namespace oblique::server {
 
 /// What the page and the service say to each other for one request of a browser.
 struct Talk {
-  using Next = std::variant<HttpAnswer, protocol::ClientRequest, AnswerPool::Job>;
+  using Next = std::variant<HttpAnswer, protocol::ClientRequest>;
   protocol::ClientRequest first;
-  /// What follows from a reply that is no error: the answer, what is asked next, or who makes the
-  /// answer.
+  /// What follows from a reply that is no error: the answer or the next request.
   std::function<Next(const protocol::ClientReply&)> go_on;
   /// The answer while the service takes longer than a browser should wait.
   HttpAnswer meanwhile;
@@ -24,12 +23,6 @@ struct Talk {
   std::function<Next(const protocol::ErrorReply&)> failed = {};
   /// It is heard to its end though the browser goes: half of it would leave a study behind.
   bool must_end = false;
-  /// What takes longer than a browser waits, and is asked for again while it goes on.
-  struct Background {
-    std::function<HttpAnswer()> so_far;  ///< what a browser is told meanwhile
-    std::function<bool()> is_forgotten;  ///< nobody has asked again
-  };
-  std::optional<Background> background = {};
 };
 
 /// That it takes too long.
@@ -48,9 +41,6 @@ Talk talk_by_name(std::uint64_t study,
                   std::function<protocol::ClientRequest(const std::string&)> ask,
                   std::function<Talk::Next(const protocol::ClientReply&)> go_on,
                   HttpAnswer meanwhile);
-
-/// The answer to a failure that the service tells.
-HttpAnswer failure(const protocol::ErrorReply& error);
 
 /// A page of studies: of `after` and `limit`.
 Talk studies_talk(const HttpQuestion& question);

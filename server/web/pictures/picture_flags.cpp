@@ -10,7 +10,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/text.h"
-#include "server/asking/sql/sql_expression.h"
+#include "server/query/sql_text.h"
 #include "server/web/answers/grid.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
@@ -133,8 +133,7 @@ PictureFormat picture_format(const FieldReader& fields) {
   return {std::move(name), std::string(kTypes.at(static_cast<std::size_t>(place)))};
 }
 
-std::vector<std::string> study_picture_flags(const LookedAtStudy& study,
-                                             const FieldReader& fields) {
+std::vector<std::string> study_picture_flags(const ServedStudy& study, const FieldReader& fields) {
   std::vector<std::string> flags;
   add_kind(fields, flags);
   for (const GridPlace& place : grid_places(*study.table, fields)) {

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "server/web/answers/answer_pool.h"
 #include "server/web/answers/fields.h"
-#include "server/web/answers/study_book.h"
 
 // The fields of a picture, judged, as arguments of `oblique plot`. Each is one argument,
 // --FLAG=VALUE, so that no value can be taken for a flag; see README.md. Throws
@@ -20,7 +20,7 @@ struct PictureFormat {
 PictureFormat picture_format(const FieldReader& fields);
 
 /// Of a picture of a study.
-std::vector<std::string> study_picture_flags(const LookedAtStudy& study, const FieldReader& fields);
+std::vector<std::string> study_picture_flags(const ServedStudy& study, const FieldReader& fields);
 /// Of a picture of one of its points.
 std::vector<std::string> point_picture_flags(std::uint64_t point, const FieldReader& fields);
 

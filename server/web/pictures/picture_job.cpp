@@ -21,6 +21,7 @@ namespace {
 
 constexpr unsigned kOk = 200;
 constexpr unsigned kWrongField = 400;
+constexpr unsigned kNotFound = 404;
 constexpr unsigned kCannotBeDrawn = 422;
 constexpr unsigned kNotNow = 503;
 
@@ -83,12 +84,14 @@ HttpAnswer answer_of(ChildEnd end, const PictureFormat& format, const std::strin
           {{"Content-Disposition", fmt::format("attachment; filename=\"{}\"", name)}}};
 }
 
-HttpAnswer picture_answer(const AnswerDesk& desk, const PictureSettings& settings, std::uint64_t id,
-                          std::optional<std::uint64_t> point, const Fields& asked) {
-  const LookedAtStudy study = desk.studies.study(desk.database, id);
+HttpAnswer picture_answer(const JobContext& context, const PictureSettings& settings,
+                          std::uint64_t id, std::optional<std::uint64_t> point,
+                          const Fields& asked) {
+  const ServedStudy study = context.study(id);
   const FieldReader fields(asked);
   if (point && *point >= study.table->size()) {
-    throw NothingThere(fmt::format("the study \"{}\" has no point {}", study.name, *point));
+    throw JobError(error_answer(
+        kNotFound, fmt::format("the study \"{}\" has no point {}", study.name, *point)));
   }
   const PictureFormat format = picture_format(fields);
   std::vector<std::string> arguments{"oblique", "plot", "--quiet", "--db=" + settings.database};
@@ -99,7 +102,8 @@ HttpAnswer picture_answer(const AnswerDesk& desk, const PictureSettings& setting
   arguments.insert(arguments.end(), {"--", study.name});
   const std::string program = program_of(settings);
   try {
-    return answer_of(run_child(program, std::move(arguments), settings.limits, desk.is_over),
+    return answer_of(run_child(program, std::move(arguments), settings.limits,
+                               [&context] { return context.is_over(); }),
                      format, file_name(study.name, point, format.name));
   } catch (const std::system_error& error) {
     return error_answer(
@@ -113,8 +117,8 @@ HttpAnswer picture_answer(const AnswerDesk& desk, const PictureSettings& setting
 
 AnswerPool::Job picture_job(const PictureSettings& settings, std::uint64_t study,
                             std::optional<std::uint64_t> point, const Fields& fields) {
-  return [settings, study, point, fields](const AnswerDesk& desk) {
-    return picture_answer(desk, settings, study, point, fields);
+  return [settings, study, point, fields](const JobContext& context) {
+    return picture_answer(context, settings, study, point, fields);
   };
 }
 

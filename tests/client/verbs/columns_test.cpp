@@ -1,4 +1,4 @@
-#include "server/asking/columns.h"
+#include "server/query/columns.h"
 
 #include <cmath>
 #include <map>

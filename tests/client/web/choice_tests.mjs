@@ -11,7 +11,7 @@ function hold_finer_ones() {
   window.fetch = async (path, how) => {
     const cells = /\/slice\?/.test(path) ? Number(new URL(path, location.href).searchParams.get("nx")) : 0;
     if (cells) window.sides.push(cells);
-    if (cells === 512) await released;
+    if (cells === 256) await released;
     return real(path, how);
   };
 }
@@ -36,7 +36,7 @@ test("a large map is asked for with few cells first, and the cell that is chosen
   assert.equal(await place(page), spoken);
   assert.equal(await text_of(page, ".choice a"), choice);
   await until(page, (text) => text.replace(/\D/g, "") === new URLSearchParams(location.hash.split("?")[1]).get("cell"), choice);
-  assert.deepEqual(await page.evaluate(() => window.sides.slice(0, 2)), [96, 512]);
+  assert.deepEqual(await page.evaluate(() => window.sides.slice(0, 2)), [96, 256]);
   // Keys go on from there. On a slow machine the coarse picture may have come again meanwhile.
   await facts(page, "200 × 200");
   await page.keyboard.press("ArrowLeft");
@@ -44,15 +44,15 @@ test("a large map is asked for with few cells first, and the cell that is chosen
   await page.close();
 });
 
-test("of a large study a coarse picture comes first when it is opened or its pictures are slow, and never for a few points more", async () => {
+test("a coarse picture comes first when a large map is opened, and never for a few points more", async () => {
   const page = await browser.open("#/");
   const steps = await page.evaluate(async () => {
     const { steps_to } = await import("/study/asked/question.js");
-    const view = (fine_ms, is_refreshing) => ({ is: (name) => ({ pic: "map", z: "fn_peak_N" })[name] ?? "", read_columns: new Set(["fn_peak_N"]),
-      study: { points: 9e6 }, fine_ms, is_refreshing });
-    return [view(Infinity, false), view(100, false), view(1000, false), view(1000, true)].map(steps_to);
+    const axes = ["mu", "H"].map((key) => ({ key, values: 200 }));
+    const view = (is_refreshing) => ({ is: (name) => ({ pic: "map", z: "fn_peak_N", x: "mu", y: "H" })[name] ?? "", block: { kind: "grid", axes }, is_refreshing });
+    return [view(false), view(true)].map(steps_to);
   });
-  assert.deepEqual(steps, [[96, 512], [512], [96, 512], [512]]);
+  assert.deepEqual(steps, [[96, 256], [256]]);
   await page.close();
 });
 

@@ -10,7 +10,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/asking/columns.h"
+#include "server/query/columns.h"
 #include "server/database/sqlite.h"
 #include "server/store/schema.h"
 #include "server/store/store.h"

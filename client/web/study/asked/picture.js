@@ -41,26 +41,13 @@ function numbers_of(side, shown) {
   return Array.from({ length: shown }, (_, i) => side.first + Math.floor((2 * i * (there - 1) + steps) / (2 * steps)));
 }
 
-/** Who hears how far a condition is that takes long: the view that is open. */
-export const waiting = { heard: (/** @type {number} */ _) => {} };
-
-/** Asks again until the answer is there. @param {string} path @param {AbortSignal} signal */
-async function asked_for(path, signal) {
-  for (;;) {
-    const answer = await numbers(path, signal, (told) => waiting.heard(told.share));
-    if (answer) return answer;
-    await new Promise((go_on) => setTimeout(go_on, 400));
-    signal.throwIfAborted();
-  }
-}
-
 /**
  * One output over one or two axes of a grid.
  * @param {number} study @param {Record<string, string | number>} asked @param {AbortSignal} signal
  * @param {(key: string) => string} unit_of @returns {Promise<Picture>}
  */
 export async function slice(study, asked, signal, unit_of) {
-  const { head, bytes, begin } = await asked_for(`/api/studies/${study}/slice?${new URLSearchParams(/** @type {any} */ (asked))}`, signal);
+  const { head, bytes, begin } = /** @type {any} */ (await numbers(`/api/studies/${study}/slice?${new URLSearchParams(/** @type {any} */ (asked))}`, signal));
   const { nx, ny } = head;
   const ys_at = begin + 8 * nx;
   const cells_at = ys_at + (head.y ? 8 * ny : 0);  // a line has no values upwards
@@ -110,7 +97,7 @@ export function steps(name, unit, least, most, bins, is_log) {
  * @param {(key: string) => string} unit_of @returns {Promise<Picture>}
  */
 export async function bins(study, asked, signal, unit_of) {
-  const { head, bytes, begin } = await asked_for(`/api/studies/${study}/bins?${new URLSearchParams(/** @type {any} */ (asked))}`, signal);
+  const { head, bytes, begin } = /** @type {any} */ (await numbers(`/api/studies/${study}/bins?${new URLSearchParams(/** @type {any} */ (asked))}`, signal));
   const side = (/** @type {any} */ of) => steps(of.column, of.unit, of.least, of.most, of.bins, of.log);
   const x = side(head.x);
   const y = head.y ? side(head.y) : { name: "", unit: "", values: new Float64Array(1), is_whole: true };

@@ -5,12 +5,10 @@ import { joined, within } from "../conditions.js";
 import { dots, kMostDots } from "./dots.js";
 import { bins, rows, slice } from "./picture.js";
 
-const kMostCells = 512; // a side of a picture
-/** Where the server looks each cell up, or reads a whole column for so many, some of them come first. */
+/** Cells along a side of a picture, at most. */
+const kMostCells = 256;
+/** The server looks up each cell, so a coarse picture comes first. */
 const kFirstCells = 96;
-const kLarge = 4_000_000; // points: a column of these takes seconds
-/** Who waits so long for a picture sees a coarse one before. */
-const kSlow_ms = 300;
 const kMostBins = 96;
 const kMostLines = 8;
 
@@ -30,10 +28,8 @@ function has_many_cells(view) {
 /** How many cells a side are asked for, one picture after the other. @param {View} view */
 export function steps_to(view) {
   if (!is_slice(view.is("pic"))) return [kMostCells];
-  const is_first = view.is("pic") === "map" && !view.read_columns.has(view.is("z")) && view.is("where") === "" && has_many_cells(view);
-  // What is shown is not made coarser by the same with a few points more.
-  const is_slow = view.study.points > kLarge && view.fine_ms > kSlow_ms && !view.is_refreshing;
-  return is_first || is_slow ? [kFirstCells, kMostCells] : [kMostCells];
+  // A refresh does not make the picture coarser.
+  return view.is("pic") === "map" && !view.is_refreshing && has_many_cells(view) ? [kFirstCells, kMostCells] : [kMostCells];
 }
 
 /** @param {View} view @param {number} cells a side, at most @returns {Record<string, string | number>} */
@@ -63,22 +59,12 @@ async function scatter(view, signal) {
     const all = await single();
     if (all) return all;
   }
-  try {
-    const gathered = await bins(view.study.id, { ...bins_fields(view), ...filter_of(view) }, signal, view.unit_of);
-    const few = gathered.head.points <= kMostDots ? await single() : null;
-    return few ?? gathered;
-  } catch (error) {
-    // Of studies that are too large for bins a few points may be solved.
-    const few = !signal.aborted && /** @type {any} */ (error).status === 400 ? await single().catch(() => null) : null;
-    if (few) return few;
-    throw error;
-  }
+  const gathered = await bins(view.study.id, { ...bins_fields(view), ...filter_of(view) }, signal, view.unit_of);
+  const few = gathered.head.points <= kMostDots ? await single() : null;
+  return few ?? gathered;
 }
 
 const filter_of = (/** @type {View} */ view) => (view.is("where") ? { where: view.is("where") } : {});
-
-/** Whether a picture of so many cells is the best one. @param {number} cells */
-export const is_fine = (cells) => cells === kMostCells;
 
 /** The picture of a view. @param {View} view @param {number} cells a side of a map, at most @param {AbortSignal} signal */
 export function ask(view, cells, signal) {

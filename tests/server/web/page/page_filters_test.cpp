@@ -1,15 +1,19 @@
 // Pictures of the points that meet a condition, of a whole server with a pretended worker.
 #include <bit>
+#include <chrono>
 #include <cstdint>
+#include <string>
+#include <thread>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "proto/wire/chunk_writer.h"
-#include "server/web/page/filter_talk.h"
+#include "proto/frames.h"
+#include "server/query/plan.h"
+#include "server/query/query_rules.h"
+#include "server/web/answers/study_answers.h"
 #include "tests/server/web/page/page_study.h"
 
 namespace oblique::server {
@@ -63,11 +67,8 @@ TEST_F(PageFiltersTest, WhatWasNotSolvedIsNotLeftOutByACondition) {
   const std::string slice = "/api/studies/1/slice?x=mu&y=H&z=mode&where=mu%20%3E%200.1";
   EXPECT_EQ(page_.numbers(slice).head["filtered"], 1);
   EXPECT_EQ(page_.numbers(slice).head["missing"], 10);
-  solve(20);  // what is known of the condition follows the study
+  solve(20);
   EXPECT_EQ(page_.numbers(slice).head["filtered"], 3);
-  while (page_.numbers(slice).head["missing"] > 0) {
-    // Columns are looked at some times a second.
-  }
   EXPECT_EQ(page_.numbers(slice).head["solved"], 9);
 }
 
@@ -76,12 +77,10 @@ TEST_F(PageFiltersTest, BinsCountWhatMeetsACondition) {
   solve(24);
   const Numbers bins = page_.numbers("/api/studies/1/bins?x=mu&nx=2&where=mu%20%3C%200.3");
   EXPECT_EQ(bins.head["points"], 12);
-  EXPECT_EQ(bins.head["filtered"], 12);
-  EXPECT_EQ(bins.head["x"]["most"], 0.2F);  // of those that are counted
+  EXPECT_EQ(bins.head["x"]["most"], 0.6 / 3.0);  // of those that are counted
   EXPECT_EQ(bins.read<std::uint32_t>(0, 2), (std::vector<std::uint32_t>{6, 6}));
   const Numbers none = page_.numbers("/api/studies/1/bins?x=mu&nx=2&where=0");
   EXPECT_EQ(none.head["points"], 0);
-  EXPECT_EQ(none.head["filtered"], 24);
 }
 
 TEST_F(PageFiltersTest, AConditionIsJudgedAsTheQueryLanguageDoes) {
@@ -109,59 +108,49 @@ TEST_F(PageFiltersTest, AConditionIsJudgedAsTheQueryLanguageDoes) {
   EXPECT_EQ(status_of_answer(page_.get("/api/studies/1/bins?x=mode&where=1")), 400);
 }
 
-ClientReply chunk_of(const std::vector<std::int64_t>& points, bool ends) {
-  protocol::ChunkWriter rows({"point"});
-  for (const std::int64_t point : points) {
-    rows.integer(point);
-    rows.end_row();
+/// The query by which a slice of the study `grid` is read.
+protocol::StudyQuery slice_query(const Fields& fields, const protocol::Recipe& recipe) {
+  ServiceLine line;
+  AnswerPool pool(
+      line, [] {}, std::chrono::hours(1));
+  EXPECT_TRUE(pool.submit(1, slice_job(1, fields)));
+  while (true) {
+    for (const std::string& frame : line.take()) {
+      ClientRequest request;
+      EXPECT_TRUE(protocol::decode(frame, request));
+      if (request.has_query()) {
+        return request.query().question();
+      }
+      ClientReply reply;
+      reply.set_request_id(request.request_id());
+      if (request.has_status()) {
+        auto& study = *reply.mutable_status()->add_studies();
+        study.set_study_id(1);
+        study.set_name("grid");
+      } else {
+        *reply.mutable_describe()->mutable_recipe() = recipe;
+      }
+      line.put(protocol::encode(reply));
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
-  ClientReply reply;
-  *reply.mutable_query() = rows.take();
-  reply.mutable_query()->set_ends(ends);
-  return reply;
 }
 
-TEST(PointFilters, WhatCameBeforeAQuestionFailedIsNoPartOfTheNextAnswer) {
-  PointFilters filters;
-  HttpQuestion question{};
-  question.number = 3;
-  const Talk talk = filters.begin(1, question, false).then();
-  ClientReply study;
-  study.mutable_status()->add_studies()->set_name("grid");
-  EXPECT_TRUE(std::holds_alternative<ClientRequest>(talk.go_on(study)));
-  EXPECT_TRUE(std::holds_alternative<ClientRequest>(talk.go_on(chunk_of({1, 2}, false))));
-  protocol::ErrorReply error;
-  error.set_wrong_request(true);
-  EXPECT_TRUE(std::holds_alternative<ClientRequest>(talk.failed(error)));
-  const auto more = talk.go_on(chunk_of({0, 1}, false));
-  ASSERT_TRUE(std::holds_alternative<ClientRequest>(more));
-  EXPECT_EQ(std::get<ClientRequest>(more).more_rows().taken(), 1U);
-  EXPECT_TRUE(std::holds_alternative<AnswerPool::Job>(talk.go_on(chunk_of({2}, true))));
-}
-
-TEST(PointFilters, WhoAsksWhileTheSameIsAskedHearsHowFarItIs) {
-  PointFilters filters;
-  HttpQuestion question{};
-  question.number = 3;
-  question.fields = {{"where", "fn_peak_N > 2"}};
-  ClientReply study;
-  study.mutable_status()->add_studies()->set_name("grid");
-  study.mutable_status()->mutable_studies(0)->set_points(200);
-  std::optional<Talk> first = filters.begin(1, question, false).then();
-  first->go_on(study);
-  first->go_on(chunk_of({1, 50}, false));
-  const Talk second = filters.begin(1, question, false).then();
-  const auto told = second.go_on(study);
-  ASSERT_TRUE(std::holds_alternative<HttpAnswer>(told));
-  EXPECT_EQ(std::get<HttpAnswer>(told).status, 202U);
-  EXPECT_EQ(nlohmann::json::parse(std::get<HttpAnswer>(told).body)["share"], 0.25);
-  EXPECT_FALSE(first->background->is_forgotten());
-  // It is kept for the next one, and one that was given up is asked anew.
-  EXPECT_TRUE(std::holds_alternative<AnswerPool::Job>(first->go_on(chunk_of({60}, true))));
-  EXPECT_TRUE(std::holds_alternative<AnswerPool::Job>(second.go_on(study)));
-  study.mutable_status()->mutable_studies(0)->set_solved(7);
-  first.reset();
-  EXPECT_TRUE(std::holds_alternative<ClientRequest>(second.go_on(study)));
+TEST_F(PageFiltersTest, TheRowsOfASliceAreLookedUpByKey) {
+  submit_grid();
+  const protocol::StudyQuery query =
+      slice_query({{"z", "fn_peak_N"}, {"x", "mu"}, {"y", "H"}, {"where", "slide_m > 1 OR e > 2"}},
+                  grid_recipe());
+  const auto database = open_database(page_.database(), SQLITE_OPEN_READWRITE);
+  restrict_to_reading(database.get());
+  const std::string statement = plan(database.get(), query).statement;
+  sqlite3_set_authorizer(database.get(), nullptr, nullptr);
+  Statement explained(database.get(), "EXPLAIN QUERY PLAN " + statement);
+  std::string steps;
+  while (explained.step()) {
+    steps += explained.text(3) + '\n';
+  }
+  EXPECT_THAT(steps, HasSubstr("(study_id=? AND point=?)")) << statement;
 }
 
 }  // namespace

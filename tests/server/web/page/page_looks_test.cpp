@@ -240,7 +240,7 @@ class PageAloneTest : public testing::Test {
   std::vector<ClientRequest> asked(std::uint64_t number) {
     std::vector<ClientRequest> all;
     for (auto frames = line_.take(); !frames.empty(); frames = line_.take()) {
-      for (const auto& [client, frame] : frames) {
+      for (const std::string& frame : frames) {
         ClientRequest request;
         EXPECT_TRUE(protocol::decode(frame, request));
         if (number == 0 || request.request_id() == number) {
@@ -261,7 +261,7 @@ class PageAloneTest : public testing::Test {
   }
 
   ServiceLine line_;
-  AnswerPool pool_{"", [] {}};
+  AnswerPool pool_{line_, [] {}};
   LiveText live_{[] { return std::nullopt; }, 0};
   std::optional<Page> page_;
 };

@@ -32,11 +32,12 @@ class PageStudyTest : public testing::Test {
     worker.work(points);
   }
   /// 3 heights, 4 frictions, 2 restitutions.
-  void submit_grid() {
-    submit("grid", protocol::recipe_of(
-                       {{protocol::listed("H", {1.0, 0.9, 0.8}), protocol::range("mu", 0.0, 0.6, 4),
-                         protocol::listed("e", {1.0, 0.5})}}));
+  static protocol::Recipe grid_recipe() {
+    return protocol::recipe_of(
+        {{protocol::listed("H", {1.0, 0.9, 0.8}), protocol::range("mu", 0.0, 0.6, 4),
+          protocol::listed("e", {1.0, 0.5})}});
   }
+  void submit_grid() { submit("grid", grid_recipe()); }
 
   PageServer page_;
   PretendedClient client_{page_.server().client_endpoint()};

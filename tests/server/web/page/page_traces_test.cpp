@@ -56,7 +56,7 @@ class PageTracesAloneTest : public testing::Test {
   }
   std::vector<std::uint64_t> ended() {
     std::vector<std::uint64_t> numbers;
-    for (const auto& [client, frame] : line_.take()) {
+    for (const std::string& frame : line_.take()) {
       ClientRequest request;
       EXPECT_TRUE(protocol::decode(frame, request));
       if (request.has_end_query()) {
@@ -67,7 +67,7 @@ class PageTracesAloneTest : public testing::Test {
   }
 
   ServiceLine line_;
-  AnswerPool pool_{"", [] {}};
+  AnswerPool pool_{line_, [] {}};
   LiveText live_{[] { return std::nullopt; }, 0};
   Page page_{settings(), Page::Neighbours{line_, pool_, pool_, live_}};
 };

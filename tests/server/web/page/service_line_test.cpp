@@ -1,5 +1,5 @@
 // What the page says to the service when a browser waits no more.
-#include "server/web/page/service_line.h"
+#include "server/web/answers/service_line.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ class ServiceLineTest : public testing::Test {
   /// Numbers of the requests that the service is told to end, in order; others are passed over.
   std::vector<std::uint64_t> ended() {
     std::vector<std::uint64_t> numbers;
-    for (const auto& [client, frame] : line_.take()) {
+    for (const std::string& frame : line_.take()) {
       protocol::ClientRequest request;
       EXPECT_TRUE(protocol::decode(frame, request));
       if (request.has_end_query()) {

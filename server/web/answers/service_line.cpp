@@ -1,0 +1,156 @@
+#include "server/web/answers/service_line.h"
+
+#include <cstddef>
+#include <utility>
+
+#include "proto/frames.h"
+#include "server/web/http/json_answer.h"
+
+namespace oblique::server {
+namespace {
+
+/// So that the loop serves others in between.
+constexpr std::size_t kMostATurn = 8;
+/// Older ones have passed their deadline at the service.
+constexpr std::size_t kMostLeftTraces = 256;
+
+}  // namespace
+
+std::uint64_t ServiceLine::new_number() {
+  const std::lock_guard lock(mutex_);
+  return ++last_number_;
+}
+
+void ServiceLine::ask(std::uint64_t number, protocol::ClientRequest request) {
+  const std::lock_guard lock(mutex_);
+  request.set_request_id(number);
+  Awaited& awaited = awaited_[number];
+  awaited.is_query = awaited.is_query || request.has_query();
+  awaited.trace = request.has_trace() ? request.trace().SerializeAsString() : std::string();
+  send(std::move(request));
+  if (awaited.trace.empty()) {
+    return;
+  }
+  // Those before end after the new one waits, or the worker would drop what it has done.
+  std::erase_if(left_traces_, [&](const LeftTrace& left) {
+    const bool is_same = left.request == awaited.trace;
+    if (is_same) {
+      end(left.number);
+    }
+    return is_same;
+  });
+}
+
+std::optional<protocol::ClientReply> ServiceLine::reply(std::uint64_t number) {
+  const std::lock_guard lock(mutex_);
+  return next_reply(number);
+}
+
+std::optional<protocol::ClientReply> ServiceLine::wait_for_reply(
+    std::uint64_t number, std::chrono::milliseconds timeout) {
+  const auto until = std::chrono::steady_clock::now() + timeout;
+  std::unique_lock lock(mutex_);
+  while (true) {
+    if (auto reply = next_reply(number)) {
+      return reply;
+    }
+    if (replied_.wait_until(lock, until) == std::cv_status::timeout) {
+      return next_reply(number);
+    }
+  }
+}
+
+std::optional<protocol::ClientReply> ServiceLine::next_reply(std::uint64_t number) {
+  for (const std::string& frame : std::exchange(frames_, {})) {
+    protocol::ClientReply reply;
+    // A message that something takes long has the number of no request.
+    const bool is_reply = protocol::decode(frame, reply);
+    const auto awaited = awaited_.find(reply.request_id());
+    if (is_reply && awaited != awaited_.end()) {
+      const bool is_part = reply.has_query() && !reply.query().ends();
+      awaited->second.is_query = awaited->second.is_query && is_part;
+      awaited->second.trace.clear();
+      awaited->second.replies.push_back(std::move(reply));
+    }
+  }
+  const auto found = awaited_.find(number);
+  if (found == awaited_.end() || found->second.replies.empty()) {
+    return std::nullopt;
+  }
+  auto reply = std::move(found->second.replies.front());
+  found->second.replies.pop_front();
+  return reply;
+}
+
+void ServiceLine::forget(std::uint64_t number) {
+  const std::lock_guard lock(mutex_);
+  drop(number);
+}
+
+void ServiceLine::drop(std::uint64_t number) {
+  const auto awaited = awaited_.extract(number);
+  if (!awaited.empty() && (awaited.mapped().is_query || !awaited.mapped().trace.empty())) {
+    end(number);
+  }
+}
+
+void ServiceLine::leave(std::uint64_t number) {
+  const std::lock_guard lock(mutex_);
+  const auto awaited = awaited_.find(number);
+  if (awaited == awaited_.end() || awaited->second.trace.empty()) {
+    drop(number);
+    return;
+  }
+  left_traces_.push_back({std::move(awaited->second.trace), number});
+  awaited_.erase(awaited);
+  if (left_traces_.size() > kMostLeftTraces) {
+    left_traces_.pop_front();
+  }
+}
+
+void ServiceLine::end(std::uint64_t number) {
+  protocol::ClientRequest request;
+  request.mutable_end_query()->set_request_id(number);
+  send(std::move(request));
+}
+
+void ServiceLine::send(protocol::ClientRequest request) {
+  request.set_protocol_version(protocol::kProtocolVersion);
+  requests_.push_back(protocol::encode(request));
+  woken_.wake();
+}
+
+std::vector<std::string> ServiceLine::take() {
+  woken_.clear();
+  const std::lock_guard lock(mutex_);
+  std::vector<std::string> some;
+  while (!requests_.empty() && some.size() < kMostATurn) {
+    some.push_back(std::move(requests_.front()));
+    requests_.pop_front();
+  }
+  if (!requests_.empty()) {
+    woken_.wake();
+  }
+  return some;
+}
+
+void ServiceLine::put(std::string frame) {
+  {
+    const std::lock_guard lock(mutex_);
+    frames_.push_back(std::move(frame));
+  }
+  replied_.notify_all();
+}
+
+HttpAnswer failure(const protocol::ErrorReply& error) {
+  constexpr unsigned kBadRequest = 400;
+  constexpr unsigned kNotFound = 404;
+  constexpr unsigned kConflict = 409;
+  const bool is_unknown = error.message().starts_with("there is no study");
+  return error_answer(is_unknown              ? kNotFound
+                      : error.wrong_request() ? kBadRequest
+                                              : kConflict,
+                      error.message());
+}
+
+}  // namespace oblique::server
