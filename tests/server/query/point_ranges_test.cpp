@@ -78,6 +78,10 @@ TEST(PointRanges, OfHugeStudiesAreFew) {
       {{range("H", 0.1, 1.0, 10'000), range("mu", 0.0, 1.0, 10'001), range("e", 0.1, 1.0, 9'999)}});
   EXPECT_EQ(points_in(point_ranges(recipe, "H = 0.1 AND mu = 0 AND e = 1")), 2U * 2 * 2);
   EXPECT_EQ(point_ranges(recipe, "e = 1").size(), 1U);
+  const std::vector<protocol::Axis> block{range("H", 0.1, 1.0, 100), range("mu", 0.0, 1.0, 90),
+                                          range("e", 0.1, 1.0, 100)};
+  EXPECT_EQ(point_ranges(protocol::recipe_of({block, block}), "e = 1").size(), 18'000U);
+  EXPECT_EQ(point_ranges(protocol::recipe_of({block, block, block}), "e = 1").size(), 1U);
 }
 
 }  // namespace
