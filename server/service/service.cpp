@@ -4,6 +4,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/recipe/point_inputs.h"
 #include "proto/result_message.h"
 
 namespace oblique::server {
@@ -220,6 +221,10 @@ void Service::perform(const StoreResults& effect, Turn turn) {
   ResultsWrite write{{effect.worker, effect.study, effect.sequence, {}}, message.attempt(), bytes};
   for (const std::size_t index : effect.accepted) {
     protocol::PointResult& result = *message.mutable_results(static_cast<int>(index));
+    if (const std::string fault = protocol::fault_of_inputs(result, *change.table);
+        !fault.empty()) {
+      result = protocol::failed_point(result.point(), fault);
+    }
     write.event.outcomes.push_back({result.point(), !result.error().empty()});
     change.results.push_back(std::move(result));
   }

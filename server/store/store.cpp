@@ -6,6 +6,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/canonical.h"
+#include "proto/recipe/point_inputs.h"
 #include "proto/result_message.h"
 #include "server/database/row_checksum.h"
 #include "server/store/rows/model_rows.h"
@@ -374,7 +375,7 @@ void Store::add(const AddResults& change) {
   }
   PackedRow& row = statements_->row;
   for (const protocol::PointResult& result : change.results) {
-    const protocol::Point point = change.table->point(result.point());
+    const protocol::Point point = protocol::inputs_of(result, *change.table);
     const StoredModel model = stored_model(change, point.model);
     const RowContext context{change.study_id, model.id,         model.accuracy, point,
                              result.point(),  change.worker_id, change.attempt, change.solved_at};

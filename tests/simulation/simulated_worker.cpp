@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "proto/frames.h"
+#include "proto/recipe/point_inputs.h"
 #include "proto/result_message.h"
 
 namespace oblique::simulation {
@@ -206,6 +207,7 @@ void SimulatedWorker::solve_some() {
     fallen_model_ = next_model();
     work.solved = position + 1;
     progress.results.push_back(answer_to(mark, point));
+    protocol::set_inputs(progress.results.back(), work.batch.points());
   }
   progress.batch_done = next_position(work) == work.batch.size();
   if (progress.batch_done) {

@@ -142,6 +142,14 @@ class PretendedWorker : public Peer<WorkerMessage, ServerToWorker> {
     send(message);
     return receive();
   }
+  ServerToWorker receive() {
+    ServerToWorker message = Peer::receive();
+    if (message.has_study()) {
+      studies_[message.study().study_id()] =
+          std::make_unique<protocol::PointTable>(message.study().recipe());
+    }
+    return message;
+  }
   void credit(std::uint32_t batches) {
     WorkerMessage message;
     message.mutable_credit()->set_batches(batches);
@@ -158,7 +166,7 @@ class PretendedWorker : public Peer<WorkerMessage, ServerToWorker> {
     results.set_batch_done(true);
     results.set_busy_s(1e-3);
     for (const std::uint64_t point : points_of(batch)) {
-      *results.add_results() = solved_point(point);
+      *results.add_results() = solved_point(point, *studies_.at(batch.study_id()));
     }
     send(message);
     return static_cast<std::uint64_t>(results.results_size());
@@ -182,6 +190,7 @@ class PretendedWorker : public Peer<WorkerMessage, ServerToWorker> {
  private:
   std::uint64_t sequence_ = 0;
   std::map<std::uint64_t, std::uint64_t> in_hand_;
+  std::map<std::uint64_t, std::unique_ptr<protocol::PointTable>> studies_;  // as defined last
 };
 
 class PretendedClient : public Peer<ClientRequest, ClientReply> {
