@@ -15,6 +15,8 @@ namespace oblique::protocol {
 inline constexpr double kLargestOutput = 1e100;
 /// Most elements of a list in a result, as peaks. Honest ones have dozens.
 inline constexpr int kMostListElements = 4096;
+/// Most ranges of points that a filter leaves out, in one message.
+inline constexpr int kMostLeftOutRanges = 10'000;
 /// Most bytes of a result.
 inline constexpr std::size_t kMostResultBytes = std::size_t{1} << 20U;
 

@@ -278,7 +278,7 @@ class Simulation {
       const auto* study = disk_.model().study(client->name());
       if (!client->wants_results() || study == nullptr ||
           study->state != server::StudyState::kDone ||
-          disk_.model().rows(study->study_id).size() < client->points()) {
+          disk_.model().rows(study->study_id).size() < client->left_in()) {
         return false;
       }
     }
@@ -296,9 +296,11 @@ class Simulation {
       }
       const auto& results = disk_.model().rows(study->study_id);
       const auto counts = server_.service().scheduler().study(study->study_id);
-      if (results.size() != client->points()) {
+      if (results.size() != client->left_in() ||
+          counts.left_out != client->points() - client->left_in()) {
         throw Violation(client->name() + " has " + std::to_string(results.size()) + " of " +
-                        std::to_string(client->points()) + " points at the end, " +
+                        std::to_string(client->left_in()) + " points at the end, " +
+                        std::to_string(counts.left_out) + " left out, " +
                         std::to_string(counts.leased) + " leased" + ", " +
                         server::state_name(study->state) + ", with " +
                         std::to_string(server_.service().scheduler().workers()) + " workers");
