@@ -98,7 +98,8 @@ PointsLeftIn points_left_in(const PointTable& table, std::size_t block) {
     return {found, false};
   }
   for (std::uint64_t look = 0; look < kLooks; ++look) {
-    found += table.is_left_in(place.first_point + sampling::hashed(2, look) % place.points) ? 1U : 0U;
+    found +=
+        table.is_left_in(place.first_point + sampling::hashed(2, look) % place.points) ? 1U : 0U;
   }
   const double share = static_cast<double>(found) / static_cast<double>(kLooks);
   return {static_cast<std::uint64_t>(share * static_cast<double>(place.points)), true};

@@ -163,12 +163,14 @@ TEST_F(BatchSolverTest, PointsThatAFilterLeavesOutAreNamed) {
   wait_batches_ended(1);
   const auto progress = solver_.collect();
   ASSERT_EQ(progress.size(), 1U);
-  std::vector<std::pair<std::uint64_t, std::uint64_t>> left_out;
+  std::vector<std::uint64_t> left_out;
   for (const Batch::Range& range : progress[0].left_out) {
-    left_out.emplace_back(range.begin, range.end);
+    for (std::uint64_t point = range.begin; point < range.end; ++point) {
+      left_out.push_back(point);
+    }
   }
-  EXPECT_EQ(left_out, (std::vector<std::pair<std::uint64_t, std::uint64_t>>{
-                          {8, 10}, {11, 13}, {5, 6}, {21, 22}}));
+  EXPECT_EQ(left_out, (std::vector<std::uint64_t>{8, 9, 11, 12, 5, 21}));
+  EXPECT_EQ(size_of(progress[0].left_out), 6U);
   EXPECT_EQ(progress[0].results.size(), 2U);
 }
 

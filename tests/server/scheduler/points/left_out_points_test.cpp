@@ -125,7 +125,7 @@ TEST_F(LeftOutPointsTest, APointThatADoneBatchNeitherSolvedNorNamedIsHandedOutAg
   event.left_out.erase(forgotten);
   bench_.feed(event);
   EXPECT_EQ(bench_.scheduler.study(1).leased, 0U);
-  const SendBatch again = bench_.join(2, 1).at(0);
+  const SendBatch again = only<SendBatch>(bench_.feed(CreditGiven{1, 1})).at(0);
   EXPECT_EQ(again.first_point(), forgotten);
   EXPECT_EQ(again.count(), 1U);
   EXPECT_EQ(again.attempt, 2U);
