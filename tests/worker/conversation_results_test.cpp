@@ -108,7 +108,7 @@ TEST_F(ConversationTest, PointsThatAFilterLeavesOutAreNamedAsRangesOfTheirBatch)
   all.push_back({1, 7, {protocol::failed_point(3, "for the test")}, 0.1, true, {{0, 3}, {4, 10}}});
   take(conversation_->on_progress(std::move(all), now_ms_));
   ASSERT_EQ(sent_results().size(), 1U);
-  const protocol::Results& results = sent_results()[0];
+  const protocol::Results results = sent_results()[0];
   EXPECT_EQ(results.lease_id(), 31U);
   EXPECT_TRUE(results.batch_done());
   EXPECT_EQ(std::vector<std::uint64_t>(results.left_out().begin(), results.left_out().end()),
