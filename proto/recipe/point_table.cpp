@@ -17,6 +17,7 @@
 #include "proto/recipe/checks.h"
 #include "proto/recipe/keys.h"
 #include "proto/recipe/model_message.h"
+#include "proto/recipe/sampling/hash.h"
 
 namespace oblique::protocol {
 
@@ -178,19 +179,6 @@ std::uint64_t PointTable::models() const {
   return models_;
 }
 
-std::uint64_t PointTable::points() const {
-  if (!has_filter_) {
-    return points_;
-  }
-  std::uint64_t points = 0;
-  for (std::size_t i = 0; i < blocks_.size(); ++i) {
-    const bool is_counted = !message(i).where().empty() && message(i).has_points_left_in();
-    points +=
-        is_counted ? std::min(message(i).points_left_in(), blocks_[i].points) : blocks_[i].points;
-  }
-  return points;
-}
-
 std::size_t PointTable::block_of_point(std::uint64_t point) const {
   if (point >= size()) {
     throw std::out_of_range("the study has no point " + std::to_string(point));
@@ -313,21 +301,20 @@ std::string PointTable::fault(std::uint64_t index) const {
   });
 }
 
-bool PointTable::needs_survey() const {
+bool PointTable::needs_judging() const {
   return std::find(is_judged_by_points_.begin(), is_judged_by_points_.end(), true) !=
          is_judged_by_points_.end();
 }
 
-bool PointTable::survey(const std::function<bool()>& goes_on) {
-  for (; surveyed_.block < blocks_.size(); surveyed_ = {surveyed_.block + 1, 0, 0}) {
-    const std::size_t i = surveyed_.block;
+void PointTable::judge_points() const {
+  const auto judged = static_cast<std::uint64_t>(
+      std::count(is_judged_by_points_.begin(), is_judged_by_points_.end(), true));
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
     if (!is_judged_by_points_[i]) {
       continue;
     }
     try {
-      if (!survey_block(i, goes_on)) {
-        return false;
-      }
+      judge_block(i, kMostJudged / judged);
     } catch (const solver::InputError& error) {
       if (recipe_->blocks_size() == 1) {
         throw;
@@ -335,43 +322,25 @@ bool PointTable::survey(const std::function<bool()>& goes_on) {
       throw solver::InputError(of_block(*recipe_, i, error.what()));
     }
   }
-  return true;
 }
 
-bool PointTable::survey_block(std::size_t number, const std::function<bool()>& goes_on) {
-  constexpr std::uint64_t kAsksEvery = 1024;
-  Block& block = *recipe_->mutable_blocks(static_cast<int>(number));
+void PointTable::judge_block(std::size_t number, std::uint64_t most) const {
+  const Block& block = message(number);
   const BlockPlace& place = blocks_[number];
-  const bool has_filter = !block.where().empty();
-  if (place.points > kMostCounted) {
-    if (has_filter) {
-      throw solver::InputError("where: the block has " + std::to_string(place.points) +
-                               " points before its filter, and each is looked at: at most " +
-                               std::to_string(kMostCounted) +
-                               " are allowed; shorten an axis, or make several studies");
-    }
-    return true;
-  }
+  const bool judges_all = place.points <= most;
   BlockPoints points(base_model_, block);
-  std::uint64_t& i = surveyed_.points;
-  std::uint64_t& left_in = surveyed_.left_in;
-  for (; i < place.points; ++i) {
-    if (i % kAsksEvery == 0 && !goes_on()) {
-      return false;
-    }
+  bool leaves_any_in = false;
+  for (std::uint64_t look = 0; look < std::min(place.points, most); ++look) {
+    const std::uint64_t i = judges_all ? look : sampling::hashed(number, look) % place.points;
     points.go_to(i);
     if (const std::string fault = points.fault(); !fault.empty()) {
       throw solver::InputError("point " + std::to_string(place.first_point + i) + ": " + fault);
     }
-    left_in += points.is_left_in() ? 1U : 0U;
+    leaves_any_in = leaves_any_in || points.is_left_in();
   }
-  if (has_filter) {
-    if (left_in == 0) {
-      throw solver::InputError(expression_in_words("where", block.where()) + " leaves no point in");
-    }
-    block.set_points_left_in(left_in);
+  if (judges_all && !leaves_any_in) {
+    throw solver::InputError(expression_in_words("where", block.where()) + " leaves no point in");
   }
-  return true;
 }
 
 }  // namespace oblique::protocol

@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -31,7 +30,7 @@ struct Segment {
 /// A run of blocks' points and models, as the table has them.
 struct BlockPlace {
   std::uint64_t first_point;
-  std::uint64_t points;  ///< point numbers, with those that the filter leaves out
+  std::uint64_t points;  ///< also those that the filter leaves out
   std::uint64_t first_model;
   std::uint64_t models;
 };
@@ -58,25 +57,20 @@ class PointTable {
   std::uint64_t size() const;    ///< how many point numbers there are
   std::uint64_t models() const;  ///< number of models
 
-  /// Number of points that filters leave in; `size` where there is no filter. Of a filter that was
-  /// not counted all points count.
-  std::uint64_t points() const;
   bool has_filter() const { return has_filter_; }
   bool is_left_in(std::uint64_t index) const;
   /// The first point of [begin, end) that is left in, or `end`. Throws std::out_of_range for an end
   /// beyond the last point.
   std::uint64_t first_left_in(std::uint64_t begin, std::uint64_t end) const;
 
-  /// Whether filters are to be counted or values judged that only their points tell.
-  bool needs_survey() const;
-  /// Looks at the points of such blocks one by one: counts what filters leave in, which the recipe
-  /// has from then on, and judges every value. Takes about a second for 10^7 points. `goes_on` is
-  /// asked now and then; false ends it with false, and the next call goes on from there. Throws
-  /// solver::InputError that names block, point and values for a value that is not allowed, for a
-  /// filter over more than `kMostCounted` points and for one that leaves nothing in. Blocks without
-  /// filter that have more are passed over: a point of theirs that is not allowed fails (`fault`).
-  bool survey(const std::function<bool()>& goes_on);
-  static constexpr std::uint64_t kMostCounted = 100'000'000;
+  /// Whether some values or filters can be judged only by their points.
+  bool needs_judging() const;
+  /// Judges such blocks by their points: by all of them or, where these are more than `kMostJudged`
+  /// in all blocks together, by some at random. Takes up to about 0.1 s. Throws solver::InputError
+  /// that names block, point and values for a value that is not allowed, and for a filter that
+  /// leaves out all points of its block. What is not found fails (`fault`).
+  void judge_points() const;
+  static constexpr std::uint64_t kMostJudged = 100'000;
 
   /// Why a point cannot be solved, as a sentence; empty for all that can. Costs nothing but for
   /// blocks that are judged by their points.
@@ -103,15 +97,9 @@ class PointTable {
   void add_block(const Block& block);
   /// Counts the points of a block without model axes that is about to be added.
   void add_to_base_segments(std::uint64_t block_points);
-  bool survey_block(std::size_t number, const std::function<bool()>& goes_on);
+  void judge_block(std::size_t number, std::uint64_t most) const;
   std::size_t block_of_model(std::uint64_t index) const;
 
-  /// Where a survey goes on.
-  struct Surveyed {
-    std::size_t block = 0;
-    std::uint64_t points = 0;  ///< of that block
-    std::uint64_t left_in = 0;
-  };
   const Block& message(std::size_t block) const { return recipe_->blocks(static_cast<int>(block)); }
 
   std::unique_ptr<Recipe> recipe_;  ///< stays where it is when the table moves
@@ -126,7 +114,6 @@ class PointTable {
   std::uint64_t models_ = 0;
   std::size_t expressions_ = 0;
   bool has_filter_ = false;
-  Surveyed surveyed_;
   std::unique_ptr<Compiled> compiled_;  ///< of the other blocks; null when there are none
 };
 

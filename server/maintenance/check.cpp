@@ -129,7 +129,7 @@ class StudyCheck {
         noted_(noted_points(database)),
         studies_(database, fmt::format("SELECT study_id, name, recipe, points, state, priority,"
                                        " max(length(created_at), length(changed_at)),"
-                                       " checksum <> {} FROM studies ORDER BY study_id",
+                                       " checksum <> {}, left_out FROM studies ORDER BY study_id",
                                        study_checksum_sql())),
         rows_(database, fmt::format("SELECT {}, checksum IS NULL, coalesce({},"
                                     " CASE WHEN model_id NOT IN (SELECT model_id FROM models)"
@@ -230,7 +230,8 @@ class StudyCheck {
     rows.for_each([&](const Interval& range) { without_row.erase(range.begin, range.end); });
     const bool has_filter = table.is_made() && table->has_filter();
     if (rows.size() + without_row.size() != completed.size() ||
-        (!without_row.empty() && !has_filter)) {
+        (!without_row.empty() && !has_filter) ||
+        (noted && without_row.size() != static_cast<std::uint64_t>(studies_.integer(8)))) {
       add_fault(fmt::format(
           "completed_ranges has {} points and results {}, and they are not the same. UPDATE "
           "studies SET counted = 0 WHERE study_id = {} makes the next server count them",

@@ -35,8 +35,11 @@ void count_again(sqlite3* database, std::uint64_t study_id, const StudyTable& ta
                  const IntervalSet& noted) {
   CompletedRanges ranges(database);
   ranges.count_again(study_id);
-  left_out(table, noted).for_each([&](const Interval& range) { ranges.add(study_id, range); });
+  const IntervalSet without_row = left_out(table, noted);
+  without_row.for_each([&](const Interval& range) { ranges.add(study_id, range); });
   ranges.flush();
+  execute_with(database, "UPDATE studies SET left_out = ?2 WHERE study_id = ?1", study_id,
+               without_row.size());
   for (const char* sql :
        {"DELETE FROM main.reused_points WHERE study_id = ?1",
         // A source is STUDY/POINT, and a name may have slashes too.

@@ -83,6 +83,7 @@ struct AddResults {
   std::uint32_t attempt;
   std::string solved_at;
   std::vector<protocol::PointResult> results;
+  IntervalSet left_out{};  ///< points that a filter leaves out: they are completed without a row
 };
 
 /// Appends points to a study, which then runs with this priority.

@@ -155,6 +155,7 @@ void CompletedRanges::count_again(std::uint64_t study_id) {
   constexpr auto kLast = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
   const IntervalSet points = points_with_row(database_, study_id, {0, kLast});
   execute_with(database_, "DELETE FROM completed_ranges WHERE study_id = ?", study_id);
+  execute_with(database_, "UPDATE studies SET left_out = 0 WHERE study_id = ?", study_id);
   points.for_each([&](const Interval& range) { write(study_id, range); });
   set_counted(study_id);
 }

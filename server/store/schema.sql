@@ -21,6 +21,7 @@ CREATE TABLE studies (
   priority     INTEGER NOT NULL DEFAULT 0, -- studies of a higher priority come first
   submitted_by TEXT,                 -- name of the key that first submitted it; NULL: without keys
   counted      INTEGER NOT NULL DEFAULT 1, -- 0: rows were deleted, `completed_ranges` must be made again
+  left_out     INTEGER NOT NULL DEFAULT 0, -- number of completed points that `where` leaves out
   reuses       INTEGER NOT NULL DEFAULT 0, -- 1: the lookup of results in other studies has not ended
   checksum     INTEGER               -- CRC-32 of study_id, name, recipe, points and created_at
 ) STRICT;

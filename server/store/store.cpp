@@ -6,6 +6,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/canonical.h"
+#include "proto/recipe/point_inputs.h"
 #include "proto/result_message.h"
 #include "server/database/row_checksum.h"
 #include "server/store/result_rows.h"
@@ -273,7 +274,7 @@ void Store::add(const AddResults& change) {
   }
   solver::CaseResult outputs;
   for (const protocol::PointResult& result : change.results) {
-    const protocol::Point point = change.table->point(result.point());
+    const protocol::Point point = protocol::inputs_of(result, *change.table);
     const bool is_solved = result.error().empty();
     if (is_solved) {
       outputs = protocol::from_message(result);
@@ -290,6 +291,12 @@ void Store::add(const AddResults& change) {
     if (statements_->add_result.run(row)) {  // else the point has a row already
       ranges_->add(change.study_id, result.point());
     }
+  }
+  if (!change.left_out.empty()) {
+    change.left_out.for_each(
+        [&](const Interval& points) { ranges_->add(change.study_id, points); });
+    execute_with(database_.get(), "UPDATE studies SET left_out = left_out + ?2 WHERE study_id = ?1",
+                 change.study_id, change.left_out.size());
   }
 }
 

@@ -34,6 +34,7 @@ struct StoredStudy {
   PointAttempts attempts{};    ///< of failures, and of points whose failure was removed by `retry`
   std::string submitted_by{};  ///< name of the key; empty: without keys
   bool reuses = false;         ///< the lookup of results in other studies has not ended
+  std::uint64_t left_out = 0;  ///< number of completed points that `where` leaves out
   std::map<std::string, std::uint64_t> taken{};  ///< number of reused results by their source
 };
 

@@ -147,7 +147,7 @@ std::vector<StoredStudy> Store::studies() {
   std::vector<StoredStudy> found;
   Statement list(database_.get(),
                  "SELECT study_id, name, recipe, state, created_at, priority,"
-                 " points, coalesce(submitted_by, ''), reuses FROM studies "
+                 " points, coalesce(submitted_by, ''), reuses, left_out FROM studies "
                  "ORDER BY study_id");
   Statement version(database_.get(),
                     "SELECT w.solver_version FROM results AS r"
@@ -180,6 +180,7 @@ std::vector<StoredStudy> Store::studies() {
     study.priority = static_cast<std::int32_t>(list.integer(5));
     study.submitted_by = list.text(7);
     study.reuses = list.integer(8) != 0;
+    study.left_out = number(list, 9);
     taken.bind(1, study.study_id);
     while (taken.step()) {
       study.taken[taken.text(0)] = number(taken, 1);

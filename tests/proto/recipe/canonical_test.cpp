@@ -294,13 +294,5 @@ TEST(Canonical, ListedValuesOfALogarithmicRangeAreThatRange) {
   EXPECT_EQ(canonical_recipe(with(listed("mu", values))), canonical_recipe(with(written)));
 }
 
-TEST(Canonical, WhatTheServerCountedIsNoPartOfWhatABlockIs) {
-  Recipe recipe = recipe_of_blocks(
-      {filtered({listed("H", {0.5}), range("mu", 0.0, 1.0, 11), listed("e", {1.0})}, "mu > 0.5")});
-  const std::string before = canonical_recipe(recipe);
-  recipe.mutable_blocks(0)->set_points_left_in(5);
-  EXPECT_EQ(canonical_recipe(recipe), before);
-}
-
 }  // namespace
 }  // namespace oblique::protocol

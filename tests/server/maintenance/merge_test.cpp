@@ -414,13 +414,15 @@ TEST_F(MergeTest, AStudyIsDoneWhenAllIsThereThatItsFilterLeavesIn) {
   store("one", {{.table = filtered_table("mu > 0.5"), .first = 5, .end = 8}});
   store("two", {{.table = filtered_table("mu > 0.5"), .first = 8, .end = 10}});
   const auto state = [&] {
-    return text("all", "SELECT state || ' ' || counted || ' ' || points FROM studies");
+    return text("all", "SELECT state || ' ' || counted || ' ' || left_out FROM studies");
   };
   merge("one");
-  EXPECT_EQ(state(), "running 1 5");
+  EXPECT_EQ(state(), "running 1 0");
+  texts("two", "INSERT INTO completed_ranges VALUES (1, 0, 5)");
+  texts("two", "UPDATE studies SET left_out = 5");
   merge("two");
   EXPECT_EQ(state(), "done 1 5");
-  EXPECT_EQ(ranges("all"), "5+5");
+  EXPECT_EQ(ranges("all"), "0+10");
   EXPECT_THAT(find_faults(file("all")), IsEmpty());
 }
 
@@ -428,7 +430,9 @@ TEST_F(MergeTest, CompletedPointsThatAFilterLeavesOutAreUnited) {
   store("one", {{.table = filtered_table("mu > 0.5"), .first = 5, .end = 8}});
   store("two", {{.table = filtered_table("mu > 0.5"), .first = 7, .end = 9}});
   texts("one", "INSERT INTO completed_ranges VALUES (1, 0, 2)");
+  texts("one", "UPDATE studies SET left_out = 2");
   texts("two", "INSERT INTO completed_ranges VALUES (1, 1, 4)");
+  texts("two", "UPDATE studies SET left_out = 4");
   merge("one");
   EXPECT_EQ(ranges("all"), "0+2,5+3");
   merge("two");

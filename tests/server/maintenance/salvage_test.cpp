@@ -203,9 +203,10 @@ TEST_F(SalvageTest, RowsThatAreOnlyInTheLogAreSavedTooAndTheLogStaysAsItIs) {
 TEST_F(SalvageTest, StudiesWithFiltersAreDoneAndReusedResultsAreCountedAgain) {
   const auto filtered = filtered_table("mu < 0.4");  // points 0 to 3
   const auto outcome = std::make_shared<ReusedResults>();
-  store_->commit(std::vector<Change>{AddStudy{2, "b", filtered, "now"},
-                                     ReuseResults{2, filtered, 0, "0.1", outcome},
-                                     SetStudyState{2, StudyState::kDone, "now"}});
+  store_->commit(std::vector<Change>{
+      AddStudy{2, "b", filtered, "now"}, ReuseResults{2, filtered, 0, "0.1", outcome},
+      AddResults{2, filtered, 1, "0.1", "avx2", 1, "now", {}, IntervalSet(4, 10)},
+      SetStudyState{2, StudyState::kDone, "now"}});
   store_.reset();
   execute(open_database(path_, SQLITE_OPEN_READWRITE).get(), "DELETE FROM reused_points");
   salvage(path_, copy_);
@@ -213,7 +214,8 @@ TEST_F(SalvageTest, StudiesWithFiltersAreDoneAndReusedResultsAreCountedAgain) {
   Store saved(copy_);
   const auto study = saved.studies().at(1);
   EXPECT_EQ(study.state, StudyState::kDone);
-  EXPECT_EQ(study.settled, IntervalSet(0, 4));
+  EXPECT_EQ(study.settled, IntervalSet(0, 10));
+  EXPECT_EQ(study.left_out, 6U);
   EXPECT_EQ(study.taken, (std::map<std::string, std::uint64_t>{{"a", 4}}));
 }
 
@@ -232,6 +234,7 @@ TEST_F(SalvageTest, PointsThatAFilterLeavesOutStayCompletedAndThoseOfLostRowsDoN
   store_.reset();
   execute(open_database(path_, SQLITE_OPEN_READWRITE).get(),
           "INSERT INTO completed_ranges VALUES (2, 4, 3);"
+          "UPDATE studies SET left_out = 3 WHERE study_id = 2;"
           "UPDATE results SET mu = 2 * mu WHERE study_id = 2 AND point = 1");
   salvage(path_, copy_);
   const DatabaseHandle saved = open_database(copy_, SQLITE_OPEN_READONLY);
