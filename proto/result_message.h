@@ -10,8 +10,7 @@
 namespace oblique::protocol {
 
 /// Largest magnitude of a number in a result, in SI units. Far beyond anything that happens to a
-/// finger, and small enough that it stays finite in every unit in which databases keep it
-/// (server/store/rows/stored_units.h).
+/// finger, and small enough that it stays finite in every unit in which it is shown.
 inline constexpr double kLargestOutput = 1e100;
 /// Most elements of a list in a result, as peaks. Honest ones have dozens.
 inline constexpr int kMostListElements = 4096;

@@ -71,11 +71,6 @@ FilePlace file_place(const std::string& path, std::string_view flag) {
   return place;
 }
 
-std::string scratch_folder(const std::string& path) {
-  const FilePlace place = file_place(path);
-  return place.is_in_place ? std::string() : place.folder();
-}
-
 NewFile::NewFile(const std::string& path, std::string_view flag)
     : name_(path), place_(file_place(path, flag)) {
   if (place_.open_descriptor >= 0) {

@@ -18,11 +18,6 @@ struct FilePlace {
 /// in a circle.
 FilePlace file_place(const std::string& path, std::string_view flag = "--out");
 
-/// The folder for what is kept of a file of that name until it is whole, which has the room that it
-/// needs, or it finds none there either; empty, for any, where it is written in place. Throws as
-/// `file_place` does.
-std::string scratch_folder(const std::string& path);
-
 /// A file that appears under its name, whole, when it is finished. Before that, and if that never
 /// happens, what was there under the name stays, and nothing is left beside it: what is written has
 /// no name where the file system can do so (most do, NFS does not). A link stays, and what it leads

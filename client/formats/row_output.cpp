@@ -4,7 +4,6 @@
 
 #include "client/formats/new_file.h"
 #include "client/formats/pager.h"
-#include "worker/solver/model/errors.h"
 
 namespace oblique::client {
 namespace {
@@ -16,12 +15,7 @@ std::unique_ptr<Sink> sink_for(const OutputSettings& settings, const TerminalSiz
   if (terminal.lines == 0) {
     return std::make_unique<StandardOutput>();
   }
-  if (settings.format == Format::kNpz) {
-    throw solver::InputError(
-        "--format npz is not text, and standard output is a terminal: write it to a file with "
-        "--out FILE.npz");
-  }
-  if (settings.may_page && is_for_people(settings.format)) {
+  if (settings.may_page && settings.format == Format::kTable) {
     return std::make_unique<PagedOutput>(terminal.lines - 1, pager_command());
   }
   return std::make_unique<StandardOutput>();
@@ -31,15 +25,10 @@ PrinterSettings printer_settings(const OutputSettings& settings, const TerminalS
   PrinterSettings of_printer;
   of_printer.shown = settings.shown;
   of_printer.way_to_all = settings.way_to_all;
-  of_printer.usual = settings.usual;
   if (settings.file.empty() && terminal.lines > 0) {
     of_printer.width = terminal.columns;
     of_printer.keeps_all = !settings.may_leave_out;
     of_printer.first_rows = terminal.lines;
-  }
-  if (!settings.file.empty()) {
-    // Its own disk has the room that it needs, or it finds none there either.
-    of_printer.folder = scratch_folder(settings.file);
   }
   return of_printer;
 }

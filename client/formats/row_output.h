@@ -17,7 +17,6 @@ struct OutputSettings {
   bool may_leave_out = true;  ///< a table that does not fit the terminal lacks columns
   std::string way_to_all = PrinterSettings().way_to_all;  ///< see PrinterSettings
   std::vector<ShownColumn> shown = {};                    ///< see PrinterSettings
-  std::vector<protocol::CellKind> usual = {};             ///< see PrinterSettings
 };
 
 /// Where the rows of an answer go: standard output, a pager where that is a terminal, or a file,
@@ -27,8 +26,7 @@ struct OutputSettings {
 /// now and then, and `finish`.
 class RowOutput {
  public:
-  /// Throws solver::InputError for a file that cannot be made, and for NumPy's archive on a
-  /// terminal.
+  /// Throws solver::InputError for a file that cannot be made.
   explicit RowOutput(OutputSettings settings);
   ~RowOutput();
 

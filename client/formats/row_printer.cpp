@@ -10,7 +10,6 @@
 #include "client/formats/csv_printer.h"
 #include "client/formats/json_printer.h"
 #include "client/formats/new_file.h"
-#include "client/formats/npz_printer.h"
 #include "client/formats/table_printer.h"
 #include "proto/suggestion.h"
 #include "worker/solver/model/errors.h"
@@ -18,8 +17,7 @@
 namespace oblique::client {
 namespace {
 
-constexpr std::array<std::string_view, 6> kFormatNames{"table", "csv", "json",
-                                                       "jsonl", "npz", "markdown"};
+constexpr std::array<std::string_view, 4> kFormatNames{"table", "csv", "json", "jsonl"};
 
 }  // namespace
 
@@ -48,8 +46,7 @@ std::string contradiction(std::string_view flag, std::string_view ending, const 
 
 Format format_of_output(const std::string& flag, const std::string& file) {
   const std::string ending = std::filesystem::path(file).extension().string();
-  const std::string_view meant =
-      ending == ".md" ? "markdown" : std::string_view(ending).substr(ending.empty() ? 0 : 1);
+  const auto meant = std::string_view(ending).substr(ending.empty() ? 0 : 1);
   const bool is_known = meant != "table" && std::find(kFormatNames.begin(), kFormatNames.end(),
                                                       meant) != kFormatNames.end();
   if (!flag.empty()) {
@@ -66,8 +63,8 @@ Format format_of_output(const std::string& flag, const std::string& file) {
     return Format::kTable;
   }
   throw solver::InputError(
-      fmt::format("--out {} does not say in which format: end its name in .csv, .json, .jsonl, "
-                  ".npz or .md, or give --format",
+      fmt::format("--out {} does not say in which format: end its name in .csv, .json or "
+                  ".jsonl, or give --format",
                   file));
 }
 
@@ -79,11 +76,6 @@ std::unique_ptr<RowPrinter> made_printer(Format format, Sink& sink, PrinterSetti
       return std::make_unique<JsonPrinter>(sink, JsonPrinter::Shape::kArray);
     case Format::kJsonLines:
       return std::make_unique<JsonPrinter>(sink, JsonPrinter::Shape::kLines);
-    case Format::kNpz:
-      return std::make_unique<NpzPrinter>(sink, std::move(settings.folder),
-                                          std::move(settings.usual));
-    case Format::kMarkdown:
-      return std::make_unique<MarkdownPrinter>(sink, std::move(settings.shown));
     case Format::kTable:
       break;
   }

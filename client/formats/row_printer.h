@@ -13,16 +13,16 @@
 
 namespace oblique::client {
 
-enum class Format { kTable, kCsv, kJson, kJsonLines, kNpz, kMarkdown };
+enum class Format { kTable, kCsv, kJson, kJsonLines };
 
-/// The format of that name: `table`, `csv`, `json`, `jsonl`, `npz` or `markdown`. Throws
-/// solver::InputError for other names.
+/// The format of that name: `table`, `csv`, `json` or `jsonl`. Throws solver::InputError for
+/// other names.
 Format format_named(std::string_view name);
 /// Names of all.
 std::span<const std::string_view> format_names();
 
-/// The format that --format names or, where that is empty, the end of the file's name: .csv, .json,
-/// .jsonl, .npz or .md; a table for standard output (`file` empty), and for what is written in
+/// The format that --format names or, where that is empty, the end of the file's name: .csv, .json
+/// or .jsonl; a table for standard output (`file` empty), and for what is written in
 /// place, as /dev/stdout. Throws solver::InputError for names and ends of no format, and for a name
 /// that ends as another format than the flag names.
 Format format_of_output(const std::string& flag, const std::string& file);
@@ -30,11 +30,6 @@ Format format_of_output(const std::string& flag, const std::string& file);
 /// The sentence for a file whose name ends as format `ending` while --format names `flag`; empty
 /// where both are one.
 std::string contradiction(std::string_view flag, std::string_view ending, const std::string& file);
-
-/// Whether it is for reading, not for other programs.
-inline bool is_for_people(Format format) {
-  return format == Format::kTable || format == Format::kMarkdown;
-}
 
 /// How tables for people show a column.
 struct ShownColumn {
@@ -64,25 +59,17 @@ struct PrinterSettings {
   std::string way_to_all = "csv and json have all";
   /// Of a table: widths of columns are those of so many rows at its beginning.
   std::size_t first_rows = 1000;
-  /// Of a table, plain or in Markdown: how each column is shown; where there is none, by its name.
+  /// Of a table: how each column is shown; where there is none, by its name.
   std::vector<ShownColumn> shown = {};
-  /// Of NumPy's archives: where columns are kept until they are whole.
-  std::string folder = {};
-  /// Of NumPy's archives: of which kind each column is when it has no values; where there is none,
-  /// real.
-  std::vector<protocol::CellKind> usual = {};
 };
 
 /// Prints to `sink`, which must outlive it.
 ///
-/// Tables, plain or in Markdown, are for reading: numbers of six digits, in a plain table aligned
-/// at the point. CSV (RFC 4180, a header line), JSON (an array of objects) and JSON lines (an
-/// object a line) hold every number as the shortest text that reads back as the same bits; NULL is
-/// an empty field, respectively null. In JSON the second of two columns of one name is called
-/// name_2, and lists that columns pack as text are arrays; see packed_columns.h. NumPy's archive
-/// (.npz) has an array a column: int64, float64, in which NULL is nan, or text of fixed width;
-/// lists are texts of JSON. An array is called as its column, but for letters that no file may have
-/// in its name (/ becomes _) and what goes beyond 200 bytes.
+/// Tables are for reading: numbers have six digits and are aligned at the point. CSV (RFC 4180, a
+/// header line), JSON (an array of objects) and JSON lines (an object a line) hold every number as
+/// the shortest text that reads back as the same bits; NULL is an empty field, respectively null.
+/// In JSON the second of two columns of one name is called name_2, and lists that columns pack as
+/// text are arrays; see packed_columns.h.
 std::unique_ptr<RowPrinter> made_printer(Format format, Sink& sink, PrinterSettings settings = {});
 
 /// A key stands for one value only: of equal names the second becomes name_2, and so on.

@@ -277,39 +277,4 @@ void TablePrinter::end() {
   }
 }
 
-void MarkdownPrinter::append_cell(const std::string& text) {
-  std::string& out = sink_.held();
-  out += ' ';
-  for (const char letter : text) {
-    out += letter == '|' ? "\\|" : std::string_view(&letter, 1);
-  }
-  out += " |";
-}
-
-void MarkdownPrinter::print(const protocol::QueryReply& chunk) {
-  std::string& out = sink_.held();
-  protocol::ChunkRows rows(chunk);
-  bool has_row = rows.next();
-  if (!std::exchange(has_head_, true)) {
-    out += '|';
-    std::string rule = "|";
-    for (int i = 0; i < chunk.columns_size(); ++i) {
-      const ShownColumn shown = shown_as(shown_, chunk, i);
-      const CellKind kind = has_row ? rows.cell(static_cast<std::size_t>(i)).kind : CellKind::kText;
-      append_cell(protocol::visible(shown.heading));
-      rule += kind == CellKind::kInteger || kind == CellKind::kReal ? "---:|" : "---|";
-      per_unit_.push_back(shown.per_unit);
-    }
-    out += '\n' + rule + '\n';
-  }
-  for (; has_row; has_row = rows.next()) {
-    out += '|';
-    for (std::size_t i = 0; i < rows.columns(); ++i) {
-      append_cell(cell_in_unit(rows.cell(i), per_unit_[i]));
-    }
-    out += '\n';
-    sink_.flush_if_long();
-  }
-}
-
 }  // namespace oblique::client

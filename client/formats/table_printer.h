@@ -56,22 +56,4 @@ class TablePrinter : public RowPrinter {
   bool has_head_ = false;
 };
 
-/// The same for tables in Markdown, which need no widths.
-class MarkdownPrinter : public RowPrinter {
- public:
-  MarkdownPrinter(Sink& sink, std::vector<ShownColumn> shown)
-      : sink_(sink), shown_(std::move(shown)) {}
-
-  void print(const protocol::QueryReply& chunk) override;
-  void end() override {}
-
- private:
-  void append_cell(const std::string& text);
-
-  Sink& sink_;
-  std::vector<ShownColumn> shown_;
-  std::vector<double> per_unit_;  // of the columns
-  bool has_head_ = false;
-};
-
 }  // namespace oblique::client

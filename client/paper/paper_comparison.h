@@ -67,12 +67,12 @@ std::vector<std::optional<OwnCase>> own_cases(const PublishedTable& table,
                                               const protocol::QueryReply& rows);
 
 /// Prints the tables for people: forces, durations, stick times, modes and where they are not the
-/// published ones, summary, misprints. `format` is kTable or kMarkdown.
-void print_comparison(std::ostream& out, Format format, const PublishedTable& table,
+/// published ones, summary, misprints.
+void print_comparison(std::ostream& out, const PublishedTable& table,
                       const std::vector<std::optional<OwnCase>>& own);
 
 /// Of these, peaks and modes alone.
-void print_modes(std::ostream& out, Format format, const PublishedTable& table,
+void print_modes(std::ostream& out, const PublishedTable& table,
                  const std::vector<std::optional<OwnCase>>& own);
 
 /// The differences as rows, one a published number, for CSV and JSON.

@@ -48,7 +48,7 @@ std::string beside(const std::vector<Difference>& differences, std::size_t case_
                      signed_number(*found->percent(), 2));
 }
 
-void print_forces(std::ostream& out, Format format, const PublishedTable& published,
+void print_forces(std::ostream& out, const PublishedTable& published,
                   const std::vector<Difference>& differences) {
   constexpr std::array<const char*, 3> kPeaks{"1st", "2nd", "3rd"};
   out << "Peaks of the contact forces (Tab. 2): ours / published [kN] / difference [%]\n\n";
@@ -68,10 +68,10 @@ void print_forces(std::ostream& out, Format format, const PublishedTable& publis
       }
     }
   }
-  print(out, table, format);
+  print(out, table, Format::kTable);
 }
 
-void print_durations(std::ostream& out, Format format, const PublishedTable& published,
+void print_durations(std::ostream& out, const PublishedTable& published,
                      const std::vector<Difference>& differences) {
   out << "\nDurations of compression and restitution (section 4.2): ours / published [ms] / "
          "difference [%]\n\n";
@@ -86,10 +86,10 @@ void print_durations(std::ostream& out, Format format, const PublishedTable& pub
       add_value(row, beside(differences, i, Quantity::kPhase, phase, 3));
     }
   }
-  print(out, table, format);
+  print(out, table, Format::kTable);
 }
 
-void print_sticks(std::ostream& out, Format format, const PublishedTable& published,
+void print_sticks(std::ostream& out, const PublishedTable& published,
                   const std::vector<Difference>& differences) {
   out << "\nTime in stick (section 4.3): ours / published [ms] / difference [%]\n\n";
   protocol::QueryReply table;
@@ -101,7 +101,7 @@ void print_sticks(std::ostream& out, Format format, const PublishedTable& publis
       add_value(row, beside(differences, i, Quantity::kStick, 0, 3));
     }
   }
-  print(out, table, format);
+  print(out, table, Format::kTable);
 }
 
 std::string place_of(const PublishedCase& in) {
@@ -134,8 +134,7 @@ void print_other_modes(std::ostream& out, const PublishedTable& published, const
   out << (others.empty() ? ".\n" : ". It is another one, with other peaks, at\n\n" + others);
 }
 
-void print_modes_table(std::ostream& out, Format format, const PublishedTable& published,
-                       const Own& own) {
+void print_modes_table(std::ostream& out, const PublishedTable& published, const Own& own) {
   out << "Peaks and modes, ripples merged (Figs. 4 to 6)\n\n";
   protocol::QueryReply table;
   add_header(table, {"H", "mu", "e*", "peaks", "published", "mode", "published mode"});
@@ -153,7 +152,7 @@ void print_modes_table(std::ostream& out, Format format, const PublishedTable& p
                        ? std::string("the same")
                        : published.cases[i].mode);
   }
-  print(out, table, format);
+  print(out, table, Format::kTable);
 }
 
 std::string place_of(const PublishedTable& published, const Difference& difference) {
@@ -205,19 +204,18 @@ void print_misprints(std::ostream& out, const PublishedTable& published) {
 
 }  // namespace
 
-void print_modes(std::ostream& out, Format format, const PublishedTable& table, const Own& own) {
-  print_modes_table(out, format, table, own);
+void print_modes(std::ostream& out, const PublishedTable& table, const Own& own) {
+  print_modes_table(out, table, own);
   print_other_modes(out, table, own);
 }
 
-void print_comparison(std::ostream& out, Format format, const PublishedTable& table,
-                      const Own& own) {
+void print_comparison(std::ostream& out, const PublishedTable& table, const Own& own) {
   const auto differences = compare(table, own);
-  print_forces(out, format, table, differences);
-  print_durations(out, format, table, differences);
-  print_sticks(out, format, table, differences);
+  print_forces(out, table, differences);
+  print_durations(out, table, differences);
+  print_sticks(out, table, differences);
   out << '\n';
-  print_modes(out, format, table, own);
+  print_modes(out, table, own);
   print_differences_summary(out, table, differences);
   print_misprints(out, table);
 }

@@ -11,8 +11,8 @@
 #include "client/plot/figures/quantity.h"
 #include "proto/suggestion.h"
 #include "proto/text.h"
-#include "server/asking/columns.h"
-#include "server/asking/sql/sql_tokens.h"
+#include "server/query/columns.h"
+#include "server/query/sql_text.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
 

@@ -131,8 +131,7 @@ bool Drawing::is_logarithmic_by_study(const ChosenAxis& axis) {
 }
 
 ColourChoice Drawing::colours() const {
-  return {palette_named(request_.palette), request_.is_colour_logarithmic,
-          range_given(request_.range)};
+  return {request_.is_colour_logarithmic, range_given(request_.range)};
 }
 
 }  // namespace oblique::client::plot

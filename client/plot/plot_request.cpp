@@ -8,7 +8,7 @@
 
 #include "client/plot/axis_choice.h"
 #include "client/plot/drawing.h"
-#include "server/asking/sql/sql_expression.h"
+#include "server/query/sql_text.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::client::plot {
@@ -43,7 +43,6 @@ void check(const PlotRequest& request) {
         fmt::format("--block {} is not allowed: it must be the number of a block, from 1, or `all`",
                     request.block));
   }
-  (void)palette_named(request.palette);
   (void)range_given(request.range);
 }
 

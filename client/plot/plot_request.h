@@ -29,7 +29,6 @@ struct PlotRequest {
   bool is_y_logarithmic = false;
   bool is_colour_logarithmic = false;
   std::string range{};  ///< "FROM:TO"
-  std::string palette{"viridis"};
 };
 
 /// Throws solver::InputError, naming the flag, for what is wrong whatever the study is.

@@ -8,7 +8,7 @@
 #include "client/plot/data/gathered.h"
 #include "client/plot/drawing.h"
 #include "client/plot/figures/charts.h"
-#include "server/asking/columns.h"
+#include "server/query/columns.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::client::plot {

@@ -20,9 +20,9 @@
 #include "client/python/query_columns.h"
 #include "proto/oblique.pb.h"
 #include "proto/wire/cell.h"
-#include "server/asking/columns.h"
-#include "server/reading/query_rules.h"
-#include "server/reading/reader.h"
+#include "server/query/columns.h"
+#include "server/query/query_rules.h"
+#include "server/query/reader.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::python {

@@ -232,20 +232,14 @@ void Connection::check(const protocol::ClientReply& reply,
   }
 }
 
-protocol::SubmitReply Connection::submit(const Study& study, const StudyTerms& terms) {
+protocol::SubmitReply Connection::submit(const Study& study, const SubmitSettings& settings) {
   protocol::ClientRequest request;
   request.mutable_submit()->set_name(study.name);
   *request.mutable_submit()->mutable_recipe() = study.recipe;
-  if (terms.priority) {
-    request.mutable_submit()->set_priority(*terms.priority);
+  if (settings.priority) {
+    request.mutable_submit()->set_priority(*settings.priority);
   }
-  if (terms.weight) {
-    request.mutable_submit()->set_weight(*terms.weight);
-  }
-  if (terms.mixes_versions) {
-    request.mutable_submit()->set_mixes_versions(true);
-  }
-  request.mutable_submit()->set_fresh(terms.fresh);
+  request.mutable_submit()->set_no_reuse(settings.no_reuse);
   return call(std::move(request)).submit();
 }
 

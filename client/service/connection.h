@@ -47,13 +47,10 @@ class Interrupted : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// How a study uses the workers of its server.
-struct StudyTerms {
-  // What is not given stays as it is for a study that the server knows.
-  std::optional<std::int32_t> priority = {};  ///< studies of a higher one come first
-  std::optional<double> weight = {};          ///< share of the workers among those of one priority
-  bool mixes_versions = false;                ///< workers of any solver version take part
-  bool fresh = false;  ///< points are solved that other studies have solved, too
+struct SubmitSettings {
+  /// Studies of a higher one come first. Not given: a known study keeps its own, a new one has 0.
+  std::optional<std::int32_t> priority = {};
+  bool no_reuse = false;  ///< solves also the points of which other studies have results
 };
 
 /// Takes in a sentence for people.
@@ -82,7 +79,7 @@ class Connection {
 
   /// What the server says of itself, with one study at most.
   protocol::StatusReply greeting();
-  protocol::SubmitReply submit(const Study& study, const StudyTerms& terms = {});
+  protocol::SubmitReply submit(const Study& study, const SubmitSettings& settings = {});
   /// The study of that name, or all of them when it is empty, however many pages they fill.
   protocol::StatusReply status(const std::string& study, const Tell& tell = {});
   /// The same of one study by its number, whatever it is called by now; `study` is for older

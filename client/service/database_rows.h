@@ -1,7 +1,7 @@
 #pragma once
 
 #include "client/service/source.h"
-#include "server/reading/reader.h"
+#include "server/query/reader.h"
 
 namespace oblique::client {
 

@@ -2,7 +2,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "server/asking/sql/sql_expression.h"
+#include "server/query/sql_text.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::client {

@@ -46,15 +46,14 @@ std::string objection_to_waiting(const protocol::StudyStatus& status) {
     return fmt::format("somebody has paused \"{}\": the same command again goes on with it",
                        status.name());
   }
-  if (status.state() != "running" || status.mixes_versions() || status.solver_version().empty() ||
+  if (status.state() != "running" || status.solver_version().empty() ||
       status.solver_version() == own || status.leased() > 0) {
     return {};
   }
   return fmt::format(
       "the results of \"{0}\" are of solver {1}, and the workers here have {2}: nobody here may "
-      "solve "
-      "its other {3} points. Go on with --mix-versions, where each row says which solver it is of, "
-      "with workers of {1}, or under another name, as --name {0}-{2}",
+      "solve its other {3} points. Go on with workers of {1}, or under another name, as --name "
+      "{0}-{2}",
       status.name(), status.solver_version(), own,
       shown_count(status.points() - status.solved() - status.failed()));
 }
@@ -99,7 +98,7 @@ RunEnd submit_and_wait(const Study& study, const RunSettings& settings, Embedded
   where.key = service.client_key();
   where.if_silent = why_silent(settings.service.database);
   Connection connection(where, look_after);
-  const auto submitted = connection.submit(study, settings.terms);
+  const auto submitted = connection.submit(study, {.no_reuse = settings.no_reuse});
   if (submitted.created()) {
     tell_mesh(std::cerr, study.recipe);
   } else {

@@ -18,7 +18,7 @@ namespace oblique::client {
 /// How `run` runs a study, and `paper` its cases.
 struct RunSettings {
   ServiceSettings service{.database = DatabaseSettings().file};
-  StudyTerms terms;
+  bool no_reuse = false;   ///< as in SubmitSettings
   std::int64_t rows = 30;  ///< most rows of results asked for at the end
 };
 

@@ -9,7 +9,7 @@
 #include "proto/text.h"
 #include "proto/wire/chunk_writer.h"
 #include "server/database/database_in_use.h"
-#include "server/reading/reader.h"
+#include "server/query/reader.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::client {

@@ -14,7 +14,7 @@
 #include "client/service/watch_teller.h"
 #include "proto/program/exit_code.h"
 #include "proto/text.h"
-#include "server/asking/sql/sql_expression.h"
+#include "server/query/sql_text.h"
 
 namespace oblique::client {
 namespace {
@@ -162,7 +162,7 @@ std::string taken_over(const protocol::TakenOver& taken) {
 protocol::QueryReply table_of(const std::vector<protocol::StudyStatus>& studies) {
   protocol::QueryReply table;
   for (const char* column : {"study", "state", "points", "solved", "failed", "leased",
-                             "points_per_s", "created_at", "priority", "weight", "waits_for"}) {
+                             "points_per_s", "created_at", "priority", "waits_for"}) {
     table.add_columns(column);
   }
   const bool any_taken = std::any_of(studies.begin(), studies.end(),
@@ -180,7 +180,6 @@ protocol::QueryReply table_of(const std::vector<protocol::StudyStatus>& studies)
     add_value(row, study.points_per_s());
     add_value(row, study.created_at());
     add_value(row, static_cast<std::int64_t>(study.priority()));
-    add_value(row, study.weight());
     add_value(row, study.waits_for());
     if (any_taken) {
       add_value(row, static_cast<std::int64_t>(study.taken().points()));

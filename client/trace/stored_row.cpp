@@ -1,91 +1,80 @@
 #include "client/trace/stored_row.h"
 
 #include <algorithm>
-#include <filesystem>
-#include <memory>
-#include <stdexcept>
+#include <cmath>
+#include <cstddef>
+#include <span>
+#include <string_view>
+#include <type_traits>
 #include <utility>
-
-#include <stdlib.h>
+#include <variant>
 
 #include <spdlog/fmt/fmt.h>
+#include <nlohmann/json.hpp>
 
-#include "proto/recipe/model_message.h"
-#include "proto/recipe/point_table.h"
-#include "proto/result_message.h"
-#include "server/asking/sql/sql_expression.h"
-#include "server/database/sqlite.h"
-#include "server/reading/reader.h"
-#include "server/store/store.h"
+#include "server/query/sql_text.h"
 #include "worker/solver/model/result_fields.h"
 
 namespace oblique::client {
 namespace {
 
+using nlohmann::json;
 using protocol::Value;
 
-constexpr const char* kStudyOfOne = "one";
+/// A database keeps 8 digits of numbers in lists.
+bool is_kept_as(const json& stored, const solver::Cell& cell) {
+  constexpr double kHalfOfTheLastDigit = 5.1e-8;
+  if (const auto* text = std::get_if<std::string_view>(&cell)) {
+    return stored == *text;
+  }
+  const bool* const flag = std::get_if<bool>(&cell);
+  const double value = flag != nullptr ? static_cast<double>(*flag) : std::get<double>(cell);
+  return stored.is_number() &&
+         std::abs(stored.get<double>() - value) <= kHalfOfTheLastDigit * std::abs(value);
+}
 
-/// A folder that is gone with this.
-class ShortLivedFolder {
- public:
-  ShortLivedFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "oblique-trace-XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) {
-      throw server::StorageError("no folder can be made in " +
-                                 std::filesystem::temp_directory_path().string());
+bool is_same_list(const Value& stored, const solver::ResultList& list,
+                  const solver::CaseResult& result) {
+  // A list without elements may be NULL.
+  const json elements =
+      stored.has_text() ? json::parse(stored.text(), nullptr, false) : json::array();
+  if (!elements.is_array()) {
+    return false;
+  }
+  std::size_t elements_seen = 0;
+  bool is_same = true;
+  list.each(result, [&](std::span<const solver::Cell> element) {
+    const json kept = elements_seen < elements.size() ? elements[elements_seen] : json();
+    is_same = is_same && kept.is_array() &&
+              std::equal(kept.begin(), kept.end(), element.begin(), element.end(), is_kept_as);
+    ++elements_seen;
+  });
+  return is_same && elements_seen == elements.size();
+}
+
+template <class T>
+bool is_same_scalar(const Value& stored, const T* value) {
+  if (value == nullptr) {
+    return stored.kind_case() == Value::KIND_NOT_SET;
+  }
+  if constexpr (std::is_same_v<T, double>) {
+    return stored.has_real() && stored.real() == *value;
+  } else if constexpr (std::is_same_v<T, std::string>) {
+    return stored.has_text() && stored.text() == *value;
+  } else {
+    return stored.has_integer() && stored.integer() == *value;
+  }
+}
+
+template <class T>
+void compare_scalars(const StoredRow& stored, const solver::CaseResult& result,
+                     std::vector<std::string>& differing) {
+  solver::for_each_sent<T>([&](const solver::ResultField& field, const solver::Member<T>& member) {
+    const auto value = stored.value(std::string(field.column));
+    if (field.name != "wall_s" && value && !is_same_scalar(*value, member.of(result))) {
+      differing.emplace_back(field.column);
     }
-    path_ = name;
-  }
-  ~ShortLivedFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  ShortLivedFolder(const ShortLivedFolder&) = delete;
-  ShortLivedFolder& operator=(const ShortLivedFolder&) = delete;
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
-
-protocol::Recipe recipe_of(const PointAtHand& point) {
-  protocol::Recipe recipe;
-  *recipe.mutable_model() = protocol::to_message(point.model);
-  recipe.set_errors(point.errors);
-  auto& block = *recipe.add_blocks();
-  for (const auto& [key, value] :
-       {std::pair{"H", point.H_m}, {"mu", point.mu}, {"e", point.e_star}}) {
-    auto& axis = *block.add_axes();
-    axis.set_key(key);
-    axis.add_values(value);
-  }
-  return recipe;
-}
-
-/// The row that this database has of a result when it is stored.
-StoredRow row_once_stored(const PointAtHand& point, const solver::CaseResult& result) {
-  constexpr std::uint64_t kStudy = 1;
-  constexpr const char* kAnyTime = "2000-01-01T00:00:00.000Z";
-  const ShortLivedFolder folder;
-  const std::string file = (folder.path() / "one.db").string();
-  server::Store store(file);
-  const auto table = std::make_shared<const protocol::PointTable>(recipe_of(point));
-  const std::vector<server::Change> changes{server::AddStudy{kStudy, kStudyOfOne, table, kAnyTime},
-                                            server::AddResults{kStudy,
-                                                               table,
-                                                               0,
-                                                               result.solver.version,
-                                                               "",
-                                                               1,
-                                                               kAnyTime,
-                                                               {protocol::to_message(0, result)}}};
-  store.commit(changes);
-  return StoredRow(server::Reader(file).query("SELECT * FROM runs", server::kNoLimits));
-}
-
-bool is_same(const Value& a, const Value& b) {
-  return a.SerializeAsString() == b.SerializeAsString();
+  });
 }
 
 }  // namespace
@@ -109,37 +98,22 @@ std::optional<StoredRow> stored_row(Source& source, const std::string& study, st
   return rows.rows().empty() ? std::nullopt : std::optional(StoredRow(std::move(rows)));
 }
 
-std::vector<std::string> differences(const StoredRow& stored, const PointAtHand& point,
-                                     const solver::CaseResult& result) {
-  const StoredRow again = row_once_stored(point, result);
+std::vector<std::string> differences(const StoredRow& stored, const solver::CaseResult& result) {
   std::vector<std::string> columns;
-  const auto compare = [&](std::string_view name) {
-    const std::string column(name);
-    const auto before = stored.value(column);
-    const auto now = again.value(column);
-    if (before && now && !is_same(*before, *now)) {
-      columns.push_back(column);
-    }
-  };
-  for (const auto& field : solver::result_fields()) {
-    if (field.sent_with == solver::SentWith::kResult && field.name != "wall_s") {
-      compare(field.column);
-    }
-  }
-  for (const auto* list : solver::result_lists()) {
-    if (solver::find_result_column(list->column) == nullptr) {
-      compare(list->column);
+  compare_scalars<double>(stored, result, columns);
+  compare_scalars<std::int64_t>(stored, result, columns);
+  compare_scalars<std::string>(stored, result, columns);
+  for (const solver::ResultList* list : solver::result_lists()) {
+    const auto value = stored.value(std::string(list->column));
+    if (value && !is_same_list(*value, *list, result)) {
+      columns.emplace_back(list->column);
     }
   }
   return columns;
 }
 
-std::string differences_in_words(const StoredRow& stored, const PointAtHand& point,
-                                 const solver::CaseResult& result) {
-  std::string names;
-  for (const auto& column : differences(stored, point, result)) {
-    names += (names.empty() ? "" : ", ") + column;
-  }
+std::string differences_in_words(const StoredRow& stored, const solver::CaseResult& result) {
+  const std::string names = fmt::format("{}", fmt::join(differences(stored, result), ", "));
   const std::string stored_version = stored.text("solver_version");
   const std::string& version = result.solver.version;
   return names.empty() ? names

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "client/service/source.h"
-#include "client/trace/point_at_hand.h"
 #include "proto/oblique.pb.h"
 #include "worker/solver/model/case_result.h"
 
@@ -31,16 +30,12 @@ class StoredRow {
 /// The row of that point; nothing: it is not solved yet.
 std::optional<StoredRow> stored_row(Source& source, const std::string& study, std::uint64_t point);
 
-/// The outputs, by column, in which the stored row is another one than `result`, the same point
-/// solved again. A database keeps the digits that outputs are accurate to: the result is stored, in
-/// a database of its own that is gone afterwards, and what comes out of both is compared bit by
-/// bit. Left out is what differs from run to run: the time that it took. Throws
-/// server::StorageError when nothing can be stored here.
-std::vector<std::string> differences(const StoredRow& stored, const PointAtHand& point,
-                                     const solver::CaseResult& result);
+/// The outputs, by column, in which the stored row differs from `result`, the same point solved
+/// again: scalars in any bit, numbers in lists in one of the 8 digits that a database keeps. The
+/// time that the solver took is left out.
+std::vector<std::string> differences(const StoredRow& stored, const solver::CaseResult& result);
 
 /// The same for people: "fn_peak_N, mode: stored by solver 0.1, now by 0.2"; empty: there are none.
-std::string differences_in_words(const StoredRow& stored, const PointAtHand& point,
-                                 const solver::CaseResult& result);
+std::string differences_in_words(const StoredRow& stored, const solver::CaseResult& result);
 
 }  // namespace oblique::client

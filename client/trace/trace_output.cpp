@@ -20,12 +20,11 @@
 namespace oblique::client {
 namespace {
 
-constexpr std::array<std::string_view, 3> kFormats{"csv", "json", "npz"};
+constexpr std::array<std::string_view, 2> kFormats{"csv", "json"};
 
 std::optional<TraceFormat> format_called(std::string_view name) {
   return name == kFormats[0]   ? std::optional(TraceFormat::kCsv)
          : name == kFormats[1] ? std::optional(TraceFormat::kJson)
-         : name == kFormats[2] ? std::optional(TraceFormat::kNpz)
                                : std::nullopt;
 }
 
@@ -54,8 +53,8 @@ TraceFormat trace_format(const std::string& flag, const std::string& file) {
     return of_file.value_or(TraceFormat::kCsv);
   }
   throw solver::InputError(
-      fmt::format("--out {} does not say in which format: end its name in .csv, .json or .npz, or "
-                  "give --format",
+      fmt::format("--out {} does not say in which format: end its name in .csv or .json, or give "
+                  "--format",
                   file));
 }
 
@@ -64,11 +63,6 @@ TraceOutput::TraceOutput(std::string file, TraceFormat format, std::string_view 
   if (!path_.empty()) {
     sink_ = std::make_unique<NewFile>(path_, flag);
     return;
-  }
-  if (format_ == TraceFormat::kNpz && fills_terminal()) {
-    throw solver::InputError(
-        "--format npz is not text, and standard output is a terminal: write it to a file with "
-        "--out FILE.npz");
   }
   sink_ = std::make_unique<StandardOutput>();
 }
@@ -81,26 +75,17 @@ void TraceOutput::begin(const solver::TraceShape& shape) {
   shape_ = shape;
   if (format_ == TraceFormat::kCsv) {
     append_trace_header(sink_->held(), shape);
-  } else if (format_ == TraceFormat::kNpz) {
-    // The file's own disk has the room that it needs, or it finds none there either.
-    archive_ = std::make_unique<TraceArchive>(shape, path_.empty() ? "" : scratch_folder(path_));
   }
 }
 
 void TraceOutput::add(const solver::TraceRow& row) {
-  switch (format_) {
-    case TraceFormat::kCsv:
-      append_trace_row(sink_->held(), row);
-      sink_->flush_if_long();
-      break;
-    case TraceFormat::kNpz:
-      archive_->add(row);
-      break;
-    case TraceFormat::kJson:
-      ++rows_;
-      solver::append_numbers(row, numbers_);
-      states_.push_back(row.state);
-      break;
+  if (format_ == TraceFormat::kCsv) {
+    append_trace_row(sink_->held(), row);
+    sink_->flush_if_long();
+  } else {
+    ++rows_;
+    solver::append_numbers(row, numbers_);
+    states_.push_back(row.state);
   }
 }
 
@@ -132,8 +117,6 @@ void TraceOutput::finish(const PointAtHand& point,
                          const std::optional<solver::CaseResult>& result) {
   if (format_ == TraceFormat::kJson) {
     print_json(point, result);
-  } else if (format_ == TraceFormat::kNpz) {
-    archive_->write(*sink_);
   }
   sink_->finish();
 }

@@ -10,13 +10,12 @@
 
 #include "client/formats/sink.h"
 #include "client/trace/point_at_hand.h"
-#include "client/trace/trace_archive.h"
 #include "worker/solver/model/case_result.h"
 #include "worker/solver/model/trace_columns.h"
 
 namespace oblique::client {
 
-enum class TraceFormat { kCsv, kJson, kNpz };
+enum class TraceFormat { kCsv, kJson };
 
 /// The format that a flag names or, where it is empty, the end of the file's name; CSV unless told.
 /// Throws solver::InputError for other names, and for a file whose name ends as another format.
@@ -28,8 +27,7 @@ std::span<const std::string_view> trace_format_names();
 /// standard output.
 class TraceOutput {
  public:
-  /// `flag` named the file. Throws solver::InputError when the file cannot be written, and for
-  /// NumPy's archive on a terminal.
+  /// `flag` named the file. Throws solver::InputError when the file cannot be written.
   TraceOutput(std::string file, TraceFormat format, std::string_view flag = "--out");
 
   /// Whether its rows come to where progress is shown.
@@ -47,7 +45,6 @@ class TraceOutput {
   std::string path_;
   TraceFormat format_;
   std::unique_ptr<Sink> sink_;
-  std::unique_ptr<TraceArchive> archive_;  // of NumPy
   solver::TraceShape shape_;
   std::size_t rows_ = 0;
   std::vector<double> numbers_;      // of all rows, for JSON

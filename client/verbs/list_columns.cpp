@@ -10,7 +10,7 @@
 #include "client/verbs/printed_rows.h"
 #include "client/verbs/verbs.h"
 #include "proto/suggestion.h"
-#include "server/asking/columns.h"
+#include "server/query/columns.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/trace_columns.h"
 

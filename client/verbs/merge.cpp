@@ -89,9 +89,8 @@ void tell(const std::string& source, const std::string& target, const server::Me
     std::cerr << fmt::format("; {} were there already", shown_count(merged.results_known));
   }
   if (merged.results_differing > 0) {
-    std::cerr << fmt::format(
-        ", {} of these with other numbers or of another solver version: those of {} stay",
-        shown_count(merged.results_differing), target);
+    std::cerr << fmt::format(", {} of these with other numbers: those of {} stay",
+                             shown_count(merged.results_differing), target);
   }
   std::cerr << ".\n";
   for (const std::string& remark : merged.remarks) {
@@ -146,8 +145,6 @@ void add_merge(CLI::App& app, Command& command) {
   verb->add_option("--rename-prefix", flags->settings.rename_prefix,
                    "goes before the names of studies whose names other recipes have")
       ->type_name("PREFIX");
-  verb->add_flag("--mix-versions", flags->settings.mixes_versions,
-                 "unite studies whose results come from different solver versions");
   verb->add_flag("--allow-network-disk", flags->allow_network_disk,
                  "take a --db on a network file system, where a second machine could damage it");
   verb->callback([flags, &command] { command = [flags] { return merge(*flags); }; });

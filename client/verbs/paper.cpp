@@ -19,7 +19,7 @@
 #include "client/verbs/verbs.h"
 #include "proto/program/choices.h"
 #include "proto/suggestion.h"
-#include "server/asking/sql/sql_expression.h"
+#include "server/query/sql_text.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/parameters.h"
 
@@ -30,7 +30,6 @@ constexpr const char* kPaperExamples = R"(Examples:
   oblique paper
   oblique paper --preset converged --modes  where the paper's modes come of its mesh
   oblique paper --preset printed
-  oblique paper --format markdown           the tables of README.md
   oblique paper --db oblique.db --study paper
   oblique paper --format csv > differences.csv
   oblique paper --figures figures           Figs. 3 to 7 as SVG files in that folder)";
@@ -99,11 +98,10 @@ int paper(const PaperFlags& flags) {
   const auto format = format_named(flags.format);
   const auto published = published_table();
   const auto own = cases_of(published, flags);
-  const bool is_for_people = format == Format::kTable || format == Format::kMarkdown;
-  if (is_for_people && flags.modes) {
-    print_modes(std::cout, format, published, own);
-  } else if (is_for_people) {
-    print_comparison(std::cout, format, published, own);
+  if (format == Format::kTable && flags.modes) {
+    print_modes(std::cout, published, own);
+  } else if (format == Format::kTable) {
+    print_comparison(std::cout, published, own);
   } else {
     print_out(rows_of(published, compare(published, own)), format);
   }

@@ -3,7 +3,6 @@
 #include <vector>
 
 #include "client/plot/block_choice.h"
-#include "client/plot/draw/palette.h"
 #include "client/plot/plot_request.h"
 #include "client/service/source_flags.h"
 #include "client/service/watching.h"
@@ -133,10 +132,6 @@ void add_plot(CLI::App& app, Command& command) {
   add_text(*verb, "--range", request.range,
            "values that colours span, or the vertical axis of --lines, or the bins of --histogram",
            "FROM:TO");
-  auto* palette =
-      add_text(*verb, "--palette", request.palette, "colours of maps: viridis or cividis", "NAME")
-          ->capture_default_str();
-  protocol::note_choices(palette, plot::palette_names());
   add_picture_flags(*verb, flags->picture);
   add_point_picture_flags(*verb, flags->point, command.names_single_lengths);
   for (const char* of_study :

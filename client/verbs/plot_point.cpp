@@ -142,7 +142,7 @@ void compare(SolvedAgain& solved, const std::optional<StoredRow>& stored) {
         "row.");
     return;
   }
-  const auto others = differences_in_words(*stored, solved.point, *solved.history.result);
+  const auto others = differences_in_words(*stored, *solved.history.result);
   if (!others.empty()) {
     solved.history.remarks.push_back(
         fmt::format("Solved again, it is other than stored in {}.", others));

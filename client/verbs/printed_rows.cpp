@@ -16,12 +16,12 @@
 #include "proto/text.h"
 #include "proto/wire/chunk_rows.h"
 #include "proto/wire/chunk_writer.h"
-#include "server/asking/columns.h"
+#include "server/query/columns.h"
 
 namespace oblique::client {
 
 void add_format_flag(CLI::App& verb, std::string& format) {
-  auto* option = verb.add_option("--format", format, "table, csv, json, jsonl, npz or markdown")
+  auto* option = verb.add_option("--format", format, "table, csv, json or jsonl")
                      ->type_name("FORMAT")
                      ->capture_default_str();
   protocol::note_choices(option, format_names());
@@ -29,8 +29,8 @@ void add_format_flag(CLI::App& verb, std::string& format) {
 
 void add_output_flags(CLI::App& verb, OutputFlags& flags) {
   auto* format = verb.add_option("--format", flags.format,
-                                 "table, csv, json, jsonl, npz or markdown; default: as the "
-                                 "name of --out ends, else table")
+                                 "table, csv, json or jsonl; default: as the name of --out "
+                                 "ends, else table; the Python module returns NumPy arrays")
                      ->type_name("FORMAT");
   protocol::note_choices(format, format_names());
   verb.add_option("--out", flags.file, "output file, written atomically")->type_name("FILE");
@@ -47,16 +47,11 @@ int print_stream(RowStream& stream, const OutputFlags& flags, bool in_shown_unit
   const Format format = format_of(flags);
   // Nothing is begun, and no file, before there is a first answer.
   protocol::QueryReply chunk = stream.next();
-  std::vector<protocol::CellKind> usual;
-  for (const auto& column : chunk.columns()) {
-    usual.push_back(server::kind_of_values(column));
-  }
   RowOutput out({.format = format,
                  .file = flags.file,
                  .may_page = !flags.no_pager,
                  .way_to_all = way_to_all,
-                 .shown = in_shown_units ? shown_columns(chunk) : std::vector<ShownColumn>(),
-                 .usual = std::move(usual)});
+                 .shown = in_shown_units ? shown_columns(chunk) : std::vector<ShownColumn>()});
   try {
     out.print(chunk);
     std::uint64_t rows = chunk.chunk_rows();

@@ -13,8 +13,7 @@
 #include "client/verbs/verbs.h"
 #include "proto/program/usage.h"
 #include "proto/text.h"
-#include "server/asking/sql/sql_items.h"
-#include "server/asking/sql/sql_tokens.h"
+#include "server/query/sql_text.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::client {

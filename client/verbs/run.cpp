@@ -60,13 +60,11 @@ void add_run(CLI::App& app, Command& command) {
   verb->add_option("--db", flags->settings.service.database, "database, made when it is not there")
       ->type_name("FILE")
       ->capture_default_str();
-  verb->add_flag("--mix-versions", flags->settings.terms.mixes_versions,
-                 "go on with a study although another solver version began it");
   verb->add_flag(
       "--allow-network-disk", flags->settings.service.allow_network_disk,
       "take a database on a network file system, where a second machine could damage it");
   verb->add_flag(
-      "--no-reuse", flags->settings.terms.fresh,
+      "--no-reuse", flags->settings.no_reuse,
       "solve every point, also those of which another study of the database has the result");
   add_worker_flags(*verb, flags->settings);
   verb->add_option("--rows", flags->settings.rows, "most rows of the table shown at the end")

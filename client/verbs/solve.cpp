@@ -24,7 +24,6 @@ constexpr const char* kSolveExamples = R"(Examples:
   oblique solve --H 1 --mu 1.2 --e 0.8 --json
   oblique solve --H 1 --mu 1.2 --e 0.8 --errors
   oblique solve --H 1 --mu 0.4 --e 1 --trace impact.csv --trace-shape
-  oblique solve --H 1 --mu 0.4 --e 1 --trace impact.npz
   oblique solve --H 1 --mu 0.4 --e 1 --trace - > impact.csv
   oblique solve --H 0.6 --mu 0.4 --e 1 --preset converged --lengths 0.4,0.4,0.2)";
 
@@ -57,8 +56,7 @@ TraceOutput trace_output(const std::string& where, bool json) {
     throw solver::InputError(
         "--trace - and --json both write to standard output: give the trace a file");
   }
-  return {where == kStandardOutput ? "" : where,
-          where.ends_with(".npz") ? TraceFormat::kNpz : TraceFormat::kCsv, "--trace"};
+  return {where == kStandardOutput ? "" : where, TraceFormat::kCsv, "--trace"};
 }
 
 /// Said before values are judged, which would speak of the largest of them.
@@ -114,9 +112,8 @@ void add_solve(CLI::App& app, Command& command) {
   verb->footer(kSolveExamples);
   verb->add_flag("--json", flags->json, "print the result as one JSON object (SI units)");
   auto* trace = verb->add_option("--trace", flags->trace,
-                                 "write the time histories of the contact to FILE (CSV, or "
-                                 "NumPy's archive where it ends in .npz; SI units); - is standard "
-                                 "output")
+                                 "write the time histories of the contact to FILE (CSV, SI "
+                                 "units); - is standard output")
                     ->type_name("FILE");
   verb->add_flag("--trace-shape", flags->trace_shape,
                  "add the positions of the chain's nodes to the trace")

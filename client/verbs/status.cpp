@@ -37,19 +37,11 @@ void add_details(protocol::QueryReply& table, const std::vector<protocol::StudyS
   table.add_columns("submitted_by");
   table.add_columns("access");
   table.add_columns("solver_version");
-  table.add_columns("mixes_versions");
   for (int i = 0; i < table.rows_size(); ++i) {
     add_value(*table.mutable_rows(i), studies.at(static_cast<std::size_t>(i)).submitted_by());
     add_value(*table.mutable_rows(i), access);
     add_value(*table.mutable_rows(i), studies.at(static_cast<std::size_t>(i)).solver_version());
-    add_value(*table.mutable_rows(i),
-              std::int64_t{studies.at(static_cast<std::size_t>(i)).mixes_versions() ? 1 : 0});
   }
-}
-
-/// The solver of a study's results, or that it takes any.
-std::string version_of(const protocol::StudyStatus& study) {
-  return study.mixes_versions() ? "mixed" : study.solver_version();
 }
 
 int percent_done(const protocol::StudyStatus& study) {
@@ -65,8 +57,9 @@ protocol::QueryReply table_for_people(const std::vector<protocol::StudyStatus>& 
   const bool any_failed = std::any_of(studies.begin(), studies.end(),
                                       [](const auto& study) { return study.failed() > 0; });
   // A file does not say it.
-  const bool any_version = std::any_of(
-      studies.begin(), studies.end(), [](const auto& study) { return !version_of(study).empty(); });
+  const bool any_version = std::any_of(studies.begin(), studies.end(), [](const auto& study) {
+    return !study.solver_version().empty();
+  });
   protocol::QueryReply table;
   for (const char* column : {"study", "state", "points", "done"}) {
     table.add_columns(column);
@@ -74,7 +67,7 @@ protocol::QueryReply table_for_people(const std::vector<protocol::StudyStatus>& 
   if (any_failed) {
     table.add_columns("failed");
   }
-  for (const char* column : {"points/s", "prio", "weight"}) {
+  for (const char* column : {"points/s", "prio"}) {
     table.add_columns(column);
   }
   if (any_version) {
@@ -93,9 +86,8 @@ protocol::QueryReply table_for_people(const std::vector<protocol::StudyStatus>& 
     }
     add_value(row, study.points_per_s() > 0 ? shown_rate(study.points_per_s()) : std::string());
     add_value(row, static_cast<std::int64_t>(study.priority()));
-    add_value(row, study.weight());
     if (any_version) {
-      add_value(row, version_of(study));
+      add_value(row, study.solver_version());
     }
   }
   align_right(table, {"points", "done", "failed", "points/s"});
@@ -117,7 +109,7 @@ int status(const StatusFlags& flags) {
   const auto source = open_source(flags.source);
   const auto studies = source->status(flags.study);
   tell_if_insecure(source->access(), source->place());
-  if (is_for_people(format)) {
+  if (format == Format::kTable) {
     print_for_people(studies, format);
     return kDone;
   }

@@ -32,7 +32,7 @@ int studies(const StudiesFlags& flags) {
     add_value(row, study.name());
     add_value(row, study.state());
     for (const auto count : {study.points(), study.solved() + study.failed()}) {
-      if (is_for_people(format)) {
+      if (format == Format::kTable) {
         add_value(row, shown_count(count));
       } else {
         add_value(row, static_cast<std::int64_t>(count));
@@ -40,7 +40,7 @@ int studies(const StudiesFlags& flags) {
     }
     add_value(row, study.created_at());
   }
-  if (is_for_people(format)) {
+  if (format == Format::kTable) {
     align_right(table, {"points", "done"});
   }
   print_out(table, format);

@@ -19,9 +19,8 @@
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
 #include "proto/program/usage.h"
-#include "proto/recipe/written/study_terms.h"
+#include "proto/recipe/written/study_priority.h"
 #include "proto/text.h"
-#include "worker/solver/model/number.h"
 
 namespace oblique::client {
 namespace {
@@ -42,22 +41,19 @@ struct SubmitFlags {
   SourceFlags source;
   bool watch = false;
   std::optional<std::int64_t> rows;  ///< of the table shown at the end; watches too
-  StudyTerms terms;
+  SubmitSettings settings;
 };
 
 void tell_submitted(const Study& study, const protocol::SubmitReply& reply,
-                    const StudyTerms& terms) {
+                    const SubmitSettings& settings) {
   std::string known;
   if (!reply.created()) {
     known = reply.appended() > 0
                 ? fmt::format("; {} points are appended to it, which was {}",
                               shown_count(reply.appended()), protocol::visible(reply.was()))
                 : "; the server had it already";
-    if (terms.priority) {
-      known += fmt::format("; its priority is now {}", *terms.priority);
-    }
-    if (terms.weight) {
-      known += fmt::format("; its weight is now {}", solver::exact_number(*terms.weight));
+    if (settings.priority) {
+      known += fmt::format("; its priority is now {}", *settings.priority);
     }
   }
   if (const std::string taken = taken_over(reply.taken()); !taken.empty()) {
@@ -97,16 +93,12 @@ int watch(const Study& study, std::uint64_t study_id, std::int64_t rows,
   return tell_end(status, query);
 }
 
-void check(const StudyTerms& terms) {
-  const std::string priority = protocol::objection_to_priority(terms.priority.value_or(0));
-  const std::string weight = protocol::objection_to_weight(terms.weight.value_or(1.0));
-  if (!priority.empty() || !weight.empty()) {
-    throw solver::InputError(priority.empty() ? "--weight: " + weight : "--priority: " + priority);
-  }
-}
-
 int submit(const SubmitFlags& flags) {
-  check(flags.terms);
+  if (const std::string objection =
+          protocol::objection_to_priority(flags.settings.priority.value_or(0));
+      !objection.empty()) {
+    throw solver::InputError("--priority: " + objection);
+  }
   const auto study = study_of_flags(flags.study, tip_reach());
   judge_points(study);
   protocol::StopSignals stop;
@@ -114,8 +106,8 @@ int submit(const SubmitFlags& flags) {
   Connection connection(server, [&stop] { return !stop.requested(); });
   bool submitted = false;
   try {
-    const auto reply = connection.submit(study, flags.terms);
-    tell_submitted(study, reply, flags.terms);
+    const auto reply = connection.submit(study, flags.settings);
+    tell_submitted(study, reply, flags.settings);
     if (reply.created()) {
       tell_mesh(std::cerr, study.recipe);
     }
@@ -145,20 +137,12 @@ void add_submit(CLI::App& app, Command& command) {
                    "watch, and show a table with so many rows at most when the study is done")
       ->check(protocol::whole_number_from(0))
       ->type_name("N");
-  verb->add_option("--priority", flags->terms.priority,
+  verb->add_option("--priority", flags->settings.priority,
                    fmt::format("studies of a higher priority come first, {}; 0 unless told",
                                protocol::allowed_priorities()))
       ->type_name("N");
-  verb->add_option(
-          "--weight", flags->terms.weight,
-          fmt::format("share of the workers among studies of one priority, {}; 1 unless told",
-                      protocol::allowed_weights()))
-      ->type_name("W");
-  verb->add_flag("--mix-versions", flags->terms.mixes_versions,
-                 "workers of any solver version take part; the column solver_version says which "
-                 "solved a point");
   verb->add_flag(
-      "--no-reuse", flags->terms.fresh,
+      "--no-reuse", flags->settings.no_reuse,
       "solve every point, also those of which another study of the database has the result");
   add_study_flags(*verb, flags->study, command.names_single_lengths);
   verb->callback([flags, &command] { command = [flags] { return submit(*flags); }; });

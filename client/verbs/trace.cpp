@@ -25,14 +25,13 @@ namespace {
 
 constexpr const char* kTraceExamples = R"(Examples:
   oblique trace paper 3 > point3.csv
-  oblique trace paper 3 --out point3.npz --shape --fall
+  oblique trace paper 3 --out point3.csv --shape --fall
   oblique trace paper 3 --format json > point3.json
   oblique trace paper 3 --server tcp://127.0.0.1:7600 --on-worker --out point3.csv
 
 The point is solved again with the model of its study, here when the database is a file and by a
 worker of the server otherwise, and held against the stored row: standard error says whether they
-are the same. `oblique columns --trace` says what the columns of a trace mean. NumPy's archive has
-an array a column, a["fn_N"], and the nodes of --shape as one, a["nodes_m"][instant, node, 0 or 1].)";
+are the same. `oblique columns --trace` says what the columns of a trace mean.)";
 
 struct TraceFlags {
   std::string study;
@@ -131,7 +130,7 @@ void tell_comparison(const std::optional<StoredRow>& stored, const Solved& solve
     tell_line(again + ". Its outputs are others than this program knows: not compared.");
     return;
   }
-  const auto others = differences_in_words(*stored, solved.point, *solved.result);
+  const auto others = differences_in_words(*stored, *solved.result);
   tell_line(others.empty() ? again + ", same as stored."
                            : fmt::format("{}, other than stored in {}.", again, others));
 }
@@ -190,8 +189,8 @@ void add_trace(CLI::App& app, Command& command) {
   verb->add_option("--out", flags->out, "file that is written; standard output when left out")
       ->type_name("FILE");
   auto* format = verb->add_option("--format", flags->format,
-                                  "csv, json or npz; as the file's name ends when left out, "
-                                  "else csv")
+                                  "csv or json; as the file's name ends when left out, else "
+                                  "csv; the Python module returns NumPy arrays")
                      ->type_name("FORMAT");
   protocol::note_choices(format, trace_format_names());
   verb->add_flag("--shape", flags->shape, "add the positions of the chain's nodes");

@@ -165,7 +165,7 @@ int workers(const WorkersFlags& flags) {
     const auto settings = connection_settings(flags.source);
     const auto reply = Connection(settings).workers();
     tell_if_insecure(reply.access(), settings.server_url);
-    print_out(is_for_people(format) ? table_for_people(reply) : full_table(reply), format);
+    print_out(format == Format::kTable ? table_for_people(reply) : full_table(reply), format);
     std::cout.flush();  // where both are one terminal, what follows stands below the table
     tell_access(reply);
     return kDone;

@@ -9,12 +9,37 @@
 namespace oblique::server {
 namespace {
 
+constexpr const char* kAfterFailedSync =
+    " (fsync): nothing more is stored, and the server ends. Once the disk works, start the server "
+    "again; workers that still run have kept what is not stored";
+
 constexpr const char* kWayOut =
     ": the file is damaged. `oblique check --db FILE` says where, and `oblique backup SAVED.db "
     "--db "
     "FILE --salvage` saves what can be read; points whose results are lost are then solved again";
 
+/// Throws the exception for a statement that failed with this code.
+[[noreturn]] void fail(sqlite3* database, int code, std::string reason) {
+  if (is_failed_sync(code)) {
+    throw_failed_sync(database);
+  }
+  if ((static_cast<unsigned>(code) & 0xffU) == SQLITE_CORRUPT) {
+    reason += kWayOut;
+  }
+  throw StorageError("the database failed: " + reason);
+}
+
 }  // namespace
+
+bool is_failed_sync(int code) {
+  return code == SQLITE_IOERR_FSYNC || code == SQLITE_IOERR_DIR_FSYNC;
+}
+
+void throw_failed_sync(sqlite3* database) {
+  const char* path = sqlite3_db_filename(database, "main");
+  throw StorageGone(std::string("the disk failed to store what was written to ") +
+                    (path != nullptr ? path : "the database") + kAfterFailedSync);
+}
 
 DatabaseHandle open_database(const std::string& path, int flags) {
   sqlite3* raw = nullptr;
@@ -38,12 +63,9 @@ void execute(sqlite3* database, const std::string& sql) {
   char* message = nullptr;
   const int code = sqlite3_exec(database, sql.c_str(), nullptr, nullptr, &message);
   if (code != SQLITE_OK) {
-    std::string reason = message != nullptr ? message : sqlite3_errmsg(database);
+    const std::string reason = message != nullptr ? message : sqlite3_errmsg(database);
     sqlite3_free(message);
-    if ((static_cast<unsigned>(code) & 0xffU) == SQLITE_CORRUPT) {
-      reason += kWayOut;
-    }
-    throw StorageError("the database refused a statement: " + reason);
+    fail(database, code, reason);
   }
 }
 
@@ -114,12 +136,9 @@ bool Statement::step() {
     return true;
   }
   if (code != SQLITE_DONE) {
-    std::string reason = sqlite3_errmsg(database_);
-    if ((static_cast<unsigned>(code) & 0xffU) == SQLITE_CORRUPT) {
-      reason += kWayOut;
-    }
+    const std::string reason = sqlite3_errmsg(database_);
     reset();
-    throw StorageError("the database failed: " + reason);
+    fail(database_, code, reason);
   }
   return false;
 }
@@ -212,10 +231,10 @@ DatabaseKind identify(sqlite3* database, const std::string& path) {
   if (version != kSchemaVersion) {
     throw StorageError(path + " has schema " + std::to_string(version) +
                        ", and this version of oblique has schema " +
-                       std::to_string(kSchemaVersion) + ": use the " +
+                       std::to_string(kSchemaVersion) + ": export its results with the " +
                        (version < kSchemaVersion ? "older" : "newer") +
-                       " version that wrote the file, read it with sqlite3, or solve its studies "
-                       "again into a new file");
+                       " version that wrote it (oblique query STUDY --db FILE --format csv), or "
+                       "solve its studies again into a new file");
   }
   return DatabaseKind::kOurs;
 }

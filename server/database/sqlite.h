@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <type_traits>
 
 #include <sqlite3.h>
 
@@ -18,12 +19,18 @@ class StorageError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The files of the database were deleted, renamed or replaced while it was open. Nothing that is
-/// written from then on is kept, and no later attempt will be.
+/// The file of the database was deleted, renamed or replaced while it was open, or a sync failed:
+/// nothing can be stored until the program starts again. After a failed sync Linux takes what it
+/// could not write for written, so that a second sync succeeds without having stored it.
 class StorageGone : public StorageError {
  public:
   using StorageError::StorageError;
 };
+
+/// Whether the extended result code is that of a failed fsync.
+bool is_failed_sync(int code);
+/// Throws StorageGone, which names the file of the connection.
+[[noreturn]] void throw_failed_sync(sqlite3* database);
 
 struct CloseDatabase {
   void operator()(sqlite3* database) const { sqlite3_close_v2(database); }
@@ -35,6 +42,11 @@ DatabaseHandle open_database(const std::string& path, int flags);
 
 /// Runs statements that return no rows. Throws StorageError.
 void execute(sqlite3* database, const std::string& sql);
+
+/// Bytes that are bound as a blob.
+struct Blob {
+  std::string_view bytes;
+};
 
 /// One prepared statement. Bindings count from 1, columns from 0, as in SQLite.
 class Statement {
@@ -52,6 +64,13 @@ class Statement {
   void bind_null(int index);
   /// The value, of whatever type, that another statement's row has in that column.
   void bind_column(int index, const Statement& row, int column);
+
+  /// Binds the values to the parameters 1, 2 and so on.
+  template <class... Values>
+  void bind_all(const Values&... values) {
+    int index = 0;
+    (bind_value(++index, values), ...);
+  }
 
   /// Advances: true when there is a row. Throws StorageError.
   bool step();
@@ -74,10 +93,28 @@ class Statement {
     void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
   };
   void check(int code) const;
+  template <class Value>
+  void bind_value(int index, const Value& value) {
+    if constexpr (std::is_integral_v<Value>) {
+      bind(index, static_cast<std::int64_t>(value));
+    } else if constexpr (std::is_same_v<Value, Blob>) {
+      bind_blob(index, value.bytes);
+    } else {
+      bind(index, value);
+    }
+  }
 
   sqlite3* database_;
   std::unique_ptr<sqlite3_stmt, Finalize> statement_;
 };
+
+/// Runs one statement without rows, with these values bound to its parameters. Throws StorageError.
+template <class... Values>
+void execute_with(sqlite3* database, std::string_view sql, const Values&... values) {
+  Statement statement(database, sql);
+  statement.bind_all(values...);
+  statement.run();
+}
 
 /// A transaction that rolls back unless it was committed.
 class Transaction {
@@ -97,7 +134,7 @@ class Transaction {
 
 /// The schema that this program writes, and the marks that tell its databases from others.
 inline constexpr std::int32_t kApplicationId = 0x6f626c71;  // "oblq"
-inline constexpr std::int32_t kSchemaVersion = 10;
+inline constexpr std::int32_t kSchemaVersion = 11;
 
 enum class DatabaseKind { kEmpty, kOurs };
 

@@ -6,7 +6,7 @@
 #include <variant>
 
 #include "proto/system/wake_up.h"
-#include "server/queries/query_pool.h"
+#include "server/query/query_pool.h"
 #include "server/service/outbox/request_reader.h"
 #include "server/store/writer.h"
 

@@ -1,9 +1,11 @@
 #include "server/maintenance/check.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cstdint>
-#include <limits>
-#include <span>
+#include <iterator>
+#include <map>
+#include <optional>
 #include <stdexcept>
 #include <string_view>
 #include <utility>
@@ -12,88 +14,70 @@
 #include <nlohmann/json.hpp>
 
 #include "proto/recipe/canonical.h"
-#include "proto/recipe/checks.h"
-#include "proto/recipe/point_table.h"
-#include "proto/result_message.h"
+#include "proto/recipe/written/study_name.h"
+#include "proto/recipe/written/study_priority.h"
 #include "server/database/open_for_reading.h"
 #include "server/database/row_checksum.h"
-#include "server/store/rows/recipe_check.h"
-#include "server/store/rows/row_columns.h"
-#include "server/store/rows/settled_runs.h"
-#include "server/store/schema/schema_setup.h"
+#include "server/store/completed_ranges.h"
+#include "server/store/recipe_check.h"
+#include "server/store/result_rows.h"
+#include "server/store/schema.h"
+#include "server/study/study_table.h"
+#include "worker/solver/model/result_fields.h"
 
 namespace oblique::server {
 namespace {
 
 constexpr std::size_t kMostOfAKind = 20;
 
-/// Appends the first column of at most `at_most` rows.
-void append(std::vector<std::string>& to, sqlite3* database, const std::string& sql,
-            std::size_t at_most = kMostOfAKind) {
+/// Appends the first column of the first rows.
+void append(std::vector<std::string>& to, sqlite3* database, const std::string& sql) {
   Statement rows(database, sql);
-  for (std::size_t i = 0; i < at_most && rows.step(); ++i) {
+  for (std::size_t i = 0; i < kMostOfAKind && rows.step(); ++i) {
     to.push_back(rows.text(0));
   }
 }
 
-void append(std::vector<std::string>& to, std::vector<std::string> faults) {
-  std::move(faults.begin(), faults.end(), std::back_inserter(to));
+void append(std::vector<std::string>& to, const std::vector<std::string>& faults) {
+  to.insert(to.end(), faults.begin(),
+            faults.begin() + static_cast<std::ptrdiff_t>(std::min(faults.size(), kMostOfAKind)));
 }
 
-/// References of our tables to rows that do not exist. Rows of a study that is being deleted have
-/// no study.
-std::vector<std::string> faults_of_references(sqlite3* database, std::size_t at_most) {
+/// A statement without its comments and spaces; quoted parts stay as they are.
+std::string without_comments(std::string_view sql) {
+  std::string rest;
+  for (std::size_t i = 0; i < sql.size(); ++i) {
+    if (sql[i] == '\'' || sql[i] == '"' || sql[i] == '`' || sql[i] == '[') {
+      const std::size_t end = std::min(sql.find(sql[i] == '[' ? ']' : sql[i], i + 1), sql.size());
+      rest += sql.substr(i, end + 1 - i);
+      i = end;
+    } else if (sql.substr(i, 2) == "--") {
+      i = std::min(sql.find('\n', i), sql.size());
+    } else if (std::isspace(static_cast<unsigned char>(sql[i])) == 0) {
+      rest += sql[i];
+    }
+  }
+  return rest;
+}
+
+/// Another definition could compute values without end, or take what no server stores.
+std::vector<std::string> faults_of_tables(sqlite3* database) {
   std::vector<std::string> faults;
-  for (const std::string& table : our_tables()) {
-    append(faults, database,
-           fmt::format("SELECT 'table {0}' || coalesce(', row ' || rowid, '') ||"
-                       " ': refers to a row of ' || parent || ' that does not exist'"
-                       " FROM pragma_foreign_key_check('{0}')"
-                       " WHERE parent <> 'studies' OR NOT EXISTS (SELECT 1 FROM deletions)",
-                       table),
-           at_most);
+  Statement find(database,
+                 "SELECT sql FROM sqlite_schema WHERE type = 'table' AND name = ? COLLATE NOCASE");
+  for (const TableDefinition& table : our_tables()) {
+    find.bind(1, table.name);
+    const bool is_there = find.step();
+    if (!is_there || without_comments(find.text(0)) != without_comments(table.sql)) {
+      faults.push_back(fmt::format(
+          "the table {} is {}: `oblique backup --salvage` makes a file "
+          "that has it, with all rows that can be read",
+          table.name,
+          is_there ? "not as servers make it" : "missing, and no server starts on this file"));
+    }
+    find.reset();
   }
-  append(faults, database,
-         "SELECT DISTINCT 'table packed_results: refers to study number ' || study_id ||"
-         " ', which does not exist' FROM packed_results WHERE EXISTS (SELECT 1 FROM deletions) AND"
-         " study_id NOT IN (SELECT study_id FROM studies UNION SELECT study_id FROM deletions)",
-         at_most);
   return faults;
-}
-
-/// Tables that other people made may have foreign keys that are violated or cannot be checked.
-void check_other_tables(sqlite3* database, Diagnosis& found) {
-  std::vector<std::string> tables;
-  append(tables, database, "SELECT name FROM sqlite_schema WHERE type = 'table'",
-         std::numeric_limits<std::size_t>::max());
-  for (const std::string& table : tables) {
-    if (std::count(our_tables().begin(), our_tables().end(), table) > 0) {
-      continue;
-    }
-    try {
-      Statement rows(database, "SELECT parent FROM pragma_foreign_key_check(?)");
-      rows.bind(1, std::string_view(table));
-      if (rows.step()) {
-        found.faults.push_back(fmt::format("table {}: refers to a row of {} that does not exist",
-                                           table, rows.text(0)));
-      }
-    } catch (const StorageError& error) {
-      found.remarks.push_back(fmt::format("the foreign keys of the table {} cannot be checked: {}",
-                                          table, error.what()));
-    }
-  }
-}
-
-/// Outputs that a row has or lacks without reason.
-std::string misplaced_outputs_sql() {
-  const auto number_missing = [](std::span<const std::string_view> columns) {
-    return fmt::format("(({} IS NULL))", fmt::join(columns, " IS NULL) + ("));
-  };
-  return fmt::format(
-      "SELECT 'study ' || study_id || ', point ' || point || CASE WHEN error IS NULL"
-      " THEN ': it is solved, and outputs are missing' ELSE ': it is failed, and has outputs' END"
-      " FROM packed_results WHERE CASE WHEN error IS NULL THEN {} > 0 ELSE {} < {} END",
-      number_missing(certain_outputs()), number_missing(packed_outputs()), packed_outputs().size());
 }
 
 /// The column that differs from the model's definition; empty: none.
@@ -114,14 +98,14 @@ std::string differing_column(const Statement& row, const solver::ModelParameters
   return {};
 }
 
-std::vector<std::string> faults_of_models(sqlite3* database, std::size_t at_most) {
+std::vector<std::string> faults_of_models(sqlite3* database) {
   std::vector<std::string> faults;
   std::string columns = "model_id, definition, lengths_m";
   for (const auto& key : solver::model_keys()) {
     columns += ", " + std::string(key.name);
   }
   Statement rows(database, "SELECT " + columns + " FROM models");
-  while (faults.size() < at_most && rows.step()) {
+  while (faults.size() < kMostOfAKind && rows.step()) {
     try {
       const std::string column = differing_column(rows, protocol::model_of_canonical(rows.text(1)));
       if (!column.empty()) {
@@ -136,84 +120,141 @@ std::vector<std::string> faults_of_models(sqlite3* database, std::size_t at_most
   return faults;
 }
 
-/// Compares each row of a study with its recipe.
-void check_rows(sqlite3* database, std::int64_t study_id, const std::string& name,
-                const protocol::PointTable& table, std::vector<std::string>& faults) {
-  RecipeCheck recipe(database, table);
-  Statement rows(database, fmt::format("SELECT {} FROM packed_results WHERE study_id = ?"
-                                       " ORDER BY point",
-                                       RecipeCheck::kColumns));
-  rows.bind(1, study_id);
-  while (faults.size() < kMostOfAKind && rows.step()) {
-    if (const std::string fault = recipe.fault_of(rows); !fault.empty()) {
-      faults.push_back(fmt::format("study {}, point {}: {}", name, rows.integer(0), fault));
+/// Checks studies one after the other, each with all its rows in one pass.
+class StudyCheck {
+ public:
+  StudyCheck(sqlite3* database, Diagnosis& found)
+      : database_(database),
+        found_(found),
+        noted_(noted_points(database)),
+        studies_(database, fmt::format("SELECT study_id, name, recipe, points, state, priority,"
+                                       " max(length(created_at), length(changed_at)),"
+                                       " checksum <> {} FROM studies ORDER BY study_id",
+                                       study_checksum_sql())),
+        rows_(database, fmt::format("SELECT {}, checksum IS NULL, coalesce({},"
+                                    " CASE WHEN model_id NOT IN (SELECT model_id FROM models)"
+                                    " THEN 'its model does not exist'"
+                                    " WHEN worker_id IS NOT NULL AND worker_id NOT IN"
+                                    " (SELECT worker_id FROM workers)"
+                                    " THEN 'its worker does not exist' END)"
+                                    " FROM results WHERE study_id = ? ORDER BY point",
+                                    RecipeCheck::kColumns, row_fault_sql())) {}
+
+  void run() {
+    while (studies_.step()) {
+      name_ = studies_.text(1);
+      if (studies_.integer(7) != 0) {
+        add_fault("its number, name, recipe or size is not the one that was stored");
+      }
+      check_terms();
+      const StudyTable table = read_table();
+      const IntervalSet points = check_rows(table);
+      check_completed(table, points);
+    }
+    append(found_.faults, study_faults_);
+    append(found_.faults, row_faults_);
+    if (without_checksum_ > 0) {
+      found_.remarks.push_back(
+          fmt::format("{} of {} results have no checksum: a flipped bit in them may go unseen",
+                      without_checksum_, all_rows_));
     }
   }
-}
 
-std::vector<std::string> faults_of_recipes(sqlite3* database) {
-  std::vector<std::string> faults;
-  Statement studies(database, "SELECT study_id, name, recipe, points FROM studies");
-  while (faults.size() < kMostOfAKind && studies.step()) {
-    const std::string name = studies.text(1);
+ private:
+  void add_fault(const std::string& fault) {
+    study_faults_.push_back(fmt::format("study {}, {}: {}", studies_.integer(0), name_, fault));
+  }
+
+  /// Values that no server stores could keep one from starting, or could not be shown.
+  void check_terms() {
+    constexpr std::int64_t kLongestTime = 64;
+    for (const std::string& objection :
+         {protocol::objection_to_study_name(name_),
+          protocol::objection_to_priority(studies_.integer(5)),
+          std::string(studies_.integer(6) > kLongestTime ? "its times are not valid" : "")}) {
+      if (!objection.empty()) {
+        add_fault(objection);
+      }
+    }
+  }
+
+  /// Its points are made where the recipe can be read.
+  StudyTable read_table() {
+    StudyTable table(studies_.text(2), static_cast<std::uint64_t>(studies_.integer(3)));
     try {
-      protocol::Recipe recipe;
-      if (!protocol::parse_recipe(studies.bytes(2), recipe)) {
-        throw std::runtime_error("its bytes are damaged, or more than a recipe may have");
-      }
-      const protocol::PointTable table(std::move(recipe));
-      if (table.points() != static_cast<std::uint64_t>(studies.integer(3))) {
-        faults.push_back(fmt::format("study {}: it has {} points, and {} by its recipe", name,
-                                     studies.integer(3), table.points()));
-      }
-      check_rows(database, studies.integer(0), name, table, faults);
-    } catch (const StorageError&) {
-      throw;
+      (void)table.get();
     } catch (const std::runtime_error& error) {
-      faults.push_back(fmt::format("study {}: its recipe cannot be read: {}", name, error.what()));
+      add_fault(fmt::format("its recipe cannot be read: {}", error.what()));
     }
+    return table;
   }
-  return faults;
-}
 
-/// Compares `settled_points` and the state of each study with its rows.
-void check_counts(sqlite3* database, Diagnosis& found) {
-  constexpr auto kLast = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
-  std::vector<std::string> faults;
-  const auto noted = noted_points(database);
-  Statement studies(database,
-                    "SELECT study_id, name, state, points FROM studies ORDER BY study_id");
-  while (studies.step()) {
-    const auto id = static_cast<std::uint64_t>(studies.integer(0));
-    const std::string name = studies.text(1);
-    const std::string state = studies.text(2);
-    const auto points = static_cast<std::uint64_t>(studies.integer(3));
-    const IntervalSet rows = points_with_row(database, id, {0, kLast});
-    if (const auto known = noted.find(id); known != noted.end() && !known->second) {
-      found.remarks.push_back(
-          fmt::format("study {}: another program deleted results; they are counted when a server "
-                      "starts",
-                      name));
-    } else if (const IntervalSet settled = known == noted.end() ? IntervalSet() : *known->second;
-               !(settled == rows)) {
-      faults.push_back(fmt::format(
-          "study {}: settled_points has {} points and results {}, and they are not the same. "
-          "UPDATE "
-          "studies SET counted = 0 WHERE study_id = {} has them counted when a server starts",
-          name, settled.size(), rows.size(), id));
+  /// Returns the points that have a row.
+  IntervalSet check_rows(const StudyTable& table) {
+    constexpr int kNoChecksum = 5;
+    constexpr int kFault = 6;
+    IntervalSet points;
+    std::optional<RecipeCheck> recipe;
+    if (table.is_made()) {
+      recipe.emplace(database_, *table.get());
     }
-    if (state == "done" && rows.size() != points) {
-      faults.push_back(
-          fmt::format("study {} is called done with {} of {} results", name, rows.size(), points));
+    rows_.bind(1, studies_.integer(0));
+    while (rows_.step()) {
+      points.insert(static_cast<std::uint64_t>(rows_.integer(0)));
+      ++all_rows_;
+      without_checksum_ += rows_.integer(kNoChecksum) != 0 ? 1U : 0U;
+      std::string fault = rows_.text(kFault);
+      if (fault.empty() && recipe) {
+        fault = recipe->fault_of(rows_);
+      }
+      if (!fault.empty() && row_faults_.size() < kMostOfAKind) {
+        row_faults_.push_back(
+            fmt::format("study {}, point {}: {}", name_, rows_.integer(0), fault));
+      }
     }
-    if (rows.size() < points) {
-      found.remarks.push_back(fmt::format("study {} is {}: {} of {} points have a result", name,
-                                          state, rows.size(), points));
+    rows_.reset();
+    return points;
+  }
+
+  /// Compares `completed_ranges` and the state with the points that have a row. A filter leaves out
+  /// completed points without a row.
+  void check_completed(const StudyTable& table, const IntervalSet& rows) {
+    const auto& noted = noted_[static_cast<std::uint64_t>(studies_.integer(0))];
+    const IntervalSet& completed = noted ? *noted : rows;
+    if (!noted) {
+      found_.remarks.push_back(fmt::format(
+          "study {}: another program deleted results; they are counted when a server starts",
+          name_));
+    }
+    IntervalSet without_row = completed;
+    rows.for_each([&](const Interval& range) { without_row.erase(range.begin, range.end); });
+    const bool has_filter = table.is_made() && table->has_filter();
+    if (rows.size() + without_row.size() != completed.size() ||
+        (!without_row.empty() && !has_filter)) {
+      add_fault(fmt::format(
+          "completed_ranges has {} points and results {}, and they are not the same. UPDATE "
+          "studies SET counted = 0 WHERE study_id = {} makes the next server count them",
+          completed.size(), rows.size(), studies_.integer(0)));
+    }
+    const std::string state = studies_.text(4);
+    if (completed.size() != table.size()) {
+      (state == "done" ? study_faults_ : found_.remarks)
+          .push_back(fmt::format("study {} is {}: {} of {} points have a result", name_, state,
+                                 completed.size(), table.size()));
     }
   }
-  faults.resize(std::min(faults.size(), kMostOfAKind));
-  append(found.faults, std::move(faults));
-}
+
+  sqlite3* database_;
+  Diagnosis& found_;
+  std::map<std::uint64_t, std::optional<IntervalSet>> noted_;
+  Statement studies_;
+  Statement rows_;
+  std::string name_;  // of the study that is checked
+  std::vector<std::string> study_faults_;
+  std::vector<std::string> row_faults_;
+  std::uint64_t all_rows_ = 0;
+  std::uint64_t without_checksum_ = 0;
+};
 
 }  // namespace
 
@@ -227,30 +268,40 @@ std::vector<std::string> faults_of_pages(sqlite3* database) {
   return found == std::vector<std::string>{"ok"} ? std::vector<std::string>{} : found;
 }
 
-std::vector<std::string> faults_of_rows(sqlite3* database, std::size_t at_most) {
-  std::vector<std::string> faults = faults_of_references(database, at_most);
-  for (const std::string& sql :
-       {"SELECT 'text ' || text_id || ' is not the one that was stored' FROM texts"
-        " WHERE checksum <> " +
-            text_checksum_sql(),
-        "SELECT 'worker ' || worker_id || ' is not the one that was stored' FROM workers"
-        " WHERE checksum <> " +
-            worker_checksum_sql(),
-        "SELECT 'study ' || study_id || ', ' || name || ': its number, name, recipe or size is not"
-        " the one that was stored' FROM studies WHERE checksum <> " +
-            study_checksum_sql(),
-        "SELECT 'study ' || study_id || ', point ' || point || ': its row is not the one that was"
-        " stored' FROM packed_results WHERE checksum <> " +
-            result_checksum_sql(),
-        fmt::format("SELECT 'study ' || study_id || ', point ' || point || ': one of its lists"
-                    " cannot be read, or has more than {} elements' FROM packed_results"
-                    " WHERE NOT {}",
-                    protocol::kMostListElements, lists_are_sound_sql()),
-        misplaced_outputs_sql()}) {
-    append(faults, database, sql, at_most);
+std::string row_fault_sql() {
+  std::vector<std::string> lists;
+  for (const solver::ResultList* list : solver::result_lists()) {
+    lists.push_back(fmt::format("json_valid(coalesce({}, '[]'))", list->column));
   }
-  append(faults, faults_of_models(database, at_most));
-  return faults;
+  return fmt::format(
+      "CASE WHEN checksum <> {} THEN 'its row is not the one that was stored'"
+      " WHEN NOT ({}) THEN 'one of its lists cannot be read'"
+      " WHEN error IS NULL AND ({} IS NULL) THEN 'it is solved, and outputs are missing'"
+      " WHEN error IS NOT NULL AND coalesce({}) IS NOT NULL"
+      " THEN 'it is failed, and has outputs' END",
+      result_checksum_sql(), fmt::join(lists, " AND "),
+      fmt::join(required_outputs(), " IS NULL OR "), fmt::join(output_columns(), ", "));
+}
+
+Diagnosis diagnose_contents(sqlite3* database) {
+  Diagnosis found;
+  found.faults = faults_of_tables(database);
+  if (!found.faults.empty()) {
+    return found;  // the other checks need all tables
+  }
+  for (const std::string table : {"results", "completed_ranges", "retries", "reused_points"}) {
+    append(found.faults, database,
+           fmt::format("SELECT DISTINCT 'table {0}: refers to study number ' || study_id ||"
+                       " ', which does not exist' FROM {0} WHERE study_id NOT IN"
+                       " (SELECT study_id FROM studies UNION SELECT study_id FROM deletions)",
+                       table));
+  }
+  append(found.faults, faults_of_models(database));
+  append(found.remarks, database,
+         "SELECT count(*) || ' results of deleted studies are left; the next server deletes them'"
+         " FROM results WHERE study_id IN (SELECT study_id FROM deletions) HAVING count(*) > 0");
+  StudyCheck(database, found).run();
+  return found;
 }
 
 Diagnosis diagnose(const std::string& path) {
@@ -264,18 +315,8 @@ Diagnosis diagnose(const std::string& path) {
   if (!found.faults.empty()) {
     return found;  // damaged pages make every other answer meaningless
   }
-  for (const std::string& table : missing_tables(database)) {
-    found.faults.push_back(fmt::format(
-        "the table {} is missing, and no server starts on this file: `oblique backup --salvage` "
-        "makes one that has it, of all that can be read",
-        table));
-  }
-  if (!found.faults.empty()) {
-    return found;  // the other checks need all tables
-  }
   add_row_checksum(database);
   execute(database, "BEGIN");  // one instant of rows and counts while a server writes
-  check_other_tables(database, found);
   for (const std::string& view : missing_views(database)) {
     found.faults.push_back(
         fmt::format("the view {} is missing: the next server on this file creates it", view));
@@ -284,17 +325,9 @@ Diagnosis diagnose(const std::string& path) {
     found.faults.push_back(fmt::format(
         "the trigger {} is not ours: no server works on this file until it is dropped", trigger));
   }
-  append(found.faults, faults_of_rows(database, kMostOfAKind));
-  append(found.faults, faults_of_recipes(database));
-  append(found.remarks, database,
-         "SELECT count(*) || ' results of deleted studies are left; the next server deletes them'"
-         " FROM packed_results WHERE study_id IN (SELECT study_id FROM deletions)"
-         " HAVING count(*) > 0");
-  check_counts(database, found);
-  append(found.remarks, database,
-         "SELECT count(*) || ' of ' || (SELECT count(*) FROM packed_results) || ' results have"
-         " no checksum: a flipped bit in them may go unseen'"
-         " FROM packed_results WHERE checksum IS NULL HAVING count(*) > 0");
+  Diagnosis contents = diagnose_contents(database);
+  std::move(contents.faults.begin(), contents.faults.end(), std::back_inserter(found.faults));
+  std::move(contents.remarks.begin(), contents.remarks.end(), std::back_inserter(found.remarks));
   return found;
 }
 

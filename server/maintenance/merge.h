@@ -2,10 +2,11 @@
 
 #include <cstdint>
 #include <functional>
-#include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
+
+#include "server/store/store.h"
 
 namespace oblique::server {
 
@@ -13,8 +14,6 @@ struct MergeSettings {
   /// Goes before the name of a study whose name is taken by one with other points, another model or
   /// another choice of errors; empty: such a database is refused.
   std::string rename_prefix;
-  /// Results of several solver versions may be in one study.
-  bool mixes_versions = false;
 };
 
 /// What the merge of one database changed.
@@ -30,7 +29,7 @@ struct Merged {
 };
 
 /// A database was not merged, and nothing of it was: its studies contradict those of the target.
-/// The message says what can be done.
+/// The message gives the remedy.
 class MergeRefused : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -43,10 +42,7 @@ class MergeRefused : public std::runtime_error {
 class Merger {
  public:
   /// Opens the target, or makes it, and locks it against servers. Throws StorageError.
-  explicit Merger(const std::string& target);
-  ~Merger();
-  Merger(const Merger&) = delete;
-  Merger& operator=(const Merger&) = delete;
+  explicit Merger(const std::string& target) : target_(target), path_(target) {}
 
   /// Called now and then with the number of rows merged so far.
   using Progress = std::function<void(std::uint64_t merged, std::uint64_t rows)>;
@@ -58,11 +54,11 @@ class Merger {
   Merged merge(const std::string& source, const MergeSettings& settings, const Progress& progress);
 
   /// Moves all changes into the one file of the target. False when a reader prevents it.
-  bool finish();
+  bool finish() { return target_.merge_log(); }
 
  private:
-  struct Parts;
-  std::unique_ptr<Parts> parts_;
+  Store target_;  // has the schema and the lock
+  std::string path_;
 };
 
 }  // namespace oblique::server

@@ -10,8 +10,9 @@
 #include "server/database/open_for_reading.h"
 #include "server/database/row_checksum.h"
 #include "server/database/sqlite.h"
+#include "server/maintenance/check.h"
 #include "server/maintenance/study_counts.h"
-#include "server/store/rows/row_columns.h"
+#include "server/store/completed_ranges.h"
 #include "server/store/store.h"
 
 namespace oblique::server {
@@ -42,142 +43,95 @@ std::vector<std::string> texts(sqlite3* database, const std::string& sql) {
   return found;
 }
 
-std::vector<std::string> columns_of(sqlite3* database, const std::string& table) {
-  return texts(database, "SELECT name FROM pragma_table_info('" + table + "')");
-}
-
-std::vector<std::string> studies_in(sqlite3* database) {
-  return texts(database, "SELECT study_id FROM studies");
-}
-
 /// Rows of one table that have ascending integer keys.
 struct KeyedRows {
   std::string table;
   std::string key = "rowid";
   std::string condition = "1";    ///< which rows are copied, in SQL
-  std::string is_sound = "1";     ///< false for a row that differs from what was stored
+  std::string is_sound = "1";     ///< false for a damaged row, in SQL
   std::int64_t before_first = 0;  ///< all keys are above
 };
 
-/// Copies the rows of a table in the order of their keys, without what cannot be read.
-class RowsCopy {
- public:
-  RowsCopy(sqlite3* from, sqlite3* to, const KeyedRows& rows)
-      : to_(to),
-        columns_(columns_of(to, rows.table)),
-        last_(rows.before_first),
-        read_(from, fmt::format("SELECT {}, {}, {} FROM {} WHERE {} AND {} > ? ORDER BY {}",
-                                rows.key, rows.is_sound, fmt::join(columns_, ", "), rows.table,
-                                rows.condition, rows.key, rows.key)),
-        insert_(to, fmt::format("INSERT INTO {} ({}) VALUES (?{})", rows.table,
-                                fmt::join(columns_, ", "), marks())) {}
-
-  std::uint64_t copied() const { return copied_; }
-  std::uint64_t unreadable_places() const { return unreadable_; }
-
-  /// After an unreadable place the next readable row is sought in growing leaps, so that a long
-  /// place costs few attempts and a short one few readable rows.
-  void run() {
-    // No table has this many rows: behind such a leap is nothing.
-    constexpr std::int64_t kLongestLeap = std::int64_t{1} << 42U;
-    std::int64_t leap = 0;
-    std::int64_t end_of_leap = last_;
-    while (!copy_until_unreadable()) {
-      const bool is_new_place = leap == 0 || last_ != end_of_leap;
-      unreadable_ += is_new_place ? 1U : 0U;
-      leap = is_new_place ? 1 : 2 * leap;
-      if (leap > kLongestLeap) {
-        return;
-      }
-      last_ += leap;
-      end_of_leap = last_;
-    }
+/// Inserts the columns behind the first two of a row. False when the row violates the schema, which
+/// makes it damaged. Throws std::runtime_error when the copy cannot be written.
+bool insert_row(sqlite3* to, Statement& insert, const Statement& row) {
+  for (int column = 2; column < row.columns(); ++column) {
+    insert.bind_column(column - 1, row, column);
   }
-
- private:
-  std::string marks() const {
-    std::string marks;
-    for (std::size_t i = 1; i < columns_.size(); ++i) {
-      marks += ", ?";
+  try {
+    insert.run();
+    return true;
+  } catch (const StorageError&) {
+    const auto code = static_cast<unsigned>(sqlite3_errcode(to)) & 0xffU;
+    if (code != SQLITE_CONSTRAINT && code != SQLITE_MISMATCH) {
+      throw std::runtime_error("the copy cannot be written: is there room on its disk?");
     }
-    return marks;
+    insert.reset();
+    return false;
   }
+}
 
-  /// True at the end of the table.
-  bool copy_until_unreadable() {
-    read_.reset();
-    read_.bind(1, last_);
-    while (true) {
-      try {
-        if (!read_.step()) {
-          return true;
-        }
-      } catch (const StorageError&) {
-        return false;
-      }
-      last_ = read_.integer(0);
-      ++(read_.integer(1) != 0 && insert() ? copied_ : unreadable_);
-    }
-  }
-
-  /// False when the row violates the schema, which makes it damaged. Throws std::runtime_error when
-  /// the copy cannot be written.
-  bool insert() {
-    for (int column = 2; column < read_.columns(); ++column) {
-      insert_.bind_column(column - 1, read_, column);
-    }
-    try {
-      insert_.run();
-      return true;
-    } catch (const StorageError&) {
-      const auto code = static_cast<unsigned>(sqlite3_errcode(to_)) & 0xffU;
-      if (code != SQLITE_CONSTRAINT && code != SQLITE_MISMATCH) {
-        throw std::runtime_error("the copy cannot be written: is there room on its disk?");
-      }
-      insert_.reset();
-      return false;
-    }
-  }
-
-  sqlite3* to_;
-  std::vector<std::string> columns_;
-  std::int64_t last_;
-  Statement read_;
-  Statement insert_;
-  std::uint64_t copied_ = 0;
-  std::uint64_t unreadable_ = 0;
-};
-
-/// Returns how many rows were copied.
+/// Copies rows in the order of their keys, without those that cannot be read, and returns how many.
+/// After an unreadable place the next readable row is sought in growing leaps, so that a long place
+/// costs few attempts and a short one few readable rows.
 std::uint64_t copy_rows(sqlite3* from, sqlite3* to, const KeyedRows& rows, Salvaged& saved) {
-  if (columns_of(from, rows.table).empty()) {
+  // No table has this many rows: behind such a leap is nothing.
+  constexpr std::int64_t kLongestLeap = std::int64_t{1} << 42U;
+  const std::string columns_sql = "SELECT name FROM pragma_table_info('" + rows.table + "')";
+  if (texts(from, columns_sql).empty()) {
     return 0;  // the table is lost
   }
-  RowsCopy copy(from, to, rows);
-  copy.run();
-  saved.unreadable_places += copy.unreadable_places();
-  return copy.copied();
+  const std::vector<std::string> columns = texts(to, columns_sql);
+  Statement read(
+      from,
+      fmt::format("SELECT {0}, {1}, {2} FROM {3} WHERE {4} AND {0} > ? ORDER BY {0}", rows.key,
+                  rows.is_sound, fmt::join(columns, ", "), rows.table, rows.condition));
+  Statement insert(
+      to, fmt::format("INSERT INTO {} ({}) VALUES ({})", rows.table, fmt::join(columns, ", "),
+                      fmt::join(std::vector<std::string>(columns.size(), "?"), ", ")));
+  std::uint64_t copied = 0;
+  std::int64_t last = rows.before_first;
+  std::int64_t end_of_leap = last;
+  for (std::int64_t leap = 0; leap <= kLongestLeap;) {
+    try {
+      read.reset();
+      read.bind(1, last);
+      while (read.step()) {
+        last = read.integer(0);
+        const bool is_copied = read.integer(1) != 0 && insert_row(to, insert, read);
+        ++(is_copied ? copied : saved.unreadable_places);
+      }
+      break;
+    } catch (const StorageError&) {  // a damaged page
+      const bool is_new_place = leap == 0 || last != end_of_leap;
+      saved.unreadable_places += is_new_place ? 1U : 0U;
+      leap = is_new_place ? 1 : 2 * leap;
+      last += leap;
+      end_of_leap = last;
+    }
+  }
+  return copied;
 }
 
 /// Copies the tables, each after those that it refers to.
 void copy_tables(sqlite3* from, sqlite3* to, Salvaged& saved) {
-  const auto unchanged = [](const std::string& checksum_sql) {
-    return "(checksum IS NULL OR checksum = " + checksum_sql + ")";
-  };
   saved.studies = copy_rows(from, to, {.table = "studies"}, saved);
-  copy_rows(from, to, {.table = "models"}, saved);
-  // Wrong words and workers would make many rows wrong.
-  copy_rows(from, to, {.table = "workers", .is_sound = unchanged(worker_checksum_sql())}, saved);
-  copy_rows(from, to, {.table = "texts", .is_sound = unchanged(text_checksum_sql())}, saved);
-  copy_rows(from, to, {.table = "retries"}, saved);
-  copy_rows(from, to, {.table = "origins"}, saved);
+  for (const std::string table : {"models", "workers", "retries"}) {
+    copy_rows(from, to, {.table = table}, saved);
+  }
   // Rows of a study that was lost mean nothing.
-  for (const std::string& study : studies_in(to)) {
+  for (const std::string& study : texts(to, "SELECT study_id FROM studies")) {
     copy_rows(from, to,
-              {.table = "packed_results",
+              {.table = "results",
                .key = "point",
                .condition = "study_id = " + study,
-               .is_sound = unchanged(result_checksum_sql()) + " AND " + lists_are_sound_sql(),
+               .is_sound = row_fault_sql() + " IS NULL",
+               .before_first = -1},
+              saved);
+    copy_rows(from, to,
+              {.table = "completed_ranges",
+               .key = "first_point",
+               .condition = "study_id = " + study,
                .before_first = -1},
               saved);
   }
@@ -185,34 +139,25 @@ void copy_tables(sqlite3* from, sqlite3* to, Salvaged& saved) {
 
 /// Removes or repairs references to rows that were lost, and counts rows again.
 void mend_references(sqlite3* database) {
-  // Rows of a study or model that is lost mean nothing, nor do those whose words are lost.
   execute(database,
-          "DELETE FROM packed_results WHERE study_id NOT IN (SELECT study_id FROM studies)"
-          " OR model_id NOT IN (SELECT model_id FROM models)"
-          " OR (mode IS NOT NULL AND mode NOT IN (SELECT text_id FROM texts))"
-          " OR (major_mode IS NOT NULL AND major_mode NOT IN (SELECT text_id FROM texts))"
-          " OR (margin_event IS NOT NULL AND margin_event NOT IN (SELECT text_id FROM texts));"
+          "DELETE FROM results WHERE model_id NOT IN (SELECT model_id FROM models);"
           "DELETE FROM retries WHERE study_id NOT IN (SELECT study_id FROM studies);"
           // The number of a lost worker stays, so that the row keeps its checksum. Databases mostly
           // have results of one solver version; otherwise that of a lost worker is unknown.
           "INSERT INTO workers"
           " (worker_id, name, threads, solver_version, instruction_set, joined_at)"
-          " SELECT DISTINCT worker, 'lost with a damaged file', 1,"
+          " SELECT DISTINCT worker_id, 'lost with a damaged file', 1,"
           " (SELECT CASE count(DISTINCT solver_version) WHEN 1 THEN min(solver_version)"
-          " ELSE 'unknown' END FROM workers), 'unknown', '' FROM packed_results"
-          " WHERE worker NOT IN (SELECT worker_id FROM workers)");
-  for (const std::string& study : studies_in(database)) {
-    count_rows_again(database, std::stoull(study));
+          " ELSE 'unknown' END FROM workers), 'unknown', '' FROM results"
+          " WHERE worker_id IS NOT NULL AND worker_id NOT IN (SELECT worker_id FROM workers);"
+          "UPDATE studies SET counted = 1;");
+  const auto noted = noted_points(database);
+  Statement studies(database, "SELECT study_id, recipe, points FROM studies");
+  while (studies.step()) {
+    const auto study_id = static_cast<std::uint64_t>(studies.integer(0));
+    const StudyTable table(studies.text(1), static_cast<std::uint64_t>(studies.integer(2)));
+    count_again(database, study_id, table, noted.at(study_id).value());
   }
-  // No later study may get a number by which rows name the study that they come from.
-  execute(database,
-          "DELETE FROM origins WHERE origin_id NOT IN (SELECT study_id FROM studies)"
-          " AND origin_id NOT IN (SELECT origin_id FROM taken_points);"
-          "UPDATE about SET last_study_id ="
-          " max(last_study_id, coalesce((SELECT max(origin_id) FROM origins), 0));"
-          "UPDATE studies SET state = 'running' WHERE state = 'done' AND points <>"
-          " (SELECT coalesce(sum(p.points), 0) FROM settled_points AS p"
-          " WHERE p.study_id = studies.study_id)");
 }
 
 }  // namespace
@@ -235,7 +180,7 @@ Salvaged salvage(const std::string& from, const std::string& to) {
     copy_tables(source.get(), target.get(), saved);
     mend_references(target.get());
     transaction.commit();
-    saved.results = std::stoull(texts(target.get(), "SELECT count(*) FROM packed_results").at(0));
+    saved.results = std::stoull(texts(target.get(), "SELECT count(*) FROM results").at(0));
     execute(target.get(), "PRAGMA journal_mode = DELETE");
   }
   draft.keep_as(to);

@@ -1,29 +1,58 @@
 #include "server/maintenance/study_counts.h"
 
-#include "server/store/rows/settled_runs.h"
+#include <algorithm>
+#include <stdexcept>
+
+#include "server/store/completed_ranges.h"
 
 namespace oblique::server {
+namespace {
 
-std::uint64_t count_rows_again(sqlite3* database, std::uint64_t study_id) {
-  SettledRuns(database).count_again(study_id);
+/// The points of `points` that the study's filter leaves out; none where its recipe cannot be read.
+IntervalSet left_out(const StudyTable& table, const IntervalSet& points) {
+  IntervalSet found;
+  try {
+    if (points.empty() || !table->has_filter()) {
+      return found;
+    }
+  } catch (const std::runtime_error&) {
+    return found;
+  }
+  points.for_each([&](const Interval& range) {
+    const std::uint64_t end = std::min(range.end, table->size());
+    for (std::uint64_t begin = range.begin; begin < end;) {
+      const std::uint64_t left_in = table->first_left_in(begin, end);
+      found.insert(begin, left_in);
+      begin = left_in + 1;
+    }
+  });
+  return found;
+}
+
+}  // namespace
+
+void count_again(sqlite3* database, std::uint64_t study_id, const StudyTable& table,
+                 const IntervalSet& noted) {
+  CompletedRanges ranges(database);
+  ranges.count_again(study_id);
+  left_out(table, noted).for_each([&](const Interval& range) { ranges.add(study_id, range); });
+  ranges.flush();
   for (const char* sql :
-       {"DELETE FROM taken_points WHERE study_id = ?1",
-        "INSERT INTO taken_points (study_id, origin_id, points)"
-        " SELECT ?1, CAST(taken_from AS INTEGER) AS origin, count(*) FROM packed_results"
-        " WHERE study_id = ?1 AND taken_from IS NOT NULL GROUP BY origin",
-        "INSERT OR IGNORE INTO origins (origin_id, name)"
-        " SELECT t.origin_id, coalesce((SELECT s.name FROM studies AS s"
-        " WHERE s.study_id = t.origin_id), 'study number ' || t.origin_id || ' (deleted)')"
-        " FROM taken_points AS t WHERE t.study_id = ?1"}) {
+       {"DELETE FROM main.reused_points WHERE study_id = ?1",
+        // A source is STUDY/POINT, and a name may have slashes too.
+        "INSERT INTO main.reused_points (study_id, source, points)"
+        " SELECT ?1, substr(reused_from, 1, length(rtrim(reused_from, '0123456789')) - 1) AS "
+        "source,"
+        " count(*) FROM main.results WHERE study_id = ?1 AND reused_from IS NOT NULL"
+        " GROUP BY source",
+        "UPDATE main.studies SET state = CASE state WHEN 'done' THEN 'running' ELSE 'done' END,"
+        " changed_at = strftime('%Y-%m-%dT%H:%M:%fZ', 'now') WHERE study_id = ?1"
+        " AND (state = 'done') <> (points = (SELECT coalesce(sum(p.points), 0)"
+        " FROM main.completed_ranges AS p WHERE p.study_id = ?1))"}) {
     Statement statement(database, sql);
     statement.bind(1, study_id);
     statement.run();
   }
-  Statement count(database,
-                  "SELECT coalesce(sum(points), 0) FROM settled_points WHERE study_id = ?");
-  count.bind(1, study_id);
-  count.step();
-  return static_cast<std::uint64_t>(count.integer(0));
 }
 
 }  // namespace oblique::server

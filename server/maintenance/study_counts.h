@@ -3,11 +3,15 @@
 #include <cstdint>
 
 #include "server/database/sqlite.h"
+#include "server/study/interval_set.h"
+#include "server/study/study_table.h"
 
 namespace oblique::server {
 
-/// Computes `settled_points` and `taken_points` of a study again from its rows, names the origins
-/// that `origins` lacks, and returns the number of rows. Throws StorageError.
-std::uint64_t count_rows_again(sqlite3* database, std::uint64_t study_id);
+/// Computes `completed_ranges` and `reused_points` of a study again: points that have a row, and
+/// those of `noted` that its filter leaves out. A study with all points becomes done, a done one
+/// without them running. Throws StorageError.
+void count_again(sqlite3* database, std::uint64_t study_id, const StudyTable& table,
+                 const IntervalSet& noted);
 
 }  // namespace oblique::server

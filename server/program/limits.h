@@ -3,7 +3,7 @@
 #include <CLI/CLI.hpp>
 
 #include "server/network/network.h"
-#include "server/queries/query_queue.h"
+#include "server/query/query_pool.h"
 #include "server/service/service.h"
 
 namespace oblique::server {

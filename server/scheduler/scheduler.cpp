@@ -27,7 +27,7 @@ void Scheduler::on(const StudyAdded& event) {
   }
   studies_.emplace(event.study,
                    Study{StudyPoints(event.table, event.settled, settings_.loss_limits),
-                         event.failed, event.cancelled, event.paused, false, event.terms,
+                         event.failed, event.cancelled, event.paused, false, event.priority,
                          least_served(event.study), event.solver_version});
   studies_.at(event.study).points.count_attempts(event.attempts);
   studies_.at(event.study).held = event.held;
@@ -110,21 +110,14 @@ void Scheduler::on(const StudyReopened& event) {
   }
 }
 
-void Scheduler::on(const StudyTermsChanged& event) {
+void Scheduler::on(const PriorityChanged& event) {
   const auto found = studies_.find(event.study);
   if (found == studies_.end()) {
     return;
   }
   Study& study = found->second;
-  study.terms = event.terms;
+  study.priority = event.priority;
   study.served = least_served(event.study);
-  for (const LeaseId id : study.leases.all()) {
-    const WorkerId worker = leases_.at(id).worker;
-    if (!admits(study, workers_.at(worker))) {  // it takes part no more
-      effects_.emplace_back(ReleaseBatch{worker, id});
-      end_lease(id, std::nullopt);
-    }
-  }
   requeue(event.study);
 }
 
@@ -158,8 +151,8 @@ void Scheduler::on(const StudyGrown& event) {
   study.cancelled = false;
   study.paused = false;
   study.finished = false;
-  if (!was_open || !(study.terms == event.terms)) {
-    study.terms = event.terms;
+  if (!was_open || study.priority != event.priority) {
+    study.priority = event.priority;
     study.served = least_served(event.study);
   }
   requeue(event.study);
@@ -194,8 +187,7 @@ StudyQueue::Place Scheduler::place_of(const Study& study) const {
   if (!study.is_open() || !(has_free || study.has_suspect())) {
     return {};
   }
-  return {has_free, study.has_suspect(), study.terms.priority, study.served,
-          study.terms.mixes_versions ? std::string() : study.solver_version};
+  return {has_free, study.has_suspect(), study.priority, study.served, study.solver_version};
 }
 
 void Scheduler::requeue(StudyId id) {
@@ -227,7 +219,7 @@ void Scheduler::finish_if_complete(StudyId id) {
 
 StudyCounts Scheduler::study(StudyId id) const {
   const Study& study = studies_.at(id);
-  const bool lacks_worker = study.has_work() && !workers_.empty() && !study.terms.mixes_versions &&
+  const bool lacks_worker = study.has_work() && !workers_.empty() &&
                             !study.solver_version.empty() &&
                             !versions_.contains(study.solver_version);
   return {study.points.size(), study.points.settled() - study.failed,

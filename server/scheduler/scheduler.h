@@ -130,8 +130,8 @@ class Scheduler {
     bool cancelled;
     bool paused;
     bool finished;
-    StudyTerms terms;
-    /// Batches handed out over the weight, since the study was last open; long ones count for more.
+    std::int32_t priority = 0;
+    /// Batches handed out since the study was last open; long ones count for more.
     double served = 0.0;
     std::string solver_version{};  ///< of its results and leases; empty while there are none
     LeaseIndex leases{};
@@ -190,7 +190,7 @@ class Scheduler {
   void on(const StudyCancelled& event);
   void on(const StudyPaused& event);
   void on(const StudyReopened& event);
-  void on(const StudyTermsChanged& event);
+  void on(const PriorityChanged& event);
   void on(const FailuresForgotten& event);
   void on(const StudyGrown& event);
   void on(const StudyRemoved& event);

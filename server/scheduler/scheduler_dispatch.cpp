@@ -58,7 +58,7 @@ bool Scheduler::may_get_ahead(const Worker& worker, StudyId study) const {
   return is_sound && study != 0 && !worker.leases.empty() &&
          std::ranges::all_of(worker.leases, [&](LeaseId id) {
            const Lease& lease = leases_.at(id);
-           return !lease.alone && lease.priority < studies_.at(study).terms.priority;
+           return !lease.alone && lease.priority < studies_.at(study).priority;
          });
 }
 
@@ -215,10 +215,9 @@ bool Scheduler::is_straggling(const Lease& lease, const Worker& helper) const {
   return true;
 }
 
-/// The results of a study come from one solver version, unless it was said that they need not.
+/// The results of a study come from one solver version.
 bool Scheduler::admits(const Study& study, const Worker& worker) {
-  return study.terms.mixes_versions || study.solver_version.empty() ||
-         study.solver_version == worker.solver_version;
+  return study.solver_version.empty() || study.solver_version == worker.solver_version;
 }
 
 StudyId Scheduler::next_free_study(const Worker& worker) const {
@@ -336,14 +335,14 @@ LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Batch
   const double takes_s = pace.s_per_point() * static_cast<double>(batch.points) / worker.threads;
   // Whatever a worker says of its pace, no batch is to make its study wait for ever.
   const double counted_s = std::clamp(takes_s, target_s(), settings_.lanes_batch_s + target_s());
-  served.served += counted_s / target_s() / served.terms.weight;
+  served.served += counted_s / target_s();
   if (served.solver_version.empty()) {
     served.solver_version = worker.solver_version;
   }
   worker.stored_ms = worker.leases.empty() ? now_ms_ : worker.stored_ms;
   const LeaseId lease = next_lease_++;
-  leases_.emplace(lease, Lease{id, study, batch, alone, now_ms_, 0, served.terms.priority});
-  note_priority(served.terms.priority, true);
+  leases_.emplace(lease, Lease{id, study, batch, alone, now_ms_, 0, served.priority});
+  note_priority(served.priority, true);
   served.leases.insert(lease, batch);
   worker.leases.insert(lease);
   worker.credit -= std::min(worker.credit, 1U);
@@ -351,7 +350,7 @@ LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Batch
   pace.last_end = batch.end();
   pace.held_points += batch.points;
   requeue(study);
-  SendBatch send{id, study, {}, batch.attempts + 1, lease, served.terms.priority};
+  SendBatch send{id, study, {}, batch.attempts + 1, lease, served.priority};
   for (const Interval& places : served.points.leased_set().within(batch.first_place, batch.end())) {
     const auto points = served.points.order().points(places);
     send.points.insert(send.points.end(), points.begin(), points.end());

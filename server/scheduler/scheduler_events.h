@@ -90,7 +90,7 @@ struct StudyAdded {
   std::uint64_t failed = 0;  ///< how many of the settled points failed
   bool cancelled = false;
   bool paused = false;
-  StudyTerms terms{};
+  std::int32_t priority = 0;
   std::string solver_version{};  ///< of its results; empty while there are none
   PointAttempts attempts{};      ///< of points that failed, also of those that were forgotten
   bool held = false;             ///< as StudyHeld says
@@ -118,9 +118,9 @@ struct StudyPaused {
 struct StudyReopened {
   StudyId study;
 };
-struct StudyTermsChanged {
+struct PriorityChanged {
   StudyId study;
-  StudyTerms terms;
+  std::int32_t priority = 0;
 };
 /// It is durable that these points, all failed before, have no row any more.
 struct FailuresForgotten {
@@ -132,7 +132,7 @@ struct FailuresForgotten {
 struct StudyGrown {
   StudyId study;
   StudyTable table;  ///< of all its points
-  StudyTerms terms{};
+  std::int32_t priority = 0;
 };
 /// It is durable that there is no such study any more. Numbers of studies are never used twice.
 struct StudyRemoved {
@@ -203,7 +203,7 @@ struct Tick {};
 
 using Event =
     std::variant<StudyAdded, StudyHeld, PointsTaken, StudyCancelled, StudyPaused, StudyReopened,
-                 StudyTermsChanged, FailuresForgotten, StudyGrown, StudyRemoved, WorkerJoined,
+                 PriorityChanged, FailuresForgotten, StudyGrown, StudyRemoved, WorkerJoined,
                  CreditGiven, ResultsReceived, ResultsStored, HeartbeatReceived, BatchesReturned,
                  WorkerLeft, WorkerUnreachable, WorkerBusy, DispatchHeld, SearchGoesOn, Tick>;
 

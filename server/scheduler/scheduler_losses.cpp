@@ -239,8 +239,7 @@ bool Scheduler::is_set_aside(const Worker& worker) const {
 /// Of those that may get points of the study.
 bool Scheduler::is_longest_proven(const Worker& worker, const Study& study) const {
   const auto since_ms = processes_.at(worker.process).proven_since_ms;
-  const std::string version = study.terms.mixes_versions ? std::string() : study.solver_version;
-  const auto [longest, is_new] = longest_proven_since_ms_.try_emplace(version);
+  const auto [longest, is_new] = longest_proven_since_ms_.try_emplace(study.solver_version);
   for (auto other = is_new ? workers_.begin() : workers_.end(); other != workers_.end(); ++other) {
     const auto other_ms = processes_.at(other->second.process).proven_since_ms;
     if (other_ms && !is_set_aside(other->second) && admits(study, other->second)) {

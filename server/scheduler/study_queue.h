@@ -11,7 +11,7 @@
 namespace oblique::server {
 
 /// The studies that have something to hand out, in the order in which they get batches: the highest
-/// priority first, then the one served least for its weight, then the oldest. Studies that are
+/// priority first, then the one served least, then the oldest. Studies that are
 /// done, cancelled or paused, or whose points are all leased, are not in it and cost nothing.
 class StudyQueue {
  public:
@@ -22,7 +22,7 @@ class StudyQueue {
     bool has_free = false;     ///< points that any worker may get
     bool has_suspect = false;  ///< points that are leased alone
     std::int32_t priority = 0;
-    double served = 0.0;           ///< batches handed out over the weight
+    double served = 0.0;           ///< batches handed out
     std::string solver_version{};  ///< of the workers that it is for; empty: of all
 
     bool operator==(const Place&) const = default;

@@ -45,8 +45,8 @@ Service::Service(const ServiceSettings& settings, Outbox& outbox, std::vector<St
     const bool seeks = study.takes_over && !waits;
     feed(StudyAdded{study.study_id, study.table, std::move(study.settled), study.failures.size(),
                     study.state == StudyState::kCancelled,
-                    study.state == StudyState::kPaused || waits, study.terms, study.solver_version,
-                    std::move(study.attempts), seeks},
+                    study.state == StudyState::kPaused || waits, study.priority,
+                    study.solver_version, std::move(study.attempts), seeks},
          now);
     if (seeks) {  // it was not at its end when the server ended
       begin_reuse(study.study_id, now);
@@ -334,7 +334,7 @@ void Service::stored(const StateWrite& write, Instant now) {
   changes_.answer(write, now);
 }
 
-void Service::stored(const TermsWrite& write, Instant now) {
+void Service::stored(const PriorityWrite& write, Instant now) {
   feed(changes_.stored(write, now), now);
   changes_.answer(write, now);
 }
@@ -371,7 +371,7 @@ void Service::refused(const StateWrite& write, const std::string& error, Instant
   changes_.refused(write, error);
 }
 
-void Service::refused(const TermsWrite& write, const std::string& error, Instant now) {
+void Service::refused(const PriorityWrite& write, const std::string& error, Instant now) {
   changes_.refused(write, error, now);
 }
 

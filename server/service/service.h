@@ -141,7 +141,7 @@ class Service {
   void stored(const ResultsWrite& write, Instant now);
   void stored(const StudyWrite& write, Instant now);
   void stored(const StateWrite& write, Instant now);
-  void stored(const TermsWrite& write, Instant now);
+  void stored(const PriorityWrite& write, Instant now);
   void stored(const FailuresWrite& write, Instant now);
   void stored(const GrowthWrite& write, Instant now);
   void stored(const NameWrite& write, Instant now);
@@ -152,7 +152,7 @@ class Service {
   void refused(const ResultsWrite& write, const std::string& error, Instant now);
   void refused(const StudyWrite& write, const std::string& error, Instant now);
   void refused(const StateWrite& write, const std::string& error, Instant now);
-  void refused(const TermsWrite& write, const std::string& error, Instant now);
+  void refused(const PriorityWrite& write, const std::string& error, Instant now);
   void refused(const FailuresWrite& write, const std::string& error, Instant now);
   void refused(const GrowthWrite& write, const std::string& error, Instant now);
   void refused(const NameWrite& write, const std::string& error, Instant now);

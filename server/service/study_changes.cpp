@@ -6,7 +6,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/written/study_name.h"
-#include "proto/recipe/written/study_terms.h"
+#include "proto/recipe/written/study_priority.h"
 #include "proto/text.h"
 
 namespace oblique::server {
@@ -15,26 +15,6 @@ namespace {
 constexpr std::size_t kLongestShownName = 200;
 /// Of one study, for a change of it to be durable.
 constexpr std::size_t kMostWaiting = 1000;
-
-/// Why no study can have these terms, or an empty text.
-std::string objection_to_terms(const StudyTerms& terms) {
-  const std::string priority = protocol::objection_to_priority(terms.priority);
-  return priority.empty() ? protocol::objection_to_weight(terms.weight) : priority;
-}
-
-/// What the request says of the terms, and for the rest what is.
-StudyTerms asked_terms(const protocol::SubmitRequest& request, StudyTerms terms) {
-  if (request.has_priority()) {
-    terms.priority = request.priority();
-  }
-  if (request.has_weight() && request.weight() != 0.0) {
-    terms.weight = request.weight();
-  }
-  if (request.has_mixes_versions()) {
-    terms.mixes_versions = request.mixes_versions();
-  }
-  return terms;
-}
 
 }  // namespace
 
@@ -61,9 +41,10 @@ void StudyChanges::submit(const Client& client, const ReadRequest& read, Instant
     return;
   }
   const auto known = states_.find(request.name());
-  const StudyTerms terms =
-      asked_terms(request, known ? states_.record(*known).terms : StudyTerms{});
-  if (const std::string reason = objection_to_terms(terms); !reason.empty()) {
+  const std::int32_t priority = request.has_priority() ? request.priority()
+                                : known                ? states_.record(*known).priority
+                                                       : 0;
+  if (const std::string reason = protocol::objection_to_priority(priority); !reason.empty()) {
     clients_.reply_error(client, reason);
     return;
   }
@@ -72,7 +53,7 @@ void StudyChanges::submit(const Client& client, const ReadRequest& read, Instant
     return;
   }
   if (!known) {
-    add(client, read, terms, now);
+    add(client, read, priority, now);
     return;
   }
   if (const auto turn = turns_.find(*known); turn != turns_.end() &&
@@ -86,10 +67,10 @@ void StudyChanges::submit(const Client& client, const ReadRequest& read, Instant
   }
   const StudyRecord& study = states_.record(*known);
   if (!study.table.is_of_the_recipe_of(read.table)) {
-    grow(client, *known, read, terms, now);
-  } else if (states_.is_durable(*known) && !(study.terms == terms)) {
+    grow(client, *known, read, priority, now);
+  } else if (states_.is_durable(*known) && study.priority != priority) {
     turns_[*known];
-    ledger_.write(SetStudyTerms{*known, terms}, TermsWrite{*known, terms, client});
+    ledger_.write(SetPriority{*known, priority}, PriorityWrite{*known, priority, client});
   } else {
     go_on(client, *known, now);
   }
@@ -97,7 +78,7 @@ void StudyChanges::submit(const Client& client, const ReadRequest& read, Instant
 
 /// The recipe is not that of the study: the study grows by what it has more, or it is refused.
 void StudyChanges::grow(const Client& client, StudyId id, const ReadRequest& read,
-                        const StudyTerms& terms, Instant now) {
+                        std::int32_t priority, Instant now) {
   const StudyRecord& study = states_.record(id);
   Growth growth{Growth::Kind::kOther, "the stored one cannot be read"};
   bool has_more = false;
@@ -121,15 +102,15 @@ void StudyChanges::grow(const Client& client, StudyId id, const ReadRequest& rea
     return;
   }
   const StudyView view = view_of(id, sources_, now);
-  const bool takes_over = !read.request.submit().fresh() &&
-                          known_.should_seek(id, view.solver_version, terms.mixes_versions);
-  const GrowthWrite write{id, read.table, terms, study.table.size(), view.state, takes_over};
+  const bool takes_over =
+      !read.request.submit().no_reuse() && known_.should_seek(id, view.solver_version);
+  const GrowthWrite write{id, read.table, priority, study.table.size(), view.state, takes_over};
   Turn& turn = turns_[id];
   turn.grown = read.table;
   turn.submitters.push_back(client);
   states_.change(id, StudyState::kRunning);
   recount(id);
-  ledger_.write(GrowStudy{id, read.table, terms, iso_8601(now), takes_over}, write);
+  ledger_.write(GrowStudy{id, read.table, priority, iso_8601(now), takes_over}, write);
 }
 
 void StudyChanges::refuse_recipe(const Client& client, const std::string& name,
@@ -179,7 +160,7 @@ bool StudyChanges::takes_end(StudyId id) {
   return ends_put_off_.erase(id) != 0;
 }
 
-void StudyChanges::add(const Client& client, const ReadRequest& read, const StudyTerms& terms,
+void StudyChanges::add(const Client& client, const ReadRequest& read, std::int32_t priority,
                        Instant now) {
   if (!may_open(client, last_study_id_ + 1, client.key(), read.table.size())) {
     return;
@@ -187,12 +168,11 @@ void StudyChanges::add(const Client& client, const ReadRequest& read, const Stud
   const StudyId id = ++last_study_id_;
   const std::string& name = read.request.submit().name();
   const std::string created_at = iso_8601(now);
-  states_.add(id, {name, read.table, created_at, terms, {}, {}, now.steady_ms, client.key()});
+  states_.add(id, {name, read.table, created_at, priority, {}, {}, now.steady_ms, client.key()});
   recount(id);
   submitters_[id].push_back(client);
-  const bool takes_over =
-      !read.request.submit().fresh() && known_.should_seek(id, {}, terms.mixes_versions);
-  ledger_.write(AddStudy{id, name, read.table, created_at, terms, client.key(), takes_over},
+  const bool takes_over = !read.request.submit().no_reuse() && known_.should_seek(id, {});
+  ledger_.write(AddStudy{id, name, read.table, created_at, priority, client.key(), takes_over},
                 StudyWrite{id, takes_over});
 }
 

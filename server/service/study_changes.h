@@ -43,7 +43,7 @@ class StudyChanges {
 
   Event stored(const StudyWrite& write, Instant now);
   Event stored(const StateWrite& write, Instant now);
-  Event stored(const TermsWrite& write, Instant now);
+  Event stored(const PriorityWrite& write, Instant now);
   Event stored(const FailuresWrite& write, Instant now);
   Event stored(const GrowthWrite& write, Instant now);
   void stored(const NameWrite& write);
@@ -52,7 +52,7 @@ class StudyChanges {
   /// To be called after the scheduler was told.
   void answer(const StudyWrite& write, Instant now);
   void answer(const StateWrite& write, Instant now);
-  void answer(const TermsWrite& write, Instant now);
+  void answer(const PriorityWrite& write, Instant now);
   void answer(const FailuresWrite& write, Instant now);
   void answer(const GrowthWrite& write, Instant now);
   void answer(const NameWrite& write, Instant now);
@@ -61,7 +61,7 @@ class StudyChanges {
   /// The database refused it, as `error` says: all is as before, and the client is told.
   void refused(const StudyWrite& write, const std::string& error, Instant now);
   void refused(const StateWrite& write, const std::string& error);
-  void refused(const TermsWrite& write, const std::string& error, Instant now);
+  void refused(const PriorityWrite& write, const std::string& error, Instant now);
   void refused(const FailuresWrite& write, const std::string& error);
   void refused(const GrowthWrite& write, const std::string& error, Instant now);
   void refused(const NameWrite& write, const std::string& error, Instant now);
@@ -88,7 +88,7 @@ class StudyChanges {
     std::vector<std::function<void(Instant)>> later{};
   };
 
-  void add(const Client& client, const ReadRequest& read, const StudyTerms& terms, Instant now);
+  void add(const Client& client, const ReadRequest& read, std::int32_t priority, Instant now);
   bool may_open(const Client& client, StudyId id, const std::string& key, std::uint64_t points);
   bool may_reopen(const Client& client, StudyId id, StudyState wanted);
   void go_on(const Client& client, StudyId id, Instant now);
@@ -96,7 +96,7 @@ class StudyChanges {
   void retry(const Client& client, StudyId id, Instant now);
   bool waits(const Client& client, StudyId id, std::function<void(Instant)> later);
   void end_turn(StudyId id, Instant now);
-  void grow(const Client& client, StudyId id, const ReadRequest& read, const StudyTerms& terms,
+  void grow(const Client& client, StudyId id, const ReadRequest& read, std::int32_t priority,
             Instant now);
   void refuse_recipe(const Client& client, const std::string& name, const Growth& growth);
   void change_one(const Client& client, const protocol::ChangeRequest& request, StudyId id,

@@ -13,7 +13,7 @@ Event StudyChanges::stored(const StudyWrite& write, Instant now) {
   states_.added(write.study, now.steady_ms);
   const StudyRecord& study = states_.record(write.study);
   note(write.study, fmt::format("of {} points begins", study.table.size()));
-  StudyAdded added{write.study, study.table, {}, 0, false, false, study.terms};
+  StudyAdded added{write.study, study.table, {}, 0, false, false, study.priority};
   added.held = write.takes_over;
   return added;
 }
@@ -31,9 +31,9 @@ Event StudyChanges::stored(const StateWrite& write, Instant /*now*/) {
   return StudyCancelled{write.study};
 }
 
-Event StudyChanges::stored(const TermsWrite& write, Instant /*now*/) {
-  states_.set_terms(write.study, write.terms);
-  return StudyTermsChanged{write.study, write.terms};
+Event StudyChanges::stored(const PriorityWrite& write, Instant /*now*/) {
+  states_.set_priority(write.study, write.priority);
+  return PriorityChanged{write.study, write.priority};
 }
 
 Event StudyChanges::stored(const FailuresWrite& write, Instant now) {
@@ -43,16 +43,15 @@ Event StudyChanges::stored(const FailuresWrite& write, Instant now) {
 }
 
 Event StudyChanges::stored(const GrowthWrite& write, Instant /*now*/) {
-  states_.grow(write.study, write.table, write.terms);
+  states_.grow(write.study, write.table, write.priority);
   states_.changed(write.study, StudyState::kRunning);
   note(write.study,
        fmt::format("grows from {} to {} points", write.points_before, write.table.size()));
-  return StudyGrown{write.study, write.table, write.terms};
+  return StudyGrown{write.study, write.table, write.priority};
 }
 
 void StudyChanges::stored(const NameWrite& write) {
   note(write.study, fmt::format("is called {} from now on", write.name));
-  known_.rename_origin(states_.record(write.study).name, write.name);
   states_.rename(write.study, write.name);
 }
 
@@ -65,8 +64,6 @@ Event StudyChanges::stored(const RemovalWrite& write, Instant now) {
   note(write.study, "is deleted");
   open_.close(write.study);
   states_.remove(write.study);
-  known_.rename_origin(reply.change().study().name(),
-                       fmt::format("{} (deleted)", reply.change().study().name()));
   known_.forget(write.study);
   release_replies(now, write.study);
   return StudyRemoved{write.study};
@@ -91,7 +88,7 @@ void StudyChanges::answer(const StateWrite& write, Instant now) {
   }
 }
 
-void StudyChanges::answer(const TermsWrite& write, Instant now) {
+void StudyChanges::answer(const PriorityWrite& write, Instant now) {
   go_on(write.client, write.study, now);
   end_turn(write.study, now);
 }
@@ -138,7 +135,7 @@ void StudyChanges::refused(const StateWrite& write, const std::string& error) {
   reply_unchanged(write.client, error);
 }
 
-void StudyChanges::refused(const TermsWrite& write, const std::string& error, Instant now) {
+void StudyChanges::refused(const PriorityWrite& write, const std::string& error, Instant now) {
   reply_unchanged(write.client, error);
   end_turn(write.study, now);
 }

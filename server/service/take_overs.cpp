@@ -12,11 +12,10 @@ constexpr std::size_t kMostNamed = 20;
 
 }  // namespace
 
-bool TakeOvers::should_seek(std::uint64_t study_id, std::string_view version,
-                            bool mixes_versions) const {
+bool TakeOvers::should_seek(std::uint64_t study_id, std::string_view version) const {
   const bool is_only_source = sources_.size() == 1 && sources_.contains(study_id);
   return !solver_version_.empty() && !sources_.empty() && !is_only_source &&
-         (version.empty() || mixes_versions || version == solver_version_);
+         (version.empty() || version == solver_version_);
 }
 
 void TakeOvers::restore(std::uint64_t study_id, const std::map<std::string, std::uint64_t>& from) {
@@ -24,14 +23,6 @@ void TakeOvers::restore(std::uint64_t study_id, const std::map<std::string, std:
     Taken& taken = taken_[study_id];
     taken.from[origin] += points;
     taken.points += points;
-  }
-}
-
-void TakeOvers::rename_origin(const std::string& before, const std::string& name) {
-  for (auto& [study_id, taken] : taken_) {
-    if (auto origin = taken.from.extract(before); !origin.empty()) {
-      taken.from[name] += origin.mapped();
-    }
   }
 }
 

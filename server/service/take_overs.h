@@ -37,14 +37,12 @@ class TakeOvers {
 
   /// The study has results.
   void note_source(std::uint64_t study_id) { sources_.insert(study_id); }
-  /// Whether another study has results, and a study of that solver version, or of any, can have
-  /// them.
-  bool should_seek(std::uint64_t study_id, std::string_view version, bool mixes_versions) const;
+  /// Whether another study has results, and a study of that solver version, or of none
+  /// yet, can have them.
+  bool should_seek(std::uint64_t study_id, std::string_view version) const;
 
-  /// From the database: points by the study that they came from.
+  /// Adds points by the name that their source had when they were copied, as the database has them.
   void restore(std::uint64_t study_id, const std::map<std::string, std::uint64_t>& from);
-  /// The study was renamed.
-  void rename_origin(const std::string& before, const std::string& name);
 
   /// A lookup begins. False when one is under way, which begins again at its end.
   bool begin(std::uint64_t study_id, std::int64_t now_ms);

@@ -27,10 +27,8 @@ std::string what_it_waits_for(StudyId id, const StudySources& sources, const Stu
     return "a worker";
   }
   if (counts.lacks_worker) {
-    return fmt::format(
-        "a worker with solver version {}, that of its results, or to be submitted again with "
-        "--mix-versions",
-        counts.solver_version);
+    return fmt::format("a worker with solver version {}, that of its results",
+                       counts.solver_version);
   }
   const QuietWorkers quiet = sources.scheduler.quiet_workers(id, now.steady_ms);
   if (counts.leased > 0 && quiet.quiet_ms >= kQuietAfter_ms) {
@@ -55,7 +53,7 @@ StudyView view_of(StudyId id, const StudySources& sources, Instant now) {
                  counts.failed,
                  counts.leased,
                  record.created_at,
-                 record.terms,
+                 record.priority,
                  counts.solver_version,
                  {},
                  0.0,
@@ -83,9 +81,7 @@ protocol::StudyStatus to_message(const StudyView& view) {
   message.set_failed(view.failed);
   message.set_leased(view.leased);
   message.set_created_at(view.created_at);
-  message.set_priority(view.terms.priority);
-  message.set_weight(view.terms.weight);
-  message.set_mixes_versions(view.terms.mixes_versions);
+  message.set_priority(view.priority);
   message.set_solver_version(view.solver_version);
   message.set_waits_for(view.waits_for);
   message.set_points_per_s(view.points_per_s);

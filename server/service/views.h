@@ -25,7 +25,7 @@ struct StudyView {
   std::uint64_t failed;
   std::uint64_t leased;
   std::string created_at;  ///< UTC, ISO 8601
-  StudyTerms terms;
+  std::int32_t priority = 0;
   std::string solver_version;   ///< of its results; empty while there are none
   std::string waits_for;        ///< why a running study does not go on; empty: it does
   double points_per_s;          ///< settled, over the last seconds; 0 unless it runs

@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "proto/oblique.pb.h"
-#include "server/queries/query_pool.h"
+#include "server/query/query_pool.h"
 #include "server/service/outbox/outbox.h"
 
 namespace oblique::server {

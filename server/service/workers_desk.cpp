@@ -212,7 +212,7 @@ void WorkersDesk::tell_of_version(WorkerId worker, Instant now) {
   }
   const std::string text = fmt::format(
       "worker {}: its solver has version {}, the server's {}: studies with results of another "
-      "version than its own go to other workers, unless they were submitted with --mix-versions",
+      "version than its own go to other workers",
       worker, record.solver_version, settings_.solver_version);
   note(Severity::kWarning, text, now);
   notice_to(worker, text);

@@ -18,7 +18,7 @@ bool is_change_of(const StudyWrite&) {
 bool is_change_of(const StateWrite&) {
   return true;
 }
-bool is_change_of(const TermsWrite&) {
+bool is_change_of(const PriorityWrite&) {
   return true;
 }
 bool is_change_of(const FailuresWrite&) {

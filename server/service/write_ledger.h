@@ -32,9 +32,9 @@ struct StateWrite {
   Client client;
   bool submitted;  ///< the client asked for it by submitting the study again
 };
-struct TermsWrite {
+struct PriorityWrite {
   StudyId study;
-  StudyTerms terms;
+  std::int32_t priority = 0;
   Client client;  ///< submitted the study again
 };
 struct FailuresWrite {
@@ -46,7 +46,7 @@ struct FailuresWrite {
 struct GrowthWrite {
   StudyId study;
   StudyTable table;
-  StudyTerms terms;
+  std::int32_t priority = 0;
   std::uint64_t points_before;
   StudyState state_before;
   bool takes_over = false;  ///< as in StudyWrite
@@ -72,7 +72,7 @@ struct EndTakingWrite {
 struct QuietWrite {};
 
 using Meaning =
-    std::variant<ResultsWrite, StudyWrite, StateWrite, TermsWrite, FailuresWrite, GrowthWrite,
+    std::variant<ResultsWrite, StudyWrite, StateWrite, PriorityWrite, FailuresWrite, GrowthWrite,
                  NameWrite, RemovalWrite, ReuseWrite, EndTakingWrite, QuietWrite>;
 
 struct LedgerLimits {

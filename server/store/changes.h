@@ -13,14 +13,13 @@
 #include "proto/recipe/point_table.h"
 #include "server/study/interval_set.h"
 #include "server/study/study_table.h"
-#include "server/study/study_terms.h"
 
 namespace oblique::server {
 
 enum class StudyState { kRunning, kPaused, kCancelled, kDone };
 inline constexpr std::size_t kStudyStates = 4;
 
-/// As in the column `studies.state`.
+/// The text in the column `studies.state`.
 constexpr const char* state_name(StudyState state) {
   switch (state) {
     case StudyState::kRunning:
@@ -35,25 +34,24 @@ constexpr const char* state_name(StudyState state) {
   return "";
 }
 
-// What can be written to the database. Instants are UTC in ISO 8601.
+// Changes of the database. Instants are UTC in ISO 8601.
 
 struct AddStudy {
   std::uint64_t study_id;
   std::string name;
   StudyTable table;
   std::string created_at;
-  StudyTerms terms{};
+  std::int32_t priority = 0;
   std::string submitted_by = {};  ///< name of the key; empty: without keys
   bool takes_over = false;        ///< results of other studies are looked up
 };
 
-struct SetStudyTerms {
+struct SetPriority {
   std::uint64_t study_id;
-  StudyTerms terms{};
+  std::int32_t priority = 0;
 };
 
-/// Forgets that these points failed; a study that was done is running again. Rows of solved points
-/// stay.
+/// Deletes the rows of these points that failed. A study that was done runs again.
 struct ForgetFailures {
   std::uint64_t study_id;
   IntervalSet points;
@@ -87,26 +85,26 @@ struct AddResults {
   std::vector<protocol::PointResult> results;
 };
 
-/// The study has further points, behind those that it had, and runs on these terms.
+/// Appends points to a study, which then runs with this priority.
 struct GrowStudy {
   std::uint64_t study_id;
   StudyTable table;  ///< of all its points
-  StudyTerms terms;
+  std::int32_t priority = 0;
   std::string changed_at;
   bool takes_over = false;  ///< as in AddStudy
 };
 
-/// What became of a ReuseResults. Read it when the change is durable.
+/// The outcome of a ReuseResults, valid once the change is durable.
 struct ReusedResults {
   IntervalSet points;                              ///< that got a row
-  std::map<std::string, std::uint64_t> origins{};  ///< how many, by the name of their source
-  std::uint64_t probes = 0;                        ///< lookups that were made
-  std::optional<std::uint64_t> next_point = {};    ///< where the next part begins; none: at the end
+  std::map<std::string, std::uint64_t> origins{};  ///< number of copies by the name of their study
+  std::uint64_t probes = 0;                        ///< number of lookups
+  std::optional<std::uint64_t> next_point = {};    ///< first point of the next part; none: the end
 };
 
 /// Looks up one part of the study's open points, from `first_point` on, among the solved points of
-/// other studies, and copies the rows that it finds: those of that solver version, of studies that
-/// ask for estimated errors as this one does or does not.
+/// other studies, and copies the rows that it finds. They must be of that solver version, and both
+/// studies must ask for estimated errors or neither.
 struct ReuseResults {
   std::uint64_t study_id;
   std::shared_ptr<const protocol::PointTable> table;
@@ -115,7 +113,7 @@ struct ReuseResults {
   std::shared_ptr<ReusedResults> outcome;  ///< is filled in
 };
 
-/// No more results of other studies are looked up for it.
+/// Ends the lookup of results for a study.
 struct EndTaking {
   std::uint64_t study_id;
 };
@@ -125,46 +123,44 @@ struct RenameStudy {
   std::string name;
 };
 
-/// There is no such study any more, its name is free, and results of it are dropped from then on.
-/// Its rows go a few at a time (`Storage::clear_away`).
+/// Deletes a study. Its name is free, and later results of it are dropped. Its rows are deleted in
+/// parts by `Storage::clear_away`.
 struct DeleteStudy {
   std::uint64_t study_id;
 };
 
 using Change =
-    std::variant<AddStudy, SetStudyState, SetStudyTerms, ForgetFailures, GrowStudy, RenameStudy,
+    std::variant<AddStudy, SetStudyState, SetPriority, ForgetFailures, GrowStudy, RenameStudy,
                  DeleteStudy, ReuseResults, EndTaking, AddWorker, AddResults>;
 
-/// How much of what deleted studies left is gone.
+/// Which rows of deleted studies a step deleted.
 enum class ClearedAway {
-  kAll,
-  kPart,
-  kMustWait,  ///< nothing more for now: readers keep the write-ahead log long
+  kAll,       ///< none are left
+  kPart,      ///< some may be left
+  kMustWait,  ///< none, because readers keep the write-ahead log long; try later
 };
 
-/// What the writer needs of a database. Tests put a failing one in its place.
+/// The database as the writer sees it. Tests replace it by one that fails.
 class Storage {
  public:
   virtual ~Storage() = default;
 
-  /// Makes all changes durable, in order, in one transaction. Throws StorageError: then none of
-  /// them was kept. Throws StorageGone as `check` does, before and after the transaction: nothing
-  /// that came back is lost.
+  /// Makes all changes durable, in order, in one transaction. Throws StorageError if none of them
+  /// was kept, and StorageGone if that is unknown: nothing can be stored any more.
   virtual void commit(std::span<const Change> changes) = 0;
 
-  /// Throws StorageGone when the database is not where it was opened.
+  /// Throws StorageGone when another file, or none, is at the path of the database.
   virtual void check() {}
 
-  /// Deletes a part of what deleted studies left, in one transaction: at most about so many rows,
-  /// or what takes as long. Throws as `commit` does.
+  /// Deletes at most so many rows of deleted studies in one transaction. Throws as `commit` does.
   virtual ClearedAway clear_away(std::size_t /*most*/) { return ClearedAway::kAll; }
 
   /// Moves the write-ahead log into the database and empties it, so that the one file holds all.
-  /// False when a reader keeps it from doing so: to be tried again. Throws StorageError.
+  /// False when a reader prevents it. Throws StorageError.
   virtual bool merge_log() { return true; }
 
-  /// Ends the statement under way, and every later one that takes long, with a StorageError. From
-  /// any thread.
+  /// Ends the current statement, and every later one that takes long, with a StorageError. From any
+  /// thread.
   virtual void interrupt() {}
 };
 

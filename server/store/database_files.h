@@ -6,20 +6,19 @@
 
 namespace oblique::server {
 
-/// The file of a database that is open for writing. A program that holds a file open goes on
-/// writing to it after somebody deleted, renamed or replaced it, and all that is lost: `check`
-/// notices that.
+/// The file of a database that is open for writing. A program can write to an open file after it
+/// was deleted, renamed or replaced, and all of that is lost: `check` notices it.
 class DatabaseFiles {
  public:
-  /// Opens the file at `path`, or makes it for its owner alone (mode 0600), and holds it against
-  /// other servers until the end of this object, which must outlive every connection: closing the
-  /// file drops SQLite's own locks. Throws StorageError when that cannot be done.
+  /// Opens the file at `path`, or creates it with mode 0600, and locks it against other servers
+  /// until the end of this object. It must outlive every connection, because closing the file drops
+  /// SQLite's own locks. Throws StorageError.
   explicit DatabaseFiles(const std::string& path);
   ~DatabaseFiles();
   DatabaseFiles(const DatabaseFiles&) = delete;
   DatabaseFiles& operator=(const DatabaseFiles&) = delete;
 
-  /// There was no file at the path.
+  /// Whether the file was created.
   bool were_made() const { return made_; }
 
   /// Throws StorageGone unless the file at the path has the device and inode of the opened one. The

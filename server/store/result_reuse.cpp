@@ -7,7 +7,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/canonical.h"
-#include "server/store/rows/row_columns.h"
+#include "server/store/result_rows.h"
 
 namespace oblique::server {
 namespace {
@@ -22,56 +22,48 @@ struct ResetAtEnd {
 /// Point numbers of one change, and lookups: some 50 ms of the writer when all have a row.
 constexpr std::uint64_t kPart = 4096;
 
-/// Columns of `rows_sql` before those of the row.
-constexpr int kChecksum = 0;
-constexpr int kIsUsable = 1;
-constexpr int kRow = 2;
-
-/// All rows of solved points with these inputs, those of lower study numbers first.
-std::string rows_sql() {
-  const auto fits = [](std::string_view column) {
-    return fmt::format(
-        " AND (r.{0} IS NULL OR EXISTS (SELECT 1 FROM texts WHERE text_id = r.{0}"
-        " AND checksum = {1}))",
-        column, text_checksum_sql());
-  };
+/// The columns of a copy: those of the row `r`, but for the study ?1, the point ?2 and its source
+/// ?3.
+std::vector<std::string> copied_columns() {
   std::vector<std::string> columns;
-  for (const std::string_view column : packed_columns()) {
-    columns.push_back(fmt::format("r.{}", column));
+  for (const std::string_view column : result_columns()) {
+    columns.push_back(column == "study_id"      ? "?1"
+                      : column == "point"       ? "?2"
+                      : column == "reused_from" ? "?3"
+                                                : fmt::format("r.{}", column));
   }
-  return fmt::format(
-      "SELECT r.checksum, EXISTS (SELECT 1 FROM workers WHERE worker_id = r.worker"
-      " AND solver_version = ?5 AND checksum = {}){}{}{}, {}"
-      " FROM packed_results AS r INDEXED BY solved_points"
-      " WHERE r.model_id = ?1 AND r.H = ?2 AND r.mu = ?3 AND r.e = ?4 AND r.error IS NULL"
-      " ORDER BY r.study_id, r.point",
-      worker_checksum_sql(), fits("mode"), fits("major_mode"), fits("margin_event"),
-      fmt::join(columns, ", "));
+  return columns;
 }
 
-void set_whole(PackedValue& value, std::uint64_t whole) {
-  value.type = PackedValue::Type::kWhole;
-  value.whole = static_cast<std::int64_t>(whole);
+/// Solved rows of other studies with these inputs, those of lower study numbers first; whether each
+/// is unchanged and of the wanted solver version.
+std::string find_sql() {
+  return fmt::format(
+      "SELECT study_id, point, checksum IS {} AND EXISTS (SELECT 1 FROM workers AS w"
+      " WHERE w.worker_id = results.worker_id AND w.solver_version = ?5)"
+      " FROM results INDEXED BY solved_points"
+      " WHERE model_id = ?1 AND H = ?2 AND mu = ?3 AND e = ?4 AND error IS NULL AND study_id <> ?6"
+      " ORDER BY study_id, point",
+      result_checksum_sql());
+}
+
+std::string copy_sql() {
+  const auto columns = copied_columns();
+  return fmt::format(
+      "INSERT INTO results ({0}, checksum) SELECT {1}, row_checksum({1}) FROM results AS r"
+      " WHERE r.study_id = ?4 AND r.point = ?5 ON CONFLICT (study_id, point) DO NOTHING",
+      fmt::join(result_columns(), ", "), fmt::join(columns, ", "));
 }
 
 }  // namespace
 
-ResultReuse::ResultReuse(sqlite3* database, SettledRuns& settled)
+ResultReuse::ResultReuse(sqlite3* database, CompletedRanges& ranges)
     : database_(database),
-      settled_(settled),
-      settled_run_(database,
-                   "SELECT p.first_point + p.points FROM settled_points AS p JOIN studies AS s"
-                   " USING (study_id) WHERE p.study_id = ?1 AND first_point <= ?2 AND s.counted"
-                   " ORDER BY first_point DESC LIMIT 1"),
+      ranges_(ranges),
       model_(database, "SELECT model_id FROM models WHERE definition = ?"),
-      rows_(database, rows_sql()),
-      source_(database, "SELECT name, recipe FROM studies WHERE study_id = ?"),
-      name_origin_(database, "INSERT OR IGNORE INTO origins (origin_id, name) VALUES (?, ?)"),
-      count_(database,
-             "INSERT INTO taken_points (study_id, origin_id, points) VALUES (?1, ?2, ?3)"
-             " ON CONFLICT DO UPDATE SET points = points + excluded.points"),
-      end_(database, "UPDATE studies SET takes_over = 0 WHERE study_id = ?"),
-      insert_(database) {}
+      find_(database, find_sql()),
+      copy_(database, copy_sql()),
+      source_(database, "SELECT name, recipe FROM studies WHERE study_id = ?") {}
 
 void ResultReuse::run(const ReuseResults& change) {
   ReusedResults& outcome = *change.outcome;
@@ -82,9 +74,9 @@ void ResultReuse::run(const ReuseResults& change) {
     return;  // it was deleted
   }
   const protocol::PointTable& table = *change.table;
-  std::uint64_t point = first_unsettled(change.study_id, change.first_point);
+  std::uint64_t point = first_open(change.study_id, change.first_point);
   const std::uint64_t last = std::min(point + kPart, table.size());
-  const IntervalSet settled = points_with_row(database_, change.study_id, {point, last});
+  const IntervalSet completed = ranges_.overlapping(change.study_id, {point, last});
   while (point < last && outcome.probes < kPart) {
     const protocol::Segment segment = table.segment_at(point);
     const std::uint64_t segment_end = segment.first_point + segment.count;
@@ -96,7 +88,7 @@ void ResultReuse::run(const ReuseResults& change) {
     }
     for (const std::uint64_t end = std::min(segment_end, last);
          point < end && outcome.probes < kPart; ++point) {
-      if (!settled.contains(point) && table.is_left_in(point) && table.fault(point).empty()) {
+      if (!completed.contains(point) && table.is_left_in(point) && table.fault(point).empty()) {
         reuse(change, point, model_id);
       }
     }
@@ -108,18 +100,16 @@ void ResultReuse::run(const ReuseResults& change) {
 }
 
 void ResultReuse::end(const EndTaking& change) {
-  end_.bind(1, change.study_id);
-  end_.run();
+  execute_with(database_, "UPDATE studies SET reuses = 0 WHERE study_id = ?", change.study_id);
 }
 
-/// `point`, or the end of the run of settled points that it is in.
-std::uint64_t ResultReuse::first_unsettled(std::uint64_t study_id, std::uint64_t point) {
-  settled_run_.bind(1, study_id);
-  settled_run_.bind(2, point);
-  const std::uint64_t end =
-      settled_run_.step() ? static_cast<std::uint64_t>(settled_run_.integer(0)) : 0;
-  settled_run_.reset();
-  return std::max(point, end);
+/// `point`, or the end of the completed range that contains it.
+std::uint64_t ResultReuse::first_open(std::uint64_t study_id, std::uint64_t point) {
+  std::uint64_t first = point;
+  ranges_.overlapping(study_id, {point, point + 1}).for_each([&](const Interval& range) {
+    first = range.end;
+  });
+  return first;
 }
 
 /// Its row in `models`; 0: there is none.
@@ -136,36 +126,27 @@ std::int64_t ResultReuse::stored_model(const protocol::PointTable& table, std::u
 
 /// Copies the first usable row that has the inputs of that point.
 void ResultReuse::reuse(const ReuseResults& change, std::uint64_t point, std::int64_t model_id) {
-  static const int kStudy = packed_column("study_id");
-  static const int kPoint = packed_column("point");
-  static const int kTakenFrom = packed_column("taken_from");
   ReusedResults& outcome = *change.outcome;
   ++outcome.probes;
   const protocol::Point inputs = change.table->point(point);
-  const ResetAtEnd reset{rows_};
-  rows_.bind(1, model_id);
-  rows_.bind(2, inputs.H_m);
-  rows_.bind(3, inputs.mu);
-  rows_.bind(4, inputs.e_star);
-  rows_.bind(5, change.solver_version);
-  for (; rows_.step(); ++outcome.probes) {
-    row_.read(rows_, kRow);
-    const auto source_id = static_cast<std::uint64_t>(row_.at(kStudy).whole);
-    Source* const source = source_id == change.study_id ? nullptr : source_of(source_id);
+  const ResetAtEnd reset{find_};
+  find_.bind_all(model_id, inputs.H_m, inputs.mu, inputs.e_star, change.solver_version,
+                 change.study_id);
+  for (; find_.step(); ++outcome.probes) {
+    const auto source_id = static_cast<std::uint64_t>(find_.integer(0));
+    Source* const source = source_of(source_id);
     if (source == nullptr || source->wants_errors != change.table->wants_errors() ||
-        rows_.integer(kIsUsable) == 0 || rows_.is_null(kChecksum) ||
-        rows_.integer(kChecksum) != row_.checksum(checksum_)) {
+        find_.integer(2) == 0) {
       continue;
     }
-    PackedValue& origin = row_.at(kTakenFrom);
-    origin.type = PackedValue::Type::kText;
-    origin.text = fmt::format("{}/{}", source_id, row_.at(kPoint).whole);
-    set_whole(row_.at(kStudy), change.study_id);
-    set_whole(row_.at(kPoint), point);
-    if (insert_.run(row_)) {
+    const std::string reused_from = fmt::format("{}/{}", source->name, find_.integer(1));
+    const ResetAtEnd reset_copy{copy_};
+    copy_.bind_all(change.study_id, point, reused_from, source_id, find_.integer(1));
+    copy_.run();
+    if (sqlite3_changes(database_) > 0) {
       ++source->copied;
       outcome.points.insert(point);
-      settled_.add(change.study_id, point);
+      ranges_.add(change.study_id, point);
     }
     break;
   }
@@ -190,18 +171,15 @@ ResultReuse::Source* ResultReuse::source_of(std::uint64_t study_id) {
 }
 
 void ResultReuse::count_origins(const ReuseResults& change) {
-  for (const auto& [source_id, source] : sources_) {
+  for (const auto& [id, source] : sources_) {
     if (!source || source->copied == 0) {
       continue;
     }
     change.outcome->origins[source->name] = source->copied;
-    name_origin_.bind(1, source_id);
-    name_origin_.bind(2, source->name);
-    name_origin_.run();
-    count_.bind(1, change.study_id);
-    count_.bind(2, source_id);
-    count_.bind(3, source->copied);
-    count_.run();
+    execute_with(database_,
+                 "INSERT INTO reused_points (study_id, source, points) VALUES (?1, ?2, ?3)"
+                 " ON CONFLICT DO UPDATE SET points = points + excluded.points",
+                 change.study_id, source->name, source->copied);
   }
 }
 

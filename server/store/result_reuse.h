@@ -8,21 +8,21 @@
 
 #include "server/database/sqlite.h"
 #include "server/store/changes.h"
-#include "server/store/rows/packed_row.h"
-#include "server/store/rows/settled_runs.h"
+#include "server/store/completed_ranges.h"
+#include "server/store/result_rows.h"
 
 namespace oblique::server {
 
 /// Carries out ReuseResults: looks up the open points of a study among the solved points of others,
 /// by the index `solved_points`, and copies the rows that it finds. A copy differs from its source
-/// only in its study, its point and `taken_from`.
+/// only in its study, its point and `reused_from`.
 ///
-/// A row is copied only if it is as it was stored: its checksum fits, and so do those of its worker
-/// and its texts. Rows that were edited by hand have no checksum and are not copied.
+/// A row is copied only if its checksum is right. Rows that were edited by hand have none and are
+/// not copied.
 class ResultReuse {
  public:
   /// All must outlive this.
-  ResultReuse(sqlite3* database, SettledRuns& settled);
+  ResultReuse(sqlite3* database, CompletedRanges& ranges);
 
   /// Fills in `change.outcome`. Throws StorageError.
   void run(const ReuseResults& change);
@@ -36,24 +36,18 @@ class ResultReuse {
     std::uint64_t copied = 0;  ///< rows
   };
 
-  std::uint64_t first_unsettled(std::uint64_t study_id, std::uint64_t point);
+  std::uint64_t first_open(std::uint64_t study_id, std::uint64_t point);
   std::int64_t stored_model(const protocol::PointTable& table, std::uint64_t model);
   void reuse(const ReuseResults& change, std::uint64_t point, std::int64_t model_id);
   Source* source_of(std::uint64_t study_id);
   void count_origins(const ReuseResults& change);
 
   sqlite3* database_;
-  SettledRuns& settled_;
-  Statement settled_run_;
+  CompletedRanges& ranges_;
   Statement model_;
-  Statement rows_;
+  Statement find_;
+  Statement copy_;
   Statement source_;
-  Statement name_origin_;
-  Statement count_;
-  Statement end_;
-  RowInsert insert_;
-  PackedRow row_;
-  RowChecksum checksum_;
   // Of the change under way: names may be others in the next one, and models be gone.
   std::map<std::uint64_t, std::optional<Source>> sources_;
   std::unordered_map<std::uint64_t, std::int64_t> models_;  // 0: it has no row

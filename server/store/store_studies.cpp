@@ -1,4 +1,5 @@
-// Reading back what studies there are and how far they are, and the numbers that were given.
+// Reading the studies and their progress from the database at a start.
+#include <algorithm>
 #include <limits>
 #include <map>
 #include <optional>
@@ -10,8 +11,8 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/text.h"
-#include "server/store/rows/recipe_check.h"
-#include "server/store/rows/row_columns.h"
+#include "server/store/recipe_check.h"
+#include "server/store/result_rows.h"
 #include "server/store/store.h"
 
 namespace oblique::server {
@@ -26,42 +27,40 @@ StudyState state_named(const std::string& name) {
   return StudyState::kRunning;
 }
 
-/// What is known of failures, gathered by a pass over all of them.
-struct Progress {
-  std::map<std::uint64_t, IntervalSet> failures;
-  std::map<std::uint64_t, PointAttempts> attempts;
-};
-
 std::uint64_t number(Statement& statement, int column) {
   return static_cast<std::uint64_t>(statement.integer(column));
 }
 
-Progress progress_of_all(sqlite3* database) {
-  Progress progress;
-  // The failures that are there come last: they are later than all that were forgotten.
-  Statement retries(database,
-                    "SELECT study_id, first_point, points, attempt FROM retries ORDER BY rowid");
-  while (retries.step()) {
-    const std::uint64_t first = number(retries, 1);
-    progress.attempts[number(retries, 0)].set({first, first + number(retries, 2)},
-                                              static_cast<std::uint32_t>(retries.integer(3)));
+/// Reads the failures, and the attempts in which points failed, of all studies.
+void read_failures(sqlite3* database, std::vector<StoredStudy>& studies) {
+  std::map<std::uint64_t, StoredStudy*> by_number;
+  for (StoredStudy& study : studies) {
+    by_number[study.study_id] = &study;
   }
-  Statement failed(database,
-                   "SELECT study_id, point, attempt FROM packed_results INDEXED BY failed_points"
-                   " WHERE error IS NOT NULL"
-                   " ORDER BY study_id, point");
-  while (failed.step()) {
-    const std::uint64_t point = number(failed, 1);
-    progress.failures[number(failed, 0)].insert(point);
-    progress.attempts[number(failed, 0)].set({point, point + 1},
-                                             static_cast<std::uint32_t>(failed.integer(2)));
-  }
-  return progress;
+  const auto read = [&](const char* sql, bool is_failed) {
+    Statement row(database, sql);
+    while (row.step()) {
+      const auto study = by_number.find(number(row, 0));
+      if (study == by_number.end()) {
+        continue;
+      }
+      const Interval points{number(row, 1), number(row, 1) + number(row, 2)};
+      study->second->attempts.set(points, static_cast<std::uint32_t>(row.integer(3)));
+      if (is_failed) {
+        study->second->failures.insert(points.begin, points.end);
+      }
+    }
+  };
+  // Rows of failures are later than the retries of their points.
+  read("SELECT study_id, first_point, points, attempt FROM retries ORDER BY rowid", false);
+  read(
+      "SELECT study_id, point, 1, attempt FROM results INDEXED BY failed_points"
+      " WHERE error IS NOT NULL ORDER BY study_id, point",
+      true);
 }
 
-/// Makes sure that points can be handed out, and makes the study's table.
-/// Gives why this version takes no such study, or an empty text. Throws StorageError for a recipe
-/// that cannot be read.
+/// Reads the study's recipe. Returns why this version does not accept the study, or an empty text.
+/// Throws StorageError for a recipe that cannot be read.
 std::string objection_to(const StoredStudy& study) {
   try {
     (void)study.table.get();
@@ -74,8 +73,14 @@ std::string objection_to(const StoredStudy& study) {
   return {};
 }
 
+bool has_condition(const StoredStudy& study) {
+  return std::ranges::any_of(study.table.get()->recipe().blocks(),
+                             [](const protocol::Block& block) { return !block.where().empty(); });
+}
+
 /// Throws StorageError for a study whose rows are those of another one, as when its number was
-/// changed by hand. Compares the first row, the last, and some between with the recipe.
+/// changed by hand. Compares the first row, the last, and some between with the recipe. A completed
+/// point may lack a row where a condition leaves out points.
 void check_rows(sqlite3* database, const StoredStudy& study) {
   constexpr std::uint64_t kCompared = 64;
   const std::uint64_t step = study.settled.size() / kCompared + 1;
@@ -92,13 +97,16 @@ void check_rows(sqlite3* database, const StoredStudy& study) {
     }
   });
   RecipeCheck recipe(database, *study.table.get());
-  Statement row(database, fmt::format("SELECT {} FROM packed_results"
+  Statement row(database, fmt::format("SELECT {} FROM results"
                                       " WHERE study_id = ? AND point = ?",
                                       RecipeCheck::kColumns));
   for (const std::uint64_t point : points) {
     row.bind(1, study.study_id);
     row.bind(2, point);
-    const std::string fault = row.step() ? recipe.fault_of(row) : "its row is gone";
+    const bool has_row = row.step();
+    const std::string fault = has_row                ? recipe.fault_of(row)
+                              : has_condition(study) ? ""
+                                                     : "its row is gone";
     row.reset();
     if (!fault.empty()) {
       throw StorageError(fmt::format(
@@ -113,45 +121,40 @@ void check_rows(sqlite3* database, const StoredStudy& study) {
 
 }  // namespace
 
-/// What is in doubt is counted in one transaction.
-PointsOfStudies Store::settled_points() {
-  auto found = noted_points(database_.get());
-  std::optional<Transaction> counting;
-  for (const auto& [study_id, points] : found) {
-    if (!points) {
-      if (!counting) {
-        log_->make_sure();
-        counting.emplace(database_.get());
-      }
-      settled_->count_again(study_id);
+/// Counts rows again where that is needed, in one transaction.
+PointsOfStudies Store::completed_points() {
+  PointsOfStudies completed;
+  std::vector<std::uint64_t> uncounted;
+  for (auto& [study_id, points] : noted_points(database_.get())) {
+    if (points) {
+      completed.emplace(study_id, std::move(*points));
+    } else {
+      uncounted.push_back(study_id);
     }
   }
-  if (counting) {
-    counting->commit();
-    found = noted_points(database_.get());
+  if (!uncounted.empty()) {
+    in_transaction(true, [&] {
+      std::ranges::for_each(uncounted, [&](std::uint64_t id) { ranges_->count_again(id); });
+    });
   }
-  PointsOfStudies settled;
-  for (auto& [study_id, points] : found) {
-    settled.emplace(study_id, std::move(points).value_or(IntervalSet()));
+  for (const std::uint64_t id : uncounted) {
+    completed.emplace(id, noted_points_of(database_.get(), id).value_or(IntervalSet()));
   }
-  return settled;
+  return completed;
 }
 
 std::vector<StoredStudy> Store::studies() {
   std::vector<StoredStudy> found;
-  Progress progress = progress_of_all(database_.get());
   Statement list(database_.get(),
-                 "SELECT study_id, name, recipe, state, created_at, priority, weight,"
-                 " mixes_versions, points, coalesce(submitted_by, ''), takes_over FROM studies "
+                 "SELECT study_id, name, recipe, state, created_at, priority,"
+                 " points, coalesce(submitted_by, ''), reuses FROM studies "
                  "ORDER BY study_id");
   Statement version(database_.get(),
-                    "SELECT w.solver_version FROM packed_results AS r"
-                    " CROSS JOIN workers AS w ON w.worker_id = r.worker"
+                    "SELECT w.solver_version FROM results AS r"
+                    " CROSS JOIN workers AS w USING (worker_id)"
                     " WHERE r.study_id = ? ORDER BY r.point LIMIT 1");
-  Statement taken(database_.get(),
-                  "SELECT o.name, t.points FROM taken_points AS t"
-                  " JOIN origins AS o USING (origin_id) WHERE t.study_id = ?");
-  PointsOfStudies settled = settled_points();
+  Statement taken(database_.get(), "SELECT source, points FROM reused_points WHERE study_id = ?");
+  PointsOfStudies settled = completed_points();
   while (list.step()) {
     StoredStudy study{};
     study.study_id = number(list, 0);
@@ -171,15 +174,15 @@ std::vector<StoredStudy> Store::studies() {
           "check` tells more",
           study.name, list.integer(0)));
     }
-    study.table = StudyTable(list.text(2), number(list, 8));
+    study.table = StudyTable(list.text(2), number(list, 6));
     study.state = state_named(list.text(3));
     study.created_at = list.text(4);
-    study.terms = {static_cast<std::int32_t>(list.integer(5)), list.real(6), list.integer(7) != 0};
-    study.submitted_by = list.text(9);
-    study.takes_over = list.integer(10) != 0;
+    study.priority = static_cast<std::int32_t>(list.integer(5));
+    study.submitted_by = list.text(7);
+    study.takes_over = list.integer(8) != 0;
     taken.bind(1, study.study_id);
     while (taken.step()) {
-      study.taken[taken.text(0)] += number(taken, 1);
+      study.taken[taken.text(0)] = number(taken, 1);
     }
     taken.reset();
     study.settled = std::move(settled[study.study_id]);
@@ -197,12 +200,11 @@ std::vector<StoredStudy> Store::studies() {
       continue;
     }
     if (!is_open || study.state != StudyState::kRunning) {
-      study.table.release();  // nobody computes with it for now
+      study.table.release();  // not needed until the study runs again
     }
-    study.failures = std::move(progress.failures[study.study_id]);
-    study.attempts = std::move(progress.attempts[study.study_id]);
     found.push_back(std::move(study));
   }
+  read_failures(database_.get(), found);
   return found;
 }
 
@@ -225,11 +227,8 @@ std::uint64_t Store::last_worker_id() {
 }
 
 std::uint64_t Store::count_start() {
-  log_->make_sure();
-  set_sync(true);
-  Transaction transaction(database_.get());
-  execute(database_.get(), "UPDATE about SET starts = starts + 1");
-  transaction.commit();
+  in_transaction(true,
+                 [this] { execute(database_.get(), "UPDATE about SET starts = starts + 1"); });
   return highest("SELECT starts FROM about");
 }
 

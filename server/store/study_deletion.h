@@ -18,15 +18,15 @@ class StudyDeletion {
   /// Deletes the study except for its rows. In a transaction of the caller. Throws StorageError.
   void remove(std::uint64_t study_id);
 
-  /// Whether rows of deleted studies are left. Throws StorageError.
+  /// Whether rows of deleted studies may be left. Throws StorageError.
   bool has_rows() const;
 
   /// Deletes at most so many rows. In a transaction of the caller. Throws StorageError.
   void delete_rows(std::size_t most);
 
-  /// Deletes the models, workers, texts and origins that no row refers to any more, if studies were
-  /// deleted and all their rows are gone. Reads all rows of the file then. To be called before any
-  /// of them is in use, in a transaction of the caller. Throws StorageError.
+  /// Deletes the models and workers that no row refers to any more, if studies were deleted and all
+  /// their rows are gone. Reads all rows of the file then. To be called before any of them is in
+  /// use, in a transaction of the caller. Throws StorageError.
   void remove_orphans();
 
   std::uint64_t rows() const { return rows_; }  ///< deleted by this object

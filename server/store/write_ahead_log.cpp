@@ -16,7 +16,7 @@ sqlite3_file* file_of(sqlite3* database) {
   return file != nullptr && file->pMethods != nullptr ? file : nullptr;  // without them: not open
 }
 
-/// Writes every byte of the file as it is, and syncs it. SQLite's code for what failed.
+/// Writes every byte of the file as it is, and syncs it. Returns the result code.
 int write_again(sqlite3_file* file) {
   std::vector<char> bytes(std::size_t{1} << 16U);
   sqlite3_int64 size = 0;
@@ -34,8 +34,9 @@ int write_again(sqlite3_file* file) {
 }  // namespace
 
 WriteAheadLog::WriteAheadLog(sqlite3* database) : database_(database) {
-  // Closing would make a checkpoint of a log that may be suspect.
+  sqlite3_busy_timeout(database_, kBusyTimeout_ms);
   sqlite3_db_config(database_, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
+  // This replaces the checkpoints of SQLite.
   sqlite3_wal_hook(
       database_,
       [](void* log, sqlite3*, const char*, int pages) {
@@ -45,19 +46,22 @@ WriteAheadLog::WriteAheadLog(sqlite3* database) : database_(database) {
       this);
 }
 
-void WriteAheadLog::make_sure() {
-  if (!is_suspect_) {
-    return;
-  }
-  // No other program may write meanwhile.
-  const Transaction transaction(database_);
+void WriteAheadLog::rewrite() {
+  const Transaction transaction(database_);  // no other program may write meanwhile
   sqlite3_file* file = file_of(database_);
   const int code = file != nullptr ? write_again(file) : SQLITE_OK;
   if (code != SQLITE_OK) {
-    throw StorageError("the write-ahead log cannot be written again after a failure: " +
+    throw StorageError("the write-ahead log cannot be written again at the start: " +
                        std::string(sqlite3_errstr(code)));
   }
-  is_suspect_ = false;
+}
+
+int WriteAheadLog::checkpoint(int mode, int* in_log, int* copied) {
+  const int code = sqlite3_wal_checkpoint_v2(database_, "main", mode, in_log, copied);
+  if (is_failed_sync(code)) {
+    throw_failed_sync(database_);
+  }
+  return code;
 }
 
 void WriteAheadLog::shorten() {
@@ -65,39 +69,26 @@ void WriteAheadLog::shorten() {
     return;
   }
   int in_log = 0;
-  int moved = 0;
-  const int code =
-      sqlite3_wal_checkpoint_v2(database_, "main", SQLITE_CHECKPOINT_PASSIVE, &in_log, &moved);
-  // Readers may keep it from doing all, which is no fault.
-  is_suspect_ = code != SQLITE_OK && code != SQLITE_BUSY;
-  if (code == SQLITE_OK && in_log == moved) {
-    pages_ = 0;  // the next commit begins it anew
+  int copied = 0;
+  if (checkpoint(SQLITE_CHECKPOINT_PASSIVE, &in_log, &copied) == SQLITE_OK && in_log == copied) {
+    pages_ = 0;  // the next commit begins the log anew
   }
 }
 
 bool WriteAheadLog::merge() {
-  make_sure();
-  const int code =
-      sqlite3_wal_checkpoint_v2(database_, "main", SQLITE_CHECKPOINT_TRUNCATE, nullptr, nullptr);
+  // A reader may take long, and results would wait.
+  sqlite3_busy_timeout(database_, 0);
+  const int code = checkpoint(SQLITE_CHECKPOINT_TRUNCATE, nullptr, nullptr);
+  sqlite3_busy_timeout(database_, kBusyTimeout_ms);
   if ((static_cast<unsigned>(code) & 0xffU) == SQLITE_BUSY) {
     return false;
   }
   if (code != SQLITE_OK) {
-    is_suspect_ = true;
     throw StorageError("the write-ahead log cannot be merged into the database: " +
                        std::string(sqlite3_errstr(code)));
   }
   pages_ = 0;
   return true;
-}
-
-void WriteAheadLog::before_closing() {
-  try {
-    make_sure();
-    sqlite3_db_config(database_, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 0, nullptr);
-  } catch (const StorageError&) {
-    // The next server tries again, with the log as it is.
-  }
 }
 
 }  // namespace oblique::server

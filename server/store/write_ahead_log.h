@@ -4,14 +4,12 @@
 
 namespace oblique::server {
 
-/// Keeps the write-ahead log of an open database honest and short.
+/// Makes the checkpoints of an open database, because SQLite ignores failures of its own ones.
 ///
-/// When a sync fails, Linux takes for written what it could not write, and a later sync succeeds
-/// without it: commits that stand in the log would be lost with the power, and a checkpoint could
-/// leave the database with parts of them. So after a failure all of the log is written again, byte
-/// by byte as it is, before anything builds on it. A server that starts does so too, for it does
-/// not know how the one before ended. SQLite makes checkpoints by itself, and keeps their failures
-/// to itself; so they are made here.
+/// After a failed sync Linux takes what it could not write for written, and a later sync succeeds
+/// without it. A checkpoint of such a log could leave the database with parts of a transaction when
+/// the power is lost. So each failed sync throws StorageGone, which ends the server, and the next
+/// one writes the log anew before it builds on it.
 class WriteAheadLog {
  public:
   /// Takes over the checkpoints of `database`, which must outlive this.
@@ -19,28 +17,33 @@ class WriteAheadLog {
   WriteAheadLog(const WriteAheadLog&) = delete;
   WriteAheadLog& operator=(const WriteAheadLog&) = delete;
 
-  /// Something failed, perhaps a sync.
-  void suspect() { is_suspect_ = true; }
-  /// Writes the log again if there is reason to. Throws StorageError when that fails.
-  void make_sure();
-  /// Moves a long log into the database. What was committed stands, also when this fails.
+  /// Writes the bytes of the log as they are and syncs them. To be called once, before the first
+  /// change: it is unknown how the server before ended. Throws StorageError.
+  void rewrite();
+  /// Copies a long log into the database. Committed transactions stay when this fails. Throws
+  /// StorageGone after a failed sync; other failures are ignored, and it is tried again.
   void shorten();
-  /// It stays many times as long as it should be, for readers that need it.
-  bool is_held_long() const { return pages_ > kHeldLong * long_pages_; }
-  /// Moves all of it into the database and empties it. False when a reader still needs it. Throws
+  /// Copies all of it into the database and empties it. False when a reader still needs it. Throws
   /// StorageError.
   bool merge();
-  /// A log of so many pages is long.
+  /// Whether readers keep the log from being shortened for so long that changes that can wait
+  /// should wait.
+  bool is_held_long() const { return pages_ > kHeldLong * long_pages_; }
+  /// Length in pages from which on `shorten` copies the log.
   void shorten_at(int pages) { long_pages_ = pages; }
-  /// To be called before the database is closed, which would build on the log.
-  void before_closing();
+  /// Lets SQLite copy and delete the log when the database is closed. Not after a failed sync.
+  void delete_on_close() {
+    sqlite3_db_config(database_, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 0, nullptr);
+  }
 
  private:
+  int checkpoint(int mode, int* in_log, int* copied);
+
   sqlite3* database_;
-  bool is_suspect_ = true;
   int pages_ = 0;
   int long_pages_ = 1000;
   static constexpr int kHeldLong = 16;
+  static constexpr int kBusyTimeout_ms = 2000;  // of other statements than `merge`
 };
 
 }  // namespace oblique::server

@@ -19,18 +19,18 @@ constexpr std::size_t kLargestGroup = 256;
 /// Pause before a faulty database is tried again.
 constexpr std::chrono::milliseconds kRetryPause{500};
 
-/// While nothing is to be written the database is looked after so often.
+/// Interval of the calls of `tend` while no job waits.
 constexpr std::chrono::milliseconds kTendPause{1000};
 
-/// Rows of deleted studies go so many at a time, some 10 ms, between which whatever waits is
-/// written. After a step that failed or must wait, none is tried for a pause.
+/// Rows of deleted studies are deleted so many at a time (about 10 ms), and waiting jobs are
+/// written in between. After a step that failed or must wait there is a pause.
 constexpr std::size_t kRowsAtOnce = 1000;
 constexpr std::chrono::milliseconds kClearPause{1000};
 
-/// So often a log that readers hold is tried before that is said.
+/// Attempts to merge a log that readers hold before that is reported.
 constexpr int kQuietTries = 5;
 
-/// At the end the log is tried so often, with such pauses: readers have some seconds.
+/// Attempts to merge the log at the end, and the pause between them: readers have three seconds.
 constexpr int kLastTries = 15;
 constexpr std::chrono::milliseconds kLastPause{200};
 
@@ -39,42 +39,17 @@ bool ends_a_study(const Change& change) {
   return state != nullptr && state->state == StudyState::kDone;
 }
 
-// The study that a change is of; 0: of none.
-std::uint64_t study_of(const AddStudy& change) {
-  return change.study_id;
-}
-std::uint64_t study_of(const SetStudyState& change) {
-  return change.study_id;
-}
-std::uint64_t study_of(const SetStudyTerms& change) {
-  return change.study_id;
-}
-std::uint64_t study_of(const ForgetFailures& change) {
-  return change.study_id;
-}
-std::uint64_t study_of(const GrowStudy& change) {
-  return change.study_id;
-}
-std::uint64_t study_of(const RenameStudy& change) {
-  return change.study_id;
-}
-std::uint64_t study_of(const ReuseResults& change) {
-  return change.study_id;
-}
-std::uint64_t study_of(const EndTaking& change) {
-  return change.study_id;
-}
-std::uint64_t study_of(const DeleteStudy& change) {
-  return change.study_id;
-}
-std::uint64_t study_of(const AddWorker& /*change*/) {
-  return 0;
-}
-std::uint64_t study_of(const AddResults& change) {
-  return change.study_id;
-}
+/// The study that the change is of; 0: none.
 std::uint64_t study_of(const Change& change) {
-  return std::visit([](const auto& kind) { return study_of(kind); }, change);
+  return std::visit(
+      [](const auto& kind) -> std::uint64_t {
+        if constexpr (requires { kind.study_id; }) {
+          return kind.study_id;
+        } else {
+          return 0;
+        }
+      },
+      change);
 }
 
 }  // namespace
@@ -187,7 +162,7 @@ CommitCounts Writer::commits() const {
 
 void Writer::merge_before_the_end() {
   if (commits_.is_faulty()) {
-    return;  // what waits is not in the log either; that it is lost is said
+    return;  // the log does not have the waiting jobs; their loss is reported
   }
   std::vector<WriteReport> reports;
   bool merged = false;
@@ -238,7 +213,7 @@ bool GroupCommit::clear(std::size_t most, std::vector<WriteReport>& reports) {
   } catch (const StorageGone& error) {
     note_gone(error, reports);
   } catch (const std::exception&) {
-    // As when the disk is full: what waits to be written finds out, and says so. Tried again.
+    // As when the disk is full, which the next commit reports. It is tried again.
   }
   return false;
 }
@@ -251,7 +226,7 @@ bool GroupCommit::merge(std::vector<WriteReport>& reports) {
   } catch (const StorageGone& error) {
     note_gone(error, reports);
   } catch (const StorageError& error) {
-    why_unmerged_ = error.what();  // what was committed stands, and the log is still there
+    why_unmerged_ = error.what();  // nothing is lost: the log is still there
   }
   return false;
 }
@@ -322,8 +297,8 @@ void GroupCommit::write_singly(std::deque<WriteJob>& jobs, std::vector<WriteRepo
     kept.push_back(std::move(job));
   };
   for (WriteJob& job : jobs) {
-    // Behind a job that is kept nothing of its kind is tried, nor anything else of its study: done
-    // and then retried must not become retried and then done.
+    // Once a job waits, later ones that can wait are not tried, nor any change of its study: "done,
+    // then retried" must not become "retried, then done".
     if (gone_ || (!fault.empty() && !job.answer_failure)) {
       keep(job);
       continue;

@@ -17,68 +17,68 @@
 
 namespace oblique::server {
 
-/// A change on its way to the database.
+/// A change that waits to be written.
 struct WriteJob {
   std::uint64_t ticket;
   Change change;
-  /// Somebody waits for a yes or no: a failure is reported at once. Otherwise the change is kept
-  /// and tried again until it is durable.
+  /// Whether a failure is reported at once, because a client waits for the answer. Otherwise the
+  /// change is tried again until it is durable.
   bool answer_failure;
 };
 
-/// What became of a job, or of the database itself.
+/// The outcome of a job, or a change of the state of the database.
 struct WriteReport {
   enum class Kind {
-    kStored,     ///< the job of that ticket is durable
-    kRefused,    ///< it failed and is given up; `error` says why
-    kFault,      ///< the database does not take changes; jobs wait. Said once
-    kRecovered,  ///< it does again
-    kGone,       ///< its files are not there any more; nothing is written from then on. Said once
-    kUnmerged,  ///< the write-ahead log cannot be merged, as `error` says. Said once a study or end
+    kStored,     ///< the job with that ticket is durable
+    kRefused,    ///< the job failed and was dropped; `error` says why
+    kFault,      ///< the database does not accept changes; jobs wait. Reported once
+    kRecovered,  ///< it accepts changes again
+    kGone,       ///< its file is gone or a sync failed; nothing is written any more. Reported once
+    kUnmerged,   ///< the write-ahead log cannot be merged; `error` says why. Once a study, or end
   };
   Kind kind;
   std::uint64_t ticket = 0;
   std::string error;
 };
 
-/// What was committed since the writer began.
+/// Counts of commits since the writer began.
 struct CommitCounts {
   Histogram duration_s{{0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0}};
   Histogram rows{{1.0, 4.0, 16.0, 64.0, 256.0, 1024.0, 4096.0, 16'384.0, 65'536.0}};  ///< results
 };
 
-/// Writes jobs in groups, one transaction each. No thread and no clock of its own.
+/// Writes jobs in groups, one transaction each. It has no thread or clock of its own.
 class GroupCommit {
  public:
   /// `storage` must outlive this.
   explicit GroupCommit(Storage& storage) : storage_(storage) {}
 
-  /// Writes the first of `jobs`, in order, and takes off what is durable or given up. When a group
-  /// fails, each of all jobs is tried alone, so that a bad one does not take the others with it;
-  /// changes of one study keep their order also then.
+  /// Writes the first of `jobs`, in order, and removes those that are durable or refused. When a
+  /// group fails, every job is tried alone, so that one bad change does not block the others;
+  /// changes of one study keep their order.
   std::vector<WriteReport> write(std::deque<WriteJob>& jobs);
 
   /// Results that became durable since this began.
   std::uint64_t rows() const { return rows_; }
-  /// The last write left jobs that the database did not take.
+  /// Whether the last write left jobs that the database did not accept.
   bool is_faulty() const { return faulty_; }
-  /// The database is not where it was; nothing is written any more.
+  /// Whether nothing is written any more, as after WriteReport::Kind::kGone.
   bool is_gone() const { return gone_; }
 
-  /// An earlier process may have left rows of deleted studies.
+  /// To be called at a start: an earlier process may have left rows of deleted studies.
   void resume_deletions() { clears_ = true; }
   /// Whether rows of deleted studies may be left.
   bool has_to_clear() const { return clears_ && !gone_; }
   /// Deletes at most so many of them. False when that must wait a while.
   bool clear(std::size_t most, std::vector<WriteReport>& reports);
 
-  /// To be called now and then while nothing waits: looks whether the database is still there, and
-  /// merges its log once a study is done.
+  /// To be called regularly while no job waits: checks the file of the database, and merges its log
+  /// once a study is done.
   std::vector<WriteReport> tend();
 
   /// Merges the log. False when it must be tried again; the database may be gone by then.
   bool merge(std::vector<WriteReport>& reports);
-  /// Says that the last `merge` failed, and why.
+  /// The report that the last `merge` failed.
   WriteReport unmerged() const { return {WriteReport::Kind::kUnmerged, 0, why_unmerged_}; }
 
  private:
@@ -98,7 +98,7 @@ class GroupCommit {
   std::string why_unmerged_;
 };
 
-/// The one thread that writes the database. What waits is committed together, in order.
+/// The thread that writes the database. Jobs that wait are committed together, in order.
 class Writer {
  public:
   using Report = std::function<void(std::vector<WriteReport>)>;
@@ -118,8 +118,8 @@ class Writer {
   /// storage.
   void resume_deletions();
 
-  /// Writes what waits, merges the log and ends the thread, also when a statement would never end.
-  /// Returns how many jobs could not be made durable.
+  /// Writes the waiting jobs, merges the log and ends the thread, also when a statement would never
+  /// end. Returns the number of jobs that could not be made durable.
   std::size_t finish();
 
   /// From any thread.

@@ -49,7 +49,7 @@ void count_studies(const Service& service, std::int64_t now_ms, bool for_page, S
     snapshot.points_open += states.state(id) == StudyState::kRunning ? points.open() : 0;
     snapshot.points_leased += points.leased;
     const StudyRecord& record = states.record(id);
-    ranked.push_back({record.terms.priority, id});
+    ranked.push_back({record.priority, id});
     if (!record.submitted_by.empty()) {
       OpenNumbers& open = snapshot.open_by_key[record.submitted_by];
       ++open.studies;

@@ -221,7 +221,7 @@ void bench_server_killed(std::uint64_t points) {
   const auto killed = Clock::now();
   const test::Server again(study.folder, study.file, study.server);
   const std::chrono::duration<double> started = Clock::now() - killed;
-  const std::string joined = "SELECT count(DISTINCT worker) FROM results WHERE worker > 2";
+  const std::string joined = "SELECT count(DISTINCT worker_id) FROM results WHERE worker_id > 2";
   wait_for([&] { return study.database.number(joined) >= 2; });
   const std::chrono::duration<double> full = Clock::now() - killed;
   std::printf("| %.3g | %.2f | %.2f |\n", static_cast<double>(points), started.count(),

@@ -6,11 +6,11 @@
 
 #include <unistd.h>
 
-#include "server/asking/plan.h"
-#include "server/asking/sql/sql_expression.h"
 #include "server/database/open_for_reading.h"
-#include "server/reading/query_rules.h"
-#include "server/reading/reader.h"
+#include "server/query/plan.h"
+#include "server/query/query_rules.h"
+#include "server/query/reader.h"
+#include "server/query/sql_text.h"
 #include "server/store/store.h"
 #include "tests/support/points.h"
 #include "worker/solver/model/errors.h"

@@ -133,11 +133,10 @@ void SimulatedClient::ask() {
     expect(protocol::STUDY_CHANGE_RESUME);
     request.mutable_submit()->set_name(name_);
     // The model of the store holds what workers solved, not copies.
-    request.mutable_submit()->set_fresh(true);
+    request.mutable_submit()->set_no_reuse(true);
     if (world_.chance(0.3)) {
-      // Submitting again with another share changes it, durably before it is acknowledged.
+      // Submitting again with another priority changes it, durably before it is acknowledged.
       request.mutable_submit()->set_priority(static_cast<std::int32_t>(world_.between(-2, 2)));
-      request.mutable_submit()->set_weight(static_cast<double>(world_.between(1, 8)) / 4.0);
     }
     *request.mutable_submit()->mutable_recipe() = recipe_;
   }

@@ -66,11 +66,11 @@ void SimulatedServer::stop() {
     for (const auto& report : commits_->write(jobs_)) {
       service_->written(report, now());
     }
-    if (commits_->is_faulty()) {
+    if (commits_->is_faulty() || commits_->is_gone()) {
       break;
     }
   }
-  if (!disk_.died()) {
+  if (!disk_.died() && !commits_->is_gone()) {
     std::vector<server::WriteReport> ignored;
     commits_->merge(ignored);
   }
@@ -79,6 +79,17 @@ void SimulatedServer::stop() {
     disk_.crash(false);
   }
   end();
+}
+
+/// A server whose sync failed ends as at a crash: what it acknowledged before is in the files.
+bool SimulatedServer::ends() {
+  const bool sync_failed = commits_->is_gone();
+  if (!disk_.died() && !sync_failed) {
+    return false;
+  }
+  failed_syncs += sync_failed ? 1U : 0U;
+  crash(world_.chance(0.4));
+  return true;
 }
 
 void SimulatedServer::after(std::int64_t delay_ms, std::function<void()> what) {
@@ -175,8 +186,7 @@ void SimulatedServer::clear_some() {
     clearing_ = false;
     std::vector<server::WriteReport> reports;
     const bool goes_on = commits_->clear(static_cast<std::size_t>(world_.between(1, 30)), reports);
-    if (disk_.died()) {
-      crash(world_.chance(0.4));
+    if (ends()) {
       return;
     }
     for (const auto& report : reports) {
@@ -192,8 +202,10 @@ void SimulatedServer::clear_some() {
 
 void SimulatedServer::write_group() {
   const auto reports = commits_->write(jobs_);
-  // In the middle of a write, or after the commit and before anybody knows of it.
-  if (disk_.died() || (world_.faults && world_.chance(0.003))) {
+  if (ends()) {
+    return;
+  }
+  if (world_.faults && world_.chance(0.003)) {  // after the commit and before its reports are read
     crash(world_.chance(0.4));
     return;
   }
@@ -207,9 +219,7 @@ void SimulatedServer::write_group() {
     after(commits_->is_faulty() ? 500 : 1, [this] { write_group(); });
   } else if (jobs_.empty()) {
     commits_->tend();
-    if (disk_.died()) {
-      crash(world_.chance(0.4));
-    }
+    ends();
   }
 }
 

@@ -61,6 +61,7 @@ class SimulatedServer final : public server::Outbox {
   std::uint64_t crashes = 0;
   std::uint64_t power_losses = 0;      // of these
   std::uint64_t deaths_in_writes = 0;  // of the crashes
+  std::uint64_t failed_syncs = 0;      // of the crashes
 
  private:
   server::Instant now() const { return {world_.now_ms(), world_.utc_ms()}; }
@@ -68,6 +69,8 @@ class SimulatedServer final : public server::Outbox {
   void after(std::int64_t delay_ms, std::function<void()> what);
   void take(std::function<void()> frame);
   void end();
+  /// The process died while it wrote, or must end because a sync failed. False: neither.
+  bool ends();
   void tick();
   void write_group();
   void clear_some();

@@ -65,6 +65,7 @@ class Simulation {
     outcome_.server_kills = server_.crashes - server_.power_losses;
     outcome_.power_losses = server_.power_losses;
     outcome_.deaths_in_writes = server_.deaths_in_writes;
+    outcome_.failed_syncs = server_.failed_syncs;
     outcome_.undone_commits = disk_.model().undone_commits;
     outcome_.refused_kept = disk_.model().refused_kept;
     outcome_.failed_commits = disk_.model().failed_commits;
@@ -173,7 +174,7 @@ class Simulation {
 
   void fault_of_disk_or_server() {
     SimulatedFiles& files = disk_.files();
-    switch (world_.between(0, 7)) {
+    switch (world_.between(0, 8)) {
       case 0:
       case 1:
         if (server_.runs()) {
@@ -197,6 +198,9 @@ class Simulation {
         ++outcome_.disk_faults;
         break;
       case 6:
+        files.plan_failing_sync(world_.between(1, 10));
+        break;
+      case 7:
         if (server_.runs()) {
           server_.stop();
           ++outcome_.server_stops;
@@ -231,6 +235,7 @@ class Simulation {
     disk_.files().full = false;
     disk_.files().failing = false;
     disk_.files().plan_death(0);
+    disk_.files().plan_failing_sync(0);
     workers_network_.heal();
     clients_network_.heal();
   }

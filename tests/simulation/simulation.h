@@ -25,6 +25,7 @@ struct SimulationOutcome {
   std::uint64_t server_kills = 0;
   std::uint64_t power_losses = 0;
   std::uint64_t deaths_in_writes = 0;  ///< of the kills and losses of power
+  std::uint64_t failed_syncs = 0;      ///< of these, too: each ends the server
   std::uint64_t server_stops = 0;
   std::uint64_t undone_commits = 0;  ///< that losing power undid
   std::uint64_t refused_kept = 0;    ///< commits that failed and were there after a crash

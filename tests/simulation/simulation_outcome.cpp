@@ -11,6 +11,7 @@ SimulationOutcome& SimulationOutcome::operator+=(const SimulationOutcome& other)
   server_kills += other.server_kills;
   power_losses += other.power_losses;
   deaths_in_writes += other.deaths_in_writes;
+  failed_syncs += other.failed_syncs;
   server_stops += other.server_stops;
   undone_commits += other.undone_commits;
   refused_kept += other.refused_kept;
@@ -36,7 +37,8 @@ std::string SimulationOutcome::text() const {
   return to_string(points) + " points, " + to_string(failed_points) + " of them killers of " +
          to_string(deaths) + " workers; " + to_string(server_kills) + " servers killed, " +
          to_string(power_losses) + " losses of power, " + to_string(deaths_in_writes) +
-         " of these in the middle of a write, " + to_string(server_stops) + " servers stopped; " +
+         " of these in the middle of a write, " + to_string(failed_syncs) +
+         " after a failed sync, " + to_string(server_stops) + " servers stopped; " +
          to_string(undone_commits) + " commits undone by losing power, " + to_string(refused_kept) +
          " refused ones found after a crash; " + to_string(disk_faults) + " faults of disks, " +
          to_string(failed_commits) + " commits failed; " + to_string(worker_faults) +

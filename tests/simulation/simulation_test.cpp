@@ -43,6 +43,7 @@ TEST_P(SimulationTest, EveryPointEndsWithOneRightRowWhateverBreaks) {
   EXPECT_GT(all.server_stops, count / 4);
   EXPECT_GT(all.undone_commits, count / 4);
   EXPECT_GT(all.failed_commits, count);
+  EXPECT_GT(all.failed_syncs, count / 4);
   EXPECT_GT(all.worker_faults, count);
   EXPECT_GT(all.partitions, count / 4);
   EXPECT_GT(all.clock_jumps, count / 4);

@@ -7,7 +7,7 @@
 #include "proto/recipe/axes.h"
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/keys.h"
-#include "server/asking/columns.h"
+#include "server/query/columns.h"
 
 namespace oblique::client::plot {
 namespace {

@@ -4,16 +4,10 @@
 #include <array>
 #include <cmath>
 
-#include <spdlog/fmt/fmt.h>
-
-#include "client/plot/draw/colour_tables.h"
-#include "proto/suggestion.h"
-#include "worker/solver/model/errors.h"
+#include "client/plot/draw/viridis.h"
 
 namespace oblique::client::plot {
 namespace {
-
-constexpr std::array<std::string_view, 2> kPaletteNames{"viridis", "cividis"};
 
 // Light enough for hatching and letters in black; after the scheme "light" of P. Tol, and a brown
 // for its grey, which is that of the others.
@@ -33,23 +27,8 @@ constexpr std::array<Stroke, kStrokes> kStrokeTable{{
 
 }  // namespace
 
-std::span<const std::string_view> palette_names() {
-  return kPaletteNames;
-}
-
-Palette palette_named(std::string_view name) {
-  for (std::size_t i = 0; i < kPaletteNames.size(); ++i) {
-    if (name == kPaletteNames[i]) {
-      return static_cast<Palette>(i);
-    }
-  }
-  throw solver::InputError(fmt::format("--palette {} is not known{}: it must be one of {}", name,
-                                       protocol::did_you_mean(name, kPaletteNames),
-                                       protocol::joined(kPaletteNames)));
-}
-
-Colour shade(Palette palette, std::size_t number) {
-  return colour_of((palette == Palette::kViridis ? kViridis : kCividis)[number]);
+Colour shade(std::size_t number) {
+  return colour_of(kViridis[number]);
 }
 
 std::size_t shade_number(double share) {

@@ -1,31 +1,22 @@
 #pragma once
 
 #include <cstddef>
-#include <span>
-#include <string>
 #include <string_view>
 
 #include "client/plot/draw/colour.h"
 
 namespace oblique::client::plot {
 
-/// Colours of a map. Both rise in lightness all the way, so that they read in grey and without
-/// telling red from green; cividis looks nearly the same to all.
-enum class Palette { kViridis, kCividis };
-
-/// Throws solver::InputError for a name that is neither `viridis` nor `cividis`.
-Palette palette_named(std::string_view name);
-/// Names of all.
-std::span<const std::string_view> palette_names();
-
-/// Number of colours of a palette.
+/// Number of colours of a map.
 inline constexpr std::size_t kShades = 256;
-Colour shade(Palette palette, std::size_t number);
+/// A colour of a map, of viridis. Its lightness rises with the number, so that maps read in grey
+/// and without telling red from green.
+Colour shade(std::size_t number);
 
 /// The shade of a share from 0 to 1; others take that of the nearer end.
 std::size_t shade_number(double share);
 
-/// The shades up to this share of a palette can be told from white paper, as lines and points must.
+/// The shades up to this share of all can be told from white paper, as lines and points must.
 inline constexpr double kDarkShare = 0.68;
 
 /// A hatching, drawn over a colour, in the ink of text.

@@ -12,7 +12,7 @@ double middle_of(double a, double b, bool is_logarithmic) {
 }  // namespace
 
 Colour shade_of(const Colours& colours, double share) {
-  return shade(colours.palette, shade_number(share * (colours.has_plate ? kDarkShare : 1.0)));
+  return shade(shade_number(share * (colours.has_plate ? kDarkShare : 1.0)));
 }
 
 void say_empty(Figure& figure, const std::string& why) {

@@ -126,11 +126,10 @@ struct Panel {
 /// What colours mean.
 struct Colours {
   FigureAxis axis{};
-  Palette palette = Palette::kViridis;
   bool has_below = false;  ///< there are values below the range, drawn as its lower end
   bool has_above = false;
   /// Lines, points and scattered cells lie on a light plate, in dark pictures too, and do without
-  /// the palette's pale end, which is lost there.
+  /// the pale shades, which is lost there.
   bool has_plate = false;
 };
 

@@ -115,8 +115,7 @@ Colours colours_for(const Quantity& quantity, const std::vector<double>& values,
   const Range all = range_of(values, choice.is_logarithmic);
   const Scale scale(choice.range ? choice.range->from : all.from,
                     choice.range ? choice.range->to : all.to, choice.is_logarithmic);
-  Colours colours{axis_of(quantity, {scale.from(), scale.to()}, choice.is_logarithmic),
-                  choice.palette};
+  Colours colours{axis_of(quantity, {scale.from(), scale.to()}, choice.is_logarithmic)};
   colours.has_below = all.from < scale.from();
   colours.has_above = all.to > scale.to();
   return colours;

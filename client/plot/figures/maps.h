@@ -20,7 +20,6 @@ struct MapAxes {
 
 /// How values become colours.
 struct ColourChoice {
-  Palette palette = Palette::kViridis;
   bool is_logarithmic = false;
   std::optional<Range> range = {};  ///< none: that of the values
 };

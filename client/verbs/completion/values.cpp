@@ -10,7 +10,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/written/written_sample.h"
-#include "server/asking/columns.h"
+#include "server/query/columns.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::client {

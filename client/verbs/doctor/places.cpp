@@ -71,13 +71,13 @@ void add_contents(Findings& found, const std::string& file) {
   }
   found.add("schema", "schema", std::to_string(server::kSchemaVersion), server::kSchemaVersion);
   const auto studies = number(database, "SELECT count(*) FROM studies");
-  const auto points = number(database, "SELECT sum(points) FROM settled_points");
+  const auto points = number(database, "SELECT sum(points) FROM completed_ranges");
   found.add("studies", "studies",
             fmt::format("{}{}", studies ? shown_count(*studies) : std::string("not told in time"),
                         points ? fmt::format(", {} points solved or failed", shown_count(*points))
                                : std::string()),
             studies ? nlohmann::ordered_json(*studies) : nullptr);
-  found.note("settled_points", points ? nlohmann::ordered_json(*points) : nullptr);
+  found.note("completed_points", points ? nlohmann::ordered_json(*points) : nullptr);
 }
 
 }  // namespace

@@ -1,10 +1,7 @@
 // @ts-check
 // Colours of values and of categories, readable by the colour-blind.
 
-const kStops = {
-  viridis: "440154 482475 414487 355f8d 2a788e 21918c 22a884 44bf70 7ad151 bddf26 fde725",
-  cividis: "00224e 123570 3b496c 575d6d 707173 8a8678 a59c74 c3b369 e1cc55 fee838",
-};
+const kViridis = "440154 482475 414487 355f8d 2a788e 21918c 22a884 44bf70 7ad151 bddf26 fde725";
 
 /** @param {string} hex @returns {[number, number, number]} */
 const rgb = (hex) => [parseInt(hex.slice(0, 2), 16), parseInt(hex.slice(2, 4), 16), parseInt(hex.slice(4, 6), 16)];
@@ -12,9 +9,9 @@ const rgb = (hex) => [parseInt(hex.slice(0, 2), 16), parseInt(hex.slice(2, 4), 1
 /** One pixel of an ImageData, opaque. @param {number[]} colour */
 const packed = ([r, g, b]) => ((255 << 24) | (b << 16) | (g << 8) | r) >>> 0;
 
-/** 256 colours from the least to the most. @param {string} name @returns {Uint32Array} */
-export function palette(name) {
-  const stops = kStops[/** @type {keyof typeof kStops} */ (Object.hasOwn(kStops, name) ? name : "viridis")].split(" ").map(rgb);
+/** 256 colours from the least to the most. @returns {Uint32Array} */
+export function palette() {
+  const stops = kViridis.split(" ").map(rgb);
   return Uint32Array.from({ length: 256 }, (_, i) => {
     const at = (i / 255) * (stops.length - 1);
     const k = Math.min(Math.floor(at), stops.length - 2);

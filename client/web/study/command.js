@@ -46,7 +46,7 @@ export function picture_fields(view) {
     block: on_grid && view.study.blocks.length > 1 && !view.solving.is_on ? view.is("block") : "", at: at.map((/** @type {any} */ one) => `${one.key}:${one.value}`).join(","),
     where: joined(is("where"), ...(kind === "histogram" ? [] : zoomed(view))),
     xlog: is("xlog"), ylog: kind === "histogram" ? "" : is("ylog"), zlog: has_map ? is("zlog") : "",
-    from, to, palette: has_map ? is("pal") : "" };
+    from, to };
 }
 
 /** The same as flags of oblique plot. @param {Fields} of @returns {[string, string][]} */
@@ -55,7 +55,7 @@ function flags(of) {
     : of.kind === "histogram" ? [["histogram", of.x]] : [[of.kind, of.z], ["x", of.x], ["y", of.y], ["by", of.by]]);
   // Its number from 1 to people.
   found.push(["block", of.block && String(Number(of.block) + 1)], ...of.at.split(",").map((one) => /** @type {[string, string]} */ (["at", one.replace(":", "=")])));
-  found.push(["where", of.where], ["range", of.from && `${of.from}:${of.to}`], ["palette", of.palette]);
+  found.push(["where", of.where], ["range", of.from && `${of.from}:${of.to}`]);
   return found.filter(([, value]) => value !== "");
 }
 

@@ -68,7 +68,7 @@ export function show_controls(view) {
   keep_focus(view.controls, () => view.controls.replaceChildren(...parts));
   show_sliders(view, on_grid);
   const has_bar = (kind === "map" || kind === "gathered") && view.columns.find((c) => c.name === view.is("z"))?.picture !== "categories";
-  const colours = has_bar ? [colour_controls({ from: view.is("from"), to: view.is("to"), is_log: view.is("zlog") !== "", palette: view.is("pal") || "viridis" },
+  const colours = has_bar ? [colour_controls({ from: view.is("from"), to: view.is("to"), is_log: view.is("zlog") !== "" },
     (changed) => {
       view.set(/** @type {any} */ (changed));
       if ("from" in changed && "to" in changed) show_controls(view);

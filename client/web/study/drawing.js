@@ -15,7 +15,7 @@ import { facts } from "./words.js";
 /** Colours and scales of a map. @param {View} view @param {Picture} picture @returns {import("./drawn/map.js").Look} */
 function look_of(view, picture) {
   const [from, to] = span_of(view, picture);
-  return { colours: palette(view.is("pal") || "viridis"), from, to, z_log: view.is("zlog") !== "" && from > 0,
+  return { colours: palette(), from, to, z_log: view.is("zlog") !== "" && from > 0,
     x_log: view.is("xlog") !== "", y_log: view.is("ylog") !== "" };
 }
 

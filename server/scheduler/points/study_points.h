@@ -14,7 +14,6 @@
 #include "server/study/interval_set.h"
 #include "server/study/point_attempts.h"
 #include "server/study/study_table.h"
-#include "server/study/study_terms.h"
 
 namespace oblique::server {
 

@@ -36,8 +36,8 @@ void StudyStates::restore(const StoredStudy& stored, std::int64_t now_ms) {
   const bool lacks_rows = stored.settled.size() < stored.table.size();
   const StudyState state =
       stored.state == StudyState::kDone && lacks_rows ? StudyState::kRunning : stored.state;
-  add(stored.study_id, {stored.name, stored.table, stored.created_at, stored.terms, stored.failures,
-                        stored.attempts, now_ms, stored.submitted_by});
+  add(stored.study_id, {stored.name, stored.table, stored.created_at, stored.priority,
+                        stored.failures, stored.attempts, now_ms, stored.submitted_by});
   Study& study = studies_.at(stored.study_id);
   set_state(stored.study_id, study, state);
   study.durable_state = state;
@@ -133,10 +133,10 @@ void StudyStates::rename(StudyId id, const std::string& name) {
   ids_.insert_or_assign(name, id);
 }
 
-void StudyStates::grow(StudyId id, const StudyTable& table, const StudyTerms& terms) {
+void StudyStates::grow(StudyId id, const StudyTable& table, std::int32_t priority) {
   StudyRecord& record = studies_.at(id).record;
   record.table = table;
-  record.terms = terms;
+  record.priority = priority;
 }
 
 bool StudyStates::finish(StudyId id) {

@@ -23,7 +23,7 @@ struct StudyRecord {
   std::string name;
   StudyTable table;
   std::string created_at;
-  StudyTerms terms;            ///< as the database has it
+  std::int32_t priority = 0;   ///< as the database has it
   IntervalSet failures;        ///< points whose rows say failed
   PointAttempts attempts;      ///< of points that failed, also of those that were forgotten
   std::int64_t since_ms{};     ///< nothing is known of its rate before
@@ -91,9 +91,11 @@ class StudyStates {
   /// ... or is durably its only one.
   void rename(StudyId id, const std::string& name);
   /// It is durable that the study has all the points of the table.
-  void grow(StudyId id, const StudyTable& table, const StudyTerms& terms);
+  void grow(StudyId id, const StudyTable& table, std::int32_t priority);
 
-  void set_terms(StudyId id, const StudyTerms& terms) { studies_.at(id).record.terms = terms; }
+  void set_priority(StudyId id, std::int32_t priority) {
+    studies_.at(id).record.priority = priority;
+  }
   /// It is durable that the point failed in that attempt.
   void point_failed(StudyId id, std::uint64_t point, std::uint32_t attempt);
   /// It is durable that these failures are forgotten: a study that was done runs.

@@ -10,7 +10,7 @@
 #include "proto/oblique.pb.h"
 #include "server/network/curve/doorkeeper.h"
 #include "server/network/delivery.h"
-#include "server/queries/query_queue.h"
+#include "server/query/query_pool.h"
 #include "server/service/outbox/request_reader.h"
 #include "server/store/writer.h"
 

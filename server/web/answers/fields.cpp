@@ -11,8 +11,8 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/text.h"
-#include "server/asking/columns.h"
-#include "server/asking/sql/sql_expression.h"
+#include "server/query/columns.h"
+#include "server/query/sql_text.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::server {

@@ -11,8 +11,8 @@
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/keys.h"
 #include "proto/recipe/model_message.h"
-#include "server/asking/columns.h"
-#include "server/asking/question.h"
+#include "server/query/columns.h"
+#include "server/query/question.h"
 #include "server/web/http/json_answer.h"
 #include "worker/solver/model/parameters.h"
 

@@ -8,7 +8,7 @@
 
 #include "proto/recipe/point_table.h"
 #include "proto/recipe/sha256.h"
-#include "proto/recipe/written/study_terms.h"
+#include "proto/recipe/written/study_priority.h"
 #include "server/web/answers/study_answers.h"
 #include "server/web/http/json_answer.h"
 #include "worker/solver/model/errors.h"

@@ -22,7 +22,6 @@ nlohmann::ordered_json study_json(const protocol::StudyStatus& study) {
           {"left_s", is_known ? nlohmann::ordered_json(open / study.points_per_s()) : nullptr},
           {"waits_for", study.waits_for()},
           {"priority", study.priority()},
-          {"weight", study.weight()},
           {"solver_version", study.solver_version()},
           {"created_at", study.created_at()},
           {"submitted_by", study.submitted_by()},

@@ -10,7 +10,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/text.h"
-#include "server/asking/sql/sql_expression.h"
+#include "server/query/sql_text.h"
 #include "server/web/answers/grid.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
@@ -105,10 +105,6 @@ void add_look(const FieldReader& fields, std::vector<std::string>& flags) {
   if (from) {
     flags.push_back(
         fmt::format("--range={}:{}", solver::exact_number(*from), solver::exact_number(*to)));
-  }
-  constexpr std::array<std::string_view, 2> kPalettes{"viridis", "cividis"};
-  if (const std::string palette = one_of(fields, "palette", "", kPalettes); !palette.empty()) {
-    flags.push_back("--palette=" + palette);
   }
 }
 

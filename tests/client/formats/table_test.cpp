@@ -21,8 +21,7 @@ protocol::QueryReply points(std::int64_t from, std::int64_t to) {
 TEST(Formats, PrintTheSameWhateverTheChunks) {
   const auto whole = points(0, 100);
   const std::vector parts{points(0, 1), points(1, 1), points(1, 60), points(60, 100)};
-  for (const Format format : {Format::kTable, Format::kCsv, Format::kJson, Format::kJsonLines,
-                              Format::kMarkdown, Format::kNpz}) {
+  for (const Format format : {Format::kTable, Format::kCsv, Format::kJson, Format::kJsonLines}) {
     EXPECT_EQ(printed(format, {whole}), printed(format, parts)) << static_cast<int>(format);
   }
 }
@@ -33,7 +32,6 @@ TEST(Formats, OfNoRowsHaveWhatTheyMustHave) {
   EXPECT_EQ(printed(Format::kCsv, none), "a,b\n");
   EXPECT_EQ(printed(Format::kJson, none), "[]\n");
   EXPECT_EQ(printed(Format::kJsonLines, none), "");
-  EXPECT_EQ(printed(Format::kMarkdown, none), "| a | b |\n|---|---|\n");
 }
 
 TEST(JsonLines, HaveAnObjectALine) {

@@ -58,19 +58,6 @@ std::vector<std::string> csv_fields(const std::string& text) {
   return fields;
 }
 
-TEST(Markdown, KeepsBarsOfTextOutOfTheTableAndAlignsNumbers) {
-  protocol::QueryReply rows;
-  rows.add_columns("|F_t|");
-  rows.add_columns("n");
-  auto& row = *rows.add_rows();
-  add_value(row, std::string("a|b"));
-  add_value(row, 2.5);
-  EXPECT_EQ(printed(rows, Format::kMarkdown),
-            "| \\|F_t\\| | n |\n"
-            "|---|---:|\n"
-            "| a\\|b | 2.5 |\n");
-}
-
 TEST(Csv, HoldsEveryNumberToTheLastBit) {
   protocol::QueryReply rows;
   rows.add_columns("x");
@@ -189,12 +176,10 @@ constexpr const char* kSteering = "\x1b[2J\u009b1m\u202ex\x7f";
 TEST(Table, ShowsControlCharactersOfTextsAndColumnsWrittenOut) {
   auto rows = rows_of_texts({kSteering});
   rows.set_columns(0, "a\x1b");
-  for (const Format format : {Format::kTable, Format::kMarkdown}) {
-    const auto text = printed(rows, format);
-    EXPECT_NE(text.find("a\\x1b"), std::string::npos) << text;
-    EXPECT_NE(text.find("\\x1b[2J\\u009b1m\\u202ex\\x7f"), std::string::npos) << text;
-    EXPECT_EQ(text.find_first_of("\x1b\x7f\xc2\xe2"), std::string::npos) << text;
-  }
+  const auto text = printed(rows, Format::kTable);
+  EXPECT_NE(text.find("a\\x1b"), std::string::npos) << text;
+  EXPECT_NE(text.find("\\x1b[2J\\u009b1m\\u202ex\\x7f"), std::string::npos) << text;
+  EXPECT_EQ(text.find_first_of("\x1b\x7f\xc2\xe2"), std::string::npos) << text;
 }
 
 TEST(Json, EscapesControlCharactersAndReadsBackTheSame) {

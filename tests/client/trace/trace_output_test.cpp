@@ -1,4 +1,4 @@
-// The same trace in every format.
+// Where a trace goes, and what of it is the fall.
 #include "client/trace/trace_output.h"
 
 #include <filesystem>
@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "client/trace/traced_fall.h"
-#include "tests/support/python.h"
+#include "tests/support/temporary_folder.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::client {
@@ -51,62 +51,9 @@ TEST(TracedFall, IsTakenOffTheFrontAndLeavesTheContact) {
   taken(0, 0);
 }
 
-class TraceArchives : public testing::Test {
- protected:
-  void write(const std::vector<solver::TraceRow>& rows, const solver::TraceShape& shape,
-             const std::string& name) {
-    const std::string file = folder_.file(name);
-    TraceOutput output(file, trace_format("", file));
-    output.begin(shape);
-    for (const auto& row : rows) {
-      output.add(row);
-    }
-    output.finish({}, std::nullopt);
-  }
-  std::string said(const std::string& program) {
-    return oblique::test::said_by_python(folder_,
-                                         "import csv, numpy\n"
-                                         "a = numpy.load('t.npz')\n"
-                                         "rows = list(csv.DictReader(open('t.csv')))\n" +
-                                             program);
-  }
-
-  oblique::test::TemporaryFolder folder_;
-};
-
-TEST_F(TraceArchives, HaveTheNumbersOfTheCsvBitByBitAndNodesAsOneArray) {
-  const auto rows = made_up_rows(50, kTwoLinksOfOneElement);
-  write(rows, kTwoLinksOfOneElement, "t.npz");
-  write(rows, kTwoLinksOfOneElement, "t.csv");
-  EXPECT_EQ(said("names = [n for n in rows[0] if not n.startswith('node')]\n"
-                 "print(a.files == names + ['nodes_m'], a['nodes_m'].shape)\n"
-                 "for n in names:\n"
-                 "  kind = str if n == 'state' else float\n"
-                 "  assert a[n].tolist() == [kind(r[n]) for r in rows], n\n"
-                 "for node in range(3):\n"
-                 "  for i, x in enumerate('xy'):\n"
-                 "    n = f'node{node}{x}_m'\n"
-                 "    assert a['nodes_m'][:, node, i].tolist() == [float(r[n]) for r in rows], n\n"
-                 "print(a['t_s'].dtype, a['state'].dtype)"),
-            "True (50, 3, 2)\nfloat64 <U2\n");
-}
-
-TEST_F(TraceArchives, WithoutTheShapeHaveNoNodes) {
-  const solver::TraceShape shape{1, 0};
-  write(made_up_rows(1, shape), shape, "t.npz");
-  write(made_up_rows(1, shape), shape, "t.csv");
-  EXPECT_EQ(said("print(a.files == list(rows[0]), a['fn_N'].shape)"), "True (1,)\n");
-}
-
-TEST_F(TraceArchives, OfNoInstantsAreRead) {
-  write({}, kTwoLinksOfOneElement, "t.npz");
-  write({}, kTwoLinksOfOneElement, "t.csv");
-  EXPECT_EQ(said("print(len(rows), a['t_s'].shape, a['nodes_m'].shape)"), "0 (0,) (0, 3, 2)\n");
-}
-
 TEST(TraceOutput, ThatIsNotFinishedLeavesWhatWasThere) {
   const oblique::test::TemporaryFolder folder;
-  for (const char* name : {"t.csv", "t.npz", "t.json"}) {
+  for (const char* name : {"t.csv", "t.json"}) {
     const std::string file = folder.file(name);
     TraceOutput output(file, trace_format("", file));
     output.begin(kTwoLinksOfOneElement);
@@ -117,11 +64,11 @@ TEST(TraceOutput, ThatIsNotFinishedLeavesWhatWasThere) {
 
 TEST(TraceOutput, NamesTheFlagOfAFileThatCannotBeWritten) {
   try {
-    const TraceOutput output("/nowhere/t.npz", TraceFormat::kNpz, "--trace");
+    const TraceOutput output("/nowhere/t.csv", TraceFormat::kCsv, "--trace");
     ADD_FAILURE() << "it is taken";
   } catch (const solver::InputError& error) {
     EXPECT_EQ(std::string(error.what()),
-              "--trace /nowhere/t.npz cannot be written: No such file or directory");
+              "--trace /nowhere/t.csv cannot be written: No such file or directory");
   }
 }
 

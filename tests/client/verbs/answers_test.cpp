@@ -245,7 +245,6 @@ TEST(TextsOfAServer, DoNotSteerTheTerminalWhateverTheVerb) {
   const ScriptedServer server(steering);
   const std::vector<std::vector<std::string>> all{{"status"},
                                                   {"status", "--format", "json"},
-                                                  {"status", "--format", "markdown"},
                                                   {"status", "error"},
                                                   {"studies"},
                                                   {"workers"},

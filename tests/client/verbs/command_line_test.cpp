@@ -75,8 +75,6 @@ TEST(CommandLine, AnswersWrongUsageWithExitCodeTwoAndASentence) {
        "--k 0-mu: point 0: k = -0.4 N/m is not allowed"},
       {{"submit", "--H", "1", "--mu", "0.4", "--e", "1", "--priority", "1001"},
        "--priority: priority = 1001 is not allowed"},
-      {{"submit", "--H", "1", "--mu", "0.4", "--e", "1", "--weight", "0"},
-       "--weight: weight = 0 is not allowed"},
       {{"solve", "--H", "1,1.1", "--mu", "0.4", "--e", "1"}, "solve takes one value for each"},
       {{"solve", "--H", "1", "--mu", "0.4", "--e", "1", "--trace", "/nowhere/x.csv"},
        "/nowhere/x.csv"},

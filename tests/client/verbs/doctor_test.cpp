@@ -123,7 +123,7 @@ TEST_F(Doctor, ReadsADatabaseWhoseServerWasKilledAndMakesNoFileBesideIt) {
   EXPECT_EQ(names_in(folder_.path() / "data"), before);
   const auto database = json_of(outcome).at("database");
   EXPECT_EQ(database.at("studies"), 1);
-  EXPECT_EQ(database.at("settled_points"), 2);
+  EXPECT_EQ(database.at("completed_points"), 2);
   EXPECT_GT(database.at("log_bytes"), 0);
   EXPECT_EQ(database.at("in_use"), false);
   EXPECT_THAT(json_of(outcome).at("odd"), Contains(HasSubstr("copy both files or none")));

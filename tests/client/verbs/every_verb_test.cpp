@@ -245,7 +245,7 @@ TEST_F(EveryVerbThatReads, StatusHasRoomInEightyColumns) {
   std::istringstream lines(status.out);
   std::string line;
   std::getline(lines, line);
-  for (const char* column : {"study", "state", "points", "done", "prio", "weight"}) {
+  for (const char* column : {"study", "state", "points", "done", "prio"}) {
     EXPECT_THAT(line, HasSubstr(column));
   }
   EXPECT_LE(line.size(), 80U);

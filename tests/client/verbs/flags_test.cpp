@@ -112,7 +112,6 @@ TEST(Flags, ThatTakeNumbersRefuseThoseThatTheyCannotMean) {
       {"run", "--workers", {"nan", "-1", "0", "1.5", "1025", "99999999999999999999"}},
       {"run", "--rows", {"nan", "-1", "1.5", "99999999999999999999"}},
       {"submit", "--priority", {"nan", "-1001", "1001", "1.5", "99999999999999999999"}},
-      {"submit", "--weight", {"nan", "-nan", "inf", "0", "-1", "1e-9", "1e9", "1e999", "x"}},
       {"submit", "--timeout", {"nan", "inf", "0", "-1", "1e9", "1e999", "x"}},
       {"converge", "--coarsest", {"nan", "0", "-1", "1.5", "2147483647", "99999999999"}},
       {"converge", "--finest", {"nan", "0", "-1", "1.5", "2147483647", "99999999999"}},

@@ -17,13 +17,18 @@ std::string text_of(const std::string& name) {
 
 // What stands between the mark of `command` and the end mark.
 std::string shown(const std::string& text, const std::string& command) {
-  const std::string mark = "<!-- " + command + " -->\n";
+  const std::string mark = "<!-- $ " + command + " -->\n";
   const auto begin = text.find(mark);
   if (begin == std::string::npos) {
     return "no " + mark;
   }
   const auto from = begin + mark.size();
   return text.substr(from, text.find("<!-- end -->", from) - from);
+}
+
+// A command and what it prints, as .ci/tables writes them.
+std::string block_of(const std::string& command, const std::string& printed) {
+  return "\n```\n$ " + command + "\n" + printed + "```\n\n";
 }
 
 TEST(Readme, ShowsTheBeginningOfTheReportOfOneImpact) {
@@ -37,15 +42,15 @@ TEST(Readme, ShowsTheBeginningOfTheReportOfOneImpact) {
 }
 
 TEST(Readme, ShowsTheTableThatItsCommandPrints) {
-  const auto printed = test::run_oblique({"paper", "--format", "markdown"});
+  const auto printed = test::run_oblique({"paper"});
   ASSERT_EQ(printed.exit_code, 0) << printed.err;
-  EXPECT_EQ(shown(text_of("client/paper/README.md"), "oblique paper --format markdown"),
-            "\n" + printed.out + "\n")
+  EXPECT_EQ(shown(text_of("client/paper/README.md"), "oblique paper"),
+            block_of("oblique paper", printed.out))
       << ".ci/tables writes the tables into client/paper/README.md";
 }
 
 TEST(Readme, SummarisesTheComparisonInTheNumbersThatItsCommandPrints) {
-  const auto printed = test::run_oblique({"paper", "--format", "markdown"});
+  const auto printed = test::run_oblique({"paper"});
   std::smatch number;
   ASSERT_TRUE(std::regex_search(
       printed.out, number,
@@ -58,18 +63,18 @@ TEST(Readme, SummarisesTheComparisonInTheNumbersThatItsCommandPrints) {
 }
 
 TEST(Readme, DescribesEveryColumnOfATrace) {
-  const auto printed = test::run_oblique({"columns", "--trace", "--format", "markdown"});
+  const auto printed = test::run_oblique({"columns", "--trace"});
   ASSERT_EQ(printed.exit_code, 0) << printed.err;
-  EXPECT_EQ(shown(text_of("worker/solver/README.md"), "oblique columns --trace --format markdown"),
-            "\n" + printed.out + "\n")
+  EXPECT_EQ(shown(text_of("worker/solver/README.md"), "oblique columns --trace"),
+            block_of("oblique columns --trace", printed.out))
       << ".ci/tables writes the tables into worker/solver/README.md";
 }
 
 TEST(Readme, DescribesEveryColumn) {
-  const auto printed = test::run_oblique({"columns", "--format", "markdown"});
+  const auto printed = test::run_oblique({"columns"});
   ASSERT_EQ(printed.exit_code, 0) << printed.err;
-  EXPECT_EQ(shown(text_of("client/output/README.md"), "oblique columns --format markdown"),
-            "\n" + printed.out + "\n")
+  EXPECT_EQ(shown(text_of("client/output/README.md"), "oblique columns"),
+            block_of("oblique columns", printed.out))
       << ".ci/tables writes the tables into client/output/README.md";
 }
 

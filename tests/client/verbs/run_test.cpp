@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "server/reading/reader.h"
+#include "server/query/reader.h"
 #include "tests/support/programs.h"
 
 namespace oblique::client {

@@ -96,18 +96,15 @@ TEST_F(TraceVerb, APointSolvedHereIsTheStoredOneWhateverStudyAndIntegratorItHas)
 
 TEST_F(TraceVerb, HasTheRowsOfSolve) {
   store_study("models");
-  for (const std::string ending : {"csv", "npz"}) {
-    const auto trace = run({"trace", "models", "15", "--shape", "--out", "trace." + ending});
-    EXPECT_EQ(trace.exit_code, 0) << trace.err;
-    EXPECT_THAT(trace.err, HasSubstr("not stored yet"));
-    const auto solve =
-        run({"solve", "--E", "7e10", "--H", "1", "--mu", "2", "--e", "1", "--elements-per-link",
-             "2", "--trace-shape", "--trace", "solve." + ending});
-    EXPECT_EQ(solve.exit_code, 0) << solve.err;
-    EXPECT_EQ(text_of(("trace." + ending).c_str()), text_of(("solve." + ending).c_str()));
-  }
-  EXPECT_THAT(text_of("trace.npz"), StartsWith("PK"));
-  EXPECT_EQ(run({"trace", "models", "15", "--shape", "--format", "npz"}).out, text_of("trace.npz"));
+  const auto trace = run({"trace", "models", "15", "--shape", "--out", "trace.csv"});
+  EXPECT_EQ(trace.exit_code, 0) << trace.err;
+  EXPECT_THAT(trace.err, HasSubstr("not stored yet"));
+  const auto solve = run({"solve", "--E", "7e10", "--H", "1", "--mu", "2", "--e", "1",
+                          "--elements-per-link", "2", "--trace-shape", "--trace", "solve.csv"});
+  EXPECT_EQ(solve.exit_code, 0) << solve.err;
+  EXPECT_THAT(text_of("trace.csv"), StartsWith("t_s,"));
+  EXPECT_EQ(text_of("trace.csv"), text_of("solve.csv"));
+  EXPECT_EQ(run({"trace", "models", "15", "--shape", "--format", "csv"}).out, text_of("trace.csv"));
 }
 
 TEST_F(TraceVerb, BeginsWithTheFallWhereThatIsAskedFor) {
@@ -208,12 +205,12 @@ TEST_F(TraceVerb, AWorkerSolvesForWhoAsksAServer) {
   EXPECT_THAT(there.err, HasSubstr("solved by worker ann ("));
   EXPECT_THAT(there.err, HasSubstr("same as stored."));
   EXPECT_EQ(there.out, text_of("here.csv"));
-  for (const char* file : {"here.npz", "there.npz"}) {
-    const bool is_here = file == std::string_view("here.npz");
+  for (const char* file : {"fall_here.csv", "fall_there.csv"}) {
+    const bool is_here = file == std::string_view("fall_here.csv");
     ask({"models", "3", "--shape", "--fall", is_here ? "--here" : "--on-worker", "--out", file});
   }
-  EXPECT_THAT(text_of("here.npz"), StartsWith("PK"));
-  EXPECT_EQ(text_of("there.npz"), text_of("here.npz"));
+  EXPECT_THAT(text_of("fall_here.csv"), StartsWith("t_s,"));
+  EXPECT_EQ(text_of("fall_there.csv"), text_of("fall_here.csv"));
   EXPECT_THAT(ask({"model", "3"}).err, HasSubstr("no study called \"model\""));
   EXPECT_THAT(ask({"models", "16"}).err, HasSubstr("its points are 0 to 15"));
 

@@ -15,7 +15,7 @@
 #include "server/maintenance/backup.h"
 #include "server/maintenance/check.h"
 #include "server/maintenance/salvage.h"
-#include "server/reading/reader.h"
+#include "server/query/reader.h"
 #include "server/store/store.h"
 #include "tests/support/points.h"
 #include "tests/support/temporary_folder.h"

@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/reading/reader.h"
+#include "server/query/reader.h"
 #include "tests/server/loop/running_server.h"
 #include "tests/support/temporary_folder.h"
 

@@ -20,7 +20,7 @@
 #include "proto/result_message.h"
 #include "proto/wire/chunk_writer.h"
 #include "server/loop/loop.h"
-#include "server/reading/query_rules.h"
+#include "server/query/query_rules.h"
 #include "tests/support/hang_limit.h"
 #include "tests/support/points.h"
 

@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/reading/reader.h"
+#include "server/query/reader.h"
 #include "tests/server/loop/running_server.h"
 #include "tests/support/recipes.h"
 #include "tests/support/temporary_folder.h"
@@ -39,7 +39,7 @@ class TakingOverTest : public testing::Test {
     ClientRequest request;
     request.mutable_submit()->set_name(name);
     *request.mutable_submit()->mutable_recipe() = recipe;
-    request.mutable_submit()->set_fresh(no_reuse);
+    request.mutable_submit()->set_no_reuse(no_reuse);
     const ClientReply reply = client_->ask(request);
     EXPECT_TRUE(reply.has_submit()) << reply.error().message();
     return reply.submit();
@@ -79,9 +79,9 @@ TEST_F(TakingOverTest, TheSamePointsUnderAnotherNameAreCopiesOfTheRowsBitByBit) 
   EXPECT_EQ(status.taken().points(), 20U);
   EXPECT_EQ(number("SELECT count(*) FROM runs AS a JOIN runs AS b USING (point, H, mu, e, status,"
                    " duration_s, fn_peak_N, ft_peak_N, mode, peaks, phases, stick_intervals,"
-                   " reaction_peaks, worker, solver_version, attempt, solved_at, model_id)"
-                   " WHERE a.study = 'a' AND b.study = 'b' AND a.taken_from IS NULL"
-                   " AND b.taken_from = 'a/' || point"),
+                   " reaction_peaks, worker_id, solver_version, attempt, solved_at, model_id)"
+                   " WHERE a.study = 'a' AND b.study = 'b' AND a.reused_from IS NULL"
+                   " AND b.reused_from = 'a/' || point"),
             20);
   stop();
   EXPECT_EQ(Reader(path_).study_status("b").at(0).taken().points(), 20U);
@@ -96,7 +96,7 @@ TEST_F(TakingOverTest, OfAGridThatOverlapsOnlyTheRestIsSolved) {
   EXPECT_EQ(client_->status("b").state(), "running");
   work(20);
   EXPECT_EQ(client_->status("b").state(), "done");
-  EXPECT_EQ(number("SELECT count(*) FROM runs WHERE study = 'b' AND taken_from IS NULL"
+  EXPECT_EQ(number("SELECT count(*) FROM runs WHERE study = 'b' AND reused_from IS NULL"
                    " AND mu > 1.0"),
             20);
 }
@@ -121,7 +121,7 @@ TEST_F(TakingOverTest, NothingIsTakenWhenAllIsToBeSolved) {
   const auto reply = submit("b", grid(0.0, 1.0, 5), true);
   EXPECT_EQ(reply.settled(), 0U);
   work(20);
-  EXPECT_EQ(number("SELECT count(*) FROM runs WHERE taken_from IS NOT NULL"), 0);
+  EXPECT_EQ(number("SELECT count(*) FROM runs WHERE reused_from IS NOT NULL"), 0);
 }
 
 TEST_F(TakingOverTest, WhatAnotherSolverVersionSolvedIsNotTaken) {
@@ -135,51 +135,28 @@ TEST_F(TakingOverTest, WhatAnotherSolverVersionSolvedIsNotTaken) {
   EXPECT_EQ(client_->status("b").state(), "running");
 }
 
-TEST_F(TakingOverTest, RowsThatWereTakenStayWhenTheirOriginIsDeleted) {
-  start();
-  submit("a", grid(0.0, 1.0, 5));
-  work(20);
-  submit("b", grid(0.0, 1.0, 5));
-  ClientRequest request;
-  request.mutable_change()->set_study("a");
-  request.mutable_change()->set_change(protocol::STUDY_CHANGE_DELETE);
-  EXPECT_TRUE(client_->ask(request).has_change());
-  EXPECT_EQ(
-      number(
-          "SELECT count(*) FROM runs WHERE study = 'b' AND taken_from = 'a (deleted)/' || point"),
-      20);
-  ASSERT_EQ(client_->status("b").taken().from_size(), 1);
-  EXPECT_EQ(client_->status("b").taken().from(0).study(), "a (deleted)");
-  // And what is deleted gives nothing; b gives what it took.
-  const auto reply = submit("c", grid(0.0, 1.0, 5));
-  ASSERT_EQ(reply.taken().from_size(), 1);
-  EXPECT_EQ(reply.taken().from(0).study(), "b");
-}
-
-TEST_F(TakingOverTest, RowsNameTheirOriginAsItIsCalledNowAlsoAfterARename) {
-  start();
-  submit("a", grid(0.0, 1.0, 5));
-  work(20);
-  submit("b", grid(0.0, 1.0, 5));
-  ClientRequest request;
-  request.mutable_change()->set_study("a");
-  request.mutable_change()->set_change(protocol::STUDY_CHANGE_RENAME);
-  request.mutable_change()->set_new_name("another/a");
-  EXPECT_TRUE(client_->ask(request).has_change());
-  submit("a", grid(3.0, 4.0, 5));  // the name may come to mean another study
-  for (const bool is_new_server : {false, true}) {
-    if (is_new_server) {
-      stop();
-      EXPECT_EQ(Reader(path_).study_status("b").at(0).taken().from(0).study(), "another/a");
-      start();
-    }
-    EXPECT_EQ(number("SELECT count(*) FROM runs WHERE study = 'b'"
-                     " AND taken_from = 'another/a/' || point"),
-              20);
-    const auto taken = client_->status("b").taken();
-    ASSERT_EQ(taken.from_size(), 1);
-    EXPECT_EQ(taken.from(0).study(), "another/a");
-    EXPECT_EQ(taken.from(0).points(), 20U);
+TEST_F(TakingOverTest, ReusedRowsStayAndNameTheirSourceAsItWasCalledWhenItIsDeletedOrRenamed) {
+  for (const bool is_deleted : {false, true}) {
+    const std::string source = is_deleted ? "deleted" : "renamed";
+    const std::string copy = source + " copy";
+    start();
+    const auto recipe = is_deleted ? grid(2.0, 3.0, 5) : grid(0.0, 1.0, 5);
+    submit(source, recipe);
+    work(20);
+    submit(copy, recipe);
+    const auto before = client_->status(copy).taken();
+    ASSERT_EQ(before.from_size(), 1);
+    EXPECT_EQ(before.from(0).study(), source);
+    ClientRequest request;
+    auto& change = *request.mutable_change();
+    change.set_study(source);
+    change.set_change(is_deleted ? protocol::STUDY_CHANGE_DELETE : protocol::STUDY_CHANGE_RENAME);
+    change.set_new_name(is_deleted ? "" : "another");
+    EXPECT_TRUE(client_->ask(request).has_change());
+    EXPECT_EQ(client_->status(copy).taken().SerializeAsString(), before.SerializeAsString());
+    stop();
+    EXPECT_EQ(Reader(path_).study_status(copy).at(0).taken().SerializeAsString(),
+              before.SerializeAsString());
   }
 }
 
@@ -206,8 +183,8 @@ TEST_F(TakingOverTest, AServerThatWasKilledMeanwhileGoesOnWithIt) {
   stop();
   // As if it had been killed after some rows.
   by_hand("DELETE FROM results WHERE study_id = 2 AND point > 3");
-  by_hand("UPDATE studies SET state = 'running', takes_over = 1 WHERE study_id = 2");
-  by_hand("UPDATE taken_points SET points = 4");
+  by_hand("UPDATE studies SET state = 'running', reuses = 1 WHERE study_id = 2");
+  by_hand("UPDATE reused_points SET points = 4");
   start();
   protocol::StudyStatus status;
   do {
@@ -215,8 +192,8 @@ TEST_F(TakingOverTest, AServerThatWasKilledMeanwhileGoesOnWithIt) {
   } while (status.taken().under_way());
   EXPECT_EQ(status.state(), "done");
   EXPECT_EQ(status.taken().points(), 20U);
-  EXPECT_EQ(number("SELECT count(*) FROM runs WHERE study = 'b' AND taken_from IS NOT NULL"), 20);
-  EXPECT_EQ(number("SELECT count(*) FROM studies WHERE takes_over"), 0);
+  EXPECT_EQ(number("SELECT count(*) FROM runs WHERE study = 'b' AND reused_from IS NOT NULL"), 20);
+  EXPECT_EQ(number("SELECT count(*) FROM studies WHERE reuses"), 0);
 }
 
 }  // namespace

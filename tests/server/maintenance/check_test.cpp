@@ -8,10 +8,12 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/canonical.h"
 #include "proto/result_message.h"
 #include "server/maintenance/backup.h"
+#include "server/store/result_rows.h"
 #include "server/store/store.h"
 #include "tests/server/maintenance/maintenance_fixture.h"
 
@@ -29,23 +31,8 @@ TEST_F(MaintenanceTest, ASoundDatabaseHasNoFaults) {
 
 TEST_F(MaintenanceTest, ADamagedPageIsFoundAndNotCopied) {
   store_.reset();  // all is in the one file now
-  {
-    std::fstream file(path_, std::ios::in | std::ios::out | std::ios::binary);
-    const auto size = std::filesystem::file_size(path_);
-    const std::string rubbish(4096, '\x5a');
-    // Every page but the first, which tells what the file is.
-    for (std::uintmax_t at = 4096; at < size; at += 4096) {
-      file.seekp(static_cast<std::streamoff>(at));
-      file << rubbish;
-    }
-  }
-  bool found = false;
-  try {
-    found = !find_faults(path_).empty();
-  } catch (const StorageError&) {
-    found = true;
-  }
-  EXPECT_TRUE(found);
+  overwrite_page(path_, page_of(path_, "results"));
+  EXPECT_FALSE(find_faults(path_).empty());
   EXPECT_THROW(back_up(path_, copy_), StorageError);
   EXPECT_FALSE(std::filesystem::exists(copy_));
 }
@@ -55,9 +42,8 @@ TEST_F(MaintenanceTest, EveryColumnOfAResultIsUnderItsChecksum) {
   std::vector<std::string> columns;
   {
     const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READONLY);
-    Statement names(
-        database.get(),
-        "SELECT name FROM pragma_table_info('packed_results') WHERE name <> 'checksum'");
+    Statement names(database.get(),
+                    "SELECT name FROM pragma_table_info('results') WHERE name <> 'checksum'");
     while (names.step()) {
       columns.push_back(names.text(0));
     }
@@ -68,12 +54,13 @@ TEST_F(MaintenanceTest, EveryColumnOfAResultIsUnderItsChecksum) {
     std::filesystem::copy_file(path_, copy);
     {
       const DatabaseHandle database = open_database(copy, SQLITE_OPEN_READWRITE);
-      execute(database.get(), "PRAGMA ignore_check_constraints = ON");
-      execute(database.get(), "UPDATE packed_results SET " + column + " = CASE typeof(" + column +
+      execute(database.get(), "UPDATE results SET " + column + " = CASE typeof(" + column +
                                   ") WHEN 'text' THEN " + column + " || ' ' WHEN 'null' THEN 1" +
                                   " ELSE " + column + " + 1 END WHERE point = 4");
     }
-    EXPECT_THAT(find_faults(copy), testing::Contains(HasSubstr("not the one that was stored")))
+    EXPECT_THAT(find_faults(copy),
+                Contains(HasSubstr(column == "study_id" ? "refers to study number 2"
+                                                        : "not the one that was stored")))
         << column;
   }
 }
@@ -81,24 +68,12 @@ TEST_F(MaintenanceTest, EveryColumnOfAResultIsUnderItsChecksum) {
 TEST_F(MaintenanceTest, AStudyThatWasChangedIsFound) {
   store_.reset();
   execute(open_database(path_, SQLITE_OPEN_READWRITE).get(), "UPDATE studies SET name = 'b'");
-  EXPECT_THAT(find_faults(path_), testing::Contains(HasSubstr("study 1, b")));
+  EXPECT_THAT(find_faults(path_), Contains(HasSubstr("study 1, b")));
 }
 
 TEST_F(MaintenanceTest, ADamagedDatabaseIsRefusedWithTheWayOut) {
   store_.reset();
-  const auto page_of = [&](const std::string& name) {
-    const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READONLY);
-    Statement root(database.get(), "SELECT rootpage FROM sqlite_schema WHERE name = ?");
-    root.bind(1, std::string_view(name));
-    root.step();
-    return root.integer(0);
-  };
-  const std::int64_t page = page_of("studies");
-  {
-    std::fstream file(path_, std::ios::in | std::ios::out | std::ios::binary);
-    file.seekp((page - 1) * 4096);
-    file << std::string(4096, '\x5a');
-  }
+  overwrite_page(path_, page_of(path_, "studies"));
   try {
     Store store(path_);
     (void)store.studies();
@@ -111,8 +86,9 @@ TEST_F(MaintenanceTest, ADamagedDatabaseIsRefusedWithTheWayOut) {
 TEST_F(MaintenanceTest, ARowOfAPointThatTheStudyDoesNotHaveIsNamed) {
   store_.reset();
   const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);
-  execute(database.get(), "UPDATE packed_results SET point = 77 WHERE point = 4");
-  EXPECT_THAT(find_faults(path_), testing::Contains(HasSubstr("study a")));
+  execute(database.get(), "UPDATE results SET point = 77, checksum = NULL WHERE point = 4");
+  EXPECT_THAT(find_faults(path_),
+              Contains(HasSubstr("study a, point 77: the study has no such point")));
 }
 
 TEST_F(MaintenanceTest, StartsOfServersAreCountedSoThatNoLeaseNumberComesTwice) {
@@ -139,7 +115,7 @@ TEST_F(MaintenanceTest, EveryTableThatIsMissingIsNamed) {
       tables.push_back(names.text(0));
     }
   }
-  EXPECT_THAT(tables, Contains("taken_points"));
+  EXPECT_THAT(tables, Contains("reused_points"));
   for (const std::string& table : tables) {
     const std::string copy = folder_.file("without_" + table + ".db");
     std::filesystem::copy_file(path_, copy);
@@ -148,19 +124,35 @@ TEST_F(MaintenanceTest, EveryTableThatIsMissingIsNamed) {
   }
 }
 
-TEST_F(MaintenanceTest, AForeignKeyOfAnotherTableThatCannotBeCheckedIsNamedAndTheRestIsChecked) {
+TEST_F(MaintenanceTest, ARowOfAWorkerOrStudyThatDoesNotExistIsNamed) {
+  store_.reset();
+  const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);
+  execute(database.get(), "UPDATE results SET worker_id = 99, checksum = NULL WHERE point = 2");
+  EXPECT_THAT(find_faults(path_), ElementsAre("study a, point 2: its worker does not exist"));
+  execute(database.get(), "INSERT INTO reused_points VALUES (7, 'b', 1)");
+  EXPECT_THAT(find_faults(path_),
+              Contains("table reused_points: refers to study number 7, which does not exist"));
+}
+
+TEST_F(MaintenanceTest, ATableThatIsNotAsServersMakeItIsNamed) {
   store_.reset();
   execute(open_database(path_, SQLITE_OPEN_READWRITE).get(),
-          "CREATE TABLE notes (study_id, point,"
-          " FOREIGN KEY (study_id, point) REFERENCES results (study_id, point));"
-          "INSERT INTO notes VALUES (1, 2);");
-  const auto found = diagnose(path_);
-  EXPECT_THAT(found.faults, IsEmpty());
-  EXPECT_THAT(found.remarks, Contains(HasSubstr("the foreign keys of the table notes")));
-  execute(open_database(path_, SQLITE_OPEN_READWRITE).get(),
-          "UPDATE packed_results SET worker = 99, checksum = NULL WHERE point = 2");
-  EXPECT_THAT(find_faults(path_),
-              Contains(HasSubstr("table packed_results: refers to a row of workers")));
+          "ALTER TABLE results ADD COLUMN note BLOB AS (zeroblob(1000000))");
+  EXPECT_THAT(find_faults(path_), ElementsAre(HasSubstr("results is not as servers make it")));
+}
+
+TEST_F(MaintenanceTest, CompletedPointsThatDifferFromTheRowsAreNamedWithTheRemedy) {
+  store_.reset();
+  const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);
+  for (const char* change :
+       {"UPDATE completed_ranges SET points = 6", "UPDATE completed_ranges SET points = 4",
+        "UPDATE completed_ranges SET first_point = 1"}) {
+    execute(database.get(), change);
+    EXPECT_THAT(find_faults(path_), Contains(HasSubstr("UPDATE studies SET counted = 0")))
+        << change;
+  }
+  execute(database.get(), "UPDATE studies SET counted = 0, state = 'done'");
+  EXPECT_THAT(find_faults(path_), ElementsAre("study a is done: 5 of 10 points have a result"));
 }
 
 TEST_F(MaintenanceTest, RowsWithoutChecksumsAreCounted) {
@@ -207,39 +199,25 @@ TEST_F(RowFaultsTest, ARowWithoutAChecksumThatDisagreesWithTheRecipeOrIsNoResult
       {"e = 0.5", "e is"},
       {"peaks = replace(peaks, ']', '')", "one of its lists cannot be read"},
       {"phases = '[inf]'", "one of its lists cannot be read"},
-      {"impulse_n = NULL", "outputs are missing"},
+      {"impulse_n_Ns = NULL", "outputs are missing"},
       {"error = 'none'", "it is failed, and has outputs"}};
+  const std::string columns = fmt::format("{}", fmt::join(result_columns(), ", "));
   for (const auto& [change, said] : damages) {
     const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);
     execute(database.get(),
-            "CREATE TEMP TABLE before AS SELECT * FROM packed_results WHERE point = 1");
-    execute(database.get(), "UPDATE packed_results SET " + change + " WHERE point = 1");
+            "CREATE TEMP TABLE before AS SELECT " + columns + " FROM results WHERE point = 1");
+    execute(database.get(), "UPDATE results SET " + change + " WHERE point = 1");
     EXPECT_THAT(find_faults(path_), Contains(testing::AllOf(HasSubstr("point 1"), HasSubstr(said))))
         << change;
-    execute(database.get(), "DELETE FROM packed_results WHERE point = 1");
-    execute(database.get(), "INSERT INTO packed_results SELECT * FROM before");
+    execute(database.get(), "DELETE FROM results WHERE point = 1");
+    execute(database.get(), "INSERT INTO results (" + columns + ") SELECT * FROM before");
     EXPECT_THAT(find_faults(path_), IsEmpty()) << "after " << change;
   }
 }
 
 TEST_F(RowFaultsTest, AFailedPointWithOutputsIsNamed) {
-  run("UPDATE packed_results SET fn_peak = 1 WHERE point = 2");
+  run("UPDATE results SET fn_peak_N = 1 WHERE point = 2");
   EXPECT_THAT(find_faults(path_), Contains(HasSubstr("point 2: it is failed, and has outputs")));
-}
-
-TEST_F(RowFaultsTest, AListThatIsLongerThanAnyResultHasItIsNamedAndNotUnfolded) {
-  const auto peaks_of = [this](int elements) {
-    run("UPDATE packed_results SET peaks = (WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1"
-        " FROM n WHERE i < " +
-        std::to_string(3 * elements) + ") SELECT json_group_array(i) FROM n) WHERE point < 2");
-  };
-  peaks_of(200'000);
-  EXPECT_THAT(find_faults(path_),
-              testing::UnorderedElementsAre(HasSubstr("point 0: one of its lists cannot be read, or"
-                                                      " has more than 4096 elements"),
-                                            HasSubstr("point 1: one of its lists")));
-  peaks_of(protocol::kMostListElements);
-  EXPECT_THAT(find_faults(path_), testing::Not(Contains(HasSubstr("one of its lists"))));
 }
 
 TEST_F(RowFaultsTest, AModelThatIsNotThatOfItsDefinitionOrOfTheRecipeIsNamed) {
@@ -260,7 +238,7 @@ TEST_F(RowFaultsTest, AModelThatIsNotThatOfItsDefinitionOrOfTheRecipeIsNamed) {
 
 TEST_F(RowFaultsTest, ARecipeThatCannotBeReadOrHasOtherPointsIsNamed) {
   run("UPDATE studies SET points = 6");
-  EXPECT_THAT(find_faults(path_), Contains(HasSubstr("it has 6 points, and 5 by its recipe")));
+  EXPECT_THAT(find_faults(path_), Contains(HasSubstr("it has 5 points, and the study 6")));
   run("UPDATE studies SET points = 5, recipe = x'ff'");
   EXPECT_THAT(find_faults(path_), Contains(HasSubstr("its recipe cannot be read")));
 }

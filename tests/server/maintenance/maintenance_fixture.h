@@ -1,9 +1,12 @@
 #pragma once
 
 #include <cstdint>
+#include <fstream>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -13,6 +16,33 @@
 #include "tests/support/temporary_folder.h"
 
 namespace oblique::server {
+
+/// Ten points, mu from 0 to 1, of which a filter leaves out some.
+inline std::shared_ptr<const protocol::PointTable> filtered_table(const std::string& where) {
+  protocol::Recipe recipe = table_of(10)->recipe();
+  recipe.mutable_blocks(0)->set_where(where);
+  protocol::PointTable counted(recipe);
+  counted.survey([] { return true; });
+  return std::make_shared<const protocol::PointTable>(std::move(counted));
+}
+
+/// The first page of a table.
+inline std::int64_t page_of(const std::string& path, const std::string& table) {
+  const DatabaseHandle database = open_database(path, SQLITE_OPEN_READONLY);
+  Statement root(database.get(), "SELECT rootpage FROM sqlite_schema WHERE name = ?");
+  root.bind(1, std::string_view(table));
+  EXPECT_TRUE(root.step()) << table;
+  return root.integer(0);
+}
+
+constexpr std::int64_t kPageBytes = 8192;
+
+/// Makes a page unreadable.
+inline void overwrite_page(const std::string& path, std::int64_t page) {
+  std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp((page - 1) * kPageBytes);
+  file << std::string(kPageBytes, '\x5a');
+}
 
 /// A database with one study of ten points, five of them solved.
 class MaintenanceTest : public testing::Test {

@@ -20,8 +20,7 @@
 #include "server/database/sqlite.h"
 #include "server/maintenance/check.h"
 #include "server/store/store.h"
-#include "tests/support/points.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/server/maintenance/maintenance_fixture.h"
 
 namespace oblique::server {
 namespace {
@@ -41,7 +40,6 @@ struct Part {
   std::string solver_version = "0.1";
   std::string worker = "host";
   std::vector<std::uint64_t> failed{};
-  StudyTerms terms{};
   double closure = 0.0;  ///< added to that of each result
 };
 
@@ -67,8 +65,7 @@ class MergeTest : public testing::Test {
     const std::uint64_t worker = store.last_worker_id() + 1;
     std::vector<Change> changes;
     if (is_new) {
-      changes.emplace_back(
-          AddStudy{study, part.study, part.table, "2024-01-01T00:00:00.000Z", part.terms});
+      changes.emplace_back(AddStudy{study, part.study, part.table, "2024-01-01T00:00:00.000Z"});
     }
     changes.emplace_back(AddWorker{worker, part.worker, 1, part.solver_version, "avx2", "then"});
     AddResults results{study, part.table, worker, part.solver_version, "avx2", 1, "now", {}};
@@ -112,6 +109,11 @@ class MergeTest : public testing::Test {
   }
   std::string text(const std::string& name, const std::string& sql) const {
     return texts(name, sql).at(0);
+  }
+
+  /// The completed points of its studies.
+  std::string ranges(const std::string& name) const {
+    return text(name, "SELECT group_concat(first_point || '+' || points) FROM completed_ranges");
   }
 
   test::TemporaryFolder folder_;
@@ -221,13 +223,10 @@ TEST_F(MergeTest, APointThatFailedGivesWayToASolvedOneAndNotTheOtherWay) {
   EXPECT_THAT(find_faults(file("all")), IsEmpty());
 }
 
-TEST_F(MergeTest, ANameThatAnotherRecipeHasRefusesTheWholeDatabaseAndNamesAllSuch) {
+TEST_F(MergeTest, ANameThatAnotherRecipeHasRefusesTheWholeDatabase) {
   store("all", {{.study = "a", .end = 1}, {.study = "b", .end = 1}});
-  store("one", {{.study = "new", .end = 5},
-                {.study = "b", .table = table_of(11), .end = 5},
-                {.study = "a", .table = table_of(12), .end = 5}});
+  store("one", {{.study = "new", .end = 5}, {.study = "b", .table = table_of(11), .end = 5}});
   const std::string reason = refusal("one");
-  EXPECT_THAT(reason, HasSubstr("a study called \"a\""));
   EXPECT_THAT(reason, HasSubstr("a study called \"b\""));
   EXPECT_THAT(reason, HasSubstr("--rename-prefix"));
   EXPECT_EQ(text("all", "SELECT count(*) FROM studies"), "2");
@@ -257,43 +256,33 @@ TEST_F(MergeTest, TwoStudiesThatBecomeOneByANewNameAreUnited) {
   EXPECT_THAT(find_faults(file("all")), IsEmpty());
 }
 
-TEST_F(MergeTest, ResultsOfAnotherSolverVersionAreRefusedUnlessVersionsMayMix) {
+TEST_F(MergeTest, ResultsOfAnotherSolverVersionAreRefused) {
   store("all", {{.end = 4}});
   store("one", {{.study = "b", .end = 4}, {.first = 4, .end = 7, .solver_version = "0.2"}});
-  EXPECT_THAT(refusal("one"), HasSubstr("solver version 0.2"));
+  EXPECT_THAT(refusal("one"), HasSubstr("results of study a come from solver version 0.2"));
   EXPECT_EQ(text("all", "SELECT count(*) FROM studies"), "1");
-  EXPECT_EQ(merge("one", {.rename_prefix = "", .mixes_versions = true}).results_added, 7U);
-  EXPECT_EQ(text("all", "SELECT mixes_versions FROM studies WHERE name = 'a'"), "1");
 }
 
-TEST_F(MergeTest, AStudyThatMixesVersionsElsewhereMixesThemHere) {
-  store("all", {{.end = 4}});
-  store("one", {{.first = 4, .end = 7, .solver_version = "0.2", .terms = {0, 1.0, true}}});
-  EXPECT_EQ(merge("one").results_added, 3U);
-  EXPECT_EQ(text("all", "SELECT mixes_versions FROM studies"), "1");
-}
-
-TEST_F(MergeTest, ARowThatIsNotAsItWasStoredRefusesTheWholeDatabase) {
-  store("one", {{.study = "b", .end = 2}, {.end = 9}});
-  texts("one", "UPDATE packed_results SET fn_peak = fn_peak + 1 WHERE point = 8");
-  EXPECT_THROW(merge("one"), StorageError);
-  EXPECT_EQ(text("all", "SELECT count(*) FROM studies"), "0");
-  texts("one", "UPDATE packed_results SET checksum = NULL, study_id = 77 WHERE point = 8");
-  EXPECT_THROW(merge("one"), StorageError) << "of a study that is not there";
-  texts("one", "UPDATE packed_results SET checksum = NULL, study_id = 1 WHERE study_id = 77");
-  texts("one", "UPDATE packed_results SET checksum = NULL, peaks = '[1, 2' WHERE point = 8");
-  EXPECT_THROW(merge("one"), StorageError) << "with a list that no query could unfold";
-}
-
-TEST_F(MergeTest, AWorkerThatIsNotAsItWasStoredRefusesTheWholeDatabase) {
-  for (const char* change : {"solver_version = '0.2'", "name = 'another'", "threads = 3"}) {
-    store(change, {{.end = 5}});
-    texts(change, std::string("UPDATE workers SET ") + change);
-    EXPECT_THROW(merge(change, {.rename_prefix = "", .mixes_versions = true}), StorageError)
-        << change;
-    texts(change, "UPDATE workers SET checksum = NULL");
-    EXPECT_NO_THROW(merge(change, {.rename_prefix = "", .mixes_versions = true})) << change;
+TEST_F(MergeTest, ADamagedRowRefusesTheWholeDatabase) {
+  int number = 0;
+  for (const char* change : {"fn_peak_N = fn_peak_N + 1", "checksum = NULL, study_id = 77",
+                             "checksum = NULL, peaks = '[1, 2'", "checksum = NULL, point = -1",
+                             "checksum = NULL, point = 10", "checksum = NULL, model_id = 7",
+                             "checksum = NULL, worker_id = 7", "checksum = NULL, mu = 0.5"}) {
+    const std::string source = "source" + std::to_string(++number);
+    store(source, {{.study = "b", .end = 2}, {.end = 9}});
+    texts(source,
+          std::string("UPDATE results SET ") + change + " WHERE study_id = 2 AND point = 8");
+    EXPECT_THROW(merge(source), StorageError) << change;
   }
+  EXPECT_EQ(text("all", "SELECT count(*) FROM studies"), "0");
+}
+
+TEST_F(MergeTest, ARowWithoutAChecksumStaysWithoutOne) {
+  store("one", {{.end = 3}});
+  texts("one", "UPDATE results SET checksum = NULL, wall_s = 7 WHERE point = 1");
+  merge("one");
+  EXPECT_EQ(text("all", "SELECT group_concat(point) FROM results WHERE checksum IS NULL"), "1");
 }
 
 TEST_F(MergeTest, AModelThatIsNotThatOfItsDefinitionRefusesTheWholeDatabase) {
@@ -305,10 +294,9 @@ TEST_F(MergeTest, AModelThatIsNotThatOfItsDefinitionRefusesTheWholeDatabase) {
 
 TEST_F(MergeTest, AStudyThatWouldKeepAServerFromStartingRefusesTheWholeDatabase) {
   int number = 0;
-  for (const char* change :
-       {"points = 1000000000000000000", "points = -1", "recipe = x'ffffffff'", "weight = 0.0",
-        "weight = 9e999", "priority = 9223372036854775807", "name = ''", "name = char(27)",
-        "name = hex(zeroblob(1000))", "created_at = hex(zeroblob(1000))"}) {
+  for (const char* change : {"points = 1000000000000000000", "points = -1", "recipe = x'ffffffff'",
+                             "priority = 9223372036854775807", "name = ''", "name = char(27)",
+                             "name = hex(zeroblob(1000))", "created_at = hex(zeroblob(1000))"}) {
     const std::string source = "source" + std::to_string(++number);
     store(source, {{.end = 3}});
     texts(source, std::string("UPDATE studies SET checksum = NULL, ") + change);
@@ -317,20 +305,24 @@ TEST_F(MergeTest, AStudyThatWouldKeepAServerFromStartingRefusesTheWholeDatabase)
   EXPECT_EQ(text("all", "SELECT count(*) FROM studies"), "0");
 }
 
-TEST_F(MergeTest, WhatIsComputedIsNotRead) {
-  store("view", {{.end = 3}});
-  texts("view", "ALTER TABLE packed_results RENAME TO stored");
-  texts("view",
-        "CREATE VIEW Packed_Results AS WITH RECURSIVE t (x) AS (SELECT 0 UNION ALL SELECT x FROM t)"
+TEST_F(MergeTest, TablesThatAServerDoesNotMakeRefuseTheWholeDatabase) {
+  int number = 0;
+  for (const char* change : {"ALTER TABLE studies ADD COLUMN big BLOB AS (zeroblob(100000000))",
+                             "DROP TABLE retries", "ALTER TABLE results RENAME TO stored"}) {
+    const std::string source = "source" + std::to_string(++number);
+    store(source, {{.end = 3}});
+    texts(source, change);
+    EXPECT_THROW(merge(source), StorageError) << change;
+  }
+  texts("source3",
+        "CREATE VIEW Results AS WITH RECURSIVE t (x) AS (SELECT 0 UNION ALL SELECT x FROM t)"
         " SELECT stored.* FROM stored, t");
-  EXPECT_THROW(merge("view"), StorageError);
-  store("column", {{.end = 3}});
-  texts("column", "ALTER TABLE studies ADD COLUMN big BLOB AS (zeroblob(100000000))");
-  EXPECT_THROW(merge("column"), StorageError);
+  EXPECT_THROW(merge("source3"), StorageError) << "would be read without end";
 }
 
 TEST_F(MergeTest, WhatIsMergedIsNotChangedAndItsStateGoesAlong) {
-  store("one", {{.end = 5, .terms = {7, 2.5, false}}});
+  store("one", {{.end = 5}});
+  texts("one", "UPDATE studies SET priority = 7");
   Store(file("one")).commit(std::vector<Change>{SetStudyState{1, StudyState::kPaused, "later"}});
   const auto bytes = [&] {
     std::ifstream stream(file("one"), std::ios::binary);
@@ -340,9 +332,9 @@ TEST_F(MergeTest, WhatIsMergedIsNotChangedAndItsStateGoesAlong) {
   merge("one");
   EXPECT_EQ(bytes(), before);
   EXPECT_EQ(text("all",
-                 "SELECT state || ' ' || priority || ' ' || weight || ' ' || created_at ||"
-                 " ' ' || changed_at FROM studies"),
-            "paused 7 2.5 2024-01-01T00:00:00.000Z later");
+                 "SELECT state || ' ' || priority || ' ' || created_at || ' ' || changed_at"
+                 " FROM studies"),
+            "paused 7 2024-01-01T00:00:00.000Z later");
 }
 
 TEST_F(MergeTest, KilledInTheMiddleItLeavesWhatWasThereAndIsDoneByTheNextTry) {
@@ -418,18 +410,9 @@ TEST_F(MergeTest, NumbersOfDeletedStudiesAreNotGivenAgain) {
   EXPECT_EQ(text("all", "SELECT study_id FROM studies WHERE name = 'c'"), "3");
 }
 
-/// The points from 0.5 on of ten from 0 to 1: numbers 5 to 9.
-Table filtered_table() {
-  protocol::Recipe recipe = table_of(10)->recipe();
-  recipe.mutable_blocks(0)->set_where("mu > 0.5");
-  protocol::PointTable table(recipe);
-  table.survey([] { return true; });
-  return std::make_shared<const protocol::PointTable>(std::move(table));
-}
-
 TEST_F(MergeTest, AStudyIsDoneWhenAllIsThereThatItsFilterLeavesIn) {
-  store("one", {{.table = filtered_table(), .first = 5, .end = 8}});
-  store("two", {{.table = filtered_table(), .first = 8, .end = 10}});
+  store("one", {{.table = filtered_table("mu > 0.5"), .first = 5, .end = 8}});
+  store("two", {{.table = filtered_table("mu > 0.5"), .first = 8, .end = 10}});
   const auto state = [&] {
     return text("all", "SELECT state || ' ' || counted || ' ' || points FROM studies");
   };
@@ -437,41 +420,49 @@ TEST_F(MergeTest, AStudyIsDoneWhenAllIsThereThatItsFilterLeavesIn) {
   EXPECT_EQ(state(), "running 1 5");
   merge("two");
   EXPECT_EQ(state(), "done 1 5");
-  EXPECT_THAT(texts("all", "SELECT first_point || '+' || points FROM settled_points"),
-              ElementsAre("5+5"));
+  EXPECT_EQ(ranges("all"), "5+5");
   EXPECT_THAT(find_faults(file("all")), IsEmpty());
 }
 
-TEST_F(MergeTest, RowsThatWereTakenOverNameTheirOriginInTheWholeAndAreCounted) {
+TEST_F(MergeTest, CompletedPointsThatAFilterLeavesOutAreUnited) {
+  store("one", {{.table = filtered_table("mu > 0.5"), .first = 5, .end = 8}});
+  store("two", {{.table = filtered_table("mu > 0.5"), .first = 7, .end = 9}});
+  texts("one", "INSERT INTO completed_ranges VALUES (1, 0, 2)");
+  texts("two", "INSERT INTO completed_ranges VALUES (1, 1, 4)");
+  merge("one");
+  EXPECT_EQ(ranges("all"), "0+2,5+3");
+  merge("two");
+  EXPECT_EQ(ranges("all"), "0+9");
+  EXPECT_THAT(find_faults(file("all")), IsEmpty());
+}
+
+TEST_F(MergeTest, APointThatNoFilterLeavesOutIsNotCompletedWithoutARow) {
+  store("one", {{.table = filtered_table("mu > 0.5"), .first = 5, .end = 7}});
+  texts("one", "INSERT INTO completed_ranges VALUES (1, 8, 2)");
+  merge("one");
+  EXPECT_EQ(ranges("all"), "5+2");
+}
+
+TEST_F(MergeTest, ReusedResultsKeepTheNamesOfTheirSourceAndAreCounted) {
   store("one",
-        {{.study = "a", .end = 4}, {.study = "gone", .first = 4, .end = 10}, {.study = "b"}});
+        {{.study = "a/b", .end = 4}, {.study = "gone", .first = 4, .end = 10}, {.study = "c"}});
   {
     Store store(file("one"));
     const auto outcome = std::make_shared<ReusedResults>();
-    store.commit(std::vector<Change>{ReuseResults{3, table_of(10), 0, "0.1", outcome},
-                                     RenameStudy{1, "first"}, DeleteStudy{2}});
-    while (store.clear_away(100) != ClearedAway::kAll) {
-    }
+    store.commit(
+        std::vector<Change>{ReuseResults{3, table_of(10), 0, "0.1", outcome}, DeleteStudy{2}});
   }
-  store("all", {{.study = "first", .table = table_of(3), .end = 3}, {.study = "x"}});
-  const std::string origins =
-      "SELECT group_concat(taken_from) FROM (SELECT * FROM runs WHERE study = 'b' ORDER BY point)";
-  const std::string counts =
-      "SELECT o.name || ' ' || t.points FROM taken_points AS t JOIN origins AS o USING (origin_id)"
-      " JOIN studies AS s USING (study_id) WHERE s.name = 'b' ORDER BY o.name";
+  store("all", {{.study = "c", .end = 2}});
   for (int i = 0; i < 2; ++i) {
-    merge("one", {.rename_prefix = "other "});
-    EXPECT_EQ(
-        text("all", origins),
-        "other first/0,other first/1,other first/2,other first/3,gone (deleted)/4,"
-        "gone (deleted)/5,gone (deleted)/6,gone (deleted)/7,gone (deleted)/8,gone (deleted)/9");
-    EXPECT_THAT(texts("all", counts), ElementsAre("gone (deleted) 6", "other first 4"));
+    merge("one");
+    EXPECT_EQ(text("all",
+                   "SELECT group_concat(reused_from) FROM (SELECT * FROM runs WHERE study = 'c'"
+                   " ORDER BY point)"),
+              "a/b/2,a/b/3,gone/4,gone/5,gone/6,gone/7,gone/8,gone/9");
+    EXPECT_THAT(texts("all", "SELECT source || ' ' || points FROM reused_points ORDER BY source"),
+                ElementsAre("a/b 2", "gone 6"));
     EXPECT_THAT(find_faults(file("all")), IsEmpty());
   }
-  EXPECT_EQ(text("all", "SELECT count(*) FROM origins"), "2");
-  // No study will have the number by which the whole knows what is gone.
-  Store all(file("all"));
-  EXPECT_GE(all.last_study_id(), std::stoull(text("all", "SELECT max(origin_id) FROM origins")));
 }
 
 TEST_F(MergeTest, AStudyIsNotGivenTheNumberOfRowsWhoseStudyWasDeletedByHand) {

@@ -14,7 +14,6 @@
 #include "server/maintenance/merge.h"
 #include "server/maintenance/salvage.h"
 #include "server/maintenance/study_changes_offline.h"
-#include "server/reading/reader.h"
 #include "tests/server/maintenance/maintenance_fixture.h"
 
 namespace oblique::server {
@@ -41,7 +40,6 @@ TEST_P(OtherSchema, IsRefusedByWhateverOpensItWithBothNumbersAndTheRemedy) {
   const auto before = contents();
   const std::vector<std::pair<std::string, std::function<void()>>> openers{
       {"server", [&] { const Store store(path_); }},
-      {"query", [&] { const Reader reader(path_); }},
       {"backup", [&] { back_up(path_, copy_); }},
       {"salvage", [&] { salvage(path_, copy_); }},
       {"check", [&] { diagnose(path_); }},
@@ -50,12 +48,13 @@ TEST_P(OtherSchema, IsRefusedByWhateverOpensItWithBothNumbersAndTheRemedy) {
       {"describe", [&] { stored_recipe(path_, 1); }},
       {"rename", [&] { rename_study(path_, 1, "b"); }}};
   for (const auto& [name, open] : openers) {
-    EXPECT_THAT(open, testing::ThrowsMessage<StorageError>(
-                          path_ + " has schema " + std::to_string(schema) +
-                          ", and this version of oblique has schema " +
-                          std::to_string(kSchemaVersion) + ": use the " + written_by +
-                          " version that wrote the file, read it with sqlite3, or solve its "
-                          "studies again into a new file"))
+    EXPECT_THAT(open,
+                testing::ThrowsMessage<StorageError>(
+                    path_ + " has schema " + std::to_string(schema) +
+                    ", and this version of oblique has schema " + std::to_string(kSchemaVersion) +
+                    ": export its results with the " + written_by +
+                    " version that wrote it (oblique query STUDY --db FILE --format csv), "
+                    "or solve its studies again into a new file"))
         << name;
   }
   EXPECT_EQ(contents(), before);

@@ -1,7 +1,6 @@
 #include "server/maintenance/salvage.h"
 
 #include <algorithm>
-#include <array>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -12,7 +11,6 @@
 #include <gtest/gtest.h>
 
 #include "server/maintenance/check.h"
-#include "server/reading/reader.h"
 #include "server/store/store.h"
 #include "tests/server/maintenance/maintenance_fixture.h"
 
@@ -29,13 +27,30 @@ class SalvageTest : public MaintenanceTest {
   static std::vector<std::string> rows_of(const std::string& file) {
     const DatabaseHandle database = open_database(file, SQLITE_OPEN_READONLY);
     Statement rows(database.get(),
-                   "SELECT printf('%02d/%06d %d', study_id, point, checksum) FROM packed_results"
+                   "SELECT printf('%02d/%06d %d', study_id, point, checksum) FROM results"
                    " ORDER BY study_id, point");
     std::vector<std::string> found;
     while (rows.step()) {
       found.push_back(rows.text(0));
     }
     return found;
+  }
+
+  /// Follows the first child of each page, whose number is where the first of the pointers behind
+  /// the header of twelve bytes says.
+  static std::int64_t first_leaf(const std::string& path, std::int64_t page) {
+    constexpr unsigned char kLeaf = 0x0a;
+    std::ifstream file(path, std::ios::binary);
+    for (std::vector<unsigned char> bytes(kPageBytes);;) {
+      file.seekg((page - 1) * kPageBytes);
+      file.read(reinterpret_cast<char*>(bytes.data()), kPageBytes);
+      if (bytes[0] == kLeaf) {
+        return page;
+      }
+      const std::size_t cell = bytes[12] * 256U + bytes[13];
+      page = bytes[cell] * 16777216 + bytes[cell + 1] * 65536 + bytes[cell + 2] * 256 +
+             bytes[cell + 3];
+    }
   }
 };
 
@@ -49,14 +64,9 @@ TEST_F(SalvageTest, WhatCanBeReadOfADamagedDatabaseIsSavedAndTheRestIsPendingAga
     store.commit(std::vector<Change>{SetStudyState{1, StudyState::kDone, "now"}});
   }
   const auto stored = rows_of(damaged);
-  {
-    // One page in the middle, where nearly all pages are rows of results.
-    std::fstream file(damaged, std::ios::in | std::ios::out | std::ios::binary);
-    constexpr std::uintmax_t kPage = 4096;
-    file.seekp(
-        static_cast<std::streamoff>(std::filesystem::file_size(damaged) / 2 / kPage * kPage));
-    file << std::string(kPage, '\x5a');
-  }
+  // One page in the middle, where nearly all pages are rows of results.
+  overwrite_page(
+      damaged, static_cast<std::int64_t>(std::filesystem::file_size(damaged)) / 2 / kPageBytes + 1);
   EXPECT_FALSE(find_faults(damaged).empty());
   const auto saved = salvage(damaged, copy_);
   EXPECT_EQ(saved.studies, 1U);
@@ -74,7 +84,7 @@ TEST_F(SalvageTest, WhatCanBeReadOfADamagedDatabaseIsSavedAndTheRestIsPendingAga
 
 TEST_F(SalvageTest, SalvagingEndsAlsoWhenTheFirstPagesOfATableAreGone) {
   constexpr std::uint64_t kPoints = 400;
-  for (const std::string damage : {"root of packed_results", "first rows", "root of models"}) {
+  for (const std::string damage : {"root of results", "first rows", "root of models"}) {
     const std::string damaged = folder_.file(damage + ".db");
     table_ = table_of(kPoints);
     {
@@ -82,33 +92,11 @@ TEST_F(SalvageTest, SalvagingEndsAlsoWhenTheFirstPagesOfATableAreGone) {
       add_results(store, 0, kPoints, true);
     }
     const auto stored = rows_of(damaged);
-    std::int64_t page = 0;
-    {
-      const DatabaseHandle database = open_database(damaged, SQLITE_OPEN_READONLY);
-      const std::string table = damage == "root of models" ? "models" : "packed_results";
-      Statement root(database.get(), "SELECT rootpage FROM sqlite_schema WHERE name = ?");
-      root.bind(1, std::string_view(table));
-      ASSERT_TRUE(root.step());
-      page = root.integer(0);
-    }
-    std::fstream file(damaged, std::ios::in | std::ios::out | std::ios::binary);
+    std::int64_t page = page_of(damaged, damage == "root of models" ? "models" : "results");
     if (damage == "first rows") {
-      // Down by the first child that each names, behind its header of twelve bytes and pointers.
-      constexpr unsigned char kLeaf = 0x0a;
-      for (std::array<unsigned char, 4096> bytes{};;) {
-        file.seekg((page - 1) * 4096);
-        file.read(reinterpret_cast<char*>(bytes.data()), bytes.size());
-        if (bytes[0] == kLeaf) {
-          break;
-        }
-        const std::size_t cell = bytes[12] * 256U + bytes[13];
-        page = bytes[cell] * 16777216 + bytes[cell + 1] * 65536 + bytes[cell + 2] * 256 +
-               bytes[cell + 3];
-      }
+      page = first_leaf(damaged, page);
     }
-    file.seekp((page - 1) * 4096);
-    file << std::string(4096, '\x5a');
-    file.close();
+    overwrite_page(damaged, page);
     const std::string saved_file = folder_.file(damage + " saved.db");
     const auto saved = salvage(damaged, saved_file);
     EXPECT_GE(saved.unreadable_places, 1U) << damage;
@@ -130,11 +118,10 @@ TEST_F(SalvageTest, AFlippedByteInAnyValueOfARowIsFoundAndTheRowIsNotSalvaged) {
   // The row of point 3 begins with the numbers that its columns do, near the end of the file; its
   // texts are found by what they say.
   const auto text_of = [&](const std::string& column) {
-    return Reader(path_)
-        .query("SELECT " + column + " FROM packed_results WHERE point = 3", kNoLimits)
-        .rows(0)
-        .values(0)
-        .text();
+    const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READONLY);
+    Statement row(database.get(), "SELECT " + column + " FROM results WHERE point = 3");
+    row.step();
+    return row.text(0);
   };
   for (const std::string column : {"peaks", "ft_peaks", "phases", "reaction_peaks"}) {
     const std::string text = text_of(column);
@@ -183,7 +170,8 @@ TEST_F(SalvageTest, OfATruncatedFileEveryRowThatIsLeftIsSavedAndTheFileStaysAsIt
   const auto stored = rows_of(whole);
   const auto size = std::filesystem::file_size(whole);
   // In the middle of a page, at its end, and so that little more than the tables' heads is left.
-  for (const std::uintmax_t cut : {size / 100 * 99 + 7, size / 4096 * 3 / 4 * 4096, size / 6}) {
+  for (const std::uintmax_t cut :
+       {size / 100 * 99 + 7, size / kPageBytes * 3 / 4 * kPageBytes, size / 6}) {
     const std::string name = std::to_string(cut);
     const std::string truncated = folder_.file(name + ".db");
     const std::string saved_file = folder_.file(name + " saved.db");
@@ -212,49 +200,46 @@ TEST_F(SalvageTest, RowsThatAreOnlyInTheLogAreSavedTooAndTheLogStaysAsItIs) {
   EXPECT_EQ(std::filesystem::file_size(crashed + "-wal"), log);
 }
 
-TEST_F(SalvageTest, StudiesWithFiltersAreDoneAndRowsThatWereTakenOverAreCountedAgain) {
-  protocol::Recipe recipe = table_->recipe();
-  recipe.mutable_blocks(0)->set_where("mu < 0.4");  // points 0 to 3 of 10
-  protocol::PointTable counted(recipe);
-  counted.survey([] { return true; });
-  const auto filtered = std::make_shared<const protocol::PointTable>(std::move(counted));
+TEST_F(SalvageTest, StudiesWithFiltersAreDoneAndReusedResultsAreCountedAgain) {
+  const auto filtered = filtered_table("mu < 0.4");  // points 0 to 3
   const auto outcome = std::make_shared<ReusedResults>();
-  store_->commit(std::vector<Change>{
-      AddStudy{2, "b", filtered, "now"}, ReuseResults{2, filtered, 0, "0.1", outcome},
-      SetStudyState{2, StudyState::kDone, "now"}, RenameStudy{1, "first"}});
+  store_->commit(std::vector<Change>{AddStudy{2, "b", filtered, "now"},
+                                     ReuseResults{2, filtered, 0, "0.1", outcome},
+                                     SetStudyState{2, StudyState::kDone, "now"}});
   store_.reset();
-  execute(open_database(path_, SQLITE_OPEN_READWRITE).get(), "DELETE FROM taken_points");
+  execute(open_database(path_, SQLITE_OPEN_READWRITE).get(), "DELETE FROM reused_points");
   salvage(path_, copy_);
   EXPECT_THAT(find_faults(copy_), testing::IsEmpty());
   Store saved(copy_);
   const auto study = saved.studies().at(1);
   EXPECT_EQ(study.state, StudyState::kDone);
   EXPECT_EQ(study.settled, IntervalSet(0, 4));
-  EXPECT_EQ(study.taken, (std::map<std::string, std::uint64_t>{{"first", 4}}));
+  EXPECT_EQ(study.taken, (std::map<std::string, std::uint64_t>{{"a", 4}}));
 }
 
-TEST_F(SalvageTest, TheNumberOfAStudyThatIsGoneIsNotGivenAgainWhereRowsNameIt) {
-  const auto other = std::make_shared<const protocol::PointTable>(
-      protocol::recipe_of({{protocol::listed("H", {0.5}), protocol::listed("mu", {0.0, 0.5}),
-                            protocol::listed("e", {1.0})}}));
-  const auto outcome = std::make_shared<ReusedResults>();
-  store_->commit(std::vector<Change>{
-      AddStudy{2, "b", other, "now"}, AddStudy{3, "source", other, "now"},
-      AddResults{3, other, 1, "0.1", "avx2", 1, "now", {solved_point(0), solved_point(1)}},
-      ReuseResults{2, other, 0, "0.1", outcome}, DeleteStudy{3}});
-  ASSERT_EQ(outcome->points, IntervalSet(0, 2));
-  while (store_->clear_away(100) != ClearedAway::kAll) {
-  }
+TEST_F(SalvageTest, PointsThatAFilterLeavesOutStayCompletedAndThoseOfLostRowsDoNot) {
+  const auto filtered = filtered_table("mu < 0.4");  // points 0 to 3
+  store_->commit(
+      std::vector<Change>{AddStudy{2, "b", filtered, "now"},
+                          AddResults{2,
+                                     filtered,
+                                     1,
+                                     "0.1",
+                                     "avx2",
+                                     1,
+                                     "now",
+                                     {solved_point(0), solved_point(1), solved_point(2)}}});
   store_.reset();
-  for (const std::string loss : {"", "DELETE FROM origins WHERE origin_id = 3"}) {
-    execute(open_database(path_, SQLITE_OPEN_READWRITE).get(), loss);
-    const std::string file = folder_.file(loss + " saved.db");
-    salvage(path_, file);
-    Store saved(file);
-    ASSERT_EQ(saved.studies().back().study_id, 2U) << loss;
-    EXPECT_EQ(saved.last_study_id(), 3U) << loss;
-    EXPECT_THAT(find_faults(file), IsEmpty()) << loss;
-  }
+  execute(open_database(path_, SQLITE_OPEN_READWRITE).get(),
+          "INSERT INTO completed_ranges VALUES (2, 4, 3);"
+          "UPDATE results SET mu = 2 * mu WHERE study_id = 2 AND point = 1");
+  salvage(path_, copy_);
+  const DatabaseHandle saved = open_database(copy_, SQLITE_OPEN_READONLY);
+  Statement ranges(saved.get(),
+                   "SELECT group_concat(first_point || '+' || points) FROM completed_ranges"
+                   " WHERE study_id = 2");
+  ASSERT_TRUE(ranges.step());
+  EXPECT_EQ(ranges.text(0), "0+1,2+1,4+3");
 }
 
 }  // namespace

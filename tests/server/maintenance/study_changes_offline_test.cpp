@@ -53,8 +53,8 @@ TEST_F(OfflineStudyTest, ADeletedStudyLeavesNothingBehind) {
   EXPECT_EQ(rows, 10U);
   { const Store next(path_); }  // a start deletes what no row refers to
   const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READONLY);
-  for (const char* table : {"studies", "models", "workers", "packed_results", "settled_points",
-                            "deletions", "retries"}) {
+  for (const char* table :
+       {"studies", "models", "workers", "results", "completed_ranges", "deletions", "retries"}) {
     Statement count(database.get(), std::string("SELECT count(*) FROM ") + table);
     ASSERT_TRUE(count.step());
     EXPECT_EQ(count.integer(0), 0) << table;

@@ -10,19 +10,13 @@ namespace {
 constexpr StudyId kSweep = 1;
 constexpr StudyId kUrgent = 2;
 
-StudyTerms terms_of(std::int32_t priority) {
-  StudyTerms terms;
-  terms.priority = priority;
-  return terms;
-}
-
 /// A worker that has solved something holds two batches of a long study of priority 3, all it asked
 /// for.
 class SchedulerAheadTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    bench_.feed(StudyAdded{
-        .study = kSweep, .table = table_of(1'000'000), .settled = {}, .terms = terms_of(3)});
+    bench_.feed(
+        StudyAdded{.study = kSweep, .table = table_of(1'000'000), .settled = {}, .priority = 3});
     const SendBatch first = bench_.join(1, 1).at(0);
     sweep_ = {bench_.next_after(first, 1e-3),
               only<SendBatch>(bench_.feed(CreditGiven{1, 1})).at(0)};
@@ -30,7 +24,7 @@ class SchedulerAheadTest : public ::testing::Test {
 
   std::vector<SendBatch> add_urgent(std::int32_t priority, std::uint64_t points = 1000) {
     return only<SendBatch>(bench_.feed(StudyAdded{
-        .study = kUrgent, .table = table_of(points), .settled = {}, .terms = terms_of(priority)}));
+        .study = kUrgent, .table = table_of(points), .settled = {}, .priority = priority}));
   }
 
   SchedulerBench bench_;
@@ -78,7 +72,7 @@ TEST_F(SchedulerAheadTest, OneOfTheSamePriorityWaitsForTheWorkerToAsk) {
 
 TEST_F(SchedulerAheadTest, APriorityThatIsRaisedCountsFromThenOn) {
   ASSERT_TRUE(add_urgent(3).empty());
-  const auto sent = only<SendBatch>(bench_.feed(StudyTermsChanged{kUrgent, terms_of(5)}));
+  const auto sent = only<SendBatch>(bench_.feed(PriorityChanged{kUrgent, 5}));
   ASSERT_EQ(sent.size(), 1U);
   EXPECT_EQ(sent[0].study, kUrgent);
 }

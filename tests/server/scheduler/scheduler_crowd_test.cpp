@@ -65,11 +65,6 @@ TEST_F(IdleCrowd, APausedStudyThatGoesOnIsHandedOutAtOnce) {
   EXPECT_FALSE(only<SendBatch>(scheduler_.handle(StudyReopened{2}, now_ms_)).empty());
 }
 
-TEST_F(IdleCrowd, AStudyThatMayMixVersionsNowIsHandedOutAtOnce) {
-  EXPECT_FALSE(
-      only<SendBatch>(scheduler_.handle(StudyTermsChanged{1, {0, 1.0, true}}, now_ms_)).empty());
-}
-
 TEST(ManyStudies, ThatRestCostDispatchNothing) {
   const auto looks_with = [](StudyId resting) {
     Scheduler scheduler(trusting());

@@ -71,11 +71,11 @@ TEST(SchedulerGrowthTest, PausedAndCancelledStudiesGoOn) {
   }
 }
 
-TEST(SchedulerGrowthTest, TheTermsOfTheGrowthHold) {
+TEST(SchedulerGrowthTest, ThePriorityOfTheGrowthHolds) {
   SchedulerBench bench;
   bench.feed(StudyAdded{1, table_of(10), {}});
   bench.feed(StudyAdded{2, table_of(10), {}});
-  bench.feed(StudyGrown{2, table_of(20), {7, 1.0, false}});
+  bench.feed(StudyGrown{2, table_of(20), 7});
   EXPECT_EQ(bench.join(1, 1).at(0).study, 2U);
 }
 

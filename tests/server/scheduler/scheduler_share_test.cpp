@@ -18,20 +18,20 @@ std::map<StudyId, int> shares(SchedulerBench& bench, std::uint32_t batches) {
   return counts;
 }
 
-TEST(SchedulerShare, StudiesOfOnePriorityShareTheWorkersByWeight) {
+TEST(SchedulerShare, StudiesOfOnePriorityShareTheWorkersAlike) {
   SchedulerBench bench(trusting());
-  bench.feed(StudyAdded{1, table_of(1'000'000), {}, 0, false, false, {0, 1.0}});
-  bench.feed(StudyAdded{2, table_of(1'000'000), {}, 0, false, false, {0, 3.0}});
+  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  bench.feed(StudyAdded{2, table_of(1'000'000), {}});
   bench.feed(WorkerJoined{1, 1});
   const auto counts = shares(bench, 400);
-  EXPECT_NEAR(counts.at(1), 100, 2);
-  EXPECT_NEAR(counts.at(2), 300, 2);
+  EXPECT_NEAR(counts.at(1), 200, 2);
+  EXPECT_NEAR(counts.at(2), 200, 2);
 }
 
 TEST(SchedulerShare, AStudyOfAHigherPriorityComesFirst) {
   SchedulerBench bench(trusting());
   bench.feed(StudyAdded{1, table_of(1'000'000), {}});
-  bench.feed(StudyAdded{2, table_of(1'000'000), {}, 0, false, false, {5, 1.0}});
+  bench.feed(StudyAdded{2, table_of(1'000'000), {}, 0, false, false, 5});
   bench.feed(WorkerJoined{1, 1});
   EXPECT_EQ(shares(bench, 10).count(1), 0U);
   bench.feed(StudyPaused{2});

@@ -6,10 +6,6 @@
 namespace oblique::server {
 namespace {
 
-StudyTerms mixed() {
-  return {0, 1.0, true};
-}
-
 TEST(SchedulerVersion, AStudyGoesToWorkersOfTheSolverVersionItBeganWith) {
   SchedulerBench bench;
   bench.feed(StudyAdded{1, table_of(100), {}});
@@ -26,13 +22,6 @@ TEST(SchedulerVersion, AWorkerOfAnotherVersionServesOtherStudies) {
   bench.feed(StudyAdded{2, table_of(100), {}});
   bench.feed(WorkerJoined{2, 1, "2.0"});
   EXPECT_EQ(only<SendBatch>(bench.feed(CreditGiven{2, 1})).at(0).study, 2U);
-}
-
-TEST(SchedulerVersion, AStudyThatMixesVersionsGoesToAllWorkers) {
-  SchedulerBench bench;
-  bench.feed(StudyAdded{1, table_of(100), IntervalSet(0, 1), 0, false, false, mixed(), "1.0"});
-  bench.feed(WorkerJoined{2, 1, "2.0"});
-  EXPECT_EQ(only<SendBatch>(bench.feed(CreditGiven{2, 1})).size(), 1U);
 }
 
 TEST(SchedulerVersion, AStudyWhoseVersionNoWorkerHasSaysSo) {
@@ -72,17 +61,6 @@ TEST(SchedulerVersion, LateResultsOfAnotherVersionAreAcknowledgedAndNotStored) {
   ASSERT_EQ(only<StoreResults>(effects).size(), 1U);
   EXPECT_TRUE(only<StoreResults>(effects)[0].accepted.empty());
   EXPECT_EQ(only<AcknowledgeResults>(bench.feed(ResultsStored{2, 1, 1, {}})).size(), 1U);
-}
-
-TEST(SchedulerVersion, WhenAStudyStopsMixingWorkersOfOtherVersionsLoseTheirBatches) {
-  SchedulerBench bench;
-  bench.feed(StudyAdded{1, table_of(100), IntervalSet(0, 1), 0, false, false, mixed(), "1.0"});
-  bench.feed(WorkerJoined{2, 1, "2.0"});
-  const auto batch = only<SendBatch>(bench.feed(CreditGiven{2, 1})).at(0);
-  const auto released = only<ReleaseBatch>(bench.feed(StudyTermsChanged{1, {}}));
-  ASSERT_EQ(released.size(), 1U);
-  EXPECT_EQ(released[0].lease, batch.lease);
-  EXPECT_EQ(bench.scheduler.study(1).leased, 0U);
 }
 
 }  // namespace

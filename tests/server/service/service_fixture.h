@@ -10,7 +10,7 @@
 
 #include "proto/frames.h"
 #include "proto/result_message.h"
-#include "server/queries/reader_program.h"
+#include "server/query/reader_program.h"
 #include "server/service/service.h"
 #include "tests/support/points.h"
 
@@ -100,7 +100,7 @@ class ServiceTest : public testing::Test {
     message.set_request_id(42);
     message.mutable_submit()->set_name(name);
     *message.mutable_submit()->mutable_recipe() = table_of(points)->recipe();
-    message.mutable_submit()->set_fresh(true);
+    message.mutable_submit()->set_no_reuse(true);
     return message;
   }
   ClientRequest change_request(const std::string& name, protocol::StudyChange change) {

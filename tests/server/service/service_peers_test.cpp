@@ -45,17 +45,10 @@ TEST_F(ServiceTest, AStudyBegunWithAnotherSolverWaitsAndSaysForWhat) {
   status.mutable_status();
   request(status);
   EXPECT_THAT(last_reply().status().studies(0).waits_for(), HasSubstr("solver version 1.0"));
-  ClientRequest mixing = submit_request("a");
-  mixing.mutable_submit()->set_mixes_versions(true);
-  request(mixing);
-  write_all();
-  EXPECT_TRUE(last_message().has_batch());
 }
 
-TEST_F(ServiceTest, AnotherShareIsAcknowledgedOnceItIsDurableAndWhatIsNotGivenStays) {
-  ClientRequest first = submit_request("a");
-  first.mutable_submit()->set_weight(3.0);
-  request(first);
+TEST_F(ServiceTest, AnotherPriorityIsAcknowledgedOnceItIsDurable) {
+  request(submit_request("a"));
   write_all();
   ClientRequest again = submit_request("a");
   again.mutable_submit()->set_priority(7);
@@ -69,7 +62,6 @@ TEST_F(ServiceTest, AnotherShareIsAcknowledgedOnceItIsDurableAndWhatIsNotGivenSt
   status.mutable_status();
   request(status);
   EXPECT_EQ(last_reply().status().studies(0).priority(), 7);
-  EXPECT_EQ(last_reply().status().studies(0).weight(), 3.0);
   hello();
   credit(1);
   EXPECT_EQ(last_message().batch().priority(), 7);

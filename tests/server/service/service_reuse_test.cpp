@@ -27,7 +27,7 @@ class ServiceReuseTest : public ServiceTest {
   }
   ClientRequest reusing(const std::string& name, std::uint64_t points = 10) {
     ClientRequest message = submit_request(name, points);
-    message.mutable_submit()->set_fresh(false);
+    message.mutable_submit()->set_no_reuse(false);
     return message;
   }
   /// Study 2, "b", is durable and its first part waits for the writer.

@@ -67,7 +67,7 @@ TEST_F(WriteLedgerTest, OnlyWhereAClientWaitsIsAFailureReportedAtOnce) {
   ledger_.write(AddWorker{}, QuietWrite{});
   ledger_.write(AddStudy{}, StudyWrite{});
   ledger_.write(SetStudyState{}, StateWrite{});
-  ledger_.write(SetStudyTerms{}, TermsWrite{});
+  ledger_.write(SetPriority{}, PriorityWrite{});
   ledger_.write(ForgetFailures{}, FailuresWrite{});
   std::vector<bool> reported;
   for (const WriteJob& job : writer_.jobs) {

@@ -1,6 +1,5 @@
-// The tables of server/store/README.md against the one source of each: the comments of the schema
-// for tables, the columns of `oblique columns` for views.
-#include <algorithm>
+// The tables of server/store/tables.md against the one source of each: the comments of the schema
+// and the columns of `oblique columns`.
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
@@ -11,11 +10,11 @@
 
 #include <gtest/gtest.h>
 
-#include "server/asking/columns.h"
+#include "server/query/columns.h"
 #include "server/database/sqlite.h"
+#include "server/store/schema.h"
 #include "server/store/store.h"
 #include "tests/support/temporary_folder.h"
-#include "worker/solver/model/result_fields.h"
 
 namespace oblique::server {
 namespace {
@@ -56,8 +55,8 @@ class DocumentTest : public testing::Test {
     for (const Column& column : all_columns()) {
       known_.emplace(column.name, column);
     }
-    for (const auto& key : {"study_id", "point"}) {
-      in_lists_.emplace(key, known_.at(key));
+    for (const TableDefinition& table : our_tables()) {
+      comments_[table.name] = comments_of(table.sql);
     }
     const auto add = [&](const char* name, const char* unit, const char* meaning) {
       in_lists_.emplace(name, Column{name, unit, "", "", meaning});
@@ -72,14 +71,10 @@ class DocumentTest : public testing::Test {
     add("ft_N", "N", "largest tangential magnitude around it");
     add("force_N", "N", "magnitude of the largest force");
     add("major", "", "1: major; 0: a ripple");
-    in_rows_.emplace(
-        "checksum",
-        Column{"checksum", "", "", "", "CRC-32 of what packed_results has of the row; NULL: none"});
-    in_rows_.emplace("E", known_.at("E_Pa"));
   }
 
   std::vector<std::string> columns_of(const std::string& name) const {
-    Statement list(database_.get(), "SELECT name FROM pragma_table_info(?)");
+    Statement list(database_.get(), "SELECT name FROM pragma_table_xinfo(?)");
     list.bind(1, std::string_view(name));
     std::vector<std::string> names;
     while (list.step()) {
@@ -88,55 +83,57 @@ class DocumentTest : public testing::Test {
     return names;
   }
 
-  /// What is known of a column of a view.
-  const Column& described(const std::string& view, const std::string& name) const {
-    const bool is_list = columns_of(view).size() < 10;
-    const auto& first = is_list ? in_lists_ : in_rows_;
-    const auto found = first.find(name);
-    if (found != first.end()) {
-      return found->second;
-    }
+  /// What a table or view of results says in a column: a comment of the schema, or what `oblique
+  /// columns` lists.
+  Column described(const std::string& table, const std::string& name) const {
+    Column column{name, "", "", "", ""};
     const auto known = known_.find(name);
-    static const Column kNone{};
-    EXPECT_TRUE(known != known_.end()) << view << "." << name << " is not described";
-    return known == known_.end() ? kNone : known->second;
+    if (known != known_.end()) {
+      column = known->second;
+    }
+    if (table != "results" && table != "runs" && in_lists_.contains(name)) {
+      column = in_lists_.at(name);
+    }
+    const std::string comment = comment_of("results", name);
+    if (!comment.empty() && (table == "results" || column.meaning.empty())) {
+      column.meaning = comment;
+    }
+    EXPECT_FALSE(column.meaning.empty()) << table << "." << name << " is not described";
+    return column;
   }
 
-  std::string view_text(const std::string& view) const {
-    std::string text = "\n#### " + view + " (view)\n\n| column | unit | |\n|---|---|---|\n";
-    for (const std::string& name : columns_of(view)) {
-      const Column& column = described(view, name);
+  std::string comment_of(const std::string& table, const std::string& column) const {
+    const auto& comments = comments_.at(table);
+    const auto found = comments.find(column);
+    return found == comments.end() ? "" : found->second;
+  }
+
+  std::string text_with_units(const std::string& table, const std::string& kind) const {
+    std::string text = "\n#### " + table + kind + "\n\n| column | unit | |\n|---|---|---|\n";
+    for (const std::string& name : columns_of(table)) {
+      const Column column = described(table, name);
       text += "| `" + name + "` | " + column.unit + " | " + column.meaning + " |\n";
     }
     return text;
   }
 
   std::string table_text(const std::string& table) const {
-    Statement create(database_.get(), "SELECT sql FROM sqlite_schema WHERE name = ?");
-    create.bind(1, std::string_view(table));
-    create.step();
-    const auto comments = comments_of(create.text(0));
     std::string text = "\n#### " + table + "\n\n| column | |\n|---|---|\n";
     for (const std::string& name : columns_of(table)) {
-      const auto comment = comments.find(name);
-      EXPECT_TRUE(comment != comments.end() && !comment->second.empty())
-          << table << "." << name << " has no comment in the schema";
-      text += "| `" + name + "` | " + (comment == comments.end() ? "" : comment->second) + " |\n";
+      const std::string comment = comment_of(table, name);
+      EXPECT_FALSE(comment.empty()) << table << "." << name << " has no comment in the schema";
+      text += "| `" + name + "` | " + comment + " |\n";
     }
     return text;
   }
 
   std::string expected() const {
     std::string text;
-    for (const char* view :
-         {"runs", "results", "peaks", "phases", "stick_intervals", "reaction_peaks"}) {
-      text += view_text(view);
+    for (const char* view : {"runs", "peaks", "phases", "stick_intervals", "reaction_peaks"}) {
+      text += text_with_units(view, " (view)");
     }
-    Statement tables(database_.get(),
-                     "SELECT name FROM sqlite_schema WHERE type = 'table'"
-                     " AND name NOT LIKE 'sqlite%' ORDER BY rowid");
-    while (tables.step()) {
-      text += table_text(tables.text(0));
+    for (const TableDefinition& table : our_tables()) {
+      text += table.name == "results" ? text_with_units(table.name, "") : table_text(table.name);
     }
     return text;
   }
@@ -146,15 +143,15 @@ class DocumentTest : public testing::Test {
   DatabaseHandle database_;
   std::map<std::string, Column> known_;
   std::map<std::string, Column> in_lists_;
-  std::map<std::string, Column> in_rows_;
+  std::map<std::string, std::map<std::string, std::string>> comments_;
 };
 
 /// OBLIQUE_WRITE_TABLES=1 in the environment writes them instead.
-TEST_F(DocumentTest, EveryTableViewAndColumnStandsInTheReadmeAsItsSourceSaysIt) {
-  const std::string readme = OBLIQUE_STORE_README;
+TEST_F(DocumentTest, EveryTableViewAndColumnIsDocumentedAsItsSourceDescribesIt) {
+  const std::string document = OBLIQUE_STORE_TABLES;
   const std::string begin = "<!-- tables -->\n";
   const std::string end = "\n<!-- end of tables -->";
-  std::ifstream file(readme);
+  std::ifstream file(document);
   std::string text(std::istreambuf_iterator<char>(file), {});
   const auto from = text.find(begin);
   const auto to = text.find(end);
@@ -162,7 +159,7 @@ TEST_F(DocumentTest, EveryTableViewAndColumnStandsInTheReadmeAsItsSourceSaysIt) 
   const auto first = from + begin.size();
   if (std::getenv("OBLIQUE_WRITE_TABLES") != nullptr) {
     const std::string written = text.replace(first, to - first, expected());
-    std::ofstream(readme) << written;
+    std::ofstream(document) << written;
     return;
   }
   EXPECT_EQ(text.substr(first, to - first), expected())

@@ -16,10 +16,7 @@
 #include <gtest/gtest.h>
 
 #include "proto/recipe/canonical.h"
-#include "server/database/sqlite.h"
-#include "server/store/store.h"
-#include "tests/support/points.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/server/store/store_fixture.h"
 
 namespace oblique::server {
 namespace {
@@ -38,15 +35,12 @@ Table table(const protocol::Recipe& recipe) {
   return std::make_shared<const protocol::PointTable>(std::move(points));
 }
 
-class ResultReuseTest : public testing::Test {
+class ResultReuseTest : public StoreFixture {
  protected:
-  ResultReuseTest() {
-    store_.commit(std::vector<Change>{AddWorker{kWorker, "host", 1, "1.0", "avx2", "then"},
-                                      AddWorker{kOldWorker, "host", 1, "0.9", "avx2", "then"}});
-  }
+  ResultReuseTest() { commit({worker(kWorker, "1.0"), worker(kOldWorker, "0.9")}); }
 
   void add(std::uint64_t study, const std::string& name, const Table& points) {
-    store_.commit(std::vector<Change>{AddStudy{study, name, points, "then"}});
+    commit({AddStudy{study, name, points, "then"}});
   }
   /// Points [0, count) are solved.
   void solve(std::uint64_t study, const Table& points, std::uint64_t count) {
@@ -54,26 +48,21 @@ class ResultReuseTest : public testing::Test {
     for (std::uint64_t point = 0; point < count; ++point) {
       solved.results.push_back(solved_point(point));
     }
-    store_.commit(std::vector<Change>{solved});
+    commit({solved});
   }
   static AddResults results(std::uint64_t study, const Table& points, std::uint64_t worker) {
     return {study, points, worker, "1.0", "avx2", 1, "2024-01-01T00:00:01.000Z", {}};
   }
   ReusedResults reuse_part(std::uint64_t study, const Table& points, std::uint64_t first = 0) {
     const auto outcome = std::make_shared<ReusedResults>();
-    store_.commit(std::vector<Change>{ReuseResults{study, points, first, "1.0", outcome}});
+    commit({ReuseResults{study, points, first, "1.0", outcome}});
     return *outcome;
   }
-  /// As another tool does.
-  void edit(const std::string& sql) {
-    const DatabaseHandle database = open_database(file_, SQLITE_OPEN_READWRITE);
-    execute(database.get(), sql);
-  }
   std::map<std::uint64_t, std::string> copies(std::uint64_t study) {
-    const DatabaseHandle database = open_database(file_, SQLITE_OPEN_READONLY);
+    const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READONLY);
     Statement rows(database.get(),
-                   "SELECT point, taken_from FROM packed_results WHERE study_id = ?"
-                   " AND taken_from IS NOT NULL");
+                   "SELECT point, reused_from FROM results WHERE study_id = ?"
+                   " AND reused_from IS NOT NULL");
     rows.bind(1, study);
     std::map<std::uint64_t, std::string> copies;
     while (rows.step()) {
@@ -84,9 +73,6 @@ class ResultReuseTest : public testing::Test {
 
   static constexpr std::uint64_t kWorker = 1;
   static constexpr std::uint64_t kOldWorker = 2;
-  test::TemporaryFolder folder_;
-  std::string file_ = folder_.file("reuse.db");
-  Store store_{file_};
 };
 
 /// Study 1 has solved points 0 to 9, all of which study 2 has, too.
@@ -113,40 +99,64 @@ TEST_F(SamePointsTest, SoundRowsAreCopiedAndCountedByTheirOrigin) {
   EXPECT_THAT(outcome.origins, ElementsAre(Pair("a", 10)));
   EXPECT_EQ(outcome.probes, 10U);
   EXPECT_EQ(outcome.next_point, std::nullopt);
-  const StoredStudy study = store_.studies().at(1);
+  const StoredStudy study = store().studies().at(1);
   EXPECT_EQ(study.settled, IntervalSet(0, 10));
   EXPECT_THAT(study.taken, ElementsAre(Pair("a", 10)));
 }
 
-TEST_F(SamePointsTest, ARowThatIsNotTheOneThatWasStoredIsNotCopied) {
-  edit("UPDATE packed_results SET slide = slide + 1000000 WHERE study_id = 1 AND point = 3");
+TEST_F(SamePointsTest, ACopyDiffersFromItsSourceOnlyInItsStudyItsPointAndWhereItCameFrom) {
+  reused();
+  std::vector<std::string> same;
+  for (const std::string_view column : result_columns()) {
+    if (column != "study_id" && column != "reused_from") {
+      same.emplace_back(column);
+    }
+  }
+  const std::string sql =
+      fmt::format("SELECT {} FROM results WHERE study_id = ", fmt::join(same, ", "));
+  EXPECT_EQ(rows(sql + "2"), rows(sql + "1"));
+  EXPECT_EQ(copies(2)[3], "a/3");
+  EXPECT_THAT(faults(), IsEmpty());
+  commit({RenameStudy{1, "c"}});
+  EXPECT_EQ(copies(2)[3], "a/3") << "the name when it was copied";
+}
+
+TEST_F(SamePointsTest, ARowThatWasEditedByHandIsNotCopied) {
+  by_hand("UPDATE results SET slide_m = slide_m + 1 WHERE study_id = 1 AND point = 3");
   EXPECT_EQ(reused(), all_but_the_third());
 }
 
 TEST_F(SamePointsTest, ARowWithoutAChecksumIsNotCopied) {
-  edit("UPDATE packed_results SET checksum = NULL WHERE study_id = 1 AND point = 3");
+  by_hand("UPDATE results SET checksum = NULL WHERE study_id = 1 AND point = 3");
   EXPECT_EQ(reused(), all_but_the_third());
 }
 
-TEST_F(SamePointsTest, RowsWhoseTextsAreGoneOrOthersAreNotCopied) {
-  edit("PRAGMA foreign_keys = OFF; UPDATE texts SET text = text || '?'");
-  EXPECT_EQ(reused(), IntervalSet());
-  edit("PRAGMA foreign_keys = OFF; DELETE FROM texts");
+TEST_F(SamePointsTest, RowsOfAnotherSolverVersionAreNotCopied) {
+  by_hand("UPDATE workers SET solver_version = '1.0b' WHERE worker_id = 1");
   EXPECT_EQ(reused(), IntervalSet());
 }
 
-TEST_F(SamePointsTest, RowsOfAWorkerThatIsNotTheOneThatWasStoredAreNotCopied) {
-  edit("UPDATE workers SET instruction_set = 'sse9'");
-  EXPECT_EQ(reused(), IntervalSet());
+TEST_F(SamePointsTest, PointsThatAreCompletedWithoutARowGetNone) {
+  by_hand("INSERT INTO completed_ranges VALUES (2, 2, 3)");
+  IntervalSet others(0, 10);
+  others.erase(2, 5);
+  EXPECT_EQ(reused(), others) << "a condition leaves them out";
+}
+
+TEST_F(SamePointsTest, ALookupThatEndedIsNotedInTheStudy) {
+  commit({AddStudy{3, "c", points_, "then", {}, "", true}});
+  EXPECT_TRUE(store().studies().at(2).takes_over);
+  commit({EndTaking{3}});
+  EXPECT_FALSE(store().studies().at(2).takes_over);
 }
 
 TEST_F(SamePointsTest, RowsOfADeletedStudyAreNotCopied) {
-  store_.commit(std::vector<Change>{DeleteStudy{1}});
+  commit({DeleteStudy{1}});
   EXPECT_EQ(reused(), IntervalSet());
 }
 
 TEST_F(SamePointsTest, ADeletedStudyGetsNoRows) {
-  store_.commit(std::vector<Change>{DeleteStudy{2}});
+  commit({DeleteStudy{2}});
   EXPECT_EQ(reused(), IntervalSet());
   EXPECT_THAT(copies(2), IsEmpty());
 }
@@ -239,7 +249,7 @@ Inputs inputs_of(const protocol::PointTable& points, std::uint64_t number) {
 
 TEST_F(ResultReuseTest, RandomStudiesGetWhatALookupInAMapFinds) {
   std::mt19937 random(4711);
-  std::map<Inputs, std::string> solved;  // by inputs the first row, as taken_from has it
+  std::map<Inputs, std::string> solved;  // by inputs the first row, as reused_from has it
   std::size_t reused = 0;
   std::size_t open = 0;
   for (std::uint64_t study = 1; study <= 60; ++study) {
@@ -268,22 +278,21 @@ TEST_F(ResultReuseTest, RandomStudiesGetWhatALookupInAMapFinds) {
         ++open;
       }
     }
-    store_.commit(std::vector<Change>{own, old});
+    commit({own, old});
     const auto outcome = reuse_part(study, points);
     EXPECT_EQ(copies(study), expected) << "study " << study;
     EXPECT_EQ(outcome.points.size(), expected.size());
     reused += expected.size();
     // What is left is solved in part. A copy comes behind its source, so it is never the first.
     AddResults rest = results(study, points, kWorker);
-    const IntervalSet settled = store_.studies().back().settled;
+    const IntervalSet settled = store().studies().back().settled;
     for (std::uint64_t number = 0; number < points->size(); ++number) {
       if (points->is_left_in(number) && !settled.contains(number) && random() % 2 == 0) {
         rest.results.push_back(solved_point(number));
-        solved.emplace(inputs_of(*points, number),
-                       std::to_string(study) + "/" + std::to_string(number));
+        solved.emplace(inputs_of(*points, number), fmt::format("study {}/{}", study, number));
       }
     }
-    store_.commit(std::vector<Change>{rest});
+    commit({rest});
   }
   EXPECT_GT(reused, 300U);
   EXPECT_GT(open, 300U);

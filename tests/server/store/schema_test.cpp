@@ -1,112 +1,129 @@
-// The schema against the tables of what a result has.
-#include <algorithm>
-#include <map>
-#include <set>
+#include "server/store/schema.h"
+
 #include <string>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/database/sqlite.h"
-#include "server/store/store.h"
-#include "tests/support/temporary_folder.h"
-#include "worker/solver/model/result_fields.h"
+#include "tests/server/store/store_fixture.h"
 
 namespace oblique::server {
 namespace {
 
-using solver::ResultList;
-using solver::SentWith;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
 
-class SchemaTest : public testing::Test {
+/// A database with three solved points, and what other programs do to it.
+class SchemaTest : public StoreFixture {
  protected:
-  SchemaTest() { const Store store(path_); }
-
-  /// Type by name; views have types where they show a column of a table as it is.
-  std::map<std::string, std::string> columns_of(const std::string& table) const {
-    const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READONLY);
-    Statement list(database.get(), "SELECT name, type FROM pragma_table_info('" + table + "')");
-    std::map<std::string, std::string> columns;
-    while (list.step()) {
-      columns.emplace(list.text(0), list.text(1));
-    }
-    return columns;
+  SchemaTest() {
+    const auto study = study_of(3);
+    commit({study, worker(1), solved(study, {0, 1, 2})});
+    close();
   }
-
-  test::TemporaryFolder folder_;
-  std::string path_ = folder_.file("studies.db");
+  std::vector<std::string> objects() const {
+    return rows(
+        "SELECT type || ' ' || name || ' ' || sql FROM sqlite_schema"
+        " WHERE type <> 'table' AND sql IS NOT NULL ORDER BY name");
+  }
+  template <class Function>
+  auto of_file(const Function& function) const {
+    return function(open_database(path_, SQLITE_OPEN_READONLY).get());
+  }
 };
 
-/// The type of the column of each output that comes with a result.
-std::map<std::string, std::string> expected_outputs() {
-  std::map<std::string, std::string> columns;
-  const auto add = [&](const std::string& type) {
-    return [&columns, type](const solver::ResultField& field, const auto&) {
-      columns.emplace(field.column, type);
-    };
-  };
-  solver::for_each_stored<double>(add("REAL"));
-  solver::for_each_stored<std::int64_t>(add("INTEGER"));
-  solver::for_each_stored<std::string>(add("TEXT"));
-  for (const ResultList* list : solver::result_lists()) {
-    columns.emplace(list->column, "TEXT");
+TEST_F(SchemaTest, EachStartCreatesWhatWasDropped) {
+  const auto before = objects();
+  ASSERT_EQ(before.size(), 8U);
+  for (const std::string dropped :
+       {"view runs", "view peaks", "view phases", "view stick_intervals", "view reaction_peaks",
+        "trigger row_deleted", "index failed_points", "index solved_points"}) {
+    by_hand("DROP " + dropped);
+    EXPECT_EQ(of_file(missing_views).size(), dropped.starts_with("view") ? 1U : 0U) << dropped;
+    EXPECT_EQ(refusal(), "it opened");
+    EXPECT_EQ(objects(), before) << dropped;
   }
-  return columns;
+  EXPECT_THAT(of_file(missing_views), IsEmpty());
+  EXPECT_THAT(of_file(missing_tables), IsEmpty());
+  EXPECT_THAT(rows("SELECT count(*) FROM runs"), ElementsAre("3"));
 }
 
-TEST_F(SchemaTest, ResultsHaveAColumnForEveryOutputAndNoneWithoutOne) {
-  auto expected = expected_outputs();
-  expected.insert({{"study_id", "INTEGER"},
-                   {"point", "INTEGER"},
-                   {"model_id", "INTEGER"},
-                   {"H", "REAL"},
-                   {"mu", "REAL"},
-                   {"e", "REAL"},
-                   {"status", "TEXT"},
-                   {"error", "TEXT"},
-                   {"worker", "INTEGER"},
-                   {"solver_version", "TEXT"},
-                   {"instruction_set", "TEXT"},
-                   {"attempt", "INTEGER"},
-                   {"solved_at", "TEXT"},
-                   {"checksum", "INTEGER"}});
-  expected.emplace("taken_from", "TEXT");
-  const auto shown = columns_of("results");
-  EXPECT_EQ(shown.size(), expected.size());
-  for (const auto& [name, type] : shown) {
-    EXPECT_TRUE(expected.contains(name)) << name;
-    EXPECT_TRUE(type.empty() || type == expected[name]) << name;
-  }
+TEST_F(SchemaTest, AReplacedViewIsOursAgainAndViewsWithOtherNamesStay) {
+  by_hand(
+      "CREATE VIEW large AS SELECT * FROM runs WHERE fn_peak_N > 1e3;"
+      "DROP VIEW peaks; CREATE VIEW peaks AS SELECT 7 AS mine;");
+  EXPECT_EQ(refusal(), "it opened");
+  EXPECT_THAT(rows("SELECT count(*) FROM large"), ElementsAre("3"));
+  EXPECT_THAT(rows("SELECT count(t_s) FROM peaks"), ElementsAre("6"));
 }
 
-TEST_F(SchemaTest, TheViewForPeopleShowsEveryOutput) {
-  auto shown = columns_of("runs");
-  for (const auto& [name, type] : expected_outputs()) {
-    EXPECT_TRUE(shown.contains(name)) << name;
-    EXPECT_TRUE(shown[name].empty() || shown[name] == type) << name;
-  }
-  for (const auto& field : solver::result_fields()) {
-    if (field.sent_with != SentWith::kResult) {
-      EXPECT_TRUE(shown.contains(std::string(field.column))) << field.column;
-    }
+TEST_F(SchemaTest, AFileWithATriggerThatIsNotOursIsRefusedWithItsName) {
+  by_hand(
+      "CREATE TRIGGER endless AFTER INSERT ON studies BEGIN"
+      " SELECT count(*) FROM (WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n)"
+      " SELECT i FROM n); END;");
+  EXPECT_THAT(of_file(other_triggers), ElementsAre("endless"));
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("triggers that are not ours"), HasSubstr("endless"),
+                               Not(HasSubstr("row_deleted"))));
+  by_hand("DROP TRIGGER endless");
+  EXPECT_EQ(refusal(), "it opened");
+}
+
+TEST_F(SchemaTest, ATriggerWithOurNameAndAnotherTextIsNotOursUntilTheNextStart) {
+  const auto before = objects();
+  EXPECT_THAT(of_file(other_triggers), IsEmpty());
+  for (const char* replacement : {"AFTER DELETE ON results BEGIN SELECT 1; END",
+                                  "AFTER INSERT ON studies BEGIN SELECT 1; END"}) {
+    by_hand(std::string("DROP TRIGGER row_deleted; CREATE TRIGGER row_deleted ") + replacement);
+    EXPECT_THAT(of_file(other_triggers), ElementsAre("row_deleted")) << replacement;
+    EXPECT_EQ(refusal(), "it opened");
+    EXPECT_EQ(objects(), before) << replacement;
+    EXPECT_THAT(of_file(other_triggers), IsEmpty());
   }
 }
 
-TEST_F(SchemaTest, ViewsOfListsHaveTheMembersOfTheirElements) {
-  for (const ResultList* list : solver::result_lists()) {
-    const auto view = columns_of(std::string(list->column));
-    if (list->column == "ft_peaks") {
-      EXPECT_TRUE(view.empty()) << "peaks has what people ask for";
-      continue;
-    }
-    std::set<std::string> expected{"study_id", "point", "seq"};
-    expected.insert(list->members.begin(), list->members.end());
-    std::set<std::string> names;
-    for (const auto& [name, type] : view) {
-      names.insert(name);
-    }
-    EXPECT_EQ(names, expected) << list->column;
+TEST_F(SchemaTest, RowsThatWereDeletedWithoutOurTriggerAreCountedAgain) {
+  for (const char* way : {"DROP TRIGGER row_deleted;",
+                          "DROP TRIGGER row_deleted; CREATE TRIGGER row_deleted AFTER DELETE ON"
+                          " results BEGIN SELECT 1; END;"}) {
+    const auto points = static_cast<std::uint64_t>(number("SELECT count(*) FROM results"));
+    by_hand(std::string(way) +
+            "DELETE FROM results WHERE point = (SELECT max(point) FROM results)");
+    EXPECT_THAT(rows("SELECT counted FROM studies"), ElementsAre("1"));
+    EXPECT_EQ(store().studies().at(0).settled, IntervalSet(0, points - 1)) << way;
+    close();
+  }
+}
+
+TEST_F(SchemaTest, AFileWithAViewInThePlaceOfATableIsRefused) {
+  by_hand(
+      "DROP TABLE about; CREATE VIEW about AS WITH RECURSIVE n(i) AS"
+      " (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT i AS database_id FROM n WHERE i < 0;");
+  EXPECT_THAT(of_file(missing_tables), ElementsAre("about"));
+  EXPECT_THAT(refusal(), HasSubstr("lacks the table about"));
+}
+
+TEST_F(SchemaTest, AFileWithATableInThePlaceOfAViewIsRefusedAndTheTableStays) {
+  by_hand("DROP VIEW runs; CREATE TABLE runs (mine)");
+  EXPECT_THAT(of_file(missing_views), ElementsAre("runs"));
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("runs"), HasSubstr("rename the table")));
+  EXPECT_THAT(rows("SELECT type FROM sqlite_schema WHERE name = 'runs'"), ElementsAre("table"));
+}
+
+TEST_F(SchemaTest, AFileOfAnotherVersionIsRefusedWithBothVersionsAndTheRemedy) {
+  for (const int version : {kSchemaVersion - 1, kSchemaVersion + 1}) {
+    by_hand(fmt::format("PRAGMA user_version = {}", version));
+    EXPECT_THAT(
+        refusal(),
+        AllOf(HasSubstr(fmt::format("has schema {}, and this version of oblique has schema {}",
+                                    version, kSchemaVersion)),
+              HasSubstr(version < kSchemaVersion ? "the older version that wrote it"
+                                                 : "the newer version that wrote it"),
+              HasSubstr("oblique query STUDY --db FILE --format csv")));
   }
 }
 

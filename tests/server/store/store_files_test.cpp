@@ -9,12 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/maintenance/backup.h"
-#include "server/maintenance/check.h"
-#include "server/reading/reader.h"
-#include "server/store/store.h"
-#include "tests/support/points.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/server/store/store_fixture.h"
 
 namespace oblique::server {
 namespace {
@@ -54,36 +49,46 @@ class DoomedFile {
   }
 };
 
-class StoreFilesTest : public testing::Test {
+class StoreFilesTest : public StoreFixture {
  protected:
   StoreFilesTest() {
     fs::create_directory(folder_.file("lab"));
-    store_.emplace(path_);
-    store_->commit(std::vector<Change>{AddStudy{1, "a", table_, "now", {}}});
-    {
-      Store other(other_);
-      other.commit(std::vector<Change>{AddStudy{1, "other", table_, "now", {}}});
-    }
+    path_ = folder_.file("lab/studies.db");
+    make_databases();
+  }
+  void make_databases() {
+    commit({study_});
+    Store other(other_);
+    other.commit(std::vector<Change>{study_of(10, 1, "other")});
   }
   void add_result(std::uint64_t point) {
-    store_->commit(std::vector<Change>{
-        AddResults{1, table_, 0, "0.1", "avx2", 1, "now", {solved_point(point)}}});
+    AddResults change = solved(study_, {point});
+    change.worker_id = 0;
+    commit({change});
   }
-  static int rows_of(const std::string& path) {
-    return Reader(path).query("SELECT point FROM results", kNoLimits).rows_size();
+  static std::int64_t rows_of(const std::string& path) {
+    const DatabaseHandle database = open_database(path, SQLITE_OPEN_READONLY);
+    Statement count(database.get(), "SELECT count(*) FROM results");
+    count.step();
+    return count.integer(0);
   }
   /// Rows that stand in the one file, whatever is beside it.
-  int rows_of_copy(const std::string& name) {
+  std::int64_t rows_of_copy(const std::string& name) {
     const std::string copy = folder_.file(name);
     fs::copy_file(path_, copy);
     return rows_of(copy);
   }
 
-  test::TemporaryFolder folder_;
-  std::string path_ = folder_.file("lab/studies.db");
+  /// A program that has read the database and waits with it open.
+  DatabaseHandle waiting_reader() const {
+    DatabaseHandle database = open_database(path_, SQLITE_OPEN_READONLY);
+    Statement count(database.get(), "SELECT count(*) FROM results");
+    EXPECT_TRUE(count.step());
+    return database;
+  }
+
+  const AddStudy study_ = study_of(10);
   std::string other_ = folder_.file("other.db");
-  std::shared_ptr<const protocol::PointTable> table_ = table_of(10);
-  std::optional<Store> store_;
 };
 
 TEST_F(StoreFilesTest, ACommitInWhichTheFileGoesIsNotAcknowledged) {
@@ -91,7 +96,7 @@ TEST_F(StoreFilesTest, ACommitInWhichTheFileGoesIsNotAcknowledged) {
   const std::string late = folder_.file("late.db");
   Store store(late);
   DoomedFile::name(late);
-  EXPECT_THROW(store.commit(std::vector<Change>{AddStudy{1, "a", table_, "now", {}}}), StorageGone);
+  EXPECT_THROW(store.commit(std::vector<Change>{study_}), StorageGone);
 }
 
 TEST_F(StoreFilesTest, NothingIsAcknowledgedOnceAFileIsDeletedRenamedOrReplaced) {
@@ -102,20 +107,18 @@ TEST_F(StoreFilesTest, NothingIsAcknowledgedOnceAFileIsDeletedRenamedOrReplaced)
        [&] { fs::rename(folder_.file("lab"), folder_.file("laboratory")); }},
       {"another database takes its name", [&] { fs::rename(other_, path_); }}};
   for (const auto& [what, blow] : blows) {
-    store_.reset();
+    close();
     for (const char* name : {"lab", "laboratory", "other.db", "elsewhere.db"}) {
       fs::remove_all(folder_.file(name));
     }
     fs::create_directory(folder_.file("lab"));
-    { Store(other_).commit(std::vector<Change>{AddStudy{1, "other", table_, "now", {}}}); }
-    store_.emplace(path_);
-    store_->commit(std::vector<Change>{AddStudy{1, "a", table_, "now", {}}});
+    make_databases();
     add_result(0);
-    EXPECT_NO_THROW(store_->check()) << what;
+    EXPECT_NO_THROW(store().check()) << what;
     blow();
-    EXPECT_THROW(store_->check(), StorageGone) << what;
+    EXPECT_THROW(store().check(), StorageGone) << what;
     EXPECT_THROW(add_result(1), StorageGone) << what;
-    EXPECT_THROW(store_->merge_log(), StorageGone) << what;
+    EXPECT_THROW(store().merge_log(), StorageGone) << what;
   }
 }
 
@@ -125,51 +128,50 @@ TEST_F(StoreFilesTest, ARenamedDatabaseGetsWhatWasAcknowledgedWhenItsServerEnds)
   const std::string elsewhere = folder_.file("elsewhere.db");
   fs::rename(path_, elsewhere);
   EXPECT_THROW(add_result(2), StorageGone);
-  store_.reset();
+  close();
   EXPECT_GE(rows_of(elsewhere), 2);
-  EXPECT_THAT(find_faults(elsewhere), IsEmpty());
+  path_ = elsewhere;
+  EXPECT_THAT(faults(), IsEmpty());
 }
 
 TEST_F(StoreFilesTest, ADatabaseThatTookTheNameOfAnotherIsNotDamagedByIt) {
   add_result(0);
   fs::rename(other_, path_);
   EXPECT_THROW(add_result(1), StorageGone);
-  store_.reset();
-  EXPECT_THAT(find_faults(path_), IsEmpty());
-  EXPECT_EQ(Reader(path_).study_status().at(0).name(), "other");
+  close();
+  EXPECT_THAT(faults(), IsEmpty());
+  EXPECT_THAT(rows("SELECT name FROM studies"), testing::ElementsAre("other"));
 }
 
 TEST_F(StoreFilesTest, AMergedLogLeavesAllInTheOneFile) {
   add_result(0);
   EXPECT_EQ(rows_of_copy("before.db"), 0) << "it is in the log";
-  EXPECT_TRUE(store_->merge_log());
+  EXPECT_TRUE(store().merge_log());
   EXPECT_EQ(fs::file_size(path_ + "-wal"), 0U);
   EXPECT_EQ(rows_of_copy("after.db"), 1);
 }
 
 TEST_F(StoreFilesTest, AReaderInTheMiddleOfAQueryKeepsTheLogAndOneThatOnlyWaitsDoesNot) {
   add_result(0);
-  Reader waits(path_);
-  EXPECT_EQ(waits.query("SELECT point FROM results", kNoLimits).rows_size(), 1);
+  const DatabaseHandle waits = waiting_reader();
   const DatabaseHandle reads = open_database(path_, SQLITE_OPEN_READONLY);
   {
     Statement rows(reads.get(), "SELECT point FROM results");
     ASSERT_TRUE(rows.step());
     add_result(1);
-    EXPECT_FALSE(store_->merge_log());
+    EXPECT_FALSE(store().merge_log());
     EXPECT_GT(fs::file_size(path_ + "-wal"), 0U);
     add_result(2);  // and it goes on
   }
-  EXPECT_TRUE(store_->merge_log());
+  EXPECT_TRUE(store().merge_log());
   EXPECT_EQ(rows_of_copy("after.db"), 3);
 }
 
 TEST_F(StoreFilesTest, ADatabaseClosedUnderAReaderHasAllInTheOneFile) {
   add_result(0);
-  Reader reader(path_);
-  EXPECT_EQ(reader.query("SELECT point FROM results", kNoLimits).rows_size(), 1);
-  EXPECT_TRUE(store_->merge_log());
-  store_.reset();
+  const DatabaseHandle reader = waiting_reader();
+  EXPECT_TRUE(store().merge_log());
+  close();
   EXPECT_EQ(rows_of_copy("copy.db"), 1);
 }
 
@@ -182,9 +184,7 @@ TEST_F(StoreFilesTest, ANewDatabaseIsForItsOwnerAloneAndAnOldOneKeepsItsMode) {
   const mode_t before = ::umask(0);
   const std::string path = folder_.file("private.db");
   { const Store store(path); }
-  back_up(path, folder_.file("copy.db"));
   EXPECT_EQ(mode_of(path), 0600U);
-  EXPECT_EQ(mode_of(folder_.file("copy.db")), 0600U);
   ASSERT_EQ(::chmod(path.c_str(), 0640), 0);
   {
     const Store store(path);

@@ -1,14 +1,15 @@
 #include "server/store/writer.h"
 
-#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <functional>
 #include <map>
 #include <mutex>
 #include <new>
 #include <thread>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "server/database/sqlite.h"
@@ -16,423 +17,344 @@
 namespace oblique::server {
 namespace {
 
+using testing::ElementsAre;
+using testing::IsEmpty;
+using testing::UnorderedElementsAre;
 using Kind = WriteReport::Kind;
 
-/// A disk that fails when it is told to, and that remembers what was committed.
-class FailingStorage final : public Storage {
+/// A database that fails when a test says so.
+class TestStorage final : public Storage {
  public:
   void commit(std::span<const Change> changes) override {
-    const std::lock_guard lock(mutex_);
-    ++attempts_;
-    if (out_of_memory_) {
-      throw std::bad_alloc();
-    }
+    check();
     for (const Change& change : changes) {
-      const auto* state = std::get_if<SetStudyState>(&change);
-      if (full_ || (state != nullptr && state->study_id == kBad)) {
-        throw StorageError("the disk is full");
-      }
+      on_change(change);
     }
+    sizes.push_back(changes.size());
     for (const Change& change : changes) {
       if (const auto* worker = std::get_if<AddWorker>(&change)) {
-        committed_.push_back(worker->worker_id);
+        workers.push_back(worker->worker_id);
       }
     }
+    is_gone = is_gone || goes_in_commit;
+    check();
   }
-
-  /// As many steps as `leave` said.
+  void check() override {
+    if (is_gone) {
+      throw StorageGone("the file was deleted");
+    }
+  }
   ClearedAway clear_away(std::size_t /*most*/) override {
-    const std::lock_guard lock(mutex_);
-    if (full_) {
+    check();
+    if (is_full) {
       throw StorageError("the disk is full");
     }
-    if (left_ == 0) {
+    if (parts_left == 0) {
       return ClearedAway::kAll;
     }
-    --left_;
+    --parts_left;
     return ClearedAway::kPart;
   }
-  void leave(int steps) {
-    const std::lock_guard lock(mutex_);
-    left_ = steps;
+  bool merge_log() override {
+    check();
+    return ++merges >= merged_at;
   }
-  int left() {
-    const std::lock_guard lock(mutex_);
-    return left_;
-  }
-
-  static constexpr std::uint64_t kBad = 666;  // a change of this study always fails
-
-  void set_full(bool full) {
-    const std::lock_guard lock(mutex_);
-    full_ = full;
-  }
-  void set_out_of_memory(bool out_of_memory) {
-    const std::lock_guard lock(mutex_);
-    out_of_memory_ = out_of_memory;
-  }
-  std::vector<std::uint64_t> committed() {
-    const std::lock_guard lock(mutex_);
-    return committed_;
-  }
-  int attempts() {
-    const std::lock_guard lock(mutex_);
-    return attempts_;
+  void interrupt() override {
+    is_interrupted = true;
+    is_interrupted.notify_all();
   }
 
- private:
-  std::mutex mutex_;
-  bool full_ = false;
-  bool out_of_memory_ = false;
-  int attempts_ = 0;
-  int left_ = 0;
-  std::vector<std::uint64_t> committed_;
+  /// Called for each change of a commit, which fails when this throws.
+  std::function<void(const Change&)> on_change = [this](const Change&) {
+    if (is_full) {
+      throw StorageError("the disk is full");
+    }
+  };
+  std::atomic<bool> is_full = false;
+  bool is_gone = false;
+  bool goes_in_commit = false;
+  int merges = 0;
+  int merged_at = 1;  ///< the call of `merge_log` that succeeds
+  std::atomic<int> parts_left = 0;
+  std::atomic<bool> is_interrupted = false;
+  std::vector<std::size_t> sizes;      ///< of the commits that succeeded
+  std::vector<std::uint64_t> workers;  ///< that were added
 };
 
-/// Collects reports and lets a test wait for one.
-class Reports {
- public:
-  void take(const std::vector<WriteReport>& reports) {
-    const std::lock_guard lock(mutex_);
-    for (const auto& report : reports) {
-      kinds_.push_back(report.kind);
-      if (report.ticket != 0) {
-        of_ticket_[report.ticket] = report.kind;
-      }
+WriteJob kept(std::uint64_t ticket) {
+  return {ticket, AddWorker{ticket, "", 1, "", "", ""}, false};
+}
+WriteJob answered(std::uint64_t ticket, std::uint64_t study = 1) {
+  return {ticket, SetStudyState{study, StudyState::kDone, ""}, true};
+}
+
+// ---- Groups of changes --------------------------------------------------------------------------
+
+class GroupCommitTest : public testing::Test {
+ protected:
+  /// Writes the jobs once. Returns what was reported.
+  std::vector<std::pair<Kind, std::uint64_t>> write() { return told(commits_.write(jobs_)); }
+  static std::vector<std::pair<Kind, std::uint64_t>> told(const std::vector<WriteReport>& reports) {
+    std::vector<std::pair<Kind, std::uint64_t>> found;
+    for (const WriteReport& report : reports) {
+      found.emplace_back(report.kind, report.ticket);
     }
-    arrived_.notify_all();
+    return found;
   }
-  void wait_for(Kind kind) {
-    std::unique_lock lock(mutex_);
-    arrived_.wait(lock, [&] { return std::count(kinds_.begin(), kinds_.end(), kind) > 0; });
+  static std::pair<Kind, std::uint64_t> report(Kind kind, std::uint64_t ticket = 0) {
+    return {kind, ticket};
   }
+
+  TestStorage storage_;
+  GroupCommit commits_{storage_};
+  std::deque<WriteJob> jobs_;
+};
+
+TEST_F(GroupCommitTest, AFailureIsAnsweredToAClientThatWaits) {
+  storage_.is_full = true;
+  jobs_ = {answered(1)};
+  EXPECT_THAT(write(), ElementsAre(report(Kind::kRefused, 1)));
+  EXPECT_THAT(jobs_, IsEmpty());
+}
+
+TEST_F(GroupCommitTest, OneBadChangeDoesNotBlockTheOthers) {
+  storage_.on_change = [](const Change& change) {
+    if (std::holds_alternative<SetStudyState>(change)) {
+      throw StorageError("bad");
+    }
+  };
+  jobs_ = {kept(1), answered(2), kept(3)};
+  EXPECT_THAT(write(), ElementsAre(report(Kind::kStored, 1), report(Kind::kRefused, 2),
+                                   report(Kind::kStored, 3)));
+}
+
+TEST_F(GroupCommitTest, ResultsWaitForAFullDiskOrMemoryAndAreWrittenWhenThereIsRoom) {
+  const auto no_memory = [](const Change&) { throw std::bad_alloc(); };
+  const auto no_disk = [](const Change&) { throw StorageError("the disk is full"); };
+  for (const std::function<void(const Change&)>& fault :
+       std::vector<std::function<void(const Change&)>>{no_disk, no_memory}) {
+    storage_.workers.clear();
+    storage_.on_change = fault;
+    jobs_ = {kept(1), kept(2)};
+    EXPECT_THAT(write(), ElementsAre(report(Kind::kFault)));
+    EXPECT_THAT(write(), IsEmpty()) << "reported once";
+    EXPECT_TRUE(commits_.is_faulty());
+    storage_.on_change = [](const Change&) {};
+    EXPECT_THAT(write(), ElementsAre(report(Kind::kRecovered), report(Kind::kStored, 1),
+                                     report(Kind::kStored, 2)));
+    EXPECT_FALSE(commits_.is_faulty());
+    EXPECT_THAT(storage_.workers, ElementsAre(1, 2));
+  }
+}
+
+TEST_F(GroupCommitTest, AChangeThatWaitsIsNotOvertakenByALaterOneOfItsStudy) {
+  storage_.on_change = [](const Change& change) {
+    if (!std::holds_alternative<ForgetFailures>(change)) {
+      throw StorageError("the disk is full");
+    }
+  };
+  jobs_.push_back({1, SetStudyState{1, StudyState::kDone, ""}, false});
+  jobs_.push_back({2, ForgetFailures{1, IntervalSet(0, 1), ""}, true});
+  jobs_.push_back({3, ForgetFailures{2, IntervalSet(0, 1), ""}, true});
+  EXPECT_THAT(write(), ElementsAre(report(Kind::kRefused, 2), report(Kind::kStored, 3),
+                                   report(Kind::kFault)));
+  ASSERT_EQ(jobs_.size(), 1U);
+  EXPECT_EQ(jobs_.front().ticket, 1U);
+}
+
+class LookupTest : public GroupCommitTest {
+ protected:
+  LookupTest() {
+    jobs_.push_back(kept(1));
+    jobs_.push_back({2, ReuseResults{1, nullptr, 0, "", nullptr}, true});
+    jobs_.push_back({3, ReuseResults{2, nullptr, 0, "", nullptr}, true});
+    jobs_.push_back(kept(4));
+  }
+};
+
+TEST_F(LookupTest, ALookupOfResultsIsTheLastChangeOfItsTransaction) {
+  while (!jobs_.empty()) {
+    write();
+  }
+  EXPECT_THAT(storage_.sizes, ElementsAre(2, 1, 1));
+}
+
+TEST_F(LookupTest, ALookupOfResultsThatFailsKeepsNothingElseFromBeingStored) {
+  storage_.on_change = [](const Change& change) {
+    if (std::holds_alternative<ReuseResults>(change)) {
+      throw StorageError("a page is damaged");
+    }
+  };
+  EXPECT_THAT(write(), UnorderedElementsAre(report(Kind::kStored, 1), report(Kind::kRefused, 2),
+                                            report(Kind::kRefused, 3), report(Kind::kStored, 4)));
+  EXPECT_THAT(jobs_, IsEmpty());
+  EXPECT_FALSE(commits_.is_faulty());
+}
+
+TEST_F(GroupCommitTest, NothingIsReportedStoredThatWasCommittedToAFileThatIsGone) {
+  storage_.goes_in_commit = true;
+  jobs_ = {kept(1), answered(2)};
+  EXPECT_THAT(write(), ElementsAre(report(Kind::kGone)));
+  EXPECT_THAT(storage_.sizes, ElementsAre(2)) << "both in one transaction";
+  EXPECT_EQ(jobs_.size(), 2U) << "they count as lost";
+  EXPECT_THAT(write(), IsEmpty()) << "reported once, never tried again";
+  EXPECT_THAT(storage_.sizes, ElementsAre(2));
+}
+
+TEST_F(GroupCommitTest, AFileThatIsGoneIsNoticedInWhateverIsDone) {
+  const std::vector<std::function<std::vector<WriteReport>(GroupCommit&)>> ways{
+      [](GroupCommit& commits) { return commits.tend(); },
+      [](GroupCommit& commits) {
+        std::vector<WriteReport> reports;
+        EXPECT_FALSE(commits.merge(reports));
+        return reports;
+      },
+      [](GroupCommit& commits) {
+        std::vector<WriteReport> reports;
+        EXPECT_FALSE(commits.clear(10, reports));
+        return reports;
+      }};
+  storage_.is_gone = true;
+  for (const auto& way : ways) {
+    GroupCommit commits(storage_);
+    commits.resume_deletions();
+    EXPECT_THAT(told(way(commits)), ElementsAre(report(Kind::kGone)));
+    EXPECT_TRUE(commits.is_gone());
+    EXPECT_FALSE(commits.has_to_clear());
+    EXPECT_THAT(commits.tend(), IsEmpty()) << "reported once";
+  }
+}
+
+TEST_F(GroupCommitTest, TheLogIsMergedWhenAStudyIsDoneAsSoonAsReadersAllowIt) {
+  commits_.tend();
+  EXPECT_EQ(storage_.merges, 0) << "no study is done";
+  jobs_ = {kept(1), answered(2)};
+  write();
+  storage_.merged_at = 8;
+  std::vector<std::pair<Kind, std::uint64_t>> reports;
+  for (int i = 0; i < 20; ++i) {
+    for (const auto& one : told(commits_.tend())) {
+      reports.push_back(one);
+    }
+  }
+  EXPECT_EQ(storage_.merges, 8);
+  EXPECT_THAT(reports, ElementsAre(report(Kind::kUnmerged))) << "reported once";
+}
+
+TEST_F(GroupCommitTest, AStepOfADeletionThatFailsIsRepeatedAndReportsNothing) {
+  EXPECT_FALSE(commits_.has_to_clear()) << "not before it is told";
+  commits_.resume_deletions();
+  storage_.parts_left = 2;
+  std::vector<WriteReport> reports;
+  EXPECT_TRUE(commits_.clear(10, reports));
+  storage_.is_full = true;
+  EXPECT_FALSE(commits_.clear(10, reports));
+  EXPECT_TRUE(commits_.has_to_clear());
+  storage_.is_full = false;
+  EXPECT_TRUE(commits_.clear(10, reports));
+  EXPECT_TRUE(commits_.clear(10, reports));
+  EXPECT_FALSE(commits_.has_to_clear());
+  EXPECT_THAT(reports, IsEmpty());
+}
+
+// ---- The thread ---------------------------------------------------------------------------------
+
+/// A writer whose reports a test waits for.
+class WriterTest : public testing::Test {
+ protected:
   Kind wait_for_ticket(std::uint64_t ticket) {
     std::unique_lock lock(mutex_);
     arrived_.wait(lock, [&] { return of_ticket_.contains(ticket); });
     return of_ticket_[ticket];
   }
-  std::ptrdiff_t count(Kind kind) {
+  std::size_t count(Kind kind) {
     const std::lock_guard lock(mutex_);
-    return std::count(kinds_.begin(), kinds_.end(), kind);
+    return kinds_[kind];
+  }
+  void take(const std::vector<WriteReport>& reports) {
+    const std::lock_guard lock(mutex_);
+    for (const auto& report : reports) {
+      ++kinds_[report.kind];
+      of_ticket_[report.ticket] = report.kind;
+    }
+    arrived_.notify_all();
   }
 
- private:
+  TestStorage storage_;
   std::mutex mutex_;
   std::condition_variable arrived_;
-  std::vector<Kind> kinds_;
+  std::map<Kind, std::size_t> kinds_;
   std::map<std::uint64_t, Kind> of_ticket_;
-};
-
-class WriterTest : public testing::Test {
- protected:
-  static WriteJob kept(std::uint64_t ticket) {
-    return {ticket, AddWorker{ticket, "", 1, "", "", ""}, false};
-  }
-  static WriteJob answered(std::uint64_t ticket, std::uint64_t study = 1) {
-    return {ticket, SetStudyState{study, StudyState::kDone, ""}, true};
-  }
-
-  FailingStorage storage_;
-  Reports reports_;
-  Writer writer_{storage_, [this](const std::vector<WriteReport>& r) { reports_.take(r); }};
+  Writer writer_{storage_, [this](const std::vector<WriteReport>& reports) { take(reports); },
+                 std::chrono::milliseconds(1)};
 };
 
 TEST_F(WriterTest, ManyJobsShareATransactionAndStayInOrder) {
+  constexpr std::uint64_t kJobs = 2000;
   std::vector<std::uint64_t> expected;
-  for (std::uint64_t ticket = 1; ticket <= 2000; ++ticket) {
+  for (std::uint64_t ticket = 1; ticket <= kJobs; ++ticket) {
     writer_.submit(kept(ticket));
     expected.push_back(ticket);
   }
   EXPECT_EQ(writer_.finish(), 0U);
-  EXPECT_EQ(storage_.committed(), expected);
-  EXPECT_EQ(reports_.count(Kind::kStored), 2000);
+  EXPECT_EQ(storage_.workers, expected);
+  EXPECT_EQ(count(Kind::kStored), kJobs);
 }
 
-TEST_F(WriterTest, AFailureIsAnsweredToWhoWaits) {
-  storage_.set_full(true);
-  writer_.submit(answered(1));
-  EXPECT_EQ(reports_.wait_for_ticket(1), Kind::kRefused);
-}
-
-TEST_F(WriterTest, OneBadChangeDoesNotTakeTheOthersWithIt) {
-  writer_.submit(kept(1));
-  writer_.submit(answered(2, FailingStorage::kBad));
-  writer_.submit(kept(3));
-  EXPECT_EQ(reports_.wait_for_ticket(1), Kind::kStored);
-  EXPECT_EQ(reports_.wait_for_ticket(2), Kind::kRefused);
-  EXPECT_EQ(reports_.wait_for_ticket(3), Kind::kStored);
-}
-
-TEST_F(WriterTest, ResultsWaitForAFullDiskAndAreWrittenWhenThereIsRoom) {
-  storage_.set_full(true);
-  writer_.submit(kept(1));
-  writer_.submit(kept(2));
-  reports_.wait_for(Kind::kFault);
-  EXPECT_EQ(reports_.count(Kind::kStored), 0);
-  storage_.set_full(false);
-  EXPECT_EQ(reports_.wait_for_ticket(2), Kind::kStored);
-  EXPECT_EQ(reports_.count(Kind::kRecovered), 1);
-  EXPECT_EQ(reports_.count(Kind::kFault), 1);
-  EXPECT_EQ(storage_.committed(), (std::vector<std::uint64_t>{1, 2}));
-}
-
-TEST_F(WriterTest, ResultsWaitWhileThereIsNoMemoryAndAreWrittenWhenThereIs) {
-  storage_.set_out_of_memory(true);
-  writer_.submit(kept(1));
-  writer_.submit(kept(2));
-  reports_.wait_for(Kind::kFault);
-  EXPECT_EQ(reports_.count(Kind::kStored), 0);
-  storage_.set_out_of_memory(false);
-  EXPECT_EQ(reports_.wait_for_ticket(2), Kind::kStored);
-  EXPECT_EQ(reports_.count(Kind::kRecovered), 1);
-  EXPECT_EQ(reports_.count(Kind::kFault), 1);
-  EXPECT_EQ(storage_.committed(), (std::vector<std::uint64_t>{1, 2}));
-}
-
-TEST(WriterEndTest, AStatementThatNeverEndsIsInterruptedAtTheEnd) {
-  class Endless final : public Storage {
-   public:
-    void commit(std::span<const Change> /*changes*/) override {
-      is_interrupted_.wait(false);
-      throw StorageError("interrupted");
-    }
-    void interrupt() override {
-      is_interrupted_ = true;
-      is_interrupted_.notify_all();
-    }
-
-   private:
-    std::atomic<bool> is_interrupted_ = false;
+TEST_F(WriterTest, AStatementThatNeverEndsIsInterruptedAtTheEnd) {
+  storage_.on_change = [this](const Change&) {
+    storage_.is_interrupted.wait(false);
+    throw StorageError("interrupted");
   };
-  Endless storage;
-  Writer writer(
-      storage, [](const auto&) {}, std::chrono::milliseconds(1));
-  writer.submit({1, AddWorker{1, "", 1, "", "", ""}, false});
-  EXPECT_EQ(writer.finish(), 1U) << "it is not durable";
+  writer_.submit(kept(1));
+  EXPECT_EQ(writer_.finish(), 1U) << "it is not durable";
 }
 
-TEST(GroupCommitTest, AChangeThatWaitsIsNotOvertakenByALaterOneOfItsStudy) {
-  // Takes retries, and nothing else.
-  class OnlyRetries final : public Storage {
-   public:
-    void commit(std::span<const Change> changes) override {
-      for (const Change& change : changes) {
-        if (!std::holds_alternative<ForgetFailures>(change)) {
-          throw StorageError("the disk is full");
-        }
-      }
-      ++retries;
-    }
-    int retries = 0;
-  };
-  OnlyRetries storage;
-  GroupCommit commits(storage);
-  std::deque<WriteJob> jobs;
-  jobs.push_back({1, SetStudyState{1, StudyState::kDone, ""}, false});
-  jobs.push_back({2, ForgetFailures{1, IntervalSet(0, 1), ""}, true});
-  jobs.push_back({3, ForgetFailures{2, IntervalSet(0, 1), ""}, true});
-  std::map<std::uint64_t, Kind> became;
-  for (const auto& report : commits.write(jobs)) {
-    became[report.ticket] = report.kind;
-  }
-  EXPECT_EQ(became[2], Kind::kRefused);
-  EXPECT_EQ(became[3], Kind::kStored) << "of another study";
-  EXPECT_EQ(storage.retries, 1);
-  ASSERT_EQ(jobs.size(), 1U);
-  EXPECT_EQ(jobs.front().ticket, 1U);
-}
-
-/// Notes how many changes each commit has; refuses lookups of results if `is_damaged`.
-class LookupStorage final : public Storage {
- public:
-  void commit(std::span<const Change> changes) override {
-    for (const Change& change : changes) {
-      if (is_damaged && std::holds_alternative<ReuseResults>(change)) {
-        throw StorageError("a page is damaged");
-      }
-    }
-    sizes.push_back(changes.size());
-  }
-  bool is_damaged = false;
-  std::vector<std::size_t> sizes;
-};
-
-std::deque<WriteJob> lookups_beside_other_changes() {
-  std::deque<WriteJob> jobs;
-  jobs.push_back({1, AddWorker{1, "", 1, "", "", ""}, false});
-  jobs.push_back({2, ReuseResults{1, nullptr, 0, "", nullptr}, true});
-  jobs.push_back({3, ReuseResults{2, nullptr, 0, "", nullptr}, true});
-  jobs.push_back({4, AddWorker{2, "", 1, "", "", ""}, false});
-  return jobs;
-}
-
-TEST(GroupCommitTest, ALookupOfResultsIsTheLastChangeOfItsTransaction) {
-  LookupStorage storage;
-  GroupCommit commits(storage);
-  auto jobs = lookups_beside_other_changes();
-  while (!jobs.empty()) {
-    commits.write(jobs);
-  }
-  EXPECT_EQ(storage.sizes, (std::vector<std::size_t>{2, 1, 1}));
-}
-
-TEST(GroupCommitTest, ALookupOfResultsThatFailsKeepsNothingElseFromBeingStored) {
-  LookupStorage storage;
-  storage.is_damaged = true;
-  GroupCommit commits(storage);
-  auto jobs = lookups_beside_other_changes();
-  std::map<std::uint64_t, Kind> became;
-  for (const auto& report : commits.write(jobs)) {
-    became[report.ticket] = report.kind;
-  }
-  EXPECT_EQ(became,
-            (std::map<std::uint64_t, Kind>{
-                {1, Kind::kStored}, {2, Kind::kRefused}, {3, Kind::kRefused}, {4, Kind::kStored}}));
-  EXPECT_TRUE(jobs.empty());
-  EXPECT_FALSE(commits.is_faulty());
-}
-
-/// Takes changes until its files are gone; merges its log at the so-many-th try.
-class VanishingStorage final : public Storage {
- public:
-  void commit(std::span<const Change> changes) override {
-    check();
-    committed += changes.size();
-    if (vanishes_in_commit) {
-      gone = true;
-      check();
-    }
-  }
-  void check() override {
-    if (gone) {
-      throw StorageGone("the file was deleted");
-    }
-  }
-  bool merge_log() override { return ++merges >= merged_at; }
-
-  bool gone = false;
-  bool vanishes_in_commit = false;
-  std::size_t committed = 0;
-  int merges = 0;
-  int merged_at = 1;
-};
-
-std::vector<Kind> kinds_of(const std::vector<WriteReport>& reports) {
-  std::vector<Kind> kinds;
-  for (const auto& report : reports) {
-    kinds.push_back(report.kind);
-  }
-  return kinds;
-}
-
-class VanishingTest : public testing::Test {
- protected:
-  static std::deque<WriteJob> some_jobs() {
-    std::deque<WriteJob> jobs;
-    jobs.push_back({1, AddWorker{1, "", 1, "", "", ""}, false});
-    jobs.push_back({2, SetStudyState{1, StudyState::kDone, ""}, true});
-    return jobs;
-  }
-
-  VanishingStorage storage_;
-  GroupCommit commits_{storage_};
-};
-
-TEST_F(VanishingTest, NothingIsReportedStoredThatWasCommittedToFilesThatAreGone) {
-  storage_.vanishes_in_commit = true;
-  auto jobs = some_jobs();
-  EXPECT_EQ(kinds_of(commits_.write(jobs)), std::vector<Kind>{Kind::kGone});
-  EXPECT_EQ(storage_.committed, 2U) << "both in one transaction";
-  EXPECT_EQ(jobs.size(), 2U) << "they count as lost";
-  EXPECT_EQ(kinds_of(commits_.write(jobs)), std::vector<Kind>{}) << "said once, never tried again";
-  EXPECT_EQ(storage_.committed, 2U);
-}
-
-TEST_F(VanishingTest, FilesThatAreGoneAreNoticedWhileNothingIsWritten) {
-  EXPECT_EQ(kinds_of(commits_.tend()), std::vector<Kind>{});
-  storage_.gone = true;
-  EXPECT_EQ(kinds_of(commits_.tend()), std::vector<Kind>{Kind::kGone});
-  EXPECT_TRUE(commits_.is_gone());
-  EXPECT_EQ(kinds_of(commits_.tend()), std::vector<Kind>{});
-}
-
-TEST_F(VanishingTest, TheLogIsMergedWhenAStudyIsDoneAsSoonAsReadersLetIt) {
-  commits_.tend();
-  EXPECT_EQ(storage_.merges, 0) << "no study has ended";
-  auto jobs = some_jobs();
-  commits_.write(jobs);
-  storage_.merged_at = 8;
-  std::vector<Kind> told;
-  for (int i = 0; i < 20; ++i) {
-    for (const Kind kind : kinds_of(commits_.tend())) {
-      told.push_back(kind);
-    }
-  }
-  EXPECT_EQ(storage_.merges, 8);
-  EXPECT_EQ(told, std::vector<Kind>{Kind::kUnmerged}) << "said once";
-}
-
-TEST_F(WriterTest, AnEndMergesTheLogAndSaysWhenReadersKeepIt) {
-  for (const bool readers_stay : {false, true}) {
-    VanishingStorage storage;
-    storage.merged_at = readers_stay ? 1'000'000 : 3;
-    Reports reports;
-    Writer writer(storage, [&](const std::vector<WriteReport>& r) { reports.take(r); });
-    writer.submit(kept(1));
-    EXPECT_EQ(writer.finish(), 0U);
-    EXPECT_GE(storage.merges, 3);
-    EXPECT_EQ(reports.count(Kind::kUnmerged), readers_stay ? 1 : 0);
-  }
-}
-
-TEST_F(WriterTest, FinishingSaysHowManyChangesWereNotMadeDurable) {
-  storage_.set_full(true);
+TEST_F(WriterTest, FinishingReturnsHowManyChangesWereNotMadeDurable) {
+  storage_.is_full = true;
   writer_.submit(kept(1));
   writer_.submit(kept(2));
   EXPECT_EQ(writer_.finish(), 2U);
+  EXPECT_EQ(storage_.merges, 0);
 }
 
-TEST_F(WriterTest, WhatDeletedStudiesLeftIsClearedAwayBetweenWritesAndWithoutAny) {
+TEST_F(WriterTest, TheEndMergesTheLogAfterSomeAttempts) {
+  storage_.merged_at = 3;
   writer_.submit(kept(1));
-  ASSERT_EQ(reports_.wait_for_ticket(1), Kind::kStored);
-  constexpr int kSteps = 300;
-  storage_.leave(kSteps);
+  EXPECT_EQ(writer_.finish(), 0U);
+  EXPECT_EQ(storage_.merges, 3);
+  EXPECT_EQ(count(Kind::kUnmerged), 0U);
+}
+
+TEST_F(WriterTest, ALogThatReadersKeepIsReportedAtTheEnd) {
+  storage_.merged_at = 1'000'000;
+  EXPECT_EQ(writer_.finish(), 0U);
+  EXPECT_GE(storage_.merges, 3);
+  EXPECT_EQ(count(Kind::kUnmerged), 1U);
+}
+
+TEST_F(WriterTest, RowsOfDeletedStudiesAreDeletedBetweenWritesAndWithoutAny) {
+  writer_.submit(kept(1));
+  ASSERT_EQ(wait_for_ticket(1), Kind::kStored);
+  storage_.parts_left = 300;
   writer_.submit({2, DeleteStudy{7}, true});
-  ASSERT_EQ(reports_.wait_for_ticket(2), Kind::kStored);
-  for (std::uint64_t ticket = 3; storage_.left() > 0; ++ticket) {
+  ASSERT_EQ(wait_for_ticket(2), Kind::kStored);
+  for (std::uint64_t ticket = 3; storage_.parts_left > 0; ++ticket) {
     writer_.submit(kept(ticket));
-    EXPECT_EQ(reports_.wait_for_ticket(ticket), Kind::kStored) << "written meanwhile";
+    EXPECT_EQ(wait_for_ticket(ticket), Kind::kStored) << "written meanwhile";
   }
   EXPECT_EQ(writer_.finish(), 0U);
 }
 
-TEST_F(WriterTest, WhatAnEarlierProcessLeftIsClearedAwayWhenItIsTold) {
-  storage_.leave(3);
+TEST_F(WriterTest, RowsThatAnEarlierProcessLeftAreDeletedWhenItIsTold) {
+  storage_.parts_left = 3;
   writer_.submit(kept(1));
-  ASSERT_EQ(reports_.wait_for_ticket(1), Kind::kStored);
-  EXPECT_EQ(storage_.left(), 3) << "others may still use the storage";
+  ASSERT_EQ(wait_for_ticket(1), Kind::kStored);
+  EXPECT_EQ(storage_.parts_left, 3) << "others may still use the storage";
   writer_.resume_deletions();
-  while (storage_.left() > 0) {
+  while (storage_.parts_left > 0) {
     std::this_thread::yield();
   }
-}
-
-TEST(GroupCommitTest, AStepThatFailsIsTakenAgainAndDisturbsNothing) {
-  FailingStorage storage;
-  GroupCommit commits(storage);
-  EXPECT_FALSE(commits.has_to_clear()) << "not before it is told";
-  commits.resume_deletions();
-  storage.leave(2);
-  std::vector<WriteReport> reports;
-  EXPECT_TRUE(commits.clear(10, reports));
-  storage.set_full(true);
-  EXPECT_FALSE(commits.clear(10, reports));
-  EXPECT_TRUE(commits.has_to_clear());
-  storage.set_full(false);
-  EXPECT_TRUE(commits.clear(10, reports));
-  EXPECT_TRUE(commits.clear(10, reports));
-  EXPECT_FALSE(commits.has_to_clear());
-  EXPECT_TRUE(reports.empty());
 }
 
 }  // namespace

@@ -1,7 +1,6 @@
 #include "tests/simulation/disk/simulated_disk.h"
 
 #include <array>
-#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <stdexcept>
@@ -31,12 +30,6 @@ const std::string& empty_database() {
     return files.contents();
   }();
   return kImage;
-}
-
-/// What a view says of an output that was stored: rounded, below what it is accurate to.
-bool shows(double shown, double output) {
-  constexpr double kRounding = 1e-7;
-  return std::abs(shown - output) <= kRounding * std::abs(output);
 }
 
 }  // namespace
@@ -120,8 +113,8 @@ void SimulatedDisk::check_rows() {
     const auto agrees = [&](const protocol::PointResult& result) {
       const auto outputs =
           result.error().empty() ? protocol::from_message(result) : solver::CaseResult{};
-      return result.error() == rows.text(3) && shows(rows.real(4), outputs.duration_s) &&
-             shows(rows.real(5), outputs.fn_peak_N);
+      return result.error() == rows.text(3) && rows.real(4) == outputs.duration_s &&
+             rows.real(5) == outputs.fn_peak_N;
     };
     const auto& table = *model_.study(study_id)->table.get();
     if (row == expected.end() || !agrees(*row->second) || table.point(point).mu != rows.real(2) ||
@@ -132,7 +125,7 @@ void SimulatedDisk::check_rows() {
     ++counts[study_id];
   }
   Statement versions(database.get(),
-                     "SELECT study_id FROM results WHERE worker IS NOT NULL"
+                     "SELECT study_id FROM results JOIN workers USING (worker_id)"
                      " GROUP BY study_id HAVING count(DISTINCT solver_version) > 1");
   if (versions.step()) {
     throw Violation("study " + versions.text(0) + " has results of two solver versions");

@@ -31,7 +31,9 @@ class SimulatedDisk final : public server::Storage {
   /// The process died while it wrote.
   bool died() const { return !files_.is_used(); }
   /// A store may fail.
-  bool is_at_fault() const { return died() || files_.full || files_.failing; }
+  bool is_at_fault() const {
+    return died() || files_.full || files_.failing || files_.sync_failed();
+  }
 
   void commit(std::span<const server::Change> changes) override;
   void check() override { store_->check(); }

@@ -30,6 +30,7 @@ SimulatedFiles::~SimulatedFiles() {
 void SimulatedFiles::start() {
   ++life_;
   used_ = true;
+  sync_failed_ = false;
 }
 
 void SimulatedFiles::kill() {
@@ -123,6 +124,7 @@ int SimulatedFiles::truncate(SimulatedFile& file, std::size_t size) {
 int SimulatedFiles::sync(SimulatedFile& file, bool and_directory) {
   if (failing_sync_in_ > 0 && --failing_sync_in_ == 0) {
     file.forget_unsynced();
+    sync_failed_ = true;
     return SQLITE_IOERR_FSYNC;
   }
   const bool dies = dies_now();

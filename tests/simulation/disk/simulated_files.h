@@ -51,6 +51,8 @@ class SimulatedFiles {
   void plan_failing_sync(std::int64_t syncs) { failing_sync_in_ = syncs; }
   /// The planned sync is still to come.
   bool awaits_failing_sync() const { return failing_sync_in_ > 0; }
+  /// A sync failed since the process began.
+  bool sync_failed() const { return sync_failed_; }
   /// Counts processes.
   std::uint64_t life() const { return life_; }
   /// The last connection that was opened.
@@ -86,6 +88,7 @@ class SimulatedFiles {
   std::int64_t failing_sync_in_ = 0;
   std::uint64_t life_ = 0;
   bool used_ = false;
+  bool sync_failed_ = false;
   sqlite3* connection_ = nullptr;
 };
 

@@ -15,8 +15,8 @@ using server::DeleteStudy;
 using server::ForgetFailures;
 using server::GrowStudy;
 using server::RenameStudy;
+using server::SetPriority;
 using server::SetStudyState;
-using server::SetStudyTerms;
 using server::StudyState;
 
 bool StoreModel::apply(const Change& change, Contents& contents) {
@@ -27,7 +27,7 @@ bool StoreModel::apply(const Change& change, Contents& contents) {
                                          study->table,
                                          StudyState::kRunning,
                                          study->created_at,
-                                         study->terms,
+                                         study->priority,
                                          {},
                                          {},
                                          {}};
@@ -51,11 +51,11 @@ bool StoreModel::apply_to_study(const Change& change, Contents& contents) {
     }
     return study != none;
   }
-  if (const auto* terms = std::get_if<SetStudyTerms>(&change)) {
-    const auto study = study_of(*terms);
-    const bool changes = study != none && !(study->second.terms == terms->terms);
+  if (const auto* priority = std::get_if<SetPriority>(&change)) {
+    const auto study = study_of(*priority);
+    const bool changes = study != none && study->second.priority != priority->priority;
     if (changes) {
-      study->second.terms = terms->terms;
+      study->second.priority = priority->priority;
     }
     return changes;
   }
@@ -79,7 +79,7 @@ bool StoreModel::apply_to_study(const Change& change, Contents& contents) {
 bool StoreModel::apply(const GrowStudy& change, Contents& contents) {
   auto& study = contents.studies.at(change.study_id);
   study.table = change.table;
-  study.terms = change.terms;
+  study.priority = change.priority;
   study.state = StudyState::kRunning;
   return true;
 }
@@ -224,7 +224,7 @@ bool StoreModel::Contents::operator==(const Found& found) const {
                       const server::StoredStudy& here = entry.second;
                       return here.study_id == there.study_id && here.name == there.name &&
                              here.state == there.state && here.created_at == there.created_at &&
-                             here.terms == there.terms && here.settled == there.settled &&
+                             here.priority == there.priority && here.settled == there.settled &&
                              here.failures == there.failures &&
                              here.table->recipe().SerializeAsString() ==
                                  there.table->recipe().SerializeAsString();

@@ -224,14 +224,14 @@ TEST_F(KeysTest, TheFolderCalledKeysIsTakenWhereThisOneHasNone) {
   }
 }
 
-TEST_F(KeysTest, WhoSubmitsAgainIsToldTheNewTermsAndHowToSeeMore) {
+TEST_F(KeysTest, WhoSubmitsAgainIsToldTheNewPriorityAndHowToSeeMore) {
   const auto worker = worker_with(key("worker"));
   EXPECT_THAT(ask(kFewPoints, key("client")).out, Not(HasSubstr("priority")));
   auto again = kFewPoints;
-  again.insert(again.end(), {"--priority", "5", "--weight", "0.5", "--rows", "2"});
+  again.insert(again.end(), {"--priority", "5", "--rows", "2"});
   const Outcome outcome = ask(again, key("client"));
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_THAT(outcome.out, HasSubstr("its priority is now 5; its weight is now 0.5"));
+  EXPECT_THAT(outcome.out, HasSubstr("its priority is now 5"));
   EXPECT_THAT(outcome.err, HasSubstr("More: oblique query few --server " + server_->client_url() +
                                      " --keys " + key("client")));
 }

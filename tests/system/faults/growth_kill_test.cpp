@@ -91,13 +91,13 @@ TEST_F(GrowthKillTest, WhatWasAcknowledgedIsThereAndWhatWasDeletedStaysAwayWhene
   wait_until("all is solved and cleared away", [&] {
     return number("SELECT count(*) FROM studies WHERE state = 'done'") == 2 &&
            number(
-               "SELECT count(*) FROM packed_results WHERE study_id IN"
+               "SELECT count(*) FROM results WHERE study_id IN"
                " (SELECT study_id FROM deletions)") == 0;
   });
-  EXPECT_EQ(number("SELECT count(*) FROM packed_results"), kPointsABlock * (kRounds + 2));
+  EXPECT_EQ(number("SELECT count(*) FROM results"), kPointsABlock * (kRounds + 2));
   EXPECT_EQ(number("SELECT count(DISTINCT point) FROM runs WHERE study = 'grows'"),
             kPointsABlock * kRounds);
-  EXPECT_EQ(number("SELECT count(*) FROM settled_points WHERE study_id NOT IN"
+  EXPECT_EQ(number("SELECT count(*) FROM completed_ranges WHERE study_id NOT IN"
                    " (SELECT study_id FROM studies)"),
             0);
   server_->process().send(SIGTERM);

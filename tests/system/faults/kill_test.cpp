@@ -91,9 +91,10 @@ TEST_F(KillTest, PointsOfAWorkerKilledInTheMiddleOfAStudyAreSolvedByTheOthers) {
   EXPECT_EQ(workers_.front()->wait(), -SIGKILL);
   ASSERT_LT(database_.rows(), kCount) << "killed too late to be a test";
   expect_complete();
-  EXPECT_EQ(database_.number("SELECT count(*) FROM results WHERE worker IS NULL OR worker NOT IN"
-                             " (SELECT worker_id FROM workers)"),
-            0);
+  EXPECT_EQ(
+      database_.number("SELECT count(*) FROM results WHERE worker_id IS NULL OR worker_id NOT IN"
+                       " (SELECT worker_id FROM workers)"),
+      0);
 }
 
 TEST_F(KillTest, AStudyWhoseOnlyWorkerWasKilledWaitsForTheNextOne) {

@@ -28,7 +28,7 @@ std::vector<Table> tables() {
       {"models", {"model_id"}, "", "definition"},
       // The model's number is one by order of arrival, so its definition stands in for it.
       {"results",
-       {"model_id", "wall_s", "worker", "attempt", "solved_at", "checksum"},
+       {"model_id", "wall_s", "worker_id", "attempt", "solved_at", "checksum"},
        " JOIN models USING (model_id)",
        "study_id, point"},
   };

@@ -92,7 +92,7 @@ class SlurmTest : public ::testing::Test {
   void wait_until_solved_by(const std::string& job, int points) const {
     wait_until("job " + job + " solves points", [&] {
       return Database(database_).number(
-                 "SELECT count(*) FROM results JOIN workers ON worker = worker_id WHERE study_id "
+                 "SELECT count(*) FROM results JOIN workers USING (worker_id) WHERE study_id "
                  "= " +
                  std::to_string(studies_) + " AND name LIKE 'slurm-" + job + "-%'") >= points;
     });

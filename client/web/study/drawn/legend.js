@@ -1,6 +1,6 @@
 // @ts-check
 // What colours mean: a bar with its range, or a list of categories.
-import { h, named, tick, picker } from "/parts/dom.js";
+import { h, named, tick } from "/parts/dom.js";
 import { category_pixel, css_colour, empty_pixel, ink, is_dark, kOther, own_looks } from "/parts/colours.js";
 import { count, heading, shown } from "/parts/format.js";
 import { scale, ticks, tick_text } from "/parts/scale.js";
@@ -87,8 +87,8 @@ export function gaps(picture) {
 
 /**
  * The range that colours span, and how.
- * @param {{from: string, to: string, is_log: boolean, palette: string}} now
- * @param {(changed: {from?: string, to?: string, zlog?: string, pal?: string}) => void} take
+ * @param {{from: string, to: string, is_log: boolean}} now
+ * @param {(changed: {from?: string, to?: string, zlog?: string}) => void} take
  */
 export function colour_controls(now, take) {
   const said = h("span", { role: "status", class: "bad" });
@@ -104,6 +104,5 @@ export function colour_controls(now, take) {
   };
   return h("div", { class: "row" }, number("from"), number("to"),
     h("button", { type: "button", onclick: () => take({ from: "", to: "" }) }, "Fit"), said,
-    named("palette", picker([["viridis", "viridis"], ["cividis", "cividis"]], now.palette, (pal) => take({ pal }))),
     tick("log colours", now.is_log, (is) => take({ zlog: is ? "1" : "" })));
 }

@@ -201,7 +201,6 @@ TEST_F(Plot, OfAWrongFlagNamesItAndWhatIsAllowed) {
                            "--colour major_mode: its values are texts"},
                           {{"a", "--histogram", "fn_peaks_N"}, "fn_peaks_N[0]"},
                           {{"a", "--at", "q=1"}, "no axis q"},
-                          {{"a", "--palette", "jet"}, "viridis, cividis"},
                           {{"a", "--range", "1"}, "FROM:TO"},
                           {{"a", "--size", "1x1"}, "WIDTHxHEIGHT"},
                           {{"a", "--out", "a.bmp"}, ".svg, .png, .csv or .gnuplot"},

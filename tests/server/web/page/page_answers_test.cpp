@@ -266,7 +266,7 @@ TEST_F(PageAnswersTest, ATextThatIsNestedWithoutEndIsAText) {
   solve(24);
   const std::string deep = std::string(100'000, '[') + std::string(100'000, ']');
   const std::string change =
-      "UPDATE packed_results SET checksum = NULL, error = '" + deep + "' WHERE point = 3";
+      "UPDATE results SET checksum = NULL, error = '" + deep + "' WHERE point = 3";
   const auto database = open_database(page_.database(), SQLITE_OPEN_READWRITE);
   sqlite3_busy_timeout(database.get(), 10'000);
   execute(database.get(), change.c_str());

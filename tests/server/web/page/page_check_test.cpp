@@ -94,7 +94,7 @@ TEST_F(PageCheckTest, TheFirstPointThatFailedIsToldWithItsReason) {
   const auto database = open_database(page_.database(), SQLITE_OPEN_READWRITE);
   sqlite3_busy_timeout(database.get(), 10'000);
   execute(database.get(),
-          "UPDATE packed_results SET checksum = NULL, error = 'failed as ' || point "
+          "UPDATE results SET checksum = NULL, error = 'failed as ' || point "
           "WHERE point IN (5, 17)");
   EXPECT_EQ(page_.json("/api/studies/1")["first_failure"],
             json({{"point", 5}, {"error", "failed as 5"}}));

@@ -11,8 +11,8 @@
 #include <gtest/gtest.h>
 
 #include "proto/frames.h"
-#include "server/asking/plan.h"
-#include "server/reading/query_rules.h"
+#include "server/query/plan.h"
+#include "server/query/query_rules.h"
 #include "server/web/answers/study_answers.h"
 #include "tests/server/web/page/page_study.h"
 

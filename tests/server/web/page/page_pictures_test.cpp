@@ -73,10 +73,10 @@ class PagePicturesTest : public testing::Test {
 TEST_F(PagePicturesTest, EveryFieldIsOneArgument) {
   start(speaking());
   EXPECT_EQ(arguments_of("?kind=map&z=fn_peak_N&x=mu&y=H&at=e:0.6&where=mu%20%3C%200.5&zlog=1&"
-                         "from=1&to=2e5&palette=cividis&width=480&height=360&format=png"),
+                         "from=1&to=2e5&width=480&height=360&format=png"),
             "[plot]\n[--quiet]\n" + db() +
                 "[--map=fn_peak_N]\n[--x=mu]\n[--y=H]\n[--at=e=0.5]\n[--where=mu < 0.5]\n"
-                "[--log-colour]\n[--range=1:200000]\n[--palette=cividis]\n[--size=480x360]\n"
+                "[--log-colour]\n[--range=1:200000]\n[--size=480x360]\n"
                 "[--format=png]\n[--]\n[grid]\n");
   EXPECT_EQ(arguments_of("?kind=scatter&x=mu&y=slide_m&z=e"),
             "[plot]\n[--quiet]\n" + db() +
@@ -110,7 +110,6 @@ TEST_F(PagePicturesTest, NothingFromOutsideBecomesAnotherFlag) {
                                   "?format=svg%20--out=/tmp/x",
                                   "?format=--out=/tmp/x",
                                   "?format=pdf",
-                                  "?palette=--out=x",
                                   "?width=1x1&height=--out=x",
                                   "?width=480",
                                   "?width=99999&height=1",

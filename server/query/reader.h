@@ -1,0 +1,86 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <sqlite3.h>
+
+#include "proto/oblique.pb.h"
+#include "proto/wire/chunk_writer.h"
+#include "server/database/sqlite.h"
+#include "server/query/query_rules.h"
+
+namespace oblique::server {
+
+/// Size at which a chunk of an answer is returned.
+inline constexpr std::uint64_t kChunkBytes = std::uint64_t{256} << 10U;
+
+/// The rows of one statement, returned in chunks. Holds a read transaction until it ends or is
+/// destroyed, during which the database cannot truncate its write-ahead log.
+class Answer {
+ public:
+  /// See Reader::answer.
+  Answer(sqlite3* database, const protocol::QueryRequest& request, const QueryLimits& limits,
+         const std::atomic<bool>& interrupted);
+
+  /// The next chunk, with its number from 1 on; `ends` is set in the last one, which may have no
+  /// row. A blob is returned as the text x'0F..', as is a text that is not UTF-8. Throws QueryError
+  /// when the statement fails, when this call takes longer than the time limit, and when a row is
+  /// longer than `max_row_bytes`. Not to be called after the end or a failure.
+  protocol::QueryReply next();
+
+ private:
+  bool step();
+  void copy_row();
+
+  sqlite3* database_;
+  QueryLimits limits_;
+  const std::atomic<bool>& interrupted_;
+  StatementHandle statement_{nullptr, &sqlite3_finalize};
+  std::vector<std::string> units_;             // of the columns, or none
+  std::optional<protocol::ChunkWriter> rows_;  // set by the constructor
+  std::uint64_t chunks_ = 0;
+};
+
+/// A database opened for reading only, also while a server writes it. Not thread-safe, but for
+/// `interrupt`.
+class Reader {
+ public:
+  /// Throws StorageError naming what was found: nothing, a directory, a foreign file, another
+  /// schema, an unreadable file.
+  explicit Reader(const std::string& path);
+
+  /// How the database is read, if that is unusual (see open_for_reading); mostly empty.
+  const std::string& remark() const { return remark_; }
+
+  /// Starts the answer to `request`. Throws QueryError as `prepare_query` does, and for a plan that
+  /// takes longer than the time limit; solver::InputError for a wrong question.
+  /// The reader must outlive the answer and does nothing else meanwhile.
+  Answer answer(const protocol::QueryRequest& request, const QueryLimits& limits);
+
+  /// The whole answer to one statement, as `rows` of one reply. Throws what Answer throws.
+  protocol::QueryReply query(const std::string& sql, const QueryLimits& limits);
+
+  /// Status of the study called `name`, or of all when `name` is empty. Leases and rate are 0,
+  /// because only a server has them. Throws QueryError for an unknown name.
+  std::vector<protocol::StudyStatus> study_status(const std::string& name = {});
+
+  /// Ends the running query and all later ones. May be called from any thread.
+  void interrupt() { interrupted_ = true; }
+
+ private:
+  std::string nearest_study(const std::string& name);
+
+  DatabaseHandle database_;
+  std::string remark_;
+  std::atomic<bool> interrupted_ = false;
+};
+
+/// A blob as SQL writes it: x'0F..'.
+std::string hexadecimal(std::string_view bytes);
+
+}  // namespace oblique::server

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+
+#include "server/database/sqlite.h"
+#include "server/study/interval_set.h"
+
+namespace oblique::server {
+
+/// Points by the number of their study.
+using PointsOfStudies = std::map<std::uint64_t, IntervalSet>;
+
+/// Which of [begin, end) have a row, from the rows themselves. Throws StorageError.
+IntervalSet points_with_row(sqlite3* database, std::uint64_t study_id, const Interval& points);
+
+/// The completed points of all studies as `completed_ranges` has them. Studies whose rows must be
+/// counted again have none. Throws StorageError.
+std::map<std::uint64_t, std::optional<IntervalSet>> noted_points(sqlite3* database);
+
+/// The same of one study.
+std::optional<IntervalSet> noted_points_of(sqlite3* database, std::uint64_t study_id);
+
+/// Keeps the table `completed_ranges`: the completed points of each study as ranges, so that a
+/// start need not read all rows. To be called in each transaction that inserts or deletes rows.
+/// When another program deletes rows, a trigger sets `studies.counted` to 0, and the next start of
+/// a server makes the ranges from the rows.
+///
+/// Writing a range costs three statements, whatever its length. Adjacent ranges are merged.
+///
+/// The connection must outlive this. All members throw StorageError.
+class CompletedRanges {
+ public:
+  explicit CompletedRanges(sqlite3* database);
+
+  /// Points are completed. Written by `flush`.
+  void add(std::uint64_t study_id, std::uint64_t point) { gathered_[study_id].insert(point); }
+  void add(std::uint64_t study_id, const Interval& points) {
+    gathered_[study_id].insert(points.begin, points.end);
+  }
+  /// Writes what was added.
+  void flush();
+  /// The transaction of what was added is rolled back.
+  void forget() { gathered_.clear(); }
+
+  /// The ranges of a study that overlap [first, end), as they are written.
+  IntervalSet overlapping(std::uint64_t study_id, const Interval& points);
+  /// These points are open again.
+  void remove(std::uint64_t study_id, const IntervalSet& points);
+  /// False after another program deleted rows of the study.
+  bool is_counted(std::uint64_t study_id);
+  void set_counted(std::uint64_t study_id);
+  /// Makes the ranges of a study from its rows.
+  void count_again(std::uint64_t study_id);
+
+ private:
+  std::optional<Interval> range_before(std::uint64_t study_id, std::uint64_t point);
+  std::uint64_t take_out(std::uint64_t study_id, std::uint64_t first, std::uint64_t last);
+  void write(std::uint64_t study_id, const Interval& range);
+
+  sqlite3* database_;
+  Statement before_;
+  Statement take_out_;
+  Statement between_;
+  Statement put_;
+  PointsOfStudies gathered_;
+};
+
+}  // namespace oblique::server

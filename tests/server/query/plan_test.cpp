@@ -1,0 +1,441 @@
+#include "server/query/plan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <spdlog/fmt/fmt.h>
+
+#include "proto/result_message.h"
+#include "server/database/open_for_reading.h"
+#include "server/query/query_rules.h"
+#include "server/query/question.h"
+#include "server/store/store.h"
+#include "tests/support/points.h"
+#include "tests/support/recipes.h"
+#include "tests/support/temporary_folder.h"
+#include "worker/solver/model/errors.h"
+
+namespace oblique::server {
+namespace {
+
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+/// Study "a" has ten solved points, e = 1, H = 1, mu from 0 to 1; of the five of "it's" 0, 1 and 2
+/// are solved and 4 failed.
+class PlanTest : public testing::Test {
+ protected:
+  PlanTest() {
+    Store store(path_);
+    const auto a = table_of(10);
+    const auto other = table_of(5);
+    AddResults all{1, a, 0, "", "", 1, "now", {}};
+    for (std::uint64_t point = 0; point < 10; ++point) {
+      all.results.push_back(solved_point(point));
+    }
+    const AddResults some{
+        2,
+        other,
+        0,
+        "",
+        "",
+        1,
+        "now",
+        {solved_point(2), solved_point(0), solved_point(1), protocol::failed_point(4, "no")}};
+    store.commit(std::vector<Change>{AddStudy{1, "a", a, "2024-01-01T00:00:00.000Z"},
+                                     AddStudy{2, "it's", other, "2024-01-02T00:00:00.000Z"}, all,
+                                     some});
+    open();
+  }
+  void open() {
+    database_ = open_for_reading(path_).database;
+    restrict_to_reading(database_.get());
+  }
+  void edit(const std::string& sql) {
+    database_.reset();
+    execute(open_database(path_, SQLITE_OPEN_READWRITE).get(), sql);
+    open();
+  }
+
+  static protocol::StudyQuery question(const std::string& select, const std::string& where = {},
+                                       const std::string& group = {},
+                                       const std::string& order = {}) {
+    protocol::StudyQuery question;
+    question.set_study("a");
+    if (!select.empty()) {
+      question.add_select(select);
+    }
+    question.set_where(where);
+    question.set_group(group);
+    question.set_order(order);
+    return question;
+  }
+  static protocol::StudyQuery of_other(protocol::StudyQuery question) {
+    question.set_study("it's");
+    return question;
+  }
+
+  /// The first value of each row of a statement, as text; NULL as nothing.
+  std::vector<std::string> texts(const std::string& sql) const {
+    Statement statement(database_.get(), sql);
+    std::vector<std::string> values;
+    while (statement.step()) {
+      values.push_back(statement.text(0));
+    }
+    return values;
+  }
+  std::vector<std::string> texts(const protocol::StudyQuery& asked) const {
+    return texts(plan(database_.get(), asked).statement);
+  }
+  double number(const protocol::StudyQuery& asked) const {
+    Statement statement(database_.get(), plan(database_.get(), asked).statement);
+    return statement.step() ? statement.real(0) : -1.0;
+  }
+  double number(const std::string& select, const std::string& where = {}) const {
+    return number(question(select, where));
+  }
+  PlannedColumn column(const std::string& select) const {
+    return plan(database_.get(), question(select)).columns.at(0);
+  }
+  /// The message of the error; empty: the query is right.
+  std::string error(const protocol::StudyQuery& asked) const {
+    try {
+      plan(database_.get(), asked);
+    } catch (const solver::InputError& error) {
+      return error.what();
+    }
+    return {};
+  }
+  std::string error(const std::string& select, const std::string& where = {},
+                    const std::string& group = {}, const std::string& order = {}) const {
+    return error(question(select, where, group, order));
+  }
+
+  test::TemporaryFolder folder_;
+  std::string path_ = folder_.file("studies.db");
+  DatabaseHandle database_;
+};
+
+TEST_F(PlanTest, RowsComeInTheOrderOfTheirPointsUnlessAnotherIsAskedFor) {
+  EXPECT_THAT(texts(of_other(question("point"))), ElementsAre("0", "1", "2", "4"));
+  EXPECT_THAT(texts(of_other(question("mu", "status = 'solved' AND mu > 0"))),
+              ElementsAre("0.25", "0.5"));
+  EXPECT_THAT(texts(of_other(question("point", "", "", "mu DESC"))),
+              ElementsAre("4", "2", "1", "0"));
+  EXPECT_THAT(texts(of_other(question("status || count(*)", "", "status"))),
+              ElementsAre("failed1", "solved3"));
+}
+
+TEST_F(PlanTest, AConditionCannotReachOtherStudies) {
+  EXPECT_THAT(texts(of_other(question("point", "mu = 7 OR 1"))), ElementsAre("0", "1", "2", "4"));
+  EXPECT_THAT(texts(question("point", "study = 'it''s'")), IsEmpty());
+  EXPECT_THAT(texts(of_other(question("DISTINCT study || study_id"))), ElementsAre("it's2"));
+}
+
+TEST_F(PlanTest, AStudyWhoseRecipeCannotBeReadIsAnswered) {
+  edit("UPDATE studies SET recipe = x'ff'");
+  EXPECT_THAT(texts(of_other(question("point", "mu > 0"))), ElementsAre("1", "2", "4"));
+}
+
+TEST_F(PlanTest, WithoutColumnsTheAxesThatVaryAndTheMainOutputsAreSelected) {
+  std::vector<std::string> names;
+  for (const PlannedColumn& column : plan(database_.get(), question("")).columns) {
+    names.push_back(column.name);
+  }
+  EXPECT_THAT(names, ElementsAre("point", "mu", "status", "fn_peak_N", "ft_peak_N", "duration_s",
+                                 "slide_m", "stick_total_s", "major_mode"));
+}
+
+TEST_F(PlanTest, AStarIsAllColumnsOfTheViewAndTheListsOfSolve) {
+  const auto columns = plan(database_.get(), question("*, phases[0].t1_s")).columns;
+  const Statement runs(database_.get(), "SELECT * FROM runs");
+  ASSERT_EQ(columns.size(), static_cast<std::size_t>(runs.columns()) + 5);
+  EXPECT_EQ(columns[0].name, "study");
+  EXPECT_EQ(columns.back().name, "phases[0].t1_s");
+}
+
+/// The axes among the usual columns.
+std::vector<std::string> usual_axes(const protocol::Recipe& recipe) {
+  auto columns = usual_columns(recipe);
+  columns.erase(std::find(columns.begin(), columns.end(), "status"), columns.end());
+  columns.erase(columns.begin());  // point
+  return columns;
+}
+
+TEST(UsualColumns, HaveEveryKeyWithSeveralValuesInTheStudyAndNoOther) {
+  using protocol::listed;
+  using protocol::recipe_of;
+  const auto H = listed("H", {1});
+  const auto mu = listed("mu", {0.4});
+  const auto e = listed("e", {1});
+  EXPECT_THAT(usual_axes(recipe_of({{H, mu, e}})), IsEmpty());
+  EXPECT_THAT(usual_axes(recipe_of({{listed("E", {7e10, 8e10}), listed("k", {1e7}), H,
+                                     protocol::range("mu", 0, 1, 3), e}})),
+              ElementsAre("mu", "E_Pa"));
+  EXPECT_THAT(usual_axes(recipe_of({{H, mu, e}, {listed("H", {0.9}), mu, e}})), ElementsAre("H"))
+      << "from block to block";
+  EXPECT_THAT(usual_axes(recipe_of({{H, mu, e}, {listed("k", {1e7}), H, mu, e}})), ElementsAre("k"))
+      << "in one of the blocks";
+  EXPECT_THAT(usual_axes(recipe_of(
+                  {{protocol::following("I", "A^2"), listed("length2", {0.3, 0.4}), H, mu, e}})),
+              ElementsAre("I", "lengths_m"));
+  EXPECT_THAT(usual_axes({}), ElementsAre("H", "mu", "e")) << "of a recipe that cannot be read";
+}
+
+TEST_F(PlanTest, FunctionsAggregateTheNumbersOfRows) {
+  EXPECT_DOUBLE_EQ(number("median(point)"), 4.5);
+  EXPECT_DOUBLE_EQ(number("median(point)", "point < 3"), 1.0);
+  EXPECT_DOUBLE_EQ(number("median(nullif(point, 9))"), 4.0);
+  EXPECT_DOUBLE_EQ(number("percentile(point, 0)"), 0.0);
+  EXPECT_DOUBLE_EQ(number("percentile(point, 100)"), 9.0);
+  EXPECT_DOUBLE_EQ(number("percentile(point, 25)"), 2.25);
+  EXPECT_DOUBLE_EQ(number("variance(point)"), 82.5 / 9.0);
+  EXPECT_DOUBLE_EQ(number("stddev(point)"), std::sqrt(82.5 / 9.0));
+  EXPECT_DOUBLE_EQ(number("stddev(point) IS NULL", "point = 3"), 1.0);
+  EXPECT_DOUBLE_EQ(number("median(point) IS NULL AND variance(point) IS NULL", "point < 0"), 1.0);
+  EXPECT_EQ(number("count_mode('SC SR') - count_mode('x')"), 10.0);
+  EXPECT_THAT(error("count_mode(mu)"), HasSubstr("count_mode('SC SR')"));
+}
+
+TEST_F(PlanTest, CorrIsPearsonsCorrelationOfTheRowsThatHaveBoth) {
+  EXPECT_DOUBLE_EQ(number("corr(point, 3 - 2 * point)"), -1.0);
+  // Of 0, 1, 2 with 0, 1, 4: covariance 2, variances 1 and 13/3.
+  EXPECT_NEAR(number("corr(point, point * point)", "point < 3"), 2.0 / std::sqrt(13.0 / 3.0),
+              1e-15);
+  EXPECT_NEAR(number("corr(nullif(point, 9), nullif(point * point, 64))", "point NOT IN (3, 4)"),
+              number("corr(point, point * point)", "point NOT IN (3, 4, 8, 9)"), 1e-15);
+  EXPECT_DOUBLE_EQ(number("corr(1e9 + point, point)"), 1.0) << "without cancellation";
+  EXPECT_DOUBLE_EQ(number("corr(point, 7) IS NULL"), 1.0) << "one of them does not vary";
+  EXPECT_DOUBLE_EQ(number("corr(point, mu) IS NULL", "point = 3"), 1.0);
+}
+
+TEST_F(PlanTest, FunctionsRefuseWhatIsNoNumber) {
+  const auto failure = [&](const std::string& expression) -> std::string {
+    try {
+      texts("SELECT " + expression + " FROM results");
+    } catch (const StorageError& error) {
+      return error.what();
+    }
+    return {};
+  };
+  EXPECT_THAT(failure("median('x')"), HasSubstr("take numbers"));
+  EXPECT_THAT(failure("stddev(x'00')"), HasSubstr("take numbers"));
+  EXPECT_THAT(failure("corr(mu, 'x')"), HasSubstr("take numbers"));
+  EXPECT_THAT(failure("percentile(mu, 101)"), HasSubstr("from 0 to 100"));
+  EXPECT_THAT(failure("percentile(mu, 'x')"), HasSubstr("from 0 to 100"));
+  EXPECT_THAT(failure("percentile(mu, point)"), HasSubstr("one percentage"));
+}
+
+TEST_F(PlanTest, SqlitesLimitOnMemoryHoldsForTheNumbersOfAFunction) {
+  const std::int64_t before = sqlite3_hard_heap_limit64(std::int64_t{16} << 20U);
+  EXPECT_THROW(texts("WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM c LIMIT "
+                     "4000000) SELECT median(x) FROM c"),
+               StorageError);
+  sqlite3_hard_heap_limit64(before);
+  EXPECT_EQ(number("median(point)"), 4.5);
+}
+
+/// A list and what its elements have.
+struct ListMembers {
+  const char* list;
+  std::vector<const char*> members;
+};
+
+TEST_F(PlanTest, ElementsAreThoseOfTheListsInTheView) {
+  edit(
+      "UPDATE results SET peaks = '[]', ft_peaks = '[]', phases = '[]', stick_intervals = '[]',"
+      " reaction_peaks = '[]' WHERE point = 1;"
+      "UPDATE results SET ft_peaks = NULL WHERE point IN (2, 3);"
+      "UPDATE results SET phases = '[1e-5]' WHERE point = 3;"
+      "UPDATE results SET phases = '[1.0e-05,2e-5,3e-5,4e-5,5e-5]' WHERE point = 4");
+  const std::vector<ListMembers> lists{{"peaks", {"t_s", "fn_N", "ft_N", "major"}},
+                                       {"ft_peaks", {"t_s", "ft_N"}},
+                                       {"phases", {"kind", "t0_s", "t1_s"}},
+                                       {"stick_intervals", {"t0_s", "t1_s"}},
+                                       {"reaction_peaks", {"t_s", "force_N"}}};
+  const auto expect_same = [&](const std::string& written, const std::string& sql) {
+    const auto shown = texts("SELECT " + sql + " FROM runs WHERE study = 'a' ORDER BY point");
+    EXPECT_EQ(texts(question(written)), shown) << written;
+    // With a column that only the view has.
+    EXPECT_EQ(texts(question(written + ", links")), shown) << written;
+  };
+  for (const auto& [list, members] : lists) {
+    expect_same(fmt::format("{}.count", list), fmt::format("json_array_length({})", list));
+    for (int i = -4; i <= 4; ++i) {
+      const std::string path = i < 0 ? fmt::format("$[#{}]", i) : fmt::format("$[{}]", i);
+      for (std::size_t member = 0; member < members.size(); ++member) {
+        expect_same(fmt::format("{}[{}].{}", list, i, members[member]),
+                    fmt::format("{} ->> '{}[{}]'", list, path, member));
+      }
+      expect_same(fmt::format("{}[{}]", list, i), fmt::format("{} -> '{}'", list, path));
+    }
+  }
+  EXPECT_EQ(number("count(phases[2].t1_s)"), 8.0);
+  EXPECT_EQ(number("count(phases[-4].kind)"), 1.0);
+  EXPECT_EQ(number(of_other(question("count(peaks.count)"))), 3.0) << "a failed point has no lists";
+}
+
+TEST_F(PlanTest, ListsOfSolveHaveTheNumbersOfTheViews) {
+  edit("UPDATE results SET ft_peaks = NULL WHERE point = 2");
+  const auto numbers = [&](const char* column, const char* from) {
+    return texts(
+        fmt::format("SELECT (SELECT json_group_array({}) FROM {}) FROM runs WHERE study = "
+                    "'a' ORDER BY point",
+                    column, from));
+  };
+  const auto fn_N = numbers("value ->> 1", "json_each(runs.peaks)");
+  EXPECT_EQ(texts(question("fn_peaks_N")), fn_N);
+  EXPECT_EQ(texts(question("fn_peaks_N, links")), fn_N);
+  EXPECT_EQ(texts(question("major_peaks_N")),
+            numbers("value ->> 1", "json_each(runs.peaks) WHERE value ->> 3"));
+  EXPECT_EQ(texts(question("ft_peaks_N")), numbers("value ->> 1", "json_each(runs.ft_peaks)"));
+  EXPECT_EQ(texts(question("stick_intervals_s")), texts(question("stick_intervals")));
+  EXPECT_EQ(texts(question("fn_peaks_N[-1]")), texts(question("peaks[-1].fn_N")));
+  EXPECT_EQ(texts(question("lengths_m[0]")), texts(question("length")));
+  EXPECT_THAT(texts(of_other(question("fn_peaks_N || ft_peaks_N", "point = 4"))), ElementsAre(""));
+}
+
+TEST_F(PlanTest, ElementsMayBeInEveryPartOfAQuery) {
+  EXPECT_EQ(number("count(*)", "peaks[1].fn_N > 0 AND stick_intervals.count = 1"), 10.0);
+  EXPECT_EQ(number(question("point", "", "", "phases[0].t1_s DESC")), 9.0);
+  EXPECT_THAT(texts(question("peaks.count * count(*)", "", "peaks.count")), ElementsAre("20"));
+  EXPECT_EQ(number("max(peaks[0].fn_N) - max(fn_peaks_N[0])"), 0.0);
+  EXPECT_EQ(column("peaks[1].fn_N"), (PlannedColumn{"peaks[1].fn_N", "N"}));
+  EXPECT_EQ(column("peaks[1].fn_N AS second").name, "second");
+  EXPECT_THAT(error("peaks[0].fn"), AllOf(HasSubstr("peaks[0].fn"), HasSubstr("fn_N")));
+  EXPECT_THAT(error("peaks[x].fn_N"), HasSubstr("whole number"));
+  EXPECT_THAT(error("peaks[0.5].fn_N"), HasSubstr("whole number"));
+}
+
+TEST_F(PlanTest, OnlyQueriesThatNameAModelOrWorkerReadTheirTables) {
+  const auto reads_models = [&](const std::string& select, const std::string& group) {
+    const auto sql = plan(database_.get(), question(select, "", group)).statement;
+    return sql.find(" runs AS runs") != std::string::npos;
+  };
+  EXPECT_FALSE(reads_models("e, avg(fn_peak_N), max(peaks[0].fn_N), max(phases[0].t1_s)", "e"));
+  EXPECT_FALSE(reads_models("study, status, major_mode, fn_peaks_N", ""));
+  EXPECT_TRUE(reads_models("k, avg(fn_peak_N)", "k"));
+  EXPECT_TRUE(reads_models("worker_name", ""));
+  EXPECT_TRUE(reads_models("phases", ""));
+}
+
+TEST_F(PlanTest, PointsThatAConditionNamesAreLookedUp) {
+  const auto asked = question("fn_peak_N", "point IN (3, 1)");
+  Statement steps(database_.get(), "EXPLAIN QUERY PLAN " + plan(database_.get(), asked).statement);
+  ASSERT_TRUE(steps.step());
+  EXPECT_THAT(steps.text(3), HasSubstr("(study_id=? AND point=?)"));
+}
+
+TEST_F(PlanTest, UnitsFollowFromThoseOfColumns) {
+  EXPECT_EQ(column("avg(fn_peak_N)").unit, "N");
+  EXPECT_EQ(column("percentile(slide_m, 90)").unit, "m");
+  EXPECT_EQ(column("max(reaction_peaks[0].t_s)").unit, "s");
+  for (const char* other : {"count(fn_peak_N)", "fn_peak_N / 1000", "mode", "fn_peak_N + slide_m",
+                            "peaks", "fn_peak_N > 3", "variance(duration_s)"}) {
+    EXPECT_EQ(column(other).unit, "") << other;
+  }
+}
+
+TEST_F(PlanTest, ItemsOfAGroupAreKeysOrAggregates) {
+  EXPECT_EQ(error("major_mode, count(*), avg(fn_peak_N)", "", "major_mode"), "");
+  EXPECT_EQ(error("round(mu, 1) AS m, max(fn_peak_N)", "", "m"), "");
+  EXPECT_EQ(error("round(mu, 1), max(fn_peak_N) / 1000", "", "round(mu, 1)"), "");
+  EXPECT_EQ(error("peaks.count, count(*) FILTER (WHERE e = 1)", "", "peaks.count"), "");
+  EXPECT_EQ(error("mu + e, count(*)", "", "mu, e", "count(*) DESC"), "");
+  EXPECT_THAT(error("mu, count(*)", "", "e"),
+              AllOf(HasSubstr("--select"), HasSubstr("mu has many")));
+  EXPECT_THAT(error("*", "", "e"), HasSubstr("* has many"));
+  EXPECT_THAT(error("e, max(mu, H)", "", "e"), HasSubstr("mu has many"));
+  EXPECT_THAT(error("peaks[0].fn_N", "", "e"), HasSubstr("peaks[0].fn_N has many"));
+  EXPECT_THAT(error("e, count(*)", "", "e", "mu"),
+              AllOf(HasSubstr("--order"), HasSubstr("mu has many")));
+}
+
+TEST_F(PlanTest, AColumnBesideAnAggregateOfAllPointsIsRefused) {
+  EXPECT_THAT(
+      error("median(mu), mode"),
+      AllOf(HasSubstr("--select"), HasSubstr("mode has many values"), HasSubstr("--group")));
+  EXPECT_THAT(error("mu, count(*) FILTER (WHERE e = 1)"), HasSubstr("mu has many"));
+  EXPECT_THAT(error("*, count(*)"), HasSubstr("* has many"));
+  EXPECT_THAT(error("peaks[0].fn_N, avg(mu)"), HasSubstr("peaks[0].fn_N has many"));
+  for (const char* right :
+       {"median(mu), max(mu) - min(mu), 1", "count(*)", "mu, e", "mu, max(mu, e)",
+        "mu, avg(mu) OVER ()",
+        "mu, avg(mu) OVER (ORDER BY mu RANGE BETWEEN 0.05 PRECEDING AND 0.05 FOLLOWING)",
+        "mu, (SELECT max(mu) FROM runs) AS most"}) {
+    EXPECT_EQ(error(right), "") << right;
+  }
+}
+
+TEST_F(PlanTest, AWrongNameIsNamedWithTheNearest) {
+  EXPECT_THAT(error("media(mu)"), HasSubstr("did you mean `median(x)`?"));
+  EXPECT_THAT(error("peak[0].fn_N"), AllOf(HasSubstr("peak is no list"), HasSubstr("`peaks`")));
+  EXPECT_THAT(error("fn_peak_N[0]"), AllOf(HasSubstr("is no list"), HasSubstr("`fn_peaks_N`")));
+  EXPECT_THAT(error("peaks[0].fn_M"), HasSubstr("did you mean `fn_N`"));
+  EXPECT_THAT(error("peaks.cnt"), HasSubstr("`peaks.count`"));
+  EXPECT_THAT(error("mode, count"), HasSubstr("did you mean `count(*)`?"));
+  EXPECT_EQ(error("mu [0]"), "");  // an alias with a number in it
+  EXPECT_THAT(error("mu", "E > 1"), HasSubstr("E_Pa"));
+  EXPECT_THAT(error("mu", "mode REGEXP 'S'"),
+              AllOf(HasSubstr("GLOB 'SC*'"), HasSubstr("LIKE '%sR%'")));
+  EXPECT_THAT(error("xyzzy"), AllOf(HasSubstr("oblique columns"), Not(HasSubstr("did you mean"))));
+  const std::string message = error("stik_total_s");
+  EXPECT_THAT(message, AllOf(HasSubstr("`stick_total_s`"), HasSubstr("oblique columns")));
+  EXPECT_LT(message.size(), 150U) << message;
+  auto unknown = question("mu");
+  unknown.set_study("b");
+  EXPECT_THAT(error(unknown), HasSubstr("no study called \"b\""));
+}
+
+TEST_F(PlanTest, ANameInDoubleQuotesIsNeverAText) {
+  EXPECT_THAT(error("count(*)", "\"mux\" > 0.5"),
+              AllOf(HasSubstr("no such column: mux"), HasSubstr("did you mean `mu`"),
+                    HasSubstr("in single quotes a text")));
+  EXPECT_THAT(error("mu", "major_mode = \"SC\""), HasSubstr("no such column: SC"));
+  EXPECT_THAT(error("mu", "", "", "\"mux\""), HasSubstr("no such column: mux"));
+  EXPECT_THAT(error("count(*)", "", "\"mux\""), HasSubstr("no such column: mux"));
+  EXPECT_EQ(number("count(*)", "\"mu\" > 0.5"), number("count(*)", "mu > 0.5"));
+  EXPECT_EQ(error("mu AS \"my mu\", \"e\""), "");
+  EXPECT_THAT(error("mux"), Not(HasSubstr("quotes")));
+}
+
+TEST_F(PlanTest, AWrongPartIsNamedByItsFlag) {
+  EXPECT_THAT(error("mu FROM runs --"), HasSubstr("--select"));
+  EXPECT_THAT(error("mu", "mu > 0.5 --"), HasSubstr("--where"));
+  EXPECT_THAT(error("mu", "", "mu ORDER BY 1"), HasSubstr("--group"));
+  EXPECT_THAT(error("mu", "", "", "mu LIMIT 1"), HasSubstr("--order"));
+  EXPECT_THAT(error("mu", "mu >"), AllOf(HasSubstr("--where \"mu >\""), HasSubstr("must follow")));
+  EXPECT_THAT(error("mu +"), HasSubstr("--select \"mu +\""));
+  EXPECT_THAT(error("mu", "mu = = 1"), AllOf(HasSubstr("--where"), HasSubstr("near \"=\"")));
+  EXPECT_THAT(error("mu", "", "", "mu DESC DESC"), HasSubstr("--order \"mu DESC DESC\""));
+}
+
+TEST_F(PlanTest, NumbersAreThoseThatWereTypedInEveryPartOfAQuery) {
+  // SQLite 3.40 reads the neighbour of each of these.
+  for (const char* typed : {"0.1166477", "0.6341252", "0.2611956", "0.863579242346664"}) {
+    EXPECT_EQ(number(typed), std::stod(typed));
+    EXPECT_EQ(number(std::string("DISTINCT ") + typed), std::stod(typed));
+  }
+  EXPECT_EQ(number(".5e1"), 5.0);
+  EXPECT_EQ(column("0.1166477 * mu").name, "0.1166477 * mu");
+  EXPECT_EQ(column("peaks[0].fn_N * mu").name, "peaks[0].fn_N * mu");
+  EXPECT_EQ(column("DISTINCT 0.1166477 * mu").name, "0.1166477 * mu");
+  EXPECT_EQ(column("DISTINCT 0.1166477 * mu x").name, "x");
+  EXPECT_EQ(column("0.1166477 AS \"x y\"").name, "x y");
+  EXPECT_EQ(number("count(*)", "mode = '0.1166477'"), 0.0);
+  // True of one row if both numbers are the same.
+  const std::string is_it = "point = 3 AND 0.1166477 = 1166477 / 1e7";
+  EXPECT_EQ(number(question("count(*)", "", is_it)), 9.0);
+  EXPECT_EQ(number(question("point", "", "", is_it + " DESC")), 3.0);
+}
+
+}  // namespace
+}  // namespace oblique::server

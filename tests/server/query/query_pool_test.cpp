@@ -1,0 +1,442 @@
+// Queries in real reader processes, including statements that no thread could be stopped at.
+#include "server/query/query_pool.h"
+
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <condition_variable>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "proto/frames.h"
+#include "proto/wire/chunk_rows.h"
+#include "server/query/query_rules.h"
+#include "server/query/reader_program.h"
+#include "server/store/store.h"
+#include "tests/support/hang_limit.h"
+#include "tests/support/process.h"
+#include "tests/support/temporary_folder.h"
+
+namespace oblique::server {
+namespace {
+
+using Kind = QueryReport::Kind;
+using testing::AnyOf;
+using testing::HasSubstr;
+
+/// Compares for hours without checking for an interrupt.
+constexpr const char* kDeaf = "SELECT instr(zeroblob(16000000), zeroblob(7999999) || x'01')";
+
+/// Megabytes: more than a client is sent ahead.
+constexpr const char* kLong =
+    "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n LIMIT 60000) "
+    "SELECT i, hex(zeroblob(50)) FROM n";
+
+/// A pool with a clock that only the tests advance.
+class QueryPoolTest : public testing::Test {
+ protected:
+  QueryPoolTest() {
+    Store store(path_);
+    settings_.reader_program = OBLIQUE_TEST_READER;
+  }
+
+  QueryPool& pool() {
+    if (!pool_) {
+      settings_.now_ms = [this] { return now_ms_.load(); };
+      pool_.emplace(path_, settings_, [this](QueryReport report) { take(report); });
+    }
+    return *pool_;
+  }
+  void advance_ms(std::int64_t time_ms) {
+    now_ms_ += time_ms;
+    pool().cancel(UINT64_MAX);  // no such query: the pool only looks at its clock
+  }
+  std::uint64_t ask(const std::string& sql, const std::string& client = "") {
+    QueryJob job{++last_ticket_, client.empty() ? std::to_string(last_ticket_) : client, {}};
+    job.request.set_sql(sql);
+    job.request.set_time_limit_ms(kTimeLimit_ms);
+    EXPECT_TRUE(pool().submit(std::move(job)));
+    return last_ticket_;
+  }
+
+  /// What was reported of a query until now.
+  struct Answer {
+    bool runs = false;
+    bool ended = false;
+    bool in_order = true;
+    std::uint64_t chunks = 0;
+    std::uint64_t rows = 0;
+    std::uint64_t largest = 0;     // bytes of a chunk
+    std::int64_t last_number = 0;  // first column of the last row
+    std::string error;
+  };
+  Answer answer(std::uint64_t ticket) {
+    const std::lock_guard lock(mutex_);
+    return answers_[ticket];
+  }
+  template <typename Condition>
+  Answer wait_until(std::uint64_t ticket, const Condition& condition) {
+    std::unique_lock lock(mutex_);
+    if (!changed_.wait_for(lock, test::kHangLimit, [&] { return condition(answers_[ticket]); })) {
+      throw std::runtime_error("the pool reports nothing");
+    }
+    return answers_[ticket];
+  }
+  void wait_for_start(std::uint64_t ticket) {
+    wait_until(ticket, [](const Answer& answer) { return answer.runs; });
+  }
+  Answer wait_for_chunks(std::uint64_t ticket, std::uint64_t chunks) {
+    return wait_until(ticket, [chunks](const Answer& answer) { return answer.chunks >= chunks; });
+  }
+  Answer wait_for_end(std::uint64_t ticket) {
+    return wait_until(ticket, [](const Answer& answer) { return answer.ended; });
+  }
+  Answer take_all(std::uint64_t ticket) {
+    std::uint64_t taken = 0;
+    while (true) {
+      const Answer now = wait_until(
+          ticket, [taken](const Answer& answer) { return answer.ended || answer.chunks > taken; });
+      if (now.ended) {
+        return now;
+      }
+      taken = now.chunks;
+      pool().more(ticket, taken);
+    }
+  }
+  /// Makes a shell script the reader program.
+  std::string use_script(const std::string& commands) {
+    settings_.reader_program = folder_.file("reader");
+    std::ofstream(settings_.reader_program) << "#!/bin/sh\n" << commands << '\n';
+    std::filesystem::permissions(settings_.reader_program, std::filesystem::perms::owner_all);
+    return settings_.reader_program;
+  }
+  std::string error_of(const std::string& sql) { return take_all(ask(sql)).error; }
+  /// Of the only row.
+  std::int64_t number_of(const std::string& sql) {
+    const Answer answer = take_all(ask(sql));
+    EXPECT_EQ(answer.rows, 1U) << answer.error;
+    return answer.last_number;
+  }
+
+  static constexpr std::int64_t kTimeLimit_ms = kLongestTimeLimit_ms;
+
+  test::TemporaryFolder folder_;
+  std::string path_ = folder_.file("studies.db");
+  QueryPoolSettings settings_;
+
+ private:
+  void take(const QueryReport& report) {
+    const std::lock_guard lock(mutex_);
+    Answer& answer = answers_[report.ticket];
+    answer.runs = true;
+    answer.ended = report.kind == Kind::kAnswered;
+    protocol::ClientReply reply;
+    EXPECT_TRUE(protocol::decode(report.reply, reply));
+    answer.error = reply.error().message();
+    if (reply.has_query()) {
+      const protocol::QueryReply& chunk = reply.query();
+      ++answer.chunks;
+      answer.in_order = answer.in_order && chunk.chunk() == answer.chunks &&
+                        protocol::is_sound(chunk) && chunk.ends() == answer.ended;
+      answer.rows += chunk.chunk_rows();
+      answer.largest = std::max<std::uint64_t>(answer.largest, report.reply.size());
+      protocol::ChunkRows rows(chunk);
+      while (rows.next()) {
+        answer.last_number = rows.cell(0).integer;
+      }
+    }
+    changed_.notify_all();
+  }
+
+  std::atomic<std::int64_t> now_ms_ = 1'000'000;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::map<std::uint64_t, Answer> answers_;
+  std::uint64_t last_ticket_ = 0;
+  std::optional<QueryPool> pool_;  // last: it reports to the others
+};
+
+TEST_F(QueryPoolTest, AReaderWhoseServerWasKilledWhileItStartedBeginsNoQuery) {
+  std::array<int, 2> ends{};
+  ASSERT_EQ(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()), 0);
+  protocol::QueryRequest request;
+  request.set_sql(kDeaf);
+  const std::string query = protocol::encode(request);
+  const FrameHead head{static_cast<std::uint32_t>(query.size()), 1};
+  ASSERT_EQ(write(ends[0], &head, sizeof head), static_cast<ssize_t>(sizeof head));
+  ASSERT_EQ(write(ends[0], query.data(), query.size()), static_cast<ssize_t>(query.size()));
+  close(ends[0]);
+  test::Process reader(folder_, settings_.reader_program, {kReadMode, path_}, {}, ends[1]);
+  close(ends[1]);
+  EXPECT_EQ(reader.wait(), 0);
+}
+
+TEST_F(QueryPoolTest, AQueryIsAnsweredByAnotherProcess) {
+  EXPECT_EQ(number_of("SELECT 5 AS five, 'x'"), 5);
+  EXPECT_EQ(number_of("SELECT 7 /*" + std::string(900'000, 'x') + "*/"), 7);
+  EXPECT_THAT(error_of("SELECT nothing"), HasSubstr("nothing"));
+  const Answer empty = take_all(ask("SELECT 1 WHERE 0"));
+  EXPECT_EQ(empty.chunks, 1U);
+  EXPECT_EQ(empty.rows, 0U);
+}
+
+TEST_F(QueryPoolTest, AQueryIsKilledAtItsDeadlineWhateverItDoes) {
+  const auto deaf = ask(kDeaf);
+  wait_for_start(deaf);
+  advance_ms(kTimeLimit_ms - 1);
+  EXPECT_EQ(number_of("SELECT 1"), 1);
+  EXPECT_FALSE(answer(deaf).ended);
+  advance_ms(1);
+  EXPECT_THAT(wait_for_end(deaf).error, HasSubstr("took too long (more than 600 s)"));
+  EXPECT_EQ(number_of("SELECT 1"), 1);
+}
+
+TEST_F(QueryPoolTest, QueriesThatNeedMuchMemoryFailAndSaySo) {
+  for (const char* sql : {"SELECT zeroblob(1000000000)", "SELECT hex(zeroblob(450000000))",
+                          "SELECT hex(zeroblob(16000000))",
+                          "SELECT replace(hex(zeroblob(8000000)), '0', '0123456789')"}) {
+    EXPECT_THAT(error_of(sql), HasSubstr("more than the 16 MiB allowed")) << sql;
+  }
+  // To SQLite's printf a text over the limit is NULL.
+  EXPECT_EQ(number_of("SELECT printf('%.*c', 900000000, 'x') IS NULL"), 1);
+  const std::string megabytes =
+      "(WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n LIMIT 5000)"
+      " SELECT hex(zeroblob(500000)) || i AS b FROM n)";
+  for (const std::string& sql : {"SELECT b FROM " + megabytes + " ORDER BY substr(b, 900000)",
+                                 "SELECT count(DISTINCT b) FROM " + megabytes,
+                                 "SELECT length(json_group_array(b)) FROM " + megabytes}) {
+    EXPECT_THAT(error_of(sql), AnyOf(HasSubstr("more memory than the 256 MiB allowed"),
+                                     HasSubstr("more than the 16 MiB allowed")))
+        << sql;
+  }
+  EXPECT_THAT(error_of("SELECT zeroblob(10000000)"), HasSubstr("one row alone has more than"));
+  EXPECT_EQ(number_of("SELECT length(zeroblob(16000000))"), 16'000'000);
+}
+
+TEST_F(QueryPoolTest, AWaitingQueryStartsWhenACancelledOneEnds) {
+  settings_.queue.most_running_each = 1;
+  const auto running = ask(kDeaf, "one client");
+  wait_for_start(running);
+  const auto next = ask("SELECT 2", "one client");
+  EXPECT_EQ(number_of("SELECT 1"), 1) << "of another client";
+  EXPECT_FALSE(answer(next).runs);
+  pool().cancel(running);
+  EXPECT_EQ(wait_for_end(next).last_number, 2);
+  EXPECT_FALSE(answer(running).ended);
+}
+
+TEST_F(QueryPoolTest, ACancelledQueryThatWaitsNeverStarts) {
+  settings_.queue.readers = 1;
+  const auto running = ask(kDeaf);
+  wait_for_start(running);
+  const auto waiting = ask("SELECT 2");
+  const auto last = ask("SELECT 3");
+  pool().cancel(waiting);
+  pool().cancel(running);
+  EXPECT_EQ(wait_for_end(last).last_number, 3);
+  EXPECT_FALSE(answer(waiting).runs);
+}
+
+TEST_F(QueryPoolTest, StoppingWaitsForNoQuery) {
+  for (int i = 0; i < 4; ++i) {
+    wait_for_start(ask(kDeaf));
+  }
+  ask(kDeaf);
+  pool().stop();
+  EXPECT_FALSE(pool().submit({99, "late", {}}));
+}
+
+TEST_F(QueryPoolTest, AReaderThatDiesIsReplaced) {
+  const std::string program = use_script("exit 3");
+  EXPECT_THAT(error_of("SELECT 1"), HasSubstr("ended with exit code 3"));
+  std::filesystem::remove(program);
+  EXPECT_THAT(error_of("SELECT 1"), HasSubstr("no process can be started"));
+  std::filesystem::create_symlink(OBLIQUE_TEST_READER, program);
+  EXPECT_EQ(number_of("SELECT 1"), 1);
+}
+
+TEST_F(QueryPoolTest, AnAnswerThatIsTooLongForAFrameEndsTheReader) {
+  use_script("printf '\\377\\377\\377\\377\\0\\0\\0\\0' >&3\nexec sleep 1000");
+  EXPECT_THAT(error_of("SELECT 1"), HasSubstr("was killed by signal 9"));
+}
+
+TEST_F(QueryPoolTest, AReaderOpensADatabaseThatCouldNotBeReadAtFirst) {
+  std::filesystem::rename(path_, path_ + ".away");
+  EXPECT_THAT(error_of("SELECT 1"), HasSubstr("there is no database"));
+  std::filesystem::rename(path_ + ".away", path_);
+  EXPECT_EQ(number_of("SELECT 1"), 1);
+}
+
+TEST_F(QueryPoolTest, ALongAnswerComesWholeInBoundedChunks) {
+  const Answer answer = take_all(ask(kLong));
+  EXPECT_EQ(answer.error, "");
+  EXPECT_EQ(answer.rows, 60'000U);
+  EXPECT_EQ(answer.last_number, 60'000);
+  EXPECT_GT(answer.chunks, 10U);
+  EXPECT_TRUE(answer.in_order);
+  EXPECT_LT(answer.largest, (std::uint64_t{256} << 10U) + 4096);
+}
+
+TEST_F(QueryPoolTest, FirstRowsDoNotWaitForManyMore) {
+  const auto ticket =
+      ask("WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) "
+          "SELECT i FROM n WHERE i % 1000000 = 1");
+  EXPECT_GT(wait_for_chunks(ticket, 1).rows, 0U);
+}
+
+TEST_F(QueryPoolTest, AClientThatTakesNothingIsSentFourChunks) {
+  const auto ticket = ask(kLong);
+  wait_for_chunks(ticket, kChunksAhead);
+  take_all(ask("SELECT 1"));
+  EXPECT_EQ(answer(ticket).chunks, kChunksAhead);
+  pool().more(ticket, 1);
+  wait_for_chunks(ticket, kChunksAhead + 1);
+  take_all(ask("SELECT 1"));
+  EXPECT_EQ(answer(ticket).chunks, kChunksAhead + 1);
+}
+
+TEST_F(QueryPoolTest, AClientThatTakesNothingForTenSecondsLosesItsAnswer) {
+  const auto ticket = ask(kLong);
+  wait_for_chunks(ticket, kChunksAhead);
+  advance_ms(settings_.patience_ms - 1);
+  take_all(ask("SELECT 1"));
+  EXPECT_FALSE(answer(ticket).ended);
+  advance_ms(1);
+  EXPECT_THAT(wait_for_end(ticket).error, HasSubstr("took no rows for 10 s"));
+}
+
+TEST_F(QueryPoolTest, AClientThatTakesChunksSlowlyGetsItsWholeAnswer) {
+  const auto ticket = ask(kLong);
+  for (std::uint64_t taken = 0; !answer(ticket).ended; ++taken) {
+    wait_until(ticket, [taken](const Answer& answer) {
+      return answer.ended || answer.chunks == taken + kChunksAhead;
+    });
+    advance_ms(settings_.patience_ms - 1);
+    pool().more(ticket, taken + 1);
+  }
+  EXPECT_EQ(answer(ticket).error, "");
+  EXPECT_EQ(answer(ticket).rows, 60'000U);
+}
+
+TEST_F(QueryPoolTest, AnAnswerMayNotTakeForever) {
+  settings_.longest_answer_ms = 5000;
+  const auto ticket = ask(kLong);
+  wait_for_chunks(ticket, kChunksAhead);
+  advance_ms(5000);
+  EXPECT_THAT(wait_for_end(ticket).error, HasSubstr("took more than 5 s in all"));
+}
+
+TEST_F(QueryPoolTest, AnErrorInTheMiddleEndsTheAnswer) {
+  const Answer answer =
+      take_all(ask("WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n LIMIT 60000) "
+                   "SELECT i, hex(zeroblob(50)), CASE WHEN i = 59000 THEN json('{') END FROM n"));
+  EXPECT_THAT(answer.error, HasSubstr("malformed JSON"));
+  EXPECT_GT(answer.chunks, 5U);
+}
+
+TEST_F(QueryPoolTest, CancelledAnswersReleaseTheirReaders) {
+  settings_.queue.most_running_each = 1;
+  for (int i = 0; i < 5; ++i) {
+    const auto ticket = ask(kLong, "a");
+    wait_for_chunks(ticket, 2);
+    pool().cancel(ticket);
+  }
+  EXPECT_EQ(take_all(ask("SELECT 1", "a")).rows, 1U);
+}
+
+class QueryQueueTest : public testing::Test {
+ protected:
+  bool add(const std::string& client, const std::string& sql = "SELECT 1") {
+    QueryJob job{++last_ticket_, client, {}};
+    job.request.set_sql(sql);
+    return queue_.add(std::move(job));
+  }
+  /// Starts all queries that may run now; returns them as "client:ticket".
+  std::vector<std::string> start() {
+    std::vector<std::string> started;
+    while (const auto job = queue_.start_next()) {
+      started.push_back(job->client + ":" + std::to_string(job->ticket));
+    }
+    return started;
+  }
+
+  using Names = std::vector<std::string>;
+
+  QueryQueue queue_{QueueSettings{}};
+  std::uint64_t last_ticket_ = 0;
+};
+
+TEST_F(QueryQueueTest, OneClientNeverHasAllReaders) {
+  for (int i = 0; i < 5; ++i) {
+    add("a");
+  }
+  EXPECT_EQ(start(), (Names{"a:1", "a:2"}));
+  add("b");
+  EXPECT_EQ(start(), Names{"b:6"});
+}
+
+TEST_F(QueryQueueTest, ClientsTakeTurnsAndEachIsServedInOrderOfArrival) {
+  for (int i = 0; i < 6; ++i) {
+    add("a");
+  }
+  for (const char* client : {"b", "b", "c", "c"}) {
+    add(client);
+  }
+  EXPECT_EQ(start(), (Names{"a:1", "b:7", "c:9", "a:2"}));
+  queue_.remove(1);
+  EXPECT_EQ(start(), Names{"b:8"});
+  queue_.remove(7);
+  EXPECT_EQ(start(), Names{"c:10"});
+  queue_.remove(9);
+  EXPECT_EQ(start(), Names{"a:3"});
+}
+
+TEST_F(QueryQueueTest, TheNumberOfWaitingQueriesIsBoundedForEachClientAndForAll) {
+  for (int i = 0; i < 16; ++i) {
+    EXPECT_TRUE(add("a"));
+  }
+  EXPECT_FALSE(add("a"));
+  for (int i = 0; i < 48; ++i) {
+    EXPECT_TRUE(add("client " + std::to_string(i)));
+  }
+  EXPECT_FALSE(add("one more"));
+  start();
+  EXPECT_TRUE(add("one more"));
+}
+
+TEST_F(QueryQueueTest, TheBytesOfWaitingStatementsAreBounded) {
+  const std::string half(QueueSettings{}.most_waiting_bytes / 2 - 100, ' ');
+  ASSERT_TRUE(add("a", half));
+  ASSERT_TRUE(add("b", half));
+  EXPECT_FALSE(add("c", std::string(1000, ' ')));
+  queue_.remove(2);
+  EXPECT_TRUE(add("c", half)) << "b's query no longer waits";
+  EXPECT_FALSE(add("d", half));
+  start();
+  EXPECT_TRUE(add("d", half)) << "running queries do not count";
+}
+
+TEST_F(QueryQueueTest, ARemovedQueryIsNeverStarted) {
+  add("a");
+  add("a");
+  add("b");
+  queue_.remove(1);
+  queue_.remove(3);
+  queue_.remove(99);
+  EXPECT_EQ(start(), Names{"a:2"});
+}
+
+}  // namespace
+}  // namespace oblique::server

@@ -1,0 +1,298 @@
+#include "server/query/reader.h"
+
+#include <cstdint>
+#include <fstream>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "proto/result_message.h"
+#include "proto/wire/chunk_rows.h"
+#include "server/store/store.h"
+#include "tests/support/points.h"
+#include "tests/support/temporary_folder.h"
+#include "worker/solver/model/errors.h"
+
+namespace oblique::server {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::Not;
+
+constexpr const char* kEndless =
+    "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT count(*) FROM n";
+
+class ReaderTest : public testing::Test {
+ protected:
+  ReaderTest() {
+    const AddResults results{
+        1,     table_of(4),
+        0,     "",
+        "",    1,
+        "now", {solved_point(0), solved_point(2), protocol::failed_point(3, "no")}};
+    commit({AddStudy{1, "a", table_of(4), "2024-01-01T00:00:00.000Z"},
+            AddStudy{2, "b", table_of(2), "2024-01-02T00:00:00.000Z"}, results});
+  }
+  void commit(const std::vector<Change>& changes) { Store(path_).commit(changes); }
+
+  std::string refusal_of(const std::string& sql, const QueryLimits& limits = {}) {
+    try {
+      Reader(path_).query(sql, limits);
+    } catch (const QueryError& error) {
+      return error.what();
+    }
+    return "it ran";
+  }
+  /// The values of the first row.
+  protocol::Row row_of(const std::string& sql) { return Reader(path_).query(sql, {}).rows(0); }
+
+  test::TemporaryFolder folder_;
+  std::string path_ = folder_.file("studies.db");
+};
+
+TEST_F(ReaderTest, ValuesHaveTheirTypes) {
+  const auto reply = Reader(path_).query(
+      "SELECT 1 AS i, 0.5 AS r, CAST(x'c3a9' AS TEXT) AS t, NULL AS n, x'0aff' AS b,"
+      " CAST(x'ff' AS TEXT), CAST(x'eda080' AS TEXT), 'SC' LIKE 'sC', 'SC' LIKE 'S%' ESCAPE '!'",
+      {});
+  EXPECT_EQ(reply.columns(1), "r");
+  const auto& row = reply.rows(0);
+  EXPECT_EQ(row.values(0).integer(), 1);
+  EXPECT_EQ(row.values(1).real(), 0.5);
+  EXPECT_EQ(row.values(2).text(), "\xc3\xa9");
+  EXPECT_EQ(row.values(3).kind_case(), protocol::Value::KIND_NOT_SET);
+  EXPECT_EQ(row.values(4).text(), "x'0AFF'");
+  EXPECT_EQ(row.values(5).text(), "x'FF'") << "no UTF-8";
+  EXPECT_EQ(row.values(6).text(), "x'EDA080'") << "no UTF-8";
+  EXPECT_EQ(row.values(7).integer(), 0) << "LIKE is case-sensitive";
+  EXPECT_EQ(row.values(8).integer(), 1);
+}
+
+TEST_F(ReaderTest, AQueryOfAStudyIsAnsweredWithUnits) {
+  Reader reader(path_);
+  const auto ask = [&](const std::string& study, const std::string& select) {
+    protocol::QueryRequest request;
+    request.mutable_question()->set_study(study);
+    request.mutable_question()->add_select(select);
+    return reader.answer(request, {}).next();
+  };
+  const auto chunk = ask("a", "H, status");
+  EXPECT_EQ(chunk.chunk_rows(), 3U);
+  EXPECT_THAT(chunk.units(), ElementsAre("m", ""));
+  EXPECT_THROW(ask("no such", "H"), solver::InputError);
+  EXPECT_THROW(ask("a", "percentile(mu, 100 + 20)"), StatementError);
+  EXPECT_THROW(reader.query("SELECT percentile(mu, 120) FROM runs", {}), StatementError);
+}
+
+TEST_F(ReaderTest, StatementsThatWriteOrReachOutsideAreRefused) {
+  for (const char* sql :
+       {"DELETE FROM results", "INSERT INTO about VALUES ('x')", "UPDATE studies SET name = 'z'",
+        "DROP TABLE results", "CREATE TABLE t (x)", "CREATE TEMP TABLE t (x)",
+        "ATTACH DATABASE '/tmp/elsewhere.db' AS other", "DETACH DATABASE main",
+        "PRAGMA user_version = 10", "PRAGMA journal_mode = DELETE", "PRAGMA writable_schema = 1",
+        "VACUUM INTO '/tmp/copy.db'", "BEGIN", "SAVEPOINT s", "ANALYZE", "REINDEX",
+        "SELECT load_extension('/tmp/x.so')"}) {
+    EXPECT_NE(refusal_of(sql), "it ran") << sql;
+  }
+  EXPECT_EQ(Reader(path_).query("SELECT * FROM results", {}).rows_size(), 3);
+}
+
+TEST_F(ReaderTest, AWrongStatementIsRefusedWithTheReason) {
+  const struct {
+    const char* sql;
+    const char* reason;
+  } wrong[] = {
+      {"SELECT fts3_tokenizer('simple')", "not authorized to use function"},
+      {"SELECT fts3_tokenizer('x', x'00')", "not authorized to use function"},
+      {"SELECT load_extension('x')", "not authorized to use function"},
+      {"SELECT sqlite_log(1, 'x')", "not authorized to use function"},
+      {"SELECT rtreecheck('results')", "not authorized to use function"},
+      {"SELECT ?", "the parameter ?,"},
+      {"SELECT 1 WHERE 1 > :mu", "the parameter :mu,"},
+      {"SELECT $x", "the parameter $x,"},
+      {"SELECT 1; SELECT 2", "one statement"},
+      {"  ", "no statement"},
+      {"SELECT nothing FROM results", "nothing"},
+      {"SELECT count(*) FROM runs WHERE \"mux\" > 0.5", "in single quotes a text"},
+  };
+  for (const auto& [sql, reason] : wrong) {
+    EXPECT_THAT(refusal_of(sql), HasSubstr(reason)) << sql;
+  }
+  EXPECT_THAT(refusal_of("SELECT mux FROM runs"), Not(HasSubstr("quotes")));
+}
+
+TEST_F(ReaderTest, StatementsMayListTablesAndUseJson) {
+  for (const char* sql :
+       {"PRAGMA table_info(results)", "SELECT name FROM sqlite_schema", "SELECT 1 ; \n",
+        "SELECT json_extract('[1]', '$[0]'), abs(-1), randomblob(3), upper('x')",
+        "SELECT \"mu\" AS \"my mu\" FROM \"runs\" ORDER BY \"my mu\""}) {
+    EXPECT_EQ(refusal_of(sql), "it ran") << sql;
+  }
+  EXPECT_EQ(row_of("SELECT sum(value) FROM json_each('[1, 2, 3]')").values(0).integer(), 6);
+  EXPECT_EQ(row_of("SELECT sum(atom) FROM json_tree('[1, [2, 3]]')").values(0).integer(), 6);
+}
+
+TEST_F(ReaderTest, ARowOverTheLimitOfAReplyIsAnError) {
+  const QueryLimits limits{1000, 0, 1'000'000};
+  EXPECT_THAT(refusal_of("SELECT zeroblob(499)", limits), HasSubstr("more than the 1000 bytes"));
+  EXPECT_THAT(refusal_of("SELECT hex(zeroblob(501))", limits),
+              HasSubstr("more than the 1000 bytes"));
+  EXPECT_EQ(refusal_of("SELECT zeroblob(400)", limits), "it ran");
+  EXPECT_THAT(refusal_of("SELECT 1 UNION ALL SELECT zeroblob(499)", limits),
+              HasSubstr("more than the 1000 bytes"));
+}
+
+TEST_F(ReaderTest, AValueOverItsLimitIsAnErrorOnTheWayToo) {
+  const QueryLimits limits{1000, 0, 1 << 20U};
+  EXPECT_THAT(refusal_of("SELECT length(zeroblob(1048577))", limits),
+              HasSubstr("more than the 1 MiB allowed"));
+  EXPECT_EQ(refusal_of("SELECT length(zeroblob(1000000))", limits), "it ran");
+}
+
+TEST_F(ReaderTest, AnEndlessQueryEndsAtItsTimeLimit) {
+  EXPECT_THAT(refusal_of(kEndless, {1000, 50, 1'000'000}),
+              HasSubstr("took too long (more than 0.05 s)"));
+}
+
+TEST_F(ReaderTest, ARunningQueryCanBeInterrupted) {
+  Reader reader(path_);
+  std::thread other([&] { reader.interrupt(); });
+  EXPECT_THROW(reader.query(kEndless, kNoLimits), QueryError);
+  other.join();
+}
+
+TEST_F(ReaderTest, TheStatusOfStudiesIsDerivedFromTheRows) {
+  execute(open_database(path_, SQLITE_OPEN_READWRITE).get(),
+          "INSERT INTO reused_points VALUES (1, 'x', 1), (1, 'y', 2), (2, 'y', 5)");
+  const auto all = Reader(path_).study_status();
+  ASSERT_EQ(all.size(), 2U);
+  EXPECT_EQ(all[0].name(), "a");
+  EXPECT_EQ(all[0].points(), 4U);
+  EXPECT_EQ(all[0].solved(), 2U);
+  EXPECT_EQ(all[0].failed(), 1U);
+  EXPECT_EQ(all[0].state(), "running");
+  EXPECT_EQ(all[0].taken().points(), 3U);
+  ASSERT_EQ(all[0].taken().from_size(), 2);
+  EXPECT_EQ(all[0].taken().from(0).study(), "y");
+  EXPECT_EQ(Reader(path_).study_status("b").at(0).solved(), 0U);
+  EXPECT_THROW(Reader(path_).study_status("c"), QueryError);
+  commit({AddResults{1, table_of(4), 0, "", "", 1, "now", {solved_point(1)}}});
+  EXPECT_EQ(Reader(path_).study_status("a").at(0).state(), "done");
+}
+
+TEST_F(ReaderTest, WhatIsNoDatabaseOfOursIsRefusedByItsKind) {
+  const auto message_of = [](const std::string& path) -> std::string {
+    try {
+      const Reader reader(path);
+    } catch (const StorageError& error) {
+      return error.what();
+    }
+    return "it opened";
+  };
+  EXPECT_THAT(message_of(folder_.file("none.db")), HasSubstr("there is no database"));
+  EXPECT_THAT(message_of(folder_.file("")), HasSubstr("is a directory"));
+  std::ofstream(folder_.file("empty.db")) << "";
+  EXPECT_THAT(message_of(folder_.file("empty.db")), HasSubstr("is empty"));
+  std::ofstream(folder_.file("text.db")) << std::string(5000, 'x');
+  EXPECT_THAT(message_of(folder_.file("text.db")), HasSubstr("is not a database"));
+}
+
+/// Study "a" has points 0 to 9, of which 5 is not solved yet, and rows of a fourth of a chunk.
+class AnswerTest : public testing::Test {
+ protected:
+  AnswerTest() : store_(path_), table_(table_of(10)) {
+    std::vector<Change> changes{AddStudy{1, "a", table_, "2024-01-01T00:00:00.000Z"}};
+    for (std::uint64_t point = 0; point < 10; ++point) {
+      if (point != 5) {
+        changes.emplace_back(result_of(point));
+      }
+    }
+    store_.commit(changes);
+  }
+
+  AddResults result_of(std::uint64_t point) const {
+    return {1, table_, 0, "", "", 1, "now", {solved_point(point)}};
+  }
+  /// Only full chunks, however slow the machine is.
+  static QueryLimits full_chunks() {
+    QueryLimits limits;
+    limits.longest_chunk_ms = INT64_MAX;
+    return limits;
+  }
+  static protocol::QueryRequest wide_rows() {
+    protocol::QueryRequest request;
+    request.mutable_question()->set_study("a");
+    request.mutable_question()->add_select("point");
+    request.mutable_question()->add_select("'" + std::string(kChunkBytes / 4, 'x') + "' AS x");
+    return request;
+  }
+  /// Points of a chunk.
+  static std::vector<std::int64_t> points_of(const protocol::QueryReply& chunk) {
+    std::vector<std::int64_t> points;
+    protocol::ChunkRows rows(chunk);
+    while (rows.next()) {
+      points.push_back(rows.cell(0).integer);
+    }
+    return points;
+  }
+
+  test::TemporaryFolder folder_;
+  std::string path_ = folder_.file("studies.db");
+  Store store_;
+  std::shared_ptr<const protocol::PointTable> table_;
+};
+
+TEST_F(AnswerTest, ComesInNumberedChunksOfOneMoment) {
+  Reader reader(path_);
+  Answer answer = reader.answer(wide_rows(), full_chunks());
+  const auto first = answer.next();
+  EXPECT_THAT(points_of(first), ElementsAre(0, 1, 2, 3));
+  EXPECT_EQ(first.chunk(), 1U);
+  EXPECT_EQ(first.columns_size(), 2);
+  const std::vector<Change> more{result_of(5)};
+  store_.commit(more);
+  const auto second = answer.next();
+  EXPECT_THAT(points_of(second), ElementsAre(4, 6, 7, 8));
+  EXPECT_EQ(second.chunk(), 2U);
+  EXPECT_FALSE(second.ends());
+  const auto last = answer.next();
+  EXPECT_THAT(points_of(last), ElementsAre(9));
+  EXPECT_TRUE(last.ends());
+  EXPECT_EQ(reader.query("SELECT * FROM results", {}).rows_size(), 10);
+}
+
+TEST_F(AnswerTest, ALimitHoldsOverAllChunks) {
+  Reader reader(path_);
+  auto request = wide_rows();
+  request.mutable_question()->set_limit(6);
+  Answer answer = reader.answer(request, full_chunks());
+  EXPECT_THAT(points_of(answer.next()), ElementsAre(0, 1, 2, 3));
+  const auto last = answer.next();
+  EXPECT_THAT(points_of(last), ElementsAre(4, 6));
+  EXPECT_TRUE(last.ends());
+}
+
+TEST_F(AnswerTest, HoldsNoTransactionOnceItHasEnded) {
+  Reader reader(path_);
+  Answer answer = reader.answer(wide_rows(), full_chunks());
+  const DatabaseHandle other = open_database(path_, SQLITE_OPEN_READWRITE);
+  execute(other.get(), "SELECT * FROM studies");
+  const auto truncate_log = [&other] {
+    return sqlite3_wal_checkpoint_v2(other.get(), nullptr, SQLITE_CHECKPOINT_TRUNCATE, nullptr,
+                                     nullptr);
+  };
+  answer.next();
+  const std::vector<Change> more{result_of(5)};
+  store_.commit(more);
+  EXPECT_EQ(truncate_log(), SQLITE_BUSY);
+  while (!answer.next().ends()) {
+  }
+  EXPECT_EQ(truncate_log(), SQLITE_OK);
+}
+
+}  // namespace
+}  // namespace oblique::server

@@ -1,0 +1,256 @@
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <spdlog/fmt/fmt.h>
+
+#include "proto/recipe/axes.h"
+#include "proto/recipe/point_table.h"
+#include "server/database/open_for_reading.h"
+#include "server/query/plan.h"
+#include "server/query/point_ranges.h"
+#include "server/query/query_rules.h"
+#include "server/store/store.h"
+#include "tests/support/points.h"
+#include "tests/support/temporary_folder.h"
+#include "worker/solver/model/number.h"
+
+namespace oblique::server {
+namespace {
+
+using protocol::Axis;
+using protocol::Recipe;
+
+/// Random studies and conditions, the same on every machine.
+class Drawn {
+ public:
+  explicit Drawn(unsigned seed) : engine_(seed) {}
+
+  std::size_t below(std::size_t limit) { return engine_() % limit; }
+  bool once_in(std::size_t times) { return below(times) == 0; }
+  template <class T>
+  const T& of(const std::vector<T>& list) {
+    return list[below(list.size())];
+  }
+
+  Recipe recipe() {
+    std::vector<std::vector<Axis>> blocks(1 + below(3));
+    for (auto& axes : blocks) {
+      if (once_in(2)) {
+        axes.push_back(axis("k", 1e7, 4e7, 1 + below(3)));
+      }
+      axes.push_back(axis("H", 0.1, 1.1, 1 + below(11)));
+      axes.push_back(axis("mu", 0.0, 2.0, 1 + below(12)));
+      axes.push_back(axis("e", 0.1, 1.0, 1 + below(10)));
+    }
+    Recipe recipe = protocol::recipe_of(blocks);
+    for (protocol::Block& block : *recipe.mutable_blocks()) {
+      make_unusual(block);
+    }
+    return recipe;
+  }
+
+  /// Over what the recipe knows and what it does not, with values of its axes and others.
+  /// Most of them are conjunctions.
+  std::string condition(const Recipe& recipe, int depth = 0) {
+    const std::size_t kind = depth == 0 && !once_in(4) ? 5 : below(depth < 3 ? 9 : 4);
+    const auto inner = [&] { return condition(recipe, depth + 1); };
+    switch (kind) {
+      case 4:
+        return fmt::format("({})", inner());
+      case 5:
+        return fmt::format("{} AND {}", inner(), inner());
+      case 6:
+        return fmt::format("{} or {}", inner(), inner());
+      case 7:
+        return once_in(3) ? fmt::format("NOT {}", inner())
+                          : fmt::format("({}) AND ({})", inner(), inner());
+      case 8:
+        return once_in(4)
+                   ? fmt::format("CASE WHEN {} THEN {} ELSE {} END", inner(), inner(), inner())
+                   : fmt::format("({}) OR ({})", inner(), inner());
+      default:
+        return comparison(recipe);
+    }
+  }
+
+ private:
+  /// Axes side by side, a sample, an axis that follows from others, or a filter; or none of it.
+  void make_unusual(protocol::Block& block) {
+    auto& e = *block.mutable_axes(block.axes_size() - 1);
+    switch (below(6)) {
+      case 0:
+        for (Axis& side : *block.mutable_axes()) {
+          side = once_in(4) ? protocol::listed(side.key(), {0.5}) : axis(side.key(), 0.1, 0.9, 5);
+        }
+        block.set_zip(true);
+        break;
+      case 1:
+        e.Clear();
+        e.set_key("e");
+        e.mutable_distribution()->set_from(0.2);
+        e.mutable_distribution()->set_to(0.9);
+        block.mutable_sample()->set_count(40);
+        block.mutable_sample()->set_seed(below(1000));
+        break;
+      case 2:
+        e.Clear();
+        e.set_key("e");
+        e.set_expression("0.5 + H / 4");
+        break;
+      case 3:
+        block.set_where("mu < 0.5 * e + H");
+        break;
+      default:
+        break;
+    }
+  }
+
+  Axis axis(const std::string& key, double from, double to, std::size_t count) {
+    if (count > 1 && once_in(2)) {
+      Axis range = protocol::range(key, from, to, count);
+      if (from > 0.0 && once_in(2)) {
+        range.set_spacing(protocol::SPACING_LOGARITHMIC);
+      }
+      return range;
+    }
+    std::vector<double> values;
+    for (std::size_t i = 0; i < count; ++i) {
+      values.push_back(from + (to - from) * static_cast<double>(i) / static_cast<double>(count));
+    }
+    std::shuffle(values.begin(), values.end(), engine_);
+    return protocol::listed(key, values);
+  }
+
+  std::string comparison(const Recipe& recipe) {
+    const auto& block =
+        recipe.blocks(static_cast<int>(below(static_cast<std::size_t>(recipe.blocks_size()))));
+    const auto& drawn =
+        block.axes(static_cast<int>(below(static_cast<std::size_t>(block.axes_size()))));
+    const std::vector<std::string> others{"fn_peak_N", "point", "duration_s"};
+    const bool is_other = once_in(5);
+    const std::string column = is_other ? of(others) : drawn.key();
+    const auto value = [&] {
+      if (column == "point") {
+        return std::to_string(below(200));
+      }
+      const double chosen = protocol::has_own_values(drawn)
+                                ? protocol::axis_value(drawn, below(protocol::axis_size(drawn)))
+                                : 0.5 + static_cast<double>(below(10)) / 40.0;
+      return solver::exact_number(once_in(4) ? chosen * 1.01 : chosen);
+    };
+    const std::vector<std::string> signs{"=", "==", "<", "<=", ">", ">=", "<>", "!=", "IS"};
+    switch (below(5)) {
+      case 0:
+        return fmt::format("{} BETWEEN {} AND {}", column, value(), value());
+      case 1:
+        return fmt::format("{}{} IN ({}, {}, {})", column, once_in(4) ? " NOT" : "", value(),
+                           value(), value());
+      case 2:
+        return fmt::format("{} {} {}", value(), of(signs), column);
+      default:
+        return fmt::format("{} {} {}", column, of(signs), value());
+    }
+  }
+
+  std::mt19937 engine_;
+};
+
+std::vector<std::int64_t> first_numbers(sqlite3* database, const std::string& sql) {
+  Statement statement(database, sql);
+  std::vector<std::int64_t> numbers;
+  while (statement.step()) {
+    numbers.push_back(statement.integer(0));
+  }
+  return numbers;
+}
+
+/// Stores every fourth study in part, and of a filtered one, as a server does, how many points are
+/// left in.
+void store_study(Store& store, std::uint64_t number, const Recipe& recipe) {
+  protocol::PointTable surveyed(recipe);
+  surveyed.survey([] { return true; });
+  const auto table = std::make_shared<const protocol::PointTable>(std::move(surveyed));
+  AddResults results{number, table, 0, "", "", 1, "now", {}};
+  for (std::uint64_t point = 0; point < table->size(); ++point) {
+    if (table->is_left_in(point) && (number % 4 != 0 || point % 3 != 0)) {
+      results.results.push_back(solved_point(point));
+    }
+  }
+  store.commit(std::vector<Change>{
+      AddStudy{number, "s" + std::to_string(number), table, "2024-01-01T00:00:00.000Z"}, results});
+}
+
+/// Whether the statement reads fewer points than the study has.
+bool is_narrowed(const Recipe& recipe, const protocol::StudyQuery& question,
+                 const std::string& statement) {
+  return points_in(point_ranges(recipe, question.where())) < points_of(recipe) &&
+         statement.find(" AND 1)") == std::string::npos;
+}
+
+bool has_filter(const Recipe& recipe) {
+  return std::any_of(recipe.blocks().begin(), recipe.blocks().end(),
+                     [](const protocol::Block& block) { return !block.where().empty(); });
+}
+
+TEST(SameRows, APlanGivesTheRowsThatSqliteGivesWithoutIt) {
+  constexpr std::uint64_t kStudies = 10;
+  constexpr int kConditions = 60;
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("studies.db");
+  Drawn drawn(7);
+  std::vector<Recipe> recipes;
+  {
+    Store store(path);
+    for (std::uint64_t number = 1; number <= kStudies; ++number) {
+      recipes.push_back(drawn.recipe());
+      store_study(store, number, recipes.back());
+    }
+  }
+  const auto database = open_for_reading(path).database;
+  restrict_to_reading(database.get());
+  int of_all = 0;
+  int of_filtered = 0;
+  int narrowed_of_all = 0;
+  int narrowed_of_filtered = 0;
+  for (std::uint64_t number = 1; number <= kStudies; ++number) {
+    const Recipe& recipe = recipes[number - 1];
+    for (int i = 0; i < kConditions; ++i) {
+      protocol::StudyQuery question;
+      question.set_study("s" + std::to_string(number));
+      question.set_where(drawn.condition(recipe));
+      question.add_select("point");
+      question.set_order(
+          drawn.of<std::string>({"", "", "point DESC", "mu, H DESC, e, k, point", "mu, point",
+                                 "H DESC, mu, point", "e DESC, point"}));
+      if (drawn.once_in(3)) {
+        question.set_limit(drawn.below(20));
+      }
+      const std::string brute = fmt::format(
+          "SELECT point FROM runs WHERE study_id = {} AND ({}) ORDER BY {} LIMIT {}", number,
+          question.where(), question.order().empty() ? "point" : question.order(),
+          question.has_limit() ? static_cast<std::int64_t>(question.limit()) : -1);
+      const auto planned = plan(database.get(), question);
+      ASSERT_EQ(first_numbers(database.get(), planned.statement),
+                first_numbers(database.get(), brute))
+          << planned.statement << '\n'
+          << brute;
+      const int is_narrow = is_narrowed(recipe, question, planned.statement) ? 1 : 0;
+      ++of_all;
+      narrowed_of_all += is_narrow;
+      of_filtered += has_filter(recipe) ? 1 : 0;
+      narrowed_of_filtered += has_filter(recipe) ? is_narrow : 0;
+    }
+  }
+  EXPECT_GT(narrowed_of_all, of_all / 4);
+  EXPECT_GT(of_filtered, 50);
+  EXPECT_GT(narrowed_of_filtered, of_filtered / 4);
+}
+
+}  // namespace
+}  // namespace oblique::server

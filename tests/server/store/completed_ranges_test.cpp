@@ -1,0 +1,173 @@
+#include "server/store/completed_ranges.h"
+
+#include <random>
+#include <set>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/store/schema.h"
+#include "tests/server/store/store_fixture.h"
+
+namespace oblique::server {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+class CompletedRangesTest : public StoreFixture {
+ protected:
+  /// "first+points" of each range of study 1.
+  std::vector<std::string> ranges() const {
+    return rows(
+        "SELECT first_point || '+' || points FROM completed_ranges WHERE study_id = 1"
+        " ORDER BY first_point");
+  }
+};
+
+TEST_F(CompletedRangesTest, AdjacentPointsAreOneRangeInWhateverOrderTheyCome) {
+  const auto study = study_of(20);
+  commit({study, worker(1), solved(study, {3, 4, 9})});
+  EXPECT_THAT(ranges(), ElementsAre("3+2", "9+1"));
+  commit({solved(study, {8, 10}), solved(study, {2})});
+  EXPECT_THAT(ranges(), ElementsAre("2+3", "8+3"));
+  commit({solved(study, {5, 6, 7})});
+  EXPECT_THAT(ranges(), ElementsAre("2+9"));
+  commit({solved(study, {0, 1, 2, 3, 11, 19})});  // some again
+  EXPECT_THAT(ranges(), ElementsAre("0+12", "19+1"));
+}
+
+TEST_F(CompletedRangesTest, ATransactionThatFailsAddsNothing) {
+  const auto study = study_of(9);
+  commit({study, worker(1)});
+  EXPECT_THROW(commit({solved(study, {1, 2}), study_of(3, 2, "a")}), StorageError);
+  EXPECT_THAT(ranges(), IsEmpty());
+  commit({solved(study, {5})});
+  EXPECT_THAT(ranges(), ElementsAre("5+1"));
+}
+
+TEST_F(CompletedRangesTest, RetriedFailuresLeaveTheirRangeAndTheStudyStaysCounted) {
+  const auto study = study_of(9);
+  commit({study, worker(1), solved(study, {0, 1, 2, 6, 7, 8}), failed(study, {3, 4, 5})});
+  EXPECT_THAT(ranges(), ElementsAre("0+9"));
+  commit({ForgetFailures{1, IntervalSet(4, 7), "now"}});
+  EXPECT_THAT(ranges(), ElementsAre("0+4", "6+3")) << "only failures are forgotten";
+  // What fails in a transaction can be forgotten in it.
+  commit({failed(study, {4}), ForgetFailures{1, IntervalSet(4, 5), "now"}});
+  EXPECT_THAT(ranges(), ElementsAre("0+4", "6+3"));
+  EXPECT_THAT(rows("SELECT counted FROM studies"), ElementsAre("1"));
+}
+
+TEST_F(CompletedRangesTest, RowsDeletedByHandAreOpenAfterTheNextStart) {
+  const auto study = study_of(9);
+  commit({study, worker(1), solved(study, {0, 1, 2, 3, 4, 5, 6, 7, 8}),
+          SetStudyState{1, StudyState::kDone, "now"}});
+  close();
+  by_hand("DELETE FROM results WHERE point IN (3, 4)");
+  EXPECT_THAT(rows("SELECT counted FROM studies"), ElementsAre("0"));
+  IntervalSet left(0, 9);
+  left.erase(3, 5);
+  EXPECT_EQ(store().studies().at(0).settled, left);
+  EXPECT_THAT(ranges(), ElementsAre("0+3", "5+4"));
+  EXPECT_THAT(rows("SELECT counted FROM studies"), ElementsAre("1"));
+}
+
+TEST_F(CompletedRangesTest, RowsDeletedByHandWhileAServerRunsStayMarkedBesideItsOwnDeletions) {
+  const auto study = study_of(9);
+  commit({study, worker(1), solved(study, {0, 1, 2, 3}), failed(study, {8})});
+  by_hand("DELETE FROM results WHERE point = 1");
+  commit({ForgetFailures{1, IntervalSet(8, 9), "now"}});
+  commit({solved(study, {5})});
+  EXPECT_THAT(rows("SELECT counted FROM studies"), ElementsAre("0"));
+  EXPECT_EQ(store().studies().at(0).settled.size(), 4U);
+  EXPECT_THAT(ranges(), ElementsAre("0+1", "2+2", "5+1"));
+}
+
+TEST_F(CompletedRangesTest, AreReadAsTheyAreWrittenAndNotForStudiesToBeCountedAgain) {
+  const auto study = study_of(9);
+  const auto other = study_of(9, 2, "b");
+  commit({study, other, worker(1), solved(study, {0, 1, 4}), solved(other, {7})});
+  by_hand("DELETE FROM results WHERE study_id = 2");
+  IntervalSet points(0, 2);
+  points.insert(4);
+  const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READONLY);
+  const auto all = noted_points(database.get());
+  EXPECT_EQ(all.size(), 2U);
+  EXPECT_EQ(all.at(1), points);
+  EXPECT_EQ(all.at(2), std::nullopt);
+  EXPECT_EQ(noted_points_of(database.get(), 1), points);
+  EXPECT_EQ(noted_points_of(database.get(), 2), std::nullopt);
+  EXPECT_EQ(noted_points_of(database.get(), 3), std::nullopt);
+  EXPECT_EQ(points_with_row(database.get(), 1, {1, 9}).size(), 2U);
+}
+
+/// The ranges of a study in an open database.
+IntervalSet written_ranges(sqlite3* database, std::uint64_t study, std::size_t& count) {
+  Statement row(database, "SELECT first_point, points FROM completed_ranges WHERE study_id = ?");
+  row.bind(1, study);
+  IntervalSet points;
+  for (count = 0; row.step(); ++count) {
+    const auto begin = static_cast<std::uint64_t>(row.integer(0));
+    points.insert(begin, begin + static_cast<std::uint64_t>(row.integer(1)));
+  }
+  return points;
+}
+
+/// Random additions and removals of points and ranges, against a set of points.
+TEST(CompletedRanges, RandomChangesLeaveThePointsOfASetInTheFewestRanges) {
+  constexpr std::uint64_t kPoints = 60;
+  const DatabaseHandle database = open_database(":memory:", SQLITE_OPEN_READWRITE);
+  create_tables(database.get());
+  CompletedRanges ranges(database.get());
+  for (unsigned seed = 1; seed <= 50; ++seed) {
+    std::mt19937 random(seed);
+    std::set<std::uint64_t> expected;
+    for (int step = 0; step < 100; ++step) {
+      const std::uint64_t begin = random() % kPoints;
+      const std::uint64_t end = std::min<std::uint64_t>(kPoints, begin + 1 + random() % 12);
+      switch (random() % 4) {
+        case 0:
+          ranges.add(seed, begin);
+          expected.insert(begin);
+          break;
+        case 1:  // as points that a condition leaves out
+          ranges.add(seed, Interval{begin, end});
+          for (std::uint64_t point = begin; point < end; ++point) {
+            expected.insert(point);
+          }
+          break;
+        case 2:  // rolled back
+          ranges.add(seed, Interval{begin, end});
+          ranges.forget();
+          break;
+        default:
+          IntervalSet gone(begin, end);
+          gone.insert(random() % kPoints);
+          ranges.remove(seed, gone);
+          gone.for_each([&](const Interval& interval) {
+            expected.erase(expected.lower_bound(interval.begin),
+                           expected.lower_bound(interval.end));
+          });
+      }
+      ranges.flush();
+      IntervalSet points;
+      for (const std::uint64_t point : expected) {
+        points.insert(point);
+      }
+      std::size_t count = 0;
+      ASSERT_EQ(written_ranges(database.get(), seed, count), points)
+          << "seed " << seed << ", step " << step;
+      ASSERT_EQ(count, points.intervals()) << "seed " << seed << ", step " << step;
+      IntervalSet overlapping;
+      points.for_each([&](const Interval& range) {
+        if (range.begin < end && range.end > begin) {
+          overlapping.insert(range.begin, range.end);
+        }
+      });
+      ASSERT_EQ(ranges.overlapping(seed, {begin, end}), overlapping);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace oblique::server
