@@ -10,8 +10,8 @@
 
 #include <gtest/gtest.h>
 
-#include "server/query/columns.h"
 #include "server/database/sqlite.h"
+#include "server/query/columns.h"
 #include "server/store/schema.h"
 #include "server/store/store.h"
 #include "tests/support/temporary_folder.h"
