@@ -24,7 +24,7 @@ ConnectionSettings at(const std::string& url, std::int64_t timeout_ms) {
 constexpr std::int64_t kLong_ms = 600'000;
 
 TEST(Connection, SaysWhereItLookedAndWhatToDoWhenNobodyAnswers) {
-  const test::ReservedPort nobody;
+  const oblique::test::ReservedPort nobody;
   const auto url = nobody.url();
   Connection connection(at(url, 100));
   try {
@@ -59,7 +59,7 @@ TEST(Connection, RefusesAnAddressThatIsNone) {
 }
 
 TEST(Connection, StopsWaitingWhenToldTo) {
-  const test::ReservedPort nobody;
+  const oblique::test::ReservedPort nobody;
   int asked = 0;
   Connection connection(at(nobody.url(), kLong_ms), [&asked] { return ++asked < 3; });
   EXPECT_THROW(connection.workers(), Interrupted);
@@ -114,7 +114,7 @@ std::vector<std::string> workers_reply(const protocol::ClientRequest& request,
 }
 
 TEST(Connection, SendsARequestAgainThatTheServerTookWithItWhenItDied) {
-  const test::ReservedPort port;
+  const oblique::test::ReservedPort port;
   std::atomic<std::uint64_t> taken{0};
   auto server = std::make_unique<ScriptedServer>(
       [&](const protocol::ClientRequest& request) {
@@ -185,7 +185,7 @@ TEST(Connection, PassesOverASecondAnswerToAnEarlierQuestion) {
 }
 
 TEST(Connection, ThatIsToWaitSaysThatTheServerIsSilentAndThatItIsBack) {
-  const test::ReservedPort port;
+  const oblique::test::ReservedPort port;
   std::unique_ptr<ScriptedServer> server;
   std::vector<std::string> sentences;
   const Tell tell = [&](const std::string& sentence) {

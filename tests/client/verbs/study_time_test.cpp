@@ -16,6 +16,7 @@ const StudyCost kCost{.threads = 2, .falls_at_once = 8, .falls_s = 1.6, .contact
 
 protocol::StudySize size_of(std::uint64_t points, std::uint64_t falls) {
   return {.points = points,
+          .points_estimated = false,
           .models = 1,
           .falls = falls,
           .falls_estimated = false,

@@ -169,5 +169,25 @@ TEST(CompletedRanges, RandomChangesLeaveThePointsOfASetInTheFewestRanges) {
   }
 }
 
+TEST_F(CompletedRangesTest, PointsThatAConditionLeavesOutAreCompletedUntilRowsAreCountedAgain) {
+  AddStudy study = study_of(10);
+  protocol::Recipe recipe = study.table->recipe();
+  recipe.mutable_blocks(0)->set_where("mu > 0.4");
+  study.table = std::make_shared<const protocol::PointTable>(recipe);
+  AddResults some = solved(study, {4, 5, 8});
+  some.left_out.insert(0, 3);
+  AddResults only_ranges = solved(study, {});
+  only_ranges.left_out.insert(3);
+  commit({study, worker(1), some});
+  commit({only_ranges});
+  EXPECT_THAT(ranges(), ElementsAre("0+6", "8+1"));
+  EXPECT_EQ(store().studies().at(0).settled.size(), 7U);
+  EXPECT_EQ(store().studies().at(0).left_out, 4U);
+  close();
+  by_hand("DELETE FROM results WHERE point = 5");
+  EXPECT_EQ(store().studies().at(0).settled.size(), 2U) << "workers name the others again";
+  EXPECT_EQ(store().studies().at(0).left_out, 0U);
+}
+
 }  // namespace
 }  // namespace oblique::server

@@ -266,10 +266,7 @@ TEST_F(StoreTest, ARecipeThatCannotBeReadIsAnErrorThatNamesTheStudy) {
 TEST_F(StoreTest, CompletedPointsOfAStudyWithAConditionMayLackRows) {
   protocol::Recipe recipe = table_of(5)->recipe();
   recipe.mutable_blocks(0)->set_where("mu > 0.3");
-  auto table = protocol::PointTable(recipe);
-  table.survey([] { return true; });
-  const AddStudy study{1, "a", std::make_shared<const protocol::PointTable>(std::move(table)),
-                       "now"};
+  const AddStudy study{1, "a", std::make_shared<const protocol::PointTable>(recipe), "now"};
   commit({study, worker(1), solved(study, {2, 3, 4})});
   close();
   by_hand("UPDATE completed_ranges SET first_point = 0, points = 5");
