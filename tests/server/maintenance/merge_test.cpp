@@ -443,6 +443,7 @@ TEST_F(MergeTest, CompletedPointsThatAFilterLeavesOutAreUnited) {
 TEST_F(MergeTest, APointThatNoFilterLeavesOutIsNotCompletedWithoutARow) {
   store("one", {{.table = filtered_table("mu > 0.5"), .first = 5, .end = 7}});
   texts("one", "INSERT INTO completed_ranges VALUES (1, 8, 2)");
+  texts("one", "UPDATE studies SET left_out = 2");
   merge("one");
   EXPECT_EQ(ranges("all"), "5+2");
 }
