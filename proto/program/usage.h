@@ -2,7 +2,10 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -21,6 +24,13 @@ CLI::Validator number_between(double least, double largest);
 
 /// A check for whole numbers from `least` on that 64 bits hold.
 CLI::Validator whole_number_from(std::int64_t least);
+
+/// Notes the values that an option may have, for completion; whoever reads the value checks it.
+/// Returns `option`.
+CLI::Option* note_choices(CLI::Option* option, std::span<const std::string_view> choices);
+
+/// The noted choices; empty where there are none.
+std::vector<std::string> choices_of(CLI::Option& option);
 
 /// What is wrong with what was typed, as a sentence: a word too many with the nearest that `verb`
 /// knows (of `app`, or `app` itself), or what the library says, in words that say what to do.
