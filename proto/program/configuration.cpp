@@ -5,6 +5,8 @@
 #include <cctype>
 #include <cstdlib>
 #include <filesystem>
+#include <map>
+#include <span>
 #include <sstream>
 #include <string_view>
 
@@ -17,7 +19,7 @@
 #include "proto/suggestion.h"
 #include "proto/text.h"
 #include "proto/toml_reader.h"
-#include "worker/solver/model/number.h"
+#include "worker/solver/model/errors.h"
 
 namespace oblique::protocol {
 namespace {
@@ -62,16 +64,9 @@ bool is_typed(const CLI::Option& option) {
 
 /// The value of a key as it would be typed.
 std::string typed_value(const TomlReader& file, std::string_view key, const toml::node& node) {
-  std::string value;
-  if (const auto* text = node.as_string()) {
-    value = text->get();
-  } else if (const auto* whole = node.as_integer()) {
-    value = std::to_string(whole->get());
-  } else if (const auto* real = node.as_floating_point()) {
-    value = solver::exact_number(real->get());
-  } else if (const auto* truth = node.as_boolean()) {
-    value = truth->get() ? "true" : "false";
-  }
+  const std::string value = node.is_string()                        ? *node.value<std::string>()
+                            : node.is_number() || node.is_boolean() ? shown(node)
+                                                                    : "";
   if (value.empty()) {
     file.fail(node, fmt::format("{} = {} is not allowed: it must be a number, true, false, a text "
                                 "that is not empty, or a list of these",
@@ -181,7 +176,18 @@ std::optional<int> Configuration::parse(int argc, const char* const* argv) {
     return exit_code;
   }
   try {
-    std::vector<std::string> words = weaker_words();
+    std::vector<std::string> words;
+    if (!without_places_) {
+      read_file();
+      read_environment();
+    }
+    for (const Setting& setting : settings_) {
+      for (const std::string& value : setting.values) {
+        if (!is_typed(*setting.option)) {
+          words.push_back(fmt::format("{}={}", setting.option->get_name(), value));
+        }
+      }
+    }
     for (const char* const* word = argv + 1; word < argv + argc; ++word) {
       words.push_back(quiet_ != nullptr && quiet_->check_name(*word) ? "--log-level=warning"
                                                                      : *word);
@@ -198,25 +204,22 @@ std::optional<int> Configuration::parse(int argc, const char* const* argv) {
 
 /// Also gives --help its footer, with an option of several words as example.
 void Configuration::find_settings() {
-  std::string example;
   for (CLI::Option* option : app_.get_options()) {
-    if (!option->get_configurable()) {
-      continue;
-    }
-    const std::string flag = option->get_name();
-    const std::string key = key_of(flag);
-    settings_.emplace_back(key, option);
-    // CLI11 would give the file precedence over it.
-    shared_variables_[option] = option->get_envname();
-    option->envname("");
-    if (example.empty() && !is_switch(*option) && key.find('_') != std::string::npos) {
-      example = fmt::format(
-          "Every option may also be an environment variable ({}: {}{}) or a key of the file ({});\n"
-          "--print-config shows the effective settings.",
-          flag, places_.environment_prefix, variable_form(flag), key);
+    if (option->get_configurable()) {
+      settings_.push_back({option, key_of(option->get_name()), option->get_envname()});
+      option->envname("");  // CLI11 would give the file precedence over it
     }
   }
-  app_.footer(example);
+  const auto example = std::find_if(settings_.begin(), settings_.end(), [](const Setting& setting) {
+    return !is_switch(*setting.option) && setting.key.find('_') != std::string::npos;
+  });
+  if (example != settings_.end()) {
+    const std::string flag = example->option->get_name();
+    app_.footer(fmt::format(
+        "Every option may also be an environment variable ({}: {}{}) or a key of the file ({});\n"
+        "--print-config shows the effective settings.",
+        flag, places_.environment_prefix, variable_form(flag), example->key));
+  }
 }
 
 std::string Configuration::key_of(const std::string& flag) const {
@@ -241,30 +244,30 @@ std::string Configuration::file_to_read() const {
   return exists || unknown ? places_.default_file : "";
 }
 
-std::map<std::string, Configuration::FileValue> Configuration::read_file() const {
+void Configuration::read_file() {
   const std::string path = file_to_read();
-  std::map<std::string, FileValue> values;
   if (path.empty()) {
-    return values;
+    return;
   }
   constexpr std::size_t kMostBytes = std::size_t{1} << 20U;
   const TomlReader file(path);
   const toml::table top = file.parse(read_small_file(path, "the configuration file", kMostBytes));
-  std::vector<std::string_view> keys;
-  for (const auto& [key, option] : settings_) {
-    keys.emplace_back(key);
-  }
-  const auto take = [&](const std::string& key, const toml::key& at, const toml::node& node) {
-    if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
-      file.fail(at, fmt::format("there is no setting {}{}", excerpt(key), did_you_mean(key, keys)));
+  const auto take = [&](const std::string& name, const toml::key& key, const toml::node& node) {
+    std::vector<std::string_view> known;
+    for (Setting& setting : settings_) {
+      if (setting.key == name) {
+        setting.values = typed_values(file, name, node);
+        setting.place = file.before(key.source());
+        return;
+      }
+      known.emplace_back(setting.key);
     }
-    values[key] = {typed_values(file, key, node), file.before(at.source())};
+    file.fail(key,
+              fmt::format("there is no setting {}{}", excerpt(name), did_you_mean(name, known)));
   };
   for (const auto& [key, node] : top) {
     const std::string name(key.str());
-    const bool is_table =
-        std::find(places_.tables.begin(), places_.tables.end(), name) != places_.tables.end();
-    if (!is_table) {
+    if (std::find(places_.tables.begin(), places_.tables.end(), name) == places_.tables.end()) {
       take(name, key, node);
       continue;
     }
@@ -272,44 +275,29 @@ std::map<std::string, Configuration::FileValue> Configuration::read_file() const
       take(name + "." + std::string(inner.str()), inner, value);
     }
   }
-  return values;
 }
 
-/// The values of file and environment as words of a command line, without those that flags replace.
-std::vector<std::string> Configuration::weaker_words() {
-  std::map<std::string, FileValue> written = read_file();
-  std::vector<std::string> words;
-  for (const auto& [key, option] : settings_) {
-    if (is_typed(*option)) {
-      continue;
-    }
-    const std::string flag = option->get_name();
-    FileValue given = written[key];
-    const std::string own = places_.environment_prefix + variable_form(flag);
-    for (const std::string& name : {shared_variables_[option], own}) {
-      if (const std::string value = without_places_ ? "" : variable(name); !value.empty()) {
-        given = {{value}, fmt::format("environment variable {}: ", name)};
+void Configuration::read_environment() {
+  for (Setting& setting : settings_) {
+    const std::string own = places_.environment_prefix + variable_form(setting.option->get_name());
+    for (const std::string& name : {setting.shared_variable, own}) {
+      if (const std::string value = variable(name); !value.empty()) {
+        setting.values = {value};
+        setting.place = fmt::format("environment variable {}: ", name);
       }
     }
-    for (const std::string& value : given.values) {
-      words.push_back(fmt::format("{}={}", flag, value));
-      place_of_[flag] = given.place;
-    }
   }
-  return words;
 }
 
 /// The error with the place of the value that it is about, unless that was typed.
 std::string Configuration::located(const std::string& error) const {
-  for (const auto& [flag, place] : place_of_) {
+  for (const Setting& setting : settings_) {
+    const std::string flag = setting.option->get_name();
     const auto at = error.find(flag);
-    const auto end = at + flag.size();
-    const bool is_whole =
-        at != std::string::npos &&
-        (end == error.size() ||
-         (error[end] != '-' && std::isalnum(static_cast<unsigned char>(error[end])) == 0));
-    if (is_whole) {
-      return place + error;
+    if (at != std::string::npos && !setting.place.empty() &&
+        std::string("-_abcdefghijklmnopqrstuvwxyz").find(error[at + flag.size()]) ==
+            std::string::npos) {
+      return setting.place + error;
     }
   }
   return error;
@@ -317,26 +305,26 @@ std::string Configuration::located(const std::string& error) const {
 
 std::string Configuration::printed() const {
   const std::string path = file_to_read();
-  std::string text = fmt::format("# {}: the effective settings; {}\n", app_.get_name(),
-                                 path.empty() ? "no file was read" : "read from " + visible(path));
+  std::string top = fmt::format("# {}: the effective settings; {}\n", app_.get_name(),
+                                path.empty() ? "no file was read" : "read from " + visible(path));
   std::map<std::string, std::string> tables;
-  for (const auto& [key, option] : settings_) {
-    const auto dot = key.find('.');
-    const std::string name = dot == std::string::npos ? key : key.substr(dot + 1);
-    std::vector<std::string> values = effective_values(*option);
+  for (const Setting& setting : settings_) {
+    const CLI::Option& option = *setting.option;
+    const auto dot = setting.key.find('.');
+    std::string& text = dot == std::string::npos ? top : tables[setting.key.substr(0, dot)];
+    const std::string name = setting.key.substr(dot + 1);  // npos is -1
+    std::vector<std::string> values = effective_values(option);
     for (std::string& value : values) {
-      value = toml_value(*option, value);
+      value = toml_value(option, value);
     }
-    const bool is_list = takes_list(*option);
-    (dot == std::string::npos ? text : tables[key.substr(0, dot)]) +=
-        values.empty() ? fmt::format("# {} is not set\n", name)
-        : is_list      ? fmt::format("{} = [{}]\n", name, fmt::join(values, ", "))
-                       : fmt::format("{} = {}\n", name, values.back());
+    text += values.empty()       ? fmt::format("# {} is not set\n", name)
+            : takes_list(option) ? fmt::format("{} = [{}]\n", name, fmt::join(values, ", "))
+                                 : fmt::format("{} = {}\n", name, values.back());
   }
   for (const auto& [table, lines] : tables) {
-    text += fmt::format("\n[{}]\n{}", table, lines);
+    top += fmt::format("\n[{}]\n{}", table, lines);
   }
-  return text;
+  return top;
 }
 
 }  // namespace oblique::protocol

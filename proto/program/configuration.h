@@ -1,9 +1,7 @@
 #pragma once
 
-#include <map>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -46,16 +44,19 @@ class Configuration {
   std::string printed() const;
 
  private:
-  struct FileValue {
-    std::vector<std::string> values;
-    std::string place;  ///< "server.toml:3:1: "
+  struct Setting {
+    CLI::Option* option;
+    std::string key;                       ///< "limits.connections"
+    std::string shared_variable;           ///< of several programs; empty: none
+    std::vector<std::string> values = {};  ///< of file or environment
+    std::string place = {};                ///< of these values, as "server.toml:3:1: "
   };
 
   void find_settings();
   std::string key_of(const std::string& flag) const;
   std::string file_to_read() const;
-  std::map<std::string, FileValue> read_file() const;
-  std::vector<std::string> weaker_words();
+  void read_file();
+  void read_environment();
   std::string located(const std::string& error) const;
 
   CLI::App& app_;
@@ -64,9 +65,7 @@ class Configuration {
   bool without_places_ = false;
   bool print_ = false;
   CLI::Option* quiet_ = nullptr;
-  std::vector<std::pair<std::string, CLI::Option*>> settings_;  ///< by key, in the order of --help
-  std::map<const CLI::Option*, std::string> shared_variables_;  ///< of several programs
-  std::map<std::string, std::string> place_of_;  ///< by flag; of values that were not typed
+  std::vector<Setting> settings_;  ///< in the order of --help
 };
 
 }  // namespace oblique::protocol

@@ -65,8 +65,8 @@ std::optional<std::int64_t> moment_s(std::string text) {
     parts.tm_isdst = -1;
     const std::int64_t moment = is_local ? std::mktime(&parts) : timegm(&parts) - written.tm_gmtoff;
     // A day that the month does not have has become one of the next month.
-    const bool is_sound = parts.tm_mday == written.tm_mday &&
-                          std::abs(written.tm_gmtoff) < kUnits.front().length_s;
+    const bool is_sound =
+        parts.tm_mday == written.tm_mday && std::abs(written.tm_gmtoff) < kUnits.front().length_s;
     return is_sound ? std::optional(moment) : std::nullopt;
   }
   return std::nullopt;

@@ -124,7 +124,8 @@ TEST_F(ConfigurationTest, NoConfigLeavesFilesAndEnvironmentOut) {
   EXPECT_EQ(options_.port, 7600);
   EXPECT_EQ(options_.db, "default.db");
   EXPECT_EQ(options_.keys, "");
-  expect_refused({"--no-config", "--config", folder_.file("default.toml")}, "--config excludes --no-config");
+  expect_refused({"--no-config", "--config", folder_.file("default.toml")},
+                 "--config excludes --no-config");
 }
 
 TEST_F(ConfigurationTest, AVariableWithoutValueIsNotSet) {
