@@ -39,7 +39,6 @@ constexpr std::array<std::string_view, 5> kPeersFields{"role", "name", "public",
                                                        "server"};
 constexpr std::array<std::string_view, 4> kEntryFields{"name", "role", "public", "added_at"};
 constexpr std::array<std::string_view, 1> kListFields{"key"};
-constexpr std::array kPeers{Role::kClient, Role::kWorker, Role::kReader};
 
 /// The fields of one table of a file. Errors never show a value, which may be a secret.
 class KeyFields {
@@ -174,20 +173,37 @@ void replace_file(const Descriptor& locked, const std::string& path, std::string
   });
 }
 
-/// Whoever can read a secret key can pass for its owner.
-void check_mode(const std::string& path) {
+/// Refuses a file or folder that has one of the mode bits `refused`; reading it reports why it
+/// cannot be read.
+void refuse_mode(const std::string& what, const std::string& path, mode_t refused,
+                 std::string_view risk, std::string_view remedy) {
   struct stat file {};
-  if (::stat(path.c_str(), &file) != 0) {
+  if (::stat(path.c_str(), &file) == 0 && (file.st_mode & refused) != 0) {
     throw solver::InputError(
-        fmt::format("the key file {} cannot be read: {}", path, std::strerror(errno)));
+        fmt::format("{} {} has mode {:04o}: {}, so it is not used. Mend it with: chmod {} '{}'",
+                    what, path, file.st_mode & 07777U, risk, remedy, path));
   }
-  const bool is_ours = file.st_uid == ::geteuid();
-  const mode_t refused = is_ours ? S_IRWXG | S_IRWXO : S_IRWXO;
-  if (S_ISREG(file.st_mode) && (file.st_mode & refused) != 0) {
-    throw solver::InputError(
-        fmt::format("the key file {} has mode {:04o}: others than its owner can use the secret "
-                    "key in it, so it is not used. Mend it with: chmod {} '{}'",
-                    path, file.st_mode & 07777U, is_ours ? "600" : "o=", path));
+}
+
+/// Whoever can read a secret key can pass for its owner.
+void check_readers(const std::string& path) {
+  struct stat file {};
+  if (::stat(path.c_str(), &file) == 0 && S_ISREG(file.st_mode)) {
+    const bool is_ours = file.st_uid == ::geteuid();
+    refuse_mode("the key file", path, is_ours ? S_IRWXG | S_IRWXO : S_IRWXO,
+                "others than its owner can use the secret key in it", is_ours ? "600" : "o=");
+  }
+}
+
+/// Anyone who can write or replace the list can add a key.
+void check_writers(const std::string& path) {
+  constexpr std::string_view kRisk = "everybody could add a key";
+  refuse_mode("the list of keys", path, S_IWOTH, kRisk, "o-w");
+  const std::string parent = std::filesystem::path(path).parent_path().string();
+  const std::string folder = parent.empty() ? "." : parent;
+  struct stat file {};
+  if (::stat(folder.c_str(), &file) == 0 && (file.st_mode & S_ISVTX) == 0) {
+    refuse_mode("the folder of the list of keys,", folder, S_IWOTH, kRisk, "o-w");
   }
 }
 
@@ -205,30 +221,6 @@ std::optional<SecretKey> take_secret(std::string& text) {
     text.replace(quote + 1, kKeyCharacters, kKeyCharacters, '0');
   }
   return key;
-}
-
-[[noreturn]] void refuse_writers(const std::string& what, mode_t mode, const std::string& path) {
-  throw solver::InputError(
-      fmt::format("{} has mode {:04o}: everybody could add a key, so it is not used. Mend it with: "
-                  "chmod o-w '{}'",
-                  what, mode & 07777U, path));
-}
-
-/// Anyone who can write or replace this file can add a key.
-void check_file(const std::string& path) {
-  struct stat file {};
-  if (::stat(path.c_str(), &file) != 0) {
-    return;  // reading it tells why
-  }
-  if ((file.st_mode & S_IWOTH) != 0) {
-    refuse_writers("the list of keys " + path, file.st_mode, path);
-  }
-  const std::string parent = std::filesystem::path(path).parent_path().string();
-  const std::string folder = parent.empty() ? "." : parent;
-  if (::stat(folder.c_str(), &file) == 0 && (file.st_mode & S_IWOTH) != 0 &&
-      (file.st_mode & S_ISVTX) == 0) {
-    refuse_writers("the folder of the list of keys, " + folder + ",", file.st_mode, folder);
-  }
 }
 
 AuthorizedKey entry_of(const TomlReader& file, const toml::node& node) {
@@ -276,20 +268,10 @@ class MadeFiles {
   std::vector<std::string> paths_;
 };
 
-void make_folder(const std::string& folder, MadeFiles& made) {
-  constexpr mode_t kFolderMode = 0700;
-  if (::mkdir(folder.c_str(), kFolderMode) == 0) {
-    made.add(folder);
-  } else if (errno != EEXIST) {
-    throw std::runtime_error(
-        fmt::format("cannot make the folder {}: {}", folder, std::strerror(errno)));
-  }
-}
-
 }  // namespace
 
 KeyFile read_key_file(const std::string& path) {
-  check_mode(path);
+  check_readers(path);
   std::string text = read_small_file(path, "the key file", kMostBytes);
   const std::optional<SecretKey> secret = take_secret(text);
   const TomlReader file(path);
@@ -387,13 +369,10 @@ void AuthorizedKeys::add(AuthorizedKey key) {
 AuthorizedKey AuthorizedKeys::remove(std::string_view name) {
   const auto* found = find(name);
   if (found == nullptr) {
-    const std::vector<std::string_view> names = [this] {
-      std::vector<std::string_view> all;
-      for (const AuthorizedKey& key : keys_) {
-        all.emplace_back(key.name);
-      }
-      return all;
-    }();
+    std::vector<std::string_view> names;
+    for (const AuthorizedKey& key : keys_) {
+      names.emplace_back(key.name);
+    }
     throw solver::InputError(fmt::format("there is no key called {}{}; there {}", excerpt(name),
                                          did_you_mean(name, names),
                                          names.empty() ? "is none" : "are: " + joined(names)));
@@ -414,7 +393,7 @@ std::string authorized_keys_beside(const std::string& server_key_file) {
 }
 
 AuthorizedKeys read_authorized_keys(const std::string& path) {
-  check_file(path);
+  check_writers(path);
   const TomlReader file(path);
   const toml::table top = file.parse(read_small_file(path, "the list of keys", kMostBytes));
   KeyFields(file, top).refuse_unknown(kListFields, "a list of keys");
@@ -484,31 +463,26 @@ std::string key_folder_meant(const std::string& named) {
 
 CurveKey make_key_folder(const std::string& folder) {
   MadeFiles made;
-  make_folder(folder, made);
+  constexpr mode_t kFolderMode = 0700;
+  if (::mkdir(folder.c_str(), kFolderMode) == 0) {
+    made.add(folder);
+  } else if (errno != EEXIST) {
+    fail_to("cannot make the folder", folder);
+  }
   const std::string list = authorized_keys_in(folder);
   if (std::filesystem::exists(std::filesystem::symlink_status(list))) {
     throw std::runtime_error(list + " is there already, and is never overwritten");
   }
-  const auto write = [&](const KeyFile& key) {
-    const std::string path = key_file_in(folder, key.name);
-    write_key_file(path, key);
-    made.add(path);
-  };
   const KeyPair server = made_key_pair();
-  write({Role::kServer, "server", server});
-  std::vector<AuthorizedKey> listed;
-  for (const Role role : kPeers) {
-    const std::string name(name_of(role));
-    const KeyPair pair = made_key_pair();
-    write({role, name, pair, server.public_key});
-    listed.push_back({name, role, pair.public_key, utc_now()});
-  }
+  const std::string server_file = key_file_in(folder, "server");
+  write_key_file(server_file, {Role::kServer, "server", server});
+  made.add(server_file);
   made.add(list);
-  change_authorized_keys(list, [&](AuthorizedKeys& keys) {
-    for (AuthorizedKey& key : listed) {
-      keys.add(std::move(key));
-    }
-  });
+  for (const Role role : {Role::kClient, Role::kWorker, Role::kReader}) {
+    const std::string name(name_of(role));
+    add_key(folder, name, role, std::nullopt);
+    made.add(key_file_in(folder, name));
+  }
   made.keep();
   return server.public_key;
 }

@@ -14,7 +14,7 @@ protocol::KeyFile servers_key(const DoorSettings& settings) {
   if (key.role != protocol::Role::kServer) {
     throw solver::InputError(fmt::format(
         "{} is the key of a {}: a server takes its own, as DIR/server.key of `oblique keygen "
-        "DIR`, by --keys or OBLIQUE_SERVER_KEYS",
+        "DIR`, by --keys or OBLIQUE_SERVER_KEYS, which override OBLIQUE_KEYS",
         settings.keys, name_of(key.role)));
   }
   return key;

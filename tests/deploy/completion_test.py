@@ -16,7 +16,7 @@ DRIVER = {
     # As bash does: the word before the cursor, and the words between blanks and =.
     "bash": 'COMP_WORDS=("${@:2}"); COMP_CWORD=$(($# - 2)); "_$2" "$2" "$1" && printf "%s\\n" "${COMPREPLY[@]}"',
     # What the script hands to zsh for a word; the part that it has taken off goes before it.
-    "zsh": """compset() { local taken=${(M)PREFIX#${~2}}; [[ -z $taken ]] || { PREFIX=${PREFIX#${~2}}; BEFORE+=$taken; } }
+    "zsh": """compset() { local taken=${(M)PREFIX##${~2}}; [[ -z $taken ]] || { PREFIX=${PREFIX##${~2}}; BEFORE+=$taken; } }
 _describe() { local each; for each in ${(P)2}; do [[ ${each%%:*} != $PREFIX* ]] || print -r -- $BEFORE${each%%:*}; done }
 _files() { : }
 words=("${@:2}"); CURRENT=${#words}; PREFIX=$1; BEFORE=; _$words[1]""",

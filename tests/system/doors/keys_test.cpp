@@ -113,14 +113,14 @@ TEST_F(KeysTest, AGoodKeyAtTheOtherPortIsToldThatItMayBeThatOne) {
   wait_until_said(worker, "the server's port for clients (by default 7600), and workers use");
 }
 
-TEST_F(KeysTest, AServerThatIsGivenAKeyOfAnothersNamesTheVariableThatHoldsItAndItsOwn) {
+TEST_F(KeysTest, AServerThatIsGivenAKeyOfAnothersNamesTheVariableOfItsOwn) {
   Process server(folder_, server_program(),
                  {"--db", folder_.file("a.db"), "--worker-port", "0", "--client-port", "0"},
                  Environment{{"OBLIQUE_KEYS", key("client")}});
   EXPECT_NE(server.wait(), 0);
   EXPECT_THAT(server.err(),
-              AllOf(HasSubstr(key("client")), HasSubstr("environment variable OBLIQUE_KEYS"),
-                    HasSubstr("--keys or OBLIQUE_SERVER_KEYS")));
+              AllOf(HasSubstr(key("client")),
+                    HasSubstr("--keys or OBLIQUE_SERVER_KEYS, which override OBLIQUE_KEYS")));
 }
 
 TEST_F(KeysTest, AKeyFileThatOthersMayReadIsWrongUsageWithTheRemedy) {

@@ -90,7 +90,7 @@ TEST(ConfigurationOfProgramsTest, AnUnknownKeyEndsBothWithTwoAndTheNearestName) 
         {worker_program(), "thread = 5\n", "threads"}}) {
     Process process(folder, program, {"--config", write(folder.file("a.toml"), text)});
     EXPECT_EQ(process.wait(), 2);
-    EXPECT_NE(process.err().find("a.toml:1: "), std::string::npos) << process.err();
+    EXPECT_NE(process.err().find("a.toml:1:1: "), std::string::npos) << process.err();
     EXPECT_NE(process.err().find("did you mean `" + std::string(named)), std::string::npos)
         << process.err();
   }
