@@ -23,7 +23,6 @@
 #include "proto/program/log.h"
 #include "proto/program/origin/origin.h"
 #include "proto/program/process.h"
-#include "proto/program/until.h"
 #include "proto/program/usage.h"
 #include "proto/system/limits_of_group.h"
 #include "worker/point_solver.h"

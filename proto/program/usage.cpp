@@ -4,7 +4,6 @@
 #include <charconv>
 #include <iostream>
 #include <iterator>
-#include <sstream>
 #include <string_view>
 #include <vector>
 
@@ -45,12 +44,6 @@ bool has_verbs(const CLI::App& verb) {
 /// with options.
 constexpr const char* kChoices = "choices";
 
-std::string shown(double number) {
-  std::ostringstream text;
-  text << number;
-  return text.str();
-}
-
 }  // namespace
 
 void refuse_empty_values(CLI::App& app) {
@@ -73,8 +66,7 @@ CLI::Validator number_between(double least, double largest) {
         const bool is_number = CLI::detail::lexical_cast(text, value);
         return is_number && value >= least && value <= largest
                    ? std::string()
-                   : "\"" + text + "\" is not a number from " + shown(least) + " to " +
-                         shown(largest);
+                   : fmt::format("\"{}\" is not a number from {:g} to {:g}", text, least, largest);
       },
       "");
 }
