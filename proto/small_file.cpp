@@ -11,7 +11,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/system/descriptor.h"
-#include "proto/system/file_kind.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::protocol {

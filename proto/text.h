@@ -29,9 +29,6 @@ std::string shortened(const std::string& text, std::size_t bytes);
 /// At most `bytes` of `text` as `visible` writes it, for an error; "..." stands for the rest.
 std::string excerpt(std::string_view text, std::size_t bytes = 80);
 
-/// For `excerpt`: a message of toml++ ends with a key.
-inline constexpr std::size_t kLongestParseError = 150;
-
 /// The parts of `text` between separators: one more than there are separators, empty ones too.
 std::vector<std::string_view> split(std::string_view text, char separator);
 

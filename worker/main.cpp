@@ -17,16 +17,12 @@
 #include <CLI/CLI.hpp>
 
 #include "proto/frames.h"
-#include "proto/program/completion/complete.h"
-#include "proto/program/configuration/configuration.h"
-#include "proto/program/configuration/log_flags.h"
+#include "proto/program/completion.h"
+#include "proto/program/configuration.h"
 #include "proto/program/exit_code.h"
 #include "proto/program/log.h"
-#include "proto/program/notify.h"
 #include "proto/program/origin/origin.h"
-#include "proto/program/parent.h"
-#include "proto/program/stop_signals.h"
-#include "proto/program/until.h"
+#include "proto/program/process.h"
 #include "proto/program/usage.h"
 #include "proto/system/limits_of_group.h"
 #include "worker/point_solver.h"
@@ -153,7 +149,7 @@ int run_worker(SessionSettings settings, std::uint64_t fall_memory_bytes,
 
 void add_options(CLI::App& app, Configuration& configuration, StopWithParent& parent,
                  SessionSettings& settings, std::uint64_t& fall_memory_bytes, Ending& ending,
-                 std::string& keys) {
+                 std::string& keys, LogSettings& log) {
   app.set_version_flag("--version", "oblique-worker " + oblique::protocol::version_and_commit());
   app.add_option("--server", settings.server, "Where the server awaits workers")
       ->type_name("URL")
@@ -185,7 +181,8 @@ void add_options(CLI::App& app, Configuration& configuration, StopWithParent& pa
       ->type_name("SECONDS")
       ->capture_default_str()
       ->check(oblique::protocol::number_between(0.0, kLongestIdle_s));
-  configuration.keep_to_command_line(parent.add_to(app));
+  parent.add_to(app);
+  configuration.add_log_options(log);
 }
 
 /// Everything but errors that nobody foresaw.
@@ -205,9 +202,10 @@ int run_program(int argc, char** argv, LogSettings& log) {
   StopWithParent parent;
   Ending ending;
   std::uint64_t fall_memory_bytes = 0;
-  add_options(app, configuration, parent, settings, fall_memory_bytes, ending, keys);
-  add_log_flags(app, configuration, log);
-  oblique::protocol::answer_shell(app, argc, argv);
+  add_options(app, configuration, parent, settings, fall_memory_bytes, ending, keys, log);
+  if (const auto exit_code = oblique::protocol::print_completion(app, argc, argv)) {
+    return *exit_code;
+  }
   if (const auto exit_code = configuration.parse(argc, argv)) {
     return *exit_code;
   }

@@ -11,7 +11,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/output/progress.h"
-#include "proto/program/stop_signals.h"
+#include "proto/program/process.h"
 #include "proto/system/wake_up.h"
 #include "worker/solver/model/number.h"
 

@@ -8,7 +8,7 @@
 
 #include "client/service/child_process.h"
 #include "client/service/keys_for_a_run.h"
-#include "proto/program/stop_signals.h"
+#include "proto/program/process.h"
 
 namespace oblique::client {
 

@@ -11,7 +11,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/keys/key_folder.h"
+#include "proto/keys/key_file.h"
 
 namespace oblique::client {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "client/service/source.h"
 #include "proto/oblique.pb.h"
-#include "proto/program/stop_signals.h"
+#include "proto/program/process.h"
 
 namespace oblique::client {
 

@@ -9,7 +9,7 @@
 
 #include "client/study/flag_axis.h"
 #include "client/study/study.h"
-#include "proto/program/choices.h"
+#include "proto/program/usage.h"
 #include "proto/recipe/axes.h"
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/checks.h"

@@ -15,8 +15,6 @@
 #include "client/study/csv_file.h"
 #include "client/study/toml_axis.h"
 #include "client/study/toml_block.h"
-#include "client/study/toml_place.h"
-#include "client/study/toml_text.h"
 #include "proto/recipe/checks.h"
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
@@ -44,7 +42,6 @@ class StudyReader {
   Study study(const toml::table& top);
 
  private:
-  void check_top_keys(const toml::table& top) const;
   std::string name(const toml::table& top) const;
   solver::ModelParameters model(const toml::node& node) const;
   void add_model_key(protocol::WrittenModel& model, std::string_view name,
@@ -56,21 +53,11 @@ class StudyReader {
   using BlockPlaces = std::map<std::string, std::string, std::less<>>;
   BlockPlaces places_of(const toml::node& node) const;
 
-  TomlPlace place_;
+  protocol::TomlReader place_;
   std::vector<BlockPlaces> places_;
   CsvFiles files_;
   const ReachCheck& check_reach_;
 };
-
-void StudyReader::check_top_keys(const toml::table& top) const {
-  for (const auto& [key, value] : top) {
-    if (std::find(kTopKeys.begin(), kTopKeys.end(), key.str()) == kTopKeys.end()) {
-      place_.fail(key, fmt::format("{}: a study file has name, errors, [model] and one or more "
-                                   "[[block]]; H, mu and e stand in a block",
-                                   protocol::unknown_key(key.str(), kTopKeys)));
-    }
-  }
-}
 
 std::string StudyReader::name(const toml::table& top) const {
   const auto* node = top.get("name");
@@ -97,7 +84,7 @@ void StudyReader::add_model_key(protocol::WrittenModel& model, std::string_view 
     place_.fail(value,
                 fmt::format("{} = {} is {}: in [model] it must be one value; a key with several "
                             "values stands in a [[block]]",
-                            name, shown(value), kind_of(value)));
+                            name, protocol::shown(value), protocol::kind_of(value)));
   }
   const double chosen = toml_number(place_, key, value,
                                     "a number; one that follows from others stands in a [[block]]");
@@ -108,7 +95,7 @@ void StudyReader::add_lengths(protocol::WrittenModel& model, const toml::node& v
   if (!value.is_array()) {
     place_.fail(value, fmt::format("lengths = {} is not allowed: it must be a list of lengths in "
                                    "m, one a link",
-                                   shown(value)));
+                                   protocol::shown(value)));
   }
   const auto& key = protocol::model_key("length");
   std::vector<double> lengths_m;
@@ -122,7 +109,8 @@ void StudyReader::add_lengths(protocol::WrittenModel& model, const toml::node& v
 solver::ModelParameters StudyReader::model(const toml::node& node) const {
   const auto* table = node.as_table();
   if (table == nullptr) {
-    place_.fail(node, "model is " + kind_of(node) + ": write [model], and the keys below it");
+    place_.fail(node,
+                "model is " + protocol::kind_of(node) + ": write [model], and the keys below it");
   }
   protocol::WrittenModel model;
   for (const auto& [key, value] : *table) {
@@ -148,7 +136,8 @@ const toml::array& StudyReader::blocks(const toml::table& top) const {
                      ": no [[block]]: a study needs at least one, with H, mu and e");
   }
   if (!blocks->is_array()) {
-    place_.fail(*blocks, "block is " + kind_of(*blocks) + ": write [[block]], in double brackets");
+    place_.fail(*blocks,
+                "block is " + protocol::kind_of(*blocks) + ": write [[block]], in double brackets");
   }
   if (blocks->as_array()->empty()) {
     place_.fail(*blocks, "block = [] is empty: a study needs at least one, with H, mu and e");
@@ -190,7 +179,9 @@ void StudyReader::add_block(Study& study, const toml::node& node) {
 }
 
 Study StudyReader::study(const toml::table& top) {
-  check_top_keys(top);
+  place_.refuse_unknown(top, kTopKeys, "",
+                        "a study file has name, errors, [model] and one or more [[block]]; H, mu "
+                        "and e stand in a block");
   Study study;
   study.name = name(top);
   const auto* errors = top.get("errors");
@@ -219,15 +210,7 @@ Study StudyReader::study(const toml::table& top) {
 }  // namespace
 
 Study parse_study(std::string_view text, const std::string& file, const ReachCheck& check_reach) {
-  check_keys(text, file);
-  try {
-    return StudyReader(file, check_reach).study(toml::parse(text, file));
-  } catch (const toml::parse_error& error) {
-    const auto& begin = error.source().begin;
-    throw InputError(
-        fmt::format("{}:{}:{}: {}", file, begin.line, begin.column,
-                    protocol::excerpt(error.description(), protocol::kLongestParseError)));
-  }
+  return StudyReader(file, check_reach).study(protocol::TomlReader(file).parse(text));
 }
 
 Study read_study_file(const std::filesystem::path& path, const ReachCheck& check_reach) {

@@ -1,6 +1,5 @@
 #include "client/study/toml_axis.h"
 
-#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -10,7 +9,6 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/study/toml_text.h"
 #include "proto/recipe/keys.h"
 #include "proto/recipe/written/written_axis.h"
 #include "proto/recipe/written/written_sample.h"
@@ -30,7 +28,8 @@ constexpr std::array<std::string_view, 5> kDistributionParts{"distribution", "fr
 /// The table of one axis.
 class AxisTable {
  public:
-  AxisTable(const TomlPlace& place, const solver::ParameterKey& key, const toml::table& table)
+  AxisTable(const protocol::TomlReader& place, const solver::ParameterKey& key,
+            const toml::table& table)
       : place_(place), key_(key), table_(table) {}
 
   protocol::Axis axis(protocol::BlockKind kind, CsvFiles& files) const {
@@ -48,12 +47,7 @@ class AxisTable {
 
  private:
   void check_parts(std::span<const std::string_view> known, std::string_view forms) const {
-    for (const auto& [part, value] : table_) {
-      if (std::find(known.begin(), known.end(), part.str()) == known.end()) {
-        place_.fail(part, fmt::format("{}: {}: {}", key_.name,
-                                      protocol::unknown_key(part.str(), known), forms));
-      }
-    }
+    place_.refuse_unknown(table_, known, fmt::format("{}: ", key_.name), forms);
   }
 
   double number(std::string_view part) const {
@@ -116,7 +110,7 @@ class AxisTable {
     if (name != "linear" && name != "log") {
       place_.fail(*table_.get("spacing"),
                   fmt::format("{}: spacing = {} is not allowed: it must be linear or log",
-                              key_.name, shown(*table_.get("spacing"))));
+                              key_.name, protocol::shown(*table_.get("spacing"))));
     }
     if (name == "log" && table_.contains("step")) {
       place_.fail(*table_.get("spacing"),
@@ -132,7 +126,7 @@ class AxisTable {
       place_.fail(table_,
                   fmt::format("{} = {} is not a range: give `from`, `to` and either `count` "
                               "or `step`",
-                              key_.name, shown(table_)));
+                              key_.name, protocol::shown(table_)));
     }
     const double from = number("from");
     const double to = number("to");
@@ -143,22 +137,22 @@ class AxisTable {
     }
     const auto& count = *table_.get("count");
     if (!count.is_integer()) {
-      place_.located(count, [&] { protocol::throw_wrong_count(key_, shown(count)); });
+      place_.located(count, [&] { protocol::throw_wrong_count(key_, protocol::shown(count)); });
     }
     return place_.located(table_, [&] {
       return protocol::counted_axis(key_, from, to, *count.value<std::int64_t>(), apart);
     });
   }
 
-  const TomlPlace& place_;
+  const protocol::TomlReader& place_;
   const solver::ParameterKey& key_;
   const toml::table& table_;
 };
 
 }  // namespace
 
-double toml_number(const TomlPlace& place, const solver::ParameterKey& key, const toml::node& value,
-                   std::string_view expected) {
+double toml_number(const protocol::TomlReader& place, const solver::ParameterKey& key,
+                   const toml::node& value, std::string_view expected) {
   if (key.name != "integrator") {
     return place.number(key.name, value, expected);
   }
@@ -168,8 +162,8 @@ double toml_number(const TomlPlace& place, const solver::ParameterKey& key, cons
   return place.located(value, [&] { return static_cast<double>(solver::integrator_named(name)); });
 }
 
-protocol::Axis axis_of_toml(const TomlPlace& place, std::string_view name, const toml::node& value,
-                            protocol::BlockKind kind, CsvFiles& files) {
+protocol::Axis axis_of_toml(const protocol::TomlReader& place, std::string_view name,
+                            const toml::node& value, protocol::BlockKind kind, CsvFiles& files) {
   const auto& key = place.located(
       value, [&]() -> auto& { return protocol::axis_key(name); });
   if (const auto* table = value.as_table()) {

@@ -11,7 +11,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/study/toml_axis.h"
-#include "client/study/toml_text.h"
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/keys.h"
 #include "proto/recipe/written/written_axis.h"
@@ -28,7 +27,7 @@ constexpr std::array<std::string_view, 3> kSampleParts{"kind", "count", "seed"};
 /// One [[block]].
 class BlockReader {
  public:
-  BlockReader(const TomlPlace& place, const toml::table& table, CsvFiles& files)
+  BlockReader(const protocol::TomlReader& place, const toml::table& table, CsvFiles& files)
       : place_(place), table_(table), files_(files) {}
 
   protocol::Block block() {
@@ -82,17 +81,13 @@ class BlockReader {
   protocol::Sample sample(const toml::node& node) const {
     const auto& sample =
         place_.table("sample", node, "{ kind = \"sobol\", count = 1000, seed = 1 }");
-    for (const auto& [part, value] : sample) {
-      if (std::find(kSampleParts.begin(), kSampleParts.end(), part.str()) == kSampleParts.end()) {
-        place_.fail(part, fmt::format("sample: {}: a sample is {{ kind, count, seed }}",
-                                      protocol::unknown_key(part.str(), kSampleParts)));
-      }
-    }
+    place_.refuse_unknown(sample, kSampleParts, "sample: ", "a sample is { kind, count, seed }");
     if (!sample.contains("kind") || !sample.contains("count")) {
-      place_.fail(node,
-                  fmt::format("sample = {} lacks {}: give kind and count, and a seed for other "
-                              "points of the kind",
-                              shown(sample), sample.contains("kind") ? "`count`" : "`kind`"));
+      place_.fail(
+          node,
+          fmt::format("sample = {} lacks {}: give kind and count, and a seed for other "
+                      "points of the kind",
+                      protocol::shown(sample), sample.contains("kind") ? "`count`" : "`kind`"));
     }
     const std::string kind =
         place_.text("sample: kind", *sample.get("kind"), "random, lhs or sobol, in quotes");
@@ -106,7 +101,7 @@ class BlockReader {
     if (!node.is_integer()) {
       place_.fail(node, fmt::format("sample: {} = {} is not allowed: it must be a whole number, "
                                     "written without point and exponent",
-                                    part, shown(node)));
+                                    part, protocol::shown(node)));
     }
     return *node.value<std::int64_t>();
   }
@@ -154,17 +149,19 @@ class BlockReader {
     });
   }
 
-  const TomlPlace& place_;
+  const protocol::TomlReader& place_;
   const toml::table& table_;
   CsvFiles& files_;
 };
 
 }  // namespace
 
-protocol::Block block_of_toml(const TomlPlace& place, const toml::node& node, CsvFiles& files) {
+protocol::Block block_of_toml(const protocol::TomlReader& place, const toml::node& node,
+                              CsvFiles& files) {
   const auto* table = node.as_table();
   if (table == nullptr) {
-    place.fail(node, "block holds " + kind_of(node) + ": write [[block]], and the axes below it");
+    place.fail(node, "block holds " + protocol::kind_of(node) +
+                         ": write [[block]], and the axes below it");
   }
   return BlockReader(place, *table, files).block();
 }

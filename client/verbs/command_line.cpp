@@ -13,6 +13,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -22,12 +23,12 @@
 #include "client/output/human_units.h"
 #include "client/output/speech.h"
 #include "client/output/terminal.h"
-#include "client/verbs/completion/values.h"
 #include "client/verbs/verbs.h"
-#include "proto/program/completion/complete.h"
+#include "proto/program/completion.h"
 #include "proto/program/origin/origin.h"
 #include "proto/program/usage.h"
 #include "proto/text.h"
+#include "server/asking/columns.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::client {
@@ -196,6 +197,20 @@ int execute(CLI::App& app, const Command& command, const SpeechFlags& flags) {
   return code;
 }
 
+/// Columns complete the values that hold names of columns.
+protocol::ValueWords columns_of_values() {
+  std::vector<std::string> names;
+  for (const auto& column : server::all_columns()) {
+    names.push_back(column.name);
+  }
+  protocol::ValueWords words;
+  for (const char* const value : {"COLUMNS", "COLUMN", "COL", "CONDITION", "EXPR", "OUTPUT", "X,Y",
+                                  "STATEMENT", "--x", "--y", "--by"}) {
+    words[value] = names;
+  }
+  return words;
+}
+
 /// Also where it is written wrong, for then the flag that may be meant is named.
 bool may_name_single_lengths(int argc, const char* const* argv) {
   return std::any_of(argv, argv + argc, [](const char* word) {
@@ -218,7 +233,9 @@ int run_command_line(int argc, const char* const* argv) {
   SpeechFlags speech;
   add_speech_flags(app, speech);
   protocol::refuse_empty_values(app);
-  protocol::answer_shell(app, argc, argv, values_of_verbs);
+  if (const auto exit_code = protocol::print_completion(app, argc, argv, columns_of_values())) {
+    return *exit_code;
+  }
   if (argc == 1) {
     return wrong_usage(app, "no verb given, as in `oblique run STUDY.toml`");
   }

@@ -11,7 +11,7 @@
 #include "client/output/work_line.h"
 #include "client/paper/parameter_fit.h"
 #include "client/verbs/verbs.h"
-#include "proto/program/choices.h"
+#include "proto/program/usage.h"
 #include "proto/suggestion.h"
 #include "worker/solver/model/number.h"
 #include "worker/solver/model/parameters.h"

@@ -8,7 +8,7 @@
 
 #include "client/verbs/printed_rows.h"
 #include "client/verbs/verbs.h"
-#include "proto/keys/key_folder.h"
+#include "proto/keys/key_file.h"
 
 namespace oblique::client {
 namespace {

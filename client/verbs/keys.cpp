@@ -13,8 +13,7 @@
 #include "client/verbs/printed_rows.h"
 #include "client/verbs/verbs.h"
 #include "proto/keys/key_file.h"
-#include "proto/keys/key_folder.h"
-#include "proto/program/choices.h"
+#include "proto/program/usage.h"
 #include "proto/text.h"
 #include "worker/solver/model/errors.h"
 

@@ -17,7 +17,7 @@
 #include "client/verbs/printed_rows.h"
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
-#include "proto/program/choices.h"
+#include "proto/program/usage.h"
 #include "proto/suggestion.h"
 #include "server/query/sql_text.h"
 #include "worker/solver/model/errors.h"

@@ -7,7 +7,7 @@
 #include "client/formats/pager.h"
 #include "client/formats/sink.h"
 #include "client/plot/terminal/terminal_figure.h"
-#include "proto/program/choices.h"
+#include "proto/program/usage.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::client {

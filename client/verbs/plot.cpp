@@ -9,7 +9,7 @@
 #include "client/verbs/picture_flags.h"
 #include "client/verbs/plot_point.h"
 #include "client/verbs/verbs.h"
-#include "proto/program/choices.h"
+#include "proto/program/usage.h"
 #include "server/maintenance/study_changes_offline.h"
 
 namespace oblique::client {

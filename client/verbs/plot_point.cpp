@@ -19,7 +19,6 @@
 #include "client/verbs/solve_here.h"
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
-#include "proto/program/choices.h"
 #include "proto/program/usage.h"
 #include "proto/recipe/point_table.h"
 #include "worker/solver/model/errors.h"

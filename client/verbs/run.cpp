@@ -11,7 +11,7 @@
 #include "client/verbs/printed_rows.h"
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
-#include "proto/program/stop_signals.h"
+#include "proto/program/process.h"
 #include "proto/program/usage.h"
 
 namespace oblique::client {

@@ -17,6 +17,7 @@
 #include "client/verbs/study_time.h"
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
+#include "proto/program/process.h"
 #include "proto/recipe/block_points.h"
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/model_message.h"

@@ -16,7 +16,6 @@
 #include "client/trace/trace_output.h"
 #include "client/verbs/solve_here.h"
 #include "client/verbs/verbs.h"
-#include "proto/program/choices.h"
 #include "proto/program/usage.h"
 #include "worker/solver/model/number.h"
 

@@ -18,7 +18,7 @@
 #include "client/service/source_flags.h"
 #include "client/service/watching.h"
 #include "client/verbs/verbs.h"
-#include "proto/program/stop_signals.h"
+#include "proto/program/process.h"
 #include "proto/program/usage.h"
 #include "proto/text.h"
 

@@ -4,6 +4,7 @@
 #include <limits>
 #include <new>
 #include <stdexcept>
+#include <utility>
 
 #include <sodium.h>
 
@@ -40,7 +41,25 @@ bool decode_z85(std::string_view text, SecretKey::Bytes key) {
   return true;
 }
 
+constexpr std::array<std::pair<Role, std::string_view>, 4> kRoles{{{Role::kServer, "server"},
+                                                                   {Role::kClient, "client"},
+                                                                   {Role::kWorker, "worker"},
+                                                                   {Role::kReader, "reader"}}};
+
 }  // namespace
+
+std::string_view name_of(Role role) {
+  return kRoles.at(static_cast<std::size_t>(role)).second;
+}
+
+std::optional<Role> role_named(std::string_view name) {
+  for (const auto& [role, its_name] : kRoles) {
+    if (name == its_name) {
+      return role;
+    }
+  }
+  return std::nullopt;
+}
 
 SecretKey::SecretKey() {
   if (sodium_init() < 0) {

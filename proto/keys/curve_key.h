@@ -38,6 +38,18 @@ class SecretKey {
   std::shared_ptr<std::uint8_t> bytes_;
 };
 
+/// What the holder of a key is to the server.
+enum class Role {
+  kServer,
+  kClient,  ///< may read and change everything at the port for clients
+  kWorker,  ///< may solve at the port for workers
+  kReader,  ///< may read at the port for clients, and change nothing
+};
+
+/// "server", "client", "worker" or "reader".
+std::string_view name_of(Role role);
+std::optional<Role> role_named(std::string_view name);
+
 struct KeyPair {
   CurveKey public_key{};
   SecretKey secret_key{};

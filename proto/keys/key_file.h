@@ -1,15 +1,19 @@
 #pragma once
 
+#include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "proto/keys/curve_key.h"
-#include "proto/keys/role.h"
 
+// Files with keys (TOML, README.md): of one program, the list of a server, and a folder with both.
+// Errors in a file are solver::InputError with file, line and key, and never show a secret.
 namespace oblique::protocol {
 
-/// What the key file of a program holds.
+/// The content of the key file of a program.
 struct KeyFile {
   Role role = Role::kClient;
   std::string name;  ///< of the key, for people
@@ -18,17 +22,80 @@ struct KeyFile {
   std::string path = {};                ///< of the file that it was read from
 };
 
-/// Reads a key file (TOML, README.md). Throws solver::InputError, with file, line and key, unless
-/// it is whole and belongs to its owner alone: as ssh does, a file of ours that the group may read
-/// is refused, and one that others may read whoever owns it, with the chmod that mends it.
+/// Reads a key file. Throws solver::InputError unless it is whole and private: as with ssh, a file
+/// of ours that the group may read is refused, and one that others may read whoever owns it, with
+/// the chmod that mends it.
 KeyFile read_key_file(const std::string& path);
 
 /// Writes a new file of mode 0600 and flushes it to the disk. Throws std::runtime_error, also when
-/// there is one of that name, which is never overwritten.
+/// the file exists: it is never overwritten.
 void write_key_file(const std::string& path, const KeyFile& key);
 
-/// Why a key cannot be called so, or an empty text: 1 to 64 letters, digits, '.', '_', '-' or '@',
-/// the first a letter or digit, so that a file can have the name too.
+/// Why a key cannot have this name, or an empty text: 1 to 64 letters, digits, '.', '_', '-' or
+/// '@', the first a letter or digit, so that a file can have the name too.
 std::string objection_to_key_name(std::string_view name);
+
+/// A key that the server admits.
+struct AuthorizedKey {
+  std::string name;
+  Role role = Role::kClient;  ///< never the server's
+  CurveKey public_key{};
+  std::string added_at;  ///< UTC, ISO 8601
+};
+
+/// The keys that a server admits, each once, by name and by key.
+class AuthorizedKeys {
+ public:
+  /// Null for a key that is not admitted.
+  const AuthorizedKey* find(const CurveKey& public_key) const;
+  const AuthorizedKey* find(std::string_view name) const;
+  /// In the order of the file.
+  const std::vector<AuthorizedKey>& all() const { return keys_; }
+
+  /// Throws solver::InputError when name or key exist, naming which, or the name is not allowed.
+  void add(AuthorizedKey key);
+  /// Throws solver::InputError, with the known names, for an unknown name.
+  AuthorizedKey remove(std::string_view name);
+
+ private:
+  std::vector<AuthorizedKey> keys_;
+  std::map<CurveKey, std::size_t> places_;
+  std::map<std::string, std::size_t, std::less<>> places_by_name_;
+};
+
+/// The list beside a server's key file: DIR/authorized_keys.toml.
+std::string authorized_keys_beside(const std::string& server_key_file);
+
+/// Reads a list; an empty file is an empty list. Throws solver::InputError when any part of it is
+/// wrong, or when everybody may write it.
+AuthorizedKeys read_authorized_keys(const std::string& path);
+
+/// Reads the list, calls `change` and replaces the file in one step, while no other process does
+/// the same. Creates a missing file. Throws as `read_authorized_keys` and `change`, and
+/// std::runtime_error when it cannot be written; then nothing has changed.
+void change_authorized_keys(const std::string& path,
+                            const std::function<void(AuthorizedKeys&)>& change);
+
+/// The time now, as in `added_at`.
+std::string utc_now();
+
+/// Paths in a folder with the keys of a server.
+std::string key_file_in(const std::string& folder, const std::string& name);
+std::string authorized_keys_in(const std::string& folder);
+
+/// `named` or, where that is empty, this folder or the `keys` in it, whichever has a server's key
+/// or list. Throws solver::InputError where it has neither.
+std::string key_folder_meant(const std::string& named);
+
+/// Makes server.key, client.key, worker.key, reader.key and the list with the last three, and a
+/// missing folder with mode 0700. Returns the server's public key. Throws std::runtime_error when
+/// one of them exists or cannot be made; then what was made is removed.
+CurveKey make_key_folder(const std::string& folder);
+
+/// Lists a key of that name: `public_key`, or that of a new pair, which NAME.key gets. Throws
+/// solver::InputError when name or key are listed already, or the server's key cannot be read, and
+/// std::runtime_error when a file cannot be written or exists; then nothing is listed.
+AuthorizedKey add_key(const std::string& folder, const std::string& name, Role role,
+                      const std::optional<CurveKey>& public_key);
 
 }  // namespace oblique::protocol

@@ -4,9 +4,10 @@
 #include <charconv>
 #include <iostream>
 #include <iterator>
-#include <sstream>
 #include <string_view>
 #include <vector>
+
+#include <spdlog/fmt/fmt.h>
 
 #include "proto/suggestion.h"
 #include "proto/text.h"
@@ -39,11 +40,9 @@ bool has_verbs(const CLI::App& verb) {
   return !verb.get_subcommands([](const CLI::App*) { return true; }).empty();
 }
 
-std::string shown(double number) {
-  std::ostringstream text;
-  text << number;
-  return text.str();
-}
+/// The name of a check that is never active and that help does not show: CLI11 keeps no other notes
+/// with options.
+constexpr const char* kChoices = "choices";
 
 }  // namespace
 
@@ -67,8 +66,7 @@ CLI::Validator number_between(double least, double largest) {
         const bool is_number = CLI::detail::lexical_cast(text, value);
         return is_number && value >= least && value <= largest
                    ? std::string()
-                   : "\"" + text + "\" is not a number from " + shown(least) + " to " +
-                         shown(largest);
+                   : fmt::format("\"{}\" is not a number from {:g} to {:g}", text, least, largest);
       },
       "");
 }
@@ -85,6 +83,22 @@ CLI::Validator whole_number_from(std::int64_t least) {
                          " is not allowed: it must be a whole number >= " + std::to_string(least);
       },
       "");
+}
+
+CLI::Option* note_choices(CLI::Option* option, std::span<const std::string_view> choices) {
+  return option->check(
+      CLI::Validator(fmt::format("{}", fmt::join(choices, " "))).name(kChoices).active(false));
+}
+
+std::vector<std::string> choices_of(CLI::Option& option) {
+  try {
+    // The description of an inactive check is empty.
+    const std::string listed = option.get_validator(kChoices)->active().get_description();
+    option.get_validator(kChoices)->active(false);
+    return CLI::detail::split(listed, ' ');
+  } catch (const CLI::OptionNotFound&) {
+    return {};
+  }
 }
 
 std::string objection_of(const CLI::App& app, const CLI::App& verb, const CLI::ParseError& error) {

@@ -1,8 +1,12 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -12,27 +16,40 @@ namespace oblique::protocol {
 
 // What the command lines of our programs share.
 
-/// Makes an empty value of any option or argument of `app` and its verbs wrong usage: a variable of
-/// a shell that is not set should not pass for a choice. To be called once all are added.
+/// Makes an empty value of any option or argument of `app` and its verbs wrong usage: it may come
+/// from a shell variable that is not set. Call it after all options are added.
 void refuse_empty_values(CLI::App& app);
 
-/// A check for numbers from `least` to `largest`; NaN is none of them.
+/// A check for numbers from `least` to `largest`; NaN is refused.
 CLI::Validator number_between(double least, double largest);
 
-/// A check for whole numbers from `least` on that 64 bits hold.
+/// A check for whole numbers of 64 bits that are at least `least`.
 CLI::Validator whole_number_from(std::int64_t least);
 
-/// What is wrong with what was typed, as a sentence: a word too many with the nearest that `verb`
-/// knows (of `app`, or `app` itself), or what the library says, in words that say what to do.
+/// The time from `now` to `text`, negative for the past. `text` is a time in ISO 8601, as
+/// 2026-11-22T05:00:00Z, 2026-11-22T05:00+01:00 or, in local time, 2026-11-22T05:00:00; or a
+/// duration: 5400, 5400s, 90m, 1h30m, 2d. Nothing for other text, and for more than a hundred
+/// years.
+std::optional<std::chrono::milliseconds> time_until(std::string_view text,
+                                                    std::chrono::system_clock::time_point now);
+
+/// Notes the values that an option may have, for completion; whoever reads the value checks it.
+/// Returns `option`.
+CLI::Option* note_choices(CLI::Option* option, std::span<const std::string_view> choices);
+
+/// The noted choices; empty where there are none.
+std::vector<std::string> choices_of(CLI::Option& option);
+
+/// The sentence for an error of the command line. An unexpected word gets the nearest name that
+/// `verb` (of `app`, or `app` itself) has.
 std::string objection_of(const CLI::App& app, const CLI::App& verb, const CLI::ParseError& error);
 
-/// Tells on standard error what is wrong, as "oblique-server: ...", and where help is. `words` are
-/// what was typed to reach it: program and verb. Gives kWrongUsage.
+/// Prints the message on standard error, as "oblique-server: ...", with the command for help.
+/// `words` are program and verb as typed. Returns kWrongUsage.
 int tell_wrong_usage(const std::string& words, const std::string& message);
 
-/// Parses the command line of a program without verbs. The exit code when there is nothing more to
-/// do: 0 after --help and --version, which go to standard output, kWrongUsage after wrong usage,
-/// which is told.
+/// Parses the command line of a program without verbs. Returns the exit code when the program is to
+/// end: 0 after --help and --version, kWrongUsage after an error, which it has printed.
 std::optional<int> parse_command_line(CLI::App& app, int argc, const char* const* argv);
 
 }  // namespace oblique::protocol

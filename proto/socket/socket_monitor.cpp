@@ -1,8 +1,12 @@
 #include "proto/socket/socket_monitor.h"
 
+#include <array>
 #include <cerrno>
+#include <cstddef>
 #include <cstring>
-#include <string>
+#include <string_view>
+
+#include <spdlog/fmt/fmt.h>
 
 namespace oblique::protocol {
 namespace {
@@ -39,7 +43,71 @@ Rejection rejection_of(std::uint16_t event, std::uint32_t value) {
                                  : Rejection::kServersKey;
 }
 
+/// The key that was shown, and the file that it is from.
+std::string key_of(const DealerSettings& settings) {
+  return fmt::format("{}, a {}'s key called \"{}\", public key {}", settings.key->path,
+                     name_of(settings.key->role), settings.key->name,
+                     z85(settings.key->pair.public_key));
+}
+
+/// A server answers alike to unknown keys and to keys for its other port, and the address shows the
+/// kind of port only where it is the usual one of this program.
+std::string refused_key(const DealerSettings& settings) {
+  constexpr std::array<std::string_view, 2> kKinds{"clients", "workers"};
+  constexpr std::array<std::string_view, 2> kPorts{"7600", "7601"};
+  const std::size_t ours = settings.is_worker ? 1 : 0;
+  const std::size_t others = 1 - ours;
+  const std::size_t role = settings.key->role == Role::kWorker ? 1 : 0;
+  if (role != ours) {
+    return fmt::format("it is for {}, and this port is for {}", kKinds.at(role), kKinds.at(ours));
+  }
+  const std::string_view port = std::string_view(settings.url).substr(settings.url.rfind(':') + 1);
+  return fmt::format(
+      "{}the key is not on the server's list, or was revoked. Where the server is, `oblique keys "
+      "list` shows the list and `oblique keys add` adds to it",
+      port == kPorts.at(ours)
+          ? ""
+          : fmt::format("either port {} is the server's port for {} (by default {}), and {} use "
+                        "another one ({}); or ",
+                        port, kKinds.at(others), kPorts.at(others), kKinds.at(ours),
+                        kPorts.at(ours)));
+}
+
 }  // namespace
+
+std::string sentence_of(Rejection rejection, const DealerSettings& settings) {
+  const bool has_key = settings.key.has_value();
+  const auto not_accepted = [&](const std::string& why) {
+    return fmt::format("the server at {} did not accept this {}", settings.url,
+                       has_key ? fmt::format("key ({}): {}", key_of(settings), why) : "program");
+  };
+  switch (rejection) {
+    case Rejection::kKey:
+      return not_accepted(has_key ? refused_key(settings) : "");
+    case Rejection::kServersKey:
+      return not_accepted(fmt::format(
+          "the public key of the server in that file, {}, is not its own, which its log shows at "
+          "the start",
+          has_key ? z85(settings.key->server.value_or(CurveKey{})) : ""));
+    case Rejection::kOtherMechanism:
+      return has_key ? not_accepted(
+                           "it has no keys. Start it with --keys, or leave out --keys and "
+                           "OBLIQUE_KEYS here to connect unencrypted")
+                     : fmt::format(
+                           "the server at {} requires a key, and none was given: name yours "
+                           "with --keys FILE or OBLIQUE_KEYS",
+                           settings.url);
+    case Rejection::kForNow:
+      return fmt::format(
+          "the server at {} has no room at present: it, or this key, has as many connections as it "
+          "may have",
+          settings.url);
+    case Rejection::kNoServer:
+      break;
+  }
+  return fmt::format("the program at {} is not an oblique-server: check the address and port",
+                     settings.url);
+}
 
 SocketMonitor::SocketMonitor(zmq::context_t& context, zmq::socket_t& socket, bool with_attempts)
     : socket_(socket), events_(context, zmq::socket_type::pair) {

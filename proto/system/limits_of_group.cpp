@@ -40,7 +40,7 @@ void take_memory(LimitsOfGroup& limits, const std::string& text) {
   }
 }
 
-/// The group's path in the line of `controller` ("" for version 2): "0::/user.slice".
+/// The group's path in the line of `controller` ("" for version 2), as "0::/user.slice".
 std::optional<std::string> path_of(const std::string& own, const std::string& controller) {
   std::istringstream lines(own);
   for (std::string line; std::getline(lines, line);) {
@@ -50,9 +50,8 @@ std::optional<std::string> path_of(const std::string& own, const std::string& co
       continue;
     }
     std::istringstream names(line.substr(first + 1, second - first - 1));
-    std::string name;
     bool is_meant = controller.empty() && second == first + 1;
-    while (std::getline(names, name, ',')) {
+    for (std::string name; std::getline(names, name, ',');) {
       is_meant = is_meant || name == controller;
     }
     if (is_meant) {
@@ -62,37 +61,24 @@ std::optional<std::string> path_of(const std::string& own, const std::string& co
   return std::nullopt;
 }
 
-/// Calls `look` with the folder of the group and of each one above it. In a container the path may
-/// be that of the machine, which is not there: the top is looked at in any case.
-template <class Look>
-void climb(const std::string& root, std::string path, const Look& look) {
-  while (path.size() > 1) {
-    look(root + path);
-    path.resize(std::max<std::size_t>(path.rfind('/'), 0));
-  }
-  look(root);
-}
-
 }  // namespace
 
 LimitsOfGroup limits_of_group(const std::string& root, const std::string& own) {
   LimitsOfGroup limits;
-  if (const auto path = path_of(own, "")) {
-    climb(root, *path, [&](const std::string& folder) {
+  for (const std::string controller : {"", "cpu", "memory"}) {
+    const std::string top = controller.empty() ? root : root + '/' + controller;
+    std::optional<std::string> path = path_of(own, controller);
+    // In a container the path may be that of the machine, which does not exist there; the top does.
+    for (bool is_done = !path; !is_done;) {
+      is_done = path->size() <= 1;
+      const std::string folder = is_done ? top : top + *path;
       take_cores(limits, text_of(folder + "/cpu.max"));
-      take_memory(limits, text_of(folder + "/memory.max"));
-    });
-  }
-  if (const auto path = path_of(own, "cpu")) {
-    climb(root + "/cpu", *path, [&](const std::string& folder) {
       take_cores(limits,
                  text_of(folder + "/cpu.cfs_quota_us") + text_of(folder + "/cpu.cfs_period_us"));
-    });
-  }
-  if (const auto path = path_of(own, "memory")) {
-    climb(root + "/memory", *path, [&](const std::string& folder) {
+      take_memory(limits, text_of(folder + "/memory.max"));
       take_memory(limits, text_of(folder + "/memory.limit_in_bytes"));
-    });
+      path->resize(is_done ? 0 : path->rfind('/'));
+    }
   }
   return limits;
 }

@@ -4,7 +4,7 @@
 
 #include <sys/stat.h>
 
-#include "proto/system/file_kind.h"
+#include "proto/small_file.h"
 
 namespace oblique::server {
 namespace {

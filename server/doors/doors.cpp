@@ -13,11 +13,9 @@ protocol::KeyFile servers_key(const DoorSettings& settings) {
   protocol::KeyFile key = protocol::read_key_file(settings.keys);
   if (key.role != protocol::Role::kServer) {
     throw solver::InputError(fmt::format(
-        "{}{} is the key of a {}: a server takes its own, as DIR/server.key of `oblique keygen "
-        "DIR`, by --keys or OBLIQUE_SERVER_KEYS",
-        settings.keys,
-        settings.keys_origin.empty() ? "" : fmt::format(" ({})", settings.keys_origin),
-        name_of(key.role)));
+        "{} is the key of a {}: a server takes its own, as DIR/server.key of `oblique keygen "
+        "DIR`, by --keys or OBLIQUE_SERVER_KEYS, which override OBLIQUE_KEYS",
+        settings.keys, name_of(key.role)));
   }
   return key;
 }

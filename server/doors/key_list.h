@@ -11,7 +11,7 @@
 #include <string>
 #include <tuple>
 
-#include "proto/keys/authorized_keys.h"
+#include "proto/keys/key_file.h"
 #include "server/network/curve/doorkeeper.h"
 
 namespace oblique::server {

@@ -9,7 +9,6 @@ struct DoorSettings {
   std::string listen = "127.0.0.1";  ///< numeric address, "localhost", or "*": all addresses
   std::string keys = {};             ///< the server's key file; empty: none
   bool insecure = false;             ///< lets in whoever reaches the ports, from anywhere
-  std::string keys_origin = {};      ///< where `keys` was said, for messages; empty: not known
 };
 
 /// What stands between the ports and strangers.

@@ -21,15 +21,12 @@
 #include <nlohmann/json.hpp>
 
 #include "proto/frames.h"
-#include "proto/program/completion/complete.h"
-#include "proto/program/configuration/configuration.h"
-#include "proto/program/configuration/log_flags.h"
+#include "proto/program/completion.h"
+#include "proto/program/configuration.h"
 #include "proto/program/exit_code.h"
 #include "proto/program/log.h"
-#include "proto/program/notify.h"
 #include "proto/program/origin/origin.h"
-#include "proto/program/parent.h"
-#include "proto/program/stop_signals.h"
+#include "proto/program/process.h"
 #include "proto/program/usage.h"
 #include "server/loop/loop.h"
 #include "server/program/limits.h"
@@ -169,25 +166,25 @@ void add_options(CLI::App& app, Configuration& configuration, StopWithParent& pa
       ->check(port);
   app.add_option("--client-port", options.client_port, "Port for clients; 0: the system picks one")
       ->check(port);
-  auto* ready = app.add_option("--ready-fd", options.ready_fd,
-                               "File descriptor that gets one line of JSON with both endpoints "
-                               "once the server can be used, and before it a line with a notice "
-                               "for each step of a start that takes long; -1: none")
-                    ->check(objection_to_descriptor);
+  app.add_option("--ready-fd", options.ready_fd,
+                 "File descriptor that gets one line of JSON with both endpoints "
+                 "once the server can be used, and before it a line with a notice "
+                 "for each step of a start that takes long; -1: none")
+      ->check(objection_to_descriptor)
+      ->configurable(false);
   options.http.add_to(app);
-  auto* only = app.add_option("--only-study", loop.service.only_study,
-                              "Hand out points of this study alone; others of the database wait. "
-                              "Empty: of all studies")
-                   ->type_name("NAME");
+  app.add_option("--only-study", loop.service.only_study,
+                 "Hand out points of this study alone; others of the database wait. "
+                 "Empty: of all studies")
+      ->type_name("NAME")
+      ->configurable(false);
   constexpr double kLongestDrain_s = 1e6;
   app.add_option("--drain", options.drain_s,
                  "When told to stop, wait so long for results under way; 0: end at once")
       ->type_name("SECONDS")
       ->check(oblique::protocol::number_between(0.0, kLongestDrain_s));
-  configuration.keep_to_command_line(ready);
-  configuration.keep_to_command_line(only);
-  configuration.keep_to_command_line(parent.add_to(app));
-  add_log_flags(app, configuration, options.log);
+  parent.add_to(app);
+  configuration.add_log_options(options.log);
   add_limits(app, loop.network, loop.service, loop.queries.queue);
 }
 
@@ -209,7 +206,6 @@ std::optional<int> finish_options(const CLI::App& app, const Configuration& conf
     std::cout << configuration.printed();
     return oblique::protocol::kDone;
   }
-  loop.doors.keys_origin = configuration.origin_of("--keys");
   loop.worker_port = options.worker_port == 0 ? "*" : std::to_string(options.worker_port);
   loop.client_port = options.client_port == 0 ? "*" : std::to_string(options.client_port);
   constexpr double kMillisecondsASecond = 1000.0;
@@ -239,7 +235,9 @@ int main(int argc, char** argv) {
                                     {"limits", "log"}});
   try {
     add_options(app, configuration, parent, options);
-    oblique::protocol::answer_shell(app, argc, argv);
+    if (const auto exit_code = oblique::protocol::print_completion(app, argc, argv)) {
+      return *exit_code;
+    }
     if (const auto exit_code = configuration.parse(argc, argv)) {
       return *exit_code;
     }

@@ -23,6 +23,7 @@ Outcome install(const TemporaryFolder& folder, const std::string& prefix,
 
 namespace {
 
+using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::IsSupersetOf;
@@ -150,7 +151,8 @@ TEST(InstallTest, ProgramsHeedTheConfigurationOfTheirPrefix) {
       run_tool(folder, "env",
                {"-u", "OBLIQUE_WORKER_CONFIG", prefix + "/bin/oblique-worker", "--print-config"});
   EXPECT_EQ(worker.exit_code, 0) << worker.err;
-  EXPECT_THAT(worker.out, HasSubstr("# " + prefix + "/etc/oblique/worker.toml:1\n"));
+  EXPECT_THAT(worker.out, AllOf(HasSubstr("read from " + prefix + "/etc/oblique/worker.toml\n"),
+                                HasSubstr("\nserver = \"tcp://lab:7601\"\n")));
 }
 
 TEST(InstallTest, WhatTheInstalledConfigurationSuggestsIsAllowed) {

@@ -62,8 +62,9 @@ class Manifests(unittest.TestCase):
             printed = subprocess.run([PROGRAMS / program, "--print-config"], env=values, text=True,
                                      capture_output=True)
             self.assertEqual(printed.returncode, 0, printed.stderr)
-            for name in values:
-                self.assertRegex(printed.stdout, rf"(?m)environment variable {name}$")
+            for name, value in values.items():
+                key = re.sub("^OBLIQUE_(SERVER_|WORKER_)?", "", name).lower()
+                self.assertRegex(printed.stdout, rf'(?m)^({key}|{key.split("_", 1)[-1]}) = \[?"?{re.escape(str(value))}"?\]?$')
 
     def test_selectors_find_the_pods(self):
         labels = {"oblique-server": SERVER["template"]["metadata"]["labels"],
@@ -83,7 +84,7 @@ class Manifests(unittest.TestCase):
         printed = subprocess.run([PROGRAMS / "oblique-server", "--no-config", "--print-config"], text=True,
                                  capture_output=True).stdout
         for name, key in ("clients", "client_port"), ("workers", "worker_port"):
-            self.assertIn(f"{key} = {ports[name]} ", printed)
+            self.assertIn(f"\n{key} = {ports[name]}\n", printed)
         self.assertTrue(variables(SERVER)["OBLIQUE_SERVER_HTTP"].endswith(f":{ports['http']}"))
         service = OBJECTS["Service", "oblique-server"]["spec"]["ports"]
         self.assertEqual({p["targetPort"]: p["port"] for p in service}, ports)

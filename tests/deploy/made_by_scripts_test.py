@@ -62,7 +62,7 @@ class Origin(InAFolder):
         self.assertEqual(self.origin_of(tree), (commit, "2026-11-20", "false"))
         (tree / "notes").write_text("not known to git")
         self.assertEqual(self.origin_of(tree), (commit, "2026-11-20", "false"))
-        (tree / ORIGIN / "README.md").write_text("changed")
+        (tree / ORIGIN / "origin.h").write_text("changed")
         self.assertEqual(self.origin_of(tree), (commit, "2026-11-20", "true"))
         # A hook of another repository builds it.
         self.assertEqual(self.origin_of(tree, GIT_DIR="/nowhere"), (commit, "2026-11-20", "true"))

@@ -7,7 +7,6 @@
 #include <variant>
 
 #include "proto/keys/curve_key.h"
-#include "proto/keys/role.h"
 
 namespace oblique::server {
 

@@ -1,4 +1,4 @@
-#include "proto/keys/authorized_keys.h"
+#include "proto/keys/key_file.h"
 
 #include <sys/stat.h>
 
@@ -167,19 +167,19 @@ TEST_F(AuthorizedKeysTest, NeverGrowsBeyondWhatIsRead) {
 TEST_F(AuthorizedKeysTest, NamesTheLineOfAnEntryThatIsWrongOrThereTwice) {
   const std::string first = entry(key_called("a"));
   EXPECT_THAT(error_of(first + entry(key_called("a"))),
-              AllOf(HasSubstr("authorized_keys.toml:6: "), HasSubstr("called a already")));
+              AllOf(HasSubstr("authorized_keys.toml:6:"), HasSubstr("called a already")));
   AuthorizedKey same = key_called("a");
   AuthorizedKey other_name = same;
   other_name.name = "b";
   EXPECT_THAT(error_of(entry(same) + entry(other_name)),
-              AllOf(HasSubstr("authorized_keys.toml:6: "), HasSubstr("there already, called a")));
+              AllOf(HasSubstr("authorized_keys.toml:6:"), HasSubstr("there already, called a")));
   EXPECT_THAT(error_of(first + "expires = 3\n"),
-              AllOf(HasSubstr("authorized_keys.toml:6: "), HasSubstr("unknown key `expires`")));
+              AllOf(HasSubstr("authorized_keys.toml:6:"), HasSubstr("unknown key `expires`")));
   EXPECT_THAT(error_of(entry(key_called("s", Role::kServer))),
-              AllOf(HasSubstr("authorized_keys.toml:3: "), HasSubstr("`role`")));
+              AllOf(HasSubstr("authorized_keys.toml:3:"), HasSubstr("`role`")));
   EXPECT_THAT(error_of("[[keys]]\n"), HasSubstr("unknown key `keys`"));
-  EXPECT_THAT(error_of("key = 3\n"), HasSubstr("authorized_keys.toml:1: "));
-  EXPECT_THAT(error_of(first + "["), HasSubstr("authorized_keys.toml:6: "));
+  EXPECT_THAT(error_of("key = 3\n"), HasSubstr("authorized_keys.toml:1:"));
+  EXPECT_THAT(error_of(first + "["), HasSubstr("authorized_keys.toml:6:"));
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "proto/keys/key_folder.h"
+#include "proto/keys/key_file.h"
 
 #include <sys/stat.h>
 
@@ -6,7 +6,6 @@
 #include <fstream>
 #include <stdexcept>
 
-#include "proto/keys/key_file.h"
 #include "tests/support/temporary_folder.h"
 #include "worker/solver/model/errors.h"
 

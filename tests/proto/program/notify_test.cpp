@@ -1,4 +1,4 @@
-#include "proto/program/notify.h"
+#include "proto/program/process.h"
 
 #include <sys/socket.h>
 #include <sys/un.h>

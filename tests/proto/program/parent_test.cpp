@@ -1,4 +1,4 @@
-#include "proto/program/parent.h"
+#include "proto/program/process.h"
 
 #include <sys/prctl.h>
 #include <sys/wait.h>

@@ -1,4 +1,4 @@
-#include "proto/program/stop_signals.h"
+#include "proto/program/process.h"
 
 #include <csignal>
 

@@ -1,4 +1,4 @@
-#include "proto/program/until.h"
+#include "proto/program/usage.h"
 
 #include <chrono>
 #include <cstdlib>

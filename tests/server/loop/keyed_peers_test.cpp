@@ -10,7 +10,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "proto/keys/authorized_keys.h"
 #include "proto/keys/key_file.h"
 #include "tests/server/loop/running_server.h"
 #include "tests/server/network/keyed_peer.h"

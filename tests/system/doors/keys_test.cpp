@@ -83,7 +83,7 @@ TEST_F(KeysTest, WithTheKeysOfTheirRolesAStudyIsSubmittedSolvedAndRead) {
 }
 
 TEST_F(KeysTest, AClientThatIsNotLetInSaysWhyAndWhoseKeyItShowed) {
-  expect_turned_away("", "asks for a key, and none was given");
+  expect_turned_away("", "requires a key, and none was given");
   expect_turned_away(key("worker"), "it is for workers, and this port is for clients");
   const std::string others = folder_.file("others");
   ASSERT_EQ(run_oblique(folder_, {"keygen", others}).exit_code, 0);
@@ -113,14 +113,14 @@ TEST_F(KeysTest, AGoodKeyAtTheOtherPortIsToldThatItMayBeThatOne) {
   wait_until_said(worker, "the server's port for clients (by default 7600), and workers use");
 }
 
-TEST_F(KeysTest, AServerThatIsGivenAKeyOfAnothersNamesTheVariableThatHoldsItAndItsOwn) {
+TEST_F(KeysTest, AServerThatIsGivenAKeyOfAnothersNamesTheVariableOfItsOwn) {
   Process server(folder_, server_program(),
                  {"--db", folder_.file("a.db"), "--worker-port", "0", "--client-port", "0"},
                  Environment{{"OBLIQUE_KEYS", key("client")}});
   EXPECT_NE(server.wait(), 0);
   EXPECT_THAT(server.err(),
-              AllOf(HasSubstr(key("client")), HasSubstr("environment variable OBLIQUE_KEYS"),
-                    HasSubstr("--keys or OBLIQUE_SERVER_KEYS")));
+              AllOf(HasSubstr(key("client")),
+                    HasSubstr("--keys or OBLIQUE_SERVER_KEYS, which override OBLIQUE_KEYS")));
 }
 
 TEST_F(KeysTest, AKeyFileThatOthersMayReadIsWrongUsageWithTheRemedy) {
@@ -144,7 +144,7 @@ TEST_F(KeysTest, AWorkerThatIsNotLetInSaysWhyAndGoesOnTryingSlowly) {
   const auto client = worker_with(key("client"));
   wait_until_said(*client, "it is for clients, and this port is for workers: trying again in 2 s");
   const Worker keyless(folder_, server_->worker_url());
-  wait_until_said(keyless, "asks for a key, and none was given");
+  wait_until_said(keyless, "requires a key, and none was given");
   wait_until_said(*client, "trying again in 4 s");
 }
 

@@ -65,7 +65,7 @@ std::vector<std::string> flags_with_values(const TemporaryFolder& folder,
   help.wait();
   std::istringstream lines(help.out());
   std::vector<std::string> flags;
-  const std::regex flag(R"(^\s+(?:-\w,)?(--[a-z-]+) [A-Z]+.*)");
+  const std::regex flag(R"(^\s+(?:-\w,)?(--[a-z-]+) (?!Excludes)[A-Z]+.*)");
   std::smatch found;
   for (std::string line; std::getline(lines, line);) {
     if (std::regex_match(line, found, flag)) {

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include <toml++/toml.h>
+
+#include "worker/solver/model/errors.h"
+
+namespace oblique::protocol {
+
+/// "a table", "a list", "a string", "a boolean", "a number" or "a date or time".
+std::string kind_of(const toml::node& node);
+
+/// A value as the file has it, on one line and shortened for a message.
+std::string shown(const toml::node& node);
+
+/// Reads a TOML file: studies, keys and settings. Every error is a solver::InputError that begins
+/// with file, line and column, as "study.toml:3:6: ".
+class TomlReader {
+ public:
+  /// `file` is the name that errors give.
+  explicit TomlReader(std::string file) : file_(std::move(file)) {}
+
+  const std::string& file() const { return file_; }
+
+  /// The content of the file. Keys with more than 8 parts between dots are refused: tables nest as
+  /// deep, and destroying them takes stack for each level.
+  toml::table parse(std::string_view text) const;
+
+  /// Throws the error `message` about the node or key `at`.
+  template <typename At>
+  [[noreturn]] void fail(const At& at, std::string_view message) const {
+    fail_at(at.source(), message);
+  }
+
+  /// The beginning of an error: "study.toml:3:6: "
+  std::string before(const toml::source_region& at) const;
+
+  /// Runs `work` and puts the place before an InputError that it throws.
+  template <typename At, typename Work>
+  decltype(auto) located(const At& at, Work work) const {
+    try {
+      return work();
+    } catch (const solver::InputError& error) {
+      fail(at, error.what());
+    }
+  }
+
+  // The value of a node that must be of that type; `key` and `expected` are for the message.
+  double number(std::string_view key, const toml::node& node, std::string_view expected) const;
+  std::string text(std::string_view key, const toml::node& node, std::string_view expected) const;
+  bool yes(std::string_view key, const toml::node& node) const;
+  const toml::table& table(std::string_view key, const toml::node& node,
+                           std::string_view expected) const;
+
+  /// Refuses a key of `table` that is not in `known`, as "`before`unknown key `muu` (did you mean
+  /// `mu`?): `rule`".
+  void refuse_unknown(const toml::table& table, std::span<const std::string_view> known,
+                      std::string_view before, std::string_view rule) const;
+
+ private:
+  [[noreturn]] void fail_at(const toml::source_region& at, std::string_view message) const;
+
+  std::string file_;
+};
+
+}  // namespace oblique::protocol
