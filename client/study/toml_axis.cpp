@@ -13,7 +13,6 @@
 #include "client/study/toml_text.h"
 #include "proto/recipe/keys.h"
 #include "proto/recipe/written/written_axis.h"
-#include "proto/recipe/written/written_sample.h"
 #include "proto/suggestion.h"
 
 namespace oblique::client {

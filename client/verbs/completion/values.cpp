@@ -9,7 +9,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/recipe/written/written_sample.h"
+#include "proto/recipe/written/written_axis.h"
 #include "server/asking/columns.h"
 #include "worker/solver/model/parameters.h"
 
