@@ -1,11 +1,11 @@
 #include "proto/recipe/checks.h"
 
 #include <algorithm>
+#include <bitset>
 #include <cmath>
 #include <cstddef>
 #include <functional>
 #include <limits>
-#include <set>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -198,15 +198,15 @@ void check_values(const ParameterKey& key, const Axis& axis, BlockKind kind) {
 
 /// Checks each axis alone, and that a block has each key once, and H, mu and e last.
 void check_axes(const Block& block) {
-  std::set<std::size_t> keys;
+  std::bitset<128> keys;
   for (const Axis& axis : block.axes()) {
     const std::size_t number = key_number(axis.key());
-    require(keys.insert(number).second, "{} appears twice: an axis is given once in a block",
-            axis.key());
+    require(!keys.test(number), "{} appears twice: an axis is given once in a block", axis.key());
+    keys.set(number);
     check_values(key_numbered(number), axis, block_kind(block));
   }
   for (const auto& key : solver::point_keys()) {
-    if (!keys.contains(key_number(key.name))) {
+    if (!keys.test(key_number(key.name))) {
       throw MissingKey(fmt::format("{} is missing: every block needs H, mu and e ({}: {}, {})",
                                    key.name, key.name, key.meaning, key.allowed));
     }

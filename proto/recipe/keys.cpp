@@ -50,8 +50,11 @@ constexpr auto kLengthKeys = []<std::size_t... links>(std::index_sequence<links.
 (std::make_index_sequence<kMostLinks>());
 
 std::optional<std::size_t> find_key_number(std::string_view name) {
+  const bool is_length = name.starts_with("length");
   for (std::size_t number = 0; number < key_count(); ++number) {
-    if (key_numbered(number).name == name) {
+    if (link_of_key(number) && !is_length) {
+      number += kMostLinks - 1;  // none of the single lengths
+    } else if (key_numbered(number).name == name) {
       return number;
     }
   }
