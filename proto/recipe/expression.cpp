@@ -321,7 +321,8 @@ double Expression::value_at(std::span<const double> values) {
     }
     ++end;
   }
-  return stack_.front();
+  const double value = stack_.front();
+  return std::isnan(value) ? std::numeric_limits<double>::quiet_NaN() : value;  // without a sign
 }
 
 }  // namespace oblique::expressions

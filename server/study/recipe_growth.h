@@ -19,9 +19,8 @@ struct Growth {
   std::string difference;
 };
 
-/// Compares two checked recipes block by block, as they are written: a list is not the range with
-/// the same values. A study grows by blocks behind its own, and by a larger count of its last
-/// block's sample unless that is a Latin hypercube.
+/// Compares two checked recipes block by block, as they are written. A study grows by blocks behind
+/// its own, and by a larger count of its last block's sample unless that is a Latin hypercube.
 Growth growth_of(const protocol::Recipe& stored, const protocol::Recipe& given);
 
 }  // namespace oblique::server

@@ -104,6 +104,16 @@ TEST(Canonical, ModelErrorsBlocksAndTheOrderOfAxesCount) {
   }
 }
 
+TEST(Canonical, OnlyARangeOfOneOrTwoValuesIsTheSameAsItsList) {
+  const auto of = [](const Axis& mu) {
+    return filtered({listed("H", {1.0}), mu, listed("e", {1.0})}, "");
+  };
+  EXPECT_TRUE(is_same_block(of(range("mu", 0.4, 0.4, 1)), of(listed("mu", {0.4}))));
+  EXPECT_TRUE(is_same_block(of(log_range("mu", 0.1, 0.4, 2)), of(listed("mu", {0.1, 0.4}))));
+  EXPECT_FALSE(is_same_block(of(range("mu", 0.1, 0.4, 2)), of(listed("mu", {0.4, 0.1}))));
+  EXPECT_FALSE(is_same_block(of(range("mu", 0.1, 0.3, 3)), of(listed("mu", {0.1, 0.2, 0.3}))));
+}
+
 TEST(Canonical, WhatIsNoPartOfABlockChangesNothing) {
   const Recipe recipe = recipe_of({kPoint});
   Recipe padded;

@@ -31,7 +31,7 @@ protocol::Recipe blocks_of(const std::vector<protocol::Axis>& mus) {
 const protocol::Axis kFiveMus = range("mu", 0.1, 0.5, 5);
 const protocol::Axis kTwoMus = listed("mu", {0.7, 0.9});
 
-protocol::Recipe sample_of(protocol::SampleKind kind, std::uint64_t count) {
+protocol::Recipe recipe_of_sample(protocol::SampleKind kind, std::uint64_t count) {
   return protocol::recipe_of_blocks({protocol::sampled(
       {protocol::uniform("H", 0.3, 1.1), listed("mu", {0.4}), listed("e", {1.0})}, kind, count)});
 }
@@ -87,22 +87,26 @@ TEST(RecipeGrowth, ModelsWithOtherSingleLengthsDiffer) {
 
 TEST(RecipeGrowth, ALargerSampleIsLongerUnlessItIsALatinHypercube) {
   for (const auto kind : {protocol::SAMPLE_RANDOM, protocol::SAMPLE_SOBOL}) {
-    EXPECT_EQ(growth_of(sample_of(kind, 10), sample_of(kind, 20)).kind, Growth::Kind::kLonger);
-    const Growth smaller = growth_of(sample_of(kind, 20), sample_of(kind, 10));
+    EXPECT_EQ(growth_of(recipe_of_sample(kind, 10), recipe_of_sample(kind, 20)).kind,
+              Growth::Kind::kLonger);
+    const Growth smaller = growth_of(recipe_of_sample(kind, 20), recipe_of_sample(kind, 10));
     EXPECT_EQ(smaller.kind, Growth::Kind::kShorter);
     EXPECT_EQ(smaller.difference, "block 1: stored a sample of 20 points, given 10");
   }
   constexpr auto kHypercube = protocol::SAMPLE_LATIN_HYPERCUBE;
-  EXPECT_THAT(growth_of(sample_of(kHypercube, 10), sample_of(kHypercube, 20)).difference,
-              HasSubstr("cannot grow"));
-  EXPECT_EQ(growth_of(sample_of(protocol::SAMPLE_RANDOM, 10), sample_of(kHypercube, 20)).difference,
-            "block 1 differs");
+  EXPECT_THAT(
+      growth_of(recipe_of_sample(kHypercube, 10), recipe_of_sample(kHypercube, 20)).difference,
+      HasSubstr("cannot grow"));
+  EXPECT_EQ(
+      growth_of(recipe_of_sample(protocol::SAMPLE_RANDOM, 10), recipe_of_sample(kHypercube, 20))
+          .difference,
+      "block 1 differs");
 }
 
 TEST(RecipeGrowth, OnlyTheLastBlockMayBeALargerSample) {
-  auto stored = sample_of(protocol::SAMPLE_SOBOL, 10);
+  auto stored = recipe_of_sample(protocol::SAMPLE_SOBOL, 10);
   *stored.add_blocks() = blocks_of({kTwoMus}).blocks(0);
-  auto given = sample_of(protocol::SAMPLE_SOBOL, 20);
+  auto given = recipe_of_sample(protocol::SAMPLE_SOBOL, 20);
   *given.add_blocks() = stored.blocks(1);
   EXPECT_EQ(growth_of(stored, given).difference, "block 1 differs");
 }
