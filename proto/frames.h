@@ -11,7 +11,7 @@
 namespace oblique::protocol {
 
 /// Peers of any other version are refused with both numbers in the reason.
-inline constexpr std::uint32_t kProtocolVersion = 6;
+inline constexpr std::uint32_t kProtocolVersion = 7;
 
 /// Largest frame that either side takes; a longer one is a foreign or broken peer.
 inline constexpr std::size_t kMaxFrameBytes = std::size_t{16} * 1024 * 1024;

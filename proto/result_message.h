@@ -15,14 +15,15 @@ namespace oblique::protocol {
 inline constexpr double kLargestOutput = 1e100;
 /// Most elements of a list in a result, as peaks. Honest ones have dozens.
 inline constexpr int kMostListElements = 4096;
+/// Most ranges of points that a filter leaves out, in one message.
+inline constexpr int kMostLeftOutRanges = 10'000;
 /// Most bytes of a result.
 inline constexpr std::size_t kMostResultBytes = std::size_t{1} << 20U;
 
 // What a worker sends of a solved point. The scalars are those of solver::result_fields(), in its
 // order and without their names, which the worker says once, when it joins.
 
-/// What solving a point gave, but for H, mu and e, which follow from the point's number, and the
-/// integrator and version of the solver, which are the study's and the worker's.
+/// What solving a point gave, without its inputs (proto/recipe/point_inputs.h).
 PointResult to_message(std::uint64_t point, const solver::CaseResult& result);
 
 /// The result that was made a message; what it does not hold is 0 or empty.

@@ -48,6 +48,19 @@ std::uint64_t Batch::first_to_solve(std::uint64_t at, std::uint64_t end) const {
   return end;
 }
 
+void Batch::append_points(std::uint64_t begin, std::uint64_t end,
+                          std::vector<Range>& ranges) const {
+  while (begin < end) {
+    const std::uint64_t run_end = std::min(end_of_run(run_of(begin)), end);
+    const std::uint64_t first = point_at(begin);
+    if (ranges.empty() || ranges.back().end != first) {
+      ranges.push_back({first, first});
+    }
+    ranges.back().end = first + (run_end - begin);
+    begin = run_end;
+  }
+}
+
 std::uint64_t Batch::end_of_model(std::uint64_t position) const {
   const std::uint64_t point = point_at(position);
   const protocol::Segment segment = points_->segment_at(point);
@@ -74,15 +87,10 @@ std::optional<std::vector<Batch::Range>> ranges_of(const protocol::Batch& messag
                                                           : std::optional(std::move(ranges));
 }
 
-std::uint64_t points_to_solve(const Batch& batch) {
-  constexpr std::uint64_t kMostLooks = 100'000;
-  if (!batch.points().has_filter() || batch.size() > kMostLooks) {
-    return batch.size();
-  }
+std::uint64_t size_of(const std::vector<Batch::Range>& ranges) {
   std::uint64_t points = 0;
-  for (std::uint64_t at = batch.first_to_solve(0, batch.size()); at < batch.size();
-       at = batch.first_to_solve(at + 1, batch.size())) {
-    ++points;
+  for (const Batch::Range& range : ranges) {
+    points += range.end - range.begin;
   }
   return points;
 }

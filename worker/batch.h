@@ -33,6 +33,8 @@ class Batch {
   std::uint64_t point_at(std::uint64_t position) const;
   /// The first position of [at, end) whose point a filter leaves in, or `end`.
   std::uint64_t first_to_solve(std::uint64_t at, std::uint64_t end) const;
+  /// Appends the points at the positions [begin, end) to `ranges`, the last of which may grow.
+  void append_points(std::uint64_t begin, std::uint64_t end, std::vector<Range>& ranges) const;
   /// The position behind the points from `position` on that follow each other and share a model.
   std::uint64_t end_of_model(std::uint64_t position) const;
 
@@ -57,17 +59,17 @@ class Batch {
 std::optional<std::vector<Batch::Range>> ranges_of(const protocol::Batch& message,
                                                    std::uint64_t study_points);
 
-/// How many points of a batch are to be solved. With a filter each point is looked at, which is
-/// cheap in a batch of usual size.
-std::uint64_t points_to_solve(const Batch& batch);
-
-/// Points of one batch that were solved since the last report of it.
+/// Points of one batch that were solved or found to be left out since the last report of it.
 struct Progress {
   std::uint64_t batch;
   std::uint64_t study_id;
   std::vector<protocol::PointResult> results;
-  double busy_s;    ///< time spent solving them
-  bool batch_done;  ///< no more will come
+  double busy_s;                         ///< time spent on them
+  bool batch_done;                       ///< no more will come
+  std::vector<Batch::Range> left_out{};  ///< points that a filter leaves out
 };
+
+/// How many points these ranges have.
+std::uint64_t size_of(const std::vector<Batch::Range>& ranges);
 
 }  // namespace oblique::worker

@@ -96,7 +96,7 @@ std::vector<Progress> BatchSolver::collect() {
 
 Progress& BatchSolver::progress_of(const Batch& batch) {
   return progress_
-      .try_emplace(batch.number(), Progress{batch.number(), batch.study_id(), {}, 0.0, false})
+      .try_emplace(batch.number(), Progress{batch.number(), batch.study_id(), {}, 0.0, false, {}})
       .first->second;
 }
 
@@ -115,7 +115,7 @@ BatchSolver::OpenBatches::iterator BatchSolver::next_batch() {
 void BatchSolver::work(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   while (changed_.wait(lock, stop, [this] { return !paused_ && next_batch() != open_.end(); })) {
-    Task task{next_batch(), 0, 0, {}, Clock::now()};
+    Task task{next_batch(), 0, 0, {}, {}, Clock::now()};
     ++task.batch->solvers;
     const Batch& batch = task.batch->batch;  // stays while a thread is at work on it
     lock.unlock();
@@ -145,7 +145,10 @@ void BatchSolver::work(const std::stop_token& stop) {
 
 std::optional<std::uint64_t> BatchSolver::next_point(Task& task, const std::stop_token& stop) {
   do {
-    task.next = task.batch->batch.first_to_solve(task.next, task.end);
+    const Batch& batch = task.batch->batch;
+    const std::uint64_t found = batch.first_to_solve(task.next, task.end);
+    batch.append_points(task.next, found, task.left_out);
+    task.next = found;
     if (task.next < task.end) {
       if (task.batch->dropped) {  // points may be slow: the rest of the task is not waited for
         return std::nullopt;
@@ -187,7 +190,7 @@ void BatchSolver::take(Task& task, protocol::PointResult&& result) {
 
 /// Needs the lock.
 void BatchSolver::hand_on(Task& task) {
-  if (task.results.empty()) {
+  if (task.results.empty() && task.left_out.empty()) {
     return;  // the time since is that of results to come
   }
   const Clock::time_point now = Clock::now();
@@ -195,9 +198,11 @@ void BatchSolver::hand_on(Task& task) {
     Progress& progress = progress_of(task.batch->batch);
     progress.results.insert(progress.results.end(), std::move_iterator(task.results.begin()),
                             std::move_iterator(task.results.end()));
+    progress.left_out.insert(progress.left_out.end(), task.left_out.begin(), task.left_out.end());
     progress.busy_s += std::chrono::duration<double>(now - task.busy_since).count();
   }
   task.results.clear();
+  task.left_out.clear();
   task.busy_since = now;
 }
 

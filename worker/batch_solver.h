@@ -20,9 +20,9 @@ namespace oblique::worker {
 
 /// Solves batches, those of the highest priority first, of these in the order in which they were
 /// added, on threads of its own, so that solving never holds up heartbeats. Points that a filter
-/// leaves out are passed over. The threads take each batch apart into tasks, each one point or a
-/// few, and meet in a lock once a task: then they leave it for one of a higher priority, and come
-/// back to it.
+/// leaves out are named and not solved. The threads take each batch apart into tasks, each one
+/// point or a few, and meet in a lock once a task: then they leave it for one of a higher priority,
+/// and come back to it.
 class BatchSolver {
  public:
   /// Gives the position in the batch of the next point to solve; nothing when there is none.
@@ -85,6 +85,7 @@ class BatchSolver {
     std::uint64_t next = 0;                      ///< position
     std::uint64_t end = 0;                       ///< past the last position
     std::vector<protocol::PointResult> results;  ///< not handed on yet
+    std::vector<Batch::Range> left_out;          ///< the same, of points that a filter leaves out
     Clock::time_point busy_since;                ///< work before this is handed on
   };
 

@@ -279,10 +279,9 @@ void Conversation::on(const protocol::Batch& batch) {
   }
   backoff_ms_ = 0;
   const Batch taken(next_batch_++, batch.study_id(), *ranges, study->second, batch.priority());
-  const std::uint64_t points = points_to_solve(taken);
-  held_[taken.number()] = {batch.study_id(), batch.lease_id(), batch.attempt(), points};
+  held_[taken.number()] = {batch.study_id(), batch.lease_id(), batch.attempt(), taken.size()};
   leaving_.note_work(now_ms_);
-  leaving_.note_batch({batch.study_id(), points});
+  leaving_.note_batch({batch.study_id(), taken.size()});
   effects_.emplace_back(Solve{taken});
   give_back_what_takes_too_long();
 }

@@ -28,7 +28,8 @@ Effects Conversation::on_progress(std::vector<Progress> progress, std::int64_t n
   }
   for (Progress& part : progress) {
     leaving_.note_work(now_ms);
-    leaving_.note_solved({part.study_id, part.results.size()}, part.busy_s);
+    leaving_.note_solved({part.study_id, part.results.size() + size_of(part.left_out)},
+                         part.busy_s);
     report(part);
   }
   give_back_what_takes_too_long();
@@ -54,7 +55,18 @@ void Conversation::report(Progress& progress) {
                                  ? 0.0
                                  : progress.busy_s / static_cast<double>(progress.results.size());
   protocol::Results results = new_message();
-  std::size_t bytes = 0;
+  results.set_busy_s(progress.results.empty() ? progress.busy_s : 0.0);
+  // Without the lease of its batch the server takes no range: it hands these points out again.
+  for (std::size_t i = 0; found != held_.end() && i < progress.left_out.size(); ++i) {
+    if (results.left_out_size() >= 2 * protocol::kMostLeftOutRanges) {
+      outbox_.add(std::exchange(results, new_message()));
+      deliver();
+    }
+    const Batch::Range& range = progress.left_out[i];
+    results.add_left_out(range.begin);
+    results.add_left_out(range.end - range.begin);
+  }
+  std::size_t bytes = results.ByteSizeLong();
   for (protocol::PointResult& result : progress.results) {
     if (result.ByteSizeLong() > settings_.most_bytes_a_result) {
       result = protocol::failed_point(result.point(), "its result is too large to send");
@@ -72,15 +84,15 @@ void Conversation::report(Progress& progress) {
     *results.add_results() = std::move(result);
   }
   if (found != held_.end()) {
-    found->second.points_left -=
-        std::min<std::uint64_t>(found->second.points_left, progress.results.size());
+    found->second.points_left -= std::min<std::uint64_t>(
+        found->second.points_left, progress.results.size() + size_of(progress.left_out));
   }
   const bool ends_lease = progress.batch_done && found != held_.end();
   results.set_batch_done(ends_lease);
   if (ends_lease) {
     held_.erase(found);
   }
-  if (ends_lease || results.results_size() > 0) {
+  if (ends_lease || results.results_size() > 0 || results.left_out_size() > 0) {
     outbox_.add(std::move(results));
     deliver();
   }

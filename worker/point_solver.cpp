@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "proto/recipe/model_message.h"
+#include "proto/recipe/point_inputs.h"
 #include "proto/result_message.h"
 #include "worker/solver/estimate.h"
 #include "worker/solver/library/point_runs.h"
@@ -69,9 +70,12 @@ class BatchPoints : public solver::PointSource {
 void PointSolver::solve(const Batch& batch, const BatchSolver::NextPoint& next,
                         const BatchSolver::TakeResult& take) {
   BatchPoints points(batch, next);
-  solver::solve_points_of_models(
-      points, falls_, batch.points().wants_errors(),
-      [&take](solver::PointOutcome&& outcome) { take(message_of(outcome)); });
+  solver::solve_points_of_models(points, falls_, batch.points().wants_errors(),
+                                 [&](solver::PointOutcome&& outcome) {
+                                   protocol::PointResult result = message_of(outcome);
+                                   protocol::set_inputs(result, batch.points());
+                                   take(std::move(result));
+                                 });
 }
 
 protocol::PointResult PointSolver::trace(const protocol::TraceOrder& order,

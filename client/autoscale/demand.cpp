@@ -1,4 +1,5 @@
 #include "client/autoscale/demand.h"
+#include "proto/study_counts.h"
 
 #include <algorithm>
 
@@ -16,7 +17,7 @@ Demand demand_of(const protocol::StatusReply& studies, const protocol::WorkersRe
                  const JobOfWorker& job_of_worker) {
   Demand demand;
   for (const auto& study : studies.studies()) {
-    const std::uint64_t settled = std::min(study.points(), study.solved() + study.failed());
+    const std::uint64_t settled = std::min(study.points(), protocol::completed_points(study));
     demand.settled_points += settled;
     if (study.state() != "running") {
       continue;

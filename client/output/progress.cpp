@@ -49,6 +49,9 @@ std::string progress_bar(const ProgressState& state, std::size_t columns) {
   if (state.failed > 0) {
     end += fmt::format(", {} failed", shown_count(state.failed));
   }
+  if (state.left_out > 0) {
+    end += fmt::format(", {} left out", shown_count(state.left_out));
+  }
   if (state.points_per_s) {
     end += fmt::format(", {} points/s", shown_rate(*state.points_per_s));
   }
@@ -78,6 +81,9 @@ std::string progress_line(const ProgressState& state) {
                   shown_count(state.settled), shown_count(state.points), percent(state));
   if (state.failed > 0) {
     text += fmt::format(", {} of them failed", shown_count(state.failed));
+  }
+  if (state.left_out > 0) {
+    text += fmt::format(", {} left out by where", shown_count(state.left_out));
   }
   if (state.points_per_s) {
     text += fmt::format(", {} points/s", shown_rate(*state.points_per_s));

@@ -16,8 +16,9 @@ namespace oblique::client {
 struct ProgressState {
   std::string study;
   std::uint64_t points = 0;
-  std::uint64_t settled = 0;  ///< solved or failed
+  std::uint64_t settled = 0;  ///< solved, failed or left out by a filter
   std::uint64_t failed = 0;
+  std::uint64_t left_out = 0;
   double elapsed_s = 0.0;                   ///< since the watching began
   std::optional<double> points_per_s = {};  ///< unknown until something moved
 };

@@ -204,6 +204,7 @@ class Database {
       named["points"] = study.points();
       named["solved"] = study.solved();
       named["failed"] = study.failed();
+      named["left_out"] = study.left_out();
       named["created_at"] = study.created_at();
       named["solver_version"] = study.solver_version();
       all.append(named);

@@ -13,6 +13,7 @@
 #include "client/service/connection.h"
 #include "client/service/result_query.h"
 #include "client/service/watching.h"
+#include "proto/study_counts.h"
 #include "proto/text.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/version.h"
@@ -55,8 +56,7 @@ std::string objection_to_waiting(const protocol::StudyStatus& status) {
       "solve "
       "its other {3} points. Go on with --mix-versions, where each row says which solver it is of, "
       "with workers of {1}, or under another name, as --name {0}-{2}",
-      status.name(), status.solver_version(), own,
-      shown_count(status.points() - status.solved() - status.failed()));
+      status.name(), status.solver_version(), own, shown_count(protocol::open_points(status)));
 }
 
 /// Names the other studies of the database that are not finished. They wait during this run.
@@ -68,7 +68,7 @@ void tell_of_other_studies(Connection& connection, const Study& study,
   for (const auto& other : all.studies()) {
     if (other.name() != study.name && other.state() == "running") {
       others.push_back(fmt::format("{} ({} points open)", other.name(),
-                                   shown_count(other.points() - other.solved() - other.failed())));
+                                   shown_count(protocol::open_points(other))));
     }
   }
   if (others.empty()) {

@@ -3,6 +3,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/output/progress.h"
+#include "proto/study_counts.h"
 
 namespace oblique::client {
 
@@ -21,7 +22,7 @@ std::string WatchTeller::wait_to_tell(const protocol::StudyStatus& status, Secon
 
 std::string WatchTeller::update(const protocol::StudyStatus& status, Seconds elapsed) {
   auto sentence = wait_to_tell(status, elapsed);
-  const std::uint64_t settled = status.solved() + status.failed();
+  const std::uint64_t settled = protocol::completed_points(status);
   if (settled != settled_ || !status.waits_for().empty()) {
     settled_ = settled;
     settled_since_ = elapsed;

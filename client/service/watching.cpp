@@ -13,6 +13,7 @@
 #include "client/output/terminal.h"
 #include "client/service/watch_teller.h"
 #include "proto/program/exit_code.h"
+#include "proto/study_counts.h"
 #include "proto/text.h"
 #include "server/asking/sql/sql_expression.h"
 
@@ -71,11 +72,12 @@ protocol::StudyStatus watch_study(const AskStatus& ask, protocol::StopSignals& s
   for (;;) {
     auto status = ask(tell);
     const Seconds elapsed = Clock::now() - start;
-    const std::uint64_t settled = status.solved() + status.failed();
+    const std::uint64_t settled = protocol::completed_points(status);
     progress.update({.study = status.name(),
                      .points = status.points(),
                      .settled = settled,
                      .failed = status.failed(),
+                     .left_out = status.left_out(),
                      .elapsed_s = elapsed.count()});
     if (const auto sentence = teller.update(status, elapsed); !sentence.empty()) {
       tell(sentence);
@@ -125,7 +127,8 @@ int tell_end(const protocol::StudyStatus& status,
   if (status.state() == "cancelled") {
     std::cerr << "The study is cancelled; oblique resume goes on with it.\n";
   }
-  return status.solved() == status.points() ? protocol::kDone : protocol::kFailed;
+  return status.solved() + status.left_out() == status.points() ? protocol::kDone
+                                                                : protocol::kFailed;
 }
 
 void tell_if_insecure(const std::string& access, const std::string& place) {
@@ -161,8 +164,9 @@ std::string taken_over(const protocol::TakenOver& taken) {
 
 protocol::QueryReply table_of(const std::vector<protocol::StudyStatus>& studies) {
   protocol::QueryReply table;
-  for (const char* column : {"study", "state", "points", "solved", "failed", "leased",
-                             "points_per_s", "created_at", "priority", "weight", "waits_for"}) {
+  for (const char* column :
+       {"study", "state", "points", "solved", "failed", "leased", "points_per_s", "created_at",
+        "priority", "weight", "waits_for", "left_out"}) {
     table.add_columns(column);
   }
   const bool any_taken = std::any_of(studies.begin(), studies.end(),
@@ -182,6 +186,7 @@ protocol::QueryReply table_of(const std::vector<protocol::StudyStatus>& studies)
     add_value(row, static_cast<std::int64_t>(study.priority()));
     add_value(row, study.weight());
     add_value(row, study.waits_for());
+    add_value(row, static_cast<std::int64_t>(study.left_out()));
     if (any_taken) {
       add_value(row, static_cast<std::int64_t>(study.taken().points()));
     }

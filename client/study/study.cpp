@@ -25,21 +25,16 @@ Subject subject_of(std::string_view sentence) {
   return {block - 1, sentence.substr(0, sentence.find_first_of(" :"))};
 }
 
-bool judge_points(protocol::PointTable& table, const Located& located,
-                  const std::function<bool()>& goes_on) {
+void judge_points(const protocol::PointTable& table, const Located& located) {
   try {
-    return !table.needs_survey() || table.survey(goes_on);
+    table.judge_points();
   } catch (const solver::InputError& error) {
     throw solver::InputError(located ? located(error.what()) : error.what());
   }
 }
 
 void judge_points(const Study& study) {
-  constexpr std::uint64_t kMostJudged = 10'000'000;
-  protocol::PointTable table(study.recipe);
-  if (table.size() <= kMostJudged) {
-    judge_points(table, study.located);
-  }
+  judge_points(protocol::PointTable(study.recipe), study.located);
 }
 
 }  // namespace oblique::client

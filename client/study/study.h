@@ -10,8 +10,8 @@
 
 namespace oblique::client {
 
-/// Puts the place of what a sentence of PointTable::survey speaks of before it: file, line and
-/// column, or the flag.
+/// Puts the place of what a sentence of PointTable::judge_points speaks of before it: file, line
+/// and column, or the flag.
 using Located = std::function<std::string(const std::string& sentence)>;
 
 /// A study as people write it: a name and what makes its points.
@@ -21,21 +21,16 @@ struct Study {
   Located located = {};  ///< none: no place is known
 };
 
-/// What a sentence of PointTable::survey speaks of, by its beginning.
+/// What a sentence of PointTable::judge_points speaks of, by its beginning.
 struct Subject {
   std::size_t block;     ///< its number, from 0
   std::string_view key;  ///< of an axis, or `where`; part of the sentence
 };
 Subject subject_of(std::string_view sentence);
 
-/// Judges what only the points tell and counts what filters leave in (PointTable::survey, which
-/// `goes_on` is for too). False when that was ended. Throws solver::InputError with the place.
-bool judge_points(
-    protocol::PointTable& table, const Located& located,
-    const std::function<bool()>& goes_on = [] { return true; });
-
-/// The same of a study that goes to a server, unless its points are more than a second's work,
-/// which the server judges.
+/// Judges what only the points tell (PointTable::judge_points). Throws solver::InputError with the
+/// place.
+void judge_points(const protocol::PointTable& table, const Located& located);
 void judge_points(const Study& study);
 
 }  // namespace oblique::client

@@ -8,6 +8,7 @@
 #include "client/service/connection.h"
 #include "client/service/source_flags.h"
 #include "client/verbs/verbs.h"
+#include "proto/study_counts.h"
 #include "proto/text.h"
 
 namespace oblique::client {
@@ -28,7 +29,7 @@ int change(const ChangeFlags& flags, protocol::StudyChange change) {
           : "";
   std::cout << fmt::format("{}: {}, {} of {} points done{}\n", protocol::visible(status.name()),
                            protocol::visible(status.state()),
-                           shown_count(status.solved() + status.failed()),
+                           shown_count(protocol::completed_points(status)),
                            shown_count(status.points()), again);
   return kDone;
 }

@@ -3,7 +3,6 @@
 #include <stdexcept>
 #include <string>
 
-#include "client/output/unjudged_note.h"
 #include "client/output/value_notes.h"
 #include "client/service/connection.h"
 #include "client/service/embedded_service.h"
@@ -36,7 +35,6 @@ int run(const RunFlags& flags) {
   const auto study = study_of_flags(flags.study, tip_reach());
   judge_points(study);
   check_settings(flags.settings);
-  tell_unjudged(std::cerr, study.recipe);
   tell_values(std::cerr, study.recipe);
   // Before any thread is started; see StopSignals.
   protocol::StopSignals stop;

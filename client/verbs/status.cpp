@@ -13,6 +13,7 @@
 #include "client/service/watching.h"
 #include "client/verbs/printed_rows.h"
 #include "client/verbs/verbs.h"
+#include "proto/study_counts.h"
 #include "proto/text.h"
 
 namespace oblique::client {
@@ -54,7 +55,7 @@ std::string version_of(const protocol::StudyStatus& study) {
 
 int percent_done(const protocol::StudyStatus& study) {
   // Rounded down: 100 % is said of nothing unfinished.
-  const auto done = static_cast<double>(study.solved() + study.failed());
+  const auto done = static_cast<double>(protocol::completed_points(study));
   return study.points() == 0 ? 100
                              : static_cast<int>(100.0 * done / static_cast<double>(study.points()));
 }
@@ -64,6 +65,8 @@ protocol::QueryReply table_for_people(const std::vector<protocol::StudyStatus>& 
   constexpr std::size_t kNameBytes = 18;
   const bool any_failed = std::any_of(studies.begin(), studies.end(),
                                       [](const auto& study) { return study.failed() > 0; });
+  const bool any_left_out = std::any_of(studies.begin(), studies.end(),
+                                        [](const auto& study) { return study.left_out() > 0; });
   // A file does not say it.
   const bool any_version = std::any_of(
       studies.begin(), studies.end(), [](const auto& study) { return !version_of(study).empty(); });
@@ -73,6 +76,9 @@ protocol::QueryReply table_for_people(const std::vector<protocol::StudyStatus>& 
   }
   if (any_failed) {
     table.add_columns("failed");
+  }
+  if (any_left_out) {
+    table.add_columns("left out");
   }
   for (const char* column : {"points/s", "prio", "weight"}) {
     table.add_columns(column);
@@ -90,6 +96,9 @@ protocol::QueryReply table_for_people(const std::vector<protocol::StudyStatus>& 
     add_value(row, fmt::format("{} %", percent_done(study)));
     if (any_failed) {
       add_value(row, shown_count(study.failed()));
+    }
+    if (any_left_out) {
+      add_value(row, shown_count(study.left_out()));
     }
     add_value(row, study.points_per_s() > 0 ? shown_rate(study.points_per_s()) : std::string());
     add_value(row, static_cast<std::int64_t>(study.priority()));

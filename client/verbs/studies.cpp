@@ -7,6 +7,7 @@
 #include "client/service/source_flags.h"
 #include "client/verbs/printed_rows.h"
 #include "client/verbs/verbs.h"
+#include "proto/study_counts.h"
 
 namespace oblique::client {
 namespace {
@@ -31,7 +32,7 @@ int studies(const StudiesFlags& flags) {
     auto& row = *table.add_rows();
     add_value(row, study.name());
     add_value(row, study.state());
-    for (const auto count : {study.points(), study.solved() + study.failed()}) {
+    for (const auto count : {study.points(), protocol::completed_points(study)}) {
       if (is_for_people(format)) {
         add_value(row, shown_count(count));
       } else {

@@ -11,14 +11,12 @@
 
 #include "client/output/human_units.h"
 #include "client/output/mesh_note.h"
-#include "client/output/unjudged_note.h"
 #include "client/output/value_notes.h"
 #include "client/output/work_line.h"
 #include "client/study/study_flags.h"
 #include "client/verbs/study_time.h"
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
-#include "proto/program/stop_signals.h"
 #include "proto/recipe/block_points.h"
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/model_message.h"
@@ -59,7 +57,7 @@ struct ShownPoint {
 /// What one block is.
 struct BlockReport {
   protocol::BlockPlace place;
-  std::uint64_t points;  ///< left in
+  protocol::PointsLeftIn left_in;
   std::string made_of;
   ShownPoint first;
   ShownPoint last;
@@ -70,7 +68,6 @@ struct Report {
   std::uint64_t numbers;  ///< of points, with those that are left out
   protocol::StudySize size;
   std::vector<BlockReport> blocks;
-  std::vector<std::uint64_t> unjudged;  ///< of the blocks, from 0
   std::optional<StudyCost> cost;
 };
 
@@ -104,27 +101,36 @@ std::string made_of(const protocol::Block& block) {
   return kind + axes + following;
 }
 
+/// The first point from `from` on, or before it, that the filter leaves in; `from` when none of
+/// 10^5 is.
+std::uint64_t nearest_left_in(protocol::BlockPoints& points, std::uint64_t from, bool forward) {
+  constexpr std::uint64_t kMostLooks = 100'000;
+  for (std::uint64_t look = 0; look < std::min(kMostLooks, points.points()); ++look) {
+    const std::uint64_t point = forward ? from + look : from - look;
+    points.go_to(point);
+    if (points.is_left_in()) {
+      return point;
+    }
+  }
+  return from;
+}
+
 BlockReport report_of_block(const protocol::PointTable& table, int number) {
   const protocol::Block& block = table.recipe().blocks(number);
   const auto& place = table.block(static_cast<std::size_t>(number));
   const auto base = protocol::from_message(table.recipe().model());
-  protocol::BlockPoints points(base, block);  // of its own: nearly all numbers may be gone through
-  std::uint64_t first = 0;
-  for (points.go_to(first); first + 1 < place.points && !points.is_left_in(); points.go_to(first)) {
-    ++first;
-  }
-  const auto shown_first = shown_point(block, points, place.first_point + first);
-  std::uint64_t last = place.points - 1;
-  for (points.go_to(last); last > first && !points.is_left_in(); points.go_to(last)) {
-    --last;
-  }
-  return {place, block.has_points_left_in() ? block.points_left_in() : place.points, made_of(block),
-          shown_first, shown_point(block, points, place.first_point + last)};
+  protocol::BlockPoints points(base, block);
+  const auto shown_from = [&](std::uint64_t from, bool forward) {
+    const std::uint64_t point = nearest_left_in(points, from, forward);
+    points.go_to(point);
+    return shown_point(block, points, place.first_point + point);
+  };
+  return {place, protocol::points_left_in(table, static_cast<std::size_t>(number)), made_of(block),
+          shown_from(0, true), shown_from(place.points - 1, false)};
 }
 
 Report report_of(const std::string& name, const protocol::PointTable& table) {
-  Report report{name, table.size(), protocol::size_of(table), {}, unjudged_blocks(table.recipe()),
-                {}};
+  Report report{name, table.size(), protocol::size_of(table), {}, {}};
   for (int i = 0; i < table.recipe().blocks_size(); ++i) {
     report.blocks.push_back(report_of_block(table, i));
   }
@@ -151,7 +157,7 @@ void print(const Report& report, const protocol::Recipe& recipe) {
   const protocol::StudySize& size = report.size;
   std::cout << "study   " << report.name << (recipe.errors() ? ", with estimated errors" : "")
             << '\n';
-  std::cout << "points  " << shown_count(size.points);
+  std::cout << "points  " << (size.points_estimated ? "about " : "") << shown_count(size.points);
   if (size.points != report.numbers) {
     std::cout << " of " << shown_count(report.numbers) << ", left in by where";
   }
@@ -162,7 +168,8 @@ void print(const Report& report, const protocol::Recipe& recipe) {
     const auto& block = report.blocks[i];
     const std::uint64_t last = block.place.first_point + block.place.points - 1;
     std::cout << fmt::format(
-        "block {}: {}, {}: {}\n", i + 1, counted(block.points, "point", "points"),
+        "block {}: {}{}, {}: {}\n", i + 1, block.left_in.estimated ? "about " : "",
+        counted(block.left_in.points, "point", "points"),
         block.place.points == 1 ? fmt::format("number {}", last)
                                 : fmt::format("numbers {} to {}", block.place.first_point, last),
         block.made_of);
@@ -192,23 +199,20 @@ nlohmann::ordered_json json_of(const ShownPoint& point) {
 }
 
 nlohmann::ordered_json json_of(const Report& report, bool wants_errors) {
-  nlohmann::ordered_json json{{"study", report.name},
-                              {"errors", wants_errors},
-                              {"points", report.size.points},
-                              {"numbers", report.numbers},
-                              {"models", report.size.models},
-                              {"falls", report.size.falls},
-                              {"falls_estimated", report.size.falls_estimated}};
+  nlohmann::ordered_json json{
+      {"study", report.name},         {"errors", wants_errors},
+      {"points", report.size.points}, {"points_estimated", report.size.points_estimated},
+      {"numbers", report.numbers},    {"models", report.size.models},
+      {"falls", report.size.falls},   {"falls_estimated", report.size.falls_estimated}};
   for (const auto& block : report.blocks) {
     json["blocks"].push_back({{"first_point", block.place.first_point},
                               {"numbers", block.place.points},
-                              {"points", block.points},
+                              {"points", block.left_in.points},
                               {"models", block.place.models},
                               {"made_of", block.made_of},
                               {"first", json_of(block.first)},
                               {"last", json_of(block.last)}});
   }
-  json["blocks_not_judged"] = report.unjudged;
   if (report.cost) {
     json["time_s"] = time_s(*report.cost, report.size);
     json["threads"] = report.cost->threads;
@@ -219,25 +223,10 @@ nlohmann::ordered_json json_of(const Report& report, bool wants_errors) {
   return json;
 }
 
-/// Counts what filters leave in, and judges what only points tell. The exit code when that was
-/// stopped by a signal.
-std::optional<int> survey(const Study& study, protocol::PointTable& table) {
-  if (!table.needs_survey()) {
-    return std::nullopt;
-  }
-  protocol::StopSignals stop;
-  WorkLine line;
-  const auto counting = line.begin("looking at every point");
-  const bool is_done = judge_points(table, study.located, [&stop] { return !stop.requested(); });
-  return is_done ? std::nullopt : std::optional(stop.exit_code());
-}
-
 int check_study(const CheckFlags& flags) {
   const auto study = study_of_flags(flags.study, tip_reach());
-  protocol::PointTable table(study.recipe);
-  if (const auto stopped = survey(study, table)) {
-    return *stopped;
-  }
+  const protocol::PointTable table(study.recipe);
+  judge_points(table, study.located);
   Report report = report_of(study.name, table);
   if (!flags.no_rate) {
     WorkLine line;
@@ -249,7 +238,6 @@ int check_study(const CheckFlags& flags) {
   } else {
     print(report, table.recipe());
     tell_mesh(std::cerr, table.recipe());
-    tell_unjudged(std::cerr, table.recipe());
     tell_values(std::cerr, table.recipe());
   }
   return kDone;

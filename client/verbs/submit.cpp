@@ -8,7 +8,6 @@
 
 #include "client/output/human_units.h"
 #include "client/output/mesh_note.h"
-#include "client/output/unjudged_note.h"
 #include "client/output/value_notes.h"
 #include "client/service/connection.h"
 #include "client/service/result_query.h"
@@ -119,7 +118,6 @@ int submit(const SubmitFlags& flags) {
     if (reply.created()) {
       tell_mesh(std::cerr, study.recipe);
     }
-    tell_unjudged(std::cerr, study.recipe);
     tell_values(std::cerr, study.recipe);
     submitted = true;
     return flags.watch || flags.rows ? watch(study, reply.study_id(), flags.rows.value_or(0),

@@ -77,9 +77,12 @@ function live_table(caption, heads) {
   };
 }
 
+/** Points that are solved, failed or left out by a filter. @param {any} study */
+export const completed = (study) => study.solved + study.failed + study.left_out;
+
 /** @param {any} study */
 export function progress_of(study) {
-  const settled = study.solved + study.failed;
+  const settled = completed(study);
   const share = study.points > 0 ? settled / study.points : 1;
   const percent = share >= 1 ? "100 %" : `${(Math.floor(share * 1000) / 10).toFixed(1)} %`;
   return h("span", { class: "share" }, h("progress", { max: Math.max(study.points, 1), value: settled,
@@ -88,7 +91,7 @@ export function progress_of(study) {
 
 /** @param {any[]} lines @param {string[]} columns */
 const csv_of = (lines, columns) => [columns, ...lines.map((line) => columns.map((name) => line[name]))].map(csv_line).join("\r\n") + "\r\n";
-const kStudyColumns = ["id", "name", "state", "points", "solved", "failed", "points_per_s", "priority", "created_at", "submitted_by"];
+const kStudyColumns = ["id", "name", "state", "points", "solved", "failed", "left_out", "points_per_s", "priority", "created_at", "submitted_by"];
 const kWorkerColumns = ["id", "name", "host", "state", "threads", "points_per_s", "leased_points", "solved_points", "silent_s", "losses", "solver_version", "instruction_set"];
 
 /** Running ones first, then the latest. @param {any[]} studies @param {string} name what names have in them */

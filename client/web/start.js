@@ -144,7 +144,7 @@ function shown_bytes(bytes) {
 /** How much a study is, in the numbers of `oblique study check`. @param {Judged} judged */
 function size_of({ points, is_counted, models = 0, falls = 0, falls_estimated, bytes = 0, surely_reached_m: reached_m }) {
   const many = (/** @type {number} */ number, /** @type {string} */ one, /** @type {string} */ more = `${one}s`) => `${count(number)} ${number === 1 ? one : more}`;
-  const said = [many(points, "point") + (is_counted ? "" : " at most")];
+  const said = [(is_counted ? "" : "about ") + many(points, "point")];
   if (models > 0) said.push(`${many(models, "model")} with ${falls_estimated ? "about " : ""}${many(falls, "fall", "different falls")}`, `about ${shown_bytes(bytes)} in the database`);
   return [`${said.join(", ")}.`,
     ...(reached_m ? [`Whether the tip comes down further than ${with_unit(reached_m, "m")} only its fall tells: points with an H that it never reaches will fail.`] : [])].join(" ");

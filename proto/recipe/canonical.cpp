@@ -35,10 +35,8 @@ bool is_later_key(const solver::ParameterKey& key) {
          std::find(first.begin(), first.end(), key.name) == first.end();
 }
 
-/// Leaves out what the server counted and the ends of a range that is none. A range of one or two
-/// values is their list.
+/// Leaves out the ends of a range that is none. A range of one or two values is their list.
 std::string comparable_bytes(Block block) {
-  block.clear_points_left_in();
   for (Axis& axis : *block.mutable_axes()) {
     if (axis.count() == 1 || axis.count() == 2) {
       axis.add_values(axis.from());

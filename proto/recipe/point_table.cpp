@@ -14,6 +14,7 @@
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/checks.h"
 #include "proto/recipe/model_message.h"
+#include "proto/recipe/sample.h"
 
 namespace oblique::protocol {
 namespace {
@@ -143,16 +144,6 @@ void PointTable::add_block(const Block& block) {
   points_ += points;
 }
 
-std::uint64_t PointTable::points() const {
-  std::uint64_t points = 0;
-  for (std::size_t i = 0; i < blocks_.size(); ++i) {
-    const bool is_counted = !message(i).where().empty() && message(i).has_points_left_in();
-    points +=
-        is_counted ? std::min(message(i).points_left_in(), blocks_[i].points) : blocks_[i].points;
-  }
-  return points;
-}
-
 std::size_t PointTable::block_of_point(std::uint64_t index) const {
   if (index >= points_) {
     throw std::out_of_range(fmt::format("the study has no point {}", index));
@@ -245,55 +236,39 @@ std::string PointTable::fault(std::uint64_t index) const {
   });
 }
 
-bool PointTable::needs_survey() const {
+bool PointTable::needs_judging() const {
   return std::any_of(blocks_.begin(), blocks_.end(),
                      [](const BlockPlace& place) { return place.is_judged_by_points; });
 }
 
-bool PointTable::survey(const std::function<bool()>& goes_on) {
-  for (; surveyed_.block < blocks_.size(); surveyed_ = {surveyed_.block + 1, 0, 0}) {
-    const std::size_t number = surveyed_.block;
-    if (blocks_[number].is_judged_by_points &&
-        !in_block(number, [&] { return survey_block(number, goes_on); })) {
-      return false;
+void PointTable::judge_points() const {
+  const auto judged = static_cast<std::uint64_t>(
+      std::count_if(blocks_.begin(), blocks_.end(),
+                    [](const BlockPlace& place) { return place.is_judged_by_points; }));
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    if (blocks_[i].is_judged_by_points) {
+      in_block(i, [&] { judge_block(i, kMostJudged / judged); });
     }
   }
-  return true;
 }
 
-bool PointTable::survey_block(std::size_t number, const std::function<bool()>& goes_on) {
-  constexpr std::uint64_t kAsksEvery = 1024;
-  Block& block = *recipe_->mutable_blocks(static_cast<int>(number));
+void PointTable::judge_block(std::size_t number, std::uint64_t most) const {
+  const Block& block = message(number);
   const BlockPlace& place = blocks_[number];
-  const bool has_filter = !block.where().empty();
-  if (place.points > kMostCounted) {
-    if (has_filter) {
-      throw InputError(
-          fmt::format("where: the block has {} points before its filter, and each is looked at: at "
-                      "most {} are allowed; shorten an axis, or make several studies",
-                      place.points, kMostCounted));
-    }
-    return true;
-  }
+  const bool judges_all = place.points <= most;
   BlockPoints points(base_model_, block);
-  std::uint64_t& i = surveyed_.points;
-  for (; i < place.points; ++i) {
-    if (i % kAsksEvery == 0 && !goes_on()) {
-      return false;
-    }
+  bool leaves_any_in = false;
+  for (std::uint64_t look = 0; look < std::min(place.points, most); ++look) {
+    const std::uint64_t i = judges_all ? look : sampling::hashed(number, look) % place.points;
     points.go_to(i);
     if (const std::string fault = points.fault(); !fault.empty()) {
       throw InputError(fmt::format("point {}: {}", place.first_point + i, fault));
     }
-    surveyed_.left_in += points.is_left_in() ? 1U : 0U;
+    leaves_any_in = leaves_any_in || points.is_left_in();
   }
-  if (has_filter) {
-    if (surveyed_.left_in == 0) {
-      throw InputError(expression_in_words("where", block.where()) + " leaves no point in");
-    }
-    block.set_points_left_in(surveyed_.left_in);
+  if (judges_all && !leaves_any_in) {
+    throw InputError(expression_in_words("where", block.where()) + " leaves no point in");
   }
-  return true;
 }
 
 }  // namespace oblique::protocol

@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -31,7 +30,7 @@ struct Segment {
 /// The points and models of one block.
 struct BlockPlace {
   std::uint64_t first_point;
-  std::uint64_t points;  ///< point numbers, with those that the filter leaves out
+  std::uint64_t points;  ///< also those that the filter leaves out
   std::uint64_t first_model;
   std::uint64_t models;
   bool is_judged_by_points;  ///< see checks.h
@@ -42,8 +41,8 @@ struct BlockPlace {
 class PointTable {
  public:
   /// Throws solver::InputError naming key, value and what is allowed for a recipe without a model
-  /// or blocks, for too many points or expressions, and for what `check_block` refuses. `survey`
-  /// judges the rest.
+  /// or blocks, for too many points or expressions, and for what `check_block` refuses.
+  /// `judge_points` judges the rest.
   explicit PointTable(Recipe recipe);
   ~PointTable();
   PointTable(PointTable&&) noexcept;
@@ -57,24 +56,20 @@ class PointTable {
   std::uint64_t size() const { return points_; }  ///< number of point numbers
   std::uint64_t models() const { return models_; }
 
-  /// Number of points that filters leave in. Of a filter that was not counted all points count.
-  std::uint64_t points() const;
   bool has_filter() const { return has_filter_; }
   bool is_left_in(std::uint64_t index) const;
   /// The first point of [begin, end) that is left in, or `end`. Throws std::out_of_range for an end
   /// beyond the last point.
   std::uint64_t first_left_in(std::uint64_t begin, std::uint64_t end) const;
 
-  /// Whether there are filters to count or values that only points tell.
-  bool needs_survey() const;
-  /// Evaluates every point of such blocks: writes into the recipe how many points filters leave in,
-  /// and checks values. Takes about a second for 10^7 points. Returns false when `goes_on` returns
-  /// false; the next call continues. Throws solver::InputError naming block, point and values for a
-  /// value that is not allowed, a filter over more than `kMostCounted` points, and a filter that
-  /// leaves nothing in. Larger blocks without a filter are skipped: their points may fail
-  /// (`fault`).
-  bool survey(const std::function<bool()>& goes_on);
-  static constexpr std::uint64_t kMostCounted = 100'000'000;
+  /// Whether some values or filters can be judged only by their points.
+  bool needs_judging() const;
+  /// Judges such blocks by their points: by all of them or, where these are more than `kMostJudged`
+  /// in all blocks together, by some at random. Takes up to about 0.1 s. Throws solver::InputError
+  /// that names block, point and values for a value that is not allowed, and for a filter that
+  /// leaves out all points of its block. What is not found fails (`fault`).
+  void judge_points() const;
+  static constexpr std::uint64_t kMostJudged = 100'000;
 
   /// Why a point cannot be solved, as a sentence, or an empty text.
   std::string fault(std::uint64_t index) const;
@@ -98,7 +93,7 @@ class PointTable {
   void add_block(const Block& block);
   template <typename Act>
   auto in_block(std::size_t number, Act act) const;
-  bool survey_block(std::size_t number, const std::function<bool()>& goes_on);
+  void judge_block(std::size_t number, std::uint64_t most) const;
   const Block& message(std::size_t block) const { return recipe_->blocks(static_cast<int>(block)); }
 
   std::unique_ptr<Recipe> recipe_;  ///< stays where it is when the table moves
@@ -111,11 +106,6 @@ class PointTable {
   std::uint64_t models_ = 0;
   std::size_t expressions_ = 0;
   bool has_filter_ = false;
-  struct Surveyed {
-    std::size_t block = 0;
-    std::uint64_t points = 0;  ///< of that block
-    std::uint64_t left_in = 0;
-  } surveyed_;  ///< where a survey goes on
   std::unique_ptr<Pool> pool_;
 };
 

@@ -36,12 +36,16 @@ std::uint64_t estimated_falls(const MetFalls& met, double looks, double points) 
 
 StudySize size_of(const PointTable& table) {
   constexpr std::uint64_t kMostCounted = 100'000;
-  constexpr std::uint64_t kMostNumbers = 10'000'000;  // a filter may leave so few in
   constexpr std::uint64_t kLooks = 10'000;
   constexpr std::uint64_t kTries = 100 * kLooks;
   constexpr std::uint64_t kExamples = 64;
   const std::uint64_t numbers = table.size();
-  StudySize size{table.points(), table.models(), 0, false, 0, {}};
+  StudySize size{0, false, table.models(), 0, false, 0, {}};
+  for (int i = 0; i < table.recipe().blocks_size(); ++i) {
+    const PointsLeftIn left_in = points_left_in(table, static_cast<std::size_t>(i));
+    size.points += left_in.points;
+    size.points_estimated = size.points_estimated || left_in.estimated;
+  }
   size.bytes = kBytesAResult * size.points + kBytesAModel * std::min(size.models, size.points);
   MetFalls met;
   std::uint64_t looks = 0;
@@ -60,7 +64,7 @@ StudySize size_of(const PointTable& table) {
       size.examples[place] = point;
     }
   };
-  if (size.points <= kMostCounted && numbers <= kMostNumbers) {
+  if (numbers <= kMostCounted) {
     for (std::uint64_t i = 0; (i = table.first_left_in(i, numbers)) < numbers; ++i) {
       look_at(i);
     }
@@ -76,6 +80,29 @@ StudySize size_of(const PointTable& table) {
   size.falls = estimated_falls(met, static_cast<double>(looks), static_cast<double>(size.points));
   size.falls_estimated = size.falls != met.size();
   return size;
+}
+
+PointsLeftIn points_left_in(const PointTable& table, std::size_t block) {
+  constexpr std::uint64_t kMostCounted = 100'000;
+  constexpr std::uint64_t kLooks = 10'000;
+  const BlockPlace& place = table.block(block);
+  if (table.recipe().blocks(static_cast<int>(block)).where().empty()) {
+    return {place.points, false};
+  }
+  const std::uint64_t end = place.first_point + place.points;
+  std::uint64_t found = 0;
+  if (place.points <= kMostCounted) {
+    for (std::uint64_t i = place.first_point; (i = table.first_left_in(i, end)) < end; ++i) {
+      ++found;
+    }
+    return {found, false};
+  }
+  for (std::uint64_t look = 0; look < kLooks; ++look) {
+    found +=
+        table.is_left_in(place.first_point + sampling::hashed(2, look) % place.points) ? 1U : 0U;
+  }
+  const double share = static_cast<double>(found) / static_cast<double>(kLooks);
+  return {static_cast<std::uint64_t>(share * static_cast<double>(place.points)), true};
 }
 
 }  // namespace oblique::protocol

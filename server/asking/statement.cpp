@@ -126,22 +126,9 @@ std::string columns_of_rows(const protocol::StudyQuery& question, const Named& n
   return columns;
 }
 
-/// The points that a study with this recipe counts: those that filters leave out are subtracted
-/// where they were counted.
-std::uint64_t points_left_in(const protocol::Recipe& recipe) {
-  std::uint64_t points = points_of(recipe);
-  for (const protocol::Block& block : recipe.blocks()) {
-    if (points > 0 && !block.where().empty() && block.has_points_left_in()) {
-      const std::uint64_t all = protocol::points_of_block(block);
-      points -= all - std::min(all, block.points_left_in());
-    }
-  }
-  return points;
-}
-
 bool has_points(const protocol::Recipe& recipe, std::int64_t points) {
   try {
-    return points > 0 && points_left_in(recipe) == static_cast<std::uint64_t>(points);
+    return points > 0 && points_of(recipe) == static_cast<std::uint64_t>(points);
   } catch (const solver::InputError&) {
     return false;  // more than a study may have
   }

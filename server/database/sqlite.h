@@ -97,7 +97,7 @@ class Transaction {
 
 /// The schema that this program writes, and the marks that tell its databases from others.
 inline constexpr std::int32_t kApplicationId = 0x6f626c71;  // "oblq"
-inline constexpr std::int32_t kSchemaVersion = 10;
+inline constexpr std::int32_t kSchemaVersion = 11;
 
 enum class DatabaseKind { kEmpty, kOurs };
 

@@ -100,7 +100,6 @@ class Loop::Parts final : public Outbox {
       take_reports();
       has_more = take_worker_messages();
       has_more = take_client_messages() || has_more || network_.has_more();
-      has_more = service_->go_on_searching(now()) || has_more;
       note_departures();
       if (Clock::now() >= next_tick) {
         service_->tick(now());

@@ -65,16 +65,6 @@ std::string objection_to(const StudyRow& study, const Statement& row) {
   return {};
 }
 
-/// How many point numbers the study has, with those that a filter leaves out. Where only another
-/// version can read the recipe: its number of points.
-std::uint64_t numbers_of(const StudyTable& table) {
-  try {
-    return table.numbers();
-  } catch (const std::runtime_error&) {
-    return table.size();
-  }
-}
-
 std::optional<StudyRow> study_named(sqlite3* database, const std::string& name) {
   Statement find(database,
                  fmt::format("SELECT {} FROM main.studies WHERE name = ?", kStudyColumns));
@@ -172,12 +162,9 @@ class StudyMerge {
       grow.bind(3, study.table.size());
       grow.run();
     }
-    return {study.id,
-            known.id,
-            known.name,
-            numbers_of(study.table),
-            solver_version_of(database_, known.id),
-            mixes};
+    return {
+        study.id, known.id, known.name, study.table.size(), solver_version_of(database_, known.id),
+        mixes};
   }
 
   StudyPlace add(const StudyRow& study, const std::string& name) {
@@ -198,7 +185,7 @@ class StudyMerge {
                                study_checksum_sql()));
     seal.bind(1, id);
     seal.run();
-    return {study.id, id, name, numbers_of(study.table), {}, true};
+    return {study.id, id, name, study.table.size(), {}, true};
   }
 
   /// Throws MergeRefused when there are conflicts, and names the first ten.

@@ -7,7 +7,8 @@
 namespace oblique::server {
 
 /// Computes `settled_points` and `taken_points` of a study again from its rows, names the origins
-/// that `origins` lacks, and returns the number of rows. Throws StorageError.
+/// that `origins` lacks, and returns how many points have a row or are left out by a filter. Throws
+/// StorageError.
 std::uint64_t count_rows_again(sqlite3* database, std::uint64_t study_id);
 
 }  // namespace oblique::server

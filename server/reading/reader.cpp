@@ -90,7 +90,8 @@ std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name)
                   " s.priority, s.weight, coalesce(s.submitted_by, ''), s.mixes_versions,"
                   " coalesce((") +
           kVersionOfRows +
-          "), '') FROM studies AS s WHERE ?1 = '' OR s.name = ?1 ORDER BY s.study_id");
+          "), ''), CASE s.counted WHEN 1 THEN s.left_out ELSE 0 END FROM studies AS s WHERE ?1 = "
+          "'' OR s.name = ?1 ORDER BY s.study_id");
   list.bind(1, name);
   Statement origins(database_.get(), kOrigins);
   std::vector<protocol::StudyStatus> found;
@@ -104,7 +105,8 @@ std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name)
     status.set_points(static_cast<std::uint64_t>(list.integer(3)));
     status.set_created_at(list.text(4));
     status.set_failed(static_cast<std::uint64_t>(list.integer(6)));
-    status.set_solved(static_cast<std::uint64_t>(settled) - status.failed());
+    status.set_left_out(static_cast<std::uint64_t>(list.integer(12)));
+    status.set_solved(static_cast<std::uint64_t>(settled) - status.failed() - status.left_out());
     status.set_priority(static_cast<std::int32_t>(list.integer(7)));
     status.set_weight(list.real(8));
     status.set_submitted_by(list.text(9));

@@ -8,7 +8,6 @@ namespace oblique::server {
 std::vector<Effect> Scheduler::handle(const Event& event, std::int64_t now_ms) {
   now_ms_ = std::max(now_ms_, now_ms);
   effects_.clear();
-  looks_left_ = settings_.most_looks;
   seeks_stragglers_ = std::holds_alternative<Tick>(event);
   std::visit([this](const auto& e) { on(e); }, event);
   dispatch();
@@ -25,10 +24,11 @@ void Scheduler::on(const StudyAdded& event) {
   if (studies_.contains(event.study)) {
     return;
   }
-  studies_.emplace(event.study,
-                   Study{StudyPoints(event.table, event.settled, settings_.loss_limits),
-                         event.failed, event.cancelled, event.paused, false, event.terms,
-                         least_served(event.study), event.solver_version});
+  studies_.emplace(
+      event.study,
+      Study{StudyPoints(event.table, event.settled, event.left_out, settings_.loss_limits),
+            event.failed, event.cancelled, event.paused, false, event.terms,
+            least_served(event.study), event.solver_version});
   studies_.at(event.study).points.count_attempts(event.attempts);
   studies_.at(event.study).held = event.held;
   finish_if_complete(event.study);
@@ -149,7 +149,7 @@ void Scheduler::on(const FailuresForgotten& event) {
 
 void Scheduler::on(const StudyGrown& event) {
   const auto found = studies_.find(event.study);
-  if (found == studies_.end() || event.table.numbers() <= found->second.points.numbers()) {
+  if (found == studies_.end() || event.table.size() <= found->second.points.size()) {
     return;
   }
   Study& study = found->second;
@@ -177,7 +177,6 @@ void Scheduler::on(const StudyRemoved& event) {
   std::erase_if(condemned_, [&](const Condemned& point) { return point.study == event.study; });
   processes_.forget_study(event.study);
   queue_.put(event.study, {});
-  searching_.erase(event.study);
   studies_.erase(event.study);
   wake_all();  // suspect points of it may have kept some from others
 }
@@ -189,8 +188,7 @@ double Scheduler::least_served(StudyId but) const {
 }
 
 StudyQueue::Place Scheduler::place_of(const Study& study) const {
-  const bool has_free =
-      study.points.has_free() && (!study.searches || study.points.has(Standing::kSound));
+  const bool has_free = study.points.has_free();
   if (!study.is_open() || !(has_free || study.has_suspect())) {
     return {};
   }
@@ -230,15 +228,17 @@ StudyCounts Scheduler::study(StudyId id) const {
   const bool lacks_worker = study.has_work() && !workers_.empty() && !study.terms.mixes_versions &&
                             !study.solver_version.empty() &&
                             !versions_.contains(study.solver_version);
-  return {study.points.size(), study.points.settled() - study.failed,
-          study.failed,        study.points.leased(),
-          study.cancelled,     study.solver_version,
-          lacks_worker};
+  const StudyPoints& points = study.points;
+  return {points.size(),        points.settled() - points.left_out() - study.failed,
+          study.failed,         points.left_out(),
+          points.leased(),      study.cancelled,
+          study.solver_version, lacks_worker};
 }
 
 PointCounts Scheduler::points(StudyId id) const {
   const Study& study = studies_.at(id);
-  return {study.points.size(), study.points.settled(), study.failed, study.points.leased()};
+  return {study.points.size(), study.points.settled(), study.failed, study.points.left_out(),
+          study.points.leased()};
 }
 
 QuietWorkers Scheduler::quiet_workers(StudyId id, std::int64_t now_ms) const {

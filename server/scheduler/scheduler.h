@@ -25,6 +25,7 @@ struct StudyCounts {
   std::uint64_t points;
   std::uint64_t solved;
   std::uint64_t failed;
+  std::uint64_t left_out;  ///< by a filter, as far as it is known
   std::uint64_t leased;
   bool cancelled;
   std::string solver_version;  ///< that its results have; empty while there are none
@@ -34,8 +35,9 @@ struct StudyCounts {
 /// The points of a study by where they are; costs nothing to ask for.
 struct PointCounts {
   std::uint64_t points;
-  std::uint64_t settled;  ///< the failed ones too
+  std::uint64_t settled;  ///< also those that failed or are left out
   std::uint64_t failed;
+  std::uint64_t left_out;  ///< by a filter
   std::uint64_t leased;
 
   std::uint64_t open() const { return points - settled; }
@@ -86,9 +88,6 @@ class Scheduler {
   /// that the table names.
   std::vector<Effect> handle(const Event& event, std::int64_t now_ms);
 
-  /// Workers wait for points of a study of which nobody knows yet where the next is that its filter
-  /// leaves in: say SearchGoesOn as soon as nothing else waits.
-  bool is_searching() const { return !searching_.empty() && !held_ && ready_workers_.size() > 0; }
   bool knows_worker(WorkerId worker) const { return workers_.contains(worker); }
   bool knows_study(StudyId study) const { return studies_.contains(study); }
   std::size_t workers() const { return workers_.size(); }
@@ -137,7 +136,6 @@ class Scheduler {
     LeaseIndex leases{};
     bool held = false;
     bool overlaps = false;  ///< a point of it may be under several of these leases
-    bool searches = false;  ///< for its next point that its filter leaves in
 
     bool is_open() const { return !cancelled && !paused && !finished && !held; }
     bool has_suspect() const {
@@ -158,11 +156,13 @@ class Scheduler {
   struct Pace {
     double busy_s = 0.0;  ///< of a thread, for so many points: the last messages, weighted
     double points = 0.0;
+    double solved = 0.0;                  ///< of these, those that no filter leaves out
     std::uint64_t last_batch_points = 0;  ///< that it was fit for
     std::uint64_t last_end = 0;           ///< place; 0: it had no batch
     std::uint64_t held_points = 0;        ///< of its leases
 
     double s_per_point() const { return points > 0.0 ? busy_s / points : 0.0; }  ///< 0: unknown
+    double s_per_solved() const { return solved > 0.0 ? busy_s / solved : 0.0; }
   };
   struct Worker {
     std::uint32_t threads;
@@ -204,7 +204,6 @@ class Scheduler {
   void on(const WorkerUnreachable& event);
   void on(const WorkerBusy& event);
   void on(const DispatchHeld& event);
-  void on(const SearchGoesOn& event);
   void on(const Tick& event);
 
   enum class WorkerEnd { kLeft, kReplaced, kLost };
@@ -218,6 +217,7 @@ class Scheduler {
   bool has_open_points(const Lease& lease) const;
   void release_if_answered(LeaseId lease);
   void remove_worker(WorkerId worker, WorkerEnd how);
+  bool names_other_points(const ResultsReceived& event) const;
   void learn_pace(Worker& worker, const ResultsReceived& event);
   void end_stalled();
   std::int64_t longest_stall_ms(const Worker& worker, std::map<StudyId, double>& paces) const;
@@ -250,7 +250,6 @@ class Scheduler {
   bool serve_straggler(WorkerId id, Worker& worker);
   bool is_straggling(const Lease& lease, const Worker& helper) const;
   static bool admits(const Study& study, const Worker& worker);
-  void set_searching(StudyId id, bool searches);
   StudyId next_free_study(const Worker& worker) const;
   double least_served(StudyId but) const;
   StudyId next_suspect_study(const Worker& worker) const;
@@ -284,9 +283,6 @@ class Scheduler {
   std::map<std::string, std::size_t> versions_;     // workers by solver version
   std::size_t draining_ = 0;                        // workers
   std::uint64_t looks_ = 0;
-  std::set<StudyId> searching_;
-  StudyId searched_last_ = 0;
-  std::uint64_t looks_left_ = 0;  // at points, whether they are left in; of the event being handled
   // By solver version, of its workers, and of all under the empty one; emptied when it may change.
   mutable std::map<std::string, std::optional<std::int64_t>> longest_proven_since_ms_;
   std::uint64_t threads_ = 0;

@@ -68,33 +68,6 @@ void Scheduler::wake_all() {
   full_workers_.wake_all();
 }
 
-/// While a study looks for its next point that is left in, others get the workers.
-void Scheduler::set_searching(StudyId id, bool searches) {
-  studies_.at(id).searches = searches;
-  if (searches) {
-    searching_.insert(id);
-  } else {
-    searching_.erase(id);
-  }
-}
-
-/// Each study in turn looks at as many points as an event has room for.
-void Scheduler::on(const SearchGoesOn& /*event*/) {
-  if (searching_.empty()) {
-    return;
-  }
-  const auto after = searching_.upper_bound(searched_last_);
-  const StudyId id = after == searching_.end() ? *searching_.begin() : *after;
-  searched_last_ = id;
-  Study& study = studies_.at(id);
-  // One that is not open does not search; it begins anew when it goes on.
-  if (!study.is_open() || study.points.search(looks_left_) || !study.points.has_free()) {
-    set_searching(id, false);
-    finish_if_complete(id);
-    requeue(id);
-  }
-}
-
 bool Scheduler::serve(WorkerId id, Worker& worker) {
   if (worker.is_busy) {
     return false;
@@ -132,24 +105,15 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
   return true;
 }
 
-/// Free points of the study. @returns the lease; 0: it looks for them
+/// Free points of the study, of which there are some. @returns the lease
 LeaseId Scheduler::serve_free(WorkerId id, Worker& worker, StudyId study) {
   const Portion wanted = portion_for(worker, study, true);
-  StudyPoints& points = studies_.at(study).points;
-  // With few looks left a batch would be small: it is cut in the next event.
-  const bool is_short = points.has_filter() && !points.has(Standing::kSound) &&
-                        looks_left_ < settings_.most_looks / 2;
-  if (const auto batch = is_short ? std::nullopt : points.take(wanted, looks_left_)) {
-    const LeaseId lease = grant(id, worker, study, *batch, false);
-    // What ended before says nothing of how much the worker can do.
-    auto& fit_for = worker.paces.at(study).last_batch_points;
-    fit_for = std::max(fit_for, wanted.points);
-    return lease;
-  }
-  set_searching(study, points.has_free());
-  finish_if_complete(study);
-  requeue(study);
-  return 0;
+  const auto batch = studies_.at(study).points.take(wanted);
+  const LeaseId lease = grant(id, worker, study, *batch, false);
+  // What ended before says nothing of how much the worker can do.
+  auto& fit_for = worker.paces.at(study).last_batch_points;
+  fit_for = std::max(fit_for, wanted.points);
+  return lease;
 }
 
 bool Scheduler::serve_suspect(WorkerId id, Worker& worker) {
@@ -158,7 +122,7 @@ bool Scheduler::serve_suspect(WorkerId id, Worker& worker) {
   set_draining(worker, false);
   // The sooner these are known to be sound, the better: its lanes may stay empty.
   const Portion wanted = portion_for(worker, id_of_study, false);
-  if (const auto batch = study.points.take(*suspect_for(study, worker), wanted, looks_left_)) {
+  if (const auto batch = study.points.take(*suspect_for(study, worker), wanted)) {
     grant(id, worker, id_of_study, *batch, true);
   }
   return true;
@@ -279,6 +243,13 @@ Portion Scheduler::portion_for(const Worker& worker, StudyId id, bool fills_lane
     points = static_cast<std::uint64_t>(std::min(by_pace, largest));
     fewest = static_cast<std::uint64_t>(by_pace * settings_.shortest_batch_s / target_s());
   }
+  if (studies_.at(id).points.has_filter()) {  // it may leave in all of the next batch
+    const double in_time =
+        pace.s_per_solved() > 0.0
+            ? settings_.lanes_batch_s * worker.threads / pace.s_per_solved()
+            : static_cast<double>(settings_.unsolved_batch_points) * worker.threads;
+    points = static_cast<std::uint64_t>(std::min(in_time, static_cast<double>(points)));
+  }
   const std::uint64_t shares = settings_.tail_batches_per_thread * threads_;
   const std::uint64_t fair =
       studies_.at(id).points.free() / std::max<std::uint64_t>(shares, 1) * worker.threads;
@@ -327,7 +298,7 @@ void Scheduler::fill_lanes(Portion& wanted, const StudyPoints& points, std::uint
 LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Batch& batch,
                          bool alone) {
   // A study may have grown since the worker was told of it.
-  const std::uint64_t numbers = studies_.at(study).points.numbers();
+  const std::uint64_t numbers = studies_.at(study).points.size();
   if (std::exchange(worker.defined[study], numbers) != numbers) {
     effects_.emplace_back(DefineStudy{id, study});
   }

@@ -66,9 +66,9 @@ struct SchedulerSettings {
   std::int64_t longest_stall_ms = 3'600'000;
   std::size_t most_absent_processes = 1024;  ///< are remembered, of newcomers and of others each
   std::uint32_t max_credit = 1024;           ///< batches a worker may ask for at a time
-  /// So many points are looked at in one event, whether a filter leaves them in: about a
-  /// millisecond.
-  std::uint64_t most_looks = 2048;
+  /// Points a thread that a batch of a filtered study has at most before the worker has solved one:
+  /// the filter may leave in all of them.
+  std::uint64_t unsolved_batch_points = 256;
   /// Leases are numbered from here. A server that restarts begins above all earlier numbers, so
   /// that results of an earlier run never close a lease of this one.
   LeaseId first_lease_id = 1;
@@ -82,7 +82,7 @@ struct PointOutcome {
 
 // ---- Events -----------------------------------------------------------------------------------
 
-/// A study that is new, or found in the database with the points that have a row.
+/// A study that is new, or found in the database with the points that have a row or are left out.
 struct StudyAdded {
   StudyId study;
   StudyTable table;
@@ -94,6 +94,7 @@ struct StudyAdded {
   std::string solver_version{};  ///< of its results; empty while there are none
   PointAttempts attempts{};      ///< of points that failed, also of those that were forgotten
   bool held = false;             ///< as StudyHeld says
+  std::uint64_t left_out = 0;    ///< how many of the settled points a filter leaves out
 };
 /// While a study is held nothing of it is handed out, whatever else happens to it.
 struct StudyHeld {
@@ -159,6 +160,7 @@ struct ResultsReceived {
   bool batch_done;
   double busy_s;
   std::vector<PointOutcome> outcomes;
+  IntervalSet left_out{};  ///< points of the lease that a filter leaves out
 };
 /// A StoreResults or StoreFailure effect is durable.
 struct ResultsStored {
@@ -166,6 +168,7 @@ struct ResultsStored {
   StudyId study;
   std::uint64_t sequence;
   std::vector<PointOutcome> outcomes;
+  IntervalSet left_out{};
 };
 /// The worker lives and holds these leases.
 struct HeartbeatReceived {
@@ -196,8 +199,6 @@ struct WorkerBusy {
 struct DispatchHeld {
   bool held;
 };
-/// There is time to look for points that a filter leaves in.
-struct SearchGoesOn {};
 /// Time has passed.
 struct Tick {};
 
@@ -205,7 +206,7 @@ using Event =
     std::variant<StudyAdded, StudyHeld, PointsTaken, StudyCancelled, StudyPaused, StudyReopened,
                  StudyTermsChanged, FailuresForgotten, StudyGrown, StudyRemoved, WorkerJoined,
                  CreditGiven, ResultsReceived, ResultsStored, HeartbeatReceived, BatchesReturned,
-                 WorkerLeft, WorkerUnreachable, WorkerBusy, DispatchHeld, SearchGoesOn, Tick>;
+                 WorkerLeft, WorkerUnreachable, WorkerBusy, DispatchHeld, Tick>;
 
 // ---- Effects ----------------------------------------------------------------------------------
 
@@ -233,6 +234,7 @@ struct StoreResults {
   StudyId study;
   std::uint64_t sequence;
   std::vector<std::size_t> accepted;  ///< indices into the event's outcomes
+  IntervalSet left_out{};             ///< points that a filter leaves out
 };
 /// Make it durable that the point failed, then say ResultsStored (worker 0).
 struct StoreFailure {

@@ -46,8 +46,8 @@ void Scheduler::check_invariants() const {
   for (const auto& [id, study] : studies_) {
     study.points.check_invariants();
     require(study.finished == study.points.is_complete(), "a study is finished and is not");
-    require(study.failed <= study.points.settled(), "more points failed than were settled");
-    require(study.searches == searching_.contains(id), "a study's search is forgotten");
+    require(study.failed + study.points.left_out() <= study.points.settled(),
+            "more points failed or are left out than were settled");
     require(!study.cancelled || study.points.leased() == 0, "a cancelled study holds leases");
     require(study.leases.size() == leases_of[id], "a study's leases are miscounted");
     const StudyQueue::Place* place = queue_.find(id);

@@ -87,6 +87,12 @@ void Scheduler::on(const ResultsReceived& event) {
   if (worker == nullptr) {
     return;
   }
+  if (names_other_points(event)) {
+    remove_worker(event.worker, WorkerEnd::kLost);
+    effects_.emplace_back(
+        DropWorker{event.worker, "it says that a filter leaves out points which it was not given"});
+    return;
+  }
   StoreResults store{event.worker, event.study, event.sequence, {}};
   const auto study = studies_.find(event.study);
   // What a worker of another solver version solved before the study was given to this one's is
@@ -100,7 +106,11 @@ void Scheduler::on(const ResultsReceived& event) {
     if (!store.accepted.empty() && study->second.solver_version.empty()) {
       study->second.solver_version = worker->solver_version;
     }
-    if (!store.accepted.empty()) {
+    // Of a lease that has ended since others name them again.
+    if (worker->leases.contains(event.lease)) {
+      store.left_out = study->second.points.receive(event.left_out);
+    }
+    if (!store.accepted.empty() || !store.left_out.empty()) {
       worker->stored_ms = now_ms_;
     }
     requeue(event.study);
@@ -125,22 +135,40 @@ void Scheduler::on(const ResultsReceived& event) {
   release_if_answered(twin);
 }
 
+/// A lease of the worker does not have all the points that the message says a filter leaves out.
+bool Scheduler::names_other_points(const ResultsReceived& event) const {
+  const auto lease = leases_.find(event.lease);
+  if (event.left_out.empty() || lease == leases_.end() || lease->second.worker != event.worker) {
+    return false;
+  }
+  const StudyPoints& points = studies_.at(lease->second.study).points;
+  if (lease->second.study != event.study || !points.has_filter() ||
+      event.left_out.back().end > points.size()) {
+    return true;
+  }
+  const IntervalSet places = points.order().places(event.left_out);
+  const Batch& batch = lease->second.batch;
+  return places.front().begin < batch.first_place || places.back().end > batch.end();
+}
+
 void Scheduler::learn_pace(Worker& worker, const ResultsReceived& event) {
-  if (event.outcomes.empty() || !std::isfinite(event.busy_s) || event.busy_s <= 0.0) {
+  const auto solved = static_cast<double>(event.outcomes.size());
+  const double points = solved + static_cast<double>(event.left_out.size());
+  if (points == 0.0 || !std::isfinite(event.busy_s) || event.busy_s <= 0.0 ||
+      event.busy_s / points > kLongestPoint_s) {
     return;
   }
-  const auto points = static_cast<double>(event.outcomes.size());
-  if (event.busy_s / points > kLongestPoint_s) {
-    return;
+  if (solved > 0.0) {
+    pace_s_ = kPaceFades * pace_s_ + event.busy_s;
+    pace_points_ = kPaceFades * pace_points_ + solved;
   }
-  pace_s_ = kPaceFades * pace_s_ + event.busy_s;
-  pace_points_ = kPaceFades * pace_points_ + points;
   // Time and points by themselves: the first points of a model come with its fall, which says
   // little of those that follow.
   Pace& known = worker.paces[event.study];
   const double weight = known.points > 0.0 ? kPaceWeight : 1.0;
   known.busy_s += weight * (event.busy_s - known.busy_s);
   known.points += weight * (points - known.points);
+  known.solved += weight * (solved - known.solved);
 }
 
 void Scheduler::on(const ResultsStored& event) {
@@ -155,6 +183,7 @@ void Scheduler::on(const ResultsStored& event) {
         }
       }
     }
+    study->second.points.settle(event.left_out);
     finish_if_complete(event.study);
     requeue(event.study);
   }

@@ -9,24 +9,12 @@
 namespace oblique::server {
 namespace {
 
-/// The intervals in up to `parts` parts of nearly one size, each of intervals or pieces of them
-/// that follow each other.
-std::vector<std::vector<Interval>> split(const std::vector<Interval>& intervals,
-                                         std::uint64_t parts) {
-  const std::uint64_t size = (size_of(intervals) + parts - 1) / parts;
-  std::vector<std::vector<Interval>> all;
-  std::uint64_t room = 0;
-  for (const Interval& interval : intervals) {
-    for (std::uint64_t begin = interval.begin; begin < interval.end;) {
-      if (room == 0) {
-        all.emplace_back();
-        room = size;
-      }
-      const std::uint64_t end = std::min(begin + room, interval.end);
-      all.back().push_back({begin, end});
-      room -= end - begin;
-      begin = end;
-    }
+/// The interval in up to `parts` parts of nearly one size.
+std::vector<Interval> split(const Interval& interval, std::uint64_t parts) {
+  const std::uint64_t size = (interval.end - interval.begin + parts - 1) / parts;
+  std::vector<Interval> all;
+  for (std::uint64_t begin = interval.begin; begin < interval.end; begin += size) {
+    all.push_back({begin, std::min(begin + size, interval.end)});
   }
   return all;
 }
@@ -57,17 +45,8 @@ void Scheduler::note_loss(const Lease& lease, const std::vector<Interval>& held,
   const Standing standing = losses.standing(settings_.loss_limits);
   // The parts are suspect too: those without the killer are solved, the other is split again.
   const std::uint64_t parts = standing == Standing::kSound ? 1 : settings_.suspect_parts;
-  const auto give_back = [&](const std::vector<Interval>& together) {
-    for (const auto& part : split(together, parts)) {
-      points.give_back(part, lease.batch.attempts + 1, losses, now_ms_);
-    }
-  };
-  if (points.has_filter()) {  // what lies between the intervals is left out, or was answered
-    give_back(held);
-  } else {
-    for (const Interval& interval : held) {
-      give_back({interval});
-    }
+  for (const Interval& interval : held) {
+    points.give_back(split(interval, parts), lease.batch.attempts + 1, losses, now_ms_);
   }
   if (standing == Standing::kCondemned) {
     condemned_.push_back({now_ms_ + settings_.return_within_ms, lease.study,
@@ -209,7 +188,7 @@ std::int64_t Scheduler::longest_stall_ms(const Worker& worker,
          ++other) {
       const auto pace = other->second.paces.find(lease.study);
       const double s_per_point =
-          pace == other->second.paces.end() ? 0.0 : pace->second.s_per_point();
+          pace == other->second.paces.end() ? 0.0 : pace->second.s_per_solved();
       if (s_per_point > 0.0 && (fastest->second == 0.0 || s_per_point < fastest->second)) {
         fastest->second = s_per_point;
       }

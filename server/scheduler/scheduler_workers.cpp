@@ -130,7 +130,6 @@ void Scheduler::on(const Tick&) {
   last_tick_ms_ = now_ms_;
   standing_of_processes_changed();  // time has passed
   fail_condemned();
-  on(SearchGoesOn{});
   std::vector<WorkerId> lost;
   for (auto& [id, worker] : workers_) {
     if (gap_ms > kLongestTick_ms) {

@@ -32,9 +32,9 @@ void ClientsDesk::take(const std::string& identity, std::string_view frame, Inst
     read_elsewhere({identity, protocol::request_id_of(frame), holder}, frame);
     return;
   }
-  const ReadRequest read = read_request(frame, {});
+  const ReadRequest read = read_request(frame, false);
   const Client client{identity, read.request_id, holder};
-  if (read.needs_survey && objection_to(read).empty() && !client.is_reader()) {
+  if (read.needs_judging && objection_to(read).empty() && !client.is_reader()) {
     read_elsewhere(client, frame);
   } else {
     answer(client, read, now);

@@ -4,6 +4,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/recipe/point_inputs.h"
 #include "proto/result_message.h"
 
 namespace oblique::server {
@@ -46,7 +47,7 @@ Service::Service(const ServiceSettings& settings, Outbox& outbox, std::vector<St
     feed(StudyAdded{study.study_id, study.table, std::move(study.settled), study.failures.size(),
                     study.state == StudyState::kCancelled,
                     study.state == StudyState::kPaused || waits, study.terms, study.solver_version,
-                    std::move(study.attempts), seeks},
+                    std::move(study.attempts), seeks, study.left_out},
          now);
     if (seeks) {  // it was not at its end when the server ended
       begin_reuse(study.study_id, now);
@@ -92,13 +93,6 @@ void Service::tick(Instant now) {
         return scheduler_.knows_worker(id) ? scheduler_.solved_points(id) : 0;
       },
       now.steady_ms);
-}
-
-bool Service::go_on_searching(Instant now) {
-  if (scheduler_.is_searching()) {
-    feed(SearchGoesOn{}, now);
-  }
-  return scheduler_.is_searching();
 }
 
 void Service::drain(Instant now) {
@@ -205,21 +199,28 @@ void Service::perform(const StoreResults& effect, Turn turn) {
   const WorkerRecord& worker = *workers_.find(effect.worker);
   protocol::Results& message = *turn.results;
   const std::size_t bytes = message.ByteSizeLong();
-  const bool any = !effect.accepted.empty() && states_.contains(effect.study);
-  if (any && workers_.needs_row(effect.worker)) {
+  const bool has_rows = !effect.accepted.empty() && states_.contains(effect.study);
+  if (has_rows && workers_.needs_row(effect.worker)) {
     // Whoever only comes and goes leaves no row.
     ledger_.write(AddWorker{effect.worker, worker.name, worker.threads, worker.solver_version,
                             worker.instruction_set, worker.joined_at},
                   QuietWrite{});
   }
   AddResults change{
-      effect.study,           any ? states_.record(effect.study).table.get() : nullptr,
+      effect.study,           has_rows ? states_.record(effect.study).table.get() : nullptr,
       effect.worker,          worker.solver_version,
       worker.instruction_set, message.attempt(),
-      iso_8601(turn.now),     {}};
-  ResultsWrite write{{effect.worker, effect.study, effect.sequence, {}}, message.attempt(), bytes};
+      iso_8601(turn.now),     {},
+      effect.left_out};
+  ResultsWrite write{{effect.worker, effect.study, effect.sequence, {}, effect.left_out},
+                     message.attempt(),
+                     bytes};
   for (const std::size_t index : effect.accepted) {
     protocol::PointResult& result = *message.mutable_results(static_cast<int>(index));
+    if (const std::string fault = protocol::fault_of_inputs(result, *change.table);
+        !fault.empty()) {
+      result = protocol::failed_point(result.point(), fault);
+    }
     write.event.outcomes.push_back({result.point(), !result.error().empty()});
     change.results.push_back(std::move(result));
   }
@@ -239,7 +240,7 @@ void Service::perform(const StoreFailure& effect, Turn turn) {
                     iso_8601(turn.now),
                     {protocol::failed_point(effect.point, effect.reason)}};
   ledger_.write(std::move(change),
-                ResultsWrite{{0, effect.study, 0, {{effect.point, true}}}, effect.attempt, 0});
+                ResultsWrite{{0, effect.study, 0, {{effect.point, true}}, {}}, effect.attempt, 0});
 }
 
 void Service::perform(const StudyFinished& effect, Turn turn) {
@@ -312,7 +313,8 @@ void Service::stored(const ResultsWrite& write, Instant now) {
     }
     ++(outcome.failed ? stored_points_.failed : stored_points_.solved);
   }
-  if (!write.event.outcomes.empty()) {
+  const bool settles = !write.event.outcomes.empty() || !write.event.left_out.empty();
+  if (settles) {
     rates_.note(id, settled_of(id), states_.record(id).since_ms, now.steady_ms);
   }
   const WorkerId worker = write.event.worker;
@@ -322,6 +324,8 @@ void Service::stored(const ResultsWrite& write, Instant now) {
   feed(write.event, now);
   if (!write.event.outcomes.empty()) {
     known_.note_source(id);
+  }
+  if (settles) {
     open_.set_points(id, scheduler_.study(id).points - settled_of(id));
   }
 }

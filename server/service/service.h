@@ -73,7 +73,6 @@ class Service {
   void tick(Instant now);
   /// Goes on to look for points that filters leave in, while workers wait for some. True when there
   /// is more to look for at once.
-  bool go_on_searching(Instant now);
   /// Nothing is handed out and no study taken any more; results are, and all else goes on.
   void drain(Instant now);
   /// Nothing is with workers, or on its way to the disk.

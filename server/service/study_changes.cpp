@@ -103,7 +103,7 @@ void StudyChanges::grow(const Client& client, StudyId id, const ReadRequest& rea
   bool has_more = false;
   try {
     growth = study.table.growth_to(read.table);
-    has_more = read.table.numbers() > study.table.numbers();
+    has_more = read.table.size() > study.table.size();
   } catch (const std::runtime_error&) {
     // Only another version can.
   }

@@ -53,6 +53,7 @@ StudyView view_of(StudyId id, const StudySources& sources, Instant now) {
                  counts.points,
                  counts.solved,
                  counts.failed,
+                 counts.left_out,
                  counts.leased,
                  record.created_at,
                  record.terms,
@@ -81,6 +82,7 @@ protocol::StudyStatus to_message(const StudyView& view) {
   message.set_points(view.points);
   message.set_solved(view.solved);
   message.set_failed(view.failed);
+  message.set_left_out(view.left_out);
   message.set_leased(view.leased);
   message.set_created_at(view.created_at);
   message.set_priority(view.terms.priority);
@@ -100,8 +102,7 @@ std::uint64_t open_points_of(StudyId id, const StudySources& sources) {
   if (!sources.states.is_durable(id)) {
     return sources.states.record(id).table.size();
   }
-  const StudyCounts counts = sources.scheduler.study(id);
-  return counts.points - counts.solved - counts.failed;
+  return sources.scheduler.points(id).open();
 }
 
 WorkerView view_of(WorkerId id, const WorkerRecord& worker, const Scheduler& scheduler,

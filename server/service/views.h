@@ -23,6 +23,7 @@ struct StudyView {
   std::uint64_t points;
   std::uint64_t solved;
   std::uint64_t failed;
+  std::uint64_t left_out;  ///< by filters, as far as it is known
   std::uint64_t leased;
   std::string created_at;  ///< UTC, ISO 8601
   StudyTerms terms;
@@ -32,7 +33,7 @@ struct StudyView {
   std::string submitted_by{};   ///< name of the key; empty: without keys
   protocol::TakenOver taken{};  ///< from other studies
 
-  std::uint64_t settled() const { return solved + failed; }
+  std::uint64_t settled() const { return solved + failed + left_out; }
 };
 
 /// Where a view of a study comes from.
@@ -61,7 +62,7 @@ struct WorkerView {
   std::string key{};    ///< its name; empty: without keys
 };
 
-/// Points that are neither solved nor failed.
+/// Points that are neither solved, failed nor known to be left out.
 std::uint64_t open_points_of(StudyId id, const StudySources& sources);
 
 WorkerView view_of(WorkerId id, const WorkerRecord& worker, const Scheduler& scheduler,

@@ -7,6 +7,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/frames.h"
+#include "proto/recipe/blocks.h"
 #include "proto/result_message.h"
 #include "proto/text.h"
 #include "proto/wire/frame_scan.h"
@@ -39,6 +40,24 @@ std::string process_of(const protocol::WorkerHello& hello) {
   const bool ends_in_number = colon != std::string::npos && colon > 0 && colon + 1 < name.size() &&
                               name.find_first_not_of("0123456789", colon + 1) == std::string::npos;
   return ends_in_number ? "name " + protocol::shortened(name, kLongestWorkerText) : std::string();
+}
+
+/// The points that a filter leaves out; nothing where the message has no ranges of points.
+std::optional<IntervalSet> left_out_of(const protocol::Results& message) {
+  IntervalSet points;
+  if (message.left_out_size() % 2 != 0 ||
+      message.left_out_size() > 2 * protocol::kMostLeftOutRanges) {
+    return std::nullopt;
+  }
+  for (int i = 0; i < message.left_out_size(); i += 2) {
+    const std::uint64_t first = message.left_out(i);
+    const std::uint64_t count = message.left_out(i + 1);
+    if (count == 0 || count > protocol::kMaxPoints || first > protocol::kMaxPoints - count) {
+      return std::nullopt;
+    }
+    points.insert(first, first + count);
+  }
+  return points;
 }
 
 }  // namespace
@@ -226,13 +245,19 @@ void WorkersDesk::results(WorkerId worker, protocol::Results message, Heard& hea
     give_up(worker, "it sends more results than workers keep", heard);
     return;
   }
+  std::optional<IntervalSet> left_out = left_out_of(message);
+  if (!left_out) {
+    give_up(worker, "it sends ranges of points that are none", heard);
+    return;
+  }
   ResultsReceived event{worker,
                         message.study_id(),
                         message.lease_id(),
                         message.sequence(),
                         message.batch_done(),
                         message.busy_s(),
-                        {}};
+                        {},
+                        std::move(*left_out)};
   event.outcomes.reserve(static_cast<std::size_t>(message.results_size()));
   for (protocol::PointResult& result : *message.mutable_results()) {
     if (const std::string fault = fault_of(result); !fault.empty()) {

@@ -85,6 +85,7 @@ struct AddResults {
   std::uint32_t attempt;
   std::string solved_at;
   std::vector<protocol::PointResult> results;
+  IntervalSet left_out{};  ///< points that a filter leaves out: they are completed without a row
 };
 
 /// The study has further points, behind those that it had, and runs on these terms.

@@ -165,7 +165,7 @@ void ResultReuse::reuse(const ReuseResults& change, std::uint64_t point, std::in
     if (insert_.run(row_)) {
       ++source->copied;
       outcome.points.insert(point);
-      settled_.add(change.study_id, point);
+      settled_.add(change.study_id, {point, point + 1});
     }
     break;
   }

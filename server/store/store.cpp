@@ -6,6 +6,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/canonical.h"
+#include "proto/recipe/point_inputs.h"
 #include "proto/result_message.h"
 #include "server/database/row_checksum.h"
 #include "server/store/rows/model_rows.h"
@@ -114,6 +115,7 @@ struct Store::Statements {
                    "INSERT INTO workers (worker_id, name, threads, solver_version,"
                    " instruction_set, joined_at, checksum) VALUES (?1, ?2, ?3, ?4, ?5, ?6,"
                    " row_checksum(?1, ?2, ?3, ?4, ?5, ?6))"),
+        note_left_out(database, "UPDATE studies SET left_out = left_out + ?2 WHERE study_id = ?1"),
         find_study(database, "SELECT 1 FROM studies WHERE study_id = ?"),
         find_model(database, "SELECT model_id FROM models WHERE definition = ?"),
         add_model(database, insert_model_sql()),
@@ -130,6 +132,7 @@ struct Store::Statements {
   Statement rename;
   Statement rename_origin;
   Statement add_worker;
+  Statement note_left_out;
   Statement find_study;
   Statement find_model;
   Statement add_model;
@@ -374,7 +377,7 @@ void Store::add(const AddResults& change) {
   }
   PackedRow& row = statements_->row;
   for (const protocol::PointResult& result : change.results) {
-    const protocol::Point point = change.table->point(result.point());
+    const protocol::Point point = protocol::inputs_of(result, *change.table);
     const StoredModel model = stored_model(change, point.model);
     const RowContext context{change.study_id, model.id,         model.accuracy, point,
                              result.point(),  change.worker_id, change.attempt, change.solved_at};
@@ -385,8 +388,16 @@ void Store::add(const AddResults& change) {
       row.pack(context, nullptr, result.error(), statements_->texts);
     }
     if (statements_->add_result.run(row)) {  // else the point has a row already
-      settled_->add(change.study_id, result.point());
+      settled_->add(change.study_id, {result.point(), result.point() + 1});
     }
+  }
+  if (!change.left_out.empty()) {
+    change.left_out.for_each(
+        [&](const Interval& points) { settled_->add(change.study_id, points); });
+    Statement& note = statements_->note_left_out;
+    note.bind(1, change.study_id);
+    note.bind(2, change.left_out.size());
+    note.run();
   }
 }
 

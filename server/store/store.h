@@ -29,11 +29,12 @@ struct StoredStudy {
   std::string created_at;
   StudyTerms terms{};
   std::string solver_version;  ///< of its first result that a worker solved; empty: there is none
-  IntervalSet settled;         ///< points that have a row
+  IntervalSet settled;         ///< points that have a row or are left out
   IntervalSet failures;        ///< those whose row says failed
   PointAttempts attempts{};    ///< of these, and of those that failed and were forgotten
   std::string submitted_by{};  ///< name of the key; empty: without keys
   bool takes_over = false;     ///< points that other studies have solved are still sought
+  std::uint64_t left_out = 0;  ///< how many of the settled points a filter leaves out
   std::map<std::string, std::uint64_t> taken{};  ///< points that it took over, by their origins
 };
 

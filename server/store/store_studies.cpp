@@ -98,7 +98,12 @@ void check_rows(sqlite3* database, const StoredStudy& study) {
   for (const std::uint64_t point : points) {
     row.bind(1, study.study_id);
     row.bind(2, point);
-    const std::string fault = row.step() ? recipe.fault_of(row) : "its row is gone";
+    std::string fault;
+    if (row.step()) {
+      fault = recipe.fault_of(row);
+    } else if (study.table->is_left_in(point)) {
+      fault = "its row is gone";
+    }
     row.reset();
     if (!fault.empty()) {
       throw StorageError(fmt::format(
@@ -140,10 +145,11 @@ PointsOfStudies Store::settled_points() {
 std::vector<StoredStudy> Store::studies() {
   std::vector<StoredStudy> found;
   Progress progress = progress_of_all(database_.get());
-  Statement list(database_.get(),
-                 "SELECT study_id, name, recipe, state, created_at, priority, weight,"
-                 " mixes_versions, points, coalesce(submitted_by, ''), takes_over FROM studies "
-                 "ORDER BY study_id");
+  Statement list(
+      database_.get(),
+      "SELECT study_id, name, recipe, state, created_at, priority, weight,"
+      " mixes_versions, points, coalesce(submitted_by, ''), takes_over, left_out FROM studies "
+      "ORDER BY study_id");
   Statement version(database_.get(),
                     "SELECT w.solver_version FROM packed_results AS r"
                     " CROSS JOIN workers AS w ON w.worker_id = r.worker"
@@ -177,6 +183,7 @@ std::vector<StoredStudy> Store::studies() {
     study.terms = {static_cast<std::int32_t>(list.integer(5)), list.real(6), list.integer(7) != 0};
     study.submitted_by = list.text(9);
     study.takes_over = list.integer(10) != 0;
+    study.left_out = number(list, 11);
     taken.bind(1, study.study_id);
     while (taken.step()) {
       study.taken[taken.text(0)] += number(taken, 1);

@@ -20,32 +20,24 @@ protocol::Recipe parsed(const std::string& bytes) {
 
 StudyTable::StudyTable(std::shared_ptr<const protocol::PointTable> table)
     : shared_(std::make_shared<Shared>(
-          Shared{table->recipe().SerializeAsString(), table->points(), table->size(), nullptr})) {
+          Shared{table->recipe().SerializeAsString(), table->size(), nullptr})) {
   shared_->table = std::move(table);
 }
 
 StudyTable::StudyTable(std::string recipe_bytes, std::uint64_t points)
-    : shared_(std::make_shared<Shared>(Shared{std::move(recipe_bytes), points, {}, nullptr})) {}
+    : shared_(std::make_shared<Shared>(Shared{std::move(recipe_bytes), points, nullptr})) {}
 
 const std::shared_ptr<const protocol::PointTable>& StudyTable::get() const {
   if (shared_->table == nullptr) {
     protocol::Recipe recipe = parsed(shared_->recipe_bytes);
     auto table = std::make_shared<const protocol::PointTable>(std::move(recipe));
-    if (table->points() != shared_->points) {
-      throw std::runtime_error("it has " + std::to_string(table->points()) +
+    if (table->size() != shared_->points) {
+      throw std::runtime_error("it has " + std::to_string(table->size()) +
                                " points, and the study " + std::to_string(shared_->points));
     }
-    shared_->numbers = table->size();
     shared_->table = std::move(table);
   }
   return shared_->table;
-}
-
-std::uint64_t StudyTable::numbers() const {
-  if (!shared_->numbers) {
-    get();
-  }
-  return *shared_->numbers;
 }
 
 Growth StudyTable::growth_to(const StudyTable& other) const {

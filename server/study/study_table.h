@@ -22,11 +22,8 @@ class StudyTable {
   /// Of a recipe that was judged when it was stored, and of so many points.
   StudyTable(std::string recipe_bytes, std::uint64_t points);
 
-  /// How many points it has, without those that filters leave out.
+  /// How many points it has, also those that filters leave out.
   std::uint64_t size() const { return shared_->points; }
-  /// How many point numbers, with those that are left out. Makes the table when nobody has yet, and
-  /// throws as `get` does.
-  std::uint64_t numbers() const;
   /// oblique.protocol.Recipe, serialised.
   const std::string& recipe_bytes() const { return shared_->recipe_bytes; }
 
@@ -51,7 +48,6 @@ class StudyTable {
   struct Shared {
     std::string recipe_bytes;
     std::uint64_t points;
-    std::optional<std::uint64_t> numbers;  // once the table was made
     std::shared_ptr<const protocol::PointTable> table;
   };
   std::shared_ptr<Shared> shared_;

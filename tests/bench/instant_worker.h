@@ -8,6 +8,7 @@
 #include <thread>
 #include <utility>
 
+#include "proto/recipe/point_inputs.h"
 #include "proto/result_message.h"
 #include "worker/session.h"
 #include "worker/solver/solve.h"
@@ -23,13 +24,15 @@ class InstantWorker {
     settings.name = "instant";
     settings.report_interval_ms = 10;
     thread_ = std::thread([this, settings] {
-      worker::Session session(settings, [this](const auto&, const auto& next, const auto& take) {
-        while (const auto point = next()) {
-          protocol::PointResult result = result_;
-          result.set_point(*point);
-          take(std::move(result));
-        }
-      });
+      worker::Session session(settings,
+                              [this](const auto& batch, const auto& next, const auto& take) {
+                                while (const auto position = next()) {
+                                  protocol::PointResult result = result_;
+                                  result.set_point(batch.point_at(*position));
+                                  protocol::set_inputs(result, batch.points());
+                                  take(std::move(result));
+                                }
+                              });
       session.run(stop_, [] {});
     });
   }

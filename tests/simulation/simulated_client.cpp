@@ -46,7 +46,7 @@ std::optional<protocol::PointTable> filtered_here_and_there(protocol::Recipe rec
   }
   try {
     protocol::PointTable table(std::move(recipe));
-    table.survey([] { return true; });
+    table.judge_points();
     return table;
   } catch (const solver::InputError&) {
     return std::nullopt;
@@ -58,12 +58,13 @@ std::optional<protocol::PointTable> filtered_here_and_there(protocol::Recipe rec
 SimulatedClient::SimulatedClient(World& world, Network& network, std::uint64_t peer,
                                  std::string name, std::uint64_t points, std::uint64_t mark)
     : world_(world), network_(network), peer_(peer), name_(std::move(name)), mark_(mark) {
-  points_ = set_recipe(points);
+  set_recipe(points);
 }
 
-/// A recipe of its own, of so many points or, with a filter, fewer; behind the one that is there,
-/// if any. Returns how many they are.
-std::uint64_t SimulatedClient::set_recipe(std::uint64_t points) {
+/// A recipe of its own, of so many points, of which a filter may leave out some; behind the one
+/// that is there, if any.
+void SimulatedClient::set_recipe(std::uint64_t points) {
+  points_ += points;
   const std::uint64_t points_a_model = world_.chance(0.3) ? points + 1
                                        : world_.chance(0.5)
                                            ? std::uint64_t{1}
@@ -74,16 +75,19 @@ std::uint64_t SimulatedClient::set_recipe(std::uint64_t points) {
                                             : "sin(1234.5 * mu + k) > -0.3";
     if (const auto table = filtered_here_and_there(recipe, filter)) {
       recipe_.mutable_blocks()->MergeFrom(table->recipe().blocks());
-      return table->points();
+      for (std::uint64_t point = 0; point < points; ++point) {
+        left_in_ += table->is_left_in(point) ? 1U : 0U;
+      }
+      return;
     }
   }
   recipe_.mutable_blocks()->MergeFrom(recipe.blocks());
-  return points;
+  left_in_ += points;
 }
 
 void SimulatedClient::grow() {
-  appended_ = set_recipe(static_cast<std::uint64_t>(world_.between(1, 60)));
-  points_ += appended_;
+  appended_ = static_cast<std::uint64_t>(world_.between(1, 60));
+  set_recipe(appended_);
 }
 
 /// The study was deleted: another one under its name.
@@ -92,7 +96,9 @@ void SimulatedClient::begin_anew() {
   study_id_ = 0;
   mark_ += kClients;
   recipe_.clear_blocks();
-  points_ = set_recipe(static_cast<std::uint64_t>(world_.between(1, 300)));
+  points_ = 0;
+  left_in_ = 0;
+  set_recipe(static_cast<std::uint64_t>(world_.between(1, 300)));
 }
 
 void SimulatedClient::start() {

@@ -29,6 +29,8 @@ class SimulatedClient {
 
   const std::string& name() const { return name_; }
   std::uint64_t points() const { return points_; }
+  /// Of these, how many filters leave in.
+  std::uint64_t left_in() const { return left_in_; }
   std::uint64_t mark() const { return mark_; }
   /// A submission was acknowledged at some time.
   bool was_acknowledged() const { return acknowledged_; }
@@ -48,7 +50,7 @@ class SimulatedClient {
   enum class Intent { kSubmit, kChange, kRename, kDelete };
 
   void connect();
-  std::uint64_t set_recipe(std::uint64_t points);
+  void set_recipe(std::uint64_t points);
   void grow();
   void begin_anew();
   void ask();
@@ -60,7 +62,8 @@ class SimulatedClient {
   Network& network_;
   std::uint64_t peer_;
   std::string name_;
-  std::uint64_t points_ = 0;  // without those that filters leave out
+  std::uint64_t points_ = 0;
+  std::uint64_t left_in_ = 0;  // of these, by filters
   std::uint64_t mark_;
   std::uint64_t study_id_ = 0;  // as it was acknowledged
   std::string new_name_;

@@ -27,7 +27,6 @@ void SimulatedServer::start() {
   settings.scheduler.loss_limits.condemned_after = max_losses_;
   // As server/loop/loop.cpp does.
   settings.scheduler.first_lease_id = found.starts << 40U;
-  settings.scheduler.most_looks = static_cast<std::uint64_t>(world_.between(1, 60));
   settings.solver_version = "1";
   settings.database_id = "disk";
   settings.last_study_id = found.last_study_id;
@@ -96,11 +95,6 @@ void SimulatedServer::after(std::int64_t delay_ms, std::function<void()> what) {
 
 void SimulatedServer::tick() {
   service_->tick(now());
-  if (world_.chance(0.5)) {  // in the other turns there is no time for it
-    for (int turn = 0; turn < 20 && service_->go_on_searching(now()); ++turn) {
-      service_->scheduler().check_invariants();
-    }
-  }
   after(250, [this] { tick(); });
 }
 

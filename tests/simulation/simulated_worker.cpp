@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "proto/frames.h"
+#include "proto/recipe/point_inputs.h"
 #include "proto/result_message.h"
 
 namespace oblique::simulation {
@@ -192,8 +193,13 @@ void SimulatedWorker::solve_some() {
   }
   Work& work = batches_.front();
   const std::uint64_t position = next_position(work);
-  worker::Progress progress{
-      work.batch.number(), work.batch.study_id(), {}, 1e-3 * static_cast<double>(busy_ms_), false};
+  worker::Progress progress{work.batch.number(),
+                            work.batch.study_id(),
+                            {},
+                            1e-3 * static_cast<double>(busy_ms_),
+                            false,
+                            {}};
+  work.batch.append_points(work.solved, position, progress.left_out);
   if (position < work.batch.size()) {
     const std::uint64_t point = work.batch.point_at(position);
     const std::uint64_t mark = mark_of(work.batch.points().point(point).H_m);
@@ -206,8 +212,12 @@ void SimulatedWorker::solve_some() {
     fallen_model_ = next_model();
     work.solved = position + 1;
     progress.results.push_back(answer_to(mark, point));
+    protocol::set_inputs(progress.results.back(), work.batch.points());
   }
   progress.batch_done = next_position(work) == work.batch.size();
+  if (progress.batch_done) {
+    work.batch.append_points(std::max(work.solved, position), work.batch.size(), progress.left_out);
+  }
   if (progress.batch_done) {
     batches_.pop_front();
   }

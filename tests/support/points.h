@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "proto/recipe/point_inputs.h"
 #include "proto/recipe/point_table.h"
 #include "proto/result_message.h"
 #include "tests/support/recipes.h"
@@ -57,6 +58,13 @@ inline protocol::PointResult solved_point(std::uint64_t point) {
   result.solver.steps = 1234;
   result.solver.wall_s = 0.25;
   return protocol::to_message(point, result);
+}
+
+/// The same as a worker sends it, with the inputs of that study.
+inline protocol::PointResult solved_point(std::uint64_t point, const protocol::PointTable& table) {
+  protocol::PointResult result = solved_point(point);
+  protocol::set_inputs(result, table);
+  return result;
 }
 
 }  // namespace oblique::server

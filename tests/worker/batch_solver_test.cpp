@@ -151,11 +151,27 @@ TEST_F(BatchSolverTest, OfTheRangesOfABatchThatIsSolvedWhichAFilterLeavesIn) {
   gate_.open(1000);
   const Batch scattered =
       filtered_batch({{339, 400}, {100, 101}, {105, 131}}, "floor(mu / 10) == mu / 10");
-  EXPECT_EQ(points_to_solve(scattered), 10U);
   solver_.add(scattered);
   wait_batches_ended(1);
   EXPECT_EQ(points_of_one_batch(solver_.collect()),
             (std::set<std::uint64_t>{100, 110, 120, 130, 340, 350, 360, 370, 380, 390}));
+}
+
+TEST_F(BatchSolverTest, PointsThatAFilterLeavesOutAreNamed) {
+  gate_.open(1000);
+  solver_.add(filtered_batch({{8, 13}, {5, 6}, {20, 22}}, "floor(mu / 10) == mu / 10"));
+  wait_batches_ended(1);
+  const auto progress = solver_.collect();
+  ASSERT_EQ(progress.size(), 1U);
+  std::vector<std::uint64_t> left_out;
+  for (const Batch::Range& range : progress[0].left_out) {
+    for (std::uint64_t point = range.begin; point < range.end; ++point) {
+      left_out.push_back(point);
+    }
+  }
+  EXPECT_EQ(left_out, (std::vector<std::uint64_t>{8, 9, 11, 12, 5, 21}));
+  EXPECT_EQ(size_of(progress[0].left_out), 6U);
+  EXPECT_EQ(progress[0].results.size(), 2U);
 }
 
 TEST_F(BatchSolverTest, RangesAreSolvedInTheOrderInWhichTheyAreGiven) {

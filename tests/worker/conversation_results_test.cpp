@@ -101,6 +101,42 @@ TEST_F(ConversationTest, AResultTooLargeToSendBecomesAFailedPoint) {
   EXPECT_EQ(sent_results()[0].results(0).error(), "its result is too large to send");
 }
 
+TEST_F(ConversationTest, PointsThatAFilterLeavesOutAreNamedAsRangesOfTheirBatch) {
+  join();
+  receive(batch_message(7, 31, 0, 10));
+  std::vector<Progress> all;
+  all.push_back({1, 7, {protocol::failed_point(3, "for the test")}, 0.1, true, {{0, 3}, {4, 10}}});
+  take(conversation_->on_progress(std::move(all), now_ms_));
+  ASSERT_EQ(sent_results().size(), 1U);
+  const protocol::Results results = sent_results()[0];
+  EXPECT_EQ(results.lease_id(), 31U);
+  EXPECT_TRUE(results.batch_done());
+  EXPECT_EQ(std::vector<std::uint64_t>(results.left_out().begin(), results.left_out().end()),
+            (std::vector<std::uint64_t>{0, 3, 4, 6}));
+}
+
+TEST_F(ConversationTest, ManyRangesGoInSeveralMessagesOfWhichTheLastEndsTheBatch) {
+  join();
+  receive(study_message(7, 100'000));
+  receive(batch_message(7, 31, 0, 100'000));
+  std::vector<Batch::Range> ranges;
+  for (std::uint64_t point = 0; point < 100'000; point += 4) {
+    ranges.push_back({point, point + 1});
+  }
+  std::vector<Progress> all;
+  all.push_back({1, 7, {}, 0.1, true, ranges});
+  take(conversation_->on_progress(std::move(all), now_ms_));
+  int numbers = 0;
+  ASSERT_GT(sent_results().size(), 1U);
+  for (const protocol::Results& results : sent_results()) {
+    EXPECT_LE(results.left_out_size(), 2 * protocol::kMostLeftOutRanges);
+    numbers += results.left_out_size();
+  }
+  EXPECT_EQ(numbers, 50'000);
+  EXPECT_FALSE(sent_results().front().batch_done());
+  EXPECT_TRUE(sent_results().back().batch_done());
+}
+
 TEST_F(ConversationTest, UnacknowledgedResultsAreDeliveredAgainBeforeCreditIsGiven) {
   join();
   receive(batch_message(7, 31));

@@ -57,6 +57,13 @@ std::vector<protocol::PointResult> solved(const Batch& batch) {
   return solved(batch, solver);
 }
 
+/// The bytes of a result's outputs but for the time that it took.
+std::string bits_of(const protocol::PointResult& result) {
+  auto outputs = protocol::from_message(result);
+  outputs.solver.wall_s = 0.0;
+  return protocol::to_message(0, outputs).SerializeAsString();
+}
+
 /// Behind the other model axes of the only block, before H, mu and e.
 void add_model_axis(protocol::Recipe& recipe, const char* key, const std::vector<double>& values) {
   protocol::Block& block = *recipe.mutable_blocks(0);
@@ -115,6 +122,25 @@ TEST(PointSolverTest, EveryPointGivesWhatTheFingerGivesForItAlone) {
     EXPECT_EQ(outputs.fn_peak_N, expected.fn_peak_N);
     EXPECT_EQ(outputs.vn_out_m_s, expected.vn_out_m_s);
   }
+}
+
+TEST(PointSolverTest, ResultsHaveTheInputsOfTheirPointsAlsoWhenTheyFailed) {
+  protocol::Recipe recipe = recipe_with_points(2);
+  recipe.mutable_blocks(0)->mutable_axes(0)->add_values(1.19);  // beyond the largest drop
+  add_model_axis(recipe, "k", {1e7, 2e7});
+  const Batch batch = batch_of(recipe);
+  const auto results = solved(batch);
+  std::size_t failed = 0;
+  for (const protocol::PointResult& result : results) {
+    const protocol::Point point = batch.points().point(result.point());
+    failed += result.error().empty() ? 0U : 1U;
+    ASSERT_TRUE(result.has_h_m() && result.has_model());
+    EXPECT_EQ(result.h_m(), point.H_m);
+    EXPECT_EQ(result.mu(), point.mu);
+    EXPECT_EQ(result.e_star(), point.e_star);
+    EXPECT_EQ(result.model().k_n_m(), batch.points().model(point.model).k_N_m);
+  }
+  EXPECT_EQ(failed, 4U);
 }
 
 TEST(PointSolverTest, APointWithoutAnswerFailsWithTheReasonAndTheOthersAreSolved) {
@@ -217,16 +243,8 @@ TEST(PointSolverTest, ResultsHaveErrorsWhereTheStudyWantsThemAndElseTheSameNumbe
     EXPECT_TRUE(result.errors.v_out);
     EXPECT_FALSE(protocol::from_message(without[i]).errors.mode_same);
     result.errors = {};
-    result.solver.wall_s = protocol::from_message(without[i]).solver.wall_s;
-    EXPECT_EQ(protocol::to_message(i, result).SerializeAsString(), without[i].SerializeAsString());
+    EXPECT_EQ(bits_of(protocol::to_message(i, result)), bits_of(without[i]));
   }
-}
-
-/// The bytes of a result but for its number and the time that it took.
-std::string bits_of(const protocol::PointResult& result) {
-  auto outputs = protocol::from_message(result);
-  outputs.solver.wall_s = 0.0;
-  return protocol::to_message(0, outputs).SerializeAsString();
 }
 
 /// The order for a point of a recipe.

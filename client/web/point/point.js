@@ -4,6 +4,7 @@ import { copied, h, named, picker, save } from "/parts/dom.js";
 import { file_link, file_sayer } from "/parts/file_link.js";
 import { count, of_file, quoted, shown, with_unit } from "/parts/format.js";
 import { line_plot } from "/parts/lines.js";
+import { completed } from "/overview.js";
 import { json } from "/server.js";
 import { wanted_of } from "/study/asked/between.js";
 import { held_open } from "/study/asked/look.js";
@@ -159,7 +160,7 @@ function look_again(study, told, ask) {
   let is_asking = false;
   return async (/** @type {any} */ now) => {
     const one = now.studies.find((/** @type {any} */ each) => each.id === study);
-    const stands = one ? one.solved + one.failed : -1;  // those that ended are not told of
+    const stands = one ? completed(one) : -1;  // those that ended are not told of
     if (told().row || is_asking || stands === settled) return;
     is_asking = true;
     try {

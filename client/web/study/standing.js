@@ -3,7 +3,7 @@
 import { h } from "/parts/dom.js";
 import { count } from "/parts/format.js";
 import { json } from "/server.js";
-import { kFailed, progress_of, study_buttons } from "/overview.js";
+import { completed, kFailed, progress_of, study_buttons } from "/overview.js";
 
 /** Of a study that events do not tell of. */
 const kAskAgain_ms = 3000;
@@ -65,17 +65,18 @@ export function standing_row(view, moved) {
   }
   /** @param {any} told */
   const show = (told) => {
-    const text = JSON.stringify([told.state, told.solved, told.failed, told.waits_for]);
+    const text = JSON.stringify([told.state, told.solved, told.failed, told.left_out, told.waits_for]);
     if (text === stood) return;
     stood = text;
     state = told.state;
     wait();
     how_far.replaceChildren(told.state, progress_of(told), `${count(told.points)} ${told.points === 1 ? "point" : "points"}`,
       told.failed > 0 ? h("span", { class: "bad" }, `${count(told.failed)} failed`) : "",
+      told.left_out > 0 ? h("span", { class: "weak" }, `${count(told.left_out)} left out by where`) : "",
       told.state === "running" && told.waits_for ? h("span", { class: "weak" }, `waits for ${told.waits_for}`) : "");
     failure.show(told);
     offer(told);
-    const now = `${told.solved + told.failed}`;
+    const now = `${completed(told)}`;
     if (now === settled) return;
     if (settled !== "" || view.study.state === "running") moved(now);  // points may have come while the view was opened
     settled = now;

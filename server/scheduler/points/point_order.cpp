@@ -218,19 +218,4 @@ Interval PointOrder::group_at(const protocol::PointTable& table, std::uint64_t p
   return {std::max(segment.first_point, end_), segment.first_point + segment.count};
 }
 
-std::uint64_t PointOrder::first_left_in(const protocol::PointTable& table, std::uint64_t begin,
-                                        std::uint64_t end) const {
-  for (std::uint64_t at = begin; at < end;) {
-    const std::uint64_t run_end = at < end_ ? std::min(end_of_run(run_of_place(at)), end) : end;
-    const std::uint64_t first = point(at);
-    const std::uint64_t past = first + (run_end - at);
-    const std::uint64_t found = table.first_left_in(first, past);
-    if (found < past) {
-      return at + (found - first);
-    }
-    at = run_end;
-  }
-  return end;
-}
-
 }  // namespace oblique::server

@@ -36,10 +36,6 @@ class PointOrder {
   /// The places around `place` of one group or, if they are not arranged, of one model.
   Interval group_at(const protocol::PointTable& table, std::uint64_t place) const;
 
-  /// The first place of [begin, end) whose point a filter leaves in, or `end`.
-  std::uint64_t first_left_in(const protocol::PointTable& table, std::uint64_t begin,
-                              std::uint64_t end) const;
-
  private:
   /// Points that follow each other and have places that do; up to the place of the next run.
   struct Run {

@@ -8,19 +8,11 @@
 
 namespace oblique::server {
 
-StudyPoints::StudyPoints(StudyTable table, IntervalSet settled, const LossLimits& limits)
-    : table_(std::move(table)),
-      points_(table_.size()),
-      limits_(limits),
-      settled_(std::move(settled)) {
-  if (settled_.first_from(points_)) {  // there is a filter, or the rows are of other points
-    settled_.erase(table_.numbers(), std::numeric_limits<std::uint64_t>::max());
-  }
-  knows_left_out_ = !is_complete();
-  if (!knows_left_out_) {
-    return;
-  }
-  fresh_.insert(0, table_.numbers());
+StudyPoints::StudyPoints(StudyTable table, IntervalSet settled, std::uint64_t left_out,
+                         const LossLimits& limits)
+    : table_(std::move(table)), limits_(limits), settled_(std::move(settled)), left_out_(left_out) {
+  settled_.erase(size(), std::numeric_limits<std::uint64_t>::max());  // rows of other points
+  fresh_.insert(0, size());
   settled_.for_each(
       [this](const Interval& interval) { fresh_.erase(interval.begin, interval.end); });
 }
@@ -69,7 +61,6 @@ void StudyPoints::move_all(const Map& map) {
       map(IntervalSet(entry.first, history.end)).for_each([&](const Interval& interval) {
         History part = history;
         part.end = interval.end;
-        part.part_end = interval.end;
         moved.emplace(interval.begin, part);
       });
     }
@@ -82,8 +73,7 @@ void StudyPoints::give_back(std::span<const Interval> parts, std::uint32_t attem
   Returned& intervals = returned(losses.standing(limits_));
   for (const Interval& part : parts) {
     for (const Interval& interval : leased_.within(part.begin, part.end)) {
-      intervals.emplace(interval.begin,
-                        History{interval.end, attempts, losses, now_ms, parts.back().end});
+      intervals.emplace(interval.begin, History{interval.end, attempts, losses, now_ms});
       returned_points_ += interval.end - interval.begin;
     }
     leased_.erase(part.begin, part.end);
@@ -111,9 +101,6 @@ bool StudyPoints::receive(std::uint64_t number) {
   if (leased_.contains(point)) {
     leased_.erase(point);
   } else if (fresh_.contains(point)) {
-    if (!table_->is_left_in(number)) {
-      return false;
-    }
     fresh_.erase(point);
   } else if (std::none_of(returned_.begin(), returned_.end(),
                           [&](Returned& intervals) { return erase_from(intervals, point); })) {
@@ -151,35 +138,63 @@ bool StudyPoints::settle(std::uint64_t number) {
   return true;
 }
 
+IntervalSet StudyPoints::receive(const IntervalSet& left_out) {
+  const IntervalSet places = extract(order_.places(left_out));
+  IntervalSet points;
+  places.for_each([&](const Interval& interval) {
+    committing_.insert(interval.begin, interval.end);
+    for (const Interval& part : order_.points(interval)) {
+      points.insert(part.begin, part.end);
+    }
+  });
+  return points;
+}
+
+void StudyPoints::settle(const IntervalSet& left_out) {
+  order_.places(left_out).for_each([&](const Interval& range) {
+    for (const Interval& interval : committing_.within(range.begin, range.end)) {
+      committing_.erase(interval.begin, interval.end);
+      settled_.insert(interval.begin, interval.end);
+      left_out_ += interval.end - interval.begin;
+    }
+  });
+}
+
 void StudyPoints::grow(StudyTable table) {
-  fresh_.insert(table_.numbers(), table.numbers());
-  points_ += table.size() - std::min(table.size(), table_.size());
+  const std::uint64_t first = size();
+  fresh_.insert(first, table.size());
   was_arranged_ = order_.is_arranged();
   if (was_arranged_) {
-    const std::uint64_t first = table_.numbers();
-    order_.arrange(*table.get(), first, IntervalSet(first, table.numbers()), falls_a_group_);
+    order_.arrange(*table.get(), first, IntervalSet(first, table.size()), falls_a_group_);
   }
   table_ = std::move(table);
 }
 
 std::uint64_t StudyPoints::settle_unsolved(const IntervalSet& points) {
-  std::uint64_t settled = 0;
-  const auto settle_all = [&](const std::vector<Interval>& intervals) {
+  const IntervalSet places = extract(order_.places(points));
+  places.for_each(
+      [this](const Interval& interval) { settled_.insert(interval.begin, interval.end); });
+  return places.size();
+}
+
+/// Takes those of these places that are neither committing nor settled out of where they are.
+IntervalSet StudyPoints::extract(const IntervalSet& places) {
+  IntervalSet extracted;
+  const auto add = [&](const std::vector<Interval>& intervals) {
     for (const Interval& interval : intervals) {
-      settled_.insert(interval.begin, interval.end);
-      settled += interval.end - interval.begin;
+      extracted.insert(interval.begin, interval.end);
     }
   };
-  order_.places(points).for_each([&](const Interval& range) {
-    for (IntervalSet* place : {&fresh_, &leased_}) {
-      settle_all(place->within(range.begin, range.end));
-      place->erase(range.begin, range.end);
+  places.for_each([&](const Interval& range) {
+    for (IntervalSet* set : {&fresh_, &leased_}) {
+      add(set->within(range.begin, range.end));
+      set->erase(range.begin, range.end);
     }
     for (Returned& intervals : returned_) {
-      settle_all(extract_from(intervals, range));
+      add(extract_from(intervals, range));
     }
   });
-  return settled;
+  return extracted;
 }
 
 /// The parts of the intervals that lie in the range, which they lose.
@@ -229,11 +244,8 @@ void StudyPoints::count_attempts(const PointAttempts& attempts) {
       for (const Interval& interval : fresh_.within(places.begin, places.end)) {
         fresh_.erase(interval.begin, interval.end);
         returned(Standing::kSound)
-            .emplace(interval.begin, History{interval.end,
-                                             times < kMostAttempts ? times : kMostAttempts,
-                                             {},
-                                             0,
-                                             interval.end});
+            .emplace(interval.begin,
+                     History{interval.end, times < kMostAttempts ? times : kMostAttempts, {}, 0});
         returned_points_ += interval.end - interval.begin;
       }
     });
@@ -246,11 +258,6 @@ std::vector<std::uint64_t> StudyPoints::condemned() const {
     points.push_back(order_.point(first));
   }
   return points;
-}
-
-std::uint64_t StudyPoints::free() const {
-  const std::uint64_t taken = leased_.size() + committing_.size() + settled();
-  return points_ - std::min(points_, taken);
 }
 
 void StudyPoints::check_invariants() const {
@@ -275,16 +282,16 @@ void StudyPoints::check_invariants() const {
       if (history.losses.standing(limits_) != standing) {
         throw std::logic_error("returned points are in the place of another standing");
       }
-      if (history.part_end < history.end) {
-        throw std::logic_error("returned points end behind their part");
-      }
     }
   }
-  if (numbers != all.size() || (knows_left_out_ && !(all == IntervalSet(0, table_.numbers())))) {
+  if (numbers != all.size() || !(all == IntervalSet(0, size()))) {
     throw std::logic_error("a point of a study is in no place or in two");
   }
   if (came_back != returned_points_) {
     throw std::logic_error("returned points are miscounted");
+  }
+  if (left_out_ > settled_.size()) {
+    throw std::logic_error("a filter leaves out more points than are settled");
   }
 }
 

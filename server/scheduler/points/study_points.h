@@ -18,8 +18,8 @@
 
 namespace oblique::server {
 
-/// Points that are handed out together, under one lease: a run of places (PointOrder), without
-/// points that a filter leaves out and some that were settled before.
+/// Points that are handed out together, under one lease: a run of places (PointOrder), without some
+/// that were settled before.
 struct Batch {
   std::uint64_t first_place;
   std::uint64_t count;
@@ -36,20 +36,16 @@ struct Batch {
 /// number of intervals, not of points. Intervals, here and in Batch, are of places: the first lease
 /// brings the points into an order in which those that share a fall follow each other.
 ///
-/// A point that a filter leaves out is fresh until somebody comes across it, and then among the
-/// settled ones, though it counts as none: so the sets stay whole intervals, and nothing that is
-/// leased or returned is left out. Coming across them costs a look at each, of which the caller
-/// says how many may be taken.
+/// Points that a filter leaves out are handed out as all others. The worker names them, and they
+/// are settled without a row.
 class StudyPoints {
  public:
-  /// `settled` are the points that have a row already. Of a study that is complete the table is not
-  /// made.
-  StudyPoints(StudyTable table, IntervalSet settled, const LossLimits& limits);
+  /// `settled` are the points that are settled already, `left_out` of them by a filter. Of a study
+  /// that is complete the table is not made.
+  StudyPoints(StudyTable table, IntervalSet settled, std::uint64_t left_out,
+              const LossLimits& limits);
 
-  /// How many points there are, without those that are left out.
-  std::uint64_t size() const { return points_; }
-  /// How many point numbers.
-  std::uint64_t numbers() const { return table_.numbers(); }
+  std::uint64_t size() const { return table_.size(); }
   /// Whether they have several models; the table is made when there is none.
   bool has_models() const { return table_->models() > 1; }
   /// Nothing is handed out for a while: the table is forgotten until something is, and the order
@@ -60,14 +56,10 @@ class StudyPoints {
 
   /// Takes points out of the returned sound ones or, when there are none, the fresh ones: those
   /// that are left of the group that `wanted` follows, then groups of which nothing was taken yet,
-  /// then the second half of what is left of the last. Nothing when there are none, or when `looks`
-  /// came to 0 before one was found: it says how many points may be looked at, whether they are
-  /// left in, and is counted down.
-  std::optional<Batch> take(const Portion& wanted, std::uint64_t& looks);
-  /// The same out of the returned ones of that standing. These cost no look but between them.
-  std::optional<Batch> take(Standing standing, const Portion& wanted, std::uint64_t& looks);
-  /// Goes on to look for the next fresh point that is left in. True when there is one to take.
-  bool search(std::uint64_t& looks);
+  /// then the second half of what is left of the last. Nothing when there are none.
+  std::optional<Batch> take(const Portion& wanted);
+  /// The same out of the returned ones of that standing.
+  std::optional<Batch> take(Standing standing, const Portion& wanted);
   /// The condemned point if it came back at `until_ms` or before, else nothing.
   std::optional<Batch> take_condemned(std::uint64_t point, std::int64_t until_ms);
 
@@ -83,8 +75,13 @@ class StudyPoints {
   /// study, else it is now committing.
   bool receive(std::uint64_t point);
 
+  /// The same of points that a filter leaves out. Returns those that are committing now.
+  IntervalSet receive(const IntervalSet& left_out);
+
   /// The result of a committing point is durable. False when the point was not committing.
   bool settle(std::uint64_t point);
+  /// It is durable that a filter leaves these points out, as far as they are committing.
+  void settle(const IntervalSet& left_out);
 
   /// The study has got points behind those that it had, which are those of `table` too: they are
   /// fresh.
@@ -101,7 +98,7 @@ class StudyPoints {
   /// or before they were reopened.
   void count_attempts(const PointAttempts& attempts);
 
-  bool has_free() const { return has(Standing::kSound) || free() > returned_points_; }
+  bool has_free() const { return has(Standing::kSound) || !fresh_.empty(); }
   bool has_filter() const { return table_->has_filter(); }
   /// Returned points of that standing.
   bool has(Standing standing) const { return !returned(standing).empty(); }
@@ -109,14 +106,15 @@ class StudyPoints {
   std::int64_t returned_ms(Standing standing) const {
     return returned(standing).begin()->second.returned_ms;
   }
-  bool is_complete() const { return settled() >= points_; }
+  bool is_complete() const { return settled() >= size(); }
   /// Some point has a result, durable or on its way.
   bool has_results() const { return settled() > 0 || !committing_.empty(); }
 
   std::vector<std::uint64_t> condemned() const;
 
-  std::uint64_t free() const;  ///< fresh and returned points
-  std::uint64_t settled() const { return settled_.size() - left_out_; }
+  std::uint64_t free() const { return fresh_.size() + returned_points_; }
+  std::uint64_t settled() const { return settled_.size(); }
+  std::uint64_t left_out() const { return left_out_; }  ///< among the settled ones
   std::uint64_t leased() const { return leased_.size(); }
   /// Places.
   const IntervalSet& leased_set() const { return leased_; }
@@ -130,7 +128,6 @@ class StudyPoints {
     std::uint32_t attempts;
     LossHistory losses;
     std::int64_t returned_ms;
-    std::uint64_t part_end;  ///< of the points that came back together and may go out together
   };
   using Returned = std::map<std::uint64_t, History>;  // by first point
 
@@ -142,18 +139,15 @@ class StudyPoints {
   template <typename Map>
   void move_all(const Map& map);
   std::optional<Interval> next_fresh(std::optional<std::uint64_t> follows) const;
-  std::optional<Interval> next_left_in(std::optional<std::uint64_t> follows, std::uint64_t& looks);
-  std::uint64_t lease_fresh(const Interval& free, const Portion& wanted, std::uint64_t& looks);
+  std::uint64_t lease_fresh(const Interval& free, const Portion& wanted);
   std::optional<Interval> fresh_near(std::uint64_t end, std::uint64_t run_end, std::uint64_t enough,
-                                     std::uint64_t taken, std::uint64_t& looks);
-  void leave_out(const Interval& range);
-  void forget_excess();
+                                     std::uint64_t taken) const;
   bool erase_from(Returned& intervals, std::uint64_t point);
   std::vector<Interval> extract_from(Returned& intervals, const Interval& range);
+  IntervalSet extract(const IntervalSet& places);
 
   StudyTable table_;
   PointOrder order_;
-  std::uint64_t points_;
   LossLimits limits_;
   IntervalSet fresh_;
   std::uint64_t begun_until_ = 0;  // of all groups before, points were taken
@@ -163,9 +157,7 @@ class StudyPoints {
   IntervalSet leased_;
   IntervalSet committing_;
   IntervalSet settled_;
-  /// False of a study that was complete at first: what is left out is in none of the sets.
-  bool knows_left_out_ = true;
-  std::uint64_t left_out_ = 0;         // among the settled ones
+  std::uint64_t left_out_;             // among the settled ones
   std::uint64_t returned_points_ = 0;  // of any standing
 };
 

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
@@ -26,19 +25,13 @@ struct ReadRequest {
   protocol::ClientRequest request;  ///< its recipe is moved into the table
   StudyTable table;                 ///< of a submission that has no fault
   std::string objection;            ///< what is wrong with the recipe; empty: nothing
-  bool needs_survey = false;        ///< the points of the recipe must be looked at, and were not
-  std::shared_ptr<protocol::PointTable> unsurveyed;  ///< of such a recipe
+  bool needs_judging = false;       ///< the points of the recipe must be judged, and were not
 };
 
 /// Reads one frame. Costs time and memory in proportion to its bytes: a long one that is padded
-/// with empty messages is not read. Where points of a recipe must be looked at, to count what a
-/// filter leaves in or to judge what follows from an expression, it takes up to minutes more:
-/// `goes_on` is asked now and then, and false ends it with an objection. Without `goes_on` nobody
-/// looks, and the request `needs_survey`.
-ReadRequest read_request(std::string_view frame, const std::function<bool()>& goes_on);
-inline ReadRequest read_request(std::string_view frame) {
-  return read_request(frame, [] { return true; });
-}
+/// with empty messages is not read. With `judges` the points of a recipe are judged too
+/// (PointTable::judge_points), which may take 0.1 s; else the request `needs_judging`.
+ReadRequest read_request(std::string_view frame, bool judges = true);
 
 /// One point of a study, with all that solving it needs.
 struct TracedPoint {
@@ -70,14 +63,13 @@ struct ReadReport {
 };
 
 /// Reads long requests and recipes on a thread of its own, so that a large recipe holds up nothing
-/// but other large ones. Recipes whose points must be looked at go on to a second thread, a short
-/// time each while others wait. Whose turn it is: by turns that of the client whose requests took
-/// least time, its smallest one, and that of the request that waits the longest.
+/// but other large ones. Whose turn it is: by turns that of the client whose requests took least
+/// time, its smallest one, and that of the request that waits the longest.
 class RequestReader {
  public:
   using Report = std::function<void(ReadReport)>;
 
-  /// `report` is called on the reader's threads.
+  /// `report` is called on the reader's thread.
   explicit RequestReader(Report report);
   /// Drops what waits, and waits for the one that is being read.
   ~RequestReader();
@@ -91,32 +83,19 @@ class RequestReader {
  private:
   using Clock = std::chrono::steady_clock;
 
-  struct Waiting {
-    ReadJob job;
-    std::uint64_t size = 0;  ///< bytes, or points to look at
-    ReadRequest read = {};   ///< where it is to be surveyed
-  };
-  /// One of the threads: what waits for it, in the order in which it began to, and what it is at.
-  struct Line {
-    std::deque<Waiting> waiting;
-    std::uint64_t ticket = 0;
-    bool is_wanted = false;
-    std::uint64_t turns = 0;
-    std::map<std::string, Clock::duration> spent;  ///< on clients of whom something waits
-  };
-
-  void run(Line& line, bool surveys);
-  Waiting next(Line& line);
+  void run();
+  ReadJob next();
   static ReadReport read(const ReadJob& job);
-  bool survey(Waiting& waiting, Clock::duration spent);
 
   Report report_;
   std::mutex mutex_;
   std::condition_variable wake_;
-  Line reading_;                        // guarded by mutex_
-  Line surveying_;                      // guarded by mutex_
-  bool stopping_ = false;               // guarded by mutex_
-  std::array<std::thread, 2> threads_;  // last: they use all the others
+  // Guarded by mutex_.
+  std::deque<ReadJob> waiting_;  // in the order in which they began to
+  std::uint64_t turns_ = 0;
+  std::map<std::string, Clock::duration> spent_;  // on clients of whom something waits
+  bool stopping_ = false;
+  std::thread thread_;  // last: it uses all the others
 };
 
 }  // namespace oblique::server

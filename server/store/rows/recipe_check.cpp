@@ -1,10 +1,12 @@
 #include "server/store/rows/recipe_check.h"
 
+#include <stdexcept>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/canonical.h"
+#include "proto/recipe/point_inputs.h"
 
 namespace oblique::server {
 
@@ -20,24 +22,32 @@ std::string RecipeCheck::fault_of(const Statement& row) {
   int column = 2;
   for (const auto& [key, value] :
        {std::pair("H", point.H_m), {"mu", point.mu}, {"e", point.e_star}}) {
-    if (row.real(column) != value) {
+    if (!protocol::is_close(row.real(column), value)) {
       return fmt::format("{} is {:.17g}, and {:.17g} in the recipe", key, row.real(column), value);
     }
     ++column;
   }
   if (!model_ || model_->number != point.model) {
-    model_ = {point.model, protocol::canonical_model(table_.model(point.model)), -1};
+    model_ = {point.model, table_.model(point.model), -1};
   }
   if (const std::int64_t model_id = row.integer(1); model_id != model_->good_id) {
-    definition_.bind(1, model_id);
-    const bool agrees = definition_.step() && definition_.text(0) == model_->definition;
-    definition_.reset();
-    if (!agrees) {
+    if (!agrees(model_id)) {
       return "its model is not that of the recipe";
     }
     model_->good_id = model_id;
   }
   return {};
+}
+
+bool RecipeCheck::agrees(std::int64_t model_id) {
+  definition_.bind(1, model_id);
+  const std::string definition = definition_.step() ? definition_.text(0) : "";
+  definition_.reset();
+  try {
+    return protocol::is_close(protocol::model_of_canonical(definition), model_->parameters);
+  } catch (const std::runtime_error&) {  // there is none, or it is damaged
+    return false;
+  }
 }
 
 }  // namespace oblique::server

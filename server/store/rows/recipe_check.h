@@ -19,15 +19,18 @@ class RecipeCheck {
   RecipeCheck(sqlite3* database, const protocol::PointTable& table)
       : table_(table), definition_(database, "SELECT definition FROM models WHERE model_id = ?") {}
 
-  /// What in the present row is not as the recipe has it: the point, H, mu, e or the model. Empty:
-  /// nothing.
+  /// What in the present row is not as the recipe has it: the point, or H, mu, e or the model by
+  /// more than another machine may compute it (proto/recipe/point_inputs.h). Empty: nothing.
   std::string fault_of(const Statement& row);
 
  private:
+  /// Whether that row of `models` is the model of the latest row.
+  bool agrees(std::int64_t model_id);
+
   /// The model of the latest row.
   struct Model {
     std::uint64_t number;
-    std::string definition;
+    solver::ModelParameters parameters;
     std::int64_t good_id;  ///< row of `models` that has it; -1: none was seen
   };
   const protocol::PointTable& table_;

@@ -80,7 +80,8 @@ struct SettledRuns::Statements {
         put(database, "INSERT OR REPLACE INTO settled_points VALUES (?, ?, ?)"),
         is_doubtful(database, "SELECT 1 FROM studies WHERE study_id = ? AND NOT counted"),
         set_certain(database, "UPDATE studies SET counted = 1 WHERE study_id = ? AND NOT counted"),
-        clear(database, "DELETE FROM settled_points WHERE study_id = ?") {}
+        clear(database, "DELETE FROM settled_points WHERE study_id = ?"),
+        forget_left_out(database, "UPDATE studies SET left_out = 0 WHERE study_id = ?") {}
 
   Statement before;
   Statement swallow;
@@ -88,6 +89,7 @@ struct SettledRuns::Statements {
   Statement is_doubtful;
   Statement set_certain;
   Statement clear;
+  Statement forget_left_out;
 };
 
 SettledRuns::SettledRuns(sqlite3* database)
@@ -181,8 +183,10 @@ void SettledRuns::set_certain(std::uint64_t study_id) {
 void SettledRuns::count_again(std::uint64_t study_id) {
   constexpr auto kLast = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
   const IntervalSet points = points_with_row(database_, study_id, {0, kLast});
-  statements_->clear.bind(1, study_id);
-  statements_->clear.run();
+  for (Statement* statement : {&statements_->clear, &statements_->forget_left_out}) {
+    statement->bind(1, study_id);
+    statement->run();
+  }
   points.for_each([&](const Interval& run) { write(study_id, run); });
   set_certain(study_id);
 }

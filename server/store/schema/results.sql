@@ -79,7 +79,7 @@ CREATE TABLE packed_results (
   PRIMARY KEY (study_id, point)
 ) STRICT, WITHOUT ROWID;
 
--- Points that have a row, as runs of neighbours, so that a server that starts need not look at the rows.
+-- Points that have a row or are left out by a filter, as runs of neighbours, so that a server that starts need not look at the rows.
 -- Right for studies that are `counted`; it is changed together with the rows.
 CREATE TABLE settled_points (
   study_id    INTEGER NOT NULL REFERENCES studies (study_id), -- whose points they are

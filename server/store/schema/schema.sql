@@ -15,7 +15,7 @@ CREATE TABLE studies (
   study_id    INTEGER PRIMARY KEY,  -- its number
   name        TEXT NOT NULL UNIQUE, -- by which people know it
   recipe      BLOB NOT NULL,     -- oblique.protocol.Recipe, serialised: point i is a function of it
-  points      INTEGER NOT NULL,     -- how many it has
+  points      INTEGER NOT NULL,     -- how many it has, also those that filters leave out
   state       TEXT NOT NULL CHECK (state IN ('running', 'paused', 'cancelled', 'done')), -- what becomes of it
   created_at  TEXT NOT NULL,     -- UTC, ISO 8601
   changed_at  TEXT NOT NULL,     -- when `state` was last set
@@ -24,7 +24,8 @@ CREATE TABLE studies (
   mixes_versions INTEGER NOT NULL DEFAULT 0, -- 1: results of several solver versions are allowed
   checksum    INTEGER,           -- CRC-32 of study_id, name, recipe, points and created_at
   submitted_by TEXT,             -- name of the key with which it was first submitted; NULL: without keys
-  counted     INTEGER NOT NULL DEFAULT 0,   -- 1: `settled_points` says which points have a row
+  counted     INTEGER NOT NULL DEFAULT 0,   -- 1: `settled_points` says which points are settled
+  left_out    INTEGER NOT NULL DEFAULT 0,   -- points of these that a filter leaves out
   takes_over  INTEGER NOT NULL DEFAULT 0    -- 1: points that other studies have solved are still sought
 ) STRICT;
 

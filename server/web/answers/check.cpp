@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <chrono>
 #include <cstdint>
 #include <optional>
 #include <stdexcept>
@@ -24,10 +23,6 @@ namespace oblique::server {
 namespace {
 
 using nlohmann::ordered_json;
-using Clock = std::chrono::steady_clock;
-
-/// A filter over many points is counted for so long.
-constexpr std::chrono::seconds kLongestSurvey{5};
 
 /// A preset's and an integrator's names, and numbers of single keys.
 protocol::ModelParameters model_of(const nlohmann::json& written) {
@@ -64,13 +59,11 @@ ordered_json json_of(const std::optional<double>& number) {
   return number ? ordered_json(*number) : ordered_json();
 }
 
-HttpAnswer check_answer(const AnswerDesk& desk, const std::string& body) {
+HttpAnswer check_answer(const std::string& body) {
   protocol::SubmitRequest asked = study_of_body(body);
   try {
-    protocol::PointTable table(std::move(*asked.mutable_recipe()));
-    const auto until = Clock::now() + kLongestSurvey;
-    const bool is_counted = !table.needs_survey() ||
-                            table.survey([&] { return Clock::now() < until && !desk.is_over(); });
+    const protocol::PointTable table(std::move(*asked.mutable_recipe()));
+    table.judge_points();
     const protocol::StudySize size = protocol::size_of(table);
     return json_answer({{"points", size.points},
                         {"numbers", table.size()},
@@ -78,7 +71,7 @@ HttpAnswer check_answer(const AnswerDesk& desk, const std::string& body) {
                         {"falls", size.falls},
                         {"falls_estimated", size.falls_estimated},
                         {"bytes", size.bytes},
-                        {"is_counted", is_counted},
+                        {"is_counted", !size.points_estimated},
                         {"surely_reached_m", json_of(surely_reached_m(table.recipe()))}});
   } catch (const solver::InputError& error) {
     throw std::invalid_argument(error.what());
@@ -127,7 +120,7 @@ protocol::SubmitRequest study_of_body(const std::string& body) {
 }
 
 AnswerPool::Job check_job(const std::string& body) {
-  return [body](const AnswerDesk& desk) { return check_answer(desk, body); };
+  return [body](const AnswerDesk& /*desk*/) { return check_answer(body); };
 }
 
 }  // namespace oblique::server

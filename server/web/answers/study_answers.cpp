@@ -145,7 +145,7 @@ HttpAnswer study_answer(const AnswerDesk& desk, std::uint64_t id) {
   return json_answer({{"id", study.id},
                       {"name", study.name},
                       {"state", study.state},
-                      {"points", study.table->points()},
+                      {"points", study.table->size()},
                       {"numbers", study.table->size()},
                       {"models", study.table->models()},
                       {"errors", recipe.errors()},

@@ -1,4 +1,5 @@
 #include "server/web/page/status_json.h"
+#include "proto/study_counts.h"
 
 namespace oblique::server {
 namespace {
@@ -9,7 +10,7 @@ constexpr std::uint32_t kSilence_ms = 2000;
 }  // namespace
 
 nlohmann::ordered_json study_json(const protocol::StudyStatus& study) {
-  const auto open = static_cast<double>(study.points() - study.solved() - study.failed());
+  const auto open = static_cast<double>(protocol::open_points(study));
   const bool is_known = study.state() == "running" && study.points_per_s() > 0.0;
   return {{"id", study.study_id()},
           {"name", study.name()},
@@ -17,6 +18,7 @@ nlohmann::ordered_json study_json(const protocol::StudyStatus& study) {
           {"points", study.points()},
           {"solved", study.solved()},
           {"failed", study.failed()},
+          {"left_out", study.left_out()},
           {"leased", study.leased()},
           {"points_per_s", study.points_per_s()},
           {"left_s", is_known ? nlohmann::ordered_json(open / study.points_per_s()) : nullptr},

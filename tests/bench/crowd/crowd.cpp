@@ -17,6 +17,7 @@
 #include <zmq.hpp>
 
 #include "proto/frames.h"
+#include "proto/recipe/point_inputs.h"
 #include "proto/result_message.h"
 #include "proto/socket/socket.h"
 #include "proto/system/descriptor.h"
@@ -180,6 +181,7 @@ class Crowd::Parts {
     progress.results.assign(solved, result_);
     for (std::uint64_t i = 0; i < solved; ++i) {
       progress.results[i].set_point(job.batch.point_at(job.done + i));
+      protocol::set_inputs(progress.results[i], job.batch.points());
     }
     const double points = static_cast<double>(solved);
     progress.busy_s = settings_.point_s > 0.0 ? points * settings_.point_s : points * 1e-6;

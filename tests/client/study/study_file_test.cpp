@@ -9,6 +9,7 @@
 
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
+#include "proto/recipe/study_size.h"
 #include "tests/client/study/study_text.h"
 #include "tests/support/temporary_folder.h"
 #include "worker/solver/model/number.h"
@@ -254,8 +255,7 @@ TEST(StudyFile, TakesExpressionsFiltersAndSingleLengths) {
   EXPECT_EQ(table.model(0).lengths_m, (std::vector{0.4, 0.3, 0.4}));
   EXPECT_FALSE(table.is_left_in(0));
   EXPECT_TRUE(table.is_left_in(1));
-  EXPECT_TRUE(table.survey([] { return true; }));
-  EXPECT_EQ(table.points(), 4U);
+  EXPECT_EQ(protocol::size_of(table).points, 4U);
 }
 
 TEST(ExampleStudies, HaveThePointsThatTheirCommentsPromise) {
@@ -263,9 +263,9 @@ TEST(ExampleStudies, HaveThePointsThatTheirCommentsPromise) {
   const auto points = [&](const std::string& name) {
     const auto study = read_study_file(folder + name + ".toml", pretended_reach());
     EXPECT_EQ(study.name, name);
-    protocol::PointTable table(study.recipe);
-    EXPECT_TRUE(table.survey([] { return true; }));
-    return table.points();
+    const protocol::PointTable table(study.recipe);
+    EXPECT_NO_THROW(table.judge_points());
+    return protocol::size_of(table).points;
   };
   EXPECT_EQ(points("paper"), 10U);
   EXPECT_EQ(points("uncertainty"), 1024U);

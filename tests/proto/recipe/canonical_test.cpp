@@ -121,7 +121,6 @@ TEST(Canonical, WhatIsNoPartOfABlockChangesNothing) {
   // server's.
   ASSERT_TRUE(padded.ParseFromString(recipe.SerializeAsString() + std::string("\x98\x06\x01", 3)));
   padded.mutable_blocks(0)->mutable_axes(1)->set_from(3.0);
-  padded.mutable_blocks(0)->set_points_left_in(1);
   EXPECT_EQ(recipe_digest(padded), recipe_digest(recipe));
   EXPECT_TRUE(is_same_block(padded.blocks(0), recipe.blocks(0)));
   padded.mutable_blocks(0)->mutable_axes(1)->set_values(0, 0.5);

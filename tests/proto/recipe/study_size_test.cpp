@@ -20,9 +20,7 @@ const Axis kMu = listed("mu", {0.4});
 const Axis kE = listed("e", {1.0});
 
 StudySize size_of_blocks(const std::vector<Block>& blocks) {
-  PointTable table(recipe_of_blocks(blocks));
-  table.survey([] { return true; });
-  return size_of(table);
+  return size_of(PointTable(recipe_of_blocks(blocks)));
 }
 
 TEST(StudySize, CountsDifferentFallsExactlyUpToAHundredThousandPoints) {
@@ -49,6 +47,19 @@ TEST(StudySize, CountsNoFallOfPointsThatAFilterLeavesOut) {
   EXPECT_EQ(size.points, 6U);
   EXPECT_EQ(size.falls, 6U);
   EXPECT_THAT(size.examples, Each(AllOf(Ge(15U), Le(20U))));
+}
+
+// 0.02 is four standard deviations of a share of a third in 10^4 points.
+TEST(StudySize, EstimatesWhatAFilterLeavesInOfMorePoints) {
+  const Block plain = filtered({kH, range("mu", 0.0, 1.0, 1'000), kE}, "");
+  const Block large = filtered({kH, range("mu", 0.0, 3.0, 3'000'000), kE}, "mu < 1");
+  const auto size = size_of_blocks({plain, large});
+  EXPECT_TRUE(size.points_estimated);
+  EXPECT_NEAR(static_cast<double>(size.points), 1'001'000.0, 0.02 * 3e6);
+  const auto counted =
+      size_of_blocks({plain, filtered({kH, kMu, listed("e", {0.5, 1})}, "e > 0.6")});
+  EXPECT_FALSE(counted.points_estimated);
+  EXPECT_EQ(counted.points, 1'001U);
 }
 
 TEST(StudySize, OfMorePointsFindsTheFallsThatManyPointsShareWithoutAnEstimate) {

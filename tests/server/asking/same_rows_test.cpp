@@ -169,12 +169,9 @@ std::vector<std::int64_t> first_numbers(sqlite3* database, const std::string& sq
   return numbers;
 }
 
-/// Stores every fourth study in part, and of a filtered one, as a server does, how many points are
-/// left in.
+/// Stores every fourth study in part.
 void store_study(Store& store, std::uint64_t number, const Recipe& recipe) {
-  protocol::PointTable surveyed(recipe);
-  surveyed.survey([] { return true; });
-  const auto table = std::make_shared<const protocol::PointTable>(std::move(surveyed));
+  const auto table = std::make_shared<const protocol::PointTable>(recipe);
   AddResults results{number, table, 0, "", "", 1, "now", {}};
   for (std::uint64_t point = 0; point < table->size(); ++point) {
     if (table->is_left_in(point) && (number % 4 != 0 || point % 3 != 0)) {

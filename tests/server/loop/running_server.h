@@ -142,12 +142,21 @@ class PretendedWorker : public Peer<WorkerMessage, ServerToWorker> {
     send(message);
     return receive();
   }
+  ServerToWorker receive() {
+    ServerToWorker message = Peer::receive();
+    if (message.has_study()) {
+      studies_[message.study().study_id()] =
+          std::make_unique<protocol::PointTable>(message.study().recipe());
+    }
+    return message;
+  }
   void credit(std::uint32_t batches) {
     WorkerMessage message;
     message.mutable_credit()->set_batches(batches);
     send(message);
   }
-  /// Sends a result for each point that is wanted of the batch, and says how many these are.
+  /// Sends a result for each point of the batch, or names it as left out. Returns how many these
+  /// are.
   std::uint64_t solve(const protocol::Batch& batch) {
     WorkerMessage message;
     auto& results = *message.mutable_results();
@@ -157,11 +166,18 @@ class PretendedWorker : public Peer<WorkerMessage, ServerToWorker> {
     results.set_sequence(++sequence_);
     results.set_batch_done(true);
     results.set_busy_s(1e-3);
-    for (const std::uint64_t point : points_of(batch)) {
-      *results.add_results() = solved_point(point);
+    const protocol::PointTable& table = *studies_.at(batch.study_id());
+    const auto points = points_of(batch);
+    for (const std::uint64_t point : points) {
+      if (table.is_left_in(point)) {
+        *results.add_results() = solved_point(point, table);
+      } else {
+        results.add_left_out(point);
+        results.add_left_out(1);
+      }
     }
     send(message);
-    return static_cast<std::uint64_t>(results.results_size());
+    return points.size();
   }
   /// Takes batches, one at a time, until `points` are solved and stored.
   void work(std::uint64_t points) {
@@ -182,6 +198,7 @@ class PretendedWorker : public Peer<WorkerMessage, ServerToWorker> {
  private:
   std::uint64_t sequence_ = 0;
   std::map<std::uint64_t, std::uint64_t> in_hand_;
+  std::map<std::uint64_t, std::unique_ptr<protocol::PointTable>> studies_;  // as defined last
 };
 
 class PretendedClient : public Peer<ClientRequest, ClientReply> {

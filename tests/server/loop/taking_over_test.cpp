@@ -108,9 +108,12 @@ TEST_F(TakingOverTest, WhatAFilterLeavesOutIsNotTaken) {
   auto filtered = grid(0.0, 1.0, 5);
   filtered.mutable_blocks(0)->set_where("mu > 0.3");
   const auto reply = submit("b", filtered);
-  EXPECT_EQ(reply.points(), 12U);
+  EXPECT_EQ(reply.points(), 20U);
   EXPECT_EQ(reply.taken().points(), 12U);
+  EXPECT_EQ(client_->status("b").state(), "running") << "until a worker has named the others";
+  work(8);
   EXPECT_EQ(client_->status("b").state(), "done");
+  EXPECT_EQ(client_->status("b").left_out(), 8U);
   EXPECT_EQ(number("SELECT count(*) FROM runs WHERE study = 'b' AND mu < 0.3"), 0);
 }
 

@@ -215,12 +215,11 @@ TEST_F(SalvageTest, RowsThatAreOnlyInTheLogAreSavedTooAndTheLogStaysAsItIs) {
 TEST_F(SalvageTest, StudiesWithFiltersAreDoneAndRowsThatWereTakenOverAreCountedAgain) {
   protocol::Recipe recipe = table_->recipe();
   recipe.mutable_blocks(0)->set_where("mu < 0.4");  // points 0 to 3 of 10
-  protocol::PointTable counted(recipe);
-  counted.survey([] { return true; });
-  const auto filtered = std::make_shared<const protocol::PointTable>(std::move(counted));
+  const auto filtered = std::make_shared<const protocol::PointTable>(recipe);
   const auto outcome = std::make_shared<ReusedResults>();
   store_->commit(std::vector<Change>{
       AddStudy{2, "b", filtered, "now"}, ReuseResults{2, filtered, 0, "0.1", outcome},
+      AddResults{2, filtered, 1, "0.1", "avx2", 1, "now", {}, IntervalSet(4, 10)},
       SetStudyState{2, StudyState::kDone, "now"}, RenameStudy{1, "first"}});
   store_.reset();
   execute(open_database(path_, SQLITE_OPEN_READWRITE).get(), "DELETE FROM taken_points");
@@ -229,7 +228,8 @@ TEST_F(SalvageTest, StudiesWithFiltersAreDoneAndRowsThatWereTakenOverAreCountedA
   Store saved(copy_);
   const auto study = saved.studies().at(1);
   EXPECT_EQ(study.state, StudyState::kDone);
-  EXPECT_EQ(study.settled, IntervalSet(0, 4));
+  EXPECT_EQ(study.settled, IntervalSet(0, 10));
+  EXPECT_EQ(study.left_out, 6U);
   EXPECT_EQ(study.taken, (std::map<std::string, std::uint64_t>{{"first", 4}}));
 }
 

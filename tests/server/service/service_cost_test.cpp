@@ -171,7 +171,7 @@ TEST_F(ServiceTest, AWorkerThatDeliversNothingLeavesNoRowAndOneThatDoesHasItFirs
   for (int sequence = 1; sequence <= 2; ++sequence) {
     results.set_sequence(static_cast<std::uint64_t>(sequence));
     results.clear_results();
-    *results.add_results() = solved_point(points_of(batch).front());
+    *results.add_results() = solved(points_of(batch).front());
     worker_says(message);
   }
   ASSERT_EQ(outbox_.jobs.size(), 3U) << "one row of the worker, and two messages";

@@ -124,11 +124,22 @@ class ServiceTest : public testing::Test {
     results.set_sequence(++sequence_);
     results.set_batch_done(true);
     for (const std::uint64_t i : points_of(batch)) {
-      *results.add_results() =
-          i < first_failed ? solved_point(i) : protocol::failed_point(i, "for the test");
+      if (batch.study_id() != 0 &&
+          !service_->states().record(batch.study_id()).table->is_left_in(i)) {
+        results.add_left_out(i);
+        results.add_left_out(1);
+        continue;
+      }
+      *results.add_results() = i >= first_failed       ? protocol::failed_point(i, "for the test")
+                               : batch.study_id() == 0 ? solved_point(i)  // of a probe
+                                                       : solved(i, batch.study_id());
     }
     worker_says(message, identity);
     write_all();
+  }
+  /// The point of that study as a worker sends it.
+  protocol::PointResult solved(std::uint64_t point, StudyId study = 1) const {
+    return solved_point(point, *service_->states().record(study).table.get());
   }
   void worker_says(const WorkerMessage& message, const std::string& identity = "worker") {
     service_->worker_frame(identity, protocol::encode(message), now_);

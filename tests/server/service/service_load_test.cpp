@@ -24,7 +24,7 @@ class ServiceLoadTest : public ServiceTest {
     auto& results = *message.mutable_results();
     results.set_study_id(1);
     results.set_sequence(++sequence_);
-    *results.add_results() = solved_point(point);
+    *results.add_results() = solved(point);
     return message;
   }
   std::size_t batches_sent() const {

@@ -1,7 +1,8 @@
+#include <cmath>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "proto/recipe/axes.h"
 #include "tests/server/service/service_fixture.h"
 
 namespace oblique::server {
@@ -80,12 +81,14 @@ TEST_F(ServiceTest, TheSameStudyContinuesAndAnotherOfTheNameIsRefused) {
   EXPECT_THAT(last_reply().error().message(), HasSubstr("another name"));
 }
 
-TEST_F(ServiceTest, TheSameBlocksWithAnotherCountOfPointsLeftInAreTheSameStudy) {
+TEST_F(ServiceTest, TheSameBlocksWrittenInAnotherWayAreTheSameStudy) {
   request(submit_request("a"));
   write_all();
   ClientRequest written = submit_request("a");
   auto& recipe = *written.mutable_submit()->mutable_recipe();
-  recipe.mutable_blocks(0)->set_points_left_in(3);  // as nobody but the server may count
+  auto& H = *recipe.mutable_blocks(0)->mutable_axes(0);
+  ASSERT_EQ(H.values_size(), 1);
+  H = protocol::range("H", H.values(0), H.values(0), 1);
   request(written);
   EXPECT_FALSE(last_reply().submit().created());
   EXPECT_EQ(last_reply().submit().study_id(), 1U);
@@ -190,7 +193,7 @@ TEST_F(ServiceTest, ResultsAreAcknowledgedOnceTheyAreStored) {
   results.set_attempt(batch.attempt());
   results.set_sequence(9);
   results.set_batch_done(true);
-  *results.add_results() = solved_point(0);
+  *results.add_results() = solved(0);
   write_all();
   worker_says(message);
   ASSERT_EQ(outbox_.jobs.size(), 2U) << "the worker's row and the results";
@@ -208,7 +211,7 @@ TEST_F(ServiceTest, AResultThatIsNotFiniteBecomesAFailedPoint) {
   hello();
   WorkerMessage message;
   message.mutable_results()->set_study_id(1);
-  auto result = solved_point(0);
+  auto result = solved(0);
   result.set_reals(4, std::numeric_limits<double>::quiet_NaN());
   *message.mutable_results()->add_results() = result;
   write_all();
@@ -216,6 +219,28 @@ TEST_F(ServiceTest, AResultThatIsNotFiniteBecomesAFailedPoint) {
   ASSERT_EQ(outbox_.jobs.size(), 2U) << "the worker's row and the results";
   const auto& change = std::get<AddResults>(outbox_.jobs[1].change);
   EXPECT_THAT(change.results.at(0).error(), HasSubstr("duration_s"));
+}
+
+TEST_F(ServiceTest, AResultOfOtherValuesThanItsPointHasBecomesAFailedPoint) {
+  request(submit_request("a", 2));
+  write_all();
+  hello();
+  WorkerMessage message;
+  message.mutable_results()->set_study_id(1);
+  auto result = solved(0);
+  result.set_h_m(std::nextafter(result.h_m(), 2.0));
+  *message.mutable_results()->add_results() = result;
+  result = solved(1);
+  result.set_h_m(1.001 * result.h_m());
+  *message.mutable_results()->add_results() = result;
+  write_all();
+  worker_says(message);
+  ASSERT_EQ(outbox_.jobs.size(), 2U) << "the worker's row and the results";
+  const auto& change = std::get<AddResults>(outbox_.jobs[1].change);
+  EXPECT_EQ(change.results.at(0).error(), "") << "another machine may round otherwise";
+  EXPECT_THAT(change.results.at(1).error(), HasSubstr("H = 1.00"));
+  write_all();
+  EXPECT_EQ(service_->scheduler().study(1).failed, 1U);
 }
 
 TEST_F(ServiceTest, AWorkerThatCannotBeReachedLosesItsBatchAtOnce) {
@@ -276,7 +301,7 @@ TEST_F(ServiceTest, StatusTellsTheRateOfTheLastSeconds) {
   WorkerMessage message;
   message.mutable_results()->set_study_id(1);
   for (std::uint64_t point = 0; point < 100; ++point) {
-    *message.mutable_results()->add_results() = solved_point(point);
+    *message.mutable_results()->add_results() = solved(point);
   }
   service_->tick(now_);
   worker_says(message);

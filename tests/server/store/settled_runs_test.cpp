@@ -139,6 +139,38 @@ TEST_F(SettledRunsTest, WhatIsDeletedWhileAServerRunsStaysInDoubtBesideItsOwnDel
   EXPECT_THAT(runs(), ElementsAre("0+1", "2+2", "5+1"));
 }
 
+TEST_F(SettledRunsTest, PointsThatAFilterLeavesOutAreSettledWithoutARowUntilRowsAreCountedAgain) {
+  AddStudy study = study_of(10);
+  protocol::Recipe recipe = study.table->recipe();
+  recipe.mutable_blocks(0)->set_where("mu > 0.4");
+  study.table = std::make_shared<const protocol::PointTable>(recipe);
+  {
+    Store store(path_);
+    AddResults change = results_of(study, {4, 5, 8});
+    change.left_out.insert(0, 3);
+    commit(store, {study, worker_, change});
+    AddResults only_ranges = results_of(study, {});
+    only_ranges.left_out.insert(3);
+    commit(store, {only_ranges});
+  }
+  EXPECT_THAT(runs(), ElementsAre("0+6", "8+1"));
+  EXPECT_THAT(find_faults(path_), ElementsAre());
+  EXPECT_EQ(Reader(path_).study_status("a").at(0).left_out(), 4U);
+  EXPECT_EQ(Reader(path_).study_status("a").at(0).solved(), 3U);
+  {
+    const auto found = Store(path_).studies().at(0);
+    EXPECT_EQ(found.settled.size(), 7U);
+    EXPECT_EQ(found.left_out, 4U);
+  }
+  by_hand("UPDATE studies SET left_out = 3");
+  EXPECT_THAT(find_faults(path_), ElementsAre(HasSubstr("they are not the same")));
+  by_hand("DELETE FROM results WHERE point = 5");
+  const auto found = Store(path_).studies().at(0);
+  EXPECT_EQ(found.settled.size(), 2U) << "workers name them again";
+  EXPECT_EQ(found.left_out, 0U);
+  EXPECT_THAT(find_faults(path_), ElementsAre());
+}
+
 TEST_F(SettledRunsTest, CheckNamesRunsThatAreNotTheRows) {
   {
     Store store(path_);

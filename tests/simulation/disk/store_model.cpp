@@ -109,7 +109,7 @@ bool StoreModel::apply(const ForgetFailures& change, Contents& contents) {
 }
 
 bool StoreModel::apply(const AddResults& change, Contents& contents) {
-  if (change.results.empty()) {
+  if (change.results.empty() && change.left_out.empty()) {
     return false;  // of a probe, perhaps, which is of no study
   }
   auto& study = contents.studies.at(change.study_id);
@@ -123,6 +123,13 @@ bool StoreModel::apply(const AddResults& change, Contents& contents) {
       study.failures.insert(result.point());
     }
   }
+  change.left_out.for_each([&](const server::Interval& points) {
+    if (!study.settled.within(points.begin, points.end).empty()) {
+      throw Violation("a filter leaves out points that were settled before");
+    }
+    study.settled.insert(points.begin, points.end);
+    study.left_out += points.end - points.begin;
+  });
   return true;
 }
 
@@ -225,7 +232,7 @@ bool StoreModel::Contents::operator==(const Found& found) const {
                       return here.study_id == there.study_id && here.name == there.name &&
                              here.state == there.state && here.created_at == there.created_at &&
                              here.terms == there.terms && here.settled == there.settled &&
-                             here.failures == there.failures &&
+                             here.failures == there.failures && here.left_out == there.left_out &&
                              here.table->recipe().SerializeAsString() ==
                                  there.table->recipe().SerializeAsString();
                     });

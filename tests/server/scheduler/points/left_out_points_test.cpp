@@ -1,4 +1,4 @@
-// Points that a filter leaves out: how the places of points and the scheduler come across them.
+// Points that a filter leaves out: workers name them, and they are settled without a row.
 #include <memory>
 #include <set>
 #include <string>
@@ -14,300 +14,209 @@
 namespace oblique::server {
 namespace {
 
-constexpr std::uint64_t kEnoughLooks = 1'000'000;
-
 /// `numbers` points with mu from 0 to numbers - 1, of which those are left in for which this is
 /// true.
 std::shared_ptr<const protocol::PointTable> filtered_table(std::uint64_t numbers,
                                                            const std::string& where) {
-  protocol::PointTable table(protocol::recipe_of_blocks(
+  return std::make_shared<const protocol::PointTable>(protocol::recipe_of_blocks(
       {protocol::filtered({protocol::listed("H", {1.0}),
                            protocol::range("mu", 0.0, static_cast<double>(numbers - 1), numbers),
                            protocol::listed("e", {1.0})},
                           where)}));
-  table.survey([] { return true; });
-  return std::make_shared<const protocol::PointTable>(std::move(table));
 }
 
 /// Every second point.
 constexpr const char* kEven = "floor(mu / 2) == mu / 2";
 
-StudyPoints points_of(const std::shared_ptr<const protocol::PointTable>& table,
-                      IntervalSet settled = {}) {
-  return {StudyTable(table), std::move(settled), LossLimits{}};
-}
-
-/// A bench whose events look at few points.
-SchedulerSettings short_sighted() {
-  SchedulerSettings settings = trusting();
-  settings.most_looks = 10;
-  return settings;
-}
-
-/// What is solved of a batch by a worker that passes over what is left out.
-std::vector<Effect> solve_left_in(SchedulerBench& bench, const protocol::PointTable& table,
-                                  const SendBatch& batch, std::set<std::uint64_t>& solved) {
+/// What a worker sends of a whole batch.
+ResultsReceived answer_to(SchedulerBench& bench, const protocol::PointTable& table,
+                          const SendBatch& batch) {
   ResultsReceived event{batch.worker, batch.study, batch.lease, ++bench.sequence, true, 1e-3, {}};
-  const std::uint64_t end = batch.first_point() + batch.count();
-  for (std::uint64_t point = table.first_left_in(batch.first_point(), end); point < end;
-       point = table.first_left_in(point + 1, end)) {
-    event.outcomes.push_back({point, false});
-    EXPECT_TRUE(solved.insert(point).second) << point << " was handed out twice";
+  for (const Interval& range : batch.points) {
+    for (std::uint64_t point = range.begin; point < range.end; ++point) {
+      if (table.is_left_in(point)) {
+        event.outcomes.push_back({point, false});
+      } else {
+        event.left_out.insert(point);
+      }
+    }
   }
+  return event;
+}
+
+/// The worker answers the whole batch, its answer is stored, and it wants another.
+std::vector<Effect> solve(SchedulerBench& bench, const protocol::PointTable& table,
+                          const SendBatch& batch) {
+  const ResultsReceived event = answer_to(bench, table, batch);
   auto effects = bench.feed(event);
-  bench.append(effects, bench.feed(ResultsStored{batch.worker, batch.study, bench.sequence,
-                                                 event.outcomes}));
+  for (const StoreResults& store : only<StoreResults>(effects)) {
+    EXPECT_EQ(store.accepted.size(), event.outcomes.size()) << "a point came twice";
+    EXPECT_EQ(store.left_out, event.left_out) << "a point was left out twice";
+    bench.append(effects, bench.feed(ResultsStored{batch.worker, batch.study, bench.sequence,
+                                                   event.outcomes, store.left_out}));
+  }
   bench.append(effects, bench.feed(CreditGiven{batch.worker, 1}));
   return effects;
 }
 
-// ---- Places -----------------------------------------------------------------------------------
+class LeftOutPointsTest : public testing::Test {
+ protected:
+  LeftOutPointsTest() { bench_.feed(StudyAdded{1, table_, {}}); }
 
-TEST(LeftOutPointsTest, ABatchIsARunOfNumbersAndCountsThoseThatAreLeftIn) {
-  const auto table = filtered_table(20, kEven);
-  StudyPoints points = points_of(table);
-  EXPECT_EQ(points.size(), 10U);
-  EXPECT_EQ(points.numbers(), 20U);
-  std::uint64_t looks = kEnoughLooks;
-  const auto batch = points.take({3}, looks);
-  ASSERT_TRUE(batch.has_value());
-  EXPECT_EQ(batch->first_place, 0U);
-  EXPECT_EQ(batch->count, 3U);
-  EXPECT_EQ(batch->points, 2U);
-  EXPECT_EQ(points.leased(), 2U);
-  EXPECT_EQ(points.free(), 8U);
-  EXPECT_EQ(points.settled(), 0U) << "what is left out is no row";
-  points.check_invariants();
-}
+  std::shared_ptr<const protocol::PointTable> table_ = filtered_table(100, kEven);
+  SchedulerBench bench_{trusting()};
+};
 
-TEST(LeftOutPointsTest, ItIsCompleteWhenAllThatAreLeftInAreSettledThoughNobodySawTheOthers) {
-  const auto table = filtered_table(1000, "mu < 3");
-  StudyPoints points = points_of(table);
-  std::uint64_t looks = kEnoughLooks;
-  ASSERT_TRUE(points.take({3}, looks).has_value());
-  EXPECT_FALSE(points.has_free()) << "three are out, and there are no more";
-  for (const std::uint64_t point : {0U, 1U, 2U}) {
-    EXPECT_TRUE(points.receive(point));
-    EXPECT_TRUE(points.settle(point));
-  }
-  EXPECT_TRUE(points.is_complete());
-  EXPECT_EQ(points.free(), 0U);
-}
-
-TEST(LeftOutPointsTest, ASearchEndsWithItsLooksAndGoesOnWhereItEnded) {
-  const auto table = filtered_table(1000, "mu == 700");
-  StudyPoints points = points_of(table);
-  std::uint64_t turns = 0;
-  while (true) {
-    std::uint64_t looks = 100;
-    if (const auto batch = points.take({50}, looks)) {
-      EXPECT_EQ(batch->first_place, 700U);
-      EXPECT_EQ(batch->points, 1U);
-      break;
-    }
-    EXPECT_EQ(looks, 0U);
-    EXPECT_TRUE(points.has_free());
-    ASSERT_LT(++turns, 20U);
-    points.check_invariants();
-  }
-  EXPECT_EQ(turns, 7U);
-}
-
-TEST(LeftOutPointsTest, AResultOfAPointThatIsLeftOutIsNotTaken) {
-  StudyPoints points = points_of(filtered_table(20, kEven));
-  EXPECT_FALSE(points.receive(7));
-  EXPECT_TRUE(points.receive(8));
-  std::uint64_t looks = kEnoughLooks;
-  ASSERT_TRUE(points.take({20}, looks).has_value());
-  EXPECT_FALSE(points.receive(7));
-  points.check_invariants();
-}
-
-TEST(LeftOutPointsTest, WhatComesBackTogetherGoesOutTogether) {
-  StudyPoints points = points_of(filtered_table(40, kEven));
-  std::uint64_t looks = kEnoughLooks;
-  const auto batch = points.take({20}, looks);
-  ASSERT_TRUE(batch.has_value());
-  EXPECT_EQ(batch->points, 10U);
-  EXPECT_TRUE(points.receive(4));  // one was answered
-  const std::vector<Interval> held = points.leased_set().within(0, batch->end());
-  points.give_back(held, 1, {}, 0);
-  points.check_invariants();
-  const auto first = points.take({20}, looks);
-  ASSERT_TRUE(first.has_value());
-  EXPECT_EQ(first->first_place, 0U);
-  EXPECT_EQ(first->points, 2U) << "the answered one is not solved again";
-  const auto rest = points.take({20}, looks);
-  ASSERT_TRUE(rest.has_value());
-  EXPECT_EQ(rest->first_place, 6U);
-  EXPECT_EQ(rest->points, 7U);
-  points.check_invariants();
-}
-
-TEST(LeftOutPointsTest, AfterARestartTheRowsAndTheCountTellWhatIsOpen) {
-  const auto table = filtered_table(20, kEven);
-  IntervalSet rows;
-  for (const std::uint64_t point : {0U, 2U, 4U, 18U}) {
-    rows.insert(point);
-  }
-  StudyPoints points = points_of(table, rows);
-  EXPECT_EQ(points.settled(), 4U);
-  EXPECT_EQ(points.free(), 6U);
-  std::set<std::uint64_t> out;
-  std::uint64_t looks = kEnoughLooks;
-  while (const auto batch = points.take({4}, looks)) {
-    for (const Interval& run : points.leased_set().within(batch->first_place, batch->end())) {
-      for (std::uint64_t point = run.begin; point < run.end; ++point) {
-        out.insert(point);
-      }
-    }
-  }
-  EXPECT_EQ(out, (std::set<std::uint64_t>{6, 8, 10, 12, 14, 16}));
-  points.check_invariants();
-}
-
-TEST(LeftOutPointsTest, AStudyThatIsCompleteAtARestartIsSoWithoutALook) {
-  const auto table = filtered_table(6, kEven);
-  IntervalSet rows;
-  for (const std::uint64_t point : {0U, 2U, 4U}) {
-    rows.insert(point);
-  }
-  StudyTable bytes(table->recipe().SerializeAsString(), 3);
-  StudyPoints points(bytes, rows, LossLimits{});
-  EXPECT_TRUE(points.is_complete());
-  points.check_invariants();
-  EXPECT_EQ(points.reopen(IntervalSet(2, 3)), 1U);  // it had failed, and is tried again
-  EXPECT_TRUE(points.has_free());
-  std::uint64_t looks = kEnoughLooks;
-  EXPECT_EQ(points.take({4}, looks)->first_place, 2U);
-  points.check_invariants();
-}
-
-TEST(LeftOutPointsTest, ACountThatIsTooLargeKeepsNobodyWaiting) {
-  protocol::Recipe recipe = filtered_table(20, kEven)->recipe();
-  recipe.mutable_blocks(0)->set_points_left_in(15);
-  StudyPoints points = points_of(std::make_shared<const protocol::PointTable>(recipe));
-  std::uint64_t looks = kEnoughLooks;
-  while (const auto batch = points.take({4}, looks)) {
-    for (const Interval& run : points.leased_set().within(batch->first_place, batch->end())) {
-      for (std::uint64_t point = run.begin; point < run.end; ++point) {
-        points.receive(point);
-        points.settle(point);
-      }
-    }
-  }
-  EXPECT_TRUE(points.is_complete());
-  EXPECT_EQ(points.size(), 10U);
-}
-
-TEST(LeftOutPointsTest, AStudyGrowsByWhatItsFurtherNumbersLeaveIn) {
-  const auto of_two = [](const char* second) {
-    protocol::Recipe recipe = filtered_table(10, kEven)->recipe();
-    *recipe.add_blocks() = filtered_table(10, second)->recipe().blocks(0);
-    return std::make_shared<const protocol::PointTable>(recipe);
-  };
-  StudyPoints points = points_of(filtered_table(10, kEven));
-  points.grow(StudyTable(of_two("mu > 7")));
-  EXPECT_EQ(points.size(), 7U);
-  EXPECT_EQ(points.free(), 7U);
-  EXPECT_EQ(points.numbers(), 20U);
-  points.check_invariants();
-}
-
-// ---- The scheduler ----------------------------------------------------------------------------
-
-TEST(LeftOutPointsTest, EveryPointThatIsLeftInIsSolvedOnceHoweverFewLooksAnEventHas) {
-  for (const char* where : {kEven, "mu > 50", "mu < 50", "mu == 77", "floor(mu / 30) == mu / 30"}) {
+TEST_F(LeftOutPointsTest, AStudyIsDoneWhenEveryPointIsSolvedOrLeftOut) {
+  for (const char* where : {kEven, "mu > 50", "mu < 50", "mu == 77", "mu < 0"}) {
     const auto table = filtered_table(100, where);
-    SchedulerBench bench(short_sighted());
+    SchedulerBench bench(trusting());
     bench.feed(StudyAdded{1, table, {}});
-    std::set<std::uint64_t> solved;
     std::vector<SendBatch> held = bench.join(1, 2);
-    for (int turn = 0; turn < 1000 && solved.size() < table->points(); ++turn) {
-      std::vector<Effect> effects = bench.feed(SearchGoesOn{});
+    std::size_t finished = 0;
+    while (!held.empty()) {
+      std::vector<SendBatch> next;
       for (const SendBatch& batch : std::exchange(held, {})) {
-        bench.append(effects, solve_left_in(bench, *table, batch, solved));
+        const auto effects = solve(bench, *table, batch);
+        finished += only<StudyFinished>(effects).size();
+        for (const SendBatch& more : only<SendBatch>(effects)) {
+          held.push_back(more);
+        }
       }
-      held = only<SendBatch>(effects);
     }
-    EXPECT_EQ(solved.size(), table->points()) << where;
-    EXPECT_EQ(bench.scheduler.points(1).settled, table->points());
-    EXPECT_EQ(bench.scheduler.points(1).open(), 0U);
-    EXPECT_FALSE(bench.scheduler.is_searching());
+    std::uint64_t left_in = 0;
+    for (std::uint64_t point = 0; point < 100; ++point) {
+      left_in += table->is_left_in(point) ? 1U : 0U;
+    }
+    const StudyCounts counts = bench.scheduler.study(1);
+    EXPECT_EQ(finished, 1U) << where;
+    EXPECT_EQ(counts.solved, left_in) << where;
+    EXPECT_EQ(counts.left_out, 100U - left_in) << where;
+    EXPECT_EQ(bench.scheduler.points(1).open(), 0U) << where;
   }
 }
 
-TEST(LeftOutPointsTest, WhileAStudySearchesAnotherGetsTheWorkers) {
-  SchedulerBench bench(short_sighted());
-  bench.feed(StudyAdded{1, filtered_table(100'000, "mu == 99999"), {}, 0, false, false, {5}});
-  bench.feed(StudyAdded{2, table_of(100), {}});
-  const auto batches = bench.join(1, 3);
-  ASSERT_EQ(batches.size(), 3U);
-  for (const SendBatch& batch : batches) {
-    EXPECT_EQ(batch.study, 2U);
-  }
-  EXPECT_EQ(bench.scheduler.points(1).leased, 0U);
+TEST_F(LeftOutPointsTest, APointIsLeftOutOnceThatIsDurable) {
+  const SendBatch batch = bench_.join(1, 1).at(0);
+  const ResultsReceived event = answer_to(bench_, *table_, batch);
+  const auto stores = only<StoreResults>(bench_.feed(event));
+  ASSERT_EQ(stores.size(), 1U);
+  EXPECT_EQ(stores[0].left_out, event.left_out);
+  EXPECT_EQ(bench_.scheduler.study(1).left_out, 0U);
+  bench_.feed(ResultsStored{1, 1, bench_.sequence, event.outcomes, event.left_out});
+  EXPECT_EQ(bench_.scheduler.study(1).left_out, event.left_out.size());
 }
 
-TEST(LeftOutPointsTest, ASearchIsWantedOnlyWhileWorkersWait) {
-  SchedulerBench bench(short_sighted());
-  bench.feed(StudyAdded{1, filtered_table(100, "mu == 99"), {}});
-  EXPECT_FALSE(bench.scheduler.is_searching());
-  EXPECT_TRUE(bench.join(1, 1).empty());
-  EXPECT_TRUE(bench.scheduler.is_searching());
-  std::vector<SendBatch> batches;
-  for (int turn = 0; turn < 20 && batches.empty(); ++turn) {
-    batches = only<SendBatch>(bench.feed(SearchGoesOn{}));
-  }
-  ASSERT_EQ(batches.size(), 1U);
-  EXPECT_EQ(batches[0].first_point(), 99U);
-  EXPECT_FALSE(bench.scheduler.is_searching());
-}
-
-TEST(LeftOutPointsTest, ATickGoesOnSearchingToo) {
-  SchedulerBench bench(short_sighted());
-  bench.feed(StudyAdded{1, filtered_table(100, "mu == 99"), {}});
-  EXPECT_TRUE(bench.join(1, 1).empty());
-  EXPECT_EQ(only<SendBatch>(bench.pass(5000, {1})).size(), 1U);
-}
-
-TEST(LeftOutPointsTest, AStudyThatStopsWhileItSearchesGoesOnLater) {
-  SchedulerBench bench(short_sighted());
-  bench.feed(StudyAdded{1, filtered_table(100, "mu == 99"), {}});
-  bench.join(1, 1);
-  bench.feed(StudyPaused{1});
-  bench.feed(SearchGoesOn{});
-  EXPECT_FALSE(bench.scheduler.is_searching());
-  bench.feed(StudyReopened{1});
-  std::vector<SendBatch> batches;
-  for (int turn = 0; turn < 20 && batches.empty(); ++turn) {
-    batches = only<SendBatch>(bench.feed(SearchGoesOn{}));
-  }
-  EXPECT_EQ(batches.size(), 1U);
-  bench.feed(StudyRemoved{1});
-  EXPECT_FALSE(bench.scheduler.is_searching());
-}
-
-TEST(LeftOutPointsTest, ABatchThatIsDoneLosesNothingThoughManyOfItsNumbersHaveNoResult) {
-  const auto table = filtered_table(100, kEven);
-  SchedulerBench bench(trusting());
+TEST_F(LeftOutPointsTest, ABatchOfWhichNothingIsLeftInIsAnAnswerAndNoLoss) {
+  SchedulerBench bench;
+  const auto table = filtered_table(100, "mu == 99");
   bench.feed(StudyAdded{1, table, {}});
   const SendBatch batch = bench.join(1, 1).at(0);
-  std::set<std::uint64_t> solved;
-  solve_left_in(bench, *table, batch, solved);
-  EXPECT_FALSE(solved.empty());
+  const SendBatch next = only<SendBatch>(solve(bench, *table, batch)).at(0);
+  EXPECT_GT(next.first_point(), batch.first_point());
+  EXPECT_GT(next.count(), batch.count()) << "it took no time";
   EXPECT_EQ(bench.scheduler.worker(1, bench.now_ms).losses, 0U);
 }
 
-TEST(LeftOutPointsTest, APointThatKillsAmongOthersIsFoundByFewWorkers) {
+TEST_F(LeftOutPointsTest, APointThatADoneBatchNeitherSolvedNorNamedIsHandedOutAgain) {
+  const SendBatch batch = bench_.join(1, 1).at(0);
+  ResultsReceived event = answer_to(bench_, *table_, batch);
+  const std::uint64_t forgotten = event.left_out.front().begin;
+  event.left_out.erase(forgotten);
+  bench_.feed(event);
+  EXPECT_EQ(bench_.scheduler.study(1).leased, 0U);
+  const SendBatch again = only<SendBatch>(bench_.feed(CreditGiven{1, 1})).at(0);
+  EXPECT_EQ(again.first_point(), forgotten);
+  EXPECT_EQ(again.count(), 1U);
+  EXPECT_EQ(again.attempt, 2U);
+}
+
+TEST_F(LeftOutPointsTest, AWorkerThatNamesPointsOutsideItsBatchIsLostAndNothingOfThatCounts) {
+  const SendBatch batch = bench_.join(1, 1).at(0);
+  const SendBatch other = bench_.join(2, 1).at(0);
+  for (const std::uint64_t point : {other.first_point(), std::uint64_t{99}, std::uint64_t{100}}) {
+    SchedulerBench bench(trusting());
+    bench.feed(StudyAdded{1, table_, {}});
+    bench.join(1, 1);
+    bench.join(2, 1);
+    ResultsReceived event = answer_to(bench, *table_, batch);
+    event.left_out.insert(point);
+    const auto effects = bench.feed(event);
+    ASSERT_EQ(only<DropWorker>(effects).size(), 1U) << point;
+    EXPECT_TRUE(only<StoreResults>(effects).empty());
+    EXPECT_FALSE(bench.scheduler.knows_worker(1));
+    EXPECT_EQ(bench.scheduler.points(1).settled, 0U);
+  }
+}
+
+TEST_F(LeftOutPointsTest, AWorkerThatNamesPointsOfAStudyWithoutAFilterIsLost) {
+  SchedulerBench bench(trusting());
+  bench.feed(StudyAdded{1, table_of(100), {}});
+  const SendBatch batch = bench.join(1, 1).at(0);
+  const auto effects = bench.feed(ResultsReceived{
+      1, 1, batch.lease, ++bench.sequence, true, 1e-3, {}, IntervalSet(batch.first_point(), 1)});
+  EXPECT_EQ(only<DropWorker>(effects).size(), 1U);
+  EXPECT_EQ(bench.scheduler.points(1).settled, 0U);
+}
+
+TEST_F(LeftOutPointsTest, OfALeaseThatHasEndedResultsCountAndRangesDoNot) {
+  const SendBatch batch = bench_.join(1, 1).at(0);
+  ResultsReceived event = answer_to(bench_, *table_, batch);
+  event.lease = 0;  // as after a restart of the server
+  const auto stores = only<StoreResults>(bench_.feed(event));
+  ASSERT_EQ(stores.size(), 1U);
+  EXPECT_EQ(stores[0].accepted.size(), event.outcomes.size());
+  EXPECT_TRUE(stores[0].left_out.empty());
+  EXPECT_TRUE(bench_.scheduler.knows_worker(1));
+}
+
+TEST_F(LeftOutPointsTest, AfterARestartTheyAreKnownAndNotHandedOut) {
+  IntervalSet settled(0, 90);
+  SchedulerBench bench(trusting());
+  bench.feed(StudyAdded{1, table_, settled, 3, false, false, {}, "", {}, false, 45});
+  EXPECT_EQ(bench.scheduler.study(1).solved, 42U);
+  EXPECT_EQ(bench.scheduler.study(1).left_out, 45U);
+  EXPECT_EQ(bench.join(1, 1).at(0).first_point(), 90U);
+}
+
+TEST_F(LeftOutPointsTest, PointsThatAStudyGrowsByAreNamedToo) {
+  std::vector<SendBatch> held = bench_.join(1, 1);
+  const auto solve_all = [&](const protocol::PointTable& table) {
+    while (!held.empty()) {
+      held = only<SendBatch>(solve(bench_, table, held.front()));
+    }
+  };
+  solve_all(*table_);
+  protocol::Recipe recipe = table_->recipe();
+  *recipe.add_blocks() = filtered_table(10, "mu > 7")->recipe().blocks(0);
+  const auto grown = std::make_shared<const protocol::PointTable>(recipe);
+  held = only<SendBatch>(bench_.feed(StudyGrown{1, StudyTable(grown)}));
+  solve_all(*grown);
+  EXPECT_EQ(bench_.scheduler.study(1).solved, 52U);
+  EXPECT_EQ(bench_.scheduler.study(1).left_out, 58U);
+}
+
+TEST_F(LeftOutPointsTest, ABatchIsNotSoLongThatItTakesTooLongWhereTheFilterLeavesInAll) {
+  const auto table = filtered_table(1'000'000, "mu > 900000");
+  SchedulerSettings settings = trusting();
+  SchedulerBench bench(settings);
+  bench.feed(StudyAdded{1, table, {}});
+  SendBatch batch = bench.join(1, 1).at(0);
+  for (int turn = 0; turn < 20; ++turn) {
+    batch = only<SendBatch>(solve(bench, *table, batch)).at(0);
+  }
+  EXPECT_EQ(batch.count(), settings.unsolved_batch_points) << "nobody knows what a point takes";
+}
+
+TEST_F(LeftOutPointsTest, APointThatKillsAmongOthersIsFoundByFewWorkers) {
   const auto table = filtered_table(2000, kEven);
   constexpr std::uint64_t kKiller = 1234;
   SchedulerSettings settings;
   settings.first_batch_points = 2000;
+  settings.unsolved_batch_points = 2000;
   settings.tail_batches_per_thread = 0;
   SchedulerBench bench(settings);
   bench.feed(StudyAdded{1, table, {}});
-  std::set<std::uint64_t> solved;
   std::uint64_t deaths = 0;
   WorkerId worker = 0;
   std::vector<Effect> effects;
@@ -339,7 +248,7 @@ TEST(LeftOutPointsTest, APointThatKillsAmongOthersIsFoundByFewWorkers) {
         join();
       }
     } else {
-      effects = solve_left_in(bench, *table, batch, solved);
+      effects = solve(bench, *table, batch);
     }
   }
   EXPECT_EQ(bench.scheduler.points(1).failed, 1U);

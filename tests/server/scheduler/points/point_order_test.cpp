@@ -141,25 +141,5 @@ TEST(PointOrderTest, AStudyOfTooManyModelsStaysInTheOrderOfItsNumbers) {
   EXPECT_EQ(order.group_at(table, 77), (Interval{77, 78}));
 }
 
-TEST(PointOrderTest, APlaceIsPassedOverIfAFilterLeavesItsPointOut) {
-  protocol::Recipe recipe = sample_with_falls(200, 4);
-  recipe.mutable_blocks(0)->set_where("mu > 0.5");
-  const PointTable table(recipe);
-  PointOrder order;
-  order.arrange(table, 0, IntervalSet(0, 200), 3);
-  ASSERT_TRUE(order.is_arranged());
-  std::uint64_t left_in = 0;
-  for (std::uint64_t at = order.first_left_in(table, 0, 200); at < 200;
-       at = order.first_left_in(table, at + 1, 200)) {
-    EXPECT_TRUE(table.is_left_in(order.point(at)));
-    ++left_in;
-  }
-  std::uint64_t expected = 0;
-  for (std::uint64_t point = 0; point < 200; ++point) {
-    expected += table.is_left_in(point) ? 1U : 0U;
-  }
-  EXPECT_EQ(left_in, expected);
-}
-
 }  // namespace
 }  // namespace oblique::server

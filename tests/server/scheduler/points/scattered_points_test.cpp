@@ -13,8 +13,6 @@
 namespace oblique::server {
 namespace {
 
-constexpr std::uint64_t kManyLooks = 1'000'000;
-
 /// All of `numbers` points but every `step`-th, the first included.
 IntervalSet every(std::uint64_t step, std::uint64_t numbers) {
   IntervalSet points;
@@ -25,12 +23,11 @@ IntervalSet every(std::uint64_t step, std::uint64_t numbers) {
 }
 
 StudyPoints points_of(std::uint64_t numbers, IntervalSet settled) {
-  return {StudyTable(table_of(numbers)), std::move(settled), LossLimits{}};
+  return {StudyTable(table_of(numbers)), std::move(settled), 0, LossLimits{}};
 }
 
 Batch taken(StudyPoints& points, const Portion& wanted) {
-  std::uint64_t looks = kManyLooks;
-  const auto batch = points.take(wanted, looks);
+  const auto batch = points.take(wanted);
   points.check_invariants();
   return batch.value();
 }
@@ -71,24 +68,10 @@ TEST(ScatteredPointsTest, ABatchGoesOnIntoAnotherModelOnlyWhereThatHasRoomInIt) 
   const auto table = std::make_shared<const protocol::PointTable>(
       protocol::recipe_of({{protocol::listed("E", {6e10, 7e10}), protocol::listed("H", {1.0}),
                             protocol::range("mu", 0.0, 1.0, 10), protocol::listed("e", {1.0})}}));
-  StudyPoints points(StudyTable(table), every(2, 20), LossLimits{});
+  StudyPoints points(StudyTable(table), every(2, 20), 0, LossLimits{});
   EXPECT_EQ(taken(points, {8}).end(), 10U) << "the other's fall is another worker's";
-  StudyPoints both(StudyTable(table), every(2, 20), LossLimits{});
+  StudyPoints both(StudyTable(table), every(2, 20), 0, LossLimits{});
   EXPECT_EQ(taken(both, {18}).end(), 20U);
-}
-
-TEST(ScatteredPointsTest, WhatAFilterLeavesOutLiesBetweenToo) {
-  protocol::PointTable table(protocol::recipe_of_blocks(
-      {protocol::filtered({protocol::listed("H", {1.0}), protocol::range("mu", 0.0, 99.0, 100),
-                           protocol::listed("e", {1.0})},
-                          "floor(mu / 3) == mu / 3")}));
-  table.survey([] { return true; });
-  StudyPoints points(StudyTable(std::make_shared<const protocol::PointTable>(std::move(table))),
-                     every(6, 100), LossLimits{});
-  const Batch batch = taken(points, {6});
-  EXPECT_EQ(batch.first_place, 3U);
-  EXPECT_EQ(batch.points, 5U) << "3, 9, 15, 21 and 27: where half of the rest is found, that is it";
-  EXPECT_EQ(batch.end(), 28U);
 }
 
 TEST(ScatteredPointsTest, TheWorkerIsToldWhatIsWantedOfTheBatchAndNothingIsHandedOutTwice) {
