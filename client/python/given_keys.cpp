@@ -9,7 +9,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/recipe/expressions/expression.h"
+#include "proto/recipe/expression.h"
 #include "proto/recipe/keys.h"
 #include "proto/recipe/written/written_model.h"
 #include "proto/suggestion.h"

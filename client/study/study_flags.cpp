@@ -14,8 +14,7 @@ using solver::InputError;
 
 std::string name_of_recipe(const protocol::Recipe& recipe) {
   constexpr std::size_t kDigits = 8;
-  return fmt::format("sweep-{}",
-                     protocol::hexadecimal(protocol::recipe_digest(recipe)).substr(0, kDigits));
+  return fmt::format("sweep-{}", protocol::recipe_digest(recipe).substr(0, kDigits));
 }
 
 void add_study_flags(CLI::App& verb, StudyFlags& flags, bool with_single_lengths) {

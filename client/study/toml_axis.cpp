@@ -11,7 +11,6 @@
 
 #include "proto/recipe/keys.h"
 #include "proto/recipe/written/written_axis.h"
-#include "proto/recipe/written/written_sample.h"
 #include "proto/suggestion.h"
 
 namespace oblique::client {

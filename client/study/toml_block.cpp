@@ -14,7 +14,6 @@
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/keys.h"
 #include "proto/recipe/written/written_axis.h"
-#include "proto/recipe/written/written_sample.h"
 #include "proto/suggestion.h"
 #include "proto/text.h"
 

@@ -28,7 +28,7 @@
 #include "proto/program/origin/origin.h"
 #include "proto/program/usage.h"
 #include "proto/text.h"
-#include "server/asking/columns.h"
+#include "server/query/columns.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::client {

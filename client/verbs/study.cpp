@@ -22,7 +22,7 @@
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/study_size.h"
-#include "proto/recipe/written/written_sample.h"
+#include "proto/recipe/written/written_axis.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {

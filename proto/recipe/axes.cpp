@@ -6,27 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "proto/recipe/exact_math/exponentials.h"
-
 namespace oblique::protocol {
-namespace {
-
-using exact_math::TwoDoubles;
-
-/// (from (last − i) + to i) / last, rounded once: then 0.1:1.0:10 holds what a person types as 0.3,
-/// and the value is the same bits on every machine.
-double interpolated(double from, double to, std::uint64_t i, std::uint64_t last) {
-  const TwoDoubles a = exact_math::exact_product(from, static_cast<double>(last - i));
-  const TwoDoubles b = exact_math::exact_product(to, static_cast<double>(i));
-  const TwoDoubles sum = exact_math::exact_sum(a.high, b.high);
-  const double low = sum.low + (a.low + b.low);
-  const double divisor = static_cast<double>(last);
-  const double quotient = (sum.high + low) / divisor;
-  const double remainder = std::fma(-quotient, divisor, sum.high) + low;
-  return quotient + remainder / divisor;
-}
-
-}  // namespace
 
 bool has_own_values(const Axis& axis) {
   return axis.count() > 0 || axis.values_size() > 0;
@@ -45,33 +25,38 @@ RangeValues::RangeValues(const Axis& axis)
       to_(axis.to()),
       last_(axis.count() - 1),
       is_logarithmic_(axis.spacing() == SPACING_LOGARITHMIC) {
-  if (is_logarithmic_) {
-    log_from_ = exact_math::log(from_);
-    log_ratio_ = exact_math::log(to_) - log_from_;
+  constexpr double kExactBelow = 0x1p53;
+  constexpr double kLargestExactPower = 1e22;
+  const auto last = static_cast<double>(last_);
+  for (double per_unit = 1.0; !is_logarithmic_ && last_ > 0 && per_unit <= kLargestExactPower;
+       per_unit *= 10.0) {
+    const double first = std::round(from_ * per_unit);
+    const double end = std::round(to_ * per_unit);
+    if (!(std::abs(first) < kExactBelow && std::abs(end) < kExactBelow && last < kExactBelow)) {
+      break;
+    }
+    if (first / per_unit == from_ && end / per_unit == to_ && std::fmod(end - first, last) == 0.0) {
+      decimals_ = {first, (end - first) / last, per_unit};
+      break;
+    }
   }
 }
 
 double RangeValues::at(std::uint64_t i) const {
-  if (i == 0) {
-    return from_;
+  if (i == 0 || i == last_) {
+    return i == 0 ? from_ : to_;
   }
-  if (i == last_) {
-    return to_;
-  }
-  double value = 0.0;
-  if (is_logarithmic_) {
-    const TwoDoubles part = log_ratio_ * static_cast<double>(i);
-    const TwoDoubles last{static_cast<double>(last_), 0.0};
-    value = exact_math::exp(log_from_ + part / last).rounded();
+  const auto part = static_cast<long double>(i);
+  const auto last = static_cast<long double>(last_);
+  long double value = 0.0L;
+  if (decimals_) {
+    value = (decimals_->first + decimals_->step * static_cast<double>(i)) / decimals_->per_unit;
+  } else if (is_logarithmic_) {
+    value = from_ * std::pow(static_cast<long double>(to_) / from_, part / last);
   } else {
-    // Products with the count must not overflow; scaling by a power of two changes no digit.
-    constexpr int kScaleExponent = 64;
-    const bool huge = std::max(std::abs(from_), std::abs(to_)) > 1e280;
-    const int exponent = huge ? kScaleExponent : 0;
-    value = std::ldexp(
-        interpolated(std::ldexp(from_, -exponent), std::ldexp(to_, -exponent), i, last_), exponent);
+    value = (from_ * (last - part) + to_ * part) / last;
   }
-  return std::min(std::max(value, from_), to_);
+  return std::min(std::max(static_cast<double>(value), from_), to_);
 }
 
 double axis_value(const Axis& axis, std::uint64_t i) {
@@ -111,16 +96,6 @@ double largest_value(const Axis& axis) {
   }
   return axis.count() > 0 ? axis.to()
                           : *std::max_element(axis.values().begin(), axis.values().end());
-}
-
-std::vector<std::uint64_t> deciding_values(const Axis& axis) {
-  std::vector<std::uint64_t> deciding{0};
-  for (const std::uint64_t i : {std::uint64_t{1}, axis.count() - 1}) {
-    if (i < axis.count() && i > deciding.back()) {
-      deciding.push_back(i);
-    }
-  }
-  return deciding;
 }
 
 }  // namespace oblique::protocol

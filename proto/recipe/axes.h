@@ -1,26 +1,25 @@
 #pragma once
 
 #include <cstdint>
-#include <vector>
+#include <optional>
 
 #include "proto/oblique.pb.h"
-#include "proto/recipe/exact_math/two_doubles.h"
 
 namespace oblique::protocol {
 
-/// Number of values of an axis: as many as a list or a range has, and 1 of an axis whose values are
-/// drawn from a distribution or follow from others.
+/// Number of values of an axis: the length of a list or range, and 1 for an axis with a
+/// distribution or an expression.
 std::uint64_t axis_size(const Axis& axis);
 
-/// Whether the values stand in the axis itself, as a list or a range.
+/// Whether the axis is a list or a range.
 bool has_own_values(const Axis& axis);
 
-/// Value i of a list or a range. A range has its two ends exactly; the values between are equally
-/// spaced, or their logarithms are, and the same bits on every machine. Throws std::out_of_range
-/// for a value that the axis does not have.
+/// Value i of a list or range. Throws std::out_of_range if the axis has no such value.
 double axis_value(const Axis& axis, std::uint64_t i);
 
-/// The values of one range for many looks: what they have in common is computed once.
+/// The values of a range. Both ends are exact. Value i of a linear one is (from (n - 1 - i) + to i)
+/// / (n - 1), and where ends and step are decimals the very double that the decimal is read as:
+/// 0.1:1:10 has 0.3. Logarithms are spaced alike in a logarithmic range.
 class RangeValues {
  public:
   /// Of an axis with a count.
@@ -32,21 +31,20 @@ class RangeValues {
   double to_;
   std::uint64_t last_;
   bool is_logarithmic_;
-  exact_math::TwoDoubles log_from_{};
-  exact_math::TwoDoubles log_ratio_{};
+  /// Value i is (first + step i) / per_unit, in whole numbers below 2^53.
+  struct Decimals {
+    double first;
+    double step;
+    double per_unit;  ///< a power of ten
+  };
+  std::optional<Decimals> decimals_;
 };
 
-/// Number of the first value of a rising axis, which every range is, that is at least `value`, and
-/// the axis' size when there is none: its inverse.
+/// Number of the first value that is at least `value` of an axis whose values rise, or its size.
 std::uint64_t first_value_from(const Axis& axis, double value);
 
-/// Bounds of the values of a list, a range or a distribution; of the last they may be infinite.
+/// Bounds of the values of a list, range or distribution; those of a distribution may be infinite.
 double smallest_value(const Axis& axis);
 double largest_value(const Axis& axis);
-
-/// Numbers of the values of a range that tell whether all of them are allowed. Every key allows an
-/// interval, for which the two ends are enough, or the whole numbers of one: when the first two
-/// values are whole their distance is, and so are all.
-std::vector<std::uint64_t> deciding_values(const Axis& axis);
 
 }  // namespace oblique::protocol

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
@@ -14,31 +13,10 @@
 namespace oblique::protocol {
 namespace {
 
-using solver::exact_number;
 using solver::InputError;
-
-/// In the place of an axis.
-constexpr std::size_t kNoAxis = ~std::size_t{0};
-
-sampling::Sample sample_of(const Sample& message) {
-  const auto kind = message.kind() == SAMPLE_SOBOL             ? sampling::Kind::kSobol
-                    : message.kind() == SAMPLE_LATIN_HYPERCUBE ? sampling::Kind::kLatinHypercube
-                                                               : sampling::Kind::kRandom;
-  return {kind, message.count(), message.seed()};
-}
 
 bool follows(const Axis& axis) {
   return !axis.expression().empty();
-}
-
-/// Throws the fault again with what it is of before it.
-template <typename Make>
-auto named(const std::string& what, Make make) {
-  try {
-    return make();
-  } catch (const InputError& fault) {
-    throw InputError(fmt::format("{}: {}", what, fault.what()));
-  }
 }
 
 }  // namespace
@@ -47,161 +25,117 @@ std::string expression_in_words(std::string_view key, const std::string& text) {
   return fmt::format("{} = \"{}\"", key, excerpt(text));
 }
 
-sampling::Distribution distribution_of(const Axis& axis) {
-  const Distribution& drawn = axis.distribution();
-  const double from = smallest_value(axis);
-  const double to = largest_value(axis);
-  switch (drawn.kind()) {
-    case DISTRIBUTION_NORMAL:
-      return sampling::Distribution::normal(drawn.mean(), drawn.sd(), from, to);
-    case DISTRIBUTION_LOG_UNIFORM:
-      return sampling::Distribution::log_uniform(from, to);
-    default:
-      return sampling::Distribution::uniform(from, to);
-  }
-}
-
 BlockPoints::BlockPoints(const solver::ModelParameters& base, const Block& block)
-    : base_(base), block_(block), sample_(sample_of(block.sample())) {
-  const auto axes = static_cast<std::size_t>(block.axes_size());
-  keys_.reserve(axes);
-  sources_.resize(axes);
-  values_.resize(axes);
+    : base_(base),
+      block_(block),
+      values_(static_cast<std::size_t>(block.axes_size())),
+      points_(points_of_block(block)) {
   std::uint32_t dimensions = 0;
-  const std::vector<AxisLayout> layout = layout_of(block);
-  for (std::size_t i = 0; i < axes; ++i) {
-    keys_.push_back(layout[i].key);
-    sources_[i].stride = layout[i].stride;
-    sources_[i].values = layout[i].values;
-    add_source(i, dimensions);
-  }
-  std::vector<Formula> formulas;
-  for (std::size_t i = 0; i < axes; ++i) {
-    const Axis& axis = block.axes(static_cast<int>(i));
-    if (follows(axis)) {
-      formulas.push_back(named(expression_in_words(axis.key(), axis.expression()),
-                               [&] { return formula_of(axis.expression(), i); }));
+  for (const AxisLayout& layout : layout_of(block)) {
+    Source& source = sources_.emplace_back(Source{layout, layout.values == 0 ? dimensions++ : 0});
+    if (layout.axis->count() > 0) {
+      source.range.emplace(*layout.axis);
+    } else if (layout.axis->has_distribution()) {
+      source.quantiles.emplace(*layout.axis);
     }
   }
-  put_in_order(std::move(formulas));
-  if (!block.where().empty()) {
-    filter_.emplace(named(expression_in_words("where", block.where()),
-                          [&] { return formula_of(block.where(), kNoAxis); }));
+  std::vector<Formula> formulas;
+  for (std::size_t i = 0; i < sources_.size(); ++i) {
+    if (const Axis& axis = *sources_[i].layout.axis; follows(axis)) {
+      formulas.push_back(read_formula(axis.key(), axis.expression(), i));
+    }
   }
-  points_ = points_of_block(block);
+  sort(std::move(formulas));
+  if (!block.where().empty()) {
+    filter_ = read_formula("where", block.where(), sources_.size());
+  }
   count_models();
 }
 
-void BlockPoints::add_source(std::size_t index, std::uint32_t& dimensions) {
-  const Axis& axis = block_.axes(static_cast<int>(index));
-  Source& source = sources_[index];
-  if (axis.count() > 0) {
-    source.range.emplace(axis);
-  }
-  if (axis.has_distribution()) {
-    source.distribution.emplace(distribution_of(axis));
-  }
-  if (block_kind(block_) == BlockKind::kSample && is_drawn(axis)) {
-    source.dimension = dimensions++;
+BlockPoints::Formula BlockPoints::read_formula(std::string_view key, const std::string& text,
+                                               std::size_t axis) {
+  try {
+    Formula formula{expressions::Expression(text), {}, axis};
+    for (const std::string& name : formula.expression.names()) {
+      formula.inputs.push_back(input_called(name));
+    }
+    return formula;
+  } catch (const InputError& fault) {
+    throw InputError(fmt::format("{}: {}", expression_in_words(key, text), fault.what()));
   }
 }
 
-BlockPoints::Formula BlockPoints::formula_of(const std::string& text, std::size_t axis) {
-  Formula formula{expressions::Expression(text), {}, axis};
-  for (const std::string& name : formula.expression.names()) {
-    formula.inputs.push_back(input_called(name));
-  }
-  return formula;
-}
-
-/// Where the value of that name comes from: an axis of the block, or the base model.
+/// The axis of that name, or a new constant of the base model.
 std::size_t BlockPoints::input_called(const std::string& name) {
   const std::size_t key = key_number(name);
   const auto axis_of = [this](std::size_t wanted) {
-    return static_cast<std::size_t>(std::find(keys_.begin(), keys_.end(), wanted) - keys_.begin());
+    const auto found = std::find_if(sources_.begin(), sources_.end(), [&](const Source& source) {
+      return source.layout.key == wanted;
+    });
+    return static_cast<std::size_t>(found - sources_.begin());
   };
-  if (const std::size_t axis = axis_of(key); axis < keys_.size()) {
-    return axis;
-  }
-  if (const auto link = link_of_key(key)) {
-    // What `length` makes of every link.
-    if (const std::size_t axis = axis_of(key_number("length")); axis < keys_.size()) {
-      return axis;
-    }
-    // `links` makes all of them as long as the first.
-    if (const std::size_t axis = axis_of(key_number("links")); axis < keys_.size()) {
-      constants_.push_back(base_.lengths_m.front());
-      return keys_.size() + constants_.size() - 1;
-    }
-    if (*link >= base_.lengths_m.size()) {
+  std::size_t axis = axis_of(key);
+  double constant = 0.0;
+  if (const auto link = link_of_key(key); axis == sources_.size() && link) {
+    axis = axis_of(key_number("length"));  // sets the length of every link
+    if (axis_of(key_number("links")) < sources_.size()) {
+      constant = base_.lengths_m.front();  // `links` makes all of them as long as the first
+    } else if (*link < base_.lengths_m.size()) {
+      constant = base_.lengths_m[*link];
+    } else if (axis == sources_.size()) {
       throw InputError(fmt::format("`{}` is the length of no link: the model has {}", name,
                                    base_.lengths_m.size()));
     }
+  } else if (axis == sources_.size()) {
+    constant = key_numbered(key).get(base_);
   }
-  constants_.push_back(key_numbered(key).get(base_));
-  return keys_.size() + constants_.size() - 1;
+  if (axis < sources_.size()) {
+    return axis;
+  }
+  constants_.push_back(constant);
+  return sources_.size() + constants_.size() - 1;
 }
 
-/// Each behind those whose values it asks for.
-void BlockPoints::put_in_order(std::vector<Formula> formulas) {
-  std::vector<bool> is_known(keys_.size(), true);
-  for (const Formula& formula : formulas) {
-    is_known[formula.axis] = false;
-  }
+void BlockPoints::sort(std::vector<Formula> formulas) {
   while (!formulas.empty()) {
+    // The first none of whose inputs is still to come.
     const auto next = std::find_if(formulas.begin(), formulas.end(), [&](const Formula& formula) {
-      return std::all_of(formula.inputs.begin(), formula.inputs.end(), [&](std::size_t input) {
-        return input >= keys_.size() || is_known[input];
+      return std::none_of(formulas.begin(), formulas.end(), [&](const Formula& other) {
+        return std::find(formula.inputs.begin(), formula.inputs.end(), other.axis) !=
+               formula.inputs.end();
       });
     });
     if (next == formulas.end()) {
       std::string circle;
       for (const Formula& formula : formulas) {
-        circle += circle.empty() ? "" : ", ";
-        circle += key_numbered(keys_[formula.axis]).name;
+        circle += (circle.empty() ? "" : ", ") + sources_[formula.axis].layout.axis->key();
       }
       throw InputError(fmt::format(
           "{}: the expressions go round in a circle: one must follow from keys that do not",
           circle));
     }
-    is_known[next->axis] = true;
     formulas_.push_back(std::move(*next));
     formulas.erase(next);
   }
 }
 
-/// The axes that the value of an axis depends on, itself among them.
-std::vector<bool> BlockPoints::axes_behind(std::size_t axis) const {
-  std::vector<bool> behind(keys_.size(), false);
-  behind[axis] = true;
-  for (std::size_t i = formulas_.size(); i-- > 0;) {  // those behind come before
-    if (behind[formulas_[i].axis]) {
-      for (const std::size_t input : formulas_[i].inputs) {
-        if (input < keys_.size()) {
-          behind[input] = true;
-        }
-      }
-    }
-  }
-  return behind;
-}
-
 void BlockPoints::count_models() {
   const bool is_product = block_kind(block_) == BlockKind::kProduct;
-  for (std::size_t axis = 0; axis < keys_.size(); ++axis) {
-    if (is_point_key(keys_[axis])) {
-      continue;
-    }
-    const std::vector<bool> behind = axes_behind(axis);
-    for (std::size_t i = 0; i < keys_.size(); ++i) {
-      const bool varies = is_drawn(block_.axes(static_cast<int>(i)));
-      if (behind[i] && varies && (!is_product || is_point_key(keys_[i]))) {
-        models_ = points_;
-        return;
-      }
-    }
+  std::vector<bool> varies;  // among the points of one combination of model axes
+  for (const Source& source : sources_) {
+    varies.push_back(is_drawn(*source.layout.axis) &&
+                     (!is_product || is_point_key(source.layout.key)));
   }
-  if (is_product) {
+  for (const Formula& formula : formulas_) {
+    varies[formula.axis] =
+        std::any_of(formula.inputs.begin(), formula.inputs.end(),
+                    [&](std::size_t input) { return input < varies.size() && varies[input]; });
+  }
+  const std::size_t model_axes_end = sources_.size() - kPointKeyOrder.size();
+  if (std::find(varies.begin(), varies.end(), true) - varies.begin() <
+      static_cast<std::ptrdiff_t>(model_axes_end)) {
+    models_ = points_;
+  } else if (is_product) {
     models_ = combinations(model_axes(block_));
   }
 }
@@ -213,9 +147,8 @@ void BlockPoints::go_to(std::uint64_t point) {
   at_ = ~std::uint64_t{0};  // until all is computed
   filter_value_.reset();
   for (std::size_t i = 0; i < sources_.size(); ++i) {
-    const Axis& axis = block_.axes(static_cast<int>(i));
-    if (!follows(axis)) {
-      values_[i] = value_from(sources_[i], axis, point);
+    if (!follows(*sources_[i].layout.axis)) {
+      values_[i] = value_of(i, point);
     }
   }
   for (Formula& formula : formulas_) {
@@ -224,24 +157,25 @@ void BlockPoints::go_to(std::uint64_t point) {
   at_ = point;
 }
 
-double BlockPoints::value_from(Source& source, const Axis& axis, std::uint64_t point) const {
+double BlockPoints::value_of(std::size_t axis, std::uint64_t point) {
+  Source& source = sources_[axis];
+  const AxisLayout& layout = source.layout;
   std::uint64_t number = 0;
-  if (source.values != 0) {
-    number = source.values == 1 ? 0 : point / source.stride % source.values;
-  } else {
-    const double part = sampling::fraction(sample_, source.dimension, point);
-    if (source.distribution) {
-      return source.distribution->value_at(part);
+  if (layout.values == 0) {
+    const double part = sampling::fraction(block_.sample(), source.dimension, point);
+    if (source.quantiles) {
+      return source.quantiles->value_at(part);
     }
-    const std::uint64_t values = axis_size(axis);
+    const std::uint64_t values = axis_size(*layout.axis);
     number = std::min(static_cast<std::uint64_t>(part * static_cast<double>(values)), values - 1);
+  } else if (layout.values > 1) {
+    number = point / layout.stride % layout.values;
   }
-  const auto index = static_cast<std::size_t>(&source - sources_.data());
   if (number == source.last) {
-    return values_[index];
+    return values_[axis];
   }
   source.last = number;
-  return source.range ? source.range->at(number) : axis.values(static_cast<int>(number));
+  return source.range ? source.range->at(number) : layout.axis->values(static_cast<int>(number));
 }
 
 double BlockPoints::result_of(Formula& formula) {
@@ -253,11 +187,7 @@ double BlockPoints::result_of(Formula& formula) {
 }
 
 bool BlockPoints::is_left_in() {
-  if (!filter_) {
-    return true;
-  }
-  const double value = filter_value();
-  return !std::isnan(value) && value != 0.0;
+  return !filter_ || (!std::isnan(filter_value()) && filter_value() != 0.0);
 }
 
 double BlockPoints::filter_value() {
@@ -269,11 +199,12 @@ double BlockPoints::filter_value() {
 
 solver::ModelParameters BlockPoints::model() const {
   solver::ModelParameters model = base_;
-  for (const bool are_single : {false, true}) {  // `links` and `length` first
-    for (std::size_t i = keys_.size(); i-- > 0;) {
-      const solver::ParameterKey& key = key_numbered(keys_[i]);
-      if (!is_point_key(keys_[i]) && link_of_key(keys_[i]).has_value() == are_single &&
-          std::isfinite(values_[i]) && key.is_allowed(values_[i])) {
+  for (const bool are_single : {false, true}) {  // single lengths act on what `links` has made
+    for (std::size_t i = sources_.size() - kPointKeyOrder.size(); i-- > 0;) {
+      const std::size_t number = sources_[i].layout.key;
+      const solver::ParameterKey& key = key_numbered(number);
+      if (link_of_key(number).has_value() == are_single && std::isfinite(values_[i]) &&
+          key.is_allowed(values_[i])) {
         key.set(model, values_[i]);
       }
     }
@@ -282,21 +213,18 @@ solver::ModelParameters BlockPoints::model() const {
 }
 
 std::string BlockPoints::fault() {
-  if (filter_) {
-    const double value = filter_value();
-    if (std::isnan(value)) {
-      return fmt::format("where has no value: {}", values_in_words());
-    }
-    if (value == 0.0) {
-      return {};
-    }
+  if (filter_ && std::isnan(filter_value())) {
+    return fmt::format("where has no value: {}", values_in_words());
+  }
+  if (!is_left_in()) {
+    return {};
   }
   try {
     for (const Formula& formula : formulas_) {
-      solver::check_value(key_numbered(keys_[formula.axis]), values_[formula.axis]);
+      solver::check_value(key_numbered(sources_[formula.axis].layout.key), values_[formula.axis]);
     }
-    const std::size_t first = values_.size() - kPointKeyOrder.size();
-    solver::validate_point(model(), values_[first], values_[first + 1], values_[first + 2]);
+    const double* point = values_.data() + values_.size() - kPointKeyOrder.size();
+    solver::validate_point(model(), point[0], point[1], point[2]);
   } catch (const InputError& fault) {
     return fmt::format("{}: {}", fault.what(), values_in_words());
   }
@@ -306,9 +234,9 @@ std::string BlockPoints::fault() {
 /// "k = 1e7, H = 0.3, mu = 0.1, e = 1"
 std::string BlockPoints::values_in_words() const {
   std::string words;
-  for (std::size_t i = 0; i < keys_.size(); ++i) {
-    words += fmt::format("{}{} = {}", words.empty() ? "" : ", ", key_numbered(keys_[i]).name,
-                         exact_number(values_[i]));
+  for (std::size_t i = 0; i < sources_.size(); ++i) {
+    words += fmt::format("{}{} = {}", words.empty() ? "" : ", ", sources_[i].layout.axis->key(),
+                         solver::exact_number(values_[i]));
   }
   return words;
 }

@@ -33,36 +33,29 @@ void throw_too_many_points() {
       "the study has more than {} points, the most that are allowed: shorten an axis", kMaxPoints));
 }
 
-std::uint64_t checked_product(std::uint64_t a, std::uint64_t b) {
-  if (a > kMaxPoints / b) {
-    throw_too_many_points();
-  }
-  return a * b;
-}
-
 std::uint64_t combinations(std::span<const Axis* const> axes) {
   std::uint64_t count = 1;
   for (const Axis* axis : axes) {
-    count = checked_product(count, axis_size(*axis));
+    if (axis_size(*axis) > kMaxPoints / count) {
+      throw_too_many_points();
+    }
+    count *= axis_size(*axis);
   }
   return count;
 }
 
 std::uint64_t points_of_block(const Block& block) {
-  if (block.has_sample()) {
-    if (block.sample().count() > kMaxPoints) {
-      throw_too_many_points();
-    }
-    return block.sample().count();
-  }
-  if (!block.zip()) {
+  if (block_kind(block) == BlockKind::kProduct) {
     return combinations({block.axes().data(), static_cast<std::size_t>(block.axes_size())});
   }
-  std::uint64_t longest = 1;
+  std::uint64_t points = block.sample().count();
   for (const Axis& axis : block.axes()) {
-    longest = std::max(longest, axis_size(axis));
+    points = block.zip() ? std::max(points, axis_size(axis)) : points;
   }
-  return checked_product(longest, 1);
+  if (points > kMaxPoints) {
+    throw_too_many_points();
+  }
+  return points;
 }
 
 std::vector<AxisLayout> layout_of(const Block& block) {

@@ -27,23 +27,21 @@ enum class BlockKind : std::uint8_t {
 };
 BlockKind block_kind(const Block& block);
 
-/// The axes of a block that was judged: those of the model, and then H, mu and e.
+/// The axes of a checked block: those of the model, and then H, mu and e.
 std::span<const Axis* const> model_axes(const Block& block);
 std::span<const Axis* const> point_axes(const Block& block);
 
 /// Whether an axis of a sample is drawn: from a distribution, or from several values.
 bool is_drawn(const Axis& axis);
 
-/// Number of points of a block that was judged, with those that its filter leaves out. Throws
+/// Number of points of a checked block, with those that its filter leaves out. Throws
 /// solver::InputError above `kMaxPoints`.
 std::uint64_t points_of_block(const Block& block);
 
-/// Number of points, or models, that axes make when they multiply; none of them is empty. Throws
-/// solver::InputError above `kMaxPoints`.
+/// Number of combinations of the values of axes, none of which is empty. Throws solver::InputError
+/// above `kMaxPoints`.
 std::uint64_t combinations(std::span<const Axis* const> axes);
 
-/// Product of two such numbers, none of them 0. Throws solver::InputError above `kMaxPoints`.
-std::uint64_t checked_product(std::uint64_t a, std::uint64_t b);
 [[noreturn]] void throw_too_many_points();
 
 /// One axis among the others of its block. Point p of a product or zip, counted in the block, has
@@ -55,27 +53,26 @@ struct AxisLayout {
   std::uint64_t stride;
 };
 
-/// The axes of a block that was judged, in their order.
+/// The axes of a checked block, in their order.
 std::vector<AxisLayout> layout_of(const Block& block);
 
-/// Whether the block is a product of lists and ranges, without expressions and without a filter, so
-/// that conditions on its axes are sets of points by `layout_of` alone.
+/// Whether the block is a product of lists and ranges without a filter, so that `layout_of` alone
+/// gives the points that meet a condition on its axes.
 bool is_plain_product(const Block& block);
 
-/// The model of the shortest finger that lists, ranges and distributions of the block make of
-/// `model`: length grows with every key that sets it.
+/// The model of the shortest finger in the block, expressions left out: length grows with every key
+/// that sets it.
 solver::ModelParameters shortest_model(solver::ModelParameters model, const Block& block);
 
-/// No finger turns back before its tip has dropped by this part of its length. From there up to the
-/// length, which is what the rules of a block allow, only the fall tells.
+/// Every finger's tip drops by at least this part of its length. From there up to the length, which
+/// the rules of a block allow, only the fall tells.
 inline constexpr double kSurelyReached = 0.9;
 
-/// That drop in m of the shortest finger of a block that was judged, where the block has H above it
-/// or may have (H follows by an expression); nothing where the tip surely reaches every H.
+/// Largest drop [m] that every finger of the block is certain to reach; empty if no H exceeds it.
 std::optional<double> surely_reached_m(const solver::ModelParameters& model, const Block& block);
 
-/// A block of the axes, in the order that recipes need: model keys as listings have them, then H,
-/// mu and e. Judges nothing. Keys must be known.
+/// A block of the axes in the order of recipes: model keys as in listings, then H, mu and e. Checks
+/// nothing. Keys must be known.
 Block block_of(std::vector<Axis> axes);
 
 }  // namespace oblique::protocol

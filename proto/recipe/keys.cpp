@@ -12,27 +12,24 @@
 namespace oblique::protocol {
 namespace {
 
-constexpr std::string_view kSingleLength = "length";
-
-/// "length1", "length2", ... where it stays.
-template <std::size_t link>
-struct LengthName {
-  static constexpr std::size_t kDigits = link + 1 < 10 ? 1 : 2;
-  static constexpr auto text = [] {
-    std::array<char, kSingleLength.size() + kDigits> name{};
-    kSingleLength.copy(name.data(), kSingleLength.size());
-    std::size_t rest = link + 1;
-    for (std::size_t i = name.size(); i > kSingleLength.size(); --i, rest /= 10) {
-      name[i - 1] = static_cast<char>('0' + rest % 10);
+/// "length1", "length2", ... in 7 or 8 characters, and 0.
+constexpr auto kLengthNames = [] {
+  std::array<std::array<char, 9>, kMostLinks> names{};
+  for (std::size_t link = 0; link < kMostLinks; ++link) {
+    const std::size_t number = link + 1;
+    const std::size_t digits = number < 10 ? 1 : 2;
+    std::string_view("length").copy(names[link].data(), 6);
+    names[link][5 + digits] = static_cast<char>('0' + number % 10);
+    if (digits == 2) {
+      names[link][6] = static_cast<char>('0' + number / 10);
     }
-    return name;
-  }();
-};
+  }
+  return names;
+}();
 
 template <std::size_t link>
 constexpr solver::ParameterKey length_key() {
-  const auto& name = LengthName<link>::text;
-  return {{name.data(), name.size()},
+  return {kLengthNames[link].data(),
           "m",
           "length of one link, counted from the pin",
           "> 0",
@@ -47,77 +44,54 @@ constexpr solver::ParameterKey length_key() {
           }};
 }
 
-template <std::size_t... links>
-constexpr std::array<solver::ParameterKey, sizeof...(links)> length_keys(
-    std::index_sequence<links...>) {
-  return {length_key<links>()...};
+constexpr auto kLengthKeys = []<std::size_t... links>(std::index_sequence<links...>) {
+  return std::array<solver::ParameterKey, kMostLinks>{length_key<links>()...};
 }
+(std::make_index_sequence<kMostLinks>());
 
-constexpr auto kLengthKeys = length_keys(std::make_index_sequence<kMostLinks>());
-
-std::vector<std::string_view> all_keys() {
-  std::vector<std::string_view> names;
-  for (const auto& key : solver::model_keys()) {
-    names.push_back(key.name);
+std::optional<std::size_t> find_key_number(std::string_view name) {
+  const bool is_length = name.starts_with("length");
+  for (std::size_t number = 0; number < key_count(); ++number) {
+    if (link_of_key(number) && !is_length) {
+      number += kMostLinks - 1;  // none of the single lengths
+    } else if (key_numbered(number).name == name) {
+      return number;
+    }
   }
-  names.insert(names.end(), {kLengthKeys[0].name, kLengthKeys[1].name, kLengthKeys[2].name, "..."});
-  names.insert(names.end(), kPointKeyOrder.begin(), kPointKeyOrder.end());
-  return names;
-}
-
-std::size_t first_point_key() {
-  return solver::model_keys().size() + kMostLinks;
+  return std::nullopt;
 }
 
 }  // namespace
 
-std::size_t key_number(std::string_view name) {
+const solver::ParameterKey& key_numbered(std::size_t number) {
   const auto model_keys = solver::model_keys();
-  if (const solver::ParameterKey* key = solver::find_model_key(name)) {
-    return static_cast<std::size_t>(key - model_keys.data());
+  if (number < model_keys.size()) {
+    return model_keys[number];
   }
-  for (std::size_t i = 0; i < kPointKeyOrder.size(); ++i) {
-    if (name == kPointKeyOrder[i]) {
-      return first_point_key() + i;
-    }
-  }
-  if (name.starts_with(kSingleLength)) {
-    for (std::size_t link = 0; link < kMostLinks; ++link) {
-      if (name == kLengthKeys[link].name) {
-        return model_keys.size() + link;
-      }
-    }
+  number -= model_keys.size();
+  return number < kMostLinks ? kLengthKeys.at(number) : solver::point_keys()[number - kMostLinks];
+}
+
+std::size_t key_count() {
+  return solver::model_keys().size() + kMostLinks + kPointKeyOrder.size();
+}
+
+std::size_t key_number(std::string_view name) {
+  if (const auto number = find_key_number(name)) {
+    return *number;
   }
   if (name == "preset" || name == "lengths") {
     throw solver::InputError(
         fmt::format("{} cannot be an axis of a block: it stands in [model]", name));
   }
-  const auto known = all_keys();
+  std::vector<std::string_view> known;
+  for (const auto& key : solver::model_keys()) {
+    known.push_back(key.name);
+  }
+  known.insert(known.end(), {"length1", "length2", "length3", "..."});
+  known.insert(known.end(), kPointKeyOrder.begin(), kPointKeyOrder.end());
   throw solver::InputError(
       fmt::format("{}: the keys are {}", unknown_key(name, known), joined(known)));
-}
-
-const solver::ParameterKey& key_numbered(std::size_t number) {
-  const auto model_keys = solver::model_keys();
-  if (const auto link = link_of_key(number)) {
-    return kLengthKeys.at(*link);
-  }
-  return number < model_keys.size() ? model_keys[number]
-                                    : solver::point_keys()[number - first_point_key()];
-}
-
-std::size_t key_count() {
-  return first_point_key() + kPointKeyOrder.size();
-}
-
-bool is_point_key(std::size_t number) {
-  return number >= first_point_key();
-}
-
-std::optional<std::size_t> link_of_key(std::size_t number) {
-  const std::size_t first = solver::model_keys().size();
-  return number >= first && number < first_point_key() ? std::optional(number - first)
-                                                       : std::nullopt;
 }
 
 const solver::ParameterKey& axis_key(std::string_view name) {
@@ -125,12 +99,16 @@ const solver::ParameterKey& axis_key(std::string_view name) {
 }
 
 bool is_axis_key(std::string_view name) {
-  try {
-    key_number(name);
-    return true;
-  } catch (const solver::InputError&) {
-    return false;
-  }
+  return find_key_number(name).has_value();
+}
+
+bool is_point_key(std::size_t number) {
+  return number >= solver::model_keys().size() + kMostLinks;
+}
+
+std::optional<std::size_t> link_of_key(std::size_t number) {
+  const std::size_t first = solver::model_keys().size();
+  return number >= first && !is_point_key(number) ? std::optional(number - first) : std::nullopt;
 }
 
 }  // namespace oblique::protocol

@@ -27,23 +27,22 @@ struct Segment {
   std::uint64_t count;
 };
 
-/// A run of blocks' points and models, as the table has them.
+/// The points and models of one block.
 struct BlockPlace {
   std::uint64_t first_point;
   std::uint64_t points;  ///< also those that the filter leaves out
   std::uint64_t first_model;
   std::uint64_t models;
+  bool is_judged_by_points;  ///< see checks.h
 };
 
-/// A recipe checked and made fit for computing with: point i and model j as pure functions, in time
-/// and memory that do not grow with the number of points. Safe to use from several threads once it
-/// is const.
+/// A checked recipe: point i and model j as functions of their numbers, in time and memory that do
+/// not grow with the number of points. Threads may share it once it is const.
 class PointTable {
  public:
-  /// Blocks without model axes share one model number. Throws solver::InputError naming key, value
-  /// and what is allowed: what checks.h says of blocks, no model or one outside its domain, no
-  /// block, too many points, too many expressions. What can be
-  /// judged only point by point is judged by `survey`.
+  /// Throws solver::InputError naming key, value and what is allowed for a recipe without a model
+  /// or blocks, for too many points or expressions, and for what `check_block` refuses.
+  /// `judge_points` judges the rest.
   explicit PointTable(Recipe recipe);
   ~PointTable();
   PointTable(PointTable&&) noexcept;
@@ -54,8 +53,8 @@ class PointTable {
   const Recipe& recipe() const { return *recipe_; }
   /// Whether results are to have estimated errors.
   bool wants_errors() const { return recipe_->errors(); }
-  std::uint64_t size() const;    ///< how many point numbers there are
-  std::uint64_t models() const;  ///< number of models
+  std::uint64_t size() const { return points_; }  ///< number of point numbers
+  std::uint64_t models() const { return models_; }
 
   bool has_filter() const { return has_filter_; }
   bool is_left_in(std::uint64_t index) const;
@@ -72,41 +71,34 @@ class PointTable {
   void judge_points() const;
   static constexpr std::uint64_t kMostJudged = 100'000;
 
-  /// Why a point cannot be solved, as a sentence; empty for all that can. Costs nothing but for
-  /// blocks that are judged by their points.
+  /// Why a point cannot be solved, as a sentence, or an empty text.
   std::string fault(std::uint64_t index) const;
 
-  /// Throws std::out_of_range for a point or model that the study does not have. A value that is no
-  /// number reads as 0, and one of a model that is not allowed as that of the recipe's model.
+  /// Throw std::out_of_range for a point or model outside the study. A value that is not finite
+  /// reads as 0; a model value that is not allowed as that of the recipe's model.
   Point point(std::uint64_t index) const;
   solver::ModelParameters model(std::uint64_t index) const;
-  /// The whole run of points around `index` that shares its model. Blocks without model axes that
-  /// follow each other are one run, so that studies of many small blocks are handed out and solved
-  /// as one large block is.
+  /// The longest run of points around `index` that share its model. Adjacent blocks without model
+  /// axes are one run, so that a study of many small blocks is leased and solved like a large
+  /// block.
   Segment segment_at(std::uint64_t index) const;
 
-  /// Where the points of block `number` of the recipe are; `layout_of` tells its axes. Throws
-  /// std::out_of_range for a block that there is not.
+  /// Throw std::out_of_range for a block or point outside the study.
   const BlockPlace& block(std::size_t number) const { return blocks_.at(number); }
-  /// The block that a point is in. Throws std::out_of_range for a point that there is not.
   std::size_t block_of_point(std::uint64_t index) const;
 
  private:
-  class Compiled;
+  class Pool;
 
   void add_block(const Block& block);
-  /// Counts the points of a block without model axes that is about to be added.
-  void add_to_base_segments(std::uint64_t block_points);
+  template <typename Act>
+  auto in_block(std::size_t number, Act act) const;
   void judge_block(std::size_t number, std::uint64_t most) const;
-  std::size_t block_of_model(std::uint64_t index) const;
-
   const Block& message(std::size_t block) const { return recipe_->blocks(static_cast<int>(block)); }
 
   std::unique_ptr<Recipe> recipe_;  ///< stays where it is when the table moves
   solver::ModelParameters base_model_;
   std::vector<BlockPlace> blocks_;
-  std::vector<bool> is_simple_;            ///< blocks whose values only have to be looked up
-  std::vector<bool> is_judged_by_points_;  ///< blocks of which only the points tell what is wrong
   std::vector<Segment> base_segments_;     ///< of the blocks without model axes, in order
   std::vector<std::size_t> model_blocks_;  ///< blocks that bring models of their own, in order
   std::optional<std::uint64_t> base_model_number_;  ///< shared by all blocks without model axes
@@ -114,7 +106,7 @@ class PointTable {
   std::uint64_t models_ = 0;
   std::size_t expressions_ = 0;
   bool has_filter_ = false;
-  std::unique_ptr<Compiled> compiled_;  ///< of the other blocks; null when there are none
+  std::unique_ptr<Pool> pool_;
 };
 
 }  // namespace oblique::protocol

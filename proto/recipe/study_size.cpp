@@ -4,7 +4,7 @@
 #include <optional>
 #include <unordered_map>
 
-#include "proto/recipe/sampling/hash.h"
+#include "proto/recipe/sample.h"
 #include "worker/solver/model/fall_model.h"
 
 namespace oblique::protocol {

@@ -6,23 +6,21 @@
 
 namespace oblique::server {
 
-/// What a recipe is to the one of a study that is there.
+/// What a recipe is to the one that a study has.
 struct Growth {
   enum class Kind {
-    kSame,     ///< the same points of the same models, however it was written
-    kLonger,   ///< it begins with all of the stored one: the study may grow by the rest
-    kShorter,  ///< the stored one begins with all of it, and goes on
+    kSame,     ///< the same model and blocks
+    kLonger,   ///< it begins with the stored one: the study may grow by the rest
+    kShorter,  ///< the stored one begins with it
     kOther,
   };
   Kind kind;
-  /// Of a shorter or another recipe: what differs, a line each, with what is stored and what is
-  /// given; no more than some ten.
+  /// Of a shorter or another recipe: what differs, a line each.
   std::string difference;
 };
 
-/// Compares two recipes that were judged, by their canonical texts. A study grows by further blocks
-/// behind its own, and by a larger count of its last block's sample if that is random or of Sobol.
-/// Costs in proportion to the recipes; blocks that are the same bytes cost little.
+/// Compares two checked recipes block by block, as they are written. A study grows by blocks behind
+/// its own, and by a larger count of its last block's sample unless that is a Latin hypercube.
 Growth growth_of(const protocol::Recipe& stored, const protocol::Recipe& given);
 
 }  // namespace oblique::server

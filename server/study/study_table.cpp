@@ -3,7 +3,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "proto/recipe/canonical.h"
 #include "proto/recipe/checks.h"
 
 namespace oblique::server {
@@ -17,28 +16,16 @@ protocol::Recipe parsed(const std::string& bytes) {
   return recipe;
 }
 
-/// Whether a message is another with blocks, and nothing else, put behind it. Messages of one kind
-/// one behind the other are one: lists go on. As most studies grow; no look at what is there.
-bool is_longer_by_blocks(const std::string& bytes, const std::string& longer) {
-  protocol::Recipe rest;
-  if (longer.size() <= bytes.size() || !longer.starts_with(bytes) ||
-      !rest.ParseFromString(longer.substr(bytes.size())) || rest.blocks_size() == 0) {
-    return false;
-  }
-  rest.clear_blocks();
-  return rest.ByteSizeLong() == 0;
-}
-
 }  // namespace
 
 StudyTable::StudyTable(std::shared_ptr<const protocol::PointTable> table)
-    : shared_(std::make_shared<Shared>(Shared{table->recipe().SerializeAsString(), table->size(),
-                                              nullptr, protocol::recipe_digest(table->recipe())})) {
+    : shared_(std::make_shared<Shared>(
+          Shared{table->recipe().SerializeAsString(), table->size(), nullptr})) {
   shared_->table = std::move(table);
 }
 
 StudyTable::StudyTable(std::string recipe_bytes, std::uint64_t points)
-    : shared_(std::make_shared<Shared>(Shared{std::move(recipe_bytes), points, nullptr, {}})) {}
+    : shared_(std::make_shared<Shared>(Shared{std::move(recipe_bytes), points, nullptr})) {}
 
 const std::shared_ptr<const protocol::PointTable>& StudyTable::get() const {
   if (shared_->table == nullptr) {
@@ -53,17 +40,7 @@ const std::shared_ptr<const protocol::PointTable>& StudyTable::get() const {
   return shared_->table;
 }
 
-const protocol::Sha256::Digest& StudyTable::digest() const {
-  if (!shared_->digest) {
-    shared_->digest = protocol::recipe_digest(parsed(shared_->recipe_bytes));
-  }
-  return *shared_->digest;
-}
-
 Growth StudyTable::growth_to(const StudyTable& other) const {
-  if (is_longer_by_blocks(recipe_bytes(), other.recipe_bytes())) {
-    return {Growth::Kind::kLonger, {}};
-  }
   const auto recipe_in = [](const StudyTable& table, protocol::Recipe& own) -> const auto& {
     return table.is_made() ? table.get()->recipe() : own = parsed(table.recipe_bytes());
   };
@@ -77,7 +54,7 @@ bool StudyTable::is_of_the_recipe_of(const StudyTable& other) const {
     return true;
   }
   try {
-    return size() == other.size() && digest() == other.digest();
+    return size() == other.size() && growth_to(other).kind == Growth::Kind::kSame;
   } catch (const std::runtime_error&) {
     return false;  // one of them cannot be read, or only by another version
   }

@@ -6,7 +6,6 @@
 #include <string>
 
 #include "proto/recipe/point_table.h"
-#include "proto/recipe/sha256.h"
 #include "server/study/recipe_growth.h"
 
 namespace oblique::server {
@@ -28,9 +27,8 @@ class StudyTable {
   /// oblique.protocol.Recipe, serialised.
   const std::string& recipe_bytes() const { return shared_->recipe_bytes; }
 
-  /// Whether both are of one recipe, however each was written. Costs a look at the bytes; where
-  /// they differ and the sizes do not, once for each table a pass over the recipe, as long as it
-  /// is.
+  /// Whether both have the same recipe; false when one cannot be read. Reads both if their bytes
+  /// differ and their sizes do not.
   bool is_of_the_recipe_of(const StudyTable& other) const;
 
   /// What another recipe is to this one. Costs in proportion to both. Throws std::runtime_error
@@ -51,10 +49,7 @@ class StudyTable {
     std::string recipe_bytes;
     std::uint64_t points;
     std::shared_ptr<const protocol::PointTable> table;
-    std::optional<protocol::Sha256::Digest> digest;  // of the canonical text, once it was asked for
   };
-  const protocol::Sha256::Digest& digest() const;
-
   std::shared_ptr<Shared> shared_;
 };
 

@@ -90,13 +90,19 @@ inline Block zipped(const std::vector<Axis>& axes) {
   return block;
 }
 
+inline Sample sample_of(SampleKind kind, std::uint64_t count, std::uint64_t seed = 1) {
+  Sample sample;
+  sample.set_kind(kind);
+  sample.set_count(count);
+  sample.set_seed(seed);
+  return sample;
+}
+
 /// A sample of `count` points.
 inline Block sampled(const std::vector<Axis>& axes, SampleKind kind, std::uint64_t count,
                      std::uint64_t seed = 1) {
   Block block = filtered(axes, "");
-  block.mutable_sample()->set_kind(kind);
-  block.mutable_sample()->set_count(count);
-  block.mutable_sample()->set_seed(seed);
+  *block.mutable_sample() = sample_of(kind, count, seed);
   return block;
 }
 

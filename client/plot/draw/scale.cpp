@@ -6,18 +6,14 @@
 #include <limits>
 #include <stdexcept>
 
-#include "proto/recipe/exact_math/exponentials.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client::plot {
 namespace {
 
-using exact_math::log10_of;
-using exact_math::pow_of;
-
 /// Exact up to 10^22, and the nearest double beyond.
 double power_of_ten(int exponent) {
-  return pow_of(10.0, exponent);
+  return std::pow(10.0, exponent);
 }
 
 /// An end that something can be reckoned with.
@@ -33,14 +29,14 @@ int exponent_for(double largest) {
   if (largest == 0.0 || (largest < kLong && largest >= kSmall)) {
     return 0;
   }
-  const int decade = static_cast<int>(std::floor(log10_of(largest) + 1e-9));
+  const int decade = static_cast<int>(std::floor(std::log10(largest) + 1e-9));
   return static_cast<int>(std::floor(decade / 3.0)) * 3;
 }
 
 /// The distance of ticks that gives about `wanted` in `length`.
 double step_for(double length, int wanted) {
   const double raw = length / std::max(wanted, 1);
-  const double decade = power_of_ten(static_cast<int>(std::floor(log10_of(raw))));
+  const double decade = power_of_ten(static_cast<int>(std::floor(std::log10(raw))));
   for (const double times : {1.0, 2.0, 5.0}) {
     if (times * decade >= raw * 0.999) {
       return times * decade;
@@ -55,7 +51,7 @@ Ticks linear_ticks(const Scale& scale, int wanted) {
   ticks.exponent = exponent_for(std::max(std::abs(scale.from()), std::abs(scale.to())));
   const double unit = power_of_ten(ticks.exponent);
   const int decimals =
-      std::clamp(-static_cast<int>(std::floor(log10_of(step / unit) + 1e-9)), 0, 17);
+      std::clamp(-static_cast<int>(std::floor(std::log10(step / unit) + 1e-9)), 0, 17);
   const double slack = step * 1e-6;
   const double first = std::ceil((scale.from() - slack) / step);
   for (int i = 0; i <= 200; ++i) {
@@ -85,8 +81,8 @@ constexpr std::array<Digits, 5> kDigits{{
 }};
 
 int labels_of(const Digits& digits, const Scale& scale) {
-  const int first = static_cast<int>(std::floor(log10_of(scale.from())));
-  const int last = static_cast<int>(std::ceil(log10_of(scale.to())));
+  const int first = static_cast<int>(std::floor(std::log10(scale.from())));
+  const int last = static_cast<int>(std::ceil(std::log10(scale.to())));
   int labels = 0;
   for (int decade = first; decade <= last; ++decade) {
     for (int digit = 1; digit <= 9; ++digit) {
@@ -114,9 +110,9 @@ Digits labelled_digits(const Scale& scale, double decades, int wanted) {
 }
 
 Ticks logarithmic_ticks(const Scale& scale, int wanted) {
-  const double decades = log10_of(scale.to()) - log10_of(scale.from());
-  const int first = static_cast<int>(std::floor(log10_of(scale.from())));
-  const int last = static_cast<int>(std::ceil(log10_of(scale.to())));
+  const double decades = std::log10(scale.to()) - std::log10(scale.from());
+  const int first = static_cast<int>(std::floor(std::log10(scale.from())));
+  const int last = static_cast<int>(std::ceil(std::log10(scale.to())));
   const int every = std::max(1, static_cast<int>(std::ceil(decades / std::max(wanted, 1))));
   const Digits labelled = labelled_digits(scale, decades, wanted);
   Ticks ticks;
@@ -164,13 +160,13 @@ Scale::Scale(double from, double to, bool is_logarithmic)
       to_ += half;
     }
   }
-  start_ = is_logarithmic ? log10_of(from_) : from_;
-  length_ = (is_logarithmic ? log10_of(to_) : to_) - start_;
+  start_ = is_logarithmic ? std::log10(from_) : from_;
+  length_ = (is_logarithmic ? std::log10(to_) : to_) - start_;
 }
 
 double Scale::share_of(double value) const {
   if (is_logarithmic_) {
-    return value > 0.0 && std::isfinite(value) ? (log10_of(value) - start_) / length_
+    return value > 0.0 && std::isfinite(value) ? (std::log10(value) - start_) / length_
                                                : std::numeric_limits<double>::quiet_NaN();
   }
   return std::isfinite(value) ? (value - start_) / length_
@@ -179,7 +175,7 @@ double Scale::share_of(double value) const {
 
 double Scale::value_at(double share) const {
   const double at = start_ + share * length_;
-  return is_logarithmic_ ? pow_of(10.0, at) : at;
+  return is_logarithmic_ ? std::pow(10.0, at) : at;
 }
 
 Range range_of(const std::vector<double>& values, bool positive_only) {

@@ -7,7 +7,6 @@
 
 #include "client/output/human_units.h"
 #include "client/plot/figures/charts.h"
-#include "proto/recipe/exact_math/exponentials.h"
 
 namespace oblique::client::plot {
 namespace {
@@ -37,7 +36,7 @@ int bins_for(const std::vector<double>& places, const Scale& scale) {
     shares.push_back(scale.share_of(value));
   }
   const double width = 2.0 * between_quartiles(std::move(shares)) /
-                       exact_math::pow_of(static_cast<double>(places.size()), 1.0 / 3.0);
+                       std::pow(static_cast<double>(places.size()), 1.0 / 3.0);
   constexpr double kFewest = 10.0;
   return static_cast<int>(
       std::clamp(width > 0.0 ? std::ceil(1.0 / width) : kFewest, kFewest, 1.0 * kMostBins));

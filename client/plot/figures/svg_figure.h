@@ -9,8 +9,7 @@
 
 namespace oblique::client::plot {
 
-/// The figure as an SVG document. Its bytes are the same on every machine, but for what zlib makes
-/// of the cells of a map.
+/// The figure as an SVG document.
 std::string svg_of(const Figure& figure, const Size& size = {});
 
 // For pictures of several figures.

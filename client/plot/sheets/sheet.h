@@ -27,8 +27,7 @@ struct Sheet {
 /// The size that its parts make together.
 Size usual_size(const Sheet& sheet);
 
-/// The sheet as an SVG document. What has no room in that height makes it higher. Bytes are the
-/// same on every machine for the same numbers.
+/// The sheet as an SVG document. What has no room in that height makes it higher.
 std::string svg_of(const Sheet& sheet, const Size& size);
 
 /// All panels in one figure, below each other: for tables, scripts and terminals.

@@ -28,9 +28,8 @@ constexpr std::size_t kDigits = 16;
 constexpr auto kFirstOfAll = static_cast<std::int32_t>(protocol::kHighestPriority);
 
 std::string name_of(const protocol::Recipe& recipe) {
-  protocol::Sha256 hash;
-  hash.add(recipe.SerializeAsString());
-  return std::string(kLookName) + protocol::hexadecimal(hash.digest()).substr(0, kDigits);
+  return std::string(kLookName) +
+         protocol::sha256_of(recipe.SerializeAsString()).substr(0, kDigits);
 }
 
 bool is_leaving(const protocol::StudyStatus& study) {

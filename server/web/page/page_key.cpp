@@ -1,7 +1,6 @@
 #include "server/web/page/page_key.h"
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <utility>
 
@@ -14,16 +13,13 @@ namespace oblique::server {
 namespace {
 
 std::string drawn_token() {
-  protocol::Sha256::Digest bytes{};
+  std::string bytes(32, '\0');
   randombytes_buf(bytes.data(), bytes.size());
-  return protocol::hexadecimal(bytes);
+  return protocol::sha256_of(bytes);
 }
 
 std::string cookie_of(const std::string& token) {
-  protocol::Sha256 hash;
-  hash.add("oblique's page: the cookie of this token\n");
-  hash.add(token);
-  return protocol::hexadecimal(hash.digest());
+  return protocol::sha256_of("oblique's page: the cookie of this token\n" + token);
 }
 
 /// In a time that does not tell how many characters are right.

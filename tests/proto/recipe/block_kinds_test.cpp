@@ -10,7 +10,6 @@
 
 #include "proto/recipe/axes.h"
 #include "proto/recipe/blocks.h"
-#include "proto/recipe/canonical.h"
 #include "proto/recipe/checks.h"
 #include "proto/recipe/keys.h"
 #include "proto/recipe/model_message.h"
@@ -272,7 +271,7 @@ TEST(BlockKindsTest, ExpressionsThatGoRoundInACircleOrAskForUnknownKeysAreRefuse
   EXPECT_THAT(with(following("E", "E * 2"), listed("k", {1e7})), HasSubstr("circle"));
   EXPECT_THAT(with(following("E", "muu * 2"), listed("k", {1e7})), HasSubstr("did you mean `mu`?"));
   EXPECT_THAT(with(following("E", "2 +"), listed("k", {1e7})),
-              HasSubstr("E = \"2 +\": it makes no expression"));
+              HasSubstr("E = \"2 +\": a value is missing"));
 }
 
 TEST(BlockKindsTest, AStudyHasABoundedNumberOfExpressions) {

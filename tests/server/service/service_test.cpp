@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "proto/recipe/axes.h"
 #include "tests/server/service/service_fixture.h"
 
 namespace oblique::server {
@@ -82,17 +81,14 @@ TEST_F(ServiceTest, TheSameStudyContinuesAndAnotherOfTheNameIsRefused) {
   EXPECT_THAT(last_reply().error().message(), HasSubstr("another name"));
 }
 
-TEST_F(ServiceTest, TheSamePointsWrittenInAnotherWayAreTheSameStudy) {
+TEST_F(ServiceTest, TheSameBlocksWrittenInAnotherWayAreTheSameStudy) {
   request(submit_request("a"));
   write_all();
   ClientRequest written = submit_request("a");
   auto& recipe = *written.mutable_submit()->mutable_recipe();
-  auto& mu = *recipe.mutable_blocks(0)->mutable_axes(1);
-  const protocol::Axis range = mu;
-  mu = protocol::listed("mu", {});
-  for (std::uint64_t i = 0; i < range.count(); ++i) {
-    mu.add_values(protocol::axis_value(range, i));
-  }
+  auto& H = *recipe.mutable_blocks(0)->mutable_axes(0);
+  ASSERT_EQ(H.values_size(), 1);
+  H = protocol::range("H", H.values(0), H.values(0), 1);
   request(written);
   EXPECT_FALSE(last_reply().submit().created());
   EXPECT_EQ(last_reply().submit().study_id(), 1U);

@@ -1,4 +1,4 @@
-#include "proto/recipe/sampling/sobol.h"
+#include "proto/recipe/sample.h"
 
 #include <cstdint>
 #include <set>
@@ -15,18 +15,16 @@ namespace {
 
 /// Digest of points in all dimensions, each coordinate times 2^64 in eight bytes, the least first.
 std::string digest_of_points(std::uint64_t first, std::uint64_t count) {
-  protocol::Sha256 sum;
+  std::string bytes;
   for (std::uint64_t index = first; index < first + count; ++index) {
     for (std::uint32_t dimension = 0; dimension < kSobolDimensions; ++dimension) {
       const std::uint64_t bits = sobol_bits(index, dimension) << (64 - kSobolBits);
-      std::string bytes;
       for (int shift = 0; shift < 64; shift += 8) {
         bytes += static_cast<char>((bits >> shift) & 0xff);
       }
-      sum.add(bytes);
     }
   }
-  return protocol::hexadecimal(sum.digest());
+  return protocol::sha256_of(bytes);
 }
 
 // The first ten points in three dimensions as Joe and Kuo print them.
@@ -49,13 +47,13 @@ TEST(SobolTest, TheFirstPointsAreThosePublished) {
   }
 }
 
-// Digests of what boost::random::sobol(128) of Boost 1.74 gives: it leaves out the origin, so its
+// Digests of what boost::random::sobol(32) of Boost 1.74 gives: it leaves out the origin, so its
 // point i is ours i + 1. The far ones are behind `seed(2^40 - 17)`.
 TEST(SobolTest, AllDimensionsAreThoseOfBoost) {
   EXPECT_EQ(digest_of_points(1, 4096),
-            "a6da69db7432f51835191b141bbeb507768235dc7319d6a59850347c173e0f28");
+            "9ec19155dfd8ef8b7ce1b7bd2e7c349bf4734b172ed36d96519d9b3f7f30f0dc");
   EXPECT_EQ(digest_of_points((std::uint64_t{1} << 40) - 16, 64),
-            "ef8c9e2ee567f3022021adbbfcac00e69ac41545e04836ea1978f319d6b59ce4");
+            "2e0a943ce4abbb8cde32391d7c06b0c91af8387eabb7ebe44375ae30c1f5111a");
 }
 
 TEST(SobolTest, ADimensionThatThereIsNotIsRefused) {

@@ -7,15 +7,16 @@
 
 #include <gtest/gtest.h>
 
-#include "proto/recipe/sampling/sample.h"
+#include "proto/recipe/sample.h"
+#include "tests/support/recipes.h"
 
 namespace oblique::sampling {
 namespace {
 
 /// Coordinates of the points of a sample, point after point.
-std::vector<double> points(const Sample& sample, std::uint32_t dimensions) {
+std::vector<double> points(const protocol::Sample& sample, std::uint32_t dimensions) {
   std::vector<double> all;
-  for (std::uint64_t index = 0; index < sample.count; ++index) {
+  for (std::uint64_t index = 0; index < sample.count(); ++index) {
     for (std::uint32_t d = 0; d < dimensions; ++d) {
       all.push_back(fraction(sample, d, index));
     }
@@ -50,11 +51,13 @@ double discrepancy_squared(const std::vector<double>& x, std::size_t dimensions)
 
 /// Mean of it over some seeds, relative to what independent points have on average:
 /// (2^-d - 3^-d) / n.
-double relative_discrepancy_squared(Kind kind, std::uint64_t count, std::uint32_t dimensions) {
+double relative_discrepancy_squared(protocol::SampleKind kind, std::uint64_t count,
+                                    std::uint32_t dimensions) {
   constexpr std::uint64_t kSeeds = 8;
   double sum = 0.0;
   for (std::uint64_t seed = 0; seed < kSeeds; ++seed) {
-    sum += discrepancy_squared(points({kind, count, seed}, dimensions), dimensions);
+    sum +=
+        discrepancy_squared(points(protocol::sample_of(kind, count, seed), dimensions), dimensions);
   }
   const double d = dimensions;
   const double random = (std::pow(2.0, -d) - std::pow(3.0, -d)) / static_cast<double>(count);
@@ -62,19 +65,19 @@ double relative_discrepancy_squared(Kind kind, std::uint64_t count, std::uint32_
 }
 
 TEST(DiscrepancyTest, RandomPointsAreAsUnevenAsChanceHasIt) {
-  EXPECT_NEAR(relative_discrepancy_squared(Kind::kRandom, 256, 3), 1.0, 0.4);
+  EXPECT_NEAR(relative_discrepancy_squared(protocol::SAMPLE_RANDOM, 256, 3), 1.0, 0.4);
 }
 
 // In one dimension strata leave 1/n of the square; in three they take away what each axis adds
 // alone.
 TEST(DiscrepancyTest, ALatinHypercubeIsMoreEven) {
-  EXPECT_LT(relative_discrepancy_squared(Kind::kLatinHypercube, 256, 1), 0.02);
-  EXPECT_LT(relative_discrepancy_squared(Kind::kLatinHypercube, 256, 3), 0.5);
+  EXPECT_LT(relative_discrepancy_squared(protocol::SAMPLE_LATIN_HYPERCUBE, 256, 1), 0.02);
+  EXPECT_LT(relative_discrepancy_squared(protocol::SAMPLE_LATIN_HYPERCUBE, 256, 3), 0.5);
 }
 
 TEST(DiscrepancyTest, SobolPointsAreMoreEvenStillAndGainWithTheirNumber) {
-  const double few = relative_discrepancy_squared(Kind::kSobol, 128, 3);
-  const double many = relative_discrepancy_squared(Kind::kSobol, 1024, 3);
+  const double few = relative_discrepancy_squared(protocol::SAMPLE_SOBOL, 128, 3);
+  const double many = relative_discrepancy_squared(protocol::SAMPLE_SOBOL, 1024, 3);
   EXPECT_LT(few, 0.1);
   EXPECT_LT(many, 0.02);
   EXPECT_LT(many, few / 3.0);
@@ -84,10 +87,10 @@ TEST(DiscrepancyTest, SobolPointsAreMoreEvenStillAndGainWithTheirNumber) {
 /// for every a. True of (0, 2)-sequences: dimensions 1 and 2 of Sobol's.
 TEST(DiscrepancyTest, EveryElementaryIntervalOfTheFirstTwoDimensionsHasOnePoint) {
   for (const int k : {1, 4, 10}) {
-    const Sample sample{Kind::kSobol, std::uint64_t{1} << k, 77};
+    const auto sample = protocol::sample_of(protocol::SAMPLE_SOBOL, std::uint64_t{1} << k, 77);
     for (int a = 0; a <= k; ++a) {
       std::vector<int> hits(std::size_t{1} << k, 0);
-      for (std::uint64_t i = 0; i < sample.count; ++i) {
+      for (std::uint64_t i = 0; i < sample.count(); ++i) {
         const auto column = static_cast<std::size_t>(std::ldexp(fraction(sample, 0, i), a));
         const auto row = static_cast<std::size_t>(std::ldexp(fraction(sample, 1, i), k - a));
         ++hits[(column << (k - a)) + row];
@@ -99,12 +102,12 @@ TEST(DiscrepancyTest, EveryElementaryIntervalOfTheFirstTwoDimensionsHasOnePoint)
 
 /// Largest number of points of 2^k in a box of volume 2^(t-k) less the 2^t that belong there, over
 /// all shapes of boxes.
-int excess(const Sample& sample, int k, std::uint32_t x, std::uint32_t y, int t) {
+int excess(const protocol::Sample& sample, int k, std::uint32_t x, std::uint32_t y, int t) {
   int worst = 0;
   const int digits = k - t;
   for (int a = 0; a <= digits; ++a) {
     std::vector<int> hits(std::size_t{1} << digits, 0);
-    for (std::uint64_t i = 0; i < sample.count; ++i) {
+    for (std::uint64_t i = 0; i < sample.count(); ++i) {
       const auto column = static_cast<std::size_t>(std::ldexp(fraction(sample, x, i), a));
       const auto row = static_cast<std::size_t>(std::ldexp(fraction(sample, y, i), digits - a));
       ++hits[(column << (digits - a)) + row];
@@ -119,7 +122,7 @@ int excess(const Sample& sample, int k, std::uint32_t x, std::uint32_t y, int t)
 TEST(DiscrepancyTest, EveryPairOfTheFirstTenDimensionsHasItsNumberInEveryElementaryInterval) {
   constexpr int kDigits = 10;
   constexpr int kT = 5;
-  const Sample sample{Kind::kSobol, std::uint64_t{1} << kDigits, 3};
+  const auto sample = protocol::sample_of(protocol::SAMPLE_SOBOL, std::uint64_t{1} << kDigits, 3);
   for (std::uint32_t x = 0; x < 10; ++x) {
     for (std::uint32_t y = x + 1; y < 10; ++y) {
       EXPECT_EQ(excess(sample, kDigits, x, y, kT), 0) << x << ", " << y;
@@ -130,9 +133,9 @@ TEST(DiscrepancyTest, EveryPairOfTheFirstTenDimensionsHasItsNumberInEveryElement
 // Any dimension alone is a (0, 1)-sequence, also from the middle of the sequence: each aligned run
 // of 2^k points has one in each stratum.
 TEST(DiscrepancyTest, EveryAlignedRunOfSobolPointsIsStratifiedInEachDimension) {
-  const Sample sample{Kind::kSobol, 4096, 11};
-  for (std::uint32_t d = 0; d < kMostDimensions; ++d) {
-    for (std::uint64_t first = 0; first < sample.count; first += 256) {
+  const auto sample = protocol::sample_of(protocol::SAMPLE_SOBOL, 4096, 11);
+  for (std::uint32_t d = 0; d < kSobolDimensions; ++d) {
+    for (std::uint64_t first = 0; first < sample.count(); first += 256) {
       std::vector<bool> hit(256, false);
       for (std::uint64_t i = first; i < first + 256; ++i) {
         hit[static_cast<std::size_t>(fraction(sample, d, i) * 256.0)] = true;

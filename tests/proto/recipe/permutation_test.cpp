@@ -1,4 +1,4 @@
-#include "proto/recipe/sampling/permutation.h"
+#include "proto/recipe/sample.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,0 +1,328 @@
+#include "proto/recipe/expression.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "proto/suggestion.h"
+#include "worker/solver/model/errors.h"
+
+namespace oblique::expressions {
+namespace {
+
+using solver::InputError;
+
+constexpr std::size_t kLongestQuoted = 40;
+
+/// A condition without a value must not pass for false, so NaN stays NaN.
+double truth(const double* x, bool value) {
+  return std::isnan(x[0]) || std::isnan(x[1]) ? std::numeric_limits<double>::quiet_NaN()
+                                              : static_cast<double>(value);
+}
+
+constexpr std::array<Function, 22> kFunctions{{
+    {"abs", 1, [](const double* x) { return std::abs(x[0]); }},
+    {"sqrt", 1, [](const double* x) { return std::sqrt(x[0]); }},
+    {"exp", 1, [](const double* x) { return std::exp(x[0]); }},
+    {"log", 1, [](const double* x) { return std::log(x[0]); }},
+    {"ln", 1, [](const double* x) { return std::log(x[0]); }},
+    {"log2", 1, [](const double* x) { return std::log2(x[0]); }},
+    {"log10", 1, [](const double* x) { return std::log10(x[0]); }},
+    {"sin", 1, [](const double* x) { return std::sin(x[0]); }},
+    {"cos", 1, [](const double* x) { return std::cos(x[0]); }},
+    {"tan", 1, [](const double* x) { return std::tan(x[0]); }},
+    {"asin", 1, [](const double* x) { return std::asin(x[0]); }},
+    {"acos", 1, [](const double* x) { return std::acos(x[0]); }},
+    {"atan", 1, [](const double* x) { return std::atan(x[0]); }},
+    {"sinh", 1, [](const double* x) { return std::sinh(x[0]); }},
+    {"cosh", 1, [](const double* x) { return std::cosh(x[0]); }},
+    {"tanh", 1, [](const double* x) { return std::tanh(x[0]); }},
+    {"floor", 1, [](const double* x) { return std::floor(x[0]); }},
+    {"ceil", 1, [](const double* x) { return std::ceil(x[0]); }},
+    {"round", 1, [](const double* x) { return std::round(x[0]); }},
+    {"min", 2, [](const double* x) { return std::isnan(x[0]) || x[0] < x[1] ? x[0] : x[1]; }},
+    {"max", 2, [](const double* x) { return std::isnan(x[0]) || x[0] > x[1] ? x[0] : x[1]; }},
+    {"if", 3, [](const double* x) { return std::isnan(x[0]) ? x[0]
+                                           : x[0] != 0.0    ? x[1]
+                                                            : x[2]; }},
+}};
+
+/// From the weakest. `not` and signs stand before one value.
+enum Priority { kOr = 1, kAnd, kNot, kComparison, kSum, kProduct, kSign, kPower };
+
+struct Operator {
+  std::string_view sign;
+  Priority priority;
+  double (*compute)(const double* x);
+};
+
+/// Between two values. The first that matches is taken, so `<=` stands before `<`.
+constexpr std::array<Operator, 15> kOperators{{
+    {"||", kOr, [](const double* x) { return truth(x, x[0] != 0.0 || x[1] != 0.0); }},
+    {"or", kOr, [](const double* x) { return truth(x, x[0] != 0.0 || x[1] != 0.0); }},
+    {"&&", kAnd, [](const double* x) { return truth(x, x[0] != 0.0 && x[1] != 0.0); }},
+    {"and", kAnd, [](const double* x) { return truth(x, x[0] != 0.0 && x[1] != 0.0); }},
+    {"<=", kComparison, [](const double* x) { return truth(x, x[0] <= x[1]); }},
+    {">=", kComparison, [](const double* x) { return truth(x, x[0] >= x[1]); }},
+    {"==", kComparison, [](const double* x) { return truth(x, x[0] == x[1]); }},
+    {"!=", kComparison, [](const double* x) { return truth(x, x[0] != x[1]); }},
+    {"<", kComparison, [](const double* x) { return truth(x, x[0] < x[1]); }},
+    {">", kComparison, [](const double* x) { return truth(x, x[0] > x[1]); }},
+    {"+", kSum, [](const double* x) { return x[0] + x[1]; }},
+    {"-", kSum, [](const double* x) { return x[0] - x[1]; }},
+    {"*", kProduct, [](const double* x) { return x[0] * x[1]; }},
+    {"/", kProduct, [](const double* x) { return x[0] / x[1]; }},
+    {"^", kPower, [](const double* x) { return std::pow(x[0], x[1]); }},
+}};
+
+bool is_digit(char c) {
+  return c >= '0' && c <= '9';
+}
+bool begins_name(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_';
+}
+
+/// The name at the start of `text`, or an empty text.
+std::string_view name_at(std::string_view text) {
+  if (text.empty() || !begins_name(text[0])) {
+    return {};
+  }
+  const auto* end = std::find_if_not(text.begin(), text.end(),
+                                     [](char c) { return begins_name(c) || is_digit(c); });
+  return text.substr(0, static_cast<std::size_t>(end - text.begin()));
+}
+
+[[noreturn]] void throw_foreign(char c) {
+  if (c == '=') {
+    throw InputError("`=` is no operator: `==` compares, and nothing is assigned");
+  }
+  if (c == '?') {
+    throw InputError("`?` means nothing in it: write if(e > 0.5, 0.4, 0.6) to choose");
+  }
+  throw InputError(c > ' ' && c <= '~' ? fmt::format("`{}` means nothing in it", c)
+                                       : "it has a character that means nothing in it");
+}
+
+}  // namespace
+
+/// Precedence climbing. Each function appends the steps of what it reads.
+class Expression::Parser {
+ public:
+  Parser(std::string_view text, Expression& to) : rest_(text), to_(to) {}
+
+  void read() {
+    if (next() == '\0') {
+      throw InputError("it is empty");
+    }
+    read_operations(kOr);
+    if (next() == ')') {
+      throw InputError("it has a closing bracket without an opening one");
+    }
+    if (next() == ',') {
+      throw InputError("it is a list of values: `,` stands between the arguments of a function");
+    }
+  }
+
+ private:
+  /// The next character that is no space, or 0 at the end.
+  char next() {
+    rest_.remove_prefix(std::min(rest_.find_first_not_of(" \t"), rest_.size()));
+    return rest_.empty() ? '\0' : rest_[0];
+  }
+  bool take(char c) {
+    const bool is_next = next() == c;
+    rest_.remove_prefix(is_next ? 1 : 0);
+    return is_next;
+  }
+
+  /// The operator that follows a value; null at a bracket, a comma or the end.
+  const Operator* next_operator() {
+    const char c = next();
+    const std::string_view word = name_at(rest_);
+    const auto* found = std::find_if(kOperators.begin(), kOperators.end(), [&](const auto& o) {
+      return word.empty() ? rest_.starts_with(o.sign) : word == o.sign;
+    });
+    if (found != kOperators.end()) {
+      return found;
+    }
+    if (c == '\0' || c == ')' || c == ',') {
+      return nullptr;
+    }
+    if (!word.empty() || is_digit(c) || c == '.' || c == '(' || c == '!') {
+      const std::string_view what = word.empty() ? rest_.substr(0, 1) : word;
+      throw InputError(
+          fmt::format("an operator is missing before `{}`", what.substr(0, kLongestQuoted)));
+    }
+    throw_foreign(c);
+  }
+
+  /// A value and all operations behind it that bind at least as strongly as `weakest`.
+  void read_operations(int weakest) {
+    read_value(weakest);
+    bool is_compared = false;
+    for (const Operator* op = next_operator(); op != nullptr && op->priority >= weakest;
+         op = next_operator()) {
+      if (op->priority == kComparison && is_compared) {
+        throw InputError("a comparison is of two values: write a < b && b < c");
+      }
+      is_compared = op->priority == kComparison;
+      rest_.remove_prefix(op->sign.size());
+      read_operations(op->priority == kPower ? kPower : op->priority + 1);
+      to_.steps_.push_back({op->compute, 2});
+    }
+  }
+
+  void read_value(int weakest) {
+    const char c = next();
+    const std::string_view word = name_at(rest_);
+    if (is_digit(c) || c == '.') {
+      read_number();
+    } else if (take('(')) {
+      read_nested(kOr);
+      close();
+    } else if (take('-')) {
+      read_nested(kSign);
+      to_.steps_.push_back({[](const double* x) { return -*x; }, 1});
+    } else if (take('+')) {
+      read_nested(kSign);
+    } else if ((c == '!' && !rest_.starts_with("!=")) || word == "not") {
+      if (weakest > kNot) {
+        throw InputError("`not` needs brackets where an operator stands before it");
+      }
+      rest_.remove_prefix(std::max<std::size_t>(word.size(), 1));
+      read_nested(kNot);
+      to_.steps_.push_back({[](const double* x) { return std::isnan(*x) ? *x : *x == 0.0; }, 1});
+    } else if (word.empty() || word == "and" || word == "or") {
+      throw_no_value(c, word);
+    } else {
+      read_name(word);
+    }
+  }
+
+  [[noreturn]] void throw_no_value(char c, std::string_view word) const {
+    if (c == '\0') {
+      throw InputError("a value is missing at its end");
+    }
+    if (word.empty() && std::string_view("<>!&|*/^),").find(c) == std::string_view::npos) {
+      throw_foreign(c);
+    }
+    throw InputError(
+        fmt::format("a value is missing before `{}`", word.empty() ? rest_.substr(0, 1) : word));
+  }
+
+  void read_nested(int weakest) {
+    if (++depth_ > kDeepestNesting) {
+      throw InputError(fmt::format("its brackets and signs stand more than {} deep in each other",
+                                   kDeepestNesting));
+    }
+    read_operations(weakest);
+    --depth_;
+  }
+
+  void close() {
+    if (!take(')')) {
+      throw InputError(next() == ',' ? "`,` stands only between the arguments of a function"
+                                     : "a bracket is open at its end");
+    }
+  }
+
+  void read_number() {
+    double value = 0.0;
+    const auto [end, error] = std::from_chars(rest_.data(), rest_.data() + rest_.size(), value);
+    if (error != std::errc() || !std::isfinite(value)) {
+      throw InputError("it has a number that cannot be read");
+    }
+    rest_.remove_prefix(static_cast<std::size_t>(end - rest_.data()));
+    if (!rest_.empty() && (begins_name(rest_[0]) || is_digit(rest_[0]) || rest_[0] == '.')) {
+      throw InputError("a number runs into what follows it: put an operator or a space between");
+    }
+    to_.steps_.push_back({nullptr, 0, value});
+  }
+
+  void read_name(std::string_view name) {
+    rest_.remove_prefix(name.size());
+    const auto* function = std::find_if(kFunctions.begin(), kFunctions.end(),
+                                        [&](const Function& f) { return f.name == name; });
+    if (take('(')) {
+      if (function == kFunctions.end()) {
+        const auto known = function_names();
+        throw InputError(fmt::format("there is no function `{}`{}; there are {}",
+                                     name.substr(0, kLongestQuoted),
+                                     protocol::did_you_mean(name, known), protocol::joined(known)));
+      }
+      read_arguments(*function);
+    } else if (function != kFunctions.end()) {
+      throw InputError(fmt::format("`{}` is a function: its arguments stand in brackets", name));
+    } else if (name == "pi") {
+      to_.steps_.push_back({nullptr, 0, std::numbers::pi});
+    } else {
+      const auto found = std::find(to_.names_.begin(), to_.names_.end(), name);
+      to_.steps_.push_back({nullptr, 0, 0.0, static_cast<std::size_t>(found - to_.names_.begin())});
+      if (found == to_.names_.end()) {
+        to_.names_.emplace_back(name);
+      }
+    }
+  }
+
+  void read_arguments(const Function& function) {
+    std::size_t count = 0;
+    if (next() != ')') {
+      do {
+        read_nested(kOr);
+        ++count;
+      } while (take(','));
+    }
+    close();
+    if (count != function.arguments) {
+      throw InputError(fmt::format("`{}` takes {} argument{} and has {}", function.name,
+                                   function.arguments, function.arguments == 1 ? "" : "s", count));
+    }
+    to_.steps_.push_back({function.compute, function.arguments});
+  }
+
+  std::string_view rest_;
+  Expression& to_;
+  std::size_t depth_ = 0;
+};
+
+std::span<const Function> functions() {
+  return kFunctions;
+}
+
+std::vector<std::string_view> function_names() {
+  std::vector<std::string_view> names;
+  for (const Function& function : kFunctions) {
+    names.push_back(function.name);
+  }
+  return names;
+}
+
+Expression::Expression(std::string_view text) {
+  if (text.size() > kLongestText) {
+    throw InputError(fmt::format("it has {} bytes, more than {}", text.size(), kLongestText));
+  }
+  Parser(text, *this).read();
+  stack_.resize(steps_.size());
+}
+
+double Expression::value_at(std::span<const double> values) {
+  double* end = stack_.data();
+  for (const Step& step : steps_) {
+    if (step.compute != nullptr) {
+      end -= step.arguments;
+      *end = step.compute(end);
+    } else {
+      *end = step.index == kNoName ? step.number : values[step.index];
+    }
+    ++end;
+  }
+  const double value = stack_.front();
+  return std::isnan(value) ? std::numeric_limits<double>::quiet_NaN() : value;  // without a sign
+}
+
+}  // namespace oblique::expressions

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+
+#include "proto/oblique.pb.h"
+
+// Points of the unit cube, each a function of its number alone.
+namespace oblique::sampling {
+
+inline constexpr std::uint64_t kMostPoints = std::uint64_t{1} << 44;
+inline constexpr std::uint32_t kSobolDimensions = 32;
+inline constexpr int kSobolBits = 52;
+
+/// Coordinate `dimension` of point `index`, in (0, 1): independent, one in each of `count` equal
+/// strata (Latin hypercube), or Sobol's sequence with Owen's scrambling. Takes the same time for
+/// any index and count. Throws std::out_of_range for a dimension or point outside the sample.
+double fraction(const protocol::Sample& sample, std::uint32_t dimension, std::uint64_t index);
+
+/// Number `index` of the sequence of `key` by SplitMix64 (Steele, Lea and Flood, Fast splittable
+/// pseudorandom number generators, 2014), computed without the numbers before it.
+std::uint64_t hashed(std::uint64_t key, std::uint64_t index);
+
+/// Image of `i` < `n` under a permutation of 0 ... n-1 that `key` chooses. Uses no list.
+std::uint64_t permuted(std::uint64_t i, std::uint64_t n, std::uint64_t key);
+
+/// Value `index` < 2^52 of Sobol's sequence in one dimension, times 2^52, in the order of the Gray
+/// code. Throws std::out_of_range for a dimension of `kSobolDimensions` or more.
+std::uint64_t sobol_bits(std::uint64_t index, std::uint32_t dimension);
+
+/// `bits` after nested uniform scrambling (A. B. Owen, Randomly permuted (t,m,s)-nets and
+/// (t,s)-sequences, 1995): each digit is flipped or not by a bit drawn for the digits before it, so
+/// every elementary interval of base 2 keeps its number of points.
+std::uint64_t owen_scrambled(std::uint64_t bits, std::uint64_t key);
+
+}  // namespace oblique::sampling
