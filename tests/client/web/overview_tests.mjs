@@ -168,7 +168,7 @@ test("the command of a form makes the study that the form starts: model, sample,
 /** A server with many studies, whose events are what a test tells. */
 const many_studies = () => {
   const real = window.fetch;
-  window.all = Array.from({ length: 450 }, (_, i) => ({ id: i + 1, name: `study-${i + 1}`, state: "done", points: 10, solved: 10, failed: 0, points_per_s: 0, left_s: null,
+  window.all = Array.from({ length: 450 }, (_, i) => ({ id: i + 1, name: `study-${i + 1}`, state: "done", points: 10, solved: 10, failed: 0, left_out: 0, points_per_s: 0, left_s: null,
     waits_for: "", priority: 0, created_at: "", submitted_by: "" }));
   window.fetch = (path, given) => {
     const url = new URL(path, location.href);
