@@ -8,4 +8,4 @@ runs <- dbGetQuery(database, "
   GROUP BY H, mu ORDER BY H, mu")
 dbDisconnect(database)
 cat("H,mu,fn_peak_N\n")
-cat(sprintf("%.15g,%.15g,%.15g\n", runs$H, runs$mu, runs$fn_peak_N), sep = "")
+cat(sprintf("%.17g,%.17g,%.17g\n", runs$H, runs$mu, runs$fn_peak_N), sep = "")

@@ -36,6 +36,7 @@ struct Example {
   std::string name;
   std::vector<std::string> command;
   std::string needs;
+  double relative_error = 0.0;  ///< of the numbers that it prints
 };
 
 class Examples : public testing::TestWithParam<Example> {};
@@ -58,7 +59,14 @@ TEST_P(Examples, ReadTheNumbersThatTheClientPrints) {
   const Outcome outcome =
       Process(folder, command.front(), {command.begin() + 1, command.end()}).outcome();
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_EQ(numbers_of(outcome.out), expected);
+  const Rows found = numbers_of(outcome.out);
+  ASSERT_EQ(found.size(), expected.size());
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    ASSERT_EQ(found[i].size(), expected[i].size());
+    for (std::size_t j = 0; j < expected[i].size(); ++j) {
+      EXPECT_NEAR(found[i][j], expected[i][j], GetParam().relative_error * expected[i][j]);
+    }
+  }
 }
 
 const std::string kExamples = OBLIQUE_EXAMPLES;
@@ -68,7 +76,8 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(Example{"Shell",
                             {"/usr/bin/sqlite3", "-readonly", "grid.db",
                              ".read '" + kExamples + "/forces.sql'"},
-                            "test -x /usr/bin/sqlite3"},
+                            "test -x /usr/bin/sqlite3",
+                            1e-14},  // the shell prints 15 digits
                     Example{"Python",
                             {"/usr/bin/python3", kExamples + "/forces.py", "grid.db"},
                             "/usr/bin/python3 -c 'import sqlite3'"},

@@ -249,7 +249,7 @@ TEST_F(PageAnswersTest, APointHasItsInputsAndWhereItsRowComesFrom) {
   submit_grid();
   const json before = page_.json("/api/studies/1/points/3");
   EXPECT_EQ(before["row"], nullptr);
-  EXPECT_EQ(before["mu"], 0.6 / 3.0);
+  EXPECT_EQ(before["mu"], 0.2);
   solve(24);
   const json after = page_.json("/api/studies/1/points/3");
   EXPECT_EQ(after["row"]["status"], "solved");
