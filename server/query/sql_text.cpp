@@ -82,6 +82,9 @@ SqlToken first_token(std::string_view rest) {
   const char c = rest.front();
   const char next = rest.size() > 1 ? rest[1] : '\0';
   refuse_character(c, next);
+  if (rest.starts_with("\xEF\xBB\xBF")) {
+    throw NotSqlPart("it has a byte-order mark");  // SQLite would read it as a space
+  }
   if (c == '\'') {
     return {Kind::kLiteral, rest.substr(0, quoted_length(rest, 0, c))};
   }

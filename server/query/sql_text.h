@@ -26,7 +26,8 @@ class NotSqlPart : public std::runtime_error {
 };
 
 /// Splits `text` into tokens as SQLite does. Throws NotSqlPart for a comment, a parameter, a
-/// semicolon, a zero byte, or a quote that is not closed. The tokens point into `text`.
+/// semicolon, a zero byte, a byte-order mark, or a quote that is not closed. The tokens point into
+/// `text`.
 std::vector<SqlToken> sql_tokens(std::string_view text);
 
 /// Whether SQLite takes two names for the same: it ignores case in ASCII.

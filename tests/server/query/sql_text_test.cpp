@@ -119,6 +119,7 @@ TEST(SqlText, NothingReachesBeyondItsPart) {
         << text;
   }
   EXPECT_THAT(objection(std::string("mu\0> 1", 6)), HasSubstr("zero byte"));
+  EXPECT_THAT(objection("mu > 1 AND \xEF\xBB\xBFmu"), HasSubstr("byte-order mark"));
   for (const char* text : {"mu FROM runs", "mu,", ",mu", "mu,,e", "mu --"}) {
     EXPECT_THAT(objection(text, SqlPart::kColumns), HasSubstr("must be columns or")) << text;
   }
