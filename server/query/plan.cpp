@@ -15,6 +15,7 @@
 #include "server/query/columns.h"
 #include "server/query/elements.h"
 #include "server/query/point_ranges.h"
+#include "server/query/query_rules.h"
 #include "server/query/question.h"
 #include "server/query/sql_functions.h"
 #include "server/query/sql_text.h"
@@ -126,6 +127,21 @@ Names names_in(std::string_view text) {
   return names;
 }
 
+/// What is read as `runs`, and what is added to its condition. SQLite finds failed points by their
+/// index only if it is told to, for it does not know that they are few.
+std::pair<std::string, std::string> table_of(const std::string& where, const QueriedStudy& study,
+                                             bool is_in_results) {
+  if (!wants_only_failed(where)) {
+    return {is_in_results ? "results AS runs" : "runs AS runs", ""};
+  }
+  if (is_in_results) {
+    return {"results AS runs INDEXED BY failed_points", " AND runs.error IS NOT NULL"};
+  }
+  return {"runs AS runs", fmt::format(" AND runs.point IN (SELECT point FROM results INDEXED BY "
+                                      "failed_points WHERE study_id = {} AND error IS NOT NULL)",
+                                      study.study_id)};
+}
+
 /// The rows of a study in `ranges`, with the columns that `text` names. They come from the table
 /// `results` if it has all of these: looking up model and worker of each row takes time.
 std::string rows_of(sqlite3* database, const protocol::StudyQuery& question,
@@ -165,13 +181,23 @@ std::string rows_of(sqlite3* database, const protocol::StudyQuery& question,
                 "stored.point = runs.point)";
   add(kStoredPhases, fmt::format(fmt::runtime(list_of), "phases"));
   add(kStoredFtPeaks, fmt::format(fmt::runtime(list_of), "ft_peaks"));
-  return fmt::format("(SELECT {} FROM {}{} AS runs WHERE runs.study_id = {} AND {})", selected,
-                     join_of(ranges), has_all ? "results" : "runs", study.study_id,
-                     condition_of(ranges, study.recipe));
+  const auto [table, condition] = table_of(question.where(), study, has_all);
+  return fmt::format("(SELECT {} FROM {}{} WHERE runs.study_id = {} AND {}{})", selected,
+                     join_of(ranges), table, study.study_id, condition_of(ranges, study.recipe),
+                     condition);
 }
 
-/// Whether rows are asked for in rising order of their points.
+/// Whether rows come in the order that is asked for if they are read by rising point.
 bool is_in_point_order(const protocol::StudyQuery& question) {
+  const std::string selected = selected_by(question);
+  const auto selected_tokens = sql_tokens(selected);
+  // A window function sorts the rows, and an alias `point` is what ORDER BY means.
+  if (std::ranges::any_of(selected_tokens,
+                          [](const auto& each) { return is_word(each, "over"); }) ||
+      std::ranges::any_of(aliases_in(selected),
+                          [](const auto& alias) { return same_but_case(alias, "point"); })) {
+    return false;
+  }
   const auto tokens = sql_tokens(question.order());
   return question.group().empty() &&
          (tokens.empty() ||
@@ -180,7 +206,8 @@ bool is_in_point_order(const protocol::StudyQuery& question) {
 }
 
 std::string statement_of(sqlite3* database, const protocol::StudyQuery& question,
-                         const QueriedStudy& study, const Names& columns) {
+                         const QueriedStudy& study, const Names& columns,
+                         const std::vector<PointRange>& ranges) {
   const std::string selected = columns_in_sqlite(selected_by(question), columns);
   const std::string where =
       question.where().empty() ? "" : fmt::format(" WHERE ({})", in_sqlite(question.where()));
@@ -188,7 +215,6 @@ std::string statement_of(sqlite3* database, const protocol::StudyQuery& question
   const std::string order = !question.order().empty() ? in_sqlite(question.order())
                             : group.empty()           ? "point"
                                                       : group;
-  const auto ranges = point_ranges(study.recipe, question.where());
   // The study is chosen in the subquery, where no condition can reach another one.
   std::string statement =
       fmt::format("SELECT {} FROM {}{}", selected,
@@ -329,7 +355,14 @@ Plan plan(sqlite3* database, protocol::StudyQuery question) {
   select_usual(question, study.recipe);
   const Names columns = columns_of_rows(database);
   check_columns(question, columns);
-  Plan plan{statement_of(database, question, study, columns), {}};
+  auto ranges = point_ranges(study.recipe, question.where());
+  if (ranges.size() > 1 && wants_only_failed(question.where())) {
+    ranges = hull(ranges);  // the index of failed points restricts more
+  }
+  Plan plan{statement_of(database, question, study, columns, ranges), {}};
+  if (plan.statement.size() > kLongestSql && ranges.size() > 1) {
+    plan.statement = statement_of(database, question, study, columns, hull(ranges));
+  }
   try {
     plan.columns = with_units(columns_of(database, plan.statement), selected_by(question));
   } catch (const solver::InputError& error) {

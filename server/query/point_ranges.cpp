@@ -93,13 +93,13 @@ Restriction between(Tokens tokens) {
                                               number_in({middle + 1, bounds.end()}));
 }
 
-/// Intersects `intervals` with those of the comparisons that `tokens` join with AND.
-void restrict_by(Tokens tokens, int depth, Intervals& intervals) {
+/// Adds to `all` the conditions that `tokens` join with AND, as far as this is clear.
+void add_conjuncts(Tokens tokens, int depth, std::vector<Tokens>& all) {
   if (depth > kDeepest || tokens.empty()) {
     return;
   }
   if (tokens[0].is_sign('(') && closing_bracket(tokens, 0) == tokens.size() - 1) {
-    restrict_by(tokens.subspan(1, tokens.size() - 2), depth + 1, intervals);
+    add_conjuncts(tokens.subspan(1, tokens.size() - 2), depth + 1, all);
     return;
   }
   std::vector<Tokens> parts;
@@ -121,9 +121,24 @@ void restrict_by(Tokens tokens, int depth, Intervals& intervals) {
   }
   for (const Tokens part : parts) {
     if (parts.size() > 1 && !part.empty() && part[0].is_sign('(')) {
-      restrict_by(part, depth + 1, intervals);
-      continue;
+      add_conjuncts(part, depth + 1, all);
+    } else {
+      all.push_back(part);
     }
+  }
+}
+
+std::vector<Tokens> conjuncts_of(Tokens tokens) {
+  std::vector<Tokens> all;
+  add_conjuncts(tokens, 0, all);
+  return all;
+}
+
+/// The intervals to which a condition restricts columns.
+Intervals intervals_of(std::string_view condition) {
+  const auto tokens = sql_tokens(condition);
+  Intervals intervals;
+  for (const Tokens part : conjuncts_of(tokens)) {
     const auto found =
         part.size() > 2 && is_word(part[1], "between") ? between(part) : comparison(part);
     if (found) {
@@ -131,6 +146,7 @@ void restrict_by(Tokens tokens, int depth, Intervals& intervals) {
       known = {std::max(known.low, found->second.low), std::min(known.high, found->second.high)};
     }
   }
+  return intervals;
 }
 
 /// The interval to which an axis is restricted; nullptr: none, or the axis alone does not decide.
@@ -168,11 +184,6 @@ std::optional<PointRange> numbers_in(const protocol::Axis& axis, const Interval&
     }
   }
   return found;
-}
-
-/// One range around all.
-Ranges hull(const Ranges& ranges) {
-  return {{ranges.front().first, ranges.back().last}};
 }
 
 /// Ranges of a block's points, numbered from 0. A product is built from its fastest axis outwards.
@@ -228,10 +239,21 @@ Ranges clipped(const Ranges& ranges, const Interval& interval) {
 
 }  // namespace
 
-std::vector<PointRange> point_ranges(const protocol::Recipe& recipe, std::string_view condition) {
+std::vector<PointRange> hull(const std::vector<PointRange>& ranges) {
+  return {{ranges.front().first, ranges.back().last}};
+}
+
+bool wants_only_failed(std::string_view condition) {
   const auto tokens = sql_tokens(condition);
-  Intervals intervals;
-  restrict_by(tokens, 0, intervals);
+  const auto parts = conjuncts_of(tokens);
+  return std::ranges::any_of(parts, [](Tokens part) {
+    return part.size() == 4 && is_word(part[0], "error") && is_word(part[1], "is") &&
+           is_word(part[2], "not") && is_word(part[3], "null");
+  });
+}
+
+std::vector<PointRange> point_ranges(const protocol::Recipe& recipe, std::string_view condition) {
+  const Intervals intervals = intervals_of(condition);
   Ranges ranges;
   std::uint64_t points = 0;
   for (const protocol::Block& block : recipe.blocks()) {

@@ -23,6 +23,13 @@ struct PointRange {
 /// check_sql_part; empty: all points.
 std::vector<PointRange> point_ranges(const protocol::Recipe& recipe, std::string_view condition);
 
+/// One range around all; there is at least one.
+std::vector<PointRange> hull(const std::vector<PointRange>& ranges);
+
+/// Whether `condition` is `error IS NOT NULL`, or joins this with others by AND. `condition` passed
+/// check_sql_part.
+bool wants_only_failed(std::string_view condition);
+
 /// Number of points of a recipe, filters ignored; 0 if an axis has no value. Throws
 /// solver::InputError for a block of more points than a study may have.
 std::uint64_t points_of(const protocol::Recipe& recipe);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,7 @@ namespace oblique::server {
 namespace {
 
 using testing::AllOf;
+using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -94,6 +96,16 @@ class PlanTest : public testing::Test {
   }
   std::vector<std::string> texts(const protocol::StudyQuery& asked) const {
     return texts(plan(database_.get(), asked).statement);
+  }
+  /// What SQLite does for a question.
+  std::vector<std::string> steps_of(const protocol::StudyQuery& asked) const {
+    Statement explained(database_.get(),
+                        "EXPLAIN QUERY PLAN " + plan(database_.get(), asked).statement);
+    std::vector<std::string> steps;
+    while (explained.step()) {
+      steps.push_back(explained.text(3));
+    }
+    return steps;
   }
   double number(const protocol::StudyQuery& asked) const {
     Statement statement(database_.get(), plan(database_.get(), asked).statement);
@@ -328,10 +340,64 @@ TEST_F(PlanTest, OnlyQueriesThatNameAModelOrWorkerReadTheirTables) {
 }
 
 TEST_F(PlanTest, PointsThatAConditionNamesAreLookedUp) {
-  const auto asked = question("fn_peak_N", "point IN (3, 1)");
-  Statement steps(database_.get(), "EXPLAIN QUERY PLAN " + plan(database_.get(), asked).statement);
-  ASSERT_TRUE(steps.step());
-  EXPECT_THAT(steps.text(3), HasSubstr("(study_id=? AND point=?)"));
+  const auto steps = steps_of(question("fn_peak_N", "point IN (3, 1)"));
+  EXPECT_THAT(steps, Contains(HasSubstr("(study_id=? AND point=?)")));
+}
+
+TEST_F(PlanTest, FailedPointsAreLookedUp) {
+  const auto is_by_index = AllOf(HasSubstr("USING"), HasSubstr("INDEX failed_points (study_id=?"));
+  const std::string failed = "error IS NOT NULL";
+  EXPECT_THAT(steps_of(question("point, error", failed)), ElementsAre(is_by_index));
+  EXPECT_THAT(steps_of(question("count(*)", "mu > 0 AND " + failed)), ElementsAre(is_by_index));
+  EXPECT_THAT(steps_of(question("point, links", failed)), Contains(is_by_index));
+  for (const char* select : {"point", "point, links", "point || error", "point, peaks.count"}) {
+    const auto failed_points = texts(of_other(question(select, "mu > 0 AND " + failed)));
+    ASSERT_EQ(failed_points.size(), 1U) << select;
+    EXPECT_THAT(failed_points[0], testing::StartsWith("4")) << select;
+  }
+  EXPECT_THAT(texts(question("point", failed)), IsEmpty());
+}
+
+/// Study "grid" has four heights and twenty frictions, all solved; the first friction is that of
+/// points 0, 20, 40 and 60, which are several ranges.
+class PlanOfRangesTest : public PlanTest {
+ protected:
+  PlanOfRangesTest() {
+    database_.reset();
+    const auto grid = std::make_shared<const protocol::PointTable>(
+        protocol::recipe_of({{protocol::listed("H", {0.7, 0.8, 0.9, 1.0}),
+                              protocol::range("mu", 0.0, 1.9, 20), protocol::listed("e", {1})}}));
+    AddResults all{3, grid, 0, "", "", 1, "now", {}};
+    for (std::uint64_t point = 0; point < grid->size(); ++point) {
+      all.results.push_back(solved_point(point, *grid));
+    }
+    Store(path_).commit(
+        std::vector<Change>{AddStudy{3, "grid", grid, "2024-01-03T00:00:00.000Z"}, all});
+    open();
+  }
+  static protocol::StudyQuery of_ranges(const std::string& select, const std::string& more = {}) {
+    auto asked = question(select, "mu < 0.05" + more);
+    asked.set_study("grid");
+    return asked;
+  }
+};
+
+TEST_F(PlanOfRangesTest, RowsOfRangesAreSortedOnlyWhereTheyNeedIt) {
+  EXPECT_THAT(texts(of_ranges("point")), ElementsAre("0", "20", "40", "60"));
+  EXPECT_THAT(steps_of(of_ranges("point")), Not(Contains(HasSubstr("ORDER BY"))));
+  EXPECT_THAT(texts(of_ranges("point, row_number() OVER (ORDER BY point DESC)")),
+              ElementsAre("0", "20", "40", "60"));
+  EXPECT_THAT(texts(of_ranges("-point AS point")), ElementsAre("-60", "-40", "-20", "0"));
+}
+
+TEST_F(PlanOfRangesTest, RangesThatWouldMakeAStatementTooLongAreOne) {
+  const auto with_text = [&](std::size_t letters) {
+    return of_ranges("point", " AND mode <> '" + std::string(letters, 'x') + "'");
+  };
+  const std::size_t others = plan(database_.get(), with_text(0)).statement.size();
+  const auto longest = with_text(kLongestSql + 1 - others);
+  EXPECT_LT(plan(database_.get(), longest).statement.size(), kLongestSql);
+  EXPECT_THAT(texts(longest), ElementsAre("0", "20", "40", "60"));
 }
 
 TEST_F(PlanTest, UnitsFollowFromThoseOfColumns) {

@@ -73,6 +73,20 @@ TEST(PointRanges, NumbersOfPointsAreCompared) {
   EXPECT_EQ(ranges("point < -1"), Ranges());
 }
 
+TEST(PointRanges, AConditionWantsOnlyFailedPointsIfAndJoinsThatToOthers) {
+  for (const char* condition : {"error IS NOT NULL", "(error is not null)",
+                                "mu BETWEEN 0 AND 1 AND ((error IS NOT NULL) AND e = 1)"}) {
+    EXPECT_TRUE(wants_only_failed(condition)) << condition;
+  }
+  for (const char* condition :
+       {"", "error IS NULL", "NOT error IS NOT NULL", "mu > 1 OR error IS NOT NULL",
+        "(mu > 1 OR error IS NOT NULL) AND e = 1", "(error IS NOT NULL) = 0",
+        "mu BETWEEN 0 AND error IS NOT NULL", "CASE WHEN 1 AND error IS NOT NULL THEN 1 END",
+        "'error' IS NOT NULL", "e + error IS NOT NULL"}) {
+    EXPECT_FALSE(wants_only_failed(condition)) << condition;
+  }
+}
+
 TEST(PointRanges, OfHugeStudiesAreFew) {
   const auto recipe = protocol::recipe_of(
       {{range("H", 0.1, 1.0, 10'000), range("mu", 0.0, 1.0, 10'001), range("e", 0.1, 1.0, 9'999)}});
