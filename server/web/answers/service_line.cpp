@@ -42,6 +42,7 @@ void ServiceLine::ask(std::uint64_t number, protocol::ClientRequest request) {
 }
 
 std::optional<protocol::ClientReply> ServiceLine::reply(std::uint64_t number) {
+  decode_frames();
   const std::lock_guard lock(mutex_);
   return next_reply(number);
 }
@@ -49,30 +50,53 @@ std::optional<protocol::ClientReply> ServiceLine::reply(std::uint64_t number) {
 std::optional<protocol::ClientReply> ServiceLine::wait_for_reply(
     std::uint64_t number, std::chrono::milliseconds timeout) {
   const auto until = std::chrono::steady_clock::now() + timeout;
-  std::unique_lock lock(mutex_);
   while (true) {
-    if (auto reply = next_reply(number)) {
+    const bool is_over = std::chrono::steady_clock::now() >= until;
+    decode_frames();
+    std::unique_lock lock(mutex_);
+    auto reply = next_reply(number);
+    if (reply || is_over) {
       return reply;
     }
-    if (replied_.wait_until(lock, until) == std::cv_status::timeout) {
-      return next_reply(number);
+    if (frames_.empty()) {
+      replied_.wait_until(lock, until);
     }
   }
 }
 
-std::optional<protocol::ClientReply> ServiceLine::next_reply(std::uint64_t number) {
-  for (const std::string& frame : std::exchange(frames_, {})) {
-    protocol::ClientReply reply;
-    // A message that something takes long has the number of no request.
-    const bool is_reply = protocol::decode(frame, reply);
-    const auto awaited = awaited_.find(reply.request_id());
-    if (is_reply && awaited != awaited_.end()) {
+void ServiceLine::decode_frames() {
+  const std::lock_guard decoding_lock(decoding_mutex_);
+  std::vector<std::string> frames;
+  {
+    const std::lock_guard lock(mutex_);
+    frames.swap(frames_);
+  }
+  std::vector<protocol::ClientReply> replies;
+  for (const std::string& frame : frames) {
+    if (!protocol::decode(frame, replies.emplace_back())) {
+      replies.pop_back();
+    }
+  }
+  if (replies.empty()) {
+    return;
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    for (protocol::ClientReply& reply : replies) {
+      const auto awaited = awaited_.find(reply.request_id());
+      if (awaited == awaited_.end()) {
+        continue;  // a message that something takes long has the number of no request
+      }
       const bool is_part = reply.has_query() && !reply.query().ends();
       awaited->second.is_query = awaited->second.is_query && is_part;
       awaited->second.trace.clear();
       awaited->second.replies.push_back(std::move(reply));
     }
   }
+  replied_.notify_all();
+}
+
+std::optional<protocol::ClientReply> ServiceLine::next_reply(std::uint64_t number) {
   const auto found = awaited_.find(number);
   if (found == awaited_.end() || found->second.replies.empty()) {
     return std::nullopt;

@@ -57,6 +57,10 @@ class ServiceLine {
     std::uint64_t number;
   };
 
+  /// Hands the frames that came to those who wait for them. Without mutex_ while it decodes, or the
+  /// loop would wait for that.
+  void decode_frames();
+
   // All with mutex_ locked.
   std::optional<protocol::ClientReply> next_reply(std::uint64_t number);
   void drop(std::uint64_t number);
@@ -64,6 +68,7 @@ class ServiceLine {
   void send(protocol::ClientRequest request);
 
   protocol::WakeUp woken_;
+  std::mutex decoding_mutex_;  ///< locked before mutex_; keeps the chunks of an answer in order
   std::mutex mutex_;
   std::condition_variable replied_;
   std::uint64_t last_number_ = std::uint64_t{1} << 63U;  // guarded by mutex_

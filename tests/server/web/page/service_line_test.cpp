@@ -1,10 +1,15 @@
 // What the page says to the service when a browser waits no more.
 #include "server/web/answers/service_line.h"
 
+#include <cstdint>
+#include <thread>
+#include <vector>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "proto/frames.h"
+#include "tests/support/hang_limit.h"
 
 namespace oblique::server {
 namespace {
@@ -62,6 +67,31 @@ TEST_F(ServiceLineTest, ATraceGoesOnUntilItIsAskedForAgainAndEndsWithTheLastWhoA
   EXPECT_THAT(ended(), ElementsAre(1));
   line_.forget(3);
   EXPECT_THAT(ended(), ElementsAre(3));
+}
+
+TEST_F(ServiceLineTest, ThreadsThatWaitAtOnceReceiveTheirRepliesInOrder) {
+  constexpr std::uint64_t kReplies = 2000;
+  std::vector<std::jthread> threads;
+  for (const std::uint64_t number : {1U, 2U, 3U}) {
+    protocol::ClientRequest request;
+    request.mutable_status();
+    line_.ask(number, request);
+    threads.emplace_back([this, number] {
+      for (std::uint64_t i = 0; i < kReplies; ++i) {
+        const auto reply = line_.wait_for_reply(number, test::kHangLimit);
+        ASSERT_TRUE(reply);
+        ASSERT_EQ(reply->status().next_after(), i);
+      }
+    });
+  }
+  for (std::uint64_t i = 0; i < kReplies; ++i) {
+    for (const std::uint64_t number : {1U, 2U, 3U}) {
+      protocol::ClientReply reply;
+      reply.set_request_id(number);
+      reply.mutable_status()->set_next_after(i);
+      line_.put(protocol::encode(reply));
+    }
+  }
 }
 
 TEST_F(ServiceLineTest, AQueryThatIsLeftEnds) {
