@@ -70,7 +70,7 @@ ServedStudy JobContext::study(std::uint64_t id) const {
   const protocol::StudyStatus& found = status.status().studies(0);
   request.mutable_describe()->set_study(found.name());
   const ClientReply described = Exchange(*this, request).next();
-  return {id, found.name(), found.state(),
+  return {id, found.name(), found.state(), found.failed(),
           std::make_shared<const protocol::PointTable>(described.describe().recipe())};
 }
 

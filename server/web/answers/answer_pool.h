@@ -25,9 +25,16 @@ namespace oblique::server {
 
 /// A study as the service reports it.
 struct ServedStudy {
+  /// Whether a point without a row is left out. That of a study that is done is: the filter on the
+  /// machine of its worker decides, and may differ from ours in the last digit of a value.
+  bool leaves_out(std::uint64_t point) const {
+    return table->has_filter() && (state == "done" || !table->is_left_in(point));
+  }
+
   std::uint64_t id;
   std::string name;
   std::string state;
+  std::uint64_t failed;  ///< points
   std::shared_ptr<const protocol::PointTable> table;
 };
 

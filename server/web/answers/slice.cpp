@@ -103,7 +103,7 @@ SliceCells read_cells(const JobContext& context, const ServedStudy& study, const
   if (study.table->has_filter()) {
     for (const auto& [point, cell] : points) {
       context.throw_if_over();  // a filter may take long
-      if (read.marks[cell] == Mark::kNotSolved && !study.table->is_left_in(point)) {
+      if (read.marks[cell] == Mark::kNotSolved && study.leaves_out(point)) {
         read.marks[cell] = Mark::kLeftOut;
       }
     }

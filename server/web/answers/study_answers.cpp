@@ -126,10 +126,13 @@ ordered_json model_json(const protocol::Recipe& recipe) {
 
 /// The first failed point and its error; null if none has failed.
 ordered_json first_failure(const JobContext& context, const ServedStudy& study) {
+  if (study.failed == 0) {
+    return nullptr;
+  }
   protocol::StudyQuery query;
   query.set_study(study.name);
   query.add_select("point, error");
-  query.set_where("error IS NOT NULL");  // of which the table has an index
+  query.set_where("error IS NOT NULL");
   query.set_limit(1);
   ordered_json first;
   context.query(query, [&](const protocol::ChunkRows& row) {
@@ -207,7 +210,7 @@ HttpAnswer point_answer(const JobContext& context, std::uint64_t id, std::uint64
                       {"H", point.H_m},
                       {"mu", point.mu},
                       {"e", point.e_star},
-                      {"left_out", !study.table->is_left_in(number)},
+                      {"left_out", study.leaves_out(number)},
                       {"fault", study.table->fault(number)},
                       {"row", nullptr}};
   protocol::StudyQuery query;
@@ -220,6 +223,11 @@ HttpAnswer point_answer(const JobContext& context, std::uint64_t id, std::uint64
     for (int i = 0; i < query.select_size(); ++i) {
       answer["row"][query.select(i)] = value_of(row.cell(static_cast<std::size_t>(i)));
     }
+    // What was solved, where another machine rounded a value of the recipe differently.
+    for (const char* key : {"H", "mu", "e"}) {
+      answer[key] = answer["row"][key];
+    }
+    answer["left_out"] = false;
   });
   return json_answer(answer);
 }

@@ -5,9 +5,11 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <sys/eventfd.h>
@@ -155,6 +157,8 @@ class PretendedWorker : public Peer<WorkerMessage, ServerToWorker> {
     message.mutable_credit()->set_batches(batches);
     send(message);
   }
+  /// Which points it fails.
+  void fail(std::set<std::uint64_t> points) { failing_ = std::move(points); }
   /// Sends a result for each point of the batch, or names it as left out. Returns how many these
   /// are.
   std::uint64_t solve(const protocol::Batch& batch) {
@@ -169,7 +173,10 @@ class PretendedWorker : public Peer<WorkerMessage, ServerToWorker> {
     const protocol::PointTable& table = *studies_.at(batch.study_id());
     const auto points = points_of(batch);
     for (const std::uint64_t point : points) {
-      if (table.is_left_in(point)) {
+      if (failing_.contains(point)) {
+        *results.add_results() =
+            protocol::failed_point(point, "failed as " + std::to_string(point));
+      } else if (table.is_left_in(point)) {
         *results.add_results() = solved_point(point, table);
       } else {
         results.add_left_out(point);
@@ -198,6 +205,7 @@ class PretendedWorker : public Peer<WorkerMessage, ServerToWorker> {
  private:
   std::uint64_t sequence_ = 0;
   std::map<std::uint64_t, std::uint64_t> in_hand_;
+  std::set<std::uint64_t> failing_;
   std::map<std::uint64_t, std::unique_ptr<protocol::PointTable>> studies_;  // as defined last
 };
 

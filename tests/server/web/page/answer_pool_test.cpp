@@ -12,6 +12,8 @@
 
 #include "proto/frames.h"
 #include "proto/wire/chunk_writer.h"
+#include "server/web/answers/study_answers.h"
+#include "tests/support/recipes.h"
 
 namespace oblique::server {
 namespace {
@@ -103,6 +105,23 @@ TEST_F(AnswerPoolTest, AJobThatIsTooSlowEndsItsQueryAndSaysSo) {
   EXPECT_EQ(late->status, 503U);
   const ClientRequest query = requested();
   EXPECT_EQ(requested().end_query().request_id(), query.request_id());
+}
+
+TEST_F(AnswerPoolTest, OfAStudyWithoutFailuresNoneIsLookedFor) {
+  ASSERT_TRUE(pool_.submit(7, study_job(1)));
+  ClientReply status;
+  status.mutable_status()->add_studies()->set_study_id(1);
+  reply(requested(), status);
+  ClientReply described;
+  *described.mutable_describe()->mutable_recipe() = protocol::recipe_of(
+      {{protocol::listed("H", {1}), protocol::listed("mu", {1}), protocol::listed("e", {1})}});
+  reply(requested(), described);
+  std::optional<HttpAnswer> found;
+  while (!(found = pool_.take(7))) {
+    ASSERT_TRUE(line_.take().empty()) << "another request";
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  EXPECT_EQ(found->status, 200U);
 }
 
 TEST_F(AnswerPoolTest, AnErrorOfTheServiceIsTheAnswer) {

@@ -9,6 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/database/sqlite.h"
 #include "tests/server/web/page/page_study.h"
 
 namespace oblique::server {
@@ -162,6 +163,38 @@ TEST_F(PageAnswersTest, WhatIsNotSolvedAndWhatIsLeftOutIsMarked) {
   EXPECT_EQ(numbers.head["least"], nullptr);
   EXPECT_EQ(numbers.read<std::uint32_t>(80, 10)[0], 0x7fc00000U);
   EXPECT_EQ(numbers.read<std::uint32_t>(80, 10)[9], 0x7fc00002U);
+}
+
+TEST_F(PageAnswersTest, WhatAStudyThatIsDoneHasNoRowOfWasLeftOutByItsWorker) {
+  protocol::Recipe recipe = grid_recipe();
+  recipe.mutable_blocks(0)->set_where("mu < 0.5");
+  submit("filtered", recipe);
+  solve(24);
+  const auto edited = open_database(page_.database(), SQLITE_OPEN_READWRITE);
+  sqlite3_busy_timeout(edited.get(), 10'000);
+  const std::string slice = "/api/studies/1/slice?z=mode&x=mu&y=H&at=e@0";
+  EXPECT_EQ(page_.numbers(slice).head["left_out"], 3);
+  execute(edited.get(), "DELETE FROM results WHERE point = 4");  // as if its machine left it out
+  EXPECT_EQ(page_.numbers(slice).head["left_out"], 4);
+  EXPECT_EQ(page_.numbers(slice).head["missing"], 0);
+  EXPECT_EQ(page_.json("/api/studies/1/points/4")["left_out"], true);
+}
+
+TEST_F(PageAnswersTest, APointIsToldAsItWasSolved) {
+  protocol::Recipe recipe = grid_recipe();
+  recipe.mutable_blocks(0)->set_where("mu < 0.5");
+  submit("filtered", recipe);
+  EXPECT_EQ(page_.json("/api/studies/1/points/7")["left_out"], true);
+  EXPECT_EQ(page_.json("/api/studies/1/points/7")["mu"], 0.6);
+  solve(24);
+  const auto edited = open_database(page_.database(), SQLITE_OPEN_READWRITE);
+  sqlite3_busy_timeout(edited.get(), 10'000);
+  // As a machine does it that rounds otherwise.
+  execute(edited.get(),
+          "UPDATE results SET checksum = NULL, point = 7, mu = 0.4375 WHERE point = 4");
+  const json point = page_.json("/api/studies/1/points/7");
+  EXPECT_EQ(point["left_out"], false);
+  EXPECT_EQ(point["mu"], 0.4375);
 }
 
 TEST_F(PageAnswersTest, AStudyOfABillionPointsIsLookedAtLikeASmallOne) {

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <set>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -26,8 +27,9 @@ class PageStudyTest : public testing::Test {
     *request.mutable_submit()->mutable_recipe() = recipe;
     ASSERT_TRUE(client_.ask(request).has_submit());
   }
-  void solve(std::uint64_t points) {
+  void solve(std::uint64_t points, const std::set<std::uint64_t>& failing = {}) {
     PretendedWorker worker(page_.server().worker_endpoint());
+    worker.fail(failing);
     worker.hello();
     worker.work(points);
   }
