@@ -100,7 +100,9 @@ function show_sliders(view, on_grid) {
         out.textContent = held(axis, Number(slider.value));
         slider.setAttribute("aria-valuetext", out.textContent);
         view.set({ at: [...now].map(([key, n]) => `${key}@${n}`).join(",") });
-        view.load();
+        view.load(true);  // what comes while it is dragged is shown
+      }, onchange: () => {
+        if (view.wants_more) view.load();
       } });
     return h("div", { class: "slider" }, h("span", {}, axis.key), slider, out);
   }));

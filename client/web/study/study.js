@@ -202,7 +202,7 @@ export class StudyView {
       this.later = 0;
       this.has_moved = false;
       this.is_refreshing = true;
-      await Promise.allSettled([this.load(), this.conditions.tell(true), this.table.again()]);
+      await Promise.allSettled([this.load(true), this.conditions.tell(true), this.table.again()]);
       await this.marked;
       this.is_refreshing = false;
       this.loaded_ms = performance.now();
@@ -247,8 +247,11 @@ export class StudyView {
     this.marking.stop();
   }
 
-  /** Asks for the picture; what is asked for meanwhile comes after it, and only the last of that. */
-  async load() {
+  /**
+   * Asks for the picture. What is under way ends, because it would not be seen; what repeats itself waits for it, or it
+   * would never end. Only the last of what is asked for meanwhile comes.
+   */
+  async load(waits = false) {
     if (this.is("between")) {
       this.solving.go_on();
       return;
@@ -256,6 +259,7 @@ export class StudyView {
     this.solving.end();
     if (this.asked) {
       this.wants_more = true;
+      if (!waits) this.asked.abort();
       return;
     }
     this.asked = new AbortController();

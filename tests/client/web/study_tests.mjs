@@ -441,3 +441,18 @@ test("a server that does not answer is told of in words, and what it was asked m
   await until(page, () => document.querySelector("p.said").textContent === "");
   await page.close();
 });
+
+test("a picture that nobody wants any more does not keep people from the next", async () => {
+  const page = await study("#/study/1?pic=map&z=fn_peak_N&x=mu&y=H", { early: () => {
+    const real = window.fetch;
+    window.fetch = (what, how) => (!String(what).includes("z=slide_m") ? real(what, how) : new Promise((_, fail) => {
+      window.is_waiting = true;  // until it is ended
+      how.signal.addEventListener("abort", () => fail(how.signal.reason));
+    }));
+  } });
+  await page.evaluate(() => { location.hash = "#/study/1?pic=map&z=slide_m&x=mu&y=H"; });
+  await until(page, () => window.is_waiting);
+  await page.evaluate(() => { location.hash = "#/study/1?pic=map&z=mode&x=mu&y=H"; });
+  await page.waitForSelector(".categories");
+  await page.close();
+});
