@@ -86,6 +86,19 @@ void Store::prepare_schema(const std::string& path) {
     throw StorageError(fmt::format("{} lacks the table {}: `oblique check --db {}` tells more",
                                    path, fmt::join(missing, " and "), path));
   }
+  // Before the views are created, which may change rows. A trigger with the name of ours is
+  // replaced then.
+  auto triggers = other_triggers(database_.get());
+  std::erase(triggers, "row_deleted");
+  if (!triggers.empty()) {
+    constexpr std::size_t kMostNames = 10;
+    const std::size_t count = triggers.size();
+    triggers.resize(std::min(count, kMostNames));
+    throw StorageError(fmt::format(
+        "{} has {} triggers that are not ours, and would run with each change of its rows: {}{}. "
+        "Drop them, as with DROP TRIGGER in the program sqlite3",
+        path, count, fmt::join(triggers, ", "), count > kMostNames ? " and more" : ""));
+  }
   try {
     create_views(database_.get());
   } catch (const StorageGone&) {
@@ -95,15 +108,6 @@ void Store::prepare_schema(const std::string& path) {
         fmt::format("the views of {} cannot be created: {}. If a table has the name of a view, "
                     "rename the table",
                     path, error.what()));
-  }
-  if (auto triggers = other_triggers(database_.get()); !triggers.empty()) {
-    constexpr std::size_t kMostNames = 10;
-    const std::size_t count = triggers.size();
-    triggers.resize(std::min(count, kMostNames));
-    throw StorageError(fmt::format(
-        "{} has {} triggers that are not ours, and would run with each change of its rows: {}{}. "
-        "Drop them, as with DROP TRIGGER in the program sqlite3",
-        path, count, fmt::join(triggers, ", "), count > kMostNames ? " and more" : ""));
   }
 }
 
@@ -117,7 +121,9 @@ Store::~Store() {
     // Another file has the name. Our log must not remain beside it, so it is merged into our own
     // file, wherever that is.
     try {
-      log_->merge();
+      if (!sync_failed_) {
+        log_->merge();
+      }
     } catch (const StorageError&) {
       // The log stays.
     }
