@@ -294,15 +294,14 @@ void Store::add(const AddResults& change) {
                         .worker_id = change.worker_id,
                         .attempt = change.attempt,
                         .solved_at = change.solved_at};
-    if (statements_->add_result.run(row)) {  // else the point has a row already
-      ranges_->add(change.study_id, result.point());
-    }
+    statements_->add_result.run(row);
+    ranges_->add(change.study_id, result.point());  // also where it had a row already
   }
-  if (!change.left_out.empty()) {
-    change.left_out.for_each(
-        [&](const Interval& points) { ranges_->add(change.study_id, points); });
+  if (const IntervalSet left_out = ranges_->open_points(change.study_id, change.left_out);
+      !left_out.empty()) {
+    left_out.for_each([&](const Interval& points) { ranges_->add(change.study_id, points); });
     execute_with(database_.get(), "UPDATE studies SET left_out = left_out + ?2 WHERE study_id = ?1",
-                 change.study_id, change.left_out.size());
+                 change.study_id, left_out.size());
   }
 }
 
