@@ -347,11 +347,14 @@ void finish_studies(sqlite3* database, const std::vector<StudyPlace>& places) {
       " WHERE study_id = ?1 AND (first_point, points, attempt, retried_at) NOT IN"
       " (SELECT first_point, points, attempt, retried_at FROM main.retries WHERE study_id = ?2)"
       " ORDER BY source.retries.rowid");
+  CompletedRanges ranges(database);
   for (const StudyPlace& place : places) {
     retries.bind(1, place.source_id);
     retries.bind(2, place.target.id);
     retries.run();
-    count_again(database, place.target.id, place.target.table, place.completed);
+    // Points that were completed without a row are those that the filter leaves out.
+    ranges.count_again(place.target.id, place.completed);
+    count_reused_and_set_state(database, place.target.id);
     place.target.table.release();
   }
 }

@@ -151,12 +151,13 @@ void mend_references(sqlite3* database) {
           " ELSE 'unknown' END FROM workers), 'unknown', '' FROM results"
           " WHERE worker_id IS NOT NULL AND worker_id NOT IN (SELECT worker_id FROM workers);"
           "UPDATE studies SET counted = 1;");
-  const auto noted = noted_points(database);
+  CompletedRanges ranges(database);
   Statement studies(database, "SELECT study_id, recipe, points FROM studies");
   while (studies.step()) {
     const auto study_id = static_cast<std::uint64_t>(studies.integer(0));
     const StudyTable table(studies.text(1), static_cast<std::uint64_t>(studies.integer(2)));
-    count_again(database, study_id, table, noted.at(study_id).value());
+    ranges.count_again(study_id, table);
+    count_reused_and_set_state(database, study_id);
   }
 }
 

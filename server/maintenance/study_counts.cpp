@@ -1,45 +1,7 @@
 #include "server/maintenance/study_counts.h"
 
-#include <algorithm>
-#include <stdexcept>
-
-#include "server/store/completed_ranges.h"
-
 namespace oblique::server {
-namespace {
-
-/// The points of `points` that the study's filter leaves out; none where its recipe cannot be read.
-IntervalSet left_out(const StudyTable& table, const IntervalSet& points) {
-  IntervalSet found;
-  try {
-    if (points.empty() || !table->has_filter()) {
-      return found;
-    }
-  } catch (const std::runtime_error&) {
-    return found;
-  }
-  points.for_each([&](const Interval& range) {
-    const std::uint64_t end = std::min(range.end, table->size());
-    for (std::uint64_t begin = range.begin; begin < end;) {
-      const std::uint64_t left_in = table->first_left_in(begin, end);
-      found.insert(begin, left_in);
-      begin = left_in + 1;
-    }
-  });
-  return found;
-}
-
-}  // namespace
-
-void count_again(sqlite3* database, std::uint64_t study_id, const StudyTable& table,
-                 const IntervalSet& noted) {
-  CompletedRanges ranges(database);
-  ranges.count_again(study_id);
-  const IntervalSet without_row = left_out(table, noted);
-  without_row.for_each([&](const Interval& range) { ranges.add(study_id, range); });
-  ranges.flush();
-  execute_with(database, "UPDATE studies SET left_out = ?2 WHERE study_id = ?1", study_id,
-               without_row.size());
+void count_reused_and_set_state(sqlite3* database, std::uint64_t study_id) {
   for (const char* sql :
        {"DELETE FROM main.reused_points WHERE study_id = ?1",
         // A source is STUDY/POINT, and a name may have slashes too.

@@ -3,15 +3,12 @@
 #include <cstdint>
 
 #include "server/database/sqlite.h"
-#include "server/study/interval_set.h"
-#include "server/study/study_table.h"
 
 namespace oblique::server {
 
-/// Computes `completed_ranges` and `reused_points` of a study again: points that have a row, and
-/// those of `noted` that its filter leaves out. A study with all points becomes done, a done one
-/// without them running. Throws StorageError.
-void count_again(sqlite3* database, std::uint64_t study_id, const StudyTable& table,
-                 const IntervalSet& noted);
+/// After the completed ranges of a study were counted again: computes `reused_points` from its
+/// rows. If all points are completed it becomes done, else a done one is running again. Throws
+/// StorageError.
+void count_reused_and_set_state(sqlite3* database, std::uint64_t study_id);
 
 }  // namespace oblique::server

@@ -264,7 +264,9 @@ std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name)
     status.set_created_at(list.text(4));
     status.set_failed(static_cast<std::uint64_t>(list.integer(6)));
     status.set_left_out(static_cast<std::uint64_t>(list.integer(10)));
-    status.set_solved(static_cast<std::uint64_t>(settled) - status.failed() - status.left_out());
+    const std::uint64_t unsolved = status.failed() + status.left_out();
+    const auto completed = static_cast<std::uint64_t>(settled);
+    status.set_solved(completed - std::min(completed, unsolved));
     status.set_priority(static_cast<std::int32_t>(list.integer(7)));
     status.set_submitted_by(list.text(8));
     status.set_solver_version(list.text(9));

@@ -220,11 +220,9 @@ StudyCounts Scheduler::study(StudyId id) const {
   const bool lacks_worker = study.has_work() && !workers_.empty() &&
                             !study.solver_version.empty() &&
                             !versions_.contains(study.solver_version);
-  const StudyPoints& points = study.points;
-  return {points.size(),        points.settled() - points.left_out() - study.failed,
-          study.failed,         points.left_out(),
-          points.leased(),      study.cancelled,
-          study.solver_version, lacks_worker};
+  const PointCounts counts = points(id);
+  return {counts.points, counts.solved(), counts.failed,        counts.left_out,
+          counts.leased, study.cancelled, study.solver_version, lacks_worker};
 }
 
 PointCounts Scheduler::points(StudyId id) const {

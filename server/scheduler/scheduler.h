@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -41,6 +42,7 @@ struct PointCounts {
   std::uint64_t leased;
 
   std::uint64_t open() const { return points - settled; }
+  std::uint64_t solved() const { return settled - std::min(settled, failed + left_out); }
 };
 
 /// Workers that hold points of a study, all of which have stored nothing for a time.
@@ -156,13 +158,15 @@ class Scheduler {
   struct Pace {
     double busy_s = 0.0;  ///< of a thread, for so many points: the last messages, weighted
     double points = 0.0;
-    double solved = 0.0;                  ///< of these, those that no filter leaves out
+    /// The same of messages with solved points: these alone, and the time of the whole message.
+    double solved_busy_s = 0.0;
+    double solved = 0.0;
     std::uint64_t last_batch_points = 0;  ///< that it was fit for
     std::uint64_t last_end = 0;           ///< place; 0: it had no batch
     std::uint64_t held_points = 0;        ///< of its leases
 
     double s_per_point() const { return points > 0.0 ? busy_s / points : 0.0; }  ///< 0: unknown
-    double s_per_solved() const { return solved > 0.0 ? busy_s / solved : 0.0; }
+    double s_per_solved() const { return solved > 0.0 ? solved_busy_s / solved : 0.0; }
   };
   struct Worker {
     std::uint32_t threads;

@@ -142,12 +142,13 @@ bool Scheduler::names_other_points(const ResultsReceived& event) const {
     return false;
   }
   const StudyPoints& points = studies_.at(lease->second.study).points;
-  if (lease->second.study != event.study || !points.has_filter() ||
-      event.left_out.back().end > points.size()) {
+  const Batch& batch = lease->second.batch;
+  // So many are not even looked up: that could take long.
+  if (event.left_out.size() > batch.points || lease->second.study != event.study ||
+      !points.may_leave_out(event.left_out)) {
     return true;
   }
   const IntervalSet places = points.order().places(event.left_out);
-  const Batch& batch = lease->second.batch;
   return places.front().begin < batch.first_place || places.back().end > batch.end();
 }
 
@@ -158,17 +159,21 @@ void Scheduler::learn_pace(Worker& worker, const ResultsReceived& event) {
       event.busy_s / points > kLongestPoint_s) {
     return;
   }
+  // Time and points by themselves: the first points of a model come with its fall, which says
+  // little of those that follow.
+  const auto learn = [&event](double& busy_s, double& number, double newest) {
+    const double weight = number > 0.0 ? kPaceWeight : 1.0;
+    busy_s += weight * (event.busy_s - busy_s);
+    number += weight * (newest - number);
+  };
+  Pace& known = worker.paces[event.study];
+  learn(known.busy_s, known.points, points);
+  // A message that only names left-out points says nothing of the time that a solved one takes.
   if (solved > 0.0) {
+    learn(known.solved_busy_s, known.solved, solved);
     pace_s_ = kPaceFades * pace_s_ + event.busy_s;
     pace_points_ = kPaceFades * pace_points_ + solved;
   }
-  // Time and points by themselves: the first points of a model come with its fall, which says
-  // little of those that follow.
-  Pace& known = worker.paces[event.study];
-  const double weight = known.points > 0.0 ? kPaceWeight : 1.0;
-  known.busy_s += weight * (event.busy_s - known.busy_s);
-  known.points += weight * (points - known.points);
-  known.solved += weight * (solved - known.solved);
 }
 
 void Scheduler::on(const ResultsStored& event) {

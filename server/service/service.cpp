@@ -62,7 +62,10 @@ void Service::worker_frame(const std::string& identity, std::string_view frame, 
                            const std::shared_ptr<const KeyHolder>& holder) {
   Heard heard =
       workers_.take(identity, frame, now, holder == nullptr ? std::string() : holder->name);
-  for (const Event& event : heard.events) {
+  for (Event& event : heard.events) {
+    if (auto* received = std::get_if<ResultsReceived>(&event)) {
+      judge_inputs(*received, heard.results);
+    }
     handle(event, {now, &heard.results});
   }
   if (heard.trace_of != 0) {
@@ -131,6 +134,27 @@ void Service::handle(const Event& event, Turn turn) {
     std::visit([&](const auto& kind) { perform(kind, turn); }, effect);
   }
   tell_traces(event);
+}
+
+/// Results with other inputs than their points have are failures, before a worker counts as one
+/// that solves points.
+void Service::judge_inputs(ResultsReceived& event, protocol::Results& message) const {
+  // Of a study without open points nothing is stored, and no table is made for that.
+  if (!states_.contains(event.study) || !scheduler_.knows_study(event.study) ||
+      scheduler_.points(event.study).open() == 0) {
+    return;
+  }
+  const StudyTable& table = states_.record(event.study).table;
+  for (std::size_t i = 0; i < event.outcomes.size(); ++i) {
+    protocol::PointResult& result = *message.mutable_results(static_cast<int>(i));
+    const std::string fault = result.point() < table.size()
+                                  ? protocol::fault_of_inputs(result, *table.get())
+                                  : std::string();
+    if (!fault.empty()) {
+      result = protocol::failed_point(result.point(), fault);
+      event.outcomes[i].failed = true;
+    }
+  }
 }
 
 /// Those who solve traces are the workers.
@@ -217,10 +241,6 @@ void Service::perform(const StoreResults& effect, Turn turn) {
                      bytes};
   for (const std::size_t index : effect.accepted) {
     protocol::PointResult& result = *message.mutable_results(static_cast<int>(index));
-    if (const std::string fault = protocol::fault_of_inputs(result, *change.table);
-        !fault.empty()) {
-      result = protocol::failed_point(result.point(), fault);
-    }
     write.event.outcomes.push_back({result.point(), !result.error().empty()});
     change.results.push_back(std::move(result));
   }

@@ -116,6 +116,7 @@ class Service {
 
   void feed(const Event& event, Instant now);
   void handle(const Event& event, Turn turn);
+  void judge_inputs(ResultsReceived& event, protocol::Results& message) const;
   void handle_found(Instant now);
   void hand_out_or_hold(Instant now);
   void tell_traces(const Event& event);

@@ -2,12 +2,57 @@
 
 #include <algorithm>
 #include <limits>
+#include <stdexcept>
+#include <utility>
 
 namespace oblique::server {
 namespace {
 
 std::uint64_t number(const Statement& row, int column) {
   return static_cast<std::uint64_t>(row.integer(column));
+}
+
+IntervalSet all_points_with_row(sqlite3* database, std::uint64_t study_id) {
+  constexpr auto kLast = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
+  return points_with_row(database, study_id, {0, kLast});
+}
+
+IntervalSet all_ranges(sqlite3* database, std::uint64_t study_id) {
+  IntervalSet found;
+  Statement ranges(database,
+                   "SELECT first_point, points FROM completed_ranges WHERE study_id = ?"
+                   " ORDER BY first_point");
+  ranges.bind_all(study_id);
+  while (ranges.step()) {
+    found.insert(number(ranges, 0), number(ranges, 0) + number(ranges, 1));
+  }
+  return found;
+}
+
+IntervalSet without(IntervalSet points, const IntervalSet& others) {
+  others.for_each([&](const Interval& range) { points.erase(range.begin, range.end); });
+  return points;
+}
+
+/// Those of the points that the study's filter leaves out; none where its recipe cannot be read.
+IntervalSet left_out_of(const StudyTable& table, const IntervalSet& points) {
+  IntervalSet found;
+  try {
+    if (points.empty() || !table->has_filter()) {
+      return found;
+    }
+  } catch (const std::runtime_error&) {
+    return found;
+  }
+  points.for_each([&](const Interval& range) {
+    const std::uint64_t end = std::min(range.end, table->size());
+    for (std::uint64_t begin = range.begin; begin < end;) {
+      const std::uint64_t left_in = table->first_left_in(begin, end);
+      found.insert(begin, left_in);
+      begin = left_in + 1;
+    }
+  });
+  return found;
 }
 
 }  // namespace
@@ -46,15 +91,7 @@ std::optional<IntervalSet> noted_points_of(sqlite3* database, std::uint64_t stud
   if (!study.step()) {
     return std::nullopt;
   }
-  IntervalSet found;
-  Statement ranges(database,
-                   "SELECT first_point, points FROM completed_ranges WHERE study_id = ?"
-                   " ORDER BY first_point");
-  ranges.bind_all(study_id);
-  while (ranges.step()) {
-    found.insert(number(ranges, 0), number(ranges, 0) + number(ranges, 1));
-  }
-  return found;
+  return all_ranges(database, study_id);
 }
 
 CompletedRanges::CompletedRanges(sqlite3* database)
@@ -126,6 +163,20 @@ IntervalSet CompletedRanges::overlapping(std::uint64_t study_id, const Interval&
   return found;
 }
 
+IntervalSet CompletedRanges::open_points(std::uint64_t study_id, const IntervalSet& points) {
+  IntervalSet open = points;
+  const auto added = gathered_.find(study_id);
+  points.for_each([&](const Interval& range) {
+    open = without(std::move(open), overlapping(study_id, range));
+    if (added != gathered_.end()) {
+      for (const Interval& part : added->second.within(range.begin, range.end)) {
+        open.erase(part.begin, part.end);
+      }
+    }
+  });
+  return open;
+}
+
 void CompletedRanges::remove(std::uint64_t study_id, const IntervalSet& points) {
   points.for_each([&](const Interval& gone) {
     const auto before = range_before(study_id, gone.begin);
@@ -151,12 +202,26 @@ void CompletedRanges::set_counted(std::uint64_t study_id) {
   execute_with(database_, "UPDATE studies SET counted = 1 WHERE study_id = ?", study_id);
 }
 
-void CompletedRanges::count_again(std::uint64_t study_id) {
-  constexpr auto kLast = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
-  const IntervalSet points = points_with_row(database_, study_id, {0, kLast});
+void CompletedRanges::count_again(std::uint64_t study_id, const StudyTable& table) {
+  const IntervalSet with_row = all_points_with_row(database_, study_id);
+  // Judging a point takes time, so only those are judged that have no row.
+  const IntervalSet rest = without(all_ranges(database_, study_id), with_row);
+  replace(study_id, with_row, left_out_of(table, rest));
+}
+
+void CompletedRanges::count_again(std::uint64_t study_id, const IntervalSet& left_out) {
+  const IntervalSet with_row = all_points_with_row(database_, study_id);
+  replace(study_id, with_row, without(left_out, with_row));
+}
+
+void CompletedRanges::replace(std::uint64_t study_id, const IntervalSet& with_row,
+                              const IntervalSet& left_out) {
   execute_with(database_, "DELETE FROM completed_ranges WHERE study_id = ?", study_id);
-  execute_with(database_, "UPDATE studies SET left_out = 0 WHERE study_id = ?", study_id);
-  points.for_each([&](const Interval& range) { write(study_id, range); });
+  execute_with(database_, "UPDATE studies SET left_out = ?2 WHERE study_id = ?1", study_id,
+               left_out.size());
+  for (const IntervalSet* points : {&with_row, &left_out}) {
+    points->for_each([&](const Interval& range) { write(study_id, range); });
+  }
   set_counted(study_id);
 }
 

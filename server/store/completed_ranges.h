@@ -6,6 +6,7 @@
 
 #include "server/database/sqlite.h"
 #include "server/study/interval_set.h"
+#include "server/study/study_table.h"
 
 namespace oblique::server {
 
@@ -25,7 +26,7 @@ std::optional<IntervalSet> noted_points_of(sqlite3* database, std::uint64_t stud
 /// Keeps the table `completed_ranges`: the completed points of each study as ranges, so that a
 /// start need not read all rows. To be called in each transaction that inserts or deletes rows.
 /// When another program deletes rows, a trigger sets `studies.counted` to 0, and the next start of
-/// a server makes the ranges from the rows.
+/// a server counts the rows again.
 ///
 /// Writing a range costs three statements, whatever its length. Adjacent ranges are merged.
 ///
@@ -46,15 +47,21 @@ class CompletedRanges {
 
   /// The ranges of a study that overlap [first, end), as they are written.
   IntervalSet overlapping(std::uint64_t study_id, const Interval& points);
+  /// Those of the points that are not completed, also not by what was added.
+  IntervalSet open_points(std::uint64_t study_id, const IntervalSet& points);
   /// These points are open again.
   void remove(std::uint64_t study_id, const IntervalSet& points);
   /// False after another program deleted rows of the study.
   bool is_counted(std::uint64_t study_id);
   void set_counted(std::uint64_t study_id);
-  /// Makes the ranges of a study from its rows.
-  void count_again(std::uint64_t study_id);
+  /// Makes the ranges of a study anew: of points with a row, and of those without one that are in
+  /// the ranges now and that the filter leaves out; none of these where the recipe cannot be read.
+  void count_again(std::uint64_t study_id, const StudyTable& table);
+  /// The same, of points with a row and those of `left_out` without one.
+  void count_again(std::uint64_t study_id, const IntervalSet& left_out);
 
  private:
+  void replace(std::uint64_t study_id, const IntervalSet& with_row, const IntervalSet& left_out);
   std::optional<Interval> range_before(std::uint64_t study_id, std::uint64_t point);
   std::uint64_t take_out(std::uint64_t study_id, std::uint64_t first, std::uint64_t last);
   void write(std::uint64_t study_id, const Interval& range);

@@ -146,8 +146,8 @@ void ResultReuse::reuse(const ReuseResults& change, std::uint64_t point, std::in
     if (sqlite3_changes(database_) > 0) {
       ++source->copied;
       outcome.points.insert(point);
-      ranges_.add(change.study_id, point);
     }
+    ranges_.add(change.study_id, point);  // also where it had a row already
     break;
   }
 }

@@ -90,12 +90,13 @@ void create_views(sqlite3* database) {
   Transaction transaction(database);
   // Without our trigger, deleted rows were not noticed.
   const auto objects = objects_of(database);
-  if (std::ranges::none_of(objects, [](const SchemaObject& object) {
-        return object.type == "trigger" && is_ours(object);
-      })) {
+  const bool had_our_trigger = std::ranges::any_of(objects, [](const SchemaObject& object) {
+    return object.type == "trigger" && is_ours(object);
+  });
+  execute(database, kViewsSql);
+  if (!had_our_trigger) {  // no other trigger runs with this, now that ours has replaced it
     execute(database, "UPDATE studies SET counted = 0");
   }
-  execute(database, kViewsSql);
   transaction.commit();
 }
 

@@ -86,6 +86,19 @@ void Store::prepare_schema(const std::string& path) {
     throw StorageError(fmt::format("{} lacks the table {}: `oblique check --db {}` tells more",
                                    path, fmt::join(missing, " and "), path));
   }
+  // Before the views are created, which may change rows. A trigger with the name of ours is
+  // replaced then.
+  auto triggers = other_triggers(database_.get());
+  std::erase(triggers, "row_deleted");
+  if (!triggers.empty()) {
+    constexpr std::size_t kMostNames = 10;
+    const std::size_t count = triggers.size();
+    triggers.resize(std::min(count, kMostNames));
+    throw StorageError(fmt::format(
+        "{} has {} triggers that are not ours, and would run with each change of its rows: {}{}. "
+        "Drop them, as with DROP TRIGGER in the program sqlite3",
+        path, count, fmt::join(triggers, ", "), count > kMostNames ? " and more" : ""));
+  }
   try {
     create_views(database_.get());
   } catch (const StorageGone&) {
@@ -95,15 +108,6 @@ void Store::prepare_schema(const std::string& path) {
         fmt::format("the views of {} cannot be created: {}. If a table has the name of a view, "
                     "rename the table",
                     path, error.what()));
-  }
-  if (auto triggers = other_triggers(database_.get()); !triggers.empty()) {
-    constexpr std::size_t kMostNames = 10;
-    const std::size_t count = triggers.size();
-    triggers.resize(std::min(count, kMostNames));
-    throw StorageError(fmt::format(
-        "{} has {} triggers that are not ours, and would run with each change of its rows: {}{}. "
-        "Drop them, as with DROP TRIGGER in the program sqlite3",
-        path, count, fmt::join(triggers, ", "), count > kMostNames ? " and more" : ""));
   }
 }
 
@@ -117,7 +121,9 @@ Store::~Store() {
     // Another file has the name. Our log must not remain beside it, so it is merged into our own
     // file, wherever that is.
     try {
-      log_->merge();
+      if (!sync_failed_) {
+        log_->merge();
+      }
     } catch (const StorageError&) {
       // The log stays.
     }
@@ -288,15 +294,14 @@ void Store::add(const AddResults& change) {
                         .worker_id = change.worker_id,
                         .attempt = change.attempt,
                         .solved_at = change.solved_at};
-    if (statements_->add_result.run(row)) {  // else the point has a row already
-      ranges_->add(change.study_id, result.point());
-    }
+    statements_->add_result.run(row);
+    ranges_->add(change.study_id, result.point());  // also where it had a row already
   }
-  if (!change.left_out.empty()) {
-    change.left_out.for_each(
-        [&](const Interval& points) { ranges_->add(change.study_id, points); });
+  if (const IntervalSet left_out = ranges_->open_points(change.study_id, change.left_out);
+      !left_out.empty()) {
+    left_out.for_each([&](const Interval& points) { ranges_->add(change.study_id, points); });
     execute_with(database_.get(), "UPDATE studies SET left_out = left_out + ?2 WHERE study_id = ?1",
-                 change.study_id, change.left_out.size());
+                 change.study_id, left_out.size());
   }
 }
 

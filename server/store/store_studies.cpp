@@ -134,7 +134,14 @@ PointsOfStudies Store::completed_points() {
   }
   if (!uncounted.empty()) {
     in_transaction(true, [&] {
-      std::ranges::for_each(uncounted, [&](std::uint64_t id) { ranges_->count_again(id); });
+      Statement study(database_.get(), "SELECT recipe, points FROM studies WHERE study_id = ?");
+      for (const std::uint64_t id : uncounted) {
+        study.bind(1, id);
+        if (study.step()) {
+          ranges_->count_again(id, StudyTable(study.text(0), number(study, 1)));
+        }
+        study.reset();
+      }
     });
   }
   for (const std::uint64_t id : uncounted) {

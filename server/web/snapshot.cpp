@@ -29,7 +29,7 @@ struct Ranked {
 StudyNumbers numbers_of(StudyId id, const Service& service, std::int64_t now_ms) {
   const PointCounts points = service.scheduler().points(id);
   return {service.states().record(id).name,
-          points.settled - points.failed - points.left_out,
+          points.solved(),
           points.failed,
           points.leased,
           points.open() - points.leased,

@@ -10,8 +10,9 @@ namespace oblique::server {
 
 StudyPoints::StudyPoints(StudyTable table, IntervalSet settled, std::uint64_t left_out,
                          const LossLimits& limits)
-    : table_(std::move(table)), limits_(limits), settled_(std::move(settled)), left_out_(left_out) {
+    : table_(std::move(table)), limits_(limits), settled_(std::move(settled)) {
   settled_.erase(size(), std::numeric_limits<std::uint64_t>::max());  // rows of other points
+  left_out_ = std::min(left_out, settled_.size());  // a database that was edited may say more
   fresh_.insert(0, size());
   settled_.for_each(
       [this](const Interval& interval) { fresh_.erase(interval.begin, interval.end); });
@@ -140,6 +141,7 @@ bool StudyPoints::settle(std::uint64_t number) {
 
 IntervalSet StudyPoints::receive(const IntervalSet& left_out) {
   const IntervalSet places = extract(order_.places(left_out));
+  committing_left_out_ += places.size();
   IntervalSet points;
   places.for_each([&](const Interval& interval) {
     committing_.insert(interval.begin, interval.end);
@@ -156,8 +158,22 @@ void StudyPoints::settle(const IntervalSet& left_out) {
       committing_.erase(interval.begin, interval.end);
       settled_.insert(interval.begin, interval.end);
       left_out_ += interval.end - interval.begin;
+      committing_left_out_ -= interval.end - interval.begin;
     }
   });
+}
+
+bool StudyPoints::may_leave_out(const IntervalSet& points) const {
+  const protocol::PointTable& table = *table_.get();
+  bool all_filtered = points.empty() || points.back().end <= table.size();
+  points.for_each([&](const Interval& range) {
+    for (std::uint64_t point = range.begin; all_filtered && point < range.end;) {
+      const std::size_t block = table.block_of_point(point);
+      all_filtered = !table.recipe().blocks(static_cast<int>(block)).where().empty();
+      point = table.block(block).first_point + table.block(block).points;
+    }
+  });
+  return all_filtered;
 }
 
 void StudyPoints::grow(StudyTable table) {

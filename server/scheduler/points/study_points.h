@@ -99,6 +99,8 @@ class StudyPoints {
 
   bool has_free() const { return has(Standing::kSound) || !fresh_.empty(); }
   bool has_filter() const { return table_->has_filter(); }
+  /// Whether all of them are points of the study in blocks with a filter.
+  bool may_leave_out(const IntervalSet& points) const;
   /// Returned points of that standing.
   bool has(Standing standing) const { return !returned(standing).empty(); }
   /// When the next points to be taken of that standing came back. There must be one.
@@ -106,8 +108,10 @@ class StudyPoints {
     return returned(standing).begin()->second.returned_ms;
   }
   bool is_complete() const { return settled() >= size(); }
-  /// Some point has a result, durable or on its way.
-  bool has_results() const { return settled() > 0 || !committing_.empty(); }
+  /// Some point has a result, durable or on its way. That a filter leaves a point out is none.
+  bool has_results() const {
+    return settled() + committing_.size() > left_out_ + committing_left_out_;
+  }
 
   std::vector<std::uint64_t> condemned() const;
 
@@ -156,7 +160,8 @@ class StudyPoints {
   IntervalSet leased_;
   IntervalSet committing_;
   IntervalSet settled_;
-  std::uint64_t left_out_;             // among the settled ones
+  std::uint64_t left_out_;  // among the settled ones
+  std::uint64_t committing_left_out_ = 0;
   std::uint64_t returned_points_ = 0;  // of any standing
 };
 

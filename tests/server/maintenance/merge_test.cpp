@@ -440,12 +440,13 @@ TEST_F(MergeTest, CompletedPointsThatAFilterLeavesOutAreUnited) {
   EXPECT_THAT(find_faults(file("all")), IsEmpty());
 }
 
-TEST_F(MergeTest, APointThatNoFilterLeavesOutIsNotCompletedWithoutARow) {
-  store("one", {{.table = filtered_table("mu > 0.5"), .first = 5, .end = 7}});
-  texts("one", "INSERT INTO completed_ranges VALUES (1, 8, 2)");
+TEST_F(MergeTest, APointWithARowIsNotCountedAsLeftOut) {
+  store("one", {{.table = filtered_table("mu > 0.5"), .first = 2, .end = 8}});
+  texts("one", "INSERT INTO completed_ranges VALUES (1, 0, 2)");
   texts("one", "UPDATE studies SET left_out = 2");
   merge("one");
-  EXPECT_EQ(ranges("all"), "5+2");
+  EXPECT_EQ(ranges("all"), "0+8");
+  EXPECT_EQ(text("all", "SELECT left_out FROM studies"), "2");
 }
 
 TEST_F(MergeTest, ReusedResultsKeepTheNamesOfTheirSourceAndAreCounted) {

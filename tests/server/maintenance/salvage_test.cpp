@@ -230,11 +230,12 @@ TEST_F(SalvageTest, PointsThatAFilterLeavesOutStayCompletedAndThoseOfLostRowsDoN
                                      "avx2",
                                      1,
                                      "now",
-                                     {solved_point(0), solved_point(1), solved_point(2)}}});
+                                     {solved_point(0), solved_point(1), solved_point(2),
+                                      solved_point(5)}}});  // which the filter leaves out
   store_.reset();
   execute(open_database(path_, SQLITE_OPEN_READWRITE).get(),
-          "INSERT INTO completed_ranges VALUES (2, 4, 3);"
-          "UPDATE studies SET left_out = 3 WHERE study_id = 2;"
+          "INSERT INTO completed_ranges VALUES (2, 4, 1), (2, 6, 1);"
+          "UPDATE studies SET left_out = 2 WHERE study_id = 2;"
           "UPDATE results SET mu = 2 * mu WHERE study_id = 2 AND point = 1");
   salvage(path_, copy_);
   const DatabaseHandle saved = open_database(copy_, SQLITE_OPEN_READONLY);
@@ -243,6 +244,9 @@ TEST_F(SalvageTest, PointsThatAFilterLeavesOutStayCompletedAndThoseOfLostRowsDoN
                    " WHERE study_id = 2");
   ASSERT_TRUE(ranges.step());
   EXPECT_EQ(ranges.text(0), "0+1,2+1,4+3");
+  Statement left_out(saved.get(), "SELECT left_out FROM studies WHERE study_id = 2");
+  ASSERT_TRUE(left_out.step());
+  EXPECT_EQ(left_out.integer(0), 2);
 }
 
 }  // namespace

@@ -243,6 +243,24 @@ TEST_F(ServiceTest, AResultOfOtherValuesThanItsPointHasBecomesAFailedPoint) {
   EXPECT_EQ(service_->scheduler().study(1).failed, 1U);
 }
 
+TEST_F(ServiceTest, AWorkerThatSolvesOtherPointsThanTheStudyHasIsNotProven) {
+  request(submit_request("a", 2));
+  write_all();
+  hello();
+  credit(1);
+  WorkerMessage message;
+  message.mutable_results()->set_study_id(1);
+  message.mutable_results()->set_lease_id(last_message().batch().lease_id());
+  auto result = solved(0);
+  result.set_h_m(1.001 * result.h_m());
+  *message.mutable_results()->add_results() = result;
+  worker_says(message);
+  EXPECT_FALSE(service_->scheduler().worker(1, now_.steady_ms).is_proven);
+  *message.mutable_results()->mutable_results(0) = solved(0);
+  worker_says(message);
+  EXPECT_TRUE(service_->scheduler().worker(1, now_.steady_ms).is_proven);
+}
+
 TEST_F(ServiceTest, AWorkerThatCannotBeReachedLosesItsBatchAtOnce) {
   request(submit_request("a"));
   write_all();

@@ -169,7 +169,7 @@ TEST(CompletedRanges, RandomChangesLeaveThePointsOfASetInTheFewestRanges) {
   }
 }
 
-TEST_F(CompletedRangesTest, PointsThatAConditionLeavesOutAreCompletedUntilRowsAreCountedAgain) {
+TEST_F(CompletedRangesTest, PointsThatAConditionLeavesOutStayCompletedWhenRowsAreCountedAgain) {
   AddStudy study = study_of(10);
   protocol::Recipe recipe = study.table->recipe();
   recipe.mutable_blocks(0)->set_where("mu > 0.4");
@@ -185,8 +185,34 @@ TEST_F(CompletedRangesTest, PointsThatAConditionLeavesOutAreCompletedUntilRowsAr
   EXPECT_EQ(store().studies().at(0).left_out, 4U);
   close();
   by_hand("DELETE FROM results WHERE point = 5");
-  EXPECT_EQ(store().studies().at(0).settled.size(), 2U) << "workers name the others again";
-  EXPECT_EQ(store().studies().at(0).left_out, 0U);
+  EXPECT_EQ(store().studies().at(0).settled.size(), 6U);
+  EXPECT_EQ(store().studies().at(0).left_out, 4U);
+  EXPECT_THAT(ranges(), ElementsAre("0+5", "8+1"));
+}
+
+TEST_F(CompletedRangesTest, OnlyPointsThatWereOpenAreCountedAsLeftOut) {
+  AddStudy study = study_of(10);
+  protocol::Recipe recipe = study.table->recipe();
+  recipe.mutable_blocks(0)->set_where("mu < 0.5");
+  study.table = std::make_shared<const protocol::PointTable>(recipe);
+  AddResults again = solved(study, {4});
+  again.left_out.insert(3, 7);
+  commit({study, worker(1), solved(study, {3})});
+  commit({again});
+  EXPECT_EQ(store().studies().at(0).left_out, 2U) << "points 5 and 6";
+  commit({again});
+  EXPECT_EQ(store().studies().at(0).left_out, 2U) << "they come again";
+  EXPECT_THAT(ranges(), ElementsAre("3+4"));
+}
+
+TEST_F(CompletedRangesTest, APointThatHadARowAlreadyIsCompletedByItsResult) {
+  const auto study = study_of(10);
+  commit({study, worker(1), solved(study, {3, 4})});
+  close();
+  by_hand("DELETE FROM completed_ranges");
+  EXPECT_TRUE(store().studies().at(0).settled.empty());
+  commit({solved(study, {4})});
+  EXPECT_THAT(ranges(), ElementsAre("4+1"));
 }
 
 }  // namespace

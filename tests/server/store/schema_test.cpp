@@ -73,6 +73,14 @@ TEST_F(SchemaTest, AFileWithATriggerThatIsNotOursIsRefusedWithItsName) {
   EXPECT_EQ(refusal(), "it opened");
 }
 
+TEST_F(SchemaTest, NoForeignTriggerRunsAtAStart) {
+  const std::string runs = "AFTER UPDATE ON studies BEGIN SELECT RAISE(ABORT, 'it ran'); END";
+  by_hand("DROP TRIGGER row_deleted; CREATE TRIGGER foreign_one " + runs);
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("triggers that are not ours"), Not(HasSubstr("it ran"))));
+  by_hand("DROP TRIGGER foreign_one; CREATE TRIGGER row_deleted " + runs);
+  EXPECT_EQ(refusal(), "it opened");
+}
+
 TEST_F(SchemaTest, ATriggerWithOurNameAndAnotherTextIsNotOursUntilTheNextStart) {
   const auto before = objects();
   EXPECT_THAT(of_file(other_triggers), IsEmpty());

@@ -159,6 +159,20 @@ TEST_F(LeftOutPointsTest, AWorkerThatNamesPointsOfAStudyWithoutAFilterIsLost) {
   EXPECT_EQ(bench.scheduler.points(1).settled, 0U);
 }
 
+TEST_F(LeftOutPointsTest, AWorkerThatNamesPointsOfABlockWithoutAFilterIsLost) {
+  protocol::Recipe recipe = filtered_table(2, kEven)->recipe();
+  *recipe.add_blocks() = table_of(100)->recipe().blocks(0);
+  const auto table = std::make_shared<const protocol::PointTable>(recipe);
+  for (const Interval named : {Interval{0, 1}, Interval{1, 3}, Interval{2, 3}}) {
+    SchedulerBench bench(trusting());
+    bench.feed(StudyAdded{1, table, {}});
+    const SendBatch batch = bench.join(1, 1).at(0);
+    const auto effects = bench.feed(ResultsReceived{
+        1, 1, batch.lease, ++bench.sequence, true, 1e-3, {}, IntervalSet(named.begin, named.end)});
+    EXPECT_EQ(only<DropWorker>(effects).size(), named.end > 2 ? 1U : 0U);
+  }
+}
+
 TEST_F(LeftOutPointsTest, OfALeaseThatHasEndedResultsCountAndRangesDoNot) {
   const SendBatch batch = bench_.join(1, 1).at(0);
   ResultsReceived event = answer_to(bench_, *table_, batch);
@@ -206,6 +220,45 @@ TEST_F(LeftOutPointsTest, ABatchIsNotSoLongThatItTakesTooLongWhereTheFilterLeave
     batch = only<SendBatch>(solve(bench, *table, batch)).at(0);
   }
   EXPECT_EQ(batch.count(), settings.unsolved_batch_points) << "nobody knows what a point takes";
+}
+
+TEST_F(LeftOutPointsTest, ALongStretchWithoutASolvedPointDoesNotMakeBatchesShort) {
+  const auto table = filtered_table(1'000'000, "mu < 100");
+  SchedulerSettings settings = trusting();
+  SchedulerBench bench(settings);
+  bench.feed(StudyAdded{1, table, {}});
+  SendBatch batch = bench.join(1, 1).at(0);
+  for (int turn = 0; turn < 50; ++turn) {
+    batch = only<SendBatch>(solve(bench, *table, batch)).at(0);
+  }
+  EXPECT_EQ(batch.count(), settings.largest_batch_points);
+}
+
+TEST_F(LeftOutPointsTest, AStudyOfWhichPointsAreOnlyLeftOutTakesAWorkerOfAnyVersion) {
+  const auto table = filtered_table(100, "mu > 90");
+  SchedulerBench bench(trusting());
+  bench.feed(StudyAdded{1, table, {}});
+  bench.feed(WorkerJoined{1, 1, "1.0"});
+  const SendBatch batch = only<SendBatch>(bench.feed(CreditGiven{1, 1})).at(0);
+  const ResultsReceived event = answer_to(bench, *table, batch);
+  bench.feed(event);
+  EXPECT_EQ(bench.scheduler.study(1).solver_version, "") << "on the way to the disk";
+  bench.feed(ResultsStored{1, 1, bench.sequence, {}, event.left_out});
+  bench.feed(WorkerLeft{1});
+  bench.feed(WorkerJoined{2, 1, "2.0"});
+  EXPECT_EQ(only<SendBatch>(bench.feed(CreditGiven{2, 1})).size(), 1U);
+  EXPECT_EQ(bench.scheduler.study(1).solver_version, "2.0");
+}
+
+TEST_F(LeftOutPointsTest, MoreLeftOutPointsThanAreSettledMakeNoHugeNumbers) {
+  SchedulerBench bench(trusting());
+  bench.feed(StudyAdded{1, table_, IntervalSet(0, 10), 3, false, false, {}, "", {}, false, 7});
+  EXPECT_EQ(bench.scheduler.study(1).solved, 0U);
+  Scheduler scheduler{trusting()};
+  scheduler.handle(
+      StudyAdded{1, table_, IntervalSet(0, 10), 3, false, false, {}, "", {}, false, 45}, 0);
+  EXPECT_EQ(scheduler.study(1).solved, 0U);
+  EXPECT_EQ(scheduler.points(1).solved(), 0U);
 }
 
 TEST_F(LeftOutPointsTest, APointThatKillsAmongOthersIsFoundByFewWorkers) {
