@@ -62,6 +62,14 @@ TEST(SchedulerPace, AMessageCountsByItsPointsSoThatAFallBeforeTheFirstOnesSaysLi
   EXPECT_NEAR(static_cast<double>(next.count()), 0.1 / (0.299 / 1000), 5.0);
 }
 
+TEST(SchedulerPace, WhoSaysThatPointsTakeDaysIsNotBelieved) {
+  SchedulerSettings settings = by_pace_alone();
+  settings.first_batch_points = 100;
+  SchedulerBench bench(settings);
+  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  EXPECT_EQ(bench.next_after(bench.join(1, 1).at(0), 1e9).count(), 100U);
+}
+
 TEST(SchedulerPace, SlowPointsOfOneModelFillTheLanesOfAWorker) {
   SchedulerBench bench(by_pace_alone());
   bench.feed(StudyAdded{1, table_of(1'000'000), {}});

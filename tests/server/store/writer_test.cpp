@@ -201,6 +201,16 @@ TEST_F(GroupCommitTest, NothingIsReportedStoredThatWasCommittedToAFileThatIsGone
   EXPECT_THAT(storage_.sizes, ElementsAre(2));
 }
 
+TEST_F(GroupCommitTest, JobsThatAreTriedAloneAreKeptWhenTheFileGoes) {
+  storage_.on_change = [this](const Change&) {
+    storage_.is_gone = true;  // before the next commit
+    throw StorageError("the disk is full");
+  };
+  jobs_ = {kept(1), kept(2)};
+  EXPECT_THAT(write(), ElementsAre(report(Kind::kGone)));
+  EXPECT_EQ(jobs_.size(), 2U) << "they count as lost";
+}
+
 TEST_F(GroupCommitTest, AFileThatIsGoneIsNoticedInWhateverIsDone) {
   const std::vector<std::function<std::vector<WriteReport>(GroupCommit&)>> ways{
       [](GroupCommit& commits) { return commits.tend(); },
