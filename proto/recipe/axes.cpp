@@ -46,16 +46,15 @@ double RangeValues::at(std::uint64_t i) const {
   if (i == 0 || i == last_) {
     return i == 0 ? from_ : to_;
   }
+  if (decimals_) {
+    return (decimals_->first + decimals_->step * static_cast<double>(i)) / decimals_->per_unit;
+  }
   const auto part = static_cast<long double>(i);
   const auto last = static_cast<long double>(last_);
-  long double value = 0.0L;
-  if (decimals_) {
-    value = (decimals_->first + decimals_->step * static_cast<double>(i)) / decimals_->per_unit;
-  } else if (is_logarithmic_) {
-    value = from_ * std::pow(static_cast<long double>(to_) / from_, part / last);
-  } else {
-    value = (from_ * (last - part) + to_ * part) / last;
-  }
+  const auto from = static_cast<long double>(from_);
+  const auto to = static_cast<long double>(to_);
+  const long double value = is_logarithmic_ ? from * std::pow(to / from, part / last)
+                                            : (from * (last - part) + to * part) / last;
   return std::min(std::max(static_cast<double>(value), from_), to_);
 }
 

@@ -57,8 +57,9 @@ double Quantiles::value_at(double fraction) const {
     const double z = normal_quantile(below_from_ * (1.0 - part) + below_to_ * part);
     value = mean_ + sd_ * (is_mirrored_ ? -z : z);
   } else if (kind_ == protocol::DISTRIBUTION_LOG_UNIFORM) {
-    value = static_cast<double>(from_ * std::pow(static_cast<long double>(to_) / from_,
-                                                 static_cast<long double>(fraction)));
+    const auto from = static_cast<long double>(from_);
+    value = static_cast<double>(
+        from * std::pow(static_cast<long double>(to_) / from, static_cast<long double>(fraction)));
   } else {
     value = from_ * (1.0 - fraction) + to_ * fraction;
   }
