@@ -17,12 +17,12 @@ bool has_own_values(const Axis& axis);
 /// Value i of a list or range. Throws std::out_of_range if the axis has no such value.
 double axis_value(const Axis& axis, std::uint64_t i);
 
-/// The values of a range. Both ends are exact. Value i of a linear one is (from (n - 1 - i) + to i)
-/// / (n - 1), and where ends and step are decimals the very double that the decimal is read as:
-/// 0.1:1:10 has 0.3. Logarithms are spaced alike in a logarithmic range.
+/// The values of a range. Both ends are exact. Value i of a linear range is (from (n - 1 - i) + to
+/// i) / (n - 1). If ends and step are decimals, it is the double nearest to the decimal: 0.1:1:10
+/// has 0.3. In a logarithmic range the logarithms are equally spaced.
 class RangeValues {
  public:
-  /// Of an axis with a count.
+  /// `axis` must have a count.
   explicit RangeValues(const Axis& axis);
   double at(std::uint64_t i) const;
 
@@ -40,7 +40,7 @@ class RangeValues {
   std::optional<Decimals> decimals_;
 };
 
-/// Number of the first value that is at least `value` of an axis whose values rise, or its size.
+/// Index of the first value that is at least `value`, or the number of values. Values must rise.
 std::uint64_t first_value_from(const Axis& axis, double value);
 
 /// Bounds of the values of a list, range or distribution; those of a distribution may be infinite.

@@ -98,7 +98,7 @@ std::size_t BlockPoints::input_called(const std::string& name) {
 
 void BlockPoints::sort(std::vector<Formula> formulas) {
   while (!formulas.empty()) {
-    // The first none of whose inputs is still to come.
+    // The first formula whose inputs are all computed.
     const auto next = std::find_if(formulas.begin(), formulas.end(), [&](const Formula& formula) {
       return std::none_of(formulas.begin(), formulas.end(), [&](const Formula& other) {
         return std::find(formula.inputs.begin(), formula.inputs.end(), other.axis) !=
@@ -121,7 +121,7 @@ void BlockPoints::sort(std::vector<Formula> formulas) {
 
 void BlockPoints::count_models() {
   const bool is_product = block_kind(block_) == BlockKind::kProduct;
-  std::vector<bool> varies;  // among the points of one combination of model axes
+  std::vector<bool> varies;  // whether the axis varies within one combination of model axes
   for (const Source& source : sources_) {
     varies.push_back(is_drawn(*source.layout.axis) &&
                      (!is_product || is_point_key(source.layout.key)));

@@ -18,31 +18,31 @@
 
 namespace oblique::protocol {
 
-/// The beginning of a sentence: `I = "A^2 / (4 * pi)"`.
+/// The beginning of a message about an expression: `I = "A^2 / (4 * pi)"`.
 std::string expression_in_words(std::string_view key, const std::string& text);
 
 /// The points of one block of any kind, each computed from its number. Not thread-safe. `base` and
 /// `block` must outlive it.
 class BlockPoints {
  public:
-  /// The axes must have passed `check_axis`. `base` has the values of keys that the block has not.
-  /// Throws solver::InputError for an expression or filter that cannot be read, that has unknown
-  /// names, or that depends on itself.
+  /// The axes must have passed `check_axis`. `base` has the values of keys that the block does not
+  /// have. Throws solver::InputError for an expression or filter that cannot be read, that has
+  /// unknown names, or that depends on itself.
   BlockPoints(const solver::ModelParameters& base, const Block& block);
 
   std::uint64_t points() const { return points_; }
-  /// Number of models: that of the combinations of model axes in a product, 1 if no model key
-  /// varies, and the number of points if a model key depends on what varies from point to point.
+  /// Number of models: 1 if no model key varies, in a product the number of combinations of model
+  /// axes, and the number of points if a model key depends on a value that varies with the point.
   std::uint64_t models() const { return models_; }
 
-  /// Computes the values of a point, which all functions below are about.
+  /// Computes the values of a point. The functions below refer to it.
   void go_to(std::uint64_t point);
 
   /// The values in the order of the axes. Those of expressions may be out of range or NaN.
   std::span<const double> values() const { return values_; }
-  /// Whether the filter keeps the point. NaN keeps nothing.
+  /// Whether the filter keeps the point. A filter that is NaN does not.
   bool is_left_in();
-  /// The model. For a value that is not allowed it has that of `base`.
+  /// The model of the point. A value that is not allowed is replaced by that of `base`.
   solver::ModelParameters model() const;
   /// Why the point cannot be solved, or that its filter is NaN, as a sentence with the values;
   /// empty if nothing is wrong.
@@ -52,13 +52,13 @@ class BlockPoints {
   /// Where the value of an axis without expression comes from.
   struct Source {
     AxisLayout layout;
-    std::uint32_t dimension;  ///< of the sample, if it is drawn
+    std::uint32_t dimension;  ///< dimension in the sample, if the axis is drawn
     std::optional<RangeValues> range{};
     std::optional<sampling::Quantiles> quantiles{};
-    std::uint64_t last = ~std::uint64_t{0};  ///< number of the value that was computed last
+    std::uint64_t last = ~std::uint64_t{0};  ///< index of the value that was computed last
   };
-  /// An expression, where its inputs stand in `values_`, or behind them in `constants_`, and which
-  /// axis has the result.
+  /// An expression, the indices of its inputs in `values_` followed by `constants_`, and the axis
+  /// of the result.
   struct Formula {
     expressions::Expression expression;
     std::vector<std::size_t> inputs;
@@ -77,13 +77,13 @@ class BlockPoints {
   const solver::ModelParameters& base_;
   const Block& block_;
   std::vector<Source> sources_;    ///< one per axis
-  std::vector<Formula> formulas_;  ///< each after those that give its inputs
+  std::vector<Formula> formulas_;  ///< each after those that compute its inputs
   std::optional<Formula> filter_;
   std::uint64_t at_ = ~std::uint64_t{0};
   std::vector<double> values_;
-  std::optional<double> filter_value_;  ///< of the point, once computed
+  std::optional<double> filter_value_;  ///< of the current point, once computed
   std::vector<double> constants_;       ///< inputs from the base model
-  std::vector<double> inputs_;          ///< of the formula being computed
+  std::vector<double> inputs_;          ///< of the current formula
   std::uint64_t points_ = 0;
   std::uint64_t models_ = 1;
 };

@@ -12,12 +12,12 @@ namespace oblique::protocol {
 namespace {
 
 constexpr std::string_view kModelHead = "oblique-model-1";
-/// The keys of version 1 behind `lengths`, always written. Keys that came later follow them only
-/// where they are not at their default, so that texts from before stay the same.
+/// The keys of version 1 after `lengths`, which are always written. Later keys follow only if they
+/// do not have their default, so that earlier texts stay valid.
 constexpr std::string_view kFirstKeys =
     "E A I rho g elements_per_link k eta2 tip_mass integrator spectral_radius dt dt_fall";
 
-/// Both zeros have one text.
+/// The text of a number; both zeros have the same.
 std::string number(double value) {
   return solver::exact_number(value + 0.0);
 }
@@ -35,7 +35,8 @@ bool is_later_key(const solver::ParameterKey& key) {
          std::find(first.begin(), first.end(), key.name) == first.end();
 }
 
-/// Leaves out the ends of a range that is none. A range of one or two values is their list.
+/// The bytes for comparison. A range of one or two values becomes a list, and the ends of an axis
+/// that is not a range are left out.
 std::string comparable_bytes(Block block) {
   for (Axis& axis : *block.mutable_axes()) {
     if (axis.count() == 1 || axis.count() == 2) {
@@ -82,7 +83,7 @@ void read_field(solver::ModelParameters& model, std::string_view name, std::stri
   const double set = name == "integrator" ? static_cast<double>(solver::integrator_named(value))
                                           : read_number(value);
   if (name == "elements_per_link") {
-    solver::check_value(*key, set);  // or the struct cannot hold it
+    solver::check_value(*key, set);  // throws if the struct cannot hold the value
   }
   key->set(model, set);
 }
@@ -120,7 +121,7 @@ solver::ModelParameters model_of_canonical(std::string_view text) {
       read_field(model, field.substr(0, equals), field.substr(equals + 1));
     }
   }
-  // One text a model: what is missing, twice or in another order shows here.
+  // A model has one text, so this finds keys that are missing, repeated or in another order.
   if (canonical_model(model) != text) {
     throw_not_canonical();
   }

@@ -28,10 +28,10 @@ namespace {
 using solver::InputError;
 using solver::ParameterKey;
 
-/// Most bytes of a recipe, with room for the rest of the frame that takes it to a worker.
+/// Most bytes of a recipe, so that the frame that brings it to a worker has room for other fields.
 constexpr std::size_t kLongestRecipe = kMaxFrameBytes - 1024;
 
-/// Throws InputError with the sentence, in which each {} becomes an argument, unless `is_met`.
+/// Unless `is_met`, throws InputError with `sentence`, formatted with the arguments.
 template <typename... Arguments>
 void require(bool is_met, std::string_view sentence, const Arguments&... arguments) {
   [[maybe_unused]] const auto readable = [](const auto& argument) {
@@ -46,7 +46,7 @@ void require(bool is_met, std::string_view sentence, const Arguments&... argumen
   }
 }
 
-/// Takes one pass over values that rise or fall, and a sort of others.
+/// Throws InputError if a list has a value twice. Sorts only values that neither rise nor fall.
 void check_repetition(const ParameterKey& key, const Axis& axis) {
   std::vector<double> values(axis.values().begin(), axis.values().end());
   if (std::adjacent_find(values.begin(), values.end(), std::greater_equal<>()) != values.end() &&
@@ -63,12 +63,12 @@ void check_list(const ParameterKey& key, const Axis& axis, BlockKind kind) {
   for (const double value : axis.values()) {
     solver::check_value(key, value);
   }
-  if (kind != BlockKind::kZip) {  // measured values side by side may come twice
+  if (kind != BlockKind::kZip) {  // in a zip a measured value may occur twice
     check_repetition(key, axis);
   }
 }
 
-/// The key takes whole numbers only, if it takes `from` and what lies between it and `to`.
+/// Whether the key takes only whole numbers, given that it takes `from` and values up to `to`.
 bool takes_whole_numbers(const ParameterKey& key, double from, double to) {
   return !key.is_allowed(from + std::min(0.25, 0.5 * (to - from)));
 }
@@ -91,14 +91,15 @@ void check_range(const ParameterKey& key, const Axis& axis) {
   const RangeValues values(axis);
   if (axis.spacing() == SPACING_LOGARITHMIC) {
     check_positive(key, axis.from());
-    // Few whole numbers have equal ratios, so this soon finds a value that is not allowed.
+    // Few sequences of whole numbers have equal ratios, so this soon finds a value that is not
+    // allowed.
     const bool takes_whole = takes_whole_numbers(key, axis.from(), axis.to());
     for (std::uint64_t i = 0; takes_whole && i < axis.count(); ++i) {
       solver::check_value(key, values.at(i));
     }
     return;
   }
-  // A key takes an interval or its whole numbers; if the second value is whole, so are all.
+  // A key takes an interval or its whole numbers. If the second value is whole, all are.
   solver::check_value(key, values.at(std::min<std::uint64_t>(1, axis.count() - 1)));
 }
 
@@ -150,7 +151,7 @@ void check_distribution(const ParameterKey& key, const Axis& axis) {
   }
 }
 
-/// Checks the text and its names; circles are found in the block.
+/// Checks the text and its names. BlockPoints finds circular expressions.
 void check_expression(const Axis& axis) {
   try {
     const expressions::Expression expression(axis.expression());
@@ -279,7 +280,7 @@ bool is_judged_by_points(const solver::ModelParameters& model, const Block& bloc
     check_reach(model, block);
     return false;
   } catch (const InputError&) {
-    return true;  // the largest H may be of another point than the shortest finger
+    return true;  // the point with the largest H may not be that with the shortest finger
   }
 }
 

@@ -7,8 +7,8 @@
 #include "proto/recipe/blocks.h"
 #include "worker/solver/model/parameters.h"
 
-// What a study may be. These are the only rules: who writes a study puts the place before their
-// message, who receives one asks them again.
+// The rules for studies. Parsers of files and flags call these functions and put the place before
+// the message; the server calls them again for a received study.
 namespace oblique::protocol {
 
 /// A block lacks H, mu or e. The message begins with the key.
@@ -17,22 +17,23 @@ class MissingKey : public solver::InputError {
   using solver::InputError::InputError;
 };
 
-/// Throws InputError naming key, value and what is allowed unless each value is finite and in the
-/// key's domain, and they are a list, a range that rises, or what such a block takes besides: in a
-/// product a list has no value twice, a sample draws from distributions. Of an expression only the
-/// text is judged. Costs a look at each listed value, and at three of a range.
+/// Throws InputError, which names key, value and what is allowed, unless the axis is a list, a
+/// rising range, an expression or, in a sample, a distribution, and each value is finite and in the
+/// key's domain. Except in a zip a list must not have a value twice. Of an expression only the text
+/// is checked. Reads each value of a list, and three of a range.
 void check_axis(const Axis& axis, BlockKind kind = BlockKind::kProduct);
 
 /// The same for the two ends of a range whose count is not known yet.
 void check_ends(const solver::ParameterKey& key, double from, double to);
 
-/// Throws InputError unless the axes of a block are allowed, each once, in order, with H, mu and e
-/// (else MissingKey), fit together as the kind of the block wants, and no H is longer than the
-/// shortest chain that the block makes of `model`. Of blocks of which that depends on the point
-/// (`is_judged_by_points`) not the last.
+/// Throws InputError unless the axes of a block are allowed, each once, in order, and fit the kind
+/// of the block, and no H is larger than the length of the shortest finger of the block. Throws
+/// MissingKey if H, mu or e is missing. H is not compared with the length in blocks where this
+/// depends on the point (`is_judged_by_points`).
 void check_block(const solver::ModelParameters& model, const Block& block);
 
-/// Whether some of the values, or whether H is in reach, can be judged only point by point.
+/// Whether some values, or whether H is within the finger's length, can be checked only point by
+/// point.
 bool is_judged_by_points(const solver::ModelParameters& model, const Block& block);
 
 /// Most expressions, filters among them, that a study may have.
@@ -41,8 +42,9 @@ inline constexpr std::size_t kMostExpressions = 1000;
 /// Throws InputError for a recipe that is too long to be sent to a worker in one frame.
 void check_size(const Recipe& recipe);
 
-/// Parses the recipe that a database file has, within the limits of one from the network: parsed, a
-/// foreign one could take a hundred times its bytes. False when it is damaged or beyond them.
+/// Parses a recipe from a database file, with the same limits as for one from the network, because
+/// a parsed recipe can take a hundred times the memory of its bytes. False when it is damaged or
+/// exceeds them.
 bool parse_recipe(std::string_view bytes, Recipe& recipe);
 
 }  // namespace oblique::protocol

@@ -4,13 +4,13 @@
 
 namespace oblique::sampling {
 
-/// The quantiles of an axis with a distribution, of which kind, order of ends, mean and sd have
-/// been checked. A normal distribution is truncated at its ends, where it has them.
+/// The quantiles of an axis with a distribution. Its kind, the order of its ends, mean and sd must
+/// have been checked. A normal distribution is truncated at its ends, if it has them.
 class Quantiles {
  public:
   explicit Quantiles(const protocol::Axis& axis);
 
-  /// The quantile of 0 < fraction < 1: it rises with `fraction` and lies between the ends.
+  /// The quantile of 0 < fraction < 1. It rises with `fraction` and is between the ends.
   double value_at(double fraction) const;
 
   /// Part of the whole normal distribution between the ends; 1 for the other kinds. Below
@@ -31,7 +31,7 @@ class Quantiles {
   bool is_mirrored_ = false;
 };
 
-/// The z that part 0 < p < 1 of the standard normal distribution lies below, to about 1e-15.
+/// The quantile z of 0 < p < 1 in the standard normal distribution, to about 1e-15.
 double normal_quantile(double p);
 
 /// Part of the standard normal distribution below z, also far below the mean to about 1e-15.

@@ -19,7 +19,7 @@ using solver::InputError;
 
 constexpr std::size_t kLongestQuoted = 40;
 
-/// A condition without a value must not pass for false, so NaN stays NaN.
+/// NaN stays NaN, because an undefined condition must not count as false.
 double truth(const double* x, bool value) {
   return std::isnan(x[0]) || std::isnan(x[1]) ? std::numeric_limits<double>::quiet_NaN()
                                               : static_cast<double>(value);
@@ -52,7 +52,7 @@ constexpr std::array<Function, 22> kFunctions{{
                                                             : x[2]; }},
 }};
 
-/// From the weakest. `not` and signs stand before one value.
+/// From the weakest. `not` and signs precede one value.
 enum Priority { kOr = 1, kAnd, kNot, kComparison, kSum, kProduct, kSign, kPower };
 
 struct Operator {
@@ -61,7 +61,7 @@ struct Operator {
   double (*compute)(const double* x);
 };
 
-/// Between two values. The first that matches is taken, so `<=` stands before `<`.
+/// Binary operators. The first match is used, so `<=` precedes `<`.
 constexpr std::array<Operator, 15> kOperators{{
     {"||", kOr, [](const double* x) { return truth(x, x[0] != 0.0 || x[1] != 0.0); }},
     {"or", kOr, [](const double* x) { return truth(x, x[0] != 0.0 || x[1] != 0.0); }},
@@ -110,7 +110,7 @@ std::string_view name_at(std::string_view text) {
 
 }  // namespace
 
-/// Precedence climbing. Each function appends the steps of what it reads.
+/// Parses by precedence climbing. Each function appends the steps of the text that it reads.
 class Expression::Parser {
  public:
   Parser(std::string_view text, Expression& to) : rest_(text), to_(to) {}
@@ -129,7 +129,7 @@ class Expression::Parser {
   }
 
  private:
-  /// The next character that is no space, or 0 at the end.
+  /// The next character that is not a space, or 0 at the end.
   char next() {
     rest_.remove_prefix(std::min(rest_.find_first_not_of(" \t"), rest_.size()));
     return rest_.empty() ? '\0' : rest_[0];
@@ -161,7 +161,7 @@ class Expression::Parser {
     throw_foreign(c);
   }
 
-  /// A value and all operations behind it that bind at least as strongly as `weakest`.
+  /// Reads a value and all following operations that bind at least as strongly as `weakest`.
   void read_operations(int weakest) {
     read_value(weakest);
     bool is_compared = false;

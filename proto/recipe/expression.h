@@ -8,7 +8,7 @@
 
 namespace oblique::expressions {
 
-/// Longest text of an expression in bytes, and the most brackets and signs inside each other.
+/// Longest text of an expression [bytes], and the most nested brackets and signs.
 inline constexpr std::size_t kLongestText = 1000;
 inline constexpr std::size_t kDeepestNesting = 32;
 
@@ -26,13 +26,14 @@ std::vector<std::string_view> function_names();
 /// brackets and functions. Not thread-safe.
 class Expression {
  public:
-  /// Throws solver::InputError that says what is wrong and what is allowed, without the text.
+  /// Throws solver::InputError, which says what is wrong and what is allowed but does not repeat
+  /// the text.
   explicit Expression(std::string_view text);
 
   /// The names in the text, each once, in the order of `value_at`'s values.
   const std::vector<std::string>& names() const { return names_; }
 
-  /// May be NaN or infinite. A comparison is 1 or 0, or NaN if one of its sides is NaN.
+  /// The value, which may be NaN or infinite. A comparison is 1 or 0, or NaN if a side is NaN.
   double value_at(std::span<const double> values);
 
  private:

@@ -3,7 +3,8 @@
 namespace oblique::protocol {
 namespace {
 
-/// Whole numbers travel unsigned and become `int` and an enumeration here: the check comes first.
+/// Messages have unsigned numbers, and the struct has `int` and an enumeration: checks the range
+/// before the conversion.
 int checked_whole_number(std::string_view key, std::uint32_t value) {
   solver::check_value(*solver::find_model_key(key), static_cast<double>(value));
   return static_cast<int>(value);

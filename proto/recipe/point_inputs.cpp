@@ -11,14 +11,15 @@
 namespace oblique::protocol {
 namespace {
 
-/// A study of one model, whose results have none, may have grown since by other models.
+/// Whether the model of the result is model `number`. A result without a model is of a study that
+/// had one model when it was solved, but may have grown since.
 bool has_model(const PointResult& result, std::uint64_t number, const PointTable& table) {
   if (!result.has_model()) {
     return number == 0;
   }
   try {
     return is_close(unjudged_from_message(result.model()), table.model(number));
-  } catch (const solver::InputError&) {  // a whole number that no model has
+  } catch (const solver::InputError&) {  // a whole number outside the domain
     return false;
   }
 }

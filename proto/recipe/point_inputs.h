@@ -6,16 +6,16 @@
 #include "proto/recipe/point_table.h"
 #include "worker/solver/model/parameters.h"
 
-// H, mu, e and the model of a point, which two machines may compute with other last bits.
+// H, mu, e and the model of a point. Two machines may compute them with different last bits.
 namespace oblique::protocol {
 
-/// Whether `value` is the finite number `own`, within a relative difference of 1e-12. Zero is only
-/// close to itself.
+/// Whether `value` equals the finite number `own` to within a relative difference of 1e-12. Only
+/// zero is close to zero.
 bool is_close(double value, double own);
-/// Whether every parameter is. Whole numbers must be equal.
+/// Whether every parameter is close. Whole numbers must be equal.
 bool is_close(const solver::ModelParameters& model, const solver::ModelParameters& own);
 
-/// Sets the inputs of the result's point. The model only when the study has several.
+/// Sets the inputs of the result's point; the model only if the study has several.
 void set_inputs(PointResult& result, const PointTable& table);
 
 /// Why the inputs of a result are not those of its point in `table`, or an empty text. A failed

@@ -21,7 +21,7 @@ namespace {
 
 using solver::InputError;
 
-/// A point's values are finite in every row and message.
+/// Rows and messages contain finite values only.
 double finite_or_0(double value) {
   return std::isfinite(value) ? value : 0.0;
 }
@@ -34,7 +34,7 @@ std::size_t expressions_in(const Block& block) {
 
 }  // namespace
 
-/// Compiled blocks, each lent to one caller at a time. Keeps those that were returned last.
+/// Compiled blocks, each used by one caller at a time. Keeps the ones that were returned last.
 class PointTable::Pool {
  public:
   Pool(const solver::ModelParameters& base, const Recipe& recipe) : base_(base), recipe_(recipe) {}
@@ -55,7 +55,7 @@ class PointTable::Pool {
   }
 
  private:
-  static constexpr std::size_t kMostIdle = 32;  // more than threads; few enough to search
+  static constexpr std::size_t kMostIdle = 32;  // more than threads, few enough to search
 
   std::unique_ptr<BlockPoints> take(std::size_t block) {
     const std::lock_guard lock(mutex_);
@@ -75,7 +75,8 @@ class PointTable::Pool {
   std::vector<std::pair<std::size_t, std::unique_ptr<BlockPoints>>> idle_;
 };
 
-/// Puts the number of the block before what `act` throws, if there are several blocks.
+/// Calls `act`. If there are several blocks, puts the block's number before the message of its
+/// error.
 template <typename Act>
 auto PointTable::in_block(std::size_t number, Act act) const {
   try {

@@ -20,7 +20,7 @@ struct Point {
   double e_star;
 };
 
-/// Points of a study that follow each other and share a model.
+/// Consecutive points of a study that share a model.
 struct Segment {
   std::uint64_t model;
   std::uint64_t first_point;
@@ -30,7 +30,7 @@ struct Segment {
 /// The points and models of one block.
 struct BlockPlace {
   std::uint64_t first_point;
-  std::uint64_t points;  ///< also those that the filter leaves out
+  std::uint64_t points;  ///< including those that the filter leaves out
   std::uint64_t first_model;
   std::uint64_t models;
   bool is_judged_by_points;  ///< see checks.h
@@ -51,36 +51,36 @@ class PointTable {
   PointTable& operator=(const PointTable&) = delete;
 
   const Recipe& recipe() const { return *recipe_; }
-  /// Whether results are to have estimated errors.
+  /// Whether the study requests estimated errors.
   bool wants_errors() const { return recipe_->errors(); }
-  std::uint64_t size() const { return points_; }  ///< number of point numbers
+  std::uint64_t size() const { return points_; }  ///< number of points, including left-out ones
   std::uint64_t models() const { return models_; }
 
   bool has_filter() const { return has_filter_; }
   bool is_left_in(std::uint64_t index) const;
-  /// The first point of [begin, end) that is left in, or `end`. Throws std::out_of_range for an end
-  /// beyond the last point.
+  /// The first point of [begin, end) that filters keep, or `end`. Throws std::out_of_range for an
+  /// end beyond the last point.
   std::uint64_t first_left_in(std::uint64_t begin, std::uint64_t end) const;
 
-  /// Whether some values or filters can be judged only by their points.
+  /// Whether some values or filters can be checked only at points.
   bool needs_judging() const;
-  /// Judges such blocks by their points: by all of them or, where these are more than `kMostJudged`
-  /// in all blocks together, by some at random. Takes up to about 0.1 s. Throws solver::InputError
-  /// that names block, point and values for a value that is not allowed, and for a filter that
-  /// leaves out all points of its block. What is not found fails (`fault`).
+  /// Checks such blocks at all of their points or, if these are more than `kMostJudged` in all
+  /// blocks together, at random points. Takes up to about 0.1 s. Throws solver::InputError, which
+  /// names block, point and values, for a value that is not allowed. Also throws for a filter that
+  /// leaves out all points of its block, if all were checked. A point with a wrong value that was
+  /// not found fails later (`fault`).
   void judge_points() const;
   static constexpr std::uint64_t kMostJudged = 100'000;
 
   /// Why a point cannot be solved, as a sentence, or an empty text.
   std::string fault(std::uint64_t index) const;
 
-  /// Throw std::out_of_range for a point or model outside the study. A value that is not finite
-  /// reads as 0; a model value that is not allowed as that of the recipe's model.
+  /// Throw std::out_of_range for a point or model outside the study. A value that is not finite is
+  /// returned as 0, a model value that is not allowed as that of the recipe's model.
   Point point(std::uint64_t index) const;
   solver::ModelParameters model(std::uint64_t index) const;
   /// The longest run of points around `index` that share its model. Adjacent blocks without model
-  /// axes are one run, so that a study of many small blocks is leased and solved like a large
-  /// block.
+  /// axes are one run, so that many small blocks are leased and solved like one large block.
   Segment segment_at(std::uint64_t index) const;
 
   /// Throw std::out_of_range for a block or point outside the study.
@@ -99,8 +99,8 @@ class PointTable {
   std::unique_ptr<Recipe> recipe_;  ///< stays where it is when the table moves
   solver::ModelParameters base_model_;
   std::vector<BlockPlace> blocks_;
-  std::vector<Segment> base_segments_;     ///< of the blocks without model axes, in order
-  std::vector<std::size_t> model_blocks_;  ///< blocks that bring models of their own, in order
+  std::vector<Segment> base_segments_;              ///< of the blocks without model axes, in order
+  std::vector<std::size_t> model_blocks_;           ///< blocks with models of their own, in order
   std::optional<std::uint64_t> base_model_number_;  ///< shared by all blocks without model axes
   std::uint64_t points_ = 0;
   std::uint64_t models_ = 0;

@@ -74,8 +74,8 @@ double middle(std::uint64_t bits, int digits) {
   return std::ldexp(static_cast<double>(bits) + 0.5, -digits);
 }
 
-/// (stratum + u) / count with u in (0, 1). u has as many digits as leave the sum exact: the
-/// quotient then stays within the stratum and below 1.
+/// (stratum + u) / count with u in (0, 1). u has so few digits that the sum is exact; so the
+/// quotient is within the stratum and below 1.
 double stratified_fraction(std::uint64_t count, std::uint64_t key, std::uint64_t index) {
   const int digits = kSobolBits - static_cast<int>(std::bit_width(count));
   const double within = middle(hashed(mixed(key), index) >> (64 - digits), digits);

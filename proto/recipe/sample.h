@@ -4,16 +4,17 @@
 
 #include "proto/oblique.pb.h"
 
-// Points of the unit cube, each a function of its number alone.
+// Points of the unit cube, each a function of its number.
 namespace oblique::sampling {
 
 inline constexpr std::uint64_t kMostPoints = std::uint64_t{1} << 44;
 inline constexpr std::uint32_t kSobolDimensions = 32;
 inline constexpr int kSobolBits = 52;
 
-/// Coordinate `dimension` of point `index`, in (0, 1): independent, one in each of `count` equal
-/// strata (Latin hypercube), or Sobol's sequence with Owen's scrambling. Takes the same time for
-/// any index and count. Throws std::out_of_range for a dimension or point outside the sample.
+/// Coordinate `dimension` of point `index`, in (0, 1). By the kind of the sample: independent, one
+/// point in each of `count` equal strata (Latin hypercube), or Sobol's sequence with Owen's
+/// scrambling. Takes the same time for any index and count. Throws std::out_of_range for a
+/// dimension or point outside the sample.
 double fraction(const protocol::Sample& sample, std::uint32_t dimension, std::uint64_t index);
 
 /// Number `index` of the sequence of `key` by SplitMix64 (Steele, Lea and Flood, Fast splittable

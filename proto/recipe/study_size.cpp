@@ -10,15 +10,16 @@
 namespace oblique::protocol {
 namespace {
 
-/// A result and a model in a database, on average (server/store/README.md).
+/// Average size of a result and of a model in a database (server/store/README.md).
 constexpr std::uint64_t kBytesAResult = 650;
 constexpr std::uint64_t kBytesAModel = 600;
 
-/// By the hash of a fall, how many of the points that were looked at have it.
+/// Number of examined points by the hash of their fall.
 using MetFalls = std::unordered_map<std::uint64_t, std::uint64_t>;
 
-/// Falls of `points` points after `looks`, from the numbers of those met once and twice (Chao
-/// 1984), but no more than if each fall that was not met had one point.
+/// Estimates the number of falls of `points` points after `looks` points were examined, from the
+/// numbers of falls that were met once and twice (Chao 1984). At most as many as if each fall that
+/// was not met had one point.
 std::uint64_t estimated_falls(const MetFalls& met, double looks, double points) {
   double once = 0.0;
   double twice = 0.0;
@@ -49,7 +50,7 @@ StudySize size_of(const PointTable& table) {
   size.bytes = kBytesAResult * size.points + kBytesAModel * std::min(size.models, size.points);
   MetFalls met;
   std::uint64_t looks = 0;
-  std::optional<std::uint64_t> model;  // of the last point, and its fall
+  std::optional<std::uint64_t> model;  // of the last point; `fall` is its fall
   std::uint64_t fall = 0;
   const auto look_at = [&](std::uint64_t point) {
     if (const auto next = table.point(point).model; next != model) {
@@ -73,7 +74,7 @@ StudySize size_of(const PointTable& table) {
   }
   for (std::uint64_t i = 0; i < kTries && looks < kLooks; ++i) {
     const std::uint64_t point = sampling::hashed(0, i) % numbers;
-    if (table.is_left_in(point) || i + 1 == kTries) {  // one point at least
+    if (table.is_left_in(point) || i + 1 == kTries) {  // at least one point is examined
       look_at(point);
     }
   }

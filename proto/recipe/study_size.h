@@ -8,24 +8,24 @@
 
 namespace oblique::protocol {
 
-/// How much a study is.
+/// The size of a study.
 struct StudySize {
-  std::uint64_t points;   ///< that filters leave in
-  bool points_estimated;  ///< from points at random
+  std::uint64_t points;   ///< points that filters keep
+  bool points_estimated;  ///< `points` is estimated from random points
   std::uint64_t models;
-  std::uint64_t falls;                  ///< different ones
-  bool falls_estimated;                 ///< from 10^4 random points: the study has more than 10^5
-  std::uint64_t bytes;                  ///< in a database
-  std::vector<std::uint64_t> examples;  ///< numbers of up to 64 points, at random
+  std::uint64_t falls;   ///< different falls
+  bool falls_estimated;  ///< from 10^4 random points, because the study has more than 10^5
+  std::uint64_t bytes;   ///< size in a database
+  std::vector<std::uint64_t> examples;  ///< numbers of up to 64 random points
 };
 StudySize size_of(const PointTable& table);
 
-/// Points that a filter leaves in.
+/// Number of points that a filter keeps.
 struct PointsLeftIn {
   std::uint64_t points;
   bool estimated;
 };
-/// Of a block of the recipe. Counted up to 10^5 points, else estimated from 10^4 at random.
+/// For a block of the recipe: counted up to 10^5 points, else estimated from 10^4 random points.
 PointsLeftIn points_left_in(const PointTable& table, std::size_t block);
 
 }  // namespace oblique::protocol

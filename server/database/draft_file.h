@@ -4,11 +4,11 @@
 
 namespace oblique::server {
 
-/// The path of a database in the making, with all that SQLite puts beside it. What is there goes
-/// with this object, so that a half-made database never has its name.
+/// A database that is not complete yet, and the files that SQLite puts beside it. The destructor
+/// deletes them, so that an incomplete database never has the final name.
 class DraftFile {
  public:
-  /// Makes the file, empty and for its owner alone (mode 0600). Throws StorageError.
+  /// Creates an empty file with mode 0600. Throws StorageError.
   explicit DraftFile(std::string path);
   ~DraftFile();
   DraftFile(const DraftFile&) = delete;

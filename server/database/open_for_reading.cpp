@@ -12,12 +12,12 @@ namespace {
 
 constexpr int kBusyTimeout_ms = 5000;
 
-/// SQLite's code for a first look at the contents.
+/// SQLite's result code for a first read.
 int look_at(sqlite3* database) {
   return sqlite3_exec(database, "PRAGMA schema_version", nullptr, nullptr, nullptr);
 }
 
-/// SQLite could not make or open what it wants beside the database.
+/// Whether SQLite could not create or open a file beside the database.
 bool lacks_files(int code) {
   const unsigned kind = static_cast<unsigned>(code) & 0xffU;
   return kind == SQLITE_CANTOPEN || kind == SQLITE_READONLY;
@@ -44,12 +44,12 @@ std::string as_uri(const std::string& path) {
   return uri;
 }
 
-/// Without anything beside it: the index of a log is held in memory.
+/// Opens a database without files beside it; the index of the log is in memory.
 DatabaseHandle open_alone(const std::string& path) {
   std::error_code no_log;
   const bool has_log = std::filesystem::file_size(path + "-wal", no_log) > 0 && !no_log;
-  // A database that SQLite calls immutable has no log. One without locks may have its index in
-  // memory, where an exclusive one has it.
+  // SQLite ignores the log of an immutable database. With a log, the database is opened without
+  // locks and in exclusive mode, in which SQLite keeps the index of the log in memory.
   DatabaseHandle database =
       open_database(as_uri(path) + (has_log ? "?vfs=unix-none" : "?immutable=1"),
                     SQLITE_OPEN_READONLY | SQLITE_OPEN_URI);

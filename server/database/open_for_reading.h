@@ -6,26 +6,25 @@
 
 namespace oblique::server {
 
-/// A database that is only read, and what there is to say of how.
+/// A database that is only read, and a remark on how.
 struct OpenedForReading {
   DatabaseHandle database;
-  std::string remark;  ///< a sentence for people; empty: nothing is unusual
+  std::string remark;  ///< a sentence; empty: nothing is unusual
 };
 
-/// Opens the database at `path`, whose contents may be anything, for reading only; nothing is
-/// changed beside it either where that is possible. SQLite wants to put an index of the write-ahead
-/// log beside a database; where nothing can be written, in a folder of somebody else or on a
-/// read-only disk, it is read without one, rows in the log included. Throws StorageError when there
-/// is no such file or it cannot be opened.
+/// Opens the database at `path` for reading only; does not check whether it is ours. SQLite may
+/// create an index of the write-ahead log beside it. In a folder that cannot be written the
+/// database is read without that file, including the rows in the log. Throws StorageError when
+/// there is no such file or it cannot be opened.
 OpenedForReading open_for_reading(const std::string& path);
 
-/// The same, and surely nothing is made or changed beside it, and nobody is waited for: where a log
-/// lies beside it without its index, its rows are read into memory, and where none does, the
-/// database is read without regard to who may begin to write to it.
+/// The same, but never creates or changes a file beside it and never waits for a lock. If there is
+/// a log without its index, the index is made in memory. If there is no log, the database is read
+/// without locks, and writes by another program are not noticed.
 DatabaseHandle open_without_traces(const std::string& path);
 
-/// As `open_for_reading` for a database that is ours and has had a study stored in it; throws
-/// StorageError, saying what it is instead, for any other.
+/// As `open_for_reading`; throws StorageError, which says what was found, unless the file is a
+/// database of ours with tables.
 OpenedForReading open_stored(const std::string& path);
 
 }  // namespace oblique::server

@@ -9,11 +9,11 @@
 
 namespace oblique::server {
 
-/// The checksum of a row: the CRC-32 (as zlib computes it) of its values. Each counts with its type
-/// and bytes: 'n' for NULL; 'i' and eight bytes, least first; 'r' and the eight bytes of the
-/// double, likewise, a negative zero as zero; 't' or 'b', the length in eight bytes, and the bytes
-/// of the text or blob. NULLs behind all other values do not count, so that a row keeps its
-/// checksum when its table gets a column that it lacks.
+/// The checksum of a row: the CRC-32 (as zlib computes it) of its values. The bytes of a value are
+/// its type and contents. NULL: 'n'. Integer: 'i' and eight bytes, least significant first. Real:
+/// 'r' and the eight bytes of the double in the same order; negative zero as zero. Text or blob:
+/// 't' or 'b', the length in eight bytes, and its bytes. NULLs after the last other value are left
+/// out, so that a row keeps its checksum when its table gets a new column.
 class RowChecksum {
  public:
   void clear();
@@ -28,12 +28,12 @@ class RowChecksum {
   void add_word(char type, std::uint64_t word);
   void add_bytes(char type, std::string_view bytes);
 
-  std::string bytes_;    // keeps its room
-  std::size_t end_ = 0;  // behind the last value that is not NULL
+  std::string bytes_;    // keeps its capacity
+  std::size_t end_ = 0;  // after the last value that is not NULL
 };
 
-/// Gives the connection the SQL function `row_checksum(value, ...)`: the checksum of its arguments,
-/// an integer from 0 to 2^32 - 1. Throws StorageError.
+/// Adds the SQL function `row_checksum(value, ...)` to the connection: the checksum of its
+/// arguments, an integer from 0 to 2^32 - 1. Throws StorageError.
 void add_row_checksum(sqlite3* database);
 
 }  // namespace oblique::server

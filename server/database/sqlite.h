@@ -20,8 +20,8 @@ class StorageError : public std::runtime_error {
 };
 
 /// The file of the database was deleted, renamed or replaced while it was open, or a sync failed:
-/// nothing can be stored until the program starts again. After a failed sync Linux takes what it
-/// could not write for written, so that a second sync succeeds without having stored it.
+/// nothing can be stored until the program starts again. After a failed sync Linux marks the
+/// unwritten pages as clean, so that a second sync succeeds without having stored them.
 class StorageGone : public StorageError {
  public:
   using StorageError::StorageError;
@@ -43,7 +43,7 @@ DatabaseHandle open_database(const std::string& path, int flags);
 /// Runs statements that return no rows. Throws StorageError.
 void execute(sqlite3* database, const std::string& sql);
 
-/// Bytes that are bound as a blob.
+/// Bytes to bind as a blob.
 struct Blob {
   std::string_view bytes;
 };
@@ -58,11 +58,11 @@ class Statement {
   void bind(int index, std::uint64_t value);
   void bind(int index, double value);  ///< a NaN is stored as NULL
   void bind(int index, std::string_view text);
-  /// The same without a copy: the text must stay where it is until the statement was reset.
+  /// The same without a copy: the text must stay in place until the statement is reset.
   void bind_lasting(int index, std::string_view text);
   void bind_blob(int index, std::string_view bytes);
   void bind_null(int index);
-  /// The value, of whatever type, that another statement's row has in that column.
+  /// Binds the value of column `column` of `row`, with its type.
   void bind_column(int index, const Statement& row, int column);
 
   /// Binds the values to the parameters 1, 2 and so on.
@@ -85,7 +85,7 @@ class Statement {
   std::int64_t integer(int column) const;
   double real(int column) const;
   std::string text(int column) const;  ///< bytes of a text or blob
-  /// The same without a copy, until the statement goes on.
+  /// The same without a copy, valid until the next call of `step` or `reset`.
   std::string_view bytes(int column) const;
 
  private:
@@ -132,17 +132,17 @@ class Transaction {
   bool open_ = true;
 };
 
-/// The schema that this program writes, and the marks that tell its databases from others.
+/// Values of PRAGMA application_id and PRAGMA user_version in our databases.
 inline constexpr std::int32_t kApplicationId = 0x6f626c71;  // "oblq"
 inline constexpr std::int32_t kSchemaVersion = 11;
 
 enum class DatabaseKind { kEmpty, kOurs };
 
-/// Says whether an open database is empty or ours. Throws StorageError naming what was found when
-/// it is a foreign file or has another schema. `path` is for the messages.
+/// Whether an open database is empty or ours. Throws StorageError, which names the reason, for a
+/// foreign file or another schema. `path` is for the messages.
 DatabaseKind identify(sqlite3* database, const std::string& path);
 
-/// Throws StorageError when `path` is there and is not a regular file.
+/// Throws StorageError when `path` exists and is not a regular file.
 void check_path(const std::string& path);
 
 }  // namespace oblique::server

@@ -14,7 +14,7 @@ void copy_pages(sqlite3* from, sqlite3* to, const std::string& path) {
   if (backup == nullptr) {
     throw StorageError("cannot write the copy " + path + ": " + sqlite3_errmsg(to));
   }
-  // All pages in one step: one instant of the source, even while a server writes to it.
+  // All pages in one step, so that the copy has one state of the source even if a server writes.
   sqlite3_backup_step(backup, -1);
   if (sqlite3_backup_finish(backup) != SQLITE_OK) {
     throw StorageError("cannot write the copy " + path + ": " + sqlite3_errmsg(to));
@@ -28,7 +28,7 @@ std::string copy_into(const DraftFile& draft, const std::string& from, const std
   const DatabaseHandle copy =
       open_database(draft.path(), SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
   copy_pages(source.database.get(), copy.get(), to);
-  // One file, without a log beside it.
+  // So that the copy is one file, without a log.
   execute(copy.get(), "PRAGMA journal_mode = DELETE");
   if (const auto faults = faults_of_pages(copy.get()); !faults.empty()) {
     throw StorageError(from + " is damaged, and so would be the copy: " + faults.front());

@@ -30,7 +30,7 @@ namespace {
 
 constexpr std::size_t kMostOfAKind = 20;
 
-/// Appends the first column of the first rows.
+/// Appends the first column of the first kMostOfAKind rows.
 void append(std::vector<std::string>& to, sqlite3* database, const std::string& sql) {
   Statement rows(database, sql);
   for (std::size_t i = 0; i < kMostOfAKind && rows.step(); ++i) {
@@ -60,7 +60,8 @@ std::string without_comments(std::string_view sql) {
   return rest;
 }
 
-/// Another definition could compute values without end, or take what no server stores.
+/// A table with another definition could compute values without end, or accept values that no
+/// server stores.
 std::vector<std::string> faults_of_tables(sqlite3* database) {
   std::vector<std::string> faults;
   Statement find(database,
@@ -80,7 +81,7 @@ std::vector<std::string> faults_of_tables(sqlite3* database) {
   return faults;
 }
 
-/// The column that differs from the model's definition; empty: none.
+/// The first column that differs from the model's definition; empty: none.
 std::string differing_column(const Statement& row, const solver::ModelParameters& model) {
   if (row.text(2) != nlohmann::json(model.lengths_m).dump()) {
     return "lengths_m";
@@ -165,7 +166,8 @@ class StudyCheck {
     study_faults_.push_back(fmt::format("study {}, {}: {}", studies_.integer(0), name_, fault));
   }
 
-  /// Values that no server stores could keep one from starting, or could not be shown.
+  /// Checks for values that no server stores; they could keep a server from starting, or could not
+  /// be shown.
   void check_terms() {
     constexpr std::int64_t kLongestTime = 64;
     for (const std::string& objection :
@@ -178,7 +180,7 @@ class StudyCheck {
     }
   }
 
-  /// Its points are made where the recipe can be read.
+  /// The table of the study; its points are computed if the recipe can be read.
   StudyTable read_table() {
     StudyTable table(studies_.text(2), static_cast<std::uint64_t>(studies_.integer(3)));
     try {
@@ -216,8 +218,8 @@ class StudyCheck {
     return points;
   }
 
-  /// Compares `completed_ranges` and the state with the points that have a row. A filter leaves out
-  /// completed points without a row.
+  /// Compares `completed_ranges` and the state with the points that have a row. Only a filter can
+  /// make a point completed without a row.
   void check_completed(const StudyTable& table, const IntervalSet& rows) {
     const auto& noted = noted_[static_cast<std::uint64_t>(studies_.integer(0))];
     const IntervalSet& completed = noted ? *noted : rows;
@@ -250,7 +252,7 @@ class StudyCheck {
   std::map<std::uint64_t, std::optional<IntervalSet>> noted_;
   Statement studies_;
   Statement rows_;
-  std::string name_;  // of the study that is checked
+  std::string name_;  // of the current study
   std::vector<std::string> study_faults_;
   std::vector<std::string> row_faults_;
   std::uint64_t all_rows_ = 0;
@@ -317,7 +319,7 @@ Diagnosis diagnose(const std::string& path) {
     return found;  // damaged pages make every other answer meaningless
   }
   add_row_checksum(database);
-  execute(database, "BEGIN");  // one instant of rows and counts while a server writes
+  execute(database, "BEGIN");  // so that rows and counts agree while a server writes
   for (const std::string& view : missing_views(database)) {
     found.faults.push_back(
         fmt::format("the view {} is missing: the next server on this file creates it", view));

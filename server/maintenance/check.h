@@ -10,18 +10,18 @@ namespace oblique::server {
 /// Findings about a database, a sentence each.
 struct Diagnosis {
   std::vector<std::string> faults;   ///< damage, at most twenty of a kind; empty: it is sound
-  std::vector<std::string> remarks;  ///< studies that are not finished, and what cannot be checked
+  std::vector<std::string> remarks;  ///< unfinished studies, and checks that were not possible
 };
 
 /// Checks the database at `path`: its pages, indices, tables, views and triggers, and its contents
-/// as `diagnose_contents` does. Throws StorageError when it is no database of ours.
+/// as `diagnose_contents` does. Throws StorageError when it is not a database of ours.
 Diagnosis diagnose(const std::string& path);
 
-/// The faults alone.
+/// Only the faults of `diagnose`.
 std::vector<std::string> find_faults(const std::string& path);
 
-/// What SQLite finds wrong with the pages and indices of an open database, at most twenty; empty:
-/// they are sound.
+/// The faults that SQLite finds in the pages and indices of an open database, at most twenty;
+/// empty: none.
 std::vector<std::string> faults_of_pages(sqlite3* database);
 
 /// Checks the definitions of our tables and, where these are sound, all studies, models and
@@ -30,7 +30,7 @@ std::vector<std::string> faults_of_pages(sqlite3* database);
 /// StorageError.
 Diagnosis diagnose_contents(sqlite3* database);
 
-/// What is wrong with a row of `results` by itself, as an expression; NULL: nothing.
+/// An SQL expression for the fault of a row of `results` regardless of other tables; NULL: none.
 std::string row_fault_sql();
 
 }  // namespace oblique::server

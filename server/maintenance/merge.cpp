@@ -24,10 +24,10 @@
 namespace oblique::server {
 namespace {
 
-/// Opens the copy of a source. Throws StorageError for tables that servers do not make, and for
-/// damaged rows.
+/// Opens the copy of a source. Throws StorageError for tables of another definition and for damaged
+/// rows.
 DatabaseHandle open_sound_source(const std::string& path) {
-  // The longest value of a database came in one message.
+  // A value that a server stores was part of one message, so it cannot be longer.
   constexpr int kLongestValue = static_cast<int>(2 * protocol::kMaxFrameBytes);
   DatabaseHandle database = open_database(path, SQLITE_OPEN_READONLY);
   sqlite3_limit(database.get(), SQLITE_LIMIT_LENGTH, kLongestValue);
@@ -54,11 +54,11 @@ StudyRow study_in(const Statement& row) {
           StudyTable(row.text(2), static_cast<std::uint64_t>(row.integer(3)))};
 }
 
-/// A study of the source and the one of the target that it becomes or is united with.
+/// A study of the source, and the study of the target to which its rows are copied.
 struct StudyPlace {
   std::uint64_t source_id;
   StudyRow target;
-  IntervalSet completed;  ///< points that were noted as completed in the target or source
+  IntervalSet completed;  ///< points that were completed in the target or source
 };
 
 /// Inserts and grows studies of the target so that each study of the source has a place.
@@ -67,7 +67,7 @@ class StudyMerge {
   StudyMerge(sqlite3* database, sqlite3* source, const std::string& rename_prefix, Merged& merged)
       : database_(database), source_(source), rename_prefix_(rename_prefix), merged_(merged) {}
 
-  /// Throws MergeRefused for a study without a place.
+  /// Throws MergeRefused for a study that has no place in the target.
   std::vector<StudyPlace> run() {
     std::vector<StudyPlace> places;
     Statement list(source_, fmt::format("SELECT {} FROM studies ORDER BY study_id", kStudyColumns));
@@ -86,7 +86,8 @@ class StudyMerge {
   }
 
  private:
-  /// The first free name or study of the same recipe: by its own name, and with the prefix.
+  /// The study of the target for `study`: tries its own name, then the name with the prefix. A free
+  /// name becomes a new study; a study of the same or a longer or shorter recipe is united with it.
   StudyRow place_of(const StudyRow& study) {
     std::string conflict;
     for (const std::string& name : {study.name, rename_prefix_ + study.name}) {
@@ -209,8 +210,8 @@ void copy_models_and_workers(sqlite3* database) {
   copy("worker", worker, worker);
 }
 
-/// Merges rows in parts: the points of a study above ?2 up to ?3, where ?1 is its number in the
-/// source and ?4 that in the target.
+/// Merges rows in parts. Parameters: ?1 the study's number in the source, ?4 in the target; points
+/// above ?2 and up to ?3.
 class RowMerge {
  public:
   RowMerge(sqlite3* database, Merged& merged)
@@ -249,8 +250,8 @@ class RowMerge {
  private:
   static constexpr const char* kPart = "i.study_id = ?1 AND i.point > ?2 AND i.point <= ?3";
 
-  /// Points that both have solved with other outputs, and the names of these as ', NAME, NAME'. The
-  /// time that a solver took is no output.
+  /// Selects the points that are solved in both with different outputs, and the names of these
+  /// outputs as ', NAME, NAME'. The time that the solver took is not compared.
   static std::string differing_sql() {
     std::string names;
     for (const std::string_view name : output_columns()) {
@@ -283,7 +284,7 @@ class RowMerge {
         fmt::join(result_columns(), ", "), fmt::join(values, ", "), kPart);
   }
 
-  /// Returns the number of rows of the next part; 0: there is none.
+  /// Selects the next part. Returns its number of rows; 0: no rows are left.
   std::uint64_t next_part(const StudyPlace& place) {
     first_ = last_;
     part_.bind(1, place.source_id);
@@ -338,7 +339,7 @@ class RowMerge {
   std::int64_t last_ = -1;
 };
 
-/// Copies which failed points were retried, and counts the points of each study again.
+/// Copies the table `retries`, and counts the points of each study again.
 void finish_studies(sqlite3* database, const std::vector<StudyPlace>& places) {
   Statement retries(
       database,
@@ -352,7 +353,7 @@ void finish_studies(sqlite3* database, const std::vector<StudyPlace>& places) {
     retries.bind(1, place.source_id);
     retries.bind(2, place.target.id);
     retries.run();
-    // Points that were completed without a row are those that the filter leaves out.
+    // Completed points without a row are points that the filter leaves out.
     ranges.count_again(place.target.id, place.completed);
     count_reused_and_set_state(database, place.target.id);
     place.target.table.release();
@@ -363,7 +364,7 @@ void finish_studies(sqlite3* database, const std::vector<StudyPlace>& places) {
 DatabaseHandle connect(const std::string& target, const std::string& copy) {
   DatabaseHandle database = open_database(target, SQLITE_OPEN_READWRITE);
   add_row_checksum(database.get());
-  // The store makes the checkpoints; pages that do not fit into so many KiB go to the log.
+  // The store makes the checkpoints. Changed pages beyond the cache are written to the log.
   execute(database.get(), "PRAGMA wal_autocheckpoint = 0");
   execute(database.get(), "PRAGMA synchronous = FULL");
   execute(database.get(), "PRAGMA cache_size = -65536");

@@ -49,11 +49,11 @@ struct KeyedRows {
   std::string key = "rowid";
   std::string condition = "1";    ///< which rows are copied, in SQL
   std::string is_sound = "1";     ///< false for a damaged row, in SQL
-  std::int64_t before_first = 0;  ///< all keys are above
+  std::int64_t before_first = 0;  ///< smaller than every key
 };
 
-/// Inserts the columns behind the first two of a row. False when the row violates the schema, which
-/// makes it damaged. Throws std::runtime_error when the copy cannot be written.
+/// Inserts the columns of a row after the first two. False when the row violates the schema, so it
+/// is damaged. Throws std::runtime_error when the copy cannot be written.
 bool insert_row(sqlite3* to, Statement& insert, const Statement& row) {
   for (int column = 2; column < row.columns(); ++column) {
     insert.bind_column(column - 1, row, column);
@@ -71,11 +71,11 @@ bool insert_row(sqlite3* to, Statement& insert, const Statement& row) {
   }
 }
 
-/// Copies rows in the order of their keys, without those that cannot be read, and returns how many.
-/// After an unreadable place the next readable row is sought in growing leaps, so that a long place
+/// Copies the readable rows in the order of their keys and returns their number. After an
+/// unreadable place it searches for the next readable row in growing leaps, so that a long place
 /// costs few attempts and a short one few readable rows.
 std::uint64_t copy_rows(sqlite3* from, sqlite3* to, const KeyedRows& rows, Salvaged& saved) {
-  // No table has this many rows: behind such a leap is nothing.
+  // Larger than every key that is used, so that no row can follow.
   constexpr std::int64_t kLongestLeap = std::int64_t{1} << 42U;
   const std::string columns_sql = "SELECT name FROM pragma_table_info('" + rows.table + "')";
   if (texts(from, columns_sql).empty()) {
@@ -119,7 +119,7 @@ void copy_tables(sqlite3* from, sqlite3* to, Salvaged& saved) {
   for (const std::string table : {"models", "workers", "retries"}) {
     copy_rows(from, to, {.table = table}, saved);
   }
-  // Rows of a study that was lost mean nothing.
+  // Rows of lost studies are not copied, because they have no meaning without the recipe.
   for (const std::string& study : texts(to, "SELECT study_id FROM studies")) {
     copy_rows(from, to,
               {.table = "results",
@@ -142,8 +142,8 @@ void mend_references(sqlite3* database) {
   execute(database,
           "DELETE FROM results WHERE model_id NOT IN (SELECT model_id FROM models);"
           "DELETE FROM retries WHERE study_id NOT IN (SELECT study_id FROM studies);"
-          // The number of a lost worker stays, so that the row keeps its checksum. Databases mostly
-          // have results of one solver version; otherwise that of a lost worker is unknown.
+          // Rows keep the number of a lost worker, so that their checksums stay right. If all other
+          // workers have one solver version, it is used for the lost worker too.
           "INSERT INTO workers"
           " (worker_id, name, threads, solver_version, instruction_set, joined_at)"
           " SELECT DISTINCT worker_id, 'lost with a damaged file', 1,"
@@ -168,7 +168,7 @@ Salvaged salvage(const std::string& from, const std::string& to) {
     throw StorageError(to + " exists already: name a file that does not");
   }
   const DatabaseHandle source = open_for_reading(from).database;
-  // A file that is shorter than its first page says can be read as far as it goes.
+  // So that SQLite reads a file that is shorter than its first page says.
   execute(source.get(), "PRAGMA writable_schema = ON");
   check_tables(source.get(), from);
   add_row_checksum(source.get());

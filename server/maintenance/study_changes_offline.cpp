@@ -15,7 +15,7 @@
 namespace oblique::server {
 namespace {
 
-/// Rows that are deleted in one transaction.
+/// Number of rows that are deleted in one transaction.
 constexpr std::size_t kRowsAtOnce = 4096;
 std::string gone_from(const std::string& path) {
   return fmt::format("the study is no longer in {}", path);
@@ -25,7 +25,7 @@ std::string gone_from(const std::string& path) {
 class StoreWithStudy {
  public:
   StoreWithStudy(const std::string& path, std::uint64_t study_id) {
-    (void)open_stored(path);  // or the store would make one
+    (void)open_stored(path);  // throws if there is no file, which the store would create
     store_.emplace(path);
     database_ = open_database(path, SQLITE_OPEN_READONLY);
     Statement find(database_.get(), "SELECT 1 FROM studies WHERE study_id = ?");

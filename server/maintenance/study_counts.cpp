@@ -4,7 +4,7 @@ namespace oblique::server {
 void count_reused_and_set_state(sqlite3* database, std::uint64_t study_id) {
   for (const char* sql :
        {"DELETE FROM main.reused_points WHERE study_id = ?1",
-        // A source is STUDY/POINT, and a name may have slashes too.
+        // `reused_from` is STUDY/POINT, and the name of a study may contain slashes.
         "INSERT INTO main.reused_points (study_id, source, points)"
         " SELECT ?1, substr(reused_from, 1, length(rtrim(reused_from, '0123456789')) - 1) AS "
         "source,"

@@ -40,7 +40,7 @@ constexpr std::array<Described, 12> kRowColumns{{
      "STUDY/POINT, as named then, of which this result is a copy; NULL: solved for this point"},
 }};
 
-/// The list `part` as an expression over the columns of `runs`. Numbers keep their digits.
+/// An SQL expression over the columns of `runs` for the list `part`. Numbers keep their digits.
 std::string list_sql(const solver::ListPart& part) {
   const std::string list = fmt::format("runs.{}", part.list->column);
   if (part.member.empty()) {
@@ -95,7 +95,7 @@ void add_outputs(std::vector<Column>& columns) {
   }
 }
 
-/// Lists of the database that `solve --json` has in another form.
+/// Adds the lists of the database that `solve --json` shows in another form.
 void add_stored_lists(std::vector<Column>& columns) {
   for (const auto* list : solver::result_lists()) {
     if (solver::find_result_column(list->column) == nullptr) {

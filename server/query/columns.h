@@ -12,22 +12,22 @@ namespace oblique::server {
 struct Column {
   std::string name;
   std::string unit;        ///< SI; empty for pure numbers and texts
-  std::string kind;        ///< input, output, row (about the row), element or function
-  std::string solve_json;  ///< where `solve --json` has it, as energy.friction_J; empty: nowhere
-  std::string meaning;     ///< one line; for inputs with what is allowed, for outputs with the sign
+  std::string kind;        ///< input, output, row (properties of the row), element or function
+  std::string solve_json;  ///< member of `solve --json`, such as energy.friction_J; empty: none
+  std::string meaning;     ///< one line; for inputs the allowed values, for outputs the sign
 };
 
-/// All columns, in the order of listings: inputs, outputs, columns about the row.
+/// All columns, in the order of listings: inputs, outputs, properties of the row.
 const std::vector<Column>& all_columns();
 
-/// The column of the input `key`. SQL takes E for e, so the column of E is E_Pa.
+/// The column of the input `key`. SQL does not distinguish E from e, so the column of E is E_Pa.
 std::string column_of_key(std::string_view key);
 
-/// The same, elements of lists, and functions: all that a query may name.
+/// All columns, elements of lists, and functions: everything that a query may name.
 std::vector<Column> columns_and_functions();
 
-/// A list that queries have beside the columns of the view `runs`, and its expression over the
-/// columns of a table called `runs`.
+/// A list that queries may name in addition to the columns of the view `runs`, and its SQL
+/// expression over the columns of `runs`.
 struct ListColumn {
   std::string name;
   std::string sql;
@@ -38,7 +38,7 @@ const std::vector<ListColumn>& lists_of_queries();
 /// several quantities and other names.
 std::string unit_of_column(std::string_view name);
 
-/// The kind of the values of a column that are not NULL; kNull for other names.
+/// The kind of the values of a column other than NULL; kNull for an unknown name.
 protocol::CellKind kind_of_values(std::string_view name);
 
 }  // namespace oblique::server

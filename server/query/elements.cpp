@@ -40,8 +40,9 @@ std::string path_of(int index) {
   return index < 0 ? fmt::format("$[#{}]", index) : fmt::format("$[{}]", index);
 }
 
-/// Member `member` of element `index` of the ends of phases: kind, beginning or end. Compression
-/// comes first, then the kinds alternate, and each phase begins where the one before it ends.
+/// Member `member` of phase `index`, computed from the list of the ends of phases: kind, beginning
+/// or end. Compression comes first, then the kinds alternate; each phase begins at the end of the
+/// previous one.
 std::string phase_sql(int index, std::size_t member) {
   const std::string count = fmt::format("json_array_length({})", kStoredPhases);
   const auto end_of = [](int i) { return fmt::format("{} ->> '{}'", kStoredPhases, path_of(i)); };
@@ -68,7 +69,7 @@ std::string member_sql(const ResultList& list, int index, std::size_t member) {
     return phase_sql(index, member);
   }
   if (list.column == "ft_peaks") {
-    // Without a list of their own they are the times and tangential forces of `peaks`.
+    // If `ft_peaks` is NULL, they are the times and tangential forces of `peaks`.
     return fmt::format(
         "CASE WHEN {0} IS NULL THEN peaks ->> '{1}[{2}]' ELSE {0} ->> '{1}[{3}]' END",
         kStoredFtPeaks, path, 2 * member, member);
@@ -130,7 +131,7 @@ ElementReference indexed(Tokens tokens) {
     return {2, fmt::format("({} ->> '{}')", name, path_of(index_in(name, brackets))), *unit};
   }
   if (list == nullptr) {
-    // With a space between them the brackets are an alias of the column.
+    // After a space SQL reads the brackets as an alias of the column.
     if (name.end() == brackets.begin()) {
       refuse_as_list(name, brackets);
     }
@@ -161,8 +162,8 @@ ElementReference counted_mode(Tokens tokens) {
   return {4, fmt::format("count(*) FILTER (WHERE major_mode = {})", tokens[2].text), {}};
 }
 
-/// `text` with the tokens replaced for which `replacement(rest)` returns a number of tokens and
-/// what stands for them.
+/// Replaces tokens of `text`: `replacement(rest)` returns how many of the first tokens of `rest` to
+/// replace, and the text for them.
 template <typename Replacement>
 std::string replaced(std::string_view text, const Replacement& replacement) {
   const auto tokens = sql_tokens(text);
@@ -209,7 +210,7 @@ std::string with_elements(std::string_view text) {
 std::string in_sqlite(std::string_view text) {
   return replaced(with_elements(text), [](Tokens tokens) {
     const SqlToken& token = tokens[0];
-    // SQLite takes only a literal before these words.
+    // SQLite accepts only a literal before these words.
     const bool is_frame_offset =
         tokens.size() > 1 && (is_word(tokens[1], "preceding") || is_word(tokens[1], "following"));
     const bool is_decimal = !is_frame_offset && token.kind == SqlToken::Kind::kLiteral &&

@@ -10,8 +10,8 @@
 
 namespace oblique::server {
 
-// Names under which a query reads the lists as the table `results` has them, where the view `runs`
-// shows them in another form.
+// Names of lists in the form of the table `results`, for lists that the view `runs` shows in
+// another form.
 inline constexpr std::string_view kStoredPhases = "stored_phases";
 inline constexpr std::string_view kStoredFtPeaks = "stored_ft_peaks";
 
@@ -19,7 +19,7 @@ inline constexpr std::string_view kStoredFtPeaks = "stored_ft_peaks";
 /// count_mode('SC SR'). Elements count from 0, as `seq` of the views does; -1 is the last. An
 /// element that a list lacks is NULL.
 struct ElementReference {
-  std::size_t tokens = 0;  ///< number of tokens that write it; 0: none
+  std::size_t tokens = 0;  ///< number of its tokens; 0: there is no element
   std::string sql;
   std::string unit;
 };
@@ -28,18 +28,18 @@ struct ElementReference {
 /// that has no such member, or a wrong index.
 ElementReference element_at(std::span<const SqlToken> tokens);
 
-/// `text` with its elements in SQLite's terms. Throws as element_at does.
+/// `text` with each element replaced by its SQL expression. Throws as element_at does.
 std::string with_elements(std::string_view text);
 
-/// The same with each decimal number as the double nearest to it: SQLite 3.40 reads some numbers of
-/// seven digits as a neighbour, and an axis has the number that was typed.
+/// The same, and each decimal replaced by the double nearest to it. SQLite 3.40 reads some decimals
+/// of seven digits as another double, which would differ from the value of an axis.
 std::string in_sqlite(std::string_view text);
 
-/// The same for selected columns. `*` becomes `all_columns`; a column whose text was changed is
-/// named as it was written.
+/// The same for selected columns. `*` becomes `all_columns`; a column whose text is replaced keeps
+/// the written text as its name.
 std::string columns_in_sqlite(std::string_view text, std::span<const std::string> all_columns);
 
-/// How elements are written, with unit and meaning, for listings.
+/// A form of elements, with unit and meaning, for listings.
 struct WrittenForm {
   std::string form;
   std::string unit;

@@ -101,8 +101,9 @@ std::string join_of(const std::vector<PointRange>& ranges) {
   return fmt::format("json_each('{{{}}}') AS span CROSS JOIN ", list);
 }
 
-/// A study without a recipe has no ranges of its own. A range of all points would only keep SQLite
-/// from looking up those that the condition names, as with IN.
+/// The condition in SQL that restricts points to `ranges`. A study without a recipe has no ranges
+/// and is not restricted. A range of all points is left out, because it would keep SQLite from
+/// looking up the points that the user's condition names, for example with IN.
 std::string condition_of(const std::vector<PointRange>& ranges, const protocol::Recipe& recipe) {
   if (ranges.empty()) {
     return recipe.blocks().empty() ? "1" : "0";
@@ -116,7 +117,7 @@ std::string condition_of(const std::vector<PointRange>& ranges, const protocol::
   return "runs.point BETWEEN CAST(span.key AS INTEGER) AND span.value";
 }
 
-/// The names in a text, of columns and others.
+/// All names in a text, whether of columns or not.
 Names names_in(std::string_view text) {
   Names names;
   for (const SqlToken& token : sql_tokens(text)) {
@@ -127,8 +128,9 @@ Names names_in(std::string_view text) {
   return names;
 }
 
-/// What is read as `runs`, and what is added to its condition. SQLite finds failed points by their
-/// index only if it is told to, for it does not know that they are few.
+/// The table that is read as `runs`, and an addition to its condition. SQLite does not use the
+/// index of failed points unless the statement names it, because SQLite cannot estimate that they
+/// are few.
 std::pair<std::string, std::string> table_of(const std::string& where, const QueriedStudy& study,
                                              bool is_in_results) {
   if (!wants_only_failed(where)) {
@@ -143,7 +145,7 @@ std::pair<std::string, std::string> table_of(const std::string& where, const Que
 }
 
 /// The rows of a study in `ranges`, with the columns that `text` names. They come from the table
-/// `results` if it has all of these: looking up model and worker of each row takes time.
+/// `results` if it has all of these, because looking up the model and worker of each row is slow.
 std::string rows_of(sqlite3* database, const protocol::StudyQuery& question,
                     const QueriedStudy& study, const std::vector<PointRange>& ranges,
                     std::string_view text, const Names& columns) {
@@ -187,11 +189,11 @@ std::string rows_of(sqlite3* database, const protocol::StudyQuery& question,
                      condition);
 }
 
-/// Whether rows come in the order that is asked for if they are read by rising point.
+/// Whether the requested order is that of rising points.
 bool is_in_point_order(const protocol::StudyQuery& question) {
   const std::string selected = selected_by(question);
   const auto selected_tokens = sql_tokens(selected);
-  // A window function sorts the rows, and an alias `point` is what ORDER BY means.
+  // A window function sorts the rows, and ORDER BY prefers an alias `point` to the column.
   if (std::ranges::any_of(selected_tokens,
                           [](const auto& each) { return is_word(each, "over"); }) ||
       std::ranges::any_of(aliases_in(selected),
@@ -231,8 +233,8 @@ std::string statement_of(sqlite3* database, const protocol::StudyQuery& question
   return statement;
 }
 
-/// The unit of a column, an element, or a function of one that keeps the unit; empty: a pure
-/// number, a text, or another expression.
+/// The unit of a column, of an element, or of a function of one of these that keeps the unit. Empty
+/// for a pure number, a text, and other expressions.
 std::string unit_of(Tokens tokens) {
   if (tokens.size() == 1 && tokens[0].is_name()) {
     return unit_of_column(name_of(tokens[0]));
@@ -261,13 +263,13 @@ std::vector<PlannedColumn> with_units(Names names, const std::string& selected) 
   return columns;
 }
 
-/// What follows `begin` in `message`; empty if it is not in it.
+/// The part of `message` after `begin`; empty if `message` does not contain it.
 std::string behind(const std::string& message, std::string_view begin) {
   const auto at = message.find(begin);
   return at == std::string::npos ? "" : message.substr(at + begin.size());
 }
 
-/// The column that SQLite did not find; empty: the message is another one.
+/// The column that SQLite did not find; empty for other messages.
 std::string missing_column(const std::string& message) {
   const std::string wrong = behind(message, "no such column: ");
   // SQLite 3.42 and later may quote the name and add a remark.
@@ -275,7 +277,7 @@ std::string missing_column(const std::string& message) {
   return remark == std::string::npos ? wrong : wrong.substr(1, remark - 1);
 }
 
-/// A hint about a name that SQLite did not find; empty: the message is another one.
+/// A hint about a name that SQLite did not find; empty for other messages.
 std::string name_hint(const std::string& message) {
   const std::string function = behind(message, "no such function: ");
   const std::string wrong = function.empty() ? missing_column(message) : function;
@@ -300,8 +302,8 @@ std::string name_hint(const std::string& message) {
   return meant + "; `oblique columns` lists all";
 }
 
-/// Throws solver::InputError, naming the flag, for a text that alone is no SQL. SQLite's message
-/// about the whole statement would quote what stands around it.
+/// Throws solver::InputError, which names the flag, for a text that is not valid SQL by itself.
+/// SQLite's message about the whole statement would quote text that the user did not write.
 void check_syntax(sqlite3* database, const protocol::StudyQuery& question) {
   const struct {
     const char* flag;
@@ -328,7 +330,7 @@ void check_syntax(sqlite3* database, const protocol::StudyQuery& question) {
   }
 }
 
-/// Gives a query that selects nothing its columns.
+/// Sets the default columns of a query that selects none.
 void select_usual(protocol::StudyQuery& question, const protocol::Recipe& recipe) {
   if (question.select().empty() && !question.group().empty()) {
     question.add_select(question.group());
@@ -357,7 +359,7 @@ Plan plan(sqlite3* database, protocol::StudyQuery question) {
   check_columns(question, columns);
   auto ranges = point_ranges(study.recipe, question.where());
   if (ranges.size() > 1 && wants_only_failed(question.where())) {
-    ranges = hull(ranges);  // the index of failed points restricts more
+    ranges = hull(ranges);  // the index of failed points selects fewer rows
   }
   Plan plan{statement_of(database, question, study, columns, ranges), {}};
   if (plan.statement.size() > kLongestSql && ranges.size() > 1) {

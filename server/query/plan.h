@@ -12,24 +12,24 @@ namespace oblique::server {
 /// One column of an answer.
 struct PlannedColumn {
   std::string name;
-  std::string unit;  ///< SI; empty: a pure number, a text, or not known
+  std::string unit;  ///< SI; empty: a pure number, a text, or unknown
 
   bool operator==(const PlannedColumn&) const = default;
 };
 
-/// How a query of a study is answered.
+/// The statement that answers a query about a study.
 struct Plan {
   std::string statement;  ///< a SELECT
   std::vector<PlannedColumn> columns;
 };
 
-/// Plans the answer to `question` from `database`, which has kNumberFunction. Throws
-/// solver::InputError for a wrong question, naming the flag or the column and what is allowed;
-/// StorageError where the database cannot be read.
+/// Plans the answer to `question`. `database` must have kNumberFunction. Throws solver::InputError
+/// for a wrong query, which names the flag or the column and what is allowed, and StorageError if
+/// the database cannot be read.
 Plan plan(sqlite3* database, protocol::StudyQuery question);
 
-/// An addition to SQLite's message about `sql` if a name that does not exist stands in double
-/// quotes, where a text may have been meant; else empty.
+/// A hint to append to SQLite's message about `sql` if an unknown name is in double quotes, because
+/// a text in single quotes may have been meant; else empty.
 std::string quotes_hint(const std::string& message, std::string_view sql);
 
 }  // namespace oblique::server

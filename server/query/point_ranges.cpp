@@ -22,11 +22,11 @@ using Ranges = std::vector<PointRange>;
 using Tokens = std::span<const SqlToken>;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-/// More ranges become one: the statement would be long and slow to start.
+/// More ranges are merged into one, because the statement would be long and slow to start.
 constexpr std::size_t kMostRanges = 20'000;
 /// Finding the first row of a range costs about as much as reading this many rows.
 constexpr std::uint64_t kRowsARange = 3;
-/// Conditions in more brackets restrict nothing.
+/// Conditions in more nested brackets than this are ignored.
 constexpr int kDeepest = 50;
 
 struct Interval {
@@ -36,7 +36,7 @@ struct Interval {
 /// The interval of each column that a condition restricts.
 using Intervals = std::map<std::string, Interval, std::less<>>;
 
-/// The number that the tokens write, with or without a sign; none for what is no plain number.
+/// The number in `tokens`, with or without a sign; none if they are not a plain number.
 std::optional<double> number_in(Tokens tokens) {
   const bool is_negative = !tokens.empty() && tokens[0].is_sign('-');
   if (is_negative || (!tokens.empty() && tokens[0].is_sign('+'))) {
@@ -56,7 +56,7 @@ Restriction restriction(Tokens column, std::optional<double> low, std::optional<
                                   : std::nullopt;
 }
 
-/// `column < number`, `number < column` and so on; none for what is no such comparison.
+/// Reads `column < number`, `number < column` and so on; none for other tokens.
 Restriction comparison(Tokens tokens) {
   const auto is_comparing = [](const SqlToken& token) {
     return token.is_sign('<') || token.is_sign('=') || token.is_sign('>');
@@ -83,7 +83,7 @@ Restriction comparison(Tokens tokens) {
   return text == ">" || text == ">=" ? restriction(column, number, kInfinity) : std::nullopt;
 }
 
-/// `column BETWEEN number AND number`
+/// Reads `column BETWEEN number AND number`; none for other tokens.
 Restriction between(Tokens tokens) {
   const Tokens bounds = tokens.subspan(2);
   const auto middle =
@@ -93,7 +93,7 @@ Restriction between(Tokens tokens) {
                                               number_in({middle + 1, bounds.end()}));
 }
 
-/// Adds to `all` the conditions that `tokens` join with AND, as far as this is clear.
+/// Adds to `all` the conditions that `tokens` join with AND. Adds none if it cannot separate them.
 void add_conjuncts(Tokens tokens, int depth, std::vector<Tokens>& all) {
   if (depth > kDeepest || tokens.empty()) {
     return;
@@ -110,7 +110,7 @@ void add_conjuncts(Tokens tokens, int depth, std::vector<Tokens>& all) {
       parts.push_back(tokens.subspan(begin, i - begin));
       begin = i + 1;
     } else if (is_word(tokens[i], "or") || is_word(tokens[i], "case")) {
-      return;  // no conjunction
+      return;  // not a conjunction
     } else if (tokens[i].is_sign('(')) {
       i = std::min(closing_bracket(tokens, i), tokens.size() - 1);
     } else if (is_word(tokens[i], "between")) {
@@ -149,10 +149,10 @@ Intervals intervals_of(std::string_view condition) {
   return intervals;
 }
 
-/// The interval to which an axis is restricted; nullptr: none, or the axis alone does not decide.
+/// The interval to which an axis is restricted; nullptr: none, or the column depends on other axes.
 const Interval* interval_of(const protocol::Block& block, const protocol::Axis& axis,
                             const Intervals& intervals) {
-  // The column `length` is that of every link, and single lengths are axes too.
+  // The column `length` is the length of every link, which axes of single lengths change too.
   const bool is_of_many =
       axis.key() == "length" &&
       std::any_of(block.axes().begin(), block.axes().end(), [](const auto& other) {
@@ -165,8 +165,8 @@ const Interval* interval_of(const protocol::Block& block, const protocol::Axis& 
              : &found->second;
 }
 
-/// Numbers of the first and the last value of an axis in `interval`; of a range of values one more
-/// at each end. None if no value is in it.
+/// Numbers of the first and the last value of an axis in `interval`; for a range of values one more
+/// at each end. None if no value is in the interval.
 std::optional<PointRange> numbers_in(const protocol::Axis& axis, const Interval& interval) {
   if (axis.count() > 0) {
     if (interval.low > interval.high) {
@@ -279,7 +279,7 @@ std::vector<PointRange> point_ranges(const protocol::Recipe& recipe, std::string
 std::uint64_t points_of(const protocol::Recipe& recipe) {
   std::uint64_t points = 0;
   for (const protocol::Block& block : recipe.blocks()) {
-    // No valid recipe has an axis without values, and its points cannot be counted.
+    // An axis without values is not valid, and its points cannot be counted.
     if (std::any_of(block.axes().begin(), block.axes().end(),
                     [](const auto& axis) { return protocol::axis_size(axis) == 0; })) {
       return 0;

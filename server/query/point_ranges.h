@@ -17,17 +17,17 @@ struct PointRange {
 };
 
 /// Ranges in rising order, disjoint, that contain every point of `recipe` that meets `condition`.
-/// They may contain others: only comparisons of an axis of a product block, or of `point`, with
-/// numbers (=, <, <=, >, >=, BETWEEN) that AND joins are used, and a range of an axis is one value
-/// wider at each end, because another machine may round a value differently. `condition` passed
-/// check_sql_part; empty: all points.
+/// They may contain other points. Only comparisons of an axis of a product block, or of `point`,
+/// with numbers (=, <, <=, >, >=, BETWEEN) that AND joins are used. A range of an axis is one value
+/// wider at each end, because another machine may round a value differently. `condition` must have
+/// passed check_sql_part; empty: all points.
 std::vector<PointRange> point_ranges(const protocol::Recipe& recipe, std::string_view condition);
 
-/// One range around all; there is at least one.
+/// The range from the first point of `ranges`, which are not empty, to the last.
 std::vector<PointRange> hull(const std::vector<PointRange>& ranges);
 
-/// Whether `condition` is `error IS NOT NULL`, or joins this with others by AND. `condition` passed
-/// check_sql_part.
+/// Whether `condition` is `error IS NOT NULL`, or joins this with others by AND. `condition` must
+/// have passed check_sql_part.
 bool wants_only_failed(std::string_view condition);
 
 /// Number of points of a recipe, filters ignored; 0 if an axis has no value. Throws

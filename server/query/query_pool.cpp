@@ -12,7 +12,7 @@
 namespace oblique::server {
 namespace {
 
-/// Pause before a failed turn is repeated.
+/// Pause after a turn of the thread that threw.
 constexpr std::chrono::milliseconds kRetryPause{20};
 constexpr std::int64_t kLongestWait_ms = 60'000;
 /// Number of chunks that marks a cancelled query.
@@ -128,11 +128,11 @@ void QueryPool::run() {
     try {
       turn();
     } catch (const std::exception&) {
-      // Such as std::bad_alloc. The next turn does the rest.
+      // For example std::bad_alloc. The next turn continues.
       std::this_thread::sleep_for(kRetryPause);
     }
   }
-  // All are killed before the first is waited for.
+  // Kills all processes before it waits for the first one.
   for (Slot& slot : slots_) {
     if (slot.process != nullptr) {
       slot.process->kill();
@@ -152,7 +152,7 @@ void QueryPool::turn() {
   wait();
 }
 
-/// Waits until a process or a caller has something to do, or a deadline has passed.
+/// Waits for input from a process, a call from another thread, or a deadline.
 void QueryPool::wait() {
   std::vector<pollfd> items{{woken_.descriptor(), POLLIN, 0}};
   const std::int64_t now_ms = settings_.now_ms();
@@ -233,7 +233,7 @@ QueryPool::Slot& QueryPool::idle_slot() {
   return slots_.back();
 }
 
-/// Passes on the frames that have come, as many as the client may be sent.
+/// Reports the received frames, up to kChunksAhead more than the client has taken.
 void QueryPool::read(Slot& slot) {
   while (slot.process != nullptr && !slot.waits_for_client()) {
     auto frame = slot.process->read();
@@ -272,14 +272,14 @@ void QueryPool::check_deadline(Slot& slot) {
   }
 }
 
-/// Sends the last part of an answer; the process is free for another query.
+/// Reports the last part of an answer and frees the process for another query.
 void QueryPool::finish(Slot& slot, std::string reply) {
   const std::uint64_t ticket = std::exchange(slot.ticket, 0);
   forget(ticket);
   report_({QueryReport::Kind::kAnswered, ticket, std::move(reply)});
 }
 
-/// Answers the query, if there is one, with an error, and ends the process.
+/// Answers the query of the slot, if any, with an error, and ends the process.
 void QueryPool::fail(Slot& slot, const std::string& message) {
   if (slot.ticket != 0) {
     finish(slot, encoded_error(message));
@@ -287,7 +287,7 @@ void QueryPool::fail(Slot& slot, const std::string& message) {
   slot.process.reset();
 }
 
-/// The slot whose process runs that query, for 0 an idle one; nullptr: none.
+/// The slot that runs the query with that ticket, or for ticket 0 an idle one; nullptr: none.
 QueryPool::Slot* QueryPool::slot_of(std::uint64_t ticket) {
   const auto found = std::find_if(slots_.begin(), slots_.end(),
                                   [&](const Slot& slot) { return slot.ticket == ticket; });

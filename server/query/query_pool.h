@@ -24,7 +24,7 @@ namespace oblique::server {
 /// A query of a client.
 struct QueryJob {
   std::uint64_t ticket;  ///< unique
-  std::string client;    ///< whose queries take turns with those of others: a key, or a connection
+  std::string client;    ///< the key or connection; clients take turns
   protocol::QueryRequest request;
 };
 
@@ -46,7 +46,7 @@ class QueryQueue {
   bool add(QueryJob job);
   /// Starts the next query that may run; it counts as running until `remove`.
   std::optional<QueryJob> start_next();
-  /// Forgets a query, whether it waits or runs. Unknown tickets are ignored.
+  /// Removes a query that waits or runs. Unknown tickets are ignored.
   void remove(std::uint64_t ticket);
 
  private:
@@ -57,13 +57,13 @@ class QueryQueue {
   };
 
   QueueSettings settings_;
-  std::list<Client> clients_;  // those with queries; the front is next
+  std::list<Client> clients_;  // clients that have queries; the front one is next
 };
 
 /// Progress of a query.
 struct QueryReport {
   enum class Kind {
-    kBegun,     ///< it runs now
+    kBegun,     ///< it has begun to run
     kRows,      ///< `reply` is a chunk of the answer, not the last
     kAnswered,  ///< `reply` is the last chunk, or an error
   };
@@ -73,12 +73,12 @@ struct QueryReport {
 };
 
 struct QueryPoolSettings {
-  /// Program that reads, see reader_program.h; the default is the one that runs.
+  /// Program of the reader processes (reader_program.h); the default is this program.
   std::string reader_program = "/proc/self/exe";
   QueueSettings queue;
   /// A client that takes none of kChunksAhead chunks for this time loses its answer.
   std::int64_t patience_ms = 10'000;
-  /// Longest time of a whole answer, waiting for its client included.
+  /// Longest time of a whole answer, including the time in which it waits for its client.
   std::int64_t longest_answer_ms = 1'800'000;
   std::function<std::int64_t()> now_ms = [] {
     using std::chrono::steady_clock;
@@ -88,11 +88,11 @@ struct QueryPoolSettings {
   };
 };
 
-/// Number of chunks that a client is sent ahead of those it has taken.
+/// Most chunks that are sent to a client before it has taken the first of them.
 inline constexpr std::uint64_t kChunksAhead = 4;
 
 /// Runs queries in reader processes, which are started when needed and kept for later queries. A
-/// process can be bounded in memory and stopped at any time, whatever its statement does. One
+/// process has a memory limit and can be stopped at any time, whatever its statement does. One
 /// thread serves all processes.
 class QueryPool {
  public:
@@ -100,16 +100,16 @@ class QueryPool {
 
   /// `report` is called on the pool's thread. No process is started before the first query.
   QueryPool(std::string database, QueryPoolSettings settings, Report report);
-  /// Stops.
+  /// Calls `stop`.
   ~QueryPool();
   QueryPool(const QueryPool&) = delete;
   QueryPool& operator=(const QueryPool&) = delete;
 
-  /// False when too many queries wait; see QueueSettings.
+  /// False when too many queries wait (QueueSettings).
   bool submit(QueryJob job);
   /// The client has taken the first `taken` chunks of its answer.
   void more(std::uint64_t ticket, std::uint64_t taken);
-  /// Ends a query, or removes it from the queue. Reports of it may still be under way.
+  /// Ends a query, or removes it from the queue. Reports of it may still arrive.
   void cancel(std::uint64_t ticket);
   /// Kills all processes and ends the thread. Open queries get no answer.
   void stop();
@@ -122,8 +122,8 @@ class QueryPool {
     std::int64_t time_limit_ms = 0;
     std::int64_t deadline_ms = 0;     ///< for the next chunk, or for the client to take one
     std::int64_t answer_ends_ms = 0;  ///< deadline of the whole answer
-    std::uint64_t given = 0;          ///< chunks
-    std::uint64_t taken = 0;          ///< chunks
+    std::uint64_t given = 0;          ///< chunks reported
+    std::uint64_t taken = 0;          ///< chunks taken by the client
 
     bool waits_for_client() const { return ticket != 0 && given >= taken + kChunksAhead; }
   };
@@ -150,8 +150,8 @@ class QueryPool {
   QueryQueue queue_;                              // guarded by mutex_
   std::map<std::uint64_t, std::uint64_t> taken_;  // guarded by mutex_; chunks, by ticket
   bool stopping_ = false;                         // guarded by mutex_
-  std::vector<Slot> slots_;                       // of the thread
-  std::thread thread_;                            // last: it uses all the others
+  std::vector<Slot> slots_;                       // used by the thread only
+  std::thread thread_;                            // last: it uses the other members
 };
 
 }  // namespace oblique::server

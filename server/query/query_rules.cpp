@@ -29,7 +29,7 @@ bool is_harmless_pragma(std::string_view name, const char* argument) {
 }
 
 /// False for functions that reach out of the database, use addresses of this process, run SQL, or
-/// belong to kinds of tables that our databases do not have.
+/// belong to virtual tables that our databases do not have.
 bool is_harmless_function(std::string_view name) {
   constexpr std::array<std::string_view, 16> kOthers{
       "load_extension", "fts3_tokenizer", "fts5",       "fts5_source_id",
@@ -39,7 +39,7 @@ bool is_harmless_function(std::string_view name) {
   return std::find(kOthers.begin(), kOthers.end(), name) == kOthers.end();
 }
 
-/// Lets statements read and compute, nothing else. Holds inside views too.
+/// SQLite's authorizer: allows only reading and computing. Applies inside views too.
 int authorize(void*, int action, const char* first, const char* second, const char*, const char*) {
   switch (action) {
     case SQLITE_SELECT:
@@ -95,7 +95,7 @@ void restrict_to_reading(sqlite3* database) {
   for (const auto& [limit, most] : kLimits) {
     sqlite3_limit(database, limit, most);
   }
-  // The schema stays trusted: SQLite 3.40 takes json_extract, which our views use, for unsafe.
+  // The schema stays trusted: SQLite 3.40 treats json_extract, which our views use, as unsafe.
   // Without DQS_DML an unknown name in double quotes is an error instead of a text.
   constexpr std::array<std::pair<int, int>, 5> kSwitches{
       {{SQLITE_DBCONFIG_DEFENSIVE, 1},

@@ -11,7 +11,7 @@
 
 namespace oblique::server {
 
-/// A statement was refused or failed. The message says why, for people.
+/// A statement was refused or failed. The message says why.
 class QueryError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -27,14 +27,14 @@ class StatementError : public QueryError {
 struct QueryLimits {
   std::uint64_t max_row_bytes = 12ULL << 20U;  ///< of a row; below protocol::kMaxFrameBytes
   std::int64_t time_limit_ms = 30'000;         ///< for each chunk of the answer; 0: no limit
-  /// Of one text, blob or row inside the statement; at most SQLite's own limit of 10^9.
+  /// Size of one text, blob or row inside the statement; at most SQLite's own limit of 10^9.
   std::int64_t max_value_bytes = std::int64_t{16} << 20U;
-  /// A chunk is returned with the first row that comes later, so that first rows wait for no
-  /// others.
+  /// The first row after this time completes its chunk, so that the first rows of a slow statement
+  /// are returned early.
   std::int64_t longest_chunk_ms = 250;
 };
 
-/// No limits but SQLite's own, for statements of trusted programs.
+/// Only SQLite's own limits, for statements of trusted programs.
 inline constexpr QueryLimits kNoLimits{UINT64_MAX, 0, 1'000'000'000};
 
 /// Longest time limit that a client can request.
@@ -52,8 +52,8 @@ inline constexpr std::int64_t kReaderHeapBytes = std::int64_t{256} << 20U;
 /// Longest statement [bytes].
 inline constexpr int kLongestSql = 1'000'000;
 
-/// Lets statements on `database` read and compute, nothing else, adds our functions, and bounds the
-/// size of a statement. LIKE becomes case-sensitive, since in modes S is stick and s is slip.
+/// Restricts statements on `database` to reading and computing, adds our functions, and limits the
+/// size of a statement. LIKE becomes case-sensitive, because in modes S is stick and s is slip.
 /// Sorting and grouping use no files.
 void restrict_to_reading(sqlite3* database);
 

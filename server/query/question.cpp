@@ -27,7 +27,7 @@ constexpr const char* kGroup = "--group";
 constexpr const char* kOrder = "--order";
 
 /// Keys with more than one value over the points of a recipe. A key that only some of the blocks
-/// have counts as one, and so does a value that follows from others.
+/// have counts as varying, and so does a key with an expression or a distribution.
 std::set<std::string_view> varying_keys(const protocol::Recipe& recipe) {
   struct Seen {
     int blocks = 0;
@@ -57,8 +57,8 @@ std::set<std::string_view> varying_keys(const protocol::Recipe& recipe) {
   return varying;
 }
 
-/// Whether a function that aggregates rows is called at token `i`. With several arguments min and
-/// max compare these.
+/// Whether a function that aggregates rows is called at token `i`. min and max with several
+/// arguments do not aggregate.
 bool calls_aggregate(Tokens tokens, std::size_t i) {
   const bool is_call = i + 1 < tokens.size() && tokens[i].kind == SqlToken::Kind::kName &&
                        tokens[i + 1].is_sign('(');
@@ -71,8 +71,8 @@ bool calls_aggregate(Tokens tokens, std::size_t i) {
   return !compares || sql_items(tokens.subspan(i + 2, close - i - 2)).size() == 1;
 }
 
-/// Index of the token behind the aggregate, with its FILTER, or subquery that begins at token `i`;
-/// `i` if none does.
+/// If an aggregate (with its FILTER) or a subquery begins at token `i`, the index of the token
+/// after it; else `i`.
 std::size_t skipped(Tokens tokens, std::size_t i) {
   if (tokens[i].is_sign('(') && i + 1 < tokens.size() && is_word(tokens[i + 1], "select")) {
     return closing_bracket(tokens, i) + 1;
@@ -85,7 +85,7 @@ std::size_t skipped(Tokens tokens, std::size_t i) {
   return std::min(is_filtered ? closing_bracket(tokens, end + 1) + 1 : end, tokens.size());
 }
 
-/// Whether an aggregate makes one row of many; window functions do not.
+/// Whether the tokens have an aggregate that is not a window function.
 bool has_aggregate(Tokens tokens) {
   for (std::size_t i = 0; i < tokens.size(); ++i) {
     const std::size_t end = skipped(tokens, i);
@@ -215,7 +215,7 @@ void check_columns(const protocol::StudyQuery& question, std::span<const std::st
   check_case_of_columns(kGroup, question.group(), columns, aliases);
   check_case_of_columns(kOrder, question.order(), columns, aliases);
   check_grouped(kSelect, selected, question, columns);
-  // Where a column has the name of an alias, rows are sorted by what has the alias.
+  // ORDER BY prefers an alias to a column of the same name.
   std::vector<std::string> others(columns.begin(), columns.end());
   std::erase_if(others, [&](const std::string& column) {
     return std::ranges::find(aliases, column) != aliases.end();

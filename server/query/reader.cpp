@@ -13,11 +13,11 @@ namespace oblique::server {
 namespace {
 
 constexpr int kBusyTimeout_ms = 2000;
-/// The solver of a study's results, which are all of one version.
+/// Selects the solver version of a study's results, which all have the same one.
 constexpr const char* kVersionOfRows =
     "SELECT w.solver_version FROM results AS r CROSS JOIN workers AS w"
     " ON w.worker_id = r.worker_id WHERE r.study_id = s.study_id ORDER BY r.point LIMIT 1";
-/// The results that a study has copied from others.
+/// Selects how many results a study has copied from each source.
 constexpr const char* kSources =
     "SELECT source, points FROM reused_points WHERE study_id = ? ORDER BY points DESC";
 
@@ -224,7 +224,7 @@ Answer Reader::answer(const protocol::QueryRequest& request, const QueryLimits& 
   return {database_.get(), request, limits, interrupted_};
 }
 
-/// " (did you mean `x`?)" with the study whose name is nearest, or nothing.
+/// " (did you mean `x`?)" with the study whose name is nearest, or an empty text.
 std::string Reader::nearest_study(const std::string& name) {
   constexpr std::size_t kMostCompared = 10'000;
   Statement list(database_.get(), "SELECT name FROM studies");
@@ -236,7 +236,7 @@ std::string Reader::nearest_study(const std::string& name) {
 }
 
 std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name) {
-  // Counts come from indices and the table for them where they can: rows are not touched.
+  // Counts come from `completed_ranges` and indices where possible, so that rows need not be read.
   Statement list(
       database_.get(),
       std::string("SELECT s.study_id, s.name, s.state, s.points, s.created_at,"
@@ -258,7 +258,7 @@ std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name)
     const std::int64_t settled = list.integer(5);
     status.set_study_id(static_cast<std::uint64_t>(list.integer(0)));
     status.set_name(list.text(1));
-    // A server that was killed may not have noted the end of a study.
+    // A server that was killed may not have stored that the study is done.
     status.set_state(settled == list.integer(3) ? "done" : list.text(2));
     status.set_points(static_cast<std::uint64_t>(list.integer(3)));
     status.set_created_at(list.text(4));

@@ -28,9 +28,9 @@ class Answer {
          const std::atomic<bool>& interrupted);
 
   /// The next chunk, with its number from 1 on; `ends` is set in the last one, which may have no
-  /// row. A blob is returned as the text x'0F..', as is a text that is not UTF-8. Throws QueryError
-  /// when the statement fails, when this call takes longer than the time limit, and when a row is
-  /// longer than `max_row_bytes`. Not to be called after the end or a failure.
+  /// rows. A blob is returned as the text x'0F..', as is a text that is not UTF-8. Throws
+  /// QueryError when the statement fails, when this call takes longer than the time limit, and when
+  /// a row is longer than `max_row_bytes`. Not to be called after the end or a failure.
   protocol::QueryReply next();
 
  private:
@@ -41,25 +41,25 @@ class Answer {
   QueryLimits limits_;
   const std::atomic<bool>& interrupted_;
   StatementHandle statement_{nullptr, &sqlite3_finalize};
-  std::vector<std::string> units_;             // of the columns, or none
+  std::vector<std::string> units_;             // of the columns; may be empty
   std::optional<protocol::ChunkWriter> rows_;  // set by the constructor
   std::uint64_t chunks_ = 0;
 };
 
-/// A database opened for reading only, also while a server writes it. Not thread-safe, but for
+/// A database opened for reading only; a server may write to it. Not thread-safe except
 /// `interrupt`.
 class Reader {
  public:
-  /// Throws StorageError naming what was found: nothing, a directory, a foreign file, another
+  /// Throws StorageError, which names the reason: no file, a directory, a foreign file, another
   /// schema, an unreadable file.
   explicit Reader(const std::string& path);
 
-  /// How the database is read, if that is unusual (see open_for_reading); mostly empty.
+  /// A remark if the database is read in an unusual way (open_for_reading); else empty.
   const std::string& remark() const { return remark_; }
 
   /// Starts the answer to `request`. Throws QueryError as `prepare_query` does, and for a plan that
-  /// takes longer than the time limit; solver::InputError for a wrong question.
-  /// The reader must outlive the answer and does nothing else meanwhile.
+  /// takes longer than the time limit; solver::InputError for a wrong query. The reader must
+  /// outlive the answer and must not be used otherwise until then.
   Answer answer(const protocol::QueryRequest& request, const QueryLimits& limits);
 
   /// The whole answer to one statement, as `rows` of one reply. Throws what Answer throws.

@@ -23,7 +23,7 @@
 namespace oblique::server {
 namespace {
 
-/// A killed process ends at once, except while the system waits for a disk.
+/// Longest wait for the end of a killed process, which ends late only if it waits for a disk.
 constexpr std::chrono::milliseconds kLongestEnd{500};
 constexpr std::size_t kReadBytes = 64 * 1024;
 
@@ -91,7 +91,7 @@ std::optional<ReaderProcess::Frame> ReaderProcess::read() {
   return std::nullopt;
 }
 
-/// False when the process has gone.
+/// False when the process has closed the channel.
 bool ReaderProcess::send_some() {
   while (!out_.empty()) {
     const ssize_t sent = ::send(channel_, out_.data(), out_.size(), MSG_NOSIGNAL);
@@ -104,7 +104,7 @@ bool ReaderProcess::send_some() {
   return true;
 }
 
-/// False when nothing has come.
+/// False when nothing was received.
 bool ReaderProcess::receive_some() {
   std::array<char, kReadBytes> bytes;
   while (true) {

@@ -10,7 +10,7 @@ namespace oblique::server {
 
 /// A child process that answers one query at a time; see reader_program.h. It is killed when this
 /// is destroyed and when the thread that created this ends. Only `end` and the destructor wait for
-/// it, and only for a short time.
+/// its end, and only for a short time.
 class ReaderProcess {
  public:
   /// Starts `program` for the database at `path`. Throws std::system_error.
@@ -26,10 +26,10 @@ class ReaderProcess {
     std::string reply;  ///< an encoded ClientReply without request_id
     bool is_last;
   };
-  /// Sends and receives what is possible without waiting. Returns the next frame of the answer once
-  /// it is complete. The process blocks while its frames are not read.
+  /// Sends and receives as many bytes as possible without waiting. Returns the next frame of the
+  /// answer once it is complete. The process blocks while its frames are not read.
   std::optional<Frame> read();
-  /// The process has closed its end, or sent bytes that are no answer. Set by `read`.
+  /// Whether the process has closed its end or sent invalid bytes. Set by `read`.
   bool is_broken() const { return is_broken_; }
 
   /// To be polled for `events()` before the next `read`.
@@ -37,7 +37,8 @@ class ReaderProcess {
   short events() const;
 
   void kill();
-  /// Kills it if needed and waits for its end. Returns how it ended, as "ended with exit code 3".
+  /// Kills the process if needed and waits for its end. Returns a clause such as "ended with exit
+  /// code 3".
   std::string end();
 
  private:
@@ -48,11 +49,11 @@ class ReaderProcess {
   int channel_ = -1;
   pid_t pid_ = -1;
   bool is_gone_ = false;
-  int status_ = 0;  ///< as waitpid returns it, once gone
+  int status_ = 0;  ///< as returned by waitpid, after the process ended
   bool is_broken_ = false;
   bool is_asked_ = false;  ///< a query was sent whose answer has not ended
   std::string out_;        ///< bytes to send
-  std::string in_;         ///< received bytes of the frames that were not returned
+  std::string in_;         ///< received bytes of frames that were not returned yet
 };
 
 }  // namespace oblique::server

@@ -24,15 +24,16 @@
 namespace oblique::server {
 namespace {
 
-/// Memory beside SQLite's, for the answer.
+/// Memory for the answer, in addition to SQLite's.
 constexpr rlim_t kOwnBytes = 512U << 20U;
 /// SQLite may create the index of the write-ahead log (-shm), and writes nothing else.
 constexpr rlim_t kLargestFile = 64U << 20U;
-/// Lower priority than server and workers, and the first process to be killed without memory.
+/// A lower priority than that of server and workers. When memory runs out, the kernel kills this
+/// process first.
 constexpr int kNiceness = 5;
 constexpr const char* kFirstToGo = "1000";
-/// Processor time beyond the limit of a query. Matters only where the server that would kill this
-/// process is gone.
+/// Processor time beyond the limit of a query. Matters only if the server, which would kill this
+/// process, has ended.
 constexpr rlim_t kSpareCpu_s = 10;
 constexpr std::size_t kLongestError = 4000;
 
@@ -42,7 +43,7 @@ void check(bool done, const char* what) {
   }
 }
 
-/// Bytes of address space that this process has now. More than memory: sanitizers reserve much.
+/// Bytes of address space of this process now. Sanitizers reserve much more than the memory in use.
 rlim_t mapped_bytes() {
   std::ifstream sizes("/proc/self/statm");
   rlim_t pages = 0;
@@ -56,7 +57,7 @@ void limit(Resource resource, rlim_t most) {
   check(setrlimit(resource, &limits) == 0, "setrlimit");
 }
 
-/// Whether the server has closed its end, which a server that was killed has.
+/// Whether the server has closed its end of the channel, as it also does when it is killed.
 bool server_is_gone() {
   pollfd channel{kReaderChannel, 0, 0};
   return ::poll(&channel, 1, 0) > 0 && (channel.revents & POLLHUP) != 0;
@@ -64,18 +65,18 @@ bool server_is_gone() {
 
 void confine() {
   check(prctl(PR_SET_PDEATHSIG, SIGKILL) == 0, "prctl");
-  // Writing where nothing may be written is an error, no reason to die.
+  // A write beyond the largest file becomes an error instead of a signal.
   std::signal(SIGXFSZ, SIG_IGN);
   limit(RLIMIT_AS, mapped_bytes() + static_cast<rlim_t>(kReaderHeapBytes) + kOwnBytes);
   limit(RLIMIT_FSIZE, kLargestFile);
   limit(RLIMIT_CORE, 0);
   sqlite3_hard_heap_limit64(kReaderHeapBytes);
-  // Where the next two are not allowed, the reader runs without them.
+  // If the next two calls are not allowed, the reader runs without their effect.
   (void)setpriority(PRIO_PROCESS, 0, kNiceness);
   std::ofstream("/proc/self/oom_score_adj") << kFirstToGo;
 }
 
-/// Lets SIGXCPU end the process when one chunk takes far longer than the query may.
+/// Makes SIGXCPU end the process when one chunk takes far longer than the query's limit.
 void limit_cpu(std::int64_t time_limit_ms) {
   rusage used{};
   check(getrusage(RUSAGE_SELF, &used) == 0, "getrusage");
@@ -85,7 +86,7 @@ void limit_cpu(std::int64_t time_limit_ms) {
   check(setrlimit(RLIMIT_CPU, &limits) == 0, "setrlimit");
 }
 
-/// False when the channel was closed before all bytes came.
+/// False when the channel was closed before all bytes were received.
 bool receive_all(void* to, std::size_t size) {
   auto* at = static_cast<char*>(to);
   while (size > 0) {
@@ -100,7 +101,7 @@ bool receive_all(void* to, std::size_t size) {
   return true;
 }
 
-/// Blocks while the server takes nothing. False when the server has gone.
+/// Blocks until the server has received all bytes. False when the server has ended.
 bool send_all(const void* from, std::size_t size) {
   const auto* at = static_cast<const char*>(from);
   while (size > 0) {
@@ -120,7 +121,7 @@ bool send_frame(const std::string& reply, bool is_last) {
   return send_all(&head, sizeof head) && send_all(reply.data(), reply.size());
 }
 
-/// Empty when the server has gone.
+/// The next query; empty when the server has ended.
 std::optional<protocol::QueryRequest> next_request() {
   FrameHead head{};
   if (!receive_all(&head, sizeof head) || head.length > protocol::kMaxFrameBytes) {
@@ -134,7 +135,7 @@ std::optional<protocol::QueryRequest> next_request() {
   return request;
 }
 
-/// Sends the answer chunk by chunk. False when the server has gone.
+/// Sends the answer chunk by chunk. False when the server has ended.
 bool send_answer(std::optional<Reader>& reader, const std::string& path,
                  const protocol::QueryRequest& request) {
   const std::int64_t time_limit_ms = time_limit_of(request);
@@ -144,7 +145,7 @@ bool send_answer(std::optional<Reader>& reader, const std::string& path,
     if (!reader) {
       reader.emplace(path);
     }
-    // Without a time limit: the server kills this process at the deadline.
+    // No time limit, because the server kills this process at the deadline.
     QueryLimits limits;
     limits.time_limit_ms = 0;
     Answer answer = reader->answer(request, limits);
@@ -174,7 +175,7 @@ bool send_answer(std::optional<Reader>& reader, const std::string& path,
 std::string encoded_error(const std::string& message, bool wrong_request) {
   protocol::ClientReply reply;
   reply.mutable_error()->set_wrong_request(wrong_request);
-  // A statement may have put any bytes into what SQLite says.
+  // SQLite's message may contain any bytes of the statement.
   reply.mutable_error()->set_message(protocol::shortened(
       protocol::is_utf8(message) ? message : hexadecimal(message), kLongestError));
   return protocol::encode(reply);
@@ -184,7 +185,7 @@ int run_reader_program(const std::string& path) {
   try {
     protocol::silence_protobuf();
     confine();
-    // A server that was killed before confine sends no signal, and its query would run for nobody.
+    // A server that was killed before the call of `confine` causes no signal to this process.
     if (server_is_gone()) {
       return 0;
     }

@@ -22,8 +22,8 @@ struct FrameHead {
 std::string encoded_error(const std::string& message, bool wrong_request = false);
 
 /// Main function of a reader process: answers queries on the database at `path` one after another,
-/// until the channel is closed. First limits its own memory, files and processor time. Dies with
-/// the thread that started it. Returns the exit code.
+/// until the channel is closed. First limits its own memory, files and processor time. Is killed
+/// when the thread that started it ends. Returns the exit code.
 int run_reader_program(const std::string& path);
 
 }  // namespace oblique::server

@@ -19,7 +19,8 @@ namespace {
 constexpr double kHalf = 50.0;
 constexpr double kWhole = 100.0;
 
-/// The numbers of a group. SQLite allocates it with zeros and frees it when the group ends.
+/// The numbers of a group. SQLite allocates this object with zeros and frees it at the end of the
+/// group.
 struct Numbers {
   double* values;
   std::uint64_t count;
@@ -104,7 +105,7 @@ void percentile_step(sqlite3_context* context, int, sqlite3_value** arguments) {
   add_number(context, arguments[0], percent);
 }
 
-/// The percentile, interpolated linearly between the two nearest numbers.
+/// Returns the percentile, interpolated linearly between the two nearest numbers.
 void numbers_final(sqlite3_context* context) {
   auto* const numbers = static_cast<Numbers*>(sqlite3_aggregate_context(context, 0));
   if (numbers == nullptr) {
@@ -148,7 +149,7 @@ void moments_step(sqlite3_context* context, int count_of_arguments, sqlite3_valu
   moments->products += step_x * step_y * part;
 }
 
-/// Variance of a sample, divided by n - 1, or its root; NULL for fewer than two numbers.
+/// Returns the sample variance (divisor n - 1) or its root; NULL for fewer than two numbers.
 template <bool is_root>
 void moments_final(sqlite3_context* context) {
   const auto* const moments = static_cast<const Moments*>(sqlite3_aggregate_context(context, 0));
@@ -158,7 +159,7 @@ void moments_final(sqlite3_context* context) {
   }
 }
 
-/// NULL for fewer than two rows, or where one of the two does not vary.
+/// Returns the correlation; NULL for fewer than two rows, or if x or y is constant.
 void corr_final(sqlite3_context* context) {
   const auto* const moments = static_cast<const Moments*>(sqlite3_aggregate_context(context, 0));
   if (moments != nullptr && moments->squares_x > 0.0 && moments->squares_y > 0.0) {

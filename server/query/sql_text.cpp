@@ -51,8 +51,8 @@ void refuse_character(char c, char next) {
   }
 }
 
-/// Length of a quoted text at the beginning of `rest`, which opens at `open`. A doubled quote
-/// stands for itself.
+/// Length of a quoted text at the beginning of `rest`, whose quote opens at `open`. A doubled quote
+/// inside is one quote.
 std::size_t quoted_length(std::string_view rest, std::size_t open, char close) {
   std::size_t end = open;
   do {
@@ -65,7 +65,8 @@ std::size_t quoted_length(std::string_view rest, std::size_t open, char close) {
   return end;
 }
 
-/// 1, 1.5, .5, 1e-5, 0x1F. Letters directly behind it belong to it, for SQLite to refuse.
+/// Length of a number: 1, 1.5, .5, 1e-5, 0x1F. Letters directly after it are included, so that
+/// SQLite refuses them.
 std::size_t number_length(std::string_view rest) {
   std::size_t end = 0;
   while (end < rest.size() && (continues_name(rest[end]) || rest[end] == '.')) {
@@ -109,7 +110,7 @@ std::string_view text_over(Tokens tokens) {
                         : std::string_view(tokens.front().text.begin(), tokens.back().text.end());
 }
 
-/// Whether an operand may end with this token, so that a name behind it is an alias.
+/// Whether an operand may end with this token, so that a name after it is an alias.
 bool ends_operand(const SqlToken& token) {
   constexpr std::array<std::string_view, 13> kJoins{"and",  "or",   "not",     "is",   "in",
                                                     "like", "glob", "between", "case", "when",

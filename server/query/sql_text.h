@@ -9,7 +9,7 @@
 
 namespace oblique::server {
 
-/// A piece of SQL.
+/// A token of SQL.
 struct SqlToken {
   enum class Kind { kName, kQuotedName, kLiteral, kSign };
   Kind kind;
@@ -19,7 +19,7 @@ struct SqlToken {
   bool is_name() const { return kind == Kind::kName || kind == Kind::kQuotedName; }
 };
 
-/// Why a text cannot be a part of a statement, as a clause for people.
+/// A text cannot be a part of a statement. The message is a clause that says why.
 class NotSqlPart : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -30,7 +30,7 @@ class NotSqlPart : public std::runtime_error {
 /// `text`.
 std::vector<SqlToken> sql_tokens(std::string_view text);
 
-/// Whether SQLite takes two names for the same: it ignores case in ASCII.
+/// Whether two names are the same for SQLite, which ignores case in ASCII.
 bool same_but_case(std::string_view a, std::string_view b);
 
 /// Whether a token is the keyword or the function `word`, in any case.
@@ -39,15 +39,15 @@ bool is_word(const SqlToken& token, std::string_view word);
 /// Index of the bracket that closes the one at index `open`; the number of tokens if none does.
 std::size_t closing_bracket(std::span<const SqlToken> tokens, std::size_t open);
 
-/// The name that a token writes, without its quotes.
+/// The name in a token, without its quotes.
 std::string name_of(const SqlToken& token);
 
-/// One expression of a list that is separated by commas.
+/// One expression of a comma-separated list.
 struct SqlItem {
   std::span<const SqlToken> tokens;  ///< without its alias
   std::string_view text;             ///< as written, without its alias
   std::string_view whole;            ///< as written
-  std::string alias;                 ///< name given with AS or without; empty: none
+  std::string alias;                 ///< name after the expression, with or without AS; empty: none
 };
 
 /// The items of a list. They point into `tokens`, and these into their text.
@@ -60,12 +60,12 @@ std::vector<std::string> aliases_in(std::string_view text);
 std::string sql_text(std::string_view text);
 std::string sql_name(std::string_view name);
 
-/// The part of a statement that the text of an option becomes.
+/// The part of a statement for which an option's text is used.
 enum class SqlPart {
   kCondition,  ///< one expression, as after WHERE
-  kColumns,    ///< expressions separated by commas, each with an alias if need be
+  kColumns,    ///< expressions separated by commas, each with an optional alias
   kGroup,      ///< expressions separated by commas
-  kOrder,      ///< expressions separated by commas, each with ASC or DESC if need be
+  kOrder,      ///< expressions separated by commas, each with an optional ASC or DESC
 };
 
 /// Throws solver::InputError, naming `flag`, the text and what is allowed, unless `text` is a whole
@@ -74,9 +74,9 @@ enum class SqlPart {
 /// brackets. SQLite checks whether the names in it exist.
 void check_sql_part(std::string_view flag, std::string_view text, SqlPart part);
 
-/// SQL takes E for e. Throws solver::InputError, with the right name, for a column in `text` that
-/// differs from one of `columns` only in case and is not one of `aliases`. `text` passed
-/// check_sql_part.
+/// SQL does not distinguish E from e. Throws solver::InputError, with the right name, for a column
+/// in `text` that differs from one of `columns` only in case and is not one of `aliases`. `text`
+/// must have passed check_sql_part.
 void check_case_of_columns(std::string_view flag, std::string_view text,
                            std::span<const std::string> columns,
                            std::span<const std::string> aliases = {});

@@ -43,7 +43,7 @@ struct AddStudy {
   std::string created_at;
   std::int32_t priority = 0;
   std::string submitted_by = {};  ///< name of the key; empty: without keys
-  bool reuses = false;            ///< results of other studies are looked up
+  bool reuses = false;            ///< look up results of other studies
 };
 
 struct SetPriority {
@@ -51,7 +51,7 @@ struct SetPriority {
   std::int32_t priority = 0;
 };
 
-/// Deletes the rows of these points that failed. A study that was done runs again.
+/// Deletes the rows of the failed ones among these points. A study that was done runs again.
 struct ForgetFailures {
   std::uint64_t study_id;
   IntervalSet points;
@@ -73,7 +73,7 @@ struct AddWorker {
   std::string joined_at;
 };
 
-/// Results of one study. A point that has a row already keeps it.
+/// Adds results of one study. A point that has a row already keeps it.
 struct AddResults {
   std::uint64_t study_id;
   std::shared_ptr<const protocol::PointTable> table;
@@ -83,13 +83,13 @@ struct AddResults {
   std::uint32_t attempt;
   std::string solved_at;
   std::vector<protocol::PointResult> results;
-  IntervalSet left_out{};  ///< points that a filter leaves out: they are completed without a row
+  IntervalSet left_out{};  ///< points that the filter leaves out: completed without a row
 };
 
 /// Appends points to a study, which then runs with this priority.
 struct GrowStudy {
   std::uint64_t study_id;
-  StudyTable table;  ///< of all its points
+  StudyTable table;  ///< all points, the earlier ones included
   std::int32_t priority = 0;
   std::string changed_at;
   bool reuses = false;  ///< as in AddStudy
@@ -97,21 +97,21 @@ struct GrowStudy {
 
 /// The outcome of a ReuseResults, valid once the change is durable.
 struct ReusedResults {
-  IntervalSet points;                              ///< that got a row
-  std::map<std::string, std::uint64_t> origins{};  ///< number of copies by the name of their study
+  IntervalSet points;                              ///< points that got a row
+  std::map<std::string, std::uint64_t> origins{};  ///< number of copies by name of the source study
   std::uint64_t probes = 0;                        ///< number of lookups
-  std::optional<std::uint64_t> next_point = {};    ///< first point of the next part; none: the end
+  std::optional<std::uint64_t> next_point = {};    ///< first point of the next part; none: end
 };
 
 /// Looks up one part of the study's open points, from `first_point` on, among the solved points of
-/// other studies, and copies the rows that it finds. They must be of that solver version, and both
-/// studies must ask for estimated errors or neither.
+/// other studies, and copies the rows that it finds. A row is copied only if it is of
+/// `solver_version` and both studies request estimated errors or neither does.
 struct ReuseResults {
   std::uint64_t study_id;
   std::shared_ptr<const protocol::PointTable> table;
   std::uint64_t first_point;
   std::string solver_version;
-  std::shared_ptr<ReusedResults> outcome;  ///< is filled in
+  std::shared_ptr<ReusedResults> outcome;  ///< set when the change is written
 };
 
 /// Ends the lookup of results for a study.
@@ -124,8 +124,8 @@ struct RenameStudy {
   std::string name;
 };
 
-/// Deletes a study. Its name is free, and later results of it are dropped. Its rows are deleted in
-/// parts by `Storage::clear_away`.
+/// Deletes a study: its name becomes free, and later results of it are dropped. Its rows are
+/// deleted in parts by `Storage::clear_away`.
 struct DeleteStudy {
   std::uint64_t study_id;
 };
@@ -134,34 +134,34 @@ using Change =
     std::variant<AddStudy, SetStudyState, SetPriority, ForgetFailures, GrowStudy, RenameStudy,
                  DeleteStudy, ReuseResults, EndReuse, AddWorker, AddResults>;
 
-/// Which rows of deleted studies a step deleted.
+/// The outcome of one step of deleting the rows of deleted studies.
 enum class ClearedAway {
-  kAll,       ///< none are left
-  kPart,      ///< some may be left
-  kMustWait,  ///< none, because readers keep the write-ahead log long; try later
+  kAll,       ///< no such row is left
+  kPart,      ///< more rows may be left
+  kMustWait,  ///< nothing was deleted, because readers keep the write-ahead log long; try later
 };
 
-/// The database as the writer sees it. Tests replace it by one that fails.
+/// The database as the writer uses it. Tests replace it by one that fails.
 class Storage {
  public:
   virtual ~Storage() = default;
 
-  /// Makes all changes durable, in order, in one transaction. Throws StorageError if none of them
-  /// was kept, and StorageGone if that is unknown: nothing can be stored any more.
+  /// Writes all changes, in order, in one transaction, and makes it durable. Throws StorageError if
+  /// none was stored, and StorageGone if that is unknown: nothing can be stored any more.
   virtual void commit(std::span<const Change> changes) = 0;
 
-  /// Throws StorageGone when another file, or none, is at the path of the database.
+  /// Throws StorageGone when the file at the path of the database was deleted or replaced.
   virtual void check() {}
 
-  /// Deletes at most so many rows of deleted studies in one transaction. Throws as `commit` does.
+  /// Deletes at most `most` rows of deleted studies in one transaction. Throws as `commit` does.
   virtual ClearedAway clear_away(std::size_t /*most*/) { return ClearedAway::kAll; }
 
-  /// Moves the write-ahead log into the database and empties it, so that the one file holds all.
-  /// False when a reader prevents it. Throws StorageError.
+  /// Moves the write-ahead log into the database and empties it, so that this one file holds
+  /// everything. False when a reader prevents it. Throws StorageError.
   virtual bool merge_log() { return true; }
 
-  /// Ends the current statement, and every later one that takes long, with a StorageError. From any
-  /// thread.
+  /// Ends the current statement, and every later one that takes long, with a StorageError. May be
+  /// called from any thread.
   virtual void interrupt() {}
 };
 

@@ -34,7 +34,7 @@ IntervalSet without(IntervalSet points, const IntervalSet& others) {
   return points;
 }
 
-/// Those of the points that the study's filter leaves out; none where its recipe cannot be read.
+/// The points in `points` that the study's filter leaves out; none if its recipe cannot be read.
 IntervalSet left_out_of(const StudyTable& table, const IntervalSet& points) {
   IntervalSet found;
   try {
@@ -204,7 +204,7 @@ void CompletedRanges::set_counted(std::uint64_t study_id) {
 
 void CompletedRanges::count_again(std::uint64_t study_id, const StudyTable& table) {
   const IntervalSet with_row = all_points_with_row(database_, study_id);
-  // Judging a point takes time, so only those are judged that have no row.
+  // Evaluating the filter takes time, so it is evaluated only for points without a row.
   const IntervalSet rest = without(all_ranges(database_, study_id), with_row);
   replace(study_id, with_row, left_out_of(table, rest));
 }

@@ -13,20 +13,20 @@ namespace oblique::server {
 /// Points by the number of their study.
 using PointsOfStudies = std::map<std::uint64_t, IntervalSet>;
 
-/// Which of [begin, end) have a row, from the rows themselves. Throws StorageError.
+/// The points in `points` that have a row, read from `results`. Throws StorageError.
 IntervalSet points_with_row(sqlite3* database, std::uint64_t study_id, const Interval& points);
 
-/// The completed points of all studies as `completed_ranges` has them. Studies whose rows must be
-/// counted again have none. Throws StorageError.
+/// The completed points of all studies, read from `completed_ranges`; none for a study whose rows
+/// must be counted again. Throws StorageError.
 std::map<std::uint64_t, std::optional<IntervalSet>> noted_points(sqlite3* database);
 
 /// The same of one study.
 std::optional<IntervalSet> noted_points_of(sqlite3* database, std::uint64_t study_id);
 
-/// Keeps the table `completed_ranges`: the completed points of each study as ranges, so that a
-/// start need not read all rows. To be called in each transaction that inserts or deletes rows.
-/// When another program deletes rows, a trigger sets `studies.counted` to 0, and the next start of
-/// a server counts the rows again.
+/// Maintains the table `completed_ranges`: the completed points of each study as ranges, so that a
+/// start need not read all rows. Each transaction that inserts or deletes rows must update it. When
+/// another program deletes rows, a trigger sets `studies.counted` to 0, and the next start of a
+/// server counts the rows again.
 ///
 /// Writing a range costs three statements, whatever its length. Adjacent ranges are merged.
 ///
@@ -35,29 +35,30 @@ class CompletedRanges {
  public:
   explicit CompletedRanges(sqlite3* database);
 
-  /// Points are completed. Written by `flush`.
+  /// Marks points as completed. `flush` writes them.
   void add(std::uint64_t study_id, std::uint64_t point) { gathered_[study_id].insert(point); }
   void add(std::uint64_t study_id, const Interval& points) {
     gathered_[study_id].insert(points.begin, points.end);
   }
   /// Writes what was added.
   void flush();
-  /// The transaction of what was added is rolled back.
+  /// Drops what was added, because its transaction was rolled back.
   void forget() { gathered_.clear(); }
 
-  /// The ranges of a study that overlap [first, end), as they are written.
+  /// The written ranges of a study that overlap `points`, uncut.
   IntervalSet overlapping(std::uint64_t study_id, const Interval& points);
-  /// Those of the points that are not completed, also not by what was added.
+  /// The points in `points` that are neither completed nor added.
   IntervalSet open_points(std::uint64_t study_id, const IntervalSet& points);
-  /// These points are open again.
+  /// Opens these points again.
   void remove(std::uint64_t study_id, const IntervalSet& points);
   /// False after another program deleted rows of the study.
   bool is_counted(std::uint64_t study_id);
   void set_counted(std::uint64_t study_id);
-  /// Makes the ranges of a study anew: of points with a row, and of those without one that are in
-  /// the ranges now and that the filter leaves out; none of these where the recipe cannot be read.
+  /// Computes the ranges of a study again. They have the points with a row, and those points of the
+  /// present ranges without a row that the filter leaves out. If the recipe cannot be read they
+  /// have only points with a row.
   void count_again(std::uint64_t study_id, const StudyTable& table);
-  /// The same, of points with a row and those of `left_out` without one.
+  /// The same for the points with a row and the points in `left_out` without one.
   void count_again(std::uint64_t study_id, const IntervalSet& left_out);
 
  private:

@@ -54,7 +54,7 @@ void DatabaseFiles::check() const {
   if (is_there && found.st_dev == opened_.st_dev && found.st_ino == opened_.st_ino) {
     return;
   }
-  // Other errors, as of a folder that may not be searched any more, say nothing about the file.
+  // Other errors, such as a folder without search permission, do not mean that the file is gone.
   if (is_there || errno == ENOENT || errno == ENOTDIR || errno == ESTALE) {
     throw StorageGone("the file " + path_ +
                       (is_there ? " was replaced" : " was deleted or renamed") + kNothingStored);

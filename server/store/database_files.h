@@ -6,8 +6,8 @@
 
 namespace oblique::server {
 
-/// The file of a database that is open for writing. A program can write to an open file after it
-/// was deleted, renamed or replaced, and all of that is lost: `check` notices it.
+/// The file of a database that is open for writing. What a program writes to a file after the file
+/// was deleted, renamed or replaced is lost; `check` detects this.
 class DatabaseFiles {
  public:
   /// Opens the file at `path`, or creates it with mode 0600, and locks it against other servers

@@ -11,7 +11,7 @@
 namespace oblique::server {
 
 std::string RecipeCheck::fault_of(const Statement& row) {
-  const auto number = static_cast<std::uint64_t>(row.integer(0));  // below 0: beyond all
+  const auto number = static_cast<std::uint64_t>(row.integer(0));  // large if negative
   if (number >= table_.size()) {
     return "the study has no such point";
   }
@@ -42,7 +42,7 @@ bool RecipeCheck::agrees(std::int64_t model_id) {
   definition_.reset();
   try {
     return protocol::is_close(protocol::model_of_canonical(definition), model_->parameters);
-  } catch (const std::runtime_error&) {  // there is none, or it is damaged
+  } catch (const std::runtime_error&) {  // it is missing or damaged
     return false;
   }
 }

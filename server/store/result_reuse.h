@@ -48,10 +48,10 @@ class ResultReuse {
   Statement find_;
   Statement copy_;
   Statement source_;
-  // Of the change under way: names may be others in the next one, and models be gone.
+  // Valid for one change: later, studies may have other names and models may be deleted.
   std::map<std::uint64_t, std::optional<Source>> sources_;
-  std::unordered_map<std::uint64_t, std::int64_t> models_;  // 0: it has no row
-  /// Whether a study asks for estimated errors, which never changes. By study.
+  std::unordered_map<std::uint64_t, std::int64_t> models_;  // row by model number; 0: none
+  /// By study, whether it requests estimated errors, which never changes.
   std::map<std::uint64_t, bool> wants_errors_;
 };
 

@@ -114,7 +114,7 @@ ResultInsert::ResultInsert(sqlite3* database)
         for (std::size_t i = 0; i < result_columns().size(); ++i) {
           marks += ", ?";
         }
-        // Only a point that has a row is passed over; any other conflict is an error.
+        // A point that has a row keeps it; any other conflict is an error.
         return fmt::format(
             "INSERT INTO results ({}, checksum) VALUES ({})"
             " ON CONFLICT (study_id, point) DO NOTHING",
@@ -211,7 +211,7 @@ void ResultInsert::put_lists(const solver::CaseResult& result) {
 }
 
 std::string insert_model_sql() {
-  // The keys are the columns, but for those handled first.
+  // The other columns are called as the model keys.
   std::string names = "definition, lengths_m";
   std::string marks = "?, ?";
   for (const auto& key : solver::model_keys()) {

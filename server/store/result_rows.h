@@ -18,21 +18,20 @@ namespace oblique::server {
 
 /// The columns of `results`, except `status`, which SQLite computes, and the checksum.
 std::span<const std::string_view> result_columns();
-/// Those of them that come from the solver. A failed row has none of them.
+/// The columns that come from the solver. They are NULL in a failed row.
 std::span<const std::string_view> output_columns();
-/// Those outputs that every solved row has.
+/// The outputs that every solved row has.
 std::span<const std::string_view> required_outputs();
 
-/// What `checksum` of a row of `results` must be, as an expression over its columns: CRC-32
-/// (row_checksum.h).
+/// An SQL expression over the columns of `results` for the checksum of a row (row_checksum.h).
 std::string result_checksum_sql();
 /// The same for `studies`.
 std::string study_checksum_sql();
 
-/// A row of `results`. What it refers to must outlive its insertion.
+/// A row of `results`. Objects that it refers to must live until it is inserted.
 struct ResultRow {
   std::uint64_t study_id;
-  std::uint64_t point;  ///< its number
+  std::uint64_t point;
   std::int64_t model_id;
   protocol::Point inputs;
   const solver::CaseResult* result;  ///< nullptr: it failed
@@ -48,8 +47,8 @@ class ResultInsert {
   /// The connection must outlive this.
   explicit ResultInsert(sqlite3* database);
 
-  /// Inserts the row unless its point has one; any other conflict is an error. Returns whether it
-  /// did. Throws StorageError.
+  /// Inserts the row unless its point has one, and returns whether it did. Any other conflict is an
+  /// error. Throws StorageError.
   bool run(const ResultRow& row);
 
  private:
@@ -65,12 +64,12 @@ class ResultInsert {
   sqlite3* database_;
   Statement insert_;
   RowChecksum checksum_;
-  int next_ = 0;                      // parameter to be bound
-  std::array<std::string, 5> lists_;  // texts of the lists, which keep their memory
+  int next_ = 0;                      // number of the next parameter
+  std::array<std::string, 5> lists_;  // texts of the lists; kept to reuse their memory
 };
 
-/// Inserts a model unless there is one of the same definition. Its parameters are those of
-/// `bind_model`, which also takes the model's canonical text (proto/recipe/canonical.h).
+/// A statement that inserts a model unless one has the same definition, the model's canonical text
+/// (proto/recipe/canonical.h). `bind_model` binds its parameters.
 std::string insert_model_sql();
 void bind_model(Statement& insert, const solver::ModelParameters& model,
                 std::string_view definition);

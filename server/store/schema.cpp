@@ -11,11 +11,11 @@
 namespace oblique::server {
 namespace {
 
-/// An object of a database, as `sqlite_schema` has it.
+/// A row of `sqlite_schema`.
 struct SchemaObject {
   std::string type;
   std::string name;
-  std::string table;  ///< that an index or trigger belongs to
+  std::string table;  ///< of an index or trigger
   std::string sql;
 
   bool operator==(const SchemaObject&) const = default;
@@ -88,13 +88,13 @@ void create_tables(sqlite3* database) {
 
 void create_views(sqlite3* database) {
   Transaction transaction(database);
-  // Without our trigger, deleted rows were not noticed.
+  // While the trigger was missing, rows may have been deleted without notice.
   const auto objects = objects_of(database);
   const bool had_our_trigger = std::ranges::any_of(objects, [](const SchemaObject& object) {
     return object.type == "trigger" && is_ours(object);
   });
   execute(database, kViewsSql);
-  if (!had_our_trigger) {  // no other trigger runs with this, now that ours has replaced it
+  if (!had_our_trigger) {  // no foreign trigger is left that could run with this
     execute(database, "UPDATE studies SET counted = 0");
   }
   transaction.commit();

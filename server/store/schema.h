@@ -10,29 +10,29 @@ namespace oblique::server {
 /// Creates the tables in an empty database, which gets a random identity. Throws StorageError.
 void create_tables(sqlite3* database);
 
-/// Creates the views and the trigger of this schema anew, and its indices where they were dropped.
-/// Objects with other names stay. If the trigger was not there, rows may
-/// have been deleted unnoticed, so all studies are marked to be counted again. Throws StorageError,
-/// as where a table has the name of a view.
+/// Creates the views and the trigger of this schema again, and its indices where they were dropped.
+/// Objects with other names stay. If the trigger was missing, rows may have been deleted without
+/// notice, so all studies are marked to be counted again. Throws StorageError, for example if a
+/// table has the name of a view.
 void create_views(sqlite3* database);
 
 /// A table of this schema and the statement that creates it.
 struct TableDefinition {
   std::string name;
-  std::string sql;  ///< as `sqlite_schema` has it
+  std::string sql;  ///< as in `sqlite_schema`
 };
 const std::vector<TableDefinition>& our_tables();
 
-/// Those tables and those views that a database of this schema lacks. Throws StorageError.
+/// The tables, and the views, of this schema that the database lacks. Throws StorageError.
 std::vector<std::string> missing_tables(sqlite3* database);
 std::vector<std::string> missing_views(sqlite3* database);
 
-/// Names of the triggers that this schema does not have, or has with another text: they would run
-/// with each change of the writer, and might never end. Throws StorageError.
+/// Names of triggers that are not in this schema, or that have another text there. They would run
+/// with each change of the writer and might never end. Throws StorageError.
 std::vector<std::string> other_triggers(sqlite3* database);
 
-/// An expression for the highest study number in any table; 0: none. Rows of a study whose row in
-/// `studies` was deleted by hand count too.
+/// An SQL expression for the highest study number in any table; 0: none. Rows of a study whose row
+/// in `studies` was deleted by hand count too.
 std::string last_study_id_sql();
 
 }  // namespace oblique::server

@@ -2,7 +2,7 @@
 -- the columns; times count from touch unless a name says otherwise. PRAGMA application_id identifies the
 -- program, PRAGMA user_version is the number of this schema.
 
--- One row. Workers recognise by it the database for which they hold results.
+-- One row. Workers compare database_id with that of the database for which they keep results.
 CREATE TABLE about (
   database_id   TEXT NOT NULL,              -- random, set when the file is created
   starts        INTEGER NOT NULL DEFAULT 0, -- how often a server has opened the file
@@ -136,7 +136,7 @@ CREATE TABLE completed_ranges (
   PRIMARY KEY (study_id, first_point)
 ) STRICT, WITHOUT ROWID;
 
--- How many results a study has copied from another.
+-- Number of results that a study has copied from another one.
 CREATE TABLE reused_points (
   study_id    INTEGER NOT NULL REFERENCES studies (study_id), -- number of the study that has the copies
   source      TEXT NOT NULL,    -- name of the other study when they were copied
@@ -144,12 +144,12 @@ CREATE TABLE reused_points (
   PRIMARY KEY (study_id, source)
 ) STRICT, WITHOUT ROWID;
 
--- Deleted studies that may still have rows. The server deletes the rows in small parts, and then the number here.
+-- Deleted studies that may still have rows. The server deletes these in small parts, and then the entry here.
 CREATE TABLE deletions (
   study_id    INTEGER PRIMARY KEY -- number of the study
 ) STRICT;
 
--- Failed points whose rows were removed by `retry`, as ranges of one attempt. The last row of a point counts.
+-- Failed points whose rows `retry` removed, as ranges of one attempt. For a point in several rows the last counts.
 CREATE TABLE retries (
   study_id    INTEGER NOT NULL REFERENCES studies (study_id), -- number of the study
   first_point INTEGER NOT NULL, -- first point of the range

@@ -16,10 +16,10 @@ namespace oblique::server {
 namespace {
 
 constexpr std::size_t kMostCachedModels = 65536;
-/// Of SQLite's virtual machine, whether the statement is interrupted: some 10 us.
+/// Instructions of SQLite's virtual machine between checks for an interrupt: about 10 us.
 constexpr int kStepsBetweenLooks = 1000;
 
-/// Whether a loss of power must not undo the change. Results can be solved again.
+/// Whether the change must survive a loss of power. Results need not: they can be solved again.
 bool is_lasting(const Change& change) {
   return !std::holds_alternative<AddResults>(change) &&
          !std::holds_alternative<ReuseResults>(change) &&
@@ -28,7 +28,7 @@ bool is_lasting(const Change& change) {
 
 }  // namespace
 
-/// Statements that each batch of results runs.
+/// Prepared statements for batches of results.
 struct Store::Statements {
   explicit Statements(sqlite3* database)
       : find_study(database, "SELECT 1 FROM studies WHERE study_id = ?"),
@@ -55,7 +55,7 @@ Store::Store(const std::string& path) {
   add_row_checksum(database_.get());
   // Overwriting deleted rows with zeros would write many pages.
   execute(database_.get(), "PRAGMA secure_delete = OFF");
-  // Takes effect in a new file. Rows fill pages of this size better than smaller ones.
+  // Applies to a new file only. Rows waste less space in pages of this size than in smaller ones.
   execute(database_.get(), "PRAGMA page_size = 8192");
   log_ = std::make_unique<WriteAheadLog>(database_.get());
   const DatabaseKind kind = identify(database_.get(), path);
@@ -70,7 +70,7 @@ Store::Store(const std::string& path) {
   }
   prepare_schema(path);
   if (kind == DatabaseKind::kEmpty) {
-    log_->merge();  // a new file is a whole database from the start
+    log_->merge();  // a new file is a complete database from the start
   }
   deletion_ = std::make_unique<StudyDeletion>(database_.get());
   in_transaction(true, [this] { deletion_->remove_orphans(); });
@@ -81,13 +81,13 @@ Store::Store(const std::string& path) {
 
 /// Creates the views, and refuses a file whose tables or triggers are not those of this schema.
 void Store::prepare_schema(const std::string& path) {
-  // A view in the place of a table could be read without end.
+  // A view in place of a table could return rows without end.
   if (const auto missing = missing_tables(database_.get()); !missing.empty()) {
     throw StorageError(fmt::format("{} lacks the table {}: `oblique check --db {}` tells more",
                                    path, fmt::join(missing, " and "), path));
   }
-  // Before the views are created, which may change rows. A trigger with the name of ours is
-  // replaced then.
+  // Checked before `create_views`, which may change rows. A trigger with the name of ours is
+  // replaced there.
   auto triggers = other_triggers(database_.get());
   std::erase(triggers, "row_deleted");
   if (!triggers.empty()) {
@@ -118,8 +118,8 @@ Store::~Store() {
       log_->delete_on_close();
     }
   } catch (const StorageGone&) {
-    // Another file has the name. Our log must not remain beside it, so it is merged into our own
-    // file, wherever that is.
+    // Another file is at the path. Our log must not remain beside it, so it is merged into the file
+    // that this process has open.
     try {
       if (!sync_failed_) {
         log_->merge();
@@ -165,7 +165,7 @@ void Store::commit(std::span<const Change> changes) {
     ranges_->forget();
     throw;
   }
-  files_->check();  // throws if it was committed to a file that has lost its name
+  files_->check();  // throws if the transaction went into a file that is no longer at the path
   guard_syncs([this] { log_->shorten(); });
 }
 
@@ -184,7 +184,7 @@ ClearedAway Store::clear_away(std::size_t most) {
   if (log_->is_held_long()) {
     return ClearedAway::kMustWait;
   }
-  // Rows that come back when power is lost are deleted again.
+  // Without a sync: rows that a loss of power restores are deleted again.
   in_transaction(false, [&] { deletion_->delete_rows(most); });
   files_->check();
   return ClearedAway::kPart;
@@ -211,7 +211,7 @@ void Store::add(const ForgetFailures& change) {
   }
   ranges_->flush();
   const bool was_counted = ranges_->is_counted(change.study_id);
-  // Failures of one attempt that follow each other have one difference between number and rank.
+  // Consecutive failed points of one attempt have the same difference of point and row number.
   Statement note(database_.get(),
                  "INSERT INTO retries (study_id, first_point, points, attempt, retried_at)"
                  " SELECT ?1, min(point), count(*), attempt, ?4 FROM"
@@ -234,7 +234,7 @@ void Store::add(const ForgetFailures& change) {
     forget.reset();
   });
   ranges_->remove(change.study_id, forgotten);
-  if (was_counted) {  // the trigger took these deletions for those of another program
+  if (was_counted) {  // the trigger has counted these deletions as those of another program
     ranges_->set_counted(change.study_id);
   }
   execute_with(database_.get(),
@@ -295,7 +295,7 @@ void Store::add(const AddResults& change) {
                         .attempt = change.attempt,
                         .solved_at = change.solved_at};
     statements_->add_result.run(row);
-    ranges_->add(change.study_id, result.point());  // also where it had a row already
+    ranges_->add(change.study_id, result.point());  // also if it already had a row
   }
   if (const IntervalSet left_out = ranges_->open_points(change.study_id, change.left_out);
       !left_out.empty()) {
@@ -305,7 +305,7 @@ void Store::add(const AddResults& change) {
   }
 }
 
-/// False for a deleted study: results of it are late ones.
+/// False for a deleted study, of which late results may arrive.
 bool Store::has_study(std::uint64_t study_id) {
   Statement& find = statements_->find_study;
   find.bind(1, study_id);
@@ -314,7 +314,7 @@ bool Store::has_study(std::uint64_t study_id) {
   return found;
 }
 
-/// The row of `models` that has that model of the study, inserted if there is none.
+/// The row of `models` that has model number `model` of the study. Inserts it if there is none.
 std::int64_t Store::stored_model(const AddResults& change, std::uint64_t model) {
   const std::pair key{change.study_id, model};
   if (const auto known = models_.find(key); known != models_.end()) {

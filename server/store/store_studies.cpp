@@ -1,4 +1,4 @@
-// Reading the studies and their progress from the database at a start.
+// Reads the studies and their progress from the database at a start.
 #include <algorithm>
 #include <limits>
 #include <map>
@@ -31,7 +31,7 @@ std::uint64_t number(Statement& statement, int column) {
   return static_cast<std::uint64_t>(statement.integer(column));
 }
 
-/// Reads the failures, and the attempts in which points failed, of all studies.
+/// Reads the failed points of all studies, and the attempts in which points failed.
 void read_failures(sqlite3* database, std::vector<StoredStudy>& studies) {
   std::map<std::uint64_t, StoredStudy*> by_number;
   for (StoredStudy& study : studies) {
@@ -51,7 +51,7 @@ void read_failures(sqlite3* database, std::vector<StoredStudy>& studies) {
       }
     }
   };
-  // Rows of failures are later than the retries of their points.
+  // Retries are read first, because a failed row of the same point is newer.
   read("SELECT study_id, first_point, points, attempt FROM retries ORDER BY rowid", false);
   read(
       "SELECT study_id, point, 1, attempt FROM results INDEXED BY failed_points"
@@ -78,14 +78,14 @@ bool has_condition(const StoredStudy& study) {
                              [](const protocol::Block& block) { return !block.where().empty(); });
 }
 
-/// Throws StorageError for a study whose rows are those of another one, as when its number was
-/// changed by hand. Compares the first row, the last, and some between with the recipe. A completed
-/// point may lack a row where a condition leaves out points.
+/// Throws StorageError for a study whose rows belong to another one, for example after its number
+/// was changed by hand. Compares the first row, the last and some between with the recipe. In a
+/// study with a filter a completed point may lack a row.
 void check_rows(sqlite3* database, const StoredStudy& study) {
   constexpr std::uint64_t kCompared = 64;
   const std::uint64_t step = study.settled.size() / kCompared + 1;
   std::vector<std::uint64_t> points;
-  std::uint64_t passed = 0;  // points before the run
+  std::uint64_t passed = 0;  // number of points in earlier runs
   study.settled.for_each([&](const Interval& run) {
     const std::uint64_t size = run.end - run.begin;
     for (std::uint64_t i = (step - passed % step) % step; i < size; i += step) {
@@ -121,7 +121,7 @@ void check_rows(sqlite3* database, const StoredStudy& study) {
 
 }  // namespace
 
-/// Counts rows again where that is needed, in one transaction.
+/// The completed points of each study. Counts rows again where needed, in one transaction.
 PointsOfStudies Store::completed_points() {
   PointsOfStudies completed;
   std::vector<std::uint64_t> uncounted;
@@ -166,7 +166,7 @@ std::vector<StoredStudy> Store::studies() {
     StoredStudy study{};
     study.study_id = number(list, 0);
     study.name = list.text(1);
-    if (!protocol::is_utf8(study.name)) {  // no message may carry it
+    if (!protocol::is_utf8(study.name)) {  // messages contain UTF-8 only
       left_out_.push_back(fmt::format(
           "study {} is left as it is, for its name \"{}\" is no UTF-8: with no server at work, "
           "sqlite3 gives it another (UPDATE studies SET name = 'NAME' WHERE study_id = {})",

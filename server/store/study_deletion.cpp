@@ -38,7 +38,7 @@ void StudyDeletion::delete_rows(std::size_t most) {
   }
 }
 
-/// Returns how many rows the statement deleted.
+/// Returns the number of deleted rows.
 std::size_t StudyDeletion::delete_some(const char* sql, std::uint64_t study_id, std::size_t most) {
   execute_with(database_, sql, study_id, most);
   return static_cast<std::size_t>(sqlite3_changes(database_));

@@ -1,10 +1,10 @@
 -- Indices, the trigger and the views, created again at each start of a server. Views that users add stay.
 
 CREATE INDEX IF NOT EXISTS failed_points ON results (study_id, point) WHERE error IS NOT NULL;
--- By which results are reused for equal points of other studies.
+-- For the lookup of equal points whose results another study reuses.
 CREATE INDEX IF NOT EXISTS solved_points ON results (model_id, H, mu, e) WHERE error IS NULL;
 
--- After a row was deleted by hand the server's next start counts the study's rows again.
+-- Makes the next start of a server count the study's rows again after rows were deleted by hand.
 DROP TRIGGER IF EXISTS row_deleted;
 CREATE TRIGGER row_deleted AFTER DELETE ON results
 WHEN (SELECT counted FROM studies WHERE study_id = OLD.study_id)

@@ -9,14 +9,14 @@
 namespace oblique::server {
 namespace {
 
-/// The log; nullptr while there is none.
+/// The file of the write-ahead log; nullptr while there is none.
 sqlite3_file* file_of(sqlite3* database) {
   sqlite3_file* file = nullptr;
   sqlite3_file_control(database, "main", SQLITE_FCNTL_JOURNAL_POINTER, &file);
-  return file != nullptr && file->pMethods != nullptr ? file : nullptr;  // without them: not open
+  return file != nullptr && file->pMethods != nullptr ? file : nullptr;  // without: not open
 }
 
-/// Writes every byte of the file as it is, and syncs it. Returns the result code.
+/// Writes every byte of the file again, unchanged, and syncs it. Returns SQLite's result code.
 int write_again(sqlite3_file* file) {
   std::vector<char> bytes(std::size_t{1} << 16U);
   sqlite3_int64 size = 0;
@@ -36,7 +36,7 @@ int write_again(sqlite3_file* file) {
 WriteAheadLog::WriteAheadLog(sqlite3* database) : database_(database) {
   sqlite3_busy_timeout(database_, kBusyTimeout_ms);
   sqlite3_db_config(database_, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
-  // This replaces the checkpoints of SQLite.
+  // A hook replaces SQLite's automatic checkpoints.
   sqlite3_wal_hook(
       database_,
       [](void* log, sqlite3*, const char*, int pages) {
@@ -47,7 +47,7 @@ WriteAheadLog::WriteAheadLog(sqlite3* database) : database_(database) {
 }
 
 void WriteAheadLog::rewrite() {
-  const Transaction transaction(database_);  // no other program may write meanwhile
+  const Transaction transaction(database_);  // keeps other programs from writing
   sqlite3_file* file = file_of(database_);
   const int code = file != nullptr ? write_again(file) : SQLITE_OK;
   if (code != SQLITE_OK) {
@@ -76,7 +76,7 @@ void WriteAheadLog::shorten() {
 }
 
 bool WriteAheadLog::merge() {
-  // A reader may take long, and results would wait.
+  // Without a timeout, because results would wait for a slow reader.
   sqlite3_busy_timeout(database_, 0);
   const int code = checkpoint(SQLITE_CHECKPOINT_TRUNCATE, nullptr, nullptr);
   sqlite3_busy_timeout(database_, kBusyTimeout_ms);

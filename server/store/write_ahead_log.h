@@ -4,12 +4,12 @@
 
 namespace oblique::server {
 
-/// Makes the checkpoints of an open database, because SQLite ignores failures of its own ones.
+/// Makes the checkpoints of an open database, because SQLite ignores a failed automatic one.
 ///
-/// After a failed sync Linux takes what it could not write for written, and a later sync succeeds
-/// without it. A checkpoint of such a log could leave the database with parts of a transaction when
-/// the power is lost. So each failed sync throws StorageGone, which ends the server, and the next
-/// one writes the log anew before it builds on it.
+/// After a failed sync Linux marks the unwritten pages as clean, and a later sync succeeds without
+/// having stored them. If the power fails after a checkpoint of such a log, the database could have
+/// only part of a transaction. So each failed sync throws StorageGone, which ends the server, and
+/// the next server writes the whole log again before any change.
 class WriteAheadLog {
  public:
   /// Takes over the checkpoints of `database`, which must outlive this.
@@ -17,19 +17,19 @@ class WriteAheadLog {
   WriteAheadLog(const WriteAheadLog&) = delete;
   WriteAheadLog& operator=(const WriteAheadLog&) = delete;
 
-  /// Writes the bytes of the log as they are and syncs them. To be called once, before the first
-  /// change: it is unknown how the server before ended. Throws StorageError.
+  /// Writes the bytes of the log again, unchanged, and syncs them. To be called once, before the
+  /// first change: the previous server may have ended after a failed sync. Throws StorageError.
   void rewrite();
   /// Copies a long log into the database. Committed transactions stay when this fails. Throws
-  /// StorageGone after a failed sync; other failures are ignored, and it is tried again.
+  /// StorageGone after a failed sync; after other failures the next call tries again.
   void shorten();
-  /// Copies all of it into the database and empties it. False when a reader still needs it. Throws
-  /// StorageError.
+  /// Copies the whole log into the database and empties it. False when a reader still needs it.
+  /// Throws StorageError.
   bool merge();
-  /// Whether readers keep the log from being shortened for so long that changes that can wait
+  /// Whether the log is so long, because readers prevent a checkpoint, that changes that can wait
   /// should wait.
   bool is_held_long() const { return pages_ > kHeldLong * long_pages_; }
-  /// Length in pages from which on `shorten` copies the log.
+  /// Sets the length [pages] from which on `shorten` copies the log.
   void shorten_at(int pages) { long_pages_ = pages; }
   /// Lets SQLite copy and delete the log when the database is closed. Not after a failed sync.
   void delete_on_close() {
@@ -43,7 +43,7 @@ class WriteAheadLog {
   int pages_ = 0;
   int long_pages_ = 1000;
   static constexpr int kHeldLong = 16;
-  static constexpr int kBusyTimeout_ms = 2000;  // of other statements than `merge`
+  static constexpr int kBusyTimeout_ms = 2000;  // `merge` does not wait
 };
 
 }  // namespace oblique::server

@@ -13,24 +13,24 @@
 namespace oblique::server {
 namespace {
 
-/// Jobs in one transaction at most, so that acknowledgements do not wait long.
+/// Most jobs in one transaction, so that acknowledgements do not wait long.
 constexpr std::size_t kLargestGroup = 256;
 
-/// Pause before a faulty database is tried again.
+/// Pause before another attempt to write after a fault.
 constexpr std::chrono::milliseconds kRetryPause{500};
 
 /// Interval of the calls of `tend` while no job waits.
 constexpr std::chrono::milliseconds kTendPause{1000};
 
-/// Rows of deleted studies are deleted so many at a time (about 10 ms), and waiting jobs are
+/// Number of rows of deleted studies that are deleted at a time (about 10 ms). Waiting jobs are
 /// written in between. After a step that failed or must wait there is a pause.
 constexpr std::size_t kRowsAtOnce = 1000;
 constexpr std::chrono::milliseconds kClearPause{1000};
 
-/// Attempts to merge a log that readers hold before that is reported.
+/// Attempts to merge a log that readers hold before a report.
 constexpr int kQuietTries = 5;
 
-/// Attempts to merge the log at the end, and the pause between them: readers have three seconds.
+/// Attempts to merge the log at the end, and the pause between them: three seconds in all.
 constexpr int kLastTries = 15;
 constexpr std::chrono::milliseconds kLastPause{200};
 
@@ -39,7 +39,7 @@ bool ends_a_study(const Change& change) {
   return state != nullptr && state->state == StudyState::kDone;
 }
 
-/// The study that the change is of; 0: none.
+/// The study that the change belongs to; 0: none.
 std::uint64_t study_of(const Change& change) {
   return std::visit(
       [](const auto& kind) -> std::uint64_t {
@@ -162,7 +162,7 @@ CommitCounts Writer::commits() const {
 
 void Writer::merge_before_the_end() {
   if (commits_.is_faulty()) {
-    return;  // the log does not have the waiting jobs; their loss is reported
+    return;  // the waiting jobs are lost, which is reported
   }
   std::vector<WriteReport> reports;
   bool merged = false;
@@ -213,7 +213,7 @@ bool GroupCommit::clear(std::size_t most, std::vector<WriteReport>& reports) {
   } catch (const StorageGone& error) {
     note_gone(error, reports);
   } catch (const std::exception&) {
-    // As when the disk is full, which the next commit reports. It is tried again.
+    // For example a full disk, which the next commit reports. The deletion is tried again.
   }
   return false;
 }
@@ -252,7 +252,7 @@ void GroupCommit::note_gone(const StorageGone& error, std::vector<WriteReport>& 
 
 bool GroupCommit::write_group(std::deque<WriteJob>& jobs, std::vector<WriteReport>& reports) {
   std::size_t size = 0;
-  // A lookup takes as long as thousands of results, so it is the last of its group.
+  // A lookup takes as long as thousands of results, so a group ends with the first one.
   for (bool has_lookup = false; size < std::min(jobs.size(), kLargestGroup) && !has_lookup;
        ++size) {
     has_lookup = std::holds_alternative<ReuseResults>(jobs[size].change);
@@ -273,9 +273,9 @@ bool GroupCommit::write_group(std::deque<WriteJob>& jobs, std::vector<WriteRepor
     put_back();
     note_gone(error, reports);
     return true;
-  } catch (const std::exception&) {  // out of memory, too
+  } catch (const std::exception&) {  // std::bad_alloc included
     put_back();
-    return false;  // which of them failed is found by trying each alone
+    return false;  // `write_singly` finds which one failed
   }
   note_committed(changes);
   if (std::exchange(faulty_, false)) {
@@ -290,15 +290,15 @@ bool GroupCommit::write_group(std::deque<WriteJob>& jobs, std::vector<WriteRepor
 
 void GroupCommit::write_singly(std::deque<WriteJob>& jobs, std::vector<WriteReport>& reports) {
   std::deque<WriteJob> kept;
-  std::set<std::uint64_t> waiting;  // studies with a job among those kept
+  std::set<std::uint64_t> waiting;  // studies that have a waiting job
   std::string fault;
   const auto keep = [&](WriteJob& job) {
     waiting.insert(study_of(job.change));
     kept.push_back(std::move(job));
   };
   for (WriteJob& job : jobs) {
-    // Once a job waits, later ones that can wait are not tried, nor any change of its study: "done,
-    // then retried" must not become "retried, then done".
+    // Once a job waits, later jobs that can wait are not tried, and neither is any change of its
+    // study: "done, then retried" must not become "retried, then done".
     if (gone_ || (!fault.empty() && !job.answer_failure)) {
       keep(job);
       continue;

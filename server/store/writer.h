@@ -29,12 +29,13 @@ struct WriteJob {
 /// The outcome of a job, or a change of the state of the database.
 struct WriteReport {
   enum class Kind {
-    kStored,     ///< the job with that ticket is durable
+    kStored,     ///< the job with this ticket is durable
     kRefused,    ///< the job failed and was dropped; `error` says why
-    kFault,      ///< the database does not accept changes; jobs wait. Reported once
+    kFault,      ///< the database accepts no changes; jobs wait. Reported once
     kRecovered,  ///< it accepts changes again
-    kGone,       ///< its file is gone or a sync failed; nothing is written any more. Reported once
-    kUnmerged,   ///< the write-ahead log cannot be merged; `error` says why. Once a study, or end
+    kGone,       ///< the file is gone or a sync failed; nothing more is written. Reported once
+    kUnmerged,  ///< the log cannot be merged; `error` says why. Once per finished study, and at the
+                ///< end
   };
   Kind kind;
   std::uint64_t ticket = 0;
@@ -53,12 +54,12 @@ class GroupCommit {
   /// `storage` must outlive this.
   explicit GroupCommit(Storage& storage) : storage_(storage) {}
 
-  /// Writes the first of `jobs`, in order, and removes those that are durable or refused. When a
-  /// group fails, every job is tried alone, so that one bad change does not block the others;
-  /// changes of one study keep their order.
+  /// Writes a group from the front of `jobs`, in order, and removes the jobs that are durable or
+  /// refused. When the group fails, every job is tried alone, so that one bad change does not block
+  /// the others; changes of one study keep their order.
   std::vector<WriteReport> write(std::deque<WriteJob>& jobs);
 
-  /// Results that became durable since this began.
+  /// Number of results that this object has made durable.
   std::uint64_t rows() const { return rows_; }
   /// Whether the last write left jobs that the database did not accept.
   bool is_faulty() const { return faulty_; }
@@ -69,16 +70,16 @@ class GroupCommit {
   void resume_deletions() { clears_ = true; }
   /// Whether rows of deleted studies may be left.
   bool has_to_clear() const { return clears_ && !gone_; }
-  /// Deletes at most so many of them. False when that must wait a while.
+  /// Deletes at most `most` of these rows. False when the next call should wait.
   bool clear(std::size_t most, std::vector<WriteReport>& reports);
 
   /// To be called regularly while no job waits: checks the file of the database, and merges its log
   /// once a study is done.
   std::vector<WriteReport> tend();
 
-  /// Merges the log. False when it must be tried again; the database may be gone by then.
+  /// Merges the log. False when it was not merged; check `is_gone` before another attempt.
   bool merge(std::vector<WriteReport>& reports);
-  /// The report that the last `merge` failed.
+  /// A report that the last `merge` failed.
   WriteReport unmerged() const { return {WriteReport::Kind::kUnmerged, 0, why_unmerged_}; }
 
  private:
@@ -94,7 +95,7 @@ class GroupCommit {
   bool gone_ = false;
   bool clears_ = false;        // rows of deleted studies may be left
   bool to_be_merged_ = false;  // a study is done
-  int tries_ = 0;              // to merge since then
+  int tries_ = 0;              // attempts to merge since then
   std::string why_unmerged_;
 };
 
@@ -104,7 +105,7 @@ class Writer {
   using Report = std::function<void(std::vector<WriteReport>)>;
 
   /// `report` is called on the writer's thread, after each commit. `storage` must outlive the
-  /// writer. At the end a step that takes longer than `longest_last_step` is interrupted.
+  /// writer. `finish` interrupts a step that takes longer than `longest_last_step`.
   Writer(Storage& storage, Report report,
          std::chrono::milliseconds longest_last_step = std::chrono::seconds(5));
   /// Stops without waiting for jobs that keep failing.
@@ -114,15 +115,15 @@ class Writer {
 
   void submit(WriteJob job);
 
-  /// Continues deletions that an earlier process left. To be called once only this thread uses the
-  /// storage.
+  /// Continues deletions that an earlier process left. To be called when no other thread uses the
+  /// storage any more.
   void resume_deletions();
 
-  /// Writes the waiting jobs, merges the log and ends the thread, also when a statement would never
-  /// end. Returns the number of jobs that could not be made durable.
+  /// Writes the waiting jobs, merges the log and ends the thread; interrupts statements that take
+  /// too long. Returns the number of jobs that could not be made durable.
   std::size_t finish();
 
-  /// From any thread.
+  /// May be called from any thread.
   CommitCounts commits() const;
 
  private:
@@ -133,20 +134,20 @@ class Writer {
 
   Storage& storage_;
   const std::chrono::milliseconds longest_last_step_;
-  GroupCommit commits_;  // of the thread
+  GroupCommit commits_;  // used by the thread only
   Report report_;
   mutable std::mutex mutex_;
   std::condition_variable wake_;
   std::deque<WriteJob> queue_;  // guarded by mutex_
   bool finishing_ = false;      // guarded by mutex_
   bool resumes_ = false;        // guarded by mutex_
-  std::uint64_t steps_ = 0;     // that the thread began; guarded by mutex_
-  bool has_ended_ = false;      // the thread; guarded by mutex_
+  std::uint64_t steps_ = 0;     // steps begun by the thread; guarded by mutex_
+  bool has_ended_ = false;      // the thread has ended; guarded by mutex_
   std::condition_variable ended_;
   CommitCounts counts_;        // guarded by mutex_
   std::size_t left_over_ = 0;  // written by the thread, read after it ended
-  std::chrono::steady_clock::time_point clears_from_{};  // of the thread
-  std::thread thread_;                                   // last: it uses all the others
+  std::chrono::steady_clock::time_point clears_from_{};  // used by the thread only
+  std::thread thread_;                                   // last: it uses the other members
 };
 
 }  // namespace oblique::server

@@ -8,11 +8,10 @@
 
 namespace oblique::server {
 
-/// How often amounts of which size came. Not thread-safe.
+/// Counts observed amounts by class of size. Not thread-safe.
 class Histogram {
  public:
-  /// `bounds` ascend; each is the largest amount of its class, and what is above them all is a
-  /// class of its own.
+  /// `bounds` ascend. Each is the largest amount of its class; larger amounts are the last class.
   explicit Histogram(std::vector<double> bounds)
       : bounds_(std::move(bounds)), counts_(bounds_.size() + 1) {}
 
@@ -23,7 +22,7 @@ class Histogram {
   }
 
   const std::vector<double>& bounds() const { return bounds_; }
-  /// By class, one more than there are bounds.
+  /// Number of amounts by class; there is one more class than bounds.
   const std::vector<std::uint64_t>& counts() const { return counts_; }
   double sum() const { return sum_; }
 

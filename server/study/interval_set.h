@@ -7,7 +7,7 @@
 
 namespace oblique::server {
 
-/// Points that follow each other, half-open: [begin, end).
+/// Consecutive points, half-open: [begin, end).
 struct Interval {
   std::uint64_t begin;
   std::uint64_t end;
@@ -24,7 +24,7 @@ inline std::uint64_t size_of(const std::vector<Interval>& intervals) {
   return points;
 }
 
-/// A set of points kept as disjoint, non-touching intervals: its cost grows with the number of
+/// A set of points as disjoint intervals that do not touch. Its cost grows with the number of
 /// intervals, not of points.
 class IntervalSet {
  public:
@@ -32,11 +32,11 @@ class IntervalSet {
   /// The one interval [begin, end); empty when begin == end.
   IntervalSet(std::uint64_t begin, std::uint64_t end) { insert(begin, end); }
 
-  /// Adds [begin, end), whatever of it is there already. Nothing happens when begin >= end.
+  /// Adds [begin, end); parts of it may already be in the set. Does nothing when begin >= end.
   void insert(std::uint64_t begin, std::uint64_t end);
   void insert(std::uint64_t point) { insert(point, point + 1); }
 
-  /// Removes [begin, end), whatever of it is there.
+  /// Removes [begin, end); parts of it may be missing from the set.
   void erase(std::uint64_t begin, std::uint64_t end);
   void erase(std::uint64_t point) { erase(point, point + 1); }
 
@@ -52,10 +52,11 @@ class IntervalSet {
   /// The lowest interval. The set must not be empty.
   Interval front() const { return {ends_.begin()->first, ends_.begin()->second}; }
 
-  /// The highest one. The set must not be empty.
+  /// The highest interval. The set must not be empty.
   Interval back() const { return {ends_.rbegin()->first, ends_.rbegin()->second}; }
 
-  /// The lowest part of an interval that lies at `point` or above; nothing when there is none.
+  /// The first interval that ends above `point`, cut to begin at `point` or later; none if there is
+  /// no such interval.
   std::optional<Interval> first_from(std::uint64_t point) const;
 
   /// The parts of the set that lie in [begin, end), in order.

@@ -26,7 +26,7 @@ void PointAttempts::set(const Interval& range, std::uint32_t attempts) {
   counts_.emplace_hint(place, merged.begin, Counted{merged.end, attempts});
 }
 
-/// Cuts `range` out of the intervals that are there.
+/// Removes `range` from the stored intervals.
 void PointAttempts::make_room(const Interval& range) {
   auto next = counts_.upper_bound(range.begin);
   if (next != counts_.begin() && std::prev(next)->second.end > range.begin) {

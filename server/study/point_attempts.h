@@ -7,11 +7,11 @@
 
 namespace oblique::server {
 
-/// How often points were leased, kept as intervals of one number: the cost grows with the number of
-/// intervals, not of points.
+/// How often points were leased. Intervals of points with equal numbers are stored, so the cost
+/// grows with the number of intervals, not of points.
 class PointAttempts {
  public:
-  /// The points of `range` were leased `attempts` times, whatever was said of them before.
+  /// Sets the number for the points of `range`, and replaces earlier ones.
   void set(const Interval& range, std::uint32_t attempts);
 
   bool empty() const { return counts_.empty(); }

@@ -15,7 +15,7 @@ namespace {
 using protocol::Block;
 using protocol::Recipe;
 
-/// Whether `longer` is `block` with more points, of which the first are those of `block`.
+/// Whether `longer` is `block` with a larger sample, whose first points are those of `block`.
 bool is_larger_sample(const Block& block, const Block& longer) {
   if (!block.has_sample() || block.sample().kind() == protocol::SAMPLE_LATIN_HYPERCUBE ||
       longer.sample().count() <= block.sample().count()) {
@@ -26,7 +26,7 @@ bool is_larger_sample(const Block& block, const Block& longer) {
   return protocol::is_same_block(block, shortened);
 }
 
-/// A line for each difference in the model and the choice of errors.
+/// One line for each difference in the model and in the request for estimated errors.
 std::vector<std::string> head_differences(const Recipe& stored, const Recipe& given) {
   std::vector<std::string> lines;
   const auto was = protocol::unjudged_from_message(stored.model());

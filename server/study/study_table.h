@@ -10,37 +10,38 @@
 
 namespace oblique::server {
 
-/// The points of a study as the server keeps them: always the bytes of the recipe, and the table
-/// made of them only while somebody computes with it. A study that rests or is done costs its bytes
-/// and nothing else. Copies share the table. Not thread-safe but for `size` and `recipe_bytes`;
-/// other threads are given what `get` returned.
+/// The recipe of a study in the server: its bytes, and the table of its points, which is made when
+/// needed and can be released. A study that is paused or done needs memory for its bytes only.
+/// Copies share the table. Not thread-safe except `size` and `recipe_bytes`; other threads may use
+/// the table that `get` returned.
 class StudyTable {
  public:
   StudyTable() = default;
-  /// Of a recipe that was judged just now.
+  /// From the table of a recipe that passed `judge_points`.
   StudyTable(std::shared_ptr<const protocol::PointTable> table);  // NOLINT: as good as the other
-  /// Of a recipe that was judged when it was stored, and of so many points.
+  /// From the bytes of a stored recipe, which was judged before, and its number of points.
   StudyTable(std::string recipe_bytes, std::uint64_t points);
 
-  /// How many points it has, also those that filters leave out.
+  /// Number of points, including those that filters leave out.
   std::uint64_t size() const { return shared_->points; }
   /// oblique.protocol.Recipe, serialised.
   const std::string& recipe_bytes() const { return shared_->recipe_bytes; }
 
-  /// Whether both have the same recipe; false when one cannot be read. Reads both if their bytes
-  /// differ and their sizes do not.
+  /// Whether both have the same recipe; false when one cannot be read. Parses both only if their
+  /// bytes differ and their numbers of points do not.
   bool is_of_the_recipe_of(const StudyTable& other) const;
 
-  /// What another recipe is to this one. Costs in proportion to both. Throws std::runtime_error
-  /// when one of them cannot be read.
+  /// How the recipe of `other` relates to this one. The time is proportional to their sizes. Throws
+  /// std::runtime_error when one of them cannot be read.
   Growth growth_to(const StudyTable& other) const;
 
-  /// The table, made when there is none. Throws solver::InputError for a recipe that this version
-  /// does not take, and std::runtime_error for bytes that are no recipe of so many points.
+  /// The table, which is made if it does not exist. Throws solver::InputError for a recipe that
+  /// this version does not accept, and std::runtime_error for bytes that are not a recipe of `size`
+  /// points.
   const std::shared_ptr<const protocol::PointTable>& get() const;
   const protocol::PointTable* operator->() const { return get().get(); }
 
-  /// Forgets the table. It is made again when it is asked for.
+  /// Frees the table; `get` makes it again.
   void release() const { shared_->table.reset(); }
   bool is_made() const { return shared_->table != nullptr; }
 

@@ -7,7 +7,7 @@ namespace oblique::protocol {
 
 inline constexpr std::int64_t kHighestPriority = 1000;  ///< the lowest is its negative
 
-/// Why no study can have that priority, or an empty text.
+/// Why a study cannot have that priority, or an empty text.
 std::string objection_to_priority(std::int64_t priority);
 
 /// The allowed range for help texts: "-1000 to 1000".

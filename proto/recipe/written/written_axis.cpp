@@ -24,7 +24,7 @@ Axis axis_of(const solver::ParameterKey& key) {
   return axis;
 }
 
-/// The number of a name. `what` begins the sentence about any other.
+/// The index of a name in `names`. `what` begins the message about an unknown name.
 int number_of_name(std::string_view name, const std::vector<std::string_view>& names,
                    std::string_view what) {
   const auto found = std::find(names.begin(), names.end(), name);
@@ -78,7 +78,8 @@ Axis stepped_axis(const solver::ParameterKey& key, double from, double to, doubl
                     exact_number(step), kMaxPoints));
   }
   const double whole_steps = std::round(steps);
-  // Decimal steps are not exact in binary; this is well above their rounding, relative to a step.
+  // Decimal steps are not exact in binary. This tolerance, relative to a step, is well above their
+  // rounding.
   const double tolerance = 1e-9 * std::max(1.0, steps);
   if (std::abs(steps - whole_steps) > tolerance) {
     const double below = from + std::floor(steps) * step;

@@ -9,8 +9,8 @@
 #include "proto/recipe/blocks.h"
 #include "worker/solver/model/parameters.h"
 
-// Axes and samples as people write them. Each function throws InputError naming key, value and what
-// is allowed.
+// Axes and samples from study files and flags. Each function throws InputError, which names key,
+// value and what is allowed.
 namespace oblique::protocol {
 
 Axis listed_axis(const solver::ParameterKey& key, const std::vector<double>& values,
@@ -21,10 +21,10 @@ Axis counted_axis(const solver::ParameterKey& key, double from, double to, std::
                   Spacing spacing = SPACING_LINEAR);
 [[noreturn]] void throw_wrong_count(const solver::ParameterKey& key, std::string_view written);
 
-/// Values `step` apart, of which the last is `to`.
+/// Values `step` apart, the last of which is `to`.
 Axis stepped_axis(const solver::ParameterKey& key, double from, double to, double step);
 
-/// A distribution with those of its parts that were written.
+/// A distribution; parts that were not written are empty.
 struct WrittenDistribution {
   DistributionKind kind = DISTRIBUTION_UNIFORM;
   std::optional<double> from;
@@ -36,7 +36,7 @@ struct WrittenDistribution {
 Axis drawn_axis(const solver::ParameterKey& key, const WrittenDistribution& distribution,
                 BlockKind kind);
 
-/// An axis that follows from others, as "A^2 / (4 * pi)".
+/// An axis computed from others by an expression such as "A^2 / (4 * pi)".
 Axis expressed_axis(const solver::ParameterKey& key, std::string_view text);
 
 /// `kind` is random, lhs or sobol.

@@ -10,24 +10,24 @@
 
 namespace oblique::protocol {
 
-/// A model as people write it: a preset, and single keys that override it, said in any order. What
-/// is wrong with one of them is thrown when it is said, as InputError naming key, value and what is
+/// A model from a study file or flags: a preset, and single keys that override it, set in any
+/// order. A wrong value throws InputError when it is set; the message names key, value and what is
 /// allowed.
 class WrittenModel {
  public:
-  /// The keys that stand in a model beside those of `solver::model_keys()`.
+  /// The keys of a written model in addition to `solver::model_keys()`.
   static constexpr std::string_view kPreset = "preset";
   static constexpr std::string_view kLengths = "lengths";
-  /// What is said to those who write `lengths` and what it stands for too.
+  /// The message if `lengths` is used together with the keys that it replaces.
   static constexpr std::string_view kLengthsStandAlone =
       "lengths stands beside links or length: give either lengths, one a link, or links and length";
 
   void set_preset(std::string_view name);
-  /// One length in m a link. Not beside the keys links and length.
+  /// Sets one length [m] per link. Not allowed together with the keys links and length.
   void set_lengths(std::vector<double> lengths_m);
   void set(std::string_view key, double value);
 
-  /// All of it. Throws InputError for what is wrong only together.
+  /// The model. Throws InputError for values that are wrong only in combination.
   solver::ModelParameters model() const;
 
  private:

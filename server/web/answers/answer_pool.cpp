@@ -13,10 +13,10 @@ using Clock = std::chrono::steady_clock;
 using protocol::ClientReply;
 using protocol::ClientRequest;
 
-/// The service runs two queries of the page at a time; the third thread answers what needs none.
+/// The service runs two queries of the page at a time; the third thread makes answers without one.
 constexpr std::size_t kThreads = 3;
 constexpr std::size_t kMostWaiting = 64;
-/// How often a thread that waits for the service looks whether its job is over.
+/// Interval at which a thread that waits for the service checks whether its job is over.
 constexpr std::chrono::milliseconds kLookEvery{50};
 
 JobError too_long() {

@@ -23,10 +23,10 @@
 
 namespace oblique::server {
 
-/// A study as the service reports it.
+/// A study as reported by the service.
 struct ServedStudy {
-  /// Whether a point without a row is left out. That of a study that is done is: the filter on the
-  /// machine of its worker decides, and may differ from ours in the last digit of a value.
+  /// Whether the filter leaves out a point that has no row. In a study that is done it does: the
+  /// worker decided, whose values may differ from those of this machine in the last digit.
   bool leaves_out(std::uint64_t point) const {
     return table->has_filter() && (state == "done" || !table->is_left_in(point));
   }
@@ -34,7 +34,7 @@ struct ServedStudy {
   std::uint64_t id;
   std::string name;
   std::string state;
-  std::uint64_t failed;  ///< points
+  std::uint64_t failed;  ///< number of failed points
   std::shared_ptr<const protocol::PointTable> table;
 };
 
@@ -49,27 +49,27 @@ class JobError : public std::exception {
   HttpAnswer answer_;
 };
 
-/// What a job works with: requests to the service, for which its thread waits. Each function throws
-/// JobError for an error of the service, and when the job is over.
+/// Sends a job's requests to the service and waits for the replies. Each function throws JobError
+/// for an error of the service, and when the job is over.
 class JobContext {
  public:
-  /// `is_over`: the client has gone, or the time is up.
+  /// `is_over` returns whether the client has disconnected or the time limit has passed.
   JobContext(ServiceLine& service, std::function<bool()> is_over)
       : service_(service), is_over_(std::move(is_over)) {}
 
   ServedStudy study(std::uint64_t id) const;
 
-  /// Passes each row of the answer to `on_row`. A reader process of the server reads it, and is
-  /// killed when the job is over.
+  /// Receives the rows of an answer, a chunk at a time. The query runs in a reader process, which
+  /// is killed when the job is over.
   using OnRow = std::function<void(const protocol::ChunkRows&)>;
   void query(const protocol::StudyQuery& query, const OnRow& on_row) const;
-  /// The same for a query that `condition`, which a person wrote, is part of. If the condition is
-  /// wrong, the error shows it as it was written.
+  /// The same for a query that contains `condition`, a text of the user. If it is wrong, the error
+  /// shows it as it was written.
   void query(const protocol::StudyQuery& query, const std::string& condition,
              const OnRow& on_row) const;
 
   bool is_over() const { return is_over_(); }
-  /// To be called now and then by what takes long.
+  /// To be called repeatedly in long computations.
   void throw_if_over() const;
 
  private:
@@ -79,17 +79,17 @@ class JobContext {
   std::function<bool()> is_over_;
 };
 
-/// Makes answers that take longer than the HTTP thread may: a few threads, one queue.
+/// Threads with one queue for answers that would block the HTTP thread for too long.
 class AnswerPool {
  public:
-  /// Throws std::invalid_argument for a wrong request, JobError.
+  /// Makes an answer. Throws std::invalid_argument for a wrong request, and JobError.
   using Job = std::function<HttpAnswer(const JobContext&)>;
 
-  /// `done` is called on a thread of the pool when an answer can be taken. A job is over after
+  /// `done` is called on a thread of the pool when an answer is ready. A job is over after
   /// `time_limit`.
   AnswerPool(ServiceLine& service, std::function<void()> done,
              std::chrono::milliseconds time_limit = std::chrono::seconds(7));
-  /// Stops.
+  /// Calls `stop`.
   ~AnswerPool();
   AnswerPool(const AnswerPool&) = delete;
   AnswerPool& operator=(const AnswerPool&) = delete;
@@ -99,9 +99,9 @@ class AnswerPool {
 
   /// `number` is that of the HTTP request. False if too many jobs wait, and after `stop`.
   bool submit(std::uint64_t number, Job job);
-  /// The answer, once; nothing if it is not ready.
+  /// Removes and returns the answer; none if it is not ready.
   std::optional<HttpAnswer> take(std::uint64_t number);
-  /// Ends a job whose client has gone.
+  /// Ends a job whose client has disconnected.
   void forget(std::uint64_t number);
 
  private:
@@ -123,7 +123,7 @@ class AnswerPool {
   std::map<std::uint64_t, std::shared_ptr<std::atomic<bool>>> running_;  // guarded by mutex_
   std::map<std::uint64_t, HttpAnswer> answers_;                          // guarded by mutex_
   bool is_stopping_ = false;                                             // guarded by mutex_
-  std::vector<std::thread> threads_;  // last: they use all the others
+  std::vector<std::thread> threads_;  // last: they use the other members
 };
 
 }  // namespace oblique::server

@@ -20,10 +20,10 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr std::uint64_t kUsualBins = 64;
-/// Values this close to an end, relative to it, are in the bins: people type 0.2 for 0.6 / 3.
+/// Values within this relative distance of an end count as inside: users type 0.2 for 0.6 / 3.
 constexpr double kEndTolerance = 1e-12;
 
-/// A number in SQL.
+/// A number as SQL text.
 std::string sql_number(double value) {
   constexpr double kMost = std::numeric_limits<double>::max();
   return fmt::format("({})", solver::exact_real(std::clamp(value, -kMost, kMost)));
@@ -41,7 +41,7 @@ struct BinSide {
   double most = 0.0;
 
   bool has_typed_ends() const { return typed_least && typed_most; }
-  /// Rows that have a place on this side.
+  /// The SQL condition for rows whose value can be in a bin of this side.
   std::string has_place_sql() const {
     return fmt::format("{} {}", column.name, is_logarithmic ? "> 0" : "IS NOT NULL");
   }
@@ -52,7 +52,7 @@ struct BinSide {
     return fmt::format("{} BETWEEN {} AND {}", column.name, sql_number(least - slack_below),
                        sql_number(most + slack_above));
   }
-  /// The number of a row's bin.
+  /// The SQL expression for the number of a row's bin.
   std::string bin_sql() const {
     const double first = place_of(least);
     const double width = place_of(most) - first;
@@ -63,8 +63,8 @@ struct BinSide {
     return fmt::format("max(min(CAST(({} - {}) * {} AS INTEGER), {}), 0)", place, sql_number(first),
                        sql_number(static_cast<double>(bins) / width), bins - 1);
   }
-  /// Takes the ends that were not typed from the range of the column; `range` is empty if no row
-  /// has a place. Throws std::invalid_argument for wrong ends.
+  /// Sets the ends that the user did not give to those of `range`, the range of the column; it is
+  /// empty if no row has a value. Throws std::invalid_argument for wrong ends.
   void set_ends(std::optional<std::pair<double, double>> range) {
     least = typed_least.value_or(range ? range->first : typed_most.value_or(0.0));
     most = typed_most.value_or(range ? range->second : least);
@@ -100,7 +100,7 @@ struct Bins {
   std::uint64_t outside = 0;
 };
 
-/// Selects from the solved points that meet the condition and have a place on all sides.
+/// A query of the solved points that meet the condition and have a value on all sides.
 protocol::StudyQuery query_of(const ServedStudy& study, const std::string& condition,
                               const std::vector<BinSide>& sides) {
   protocol::StudyQuery query;
@@ -114,7 +114,7 @@ protocol::StudyQuery query_of(const ServedStudy& study, const std::string& condi
   return query;
 }
 
-/// Sets the ends of the sides, by a query unless all were typed.
+/// Sets the ends of the sides, by a query unless the user gave all of them.
 void find_ends(const JobContext& context, const ServedStudy& study, const std::string& condition,
                std::vector<BinSide>& sides) {
   if (std::ranges::all_of(sides, &BinSide::has_typed_ends)) {
@@ -136,7 +136,7 @@ void find_ends(const JobContext& context, const ServedStudy& study, const std::s
   });
 }
 
-/// One row a bin; of what lies beyond the ends the bin is NULL.
+/// Counts by a query with one row per bin. Rows beyond the ends have the bin NULL.
 Bins count_bins(const JobContext& context, const ServedStudy& study, const std::string& condition,
                 const std::vector<BinSide>& sides, const std::optional<PictureColumn>& z) {
   std::size_t size = 1;

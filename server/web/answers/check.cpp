@@ -24,7 +24,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-/// A preset's and an integrator's names, and numbers of single keys.
+/// A model from JSON: names of a preset and an integrator, and numbers of single keys.
 protocol::ModelParameters model_of(const nlohmann::json& written) {
   protocol::WrittenModel model;
   for (const auto& [key, value] : written.items()) {
@@ -41,8 +41,8 @@ protocol::ModelParameters model_of(const nlohmann::json& written) {
   return protocol::to_message(model.model());
 }
 
-/// The least drop in m beyond which only a fall tells whether the tip comes to an H of the study;
-/// nothing where it comes to all of them.
+/// The least drop [m] above which only a computed fall shows whether the tip reaches an H of the
+/// study; none if the tip reaches all of them.
 std::optional<double> surely_reached_m(const protocol::Recipe& recipe) {
   const auto model = protocol::from_message(recipe.model());
   std::optional<double> least_m;
@@ -81,7 +81,7 @@ HttpAnswer check_answer(const std::string& body) {
 }  // namespace
 
 protocol::SubmitRequest study_of_body(const std::string& body) {
-  // Protobuf refuses what is deeper than that, too.
+  // Protobuf refuses deeper JSON too.
   constexpr int kDeepest = 50;
   bool is_deep = false;
   auto whole = nlohmann::json::parse(

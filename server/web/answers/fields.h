@@ -10,13 +10,14 @@
 
 namespace oblique::server {
 
-/// The fields behind the question mark of a request, decoded.
+/// The decoded fields of the query string of a request.
 using Fields = std::map<std::string, std::string>;
 
-/// Whether all of them are UTF-8: messages to the service have nothing else.
+/// Whether all fields are UTF-8, which messages to the service require.
 bool is_text(const Fields& fields);
 
-/// Reads fields. Each function throws std::invalid_argument, naming the field and what is allowed.
+/// Parses fields. Each function throws std::invalid_argument, which names the field and what is
+/// allowed.
 class FieldReader {
  public:
   explicit FieldReader(const Fields& fields) : fields_(fields) {}
@@ -24,9 +25,10 @@ class FieldReader {
   std::optional<std::string> text(const std::string& name) const;
   std::optional<std::uint64_t> whole(const std::string& name) const;
   std::optional<double> number(const std::string& name) const;
-  /// Cells along one side of a picture, from 1 to kMostCells.
+  /// Number of cells along one side of a picture, from 1 to kMostCells; `usual` if the field is
+  /// absent.
   std::uint64_t cells(const std::string& name, std::uint64_t usual) const;
-  /// The condition `where`, a whole expression of SQL; empty if there is none.
+  /// The condition `where`, a complete SQL expression; empty if there is none.
   std::string condition() const;
 
   static constexpr std::uint64_t kMostCells = 256;
@@ -45,11 +47,11 @@ struct PictureColumn {
   bool is_category = false;  ///< a text with few values; else a number
 };
 
-/// Nothing if the column is neither a number nor a category.
+/// The column of that name; none if it is neither a number nor a category.
 std::optional<PictureColumn> find_picture_column(std::string_view name);
 
-/// The column in a field. Throws std::invalid_argument unless it is a number or, where allowed, a
-/// category.
+/// The column that a field names. Throws std::invalid_argument unless it is a number or, where
+/// allowed, a category.
 PictureColumn picture_column(const FieldReader& fields, const std::string& name,
                              bool may_be_category);
 

@@ -19,7 +19,7 @@ using protocol::AxisLayout;
 
 constexpr std::uint64_t kUsualCells = 256;
 
-/// Null: the block has no such axis with values of its own.
+/// The axis of that key; null if the block has no such axis with values of its own.
 const AxisLayout* find(const std::vector<AxisLayout>& axes, std::string_view key) {
   const auto axis = std::find_if(axes.begin(), axes.end(), [key](const AxisLayout& layout) {
     return layout.axis->key() == key && protocol::has_own_values(*layout.axis);
@@ -56,7 +56,7 @@ std::size_t chosen_block(const protocol::PointTable& table, const FieldReader& f
                   protocol::excerpt(x), y.empty() ? "" : " and " + protocol::excerpt(y)));
 }
 
-/// The values that are shown: all, or evenly chosen ones, both ends in.
+/// Selects the values to show: all, or evenly spaced ones including both ends.
 GridSide side_of(const AxisLayout& layout, const FieldReader& fields, const std::string& name) {
   GridSide side{layout.axis->key(), layout.values, 0, 0, layout.stride, {}, {}};
   side.first = fields.whole(name + "0").value_or(0);
@@ -69,7 +69,7 @@ GridSide side_of(const AxisLayout& layout, const FieldReader& fields, const std:
   const std::uint64_t there = side.last - side.first + 1;
   const std::uint64_t shown = std::min(there, fields.cells("n" + name, kUsualCells));
   for (std::uint64_t i = 0; i < shown; ++i) {
-    // Half is added so that the nearest line is taken.
+    // Half is added to round to the nearest value.
     const std::uint64_t steps = shown > 1 ? shown - 1 : 1;
     const std::uint64_t number = side.first + (2 * i * (there - 1) + steps) / (2 * steps);
     side.numbers.push_back(shown > 1 ? number : side.first);
@@ -78,7 +78,7 @@ GridSide side_of(const AxisLayout& layout, const FieldReader& fields, const std:
   return side;
 }
 
-/// The number of the value that is nearest; lists may have any order.
+/// The number of the nearest value; lists may have any order.
 std::uint64_t nearest(const protocol::Axis& axis, double value) {
   const std::uint64_t size = protocol::axis_size(axis);
   if (axis.count() > 0) {
@@ -97,7 +97,8 @@ std::uint64_t nearest(const protocol::Axis& axis, double value) {
   return static_cast<std::uint64_t>(found - values.begin());
 }
 
-/// One entry of `at`: KEY:VALUE, the nearest value of the axis, or KEY@NUMBER, that one.
+/// Parses one entry of `at`: KEY:VALUE selects the nearest value of the axis, KEY@NUMBER the value
+/// of that number.
 GridPlace place_of(const std::vector<AxisLayout>& axes, std::string_view text) {
   const std::size_t mark = text.find_first_of(":@");
   const std::string_view key = text.substr(0, mark);
@@ -120,7 +121,7 @@ GridPlace place_of(const std::vector<AxisLayout>& axes, std::string_view text) {
   return {std::string(key), axis->values, number, protocol::axis_value(*axis->axis, number)};
 }
 
-/// All entries of `at`.
+/// Parses all entries of `at`.
 std::vector<GridPlace> places_at(const std::vector<AxisLayout>& axes, std::string_view at) {
   std::vector<GridPlace> places;
   while (!at.empty()) {

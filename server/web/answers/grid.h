@@ -12,15 +12,15 @@
 
 namespace oblique::server {
 
-/// One side of a slice: which values of an axis are shown.
+/// One side of a slice: the values of an axis that are shown.
 struct GridSide {
   std::string key;
-  std::uint64_t of = 1;     ///< values of the axis
-  std::uint64_t first = 0;  ///< of those that are looked at
+  std::uint64_t of = 1;     ///< number of values of the axis
+  std::uint64_t first = 0;  ///< number of the first value in the selected part
   std::uint64_t last = 0;
-  std::uint64_t stride = 0;            ///< from one value to the next, in points
-  std::vector<std::uint64_t> numbers;  ///< of the values that are shown, rising
-  std::vector<double> values;          ///< the same
+  std::uint64_t stride = 0;            ///< difference of point numbers from one value to the next
+  std::vector<std::uint64_t> numbers;  ///< numbers of the shown values, rising
+  std::vector<double> values;          ///< the shown values
 };
 
 /// An axis that is held at one value.
@@ -35,9 +35,9 @@ struct GridPlace {
 struct GridSlice {
   std::size_t block;
   GridSide x;
-  GridSide y;  ///< without a key: one row
+  GridSide y;  ///< its key is empty: the slice is a line
   std::vector<GridPlace> at;
-  std::uint64_t first_point;  ///< that of the first values of both sides
+  std::uint64_t first_point;  ///< point of the first values of both sides
 
   /// The point of a cell.
   std::uint64_t point(std::size_t column, std::size_t row) const {
@@ -45,11 +45,11 @@ struct GridSlice {
   }
 };
 
-/// What `x`, `y`, `at`, `block`, `x0`, `x1`, `y0`, `y1`, `nx` and `ny` ask for. Throws
-/// std::invalid_argument naming the field and what is allowed.
+/// The slice that the fields `x`, `y`, `at`, `block`, `x0`, `x1`, `y0`, `y1`, `nx` and `ny` select.
+/// Throws std::invalid_argument, which names the field and what is allowed.
 GridSlice grid_slice(const protocol::PointTable& table, const FieldReader& fields);
 
-/// What `at` holds fixed, and only that, of the first block that has all its axes. Throws as
+/// The axes that the field `at` holds fixed, in the first block that has all of them. Throws as
 /// `grid_slice` does.
 std::vector<GridPlace> grid_places(const protocol::PointTable& table, const FieldReader& fields);
 

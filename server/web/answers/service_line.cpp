@@ -9,9 +9,9 @@
 namespace oblique::server {
 namespace {
 
-/// So that the loop serves others in between.
+/// Most frames that `take` returns, so that the loop can serve other clients in between.
 constexpr std::size_t kMostATurn = 8;
-/// Older ones have passed their deadline at the service.
+/// Most traces that are remembered; older ones have passed their deadline in the service.
 constexpr std::size_t kMostLeftTraces = 256;
 
 }  // namespace
@@ -31,7 +31,8 @@ void ServiceLine::ask(std::uint64_t number, protocol::ClientRequest request) {
   if (awaited.trace.empty()) {
     return;
   }
-  // Those before end after the new one waits, or the worker would drop what it has done.
+  // Ends the earlier requests only after the new one was sent, so that the worker keeps its
+  // progress.
   std::erase_if(left_traces_, [&](const LeftTrace& left) {
     const bool is_same = left.request == awaited.trace;
     if (is_same) {
@@ -85,7 +86,7 @@ void ServiceLine::decode_frames() {
     for (protocol::ClientReply& reply : replies) {
       const auto awaited = awaited_.find(reply.request_id());
       if (awaited == awaited_.end()) {
-        continue;  // a message that something takes long has the number of no request
+        continue;  // a notice of a delay belongs to no request
       }
       const bool is_part = reply.has_query() && !reply.query().ends();
       awaited->second.is_query = awaited->second.is_query && is_part;

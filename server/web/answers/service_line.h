@@ -20,36 +20,36 @@ namespace oblique::server {
 /// Thread-safe.
 class ServiceLine {
  public:
-  /// By which the service recognises this client; no connection has this identity.
+  /// The identity of this client for the service; no connection has it.
   static constexpr const char* kIdentity = "the page";
 
-  // ---- Of the HTTP thread and of those that make answers.
-  /// A number that no HTTP request has.
+  // ---- Called by the HTTP thread and by threads that make answers.
+  /// A new request number, different from those of HTTP requests.
   std::uint64_t new_number();
   void ask(std::uint64_t number, protocol::ClientRequest request);
-  /// The next reply under that number; nothing if there is none yet.
+  /// The next reply to request `number`; none if there is none yet.
   std::optional<protocol::ClientReply> reply(std::uint64_t number);
-  /// The same, waiting up to `timeout`.
+  /// The same, but waits up to `timeout`.
   std::optional<protocol::ClientReply> wait_for_reply(std::uint64_t number,
                                                       std::chrono::milliseconds timeout);
-  /// Drops further replies under that number, and ends its query or trace.
+  /// Drops further replies to request `number`, and ends its query or trace.
   void forget(std::uint64_t number);
-  /// The same, but a trace goes on, because a browser requests it again. The first such request
-  /// replaces this one; without one the service ends the trace at its deadline.
+  /// The same, but a trace continues, because the browser may request it again. Such a request
+  /// takes the trace over; without one the service ends it at its deadline.
   void leave(std::uint64_t number);
 
-  // ---- Of the loop's thread.
+  // ---- Called by the loop's thread.
   /// Readable when there are requests to take.
   int descriptor() const { return woken_.descriptor(); }
-  /// Frames of ClientRequest, a few at a time.
+  /// The next few frames of ClientRequest.
   std::vector<std::string> take();
-  /// A frame of ClientReply.
+  /// Adds a received frame of ClientReply.
   void put(std::string frame);
 
  private:
   struct Awaited {
-    bool is_query = false;   ///< whose answer has not ended
-    std::string trace = {};  ///< the request for a trace that has not come; empty: none
+    bool is_query = false;   ///< a query whose answer has not ended
+    std::string trace = {};  ///< the request for a trace that is not complete; empty: none
     std::deque<protocol::ClientReply> replies = {};
   };
   struct LeftTrace {
@@ -57,11 +57,11 @@ class ServiceLine {
     std::uint64_t number;
   };
 
-  /// Hands the frames that came to those who wait for them. Without mutex_ while it decodes, or the
-  /// loop would wait for that.
+  /// Decodes received frames and adds them to the replies. mutex_ is not locked while it decodes,
+  /// so that the loop need not wait.
   void decode_frames();
 
-  // All with mutex_ locked.
+  // Called with mutex_ locked.
   std::optional<protocol::ClientReply> next_reply(std::uint64_t number);
   void drop(std::uint64_t number);
   void end(std::uint64_t number);

@@ -18,16 +18,16 @@ namespace {
 
 using nlohmann::ordered_json;
 
-/// Why a cell has no value. As a number it is the NaN with the bits kNan + mark, as a category the
-/// code 0xffff - mark.
+/// Why a cell has no value. In numbers a mark is the NaN with the bits kNan + mark, in categories
+/// the code 0xffff - mark.
 enum class Mark : std::uint8_t { kNotSolved, kFailed, kLeftOut, kNoValue, kFiltered, kHasValue };
 constexpr std::uint32_t kNan = 0x7fc00000;
 constexpr std::uint16_t kLastCode = 0xffff;
 
-/// What the cells of a picture have, row by row.
+/// The cells of a picture, row by row.
 struct SliceCells {
   std::vector<Mark> marks;
-  std::vector<float> numbers;                              ///< of a column of numbers
+  std::vector<float> numbers;                              ///< values of a column of numbers
   std::map<std::string, std::vector<std::size_t>> places;  ///< of categories: cells by text
 };
 
@@ -38,7 +38,7 @@ void append(const std::vector<Number>& numbers, std::string& bytes) {
   }
 }
 
-/// What is added to the number of a point for each cell along a side, as a JSON array.
+/// The offset of the point number for each cell along a side, as a JSON array.
 std::string offsets_json(const GridSide& side, std::uint64_t first) {
   std::vector<std::uint64_t> offsets;
   for (const std::uint64_t number : side.numbers) {
@@ -67,7 +67,7 @@ protocol::StudyQuery slice_query(const ServedStudy& study, const GridSlice& slic
   return query;
 }
 
-/// The cells by rising point.
+/// Point and cell of all cells, by rising point.
 std::vector<std::pair<std::uint64_t, std::size_t>> points_of(const GridSlice& slice) {
   std::vector<std::pair<std::uint64_t, std::size_t>> points;
   for (std::size_t row = 0; row < slice.y.numbers.size(); ++row) {
@@ -102,7 +102,7 @@ SliceCells read_cells(const JobContext& context, const ServedStudy& study, const
   context.query(slice_query(study, slice, column.name, condition), condition, take);
   if (study.table->has_filter()) {
     for (const auto& [point, cell] : points) {
-      context.throw_if_over();  // a filter may take long
+      context.throw_if_over();  // evaluating filters may take long
       if (read.marks[cell] == Mark::kNotSolved && study.leaves_out(point)) {
         read.marks[cell] = Mark::kLeftOut;
       }
@@ -121,7 +121,7 @@ ordered_json side_json(const GridSide& side) {
       {"stride", side.stride}, {"all_lines", side.numbers.size() == side.last - side.first + 1}};
 }
 
-/// Adds least and most to the head, and the cells to the numbers.
+/// Adds the least and the largest value to `head`, and the values of the cells to `numbers`.
 void append_numbers(const SliceCells& read, ordered_json& head, std::string& numbers) {
   std::vector<std::uint32_t> bits;
   std::optional<std::pair<float, float>> range;
@@ -140,8 +140,8 @@ void append_numbers(const SliceCells& read, ordered_json& head, std::string& num
   append(bits, numbers);
 }
 
-/// Adds the dictionary to the head, and the codes of the cells to the numbers. The most frequent
-/// text comes first, of equally frequent ones the first in the alphabet, as in `oblique plot`.
+/// Adds the dictionary to `head`, and the codes of the cells to `numbers`. Texts are sorted by
+/// falling frequency, then alphabetically, as in `oblique plot`.
 void append_codes(const SliceCells& read, ordered_json& head, std::string& numbers) {
   std::vector<std::uint16_t> codes;
   for (const Mark mark : read.marks) {
@@ -156,7 +156,8 @@ void append_codes(const SliceCells& read, ordered_json& head, std::string& numbe
   for (std::size_t code = 0; code < ranked.size(); ++code) {
     const auto& [text, places] = ranked[code];
     for (const std::size_t cell : places) {
-      // No picture has so many texts that a code would be a mark, but a file made by hand may.
+      // A code above the limit would be a mark; only a file that was changed by hand has so many
+      // texts.
       codes[cell] = static_cast<std::uint16_t>(std::min<std::size_t>(code, kLastCode - 5));
     }
     head["dictionary"].push_back({{"text", text}, {"cells", places.size()}});

@@ -22,7 +22,7 @@ namespace {
 using nlohmann::ordered_json;
 using protocol::Axis;
 
-/// Longer lists of values are given by slices, as far as they are shown.
+/// Longer lists of values are not in the answer; slices have the values that they show.
 constexpr std::uint64_t kMostListed = 4096;
 
 ordered_json distribution_json(const protocol::Distribution& from) {
@@ -100,7 +100,7 @@ ordered_json columns_json() {
   return columns;
 }
 
-/// The model that blocks without model axes have, key by key.
+/// The model of blocks without model axes, key by key.
 ordered_json model_json(const protocol::Recipe& recipe) {
   const auto model = protocol::unjudged_from_message(recipe.model());
   const solver::ModelParameters usual;
@@ -108,7 +108,7 @@ ordered_json model_json(const protocol::Recipe& recipe) {
   for (const solver::ParameterKey& key : solver::model_keys()) {
     const bool is_word = key.name == "integrator";
     ordered_json value = is_word ? ordered_json(solver::integrator_name(model.integrator))
-                                 : ordered_json(key.get(model));  // what is no number becomes null
+                                 : ordered_json(key.get(model));  // NaN and infinity become null
     keys.push_back({{"key", key.name},
                     {"unit", key.unit},
                     {"meaning", key.meaning},
@@ -164,8 +164,8 @@ HttpAnswer study_answer(const JobContext& context, std::uint64_t id) {
                       {"usual_columns", usual_columns(recipe)}});
 }
 
-/// The list that a text is; discarded where it is none, or nested deeper than ours are: whoever
-/// wrote the file decides how deep, and to copy or write such a value takes as much of the stack.
+/// Parses a text as a list; discarded if it is not JSON or is nested deeper than our lists. A
+/// foreign file may have any depth, and copying or writing a deep value would overflow the stack.
 ordered_json list_of(const std::string& text) {
   constexpr int kDeepest = 3;
   bool is_too_deep = false;
@@ -223,7 +223,8 @@ HttpAnswer point_answer(const JobContext& context, std::uint64_t id, std::uint64
     for (int i = 0; i < query.select_size(); ++i) {
       answer["row"][query.select(i)] = value_of(row.cell(static_cast<std::size_t>(i)));
     }
-    // What was solved, where another machine rounded a value of the recipe differently.
+    // The solved values, because another machine may have rounded a value of the recipe
+    // differently.
     for (const char* key : {"H", "mu", "e"}) {
       answer[key] = answer["row"][key];
     }

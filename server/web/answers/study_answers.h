@@ -7,7 +7,7 @@
 #include "server/web/answers/answer_pool.h"
 #include "server/web/answers/fields.h"
 
-// Answers about a study; server/web/page/README.md has their fields.
+// Answers about a study; server/web/page/README.md lists their fields.
 namespace oblique::server {
 
 /// The recipe of a study and the columns of its results.
@@ -19,11 +19,11 @@ AnswerPool::Job slice_job(std::uint64_t study, const Fields& fields);
 /// Number of points, and mean of a column, in bins along one or two columns.
 AnswerPool::Job bins_job(std::uint64_t study, const Fields& fields);
 
-/// A study as the body of a submission has it: SubmitRequest in Protobuf's JSON, and beside it
-/// `model` as people write one. Throws std::invalid_argument with a sentence for what is none.
+/// Parses the body of a submission: SubmitRequest in Protobuf's JSON, with a member `model` that
+/// has the keys of study files. Throws std::invalid_argument with a sentence for an invalid body.
 protocol::SubmitRequest study_of_body(const std::string& body);
 
-/// Whether the body of a submission has a valid recipe, and the size of its study.
+/// Validates the recipe in the body of a submission; the answer has the size of the study.
 AnswerPool::Job check_job(const std::string& body);
 
 }  // namespace oblique::server
