@@ -17,7 +17,7 @@ namespace {
 
 /// Of whole lists hardly two are alike; their elements can be counted.
 void refuse_list(const std::string& column) {
-  const auto lists = server::lists_of_queries();
+  const auto& lists = server::lists_of_queries();
   if (std::any_of(lists.begin(), lists.end(),
                   [&](const server::ListColumn& list) { return list.name == column; })) {
     throw solver::InputError(

@@ -176,7 +176,9 @@ void QueryPool::take_requests() {
     const std::lock_guard lock(mutex_);
     taken = std::exchange(taken_, {});
   }
-  for (const auto& [ticket, chunks] : taken) {
+  for (const auto& request : taken) {
+    const std::uint64_t ticket = request.first;
+    const std::uint64_t chunks = request.second;
     Slot* const slot = slot_of(ticket);
     if (chunks == kCancelled) {
       forget(ticket);

@@ -13,6 +13,7 @@
 #include "proto/text.h"
 #include "server/store/recipe_check.h"
 #include "server/store/result_rows.h"
+#include "server/store/schema.h"
 #include "server/store/store.h"
 
 namespace oblique::server {
