@@ -11,7 +11,7 @@ namespace oblique::protocol {
 namespace {
 
 /// Average size of a result and of a model in a database (server/store/README.md).
-constexpr std::uint64_t kBytesAResult = 650;
+constexpr std::uint64_t kBytesAResult = 970;
 constexpr std::uint64_t kBytesAModel = 600;
 
 /// Number of examined points by the hash of their fall.

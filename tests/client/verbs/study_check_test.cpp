@@ -81,7 +81,7 @@ TEST(StudyCheck, KnowsFallsAndSizeOfManyModels) {
   EXPECT_EQ(stiff["models"], 40000);
   EXPECT_EQ(stiff["falls"], 1) << "k and eta2 act in contact alone";
   EXPECT_EQ(stiff["falls_estimated"], false);
-  EXPECT_EQ(stiff["bytes"], 40000 * (650 + 600));
+  EXPECT_EQ(stiff["bytes"], 40000 * (970 + 600));
   const auto thick = check({"--sample", "sobol:40000:1", "--k", "1e7:1e8", "--A", "4e-4:6e-4"});
   EXPECT_EQ(thick["falls"], 40000) << "every area falls in its own way";
   EXPECT_EQ(thick["falls_estimated"], false);
@@ -148,7 +148,7 @@ TEST(StudyCheck, OfAThousandMillionPointsCostsNoMoreThanOfAFew) {
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("points  1,000,000,000\n"));
   EXPECT_THAT(outcome.out, HasSubstr("sobol sample of H, mu, e"));
-  EXPECT_THAT(outcome.out, HasSubstr("size    about 650 GB"));
+  EXPECT_THAT(outcome.out, HasSubstr("size    about 970 GB"));
 }
 
 TEST(StudyCheck, EndsWithTwoAndThePlaceForWhatIsWrong) {

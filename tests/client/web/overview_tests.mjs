@@ -126,9 +126,9 @@ test("a form says where only a fall tells whether the tip comes to H, and refuse
 test("a form says points, models, falls and size, and has the command that measures the time", async () => {
   const page = await form();
   const says = (text) => until(page, (wanted) => document.querySelector("form [role=status]").textContent === wanted, text);
-  await says("40 points, 1 model with 1 fall, about 27 kB in the database.");
+  await says("40 points, 1 model with 1 fall, about 39 kB in the database.");
   await page.type("form textarea", "rho=2600:2700:3\nk=1e7:3e7:5");
-  await says("600 points, 15 models with 3 different falls, about 399 kB in the database.");
+  await says("600 points, 15 models with 3 different falls, about 591 kB in the database.");
   await fill(page, 5, "mu < 0.2");
   await page.click("form input[type=checkbox]");
   const commands = await page.$$eval(".copied code", (all) => all.map((one) => one.textContent));

@@ -94,9 +94,9 @@ TEST(StudySize, GivesExamplesFromAllOverTheStudy) {
 
 TEST(StudySize, IsOfAResultForEachPointAndOfEachModel) {
   EXPECT_EQ(size_of_blocks({filtered({kH, range("mu", 0.1, 1, 100), kE}, "")}).bytes,
-            100U * 650 + 600);
+            100U * 970 + 600);
   EXPECT_EQ(size_of_blocks({filtered({range("k", 1e7, 2e7, 100), kH, kMu, kE}, "")}).bytes,
-            100U * (650 + 600));
+            100U * (970 + 600));
 }
 
 }  // namespace

@@ -26,7 +26,7 @@ TEST_F(PageCheckTest, AStudyIsJudgedBeforeItIsSubmitted) {
   EXPECT_EQ(all["models"], 1);
   EXPECT_EQ(all["falls"], 1);
   EXPECT_EQ(all["falls_estimated"], false);
-  EXPECT_EQ(all["bytes"], 11 * 650 + 600) << "as of oblique study check";
+  EXPECT_EQ(all["bytes"], 11 * 970 + 600) << "as of oblique study check";
   const json some = json::parse(body_of(check(R"("from":0,"to":1,"count":11)", "mu > 0.45")));
   EXPECT_EQ(some["points"], 6);
   EXPECT_EQ(some["numbers"], 11);
