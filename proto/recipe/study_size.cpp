@@ -74,7 +74,8 @@ StudySize size_of(const PointTable& table) {
   }
   for (std::uint64_t i = 0; i < kTries && looks < kLooks; ++i) {
     const std::uint64_t point = sampling::hashed(0, i) % numbers;
-    if (table.is_left_in(point) || i + 1 == kTries) {  // at least one point is examined
+    const bool is_last_chance = i + 1 == kTries && looks == 0;
+    if (table.is_left_in(point) || is_last_chance) {  // at least one point is examined
       look_at(point);
     }
   }
